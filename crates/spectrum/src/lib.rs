@@ -1,0 +1,31 @@
+//! Wavelength grids, spectra, spectral images, illuminants, observers and colour.
+//!
+//! Wavelengths are nanometres. Spectral radiance is W m⁻² sr⁻¹ nm⁻¹, spectral irradiance
+//! W m⁻² nm⁻¹. Row 0 of an image is its top, upright as the photographer sees it.
+//!
+//! This crate is the bottom layer: it knows nothing of lenses, scenes, sensors or files.
+//!
+//! ```
+//! use dioptric_spectrum::{Illuminant, Observer, WavelengthGrid, Xyz};
+//! let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0)?;
+//! let white = Illuminant::D65.spectrum().sample_held(&grid);
+//! let xyz: Xyz = Observer::Cie1931.xyz(&grid, &white);
+//! assert!((xyz.chromaticity()[0] - 0.3127).abs() < 0.002);
+//! # Ok::<(), dioptric_spectrum::SpectrumError>(())
+//! ```
+
+mod color;
+mod display;
+mod error;
+mod grid;
+mod illuminant;
+mod image;
+mod spectrum;
+
+pub use color::{Lab, Observer, Xyz, adapt_bradford, delta_e_2000, srgb_decode, srgb_encode};
+pub use display::Display;
+pub use error::SpectrumError;
+pub use grid::WavelengthGrid;
+pub use illuminant::{Illuminant, blackbody, color_checker_reflectances, daylight};
+pub use image::{Bands, DepthMap, Quantity, SpectralImage};
+pub use spectrum::Spectrum;
