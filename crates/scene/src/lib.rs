@@ -1,1 +1,17 @@
-//! To be written.
+//! Spectral radiance with depth: scenes, their files, targets and a built-in still life.
+//!
+//! A [`Scene`] is what stands before the camera as seen from one point: spectral radiance (W m⁻² sr⁻¹ nm⁻¹), the
+//! axial depth of each sample (m), and the pinhole geometry ([`View`]) that gives each sample a direction. Row 0 is
+//! the top, upright as the photographer sees it.
+//!
+//! This crate knows nothing of lenses: what blurs a scene is another crate's concern.
+
+mod error;
+mod resample;
+mod scene;
+mod view;
+
+pub use error::SceneError;
+pub use resample::{reflectance_under, resampled};
+pub use scene::{HiddenLayer, Scene};
+pub use view::View;

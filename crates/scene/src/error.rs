@@ -1,0 +1,122 @@
+//! What can be wrong with a scene or its file.
+
+use std::path::PathBuf;
+
+use dioptric_spectrum::SpectrumError;
+
+/// A scene that cannot be read, written or used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SceneError {
+    /// A file that cannot be read: absent, truncated, or of another format.
+    #[error("{}: cannot be read: {reason}", file.display())]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A file or folder that cannot be written.
+    #[error("{}: cannot be written: {reason}", file.display())]
+    Unwritable {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A header that asks for more memory than any sensible picture needs.
+    #[error("{}: its header asks for {bytes} bytes of samples, more than the limit of {limit} bytes", file.display())]
+    TooLarge {
+        /// The file.
+        file: PathBuf,
+        /// Bytes asked for.
+        bytes: u64,
+        /// Bytes allowed.
+        limit: u64,
+    },
+    /// A file whose kind the name does not tell.
+    #[error(
+        "{}: expected a .exr, .hdr (ENVI), .png, .jpg or .tif file, or a folder with one picture a band",
+        file.display()
+    )]
+    UnknownKind {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A picture without a single spectral band.
+    #[error("{}: no spectral band found: expected {expected}", file.display())]
+    NoBands {
+        /// The file or folder.
+        file: PathBuf,
+        /// What a band would look like.
+        expected: &'static str,
+    },
+    /// Bands or units that do not belong in one picture.
+    #[error("{}: mixed or unknown units: {reason}", file.display())]
+    Units {
+        /// The file.
+        file: PathBuf,
+        /// What clashes with what.
+        reason: String,
+    },
+    /// A line of a text header that cannot be used.
+    #[error("{}: line {line}: '{key}': {reason}", file.display())]
+    Header {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line, 0 where the key is absent.
+        line: usize,
+        /// The key.
+        key: String,
+        /// What is wrong and what was expected.
+        reason: String,
+    },
+    /// Samples, depths or wavelengths of a file that cannot be.
+    #[error("{}: {source}", file.display())]
+    Values {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        source: SpectrumError,
+    },
+    /// Spectral data made in memory that cannot be.
+    #[error(transparent)]
+    Spectrum(#[from] SpectrumError),
+    /// A scene without the depth that the next stage needs.
+    #[error("{name}: the scene has no depth: give one, in metres, or add a channel 'Z' to its file")]
+    MissingDepth {
+        /// The scene.
+        name: String,
+    },
+    /// A scene without camera data that the next stage needs.
+    #[error("{name}: the scene has no camera data: give its horizontal field of view in degrees")]
+    MissingView {
+        /// The scene.
+        name: String,
+    },
+    /// Two parts of a scene of different size.
+    #[error("{name}: {what} is {found_rows} × {found_columns} samples, the radiance {rows} × {columns}")]
+    Size {
+        /// The scene.
+        name: String,
+        /// Which part.
+        what: &'static str,
+        /// Rows of the radiance.
+        rows: usize,
+        /// Columns of the radiance.
+        columns: usize,
+        /// Rows of the part.
+        found_rows: usize,
+        /// Columns of the part.
+        found_columns: usize,
+    },
+    /// A setting outside its range.
+    #[error("{what} is {value}: expected {expected}")]
+    Setting {
+        /// The setting.
+        what: &'static str,
+        /// What was given.
+        value: String,
+        /// What would do.
+        expected: String,
+    },
+}
