@@ -14,6 +14,10 @@
 //! # Ok::<(), dioptric_spectrum::SpectrumError>(())
 //! ```
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod color;
 mod display;
 mod error;
