@@ -1,0 +1,320 @@
+//! The words of the command line, and nothing else.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Simulates a camera from the scene's spectral radiance to the final picture.
+#[derive(Debug, Parser)]
+#[command(name = "dioptric", version, propagate_version = true, max_term_width = 110)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Options of every command.
+    #[command(flatten)]
+    pub(crate) common: Common,
+}
+
+/// Options of every command.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct Common {
+    /// Prints numbers as JSON
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// Uses N threads [default: one a core]; results do not depend on it
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+    /// Draws all noise from this seed [default: the camera file's, or 1]
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Prints nothing but errors and what was asked for
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+}
+
+/// A command.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Runs the whole camera: scene, lens, sensor, picture; with no arguments, the built-in demo
+    Run(Box<RunArgs>),
+    /// Lists, describes, draws and converts lenses
+    #[command(subcommand)]
+    Lens(LensCommand),
+    /// Lists and describes glasses
+    #[command(subcommand)]
+    Glass(GlassCommand),
+    /// Traces rays from a table through a lens
+    Trace(TraceArgs),
+    /// Computes point-spread functions over field, distance and wavelength
+    Psf(PsfArgs),
+    /// Exposes a sensor to an irradiance image and processes the picture
+    Sense(SenseArgs),
+}
+
+/// A run of the whole camera.
+#[derive(Debug, Args)]
+pub(crate) struct RunArgs {
+    /// The camera file; without it, the built-in demo camera
+    pub(crate) camera: Option<PathBuf>,
+    /// Scene to photograph: spectral EXR, ENVI header, folder of band PNGs, or a picture
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    /// Folder for the results
+    #[arg(long, short, value_name = "DIR", default_value = "dioptric-out")]
+    pub(crate) out: PathBuf,
+    /// Lens, a file or the name of a built-in one
+    #[arg(long, value_name = "LENS")]
+    pub(crate) lens: Option<String>,
+    /// Stops the lens down to this f-number
+    #[arg(long, value_name = "N", conflicts_with = "stop_mm")]
+    pub(crate) f_number: Option<f64>,
+    /// Diameter of the stop, mm
+    #[arg(long, value_name = "D")]
+    pub(crate) stop_mm: Option<f64>,
+    /// Focuses on this distance from the first vertex, mm
+    #[arg(long, value_name = "D", conflicts_with = "film_mm")]
+    pub(crate) focus_mm: Option<f64>,
+    /// Places the film this far behind the last vertex, mm
+    #[arg(long, value_name = "D")]
+    pub(crate) film_mm: Option<f64>,
+    /// Horizontal field of view of the scene, degrees
+    #[arg(long, value_name = "A")]
+    pub(crate) fov_deg: Option<f64>,
+    /// Depth of a scene that has none, m
+    #[arg(long, value_name = "Z")]
+    pub(crate) depth_m: Option<f64>,
+    /// Light on a scene that holds reflectances: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3
+    #[arg(long, value_name = "NAME")]
+    pub(crate) illuminant: Option<String>,
+    /// Illuminance on a scene of reflectances, or of a picture's white, lux
+    #[arg(long, value_name = "LUX")]
+    pub(crate) illuminance_lux: Option<f64>,
+    /// Sensor, a file or the name of a built-in one
+    #[arg(long, value_name = "SENSOR")]
+    pub(crate) sensor: Option<String>,
+    /// Size of the film in pixels, e.g. 640x480 [default: the picture of the scene, at most the sensor]
+    #[arg(long, value_name = "WxH")]
+    pub(crate) pixels: Option<String>,
+    /// Distance between pixels, µm [default: the sensor's]
+    #[arg(long, value_name = "P")]
+    pub(crate) pixel_um: Option<f64>,
+    /// Exposure time, s [default: automatic]
+    #[arg(long, value_name = "T")]
+    pub(crate) exposure_s: Option<f64>,
+    /// Diffraction at the stop
+    #[arg(long, value_name = "KIND", value_enum)]
+    pub(crate) diffraction: Option<DiffractionKind>,
+    /// How the scene is blurred
+    #[arg(long, value_name = "MODE", value_enum)]
+    pub(crate) blur: Option<BlurKind>,
+    /// Bands, nm: a list or first:last:step [default: those of the scene]
+    #[arg(long, value_name = "LIST")]
+    pub(crate) wavelengths_nm: Option<String>,
+}
+
+/// What diffraction to compute.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DiffractionKind {
+    /// Rays only
+    None,
+    /// Heisenberg-uncertainty ray bending, γ = 1 (the paper, Freniere)
+    Hurb,
+    /// Heisenberg-uncertainty ray bending, γ = √2 (Scene3D since 2015)
+    HurbScene3d,
+}
+
+/// How the scene is blurred.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BlurKind {
+    /// Depth layers with occlusion
+    Layered,
+    /// Every sample spread on its own, as in the paper
+    Pointwise,
+}
+
+/// Something to do with lenses.
+#[derive(Debug, Subcommand)]
+pub(crate) enum LensCommand {
+    /// Lists the built-in lenses
+    List,
+    /// Prints first-order data and third-order sums
+    Info(LensInfoArgs),
+    /// Draws the lens with rays as SVG
+    Draw(LensDrawArgs),
+    /// Writes a lens in another format, chosen by the extension
+    Convert {
+        /// Lens to read, a file or the name of a built-in one
+        input: String,
+        /// File to write
+        output: PathBuf,
+    },
+}
+
+/// What to print about a lens.
+#[derive(Debug, Args)]
+pub(crate) struct LensInfoArgs {
+    /// Lens, a file or the name of a built-in one
+    pub(crate) lens: String,
+    /// Wavelengths, nm: a list or first:last:step
+    #[arg(long, value_name = "LIST", default_value = "550")]
+    pub(crate) wavelengths_nm: String,
+    /// Also images an object at this distance from the first vertex, mm
+    #[arg(long, value_name = "D")]
+    pub(crate) distance_mm: Option<f64>,
+    /// Diameter of the stop, mm [default: the lens's own]
+    #[arg(long, value_name = "D")]
+    pub(crate) stop_mm: Option<f64>,
+    /// Half field for the third-order sums, degrees
+    #[arg(long, value_name = "A", default_value_t = 10.0)]
+    pub(crate) field_deg: f64,
+}
+
+/// How to draw a lens.
+#[derive(Debug, Args)]
+pub(crate) struct LensDrawArgs {
+    /// Lens, a file or the name of a built-in one
+    pub(crate) lens: String,
+    /// SVG file to write
+    #[arg(long, short, value_name = "F.svg")]
+    pub(crate) output: PathBuf,
+    /// Field angles of the ray fans, degrees
+    #[arg(long, value_name = "LIST", default_value = "0,10")]
+    pub(crate) fields_deg: String,
+    /// Distance of the object, mm, or inf
+    #[arg(long, value_name = "D", default_value_t = f64::INFINITY)]
+    pub(crate) distance_mm: f64,
+    /// Diameter of the stop, mm [default: the lens's own]
+    #[arg(long, value_name = "D")]
+    pub(crate) stop_mm: Option<f64>,
+    /// Film distance behind the last vertex, mm [default: in focus]
+    #[arg(long, value_name = "D")]
+    pub(crate) film_mm: Option<f64>,
+    /// Wavelength, nm
+    #[arg(long, value_name = "W", default_value_t = 550.0)]
+    pub(crate) wavelength_nm: f64,
+}
+
+/// Something to do with glasses.
+#[derive(Debug, Subcommand)]
+pub(crate) enum GlassCommand {
+    /// Lists the glasses of the catalogue
+    List {
+        /// Only glasses whose name contains this, in any case
+        #[arg(long, value_name = "TEXT")]
+        filter: Option<String>,
+    },
+    /// Prints a glass's refractive index
+    Show {
+        /// Name of the glass, e.g. N-BK7
+        name: String,
+        /// Wavelengths, nm: a list or first:last:step
+        #[arg(long, value_name = "LIST", default_value = "400:700:50")]
+        wavelengths_nm: String,
+    },
+}
+
+/// Rays to trace.
+#[derive(Debug, Args)]
+pub(crate) struct TraceArgs {
+    /// Lens, a file or the name of a built-in one
+    pub(crate) lens: String,
+    /// Table of rays with the columns `x_mm,y_mm,z_mm,l,m,n,wavelength_nm`
+    #[arg(long, value_name = "IN.csv")]
+    pub(crate) rays: PathBuf,
+    /// Table to write [default: standard output]
+    #[arg(long, short, value_name = "OUT.csv")]
+    pub(crate) output: Option<PathBuf>,
+    /// Also takes the rays to a film this far behind the last vertex, mm
+    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    pub(crate) film_mm: Option<f64>,
+    /// Diameter of the stop, mm [default: the lens's own]
+    #[arg(long, value_name = "D")]
+    pub(crate) stop_mm: Option<f64>,
+    /// Ignores the rims of the surfaces
+    #[arg(long)]
+    pub(crate) no_clip: bool,
+}
+
+/// Point-spread functions to compute.
+#[derive(Debug, Args)]
+pub(crate) struct PsfArgs {
+    /// Lens, a file or the name of a built-in one
+    pub(crate) lens: String,
+    /// Field angles, degrees
+    #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true)]
+    pub(crate) fields_deg: String,
+    /// Distances of the points from the first vertex, mm; inf for a star
+    #[arg(long, value_name = "LIST", default_value = "2000")]
+    pub(crate) distances_mm: String,
+    /// Wavelengths, nm: a list or first:last:step
+    #[arg(long, value_name = "LIST", default_value = "550")]
+    pub(crate) wavelengths_nm: String,
+    /// Where the film is
+    #[command(flatten)]
+    pub(crate) film: FilmPlace,
+    /// Diameter of the stop, mm [default: the lens's own]
+    #[arg(long, value_name = "D")]
+    pub(crate) stop_mm: Option<f64>,
+    /// Diffraction at the stop
+    #[arg(long, value_name = "KIND", value_enum, default_value_t = DiffractionKind::None)]
+    pub(crate) diffraction: DiffractionKind,
+    /// Pixel of the pictures and of the metrics, µm
+    #[arg(long, value_name = "P", default_value_t = 1.0)]
+    pub(crate) pixel_um: f64,
+    /// Width and height of the pictures, pixels [default: to hold the spot]
+    #[arg(long, value_name = "N")]
+    pub(crate) size: Option<usize>,
+    /// How the light is sampled
+    #[arg(long, value_name = "MODE", value_enum, default_value_t = PsfMode::Pupil)]
+    pub(crate) mode: PsfMode,
+    /// Rays along the side of the paper mode's square grid
+    #[arg(long, value_name = "N", default_value_t = 201)]
+    pub(crate) rays: usize,
+    /// Adds MTF tables at these frequencies, cycles/mm
+    #[arg(long, value_name = "LIST")]
+    pub(crate) mtf_per_mm: Option<String>,
+    /// Writes the pictures: an EXR with a layer a PSF, or a PNG or SVG mosaic
+    #[arg(long, short, value_name = "F")]
+    pub(crate) output: Option<PathBuf>,
+}
+
+/// Where the film is: at a focus or at a place.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub(crate) struct FilmPlace {
+    /// Focuses on this distance from the first vertex, mm
+    #[arg(long, value_name = "D")]
+    pub(crate) focus_mm: Option<f64>,
+    /// Places the film this far behind the last vertex, mm
+    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    pub(crate) film_mm: Option<f64>,
+}
+
+/// How a point-spread function is sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PsfMode {
+    /// Rays through the entrance pupil, exact rasteriser
+    Pupil,
+    /// The paper's: rays on a square grid over the front rim, counted a pixel
+    Paper,
+}
+
+/// A sensor to expose.
+#[derive(Debug, Args)]
+pub(crate) struct SenseArgs {
+    /// Spectral irradiance, EXR
+    pub(crate) irradiance: PathBuf,
+    /// Sensor, a file or the name of a built-in one
+    #[arg(long, value_name = "SENSOR")]
+    pub(crate) sensor: String,
+    /// Folder for the results
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Exposure time, s [default: automatic]
+    #[arg(long, value_name = "T")]
+    pub(crate) exposure_s: Option<f64>,
+    /// White balance for this light [default: gray world]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) illuminant: Option<String>,
+}

@@ -1,0 +1,158 @@
+//! Spectra as colours on a screen, and pictures as PNG.
+
+use dioptric_spectrum::{Observer, SpectralImage, WavelengthGrid, Xyz, srgb_encode};
+use image::{ImageEncoder, RgbImage, codecs::png::PngEncoder};
+use ndarray::Array2;
+
+use crate::PipelineError;
+
+/// Turns spectra on one grid into linear sRGB.
+pub(crate) struct SpectrumToRgb {
+    /// Weights of red, green and blue, a list of one a band each.
+    weights: [Vec<f64>; 3],
+}
+
+impl SpectrumToRgb {
+    /// For spectra seen as they are; Y of 1 lux or cd/m² becomes linear 1.
+    pub(crate) fn new(grid: &WavelengthGrid) -> Self {
+        let xyz = Observer::Cie1931.weights(grid);
+        let mut weights = [0, 1, 2].map(|_| vec![0.0; grid.len()]);
+        for band in 0..grid.len() {
+            let rgb = Xyz([xyz[0][band], xyz[1][band], xyz[2][band]]).to_linear_srgb();
+            for (list, value) in weights.iter_mut().zip(rgb) {
+                list[band] = value;
+            }
+        }
+        Self { weights }
+    }
+
+    /// For spectra of which this one is to look white, linear (1, 1, 1).
+    pub(crate) fn with_white(grid: &WavelengthGrid, white: &[f64]) -> Self {
+        let mut it = Self::new(grid);
+        for list in &mut it.weights {
+            let sum: f64 = list.iter().zip(white).map(|(w, v)| w * v).sum();
+            list.iter_mut().for_each(|w| *w /= sum);
+        }
+        it
+    }
+
+    /// The weights of a band on red, green and blue.
+    pub(crate) fn of_band(&self, band: usize) -> [f64; 3] {
+        [self.weights[0][band], self.weights[1][band], self.weights[2][band]]
+    }
+}
+
+/// A picture in linear sRGB, summed a band at a time.
+#[derive(Clone, Debug)]
+pub(crate) struct LinearRgb {
+    pub(crate) planes: [Array2<f32>; 3],
+}
+
+impl LinearRgb {
+    pub(crate) fn black(rows: usize, columns: usize) -> Self {
+        Self { planes: [(); 3].map(|()| Array2::zeros((rows, columns))) }
+    }
+
+    /// Adds a band seen in this colour.
+    pub(crate) fn add(&mut self, band: &Array2<f32>, rgb: [f64; 3]) {
+        for (plane, weight) in self.planes.iter_mut().zip(rgb) {
+            plane.scaled_add(weight as f32, band);
+        }
+    }
+
+    /// Returns the picture of all bands of an image.
+    pub(crate) fn of_image(image: &SpectralImage) -> Self {
+        let to_rgb = SpectrumToRgb::new(image.grid());
+        let mut rgb = Self::black(image.rows(), image.columns());
+        for (band, plane) in image.planes().iter().enumerate() {
+            rgb.add(plane, to_rgb.of_band(band));
+        }
+        rgb
+    }
+
+    /// Returns the level below which this share of all samples lie.
+    pub(crate) fn level_at(&self, share: f64) -> f64 {
+        let mut values: Vec<f32> = self.planes.iter().flatten().copied().collect();
+        let index = ((values.len() - 1) as f64 * share) as usize;
+        *values.select_nth_unstable_by(index, f32::total_cmp).1 as f64
+    }
+
+    /// Returns the 8-bit picture in which linear `white` is full.
+    pub(crate) fn to_srgb(&self, white: f64) -> RgbImage {
+        let (rows, columns) = self.planes[0].dim();
+        RgbImage::from_fn(columns as u32, rows as u32, |x, y| {
+            let at = (y as usize, x as usize);
+            image::Rgb(self.planes.each_ref().map(|plane| code(f64::from(plane[at]) / white)))
+        })
+    }
+}
+
+/// Returns the 8-bit sRGB code of a linear value.
+pub(crate) fn code(linear: f64) -> u8 {
+    (255.0 * srgb_encode(linear)).round() as u8
+}
+
+/// Returns the colour of a single wavelength as `#rrggbb`, bright enough for a line on white.
+pub(crate) fn wavelength_color(wavelength_nm: f64) -> String {
+    // Beyond the visible the colour is that of its end.
+    let grid = WavelengthGrid::new(vec![wavelength_nm.clamp(405.0, 680.0)]).expect("a wavelength in the visible");
+    let rgb = Observer::Cie1931.xyz(&grid, &[1.0]).to_linear_srgb().map(|v| v.max(0.0));
+    let most = rgb.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    // Yellow and green at full drive vanish on white paper.
+    let luminance: f64 = Xyz::from_linear_srgb(rgb.map(|v| v / most)).0[1];
+    let level = (0.35 / luminance).min(1.0);
+    let [r, g, b] = rgb.map(|v| code(v / most * level));
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// Returns a picture as the bytes of a PNG file.
+pub(crate) fn png_bytes(picture: &RgbImage) -> Result<Vec<u8>, PipelineError> {
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes)
+        .write_image(picture, picture.width(), picture.height(), image::ExtendedColorType::Rgb8)
+        .map_err(|e| PipelineError::Png { reason: e.to_string() })?;
+    Ok(bytes)
+}
+
+/// Returns the picture enlarged by a whole number, samples staying sharp.
+pub(crate) fn enlarged(picture: &RgbImage, factor: u32) -> RgbImage {
+    RgbImage::from_fn(picture.width() * factor, picture.height() * factor, |x, y| {
+        *picture.get_pixel(x / factor, y / factor)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_white_given_is_white() {
+        let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
+        let white: Vec<f64> = grid.centers_nm().iter().map(|w| w / 500.0).collect();
+        let to_rgb = SpectrumToRgb::with_white(&grid, &white);
+        for channel in 0..3 {
+            let sum: f64 = (0..grid.len()).map(|band| to_rgb.of_band(band)[channel] * white[band]).sum();
+            approx::assert_abs_diff_eq!(sum, 1.0, epsilon = 1e-12);
+        }
+    }
+
+    #[test]
+    fn wavelengths_have_their_colours() {
+        let rgb = |nm| {
+            let text = wavelength_color(nm);
+            [1, 3, 5].map(|i| u8::from_str_radix(&text[i..i + 2], 16).unwrap())
+        };
+        let ([r, g, b], [r2, g2, b2]) = (rgb(450.0), rgb(650.0));
+        assert!(b > r && b > g && r2 > g2 && r2 > b2);
+        let [r, g, b] = rgb(530.0);
+        assert!(g > r && g > b);
+        assert_eq!(rgb(300.0), rgb(405.0));
+    }
+
+    #[test]
+    fn levels_are_those_of_the_sorted_samples() {
+        let mut picture = LinearRgb::black(1, 4);
+        picture.add(&ndarray::array![[1.0, 2.0, 3.0, 4.0]], [1.0, 1.0, 1.0]);
+        assert_eq!([picture.level_at(0.0), picture.level_at(1.0)], [1.0, 4.0]);
+    }
+}

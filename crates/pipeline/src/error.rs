@@ -1,0 +1,38 @@
+//! What can go wrong between a camera file and its picture.
+
+use std::path::PathBuf;
+
+/// A camera that cannot be built, run or written down.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PipelineError {
+    /// A list of numbers that cannot be read.
+    #[error("{what}: '{item}' is neither a number nor a range first:last:step")]
+    List {
+        /// What the list was for.
+        what: &'static str,
+        /// The item that cannot be read.
+        item: String,
+    },
+    /// A place that cannot be written to.
+    #[error("cannot write {}: {reason}", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A file that cannot be read.
+    #[error("cannot read {}: {reason}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A picture that cannot be encoded.
+    #[error("cannot encode a picture as PNG: {reason}")]
+    Png {
+        /// Why.
+        reason: String,
+    },
+}

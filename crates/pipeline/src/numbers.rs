@@ -1,0 +1,67 @@
+//! Lists of numbers as people type them: `400,550` or `400:700:10`.
+
+use crate::PipelineError;
+
+/// The most numbers that one list may hold.
+const LONGEST: usize = 100_000;
+
+/// Returns the numbers of a list: values and `first:last:step` ranges, separated by commas.
+///
+/// `inf` is infinity. `what` names the list in the error.
+///
+/// ```
+/// let wavelengths_nm = dioptric_pipeline::parse_numbers("wavelengths", "400:700:100,850")?;
+/// assert_eq!(wavelengths_nm, [400.0, 500.0, 600.0, 700.0, 850.0]);
+/// # Ok::<(), dioptric_pipeline::PipelineError>(())
+/// ```
+///
+/// # Errors
+/// When an item is neither a number nor a range with a step that leads from first to last.
+pub fn parse_numbers(what: &'static str, text: &str) -> Result<Vec<f64>, PipelineError> {
+    let wrong = |item: &str| PipelineError::List { what, item: item.trim().to_owned() };
+    let mut numbers = Vec::new();
+    for item in text.split(',') {
+        let parts: Option<Vec<f64>> = item.split(':').map(|part| part.trim().parse().ok()).collect();
+        match parts.as_deref() {
+            Some(&[value]) if !value.is_nan() => numbers.push(value),
+            Some(&[first, last, step]) => {
+                let n_steps = ((last - first) / step + 1e-9).floor();
+                if !(n_steps.is_finite() && n_steps >= 0.0 && (n_steps as usize) < LONGEST && step.is_finite()) {
+                    return Err(wrong(item));
+                }
+                numbers.extend((0..=n_steps as usize).map(|i| first + step * i as f64));
+            }
+            _ => return Err(wrong(item)),
+        }
+    }
+    Ok(numbers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(text: &str, expected: &[f64]) {
+        assert_eq!(parse_numbers("numbers", text).unwrap(), expected);
+    }
+
+    #[test]
+    fn lists_and_ranges_mix() {
+        check("5", &[5.0]);
+        check(" -5, 0 ,inf", &[-5.0, 0.0, f64::INFINITY]);
+        check("0:1:0.25", &[0.0, 0.25, 0.5, 0.75, 1.0]);
+        check("400:690:100", &[400.0, 500.0, 600.0]);
+        check("3:1:-1,7", &[3.0, 2.0, 1.0, 7.0]);
+    }
+
+    #[test]
+    fn the_wrong_item_is_named() {
+        for (text, item) in [("1,two", "two"), ("1:2", "1:2"), ("1:2:0", "1:2:0"), ("2:1:1", "2:1:1"), ("NaN", "NaN")] {
+            let message = parse_numbers("fields", text).unwrap_err().to_string();
+            assert!(message.contains(item) && message.contains("fields"), "{message}");
+        }
+        assert!(parse_numbers("fields", "").is_err());
+        assert!(parse_numbers("fields", "0:1:1e-9").is_err());
+    }
+}
