@@ -2,6 +2,8 @@
 //!
 //! Sets `cfg(has_shared)` when the data is there, so that such tests count as ignored when it is not.
 
+#![expect(clippy::print_stdout, reason = "this is how a build script speaks to cargo")]
+
 use std::path::Path;
 
 fn main() {

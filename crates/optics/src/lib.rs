@@ -1,1 +1,33 @@
-//! To be written.
+//! Glass, lenses and lens files, first-order theory, and exact rays traced through them.
+//!
+//! Lengths are millimetres, wavelengths nanometres, angles radians. In the lens frame +z is the way light travels
+//! and the origin is the vertex of the first surface; a radius is positive when the centre of curvature lies at +z,
+//! and the index after a surface is that of the medium behind it. A film lies `film_mm` behind the last vertex.
+//!
+//! This crate knows nothing of diffraction, images or files of pixels. It offers one hook, at the stop: trace to it,
+//! bend the rays, and trace on ([`MonoLens::trace_surfaces`]).
+#![doc = include_str!("../README.md")]
+
+mod error;
+mod formats;
+mod glass;
+mod lens;
+mod library;
+mod mono;
+mod paraxial;
+mod prescription;
+mod pupil;
+mod rays;
+mod surface;
+mod trace;
+
+pub use error::OpticsError;
+pub use glam;
+pub use glass::{C_LINE_NM, D_LINE_NM, F_LINE_NM, Glass};
+pub use lens::Lens;
+pub use mono::MonoLens;
+pub use paraxial::{Conjugate, FirstOrder};
+pub use pupil::{ObjectPoint, PupilBoundary, rays_over_front, rays_towards};
+pub use rays::{Losses, RayBatch, RayFate, SurfaceLosses};
+pub use surface::{Interface, Shape, Surface};
+pub use trace::Rims;

@@ -1,0 +1,138 @@
+//! What can be wrong with a glass, a lens or a lens file.
+
+use std::path::PathBuf;
+
+/// A glass, lens or lens file that cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OpticsError {
+    /// A wavelength at which a glass is not known.
+    #[error("{glass} is known from {first_nm} to {last_nm} nm, not at {wavelength_nm} nm")]
+    WavelengthOutsideGlass {
+        /// The glass, in words.
+        glass: String,
+        /// The wavelength asked for, nm.
+        wavelength_nm: f64,
+        /// Shortest wavelength known, nm.
+        first_nm: f64,
+        /// Longest wavelength known, nm.
+        last_nm: f64,
+    },
+    /// A wavelength that is not a positive number.
+    #[error("a wavelength must be a positive number, found {wavelength_nm} nm")]
+    Wavelength {
+        /// What was given, nm.
+        wavelength_nm: f64,
+    },
+    /// A glass whose numbers give no index.
+    #[error("{glass} has no refractive index at {wavelength_nm} nm: its formula gives {found}")]
+    Index {
+        /// The glass, in words.
+        glass: String,
+        /// The wavelength, nm.
+        wavelength_nm: f64,
+        /// What the formula gave.
+        found: f64,
+    },
+    /// A number of a glass that makes no sense.
+    #[error("glass: {key} is {found}, expected {expected}")]
+    Glass {
+        /// Which number.
+        key: &'static str,
+        /// What stood there.
+        found: f64,
+        /// What should stand there.
+        expected: &'static str,
+    },
+    /// A number of a surface that makes no sense.
+    #[error("surface {surface}: {key} is {found}, expected {expected}")]
+    Surface {
+        /// 0-based surface.
+        surface: usize,
+        /// Which number.
+        key: &'static str,
+        /// What stood there.
+        found: f64,
+        /// What should stand there.
+        expected: &'static str,
+    },
+    /// A rim that lies beyond the sphere or conic it should be cut from.
+    #[error("surface {surface}: a rim of {semi_aperture_mm} mm does not fit on a surface of radius {radius_mm} mm")]
+    RimBeyondSurface {
+        /// 0-based surface.
+        surface: usize,
+        /// Half the clear diameter, mm.
+        semi_aperture_mm: f64,
+        /// Radius of curvature, mm.
+        radius_mm: f64,
+    },
+    /// Not exactly one stop.
+    #[error("a lens has exactly one stop, but {n_stops} surfaces are marked as the stop")]
+    Stops {
+        /// How many were found.
+        n_stops: usize,
+    },
+    /// No surfaces, or more than can be counted.
+    #[error("a lens has 1 to 1000 surfaces, found {n_surfaces}")]
+    SurfaceCount {
+        /// How many were found.
+        n_surfaces: usize,
+    },
+    /// A stop wider than the lens allows.
+    #[error("the stop of {lens} opens to at most {largest_mm} mm (f/{smallest_f_number:.3}), asked for {asked_mm} mm")]
+    StopTooWide {
+        /// The lens.
+        lens: String,
+        /// The diameter asked for, mm.
+        asked_mm: f64,
+        /// The largest diameter, mm.
+        largest_mm: f64,
+        /// The f-number of that diameter.
+        smallest_f_number: f64,
+    },
+    /// A quantity that must be positive.
+    #[error("{what} must be a positive number, found {found}")]
+    NotPositive {
+        /// Which quantity, with its unit.
+        what: &'static str,
+        /// What was given.
+        found: f64,
+    },
+    /// An object or a film that has no image.
+    #[error("{lens} forms no image {side} of an object or film at {distance_mm} mm")]
+    NoFocus {
+        /// The lens.
+        lens: String,
+        /// On which side the image was sought.
+        side: &'static str,
+        /// The distance given, mm.
+        distance_mm: f64,
+    },
+    /// A name that names nothing.
+    #[error("no {kind} is named '{name}'; {known}")]
+    Unknown {
+        /// What was looked for.
+        kind: &'static str,
+        /// The name given.
+        name: String,
+        /// The names that would do.
+        known: String,
+    },
+    /// A file that cannot be read or written.
+    #[error("{path}: {reason}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A file whose text is not what it should be.
+    #[error("{path}{}: {reason}", line.map(|l| format!(":{l}")).unwrap_or_default())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// 1-based line where known.
+        line: Option<usize>,
+        /// What is wrong there and what was expected.
+        reason: String,
+    },
+}

@@ -1,0 +1,187 @@
+//! A lens: surfaces in a row, one of them the stop.
+
+use std::path::Path;
+
+use crate::{Glass, Interface, MonoLens, OpticsError, Shape, Surface, formats, library};
+
+/// A lens that has been checked and can be traced.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lens {
+    // Invariants: 1 to 1000 interfaces whose numbers are finite and whose rims fit; `stop` is an index of them;
+    // the stop's semi-aperture is at most `full_stop_semi_aperture_mm`.
+    name: String,
+    source: String,
+    interfaces: Vec<Interface>,
+    stop: usize,
+    full_stop_semi_aperture_mm: f64,
+}
+
+impl Lens {
+    /// Returns the lens made of these interfaces, in air, with the stop at the surface of this index.
+    ///
+    /// # Errors
+    /// When there are no surfaces, a number makes no sense or a rim does not fit on its surface.
+    pub fn new(
+        name: impl Into<String>,
+        source: impl Into<String>,
+        interfaces: Vec<Interface>,
+        stop: usize,
+    ) -> Result<Self, OpticsError> {
+        if !(1..=1000).contains(&interfaces.len()) {
+            return Err(OpticsError::SurfaceCount { n_surfaces: interfaces.len() });
+        }
+        if stop >= interfaces.len() {
+            return Err(OpticsError::Stops { n_stops: 0 });
+        }
+        for (surface, interface) in interfaces.iter().enumerate() {
+            interface.surface.check(surface)?;
+            interface.medium_after.check()?;
+            let found = interface.thickness_after_mm;
+            if !found.is_finite() {
+                let key = "thickness_mm";
+                return Err(OpticsError::Surface { surface, key, found, expected: "a finite number" });
+            }
+        }
+        let full_stop_semi_aperture_mm = interfaces[stop].surface.semi_aperture_mm;
+        Ok(Self { name: name.into(), source: source.into(), interfaces, stop, full_stop_semi_aperture_mm })
+    }
+
+    /// Returns a pinhole of this diameter: a stop and nothing else.
+    ///
+    /// # Errors
+    /// When the diameter is not positive.
+    pub fn pinhole(diameter_mm: f64) -> Result<Self, OpticsError> {
+        let semi_aperture_mm = 0.5 * positive("the diameter of a pinhole in mm", diameter_mm)?;
+        let surface = Surface::plane(semi_aperture_mm);
+        let source = "a hole in a thin plane";
+        Self::new("pinhole", source, vec![Interface { surface, medium_after: Glass::Air, thickness_after_mm: 0.0 }], 0)
+    }
+
+    /// Returns an ideal thin lens, which is its own stop: it images every plane perfectly and without distortion.
+    ///
+    /// # Errors
+    /// When the diameter is not positive or the focal length is 0 or not finite.
+    pub fn thin(focal_length_mm: f64, diameter_mm: f64) -> Result<Self, OpticsError> {
+        let semi_aperture_mm = 0.5 * positive("the diameter of a thin lens in mm", diameter_mm)?;
+        let shape = Shape::ThinLens { power_per_mm: 1.0 / focal_length_mm };
+        let surface = Surface { curvature_per_mm: 0.0, shape, semi_aperture_mm };
+        let interface = Interface { surface, medium_after: Glass::Air, thickness_after_mm: 0.0 };
+        Self::new("thin lens", "the thin-lens equation", vec![interface], 0)
+    }
+
+    /// Returns the built-in lens of this name; [`built_in_names`](Self::built_in_names) lists them.
+    ///
+    /// # Errors
+    /// When there is none of that name.
+    pub fn built_in(name: &str) -> Result<Self, OpticsError> {
+        library::built_in(name)
+    }
+
+    /// The names of the built-in lenses.
+    pub fn built_in_names() -> impl Iterator<Item = &'static str> {
+        library::names()
+    }
+
+    /// Reads a lens file, by its extension: `.ron` (our own) or `.dat`.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is not what it should be; the message names the file and, where it can, the
+    /// line and key.
+    pub fn read(path: &Path) -> Result<Self, OpticsError> {
+        formats::read(path)
+    }
+
+    /// The lens's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Where the prescription comes from.
+    pub fn source(&self) -> &str {
+        &self.source
+    }
+
+    /// The surfaces in the order that light meets them, each with the medium and distance that follow it.
+    pub fn interfaces(&self) -> &[Interface] {
+        &self.interfaces
+    }
+
+    /// The index of the surface that is the stop.
+    pub fn stop(&self) -> usize {
+        self.stop
+    }
+
+    /// z of the last vertex, mm: the sum of all distances between vertices.
+    pub fn last_vertex_z_mm(&self) -> f64 {
+        self.vertices_z_mm().last().copied().unwrap_or(0.0)
+    }
+
+    /// z of each vertex from the first, mm.
+    pub fn vertices_z_mm(&self) -> Vec<f64> {
+        let mut z = 0.0;
+        let vertex = |interface: &Interface| {
+            let here = z;
+            z += interface.thickness_after_mm;
+            here
+        };
+        self.interfaces.iter().map(vertex).collect()
+    }
+
+    /// Half the clear diameter of the first surface, mm.
+    pub fn front_semi_aperture_mm(&self) -> f64 {
+        self.interfaces[0].surface.semi_aperture_mm
+    }
+
+    /// Half the diameter of the stop, mm.
+    pub fn stop_semi_aperture_mm(&self) -> f64 {
+        self.interfaces[self.stop].surface.semi_aperture_mm
+    }
+
+    /// Returns the lens with its stop set to this diameter.
+    ///
+    /// # Errors
+    /// When the diameter is not positive or wider than the prescription's stop.
+    pub fn with_stop_diameter_mm(&self, diameter_mm: f64) -> Result<Self, OpticsError> {
+        let semi_aperture_mm = 0.5 * positive("the diameter of a stop in mm", diameter_mm)?;
+        let full_mm = self.full_stop_semi_aperture_mm;
+        // A diameter that came from the full stop by way of its f-number may be off by rounding.
+        if semi_aperture_mm > full_mm * (1.0 + 1e-9) {
+            let mut full = self.clone();
+            full.interfaces[self.stop].surface.semi_aperture_mm = full_mm;
+            return Err(OpticsError::StopTooWide {
+                lens: self.name.clone(),
+                asked_mm: diameter_mm,
+                largest_mm: 2.0 * full_mm,
+                smallest_f_number: full.at(MESSAGE_WAVELENGTH_NM).map_or(f64::NAN, |lens| lens.first_order().f_number),
+            });
+        }
+        let mut lens = self.clone();
+        lens.interfaces[self.stop].surface.semi_aperture_mm = semi_aperture_mm.min(full_mm);
+        Ok(lens)
+    }
+
+    /// Returns the lens stopped down to this f-number (for a far object) at this wavelength.
+    ///
+    /// # Errors
+    /// When the f-number is not positive or below that of the full stop.
+    pub fn with_f_number(&self, f_number: f64, wavelength_nm: f64) -> Result<Self, OpticsError> {
+        positive("an f-number", f_number)?;
+        let now = self.at(wavelength_nm)?.first_order().f_number;
+        self.with_stop_diameter_mm(2.0 * self.stop_semi_aperture_mm() * now / f_number)
+    }
+
+    /// Returns the lens at one wavelength.
+    ///
+    /// # Errors
+    /// When a glass is not known at that wavelength.
+    pub fn at(&self, wavelength_nm: f64) -> Result<MonoLens, OpticsError> {
+        MonoLens::new(self, wavelength_nm)
+    }
+}
+
+/// The wavelength at which a message states an f-number, nm.
+const MESSAGE_WAVELENGTH_NM: f64 = crate::glass::D_LINE_NM;
+
+fn positive(what: &'static str, found: f64) -> Result<f64, OpticsError> {
+    if found > 0.0 && found.is_finite() { Ok(found) } else { Err(OpticsError::NotPositive { what, found }) }
+}

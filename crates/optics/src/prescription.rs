@@ -1,0 +1,147 @@
+//! Our own lens file: RON, with every number named and its unit in the name.
+
+use ron::extensions::Extensions;
+use serde::{Deserialize, Serialize};
+
+use crate::{Glass, Interface, Lens, OpticsError, Shape, Surface};
+
+/// A lens as it stands in a file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Prescription {
+    name: String,
+    source: String,
+    surfaces: Vec<Row>,
+}
+
+/// A surface as it stands in a file, with what follows it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    /// Left out for a plane.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    radius_mm: Option<f64>,
+    #[serde(default, skip_serializing_if = "is_sphere")]
+    shape: Shape,
+    #[serde(default, skip_serializing_if = "is_false")]
+    stop: bool,
+    semi_aperture_mm: f64,
+    /// Left out for air.
+    #[serde(default, skip_serializing_if = "is_air")]
+    medium: Glass,
+    thickness_mm: f64,
+}
+
+fn is_sphere(shape: &Shape) -> bool {
+    *shape == Shape::Sphere
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_false(flag: &bool) -> bool {
+    !flag
+}
+
+fn is_air(glass: &Glass) -> bool {
+    *glass == Glass::Air
+}
+
+/// What is wrong with the text of a lens file, and on which line where that is known.
+pub(crate) struct TextError {
+    pub(crate) line: Option<usize>,
+    pub(crate) reason: String,
+}
+
+impl From<OpticsError> for TextError {
+    fn from(error: OpticsError) -> Self {
+        Self { line: None, reason: error.to_string() }
+    }
+}
+
+/// Reads a lens from the text of our own file.
+pub(crate) fn lens_from_ron(text: &str) -> Result<Lens, TextError> {
+    let prescription: Prescription = ron_options()
+        .from_str(text)
+        .map_err(|error| TextError { line: Some(error.span.start.line), reason: error.code.to_string() })?;
+    let stops: Vec<usize> = (0..prescription.surfaces.len()).filter(|&i| prescription.surfaces[i].stop).collect();
+    let &[stop] = stops.as_slice() else { return Err(OpticsError::Stops { n_stops: stops.len() }.into()) };
+    let mut interfaces = Vec::with_capacity(prescription.surfaces.len());
+    for (surface, row) in prescription.surfaces.into_iter().enumerate() {
+        let curvature_per_mm = match row.radius_mm {
+            None => 0.0,
+            Some(found) if found == 0.0 || found.is_nan() => {
+                let expected = "a radius other than 0, or no radius for a plane";
+                return Err(OpticsError::Surface { surface, key: "radius_mm", found, expected }.into());
+            }
+            Some(radius_mm) => 1.0 / radius_mm,
+        };
+        let surface = Surface { curvature_per_mm, shape: row.shape, semi_aperture_mm: row.semi_aperture_mm };
+        interfaces.push(Interface { surface, medium_after: row.medium, thickness_after_mm: row.thickness_mm });
+    }
+    Ok(Lens::new(prescription.name, prescription.source, interfaces, stop)?)
+}
+
+impl Lens {
+    /// Returns the lens as the text of our own file, which reads back as the same lens.
+    pub fn to_ron(&self) -> String {
+        let row = |(i, interface): (usize, &Interface)| Row {
+            radius_mm: (interface.surface.curvature_per_mm != 0.0).then(|| 1.0 / interface.surface.curvature_per_mm),
+            shape: interface.surface.shape.clone(),
+            stop: i == self.stop(),
+            semi_aperture_mm: interface.surface.semi_aperture_mm,
+            medium: interface.medium_after.clone(),
+            thickness_mm: interface.thickness_after_mm,
+        };
+        let prescription = Prescription {
+            name: self.name().to_owned(),
+            source: self.source().to_owned(),
+            surfaces: self.interfaces().iter().enumerate().map(row).collect(),
+        };
+        let pretty = ron::ser::PrettyConfig::new().depth_limit(2);
+        ron_options().to_string_pretty(&prescription, pretty).expect("numbers and text always have a RON form")
+    }
+}
+
+fn ron_options() -> ron::Options {
+    ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SINGLET: &str = "(
+        name: \"singlet\",
+        source: \"made up\",
+        surfaces: [
+            (radius_mm: 50.0, semi_aperture_mm: 5.0, medium: NdVd(nd: 1.5, vd: 60.0), thickness_mm: 2.0),
+            (stop: true, semi_aperture_mm: 4.0, thickness_mm: 0.0),
+        ],
+    )";
+
+    #[track_caller]
+    fn message(text: &str) -> String {
+        let Err(error) = lens_from_ron(text) else { panic!("should be refused") };
+        format!("{}: {}", error.line.unwrap_or(0), error.reason)
+    }
+
+    #[test]
+    fn file_and_back() {
+        let Ok(lens) = lens_from_ron(SINGLET) else { panic!("should be read") };
+        assert_eq!(lens.stop(), 1);
+        assert_eq!(lens.interfaces()[1].surface.curvature_per_mm, 0.0);
+        let Ok(again) = lens_from_ron(&lens.to_ron()) else { panic!("{}", lens.to_ron()) };
+        assert_eq!(again, lens);
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        assert!(message(&SINGLET.replace("thickness_mm: 2.0", "thickness: 2.0")).starts_with("5: "));
+        assert!(message(&SINGLET.replace("thickness_mm: 2.0", "thickness: 2.0")).contains("thickness"));
+        assert!(message(&SINGLET.replace("stop: true, ", "")).contains("exactly one stop, but 0"));
+        assert!(message(&SINGLET.replace("radius_mm", "stop: true, radius_mm")).contains("exactly one stop, but 2"));
+        assert!(message(&SINGLET.replace("50.0", "NaN")).contains("radius_mm is NaN"));
+        assert!(message(&SINGLET.replace("2.0)", "inf)")).contains("surface 0: thickness_mm is inf"));
+        assert!(message(&SINGLET.replace("vd: 60.0", "vd: -1.0")).contains("vd is -1"));
+        assert!(message("(name: ").starts_with("1: "));
+    }
+}

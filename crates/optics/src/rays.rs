@@ -1,0 +1,259 @@
+//! Batches of rays, kept as a structure of arrays.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// How a ray ended, or that it has not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub enum RayFate {
+    /// The ray is on its way.
+    #[default]
+    InFlight,
+    /// The ray met a surface outside its rim, and ended there.
+    Vignetted {
+        /// 0-based surface.
+        surface: u16,
+    },
+    /// The ray passed a surface without meeting it; it is left where it was before.
+    Missed {
+        /// 0-based surface.
+        surface: u16,
+    },
+    /// The ray was totally reflected, and ended on that surface.
+    TotalReflection {
+        /// 0-based surface.
+        surface: u16,
+    },
+}
+
+impl RayFate {
+    /// Whether the ray is still on its way.
+    pub fn is_in_flight(self) -> bool {
+        self == Self::InFlight
+    }
+
+    /// The surface that ended the ray.
+    pub fn surface(self) -> Option<usize> {
+        match self {
+            Self::InFlight => None,
+            Self::Vignetted { surface } | Self::Missed { surface } | Self::TotalReflection { surface } => {
+                Some(surface.into())
+            }
+        }
+    }
+}
+
+/// Rays of one wavelength, in the lens frame: a list each of positions, direction cosines and path lengths.
+///
+/// All lists have the same length. Tracing moves each ray in flight to where it meets a surface and turns it there;
+/// a ray that ends stays where it ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RayBatch {
+    /// x of each ray's point, mm.
+    pub x_mm: Vec<f64>,
+    /// y of each ray's point, mm.
+    pub y_mm: Vec<f64>,
+    /// z of each ray's point from the first vertex, mm.
+    pub z_mm: Vec<f64>,
+    /// x of each unit direction.
+    pub l: Vec<f64>,
+    /// y of each unit direction.
+    pub m: Vec<f64>,
+    /// z of each unit direction.
+    pub n: Vec<f64>,
+    /// Optical path length gathered so far, mm.
+    pub opl_mm: Vec<f64>,
+    /// How each ray ended, or that it has not.
+    pub fate: Vec<RayFate>,
+    /// z of the object plane that the rays come from, mm; −∞ where it is far away.
+    ///
+    /// Only the path length through an ideal lens needs it: no lens delays the light of every object plane rightly.
+    pub object_z_mm: f64,
+}
+
+impl Default for RayBatch {
+    fn default() -> Self {
+        Self::with_capacity(0)
+    }
+}
+
+impl RayBatch {
+    /// Returns an empty batch with room for this many rays.
+    pub fn with_capacity(n_rays: usize) -> Self {
+        let list = || Vec::with_capacity(n_rays);
+        let fate = Vec::with_capacity(n_rays);
+        let object_z_mm = f64::NEG_INFINITY;
+        Self {
+            x_mm: list(),
+            y_mm: list(),
+            z_mm: list(),
+            l: list(),
+            m: list(),
+            n: list(),
+            opl_mm: list(),
+            fate,
+            object_z_mm,
+        }
+    }
+
+    /// Returns rays from these points along these unit directions, of path length 0.
+    pub fn from_points(points_mm: &[DVec3], directions: &[DVec3]) -> Self {
+        assert_eq!(points_mm.len(), directions.len(), "a direction for each point");
+        let mut batch = Self::with_capacity(points_mm.len());
+        for (&point, &direction) in points_mm.iter().zip(directions) {
+            batch.push(point, direction, 0.0);
+        }
+        batch
+    }
+
+    /// Adds a ray in flight; the direction must be of unit length.
+    pub fn push(&mut self, point_mm: DVec3, direction: DVec3, opl_mm: f64) {
+        self.x_mm.push(point_mm.x);
+        self.y_mm.push(point_mm.y);
+        self.z_mm.push(point_mm.z);
+        self.l.push(direction.x);
+        self.m.push(direction.y);
+        self.n.push(direction.z);
+        self.opl_mm.push(opl_mm);
+        self.fate.push(RayFate::InFlight);
+    }
+
+    /// The number of rays, ended ones included.
+    pub fn len(&self) -> usize {
+        self.fate.len()
+    }
+
+    /// Whether there are no rays.
+    pub fn is_empty(&self) -> bool {
+        self.fate.is_empty()
+    }
+
+    /// The point of a ray, mm.
+    pub fn point_mm(&self, ray: usize) -> DVec3 {
+        DVec3::new(self.x_mm[ray], self.y_mm[ray], self.z_mm[ray])
+    }
+
+    /// The unit direction of a ray.
+    pub fn direction(&self, ray: usize) -> DVec3 {
+        DVec3::new(self.l[ray], self.m[ray], self.n[ray])
+    }
+
+    /// Turns a ray to a new unit direction.
+    pub fn set_direction(&mut self, ray: usize, direction: DVec3) {
+        (self.l[ray], self.m[ray], self.n[ray]) = direction.into();
+    }
+
+    /// The number of rays still in flight.
+    pub fn n_in_flight(&self) -> usize {
+        self.fate.iter().filter(|fate| fate.is_in_flight()).count()
+    }
+
+    /// Counts the fates of the rays: a row for each surface that ended any.
+    pub fn losses(&self) -> Losses {
+        let mut losses = Losses::default();
+        for &fate in &self.fate {
+            let Some(surface) = fate.surface() else {
+                losses.n_in_flight += 1;
+                continue;
+            };
+            if losses.by_surface.len() <= surface {
+                losses.by_surface.resize(surface + 1, SurfaceLosses::default());
+            }
+            let row = &mut losses.by_surface[surface];
+            match fate {
+                RayFate::InFlight => {}
+                RayFate::Vignetted { .. } => row.n_vignetted += 1,
+                RayFate::Missed { .. } => row.n_missed += 1,
+                RayFate::TotalReflection { .. } => row.n_totally_reflected += 1,
+            }
+        }
+        losses
+    }
+
+    pub(crate) fn slices(&mut self) -> RaySlices<'_> {
+        RaySlices {
+            x: &mut self.x_mm,
+            y: &mut self.y_mm,
+            z: &mut self.z_mm,
+            l: &mut self.l,
+            m: &mut self.m,
+            n: &mut self.n,
+            opl: &mut self.opl_mm,
+            fate: &mut self.fate,
+        }
+    }
+
+    /// Returns the rays in chunks of this many, for threads to share.
+    pub(crate) fn par_slices(&mut self, n_rays: usize) -> impl IndexedParallelIterator<Item = RaySlices<'_>> {
+        let position = triples(&mut self.x_mm, &mut self.y_mm, &mut self.z_mm, n_rays);
+        let direction = triples(&mut self.l, &mut self.m, &mut self.n, n_rays);
+        let rest = self.opl_mm.par_chunks_mut(n_rays).zip(self.fate.par_chunks_mut(n_rays));
+        position.zip(direction).zip(rest).map(|(((x, y, z), (l, m, n)), (opl, fate))| RaySlices {
+            x,
+            y,
+            z,
+            l,
+            m,
+            n,
+            opl,
+            fate,
+        })
+    }
+
+    /// Moves every ray in flight along its line to the plane at `z_mm` in a medium of this index.
+    pub(crate) fn move_to_plane(&mut self, z_mm: f64, index: f64) {
+        for i in 0..self.len() {
+            if self.fate[i].is_in_flight() {
+                let t = (z_mm - self.z_mm[i]) / self.n[i];
+                self.x_mm[i] += self.l[i] * t;
+                self.y_mm[i] += self.m[i] * t;
+                self.z_mm[i] = z_mm;
+                self.opl_mm[i] += index * t;
+            }
+        }
+    }
+}
+
+/// The lists of a batch, or of some of its rays.
+pub(crate) struct RaySlices<'a> {
+    pub(crate) x: &'a mut [f64],
+    pub(crate) y: &'a mut [f64],
+    pub(crate) z: &'a mut [f64],
+    pub(crate) l: &'a mut [f64],
+    pub(crate) m: &'a mut [f64],
+    pub(crate) n: &'a mut [f64],
+    pub(crate) opl: &'a mut [f64],
+    pub(crate) fate: &'a mut [RayFate],
+}
+
+type Triple<'a> = (&'a mut [f64], &'a mut [f64], &'a mut [f64]);
+
+fn triples<'a>(
+    a: &'a mut [f64],
+    b: &'a mut [f64],
+    c: &'a mut [f64],
+    n: usize,
+) -> impl IndexedParallelIterator<Item = Triple<'a>> {
+    a.par_chunks_mut(n).zip(b.par_chunks_mut(n)).zip(c.par_chunks_mut(n)).map(|((a, b), c)| (a, b, c))
+}
+
+/// How many rays a batch has lost, and where.
+#[derive(Clone, Debug, PartialEq, Eq, Default, Serialize)]
+pub struct Losses {
+    /// Rays still in flight.
+    pub n_in_flight: usize,
+    /// Losses at each surface, as far as the last that lost any.
+    pub by_surface: Vec<SurfaceLosses>,
+}
+
+/// How many rays one surface has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+pub struct SurfaceLosses {
+    /// Rays outside its rim.
+    pub n_vignetted: usize,
+    /// Rays that did not meet it.
+    pub n_missed: usize,
+    /// Rays that it reflected totally.
+    pub n_totally_reflected: usize,
+}

@@ -1,0 +1,139 @@
+//! Surfaces and the media between them.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Glass, OpticsError};
+
+/// The shape of a surface, beyond its curvature at the vertex.
+///
+/// A family that grows: code outside this crate should have a catch-all arm.
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub enum Shape {
+    /// A sphere, or a plane where the curvature is 0.
+    #[default]
+    Sphere,
+    /// A conic of revolution.
+    Conic {
+        /// The conic constant: 0 for a sphere, −1 for a paraboloid.
+        conic: f64,
+    },
+    /// A conic with added even powers of the distance r from the axis.
+    EvenAsphere {
+        /// The conic constant.
+        conic: f64,
+        /// Coefficients of r⁴, r⁶, r⁸, …: `coefficients[i]` in mm^(−3 − 2i).
+        coefficients: Vec<f64>,
+    },
+    /// An ideal thin lens in a plane: it changes the tangents of a ray's slopes by height × power, so that every
+    /// plane is imaged as a plane, perfectly and without distortion.
+    ThinLens {
+        /// One over the focal length in air, 1/mm.
+        power_per_mm: f64,
+    },
+}
+
+/// A surface of revolution in the frame of its own vertex, with a circular rim.
+///
+/// The curvature is signed: positive when the centre lies downstream, at +z. A plane is a surface of zero
+/// curvature, not a special case.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// One over the radius at the vertex, 1/mm.
+    pub curvature_per_mm: f64,
+    /// The rest of the shape.
+    pub shape: Shape,
+    /// Half the clear diameter, mm.
+    pub semi_aperture_mm: f64,
+}
+
+impl Surface {
+    /// Returns a sphere; an infinite radius makes a plane.
+    pub fn sphere(radius_mm: f64, semi_aperture_mm: f64) -> Self {
+        Self { curvature_per_mm: 1.0 / radius_mm, shape: Shape::Sphere, semi_aperture_mm }
+    }
+
+    /// Returns a plane.
+    pub fn plane(semi_aperture_mm: f64) -> Self {
+        Self { curvature_per_mm: 0.0, shape: Shape::Sphere, semi_aperture_mm }
+    }
+
+    /// Returns the z of the surface at a distance from the axis, mm; NaN beyond its equator.
+    pub fn sag_mm(&self, r_mm: f64) -> f64 {
+        let r2 = r_mm * r_mm;
+        let base = |conic: f64| {
+            let c = self.curvature_per_mm;
+            c * r2 / (1.0 + (1.0 - (1.0 + conic) * c * c * r2).sqrt())
+        };
+        match &self.shape {
+            Shape::Sphere => base(0.0),
+            Shape::Conic { conic } => base(*conic),
+            Shape::EvenAsphere { conic, coefficients } => {
+                base(*conic) + r2 * r2 * coefficients.iter().rev().fold(0.0, |sum, a| sum * r2 + a)
+            }
+            Shape::ThinLens { .. } => 0.0,
+        }
+    }
+
+    /// Checks that the numbers make sense; `index` is the surface's place, for the message.
+    pub(crate) fn check(&self, surface: usize) -> Result<(), OpticsError> {
+        let finite = |key, found: f64| match found.is_finite() {
+            true => Ok(()),
+            false => Err(OpticsError::Surface { surface, key, found, expected: "a finite number" }),
+        };
+        finite("curvature", self.curvature_per_mm)?;
+        match &self.shape {
+            Shape::Sphere => {}
+            Shape::Conic { conic } => finite("conic", *conic)?,
+            Shape::EvenAsphere { conic, coefficients } => {
+                finite("conic", *conic)?;
+                coefficients.iter().try_for_each(|&a| finite("coefficient", a))?;
+            }
+            Shape::ThinLens { power_per_mm } => finite("power_per_mm", *power_per_mm)?,
+        }
+        let found = self.semi_aperture_mm;
+        if !(found > 0.0 && found.is_finite()) {
+            let key = "semi_aperture_mm";
+            return Err(OpticsError::Surface { surface, key, found, expected: "a finite number above 0" });
+        }
+        if !self.sag_mm(found * (1.0 - 1e-9)).is_finite() {
+            let radius_mm = 1.0 / self.curvature_per_mm;
+            return Err(OpticsError::RimBeyondSurface { surface, semi_aperture_mm: found, radius_mm });
+        }
+        Ok(())
+    }
+}
+
+/// A surface, the medium behind it and the way to the next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Interface {
+    /// The surface.
+    pub surface: Surface,
+    /// The medium between this surface and the next.
+    pub medium_after: Glass,
+    /// Distance from this vertex to the next, mm; negative where surfaces overlap.
+    pub thickness_after_mm: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sag_of_a_sphere_and_a_paraboloid() {
+        assert!((Surface::sphere(5.0, 4.0).sag_mm(4.0) - 2.0).abs() < 1e-15);
+        let paraboloid = Surface { shape: Shape::Conic { conic: -1.0 }, ..Surface::sphere(-10.0, 5.0) };
+        assert!((paraboloid.sag_mm(4.0) + 0.8).abs() < 1e-15);
+        assert_eq!(Surface::plane(1.0).sag_mm(0.7), 0.0);
+        let flat = Shape::EvenAsphere { conic: 0.0, coefficients: vec![1e-3, 1e-5] };
+        assert!((Surface { shape: flat, ..Surface::plane(3.0) }.sag_mm(2.0) - 0.01664).abs() < 1e-15);
+    }
+
+    #[test]
+    fn rim_must_fit_on_its_sphere() {
+        assert!(Surface::sphere(5.0, 5.0).check(0).is_ok());
+        let message = Surface::sphere(5.0, 5.1).check(3).unwrap_err().to_string();
+        assert_eq!(message, "surface 3: a rim of 5.1 mm does not fit on a surface of radius 5 mm");
+    }
+}
