@@ -1,0 +1,168 @@
+//! Heisenberg uncertainty ray bending (HURB): how far a ray is spread by the edge that it passes.
+//!
+//! Freniere et al., SPIE 3780 (1999): a ray that passes an edge at the distance d is known to within d, so that its
+//! transverse momentum is not: `tan σ = γ / (2 k d)`, a Gaussian. It gives the width of Airy's pattern, its
+//! scaling with wavelength and f-number, and a good edge in defocus; it does not give rings.
+
+use std::f64::consts::PI;
+
+use serde::{Deserialize, Serialize};
+
+use crate::quadrature::gauss_legendre_on;
+
+/// The two constants of uncertainty bending: `tan σ = √((edge/d)² + (floor/R)²) / (2k)` for an edge at the distance d
+/// in a round stop of radius R.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hurb {
+    /// Factor γ of the distance to the edge.
+    pub edge: f64,
+    /// Factor of the radius of the stop; 0 in the published model.
+    pub floor: f64,
+}
+
+/// The spread of one ray: standard deviations of its direction cosines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// Along the radius of the stop.
+    pub radial: f64,
+    /// Across it.
+    pub across: f64,
+}
+
+impl Hurb {
+    /// The paper's model, and Freniere's: γ = 1.
+    pub const PAPER: Self = Self { edge: 1.0, floor: 0.0 };
+    /// The model of later `Scene3D` and PBRT forks: γ = √2.
+    pub const SCENE3D: Self = Self { edge: std::f64::consts::SQRT_2, floor: 0.0 };
+    /// Our own: the far tail and the slope of the modulation at 0 of Airy's pattern (edge √(2/π)), and its core
+    /// (floor 1.65). Better than γ = 1 in focus, not in defocus.
+    pub const CALIBRATED: Self = Self { edge: 0.797_884_560_802_865_4, floor: 1.65 };
+
+    /// Returns the published model with another γ.
+    pub fn with_gamma(gamma: f64) -> Self {
+        Self { edge: gamma, floor: 0.0 }
+    }
+
+    /// Returns the standard deviation of a direction cosine for an edge at `distance_mm` in a stop of `radius_mm`.
+    ///
+    /// `wave_number_per_mm` is k = 2πn/λ in the medium of the stop. The tangent of the spread is taken for the spread
+    /// itself: they differ where a ray passes within a wavelength of the edge.
+    pub fn sigma(self, distance_mm: f64, radius_mm: f64, wave_number_per_mm: f64) -> f64 {
+        let tangent = (self.edge / distance_mm).hypot(self.floor / radius_mm) / (2.0 * wave_number_per_mm);
+        tangent.atan()
+    }
+
+    /// Returns the spread of a ray that crosses a round stop `r_mm` from its centre.
+    ///
+    /// The distances to the edge are R − r along the radius and the half-chord √(R² − r²) across it.
+    pub fn spread(self, r_mm: f64, radius_mm: f64, wave_number_per_mm: f64) -> Spread {
+        let clearance = (radius_mm - r_mm).max(1e-12 * radius_mm);
+        let half_chord = (clearance * (radius_mm + r_mm)).sqrt();
+        Spread {
+            radial: self.sigma(clearance, radius_mm, wave_number_per_mm),
+            across: self.sigma(half_chord, radius_mm, wave_number_per_mm),
+        }
+    }
+
+    /// Returns the modulation of an ideal lens in focus at the frequency `s`, in units of 1/(λN).
+    pub fn mtf(self, s: f64) -> f64 {
+        self.average(|radial, across| {
+            mean_over_azimuth(|cos2| (-2.0 * (PI * s).powi(2) * (cos2 * radial + (1.0 - cos2) * across)).exp())
+        })
+    }
+
+    /// Returns the line spread of an ideal lens in focus `u` from the line, in units of λN.
+    pub fn lsf(self, u: f64) -> f64 {
+        self.average(|radial, across| {
+            mean_over_azimuth(|cos2| {
+                let variance = cos2 * radial + (1.0 - cos2) * across;
+                (-0.5 * u * u / variance).exp() / (2.0 * PI * variance).sqrt()
+            })
+        })
+    }
+
+    /// Returns the share of the energy of an ideal lens in focus within `r` of the centre, in units of λN.
+    pub fn encircled_energy(self, r: f64) -> f64 {
+        self.average(|radial, across| {
+            mean_over_azimuth(|cos2| {
+                let q = cos2 / radial + (1.0 - cos2) / across;
+                -(-0.5 * r * r * q).exp_m1() / (q * (radial * across).sqrt())
+            })
+        })
+    }
+
+    /// Returns the mean over the pupil of a function of the two film variances, (λN)².
+    fn average(self, value: impl Fn(f64, f64) -> f64) -> f64 {
+        // With ρ = 1 − t² the nodes crowd where the spread diverges.
+        gauss_legendre_on(96, 0.0, 1.0)
+            .iter()
+            .map(|&(t, w)| {
+                let clearance = t * t;
+                let rho = 1.0 - clearance;
+                let variance = |d2: f64| (self.edge * self.edge / d2 + self.floor * self.floor) / (4.0 * PI * PI);
+                let measure = 2.0 * rho * 2.0 * t * w;
+                measure * value(variance(clearance * clearance), variance(clearance * (1.0 + rho)))
+            })
+            .sum()
+    }
+}
+
+/// Returns the mean over the azimuth of a function of its cosine squared.
+fn mean_over_azimuth(value: impl Fn(f64) -> f64) -> f64 {
+    let n = 128;
+    (0..n).map(|i| value((0.5 * PI * (f64::from(i) + 0.5) / f64::from(n)).cos().powi(2))).sum::<f64>() / f64::from(n)
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_abs_diff_eq;
+
+    use super::*;
+    use crate::{airy, width::full_width_at_half_maximum};
+
+    fn width(model: Hurb) -> f64 {
+        full_width_at_half_maximum(|u| model.lsf(u), 2.0)
+    }
+
+    #[test]
+    fn widths_are_those_of_the_universal_curve() {
+        // Values to four digits from an independent quadrature.
+        assert_abs_diff_eq!(width(Hurb::PAPER), 0.6174, epsilon = 2e-4);
+        assert_abs_diff_eq!(width(Hurb::SCENE3D), 0.8732, epsilon = 2e-4);
+        assert_abs_diff_eq!(width(Hurb::with_gamma(2.0)), 1.2349, epsilon = 3e-4);
+        assert_abs_diff_eq!(width(Hurb::CALIBRATED), 0.885, epsilon = 5e-3);
+    }
+
+    #[test]
+    fn modulation_is_that_of_the_closed_form() {
+        for (s, paper, scene3d) in
+            [(0.05, 0.9239, 0.8942), (0.2, 0.7274, 0.6351), (0.5, 0.4380, 0.2999), (1.0, 0.1677, 0.0667)]
+        {
+            assert_abs_diff_eq!(Hurb::PAPER.mtf(s), paper, epsilon = 1e-4);
+            assert_abs_diff_eq!(Hurb::SCENE3D.mtf(s), scene3d, epsilon = 1e-4);
+        }
+    }
+
+    #[test]
+    fn the_calibrated_model_follows_theory_in_focus() {
+        for s in [0.1, 0.2, 0.3, 0.5, 0.7] {
+            assert_abs_diff_eq!(Hurb::CALIBRATED.mtf(s), airy::mtf(s), epsilon = 0.025);
+        }
+        for r in [0.5, 1.0, 1.22, 2.0] {
+            assert_abs_diff_eq!(Hurb::CALIBRATED.encircled_energy(r), airy::encircled_energy(r), epsilon = 0.055);
+        }
+        for r in [3.0, 5.0, 10.0] {
+            assert_abs_diff_eq!(Hurb::CALIBRATED.encircled_energy(r), airy::encircled_energy(r), epsilon = 0.004);
+        }
+    }
+
+    #[test]
+    fn spread_is_inversely_related_to_the_distance_of_the_edge() {
+        let k = 2.0 * PI / 550e-6;
+        let (far, near) = (Hurb::PAPER.spread(0.0, 1.0, k), Hurb::PAPER.spread(0.9, 1.0, k));
+        assert_abs_diff_eq!(near.radial / far.radial, 10.0, epsilon = 1e-4);
+        assert_abs_diff_eq!(near.across / far.across, 1.0 / 0.19f64.sqrt(), epsilon = 1e-4);
+        assert_eq!(far.radial, far.across);
+    }
+}
