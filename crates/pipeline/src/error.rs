@@ -35,4 +35,28 @@ pub enum PipelineError {
         /// Why.
         reason: String,
     },
+    /// A camera file that is not RON, or whose words are not ours.
+    #[error("{}:{line}:{column}: {reason}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// 1-based line.
+        line: usize,
+        /// 1-based column.
+        column: usize,
+        /// What is wrong and what was expected.
+        reason: String,
+    },
+    /// A value that cannot be.
+    #[error("{origin}: {key} is {found}, expected {expected}")]
+    Value {
+        /// The file and line, or the camera's name.
+        origin: String,
+        /// The key.
+        key: &'static str,
+        /// What was found.
+        found: String,
+        /// What would do.
+        expected: String,
+    },
 }

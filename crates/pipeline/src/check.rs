@@ -1,0 +1,71 @@
+//! Checks of numbers in a file, which say where they stand.
+
+use std::{ops::RangeInclusive, path::Path};
+
+use crate::PipelineError;
+
+/// Where numbers come from, for the error that names them.
+pub(crate) struct Checker<'a> {
+    origin: String,
+    text: &'a str,
+}
+
+impl<'a> Checker<'a> {
+    /// Numbers of a file with this text.
+    pub(crate) fn of_file(path: &Path, text: &'a str) -> Self {
+        Self { origin: path.display().to_string(), text }
+    }
+
+    /// Numbers that are in no file.
+    pub(crate) fn of_settings(name: &str) -> Self {
+        Self { origin: name.to_owned(), text: "" }
+    }
+
+    /// Checks that a number is finite and above 0.
+    pub(crate) fn positive(&self, key: &'static str, found: f64) -> Result<(), PipelineError> {
+        if found.is_finite() && found > 0.0 {
+            return Ok(());
+        }
+        self.wrong(key, &found.to_string(), "a finite number above 0")
+    }
+
+    /// Checks that a number is finite.
+    pub(crate) fn finite(&self, key: &'static str, found: f64) -> Result<(), PipelineError> {
+        if found.is_finite() {
+            return Ok(());
+        }
+        self.wrong(key, &found.to_string(), "a finite number")
+    }
+
+    /// Checks that a number is one of a range.
+    pub(crate) fn count(
+        &self,
+        key: &'static str,
+        found: usize,
+        allowed: RangeInclusive<usize>,
+    ) -> Result<(), PipelineError> {
+        if allowed.contains(&found) {
+            return Ok(());
+        }
+        self.wrong(key, &found.to_string(), &format!("{} to {}", allowed.start(), allowed.end()))
+    }
+
+    /// Says that the value of a key is wrong.
+    pub(crate) fn wrong(&self, key: &'static str, found: &str, expected: &str) -> Result<(), PipelineError> {
+        let origin = match self.line_of(key) {
+            Some(line) => format!("{}:{line}", self.origin),
+            None => self.origin.clone(),
+        };
+        Err(PipelineError::Value { origin, key, found: found.to_owned(), expected: expected.to_owned() })
+    }
+
+    /// Returns the 1-based line where a key first stands as a whole word, outside comments.
+    fn line_of(&self, key: &str) -> Option<usize> {
+        let is_word = |c: char| c.is_alphanumeric() || c == '_';
+        let has_key = |line: &str| {
+            let code = line.split("//").next().unwrap_or_default();
+            code.split(|c| !is_word(c)).any(|word| word == key)
+        };
+        self.text.lines().position(has_key).map(|index| index + 1)
+    }
+}
