@@ -1,1 +1,36 @@
-//! To be written.
+//! Image sensors and the processing of their frames: irradiance to electrons, volts, digital numbers and pictures.
+//!
+//! Irradiance is W m⁻² nm⁻¹, and absolute: nothing is rescaled. Row 0 is the top of the picture.
+//!
+//! This crate knows nothing of lenses or scenes: it takes spectral irradiance from anywhere.
+//!
+#![doc = include_str!("../README.md")]
+
+mod capture;
+mod cfa;
+mod check;
+mod collect;
+mod error;
+mod exposure;
+mod frames;
+mod integrate;
+mod library;
+mod metering;
+mod noise;
+mod poisson;
+mod raw;
+mod readout;
+mod response;
+mod sampling;
+mod sensor;
+
+pub use capture::Capture;
+pub use cfa::{Bayer, Cfa, Tile};
+pub use collect::Illumination;
+pub use error::SensorError;
+pub use exposure::{AutoExposure, Exposure, ExposureControl, GainMode, Metering};
+pub use frames::{ElectronRate, Electrons, Volts};
+pub use noise::Noise;
+pub use raw::{Levels, Raw, RawPlane};
+pub use response::{Adc, Response};
+pub use sensor::{DarkCurrent, Defects, Filter, HighGain, Layer, Sensor};

@@ -1,0 +1,138 @@
+//! How long the shutter is open, and how that is chosen.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Sensor, SensorError};
+
+/// What belongs to a shot.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Exposure {
+    /// How long the shutter is open, s.
+    pub time_s: f64,
+    /// The factor on the voltage after the pixel; 2 doubles the signal.
+    #[serde(default = "one")]
+    pub analog_gain: f64,
+    /// Which readout of a dual-gain pixel is used.
+    #[serde(default)]
+    pub gain_mode: GainMode,
+    /// The temperature of the chip, °C.
+    #[serde(default = "room_c")]
+    pub temperature_c: f64,
+}
+
+/// A readout of a dual-gain pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum GainMode {
+    /// The one every sensor has.
+    #[default]
+    Low,
+    /// The more sensitive one; the same as `Low` where a sensor has no other.
+    High,
+}
+
+/// How the exposure is chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum ExposureControl {
+    /// By hand.
+    Manual(Exposure),
+    /// By metering the light on the sensor.
+    Auto(AutoExposure),
+}
+
+/// An exposure time chosen by metering.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AutoExposure {
+    /// What is metered.
+    pub metering: Metering,
+    /// Where the metered signal is put, as a share of saturation.
+    pub target_fraction: f64,
+    /// The longest time allowed, s.
+    #[serde(default = "endless")]
+    pub max_time_s: f64,
+    /// The factor on the voltage after the pixel.
+    #[serde(default = "one")]
+    pub analog_gain: f64,
+    /// Which readout of a dual-gain pixel is used.
+    #[serde(default)]
+    pub gain_mode: GainMode,
+    /// The temperature of the chip, °C.
+    #[serde(default = "room_c")]
+    pub temperature_c: f64,
+}
+
+/// What an automatic exposure looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Metering {
+    /// The mean of all pixels.
+    Mean,
+    /// The mean of all pixels, weighted towards the centre with a Gaussian of a quarter of the width and height.
+    CenterWeighted,
+    /// The brightest pixel.
+    Peak,
+    /// The pixel that this share (0–100 %) of all pixels does not exceed.
+    Percentile(f64),
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn room_c() -> f64 {
+    25.0
+}
+
+fn endless() -> f64 {
+    f64::INFINITY
+}
+
+impl Exposure {
+    /// Returns an exposure of this time, of gain 1 and at 25 °C.
+    pub fn seconds(time_s: f64) -> Self {
+        Self { time_s, analog_gain: 1.0, gain_mode: GainMode::Low, temperature_c: room_c() }
+    }
+
+    /// Returns the same exposure with the gain of an ISO speed.
+    ///
+    /// # Errors
+    /// When the sensor does not say which speed its gain of 1 has, or the speed is not above 0.
+    pub fn at_iso(self, sensor: &Sensor, iso: f64) -> Result<Self, SensorError> {
+        let unity = sensor.iso_at_unity_gain.ok_or_else(|| SensorError::Unsuitable {
+            what: "an ISO speed",
+            reason: format!("needs iso_at_unity_gain, which {} does not state", sensor.name),
+        })?;
+        if !(iso > 0.0 && iso.is_finite()) {
+            return Err(SensorError::value("the exposure", "iso", iso, "a number above 0"));
+        }
+        Ok(Self { analog_gain: iso / unity, ..self })
+    }
+
+    pub(crate) fn check(&self) -> Result<(), SensorError> {
+        let wrong = |key, value, expected| Err(SensorError::value("the exposure", key, value, expected));
+        if !(self.time_s >= 0.0 && self.time_s.is_finite()) {
+            return wrong("time_s", self.time_s, "a number of 0 or more");
+        }
+        if !(self.analog_gain > 0.0 && self.analog_gain.is_finite()) {
+            return wrong("analog_gain", self.analog_gain, "a number above 0");
+        }
+        if !self.temperature_c.is_finite() {
+            return wrong("temperature_c", self.temperature_c, "a finite number");
+        }
+        Ok(())
+    }
+}
+
+impl AutoExposure {
+    /// Returns the metering that puts a share of saturation there, at gain 1 and 25 °C.
+    pub fn new(metering: Metering, target_fraction: f64) -> Self {
+        Self {
+            metering,
+            target_fraction,
+            max_time_s: f64::INFINITY,
+            analog_gain: 1.0,
+            gain_mode: GainMode::Low,
+            temperature_c: room_c(),
+        }
+    }
+}

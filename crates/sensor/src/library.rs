@@ -1,0 +1,113 @@
+//! Built-in sensors, and sensors from files.
+
+use std::{fs, path::Path};
+
+use crate::{Sensor, SensorError};
+
+/// The names of the built-in sensors and their data sheets.
+const BUILT_IN: [(&str, &str); 8] = [
+    ("ideal", include_str!("../data/ideal.ron")),
+    ("ideal-mono", include_str!("../data/ideal-mono.ron")),
+    ("imx363", include_str!("../data/imx363.ron")),
+    ("mt9v024", include_str!("../data/mt9v024.ron")),
+    ("nikon-d100", include_str!("../data/nikon-d100.ron")),
+    ("nikon-d5100", include_str!("../data/nikon-d5100.ron")),
+    ("machine-vision-mono", include_str!("../data/machine-vision-mono.ron")),
+    ("scmos", include_str!("../data/scmos.ron")),
+];
+
+impl Sensor {
+    /// Returns the names of the built-in sensors.
+    pub fn built_in_names() -> impl Iterator<Item = &'static str> {
+        BUILT_IN.iter().map(|(name, _)| *name)
+    }
+
+    /// Returns a built-in sensor.
+    ///
+    /// # Errors
+    /// When none has that name.
+    pub fn built_in(name: &str) -> Result<Self, SensorError> {
+        match BUILT_IN.iter().find(|(known, _)| *known == name) {
+            Some((_, text)) => Self::from_ron(text, name),
+            None => {
+                let known = Self::built_in_names().collect::<Vec<_>>().join(", ");
+                Err(SensorError::Unknown { name: name.to_owned(), known })
+            }
+        }
+    }
+
+    /// Reads a data sheet from a RON file.
+    ///
+    /// # Errors
+    /// Names the file and line that cannot be read, or the field whose value makes no sense.
+    pub fn read(path: &Path) -> Result<Self, SensorError> {
+        let read_error = |e: std::io::Error| SensorError::Read { path: path.to_owned(), reason: e.to_string() };
+        let text = fs::read_to_string(path).map_err(read_error)?;
+        Self::from_ron(&text, &path.display().to_string())
+    }
+
+    /// Returns the sensor of a data sheet's text; `origin` names it in errors.
+    ///
+    /// # Errors
+    /// Names the line that cannot be read, or the field whose value makes no sense.
+    pub fn from_ron(text: &str, origin: &str) -> Result<Self, SensorError> {
+        let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+        let sensor: Self = options.from_str(text).map_err(|e| SensorError::Syntax {
+            origin: origin.to_owned(),
+            line: e.span.start.line,
+            column: e.span.start.col,
+            reason: e.code.to_string(),
+        })?;
+        sensor.check()?;
+        Ok(sensor)
+    }
+
+    /// Returns the data sheet as RON text, which reads back the same.
+    pub fn to_ron(&self) -> String {
+        ron::ser::to_string_pretty(self, ron::ser::PrettyConfig::default()).expect("a data sheet can be written")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_built_in_sensor_makes_sense_and_reads_back() {
+        for name in Sensor::built_in_names() {
+            let sensor = Sensor::built_in(name).unwrap();
+            assert!(!sensor.source.is_empty(), "{name}");
+            assert_eq!(Sensor::from_ron(&sensor.to_ron(), name).unwrap(), sensor, "{name}");
+        }
+    }
+
+    #[test]
+    fn the_sensor_of_figure_4_is_the_papers() {
+        let sensor = Sensor::built_in("nikon-d100").unwrap();
+        assert_eq!((sensor.rows, sensor.columns, sensor.pixel_pitch_um, sensor.fill_factor), (500, 500, 72.0, 0.45));
+        assert_eq!((sensor.swing_v, sensor.full_well_e, sensor.conversion_gain_v_per_e), (1.15, 90_000.0, 1.2778e-5));
+        assert_eq!((sensor.prnu_fraction, sensor.adc), (0.002_218, crate::Adc::Analog));
+        assert!((sensor.size_mm().0 - 36.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let good = Sensor::built_in("imx363").unwrap().to_ron();
+        let check = |from: &str, to: &str, words: &[&str]| {
+            assert!(good.contains(from), "{from}");
+            let message = Sensor::from_ron(&good.replace(from, to), "bad.ron").unwrap_err().to_string();
+            for word in words {
+                assert!(message.contains(word), "'{word}' is not in: {message}");
+            }
+        };
+        check("pixel_pitch_um: 1.4", "pixel_pitch_um: -1.4", &["pixel_pitch_um", "-1.4", "above 0"]);
+        check("pixel_pitch_um: 1.4", "pixel_pitch_mm: 1.4", &["bad.ron:6", "pixel_pitch_mm"]);
+        check("fill_factor: 1.0", "fill_factor: 1.5", &["fill_factor", "1.5", "0 to 1"]);
+        check("rows: 3024", "rows: 0", &["rows", "1 or more"]);
+        check("bits: 10", "bits: 17", &["adc.bits", "17", "1 to 16"]);
+        check("name: \"G\"", "name: \"X\"", &["colour filter array", "'G'", "R, X, B"]);
+        check("rows: 3024", "rows: many", &["bad.ron:4", "integer"]);
+        assert!(Sensor::built_in("imx000").unwrap_err().to_string().contains("imx363"));
+        assert!(Sensor::read(Path::new("no/such.ron")).unwrap_err().to_string().contains("such.ron"));
+    }
+}

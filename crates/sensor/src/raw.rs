@@ -1,0 +1,143 @@
+//! The frame that a sensor hands on, with what is needed to understand it.
+
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use crate::{Adc, Exposure, Response, Sensor, Tile};
+
+/// A frame of digital numbers, or of volts where the sensor has no converter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Raw {
+    /// One plane for a mosaic, one a filter where they are stacked.
+    pub planes: Vec<RawPlane>,
+    /// The mosaic from the top left pixel on; `None` where every pixel has all filters.
+    pub tile: Option<Tile>,
+    /// The names of the filters that the tile counts, or of the planes.
+    pub filter_names: Vec<String>,
+    /// What the samples stand for.
+    pub levels: Levels,
+    /// How the frame was exposed.
+    pub exposure: Exposure,
+    /// The time from one row's readout to the next, µs; row r is exposed r times this later than row 0.
+    pub row_time_us: f64,
+}
+
+/// The samples of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RawPlane {
+    /// Digital numbers.
+    Dn(Array2<u16>),
+    /// Volts after the analog gain.
+    Volts(Array2<f32>),
+}
+
+impl RawPlane {
+    /// Rows and columns.
+    pub fn size(&self) -> (usize, usize) {
+        match self {
+            Self::Dn(plane) => plane.dim(),
+            Self::Volts(plane) => plane.dim(),
+        }
+    }
+}
+
+/// What the samples of a frame stand for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Levels {
+    /// The sample of no light: digital number, or volts without a converter.
+    pub black: f64,
+    /// The sample at which a pixel is saturated.
+    pub white: f64,
+    /// The highest sample there can be: 2^bits − 1, or the swing in volts.
+    pub top: f64,
+    /// Volts a unit of the samples.
+    pub step_v: f64,
+    /// Amplified volts an electron.
+    pub volts_per_electron: f64,
+    response: Response,
+    swing_v: f64,
+    converter_black: f64,
+    black_v: f64,
+    white_v: f64,
+}
+
+impl Levels {
+    pub(crate) fn new(sensor: &Sensor, exposure: &Exposure) -> Self {
+        let swing_v = sensor.swing_v;
+        let step_v = sensor.adc.step_v(swing_v).unwrap_or(1.0);
+        let converter_black = match sensor.adc {
+            Adc::Analog => 0.0,
+            Adc::Bits { black_level_dn, .. } => f64::from(black_level_dn),
+        };
+        let volts_per_electron = sensor.conversion_gain_v_per_e(exposure.gain_mode) * exposure.analog_gain;
+        let black_v = sensor.offset_v * exposure.analog_gain;
+        let white_v = black_v + volts_per_electron * sensor.saturation_e(exposure);
+        let sample = |v: f64| converter_black + sensor.response.apply(v.abs(), swing_v).copysign(v) / step_v;
+        Self {
+            black: sample(black_v),
+            white: sample(white_v),
+            top: sensor.adc.top_dn().map_or(swing_v, f64::from),
+            step_v,
+            volts_per_electron,
+            response: sensor.response.clone(),
+            swing_v,
+            converter_black,
+            black_v,
+            white_v,
+        }
+    }
+
+    /// Returns the light that a sample stands for: 0 for none, 1 at saturation; the response curve is undone.
+    pub fn linear(&self, sample: f64) -> f64 {
+        let out_v = (sample - self.converter_black) * self.step_v;
+        let v = self.response.inverse(out_v.abs(), self.swing_v).copysign(out_v);
+        (v - self.black_v) / (self.white_v - self.black_v)
+    }
+
+    /// Returns the electrons at saturation, [`linear`](Self::linear) = 1.
+    pub fn saturation_e(&self) -> f64 {
+        (self.white_v - self.black_v) / self.volts_per_electron
+    }
+}
+
+impl Raw {
+    /// Rows and columns.
+    pub fn size(&self) -> (usize, usize) {
+        self.planes[0].size()
+    }
+
+    /// Returns the digital numbers of a mosaic or monochrome frame, or `None` for volts and for stacked filters.
+    pub fn dn(&self) -> Option<&Array2<u16>> {
+        match self.planes.as_slice() {
+            [RawPlane::Dn(plane)] => Some(plane),
+            _ => None,
+        }
+    }
+
+    /// Returns each plane as light: 0 for none, 1 at saturation, the response curve undone.
+    pub fn linear(&self) -> Vec<Array2<f32>> {
+        let plane = |plane: &RawPlane| match plane {
+            RawPlane::Dn(plane) => {
+                let table: Vec<f32> =
+                    (0..=self.levels.top as u16).map(|dn| self.levels.linear(f64::from(dn)) as f32).collect();
+                ndarray::Zip::from(plane).par_map_collect(|&dn| table.get(usize::from(dn)).copied().unwrap_or(1.0))
+            }
+            RawPlane::Volts(plane) => {
+                ndarray::Zip::from(plane).par_map_collect(|&v| self.levels.linear(f64::from(v)) as f32)
+            }
+        };
+        self.planes.iter().map(plane).collect()
+    }
+
+    /// Returns the share of samples at or above saturation.
+    pub fn saturated_fraction(&self) -> f64 {
+        // Half a step below, because the level need not be a whole number.
+        let white = self.levels.white - if self.dn().is_some() { 0.5 } else { 1e-6 * self.levels.white };
+        let count = |plane: &RawPlane| match plane {
+            RawPlane::Dn(plane) => plane.par_iter().filter(|&&dn| f64::from(dn) >= white).count(),
+            RawPlane::Volts(plane) => plane.par_iter().filter(|&&v| f64::from(v) >= white).count(),
+        };
+        let (rows, columns) = self.size();
+        self.planes.iter().map(count).sum::<usize>() as f64 / (rows * columns * self.planes.len()) as f64
+    }
+}

@@ -1,0 +1,129 @@
+//! From electrons to volts and digital numbers.
+
+use ndarray::Array2;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use crate::{Electrons, Exposure, Noise, Raw, RawPlane, Sensor, SensorError, Volts, noise::Kind, raw::Levels};
+
+impl Sensor {
+    /// Returns the voltages at the pixels' outputs: not amplified and not clipped, so that noise keeps its shape.
+    ///
+    /// # Errors
+    /// When the exposure makes no sense.
+    pub fn volts(&self, electrons: &Electrons, exposure: &Exposure, noise: &Noise) -> Result<Volts, SensorError> {
+        exposure.check()?;
+        let plane = |(number, electrons): (usize, &Array2<f32>)| {
+            let mut volts = electrons.as_standard_layout().into_owned();
+            let n_columns = volts.ncols();
+            let readout = Readout::new(self, exposure, noise, number, n_columns);
+            let rows = volts.as_slice_mut().expect("a standard layout is contiguous").par_chunks_mut(n_columns);
+            rows.enumerate().for_each(|(row, values)| readout.read_row(row, values));
+            volts
+        };
+        Ok(Volts { planes_v: electrons.planes_e.iter().enumerate().map(plane).collect() })
+    }
+
+    /// Returns the frame as the converter gives it: offset, analog gain, clipping, response curve, rounding.
+    ///
+    /// Voltages are clipped to the swing above, and below to 0 or as far under it as the black level reaches, so that a
+    /// black level lets dark noise through on both sides.
+    ///
+    /// # Errors
+    /// When the sensor or the exposure makes no sense.
+    pub fn digitize(&self, volts: &Volts, exposure: &Exposure) -> Result<Raw, SensorError> {
+        self.check()?;
+        exposure.check()?;
+        let levels = Levels::new(self, exposure);
+        let planes = volts.planes_v.iter().map(|plane| self.convert(plane, exposure)).collect();
+        Ok(Raw {
+            planes,
+            tile: self.tile()?,
+            filter_names: self.filters.iter().map(|f| f.name.clone()).collect(),
+            levels,
+            exposure: *exposure,
+            row_time_us: self.row_time_us,
+        })
+    }
+
+    fn convert(&self, volts: &Array2<f32>, exposure: &Exposure) -> RawPlane {
+        let black_v = match self.adc {
+            crate::Adc::Bits { black_level_dn, .. } => {
+                self.adc.step_v(self.swing_v).map_or(0.0, |step_v| step_v * f64::from(black_level_dn))
+            }
+            crate::Adc::Analog => 0.0,
+        };
+        let out_v = |v: f32| {
+            let amplified = (f64::from(v) + self.offset_v) * exposure.analog_gain;
+            let clipped = amplified.clamp(-black_v, self.swing_v);
+            // Below 0 the curve is continued by symmetry.
+            self.response.apply(clipped.abs(), self.swing_v).copysign(clipped)
+        };
+        match (self.adc.step_v(self.swing_v), self.adc.top_dn()) {
+            (Some(step_v), Some(top)) => {
+                let code = |&v: &f32| ((out_v(v) + black_v) / step_v + 0.5).floor().clamp(0.0, f64::from(top)) as u16;
+                RawPlane::Dn(ndarray::Zip::from(volts).par_map_collect(code))
+            }
+            _ => RawPlane::Volts(ndarray::Zip::from(volts).par_map_collect(|&v| out_v(v) as f32)),
+        }
+    }
+}
+
+/// The readout of one plane of one frame.
+struct Readout<'a> {
+    noise: &'a Noise,
+    plane: usize,
+    /// For each column its volts an electron and its offset, V.
+    columns: Vec<(f32, f32)>,
+    read_noise_v: f64,
+    reset_noise_v: f64,
+    row_noise_v: f64,
+    dsnu_v: f64,
+}
+
+impl<'a> Readout<'a> {
+    fn new(sensor: &Sensor, exposure: &Exposure, noise: &'a Noise, plane: usize, n_columns: usize) -> Self {
+        let gain_v_per_e = sensor.conversion_gain_v_per_e(exposure.gain_mode);
+        let on = |switch: bool, rms: f64| if switch { rms } else { 0.0 };
+        let mut gain_rng = noise.rng(Kind::ColumnGain, plane, 0);
+        let mut offset_rng = noise.rng(Kind::ColumnOffset, plane, 0);
+        let column = |_| {
+            let (g, o): (f64, f64) = (StandardNormal.sample(&mut gain_rng), StandardNormal.sample(&mut offset_rng));
+            let gain = gain_v_per_e * (1.0 + on(noise.column, sensor.column_gain_fraction) * g);
+            (gain as f32, (on(noise.column, sensor.column_offset_v) * o) as f32)
+        };
+        Self {
+            noise,
+            plane,
+            columns: (0..n_columns).map(column).collect(),
+            read_noise_v: on(noise.read, sensor.read_noise_v(exposure.gain_mode)),
+            reset_noise_v: on(noise.reset && !sensor.correlated_double_sampling, sensor.reset_noise_v),
+            row_noise_v: on(noise.row, sensor.row_noise_v),
+            dsnu_v: on(noise.dsnu, sensor.dsnu_v),
+        }
+    }
+
+    /// Turns a row of electrons into a row of volts.
+    fn read_row(&self, row: usize, values: &mut [f32]) {
+        for (value, (gain_v_per_e, offset_v)) in values.iter_mut().zip(&self.columns) {
+            *value = *value * gain_v_per_e + offset_v;
+        }
+        self.add_gaussian(Kind::Read, self.read_noise_v, row, values);
+        self.add_gaussian(Kind::Reset, self.reset_noise_v, row, values);
+        self.add_gaussian(Kind::Dsnu, self.dsnu_v, row, values);
+        if self.row_noise_v > 0.0 {
+            let g: f64 = StandardNormal.sample(&mut self.noise.rng(Kind::Row, self.plane, row));
+            values.iter_mut().for_each(|v| *v += (self.row_noise_v * g) as f32);
+        }
+    }
+
+    fn add_gaussian(&self, kind: Kind, rms_v: f64, row: usize, values: &mut [f32]) {
+        if rms_v > 0.0 {
+            let mut rng = self.noise.rng(kind, self.plane, row);
+            for value in values {
+                let g: f64 = StandardNormal.sample(&mut rng);
+                *value += (rms_v * g) as f32;
+            }
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! The data sheet of a sensor.
+
+use dioptric_spectrum::{Spectrum, WavelengthGrid};
+use serde::{Deserialize, Serialize};
+
+use crate::{Adc, Cfa, Exposure, GainMode, Response, SensorError, Tile};
+
+/// The data sheet of an image sensor.
+///
+/// Everything that belongs to the chip; what belongs to the shot is in [`Exposure`]. The signal path is
+///
+/// ```text
+/// photons → electrons (quantum efficiency, PRNU, dark current, Poisson, full well)
+///         → volts     (conversion gain, read noise, reset noise without CDS, DSNU, column and row noise)
+///         → volts out (volts + offset) × analog gain, clipped to 0 … swing; then the response curve
+///         → DN        ⌊volts out / LSB + ½⌋ + black level, clipped to 0 … 2^bits − 1
+/// ```
+///
+/// A gain of 2 doubles the signal (ISETCam divides by it). Fields that most sensors do without may be left out
+/// of a file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensor {
+    /// What to call it.
+    pub name: String,
+    /// Where the numbers come from.
+    pub source: String,
+    /// The rows of pixels.
+    pub rows: usize,
+    /// The columns of pixels.
+    pub columns: usize,
+    /// The distance between pixels, µm; pixels are square.
+    pub pixel_pitch_um: f64,
+    /// The share of the pixel's area that collects light, 0–1. Below 1 the aperture is a centred square.
+    pub fill_factor: f64,
+    /// Which filter lies on which pixel.
+    pub cfa: Cfa,
+    /// The colour filters, each with the quantum efficiency of a pixel behind it.
+    pub filters: Vec<Filter>,
+    /// Glass over the whole array: infrared cut, cover glass, anti-alias filter.
+    #[serde(default)]
+    pub filter_stack: Vec<Layer>,
+    /// Volts an electron.
+    pub conversion_gain_v_per_e: f64,
+    /// The electrons that a pixel holds.
+    pub full_well_e: f64,
+    /// The second readout of a dual-gain pixel.
+    #[serde(default)]
+    pub high_gain: Option<HighGain>,
+    /// The range of the output and of the converter, V.
+    pub swing_v: f64,
+    /// Read noise, rms V at the pixel's output (before the analog gain); with correlated double sampling where the
+    /// sensor has it.
+    pub read_noise_v: f64,
+    /// Reset (kTC) noise, rms V; added only without correlated double sampling.
+    #[serde(default)]
+    pub reset_noise_v: f64,
+    /// Whether correlated double sampling takes the reset noise away.
+    #[serde(default = "yes")]
+    pub correlated_double_sampling: bool,
+    /// Dark current.
+    #[serde(default)]
+    pub dark_current: DarkCurrent,
+    /// Photo-response non-uniformity: the rms share by which pixels differ in sensitivity.
+    #[serde(default)]
+    pub prnu_fraction: f64,
+    /// Dark-signal non-uniformity: the rms of the pixels' fixed offsets, V.
+    #[serde(default)]
+    pub dsnu_v: f64,
+    /// The rms of the columns' fixed offsets, V.
+    #[serde(default)]
+    pub column_offset_v: f64,
+    /// The rms share by which columns differ in gain.
+    #[serde(default)]
+    pub column_gain_fraction: f64,
+    /// The rms of an offset drawn anew for each row of each frame, V.
+    #[serde(default)]
+    pub row_noise_v: f64,
+    /// Pixels that do not work.
+    #[serde(default)]
+    pub defects: Defects,
+    /// A fixed voltage added before the analog gain, V.
+    #[serde(default)]
+    pub offset_v: f64,
+    /// The curve from the amplified voltage to the converter's input.
+    #[serde(default)]
+    pub response: Response,
+    /// The converter.
+    pub adc: Adc,
+    /// The ISO speed that the maker calls analog gain 1.
+    #[serde(default)]
+    pub iso_at_unity_gain: Option<f64>,
+    /// The time from one row's readout to the next, µs; 0 for a global shutter.
+    #[serde(default)]
+    pub row_time_us: f64,
+    /// Where the light meant for a pixel goes before the filters: rows × columns about the pixel, summing to at most 1.
+    #[serde(default)]
+    pub optical_crosstalk: Option<[[f64; 3]; 3]>,
+    /// Where the electrons made in a pixel are collected: rows × columns about the pixel, summing to at most 1.
+    #[serde(default)]
+    pub electrical_crosstalk: Option<[[f64; 3]; 3]>,
+    /// Relative sensitivity against the chief-ray angle: pairs of degrees and share, ascending, straight lines between.
+    #[serde(default)]
+    pub chief_ray_response: Vec<(f64, f64)>,
+    /// The share of the electrons above the full well that spills into the pixels above and below.
+    #[serde(default)]
+    pub blooming_fraction: f64,
+}
+
+/// A colour filter with the pixel behind it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Filter {
+    /// The name that the mosaic uses, often one letter.
+    pub name: String,
+    /// Electrons a photon that falls on the pixel's aperture; 0 beyond the table.
+    pub quantum_efficiency: Spectrum,
+}
+
+/// A layer over the whole array.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Layer {
+    /// What it is.
+    pub name: String,
+    /// The share of light that passes; the ends of the table are held.
+    pub transmittance: Spectrum,
+}
+
+/// The second, more sensitive readout of a dual-gain pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HighGain {
+    /// Volts an electron.
+    pub conversion_gain_v_per_e: f64,
+    /// The electrons that can be read in this mode.
+    pub full_well_e: f64,
+    /// Read noise, rms V.
+    pub read_noise_v: f64,
+}
+
+/// Dark current and how it grows with temperature.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DarkCurrent {
+    /// Electrons a second and pixel at the reference temperature.
+    pub e_per_s: f64,
+    /// The reference temperature, °C.
+    pub at_c: f64,
+    /// The step of temperature that doubles it, K.
+    pub doubling_k: f64,
+}
+
+impl DarkCurrent {
+    /// Returns the electrons a second and pixel at a temperature.
+    pub fn at(self, temperature_c: f64) -> f64 {
+        self.e_per_s * ((temperature_c - self.at_c) / self.doubling_k).exp2()
+    }
+}
+
+impl Default for DarkCurrent {
+    /// None.
+    fn default() -> Self {
+        Self { e_per_s: 0.0, at_c: 25.0, doubling_k: 7.0 }
+    }
+}
+
+/// Pixels that do not work, placed by the fixed pattern's seed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Defects {
+    /// The share of pixels with an excess dark current.
+    pub hot_fraction: f64,
+    /// The excess dark current of a hot pixel at the reference temperature, electrons a second.
+    pub hot_e_per_s: f64,
+    /// The share of pixels that see no light.
+    pub dead_fraction: f64,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Planck's constant × the speed of light, J m.
+const HC_J_M: f64 = 6.626_070_15e-34 * 299_792_458.0;
+
+impl Sensor {
+    /// Returns a sensor of the same pixels with another number of them.
+    #[must_use]
+    pub fn with_size(&self, rows: usize, columns: usize) -> Self {
+        Self { rows, columns, ..self.clone() }
+    }
+
+    /// The width and the height of the array, mm.
+    pub fn size_mm(&self) -> (f64, f64) {
+        let pitch_mm = 1e-3 * self.pixel_pitch_um;
+        (pitch_mm * self.columns as f64, pitch_mm * self.rows as f64)
+    }
+
+    /// Returns the tile of the mosaic, or `None` where every pixel has all filters.
+    ///
+    /// # Errors
+    /// When the mosaic names an unknown filter or is no rectangle.
+    pub fn tile(&self) -> Result<Option<Tile>, SensorError> {
+        let names: Vec<&str> = self.filters.iter().map(|f| f.name.as_str()).collect();
+        self.cfa.resolve(&self.name, &names)
+    }
+
+    /// The number of planes that a frame has: 1 for a mosaic, the number of filters where they are stacked.
+    pub fn n_planes(&self) -> usize {
+        if self.cfa == Cfa::Stacked { self.filters.len() } else { 1 }
+    }
+
+    /// Returns the electrons an incident photon of a wavelength makes behind a filter, with all layers.
+    pub fn quantum_efficiency(&self, filter: usize, wavelength_nm: f64) -> f64 {
+        let layers: f64 = self.filter_stack.iter().map(|l| l.transmittance.at_held(wavelength_nm)).product();
+        self.filters[filter].quantum_efficiency.at_or_zero(wavelength_nm) * layers
+    }
+
+    /// Returns, for each filter and band, the electrons a second that an irradiance of 1 W m⁻² nm⁻¹ makes in a pixel.
+    ///
+    /// The quantum efficiency × the wavelength is averaged over the width of the band.
+    pub fn electron_weights(&self, grid: &WavelengthGrid) -> Vec<Vec<f64>> {
+        let area_m2 = 1e-12 * self.pixel_pitch_um.powi(2) * self.fill_factor;
+        (0..self.filters.len())
+            .map(|filter| {
+                let weight = |(&center_nm, &width_nm): (&f64, &f64)| {
+                    let n = (2.0 * width_nm).ceil().max(1.0) as usize;
+                    let mean = (0..n)
+                        .map(|i| center_nm + width_nm * ((i as f64 + 0.5) / n as f64 - 0.5))
+                        .map(|nm| self.quantum_efficiency(filter, nm) * 1e-9 * nm)
+                        .sum::<f64>()
+                        / n as f64;
+                    area_m2 * width_nm * mean / HC_J_M
+                };
+                grid.centers_nm().iter().zip(grid.widths_nm()).map(weight).collect()
+            })
+            .collect()
+    }
+
+    /// Returns the conversion gain of a readout mode, V an electron.
+    pub fn conversion_gain_v_per_e(&self, mode: GainMode) -> f64 {
+        self.high(mode).map_or(self.conversion_gain_v_per_e, |high| high.conversion_gain_v_per_e)
+    }
+
+    /// Returns the electrons that a readout mode holds.
+    pub fn full_well_e(&self, mode: GainMode) -> f64 {
+        self.high(mode).map_or(self.full_well_e, |high| high.full_well_e)
+    }
+
+    /// Returns the read noise of a readout mode, rms V.
+    pub fn read_noise_v(&self, mode: GainMode) -> f64 {
+        self.high(mode).map_or(self.read_noise_v, |high| high.read_noise_v)
+    }
+
+    fn high(&self, mode: GainMode) -> Option<HighGain> {
+        self.high_gain.filter(|_| mode == GainMode::High)
+    }
+
+    /// Returns the electrons at which a pixel saturates: its well, the swing or the converter, whichever is first.
+    pub fn saturation_e(&self, exposure: &Exposure) -> f64 {
+        let top_v = self.response.inverse(self.adc.top_v(self.swing_v), self.swing_v);
+        let by_swing =
+            (top_v / exposure.analog_gain - self.offset_v) / self.conversion_gain_v_per_e(exposure.gain_mode);
+        by_swing.min(self.full_well_e(exposure.gain_mode))
+    }
+
+    /// Returns the relative sensitivity at a chief-ray angle, degrees.
+    pub(crate) fn chief_ray_factor(&self, angle_deg: f64) -> f64 {
+        let table = &self.chief_ray_response;
+        let above = table.partition_point(|&(deg, _)| deg < angle_deg);
+        match (above.checked_sub(1).map(|i| table[i]), table.get(above)) {
+            (None, None) => 1.0,
+            (Some((_, only)), None) | (None, Some(&(_, only))) => only,
+            (Some((a0, f0)), Some(&(a1, f1))) => f0 + (f1 - f0) * (angle_deg - a0) / (a1 - a0),
+        }
+    }
+}
