@@ -89,6 +89,9 @@ fn trace_batch_here(steps: &[Step], first: usize, rims: Rims, rays: &mut RaySlic
         for z in &mut tile.z {
             *z -= begin.vertex_z;
         }
+        if first == 0 {
+            approach_tile(begin.index_before, &mut tile);
+        }
         let mut previous_z = begin.vertex_z;
         for (i, step) in steps.iter().enumerate() {
             let shift = step.vertex_z - previous_z;
@@ -161,6 +164,20 @@ fn decode(code: u64) -> RayFate {
         VIGNETTED => RayFate::Vignetted { surface },
         MISSED => RayFate::Missed { surface },
         _ => RayFate::TotalReflection { surface },
+    }
+}
+
+/// Moves each ray to where it passes nearest to the first vertex, so that far starts cost no digits at the surface.
+#[inline(always)]
+fn approach_tile(index: f64, tile: &mut Tile) {
+    for i in 0..LANES {
+        let is_alive = tile.code[i] == IN_FLIGHT;
+        let t = -(tile.x[i] * tile.l[i] + tile.y[i] * tile.m[i] + tile.z[i] * tile.n[i]);
+        let t = if is_alive { t } else { 0.0 };
+        tile.x[i] += tile.l[i] * t;
+        tile.y[i] += tile.m[i] * t;
+        tile.z[i] += tile.n[i] * t;
+        tile.opl[i] += index * t;
     }
 }
 
