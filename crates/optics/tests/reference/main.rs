@@ -1,4 +1,5 @@
 //! Lenses of the shared reference data, traced by a tool of fifty digits.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test's helpers may fail the test")]
 
 mod first_order;
 mod lens;
