@@ -6,10 +6,13 @@
 //!
 #![doc = include_str!("../README.md")]
 
+mod balance;
 mod capture;
 mod cfa;
 mod check;
 mod collect;
+mod color;
+mod demosaic;
 mod error;
 mod exposure;
 mod frames;
@@ -17,20 +20,29 @@ mod integrate;
 mod library;
 mod metering;
 mod noise;
+mod picture;
 mod poisson;
+mod process;
 mod raw;
 mod readout;
 mod response;
 mod sampling;
 mod sensor;
+mod tone;
 
+pub use balance::WhiteBalance;
 pub use capture::Capture;
 pub use cfa::{Bayer, Cfa, Tile};
 pub use collect::Illumination;
+pub use color::{ColorCorrection, ColorMatrix};
+pub use demosaic::{Demosaic, demosaic};
 pub use error::SensorError;
 pub use exposure::{AutoExposure, Exposure, ExposureControl, GainMode, Metering};
 pub use frames::{ElectronRate, Electrons, Volts};
 pub use noise::Noise;
+pub use picture::Picture;
+pub use process::{Developed, Processing};
 pub use raw::{Levels, Raw, RawPlane};
 pub use response::{Adc, Response};
 pub use sensor::{DarkCurrent, Defects, Filter, HighGain, Layer, Sensor};
+pub use tone::{Brightness, ToneCurve};

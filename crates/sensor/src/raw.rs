@@ -3,7 +3,7 @@
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{Adc, Exposure, Response, Sensor, Tile};
+use crate::{Adc, Exposure, Response, Sensor, SensorError, Tile};
 
 /// A frame of digital numbers, or of volts where the sensor has no converter.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,5 +139,22 @@ impl Raw {
         };
         let (rows, columns) = self.size();
         self.planes.iter().map(count).sum::<usize>() as f64 / (rows * columns * self.planes.len()) as f64
+    }
+
+    /// Checks that the planes agree in size and are as many as the filters ask for.
+    pub(crate) fn check(&self) -> Result<(), SensorError> {
+        let expected = if self.tile.is_some() { 1 } else { self.filter_names.len() };
+        if self.planes.len() != expected || self.planes.is_empty() {
+            let (expected, found) = (expected.to_string(), self.planes.len().to_string());
+            return Err(SensorError::Shape { what: "planes of a raw frame", expected, found });
+        }
+        let text = |(rows, columns): (usize, usize)| format!("{rows} × {columns}");
+        match self.planes.iter().find(|plane| plane.size() != self.size()) {
+            Some(plane) => {
+                let (expected, found) = (text(self.size()), text(plane.size()));
+                Err(SensorError::Shape { what: "rows × columns of a raw plane", expected, found })
+            }
+            None => Ok(()),
+        }
     }
 }

@@ -1,0 +1,192 @@
+//! Colour differences along edges (Pekkucuksen & Altunbasak, ICIP 2010), block by block.
+//!
+//! The green − red and green − blue differences are smooth where the colours themselves are not. They are estimated
+//! along rows and along columns, averaged over four pixels to the north, south, west and east, and these four are
+//! mixed by how little the differences change that way.
+
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use super::padded::Block;
+use crate::Bayer;
+
+/// How far a pixel looks: 2 (interpolation) + 1 (gradient) + 4 (window) + 3 (diagonal filter) + 1 (green pixels).
+const MARGIN: usize = 12;
+/// Rows and columns of a block; even, so that all blocks have the same phase, and small enough for the cache.
+const BLOCK: (usize, usize) = (128, 256);
+/// Keeps the weights finite where nothing changes: far below one digital number of a frame of 0 … 1.
+const LEAST_GRADIENT: f32 = 1e-6;
+
+pub(super) fn demosaic(values: &Array2<f32>, bayer: Bayer, n_channels: usize) -> Vec<Array2<f32>> {
+    let (n_rows, n_columns) = values.dim();
+    let mut channels = vec![Array2::<f32>::zeros((n_rows, n_columns)); n_channels];
+    let mut strips: Vec<Vec<&mut [f32]>> = (0..n_rows.div_ceil(BLOCK.0)).map(|_| Vec::new()).collect();
+    for channel in &mut channels {
+        let all = channel.as_slice_mut().expect("a new array is contiguous");
+        all.chunks_mut(BLOCK.0 * n_columns).zip(&mut strips).for_each(|(chunk, strip)| strip.push(chunk));
+    }
+    strips.into_par_iter().enumerate().for_each_init(Planes::default, |planes, (number, mut out)| {
+        let first_row = number * BLOCK.0;
+        let n_strip_rows = out[0].len() / n_columns;
+        for first_column in (0..n_columns).step_by(BLOCK.1) {
+            let size = (n_strip_rows, BLOCK.1.min(n_columns - first_column));
+            let block = Block::cut(values, (first_row, first_column), size, MARGIN);
+            planes.fill(&block, bayer);
+            for row in 0..size.0 {
+                let from = (row + MARGIN) * block.width + MARGIN;
+                let to = row * n_columns + first_column;
+                for (channel, plane) in
+                    [(bayer.green, &planes.green), (bayer.in_even_rows, &planes.even), (bayer.in_odd_rows, &planes.odd)]
+                {
+                    out[channel][to..to + size.1].copy_from_slice(&plane[from..from + size.1]);
+                }
+            }
+        }
+    });
+    channels
+}
+
+/// The planes of one block, kept from block to block.
+#[derive(Default)]
+struct Planes {
+    /// Green minus the other colour of the row or column, estimated along rows and along columns.
+    along_rows: Vec<f32>,
+    along_columns: Vec<f32>,
+    /// How much these change along their direction, summed over five pixels across it.
+    change_along_rows: Vec<f32>,
+    change_along_columns: Vec<f32>,
+    scratch: Vec<f32>,
+    /// Green minus the other colour, at the pixels of the other colours.
+    difference: Vec<f32>,
+    green: Vec<f32>,
+    even: Vec<f32>,
+    odd: Vec<f32>,
+}
+
+impl Planes {
+    fn fill(&mut self, block: &Block, bayer: Bayer) {
+        self.estimate_differences(block, bayer);
+        self.sum_changes(block.width);
+        self.mix_directions(block, bayer);
+        self.other_colors(block, bayer);
+    }
+
+    /// Estimates green minus the other colour at each pixel, along rows and along columns.
+    fn estimate_differences(&mut self, block: &Block, bayer: Bayer) {
+        let (v, w) = (&block.values, block.width);
+        for plane in [&mut self.along_rows, &mut self.along_columns] {
+            plane.clear();
+            plane.resize(v.len(), 0.0);
+        }
+        // The missing colour is the mean of the neighbours plus half the curvature of the pixel's own colour.
+        let estimate = |i: usize, step: usize| {
+            let own = v[i];
+            let missing = 0.5 * (v[i - step] + v[i + step]) + 0.25 * (2.0 * own - v[i - 2 * step] - v[i + 2 * step]);
+            missing - own
+        };
+        for row in 2..v.len() / w - 2 {
+            for column in 2..w - 2 {
+                let i = row * w + column;
+                let sign = if bayer.is_green(row, column) { -1.0 } else { 1.0 };
+                self.along_rows[i] = sign * estimate(i, 1);
+                self.along_columns[i] = sign * estimate(i, w);
+            }
+        }
+    }
+
+    /// Sums how much the differences change over five pixels across their direction.
+    fn sum_changes(&mut self, w: usize) {
+        let n = self.along_rows.len();
+        for (changes, plane, step, across) in [
+            (&mut self.change_along_rows, &self.along_rows, 1, w),
+            (&mut self.change_along_columns, &self.along_columns, w, 1),
+        ] {
+            self.scratch.clear();
+            self.scratch.resize(n, 0.0);
+            for i in step..n - step {
+                self.scratch[i] = (plane[i - step] - plane[i + step]).abs();
+            }
+            changes.clear();
+            changes.resize(n, 0.0);
+            let s = &self.scratch;
+            for i in 2 * across..n - 2 * across {
+                changes[i] = s[i - 2 * across] + s[i - across] + s[i] + s[i + across] + s[i + 2 * across];
+            }
+        }
+    }
+
+    /// Mixes the means of the four directions into one difference, and gives green.
+    fn mix_directions(&mut self, block: &Block, bayer: Bayer) {
+        let (v, w) = (&block.values, block.width);
+        self.difference.clear();
+        self.difference.resize(v.len(), 0.0);
+        self.green.clone_from(v);
+        for row in 7..v.len() / w - 7 {
+            // Greens alternate along a row: the first pixel of another colour, then every second.
+            let first = 7 + usize::from(bayer.is_green(row, 7));
+            for column in (first..w - 7).step_by(2) {
+                let i = row * w + column;
+                let (mut sum, mut weights) = (0.0, 0.0);
+                for (plane, changes, step) in [
+                    (&self.along_rows, &self.change_along_rows, 1),
+                    (&self.along_columns, &self.change_along_columns, w),
+                ] {
+                    let five = |p: &[f32], first: usize| {
+                        p[first] + p[first + step] + p[first + 2 * step] + p[first + 3 * step] + p[first + 4 * step]
+                    };
+                    for first in [i - 4 * step, i] {
+                        let change = five(changes, first) + LEAST_GRADIENT;
+                        let weight = 1.0 / (change * change);
+                        sum += weight * 0.2 * five(plane, first);
+                        weights += weight;
+                    }
+                }
+                self.difference[i] = sum / weights;
+                self.green[i] = v[i] + self.difference[i];
+            }
+        }
+    }
+
+    /// Gives the other two colours from green and the differences.
+    fn other_colors(&mut self, block: &Block, bayer: Bayer) {
+        let (v, w) = (&block.values, block.width);
+        let d = &self.difference;
+        for plane in [&mut self.even, &mut self.odd] {
+            plane.clear();
+            plane.resize(v.len(), 0.0);
+        }
+        for row in 11..v.len() / w - 11 {
+            // The colour of this row's own pixels, and that of the rows above and below.
+            let (own, other) =
+                if row % 2 == 0 { (&mut self.even, &mut self.odd) } else { (&mut self.odd, &mut self.even) };
+            for column in 11..w - 11 {
+                let i = row * w + column;
+                if bayer.is_green(row, column) {
+                    // Both neighbours along the row are of this row's colour; above and below lie the other's.
+                    let (left, right) = (d[i - 1], d[i + 1]);
+                    let (above, below) = (d[i - w], d[i + w]);
+                    own[i] = v[i] - 0.25 * (left + right + diagonal(d, i - w, w) + diagonal(d, i + w, w));
+                    other[i] = v[i] - 0.25 * (above + below + diagonal(d, i - 1, w) + diagonal(d, i + 1, w));
+                } else {
+                    own[i] = v[i];
+                    other[i] = self.green[i] - diagonal(d, i, w);
+                }
+            }
+        }
+    }
+}
+
+/// Returns the other colour's difference at a pixel of a non-green colour, from the diagonals about it.
+#[inline]
+fn diagonal(d: &[f32], i: usize, w: usize) -> f32 {
+    let near = d[i - w - 1] + d[i - w + 1] + d[i + w - 1] + d[i + w + 1];
+    let far = d[i - 3 * w - 1]
+        + d[i - 3 * w + 1]
+        + d[i + 3 * w - 1]
+        + d[i + 3 * w + 1]
+        + d[i - w - 3]
+        + d[i - w + 3]
+        + d[i + w - 3]
+        + d[i + w + 3];
+    (10.0 * near - far) / 32.0
+}

@@ -1,0 +1,186 @@
+//! From a raw frame to a picture.
+
+use dioptric_spectrum::{Illuminant, Spectrum, color_checker_reflectances};
+use ndarray::{Array2, Array3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Brightness, ColorCorrection, ColorMatrix, Demosaic, Picture, Raw, Sensor, SensorError, ToneCurve, WhiteBalance,
+    balance::gains, demosaic, metering::percentile,
+};
+
+/// What is done to a raw frame, in this order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Processing {
+    /// How white is made neutral; channels are clipped at saturation afterwards.
+    pub white_balance: WhiteBalance,
+    /// How the missing colours are found.
+    pub demosaic: Demosaic,
+    /// How channels become colours.
+    pub color: ColorCorrection,
+    /// How bright the picture is made.
+    pub brightness: Brightness,
+    /// The curve from light to codes.
+    pub curve: ToneCurve,
+}
+
+impl Processing {
+    /// Returns the usual processing of a scene under a known light.
+    pub fn for_light(light: Illuminant) -> Self {
+        Self {
+            white_balance: WhiteBalance::Illuminant(light),
+            demosaic: Demosaic::Directional,
+            color: ColorCorrection::Fitted(light),
+            brightness: Brightness::AsExposed,
+            curve: ToneCurve::Srgb,
+        }
+    }
+
+    /// Returns the processing of the paper's Figure 4: bilinear, no balance, no colour correction, a power of 0.6.
+    pub fn paper() -> Self {
+        Self {
+            white_balance: WhiteBalance::None,
+            demosaic: Demosaic::Bilinear,
+            color: ColorCorrection::None,
+            brightness: Brightness::AsExposed,
+            curve: ToneCurve::Gamma(0.6),
+        }
+    }
+}
+
+/// A picture and what was found out while making it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Developed {
+    /// The picture.
+    pub picture: Picture,
+    /// The factor on each channel that made white neutral.
+    pub balance: Vec<f64>,
+    /// The matrix from balanced channels to linear sRGB.
+    pub color: ColorMatrix,
+    /// The factor on linear light that made the picture as bright as asked.
+    pub brightness: f64,
+}
+
+impl Sensor {
+    /// Returns the picture that a raw frame of this sensor gives.
+    ///
+    /// # Errors
+    /// When the frame is not of this sensor or too small, or a setting makes no sense.
+    pub fn develop(&self, raw: &Raw, processing: &Processing) -> Result<Developed, SensorError> {
+        raw.check()?;
+        self.check_settings(raw, processing)?;
+        let tile = raw.tile.as_ref();
+        let n_channels = self.filters.len();
+        let mut planes = raw.linear();
+        let balance = gains(self, &planes, tile, &processing.white_balance);
+        weigh(&mut planes, tile, &balance);
+        let channels = match tile {
+            Some(tile) => demosaic(&planes[0], tile, n_channels, processing.demosaic)?,
+            None => planes,
+        };
+        let color = match &processing.color {
+            ColorCorrection::None => ColorMatrix::identity(n_channels),
+            ColorCorrection::Fitted(light) => {
+                let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
+                ColorMatrix::fit(self, *light, &chart)
+            }
+            ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), delta_e: Vec::new() },
+        };
+        let mut linear = mix(&channels, &color);
+        drop(channels);
+        let brightness = factor(&linear, processing.brightness);
+        let table = processing.curve.table();
+        let codes = linear.as_slice_mut().expect("a new array is contiguous");
+        codes.par_iter_mut().for_each(|code| *code = table.encode(*code * brightness as f32));
+        Ok(Developed { picture: Picture { codes: linear }, balance, color, brightness })
+    }
+
+    fn check_settings(&self, raw: &Raw, processing: &Processing) -> Result<(), SensorError> {
+        let shape = |what, expected: usize, found: usize| {
+            Err(SensorError::Shape { what, expected: expected.to_string(), found: found.to_string() })
+        };
+        let n_channels = self.filters.len();
+        if raw.filter_names.len() != n_channels {
+            return shape("filters of the raw frame", n_channels, raw.filter_names.len());
+        }
+        if let WhiteBalance::Gains(gains) = &processing.white_balance {
+            if gains.len() != n_channels {
+                return shape("white balance gains", n_channels, gains.len());
+            }
+            if let Some(&gain) = gains.iter().find(|&&g| !(g > 0.0 && g.is_finite())) {
+                return Err(SensorError::value("the processing", "white_balance.gains", gain, "a number above 0"));
+            }
+        }
+        if let WhiteBalance::WhitePatch { percentile } = processing.white_balance
+            && !(0.0..=100.0).contains(&percentile)
+        {
+            let expected = "a number from 0 to 100";
+            return Err(SensorError::value("the processing", "white_balance.percentile", percentile, expected));
+        }
+        if let ColorCorrection::Matrix(rows) = &processing.color
+            && let Some(row) = rows.iter().find(|row| row.len() != n_channels)
+        {
+            return shape("factors in a row of the colour matrix", n_channels, row.len());
+        }
+        let (key, value, right) = match processing.brightness {
+            Brightness::AsExposed => ("", 1.0, true),
+            Brightness::Factor(factor) => ("brightness.factor", factor, factor > 0.0 && factor.is_finite()),
+            Brightness::Percentile { percent, to } if (0.0..=100.0).contains(&percent) => {
+                ("brightness.to", to, to > 0.0 && to.is_finite())
+            }
+            Brightness::Percentile { percent, .. } => ("brightness.percent", percent, false),
+        };
+        if !right {
+            return Err(SensorError::value("the processing", key, value, "a number above 0, and at most 100 %"));
+        }
+        processing.curve.check()
+    }
+}
+
+/// Multiplies each channel by its factor and clips it at saturation.
+fn weigh(planes: &mut [Array2<f32>], tile: Option<&crate::Tile>, balance: &[f64]) {
+    for (number, plane) in planes.iter_mut().enumerate() {
+        plane.outer_iter_mut().into_par_iter().enumerate().for_each(|(row, mut values)| {
+            let filters = tile.map_or(std::slice::from_ref(&number), |tile| tile.row(row));
+            let gains: Vec<f32> = filters.iter().map(|&filter| balance[filter] as f32).collect();
+            let gains = gains.iter().cycle();
+            values.iter_mut().zip(gains).for_each(|(value, gain)| *value = (*value * gain).min(1.0));
+        });
+    }
+}
+
+/// Returns linear sRGB from channels: rows × columns × 3.
+fn mix(channels: &[Array2<f32>], color: &ColorMatrix) -> Array3<f32> {
+    let (n_rows, n_columns) = channels[0].dim();
+    let rows: [Vec<f32>; 3] = color.rows.each_ref().map(|row| row.iter().map(|&m| m as f32).collect());
+    let mut linear = Array3::<f32>::zeros((n_rows, n_columns, 3));
+    let lines = linear.as_slice_mut().expect("a new array is contiguous").par_chunks_mut(3 * n_columns);
+    lines.enumerate().for_each(|(row, line)| {
+        for (channel, plane) in channels.iter().enumerate() {
+            let factors = rows.each_ref().map(|row| row[channel]);
+            for (pixel, &value) in line.chunks_exact_mut(3).zip(plane.row(row)) {
+                pixel[0] += factors[0] * value;
+                pixel[1] += factors[1] * value;
+                pixel[2] += factors[2] * value;
+            }
+        }
+    });
+    linear
+}
+
+/// Returns the factor on linear light that a brightness asks for.
+fn factor(linear: &Array3<f32>, brightness: Brightness) -> f64 {
+    match brightness {
+        Brightness::AsExposed => 1.0,
+        Brightness::Factor(factor) => factor,
+        Brightness::Percentile { percent, to } => {
+            let pixels = linear.as_slice().expect("a new array is contiguous").par_chunks_exact(3);
+            // The luminance of linear sRGB (IEC 61966-2-1).
+            let luminances = pixels.map(|rgb| 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]).collect();
+            let level = percentile(luminances, percent);
+            if level > 0.0 { to / level } else { 1.0 }
+        }
+    }
+}

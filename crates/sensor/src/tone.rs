@@ -1,0 +1,112 @@
+//! From linear light to the codes of a picture.
+
+use dioptric_spectrum::srgb_encode;
+use serde::{Deserialize, Serialize};
+
+use crate::SensorError;
+
+/// How bright the picture is made.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Brightness {
+    /// As exposed: saturation of the least sensitive channel is white.
+    AsExposed,
+    /// Multiplied by a factor.
+    Factor(f64),
+    /// The luminance that this share (0–100 %) of all pixels does not exceed is put at `to`, 1 being white.
+    Percentile {
+        /// 0–100 %.
+        percent: f64,
+        /// Where it is put.
+        to: f64,
+    },
+}
+
+/// The curve from linear light to codes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum ToneCurve {
+    /// None: codes are linear light.
+    Linear,
+    /// The curve of sRGB and Display P3 (IEC 61966-2-1).
+    Srgb,
+    /// A power law: code = light^exponent.
+    Gamma(f64),
+    /// The curve of sRGB after an S about middle grey; 0 is none, 1 strong.
+    Filmic {
+        /// 0 to 1.
+        contrast: f64,
+    },
+}
+
+impl ToneCurve {
+    pub(crate) fn check(self) -> Result<(), SensorError> {
+        let (key, value, right) = match self {
+            Self::Linear | Self::Srgb => return Ok(()),
+            Self::Gamma(exponent) => ("curve.gamma", exponent, exponent > 0.0 && exponent.is_finite()),
+            Self::Filmic { contrast } => ("curve.contrast", contrast, (0.0..=1.0).contains(&contrast)),
+        };
+        let expected = "a number above 0 (gamma), from 0 to 1 (contrast)";
+        if right { Ok(()) } else { Err(SensorError::value("the processing", key, value, expected)) }
+    }
+
+    /// Returns the code, 0–1, of linear light; light outside 0–1 is clipped.
+    pub fn encode(self, light: f64) -> f64 {
+        let light = light.clamp(0.0, 1.0);
+        match self {
+            Self::Linear => light,
+            Self::Srgb => srgb_encode(light),
+            Self::Gamma(exponent) => light.powf(exponent),
+            Self::Filmic { contrast } => {
+                // In codes, so that the S is about middle grey: a blend with the smooth step 3 x² − 2 x³.
+                let code = srgb_encode(light);
+                code + contrast * (code * code * (3.0 - 2.0 * code) - code)
+            }
+        }
+    }
+
+    /// Returns the curve as a table that is read with straight lines between its entries.
+    pub(crate) fn table(self) -> ToneTable {
+        ToneTable((0..=TABLE_STEPS).map(|i| self.encode(i as f64 / TABLE_STEPS as f64) as f32).collect())
+    }
+}
+
+/// Enough steps that straight lines between them are within 1e-6 of sRGB, less than a sixteenth of a 16-bit code.
+const TABLE_STEPS: usize = 1 << 16;
+
+/// A tone curve as a table.
+pub(crate) struct ToneTable(Vec<f32>);
+
+impl ToneTable {
+    #[inline]
+    #[expect(clippy::manual_clamp, reason = "clamp would keep what is no number, which max turns into 0")]
+    pub(crate) fn encode(&self, light: f32) -> f32 {
+        let place = light.max(0.0).min(1.0) * TABLE_STEPS as f32;
+        let below = (place as usize).min(TABLE_STEPS - 1);
+        let (low, high) = (self.0[below], self.0[below + 1]);
+        low + (high - low) * (place - below as f32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+
+    #[test]
+    fn the_table_is_the_curve() {
+        for curve in [ToneCurve::Linear, ToneCurve::Srgb, ToneCurve::Filmic { contrast: 0.5 }] {
+            let table = curve.table();
+            for i in 0..5000 {
+                let light = f64::from(i) / 4999.0 * 1.2 - 0.1;
+                assert_abs_diff_eq!(f64::from(table.encode(light as f32)), curve.encode(light), epsilon = 1e-6);
+            }
+            assert_eq!((table.encode(f32::NAN), table.encode(f32::INFINITY)), (0.0, 1.0));
+        }
+    }
+
+    #[test]
+    fn wrong_curves_are_refused() {
+        assert!(ToneCurve::Gamma(0.0).check().is_err());
+        assert!(ToneCurve::Filmic { contrast: 2.0 }.check().is_err());
+        assert!(ToneCurve::Gamma(0.6).check().is_ok());
+    }
+}
