@@ -7,11 +7,16 @@
 //! This crate knows nothing of lenses: what blurs a scene is another crate's concern.
 
 mod error;
+mod formats;
 mod resample;
 mod scene;
 mod view;
 
 pub use error::SceneError;
+pub use formats::{
+    BandWriter, EnviCube, ExrParts, ReadOptions, SpectralFile, read_band_folder, read_envi, read_picture,
+    read_planes_exr, read_scene, read_spectral_exr, write_planes_exr, write_scene_exr, write_spectral_exr,
+};
 pub use resample::{reflectance_under, resampled};
 pub use scene::{HiddenLayer, Scene};
 pub use view::View;

@@ -7,7 +7,7 @@ use crate::SceneError;
 /// Where the samples of a scene lie, as seen from the projection centre.
 ///
 /// Centres of samples are at whole numbers of rows and columns: a sample at (row, column) shows what lies at the
-/// tangents (column − center_x) / focal to the right and (center_y − row) / focal upwards.
+/// tangents (column − `center_x_px`) / `focal_px` to the right and (`center_y_px` − row) / `focal_px` upwards.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct View {

@@ -1,0 +1,160 @@
+//! A folder with one grey picture a band, as in the CAVE database.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
+use image::DynamicImage;
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use super::{beside::unreadable, picture::decode};
+use crate::SceneError;
+
+/// Names of a text file with the wavelengths of numbered pictures, nm.
+const LISTS: [&str; 2] = ["wavelengths.txt", "wavelengths.csv"];
+
+/// Reads a folder of grey PNG or TIFF pictures, one a band, as reflectances: the largest code is 1, linear.
+///
+/// Names end in the wavelength in nm (`toys_400.png`, `toys-400.5nm.png`) or in a number (`toys_ms_01.png`). Numbered
+/// pictures take their wavelengths, in the order of their numbers, from `wavelengths`, from a file `wavelengths.txt` in
+/// the folder (nm, separated by anything), or, when there are 31 named `…_ms_NN`, from CAVE's 400–700 nm every 10 nm.
+///
+/// # Errors
+/// When there is no such picture, wavelengths are missing, or the pictures differ in size.
+pub fn read_band_folder(folder: &Path, wavelengths: Option<&WavelengthGrid>) -> Result<SpectralImage, SceneError> {
+    let pictures = numbered_pictures(folder)?;
+    if pictures.is_empty() {
+        return Err(SceneError::NoBands {
+            file: folder.to_owned(),
+            expected: "PNG or TIFF pictures whose names end in a wavelength in nm or in a number",
+        });
+    }
+    let values = |source| SceneError::Values { file: folder.to_owned(), source };
+    let grid = match wavelengths {
+        Some(grid) => grid.clone(),
+        None => WavelengthGrid::new(wavelengths_of(folder, &pictures)?).map_err(values)?,
+    };
+    if grid.len() != pictures.len() {
+        let reason = format!("{} pictures of bands, but {} wavelengths", pictures.len(), grid.len());
+        return Err(unreadable(folder, reason));
+    }
+    let planes: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| grey(path)).collect();
+    SpectralImage::new(Quantity::Reflectance, grid, planes?).map_err(values)
+}
+
+/// Returns the pictures whose names end in a number, with the number, in its order.
+fn numbered_pictures(folder: &Path) -> Result<Vec<(f64, PathBuf)>, SceneError> {
+    let entries = fs::read_dir(folder).map_err(|error| unreadable(folder, error))?;
+    let mut pictures = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|error| unreadable(folder, error))?.path();
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        if !matches!(extension.as_str(), "png" | "tif" | "tiff") {
+            continue;
+        }
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        if let Some(number) = number_at_end(&stem) {
+            pictures.push((number, path));
+        }
+    }
+    pictures.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
+    Ok(pictures)
+}
+
+/// Returns the number that a stem ends in, before an optional `nm`.
+fn number_at_end(stem: &str) -> Option<f64> {
+    let stem = stem.strip_suffix("nm").unwrap_or(stem);
+    let digits = stem.len() - stem.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.').len();
+    stem[stem.len() - digits..].trim_start_matches('.').parse().ok()
+}
+
+fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>, SceneError> {
+    if let Some(list) = LISTS.iter().map(|name| folder.join(name)).find(|path| path.is_file()) {
+        let text = fs::read_to_string(&list).map_err(|error| unreadable(&list, error))?;
+        let is_separator = |c: char| c.is_whitespace() || c == ',' || c == ';';
+        return Ok(text.split(is_separator).filter_map(|word| word.parse().ok()).collect());
+    }
+    let numbers: Vec<f64> = pictures.iter().map(|(number, _)| *number).collect();
+    if numbers.iter().all(|number| (150.0..=20_000.0).contains(number)) {
+        return Ok(numbers);
+    }
+    let is_cave = |path: &PathBuf| path.file_stem().is_some_and(|stem| stem.to_string_lossy().contains("_ms_"));
+    if pictures.len() == 31 && pictures.iter().all(|(_, path)| is_cave(path)) {
+        return Ok((0..31).map(|i| 400.0 + 10.0 * f64::from(i)).collect());
+    }
+    Err(SceneError::NoBands {
+        file: folder.to_owned(),
+        expected: "a file wavelengths.txt with the wavelength in nm of each numbered picture",
+    })
+}
+
+/// Reads a grey picture, white being 1; of a coloured one the green channel, which a grey one saved as RGB repeats.
+fn grey(path: &Path) -> Result<Array2<f32>, SceneError> {
+    let picture = decode(path)?;
+    let (columns, rows) = (picture.width() as usize, picture.height() as usize);
+    let samples: Vec<f32> = match picture {
+        DynamicImage::ImageLuma8(p) => p.into_raw().into_iter().map(|v| f32::from(v) / 255.0).collect(),
+        DynamicImage::ImageLuma16(p) => p.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect(),
+        other => other.into_rgb16().pixels().map(|p| f32::from(p.0[1]) / 65535.0).collect(),
+    };
+    Array2::from_shape_vec((rows, columns), samples).map_err(|error| unreadable(path, error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{ImageBuffer, Luma};
+
+    fn folder_of(names: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for (i, name) in names.iter().enumerate() {
+            let picture = ImageBuffer::from_pixel(3, 2, Luma([100 * (i as u16 + 1)]));
+            picture.save(folder.path().join(name)).unwrap();
+        }
+        fs::write(folder.path().join("readme.md"), "not a picture").unwrap();
+        folder
+    }
+
+    #[test]
+    fn wavelengths_come_from_the_names() {
+        let folder = folder_of(&["toys_1000.png", "toys_400.5nm.png", "toys-550.png", "preview.png"]);
+        let image = read_band_folder(folder.path(), None).unwrap();
+        assert_eq!(image.grid().centers_nm(), [400.5, 550.0, 1000.0]);
+        assert_eq!(image.quantity(), Quantity::Reflectance);
+        let expected = [200.0, 300.0, 100.0].map(|code: f32| f64::from(code / 65535.0));
+        assert_eq!(image.spectrum_at(1, 2), expected);
+    }
+
+    #[test]
+    fn numbered_pictures_need_a_list() {
+        let folder = folder_of(&["b_1.png", "b_2.png", "b_10.png"]);
+        assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("wavelengths.txt"));
+        let given = WavelengthGrid::uniform(500.0, 700.0, 100.0).unwrap();
+        let image = read_band_folder(folder.path(), Some(&given)).unwrap();
+        assert!(image.spectrum_at(0, 0)[2] > image.spectrum_at(0, 0)[1]);
+        fs::write(folder.path().join("wavelengths.txt"), "wavelength_nm\n450\n550\n650\n").unwrap();
+        assert_eq!(read_band_folder(folder.path(), None).unwrap().grid().centers_nm(), [450.0, 550.0, 650.0]);
+        fs::write(folder.path().join("wavelengths.txt"), "450, 550").unwrap();
+        assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("3 pictures"));
+    }
+
+    #[test]
+    fn cave_is_known_by_its_names() {
+        let names: Vec<String> = (1..=31).map(|i| format!("toys_ms_{i:02}.png")).collect();
+        let folder = folder_of(&names.iter().map(String::as_str).collect::<Vec<_>>());
+        let image = read_band_folder(folder.path(), None).unwrap();
+        assert_eq!(image.grid(), &WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap());
+    }
+
+    #[test]
+    fn a_folder_without_bands_or_of_two_sizes_is_refused() {
+        let folder = folder_of(&[]);
+        assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("no spectral band"));
+        let folder = folder_of(&["a_400.png"]);
+        ImageBuffer::from_pixel(9, 9, Luma([1_u8])).save(folder.path().join("a_500.png")).unwrap();
+        assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("rows of a band"));
+    }
+}

@@ -1,0 +1,258 @@
+//! Spectral EXR there and back, and files that must be refused.
+
+use std::{fs, path::PathBuf};
+
+use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use exr::prelude::{
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text,
+    WritableImage, f16,
+};
+use ndarray::Array2;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+use crate::{HiddenLayer, Scene, SceneError, View};
+
+const ROWS: usize = 5;
+const COLUMNS: usize = 7;
+
+fn noise(rng: &mut ChaCha8Rng) -> Array2<f32> {
+    Array2::from_shape_simple_fn((ROWS, COLUMNS), || rng.random::<f32>() + 1e-3)
+}
+
+fn image(quantity: Quantity, centers_nm: Vec<f64>) -> SpectralImage {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let grid = WavelengthGrid::new(centers_nm).unwrap();
+    let planes = (0..grid.len()).map(|_| noise(&mut rng)).collect();
+    SpectralImage::new(quantity, grid, planes).unwrap()
+}
+
+fn scene() -> Scene {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let mut scene = Scene::new("noise", image(Quantity::Radiance, vec![380.0, 550.0, 1000.0 / 1.5, 1000.0]));
+    scene.depth = Some(DepthMap::new(noise(&mut rng)).unwrap());
+    scene.view = Some(View { focal_px: 10.0 / 3.0, center_x_px: 3.25, center_y_px: 2.0 });
+    scene
+}
+
+struct TestFile {
+    _folder: tempfile::TempDir,
+    path: PathBuf,
+}
+
+fn file() -> TestFile {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("test.exr");
+    TestFile { _folder: folder, path }
+}
+
+/// Writes channels as they are, right or wrong.
+fn write_raw(path: &PathBuf, channels: Vec<(&str, FlatSamples)>, attributes: &[(&str, &str)]) {
+    let list: SmallVec<[_; 4]> = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples)).collect();
+    let mut layer = LayerAttributes::default();
+    for (name, value) in attributes {
+        layer.other.insert(Text::from(*name), AttributeValue::Text(Text::from(*value)));
+    }
+    let layer = Layer::new((2, 2), layer, Encoding::FAST_LOSSLESS, AnyChannels::sort(list));
+    Image::from_layer(layer).write().to_file(path).unwrap();
+}
+
+fn flat(value: f32) -> FlatSamples {
+    FlatSamples::F32(vec![value; 4])
+}
+
+#[track_caller]
+fn refused(channels: Vec<(&str, FlatSamples)>, attributes: &[(&str, &str)], words: &[&str]) {
+    let file = file();
+    write_raw(&file.path, channels, attributes);
+    let message = read_spectral_exr(&file.path).unwrap_err().to_string();
+    for word in words.iter().chain(&["test.exr"]) {
+        assert!(message.contains(word), "'{word}' in: {message}");
+    }
+    assert!(!message.contains('\n'));
+}
+
+#[test]
+fn a_scene_comes_back_to_the_bit() {
+    for compress in [false, true] {
+        let (file, mut scene) = (file(), scene());
+        write_scene_exr(&file.path, &scene, compress).unwrap();
+        let back = read_spectral_exr(&file.path).unwrap();
+        assert_eq!(back.image, scene.radiance);
+        assert_eq!((back.depth, back.view, back.hidden), (scene.depth.clone(), scene.view, None));
+
+        let hidden = HiddenLayer { radiance: scene.radiance.clone(), depth: scene.depth.clone().unwrap() };
+        scene.hidden = Some(hidden);
+        write_scene_exr(&file.path, &scene, compress).unwrap();
+        let back = read_spectral_exr(&file.path).unwrap();
+        assert_eq!((back.image, back.hidden), (scene.radiance, scene.hidden));
+    }
+}
+
+#[test]
+fn irradiance_keeps_its_pitch_and_reflectance_its_kind() {
+    let file = file();
+    let irradiance = image(Quantity::Irradiance, vec![500.0]).with_pitch_um(1.4);
+    write_spectral_exr(&file.path, &irradiance, &ExrParts::default()).unwrap();
+    assert_eq!(read_spectral_exr(&file.path).unwrap().image, irradiance);
+    let reflectance = image(Quantity::Reflectance, vec![400.0, 700.0]);
+    write_spectral_exr(&file.path, &reflectance, &ExrParts::default()).unwrap();
+    assert_eq!(read_spectral_exr(&file.path).unwrap().image, reflectance);
+}
+
+#[test]
+fn bands_written_one_by_one_make_the_same_file() {
+    let (file, scene) = (file(), scene());
+    let parts = ExrParts { depth: scene.depth.as_ref(), view: scene.view, pitch_um: Some(3.0), ..ExrParts::default() };
+    let grid = scene.radiance.grid();
+    let mut writer = BandWriter::create(&file.path, Quantity::Irradiance, grid, (ROWS, COLUMNS), &parts).unwrap();
+    for band in [2, 0, 3, 1] {
+        writer.write_band(band, &scene.radiance.planes()[band]).unwrap();
+    }
+    assert!(!file.path.exists());
+    writer.finish().unwrap();
+    let back = read_spectral_exr(&file.path).unwrap();
+    let planes = scene.radiance.planes().to_vec();
+    let expected = SpectralImage::new(Quantity::Irradiance, grid.clone(), planes).unwrap().with_pitch_um(3.0);
+    assert_eq!((back.image, back.depth, back.view), (expected, scene.depth, scene.view));
+}
+
+#[test]
+fn a_band_writer_left_unfinished_leaves_nothing() {
+    let (file, scene) = (file(), scene());
+    let grid = scene.radiance.grid();
+    let create = || BandWriter::create(&file.path, Quantity::Radiance, grid, (ROWS, COLUMNS), &ExrParts::default());
+    let mut writer = create().unwrap();
+    writer.write_band(0, &scene.radiance.planes()[0]).unwrap();
+    assert!(writer.write_band(9, &scene.radiance.planes()[0]).is_err());
+    assert!(writer.write_band(1, &Array2::zeros((1, 1))).unwrap_err().to_string().contains("1 × 1 samples"));
+    assert!(writer.finish().unwrap_err().to_string().contains("S0.550,000000nm"));
+    drop(create().unwrap());
+    assert_eq!(fs::read_dir(file.path.parent().unwrap()).unwrap().count(), 0);
+}
+
+#[test]
+fn planes_of_volts_come_back() {
+    let (file, scene) = (file(), scene());
+    let volts = &scene.radiance.planes()[0];
+    write_planes_exr(&file.path, &[("V", volts), ("Z", scene.depth.as_ref().unwrap().z_m())], false).unwrap();
+    let planes = read_planes_exr(&file.path).unwrap();
+    assert_eq!(planes.iter().find(|(name, _)| name == "V").map(|(_, plane)| plane), Some(volts));
+    assert!(write_planes_exr(&file.path, &[], false).is_err());
+    assert!(read_spectral_exr(&file.path).unwrap_err().to_string().contains("no spectral band"));
+}
+
+#[test]
+fn half_floats_other_units_and_rgb_are_read() {
+    let file = file();
+    let half = FlatSamples::F16(vec![f16::from_f32(0.5); 4]);
+    let channels = vec![("R", flat(9.0)), ("S0.0,55um", flat(2.0)), ("S0.1000nm", flat(3.0)), ("S0.400.0nm", half)];
+    write_raw(&file.path, channels, &[("emissiveUnits", "W.m^-2.sr^-1")]);
+    let back = read_spectral_exr(&file.path).unwrap();
+    assert_eq!(back.image.grid().centers_nm()[1].round(), 550.0);
+    assert_eq!(back.image.spectrum_at(1, 1), [0.5, 2.0, 3.0]);
+    assert_eq!(back.image.quantity(), Quantity::Radiance);
+}
+
+#[test]
+fn distance_becomes_depth_with_a_view() {
+    let file = file();
+    write_raw(&file.path, vec![("S0.500nm", flat(1.0)), ("distance", flat(2.0))], &[]);
+    let back = read_spectral_exr(&file.path).unwrap();
+    assert_eq!(back.depth_with(None), Ok(None));
+    let view = View { focal_px: 1.0, center_x_px: 0.0, center_y_px: 0.0 };
+    let depth = back.depth_with(Some(view)).unwrap().unwrap();
+    assert_eq!((depth.z_m()[(0, 0)], depth.z_m()[(0, 1)]), (2.0, (2.0 / 2.0_f64.sqrt()) as f32));
+}
+
+#[test]
+fn wrong_contents_are_refused_in_one_sentence() {
+    let s0 = "S0.500nm";
+    refused(vec![("R", flat(1.0)), ("G", flat(1.0))], &[], &["no spectral band"]);
+    refused(vec![(s0, flat(f32::NAN))], &[], &["500 nm", "row 0, column 0", "NaN"]);
+    refused(vec![(s0, FlatSamples::F32(vec![1.0, 1.0, 1.0, -2.0]))], &[], &["row 1, column 1", "-2"]);
+    refused(vec![(s0, flat(1.0)), ("Z", flat(0.0))], &[], &["depth", "row 0"]);
+    refused(vec![(s0, flat(1.0)), ("distance", flat(-1.0))], &[], &["depth"]);
+    refused(vec![(s0, flat(1.0)), ("T.600nm", flat(1.0))], &[], &["mixed", s0, "T.600nm"]);
+    refused(vec![(s0, flat(1.0)), ("S0.500,0nm", flat(1.0))], &[], &["same wavelength", s0]);
+    refused(vec![(s0, flat(1.0))], &[("emissiveUnits", "lm")], &["units", "'lm'"]);
+    refused(vec![(s0, flat(1.0))], &[("viewFocalPx", "-3")], &["focal"]);
+    refused(vec![(s0, flat(1.0))], &[("viewHorizontalFovDeg", "200")], &["200°"]);
+}
+
+#[test]
+fn a_truncated_or_absent_or_foreign_file_is_refused() {
+    let (file, scene) = (file(), scene());
+    write_scene_exr(&file.path, &scene, true).unwrap();
+    let whole = fs::read(&file.path).unwrap();
+    fs::write(&file.path, &whole[..whole.len() - 20]).unwrap();
+    let message = read_spectral_exr(&file.path).unwrap_err().to_string();
+    assert!(message.contains("test.exr") && message.contains("truncated"), "{message}");
+    fs::write(&file.path, b"not a picture").unwrap();
+    assert!(matches!(read_spectral_exr(&file.path), Err(SceneError::Unreadable { .. })));
+    fs::remove_file(&file.path).unwrap();
+    assert!(matches!(read_spectral_exr(&file.path), Err(SceneError::Unreadable { .. })));
+    let nowhere = file.path.join("no/folder.exr");
+    assert!(matches!(write_scene_exr(&nowhere, &scene, false), Err(SceneError::Unwritable { .. })));
+}
+
+#[test]
+fn a_header_that_asks_for_terabytes_is_refused_before_it_is_believed() {
+    let (file, scene) = (file(), scene());
+    write_scene_exr(&file.path, &scene, false).unwrap();
+    let mut bytes = fs::read(&file.path).unwrap();
+    let key = b"dataWindow\0box2i\0";
+    let at = bytes.windows(key.len()).position(|window| window == key).unwrap() + key.len() + 4;
+    bytes[at + 8..at + 12].copy_from_slice(&1_000_000_i32.to_le_bytes());
+    bytes[at + 12..at + 16].copy_from_slice(&1_000_000_i32.to_le_bytes());
+    fs::write(&file.path, &bytes).unwrap();
+    let message = read_spectral_exr(&file.path).unwrap_err().to_string();
+    assert!(message.contains("more than the limit"), "{message}");
+}
+
+#[test]
+fn no_mutation_of_a_file_makes_the_reader_panic() {
+    let (file, scene) = (file(), scene());
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut n_refused = 0;
+    for compress in [false, true] {
+        write_scene_exr(&file.path, &scene, compress).unwrap();
+        let whole = fs::read(&file.path).unwrap();
+        for _ in 0..1500 {
+            let mut bytes = whole.clone();
+            if rng.random::<f32>() < 0.2 {
+                bytes.truncate(rng.random_range(0..whole.len()));
+            } else {
+                for _ in 0..rng.random_range(1..4) {
+                    let at = rng.random_range(0..bytes.len());
+                    bytes[at] ^= rng.random_range(1..=255_u8);
+                }
+            }
+            fs::write(&file.path, &bytes).unwrap();
+            n_refused += usize::from(read_spectral_exr(&file.path).is_err());
+        }
+    }
+    // A flipped byte of a plain sample is no error; most others are.
+    assert!(n_refused > 800, "{n_refused} of 3000 refused");
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+fn the_real_files_are_read() {
+    let Some(folder) = dioptric_golden::shared("data/scenes") else { return };
+    for (name, quantity, size, bands, has_depth) in [
+        ("piano3d.radiance_depth", Quantity::Radiance, (200, 200), 31, true),
+        ("motorcycle_370.radiance_depth", Quantity::Radiance, (250, 370), 16, true),
+        ("cave_chart_crop.radiance", Quantity::Radiance, (256, 300), 31, false),
+        ("cave_chart_and_stuffed_toy.reflectance", Quantity::Reflectance, (512, 512), 31, false),
+        ("spectral_exr_reference_Macbeth", Quantity::Reflectance, (400, 600), 36, false),
+        ("spectral_exr_reference_D65", Quantity::Radiance, (1, 1), 90, false),
+    ] {
+        let back = read_spectral_exr(&folder.join(format!("{name}.exr"))).unwrap();
+        assert_eq!(back.image.quantity(), quantity, "{name}");
+        assert_eq!((back.image.rows(), back.image.columns()), size, "{name}");
+        assert_eq!(back.image.grid().len(), bands, "{name}");
+        assert_eq!(back.depth.is_some(), has_depth, "{name}");
+    }
+}

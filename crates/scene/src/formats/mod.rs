@@ -1,0 +1,22 @@
+//! Files of scenes.
+
+mod band_folder;
+mod band_name;
+mod beside;
+mod camera;
+mod envi;
+mod envi_header;
+mod exr_attributes;
+#[cfg(test)]
+mod exr_tests;
+mod exr_write;
+mod picture;
+mod read_scene;
+mod spectral_exr;
+
+pub use band_folder::read_band_folder;
+pub use envi::{EnviCube, read_envi};
+pub use exr_write::{BandWriter, ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
+pub use picture::read_picture;
+pub use read_scene::{ReadOptions, read_scene};
+pub use spectral_exr::{SpectralFile, read_planes_exr, read_spectral_exr};

@@ -1,0 +1,235 @@
+//! Reading spectral OpenEXR in the layout of Fichet, Pacanowski and Wilkie (2021), with depth.
+
+use std::{collections::HashMap, fs::File, io::BufReader, path::Path};
+
+use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use exr::{
+    meta::MetaData,
+    prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, ReadChannels, ReadLayers, read},
+};
+use ndarray::Array2;
+
+use super::{
+    band_name::{self, BandKind},
+    beside::unreadable,
+    exr_attributes::{self, Attributes},
+};
+use crate::{HiddenLayer, SceneError, View};
+
+/// The name of the layer that holds what lies behind the first surface.
+pub(crate) const HIDDEN_LAYER: &str = "hidden";
+
+/// No picture read here may need more memory than this.
+const LIMIT_BYTES: u64 = 16 << 30;
+/// The samples of a compressed file are at most this many times the file, or the header lies.
+const LIMIT_RATIO: u64 = 2000;
+
+/// What a spectral EXR file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpectralFile {
+    /// Radiance, irradiance or reflectance; with the sample pitch where the file tells it.
+    pub image: SpectralImage,
+    /// Axial depth, from channel `Z`.
+    pub depth: Option<DepthMap>,
+    /// Distance from the projection centre, m, from channel `distance`.
+    pub distance_m: Option<Array2<f32>>,
+    /// Pinhole geometry, where the file tells it.
+    pub view: Option<View>,
+    /// What lies behind the first surface, from a second layer of that name.
+    pub hidden: Option<HiddenLayer>,
+}
+
+impl SpectralFile {
+    /// Returns the axial depth: from `Z`, or else from `distance` as seen with this view.
+    ///
+    /// # Errors
+    /// When a converted distance is not above 0.
+    pub fn depth_with(&self, view: Option<View>) -> Result<Option<DepthMap>, SceneError> {
+        if let (None, Some(distance), Some(view)) = (&self.depth, &self.distance_m, view) {
+            let z = Array2::from_shape_fn(distance.dim(), |(row, column)| {
+                let along = view.distance_per_depth(row as f64, column as f64);
+                (f64::from(distance[(row, column)]) / along) as f32
+            });
+            return Ok(Some(DepthMap::new(z)?));
+        }
+        Ok(self.depth.clone())
+    }
+}
+
+/// Reads a spectral EXR file.
+///
+/// Channels are `S0.…` (radiance, or irradiance where `emissiveUnits` says so) or `T.…` (reflectance), in any number
+/// of decimals, with exponents and any unit of length or frequency, as half or single floats. Values are a
+/// nanometre. Other channels, such as RGB, are left alone, but for `Z` and `distance`.
+///
+/// # Errors
+/// One sentence with the file's name when it is truncated, too large, without spectral bands, of mixed units, or holds
+/// a sample that is not finite or is negative.
+pub fn read_spectral_exr(path: &Path) -> Result<SpectralFile, SceneError> {
+    let mut layers = read_layers(path)?;
+    let Some(index) = layers.iter().position(|layer| layer.has_bands()) else {
+        return Err(SceneError::NoBands {
+            file: path.to_owned(),
+            expected: "channels named like S0.550,000000nm (light) or T.550,000000nm (reflectance)",
+        });
+    };
+    let first = layers.swap_remove(index);
+    let hidden = layers.into_iter().find(|layer| layer.name == HIDDEN_LAYER && layer.has_bands());
+    let attributes = first.attributes.clone();
+    let (image, depth, distance_m) = first.into_image(path)?;
+    let hidden = match hidden {
+        Some(layer) => match layer.into_image(path)? {
+            (radiance, Some(depth), _) => Some(HiddenLayer { radiance, depth }),
+            _ => return Err(unreadable(path, "the layer 'hidden' has no channel 'Z'")),
+        },
+        None => None,
+    };
+    let image = match attributes.pitch_um {
+        Some(pitch_um) => image.with_pitch_um(pitch_um),
+        None => image,
+    };
+    let view = attributes.view(image.columns(), image.rows()).map_err(|error| unreadable(path, error))?;
+    Ok(SpectralFile { image, depth, distance_m, view, hidden })
+}
+
+/// Reads every channel of an EXR file's first layer as single floats, by name.
+///
+/// # Errors
+/// When the file is truncated, too large or no EXR.
+pub fn read_planes_exr(path: &Path) -> Result<Vec<(String, Array2<f32>)>, SceneError> {
+    Ok(read_layers(path)?.swap_remove(0).planes)
+}
+
+/// A layer, its channels as single floats.
+struct RawLayer {
+    name: String,
+    attributes: Attributes,
+    planes: Vec<(String, Array2<f32>)>,
+}
+
+impl RawLayer {
+    fn has_bands(&self) -> bool {
+        self.planes.iter().any(|(name, _)| band_name::parse(name).is_some())
+    }
+
+    /// Sorts the channels into an image, `Z` and `distance`.
+    fn into_image(self, path: &Path) -> Result<Parts, SceneError> {
+        let mut kinds = HashMap::new();
+        let mut bands = Vec::new();
+        let (mut depth, mut distance_m) = (None, None);
+        for (name, plane) in self.planes {
+            if let Some((kind, wavelength_nm)) = band_name::parse(&name) {
+                kinds.entry(kind == BandKind::Emissive).or_insert_with(|| name.clone());
+                bands.push((wavelength_nm, name, plane));
+            } else if name == "Z" {
+                depth = Some(plane);
+            } else if name == "distance" {
+                distance_m = Some(plane);
+            }
+        }
+        let units = |reason: String| Err(SceneError::Units { file: path.to_owned(), reason });
+        if let (Some(light), Some(reflectance)) = (kinds.get(&true), kinds.get(&false)) {
+            return units(format!("both light ('{light}') and reflectance ('{reflectance}') channels"));
+        }
+        bands.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some(pair) = bands.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            return units(format!("channels '{}' and '{}' are the same wavelength", pair[0].1, pair[1].1));
+        }
+        let quantity = match (kinds.contains_key(&true), &self.attributes.quantity) {
+            (false, _) => Quantity::Reflectance,
+            (true, Ok(quantity)) => quantity.unwrap_or(Quantity::Radiance),
+            (true, Err(unknown)) => {
+                return units(format!(
+                    "emissiveUnits is '{unknown}': expected W.m^-2.sr^-1 or W.m^-2, a nanometre understood"
+                ));
+            }
+        };
+        let values = |source| SceneError::Values { file: path.to_owned(), source };
+        let grid = WavelengthGrid::new(bands.iter().map(|band| band.0).collect()).map_err(values)?;
+        let planes = bands.into_iter().map(|band| band.2).collect();
+        let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
+        image.check_samples().map_err(values)?;
+        let depth = depth.map(DepthMap::new).transpose().map_err(values)?;
+        let distance_m = distance_m.map(DepthMap::new).transpose().map_err(values)?.map(|map| map.z_m().clone());
+        Ok((image, depth, distance_m))
+    }
+}
+
+type Parts = (SpectralImage, Option<DepthMap>, Option<Array2<f32>>);
+
+/// Reads all layers; at least one.
+fn read_layers(path: &Path) -> Result<Vec<RawLayer>, SceneError> {
+    let open = || File::open(path).map_err(|error| unreadable(path, error));
+    guard(path, open()?)?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_buffered(BufReader::new(open()?))
+        .map_err(|error| unreadable(path, explain(&error)))?;
+    let layers: Result<Vec<_>, _> = image.layer_data.into_iter().map(|layer| raw_layer(path, layer)).collect();
+    let layers = layers?;
+    if layers.is_empty() {
+        return Err(unreadable(path, "it has no layer"));
+    }
+    Ok(layers)
+}
+
+fn raw_layer(path: &Path, layer: Layer<AnyChannels<FlatSamples>>) -> Result<RawLayer, SceneError> {
+    let (columns, rows) = (layer.size.0, layer.size.1);
+    let planes: Result<Vec<_>, _> =
+        layer.channel_data.list.into_iter().map(|channel| plane_of(path, channel, rows, columns)).collect();
+    Ok(RawLayer {
+        name: layer.attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default(),
+        attributes: exr_attributes::from_layer(&layer.attributes),
+        planes: planes?,
+    })
+}
+
+fn plane_of(
+    path: &Path,
+    channel: AnyChannel<FlatSamples>,
+    rows: usize,
+    columns: usize,
+) -> Result<(String, Array2<f32>), SceneError> {
+    let samples: Vec<f32> = match channel.sample_data {
+        FlatSamples::F16(samples) => samples.into_iter().map(|v| v.to_f32()).collect(),
+        FlatSamples::F32(samples) => samples,
+        FlatSamples::U32(samples) => samples.into_iter().map(|v| v as f32).collect(),
+    };
+    let name = channel.name.to_string();
+    match Array2::from_shape_vec((rows, columns), samples) {
+        Ok(plane) => Ok((name, plane)),
+        Err(_) => Err(unreadable(path, format!("channel '{name}' has not {rows} × {columns} samples"))),
+    }
+}
+
+/// Refuses a file whose header asks for more memory than it can fill.
+fn guard(path: &Path, file: File) -> Result<(), SceneError> {
+    let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
+    let meta =
+        MetaData::read_from_buffered(BufReader::new(file), false).map_err(|error| unreadable(path, explain(&error)))?;
+    let bytes = meta.headers.iter().fold(0_u64, |sum, header| {
+        let samples = (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
+        let sample_bytes = header.channels.list.iter().map(|channel| channel.sample_type.bytes_per_sample() as u64);
+        // Even a file without channels has a table of its rows.
+        sum.saturating_add(samples.saturating_mul(sample_bytes.sum::<u64>().max(1)))
+    });
+    let limit = LIMIT_BYTES.min(length.saturating_mul(LIMIT_RATIO));
+    if bytes > limit {
+        return Err(SceneError::TooLarge { file: path.to_owned(), bytes, limit });
+    }
+    Ok(())
+}
+
+/// Returns what is wrong with an EXR file in a few words.
+fn explain(error: &exr::error::Error) -> String {
+    let text = error.to_string();
+    // The crate turns the end of a file into these words.
+    if text.contains("reference to missing bytes") {
+        return "the file ends too early (truncated)".to_owned();
+    }
+    format!("no OpenEXR file that can be read ({text})")
+}
