@@ -38,7 +38,9 @@ def nanometres(um) -> str:
 def line(glass) -> str:
     if glass["type"] == "tabulated n":
         formula = "t"
-        numbers = [word for um, n in zip(glass["wl_um"], glass["n"]) for word in (nanometres(um), text(n))]
+        # Two tables of the source (LZOS CTK8 and OF1) have a row out of order.
+        rows = sorted(zip(glass["wl_um"], glass["n"]))
+        numbers = [word for um, n in rows for word in (nanometres(um), text(n))]
     else:
         formula = glass["type"].removeprefix("formula ")
         numbers = [text(c) for c in glass["c"]]

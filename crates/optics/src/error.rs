@@ -117,6 +117,16 @@ pub enum OpticsError {
         /// The names that would do.
         known: String,
     },
+    /// A name that means several things.
+    #[error("{kind} '{name}' could be {}; name one of them", in_words(candidates))]
+    Ambiguous {
+        /// What was looked for.
+        kind: &'static str,
+        /// The name given.
+        name: String,
+        /// What it could mean, each by a name that means it alone.
+        candidates: Vec<String>,
+    },
     /// A file that cannot be read or written.
     #[error("{path}: {reason}")]
     Io {
@@ -135,4 +145,12 @@ pub enum OpticsError {
         /// What is wrong there and what was expected.
         reason: String,
     },
+}
+
+/// Joins names as `a, b or c`.
+fn in_words(names: &[String]) -> String {
+    match names {
+        [first @ .., last] if !first.is_empty() => format!("{} or {last}", first.join(", ")),
+        _ => names.concat(),
+    }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::OpticsError;
+use crate::{GlassCatalogue, OpticsError};
 
 /// The helium d line, at which catalogues state the main index, nm.
 pub const D_LINE_NM: f64 = 587.5618;
@@ -21,6 +21,8 @@ pub enum Glass {
     /// Air, of index 1 exactly: catalogue indices are relative to it.
     #[default]
     Air,
+    /// A glass of the built-in [`GlassCatalogue`], by a name that means it alone, as `SCHOTT:N-BK7`.
+    Named(String),
     /// A medium without dispersion.
     Constant {
         /// The index.
@@ -116,6 +118,7 @@ impl Glass {
     /// Where the index is known, nm; `None` for a law without stated ends.
     pub fn range_nm(&self) -> Option<(f64, f64)> {
         match self {
+            Self::Named(name) => named(name)?.range_nm(),
             Self::Sellmeier { range_nm, .. } | Self::Formula { range_nm, .. } => *range_nm,
             Self::Tabulated { wavelengths_nm, .. } => Some((*wavelengths_nm.first()?, *wavelengths_nm.last()?)),
             _ => None,
@@ -134,6 +137,7 @@ impl Glass {
     pub fn describe(&self) -> String {
         match self {
             Self::Air => "air".to_owned(),
+            Self::Named(name) => format!("the glass {name}"),
             Self::Constant { index } => format!("the medium of constant index {index}"),
             Self::Linear { index, reference_nm, .. } => {
                 format!("the medium of index {index} at {reference_nm} nm with a linear law")
@@ -167,6 +171,7 @@ impl Glass {
         };
         match self {
             Self::Air => Ok(()),
+            Self::Named(name) => GlassCatalogue::built_in().find(name).map(|_| ()),
             Self::Constant { index } => positive("index", *index),
             Self::Linear { index, reference_nm, slope_per_nm } => {
                 positive("index", *index)?;
@@ -214,6 +219,7 @@ impl Glass {
         let um = 1e-3 * wavelength_nm;
         match self {
             Self::Air => 1.0,
+            Self::Named(name) => named(name).map_or(f64::NAN, |glass| glass.index_unchecked(wavelength_nm)),
             Self::Constant { index } => *index,
             Self::Linear { index, reference_nm, slope_per_nm } => index + slope_per_nm * (wavelength_nm - reference_nm),
             Self::Cauchy { a, b_um2 } => a + b_um2 / (um * um),
@@ -229,6 +235,10 @@ impl Glass {
             Self::Tabulated { wavelengths_nm, indices } => interpolate(wavelengths_nm, indices, wavelength_nm),
         }
     }
+}
+
+fn named(name: &str) -> Option<&'static Glass> {
+    GlassCatalogue::built_in().find(name).ok().map(|found| &found.glass)
 }
 
 fn check_range(range_nm: Option<(f64, f64)>) -> Result<(), OpticsError> {
@@ -348,6 +358,17 @@ mod tests {
         check(&sellmeier, 550.0, squared.index_at(550.0).unwrap());
         check(&polynomial, 500.0, (2.25_f64 + 0.08).sqrt());
         check(&cauchy, 500.0, 1.52);
+    }
+
+    #[test]
+    fn named_glass_is_that_of_the_catalogue() {
+        let bk7 = Glass::Named("SCHOTT:N-BK7".to_owned());
+        check(&bk7, D_LINE_NM, 1.51680);
+        assert_eq!(bk7.range_nm(), Some((300.0, 2500.0)));
+        let message = bk7.index_at(200.0).unwrap_err().to_string();
+        assert!(message.starts_with("the glass SCHOTT:N-BK7 is known from 300"), "{message}");
+        assert!(Glass::Named("F2".to_owned()).check().unwrap_err().to_string().contains("SCHOTT:F2"));
+        assert!(Glass::Named("F2".to_owned()).index_at(550.0).is_err());
     }
 
     #[test]

@@ -8,6 +8,7 @@
 //! bend the rays, and trace on ([`MonoLens::trace_surfaces`]).
 #![doc = include_str!("../README.md")]
 
+mod catalogue;
 mod error;
 mod formats;
 mod glass;
@@ -21,6 +22,7 @@ mod rays;
 mod surface;
 mod trace;
 
+pub use catalogue::{CatalogueGlass, GlassCatalogue};
 pub use error::OpticsError;
 pub use glam;
 pub use glass::{C_LINE_NM, D_LINE_NM, F_LINE_NM, Glass};

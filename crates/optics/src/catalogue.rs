@@ -1,0 +1,269 @@
+//! Glasses by name: the built-in catalogue, and those that are read from files.
+
+use std::{collections::HashMap, sync::LazyLock};
+
+use crate::{Glass, OpticsError};
+
+/// A glass with its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CatalogueGlass {
+    /// Who makes it, as `SCHOTT`; `MISC` for what no one maker owns. Empty where a file does not say.
+    pub maker: String,
+    /// What its maker calls it, as `N-BK7`.
+    pub name: String,
+    /// The law of its index.
+    pub glass: Glass,
+}
+
+impl CatalogueGlass {
+    /// Returns the name that means this glass and no other: `SCHOTT:N-BK7`.
+    pub fn full_name(&self) -> String {
+        if self.maker.is_empty() { self.name.clone() } else { format!("{}:{}", self.maker, self.name) }
+    }
+}
+
+/// Glasses that are found by their names.
+///
+/// A name is `N-BK7`, `SCHOTT:N-BK7` or `schott/n-bk7`. Where no glass has exactly that name, hyphens, blanks and
+/// other signs do not count, so that `NBK7` is found too. A name that means several glasses is an error, which lists
+/// them; so is one that means none, which lists similar ones. Nothing is ever replaced by something similar.
+#[derive(Clone, Debug, Default)]
+pub struct GlassCatalogue {
+    // Invariant: `by_key` lists the index of every glass under the key of its name.
+    glasses: Vec<CatalogueGlass>,
+    by_key: HashMap<String, Vec<usize>>,
+}
+
+const BUILT_IN: &str = include_str!("../data/glass/catalogue.csv");
+
+/// Names that other programs use for glasses of the built-in catalogue.
+const ALIASES: &[(&str, &str)] = &[
+    ("FSILICA", "FUSEDSILICA"),
+    ("SILICA", "FUSEDSILICA"),
+    ("ACRYLIC", "PMMA"),
+    ("POLYCARB", "PC"),
+    ("POLYCARBONATE", "PC"),
+    ("POLYSTYR", "PS"),
+    ("POLYSTYRENE", "PS"),
+    ("E48R", "ZEONEXE48R"),
+    ("OPTOREZ", "OPTOREZ1330"),
+    ("MGF2", "MGF2O"),
+    ("SAPPHIRE", "SAPPHIREO"),
+];
+
+impl GlassCatalogue {
+    /// The built-in glasses: those of six makers and LZOS, and a few plastics, crystals and fluids.
+    ///
+    /// The numbers are the refractiveindex.info database's (public domain, CC0 1.0). Indices are relative to air, but
+    /// for the fluids, whose source gives them relative to vacuum.
+    pub fn built_in() -> &'static Self {
+        static CATALOGUE: LazyLock<GlassCatalogue> = LazyLock::new(|| {
+            let rows = BUILT_IN.lines().filter(|line| !line.starts_with('#'));
+            GlassCatalogue::new(rows.map(|row| glass_of_row(row).expect("a test reads every row")).collect())
+        });
+        &CATALOGUE
+    }
+
+    /// Returns a catalogue of these glasses.
+    pub fn new(glasses: Vec<CatalogueGlass>) -> Self {
+        let mut by_key: HashMap<String, Vec<usize>> = HashMap::with_capacity(glasses.len());
+        for (i, glass) in glasses.iter().enumerate() {
+            by_key.entry(key_of(&glass.name)).or_default().push(i);
+        }
+        Self { glasses, by_key }
+    }
+
+    /// All glasses, in the order of the source.
+    pub fn glasses(&self) -> &[CatalogueGlass] {
+        &self.glasses
+    }
+
+    /// Returns the names of the makers, each once, in alphabetical order.
+    pub fn makers(&self) -> Vec<&str> {
+        let mut makers: Vec<&str> = self.glasses.iter().map(|glass| glass.maker.as_str()).collect();
+        makers.sort_unstable();
+        makers.dedup();
+        makers
+    }
+
+    /// Returns the glass of this name, with or without its maker.
+    ///
+    /// # Errors
+    /// When the name means no glass, or several.
+    pub fn find(&self, name: &str) -> Result<&CatalogueGlass, OpticsError> {
+        match self.all_named(name).as_slice() {
+            [] => Err(self.unknown(name)),
+            [glass] => Ok(glass),
+            several => {
+                let candidates = several.iter().map(|glass| glass.full_name()).collect();
+                Err(OpticsError::Ambiguous { kind: "glass", name: name.to_owned(), candidates })
+            }
+        }
+    }
+
+    /// Returns the glass of this name from the first of these makers that has one, else as [`find`](Self::find) does.
+    ///
+    /// # Errors
+    /// When the name means no glass, or several and none of these makers'.
+    pub fn find_among(&self, name: &str, makers: &[String]) -> Result<&CatalogueGlass, OpticsError> {
+        let named = self.all_named(name);
+        let of_maker = |maker: &String| {
+            let mut found = named.iter().filter(|glass| glass.maker.eq_ignore_ascii_case(maker));
+            found.next().filter(|_| found.next().is_none())
+        };
+        makers.iter().find_map(of_maker).map_or_else(|| self.find(name), |glass| Ok(glass))
+    }
+
+    /// Returns the glasses nearest to an index at the d line and an Abbe number, the nearest first, each with its
+    /// distance.
+    ///
+    /// Distances are counted in the usual tolerances of a melt, 0.0005 in `n_d` and 0.8 % in `V_d`, added in quadrature.
+    pub fn nearest(&self, nd: f64, vd: f64, n_glasses: usize) -> Vec<(&CatalogueGlass, f64)> {
+        let distance = |glass: &CatalogueGlass| {
+            let (its_nd, its_vd) = glass.glass.nd_vd()?;
+            let distance = ((its_nd - nd) / 0.0005).hypot((its_vd - vd) / (0.008 * vd));
+            distance.is_finite().then_some(distance)
+        };
+        let mut found: Vec<_> = self.glasses.iter().filter_map(|glass| Some((glass, distance(glass)?))).collect();
+        found.sort_by(|a, b| a.1.total_cmp(&b.1));
+        found.truncate(n_glasses);
+        found
+    }
+
+    /// Returns the glasses whose full name holds this text, whatever the case.
+    pub fn search(&self, text: &str) -> impl Iterator<Item = &CatalogueGlass> {
+        let text = text.to_uppercase();
+        self.glasses.iter().filter(move |glass| glass.full_name().to_uppercase().contains(&text))
+    }
+
+    /// Every glass that the name could mean.
+    fn all_named(&self, name: &str) -> Vec<&CatalogueGlass> {
+        let (maker, name) = split_maker(name);
+        let key = key_of(name);
+        let key = match ALIASES.iter().find(|(alias, _)| *alias == key) {
+            Some((alias, other)) if !self.by_key.contains_key(*alias) => (*other).to_owned(),
+            _ => key,
+        };
+        let all = self.by_key.get(&key).into_iter().flatten().map(|&i| &self.glasses[i]);
+        let all: Vec<_> = all.filter(|glass| maker.is_none_or(|m| glass.maker.eq_ignore_ascii_case(m))).collect();
+        let exact: Vec<_> = all.iter().copied().filter(|glass| glass.name.eq_ignore_ascii_case(name)).collect();
+        if exact.is_empty() { all } else { exact }
+    }
+
+    fn unknown(&self, name: &str) -> OpticsError {
+        let (_, bare) = split_maker(name);
+        let key = key_of(bare);
+        let mut similar: Vec<&CatalogueGlass> = match key.len() {
+            0 | 1 => Vec::new(),
+            _ => self.glasses.iter().filter(|glass| key_of(&glass.name).contains(&key)).collect(),
+        };
+        similar.sort_by_key(|glass| glass.name.len());
+        let known = match similar.as_slice() {
+            [] => "no name is similar".to_owned(),
+            some => {
+                let names: Vec<String> = some.iter().take(8).map(|glass| glass.full_name()).collect();
+                format!("similar names are {}", names.join(", "))
+            }
+        };
+        OpticsError::Unknown { kind: "glass", name: name.to_owned(), known }
+    }
+}
+
+/// Splits `MAKER:NAME` or `maker/name`.
+fn split_maker(name: &str) -> (Option<&str>, &str) {
+    match name.split_once([':', '/']) {
+        Some((maker, name)) => (Some(maker.trim()), name.trim()),
+        None => (None, name.trim()),
+    }
+}
+
+/// What counts of a name when signs do not: its letters, in capitals, and its digits.
+fn key_of(name: &str) -> String {
+    name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_uppercase()).collect()
+}
+
+/// Reads a row `maker,name,formula,first_nm,last_nm,numbers` of the built-in catalogue.
+fn glass_of_row(row: &str) -> Option<CatalogueGlass> {
+    let cells: Vec<&str> = row.split(',').collect();
+    let [maker, name, formula, first_nm, last_nm, numbers] = cells[..] else { return None };
+    let numbers: Vec<f64> = numbers.split(' ').map(str::parse).collect::<Result<_, _>>().ok()?;
+    let glass = if formula == "t" {
+        let column = |first: usize| numbers.iter().skip(first).step_by(2).copied().collect();
+        Glass::Tabulated { wavelengths_nm: column(0), indices: column(1) }
+    } else {
+        let range_nm = Some((first_nm.parse().ok()?, last_nm.parse().ok()?));
+        Glass::Formula { formula: formula.parse().ok()?, coefficients: numbers, range_nm }
+    };
+    Some(CatalogueGlass { maker: maker.to_owned(), name: name.to_owned(), glass })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_is_read_and_makes_sense() {
+        let catalogue = GlassCatalogue::built_in();
+        assert_eq!(catalogue.glasses().len(), 1694);
+        for glass in catalogue.glasses() {
+            glass.glass.check().unwrap();
+            let (nd, vd) = glass.glass.nd_vd().unwrap_or_else(|| panic!("{}", glass.full_name()));
+            assert!((1.0..2.5).contains(&nd) && (10.0..120.0).contains(&vd), "{} {nd} {vd}", glass.full_name());
+            assert_eq!(catalogue.find(&glass.full_name()).unwrap(), glass);
+        }
+        let makers = ["CDGM", "HIKARI", "HOYA", "LZOS", "MISC", "OHARA", "SCHOTT", "SUMITA"];
+        assert_eq!(catalogue.makers(), makers);
+    }
+
+    #[track_caller]
+    fn check(name: &str, expected: &str) {
+        assert_eq!(GlassCatalogue::built_in().find(name).unwrap().full_name(), expected);
+    }
+
+    #[test]
+    fn name_is_found_with_or_without_its_maker_in_any_case() {
+        check("N-BK7", "SCHOTT:N-BK7");
+        check("n-bk7", "SCHOTT:N-BK7");
+        check("SCHOTT:N-BK7", "SCHOTT:N-BK7");
+        check("schott/n-bk7", "SCHOTT:N-BK7");
+        check("NBK7", "SCHOTT:N-BK7");
+        check("cdgm:f2", "CDGM:F2");
+        check("acrylic", "MISC:PMMA");
+    }
+
+    #[track_caller]
+    fn message(name: &str) -> String {
+        GlassCatalogue::built_in().find(name).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn name_of_several_or_none_is_told() {
+        let expected = "glass 'F2' could be CDGM:F2, HIKARI:F2 or SCHOTT:F2; name one of them";
+        assert_eq!(message("F2"), expected);
+        let similar = "no glass is named 'BK7'; similar names are HIKARI:E-BK7, HIKARI:J-BK7, SCHOTT:N-BK7";
+        assert!(message("BK7").starts_with(similar), "{}", message("BK7"));
+        assert_eq!(message("Unobtainium"), "no glass is named 'Unobtainium'; no name is similar");
+        assert!(message("OHARA:N-BK7").contains("similar names are SCHOTT:N-BK7"));
+        assert!(message("").contains("no glass is named ''"));
+    }
+
+    #[test]
+    fn makers_that_a_file_names_decide() {
+        let find = |makers: &[&str]| {
+            let makers: Vec<String> = makers.iter().map(|&maker| maker.to_owned()).collect();
+            GlassCatalogue::built_in().find_among("F2", &makers).map(CatalogueGlass::full_name)
+        };
+        assert_eq!(find(&["HOYA", "hikari", "SCHOTT"]).unwrap(), "HIKARI:F2");
+        assert!(find(&["OHARA"]).is_err());
+    }
+
+    #[test]
+    fn nearest_is_the_glass_itself_then_its_kin() {
+        let nearest = GlassCatalogue::built_in().nearest(1.5168, 64.17, 12);
+        assert_eq!(nearest.len(), 12);
+        let names: Vec<String> = nearest.iter().map(|(glass, _)| glass.full_name()).collect();
+        assert!(names.contains(&"SCHOTT:N-BK7".to_owned()), "{names:?}");
+        assert!(nearest[0].1 < 0.05 && nearest.windows(2).all(|two| two[0].1 <= two[1].1));
+        assert!(GlassCatalogue::built_in().search("lak").count() > 50);
+    }
+}
