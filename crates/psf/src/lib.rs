@@ -1,1 +1,31 @@
-//! To be written.
+//! Point spread functions over field, depth and wavelength.
+//!
+//! A [`PsfBank`] keeps where rays land, interpolates rays, and draws them on pixels with exact energy. [`Picture`]
+//! measures any point spread function.
+//!
+//! Lengths are millimetres in the lens and on the film, micrometres on pixels; wavelengths nanometres; fields are
+//! tangents at the entrance pupil and depths dioptres from it. Pictures are in the picture frame: the film turned by
+//! 180°, x to the right, y up, row 0 the top.
+//!
+//! This crate knows nothing of scenes or sensors.
+#![doc = include_str!("../README.md")]
+
+mod axis;
+mod bank;
+mod error;
+mod geometry;
+mod kernel;
+mod mesh;
+mod metrics;
+mod pupil;
+mod raster;
+mod ray_map;
+mod render;
+mod splat;
+
+pub use bank::{BankSettings, Diffraction, PsfBank};
+pub use error::PsfError;
+pub use geometry::RadialGeometry;
+pub use kernel::Kernel;
+pub use metrics::{Picture, Profile};
+pub use raster::Raster;

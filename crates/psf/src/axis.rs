@@ -1,0 +1,80 @@
+//! The knots of one axis of the bank, and interpolation between them.
+
+use serde::{Deserialize, Serialize};
+
+/// Ascending places at which something is known.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Axis {
+    // Invariant: at least one knot, ascending.
+    knots: Vec<f64>,
+}
+
+/// Up to three knots and their weights, whose sum is 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Stencil {
+    n: usize,
+    first: usize,
+    weights: [f64; 3],
+}
+
+impl Axis {
+    /// Returns an axis on these knots, or `None` if they do not ascend or there are none.
+    pub(crate) fn new(knots: Vec<f64>) -> Option<Self> {
+        let ascends = knots.windows(2).all(|pair| pair[0] < pair[1]);
+        (ascends && !knots.is_empty() && knots.iter().all(|k| k.is_finite())).then_some(Self { knots })
+    }
+
+    pub(crate) fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    /// Returns Lagrange's quadratic weights of the three knots nearest to a place, which is moved into the axis.
+    ///
+    /// On a knot, that knot alone has a weight; on an axis of two knots it is linear, on one constant.
+    pub(crate) fn stencil(&self, at: f64) -> Stencil {
+        let n = self.knots.len();
+        let at = at.clamp(self.knots[0], self.knots[n - 1]);
+        if n <= 2 {
+            let fraction = if n == 2 { (at - self.knots[0]) / (self.knots[1] - self.knots[0]) } else { 0.0 };
+            return Stencil { n, first: 0, weights: [1.0 - fraction, fraction, 0.0] };
+        }
+        let above = self.knots.partition_point(|&k| k < at).clamp(1, n - 1);
+        let nearest = if at - self.knots[above - 1] < self.knots[above] - at { above - 1 } else { above };
+        let first = nearest.saturating_sub(1).min(n - 3);
+        let k = &self.knots[first..first + 3];
+        let weight = |i: usize, j: usize, l: usize| (at - k[j]) * (at - k[l]) / ((k[i] - k[j]) * (k[i] - k[l]));
+        Stencil { n: 3, first, weights: [weight(0, 1, 2), weight(1, 0, 2), weight(2, 0, 1)] }
+    }
+}
+
+impl Stencil {
+    /// The knots whose weight is not 0, with their weights.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        (0..self.n).map(|i| (self.first + i, self.weights[i])).filter(|(_, weight)| *weight != 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quadratics_are_met_exactly() {
+        let axis = Axis::new(vec![0.0, 0.5, 1.5, 2.0, 4.0]).unwrap();
+        let f = |x: f64| 3.0 - x + 0.7 * x * x;
+        for x in [0.0, 0.1, 0.5, 0.9, 1.7, 2.9, 3.9, 4.0] {
+            let value: f64 = axis.stencil(x).iter().map(|(i, w)| w * f(axis.knots()[i])).sum();
+            assert!((value - f(x)).abs() < 1e-13, "at {x}: {value}");
+        }
+        assert_eq!(axis.stencil(1.5).iter().collect::<Vec<_>>(), [(2, 1.0)]);
+    }
+
+    #[test]
+    fn places_off_the_axis_are_moved_to_its_end() {
+        let axis = Axis::new(vec![1.0, 2.0]).unwrap();
+        assert_eq!(axis.stencil(9.0).iter().collect::<Vec<_>>(), [(1, 1.0)]);
+        assert_eq!(axis.stencil(1.25).iter().collect::<Vec<_>>(), [(0, 0.75), (1, 0.25)]);
+        assert_eq!(Axis::new(vec![7.0]).unwrap().stencil(3.0).iter().collect::<Vec<_>>(), [(0, 1.0)]);
+        assert!(Axis::new(vec![]).is_none() && Axis::new(vec![1.0, 1.0]).is_none());
+    }
+}

@@ -1,0 +1,202 @@
+//! Where a rotationally symmetric lens puts the centroids of points, and how bright it makes them.
+
+/// Image height and irradiance against field, for one depth and wavelength.
+///
+/// A field is the tangent of the angle at the entrance pupil; heights are in the picture frame, where a distant point
+/// at tan θ lands at about + f tan θ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RadialGeometry {
+    // Invariants: fields ascend from 0, and the heights with them; all lists are of one length.
+    field_tans: Vec<f64>,
+    /// Image height over field, mm: even in the field.
+    magnification_mm: Vec<f64>,
+    /// Second derivatives of the cubic spline through these.
+    bends: Vec<f64>,
+    radii_mm: Vec<f64>,
+    irradiance_per_radiance: Vec<f64>,
+}
+
+impl RadialGeometry {
+    /// Returns the geometry through `magnification_mm` (height over field; at field 0, its limit) and the pupil's
+    /// `cos⁴`-weighted area, mm², at each field. Fields at which the height no longer grows are cut off.
+    pub(crate) fn new(mut field_tans: Vec<f64>, mut magnification_mm: Vec<f64>, pupil_mm2: &[f64]) -> Self {
+        let radii: Vec<f64> = field_tans.iter().zip(&magnification_mm).map(|(f, g)| f * g).collect();
+        let n = 1 + radii.windows(2).take_while(|pair| pair[1].abs() > pair[0].abs()).count();
+        field_tans.truncate(n);
+        magnification_mm.truncate(n);
+        let bends = even_spline(&field_tans, &magnification_mm);
+        let mut this = Self {
+            field_tans,
+            magnification_mm,
+            bends,
+            radii_mm: radii[..n].to_vec(),
+            irradiance_per_radiance: vec![],
+        };
+        this.irradiance_per_radiance = (0..n)
+            .map(|i| {
+                let (g, slope) = this.magnification_at(this.field_tans[i]);
+                pupil_mm2[i] / (g * (g + this.field_tans[i] * slope)).abs()
+            })
+            .collect();
+        this
+    }
+
+    /// Returns the height of the centroid in the picture frame, mm, positive outwards. Beyond the traced field it goes
+    /// on straight.
+    pub fn image_radius_mm(&self, field_tan: f64) -> f64 {
+        let last = self.last_field_tan();
+        if field_tan > last {
+            let (g, slope) = self.magnification_at(last);
+            return last * g + (field_tan - last) * (g + last * slope);
+        }
+        field_tan * self.magnification_at(field_tan).0
+    }
+
+    /// Returns the field that lands at this height, or `None` beyond the traced field.
+    pub fn field_tan(&self, image_radius_mm: f64) -> Option<f64> {
+        let n = self.radii_mm.len();
+        let target = image_radius_mm;
+        let sign = if self.radii_mm[n - 1] < 0.0 { -1.0 } else { 1.0 };
+        // Rounding must not lose the last field.
+        if n < 2 || target * sign > self.radii_mm[n - 1] * sign * (1.0 + 1e-12) {
+            return None;
+        }
+        let above = self.radii_mm.partition_point(|&r| r * sign < target * sign).clamp(1, n - 1);
+        let (mut low, mut high) = (self.field_tans[above - 1], self.field_tans[above]);
+        let (r_low, r_high) = (self.radii_mm[above - 1], self.radii_mm[above]);
+        let mut field = low + (high - low) * (target - r_low) / (r_high - r_low);
+        // Newton's method, kept inside the bracket.
+        for _ in 0..20 {
+            let (g, slope) = self.magnification_at(field);
+            let error = field * g - target;
+            if error.abs() <= 1e-13 * r_high.abs() {
+                break;
+            }
+            if error * sign > 0.0 {
+                high = field;
+            } else {
+                low = field;
+            }
+            let next = field - error / (g + field * slope);
+            field = if next > low && next < high { next } else { 0.5 * (low + high) };
+        }
+        Some(field)
+    }
+
+    /// Returns irradiance on the film over radiance of a locally uniform scene, sr: the projected solid angle of the
+    /// pupil times `|dA_object / dA_film|`. It holds vignetting and every cosine; losses in glass are not in it.
+    pub fn irradiance_per_radiance(&self, field_tan: f64) -> f64 {
+        let n = self.field_tans.len();
+        if n == 1 {
+            return self.irradiance_per_radiance[0];
+        }
+        let at = field_tan.clamp(0.0, self.last_field_tan());
+        let above = self.field_tans.partition_point(|&f| f < at).clamp(1, n - 1);
+        let width = self.field_tans[above] - self.field_tans[above - 1];
+        let fraction = (at - self.field_tans[above - 1]) / width;
+        let (a, b) = (self.irradiance_per_radiance[above - 1], self.irradiance_per_radiance[above]);
+        if above == 1 {
+            // Even in the field: flat on the axis.
+            return a + (b - a) * fraction * fraction;
+        }
+        a + (b - a) * fraction
+    }
+
+    /// The largest field that was traced.
+    pub fn last_field_tan(&self) -> f64 {
+        self.field_tans[self.field_tans.len() - 1]
+    }
+
+    /// The largest image height that was traced, mm.
+    pub fn last_image_radius_mm(&self) -> f64 {
+        self.radii_mm[self.radii_mm.len() - 1]
+    }
+
+    /// Returns height over field, mm, and its derivative.
+    fn magnification_at(&self, field_tan: f64) -> (f64, f64) {
+        let n = self.field_tans.len();
+        if n == 1 {
+            return (self.magnification_mm[0], 0.0);
+        }
+        let above = self.field_tans.partition_point(|&f| f < field_tan).clamp(1, n - 1);
+        let (x0, x1) = (self.field_tans[above - 1], self.field_tans[above]);
+        let (y0, y1) = (self.magnification_mm[above - 1], self.magnification_mm[above]);
+        let (m0, m1) = (self.bends[above - 1], self.bends[above]);
+        let h = x1 - x0;
+        let (a, b) = ((x1 - field_tan) / h, (field_tan - x0) / h);
+        let value = a * y0 + b * y1 + ((a * a * a - a) * m0 + (b * b * b - b) * m1) * h * h / 6.0;
+        let slope = (y1 - y0) / h + ((1.0 - 3.0 * a * a) * m0 + (3.0 * b * b - 1.0) * m1) * h / 6.0;
+        (value, slope)
+    }
+}
+
+/// Returns the second derivatives at the knots of the cubic spline that is flat at the first, and whose curvature is
+/// constant over the last interval.
+fn even_spline(x: &[f64], y: &[f64]) -> Vec<f64> {
+    let n = x.len();
+    if n < 2 {
+        return vec![0.0; n];
+    }
+    let (mut diagonal, mut right) = (vec![0.0; n], vec![0.0; n]);
+    let mut above = vec![0.0; n];
+    let h = |i: usize| x[i + 1] - x[i];
+    let rise = |i: usize| (y[i + 1] - y[i]) / h(i);
+    (diagonal[0], above[0], right[0]) = (h(0) / 3.0, h(0) / 6.0, rise(0));
+    for i in 1..n {
+        let below = if i < n - 1 { h(i - 1) / 6.0 } else { -1.0 };
+        let factor = below / diagonal[i - 1];
+        let (own, next, value) =
+            if i < n - 1 { ((h(i - 1) + h(i)) / 3.0, h(i) / 6.0, rise(i) - rise(i - 1)) } else { (1.0, 0.0, 0.0) };
+        diagonal[i] = own - factor * above[i - 1];
+        above[i] = next;
+        right[i] = value - factor * right[i - 1];
+    }
+    let mut bends = vec![0.0; n];
+    for i in (0..n).rev() {
+        let next = if i + 1 < n { bends[i + 1] } else { 0.0 };
+        bends[i] = (right[i] - above[i] * next) / diagonal[i];
+    }
+    bends
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn barrel() -> RadialGeometry {
+        let fields: Vec<f64> = (0..13).map(|i| f64::from(i) / 20.0).collect();
+        let magnification = fields.iter().map(|f| 50.0 * (1.0 - 0.1 * f * f)).collect();
+        RadialGeometry::new(fields, magnification, &[100.0; 13])
+    }
+
+    #[test]
+    fn heights_follow_the_distortion_and_back() {
+        let geometry = barrel();
+        for field in [0.0, 0.01, 0.123, 0.3, 0.55, 0.6] {
+            let expected = 50.0 * field * (1.0 - 0.1 * field * field);
+            // A cubic spline meets a parabola exactly but for its ends.
+            assert!((geometry.image_radius_mm(field) - expected).abs() < 1e-9, "at {field}");
+            assert!((geometry.field_tan(expected).unwrap() - field).abs() < 1e-9, "at {field}");
+        }
+        assert_eq!(geometry.field_tan(31.0), None);
+        assert!(geometry.image_radius_mm(0.7) > geometry.image_radius_mm(0.6));
+    }
+
+    #[test]
+    fn brightness_is_the_pupil_over_the_magnifications() {
+        let geometry = barrel();
+        assert!((geometry.irradiance_per_radiance(0.0) - 100.0 / 2500.0).abs() < 1e-9);
+        let field = 0.4f64;
+        let expected = 100.0 / (50.0 * (1.0 - 0.1 * field * field) * 50.0 * (1.0 - 0.3 * field * field));
+        assert!((geometry.irradiance_per_radiance(field) / expected - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn fields_that_fold_back_are_cut_off() {
+        let fields: Vec<f64> = (0..11).map(f64::from).collect();
+        let magnification = fields.iter().map(|f| 10.0 - f).collect();
+        let geometry = RadialGeometry::new(fields, magnification, &[1.0; 11]);
+        assert_eq!(geometry.last_field_tan(), 5.0);
+        assert_eq!(geometry.field_tan(26.0), None);
+    }
+}

@@ -1,0 +1,71 @@
+//! A point spread function on pixels.
+
+use ndarray::Array2;
+
+/// A point spread function on square pixels: odd × odd, its centroid in the middle of the middle pixel, in the
+/// picture frame (row 0 is the top).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kernel {
+    /// The share of the point's transmitted energy that falls on each pixel. The sum is what the window holds, 1 or
+    /// a little less.
+    pub samples: Array2<f32>,
+    /// Side of a pixel, µm.
+    pub pitch_um: f64,
+}
+
+impl Kernel {
+    /// Returns the kernel that blurs nothing.
+    pub fn identity(pitch_um: f64) -> Self {
+        Self { samples: Array2::ones((1, 1)), pitch_um }
+    }
+
+    /// The share of the energy that the window holds.
+    pub fn sum(&self) -> f64 {
+        self.samples.iter().map(|&e| f64::from(e)).sum()
+    }
+
+    /// Returns the kernel with the sum 1.
+    pub fn normalized(mut self) -> Self {
+        let scale = (1.0 / self.sum()) as f32;
+        self.samples.mapv_inplace(|e| e * scale);
+        self
+    }
+}
+
+/// Returns the smallest odd square about the middle that holds at least `share` of what the picture holds.
+pub(crate) fn trim(energy: &Array2<f64>, share: f64) -> Array2<f32> {
+    let middle = energy.nrows() / 2;
+    let mut by_ring = vec![0.0; middle + 1];
+    for ((row, column), e) in energy.indexed_iter() {
+        by_ring[row.abs_diff(middle).max(column.abs_diff(middle))] += e;
+    }
+    let wanted = share * by_ring.iter().sum::<f64>();
+    let mut held = 0.0;
+    let reach = by_ring
+        .iter()
+        .position(|e| {
+            held += e;
+            held >= wanted
+        })
+        .unwrap_or(middle);
+    Array2::from_shape_fn((2 * reach + 1, 2 * reach + 1), |(row, column)| {
+        energy[(row + middle - reach, column + middle - reach)] as f32
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trimming_keeps_the_share_and_the_middle() {
+        let mut energy = Array2::zeros((9, 9));
+        energy[(4, 4)] = 0.9;
+        energy[(3, 5)] = 0.0995;
+        energy[(0, 0)] = 0.0005;
+        let kernel = trim(&energy, 0.999);
+        assert_eq!(kernel.dim(), (3, 3));
+        assert_eq!(kernel[(1, 1)], 0.9);
+        assert_eq!(trim(&energy, 1.0).dim(), (9, 9));
+    }
+}

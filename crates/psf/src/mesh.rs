@@ -1,0 +1,76 @@
+//! The mesh of the pupil whose nodes are traced.
+
+use std::f64::consts::TAU;
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+/// A polar mesh over the pupil: a centre, then rings out to its edge, each of equally many nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Mesh {
+    pub(crate) n_rings: usize,
+    pub(crate) n_azimuths: usize,
+}
+
+impl Mesh {
+    pub(crate) fn n_nodes(self) -> usize {
+        1 + self.n_rings * self.n_azimuths
+    }
+
+    pub(crate) fn n_cells(self) -> usize {
+        self.n_rings * self.n_azimuths
+    }
+
+    /// Returns the radius of a ring as a share of the pupil's: 0 is the centre, `n_rings` the edge.
+    ///
+    /// Rings crowd a little towards the edge, where outlines are drawn and diffraction is strongest.
+    pub(crate) fn share(self, ring: f64) -> f64 {
+        let s = ring / self.n_rings as f64;
+        1.0 - (1.0 - s).max(0.0).powf(1.4)
+    }
+
+    pub(crate) fn azimuth(self, j: f64) -> f64 {
+        TAU * j / self.n_azimuths as f64
+    }
+
+    /// Returns the place of a node in a list: all of ring 0 are the centre.
+    pub(crate) fn node(self, ring: usize, j: usize) -> usize {
+        if ring == 0 { 0 } else { 1 + (ring - 1) * self.n_azimuths + j % self.n_azimuths }
+    }
+
+    /// Returns the polar places (share of the radius, azimuth) of all nodes in order.
+    pub(crate) fn nodes(self) -> impl Iterator<Item = (f64, f64)> {
+        let rings = (1..=self.n_rings).flat_map(move |ring| (0..self.n_azimuths).map(move |j| (ring, j)));
+        std::iter::once((0.0, 0.0)).chain(rings.map(move |(i, j)| (self.share(i as f64), self.azimuth(j as f64))))
+    }
+
+    /// Returns the ring and azimuth numbers of all cells in order: cell (i, j) lies between rings i and i + 1.
+    pub(crate) fn cells(self) -> impl Iterator<Item = (usize, usize)> {
+        (0..self.n_rings).flat_map(move |ring| (0..self.n_azimuths).map(move |j| (ring, j)))
+    }
+
+    /// Returns the nodes at the corners of a cell: inner, outer, outer next, inner next.
+    pub(crate) fn corners(self, ring: usize, j: usize) -> [usize; 4] {
+        [self.node(ring, j), self.node(ring + 1, j), self.node(ring + 1, j + 1), self.node(ring, j + 1)]
+    }
+}
+
+/// Returns a polar place about a centre.
+pub(crate) fn polar(center: DVec2, radius: f64, azimuth: f64) -> DVec2 {
+    center + DVec2::from_angle(azimuth) * radius
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cell_has_its_four_corners_among_the_nodes() {
+        let mesh = Mesh { n_rings: 3, n_azimuths: 5 };
+        assert_eq!(mesh.nodes().count(), mesh.n_nodes());
+        assert_eq!(mesh.cells().count(), mesh.n_cells());
+        assert_eq!(mesh.corners(0, 4), [0, 5, 1, 0]);
+        assert_eq!(mesh.corners(2, 4), [10, 15, 11, 6]);
+        assert_eq!((mesh.share(0.0), mesh.share(3.0)), (0.0, 1.0));
+    }
+}

@@ -1,0 +1,156 @@
+//! The vignetted pupil, found from that of a neighbouring point.
+
+use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, rays_towards};
+use glam::DVec2;
+
+use crate::mesh::polar;
+
+/// How near to a rim the pupil's edge must pass, mm: the pupil's area is then good to 1e-8.
+const TOLERANCE_MM: f64 = 1e-8;
+
+/// The edge of a pupil in the entrance-pupil plane, at equally spaced azimuths about a centre.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Pupil {
+    pub(crate) center_mm: DVec2,
+    pub(crate) z_mm: f64,
+    pub(crate) rho_mm: Vec<f64>,
+}
+
+impl Pupil {
+    /// Finds the pupil from nothing.
+    pub(crate) fn find(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> Option<Self> {
+        let boundary = PupilBoundary::find(lens, point, n_azimuths)?;
+        Some(Self {
+            center_mm: boundary.center_mm(),
+            z_mm: boundary.z_mm(),
+            rho_mm: boundary.rho_at_azimuths_mm().to_vec(),
+        })
+    }
+
+    /// Finds the pupil of a point whose pupil should be like this one, or from nothing if it is not.
+    pub(crate) fn near(&self, lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
+        let n_azimuths = self.rho_mm.len();
+        let z_mm = lens.first_order().entrance_pupil_z_mm;
+        let guess = Self { z_mm: if z_mm.is_finite() { z_mm } else { 0.0 }, ..self.clone() };
+        // Once to know where its centre is, once about that: any three digits of the first will do.
+        let solved = guess
+            .refined(lens, point, 1e-3 * TOLERANCE_MM.sqrt())
+            .map(Self::recentered)
+            .and_then(|centered| centered.refined(lens, point, TOLERANCE_MM));
+        solved.or_else(|| Self::find(lens, point, n_azimuths))
+    }
+
+    fn azimuth(&self, i: usize) -> f64 {
+        std::f64::consts::TAU * i as f64 / self.rho_mm.len() as f64
+    }
+
+    /// Returns the same region seen from its centroid; its edge by straight lines between what was known.
+    fn recentered(self) -> Self {
+        let n = self.rho_mm.len();
+        let edge: Vec<DVec2> = (0..n).map(|i| polar(DVec2::ZERO, self.rho_mm[i], self.azimuth(i))).collect();
+        let area: f64 = self.rho_mm.iter().map(|r| r * r).sum::<f64>() / 2.0;
+        let shift = edge.iter().map(|p| *p * (p.length() / 3.0)).sum::<DVec2>() / area;
+        let rho_mm = (0..n).map(|i| ray_to_polygon(shift, DVec2::from_angle(self.azimuth(i)), &edge)).collect();
+        Self { center_mm: self.center_mm + shift, rho_mm, ..self }
+    }
+
+    /// Returns the region with its edge moved to where clearances are 0, or `None` if that does not converge.
+    fn refined(mut self, lens: &MonoLens, point: &ObjectPoint, tolerance_mm: f64) -> Option<Self> {
+        let n = self.rho_mm.len();
+        let (center_mm, z_mm) = (self.center_mm, self.z_mm);
+        let azimuths: Vec<f64> = (0..n).map(|i| self.azimuth(i)).collect();
+        let clearances = |rho: &[f64]| {
+            let targets: Vec<DVec2> = (0..n).map(|i| polar(center_mm, rho[i], azimuths[i])).collect();
+            lens.clearances_mm(rays_towards(point, &targets, z_mm, 0.0))
+        };
+        let center = rays_towards(point, &[self.center_mm], self.z_mm, 0.0);
+        let at_center = lens.clearances_mm(center)[0];
+        if at_center <= 0.0 {
+            return None;
+        }
+        let mut inside = vec![(0.0, at_center); n];
+        let mut outside = vec![(f64::INFINITY, f64::NAN); n];
+        let mut previous = inside.clone();
+        let mut here = self.rho_mm.clone();
+        for _ in 0..60 {
+            let values = clearances(&here);
+            let mut is_done = true;
+            for i in 0..n {
+                let (r, f) = (here[i], values[i]);
+                if f.abs() <= tolerance_mm || outside[i].0 - inside[i].0 <= tolerance_mm {
+                    self.rho_mm[i] = if f >= -tolerance_mm { r } else { inside[i].0 };
+                    continue;
+                }
+                is_done = false;
+                if f > 0.0 {
+                    inside[i] = (r, f);
+                } else {
+                    outside[i] = (r, f);
+                }
+                here[i] = next_guess(previous[i], (r, f), inside[i].0, outside[i].0);
+                previous[i] = (r, f);
+            }
+            if is_done {
+                return self.rho_mm.iter().all(|r| *r > 0.0).then_some(self);
+            }
+        }
+        None
+    }
+}
+
+/// Returns the next place to look for a root: the secant's, if it stays in the bracket.
+fn next_guess((r0, f0): (f64, f64), (r1, f1): (f64, f64), inside: f64, outside: f64) -> f64 {
+    let secant = r1 - f1 * (r1 - r0) / (f1 - f0);
+    let furthest = if outside.is_finite() { outside } else { 1.5 * r1.max(inside) };
+    if secant.is_finite() && secant > inside && secant < furthest {
+        secant
+    } else if outside.is_finite() {
+        0.5 * (inside + outside)
+    } else {
+        furthest
+    }
+}
+
+/// Returns how far from `from` a ray leaves a closed polygon that it starts in.
+fn ray_to_polygon(from: DVec2, direction: DVec2, polygon: &[DVec2]) -> f64 {
+    let mut furthest: f64 = 0.0;
+    for (i, a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        let (side, to_a) = (b - *a, *a - from);
+        let across = direction.perp_dot(side);
+        let along_side = to_a.perp_dot(direction) / across;
+        let along_ray = to_a.perp_dot(side) / across;
+        if (-1e-9..=1.0 + 1e-9).contains(&along_side) && along_ray.is_finite() {
+            furthest = furthest.max(along_ray);
+        }
+    }
+    furthest
+}
+
+#[cfg(test)]
+mod tests {
+    use dioptric_optics::Lens;
+
+    use super::*;
+
+    #[test]
+    fn the_neighbours_pupil_leads_to_the_pupil_found_from_nothing() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
+        let point = |field| ObjectPoint::from_field(&lens, DVec2::new(field, 0.0), 0.5);
+        let mut pupil = Pupil::find(&lens, &point(0.0), 32).unwrap();
+        for field in [0.03, 0.06, 0.12, 0.18, 0.24] {
+            pupil = pupil.near(&lens, &point(field)).unwrap();
+            let found = Pupil::find(&lens, &point(field), 32).unwrap();
+            let area = |p: &Pupil| p.rho_mm.iter().map(|r| r * r).sum::<f64>();
+            // The centres differ a little, and with them the sum over 32 azimuths where the edge has kinks.
+            assert!((area(&pupil) / area(&found) - 1.0).abs() < 1e-3, "at {field}");
+            let edge = |share: f64| {
+                let on = |i| polar(pupil.center_mm, share * pupil.rho_mm[i], pupil.azimuth(i));
+                let targets: Vec<DVec2> = (0..32).map(on).collect();
+                lens.clearances_mm(rays_towards(&point(field), &targets, pupil.z_mm, 0.0))
+            };
+            assert!(edge(0.999_999).iter().all(|c| *c > 0.0), "at {field}");
+            assert!(edge(1.000_001).iter().all(|c| *c < 0.0), "at {field}");
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! Where the nodes of the pupil mesh land on the film: the map from which a point spread function is drawn.
+
+use dioptric_diffraction::{StopRay, trace_stop_rays};
+use dioptric_optics::{MonoLens, ObjectPoint, Rims, rays_towards};
+use glam::DVec2;
+
+use crate::{
+    mesh::{Mesh, polar},
+    pupil::Pupil,
+};
+
+/// What is kept of one node.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Node {
+    /// Place on the film about the centroid, mm, picture frame.
+    pub(crate) at_mm: DVec2,
+    /// Place in the stop over the stop's radius.
+    pub(crate) in_stop: DVec2,
+    /// Movement on the film for a unit change of the direction cosine along x at the stop, mm, picture frame.
+    pub(crate) along_l_mm: DVec2,
+    /// The same along y.
+    pub(crate) along_m_mm: DVec2,
+}
+
+/// The lists of numbers that a record holds for nodes: two of places, and six that diffraction needs.
+const PLACE_LISTS: usize = 2;
+const STOP_LISTS: usize = 6;
+
+/// All that interpolation mixes, as one list of numbers: node coordinates list by list, then the cells' energies.
+///
+/// Records of the same mesh can be added with weights; any such sum with weights of sum 1 is again a record.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Record {
+    pub(crate) mesh: Mesh,
+    pub(crate) has_stop: bool,
+    pub(crate) numbers: Vec<f32>,
+}
+
+impl Record {
+    pub(crate) fn length(mesh: Mesh, has_stop: bool) -> usize {
+        (PLACE_LISTS + if has_stop { STOP_LISTS } else { 0 }) * mesh.n_nodes() + mesh.n_cells()
+    }
+
+    /// Returns the record that is the sum of these with these weights.
+    pub(crate) fn mix<'a>(mut weighted: impl Iterator<Item = (&'a Self, f64)>) -> Option<Self> {
+        let (first, weight) = weighted.next()?;
+        let mut sum = first.clone();
+        if weight != 1.0 {
+            sum.numbers.iter_mut().for_each(|number| *number *= weight as f32);
+        }
+        for (record, weight) in weighted {
+            let weight = weight as f32;
+            for (number, other) in sum.numbers.iter_mut().zip(&record.numbers) {
+                *number += weight * other;
+            }
+        }
+        Some(sum)
+    }
+
+    fn from_nodes(mesh: Mesh, has_stop: bool, nodes: &[Node], energies: &[f64]) -> Self {
+        let mut numbers = Vec::with_capacity(Self::length(mesh, has_stop));
+        let mut list = |of: &dyn Fn(&Node) -> f64| numbers.extend(nodes.iter().map(|node| of(node) as f32));
+        list(&|n| n.at_mm.x);
+        list(&|n| n.at_mm.y);
+        if has_stop {
+            list(&|n| n.in_stop.x);
+            list(&|n| n.in_stop.y);
+            list(&|n| n.along_l_mm.x);
+            list(&|n| n.along_l_mm.y);
+            list(&|n| n.along_m_mm.x);
+            list(&|n| n.along_m_mm.y);
+        }
+        numbers.extend(energies.iter().map(|e| *e as f32));
+        Self { mesh, has_stop, numbers }
+    }
+
+    fn pair(&self, list: usize, node: usize) -> DVec2 {
+        let n = self.mesh.n_nodes();
+        DVec2::new(self.numbers[list * n + node].into(), self.numbers[(list + 1) * n + node].into())
+    }
+
+    /// Returns a node; without diffraction data but its place.
+    pub(crate) fn node(&self, node: usize) -> Node {
+        let at_mm = self.pair(0, node);
+        if !self.has_stop {
+            return Node { at_mm, ..Node::default() };
+        }
+        let [in_stop, along_l_mm, along_m_mm] = [2, 4, 6].map(|list| self.pair(list, node));
+        Node { at_mm, in_stop, along_l_mm, along_m_mm }
+    }
+
+    /// The energies of the cells; their sum is 1.
+    pub(crate) fn energies(&self) -> &[f32] {
+        &self.numbers[self.numbers.len() - self.mesh.n_cells()..]
+    }
+}
+
+/// What a ray map says of its point as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Summary {
+    /// Centroid on the film, mm, picture frame.
+    pub(crate) centroid_mm: DVec2,
+    /// Area of the pupil, mm², weighted with cos⁴ of the angle, or for near points with what stands for it.
+    pub(crate) pupil_mm2: f64,
+    /// Rms radius on the film of the part of the map that is linear in the pupil, mm; negative for what was in focus
+    /// before it reached the film.
+    pub(crate) signed_rms_mm: f64,
+}
+
+/// A point and how to trace it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Task<'a> {
+    pub(crate) lens: &'a MonoLens,
+    /// The lens at the wavelength whose entrance pupil fields and depths count from.
+    pub(crate) reference: &'a MonoLens,
+    pub(crate) field_tan: DVec2,
+    pub(crate) dioptres: f64,
+    pub(crate) film_mm: f64,
+    pub(crate) mesh: Mesh,
+}
+
+/// A traced mesh in full precision.
+pub(crate) struct Traced {
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) energies: Vec<f64>,
+    pub(crate) summary: Summary,
+}
+
+impl Task<'_> {
+    /// The point in the lens frame.
+    pub(crate) fn point(self) -> ObjectPoint {
+        ObjectPoint::from_field(self.reference, self.field_tan, self.dioptres)
+    }
+
+    /// Traces the mesh in a pupil, or returns `None` if its middle ray does not reach the film.
+    pub(crate) fn trace(self, pupil: &Pupil, has_stop: bool) -> Option<Traced> {
+        let point = &self.point();
+        let targets: Vec<DVec2> = self
+            .mesh
+            .nodes()
+            .enumerate()
+            .map(|(i, (share, azimuth))| {
+                let j = i.saturating_sub(1) % self.mesh.n_azimuths;
+                polar(pupil.center_mm, share * pupil.rho_mm[j], azimuth)
+            })
+            .collect();
+        let mut nodes = self.land(point, &targets, pupil.z_mm, has_stop)?;
+        let weights = self.weights(point, &targets, pupil.z_mm);
+        let mut energies = self.cell_areas(&weights, &pupil.rho_mm);
+        let pupil_mm2: f64 = energies.iter().sum();
+        energies.iter_mut().for_each(|e| *e /= pupil_mm2);
+
+        let centroid_mm: DVec2 = self
+            .mesh
+            .cells()
+            .zip(&energies)
+            .map(|((ring, j), e)| {
+                let [a, b, c, d] = self.mesh.corners(ring, j).map(|node| nodes[node].at_mm);
+                // That of the two triangles that will be drawn.
+                (2.0 * a + b + 2.0 * c + d) * (e / 6.0)
+            })
+            .sum();
+        nodes.iter_mut().for_each(|node| node.at_mm -= centroid_mm);
+        let signed_rms_mm = self.signed_rms_mm(&nodes, &targets, &energies);
+        Some(Traced { nodes, energies, summary: Summary { centroid_mm, pupil_mm2, signed_rms_mm } })
+    }
+
+    /// Returns where rays aimed at the pupil land, in the picture frame. A ray that fails at the pupil's very edge
+    /// lands with its neighbour inside.
+    fn land(self, point: &ObjectPoint, targets: &[DVec2], z_mm: f64, has_stop: bool) -> Option<Vec<Node>> {
+        let mut rays = rays_towards(point, targets, z_mm, 0.0);
+        let landed: Vec<Option<Node>> = if has_stop {
+            let radius_mm = self.lens.stop_semi_aperture_mm();
+            let node = |ray: StopRay| Node {
+                at_mm: -ray.film_mm,
+                in_stop: ray.stop_mm / radius_mm,
+                along_l_mm: -ray.along_l_mm,
+                along_m_mm: -ray.along_m_mm,
+            };
+            trace_stop_rays(self.lens, rays, self.film_mm).into_iter().map(|ray| ray.map(node)).collect()
+        } else {
+            self.lens.trace(&mut rays, Rims::Ignore);
+            self.lens.to_film(&mut rays, self.film_mm);
+            let node = |ray| Node { at_mm: -rays.point_mm(ray).truncate(), ..Node::default() };
+            (0..rays.len()).map(|ray| rays.fate[ray].is_in_flight().then(|| node(ray))).collect()
+        };
+        let mut nodes = vec![landed[0]?];
+        for (i, node) in landed.into_iter().enumerate().skip(1) {
+            let inside = i.checked_sub(self.mesh.n_azimuths).filter(|inside| *inside > 0).unwrap_or(0);
+            nodes.push(node.unwrap_or(nodes[inside]));
+        }
+        Some(nodes)
+    }
+
+    /// Returns the weight of pupil area at each target: cos⁴ of the angle, or for near points (Z/d)² cos²: projected
+    /// solid angle times the square of the axial distance.
+    fn weights(self, point: &ObjectPoint, targets: &[DVec2], z_mm: f64) -> Vec<f64> {
+        match *point {
+            ObjectPoint::Infinite(direction) => vec![direction.z.powi(4); targets.len()],
+            ObjectPoint::Finite(point) => {
+                let axial_mm = 1e3 / self.dioptres;
+                let weight = |target: &DVec2| {
+                    let way = target.extend(z_mm) - point;
+                    let square = way.length_squared();
+                    axial_mm * axial_mm / square * (way.z * way.z / square)
+                };
+                targets.iter().map(weight).collect()
+            }
+        }
+    }
+
+    /// Returns the weighted areas of the cells, mm².
+    fn cell_areas(self, weights: &[f64], rho_mm: &[f64]) -> Vec<f64> {
+        let mesh = self.mesh;
+        let wedge = mesh.azimuth(1.0);
+        mesh.cells()
+            .map(|(ring, j)| {
+                let (inner, outer) = (mesh.share(ring as f64), mesh.share((ring + 1) as f64));
+                // The mean of the squares at both sides: the trapezoid rule around the pupil.
+                let square = 0.5 * (rho_mm[j].powi(2) + rho_mm[(j + 1) % mesh.n_azimuths].powi(2));
+                let weight = mesh.corners(ring, j).map(|node| weights[node]).iter().sum::<f64>() / 4.0;
+                0.5 * wedge * (outer * outer - inner * inner) * square * weight
+            })
+            .collect()
+    }
+
+    fn signed_rms_mm(self, nodes: &[Node], targets: &[DVec2], energies: &[f64]) -> f64 {
+        let mean_of = |of: &dyn Fn(usize) -> DVec2, ring, j| -> DVec2 {
+            self.mesh.corners(ring, j).map(of).into_iter().sum::<DVec2>() / 4.0
+        };
+        let cells: Vec<(DVec2, DVec2, f64)> = self
+            .mesh
+            .cells()
+            .zip(energies)
+            .map(|((ring, j), e)| (mean_of(&|n| targets[n], ring, j), mean_of(&|n| nodes[n].at_mm, ring, j), *e))
+            .collect();
+        let center: DVec2 = cells.iter().map(|(p, _, e)| *p * *e).sum();
+        let product: f64 = cells.iter().map(|(p, at, e)| (*p - center).dot(*at) * e).sum();
+        let square: f64 = cells.iter().map(|(p, _, e)| (*p - center).length_squared() * e).sum();
+        // Before its focus a bundle is still on the pupil's side; the picture frame is turned by 180°.
+        -product / square.sqrt()
+    }
+}
+
+impl Traced {
+    pub(crate) fn record(&self, mesh: Mesh, has_stop: bool) -> Record {
+        Record::from_nodes(mesh, has_stop, &self.nodes, &self.energies)
+    }
+}

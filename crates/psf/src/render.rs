@@ -1,0 +1,164 @@
+//! Pictures drawn from ray maps.
+
+use dioptric_diffraction::{Covariance, Edge, Hurb};
+use glam::DVec2;
+
+use crate::{
+    Kernel,
+    kernel::trim,
+    raster::Raster,
+    ray_map::{Node, Record},
+    splat,
+};
+
+/// Half the side of the largest window, pixels.
+const MOST_PIXELS: f64 = 600.0;
+/// Of what the window of a diffracted picture holds, the share that is kept when the window is trimmed.
+const KEPT_OF_TAILS: f64 = 0.999;
+/// How far diffraction's tails are followed beyond the geometric picture, in units of λN.
+const TAILS: f64 = 12.0;
+/// A cell this many standard deviations across, both ways, is drawn as a polygon.
+const POLYGON: f64 = 8.0;
+/// A Gaussian whose wide axis is below this, in pixels, is not drawn.
+const NARROW: f64 = 0.25;
+/// Variance, pixels², that a pixel's own size adds when the need for subdivision is judged.
+const PIXEL_VARIANCE: f64 = 0.12;
+
+/// Uncertainty bending at the stop.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bending {
+    pub(crate) model: Hurb,
+    pub(crate) edge: Edge,
+}
+
+/// Draws a ray map about its centroid; `turn` is the direction of the field in the picture.
+pub(crate) fn kernel(record: &Record, turn: DVec2, bending: Option<Bending>, pitch_um: f64) -> Kernel {
+    let scale = 1e3 / pitch_um;
+    let mut nodes: Vec<Node> = (0..record.mesh.n_nodes()).map(|i| record.node(i)).collect();
+    for node in &mut nodes {
+        for v in [&mut node.at_mm, &mut node.along_l_mm, &mut node.along_m_mm] {
+            // To pixels: columns to the right, rows down.
+            *v = turn.rotate(*v) * DVec2::new(scale, -scale);
+        }
+    }
+    let reach = nodes.iter().map(|node| node.at_mm.abs().max_element()).fold(0.0, f64::max);
+    let tails = bending.map_or(0.0, |bending| TAILS * unit(record, &nodes, bending));
+    let half = (reach + tails - 0.5).ceil().clamp(0.0, MOST_PIXELS) as usize;
+    let side = 2 * half + 1;
+    let middle = DVec2::splat(half as f64 + 0.5);
+    nodes.iter_mut().for_each(|node| node.at_mm += middle);
+
+    let mut raster = Raster::new(side, side);
+    for ((ring, j), &energy) in record.mesh.cells().zip(record.energies()) {
+        let corners = record.mesh.corners(ring, j).map(|node| nodes[node]);
+        match bending {
+            None => raster.quadrilateral(corners.map(|node| node.at_mm), energy.into()),
+            Some(bending) => {
+                let cell = Cell { corners, inner: ring as f64, energy: energy.into() };
+                draw_bent(&mut raster, record, &cell, bending);
+            }
+        }
+    }
+    let kept = if bending.is_some() { KEPT_OF_TAILS } else { 1.0 - 1e-7 };
+    Kernel { samples: trim(&raster.finish(), kept), pitch_um }
+}
+
+/// Returns λN in pixels: what the Gaussian of a ray through the middle of the stop would give.
+fn unit(record: &Record, nodes: &[Node], bending: Bending) -> f64 {
+    let center = nodes[record.mesh.node(0, 0)];
+    let per_cosine = center.along_l_mm.length().max(center.along_m_mm.length());
+    let Edge { radius_mm, wave_number_per_mm } = bending.edge;
+    per_cosine * std::f64::consts::PI / (wave_number_per_mm * radius_mm)
+}
+
+/// A cell of the mesh with its corners: inner, outer, outer next, inner next.
+struct Cell {
+    corners: [Node; 4],
+    /// Number of the ring inside it.
+    inner: f64,
+    energy: f64,
+}
+
+impl Cell {
+    /// Returns what lies between the corners, `a` of the way outwards and `b` around.
+    fn at(&self, a: f64, b: f64) -> Node {
+        let weights = [(1.0 - a) * (1.0 - b), a * (1.0 - b), a * b, (1.0 - a) * b];
+        let mix =
+            |of: fn(&Node) -> DVec2| -> DVec2 { self.corners.iter().zip(weights).map(|(node, w)| of(node) * w).sum() };
+        Node {
+            at_mm: mix(|n| n.at_mm),
+            in_stop: mix(|n| n.in_stop),
+            along_l_mm: mix(|n| n.along_l_mm),
+            along_m_mm: mix(|n| n.along_m_mm),
+        }
+    }
+
+    /// Returns the sides of the cell through a place in it: outwards and around.
+    fn sides(&self, a: f64, b: f64) -> (DVec2, DVec2) {
+        let [p, q, r, s] = self.corners.map(|node| node.at_mm);
+        ((q - p) * (1.0 - b) + (r - s) * b, (s - p) * (1.0 - a) + (r - q) * a)
+    }
+}
+
+impl Bending {
+    /// Returns the covariance on the film of a ray's Gaussian, pixels².
+    fn covariance(self, node: &Node) -> Covariance {
+        let r = node.in_stop.length().min(1.0);
+        let spread = self.model.spread(r * self.edge.radius_mm, self.edge.radius_mm, self.edge.wave_number_per_mm);
+        let radial = node.in_stop.try_normalize().unwrap_or(DVec2::X);
+        let on_film = |d: DVec2| node.along_l_mm * d.x + node.along_m_mm * d.y;
+        Covariance::along(on_film(radial) * spread.radial)
+            .plus(Covariance::along(on_film(radial.perp()) * spread.across))
+    }
+}
+
+/// Draws a cell whose rays are bent: as a polygon where bending is small beside it, else as Gaussians.
+fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending) {
+    let (along, around) = cell.sides(0.5, 0.5);
+    let covariance = bending.covariance(&cell.at(0.5, 0.5));
+    let (_, wide) = covariance.axes();
+    let widened = Covariance { xx: covariance.xx + PIXEL_VARIANCE, yy: covariance.yy + PIXEL_VARIANCE, ..covariance };
+    let (n_along, n_around) = (in_sigmas(along, widened), in_sigmas(around, widened));
+    if wide < NARROW * NARROW || (n_along > POLYGON && n_around > POLYGON) {
+        return raster.quadrilateral(cell.corners.map(|node| node.at_mm), cell.energy);
+    }
+    // A piece two standard deviations across leaves no ripple.
+    let n_around = (0.5 * n_around).ceil().clamp(1.0, 64.0) as usize;
+    let n_along = ((0.5 * n_along).ceil().clamp(1.0, 64.0) as usize).max(edge_pieces(record, cell.inner));
+    let mesh = record.mesh;
+    let (share_inner, share_outer) = (mesh.share(cell.inner), mesh.share(cell.inner + 1.0));
+    let whole = share_outer * share_outer - share_inner * share_inner;
+    // Pieces crowd towards the edge like rings do, only more so: there the spread grows like 1/distance.
+    let (gap_inner, gap_outer) = ((1.0 - share_inner).sqrt(), (1.0 - share_outer).max(0.0).sqrt());
+    let share = |i: usize| 1.0 - (gap_inner + (gap_outer - gap_inner) * i as f64 / n_along as f64).powi(2);
+    for i in 0..n_along {
+        let (inner, outer) = (share(i), share(i + 1));
+        let place = |share: f64| (share - share_inner) / (share_outer - share_inner);
+        let (a, step_a) = (place(0.5 * (inner + outer)), place(outer) - place(inner));
+        let energy = cell.energy * (outer * outer - inner * inner) / whole / n_around as f64;
+        for j in 0..n_around {
+            let b = (j as f64 + 0.5) / n_around as f64;
+            let node = cell.at(a, b);
+            let (along, around) = cell.sides(a, b);
+            let footprint = |side: DVec2| Covariance::along(side / 12f64.sqrt());
+            let covariance =
+                bending.covariance(&node).plus(footprint(along * step_a)).plus(footprint(around / n_around as f64));
+            splat::deposit(raster, node.at_mm, covariance, energy);
+        }
+    }
+}
+
+/// Returns how many pieces the spread of a ring needs: it doubles over the last few.
+fn edge_pieces(record: &Record, inner: f64) -> usize {
+    match record.mesh.n_rings - inner as usize {
+        1 => 4,
+        2 | 3 => 2,
+        _ => 1,
+    }
+}
+
+/// Returns the length of a side in standard deviations of a Gaussian.
+fn in_sigmas(side: DVec2, c: Covariance) -> f64 {
+    let determinant = c.xx * c.yy - c.xy * c.xy;
+    ((c.yy * side.x * side.x - 2.0 * c.xy * side.x * side.y + c.xx * side.y * side.y) / determinant).sqrt()
+}
