@@ -1,0 +1,227 @@
+//! Photon transfer: the parameters of the linear model of EMVA standard 1288 from flat frames.
+//!
+//! Temporal variance comes from the difference of two frames, so that fixed patterns do not enter it. The model is
+//! that of release 3.1: variance = dark variance + K × (mean − dark mean), K in digital numbers an electron.
+
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use crate::SensorError;
+
+/// The variance of rounding to whole numbers.
+const QUANTISATION_VARIANCE: f64 = 1.0 / 12.0;
+/// The share of saturation up to which the gain is fitted (EMVA 1288, 6.6).
+const FIT_UP_TO: f64 = 0.7;
+
+/// What two flat frames under equal light show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlatPoint {
+    /// The mean number of photons that fell on a pixel; 0 in the dark.
+    pub photons: f64,
+    /// The mean of both frames, DN.
+    pub mean_dn: f64,
+    /// The temporal variance, DN².
+    pub variance_dn2: f64,
+}
+
+impl FlatPoint {
+    /// Returns the mean and the temporal variance of two frames.
+    ///
+    /// # Errors
+    /// When the frames differ in size.
+    pub fn measure(photons: f64, first: &Array2<f32>, second: &Array2<f32>) -> Result<Self, SensorError> {
+        check_sizes(&[first, second])?;
+        let (mean_first, mean_second) = (mean(first), mean(second));
+        let rows: Vec<f64> = (first.outer_iter().into_par_iter())
+            .zip(second.outer_iter())
+            .map(|(a, b)| a.iter().zip(&b).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum())
+            .collect();
+        let mean_square = rows.iter().sum::<f64>() / first.len() as f64;
+        Ok(Self {
+            photons,
+            mean_dn: 0.5 * (mean_first + mean_second),
+            variance_dn2: 0.5 * (mean_square - (mean_first - mean_second).powi(2)),
+        })
+    }
+}
+
+/// The temporal parameters of a camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhotonTransfer {
+    /// The system gain K, DN an electron.
+    pub gain_dn_per_e: f64,
+    /// The responsivity, DN a photon.
+    pub responsivity_dn_per_photon: f64,
+    /// The quantum efficiency: responsivity over gain.
+    pub quantum_efficiency: f64,
+    /// The temporal dark noise without that of rounding, electrons.
+    pub dark_noise_e: f64,
+    /// The electrons at which the variance is largest: saturation.
+    pub saturation_e: f64,
+    /// The photons at which signal and noise are equal.
+    pub threshold_photons: f64,
+    /// Saturation over the threshold, dB.
+    pub dynamic_range_db: f64,
+    /// The dark point.
+    pub dark: FlatPoint,
+    /// The other points, by rising light.
+    pub points: Vec<FlatPoint>,
+}
+
+impl PhotonTransfer {
+    /// Returns the parameters that a dark point and points of rising light show.
+    ///
+    /// # Errors
+    /// When fewer than three points lie in the fitted range, or the signal does not rise with light.
+    pub fn fit(dark: FlatPoint, points: &[FlatPoint]) -> Result<Self, SensorError> {
+        let mut points = points.to_vec();
+        points.sort_by(|a, b| a.photons.total_cmp(&b.photons));
+        let few = |found: usize| SensorError::Shape {
+            what: "flat points below 70 % of saturation",
+            expected: "3 or more".to_owned(),
+            found: found.to_string(),
+        };
+        let saturated = points.iter().max_by(|a, b| a.variance_dn2.total_cmp(&b.variance_dn2)).ok_or_else(|| few(0))?;
+        let limit = FIT_UP_TO * saturated.photons;
+        let fitted: Vec<&FlatPoint> = points.iter().filter(|p| p.photons <= limit).collect();
+        if fitted.len() < 3 {
+            return Err(few(fitted.len()));
+        }
+        let signal = |p: &&FlatPoint| p.mean_dn - dark.mean_dn;
+        let gain_dn_per_e = slope(fitted.iter().map(|p| (signal(p), p.variance_dn2 - dark.variance_dn2)));
+        let responsivity = slope(fitted.iter().map(|p| (p.photons, signal(p))));
+        if !(gain_dn_per_e > 0.0 && responsivity > 0.0) {
+            let reason = "needs a mean and a variance that rise with light".to_owned();
+            return Err(SensorError::Unsuitable { what: "photon transfer", reason });
+        }
+        let quantum_efficiency = responsivity / gain_dn_per_e;
+        let dark_e2 = (dark.variance_dn2 - QUANTISATION_VARIANCE).max(0.0) / gain_dn_per_e.powi(2);
+        let rounding_e2 = QUANTISATION_VARIANCE / gain_dn_per_e.powi(2);
+        // Signal = noise: e = √(e + σd² + σq²), solved for e (EMVA 1288, equation 26).
+        let threshold_e = 0.5 + (dark_e2 + rounding_e2 + 0.25).sqrt();
+        let saturation_e = quantum_efficiency * saturated.photons;
+        Ok(Self {
+            gain_dn_per_e,
+            responsivity_dn_per_photon: responsivity,
+            quantum_efficiency,
+            dark_noise_e: dark_e2.sqrt(),
+            saturation_e,
+            threshold_photons: threshold_e / quantum_efficiency,
+            dynamic_range_db: 20.0 * (saturation_e / threshold_e).log10(),
+            dark,
+            points,
+        })
+    }
+
+    /// Returns the measured signal-to-noise ratio of a point.
+    pub fn snr(&self, point: &FlatPoint) -> f64 {
+        (point.mean_dn - self.dark.mean_dn) / point.variance_dn2.sqrt()
+    }
+
+    /// Returns the signal-to-noise ratio that the linear model gives for a number of electrons.
+    pub fn model_snr(&self, electrons: f64) -> f64 {
+        electrons / (electrons + self.dark_noise_e.powi(2) + QUANTISATION_VARIANCE / self.gain_dn_per_e.powi(2)).sqrt()
+    }
+}
+
+/// How pixels differ from each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NonUniformity {
+    /// Dark-signal non-uniformity, rms electrons.
+    pub dsnu_e: f64,
+    /// Photo-response non-uniformity, rms share.
+    pub prnu_fraction: f64,
+}
+
+impl NonUniformity {
+    /// Returns the non-uniformities that stacks of dark frames and of frames at half saturation show.
+    ///
+    /// The temporal noise that is left in the mean of a stack is taken away.
+    ///
+    /// # Errors
+    /// When a stack has fewer than two frames, or frames differ in size.
+    pub fn measure(dark: &[Array2<f32>], bright: &[Array2<f32>], gain_dn_per_e: f64) -> Result<Self, SensorError> {
+        let (dark_mean, dark_variance) = spatial(dark)?;
+        let (bright_mean, bright_variance) = spatial(bright)?;
+        Ok(Self {
+            dsnu_e: dark_variance.max(0.0).sqrt() / gain_dn_per_e,
+            prnu_fraction: (bright_variance - dark_variance).max(0.0).sqrt() / (bright_mean - dark_mean),
+        })
+    }
+}
+
+/// The dark current that dark points of several exposure times show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DarkCurrentEstimate {
+    /// From the rise of the mean, electrons a second.
+    pub by_mean_e_per_s: f64,
+    /// From the rise of the variance, electrons a second.
+    pub by_variance_e_per_s: f64,
+}
+
+impl DarkCurrentEstimate {
+    /// Returns the dark current from pairs of exposure time, s, and dark point.
+    pub fn fit(points: &[(f64, FlatPoint)], gain_dn_per_e: f64) -> Self {
+        let by_mean = slope(points.iter().map(|(time_s, p)| (*time_s, p.mean_dn)));
+        let by_variance = slope(points.iter().map(|(time_s, p)| (*time_s, p.variance_dn2)));
+        Self { by_mean_e_per_s: by_mean / gain_dn_per_e, by_variance_e_per_s: by_variance / gain_dn_per_e.powi(2) }
+    }
+}
+
+/// Returns the mean of a stack and the variance over its pixels without what temporal noise adds.
+fn spatial(stack: &[Array2<f32>]) -> Result<(f64, f64), SensorError> {
+    if stack.len() < 2 {
+        let (expected, found) = ("2 or more".to_owned(), stack.len().to_string());
+        return Err(SensorError::Shape { what: "frames of a stack", expected, found });
+    }
+    check_sizes(&stack.iter().collect::<Vec<_>>())?;
+    let n = stack.len() as f64;
+    let (rows, columns) = stack[0].dim();
+    // For each pixel the sum over frames and the sum of squares about the first frame, which keeps them small.
+    let row_sums: Vec<(f64, f64, f64)> = (0..rows)
+        .into_par_iter()
+        .map(|row| {
+            let mut sums = (0.0, 0.0, 0.0);
+            for column in 0..columns {
+                let values = || stack.iter().map(|frame| f64::from(frame[(row, column)]));
+                let average = values().sum::<f64>() / n;
+                let scatter: f64 = values().map(|v| (v - average).powi(2)).sum();
+                sums = (sums.0 + average, sums.1 + average * average, sums.2 + scatter / (n - 1.0));
+            }
+            sums
+        })
+        .collect();
+    let n_pixels = (rows * columns) as f64;
+    let total = row_sums.iter().fold((0.0, 0.0, 0.0), |t, s| (t.0 + s.0, t.1 + s.1, t.2 + s.2));
+    let (mean, temporal) = (total.0 / n_pixels, total.2 / n_pixels);
+    let variance = (total.1 - n_pixels * mean * mean) / (n_pixels - 1.0);
+    Ok((mean, variance - temporal / n))
+}
+
+fn mean(frame: &Array2<f32>) -> f64 {
+    let rows: Vec<f64> =
+        frame.outer_iter().into_par_iter().map(|row| row.iter().map(|&v| f64::from(v)).sum()).collect();
+    rows.iter().sum::<f64>() / frame.len() as f64
+}
+
+fn check_sizes(frames: &[&Array2<f32>]) -> Result<(), SensorError> {
+    let size = frames[0].dim();
+    match frames.iter().find(|frame| frame.dim() != size) {
+        Some(frame) => {
+            let text = |(rows, columns): (usize, usize)| format!("{rows} × {columns}");
+            let (expected, found) = (text(size), text(frame.dim()));
+            Err(SensorError::Shape { what: "rows × columns of a flat frame", expected, found })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Returns the slope of the least-squares line.
+fn slope(points: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+    let n = points.clone().count() as f64;
+    let (sum_x, sum_y) = points.clone().fold((0.0, 0.0), |(sx, sy), (x, y)| (sx + x, sy + y));
+    let (mean_x, mean_y) = (sum_x / n, sum_y / n);
+    let (xy, xx) =
+        points.fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + (x - mean_x) * (y - mean_y), xx + (x - mean_x).powi(2)));
+    xy / xx
+}
