@@ -2,9 +2,30 @@
 
 use crate::{Lens, OpticsError, prescription::lens_from_ron};
 
-const LENSES: &[(&str, &str)] = &[
-    ("paper-2el", include_str!("../data/lenses/paper-2el.ron")),
-    ("dgauss-50mm", include_str!("../data/lenses/dgauss-50mm.ron")),
+/// Names the lenses whose files lie in `data/lenses`.
+macro_rules! lenses {
+    ($($name:literal),* $(,)?) => {
+        &[$(($name, include_str!(concat!("../data/lenses/", $name, ".ron")))),*]
+    };
+}
+
+const LENSES: &[(&str, &str)] = lenses![
+    "paper-2el",
+    "dgauss-50mm",
+    "dgauss-50mm-schott",
+    "canon-50mm",
+    "tessar-50mm",
+    "cooke-50mm",
+    "singlet-50mm",
+    "achromat-100mm",
+    "asphere-15mm",
+    "wide-100deg",
+    "wide-6mm",
+    "fisheye-12.5mm",
+    "telephoto-127mm",
+    "telephoto-250mm",
+    "microscope-20x",
+    "relay-1to1",
 ];
 
 pub(crate) fn names() -> impl Iterator<Item = &'static str> {

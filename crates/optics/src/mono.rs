@@ -135,7 +135,7 @@ impl MonoLens {
     }
 
     /// Returns the steps, in which ideal lenses know where the object plane appears to them.
-    fn steps_for(&self, object_z_mm: f64) -> Cow<'_, [Step]> {
+    pub(crate) fn steps_for(&self, object_z_mm: f64) -> Cow<'_, [Step]> {
         if !self.steps.iter().any(|step| matches!(step.kind, Kind::ThinLens { .. })) {
             return Cow::Borrowed(&self.steps);
         }

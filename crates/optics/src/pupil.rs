@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::{MonoLens, RayBatch, Rims};
+use crate::{MonoLens, RayBatch, trace};
 
 /// A point that light comes from, in the lens frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -280,15 +280,8 @@ impl MonoLens {
     /// Negative for a ray that a rim would end; −∞ for one that misses a surface or is totally reflected.
     pub fn clearances_mm(&self, mut rays: RayBatch) -> Vec<f64> {
         let mut clearances_mm = vec![f64::INFINITY; rays.len()];
-        for surface in 0..self.n_surfaces() {
-            self.trace_surfaces(surface..surface + 1, &mut rays, Rims::Ignore);
-            let rim_mm = self.semi_aperture_mm(surface);
-            for (i, clearance) in clearances_mm.iter_mut().enumerate() {
-                let r_mm = rays.x_mm[i].hypot(rays.y_mm[i]);
-                let here = if rays.fate[i].is_in_flight() { rim_mm - r_mm } else { f64::NEG_INFINITY };
-                *clearance = clearance.min(here);
-            }
-        }
+        let steps = self.steps_for(rays.object_z_mm);
+        trace::trace_clearances(&steps, rays.slices(), &mut clearances_mm);
         clearances_mm
     }
 }

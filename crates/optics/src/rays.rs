@@ -15,7 +15,7 @@ pub enum RayFate {
         /// 0-based surface.
         surface: u16,
     },
-    /// The ray passed a surface without meeting it; it is left where it was before.
+    /// The ray passed a surface without meeting it; it is left on its line, before that surface.
     Missed {
         /// 0-based surface.
         surface: u16,

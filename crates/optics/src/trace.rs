@@ -1,11 +1,16 @@
-//! Exact tracing of ray batches: tiles of eight rays, surface by surface.
+//! Exact tracing of ray batches: tiles of rays, surface by surface.
 //!
-//! The tile is plain Rust over arrays of eight lanes, compiled once for the base instruction set and once for AVX2,
-//! chosen at run time. Neither uses fused multiply-add, and square roots and divisions are correctly rounded, so
-//! every machine gives the same bits.
+//! The tile is plain Rust over arrays of lanes, compiled once for the base instruction set and once for AVX2, chosen
+//! at run time. Neither uses fused multiply-add, and square roots and divisions are correctly rounded, so every
+//! machine gives the same bits. Lanes whose ray has ended go on computing numbers that nobody reads.
+
+mod crossing;
+#[cfg(test)]
+mod twin;
 
 use multiversion::multiversion;
 
+use self::crossing::{Ray, cross_conic, cross_even_asphere, cross_plane, cross_sphere, refract, thin_lens};
 use crate::{RayFate, rays::RaySlices};
 
 /// Whether rims end rays.
@@ -47,19 +52,12 @@ pub(crate) enum Kind {
     },
 }
 
-/// Rays in a tile.
+/// Rays in a tile: enough for two vectors of the widest kind in use, so that one can wait while the other computes.
 const LANES: usize = 8;
-/// Newton steps after which a ray is held to miss an asphere.
-const NEWTON_STEPS: usize = 30;
-
-const IN_FLIGHT: u64 = 0;
-const VIGNETTED: u64 = 1;
-const MISSED: u64 = 2;
-const REFLECTED: u64 = 3;
 
 type Lanes = [f64; LANES];
 
-/// Eight rays; z is from the vertex of the surface at hand.
+/// Some rays; z is from the vertex of the surface at hand.
 struct Tile {
     x: Lanes,
     y: Lanes,
@@ -68,53 +66,73 @@ struct Tile {
     m: Lanes,
     n: Lanes,
     opl: Lanes,
-    /// 0 in flight, else how the ray ended plus four times the surface.
-    code: [u64; LANES],
+    /// All ones while the ray is in flight, else 0.
+    alive: [u64; LANES],
 }
 
 /// Traces rays given in the lens frame through these steps; `first` is the number of the first of them.
-#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+#[multiversion(targets("x86_64+avx2"))]
 pub(crate) fn trace_batch(steps: &[Step], first: usize, rims: Rims, mut rays: RaySlices<'_>) {
-    trace_batch_here(steps, first, rims, &mut rays);
+    trace_tiles(steps, first, rims, &mut rays, |_, _, _| {});
+}
+
+/// Traces rays without rims, and keeps for each the least over all surfaces of semi-aperture less distance from the
+/// axis; −∞ for a ray that does not get through.
+#[multiversion(targets("x86_64+avx2"))]
+pub(crate) fn trace_clearances(steps: &[Step], mut rays: RaySlices<'_>, clearances: &mut [f64]) {
+    let note = |step: &Step, tile: &Tile, start: usize| {
+        for i in 0..LANES.min(clearances.len() - start) {
+            let here = step.semi_aperture - (tile.x[i] * tile.x[i] + tile.y[i] * tile.y[i]).sqrt();
+            let here = if tile.alive[i] == 0 { f64::NEG_INFINITY } else { here };
+            clearances[start + i] = if here < clearances[start + i] { here } else { clearances[start + i] };
+        }
+    };
+    trace_tiles(steps, 0, Rims::Ignore, &mut rays, note);
 }
 
 #[inline(always)]
-fn trace_batch_here(steps: &[Step], first: usize, rims: Rims, rays: &mut RaySlices<'_>) {
+fn trace_tiles(
+    steps: &[Step],
+    first: usize,
+    rims: Rims,
+    rays: &mut RaySlices<'_>,
+    mut note: impl FnMut(&Step, &Tile, usize),
+) {
     let (Some(begin), Some(end)) = (steps.first(), steps.last()) else { return };
-    let n_rays = rays.fate.len();
-    let mut start = 0;
-    while start < n_rays {
-        let n = LANES.min(n_rays - start);
-        let mut tile = load(rays, start, n);
+    for start in (0..rays.fate.len()).step_by(LANES) {
+        let mut tile = load(rays, start);
         for z in &mut tile.z {
             *z -= begin.vertex_z;
         }
         if first == 0 {
-            approach_tile(begin.index_before, &mut tile);
+            approach(begin.index_before, &mut tile);
         }
         let mut previous_z = begin.vertex_z;
         for (i, step) in steps.iter().enumerate() {
             let shift = step.vertex_z - previous_z;
+            previous_z = step.vertex_z;
             for z in &mut tile.z {
                 *z -= shift;
             }
-            previous_z = step.vertex_z;
-            step_tile(step, (first + i) as u64, rims, &mut tile);
+            let limit_mm2 = match rims {
+                Rims::Clip => step.semi_aperture * step.semi_aperture,
+                Rims::Ignore => f64::MAX,
+            };
+            let mut at = At { step, surface: (first + i) as u16, limit_mm2, rays: &mut *rays, start };
+            pass(&mut at, &mut tile);
+            note(step, &tile, start);
         }
-        for z in &mut tile.z {
-            *z += end.vertex_z;
-        }
-        store(&tile, rays, start, n);
-        start += n;
+        store(&tile, end.vertex_z, rays, start);
     }
 }
 
 #[inline(always)]
-fn load(rays: &RaySlices<'_>, start: usize, n: usize) -> Tile {
+fn load(rays: &RaySlices<'_>, start: usize) -> Tile {
+    let n = LANES.min(rays.fate.len() - start);
     // Lanes without a ray hold one that has ended.
-    let mut code = [MISSED; LANES];
-    for (code, fate) in code.iter_mut().zip(&rays.fate[start..start + n]) {
-        *code = encode(*fate);
+    let mut alive = [0; LANES];
+    for (alive, fate) in alive.iter_mut().zip(&rays.fate[start..start + n]) {
+        *alive = if fate.is_in_flight() { u64::MAX } else { 0 };
     }
     let take = |list: &[f64], rest: f64| {
         let mut lanes = [rest; LANES];
@@ -129,51 +147,35 @@ fn load(rays: &RaySlices<'_>, start: usize, n: usize) -> Tile {
         m: take(rays.m, 0.0),
         n: take(rays.n, 1.0),
         opl: take(rays.opl, 0.0),
-        code,
+        alive,
     }
 }
 
+/// Writes the rays that are still in flight; the others have been written where they ended.
 #[inline(always)]
-fn store(tile: &Tile, rays: &mut RaySlices<'_>, start: usize, n: usize) {
-    let put = |list: &mut [f64], lanes: &Lanes| list[start..start + n].copy_from_slice(&lanes[..n]);
-    put(rays.x, &tile.x);
-    put(rays.y, &tile.y);
-    put(rays.z, &tile.z);
-    put(rays.l, &tile.l);
-    put(rays.m, &tile.m);
-    put(rays.n, &tile.n);
-    put(rays.opl, &tile.opl);
-    for (fate, code) in rays.fate[start..start + n].iter_mut().zip(tile.code) {
-        *fate = decode(code);
+fn store(tile: &Tile, vertex_z: f64, rays: &mut RaySlices<'_>, start: usize) {
+    let n = LANES.min(rays.fate.len() - start);
+    if n == LANES && tile.alive.iter().fold(u64::MAX, |all, alive| all & alive) == u64::MAX {
+        let put = |list: &mut [f64], lanes: &Lanes| list[start..start + LANES].copy_from_slice(lanes);
+        put(rays.x, &tile.x);
+        put(rays.y, &tile.y);
+        put(rays.z, &tile.z.map(|z| z + vertex_z));
+        put(rays.l, &tile.l);
+        put(rays.m, &tile.m);
+        put(rays.n, &tile.n);
+        put(rays.opl, &tile.opl);
+        return;
     }
-}
-
-fn encode(fate: RayFate) -> u64 {
-    match fate {
-        RayFate::InFlight => IN_FLIGHT,
-        RayFate::Vignetted { surface } => VIGNETTED + 4 * u64::from(surface),
-        RayFate::Missed { surface } => MISSED + 4 * u64::from(surface),
-        RayFate::TotalReflection { surface } => REFLECTED + 4 * u64::from(surface),
-    }
-}
-
-fn decode(code: u64) -> RayFate {
-    let surface = (code / 4) as u16;
-    match code % 4 {
-        IN_FLIGHT => RayFate::InFlight,
-        VIGNETTED => RayFate::Vignetted { surface },
-        MISSED => RayFate::Missed { surface },
-        _ => RayFate::TotalReflection { surface },
+    for i in (0..n).filter(|&i| tile.alive[i] != 0) {
+        rays.put(start + i, &tile.ray(i), vertex_z);
     }
 }
 
 /// Moves each ray to where it passes nearest to the first vertex, so that far starts cost no digits at the surface.
 #[inline(always)]
-fn approach_tile(index: f64, tile: &mut Tile) {
+fn approach(index: f64, tile: &mut Tile) {
     for i in 0..LANES {
-        let is_alive = tile.code[i] == IN_FLIGHT;
         let t = -(tile.x[i] * tile.l[i] + tile.y[i] * tile.m[i] + tile.z[i] * tile.n[i]);
-        let t = if is_alive { t } else { 0.0 };
         tile.x[i] += tile.l[i] * t;
         tile.y[i] += tile.m[i] * t;
         tile.z[i] += tile.n[i] * t;
@@ -181,212 +183,224 @@ fn approach_tile(index: f64, tile: &mut Tile) {
     }
 }
 
-/// What a ray does at a surface: how far it goes, the normal there and the cosine of incidence.
-#[derive(Clone, Copy)]
-struct Meeting {
-    is_hit: bool,
-    t: f64,
-    /// Unit normal, pointing downstream.
-    normal: [f64; 3],
-    cos_incidence: f64,
+impl Tile {
+    #[inline(always)]
+    fn ray(&self, i: usize) -> Ray {
+        Ray { x: self.x[i], y: self.y[i], z: self.z[i], l: self.l[i], m: self.m[i], n: self.n[i], opl: self.opl[i] }
+    }
 }
 
+impl RaySlices<'_> {
+    #[inline(always)]
+    fn put(&mut self, i: usize, ray: &Ray, vertex_z: f64) {
+        (self.x[i], self.y[i], self.z[i]) = (ray.x, ray.y, ray.z + vertex_z);
+        (self.l[i], self.m[i], self.n[i]) = (ray.l, ray.m, ray.n);
+        self.opl[i] = ray.opl;
+    }
+}
+
+/// A surface that a tile is at, and where the tile's rays are written when they end there.
+struct At<'a, 'b> {
+    step: &'a Step,
+    surface: u16,
+    limit_mm2: f64,
+    rays: &'a mut RaySlices<'b>,
+    start: usize,
+}
+
+/// Takes a tile through one surface.
 #[inline(always)]
-fn step_tile(step: &Step, surface: u64, rims: Rims, tile: &mut Tile) {
-    let limit_mm2 = match rims {
-        Rims::Clip => step.semi_aperture * step.semi_aperture,
-        Rims::Ignore => f64::INFINITY,
-    };
+fn pass(at: &mut At<'_, '_>, tile: &mut Tile) {
+    let (step, limit_mm2) = (at.step, at.limit_mm2);
+    let c = step.curvature;
+    let refracting = Refracting::new(step, limit_mm2);
     match &step.kind {
-        Kind::Window => window_tile(step, surface, limit_mm2, tile),
-        Kind::Sphere => refract_tile(step, surface, limit_mm2, tile, |ray| meet_sphere(step.curvature, ray)),
-        Kind::Conic { conic } => {
-            refract_tile(step, surface, limit_mm2, tile, |ray| meet_conic(step.curvature, *conic, ray));
-        }
+        Kind::Window => pass_lanes(at, tile, |ray| cross_plane(step.index_before, limit_mm2, ray)),
+        Kind::Sphere => pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_sphere(c, ray))),
+        Kind::Conic { conic } => pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_conic(c, *conic, ray))),
         Kind::EvenAsphere { conic, coefficients } => {
-            refract_tile(step, surface, limit_mm2, tile, |ray| {
-                meet_even_asphere(step.curvature, *conic, coefficients, ray)
-            });
+            pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_even_asphere(c, *conic, coefficients, ray)));
         }
-        Kind::ThinLens { power, object_z } => thin_lens_tile(step, *power, *object_z, surface, limit_mm2, tile),
+        Kind::ThinLens { power, object_z } => {
+            pass_lanes(at, tile, |ray| thin_lens(step, *power, *object_z, limit_mm2, ray));
+        }
+    }
+}
+
+/// What refraction needs of a surface.
+pub(crate) struct Refracting {
+    ratio: f64,
+    ratio2: f64,
+    index_before: f64,
+    limit_mm2: f64,
+}
+
+impl Refracting {
+    #[inline(always)]
+    fn new(step: &Step, limit_mm2: f64) -> Self {
+        let ratio = step.index_before / step.index_after;
+        Self { ratio, ratio2: ratio * ratio, index_before: step.index_before, limit_mm2 }
     }
 }
 
-/// A ray's point, from the vertex, and its direction.
-type Ray = [f64; 6];
-
-/// Returns where a ray meets a sphere: the crossing at which it goes through the surface downstream.
-///
-/// Written in curvature, so that it stays accurate as the sphere flattens to a plane; the cosine of incidence
-/// comes with it, and the normal is already of unit length.
-#[inline(always)]
-fn meet_sphere(c: f64, [x, y, z, l, m, n]: Ray) -> Meeting {
-    let f = c * (x * x + y * y + z * z) - 2.0 * z;
-    let g = n - c * (x * l + y * m + z * n);
-    let square = g * g - c * f;
-    let s = square.max(0.0).sqrt();
-    // Both quotients are the same number; each is free of cancellation on its side.
-    let is_ahead = g >= 0.0;
-    let numerator = if is_ahead { f } else { g - s };
-    let denominator = if is_ahead { g + s } else { c };
-    let t = numerator / denominator;
-    let (x1, y1, z1) = (x + l * t, y + m * t, z + n * t);
-    let normal = [-c * x1, -c * y1, 1.0 - c * z1];
-    // Beyond the equator the sphere is no longer the surface.
-    let is_hit = (square >= 0.0) & (t.abs() < f64::INFINITY) & (normal[2] > 0.0);
-    Meeting { is_hit, t, normal, cos_incidence: s }
+/// What becomes of a ray at a surface.
+#[derive(Clone, Copy)]
+struct Passed {
+    /// The ray on the surface, turned.
+    ray: Ray,
+    /// Whether it goes on; if not, the rest says why.
+    goes_on: bool,
+    /// Whether it met the surface at all.
+    is_hit: bool,
+    /// Whether it met it inside the rim.
+    is_within: bool,
 }
 
 #[inline(always)]
-fn meet_conic(c: f64, conic: f64, [x, y, z, l, m, n]: Ray) -> Meeting {
-    let k1 = 1.0 + conic;
-    let a = c * (1.0 + conic * n * n);
-    let f = c * (x * x + y * y + k1 * z * z) - 2.0 * z;
-    let g = n - c * (x * l + y * m + k1 * z * n);
-    let square = g * g - a * f;
-    let s = square.max(0.0).sqrt();
-    let is_ahead = g >= 0.0;
-    let numerator = if is_ahead { f } else { g - s };
-    let denominator = if is_ahead { g + s } else { a };
-    let t = numerator / denominator;
-    let (x1, y1, z1) = (x + l * t, y + m * t, z + n * t);
-    let gradient = [-c * x1, -c * y1, 1.0 - c * k1 * z1];
-    let length = (gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2]).sqrt();
-    let is_hit = (square >= 0.0) & (t.abs() < f64::INFINITY) & (gradient[2] > 0.0);
-    let inverse = 1.0 / length;
-    Meeting { is_hit, t, normal: gradient.map(|v| v * inverse), cos_incidence: s * inverse }
-}
-
-#[inline(always)]
-fn meet_even_asphere(c: f64, conic: f64, coefficients: &[f64], ray: Ray) -> Meeting {
-    let [x, y, z, l, m, n] = ray;
-    let start = meet_conic(c, conic, ray);
-    let mut t = if start.is_hit { start.t } else { -z / n };
-    let k1 = 1.0 + conic;
-    let mut is_hit = false;
-    let (mut gx, mut gy) = (0.0, 0.0);
-    let mut last_step = f64::INFINITY;
-    for _ in 0..NEWTON_STEPS {
-        let (x1, y1, z1) = (x + l * t, y + m * t, z + n * t);
-        let r2 = x1 * x1 + y1 * y1;
-        let root2 = 1.0 - k1 * c * c * r2;
-        let root = root2.sqrt();
-        let (mut high, mut slope) = (0.0, 0.0);
-        for (i, a) in coefficients.iter().enumerate().rev() {
-            high = high * r2 + a;
-            slope = slope * r2 + a * (i + 2) as f64;
-        }
-        let sag = c * r2 / (1.0 + root) + high * r2 * r2;
-        // d sag / d(r²), doubled: the slope along x is this times x.
-        let along = c / root + 2.0 * slope * r2;
-        (gx, gy) = (-along * x1, -along * y1);
-        let step = (z1 - sag) / (l * gx + m * gy + n);
-        t -= step;
-        // Converged once a step no longer halves the one before and is down at rounding.
-        let is_small = step.abs() <= 1e-13 * (1.0 + t.abs());
-        if is_small && (step == 0.0 || step.abs() >= 0.5 * last_step) {
-            is_hit = true;
-            break;
-        }
-        is_hit = is_small;
-        last_step = step.abs();
-        if !step.is_finite() {
-            break;
-        }
-    }
-    let length = (gx * gx + gy * gy + 1.0).sqrt();
-    let cos_incidence = (l * gx + m * gy + n) / length;
-    is_hit &= (cos_incidence > 0.0) & t.is_finite();
-    Meeting { is_hit, t, normal: [gx / length, gy / length, 1.0 / length], cos_incidence }
-}
-
-/// Moves each ray of a tile to the surface, and refracts it there.
-#[inline(always)]
-fn refract_tile(step: &Step, surface: u64, limit_mm2: f64, tile: &mut Tile, meet: impl Fn(Ray) -> Meeting) {
-    let ratio = step.index_before / step.index_after;
+fn pass_lanes(at: &mut At<'_, '_>, tile: &mut Tile, pass_one: impl Fn(Ray) -> Passed) {
+    let mut next = [[0.0; LANES]; 7];
+    let mut ended = [0_u64; LANES];
     for i in 0..LANES {
-        let (x, y, z) = (tile.x[i], tile.y[i], tile.z[i]);
-        let (l, m, n) = (tile.l[i], tile.m[i], tile.n[i]);
-        let is_alive = tile.code[i] == IN_FLIGHT;
-        let Meeting { is_hit, t, normal, cos_incidence } = meet([x, y, z, l, m, n]);
-        let (x1, y1, z1) = (x + l * t, y + m * t, z + n * t);
-        let is_within = x1 * x1 + y1 * y1 <= limit_mm2;
-        let cos2 = 1.0 - ratio * ratio * (1.0 - cos_incidence * cos_incidence);
-        let is_refracted = cos2 >= 0.0;
-        let bend = cos2.max(0.0).sqrt() - ratio * cos_incidence;
-
-        let ended = if !is_hit {
-            MISSED
-        } else if !is_within {
-            VIGNETTED
-        } else {
-            REFLECTED
-        } + 4 * surface;
-        let goes_on = is_hit & is_within & is_refracted;
-        let moves = is_alive & is_hit;
-        let turns = is_alive & goes_on;
-        tile.code[i] = if is_alive & !goes_on { ended } else { tile.code[i] };
-        tile.x[i] = if moves { x1 } else { x };
-        tile.y[i] = if moves { y1 } else { y };
-        tile.z[i] = if moves { z1 } else { z };
-        tile.opl[i] = if moves { tile.opl[i] + step.index_before * t } else { tile.opl[i] };
-        tile.l[i] = if turns { ratio * l + bend * normal[0] } else { l };
-        tile.m[i] = if turns { ratio * m + bend * normal[1] } else { m };
-        tile.n[i] = if turns { ratio * n + bend * normal[2] } else { n };
+        let Passed { ray, goes_on, .. } = pass_one(tile.ray(i));
+        next[0][i] = ray.x;
+        next[1][i] = ray.y;
+        next[2][i] = ray.z;
+        next[3][i] = ray.l;
+        next[4][i] = ray.m;
+        next[5][i] = ray.n;
+        next[6][i] = ray.opl;
+        ended[i] = if goes_on { 0 } else { tile.alive[i] };
     }
-}
-
-/// Moves each ray of a tile to the vertex plane and clips it there.
-#[inline(always)]
-fn window_tile(step: &Step, surface: u64, limit_mm2: f64, tile: &mut Tile) {
-    for i in 0..LANES {
-        let t = -tile.z[i] / tile.n[i];
-        let is_alive = tile.code[i] == IN_FLIGHT;
-        let is_hit = (tile.n[i] > 0.0) & (t.abs() < f64::INFINITY);
-        let moves = is_alive & is_hit;
-        let (x1, y1) = (tile.x[i] + tile.l[i] * t, tile.y[i] + tile.m[i] * t);
-        let is_within = x1 * x1 + y1 * y1 <= limit_mm2;
-        let ended = if is_hit { VIGNETTED } else { MISSED } + 4 * surface;
-        tile.code[i] = if is_alive & !(is_hit & is_within) { ended } else { tile.code[i] };
-        tile.x[i] = if moves { x1 } else { tile.x[i] };
-        tile.y[i] = if moves { y1 } else { tile.y[i] };
-        tile.z[i] = if moves { 0.0 } else { tile.z[i] };
-        tile.opl[i] = if moves { tile.opl[i] + step.index_before * t } else { tile.opl[i] };
-    }
-}
-
-/// Moves each ray of a tile to an ideal lens, and turns it there.
-#[inline(always)]
-fn thin_lens_tile(step: &Step, power: f64, object_z: f64, surface: u64, limit_mm2: f64, tile: &mut Tile) {
-    window_tile(step, surface, limit_mm2, tile);
-    let (n1, n2) = (step.index_before, step.index_after);
-    for i in 0..LANES {
-        if tile.code[i] != IN_FLIGHT {
-            continue;
+    if ended.iter().fold(0, |any, ended| any | ended) != 0 {
+        for i in (0..LANES).filter(|&i| ended[i] != 0) {
+            let before = tile.ray(i);
+            end_ray(at, i, before, pass_one(before));
+            tile.alive[i] = 0;
         }
-        let (x, y) = (tile.x[i], tile.y[i]);
-        let (tx, ty) = (tile.l[i] / tile.n[i], tile.m[i] / tile.n[i]);
-        let (sx, sy) = ((n1 * tx - power * x) / n2, (n1 * ty - power * y) / n2);
-        // The path from the object point, and on to its image, is made that of the ray through the centre.
-        let reduced = n1 / object_z + power;
-        let before = path_difference([x, y], [tx, ty], object_z);
-        let after = path_difference([x, y], [sx, sy], n2 / reduced);
-        let n_after = 1.0 / (1.0 + sx * sx + sy * sy).sqrt();
-        tile.opl[i] += n2 * after - n1 * before;
-        tile.l[i] = sx * n_after;
-        tile.m[i] = sy * n_after;
-        tile.n[i] = n_after;
+    }
+    [tile.x, tile.y, tile.z, tile.l, tile.m, tile.n, tile.opl] = next;
+}
+
+/// Writes a ray where it ended, with the direction in which it came.
+#[inline(never)]
+fn end_ray(at: &mut At<'_, '_>, lane: usize, before: Ray, passed: Passed) {
+    let surface = at.surface;
+    let (fate, ray) = fate_of(surface, before, passed);
+    at.rays.put(at.start + lane, &ray, at.step.vertex_z);
+    at.rays.fate[at.start + lane] = fate;
+}
+
+fn fate_of(surface: u16, before: Ray, passed: Passed) -> (RayFate, Ray) {
+    let Ray { l, m, n, .. } = before;
+    let there = Ray { l, m, n, ..passed.ray };
+    match (passed.is_hit, passed.is_within) {
+        (false, _) => (RayFate::Missed { surface }, before),
+        (true, false) => (RayFate::Vignetted { surface }, there),
+        (true, true) => (RayFate::TotalReflection { surface }, there),
     }
 }
 
-/// Returns the distance to a point of the plane `z` from the lens centre, less that from `height`, both counted along
-/// the ray of these slopes through `height`; written so that the point may be infinitely far.
-#[inline(always)]
-fn path_difference(height: [f64; 2], slopes: [f64; 2], z: f64) -> f64 {
-    // With u = slopes + height/z the slopes from the centre: z (|(slopes, 1)| − |(u, 1)|) without cancellation.
-    let (ux, uy) = (slopes[0] + height[0] / z, slopes[1] + height[1] / z);
-    let along = 1.0 + slopes[0] * slopes[0] + slopes[1] * slopes[1];
-    let centre = 1.0 + ux * ux + uy * uy;
-    let sum = (slopes[0] + ux) * height[0] + (slopes[1] + uy) * height[1];
-    sum / (along.sqrt() + centre.sqrt())
+#[cfg(test)]
+mod tests {
+    use glam::{DVec2, DVec3};
+
+    use super::*;
+    use crate::{Lens, MonoLens, ObjectPoint, RayBatch, rays_towards};
+
+    /// Rays that fill the front of a lens, and more: some pass, some are vignetted, some miss.
+    fn bundle(lens: &MonoLens, field_tan: f64, n_rays: usize) -> RayBatch {
+        let point = ObjectPoint::from_field(lens, DVec2::new(field_tan, 0.3 * field_tan), 0.5);
+        let radius_mm = 1.2 * lens.semi_aperture_mm(0);
+        let place = |i: usize| radius_mm * (i as f64 / n_rays as f64).sqrt() * DVec2::from_angle(2.4 * i as f64);
+        let targets: Vec<DVec2> = (0..n_rays).map(place).collect();
+        rays_towards(&point, &targets, lens.first_order().entrance_pupil_z_mm, 0.0)
+    }
+
+    #[track_caller]
+    fn assert_same_bits(a: &RayBatch, b: &RayBatch) {
+        assert_eq!(a.fate, b.fate);
+        let bits = |r: &RayBatch| {
+            let lists = [&r.x_mm, &r.y_mm, &r.z_mm, &r.l, &r.m, &r.n, &r.opl_mm];
+            lists.map(|list| list.iter().map(|v| v.to_bits()).collect::<Vec<_>>())
+        };
+        assert_eq!(bits(a), bits(b));
+    }
+
+    #[test]
+    fn tile_and_scalar_twin_agree_to_the_bit() {
+        for name in ["dgauss-50mm", "paper-2el", "fisheye-12.5mm", "asphere-15mm", "singlet-50mm"] {
+            let lens = Lens::built_in(name).unwrap().at(550.0).unwrap();
+            for rims in [Rims::Clip, Rims::Ignore] {
+                for (field_tan, n_rays) in [(0.0, 501), (0.3, 1003), (3.0, 777)] {
+                    let rays = bundle(&lens, field_tan, n_rays);
+                    let (mut tiled, mut single) = (rays.clone(), rays.clone());
+                    lens.trace(&mut tiled, rims);
+                    twin::trace_one_by_one(&lens.steps_for(rays.object_z_mm), rims, &mut single);
+                    assert_same_bits(&tiled, &single);
+                }
+            }
+        }
+        let lens = Lens::thin(50.0, 10.0).unwrap().at(550.0).unwrap();
+        let rays = bundle(&lens, 0.2, 99);
+        let (mut tiled, mut single) = (rays.clone(), rays.clone());
+        lens.trace(&mut tiled, Rims::Clip);
+        twin::trace_one_by_one(&lens.steps_for(rays.object_z_mm), Rims::Clip, &mut single);
+        assert_same_bits(&tiled, &single);
+    }
+
+    #[test]
+    fn pieces_and_threads_change_no_bit() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().at(500.0).unwrap();
+        let rays = bundle(&lens, 0.2, 10_001);
+        let (mut whole, mut shared) = (rays.clone(), rays.clone());
+        lens.trace(&mut whole, Rims::Clip);
+        lens.trace_parallel(&mut shared, Rims::Clip);
+        assert_same_bits(&whole, &shared);
+        let losses = whole.losses();
+        assert!(losses.n_in_flight > 1000 && losses.by_surface.iter().filter(|s| s.n_vignetted > 0).count() > 3);
+
+        // A trace in pieces passes the lens frame between them, which rounds z.
+        let mut pieces = rays;
+        lens.trace_surfaces(0..lens.stop() + 1, &mut pieces, Rims::Clip);
+        lens.trace_surfaces(lens.stop() + 1..lens.n_surfaces(), &mut pieces, Rims::Clip);
+        assert_eq!(whole.fate, pieces.fate);
+        let apart = whole.x_mm.iter().zip(&pieces.x_mm).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-13, "{apart}");
+    }
+
+    #[test]
+    fn rays_end_where_and_as_they_should() {
+        let lens = Lens::built_in("paper-2el").unwrap().at(550.0).unwrap();
+        let at = |y: f64, direction: DVec3| {
+            let mut rays = RayBatch::from_points(&[DVec3::new(0.0, y, -5.0)], &[direction.normalize()]);
+            lens.trace(&mut rays, Rims::Clip);
+            (rays.fate[0], rays.point_mm(0))
+        };
+        assert_eq!(at(12.4, DVec3::Z).0, RayFate::InFlight);
+        let (fate, point) = at(12.6, DVec3::Z);
+        assert_eq!(fate, RayFate::Vignetted { surface: 0 });
+        assert!((point.z - (67.0 - (67.0_f64.powi(2) - 12.6_f64.powi(2)).sqrt())).abs() < 1e-12, "{point}");
+        let (fate, point) = at(80.0, DVec3::Z);
+        assert_eq!((fate, point), (RayFate::Missed { surface: 0 }, DVec3::new(0.0, 80.0, 0.0)));
+
+        // Light inside a glass ball beyond the critical angle, 37.3 degrees.
+        let ball = crate::Interface {
+            surface: crate::Surface::sphere(-10.0, 9.99),
+            medium_after: crate::Glass::Air,
+            thickness_after_mm: 0.0,
+        };
+        let window = crate::Interface {
+            surface: crate::Surface::plane(9.0),
+            medium_after: crate::Glass::Constant { index: 1.65 },
+            thickness_after_mm: 10.0,
+        };
+        let dome = Lens::new("dome", "test", vec![window, ball], 0).unwrap().at(550.0).unwrap();
+        let end = |y: f64| {
+            let mut rays = RayBatch::from_points(&[DVec3::new(0.0, y, -1.0)], &[DVec3::Z]);
+            dome.trace(&mut rays, Rims::Clip);
+            rays.fate[0]
+        };
+        assert_eq!(end(10.0 * (1.0 / 1.65) - 1e-9), RayFate::InFlight);
+        assert_eq!(end(10.0 * (1.0 / 1.65) + 1e-9), RayFate::TotalReflection { surface: 1 });
+    }
 }

@@ -30,12 +30,12 @@ fn follow(mono: &MonoLens, row: &Value, image_z_mm: f64, worst: &mut Worst) -> O
         worst.cosine = worst.cosine.max(d.abs().max_element());
         worst.opl_mm = worst.opl_mm.max((rays.opl_mm[0] - e[6]).abs());
     };
-    for (surface, expected) in trace.iter().enumerate().take(mono.n_surfaces()) {
+    for surface in 0..mono.n_surfaces() {
         mono.trace_surfaces(surface..surface + 1, &mut rays, Rims::Ignore);
         if !rays.fate[0].is_in_flight() {
             return rays.fate[0].surface();
         }
-        compare(&rays, expected);
+        compare(&rays, trace.get(surface).unwrap_or(&Value::Null));
     }
     mono.to_film(&mut rays, image_z_mm - mono.last_vertex_z_mm());
     compare(&rays, &trace[mono.n_surfaces()]);
