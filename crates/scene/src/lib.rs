@@ -8,8 +8,10 @@
 
 mod error;
 mod formats;
+mod preview;
 mod resample;
 mod scene;
+mod targets;
 mod view;
 
 pub use error::SceneError;
@@ -17,6 +19,8 @@ pub use formats::{
     BandWriter, EnviCube, ExrParts, ReadOptions, SpectralFile, read_band_folder, read_envi, read_picture,
     read_planes_exr, read_scene, read_spectral_exr, write_planes_exr, write_scene_exr, write_spectral_exr,
 };
+pub use preview::{srgb_preview, write_preview_png};
 pub use resample::{reflectance_under, resampled};
 pub use scene::{HiddenLayer, Scene};
+pub use targets::{Pattern, Target, TargetLight};
 pub use view::View;

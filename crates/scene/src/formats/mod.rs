@@ -14,6 +14,8 @@ mod picture;
 mod read_scene;
 mod spectral_exr;
 
+pub(crate) use beside::{PartialFile, unwritable};
+
 pub use band_folder::read_band_folder;
 pub use envi::{EnviCube, read_envi};
 pub use exr_write::{BandWriter, ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};

@@ -1,0 +1,323 @@
+//! Test targets made from formulas: a flat pattern at one distance under one light.
+
+mod pattern;
+
+use dioptric_spectrum::{
+    Illuminant, Observer, Quantity, SpectralImage, Spectrum, WavelengthGrid, color_checker_reflectances,
+};
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+
+use crate::{Scene, SceneError};
+
+/// What is drawn on a target.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Pattern {
+    /// White all over.
+    Uniform,
+    /// Squares of this many samples; the one at the top left is dark.
+    Checkerboard {
+        /// Side of a square, in samples.
+        check_px: usize,
+    },
+    /// One straight edge through the centre, light at the lower left.
+    SlantedBar {
+        /// Rows a column along the edge.
+        slope: f64,
+    },
+    /// Lines a sample wide through the centre, evenly turned.
+    RadialLines {
+        /// The number of whole lines; 8 give 16 rays.
+        n_lines: usize,
+    },
+    /// Single light samples on a square lattice that has one at the centre.
+    PointArray {
+        /// From point to point, in samples.
+        spacing_px: usize,
+    },
+    /// Light and dark sectors.
+    SiemensStar {
+        /// Pairs of sectors once around.
+        n_cycles: usize,
+    },
+    /// The 24 patches of the `ColorChecker`, four rows of six, on a black frame.
+    ColorChart,
+}
+
+/// The shape of a target's spectrum.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum TargetLight {
+    /// The same power in every nanometre.
+    EqualEnergy,
+    /// The same number of photons in every nanometre.
+    EqualPhotons,
+    /// The spectrum of a light.
+    Illuminant(Illuminant),
+}
+
+impl TargetLight {
+    /// Returns the relative spectral power.
+    fn spectrum(self) -> Spectrum {
+        match self {
+            Self::EqualEnergy => Spectrum::constant(1.0),
+            Self::EqualPhotons => {
+                // The energy of a photon is as one over its wavelength.
+                let wavelengths_nm: Vec<f64> = (200..=1200).map(f64::from).collect();
+                let values = wavelengths_nm.iter().map(|nm| 550.0 / nm).collect();
+                Spectrum::new(wavelengths_nm, values).expect("the wavelengths ascend")
+            }
+            Self::Illuminant(illuminant) => illuminant.spectrum(),
+        }
+    }
+}
+
+/// A flat target that faces the camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// What is drawn on it.
+    pub pattern: Pattern,
+    /// Rows.
+    pub rows: usize,
+    /// Columns.
+    pub columns: usize,
+    /// The shape of its spectrum.
+    pub light: TargetLight,
+    /// The luminance of its white, cd/m².
+    pub luminance_cd_m2: f64,
+    /// What its dark reflects, as a share of its white; a chart does without.
+    pub dark: f64,
+    /// Points a sample and direction at which the pattern is looked up: 1 gives hard steps, as in the paper.
+    pub supersampling: usize,
+    /// Angle from its left edge to its right.
+    pub horizontal_fov_deg: f64,
+    /// Its distance along the axis, m.
+    pub distance_m: f64,
+}
+
+impl Target {
+    /// The checkerboard of Figure 3 of the paper: 4 × 4 squares of 16 samples, 3° wide, 8 m away.
+    pub fn paper_checkerboard() -> Self {
+        Self::paper(Pattern::Checkerboard { check_px: 16 }, 64, TargetLight::EqualPhotons)
+    }
+
+    /// The slanted bar of Figure 3 of the paper: 385 samples, slope 2.6, 3° wide, 8 m away.
+    pub fn paper_slanted_bar() -> Self {
+        Self::paper(Pattern::SlantedBar { slope: 2.6 }, 385, TargetLight::EqualEnergy)
+    }
+
+    /// The radial lines of Figure 3 of the paper: 256 samples, 8 lines, 3° wide, 8 m away.
+    pub fn paper_radial_lines() -> Self {
+        Self::paper(Pattern::RadialLines { n_lines: 8 }, 256, TargetLight::EqualPhotons)
+    }
+
+    fn paper(pattern: Pattern, size: usize, light: TargetLight) -> Self {
+        Self {
+            pattern,
+            rows: size,
+            columns: size,
+            light,
+            luminance_cd_m2: 100.0,
+            dark: 1e-4,
+            supersampling: 1,
+            horizontal_fov_deg: 3.0,
+            distance_m: 8.0,
+        }
+    }
+
+    /// Returns the target as a scene on these bands, with its depth and view.
+    ///
+    /// # Errors
+    /// When a size, the luminance, the contrast, the angle or the distance cannot be.
+    pub fn scene(&self, grid: &WavelengthGrid) -> Result<Scene, SceneError> {
+        self.check()?;
+        let white = self.white_radiance(grid)?;
+        let radiance = match self.pattern {
+            Pattern::ColorChart => self.chart(grid, &white)?,
+            _ => {
+                let light = pattern::light_share(self);
+                let reflected = light.mapv(|share| self.dark + (1.0 - self.dark) * share);
+                let planes = white.iter().map(|w| reflected.mapv(|r| (r * w) as f32)).collect();
+                SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?
+            }
+        };
+        Scene::new(self.name(), radiance)
+            .or_flat_depth_m(self.distance_m)?
+            .or_horizontal_fov_deg(self.horizontal_fov_deg)
+    }
+
+    /// The name of the pattern, in words.
+    fn name(&self) -> &'static str {
+        match self.pattern {
+            Pattern::Uniform => "uniform target",
+            Pattern::Checkerboard { .. } => "checkerboard",
+            Pattern::SlantedBar { .. } => "slanted bar",
+            Pattern::RadialLines { .. } => "radial lines",
+            Pattern::PointArray { .. } => "point array",
+            Pattern::SiemensStar { .. } => "Siemens star",
+            Pattern::ColorChart => "colour chart",
+        }
+    }
+
+    fn check(&self) -> Result<(), SceneError> {
+        let setting = |what, value: String, expected: &str| {
+            Err(SceneError::Setting { what, value, expected: expected.to_owned() })
+        };
+        if self.rows == 0 || self.columns == 0 || self.rows.saturating_mul(self.columns) > 1 << 30 {
+            let value = format!("{} × {} samples", self.rows, self.columns);
+            return setting("the size of the target", value, "1 to 2³⁰ samples");
+        }
+        if !(self.luminance_cd_m2.is_finite() && self.luminance_cd_m2 > 0.0) {
+            let value = format!("{} cd/m²", self.luminance_cd_m2);
+            return setting("the luminance of the target", value, "a finite number above 0");
+        }
+        if !(0.0..=1.0).contains(&self.dark) {
+            return setting("the dark of the target", self.dark.to_string(), "a share from 0 to 1");
+        }
+        if !(1..=64).contains(&self.supersampling) {
+            return setting("the supersampling of the target", self.supersampling.to_string(), "1 to 64");
+        }
+        let (counts, finite) = match self.pattern {
+            Pattern::Checkerboard { check_px: n }
+            | Pattern::RadialLines { n_lines: n }
+            | Pattern::PointArray { spacing_px: n }
+            | Pattern::SiemensStar { n_cycles: n } => (n > 0, true),
+            Pattern::SlantedBar { slope } => (true, slope.is_finite()),
+            Pattern::Uniform | Pattern::ColorChart => (true, true),
+        };
+        if !(counts && finite) {
+            return setting(
+                "the pattern of the target",
+                format!("{:?}", self.pattern),
+                "a count above 0, a finite slope",
+            );
+        }
+        Ok(())
+    }
+
+    /// Returns the radiance of the white in each band.
+    fn white_radiance(&self, grid: &WavelengthGrid) -> Result<Vec<f64>, SceneError> {
+        let spectrum = self.light.spectrum();
+        // The luminance comes from the full 1 nm table, not from the caller's grid.
+        let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0)?;
+        let luminance = Observer::Cie1931.xyz(&fine, &spectrum.sample_held(&fine)).luminance_cd_m2();
+        Ok(spectrum.sample_held(grid).into_iter().map(|v| v * self.luminance_cd_m2 / luminance).collect())
+    }
+
+    fn chart(&self, grid: &WavelengthGrid, white: &[f64]) -> Result<SpectralImage, SceneError> {
+        let patches: Vec<Vec<f64>> = color_checker_reflectances().iter().map(|(_, s)| s.sample_held(grid)).collect();
+        let shares = pattern::patch_shares(self);
+        let planes = (0..grid.len()).map(|band| {
+            let reflected = |shares: &pattern::PatchShares| -> f64 {
+                let patches = shares.iter().map(|&(patch, share)| share * patches[usize::from(patch)][band]);
+                patches.sum::<f64>() * white[band]
+            };
+            Array2::from_shape_fn(shares.dim(), |at| reflected(&shares[at]) as f32)
+        });
+        Ok(SpectralImage::new(Quantity::Radiance, grid.clone(), planes.collect())?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn grid() -> WavelengthGrid {
+        WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap()
+    }
+
+    fn of(pattern: Pattern) -> Target {
+        Target {
+            rows: 61,
+            columns: 81,
+            supersampling: 4,
+            light: TargetLight::Illuminant(Illuminant::D65),
+            ..Target::paper(pattern, 1, TargetLight::EqualEnergy)
+        }
+    }
+
+    #[test]
+    fn the_papers_targets_have_the_papers_shapes() {
+        let scene = Target::paper_checkerboard().scene(&grid()).unwrap();
+        let plane = &scene.radiance.planes()[10];
+        assert_eq!(plane.dim(), (64, 64));
+        assert!(plane[(8, 8)] < 1e-3 * plane[(8, 24)] && plane[(24, 8)] == plane[(8, 24)]);
+        // Equal photons: energy falls as one over the wavelength.
+        let spectrum = scene.radiance.spectrum_at(8, 24);
+        assert_relative_eq!(spectrum[0] * 400.0, spectrum[30] * 700.0, max_relative = 1e-6);
+
+        let bar = Target::paper_slanted_bar().scene(&grid()).unwrap();
+        let plane = &bar.radiance.planes()[0];
+        assert_eq!(plane.dim(), (385, 385));
+        assert!(plane[(384, 0)] > plane[(0, 384)]);
+        let light_in_top_row = plane.row(0).iter().filter(|&&v| v > 0.5 * plane[(384, 0)]).count();
+        // The edge y = 2.6 x meets the top row, 192 above the centre, 73.8 left of it.
+        assert_eq!(light_in_top_row, 192 - 73);
+
+        let lines = Target::paper_radial_lines().scene(&grid()).unwrap();
+        let plane = &lines.radiance.planes()[0];
+        let bright = plane[(128, 128)];
+        let on_circle = (0..3600).map(|i| f64::from(i).to_radians() / 10.0).map(|angle| {
+            let (row, column) = (128.0 + 80.0 * angle.sin(), 128.0 + 80.0 * angle.cos());
+            plane[(row.round() as usize, column.round() as usize)] == bright
+        });
+        let on_circle: Vec<bool> = on_circle.collect();
+        let rays = (0..3600).filter(|&i| on_circle[i] && !on_circle[(i + 1) % 3600]).count();
+        assert_eq!(rays, 16);
+    }
+
+    #[test]
+    fn white_has_the_luminance_asked_for() {
+        for pattern in [Pattern::Uniform, Pattern::SiemensStar { n_cycles: 16 }] {
+            let target = Target { luminance_cd_m2: 250.0, ..of(pattern) };
+            let scene = target.scene(&WavelengthGrid::uniform(380.0, 780.0, 5.0).unwrap()).unwrap();
+            scene.validate().unwrap();
+            let expected = if pattern == Pattern::Uniform { 250.0 } else { 125.0 };
+            // A star is half light, to the share of its odd centre sample; 5 nm bands are within 0.1 %.
+            assert_relative_eq!(scene.mean_luminance_cd_m2(), expected, max_relative = 0.01);
+        }
+    }
+
+    #[test]
+    fn a_point_array_has_one_sample_a_point() {
+        let scene = Target { dark: 0.0, ..of(Pattern::PointArray { spacing_px: 20 }) }.scene(&grid()).unwrap();
+        let plane = &scene.radiance.planes()[0];
+        assert_eq!(plane.iter().filter(|&&v| v > 0.0).count(), 4 * 4 + 5 * 3 - 16);
+        assert!(plane[(30, 40)] > 0.0 && plane[(50, 20)] > 0.0);
+    }
+
+    #[test]
+    fn the_chart_shows_its_patches() {
+        let target = Target { rows: 120, columns: 180, ..of(Pattern::ColorChart) };
+        let scene = target.scene(&grid()).unwrap();
+        scene.validate().unwrap();
+        let white = TargetLight::Illuminant(Illuminant::D65);
+        let white = Target { light: white, ..target }.white_radiance(&grid()).unwrap();
+        let chart = color_checker_reflectances();
+        for (patch, (name, reflectance)) in chart.iter().enumerate() {
+            let (row, column) = (15 + 30 * (patch / 6), 15 + 30 * (patch % 6));
+            let found = scene.radiance.spectrum_at(row, column)[15] / white[15];
+            assert_relative_eq!(found, reflectance.at_held(550.0), max_relative = 1e-6);
+            assert!(!name.is_empty());
+        }
+    }
+
+    #[test]
+    fn targets_that_cannot_be_are_refused() {
+        let good = of(Pattern::Uniform);
+        for wrong in [
+            Target { rows: 0, ..good.clone() },
+            Target { luminance_cd_m2: f64::NAN, ..good.clone() },
+            Target { dark: 1.5, ..good.clone() },
+            Target { supersampling: 0, ..good.clone() },
+            Target { horizontal_fov_deg: 0.0, ..good.clone() },
+            Target { distance_m: -1.0, ..good },
+            of(Pattern::Checkerboard { check_px: 0 }),
+            of(Pattern::SlantedBar { slope: f64::INFINITY }),
+        ] {
+            assert!(wrong.scene(&grid()).is_err(), "{wrong:?}");
+        }
+    }
+}
