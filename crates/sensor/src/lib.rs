@@ -29,6 +29,7 @@ mod readout;
 mod response;
 mod sampling;
 mod sensor;
+mod similarity;
 mod tone;
 
 pub use balance::WhiteBalance;
@@ -43,8 +44,9 @@ pub use frames::{ElectronRate, Electrons, Volts};
 pub use noise::Noise;
 pub use photon_transfer::{DarkCurrentEstimate, FlatPoint, NonUniformity, PhotonTransfer};
 pub use picture::Picture;
-pub use process::{Developed, Processing};
+pub use process::{Developed, LinearPicture, Processing};
 pub use raw::{Levels, Raw, RawPlane};
 pub use response::{Adc, Response};
 pub use sensor::{DarkCurrent, Defects, Filter, HighGain, Layer, Sensor};
+pub use similarity::psnr_db;
 pub use tone::{Brightness, ToneCurve};

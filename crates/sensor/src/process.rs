@@ -50,6 +50,17 @@ impl Processing {
     }
 }
 
+/// Linear light in the primaries of sRGB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearPicture {
+    /// Light, rows × columns × (red, green, blue); not clipped: colours outside sRGB have negative parts.
+    pub light: Array3<f32>,
+    /// The factor on each channel that made white neutral.
+    pub balance: Vec<f64>,
+    /// The matrix from balanced channels to linear sRGB.
+    pub color: ColorMatrix,
+}
+
 /// A picture and what was found out while making it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Developed {
@@ -69,6 +80,14 @@ impl Sensor {
     /// # Errors
     /// When the frame is not of this sensor or too small, or a setting makes no sense.
     pub fn develop(&self, raw: &Raw, processing: &Processing) -> Result<Developed, SensorError> {
+        Ok(self.develop_linear(raw, processing)?.encode(processing.brightness, processing.curve))
+    }
+
+    /// Returns the linear light of a raw frame, as [`develop`](Self::develop) has it before brightness and tone curve.
+    ///
+    /// # Errors
+    /// As [`develop`](Self::develop).
+    pub fn develop_linear(&self, raw: &Raw, processing: &Processing) -> Result<LinearPicture, SensorError> {
         raw.check()?;
         self.check_settings(raw, processing)?;
         let tile = raw.tile.as_ref();
@@ -88,13 +107,7 @@ impl Sensor {
             }
             ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), delta_e: Vec::new() },
         };
-        let mut linear = mix(&channels, &color);
-        drop(channels);
-        let brightness = factor(&linear, processing.brightness);
-        let table = processing.curve.table();
-        let codes = linear.as_slice_mut().expect("a new array is contiguous");
-        codes.par_iter_mut().for_each(|code| *code = table.encode(*code * brightness as f32));
-        Ok(Developed { picture: Picture { codes: linear }, balance, color, brightness })
+        Ok(LinearPicture { light: mix(&channels, &color), balance, color })
     }
 
     fn check_settings(&self, raw: &Raw, processing: &Processing) -> Result<(), SensorError> {
@@ -136,6 +149,18 @@ impl Sensor {
             return Err(SensorError::value("the processing", key, value, "a number above 0, and at most 100 %"));
         }
         processing.curve.check()
+    }
+}
+
+impl LinearPicture {
+    /// Returns the picture of a brightness and a tone curve; colours outside sRGB are clipped.
+    pub fn encode(self, brightness: Brightness, curve: ToneCurve) -> Developed {
+        let brightness = factor(&self.light, brightness);
+        let table = curve.table();
+        let mut codes = self.light;
+        let all = codes.as_slice_mut().expect("linear pictures are made contiguous");
+        all.par_iter_mut().for_each(|code| *code = table.encode(*code * brightness as f32));
+        Developed { picture: Picture { codes }, balance: self.balance, color: self.color, brightness }
     }
 }
 

@@ -1,0 +1,182 @@
+//! Pictures: colours of a chart, and demosaics held to a sensor that has every filter in every pixel.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by a panic")]
+
+mod common;
+
+use common::{lit, lit_by_d65};
+use dioptric_sensor::{
+    Adc, AutoExposure, Brightness, Cfa, Demosaic, Developed, ExposureControl, GainMode, Illumination, Metering, Noise,
+    Processing, Sensor, ToneCurve, WhiteBalance, psnr_db,
+};
+use dioptric_spectrum::{
+    Illuminant, Lab, Observer, SpectralImage, WavelengthGrid, Xyz, color_checker_reflectances, delta_e_2000,
+};
+use ndarray::Array2;
+
+/// The side of a patch of the chart, pixels.
+const PATCH: usize = 24;
+
+/// Puts the brightest pixels but a few at 90 % of saturation.
+const WHITE_AT_90: ExposureControl = ExposureControl::Auto(AutoExposure {
+    metering: Metering::Percentile(99.5),
+    target_fraction: 0.9,
+    max_time_s: f64::INFINITY,
+    analog_gain: 1.0,
+    gain_mode: GainMode::Low,
+    temperature_c: 25.0,
+});
+
+fn develop(sensor: &Sensor, image: &SpectralImage, noise: &Noise, processing: &Processing) -> Developed {
+    let capture = sensor.capture(&Illumination::on_pixels(image), &WHITE_AT_90, noise).unwrap();
+    sensor.develop(&capture.raw, processing).unwrap()
+}
+
+/// Returns the 24 patches in 4 rows of 6.
+fn chart() -> SpectralImage {
+    let grid = WavelengthGrid::uniform(380.0, 730.0, 10.0).unwrap();
+    let patches: Vec<Vec<f64>> = color_checker_reflectances().iter().map(|(_, s)| s.sample_held(&grid)).collect();
+    let plane = |band: usize| {
+        Array2::from_shape_fn((4 * PATCH, 6 * PATCH), |(r, c)| patches[6 * (r / PATCH) + c / PATCH][band] as f32)
+    };
+    let planes = (0..grid.len()).map(plane).collect();
+    lit(grid, planes)
+}
+
+/// Returns ΔE₀₀ of each patch of a developed chart against what the 1931 observer sees under D65.
+fn chart_delta_e(sensor: &Sensor, noise: &Noise) -> Vec<f64> {
+    let image = chart();
+    let capture = sensor.capture(&Illumination::on_pixels(&image), &WHITE_AT_90, noise).unwrap();
+    let linear = sensor.develop_linear(&capture.raw, &Processing::for_light(Illuminant::D65)).unwrap();
+    let grid = WavelengthGrid::uniform(380.0, 780.0, 1.0).unwrap();
+    let light = Illuminant::D65.spectrum().sample_held(&grid);
+    let white = Observer::Cie1931.xyz(&grid, &light);
+    let wanted: Vec<Lab> = color_checker_reflectances()
+        .iter()
+        .map(|(_, s)| {
+            let lit: Vec<f64> = s.sample_held(&grid).iter().zip(&light).map(|(r, s)| r * s).collect();
+            Observer::Cie1931.xyz(&grid, &lit).to_lab(white)
+        })
+        .collect();
+    let got: Vec<[f64; 3]> = (0..24)
+        .map(|patch| {
+            // The middle of the patch, away from its neighbours.
+            let (row, column) = (PATCH * (patch / 6) + 8, PATCH * (patch % 6) + 8);
+            let mean = |i: usize| {
+                let view = linear.light.slice(ndarray::s![row..row + 8, column..column + 8, i]);
+                view.iter().map(|&v| f64::from(v)).sum::<f64>() / 64.0
+            };
+            [mean(0), mean(1), mean(2)]
+        })
+        .collect();
+    // The exposure is a free factor: the white patch is given its luminance.
+    let white_y = (wanted[18].l + 16.0) / 116.0;
+    let scale = white_y.powi(3) / Xyz::from_linear_srgb(got[18]).luminance_cd_m2();
+    got.iter()
+        .zip(&wanted)
+        .map(|(rgb, wanted)| delta_e_2000(Xyz::from_linear_srgb(rgb.map(|v| v * scale)).to_lab(Xyz::D65), *wanted))
+        .collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[test]
+fn a_chart_through_a_phones_sensor_keeps_its_colors() {
+    let delta_e = chart_delta_e(&Sensor::built_in("imx363").unwrap(), &Noise::none());
+    assert!(mean(&delta_e) <= 3.0, "mean {:.3}: {delta_e:.2?}", mean(&delta_e));
+}
+
+#[test]
+fn a_chart_through_an_observing_sensor_is_exact() {
+    let delta_e = chart_delta_e(&Sensor::built_in("ideal").unwrap(), &Noise::none());
+    // Bands of 10 nm and steps of 5 nm in the sensor's curves are what is left.
+    assert!(mean(&delta_e) <= 0.1, "mean {:.3}: {delta_e:.2?}", mean(&delta_e));
+}
+
+#[test]
+fn monochrome_gives_a_grey_picture() {
+    let sensor = Sensor::built_in("machine-vision-mono").unwrap();
+    let developed = develop(&sensor, &chart(), &Noise::all(1), &Processing::for_light(Illuminant::D65));
+    assert_eq!(developed.balance, [1.0]);
+    for pixel in developed.picture.codes.rows() {
+        assert!(pixel[0] == pixel[1] && pixel[1] == pixel[2]);
+    }
+}
+
+#[test]
+fn white_is_found_by_every_balance() {
+    let sensor = Sensor::built_in("imx363").unwrap();
+    let grid = WavelengthGrid::uniform(380.0, 730.0, 10.0).unwrap();
+    // A hill that is its own mirror image, so that the pixels of each filter have the same mean.
+    let slope = |i: usize| (i as f32 - 31.5).abs();
+    let grey = Array2::from_shape_fn((64, 64), |(r, c)| 0.5 - 0.004 * (slope(r) + slope(c)));
+    let planes = vec![grey; grid.len()];
+    let image = lit(grid, planes);
+    for white_balance in [
+        WhiteBalance::GreyWorld,
+        WhiteBalance::WhitePatch { percentile: 99.0 },
+        WhiteBalance::Illuminant(Illuminant::D65),
+    ] {
+        let processing = Processing { white_balance: white_balance.clone(), ..Processing::for_light(Illuminant::D65) };
+        let developed = develop(&sensor, &image, &Noise::none(), &processing);
+        let mean = |i: usize| developed.picture.codes.index_axis(ndarray::Axis(2), i).mean().unwrap();
+        let (red, green, blue) = (mean(0), mean(1), mean(2));
+        // The mean of 4096 pixels of 10 bits each.
+        assert!((red - green).abs() < 2e-3 && (blue - green).abs() < 2e-3, "{white_balance:?}: {red} {green} {blue}");
+    }
+}
+
+#[test]
+fn brightness_is_put_where_it_is_asked() {
+    let sensor = Sensor::built_in("ideal").unwrap();
+    let brightness = Brightness::Percentile { percent: 50.0, to: 0.18 };
+    let processing = Processing { brightness, curve: ToneCurve::Linear, ..Processing::for_light(Illuminant::D65) };
+    let grid = WavelengthGrid::uniform(380.0, 730.0, 10.0).unwrap();
+    let ramp = Array2::from_shape_fn((21, 21), |(r, c)| 0.001 * (1 + 21 * r + c) as f32);
+    let planes = vec![ramp; grid.len()];
+    let developed = develop(&sensor, &lit(grid, planes), &Noise::none(), &processing);
+    let mut luminances: Vec<f32> =
+        developed.picture.codes.rows().into_iter().map(|p| 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]).collect();
+    luminances.sort_by(f32::total_cmp);
+    assert!((luminances[luminances.len() / 2] - 0.18).abs() < 1e-3);
+}
+
+const METHODS: [Demosaic; 4] = [Demosaic::Nearest, Demosaic::Bilinear, Demosaic::Malvar, Demosaic::Directional];
+
+/// Returns the PSNR of each method, dB, of codes against those of a sensor with every filter in every pixel.
+fn demosaic_psnr_db(path: &std::path::Path, cfa: &Cfa) -> [f64; 4] {
+    let image = lit_by_d65(path);
+    let mosaic = Sensor { cfa: cfa.clone(), adc: Adc::Analog, ..Sensor::built_in("imx363").unwrap() };
+    let full = Sensor { cfa: Cfa::Stacked, ..mosaic.clone() };
+    let processing = |demosaic| Processing { demosaic, ..Processing::for_light(Illuminant::D65) };
+    let wanted = develop(&full, &image, &Noise::none(), &processing(Demosaic::Nearest));
+    METHODS.map(|method| {
+        let got = develop(&mosaic, &image, &Noise::none(), &processing(method));
+        psnr_db(&got.picture, &wanted.picture).unwrap()
+    })
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+fn the_good_demosaic_beats_bilinear_by_three_decibels() {
+    for name in ["cave_chart_and_stuffed_toy", "cave_stuffed_toys_256"] {
+        let path = dioptric_golden::shared(&format!("data/scenes/{name}.reflectance.exr")).unwrap();
+        for letters in ["RGGB", "GBRG"] {
+            let [nearest, bilinear, malvar, directional] = demosaic_psnr_db(&path, &Cfa::two_by_two(letters).unwrap());
+            let quoted = format!("{name} {letters}: {nearest:.2} {bilinear:.2} {malvar:.2} {directional:.2}");
+            assert!(nearest < bilinear && bilinear < malvar && bilinear + 3.0 <= directional, "{quoted}");
+        }
+    }
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+fn other_mosaics_gain_from_detail() {
+    let path = dioptric_golden::shared("data/scenes/cave_stuffed_toys_256.reflectance.exr").unwrap();
+    let quad = Cfa::two_by_two("RGGB").unwrap().repeated(2);
+    let [nearest, bilinear, _, directional] = demosaic_psnr_db(&path, &quad);
+    let quoted = format!("quad Bayer: {nearest:.2} {bilinear:.2} {directional:.2}");
+    assert!(nearest < bilinear && bilinear < directional, "{quoted}");
+}
