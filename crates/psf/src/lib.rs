@@ -12,11 +12,13 @@
 
 mod axis;
 mod bank;
+mod count;
 mod error;
 mod geometry;
 mod kernel;
 mod mesh;
 mod metrics;
+pub mod paper;
 mod pupil;
 mod raster;
 mod ray_map;
@@ -24,6 +26,7 @@ mod render;
 mod splat;
 
 pub use bank::{BankSettings, Diffraction, PsfBank};
+pub use count::{AuthorsBending, CountingFilm, FrontGrid, mean_place_mm, trace_as_authors};
 pub use error::PsfError;
 pub use geometry::RadialGeometry;
 pub use kernel::Kernel;

@@ -1,4 +1,5 @@
 //! The bank, held to direct tracing, closed forms and conservation.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_psf::{BankSettings, Diffraction, Picture, PsfBank};
