@@ -8,6 +8,7 @@
 //! bend the rays, and trace on ([`MonoLens::trace_surfaces`]).
 #![doc = include_str!("../README.md")]
 
+mod bundle;
 mod catalogue;
 mod error;
 mod formats;
@@ -22,6 +23,7 @@ mod rays;
 mod surface;
 mod trace;
 
+pub use bundle::{ObjectPoint, rays_over_front, rays_towards};
 pub use catalogue::{CatalogueGlass, GlassCatalogue};
 pub use error::OpticsError;
 pub use glam;
@@ -29,7 +31,7 @@ pub use glass::{C_LINE_NM, D_LINE_NM, F_LINE_NM, Glass};
 pub use lens::Lens;
 pub use mono::MonoLens;
 pub use paraxial::{Conjugate, FirstOrder};
-pub use pupil::{ObjectPoint, PupilBoundary, rays_over_front, rays_towards};
+pub use pupil::PupilBoundary;
 pub use rays::{Losses, RayBatch, RayFate, SurfaceLosses};
 pub use surface::{Interface, Shape, Surface};
 pub use trace::Rims;

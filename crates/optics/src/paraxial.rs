@@ -158,3 +158,98 @@ pub(crate) fn first_order(steps: &[Step], stop: usize, wavelength_nm: f64) -> Fi
         image_index: n1,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::Lens;
+
+    /// The published lengths have four decimals, the last off by one at times.
+    const ANCHOR_MM: f64 = 1e-4;
+
+    #[track_caller]
+    fn check(lens: &Lens, wavelength_nm: f64, [efl, bfl, film_8m, film_2m]: [f64; 4]) {
+        let mono = lens.at(wavelength_nm).unwrap();
+        let first = mono.first_order();
+        let film = |mm: f64| mono.film_mm_for(mm).unwrap();
+        for (found, expected) in [
+            (first.efl_mm, efl),
+            (first.bfl_mm, bfl),
+            (film(8e3), film_8m),
+            (film(2e3), film_2m),
+            (film(f64::INFINITY), bfl),
+        ] {
+            assert!((found - expected).abs() < ANCHOR_MM, "{wavelength_nm} nm: {found}, expected {expected}");
+        }
+        let back_mm = mono.object_distance_mm_for(film(2e3)).unwrap();
+        assert!((back_mm - 2e3).abs() < 1e-7, "{back_mm}");
+        assert_eq!(mono.object_distance_mm_for(film(f64::INFINITY)).unwrap(), f64::INFINITY);
+    }
+
+    #[test]
+    fn double_gauss_has_the_published_lengths() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap();
+        check(&lens, 400.0, [50.2380, 35.9674, 36.2840, 37.2465]);
+        check(&lens, 550.0, [50.3463, 36.0920, 36.4099, 37.3768]);
+        check(&lens, 700.0, [50.3802, 36.1322, 36.4505, 37.4187]);
+        let first = lens.at(550.0).unwrap().first_order();
+        for (found, expected) in [
+            (first.entrance_pupil_z_mm, 19.9558),
+            (0.5 * first.entrance_pupil_diameter_mm, 12.4149),
+            (first.exit_pupil_z_mm, -17.7832),
+            (0.5 * first.exit_pupil_diameter_mm, 13.2851),
+            (first.f_number, 2.0277),
+            (first.pupil_magnification(), 1.0701),
+        ] {
+            assert!((found - expected).abs() < ANCHOR_MM, "{found}, expected {expected}");
+        }
+    }
+
+    #[test]
+    fn paper_lens_has_the_published_lengths() {
+        let lens = Lens::built_in("paper-2el").unwrap();
+        check(&lens, 400.0, [50.4532, 49.5468, 49.8670, 50.8519]);
+        check(&lens, 550.0, [51.9971, 51.0799, 51.4200, 52.4671]);
+        check(&lens, 700.0, [53.6387, 52.7105, 53.0725, 54.1880]);
+        let first = lens.with_stop_diameter_mm(10.0).unwrap().at(550.0).unwrap().first_order();
+        assert!((first.f_number - 5.154).abs() < 5e-4, "{}", first.f_number);
+    }
+
+    #[test]
+    fn thin_lens_obeys_its_equation() {
+        let lens = Lens::thin(50.0, 10.0).unwrap();
+        let mono = lens.at(550.0).unwrap();
+        let film_mm = mono.film_mm_for(2_000.0).unwrap();
+        assert!((film_mm - 1.0 / (1.0 / 50.0 - 1.0 / 2_000.0)).abs() < 1e-12);
+        assert!((mono.conjugate(2_000.0).magnification + film_mm / 2_000.0).abs() < 1e-15);
+        let first = mono.first_order();
+        assert!((first.working_f_number(film_mm / 2_000.0) - film_mm / 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_cannot_focus_says_so() {
+        let pinhole = Lens::pinhole(0.3).unwrap().at(550.0).unwrap();
+        assert_eq!(pinhole.first_order().power_per_mm, 0.0);
+        assert!(pinhole.film_mm_for(1_000.0).is_err());
+        let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
+        // Within the front focal length the image is virtual.
+        let message = lens.film_mm_for(5.0).unwrap_err().to_string();
+        assert!(message.contains("dgauss-50mm forms no image behind it"), "{message}");
+        assert!(lens.film_mm_for(-5.0).is_err());
+        assert!(lens.film_mm_for(f64::NAN).is_err());
+        assert!(lens.object_distance_mm_for(20.0).is_err());
+    }
+
+    #[test]
+    fn stop_opens_no_further_than_it_goes() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap();
+        let f4 = lens.with_f_number(4.0, 550.0).unwrap();
+        assert!((f4.at(550.0).unwrap().first_order().f_number - 4.0).abs() < 1e-12);
+        let message = f4.with_f_number(1.4, 550.0).unwrap_err().to_string();
+        assert!(message.contains("opens to at most 17.1 mm (f/2.0"), "{message}");
+        let full = f4.with_f_number(lens.at(550.0).unwrap().first_order().f_number, 550.0).unwrap();
+        assert!((full.stop_semi_aperture_mm() - 8.55).abs() < 1e-12);
+        for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(lens.with_stop_diameter_mm(wrong).is_err());
+        }
+    }
+}

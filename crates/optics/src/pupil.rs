@@ -1,95 +1,8 @@
-//! Object points, bundles of rays from them, and the pupil that they see.
+//! The pupil that an object point sees.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
-use crate::{MonoLens, RayBatch, trace};
-
-/// A point that light comes from, in the lens frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ObjectPoint {
-    /// A point, mm.
-    Finite(DVec3),
-    /// A far point, by the unit direction in which its light travels.
-    Infinite(DVec3),
-}
-
-impl ObjectPoint {
-    /// Returns the point seen from the paraxial entrance-pupil centre of `lens` under these tangents of field angles,
-    /// `dioptres` = 1/Z away (Z the axial distance from that centre in metres; 0 is infinitely far).
-    ///
-    /// A telecentric lens has no such centre; there the first vertex stands for it.
-    pub fn from_field(lens: &MonoLens, field_tan: DVec2, dioptres: f64) -> Self {
-        let z_mm = lens.first_order().entrance_pupil_z_mm;
-        let center_z_mm = if z_mm.is_finite() { z_mm } else { 0.0 };
-        if dioptres == 0.0 {
-            return Self::Infinite(DVec3::new(-field_tan.x, -field_tan.y, 1.0).normalize());
-        }
-        let distance_mm = 1e3 / dioptres;
-        Self::Finite((field_tan * distance_mm).extend(center_z_mm - distance_mm))
-    }
-
-    /// z of the plane that the point lies in, mm; −∞ for a far point.
-    pub fn z_mm(&self) -> f64 {
-        match self {
-            Self::Finite(point) => point.z,
-            Self::Infinite(_) => f64::NEG_INFINITY,
-        }
-    }
-
-    /// Returns the unit direction from this point to another.
-    pub fn direction_to(&self, target_mm: DVec3) -> DVec3 {
-        match *self {
-            Self::Finite(point) => (target_mm - point).normalize(),
-            Self::Infinite(direction) => direction,
-        }
-    }
-
-    /// Returns by how much the path from this point to `a` is longer than that to `b`, mm.
-    ///
-    /// Computed without ever forming the paths, so that it stays exact for far points.
-    pub fn path_difference_mm(&self, a: DVec3, b: DVec3) -> f64 {
-        match *self {
-            Self::Finite(point) => {
-                let (to_a, to_b) = (a - point, b - point);
-                (a - b).dot(to_a + to_b) / (to_a.length() + to_b.length())
-            }
-            Self::Infinite(direction) => direction.dot(a - b),
-        }
-    }
-}
-
-/// Returns rays from an object point aimed at targets in the plane `z_mm`, started on the plane `start_z_mm`.
-///
-/// Path lengths are those from the point, less that of the ray aimed at the axis in the same plane; so they are
-/// small numbers, exact however far the point is. Starting on the first vertex plane (`start_z_mm` = 0) keeps
-/// positions exact too.
-pub fn rays_towards(point: &ObjectPoint, targets_mm: &[DVec2], z_mm: f64, start_z_mm: f64) -> RayBatch {
-    let start = |target_mm: DVec2| {
-        let target_mm = target_mm.extend(z_mm);
-        let direction = point.direction_to(target_mm);
-        (target_mm + direction * ((start_z_mm - z_mm) / direction.z), direction)
-    };
-    let (reference_mm, _) = start(DVec2::ZERO);
-    let mut rays = RayBatch::with_capacity(targets_mm.len());
-    rays.object_z_mm = point.z_mm();
-    for &target_mm in targets_mm {
-        let (start_mm, direction) = start(target_mm);
-        rays.push(start_mm, direction, point.path_difference_mm(start_mm, reference_mm));
-    }
-    rays
-}
-
-/// Returns rays from an object point to a square grid of `n_across`² points, of which those in a disc are kept, on
-/// the flat front disc of the lens: the paper's way of choosing rays.
-///
-/// The disc has the radius of the first surface's rim and lies in its vertex plane.
-pub fn rays_over_front(lens: &MonoLens, point: &ObjectPoint, n_across: usize) -> RayBatch {
-    let radius_mm = lens.semi_aperture_mm(0);
-    let at = |i: usize| if n_across < 2 { 0.0 } else { 2.0 * i as f64 / (n_across - 1) as f64 - 1.0 };
-    let grid = (0..n_across).flat_map(|row| (0..n_across).map(move |column| DVec2::new(at(column), at(row))));
-    let targets: Vec<DVec2> = grid.filter(|p| p.length_squared() <= 1.0).map(|p| p * radius_mm).collect();
-    rays_towards(point, &targets, 0.0, 0.0)
-}
+use crate::{MonoLens, ObjectPoint, RayBatch, rays_towards, trace};
 
 /// The true, vignetted pupil that one object point sees at one wavelength: a region of the entrance-pupil plane,
 /// given by its edge at equally spaced azimuths about a centre.
@@ -109,11 +22,12 @@ impl PupilBoundary {
     pub fn find(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> Option<Self> {
         let n_azimuths = n_azimuths.max(8);
         let search = Search::new(lens, point);
-        let inside_mm = search.clearest_mm()?;
-        let rough = search.boundary(inside_mm, n_azimuths)?;
+        let inside_mm = search.inside_mm()?;
+        let rough = search.boundary(inside_mm, n_azimuths, 1e-3)?;
         let centroid_mm = rough.centroid_mm();
-        // A region far from convex may not hold its centroid; then the clearest point serves.
-        if search.clearances(&[centroid_mm])[0] > 0.0 { search.boundary(centroid_mm, n_azimuths) } else { Some(rough) }
+        // A region far from convex may not hold its centroid; then the point found first serves.
+        let is_clear = search.clearances(&[centroid_mm])[0] > 0.0;
+        search.boundary(if is_clear { centroid_mm } else { inside_mm }, n_azimuths, EDGE_MM)
     }
 
     /// The centre that radii count from, in the entrance-pupil plane, mm from the axis.
@@ -179,32 +93,34 @@ impl<'a> Search<'a> {
         self.lens.clearances_mm(rays_towards(self.point, targets_mm, self.z_mm, 0.0))
     }
 
-    /// Returns the point of the pupil plane whose ray stays clear of all rims by most, if any ray gets through.
-    fn clearest_mm(&self) -> Option<DVec2> {
+    /// Returns a point of the pupil, if any ray gets through.
+    fn inside_mm(&self) -> Option<DVec2> {
+        if self.clearances(&[DVec2::ZERO])[0] > 0.0 {
+            return Some(DVec2::ZERO);
+        }
         let rim_mm = self.lens.semi_aperture_mm(0);
         let (mut center, mut reach) = (DVec2::ZERO, 1.0);
-        let mut best: Option<(f64, DVec2)> = None;
-        for _ in 0..24 {
-            const N: i32 = 12;
+        let mut best = (f64::NEG_INFINITY, DVec2::ZERO);
+        // Rays through a grid on the first surface, finer and finer about the one that stays clear of rims by most.
+        for _ in 0..SEARCH_ROUNDS {
+            const N: i32 = 10;
             let step = reach / f64::from(N);
             let grid = (-N..=N).flat_map(|i| (-N..=N).map(move |j| DVec2::new(f64::from(i), f64::from(j)) * step));
             let candidates: Vec<DVec2> =
                 grid.map(|offset| center + offset).filter(|p| p.length_squared() <= 1.0).collect();
             let targets: Vec<DVec2> = candidates.iter().map(|p| self.target_through_front(*p * rim_mm)).collect();
-            let clearances = self.clearances(&targets);
-            for ((&candidate, &target), clearance) in candidates.iter().zip(&targets).zip(clearances) {
-                if best.is_none_or(|(most, _)| clearance > most) {
-                    best = Some((clearance, target));
+            for ((&candidate, &target), clearance) in candidates.iter().zip(&targets).zip(self.clearances(&targets)) {
+                if clearance > best.0 {
+                    best = (clearance, target);
                     center = candidate;
                 }
             }
-            // Inside by more than the grid is fine: a clear point well within will do.
-            if best.is_some_and(|(most, _)| most > 0.0) && reach < 0.2 {
-                break;
+            if best.0 > 0.0 {
+                return Some(best.1);
             }
-            reach *= 0.4;
+            reach *= 0.5;
         }
-        best.filter(|(most, _)| *most > 0.0).map(|(_, target)| target)
+        None
     }
 
     /// Returns where the ray through this point of the first surface crosses the pupil plane.
@@ -215,61 +131,82 @@ impl<'a> Search<'a> {
         (point + direction * ((self.z_mm - point.z) / direction.z)).truncate()
     }
 
-    /// Returns the edge as seen from a point inside.
-    fn boundary(&self, center_mm: DVec2, n_azimuths: usize) -> Option<PupilBoundary> {
-        let directions: Vec<DVec2> = PupilBoundary::azimuths(n_azimuths).collect();
-        let at = |rho: &[f64]| -> Vec<f64> {
-            let targets: Vec<DVec2> = directions.iter().zip(rho).map(|(u, r)| center_mm + *u * *r).collect();
-            self.clearances(&targets)
-        };
-        let center_clearance = self.clearances(&[center_mm])[0];
-        let mut inner = vec![(0.0, center_clearance); n_azimuths];
-        let mut outer = vec![(f64::NAN, f64::NAN); n_azimuths];
-        let mut reach = vec![center_clearance.max(1e-6); n_azimuths];
-        // Go out until every direction has left the pupil.
-        for _ in 0..60 {
-            let clearances = at(&reach);
-            for i in 0..n_azimuths {
-                if outer[i].0.is_nan() {
-                    match clearances[i] > 0.0 {
-                        true => inner[i] = (reach[i], clearances[i]),
-                        false => outer[i] = (reach[i], clearances[i]),
-                    }
-                }
-                reach[i] = if outer[i].0.is_nan() { 1.5 * reach[i] } else { outer[i].0 };
-            }
-            if outer.iter().all(|o| !o.0.is_nan()) {
+    /// Returns the edge as seen from a point inside, found to `edge_mm` of clearance.
+    fn boundary(&self, center_mm: DVec2, n_azimuths: usize, edge_mm: f64) -> Option<PupilBoundary> {
+        let at_center = self.clearances(&[center_mm])[0];
+        let edge_mm = edge_mm.min(0.01 * at_center);
+        let mut edges: Vec<Edge> =
+            PupilBoundary::azimuths(n_azimuths).map(|direction| Edge::new(direction, at_center)).collect();
+        for _ in 0..EDGE_ROUNDS {
+            let mut open: Vec<&mut Edge> = edges.iter_mut().filter(|edge| !edge.is_found(edge_mm)).collect();
+            if open.is_empty() {
                 break;
             }
-        }
-        if outer.iter().any(|o| o.0.is_nan()) {
-            return None;
-        }
-        // Regula falsi where both ends have a clearance, halving every third time and where a ray misses.
-        for round in 0..120 {
-            let rho: Vec<f64> = inner
-                .iter()
-                .zip(&outer)
-                .map(|(&(a, fa), &(b, fb))| match fb.is_finite() && round % 3 != 2 {
-                    true => (a * fb - b * fa) / (fb - fa),
-                    false => 0.5 * (a + b),
-                })
-                .zip(inner.iter().zip(&outer))
-                .map(|(r, (a, b))| r.clamp(a.0, b.0))
-                .collect();
-            let clearances = at(&rho);
-            for i in 0..n_azimuths {
-                match clearances[i] > 0.0 {
-                    true => inner[i] = (rho[i], clearances[i]),
-                    false => outer[i] = (rho[i], clearances[i]),
-                }
-            }
-            if inner.iter().zip(&outer).all(|(a, b)| b.0 - a.0 <= 1e-14 * (1.0 + b.0) || a.1 <= 0.0) {
-                break;
+            let radii: Vec<f64> = open.iter().map(|edge| edge.next_rho_mm()).collect();
+            let target = |(edge, rho): (&&mut Edge, &f64)| center_mm + edge.direction * *rho;
+            let targets: Vec<DVec2> = open.iter().zip(&radii).map(target).collect();
+            for ((edge, rho), clearance) in open.iter_mut().zip(radii).zip(self.clearances(&targets)) {
+                edge.note(rho, clearance);
             }
         }
-        let rho_mm: Vec<f64> = inner.iter().map(|a| a.0).collect();
-        rho_mm.iter().all(|r| *r > 0.0).then_some(PupilBoundary { center_mm, z_mm: self.z_mm, rho_mm })
+        let rho_mm: Vec<f64> = edges.iter().map(|edge| edge.inner.0).collect();
+        let is_whole = edges.iter().all(|edge| edge.outer.is_some() && edge.inner.0 > 0.0);
+        is_whole.then_some(PupilBoundary { center_mm, z_mm: self.z_mm, rho_mm })
+    }
+}
+
+/// Rounds of the search for a first ray that gets through: the grid shrinks by half in each.
+const SEARCH_ROUNDS: usize = 16;
+/// Rounds after which an edge is as good as it gets; a well-behaved one takes ten.
+const EDGE_ROUNDS: usize = 100;
+/// Clearance at which a ray is held to graze its rim, mm.
+const EDGE_MM: f64 = 1e-11;
+
+/// The edge of the pupil in one direction from the centre, between a radius inside and one outside.
+struct Edge {
+    direction: DVec2,
+    /// Radius and clearance of the outermost ray known to get through.
+    inner: (f64, f64),
+    /// Radius and clearance of the innermost ray known not to, once there is one.
+    outer: Option<(f64, f64)>,
+    /// Which end moved last, and how often in a row.
+    in_a_row: i32,
+    rounds: usize,
+}
+
+impl Edge {
+    fn new(direction: DVec2, at_center: f64) -> Self {
+        Self { direction, inner: (0.0, at_center), outer: None, in_a_row: 0, rounds: 0 }
+    }
+
+    fn is_found(&self, edge_mm: f64) -> bool {
+        self.outer.is_some_and(|outer| self.inner.1 <= edge_mm || outer.0 - self.inner.0 <= 1e-14 * (1.0 + outer.0))
+    }
+
+    /// Returns where to look next: outwards until a rim is passed, then by regula falsi with the Illinois rule.
+    fn next_rho_mm(&self) -> f64 {
+        let (a, fa) = self.inner;
+        let Some((b, fb)) = self.outer else { return 1.3 * (a + fa.max(1e-6)) };
+        // A ray that misses has no clearance, and a kink may fool the rule: halve.
+        if !fb.is_finite() || self.rounds % 8 == 7 {
+            return 0.5 * (a + b);
+        }
+        let weight = 0.5_f64.powi(self.in_a_row.abs() - 1).min(1.0);
+        let (wa, wb) = if self.in_a_row > 0 { (fa, weight * fb) } else { (weight * fa, fb) };
+        let root = (a * wb - b * wa) / (wb - wa);
+        // A hair inwards, so that the ray found is one that gets through.
+        (root - 1e-12 * (1.0 + root)).clamp(a, b)
+    }
+
+    fn note(&mut self, rho: f64, clearance: f64) {
+        self.rounds += 1;
+        if clearance > 0.0 {
+            self.inner = (rho, clearance);
+            self.in_a_row = self.in_a_row.max(0) + 1;
+        } else {
+            self.outer = Some((rho, clearance));
+            self.in_a_row = self.in_a_row.min(0) - 1;
+        }
     }
 }
 
@@ -283,5 +220,78 @@ impl MonoLens {
         let steps = self.steps_for(rays.object_z_mm);
         trace::trace_clearances(&steps, rays.slices(), &mut clearances_mm);
         clearances_mm
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::{Lens, Rims};
+
+    #[track_caller]
+    fn pupil(lens: &MonoLens, field_deg: f64, dioptres: f64) -> PupilBoundary {
+        let point = ObjectPoint::from_field(lens, DVec2::new(field_deg.to_radians().tan(), 0.0), dioptres);
+        PupilBoundary::find(lens, &point, 64).expect("light gets through")
+    }
+
+    #[test]
+    fn thin_lens_shows_its_whole_disc_at_any_field() {
+        let lens = Lens::thin(50.0, 10.0).unwrap().at(550.0).unwrap();
+        for (field_deg, dioptres) in [(0.0, 0.0), (20.0, 0.0), (40.0, 2.0)] {
+            let pupil = pupil(&lens, field_deg, dioptres);
+            assert!(pupil.center_mm().length() < 1e-9);
+            assert!(pupil.rho_at_azimuths_mm().iter().all(|r| (r - 5.0).abs() < 1e-11));
+            assert!((pupil.area_mm2() - 25.0 * PI).abs() < 1e-9);
+            assert!((pupil.rho_max_mm(0.123) - 5.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn rays_just_inside_the_edge_pass_and_just_outside_do_not() {
+        for (name, field_deg) in [
+            ("dgauss-50mm", 0.0),
+            ("dgauss-50mm", 18.0),
+            ("fisheye-12.5mm", 75.0),
+            ("paper-2el", 12.0),
+            ("telephoto-127mm", 20.0),
+        ] {
+            let lens = Lens::built_in(name).unwrap().at(550.0).unwrap();
+            let point = ObjectPoint::from_field(&lens, DVec2::new(tan_deg(field_deg), 0.0), 0.5);
+            let pupil = PupilBoundary::find(&lens, &point, 48).unwrap();
+            let directions: Vec<_> = PupilBoundary::azimuths(48).zip(pupil.rho_at_azimuths_mm()).collect();
+            let at = |scale: f64| -> Vec<DVec2> {
+                directions.iter().map(|(u, rho)| pupil.center_mm() + u * (*rho + scale)).collect()
+            };
+            for (offset_mm, n_passed) in [(0.0, 48), (1e-8, 0)] {
+                let mut rays = rays_towards(&point, &at(offset_mm), pupil.z_mm(), 0.0);
+                lens.trace(&mut rays, Rims::Clip);
+                assert_eq!(rays.n_in_flight(), n_passed, "{name} at {field_deg} degrees");
+            }
+        }
+    }
+
+    fn tan_deg(angle_deg: f64) -> f64 {
+        angle_deg.to_radians().tan()
+    }
+
+    #[test]
+    fn vignetting_shrinks_the_pupil_and_ends_in_the_dark() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
+        let areas: Vec<f64> = [0.0, 6.0, 12.0, 18.0, 22.0].map(|deg| pupil(&lens, deg, 0.0).area_mm2()).to_vec();
+        assert!(areas.windows(2).all(|pair| pair[1] < pair[0]), "{areas:?}");
+        let point = ObjectPoint::from_field(&lens, DVec2::new(40_f64.to_radians().tan(), 0.0), 0.0);
+        assert_eq!(PupilBoundary::find(&lens, &point, 32), None);
+    }
+
+    #[test]
+    fn stopped_down_pupil_is_the_paraxial_one() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(22.0, 550.0).unwrap().at(550.0).unwrap();
+        let first = lens.first_order();
+        let pupil = pupil(&lens, 0.0, 0.0);
+        let expected = PI / 4.0 * first.entrance_pupil_diameter_mm.powi(2);
+        // Spherical aberration of the pupil falls with the square of its size.
+        assert!((pupil.area_mm2() / expected - 1.0).abs() < 1e-3);
     }
 }

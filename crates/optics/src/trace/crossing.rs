@@ -175,3 +175,128 @@ fn path_difference(height: [f64; 2], slopes: [f64; 2], z: f64) -> f64 {
     let sum = (slopes[0] + ux) * height[0] + (slopes[1] + uy) * height[1];
     sum / (along.sqrt() + center.sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec2, DVec3};
+
+    use crate::{Glass, Interface, Lens, ObjectPoint, RayBatch, Rims, Shape, Surface, rays_towards};
+
+    const TARGETS: [DVec2; 4] = [DVec2::ZERO, DVec2::new(4.0, 0.0), DVec2::new(-2.0, 3.0), DVec2::new(0.0, -4.9)];
+
+    #[test]
+    fn thin_lens_images_every_point_to_a_point_by_equal_paths() {
+        let lens = Lens::thin(50.0, 10.0).unwrap().at(550.0).unwrap();
+        for dioptres in [0.0, 0.5, 4.0] {
+            let field_tan = DVec2::new(0.3, -0.2);
+            let point = ObjectPoint::from_field(&lens, field_tan, dioptres);
+            let film_mm = lens.film_mm_for(1e3 / dioptres).unwrap();
+            let mut rays = rays_towards(&point, &TARGETS, 0.0, 0.0);
+            lens.trace(&mut rays, Rims::Clip);
+            lens.to_film(&mut rays, film_mm);
+            for i in 0..rays.len() {
+                let image = field_tan * -film_mm;
+                assert!((rays.point_mm(i).truncate() - image).length() < 1e-12, "{dioptres}: {}", rays.point_mm(i));
+                assert!((rays.opl_mm[i] - rays.opl_mm[0]).abs() < 1e-12, "{dioptres}: {:?}", rays.opl_mm);
+            }
+        }
+    }
+
+    #[test]
+    fn thin_lens_behind_another_sees_its_image() {
+        let [first, second] = [80.0, -120.0].map(|focal_length_mm: f64| Interface {
+            surface: Surface { shape: Shape::ThinLens { power_per_mm: 1.0 / focal_length_mm }, ..Surface::plane(20.0) },
+            medium_after: Glass::Air,
+            thickness_after_mm: 15.0,
+        });
+        let lens = Lens::new("pair", "test", vec![first, second], 0).unwrap().at(550.0).unwrap();
+        let point = ObjectPoint::from_field(&lens, DVec2::new(0.1, 0.05), 1.0);
+        let film_mm = lens.film_mm_for(1_000.0).unwrap();
+        let mut rays = rays_towards(&point, &TARGETS, 0.0, 0.0);
+        lens.trace(&mut rays, Rims::Clip);
+        lens.to_film(&mut rays, film_mm);
+        for i in 1..rays.len() {
+            assert!((rays.point_mm(i) - rays.point_mm(0)).length() < 1e-12);
+            assert!((rays.opl_mm[i] - rays.opl_mm[0]).abs() < 1e-12);
+        }
+    }
+
+    fn single(shape: Shape, radius_mm: f64, index: f64) -> Lens {
+        let surface = Surface { shape, ..Surface::sphere(radius_mm, 8.0) };
+        let medium_after = Glass::Constant { index };
+        Lens::new("surface", "test", vec![Interface { surface, medium_after, thickness_after_mm: 0.0 }], 0).unwrap()
+    }
+
+    #[test]
+    fn ellipsoid_images_a_far_point_perfectly() {
+        // The Cartesian oval of a far axial point: conic constant −1/n², focus at n R/(n − 1).
+        let (radius_mm, index) = (20.0, 1.5);
+        let lens = single(Shape::Conic { conic: -1.0 / (index * index) }, radius_mm, index).at(550.0).unwrap();
+        let focus_mm = index * radius_mm / (index - 1.0);
+        let mut rays = rays_towards(&ObjectPoint::Infinite(DVec3::Z), &TARGETS, 0.0, 0.0);
+        lens.trace(&mut rays, Rims::Clip);
+        lens.to_film(&mut rays, focus_mm);
+        for i in 0..rays.len() {
+            assert!(rays.point_mm(i).truncate().length() < 1e-13, "{}", rays.point_mm(i));
+            assert!((rays.opl_mm[i] - rays.opl_mm[0]).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn conic_and_asphere_of_no_asphericity_are_the_sphere() {
+        let trace = |shape: Shape| {
+            let lens = single(shape, 20.0, 1.6).at(550.0).unwrap();
+            let point = ObjectPoint::from_field(&lens, DVec2::new(0.2, 0.1), 1.0);
+            let mut rays = rays_towards(&point, &TARGETS, 0.0, 0.0);
+            lens.trace(&mut rays, Rims::Clip);
+            rays
+        };
+        let sphere = trace(Shape::Sphere);
+        let others =
+            [Shape::Conic { conic: 0.0 }, Shape::EvenAsphere { conic: 0.0, coefficients: vec![0.0, 0.0] }].map(trace);
+        for (i, other) in others.iter().flat_map(|other| (0..4).map(move |i| (i, other))) {
+            assert!((sphere.point_mm(i) - other.point_mm(i)).length() < 1e-14);
+            assert!((sphere.direction(i) - other.direction(i)).length() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn light_goes_back_the_way_it_came() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap();
+        // The same lens met from behind.
+        let n = lens.interfaces().len();
+        let reversed: Vec<Interface> = (0..n)
+            .rev()
+            .map(|i| {
+                let surface = &lens.interfaces()[i].surface;
+                let before = |i: usize| &lens.interfaces()[i - 1];
+                Interface {
+                    surface: Surface { curvature_per_mm: -surface.curvature_per_mm, ..surface.clone() },
+                    medium_after: if i == 0 { Glass::Air } else { before(i).medium_after.clone() },
+                    thickness_after_mm: if i == 0 { 0.0 } else { before(i).thickness_after_mm },
+                }
+            })
+            .collect();
+        let back = Lens::new("reversed", "test", reversed, n - 1 - lens.stop()).unwrap().at(550.0).unwrap();
+        let lens = lens.at(550.0).unwrap();
+        let point = ObjectPoint::from_field(&lens, DVec2::new(0.1, 0.2), 0.5);
+        let start = rays_towards(&point, &TARGETS, lens.first_order().entrance_pupil_z_mm, 0.0);
+        let mut rays = start.clone();
+        lens.trace(&mut rays, Rims::Clip);
+        lens.to_film(&mut rays, 30.0);
+        let film_z_mm = lens.last_vertex_z_mm() + 30.0;
+        let mut home = RayBatch::with_capacity(4);
+        for i in 0..rays.len() {
+            let (mut p, mut d) = (rays.point_mm(i), -rays.direction(i));
+            (p.z, d.z) = (lens.last_vertex_z_mm() - p.z, -d.z);
+            assert!((p.z - (lens.last_vertex_z_mm() - film_z_mm)).abs() < 1e-12);
+            home.push(p, d, 0.0);
+        }
+        back.trace(&mut home, Rims::Clip);
+        back.to_film(&mut home, 0.0);
+        for i in 0..rays.len() {
+            assert!((home.point_mm(i).truncate() - start.point_mm(i).truncate()).length() < 1e-12);
+            assert!((home.opl_mm[i] - (rays.opl_mm[i] - start.opl_mm[i])).abs() < 1e-12);
+        }
+    }
+}
