@@ -1,1 +1,39 @@
-//! To be written.
+//! From a scene and the PSFs of a lens to spectral irradiance on the film.
+//!
+//! Every sample of the scene is put where the centroid of its PSF lies (distortion and lateral colour included),
+//! given the irradiance that the pupil passes, and spread by the PSF of its place, depth and wavelength. Surfaces at
+//! different depths are blurred in layers and laid one behind the other, so that near ones hide far ones.
+//!
+//! Radiance is W m⁻² sr⁻¹ nm⁻¹, irradiance W m⁻² nm⁻¹, absolute throughout. Row 0 of a picture is its top.
+//!
+//! This crate knows nothing of sensors, and of a lens only what [`Kernels`] asks.
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+mod bank;
+mod blur;
+mod convolve;
+mod disc_lens;
+mod error;
+mod film;
+mod geometry;
+mod hidden;
+mod kernels;
+mod layers;
+mod occlusion;
+mod render;
+mod sampler;
+mod tiles;
+
+#[cfg(test)]
+mod acceptance;
+
+pub use bank::{Coverage, bank_settings_for, irradiance};
+pub use disc_lens::DiscLens;
+pub use error::{ForwardError, SinkError};
+pub use film::{BlurMode, Film, Settings};
+pub use geometry::RadialMap;
+pub use kernels::Kernels;
+pub use render::{Behind, Sink, Source, render};

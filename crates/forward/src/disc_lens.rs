@@ -1,0 +1,100 @@
+//! A lens by formula, whose blur is a uniform disc.
+
+use glam::DVec2;
+use ndarray::Array2;
+
+use crate::{Kernels, RadialMap};
+
+/// A lens by formula: uniform discs of blur, one irradiance per radiance everywhere, distortion where asked for.
+///
+/// It stands in for a traced lens where the truth must be known: in tests, benchmarks and examples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiscLens {
+    /// Depth in focus, dioptres.
+    pub focus_dioptres: f64,
+    /// Radius of the disc a dioptre from focus, on the axis, µm.
+    pub radius_um_per_dioptre: f64,
+    /// Growth of the discs from the axis to a field of tangent 1, as a share.
+    pub growth: f64,
+    /// Focal length, mm.
+    pub focal_mm: f64,
+    /// Third-order distortion: the field seen at r mm is r/f · (1 + d r²).
+    pub distortion_per_mm2: f64,
+    /// Growth of the focal length a nanometre beyond 550 nm, as a share.
+    pub lateral_per_nm: f64,
+    /// Irradiance per radiance, sr.
+    pub irradiance_per_radiance: f64,
+}
+
+impl Default for DiscLens {
+    fn default() -> Self {
+        Self {
+            focus_dioptres: 0.0,
+            radius_um_per_dioptre: 1.0,
+            growth: 0.0,
+            focal_mm: 1.0,
+            distortion_per_mm2: 0.0,
+            lateral_per_nm: 0.0,
+            irradiance_per_radiance: 1.0,
+        }
+    }
+}
+
+impl Kernels for DiscLens {
+    fn wavelengths_nm(&self) -> (f64, f64) {
+        (100.0, 10_000.0)
+    }
+    fn dioptres(&self) -> (f64, f64) {
+        (0.0, 1000.0)
+    }
+    fn is_dark_beyond_reach(&self) -> bool {
+        true
+    }
+    fn radial_map(&self, _dioptres: f64, wavelength_nm: f64, reach_mm: f64) -> RadialMap {
+        let scale_mm = self.focal_mm * (1.0 + self.lateral_per_nm * (wavelength_nm - 550.0));
+        let tan_at = |r: f64| Some(r / scale_mm * (1.0 + self.distortion_per_mm2 * r * r));
+        RadialMap::tabulate(reach_mm, tan_at, |_| self.irradiance_per_radiance)
+    }
+    fn kernel(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Array2<f32> {
+        let radius_mm = self.blur_radius_mm(field_tan.length(), dioptres, wavelength_nm).abs();
+        disc(1e3 * radius_mm / pitch_um)
+    }
+    fn blur_radius_mm(&self, field_tan: f64, dioptres: f64, _wavelength_nm: f64) -> f64 {
+        1e-3 * self.radius_um_per_dioptre * (dioptres - self.focus_dioptres) * (1.0 + self.growth * field_tan)
+    }
+}
+
+/// Returns a uniform disc whose points are shared bilinearly among the pixels around them.
+fn disc(radius_px: f64) -> Array2<f32> {
+    // Points across a pixel, and rings across the smallest discs.
+    const FINE: f64 = 8.0;
+    let half = radius_px.ceil() as usize;
+    let n_rings = (FINE * radius_px).round().max(1.0) as usize;
+    let mut kernel = Array2::<f64>::zeros((2 * half + 1, 2 * half + 1));
+    let mut share = |row: f64, column: f64, weight: f64| {
+        let (top, left) = (row.floor(), column.floor());
+        let (down, across) = (row - top, column - left);
+        for (r, c, part) in [
+            (0, 0, (1.0 - down) * (1.0 - across)),
+            (0, 1, (1.0 - down) * across),
+            (1, 0, down * (1.0 - across)),
+            (1, 1, down * across),
+        ] {
+            if part > 0.0 {
+                kernel[(top as usize + r, left as usize + c)] += weight * part;
+            }
+        }
+    };
+    for ring in 0..n_rings {
+        // Points in proportion to the ring's area, symmetric in all eight octants.
+        let radius = radius_px * (ring as f64 + 0.5) / n_rings as f64;
+        let n_octant = ring + 1;
+        for k in 0..8 * n_octant {
+            let angle = (k as f64 + 0.5) / (8 * n_octant) as f64 * std::f64::consts::TAU;
+            let weight = (2 * ring + 1) as f64 / (8 * n_octant) as f64;
+            share(half as f64 - radius * angle.sin(), half as f64 + radius * angle.cos(), weight);
+        }
+    }
+    let sum = kernel.sum();
+    kernel.mapv(|v| (v / sum) as f32)
+}

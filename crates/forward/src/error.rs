@@ -1,0 +1,111 @@
+//! What can keep a scene from being imaged.
+
+use dioptric_spectrum::SpectrumError;
+
+/// A scene that cannot be imaged through a lens.
+#[derive(Debug, thiserror::Error)]
+pub enum ForwardError {
+    /// The scene has no depth map.
+    #[error("the scene '{scene}' has no depth: give it a depth map or a flat depth")]
+    MissingDepth {
+        /// Name of the scene.
+        scene: String,
+    },
+    /// The scene has no field of view.
+    #[error("the scene '{scene}' has no field of view: give its focal length or its horizontal field of view")]
+    MissingView {
+        /// Name of the scene.
+        scene: String,
+    },
+    /// The scene is not in radiance.
+    #[error("the scene is in {unit}, expected spectral radiance: light it first")]
+    NotRadiance {
+        /// Unit of the scene's samples.
+        unit: &'static str,
+    },
+    /// Two planes that must be of one size.
+    #[error("{what} is {found_rows} x {found_columns} samples, expected {rows} x {columns} as the radiance")]
+    Size {
+        /// What was compared with the radiance.
+        what: &'static str,
+        /// Its rows.
+        found_rows: usize,
+        /// Its columns.
+        found_columns: usize,
+        /// Rows of the radiance.
+        rows: usize,
+        /// Columns of the radiance.
+        columns: usize,
+    },
+    /// A film of no area.
+    #[error("a film of {rows} x {columns} pixels of {pitch_um} um has no area")]
+    EmptyFilm {
+        /// Rows of pixels.
+        rows: usize,
+        /// Columns of pixels.
+        columns: usize,
+        /// Pixel pitch, µm.
+        pitch_um: f64,
+    },
+    /// A setting outside its range.
+    #[error("{what} is {value}, expected {expected}")]
+    Setting {
+        /// Name of the setting.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// A band at a wavelength for which the bank was not traced.
+    #[error("the scene has a band at {wavelength_nm} nm, but the lens was traced from {first_nm} to {last_nm} nm")]
+    WavelengthOutside {
+        /// Centre of the band, nm.
+        wavelength_nm: f64,
+        /// Shortest wavelength of the bank, nm.
+        first_nm: f64,
+        /// Longest wavelength of the bank, nm.
+        last_nm: f64,
+    },
+    /// Depths for which the bank was not traced.
+    #[error("the scene is {near_m} to {far_m} m away, but the lens was traced for {bank_near_m} to {bank_far_m} m")]
+    DepthOutside {
+        /// Nearest depth of the scene, m.
+        near_m: f64,
+        /// Farthest depth of the scene, m.
+        far_m: f64,
+        /// Nearest depth of the bank, m.
+        bank_near_m: f64,
+        /// Farthest depth of the bank, m.
+        bank_far_m: f64,
+    },
+    /// The corner of the film sees a field that was not traced, or that the lens does not pass.
+    #[error(
+        "the film's corner is {corner_mm:.3} mm off axis, but at {wavelength_nm} nm the lens was traced only to {reach_mm:.3} mm"
+    )]
+    FilmBeyondField {
+        /// Half the film's diagonal, mm.
+        corner_mm: f64,
+        /// How far from the axis the traced field reaches, mm.
+        reach_mm: f64,
+        /// Wavelength, nm.
+        wavelength_nm: f64,
+    },
+    /// The lens could not be traced.
+    #[error(transparent)]
+    Lens(#[from] dioptric_optics::OpticsError),
+    /// A band could not be had.
+    #[error(transparent)]
+    Spectrum(#[from] SpectrumError),
+    /// The receiver of the bands gave up.
+    #[error("band {band} could not be handed on: {source}")]
+    Sink {
+        /// 0-based band.
+        band: usize,
+        /// Why.
+        source: SinkError,
+    },
+}
+
+/// Why a receiver of bands gave up.
+pub type SinkError = Box<dyn std::error::Error + Send + Sync>;

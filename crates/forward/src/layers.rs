@@ -1,0 +1,169 @@
+//! Depth layers: even steps of blur radius, with tent weights between them.
+
+use crate::{Film, Kernels};
+
+/// The depths at which the scene is blurred, nearest first.
+///
+/// The blur of a point is proportional to the difference of its dioptres from those of the focus, so layers evenly
+/// spaced in dioptres are evenly spaced in blur radius. They lie twice as close where anything is nearly in focus,
+/// for there a step changes a blur the most. A sample between two layers belongs to both in proportion.
+#[derive(Clone, Debug)]
+pub(crate) struct Layers {
+    // Invariant: at least one layer, in strictly descending order of dioptres.
+    dioptres: Vec<f64>,
+    radius_px: Vec<f64>,
+    px_per_dioptre: f64,
+}
+
+/// A change of blur over the whole scene that is not worth two layers, pixels.
+const NEGLIGIBLE_PX: f64 = 0.02;
+/// Blur radius up to which layers lie twice as close, pixels.
+const NEAR_FOCUS_PX: f64 = 4.0;
+
+impl Layers {
+    /// Lays layers over a range of dioptres (farthest, nearest), at most `step_px` of blur radius apart.
+    pub(crate) fn over(
+        range: (f64, f64),
+        step_px: f64,
+        film: &Film,
+        corner_tan: f64,
+        wavelengths_nm: &[f64],
+        kernels: &dyn Kernels,
+    ) -> Self {
+        let pitch_mm = 1e-3 * film.pitch_um;
+        let last = wavelengths_nm.len() - 1;
+        let samples: Vec<(f64, f64)> = [0, last / 2, last]
+            .into_iter()
+            .flat_map(|w| [0.0, 0.5, 1.0].map(|part| (part * corner_tan, wavelengths_nm[w])))
+            .collect();
+        let blur_px = |(tan, nm): &(f64, f64), dioptres: f64| kernels.blur_radius_mm(*tan, dioptres, *nm) / pitch_mm;
+        let change_px = samples.iter().map(|s| (blur_px(s, range.1) - blur_px(s, range.0)).abs()).fold(0.0, f64::max);
+        let mut dioptres = vec![0.5 * (range.0 + range.1)];
+        let mut px_per_dioptre = 0.0;
+        if change_px > NEGLIGIBLE_PX {
+            px_per_dioptre = change_px / (range.1 - range.0);
+            // Blur is linear in dioptres, so the line through the ends crosses 0 at the focus.
+            let focus = |s: &(f64, f64)| {
+                let (far, near) = (blur_px(s, range.0), blur_px(s, range.1));
+                range.0 + (range.1 - range.0) * far / (far - near)
+            };
+            let (low, high) = samples
+                .iter()
+                .map(focus)
+                .filter(|d| d.is_finite())
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), d| (low.min(d), high.max(d)));
+            let margin = NEAR_FOCUS_PX / px_per_dioptre;
+            let (low, high) = ((low - margin).clamp(range.0, range.1), (high + margin).clamp(range.0, range.1));
+            dioptres = vec![range.1];
+            for (end, step_px) in [(high, step_px), (low, 0.5 * step_px), (range.0, step_px)] {
+                let start = dioptres[dioptres.len() - 1];
+                let n_steps = ((start - end) * px_per_dioptre / step_px - 1e-6).ceil().max(0.0) as usize;
+                dioptres.extend((1..=n_steps).map(|i| start + (end - start) * i as f64 / n_steps as f64));
+            }
+            let last = dioptres.len() - 1;
+            dioptres[last] = range.0;
+        }
+        let radius_px =
+            dioptres.iter().map(|&d| samples.iter().map(|s| blur_px(s, d).abs()).fold(0.0, f64::max)).collect();
+        Self { dioptres, radius_px, px_per_dioptre }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.dioptres.len()
+    }
+
+    /// The dioptres of each layer, nearest first.
+    pub(crate) fn dioptres(&self) -> &[f64] {
+        &self.dioptres
+    }
+
+    /// Returns how far behind the nearest layer a depth lies, in pixels of blur radius.
+    pub(crate) fn distance_px(&self, depth_m: f32) -> f32 {
+        ((self.dioptres[0] - 1.0 / f64::from(depth_m)) * self.px_per_dioptre) as f32
+    }
+
+    /// Returns where a depth lies among the layers: 0 at the nearest, 1 at the next.
+    pub(crate) fn place_of(&self, depth_m: f32) -> f32 {
+        self.place_at(1.0 / f64::from(depth_m))
+    }
+
+    /// Returns where a distance behind the nearest layer, in pixels of blur radius, lies among the layers.
+    pub(crate) fn place_of_distance(&self, distance_px: f32) -> f32 {
+        self.place_at(self.dioptres[0] - f64::from(distance_px) / self.px_per_dioptre)
+    }
+
+    fn place_at(&self, dioptres: f64) -> f32 {
+        let last = self.len() - 1;
+        let above = self.dioptres.partition_point(|&d| d > dioptres);
+        if above == 0 || last == 0 {
+            return 0.0;
+        }
+        if above > last {
+            return last as f32;
+        }
+        let (near, far) = (self.dioptres[above - 1], self.dioptres[above]);
+        ((above - 1) as f64 + (near - dioptres) / (near - far)) as f32
+    }
+
+    /// Returns the largest blur radius of the samples at a place among the layers, pixels.
+    pub(crate) fn radius_px_at(&self, place: f32) -> f64 {
+        let below = (place as usize).min(self.len() - 1);
+        let above = (below + 1).min(self.len() - 1);
+        f64::max(self.radius_px[below], self.radius_px[above])
+    }
+}
+
+/// Returns the share of a sample at `place` that belongs to a layer; 0 where there is no sample (NaN).
+#[inline]
+pub(crate) fn tent(place: f32, layer: f32) -> f32 {
+    (1.0 - (place - layer).abs()).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DiscLens;
+
+    fn layers(range: (f64, f64), step_px: f64) -> Layers {
+        let lens = DiscLens { focus_dioptres: 10.0, ..DiscLens::default() };
+        let film = Film { rows: 10, columns: 10, pitch_um: 1.0 };
+        Layers::over(range, step_px, &film, 0.1, &[550.0], &lens)
+    }
+
+    #[test]
+    fn layers_reach_both_ends_in_steps_no_larger_than_asked() {
+        let layers = layers((2.0, 25.0), 2.0);
+        let dioptres = layers.dioptres();
+        let last = layers.len() - 1;
+        assert_eq!((dioptres[0], dioptres[last]), (25.0, 2.0));
+        for pair in dioptres.windows(2) {
+            let step_px = if pair[0] > 14.0 + 1e-9 || pair[1] < 6.0 - 1e-9 { 2.0 } else { 1.0 };
+            assert!(pair[0] > pair[1] && pair[0] - pair[1] <= step_px + 1e-9, "{pair:?}");
+        }
+        assert_eq!(layers.place_of(1.0 / 25.0), 0.0);
+        assert_eq!(layers.place_of(f32::INFINITY), last as f32);
+        let place = layers.place_of(1.0 / 9.3);
+        let between = dioptres[place as usize]
+            + f64::from(place.fract()) * (dioptres[place as usize + 1] - dioptres[place as usize]);
+        assert!((between - 9.3).abs() < 1e-5, "{between}");
+        assert!((layers.distance_px(1.0 / 9.3) - 15.7).abs() < 1e-4);
+        assert!((layers.place_of_distance(15.7) - place).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_flat_scene_has_one_layer() {
+        let layers = layers((5.0, 5.0), 2.0);
+        assert_eq!((layers.len(), layers.dioptres()[0], layers.place_of(0.2)), (1, 5.0, 0.0));
+    }
+
+    #[test]
+    fn weights_of_a_sample_sum_to_one() {
+        let layers = layers((2.0, 25.0), 2.0);
+        for depth_m in [0.04, 0.05, 0.0833, 0.2, 0.5] {
+            let place = layers.place_of(depth_m);
+            let sum: f32 = (0..layers.len()).map(|l| tent(place, l as f32)).sum();
+            assert!((sum - 1.0).abs() < 1e-6);
+        }
+        assert_eq!(tent(f32::NAN, 3.0), 0.0);
+    }
+}

@@ -1,0 +1,296 @@
+//! The film cut into square cells, with a knot for the PSF at each corner.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec2;
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use crate::{Film, Kernels, RadialMap, Settings, geometry::FilmFrame, layers::Layers};
+
+/// A point of the film at which the PSF is computed: pixels to the right of the axis and below it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Knot {
+    pub(crate) right: i32,
+    pub(crate) down: i32,
+}
+
+impl Knot {
+    /// Returns the knot of the same distance from the axis in the first octant, right and up.
+    pub(crate) fn canonical(self) -> Self {
+        let (a, b) = (self.right.abs(), self.down.abs());
+        Self { right: a.max(b), down: -a.min(b) }
+    }
+
+    /// Returns the field at the knot.
+    fn field_tan(self, map: &RadialMap, pitch_mm: f64) -> DVec2 {
+        let (x, y) = map.field_tan(f64::from(self.right) * pitch_mm, -f64::from(self.down) * pitch_mm);
+        DVec2::new(x, y)
+    }
+}
+
+/// A square of the film, which may reach beyond its edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Cell {
+    /// The corner at the top left.
+    pub(crate) corner: Knot,
+    /// Length of a side, pixels.
+    pub(crate) size: usize,
+}
+
+/// Cells are not halved below this size, pixels.
+const SMALLEST: usize = 16;
+
+impl Cell {
+    /// The corners: top left, top right, bottom left, bottom right.
+    pub(crate) fn knots(&self) -> [Knot; 4] {
+        let Knot { right, down } = self.corner;
+        let size = self.size as i32;
+        [(0, 0), (size, 0), (0, size), (size, size)].map(|(r, d)| Knot { right: right + r, down: down + d })
+    }
+
+    fn middle(&self) -> Knot {
+        let half = (self.size / 2) as i32;
+        Knot { right: self.corner.right + half, down: self.corner.down + half }
+    }
+
+    fn quarters(&self) -> [Self; 4] {
+        let half = (self.size / 2) as i32;
+        let Knot { right, down } = self.corner;
+        [(0, 0), (half, 0), (0, half), (half, half)]
+            .map(|(r, d)| Self { corner: Knot { right: right + r, down: down + d }, size: self.size / 2 })
+    }
+
+    /// The row and column of the first pixel whose centre lies in the cell.
+    pub(crate) fn first_pixel(&self, frame: &FilmFrame) -> (i64, i64) {
+        let (center_row, center_column) = frame.center();
+        (
+            (f64::from(self.corner.down) + center_row).ceil() as i64,
+            (f64::from(self.corner.right) + center_column).ceil() as i64,
+        )
+    }
+}
+
+/// Returns the cells of a film and of a border of `pad_px` around it.
+pub(crate) fn cells_over(film: &Film, pad_px: usize, size: usize) -> Vec<Cell> {
+    let reach = |n: usize| ((0.5 * n as f64 + pad_px as f64) / size as f64).ceil() as i32;
+    let (across, along) = (reach(film.columns), reach(film.rows));
+    let step = size as i32;
+    (-along..along)
+        .flat_map(|row| (-across..across).map(move |column| (row, column)))
+        .map(|(row, column)| Cell { corner: Knot { right: column * step, down: row * step }, size })
+        .collect()
+}
+
+/// The kernels of one layer at one wavelength, at the canonical knots.
+#[derive(Clone, Debug)]
+pub(crate) struct LayerKernels {
+    /// Samples along a side of every kernel; odd.
+    pub(crate) width: usize,
+    by_knot: BTreeMap<Knot, Vec<f32>>,
+}
+
+impl LayerKernels {
+    /// Takes kernels of any odd sizes, scales each to a sum of 1 and pads them to one size.
+    pub(crate) fn new(kernels: Vec<(Knot, Array2<f32>)>) -> Self {
+        let width = kernels.iter().map(|(_, k)| k.nrows().max(k.ncols())).max().unwrap_or(1);
+        let by_knot = kernels.into_iter().map(|(knot, kernel)| (knot, padded(&kernel, width))).collect();
+        Self { width, by_knot }
+    }
+
+    /// Returns the kernel at a knot anywhere on the film: that of its canonical knot, mirrored.
+    pub(crate) fn at(&self, knot: Knot) -> Vec<f32> {
+        let kernel = &self.by_knot[&knot.canonical()];
+        let (n, last) = (self.width, self.width - 1);
+        let swap = knot.down.abs() > knot.right.abs();
+        let (flip_columns, flip_rows) = (knot.right < 0, knot.down > 0);
+        let mut turned = Vec::with_capacity(n * n);
+        for row in 0..n {
+            let row = if flip_rows { last - row } else { row };
+            for column in 0..n {
+                let column = if flip_columns { last - column } else { column };
+                let (r, c) = if swap { (last - column, last - row) } else { (row, column) };
+                turned.push(kernel[r * n + c]);
+            }
+        }
+        turned
+    }
+}
+
+fn padded(kernel: &Array2<f32>, width: usize) -> Vec<f32> {
+    let (rows, columns) = kernel.dim();
+    let (top, left) = ((width - rows) / 2, (width - columns) / 2);
+    let sum: f64 = kernel.iter().map(|&v| f64::from(v)).sum();
+    let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+    let mut samples = vec![0.0; width * width];
+    for ((row, column), &value) in kernel.indexed_iter() {
+        samples[(top + row) * width + left + column] = (f64::from(value) * scale) as f32;
+    }
+    samples
+}
+
+/// The cells of every layer, fine enough for the PSF to be interpolated across them.
+pub(crate) struct Tiling {
+    /// Of each layer, the cells with something in them.
+    pub(crate) cells: Vec<Vec<Cell>>,
+    /// Of each layer, the canonical knots of its cells.
+    knots: Vec<BTreeSet<Knot>>,
+}
+
+impl Tiling {
+    /// Halves the cells of each layer until the PSF half-way between the knots is met.
+    pub(crate) fn new(
+        active: Vec<Vec<Cell>>,
+        maps: &[RadialMap],
+        layers: &Layers,
+        film: &Film,
+        wavelength_nm: f64,
+        kernels: &dyn Kernels,
+        settings: &Settings,
+    ) -> Self {
+        let cells: Vec<Vec<Cell>> = active
+            .into_par_iter()
+            .enumerate()
+            .map(|(layer, cells)| {
+                let mut probe = Probe {
+                    kernel_at: &|knot: Knot| {
+                        let field_tan = knot.field_tan(&maps[layer], 1e-3 * film.pitch_um);
+                        kernels.kernel(field_tan, layers.dioptres()[layer], wavelength_nm, film.pitch_um)
+                    },
+                    kernels: BTreeMap::new(),
+                    errors: BTreeMap::new(),
+                };
+                cells.into_iter().flat_map(|cell| probe.halved_until(cell, settings.max_edge_error)).collect()
+            })
+            .collect();
+        let knots =
+            cells.iter().map(|cells| cells.iter().flat_map(|c| c.knots().map(Knot::canonical)).collect()).collect();
+        Self { cells, knots }
+    }
+
+    /// Computes the kernels of all layers at a wavelength; none for a layer without cells.
+    pub(crate) fn kernels_at(
+        &self,
+        maps: &[RadialMap],
+        layers: &Layers,
+        film: &Film,
+        wavelength_nm: f64,
+        kernels: &dyn Kernels,
+    ) -> Vec<LayerKernels> {
+        let wanted: Vec<(usize, Knot)> =
+            self.knots.iter().enumerate().flat_map(|(layer, knots)| knots.iter().map(move |&k| (layer, k))).collect();
+        let computed: Vec<(usize, Knot, Array2<f32>)> = wanted
+            .into_par_iter()
+            .map(|(layer, knot)| {
+                let field_tan = knot.field_tan(&maps[layer], 1e-3 * film.pitch_um);
+                let dioptres = layers.dioptres()[layer];
+                (layer, knot, kernels.kernel(field_tan, dioptres, wavelength_nm, film.pitch_um))
+            })
+            .collect();
+        let mut by_layer: Vec<Vec<(Knot, Array2<f32>)>> = vec![vec![]; layers.len()];
+        for (layer, knot, kernel) in computed {
+            by_layer[layer].push((knot, kernel));
+        }
+        by_layer.into_iter().map(LayerKernels::new).collect()
+    }
+}
+
+/// Tells where the PSF cannot be interpolated across a cell.
+struct Probe<'a> {
+    kernel_at: &'a dyn Fn(Knot) -> Array2<f32>,
+    kernels: BTreeMap<Knot, Array2<f32>>,
+    errors: BTreeMap<(Knot, usize), f64>,
+}
+
+impl Probe<'_> {
+    fn halved_until(&mut self, cell: Cell, max_edge_error: f64) -> Vec<Cell> {
+        if cell.size / 2 < SMALLEST || self.edge_error(&cell) <= max_edge_error {
+            return vec![cell];
+        }
+        cell.quarters().into_iter().flat_map(|quarter| self.halved_until(quarter, max_edge_error)).collect()
+    }
+
+    /// Returns the largest error of the edge spread function, of edges along rows and columns, mid-cell.
+    fn edge_error(&mut self, cell: &Cell) -> f64 {
+        let key = (cell.middle().canonical(), cell.size);
+        if let Some(&error) = self.errors.get(&key) {
+            return error;
+        }
+        let wanted: Vec<Knot> = cell.knots().into_iter().chain([cell.middle()]).collect();
+        for knot in &wanted {
+            let canonical = knot.canonical();
+            let kernel_at = self.kernel_at;
+            self.kernels.entry(canonical).or_insert_with(|| kernel_at(canonical));
+        }
+        let canonical = wanted.iter().map(|k| k.canonical());
+        let kernels = LayerKernels::new(canonical.map(|k| (k, self.kernels[&k].clone())).collect());
+        let turned: Vec<Vec<f32>> = wanted.iter().map(|&knot| kernels.at(knot)).collect();
+        let difference: Vec<f64> = (0..kernels.width * kernels.width)
+            .map(|i| f64::from(turned[4][i]) - 0.25 * turned[..4].iter().map(|k| f64::from(k[i])).sum::<f64>())
+            .collect();
+        let error = edge_spread_peak(&difference, kernels.width);
+        self.errors.insert(key, error);
+        error
+    }
+}
+
+/// Returns the largest magnitude of the edge spread functions, along rows and columns, of a kernel.
+pub(crate) fn edge_spread_peak(kernel: &[f64], width: usize) -> f64 {
+    let (mut down, mut right, mut peak) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for i in 0..width {
+        down += kernel[i * width..][..width].iter().sum::<f64>();
+        right += kernel.iter().skip(i).step_by(width).sum::<f64>();
+        peak = peak.max(down.abs()).max(right.abs());
+    }
+    peak
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_cover_the_film_and_its_border_once() {
+        for (rows, columns) in [(100, 151), (128, 64)] {
+            let film = Film { rows, columns, pitch_um: 1.0 };
+            let frame = FilmFrame::new(&film);
+            let mut hits = Array2::<u8>::zeros((rows + 20, columns + 20));
+            for cell in cells_over(&film, 10, 32) {
+                let (row, column) = cell.first_pixel(&frame);
+                for r in row..row + 32 {
+                    for c in column..column + 32 {
+                        if let (Ok(r), Ok(c)) = (usize::try_from(r + 10), usize::try_from(c + 10))
+                            && let Some(hit) = hits.get_mut((r, c))
+                        {
+                            *hit += 1;
+                        }
+                    }
+                }
+            }
+            assert!(hits.iter().all(|&hit| hit == 1));
+        }
+    }
+
+    #[test]
+    fn kernels_are_mirrored_with_their_knots() {
+        // A comet pointing away from the axis at (tan 2, 1): right and up.
+        let comet = |x: f64, y: f64| {
+            let mut kernel = Array2::zeros((5, 5));
+            kernel[((2.0 - y) as usize, (2.0 + x) as usize)] = 1.0;
+            kernel
+        };
+        let kernels = LayerKernels::new(vec![(Knot { right: 64, down: -32 }, comet(2.0, 1.0))]);
+        for (right, down, x, y) in [
+            (64, -32, 2.0, 1.0),
+            (-64, -32, -2.0, 1.0),
+            (64, 32, 2.0, -1.0),
+            (32, -64, 1.0, 2.0),
+            (-32, 64, -1.0, -2.0),
+            (32, 64, 1.0, -2.0),
+            (-32, -64, -1.0, 2.0),
+        ] {
+            let expected: Vec<f32> = comet(x, y).into_iter().collect();
+            assert_eq!(kernels.at(Knot { right, down }), expected, "at {right}, {down}");
+        }
+    }
+}
