@@ -20,6 +20,7 @@ mod paraxial;
 mod prescription;
 mod pupil;
 mod rays;
+mod seidel;
 mod surface;
 mod trace;
 
@@ -33,5 +34,6 @@ pub use mono::MonoLens;
 pub use paraxial::{Conjugate, FirstOrder};
 pub use pupil::PupilBoundary;
 pub use rays::{Losses, RayBatch, RayFate, SurfaceLosses};
+pub use seidel::{Seidel, SeidelSettings, SeidelSums};
 pub use surface::{Interface, Shape, Surface};
 pub use trace::Rims;

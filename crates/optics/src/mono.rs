@@ -104,6 +104,10 @@ impl MonoLens {
         self.steps[self.steps.len() - 1].vertex_z
     }
 
+    pub(crate) fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
     /// Returns the z of the first surface at a distance from the axis, mm; NaN beyond its equator.
     pub(crate) fn front_sag_mm(&self, r_mm: f64) -> f64 {
         self.front.sag_mm(r_mm)

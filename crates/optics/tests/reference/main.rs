@@ -4,3 +4,4 @@
 mod first_order;
 mod lens;
 mod rays;
+mod seidel;

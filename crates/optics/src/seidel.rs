@@ -1,0 +1,217 @@
+//! Third-order aberrations: the Seidel sums, surface by surface.
+
+use std::ops::AddAssign;
+
+use serde::Serialize;
+
+use crate::{
+    C_LINE_NM, D_LINE_NM, F_LINE_NM, Lens, OpticsError,
+    trace::{Kind, Step},
+};
+
+/// The Seidel sums of a surface or of a whole lens, mm, in the sign convention of Welford.
+///
+/// S1 = −A² y Δ(u/n), and so on; C1 = A y Δ(δn/n), δn = n(short) − n(long). A positive S1 is undercorrected spherical
+/// aberration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub struct SeidelSums {
+    /// Spherical aberration.
+    pub s1: f64,
+    /// Coma.
+    pub s2: f64,
+    /// Astigmatism.
+    pub s3: f64,
+    /// Petzval curvature.
+    pub s4: f64,
+    /// Distortion.
+    pub s5: f64,
+    /// Axial colour.
+    pub c1: f64,
+    /// Lateral colour.
+    pub c2: f64,
+}
+
+impl AddAssign for SeidelSums {
+    fn add_assign(&mut self, other: Self) {
+        self.s1 += other.s1;
+        self.s2 += other.s2;
+        self.s3 += other.s3;
+        self.s4 += other.s4;
+        self.s5 += other.s5;
+        self.c1 += other.c1;
+        self.c2 += other.c2;
+    }
+}
+
+/// The Seidel sums of a lens.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Seidel {
+    /// Those of each surface, the stop included.
+    pub per_surface: Vec<SeidelSums>,
+    /// Their sum.
+    pub total: SeidelSums,
+    /// The Lagrange invariant n (u ȳ − ū y), mm.
+    pub lagrange_mm: f64,
+}
+
+/// For which rays and wavelengths Seidel sums are wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeidelSettings {
+    /// The main wavelength, nm.
+    pub wavelength_nm: f64,
+    /// The two wavelengths between which colour is counted, the shorter first, nm.
+    pub colors_nm: [f64; 2],
+    /// Distance of the object before the first vertex, mm; infinite for a far one.
+    pub object_distance_mm: f64,
+    /// Slope dy/dz of the chief ray before the lens.
+    pub chief_slope: f64,
+}
+
+impl SeidelSettings {
+    /// Returns the usual settings: a far object, the d line, and colour from F to C.
+    pub fn far(chief_slope: f64) -> Self {
+        let (wavelength_nm, colors_nm) = (D_LINE_NM, [F_LINE_NM, C_LINE_NM]);
+        Self { wavelength_nm, colors_nm, object_distance_mm: f64::INFINITY, chief_slope }
+    }
+}
+
+/// A paraxial ray: its height and its slope.
+#[derive(Clone, Copy)]
+struct Paraxial {
+    y: f64,
+    u: f64,
+}
+
+impl Paraxial {
+    fn refracted(self, step: &Step) -> Self {
+        Self { u: (step.index_before * self.u - step.power() * self.y) / step.index_after, ..self }
+    }
+
+    fn moved(self, distance: f64) -> Self {
+        Self { y: self.y + distance * self.u, ..self }
+    }
+}
+
+impl Lens {
+    /// Returns the Seidel sums of the lens for a full aperture.
+    ///
+    /// The marginal ray passes the edge of the paraxial entrance pupil, the chief ray its centre. An ideal lens in
+    /// the train adds nothing; a conic or asphere adds what its r⁴ term departs from the sphere.
+    ///
+    /// # Errors
+    /// When a glass is not known at one of the wavelengths.
+    pub fn seidel(&self, settings: &SeidelSettings) -> Result<Seidel, OpticsError> {
+        let mono = self.at(settings.wavelength_nm)?;
+        let [short, long] = [self.at(settings.colors_nm[0])?, self.at(settings.colors_nm[1])?];
+        let first = mono.first_order();
+        let (pupil_z, pupil_radius) = (first.entrance_pupil_z_mm, 0.5 * first.entrance_pupil_diameter_mm);
+        let mut marginal = match settings.object_distance_mm.is_infinite() {
+            true => Paraxial { y: pupil_radius, u: 0.0 },
+            false => {
+                let u = pupil_radius / (pupil_z + settings.object_distance_mm);
+                Paraxial { y: settings.object_distance_mm * u, u }
+            }
+        };
+        let mut chief = Paraxial { y: -pupil_z * settings.chief_slope, u: settings.chief_slope };
+        let lagrange_mm = mono.steps()[0].index_before * (marginal.u * chief.y - chief.u * marginal.y);
+
+        let (mut per_surface, mut total) = (Vec::new(), SeidelSums::default());
+        let steps = mono.steps();
+        for (i, step) in steps.iter().enumerate() {
+            if i > 0 {
+                let gap = step.vertex_z - steps[i - 1].vertex_z;
+                (marginal, chief) = (marginal.moved(gap), chief.moved(gap));
+            }
+            let index_difference = [&short.steps()[i], &long.steps()[i]].map(|s| [s.index_before, s.index_after]);
+            let at = AtSurface { step, marginal, chief, lagrange_mm, index_difference: difference(index_difference) };
+            let sums = at.sums();
+            per_surface.push(sums);
+            total += sums;
+            (marginal, chief) = (marginal.refracted(step), chief.refracted(step));
+        }
+        Ok(Seidel { per_surface, total, lagrange_mm })
+    }
+}
+
+fn difference([short, long]: [[f64; 2]; 2]) -> [f64; 2] {
+    [short[0] - long[0], short[1] - long[1]]
+}
+
+/// The rays that arrive at a surface.
+struct AtSurface<'a> {
+    step: &'a Step,
+    marginal: Paraxial,
+    chief: Paraxial,
+    lagrange_mm: f64,
+    /// Dispersion before and after.
+    index_difference: [f64; 2],
+}
+
+impl AtSurface<'_> {
+    fn sums(&self) -> SeidelSums {
+        let (step, h) = (self.step, self.lagrange_mm);
+        if matches!(step.kind, Kind::Window | Kind::ThinLens { .. }) {
+            return SeidelSums::default();
+        }
+        let (n0, n1, c) = (step.index_before, step.index_after, step.curvature);
+        let (y, y_bar) = (self.marginal.y, self.chief.y);
+        let a = n0 * (self.marginal.u + c * y);
+        let a_bar = n0 * (self.chief.u + c * y_bar);
+        let u_over_n = self.marginal.refracted(step).u / n1 - self.marginal.u / n0;
+        let petzval = c * (1.0 / n1 - 1.0 / n0);
+        // Free of the quotient of Ā and A, which fails where the marginal ray meets the surface head-on.
+        let s5 = a_bar * (petzval * y_bar * (a_bar * y - h) - a_bar * a_bar * y * (1.0 / (n1 * n1) - 1.0 / (n0 * n0)));
+        let color = self.index_difference[1] / n1 - self.index_difference[0] / n0;
+        let bent = match &step.kind {
+            Kind::Conic { conic } => conic * c.powi(3),
+            Kind::EvenAsphere { conic, coefficients } => {
+                conic * c.powi(3) + 8.0 * coefficients.first().copied().unwrap_or(0.0)
+            }
+            _ => 0.0,
+        } * (n1 - n0);
+        SeidelSums {
+            s1: -a * a * y * u_over_n + bent * y.powi(4),
+            s2: -a * a_bar * y * u_over_n + bent * y.powi(3) * y_bar,
+            s3: -a_bar * a_bar * y * u_over_n + bent * (y * y_bar).powi(2),
+            s4: -h * h * petzval,
+            s5: s5 + bent * y * y_bar.powi(3),
+            c1: a * y * color,
+            c2: a_bar * y * color,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Glass, Interface, Surface};
+
+    #[test]
+    fn thin_lens_of_glass_has_the_textbook_petzval_and_color() {
+        // A thin equiconvex lens at the stop: S4 = H² φ/n, C1 = y² φ/V, C2 = 0.
+        let side = |radius_mm: f64, medium_after: Glass| Interface {
+            surface: Surface::sphere(radius_mm, 5.0),
+            medium_after,
+            thickness_after_mm: 0.0,
+        };
+        let glass = Glass::NdVd { nd: 1.5, vd: 50.0 };
+        let lens = Lens::new("thin", "test", vec![side(100.0, glass), side(-100.0, Glass::Air)], 0).unwrap();
+        let total = lens.seidel(&SeidelSettings::far(0.1)).unwrap().total;
+        let power = 0.01;
+        assert!((total.s4 - 0.25 * power / 1.5).abs() < 1e-12, "{total:?}");
+        assert!((total.c1 - 25.0 * power / 50.0).abs() < 1e-9, "{total:?}");
+        assert!(total.c2.abs() < 1e-15 && total.s5.abs() < 1e-15);
+        // Astigmatism of a thin lens at the stop: S3 = H² φ.
+        assert!((total.s3 - 0.25 * power).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ellipsoid_has_no_spherical_aberration() {
+        let surface = Surface { shape: crate::Shape::Conic { conic: -1.0 / 2.25 }, ..Surface::sphere(20.0, 5.0) };
+        let medium_after = Glass::Constant { index: 1.5 };
+        let interface = Interface { surface, medium_after, thickness_after_mm: 0.0 };
+        let lens = Lens::new("ellipsoid", "test", vec![interface], 0).unwrap();
+        assert!(lens.seidel(&SeidelSettings::far(0.0)).unwrap().total.s1.abs() < 1e-15);
+    }
+}
