@@ -1,0 +1,399 @@
+//! Drawings of a lens in its meridional plane, as SVG.
+
+use std::fmt::Write;
+
+use glam::DVec2;
+
+use crate::{Glass, Lens, MonoLens, ObjectPoint, OpticsError, PupilBoundary, RayBatch, Rims, Surface, rays_towards};
+
+/// What a drawing shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// Distance of the film behind the last vertex, mm.
+    pub film_mm: f64,
+    /// Distance of the object before the first vertex, mm; infinite for a far one.
+    pub object_distance_mm: f64,
+    /// Tangents of the field angles from which rays come.
+    pub field_tans: Vec<f64>,
+    /// Wavelengths of the rays, nm. With one field, rays are coloured by wavelength, else by field.
+    pub wavelengths_nm: Vec<f64>,
+    /// Rays a field and wavelength.
+    pub n_rays: usize,
+    /// Width of the picture, px.
+    pub width_px: f64,
+}
+
+/// Margin around the drawing, px.
+const MARGIN_PX: f64 = 28.0;
+/// Room for the words below the drawing, px.
+const FOOT_PX: f64 = 34.0;
+/// Colours of fields, in their order: blue, green, red, orange, violet, grey.
+const FIELD_COLORS: [&str; 6] = ["#2166ac", "#1b7837", "#b2182b", "#d9810c", "#762a83", "#555555"];
+
+impl Lens {
+    /// Draws the lens with its stop, its film and rays, and returns the picture as SVG text.
+    ///
+    /// Each fan of rays fills the true, vignetted pupil of its field at the first wavelength; objects lie below the
+    /// axis, so that fans climb.
+    ///
+    /// # Errors
+    /// When there is no wavelength or a glass is not known at one of them.
+    pub fn draw(&self, layout: &Layout) -> Result<String, OpticsError> {
+        let Some(&reference_nm) = layout.wavelengths_nm.first() else {
+            return Err(OpticsError::NotPositive { what: "the number of wavelengths to draw", found: 0.0 });
+        };
+        let lenses: Vec<MonoLens> = layout.wavelengths_nm.iter().map(|&w| self.at(w)).collect::<Result<_, _>>()?;
+        let fans = fans(self, &lenses, layout);
+        let frame = Frame::around(self, layout, &fans);
+        let mut svg = frame.open(self.name());
+        frame.axis(&mut svg);
+        elements(self, layout, &frame, &mut svg);
+        for fan in &fans {
+            frame.rays(fan, &mut svg);
+        }
+        stop(self, &frame, &mut svg);
+        film(self, layout, &fans, &frame, &mut svg);
+        let first = self.at(reference_nm)?.first_order();
+        let words = match first.power_per_mm == 0.0 {
+            true => self.name().to_owned(),
+            false => format!("{} · f = {:.2} mm · f/{:.2}", self.name(), first.efl_mm, first.f_number),
+        };
+        frame.foot(&words, layout, &mut svg);
+        svg.push_str("</svg>\n");
+        Ok(svg)
+    }
+}
+
+/// The rays of one field and wavelength, as lines of (z, y) in mm.
+struct Fan {
+    color: String,
+    lines: Vec<Line>,
+}
+
+struct Line {
+    points: Vec<DVec2>,
+    reaches_film: bool,
+}
+
+fn fans(lens: &Lens, lenses: &[MonoLens], layout: &Layout) -> Vec<Fan> {
+    let track_mm = lens.last_vertex_z_mm() + layout.film_mm;
+    let lead_mm = layout.object_distance_mm.min(0.25 * track_mm + 0.3 * lens.front_semi_aperture_mm());
+    let entrance_z_mm = lenses[0].first_order().entrance_pupil_z_mm;
+    let entrance_z_mm = if entrance_z_mm.is_finite() { entrance_z_mm } else { 0.0 };
+    let dioptres = 1e3 / (layout.object_distance_mm + entrance_z_mm);
+    let mut fans = Vec::new();
+    for (i, &field_tan) in layout.field_tans.iter().enumerate() {
+        let point = ObjectPoint::from_field(&lenses[0], DVec2::new(0.0, -field_tan), dioptres);
+        let Some(pupil) = PupilBoundary::find(&lenses[0], &point, 64) else { continue };
+        let (low, high) =
+            (pupil.rho_max_mm(-std::f64::consts::FRAC_PI_2), pupil.rho_max_mm(std::f64::consts::FRAC_PI_2));
+        let n_rays = layout.n_rays.max(1);
+        // The outermost rays keep clear of the rims by a hair, for the other wavelengths' sake.
+        let share = |ray: usize| if n_rays == 1 { 0.5 } else { 0.005 + 0.99 * ray as f64 / (n_rays - 1) as f64 };
+        let height = |ray: usize| pupil.center_mm().y - low + (low + high) * share(ray);
+        let targets: Vec<DVec2> = (0..n_rays).map(|ray| DVec2::new(pupil.center_mm().x, height(ray))).collect();
+        for (lens, &wavelength_nm) in lenses.iter().zip(&layout.wavelengths_nm) {
+            let rays = rays_towards(&point, &targets, pupil.z_mm(), 0.0);
+            let color = match layout.field_tans.len() {
+                1 => wavelength_color(wavelength_nm),
+                _ => FIELD_COLORS[i % FIELD_COLORS.len()].to_owned(),
+            };
+            fans.push(Fan { color, lines: follow(lens, rays, lead_mm, layout.film_mm) });
+        }
+    }
+    fans
+}
+
+fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_mm: f64) -> Vec<Line> {
+    // Steep rays start no further off than a little beyond the widest rim.
+    let rims = (0..lens.n_surfaces()).map(|surface| lens.semi_aperture_mm(surface));
+    let reach_mm = 1.5 * rims.fold(0.0, f64::max);
+    let start = |i: usize| {
+        let (point, direction) = (rays.point_mm(i), rays.direction(i));
+        let by_height = (reach_mm - point.y.abs()).max(0.0) / direction.y.abs();
+        let back = by_height.min(lead_mm / direction.z);
+        let start = point - direction * back;
+        Line { points: vec![DVec2::new(start.z, start.y)], reaches_film: false }
+    };
+    let mut lines: Vec<Line> = (0..rays.len()).map(start).collect();
+    let note = |lines: &mut Vec<Line>, rays: &RayBatch, was_in_flight: &[bool]| {
+        for (i, line) in lines.iter_mut().enumerate().filter(|(i, _)| was_in_flight[*i]) {
+            line.points.push(DVec2::new(rays.z_mm[i], rays.y_mm[i]));
+        }
+    };
+    let in_flight = |rays: &RayBatch| rays.fate.iter().map(|fate| fate.is_in_flight()).collect::<Vec<_>>();
+    for surface in 0..lens.n_surfaces() {
+        let before = in_flight(&rays);
+        lens.trace_surfaces(surface..surface + 1, &mut rays, Rims::Clip);
+        note(&mut lines, &rays, &before);
+    }
+    lens.to_film(&mut rays, film_mm);
+    let arrived = in_flight(&rays);
+    note(&mut lines, &rays, &arrived);
+    for (line, arrived) in lines.iter_mut().zip(arrived) {
+        line.reaches_film = arrived;
+    }
+    lines
+}
+
+/// The drawing's scale and bounds.
+struct Frame {
+    z_min_mm: f64,
+    y_min_mm: f64,
+    y_max_mm: f64,
+    px_per_mm: f64,
+    width_px: f64,
+    height_px: f64,
+}
+
+impl Frame {
+    fn around(lens: &Lens, layout: &Layout, fans: &[Fan]) -> Self {
+        let points = || fans.iter().flat_map(|fan| &fan.lines).flat_map(|line| &line.points);
+        let z_film_mm = lens.last_vertex_z_mm() + layout.film_mm;
+        let z_min_mm = points().map(|p| p.x).fold(0.0, f64::min);
+        let z_max_mm = points().map(|p| p.x).fold(z_film_mm, f64::max);
+        let rims = lens.interfaces().iter().map(|interface| interface.surface.semi_aperture_mm);
+        let rim_mm = 1.15 * rims.fold(0.0, f64::max);
+        let y_min_mm = points().map(|p| p.y).fold(-rim_mm, f64::min);
+        let y_max_mm = points().map(|p| p.y).fold(rim_mm, f64::max);
+        let px_per_mm = (layout.width_px - 2.0 * MARGIN_PX) / (z_max_mm - z_min_mm).max(1e-9);
+        let height_px = 2.0 * MARGIN_PX + (y_max_mm - y_min_mm) * px_per_mm + FOOT_PX;
+        Self { z_min_mm, y_min_mm, y_max_mm, px_per_mm, width_px: layout.width_px, height_px }
+    }
+
+    fn x(&self, z_mm: f64) -> f64 {
+        MARGIN_PX + (z_mm - self.z_min_mm) * self.px_per_mm
+    }
+
+    fn y(&self, y_mm: f64) -> f64 {
+        MARGIN_PX + (self.y_max_mm - y_mm) * self.px_per_mm
+    }
+
+    fn open(&self, name: &str) -> String {
+        let (w, h) = (self.width_px, self.height_px);
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w:.0}\" height=\"{h:.0}\" viewBox=\"0 0 {w:.0} {h:.0}\" \
+             font-family=\"Helvetica, Arial, sans-serif\" font-size=\"13\">\n<title>{}</title>\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
+            escaped(name)
+        )
+    }
+
+    fn axis(&self, svg: &mut String) {
+        let y = self.y(0.0);
+        let _ = writeln!(
+            svg,
+            "<line x1=\"{:.2}\" y1=\"{y:.2}\" x2=\"{:.2}\" y2=\"{y:.2}\" stroke=\"#888\" stroke-width=\"0.7\" \
+             stroke-dasharray=\"12 3 2 3\"/>",
+            0.3 * MARGIN_PX,
+            self.width_px - 0.3 * MARGIN_PX
+        );
+    }
+
+    fn path(&self, points: impl IntoIterator<Item = DVec2>) -> String {
+        let mut path = String::new();
+        for (i, p) in points.into_iter().enumerate() {
+            let _ = write!(path, "{}{:.2} {:.2}", if i == 0 { "M" } else { " L" }, self.x(p.x), self.y(p.y));
+        }
+        path
+    }
+
+    fn rays(&self, fan: &Fan, svg: &mut String) {
+        for (reaches_film, opacity) in [(true, 0.85), (false, 0.3)] {
+            let lines = fan.lines.iter().filter(|line| line.reaches_film == reaches_film);
+            let path: Vec<String> = lines.map(|line| self.path(line.points.iter().copied())).collect();
+            if !path.is_empty() {
+                let _ = writeln!(
+                    svg,
+                    "<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"0.9\" stroke-opacity=\"{opacity}\"/>",
+                    path.join(" "),
+                    fan.color
+                );
+            }
+        }
+    }
+
+    /// Writes the words below the drawing, and the scale bar.
+    fn foot(&self, words: &str, layout: &Layout, svg: &mut String) {
+        let y = self.height_px - 0.6 * FOOT_PX;
+        let _ =
+            writeln!(svg, "<text x=\"{MARGIN_PX:.1}\" y=\"{:.1}\" fill=\"#222\">{}</text>", y + 5.0, escaped(words));
+        let length_mm = round_length_mm(0.16 * self.width_px / self.px_per_mm);
+        let (x1, length_px) = (self.width_px - MARGIN_PX, length_mm * self.px_per_mm);
+        let _ = writeln!(
+            svg,
+            "<path d=\"M{:.2} {:.1} v6 h{length_px:.2} v-6\" fill=\"none\" stroke=\"#222\"/>\n\
+             <text x=\"{:.2}\" y=\"{:.1}\" fill=\"#222\" text-anchor=\"middle\">{length_mm} mm</text>",
+            x1 - length_px,
+            y - 8.0,
+            x1 - 0.5 * length_px,
+            y + 13.0
+        );
+        let mut x = 0.5 * self.width_px - 30.0 * layout.field_tans.len() as f64;
+        if layout.field_tans.len() > 1 {
+            for (i, tan) in layout.field_tans.iter().enumerate() {
+                let color = FIELD_COLORS[i % FIELD_COLORS.len()];
+                let angle = tan.atan().to_degrees();
+                let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{:.1}\" fill=\"{color}\">{angle:.1}°</text>", y + 5.0);
+                x += 60.0;
+            }
+        }
+    }
+}
+
+/// Draws what lies between two surfaces and is not air.
+fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
+    let (interfaces, vertices) = (lens.interfaces(), lens.vertices_z_mm());
+    let mut i = 0;
+    while i < interfaces.len() {
+        let medium = &interfaces[i].medium_after;
+        if *medium == Glass::Air {
+            i += 1;
+            continue;
+        }
+        // A stop inside the glass does not end the element.
+        let is_within = |j: usize| {
+            let surface = &interfaces[j].surface;
+            surface.curvature_per_mm == 0.0 && interfaces[j].medium_after == *medium
+        };
+        let last = (i + 1..interfaces.len()).find(|&j| !is_within(j));
+        let front = outline(&interfaces[i].surface, vertices[i]);
+        let back = match last {
+            Some(j) => outline(&interfaces[j].surface, vertices[j]),
+            None => {
+                let film_z_mm = lens.last_vertex_z_mm() + layout.film_mm;
+                outline(&Surface::plane(interfaces[i].surface.semi_aperture_mm), film_z_mm)
+            }
+        };
+        let rim_mm = front[0].y.abs().max(back[0].y.abs());
+        let (fill, stroke) = glass_colors(medium);
+        let at_rim = |p: DVec2, sign: f64| DVec2::new(p.x, sign * rim_mm);
+        let (f, b) = (front[0].x, back[0].x);
+        let mut points = vec![at_rim(DVec2::new(f, 0.0), -1.0)];
+        points.extend(&front);
+        points.extend([at_rim(DVec2::new(f, 0.0), 1.0), at_rim(DVec2::new(b, 0.0), 1.0)]);
+        points.extend(back.iter().rev());
+        points.push(at_rim(DVec2::new(b, 0.0), -1.0));
+        let _ = writeln!(
+            svg,
+            "<path d=\"{} Z\" fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"1.1\" stroke-linejoin=\"round\"/>",
+            frame.path(points)
+        );
+        i = last.unwrap_or(interfaces.len());
+    }
+}
+
+/// Returns the points of a surface from its lower rim to its upper one.
+fn outline(surface: &Surface, vertex_z_mm: f64) -> Vec<DVec2> {
+    const N: i32 = 32;
+    let at = |i: i32| {
+        // Denser towards the rim, which may lie on the equator to rounding.
+        let y = surface.semi_aperture_mm * (std::f64::consts::FRAC_PI_2 * f64::from(i) / f64::from(N)).sin();
+        let sag_mm = surface.sag_mm(y.abs() * (1.0 - 1e-12));
+        DVec2::new(vertex_z_mm + if sag_mm.is_finite() { sag_mm } else { 0.0 }, y)
+    };
+    if surface.curvature_per_mm == 0.0 && surface.sag_mm(surface.semi_aperture_mm) == 0.0 {
+        return vec![at(-N), at(N)];
+    }
+    (-N..=N).map(at).collect()
+}
+
+/// Tints a glass by its dispersion, crown blue and flint violet, and by its index.
+fn glass_colors(glass: &Glass) -> (String, String) {
+    let (nd, vd) = glass.nd_vd().unwrap_or((1.5, 60.0));
+    let hue = 205.0 + 55.0 * ((60.0 - vd.clamp(25.0, 60.0)) / 35.0);
+    let lightness = 93.0 - 22.0 * (nd - 1.45).clamp(0.0, 0.5);
+    (format!("hsl({hue:.0}, 60%, {lightness:.0}%)"), format!("hsl({hue:.0}, 35%, 38%)"))
+}
+
+fn stop(lens: &Lens, frame: &Frame, svg: &mut String) {
+    let surface = &lens.interfaces()[lens.stop()].surface;
+    let sag_mm = surface.sag_mm(surface.semi_aperture_mm * (1.0 - 1e-12));
+    let z_mm = lens.vertices_z_mm()[lens.stop()] + if sag_mm.is_finite() { sag_mm } else { 0.0 };
+    let length_mm = (0.22 * lens.stop_semi_aperture_mm()).max(10.0 / frame.px_per_mm);
+    for sign in [-1.0, 1.0] {
+        let inner = sign * surface.semi_aperture_mm;
+        let line = frame.path([DVec2::new(z_mm, inner), DVec2::new(z_mm, inner + sign * length_mm)]);
+        let _ = writeln!(svg, "<path d=\"{line}\" stroke=\"#111\" stroke-width=\"3\"/>");
+    }
+}
+
+fn film(lens: &Lens, layout: &Layout, fans: &[Fan], frame: &Frame, svg: &mut String) {
+    let z_mm = lens.last_vertex_z_mm() + layout.film_mm;
+    let arrived = fans.iter().flat_map(|fan| &fan.lines).filter(|line| line.reaches_film);
+    let height = arrived.filter_map(|line| line.points.last()).map(|p| p.y.abs()).fold(0.0, f64::max);
+    let half_mm = (1.06 * height).max(8.0 / frame.px_per_mm).min(frame.y_max_mm.max(-frame.y_min_mm));
+    let line = frame.path([DVec2::new(z_mm, -half_mm), DVec2::new(z_mm, half_mm)]);
+    let _ = writeln!(svg, "<path d=\"{line}\" stroke=\"#111\" stroke-width=\"2\"/>");
+}
+
+/// Returns the longest of 1, 2 or 5 times a power of ten that is at most this long.
+fn round_length_mm(longest_mm: f64) -> f64 {
+    let power = 10_f64.powf(longest_mm.log10().floor());
+    [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|&length| length <= longest_mm).unwrap_or(power)
+}
+
+/// Returns a colour that stands for a wavelength.
+fn wavelength_color(wavelength_nm: f64) -> String {
+    const HUES: [(f64, f64); 7] =
+        [(400.0, 270.0), (450.0, 235.0), (490.0, 185.0), (530.0, 130.0), (580.0, 48.0), (620.0, 15.0), (700.0, 0.0)];
+    let above = HUES.partition_point(|(nm, _)| *nm < wavelength_nm).clamp(1, HUES.len() - 1);
+    let ((w0, h0), (w1, h1)) = (HUES[above - 1], HUES[above]);
+    let fraction = ((wavelength_nm - w0) / (w1 - w0)).clamp(0.0, 1.0);
+    format!("hsl({:.0}, 85%, 42%)", h0 + (h1 - h0) * fraction)
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn draw(lens: &Lens, degrees: &[f64]) -> String {
+        let mono = lens.at(550.0).unwrap();
+        let layout = Layout {
+            film_mm: mono.film_mm_for(f64::INFINITY).unwrap_or(20.0),
+            object_distance_mm: f64::INFINITY,
+            field_tans: degrees.iter().map(|deg| deg.to_radians().tan()).collect(),
+            wavelengths_nm: vec![550.0],
+            n_rays: 5,
+            width_px: 900.0,
+        };
+        lens.draw(&layout).unwrap()
+    }
+
+    #[test]
+    fn every_built_in_lens_draws_with_its_elements_stop_and_film() {
+        for name in Lens::built_in_names() {
+            let lens = Lens::built_in(name).unwrap();
+            let svg = draw(&lens, &[0.0, 1.0]);
+            assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"), "{name}");
+            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
+            assert!(svg.contains(name) && svg.contains(" mm</text>"));
+            assert_eq!(svg.matches("stroke-width=\"3\"").count(), 2, "{name}: the stop's two blades");
+        }
+    }
+
+    #[test]
+    fn stop_inside_the_glass_leaves_one_element() {
+        let svg = draw(&Lens::built_in("paper-2el").unwrap(), &[0.0]);
+        assert_eq!(svg.matches(" Z\"").count(), 1);
+        let svg = draw(&Lens::built_in("dgauss-50mm").unwrap(), &[0.0]);
+        assert_eq!(svg.matches(" Z\"").count(), 6);
+    }
+
+    #[test]
+    fn pinholes_and_thin_lenses_draw_too() {
+        for lens in [Lens::pinhole(0.5).unwrap(), Lens::thin(50.0, 20.0).unwrap()] {
+            let svg = draw(&lens, &[0.0, 20.0]);
+            assert!(!svg.contains("NaN"), "{svg}");
+        }
+    }
+
+    #[test]
+    fn scale_bar_has_a_round_length() {
+        assert_eq!([0.7, 2.0, 19.0, 51.0].map(round_length_mm), [0.5, 2.0, 10.0, 50.0]);
+    }
+}
