@@ -82,7 +82,9 @@ impl Lens {
         library::names()
     }
 
-    /// Reads a lens file, by its extension: `.ron` (our own) or `.dat`.
+    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx` or `.seq`.
+    ///
+    /// [`LensFile::read`](crate::LensFile::read) tells what else the file says, as where the film lies.
     ///
     /// # Errors
     /// When the file cannot be read or is not what it should be; the message names the file and, where it can, the

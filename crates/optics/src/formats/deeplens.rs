@@ -1,0 +1,171 @@
+//! The JSON lens files of `DeepLens`: `surfaces` with type, r, c (or roc), d, k, ai and the media on both sides.
+
+use serde_json::Value;
+
+use crate::{Glass, Interface, Lens, OpticsError, Shape, Surface, prescription::TextError};
+
+use super::{
+    glasses::{Glasses, constant, model},
+    json::{Object, number, numbers},
+    lens_file::LensFile,
+    shapes::even_asphere,
+};
+
+/// Whether a JSON value has the looks of a `DeepLens` file: its surfaces have the media on both sides.
+pub(super) fn is_deeplens(value: &Value) -> bool {
+    let surfaces = value.get("surfaces").and_then(Value::as_array);
+    surfaces.is_some_and(|list| list.iter().any(|row| row.get("mat1").or(row.get("mat2")).is_some()))
+}
+
+/// Reads a lens from the JSON value of a `DeepLens` file, which has no name of its own.
+pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -> Result<LensFile, TextError> {
+    let file = Object::new(value, "")?;
+    let mut interfaces: Vec<Interface> = Vec::new();
+    let mut stops = Vec::new();
+    let rows = file.objects("surfaces")?;
+    for (i, row) in rows.iter().enumerate() {
+        let wrong =
+            |key: &str, reason: String| TextError { line: None, reason: format!("{}: {reason}", row.place(key)) };
+        let kind = row.text("type").unwrap_or_default();
+        if matches!(kind, "Stop" | "Aperture" | "Diaphragm") {
+            stops.push(i);
+        }
+        if row.get("is_square") == Some(&Value::Bool(true)) {
+            return Err(wrong("is_square", "a square rim is not supported".to_owned()));
+        }
+        let shape = shape(kind, row)?;
+        let curvature_per_mm = if matches!(kind, "Plane" | "ThinLens") { 0.0 } else { curvature_per_mm(row)? };
+        let before = interfaces.last().map_or(&Glass::Air, |interface| &interface.medium_after);
+        if let Some(name) = row.text("mat1")
+            && medium(name, glasses).map_err(|reason| wrong("mat1", reason))? != *before
+        {
+            let reason = format!("is '{name}', but the medium behind the surface before is {}", before.describe());
+            return Err(wrong("mat1", reason));
+        }
+        let medium_after = match row.text("mat2") {
+            Some(name) => medium(name, glasses).map_err(|reason| wrong("mat2", reason))?,
+            None if stops.last() == Some(&i) => before.clone(),
+            None => return Err(wrong("mat2", "is missing, expected the medium behind the surface".to_owned())),
+        };
+        let surface = Surface { curvature_per_mm, shape, semi_aperture_mm: row.number("r")? };
+        let thickness_after_mm = match rows.get(i + 1) {
+            Some(next) if row.has("d") && next.has("d") => next.number("d")? - row.number("d")?,
+            Some(_) => row.number("d_next")?,
+            None => 0.0,
+        };
+        interfaces.push(Interface { surface, medium_after, thickness_after_mm });
+    }
+    let &[stop] = stops.as_slice() else { return Err(OpticsError::Stops { n_stops: stops.len() }.into()) };
+    let source = file.text("info").unwrap_or("a DeepLens file");
+    let mut read = LensFile::of_lens(Lens::new(name, source, interfaces, stop)?);
+    if let (Some(sensor), Some(last)) = (file.get("d_sensor"), rows.last()) {
+        read.film_mm = Some(number(sensor, "d_sensor")? - last.number_or("d", 0.0)?);
+    }
+    Ok(read)
+}
+
+/// Returns the shape beyond the curvature at the vertex.
+fn shape(kind: &str, row: &Object) -> Result<Shape, TextError> {
+    match kind {
+        "Stop" | "Aperture" | "Diaphragm" | "Plane" | "Spheric" => Ok(Shape::Sphere),
+        "Aspheric" => {
+            let coefficients = coefficients_from_r2(row)?;
+            even_asphere(row.number_or("k", 0.0)?, &coefficients)
+                .map_err(|reason| TextError { line: None, reason: format!("{}: {reason}", row.place("ai")) })
+        }
+        "ThinLens" => {
+            let key = if row.has("f") { "f" } else { "foclen" };
+            Ok(Shape::ThinLens { power_per_mm: 1.0 / row.number(key)? })
+        }
+        other => {
+            let known = "expected Stop, Aperture, Plane, Spheric, Aspheric or ThinLens";
+            let reason = format!("{}: surfaces of type '{other}' are not supported; {known}", row.place("type"));
+            Err(TextError { line: None, reason })
+        }
+    }
+}
+
+/// Returns the aspheric coefficients from r² on: of the keys ai2, ai4, … where there are any, else of the list ai.
+fn coefficients_from_r2(row: &Object) -> Result<Vec<f64>, TextError> {
+    let keys: Vec<String> = (1..=15).map(|half| format!("ai{}", 2 * half)).collect();
+    let Some(n_keys) = keys.iter().rposition(|key| row.get(key).is_some()) else {
+        return row.get("ai").map_or(Ok(Vec::new()), |list| numbers(list, &row.place("ai")));
+    };
+    keys[..=n_keys].iter().map(|key| row.number_or(key, 0.0)).collect()
+}
+
+/// Returns the curvature: of `c`, or of the radius `roc`, of which 0 or infinity means a plane.
+fn curvature_per_mm(row: &Object) -> Result<f64, TextError> {
+    if row.get("c").is_some() {
+        return row.number("c");
+    }
+    let radius_mm = row.number_or("roc", 0.0)?;
+    Ok(if radius_mm == 0.0 { 0.0 } else { 1.0 / radius_mm })
+}
+
+/// Returns the medium of a name, as `air`, `pmma`, `n-bk7`, `1.6280/57.0` or `1.5`.
+fn medium(name: &str, glasses: &Glasses) -> Result<Glass, String> {
+    if matches!(name.to_lowercase().as_str(), "air" | "vacuum" | "occluder") {
+        return Ok(Glass::Air);
+    }
+    let glass = match name.split_once('/').map(|(nd, vd)| (nd.trim().parse(), vd.trim().parse())) {
+        Some((Ok(nd), Ok(vd))) => model(nd, vd),
+        _ => match name.parse() {
+            Ok(index) => constant(index),
+            Err(_) => glasses.find(name, None)?.glass,
+        },
+    };
+    glass.check().map_err(|error| error.to_string())?;
+    Ok(glass)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::lens_file::ReadOptions;
+
+    const SINGLET: &str = r#"{"info": "a test", "d_sensor": 52.5, "surfaces": [
+        {"type": "Stop", "r": 1.0, "c": 0.0, "d": 0.0, "mat1": "air", "mat2": "air"},
+        {"type": "Aspheric", "r": 2.0, "c": 0.02, "d": 0.5, "k": -1.0, "ai": [0.0, 1e-5], "mat1": "air", "mat2": "1.5/60"},
+        {"type": "Spheric", "r": 2.0, "roc": -50, "d": 2.5, "mat1": "1.5/60", "mat2": "air"}]}"#;
+
+    fn read(text: &str) -> Result<LensFile, TextError> {
+        lens_from_deeplens(&serde_json::from_str(text).unwrap(), "file", &Glasses::new(&ReadOptions::default()))
+    }
+
+    #[track_caller]
+    fn message(text: &str) -> String {
+        read(text).expect_err("should be refused").reason
+    }
+
+    #[test]
+    fn surfaces_film_and_media_are_read() {
+        let file = read(SINGLET).ok().unwrap();
+        assert_eq!((file.lens.stop(), file.lens.last_vertex_z_mm(), file.film_mm), (0, 2.5, Some(50.0)));
+        let asphere = &file.lens.interfaces()[1];
+        assert_eq!(asphere.medium_after, Glass::NdVd { nd: 1.5, vd: 60.0 });
+        assert_eq!(asphere.surface.shape, Shape::EvenAsphere { conic: -1.0, coefficients: vec![1e-5] });
+        assert_eq!(file.lens.interfaces()[2].surface.curvature_per_mm, -0.02);
+    }
+
+    #[test]
+    fn what_is_wrong_or_not_supported_is_told_by_its_key() {
+        assert!(
+            message(&SINGLET.replace("Spheric", "Cubic")).starts_with("surfaces[2].type: surfaces of type 'Cubic'")
+        );
+        assert!(message(&SINGLET.replace("\"Stop\"", "\"Plane\"")).contains("but 0 surfaces"));
+        assert!(
+            message(&SINGLET.replace("1.5/60\"}", "unobtainium\"}")).contains("surfaces[1].mat2: no glass is named")
+        );
+        assert!(
+            message(&SINGLET.replace("\"mat1\": \"1.5/60\"", "\"mat1\": \"pmma\""))
+                .starts_with("surfaces[2].mat1: is 'pmma'")
+        );
+        assert!(
+            message(&SINGLET.replace("[0.0, 1e-5]", "[0.1, 1e-5]")).contains("surfaces[1].ai: an aspheric r² term")
+        );
+        assert!(
+            message(&SINGLET.replace("\"r\": 1.0", "\"r\": [1]")).contains("surfaces[0].r is [1], expected a number")
+        );
+    }
+}

@@ -1,0 +1,82 @@
+//! Glasses by the names that lens files use.
+
+use crate::{CatalogueGlass, Glass, GlassCatalogue, OpticsError};
+
+use super::lens_file::{MissingGlass, ReadOptions};
+
+/// Where a lens file's glasses are looked up.
+pub(super) struct Glasses<'a> {
+    options: &'a ReadOptions,
+    /// The catalogues that the file itself names, in order.
+    pub(super) makers: Vec<String>,
+    /// Glasses that the file itself defines.
+    pub(super) private: Vec<CatalogueGlass>,
+}
+
+/// A glass that was found, and what the reader of the file should know about it.
+pub(super) struct Found {
+    pub(super) glass: Glass,
+    pub(super) note: Option<String>,
+}
+
+impl<'a> Glasses<'a> {
+    pub(super) fn new(options: &'a ReadOptions) -> Self {
+        Self { options, makers: Vec::new(), private: Vec::new() }
+    }
+
+    /// Returns the glass of this name; `nd_vd` is what the file states of it besides.
+    pub(super) fn find(&self, name: &str, nd_vd: Option<(f64, f64)>) -> Result<Found, String> {
+        let found = |glass| Ok(Found { glass, note: None });
+        if let Some(private) = self.private.iter().find(|glass| glass.name.eq_ignore_ascii_case(name)) {
+            return found(private.glass.clone());
+        }
+        for catalogue in &self.options.catalogues {
+            match catalogue.find_among(name, &self.makers) {
+                Ok(entry) => return found(entry.glass.clone()),
+                Err(OpticsError::Unknown { .. }) => {}
+                Err(error) => return Err(error.to_string()),
+            }
+        }
+        let error = match GlassCatalogue::built_in().find_among(name, &self.makers) {
+            Ok(entry) => return found(Glass::Named(entry.full_name())),
+            Err(error) => error,
+        };
+        self.instead(name, nd_vd).ok_or_else(|| {
+            let stated = match nd_vd {
+                Some((nd, vd)) => format!("; the file states n_d {nd} and V_d {vd} for it"),
+                None => String::new(),
+            };
+            format!("{error}{stated}")
+        })
+    }
+
+    /// Returns what stands for a glass that no catalogue has, where that was asked for.
+    fn instead(&self, name: &str, nd_vd: Option<(f64, f64)>) -> Option<Found> {
+        let (nd, vd) = nd_vd?;
+        match self.options.missing_glass {
+            MissingGlass::Refuse => None,
+            MissingGlass::FromNdVd => {
+                let note = format!("glass '{name}' is in no catalogue: its n_d {nd} and V_d {vd} stand for it");
+                Some(Found { glass: model(nd, vd), note: Some(note) })
+            }
+            MissingGlass::Nearest => {
+                let (nearest, distance) = GlassCatalogue::built_in().nearest(nd, vd, 1).into_iter().next()?;
+                let full_name = nearest.full_name();
+                let note = format!(
+                    "glass '{name}' is in no catalogue: {full_name} stands for it, {distance:.1} melt tolerances away"
+                );
+                Some(Found { glass: Glass::Named(full_name), note: Some(note) })
+            }
+        }
+    }
+}
+
+/// Returns the glass of an index and an Abbe number as files state them: an Abbe number of 0 means no dispersion.
+pub(super) fn model(nd: f64, vd: f64) -> Glass {
+    if vd == 0.0 { constant(nd) } else { Glass::NdVd { nd, vd } }
+}
+
+/// Returns the medium of an index that does not depend on the wavelength.
+pub(super) fn constant(index: f64) -> Glass {
+    if index == 1.0 { Glass::Air } else { Glass::Constant { index } }
+}

@@ -1,0 +1,462 @@
+//! CODE V sequence files (`.seq`): commands, of which `S` adds a surface and `;` or a line's end ends each.
+//!
+//! Read are rotationally symmetric systems: radii or curvatures, thicknesses, glasses of the catalogue or of a private
+//! one (`PRV` … `END`), conics and even aspheres, circular apertures, the pupil, fields and wavelengths. Commands that
+//! change no ray (solves, variables, labels) are passed over; what changes rays and cannot be traced is refused.
+
+use crate::{CatalogueGlass, Glass, prescription::TextError};
+
+use super::{
+    glasses::{Glasses, constant, model},
+    lens_file::{Field, LensFile},
+    shapes::even_asphere,
+    system::{Beam, System, SystemSurface, Vignetting},
+};
+
+/// Reads a CODE V file; `name` serves where the file states none.
+pub(super) fn lens_from_seq(text: &str, name: &str, glasses: Glasses) -> Result<LensFile, TextError> {
+    let mut file = Seq::new(name, glasses);
+    for command in commands_of(text) {
+        file.take(&command)?;
+    }
+    file.into_system()?.build()
+}
+
+/// A command and what follows it.
+struct Command {
+    line: usize,
+    words: Vec<String>,
+}
+
+/// Returns the commands of a file: comments gone, continued lines joined, quoted words whole.
+fn commands_of(text: &str) -> Vec<Command> {
+    let mut commands = Vec::new();
+    let mut command = Command { line: 1, words: Vec::new() };
+    for (number, line) in text.lines().enumerate() {
+        let mut word = String::new();
+        let (mut quote, mut is_continued) = (None, false);
+        for sign in line.chars().chain(['\n']) {
+            match (quote, sign) {
+                (Some(mark), sign) if sign == mark || sign == '\n' => {
+                    command.words.push(std::mem::take(&mut word));
+                    quote = None;
+                }
+                (Some(_), sign) => word.push(sign),
+                (None, '\'' | '"') if word.is_empty() => quote = Some(sign),
+                (None, '!') => {
+                    push_word(&mut command, &mut word);
+                    break;
+                }
+                (None, '&') => is_continued = true,
+                (None, ';') => {
+                    push_word(&mut command, &mut word);
+                    finish(&mut commands, &mut command, number + 1);
+                }
+                (None, sign) if sign.is_whitespace() => push_word(&mut command, &mut word),
+                (None, sign) => word.push(sign),
+            }
+        }
+        push_word(&mut command, &mut word);
+        if !is_continued {
+            finish(&mut commands, &mut command, number + 2);
+        }
+    }
+    finish(&mut commands, &mut command, 0);
+    commands
+}
+
+fn push_word(command: &mut Command, word: &mut String) {
+    if !word.is_empty() {
+        command.words.push(std::mem::take(word));
+    }
+}
+
+fn finish(commands: &mut Vec<Command>, command: &mut Command, next_line: usize) {
+    let done = std::mem::replace(command, Command { line: next_line, words: Vec::new() });
+    if !done.words.is_empty() {
+        commands.push(done);
+    }
+}
+
+impl Command {
+    fn wrong(&self, reason: impl std::fmt::Display) -> TextError {
+        TextError { line: Some(self.line), reason: format!("{}: {reason}", self.words[0]) }
+    }
+
+    fn number(&self, place: usize) -> Result<f64, TextError> {
+        let Some(word) = self.words.get(place) else {
+            return Err(self.wrong(format!("expected {place} numbers, found {}", self.words.len() - 1)));
+        };
+        match word.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            _ => Err(self.wrong(format!("'{word}' is not a number"))),
+        }
+    }
+
+    fn numbers(&self) -> Result<Vec<f64>, TextError> {
+        (1..self.words.len()).map(|place| self.number(place)).collect()
+    }
+}
+
+/// What a file says, in its own units.
+struct Seq<'a> {
+    glasses: Glasses<'a>,
+    name: String,
+    mm_per_unit: f64,
+    is_radius_mode: bool,
+    beam: Option<Beam>,
+    wavelengths_nm: Vec<f64>,
+    /// Counted from 1.
+    reference: usize,
+    field_kind: Option<FieldKind>,
+    fields: [Vec<f64>; 2],
+    /// Upper and lower vignetting along x, then along y.
+    vignetting: [Vec<f64>; 4],
+    /// Wavelengths of a private catalogue that is being read.
+    private_wavelengths_nm: Option<Vec<f64>>,
+    surfaces: Vec<SeqSurface>,
+    has_image: bool,
+    notes: Vec<String>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum FieldKind {
+    Angle,
+    ObjectHeight,
+    ImageHeight,
+}
+
+/// A surface as the file states it, in the file's units; the first is the object, the last the image.
+#[derive(Default)]
+struct SeqSurface {
+    line: usize,
+    is_stop: bool,
+    curvature: f64,
+    thickness: f64,
+    medium: Option<Glass>,
+    conic: f64,
+    /// From r⁴ on.
+    coefficients: [f64; 9],
+    clear_radius: Option<f64>,
+}
+
+impl<'a> Seq<'a> {
+    fn new(name: &str, glasses: Glasses<'a>) -> Self {
+        Self {
+            glasses,
+            name: name.to_owned(),
+            mm_per_unit: 1.0,
+            is_radius_mode: true,
+            beam: None,
+            wavelengths_nm: Vec::new(),
+            reference: 1,
+            field_kind: None,
+            fields: Default::default(),
+            vignetting: Default::default(),
+            private_wavelengths_nm: None,
+            surfaces: Vec::new(),
+            has_image: false,
+            notes: Vec::new(),
+        }
+    }
+
+    fn take(&mut self, command: &Command) -> Result<(), TextError> {
+        let keyword = command.words[0].to_uppercase();
+        if self.private_wavelengths_nm.is_some() {
+            return self.take_private(&keyword, command);
+        }
+        match keyword.as_str() {
+            "TIT" | "TITLE" => {
+                if let Some(title) = command.words.get(1).filter(|title| !title.trim().is_empty()) {
+                    self.name = title.trim().to_owned();
+                }
+            }
+            "RDM" => self.is_radius_mode = !is_no(command),
+            "CUM" => self.is_radius_mode = is_no(command),
+            "DIM" => self.mm_per_unit = mm_per_unit(command)?,
+            "EPD" => self.beam = Some(Beam::EntrancePupil(command.number(1)?)),
+            "FNO" => self.beam = Some(Beam::FNumber(command.number(1)?)),
+            "NAO" => self.beam = Some(Beam::ObjectAperture(command.number(1)?)),
+            "NA" => return Err(command.wrong("the image-side aperture is not supported; state EPD, FNO or NAO")),
+            "WL" => self.wavelengths_nm = command.numbers()?,
+            "REF" => self.reference = command.number(1)? as usize,
+            "XAN" | "YAN" => self.take_fields(FieldKind::Angle, command)?,
+            "XOB" | "YOB" => self.take_fields(FieldKind::ObjectHeight, command)?,
+            "XIM" | "YIM" | "XRI" | "YRI" => self.take_fields(FieldKind::ImageHeight, command)?,
+            "VUX" => self.vignetting[0] = command.numbers()?,
+            "VLX" => self.vignetting[1] = command.numbers()?,
+            "VUY" => self.vignetting[2] = command.numbers()?,
+            "VLY" => self.vignetting[3] = command.numbers()?,
+            "PRV" => self.private_wavelengths_nm = Some(Vec::new()),
+            "SO" | "S" | "SI" => self.add_surface(&keyword, command)?,
+            "S0" => self.add_surface("SO", command)?,
+            _ => self.take_of_surface(&keyword, command)?,
+        }
+        Ok(())
+    }
+
+    fn take_fields(&mut self, kind: FieldKind, command: &Command) -> Result<(), TextError> {
+        if self.field_kind.is_some_and(|before| before != kind) {
+            return Err(command.wrong("fields of two kinds; expected angles, object heights or image heights alone"));
+        }
+        self.field_kind = Some(kind);
+        let axis = usize::from(command.words[0].to_uppercase().starts_with('Y'));
+        self.fields[axis] = command.numbers()?;
+        Ok(())
+    }
+
+    /// Takes a line of a private catalogue: `PWL` and the wavelengths, or a glass and its indices there.
+    fn take_private(&mut self, keyword: &str, command: &Command) -> Result<(), TextError> {
+        let Some(wavelengths_nm) = &mut self.private_wavelengths_nm else { return Ok(()) };
+        match keyword {
+            "END" => self.private_wavelengths_nm = None,
+            "PWL" => *wavelengths_nm = command.numbers()?,
+            _ => {
+                let indices = command.numbers()?;
+                if indices.len() != wavelengths_nm.len() || indices.is_empty() {
+                    let (found, wanted) = (indices.len(), wavelengths_nm.len());
+                    return Err(command.wrong(format!("{found} indices for {wanted} wavelengths (PWL)")));
+                }
+                let mut rows: Vec<(f64, f64)> = wavelengths_nm.iter().copied().zip(indices).collect();
+                rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+                let glass = match rows.as_slice() {
+                    [(_, index)] => constant(*index),
+                    _ => {
+                        let (wavelengths_nm, indices) = rows.into_iter().unzip();
+                        Glass::Tabulated { wavelengths_nm, indices }
+                    }
+                };
+                glass.check().map_err(|error| command.wrong(error))?;
+                let (maker, name) = (String::new(), command.words[0].clone());
+                self.glasses.private.push(CatalogueGlass { maker, name, glass });
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the surface of `S radius thickness glass`.
+    fn add_surface(&mut self, keyword: &str, command: &Command) -> Result<(), TextError> {
+        if (keyword == "SO") != self.surfaces.is_empty() || self.has_image {
+            let expected =
+                if self.surfaces.is_empty() { "SO, the object, first" } else { "S … and one SI at the end" };
+            return Err(command.wrong(format!("out of order; expected {expected}")));
+        }
+        self.has_image = keyword == "SI";
+        let value = if command.words.len() > 1 { command.number(1)? } else { 0.0 };
+        let curvature = match (self.is_radius_mode, value == 0.0) {
+            (true, false) => 1.0 / value,
+            _ => value,
+        };
+        let thickness = if command.words.len() > 2 { command.number(2)? } else { 0.0 };
+        let medium = match command.words.get(3) {
+            Some(word) => self.medium(word, command)?,
+            None => None,
+        };
+        let line = command.line;
+        self.surfaces.push(SeqSurface { line, curvature, thickness, medium, ..Default::default() });
+        Ok(())
+    }
+
+    /// Takes a command that belongs to a surface: the last, or the one that the first word after it names (`S3`).
+    fn take_of_surface(&mut self, keyword: &str, command: &Command) -> Result<(), TextError> {
+        let named = command.words.get(1).and_then(|word| self.surface_named(word));
+        let place = if named.is_some() { 2 } else { 1 };
+        let Some(surface) = named.or(self.surfaces.len().checked_sub(1)) else { return Ok(()) };
+        let is_asphere = "ABCDEFGHJ".find(keyword).filter(|_| keyword.len() == 1);
+        match keyword {
+            "STO" => {
+                self.surfaces.iter_mut().for_each(|surface| surface.is_stop = false);
+                self.surfaces[surface].is_stop = true;
+            }
+            "K" => self.surfaces[surface].conic = command.number(place)?,
+            "RDY" => {
+                self.surfaces[surface].curvature = match command.number(place)? {
+                    0.0 => 0.0,
+                    radius => 1.0 / radius,
+                }
+            }
+            "CUY" => self.surfaces[surface].curvature = command.number(place)?,
+            "THI" => self.surfaces[surface].thickness = command.number(place)?,
+            "GLA" | "GL1" => {
+                if let Some(word) = command.words.get(place) {
+                    self.surfaces[surface].medium = self.medium(word, command)?;
+                }
+            }
+            "CIR" => match command.words.get(place).map(|word| word.to_uppercase()).as_deref() {
+                Some("EDG") => {}
+                Some("OBS" | "HOL") => return Err(command.wrong("obscurations are not supported")),
+                _ => self.surfaces[surface].clear_radius = Some(command.number(place)?),
+            },
+            "REX" | "REY" | "ELX" | "ELY" => {
+                return Err(command.wrong("apertures other than circles are not supported"));
+            }
+            "XDE" | "YDE" | "ZDE" | "ADE" | "BDE" | "CDE" if command.number(place)? != 0.0 => {
+                return Err(command.wrong("tilted or decentred surfaces are not supported"));
+            }
+            "CYL" | "XTO" | "YTO" | "AAS" | "SPS" | "SPL" | "GRT" | "DIF" | "HOE" => {
+                let what = command.words.join(" ");
+                return Err(command
+                    .wrong(format!("surfaces of the kind '{what}' are not supported; expected spheres, K and ASP")));
+            }
+            "RMD" => return Err(command.wrong("mirrors are not supported")),
+            _ => {
+                if let Some(power) = is_asphere {
+                    self.surfaces[surface].coefficients[power] = command.number(place)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the surface that a word as `S3`, `SO` or `SI` names.
+    fn surface_named(&self, word: &str) -> Option<usize> {
+        let rest = word.strip_prefix(['S', 's'])?;
+        let number = match rest.to_uppercase().as_str() {
+            "O" => 0,
+            "I" => self.surfaces.len().checked_sub(1)?,
+            digits => digits.parse().ok()?,
+        };
+        (number < self.surfaces.len()).then_some(number)
+    }
+
+    /// Returns the medium of a word as `N-SK16_SCHOTT`, `1.5168:64.17`, `517642` or `AIR`; nothing for air.
+    fn medium(&mut self, word: &str, command: &Command) -> Result<Option<Glass>, TextError> {
+        if matches!(word.to_uppercase().as_str(), "AIR" | "VACUUM" | "") {
+            return Ok(None);
+        }
+        if matches!(word.to_uppercase().as_str(), "REFL" | "REFR" | "REFO") {
+            return Err(command.wrong("mirrors are not supported"));
+        }
+        let glass = match code_of(word) {
+            Some(glass) => glass,
+            None => {
+                let name = match word.rsplit_once('_') {
+                    Some((name, maker)) if !maker.is_empty() => format!("{maker}:{name}"),
+                    _ => word.to_owned(),
+                };
+                let is_private = self.glasses.private.iter().any(|glass| glass.name.eq_ignore_ascii_case(word));
+                let found = self.glasses.find(if is_private { word } else { &name }, None);
+                found.map_err(|reason| command.wrong(reason))?.glass
+            }
+        };
+        glass.check().map_err(|error| command.wrong(error))?;
+        Ok(Some(glass))
+    }
+
+    fn into_system(mut self) -> Result<System, TextError> {
+        if !self.has_image {
+            let reason = "the file has no image surface (SI); expected SO, surfaces S and SI".to_owned();
+            return Err(TextError { line: None, reason });
+        }
+        let mm = self.mm_per_unit;
+        let n_surfaces = self.surfaces.len();
+        let stop = self.surfaces.iter().position(|surface| surface.is_stop);
+        let (object, image) = (&self.surfaces[0], &self.surfaces[n_surfaces - 1]);
+        if object.medium.is_some() {
+            let reason = "SO: an object space other than air is not supported".to_owned();
+            return Err(TextError { line: Some(object.line), reason });
+        }
+        if image.curvature != 0.0 {
+            self.notes.push(format!("the image surface of radius {} mm is read as a plane", mm / image.curvature));
+        }
+        // The defocus on the image surface is part of the distance to the film; 1e10 and more is infinitely far.
+        let defocus_mm = image.thickness * mm;
+        let is_far = object.thickness.abs() >= 1e10;
+        let object_distance_mm = if is_far { f64::INFINITY } else { object.thickness * mm };
+        let mut surfaces = Vec::with_capacity(n_surfaces);
+        for surface in &self.surfaces[1..n_surfaces - 1] {
+            surfaces.push(surface.in_mm(mm)?);
+        }
+        if let Some(last) = surfaces.last_mut() {
+            last.thickness_after_mm += defocus_mm;
+        }
+        // Without a stop the first surface is it, as in the program.
+        let stop = match stop {
+            Some(stop) => stop.checked_sub(1),
+            None => {
+                self.notes.push("no surface is marked as the stop (STO): the first is it".to_owned());
+                Some(0)
+            }
+        };
+        Ok(System {
+            name: self.name.clone(),
+            source: "a CODE V file".to_owned(),
+            object_distance_mm,
+            surfaces,
+            stop,
+            beam: self.beam.map(|beam| match beam {
+                Beam::EntrancePupil(diameter) => Beam::EntrancePupil(diameter * mm),
+                other => other,
+            }),
+            fields: self.fields_in_mm(),
+            wavelengths_nm: self.wavelengths_nm,
+            reference: self.reference.saturating_sub(1),
+            notes: self.notes,
+        })
+    }
+
+    fn fields_in_mm(&self) -> Vec<(Field, Vignetting)> {
+        let [x, y] = &self.fields;
+        let at = |list: &[f64], i: usize| list.get(i).copied().unwrap_or(0.0);
+        let mm = self.mm_per_unit;
+        let field = |i: usize| {
+            let (x, y) = (at(x, i), at(y, i));
+            let field = match self.field_kind {
+                Some(FieldKind::ObjectHeight) => Field::ObjectHeight { x_mm: mm * x, y_mm: mm * y },
+                Some(FieldKind::ImageHeight) => Field::ImageHeight { x_mm: mm * x, y_mm: mm * y },
+                _ => Field::Angle { x_deg: x, y_deg: y },
+            };
+            // The program cuts a share of the pupil radius off each side.
+            let [upper_x, lower_x, upper_y, lower_y] = self.vignetting.each_ref().map(|list| at(list, i));
+            let center = (0.5 * (lower_x - upper_x), 0.5 * (lower_y - upper_y)).into();
+            let compression = (0.5 * (upper_x + lower_x), 0.5 * (upper_y + lower_y)).into();
+            (field, Vignetting { center, compression })
+        };
+        (0..x.len().max(y.len())).map(field).collect()
+    }
+}
+
+impl SeqSurface {
+    fn in_mm(&self, mm: f64) -> Result<SystemSurface, TextError> {
+        let mut from_r2 = vec![0.0];
+        from_r2.extend(self.coefficients.iter().zip(1..).map(|(a, i)| a * mm.powi(-1 - 2 * i)));
+        let shape = even_asphere(self.conic, &from_r2)
+            .map_err(|reason| TextError { line: Some(self.line), reason: format!("S: {reason}") })?;
+        Ok(SystemSurface {
+            line: self.line,
+            curvature_per_mm: self.curvature / mm,
+            shape,
+            medium_after: self.medium.clone().unwrap_or_default(),
+            thickness_after_mm: self.thickness * mm,
+            semi_aperture_mm: self.clear_radius.map(|radius| radius * mm),
+            is_rim_fixed: self.clear_radius.is_some(),
+        })
+    }
+}
+
+fn is_no(command: &Command) -> bool {
+    command.words.get(1).is_some_and(|word| word.to_uppercase().starts_with('N'))
+}
+
+fn mm_per_unit(command: &Command) -> Result<f64, TextError> {
+    match command.words.get(1).map(|word| word.to_uppercase()).as_deref() {
+        Some("M" | "MM") => Ok(1.0),
+        Some("C" | "CM") => Ok(10.0),
+        Some("I" | "IN" | "INCH" | "INCHES") => Ok(25.4),
+        other => Err(command.wrong(format!("'{}' is no unit of length; expected M, C or I", other.unwrap_or("")))),
+    }
+}
+
+/// Returns the glass of a fictitious code: `1.5168:64.17`, `1.5168`, `517642` or `517.642`.
+fn code_of(word: &str) -> Option<Glass> {
+    if let Some((nd, vd)) = word.split_once(':') {
+        return Some(model(nd.parse().ok()?, vd.parse().ok()?));
+    }
+    let n_digits = word.bytes().filter(u8::is_ascii_digit).count();
+    if n_digits == 6 && (word.len() == 6 || (word.len() == 7 && word.as_bytes()[3] == b'.')) {
+        let (thousandths, tenths) =
+            (word.get(..3)?.parse::<f64>().ok()?, word.get(word.len() - 3..)?.parse::<f64>().ok()?);
+        return Some(model((1000.0 + thousandths) / 1000.0, tenths / 10.0));
+    }
+    word.parse().ok().map(constant)
+}

@@ -1,0 +1,282 @@
+//! A lens as design programs write it: with an entrance pupil and fields instead of clear diameters.
+//!
+//! Such files often leave the diameters to the program. [`System::build`] makes a lens of them: the stop is as wide as
+//! the stated pupil or f-number makes it (to first order), and every surface without a stated rim is as wide as the
+//! exact rays of the stated fields and wavelengths need.
+
+use glam::{DVec2, DVec3};
+
+use crate::{
+    Glass, Interface, Lens, MonoLens, ObjectPoint, OpticsError, Rims, Shape, Surface, glass::D_LINE_NM,
+    prescription::TextError, rays_towards,
+};
+
+use super::lens_file::{Field, LensFile};
+
+/// A surface of a design program's file, in mm.
+#[derive(Clone, Debug)]
+pub(super) struct SystemSurface {
+    /// Where the file begins to speak of it.
+    pub(super) line: usize,
+    pub(super) curvature_per_mm: f64,
+    pub(super) shape: Shape,
+    pub(super) medium_after: Glass,
+    pub(super) thickness_after_mm: f64,
+    /// The rim, where the file states one.
+    pub(super) semi_aperture_mm: Option<f64>,
+    /// Whether the rim is one that stops light, not merely where the program's rays went.
+    pub(super) is_rim_fixed: bool,
+}
+
+/// How wide the beam is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Beam {
+    /// As wide as the rim of the stop lets it be.
+    Stop,
+    /// Diameter of the entrance pupil, mm.
+    EntrancePupil(f64),
+    /// Focal length over entrance pupil.
+    FNumber(f64),
+    /// Sine of the half angle at the object point, in air.
+    ObjectAperture(f64),
+}
+
+/// The part of the pupil that a field uses: `center + (1 − compression) · pupil`, in pupil radii.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Vignetting {
+    pub(super) center: DVec2,
+    pub(super) compression: DVec2,
+}
+
+/// Everything between the object and the image.
+#[derive(Clone, Debug)]
+pub(super) struct System {
+    pub(super) name: String,
+    pub(super) source: String,
+    /// Distance from the object to the first surface, mm; infinite for a far object.
+    pub(super) object_distance_mm: f64,
+    pub(super) surfaces: Vec<SystemSurface>,
+    pub(super) stop: Option<usize>,
+    pub(super) beam: Option<Beam>,
+    pub(super) wavelengths_nm: Vec<f64>,
+    /// Index into the wavelengths.
+    pub(super) reference: usize,
+    pub(super) fields: Vec<(Field, Vignetting)>,
+    pub(super) notes: Vec<String>,
+}
+
+/// Directions in which rays are sent through the edge of the pupil.
+const N_AZIMUTHS: usize = 32;
+/// A rim that was found by rays is this much wider than they need, so that rounding does not cut them.
+const SLACK: f64 = 1.0 + 1e-9;
+
+impl System {
+    /// Returns the lens and what the file says about its use.
+    pub(super) fn build(mut self) -> Result<LensFile, TextError> {
+        if !(1..=1000).contains(&self.surfaces.len()) {
+            return Err(OpticsError::SurfaceCount { n_surfaces: self.surfaces.len() }.into());
+        }
+        let Some(mut stop) = self.stop.filter(|&stop| stop < self.surfaces.len()) else {
+            return Err(OpticsError::Stops { n_stops: 0 }.into());
+        };
+        self.drop_dummies(&mut stop);
+        let film_mm = self.surfaces.last().map(|last| last.thickness_after_mm);
+        let reference_nm = self.wavelengths_nm.get(self.reference).copied();
+        let lens = self.provisional(stop)?;
+        let mono = lens.at(reference_nm.unwrap_or(D_LINE_NM))?;
+        let stop_semi_aperture_mm = self.stop_semi_aperture_mm(&mono)?;
+        let mut interfaces = lens.interfaces().to_vec();
+        interfaces[stop].surface.semi_aperture_mm = stop_semi_aperture_mm;
+        if self.surfaces.iter().enumerate().any(|(i, surface)| i != stop && surface.semi_aperture_mm.is_none()) {
+            let found = self.clear_semi_apertures_mm(&lens, stop_semi_aperture_mm)?;
+            for (i, (interface, found)) in interfaces.iter_mut().zip(found).enumerate() {
+                if i != stop && self.surfaces[i].semi_aperture_mm.is_none() {
+                    interface.surface.semi_aperture_mm = found;
+                }
+            }
+        }
+        let lens = Lens::new(self.name.clone(), self.source.clone(), interfaces, stop)?;
+        Ok(LensFile {
+            lens,
+            film_mm: film_mm.filter(|film| film.is_finite()),
+            object_distance_mm: Some(self.object_distance_mm).filter(|distance| distance.is_finite()),
+            wavelengths_nm: self.wavelengths_nm,
+            reference_wavelength_nm: reference_nm,
+            fields: self.fields.iter().map(|(field, _)| *field).collect(),
+            notes: self.notes,
+        })
+    }
+
+    /// Drops planes at which nothing happens to any ray.
+    fn drop_dummies(&mut self, stop: &mut usize) {
+        let mut i = 0;
+        while i < self.surfaces.len() && self.surfaces.len() > 1 {
+            let medium_before = match i {
+                0 => &Glass::Air,
+                _ => &self.surfaces[i - 1].medium_after,
+            };
+            let surface = &self.surfaces[i];
+            let is_plane = surface.shape == Shape::Sphere && surface.curvature_per_mm == 0.0;
+            if i == *stop || !is_plane || surface.is_rim_fixed || surface.medium_after != *medium_before {
+                i += 1;
+                continue;
+            }
+            let thickness_mm = surface.thickness_after_mm;
+            match i {
+                0 => self.object_distance_mm += thickness_mm,
+                _ => self.surfaces[i - 1].thickness_after_mm += thickness_mm,
+            }
+            self.surfaces.remove(i);
+            if i < *stop {
+                *stop -= 1;
+            }
+        }
+    }
+
+    /// Returns the lens with rims as wide as its surfaces allow where the file states none.
+    fn provisional(&self, stop: usize) -> Result<Lens, TextError> {
+        let mut interfaces = Vec::with_capacity(self.surfaces.len());
+        for (i, surface) in self.surfaces.iter().enumerate() {
+            let is_last = i + 1 == self.surfaces.len();
+            let at_line = |error: OpticsError| TextError { line: Some(surface.line), reason: error.to_string() };
+            let interface = Interface {
+                surface: Surface {
+                    curvature_per_mm: surface.curvature_per_mm,
+                    shape: surface.shape.clone(),
+                    semi_aperture_mm: surface.semi_aperture_mm.unwrap_or(widest_mm(surface)),
+                },
+                medium_after: surface.medium_after.clone(),
+                thickness_after_mm: if is_last { 0.0 } else { surface.thickness_after_mm },
+            };
+            interface.surface.check(i).and_then(|()| interface.medium_after.check()).map_err(at_line)?;
+            if !interface.thickness_after_mm.is_finite() {
+                let found = interface.thickness_after_mm;
+                let expected = "a finite number: only the object may be infinitely far";
+                return Err(at_line(OpticsError::Surface { surface: i, key: "thickness", found, expected }));
+            }
+            interfaces.push(interface);
+        }
+        Ok(Lens::new(self.name.clone(), self.source.clone(), interfaces, stop)?)
+    }
+
+    /// Returns half the diameter of the stop that lets the stated beam through.
+    fn stop_semi_aperture_mm(&self, mono: &MonoLens) -> Result<f64, TextError> {
+        let first = mono.first_order();
+        let now_mm = mono.stop_semi_aperture_mm();
+        let beam = match self.beam {
+            Some(beam) => beam,
+            None if self.surfaces[mono.stop()].semi_aperture_mm.is_some() => Beam::Stop,
+            None => return Err(plain("neither an entrance pupil, an f-number nor the stop's diameter is stated")),
+        };
+        let pupil_mm = match beam {
+            Beam::Stop if self.surfaces[mono.stop()].semi_aperture_mm.is_some() => return Ok(now_mm),
+            Beam::Stop => return Err(plain("the beam fills the stop, but the stop's diameter is not stated")),
+            Beam::EntrancePupil(diameter_mm) => diameter_mm,
+            Beam::FNumber(f_number) => (first.efl_mm / f_number).abs(),
+            Beam::ObjectAperture(sine) => {
+                let distance_mm = self.object_distance_mm + first.entrance_pupil_z_mm;
+                2.0 * distance_mm * sine / (1.0 - sine * sine).sqrt()
+            }
+        };
+        let semi_aperture_mm = now_mm * pupil_mm / first.entrance_pupil_diameter_mm;
+        if semi_aperture_mm > 0.0 && semi_aperture_mm.is_finite() {
+            return Ok(semi_aperture_mm);
+        }
+        Err(plain(&format!(
+            "the stated beam ({beam:?}) makes an entrance pupil of {pupil_mm} mm; expected a positive one"
+        )))
+    }
+
+    /// Returns how far from the axis the rays of the stated fields and wavelengths meet each surface, mm.
+    fn clear_semi_apertures_mm(&mut self, lens: &Lens, stop_semi_aperture_mm: f64) -> Result<Vec<f64>, TextError> {
+        let mut interfaces = lens.interfaces().to_vec();
+        interfaces[lens.stop()].surface.semi_aperture_mm = stop_semi_aperture_mm;
+        let lens = Lens::new("", "", interfaces, lens.stop())?;
+        let on_axis = [(Field::Angle { x_deg: 0.0, y_deg: 0.0 }, Vignetting::default())];
+        let fields = if self.fields.is_empty() { &on_axis[..] } else { &self.fields[..] };
+        let reference_nm = self.wavelengths_nm.get(self.reference).copied().unwrap_or(D_LINE_NM);
+        let reference_nm = [reference_nm];
+        let wavelengths_nm = if self.wavelengths_nm.is_empty() { &reference_nm[..] } else { &self.wavelengths_nm };
+        let mut widest_mm = vec![0.0_f64; lens.interfaces().len()];
+        for &wavelength_nm in wavelengths_nm {
+            let mono = match lens.at(wavelength_nm) {
+                Ok(mono) => mono,
+                Err(error) if wavelength_nm != reference_nm[0] => {
+                    self.notes.push(format!("the rims are found without {wavelength_nm} nm: {error}"));
+                    continue;
+                }
+                Err(error) => return Err(error.into()),
+            };
+            for (field, vignetting) in fields {
+                let point = self.object_point(&mono, *field)?;
+                widen(&mut widest_mm, &mono, &point, *vignetting);
+            }
+        }
+        let unreached = widest_mm.iter().position(|&semi_aperture_mm| semi_aperture_mm == 0.0);
+        match unreached {
+            None => Ok(widest_mm.iter().map(|semi_aperture_mm| semi_aperture_mm * SLACK).collect()),
+            Some(surface) => Err(TextError {
+                line: Some(self.surfaces[surface].line),
+                reason: format!("surface {surface} has no diameter, and no ray of the stated fields reaches it"),
+            }),
+        }
+    }
+
+    /// Returns the object point of a field.
+    fn object_point(&self, mono: &MonoLens, field: Field) -> Result<ObjectPoint, TextError> {
+        let first = mono.first_order();
+        let distance_mm = self.object_distance_mm;
+        let tan = match field {
+            Field::Angle { x_deg, y_deg } => DVec2::new(x_deg.to_radians().tan(), y_deg.to_radians().tan()),
+            Field::ObjectHeight { x_mm, y_mm } if distance_mm.is_finite() => {
+                return Ok(ObjectPoint::Finite(DVec3::new(x_mm, y_mm, -distance_mm)));
+            }
+            Field::ObjectHeight { .. } => return Err(plain("a field is an object height, but the object is far away")),
+            Field::ImageHeight { x_mm, y_mm } if distance_mm.is_finite() => {
+                let height_mm = DVec2::new(x_mm, y_mm) / mono.conjugate(distance_mm).magnification;
+                return Ok(ObjectPoint::Finite(height_mm.extend(-distance_mm)));
+            }
+            Field::ImageHeight { x_mm, y_mm } => -DVec2::new(x_mm, y_mm) / first.efl_mm,
+        };
+        let dioptres = if distance_mm.is_finite() { 1e3 / (distance_mm + first.entrance_pupil_z_mm) } else { 0.0 };
+        Ok(ObjectPoint::from_field(mono, tan, dioptres))
+    }
+}
+
+/// Widens the rims so that a ring of rays through the edge of the pupil, and the ray through its centre, pass.
+fn widen(widest_mm: &mut [f64], mono: &MonoLens, point: &ObjectPoint, vignetting: Vignetting) {
+    let first = mono.first_order();
+    if !first.entrance_pupil_z_mm.is_finite() {
+        return;
+    }
+    let radius_mm = 0.5 * first.entrance_pupil_diameter_mm;
+    let on_ring = |i: usize| {
+        let (sine, cosine) = (i as f64 * std::f64::consts::TAU / N_AZIMUTHS as f64).sin_cos();
+        radius_mm * (vignetting.center + (DVec2::ONE - vignetting.compression) * DVec2::new(cosine, sine))
+    };
+    let mut targets: Vec<DVec2> = (0..N_AZIMUTHS).map(on_ring).collect();
+    targets.push(radius_mm * vignetting.center);
+    let mut rays = rays_towards(point, &targets, first.entrance_pupil_z_mm, 0.0);
+    for (surface, widest_mm) in widest_mm.iter_mut().enumerate() {
+        mono.trace_surfaces(surface..surface + 1, &mut rays, Rims::Ignore);
+        for ((&x, &y), fate) in rays.x_mm.iter().zip(&rays.y_mm).zip(&rays.fate) {
+            if fate.is_in_flight() && x.hypot(y).is_finite() {
+                *widest_mm = widest_mm.max(x.hypot(y));
+            }
+        }
+    }
+}
+
+/// Returns the widest rim that fits on a surface, mm.
+fn widest_mm(surface: &SystemSurface) -> f64 {
+    let conic = match surface.shape {
+        Shape::Conic { conic } | Shape::EvenAsphere { conic, .. } => conic,
+        _ => 0.0,
+    };
+    let flattened = (1.0 + conic) * surface.curvature_per_mm * surface.curvature_per_mm;
+    if flattened > 0.0 { (1.0 / flattened.sqrt()).min(1e6) } else { 1e6 }
+}
+
+fn plain(reason: &str) -> TextError {
+    TextError { line: None, reason: reason.to_owned() }
+}

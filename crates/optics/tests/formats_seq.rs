@@ -1,0 +1,140 @@
+//! CODE V files: what is read, and what is said where something cannot be.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::path::Path;
+
+use dioptric_optics::{Field, Glass, LensFile, OpticsError, ReadOptions, Shape};
+
+const DOUBLET: &str = "RDM;LEN       \"VERSION: 10.1\"
+TITLE 'a doublet'   ! named
+DIM   M
+EPD   10.0
+WL    656.3 587.6 &
+      486.1
+REF   2
+XAN   0.0 0.0
+YAN   0.0 2.0
+VUY   0.0 0.2
+VLY   0.0 0.1
+PRV
+PWL 700.0 480.0
+'MYGLASS' 1.60 1.62
+END
+SO    0.0 0.1e11
+S     60.0 4.0 NBK7_SCHOTT
+  STO
+  CIR 7.0
+  CCY 0; THC 0
+S     -40.0 2.0 MYGLASS
+S     -200.0 95.0
+SI    0.0 0.5
+GO
+";
+
+fn read(text: &str) -> Result<LensFile, OpticsError> {
+    LensFile::from_bytes(Path::new("lens.seq"), text.as_bytes(), &ReadOptions::default())
+}
+
+#[track_caller]
+fn message(from: &str, to: &str) -> String {
+    assert!(DOUBLET.contains(from), "{from}");
+    read(&DOUBLET.replacen(from, to, 1)).unwrap_err().to_string()
+}
+
+#[track_caller]
+fn medium(word: &str) -> Glass {
+    read(&DOUBLET.replace("NBK7_SCHOTT", word)).unwrap().lens.interfaces()[0].medium_after.clone()
+}
+
+#[test]
+fn surfaces_pupil_fields_and_wavelengths_are_read() {
+    let file = read(DOUBLET).unwrap();
+    let lens = &file.lens;
+    assert_eq!((lens.name(), lens.stop(), lens.interfaces().len()), ("a doublet", 0, 3));
+    assert_eq!(lens.interfaces()[0].medium_after, Glass::Named("SCHOTT:N-BK7".to_owned()));
+    let private = Glass::Tabulated { wavelengths_nm: vec![480.0, 700.0], indices: vec![1.62, 1.6] };
+    assert_eq!(lens.interfaces()[1].medium_after, private);
+    // The defocus of the image surface is part of the distance.
+    assert_eq!((file.film_mm, file.object_distance_mm), (Some(95.5), None));
+    assert_eq!(file.wavelengths_nm, [656.3, 587.6, 486.1]);
+    assert_eq!(file.reference_wavelength_nm, Some(587.6));
+    assert_eq!(file.fields, [0.0, 2.0].map(|y_deg| Field::Angle { x_deg: 0.0, y_deg }));
+    assert!((lens.stop_semi_aperture_mm() - 5.0).abs() < 1e-14);
+    assert!(file.notes.is_empty(), "{:?}", file.notes);
+}
+
+#[test]
+fn wavelength_that_a_glass_does_not_reach_is_noted() {
+    let file = read(&DOUBLET.replace("PWL 700.0 480.0", "PWL 700.0 500.0")).unwrap();
+    assert!(file.notes[0].starts_with("the rims are found without 486.1 nm: a glass"), "{:?}", file.notes);
+}
+
+#[test]
+fn vignetting_of_a_field_narrows_the_rims_it_needs() {
+    let last_rim_mm = |text: &str| read(text).unwrap().lens.interfaces()[2].surface.semi_aperture_mm;
+    let far_field = DOUBLET.replace("YAN   0.0 2.0", "YAN   0.0 20.0");
+    let whole = far_field.replace("VUY   0.0 0.2\nVLY   0.0 0.1\n", "");
+    assert!(last_rim_mm(&far_field) < 0.97 * last_rim_mm(&whole));
+}
+
+#[test]
+fn glass_may_be_a_name_a_code_or_an_index() {
+    assert_eq!(medium("SCHOTT:N-BK7"), Glass::Named("SCHOTT:N-BK7".to_owned()));
+    assert_eq!(medium("N-BK7"), Glass::Named("SCHOTT:N-BK7".to_owned()));
+    assert_eq!(medium("1.5168:64.17"), Glass::NdVd { nd: 1.5168, vd: 64.17 });
+    assert_eq!(medium("517642"), Glass::NdVd { nd: 1.517, vd: 64.2 });
+    assert_eq!(medium("517.642"), Glass::NdVd { nd: 1.517, vd: 64.2 });
+    assert_eq!(medium("1.5"), Glass::Constant { index: 1.5 });
+    assert_eq!(medium("AIR"), Glass::Air);
+}
+
+#[test]
+fn conics_aspheres_and_curvatures_are_read() {
+    let text = DOUBLET.replace("  CIR 7.0", "  ASP; K -0.7; A 1E-6; C 1E-10").replace("S     -200.0", "S  0 ");
+    let lens = read(&text).unwrap().lens;
+    let shape = Shape::EvenAsphere { conic: -0.7, coefficients: vec![1e-6, 0.0, 1e-10] };
+    assert_eq!(lens.interfaces()[0].surface.shape, shape);
+    assert_eq!(lens.interfaces()[2].surface.curvature_per_mm, 0.0);
+    let curved = DOUBLET
+        .replace("RDM;", "CUM;")
+        .replace("S     60.0", "S 0.02")
+        .replace("-40.0", "-0.02")
+        .replace("-200.0", "-0.005");
+    assert_eq!(read(&curved).unwrap().lens.interfaces()[1].surface.curvature_per_mm, -0.02);
+    let later = DOUBLET.replace("GO\n", "RDY S2 -41\nTHI S1 4.5\nCIR S3 6\nSTO S2\n");
+    let lens = read(&later).unwrap().lens;
+    assert_eq!(lens.interfaces()[1].surface.curvature_per_mm, 1.0 / -41.0);
+    assert_eq!(lens.interfaces()[0].thickness_after_mm, 4.5);
+    assert_eq!(lens.interfaces()[2].surface.semi_aperture_mm, 6.0);
+    assert_eq!(lens.stop(), 1);
+}
+
+#[test]
+fn inches_and_near_objects_are_converted() {
+    let text =
+        DOUBLET.replace("DIM   M", "DIM   I").replace("0.1e11", "10").replace("YAN", "YOB").replace("XAN", "XOB");
+    let file = read(&text).unwrap();
+    assert_eq!(file.object_distance_mm, Some(254.0));
+    assert!(matches!(file.fields[1], Field::ObjectHeight { y_mm, .. } if (y_mm - 50.8).abs() < 1e-12));
+}
+
+#[test]
+fn what_cannot_be_traced_is_refused_by_name() {
+    assert!(message("  CIR 7.0", "  CIR OBS 1").contains("CIR: obscurations are not supported"));
+    assert!(message("  CIR 7.0", "  REX 3").contains("REX: apertures other than circles"));
+    assert!(message("  CIR 7.0", "  XDE 0; ADE 2.5").starts_with("lens.seq:19: ADE: tilted or decentred"));
+    assert!(message("  CIR 7.0", "  SPS ODD").contains("surfaces of the kind 'SPS ODD' are not supported"));
+    assert!(message("NBK7_SCHOTT", "REFL").contains("mirrors are not supported"));
+    assert!(message("EPD   10.0", "NA 0.1").contains("state EPD, FNO or NAO"));
+}
+
+#[test]
+fn mistakes_are_told_by_line_and_command() {
+    assert_eq!(message("S     60.0", "S     6O.0"), "lens.seq:17: S: '6O.0' is not a number");
+    assert!(message("NBK7_SCHOTT", "NBK8_SCHOTT").starts_with("lens.seq:17: S: no glass is named 'SCHOTT:NBK8'"));
+    assert!(message("1.60 1.62", "1.60").contains("lens.seq:14: MYGLASS: 1 indices for 2 wavelengths (PWL)"));
+    assert!(message("DIM   M", "DIM   Q").contains("'Q' is no unit of length; expected M, C or I"));
+    assert!(message("SI    0.0 0.5\n", "").contains("the file has no image surface (SI)"));
+    assert!(message("SO ", "S ").contains("out of order; expected SO, the object, first"));
+    assert!(message("YAN", "YIM").contains("fields of two kinds"));
+}

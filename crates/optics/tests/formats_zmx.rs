@@ -1,0 +1,203 @@
+//! Zemax files: what is read, and what is said where something cannot be.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::path::Path;
+
+use dioptric_optics::{
+    CatalogueGlass, Field, Glass, GlassCatalogue, LensFile, MissingGlass, OpticsError, ReadOptions, Shape,
+};
+
+const SINGLET: &str = "VERS 140124 258 36214
+MODE SEQ
+NAME a singlet
+UNIT MM X W X CM MR CPMM
+ENPD 1.0E+1
+GCAT SCHOTT MISC
+FTYP 0 0 2 1 0 0 0
+XFLN 0 0 0
+YFLN 0 5 0
+WAVM 1 5.875618E-1 1
+WAVM 2 0.55 1
+PWAV 1
+SURF 0
+  TYPE STANDARD
+  CURV 0.0 0 0 0 0 \"\"
+  DISZ INFINITY
+  DIAM 0 0 0 0 1 \"\"
+SURF 1
+  STOP
+  TYPE EVENASPH
+  CURV 2.0E-2
+  COAT AR
+  PARM 1 0
+  PARM 2 1.0E-6
+  PARM 3 0
+  DISZ 5.0
+  GLAS N-BK7 0 0 1.5168 64.17 0 0 0 0 0 0
+  CONI -0.5
+  DIAM 6.0 1 0 0 1 \"\"
+SURF 2
+  TYPE STANDARD
+  CURV -0.01
+  DISZ 60.0
+SURF 3
+  TYPE STANDARD
+  CURV 0.0
+  DISZ 0
+TOL TOFF 0
+MNUM 1 1
+";
+
+fn read_with(bytes: &[u8], options: &ReadOptions) -> Result<LensFile, OpticsError> {
+    LensFile::from_bytes(Path::new("lens.zmx"), bytes, options)
+}
+
+fn read(text: &str) -> Result<LensFile, OpticsError> {
+    read_with(text.as_bytes(), &ReadOptions::default())
+}
+
+#[track_caller]
+fn message(from: &str, to: &str) -> String {
+    assert!(SINGLET.contains(from), "{from}");
+    read(&SINGLET.replace(from, to)).unwrap_err().to_string()
+}
+
+#[test]
+fn surfaces_pupil_fields_and_wavelengths_are_read() {
+    let file = read(SINGLET).unwrap();
+    let lens = &file.lens;
+    assert_eq!((lens.name(), lens.stop(), lens.interfaces().len()), ("a singlet", 0, 2));
+    assert_eq!(lens.interfaces()[0].medium_after, Glass::Named("SCHOTT:N-BK7".to_owned()));
+    let asphere = Shape::EvenAsphere { conic: -0.5, coefficients: vec![1e-6] };
+    assert_eq!(lens.interfaces()[0].surface.shape, asphere);
+    assert_eq!((file.film_mm, file.object_distance_mm), (Some(60.0), None));
+    // FTYP says that one wavelength is used.
+    assert_eq!(file.wavelengths_nm, [587.5618]);
+    assert_eq!(file.fields[1], Field::Angle { x_deg: 0.0, y_deg: 5.0 });
+    assert!(file.notes.is_empty());
+    // The pupil is the stop itself: 10 mm, although the glass is 12 mm wide.
+    assert!((lens.stop_semi_aperture_mm() - 5.0).abs() < 1e-14);
+    // The second surface is as wide as the field of 5 degrees needs.
+    let wide_mm = lens.interfaces()[1].surface.semi_aperture_mm;
+    assert!((5.0..5.3).contains(&wide_mm), "{wide_mm}");
+}
+
+#[test]
+fn every_encoding_and_line_end_gives_the_same_lens() {
+    let expected = read(SINGLET).unwrap();
+    let crlf = SINGLET.replace('\n', "\r\n");
+    let utf16: Vec<u8> = crlf.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let big: Vec<u8> = crlf.encode_utf16().flat_map(u16::to_be_bytes).collect();
+    for bytes in [
+        crlf.as_bytes().to_vec(),
+        [b"\xEF\xBB\xBF", crlf.as_bytes()].concat(),
+        [b"\xFF\xFE", utf16.as_slice()].concat(),
+        [b"\xFE\xFF", big.as_slice()].concat(),
+        utf16,
+    ] {
+        assert_eq!(read_with(&bytes, &ReadOptions::default()).unwrap(), expected);
+    }
+}
+
+#[test]
+fn lengths_are_converted_from_other_units() {
+    let inches = read(&SINGLET.replace("UNIT MM", "UNIT IN")).unwrap();
+    let expected = read(SINGLET).unwrap();
+    let efl_mm = |file: &LensFile| file.lens.at(550.0).unwrap().first_order().efl_mm;
+    assert!((efl_mm(&inches) / efl_mm(&expected) - 25.4).abs() < 1e-12);
+    let sag = |file: &LensFile, r: f64| file.lens.interfaces()[0].surface.sag_mm(r);
+    assert!((sag(&inches, 4.0 * 25.4) / sag(&expected, 4.0) - 25.4).abs() < 1e-12);
+    assert!(
+        (inches.lens.interfaces()[1].surface.semi_aperture_mm / 25.4
+            - expected.lens.interfaces()[1].surface.semi_aperture_mm)
+            .abs()
+            < 1e-9
+    );
+}
+
+#[test]
+fn dummy_planes_are_merged_into_distances() {
+    let dummy = "SURF 1\n  TYPE STANDARD\n  CURV 0\n  DISZ 20\nSURF 2\n  STOP";
+    let renumbered = SINGLET.replace("SURF 3", "SURF 4").replace("SURF 2", "SURF 3").replace("SURF 1\n  STOP", dummy);
+    let file = read(&renumbered).unwrap();
+    let expected = read(SINGLET).unwrap();
+    assert_eq!(file.lens, expected.lens);
+    let near = read(&renumbered.replace("DISZ INFINITY", "DISZ 100")).unwrap();
+    assert_eq!(near.object_distance_mm, Some(120.0));
+}
+
+#[test]
+fn ideal_lens_and_model_glass_are_read() {
+    let text = SINGLET
+        .replace("CURV -0.01", "CURV 0\n  PARM 1 40")
+        .replace("  TYPE STANDARD\n  CURV 0\n", "  TYPE PARAXIAL\n  CURV 0\n");
+    let lens = read(&text).unwrap().lens;
+    assert_eq!(lens.interfaces()[1].surface.shape, Shape::ThinLens { power_per_mm: 0.025 });
+    let lens = read(&SINGLET.replace("GLAS N-BK7", "GLAS ___BLANK")).unwrap().lens;
+    assert_eq!(lens.interfaces()[0].medium_after, Glass::NdVd { nd: 1.5168, vd: 64.17 });
+    let lens = read(&SINGLET.replace("GLAS N-BK7 0 0 1.5168 64.17", "GLAS ___BLANK 1 0 1.5 0")).unwrap().lens;
+    assert_eq!(lens.interfaces()[0].medium_after, Glass::Constant { index: 1.5 });
+}
+
+#[test]
+fn missing_glass_is_named_with_where_it_was_sought() {
+    let text = SINGLET.replace("N-BK7", "UNOBTAIN-7");
+    let expected = "lens.zmx:27: surface 1: no glass is named 'UNOBTAIN-7'; no name is similar; the file states \
+        n_d 1.5168 and V_d 64.17 for it; the file's catalogues (GCAT) are SCHOTT, MISC";
+    assert_eq!(read(&text).unwrap_err().to_string(), expected);
+
+    let with = |missing_glass| {
+        let file = read_with(text.as_bytes(), &ReadOptions { missing_glass, ..Default::default() }).unwrap();
+        assert!(file.notes[0].starts_with("glass 'UNOBTAIN-7' is in no catalogue"), "{:?}", file.notes);
+        file.lens.interfaces()[0].medium_after.clone()
+    };
+    assert_eq!(with(MissingGlass::FromNdVd), Glass::NdVd { nd: 1.5168, vd: 64.17 });
+    let Glass::Named(nearest) = with(MissingGlass::Nearest) else { panic!("not from the catalogue") };
+    assert!(nearest.contains("BK7") || nearest.contains("K9"), "{nearest}");
+
+    let glass = Glass::Constant { index: 1.7 };
+    let own = CatalogueGlass { maker: "OWN".to_owned(), name: "UNOBTAIN-7".to_owned(), glass: glass.clone() };
+    let options = ReadOptions { catalogues: vec![GlassCatalogue::new(vec![own])], ..Default::default() };
+    assert_eq!(read_with(text.as_bytes(), &options).unwrap().lens.interfaces()[0].medium_after, glass);
+}
+
+#[test]
+fn catalogues_of_the_file_decide_between_makers() {
+    let glass = |makers: &str| {
+        let text = SINGLET.replace("N-BK7", "F2").replace("GCAT SCHOTT MISC", makers);
+        read(&text).map(|file| file.lens.interfaces()[0].medium_after.clone())
+    };
+    assert_eq!(glass("GCAT MISC CDGM SCHOTT").unwrap(), Glass::Named("CDGM:F2".to_owned()));
+    let message = glass("GCAT OHARA").unwrap_err().to_string();
+    assert!(message.contains("glass 'F2' could be CDGM:F2, HIKARI:F2 or SCHOTT:F2"), "{message}");
+}
+
+#[test]
+fn what_cannot_be_traced_is_refused_by_name() {
+    assert!(message("TYPE EVENASPH", "TYPE TOROIDAL").starts_with("lens.zmx:18: surface 1: surfaces of type TOROIDAL"));
+    assert!(message("TYPE EVENASPH", "TYPE ODDASPHE").contains("surfaces of type ODDASPHE are not supported"));
+    assert!(message("TYPE EVENASPH", "TYPE BICONICX").contains("surfaces of type BICONICX are not supported"));
+    assert!(message("TYPE EVENASPH", "TYPE COORDBRK\n  PARM 3 2.5").contains("a coordinate break (COORDBRK: tilt"));
+    assert!(message("PARM 1 0", "PARM 1 0.01").contains("an aspheric r² term (0.01)"));
+    assert!(message("GLAS N-BK7", "GLAS MIRROR").contains("mirrors are not supported"));
+    assert!(message("  CONI", "  OBSC 0 1\n  CONI").contains("OBSC: a central obscuration is not supported"));
+    assert!(message("  CONI", "  OBDC 1 0\n  CONI").contains("OBDC: a decentred aperture"));
+    assert!(message("MODE SEQ", "MODE NSC").contains("MODE: NSC is not supported; expected SEQ"));
+    assert!(message("FTYP 0", "FTYP 7").contains("field type 7 is not supported"));
+}
+
+#[test]
+fn mistakes_are_told_by_line_and_keyword() {
+    assert_eq!(message("CURV 2.0E-2", "CURV 2.0F-2"), "lens.zmx:21: CURV: '2.0F-2' is not a number");
+    assert_eq!(message("CURV 2.0E-2", "CURV"), "lens.zmx:21: CURV: expected 1 numbers, found 0");
+    assert_eq!(
+        message("UNIT MM", "UNIT FURLONG"),
+        "lens.zmx:4: UNIT: 'FURLONG' is no unit of length; expected MM, CM, IN or METER"
+    );
+    assert!(message("SURF 2", "SURF 7").contains("SURF: surface 7 where 2 was expected"));
+    assert!(message("  STOP\n", "").contains("exactly one stop, but 0"));
+    assert!(message("DISZ 5.0", "DISZ INFINITY").contains("surface 0: thickness is inf"));
+    assert!(message("ENPD 1.0E+1", "ENPD -1").contains("makes an entrance pupil of -1 mm"));
+    assert!(message("ENPD 1.0E+1", "ENPD 1e9").contains("does not fit"));
+    assert!(read("").unwrap_err().to_string().contains("the file has 0 surfaces"));
+}
