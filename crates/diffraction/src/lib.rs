@@ -1,22 +1,35 @@
-//! Diffraction: uncertainty bending of rays (HURB) at the stop and the theory it is held to.
+//! Diffraction: uncertainty bending of rays (HURB) at the stop, point spread functions and wavefronts of wave optics,
+//! and the theory that both are held to.
 //!
 //! Lengths are millimetres, wavelengths nanometres (vacuum), angles radians, in the lens frame of `dioptric-optics`.
 //! Theory curves ([`airy`], [`Hurb::lsf`]) are in units of λN, N being the working f-number.
 //!
-//! This crate knows nothing of pixels, scenes or sensors. It bends rays between two calls of the tracer, and says how
-//! far each ray is spread on the film.
+//! This crate knows nothing of scenes or sensors. It bends rays between two calls of the tracer, says how far each ray
+//! is spread on the film, and sums the waves of one point there.
 #![doc = include_str!("../README.md")]
 
 pub mod airy;
 mod bend;
 mod covariance;
+mod error;
 mod hurb;
+mod huygens;
 pub mod quadrature;
 mod stop_ray;
+mod wave;
+mod wavefront;
 mod width;
+pub mod zernike;
 
 pub use bend::{BendForm, Edge, bend};
 pub use covariance::Covariance;
+pub use error::DiffractionError;
 pub use hurb::{Hurb, Spread};
+pub use huygens::HuygensSources;
 pub use stop_ray::{StopRay, trace_stop_rays};
+pub use wave::{
+    Peak, PhaseRange, Propagation, PupilGrid, WaveNodes, WavePsf, WaveQuality, WaveWindow, WindowCenter,
+    polychromatic_psf, wave_nodes, wave_psf,
+};
+pub use wavefront::{ReferenceSphere, Wavefront, WavefrontReference};
 pub use width::full_width_at_half_maximum;

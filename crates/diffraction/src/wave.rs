@@ -1,0 +1,213 @@
+//! Point spread functions of wave optics, from traced rays.
+//!
+//! Every node of the true, vignetted pupil sends a plane wave to the film, with the phase that its optical path gives
+//! it (the angular eikonal) and the amplitude of the energy that it carries per range of directions. The waves are
+//! summed at the Gauss–Legendre points of each pixel, and their square is integrated over the pixel. No exit pupil is
+//! built and nothing is resampled, so any pitch, origin, field, vignetting and image medium will do.
+//!
+//! What comes out is normalised by the pupil's energy, never by the window's: the sum is the share of the light that
+//! the window holds. Polarisation is left out.
+
+mod axis;
+pub(crate) mod cis;
+mod nodes;
+mod polychromatic;
+mod strehl;
+mod transform;
+
+use dioptric_optics::{MonoLens, ObjectPoint};
+use glam::DVec2;
+use ndarray::{Array2, s};
+
+use crate::DiffractionError;
+use axis::SampleAxis;
+pub use nodes::{PhaseRange, Propagation, PupilGrid, WaveNodes};
+pub(crate) use nodes::{polar, solid_angle_per_area};
+pub use polychromatic::polychromatic_psf;
+pub use strehl::Peak;
+
+/// Where the middle of a window lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WindowCenter {
+    /// On the centroid of the light.
+    Centroid,
+    /// At this point of the film, mm, lens frame.
+    At(DVec2),
+}
+
+/// A window of square pixels on the film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WaveWindow {
+    /// Side of a pixel, µm.
+    pub pitch_um: f64,
+    /// Rows of pixels.
+    pub rows: usize,
+    /// Columns of pixels.
+    pub columns: usize,
+    /// Where its middle lies: the middle of the middle pixel where the numbers are odd.
+    pub center: WindowCenter,
+}
+
+/// How finely a point spread function is computed. The default follows the node rule.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WaveQuality {
+    /// The nodes of the pupil; `None` takes as many as the rule asks for, and at least 12 × 48.
+    pub nodes: Option<PupilGrid>,
+    /// Gauss–Legendre points along each side of a pixel; `None` takes ⌈2 p / λN⌉ + 1. With 1 the irradiance at the
+    /// middle of the pixel stands for all of it.
+    pub points_per_pixel: Option<usize>,
+}
+
+/// A point spread function on pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WavePsf {
+    /// The share of the point's transmitted energy on each pixel, in the picture frame: the film turned by 180°, row
+    /// 0 at the top, so that columns run towards −x and rows towards +y of the film.
+    pub samples: Array2<f64>,
+    /// Side of a pixel, µm.
+    pub pitch_um: f64,
+    /// The film point in the middle of the window, mm, lens frame.
+    pub center_mm: DVec2,
+    /// The centroid of all the light, mm on the film, lens frame; of the light outside the window too.
+    pub centroid_mm: DVec2,
+    /// The share of the transmitted energy that the window holds: the sum of the samples.
+    pub captured: f64,
+    /// Nodes in the pupil.
+    pub n_nodes: usize,
+    /// The range of phases over the pupil's radius, radians.
+    pub bandwidth: f64,
+    /// Points along each side of a pixel.
+    pub points_per_pixel: usize,
+}
+
+impl WavePsf {
+    /// Returns the samples in the film's own frame: rows ascend with y, columns with x.
+    pub fn in_film_frame(&self) -> Array2<f64> {
+        self.samples.slice(s![.., ..;-1]).to_owned()
+    }
+
+    /// Returns the film point in the middle of a pixel, mm, lens frame.
+    pub fn pixel_mm(&self, row: usize, column: usize) -> DVec2 {
+        let from_middle = |i: usize, n: usize| i as f64 - 0.5 * (n as f64 - 1.0);
+        let (rows, columns) = self.samples.dim();
+        let offset = DVec2::new(-from_middle(column, columns), from_middle(row, rows));
+        self.center_mm + offset * (self.pitch_um * 1e-3)
+    }
+}
+
+/// The largest range of phases that is accepted: a hundred and fifty thousand nodes.
+const LARGEST_BANDWIDTH: f64 = 1000.0;
+
+/// Returns the point spread function of an object point on a window of the film, `film_mm` behind the last vertex.
+///
+/// # Errors
+/// When no light gets through, the window makes no sense, more nodes are needed than are asked for, or the blur and
+/// window are so large that they need more than a wave sum can have.
+pub fn wave_psf(
+    lens: &MonoLens,
+    point: &ObjectPoint,
+    film_mm: f64,
+    window: &WaveWindow,
+    quality: WaveQuality,
+) -> Result<WavePsf, DiffractionError> {
+    wave_nodes(lens, point, film_mm, window, quality)?.psf(window, quality.points_per_pixel)
+}
+
+/// Returns the nodes that [`wave_psf`] sums: as many as `quality` says, or the window needs.
+///
+/// # Errors
+/// Those of [`wave_psf`].
+pub fn wave_nodes(
+    lens: &MonoLens,
+    point: &ObjectPoint,
+    film_mm: f64,
+    window: &WaveWindow,
+    quality: WaveQuality,
+) -> Result<WaveNodes, DiffractionError> {
+    let reference_mm = match window.center {
+        WindowCenter::Centroid => None,
+        WindowCenter::At(film_mm) => Some(film_mm),
+    };
+    let trace = |grid| WaveNodes::trace(lens, point, film_mm, grid, reference_mm);
+    let reach_mm = window.check()?;
+    if let Some(grid) = quality.nodes {
+        let nodes = trace(grid)?;
+        nodes.check(reach_mm)?;
+        return Ok(nodes);
+    }
+    let mut nodes = trace(PupilGrid::STANDARD)?;
+    // More nodes reach nearer to the edge, and may find that still more are needed: hence the hundredth to spare.
+    loop {
+        let PhaseRange { rays, window } = nodes.phase_range(reach_mm);
+        if nodes.grid.covers(PupilGrid::needed(PhaseRange { rays, window })) {
+            return Ok(nodes);
+        }
+        let bandwidth = rays + window;
+        if bandwidth > LARGEST_BANDWIDTH {
+            return Err(DiffractionError::TooBlurred { bandwidth, limit: LARGEST_BANDWIDTH });
+        }
+        nodes = trace(PupilGrid::needed(PhaseRange { rays: 1.01 * rays, window: 1.01 * window }).max(nodes.grid))?;
+    }
+}
+
+impl WaveWindow {
+    /// Checks the numbers, and returns the distance from the middle to a corner, mm.
+    fn check(&self) -> Result<f64, DiffractionError> {
+        let setting = |what, found, expected| Err(DiffractionError::Setting { what, found, expected });
+        if !(self.pitch_um > 0.0 && self.pitch_um.is_finite()) {
+            return setting("the pixel pitch in µm", self.pitch_um, "a positive number");
+        }
+        let n = self.rows.min(self.columns);
+        if n == 0 {
+            return setting("the number of rows or columns of a window", 0.0, "at least 1");
+        }
+        let (rows, columns) = (self.rows as f64, self.columns as f64);
+        Ok(0.5e-3 * self.pitch_um * rows.hypot(columns))
+    }
+}
+
+impl WaveNodes {
+    /// Returns the point spread function on a window, with this many points along each side of a pixel (`None`:
+    /// ⌈2 p / λN⌉ + 1).
+    ///
+    /// # Errors
+    /// When the window makes no sense or needs more nodes than there are.
+    pub fn psf(&self, window: &WaveWindow, points_per_pixel: Option<usize>) -> Result<WavePsf, DiffractionError> {
+        let reach_mm = window.check()?;
+        let center_mm = match window.center {
+            WindowCenter::Centroid => self.centroid_mm(),
+            WindowCenter::At(film_mm) => film_mm,
+        };
+        if center_mm != self.reference_mm {
+            return self
+                .clone()
+                .about(center_mm)
+                .psf(&WaveWindow { center: WindowCenter::At(center_mm), ..*window }, points_per_pixel);
+        }
+        let bandwidth = self.check(reach_mm)?;
+        let pitch_mm = window.pitch_um * 1e-3;
+        let points_per_pixel = match points_per_pixel {
+            Some(0) => {
+                let (what, expected) = ("the number of points along a pixel", "at least 1");
+                return Err(DiffractionError::Setting { what, found: 0.0, expected });
+            }
+            Some(n) => n,
+            // A hundredth to spare, so that a pitch of just λN/2 is not pushed over by rounding.
+            None => (2.0 * pitch_mm / self.airy_unit_mm() - 0.01).ceil().max(1.0) as usize + 1,
+        };
+        let axis = |n_pixels| SampleAxis::new(n_pixels, pitch_mm, points_per_pixel);
+        let mean = transform::mean_square(&self.plane_waves(), &axis(window.columns), &axis(window.rows));
+        // In a film's rows y ascends, as it does down a picture; its x ascends to the picture's left.
+        let samples = mean.slice(s![.., ..;-1]).mapv(|per_mm2| per_mm2 * pitch_mm * pitch_mm);
+        Ok(WavePsf {
+            captured: samples.sum(),
+            samples,
+            pitch_um: window.pitch_um,
+            center_mm,
+            centroid_mm: self.centroid_mm(),
+            n_nodes: self.len(),
+            bandwidth,
+            points_per_pixel,
+        })
+    }
+}
