@@ -11,6 +11,7 @@ mod formats;
 mod preview;
 mod resample;
 mod scene;
+mod still_life;
 mod targets;
 mod view;
 
@@ -22,5 +23,6 @@ pub use formats::{
 pub use preview::{srgb_preview, write_preview_png};
 pub use resample::{reflectance_under, resampled};
 pub use scene::{HiddenLayer, Scene};
+pub use still_life::StillLife;
 pub use targets::{Pattern, Target, TargetLight};
 pub use view::View;

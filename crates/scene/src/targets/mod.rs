@@ -2,6 +2,8 @@
 
 mod pattern;
 
+pub(crate) use pattern::patch_at;
+
 use dioptric_spectrum::{
     Illuminant, Observer, Quantity, SpectralImage, Spectrum, WavelengthGrid, color_checker_reflectances,
 };

@@ -1,0 +1,286 @@
+//! The picture of the still life: rays from the eye, light gathered, smoothed and coloured.
+
+use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use glam::{DMat3, DVec2, DVec3};
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use super::{
+    filter::{Guide, Lights, smoothed},
+    noise::{pixel_offset, spread},
+    pigment::PigmentIndex,
+    shade::Shader,
+    shape::Ray,
+    world::{Hit, Seen, World},
+};
+use crate::{SceneError, View};
+
+/// Points of a pixel: 4 × 4, no two in one row or column of a fine lattice. The first four are themselves spread.
+const POINTS: [(u8, u8); 16] = [
+    (0, 1),
+    (1, 3),
+    (2, 0),
+    (3, 2),
+    (0, 0),
+    (0, 2),
+    (0, 3),
+    (1, 0),
+    (1, 1),
+    (1, 2),
+    (2, 1),
+    (2, 2),
+    (2, 3),
+    (3, 0),
+    (3, 1),
+    (3, 3),
+];
+/// An eye in the room.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Eye {
+    pub(super) origin: DVec3,
+    /// Its right, its up and where it looks.
+    pub(super) axes: DMat3,
+    pub(super) view: View,
+}
+
+impl Eye {
+    fn ray(&self, row: f64, column: f64) -> Ray {
+        let (x, y) = self.view.tan_at(row, column);
+        Ray { origin: self.origin, direction: (self.axes * DVec3::new(x, y, 1.0)).normalize() }
+    }
+
+    fn depth_m(&self, point: DVec3) -> f64 {
+        (point - self.origin).dot(self.axes.z_axis)
+    }
+}
+
+/// A part of a pixel that shows one object.
+#[derive(Clone, Debug)]
+struct Fragment {
+    seen: Seen,
+    /// Share of the pixel.
+    share: f32,
+    /// The part of the share whose coat is rough.
+    sheen: f32,
+    /// Pigments, each with its share of the pixel.
+    pigments: Vec<(PigmentIndex, f32)>,
+    lights: Lights,
+}
+
+/// A row before its light is smoothed.
+struct Row {
+    /// The fragments of each pixel, the largest first.
+    pixels: Vec<Vec<Fragment>>,
+    /// What is mirrored or glows, columns × bands.
+    own: Vec<f32>,
+    z_m: Vec<f32>,
+}
+
+/// A layer of the picture.
+pub(super) struct Layer {
+    pub(super) radiance: SpectralImage,
+    pub(super) depth: DepthMap,
+}
+
+/// Which surfaces a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Which {
+    /// The first on each ray.
+    First,
+    /// The first behind the thing at the centre of the pixel.
+    Behind,
+}
+
+/// Returns the picture of a world.
+pub(super) fn picture(
+    world: &World,
+    eye: &Eye,
+    (rows, columns): (usize, usize),
+    grid: &WavelengthGrid,
+    which: Which,
+) -> Result<Layer, SceneError> {
+    let painter = Painter { shader: Shader::new(world, eye.origin, grid), eye, n_bands: grid.len(), which };
+    let drawn: Vec<Row> = (0..rows).into_par_iter().map(|row| painter.row(row, columns)).collect();
+    let pixels = || drawn.iter().flat_map(|row| row.pixels.iter().map(|fragments| &fragments[0]));
+    let guides: Vec<Guide> = pixels().map(guide_of).collect();
+    let lights = smoothed(&guides, pixels().map(|fragment| fragment.lights).collect(), columns);
+    let finished: Vec<Vec<f32>> =
+        drawn.par_iter().enumerate().map(|(row, drawn)| painter.finished(row, drawn, &guides, &lights)).collect();
+    let planes = (0..grid.len())
+        .into_par_iter()
+        .map(|band| Array2::from_shape_fn((rows, columns), |(r, c)| finished[r][c * grid.len() + band]))
+        .collect();
+    let z_m = Array2::from_shape_fn((rows, columns), |(r, c)| drawn[r].z_m[c]);
+    Ok(Layer { radiance: SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?, depth: DepthMap::new(z_m)? })
+}
+
+fn guide_of(fragment: &Fragment) -> Guide {
+    Guide { object: fragment.seen.object as u32, point: fragment.seen.point, normal: fragment.seen.normal }
+}
+
+struct Painter<'a> {
+    shader: Shader<'a>,
+    eye: &'a Eye,
+    n_bands: usize,
+    which: Which,
+}
+
+impl Painter<'_> {
+    fn row(&self, row: usize, columns: usize) -> Row {
+        let mut own = vec![0.0; columns * self.n_bands];
+        let mut pixels = Vec::with_capacity(columns);
+        let mut z_m = Vec::with_capacity(columns);
+        for (column, own) in (0..columns).zip(own.chunks_exact_mut(self.n_bands)) {
+            let aim = Aim::new(self, row, column);
+            z_m.push(aim.z_m as f32);
+            let mut fragments = self.fragments(&aim, own);
+            fragments[0].lights = self.shader.gather(&fragments[0].seen, row, column);
+            pixels.push(fragments);
+        }
+        Row { pixels, own, z_m }
+    }
+
+    /// Looks through the points of a pixel.
+    fn fragments(&self, aim: &Aim, own: &mut [f32]) -> Vec<Fragment> {
+        let first: Vec<Seen> = (0..4).map(|point| aim.look(self, point)).collect();
+        let is_plain = first.iter().all(|seen| alike(seen, &first[0]));
+        let rest = if is_plain { 0 } else { POINTS.len() - first.len() };
+        let share = 1.0 / (first.len() + rest) as f32;
+        let mut fragments: Vec<Fragment> = Vec::new();
+        let looks = first.into_iter().chain((4..4 + rest).map(|point| aim.look(self, point)));
+        for (point, seen) in looks.enumerate() {
+            self.shader.add_glow(&seen, share, None, own);
+            let coat = seen.surface.coat;
+            let fresnel = self.shader.fresnel(&seen) as f32;
+            let is_clear = coat.f0 > 0.0 && coat.roughness == 0.0;
+            if is_clear {
+                self.shader.add_mirrored(&seen, share * fresnel, spread(2 * point, aim.offset), own);
+            }
+            let fragment = match fragments.iter().position(|f| f.seen.object == seen.object) {
+                Some(index) => &mut fragments[index],
+                None => {
+                    let empty =
+                        Fragment { seen, share: 0.0, sheen: 0.0, pigments: Vec::new(), lights: Lights::default() };
+                    fragments.push(empty);
+                    fragments.last_mut().expect("one has just been added")
+                }
+            };
+            fragment.share += share;
+            fragment.sheen += if is_clear { 0.0 } else { share };
+            let diffuse = if coat.metal.is_some() { 0.0 } else { share * (1.0 - fresnel) };
+            for &(pigment, part) in seen.surface.mix.parts() {
+                match fragment.pigments.iter_mut().find(|(known, _)| *known == pigment) {
+                    Some((_, sum)) => *sum += diffuse * part,
+                    None => fragment.pigments.push((pigment, diffuse * part)),
+                }
+            }
+        }
+        fragments.sort_by(|a, b| b.share.total_cmp(&a.share));
+        fragments
+    }
+
+    /// Returns the spectra of a row, columns × bands, under the smoothed light.
+    fn finished(&self, row: usize, drawn: &Row, guides: &[Guide], lights: &[Lights]) -> Vec<f32> {
+        let columns = drawn.pixels.len();
+        let mut spectra = drawn.own.clone();
+        for ((column, fragments), spectrum) in
+            drawn.pixels.iter().enumerate().zip(spectra.chunks_exact_mut(self.n_bands))
+        {
+            for (place, fragment) in fragments.iter().enumerate() {
+                let found = match place {
+                    0 => Some(lights[row * columns + column]),
+                    _ => light_beside(row, column, columns, fragment.seen.object as u32, guides, lights),
+                };
+                let lights = found.unwrap_or_else(|| self.shader.gather(&fragment.seen, row, column));
+                self.shader.add_lit(&lights, &fragment.pigments, fragment.sheen, spectrum);
+            }
+        }
+        spectra
+    }
+}
+
+/// Returns the mean light of the pixels about one that show mostly this object.
+fn light_beside(
+    row: usize,
+    column: usize,
+    columns: usize,
+    object: u32,
+    guides: &[Guide],
+    lights: &[Lights],
+) -> Option<Lights> {
+    let rows = guides.len() / columns;
+    let (mut sum, mut n) = (Lights::default(), 0.0);
+    for r in row.saturating_sub(1)..(row + 2).min(rows) {
+        for c in column.saturating_sub(1)..(column + 2).min(columns) {
+            if guides[r * columns + c].object == object {
+                sum.iter_mut().zip(&lights[r * columns + c]).for_each(|(s, l)| *s += l);
+                n += 1.0;
+            }
+        }
+    }
+    (n > 0.0).then(|| sum.map(|s| s / n))
+}
+
+/// Tells whether two points of a pixel look so alike that more need not be looked at.
+fn alike(a: &Seen, b: &Seen) -> bool {
+    let (main_a, main_b) = (a.surface.mix.parts()[0], b.surface.mix.parts()[0]);
+    a.object == b.object
+        && a.normal.dot(b.normal) > 0.985
+        && main_a.0 == main_b.0
+        && (main_a.1 - main_b.1).abs() < 0.12
+        && a.surface.mix.parts().len() == b.surface.mix.parts().len()
+        && (a.surface.coat.f0 == 0.0 || a.surface.coat.roughness > 0.0 || a.normal.dot(b.normal) > 0.9995)
+        && a.surface.glow.map(|(light, _)| light) == b.surface.glow.map(|(light, _)| light)
+}
+
+/// A pixel to look through.
+struct Aim {
+    row: f64,
+    column: f64,
+    /// The thing at its centre and where it begins, when what is behind it is wanted.
+    without: Option<(usize, f64)>,
+    z_m: f64,
+    offset: DVec2,
+}
+
+impl Aim {
+    fn new(painter: &Painter<'_>, row: usize, column: usize) -> Self {
+        let mut aim = Self {
+            row: row as f64,
+            column: column as f64,
+            without: None,
+            z_m: 0.0,
+            offset: pixel_offset(row, column, 6),
+        };
+        let ray = painter.eye.ray(aim.row, aim.column);
+        let mut hit = aim.hit(painter, ray);
+        if painter.which == Which::Behind {
+            let thing = painter.shader.world.thing_of(hit.object);
+            // Behind the walls there is nothing.
+            if painter.shader.world.first_hit(ray, hit.t, Some(thing)).is_some() {
+                aim.without = Some((thing, hit.t));
+                hit = aim.hit(painter, ray);
+            }
+        }
+        aim.z_m = painter.eye.depth_m(hit.point);
+        aim
+    }
+
+    fn hit(&self, painter: &Painter<'_>, ray: Ray) -> Hit {
+        let behind = self.without.and_then(|(thing, t)| painter.shader.world.first_hit(ray, t, Some(thing)));
+        let first = || painter.shader.world.first_hit(ray, 0.0, None);
+        behind.or_else(first).expect("the room is closed: every ray from inside meets it")
+    }
+
+    fn look(&self, painter: &Painter<'_>, point: usize) -> Seen {
+        let (i, j) = POINTS[point];
+        let at = |cell: u8, within: u8| (f64::from(cell) + (f64::from(within) + 0.5) / 4.0) / 4.0 - 0.5;
+        let ray = painter.eye.ray(self.row + at(j, i), self.column + at(i, j));
+        let hit = self.hit(painter, ray);
+        let cosine = painter.shader.world.cosine(&hit, ray.direction).max(0.12);
+        // The side of a square of the mean of the pixel's width and its length along the slope.
+        let width = hit.t / painter.eye.view.focal_px;
+        let footprint = 0.5 * (width + width / cosine);
+        painter.shader.world.seen(&hit, ray.direction, 0.7 * footprint)
+    }
+}
