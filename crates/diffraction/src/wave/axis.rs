@@ -55,11 +55,6 @@ impl SampleAxis {
     pub(crate) fn weight(&self, point: usize) -> f64 {
         self.points[point].1
     }
-
-    /// Distance from the middle to the outer border, mm.
-    pub(crate) fn reach_mm(&self) -> f64 {
-        0.5 * self.n_pixels as f64 * self.pitch_mm
-    }
 }
 
 #[cfg(test)]
@@ -71,7 +66,11 @@ mod tests {
         for (n_pixels, n_points) in [(4, 1), (5, 1), (5, 2), (5, 3), (4, 3), (1, 1), (1, 4)] {
             let axis = SampleAxis::new(n_pixels, 2.0, n_points);
             let places: Vec<f64> = (0..axis.n_half()).map(|i| axis.at_mm(i)).collect();
-            assert!(places.is_sorted() && places[0] >= 0.0 && places.iter().all(|x| *x < axis.reach_mm()));
+            assert!(
+                places.is_sorted()
+                    && places[0] >= 0.0
+                    && places.iter().all(|x| *x < 0.5 * n_pixels as f64 * axis.pitch_mm)
+            );
             assert_eq!(axis.has_middle(), places[0] == 0.0);
             let sum: f64 = (0..n_points).map(|i| axis.weight(i)).sum();
             // Rounding of a few weights.

@@ -14,8 +14,8 @@ pub struct Peak {
     pub strehl: f64,
 }
 
-/// Places along each axis at which the peak is first looked for, at most.
-const LARGEST_SEARCH: usize = 161;
+/// Places to each side at which the peak is first looked for, at most.
+const LARGEST_SEARCH: usize = 80;
 
 impl WaveNodes {
     /// Returns the irradiance at a film point over that of the same amplitudes all in phase.
@@ -25,18 +25,20 @@ impl WaveNodes {
 
     /// Finds the highest point of the point spread function on the film, and the Strehl ratio there.
     ///
-    /// It is looked for on a lattice of a quarter λN about the centroid, as far as rays go and one and a half λN more
-    /// (20 λN at most), and then by parabolas to 1e-4 λN.
+    /// It is looked for on a lattice of a quarter λN about the centroid, as far as rays go and one and a half λN more,
+    /// or as far as the nodes resolve, and 20 λN at most; and then by parabolas to 1e-4 λN.
     ///
     /// # Errors
-    /// When that search needs more nodes than there are.
+    /// When there are too few nodes even for one and a half λN.
     pub fn peak(&self) -> Result<Peak, DiffractionError> {
         let unit_mm = self.airy_unit_mm();
         let nodes = self.clone().about(self.centroid_mm());
         let spot_mm = nodes.q_x_mm.iter().zip(&nodes.q_y_mm).map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max);
-        let half = ((spot_mm / unit_mm + 1.5) * 4.0).ceil().min(LARGEST_SEARCH as f64 / 2.0) as usize;
+        let wanted = ((spot_mm / unit_mm + 1.5) * 4.0).ceil().min(LARGEST_SEARCH as f64) as usize;
+        let reach_mm = |half: usize| (half as f64 + 0.5) * 0.25 * unit_mm * std::f64::consts::SQRT_2;
+        let half = (6..=wanted).rev().find(|&half| nodes.check(reach_mm(half)).is_ok()).unwrap_or(6);
+        nodes.check(reach_mm(half))?;
         let axis = SampleAxis::new(2 * half + 1, 0.25 * unit_mm, 1);
-        nodes.check(axis.reach_mm() * std::f64::consts::SQRT_2)?;
         let lattice = transform::mean_square(&nodes.plane_waves(), &axis, &axis);
         let highest = lattice.indexed_iter().max_by(|a, b| a.1.total_cmp(b.1));
         let (row, column) = highest.map_or((half, half), |(place, _)| place);

@@ -1,0 +1,146 @@
+//! The reference lenses as lenses, and their objects and pupils.
+
+use std::fs;
+
+use dioptric_optics::{
+    Glass, Interface, Lens, MonoLens, ObjectPoint, PupilBoundary, Rims, Shape, Surface,
+    glam::{DMat2, DVec2, DVec3},
+    rays_towards,
+};
+use serde_json::Value;
+
+/// The names of the reference lenses.
+pub(crate) const NAMES: [&str; 10] = [
+    "achromat_krakenos",
+    "asphere_al1815c",
+    "canon_ef50_f18_1m",
+    "cooke_triplet",
+    "double_gauss_f2",
+    "microscope_20x",
+    "relay_1to1",
+    "singlet_lb1471a",
+    "telephoto_laikin",
+    "wideangle_100",
+];
+
+/// Reads one JSON file of the reference, or says that the test is skipped.
+pub(crate) fn json(name: &str) -> Option<Value> {
+    let path = dioptric_golden::shared(&format!("reference/optics/{name}.json"))?;
+    Some(serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap())
+}
+
+/// A number of a JSON file.
+pub(crate) fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+/// Every number of a JSON list.
+pub(crate) fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(number).collect()
+}
+
+fn glass(material: &Value) -> Glass {
+    let coefficients = || numbers(&material["coefficients"]);
+    match material["model"].as_str().unwrap() {
+        "air" => Glass::Air,
+        "cauchy_nd_vd" => Glass::cauchy_from_nd_vd(number(&material["nd"]), number(&material["vd"])).unwrap(),
+        formula => {
+            let formula = formula.strip_prefix("rii_formula").unwrap().parse().unwrap();
+            Glass::Formula { formula, coefficients: coefficients(), range_nm: None }
+        }
+    }
+}
+
+/// Returns the lens of a reference file.
+pub(crate) fn lens(file: &Value) -> Lens {
+    let lens = &file["lens"];
+    let rows = lens["surfaces"].as_array().unwrap();
+    let stop = rows.iter().position(|row| row["stop"] == true).unwrap();
+    let interface = |row: &Value| {
+        let (conic, coefficients) = (number(&row["conic"]), numbers(&row["asph_a4_a6_etc"]));
+        let shape = match (conic, coefficients.is_empty()) {
+            (0.0, true) => Shape::Sphere,
+            (_, true) => Shape::Conic { conic },
+            _ => Shape::EvenAsphere { conic, coefficients },
+        };
+        let (curvature_per_mm, semi_aperture_mm) = (number(&row["curvature"]), number(&row["semi_diameter"]));
+        Interface {
+            surface: Surface { curvature_per_mm, shape, semi_aperture_mm },
+            medium_after: glass(&row["material_after"]),
+            thickness_after_mm: number(&row["thickness_after"]),
+        }
+    };
+    let interfaces = rows.iter().map(interface).collect();
+    Lens::new(lens["name"].as_str().unwrap(), lens["source"].as_str().unwrap(), interfaces, stop).unwrap()
+}
+
+/// A lens of the reference, and what its file says of objects and pupils.
+pub(crate) struct Reference {
+    pub(crate) file: Value,
+    pub(crate) lens: Lens,
+    /// z of the paraxial entrance pupil at the main wavelength, mm.
+    pub(crate) pupil_z_mm: f64,
+    /// Radius of that pupil, mm.
+    pub(crate) pupil_radius_mm: f64,
+}
+
+impl Reference {
+    pub(crate) fn open(name: &str) -> Option<Self> {
+        let file = json(name)?;
+        let pupil_z_mm = number(&file["lens"]["entrance_pupil_z_primary"]);
+        let pupil_radius_mm = 0.5 * number(&file["lens"]["epd_mm"]);
+        // The stop's rim is as published; the pupil meant may be narrower.
+        let stop_mm = 2.0 * number(&file["lens"]["stop_radius_real_axis"]);
+        let lens = lens(&file);
+        let lens = lens.with_stop_diameter_mm(stop_mm).unwrap_or(lens);
+        Some(Self { lens, file, pupil_z_mm, pupil_radius_mm })
+    }
+
+    pub(crate) fn at(&self, row: &Value) -> MonoLens {
+        self.lens.at(number(&row["wavelength_nm"])).unwrap()
+    }
+
+    /// Returns the object point of a row's field.
+    pub(crate) fn point(&self, row: &Value) -> ObjectPoint {
+        let described = &self.file["lens"];
+        let most = number(&described["fields"]["max"]);
+        let field = DVec2::from_slice(&numbers(&row["field"]));
+        match described["object"]["type"].as_str().unwrap() {
+            "infinite" => {
+                let slope = |share: f64| (share * most).to_radians().tan();
+                ObjectPoint::Infinite(DVec3::new(slope(field.x), slope(field.y), 1.0).normalize())
+            }
+            _ => ObjectPoint::Finite((field * most).extend(-number(&described["object"]["distance"]))),
+        }
+    }
+
+    /// Returns where to aim in the entrance-pupil plane for pupil coordinates: fractions of its radius, or of that of
+    /// the real stop, which rays of the main wavelength are then made to meet.
+    pub(crate) fn target_mm(&self, point: &ObjectPoint, pupil: DVec2) -> DVec2 {
+        let paraxial = pupil * self.pupil_radius_mm;
+        if self.file["lens"]["pupil_mode"] == "paraxial_ep" {
+            return paraxial;
+        }
+        let mono = self.lens.at(number(&self.file["lens"]["primary_nm"])).unwrap();
+        let wanted = pupil * number(&self.file["lens"]["stop_radius_real_axis"]);
+        let miss = |target: DVec2| {
+            let mut rays = rays_towards(point, &[target], self.pupil_z_mm, 0.0);
+            mono.trace_surfaces(0..mono.stop() + 1, &mut rays, Rims::Ignore);
+            assert!(rays.fate[0].is_in_flight(), "aim lost at {target}");
+            rays.point_mm(0).truncate() - wanted
+        };
+        // The pupil of a wide lens moves with the field; the centre of the true one is a good start.
+        let start = PupilBoundary::find(&mono, point, 64).unwrap().center_mm();
+        let mut target = start;
+        for _ in 0..40 {
+            let here = miss(target);
+            if here.length() < 1e-13 {
+                break;
+            }
+            let slope = |u: DVec2| (miss(target + u * 1e-6) - miss(target - u * 1e-6)) / 2e-6;
+            let step = DMat2::from_cols(slope(DVec2::X), slope(DVec2::Y)).inverse() * here;
+            target -= step * (0.3 / step.length()).min(1.0);
+        }
+        target
+    }
+}
