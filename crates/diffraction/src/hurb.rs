@@ -50,7 +50,8 @@ impl Hurb {
     /// itself: they differ where a ray passes within a wavelength of the edge.
     pub fn sigma(self, distance_mm: f64, radius_mm: f64, wave_number_per_mm: f64) -> f64 {
         let tangent = (self.edge / distance_mm).hypot(self.floor / radius_mm) / (2.0 * wave_number_per_mm);
-        tangent.atan()
+        // Below 1e-4 the arc is its tangent to 3e-9.
+        if tangent < 1e-4 { tangent } else { tangent.atan() }
     }
 
     /// Returns the spread of a ray that crosses a round stop `r_mm` from its centre.

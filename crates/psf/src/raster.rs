@@ -35,9 +35,9 @@ impl Raster {
         }
     }
 
-    /// The pixels of a row, to be added to.
-    pub(crate) fn row_mut(&mut self, row: usize) -> &mut [f64] {
-        &mut self.direct[row * self.columns..][..self.columns]
+    /// The pixels, row by row, to be added to.
+    pub(crate) fn pixels_mut(&mut self) -> &mut [f64] {
+        &mut self.direct
     }
 
     /// The number of rows and columns.

@@ -20,7 +20,7 @@ const TAILS: f64 = 12.0;
 /// A cell this many standard deviations across, both ways, is drawn as a polygon.
 const POLYGON: f64 = 8.0;
 /// A Gaussian whose wide axis is below this, in pixels, is not drawn.
-const NARROW: f64 = 0.25;
+const NARROW: f64 = 0.12;
 /// Variance, pixels², that a pixel's own size adds when the need for subdivision is judged.
 const PIXEL_VARIANCE: f64 = 0.12;
 
@@ -151,8 +151,9 @@ fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending
 /// Returns how many pieces the spread of a ring needs: it doubles over the last few.
 fn edge_pieces(record: &Record, inner: f64) -> usize {
     match record.mesh.n_rings - inner as usize {
-        1 => 4,
-        2 | 3 => 2,
+        1 => 6,
+        2 | 3 => 3,
+        4..=6 => 2,
         _ => 1,
     }
 }

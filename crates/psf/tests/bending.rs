@@ -1,0 +1,96 @@
+//! Drawn uncertainty bending, held to random bending at the stop.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use dioptric_diffraction::{BendForm, Edge, Hurb, bend};
+use dioptric_optics::{
+    Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
+    glam::{DVec2, DVec3},
+    rays_towards,
+};
+use dioptric_psf::{BankSettings, Diffraction, Kernel, PsfBank};
+
+const PITCH_UM: f64 = 4.0;
+
+/// Returns rays of a point spread evenly over its pupil, at the stop.
+fn rays_at_stop(lens: &MonoLens, point: &ObjectPoint, n_rays: usize) -> RayBatch {
+    let boundary = PupilBoundary::find(lens, point, 64).unwrap();
+    // Vogel's spiral over the disc about the pupil; what is outside is vignetted.
+    let reach_mm = boundary.rho_at_azimuths_mm().iter().copied().fold(0.0, f64::max);
+    let targets: Vec<DVec2> = (0..n_rays)
+        .map(|i| {
+            let radius_mm = reach_mm * ((i as f64 + 0.5) / n_rays as f64).sqrt();
+            boundary.center_mm() + DVec2::from_angle(2.399_963_229_728_653 * i as f64) * radius_mm
+        })
+        .collect();
+    let mut rays = rays_towards(point, &targets, boundary.z_mm(), 0.0);
+    lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Rims::Clip);
+    // Rims behind the stop clip the straight ray, not the bent one.
+    let mut straight = rays.clone();
+    if lens.stop() + 1 < lens.n_surfaces() {
+        lens.trace_surfaces(lens.stop() + 1..lens.n_surfaces(), &mut straight, Rims::Clip);
+    }
+    let kept: Vec<usize> = (0..n_rays).filter(|&ray| straight.fate[ray].is_in_flight()).collect();
+    let points: Vec<DVec3> = kept.iter().map(|&ray| rays.point_mm(ray)).collect();
+    let directions: Vec<DVec3> = kept.iter().map(|&ray| rays.direction(ray)).collect();
+    RayBatch::from_points(&points, &directions)
+}
+
+/// Returns the L1 difference of a kernel from bent rays counted on its pixels, and what random counts alone would give.
+fn difference(lens: &Lens, kernel: &Kernel, field_tan: f64, dioptres: f64, film_mm: f64, gamma: f64) -> (f64, f64) {
+    let mono = lens.at(550.0).unwrap();
+    let point = ObjectPoint::from_field(&mono, DVec2::new(field_tan, 0.0), dioptres);
+    let behind = rays_at_stop(&mono, &point, 100_000);
+    let land = |mut rays: RayBatch| {
+        if mono.stop() + 1 < mono.n_surfaces() {
+            mono.trace_surfaces(mono.stop() + 1..mono.n_surfaces(), &mut rays, Rims::Ignore);
+        }
+        mono.to_film(&mut rays, film_mm);
+        (0..rays.len()).map(|ray| -rays.point_mm(ray).truncate()).collect::<Vec<DVec2>>()
+    };
+    let straight = land(behind.clone());
+    let centroid = straight.iter().sum::<DVec2>() / straight.len() as f64;
+    let edge = Edge::new(mono.stop_semi_aperture_mm(), 550.0, mono.stop_medium_index());
+    let n_rounds = 10;
+    let side = kernel.samples.nrows();
+    let mut counts = vec![0.0f64; side * side];
+    for round in 0..n_rounds {
+        let mut rays = behind.clone();
+        bend(&mut rays, edge, Hurb::with_gamma(gamma), BendForm::DirectionCosines, round);
+        for at in land(rays) {
+            let at = (at - centroid) * (1e3 / PITCH_UM);
+            let (column, row) = (at.x + 0.5 * side as f64, 0.5 * side as f64 - at.y);
+            if column >= 0.0 && row >= 0.0 && column < side as f64 && row < side as f64 {
+                counts[row as usize * side + column as usize] += 1.0;
+            }
+        }
+    }
+    let n = (straight.len() as u64 * n_rounds) as f64;
+    let expected = kernel.samples.iter().map(|&e| f64::from(e));
+    let l1 = expected.clone().zip(&counts).map(|(e, c)| (e - c / n).abs()).sum();
+    let noise = expected.map(|e| (2.0 / std::f64::consts::PI * e / n).sqrt()).sum();
+    (l1, noise)
+}
+
+#[test]
+fn kernels_are_those_of_rays_bent_at_random() {
+    for (f_number, field_tan, dioptres, tolerance) in [
+        (16.0, 0.1, 0.5, 0.01),
+        (8.0, 0.1, 0.5, 0.01),
+        (8.0, 0.0, 0.1, 0.02),
+        (4.0, 0.1, 0.5, 0.02),
+        (4.0, 0.1, 0.1, 0.02),
+    ] {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(f_number, 550.0).unwrap();
+        let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+        let gamma = 1.0;
+        let settings = BankSettings {
+            field_tans: vec![0.0, 0.1],
+            ..BankSettings::covering(film_mm, 0.1, (dioptres, dioptres), (550.0, 550.0), Diffraction::Hurb { gamma })
+        };
+        let kernel =
+            PsfBank::build(&lens, &settings).unwrap().kernel(DVec2::new(field_tan, 0.0), dioptres, 550.0, PITCH_UM);
+        let (l1, noise) = difference(&lens, &kernel, field_tan, dioptres, film_mm, gamma);
+        // The noise of the counts and the error of the drawing are independent.
+        assert!(l1 < noise.hypot(tolerance), "f/{f_number}, {field_tan}, {dioptres} D: {l1}, noise {noise}");
+    }
+}
