@@ -37,8 +37,9 @@ impl MonoLens {
                 Shape::Sphere => Kind::Sphere,
                 Shape::Conic { conic } => Kind::Conic { conic: *conic },
                 Shape::EvenAsphere { conic, coefficients } => {
-                    Kind::EvenAsphere { conic: *conic, coefficients: coefficients.clone() }
+                    Kind::EvenAsphere { conic: *conic, a2: 0.0, coefficients: coefficients.clone() }
                 }
+                Shape::OddAsphere { conic, coefficients } => asphere(*conic, coefficients),
                 Shape::ThinLens { power_per_mm } => {
                     Kind::ThinLens { power: *power_per_mm, object_z: f64::NEG_INFINITY }
                 }
@@ -197,4 +198,13 @@ impl MonoLens {
         }
         Err(OpticsError::NoFocus { lens: self.name.clone(), side: "before it", distance_mm: film_mm })
     }
+}
+
+/// Returns the kernel's form of an asphere: that of even powers where there are no others.
+fn asphere(conic: f64, from_r1: &[f64]) -> Kind {
+    if from_r1.iter().step_by(2).any(|&a| a != 0.0) {
+        return Kind::OddAsphere { conic, coefficients: from_r1.to_vec() };
+    }
+    let mut even = from_r1.iter().skip(1).step_by(2).copied();
+    Kind::EvenAsphere { conic, a2: even.next().unwrap_or(0.0), coefficients: even.collect() }
 }

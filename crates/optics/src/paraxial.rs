@@ -129,8 +129,18 @@ impl Step {
         match self.kind {
             Kind::Window => 0.0,
             Kind::ThinLens { power, .. } => power,
-            _ => (self.index_after - self.index_before) * self.curvature,
+            _ => (self.index_after - self.index_before) * self.vertex_curvature(),
         }
+    }
+
+    /// The curvature at the vertex, 1/mm, a square term of an asphere included.
+    pub(crate) fn vertex_curvature(&self) -> f64 {
+        let square_term = match &self.kind {
+            Kind::EvenAsphere { a2, .. } => *a2,
+            Kind::OddAsphere { coefficients, .. } => coefficients.get(1).copied().unwrap_or(0.0),
+            _ => 0.0,
+        };
+        self.curvature + 2.0 * square_term
     }
 }
 

@@ -154,7 +154,7 @@ impl AtSurface<'_> {
         if matches!(step.kind, Kind::Window | Kind::ThinLens { .. }) {
             return SeidelSums::default();
         }
-        let (n0, n1, c) = (step.index_before, step.index_after, step.curvature);
+        let (n0, n1, c) = (step.index_before, step.index_after, step.vertex_curvature());
         let (y, y_bar) = (self.marginal.y, self.chief.y);
         let a = n0 * (self.marginal.u + c * y);
         let a_bar = n0 * (self.chief.u + c * y_bar);
@@ -163,11 +163,12 @@ impl AtSurface<'_> {
         // Free of the quotient of Ā and A, which fails where the marginal ray meets the surface head-on.
         let s5 = a_bar * (petzval * y_bar * (a_bar * y - h) - a_bar * a_bar * y * (1.0 / (n1 * n1) - 1.0 / (n0 * n0)));
         let color = self.index_difference[1] / n1 - self.index_difference[0] / n0;
+        // How much the r⁴ term departs from that of the sphere of the vertex's curvature, eightfold.
+        let fourth = |conic: f64, a4: f64| (1.0 + conic) * step.curvature.powi(3) + 8.0 * a4 - c.powi(3);
         let bent = match &step.kind {
-            Kind::Conic { conic } => conic * c.powi(3),
-            Kind::EvenAsphere { conic, coefficients } => {
-                conic * c.powi(3) + 8.0 * coefficients.first().copied().unwrap_or(0.0)
-            }
+            Kind::Conic { conic } => fourth(*conic, 0.0),
+            Kind::EvenAsphere { conic, coefficients, .. } => fourth(*conic, at_or_zero(coefficients, 0)),
+            Kind::OddAsphere { conic, coefficients } => fourth(*conic, at_or_zero(coefficients, 3)),
             _ => 0.0,
         } * (n1 - n0);
         SeidelSums {
@@ -180,6 +181,10 @@ impl AtSurface<'_> {
             c2: a_bar * y * color,
         }
     }
+}
+
+fn at_or_zero(coefficients: &[f64], i: usize) -> f64 {
+    coefficients.get(i).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

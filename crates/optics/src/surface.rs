@@ -26,6 +26,15 @@ pub enum Shape {
         /// Coefficients of r⁴, r⁶, r⁸, …: `coefficients[i]` in mm^(−3 − 2i).
         coefficients: Vec<f64>,
     },
+    /// A conic with added powers of r from the first on: what even aspheres with an r² term are, and odd ones.
+    ///
+    /// The r² term adds to the power of the surface; an r term makes a cone, which first-order optics leaves out.
+    OddAsphere {
+        /// The conic constant.
+        conic: f64,
+        /// Coefficients of r, r², r³, …: `coefficients[i]` in mm^(−i).
+        coefficients: Vec<f64>,
+    },
     /// An ideal thin lens in a plane: it changes the tangents of a ray's slopes by height × power, so that every
     /// plane is imaged as a plane, perfectly and without distortion.
     ThinLens {
@@ -72,6 +81,9 @@ impl Surface {
             Shape::EvenAsphere { conic, coefficients } => {
                 base(*conic) + r2 * r2 * coefficients.iter().rev().fold(0.0, |sum, a| sum * r2 + a)
             }
+            Shape::OddAsphere { conic, coefficients } => {
+                base(*conic) + r_mm * coefficients.iter().rev().fold(0.0, |sum, a| sum * r_mm + a)
+            }
             Shape::ThinLens { .. } => 0.0,
         }
     }
@@ -86,7 +98,7 @@ impl Surface {
         match &self.shape {
             Shape::Sphere => {}
             Shape::Conic { conic } => finite("conic", *conic)?,
-            Shape::EvenAsphere { conic, coefficients } => {
+            Shape::EvenAsphere { conic, coefficients } | Shape::OddAsphere { conic, coefficients } => {
                 finite("conic", *conic)?;
                 coefficients.iter().try_for_each(|&a| finite("coefficient", a))?;
             }

@@ -10,7 +10,9 @@ mod twin;
 
 use multiversion::multiversion;
 
-use self::crossing::{Ray, cross_conic, cross_even_asphere, cross_plane, cross_sphere, refract, thin_lens};
+use self::crossing::{
+    AllPowers, EvenPowers, Ray, cross_asphere, cross_conic, cross_plane, cross_sphere, refract, thin_lens,
+};
 use crate::{RayFate, rays::RaySlices};
 
 /// Whether rims end rays.
@@ -42,7 +44,14 @@ pub(crate) enum Kind {
     Conic {
         conic: f64,
     },
+    /// The coefficient of r², then those of r⁴ and on.
     EvenAsphere {
+        conic: f64,
+        a2: f64,
+        coefficients: Vec<f64>,
+    },
+    /// Coefficients of r and on.
+    OddAsphere {
         conic: f64,
         coefficients: Vec<f64>,
     },
@@ -218,8 +227,13 @@ fn pass(at: &mut At<'_, '_>, tile: &mut Tile) {
         Kind::Window => pass_lanes(at, tile, |ray| cross_plane(step.index_before, limit_mm2, ray)),
         Kind::Sphere => pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_sphere(c, ray))),
         Kind::Conic { conic } => pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_conic(c, *conic, ray))),
-        Kind::EvenAsphere { conic, coefficients } => {
-            pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_even_asphere(c, *conic, coefficients, ray)));
+        Kind::EvenAsphere { conic, a2, coefficients } => {
+            let bumps = EvenPowers { a2: *a2, coefficients };
+            pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_asphere(c, *conic, bumps, ray)));
+        }
+        Kind::OddAsphere { conic, coefficients } => {
+            let bumps = AllPowers { coefficients };
+            pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_asphere(c, *conic, bumps, ray)));
         }
         Kind::ThinLens { power, object_z } => {
             pass_lanes(at, tile, |ray| thin_lens(step, *power, *object_z, limit_mm2, ray));

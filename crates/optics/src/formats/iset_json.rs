@@ -71,7 +71,7 @@ fn shape(row: &Object) -> Result<Shape, TextError> {
     if let Some(list) = row.get("aspheric_coefficients") {
         coefficients.extend(numbers(list, &place)?);
     }
-    even_asphere(conic, &coefficients).map_err(|reason| TextError { line: None, reason: format!("{place}: {reason}") })
+    Ok(even_asphere(conic, &coefficients))
 }
 
 fn medium(row: &Object, is_stop: bool, before: &Glass, glasses: &Glasses) -> Result<Glass, TextError> {

@@ -420,8 +420,7 @@ impl SeqSurface {
     fn in_mm(&self, mm: f64) -> Result<SystemSurface, TextError> {
         let mut from_r2 = vec![0.0];
         from_r2.extend(self.coefficients.iter().zip(1..).map(|(a, i)| a * mm.powi(-1 - 2 * i)));
-        let shape = even_asphere(self.conic, &from_r2)
-            .map_err(|reason| TextError { line: Some(self.line), reason: format!("S: {reason}") })?;
+        let shape = even_asphere(self.conic, &from_r2);
         Ok(SystemSurface {
             line: self.line,
             curvature_per_mm: self.curvature / mm,

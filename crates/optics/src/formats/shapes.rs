@@ -3,18 +3,16 @@
 use crate::Shape;
 
 /// Returns the conic with added even powers of r, the coefficients from r² on, mm.
-///
-/// # Errors
-/// In words, when the shape cannot be traced.
-pub(super) fn even_asphere(conic: f64, coefficients_from_r2: &[f64]) -> Result<Shape, String> {
-    let [r2, rest @ ..] = coefficients_from_r2 else { return Ok(conic_of(conic)) };
+pub(super) fn even_asphere(conic: f64, coefficients_from_r2: &[f64]) -> Shape {
+    let [r2, rest @ ..] = coefficients_from_r2 else { return conic_of(conic) };
     if *r2 != 0.0 {
-        return Err(format!("an aspheric r² term ({r2}) is not supported: only r⁴ and higher are"));
+        let coefficients = coefficients_from_r2.iter().flat_map(|&a| [0.0, a]).collect();
+        return Shape::OddAsphere { conic, coefficients };
     }
     let n_used = rest.iter().rposition(|&a| a != 0.0).map_or(0, |last| last + 1);
     match &rest[..n_used] {
-        [] => Ok(conic_of(conic)),
-        used => Ok(Shape::EvenAsphere { conic, coefficients: used.to_vec() }),
+        [] => conic_of(conic),
+        used => Shape::EvenAsphere { conic, coefficients: used.to_vec() },
     }
 }
 

@@ -1,7 +1,7 @@
 //! Zemax lens files (`.zmx`): a keyword a line, surfaces in blocks that begin with `SURF`.
 //!
-//! Read are sequential systems of the surfaces STANDARD, EVENASPH and PARAXIAL, with the entrance pupil, fields and
-//! wavelengths of the first configuration. Keywords that change no ray (colours, tolerances, merit functions) are
+//! Read are sequential systems of the surfaces STANDARD, EVENASPH, ODDASPHE and PARAXIAL, with the entrance pupil,
+//! fields and wavelengths of the first configuration. Keywords that change no ray (colours, tolerances, merit functions) are
 //! passed over; whatever changes rays and cannot be traced is refused by name.
 
 use crate::{Glass, Shape, prescription::TextError};
@@ -338,7 +338,12 @@ impl ZmxSurface {
                 let powers = (1..).map(|half| 1 - 2 * half);
                 let from_r2: Vec<f64> =
                     self.parameters.iter().take(8).zip(powers).map(|(a, p)| a * mm.powi(p)).collect();
-                even_asphere(self.conic, &from_r2).map_err(wrong)?
+                even_asphere(self.conic, &from_r2)
+            }
+            "ODDASPHE" => {
+                let powers = (1..).map(|power| 1 - power);
+                let from_r1 = self.parameters.iter().take(8).zip(powers).map(|(a, p)| a * mm.powi(p)).collect();
+                Shape::OddAsphere { conic: self.conic, coefficients: from_r1 }
             }
             "PARAXIAL" => {
                 curvature_per_mm = 0.0;
@@ -349,7 +354,7 @@ impl ZmxSurface {
                 return Err(wrong("a coordinate break (COORDBRK: tilt or decentre) is not supported".to_owned()));
             }
             other => {
-                let known = "expected STANDARD, EVENASPH, PARAXIAL or a COORDBRK of zeros";
+                let known = "expected STANDARD, EVENASPH, ODDASPHE, PARAXIAL or a COORDBRK of zeros";
                 return Err(wrong(format!("surfaces of type {other} are not supported; {known}")));
             }
         };

@@ -73,11 +73,57 @@ pub(crate) fn cross_conic(c: f64, conic: f64, ray: Ray) -> Crossing {
     Crossing { t, normal: gradient.map(|v| v * inverse), cos, cos2: cos * cos, is_front: gradient[2] > 0.0 }
 }
 
-/// Crosses a conic with even powers of r added, by Newton's method from the conic.
+/// What an asphere adds to its conic at a distance r from the axis, given by its square: the added sag, and its slope
+/// over r.
+pub(crate) trait Bumps: Copy {
+    fn at(self, r2: f64) -> (f64, f64);
+}
+
+/// Powers r², r⁴, r⁶, ….
+#[derive(Clone, Copy)]
+pub(crate) struct EvenPowers<'a> {
+    pub(crate) a2: f64,
+    /// From r⁴ on.
+    pub(crate) coefficients: &'a [f64],
+}
+
+impl Bumps for EvenPowers<'_> {
+    #[inline(always)]
+    fn at(self, r2: f64) -> (f64, f64) {
+        let (mut high, mut slope) = (0.0, 0.0);
+        for (i, a) in self.coefficients.iter().enumerate().rev() {
+            high = high * r2 + a;
+            slope = slope * r2 + a * (2 * i + 4) as f64;
+        }
+        ((high * r2 + self.a2) * r2, slope * r2 + 2.0 * self.a2)
+    }
+}
+
+/// Powers r, r², r³, ….
+#[derive(Clone, Copy)]
+pub(crate) struct AllPowers<'a> {
+    pub(crate) coefficients: &'a [f64],
+}
+
+impl Bumps for AllPowers<'_> {
+    #[inline(always)]
+    fn at(self, r2: f64) -> (f64, f64) {
+        let r = r2.sqrt();
+        let (mut high, mut slope) = (0.0, 0.0);
+        for (i, a) in self.coefficients.iter().enumerate().rev() {
+            high = high * r + a;
+            slope = slope * r + a * (i + 1) as f64;
+        }
+        // At the tip of a cone the normal is taken along the axis.
+        (high * r, if r > 0.0 { slope / r } else { 0.0 })
+    }
+}
+
+/// Crosses a conic with powers of r added, by Newton's method from the conic.
 ///
-/// A step that small has converged to rounding, for the next would be of the order of its square.
+/// Once a step is small the next would be of the order of its square: it has converged to rounding.
 #[inline(always)]
-pub(crate) fn cross_even_asphere(c: f64, conic: f64, coefficients: &[f64], ray: Ray) -> Crossing {
+pub(crate) fn cross_asphere(c: f64, conic: f64, bumps: impl Bumps, ray: Ray) -> Crossing {
     let Ray { x, y, z, l, m, n, .. } = ray;
     let start = cross_conic(c, conic, ray);
     let is_start = start.is_front & (start.t.abs() < f64::INFINITY);
@@ -87,22 +133,17 @@ pub(crate) fn cross_even_asphere(c: f64, conic: f64, coefficients: &[f64], ray: 
         let (x1, y1) = (x + l * t, y + m * t);
         let r2 = x1 * x1 + y1 * y1;
         let root = (1.0 - (1.0 + conic) * c * c * r2).sqrt();
-        let (mut high, mut slope) = (0.0, 0.0);
-        for (i, a) in coefficients.iter().enumerate().rev() {
-            high = high * r2 + a;
-            slope = slope * r2 + a * (i + 2) as f64;
-        }
-        let sag = c * r2 / (1.0 + root) + high * r2 * r2;
-        let along = c / root + 2.0 * slope * r2;
-        (sag, -along * x1, -along * y1)
+        let (bump, slope) = bumps.at(r2);
+        let along = c / root + slope;
+        (c * r2 / (1.0 + root) + bump, -along * x1, -along * y1)
     };
     let mut is_converged = false;
     for _ in 0..NEWTON_STEPS {
         let (sag, gx, gy) = surface(t);
         let step = (z + n * t - sag) / (l * gx + m * gy + n);
-        t = if is_converged { t } else { t - step };
-        is_converged |= step.abs() <= 1e-9 * (1.0 + t.abs());
-        if is_converged {
+        t -= step;
+        if step.abs() <= 1e-9 * (1.0 + t.abs()) {
+            is_converged = true;
             break;
         }
     }
@@ -252,11 +293,56 @@ mod tests {
             rays
         };
         let sphere = trace(Shape::Sphere);
-        let others =
-            [Shape::Conic { conic: 0.0 }, Shape::EvenAsphere { conic: 0.0, coefficients: vec![0.0, 0.0] }].map(trace);
+        let others = [
+            Shape::Conic { conic: 0.0 },
+            Shape::EvenAsphere { conic: 0.0, coefficients: vec![0.0, 0.0] },
+            Shape::OddAsphere { conic: 0.0, coefficients: vec![0.0, 0.0, 1e-300] },
+        ]
+        .map(trace);
         for (i, other) in others.iter().flat_map(|other| (0..4).map(move |i| (i, other))) {
             assert!((sphere.point_mm(i) - other.point_mm(i)).length() < 1e-14);
             assert!((sphere.direction(i) - other.direction(i)).length() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn even_and_odd_powers_say_the_same_where_they_can() {
+        let trace = |shape: Shape| {
+            let lens = single(shape, 20.0, 1.6).at(550.0).unwrap();
+            let point = ObjectPoint::from_field(&lens, DVec2::new(0.2, 0.1), 1.0);
+            let mut rays = rays_towards(&point, &TARGETS, 0.0, 0.0);
+            lens.trace(&mut rays, Rims::Clip);
+            rays
+        };
+        let even = trace(Shape::EvenAsphere { conic: -0.4, coefficients: vec![2e-5, -3e-7] });
+        // The last, no more than nothing, keeps the odd kernel in use.
+        let odd = trace(Shape::OddAsphere { conic: -0.4, coefficients: vec![0.0, 0.0, 0.0, 2e-5, 0.0, -3e-7, 1e-300] });
+        for i in 0..4 {
+            assert!((even.point_mm(i) - odd.point_mm(i)).length() < 1e-14);
+            assert!((even.direction(i) - odd.direction(i)).length() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn paraboloid_may_be_written_as_a_square_term() {
+        // r²/2R is a paraboloid of radius R, whichever way it is written.
+        let plane =
+            Surface { shape: Shape::OddAsphere { conic: 0.0, coefficients: vec![0.0, 0.025] }, ..Surface::plane(8.0) };
+        let medium_after = Glass::Constant { index: 1.6 };
+        let interface = Interface { surface: plane, medium_after, thickness_after_mm: 0.0 };
+        let written = Lens::new("square term", "test", vec![interface], 0).unwrap().at(550.0).unwrap();
+        let conic = single(Shape::Conic { conic: -1.0 }, 20.0, 1.6).at(550.0).unwrap();
+        assert_eq!(written.first_order().efl_mm, conic.first_order().efl_mm);
+        let trace = |lens: &crate::MonoLens| {
+            let mut rays =
+                rays_towards(&ObjectPoint::Infinite(DVec3::new(0.1, 0.0, 1.0).normalize()), &TARGETS, 0.0, 0.0);
+            lens.trace(&mut rays, Rims::Clip);
+            rays
+        };
+        let (a, b) = (trace(&written), trace(&conic));
+        for i in 0..4 {
+            assert!((a.point_mm(i) - b.point_mm(i)).length() < 1e-14);
+            assert!((a.direction(i) - b.direction(i)).length() < 1e-15);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::{
     Kind, Rims, Step,
-    crossing::{Ray, cross_conic, cross_even_asphere, cross_plane, cross_sphere, refract, thin_lens},
+    crossing::{AllPowers, EvenPowers, Ray, cross_asphere, cross_conic, cross_plane, cross_sphere, refract, thin_lens},
     fate_of,
 };
 use crate::{RayBatch, RayFate, trace::Refracting};
@@ -33,8 +33,13 @@ fn trace_one(steps: &[Step], rims: Rims, mut ray: Ray) -> (Ray, RayFate) {
             Kind::Window => cross_plane(step.index_before, limit_mm2, ray),
             Kind::Sphere => refract(&refracting, ray, cross_sphere(step.curvature, ray)),
             Kind::Conic { conic } => refract(&refracting, ray, cross_conic(step.curvature, *conic, ray)),
-            Kind::EvenAsphere { conic, coefficients } => {
-                refract(&refracting, ray, cross_even_asphere(step.curvature, *conic, coefficients, ray))
+            Kind::EvenAsphere { conic, a2, coefficients } => {
+                let bumps = EvenPowers { a2: *a2, coefficients };
+                refract(&refracting, ray, cross_asphere(step.curvature, *conic, bumps, ray))
+            }
+            Kind::OddAsphere { conic, coefficients } => {
+                let bumps = AllPowers { coefficients };
+                refract(&refracting, ray, cross_asphere(step.curvature, *conic, bumps, ray))
             }
             Kind::ThinLens { power, object_z } => thin_lens(step, *power, *object_z, limit_mm2, ray),
         };
