@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Kernel, PsfError, RadialGeometry,
-    axis::Axis,
+    axis::{Axis, Stencil},
+    dispersion::Dispersion,
     mesh::Mesh,
     pupil::Pupil,
     ray_map::{Record, Summary, Task},
@@ -148,13 +149,14 @@ pub struct PsfBank {
     settings: BankSettings,
     fields: Axis,
     dioptres: Axis,
-    /// 1/λ², 1/nm², ascending: wavelengths in reverse.
-    frequencies: Axis,
+    /// Wavelengths in reverse, by the measure of the lens's dispersion.
+    colors: Axis,
+    dispersion: Dispersion,
     records: Vec<Record>,
     geometry_fields: Vec<f64>,
     summaries: Vec<Summary>,
     stop_radius_mm: f64,
-    /// Index around the stop at each of the frequencies.
+    /// Index around the stop at each of the colours.
     stop_indices: Vec<f64>,
 }
 
@@ -233,12 +235,14 @@ impl PsfBank {
                 summaries.push(summary);
             }
         }
+        let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
         let axis = |knots: Vec<f64>| Axis::new(knots).expect("the settings were checked");
         Ok(Self {
             settings: settings.clone(),
             fields: axis(settings.field_tans[..n_fields].to_vec()),
             dioptres: axis(settings.dioptres.clone()),
-            frequencies: axis(settings.wavelengths_nm.iter().rev().map(|&nm| inverse_square(nm)).collect()),
+            colors: axis(settings.wavelengths_nm.iter().rev().map(|&nm| dispersion.coordinate(nm)).collect()),
+            dispersion,
             records,
             geometry_fields: geometry_fields[..n_geometry].to_vec(),
             summaries,
@@ -313,10 +317,10 @@ impl PsfBank {
     fn columns(&self, dioptres: f64, wavelength_nm: f64) -> impl Iterator<Item = (usize, f64)> {
         let n_depths = self.dioptres.knots().len();
         let depths = self.dioptres.stencil(dioptres);
-        let frequencies = self.frequencies.stencil(inverse_square(wavelength_nm));
-        let pairs: Vec<(usize, f64)> = frequencies
+        let colors = self.color_stencil(wavelength_nm);
+        let pairs: Vec<(usize, f64)> = colors
             .iter()
-            .flat_map(|(f, wf)| depths.iter().map(move |(d, wd)| (f * n_depths + d, wf * wd)).collect::<Vec<_>>())
+            .flat_map(|(c, wc)| depths.iter().map(move |(d, wd)| (c * n_depths + d, wc * wd)).collect::<Vec<_>>())
             .collect();
         pairs.into_iter()
     }
@@ -330,9 +334,13 @@ impl PsfBank {
         Record::mix(weighted).expect("every stencil has a knot")
     }
 
+    fn color_stencil(&self, wavelength_nm: f64) -> Stencil {
+        let nm = &self.settings.wavelengths_nm;
+        self.colors.stencil(self.dispersion.coordinate(wavelength_nm.clamp(nm[0], nm[nm.len() - 1])))
+    }
+
     fn stop_index(&self, wavelength_nm: f64) -> f64 {
-        let stencil = self.frequencies.stencil(inverse_square(wavelength_nm));
-        stencil.iter().map(|(i, weight)| weight * self.stop_indices[i]).sum()
+        self.color_stencil(wavelength_nm).iter().map(|(i, weight)| weight * self.stop_indices[i]).sum()
     }
 }
 

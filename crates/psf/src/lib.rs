@@ -13,6 +13,7 @@
 mod axis;
 mod bank;
 mod count;
+mod dispersion;
 mod error;
 mod geometry;
 mod kernel;

@@ -21,6 +21,8 @@ const TAILS: f64 = 12.0;
 const POLYGON: f64 = 8.0;
 /// A Gaussian whose wide axis is below this, in pixels, is not drawn.
 const NARROW: f64 = 0.12;
+/// The same where a cell is larger than a pixel, and so are its neighbours.
+const PART_OF_A_PIXEL: f64 = 0.2;
 /// Variance, pixels², that a pixel's own size adds when the need for subdivision is judged.
 const PIXEL_VARIANCE: f64 = 0.12;
 
@@ -119,7 +121,8 @@ fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending
     let (_, wide) = covariance.axes();
     let widened = Covariance { xx: covariance.xx + PIXEL_VARIANCE, yy: covariance.yy + PIXEL_VARIANCE, ..covariance };
     let (n_along, n_around) = (in_sigmas(along, widened), in_sigmas(around, widened));
-    if wide < NARROW * NARROW || (n_along > POLYGON && n_around > POLYGON) {
+    let is_beside_the_cell = wide < PART_OF_A_PIXEL * PART_OF_A_PIXEL && along.length().min(around.length()) > 1.0;
+    if wide < NARROW * NARROW || is_beside_the_cell || (n_along > POLYGON && n_around > POLYGON) {
         return raster.quadrilateral(cell.corners.map(|node| node.at_mm), cell.energy);
     }
     // A piece two standard deviations across leaves no ripple.
