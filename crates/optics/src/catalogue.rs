@@ -36,6 +36,10 @@ pub struct GlassCatalogue {
 
 const BUILT_IN: &str = include_str!("../data/glass/catalogue.csv");
 
+/// Plastics of phone lenses, of which data sheets state but the index at the d line and the Abbe number: those of
+/// Osaka Gas Chemicals (OKP4, OKP4HT) and TOPAS (a cyclo-olefin copolymer, grade 5013).
+const PLASTICS: [(&str, f64, f64); 3] = [("OKP4", 1.607, 27.0), ("OKP4HT", 1.632, 23.0), ("COC", 1.533, 56.0)];
+
 /// Names that other programs use for glasses of the built-in catalogue.
 const ALIASES: &[(&str, &str)] = &[
     ("FSILICA", "FUSEDSILICA"),
@@ -54,12 +58,18 @@ const ALIASES: &[(&str, &str)] = &[
 impl GlassCatalogue {
     /// The built-in glasses: those of six makers and LZOS, and a few plastics, crystals and fluids.
     ///
-    /// The numbers are the refractiveindex.info database's (public domain, CC0 1.0). Indices are relative to air, but
+    /// The numbers are the refractiveindex.info database's (public domain, CC0 1.0), but for three plastics. Indices are relative to air, but
     /// for the fluids, whose source gives them relative to vacuum.
     pub fn built_in() -> &'static Self {
         static CATALOGUE: LazyLock<GlassCatalogue> = LazyLock::new(|| {
             let rows = BUILT_IN.lines().filter(|line| !line.starts_with('#'));
-            GlassCatalogue::new(rows.map(|row| glass_of_row(row).expect("a test reads every row")).collect())
+            let of_database = rows.map(|row| glass_of_row(row).expect("a test reads every row"));
+            let plastics = PLASTICS.map(|(name, nd, vd)| CatalogueGlass {
+                maker: "MISC".to_owned(),
+                name: name.to_owned(),
+                glass: Glass::NdVd { nd, vd },
+            });
+            GlassCatalogue::new(of_database.chain(plastics).collect())
         });
         &CATALOGUE
     }
@@ -204,7 +214,7 @@ mod tests {
     #[test]
     fn every_row_is_read_and_makes_sense() {
         let catalogue = GlassCatalogue::built_in();
-        assert_eq!(catalogue.glasses().len(), 1694);
+        assert_eq!(catalogue.glasses().len(), 1694 + PLASTICS.len());
         for glass in catalogue.glasses() {
             glass.glass.check().unwrap();
             let (nd, vd) = glass.glass.nd_vd().unwrap_or_else(|| panic!("{}", glass.full_name()));

@@ -1,13 +1,16 @@
 //! Lens files, told apart by their extension.
 
+mod agf;
 mod dat;
 mod decode;
 mod deeplens;
+mod glass_file;
 mod glasses;
 mod iset_json;
 mod json;
 mod lens_file;
 mod pbrt_list;
+mod rii_yaml;
 mod seq;
 mod shapes;
 mod system;

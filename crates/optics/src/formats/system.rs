@@ -270,7 +270,7 @@ fn widen(widest_mm: &mut [f64], mono: &MonoLens, point: &ObjectPoint, vignetting
 /// Returns the widest rim that fits on a surface, mm.
 fn widest_mm(surface: &SystemSurface) -> f64 {
     let conic = match surface.shape {
-        Shape::Conic { conic } | Shape::EvenAsphere { conic, .. } => conic,
+        Shape::Conic { conic } | Shape::EvenAsphere { conic, .. } | Shape::OddAsphere { conic, .. } => conic,
         _ => 0.0,
     };
     let flattened = (1.0 + conic) * surface.curvature_per_mm * surface.curvature_per_mm;

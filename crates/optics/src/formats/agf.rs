@@ -1,0 +1,182 @@
+//! Zemax glass catalogues (`.agf`): of each glass the name and formula (`NM`), coefficients (`CD`) and range (`LD`).
+
+use crate::{CatalogueGlass, Glass, prescription::TextError};
+
+use super::zmx::nm_of_um;
+
+/// A glass whose lines are being read.
+struct Entry {
+    line: usize,
+    name: String,
+    formula: usize,
+    coefficients: Vec<f64>,
+    range_nm: Option<(f64, f64)>,
+}
+
+/// Reads the glasses of a catalogue.
+pub(super) fn glasses_from_agf(text: &str, maker: &str) -> Result<Vec<CatalogueGlass>, TextError> {
+    let mut glasses = Vec::new();
+    let mut entry: Option<Entry> = None;
+    for (line, text) in text.lines().enumerate().map(|(i, text)| (i + 1, text)) {
+        let mut words = text.split_whitespace();
+        let keyword = words.next().unwrap_or_default();
+        let words: Vec<&str> = words.collect();
+        let numbers = || words.iter().map(|word| number(word, line, keyword)).collect::<Result<Vec<f64>, _>>();
+        match (keyword, &mut entry) {
+            ("NM", before) => {
+                glasses.extend(before.take().map(|entry| entry.finish(maker)).transpose()?);
+                let [name, formula, ..] = words[..] else {
+                    return Err(wrong(line, keyword, "expected a name and the number of a formula"));
+                };
+                // Some catalogues write the whole number as 2.0.
+                let formula = number(formula, line, keyword)?;
+                let (name, formula) = (name.to_owned(), formula as usize);
+                entry = Some(Entry { line, name, formula, coefficients: Vec::new(), range_nm: None });
+            }
+            ("CD", Some(entry)) => entry.coefficients = numbers()?,
+            ("LD", Some(entry)) => {
+                let &[first_um, last_um, ..] = numbers()?.as_slice() else {
+                    return Err(wrong(line, keyword, "expected the shortest and longest wavelength"));
+                };
+                entry.range_nm = Some((nm_of_um(first_um), nm_of_um(last_um)));
+            }
+            ("CD" | "LD", None) => return Err(wrong(line, keyword, "no glass (NM) before it")),
+            _ => {}
+        }
+    }
+    glasses.extend(entry.map(|entry| entry.finish(maker)).transpose()?);
+    if glasses.is_empty() {
+        return Err(TextError { line: None, reason: "no glass (NM) in the file".to_owned() });
+    }
+    Ok(glasses)
+}
+
+fn number(word: &str, line: usize, keyword: &str) -> Result<f64, TextError> {
+    match word.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err(wrong(line, keyword, &format!("'{word}' is not a number"))),
+    }
+}
+
+fn wrong(line: usize, keyword: &str, reason: &str) -> TextError {
+    TextError { line: Some(line), reason: format!("{keyword}: {reason}") }
+}
+
+impl Entry {
+    fn finish(self, maker: &str) -> Result<CatalogueGlass, TextError> {
+        let wrong =
+            |reason: String| TextError { line: Some(self.line), reason: format!("glass {}: {reason}", self.name) };
+        if self.coefficients.is_empty() {
+            return Err(wrong("its coefficients (CD) are missing".to_owned()));
+        }
+        let Some((formula, coefficients)) = as_database_formula(self.formula, &self.coefficients) else {
+            return Err(wrong(format!("formula {} is not known; expected 1 to 13", self.formula)));
+        };
+        let glass = Glass::Formula { formula, coefficients, range_nm: self.range_nm };
+        glass.check().map_err(|error| wrong(error.to_string()))?;
+        Ok(CatalogueGlass { maker: maker.to_owned(), name: self.name.clone(), glass })
+    }
+}
+
+/// Returns one of Zemax's formulas as the formula of refractiveindex.info that says the same, λ in µm in both.
+fn as_database_formula(formula: usize, c: &[f64]) -> Option<(u8, Vec<f64>)> {
+    let at = |i: usize| c.get(i).copied().unwrap_or(0.0);
+    // n² = Σ a λ^p, the powers in the order of the coefficients.
+    let powers = |powers: &[f64]| {
+        let terms = powers.iter().zip(1..).flat_map(|(&power, i)| [at(i), power]);
+        Some((3, [at(0)].into_iter().chain(terms).collect()))
+    };
+    // n² = 1 + Σ K λ² / (λ² − L).
+    let sellmeier = |n_terms: usize| Some((2, [0.0].into_iter().chain((0..2 * n_terms).map(at)).collect()));
+    match formula {
+        // Schott.
+        1 => powers(&[2.0, -2.0, -4.0, -6.0, -8.0]),
+        // Sellmeier 1.
+        2 => sellmeier(3),
+        // Herzberger.
+        3 => Some((7, (0..6).map(at).collect())),
+        // Sellmeier 2: n² = 1 + A + B λ²/(λ² − l²) + C/(λ² − m²).
+        4 => Some((4, vec![1.0 + at(0), at(1), 2.0, at(2), 2.0, at(3), 0.0, at(4), 2.0])),
+        // Conrady: n = n0 + A/λ + B/λ^3.5.
+        5 => Some((5, vec![at(0), at(1), -1.0, at(2), -3.5])),
+        // Sellmeier 3.
+        6 => sellmeier(4),
+        // Handbook of Optics 1: n² = A + B/(λ² − C) − D λ².
+        7 => Some((4, vec![at(0), at(1), 0.0, at(2), 1.0, 0.0, 0.0, 0.0, 0.0, -at(3), 2.0])),
+        // Handbook of Optics 2: n² = A + B λ²/(λ² − C) − D λ².
+        8 => Some((4, vec![at(0), at(1), 2.0, at(2), 1.0, 0.0, 0.0, 0.0, 0.0, -at(3), 2.0])),
+        // Sellmeier 4: n² = A + B λ²/(λ² − C) + D λ²/(λ² − E).
+        9 => Some((4, vec![at(0), at(1), 2.0, at(2), 1.0, at(3), 2.0, at(4), 1.0])),
+        // Extended.
+        10 => powers(&[2.0, -2.0, -4.0, -6.0, -8.0, -10.0, -12.0]),
+        // Sellmeier 5.
+        11 => sellmeier(5),
+        // Extended 2.
+        12 => powers(&[2.0, -2.0, -4.0, -6.0, -8.0, 4.0, 6.0]),
+        // Extended 3.
+        13 => powers(&[2.0, 4.0, -2.0, -4.0, -6.0, -8.0, -10.0, -12.0]),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TWO: &str = "CC a comment\r\nNM N-BK7 2 517642.251 1.5168 64.17 0 1\r\nGC comment\r\n\
+        CD 1.03961212 0.00600069867 0.231792344 0.0200179144 1.01046945 103.560653\r\nLD 0.3 2.5\r\n\
+        NM OLD 1.0 0\r\nCD 2.25 -0.01 0.02\r\nIT 0.4 0.99 25\r\n";
+
+    #[test]
+    fn glasses_are_read_with_their_range() {
+        let glasses = glasses_from_agf(TWO, "SCHOTT").ok().unwrap();
+        assert_eq!(glasses.len(), 2);
+        assert_eq!(glasses[0].full_name(), "SCHOTT:N-BK7");
+        assert!((glasses[0].glass.index_at(587.5618).unwrap() - 1.5168).abs() < 1e-6);
+        assert_eq!(glasses[0].glass.range_nm(), Some((300.0, 2500.0)));
+        let expected = (2.25_f64 - 0.01 * 0.25 + 0.02 / 0.25).sqrt();
+        assert!((glasses[1].glass.index_at(500.0).unwrap() - expected).abs() < 1e-15);
+    }
+
+    /// Each formula at 0.5 µm, where λ² = 1/4, against its definition worked out by hand.
+    #[test]
+    fn formulas_are_those_of_their_definition() {
+        let check = |formula: usize, c: &[f64], expected: f64| {
+            let (formula_there, coefficients) = as_database_formula(formula, c).unwrap();
+            let glass = Glass::Formula { formula: formula_there, coefficients, range_nm: None };
+            let found = glass.index_at(500.0).unwrap();
+            assert!((found - expected).abs() < 4e-16 * expected, "formula {formula}: {found}, expected {expected}");
+        };
+        let (w2, root) = (0.25_f64, f64::sqrt);
+        let l = 1.0 / (w2 - 0.028);
+        check(1, &[2.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5], root(2.0 + 0.025 + 0.04 + 0.016 + 0.0064 + 0.00256));
+        check(2, &[1.0, 0.01, 0.1, 0.02], root(1.0 + 0.25 / 0.24 + 0.025 / 0.23));
+        check(3, &[1.5, 0.01, 1e-3, 0.1, 0.2, 0.3], 1.5 + 0.01 * l + 1e-3 * l * l + 0.025 + 0.0125 + 0.3 / 64.0);
+        check(4, &[0.2, 1.0, 0.1, 0.01, 0.2], root(1.2 + 0.25 / 0.24 + 0.01 / 0.21));
+        check(5, &[1.5, 0.01, 1e-4], 1.5 + 0.02 + 1e-4 * 2.0_f64.powf(3.5));
+        check(7, &[2.2, 0.01, 0.05, 0.1], root(2.2 + 0.01 / 0.2 - 0.025));
+        check(8, &[2.2, 0.01, 0.05, 0.1], root(2.2 + 0.0025 / 0.2 - 0.025));
+        check(9, &[1.2, 1.0, 0.05, 0.1, 0.15], root(1.2 + 0.25 / 0.2 + 0.025 / 0.1));
+        check(10, &[2.0, 0.1, 0.01, 0.0, 0.0, 0.0, 1e-6, 1e-7], root(2.0 + 0.025 + 0.04 + 1.024e-3 + 4.096e-4));
+        check(12, &[2.0, 0.1, 0.01, 0.0, 0.0, 0.0, 0.1, 0.2], root(2.0 + 0.025 + 0.04 + 0.00625 + 0.003125));
+        check(13, &[2.0, 0.1, 0.2, 0.01, 0.0, 0.0, 0.0, 0.0, 1e-7], root(2.0 + 0.025 + 0.0125 + 0.04 + 4.096e-4));
+        for (formula, n_terms) in [(6, 4), (11, 5)] {
+            let c: Vec<f64> = (0..n_terms).flat_map(|_| [0.2, 0.05]).collect();
+            check(formula, &c, root(1.0 + n_terms as f64 * 0.2 * 0.25 / 0.2));
+        }
+    }
+
+    #[test]
+    fn mistakes_are_told_by_line_and_glass() {
+        let message = |from: &str, to: &str| {
+            let error = glasses_from_agf(&TWO.replace(from, to), "").err().unwrap();
+            format!("{}: {}", error.line.unwrap_or(0), error.reason)
+        };
+        assert_eq!(message("0.3 2.5", "0.3 x"), "5: LD: 'x' is not a number");
+        assert_eq!(message("0.3 2.5", "0.3"), "5: LD: expected the shortest and longest wavelength");
+        assert_eq!(message("N-BK7 2", "N-BK7 14"), "2: glass N-BK7: formula 14 is not known; expected 1 to 13");
+        assert_eq!(message("CD 2.25 -0.01 0.02", ""), "6: glass OLD: its coefficients (CD) are missing");
+        assert_eq!(message("NM N-BK7", "XX N-BK7"), "4: CD: no glass (NM) before it");
+        assert_eq!(message(TWO, ""), "0: no glass (NM) in the file");
+    }
+}
