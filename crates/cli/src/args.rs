@@ -120,8 +120,10 @@ pub(crate) enum DiffractionKind {
     None,
     /// Heisenberg-uncertainty ray bending, γ = 1 (the paper, Freniere)
     Hurb,
-    /// Heisenberg-uncertainty ray bending, γ = √2 (Scene3D since 2015)
+    /// Heisenberg-uncertainty ray bending, γ = √2 (`Scene3D` since 2015)
     HurbScene3d,
+    /// Ray bending with constants fitted to Airy's pattern
+    HurbCalibrated,
 }
 
 /// How the scene is blurred.

@@ -1,2 +1,57 @@
 //! The command line of dioptric.
-fn main() {}
+//!
+//! `args` holds the words; each subcommand has its file and calls `dioptric-pipeline`, which does the work. An error
+//! ends in one sentence on standard error and a status that is not 0, and leaves no half-written file.
+
+mod args;
+mod glass;
+mod lens;
+mod psf;
+mod run;
+mod sense;
+mod terminal;
+mod trace;
+
+use std::process::ExitCode;
+
+use anyhow::Context;
+use clap::Parser;
+
+use crate::{
+    args::{Cli, Command, Common},
+    terminal::ClosedPipe,
+};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    terminal::remove_partial_files_on_interrupt();
+    match dispatch(cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        // Whoever read the output has seen enough.
+        Err(error) if error.is::<ClosedPipe>() => ExitCode::SUCCESS,
+        Err(error) => {
+            terminal::print_error(&error);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
+    use_threads(&common)?;
+    match command {
+        Command::Run(arguments) => run::run(&arguments, &common),
+        Command::Lens(command) => lens::run(&command, &common),
+        Command::Glass(command) => glass::run(&command, &common),
+        Command::Trace(arguments) => trace::run(&arguments),
+        Command::Psf(arguments) => psf::run(&arguments, &common),
+        Command::Sense(arguments) => sense::run(&arguments, &common),
+    }
+}
+
+fn use_threads(common: &Common) -> anyhow::Result<()> {
+    let Some(n_threads) = common.threads else { return Ok(()) };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(n_threads.into())
+        .build_global()
+        .with_context(|| format!("cannot start {n_threads} threads"))
+}

@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_sensor::{AutoExposure, ExposureControl, Metering};
+use dioptric_sensor::{
+    AutoExposure, Brightness, ColorCorrection, Demosaic, ExposureControl, Metering, Processing, ToneCurve, WhiteBalance,
+};
+use dioptric_spectrum::Illuminant;
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
@@ -135,9 +138,11 @@ pub enum DiffractionChoice {
     None,
     /// Heisenberg-uncertainty ray bending.
     Hurb {
-        /// Strength: 1 is the paper's and Freniere's, √2 that of Scene3D since 2015.
+        /// Strength: 1 is the paper's and Freniere's, √2 that of `Scene3D` since 2015.
         gamma: f64,
     },
+    /// Ray bending with constants fitted to Airy's pattern: better in focus, not in defocus.
+    HurbCalibrated,
 }
 
 impl Default for DiffractionChoice {
@@ -173,37 +178,50 @@ pub enum SensorChoice {
 #[serde(deny_unknown_fields, default)]
 pub struct ProcessingChoice {
     /// How missing colours are filled in.
-    pub demosaic: DemosaicChoice,
+    pub demosaic: Demosaic,
     /// What is made white.
     pub white: WhiteChoice,
-    /// Factor on the linear picture before it is encoded.
-    pub brightness: f64,
+    /// How bright the picture is made.
+    pub brightness: Brightness,
+    /// The curve from light to codes.
+    pub curve: ToneCurve,
 }
 
 impl Default for ProcessingChoice {
     fn default() -> Self {
-        Self { demosaic: DemosaicChoice::EdgeAware, white: WhiteChoice::Scene, brightness: 1.0 }
+        Self {
+            demosaic: Demosaic::Directional,
+            white: WhiteChoice::Scene,
+            brightness: Brightness::AsExposed,
+            curve: ToneCurve::Srgb,
+        }
     }
 }
 
-/// How missing colours are filled in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum DemosaicChoice {
-    /// Means of neighbours.
-    Bilinear,
-    /// Along edges, not across.
-    EdgeAware,
+/// What is made white, and how colours are corrected.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum WhiteChoice {
+    /// The light on the scene, with colours corrected for it.
+    Scene,
+    /// This light, with colours corrected for it.
+    Light(Illuminant),
+    /// The mean of the picture, with colours corrected for the light on the scene.
+    GreyWorld,
+    /// Nothing: channels are shown as they are.
+    None,
 }
 
-/// What is made white.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum WhiteChoice {
-    /// The light of the scene where it is known, else the mean of the picture.
-    Scene,
-    /// The mean of the picture.
-    GrayWorld,
-    /// Nothing.
-    None,
+impl ProcessingChoice {
+    /// Returns the sensor's processing under the light on the scene.
+    pub fn under(self, light: Illuminant) -> Processing {
+        let (white_balance, color) = match self.white {
+            WhiteChoice::Scene => (WhiteBalance::Illuminant(light), ColorCorrection::Fitted(light)),
+            WhiteChoice::Light(other) => (WhiteBalance::Illuminant(other), ColorCorrection::Fitted(other)),
+            WhiteChoice::GreyWorld => (WhiteBalance::GreyWorld, ColorCorrection::Fitted(light)),
+            WhiteChoice::None => (WhiteBalance::None, ColorCorrection::None),
+        };
+        Processing { white_balance, demosaic: self.demosaic, color, brightness: self.brightness, curve: self.curve }
+    }
 }
 
 /// The bands that are simulated.
@@ -332,7 +350,6 @@ impl Camera {
             ExposureControl::Manual(exposure) => checker.positive("time_s", exposure.time_s)?,
             ExposureControl::Auto(auto) => checker.positive("target_fraction", auto.target_fraction)?,
         }
-        checker.positive("brightness", self.processing.brightness)?;
         match &self.wavelengths {
             WavelengthChoice::Scene => {}
             WavelengthChoice::Range { first_nm, last_nm, step_nm } => {
@@ -368,7 +385,7 @@ mod tests {
 
     const SHORT: &str = r#"(
     name: "short",
-    lens: BuiltIn("double-gauss-50mm"),
+    lens: BuiltIn("dgauss-50mm"),
     stop: FNumber(4.0),
     focus: DistanceMm(2000.0),
     sensor: File("my/sensor.ron"),

@@ -2,8 +2,15 @@
 
 use std::path::PathBuf;
 
+use dioptric_forward::ForwardError;
+use dioptric_optics::OpticsError;
+use dioptric_psf::PsfError;
+use dioptric_scene::SceneError;
+use dioptric_sensor::SensorError;
+use dioptric_spectrum::SpectrumError;
+
 /// A camera that cannot be built, run or written down.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
     /// A list of numbers that cannot be read.
     #[error("{what}: '{item}' is neither a number nor a range first:last:step")]
@@ -58,5 +65,41 @@ pub enum PipelineError {
         found: String,
         /// What would do.
         expected: String,
+    },
+    /// A row of a table that cannot be used.
+    #[error("{}:{line}: {reason}", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// 1-based line.
+        line: u64,
+        /// What is wrong and what was expected.
+        reason: String,
+    },
+    /// The lens.
+    #[error(transparent)]
+    Optics(#[from] OpticsError),
+    /// The sensor.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// The point-spread functions.
+    #[error(transparent)]
+    Psf(#[from] PsfError),
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The blur.
+    #[error(transparent)]
+    Forward(#[from] ForwardError),
+    /// Spectral data.
+    #[error(transparent)]
+    Spectrum(#[from] SpectrumError),
+    /// A part of the camera that does not go with another.
+    #[error("{what}: {reason}")]
+    Unsuitable {
+        /// The part.
+        what: &'static str,
+        /// Why.
+        reason: String,
     },
 }

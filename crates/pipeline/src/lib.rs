@@ -1,20 +1,58 @@
-//! The whole camera: scene, lens, sensor and processing chained as in Figure 1.
+//! The whole camera, chained as in Figure 1 of the paper: scene, lens, irradiance, sensor, picture.
+//!
+//! A [`Camera`] is a file: it says everything about a shot. A [`Shot`] is a camera with all that it names opened, a
+//! [`Capture`] what came of it, stage by stage; [`Capture::write`] leaves frames, a picture and a report in a folder.
+//! Beside it stand the tables that the command line prints (lenses, glasses, traced rays, point-spread functions) and
+//! the [`figures`] of the paper, each a function that returns data.
+//!
+//! This crate alone sees every stage. It knows nothing of terminals: it prints nothing and reads no clock, and tells
+//! how far it is through [`Progress`].
+#![doc = include_str!("../README.md")]
 
+mod band_stream;
 mod camera;
+mod capture;
 mod check;
+mod convert;
 mod display;
 mod error;
+pub mod figures;
+mod glass_table;
+mod lens_choice;
+mod lens_drawing;
+mod lens_table;
+mod mosaic;
 mod numbers;
 mod plots;
+mod progress;
+mod psf_table;
+mod report;
 mod scene_choice;
+mod sense;
+mod shot;
+mod spot;
 mod staged;
+mod trace_table;
 
 pub use camera::{
-    BlurChoice, Camera, DemosaicChoice, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, Outputs,
-    ProcessingChoice, SensorChoice, StopChoice, WavelengthChoice, WhiteChoice,
+    BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, Outputs, ProcessingChoice,
+    SensorChoice, StopChoice, WavelengthChoice, WhiteChoice,
 };
+pub use capture::{Capture, IrradianceSummary};
+pub use convert::convert_lens;
 pub use error::PipelineError;
+pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
+pub use lens_choice::{REFERENCE_WAVELENGTH_NM, open_lens};
+pub use lens_drawing::LensDrawing;
+pub use lens_table::{ImageData, LensData, LensQuestion, LensRow, SurfaceRow, built_in_lenses, surface_rows};
+pub use mosaic::{MosaicPlan, PsfMosaic};
 pub use numbers::parse_numbers;
-pub use plots::{LineChart, Series};
+pub use plots::{Corner, LineChart, Series};
+pub use progress::{Progress, Silent, Stage};
+pub use psf_table::{MtfRow, PsfRequest, PsfRow, PsfSampling, PsfSet};
+pub use report::{ChannelStatistics, FilmData, IrradianceData, LossRow, Report, SceneData, SensorStatistics};
 pub use scene_choice::{SceneChoice, SceneSource};
+pub use sense::{SenseRequest, parse_illuminant, sense_irradiance, with_exposure_s};
+pub use shot::Shot;
 pub use staged::Staged;
+pub use trace_table::{RayTable, TraceError, TraceSettings};

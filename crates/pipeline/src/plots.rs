@@ -30,6 +30,17 @@ pub struct LineChart {
     pub y_range: (f64, f64),
     /// Lines, drawn in this order.
     pub series: Vec<Series>,
+    /// Where the legend has room.
+    pub legend: Corner,
+}
+
+/// A corner of a plot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Corner {
+    /// Top right.
+    TopRight,
+    /// Bottom left.
+    BottomLeft,
 }
 
 impl LineChart {
@@ -53,7 +64,10 @@ impl LineChart {
             .with_y_axis_max(self.y_range.1)
             .with_clamp_axis();
         if self.series.iter().any(|series| series.label.is_some()) {
-            layout = layout.with_legend_position(LegendPosition::InsideTopRight);
+            layout = layout.with_legend_position(match self.legend {
+                Corner::TopRight => LegendPosition::InsideTopRight,
+                Corner::BottomLeft => LegendPosition::InsideBottomLeft,
+            });
         }
         render_to_svg(plots, layout)
     }
@@ -89,6 +103,7 @@ mod tests {
                 points: vec![(-1.0, 0.0), (0.0, 1.0), (1.0, 0.0)],
                 is_dashed: false,
             }],
+            legend: Corner::TopRight,
         };
         let svg = chart.to_svg(480.0, 320.0);
         for word in ["<svg", "Line spread", "550 nm", "#00aa00"] {

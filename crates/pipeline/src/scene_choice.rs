@@ -1,8 +1,12 @@
 //! What stands before the camera, as a camera file says it.
 
-use std::path::{Path, PathBuf};
+use std::{
+    f64::consts::PI,
+    path::{Path, PathBuf},
+};
 
-use dioptric_spectrum::Illuminant;
+use dioptric_scene::{Pattern, ReadOptions, Scene, StillLife, Target, TargetLight, read_scene};
+use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
 use crate::{PipelineError, check::Checker};
@@ -19,7 +23,7 @@ pub struct SceneChoice {
     /// One depth for the whole scene, m; for files that hold no depth, and for targets.
     #[serde(default)]
     pub depth_m: Option<f64>,
-    /// The light on a scene that holds reflectances.
+    /// The light on the scene: it lights reflectances, and is what white balance goes by.
     #[serde(default = "noon")]
     pub illuminant: Illuminant,
     /// Its illuminance, lux; for a picture, that of a white in it.
@@ -43,45 +47,14 @@ pub enum SceneSource {
         /// Rows.
         rows: usize,
     },
-    /// A checkerboard.
-    Checkerboard {
-        /// Samples along a side of the square picture.
-        samples: usize,
-        /// Samples along a side of a check.
-        check_samples: usize,
-    },
-    /// A bright half plane with a slanted edge.
-    SlantedBar {
-        /// Samples along a side of the square picture.
-        samples: usize,
-        /// Columns the edge moves a row.
-        slope: f64,
-    },
-    /// Bright lines through the centre.
-    RadialLines {
-        /// Samples along a side of the square picture.
-        samples: usize,
-        /// Number of lines.
-        lines: usize,
-    },
-    /// Bright points on a grid.
-    Points {
-        /// Samples along a side of the square picture.
-        samples: usize,
-        /// Samples between points.
-        spacing_samples: usize,
-    },
-    /// The 24-patch chart.
-    ColorChart {
-        /// Samples along a side of a patch.
-        patch_samples: usize,
-    },
-    /// A plane of one reflectance.
-    Uniform {
-        /// Samples along a side of the square picture.
-        samples: usize,
-        /// Reflectance, 0–1.
-        reflectance: f64,
+    /// A flat target that faces the camera; needs a field of view and a depth.
+    Target {
+        /// What is drawn on it.
+        pattern: Pattern,
+        /// Columns.
+        columns: usize,
+        /// Rows.
+        rows: usize,
     },
 }
 
@@ -119,27 +92,60 @@ impl SceneChoice {
             checker.positive("mean_luminance_cd_m2", luminance)?;
         }
         checker.positive("illuminance_lux", self.illuminance_lux)?;
-        let sizes: &[(&'static str, usize)] = match &self.source {
-            SceneSource::File(_) => &[],
-            SceneSource::StillLife { columns, rows } => &[("columns", *columns), ("rows", *rows)],
-            SceneSource::Checkerboard { samples, check_samples } => {
-                &[("samples", *samples), ("check_samples", *check_samples)]
+        match self.source {
+            SceneSource::File(_) => Ok(()),
+            SceneSource::StillLife { columns, rows } => check_size(checker, columns, rows),
+            SceneSource::Target { columns, rows, .. } => {
+                check_size(checker, columns, rows)?;
+                let missing = |key| checker.wrong(key, "missing", "a number: a target has none of its own");
+                match (self.field_of_view_deg, self.depth_m) {
+                    (None, _) => missing("field_of_view_deg"),
+                    (_, None) => missing("depth_m"),
+                    _ => Ok(()),
+                }
             }
-            SceneSource::SlantedBar { samples, slope } => {
-                checker.finite("slope", *slope)?;
-                &[("samples", *samples)]
+        }
+    }
+
+    /// Returns the scene on the bands wanted, or on its own.
+    ///
+    /// # Errors
+    /// When a file cannot be read, lacks what is needed or holds what cannot be.
+    pub fn open(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
+        let own_or = || wanted.cloned().map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok);
+        let mut scene = match &self.source {
+            SceneSource::File(path) => {
+                let options = ReadOptions {
+                    grid: wanted.cloned(),
+                    light: self.illuminant,
+                    illuminance_lux: self.illuminance_lux,
+                    picture_white_cd_m2: self.illuminance_lux / PI,
+                    depth_m: self.depth_m,
+                    horizontal_fov_deg: self.field_of_view_deg,
+                    ..ReadOptions::default()
+                };
+                read_scene(path, &options)?
             }
-            SceneSource::RadialLines { samples, lines } => &[("samples", *samples), ("lines", *lines)],
-            SceneSource::Points { samples, spacing_samples } => {
-                &[("samples", *samples), ("spacing_samples", *spacing_samples)]
+            SceneSource::StillLife { columns, rows } => StillLife::new(*columns, *rows).scene(&own_or()?)?,
+            SceneSource::Target { pattern, columns, rows } => Target {
+                pattern: *pattern,
+                rows: *rows,
+                columns: *columns,
+                light: TargetLight::Illuminant(self.illuminant),
+                luminance_cd_m2: self.illuminance_lux / PI,
+                dark: 0.02,
+                supersampling: 4,
+                horizontal_fov_deg: self.field_of_view_deg.unwrap_or(f64::NAN),
+                distance_m: self.depth_m.unwrap_or(f64::NAN),
             }
-            SceneSource::ColorChart { patch_samples } => &[("patch_samples", *patch_samples)],
-            SceneSource::Uniform { samples, reflectance } => {
-                checker.positive("reflectance", *reflectance)?;
-                &[("samples", *samples)]
-            }
+            .scene(&own_or()?)?,
         };
-        sizes.iter().try_for_each(|&(key, size)| checker.count(key, size, 1..=65_536))
+        scene.require_depth()?;
+        scene.require_view()?;
+        if let Some(wanted_cd_m2) = self.mean_luminance_cd_m2 {
+            scene.scale(wanted_cd_m2 / scene.mean_luminance_cd_m2())?;
+        }
+        Ok(scene)
     }
 
     pub(crate) fn resolve_paths(&mut self, folder: &Path) {
@@ -147,4 +153,9 @@ impl SceneChoice {
             *path = folder.join(&path);
         }
     }
+}
+
+fn check_size(checker: &Checker<'_>, columns: usize, rows: usize) -> Result<(), PipelineError> {
+    checker.count("columns", columns, 1..=65_536)?;
+    checker.count("rows", rows, 1..=65_536)
 }

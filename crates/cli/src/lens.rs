@@ -1,0 +1,130 @@
+//! `dioptric lens`: built-in lenses, first-order data, drawings, formats.
+
+use std::{fmt::Write, fs};
+
+use anyhow::Context;
+use dioptric_pipeline::{
+    LensData, LensDrawing, LensQuestion, Staged, SurfaceRow, built_in_lenses, convert_lens, open_lens, parse_numbers,
+    surface_rows,
+};
+
+use crate::{
+    args::{Common, LensCommand, LensDrawArgs, LensInfoArgs},
+    terminal::{guarded, print, print_json, remark},
+};
+
+pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> {
+    match command {
+        LensCommand::List => list(common),
+        LensCommand::Info(arguments) => info(arguments, common),
+        LensCommand::Draw(arguments) => draw(arguments, common),
+        LensCommand::Convert { input, output } => {
+            let staged = guarded(Staged::file(output)?);
+            convert_lens(input, output, staged.path())?;
+            Ok(staged.commit()?)
+        }
+    }
+}
+
+fn list(common: &Common) -> anyhow::Result<()> {
+    let lenses = built_in_lenses()?;
+    if common.json {
+        return print_json(&lenses);
+    }
+    let mut text = format!("{:<20} {:>8} {:>7} {:>9}  source\n", "name", "EFL mm", "f/", "surfaces");
+    for lens in lenses {
+        writeln!(
+            text,
+            "{:<20} {:>8.3} {:>7.2} {:>9}  {}",
+            lens.name, lens.efl_mm, lens.f_number, lens.surfaces, lens.source
+        )?;
+    }
+    print(&text)
+}
+
+fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
+    let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
+    let wavelengths_nm = parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?;
+    let data: Vec<LensData> = wavelengths_nm
+        .iter()
+        .map(|&wavelength_nm| {
+            let LensInfoArgs { distance_mm, field_deg, .. } = *arguments;
+            LensData::new(&lens, &LensQuestion { wavelength_nm, distance_mm, field_deg })
+        })
+        .collect::<Result<_, _>>()?;
+    if common.json {
+        return print_json(&data);
+    }
+    let mut text = format!("{}\n{}\n\n", lens.name(), lens.source());
+    text += &surface_table(&surface_rows(&lens))?;
+    text += "\n";
+    text += &data_table(&data)?;
+    print(&text)
+}
+
+fn surface_table(rows: &[SurfaceRow]) -> Result<String, std::fmt::Error> {
+    let mut text =
+        format!("{:>7} {:>12} {:>12} {:>12}  medium behind\n", "surface", "radius mm", "distance mm", "diameter mm");
+    for row in rows {
+        let stop = if row.is_stop { "  (stop)" } else { "" };
+        let SurfaceRow { surface, radius_mm, thickness_mm, diameter_mm, medium_after, .. } = row;
+        writeln!(
+            text,
+            "{surface:>7} {radius_mm:>12.4} {thickness_mm:>12.4} {diameter_mm:>12.4}  {medium_after}{stop}"
+        )?;
+    }
+    Ok(text)
+}
+
+/// One line a quantity, one column a wavelength.
+fn data_table(data: &[LensData]) -> anyhow::Result<String> {
+    let mut text = String::new();
+    let records: Vec<serde_json::Map<String, serde_json::Value>> = data
+        .iter()
+        .map(|d| serde_json::to_value(d)?.as_object().cloned().context("the data of a lens is a record"))
+        .collect::<anyhow::Result<_>>()?;
+    let Some(first) = records.first() else { return Ok(text) };
+    for key in first.keys().filter(|key| *key != "lens" && *key != "seidel_surfaces") {
+        if let Some(sums) = first[key].as_object() {
+            for name in sums.keys() {
+                write!(text, "{:<28}", format!("{key} {name}"))?;
+                for record in &records {
+                    write!(text, " {:>14}", number(&record[key][name]))?;
+                }
+                text += "\n";
+            }
+            continue;
+        }
+        write!(text, "{key:<28}")?;
+        for record in &records {
+            write!(text, " {:>14}", number(&record[key]))?;
+        }
+        text += "\n";
+    }
+    Ok(text)
+}
+
+fn number(value: &serde_json::Value) -> String {
+    match value.as_f64() {
+        Some(v) if v == 0.0 || (1e-3..1e6).contains(&v.abs()) => format!("{v:.6}"),
+        Some(v) => format!("{v:.5e}"),
+        None => "inf".to_owned(),
+    }
+}
+
+fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
+    let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
+    let drawing = LensDrawing {
+        fields_deg: parse_numbers("--fields-deg", &arguments.fields_deg)?,
+        distance_mm: arguments.distance_mm,
+        wavelength_nm: arguments.wavelength_nm,
+        film_mm: arguments.film_mm,
+    };
+    let svg = drawing.to_svg(&lens)?;
+    let path = &arguments.output;
+    let staged = guarded(Staged::file(path)?);
+    fs::write(staged.path(), svg).with_context(|| format!("cannot write {}", path.display()))?;
+    staged.commit()?;
+    remark(common.quiet, &format!("wrote {}", path.display()));
+    Ok(())
+}

@@ -1,0 +1,97 @@
+//! `dioptric psf`: point-spread functions and what is measured of them.
+
+use std::fmt::Write;
+
+use dioptric_pipeline::{FocusChoice, PsfRequest, PsfSampling, PsfSet, Staged, open_lens, parse_numbers};
+
+use crate::{
+    args::{Common, PsfArgs, PsfMode},
+    run::diffraction,
+    terminal::{Bar, guarded, print, print_json, remark},
+};
+
+/// The seed where the user gives none.
+const SEED: u64 = 1;
+
+pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
+    let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
+    let focus = match (arguments.film.focus_mm, arguments.film.film_mm) {
+        (Some(distance_mm), _) => FocusChoice::DistanceMm(distance_mm),
+        (None, Some(film_mm)) => FocusChoice::FilmMm(film_mm),
+        (None, None) => anyhow::bail!("one of --focus-mm and --film-mm is needed"),
+    };
+    let request = PsfRequest {
+        fields_deg: parse_numbers("--fields-deg", &arguments.fields_deg)?,
+        distances_mm: parse_numbers("--distances-mm", &arguments.distances_mm)?,
+        wavelengths_nm: parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?,
+        focus,
+        diffraction: diffraction(arguments.diffraction),
+        pixel_um: arguments.pixel_um,
+        size: arguments.size,
+        sampling: match arguments.mode {
+            PsfMode::Pupil => PsfSampling::Pupil,
+            PsfMode::Paper => PsfSampling::Paper { n_across: arguments.rays },
+        },
+        mtf_per_mm: match &arguments.mtf_per_mm {
+            Some(list) => parse_numbers("--mtf-per-mm", list)?,
+            None => Vec::new(),
+        },
+        seed: common.seed.unwrap_or(SEED),
+    };
+    // The place is tried before the work.
+    let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
+    let bar = Bar::new(common.quiet);
+    bar.show("tracing the lens", 0.0);
+    let set = request.compute(&lens)?;
+    drop(bar);
+    if let (Some(staged), Some(path)) = (staged, &arguments.output) {
+        set.write(staged.path())?;
+        staged.commit()?;
+        remark(common.quiet, &format!("wrote {}", path.display()));
+    }
+    if common.json { print_json(&set.rows) } else { print(&table(&set)?) }
+}
+
+fn table(set: &PsfSet) -> Result<String, std::fmt::Error> {
+    let mut text = format!("film {:.4} mm behind the last vertex, pixels of {} µm\n\n", set.film_mm, set.pixel_um);
+    writeln!(
+        text,
+        "{:>9} {:>12} {:>8} {:>12} {:>12} {:>10} {:>10} {:>10} {:>10} {:>10} {:>8}",
+        "field °",
+        "distance mm",
+        "λ nm",
+        "centroid x",
+        "centroid y",
+        "rms µm",
+        "σx µm",
+        "σy µm",
+        "LSF µm",
+        "EE50 µm",
+        "energy"
+    )?;
+    for row in &set.rows {
+        writeln!(
+            text,
+            "{:>9.3} {:>12.1} {:>8.1} {:>12.5} {:>12.5} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>8.4}",
+            row.field_deg,
+            row.distance_mm,
+            row.wavelength_nm,
+            row.centroid_x_mm,
+            row.centroid_y_mm,
+            row.rms_radius_um,
+            row.sigma_x_um,
+            row.sigma_y_um,
+            row.lsf_fwhm_um,
+            row.ee50_radius_um,
+            row.energy
+        )?;
+        for mtf in &row.mtf {
+            writeln!(
+                text,
+                "{:>31} {:>8.2}/mm  radial {:.4}  tangential {:.4}",
+                "MTF", mtf.cycles_per_mm, mtf.radial, mtf.tangential
+            )?;
+        }
+    }
+    Ok(text)
+}

@@ -1,0 +1,191 @@
+//! `dioptric run`: the whole of Figure 1.
+
+use std::{
+    path::Path,
+    sync::{Mutex, PoisonError},
+    time::Instant,
+};
+
+use anyhow::{Context, bail};
+use dioptric_pipeline::{
+    BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, Progress, Report, SceneChoice,
+    SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, parse_illuminant, parse_numbers, with_exposure_s,
+};
+
+use crate::{
+    args::{BlurKind, Common, DiffractionKind, RunArgs},
+    terminal::{Bar, guarded, print, print_json, remark},
+};
+
+pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
+    let camera = camera_of(arguments, common)?;
+    camera.validate()?;
+    let staged = guarded(Staged::folder(&arguments.out)?);
+    let clock = Clock::new(common.quiet);
+    let (shot, capture) = camera.capture(Some(staged.path()), &clock)?;
+    let timings = clock.timings();
+    clock.at(Stage::Report, 0.0);
+    let report = capture.write(&shot, staged.path(), &timings)?;
+    staged.commit()?;
+    drop(clock);
+    if common.json {
+        return print_json(&report);
+    }
+    remark(common.quiet, "");
+    if common.quiet { Ok(()) } else { print(&summary(&report, &arguments.out)) }
+}
+
+/// Returns the camera of the file, or the demo, with what the command line changes.
+fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<Camera> {
+    let mut camera = match &arguments.camera {
+        Some(path) => Camera::read(path)?,
+        None => Camera::demo()?,
+    };
+    if let Some(scene) = &arguments.scene {
+        // The demo's film and bands are made for its own scene.
+        if arguments.camera.is_none() {
+            camera.film = FilmChoice::Scene;
+            camera.wavelengths = WavelengthChoice::Scene;
+            camera.name = format!("{}, 50 mm double Gauss", stem_of(scene));
+        }
+        camera.scene = SceneChoice::of_file(scene.clone());
+    }
+    change_scene(&mut camera, arguments)?;
+    change_lens(&mut camera, arguments);
+    change_sensor(&mut camera, arguments)?;
+    if let Some(seed) = common.seed {
+        camera.seed = seed;
+    }
+    if let Some(list) = &arguments.wavelengths_nm {
+        camera.wavelengths = WavelengthChoice::ListNm(parse_numbers("--wavelengths-nm", list)?);
+    }
+    Ok(camera)
+}
+
+fn stem_of(path: &Path) -> String {
+    path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+fn change_scene(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
+    let scene = &mut camera.scene;
+    scene.field_of_view_deg = arguments.fov_deg.or(scene.field_of_view_deg);
+    scene.depth_m = arguments.depth_m.or(scene.depth_m);
+    scene.illuminance_lux = arguments.illuminance_lux.unwrap_or(scene.illuminance_lux);
+    if let Some(name) = &arguments.illuminant {
+        scene.illuminant = parse_illuminant(name)?;
+    }
+    Ok(())
+}
+
+fn change_lens(camera: &mut Camera, arguments: &RunArgs) {
+    if let Some(lens) = &arguments.lens {
+        camera.lens = LensChoice::named(lens);
+        // The f-number in the file was meant for another lens.
+        camera.stop = StopChoice::AsGiven;
+    }
+    if let Some(n) = arguments.f_number {
+        camera.stop = StopChoice::FNumber(n);
+    }
+    if let Some(d) = arguments.stop_mm {
+        camera.stop = StopChoice::DiameterMm(d);
+    }
+    if let Some(d) = arguments.focus_mm {
+        camera.focus = FocusChoice::DistanceMm(d);
+    }
+    if let Some(d) = arguments.film_mm {
+        camera.focus = FocusChoice::FilmMm(d);
+    }
+    if let Some(kind) = arguments.diffraction {
+        camera.diffraction = diffraction(kind);
+    }
+    if let Some(kind) = arguments.blur {
+        camera.blur = match kind {
+            BlurKind::Layered => BlurChoice::Layered,
+            BlurKind::Pointwise => BlurChoice::Pointwise,
+        };
+    }
+}
+
+pub(crate) fn diffraction(kind: DiffractionKind) -> DiffractionChoice {
+    match kind {
+        DiffractionKind::None => DiffractionChoice::None,
+        DiffractionKind::Hurb => DiffractionChoice::Hurb { gamma: 1.0 },
+        DiffractionKind::HurbScene3d => DiffractionChoice::Hurb { gamma: std::f64::consts::SQRT_2 },
+        DiffractionKind::HurbCalibrated => DiffractionChoice::HurbCalibrated,
+    }
+}
+
+fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
+    if let Some(sensor) = &arguments.sensor {
+        camera.sensor = SensorChoice::named(sensor);
+        if arguments.scene.is_none() {
+            camera.film = FilmChoice::Sensor;
+        }
+    }
+    match (&arguments.pixels, arguments.pixel_um) {
+        (None, None) => {}
+        (Some(size), Some(pitch_um)) => {
+            let (columns, rows) = parse_size(size)?;
+            camera.film = FilmChoice::Pixels { columns, rows, pitch_um };
+        }
+        _ => bail!("--pixels and --pixel-um go together"),
+    }
+    if let Some(time_s) = arguments.exposure_s {
+        camera.exposure = with_exposure_s(camera.exposure, time_s);
+    }
+    Ok(())
+}
+
+fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
+    let parts = text.split_once(['x', 'X', '×']);
+    parts
+        .and_then(|(columns, rows)| Some((columns.trim().parse().ok()?, rows.trim().parse().ok()?)))
+        .with_context(|| format!("--pixels is '{text}', expected WxH, as 640x480"))
+}
+
+fn summary(report: &Report, out: &Path) -> String {
+    let total_s: f64 = report.timings_s.iter().map(|(_, seconds)| seconds).sum();
+    format!(
+        "{}: {} × {} pixels, {} bands, {:.2} ms, {:.1} s\n{}\n",
+        report.camera.name,
+        report.film.columns,
+        report.film.rows,
+        report.irradiance.wavelengths_nm.len(),
+        1e3 * report.sensor.exposure_time_s,
+        total_s,
+        out.join("report.html").display(),
+    )
+}
+
+/// Shows progress and measures how long each stage takes.
+struct Clock {
+    bar: Bar,
+    stages: Mutex<Vec<(Stage, Instant)>>,
+}
+
+impl Clock {
+    fn new(quiet: bool) -> Self {
+        Self { bar: Bar::new(quiet), stages: Mutex::new(Vec::new()) }
+    }
+
+    /// Returns how long each stage has taken so far, s.
+    fn timings(&self) -> Vec<(String, f64)> {
+        let stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
+        let ends = stages.iter().skip(1).map(|(_, start)| *start).chain([Instant::now()]);
+        stages
+            .iter()
+            .zip(ends)
+            .map(|((stage, start), end)| (stage.title().to_owned(), (end - *start).as_secs_f64()))
+            .collect()
+    }
+}
+
+impl Progress for Clock {
+    fn at(&self, stage: Stage, fraction: f64) {
+        let mut stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
+        if stages.last().is_none_or(|(last, _)| *last != stage) {
+            stages.push((stage, Instant::now()));
+        }
+        self.bar.show(stage.title(), fraction);
+    }
+}

@@ -1,0 +1,52 @@
+//! `dioptric sense`: a sensor exposed to an irradiance image.
+
+use std::fmt::Write;
+
+use dioptric_pipeline::{
+    Camera, SenseRequest, SensorChoice, SensorStatistics, Staged, parse_illuminant, sense_irradiance, with_exposure_s,
+};
+
+use crate::{
+    args::{Common, SenseArgs},
+    terminal::{guarded, print, print_json},
+};
+
+pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> {
+    let demo = Camera::demo()?;
+    let request = SenseRequest {
+        sensor: SensorChoice::named(&arguments.sensor),
+        exposure: match arguments.exposure_s {
+            Some(time_s) => with_exposure_s(demo.exposure, time_s),
+            None => demo.exposure,
+        },
+        processing: demo.processing,
+        illuminant: arguments.illuminant.as_deref().map(parse_illuminant).transpose()?,
+        seed: common.seed.unwrap_or(demo.seed),
+    };
+    let staged = guarded(Staged::folder(&arguments.out)?);
+    let statistics = sense_irradiance(&arguments.irradiance, &request, staged.path())?;
+    staged.commit()?;
+    match (common.json, common.quiet) {
+        (true, _) => print_json(&statistics),
+        (false, true) => Ok(()),
+        (false, false) => print(&table(&statistics)?),
+    }
+}
+
+fn table(statistics: &SensorStatistics) -> Result<String, std::fmt::Error> {
+    let mut text = format!(
+        "{}: {:.4} ms, saturation at {:.0} electrons, {:.3} % saturated\n",
+        statistics.sensor,
+        1e3 * statistics.exposure_time_s,
+        statistics.saturation_e,
+        100.0 * statistics.saturated_fraction
+    );
+    for channel in &statistics.channels {
+        writeln!(
+            text,
+            "{:<8} mean {:>10.1} e  largest {:>10.1} e  SNR {:>6.1} dB  raw mean {:>9.2}",
+            channel.filter, channel.mean_e, channel.max_e, channel.snr_db, channel.mean_raw
+        )?;
+    }
+    Ok(text)
+}

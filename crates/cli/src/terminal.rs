@@ -1,0 +1,115 @@
+//! What the user sees: results, errors, progress; and what an interrupt leaves behind.
+
+#![expect(clippy::print_stderr, reason = "errors go to standard error")]
+
+use std::{
+    fmt,
+    io::{self, IsTerminal, Write},
+    path::PathBuf,
+    sync::{LazyLock, Mutex, PoisonError},
+    time::Duration,
+};
+
+use dioptric_pipeline::Staged;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+/// The status of a program that an interrupt ended.
+const INTERRUPTED: i32 = 130;
+
+/// Half-written results, to be removed on an interrupt.
+static PARTIAL: LazyLock<Mutex<Vec<PathBuf>>> = LazyLock::new(|| Mutex::new(Vec::new()));
+
+/// Whoever read standard output is gone.
+#[derive(Debug)]
+pub(crate) struct ClosedPipe;
+
+impl fmt::Display for ClosedPipe {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("the output is closed")
+    }
+}
+
+impl std::error::Error for ClosedPipe {}
+
+/// Writes text to standard output.
+pub(crate) fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(output_error)
+}
+
+/// Writes a value to standard output as JSON.
+pub(crate) fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
+    print(&(serde_json::to_string_pretty(value)? + "\n"))
+}
+
+/// Returns the error of a failed write to standard output; a closed pipe is told apart.
+pub(crate) fn output_error(error: io::Error) -> anyhow::Error {
+    if error.kind() == io::ErrorKind::BrokenPipe { ClosedPipe.into() } else { error.into() }
+}
+
+/// Prints an error and its causes as one sentence on one line.
+pub(crate) fn print_error(error: &anyhow::Error) {
+    let sentence = format!("{error:#}");
+    let words: Vec<&str> = sentence.split_whitespace().collect();
+    // Standard error may be closed too; then there is nobody to tell.
+    let _ = writeln!(io::stderr(), "error: {}", words.join(" "));
+}
+
+/// Prints a remark, unless the user wants none.
+pub(crate) fn remark(quiet: bool, text: &str) {
+    if !quiet {
+        eprintln!("{text}");
+    }
+}
+
+/// Removes half-written results when the user interrupts the program.
+pub(crate) fn remove_partial_files_on_interrupt() {
+    let removed = ctrlc::set_handler(|| {
+        for path in PARTIAL.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+            let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
+        }
+        std::process::exit(INTERRUPTED);
+    });
+    // Without a handler an interrupt still ends the program; only hidden partial files may stay.
+    drop(removed);
+}
+
+/// Makes results known, so that an interrupt removes them while they are half-written.
+pub(crate) fn guarded(staged: Staged) -> Staged {
+    PARTIAL.lock().unwrap_or_else(PoisonError::into_inner).push(staged.path().to_owned());
+    staged
+}
+
+/// A progress bar, shown on a terminal only.
+pub(crate) struct Bar(Option<ProgressBar>);
+
+impl Bar {
+    pub(crate) fn new(quiet: bool) -> Self {
+        if quiet || !io::stderr().is_terminal() {
+            return Self(None);
+        }
+        let bar = ProgressBar::new(1000);
+        let style = ProgressStyle::with_template("{msg:<28} {bar:40.cyan/dim} {percent:>3}% {elapsed}")
+            .expect("the template is well-formed");
+        bar.set_style(style.progress_chars("━╸─"));
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self(Some(bar))
+    }
+
+    /// Shows a stage and how far it is, 0–1.
+    pub(crate) fn show(&self, stage: &'static str, fraction: f64) {
+        if let Some(bar) = &self.0 {
+            bar.set_message(stage);
+            bar.set_position((1000.0 * fraction) as u64);
+        }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! `dioptric trace`: rays from a table through a lens.
+
+use std::{fs::File, io, path::Path};
+
+use anyhow::Context;
+use dioptric_pipeline::{RayTable, Staged, TraceError, TraceSettings, open_lens};
+
+use crate::{
+    args::TraceArgs,
+    terminal::{guarded, output_error},
+};
+
+pub(crate) fn run(arguments: &TraceArgs) -> anyhow::Result<()> {
+    let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
+    let rays = RayTable::open(&arguments.rays)?;
+    let settings = TraceSettings { rims_clip: !arguments.no_clip, film_mm: arguments.film_mm };
+    let Some(path) = &arguments.output else {
+        let out = io::BufWriter::new(io::stdout().lock());
+        return rays.trace(&lens, &settings, out).map_err(without_closed_pipe);
+    };
+    let staged = guarded(Staged::file(path)?);
+    let file = create(staged.path())?;
+    rays.trace(&lens, &settings, io::BufWriter::new(file))?;
+    Ok(staged.commit()?)
+}
+
+fn create(path: &Path) -> anyhow::Result<File> {
+    File::create(path).with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn without_closed_pipe(error: TraceError) -> anyhow::Error {
+    match error {
+        TraceError::Write(io) => output_error(io),
+        other => other.into(),
+    }
+}

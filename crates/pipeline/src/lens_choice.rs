@@ -1,0 +1,99 @@
+//! Lenses and sensors as people name them: a built-in name or a file.
+
+use std::path::{Path, PathBuf};
+
+use dioptric_optics::Lens;
+use dioptric_sensor::Sensor;
+
+use crate::{LensChoice, PipelineError, SensorChoice, StopChoice};
+
+/// The wavelength of f-numbers, fields and focus where nothing else is said, nm.
+pub const REFERENCE_WAVELENGTH_NM: f64 = 550.0;
+
+impl LensChoice {
+    /// Returns what `LENS` on the command line means: a path where it looks like one or is one, else a built-in name.
+    pub fn named(text: &str) -> Self {
+        if is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
+    }
+
+    /// Returns the lens.
+    ///
+    /// # Errors
+    /// When there is none of that name, or the file cannot be read.
+    pub fn open(&self) -> Result<Lens, PipelineError> {
+        Ok(match self {
+            Self::BuiltIn(name) => Lens::built_in(name)?,
+            Self::File(path) => Lens::read(path)?,
+            Self::Thin { focal_length_mm, diameter_mm } => Lens::thin(*focal_length_mm, *diameter_mm)?,
+            Self::Pinhole { diameter_mm } => Lens::pinhole(*diameter_mm)?,
+        })
+    }
+}
+
+impl StopChoice {
+    /// Returns the lens with its stop set.
+    ///
+    /// # Errors
+    /// When the stop does not open so far.
+    pub fn apply(self, lens: Lens) -> Result<Lens, PipelineError> {
+        Ok(match self {
+            Self::AsGiven => lens,
+            Self::FNumber(n) => lens.with_f_number(n, REFERENCE_WAVELENGTH_NM)?,
+            Self::DiameterMm(d) => lens.with_stop_diameter_mm(d)?,
+        })
+    }
+}
+
+impl SensorChoice {
+    /// Returns what `SENSOR` on the command line means: a path where it looks like one or is one, else a built-in name.
+    pub fn named(text: &str) -> Self {
+        if is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
+    }
+
+    /// Returns the sensor.
+    ///
+    /// # Errors
+    /// When there is none of that name, or the file cannot be read.
+    pub fn open(&self) -> Result<Sensor, PipelineError> {
+        Ok(match self {
+            Self::BuiltIn(name) => Sensor::built_in(name)?,
+            Self::File(path) => Sensor::read(path)?,
+        })
+    }
+}
+
+fn is_path(text: &str) -> bool {
+    let path = Path::new(text);
+    path.extension().is_some() || text.contains(std::path::MAIN_SEPARATOR) || path.exists()
+}
+
+/// Returns the lens that `LENS` on the command line means, with its stop set to `stop_mm` where given.
+///
+/// # Errors
+/// When there is no such lens, its file cannot be read, or the stop does not open so far.
+pub fn open_lens(text: &str, stop_mm: Option<f64>) -> Result<Lens, PipelineError> {
+    let lens = LensChoice::named(text).open()?;
+    stop_mm.map_or(StopChoice::AsGiven, StopChoice::DiameterMm).apply(lens)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_paths_are_told_apart() {
+        assert_eq!(LensChoice::named("dgauss-50mm"), LensChoice::BuiltIn("dgauss-50mm".to_owned()));
+        for path in ["lens.dat", "./lens", "folder/lens"] {
+            assert_eq!(LensChoice::named(path), LensChoice::File(PathBuf::from(path)));
+        }
+    }
+
+    #[test]
+    fn a_stop_is_set() {
+        let lens = open_lens("dgauss-50mm", Some(8.0)).unwrap();
+        assert_eq!(lens.stop_semi_aperture_mm(), 4.0);
+        assert!(open_lens("dgauss-50mm", Some(80.0)).is_err());
+        let message = open_lens("no-such-lens", None).unwrap_err().to_string();
+        assert!(message.contains("no-such-lens") && message.contains("dgauss-50mm"), "{message}");
+    }
+}

@@ -1,0 +1,243 @@
+//! A lens described in numbers.
+
+use dioptric_optics::{C_LINE_NM, F_LINE_NM, Lens, MonoLens, SeidelSettings, SeidelSums, Surface};
+use serde::Serialize;
+
+use crate::PipelineError;
+
+/// The first-order data and third-order sums of a lens at one wavelength.
+///
+/// z of things in front is from the first vertex, of things behind from the last. What is infinite is left out of
+/// JSON as `null`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LensData {
+    /// The lens.
+    pub lens: String,
+    /// Wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Effective focal length, mm.
+    pub efl_mm: f64,
+    /// z of the rear focal point from the last vertex, mm.
+    pub bfl_mm: f64,
+    /// z of the front focal point from the first vertex, mm.
+    pub ffl_mm: f64,
+    /// z of the front principal plane from the first vertex, mm.
+    pub front_principal_mm: f64,
+    /// z of the rear principal plane from the last vertex, mm.
+    pub rear_principal_mm: f64,
+    /// z of the entrance pupil from the first vertex, mm.
+    pub entrance_pupil_z_mm: f64,
+    /// Diameter of the entrance pupil, mm.
+    pub entrance_pupil_diameter_mm: f64,
+    /// z of the exit pupil from the last vertex, mm.
+    pub exit_pupil_z_mm: f64,
+    /// Diameter of the exit pupil, mm.
+    pub exit_pupil_diameter_mm: f64,
+    /// f-number for a far object.
+    pub f_number: f64,
+    /// The image of an object at the distance asked for.
+    #[serde(flatten)]
+    pub image: Option<ImageData>,
+    /// The third-order sums of the whole lens, mm: colour from the F to the C line.
+    pub seidel: SeidelSums,
+    /// The third-order sums of each surface, mm.
+    pub seidel_surfaces: Vec<SeidelSums>,
+}
+
+/// What the data of a lens is about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensQuestion {
+    /// Wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Distance of an object before the first vertex, mm, of which the image is wanted.
+    pub distance_mm: Option<f64>,
+    /// Half field of the third-order sums, degrees.
+    pub field_deg: f64,
+}
+
+/// The paraxial image of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ImageData {
+    /// Distance of the object before the first vertex, mm.
+    pub distance_mm: f64,
+    /// z of the image from the last vertex, mm.
+    pub image_distance_mm: f64,
+    /// Lateral magnification, negative for an image upside down.
+    pub magnification: f64,
+    /// f-number of the cone at the image.
+    pub working_f_number: f64,
+}
+
+impl LensData {
+    /// Returns the data of a lens; with those of an image where an object distance is given.
+    ///
+    /// The third-order sums are those of an object at that distance, else of a far one.
+    ///
+    /// # Errors
+    /// When a glass is not known at the wavelength or at the F and C lines, or the distance is not above 0.
+    pub fn new(lens: &Lens, question: &LensQuestion) -> Result<Self, PipelineError> {
+        let LensQuestion { wavelength_nm, distance_mm, field_deg } = *question;
+        let mono = lens.at(wavelength_nm)?;
+        let seidel = lens.seidel(&SeidelSettings {
+            wavelength_nm,
+            colors_nm: [F_LINE_NM, C_LINE_NM],
+            object_distance_mm: distance_mm.unwrap_or(f64::INFINITY),
+            chief_slope: field_deg.to_radians().tan(),
+        })?;
+        let first = mono.first_order();
+        Ok(Self {
+            lens: lens.name().to_owned(),
+            wavelength_nm,
+            efl_mm: first.efl_mm,
+            bfl_mm: first.bfl_mm,
+            ffl_mm: first.ffl_mm,
+            front_principal_mm: first.front_principal_mm,
+            rear_principal_mm: first.rear_principal_mm,
+            entrance_pupil_z_mm: first.entrance_pupil_z_mm,
+            entrance_pupil_diameter_mm: first.entrance_pupil_diameter_mm,
+            exit_pupil_z_mm: first.exit_pupil_z_mm,
+            exit_pupil_diameter_mm: first.exit_pupil_diameter_mm,
+            f_number: first.f_number,
+            image: distance_mm.map(|distance_mm| image_of(&mono, distance_mm)).transpose()?,
+            seidel: seidel.total,
+            seidel_surfaces: seidel.per_surface,
+        })
+    }
+}
+
+fn image_of(lens: &MonoLens, distance_mm: f64) -> Result<ImageData, PipelineError> {
+    if distance_mm.is_nan() || distance_mm <= 0.0 {
+        return Err(PipelineError::Value {
+            origin: "the object".to_owned(),
+            key: "distance_mm",
+            found: distance_mm.to_string(),
+            expected: "a number above 0, or inf".to_owned(),
+        });
+    }
+    let conjugate = lens.conjugate(distance_mm);
+    Ok(ImageData {
+        distance_mm,
+        image_distance_mm: conjugate.image_z_mm,
+        magnification: conjugate.magnification,
+        working_f_number: lens.first_order().working_f_number(conjugate.magnification),
+    })
+}
+
+/// A surface of a lens as a row of a table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SurfaceRow {
+    /// 0-based place in the lens.
+    pub surface: usize,
+    /// Whether it is the stop.
+    pub is_stop: bool,
+    /// Radius, mm; infinite for a plane.
+    pub radius_mm: f64,
+    /// Distance to the next vertex, mm.
+    pub thickness_mm: f64,
+    /// What lies behind.
+    pub medium_after: String,
+    /// Clear diameter, mm.
+    pub diameter_mm: f64,
+}
+
+/// Returns the surfaces of a lens as the rows of a table.
+pub fn surface_rows(lens: &Lens) -> Vec<SurfaceRow> {
+    let radius = |surface: &Surface| match surface.curvature_per_mm {
+        0.0 => f64::INFINITY,
+        curvature => 1.0 / curvature,
+    };
+    lens.interfaces()
+        .iter()
+        .enumerate()
+        .map(|(surface, interface)| SurfaceRow {
+            surface,
+            is_stop: surface == lens.stop(),
+            radius_mm: radius(&interface.surface),
+            thickness_mm: interface.thickness_after_mm,
+            medium_after: interface.medium_after.describe(),
+            diameter_mm: 2.0 * interface.surface.semi_aperture_mm,
+        })
+        .collect()
+}
+
+/// A built-in lens as a row of a list.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LensRow {
+    /// The name that `LENS` takes.
+    pub name: String,
+    /// Effective focal length at 550 nm, mm.
+    pub efl_mm: f64,
+    /// f-number wide open.
+    pub f_number: f64,
+    /// Number of surfaces, the stop included.
+    pub surfaces: usize,
+    /// Where the prescription comes from.
+    pub source: String,
+}
+
+/// Returns the built-in lenses.
+///
+/// # Errors
+/// Never; the built-in lenses are held to by tests.
+pub fn built_in_lenses() -> Result<Vec<LensRow>, PipelineError> {
+    Lens::built_in_names()
+        .map(|name| {
+            let lens = Lens::built_in(name)?;
+            let first = lens.at(crate::REFERENCE_WAVELENGTH_NM)?.first_order();
+            Ok(LensRow {
+                name: name.to_owned(),
+                efl_mm: first.efl_mm,
+                f_number: first.f_number,
+                surfaces: lens.interfaces().len(),
+                source: lens.source().to_owned(),
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn question(distance_mm: Option<f64>) -> LensQuestion {
+        LensQuestion { wavelength_nm: 550.0, distance_mm, field_deg: 10.0 }
+    }
+
+    #[test]
+    fn the_papers_lens_has_its_focal_length() {
+        let lens = Lens::built_in("paper-2el").unwrap();
+        let data = LensData::new(&lens, &question(Some(8000.0))).unwrap();
+        // PHYSICS, "paraxial anchors": five digits.
+        assert_relative_eq!(data.efl_mm, 51.9971, epsilon = 1e-4);
+        assert_relative_eq!(data.image.unwrap().image_distance_mm, 51.4200, epsilon = 1e-4);
+        assert!(LensData::new(&lens, &question(Some(-1.0))).is_err());
+    }
+
+    #[test]
+    fn json_has_the_keys_of_the_contract() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap();
+        let json = serde_json::to_value(LensData::new(&lens, &question(Some(2000.0))).unwrap()).unwrap();
+        for key in "efl_mm bfl_mm ffl_mm front_principal_mm rear_principal_mm entrance_pupil_z_mm \
+                    entrance_pupil_diameter_mm exit_pupil_z_mm exit_pupil_diameter_mm f_number image_distance_mm \
+                    magnification working_f_number"
+            .split_whitespace()
+        {
+            assert!(json[key].is_f64(), "{key}");
+        }
+        for key in ["S1", "S2", "S3", "S4", "S5", "C1", "C2"] {
+            let of_surfaces = json["seidel_surfaces"].as_array().unwrap();
+            let sum: f64 = of_surfaces.iter().map(|sums| sums[key].as_f64().unwrap()).sum();
+            assert_relative_eq!(json["seidel"][key].as_f64().unwrap(), sum, epsilon = 1e-12);
+        }
+    }
+
+    #[test]
+    fn every_surface_has_a_row() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap();
+        let rows = surface_rows(&lens);
+        assert_eq!(rows.len(), lens.interfaces().len());
+        assert_eq!(rows.iter().filter(|row| row.is_stop).count(), 1);
+        assert!(built_in_lenses().unwrap().iter().any(|row| row.name == "dgauss-50mm"));
+    }
+}

@@ -1,0 +1,49 @@
+//! How far a run is, for whoever wants to know.
+
+/// A stage of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Stage {
+    /// Reading or making the scene.
+    Scene,
+    /// Tracing the lens into a bank of point-spread functions.
+    Lens,
+    /// From the scene to irradiance on the film, and on to electrons.
+    Irradiance,
+    /// Exposure, noise, conversion.
+    Sensor,
+    /// From the raw frame to the picture.
+    Picture,
+    /// Measuring and drawing for the report, and writing files.
+    Report,
+}
+
+impl Stage {
+    /// All stages, in their order.
+    pub const ALL: [Self; 6] = [Self::Scene, Self::Lens, Self::Irradiance, Self::Sensor, Self::Picture, Self::Report];
+
+    /// What the stage does, in a few words.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Scene => "reading the scene",
+            Self::Lens => "tracing the lens",
+            Self::Irradiance => "scene to irradiance",
+            Self::Sensor => "exposing the sensor",
+            Self::Picture => "developing the picture",
+            Self::Report => "writing the report",
+        }
+    }
+}
+
+/// Is told how far a run is.
+pub trait Progress: Sync {
+    /// A stage is done to this part, 0–1. Called from any thread; 0 is the start of the stage.
+    fn at(&self, stage: Stage, fraction: f64);
+}
+
+/// Tells nobody.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn at(&self, _: Stage, _: f64) {}
+}

@@ -1,0 +1,284 @@
+//! The plots of the report.
+
+use dioptric_optics::glam::DVec2;
+use dioptric_psf::{Picture, PsfBank};
+
+use super::statistics::SensorStatistics;
+use crate::{Capture, Corner, LineChart, REFERENCE_WAVELENGTH_NM, Series, Shot, display::wavelength_color};
+
+/// Points of a curve.
+const POINTS: usize = 64;
+/// Colours of the channels of a frame that are not red, green or blue.
+const OTHER_CHANNEL: &str = "#555566";
+
+/// The plots of the report.
+pub(super) struct Charts {
+    pub(super) lsf: LineChart,
+    pub(super) mtf: LineChart,
+    pub(super) illumination: LineChart,
+    pub(super) distortion: LineChart,
+    pub(super) spectrum: LineChart,
+    pub(super) histogram: LineChart,
+}
+
+/// The places of the scene that the plots are about.
+pub(super) struct Places {
+    /// The largest field of the film, as its tangent.
+    pub(super) corner_tan: f64,
+    /// The depth in focus, dioptres, moved into the range of the bank.
+    pub(super) focus_dioptres: f64,
+    /// A few depths from far to near, dioptres.
+    pub(super) dioptres: Vec<f64>,
+    /// A few wavelengths, nm.
+    pub(super) wavelengths_nm: Vec<f64>,
+}
+
+impl Places {
+    pub(super) fn of(shot: &Shot, capture: &Capture) -> Self {
+        let bank = &capture.bank;
+        let settings = bank.settings();
+        let (far, near) = (settings.dioptres[0], settings.dioptres[settings.dioptres.len() - 1]);
+        let steps = if near - far > 1e-6 { 4 } else { 1 };
+        let (first, last) = shot.grid().range_nm();
+        // Four wavelengths from end to end, and the reference in place of the nearest where it is among them.
+        let wavelengths_nm =
+            (0..4).map(|i| first + (last - first) * f64::from(i) / 3.0).map(f64::round).collect::<Vec<_>>();
+        let focus = shot.focus_distance_mm.map_or(near, |mm| {
+            let pupil_z = shot.lens.at(REFERENCE_WAVELENGTH_NM).map_or(0.0, |l| l.first_order().entrance_pupil_z_mm);
+            1e3 / (mm + if pupil_z.is_finite() { pupil_z } else { 0.0 })
+        });
+        let corner_mm = shot.film.half_diagonal_mm();
+        let geometry = bank.geometry(focus.clamp(far, near), REFERENCE_WAVELENGTH_NM);
+        Self {
+            corner_tan: geometry.field_tan(corner_mm).unwrap_or(bank.last_field_tan()),
+            focus_dioptres: focus.clamp(far, near),
+            dioptres: (0..steps).map(|i| far + (near - far) * i as f64 / (steps as f64 - 1.0).max(1.0)).collect(),
+            wavelengths_nm: if last > first { wavelengths_nm } else { vec![first] },
+        }
+    }
+}
+
+impl Charts {
+    pub(super) fn of(shot: &Shot, capture: &Capture, places: &Places, sensor: &SensorStatistics) -> Self {
+        Self {
+            lsf: lsf(shot, &capture.bank, places),
+            mtf: mtf(shot, &capture.bank, places),
+            illumination: illumination(&capture.bank, places),
+            distortion: distortion(&capture.bank, places),
+            spectrum: spectrum(shot, capture),
+            histogram: histogram(capture, sensor),
+        }
+    }
+}
+
+fn picture(bank: &PsfBank, field_tan: f64, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Picture {
+    Picture::from(&bank.kernel(DVec2::new(field_tan, 0.0), dioptres, wavelength_nm, pitch_um))
+}
+
+/// Line spreads on the axis, in focus, over wavelength.
+fn lsf(shot: &Shot, bank: &PsfBank, places: &Places) -> LineChart {
+    let spreads: Vec<_> = places
+        .wavelengths_nm
+        .iter()
+        .map(|&nm| {
+            // As fine as the narrowest line asks for.
+            let airy_um = 1e-3 * nm * shot.lens.at(nm).map_or(4.0, |l| l.first_order().f_number);
+            let blur_um = 1e3 * bank.blur_radius_mm(0.0, places.focus_dioptres, nm).abs();
+            let pitch_um = (0.1 * airy_um).max(0.02 * blur_um);
+            (nm, picture(bank, 0.0, places.focus_dioptres, nm, pitch_um).line_spread(0.0))
+        })
+        .collect();
+    let reach_um = spreads
+        .iter()
+        .map(|(_, spread)| 2.5 * spread.full_width_at_half_maximum_um())
+        .filter(|reach| reach.is_finite())
+        .fold(1.0, f64::max);
+    let top = spreads.iter().flat_map(|(_, spread)| &spread.values).copied().fold(0.0, f64::max);
+    let series = spreads
+        .iter()
+        .map(|(nm, spread)| Series {
+            label: Some(format!("{nm:.0} nm")),
+            color: wavelength_color(*nm),
+            points: spread
+                .at_um
+                .iter()
+                .zip(&spread.values)
+                .filter(|(x, _)| x.abs() <= reach_um)
+                .map(|(&x, &y)| (x, y))
+                .collect(),
+            is_dashed: false,
+        })
+        .collect();
+    LineChart {
+        title: "Line spread on the axis, in focus".to_owned(),
+        x_label: "x on the film, µm".to_owned(),
+        y_label: "share per µm".to_owned(),
+        x_range: (-reach_um, reach_um),
+        y_range: (0.0, 1.05 * top),
+        series,
+        legend: Corner::TopRight,
+    }
+}
+
+/// Modulation up to the sensor's Nyquist frequency on the axis and towards the corner, in focus and at the far end.
+fn mtf(shot: &Shot, bank: &PsfBank, places: &Places) -> LineChart {
+    let nyquist_per_mm = 500.0 / shot.film.pitch_um;
+    let pitch_um = (shot.film.pitch_um / 8.0).min(2.0);
+    let far = places.dioptres[0];
+    let mut lines = vec![
+        ("axis, in focus", 0.0, places.focus_dioptres, 0.0, "#1b6ca8"),
+        ("70 % field, radial", 0.7 * places.corner_tan, places.focus_dioptres, 0.0, "#c2571a"),
+        (
+            "70 % field, tangential",
+            0.7 * places.corner_tan,
+            places.focus_dioptres,
+            std::f64::consts::FRAC_PI_2,
+            "#7a9e2c",
+        ),
+    ];
+    if (far - places.focus_dioptres).abs() > 1e-6 {
+        lines.push(("axis, far end of the scene", 0.0, far, 0.0, "#777788"));
+    }
+    let series = lines
+        .into_iter()
+        .map(|(label, field_tan, dioptres, direction, color)| {
+            let spot = picture(bank, field_tan, dioptres, REFERENCE_WAVELENGTH_NM, pitch_um);
+            let points = (0..=POINTS)
+                .map(|i| nyquist_per_mm * i as f64 / POINTS as f64)
+                .map(|f| (f, spot.mtf(direction, f)))
+                .collect();
+            Series {
+                label: Some(label.to_owned()),
+                color: color.to_owned(),
+                points,
+                is_dashed: label.ends_with("tangential"),
+            }
+        })
+        .collect();
+    LineChart {
+        title: format!("Modulation of the lens at {REFERENCE_WAVELENGTH_NM:.0} nm, to the sensor's Nyquist frequency"),
+        x_label: "cycles per mm".to_owned(),
+        y_label: "modulation".to_owned(),
+        x_range: (0.0, nyquist_per_mm),
+        y_range: (0.0, 1.05),
+        series,
+        legend: Corner::BottomLeft,
+    }
+}
+
+fn over_field(places: &Places, of: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+    (0..=POINTS)
+        .map(|i| places.corner_tan * i as f64 / POINTS as f64)
+        .map(|tan| (tan.atan().to_degrees(), of(tan)))
+        .collect()
+}
+
+fn illumination(bank: &PsfBank, places: &Places) -> LineChart {
+    let geometry = bank.geometry(places.focus_dioptres, REFERENCE_WAVELENGTH_NM);
+    let axis = geometry.irradiance_per_radiance(0.0);
+    let real = over_field(places, |tan| geometry.irradiance_per_radiance(tan) / axis);
+    let cosines = over_field(places, |tan| tan.atan().cos().powi(4));
+    let series = |label: &str, color: &str, points, is_dashed| Series {
+        label: Some(label.to_owned()),
+        color: color.to_owned(),
+        points,
+        is_dashed,
+    };
+    LineChart {
+        title: "Relative illumination".to_owned(),
+        x_label: "field angle, degrees".to_owned(),
+        y_label: "share of the axis".to_owned(),
+        x_range: (0.0, places.corner_tan.atan().to_degrees()),
+        y_range: (0.0, 1.05),
+        series: vec![series("this lens", "#1b6ca8", real, false), series("cos⁴", "#999999", cosines, true)],
+        legend: Corner::BottomLeft,
+    }
+}
+
+fn distortion(bank: &PsfBank, places: &Places) -> LineChart {
+    let curves: Vec<Series> = places
+        .wavelengths_nm
+        .iter()
+        .map(|&nm| {
+            let geometry = bank.geometry(places.focus_dioptres, nm);
+            let reference = bank.geometry(places.focus_dioptres, REFERENCE_WAVELENGTH_NM);
+            let small = 1e-3 * places.corner_tan;
+            let scale = reference.image_radius_mm(small) / small;
+            let points = over_field(places, |tan| {
+                let tan = tan.max(small);
+                100.0 * (geometry.image_radius_mm(tan) / (scale * tan) - 1.0)
+            });
+            Series { label: Some(format!("{nm:.0} nm")), color: wavelength_color(nm), points, is_dashed: false }
+        })
+        .collect();
+    let values = || curves.iter().flat_map(|curve| curve.points.iter().map(|p| p.1));
+    let (low, high) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
+    let margin = 0.08 * (high - low).max(0.01);
+    LineChart {
+        title: "Distortion and lateral colour".to_owned(),
+        x_label: "field angle, degrees".to_owned(),
+        y_label: "image height against f · tan, %".to_owned(),
+        x_range: (0.0, places.corner_tan.atan().to_degrees()),
+        y_range: (low - margin, high + margin),
+        series: curves,
+        legend: Corner::BottomLeft,
+    }
+}
+
+fn spectrum(shot: &Shot, capture: &Capture) -> LineChart {
+    let points: Vec<(f64, f64)> =
+        shot.grid().centers_nm().iter().zip(&capture.irradiance.mean).map(|(&nm, &e)| (nm, 1e3 * e)).collect();
+    let top = points.iter().map(|p| p.1).fold(0.0, f64::max);
+    let (first, last) = shot.grid().range_nm();
+    LineChart {
+        title: "Mean spectral irradiance on the film".to_owned(),
+        x_label: "wavelength, nm".to_owned(),
+        y_label: "mW m⁻² nm⁻¹".to_owned(),
+        x_range: if last > first { (first, last) } else { (first - 1.0, first + 1.0) },
+        y_range: (0.0, 1.05 * top.max(f64::MIN_POSITIVE)),
+        series: vec![Series { label: None, color: "#1b6ca8".to_owned(), points, is_dashed: false }],
+        legend: Corner::TopRight,
+    }
+}
+
+fn histogram(capture: &Capture, sensor: &SensorStatistics) -> LineChart {
+    let series: Vec<Series> = sensor
+        .channels
+        .iter()
+        .map(|channel| {
+            let n = channel.histogram.len() as f64;
+            let top = capture.raw.levels.top;
+            let center = |bin: usize| (bin as f64 + 0.5) / n * top;
+            Series {
+                label: Some(channel.filter.clone()),
+                color: channel_color(&channel.filter).to_owned(),
+                points: channel
+                    .histogram
+                    .iter()
+                    .enumerate()
+                    .map(|(bin, &share)| (center(bin), 100.0 * share))
+                    .collect(),
+                is_dashed: false,
+            }
+        })
+        .collect();
+    let top = series.iter().flat_map(|s| &s.points).map(|p| p.1).fold(0.0, f64::max);
+    LineChart {
+        title: "Raw frame".to_owned(),
+        x_label: "digital number".to_owned(),
+        y_label: "pixels of the channel, %".to_owned(),
+        x_range: (0.0, capture.raw.levels.top),
+        y_range: (0.0, 1.05 * top.max(f64::MIN_POSITIVE)),
+        series,
+        legend: Corner::TopRight,
+    }
+}
+
+fn channel_color(filter: &str) -> &'static str {
+    match filter.chars().next().map(|c| c.to_ascii_lowercase()) {
+        Some('r') => "#c23b22",
+        Some('g') => "#2e8b3d",
+        Some('b') => "#2855b5",
+        _ => OTHER_CHANNEL,
+    }
+}

@@ -1,0 +1,242 @@
+//! What a run tells of itself: `report.json` and a self-contained `report.html`.
+
+mod charts;
+mod page;
+mod statistics;
+
+use std::{fs, path::Path};
+
+use dioptric_scene::write_planes_exr;
+use dioptric_sensor::{ElectronRate, Exposure, Picture, Raw, RawPlane, Sensor, Volts};
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use serde::Serialize;
+
+pub use statistics::{ChannelStatistics, LossRow, SensorStatistics};
+
+use crate::{
+    Camera, Capture, LensData, Outputs, PipelineError, Shot,
+    capture::IRRADIANCE_FILE,
+    report::charts::{Charts, Places},
+};
+
+/// Numbers of a run, as `report.json` has them.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The version that made it.
+    pub dioptric: &'static str,
+    /// The camera as it was run.
+    pub camera: Camera,
+    /// The lens, at the reference wavelength and the distance in focus.
+    pub lens: LensData,
+    /// Distance of the film behind the last vertex, mm.
+    pub film_mm: f64,
+    /// The film.
+    pub film: FilmData,
+    /// The scene.
+    pub scene: SceneData,
+    /// The irradiance on the film.
+    pub irradiance: IrradianceData,
+    /// What the sensor saw.
+    pub sensor: SensorStatistics,
+    /// Where the light goes, over the field.
+    pub losses: Vec<LossRow>,
+    /// Factor on each channel that made white neutral.
+    pub white_balance: Vec<f64>,
+    /// How long each stage took, s.
+    pub timings_s: Vec<(String, f64)>,
+    /// The files beside the report.
+    pub files: Vec<String>,
+}
+
+/// The film of a run.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct FilmData {
+    /// Columns of pixels.
+    pub columns: usize,
+    /// Rows of pixels.
+    pub rows: usize,
+    /// Distance between pixels, µm.
+    pub pitch_um: f64,
+}
+
+/// The scene of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneData {
+    /// Where it came from.
+    pub name: String,
+    /// Columns of samples.
+    pub columns: usize,
+    /// Rows of samples.
+    pub rows: usize,
+    /// Nearest depth, m.
+    pub near_m: f64,
+    /// Farthest depth, m.
+    pub far_m: f64,
+    /// Mean luminance, cd/m².
+    pub mean_luminance_cd_m2: f64,
+}
+
+/// The irradiance of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct IrradianceData {
+    /// Bands, nm.
+    pub wavelengths_nm: Vec<f64>,
+    /// Mean over the film, W m⁻² nm⁻¹.
+    pub mean_w_m2_nm: Vec<f64>,
+    /// Largest sample, W m⁻² nm⁻¹.
+    pub max_w_m2_nm: Vec<f64>,
+    /// Mean illuminance, lux.
+    pub mean_lux: f64,
+}
+
+impl Capture {
+    /// Writes everything but the irradiance, which was streamed, into a folder, and returns the report.
+    ///
+    /// `timings_s` is what the caller measured of each stage; the library reads no clock.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn write(&self, shot: &Shot, folder: &Path, timings_s: &[(String, f64)]) -> Result<Report, PipelineError> {
+        let outputs = shot.camera.outputs;
+        let mut files = Vec::new();
+        if outputs.irradiance {
+            files.push(IRRADIANCE_FILE.to_owned());
+        }
+        if outputs.depth {
+            let depth = shot.scene.require_depth()?;
+            write_planes_exr(&folder.join("depth.exr"), &[("Z", depth.z_m())], true)?;
+            files.push("depth.exr".to_owned());
+        }
+        let (frame_files, png) = write_frames(&self.frames(shot), &self.developed.picture, outputs, folder)?;
+        files.extend(frame_files);
+
+        let report = self.report(shot, timings_s, files)?;
+        write_json(&folder.join("report.json"), &report)?;
+        let places = Places::of(shot, self);
+        let charts = Charts::of(shot, self, &places, &report.sensor);
+        let html = page::render(&page::Page {
+            shot,
+            capture: self,
+            report: &report,
+            places: &places,
+            charts: &charts,
+            picture_png: &png,
+        })?;
+        write_file(&folder.join("report.html"), html.as_bytes())?;
+        Ok(report)
+    }
+
+    fn report(&self, shot: &Shot, timings_s: &[(String, f64)], files: Vec<String>) -> Result<Report, PipelineError> {
+        let places = Places::of(shot, self);
+        let fields: Vec<f64> = [0.0, 0.35, 0.7, 1.0].iter().map(|share| share * places.corner_tan).collect();
+        let (near_m, far_m) = shot.scene.require_depth()?.range_m();
+        Ok(Report {
+            dioptric: env!("CARGO_PKG_VERSION"),
+            camera: shot.camera.clone(),
+            lens: statistics::lens_data(shot, places.corner_tan)?,
+            film_mm: shot.film_mm,
+            film: FilmData { columns: shot.film.columns, rows: shot.film.rows, pitch_um: shot.film.pitch_um },
+            scene: SceneData {
+                name: shot.scene.name.clone(),
+                columns: shot.scene.columns(),
+                rows: shot.scene.rows(),
+                near_m,
+                far_m,
+                mean_luminance_cd_m2: shot.scene.mean_luminance_cd_m2(),
+            },
+            irradiance: IrradianceData {
+                wavelengths_nm: shot.grid().centers_nm().to_vec(),
+                mean_w_m2_nm: self.irradiance.mean.clone(),
+                max_w_m2_nm: self.irradiance.max.clone(),
+                mean_lux: self.irradiance.mean_lux,
+            },
+            sensor: SensorStatistics::new(&self.frames(shot))?,
+            losses: statistics::losses(shot, &fields)?,
+            white_balance: self.developed.balance.clone(),
+            timings_s: timings_s.to_vec(),
+            files,
+        })
+    }
+
+    fn frames<'a>(&'a self, shot: &'a Shot) -> Frames<'a> {
+        Frames { sensor: &shot.sensor, exposure: &self.exposure, rate: &self.rate, volts: &self.volts, raw: &self.raw }
+    }
+}
+
+/// The frames of one exposure.
+#[derive(Clone, Copy)]
+pub(crate) struct Frames<'a> {
+    pub(crate) sensor: &'a Sensor,
+    pub(crate) exposure: &'a Exposure,
+    pub(crate) rate: &'a ElectronRate,
+    pub(crate) volts: &'a Volts,
+    pub(crate) raw: &'a Raw,
+}
+
+/// Writes the volts, the raw frame and the picture; returns the names of the files and the bytes of the picture's.
+pub(crate) fn write_frames(
+    frames: &Frames<'_>,
+    picture: &Picture,
+    outputs: Outputs,
+    folder: &Path,
+) -> Result<(Vec<String>, Vec<u8>), PipelineError> {
+    let mut names = vec!["picture.png".to_owned()];
+    if outputs.volts {
+        write_volts(frames, &folder.join("volts.exr"))?;
+        names.push("volts.exr".to_owned());
+    }
+    if outputs.raw {
+        names.extend(write_raw(frames.raw, folder)?);
+    }
+    let png = encode_png(&picture.to_rgb8(), (picture.columns(), picture.rows()), ExtendedColorType::Rgb8)?;
+    write_file(&folder.join("picture.png"), &png)?;
+    Ok((names, png))
+}
+
+fn write_volts(frames: &Frames<'_>, path: &Path) -> Result<(), PipelineError> {
+    let planes = &frames.volts.planes_v;
+    let names: Vec<&str> = match planes.len() {
+        1 => vec!["V"],
+        _ => frames.raw.filter_names.iter().map(String::as_str).collect(),
+    };
+    let planes: Vec<_> = names.into_iter().zip(planes).collect();
+    Ok(write_planes_exr(path, &planes, false)?)
+}
+
+/// Writes each plane of digital numbers as a 16-bit PNG; a sensor without a converter has none.
+fn write_raw(raw: &Raw, folder: &Path) -> Result<Vec<String>, PipelineError> {
+    let mut names = Vec::new();
+    for (plane, filter) in raw.planes.iter().zip(&raw.filter_names) {
+        let RawPlane::Dn(dn) = plane else { continue };
+        let name = if raw.planes.len() == 1 { "raw.png".to_owned() } else { format!("raw.{filter}.png") };
+        let bytes: Vec<u8> = dn.iter().flat_map(|dn| dn.to_ne_bytes()).collect();
+        let png = encode_png(&bytes, (dn.ncols(), dn.nrows()), ExtendedColorType::L16)?;
+        write_file(&folder.join(&name), &png)?;
+        names.push(name);
+    }
+    Ok(names)
+}
+
+/// Writes a value as JSON.
+pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), PipelineError> {
+    let json = serde_json::to_vec_pretty(value)
+        .map_err(|e| PipelineError::Write { path: path.to_owned(), reason: e.to_string() })?;
+    write_file(path, &json)
+}
+
+/// Returns samples as the bytes of a PNG file; 16-bit samples in the machine's order.
+fn encode_png(
+    samples: &[u8],
+    (columns, rows): (usize, usize),
+    color: ExtendedColorType,
+) -> Result<Vec<u8>, PipelineError> {
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes)
+        .write_image(samples, columns as u32, rows as u32, color)
+        .map_err(|e| PipelineError::Png { reason: e.to_string() })?;
+    Ok(bytes)
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), PipelineError> {
+    fs::write(path, bytes).map_err(|e| PipelineError::Write { path: path.to_owned(), reason: e.to_string() })
+}

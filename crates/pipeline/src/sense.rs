@@ -1,0 +1,94 @@
+//! A sensor exposed to an irradiance image from a file.
+
+use std::path::Path;
+
+use dioptric_scene::read_spectral_exr;
+use dioptric_sensor::{Exposure, ExposureControl, Illumination, Noise};
+use dioptric_spectrum::{Illuminant, Quantity};
+
+use crate::{
+    Outputs, PipelineError, ProcessingChoice, SensorChoice, SensorStatistics, WhiteChoice,
+    report::{Frames, write_frames},
+};
+
+/// How a sensor is exposed to an irradiance image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SenseRequest {
+    /// The sensor; where the image has another pitch or size, its pixels are laid over the image's middle.
+    pub sensor: SensorChoice,
+    /// The exposure.
+    pub exposure: ExposureControl,
+    /// From the raw frame to the picture.
+    pub processing: ProcessingChoice,
+    /// The light that white balance goes by; the mean of the picture where it is not known.
+    pub illuminant: Option<Illuminant>,
+    /// The seed of all noise.
+    pub seed: u64,
+}
+
+/// Exposes a sensor to a spectral irradiance and writes volts, raw frame, picture and `report.json` into a folder.
+///
+/// An image that states the distance between its samples is averaged over the sensor's pixels; one that does not has
+/// one sample a pixel.
+///
+/// # Errors
+/// When the image cannot be read or is no irradiance, the sensor is unknown, or a file cannot be written.
+pub fn sense_irradiance(
+    image: &Path,
+    request: &SenseRequest,
+    folder: &Path,
+) -> Result<SensorStatistics, PipelineError> {
+    let sensor = request.sensor.open()?;
+    let irradiance = read_spectral_exr(image)?.image;
+    let in_file = |reason: String| PipelineError::Read { path: image.to_owned(), reason };
+    if irradiance.quantity() != Quantity::Irradiance {
+        let unit = irradiance.quantity().unit();
+        return Err(in_file(format!("its unit is {unit}, expected an irradiance, {}", Quantity::Irradiance.unit())));
+    }
+    irradiance.check_samples().map_err(|e| in_file(e.to_string()))?;
+    let light = match irradiance.pitch_um() {
+        // The image lies on these very pixels.
+        Some(pitch_um) if (pitch_um / sensor.pixel_pitch_um - 1.0).abs() < 1e-6 => Illumination::on_pixels(&irradiance),
+        Some(pitch_um) => Illumination::with_pitch_um(&irradiance, pitch_um),
+        None => Illumination::on_pixels(&irradiance),
+    };
+    let rate = sensor.electron_rate(&light)?;
+    let (rows, columns) = rate.planes_e_per_s[0].dim();
+    let sensor = sensor.with_size(rows, columns);
+    let noise = Noise::all(request.seed);
+    let exposure = sensor.expose(&rate, &request.exposure)?;
+    let electrons = sensor.electrons(&rate, &exposure, &noise)?;
+    let volts = sensor.volts(&electrons, &exposure, &noise)?;
+    let raw = sensor.digitize(&volts, &exposure)?;
+    let processing = match request.illuminant {
+        Some(light) => request.processing.under(light),
+        None => ProcessingChoice { white: WhiteChoice::GreyWorld, ..request.processing }.under(Illuminant::D65),
+    };
+    let developed = sensor.develop(&raw, &processing)?;
+    let frames = Frames { sensor: &sensor, exposure: &exposure, rate: &rate, volts: &volts, raw: &raw };
+    let statistics = SensorStatistics::new(&frames)?;
+    write_frames(&frames, &developed.picture, Outputs::default(), folder)?;
+    crate::report::write_json(&folder.join("report.json"), &statistics)?;
+    Ok(statistics)
+}
+
+/// Returns the exposure with its time set by hand; gain and temperature stay.
+pub fn with_exposure_s(control: ExposureControl, time_s: f64) -> ExposureControl {
+    ExposureControl::Manual(match control {
+        ExposureControl::Manual(exposure) => Exposure { time_s, ..exposure },
+        ExposureControl::Auto(auto) => Exposure {
+            time_s,
+            analog_gain: auto.analog_gain,
+            gain_mode: auto.gain_mode,
+            temperature_c: auto.temperature_c,
+        },
+    })
+}
+
+/// Returns the light of a name, in any case.
+///
+/// # Errors
+/// When no light has that name.
+pub fn parse_illuminant(name: &str) -> Result<Illuminant, PipelineError> {
+    Ok(Illuminant::named(name)?)
+}

@@ -1,0 +1,174 @@
+//! A camera with everything it names opened: the lens, the scene, the film and the sensor.
+
+use dioptric_forward::{BlurMode, Film, Settings};
+use dioptric_optics::{Lens, MonoLens};
+use dioptric_scene::{Scene, View};
+use dioptric_sensor::Sensor;
+use dioptric_spectrum::WavelengthGrid;
+
+use crate::{
+    BlurChoice, Camera, FilmChoice, FocusChoice, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, Stage,
+    WavelengthChoice,
+};
+
+/// The share of the scene's samples that may be nearer than the near object.
+const NEAR_SHARE: f64 = 0.02;
+
+/// A camera with everything it names opened and fitted together.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// The camera as it was asked for.
+    pub camera: Camera,
+    /// The lens, its stop set.
+    pub lens: Lens,
+    /// What stands before it.
+    pub scene: Scene,
+    /// The raster of pixels.
+    pub film: Film,
+    /// Distance of the film behind the last vertex, mm.
+    pub film_mm: f64,
+    /// Distance before the first vertex that is in focus, mm, where there is one.
+    pub focus_distance_mm: Option<f64>,
+    /// The sensor, of the film's size.
+    pub sensor: Sensor,
+    /// How the point-spread functions are laid over the scene.
+    pub blur: Settings,
+}
+
+impl Shot {
+    /// Opens everything that a camera names.
+    ///
+    /// # Errors
+    /// When a number makes no sense, a name is unknown, a file cannot be read, or parts do not go together.
+    pub fn open(camera: &Camera, progress: &dyn Progress) -> Result<Self, PipelineError> {
+        camera.validate()?;
+        progress.at(Stage::Scene, 0.0);
+        let lens = camera.stop.apply(camera.lens.open()?)?;
+        let sensor = camera.sensor.open()?;
+        let scene = camera.scene.open(camera.wavelengths.grid()?.as_ref())?;
+        let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
+        // Every glass must be known at every band before any work is done.
+        for &wavelength_nm in scene.radiance.grid().centers_nm() {
+            lens.at(wavelength_nm)?;
+        }
+        let film_mm = place_film(camera.focus, &reference, &scene)?;
+        let focus_distance_mm = reference.object_distance_mm_for(film_mm).ok();
+        let film = size_film(camera.film, &reference, film_mm, &scene, &sensor)?;
+        let sensor = Sensor { pixel_pitch_um: film.pitch_um, ..sensor.with_size(film.rows, film.columns) };
+        let mode = match camera.blur {
+            BlurChoice::Layered => BlurMode::Layered,
+            BlurChoice::Pointwise => BlurMode::Pointwise,
+        };
+        let blur = Settings { mode, ..Settings::default() };
+        progress.at(Stage::Scene, 1.0);
+        Ok(Self { camera: camera.clone(), lens, scene, film, film_mm, focus_distance_mm, sensor, blur })
+    }
+
+    /// The bands.
+    pub fn grid(&self) -> &WavelengthGrid {
+        self.scene.radiance.grid()
+    }
+}
+
+impl WavelengthChoice {
+    /// Returns the bands asked for, or `None` for those of the scene.
+    ///
+    /// # Errors
+    /// When they do not ascend or the step does not lead from first to last.
+    pub fn grid(&self) -> Result<Option<WavelengthGrid>, PipelineError> {
+        Ok(match self {
+            Self::Scene => None,
+            Self::Range { first_nm, last_nm, step_nm } => Some(WavelengthGrid::uniform(*first_nm, *last_nm, *step_nm)?),
+            Self::ListNm(list) => Some(WavelengthGrid::new(list.clone())?),
+        })
+    }
+}
+
+fn place_film(focus: FocusChoice, lens: &MonoLens, scene: &Scene) -> Result<f64, PipelineError> {
+    match focus {
+        FocusChoice::FilmMm(film_mm) => Ok(film_mm),
+        FocusChoice::DistanceMm(distance_mm) => Ok(lens.film_mm_for(distance_mm)?),
+        FocusChoice::NearObject => {
+            let z_mm = 1e3 * near_depth_m(scene)?;
+            let pupil_z = lens.first_order().entrance_pupil_z_mm;
+            Ok(lens.film_mm_for(z_mm - if pupil_z.is_finite() { pupil_z } else { 0.0 })?)
+        }
+    }
+}
+
+/// Returns the depth that a small share of the samples do not reach.
+fn near_depth_m(scene: &Scene) -> Result<f64, PipelineError> {
+    let mut depths: Vec<f32> = scene.require_depth()?.z_m().iter().copied().collect();
+    let index = ((depths.len() - 1) as f64 * NEAR_SHARE) as usize;
+    Ok(f64::from(*depths.select_nth_unstable_by(index, f32::total_cmp).1))
+}
+
+fn size_film(
+    choice: FilmChoice,
+    lens: &MonoLens,
+    film_mm: f64,
+    scene: &Scene,
+    sensor: &Sensor,
+) -> Result<Film, PipelineError> {
+    Ok(match choice {
+        FilmChoice::Sensor => Film { rows: sensor.rows, columns: sensor.columns, pitch_um: sensor.pixel_pitch_um },
+        FilmChoice::Pixels { columns, rows, pitch_um } => Film { rows, columns, pitch_um },
+        FilmChoice::Scene => {
+            let view = scene.require_view()?;
+            let (rows, columns) = seen_evenly(&view, scene.rows(), scene.columns())?;
+            let pitch_um = 1e3 * height_per_tan_mm(lens, film_mm) / view.focal_px;
+            if !(pitch_um.is_finite() && pitch_um > 0.0) {
+                let reason = format!("the film at {film_mm} mm sees no upright picture of the scene");
+                return Err(PipelineError::Unsuitable { what: "film: Scene", reason });
+            }
+            Film { rows, columns, pitch_um }
+        }
+    })
+}
+
+/// Returns the rows and columns of the largest film about the axis that the scene fills.
+fn seen_evenly(view: &View, rows: usize, columns: usize) -> Result<(usize, usize), PipelineError> {
+    let even = |center: f64, n: usize| {
+        let half = (center + 0.5).min(n as f64 - 0.5 - center);
+        (2.0 * half + 1e-6).floor().max(0.0) as usize
+    };
+    let (even_rows, even_columns) = (even(view.center_y_px, rows), even(view.center_x_px, columns));
+    if even_rows == 0 || even_columns == 0 {
+        let reason = "the axis of the scene's camera data lies outside its picture".to_owned();
+        return Err(PipelineError::Unsuitable { what: "film: Scene", reason });
+    }
+    Ok((even_rows, even_columns))
+}
+
+/// Returns how far off axis the chief ray of a unit tangent lands, mm, by first order.
+fn height_per_tan_mm(lens: &MonoLens, film_mm: f64) -> f64 {
+    let first = lens.first_order();
+    let magnification = first.pupil_magnification();
+    if first.exit_pupil_z_mm.is_finite() && magnification.is_finite() {
+        (film_mm - first.exit_pupil_z_mm) / (first.image_index * magnification)
+    } else {
+        first.efl_mm
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn a_unit_tangent_lands_a_focal_length_off_axis_at_infinity_focus() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
+        let first = lens.first_order();
+        assert_relative_eq!(height_per_tan_mm(&lens, first.bfl_mm), first.efl_mm, max_relative = 1e-9);
+        let hole = Lens::pinhole(0.2).unwrap().at(550.0).unwrap();
+        assert_relative_eq!(height_per_tan_mm(&hole, 40.0), 40.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn a_film_of_the_scene_is_centred_on_its_axis() {
+        let view = View { focal_px: 500.0, center_x_px: 155.0, center_y_px: 124.5 };
+        assert_eq!(seen_evenly(&view, 250, 370).unwrap(), (250, 311));
+        assert!(seen_evenly(&View { center_x_px: -3.0, ..view }, 250, 370).is_err());
+    }
+}

@@ -1,0 +1,169 @@
+//! Where the rays of a point land: centroid, moments and losses, without any pixels.
+
+use dioptric_diffraction::{BendForm, Edge, Hurb, bend};
+use dioptric_optics::{
+    Interface, Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims, glam::DVec2, rays_over_front, rays_towards,
+};
+
+use crate::PipelineError;
+
+/// Rings and azimuths of the rays of a spot.
+const RINGS: usize = 24;
+const AZIMUTHS: usize = 96;
+
+/// Where rays land on the film, in the picture frame (mm, x to the right, y up), each with its share of the energy.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Spot {
+    pub(crate) at_mm: Vec<DVec2>,
+    pub(crate) weights: Vec<f64>,
+    /// The share of the light that entered that reached the film.
+    pub(crate) energy: f64,
+}
+
+/// The place and the size of a spot.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moments {
+    pub(crate) centroid_mm: DVec2,
+    /// Standard deviations along x and y, mm.
+    pub(crate) sigma_mm: DVec2,
+}
+
+impl Spot {
+    /// Sends rays evenly through the true pupil of a point.
+    ///
+    /// `energy` is the share of the light that the stop alone would pass.
+    pub(crate) fn through_pupil(
+        lens: &Lens,
+        mono: &MonoLens,
+        point: &ObjectPoint,
+        film_mm: f64,
+    ) -> Result<Self, PipelineError> {
+        let Some(pupil) = PupilBoundary::find(mono, point, AZIMUTHS) else { return Ok(Self::default()) };
+        let (mut targets, mut areas) = (Vec::new(), Vec::new());
+        for azimuth in 0..AZIMUTHS {
+            let theta = std::f64::consts::TAU * azimuth as f64 / AZIMUTHS as f64;
+            let rho = pupil.rho_max_mm(theta);
+            for ring in 0..RINGS {
+                let r = rho * ((ring as f64 + 0.5) / RINGS as f64).sqrt();
+                targets.push(pupil.center_mm() + DVec2::from_angle(theta) * r);
+                areas.push(rho * rho);
+            }
+        }
+        let mut rays = rays_towards(point, &targets, pupil.z_mm(), 0.0);
+        let cones = solid_angles(point, &rays);
+        mono.trace(&mut rays, Rims::Clip);
+        mono.to_film(&mut rays, film_mm);
+        let open = open_lens(lens)?.at(mono.wavelength_nm())?;
+        let unvignetted_mm2 = PupilBoundary::find(&open, point, AZIMUTHS).map_or(0.0, |p| p.area_mm2());
+        let mut spot = Self::of_rays(&rays, |ray| areas[ray] * cones[ray]);
+        spot.energy = (pupil.area_mm2() / unvignetted_mm2).min(1.0);
+        Ok(spot)
+    }
+
+    /// Sends rays to a square grid over the front disc, as the paper does; `bending` also draws diffraction.
+    ///
+    /// `energy` is the share of the rays that reached the film.
+    pub(crate) fn over_front(mono: &MonoLens, point: &ObjectPoint, film_mm: f64, paper: &PaperRays) -> Self {
+        let mut rays = rays_over_front(mono, point, paper.n_across);
+        let stop = mono.stop();
+        mono.trace_surfaces(0..stop + 1, &mut rays, Rims::Clip);
+        if let Some(model) = paper.bending {
+            let edge = Edge::new(mono.stop_semi_aperture_mm(), mono.wavelength_nm(), mono.stop_medium_index());
+            bend(&mut rays, edge, model, BendForm::Angles, paper.seed);
+        }
+        mono.trace_surfaces(stop + 1..mono.n_surfaces(), &mut rays, Rims::Clip);
+        mono.to_film(&mut rays, film_mm);
+        let mut spot = Self::of_rays(&rays, |_| 1.0);
+        spot.energy = spot.at_mm.len() as f64 / rays.len().max(1) as f64;
+        spot
+    }
+
+    fn of_rays(rays: &RayBatch, weight: impl Fn(usize) -> f64) -> Self {
+        let passed: Vec<usize> = (0..rays.len()).filter(|&ray| rays.fate[ray].is_in_flight()).collect();
+        // The film turned by 180°: upright as the photographer sees it.
+        let at_mm = passed.iter().map(|&ray| -DVec2::new(rays.x_mm[ray], rays.y_mm[ray])).collect();
+        let weights: Vec<f64> = passed.iter().map(|&ray| weight(ray)).collect();
+        let sum: f64 = weights.iter().sum();
+        Self { at_mm, weights: weights.into_iter().map(|w| w / sum).collect(), energy: 0.0 }
+    }
+
+    /// Returns the place and the size of the spot, or `None` if no light arrived.
+    pub(crate) fn moments(&self) -> Option<Moments> {
+        if self.at_mm.is_empty() {
+            return None;
+        }
+        let mean = |of: &dyn Fn(DVec2) -> DVec2| -> DVec2 {
+            self.at_mm.iter().zip(&self.weights).map(|(&p, &w)| of(p) * w).sum()
+        };
+        let centroid_mm = mean(&|p| p);
+        let variance = mean(&|p| (p - centroid_mm) * (p - centroid_mm));
+        Some(Moments { centroid_mm, sigma_mm: DVec2::new(variance.x.sqrt(), variance.y.sqrt()) })
+    }
+}
+
+/// The paper's way of choosing rays.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PaperRays {
+    /// Rays along the side of the square grid.
+    pub(crate) n_across: usize,
+    /// Diffraction drawn at the stop.
+    pub(crate) bending: Option<Hurb>,
+    pub(crate) seed: u64,
+}
+
+/// Returns the solid angle a unit of pupil area takes up as seen from the point, up to a common factor.
+fn solid_angles(point: &ObjectPoint, rays: &RayBatch) -> Vec<f64> {
+    match point {
+        // From a point, cos θ / d² and d = |z| / cos θ.
+        ObjectPoint::Finite(_) => rays.n.iter().map(|n| n.powi(3)).collect(),
+        ObjectPoint::Infinite(_) => vec![1.0; rays.len()],
+    }
+}
+
+/// Returns the lens with every rim but the stop's as wide as its surface allows, up to three times.
+fn open_lens(lens: &Lens) -> Result<Lens, PipelineError> {
+    let stop = lens.stop();
+    let opened = |(i, interface): (usize, &Interface)| {
+        let mut interface = interface.clone();
+        if i != stop {
+            let widest = 3.0 * interface.surface.semi_aperture_mm;
+            let fits = 0.999 / interface.surface.curvature_per_mm.abs();
+            interface.surface.semi_aperture_mm = widest.min(fits).max(interface.surface.semi_aperture_mm);
+        }
+        interface
+    };
+    let interfaces = lens.interfaces().iter().enumerate().map(opened).collect();
+    Ok(Lens::new(lens.name(), lens.source(), interfaces, stop)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spot_at(field_deg: f64, distance_mm: f64) -> Spot {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
+        let mono = lens.at(550.0).unwrap();
+        let film_mm = mono.film_mm_for(distance_mm).unwrap();
+        let point = ObjectPoint::from_field(&mono, DVec2::new(field_deg.to_radians().tan(), 0.0), 1e3 / distance_mm);
+        Spot::through_pupil(&lens, &mono, &point, film_mm).unwrap()
+    }
+
+    #[test]
+    fn an_axial_point_loses_nothing_and_an_oblique_one_does() {
+        let axial = spot_at(0.0, 2000.0);
+        assert!((axial.energy - 1.0).abs() < 1e-12);
+        let moments = axial.moments().unwrap();
+        assert!(moments.centroid_mm.length() < 1e-9);
+        assert!((moments.sigma_mm.x - moments.sigma_mm.y).abs() < 1e-9);
+        let oblique = spot_at(24.0, 2000.0);
+        assert!(oblique.energy > 0.2 && oblique.energy < 0.95, "{}", oblique.energy);
+    }
+
+    #[test]
+    fn a_point_to_the_right_lands_on_the_right_of_the_picture() {
+        let moments = spot_at(10.0, 1e6).moments().unwrap();
+        // The focal length times the tangent, within distortion and coma.
+        let expected = 50.35 * 10f64.to_radians().tan();
+        assert!((moments.centroid_mm.x / expected - 1.0).abs() < 0.02, "{}", moments.centroid_mm);
+    }
+}
