@@ -22,6 +22,8 @@ pub struct DiscLens {
     pub distortion_per_mm2: f64,
     /// Growth of the focal length a nanometre beyond 550 nm, as a share.
     pub lateral_per_nm: f64,
+    /// Shift of the depth in focus a nanometre beyond 550 nm, dioptres.
+    pub axial_per_nm: f64,
     /// Irradiance per radiance, sr.
     pub irradiance_per_radiance: f64,
 }
@@ -35,6 +37,7 @@ impl Default for DiscLens {
             focal_mm: 1.0,
             distortion_per_mm2: 0.0,
             lateral_per_nm: 0.0,
+            axial_per_nm: 0.0,
             irradiance_per_radiance: 1.0,
         }
     }
@@ -59,8 +62,9 @@ impl Kernels for DiscLens {
         let radius_mm = self.blur_radius_mm(field_tan.length(), dioptres, wavelength_nm).abs();
         disc(1e3 * radius_mm / pitch_um)
     }
-    fn blur_radius_mm(&self, field_tan: f64, dioptres: f64, _wavelength_nm: f64) -> f64 {
-        1e-3 * self.radius_um_per_dioptre * (dioptres - self.focus_dioptres) * (1.0 + self.growth * field_tan)
+    fn blur_radius_mm(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> f64 {
+        let focus_dioptres = self.focus_dioptres + self.axial_per_nm * (wavelength_nm - 550.0);
+        1e-3 * self.radius_um_per_dioptre * (dioptres - focus_dioptres) * (1.0 + self.growth * field_tan)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Depth layers: even steps of blur radius, with tent weights between them.
 
-use crate::{Film, Kernels};
+use crate::Kernels;
 
 /// The depths at which the scene is blurred, nearest first.
 ///
@@ -15,6 +15,27 @@ pub(crate) struct Layers {
     px_per_dioptre: f64,
 }
 
+/// The blur of a lens on a film, sampled over the field and the bands.
+pub(crate) struct Blurs<'a> {
+    pub(crate) kernels: &'a dyn Kernels,
+    pub(crate) pitch_mm: f64,
+    /// Field of the film's corner.
+    pub(crate) corner_tan: f64,
+    pub(crate) wavelengths_nm: &'a [f64],
+}
+
+impl Blurs<'_> {
+    /// Fields from the axis to the corner at a band: tangent and wavelength.
+    fn samples(&self, band: usize) -> impl Iterator<Item = (f64, f64)> {
+        let wavelength_nm = self.wavelengths_nm[band];
+        [0.0, 0.5, 1.0].into_iter().map(move |part| (part * self.corner_tan, wavelength_nm))
+    }
+
+    fn blur_px(&self, (tan, wavelength_nm): (f64, f64), dioptres: f64) -> f64 {
+        self.kernels.blur_radius_mm(tan, dioptres, wavelength_nm) / self.pitch_mm
+    }
+}
+
 /// A change of blur over the whole scene that is not worth two layers, pixels.
 const NEGLIGIBLE_PX: f64 = 0.02;
 /// Blur radius up to which layers lie twice as close, pixels.
@@ -22,21 +43,10 @@ const NEAR_FOCUS_PX: f64 = 4.0;
 
 impl Layers {
     /// Lays layers over a range of dioptres (farthest, nearest), at most `step_px` of blur radius apart.
-    pub(crate) fn over(
-        range: (f64, f64),
-        step_px: f64,
-        film: &Film,
-        corner_tan: f64,
-        wavelengths_nm: &[f64],
-        kernels: &dyn Kernels,
-    ) -> Self {
-        let pitch_mm = 1e-3 * film.pitch_um;
-        let last = wavelengths_nm.len() - 1;
-        let samples: Vec<(f64, f64)> = [0, last / 2, last]
-            .into_iter()
-            .flat_map(|w| [0.0, 0.5, 1.0].map(|part| (part * corner_tan, wavelengths_nm[w])))
-            .collect();
-        let blur_px = |(tan, nm): &(f64, f64), dioptres: f64| kernels.blur_radius_mm(*tan, dioptres, *nm) / pitch_mm;
+    pub(crate) fn over(range: (f64, f64), step_px: f64, lens: &Blurs<'_>) -> Self {
+        let last = lens.wavelengths_nm.len() - 1;
+        let samples: Vec<(f64, f64)> = [0, last / 2, last].into_iter().flat_map(|band| lens.samples(band)).collect();
+        let blur_px = |sample: &(f64, f64), dioptres: f64| lens.blur_px(*sample, dioptres);
         let change_px = samples.iter().map(|s| (blur_px(s, range.1) - blur_px(s, range.0)).abs()).fold(0.0, f64::max);
         let mut dioptres = vec![0.5 * (range.0 + range.1)];
         let mut px_per_dioptre = 0.0;
@@ -66,6 +76,29 @@ impl Layers {
         let radius_px =
             dioptres.iter().map(|&d| samples.iter().map(|s| blur_px(s, d).abs()).fold(0.0, f64::max)).collect();
         Self { dioptres, radius_px, px_per_dioptre }
+    }
+
+    /// Returns the bands at which PSFs are computed: first, last, and enough between them that the blur radius changes
+    /// by at most `step_px` from one to the next, all over the film and the depths.
+    pub(crate) fn chromatic_knots(&self, step_px: f64, lens: &Blurs<'_>) -> Vec<usize> {
+        let ends = [self.dioptres[0], self.dioptres[self.len() - 1]];
+        let blurs = |band: usize| -> Vec<f64> {
+            lens.samples(band).flat_map(|sample| ends.map(|d| lens.blur_px(sample, d))).collect()
+        };
+        let all: Vec<Vec<f64>> = (0..lens.wavelengths_nm.len()).map(blurs).collect();
+        let change = |a: usize, b: usize| all[a].iter().zip(&all[b]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let mut knots = vec![0];
+        for band in 1..all.len() {
+            let last = knots[knots.len() - 1];
+            // A blur may come back to what it was, so every band on the way counts.
+            if band - last > 1 && (last + 1..=band).any(|between| change(last, between) > step_px) {
+                knots.push(band - 1);
+            }
+        }
+        if all.len() > 1 {
+            knots.push(all.len() - 1);
+        }
+        knots
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -125,9 +158,20 @@ mod tests {
     use crate::DiscLens;
 
     fn layers(range: (f64, f64), step_px: f64) -> Layers {
-        let lens = DiscLens { focus_dioptres: 10.0, ..DiscLens::default() };
-        let film = Film { rows: 10, columns: 10, pitch_um: 1.0 };
-        Layers::over(range, step_px, &film, 0.1, &[550.0], &lens)
+        let kernels = DiscLens { focus_dioptres: 10.0, ..DiscLens::default() };
+        let lens = Blurs { kernels: &kernels, pitch_mm: 1e-3, corner_tan: 0.1, wavelengths_nm: &[550.0] };
+        Layers::over(range, step_px, &lens)
+    }
+
+    #[test]
+    fn bands_share_psfs_only_while_the_blur_stays() {
+        let lens = DiscLens { focus_dioptres: 10.0, axial_per_nm: 0.002, ..DiscLens::default() };
+        let wavelengths_nm: Vec<f64> = (0..31).map(|i| 400.0 + 10.0 * f64::from(i)).collect();
+        let lens = Blurs { kernels: &lens, pitch_mm: 1e-3, corner_tan: 0.1, wavelengths_nm: &wavelengths_nm };
+        let layers = Layers::over((5.0, 12.0), 2.0, &lens);
+        // 0.02 pixels a band: 12 bands make 0.24 pixels.
+        assert_eq!(layers.chromatic_knots(0.25, &lens), [0, 12, 24, 30]);
+        assert_eq!(layers.chromatic_knots(0.0, &lens), (0..31).collect::<Vec<_>>());
     }
 
     #[test]

@@ -15,7 +15,7 @@ use crate::{
     blur::{LayerTask, blur_layer},
     geometry::{FilmFrame, check_reach},
     hidden::{EdgeRule, Fill, reach_of_edges},
-    layers::Layers,
+    layers::{Blurs, Layers},
     occlusion::{BlurredLayer, Composite},
     sampler::{Sampler, Surface},
     tiles::{Cell, LayerKernels, Tiling, cells_over},
@@ -102,6 +102,8 @@ struct Plan<'a> {
     film: &'a Film,
     settings: &'a Settings,
     wavelengths_nm: Vec<f64>,
+    /// The bands at which PSFs are computed; between them they are interpolated.
+    kernel_bands: Vec<usize>,
     layers: Layers,
     sampler: Sampler,
     tiling: Tiling,
@@ -127,12 +129,6 @@ impl Hidden {
     }
 }
 
-/// What a band needs to know of the lens.
-struct BandLens {
-    maps: Vec<RadialMap>,
-    kernels: Vec<LayerKernels>,
-}
-
 impl<'a> Plan<'a> {
     fn new(
         source: &Source<'_>,
@@ -145,7 +141,9 @@ impl<'a> Plan<'a> {
         let middle_nm = wavelengths_nm[wavelengths_nm.len() / 2];
         let corner_mm = film.half_diagonal_mm();
         let (corner_tan, _) = kernels.radial_map(dioptres.0, middle_nm, corner_mm).field_tan(corner_mm, 0.0);
-        let layers = Layers::over(dioptres, settings.layer_step_px, film, corner_tan, &wavelengths_nm, kernels);
+        let blurs = Blurs { kernels, pitch_mm: 1e-3 * film.pitch_um, corner_tan, wavelengths_nm: &wavelengths_nm };
+        let layers = Layers::over(dioptres, settings.layer_step_px, &blurs);
+        let kernel_bands = layers.chromatic_knots(settings.chromatic_step_px, &blurs);
         let places = source.depth.z_m().mapv(|z| layers.place_of(z));
         // The 95 % radius of a blur, doubled, holds all but the faintest of its light.
         let pad_px = (0..layers.len()).map(|l| layers.radius_px_at(l as f32)).fold(0.0, f64::max) * 2.0 + 8.0;
@@ -170,7 +168,19 @@ impl<'a> Plan<'a> {
             layers.len(),
         );
         let tiling = Tiling::new(active, &maps, &layers, film, middle_nm, kernels, settings);
-        Self { kernels, film, settings, wavelengths_nm, layers, sampler, tiling, places, hidden, reach_mm }
+        Self {
+            kernels,
+            film,
+            settings,
+            kernel_bands,
+            wavelengths_nm,
+            layers,
+            sampler,
+            tiling,
+            places,
+            hidden,
+            reach_mm,
+        }
     }
 
     fn render(
@@ -181,34 +191,51 @@ impl<'a> Plan<'a> {
     ) -> Result<(), ForwardError> {
         let n_bands = self.wavelengths_nm.len();
         let done = AtomicUsize::new(0);
-        let bands: Vec<usize> = (0..n_bands).collect();
-        for group in bands.chunks(rayon::current_num_threads().clamp(1, 4)) {
-            let pictures: Vec<Result<Array2<f32>, ForwardError>> = group
-                .par_iter()
-                .map(|&band| {
-                    let lens = self.band_lens(band);
-                    let picture = self.render_band(source, band, &lens);
-                    let n_done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                    progress(n_done as f64 / n_bands as f64);
-                    picture
-                })
-                .collect();
-            for (&band, picture) in group.iter().zip(pictures) {
-                sink(band, picture?).map_err(|source| ForwardError::Sink { band, source })?;
+        let mut lower = self.kernels_at(0);
+        for pair in self.kernel_bands.windows(2) {
+            let upper = self.kernels_at(pair[1]);
+            let bands: Vec<usize> = (pair[0]..pair[1]).collect();
+            for group in bands.chunks(rayon::current_num_threads().clamp(1, 4)) {
+                let pictures: Vec<Result<Array2<f32>, ForwardError>> = group
+                    .par_iter()
+                    .map(|&band| {
+                        let fraction = (band - pair[0]) as f32 / (pair[1] - pair[0]) as f32;
+                        let picture = self.render_band(source, band, &mixed(&lower, &upper, fraction));
+                        let n_done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                        progress(n_done as f64 / n_bands as f64);
+                        picture
+                    })
+                    .collect();
+                for (&band, picture) in group.iter().zip(pictures) {
+                    sink(band, picture?).map_err(|source| ForwardError::Sink { band, source })?;
+                }
             }
+            lower = upper;
         }
-        Ok(())
+        let last = n_bands - 1;
+        let picture = self.render_band(source, last, &lower)?;
+        progress(1.0);
+        sink(last, picture).map_err(|source| ForwardError::Sink { band: last, source })
     }
 
-    fn band_lens(&self, band: usize) -> BandLens {
+    fn maps_at(&self, band: usize) -> Vec<RadialMap> {
         let wavelength_nm = self.wavelengths_nm[band];
         let map = |&dioptres: &f64| self.kernels.radial_map(dioptres, wavelength_nm, self.reach_mm);
-        let maps: Vec<RadialMap> = self.layers.dioptres().iter().map(map).collect();
-        let kernels = self.tiling.kernels_at(&maps, &self.layers, self.film, wavelength_nm, self.kernels);
-        BandLens { maps, kernels }
+        self.layers.dioptres().iter().map(map).collect()
     }
 
-    fn render_band(&self, source: &Source<'_>, band: usize, lens: &BandLens) -> Result<Array2<f32>, ForwardError> {
+    fn kernels_at(&self, band: usize) -> Vec<LayerKernels> {
+        let maps = self.maps_at(band);
+        self.tiling.kernels_at(&maps, &self.layers, self.film, self.wavelengths_nm[band], self.kernels)
+    }
+
+    fn render_band(
+        &self,
+        source: &Source<'_>,
+        band: usize,
+        kernels: &[LayerKernels],
+    ) -> Result<Array2<f32>, ForwardError> {
+        let maps = self.maps_at(band);
         let front = source.radiance.band(band)?;
         let behind: Option<Cow<'_, Array2<f32>>> = match (&self.hidden, &source.behind) {
             (Hidden::Guessed { fill, .. }, _) => Some(Cow::Owned(fill.samples(&front))),
@@ -225,11 +252,11 @@ impl<'a> Plan<'a> {
         for (layer, cells) in self.tiling.cells.iter().enumerate() {
             let task = LayerTask {
                 sampler: &self.sampler,
-                map: &lens.maps[layer],
+                map: &maps[layer],
                 layer,
                 surfaces: &surfaces,
                 cells,
-                kernels: &lens.kernels[layer],
+                kernels: &kernels[layer],
                 film_rows: rows,
                 film_columns: columns,
                 with_cover: hides,
@@ -243,6 +270,11 @@ impl<'a> Plan<'a> {
         }
         Ok(if hides { picture.finish() } else { picture.finish_sum() })
     }
+}
+
+/// Returns the kernels of all layers between two bands.
+fn mixed(lower: &[LayerKernels], upper: &[LayerKernels], fraction: f32) -> Vec<LayerKernels> {
+    lower.iter().zip(upper).map(|(lower, upper)| lower.mixed(upper, fraction)).collect()
 }
 
 /// Returns the places of what lies behind near surfaces, close to their edges.

@@ -98,6 +98,16 @@ impl LayerKernels {
         Self { width, by_knot }
     }
 
+    /// Returns the kernels between two wavelengths.
+    pub(crate) fn mixed(&self, other: &Self, fraction: f32) -> Self {
+        let width = self.width.max(other.width);
+        let mix = |(knot, a): (&Knot, &Vec<f32>)| {
+            let (a, b) = (widened(a, self.width, width), widened(&other.by_knot[knot], other.width, width));
+            (*knot, a.iter().zip(&b).map(|(a, b)| a + fraction * (b - a)).collect())
+        };
+        Self { width, by_knot: self.by_knot.iter().map(mix).collect() }
+    }
+
     /// Returns the kernel at a knot anywhere on the film: that of its canonical knot, mirrored.
     pub(crate) fn at(&self, knot: Knot) -> Vec<f32> {
         let kernel = &self.by_knot[&knot.canonical()];
@@ -125,6 +135,15 @@ fn padded(kernel: &Array2<f32>, width: usize) -> Vec<f32> {
     let mut samples = vec![0.0; width * width];
     for ((row, column), &value) in kernel.indexed_iter() {
         samples[(top + row) * width + left + column] = (f64::from(value) * scale) as f32;
+    }
+    samples
+}
+
+fn widened(kernel: &[f32], width: usize, to: usize) -> Vec<f32> {
+    let margin = (to - width) / 2;
+    let mut samples = vec![0.0; to * to];
+    for (row, line) in kernel.chunks_exact(width).enumerate() {
+        samples[(margin + row) * to + margin..][..width].copy_from_slice(line);
     }
     samples
 }
