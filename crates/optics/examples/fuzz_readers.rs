@@ -1,0 +1,42 @@
+//! Reads N randomly changed files of every format, as the test `formats_robust` does with a few thousand.
+//!
+//! `cargo run --release -p dioptric-optics --example fuzz_readers -- 1000000 [first]`: mutants `first` and on of each
+//! seed. A panic names the seed and the mutant's number, and its input is left in `crash-NUMBER-NAME`.
+#![expect(clippy::print_stdout, reason = "this is a command")]
+
+use std::{panic, time::Instant};
+
+#[path = "../tests/mutate/mod.rs"]
+mod mutate;
+
+use mutate::{SEEDS, mutant, read};
+
+fn main() {
+    let mut arguments = std::env::args().skip(1).map(|word| word.parse::<u64>().unwrap_or(0));
+    let (n_mutants, first) = (arguments.next().unwrap_or(1000), arguments.next().unwrap_or(0));
+    for (name, seed) in SEEDS {
+        let (start, mut slowest_s, mut n_read) = (Instant::now(), (0.0_f64, 0), 0_u64);
+        let mut n_crashes = 0;
+        for number in first..first + n_mutants {
+            let bytes = mutant(seed, number);
+            let began = Instant::now();
+            match panic::catch_unwind(|| read(name, &bytes)) {
+                Ok(is_read) => n_read += u64::from(is_read),
+                Err(_) => {
+                    n_crashes += 1;
+                    println!("{name}: mutant {number} panics");
+                    std::fs::write(format!("crash-{number}-{name}"), &bytes).expect("the folder can be written to");
+                }
+            }
+            let took_s = began.elapsed().as_secs_f64();
+            if took_s > slowest_s.0 {
+                slowest_s = (took_s, number);
+            }
+        }
+        let per_s = n_mutants as f64 / start.elapsed().as_secs_f64();
+        println!(
+            "{name}: {n_mutants} mutants, {n_crashes} panics, {n_read} read, {per_s:.0}/s, slowest {:.3} s (mutant {})",
+            slowest_s.0, slowest_s.1
+        );
+    }
+}
