@@ -1,5 +1,4 @@
 //! Building a bank and drawing from it.
-#![expect(missing_docs, reason = "the macro makes public functions")]
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 
 use criterion::{Criterion, criterion_group, criterion_main};

@@ -1,8 +1,9 @@
 //! The bank: ray maps over field, depth and wavelength, from which any point spread function is drawn.
 
-use dioptric_diffraction::{Edge, Hurb};
-use dioptric_optics::{Lens, MonoLens};
+use dioptric_diffraction::{Edge, Hurb, WaveQuality, WaveWindow, WindowCenter, wave_psf};
+use dioptric_optics::{Lens, MonoLens, ObjectPoint};
 use glam::DVec2;
+use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +14,7 @@ use crate::{
     mesh::Mesh,
     pupil::Pupil,
     ray_map::{Record, Summary, Task},
-    render::{self, Bending},
+    render::{self, Bending, Layout},
 };
 
 /// How diffraction is taken into account.
@@ -29,6 +30,9 @@ pub enum Diffraction {
     },
     /// Uncertainty bending with constants calibrated to Airy's pattern: better in focus, not in defocus.
     HurbCalibrated,
+    /// Wave optics while the blur is small enough for it, uncertainty bending (γ = 1) beyond, blended over an octave:
+    /// see [`PsfBank::wave_share`].
+    Wave,
 }
 
 impl Diffraction {
@@ -36,6 +40,7 @@ impl Diffraction {
         match self {
             Self::None => None,
             Self::Hurb { gamma } => Some(Hurb::with_gamma(gamma)),
+            Self::Wave => Some(Hurb::PAPER),
             Self::HurbCalibrated => Some(Hurb::CALIBRATED),
         }
     }
@@ -134,6 +139,8 @@ fn inverse_square(wavelength_nm: f64) -> f64 {
     1.0 / (wavelength_nm * wavelength_nm)
 }
 
+/// The largest range of phases, radians, at which a kernel is wave optics alone; at twice that there is none.
+const ALL_WAVE: f64 = 200.0;
 /// How many times finer than the bank's the table of image heights is, in the field.
 const GEOMETRY_STEPS: usize = 3;
 /// The field that stands for the axis where a ratio of height to field is needed, as a share of the largest.
@@ -155,7 +162,8 @@ pub struct PsfBank {
     records: Vec<Record>,
     geometry_fields: Vec<f64>,
     summaries: Vec<Summary>,
-    stop_radius_mm: f64,
+    lens: Lens,
+    reference: MonoLens,
     /// Index around the stop at each of the colours.
     stop_indices: Vec<f64>,
 }
@@ -246,8 +254,9 @@ impl PsfBank {
             records,
             geometry_fields: geometry_fields[..n_geometry].to_vec(),
             summaries,
-            stop_radius_mm: reference.stop_semi_aperture_mm(),
+            lens: lens.clone(),
             stop_indices: lenses.iter().map(MonoLens::stop_medium_index).collect(),
+            reference,
         })
     }
 
@@ -282,12 +291,58 @@ impl PsfBank {
     /// picture, and of diffraction's Gaussians all but their far tails; the sum says how much.
     pub fn kernel(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Kernel {
         let record = self.record(field_tan.length(), dioptres, wavelength_nm);
+        let layout = self.layout(&record, field_tan, wavelength_nm, pitch_um);
+        let is_diffracted = self.settings.diffraction != Diffraction::None;
+        let (side, share) = (layout.side(), self.share_of(&layout));
+        let waves = (share > 0.0).then(|| self.waves(field_tan, dioptres, wavelength_nm, pitch_um, side)).flatten();
+        let energies = match waves {
+            None => layout.draw(),
+            Some(waves) if share == 1.0 => waves,
+            Some(waves) => waves * share + layout.draw() * (1.0 - share),
+        };
+        render::kernel(&energies, is_diffracted, pitch_um)
+    }
+
+    /// Returns how much of a kernel is wave optics, and not uncertainty bending: 1 or 0, or between them where they are
+    /// blended. It is 0 unless the bank has [`Diffraction::Wave`].
+    ///
+    /// It falls with the range of phases B over the pupil that the sum has to follow, on a scale of its logarithm: from
+    /// 1 at B = 200 to 0 at B = 400, a blur of about ten waves of defocus.
+    pub fn wave_share(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> f64 {
+        let record = self.record(field_tan, dioptres, wavelength_nm);
+        self.share_of(&self.layout(&record, DVec2::X, wavelength_nm, pitch_um))
+    }
+
+    fn share_of(&self, layout: &Layout<'_>) -> f64 {
+        match self.settings.diffraction {
+            Diffraction::Wave => (2.0 - (layout.bandwidth() / ALL_WAVE).log2()).clamp(1.0, 2.0) - 1.0,
+            _ => 0.0,
+        }
+    }
+
+    fn layout<'a>(&self, record: &'a Record, field_tan: DVec2, wavelength_nm: f64, pitch_um: f64) -> Layout<'a> {
         let turn = field_tan.try_normalize().unwrap_or(DVec2::X);
         let bending = self.settings.diffraction.model().map(|model| {
             let index = self.stop_index(wavelength_nm);
-            Bending { model, edge: Edge::new(self.stop_radius_mm, wavelength_nm, index) }
+            Bending { model, edge: Edge::new(self.reference.stop_semi_aperture_mm(), wavelength_nm, index) }
         });
-        render::kernel(&record, turn, bending, pitch_um)
+        Layout::new(record, turn, bending, pitch_um)
+    }
+
+    /// Returns the wave-optical energies about the centroid, or `None` where the rays have no angular spectrum.
+    fn waves(&self, tan: DVec2, dioptres: f64, nm: f64, pitch_um: f64, side: usize) -> Option<Array2<f64>> {
+        let lens = self.lens.at(self.within_colors(nm)).ok()?;
+        let (knots, last) = (self.dioptres.knots(), self.last_field_tan());
+        let dioptres = dioptres.clamp(knots[0], knots[knots.len() - 1]);
+        let point = ObjectPoint::from_field(&self.reference, tan.clamp_length_max(last), dioptres);
+        let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::Centroid };
+        let psf = wave_psf(&lens, &point, self.settings.film_mm, &window, WaveQuality::default()).ok()?;
+        Some(psf.samples)
+    }
+
+    fn within_colors(&self, wavelength_nm: f64) -> f64 {
+        let nm = &self.settings.wavelengths_nm;
+        wavelength_nm.clamp(nm[0], nm[nm.len() - 1])
     }
 
     /// Returns the signed radius of the circle of confusion, mm: above 0 for objects nearer than the focus.
@@ -335,8 +390,7 @@ impl PsfBank {
     }
 
     fn color_stencil(&self, wavelength_nm: f64) -> Stencil {
-        let nm = &self.settings.wavelengths_nm;
-        self.colors.stencil(self.dispersion.coordinate(wavelength_nm.clamp(nm[0], nm[nm.len() - 1])))
+        self.colors.stencil(self.dispersion.coordinate(self.within_colors(wavelength_nm)))
     }
 
     fn stop_index(&self, wavelength_nm: f64) -> f64 {

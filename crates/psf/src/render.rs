@@ -2,6 +2,7 @@
 
 use dioptric_diffraction::{Covariance, Edge, Hurb};
 use glam::DVec2;
+use ndarray::Array2;
 
 use crate::{
     Kernel,
@@ -33,36 +34,71 @@ pub(crate) struct Bending {
     pub(crate) edge: Edge,
 }
 
-/// Draws a ray map about its centroid; `turn` is the direction of the field in the picture.
-pub(crate) fn kernel(record: &Record, turn: DVec2, bending: Option<Bending>, pitch_um: f64) -> Kernel {
-    let scale = 1e3 / pitch_um;
-    let mut nodes: Vec<Node> = (0..record.mesh.n_nodes()).map(|i| record.node(i)).collect();
-    for node in &mut nodes {
-        for v in [&mut node.at_mm, &mut node.along_l_mm, &mut node.along_m_mm] {
-            // To pixels: columns to the right, rows down.
-            *v = turn.rotate(*v) * DVec2::new(scale, -scale);
-        }
-    }
-    let reach = nodes.iter().map(|node| node.at_mm.abs().max_element()).fold(0.0, f64::max);
-    let tails = bending.map_or(0.0, |bending| TAILS * unit(record, &nodes, bending));
-    let half = (reach + tails - 0.5).ceil().clamp(0.0, MOST_PIXELS) as usize;
-    let side = 2 * half + 1;
-    let middle = DVec2::splat(half as f64 + 0.5);
-    nodes.iter_mut().for_each(|node| node.at_mm += middle);
+/// A ray map turned to its field and scaled to pixels, and the window that holds it.
+pub(crate) struct Layout<'a> {
+    record: &'a Record,
+    nodes: Vec<Node>,
+    bending: Option<Bending>,
+    /// The geometric picture's reach from the centroid, pixels.
+    reach: f64,
+    /// λN, pixels; 0 without diffraction.
+    unit: f64,
+    half: usize,
+}
 
-    let mut raster = Raster::new(side, side);
-    for ((ring, j), &energy) in record.mesh.cells().zip(record.energies()) {
-        let corners = record.mesh.corners(ring, j).map(|node| nodes[node]);
-        match bending {
-            None => raster.quadrilateral(corners.map(|node| node.at_mm), energy.into()),
-            Some(bending) => {
-                let cell = Cell { corners, inner: ring as f64, energy: energy.into() };
-                draw_bent(&mut raster, record, &cell, bending);
+impl<'a> Layout<'a> {
+    /// Returns the layout of a ray map; `turn` is the direction of the field in the picture.
+    pub(crate) fn new(record: &'a Record, turn: DVec2, bending: Option<Bending>, pitch_um: f64) -> Self {
+        let scale = 1e3 / pitch_um;
+        let mut nodes: Vec<Node> = (0..record.mesh.n_nodes()).map(|i| record.node(i)).collect();
+        for node in &mut nodes {
+            for v in [&mut node.at_mm, &mut node.along_l_mm, &mut node.along_m_mm] {
+                // To pixels: columns to the right, rows down.
+                *v = turn.rotate(*v) * DVec2::new(scale, -scale);
             }
         }
+        let reach = nodes.iter().map(|node| node.at_mm.abs().max_element()).fold(0.0, f64::max);
+        let unit = bending.map_or(0.0, |bending| unit(record, &nodes, bending));
+        let half = (reach + TAILS * unit - 0.5).ceil().clamp(0.0, MOST_PIXELS) as usize;
+        Self { record, nodes, bending, reach, unit, half }
     }
-    let kept = if bending.is_some() { KEPT_OF_TAILS } else { 1.0 - 1e-7 };
-    Kernel { samples: trim(&raster.finish(), kept), pitch_um }
+
+    /// The side of the window in pixels, an odd number.
+    pub(crate) fn side(&self) -> usize {
+        2 * self.half + 1
+    }
+
+    /// The range of phases B that a wave sum would have to follow, radians: over the pupil's radius, for light from
+    /// its outermost ray to the window's corner.
+    pub(crate) fn bandwidth(&self) -> f64 {
+        let corner = std::f64::consts::SQRT_2 * (self.half as f64 + 0.5);
+        std::f64::consts::PI * (self.reach + corner) / self.unit
+    }
+
+    /// Draws the energy of each pixel of the window.
+    pub(crate) fn draw(mut self) -> Array2<f64> {
+        let middle = DVec2::splat(self.half as f64 + 0.5);
+        self.nodes.iter_mut().for_each(|node| node.at_mm += middle);
+        let record = self.record;
+        let mut raster = Raster::new(self.side(), self.side());
+        for ((ring, j), &energy) in record.mesh.cells().zip(record.energies()) {
+            let corners = record.mesh.corners(ring, j).map(|node| self.nodes[node]);
+            match self.bending {
+                None => raster.quadrilateral(corners.map(|node| node.at_mm), energy.into()),
+                Some(bending) => {
+                    let cell = Cell { corners, inner: ring as f64, energy: energy.into() };
+                    draw_bent(&mut raster, record, &cell, bending);
+                }
+            }
+        }
+        raster.finish()
+    }
+}
+
+/// Returns drawn energies as a kernel, trimmed to what matters.
+pub(crate) fn kernel(energies: &Array2<f64>, is_diffracted: bool, pitch_um: f64) -> Kernel {
+    let kept = if is_diffracted { KEPT_OF_TAILS } else { 1.0 - 1e-7 };
+    Kernel { samples: trim(energies, kept), pitch_um }
 }
 
 /// Returns λN in pixels: what the Gaussian of a ray through the middle of the stop would give.
