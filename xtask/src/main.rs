@@ -2,16 +2,19 @@
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool talks to its user")]
 
+mod figures;
 mod layers;
 
-use std::process::ExitCode;
+use std::{path::Path, process::ExitCode};
 
-const USAGE: &str = "usage: cargo xtask layers";
+const USAGE: &str = "usage: cargo xtask layers | figures [--out DIR]";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["layers"] => layers::run(),
+        ["figures"] => figures::run(Path::new("docs/figures")),
+        ["figures", "--out", folder] => figures::run(Path::new(folder)),
         _ => Err(anyhow::anyhow!(USAGE)),
     };
     match outcome {
