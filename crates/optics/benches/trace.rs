@@ -3,7 +3,9 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use dioptric_optics::{Lens, MonoLens, ObjectPoint, RayBatch, Rims, glam::DVec2, rays_towards};
+use dioptric_optics::{
+    Glass, Interface, Lens, MonoLens, ObjectPoint, RayBatch, Rims, Shape, Surface, glam::DVec2, rays_towards,
+};
 
 /// Rays from an axial point at 2 m over a disc a little wider than the entrance pupil.
 fn bundle(lens: &MonoLens, n_rays: usize) -> RayBatch {
@@ -17,6 +19,32 @@ fn bundle(lens: &MonoLens, n_rays: usize) -> RayBatch {
     };
     let targets: Vec<DVec2> = (0..n_rays).map(place).collect();
     rays_towards(&point, &targets, first.entrance_pupil_z_mm, 0.0)
+}
+
+/// Eight aspheres of six even powers each, as a phone's lens has.
+fn aspheres() -> MonoLens {
+    let coefficients = vec![1e-5, -1e-7, 1e-9, 1e-12, 1e-14];
+    let interface = |i: usize| Interface {
+        surface: Surface {
+            shape: Shape::EvenAsphere { conic: -0.5, coefficients: coefficients.clone() },
+            ..Surface::sphere(if i.is_multiple_of(3) { -40.0 } else { 30.0 }, 6.0)
+        },
+        medium_after: if i.is_multiple_of(2) { Glass::Constant { index: 1.53 } } else { Glass::Air },
+        thickness_after_mm: 1.0,
+    };
+    let lens = Lens::new("aspheres", "made up", (0..8).map(interface).collect(), 0);
+    lens.and_then(|lens| lens.at(550.0)).expect("the lens is well formed")
+}
+
+fn trace_aspheres(criterion: &mut Criterion) {
+    let lens = aspheres();
+    let rays = bundle(&lens, 10_000);
+    let mut group = criterion.benchmark_group("trace/aspheres");
+    group.throughput(Throughput::Elements((rays.len() * lens.n_surfaces()) as u64));
+    group.bench_with_input(BenchmarkId::from_parameter(rays.len()), &rays, |bencher, rays| {
+        bencher.iter_batched_ref(|| rays.clone(), |rays| lens.trace(rays, Rims::Clip), BatchSize::LargeInput);
+    });
+    group.finish();
 }
 
 fn trace(criterion: &mut Criterion) {
@@ -43,5 +71,5 @@ fn trace(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, trace);
+criterion_group!(benches, trace, trace_aspheres);
 criterion_main!(benches);

@@ -164,7 +164,7 @@ impl MonoLens {
 
     /// Moves rays straight on to the film plane, `film_mm` behind the last vertex.
     pub fn to_film(&self, rays: &mut RayBatch, film_mm: f64) {
-        rays.move_to_plane(self.last_vertex_z_mm() + film_mm, self.image_index());
+        trace::move_to_plane(rays.slices(), self.last_vertex_z_mm() + film_mm, self.image_index());
     }
 
     /// Returns the image of the axial point at `object_distance_mm` before the first vertex (infinite for far ones).

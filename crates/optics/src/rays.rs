@@ -200,19 +200,6 @@ impl RayBatch {
             fate,
         })
     }
-
-    /// Moves every ray in flight along its line to the plane at `z_mm` in a medium of this index.
-    pub(crate) fn move_to_plane(&mut self, z_mm: f64, index: f64) {
-        for i in 0..self.len() {
-            if self.fate[i].is_in_flight() {
-                let t = (z_mm - self.z_mm[i]) / self.n[i];
-                self.x_mm[i] += self.l[i] * t;
-                self.y_mm[i] += self.m[i] * t;
-                self.z_mm[i] = z_mm;
-                self.opl_mm[i] += index * t;
-            }
-        }
-    }
 }
 
 /// The lists of a batch, or of some of its rays.

@@ -4,14 +4,16 @@
 //! at run time. Neither uses fused multiply-add, and square roots and divisions are correctly rounded, so every
 //! machine gives the same bits. Lanes whose ray has ended go on computing numbers that nobody reads.
 
+mod asphere;
 mod crossing;
 #[cfg(test)]
 mod twin;
 
 use multiversion::multiversion;
 
-use self::crossing::{
-    AllPowers, EvenPowers, Ray, cross_asphere, cross_conic, cross_plane, cross_sphere, refract, thin_lens,
+use self::{
+    asphere::{Asphere, Powers},
+    crossing::{Crossing, Ray, cross_conic, cross_plane, cross_sphere, refract, thin_lens},
 };
 use crate::{RayFate, rays::RaySlices};
 
@@ -83,6 +85,23 @@ struct Tile {
 #[multiversion(targets("x86_64+avx2"))]
 pub(crate) fn trace_batch(steps: &[Step], first: usize, rims: Rims, mut rays: RaySlices<'_>) {
     trace_tiles(steps, first, rims, &mut rays, |_, _, _| {});
+}
+
+/// Moves every ray in flight along its line to the plane at `z` in a medium of this index.
+#[multiversion(targets("x86_64+avx2"))]
+pub(crate) fn move_to_plane(rays: RaySlices<'_>, plane_z: f64, index: f64) {
+    let RaySlices { x, y, z, l, m, n, opl, fate } = rays;
+    let count = fate.len();
+    let (x, y, z, opl) = (&mut x[..count], &mut y[..count], &mut z[..count], &mut opl[..count]);
+    let (l, m, n) = (&l[..count], &m[..count], &n[..count]);
+    for i in 0..count {
+        let t = (plane_z - z[i]) / n[i];
+        let is_alive = fate[i].is_in_flight();
+        x[i] = if is_alive { x[i] + l[i] * t } else { x[i] };
+        y[i] = if is_alive { y[i] + m[i] * t } else { y[i] };
+        z[i] = if is_alive { plane_z } else { z[i] };
+        opl[i] = if is_alive { opl[i] + index * t } else { opl[i] };
+    }
 }
 
 /// Traces rays without rims, and keeps for each the least over all surfaces of semi-aperture less distance from the
@@ -199,6 +218,13 @@ impl Tile {
     }
 }
 
+impl Tile {
+    #[inline(always)]
+    fn cross(&self, asphere: Asphere<'_>) -> [Crossing; LANES] {
+        asphere.cross(std::array::from_fn(|i| self.ray(i)), self.alive.map(|alive| alive != 0))
+    }
+}
+
 impl RaySlices<'_> {
     #[inline(always)]
     fn put(&mut self, i: usize, ray: &Ray, vertex_z: f64) {
@@ -224,19 +250,20 @@ fn pass(at: &mut At<'_, '_>, tile: &mut Tile) {
     let c = step.curvature;
     let refracting = Refracting::new(step, limit_mm2);
     match &step.kind {
-        Kind::Window => pass_lanes(at, tile, |ray| cross_plane(step.index_before, limit_mm2, ray)),
-        Kind::Sphere => pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_sphere(c, ray))),
-        Kind::Conic { conic } => pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_conic(c, *conic, ray))),
+        Kind::Window => pass_lanes(at, tile, |_, ray| cross_plane(step.index_before, limit_mm2, ray)),
+        Kind::Sphere => pass_lanes(at, tile, |_, ray| refract(&refracting, ray, cross_sphere(c, ray))),
+        Kind::Conic { conic } => pass_lanes(at, tile, |_, ray| refract(&refracting, ray, cross_conic(c, *conic, ray))),
         Kind::EvenAsphere { conic, a2, coefficients } => {
-            let bumps = EvenPowers { a2: *a2, coefficients };
-            pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_asphere(c, *conic, bumps, ray)));
+            let powers = Powers::Even { a2: *a2, rest: coefficients };
+            let crossings = tile.cross(Asphere { curvature: c, conic: *conic, powers });
+            pass_lanes(at, tile, |i, ray| refract(&refracting, ray, crossings[i]));
         }
         Kind::OddAsphere { conic, coefficients } => {
-            let bumps = AllPowers { coefficients };
-            pass_lanes(at, tile, |ray| refract(&refracting, ray, cross_asphere(c, *conic, bumps, ray)));
+            let crossings = tile.cross(Asphere { curvature: c, conic: *conic, powers: Powers::All(coefficients) });
+            pass_lanes(at, tile, |i, ray| refract(&refracting, ray, crossings[i]));
         }
         Kind::ThinLens { power, object_z } => {
-            pass_lanes(at, tile, |ray| thin_lens(step, *power, *object_z, limit_mm2, ray));
+            pass_lanes(at, tile, |_, ray| thin_lens(step, *power, *object_z, limit_mm2, ray));
         }
     }
 }
@@ -271,11 +298,11 @@ struct Passed {
 }
 
 #[inline(always)]
-fn pass_lanes(at: &mut At<'_, '_>, tile: &mut Tile, pass_one: impl Fn(Ray) -> Passed) {
+fn pass_lanes(at: &mut At<'_, '_>, tile: &mut Tile, pass_one: impl Fn(usize, Ray) -> Passed) {
     let mut next = [[0.0; LANES]; 7];
     let mut ended = [0_u64; LANES];
     for i in 0..LANES {
-        let Passed { ray, goes_on, .. } = pass_one(tile.ray(i));
+        let Passed { ray, goes_on, .. } = pass_one(i, tile.ray(i));
         next[0][i] = ray.x;
         next[1][i] = ray.y;
         next[2][i] = ray.z;
@@ -288,7 +315,7 @@ fn pass_lanes(at: &mut At<'_, '_>, tile: &mut Tile, pass_one: impl Fn(Ray) -> Pa
     if ended.iter().fold(0, |any, ended| any | ended) != 0 {
         for i in (0..LANES).filter(|&i| ended[i] != 0) {
             let before = tile.ray(i);
-            end_ray(at, i, before, pass_one(before));
+            end_ray(at, i, before, pass_one(i, before));
             tile.alive[i] = 0;
         }
     }
@@ -319,7 +346,7 @@ mod tests {
     use glam::{DVec2, DVec3};
 
     use super::*;
-    use crate::{Lens, MonoLens, ObjectPoint, RayBatch, rays_towards};
+    use crate::{Glass, Interface, Lens, MonoLens, ObjectPoint, RayBatch, Shape, Surface, rays_towards};
 
     /// Rays that fill the front of a lens, and more: some pass, some are vignetted, some miss.
     fn bundle(lens: &MonoLens, field_tan: f64, n_rays: usize) -> RayBatch {
@@ -354,12 +381,20 @@ mod tests {
                 }
             }
         }
-        let lens = Lens::thin(50.0, 10.0).unwrap().at(550.0).unwrap();
-        let rays = bundle(&lens, 0.2, 99);
-        let (mut tiled, mut single) = (rays.clone(), rays.clone());
-        lens.trace(&mut tiled, Rims::Clip);
-        twin::trace_one_by_one(&lens.steps_for(rays.object_z_mm), Rims::Clip, &mut single);
-        assert_same_bits(&tiled, &single);
+        let odd = Surface {
+            shape: Shape::OddAsphere { conic: -0.5, coefficients: vec![1e-3, 2e-3, -1e-4, 1e-6] },
+            ..Surface::sphere(20.0, 9.0)
+        };
+        let medium_after = Glass::Constant { index: 1.6 };
+        let odd = Lens::new("odd", "test", vec![Interface { surface: odd, medium_after, thickness_after_mm: 0.0 }], 0);
+        for lens in [Lens::thin(50.0, 10.0).unwrap(), odd.unwrap()] {
+            let lens = lens.at(550.0).unwrap();
+            let rays = bundle(&lens, 0.2, 99);
+            let (mut tiled, mut single) = (rays.clone(), rays.clone());
+            lens.trace(&mut tiled, Rims::Clip);
+            twin::trace_one_by_one(&lens.steps_for(rays.object_z_mm), Rims::Clip, &mut single);
+            assert_same_bits(&tiled, &single);
+        }
     }
 
     #[test]
@@ -398,14 +433,11 @@ mod tests {
         assert_eq!((fate, point), (RayFate::Missed { surface: 0 }, DVec3::new(0.0, 80.0, 0.0)));
 
         // Light inside a glass ball beyond the critical angle, 37.3 degrees.
-        let ball = crate::Interface {
-            surface: crate::Surface::sphere(-10.0, 9.99),
-            medium_after: crate::Glass::Air,
-            thickness_after_mm: 0.0,
-        };
-        let window = crate::Interface {
-            surface: crate::Surface::plane(9.0),
-            medium_after: crate::Glass::Constant { index: 1.65 },
+        let ball =
+            Interface { surface: Surface::sphere(-10.0, 9.99), medium_after: Glass::Air, thickness_after_mm: 0.0 };
+        let window = Interface {
+            surface: Surface::plane(9.0),
+            medium_after: Glass::Constant { index: 1.65 },
             thickness_after_mm: 10.0,
         };
         let dome = Lens::new("dome", "test", vec![window, ball], 0).unwrap().at(550.0).unwrap();

@@ -4,9 +4,6 @@
 
 use super::{Passed, Refracting, Step};
 
-/// Newton steps after which a ray is held to miss an asphere.
-const NEWTON_STEPS: usize = 24;
-
 /// A ray: its point from the vertex at hand, its direction and its path so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ray {
@@ -23,14 +20,14 @@ pub(crate) struct Ray {
 #[derive(Clone, Copy)]
 pub(crate) struct Crossing {
     /// Distance along the ray.
-    t: f64,
+    pub(super) t: f64,
     /// Unit normal there, pointing downstream.
-    normal: [f64; 3],
+    pub(super) normal: [f64; 3],
     /// Cosine of the angle of incidence, and its square.
-    cos: f64,
-    cos2: f64,
+    pub(super) cos: f64,
+    pub(super) cos2: f64,
     /// Whether the crossing lies on the sheet of the vertex.
-    is_front: bool,
+    pub(super) is_front: bool,
 }
 
 /// Crosses a sphere where the ray goes through it downstream.
@@ -71,87 +68,6 @@ pub(crate) fn cross_conic(c: f64, conic: f64, ray: Ray) -> Crossing {
     let inverse = 1.0 / square.sqrt();
     let cos = s * inverse;
     Crossing { t, normal: gradient.map(|v| v * inverse), cos, cos2: cos * cos, is_front: gradient[2] > 0.0 }
-}
-
-/// What an asphere adds to its conic at a distance r from the axis, given by its square: the added sag, and its slope
-/// over r.
-pub(crate) trait Bumps: Copy {
-    fn at(self, r2: f64) -> (f64, f64);
-}
-
-/// Powers r², r⁴, r⁶, ….
-#[derive(Clone, Copy)]
-pub(crate) struct EvenPowers<'a> {
-    pub(crate) a2: f64,
-    /// From r⁴ on.
-    pub(crate) coefficients: &'a [f64],
-}
-
-impl Bumps for EvenPowers<'_> {
-    #[inline(always)]
-    fn at(self, r2: f64) -> (f64, f64) {
-        let (mut high, mut slope) = (0.0, 0.0);
-        for (i, a) in self.coefficients.iter().enumerate().rev() {
-            high = high * r2 + a;
-            slope = slope * r2 + a * (2 * i + 4) as f64;
-        }
-        ((high * r2 + self.a2) * r2, slope * r2 + 2.0 * self.a2)
-    }
-}
-
-/// Powers r, r², r³, ….
-#[derive(Clone, Copy)]
-pub(crate) struct AllPowers<'a> {
-    pub(crate) coefficients: &'a [f64],
-}
-
-impl Bumps for AllPowers<'_> {
-    #[inline(always)]
-    fn at(self, r2: f64) -> (f64, f64) {
-        let r = r2.sqrt();
-        let (mut high, mut slope) = (0.0, 0.0);
-        for (i, a) in self.coefficients.iter().enumerate().rev() {
-            high = high * r + a;
-            slope = slope * r + a * (i + 1) as f64;
-        }
-        // At the tip of a cone the normal is taken along the axis.
-        (high * r, if r > 0.0 { slope / r } else { 0.0 })
-    }
-}
-
-/// Crosses a conic with powers of r added, by Newton's method from the conic.
-///
-/// Once a step is small the next would be of the order of its square: it has converged to rounding.
-#[inline(always)]
-pub(crate) fn cross_asphere(c: f64, conic: f64, bumps: impl Bumps, ray: Ray) -> Crossing {
-    let Ray { x, y, z, l, m, n, .. } = ray;
-    let start = cross_conic(c, conic, ray);
-    let is_start = start.is_front & (start.t.abs() < f64::INFINITY);
-    let mut t = if is_start { start.t } else { -z / n };
-    // Sag and gradient below the point at t.
-    let surface = |t: f64| {
-        let (x1, y1) = (x + l * t, y + m * t);
-        let r2 = x1 * x1 + y1 * y1;
-        let root = (1.0 - (1.0 + conic) * c * c * r2).sqrt();
-        let (bump, slope) = bumps.at(r2);
-        let along = c / root + slope;
-        (c * r2 / (1.0 + root) + bump, -along * x1, -along * y1)
-    };
-    let mut is_converged = false;
-    for _ in 0..NEWTON_STEPS {
-        let (sag, gx, gy) = surface(t);
-        let step = (z + n * t - sag) / (l * gx + m * gy + n);
-        t -= step;
-        if step.abs() <= 1e-9 * (1.0 + t.abs()) {
-            is_converged = true;
-            break;
-        }
-    }
-    let (_, gx, gy) = surface(t);
-    let inverse = 1.0 / (gx * gx + gy * gy + 1.0).sqrt();
-    let cos = (l * gx + m * gy + n) * inverse;
-    let normal = [gx * inverse, gy * inverse, inverse];
-    Crossing { t, normal, cos, cos2: cos * cos, is_front: is_converged & (cos > 0.0) }
 }
 
 /// Moves a ray to its crossing and refracts it there.

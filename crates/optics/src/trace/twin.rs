@@ -2,7 +2,8 @@
 
 use super::{
     Kind, Rims, Step,
-    crossing::{AllPowers, EvenPowers, Ray, cross_asphere, cross_conic, cross_plane, cross_sphere, refract, thin_lens},
+    asphere::{Asphere, Powers},
+    crossing::{Ray, cross_conic, cross_plane, cross_sphere, refract, thin_lens},
     fate_of,
 };
 use crate::{RayBatch, RayFate, trace::Refracting};
@@ -34,12 +35,14 @@ fn trace_one(steps: &[Step], rims: Rims, mut ray: Ray) -> (Ray, RayFate) {
             Kind::Sphere => refract(&refracting, ray, cross_sphere(step.curvature, ray)),
             Kind::Conic { conic } => refract(&refracting, ray, cross_conic(step.curvature, *conic, ray)),
             Kind::EvenAsphere { conic, a2, coefficients } => {
-                let bumps = EvenPowers { a2: *a2, coefficients };
-                refract(&refracting, ray, cross_asphere(step.curvature, *conic, bumps, ray))
+                let powers = Powers::Even { a2: *a2, rest: coefficients };
+                let [crossing] = Asphere { curvature: step.curvature, conic: *conic, powers }.cross([ray], [true]);
+                refract(&refracting, ray, crossing)
             }
             Kind::OddAsphere { conic, coefficients } => {
-                let bumps = AllPowers { coefficients };
-                refract(&refracting, ray, cross_asphere(step.curvature, *conic, bumps, ray))
+                let powers = Powers::All(coefficients);
+                let [crossing] = Asphere { curvature: step.curvature, conic: *conic, powers }.cross([ray], [true]);
+                refract(&refracting, ray, crossing)
             }
             Kind::ThinLens { power, object_z } => thin_lens(step, *power, *object_z, limit_mm2, ray),
         };
