@@ -264,6 +264,19 @@ mod tests {
     }
 
     #[test]
+    fn product_has_the_bits_of_the_plain_loop_on_any_instruction_set() {
+        let (x, y) = (SampleAxis::new(2 * PLACES, 0.13, 1), SampleAxis::new(8, 0.11, 1));
+        let mut factors = Factors::new(&x, &y);
+        factors.fill(&waves(200), 0..200, 1.0, &x, &y);
+        let mut sums = vec![[[0.0; COLUMNS]; ROWS]; y.n_half()];
+        multiply(&factors.left, &factors.right, 200, &mut sums);
+        for (place, sum) in sums.iter().enumerate() {
+            // This call is compiled for the base instruction set, `multiply` chose the best that there is.
+            assert_eq!(*sum, product(&factors.left[200 * place..][..200], &factors.right[..200]));
+        }
+    }
+
+    #[test]
     fn pixels_are_means_over_their_area() {
         let waves = waves(40);
         let fine = mean_square(&waves, &SampleAxis::new(40, 0.01, 2), &SampleAxis::new(30, 0.01, 2));
