@@ -98,7 +98,7 @@ impl BankSettings {
         }
     }
 
-    fn check(&self) -> Result<(), PsfError> {
+    pub(crate) fn check(&self) -> Result<(), PsfError> {
         let axis = |axis, found: &[f64], expected, is_good: &dyn Fn(f64) -> bool| match Axis::new(found.to_vec())
             .is_some()
             && found.iter().all(|&v| is_good(v))
@@ -234,7 +234,7 @@ impl PsfBank {
             return Err(PsfError::Dark { lens: lens.name().to_owned(), dioptres, wavelength_nm });
         }
         let n_fields = (n_lit - 1) / GEOMETRY_STEPS + 1;
-        let n_geometry = (n_fields - 1) * GEOMETRY_STEPS + 1;
+        let n_geometry = Self::n_geometry(n_fields);
         let mut records = vec![];
         let mut summaries = vec![];
         for column in traced {
@@ -243,21 +243,58 @@ impl PsfBank {
                 summaries.push(summary);
             }
         }
+        Self::assemble(lens, settings, n_fields, records, summaries)
+    }
+
+    /// Puts a bank together from what was traced.
+    pub(crate) fn assemble(
+        lens: &Lens,
+        settings: &BankSettings,
+        n_fields: usize,
+        records: Vec<Record>,
+        summaries: Vec<Summary>,
+    ) -> Result<Self, PsfError> {
+        settings.check()?;
+        let colors: Vec<f64> = settings.wavelengths_nm.iter().rev().copied().collect();
         let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
+        let stop_index = |&nm: &f64| Ok(lens.at(nm)?.stop_medium_index());
         let axis = |knots: Vec<f64>| Axis::new(knots).expect("the settings were checked");
+        let mut geometry_fields = geometry_fields(&settings.field_tans);
+        geometry_fields.truncate(Self::n_geometry(n_fields));
         Ok(Self {
-            settings: settings.clone(),
             fields: axis(settings.field_tans[..n_fields].to_vec()),
             dioptres: axis(settings.dioptres.clone()),
-            colors: axis(settings.wavelengths_nm.iter().rev().map(|&nm| dispersion.coordinate(nm)).collect()),
+            colors: axis(colors.iter().map(|&nm| dispersion.coordinate(nm)).collect()),
             dispersion,
             records,
-            geometry_fields: geometry_fields[..n_geometry].to_vec(),
+            geometry_fields,
             summaries,
             lens: lens.clone(),
-            stop_indices: lenses.iter().map(MonoLens::stop_medium_index).collect(),
-            reference,
+            stop_indices: colors.iter().map(stop_index).collect::<Result<_, PsfError>>()?,
+            reference: lens.at(settings.reference_wavelength_nm)?,
+            settings: settings.clone(),
         })
+    }
+
+    pub(crate) fn lens(&self) -> &Lens {
+        &self.lens
+    }
+
+    pub(crate) fn n_fields(&self) -> usize {
+        self.fields.knots().len()
+    }
+
+    /// Returns how many fields the table of image heights has, for so many of the bank.
+    pub(crate) fn n_geometry(n_fields: usize) -> usize {
+        n_fields.saturating_sub(1) * GEOMETRY_STEPS + 1
+    }
+
+    pub(crate) fn records(&self) -> &[Record] {
+        &self.records
+    }
+
+    pub(crate) fn summaries(&self) -> &[Summary] {
+        &self.summaries
     }
 
     /// What the bank was asked to cover.

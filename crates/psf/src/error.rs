@@ -38,4 +38,12 @@ pub enum PsfError {
         /// Wavelength, nm.
         wavelength_nm: f64,
     },
+    /// A bank's file that cannot be read or written.
+    #[error("{}: {reason}", path.display())]
+    File {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
 }

@@ -25,6 +25,7 @@ mod raster;
 mod ray_map;
 mod render;
 mod splat;
+mod store;
 
 pub use bank::{BankSettings, Diffraction, PsfBank};
 pub use count::{AuthorsBending, CountingFilm, FrontGrid, mean_place_mm, trace_as_authors};
