@@ -127,6 +127,14 @@ pub enum OpticsError {
         /// What it could mean, each by a name that means it alone.
         candidates: Vec<String>,
     },
+    /// A lens that a file format cannot hold.
+    #[error("{format} cannot hold this lens: {reason}")]
+    CannotWrite {
+        /// The format, in words.
+        format: &'static str,
+        /// What it has no place for.
+        reason: String,
+    },
     /// A file that cannot be read or written.
     #[error("{path}: {reason}")]
     Io {

@@ -14,6 +14,7 @@ mod rii_yaml;
 mod seq;
 mod shapes;
 mod system;
+mod write;
 mod zmx;
 
 use std::path::Path;

@@ -1,0 +1,138 @@
+//! Lens files written and read again.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::path::Path;
+
+use dioptric_optics::{
+    Field, Glass, Interface, Lens, LensFile, ObjectPoint, RayBatch, ReadOptions, Rims, Shape, Surface, glam::DVec2,
+    rays_towards,
+};
+
+fn read(name: &str, text: &str) -> LensFile {
+    LensFile::from_bytes(Path::new(name), text.as_bytes(), &ReadOptions::default())
+        .unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+/// Returns rays of a field of half a degree, behind the lens.
+fn traced(lens: &Lens, wavelength_nm: f64) -> RayBatch {
+    let mono = lens.at(wavelength_nm).unwrap();
+    let first = mono.first_order();
+    let at = |i: usize| 0.05 * first.entrance_pupil_diameter_mm * (i as f64 - 10.0);
+    let targets: Vec<DVec2> = (0..441).map(|i| DVec2::new(at(i / 21), at(i % 21))).collect();
+    let point = ObjectPoint::from_field(&mono, DVec2::new(0.0, 0.01), 0.0);
+    let mut rays = rays_towards(&point, &targets, first.entrance_pupil_z_mm, 0.0);
+    mono.trace(&mut rays, Rims::Clip);
+    rays
+}
+
+/// Checks that two lenses send rays the same way, to rounding: a radius and its curvature are two roundings apart.
+#[track_caller]
+fn check_same(a: &Lens, b: &Lens, wavelength_nm: f64) {
+    let (a, b) = (traced(a, wavelength_nm), traced(b, wavelength_nm));
+    assert_eq!(a.fate, b.fate);
+    assert!(a.fate.iter().filter(|fate| fate.is_in_flight()).count() > 50);
+    for i in 0..a.len() {
+        let moved = [a.x_mm[i] - b.x_mm[i], a.y_mm[i] - b.y_mm[i], a.l[i] - b.l[i], a.m[i] - b.m[i]];
+        assert!(moved.iter().all(|difference| difference.abs() <= 1e-12), "ray {i}: {moved:?}");
+    }
+}
+
+/// A cemented group with an inner stop, an asphere and glasses of the kinds that Zemax files hold.
+fn design() -> LensFile {
+    let surface = |radius_mm: f64, semi_aperture_mm| Surface::sphere(radius_mm, semi_aperture_mm);
+    let interface = |surface, medium_after, thickness_after_mm| Interface { surface, medium_after, thickness_after_mm };
+    let asphere = Surface {
+        shape: Shape::EvenAsphere { conic: -0.3, coefficients: vec![1.234_567_890_123e-6, -2.5e-9] },
+        ..surface(41.3, 9.0)
+    };
+    let interfaces = vec![
+        interface(asphere, Glass::Named("SCHOTT:N-BK7".to_owned()), 4.1),
+        interface(surface(-38.7, 9.0), Glass::NdVd { nd: 1.62, vd: 36.3 }, 2.05),
+        interface(surface(-120.9, 9.0), Glass::Air, 3.3),
+        interface(Surface::plane(6.0), Glass::Air, 2.2),
+        interface(
+            Surface { shape: Shape::Conic { conic: 0.7 }, ..surface(77.7, 8.0) },
+            Glass::Constant { index: 1.5 },
+            3.0,
+        ),
+        interface(surface(-90.1, 8.0), Glass::Air, 0.0),
+    ];
+    let mut file = LensFile::from(Lens::new("a design", "made up", interfaces, 3).unwrap());
+    file.film_mm = Some(37.25);
+    file.wavelengths_nm = vec![486.1327, 550.0, 656.2725];
+    file.reference_wavelength_nm = Some(550.0);
+    file.fields = [0.0, 3.0].map(|y_deg| Field::Angle { x_deg: 0.0, y_deg }).to_vec();
+    file
+}
+
+#[test]
+fn zemax_file_reads_back_as_the_same_system() {
+    let file = design();
+    let again = read("a.zmx", &file.to_zmx().unwrap());
+    assert_eq!(again, file);
+}
+
+#[test]
+fn iset_file_traces_the_same_at_the_wavelengths_of_the_file() {
+    let file = design();
+    let again = read("a.json", &file.to_omni_json().unwrap());
+    assert_eq!((again.lens.name(), again.lens.stop()), ("a design", 3));
+    for &nm in &file.wavelengths_nm {
+        check_same(&again.lens, &file.lens, nm);
+    }
+    let refracting_stop = Lens::new("s", "s", design().lens.interfaces().to_vec(), 4).unwrap();
+    let text = LensFile::from(refracting_stop.clone()).to_omni_json().unwrap();
+    check_same(&read("s.json", &text).lens, &refracting_stop, 550.0);
+    assert!(text.contains("\"stop\": true") && text.contains("\"radius\": null"));
+}
+
+#[test]
+fn dat_file_traces_the_same_at_its_one_wavelength() {
+    for name in ["dgauss-50mm", "paper-2el"] {
+        let mut file = LensFile::from(Lens::built_in(name).unwrap());
+        file.reference_wavelength_nm = Some(550.0);
+        let again = read("a.dat", &file.to_dat().unwrap());
+        assert_eq!((again.lens.name(), again.lens.stop()), (name, file.lens.stop()));
+        check_same(&again.lens, &file.lens, 550.0);
+    }
+}
+
+#[test]
+fn every_built_in_lens_reads_back_from_what_can_hold_it() {
+    let folder = std::env::temp_dir().join(format!("dioptric-write-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let mut n_written = [0; 4];
+    for name in Lens::built_in_names() {
+        let mut file = LensFile::from(Lens::built_in(name).unwrap());
+        file.wavelengths_nm = vec![550.0];
+        file.reference_wavelength_nm = Some(550.0);
+        for (n_written, extension) in n_written.iter_mut().zip(["ron", "dat", "json", "zmx"]) {
+            let path = folder.join(format!("{name}.{extension}"));
+            match file.write(&path) {
+                Ok(()) => {
+                    check_same(&Lens::read(&path).unwrap(), &file.lens, 550.0);
+                    *n_written += 1;
+                }
+                Err(error) => {
+                    assert_ne!(extension, "ron", "{error}");
+                    assert!(error.to_string().contains("cannot hold this lens: "), "{error}");
+                }
+            }
+        }
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+    let n_lenses = Lens::built_in_names().count();
+    assert_eq!((n_written[0], n_written[2]), (n_lenses, n_lenses), "our own format and ISET's hold them all");
+    assert!(n_written[1] >= 3 && n_written[3] >= 3, "{n_written:?}");
+}
+
+#[test]
+fn what_a_format_cannot_hold_is_named() {
+    let message = design().to_dat().unwrap_err().to_string();
+    assert_eq!(message, "a .dat file cannot hold this lens: surface 0 is not a sphere");
+    let linear = LensFile::from(Lens::built_in("paper-2el").unwrap()).to_zmx().unwrap_err().to_string();
+    assert!(linear.starts_with("a .zmx file cannot hold this lens: surface 0 has behind it the medium of"), "{linear}");
+    let thin = LensFile::from(Lens::thin(50.0, 10.0).unwrap());
+    assert!(thin.to_omni_json().unwrap_err().to_string().contains("surface 0 is neither a sphere"));
+    assert!(thin.write(Path::new("a.step")).unwrap_err().to_string().contains("expected .ron, .dat, .json or .zmx"));
+}
