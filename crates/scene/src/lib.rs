@@ -5,6 +5,16 @@
 //! the top, upright as the photographer sees it.
 //!
 //! This crate knows nothing of lenses: what blurs a scene is another crate's concern.
+//!
+//! ```
+//! use dioptric_scene::StillLife;
+//! use dioptric_spectrum::WavelengthGrid;
+//! let grid = WavelengthGrid::uniform(450.0, 650.0, 50.0)?;
+//! let scene = StillLife::new(30, 20).scene(&grid)?;
+//! let (near_m, far_m) = scene.require_depth()?.range_m();
+//! assert!(near_m < 1.0 && far_m > 3.5);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod error;
 mod formats;
@@ -26,3 +36,7 @@ pub use scene::{HiddenLayer, Scene};
 pub use still_life::StillLife;
 pub use targets::{Pattern, Target, TargetLight};
 pub use view::View;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -13,6 +13,9 @@ pub(super) const WINDOW_CD_M2: f64 = 3300.0;
 /// Share of the window that is glass.
 const GLASS: f64 = 0.80;
 
+/// The shadows of a lamp that gives less than this, head on, are left out: they are too weak to be seen.
+const FAINT_LUX: f64 = 14.0;
+
 /// A lamp that shines like a ball.
 pub(super) struct Bulb {
     pub(super) center: DVec3,
@@ -38,7 +41,7 @@ pub(super) fn direct(world: &World, seen: &Seen, n_window: usize, n_bulb: usize,
     let mut lux = Lux { day: window(world, seen, n_window, offsets[0]), warm: 0.0 };
     for (index, bulb) in BULBS.iter().enumerate() {
         // The far lamp is smooth on all that is near; the near one makes the sharpest shadows.
-        let n = if index == 0 { n_bulb } else { n_bulb.div_ceil(2) };
+        let n = if index == 0 { n_bulb } else { 1 };
         let offset = (offsets[1] + DVec2::splat(0.37 * index as f64)).fract();
         lux.warm += from_bulb(world, seen, bulb, n, offset);
     }
@@ -73,6 +76,10 @@ fn from_bulb(world: &World, seen: &Seen, bulb: &Bulb, n: usize, offset: DVec2) -
     if seen.normal.dot(axis) < -bulb.radius / distance || distance <= bulb.radius {
         return 0.0;
     }
+    let solid_angle = std::f64::consts::PI * (bulb.radius / distance).powi(2);
+    if bulb.luminance * solid_angle < FAINT_LUX {
+        return bulb.luminance * solid_angle * seen.normal.dot(axis).max(0.0);
+    }
     let (x, y) = axis.any_orthonormal_pair();
     let mut sum = 0.0;
     for i in 0..n {
@@ -86,6 +93,5 @@ fn from_bulb(world: &World, seen: &Seen, bulb: &Bulb, n: usize, offset: DVec2) -
             sum += cosine;
         }
     }
-    let solid_angle = std::f64::consts::PI * (bulb.radius / distance).powi(2);
     bulb.luminance * solid_angle * sum / n as f64
 }

@@ -54,9 +54,8 @@ impl Eye {
     }
 }
 
-/// A part of a pixel that shows one object.
-#[derive(Clone, Debug)]
-struct Fragment {
+/// A part of a pixel that shows one object, while the pixel is looked through.
+struct Part {
     seen: Seen,
     /// Share of the pixel.
     share: f32,
@@ -64,16 +63,57 @@ struct Fragment {
     sheen: f32,
     /// Pigments, each with its share of the pixel.
     pigments: Vec<(PigmentIndex, f32)>,
-    lights: Lights,
+}
+
+/// What is kept of a part until the light is smoothed.
+struct Fragment {
+    object: u32,
+    sheen: f32,
+    n_pigments: usize,
+    /// For all but the largest part of a pixel, whose light may have to be gathered later.
+    seen: Option<Box<Seen>>,
 }
 
 /// A row before its light is smoothed.
 struct Row {
-    /// The fragments of each pixel, the largest first.
-    pixels: Vec<Vec<Fragment>>,
+    /// The surface of the largest part of each pixel, and the light on it.
+    guides: Vec<Guide>,
+    lights: Vec<Lights>,
+    /// How many fragments each pixel has, the largest first; all fragments; all their pigments.
+    n_fragments: Vec<usize>,
+    fragments: Vec<Fragment>,
+    pigments: Vec<(PigmentIndex, f32)>,
     /// What is mirrored or glows, columns × bands.
     own: Vec<f32>,
     z_m: Vec<f32>,
+}
+
+impl Row {
+    fn empty(columns: usize, n_bands: usize) -> Self {
+        Self {
+            guides: Vec::with_capacity(columns),
+            lights: Vec::with_capacity(columns),
+            n_fragments: Vec::with_capacity(columns),
+            fragments: Vec::with_capacity(columns),
+            pigments: Vec::with_capacity(2 * columns),
+            own: vec![0.0; columns * n_bands],
+            z_m: Vec::with_capacity(columns),
+        }
+    }
+
+    /// Adds the parts of the next pixel, the largest first.
+    fn push(&mut self, parts: Vec<Part>) {
+        self.n_fragments.push(parts.len());
+        for (place, part) in parts.into_iter().enumerate() {
+            self.fragments.push(Fragment {
+                object: part.seen.object as u32,
+                sheen: part.sheen,
+                n_pigments: part.pigments.len(),
+                seen: (place > 0).then(|| Box::new(part.seen)),
+            });
+            self.pigments.extend(part.pigments);
+        }
+    }
 }
 
 /// A layer of the picture.
@@ -101,21 +141,33 @@ pub(super) fn picture(
 ) -> Result<Layer, SceneError> {
     let painter = Painter { shader: Shader::new(world, eye.origin, grid), eye, n_bands: grid.len(), which };
     let drawn: Vec<Row> = (0..rows).into_par_iter().map(|row| painter.row(row, columns)).collect();
-    let pixels = || drawn.iter().flat_map(|row| row.pixels.iter().map(|fragments| &fragments[0]));
-    let guides: Vec<Guide> = pixels().map(guide_of).collect();
-    let lights = smoothed(&guides, pixels().map(|fragment| fragment.lights).collect(), columns);
-    let finished: Vec<Vec<f32>> =
-        drawn.par_iter().enumerate().map(|(row, drawn)| painter.finished(row, drawn, &guides, &lights)).collect();
-    let planes = (0..grid.len())
-        .into_par_iter()
-        .map(|band| Array2::from_shape_fn((rows, columns), |(r, c)| finished[r][c * grid.len() + band]))
-        .collect();
+    let guides: Vec<Guide> = drawn.iter().flat_map(|row| &row.guides).copied().collect();
+    let lights = drawn.iter().flat_map(|row| &row.lights).copied().collect();
+    let lights = smoothed(&guides, lights, columns);
     let z_m = Array2::from_shape_fn((rows, columns), |(r, c)| drawn[r].z_m[c]);
+    let finished: Vec<Vec<f32>> =
+        drawn.into_par_iter().enumerate().map(|(row, drawn)| painter.finished(row, drawn, &guides, &lights)).collect();
+    let planes = planes(&finished, columns, grid.len());
     Ok(Layer { radiance: SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?, depth: DepthMap::new(z_m)? })
 }
 
-fn guide_of(fragment: &Fragment) -> Guide {
-    Guide { object: fragment.seen.object as u32, point: fragment.seen.point, normal: fragment.seen.normal }
+/// Turns rows of columns × bands into bands of rows × columns.
+fn planes(spectra: &[Vec<f32>], columns: usize, n_bands: usize) -> Vec<Array2<f32>> {
+    let mut planes = vec![Array2::<f32>::zeros((spectra.len(), columns)); n_bands];
+    let mut rows: Vec<Vec<&mut [f32]>> = spectra.iter().map(|_| Vec::with_capacity(n_bands)).collect();
+    for plane in &mut planes {
+        let samples = plane.as_slice_mut().expect("a new plane is in standard order");
+        samples.chunks_exact_mut(columns).zip(&mut rows).for_each(|(row, bands)| bands.push(row));
+    }
+    rows.into_par_iter().zip(spectra).for_each(|(bands, spectra)| {
+        for (band, samples) in bands.into_iter().enumerate() {
+            samples
+                .iter_mut()
+                .zip(spectra[band..].iter().step_by(n_bands))
+                .for_each(|(sample, value)| *sample = *value);
+        }
+    });
+    planes
 }
 
 struct Painter<'a> {
@@ -127,26 +179,27 @@ struct Painter<'a> {
 
 impl Painter<'_> {
     fn row(&self, row: usize, columns: usize) -> Row {
-        let mut own = vec![0.0; columns * self.n_bands];
-        let mut pixels = Vec::with_capacity(columns);
-        let mut z_m = Vec::with_capacity(columns);
-        for (column, own) in (0..columns).zip(own.chunks_exact_mut(self.n_bands)) {
+        let mut drawn = Row::empty(columns, self.n_bands);
+        for column in 0..columns {
             let aim = Aim::new(self, row, column);
-            z_m.push(aim.z_m as f32);
-            let mut fragments = self.fragments(&aim, own);
-            fragments[0].lights = self.shader.gather(&fragments[0].seen, row, column);
-            pixels.push(fragments);
+            drawn.z_m.push(aim.z_m as f32);
+            let parts = self.parts(&aim, &mut drawn.own[column * self.n_bands..][..self.n_bands]);
+            let largest = &parts[0].seen;
+            let guide = Guide { object: largest.object as u32, point: largest.point, normal: largest.normal };
+            drawn.guides.push(guide);
+            drawn.lights.push(self.shader.gather(largest, row, column));
+            drawn.push(parts);
         }
-        Row { pixels, own, z_m }
+        drawn
     }
 
     /// Looks through the points of a pixel.
-    fn fragments(&self, aim: &Aim, own: &mut [f32]) -> Vec<Fragment> {
+    fn parts(&self, aim: &Aim, own: &mut [f32]) -> Vec<Part> {
         let first: Vec<Seen> = (0..4).map(|point| aim.look(self, point)).collect();
         let is_plain = first.iter().all(|seen| alike(seen, &first[0]));
         let rest = if is_plain { 0 } else { POINTS.len() - first.len() };
         let share = 1.0 / (first.len() + rest) as f32;
-        let mut fragments: Vec<Fragment> = Vec::new();
+        let mut parts: Vec<Part> = Vec::new();
         let looks = first.into_iter().chain((4..4 + rest).map(|point| aim.look(self, point)));
         for (point, seen) in looks.enumerate() {
             self.shader.add_glow(&seen, share, None, own);
@@ -156,46 +209,44 @@ impl Painter<'_> {
             if is_clear {
                 self.shader.add_mirrored(&seen, share * fresnel, spread(2 * point, aim.offset), own);
             }
-            let fragment = match fragments.iter().position(|f| f.seen.object == seen.object) {
-                Some(index) => &mut fragments[index],
+            let shown = match parts.iter().position(|p| p.seen.object == seen.object) {
+                Some(index) => &mut parts[index],
                 None => {
-                    let empty =
-                        Fragment { seen, share: 0.0, sheen: 0.0, pigments: Vec::new(), lights: Lights::default() };
-                    fragments.push(empty);
-                    fragments.last_mut().expect("one has just been added")
+                    parts.push(Part { seen, share: 0.0, sheen: 0.0, pigments: Vec::new() });
+                    parts.last_mut().expect("one has just been added")
                 }
             };
-            fragment.share += share;
-            fragment.sheen += if is_clear { 0.0 } else { share };
+            shown.share += share;
+            shown.sheen += if is_clear { 0.0 } else { share };
             let diffuse = if coat.metal.is_some() { 0.0 } else { share * (1.0 - fresnel) };
             for &(pigment, part) in seen.surface.mix.parts() {
-                match fragment.pigments.iter_mut().find(|(known, _)| *known == pigment) {
+                match shown.pigments.iter_mut().find(|(known, _)| *known == pigment) {
                     Some((_, sum)) => *sum += diffuse * part,
-                    None => fragment.pigments.push((pigment, diffuse * part)),
+                    None => shown.pigments.push((pigment, diffuse * part)),
                 }
             }
         }
-        fragments.sort_by(|a, b| b.share.total_cmp(&a.share));
-        fragments
+        parts.sort_by(|a, b| b.share.total_cmp(&a.share));
+        parts
     }
 
     /// Returns the spectra of a row, columns × bands, under the smoothed light.
-    fn finished(&self, row: usize, drawn: &Row, guides: &[Guide], lights: &[Lights]) -> Vec<f32> {
-        let columns = drawn.pixels.len();
-        let mut spectra = drawn.own.clone();
-        for ((column, fragments), spectrum) in
-            drawn.pixels.iter().enumerate().zip(spectra.chunks_exact_mut(self.n_bands))
-        {
-            for (place, fragment) in fragments.iter().enumerate() {
-                let found = match place {
-                    0 => Some(lights[row * columns + column]),
-                    _ => light_beside(row, column, columns, fragment.seen.object as u32, guides, lights),
+    fn finished(&self, row: usize, mut drawn: Row, guides: &[Guide], lights: &[Lights]) -> Vec<f32> {
+        let columns = drawn.guides.len();
+        let (mut fragments, mut pigments) = (drawn.fragments.iter(), drawn.pigments.as_slice());
+        for (column, spectrum) in drawn.own.chunks_exact_mut(self.n_bands).enumerate() {
+            for fragment in fragments.by_ref().take(drawn.n_fragments[column]) {
+                let lights = match &fragment.seen {
+                    None => lights[row * columns + column],
+                    Some(seen) => light_beside(row, column, columns, fragment.object, guides, lights)
+                        .unwrap_or_else(|| self.shader.gather(seen, row, column)),
                 };
-                let lights = found.unwrap_or_else(|| self.shader.gather(&fragment.seen, row, column));
-                self.shader.add_lit(&lights, &fragment.pigments, fragment.sheen, spectrum);
+                let (own, rest) = pigments.split_at(fragment.n_pigments);
+                pigments = rest;
+                self.shader.add_lit(&lights, own, fragment.sheen, spectrum);
             }
         }
-        spectra
+        drawn.own
     }
 }
 

@@ -68,7 +68,9 @@ impl<'a> Shader<'a> {
         let direction = self.mirrored(seen, DVec2::ZERO);
         let Some(hit) = self.world.first_hit(seen.ray(direction), 0.0, None) else { return };
         let far = self.world.seen(&hit, direction, 0.004);
-        let lux = direct(self.world, &far, 1, 1, [offset, (offset + DVec2::splat(0.5)).fract()]);
+        // A metal shows the noise of what it shows; under a clear coat hardly any is seen.
+        let (n_window, n_bulb) = if seen.surface.coat.metal.is_some() { (4, 2) } else { (1, 1) };
+        let lux = direct(self.world, &far, n_window, n_bulb, [offset, (offset + DVec2::splat(0.5)).fract()]);
         let light = [(lux.day + FAR_LUX[0]) as f32, (lux.warm + FAR_LUX[1]) as f32];
         let tint = seen.surface.coat.metal.map(|pigment| self.palette.of(pigment));
         for &(pigment, part) in far.surface.mix.parts() {
