@@ -6,16 +6,30 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Brightness, ColorCorrection, ColorMatrix, Demosaic, Picture, Raw, Sensor, SensorError, ToneCurve, WhiteBalance,
-    balance::gains, demosaic, metering::percentile,
+    Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, LensShading, Picture, Raw, Sensor,
+    SensorError, ToneCurve, WhiteBalance,
+    balance::gains,
+    defects, demosaic,
+    denoise::{SampleNoise, denoise},
+    metering::percentile,
 };
 
 /// What is done to a raw frame, in this order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Processing {
+    /// Pixels further than this above or below all their neighbours of the same filter are replaced, as a share of
+    /// saturation; left out, none are.
+    #[serde(default)]
+    pub defect_threshold: Option<f64>,
+    /// The fall of light towards the corners that is undone.
+    #[serde(default)]
+    pub shading: Option<LensShading>,
     /// How white is made neutral; channels are clipped at saturation afterwards.
     pub white_balance: WhiteBalance,
+    /// How much noise is taken out of the raw frame: 0 none, 1 what is below three standard deviations.
+    #[serde(default)]
+    pub denoise: f64,
     /// How the missing colours are found.
     pub demosaic: Demosaic,
     /// How channels become colours.
@@ -24,28 +38,39 @@ pub struct Processing {
     pub brightness: Brightness,
     /// The curve from light to codes.
     pub curve: ToneCurve,
+    /// The primaries of the picture.
+    #[serde(default)]
+    pub space: ColorSpace,
 }
 
 impl Processing {
     /// Returns the usual processing of a scene under a known light.
     pub fn for_light(light: Illuminant) -> Self {
         Self {
+            defect_threshold: None,
+            shading: None,
+            denoise: 0.0,
             white_balance: WhiteBalance::Illuminant(light),
             demosaic: Demosaic::Directional,
             color: ColorCorrection::Fitted(light),
             brightness: Brightness::AsExposed,
             curve: ToneCurve::Srgb,
+            space: ColorSpace::Srgb,
         }
     }
 
     /// Returns the processing of the paper's Figure 4: bilinear, no balance, no colour correction, a power of 0.6.
     pub fn paper() -> Self {
         Self {
+            defect_threshold: None,
+            shading: None,
+            denoise: 0.0,
             white_balance: WhiteBalance::None,
             demosaic: Demosaic::Bilinear,
             color: ColorCorrection::None,
             brightness: Brightness::AsExposed,
             curve: ToneCurve::Gamma(0.6),
+            space: ColorSpace::Srgb,
         }
     }
 }
@@ -80,7 +105,7 @@ impl Sensor {
     /// # Errors
     /// When the frame is not of this sensor or too small, or a setting makes no sense.
     pub fn develop(&self, raw: &Raw, processing: &Processing) -> Result<Developed, SensorError> {
-        Ok(self.develop_linear(raw, processing)?.encode(processing.brightness, processing.curve))
+        Ok(self.develop_linear(raw, processing)?.encode(processing.brightness, processing.curve, processing.space))
     }
 
     /// Returns the linear light of a raw frame, as [`develop`](Self::develop) has it before brightness and tone curve.
@@ -93,6 +118,16 @@ impl Sensor {
         let tile = raw.tile.as_ref();
         let n_channels = self.filters.len();
         let mut planes = raw.linear();
+        if let Some(threshold) = processing.defect_threshold {
+            defects::correct(&mut planes, tile, threshold as f32);
+        }
+        if let Some(shading) = &processing.shading {
+            shading.correct(&mut planes, tile);
+        }
+        if processing.denoise > 0.0 {
+            let noise = vec![self.sample_noise(raw); n_channels];
+            denoise(&mut planes, tile, &noise, processing.denoise);
+        }
         let balance = gains(self, &planes, tile, &processing.white_balance);
         weigh(&mut planes, tile, &balance);
         let channels = match tile {
@@ -110,11 +145,29 @@ impl Sensor {
         Ok(LinearPicture { light: mix(&channels, &color), balance, color })
     }
 
+    /// Returns the noise of a frame's samples in units of saturation.
+    pub(crate) fn sample_noise(&self, raw: &Raw) -> SampleNoise {
+        let volts = self.read_noise_v(raw.exposure.gain_mode).hypot(self.dsnu_v).hypot(self.row_noise_v);
+        let rounding_v = if self.adc == Adc::Analog { 0.0 } else { raw.levels.step_v / 12.0_f64.sqrt() };
+        let floor_v = (volts * raw.exposure.analog_gain).hypot(rounding_v);
+        let dark_e = self.dark_current.at(raw.exposure.temperature_c) * raw.exposure.time_s;
+        SampleNoise {
+            electrons_per_unit: raw.levels.saturation_e(),
+            floor_e: (floor_v / raw.levels.volts_per_electron).hypot(dark_e.sqrt()),
+        }
+    }
+
     fn check_settings(&self, raw: &Raw, processing: &Processing) -> Result<(), SensorError> {
         let shape = |what, expected: usize, found: usize| {
             Err(SensorError::Shape { what, expected: expected.to_string(), found: found.to_string() })
         };
         let n_channels = self.filters.len();
+        let not_negative =
+            [("defect_threshold", processing.defect_threshold.unwrap_or(0.0)), ("denoise", processing.denoise)];
+        if let Some((key, value)) = not_negative.into_iter().find(|(_, v)| !(*v >= 0.0 && v.is_finite())) {
+            return Err(SensorError::value("the processing", key, value, "a number of 0 or more"));
+        }
+        processing.shading.as_ref().map_or(Ok(()), |shading| shading.check(n_channels))?;
         if raw.filter_names.len() != n_channels {
             return shape("filters of the raw frame", n_channels, raw.filter_names.len());
         }
@@ -153,13 +206,16 @@ impl Sensor {
 }
 
 impl LinearPicture {
-    /// Returns the picture of a brightness and a tone curve; colours outside sRGB are clipped.
-    pub fn encode(self, brightness: Brightness, curve: ToneCurve) -> Developed {
+    /// Returns the picture of a brightness, a tone curve and primaries; colours outside these are clipped.
+    pub fn encode(self, brightness: Brightness, curve: ToneCurve, space: ColorSpace) -> Developed {
         let brightness = factor(&self.light, brightness);
         let table = curve.table();
         let mut codes = self.light;
         let all = codes.as_slice_mut().expect("linear pictures are made contiguous");
-        all.par_iter_mut().for_each(|code| *code = table.encode(*code * brightness as f32));
+        all.par_chunks_exact_mut(3).for_each(|pixel| {
+            let light = space.from_linear_srgb([0, 1, 2].map(|i| pixel[i] * brightness as f32));
+            pixel.iter_mut().zip(light).for_each(|(code, light)| *code = table.encode(light));
+        });
         Developed { picture: Picture { codes }, balance: self.balance, color: self.color, brightness }
     }
 }

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{lit, lit_by_d65};
+use common::{PATCH, chart, lit, lit_by_d65};
 use dioptric_sensor::{
     Adc, AutoExposure, Brightness, Cfa, Demosaic, Developed, ExposureControl, GainMode, Illumination, Metering, Noise,
     Processing, Sensor, ToneCurve, WhiteBalance, psnr_db,
@@ -13,9 +13,6 @@ use dioptric_spectrum::{
     Illuminant, Lab, Observer, SpectralImage, WavelengthGrid, Xyz, color_checker_reflectances, delta_e_2000,
 };
 use ndarray::Array2;
-
-/// The side of a patch of the chart, pixels.
-const PATCH: usize = 24;
 
 /// Puts the brightest pixels but a few at 90 % of saturation.
 const WHITE_AT_90: ExposureControl = ExposureControl::Auto(AutoExposure {
@@ -30,17 +27,6 @@ const WHITE_AT_90: ExposureControl = ExposureControl::Auto(AutoExposure {
 fn develop(sensor: &Sensor, image: &SpectralImage, noise: &Noise, processing: &Processing) -> Developed {
     let capture = sensor.capture(&Illumination::on_pixels(image), &WHITE_AT_90, noise).unwrap();
     sensor.develop(&capture.raw, processing).unwrap()
-}
-
-/// Returns the 24 patches in 4 rows of 6.
-fn chart() -> SpectralImage {
-    let grid = WavelengthGrid::uniform(380.0, 730.0, 10.0).unwrap();
-    let patches: Vec<Vec<f64>> = color_checker_reflectances().iter().map(|(_, s)| s.sample_held(&grid)).collect();
-    let plane = |band: usize| {
-        Array2::from_shape_fn((4 * PATCH, 6 * PATCH), |(r, c)| patches[6 * (r / PATCH) + c / PATCH][band] as f32)
-    };
-    let planes = (0..grid.len()).map(plane).collect();
-    lit(grid, planes)
 }
 
 /// Returns ΔE₀₀ of each patch of a developed chart against what the 1931 observer sees under D65.
@@ -179,4 +165,30 @@ fn other_mosaics_gain_from_detail() {
     let [nearest, bilinear, _, directional] = demosaic_psnr_db(&path, &quad);
     let quoted = format!("quad Bayer: {nearest:.2} {bilinear:.2} {directional:.2}");
     assert!(nearest < bilinear && bilinear < directional, "{quoted}");
+}
+
+/// Returns the PSNR, dB, of a noisy picture against one without noise, at a strength of denoising.
+fn noisy_psnr_db(path: &std::path::Path, strength: f64) -> f64 {
+    let image = lit_by_d65(path);
+    let sensor = Sensor::built_in("imx363").unwrap();
+    // A short exposure at a high gain: 8 % of the well at white.
+    let control =
+        ExposureControl::Auto(AutoExposure { analog_gain: 11.0, ..AutoExposure::new(Metering::Percentile(99.5), 0.9) });
+    let processing = |denoise| Processing { denoise, ..Processing::for_light(Illuminant::D65) };
+    let picture = |noise: Noise, strength| {
+        let capture = sensor.capture(&Illumination::on_pixels(&image), &control, &noise).unwrap();
+        sensor.develop(&capture.raw, &processing(strength)).unwrap().picture
+    };
+    psnr_db(&picture(Noise::all(7), strength), &picture(Noise::none(), 0.0)).unwrap()
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+fn denoising_brings_a_noisy_picture_nearer_to_the_clean_one() {
+    for name in ["cave_chart_and_stuffed_toy", "cave_stuffed_toys_256"] {
+        let path = dioptric_golden::shared(&format!("data/scenes/{name}.reflectance.exr")).unwrap();
+        let (noisy, denoised) = (noisy_psnr_db(&path, 0.0), noisy_psnr_db(&path, 1.0));
+        // The toys at 256 pixels are texture nearly everywhere, which must not be lost with the noise.
+        assert!(denoised > noisy + 1.0, "{name}: {noisy:.2} dB, denoised {denoised:.2} dB");
+    }
 }

@@ -1,6 +1,6 @@
 //! Spectral reflectances of the shared reference data, lit.
 
-use dioptric_spectrum::{Illuminant, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{Illuminant, Quantity, SpectralImage, WavelengthGrid, color_checker_reflectances};
 use exr::prelude::{ReadChannels, ReadLayers};
 use ndarray::Array2;
 
@@ -41,4 +41,18 @@ pub(crate) fn lit(grid: WavelengthGrid, reflectances: Vec<Array2<f32>>) -> Spect
         plane.mapv(|reflectance| reflectance.max(0.0) * factor)
     });
     SpectralImage::new(Quantity::Irradiance, grid, planes.collect()).unwrap()
+}
+
+/// The side of a patch of the chart, pixels.
+pub(crate) const PATCH: usize = 24;
+
+/// Returns the 24 patches in 4 rows of 6, lit.
+pub(crate) fn chart() -> SpectralImage {
+    let grid = WavelengthGrid::uniform(380.0, 730.0, 10.0).unwrap();
+    let patches: Vec<Vec<f64>> = color_checker_reflectances().iter().map(|(_, s)| s.sample_held(&grid)).collect();
+    let plane = |band: usize| {
+        Array2::from_shape_fn((4 * PATCH, 6 * PATCH), |(r, c)| patches[6 * (r / PATCH) + c / PATCH][band] as f32)
+    };
+    let planes = (0..grid.len()).map(plane).collect();
+    lit(grid, planes)
 }

@@ -1,0 +1,193 @@
+//! Noise taken out of a raw frame, by wavelets.
+//!
+//! The variance of shot and read noise is known, so a square root makes it 1 everywhere (Anscombe, Biometrika 35, 1948,
+//! with read noise). The pixels of a tile are turned into their mean and differences by a cosine transform, which
+//! keeps white noise white. An undecimated wavelet transform with the B₃ spline (Starck & Murtagh, "Image restoration
+//! with noise suppression using the wavelet transform", Astronomy & Astrophysics 288, 1994) parts each of these planes by
+//! scale, and what is not above a few standard deviations is taken out.
+
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use crate::Tile;
+
+/// The standard deviation that white noise of 1 has at each scale of the B₃ spline transform (Starck & Murtagh, table 1).
+const NOISE_AT_SCALE: [f32; 4] = [0.889, 0.200, 0.0859, 0.0413];
+/// The threshold in standard deviations at a strength of 1.
+const THRESHOLD: f32 = 3.0;
+
+/// The noise of a filter's samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SampleNoise {
+    /// Electrons a unit of the samples.
+    pub(crate) electrons_per_unit: f64,
+    /// Noise that does not depend on the signal, rms electrons.
+    pub(crate) floor_e: f64,
+}
+
+impl SampleNoise {
+    /// Returns the sample on a scale on which noise is 1.
+    fn stabilised(self, sample: f32) -> f32 {
+        let electrons = f64::from(sample) * self.electrons_per_unit;
+        (2.0 * (electrons + 0.375 + self.floor_e.powi(2)).max(0.0).sqrt()) as f32
+    }
+
+    /// Returns the sample of a value on that scale; the mean comes out unbiased above a few electrons.
+    fn unstabilised(self, value: f32) -> f32 {
+        let half = 0.5 * f64::from(value.max(0.0));
+        ((half * half - 0.125 - self.floor_e.powi(2)) / self.electrons_per_unit) as f32
+    }
+}
+
+/// Takes noise out of the planes of a frame; `noise` is that of each filter.
+pub(crate) fn denoise(planes: &mut [Array2<f32>], tile: Option<&Tile>, noise: &[SampleNoise], strength: f64) {
+    match tile {
+        Some(tile) => denoise_mosaic(&mut planes[0], tile, noise, strength as f32),
+        None => {
+            for (number, plane) in planes.iter_mut().enumerate() {
+                denoise_mosaic(plane, &Tile::single(number), noise, strength as f32);
+            }
+        }
+    }
+}
+
+fn denoise_mosaic(plane: &mut Array2<f32>, tile: &Tile, noise: &[SampleNoise], strength: f32) {
+    let n_phases = tile.rows() * tile.columns();
+    let (n_rows, n_columns) = plane.dim();
+    let size = (n_rows.div_ceil(tile.rows()), n_columns.div_ceil(tile.columns()));
+    let noise_of = |phase: usize| noise[tile.filter_at(phase / tile.columns(), phase % tile.columns())];
+    // A tile that hangs over the edge takes its missing samples from the tile before it.
+    let inside =
+        |place: usize, period: usize, n: usize| if place < n { place } else { place.saturating_sub(period).min(n - 1) };
+    let phases: Vec<Array2<f32>> = (0..n_phases)
+        .into_par_iter()
+        .map(|phase| {
+            Array2::from_shape_fn(size, |(r, c)| {
+                let row = inside(r * tile.rows() + phase / tile.columns(), tile.rows(), n_rows);
+                let column = inside(c * tile.columns() + phase % tile.columns(), tile.columns(), n_columns);
+                noise_of(phase).stabilised(plane[(row, column)])
+            })
+        })
+        .collect();
+    let cosines = cosines(tile.rows(), tile.columns());
+    let denoised: Vec<Array2<f32>> =
+        cosines.par_iter().map(|row| shrink(&weighted_sum(&phases, row), strength)).collect();
+    drop(phases);
+    let back: Vec<Array2<f32>> = (0..n_phases)
+        .into_par_iter()
+        .map(|phase| weighted_sum(&denoised, &cosines.iter().map(|row| row[phase]).collect::<Vec<_>>()))
+        .collect();
+    plane.outer_iter_mut().into_par_iter().enumerate().for_each(|(row, mut values)| {
+        for (column, value) in values.iter_mut().enumerate() {
+            let phase = (row % tile.rows()) * tile.columns() + column % tile.columns();
+            *value = noise_of(phase).unstabilised(back[phase][(row / tile.rows(), column / tile.columns())]);
+        }
+    });
+}
+
+/// Returns the orthonormal cosine transform of a tile: a row a frequency, a column a phase.
+fn cosines(rows: usize, columns: usize) -> Vec<Vec<f32>> {
+    let one = |k: usize, i: usize, n: usize| {
+        let norm = if k == 0 { 1.0 / n as f64 } else { 2.0 / n as f64 }.sqrt();
+        norm * (std::f64::consts::PI * k as f64 * (i as f64 + 0.5) / n as f64).cos()
+    };
+    let phases = || (0..rows).flat_map(|r| (0..columns).map(move |c| (r, c)));
+    let row = |(kr, kc)| phases().map(|(r, c)| (one(kr, r, rows) * one(kc, c, columns)) as f32).collect();
+    phases().map(row).collect()
+}
+
+fn weighted_sum(planes: &[Array2<f32>], weights: &[f32]) -> Array2<f32> {
+    let mut sum = Array2::zeros(planes[0].dim());
+    planes.iter().zip(weights).for_each(|(plane, &weight)| sum.scaled_add(weight, plane));
+    sum
+}
+
+/// Returns the plane without what noise of 1 explains.
+fn shrink(plane: &Array2<f32>, strength: f32) -> Array2<f32> {
+    let mut smooth = plane.clone();
+    let mut kept = Array2::zeros(plane.dim());
+    for (scale, noise) in NOISE_AT_SCALE.iter().enumerate() {
+        let smoother = smoothed(&smooth, 1 << scale);
+        let threshold = strength * THRESHOLD * noise;
+        ndarray::Zip::from(&mut kept).and(&smooth).and(&smoother).for_each(|kept: &mut f32, &fine, &coarse| {
+            let detail = fine - coarse;
+            // Between a hard and a soft threshold: what is far above it stays nearly as it is.
+            if detail.abs() > threshold {
+                *kept += detail - threshold * threshold / detail;
+            }
+        });
+        smooth = smoother;
+    }
+    kept + smooth
+}
+
+/// Returns the plane smoothed by the B₃ spline with `hole` pixels between its taps; the border is mirrored.
+fn smoothed(plane: &Array2<f32>, hole: usize) -> Array2<f32> {
+    const TAPS: [f32; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
+    let (n_rows, n_columns) = plane.dim();
+    let places = |i: usize, n: usize| {
+        [-2_isize, -1, 0, 1, 2].map(|tap| {
+            let last = n as isize - 1;
+            let place = (i as isize + tap * hole as isize).abs();
+            // One reflection is enough unless the plane is smaller than the filter.
+            (if place > last { (2 * last - place).max(0) } else { place }) as usize
+        })
+    };
+    let mut along = Array2::zeros((n_rows, n_columns));
+    for (from, mut to) in plane.outer_iter().zip(along.outer_iter_mut()) {
+        for (column, value) in to.iter_mut().enumerate() {
+            *value = places(column, n_columns).iter().zip(TAPS).map(|(&c, tap)| tap * from[c]).sum();
+        }
+    }
+    let mut both = Array2::zeros((n_rows, n_columns));
+    for (row, mut to) in both.outer_iter_mut().enumerate() {
+        for (&r, tap) in places(row, n_rows).iter().zip(TAPS) {
+            to.scaled_add(tap, &along.row(r));
+        }
+    }
+    both
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn the_cosine_transform_keeps_lengths() {
+        for (rows, columns) in [(2, 2), (4, 4), (1, 3)] {
+            let rows_of = cosines(rows, columns);
+            for (i, a) in rows_of.iter().enumerate() {
+                for (j, b) in rows_of.iter().enumerate() {
+                    let product: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+                    assert!((product - f32::from(u8::from(i == j))).abs() < 1e-6);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn white_noise_has_the_tabled_size_at_each_scale_and_is_taken_out() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let noise = Array2::from_shape_simple_fn((256, 256), || StandardNormal.sample(&mut rng));
+        let rms = |plane: &Array2<f32>| (plane.iter().map(|v| v * v).sum::<f32>() / plane.len() as f32).sqrt();
+        let mut smooth = noise.clone();
+        for (scale, expected) in NOISE_AT_SCALE.iter().enumerate() {
+            let smoother = smoothed(&smooth, 1 << scale);
+            // The coarser the scale, the fewer independent samples there are.
+            assert!((rms(&(&smooth - &smoother)) / expected - 1.0).abs() < 0.05, "scale {scale}");
+            smooth = smoother;
+        }
+        assert!(rms(&shrink(&noise, 1.0)) < 0.1);
+    }
+
+    #[test]
+    fn stabilising_and_back_is_the_same_but_for_the_known_eighth() {
+        let noise = SampleNoise { electrons_per_unit: 6000.0, floor_e: 3.0 };
+        for sample in [0.0, 0.01, 0.5, 1.0] {
+            let back = noise.unstabilised(noise.stabilised(sample));
+            assert!((back - sample - 0.25 / 6000.0).abs() < 1e-6, "{sample} {back}");
+        }
+    }
+}

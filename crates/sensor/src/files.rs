@@ -1,0 +1,96 @@
+//! Pictures and raw frames as PNG and TIFF files.
+
+use std::{
+    fs,
+    io::{BufWriter, Cursor, Write},
+    path::Path,
+};
+
+use image::{DynamicImage, ImageBuffer, ImageFormat};
+
+use crate::{Picture, Raw, RawPlane, SensorError};
+
+/// How many bits a file has for each code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// 8.
+    Eight,
+    /// 16.
+    Sixteen,
+}
+
+impl Picture {
+    /// Writes the picture as PNG or TIFF, by the path's extension.
+    ///
+    /// # Errors
+    /// When the extension is another or the file cannot be written; then there is no file.
+    pub fn write(&self, path: &Path, depth: Depth) -> Result<(), SensorError> {
+        let (width, height) = (self.columns() as u32, self.rows() as u32);
+        let image = match depth {
+            Depth::Eight => ImageBuffer::from_raw(width, height, self.to_rgb8()).map(DynamicImage::ImageRgb8),
+            Depth::Sixteen => ImageBuffer::from_raw(width, height, self.to_rgb16()).map(DynamicImage::ImageRgb16),
+        };
+        write_image(path, &image.expect("three codes a pixel"))
+    }
+}
+
+impl Raw {
+    /// Writes the digital numbers of a mosaic or monochrome frame as 16-bit grey PNG or TIFF, by the path's extension.
+    ///
+    /// The codes are those of the converter, not stretched.
+    ///
+    /// # Errors
+    /// When the frame is in volts or has stacked filters, the extension is another or the file cannot be written; then
+    /// there is no file.
+    pub fn write(&self, path: &Path) -> Result<(), SensorError> {
+        let dn = self.dn().ok_or_else(|| self.without_numbers("a 16-bit picture"))?;
+        let codes: Vec<u16> = dn.iter().copied().collect();
+        let image = ImageBuffer::from_raw(dn.ncols() as u32, dn.nrows() as u32, codes).map(DynamicImage::ImageLuma16);
+        write_image(path, &image.expect("one code a pixel"))
+    }
+
+    /// Returns the error of a frame that has no plane of digital numbers.
+    pub(crate) fn without_numbers(&self, what: &'static str) -> SensorError {
+        let found = match self.planes.as_slice() {
+            [RawPlane::Volts(_)] => "volts, from a sensor without converter",
+            _ => "several planes, from a sensor of stacked filters",
+        };
+        SensorError::Unsuitable {
+            what,
+            reason: format!("needs one plane of digital numbers, but the frame has {found}"),
+        }
+    }
+}
+
+fn write_image(path: &Path, image: &DynamicImage) -> Result<(), SensorError> {
+    let format = match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        Some("png") => ImageFormat::Png,
+        Some("tif" | "tiff") => ImageFormat::Tiff,
+        _ => return Err(write_error(path, "the extension must be png, tif or tiff")),
+    };
+    let mut bytes = Cursor::new(Vec::new());
+    image.write_to(&mut bytes, format).map_err(|e| write_error(path, e))?;
+    write_beside_and_rename(path, bytes.get_ref())
+}
+
+/// Writes a file under another name beside its own, then renames it, so that there is never half a file.
+pub(crate) fn write_beside_and_rename(path: &Path, bytes: &[u8]) -> Result<(), SensorError> {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    let beside = Path::new(&beside);
+    let write = || {
+        let mut file = BufWriter::new(fs::File::create(beside)?);
+        file.write_all(bytes)?;
+        file.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?;
+        fs::rename(beside, path)
+    };
+    write().map_err(|e| {
+        // The part may not exist; what matters is the first error.
+        let _ = fs::remove_file(beside);
+        write_error(path, e)
+    })
+}
+
+pub(crate) fn write_error(path: &Path, reason: impl std::fmt::Display) -> SensorError {
+    SensorError::Write { path: path.to_owned(), reason: reason.to_string() }
+}

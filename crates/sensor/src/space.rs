@@ -1,0 +1,50 @@
+//! The primaries of a picture.
+
+use serde::{Deserialize, Serialize};
+
+/// The primaries in which a picture is coded; white is D65 in all of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ColorSpace {
+    /// sRGB, those of ITU-R BT.709.
+    #[default]
+    Srgb,
+    /// Display P3.
+    DisplayP3,
+}
+
+/// Linear Display P3 from linear sRGB, both with a white of D65: from their primaries' chromaticities.
+const P3_FROM_SRGB: [[f32; 3]; 3] =
+    [[0.822_461_96, 0.177_538_04, 0.0], [0.033_194_2, 0.966_805_8, 0.0], [0.017_082_63, 0.072_397_44, 0.910_519_93]];
+
+impl ColorSpace {
+    /// Returns linear light in these primaries, of linear sRGB.
+    #[inline]
+    pub fn from_linear_srgb(self, rgb: [f32; 3]) -> [f32; 3] {
+        match self {
+            Self::Srgb => rgb,
+            Self::DisplayP3 => P3_FROM_SRGB.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dioptric_spectrum::Xyz;
+
+    #[test]
+    fn white_stays_and_the_primaries_of_p3_are_its_own() {
+        for value in ColorSpace::DisplayP3.from_linear_srgb([1.0; 3]) {
+            assert!((value - 1.0).abs() < 1e-6);
+        }
+        // Display P3: red (0.680, 0.320), green (0.265, 0.690), blue (0.150, 0.060). Linear sRGB of each, by its
+        // chromaticity, must give that primary alone.
+        for (index, (x, y)) in [(0.680, 0.320), (0.265, 0.690), (0.150, 0.060)].into_iter().enumerate() {
+            let rgb = Xyz([x / y, 1.0, (1.0 - x - y) / y]).to_linear_srgb();
+            let p3 = ColorSpace::DisplayP3.from_linear_srgb(rgb.map(|v| v as f32));
+            for (i, value) in p3.iter().enumerate() {
+                assert!(i == index || value.abs() < 1e-3 * p3[index], "{index}: {p3:?}");
+            }
+        }
+    }
+}
