@@ -49,6 +49,12 @@ impl Mesh {
         (0..self.n_rings).flat_map(move |ring| (0..self.n_azimuths).map(move |j| (ring, j)))
     }
 
+    /// Returns the share of a cell's area in the pupil that lies in the triangle on its outer side.
+    pub(crate) fn outer_share(self, ring: usize) -> f64 {
+        let (inner, outer) = (self.share(ring as f64), self.share((ring + 1) as f64));
+        outer / (inner + outer)
+    }
+
     /// Returns the nodes at the corners of a cell: inner, outer, outer next, inner next.
     pub(crate) fn corners(self, ring: usize, j: usize) -> [usize; 4] {
         [self.node(ring, j), self.node(ring + 1, j), self.node(ring + 1, j + 1), self.node(ring, j + 1)]

@@ -65,13 +65,14 @@ impl Raster {
         }
     }
 
-    /// Deposits energy evenly on a quadrilateral, given in order, as the two triangles on its diagonal: by equal shares.
-    pub fn quadrilateral(&mut self, [a, b, c, d]: [DVec2; 4], energy: f64) {
+    /// Deposits energy on a quadrilateral a, b, c, d, given in order, as two triangles: `first_share` of it evenly on a,
+    /// b, c and the rest on a, c, d.
+    pub fn quadrilateral(&mut self, [a, b, c, d]: [DVec2; 4], energy: f64, first_share: f64) {
         if a.min(b).min(c.min(d)).floor() == a.max(b).max(c.max(d)).floor() {
             return self.point(a, energy);
         }
-        self.triangle([a, b, c], 0.5 * energy);
-        self.triangle([a, c, d], 0.5 * energy);
+        self.triangle([a, b, c], first_share * energy);
+        self.triangle([a, c, d], (1.0 - first_share) * energy);
     }
 
     /// Returns the energy of each pixel.
@@ -165,7 +166,7 @@ mod tests {
     fn a_square_covers_what_it_covers() {
         let mut raster = Raster::new(3, 4);
         let corners = [(0.5, 0.25), (2.5, 0.25), (2.5, 2.0), (0.5, 2.0)].map(|(x, y)| DVec2::new(x, y));
-        raster.quadrilateral(corners, 3.5);
+        raster.quadrilateral(corners, 3.5, 0.5);
         let expected = [[0.375, 0.75, 0.375, 0.0], [0.5, 1.0, 0.5, 0.0], [0.0; 4]];
         for (row, expected) in raster.finish().rows().into_iter().zip(expected) {
             for (a, e) in row.iter().zip(expected) {

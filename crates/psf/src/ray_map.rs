@@ -157,7 +157,8 @@ impl Task<'_> {
             .map(|((ring, j), e)| {
                 let [a, b, c, d] = self.mesh.corners(ring, j).map(|node| nodes[node].at_mm);
                 // That of the two triangles that will be drawn.
-                (2.0 * a + b + 2.0 * c + d) * (e / 6.0)
+                let outer = self.mesh.outer_share(ring);
+                (a + c + outer * b + (1.0 - outer) * d) * (e / 3.0)
             })
             .sum();
         nodes.iter_mut().for_each(|node| node.at_mm -= centroid_mm);

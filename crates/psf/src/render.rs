@@ -84,7 +84,10 @@ impl<'a> Layout<'a> {
         for ((ring, j), &energy) in record.mesh.cells().zip(record.energies()) {
             let corners = record.mesh.corners(ring, j).map(|node| self.nodes[node]);
             match self.bending {
-                None => raster.quadrilateral(corners.map(|node| node.at_mm), energy.into()),
+                None => {
+                    let outer = record.mesh.outer_share(ring);
+                    raster.quadrilateral(corners.map(|node| node.at_mm), energy.into(), outer);
+                }
                 Some(bending) => {
                     let cell = Cell { corners, inner: ring as f64, energy: energy.into() };
                     draw_bent(&mut raster, record, &cell, bending);
@@ -159,7 +162,8 @@ fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending
     let (n_along, n_around) = (in_sigmas(along, widened), in_sigmas(around, widened));
     let is_beside_the_cell = wide < PART_OF_A_PIXEL * PART_OF_A_PIXEL && along.length().min(around.length()) > 1.0;
     if wide < NARROW * NARROW || is_beside_the_cell || (n_along > POLYGON && n_around > POLYGON) {
-        return raster.quadrilateral(cell.corners.map(|node| node.at_mm), cell.energy);
+        let outer = record.mesh.outer_share(cell.inner as usize);
+        return raster.quadrilateral(cell.corners.map(|node| node.at_mm), cell.energy, outer);
     }
     // A piece two standard deviations across leaves no ripple.
     let n_around = (0.5 * n_around).ceil().clamp(1.0, 64.0) as usize;
