@@ -36,5 +36,16 @@ fn kernel(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, build, kernel);
+/// Wave-optical kernels of points in focus and near it, traced and summed anew each time.
+fn waves(criterion: &mut Criterion) {
+    let bank = PsfBank::build(&dgauss(), &settings(Diffraction::Wave)).unwrap();
+    let mut group = criterion.benchmark_group("kernel/wave");
+    for (place, dioptres) in [("focus", 0.495), ("blur_12um", 0.46)] {
+        group.bench_function(place, |bencher| {
+            bencher.iter(|| bank.kernel(DVec2::new(0.1, 0.05), dioptres, 550.0, 5.0));
+        });
+    }
+}
+
+criterion_group!(benches, build, kernel, waves);
 criterion_main!(benches);
