@@ -42,9 +42,10 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<Camera> {
         None => Camera::demo()?,
     };
     if let Some(scene) = &arguments.scene {
-        // The demo's film and bands are made for its own scene.
+        // The demo's film, focus and bands are made for its own scene.
         if arguments.camera.is_none() {
             camera.film = FilmChoice::Scene;
+            camera.focus = FocusChoice::NearObject;
             camera.wavelengths = WavelengthChoice::Scene;
             camera.name = format!("{}, 50 mm double Gauss", stem_of(scene));
         }

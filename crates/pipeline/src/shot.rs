@@ -1,7 +1,7 @@
 //! A camera with everything it names opened: the lens, the scene, the film and the sensor.
 
 use dioptric_forward::{BlurMode, Film, Settings};
-use dioptric_optics::{Lens, MonoLens};
+use dioptric_optics::{Lens, MonoLens, ObjectPoint, Rims, glam::DVec2, rays_towards};
 use dioptric_scene::{Scene, View};
 use dioptric_sensor::Sensor;
 use dioptric_spectrum::WavelengthGrid;
@@ -116,7 +116,17 @@ fn size_film(
         FilmChoice::Scene => {
             let view = scene.require_view()?;
             let (rows, columns) = seen_evenly(&view, scene.rows(), scene.columns())?;
-            let pitch_um = 1e3 * height_per_tan_mm(lens, film_mm) / view.focal_px;
+            let (half_rows, half_columns) = (0.5 * rows as f64, 0.5 * columns as f64);
+            let paraxial_um = 1e3 * height_per_tan_mm(lens, film_mm) / view.focal_px;
+            // Barrel distortion draws the rim of the scene inwards, and blur mixes it with the dark beyond.
+            let seen = [(half_columns, 0.0), (0.0, half_rows), (half_columns, half_rows)]
+                .map(|(x, y)| DVec2::new(x, y).length() / view.focal_px)
+                .map(|tan| height_over_paraxial(lens, tan, film_mm))
+                .into_iter()
+                .fold(1.0, f64::min);
+            let half_um =
+                seen * paraxial_um * half_rows.min(half_columns) - 1e3 * widest_blur_mm(lens, film_mm, scene)?;
+            let pitch_um = half_um / half_rows.min(half_columns);
             if !(pitch_um.is_finite() && pitch_um > 0.0) {
                 let reason = format!("the film at {film_mm} mm sees no upright picture of the scene");
                 return Err(PipelineError::Unsuitable { what: "film: Scene", reason });
@@ -149,6 +159,32 @@ fn height_per_tan_mm(lens: &MonoLens, film_mm: f64) -> f64 {
     } else {
         first.efl_mm
     }
+}
+
+/// Returns by how much the chief ray of a field lands farther out than first order says; 1 where it does not get through.
+fn height_over_paraxial(lens: &MonoLens, tan: f64, film_mm: f64) -> f64 {
+    let pupil_z = lens.first_order().entrance_pupil_z_mm;
+    if !pupil_z.is_finite() {
+        return 1.0;
+    }
+    let point = ObjectPoint::from_field(lens, DVec2::new(tan, 0.0), 0.0);
+    let mut rays = rays_towards(&point, &[DVec2::ZERO], pupil_z, 0.0);
+    lens.trace(&mut rays, Rims::Ignore);
+    lens.to_film(&mut rays, film_mm);
+    if rays.fate[0].is_in_flight() { rays.x_mm[0].abs() / (tan * height_per_tan_mm(lens, film_mm)) } else { 1.0 }
+}
+
+/// Returns the radius of the largest blur of the scene on the axis, mm, by first order.
+fn widest_blur_mm(lens: &MonoLens, film_mm: f64, scene: &Scene) -> Result<f64, PipelineError> {
+    let first = lens.first_order();
+    let (near_m, far_m) = scene.require_depth()?.range_m();
+    let focus_dioptres = match lens.object_distance_mm_for(film_mm) {
+        Ok(distance_mm) => 1e3 / (distance_mm + first.entrance_pupil_z_mm),
+        Err(_) => return Ok(0.0),
+    };
+    let farthest = [1.0 / near_m, 1.0 / far_m].map(|d| (d - focus_dioptres).abs()).into_iter().fold(0.0, f64::max);
+    let radius_mm = 0.5e-3 * first.entrance_pupil_diameter_mm * farthest * height_per_tan_mm(lens, film_mm);
+    Ok(if radius_mm.is_finite() { radius_mm } else { 0.0 })
 }
 
 #[cfg(test)]

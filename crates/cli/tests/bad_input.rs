@@ -1,0 +1,181 @@
+//! Bad input ends in one sentence, a status that is not 0, and no file.
+
+mod common;
+
+use std::{fs, path::Path};
+
+use common::{check_error, output};
+
+/// A camera of a few pixels, so that a test takes a moment.
+const CAMERA: &str = r#"(
+    name: "small",
+    lens: BuiltIn("dgauss-50mm"),
+    stop: FNumber(4.0),
+    focus: DistanceMm(2000.0),
+    film: Pixels(columns: 24, rows: 16, pitch_um: 200.0),
+    sensor: BuiltIn("nikon-d5100"),
+    scene: (source: Target(pattern: Uniform, columns: 32, rows: 32), field_of_view_deg: 12.0, depth_m: 2.0),
+    wavelengths: ListNm([450.0, 550.0, 650.0]),
+)"#;
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    folder
+}
+
+/// Runs the small camera for its irradiance, which is a valid spectral EXR.
+fn spectral_exr(folder: &Path) -> Vec<u8> {
+    output(folder, &["run", "camera.ron", "--out", "good", "--quiet"]);
+    let bytes = fs::read(folder.join("good/irradiance.exr")).unwrap();
+    fs::remove_dir_all(folder.join("good")).unwrap();
+    bytes
+}
+
+fn check_scene(folder: &Path, words: &[&str]) {
+    check_error(folder, &["run", "camera.ron", "--scene", "scene.exr", "--depth-m", "2", "--out", "out"], words);
+}
+
+#[test]
+fn a_truncated_exr_is_named() {
+    let folder = folder();
+    let bytes = spectral_exr(folder.path());
+    fs::write(folder.path().join("scene.exr"), &bytes[..bytes.len() / 2]).unwrap();
+    check_scene(folder.path(), &["scene.exr"]);
+    fs::write(folder.path().join("scene.exr"), b"no picture at all").unwrap();
+    check_scene(folder.path(), &["scene.exr"]);
+    check_error(folder.path(), &["run", "camera.ron", "--scene", "absent.exr", "--out", "out"], &["absent.exr"]);
+}
+
+#[test]
+fn an_exr_without_spectral_bands_is_named() {
+    let folder = folder();
+    output(folder.path(), &["run", "camera.ron", "--out", "good", "--quiet"]);
+    fs::copy(folder.path().join("good/volts.exr"), folder.path().join("scene.exr")).unwrap();
+    check_scene(folder.path(), &["scene.exr", "no spectral band"]);
+}
+
+#[test]
+fn an_irradiance_is_no_scene() {
+    let folder = folder();
+    let bytes = spectral_exr(folder.path());
+    fs::write(folder.path().join("scene.exr"), bytes).unwrap();
+    check_scene(folder.path(), &["W.m^-2.sr^-1.nm^-1"]);
+}
+
+#[test]
+fn nan_and_negative_samples_are_named_with_their_place() {
+    let folder = folder();
+    let good = spectral_exr(folder.path());
+    for bad in [f32::NAN, -1.0] {
+        // The file is not compressed: its last four bytes are the last sample of the last band.
+        let mut bytes = good.clone();
+        let at = bytes.len() - 4;
+        bytes[at..].copy_from_slice(&bad.to_le_bytes());
+        fs::write(folder.path().join("light.exr"), bytes).unwrap();
+        let arguments = ["sense", "light.exr", "--sensor", "nikon-d5100", "--out", "out"];
+        check_error(folder.path(), &arguments, &["row 15, column 23", "650 nm"]);
+        fs::remove_file(folder.path().join("light.exr")).unwrap();
+    }
+}
+
+#[test]
+fn missing_depth_and_view_are_asked_for() {
+    let folder = folder();
+    let picture = image_of_one_colour();
+    fs::write(folder.path().join("scene.png"), picture).unwrap();
+    let run = ["run", "camera.ron", "--scene", "scene.png", "--out", "out"];
+    check_error(folder.path(), &[&run[..], &["--fov-deg", "12"]].concat(), &["scene.png", "depth"]);
+    check_error(folder.path(), &[&run[..], &["--depth-m", "2"]].concat(), &["scene.png", "field of view"]);
+    output(folder.path(), &[&run[..], &["--fov-deg", "12", "--depth-m", "2", "--quiet"]].concat());
+    assert!(folder.path().join("out/picture.png").exists());
+}
+
+/// A picture that the program itself made.
+fn image_of_one_colour() -> Vec<u8> {
+    let other = folder();
+    output(other.path(), &["run", "camera.ron", "--out", "good", "--quiet"]);
+    fs::read(other.path().join("good/picture.png")).unwrap()
+}
+
+#[test]
+fn wavelengths_outside_the_glass_are_named() {
+    let folder = folder();
+    let lens = r#"(
+    name: "tabulated",
+    source: "a test",
+    surfaces: [
+        (radius_mm: 50.0, thickness_mm: 4.0, semi_aperture_mm: 8.0, medium: Tabulated(wavelengths_nm: [500.0, 600.0], indices: [1.6, 1.59])),
+        (radius_mm: -50.0, thickness_mm: 1.0, semi_aperture_mm: 8.0, medium: Air),
+        (stop: true, thickness_mm: 0.0, semi_aperture_mm: 4.0, medium: Air),
+    ],
+)"#;
+    fs::write(folder.path().join("lens.ron"), lens).unwrap();
+    let arguments = ["glass", "show", "SCHOTT:N-BK7", "--wavelengths-nm", "100"];
+    check_error(folder.path(), &arguments, &["100 nm", "from"]);
+    check_error(folder.path(), &["lens", "info", "lens.ron", "--wavelengths-nm", "450"], &["500 to 600 nm"]);
+}
+
+#[test]
+fn a_dat_needs_exactly_one_stop() {
+    let folder = folder();
+    let rows = |stops: usize| {
+        let stop = "0\t1.0\t1\t8\n".repeat(stops);
+        format!("# lens\n50\nradius\taxpos\tN\taperture\n50\t4\t1.6\t16\n-50\t2\t1\t16\n{stop}60\t0\t1\t16\n")
+    };
+    for stops in [0, 2] {
+        fs::write(folder.path().join("lens.dat"), rows(stops)).unwrap();
+        check_error(folder.path(), &["lens", "info", "lens.dat"], &["lens.dat", "stop"]);
+    }
+    fs::write(folder.path().join("lens.dat"), rows(1)).unwrap();
+    output(folder.path(), &["lens", "info", "lens.dat"]);
+}
+
+#[test]
+fn malformed_ron_is_named_with_its_line() {
+    let folder = folder();
+    fs::write(folder.path().join("camera.ron"), CAMERA.replace("focus:", "fokus:")).unwrap();
+    check_error(folder.path(), &["run", "camera.ron"], &["camera.ron:5", "fokus"]);
+    fs::write(folder.path().join("camera.ron"), &CAMERA[..100]).unwrap();
+    check_error(folder.path(), &["run", "camera.ron"], &["camera.ron:"]);
+    fs::write(folder.path().join("camera.ron"), CAMERA.replace("200.0)", "NaN)")).unwrap();
+    check_error(folder.path(), &["run", "camera.ron"], &["camera.ron:6", "pitch_um", "NaN"]);
+}
+
+#[test]
+fn unknown_names_are_answered_with_the_known_ones() {
+    let folder = folder();
+    check_error(folder.path(), &["lens", "info", "no-such-lens"], &["no-such-lens", "dgauss-50mm"]);
+    check_error(folder.path(), &["run", "camera.ron", "--lens", "no-such-lens"], &["no-such-lens"]);
+    check_error(folder.path(), &["run", "camera.ron", "--sensor", "no-such-sensor"], &["no-such-sensor"]);
+    check_error(folder.path(), &["run", "camera.ron", "--illuminant", "D66"], &["D66", "D65"]);
+}
+
+#[test]
+fn a_place_that_cannot_be_written_to_is_named_before_the_work() {
+    let folder = folder();
+    fs::write(folder.path().join("file"), "").unwrap();
+    check_error(folder.path(), &["run", "camera.ron", "--out", "file"], &["cannot write file"]);
+    check_error(folder.path(), &["run", "camera.ron", "--out", "file/out"], &["cannot write file/out"]);
+    check_error(folder.path(), &["lens", "draw", "dgauss-50mm", "-o", "file/lens.svg"], &["cannot write"]);
+    let psf = ["psf", "dgauss-50mm", "--focus-mm", "2000", "-o", "file/psf.exr"];
+    check_error(folder.path(), &psf, &["cannot write"]);
+}
+
+#[test]
+fn numbers_that_make_no_sense_are_named() {
+    let folder = folder();
+    for (arguments, word) in [
+        (vec!["psf", "dgauss-50mm", "--focus-mm", "2000", "--fields-deg", "90"], "fields_deg"),
+        (vec!["psf", "dgauss-50mm", "--focus-mm", "2000", "--distances-mm", "-5"], "distances"),
+        (vec!["psf", "dgauss-50mm", "--focus-mm", "1"], "1 mm"),
+        (vec!["psf", "dgauss-50mm", "--focus-mm", "2000", "--stop-mm", "80"], "80"),
+        (vec!["run", "camera.ron", "--f-number", "-4"], "FNumber"),
+        (vec!["lens", "info", "dgauss-50mm", "--wavelengths-nm", "blue"], "blue"),
+    ] {
+        let run = common::dioptric(folder.path(), &arguments);
+        let message = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(!run.status.success() && !message.contains("panicked"), "{arguments:?}: {message}");
+        assert!(message.contains(word) || message.contains("unexpected argument"), "{arguments:?}: {message}");
+    }
+}

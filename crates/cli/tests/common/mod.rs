@@ -1,0 +1,50 @@
+//! Runs the built program.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+/// Runs `dioptric` with these arguments in a folder.
+pub(crate) fn dioptric(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_dioptric"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("the program starts")
+}
+
+/// Returns what a run that must succeed writes to standard output.
+#[track_caller]
+#[allow(dead_code, reason = "not every test file needs it")]
+pub(crate) fn output(folder: &Path, arguments: &[&str]) -> String {
+    let run = dioptric(folder, arguments);
+    assert!(run.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&run.stderr));
+    String::from_utf8(run.stdout).expect("the output is text")
+}
+
+/// Checks that a run fails with one sentence that holds these words, and leaves the folder as it was.
+#[track_caller]
+#[allow(dead_code, reason = "not every test file needs it")]
+pub(crate) fn check_error(folder: &Path, arguments: &[&str], words: &[&str]) {
+    let before = names_in(folder);
+    let run = dioptric(folder, arguments);
+    let message = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(!run.status.success(), "{arguments:?} succeeded");
+    assert_eq!(message.lines().count(), 1, "{message}");
+    assert!(message.starts_with("error: ") && !message.contains("panicked"), "{message}");
+    for word in words {
+        assert!(message.contains(word), "'{word}' in: {message}");
+    }
+    assert_eq!(names_in(folder), before, "{arguments:?} left something behind");
+}
+
+fn names_in(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .expect("the folder is there")
+        .map(|entry| entry.expect("the folder can be read").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}

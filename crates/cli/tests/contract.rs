@@ -1,0 +1,139 @@
+//! The words, keys and columns that users rely on.
+
+mod common;
+
+use std::{fs, path::Path};
+
+use common::output;
+use serde_json::Value;
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    serde_json::from_str(&output(folder, arguments)).expect("the output is JSON")
+}
+
+#[track_caller]
+fn check_numbers(record: &Value, keys: &str) {
+    for key in keys.split_whitespace() {
+        assert!(record[key].is_number(), "{key} in {record}");
+    }
+}
+
+#[test]
+fn lens_info_has_its_keys_for_each_wavelength() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments =
+        ["lens", "info", "dgauss-50mm", "--wavelengths-nm", "400:700:100", "--distance-mm", "2000", "--json"];
+    let records = json(folder.path(), &arguments);
+    assert_eq!(records.as_array().unwrap().len(), 4);
+    for record in records.as_array().unwrap() {
+        check_numbers(
+            record,
+            "wavelength_nm efl_mm bfl_mm ffl_mm front_principal_mm rear_principal_mm entrance_pupil_z_mm \
+             entrance_pupil_diameter_mm exit_pupil_z_mm exit_pupil_diameter_mm f_number image_distance_mm \
+             magnification working_f_number",
+        );
+        check_numbers(&record["seidel"], "S1 S2 S3 S4 S5 C1 C2");
+        assert_eq!(record["seidel_surfaces"].as_array().unwrap().len(), 11);
+    }
+}
+
+#[test]
+fn psf_has_its_keys_in_both_modes() {
+    let folder = tempfile::tempdir().unwrap();
+    let common = [
+        "psf",
+        "paper-2el",
+        "--fields-deg",
+        "0,2",
+        "--distances-mm",
+        "8000",
+        "--wavelengths-nm",
+        "500:600:100",
+        "--film-mm",
+        "51.8145",
+        "--stop-mm",
+        "4",
+        "--pixel-um",
+        "4",
+        "--size",
+        "75",
+        "--json",
+    ];
+    for mode in [&["--mode", "pupil"][..], &["--mode", "paper", "--rays", "51"], &["--diffraction", "hurb"]] {
+        let records = json(folder.path(), &[&common[..], mode].concat());
+        assert_eq!(records.as_array().unwrap().len(), 4);
+        for record in records.as_array().unwrap() {
+            check_numbers(
+                record,
+                "field_deg distance_mm wavelength_nm centroid_x_mm centroid_y_mm rms_radius_um sigma_x_um \
+                 sigma_y_um lsf_fwhm_um ee50_radius_um energy",
+            );
+        }
+    }
+}
+
+#[test]
+fn traced_rays_have_their_columns_and_seventeen_digits() {
+    let folder = tempfile::tempdir().unwrap();
+    let rays = "x_mm,y_mm,z_mm,l,m,n,wavelength_nm\n0,2,-10,0,0,1,550\n0,12.7,-10,0,0,1,550\n";
+    fs::write(folder.path().join("rays.csv"), rays).unwrap();
+    let common = ["trace", "dgauss-50mm", "--rays", "rays.csv", "--film-mm", "36"];
+    let text = output(folder.path(), &common);
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("ray,surface,x_mm,y_mm,z_mm,l,m,n,opl_mm,fate"));
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    // Eleven surfaces and the image for the first ray, one row for the second, which the front rim ends.
+    assert_eq!(rows.len(), 13);
+    assert_eq!((rows[11][1], rows[11][9], rows[12][0], rows[12][9]), ("image", "passed", "1", "vignetted"));
+    assert!(rows[0][3].split(['.', 'e']).nth(1).is_some_and(|digits| digits.len() == 16), "{}", rows[0][3]);
+    let unclipped = output(folder.path(), &[&common[..], &["--no-clip", "-o", "out.csv"]].concat());
+    assert!(unclipped.is_empty());
+    assert!(fs::read_to_string(folder.path().join("out.csv")).unwrap().lines().count() > 14);
+}
+
+#[test]
+fn lists_name_what_is_built_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let lenses = json(folder.path(), &["lens", "list", "--json"]);
+    assert!(lenses.as_array().unwrap().iter().any(|lens| lens["name"] == "paper-2el"));
+    let glass = json(folder.path(), &["glass", "show", "SCHOTT:N-BK7", "--wavelengths-nm", "587.5618", "--json"]);
+    assert!((glass["indices"][0].as_f64().unwrap() - 1.5168).abs() < 1e-5);
+    assert!(output(folder.path(), &["glass", "list", "--filter", "bk7"]).contains("N-BK7"));
+}
+
+#[test]
+fn a_lens_is_drawn_and_converted() {
+    let folder = tempfile::tempdir().unwrap();
+    output(folder.path(), &["lens", "draw", "dgauss-50mm", "-o", "lens.svg", "--quiet"]);
+    assert!(fs::read_to_string(folder.path().join("lens.svg")).unwrap().contains("<svg"));
+    output(folder.path(), &["lens", "convert", "paper-2el", "copy.ron"]);
+    let original = json(folder.path(), &["lens", "info", "paper-2el", "--json"]);
+    let copy = json(folder.path(), &["lens", "info", "copy.ron", "--json"]);
+    assert_eq!(original[0]["efl_mm"], copy[0]["efl_mm"]);
+}
+
+#[test]
+fn threads_change_no_bit_of_any_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |threads: &str, out: &str| {
+        let small = ["--pixels", "48x32", "--pixel-um", "660", "--wavelengths-nm", "450:650:100"];
+        let arguments = [&["run", "--quiet", "--threads", threads, "--seed", "7", "--out", out][..], &small].concat();
+        output(folder.path(), &arguments);
+    };
+    run("1", "one");
+    run("2", "two");
+    let both = |name: &str| ["one", "two"].map(|out| fs::read(folder.path().join(out).join(name)).unwrap());
+    for name in ["depth.exr", "volts.exr", "raw.png", "picture.png"] {
+        let [one, two] = both(name);
+        assert!(one == two, "{name} differs");
+    }
+    // The attributes in the header of a spectral EXR come in any order; its samples fill the end of the file:
+    // for each of 32 rows 8 bytes that number it, and 48 floats of each of 3 bands.
+    const SAMPLES: usize = 32 * (8 + 48 * 3 * 4);
+    let [one, two] = both("irradiance.exr");
+    assert_eq!(one.len(), two.len());
+    assert!(one[one.len() - SAMPLES..] == two[two.len() - SAMPLES..], "irradiance.exr differs");
+    let report: Value =
+        serde_json::from_str(&fs::read_to_string(folder.path().join("one/report.json")).unwrap()).unwrap();
+    assert_eq!((report["film"]["columns"].as_u64(), report["camera"]["seed"].as_u64()), (Some(48), Some(7)));
+}
