@@ -185,6 +185,8 @@ pub struct ProcessingChoice {
     pub brightness: Brightness,
     /// The curve from light to codes.
     pub curve: ToneCurve,
+    /// How much noise is taken out of the raw frame: 0 none, 1 what is below three standard deviations.
+    pub denoise: f64,
 }
 
 impl Default for ProcessingChoice {
@@ -194,6 +196,7 @@ impl Default for ProcessingChoice {
             white: WhiteChoice::Scene,
             brightness: Brightness::AsExposed,
             curve: ToneCurve::Srgb,
+            denoise: 0.0,
         }
     }
 }
@@ -220,7 +223,8 @@ impl ProcessingChoice {
             WhiteChoice::GreyWorld => (WhiteBalance::GreyWorld, ColorCorrection::Fitted(light)),
             WhiteChoice::None => (WhiteBalance::None, ColorCorrection::None),
         };
-        Processing { white_balance, demosaic: self.demosaic, color, brightness: self.brightness, curve: self.curve }
+        let Self { demosaic, brightness, curve, denoise, .. } = self;
+        Processing { white_balance, demosaic, color, brightness, curve, denoise, ..Processing::for_light(light) }
     }
 }
 
