@@ -90,6 +90,9 @@ pub(crate) struct RunArgs {
     /// Illuminance on a scene of reflectances, or of a picture's white, lux
     #[arg(long, value_name = "LUX")]
     pub(crate) illuminance_lux: Option<f64>,
+    /// What the picture makes white [default: the light on the scene]
+    #[arg(long, value_name = "KIND", value_enum)]
+    pub(crate) white: Option<WhiteKind>,
     /// Sensor, a file or the name of a built-in one
     #[arg(long, value_name = "SENSOR")]
     pub(crate) sensor: Option<String>,
@@ -124,6 +127,17 @@ pub(crate) enum DiffractionKind {
     HurbScene3d,
     /// Ray bending with constants fitted to Airy's pattern
     HurbCalibrated,
+}
+
+/// What the picture makes white.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum WhiteKind {
+    /// The light on the scene
+    Scene,
+    /// The mean of the picture
+    GreyWorld,
+    /// Nothing: the sensor's own colours
+    None,
 }
 
 /// How the scene is blurred.

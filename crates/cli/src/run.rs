@@ -9,11 +9,12 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_pipeline::{
     BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, Progress, Report, SceneChoice,
-    SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, parse_illuminant, parse_numbers, with_exposure_s,
+    SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, WhiteChoice, parse_illuminant, parse_numbers,
+    with_exposure_s,
 };
 
 use crate::{
-    args::{BlurKind, Common, DiffractionKind, RunArgs},
+    args::{BlurKind, Common, DiffractionKind, RunArgs, WhiteKind},
     terminal::{Bar, guarded, print, print_json, remark},
 };
 
@@ -133,6 +134,13 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
     }
     if let Some(time_s) = arguments.exposure_s {
         camera.exposure = with_exposure_s(camera.exposure, time_s);
+    }
+    if let Some(kind) = arguments.white {
+        camera.processing.white = match kind {
+            WhiteKind::Scene => WhiteChoice::Scene,
+            WhiteKind::GreyWorld => WhiteChoice::GreyWorld,
+            WhiteKind::None => WhiteChoice::None,
+        };
     }
     Ok(())
 }

@@ -1,7 +1,5 @@
 //! The words, keys and columns that users rely on.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot set up its files fails")]
-
 mod common;
 
 use std::{fs, path::Path};
