@@ -165,9 +165,12 @@ fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending
         let outer = record.mesh.outer_share(cell.inner as usize);
         return raster.quadrilateral(cell.corners.map(|node| node.at_mm), cell.energy, outer);
     }
-    // A piece two standard deviations across leaves no ripple.
-    let n_around = (0.5 * n_around).ceil().clamp(1.0, 64.0) as usize;
-    let n_along = ((0.5 * n_along).ceil().clamp(1.0, 64.0) as usize).max(edge_pieces(record, cell.inner));
+    // A piece of this many standard deviations across leaves a ripple of 1 %, which pixels and neighbours hide.
+    const PIECE: f64 = 2.3;
+    let pieces = |n_sigmas: f64| (n_sigmas / PIECE).ceil().clamp(1.0, 64.0) as usize;
+    // Out of focus, where a cell is larger than a pixel, the tails of single rings hardly show.
+    let is_blurred = around.length() > 1.0;
+    let (n_around, n_along) = (pieces(n_around), pieces(n_along).max(edge_pieces(record, cell.inner, is_blurred)));
     let mesh = record.mesh;
     let (share_inner, share_outer) = (mesh.share(cell.inner), mesh.share(cell.inner + 1.0));
     let whole = share_outer * share_outer - share_inner * share_inner;
@@ -192,11 +195,12 @@ fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending
 }
 
 /// Returns how many pieces the spread of a ring needs: it doubles over the last few.
-fn edge_pieces(record: &Record, inner: f64) -> usize {
-    match record.mesh.n_rings - inner as usize {
-        1 => 6,
-        2 | 3 => 3,
-        4..=6 => 2,
+fn edge_pieces(record: &Record, inner: f64, is_blurred: bool) -> usize {
+    match (record.mesh.n_rings - inner as usize, is_blurred) {
+        (1, false) => 6,
+        (1, true) => 3,
+        (2 | 3, false) => 3,
+        (4..=6, false) => 2,
         _ => 1,
     }
 }
