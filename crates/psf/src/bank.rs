@@ -56,7 +56,7 @@ pub struct BankSettings {
     pub reference_wavelength_nm: f64,
     /// Tangents of field angles, ascending from 0.
     pub field_tans: Vec<f64>,
-    /// Depths in dioptres (1/Z[m] from the entrance pupil, 0 is infinitely far), ascending.
+    /// Depths in dioptres (1/Z, Z in metres from the entrance pupil, 0 is infinitely far), ascending.
     pub dioptres: Vec<f64>,
     /// Wavelengths, nm, ascending.
     pub wavelengths_nm: Vec<f64>,
