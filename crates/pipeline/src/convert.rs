@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use dioptric_optics::LensFile;
+
 use crate::{LensChoice, PipelineError};
 
 /// Writes the lens that `input` means (a file or a built-in name) in the format that `target`'s extension tells, to
@@ -13,9 +15,16 @@ pub fn convert_lens(input: &str, target: &Path, path: &Path) -> Result<(), Pipel
     let lens = LensChoice::named(input).open()?;
     let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let cannot = |reason: String| PipelineError::Write { path: target.to_owned(), reason };
+    let file = LensFile::from(lens);
     let text = match extension.as_str() {
-        "ron" => lens.to_ron(),
-        _ => return Err(cannot(format!("'.{extension}' is no lens format that can be written; expected .ron"))),
+        "ron" => file.lens.to_ron(),
+        "dat" => file.to_dat()?,
+        "json" => file.to_omni_json()?,
+        "zmx" => file.to_zmx()?,
+        _ => {
+            let expected = "expected .ron, .dat, .json (ISET) or .zmx";
+            return Err(cannot(format!("'.{extension}' is no lens format that can be written; {expected}")));
+        }
     };
     std::fs::write(path, text).map_err(|e| cannot(e.to_string()))
 }

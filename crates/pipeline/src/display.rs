@@ -70,6 +70,22 @@ impl LinearRgb {
         rgb
     }
 
+    /// Returns the picture with colours that a screen cannot show moved towards the grey of their luminance until it can.
+    pub(crate) fn within_gamut(mut self) -> Self {
+        let [red, green, blue] = &mut self.planes;
+        ndarray::Zip::from(red).and(green).and(blue).for_each(|r, g, b| {
+            let least = r.min(*g).min(*b);
+            let [_, y, _] = Xyz::from_linear_srgb([*r, *g, *b].map(f64::from)).0;
+            if least < 0.0 && y > 0.0 {
+                let share = (y / (y - f64::from(least))) as f32;
+                for v in [r, g, b] {
+                    *v = y as f32 + share * (*v - y as f32);
+                }
+            }
+        });
+        self
+    }
+
     /// Returns the level below which this share of all samples lie.
     pub(crate) fn level_at(&self, share: f64) -> f64 {
         let mut values: Vec<f32> = self.planes.iter().flatten().copied().collect();
@@ -147,6 +163,16 @@ mod tests {
         let [r, g, b] = rgb(530.0);
         assert!(g > r && g > b);
         assert_eq!(rgb(300.0), rgb(405.0));
+    }
+
+    #[test]
+    fn a_colour_beyond_the_screen_keeps_its_luminance() {
+        let mut picture = LinearRgb::black(1, 1);
+        picture.add(&ndarray::array![[1.0]], [-0.2, 0.1, 0.9]);
+        let luminance = |p: &LinearRgb| Xyz::from_linear_srgb([0, 1, 2].map(|i| f64::from(p.planes[i][(0, 0)]))).0[1];
+        let shown = picture.clone().within_gamut();
+        approx::assert_abs_diff_eq!(luminance(&shown), luminance(&picture), epsilon = 1e-6);
+        approx::assert_abs_diff_eq!(shown.planes[0][(0, 0)], 0.0, epsilon = 1e-6);
     }
 
     #[test]

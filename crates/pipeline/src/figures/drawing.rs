@@ -128,7 +128,8 @@ fn panels(blur_scale: f64) -> Result<RgbImage, PipelineError> {
     let mut sheet = RgbImage::new(3 * SIDE, 2 * SIDE);
     for (row, distance_mm) in figure3::DISTANCES_MM.into_iter().enumerate() {
         for (column, target) in figure3::targets().iter().enumerate() {
-            let rgb = LinearRgb::of_image(&figure3::irradiance(target, distance_mm, blur_scale)?);
+            let irradiance = figure3::irradiance(target, distance_mm, blur_scale)?;
+            let rgb = LinearRgb::of_image(&irradiance).within_gamut();
             let picture = rgb.to_srgb(rgb.level_at(1.0));
             let tile = imageops::resize(&picture, SIDE, SIDE, imageops::FilterType::Triangle);
             imageops::replace(&mut sheet, &tile, i64::from(column as u32 * SIDE), i64::from(row as u32 * SIDE));
