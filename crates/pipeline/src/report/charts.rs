@@ -156,7 +156,7 @@ fn mtf(shot: &Shot, bank: &PsfBank, places: &Places) -> LineChart {
         })
         .collect();
     LineChart {
-        title: format!("Modulation of the lens at {REFERENCE_WAVELENGTH_NM:.0} nm, to the sensor's Nyquist frequency"),
+        title: format!("Modulation of the lens at {REFERENCE_WAVELENGTH_NM:.0} nm"),
         x_label: "cycles per mm".to_owned(),
         y_label: "modulation".to_owned(),
         x_range: (0.0, nyquist_per_mm),
