@@ -235,9 +235,11 @@ mod tests {
             let nm = number(&row, "wave_nm");
             let width = figure.binned(&lsf, nm).full_width_at_half_maximum_um();
             let expected = number(&row, "stored_LSF_fwhm_um");
-            // The printed data has 126 000 rays, the others 31 000, whose noise is twice that.
-            let tolerance = if is_printed { 0.015 } else { 0.032 };
-            assert!((width / expected - 1.0).abs() < tolerance, "{} {nm}: {width}, not {expected}", row["dataset"]);
+            // The printed data has 126 000 rays; the others 31 000, whose widths scatter by 1.2 %. The table gives
+            // hundredths of a µm, so a width is known to half of that.
+            let share = if is_printed { 0.015 } else { 0.03 };
+            let tolerance_um = share * expected + 0.005;
+            assert!((width - expected).abs() < tolerance_um, "{} {nm}: {width}, not {expected}", row["dataset"]);
         }
     }
 
