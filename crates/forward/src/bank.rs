@@ -84,9 +84,10 @@ pub struct Coverage<'a> {
 /// to end in dioptres, wavelengths evenly in 1/λ².
 ///
 /// # Errors
-/// When the film has no area or the lens has no index at a wavelength of the grid.
+/// When the film has no area, or the lens has no index at a wavelength of the grid or is not rotationally symmetric.
 pub fn bank_settings_for(coverage: &Coverage<'_>) -> Result<BankSettings, ForwardError> {
     coverage.film.check()?;
+    coverage.lens.check_rotational("the forward path")?;
     let (near_m, far_m) = coverage.depth_range_m;
     if !(near_m > 0.0 && near_m <= far_m) {
         let (what, value) = ("the nearest depth", near_m);

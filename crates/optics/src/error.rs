@@ -77,6 +77,44 @@ pub enum OpticsError {
         /// How many were found.
         n_surfaces: usize,
     },
+    /// A move of surfaces that are not there.
+    #[error(
+        "move {number} is of surfaces {first} to {last}, expected a first and a last of 0 to {n_surfaces} (the film)"
+    )]
+    MoveOfSurfaces {
+        /// 0-based place in the list of moves.
+        number: usize,
+        /// The first surface it names.
+        first: usize,
+        /// The last surface it names.
+        last: usize,
+        /// How many surfaces the lens has.
+        n_surfaces: usize,
+    },
+    /// More moves than any lens needs.
+    #[error("a lens has at most {most} moves, found {n_moves}")]
+    MoveCount {
+        /// How many were found.
+        n_moves: usize,
+        /// How many there may be.
+        most: usize,
+    },
+    /// A number of a move that makes no sense.
+    #[error("move {number} has the number {found}, expected finite numbers below 1e9")]
+    MoveNumber {
+        /// 0-based place in the list of moves.
+        number: usize,
+        /// What stood there.
+        found: f64,
+    },
+    /// A lens without an axis of symmetry where one is needed.
+    #[error("{task} needs a lens that is centred and rotationally symmetric, which {lens} is not")]
+    NotRotational {
+        /// The lens.
+        lens: String,
+        /// What was to be done, in words.
+        task: &'static str,
+    },
     /// A stop wider than the lens allows.
     #[error("the stop of {lens} opens to at most {largest_mm} mm (f/{smallest_f_number:.3}), asked for {asked_mm} mm")]
     StopTooWide {

@@ -2,9 +2,11 @@
 
 use std::fmt::Write;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
-use crate::{Glass, Lens, MonoLens, ObjectPoint, OpticsError, PupilBoundary, RayBatch, Rims, Surface, rays_towards};
+use crate::{
+    Glass, Lens, MonoLens, ObjectPoint, OpticsError, Pose, PupilBoundary, RayBatch, Rims, Surface, rays_towards,
+};
 
 /// What a drawing shows.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +36,7 @@ impl Lens {
     /// Draws the lens with its stop, its film and rays, and returns the picture as SVG text.
     ///
     /// Each fan of rays fills the true, vignetted pupil of its field at the first wavelength; objects lie below the
-    /// axis, so that fans climb.
+    /// axis, so that fans climb. Of a tilted or decentred lens the section in the y–z plane is drawn.
     ///
     /// # Errors
     /// When there is no wavelength or a glass is not known at one of them.
@@ -243,7 +245,7 @@ impl Frame {
 
 /// Draws what lies between two surfaces and is not air.
 fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
-    let (interfaces, vertices) = (lens.interfaces(), lens.vertices_z_mm());
+    let (interfaces, poses) = (lens.interfaces(), lens.poses());
     let mut i = 0;
     while i < interfaces.len() {
         let medium = &interfaces[i].medium_after;
@@ -257,23 +259,27 @@ fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
             surface.curvature_per_mm == 0.0 && interfaces[j].medium_after == *medium
         };
         let last = (i + 1..interfaces.len()).find(|&j| !is_within(j));
-        let front = outline(&interfaces[i].surface, vertices[i]);
+        let front = outline(&interfaces[i].surface, &poses[i]);
         let back = match last {
-            Some(j) => outline(&interfaces[j].surface, vertices[j]),
+            Some(j) => outline(&interfaces[j].surface, &poses[j]),
             None => {
                 let film_z_mm = lens.last_vertex_z_mm() + layout.film_mm;
-                outline(&Surface::plane(interfaces[i].surface.semi_aperture_mm), film_z_mm)
+                outline(&Surface::plane(interfaces[i].surface.semi_aperture_mm), &Pose::centered(film_z_mm))
             }
         };
         let rim_mm = front[0].y.abs().max(back[0].y.abs());
         let (fill, stroke) = glass_colors(medium);
         let at_rim = |p: DVec2, sign: f64| DVec2::new(p.x, sign * rim_mm);
         let (f, b) = (front[0].x, back[0].x);
-        let mut points = vec![at_rim(DVec2::new(f, 0.0), -1.0)];
-        points.extend(&front);
-        points.extend([at_rim(DVec2::new(f, 0.0), 1.0), at_rim(DVec2::new(b, 0.0), 1.0)]);
+        let mut points = front.clone();
+        if lens.is_rotational() {
+            points.insert(0, at_rim(DVec2::new(f, 0.0), -1.0));
+            points.extend([at_rim(DVec2::new(f, 0.0), 1.0), at_rim(DVec2::new(b, 0.0), 1.0)]);
+        }
         points.extend(back.iter().rev());
-        points.push(at_rim(DVec2::new(b, 0.0), -1.0));
+        if lens.is_rotational() {
+            points.push(at_rim(DVec2::new(b, 0.0), -1.0));
+        }
         let _ = writeln!(
             svg,
             "<path d=\"{} Z\" fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"1.1\" stroke-linejoin=\"round\"/>",
@@ -284,13 +290,14 @@ fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
 }
 
 /// Returns the points of a surface from its lower rim to its upper one.
-fn outline(surface: &Surface, vertex_z_mm: f64) -> Vec<DVec2> {
+fn outline(surface: &Surface, pose: &Pose) -> Vec<DVec2> {
     const N: i32 = 32;
     let at = |i: i32| {
         // Denser towards the rim, which may lie on the equator to rounding.
         let y = surface.semi_aperture_mm * (std::f64::consts::FRAC_PI_2 * f64::from(i) / f64::from(N)).sin();
         let sag_mm = surface.sag_mm(y.abs() * (1.0 - 1e-12));
-        DVec2::new(vertex_z_mm + if sag_mm.is_finite() { sag_mm } else { 0.0 }, y)
+        let point = pose.to_lens(DVec3::new(0.0, y, if sag_mm.is_finite() { sag_mm } else { 0.0 }));
+        DVec2::new(point.z, point.y)
     };
     if surface.curvature_per_mm == 0.0 && surface.sag_mm(surface.semi_aperture_mm) == 0.0 {
         return vec![at(-N), at(N)];
@@ -309,11 +316,15 @@ fn glass_colors(glass: &Glass) -> (String, String) {
 fn stop(lens: &Lens, frame: &Frame, svg: &mut String) {
     let surface = &lens.interfaces()[lens.stop()].surface;
     let sag_mm = surface.sag_mm(surface.semi_aperture_mm * (1.0 - 1e-12));
-    let z_mm = lens.vertices_z_mm()[lens.stop()] + if sag_mm.is_finite() { sag_mm } else { 0.0 };
+    let sag_mm = if sag_mm.is_finite() { sag_mm } else { 0.0 };
+    let pose = lens.poses()[lens.stop()];
     let length_mm = (0.22 * lens.stop_semi_aperture_mm()).max(10.0 / frame.px_per_mm);
     for sign in [-1.0, 1.0] {
         let inner = sign * surface.semi_aperture_mm;
-        let line = frame.path([DVec2::new(z_mm, inner), DVec2::new(z_mm, inner + sign * length_mm)]);
+        let line = frame.path([inner, inner + sign * length_mm].map(|y| {
+            let point = pose.to_lens(DVec3::new(0.0, y, sag_mm));
+            DVec2::new(point.z, point.y)
+        }));
         let _ = writeln!(svg, "<path d=\"{line}\" stroke=\"#111\" stroke-width=\"3\"/>");
     }
 }

@@ -2,18 +2,30 @@
 
 use std::path::Path;
 
-use crate::{Glass, Interface, MonoLens, OpticsError, Shape, Surface, formats, library};
+use crate::{Glass, Interface, MonoLens, Move, OpticsError, Pose, Shape, Surface, formats, library, pose};
 
 /// A lens that has been checked and can be traced.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lens {
     // Invariants: 1 to 1000 interfaces whose numbers are finite and whose rims fit; `stop` is an index of them;
-    // the stop's semi-aperture is at most `full_stop_semi_aperture_mm`.
+    // the stop's semi-aperture is at most `full_stop_semi_aperture_mm`; the moves have been checked.
     name: String,
     source: String,
     interfaces: Vec<Interface>,
     stop: usize,
     full_stop_semi_aperture_mm: f64,
+    moves: Vec<Move>,
+    image_surface: ImageSurface,
+}
+
+/// The shape of the film: a conic with its vertex on the axis. As it stands by default, it is a plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImageSurface {
+    /// One over the radius at the vertex, 1/mm; positive where the centre lies downstream, so that a retina's is
+    /// negative.
+    pub curvature_per_mm: f64,
+    /// The conic constant.
+    pub conic: f64,
 }
 
 impl Lens {
@@ -27,7 +39,7 @@ impl Lens {
         interfaces: Vec<Interface>,
         stop: usize,
     ) -> Result<Self, OpticsError> {
-        if !(1..=1000).contains(&interfaces.len()) {
+        if !(1..=MOST_SURFACES).contains(&interfaces.len()) {
             return Err(OpticsError::SurfaceCount { n_surfaces: interfaces.len() });
         }
         if stop >= interfaces.len() {
@@ -43,7 +55,46 @@ impl Lens {
             }
         }
         let full_stop_semi_aperture_mm = interfaces[stop].surface.semi_aperture_mm;
-        Ok(Self { name: name.into(), source: source.into(), interfaces, stop, full_stop_semi_aperture_mm })
+        Ok(Self {
+            name: name.into(),
+            source: source.into(),
+            interfaces,
+            stop,
+            full_stop_semi_aperture_mm,
+            moves: Vec::new(),
+            image_surface: ImageSurface::default(),
+        })
+    }
+
+    /// Returns the lens with its surfaces tilted and decentred by these moves, and by no others.
+    ///
+    /// The lens frame stays where it was: at the place of the first vertex before the moves.
+    ///
+    /// # Errors
+    /// When a move is of surfaces that are not there, or has a number that makes no sense.
+    pub fn with_moves(mut self, moves: Vec<Move>) -> Result<Self, OpticsError> {
+        moves.iter().enumerate().try_for_each(|(i, step)| step.check(i, self.interfaces.len()))?;
+        if moves.len() > MOST_MOVES {
+            return Err(OpticsError::MoveCount { n_moves: moves.len(), most: MOST_MOVES });
+        }
+        self.moves = moves;
+        Ok(self)
+    }
+
+    /// Returns the lens with a film of this shape.
+    ///
+    /// # Errors
+    /// When a number is not finite.
+    pub fn with_image_surface(mut self, image_surface: ImageSurface) -> Result<Self, OpticsError> {
+        let surface = self.interfaces.len();
+        for (key, found) in [("image curvature", image_surface.curvature_per_mm), ("image conic", image_surface.conic)]
+        {
+            if !found.is_finite() {
+                return Err(OpticsError::Surface { surface, key, found, expected: "a finite number" });
+            }
+        }
+        self.image_surface = image_surface;
+        Ok(self)
     }
 
     /// Returns a pinhole of this diameter: a stop and nothing else.
@@ -113,12 +164,50 @@ impl Lens {
         self.stop
     }
 
-    /// z of the last vertex, mm: the sum of all distances between vertices.
+    /// The tilts and decentres of surfaces, groups and the film; none for a centred lens.
+    pub fn moves(&self) -> &[Move] {
+        &self.moves
+    }
+
+    /// The shape of the film.
+    pub fn image_surface(&self) -> ImageSurface {
+        self.image_surface
+    }
+
+    /// Where each surface stands, all moves done.
+    pub fn poses(&self) -> Vec<Pose> {
+        let vertices_z_mm = self.vertices_z_mm();
+        let centered = vertices_z_mm.iter().map(|&z_mm| Pose::centered(z_mm));
+        match pose::motions(&self.moves, &vertices_z_mm) {
+            Some(motions) => motions.iter().zip(centered).map(|(motion, pose)| motion.after(&pose)).collect(),
+            None => centered.collect(),
+        }
+    }
+
+    /// Whether every surface is one of revolution about the lens's axis: whether nothing is tilted, decentred or
+    /// curved differently along x and y.
+    pub fn is_rotational(&self) -> bool {
+        let is_round = |interface: &Interface| interface.surface.is_rotational();
+        self.interfaces.iter().all(is_round) && pose::motions(&self.moves, &self.vertices_z_mm()).is_none()
+    }
+
+    /// Checks that the lens is rotationally symmetric; `task` says what needs that, in words.
+    ///
+    /// # Errors
+    /// When it is not.
+    pub fn check_rotational(&self, task: &'static str) -> Result<(), OpticsError> {
+        if self.is_rotational() {
+            return Ok(());
+        }
+        Err(OpticsError::NotRotational { lens: self.name.clone(), task })
+    }
+
+    /// z of the last vertex, mm: the sum of all distances between vertices, along the axis that moves may bend.
     pub fn last_vertex_z_mm(&self) -> f64 {
         self.vertices_z_mm().last().copied().unwrap_or(0.0)
     }
 
-    /// z of each vertex from the first, mm.
+    /// z of each vertex from the first, mm, along the axis that moves may bend; [`poses`](Self::poses) says where it is.
     pub fn vertices_z_mm(&self) -> Vec<f64> {
         let mut z = 0.0;
         let vertex = |interface: &Interface| {
@@ -180,6 +269,11 @@ impl Lens {
         MonoLens::new(self, wavelength_nm)
     }
 }
+
+/// The largest number of surfaces.
+const MOST_SURFACES: usize = 1000;
+/// The largest number of moves: two breaks before each surface.
+const MOST_MOVES: usize = 2 * MOST_SURFACES;
 
 /// The wavelength at which a message states an f-number, nm.
 const MESSAGE_WAVELENGTH_NM: f64 = crate::glass::D_LINE_NM;

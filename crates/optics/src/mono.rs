@@ -2,11 +2,13 @@
 
 use std::{borrow::Cow, ops::Range};
 
+use glam::{DVec2, DVec3};
 use rayon::iter::ParallelIterator;
 
 use crate::{
-    Conjugate, FirstOrder, Lens, OpticsError, RayBatch, Rims, Shape, Surface,
+    Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, Rims, Shape, Surface,
     paraxial::{self, Matrix},
+    pose,
     trace::{self, Kind, Step},
 };
 
@@ -22,7 +24,19 @@ pub struct MonoLens {
     steps: Vec<Step>,
     stop: usize,
     front: Surface,
+    image_surface: ImageSurface,
+    /// Where surfaces stand, if not all are centred.
+    placed: Option<Placed>,
     first_order: FirstOrder,
+}
+
+/// Where the surfaces of a lens stand that is not centred.
+#[derive(Clone, Debug)]
+struct Placed {
+    /// That of each surface.
+    poses: Vec<Pose>,
+    /// What has become of the straight axis at the film.
+    film: Pose,
 }
 
 impl MonoLens {
@@ -32,25 +46,30 @@ impl MonoLens {
         for (interface, vertex_z) in lens.interfaces().iter().zip(lens.vertices_z_mm()) {
             let index_after = interface.medium_after.index_at(wavelength_nm)?;
             let surface = &interface.surface;
-            let kind = match &surface.shape {
-                Shape::Sphere if surface.curvature_per_mm == 0.0 && index_before == index_after => Kind::Window,
-                Shape::Sphere => Kind::Sphere,
-                Shape::Conic { conic } => Kind::Conic { conic: *conic },
-                Shape::EvenAsphere { conic, coefficients } => {
-                    Kind::EvenAsphere { conic: *conic, a2: 0.0, coefficients: coefficients.clone() }
-                }
-                Shape::OddAsphere { conic, coefficients } => asphere(*conic, coefficients),
-                Shape::ThinLens { power_per_mm } => {
-                    Kind::ThinLens { power: *power_per_mm, object_z: f64::NEG_INFINITY }
-                }
-            };
+            let is_window = surface.curvature_per_mm == 0.0 && index_before == index_after;
+            let kind = kind_of(surface, is_window);
             let (curvature, semi_aperture) = (surface.curvature_per_mm, surface.semi_aperture_mm);
             steps.push(Step { kind, curvature, index_before, index_after, vertex_z, semi_aperture });
             index_before = index_after;
         }
         let first_order = paraxial::first_order(&steps, lens.stop(), wavelength_nm);
-        let front = lens.interfaces()[0].surface.clone();
-        Ok(Self { name: lens.name().to_owned(), wavelength_nm, steps, stop: lens.stop(), front, first_order })
+        let motions = pose::motions(lens.moves(), &lens.vertices_z_mm());
+        let placed = motions.map(|motions| Placed { poses: lens.poses(), film: motions[steps.len()] });
+        Ok(Self {
+            name: lens.name().to_owned(),
+            wavelength_nm,
+            steps,
+            stop: lens.stop(),
+            front: lens.interfaces()[0].surface.clone(),
+            image_surface: lens.image_surface(),
+            placed,
+            first_order,
+        })
+    }
+
+    /// Whether the lens is rotationally symmetric, as [`Lens::is_rotational`].
+    pub fn is_rotational(&self) -> bool {
+        self.placed.is_none() && !self.steps.iter().any(|step| matches!(step.kind, Kind::Toric(_)))
     }
 
     /// The wavelength, nm.
@@ -59,8 +78,23 @@ impl MonoLens {
     }
 
     /// Focal lengths, principal planes and pupils.
+    ///
+    /// Of a lens that is not rotationally symmetric they are those of its axis with all surfaces put back on it (a bent
+    /// axis made straight), in the y–z plane; [`first_order_x`](Self::first_order_x) gives those of the x–z plane. A
+    /// tilted or decentred lens forms its image by them only as far as its tilts are small.
     pub fn first_order(&self) -> FirstOrder {
         self.first_order
+    }
+
+    /// Focal lengths, principal planes and pupils in the x–z plane; those of [`first_order`](Self::first_order) unless
+    /// a surface is curved differently along x and y.
+    pub fn first_order_x(&self) -> FirstOrder {
+        let along_x = |step: &Step| match &step.kind {
+            Kind::Toric(toric) => Step { kind: Kind::Sphere, curvature: toric.vertex_curvatures()[0], ..step.clone() },
+            _ => step.clone(),
+        };
+        let steps: Vec<Step> = self.steps.iter().map(along_x).collect();
+        paraxial::first_order(&steps, self.stop, self.wavelength_nm)
     }
 
     /// The index of the surface that is the stop.
@@ -109,9 +143,21 @@ impl MonoLens {
         &self.steps
     }
 
-    /// Returns the z of the first surface at a distance from the axis, mm; NaN beyond its equator.
-    pub(crate) fn front_sag_mm(&self, r_mm: f64) -> f64 {
-        self.front.sag_mm(r_mm)
+    pub(crate) fn poses(&self) -> Option<&[Pose]> {
+        self.placed.as_ref().map(|placed| placed.poses.as_slice())
+    }
+
+    /// Returns the point of the first surface over this place of its vertex plane, mm; beyond its equator, the place.
+    pub(crate) fn on_front_mm(&self, place_mm: DVec2) -> DVec3 {
+        let sag_mm = self.front.sag_at_mm(place_mm.x, place_mm.y);
+        let point = place_mm.extend(if sag_mm.is_finite() { sag_mm } else { 0.0 });
+        self.poses().map_or(point, |poses| poses[0].to_lens(point))
+    }
+
+    /// Where a film stands that lies `film_mm` behind the last vertex.
+    pub fn film_pose(&self, film_mm: f64) -> Pose {
+        let centered = Pose::centered(self.last_vertex_z_mm() + film_mm);
+        self.placed.as_ref().map_or(centered, |placed| placed.film.after(&centered))
     }
 
     /// Traces rays through all surfaces, on this thread.
@@ -128,7 +174,12 @@ impl MonoLens {
     pub fn trace_surfaces(&self, surfaces: Range<usize>, rays: &mut RayBatch, rims: Rims) {
         let first = surfaces.start;
         let steps = self.steps_for(rays.object_z_mm);
-        trace::trace_batch(&steps[surfaces], first, rims, rays.slices());
+        match self.poses() {
+            None => trace::trace_batch(&steps[surfaces], first, rims, rays.slices()),
+            Some(poses) => {
+                trace::trace_placed(&steps[surfaces.clone()], &poses[surfaces], first, rims, &mut rays.slices());
+            }
+        }
     }
 
     /// Traces rays through all surfaces on the threads of the current rayon pool.
@@ -136,7 +187,10 @@ impl MonoLens {
     /// The result is that of [`trace`](Self::trace), to the bit.
     pub fn trace_parallel(&self, rays: &mut RayBatch, rims: Rims) {
         let steps = self.steps_for(rays.object_z_mm);
-        rays.par_slices(CHUNK).for_each(|chunk| trace::trace_batch(&steps, 0, rims, chunk));
+        rays.par_slices(CHUNK).for_each(|mut chunk| match self.poses() {
+            None => trace::trace_batch(&steps, 0, rims, chunk),
+            Some(poses) => trace::trace_placed(&steps, poses, 0, rims, &mut chunk),
+        });
     }
 
     /// Returns the steps, in which ideal lenses know where the object plane appears to them.
@@ -162,9 +216,35 @@ impl MonoLens {
         Cow::Owned(steps)
     }
 
-    /// Moves rays straight on to the film plane, `film_mm` behind the last vertex.
+    /// Moves rays straight on to the film plane, `film_mm` behind the last vertex, however the film is curved.
+    ///
+    /// Where the film itself is moved, points stay in the lens frame; [`film_pose`](Self::film_pose) takes them to the
+    /// film's own.
     pub fn to_film(&self, rays: &mut RayBatch, film_mm: f64) {
-        trace::move_to_plane(rays.slices(), self.last_vertex_z_mm() + film_mm, self.image_index());
+        match &self.placed {
+            None => trace::move_to_plane(rays.slices(), self.last_vertex_z_mm() + film_mm, self.image_index()),
+            Some(_) => {
+                trace::move_to_placed_plane(&self.film_pose(film_mm), self.image_index(), &mut rays.slices());
+            }
+        }
+    }
+
+    /// The shape of the film.
+    pub fn image_surface(&self) -> ImageSurface {
+        self.image_surface
+    }
+
+    /// Moves rays straight on to the film as it is curved, its vertex `film_mm` behind the last vertex.
+    ///
+    /// A ray that does not meet it ends as one that missed the surface after the last.
+    pub fn to_image_surface(&self, rays: &mut RayBatch, film_mm: f64) {
+        let ImageSurface { curvature_per_mm, conic } = self.image_surface;
+        if curvature_per_mm == 0.0 {
+            return self.to_film(rays, film_mm);
+        }
+        let medium = (self.image_index(), self.n_surfaces() as u16);
+        let pose = self.film_pose(film_mm);
+        trace::move_to_placed_conic(&pose, [curvature_per_mm, conic], medium, &mut rays.slices());
     }
 
     /// Returns the image of the axial point at `object_distance_mm` before the first vertex (infinite for far ones).
@@ -197,6 +277,23 @@ impl MonoLens {
             return Ok(distance_mm);
         }
         Err(OpticsError::NoFocus { lens: self.name.clone(), side: "before it", distance_mm: film_mm })
+    }
+}
+
+/// Returns the kernel's form of a surface's shape.
+fn kind_of(surface: &Surface, is_window: bool) -> Kind {
+    if let Some(toric) = surface.toric() {
+        return Kind::Toric(toric);
+    }
+    match &surface.shape {
+        Shape::Sphere if is_window => Kind::Window,
+        Shape::Conic { conic } => Kind::Conic { conic: *conic },
+        Shape::EvenAsphere { conic, coefficients } => {
+            Kind::EvenAsphere { conic: *conic, a2: 0.0, coefficients: coefficients.clone() }
+        }
+        Shape::OddAsphere { conic, coefficients } => asphere(*conic, coefficients),
+        Shape::ThinLens { power_per_mm } => Kind::ThinLens { power: *power_per_mm, object_z: f64::NEG_INFINITY },
+        Shape::Sphere | Shape::Biconic { .. } | Shape::Toroid { .. } => Kind::Sphere,
     }
 }
 

@@ -134,7 +134,12 @@ impl Step {
     }
 
     /// The curvature at the vertex, 1/mm, a square term of an asphere included.
+    ///
+    /// Of a surface that is not one of revolution it is that along y.
     pub(crate) fn vertex_curvature(&self) -> f64 {
+        if let Kind::Toric(toric) = &self.kind {
+            return toric.vertex_curvatures()[1];
+        }
         let square_term = match &self.kind {
             Kind::EvenAsphere { a2, .. } => *a2,
             Kind::OddAsphere { coefficients, .. } => coefficients.get(1).copied().unwrap_or(0.0),

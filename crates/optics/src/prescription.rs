@@ -3,7 +3,7 @@
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::{Glass, Interface, Lens, OpticsError, Shape, Surface};
+use crate::{Glass, ImageSurface, Interface, Lens, Move, OpticsError, Shape, Surface};
 
 /// A lens as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -12,6 +12,14 @@ struct Prescription {
     name: String,
     source: String,
     surfaces: Vec<Row>,
+    /// Tilts and decentres.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    moves: Vec<Move>,
+    /// Left out for a flat film.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    image_radius_mm: Option<f64>,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    image_conic: f64,
 }
 
 /// A surface as it stands in a file, with what follows it.
@@ -34,6 +42,11 @@ struct Row {
 
 fn is_sphere(shape: &Shape) -> bool {
     *shape == Shape::Sphere
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
@@ -66,25 +79,34 @@ pub(crate) fn lens_from_ron(text: &str) -> Result<Lens, TextError> {
     let &[stop] = stops.as_slice() else { return Err(OpticsError::Stops { n_stops: stops.len() }.into()) };
     let mut interfaces = Vec::with_capacity(prescription.surfaces.len());
     for (surface, row) in prescription.surfaces.into_iter().enumerate() {
-        let curvature_per_mm = match row.radius_mm {
-            None => 0.0,
-            Some(found) if found == 0.0 || found.is_nan() => {
-                let expected = "a radius other than 0, or no radius for a plane";
-                return Err(OpticsError::Surface { surface, key: "radius_mm", found, expected }.into());
-            }
-            Some(radius_mm) => 1.0 / radius_mm,
-        };
+        let curvature_per_mm = curvature_per_mm(surface, "radius_mm", row.radius_mm)?;
         let surface = Surface { curvature_per_mm, shape: row.shape, semi_aperture_mm: row.semi_aperture_mm };
         interfaces.push(Interface { surface, medium_after: row.medium, thickness_after_mm: row.thickness_mm });
     }
-    Ok(Lens::new(prescription.name, prescription.source, interfaces, stop)?)
+    let curvature_per_mm = curvature_per_mm(interfaces.len(), "image_radius_mm", prescription.image_radius_mm)?;
+    let image_surface = ImageSurface { curvature_per_mm, conic: prescription.image_conic };
+    let lens = Lens::new(prescription.name, prescription.source, interfaces, stop)?;
+    Ok(lens.with_moves(prescription.moves)?.with_image_surface(image_surface)?)
+}
+
+/// Returns the curvature of a radius, which is left out for a plane.
+fn curvature_per_mm(surface: usize, key: &'static str, radius_mm: Option<f64>) -> Result<f64, OpticsError> {
+    match radius_mm {
+        None => Ok(0.0),
+        Some(found) if found == 0.0 || found.is_nan() => {
+            let expected = "a radius other than 0, or no radius for a plane";
+            Err(OpticsError::Surface { surface, key, found, expected })
+        }
+        Some(radius_mm) => Ok(1.0 / radius_mm),
+    }
 }
 
 impl Lens {
     /// Returns the lens as the text of our own file, which reads back as the same lens.
     pub fn to_ron(&self) -> String {
+        let radius_mm = |curvature_per_mm: f64| (curvature_per_mm != 0.0).then(|| 1.0 / curvature_per_mm);
         let row = |(i, interface): (usize, &Interface)| Row {
-            radius_mm: (interface.surface.curvature_per_mm != 0.0).then(|| 1.0 / interface.surface.curvature_per_mm),
+            radius_mm: radius_mm(interface.surface.curvature_per_mm),
             shape: interface.surface.shape.clone(),
             stop: i == self.stop(),
             semi_aperture_mm: interface.surface.semi_aperture_mm,
@@ -95,6 +117,9 @@ impl Lens {
             name: self.name().to_owned(),
             source: self.source().to_owned(),
             surfaces: self.interfaces().iter().enumerate().map(row).collect(),
+            moves: self.moves().to_vec(),
+            image_radius_mm: radius_mm(self.image_surface().curvature_per_mm),
+            image_conic: self.image_surface().conic,
         };
         let pretty = ron::ser::PrettyConfig::new().depth_limit(2);
         ron_options().to_string_pretty(&prescription, pretty).expect("numbers and text always have a RON form")

@@ -125,8 +125,7 @@ impl<'a> Search<'a> {
 
     /// Returns where the ray through this point of the first surface crosses the pupil plane.
     fn target_through_front(&self, on_front_mm: DVec2) -> DVec2 {
-        let sag_mm = self.lens.front_sag_mm(on_front_mm.length());
-        let point = on_front_mm.extend(if sag_mm.is_finite() { sag_mm } else { 0.0 });
+        let point = self.lens.on_front_mm(on_front_mm);
         let direction = self.point.direction_to(point);
         (point + direction * ((self.z_mm - point.z) / direction.z)).truncate()
     }
@@ -218,7 +217,10 @@ impl MonoLens {
     pub fn clearances_mm(&self, mut rays: RayBatch) -> Vec<f64> {
         let mut clearances_mm = vec![f64::INFINITY; rays.len()];
         let steps = self.steps_for(rays.object_z_mm);
-        trace::trace_clearances(&steps, rays.slices(), &mut clearances_mm);
+        match self.poses() {
+            None => trace::trace_clearances(&steps, rays.slices(), &mut clearances_mm),
+            Some(poses) => trace::placed_clearances(&steps, poses, &mut rays.slices(), &mut clearances_mm),
+        }
         clearances_mm
     }
 }

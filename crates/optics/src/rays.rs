@@ -17,7 +17,7 @@ pub enum RayFate {
     },
     /// The ray passed a surface without meeting it; it is left on its line, before that surface.
     Missed {
-        /// 0-based surface.
+        /// 0-based surface; a curved film counts as the one after the last.
         surface: u16,
     },
     /// The ray was totally reflected, and ended on that surface.
@@ -212,6 +212,29 @@ pub(crate) struct RaySlices<'a> {
     pub(crate) n: &'a mut [f64],
     pub(crate) opl: &'a mut [f64],
     pub(crate) fate: &'a mut [RayFate],
+}
+
+impl RaySlices<'_> {
+    pub(crate) fn reborrow(&mut self) -> RaySlices<'_> {
+        let Self { x, y, z, l, m, n, opl, fate } = self;
+        RaySlices { x, y, z, l, m, n, opl, fate }
+    }
+
+    pub(crate) fn point(&self, i: usize) -> DVec3 {
+        DVec3::new(self.x[i], self.y[i], self.z[i])
+    }
+
+    pub(crate) fn set_point(&mut self, i: usize, point: DVec3) {
+        (self.x[i], self.y[i], self.z[i]) = point.into();
+    }
+
+    pub(crate) fn direction(&self, i: usize) -> DVec3 {
+        DVec3::new(self.l[i], self.m[i], self.n[i])
+    }
+
+    pub(crate) fn set_direction(&mut self, i: usize, direction: DVec3) {
+        (self.l[i], self.m[i], self.n[i]) = direction.into();
+    }
 }
 
 type Triple<'a> = (&'a mut [f64], &'a mut [f64], &'a mut [f64]);

@@ -100,8 +100,9 @@ impl Lens {
     /// the train adds nothing; a conic or asphere adds what its r⁴ term departs from the sphere.
     ///
     /// # Errors
-    /// When a glass is not known at one of the wavelengths.
+    /// When a glass is not known at one of the wavelengths, or the lens is not rotationally symmetric.
     pub fn seidel(&self, settings: &SeidelSettings) -> Result<Seidel, OpticsError> {
+        self.check_rotational("a sum of Seidel aberrations")?;
         let mono = self.at(settings.wavelength_nm)?;
         let [short, long] = [self.at(settings.colors_nm[0])?, self.at(settings.colors_nm[1])?];
         let first = mono.first_order();

@@ -1,8 +1,11 @@
 //! Surfaces and the media between them.
 
+use std::f64::consts::FRAC_PI_2;
+
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::{Glass, OpticsError};
+use crate::{Glass, OpticsError, trace::Toric};
 
 /// The shape of a surface, beyond its curvature at the vertex.
 ///
@@ -41,15 +44,43 @@ pub enum Shape {
         /// One over the focal length in air, 1/mm.
         power_per_mm: f64,
     },
+    /// A surface with a conic section each along y, whose curvature is the surface's own, and along x:
+    /// `z = (c_x x² + c_y y²) / (1 + √(1 − (1 + k_x) c_x² x² − (1 + k_y) c_y² y²))`.
+    Biconic {
+        /// The conic constant along y.
+        conic: f64,
+        /// The curvature along x, 1/mm.
+        curvature_x_per_mm: f64,
+        /// The conic constant along x.
+        conic_x: f64,
+    },
+    /// A toroid: a curve in the y–z plane, of the surface's own curvature, turned about an axis parallel to y.
+    ///
+    /// With no curvature along x it is a cylinder.
+    Toroid {
+        /// One over the radius of rotation, which is the curvature along x, 1/mm.
+        curvature_x_per_mm: f64,
+        /// The conic constant of the curve.
+        conic: f64,
+        /// What the curve adds to its conic: coefficients of y², y⁴, …, `coefficients[i]` in mm^(−1 − 2i).
+        coefficients: Vec<f64>,
+    },
 }
 
-/// A surface of revolution in the frame of its own vertex, with a circular rim.
+impl Shape {
+    /// Whether the shape is one of revolution.
+    pub fn is_rotational(&self) -> bool {
+        !matches!(self, Self::Biconic { .. } | Self::Toroid { .. })
+    }
+}
+
+/// A surface in the frame of its own vertex, with a circular rim about its axis.
 ///
 /// The curvature is signed: positive when the centre lies downstream, at +z. A plane is a surface of zero
-/// curvature, not a special case.
+/// curvature, not a special case. Where the surface is not one of revolution the curvature is that along y.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
-    /// One over the radius at the vertex, 1/mm.
+    /// One over the radius at the vertex (along y), 1/mm.
     pub curvature_per_mm: f64,
     /// The rest of the shape.
     pub shape: Shape,
@@ -69,6 +100,8 @@ impl Surface {
     }
 
     /// Returns the z of the surface at a distance from the axis, mm; NaN beyond its equator.
+    ///
+    /// Of a surface that is not one of revolution it is the z in the y–z plane.
     pub fn sag_mm(&self, r_mm: f64) -> f64 {
         let r2 = r_mm * r_mm;
         let base = |conic: f64| {
@@ -85,7 +118,33 @@ impl Surface {
                 base(*conic) + r_mm * coefficients.iter().rev().fold(0.0, |sum, a| sum * r_mm + a)
             }
             Shape::ThinLens { .. } => 0.0,
+            Shape::Biconic { .. } | Shape::Toroid { .. } => self.sag_at_mm(0.0, r_mm),
         }
+    }
+
+    /// Returns the z of the surface at a place, mm; NaN beyond its equator.
+    pub fn sag_at_mm(&self, x_mm: f64, y_mm: f64) -> f64 {
+        self.toric().map_or_else(|| self.sag_mm(x_mm.hypot(y_mm)), |toric| toric.at(x_mm, y_mm).z)
+    }
+
+    /// Returns the kernel's form of a surface that is not one of revolution.
+    pub(crate) fn toric(&self) -> Option<Toric> {
+        let cy = self.curvature_per_mm;
+        match &self.shape {
+            Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
+                Some(Toric::Biconic { c: [*curvature_x_per_mm, cy], k: [*conic_x, *conic] })
+            }
+            Shape::Toroid { curvature_x_per_mm, conic, coefficients } => {
+                let coefficients = coefficients.clone();
+                Some(Toric::Toroid { c: [*curvature_x_per_mm, cy], conic: *conic, coefficients })
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether the surface is one of revolution about its own axis.
+    pub fn is_rotational(&self) -> bool {
+        self.shape.is_rotational()
     }
 
     /// Checks that the numbers make sense; `index` is the surface's place, for the message.
@@ -103,19 +162,50 @@ impl Surface {
                 coefficients.iter().try_for_each(|&a| finite("coefficient", a))?;
             }
             Shape::ThinLens { power_per_mm } => finite("power_per_mm", *power_per_mm)?,
+            Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
+                finite("conic", *conic)?;
+                finite("curvature_x_per_mm", *curvature_x_per_mm)?;
+                finite("conic_x", *conic_x)?;
+            }
+            Shape::Toroid { curvature_x_per_mm, conic, coefficients } => {
+                finite("conic", *conic)?;
+                finite("curvature_x_per_mm", *curvature_x_per_mm)?;
+                coefficients.iter().try_for_each(|&a| finite("coefficient", a))?;
+            }
         }
         let found = self.semi_aperture_mm;
         if !(found > 0.0 && found.is_finite()) {
             let key = "semi_aperture_mm";
             return Err(OpticsError::Surface { surface, key, found, expected: "a finite number above 0" });
         }
-        if !self.sag_mm(found * (1.0 - 1e-9)).is_finite() {
-            let radius_mm = 1.0 / self.curvature_per_mm;
+        if let Some(section) = self.section_that_ends_within(found * (1.0 - 1e-9)) {
+            let radius_mm = match &self.shape {
+                Shape::Biconic { curvature_x_per_mm, .. } | Shape::Toroid { curvature_x_per_mm, .. }
+                    if section.x != 0.0 =>
+                {
+                    1.0 / curvature_x_per_mm
+                }
+                _ => 1.0 / self.curvature_per_mm,
+            };
             return Err(OpticsError::RimBeyondSurface { surface, semi_aperture_mm: found, radius_mm });
         }
         Ok(())
     }
+
+    /// Returns the direction in which the surface does not reach this far from its axis, if there is one.
+    fn section_that_ends_within(&self, r_mm: f64) -> Option<DVec2> {
+        let n_directions = if self.is_rotational() { 1 } else { RIM_DIRECTIONS };
+        let direction = |i: usize| match i {
+            0 => DVec2::Y,
+            1 => DVec2::X,
+            _ => DVec2::from_angle(FRAC_PI_2 * (i - 1) as f64 / (n_directions - 1) as f64),
+        };
+        (0..n_directions).map(direction).find(|u| !self.sag_at_mm(r_mm * u.x, r_mm * u.y).is_finite())
+    }
 }
+
+/// Directions between x and y in which a rim is looked at; the four quadrants of a surface are alike.
+const RIM_DIRECTIONS: usize = 9;
 
 /// A surface, the medium behind it and the way to the next.
 #[derive(Clone, Debug, PartialEq)]

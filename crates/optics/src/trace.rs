@@ -6,6 +6,8 @@
 
 mod asphere;
 mod crossing;
+mod placed;
+mod toric;
 #[cfg(test)]
 mod twin;
 
@@ -14,6 +16,10 @@ use multiversion::multiversion;
 use self::{
     asphere::{Asphere, Powers},
     crossing::{Crossing, Ray, cross_conic, cross_plane, cross_sphere, refract, thin_lens},
+};
+pub(crate) use self::{
+    placed::{move_to_placed_conic, move_to_placed_plane, placed_clearances, trace_placed},
+    toric::Toric,
 };
 use crate::{RayFate, rays::RaySlices};
 
@@ -61,6 +67,8 @@ pub(crate) enum Kind {
         power: f64,
         object_z: f64,
     },
+    /// Curved differently along x and y.
+    Toric(Toric),
 }
 
 /// Rays in a tile: enough for two vectors of the widest kind in use, so that one can wait while the other computes.
@@ -265,6 +273,7 @@ fn pass(at: &mut At<'_, '_>, tile: &mut Tile) {
         Kind::ThinLens { power, object_z } => {
             pass_lanes(at, tile, |_, ray| thin_lens(step, *power, *object_z, limit_mm2, ray));
         }
+        Kind::Toric(toric) => pass_lanes(at, tile, |_, ray| refract(&refracting, ray, toric.cross(ray))),
     }
 }
 

@@ -174,9 +174,11 @@ impl PsfBank {
     /// Fields that see no light at some depth or wavelength are left out, and those beyond them.
     ///
     /// # Errors
-    /// When the settings make no sense, the lens has no index at a wavelength, or not even the axis sees light.
+    /// When the settings make no sense, the lens has no index at a wavelength or is not rotationally symmetric, or not
+    /// even the axis sees light.
     pub fn build(lens: &Lens, settings: &BankSettings) -> Result<Self, PsfError> {
         settings.check()?;
+        lens.check_rotational("a bank of point spread functions")?;
         let reference = lens.at(settings.reference_wavelength_nm)?;
         let lenses: Vec<MonoLens> =
             settings.wavelengths_nm.iter().rev().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;

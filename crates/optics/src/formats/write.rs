@@ -262,6 +262,13 @@ fn write_zmx_shape(text: &mut String, i: usize, surface: &Surface) -> Result<(),
         }
         Shape::OddAsphere { conic, coefficients } => ("ODDASPHE", *conic, coefficients.clone()),
         Shape::ThinLens { power_per_mm } => ("PARAXIAL", 0.0, vec![1.0 / power_per_mm]),
+        Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
+            ("BICONICX", *conic, vec![zmx_radius(*curvature_x_per_mm), *conic_x])
+        }
+        Shape::Toroid { curvature_x_per_mm, conic, coefficients } => {
+            let radius = [zmx_radius(*curvature_x_per_mm)];
+            ("TOROIDAL", *conic, radius.into_iter().chain(coefficients.iter().copied()).collect())
+        }
     };
     if parameters.len() > 8 {
         return Err(cannot("a .zmx file", i, "has more than eight aspheric coefficients"));
@@ -274,6 +281,11 @@ fn write_zmx_shape(text: &mut String, i: usize, surface: &Surface) -> Result<(),
         let _ = write!(text, "  PARM {place} {parameter:e}\r\n");
     }
     Ok(())
+}
+
+/// Returns the radius of a curvature, of which Zemax writes 0 for that of a plane.
+fn zmx_radius(curvature_per_mm: f64) -> f64 {
+    if curvature_per_mm == 0.0 { 0.0 } else { 1.0 / curvature_per_mm }
 }
 
 /// Returns a text without line ends, which would end it in a format of lines.

@@ -45,6 +45,7 @@ fn trace_one(steps: &[Step], rims: Rims, mut ray: Ray) -> (Ray, RayFate) {
                 refract(&refracting, ray, crossing)
             }
             Kind::ThinLens { power, object_z } => thin_lens(step, *power, *object_z, limit_mm2, ray),
+            Kind::Toric(toric) => refract(&refracting, ray, toric.cross(ray)),
         };
         if !passed.goes_on {
             let (fate, ended) = fate_of(surface as u16, ray, passed);
