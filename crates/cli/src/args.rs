@@ -84,13 +84,13 @@ pub(crate) struct RunArgs {
     /// Depth of a scene that has none, m
     #[arg(long, value_name = "Z")]
     pub(crate) depth_m: Option<f64>,
-    /// Light on a scene that holds reflectances: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3
+    /// Light on the scene, which lights reflectances and is made white: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3
     #[arg(long, value_name = "NAME")]
     pub(crate) illuminant: Option<String>,
     /// Illuminance on a scene of reflectances, or of a picture's white, lux
     #[arg(long, value_name = "LUX")]
     pub(crate) illuminance_lux: Option<f64>,
-    /// What the picture makes white [default: the light on the scene]
+    /// What the picture makes white [default: the light on the scene; the mean of a scene of unknown light]
     #[arg(long, value_name = "KIND", value_enum)]
     pub(crate) white: Option<WhiteKind>,
     /// Sensor, a file or the name of a built-in one

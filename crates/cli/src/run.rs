@@ -74,7 +74,7 @@ fn change_scene(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> 
     scene.depth_m = arguments.depth_m.or(scene.depth_m);
     scene.illuminance_lux = arguments.illuminance_lux.unwrap_or(scene.illuminance_lux);
     if let Some(name) = &arguments.illuminant {
-        scene.illuminant = parse_illuminant(name)?;
+        scene.illuminant = Some(parse_illuminant(name)?);
     }
     Ok(())
 }

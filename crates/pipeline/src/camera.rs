@@ -204,23 +204,24 @@ impl Default for ProcessingChoice {
 /// What is made white, and how colours are corrected.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum WhiteChoice {
-    /// The light on the scene, with colours corrected for it.
+    /// The light on the scene, with colours corrected for it; the mean of the picture where the light is not known.
     Scene,
     /// This light, with colours corrected for it.
     Light(Illuminant),
-    /// The mean of the picture, with colours corrected for the light on the scene.
+    /// The mean of the picture, with colours corrected for the light on the scene, or for D65 where it is not known.
     GreyWorld,
     /// Nothing: channels are shown as they are.
     None,
 }
 
 impl ProcessingChoice {
-    /// Returns the sensor's processing under the light on the scene.
-    pub fn under(self, light: Illuminant) -> Processing {
+    /// Returns the sensor's processing under the light on the scene, if that is known.
+    pub fn under(self, known: Option<Illuminant>) -> Processing {
+        let light = known.unwrap_or(Illuminant::D65);
         let (white_balance, color) = match self.white {
-            WhiteChoice::Scene => (WhiteBalance::Illuminant(light), ColorCorrection::Fitted(light)),
+            WhiteChoice::Scene if known.is_some() => (WhiteBalance::Illuminant(light), ColorCorrection::Fitted(light)),
             WhiteChoice::Light(other) => (WhiteBalance::Illuminant(other), ColorCorrection::Fitted(other)),
-            WhiteChoice::GreyWorld => (WhiteBalance::GreyWorld, ColorCorrection::Fitted(light)),
+            WhiteChoice::Scene | WhiteChoice::GreyWorld => (WhiteBalance::GreyWorld, ColorCorrection::Fitted(light)),
             WhiteChoice::None => (WhiteBalance::None, ColorCorrection::None),
         };
         let Self { demosaic, brightness, curve, denoise, .. } = self;
@@ -405,6 +406,17 @@ mod tests {
         let demo = Camera::demo().unwrap();
         demo.validate().unwrap();
         assert_eq!(parse(&demo.to_ron()).unwrap(), demo);
+    }
+
+    #[test]
+    fn white_goes_by_the_light_where_that_is_known() {
+        let choice = ProcessingChoice::default();
+        assert_eq!(choice.under(Some(Illuminant::A)), Processing::for_light(Illuminant::A));
+        let unknown = choice.under(None);
+        assert_eq!(unknown.white_balance, WhiteBalance::GreyWorld);
+        assert_eq!(unknown.color, ColorCorrection::Fitted(Illuminant::D65));
+        let asked = ProcessingChoice { white: WhiteChoice::Light(Illuminant::D50), ..choice };
+        assert_eq!(asked.under(None), Processing::for_light(Illuminant::D50));
     }
 
     #[test]

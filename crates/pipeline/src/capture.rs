@@ -85,7 +85,7 @@ impl Shot {
         let raw = self.sensor.digitize(&volts, &exposure)?;
 
         progress.at(Stage::Picture, 0.0);
-        let processing = self.camera.processing.under(self.camera.scene.illuminant);
+        let processing = self.camera.processing.under(self.scene.light);
         let developed = self.sensor.develop(&raw, &processing)?;
         progress.at(Stage::Picture, 1.0);
         Ok(Capture { bank, irradiance, exposure, rate, volts, raw, developed })

@@ -23,9 +23,9 @@ pub struct SceneChoice {
     /// One depth for the whole scene, m; for files that hold no depth, and for targets.
     #[serde(default)]
     pub depth_m: Option<f64>,
-    /// The light on the scene: it lights reflectances, and is what white balance goes by.
-    #[serde(default = "noon")]
-    pub illuminant: Illuminant,
+    /// The light on the scene: it lights reflectances and targets (D65 if left out), and is what white balance goes by.
+    #[serde(default)]
+    pub illuminant: Option<Illuminant>,
     /// Its illuminance, lux; for a picture, that of a white in it.
     #[serde(default = "thousand")]
     pub illuminance_lux: f64,
@@ -58,10 +58,6 @@ pub enum SceneSource {
     },
 }
 
-fn noon() -> Illuminant {
-    Illuminant::D65
-}
-
 fn thousand() -> f64 {
     1000.0
 }
@@ -73,7 +69,7 @@ impl SceneChoice {
             source: SceneSource::File(path),
             field_of_view_deg: None,
             depth_m: None,
-            illuminant: noon(),
+            illuminant: None,
             illuminance_lux: thousand(),
             mean_luminance_cd_m2: None,
         }
@@ -113,11 +109,12 @@ impl SceneChoice {
     /// When a file cannot be read, lacks what is needed or holds what cannot be.
     pub fn open(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
         let own_or = || wanted.cloned().map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok);
+        let light = self.illuminant.unwrap_or(Illuminant::D65);
         let mut scene = match &self.source {
             SceneSource::File(path) => {
                 let options = ReadOptions {
                     grid: wanted.cloned(),
-                    light: self.illuminant,
+                    light,
                     illuminance_lux: self.illuminance_lux,
                     picture_white_cd_m2: self.illuminance_lux / PI,
                     depth_m: self.depth_m,
@@ -131,7 +128,7 @@ impl SceneChoice {
                 pattern: *pattern,
                 rows: *rows,
                 columns: *columns,
-                light: TargetLight::Illuminant(self.illuminant),
+                light: TargetLight::Illuminant(light),
                 luminance_cd_m2: self.illuminance_lux / PI,
                 dark: 0.02,
                 supersampling: 4,
@@ -140,6 +137,7 @@ impl SceneChoice {
             }
             .scene(&own_or()?)?,
         };
+        scene.light = self.illuminant.or(scene.light);
         scene.require_depth()?;
         scene.require_view()?;
         if let Some(wanted_cd_m2) = self.mean_luminance_cd_m2 {

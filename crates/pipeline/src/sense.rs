@@ -7,7 +7,7 @@ use dioptric_sensor::{Exposure, ExposureControl, Illumination, Noise};
 use dioptric_spectrum::{Illuminant, Quantity};
 
 use crate::{
-    Outputs, PipelineError, ProcessingChoice, SensorChoice, SensorStatistics, WhiteChoice,
+    Outputs, PipelineError, ProcessingChoice, SensorChoice, SensorStatistics,
     report::{Frames, write_frames},
 };
 
@@ -60,11 +60,7 @@ pub fn sense_irradiance(
     let electrons = sensor.electrons(&rate, &exposure, &noise)?;
     let volts = sensor.volts(&electrons, &exposure, &noise)?;
     let raw = sensor.digitize(&volts, &exposure)?;
-    let processing = match request.illuminant {
-        Some(light) => request.processing.under(light),
-        None => ProcessingChoice { white: WhiteChoice::GreyWorld, ..request.processing }.under(Illuminant::D65),
-    };
-    let developed = sensor.develop(&raw, &processing)?;
+    let developed = sensor.develop(&raw, &request.processing.under(request.illuminant))?;
     let frames = Frames { sensor: &sensor, exposure: &exposure, rate: &rate, volts: &volts, raw: &raw };
     let statistics = SensorStatistics::new(&frames)?;
     write_frames(&frames, &developed.picture, Outputs::default(), folder)?;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use dioptric_spectrum::{DepthMap, Observer, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{DepthMap, Illuminant, Observer, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, s};
 
 use crate::{SceneError, View, resample::resampled};
@@ -20,6 +20,8 @@ pub struct Scene {
     pub view: Option<View>,
     /// What lies behind the first surface, where that is known.
     pub hidden: Option<HiddenLayer>,
+    /// The light on it, where that is known: what a white balance may go by.
+    pub light: Option<Illuminant>,
 }
 
 /// What would be seen if the object at the centre of each sample were taken away.
@@ -36,7 +38,7 @@ pub struct HiddenLayer {
 impl Scene {
     /// Returns a scene of radiance alone.
     pub fn new(name: impl Into<String>, radiance: SpectralImage) -> Self {
-        Self { name: name.into(), radiance, depth: None, view: None, hidden: None }
+        Self { name: name.into(), radiance, depth: None, view: None, hidden: None, light: None }
     }
 
     /// The number of rows.
@@ -152,6 +154,7 @@ impl Scene {
             depth: self.depth.as_ref().map(|d| DepthMap::new(plane(d.z_m()))).transpose()?,
             view: self.view.map(|v| v.cropped(rows.start, columns.start)),
             hidden,
+            light: self.light,
         })
     }
 
@@ -173,6 +176,7 @@ impl Scene {
             depth: self.depth.clone(),
             view: self.view,
             hidden,
+            light: self.light,
         })
     }
 

@@ -71,7 +71,8 @@ pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Scene, SceneErro
                 other => other,
             };
             let depth = file.depth_with(view_wanted(options, &file.image)?.or(view)).map_err(in_file)?;
-            finish(path, name, Contents { depth, view, hidden: file.hidden, image: file.image }, options)
+            let contents = Contents { depth, view, hidden: file.hidden, ..Contents::of(file.image) };
+            finish(path, name, contents, options)
         }
         "hdr" => finish(path, name, Contents::of(read_envi(path)?.into_image(options.white_level)?), options),
         "png" | "jpg" | "jpeg" | "tif" | "tiff" => {
@@ -80,7 +81,8 @@ pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Scene, SceneErro
                 None => WavelengthGrid::uniform(400.0, 700.0, 10.0)?,
             };
             let image = read_picture(path, &Display::apple_studio(), &grid, options.picture_white_cd_m2)?;
-            finish(path, name, Contents::of(image), options)
+            // The white of sRGB.
+            finish(path, name, Contents { light: Some(Illuminant::D65), ..Contents::of(image) }, options)
         }
         _ if !path.exists() => Err(super::beside::unreadable(path, "there is no such file")),
         _ => Err(SceneError::UnknownKind { file: path.to_owned() }),
@@ -93,11 +95,12 @@ struct Contents {
     depth: Option<dioptric_spectrum::DepthMap>,
     view: Option<View>,
     hidden: Option<HiddenLayer>,
+    light: Option<Illuminant>,
 }
 
 impl Contents {
     fn of(image: SpectralImage) -> Self {
-        Self { image, depth: None, view: None, hidden: None }
+        Self { image, depth: None, view: None, hidden: None, light: None }
     }
 }
 
@@ -111,7 +114,12 @@ fn finish(path: &Path, name: String, contents: Contents, options: &ReadOptions) 
         Some(layer) => Some(HiddenLayer { radiance: lit(layer.radiance, options)?, ..layer }),
         None => None,
     };
-    let scene = Scene { name, radiance: lit(contents.image, options)?, depth: contents.depth, view, hidden };
+    let light = match contents.image.quantity() {
+        Quantity::Reflectance => Some(options.light),
+        _ => contents.light,
+    };
+    let radiance = lit(contents.image, options)?;
+    let scene = Scene { name, radiance, depth: contents.depth, view, hidden, light };
     let scene = match options.depth_m {
         Some(depth_m) => scene.or_flat_depth_m(depth_m)?,
         None => scene,
@@ -158,6 +166,7 @@ mod tests {
         let options = ReadOptions { depth_m: Some(2.0), horizontal_fov_deg: Some(30.0), ..ReadOptions::default() };
         let scene = read_scene(&path, &options).unwrap();
         assert_eq!(scene.require_depth().unwrap().range_m(), (2.0, 2.0));
+        assert_eq!(scene.light, Some(Illuminant::D65));
         assert_relative_eq!(scene.require_view().unwrap().horizontal_fov_deg(8), 30.0, max_relative = 1e-12);
         let beyond = ReadOptions { grid: Some(WavelengthGrid::uniform(300.0, 700.0, 10.0).unwrap()), ..options };
         assert!(read_scene(&path, &beyond).is_err());
@@ -180,6 +189,8 @@ mod tests {
         let Some(folder) = dioptric_golden::shared("data/scenes") else { return };
         let piano = read_scene(&folder.join("piano3d.radiance_depth.exr"), &ReadOptions::default()).unwrap();
         assert_relative_eq!(piano.require_view().unwrap().horizontal_fov_deg(200), 40.0, max_relative = 1e-9);
+        // Radiance does not tell what light was on it.
+        assert_eq!(piano.light, None);
         let (near, far) = piano.require_depth().unwrap().range_m();
         assert!(near > 0.3 && far < 0.9);
         // The provenance of the file says 99.999 cd/m².

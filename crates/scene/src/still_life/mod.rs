@@ -73,6 +73,7 @@ impl StillLife {
             depth: Some(first.depth),
             view: Some(view),
             hidden,
+            light: Some(shade::WINDOW),
         })
     }
 }

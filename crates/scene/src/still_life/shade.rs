@@ -23,6 +23,9 @@ const FAR_LUX: [f64; 2] = [70.0, 35.0];
 /// so few rays meet a bulb that more would make spots.
 const BULB_SHEEN: [f64; 2] = [10_000.0, 800.0];
 
+/// The daylight that comes in by the window.
+pub(super) const WINDOW: Illuminant = Illuminant::Daylight(6200.0);
+
 /// Everything that light meets, on the bands of the picture.
 pub(super) struct Shader<'a> {
     pub(super) world: &'a World,
@@ -35,7 +38,7 @@ pub(super) struct Shader<'a> {
 
 impl<'a> Shader<'a> {
     pub(super) fn new(world: &'a World, eye: DVec3, grid: &WavelengthGrid) -> Self {
-        let white = [Illuminant::Daylight(6200.0), Illuminant::Blackbody(2850.0)]
+        let white = [WINDOW, Illuminant::Blackbody(2850.0)]
             .map(|light| light.white_radiance(grid, 1.0).into_iter().map(|v| v as f32).collect());
         Self { world, eye, palette: Palette::on(grid), white }
     }

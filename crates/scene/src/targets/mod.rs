@@ -144,7 +144,12 @@ impl Target {
                 SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?
             }
         };
-        Scene::new(self.name(), radiance)
+        let light = match self.light {
+            TargetLight::EqualEnergy => Some(Illuminant::E),
+            TargetLight::EqualPhotons => None,
+            TargetLight::Illuminant(light) => Some(light),
+        };
+        Scene { light, ..Scene::new(self.name(), radiance) }
             .or_flat_depth_m(self.distance_m)?
             .or_horizontal_fov_deg(self.horizontal_fov_deg)
     }
