@@ -6,10 +6,10 @@ use glam::{DVec2, DVec3};
 use rayon::iter::ParallelIterator;
 
 use crate::{
-    Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, Rims, Shape, Surface,
+    Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, RayBatchF32, Rims, Shape, Surface,
     paraxial::{self, Matrix},
     pose,
-    trace::{self, Kind, Step},
+    trace::{self, Goal, Kind, Plan, Step},
 };
 
 /// Rays that one task of [`MonoLens::trace_parallel`] traces.
@@ -175,9 +175,12 @@ impl MonoLens {
         let first = surfaces.start;
         let steps = self.steps_for(rays.object_z_mm);
         match self.poses() {
-            None => trace::trace_batch(&steps[surfaces], first, rims, rays.slices()),
             Some(poses) => {
                 trace::trace_placed(&steps[surfaces.clone()], &poses[surfaces], first, rims, &mut rays.slices());
+            }
+            None if surfaces.is_empty() => {}
+            None => {
+                trace::trace_batch(&Plan::new(&steps[surfaces], first, rims), Goal::LastSurface, rays.slices());
             }
         }
     }
@@ -187,10 +190,40 @@ impl MonoLens {
     /// The result is that of [`trace`](Self::trace), to the bit.
     pub fn trace_parallel(&self, rays: &mut RayBatch, rims: Rims) {
         let steps = self.steps_for(rays.object_z_mm);
-        rays.par_slices(CHUNK).for_each(|mut chunk| match self.poses() {
-            None => trace::trace_batch(&steps, 0, rims, chunk),
-            Some(poses) => trace::trace_placed(&steps, poses, 0, rims, &mut chunk),
-        });
+        if let Some(poses) = self.poses() {
+            let trace = |mut chunk| trace::trace_placed(&steps, poses, 0, rims, &mut chunk);
+            return rays.par_slices(CHUNK).for_each(trace);
+        }
+        let plan = Plan::new(&steps, 0, rims);
+        rays.par_slices(CHUNK).for_each(|chunk| trace::trace_batch(&plan, Goal::LastSurface, chunk));
+    }
+
+    /// Traces rays through all surfaces and straight on to the film plane, `film_mm` behind the last vertex.
+    ///
+    /// What [`trace`](Self::trace) and [`to_film`](Self::to_film) do, in one go.
+    pub fn trace_to_film(&self, rays: &mut RayBatch, rims: Rims, film_mm: f64) {
+        if self.placed.is_some() {
+            self.trace(rays, rims);
+            return self.to_film(rays, film_mm);
+        }
+        let plan = Plan::new(&self.steps_for(rays.object_z_mm), 0, rims);
+        trace::trace_batch(&plan, Goal::Film { film_mm }, rays.slices());
+    }
+
+    /// Traces rays in single precision through all surfaces and straight on to the film plane, `film_mm` behind the
+    /// last vertex.
+    ///
+    /// They land within 0.05 µm of where [`trace_to_film`](Self::trace_to_film) lands them. Through tilted and
+    /// decentred surfaces they go in double precision, no faster than there.
+    pub fn trace_to_film_f32(&self, rays: &mut RayBatchF32, rims: Rims, film_mm: f64) {
+        if self.placed.is_some() {
+            let mut wide = rays.widened();
+            self.trace_to_film(&mut wide, rims, film_mm);
+            return rays.set_rounded(&wide, |point, _| point);
+        }
+        // Where the object plane lies matters to path lengths only.
+        let plan = Plan::new(&self.steps, 0, rims);
+        trace::trace_batch(&plan, Goal::Film { film_mm }, rays.slices());
     }
 
     /// Returns the steps, in which ideal lenses know where the object plane appears to them.

@@ -2,7 +2,10 @@
 
 use glam::DVec2;
 
-use crate::{MonoLens, ObjectPoint, RayBatch, rays_towards, trace};
+use crate::{
+    MonoLens, ObjectPoint, RayBatch, Rims, rays_towards,
+    trace::{self, Plan},
+};
 
 /// The true, vignetted pupil that one object point sees at one wavelength: a region of the entrance-pupil plane,
 /// given by its edge at equally spaced azimuths about a centre.
@@ -218,7 +221,10 @@ impl MonoLens {
         let mut clearances_mm = vec![f64::INFINITY; rays.len()];
         let steps = self.steps_for(rays.object_z_mm);
         match self.poses() {
-            None => trace::trace_clearances(&steps, rays.slices(), &mut clearances_mm),
+            None => {
+                let plan = Plan::new(&steps, 0, Rims::Ignore);
+                trace::trace_clearances(&plan, rays.slices(), &mut clearances_mm);
+            }
             Some(poses) => trace::placed_clearances(&steps, poses, &mut rays.slices(), &mut clearances_mm),
         }
         clearances_mm
@@ -230,7 +236,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::{Lens, Rims};
+    use crate::Lens;
 
     #[track_caller]
     fn pupil(lens: &MonoLens, field_deg: f64, dioptres: f64) -> PupilBoundary {

@@ -203,14 +203,14 @@ impl RayBatch {
 }
 
 /// The lists of a batch, or of some of its rays.
-pub(crate) struct RaySlices<'a> {
-    pub(crate) x: &'a mut [f64],
-    pub(crate) y: &'a mut [f64],
-    pub(crate) z: &'a mut [f64],
-    pub(crate) l: &'a mut [f64],
-    pub(crate) m: &'a mut [f64],
-    pub(crate) n: &'a mut [f64],
-    pub(crate) opl: &'a mut [f64],
+pub(crate) struct RaySlices<'a, T = f64> {
+    pub(crate) x: &'a mut [T],
+    pub(crate) y: &'a mut [T],
+    pub(crate) z: &'a mut [T],
+    pub(crate) l: &'a mut [T],
+    pub(crate) m: &'a mut [T],
+    pub(crate) n: &'a mut [T],
+    pub(crate) opl: &'a mut [T],
     pub(crate) fate: &'a mut [RayFate],
 }
 

@@ -1,136 +1,172 @@
-//! Aspheres: Newton's method from the conic, for a tile at once.
+//! Aspheres: Newton's method from the conic, for a block of lanes at once.
 //!
 //! Every lane stops for itself, so that a ray's result does not depend on its neighbours. The scalar twin uses the
 //! same code with one lane.
 
-use super::crossing::{Crossing, Ray, cross_conic};
+use super::{
+    block::Block,
+    crossing::{Crossing, Interface, Ray, conic_distance, refract},
+    kernel::{Optic, pass_lanes},
+    real::Real,
+};
 
 /// Newton steps after which a ray is held to miss an asphere.
 const NEWTON_STEPS: usize = 24;
 
 /// A conic with powers of r added.
-#[derive(Clone, Copy)]
-pub(crate) struct Asphere<'a> {
-    pub(crate) curvature: f64,
-    pub(crate) conic: f64,
-    pub(crate) powers: Powers<'a>,
+#[derive(Clone, Debug)]
+pub(super) struct Asphere<T, P> {
+    pub(super) curvature: T,
+    pub(super) conic: T,
+    pub(super) powers: P,
+    pub(super) interface: Interface<T>,
 }
 
-/// The powers that an asphere adds to its conic.
-#[derive(Clone, Copy)]
-pub(crate) enum Powers<'a> {
-    /// r², and the rest from r⁴ on.
-    Even { a2: f64, rest: &'a [f64] },
-    /// From r on.
-    All(&'a [f64]),
+/// The powers of r that an asphere adds to its conic.
+pub(super) trait Powers<T> {
+    /// Returns the added sag, and its slope over r, at this squared distance from the axis.
+    fn at(&self, r2: T) -> (T, T);
 }
 
-/// Sag and gradient of an asphere below the points of a tile's rays.
-struct Below<const N: usize> {
-    sag: [f64; N],
-    gx: [f64; N],
-    gy: [f64; N],
+/// Even powers, from r² on. A fixed number of them, so that the compiler unrolls the sum.
+#[derive(Clone, Debug)]
+pub(super) struct EvenPowers<T, const M: usize>(pub(super) [T; M]);
+
+/// All powers, from r on.
+#[derive(Clone, Debug)]
+pub(super) struct AllPowers<T, const M: usize>(pub(super) [T; M]);
+
+/// All powers, from r on, as many as there are: right for any number, but lane by lane.
+#[derive(Clone, Debug)]
+pub(super) struct ManyPowers<T>(pub(super) Vec<T>);
+
+/// Returns a polynomial and its derivative by Horner's rule.
+#[inline(always)]
+fn horner<T: Real>(coefficients: &[T], u: T) -> (T, T) {
+    let (mut value, mut derivative) = (T::ZERO, T::ZERO);
+    for &a in coefficients.iter().rev() {
+        derivative = derivative * u + value;
+        value = value * u + a;
+    }
+    (value, derivative)
 }
 
-impl Asphere<'_> {
-    /// Crosses the asphere with each ray.
-    ///
-    /// Once a step is small the next would be of the order of its square: it has converged to rounding.
+/// Returns sag and slope over r of the powers of r whose sum over r is this polynomial of r.
+#[inline(always)]
+fn from_first<T: Real>(coefficients: &[T], r2: T) -> (T, T) {
+    let r = r2.sqrt();
+    let (value, derivative) = horner(coefficients, r);
+    // At the tip of a cone the normal is taken along the axis.
+    let slope = if r > T::ZERO { value / r } else { T::ZERO };
+    (value * r, slope + derivative)
+}
+
+impl<T: Real, const M: usize> Powers<T> for EvenPowers<T, M> {
     #[inline(always)]
-    pub(crate) fn cross<const N: usize>(self, rays: [Ray; N], alive: [bool; N]) -> [Crossing; N] {
-        let mut t = [0.0; N];
-        for i in 0..N {
-            let start = cross_conic(self.curvature, self.conic, rays[i]);
-            let is_start = start.is_front & (start.t.abs() < f64::INFINITY);
-            t[i] = if is_start { start.t } else { -rays[i].z / rays[i].n };
+    fn at(&self, r2: T) -> (T, T) {
+        let (value, derivative) = horner(&self.0, r2);
+        (value * r2, T::TWO * (value + derivative * r2))
+    }
+}
+
+impl<T: Real, const M: usize> Powers<T> for AllPowers<T, M> {
+    #[inline(always)]
+    fn at(&self, r2: T) -> (T, T) {
+        from_first(&self.0, r2)
+    }
+}
+
+impl<T: Real> Powers<T> for ManyPowers<T> {
+    #[inline(always)]
+    fn at(&self, r2: T) -> (T, T) {
+        from_first(&self.0, r2)
+    }
+}
+
+/// What an asphere is like below a point of a ray.
+struct Below<T> {
+    x: T,
+    y: T,
+    r2: T,
+    /// √(1 − (1 + conic) c² r²): the conic's sag is c r²/(1 + root) and its slope c r/root.
+    root: T,
+    bump: T,
+    /// Slope over r, times the root.
+    along: T,
+}
+
+impl<T: Real, P: Powers<T>> Asphere<T, P> {
+    #[inline(always)]
+    fn below(&self, ray: &Ray<T>, t: T) -> Below<T> {
+        let c = self.curvature;
+        let (x, y) = (ray.x + ray.l * t, ray.y + ray.m * t);
+        let r2 = x * x + y * y;
+        let root = (T::ONE - (T::ONE + self.conic) * c * c * r2).sqrt();
+        let (bump, slope) = self.powers.at(r2);
+        Below { x, y, r2, root, bump, along: c + slope * root }
+    }
+
+    /// Where Newton's method starts: on the conic, or on the vertex plane for rays that miss it.
+    #[inline(always)]
+    fn start(&self, ray: &Ray<T>) -> T {
+        let (c, k1) = (self.curvature, T::ONE + self.conic);
+        let (t, _) = conic_distance(c, self.conic, ray);
+        let is_front = T::ONE - c * k1 * (ray.z + ray.n * t) > T::ZERO;
+        if is_front & (t.abs() < T::INFINITY) { t } else { -ray.z / ray.n }
+    }
+
+    /// The step from `t` towards the crossing: height over its rate, both times (1 + root) root, which leaves a
+    /// single division.
+    #[inline(always)]
+    fn step(&self, ray: &Ray<T>, t: T) -> T {
+        let Below { x, y, r2, root, bump, along } = self.below(ray, t);
+        let beyond = T::ONE + root;
+        let height = ((ray.z + ray.n * t - bump) * beyond - self.curvature * r2) * root;
+        let rate = (ray.n * root - along * (x * ray.l + y * ray.m)) * beyond;
+        height / rate
+    }
+
+    /// Returns the crossing at a distance that is known.
+    #[inline(always)]
+    fn crossing(&self, ray: &Ray<T>, t: T, is_found: bool) -> Crossing<T> {
+        let Below { x, y, root, along, .. } = self.below(ray, t);
+        // The gradient, times the root.
+        let (gx, gy) = (-along * x, -along * y);
+        let inverse = T::ONE / (gx * gx + gy * gy + root * root).sqrt();
+        let normal = [gx * inverse, gy * inverse, root * inverse];
+        let cos = ray.l * normal[0] + ray.m * normal[1] + ray.n * normal[2];
+        let is_front = is_found & (cos > T::ZERO) & (root > T::ZERO);
+        Crossing { t, normal, cos, cos2: cos * cos, is_front }
+    }
+}
+
+impl<T: Real, P: Powers<T>> Optic<T> for Asphere<T, P> {
+    /// Once a step is small the next would be of the order of its square: the ray has converged to rounding.
+    #[inline(always)]
+    fn pass<const N: usize>(&self, shift: T, from: &Block<T, N>, to: &mut Block<T, N>) {
+        let mut t = [T::ZERO; N];
+        for (i, t) in t.iter_mut().enumerate() {
+            *t = self.start(&from.ray(i, shift));
         }
-        let mut is_converged = [false; N];
-        let mut is_open = alive;
+        let (mut found, mut open) = ([T::NO; N], from.alive);
         for _ in 0..NEWTON_STEPS {
-            let below = self.below(&rays, &t);
+            let mut any = T::NO;
             for i in 0..N {
-                let ray = &rays[i];
-                let step = (ray.z + ray.n * t[i] - below.sag[i]) / (ray.l * below.gx[i] + ray.m * below.gy[i] + ray.n);
+                let step = self.step(&from.ray(i, shift), t[i]);
                 let next = t[i] - step;
-                let is_small = step.abs() <= 1e-9 * (1.0 + next.abs());
-                t[i] = if is_open[i] { next } else { t[i] };
-                is_converged[i] |= is_open[i] & is_small;
+                let is_small = T::mask(step.abs() <= T::SMALL_STEP * (T::ONE + next.abs()));
+                t[i] = if open[i] == T::NO { t[i] } else { next };
+                found[i] = found[i] | (open[i] & is_small);
                 // A ray that has left the surface's domain has no step.
-                is_open[i] &= !is_small & (step.abs() < f64::INFINITY);
+                open[i] = open[i] & !is_small & T::mask(step.abs() < T::INFINITY);
+                any = any | open[i];
             }
-            if is_open.iter().fold(0, |any, &open| any | u8::from(open)) == 0 {
+            if any == T::NO {
                 break;
             }
         }
-        let below = self.below(&rays, &t);
-        std::array::from_fn(|i| {
-            let (gx, gy) = (below.gx[i], below.gy[i]);
-            let inverse = 1.0 / (gx * gx + gy * gy + 1.0).sqrt();
-            let cos = (rays[i].l * gx + rays[i].m * gy + rays[i].n) * inverse;
-            let normal = [gx * inverse, gy * inverse, inverse];
-            Crossing { t: t[i], normal, cos, cos2: cos * cos, is_front: is_converged[i] & (cos > 0.0) }
-        })
-    }
-
-    #[inline(always)]
-    fn below<const N: usize>(self, rays: &[Ray; N], t: &[f64; N]) -> Below<N> {
-        let (c, k1) = (self.curvature, 1.0 + self.conic);
-        let (mut x, mut y, mut r2) = ([0.0; N], [0.0; N], [0.0; N]);
-        for i in 0..N {
-            x[i] = rays[i].x + rays[i].l * t[i];
-            y[i] = rays[i].y + rays[i].m * t[i];
-            r2[i] = x[i] * x[i] + y[i] * y[i];
-        }
-        let (bump, slope) = self.powers.at(&r2);
-        let mut below = Below { sag: [0.0; N], gx: [0.0; N], gy: [0.0; N] };
-        for i in 0..N {
-            let root = (1.0 - k1 * c * c * r2[i]).sqrt();
-            // The conic's slope is c r/root, its sag c r²/(1 + root): one division serves both.
-            let shared = c / (root * (1.0 + root));
-            let along = shared * (1.0 + root) + slope[i];
-            below.sag[i] = shared * root * r2[i] + bump[i];
-            below.gx[i] = -along * x[i];
-            below.gy[i] = -along * y[i];
-        }
-        below
-    }
-}
-
-impl Powers<'_> {
-    /// Returns the added sag, and its slope over r, at these squared distances from the axis.
-    #[inline(always)]
-    fn at<const N: usize>(self, r2: &[f64; N]) -> ([f64; N], [f64; N]) {
-        let (mut high, mut slope) = ([0.0; N], [0.0; N]);
-        match self {
-            Self::Even { a2, rest } => {
-                for (power, a) in rest.iter().enumerate().rev() {
-                    let derived = a * (2 * power + 4) as f64;
-                    for i in 0..N {
-                        high[i] = high[i] * r2[i] + a;
-                        slope[i] = slope[i] * r2[i] + derived;
-                    }
-                }
-                for i in 0..N {
-                    high[i] = (high[i] * r2[i] + a2) * r2[i];
-                    slope[i] = slope[i] * r2[i] + 2.0 * a2;
-                }
-            }
-            Self::All(coefficients) => {
-                let r = r2.map(f64::sqrt);
-                for (power, a) in coefficients.iter().enumerate().rev() {
-                    let derived = a * (power + 1) as f64;
-                    for i in 0..N {
-                        high[i] = high[i] * r[i] + a;
-                        slope[i] = slope[i] * r[i] + derived;
-                    }
-                }
-                for i in 0..N {
-                    high[i] *= r[i];
-                    // At the tip of a cone the normal is taken along the axis.
-                    slope[i] = if r[i] > 0.0 { slope[i] / r[i] } else { 0.0 };
-                }
-            }
-        }
-        (high, slope)
+        pass_lanes(shift, from, to, |i, ray| {
+            refract(&self.interface, ray, &self.crossing(ray, t[i], found[i] != T::NO))
+        });
     }
 }

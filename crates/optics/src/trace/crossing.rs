@@ -1,33 +1,71 @@
 //! Where one ray crosses a surface, and what becomes of it there.
 //!
-//! These few lines are the whole geometry. The tile runs them lane by lane, as vectors; the scalar twin one by one.
+//! These few lines are the whole geometry. The kernel runs them lane by lane, as vectors; the scalar twin one by one.
 
-use super::{Passed, Refracting, Step};
+use super::real::Real;
 
 /// A ray: its point from the vertex at hand, its direction and its path so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Ray {
-    pub(crate) x: f64,
-    pub(crate) y: f64,
-    pub(crate) z: f64,
-    pub(crate) l: f64,
-    pub(crate) m: f64,
-    pub(crate) n: f64,
-    pub(crate) opl: f64,
+pub(crate) struct Ray<T> {
+    pub(crate) x: T,
+    pub(crate) y: T,
+    pub(crate) z: T,
+    pub(crate) l: T,
+    pub(crate) m: T,
+    pub(crate) n: T,
+    pub(crate) opl: T,
+}
+
+impl<T: Real> Ray<T> {
+    pub(super) fn to_f64(self) -> Ray<f64> {
+        let Self { x, y, z, l, m, n, opl } = self;
+        let [x, y, z, l, m, n, opl] = [x, y, z, l, m, n, opl].map(T::to_f64);
+        Ray { x, y, z, l, m, n, opl }
+    }
 }
 
 /// A ray's crossing of a surface. Where there is none, the distance is not finite.
 #[derive(Clone, Copy)]
-pub(crate) struct Crossing {
+pub(super) struct Crossing<T> {
     /// Distance along the ray.
-    pub(super) t: f64,
+    pub(super) t: T,
     /// Unit normal there, pointing downstream.
-    pub(super) normal: [f64; 3],
+    pub(super) normal: [T; 3],
     /// Cosine of the angle of incidence, and its square.
-    pub(super) cos: f64,
-    pub(super) cos2: f64,
+    pub(super) cos: T,
+    pub(super) cos2: T,
     /// Whether the crossing lies on the sheet of the vertex.
     pub(super) is_front: bool,
+}
+
+/// What a surface does to rays, whatever its shape.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interface<T> {
+    /// The index before over the index after, and its square.
+    pub(super) ratio: T,
+    pub(super) ratio2: T,
+    pub(super) index_before: T,
+    /// Square of the rim's radius.
+    pub(super) limit_mm2: T,
+}
+
+/// What becomes of a ray at a surface.
+#[derive(Clone, Copy)]
+pub(super) struct Passed<T> {
+    /// The ray on the surface, turned.
+    pub(super) ray: Ray<T>,
+    /// Whether it goes on; if not, the rest says why.
+    pub(super) goes_on: bool,
+    /// Whether it met the surface at all.
+    pub(super) is_hit: bool,
+}
+
+impl<T: Real> Interface<T> {
+    /// Whether a point of the surface lies inside the rim. One that is not finite does not.
+    #[inline(always)]
+    pub(super) fn is_within(&self, x: T, y: T) -> bool {
+        x * x + y * y <= self.limit_mm2
+    }
 }
 
 /// Crosses a sphere where the ray goes through it downstream.
@@ -35,49 +73,55 @@ pub(crate) struct Crossing {
 /// Written in curvature, so that it stays accurate as the sphere flattens to a plane; the cosine of incidence comes
 /// with it, and the normal is already of unit length. Beyond the equator the sphere is no longer the surface.
 #[inline(always)]
-pub(crate) fn cross_sphere(c: f64, ray: Ray) -> Crossing {
-    let Ray { x, y, z, l, m, n, .. } = ray;
-    let f = c * (x * x + y * y + z * z) - 2.0 * z;
+pub(super) fn cross_sphere<T: Real>(c: T, ray: &Ray<T>) -> Crossing<T> {
+    let &Ray { x, y, z, l, m, n, .. } = ray;
+    let f = c * (x * x + y * y + z * z) - T::TWO * z;
     let g = n - c * (x * l + y * m + z * n);
     let cos2 = g * g - c * f;
     let cos = cos2.sqrt();
     // Both quotients are the same number; each is free of cancellation on its side.
-    let is_ahead = g >= 0.0;
+    let is_ahead = g >= T::ZERO;
     let numerator = if is_ahead { f } else { g - cos };
     let denominator = if is_ahead { g + cos } else { c };
     let t = numerator / denominator;
-    let normal = [-c * (x + l * t), -c * (y + m * t), 1.0 - c * (z + n * t)];
-    Crossing { t, normal, cos, cos2, is_front: normal[2] > 0.0 }
+    let normal = [-c * (x + l * t), -c * (y + m * t), T::ONE - c * (z + n * t)];
+    Crossing { t, normal, cos, cos2, is_front: normal[2] > T::ZERO }
+}
+
+/// Returns how far along a ray crosses a conic of revolution downstream, and the root that the distance takes.
+#[inline(always)]
+pub(super) fn conic_distance<T: Real>(c: T, conic: T, ray: &Ray<T>) -> (T, T) {
+    let &Ray { x, y, z, l, m, n, .. } = ray;
+    let k1 = T::ONE + conic;
+    let a = c * (T::ONE + conic * n * n);
+    let f = c * (x * x + y * y + k1 * z * z) - T::TWO * z;
+    let g = n - c * (x * l + y * m + k1 * z * n);
+    let s = (g * g - a * f).sqrt();
+    let is_ahead = g >= T::ZERO;
+    let numerator = if is_ahead { f } else { g - s };
+    let denominator = if is_ahead { g + s } else { a };
+    (numerator / denominator, s)
 }
 
 /// Crosses a conic of revolution where the ray goes through it downstream.
 #[inline(always)]
-pub(crate) fn cross_conic(c: f64, conic: f64, ray: Ray) -> Crossing {
-    let Ray { x, y, z, l, m, n, .. } = ray;
-    let k1 = 1.0 + conic;
-    let a = c * (1.0 + conic * n * n);
-    let f = c * (x * x + y * y + k1 * z * z) - 2.0 * z;
-    let g = n - c * (x * l + y * m + k1 * z * n);
-    let s = (g * g - a * f).sqrt();
-    let is_ahead = g >= 0.0;
-    let numerator = if is_ahead { f } else { g - s };
-    let denominator = if is_ahead { g + s } else { a };
-    let t = numerator / denominator;
-    let gradient = [-c * (x + l * t), -c * (y + m * t), 1.0 - c * k1 * (z + n * t)];
+pub(super) fn cross_conic<T: Real>(c: T, conic: T, ray: &Ray<T>) -> Crossing<T> {
+    let &Ray { x, y, z, l, m, n, .. } = ray;
+    let (t, s) = conic_distance(c, conic, ray);
+    let gradient = [-c * (x + l * t), -c * (y + m * t), T::ONE - c * (T::ONE + conic) * (z + n * t)];
     let square = gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2];
-    let inverse = 1.0 / square.sqrt();
+    let inverse = T::ONE / square.sqrt();
     let cos = s * inverse;
-    Crossing { t, normal: gradient.map(|v| v * inverse), cos, cos2: cos * cos, is_front: gradient[2] > 0.0 }
+    Crossing { t, normal: gradient.map(|v| v * inverse), cos, cos2: cos * cos, is_front: gradient[2] > T::ZERO }
 }
 
 /// Moves a ray to its crossing and refracts it there.
 #[inline(always)]
-pub(crate) fn refract(surface: &Refracting, ray: Ray, crossing: Crossing) -> Passed {
-    let Crossing { t, normal, cos, cos2, is_front } = crossing;
-    let Refracting { ratio, ratio2, index_before, limit_mm2 } = *surface;
+pub(super) fn refract<T: Real>(interface: &Interface<T>, ray: &Ray<T>, crossing: &Crossing<T>) -> Passed<T> {
+    let &Crossing { t, normal, cos, cos2, is_front } = crossing;
+    let &Interface { ratio, ratio2, index_before, .. } = interface;
     let (x, y, z) = (ray.x + ray.l * t, ray.y + ray.m * t, ray.z + ray.n * t);
-    let r2 = x * x + y * y;
-    let after2 = 1.0 - ratio2 * (1.0 - cos2);
+    let after2 = T::ONE - ratio2 * (T::ONE - cos2);
     let bend = after2.sqrt() - ratio * cos;
     let refracted = Ray {
         x,
@@ -86,49 +130,65 @@ pub(crate) fn refract(surface: &Refracting, ray: Ray, crossing: Crossing) -> Pas
         l: ratio * ray.l + bend * normal[0],
         m: ratio * ray.m + bend * normal[1],
         n: ratio * ray.n + bend * normal[2],
-        opl: ray.opl + index_before * t,
+        opl: longer(ray.opl, index_before, t),
     };
-    // A ray without a crossing has no finite r2, so that it is not within.
-    let is_within = r2 <= limit_mm2;
-    let goes_on = is_within & is_front & (after2 >= 0.0);
-    Passed { ray: refracted, goes_on, is_hit: is_front & (t.abs() < f64::INFINITY), is_within }
+    let goes_on = interface.is_within(x, y) & is_front & (after2 >= T::ZERO);
+    Passed { ray: refracted, goes_on, is_hit: is_front & (t.abs() < T::INFINITY) }
 }
 
 /// Moves a ray to the vertex plane, where nothing bends it.
 #[inline(always)]
-pub(crate) fn cross_plane(index_before: f64, limit_mm2: f64, ray: Ray) -> Passed {
+pub(super) fn cross_plane<T: Real>(interface: &Interface<T>, ray: &Ray<T>) -> Passed<T> {
     let t = -ray.z / ray.n;
     let (x, y) = (ray.x + ray.l * t, ray.y + ray.m * t);
-    let is_within = x * x + y * y <= limit_mm2;
-    let is_ahead = ray.n > 0.0;
-    let moved = Ray { x, y, z: 0.0, opl: ray.opl + index_before * t, ..ray };
-    Passed { ray: moved, goes_on: is_within & is_ahead, is_hit: is_ahead & (t.abs() < f64::INFINITY), is_within }
+    let is_ahead = ray.n > T::ZERO;
+    let moved = Ray { x, y, z: T::ZERO, opl: longer(ray.opl, interface.index_before, t), ..*ray };
+    let goes_on = interface.is_within(x, y) & is_ahead;
+    Passed { ray: moved, goes_on, is_hit: is_ahead & (t.abs() < T::INFINITY) }
+}
+
+/// A path that goes on by `t` in a medium.
+#[inline(always)]
+pub(super) fn longer<T: Real>(opl: T, index: T, t: T) -> T {
+    if T::HAS_PATH { opl + index * t } else { opl }
+}
+
+/// An ideal lens: its media, its power in air and the z of the object plane as it sees it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ideal<T> {
+    pub(super) index_before: T,
+    pub(super) index_after: T,
+    pub(super) power: T,
+    pub(super) object_z: T,
 }
 
 /// Moves a ray to an ideal lens in the vertex plane, and turns it there.
 #[inline(always)]
-pub(crate) fn thin_lens(step: &Step, power: f64, object_z: f64, limit_mm2: f64, ray: Ray) -> Passed {
-    let (n1, n2) = (step.index_before, step.index_after);
-    let passed = cross_plane(n1, limit_mm2, ray);
+pub(super) fn thin_lens<T: Real>(lens: &Ideal<T>, interface: &Interface<T>, ray: &Ray<T>) -> Passed<T> {
+    let &Ideal { index_before: n1, index_after: n2, power, object_z } = lens;
+    let passed = cross_plane(interface, ray);
     let Ray { x, y, l, m, n, opl, .. } = passed.ray;
     let (tx, ty) = (l / n, m / n);
     let (sx, sy) = ((n1 * tx - power * x) / n2, (n1 * ty - power * y) / n2);
-    // The path from the object point, and on to its image, is made that of the ray through the centre.
-    let reduced = n1 / object_z + power;
-    let before = path_difference([x, y], [tx, ty], object_z);
-    let after = path_difference([x, y], [sx, sy], n2 / reduced);
-    let n_after = 1.0 / (1.0 + sx * sx + sy * sy).sqrt();
-    let opl = opl + (n2 * after - n1 * before);
-    Passed { ray: Ray { l: sx * n_after, m: sy * n_after, n: n_after, opl, ..passed.ray }, ..passed }
+    let n_after = T::ONE / (T::ONE + sx * sx + sy * sy).sqrt();
+    let mut turned = Ray { l: sx * n_after, m: sy * n_after, n: n_after, ..passed.ray };
+    if T::HAS_PATH {
+        // The path from the object point, and on to its image, is made that of the ray through the centre.
+        let reduced = n1 / object_z + power;
+        let before = path_difference([x, y], [tx, ty], object_z);
+        let after = path_difference([x, y], [sx, sy], n2 / reduced);
+        turned.opl = opl + (n2 * after - n1 * before);
+    }
+    Passed { ray: turned, ..passed }
 }
 
 /// Returns by how much the ray of these slopes through `height` has further to go from its point in the plane `z`
 /// than the ray through the lens centre has; the plane may be infinitely far.
 #[inline(always)]
-fn path_difference(height: [f64; 2], slopes: [f64; 2], z: f64) -> f64 {
+fn path_difference<T: Real>(height: [T; 2], slopes: [T; 2], z: T) -> T {
     let (ux, uy) = (slopes[0] + height[0] / z, slopes[1] + height[1] / z);
-    let along = 1.0 + slopes[0] * slopes[0] + slopes[1] * slopes[1];
-    let center = 1.0 + ux * ux + uy * uy;
+    let along = T::ONE + slopes[0] * slopes[0] + slopes[1] * slopes[1];
+    let center = T::ONE + ux * ux + uy * uy;
     let sum = (slopes[0] + ux) * height[0] + (slopes[1] + uy) * height[1];
     sum / (along.sqrt() + center.sqrt())
 }

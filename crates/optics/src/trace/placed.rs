@@ -2,7 +2,11 @@
 
 use glam::DVec3;
 
-use super::{Rims, Step, crossing::Ray, crossing::cross_conic, move_to_plane, trace_batch, trace_clearances};
+use super::{
+    Goal, Plan, Rims, Step,
+    crossing::{Ray, cross_conic},
+    move_to_plane, trace_batch, trace_clearances,
+};
 use crate::{Pose, RayFate, rays::RaySlices};
 
 /// Traces rays given in the lens frame through these steps, each of which stands as its pose says; `first` is the
@@ -10,7 +14,7 @@ use crate::{Pose, RayFate, rays::RaySlices};
 pub(crate) fn trace_placed(steps: &[Step], poses: &[Pose], first: usize, rims: Rims, rays: &mut RaySlices<'_>) {
     for (i, (step, pose)) in steps.iter().zip(poses).enumerate() {
         let own = [Step { vertex_z: 0.0, ..step.clone() }];
-        in_frame(pose, rays, |rays| trace_batch(&own, first + i, rims, rays));
+        in_frame(pose, rays, |rays| trace_batch(&Plan::new(&own, first + i, rims), Goal::LastSurface, rays));
     }
 }
 
@@ -18,7 +22,7 @@ pub(crate) fn trace_placed(steps: &[Step], poses: &[Pose], first: usize, rims: R
 pub(crate) fn placed_clearances(steps: &[Step], poses: &[Pose], rays: &mut RaySlices<'_>, clearances: &mut [f64]) {
     for (step, pose) in steps.iter().zip(poses) {
         let own = [Step { vertex_z: 0.0, ..step.clone() }];
-        in_frame(pose, rays, |rays| trace_clearances(&own, rays, clearances));
+        in_frame(pose, rays, |rays| trace_clearances(&Plan::new(&own, 0, Rims::Ignore), rays, clearances));
     }
 }
 
@@ -42,7 +46,7 @@ pub(crate) fn move_to_placed_conic(
             let near = -p.dot(d);
             let q = p + d * near;
             let crossing =
-                cross_conic(curvature, conic, Ray { x: q.x, y: q.y, z: q.z, l: d.x, m: d.y, n: d.z, opl: 0.0 });
+                cross_conic(curvature, conic, &Ray { x: q.x, y: q.y, z: q.z, l: d.x, m: d.y, n: d.z, opl: 0.0 });
             if !(crossing.is_front && crossing.t.is_finite()) {
                 rays.fate[i] = RayFate::Missed { surface };
                 continue;

@@ -74,7 +74,7 @@ impl Toric {
 
     /// Crosses the surface with a ray.
     #[inline(never)]
-    pub(crate) fn cross(&self, ray: Ray) -> Crossing {
+    pub(super) fn cross(&self, ray: &Ray<f64>) -> Crossing<f64> {
         let place = |t: f64| self.at(ray.x + ray.l * t, ray.y + ray.m * t);
         let is_inside = |sag: &Sag| (sag.z + sag.slope_x + sag.slope_y).is_finite();
         let miss =
@@ -131,7 +131,9 @@ fn curve(c: f64, conic: f64, coefficients: &[f64], y: f64) -> (f64, f64) {
 mod tests {
     use glam::{DVec2, DVec3};
 
-    use crate::{Glass, Interface, Lens, ObjectPoint, Rims, Shape, Surface, rays_towards, trace::twin};
+    use crate::{
+        Glass, Interface, Lens, ObjectPoint, Rims, Shape, Surface, rays_towards, trace::tests::trace_one_by_one,
+    };
 
     #[test]
     fn tile_and_scalar_twin_agree_to_the_bit() {
@@ -151,7 +153,7 @@ mod tests {
                 let mut tiled = rays_towards(&point, &targets, 0.0, -3.0);
                 let mut single = tiled.clone();
                 lens.trace(&mut tiled, rims);
-                twin::trace_one_by_one(&lens.steps_for(tiled.object_z_mm), rims, &mut single);
+                trace_one_by_one(&lens, rims, &mut single);
                 assert!(tiled.n_in_flight() > 100 && (rims == Rims::Ignore || tiled.n_in_flight() < 203));
                 assert_eq!(tiled, single);
             }

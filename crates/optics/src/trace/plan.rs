@@ -1,0 +1,169 @@
+//! A train of surfaces as the kernel wants it: constants worked out once, in the kernel's own kind of float.
+
+use super::{
+    Kind, Rims, Step,
+    asphere::{AllPowers, Asphere, EvenPowers, ManyPowers},
+    block::Block,
+    crossing::{Ideal, Interface},
+    kernel::{Conic, Sphere, ThinLens, TwoCurvatures, Window, pass_blocks},
+    real::Real,
+};
+
+/// What to trace: surfaces, and where they lie.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan<T> {
+    pub(super) passes: Vec<Pass<T>>,
+    /// The number of the first surface.
+    pub(super) first: usize,
+    /// The index before the first surface, and behind the last.
+    pub(super) index_before: T,
+    pub(super) index_after: T,
+}
+
+/// One surface of a plan.
+#[derive(Clone, Debug)]
+pub(super) struct Pass<T> {
+    pub(super) form: Form<T>,
+    /// How far its vertex lies behind the one before.
+    pub(super) shift: T,
+    pub(super) vertex_z: T,
+    pub(super) semi_aperture: T,
+    pub(super) interface: Interface<T>,
+}
+
+/// The forms of surfaces; aspheres are sorted by how many powers they have.
+#[derive(Clone, Debug)]
+pub(super) enum Form<T> {
+    Window(Window<T>),
+    Sphere(Sphere<T>),
+    Conic(Conic<T>),
+    Even4(Asphere<T, EvenPowers<T, 4>>),
+    Even8(Asphere<T, EvenPowers<T, 8>>),
+    Even12(Asphere<T, EvenPowers<T, 12>>),
+    All10(Asphere<T, AllPowers<T, 10>>),
+    All20(Asphere<T, AllPowers<T, 20>>),
+    Many(Asphere<T, ManyPowers<T>>),
+    ThinLens(ThinLens<T>),
+    TwoCurvatures(TwoCurvatures<T>),
+}
+
+/// Does the same with a form's optic, whichever it is.
+macro_rules! with_optic {
+    ($form:expr, $optic:ident => $result:expr) => {
+        match $form {
+            Form::Window($optic) => $result,
+            Form::Sphere($optic) => $result,
+            Form::Conic($optic) => $result,
+            Form::Even4($optic) => $result,
+            Form::Even8($optic) => $result,
+            Form::Even12($optic) => $result,
+            Form::All10($optic) => $result,
+            Form::All20($optic) => $result,
+            Form::Many($optic) => $result,
+            Form::ThinLens($optic) => $result,
+            Form::TwoCurvatures($optic) => $result,
+        }
+    };
+}
+
+impl<T: Real> Form<T> {
+    /// Takes blocks through the surface, and returns whether a ray ended there.
+    pub(super) fn pass_blocks(&self, shift: T, from: &[Block<T>], to: &mut [Block<T>]) -> bool {
+        with_optic!(self, optic => pass_blocks(optic, shift, from, to))
+    }
+
+    /// Takes a single block through the surface, of any size.
+    #[cfg(test)]
+    pub(super) fn pass<const N: usize>(&self, shift: T, from: &Block<T, N>, to: &mut Block<T, N>) {
+        use super::kernel::Optic;
+
+        with_optic!(self, optic => optic.pass(shift, from, to));
+    }
+
+    fn of(step: &Step, interface: Interface<T>) -> Self {
+        let curvature = T::of(step.curvature);
+        match &step.kind {
+            Kind::Window => Self::Window(Window(interface)),
+            Kind::Sphere => Self::Sphere(Sphere { curvature, interface }),
+            Kind::Conic { conic } => Self::Conic(Conic { curvature, conic: T::of(*conic), interface }),
+            Kind::EvenAsphere { conic, a2, coefficients } => {
+                let from_r2: Vec<f64> = std::iter::once(a2).chain(coefficients).copied().collect();
+                let base = (curvature, T::of(*conic), interface);
+                match from_r2.len() {
+                    0..=4 => Self::Even4(asphere(base, EvenPowers(padded(&from_r2)))),
+                    5..=8 => Self::Even8(asphere(base, EvenPowers(padded(&from_r2)))),
+                    9..=12 => Self::Even12(asphere(base, EvenPowers(padded(&from_r2)))),
+                    _ => {
+                        let from_r1 = from_r2.iter().flat_map(|&a| [T::ZERO, T::of(a)]).collect();
+                        Self::Many(asphere(base, ManyPowers(from_r1)))
+                    }
+                }
+            }
+            Kind::OddAsphere { conic, coefficients } => {
+                let base = (curvature, T::of(*conic), interface);
+                match coefficients.len() {
+                    0..=10 => Self::All10(asphere(base, AllPowers(padded(coefficients)))),
+                    11..=20 => Self::All20(asphere(base, AllPowers(padded(coefficients)))),
+                    _ => Self::Many(asphere(base, ManyPowers(coefficients.iter().map(|&a| T::of(a)).collect()))),
+                }
+            }
+            Kind::ThinLens { power, object_z } => {
+                let (index_before, index_after) = (T::of(step.index_before), T::of(step.index_after));
+                let ideal = Ideal { index_before, index_after, power: T::of(*power), object_z: T::of(*object_z) };
+                Self::ThinLens(ThinLens { ideal, interface })
+            }
+            Kind::Toric(toric) => Self::TwoCurvatures(TwoCurvatures { toric: toric.clone(), interface }),
+        }
+    }
+}
+
+fn asphere<T, P>((curvature, conic, interface): (T, T, Interface<T>), powers: P) -> Asphere<T, P> {
+    Asphere { curvature, conic, powers, interface }
+}
+
+/// Returns the coefficients with zeros behind them.
+fn padded<T: Real, const M: usize>(coefficients: &[f64]) -> [T; M] {
+    std::array::from_fn(|i| coefficients.get(i).map_or(T::ZERO, |&a| T::of(a)))
+}
+
+impl<T: Real> Plan<T> {
+    /// Plans a trace through these steps, of which there is at least one; `first` is the number of the first of them.
+    pub(crate) fn new(steps: &[Step], first: usize, rims: Rims) -> Self {
+        let (begin, end) = (&steps[0], &steps[steps.len() - 1]);
+        let mut previous_z = begin.vertex_z;
+        let pass = |step: &Step| {
+            let shift = T::of(step.vertex_z - previous_z);
+            previous_z = step.vertex_z;
+            let ratio = step.index_before / step.index_after;
+            let limit_mm2 = match rims {
+                Rims::Clip => T::of(step.semi_aperture * step.semi_aperture),
+                Rims::Ignore => T::MAX,
+            };
+            let interface = Interface {
+                ratio: T::of(ratio),
+                ratio2: T::of(ratio * ratio),
+                index_before: T::of(step.index_before),
+                limit_mm2,
+            };
+            Pass {
+                form: Form::of(step, interface),
+                shift,
+                vertex_z: T::of(step.vertex_z),
+                semi_aperture: T::of(step.semi_aperture),
+                interface,
+            }
+        };
+        Self {
+            first,
+            index_before: T::of(begin.index_before),
+            index_after: T::of(end.index_after),
+            passes: steps.iter().map(pass).collect(),
+        }
+    }
+
+    /// z of the vertex that rays start before, and of the last.
+    pub(super) fn ends_z(&self) -> (T, T) {
+        let z = |pass: Option<&Pass<T>>| pass.map_or(T::ZERO, |pass| pass.vertex_z);
+        (z(self.passes.first()), z(self.passes.last()))
+    }
+}
