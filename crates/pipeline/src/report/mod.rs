@@ -8,6 +8,7 @@ use std::{fs, path::Path};
 
 use dioptric_scene::write_planes_exr;
 use dioptric_sensor::{ElectronRate, Exposure, Picture, Raw, RawPlane, Sensor, Volts};
+use dioptric_spectrum::Illuminant;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use serde::Serialize;
 
@@ -74,6 +75,8 @@ pub struct SceneData {
     pub far_m: f64,
     /// Mean luminance, cd/m².
     pub mean_luminance_cd_m2: f64,
+    /// The light on it, where that is known.
+    pub light: Option<Illuminant>,
 }
 
 /// The irradiance of a run.
@@ -143,6 +146,7 @@ impl Capture {
                 near_m,
                 far_m,
                 mean_luminance_cd_m2: shot.scene.mean_luminance_cd_m2(),
+                light: shot.scene.light,
             },
             irradiance: IrradianceData {
                 wavelengths_nm: shot.grid().centers_nm().to_vec(),
