@@ -15,13 +15,14 @@ mod seq;
 mod shapes;
 mod system;
 mod write;
+mod write_zmx;
 mod zmx;
 
 use std::path::Path;
 
 use crate::{Lens, OpticsError};
 
-pub use lens_file::{Field, LensFile, MissingGlass, ReadOptions};
+pub use lens_file::{Field, LensFile, Microlens, MissingGlass, ReadOptions};
 
 /// Reads a lens file, and gives the lens alone.
 pub(crate) fn read(path: &Path) -> Result<Lens, OpticsError> {

@@ -184,6 +184,12 @@ impl Lens {
         }
     }
 
+    /// What the moves do to the film.
+    pub(crate) fn film_motion(&self) -> Pose {
+        let motions = pose::motions(&self.moves, &self.vertices_z_mm());
+        motions.and_then(|motions| motions.last().copied()).unwrap_or(Pose::centered(0.0))
+    }
+
     /// Whether every surface is one of revolution about the lens's axis: whether nothing is tilted, decentred or
     /// curved differently along x and y.
     pub fn is_rotational(&self) -> bool {

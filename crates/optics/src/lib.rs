@@ -30,7 +30,7 @@ mod trace;
 pub use bundle::{ObjectPoint, rays_over_front, rays_towards};
 pub use catalogue::{CatalogueGlass, GlassCatalogue};
 pub use error::OpticsError;
-pub use formats::{Field, LensFile, MissingGlass, ReadOptions};
+pub use formats::{Field, LensFile, Microlens, MissingGlass, ReadOptions};
 pub use glam;
 pub use glass::{C_LINE_NM, D_LINE_NM, F_LINE_NM, Glass};
 pub use layout::Layout;

@@ -105,7 +105,7 @@ impl Pose {
     }
 
     /// Whether nothing moves, to rounding.
-    fn is_rest(&self) -> bool {
+    pub(crate) fn is_rest(&self) -> bool {
         let turned = (self.rotation - DMat3::IDENTITY).to_cols_array();
         self.vertex_mm.abs().max_element() <= ROUNDING.0 && turned.iter().all(|v| v.abs() <= ROUNDING.1)
     }

@@ -26,8 +26,21 @@ pub struct LensFile {
     pub reference_wavelength_nm: Option<f64>,
     /// The fields that the file names.
     pub fields: Vec<Field>,
+    /// The array of microlenses before the film that the file states. It is kept, not traced.
+    pub microlens: Option<Microlens>,
     /// What the file says and this crate does otherwise or not at all, a sentence each.
     pub notes: Vec<String>,
+}
+
+/// An array of like microlenses before the film.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Microlens {
+    /// How many there are along x and y.
+    pub dimensions: [usize; 2],
+    /// The shift of each from its place in the grid, mm; empty where none is shifted.
+    pub offsets_mm: Vec<[f64; 2]>,
+    /// One of them. Where the file marks no stop, its first surface is it.
+    pub lens: Lens,
 }
 
 /// A point of the field, as lens files name them.
@@ -126,6 +139,7 @@ impl LensFile {
             wavelengths_nm: Vec::new(),
             reference_wavelength_nm: None,
             fields: Vec::new(),
+            microlens: None,
             notes: Vec::new(),
         }
     }
@@ -147,6 +161,6 @@ fn json(text: &str, name: &str, glasses: &Glasses) -> Result<LensFile, TextError
     if deeplens::is_deeplens(&value) {
         deeplens::lens_from_deeplens(&value, name, glasses)
     } else {
-        iset_json::lens_from_omni(&value, name, glasses).map(LensFile::of_lens)
+        iset_json::lens_from_omni(&value, name, glasses)
     }
 }

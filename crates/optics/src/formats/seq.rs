@@ -1,16 +1,23 @@
 //! CODE V sequence files (`.seq`): commands, of which `S` adds a surface and `;` or a line's end ends each.
 //!
-//! Read are rotationally symmetric systems: radii or curvatures, thicknesses, glasses of the catalogue or of a private
-//! one (`PRV` … `END`), conics and even aspheres, circular apertures, the pupil, fields and wavelengths. Commands that
+//! Read are radii or curvatures, thicknesses, glasses of the catalogue or of a private one (`PRV` … `END`), conics, even
+//! aspheres, Y toroids and anamorphic conics (`AAS`), decentres and tilts (basic or `DAR`), circular apertures, the
+//! pupil, fields and wavelengths. Commands that
 //! change no ray (solves, variables, labels) are passed over; what changes rays and cannot be traced is refused.
 
-use crate::{CatalogueGlass, Glass, prescription::TextError};
+mod command;
+mod surface;
 
+use crate::{CatalogueGlass, Glass, ImageSurface, prescription::TextError};
+
+use self::{
+    command::{Command, commands_of},
+    surface::{SeqKind, SeqSurface},
+};
 use super::{
     glasses::{Glasses, constant, model},
     lens_file::{Field, LensFile},
-    shapes::even_asphere,
-    system::{Beam, System, SystemSurface, Vignetting},
+    system::{Beam, System, Vignetting},
 };
 
 /// Reads a CODE V file; `name` serves where the file states none.
@@ -20,82 +27,6 @@ pub(super) fn lens_from_seq(text: &str, name: &str, glasses: Glasses) -> Result<
         file.take(&command)?;
     }
     file.into_system()?.build()
-}
-
-/// A command and what follows it.
-struct Command {
-    line: usize,
-    words: Vec<String>,
-}
-
-/// Returns the commands of a file: comments gone, continued lines joined, quoted words whole.
-fn commands_of(text: &str) -> Vec<Command> {
-    let mut commands = Vec::new();
-    let mut command = Command { line: 1, words: Vec::new() };
-    for (number, line) in text.lines().enumerate() {
-        let mut word = String::new();
-        let (mut quote, mut is_continued) = (None, false);
-        for sign in line.chars().chain(['\n']) {
-            match (quote, sign) {
-                (Some(mark), sign) if sign == mark || sign == '\n' => {
-                    command.words.push(std::mem::take(&mut word));
-                    quote = None;
-                }
-                (Some(_), sign) => word.push(sign),
-                (None, '\'' | '"') if word.is_empty() => quote = Some(sign),
-                (None, '!') => {
-                    push_word(&mut command, &mut word);
-                    break;
-                }
-                (None, '&') => is_continued = true,
-                (None, ';') => {
-                    push_word(&mut command, &mut word);
-                    finish(&mut commands, &mut command, number + 1);
-                }
-                (None, sign) if sign.is_whitespace() => push_word(&mut command, &mut word),
-                (None, sign) => word.push(sign),
-            }
-        }
-        push_word(&mut command, &mut word);
-        if !is_continued {
-            finish(&mut commands, &mut command, number + 2);
-        }
-    }
-    finish(&mut commands, &mut command, 0);
-    commands
-}
-
-fn push_word(command: &mut Command, word: &mut String) {
-    if !word.is_empty() {
-        command.words.push(std::mem::take(word));
-    }
-}
-
-fn finish(commands: &mut Vec<Command>, command: &mut Command, next_line: usize) {
-    let done = std::mem::replace(command, Command { line: next_line, words: Vec::new() });
-    if !done.words.is_empty() {
-        commands.push(done);
-    }
-}
-
-impl Command {
-    fn wrong(&self, reason: impl std::fmt::Display) -> TextError {
-        TextError { line: Some(self.line), reason: format!("{}: {reason}", self.words[0]) }
-    }
-
-    fn number(&self, place: usize) -> Result<f64, TextError> {
-        let Some(word) = self.words.get(place) else {
-            return Err(self.wrong(format!("expected {place} numbers, found {}", self.words.len() - 1)));
-        };
-        match word.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(number),
-            _ => Err(self.wrong(format!("'{word}' is not a number"))),
-        }
-    }
-
-    fn numbers(&self) -> Result<Vec<f64>, TextError> {
-        (1..self.words.len()).map(|place| self.number(place)).collect()
-    }
 }
 
 /// What a file says, in its own units.
@@ -124,20 +55,6 @@ enum FieldKind {
     Angle,
     ObjectHeight,
     ImageHeight,
-}
-
-/// A surface as the file states it, in the file's units; the first is the object, the last the image.
-#[derive(Default)]
-struct SeqSurface {
-    line: usize,
-    is_stop: bool,
-    curvature: f64,
-    thickness: f64,
-    medium: Option<Glass>,
-    conic: f64,
-    /// From r⁴ on.
-    coefficients: [f64; 9],
-    clear_radius: Option<f64>,
 }
 
 impl<'a> Seq<'a> {
@@ -290,13 +207,37 @@ impl<'a> Seq<'a> {
             "REX" | "REY" | "ELX" | "ELY" => {
                 return Err(command.wrong("apertures other than circles are not supported"));
             }
-            "XDE" | "YDE" | "ZDE" | "ADE" | "BDE" | "CDE" if command.number(place)? != 0.0 => {
-                return Err(command.wrong("tilted or decentred surfaces are not supported"));
+            "XDE" | "YDE" | "ZDE" => {
+                let axis = usize::from(keyword.as_bytes()[0] - b'X');
+                self.surfaces[surface].decenter[axis] = command.number(place)?;
             }
-            "CYL" | "XTO" | "YTO" | "AAS" | "SPS" | "SPL" | "GRT" | "DIF" | "HOE" => {
+            "ADE" | "BDE" | "CDE" => {
+                let axis = usize::from(keyword.as_bytes()[0] - b'A');
+                self.surfaces[surface].tilt_deg[axis] = command.number(place)?;
+            }
+            "DAR" => self.surfaces[surface].is_returned = true,
+            "REV" | "BEN" | "RET" | "GLB" => {
+                return Err(command.wrong("this kind of tilt is not supported; expected XDE to CDE, alone or with DAR"));
+            }
+            "YTO" => self.surfaces[surface].kind = SeqKind::Toroid,
+            "AAS" => self.surfaces[surface].kind = SeqKind::Biconic,
+            "KX" => self.surfaces[surface].conic_x = command.number(place)?,
+            "KY" => self.surfaces[surface].conic = command.number(place)?,
+            "CUX" => self.surfaces[surface].curvature_x = command.number(place)?,
+            "RDX" => {
+                self.surfaces[surface].curvature_x = match command.number(place)? {
+                    0.0 => 0.0,
+                    radius => 1.0 / radius,
+                }
+            }
+            "AR" | "BR" | "CR" | "DR" | "AP" | "BP" | "CP" | "DP" if command.number(place)? != 0.0 => {
+                return Err(command.wrong("higher terms of an anamorphic asphere are not supported"));
+            }
+            "CYL" | "XTO" | "SPS" | "SPL" | "GRT" | "DIF" | "HOE" => {
                 let what = command.words.join(" ");
-                return Err(command
-                    .wrong(format!("surfaces of the kind '{what}' are not supported; expected spheres, K and ASP")));
+                return Err(command.wrong(format!(
+                    "surfaces of the kind '{what}' are not supported; expected spheres, K, ASP, YTO and AAS"
+                )));
             }
             "RMD" => return Err(command.wrong("mirrors are not supported")),
             _ => {
@@ -356,16 +297,19 @@ impl<'a> Seq<'a> {
             let reason = "SO: an object space other than air is not supported".to_owned();
             return Err(TextError { line: Some(object.line), reason });
         }
-        if image.curvature != 0.0 {
-            self.notes.push(format!("the image surface of radius {} mm is read as a plane", mm / image.curvature));
-        }
+        let image_surface = ImageSurface { curvature_per_mm: image.curvature / mm, conic: image.conic };
         // The defocus on the image surface is part of the distance to the film; 1e10 and more is infinitely far.
         let defocus_mm = image.thickness * mm;
         let is_far = object.thickness.abs() >= 1e10;
         let object_distance_mm = if is_far { f64::INFINITY } else { object.thickness * mm };
         let mut surfaces = Vec::with_capacity(n_surfaces);
-        for surface in &self.surfaces[1..n_surfaces - 1] {
-            surfaces.push(surface.in_mm(mm)?);
+        let (mut moves, mut z_mm) = (Vec::new(), 0.0);
+        for (i, surface) in self.surfaces[1..].iter().enumerate() {
+            moves.extend(surface.own_move(i, mm, z_mm));
+            z_mm += surface.thickness * mm;
+            if i + 2 < n_surfaces {
+                surfaces.push(surface.in_mm(mm)?);
+            }
         }
         if let Some(last) = surfaces.last_mut() {
             last.thickness_after_mm += defocus_mm;
@@ -382,7 +326,10 @@ impl<'a> Seq<'a> {
             name: self.name.clone(),
             source: "a CODE V file".to_owned(),
             object_distance_mm,
+            first_vertex_z_mm: 0.0,
             surfaces,
+            moves,
+            image_surface,
             stop,
             beam: self.beam.map(|beam| match beam {
                 Beam::EntrancePupil(diameter) => Beam::EntrancePupil(diameter * mm),
@@ -413,23 +360,6 @@ impl<'a> Seq<'a> {
             (field, Vignetting { center, compression })
         };
         (0..x.len().max(y.len())).map(field).collect()
-    }
-}
-
-impl SeqSurface {
-    fn in_mm(&self, mm: f64) -> Result<SystemSurface, TextError> {
-        let mut from_r2 = vec![0.0];
-        from_r2.extend(self.coefficients.iter().zip(1..).map(|(a, i)| a * mm.powi(-1 - 2 * i)));
-        let shape = even_asphere(self.conic, &from_r2);
-        Ok(SystemSurface {
-            line: self.line,
-            curvature_per_mm: self.curvature / mm,
-            shape,
-            medium_after: self.medium.clone().unwrap_or_default(),
-            thickness_after_mm: self.thickness * mm,
-            semi_aperture_mm: self.clear_radius.map(|radius| radius * mm),
-            is_rim_fixed: self.clear_radius.is_some(),
-        })
     }
 }
 

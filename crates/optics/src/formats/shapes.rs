@@ -20,3 +20,10 @@ pub(super) fn even_asphere(conic: f64, coefficients_from_r2: &[f64]) -> Shape {
 pub(super) fn conic_of(conic: f64) -> Shape {
     if conic == 0.0 { Shape::Sphere } else { Shape::Conic { conic } }
 }
+
+/// Returns coefficients without the zeros at their end.
+pub(super) fn up_to_last(mut coefficients: Vec<f64>) -> Vec<f64> {
+    let n_used = coefficients.iter().rposition(|&a| a != 0.0).map_or(0, |last| last + 1);
+    coefficients.truncate(n_used);
+    coefficients
+}

@@ -7,8 +7,8 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    Glass, Interface, Lens, MonoLens, ObjectPoint, OpticsError, Rims, Shape, Surface, glass::D_LINE_NM,
-    prescription::TextError, rays_towards,
+    Glass, ImageSurface, Interface, Lens, MonoLens, Move, ObjectPoint, OpticsError, Pose, Rims, Shape, Surface,
+    glass::D_LINE_NM, prescription::TextError, rays_towards,
 };
 
 use super::lens_file::{Field, LensFile};
@@ -26,6 +26,15 @@ pub(super) struct SystemSurface {
     pub(super) semi_aperture_mm: Option<f64>,
     /// Whether the rim is one that stops light, not merely where the program's rays went.
     pub(super) is_rim_fixed: bool,
+}
+
+/// A tilt and decentre, with the z along the axis at which it happens: from the file's first surface.
+///
+/// Its surfaces are those that the file has; the last may be beyond them, which means the film.
+#[derive(Clone, Debug)]
+pub(super) struct SystemMove {
+    pub(super) z_mm: f64,
+    pub(super) step: Move,
 }
 
 /// How wide the beam is.
@@ -55,7 +64,11 @@ pub(super) struct System {
     pub(super) source: String,
     /// Distance from the object to the first surface, mm; infinite for a far object.
     pub(super) object_distance_mm: f64,
+    /// z along the axis of the first surface, in the count of the moves.
+    pub(super) first_vertex_z_mm: f64,
     pub(super) surfaces: Vec<SystemSurface>,
+    pub(super) moves: Vec<SystemMove>,
+    pub(super) image_surface: ImageSurface,
     pub(super) stop: Option<usize>,
     pub(super) beam: Option<Beam>,
     pub(super) wavelengths_nm: Vec<f64>,
@@ -95,16 +108,32 @@ impl System {
                 }
             }
         }
-        let lens = Lens::new(self.name.clone(), self.source.clone(), interfaces, stop)?;
         Ok(LensFile {
-            lens,
+            lens: self.lens(interfaces, stop)?,
             film_mm: film_mm.filter(|film| film.is_finite()),
             object_distance_mm: Some(self.object_distance_mm).filter(|distance| distance.is_finite()),
             wavelengths_nm: self.wavelengths_nm,
             reference_wavelength_nm: reference_nm,
             fields: self.fields.iter().map(|(field, _)| *field).collect(),
+            microlens: None,
             notes: self.notes,
         })
+    }
+
+    /// Returns the lens of these surfaces, tilted and decentred as the file says.
+    fn lens(&self, interfaces: Vec<Interface>, stop: usize) -> Result<Lens, OpticsError> {
+        let n_surfaces = interfaces.len();
+        let lens = Lens::new(self.name.clone(), self.source.clone(), interfaces, stop)?;
+        let vertices_z_mm = lens.vertices_z_mm();
+        let in_lens = |SystemMove { z_mm, step }: &SystemMove| {
+            let (first, last) = step.surfaces;
+            let pivot_mm = z_mm - self.first_vertex_z_mm - vertices_z_mm[first.min(n_surfaces - 1)];
+            // What is left where two sums of the same distances meet.
+            let pivot_mm = if pivot_mm.abs() < 1e-12 { 0.0 } else { pivot_mm };
+            Move { surfaces: (first, last.min(n_surfaces)), pivot_mm, ..*step }
+        };
+        let moves = self.moves.iter().map(in_lens).collect();
+        lens.with_moves(moves)?.with_image_surface(self.image_surface)
     }
 
     /// Drops planes at which nothing happens to any ray.
@@ -123,10 +152,18 @@ impl System {
             }
             let thickness_mm = surface.thickness_after_mm;
             match i {
-                0 => self.object_distance_mm += thickness_mm,
+                0 => {
+                    self.object_distance_mm += thickness_mm;
+                    self.first_vertex_z_mm += thickness_mm;
+                }
                 _ => self.surfaces[i - 1].thickness_after_mm += thickness_mm,
             }
             self.surfaces.remove(i);
+            self.moves.retain(|step| step.step.surfaces != (i, i));
+            for SystemMove { step, .. } in &mut self.moves {
+                let (first, last) = step.surfaces;
+                step.surfaces = (first - usize::from(first > i), last - usize::from(last >= i && last != usize::MAX));
+            }
             if i < *stop {
                 *stop -= 1;
             }
@@ -156,7 +193,7 @@ impl System {
             }
             interfaces.push(interface);
         }
-        Ok(Lens::new(self.name.clone(), self.source.clone(), interfaces, stop)?)
+        Ok(self.lens(interfaces, stop)?)
     }
 
     /// Returns half the diameter of the stop that lets the stated beam through.
@@ -191,7 +228,8 @@ impl System {
     fn clear_semi_apertures_mm(&mut self, lens: &Lens, stop_semi_aperture_mm: f64) -> Result<Vec<f64>, TextError> {
         let mut interfaces = lens.interfaces().to_vec();
         interfaces[lens.stop()].surface.semi_aperture_mm = stop_semi_aperture_mm;
-        let lens = Lens::new("", "", interfaces, lens.stop())?;
+        let lens = self.lens(interfaces, lens.stop())?;
+        let poses = lens.poses();
         let on_axis = [(Field::Angle { x_deg: 0.0, y_deg: 0.0 }, Vignetting::default())];
         let fields = if self.fields.is_empty() { &on_axis[..] } else { &self.fields[..] };
         let reference_nm = self.wavelengths_nm.get(self.reference).copied().unwrap_or(D_LINE_NM);
@@ -209,7 +247,7 @@ impl System {
             };
             for (field, vignetting) in fields {
                 let point = self.object_point(&mono, *field)?;
-                widen(&mut widest_mm, &mono, &point, *vignetting);
+                widen(&mut widest_mm, (&mono, &poses), &point, *vignetting);
             }
         }
         let unreached = widest_mm.iter().position(|&semi_aperture_mm| semi_aperture_mm == 0.0);
@@ -244,7 +282,7 @@ impl System {
 }
 
 /// Widens the rims so that a ring of rays through the edge of the pupil, and the ray through its centre, pass.
-fn widen(widest_mm: &mut [f64], mono: &MonoLens, point: &ObjectPoint, vignetting: Vignetting) {
+fn widen(widest_mm: &mut [f64], (mono, poses): (&MonoLens, &[Pose]), point: &ObjectPoint, vignetting: Vignetting) {
     let first = mono.first_order();
     if !first.entrance_pupil_z_mm.is_finite() {
         return;
@@ -259,9 +297,10 @@ fn widen(widest_mm: &mut [f64], mono: &MonoLens, point: &ObjectPoint, vignetting
     let mut rays = rays_towards(point, &targets, first.entrance_pupil_z_mm, 0.0);
     for (surface, widest_mm) in widest_mm.iter_mut().enumerate() {
         mono.trace_surfaces(surface..surface + 1, &mut rays, Rims::Ignore);
-        for ((&x, &y), fate) in rays.x_mm.iter().zip(&rays.y_mm).zip(&rays.fate) {
-            if fate.is_in_flight() && x.hypot(y).is_finite() {
-                *widest_mm = widest_mm.max(x.hypot(y));
+        for ray in (0..rays.len()).filter(|&ray| rays.fate[ray].is_in_flight()) {
+            let from_axis_mm = poses[surface].to_own(rays.point_mm(ray)).truncate().length();
+            if from_axis_mm.is_finite() {
+                *widest_mm = widest_mm.max(from_axis_mm);
             }
         }
     }
@@ -269,12 +308,20 @@ fn widen(widest_mm: &mut [f64], mono: &MonoLens, point: &ObjectPoint, vignetting
 
 /// Returns the widest rim that fits on a surface, mm.
 fn widest_mm(surface: &SystemSurface) -> f64 {
-    let conic = match surface.shape {
-        Shape::Conic { conic } | Shape::EvenAsphere { conic, .. } | Shape::OddAsphere { conic, .. } => conic,
-        _ => 0.0,
+    let widest = |curvature_per_mm: f64, conic: f64| {
+        let flattened = (1.0 + conic) * curvature_per_mm * curvature_per_mm;
+        if flattened > 0.0 { (1.0 / flattened.sqrt()).min(1e6) } else { 1e6 }
     };
-    let flattened = (1.0 + conic) * surface.curvature_per_mm * surface.curvature_per_mm;
-    if flattened > 0.0 { (1.0 / flattened.sqrt()).min(1e6) } else { 1e6 }
+    let along_y = |conic: f64| widest(surface.curvature_per_mm, conic);
+    match surface.shape {
+        Shape::Conic { conic } | Shape::EvenAsphere { conic, .. } | Shape::OddAsphere { conic, .. } => along_y(conic),
+        Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
+            along_y(conic).min(widest(curvature_x_per_mm, conic_x))
+        }
+        // A ring's curve may rise towards the axis of rotation: half as wide is safe for all but odd ones.
+        Shape::Toroid { conic, curvature_x_per_mm, .. } => 0.5 * along_y(conic).min(widest(curvature_x_per_mm, 0.0)),
+        _ => along_y(0.0),
+    }
 }
 
 fn plain(reason: &str) -> TextError {

@@ -4,9 +4,9 @@ use std::{fmt::Write as _, fs, path::Path};
 
 use serde_json::{Value, json};
 
-use crate::{Glass, GlassCatalogue, Interface, Lens, OpticsError, Shape, Surface, glass::D_LINE_NM};
+use crate::{Glass, Interface, Lens, OpticsError, Pose, Shape, Surface, glass::D_LINE_NM};
 
-use super::lens_file::{Field, LensFile};
+use super::lens_file::{LensFile, Microlens};
 
 impl From<Lens> for LensFile {
     fn from(lens: Lens) -> Self {
@@ -15,7 +15,7 @@ impl From<Lens> for LensFile {
 }
 
 /// Returns the refusal of a format.
-fn cannot(format: &'static str, surface: usize, what: &str) -> OpticsError {
+pub(super) fn cannot(format: &'static str, surface: usize, what: &str) -> OpticsError {
     OpticsError::CannotWrite { format, reason: format!("surface {surface} {what}") }
 }
 
@@ -49,11 +49,15 @@ impl LensFile {
     /// that at the reference wavelength, or at the d line where the file states none.
     ///
     /// # Errors
-    /// When a surface is a plane that is not the stop, an asphere or an ideal lens, or the stop is curved.
+    /// When a surface is a plane that is not the stop, an asphere or an ideal lens, or tilted or decentred, or the stop
+    /// is curved.
     pub fn to_dat(&self) -> Result<String, OpticsError> {
         const FORMAT: &str = "a .dat file";
         let wavelength_nm = self.reference_wavelength_nm.unwrap_or(D_LINE_NM);
         let lens = &self.lens;
+        if let Some(surface) = first_moved(lens) {
+            return Err(cannot(FORMAT, surface, "is tilted or decentred"));
+        }
         let efl_mm = lens.at(wavelength_nm)?.first_order().efl_mm;
         let mut text = format!(
             "# Name: {}\n# Indices at {wavelength_nm} nm. Focal length (mm):\n{efl_mm}\n",
@@ -83,7 +87,8 @@ impl LensFile {
     /// this crate reads (`"radius": null`, `"stop": true`), so that ISET refuses the file instead of misreading it.
     ///
     /// # Errors
-    /// When a surface is an odd asphere or an ideal lens, or a glass is not known at one of the wavelengths.
+    /// When a surface is an odd asphere, a toroid or an ideal lens, the film is tilted or decentred, or a glass is not
+    /// known at one of the wavelengths.
     pub fn to_omni_json(&self) -> Result<String, OpticsError> {
         let mut wavelengths_nm = self.wavelengths_nm.clone();
         if wavelengths_nm.is_empty() {
@@ -92,105 +97,47 @@ impl LensFile {
         wavelengths_nm.sort_by(f64::total_cmp);
         wavelengths_nm.dedup();
         let lens = &self.lens;
-        let row = |(i, interface): (usize, &Interface)| omni_row(i, i == lens.stop(), interface, &wavelengths_nm);
-        let surfaces: Vec<Value> = lens.interfaces().iter().enumerate().map(row).collect::<Result<_, _>>()?;
-        let file = json!({
+        if lens.film_motion() != Pose::centered(0.0) {
+            return Err(cannot(OMNI, lens.interfaces().len(), "(the film) is tilted or decentred"));
+        }
+        let mut file = json!({
             "name": lens.name(),
             "description": lens.source(),
             "type": "multi element lens",
-            "surfaces": surfaces,
+            "surfaces": omni_rows(lens, &wavelengths_nm)?,
         });
+        if let Some(Microlens { dimensions, offsets_mm, lens }) = &self.microlens {
+            let surfaces = omni_rows(lens, &wavelengths_nm)?;
+            file["microlens"] = json!({ "dimensions": dimensions, "offsets": offsets_mm, "surfaces": surfaces });
+        }
         Ok(format!("{file:#}\n"))
     }
-
-    /// Returns the lens as a Zemax file, with its film, fields and wavelengths.
-    ///
-    /// # Errors
-    /// When a glass is neither of the catalogue nor given by index and Abbe number: the format has no place for others.
-    pub fn to_zmx(&self) -> Result<String, OpticsError> {
-        let lens = &self.lens;
-        let glasses: Vec<String> = lens
-            .interfaces()
-            .iter()
-            .enumerate()
-            .map(|(i, interface)| zmx_glass(i, &interface.medium_after))
-            .collect::<Result<_, _>>()?;
-        let mut text = format!("MODE SEQ\r\nNAME {}\r\nNOTE 0 {}\r\n", one_line(lens.name()), one_line(lens.source()));
-        text.push_str("UNIT MM X W X CM MR CPMM\r\nFLOA\r\n");
-        let makers = self.zmx_makers()?;
-        if !makers.is_empty() {
-            let _ = write!(text, "GCAT {}\r\n", makers.join(" "));
-        }
-        self.write_zmx_fields(&mut text);
-        let distance_mm = self.object_distance_mm.map_or("INFINITY".to_owned(), |distance| format!("{distance:e}"));
-        let _ = write!(text, "SURF 0\r\n  TYPE STANDARD\r\n  CURV 0\r\n  DISZ {distance_mm}\r\n");
-        let last = lens.interfaces().len() - 1;
-        for (i, interface) in lens.interfaces().iter().enumerate() {
-            let _ = write!(text, "SURF {}\r\n", i + 1);
-            if i == lens.stop() {
-                text.push_str("  STOP\r\n");
-            }
-            write_zmx_shape(&mut text, i, &interface.surface)?;
-            let thickness_mm = if i == last { self.film_mm.unwrap_or(0.0) } else { interface.thickness_after_mm };
-            let radius_mm = interface.surface.semi_aperture_mm;
-            let _ = write!(
-                text,
-                "  DISZ {thickness_mm:e}\r\n{}  DIAM {radius_mm:e} 1\r\n  CLAP 0 {radius_mm:e} 0\r\n",
-                glasses[i]
-            );
-        }
-        let _ = write!(text, "SURF {}\r\n  TYPE STANDARD\r\n  CURV 0\r\n  DISZ 0\r\n", last + 2);
-        Ok(text)
-    }
-
-    /// Returns the makers of the glasses, after a check that each glass's name means it in their company.
-    fn zmx_makers(&self) -> Result<Vec<String>, OpticsError> {
-        let mut makers: Vec<String> = Vec::new();
-        let named = self.lens.interfaces().iter().filter_map(|interface| match &interface.medium_after {
-            Glass::Named(name) => Some(GlassCatalogue::built_in().find(name)),
-            _ => None,
-        });
-        let named = named.collect::<Result<Vec<_>, _>>()?;
-        for glass in &named {
-            if !makers.contains(&glass.maker) {
-                makers.push(glass.maker.clone());
-            }
-        }
-        for glass in named {
-            if GlassCatalogue::built_in().find_among(&glass.name, &makers)? != glass {
-                let reason = format!("{} and a glass of another maker have one name", glass.full_name());
-                return Err(OpticsError::CannotWrite { format: "a .zmx file", reason });
-            }
-        }
-        Ok(makers)
-    }
-
-    fn write_zmx_fields(&self, text: &mut String) {
-        let (mut kind, mut rows) = (0, [String::new(), String::new()]);
-        for field in &self.fields {
-            let (this_kind, x, y) = match *field {
-                Field::Angle { x_deg, y_deg } => (0, x_deg, y_deg),
-                Field::ObjectHeight { x_mm, y_mm } => (1, x_mm, y_mm),
-                Field::ImageHeight { x_mm, y_mm } => (3, x_mm, y_mm),
-            };
-            kind = this_kind;
-            let _ = write!(rows[0], " {x:e}");
-            let _ = write!(rows[1], " {y:e}");
-        }
-        let (n_fields, n_wavelengths) = (self.fields.len(), self.wavelengths_nm.len());
-        let _ = write!(text, "FTYP {kind} 0 {n_fields} {n_wavelengths} 0 0 0\r\n");
-        if n_fields > 0 {
-            let _ = write!(text, "XFLN{}\r\nYFLN{}\r\n", rows[0], rows[1]);
-        }
-        for (i, nm) in self.wavelengths_nm.iter().enumerate() {
-            let _ = write!(text, "WAVM {} {:e} 1\r\n", i + 1, nm / 1e3);
-        }
-        let is_reference = |nm: &f64| Some(*nm) == self.reference_wavelength_nm;
-        if let Some(reference) = self.wavelengths_nm.iter().position(is_reference) {
-            let _ = write!(text, "PWAV {}\r\n", reference + 1);
-        }
-    }
 }
+
+const OMNI: &str = "a .json file of ISET";
+
+/// Returns the first surface that does not stand where its distances alone put it.
+fn first_moved(lens: &Lens) -> Option<usize> {
+    lens.poses().iter().zip(lens.vertices_z_mm()).position(|(pose, z_mm)| *pose != Pose::centered(z_mm))
+}
+
+fn omni_rows(lens: &Lens, wavelengths_nm: &[f64]) -> Result<Vec<Value>, OpticsError> {
+    let (poses, vertices_z_mm) = (lens.poses(), lens.vertices_z_mm());
+    let row = |(i, interface): (usize, &Interface)| {
+        let mut row = omni_row(i, i == lens.stop(), interface, wavelengths_nm)?;
+        let Pose { vertex_mm, rotation } = poses[i];
+        if poses[i] != Pose::centered(vertices_z_mm[i]) {
+            let shift_mm = vertex_mm - Pose::centered(vertices_z_mm[i]).vertex_mm;
+            row["transform"] =
+                json!([rotation.x_axis, rotation.y_axis, rotation.z_axis, shift_mm].map(|v| v.to_array()));
+        }
+        Ok(row)
+    };
+    lens.interfaces().iter().enumerate().map(row).collect()
+}
+
+/// Stands for infinity where a biconic is flat along one axis: 1 m off its axis it sags by 5e-13 mm.
+const PLANE_RADIUS_MM: f64 = 1e18;
 
 fn omni_row(i: usize, is_stop: bool, interface: &Interface, wavelengths_nm: &[f64]) -> Result<Value, OpticsError> {
     let surface = &interface.surface;
@@ -220,8 +167,15 @@ fn omni_row(i: usize, is_stop: bool, interface: &Interface, wavelengths_nm: &[f6
             row["conic_constant"] = json!(conic);
             row["aspheric_coefficients"] = json!(coefficients);
         }
+        Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
+            // JSON has no infinity; ISET's readers take a huge radius for it.
+            let radius = |c: f64| if c == 0.0 { PLANE_RADIUS_MM } else { 1.0 / c };
+            row["radius"] = json!([radius(*curvature_x_per_mm), radius(surface.curvature_per_mm)]);
+            row["conic_constant"] = json!([conic_x, conic]);
+        }
         _ => {
-            return Err(cannot("a .json file of ISET", i, "is neither a sphere nor a conic nor an asphere from r⁴ on"));
+            let what = "is neither a sphere nor a conic, a biconic or an asphere from r⁴ on";
+            return Err(cannot(OMNI, i, what));
         }
     }
     if is_stop && !is_plane(surface) {
@@ -230,65 +184,7 @@ fn omni_row(i: usize, is_stop: bool, interface: &Interface, wavelengths_nm: &[f6
     Ok(row)
 }
 
-/// Returns the line of a medium, or nothing for air.
-fn zmx_glass(i: usize, medium: &Glass) -> Result<String, OpticsError> {
-    let model = |nd: f64, vd: f64| format!("  GLAS ___BLANK 1 0 {nd:e} {vd:e}\r\n");
-    match medium {
-        Glass::Air => Ok(String::new()),
-        Glass::Constant { index } => Ok(model(*index, 0.0)),
-        Glass::NdVd { nd, vd } => Ok(model(*nd, *vd)),
-        Glass::Named(name) => {
-            let glass = GlassCatalogue::built_in().find(name)?;
-            let (nd, vd) = glass.glass.nd_vd().unwrap_or((0.0, 0.0));
-            Ok(format!("  GLAS {} 0 0 {nd:.6} {vd:.3}\r\n", glass.name))
-        }
-        other => {
-            let what =
-                format!("has behind it {}, which is neither of the catalogue nor of n_d and V_d", other.describe());
-            Err(cannot("a .zmx file", i, &what))
-        }
-    }
-}
-
-fn write_zmx_shape(text: &mut String, i: usize, surface: &Surface) -> Result<(), OpticsError> {
-    let (kind, conic, parameters): (&str, f64, Vec<f64>) = match &surface.shape {
-        Shape::Sphere => ("STANDARD", 0.0, Vec::new()),
-        Shape::Conic { conic } => ("STANDARD", *conic, Vec::new()),
-        Shape::EvenAsphere { conic, coefficients } => {
-            ("EVENASPH", *conic, [0.0].into_iter().chain(coefficients.iter().copied()).collect())
-        }
-        Shape::OddAsphere { conic, coefficients } if coefficients.iter().step_by(2).all(|&a| a == 0.0) => {
-            ("EVENASPH", *conic, coefficients.iter().skip(1).step_by(2).copied().collect())
-        }
-        Shape::OddAsphere { conic, coefficients } => ("ODDASPHE", *conic, coefficients.clone()),
-        Shape::ThinLens { power_per_mm } => ("PARAXIAL", 0.0, vec![1.0 / power_per_mm]),
-        Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
-            ("BICONICX", *conic, vec![zmx_radius(*curvature_x_per_mm), *conic_x])
-        }
-        Shape::Toroid { curvature_x_per_mm, conic, coefficients } => {
-            let radius = [zmx_radius(*curvature_x_per_mm)];
-            ("TOROIDAL", *conic, radius.into_iter().chain(coefficients.iter().copied()).collect())
-        }
-    };
-    if parameters.len() > 8 {
-        return Err(cannot("a .zmx file", i, "has more than eight aspheric coefficients"));
-    }
-    let _ = write!(text, "  TYPE {kind}\r\n  CURV {:e}\r\n", surface.curvature_per_mm);
-    if conic != 0.0 {
-        let _ = write!(text, "  CONI {conic:e}\r\n");
-    }
-    for (place, parameter) in (1..).zip(parameters) {
-        let _ = write!(text, "  PARM {place} {parameter:e}\r\n");
-    }
-    Ok(())
-}
-
-/// Returns the radius of a curvature, of which Zemax writes 0 for that of a plane.
-fn zmx_radius(curvature_per_mm: f64) -> f64 {
-    if curvature_per_mm == 0.0 { 0.0 } else { 1.0 / curvature_per_mm }
-}
-
 /// Returns a text without line ends, which would end it in a format of lines.
-fn one_line(text: &str) -> String {
+pub(super) fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -1,16 +1,19 @@
 //! Zemax lens files (`.zmx`): a keyword a line, surfaces in blocks that begin with `SURF`.
 //!
-//! Read are sequential systems of the surfaces STANDARD, EVENASPH, ODDASPHE and PARAXIAL, with the entrance pupil,
-//! fields and wavelengths of the first configuration. Keywords that change no ray (colours, tolerances, merit functions) are
+//! Read are sequential systems of the surfaces STANDARD, EVENASPH, ODDASPHE, BICONICX, TOROIDAL, PARAXIAL and COORDBRK,
+//! with the entrance pupil, fields and wavelengths of the first configuration. Solves and pickups keep the values that
+//! the file stores. Keywords that change no ray (colours, tolerances, merit functions) are
 //! passed over; whatever changes rays and cannot be traced is refused by name.
 
-use crate::{Glass, Shape, prescription::TextError};
+mod surface;
 
+use crate::{ImageSurface, prescription::TextError};
+
+use self::surface::ZmxSurface;
 use super::{
-    glasses::{Glasses, model},
+    glasses::Glasses,
     lens_file::{Field, LensFile},
-    shapes::{conic_of, even_asphere},
-    system::{Beam, System, SystemSurface, Vignetting},
+    system::{Beam, System, SystemMove, SystemSurface, Vignetting},
 };
 
 /// Reads a Zemax file; `name` serves where the file states none.
@@ -93,42 +96,6 @@ struct Zmx {
     surfaces: Vec<ZmxSurface>,
 }
 
-/// A surface as the file states it, in the file's units.
-#[derive(Default)]
-struct ZmxSurface {
-    line: usize,
-    is_stop: bool,
-    kind: String,
-    curvature: f64,
-    conic: f64,
-    thickness: f64,
-    /// Numbered from 1.
-    parameters: Vec<f64>,
-    semi_diameter: Option<f64>,
-    is_semi_diameter_fixed: bool,
-    clear_radius: Option<f64>,
-    glass: Option<ZmxGlass>,
-}
-
-struct ZmxGlass {
-    line: usize,
-    name: String,
-    nd_vd: Option<(f64, f64)>,
-}
-
-/// Keywords of apertures that are no circles around the axis.
-const OTHER_APERTURES: [(&str, &str); 9] = [
-    ("OBSC", "a central obscuration"),
-    ("SPID", "a spider"),
-    ("SQAP", "a rectangular aperture"),
-    ("SQOB", "a rectangular obscuration"),
-    ("ELAP", "an elliptical aperture"),
-    ("ELOB", "an elliptical obscuration"),
-    ("USAP", "a user-defined aperture"),
-    ("USOB", "a user-defined obscuration"),
-    ("UDAP", "a user-defined aperture"),
-];
-
 impl Zmx {
     fn take(&mut self, line: &Line) -> Result<(), TextError> {
         match line.keyword {
@@ -137,7 +104,7 @@ impl Zmx {
                 if number != self.surfaces.len() {
                     return Err(line.wrong(format!("surface {number} where {} was expected", self.surfaces.len())));
                 }
-                self.surfaces.push(ZmxSurface { line: line.number, kind: "STANDARD".to_owned(), ..Default::default() });
+                self.surfaces.push(ZmxSurface::begin(line.number));
                 Ok(())
             }
             _ => {
@@ -198,17 +165,32 @@ impl Zmx {
             let reason = "surface 0: an object space other than air is not supported".to_owned();
             return Err(TextError { line: Some(object.line), reason });
         }
-        if image.curvature != 0.0 {
-            notes.push(format!("the image surface of radius {} mm is read as a plane", mm / image.curvature));
-        }
+        let image_surface = ImageSurface { curvature_per_mm: image.curvature / mm, conic: image.conic };
         let last = self.surfaces.len() - 1;
         let mut surfaces: Vec<SystemSurface> = Vec::with_capacity(last);
         let mut stop = self.surfaces[0].is_stop.then_some(0);
+        let mut moves: Vec<SystemMove> = Vec::new();
+        let mut object_distance_mm = self.surfaces[0].thickness * mm;
+        // z along the axis from the first surface of the file, and of its first surface that is no coordinate break.
+        let (mut z_mm, mut first_vertex_z_mm) = (0.0, 0.0);
         for (number, surface) in self.surfaces[..last].iter().enumerate().skip(1) {
-            if surface.is_stop {
-                stop = Some(surfaces.len());
+            let thickness_mm = surface.thickness * mm;
+            if surface.kind == "COORDBRK" {
+                moves.push(surface.coordinate_break(number, mm, (surfaces.len(), z_mm))?);
+                match surfaces.last_mut() {
+                    Some(before) => before.thickness_after_mm += thickness_mm,
+                    None => {
+                        object_distance_mm += thickness_mm;
+                        first_vertex_z_mm += thickness_mm;
+                    }
+                }
+            } else {
+                if surface.is_stop {
+                    stop = Some(surfaces.len());
+                }
+                surfaces.push(surface.in_mm(number, mm, &glasses, &mut notes)?);
             }
-            surfaces.push(surface.in_mm(number, mm, &glasses, &mut notes)?);
+            z_mm += thickness_mm;
         }
         let mut wavelengths_um = self.wavelengths_um;
         wavelengths_um.sort_by_key(|(number, _)| *number);
@@ -217,8 +199,11 @@ impl Zmx {
         Ok(System {
             name: if self.name.is_empty() { name.to_owned() } else { self.name },
             source: if self.note.is_empty() { "a Zemax file".to_owned() } else { self.note },
-            object_distance_mm: self.surfaces[0].thickness * mm,
+            object_distance_mm,
+            first_vertex_z_mm,
             surfaces,
+            moves,
+            image_surface,
             stop,
             beam: self.beam.map(|beam| match beam {
                 Beam::EntrancePupil(diameter) => Beam::EntrancePupil(diameter * mm),
@@ -273,128 +258,4 @@ fn fields(
         Ok((field, Vignetting { center: (dx, dy).into(), compression: (cx, cy).into() }))
     };
     (0..n_fields).map(field).collect()
-}
-
-impl ZmxSurface {
-    /// Takes what belongs to a surface; gives false where the line does not.
-    fn take(&mut self, line: &Line) -> Result<bool, TextError> {
-        match line.keyword {
-            "STOP" => self.is_stop = true,
-            "TYPE" => self.kind = line.words.first().copied().unwrap_or_default().to_uppercase(),
-            "CURV" => self.curvature = line.number(0)?,
-            "CONI" => self.conic = line.number(0)?,
-            "DISZ" => self.thickness = line.number(0)?,
-            "PARM" => {
-                let place = line.count(0)?;
-                if !(1..=200).contains(&place) {
-                    return Err(line.wrong(format!("parameter {place}; expected 1 to 200")));
-                }
-                self.parameters.resize(self.parameters.len().max(place), 0.0);
-                self.parameters[place - 1] = line.number(1)?;
-            }
-            "DIAM" => {
-                let semi_diameter = line.number(0)?;
-                self.semi_diameter = (semi_diameter > 0.0).then_some(semi_diameter);
-                self.is_semi_diameter_fixed = line.number_or(1, 0.0)? == 1.0;
-            }
-            "CLAP" => {
-                if line.number(0)? > 0.0 {
-                    return Err(line.wrong("an aperture with a hole is not supported"));
-                }
-                self.clear_radius = Some(line.number(1)?);
-            }
-            "FLAP" => self.is_semi_diameter_fixed = true,
-            "OBDC" if line.number_or(0, 0.0)? != 0.0 || line.number_or(1, 0.0)? != 0.0 => {
-                return Err(line.wrong("a decentred aperture is not supported"));
-            }
-            "GLAS" => {
-                let name = line.words.first().copied().unwrap_or_default().to_owned();
-                let (nd, vd) = (line.number_or(3, 0.0)?, line.number_or(4, 0.0)?);
-                self.glass = Some(ZmxGlass { line: line.number, name, nd_vd: (nd > 0.0).then_some((nd, vd)) });
-            }
-            keyword => {
-                if let Some((_, what)) = OTHER_APERTURES.iter().find(|(other, _)| *other == keyword) {
-                    return Err(line.wrong(format!("{what} is not supported")));
-                }
-                return Ok(false);
-            }
-        }
-        Ok(true)
-    }
-
-    fn in_mm(
-        &self,
-        number: usize,
-        mm: f64,
-        glasses: &Glasses,
-        notes: &mut Vec<String>,
-    ) -> Result<SystemSurface, TextError> {
-        let wrong = |reason: String| TextError { line: Some(self.line), reason: format!("surface {number}: {reason}") };
-        let parameter = |place: usize| self.parameters.get(place - 1).copied().unwrap_or(0.0);
-        let mut curvature_per_mm = self.curvature / mm;
-        let shape = match self.kind.as_str() {
-            "STANDARD" => conic_of(self.conic),
-            "EVENASPH" => {
-                let powers = (1..).map(|half| 1 - 2 * half);
-                let from_r2: Vec<f64> =
-                    self.parameters.iter().take(8).zip(powers).map(|(a, p)| a * mm.powi(p)).collect();
-                even_asphere(self.conic, &from_r2)
-            }
-            "ODDASPHE" => {
-                let powers = (1..).map(|power| 1 - power);
-                let from_r1 = self.parameters.iter().take(8).zip(powers).map(|(a, p)| a * mm.powi(p)).collect();
-                Shape::OddAsphere { conic: self.conic, coefficients: from_r1 }
-            }
-            "PARAXIAL" => {
-                curvature_per_mm = 0.0;
-                Shape::ThinLens { power_per_mm: 1.0 / (parameter(1) * mm) }
-            }
-            "COORDBRK" if self.parameters.iter().take(5).all(|&p| p == 0.0) => Shape::Sphere,
-            "COORDBRK" => {
-                return Err(wrong("a coordinate break (COORDBRK: tilt or decentre) is not supported".to_owned()));
-            }
-            other => {
-                let known = "expected STANDARD, EVENASPH, ODDASPHE, PARAXIAL or a COORDBRK of zeros";
-                return Err(wrong(format!("surfaces of type {other} are not supported; {known}")));
-            }
-        };
-        let medium_after = self.medium(number, glasses, notes)?;
-        let semi_aperture = self.clear_radius.or(self.semi_diameter).filter(|_| self.kind != "COORDBRK");
-        Ok(SystemSurface {
-            line: self.line,
-            curvature_per_mm,
-            shape,
-            medium_after,
-            thickness_after_mm: self.thickness * mm,
-            semi_aperture_mm: semi_aperture.map(|semi_aperture| semi_aperture * mm),
-            is_rim_fixed: semi_aperture.is_some() && (self.clear_radius.is_some() || self.is_semi_diameter_fixed),
-        })
-    }
-
-    fn medium(&self, number: usize, glasses: &Glasses, notes: &mut Vec<String>) -> Result<Glass, TextError> {
-        let Some(stated) = &self.glass else { return Ok(Glass::Air) };
-        let wrong =
-            |reason: String| TextError { line: Some(stated.line), reason: format!("surface {number}: {reason}") };
-        match (stated.name.to_uppercase().as_str(), stated.nd_vd) {
-            ("MIRROR", _) => Err(wrong("mirrors are not supported".to_owned())),
-            ("AIR" | "VACUUM" | "", _) => Ok(Glass::Air),
-            ("___BLANK", Some((nd, vd))) => Ok(model(nd, vd)),
-            ("___BLANK", None) => Err(wrong("a model glass without its index".to_owned())),
-            (_, nd_vd) => {
-                let found = glasses
-                    .find(&stated.name, nd_vd)
-                    .map_err(|reason| wrong(format!("{reason}{}", searched(glasses))))?;
-                notes.extend(found.note);
-                Ok(found.glass)
-            }
-        }
-    }
-}
-
-/// Says in which catalogues the file itself would look.
-fn searched(glasses: &Glasses) -> String {
-    match glasses.makers.as_slice() {
-        [] => String::new(),
-        makers => format!("; the file's catalogues (GCAT) are {}", makers.join(", ")),
-    }
 }

@@ -1,0 +1,219 @@
+//! Zemax files written.
+
+use std::fmt::Write as _;
+
+use crate::{Glass, GlassCatalogue, OpticsError, Pose, Shape, Surface};
+
+use super::{
+    lens_file::{Field, LensFile},
+    write::{cannot, one_line},
+};
+
+/// The way from one surface to the next: a distance along the axis, and a coordinate break where the next stands off it.
+struct Gap {
+    thickness_mm: f64,
+    turn: Option<Pose>,
+}
+
+impl Gap {
+    /// Returns the gap of this way, which is `straight_mm` long where it follows the axis.
+    fn new(way: &Pose, straight_mm: f64) -> Self {
+        let straight = Pose::centered(straight_mm);
+        // What rounding leaves of a motion and its return.
+        if way.inverse().after(&straight).is_rest() {
+            return Self { thickness_mm: straight_mm, turn: None };
+        }
+        Self { thickness_mm: way.vertex_mm.z, turn: Some(*way) }
+    }
+
+    fn write_break(&self, text: &mut String, n_written: &mut usize) {
+        let Some(turn) = &self.turn else { return };
+        *n_written += 1;
+        let _ = write!(text, "SURF {n_written}\r\n  TYPE COORDBRK\r\n  CURV 0\r\n");
+        let [x, y, z] = turn.tilt_deg();
+        for (place, parameter) in (1..).zip([turn.vertex_mm.x, turn.vertex_mm.y, x, y, z, 0.0]) {
+            let _ = write!(text, "  PARM {place} {parameter:e}\r\n");
+        }
+        text.push_str("  DISZ 0\r\n");
+    }
+}
+
+impl LensFile {
+    /// Returns the lens as a Zemax file, with its film, fields and wavelengths. What is tilted or decentred stands behind
+    /// coordinate breaks, one from each surface to the next. A first surface that is shifted along z comes back at z = 0,
+    /// which moves the lens frame.
+    ///
+    /// # Errors
+    /// When a glass is neither of the catalogue nor given by index and Abbe number: the format has no place for others.
+    pub fn to_zmx(&self) -> Result<String, OpticsError> {
+        let lens = &self.lens;
+        let glasses: Vec<String> = lens
+            .interfaces()
+            .iter()
+            .enumerate()
+            .map(|(i, interface)| zmx_glass(i, &interface.medium_after))
+            .collect::<Result<_, _>>()?;
+        let mut text = format!("MODE SEQ\r\nNAME {}\r\nNOTE 0 {}\r\n", one_line(lens.name()), one_line(lens.source()));
+        text.push_str("UNIT MM X W X CM MR CPMM\r\nFLOA\r\n");
+        let makers = self.zmx_makers()?;
+        if !makers.is_empty() {
+            let _ = write!(text, "GCAT {}\r\n", makers.join(" "));
+        }
+        self.write_zmx_fields(&mut text);
+        let gaps = self.zmx_gaps();
+        let mut n_written = 0;
+        let distance_mm = match self.object_distance_mm {
+            Some(distance_mm) => format!("{:e}", distance_mm + gaps[0].thickness_mm),
+            None => "INFINITY".to_owned(),
+        };
+        let _ = write!(text, "SURF 0\r\n  TYPE STANDARD\r\n  CURV 0\r\n  DISZ {distance_mm}\r\n");
+        gaps[0].write_break(&mut text, &mut n_written);
+        for (i, interface) in lens.interfaces().iter().enumerate() {
+            n_written += 1;
+            let _ = write!(text, "SURF {n_written}\r\n");
+            if i == lens.stop() {
+                text.push_str("  STOP\r\n");
+            }
+            write_zmx_shape(&mut text, i, &interface.surface)?;
+            let thickness_mm = gaps[i + 1].thickness_mm;
+            let radius_mm = interface.surface.semi_aperture_mm;
+            let _ = write!(
+                text,
+                "  DISZ {thickness_mm:e}\r\n{}  DIAM {radius_mm:e} 1\r\n  CLAP 0 {radius_mm:e} 0\r\n",
+                glasses[i]
+            );
+            gaps[i + 1].write_break(&mut text, &mut n_written);
+        }
+        let image = lens.image_surface();
+        let _ = write!(text, "SURF {}\r\n  TYPE STANDARD\r\n  CURV {:e}\r\n", n_written + 1, image.curvature_per_mm);
+        if image.conic != 0.0 {
+            let _ = write!(text, "  CONI {:e}\r\n", image.conic);
+        }
+        text.push_str("  DISZ 0\r\n");
+        Ok(text)
+    }
+
+    /// Returns the ways from the lens frame to the first surface, between surfaces, and to the film.
+    fn zmx_gaps(&self) -> Vec<Gap> {
+        let lens = &self.lens;
+        let film_z_mm = lens.last_vertex_z_mm() + self.film_mm.unwrap_or(0.0);
+        let film = lens.film_motion().after(&Pose::centered(film_z_mm));
+        let mut before = Pose::centered(0.0);
+        let gap = |(i, pose): (usize, Pose)| {
+            let way = std::mem::replace(&mut before, pose).inverse().after(&pose);
+            let straight_mm = match i.checked_sub(1) {
+                None => 0.0,
+                Some(i) if i + 1 == lens.interfaces().len() => self.film_mm.unwrap_or(0.0),
+                Some(i) => lens.interfaces()[i].thickness_after_mm,
+            };
+            Gap::new(&way, straight_mm)
+        };
+        lens.poses().into_iter().chain([film]).enumerate().map(gap).collect()
+    }
+
+    /// Returns the makers of the glasses, after a check that each glass's name means it in their company.
+    fn zmx_makers(&self) -> Result<Vec<String>, OpticsError> {
+        let mut makers: Vec<String> = Vec::new();
+        let named = self.lens.interfaces().iter().filter_map(|interface| match &interface.medium_after {
+            Glass::Named(name) => Some(GlassCatalogue::built_in().find(name)),
+            _ => None,
+        });
+        let named = named.collect::<Result<Vec<_>, _>>()?;
+        for glass in &named {
+            if !makers.contains(&glass.maker) {
+                makers.push(glass.maker.clone());
+            }
+        }
+        for glass in named {
+            if GlassCatalogue::built_in().find_among(&glass.name, &makers)? != glass {
+                let reason = format!("{} and a glass of another maker have one name", glass.full_name());
+                return Err(OpticsError::CannotWrite { format: "a .zmx file", reason });
+            }
+        }
+        Ok(makers)
+    }
+
+    fn write_zmx_fields(&self, text: &mut String) {
+        let (mut kind, mut rows) = (0, [String::new(), String::new()]);
+        for field in &self.fields {
+            let (this_kind, x, y) = match *field {
+                Field::Angle { x_deg, y_deg } => (0, x_deg, y_deg),
+                Field::ObjectHeight { x_mm, y_mm } => (1, x_mm, y_mm),
+                Field::ImageHeight { x_mm, y_mm } => (3, x_mm, y_mm),
+            };
+            kind = this_kind;
+            let _ = write!(rows[0], " {x:e}");
+            let _ = write!(rows[1], " {y:e}");
+        }
+        let (n_fields, n_wavelengths) = (self.fields.len(), self.wavelengths_nm.len());
+        let _ = write!(text, "FTYP {kind} 0 {n_fields} {n_wavelengths} 0 0 0\r\n");
+        if n_fields > 0 {
+            let _ = write!(text, "XFLN{}\r\nYFLN{}\r\n", rows[0], rows[1]);
+        }
+        for (i, nm) in self.wavelengths_nm.iter().enumerate() {
+            let _ = write!(text, "WAVM {} {:e} 1\r\n", i + 1, nm / 1e3);
+        }
+        let is_reference = |nm: &f64| Some(*nm) == self.reference_wavelength_nm;
+        if let Some(reference) = self.wavelengths_nm.iter().position(is_reference) {
+            let _ = write!(text, "PWAV {}\r\n", reference + 1);
+        }
+    }
+}
+
+/// Returns the line of a medium, or nothing for air.
+fn zmx_glass(i: usize, medium: &Glass) -> Result<String, OpticsError> {
+    let model = |nd: f64, vd: f64| format!("  GLAS ___BLANK 1 0 {nd:e} {vd:e}\r\n");
+    match medium {
+        Glass::Air => Ok(String::new()),
+        Glass::Constant { index } => Ok(model(*index, 0.0)),
+        Glass::NdVd { nd, vd } => Ok(model(*nd, *vd)),
+        Glass::Named(name) => {
+            let glass = GlassCatalogue::built_in().find(name)?;
+            let (nd, vd) = glass.glass.nd_vd().unwrap_or((0.0, 0.0));
+            Ok(format!("  GLAS {} 0 0 {nd:.6} {vd:.3}\r\n", glass.name))
+        }
+        other => {
+            let what =
+                format!("has behind it {}, which is neither of the catalogue nor of n_d and V_d", other.describe());
+            Err(cannot("a .zmx file", i, &what))
+        }
+    }
+}
+
+fn write_zmx_shape(text: &mut String, i: usize, surface: &Surface) -> Result<(), OpticsError> {
+    let (kind, conic, parameters): (&str, f64, Vec<f64>) = match &surface.shape {
+        Shape::Sphere => ("STANDARD", 0.0, Vec::new()),
+        Shape::Conic { conic } => ("STANDARD", *conic, Vec::new()),
+        Shape::EvenAsphere { conic, coefficients } => {
+            ("EVENASPH", *conic, [0.0].into_iter().chain(coefficients.iter().copied()).collect())
+        }
+        Shape::OddAsphere { conic, coefficients } if coefficients.iter().step_by(2).all(|&a| a == 0.0) => {
+            ("EVENASPH", *conic, coefficients.iter().skip(1).step_by(2).copied().collect())
+        }
+        Shape::OddAsphere { conic, coefficients } => ("ODDASPHE", *conic, coefficients.clone()),
+        Shape::ThinLens { power_per_mm } => ("PARAXIAL", 0.0, vec![1.0 / power_per_mm]),
+        Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
+            ("BICONICX", *conic, vec![zmx_radius(*curvature_x_per_mm), *conic_x])
+        }
+        Shape::Toroid { curvature_x_per_mm, conic, coefficients } => {
+            let radius = [zmx_radius(*curvature_x_per_mm)];
+            ("TOROIDAL", *conic, radius.into_iter().chain(coefficients.iter().copied()).collect())
+        }
+    };
+    if parameters.len() > 8 {
+        return Err(cannot("a .zmx file", i, "has more than eight aspheric coefficients"));
+    }
+    let _ = write!(text, "  TYPE {kind}\r\n  CURV {:e}\r\n", surface.curvature_per_mm);
+    if conic != 0.0 {
+        let _ = write!(text, "  CONI {conic:e}\r\n");
+    }
+    for (place, parameter) in (1..).zip(parameters) {
+        let _ = write!(text, "  PARM {place} {parameter:e}\r\n");
+    }
+    Ok(())
+}
+
+/// Returns the radius of a curvature, of which Zemax writes 0 for that of a plane.
+fn zmx_radius(curvature_per_mm: f64) -> f64 {
+    if curvature_per_mm == 0.0 { 0.0 } else { 1.0 / curvature_per_mm }
+}

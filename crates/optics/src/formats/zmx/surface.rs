@@ -1,0 +1,217 @@
+//! A surface of a Zemax file.
+
+use crate::{Glass, Move, Shape, prescription::TextError};
+
+use super::super::{
+    glasses::{Glasses, model},
+    shapes::{conic_of, even_asphere, up_to_last},
+    system::{SystemMove, SystemSurface},
+};
+use super::Line;
+
+/// A surface as the file states it, in the file's units.
+#[derive(Default)]
+pub(super) struct ZmxSurface {
+    pub(super) line: usize,
+    pub(super) is_stop: bool,
+    pub(super) kind: String,
+    pub(super) curvature: f64,
+    pub(super) conic: f64,
+    pub(super) thickness: f64,
+    /// Numbered from 1.
+    parameters: Vec<f64>,
+    semi_diameter: Option<f64>,
+    is_semi_diameter_fixed: bool,
+    has_extra_data: bool,
+    clear_radius: Option<f64>,
+    pub(super) glass: Option<ZmxGlass>,
+}
+
+pub(super) struct ZmxGlass {
+    line: usize,
+    name: String,
+    nd_vd: Option<(f64, f64)>,
+}
+
+/// Keywords of apertures that are no circles around the axis.
+const OTHER_APERTURES: [(&str, &str); 9] = [
+    ("OBSC", "a central obscuration"),
+    ("SPID", "a spider"),
+    ("SQAP", "a rectangular aperture"),
+    ("SQOB", "a rectangular obscuration"),
+    ("ELAP", "an elliptical aperture"),
+    ("ELOB", "an elliptical obscuration"),
+    ("USAP", "a user-defined aperture"),
+    ("USOB", "a user-defined obscuration"),
+    ("UDAP", "a user-defined aperture"),
+];
+
+impl ZmxSurface {
+    /// Returns a plane that begins at this line.
+    pub(super) fn begin(line: usize) -> Self {
+        Self { line, kind: "STANDARD".to_owned(), ..Default::default() }
+    }
+
+    /// Takes what belongs to a surface; gives false where the line does not.
+    pub(super) fn take(&mut self, line: &Line) -> Result<bool, TextError> {
+        match line.keyword {
+            "STOP" => self.is_stop = true,
+            "TYPE" => self.kind = line.words.first().copied().unwrap_or_default().to_uppercase(),
+            "CURV" => self.curvature = line.number(0)?,
+            "CONI" => self.conic = line.number(0)?,
+            "DISZ" => self.thickness = line.number(0)?,
+            "PARM" => {
+                let place = line.count(0)?;
+                if !(1..=200).contains(&place) {
+                    return Err(line.wrong(format!("parameter {place}; expected 1 to 200")));
+                }
+                self.parameters.resize(self.parameters.len().max(place), 0.0);
+                self.parameters[place - 1] = line.number(1)?;
+            }
+            "DIAM" => {
+                let semi_diameter = line.number(0)?;
+                self.semi_diameter = (semi_diameter > 0.0).then_some(semi_diameter);
+                self.is_semi_diameter_fixed = line.number_or(1, 0.0)? == 1.0;
+            }
+            "CLAP" => {
+                if line.number(0)? > 0.0 {
+                    return Err(line.wrong("an aperture with a hole is not supported"));
+                }
+                self.clear_radius = Some(line.number(1)?);
+            }
+            "XDAT" => self.has_extra_data |= line.number_or(1, 0.0)? != 0.0,
+            "FLAP" => self.is_semi_diameter_fixed = true,
+            "OBDC" if line.number_or(0, 0.0)? != 0.0 || line.number_or(1, 0.0)? != 0.0 => {
+                return Err(line.wrong("a decentred aperture is not supported"));
+            }
+            "GLAS" => {
+                let name = line.words.first().copied().unwrap_or_default().to_owned();
+                let (nd, vd) = (line.number_or(3, 0.0)?, line.number_or(4, 0.0)?);
+                self.glass = Some(ZmxGlass { line: line.number, name, nd_vd: (nd > 0.0).then_some((nd, vd)) });
+            }
+            keyword => {
+                if let Some((_, what)) = OTHER_APERTURES.iter().find(|(other, _)| *other == keyword) {
+                    return Err(line.wrong(format!("{what} is not supported")));
+                }
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    pub(super) fn in_mm(
+        &self,
+        number: usize,
+        mm: f64,
+        glasses: &Glasses,
+        notes: &mut Vec<String>,
+    ) -> Result<SystemSurface, TextError> {
+        let wrong = |reason: String| TextError { line: Some(self.line), reason: format!("surface {number}: {reason}") };
+        let parameter = |place: usize| self.parameters.get(place - 1).copied().unwrap_or(0.0);
+        let mut curvature_per_mm = self.curvature / mm;
+        let shape = match self.kind.as_str() {
+            "STANDARD" => conic_of(self.conic),
+            "EVENASPH" => {
+                let powers = (1..).map(|half| 1 - 2 * half);
+                let from_r2: Vec<f64> =
+                    self.parameters.iter().take(8).zip(powers).map(|(a, p)| a * mm.powi(p)).collect();
+                even_asphere(self.conic, &from_r2)
+            }
+            "ODDASPHE" => {
+                let powers = (1..).map(|power| 1 - power);
+                let from_r1 = self.parameters.iter().take(8).zip(powers).map(|(a, p)| a * mm.powi(p)).collect();
+                Shape::OddAsphere { conic: self.conic, coefficients: from_r1 }
+            }
+            "PARAXIAL" => {
+                curvature_per_mm = 0.0;
+                Shape::ThinLens { power_per_mm: 1.0 / (parameter(1) * mm) }
+            }
+            "BICONICX" => Shape::Biconic {
+                conic: self.conic,
+                curvature_x_per_mm: curvature_of(parameter(1) * mm),
+                conic_x: parameter(2),
+            },
+            "TOROIDAL" if self.has_extra_data => {
+                return Err(wrong("Zernike terms (XDAT) of a toroid are not supported".to_owned()));
+            }
+            "TOROIDAL" => {
+                let powers = (1..).map(|half| 1 - 2 * half);
+                let from_y2 = self.parameters.iter().skip(1).take(7).zip(powers).map(|(a, p)| a * mm.powi(p));
+                Shape::Toroid {
+                    curvature_x_per_mm: curvature_of(parameter(1) * mm),
+                    conic: self.conic,
+                    coefficients: up_to_last(from_y2.collect()),
+                }
+            }
+            other => {
+                let known = "expected STANDARD, EVENASPH, ODDASPHE, BICONICX, TOROIDAL, PARAXIAL or COORDBRK";
+                return Err(wrong(format!("surfaces of type {other} are not supported; {known}")));
+            }
+        };
+        let medium_after = self.medium(number, glasses, notes)?;
+        let semi_aperture = self.clear_radius.or(self.semi_diameter);
+        Ok(SystemSurface {
+            line: self.line,
+            curvature_per_mm,
+            shape,
+            medium_after,
+            thickness_after_mm: self.thickness * mm,
+            semi_aperture_mm: semi_aperture.map(|semi_aperture| semi_aperture * mm),
+            is_rim_fixed: semi_aperture.is_some() && (self.clear_radius.is_some() || self.is_semi_diameter_fixed),
+        })
+    }
+
+    /// Returns the move of everything from this coordinate break to the film, whose next surface is `first`.
+    pub(super) fn coordinate_break(
+        &self,
+        number: usize,
+        mm: f64,
+        (first, z_mm): (usize, f64),
+    ) -> Result<SystemMove, TextError> {
+        if self.is_stop {
+            let reason = format!("surface {number}: a coordinate break cannot be the stop");
+            return Err(TextError { line: Some(self.line), reason });
+        }
+        let parameter = |place: usize| self.parameters.get(place - 1).copied().unwrap_or(0.0);
+        let step = Move {
+            surfaces: (first, usize::MAX),
+            pivot_mm: 0.0,
+            decenter_mm: [parameter(1) * mm, parameter(2) * mm, 0.0],
+            tilt_deg: [parameter(3), parameter(4), parameter(5)],
+            tilt_first: parameter(6) != 0.0,
+        };
+        Ok(SystemMove { z_mm, step })
+    }
+
+    fn medium(&self, number: usize, glasses: &Glasses, notes: &mut Vec<String>) -> Result<Glass, TextError> {
+        let Some(stated) = &self.glass else { return Ok(Glass::Air) };
+        let wrong =
+            |reason: String| TextError { line: Some(stated.line), reason: format!("surface {number}: {reason}") };
+        match (stated.name.to_uppercase().as_str(), stated.nd_vd) {
+            ("MIRROR", _) => Err(wrong("mirrors are not supported".to_owned())),
+            ("AIR" | "VACUUM" | "", _) => Ok(Glass::Air),
+            ("___BLANK", Some((nd, vd))) => Ok(model(nd, vd)),
+            ("___BLANK", None) => Err(wrong("a model glass without its index".to_owned())),
+            (_, nd_vd) => {
+                let found = glasses
+                    .find(&stated.name, nd_vd)
+                    .map_err(|reason| wrong(format!("{reason}{}", searched(glasses))))?;
+                notes.extend(found.note);
+                Ok(found.glass)
+            }
+        }
+    }
+}
+
+/// Says in which catalogues the file itself would look.
+fn searched(glasses: &Glasses) -> String {
+    match glasses.makers.as_slice() {
+        [] => String::new(),
+        makers => format!("; the file's catalogues (GCAT) are {}", makers.join(", ")),
+    }
+}
+
+/// Returns the curvature of a radius, of which 0 or infinity means a plane.
+fn curvature_of(radius_mm: f64) -> f64 {
+    if radius_mm == 0.0 { 0.0 } else { 1.0 / radius_mm }
+}

@@ -1,0 +1,214 @@
+//! Tilted, decentred and anamorphic surfaces and curved films in lens files.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::path::Path;
+
+use dioptric_optics::{
+    Glass, ImageSurface, Interface, Lens, LensFile, Move, RayBatch, ReadOptions, Rims, Shape, Surface,
+    glam::{DVec2, DVec3},
+};
+
+const PLATE: &str = "MODE SEQ
+UNIT MM
+ENPD 4
+WAVM 1 0.55 1
+PWAV 1
+SURF 0
+  DISZ INFINITY
+SURF 1
+  STOP
+  DISZ 10
+SURF 2
+  TYPE COORDBRK
+  PARM 3 30
+  DISZ 0
+SURF 3
+  DISZ 7
+  GLAS ___BLANK 1 0 1.5 0
+SURF 4
+  DISZ 0
+SURF 5
+  TYPE COORDBRK
+  PARM 3 -30
+  PARM 6 1
+  DISZ 20
+SURF 6
+  CURV -0.05
+  CONI 0.25
+";
+
+fn read(name: &str, text: &str) -> LensFile {
+    LensFile::from_bytes(Path::new(name), text.as_bytes(), &ReadOptions::default())
+        .unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+/// Where rays through a lens meet the film, in the film's own frame.
+fn on_film(lens: &Lens, film_mm: f64) -> Vec<Option<DVec2>> {
+    let mono = lens.at(550.0).unwrap();
+    let start = |i: i32| DVec3::new(0.5 * f64::from(i % 9 - 4), 0.5 * f64::from(i / 9 - 4), -5.0);
+    let starts: Vec<DVec3> = (0..81).map(start).collect();
+    let direction = DVec3::new(0.02, -0.03, 1.0).normalize();
+    let mut rays = RayBatch::from_points(&starts, &[direction; 81]);
+    mono.trace(&mut rays, Rims::Clip);
+    mono.to_film(&mut rays, film_mm);
+    let pose = mono.film_pose(film_mm);
+    let place = |i: usize| rays.fate[i].is_in_flight().then(|| pose.to_own(rays.point_mm(i)).truncate());
+    (0..rays.len()).map(place).collect()
+}
+
+#[track_caller]
+fn assert_same(a: &LensFile, b: &LensFile) {
+    // An axis that goes round by breaks is as long as its pieces, and so are its distances.
+    let film_mm = b.film_mm.unwrap();
+    let (a, b) = (on_film(&a.lens, a.film_mm.unwrap_or(film_mm)), on_film(&b.lens, film_mm));
+    assert!(a.iter().flatten().count() > 40);
+    for (a, b) in a.into_iter().zip(b) {
+        match (a, b) {
+            // Angles are written in degrees and read back: some roundings of a hundred millimetres.
+            (Some(a), Some(b)) => assert!((a - b).length() < 1e-12, "{a} {b}"),
+            (a, b) => assert_eq!(a, b),
+        }
+    }
+}
+
+fn still(surfaces: (usize, usize)) -> Move {
+    Move { surfaces, pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg: [0.0; 3], tilt_first: false }
+}
+
+#[test]
+fn tilted_plate_of_a_zemax_file_shifts_light_and_its_return_puts_the_film_back() {
+    let file = read("plate.zmx", PLATE);
+    assert_eq!((file.lens.interfaces().len(), file.film_mm), (3, Some(20.0)));
+    assert_eq!(file.lens.image_surface(), ImageSurface { curvature_per_mm: -0.05, conic: 0.25 });
+    let mono = file.lens.at(550.0).unwrap();
+    let mut rays = RayBatch::from_points(&[DVec3::ZERO], &[DVec3::Z]);
+    mono.trace(&mut rays, Rims::Clip);
+    mono.to_film(&mut rays, 20.0);
+    let (sine, cosine) = 30_f64.to_radians().sin_cos();
+    let shift_mm = -7.0 * sine * (1.0 - cosine / (2.25 - sine * sine).sqrt());
+    // The return is made at the plate's back, so that the film follows the axis from there.
+    let film = DVec3::new(0.0, -7.0 * sine, 10.0 + 7.0 * cosine + 20.0);
+    assert!((mono.film_pose(20.0).vertex_mm - film).length() < 1e-14);
+    assert!((rays.point_mm(0) - DVec3::new(0.0, shift_mm, film.z)).length() < 1e-13, "{}", rays.point_mm(0));
+    // Rims that the file leaves out are as wide as the tilted beam needs them.
+    assert!((file.lens.interfaces()[1].surface.semi_aperture_mm - 2.0 / cosine).abs() < 1e-6);
+}
+
+#[test]
+fn breaks_are_in_the_units_of_the_file() {
+    let inches = PLATE.replace("UNIT MM", "UNIT IN").replace("PARM 3 30", "PARM 1 0.5\n  PARM 2 -1\n  PARM 3 30");
+    let lens = read("plate.zmx", &inches).lens;
+    let pose = lens.poses()[1];
+    assert!((pose.vertex_mm - DVec3::new(12.7, -25.4, 254.0)).length() < 1e-12);
+    assert!((pose.tilt_deg()[0] - 30.0).abs() < 1e-13);
+}
+
+/// A lens with every kind of shape and move.
+fn design() -> LensFile {
+    let biconic = Shape::Biconic { conic: -0.3, curvature_x_per_mm: 0.02, conic_x: 0.7 };
+    let interface = |shape, radius_mm, medium_after| Interface {
+        surface: Surface { shape, ..Surface::sphere(radius_mm, 6.0) },
+        medium_after,
+        thickness_after_mm: 2.5,
+    };
+    let mut interfaces = vec![
+        interface(biconic, 40.0, Glass::Constant { index: 1.5 }),
+        interface(Shape::Sphere, -60.0, Glass::Air),
+        interface(Shape::Sphere, f64::INFINITY, Glass::Air),
+        interface(Shape::Conic { conic: -1.0 }, 80.0, Glass::Named("SCHOTT:N-BK7".to_owned())),
+        interface(Shape::Sphere, -70.0, Glass::Air),
+    ];
+    interfaces[4].thickness_after_mm = 0.0;
+    let lens = Lens::new("placed", "test", interfaces, 2).unwrap();
+    let moves = vec![
+        Move { decenter_mm: [0.1, -0.2, 0.0], tilt_deg: [2.0, -1.0, 5.0], ..still((0, 0)) },
+        Move { decenter_mm: [0.4, 0.1, 0.0], tilt_deg: [1.0, 1.5, -20.0], pivot_mm: 1.25, ..still((3, 4)) },
+        Move { tilt_deg: [-3.0, 0.5, 0.0], tilt_first: true, ..still((4, 4)) },
+    ];
+    let mut file = LensFile::from(lens.with_moves(moves).unwrap());
+    file.film_mm = Some(55.0);
+    file.wavelengths_nm = vec![550.0];
+    file.reference_wavelength_nm = Some(550.0);
+    file
+}
+
+#[test]
+fn files_written_trace_the_same() {
+    let file = design();
+    let json = read("a.json", &file.to_omni_json().unwrap());
+    assert_same(&json, &file);
+    let zmx = read("a.zmx", &file.to_zmx().unwrap());
+    assert_eq!((zmx.lens.stop(), zmx.lens.interfaces().len()), (2, 5));
+    assert_same(&zmx, &file);
+    assert_eq!(file.to_zmx().unwrap().matches("COORDBRK").count(), 5, "around surface 0 and the group, and within it");
+
+    let mut bent = design();
+    let mut moves = bent.lens.moves().to_vec();
+    moves.push(Move { tilt_deg: [4.0, 0.0, 0.0], ..still((5, 5)) });
+    let image_surface = ImageSurface { curvature_per_mm: -0.01, conic: 0.5 };
+    bent.lens = bent.lens.with_moves(moves).unwrap().with_image_surface(image_surface).unwrap();
+    let zmx = read("a.zmx", &bent.to_zmx().unwrap());
+    assert_same(&zmx, &bent);
+    assert_eq!(zmx.lens.image_surface(), image_surface);
+    let message = bent.to_omni_json().unwrap_err().to_string();
+    assert!(message.ends_with("surface 5 (the film) is tilted or decentred"), "{message}");
+    let message = design().to_dat().unwrap_err().to_string();
+    assert_eq!(message, "a .dat file cannot hold this lens: surface 0 is tilted or decentred");
+}
+
+#[test]
+fn toroid_is_written_and_read_in_any_unit() {
+    let toroid = Shape::Toroid { curvature_x_per_mm: 0.0, conic: 0.5, coefficients: vec![1e-3, 0.0, -2e-7] };
+    let surface = Surface { shape: toroid.clone(), ..Surface::sphere(40.0, 5.0) };
+    let interface = Interface { surface, medium_after: Glass::Constant { index: 1.5 }, thickness_after_mm: 0.0 };
+    let mut file = LensFile::from(Lens::new("toroid", "test", vec![interface], 0).unwrap());
+    file.film_mm = Some(100.0);
+    let text = file.to_zmx().unwrap();
+    let again = read("a.zmx", &text);
+    assert_eq!(again.lens.interfaces()[0].surface.shape, toroid);
+    let lengths = read("a.zmx", &text.replace("UNIT MM", "UNIT CM")).lens;
+    let sag = |lens: &Lens, scale: f64| lens.interfaces()[0].surface.sag_at_mm(3.0 * scale, 4.0 * scale);
+    assert!((sag(&lengths, 10.0) - 10.0 * sag(&file.lens, 1.0)).abs() < 1e-12);
+    let message = file.to_omni_json().unwrap_err().to_string();
+    assert!(message.contains("surface 0 is neither a sphere nor a conic, a biconic or an asphere"), "{message}");
+}
+
+const SEQ: &str = "RDM
+DIM M
+EPD 4
+WL 550
+SO 0 1E10
+S 50 5 1.5
+ STO
+S -50 10
+ XDE 0.1; YDE 0.2; ZDE 0.3; ADE 2; BDE 3; CDE 4; DAR
+S 0 20
+ ADE -1
+SI -30
+";
+
+#[test]
+fn code_v_turns_x_and_y_by_the_left_hand() {
+    let file = read("a.seq", SEQ);
+    let expected = [
+        Move { decenter_mm: [0.1, 0.2, 0.3], tilt_deg: [-2.0, -3.0, 4.0], ..still((1, 1)) },
+        Move { tilt_deg: [1.0, 0.0, 0.0], ..still((2, 3)) },
+    ];
+    // A plane in air that is not the stop does nothing, and is dropped; what it turns is not.
+    let merged = Move { surfaces: (2, 2), pivot_mm: 10.0, ..expected[1] };
+    assert_eq!(file.lens.moves(), [expected[0], merged]);
+    assert_eq!(file.lens.image_surface().curvature_per_mm, -1.0 / 30.0);
+    assert_eq!(file.film_mm, Some(30.0));
+}
+
+#[test]
+fn code_v_toroids_and_anamorphic_conics_are_read() {
+    let shape = |keys: &str| {
+        let text = SEQ.replace(" STO\n", &format!(" STO\n {keys}\n"));
+        read("a.seq", &text).lens.interfaces()[0].surface.shape.clone()
+    };
+    let toroid = Shape::Toroid { curvature_x_per_mm: 0.025, conic: -0.5, coefficients: vec![0.0, 1e-6] };
+    assert_eq!(shape("YTO; RDX 40; K -0.5; A 1E-6"), toroid);
+    let biconic = Shape::Biconic { conic: -0.5, curvature_x_per_mm: 0.01, conic_x: 2.0 };
+    assert_eq!(shape("AAS; CUX 0.01; KY -0.5; KX 2"), biconic);
+}
