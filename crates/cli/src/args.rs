@@ -156,7 +156,7 @@ pub(crate) enum LensCommand {
     List,
     /// Prints first-order data and third-order sums
     Info(LensInfoArgs),
-    /// Draws the lens with rays as SVG
+    /// Draws the lens with rays, as SVG or PNG
     Draw(LensDrawArgs),
     /// Writes a lens in another format, chosen by the extension
     Convert {
@@ -191,8 +191,8 @@ pub(crate) struct LensInfoArgs {
 pub(crate) struct LensDrawArgs {
     /// Lens, a file or the name of a built-in one
     pub(crate) lens: String,
-    /// SVG file to write
-    #[arg(long, short, value_name = "F.svg")]
+    /// File to write, .svg or .png
+    #[arg(long, short, visible_alias = "out", value_name = "F")]
     pub(crate) output: PathBuf,
     /// Field angles of the ray fans, degrees
     #[arg(long, value_name = "LIST", default_value = "0,10")]
@@ -206,9 +206,9 @@ pub(crate) struct LensDrawArgs {
     /// Film distance behind the last vertex, mm [default: in focus]
     #[arg(long, value_name = "D")]
     pub(crate) film_mm: Option<f64>,
-    /// Wavelength, nm
-    #[arg(long, value_name = "W", default_value_t = 550.0)]
-    pub(crate) wavelength_nm: f64,
+    /// Wavelengths of the rays, nm: a list or first:last:step; focus and f-number are those of the first
+    #[arg(long, alias = "wavelength-nm", value_name = "LIST", default_value = "550")]
+    pub(crate) wavelengths_nm: String,
 }
 
 /// Something to do with glasses.

@@ -4,8 +4,8 @@ use std::{fmt::Write, fs};
 
 use anyhow::Context;
 use dioptric_pipeline::{
-    LensData, LensDrawing, LensQuestion, Staged, SurfaceRow, built_in_lenses, convert_lens, open_lens, parse_numbers,
-    surface_rows,
+    LensData, LensDrawing, LensQuestion, Staged, SurfaceRow, built_in_lenses, convert_lens, drawing_file, open_lens,
+    parse_numbers, surface_rows,
 };
 
 use crate::{
@@ -117,13 +117,13 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     let drawing = LensDrawing {
         fields_deg: parse_numbers("--fields-deg", &arguments.fields_deg)?,
         distance_mm: arguments.distance_mm,
-        wavelength_nm: arguments.wavelength_nm,
+        wavelengths_nm: parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?,
         film_mm: arguments.film_mm,
     };
-    let svg = drawing.to_svg(&lens)?;
     let path = &arguments.output;
+    let bytes = drawing_file(&drawing.to_svg(&lens)?, path)?;
     let staged = guarded(Staged::file(path)?);
-    fs::write(staged.path(), svg).with_context(|| format!("cannot write {}", path.display()))?;
+    fs::write(staged.path(), bytes).with_context(|| format!("cannot write {}", path.display()))?;
     staged.commit()?;
     remark(common.quiet, &format!("wrote {}", path.display()));
     Ok(())

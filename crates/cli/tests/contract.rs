@@ -106,6 +106,11 @@ fn a_lens_is_drawn_and_converted() {
     let folder = tempfile::tempdir().unwrap();
     output(folder.path(), &["lens", "draw", "dgauss-50mm", "-o", "lens.svg", "--quiet"]);
     assert!(fs::read_to_string(folder.path().join("lens.svg")).unwrap().contains("<svg"));
+    output(
+        folder.path(),
+        &["lens", "draw", "fisheye-12.5mm", "--out", "f.png", "--wavelengths-nm", "450,650", "--fields-deg", "0,80"],
+    );
+    assert!(fs::read(folder.path().join("f.png")).unwrap().starts_with(b"\x89PNG"));
     let original = json(folder.path(), &["lens", "info", "dgauss-50mm", "--json", "--wavelengths-nm", "587.5618"]);
     for file in ["copy.ron", "copy.dat", "copy.json", "copy.zmx"] {
         output(folder.path(), &["lens", "convert", "dgauss-50mm", file]);

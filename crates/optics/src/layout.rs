@@ -1,9 +1,12 @@
 //! Drawings of a lens in its meridional plane, as SVG.
 
+mod frame;
+
 use std::fmt::Write;
 
 use glam::{DVec2, DVec3};
 
+use self::frame::Frame;
 use crate::{
     Glass, Lens, MonoLens, ObjectPoint, OpticsError, Pose, PupilBoundary, RayBatch, Rims, Surface, rays_towards,
 };
@@ -17,7 +20,8 @@ pub struct Layout {
     pub object_distance_mm: f64,
     /// Tangents of the field angles from which rays come.
     pub field_tans: Vec<f64>,
-    /// Wavelengths of the rays, nm. With one field, rays are coloured by wavelength, else by field.
+    /// Wavelengths of the rays, nm. With one field, rays are coloured by wavelength; else by field, and dashed by
+    /// wavelength.
     pub wavelengths_nm: Vec<f64>,
     /// Rays a field and wavelength.
     pub n_rays: usize,
@@ -25,12 +29,10 @@ pub struct Layout {
     pub width_px: f64,
 }
 
-/// Margin around the drawing, px.
-const MARGIN_PX: f64 = 28.0;
-/// Room for the words below the drawing, px.
-const FOOT_PX: f64 = 34.0;
 /// Colours of fields, in their order: blue, green, red, orange, violet, grey.
 const FIELD_COLORS: [&str; 6] = ["#2166ac", "#1b7837", "#b2182b", "#d9810c", "#762a83", "#555555"];
+/// Dashes of wavelengths, in their order, where colours tell fields; the first is a whole line.
+const DASHES: [&str; 4] = ["none", "7 3", "2 2", "9 2 2 2"];
 
 impl Lens {
     /// Draws the lens with its stop, its film and rays, and returns the picture as SVG text.
@@ -60,15 +62,38 @@ impl Lens {
             true => self.name().to_owned(),
             false => format!("{} · f = {:.2} mm · f/{:.2}", self.name(), first.efl_mm, first.f_number),
         };
-        frame.foot(&words, layout, &mut svg);
+        frame.foot(&words, &mut svg);
+        frame.keys(&words, layout, &fans, &mut svg);
         svg.push_str("</svg>\n");
         Ok(svg)
     }
 }
 
+/// How the rays of a wavelength are told from those of others.
+struct WavelengthKey {
+    wavelength_nm: f64,
+    /// Its own colour, where colours do not tell fields.
+    color: Option<String>,
+    dashes: &'static str,
+}
+
+impl Layout {
+    fn wavelength_keys(&self) -> impl Iterator<Item = WavelengthKey> {
+        let has_fields = self.field_tans.len() > 1;
+        self.wavelengths_nm.iter().enumerate().map(move |(i, &wavelength_nm)| WavelengthKey {
+            wavelength_nm,
+            color: (!has_fields).then(|| wavelength_color(wavelength_nm)),
+            dashes: if has_fields { DASHES[i % DASHES.len()] } else { DASHES[0] },
+        })
+    }
+}
+
 /// The rays of one field and wavelength, as lines of (z, y) in mm.
 struct Fan {
+    /// Its place in the list of fields.
+    field: usize,
     color: String,
+    dashes: &'static str,
     lines: Vec<Line>,
 }
 
@@ -94,27 +119,29 @@ fn fans(lens: &Lens, lenses: &[MonoLens], layout: &Layout) -> Vec<Fan> {
         let share = |ray: usize| if n_rays == 1 { 0.5 } else { 0.005 + 0.99 * ray as f64 / (n_rays - 1) as f64 };
         let height = |ray: usize| pupil.center_mm().y - low + (low + high) * share(ray);
         let targets: Vec<DVec2> = (0..n_rays).map(|ray| DVec2::new(pupil.center_mm().x, height(ray))).collect();
-        for (lens, &wavelength_nm) in lenses.iter().zip(&layout.wavelengths_nm) {
+        for (lens, key) in lenses.iter().zip(layout.wavelength_keys()) {
             let rays = rays_towards(&point, &targets, pupil.z_mm(), 0.0);
-            let color = match layout.field_tans.len() {
-                1 => wavelength_color(wavelength_nm),
-                _ => FIELD_COLORS[i % FIELD_COLORS.len()].to_owned(),
-            };
-            fans.push(Fan { color, lines: follow(lens, rays, lead_mm, layout.film_mm) });
+            let color = key.color.unwrap_or_else(|| FIELD_COLORS[i % FIELD_COLORS.len()].to_owned());
+            fans.push(Fan { field: i, color, dashes: key.dashes, lines: follow(lens, rays, lead_mm, layout.film_mm) });
         }
     }
     fans
 }
 
 fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_mm: f64) -> Vec<Line> {
-    // Steep rays start no further off than a little beyond the widest rim.
+    // Steep rays start no further off than a little beyond the widest rim, and all of a fan on one front.
     let rims = (0..lens.n_surfaces()).map(|surface| lens.semi_aperture_mm(surface));
     let reach_mm = 1.5 * rims.fold(0.0, f64::max);
-    let start = |i: usize| {
+    let heading = (0..rays.len()).map(|i| rays.direction(i)).sum::<DVec3>().normalize_or(DVec3::Z);
+    let nearest_start = |i: usize| {
         let (point, direction) = (rays.point_mm(i), rays.direction(i));
         let by_height = (reach_mm - point.y.abs()).max(0.0) / direction.y.abs();
-        let back = by_height.min(lead_mm / direction.z);
-        let start = point - direction * back;
+        heading.dot(point - direction * by_height.min(lead_mm / direction.z))
+    };
+    let front_mm = (0..rays.len()).map(nearest_start).fold(f64::NEG_INFINITY, f64::max);
+    let start = |i: usize| {
+        let (point, direction) = (rays.point_mm(i), rays.direction(i));
+        let start = point - direction * ((heading.dot(point) - front_mm) / heading.dot(direction));
         Line { points: vec![DVec2::new(start.z, start.y)], reaches_film: false }
     };
     let mut lines: Vec<Line> = (0..rays.len()).map(start).collect();
@@ -136,111 +163,6 @@ fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_mm: f64) -> Ve
         line.reaches_film = arrived;
     }
     lines
-}
-
-/// The drawing's scale and bounds.
-struct Frame {
-    z_min_mm: f64,
-    y_min_mm: f64,
-    y_max_mm: f64,
-    px_per_mm: f64,
-    width_px: f64,
-    height_px: f64,
-}
-
-impl Frame {
-    fn around(lens: &Lens, layout: &Layout, fans: &[Fan]) -> Self {
-        let points = || fans.iter().flat_map(|fan| &fan.lines).flat_map(|line| &line.points);
-        let z_film_mm = lens.last_vertex_z_mm() + layout.film_mm;
-        let z_min_mm = points().map(|p| p.x).fold(0.0, f64::min);
-        let z_max_mm = points().map(|p| p.x).fold(z_film_mm, f64::max);
-        let rims = lens.interfaces().iter().map(|interface| interface.surface.semi_aperture_mm);
-        let rim_mm = 1.15 * rims.fold(0.0, f64::max);
-        let y_min_mm = points().map(|p| p.y).fold(-rim_mm, f64::min);
-        let y_max_mm = points().map(|p| p.y).fold(rim_mm, f64::max);
-        let px_per_mm = (layout.width_px - 2.0 * MARGIN_PX) / (z_max_mm - z_min_mm).max(1e-9);
-        let height_px = 2.0 * MARGIN_PX + (y_max_mm - y_min_mm) * px_per_mm + FOOT_PX;
-        Self { z_min_mm, y_min_mm, y_max_mm, px_per_mm, width_px: layout.width_px, height_px }
-    }
-
-    fn x(&self, z_mm: f64) -> f64 {
-        MARGIN_PX + (z_mm - self.z_min_mm) * self.px_per_mm
-    }
-
-    fn y(&self, y_mm: f64) -> f64 {
-        MARGIN_PX + (self.y_max_mm - y_mm) * self.px_per_mm
-    }
-
-    fn open(&self, name: &str) -> String {
-        let (w, h) = (self.width_px, self.height_px);
-        format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w:.0}\" height=\"{h:.0}\" viewBox=\"0 0 {w:.0} {h:.0}\" \
-             font-family=\"Helvetica, Arial, sans-serif\" font-size=\"13\">\n<title>{}</title>\n\
-             <rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
-            escaped(name)
-        )
-    }
-
-    fn axis(&self, svg: &mut String) {
-        let y = self.y(0.0);
-        let _ = writeln!(
-            svg,
-            "<line x1=\"{:.2}\" y1=\"{y:.2}\" x2=\"{:.2}\" y2=\"{y:.2}\" stroke=\"#888\" stroke-width=\"0.7\" \
-             stroke-dasharray=\"12 3 2 3\"/>",
-            0.3 * MARGIN_PX,
-            self.width_px - 0.3 * MARGIN_PX
-        );
-    }
-
-    fn path(&self, points: impl IntoIterator<Item = DVec2>) -> String {
-        let mut path = String::new();
-        for (i, p) in points.into_iter().enumerate() {
-            let _ = write!(path, "{}{:.2} {:.2}", if i == 0 { "M" } else { " L" }, self.x(p.x), self.y(p.y));
-        }
-        path
-    }
-
-    fn rays(&self, fan: &Fan, svg: &mut String) {
-        for (reaches_film, opacity) in [(true, 0.85), (false, 0.3)] {
-            let lines = fan.lines.iter().filter(|line| line.reaches_film == reaches_film);
-            let path: Vec<String> = lines.map(|line| self.path(line.points.iter().copied())).collect();
-            if !path.is_empty() {
-                let _ = writeln!(
-                    svg,
-                    "<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"0.9\" stroke-opacity=\"{opacity}\"/>",
-                    path.join(" "),
-                    fan.color
-                );
-            }
-        }
-    }
-
-    /// Writes the words below the drawing, and the scale bar.
-    fn foot(&self, words: &str, layout: &Layout, svg: &mut String) {
-        let y = self.height_px - 0.6 * FOOT_PX;
-        let _ =
-            writeln!(svg, "<text x=\"{MARGIN_PX:.1}\" y=\"{:.1}\" fill=\"#222\">{}</text>", y + 5.0, escaped(words));
-        let length_mm = round_length_mm(0.16 * self.width_px / self.px_per_mm);
-        let (x1, length_px) = (self.width_px - MARGIN_PX, length_mm * self.px_per_mm);
-        let _ = writeln!(
-            svg,
-            "<path d=\"M{:.2} {:.1} v6 h{length_px:.2} v-6\" fill=\"none\" stroke=\"#222\"/>\n\
-             <text x=\"{:.2}\" y=\"{:.1}\" fill=\"#222\" text-anchor=\"middle\">{length_mm} mm</text>",
-            x1 - length_px,
-            y - 8.0,
-            x1 - 0.5 * length_px,
-            y + 13.0
-        );
-        let mut x = 0.5 * self.width_px - 30.0 * layout.field_tans.len() as f64;
-        if layout.field_tans.len() > 1 {
-            for (i, tan) in layout.field_tans.iter().enumerate() {
-                let color = FIELD_COLORS[i % FIELD_COLORS.len()];
-                let angle = tan.atan().to_degrees();
-                let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{:.1}\" fill=\"{color}\">{angle:.1}°</text>", y + 5.0);
-                x += 60.0;
-            }
-        }
-    }
 }
 
 /// Draws what lies between two surfaces and is not air.
@@ -327,6 +249,9 @@ fn stop(lens: &Lens, frame: &Frame, svg: &mut String) {
         }));
         let _ = writeln!(svg, "<path d=\"{line}\" stroke=\"#111\" stroke-width=\"3\"/>");
     }
+    let below_mm = surface.semi_aperture_mm + length_mm;
+    let foot = pose.to_lens(DVec3::new(0.0, -below_mm, sag_mm));
+    frame.label((frame.x(foot.z), frame.y(foot.y) + 13.0), "middle", "stop", svg);
 }
 
 fn film(lens: &Lens, layout: &Layout, fans: &[Fan], frame: &Frame, svg: &mut String) {
@@ -336,12 +261,7 @@ fn film(lens: &Lens, layout: &Layout, fans: &[Fan], frame: &Frame, svg: &mut Str
     let half_mm = (1.06 * height).max(8.0 / frame.px_per_mm).min(frame.y_max_mm.max(-frame.y_min_mm));
     let line = frame.path([DVec2::new(z_mm, -half_mm), DVec2::new(z_mm, half_mm)]);
     let _ = writeln!(svg, "<path d=\"{line}\" stroke=\"#111\" stroke-width=\"2\"/>");
-}
-
-/// Returns the longest of 1, 2 or 5 times a power of ten that is at most this long.
-fn round_length_mm(longest_mm: f64) -> f64 {
-    let power = 10_f64.powf(longest_mm.log10().floor());
-    [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|&length| length <= longest_mm).unwrap_or(power)
+    frame.label((frame.x(z_mm) + 3.0, frame.y(half_mm) - 6.0), "end", "film", svg);
 }
 
 /// Returns a colour that stands for a wavelength.
@@ -352,10 +272,6 @@ fn wavelength_color(wavelength_nm: f64) -> String {
     let ((w0, h0), (w1, h1)) = (HUES[above - 1], HUES[above]);
     let fraction = ((wavelength_nm - w0) / (w1 - w0)).clamp(0.0, 1.0);
     format!("hsl({:.0}, 85%, 42%)", h0 + (h1 - h0) * fraction)
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]
@@ -404,7 +320,23 @@ mod tests {
     }
 
     #[test]
-    fn scale_bar_has_a_round_length() {
-        assert_eq!([0.7, 2.0, 19.0, 51.0].map(round_length_mm), [0.5, 2.0, 10.0, 50.0]);
+    fn dark_fields_and_several_wavelengths_are_told() {
+        let lens = Lens::built_in("microscope-20x").unwrap();
+        let svg = draw(&lens, &[0.0, 30.0]);
+        assert!(svg.contains(">0.0°<") && svg.contains(">30.0° dark<"));
+        let layout = Layout {
+            film_mm: 36.0,
+            object_distance_mm: f64::INFINITY,
+            field_tans: vec![0.0, 0.1],
+            wavelengths_nm: vec![450.0, 650.0],
+            n_rays: 3,
+            width_px: 900.0,
+        };
+        let lens = Lens::built_in("dgauss-50mm").unwrap();
+        let svg = lens.draw(&layout).unwrap();
+        // A dash for the rays of each field, and one in the key.
+        assert!(svg.matches("stroke-dasharray=\"7 3\"").count() == 3 && svg.contains("650 nm"), "{svg}");
+        let svg = lens.draw(&Layout { field_tans: vec![0.1], ..layout }).unwrap();
+        assert!(!svg.contains("stroke-dasharray=\"7 3\"") && svg.contains("450 nm"));
     }
 }

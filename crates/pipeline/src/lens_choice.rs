@@ -11,9 +11,12 @@ use crate::{LensChoice, PipelineError, SensorChoice, StopChoice};
 pub const REFERENCE_WAVELENGTH_NM: f64 = 550.0;
 
 impl LensChoice {
-    /// Returns what `LENS` on the command line means: a path where it looks like one or is one, else a built-in name.
+    /// Returns what `LENS` on the command line means: a built-in name where it is one, a path where it looks like one or
+    /// is one, else a name that is not known.
     pub fn named(text: &str) -> Self {
-        if is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
+        // Names such as fisheye-12.5mm look as though they had an extension.
+        let is_built_in = Lens::built_in_names().any(|name| name == text);
+        if !is_built_in && is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
     }
 
     /// Returns the lens.
@@ -83,6 +86,7 @@ mod tests {
     #[test]
     fn names_and_paths_are_told_apart() {
         assert_eq!(LensChoice::named("dgauss-50mm"), LensChoice::BuiltIn("dgauss-50mm".to_owned()));
+        assert_eq!(LensChoice::named("fisheye-12.5mm"), LensChoice::BuiltIn("fisheye-12.5mm".to_owned()));
         for path in ["lens.dat", "./lens", "folder/lens"] {
             assert_eq!(LensChoice::named(path), LensChoice::File(PathBuf::from(path)));
         }

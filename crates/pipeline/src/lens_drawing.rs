@@ -2,7 +2,7 @@
 
 use dioptric_optics::{Layout, Lens};
 
-use crate::PipelineError;
+use crate::{PipelineError, REFERENCE_WAVELENGTH_NM};
 
 /// Rays of each fan.
 const RAYS: usize = 9;
@@ -16,8 +16,8 @@ pub struct LensDrawing {
     pub fields_deg: Vec<f64>,
     /// Distance of the object before the first vertex, mm; infinity for a far one.
     pub distance_mm: f64,
-    /// Wavelength of the rays, nm.
-    pub wavelength_nm: f64,
+    /// Wavelengths of the rays, nm; focus and f-number are those of the first.
+    pub wavelengths_nm: Vec<f64>,
     /// Distance of the film behind the last vertex, mm; `None` for where the object is in focus.
     pub film_mm: Option<f64>,
 }
@@ -38,13 +38,16 @@ impl LensDrawing {
         }
         let film_mm = match self.film_mm {
             Some(film_mm) => film_mm,
-            None => lens.at(self.wavelength_nm)?.film_mm_for(self.distance_mm)?,
+            None => {
+                let reference_nm = self.wavelengths_nm.first().copied().unwrap_or(REFERENCE_WAVELENGTH_NM);
+                lens.at(reference_nm)?.film_mm_for(self.distance_mm)?
+            }
         };
         Ok(lens.draw(&Layout {
             film_mm,
             object_distance_mm: self.distance_mm,
             field_tans: self.fields_deg.iter().map(|field| field.to_radians().tan()).collect(),
-            wavelengths_nm: vec![self.wavelength_nm],
+            wavelengths_nm: self.wavelengths_nm.clone(),
             n_rays: RAYS,
             width_px: WIDTH_PX,
         })?)
@@ -56,7 +59,7 @@ mod tests {
     use super::*;
 
     fn drawing() -> LensDrawing {
-        LensDrawing { fields_deg: vec![0.0, 14.0], distance_mm: 2000.0, wavelength_nm: 550.0, film_mm: None }
+        LensDrawing { fields_deg: vec![0.0, 14.0], distance_mm: 2000.0, wavelengths_nm: vec![550.0], film_mm: None }
     }
 
     #[test]

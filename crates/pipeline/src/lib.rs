@@ -32,6 +32,7 @@ mod sense;
 mod shot;
 mod spot;
 mod staged;
+mod svg_png;
 mod trace_table;
 
 pub use camera::{
@@ -55,4 +56,5 @@ pub use scene_choice::{SceneChoice, SceneSource};
 pub use sense::{SenseRequest, parse_illuminant, sense_irradiance, with_exposure_s};
 pub use shot::Shot;
 pub use staged::Staged;
+pub use svg_png::{drawing_file, svg_to_png};
 pub use trace_table::{RayTable, TraceError, TraceSettings};

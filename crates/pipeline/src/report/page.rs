@@ -53,7 +53,7 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
     let drawing = LensDrawing {
         fields_deg: [0.0, 0.7, 1.0].iter().map(|share| (share * page.places.corner_tan).atan().to_degrees()).collect(),
         distance_mm: page.shot.focus_distance_mm.unwrap_or(f64::INFINITY),
-        wavelength_nm: crate::REFERENCE_WAVELENGTH_NM,
+        wavelengths_nm: vec![crate::REFERENCE_WAVELENGTH_NM],
         film_mm: Some(page.shot.film_mm),
     };
     let (mosaic, mosaic_src) = mosaic(page)?;
