@@ -8,6 +8,7 @@
 //! bend the rays, and trace on ([`MonoLens::trace_surfaces`]).
 #![doc = include_str!("../README.md")]
 
+pub mod analysis;
 mod bundle;
 mod catalogue;
 mod error;

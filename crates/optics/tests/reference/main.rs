@@ -5,3 +5,4 @@ mod first_order;
 mod lens;
 mod rays;
 mod seidel;
+mod spots;

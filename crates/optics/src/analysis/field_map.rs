@@ -1,0 +1,140 @@
+//! Where real chief rays land: distortion and lateral colour.
+
+use glam::DVec2;
+
+use super::pupil_places::{PupilCoordinates, PupilSampling};
+use crate::{MonoLens, ObjectPoint, Rims, paraxial::Matrix};
+
+/// How an image without distortion grows with the field angle θ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Projection {
+    /// In step with tan θ: straight lines stay straight.
+    Tangent,
+    /// In step with θ: equal angles stay equal, as a fisheye has it.
+    Angle,
+}
+
+/// The image height of a chief ray against that of an image without distortion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distortion {
+    /// Height of the real chief ray, mm, in the picture frame: positive on the side that the point lies on.
+    pub height_mm: f64,
+    /// The height with the paraxial scale on the same film, mm.
+    pub ideal_mm: f64,
+}
+
+impl Distortion {
+    /// Returns the distortion of a field on a film `film_mm` behind the last vertex; `None` if no ray passes the middle
+    /// of the stop.
+    ///
+    /// The field is the tangent of the angle at the paraxial entrance pupil. The paraxial scale is that of this film and
+    /// wavelength, in focus or not, so that distortion is 0 for small fields: focal length, for a far point in focus.
+    pub fn of(
+        lens: &MonoLens,
+        (field_tan, dioptres): (f64, f64),
+        film_mm: f64,
+        projection: Projection,
+    ) -> Option<Self> {
+        let point = ObjectPoint::from_field(lens, DVec2::new(0.0, field_tan), dioptres);
+        let height_mm = -lens.chief_film_point_mm(&point, film_mm)?.y;
+        let field = match projection {
+            Projection::Tangent => field_tan,
+            Projection::Angle => field_tan.atan(),
+        };
+        Some(Self { height_mm, ideal_mm: field * lens.film_scale_mm(film_mm) })
+    }
+
+    /// Returns the relative distortion: 0.01 for an image 1 % too large, −1 for one shrunk to a point; 0 on the axis.
+    pub fn relative(&self) -> f64 {
+        if self.ideal_mm == 0.0 { 0.0 } else { self.height_mm / self.ideal_mm - 1.0 }
+    }
+}
+
+impl MonoLens {
+    /// Returns where the ray of a point through the middle of the real stop meets the film, mm, lens frame; rims do not
+    /// end it. `None` if there is no such ray.
+    ///
+    /// Its difference between wavelengths is lateral colour.
+    pub fn chief_film_point_mm(&self, point: &ObjectPoint, film_mm: f64) -> Option<DVec2> {
+        let coordinates = PupilCoordinates::stop(self);
+        let sampling = PupilSampling { coordinates, places: vec![DVec2::ZERO], rims: Rims::Ignore };
+        let rays = sampling.rays_on_film(self, point, film_mm);
+        rays.fate[0].is_in_flight().then(|| rays.point_mm(0).truncate())
+    }
+
+    /// Returns the paraxial image height on a film over the tangent of the field angle at the entrance pupil, mm,
+    /// positive for an image upside down: the focal length, for a film in the rear focal plane.
+    pub fn film_scale_mm(&self, film_mm: f64) -> f64 {
+        let (steps, pupil_z_mm) = (self.steps(), self.first_order().entrance_pupil_z_mm);
+        let matrix = Matrix::of(steps);
+        // A ray of slope 1 through the middle of the entrance pupil; where that is infinitely far, of the first vertex.
+        let y = if pupil_z_mm.is_finite() { -pupil_z_mm } else { 0.0 };
+        let w = steps[0].index_before;
+        matrix.a * y + matrix.b * w + film_mm * (matrix.c * y + matrix.d * w) / self.image_index()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Lens;
+
+    #[track_caller]
+    fn relative(lens: &MonoLens, field_tan: f64, film_mm: f64, projection: Projection) -> f64 {
+        Distortion::of(lens, (field_tan, 0.0), film_mm, projection).unwrap().relative()
+    }
+
+    #[test]
+    fn pinholes_and_ideal_lenses_have_none() {
+        for lens in [Lens::pinhole(0.5).unwrap(), Lens::thin(50.0, 10.0).unwrap()] {
+            let lens = lens.at(550.0).unwrap();
+            for field_tan in [0.0, 0.1, 1.0, 5.0] {
+                assert!(relative(&lens, field_tan, 37.0, Projection::Tangent).abs() < 1e-13);
+            }
+            // θ / tan θ by definition.
+            assert!((relative(&lens, 1.0, 37.0, Projection::Angle) - (4.0 / std::f64::consts::PI - 1.0)).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn scale_is_the_focal_length_in_focus_and_the_magnification_near() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
+        let first = lens.first_order();
+        let film_mm = lens.film_mm_for(f64::INFINITY).unwrap();
+        assert!((lens.film_scale_mm(film_mm) / first.efl_mm - 1.0).abs() < 1e-13);
+        let conjugate = lens.conjugate(500.0);
+        let expected = -conjugate.magnification * (500.0 + first.entrance_pupil_z_mm);
+        assert!((lens.film_scale_mm(conjugate.image_z_mm) / expected - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn small_fields_bend_as_the_fifth_seidel_sum_says() {
+        for name in ["dgauss-50mm", "telephoto-127mm", "singlet-50mm"] {
+            let lens = Lens::built_in(name).unwrap();
+            let mono = lens.at(550.0).unwrap();
+            let field_tan = 0.02;
+            let settings = crate::SeidelSettings {
+                wavelength_nm: 550.0,
+                colors_nm: [500.0, 600.0],
+                object_distance_mm: f64::INFINITY,
+                chief_slope: field_tan,
+            };
+            let sums = lens.seidel(&settings).unwrap();
+            let film_mm = mono.film_mm_for(f64::INFINITY).unwrap();
+            // δh = S5 / (2 n' u'), h = H / (n' u'): relative S5 / 2H.
+            let expected = sums.total.s5 / (2.0 * sums.lagrange_mm);
+            let found = relative(&mono, field_tan, film_mm, Projection::Tangent);
+            // Fifth order is smaller by the square of the field, times some tens.
+            assert!((found / expected - 1.0).abs() < 0.02, "{name}: {found:e} {expected:e}");
+        }
+    }
+
+    #[test]
+    fn fisheye_keeps_angles_rather_than_straight_lines() {
+        let lens = Lens::built_in("fisheye-12.5mm").unwrap().at(550.0).unwrap();
+        let film_mm = lens.film_mm_for(f64::INFINITY).unwrap();
+        let at = |degrees: f64, projection| relative(&lens, degrees.to_radians().tan(), film_mm, projection);
+        assert!(at(85.0, Projection::Tangent) < -0.85);
+        assert!(at(80.0, Projection::Angle).abs() < 0.15, "{}", at(80.0, Projection::Angle));
+    }
+}

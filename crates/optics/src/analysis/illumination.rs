@@ -1,0 +1,84 @@
+//! How much light the exit cone holds.
+
+use glam::DVec2;
+
+use crate::{MonoLens, ObjectPoint, PupilBoundary, Rims, rays_towards};
+
+/// Returns the projected solid angle of the cone of light that arrives at the image of a point, times the square of the
+/// image space's index, sr: the irradiance there for a uniform scene of radiance 1; 0 where no light gets through.
+///
+/// The solid angle is the area that the rays' direction cosines (l, m) fill; its edge is that of the true, vignetted
+/// pupil, found at `n_azimuths` (rounded up to an even number). It is exact for a sharp image; where aberrations are
+/// large, film points see slightly other pupils than the object point does. Its ratio to that on the axis is the
+/// relative illumination.
+pub fn projected_solid_angle(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> f64 {
+    let n = n_azimuths.max(16).next_multiple_of(2);
+    let Some(pupil) = PupilBoundary::find(lens, point, n) else { return 0.0 };
+    let azimuth = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64);
+    let edge = |(i, rho): (usize, &f64)| pupil.center_mm() + azimuth(i) * *rho;
+    let targets_mm: Vec<DVec2> = pupil.rho_at_azimuths_mm().iter().enumerate().map(edge).collect();
+    let mut rays = rays_towards(point, &targets_mm, pupil.z_mm(), 0.0);
+    lens.trace(&mut rays, Rims::Ignore);
+    let cosines: Vec<DVec2> = (0..n).map(|i| rays.direction(i).truncate()).collect();
+    let area = |step: usize| {
+        let corners: Vec<DVec2> = cosines.iter().copied().step_by(step).collect();
+        let pairs = corners.iter().zip(corners.iter().cycle().skip(1));
+        0.5 * pairs.map(|(a, b)| a.perp_dot(*b)).sum::<f64>().abs()
+    };
+    // A polygon falls short by the square of its sides; two of them tell by how much.
+    lens.image_index().powi(2) * (4.0 * area(1) - area(2)) / 3.0
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::{Glass, Interface, Lens, Surface};
+
+    #[test]
+    fn a_small_hole_has_the_fourth_power_of_the_cosine() {
+        let lens = Lens::pinhole(0.2).unwrap().at(550.0).unwrap();
+        let cone = |degrees: f64| {
+            let place = DVec3::new(0.0, -degrees.to_radians().tan(), -1.0) * 1000.0;
+            projected_solid_angle(&lens, &ObjectPoint::Finite(place), 256)
+        };
+        // A disc of radius a at distance d: sin²u = a²/(a² + d²) of π on the axis.
+        assert!((cone(0.0) / (PI * 1e-8 / (1.0 + 1e-8)) - 1.0).abs() < 1e-6);
+        for degrees in [10.0f64, 40.0] {
+            assert!((cone(degrees) / cone(0.0) / degrees.to_radians().cos().powi(4) - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn on_the_axis_it_is_pi_sine_squared_in_any_medium() {
+        for index in [1.0, 1.5] {
+            let surface = Surface::sphere(20.0, 4.0);
+            let front = Interface { surface, medium_after: Glass::Constant { index: 1.7 }, thickness_after_mm: 3.0 };
+            let back = Interface {
+                surface: Surface::sphere(-40.0, 5.0),
+                medium_after: Glass::Constant { index },
+                thickness_after_mm: 0.0,
+            };
+            let lens = Lens::new("thick", "test", vec![front, back], 0).unwrap().at(550.0).unwrap();
+            let far = ObjectPoint::Infinite(DVec3::Z);
+            let mut edge = rays_towards(&far, &[DVec2::new(0.0, 4.0)], 0.0, 0.0);
+            lens.trace(&mut edge, Rims::Ignore);
+            let expected = PI * (index * edge.m[0]).powi(2);
+            // The polygon is off by the fourth power of its sides: (2π / n)⁴ / 30.
+            for (n, error) in [(64, 3.2e-6), (256, 1.3e-8)] {
+                let found = projected_solid_angle(&lens, &far, n);
+                assert!((found / expected - 1.0).abs() < error, "{found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn darkness_is_zero() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
+        let point = ObjectPoint::from_field(&lens, DVec2::new(1.2, 0.0), 0.0);
+        assert_eq!(projected_solid_angle(&lens, &point, 64), 0.0);
+    }
+}

@@ -1,0 +1,22 @@
+//! Real-ray analysis: spots, fans, field curvature, distortion, colour, illumination and focus.
+//!
+//! Everything here is computed from exact rays of one [`ObjectPoint`](crate::ObjectPoint) at one wavelength, and holds
+//! for any aperture and field. A ray that cannot be found or does not arrive is `None`, never an error.
+
+mod aim;
+mod close_rays;
+mod field_map;
+mod focus;
+mod illumination;
+mod pupil_places;
+mod ray_fan;
+mod spot;
+
+pub use aim::StopAim;
+pub use close_rays::AstigmaticFoci;
+pub use field_map::{Distortion, Projection};
+pub use focus::{Autofocus, FocusRays};
+pub use illumination::projected_solid_angle;
+pub use pupil_places::{PupilCoordinates, PupilSampling, hexapolar, pupil_line};
+pub use ray_fan::RayFan;
+pub use spot::SpotDiagram;
