@@ -84,6 +84,8 @@ impl Autofocus<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::slice::from_ref;
+
     use super::*;
     use crate::{
         Lens, Rims,
@@ -98,7 +100,7 @@ mod tests {
     fn an_ideal_lens_is_focused_where_its_equation_says() {
         let lens = Lens::thin(50.0, 10.0).unwrap().at(550.0).unwrap();
         let points = [0.0, 0.2].map(|tan| ObjectPoint::from_field(&lens, DVec2::X * tan, 0.5));
-        let focus = Autofocus { lenses: &[lens.clone()], points: &points, sampling: &sampling(&lens) };
+        let focus = Autofocus { lenses: from_ref(&lens), points: &points, sampling: &sampling(&lens) };
         let (film_mm, rms_mm) = focus.best_film_mm(40.0).unwrap();
         assert!((film_mm - 1.0 / (1.0 / 50.0 - 1.0 / 2000.0)).abs() < 1e-11);
         // What is left is the square root of rounding in squares of 1 mm.
@@ -110,7 +112,7 @@ mod tests {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.0, 0.2), 0.0);
         let sampling = sampling(&lens);
-        let focus = Autofocus { lenses: &[lens.clone()], points: &[point], sampling: &sampling };
+        let focus = Autofocus { lenses: from_ref(&lens), points: &[point], sampling: &sampling };
         let (film_mm, rms_mm) = focus.best_film_mm(36.0).unwrap();
         assert!((focus.best_film_mm(30.0).unwrap().0 - film_mm).abs() < 1e-11);
         let spot = |film_mm: f64| SpotDiagram::trace(&lens, &point, film_mm, &sampling).rms_mm().unwrap();
@@ -126,7 +128,7 @@ mod tests {
         let axis = ObjectPoint::from_field(&lens, DVec2::ZERO, 0.0);
         let mut sampling = sampling(&lens);
         sampling.places = hexapolar(60);
-        let focus = Autofocus { lenses: &[lens.clone()], points: &[axis], sampling: &sampling };
+        let focus = Autofocus { lenses: from_ref(&lens), points: &[axis], sampling: &sampling };
         let paraxial_mm = lens.film_mm_for(f64::INFINITY).unwrap();
         let edge = PupilSampling { places: vec![DVec2::Y], ..sampling.clone() };
         let marginal = edge.rays_on_film(&lens, &axis, paraxial_mm);
@@ -140,7 +142,7 @@ mod tests {
     fn darkness_has_no_focus() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.0, 1.2), 0.0);
-        let focus = Autofocus { lenses: &[lens.clone()], points: &[point], sampling: &sampling(&lens) };
+        let focus = Autofocus { lenses: from_ref(&lens), points: &[point], sampling: &sampling(&lens) };
         assert_eq!(focus.best_film_mm(36.0), None);
     }
 }
