@@ -5,7 +5,7 @@
 
 use super::{
     block::Block,
-    crossing::{Crossing, Interface, Ray, conic_distance, refract},
+    crossing::{ConicForm, Crossing, Interface, Ray, conic_distance, refract},
     kernel::{Optic, pass_lanes},
     real::Real,
 };
@@ -16,8 +16,7 @@ const NEWTON_STEPS: usize = 24;
 /// A conic with powers of r added.
 #[derive(Clone, Debug)]
 pub(super) struct Asphere<T, P> {
-    pub(super) curvature: T,
-    pub(super) conic: T,
+    pub(super) base: ConicForm<T>,
     pub(super) powers: P,
     pub(super) interface: Interface<T>,
 }
@@ -98,10 +97,10 @@ struct Below<T> {
 impl<T: Real, P: Powers<T>> Asphere<T, P> {
     #[inline(always)]
     fn below(&self, ray: &Ray<T>, t: T) -> Below<T> {
-        let c = self.curvature;
+        let &ConicForm { c, c2k1, .. } = &self.base;
         let (x, y) = (ray.x + ray.l * t, ray.y + ray.m * t);
         let r2 = x * x + y * y;
-        let root = (T::ONE - (T::ONE + self.conic) * c * c * r2).sqrt();
+        let root = (T::ONE - c2k1 * r2).sqrt();
         let (bump, slope) = self.powers.at(r2);
         Below { x, y, r2, root, bump, along: c + slope * root }
     }
@@ -109,9 +108,8 @@ impl<T: Real, P: Powers<T>> Asphere<T, P> {
     /// Where Newton's method starts: on the conic, or on the vertex plane for rays that miss it.
     #[inline(always)]
     fn start(&self, ray: &Ray<T>) -> T {
-        let (c, k1) = (self.curvature, T::ONE + self.conic);
-        let (t, _) = conic_distance(c, self.conic, ray);
-        let is_front = T::ONE - c * k1 * (ray.z + ray.n * t) > T::ZERO;
+        let (t, _) = conic_distance(&self.base, ray);
+        let is_front = T::ONE - self.base.ck1 * (ray.z + ray.n * t) > T::ZERO;
         if is_front & (t.abs() < T::INFINITY) { t } else { -ray.z / ray.n }
     }
 
@@ -121,7 +119,7 @@ impl<T: Real, P: Powers<T>> Asphere<T, P> {
     fn step(&self, ray: &Ray<T>, t: T) -> T {
         let Below { x, y, r2, root, bump, along } = self.below(ray, t);
         let beyond = T::ONE + root;
-        let height = ((ray.z + ray.n * t - bump) * beyond - self.curvature * r2) * root;
+        let height = ((ray.z + ray.n * t - bump) * beyond - self.base.c * r2) * root;
         let rate = (ray.n * root - along * (x * ray.l + y * ray.m)) * beyond;
         height / rate
     }

@@ -88,11 +88,29 @@ pub(super) fn cross_sphere<T: Real>(c: T, ray: &Ray<T>) -> Crossing<T> {
     Crossing { t, normal, cos, cos2, is_front: normal[2] > T::ZERO }
 }
 
+/// A conic of revolution: its curvature, 1 + its conic constant, and what depends on them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ConicForm<T> {
+    pub(super) c: T,
+    pub(super) conic: T,
+    pub(super) k1: T,
+    /// c (1 + conic), and c² (1 + conic).
+    pub(super) ck1: T,
+    pub(super) c2k1: T,
+}
+
+impl<T: Real> ConicForm<T> {
+    pub(super) fn new(c: T, conic: T) -> Self {
+        let k1 = T::ONE + conic;
+        Self { c, conic, k1, ck1: c * k1, c2k1: k1 * c * c }
+    }
+}
+
 /// Returns how far along a ray crosses a conic of revolution downstream, and the root that the distance takes.
 #[inline(always)]
-pub(super) fn conic_distance<T: Real>(c: T, conic: T, ray: &Ray<T>) -> (T, T) {
+pub(super) fn conic_distance<T: Real>(form: &ConicForm<T>, ray: &Ray<T>) -> (T, T) {
     let &Ray { x, y, z, l, m, n, .. } = ray;
-    let k1 = T::ONE + conic;
+    let &ConicForm { c, conic, k1, .. } = form;
     let a = c * (T::ONE + conic * n * n);
     let f = c * (x * x + y * y + k1 * z * z) - T::TWO * z;
     let g = n - c * (x * l + y * m + k1 * z * n);
@@ -105,10 +123,11 @@ pub(super) fn conic_distance<T: Real>(c: T, conic: T, ray: &Ray<T>) -> (T, T) {
 
 /// Crosses a conic of revolution where the ray goes through it downstream.
 #[inline(always)]
-pub(super) fn cross_conic<T: Real>(c: T, conic: T, ray: &Ray<T>) -> Crossing<T> {
+pub(super) fn cross_conic<T: Real>(form: &ConicForm<T>, ray: &Ray<T>) -> Crossing<T> {
     let &Ray { x, y, z, l, m, n, .. } = ray;
-    let (t, s) = conic_distance(c, conic, ray);
-    let gradient = [-c * (x + l * t), -c * (y + m * t), T::ONE - c * (T::ONE + conic) * (z + n * t)];
+    let &ConicForm { c, ck1, .. } = form;
+    let (t, s) = conic_distance(form, ray);
+    let gradient = [-c * (x + l * t), -c * (y + m * t), T::ONE - ck1 * (z + n * t)];
     let square = gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2];
     let inverse = T::ONE / square.sqrt();
     let cos = s * inverse;
@@ -153,19 +172,20 @@ pub(super) fn longer<T: Real>(opl: T, index: T, t: T) -> T {
     if T::HAS_PATH { opl + index * t } else { opl }
 }
 
-/// An ideal lens: its media, its power in air and the z of the object plane as it sees it.
+/// An ideal lens: its media, its power in air, and the z of the object plane and of its image as it sees them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ideal<T> {
     pub(super) index_before: T,
     pub(super) index_after: T,
     pub(super) power: T,
     pub(super) object_z: T,
+    pub(super) image_z: T,
 }
 
 /// Moves a ray to an ideal lens in the vertex plane, and turns it there.
 #[inline(always)]
 pub(super) fn thin_lens<T: Real>(lens: &Ideal<T>, interface: &Interface<T>, ray: &Ray<T>) -> Passed<T> {
-    let &Ideal { index_before: n1, index_after: n2, power, object_z } = lens;
+    let &Ideal { index_before: n1, index_after: n2, power, object_z, image_z } = lens;
     let passed = cross_plane(interface, ray);
     let Ray { x, y, l, m, n, opl, .. } = passed.ray;
     let (tx, ty) = (l / n, m / n);
@@ -174,9 +194,8 @@ pub(super) fn thin_lens<T: Real>(lens: &Ideal<T>, interface: &Interface<T>, ray:
     let mut turned = Ray { l: sx * n_after, m: sy * n_after, n: n_after, ..passed.ray };
     if T::HAS_PATH {
         // The path from the object point, and on to its image, is made that of the ray through the centre.
-        let reduced = n1 / object_z + power;
         let before = path_difference([x, y], [tx, ty], object_z);
-        let after = path_difference([x, y], [sx, sy], n2 / reduced);
+        let after = path_difference([x, y], [sx, sy], image_z);
         turned.opl = opl + (n2 * after - n1 * before);
     }
     Passed { ray: turned, ..passed }

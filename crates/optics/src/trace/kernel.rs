@@ -8,7 +8,9 @@ use multiversion::multiversion;
 
 use super::{
     block::{Block, LANES},
-    crossing::{Crossing, Ideal, Interface, Passed, Ray, cross_conic, cross_plane, cross_sphere, refract, thin_lens},
+    crossing::{
+        ConicForm, Crossing, Ideal, Interface, Passed, Ray, cross_conic, cross_plane, cross_sphere, refract, thin_lens,
+    },
     real::Real,
     toric::Toric,
 };
@@ -66,8 +68,7 @@ pub(super) struct Sphere<T> {
 /// A conic of revolution.
 #[derive(Clone, Debug)]
 pub(super) struct Conic<T> {
-    pub(super) curvature: T,
-    pub(super) conic: T,
+    pub(super) form: ConicForm<T>,
     pub(super) interface: Interface<T>,
 }
 
@@ -102,9 +103,7 @@ impl<T: Real> Optic<T> for Sphere<T> {
 impl<T: Real> Optic<T> for Conic<T> {
     #[inline(always)]
     fn pass<const N: usize>(&self, shift: T, from: &Block<T, N>, to: &mut Block<T, N>) {
-        pass_lanes(shift, from, to, |_, ray| {
-            refract(&self.interface, ray, &cross_conic(self.curvature, self.conic, ray))
-        });
+        pass_lanes(shift, from, to, |_, ray| refract(&self.interface, ray, &cross_conic(&self.form, ray)));
     }
 }
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{
     Goal, Plan, Rims, Step,
-    crossing::{Ray, cross_conic},
+    crossing::{ConicForm, Ray, cross_conic},
     move_to_plane, trace_batch, trace_clearances,
 };
 use crate::{Pose, RayFate, rays::RaySlices};
@@ -39,14 +39,14 @@ pub(crate) fn move_to_placed_conic(
     (index, surface): (f64, u16),
     rays: &mut RaySlices<'_>,
 ) {
+    let form = ConicForm::new(curvature, conic);
     in_frame(pose, rays, |mut rays| {
         for i in (0..rays.fate.len()).filter(|&i| rays.fate[i].is_in_flight()).collect::<Vec<_>>() {
             let (p, d) = (rays.point(i), rays.direction(i));
             // From where the ray passes nearest to the vertex, so that a far start costs no digits.
             let near = -p.dot(d);
             let q = p + d * near;
-            let crossing =
-                cross_conic(curvature, conic, &Ray { x: q.x, y: q.y, z: q.z, l: d.x, m: d.y, n: d.z, opl: 0.0 });
+            let crossing = cross_conic(&form, &Ray { x: q.x, y: q.y, z: q.z, l: d.x, m: d.y, n: d.z, opl: 0.0 });
             if !(crossing.is_front && crossing.t.is_finite()) {
                 rays.fate[i] = RayFate::Missed { surface };
                 continue;

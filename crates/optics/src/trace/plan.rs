@@ -4,7 +4,7 @@ use super::{
     Kind, Rims, Step,
     asphere::{AllPowers, Asphere, EvenPowers, ManyPowers},
     block::Block,
-    crossing::{Ideal, Interface},
+    crossing::{ConicForm, Ideal, Interface},
     kernel::{Conic, Sphere, ThinLens, TwoCurvatures, Window, pass_blocks},
     real::Real,
 };
@@ -85,10 +85,10 @@ impl<T: Real> Form<T> {
         match &step.kind {
             Kind::Window => Self::Window(Window(interface)),
             Kind::Sphere => Self::Sphere(Sphere { curvature, interface }),
-            Kind::Conic { conic } => Self::Conic(Conic { curvature, conic: T::of(*conic), interface }),
+            Kind::Conic { conic } => Self::Conic(Conic { form: ConicForm::new(curvature, T::of(*conic)), interface }),
             Kind::EvenAsphere { conic, a2, coefficients } => {
                 let from_r2: Vec<f64> = std::iter::once(a2).chain(coefficients).copied().collect();
-                let base = (curvature, T::of(*conic), interface);
+                let base = (ConicForm::new(curvature, T::of(*conic)), interface);
                 match from_r2.len() {
                     0..=4 => Self::Even4(asphere(base, EvenPowers(padded(&from_r2)))),
                     5..=8 => Self::Even8(asphere(base, EvenPowers(padded(&from_r2)))),
@@ -100,7 +100,7 @@ impl<T: Real> Form<T> {
                 }
             }
             Kind::OddAsphere { conic, coefficients } => {
-                let base = (curvature, T::of(*conic), interface);
+                let base = (ConicForm::new(curvature, T::of(*conic)), interface);
                 match coefficients.len() {
                     0..=10 => Self::All10(asphere(base, AllPowers(padded(coefficients)))),
                     11..=20 => Self::All20(asphere(base, AllPowers(padded(coefficients)))),
@@ -109,7 +109,14 @@ impl<T: Real> Form<T> {
             }
             Kind::ThinLens { power, object_z } => {
                 let (index_before, index_after) = (T::of(step.index_before), T::of(step.index_after));
-                let ideal = Ideal { index_before, index_after, power: T::of(*power), object_z: T::of(*object_z) };
+                let image_z = step.index_after / (step.index_before / object_z + power);
+                let ideal = Ideal {
+                    index_before,
+                    index_after,
+                    power: T::of(*power),
+                    object_z: T::of(*object_z),
+                    image_z: T::of(image_z),
+                };
                 Self::ThinLens(ThinLens { ideal, interface })
             }
             Kind::Toric(toric) => Self::TwoCurvatures(TwoCurvatures { toric: toric.clone(), interface }),
@@ -117,8 +124,8 @@ impl<T: Real> Form<T> {
     }
 }
 
-fn asphere<T, P>((curvature, conic, interface): (T, T, Interface<T>), powers: P) -> Asphere<T, P> {
-    Asphere { curvature, conic, powers, interface }
+fn asphere<T, P>((base, interface): (ConicForm<T>, Interface<T>), powers: P) -> Asphere<T, P> {
+    Asphere { base, powers, interface }
 }
 
 /// Returns the coefficients with zeros behind them.
