@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::{MonoLens, RayBatch};
+use crate::{MonoLens, RayBatch, beam::Aim};
 
 /// A point that light comes from, in the lens frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +37,7 @@ impl ObjectPoint {
     }
 
     /// Returns the unit direction from this point to another.
+    #[inline]
     pub fn direction_to(&self, target_mm: DVec3) -> DVec3 {
         match *self {
             Self::Finite(point) => (target_mm - point).normalize(),
@@ -47,6 +48,7 @@ impl ObjectPoint {
     /// Returns by how much the path from this point to `a` is longer than that to `b`, mm.
     ///
     /// Computed without ever forming the paths, so that it stays exact for far points.
+    #[inline]
     pub fn path_difference_mm(&self, a: DVec3, b: DVec3) -> f64 {
         match *self {
             Self::Finite(point) => {
@@ -64,17 +66,12 @@ impl ObjectPoint {
 /// small numbers, exact however far the point is. Starting on the first vertex plane (`start_z_mm` = 0) keeps
 /// positions exact too.
 pub fn rays_towards(point: &ObjectPoint, targets_mm: &[DVec2], z_mm: f64, start_z_mm: f64) -> RayBatch {
-    let start = |target_mm: DVec2| {
-        let target_mm = target_mm.extend(z_mm);
-        let direction = point.direction_to(target_mm);
-        (target_mm + direction * ((start_z_mm - z_mm) / direction.z), direction)
-    };
-    let (reference_mm, _) = start(DVec2::ZERO);
+    let aim = Aim::new(point, z_mm, start_z_mm);
     let mut rays = RayBatch::with_capacity(targets_mm.len());
     rays.object_z_mm = point.z_mm();
     for &target_mm in targets_mm {
-        let (start_mm, direction) = start(target_mm);
-        rays.push(start_mm, direction, point.path_difference_mm(start_mm, reference_mm));
+        let (start_mm, direction, opl_mm) = aim.ray(target_mm);
+        rays.push(start_mm, direction, opl_mm);
     }
     rays
 }

@@ -9,6 +9,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod analysis;
+mod beam;
 mod bundle;
 mod catalogue;
 mod error;
@@ -28,6 +29,7 @@ mod seidel;
 mod surface;
 mod trace;
 
+pub use beam::Beam;
 pub use bundle::{ObjectPoint, rays_over_front, rays_towards};
 pub use catalogue::{CatalogueGlass, GlassCatalogue};
 pub use error::OpticsError;

@@ -171,6 +171,15 @@ impl RayBatch {
         losses
     }
 
+    /// Makes room for exactly this many rays; those that are new are not set.
+    pub(crate) fn resize(&mut self, n_rays: usize) {
+        let position = [&mut self.x_mm, &mut self.y_mm, &mut self.z_mm];
+        for list in position.into_iter().chain([&mut self.l, &mut self.m, &mut self.n, &mut self.opl_mm]) {
+            list.resize(n_rays, 0.0);
+        }
+        self.fate.resize(n_rays, RayFate::InFlight);
+    }
+
     pub(crate) fn slices(&mut self) -> RaySlices<'_> {
         RaySlices {
             x: &mut self.x_mm,

@@ -4,7 +4,7 @@
 //! rays, keeps the light that is lost, and has no noise.
 
 use dioptric_diffraction::{BendForm, Edge, Hurb, bend};
-use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Rims, rays_towards};
+use dioptric_optics::{Beam, MonoLens, ObjectPoint, RayBatch, Rims, rays_towards};
 use glam::{DVec2, DVec3};
 use ndarray::Array2;
 use rand::RngExt;
@@ -42,6 +42,11 @@ pub struct CountingFilm {
 impl FrontGrid {
     /// Returns the rays from a point of the lens frame to this grid, started on the first vertex plane.
     pub fn rays(self, lens: &MonoLens, source_mm: DVec3) -> RayBatch {
+        rays_towards(&ObjectPoint::Finite(source_mm), &self.targets_mm(lens), 0.0, 0.0)
+    }
+
+    /// Returns the points of the grid, in the plane of the first vertex.
+    pub fn targets_mm(self, lens: &MonoLens) -> Vec<DVec2> {
         let step = 2.0 / (self.n_across.max(2) - 1) as f64;
         let mut random = self.jitter_seed.map(ChaCha8Rng::seed_from_u64);
         let mut targets = vec![];
@@ -56,7 +61,7 @@ impl FrontGrid {
                 }
             }
         }
-        rays_towards(&ObjectPoint::Finite(source_mm), &targets, 0.0, 0.0)
+        targets
     }
 }
 
@@ -81,6 +86,19 @@ impl CountingFilm {
     /// The first column stays empty, as it did for the authors.
     pub fn count(self, rays: &RayBatch) -> Array2<f64> {
         let mut counts = Array2::zeros((self.n_pixels, self.n_pixels));
+        self.add(rays, &mut counts);
+        counts
+    }
+
+    /// Returns what [`count`](Self::count) does for the rays of a beam on the plane `film_mm` behind the lens, without
+    /// storing them.
+    pub fn count_beam(self, lens: &MonoLens, beam: &Beam<'_>, film_mm: f64) -> Array2<f64> {
+        let mut counts = Array2::zeros((self.n_pixels, self.n_pixels));
+        lens.trace_onto(beam, Rims::Clip, film_mm, |rays| self.add(rays, &mut counts));
+        counts
+    }
+
+    fn add(self, rays: &RayBatch, counts: &mut Array2<f64>) {
         let pixels_per_mm = self.n_pixels as f64 / self.side_mm;
         let middle = 0.5 * (self.n_pixels as f64 + 1.0);
         let last = self.n_pixels as f64;
@@ -92,7 +110,6 @@ impl CountingFilm {
                 counts[(row as usize - 1, column as usize - 1)] += 1.0;
             }
         }
-        counts
     }
 
     /// Side of a pixel, µm.
@@ -136,5 +153,21 @@ mod tests {
             expected[at] = 1.0;
         }
         assert_eq!(counts, expected);
+    }
+
+    #[test]
+    fn counting_a_beam_is_counting_its_rays() {
+        let lens = Lens::built_in("paper-2el").unwrap().at(550.0).unwrap();
+        let grid = FrontGrid { n_across: 201, jitter_seed: Some(1) };
+        let source_mm = DVec3::new(100.0, 0.0, -2_000.0);
+        let (film_mm, targets_mm) = (52.0, grid.targets_mm(&lens));
+        let mut rays = grid.rays(&lens, source_mm);
+        lens.trace_to_film(&mut rays, Rims::Clip, film_mm);
+        let center_mm = mean_place_mm(&rays).unwrap();
+        let film = CountingFilm { n_pixels: 64, side_mm: 1.0, center_mm };
+        let beam = Beam { point: ObjectPoint::Finite(source_mm), targets_mm: &targets_mm, z_mm: 0.0 };
+        let counts = film.count_beam(&lens, &beam, film_mm);
+        assert!(counts.sum() > 1e3);
+        assert_eq!(counts, film.count(&rays));
     }
 }

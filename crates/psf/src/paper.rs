@@ -3,7 +3,7 @@
 //! Object places are given as the authors did: in a frame whose origin is the last vertex.
 
 use dioptric_diffraction::Hurb;
-use dioptric_optics::{Interface, Lens, MonoLens, RayBatch, Surface};
+use dioptric_optics::{Beam, Interface, Lens, MonoLens, ObjectPoint, RayBatch, Surface};
 use glam::{DVec2, DVec3};
 use ndarray::Array2;
 
@@ -48,7 +48,11 @@ pub fn counted_psfs(
     grid: FrontGrid,
     film: CountingFilm,
 ) -> Vec<Array2<f64>> {
-    lenses.iter().map(|lens| film.count(&land(lens, source_mm, film_mm, grid))).collect()
+    let count = |lens: &MonoLens| {
+        let point = ObjectPoint::Finite(source_mm + DVec3::Z * lens.last_vertex_z_mm());
+        film.count_beam(lens, &Beam { point, targets_mm: &grid.targets_mm(lens), z_mm: 0.0 }, film_mm)
+    };
+    lenses.iter().map(count).collect()
 }
 
 /// Returns where the middle of a fine film belongs: the mean place, over all wavelengths, of a first pass with 26² rays,
