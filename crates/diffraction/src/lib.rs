@@ -28,8 +28,8 @@ pub use hurb::{Hurb, Spread};
 pub use huygens::HuygensSources;
 pub use stop_ray::{StopRay, trace_stop_rays};
 pub use wave::{
-    Peak, PhaseRange, Propagation, PupilGrid, WaveNodes, WavePsf, WaveQuality, WaveWindow, WindowCenter,
-    polychromatic_psf, wave_nodes, wave_psf,
+    Peak, PhaseRange, Propagation, PupilEdge, PupilGrid, WaveMap, WaveNodes, WavePsf, WaveQuality, WaveWindow,
+    WindowCenter, polychromatic_psf, wave_nodes, wave_psf,
 };
 pub use wavefront::{ReferenceSphere, Wavefront, WavefrontReference};
 pub use width::full_width_at_half_maximum;

@@ -10,8 +10,12 @@
 
 mod axis;
 pub(crate) mod cis;
+mod gridded;
+mod map;
 mod nodes;
+mod pixel_mean;
 mod polychromatic;
+mod smooth;
 mod strehl;
 mod transform;
 
@@ -21,6 +25,8 @@ use ndarray::{Array2, s};
 
 use crate::DiffractionError;
 use axis::SampleAxis;
+use gridded::Grid;
+pub use map::{PupilEdge, WaveMap};
 pub use nodes::{PhaseRange, Propagation, PupilGrid, WaveNodes};
 pub(crate) use nodes::{polar, solid_angle_per_area};
 pub use polychromatic::polychromatic_psf;
@@ -135,7 +141,16 @@ pub fn wave_nodes(
         nodes.check(reach_mm)?;
         return Ok(nodes);
     }
-    let mut nodes = trace(PupilGrid::STANDARD)?;
+    enough_nodes(PupilGrid::STANDARD, reach_mm, trace)
+}
+
+/// Returns as many nodes as places up to `reach_mm` from their reference need, beginning with a grid.
+fn enough_nodes(
+    first: PupilGrid,
+    reach_mm: f64,
+    of: impl Fn(PupilGrid) -> Result<WaveNodes, DiffractionError>,
+) -> Result<WaveNodes, DiffractionError> {
+    let mut nodes = of(first)?;
     // More nodes reach nearer to the edge, and may find that still more are needed: hence the hundredth to spare.
     loop {
         let PhaseRange { rays, window } = nodes.phase_range(reach_mm);
@@ -146,7 +161,7 @@ pub fn wave_nodes(
         if bandwidth > LARGEST_BANDWIDTH {
             return Err(DiffractionError::TooBlurred { bandwidth, limit: LARGEST_BANDWIDTH });
         }
-        nodes = trace(PupilGrid::needed(PhaseRange { rays: 1.01 * rays, window: 1.01 * window }).max(nodes.grid))?;
+        nodes = of(PupilGrid::needed(PhaseRange { rays: 1.01 * rays, window: 1.01 * window }).max(nodes.grid))?;
     }
 }
 
@@ -186,6 +201,7 @@ impl WaveNodes {
         }
         let bandwidth = self.check(reach_mm)?;
         let pitch_mm = window.pitch_um * 1e-3;
+        let is_rule = points_per_pixel.is_none();
         let points_per_pixel = match points_per_pixel {
             Some(0) => {
                 let (what, expected) = ("the number of points along a pixel", "at least 1");
@@ -195,8 +211,15 @@ impl WaveNodes {
             // A hundredth to spare, so that a pitch of just λN/2 is not pushed over by rounding.
             None => (2.0 * pitch_mm / self.airy_unit_mm() - 0.01).ceil().max(1.0) as usize + 1,
         };
-        let axis = |n_pixels| SampleAxis::new(n_pixels, pitch_mm, points_per_pixel);
-        let mean = transform::mean_square(&self.plane_waves(), &axis(window.columns), &axis(window.rows));
+        let waves = self.plane_waves();
+        let grid =
+            Grid { n_rows: window.rows, n_columns: window.columns, pitch_mm, samples_per_pixel: points_per_pixel };
+        let mean = if is_rule && grid.is_cheaper(self.len()) {
+            gridded::mean_square(&waves, grid)
+        } else {
+            let axis = |n_pixels| SampleAxis::new(n_pixels, pitch_mm, points_per_pixel);
+            transform::mean_square(&waves, &axis(window.columns), &axis(window.rows))
+        };
         // In a film's rows y ascends, as it does down a picture; its x ascends to the picture's left.
         let samples = mean.slice(s![.., ..;-1]).mapv(|per_mm2| per_mm2 * pitch_mm * pitch_mm);
         Ok(WavePsf {

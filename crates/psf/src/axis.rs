@@ -9,12 +9,12 @@ pub(crate) struct Axis {
     knots: Vec<f64>,
 }
 
-/// Up to three knots and their weights, whose sum is 1.
+/// Up to four knots and their weights, whose sum is 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Stencil {
     n: usize,
     first: usize,
-    weights: [f64; 3],
+    weights: [f64; 4],
 }
 
 impl Axis {
@@ -36,14 +36,31 @@ impl Axis {
         let at = at.clamp(self.knots[0], self.knots[n - 1]);
         if n <= 2 {
             let fraction = if n == 2 { (at - self.knots[0]) / (self.knots[1] - self.knots[0]) } else { 0.0 };
-            return Stencil { n, first: 0, weights: [1.0 - fraction, fraction, 0.0] };
+            return Stencil { n, first: 0, weights: [1.0 - fraction, fraction, 0.0, 0.0] };
         }
         let above = self.knots.partition_point(|&k| k < at).clamp(1, n - 1);
         let nearest = if at - self.knots[above - 1] < self.knots[above] - at { above - 1 } else { above };
         let first = nearest.saturating_sub(1).min(n - 3);
         let k = &self.knots[first..first + 3];
         let weight = |i: usize, j: usize, l: usize| (at - k[j]) * (at - k[l]) / ((k[i] - k[j]) * (k[i] - k[l]));
-        Stencil { n: 3, first, weights: [weight(0, 1, 2), weight(1, 0, 2), weight(2, 0, 1)] }
+        Stencil { n: 3, first, weights: [weight(0, 1, 2), weight(1, 0, 2), weight(2, 0, 1), 0.0] }
+    }
+
+    /// Returns Lagrange's cubic weights of the two knots on each side of a place, which is moved into the axis; on an
+    /// axis of fewer than four knots those of [`stencil`](Self::stencil).
+    pub(crate) fn cubic(&self, at: f64) -> Stencil {
+        let n = self.knots.len();
+        if n < 4 {
+            return self.stencil(at);
+        }
+        let at = at.clamp(self.knots[0], self.knots[n - 1]);
+        let first = self.knots.partition_point(|&k| k < at).saturating_sub(2).min(n - 4);
+        let k = &self.knots[first..first + 4];
+        let weight = |i: usize| {
+            let others = (0..4).filter(|j| *j != i);
+            others.map(|j| (at - k[j]) / (k[i] - k[j])).product()
+        };
+        Stencil { n: 4, first, weights: std::array::from_fn(weight) }
     }
 }
 
@@ -67,6 +84,19 @@ mod tests {
             assert!((value - f(x)).abs() < 1e-13, "at {x}: {value}");
         }
         assert_eq!(axis.stencil(1.5).iter().collect::<Vec<_>>(), [(2, 1.0)]);
+    }
+
+    #[test]
+    fn cubics_are_met_exactly() {
+        let axis = Axis::new(vec![0.0, 0.5, 1.5, 2.0, 4.0]).unwrap();
+        let f = |x: f64| 3.0 - x + 0.7 * x * x - 0.3 * x.powi(3);
+        for x in [0.0, 0.1, 0.5, 0.9, 1.7, 2.9, 3.9, 4.0] {
+            let value: f64 = axis.cubic(x).iter().map(|(i, w)| w * f(axis.knots()[i])).sum();
+            assert!((value - f(x)).abs() < 1e-12, "at {x}: {value}");
+        }
+        assert_eq!(axis.cubic(2.0).iter().collect::<Vec<_>>(), [(3, 1.0)]);
+        let few = Axis::new(vec![0.0, 1.0, 2.0]).unwrap();
+        assert_eq!(few.cubic(0.3), few.stencil(0.3));
     }
 
     #[test]

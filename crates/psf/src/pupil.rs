@@ -40,6 +40,17 @@ impl Pupil {
         solved.or_else(|| Self::find(lens, point, n_azimuths))
     }
 
+    /// Returns the same region with its edge at so many azimuths, by straight lines between those known.
+    pub(crate) fn resampled(&self, n_azimuths: usize) -> Self {
+        let n = self.rho_mm.len();
+        let edge = |i: usize| {
+            let place = i as f64 * n as f64 / n_azimuths as f64;
+            let (below, fraction) = (place as usize, place.fract());
+            self.rho_mm[below % n] * (1.0 - fraction) + self.rho_mm[(below + 1) % n] * fraction
+        };
+        Self { rho_mm: (0..n_azimuths).map(edge).collect(), ..self.clone() }
+    }
+
     fn azimuth(&self, i: usize) -> f64 {
         std::f64::consts::TAU * i as f64 / self.rho_mm.len() as f64
     }

@@ -7,6 +7,8 @@
 use glam::DVec2;
 use ndarray::Array2;
 
+use crate::mesh::Mesh;
+
 /// Below this area, in pixels², a triangle is a segment: the rounding error of the running sum is its energy
 /// × 1e-16 / area.
 const SEGMENT_AREA: f64 = 1e-6;
@@ -47,21 +49,58 @@ impl Raster {
 
     /// Deposits energy evenly on a triangle; what falls outside is lost.
     pub fn triangle(&mut self, [a, b, c]: [DVec2; 3], energy: f64) {
+        let density = self.density([a, b, c], energy);
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            self.edge(from, to, density);
+        }
+    }
+
+    /// Returns the energy per area of a triangle, negative if it runs the other way; or deposits it, if it covers next
+    /// to nothing or a part of one pixel, and returns 0.
+    fn density(&mut self, [a, b, c]: [DVec2; 3], energy: f64) -> f64 {
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        if !(low.is_finite() && high.is_finite() && self.meets(low, high)) {
-            return;
+        if energy == 0.0 || !(low.is_finite() && high.is_finite() && self.meets(low, high)) {
+            return 0.0;
         }
         if low.floor() == high.floor() {
-            return self.point(a, energy);
+            self.point(a, energy);
+            return 0.0;
         }
         let doubled = (b - a).perp_dot(c - a);
         if doubled.abs() < 2.0 * SEGMENT_AREA {
-            return self.sliver([a, b, c], energy);
+            self.sliver([a, b, c], energy);
+            return 0.0;
         }
         // A triangle that runs the other way has a negative area, and so has every piece of it.
-        let density = 2.0 * energy / doubled;
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            self.edge(from, to, density);
+        2.0 * energy / doubled
+    }
+
+    /// Deposits energies on the cells of a mesh whose nodes lie at these places, each as by
+    /// [`quadrilateral`](Self::quadrilateral); edges between two cells are walked once.
+    pub(crate) fn mesh(&mut self, mesh: Mesh, at: &[DVec2], energies: &[f64]) {
+        let corners = |ring, j| mesh.corners(ring, j).map(|node| at[node]);
+        let densities: Vec<[f64; 2]> = mesh
+            .cells()
+            .zip(energies)
+            .map(|((ring, j), &energy)| {
+                let [a, b, c, d] = corners(ring, j);
+                let share = mesh.outer_share(ring);
+                if energy != 0.0 && a.min(b).min(c.min(d)).floor() == a.max(b).max(c.max(d)).floor() {
+                    self.point(a, energy);
+                    return [0.0; 2];
+                }
+                [self.density([a, b, c], share * energy), self.density([a, c, d], (1.0 - share) * energy)]
+            })
+            .collect();
+        let n = mesh.n_azimuths;
+        for ((ring, j), [outer, inner]) in mesh.cells().zip(&densities) {
+            let [a, b, c, _] = corners(ring, j);
+            // The neighbours run along the same edges the other way.
+            let [_, before] = densities[ring * n + (j + n - 1) % n];
+            let beyond = densities.get((ring + 1) * n + j).map_or(0.0, |[_, inner]| *inner);
+            self.edge(a, b, outer - before);
+            self.edge(b, c, outer - beyond);
+            self.edge(a, c, inner - outer);
         }
     }
 
@@ -105,6 +144,9 @@ impl Raster {
     /// Adds an edge, cut at the borders of the grid. What lies to the left still covers the row; what lies to the
     /// right does not.
     fn edge(&mut self, from: DVec2, to: DVec2, density: f64) {
+        if density == 0.0 {
+            return;
+        }
         let (top, bottom, sign) = if from.y < to.y { (from, to, -density) } else { (to, from, density) };
         let height = self.rows as f64;
         let (first, last) = (top.y.max(0.0), bottom.y.min(height));
@@ -208,6 +250,26 @@ mod tests {
         let (whole, window) = (whole.finish(), window.finish());
         for ((row, column), &value) in window.indexed_iter() {
             assert!((value - whole[(row + 17, column + 21)]).abs() < 1e-9, "at {row}, {column}");
+        }
+    }
+
+    #[test]
+    fn a_mesh_is_the_sum_of_its_cells() {
+        let mesh = Mesh { n_rings: 5, n_azimuths: 12 };
+        // A fold: the outer rings come back inwards and to one side; part of it lies outside.
+        let at: Vec<DVec2> = mesh
+            .nodes()
+            .map(|(t, a)| DVec2::new(13.0, 12.0) + DVec2::from_angle(a) * (14.0 * (t - 0.7 * t.powi(3))) + t * t)
+            .collect();
+        let energies: Vec<f64> =
+            (0..mesh.n_cells()).map(|i| if i % 7 == 3 { 0.0 } else { 1.0 + 0.01 * i as f64 }).collect();
+        let (mut whole, mut parts) = (Raster::new(25, 21), Raster::new(25, 21));
+        whole.mesh(mesh, &at, &energies);
+        for ((ring, j), &energy) in mesh.cells().zip(&energies) {
+            parts.quadrilateral(mesh.corners(ring, j).map(|node| at[node]), energy, mesh.outer_share(ring));
+        }
+        for (a, b) in whole.finish().iter().zip(&parts.finish()) {
+            assert!((a - b).abs() < 1e-11, "{a} {b}");
         }
     }
 

@@ -22,8 +22,12 @@ const TAILS: f64 = 12.0;
 const POLYGON: f64 = 8.0;
 /// A Gaussian whose wide axis is below this, in pixels, is not drawn.
 const NARROW: f64 = 0.12;
-/// The same where a cell is larger than a pixel, and so are its neighbours.
+/// The same where cells are at least this wide, pixels, in a blur of many pixels.
+const NARROW_CELL: f64 = 0.5;
 const PART_OF_A_PIXEL: f64 = 0.2;
+/// The same where they are wider than a pixel.
+const WIDE_CELL: f64 = 1.0;
+const PART_OF_A_WIDE_CELL: f64 = 0.25;
 /// Variance, pixels², that a pixel's own size adds when the need for subdivision is judged.
 const PIXEL_VARIANCE: f64 = 0.12;
 
@@ -43,7 +47,9 @@ pub(crate) struct Layout<'a> {
     reach: f64,
     /// λN, pixels; 0 without diffraction.
     unit: f64,
-    half: usize,
+    side: usize,
+    /// The side that holds the picture.
+    natural_side: usize,
 }
 
 impl<'a> Layout<'a> {
@@ -60,40 +66,45 @@ impl<'a> Layout<'a> {
         let reach = nodes.iter().map(|node| node.at_mm.abs().max_element()).fold(0.0, f64::max);
         let unit = bending.map_or(0.0, |bending| unit(record, &nodes, bending));
         let half = (reach + TAILS * unit - 0.5).ceil().clamp(0.0, MOST_PIXELS) as usize;
-        Self { record, nodes, bending, reach, unit, half }
+        Self { record, nodes, bending, reach, unit, side: 2 * half + 1, natural_side: 2 * half + 1 }
     }
 
-    /// The side of the window in pixels, an odd number.
+    /// Returns the layout with a window of so many pixels along its side, if any are asked for.
+    pub(crate) fn with_side(self, side: Option<usize>) -> Self {
+        Self { side: side.unwrap_or(self.side), ..self }
+    }
+
+    /// The side of the window in pixels; an odd number unless another was asked for.
     pub(crate) fn side(&self) -> usize {
-        2 * self.half + 1
+        self.side
     }
 
     /// The range of phases B that a wave sum would have to follow, radians: over the pupil's radius, for light from
-    /// its outermost ray to the window's corner.
+    /// its outermost ray to the corner of the window that holds the picture.
     pub(crate) fn bandwidth(&self) -> f64 {
-        let corner = std::f64::consts::SQRT_2 * (self.half as f64 + 0.5);
+        let corner = std::f64::consts::FRAC_1_SQRT_2 * self.natural_side as f64;
         std::f64::consts::PI * (self.reach + corner) / self.unit
     }
 
     /// Draws the energy of each pixel of the window.
     pub(crate) fn draw(mut self) -> Array2<f64> {
-        let middle = DVec2::splat(self.half as f64 + 0.5);
+        let middle = DVec2::splat(0.5 * self.side as f64);
         self.nodes.iter_mut().for_each(|node| node.at_mm += middle);
         let record = self.record;
         let mut raster = Raster::new(self.side(), self.side());
-        for ((ring, j), &energy) in record.mesh.cells().zip(record.energies()) {
-            let corners = record.mesh.corners(ring, j).map(|node| self.nodes[node]);
-            match self.bending {
-                None => {
-                    let outer = record.mesh.outer_share(ring);
-                    raster.quadrilateral(corners.map(|node| node.at_mm), energy.into(), outer);
-                }
-                Some(bending) => {
-                    let cell = Cell { corners, inner: ring as f64, energy: energy.into() };
-                    draw_bent(&mut raster, record, &cell, bending);
+        let mut energies: Vec<f64> = record.energies().iter().map(|e| f64::from(*e)).collect();
+        if let Some(bending) = self.bending {
+            // What is bent is deposited as Gaussians, and is then no part of the mesh.
+            for ((ring, j), energy) in record.mesh.cells().zip(&mut energies) {
+                let corners = record.mesh.corners(ring, j).map(|node| self.nodes[node]);
+                let cell = Cell { corners, inner: ring as f64, energy: *energy };
+                if draw_bent(&mut raster, record, &cell, bending) {
+                    *energy = 0.0;
                 }
             }
         }
+        let at: Vec<DVec2> = self.nodes.iter().map(|node| node.at_mm).collect();
+        raster.mesh(record.mesh, &at, &energies);
         raster.finish()
     }
 }
@@ -153,17 +164,21 @@ impl Bending {
     }
 }
 
-/// Draws a cell whose rays are bent: as a polygon where bending is small beside it, else as Gaussians.
-fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending) {
+/// Draws a cell whose rays are bent as Gaussians, unless bending is so small beside it that a polygon will do.
+fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending) -> bool {
     let (along, around) = cell.sides(0.5, 0.5);
     let covariance = bending.covariance(&cell.at(0.5, 0.5));
     let (_, wide) = covariance.axes();
     let widened = Covariance { xx: covariance.xx + PIXEL_VARIANCE, yy: covariance.yy + PIXEL_VARIANCE, ..covariance };
     let (n_along, n_around) = (in_sigmas(along, widened), in_sigmas(around, widened));
-    let is_beside_the_cell = wide < PART_OF_A_PIXEL * PART_OF_A_PIXEL && along.length().min(around.length()) > 1.0;
-    if wide < NARROW * NARROW || is_beside_the_cell || (n_along > POLYGON && n_around > POLYGON) {
-        let outer = record.mesh.outer_share(cell.inner as usize);
-        return raster.quadrilateral(cell.corners.map(|node| node.at_mm), cell.energy, outer);
+    // Cells of a blur lie side by side: what one loses to its neighbour it gets back.
+    let narrow = match along.length().min(around.length()) {
+        side if side > WIDE_CELL => PART_OF_A_WIDE_CELL,
+        side if side > NARROW_CELL => PART_OF_A_PIXEL,
+        _ => NARROW,
+    };
+    if wide < narrow * narrow || (n_along > POLYGON && n_around > POLYGON) {
+        return false;
     }
     // A piece of this many standard deviations across leaves a ripple of 1 %, which pixels and neighbours hide.
     const PIECE: f64 = 2.3;
@@ -192,6 +207,7 @@ fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending
             splat::deposit(raster, node.at_mm, covariance, energy);
         }
     }
+    true
 }
 
 /// Returns how many pieces the spread of a ring needs: it doubles over the last few.

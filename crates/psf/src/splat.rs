@@ -75,8 +75,8 @@ fn sample_lines(pixels: &mut [f64], grid: Grid, at: DVec2, c: Covariance, energy
             continue;
         }
         let dx = first as f64 + 0.5 - center;
-        let mut value = peak * (-0.5 * (t2 + q_xx * dx * dx)).exp();
-        let mut ratio = (-q_xx * (dx + 0.5)).exp();
+        let mut value = peak * exp(-0.5 * (t2 + q_xx * dx * dx));
+        let mut ratio = exp(-q_xx * (dx + 0.5));
         let pixels = &mut pixels[line / divisions * line_step..];
         let (mut pixel, mut phase) = (first / divisions * step, first % divisions);
         let mut left = end - first;
@@ -94,6 +94,22 @@ fn sample_lines(pixels: &mut [f64], grid: Grid, at: DVec2, c: Covariance, energy
             left -= n;
         }
     }
+}
+
+/// Returns e^x for |x| < 700, to 1e-9 of itself: quicker than the library's, and the same bits everywhere.
+#[inline(always)]
+fn exp(x: f64) -> f64 {
+    const SHIFT: f64 = 6_755_399_441_055_744.0;
+    let turns = x * std::f64::consts::LOG2_E;
+    let shifted = turns + SHIFT;
+    let t = (turns - (shifted - SHIFT)) * std::f64::consts::LN_2;
+    // Taylor's series to the tenth power, over |t| < 0.35.
+    let mut sum = 1.0 / 3_628_800.0;
+    for factor in [362_880.0, 40_320.0, 5040.0, 720.0, 120.0, 24.0, 6.0, 2.0, 1.0, 1.0] {
+        sum = sum * t + 1.0 / factor;
+    }
+    // The whole number of doublings is in the last bits of the shifted sum; it goes to the exponent.
+    f64::from_bits(sum.to_bits().wrapping_add(shifted.to_bits() << 52))
 }
 
 /// Returns the samples whose centres lie within `reach` of a place, of the `n` that there are.
@@ -134,6 +150,14 @@ mod tests {
                 assert!((mean(&|x, _| x * x) - c.xx - 1.0 / 12.0).abs() < 4e-3 * c.xx);
                 assert!((mean(&|x, y| x * y) - c.xy).abs() < 4e-3 * c.xx);
             }
+        }
+    }
+
+    #[test]
+    fn the_exponential_is_the_librarys() {
+        for i in -6900..6900 {
+            let x = f64::from(i) * 0.1;
+            assert!((exp(x) / x.exp() - 1.0).abs() < 1e-9, "{x}: {} {}", exp(x), x.exp());
         }
     }
 

@@ -2,17 +2,19 @@
 
 use std::{fs, io::Write, path::Path};
 
+use dioptric_diffraction::WaveMap;
 use dioptric_optics::Lens;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     BankSettings, PsfBank, PsfError,
+    bank::Parts,
     mesh::Mesh,
     ray_map::{Record, Summary},
 };
 
-const FORMAT: &str = "dioptric psf bank 1";
+const FORMAT: &str = "dioptric psf bank 2";
 
 /// The first line of a file.
 #[derive(Serialize, Deserialize)]
@@ -24,6 +26,8 @@ struct Header {
     prescription: String,
     settings: BankSettings,
     n_fields: usize,
+    /// Numbers of the waves of one sample; 0 where there are none.
+    n_wave_numbers: usize,
 }
 
 impl PsfBank {
@@ -39,6 +43,7 @@ impl PsfBank {
             prescription: fingerprint(self.lens()),
             settings: self.settings().clone(),
             n_fields: self.n_fields(),
+            n_wave_numbers: self.waves().first().map_or(0, |map| map.numbers().len()),
         };
         let text = ron::to_string(&header).map_err(|error| store_error(path, error))?;
         let mut bytes = format!("{text}\n").into_bytes();
@@ -48,6 +53,9 @@ impl PsfBank {
         for s in self.summaries() {
             let numbers = [s.centroid_mm.x, s.centroid_mm.y, s.pupil_mm2, s.signed_rms_mm];
             bytes.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+        }
+        for map in self.waves() {
+            bytes.extend(map.numbers().iter().flat_map(|number| number.to_le_bytes()));
         }
         let beside = path.with_extension("partial");
         let write = || {
@@ -95,16 +103,29 @@ impl PsfBank {
         let numbers: Vec<f32> = numbers.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
         let records = numbers.chunks(length.max(1)).map(|numbers| Record { mesh, has_stop, numbers: numbers.to_vec() });
         let n_summaries = n_columns * Self::n_geometry(header.n_fields);
-        if rest.len() != 32 * n_summaries {
+        if header.n_wave_numbers > 1 << 16 {
+            return Err(not_a_bank(path));
+        }
+        let n_wave_numbers = n_records * header.n_wave_numbers;
+        if rest.len() != 32 * n_summaries + 8 * n_wave_numbers {
             return Err(cut(path));
         }
         let doubles: Vec<f64> = rest.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        let (doubles, wave_numbers) = doubles.split_at(4 * n_summaries);
+        let waves = match header.n_wave_numbers {
+            0 => vec![],
+            n => {
+                let maps = wave_numbers.chunks(n).map(|numbers| WaveMap::from_numbers(numbers.to_vec()));
+                maps.collect::<Option<_>>().ok_or_else(|| not_a_bank(path))?
+            }
+        };
         let summaries = doubles.as_chunks::<4>().0.iter().map(|&[x, y, pupil_mm2, signed_rms_mm]| Summary {
             centroid_mm: DVec2::new(x, y),
             pupil_mm2,
             signed_rms_mm,
         });
-        Self::assemble(lens, &settings, header.n_fields, records.collect(), summaries.collect())
+        let (records, summaries) = (records.collect(), summaries.collect());
+        Self::assemble(lens, &settings, Parts { n_fields: header.n_fields, records, summaries, waves })
     }
 
     /// Returns the bank from a file in `folder` that is named by what the lens and the settings are, or builds it and

@@ -334,7 +334,7 @@ pub(crate) fn polar(grid: PupilGrid, rho_max: impl Fn(usize) -> f64) -> impl Ite
 }
 
 /// Returns the wave model for a lens and film.
-fn propagation(lens: &MonoLens, film_mm: f64) -> Propagation {
+pub(super) fn propagation(lens: &MonoLens, film_mm: f64) -> Propagation {
     let first = lens.first_order();
     let (radius_mm, way_mm) = (0.5 * first.exit_pupil_diameter_mm, film_mm - first.exit_pupil_z_mm);
     let zones = first.image_index * radius_mm * radius_mm / (lens.wavelength_nm() * 1e-6 * way_mm.abs());
@@ -422,13 +422,13 @@ pub(crate) fn solid_angle_per_area(point: &ObjectPoint, target_mm: DVec3) -> f64
 }
 
 /// Directions of waves, and optical paths along them to the reference point.
-struct Waves {
-    d: Vec<DVec2>,
-    phi_mm: Vec<f64>,
+pub(super) struct Waves {
+    pub(super) d: Vec<DVec2>,
+    pub(super) phi_mm: Vec<f64>,
 }
 
 /// Each ray as a plane wave.
-fn along_rays(rays: &RayBatch, reference_mm: DVec2, index: f64) -> Waves {
+pub(super) fn along_rays(rays: &RayBatch, reference_mm: DVec2, index: f64) -> Waves {
     let d: Vec<DVec2> = (0..rays.len()).map(|i| rays.direction(i).truncate()).collect();
     let phi_mm = d.iter().enumerate().map(|(i, d)| {
         let q = rays.point_mm(i).truncate() - reference_mm;

@@ -23,6 +23,14 @@ pub(crate) struct PlaneWaves {
     pub(crate) turns_y_per_mm: Vec<f64>,
 }
 
+impl PlaneWaves {
+    /// Returns one over the sum of the amplitudes: single precision then works on numbers up to 1.
+    pub(crate) fn scale(&self) -> f64 {
+        let sum: f64 = self.re.iter().zip(&self.im).map(|(re, im)| (re * re + im * im).sqrt()).sum();
+        if sum > 0.0 { 1.0 / sum } else { 1.0 }
+    }
+}
+
 /// Places along x in a tile.
 const PLACES: usize = 8;
 /// Columns of a tile: a cosine and a sine a place.
@@ -39,19 +47,13 @@ pub(crate) fn mean_square(waves: &PlaneWaves, x: &SampleAxis, y: &SampleAxis) ->
     let (n_panels, n_rows) = (x.n_half().div_ceil(PLACES), y.n_half());
     let mut sums = vec![[[0.0; COLUMNS]; ROWS]; n_panels * n_rows];
     let mut factors = Factors::new(x, y);
+    let scale = waves.scale();
     for start in (0..waves.re.len()).step_by(BLOCK) {
         let block = start..(start + BLOCK).min(waves.re.len());
-        let scale = scale_of(waves);
         factors.fill(waves, block, scale, x, y);
         multiply(&factors.left, &factors.right, factors.n_nodes, &mut sums);
     }
-    gather(&sums, n_panels, x, y, scale_of(waves))
-}
-
-/// Returns one over the sum of the amplitudes: single precision then works on numbers up to 1.
-fn scale_of(waves: &PlaneWaves) -> f64 {
-    let sum: f64 = waves.re.iter().zip(&waves.im).map(|(re, im)| (re * re + im * im).sqrt()).sum();
-    if sum > 0.0 { 1.0 / sum } else { 1.0 }
+    gather(&sums, n_panels, x, y, scale)
 }
 
 /// The two factors for one block of nodes.
@@ -253,7 +255,7 @@ mod tests {
             let waves = waves(n);
             let (x, y) = (SampleAxis::new(nx, 0.13, 1), SampleAxis::new(ny, 0.11, 1));
             let found = mean_square(&waves, &x, &y);
-            let peak = 1.0 / scale_of(&waves).powi(2);
+            let peak = 1.0 / waves.scale().powi(2);
             for ((row, column), value) in found.indexed_iter() {
                 let place = |i: usize, n: usize, pitch: f64| (i as f64 - 0.5 * (n as f64 - 1.0)) * pitch;
                 let expected = square_at(&waves, place(column, nx, 0.13), place(row, ny, 0.11));

@@ -1,0 +1,414 @@
+//! The light of a point over its pupil as smooth functions, which can be interpolated between points.
+
+use std::f64::consts::TAU;
+
+use dioptric_optics::{MonoLens, ObjectPoint, Rims, rays_towards};
+use glam::DVec2;
+use multiversion::multiversion;
+
+use super::{
+    Propagation, PupilGrid, WaveNodes, WavePsf, WaveWindow, WindowCenter, enough_nodes,
+    nodes::{along_rays, propagation, solid_angle_per_area},
+    smooth::{Azimuth, Parity, Places, Ray, horner, radial_slope},
+};
+use crate::{DiffractionError, quadrature::gauss_legendre_on};
+
+/// The edge of a pupil that is symmetric about its x axis, in the entrance-pupil plane.
+#[derive(Clone, Copy, Debug)]
+pub struct PupilEdge<'a> {
+    /// What the distances count from, mm from the axis along x.
+    pub center_x_mm: f64,
+    /// z of the plane from the first vertex, mm.
+    pub z_mm: f64,
+    /// Distances at the azimuths `2π i / n`, mm; n is a multiple of 4.
+    pub rho_mm: &'a [f64],
+}
+
+/// The light of one object point at one wavelength on the film, as smooth functions over its pupil: polynomials of
+/// degree 12 for the directions behind the lens, the angular eikonal Φ and the brightness, and the pupil's edge.
+///
+/// Maps of neighbouring fields, depths and wavelengths can be added with weights ([`mix`](Self::mix)), and nodes for
+/// the wave sum be taken from them in any number ([`nodes`](Self::nodes)). The field lies along +x of the film's frame;
+/// the pupil is then symmetric about x. Coordinates over the pupil count from its middle in units of twice its rms
+/// width and height, so that pupils of different vignetting correspond.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WaveMap {
+    // Invariant: SCALARS, then the coefficients of dx, dy, Φ (mm) and ln brightness, then the edge from azimuth 0 to π.
+    numbers: Vec<f64>,
+}
+
+/// Numbers before the functions: image index, what the pupil collects, centroid along x (mm), half width and half
+/// height of the pupil (mm), error of the fit (waves rms).
+const SCALARS: usize = 6;
+/// Radii at which functions are fitted, and every how many azimuths of the edge.
+const FIT_RADII: usize = 12;
+const FIT_AZIMUTHS: usize = 48;
+
+/// The places of a function in the list of numbers.
+fn span(function: usize) -> (Parity, std::ops::Range<usize>) {
+    let (even, odd) = (Parity::Even.n_terms(), Parity::Odd.n_terms());
+    let (parity, start) = match function {
+        0 => (Parity::Even, 0),
+        1 => (Parity::Odd, even),
+        2 => (Parity::Even, even + odd),
+        _ => (Parity::Even, 2 * even + odd),
+    };
+    (parity, SCALARS + start..SCALARS + start + parity.n_terms())
+}
+
+impl WaveMap {
+    /// Traces the light of a point in a field along x to the film, `film_mm` behind the last vertex, and fits it.
+    ///
+    /// # Errors
+    /// When rays within the pupil are lost, all run in one direction, or the pupil is one of few Fresnel zones, whose
+    /// waves are not those of rays.
+    pub fn trace(
+        lens: &MonoLens,
+        point: &ObjectPoint,
+        film_mm: f64,
+        edge: PupilEdge<'_>,
+    ) -> Result<Self, DiffractionError> {
+        let wavelength_nm = lens.wavelength_nm();
+        let folded = DiffractionError::Folded { wavelength_nm };
+        if propagation(lens, film_mm) == Propagation::Fresnel {
+            return Err(folded);
+        }
+        let half_mm = edge.half_sizes_mm();
+        let (targets_mm, areas, places) = edge.places(half_mm);
+        let mut rays = rays_towards(point, &targets_mm, edge.z_mm, 0.0);
+        lens.trace(&mut rays, Rims::Ignore);
+        lens.to_film(&mut rays, film_mm);
+        let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
+        if n_lost > 0 {
+            return Err(DiffractionError::LostRays { wavelength_nm, n_lost, n_rays });
+        }
+        let brightness: Vec<f64> =
+            targets_mm.iter().map(|target| solid_angle_per_area(point, target.extend(edge.z_mm))).collect();
+        let taken: Vec<f64> = brightness.iter().zip(&areas).map(|(b, area)| b * area).collect();
+        let half_collected: f64 = taken.iter().sum();
+        // The other half of the pupil mirrors this one.
+        let centroid_x_mm = taken.iter().zip(&rays.x_mm).map(|(e, x)| e * x).sum::<f64>() / half_collected;
+        let waves = along_rays(&rays, DVec2::new(centroid_x_mm, 0.0), lens.image_index());
+        let piston_mm = waves.phi_mm[0];
+        let phi_mm: Vec<f64> = waves.phi_mm.iter().map(|phi| phi - piston_mm).collect();
+        let d_x: Vec<f64> = waves.d.iter().map(|d| d.x).collect();
+        let d_y: Vec<f64> = waves.d.iter().map(|d| d.y).collect();
+        let ln_brightness: Vec<f64> = brightness.iter().map(|b| b.ln()).collect();
+        let [fit_x, fit_phi, fit_b] =
+            places.fit(Parity::Even, [&d_x, &phi_mm, &ln_brightness]).ok_or_else(|| folded.clone())?;
+        let [fit_y] = places.fit(Parity::Odd, [&d_y]).ok_or(folded)?;
+        let error_waves = rms_error(&places, &fit_phi, &phi_mm) / (wavelength_nm * 1e-6);
+        let mut numbers =
+            vec![lens.image_index(), 2.0 * half_collected, centroid_x_mm, half_mm.x, half_mm.y, error_waves];
+        for fit in [&fit_x, &fit_y, &fit_phi, &fit_b] {
+            numbers.extend(fit);
+        }
+        numbers.extend(&edge.rho_mm[..=edge.rho_mm.len() / 2]);
+        Ok(Self { numbers })
+    }
+
+    /// Returns a map from the list of its numbers, or `None` if there are not `4 n + 1` azimuths of its edge in it.
+    pub fn from_numbers(numbers: Vec<f64>) -> Option<Self> {
+        let n_edge = numbers.len().checked_sub(span(3).1.end)?;
+        (n_edge > 4 && (n_edge - 1).is_multiple_of(2)).then_some(Self { numbers })
+    }
+
+    /// All that interpolation mixes, as one list.
+    pub fn numbers(&self) -> &[f64] {
+        &self.numbers
+    }
+
+    /// Returns how many numbers a map has, of a pupil whose edge is known at `n_azimuths`.
+    pub fn n_numbers(n_azimuths: usize) -> usize {
+        span(3).1.end + n_azimuths / 2 + 1
+    }
+
+    /// Returns the sum of maps with weights of sum 1, or `None` of none; all edges must be known at the same azimuths.
+    pub fn mix<'a>(weighted: impl Iterator<Item = (&'a Self, f64)>) -> Option<Self> {
+        let mut sum: Option<Self> = None;
+        for (map, weight) in weighted {
+            match &mut sum {
+                None => sum = Some(Self { numbers: map.numbers.iter().map(|x| x * weight).collect() }),
+                Some(sum) => {
+                    for (total, x) in sum.numbers.iter_mut().zip(&map.numbers) {
+                        *total += weight * x;
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    /// How far the polynomials are from the traced eikonal, waves rms: of a mixed map, of those that it is mixed from.
+    pub fn error_waves(&self) -> f64 {
+        self.numbers[5]
+    }
+
+    /// Returns the distance of the edge from the middle at an azimuth, mm: exact where it was found, else a cubic.
+    fn edge_mm(&self, azimuth: f64) -> f64 {
+        let edge = &self.numbers[span(3).1.end..];
+        let half = edge.len() as i64 - 1;
+        let place = (azimuth / TAU).rem_euclid(1.0) * (2 * half) as f64;
+        let (below, t) = (place.floor() as i64, place.fract());
+        let at = |i: i64| {
+            let i = i.rem_euclid(2 * half);
+            edge[i.min(2 * half - i) as usize]
+        };
+        let (p0, p1, p2, p3) = (at(below - 1), at(below), at(below + 1), at(below + 2));
+        let cubic =
+            p1 + 0.5 * t * (p2 - p0 + t * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + t * (3.0 * (p1 - p2) + p3 - p0)));
+        // At a kink a cubic may overshoot; the neighbours bound it.
+        cubic.clamp(0.98 * p1.min(p2), 1.02 * p1.max(p2))
+    }
+
+    /// Returns the nodes of the wave sum at a wavelength in a field along the unit vector `turn` of the film's frame,
+    /// with the centroid of the light as their reference.
+    ///
+    /// # Errors
+    /// When the rays do not fill the directions one to one.
+    pub fn nodes(&self, grid: PupilGrid, wavelength_nm: f64, turn: DVec2) -> Result<WaveNodes, DiffractionError> {
+        let half_azimuths = grid.n_azimuths / 2;
+        let n_radii = grid.n_radii;
+        let radii = gauss_legendre_on(n_radii, 0.0, 1.0);
+        let step = TAU / grid.n_azimuths as f64;
+        let [index, _, _, half_x, half_y, _] = *self.numbers.first_chunk::<SCALARS>().expect("a map has its scalars");
+        let mut sector = Sector::new(n_radii);
+        let mut half = Lists::default();
+        for j in 0..=half_azimuths {
+            let rho_mm = self.edge_mm(step * j as f64);
+            let (c, s) = super::cis::cis(j as f64 / grid.n_azimuths as f64);
+            let stretched = DVec2::new(c / half_x, s / half_y);
+            let stretch = stretched.length();
+            let azimuth = Azimuth::new(stretched.x / stretch, stretched.y / stretch);
+            for (radius, (t, _)) in sector.radii.iter_mut().zip(&radii) {
+                *radius = rho_mm * stretch * t;
+            }
+            sector.fill(&self.rays_along(&azimuth), index);
+            half.append(&sector, radii.iter().map(|(t, w)| rho_mm * rho_mm * t * w * step), half_x * half_y);
+        }
+        if !half.jacobian.iter().all(|j| j * half.jacobian[0] > 0.0) {
+            return Err(DiffractionError::Folded { wavelength_nm });
+        }
+        Ok(self.assemble(grid, wavelength_nm, turn, &half))
+    }
+
+    /// The functions along an azimuth.
+    fn rays_along(&self, azimuth: &Azimuth) -> Rays {
+        let of = |function: usize| {
+            let (parity, span) = span(function);
+            (azimuth.value(parity, &self.numbers[span.clone()]), azimuth.slope(parity, &self.numbers[span]))
+        };
+        let ((d_x, around_x), (d_y, around_y), (phi, around_phi)) = (of(0), of(1), of(2));
+        let (brightness, _) = of(3);
+        let along = [radial_slope(&d_x), radial_slope(&d_y), radial_slope(&phi)];
+        Rays { values: [d_x, d_y, phi, brightness], along, around: [around_x, around_y, around_phi] }
+    }
+
+    /// Mirrors the half pupil, turns it to its field and counts from the centroid.
+    fn assemble(&self, grid: PupilGrid, wavelength_nm: f64, turn: DVec2, half: &Lists) -> WaveNodes {
+        let (n_radii, n_azimuths) = (grid.n_radii, grid.n_azimuths);
+        let n = grid.n_nodes();
+        let place = |node: usize| {
+            let (azimuth, radius) = (node / n_radii, node % n_radii);
+            let (mirrored, sign) = if 2 * azimuth > n_azimuths { (n_azimuths - azimuth, -1.0) } else { (azimuth, 1.0) };
+            (mirrored * n_radii + radius, sign)
+        };
+        let [index, collected, centroid_x_mm, ..] =
+            *self.numbers.first_chunk::<SCALARS>().expect("a map has its scalars");
+        let total: f64 = (0..n).map(|node| half.energy[place(node).0]).sum();
+        let along_x: f64 = (0..n).map(|node| place(node).0).map(|i| half.energy[i] * half.q_x[i]).sum::<f64>() / total;
+        let per_mm = index / (wavelength_nm * 1e-6);
+        let reference_mm = turn * (centroid_x_mm + along_x);
+        let mut nodes = WaveNodes {
+            wavelength_nm,
+            image_index: index,
+            grid,
+            propagation: Propagation::Debye,
+            reference_mm,
+            collected,
+            q_x_mm: Vec::with_capacity(n),
+            q_y_mm: Vec::with_capacity(n),
+            d_x: Vec::with_capacity(n),
+            d_y: Vec::with_capacity(n),
+            phi_mm: Vec::with_capacity(n),
+            energy: Vec::with_capacity(n),
+            amplitude_per_mm: Vec::with_capacity(n),
+        };
+        for (i, sign) in (0..n).map(place) {
+            let q = turn.rotate(DVec2::new(half.q_x[i] - along_x, sign * half.q_y[i]));
+            let d = turn.rotate(DVec2::new(half.d_x[i], sign * half.d_y[i]));
+            let energy = half.energy[i] / total;
+            nodes.q_x_mm.push(q.x);
+            nodes.q_y_mm.push(q.y);
+            nodes.d_x.push(d.x);
+            nodes.d_y.push(d.y);
+            nodes.phi_mm.push(half.phi_mm[i] + index * along_x * half.d_x[i]);
+            nodes.energy.push(energy);
+            nodes.amplitude_per_mm.push(per_mm * (energy * half.jacobian[i].abs()).sqrt());
+        }
+        nodes
+    }
+
+    /// Returns the point spread function about the centroid, on a window of so many rows and columns of a pitch, with as
+    /// many nodes as it needs.
+    ///
+    /// # Errors
+    /// When the window makes no sense, the blur and window are too large for a wave sum, or those of
+    /// [`nodes`](Self::nodes).
+    pub fn psf(
+        &self,
+        wavelength_nm: f64,
+        turn: DVec2,
+        pitch_um: f64,
+        (rows, columns): (usize, usize),
+    ) -> Result<WavePsf, DiffractionError> {
+        let window = WaveWindow { pitch_um, rows, columns, center: WindowCenter::Centroid };
+        let reach_mm = window.check()?;
+        // A few nodes tell how many are needed.
+        let few = PupilGrid { n_radii: 8, n_azimuths: 32 };
+        let nodes = enough_nodes(few, reach_mm, |grid| self.nodes(grid, wavelength_nm, turn))?;
+        nodes.psf(&WaveWindow { center: WindowCenter::At(nodes.reference_mm), ..window }, None)
+    }
+}
+
+impl PupilEdge<'_> {
+    fn azimuth(&self, i: usize) -> DVec2 {
+        let (c, s) = super::cis::cis(i as f64 / self.rho_mm.len() as f64);
+        DVec2::new(c, s)
+    }
+
+    /// Returns twice the rms width and height of the pupil, mm: its half axes, if it is an ellipse.
+    fn half_sizes_mm(&self) -> DVec2 {
+        let (mut area, mut first, mut second) = (0.0, 0.0, DVec2::ZERO);
+        for (i, rho) in self.rho_mm.iter().enumerate() {
+            let u = self.azimuth(i);
+            area += rho * rho / 2.0;
+            first += rho.powi(3) / 3.0 * u.x;
+            second += rho.powi(4) / 4.0 * u * u;
+        }
+        let mean_x = first / area;
+        let variance = second / area - DVec2::new(mean_x * mean_x, 0.0);
+        DVec2::new(2.0 * variance.x.sqrt(), 2.0 * variance.y.sqrt())
+    }
+
+    /// Returns the points of half the pupil at which functions are fitted, with their areas.
+    fn places(&self, half_mm: DVec2) -> (Vec<DVec2>, Vec<f64>, Places) {
+        let n = self.rho_mm.len();
+        let stride = (n / FIT_AZIMUTHS).max(1);
+        let radii = gauss_legendre_on(FIT_RADII, 0.0, 1.0);
+        let (mut targets_mm, mut areas, mut polar) = (vec![], vec![], vec![]);
+        for i in (0..=n / 2).step_by(stride) {
+            let (rho, u) = (self.rho_mm[i], self.azimuth(i));
+            let stretched = u / half_mm;
+            let azimuth = Azimuth::new(stretched.x / stretched.length(), stretched.y / stretched.length());
+            // The azimuths on the axis belong to both halves.
+            let share = if i == 0 || 2 * i == n { 0.5 } else { 1.0 };
+            for (t, w) in &radii {
+                let area = share * rho * rho * t * w * TAU * stride as f64 / n as f64;
+                targets_mm.push(DVec2::new(self.center_x_mm, 0.0) + u * (rho * t));
+                areas.push(area);
+                polar.push((rho * t * stretched.length(), azimuth, area));
+            }
+        }
+        (targets_mm, areas, Places { polar })
+    }
+}
+
+/// Returns the weighted rms of what a fit leaves.
+fn rms_error(places: &Places, fit: &[f64], values: &[f64]) -> f64 {
+    let (mut square, mut total) = (0.0, 0.0);
+    for ((radius, azimuth, weight), value) in places.polar.iter().zip(values) {
+        let mut found = [0.0];
+        horner(&azimuth.value(Parity::Even, fit), &[*radius], &mut found);
+        square += weight * (found[0] - value).powi(2);
+        total += weight;
+    }
+    (square / total).sqrt()
+}
+
+/// Functions along one azimuth: dx, dy, Φ and ln brightness, and the first three's derivatives outwards and around.
+struct Rays {
+    values: [Ray; 4],
+    along: [Ray; 3],
+    around: [Ray; 3],
+}
+
+/// The nodes of one azimuth.
+struct Sector {
+    /// In units of the pupil's half axes.
+    radii: Vec<f64>,
+    values: [Vec<f64>; 4],
+    along: [Vec<f64>; 3],
+    around: [Vec<f64>; 3],
+    q_x: Vec<f64>,
+    q_y: Vec<f64>,
+    /// Of (dx, dy) by the coordinates over the pupil.
+    jacobian: Vec<f64>,
+}
+
+impl Sector {
+    fn new(n_radii: usize) -> Self {
+        let list = || vec![0.0; n_radii];
+        let three = || [(); 3].map(|()| list());
+        Self {
+            radii: list(),
+            values: [(); 4].map(|()| list()),
+            along: three(),
+            around: three(),
+            q_x: list(),
+            q_y: list(),
+            jacobian: list(),
+        }
+    }
+
+    /// Computes all lists from the radii.
+    fn fill(&mut self, rays: &Rays, index: f64) {
+        let of = [&rays.values[..], &rays.along[..], &rays.around[..]].concat();
+        let lists = self.values.iter_mut().chain(&mut self.along).chain(&mut self.around);
+        for (ray, values) in of.iter().zip(lists) {
+            evaluate(ray, &self.radii, values);
+        }
+        for i in 0..self.radii.len() {
+            let [x_r, y_r, phi_r] = [0, 1, 2].map(|f: usize| self.along[f][i]);
+            let [x_a, y_a, phi_a] = [0, 1, 2].map(|f: usize| self.around[f][i]);
+            let determinant = x_r * y_a - x_a * y_r;
+            // dΦ = −n q·dd, outwards and around.
+            self.q_x[i] = -(phi_r * y_a - phi_a * y_r) / (index * determinant);
+            self.q_y[i] = -(x_r * phi_a - x_a * phi_r) / (index * determinant);
+            self.jacobian[i] = determinant / self.radii[i];
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn evaluate(ray: &Ray, radii: &[f64], values: &mut [f64]) {
+    horner(ray, radii, values);
+}
+
+/// The nodes of half a pupil.
+#[derive(Default)]
+struct Lists {
+    d_x: Vec<f64>,
+    d_y: Vec<f64>,
+    phi_mm: Vec<f64>,
+    q_x: Vec<f64>,
+    q_y: Vec<f64>,
+    /// Up to a common factor.
+    energy: Vec<f64>,
+    /// Area of each node's cell in (dx, dy), with its sign.
+    jacobian: Vec<f64>,
+}
+
+impl Lists {
+    fn append(&mut self, sector: &Sector, areas_mm2: impl Iterator<Item = f64>, unit_mm2: f64) {
+        for (i, area) in areas_mm2.enumerate() {
+            self.energy.push(area * sector.values[3][i].exp());
+            self.jacobian.push(sector.jacobian[i] * area / unit_mm2);
+        }
+        self.d_x.extend(&sector.values[0]);
+        self.d_y.extend(&sector.values[1]);
+        self.phi_mm.extend(&sector.values[2]);
+        self.q_x.extend(&sector.q_x);
+        self.q_y.extend(&sector.q_y);
+    }
+}

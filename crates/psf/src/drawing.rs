@@ -1,0 +1,120 @@
+//! Point spread functions drawn from a bank, by the model that suits each.
+
+use dioptric_diffraction::{DiffractionError, Edge, WaveQuality, WaveWindow, WindowCenter, wave_psf};
+use dioptric_optics::ObjectPoint;
+use glam::DVec2;
+use ndarray::Array2;
+use serde::Serialize;
+
+use crate::{
+    Diffraction, Kernel, PsfBank,
+    ray_map::Record,
+    render::{self, Bending, Layout},
+};
+
+/// The largest range of phases, radians, at which a kernel is wave optics alone; at twice that there is none.
+const ALL_WAVE: f64 = 200.0;
+
+/// A point at one wavelength, on pixels of a pitch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PsfQuery {
+    /// Tangents of the field angles, in the picture frame.
+    pub field_tan: DVec2,
+    /// Depth, dioptres.
+    pub dioptres: f64,
+    /// Wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Side of a pixel, µm.
+    pub pitch_um: f64,
+}
+
+/// Which model a point spread function was drawn with.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModelUse {
+    /// The share that is the sum of waves; the rest is geometric or bent rays, as the bank's setting says.
+    pub wave_share: f64,
+    /// Why waves that were wanted were not summed, if so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fallback: Option<String>,
+}
+
+impl PsfBank {
+    /// Returns the point spread function of a point, on pixels of a pitch, about its centroid.
+    ///
+    /// Fields, depths and wavelengths outside the bank are moved to its ends. The window holds the whole geometric
+    /// picture, and of diffraction's Gaussians all but their far tails; the sum says how much.
+    pub fn kernel(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Kernel {
+        let (energies, _) = self.draw(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um }, None);
+        render::kernel(&energies, self.settings().diffraction != Diffraction::None, pitch_um)
+    }
+
+    /// Returns the energy on each pixel of a window of `size` × `size` about the centroid, in the picture frame, and
+    /// the model that drew it. The energy of the point is 1; what falls outside is lost.
+    pub fn picture(&self, query: PsfQuery, size: usize) -> (Array2<f64>, ModelUse) {
+        self.draw(query, Some(size))
+    }
+
+    /// Returns the whole picture, its side an odd number of pixels that is chosen to hold it, and the model.
+    pub fn whole_picture(&self, query: PsfQuery) -> (Array2<f64>, ModelUse) {
+        self.draw(query, None)
+    }
+
+    fn draw(&self, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
+        let record = self.record(query.field_tan.length(), query.dioptres, query.wavelength_nm);
+        let layout = self.layout(&record, query, side);
+        let share = self.share_of(&layout);
+        if share == 0.0 {
+            return (layout.draw(), ModelUse { wave_share: 0.0, fallback: None });
+        }
+        match self.wave_energies(query, layout.side()) {
+            Ok(waves) if share == 1.0 => (waves, ModelUse { wave_share: 1.0, fallback: None }),
+            Ok(waves) => {
+                (waves * share + layout.draw() * (1.0 - share), ModelUse { wave_share: share, fallback: None })
+            }
+            Err(error) => (layout.draw(), ModelUse { wave_share: 0.0, fallback: Some(error.to_string()) }),
+        }
+    }
+
+    /// Returns how much of a kernel is wave optics, and not uncertainty bending: 1 or 0, or between them where they are
+    /// blended. It is 0 unless the bank has [`Diffraction::Wave`].
+    ///
+    /// It falls with the range of phases B over the pupil that the sum has to follow, on a scale of its logarithm: from
+    /// 1 at B = 200 to 0 at B = 400, a blur of about ten waves of defocus.
+    pub fn wave_share(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> f64 {
+        let record = self.record(field_tan, dioptres, wavelength_nm);
+        let query = PsfQuery { field_tan: DVec2::X * field_tan, dioptres, wavelength_nm, pitch_um };
+        self.share_of(&self.layout(&record, query, None))
+    }
+
+    fn share_of(&self, layout: &Layout<'_>) -> f64 {
+        match self.settings().diffraction {
+            Diffraction::Wave => (2.0 - (layout.bandwidth() / ALL_WAVE).log2()).clamp(1.0, 2.0) - 1.0,
+            _ => 0.0,
+        }
+    }
+
+    fn layout<'a>(&self, record: &'a Record, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
+        let turn = query.field_tan.try_normalize().unwrap_or(DVec2::X);
+        let bending = self.settings().diffraction.model().map(|model| {
+            let index = self.stop_index(query.wavelength_nm);
+            Bending { model, edge: Edge::new(self.reference().stop_semi_aperture_mm(), query.wavelength_nm, index) }
+        });
+        Layout::new(record, turn, bending, query.pitch_um).with_side(side)
+    }
+
+    /// Returns the wave-optical energies about the centroid.
+    fn wave_energies(&self, query: PsfQuery, side: usize) -> Result<Array2<f64>, DiffractionError> {
+        let PsfQuery { field_tan, dioptres, pitch_um, .. } = query;
+        let wavelength_nm = self.within_colors(query.wavelength_nm);
+        if let Some(map) = self.wave_map(field_tan.length(), dioptres, wavelength_nm) {
+            let turn = field_tan.try_normalize().unwrap_or(DVec2::X);
+            return Ok(map.psf(wavelength_nm, turn, pitch_um, (side, side))?.samples);
+        }
+        let lens = self.lens().at(wavelength_nm)?;
+        let (least, most) = self.dioptre_range();
+        let field_tan = field_tan.clamp_length_max(self.last_field_tan());
+        let point = ObjectPoint::from_field(self.reference(), field_tan, dioptres.clamp(least, most));
+        let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::Centroid };
+        Ok(wave_psf(&lens, &point, self.settings().film_mm, &window, WaveQuality::default())?.samples)
+    }
+}
