@@ -28,6 +28,8 @@ const PART_OF_A_PIXEL: f64 = 0.2;
 /// The same where they are wider than a pixel.
 const WIDE_CELL: f64 = 1.0;
 const PART_OF_A_WIDE_CELL: f64 = 0.25;
+/// How many standard deviations from the picture a cell is left out.
+const FAR: f64 = 5.0;
 /// Variance, pixels², that a pixel's own size adds when the need for subdivision is judged.
 const PIXEL_VARIANCE: f64 = 0.12;
 
@@ -145,6 +147,16 @@ impl Cell {
         }
     }
 
+    /// Whether next to nothing of the cell's light, bent as at its middle and as near its outer side, meets the picture.
+    fn is_beyond(&self, raster: &Raster, bending: Bending) -> bool {
+        let spread = [0.5, 0.9].map(|a| bending.covariance(&self.at(a, 0.5)).axes().1.sqrt());
+        let reach = DVec2::splat(FAR * spread[0].max(spread[1]));
+        let [a, b, c, d] = self.corners.map(|node| node.at_mm);
+        let (rows, columns) = raster.size();
+        let (low, high) = (a.min(b).min(c.min(d)) - reach, a.max(b).max(c.max(d)) + reach);
+        high.x < 0.0 || high.y < 0.0 || low.x > columns as f64 || low.y > rows as f64
+    }
+
     /// Returns the sides of the cell through a place in it: outwards and around.
     fn sides(&self, a: f64, b: f64) -> (DVec2, DVec2) {
         let [p, q, r, s] = self.corners.map(|node| node.at_mm);
@@ -180,8 +192,11 @@ fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending
     if wide < narrow * narrow || (n_along > POLYGON && n_around > POLYGON) {
         return false;
     }
-    // A piece of this many standard deviations across leaves a ripple of 1 %, which pixels and neighbours hide.
-    const PIECE: f64 = 2.3;
+    if cell.is_beyond(raster, bending) {
+        return true;
+    }
+    // A piece of this many standard deviations across leaves a ripple of 2 %, which pixels and neighbours hide.
+    const PIECE: f64 = 2.7;
     let pieces = |n_sigmas: f64| (n_sigmas / PIECE).ceil().clamp(1.0, 64.0) as usize;
     // Out of focus, where a cell is larger than a pixel, the tails of single rings hardly show.
     let is_blurred = around.length() > 1.0;

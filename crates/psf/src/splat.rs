@@ -96,20 +96,19 @@ fn sample_lines(pixels: &mut [f64], grid: Grid, at: DVec2, c: Covariance, energy
     }
 }
 
-/// Returns e^x for |x| < 700, to 1e-9 of itself: quicker than the library's, and the same bits everywhere.
+/// Returns e^x for |x| < 700, to 1e-7 of itself: quicker than the library's, and the same bits everywhere.
 #[inline(always)]
 fn exp(x: f64) -> f64 {
     const SHIFT: f64 = 6_755_399_441_055_744.0;
     let turns = x * std::f64::consts::LOG2_E;
     let shifted = turns + SHIFT;
     let t = (turns - (shifted - SHIFT)) * std::f64::consts::LN_2;
-    // Taylor's series to the tenth power, over |t| < 0.35.
-    let mut sum = 1.0 / 3_628_800.0;
-    for factor in [362_880.0, 40_320.0, 5040.0, 720.0, 120.0, 24.0, 6.0, 2.0, 1.0, 1.0] {
-        sum = sum * t + 1.0 / factor;
-    }
+    // Taylor's series to the seventh power over |t| < 0.35, in pairs so that few steps wait for each other.
+    let (t2, t4) = (t * t, t * t * t * t);
+    let low = (1.0 + t) + t2 * (0.5 + t * (1.0 / 6.0));
+    let high = (1.0 / 24.0 + t * (1.0 / 120.0)) + t2 * (1.0 / 720.0 + t * (1.0 / 5040.0));
     // The whole number of doublings is in the last bits of the shifted sum; it goes to the exponent.
-    f64::from_bits(sum.to_bits().wrapping_add(shifted.to_bits() << 52))
+    f64::from_bits((low + t4 * high).to_bits().wrapping_add(shifted.to_bits() << 52))
 }
 
 /// Returns the samples whose centres lie within `reach` of a place, of the `n` that there are.
@@ -157,7 +156,7 @@ mod tests {
     fn the_exponential_is_the_librarys() {
         for i in -6900..6900 {
             let x = f64::from(i) * 0.1;
-            assert!((exp(x) / x.exp() - 1.0).abs() < 1e-9, "{x}: {} {}", exp(x), x.exp());
+            assert!((exp(x) / x.exp() - 1.0).abs() < 1e-7, "{x}: {} {}", exp(x), x.exp());
         }
     }
 

@@ -8,7 +8,7 @@
 use std::{cell::RefCell, f64::consts::PI, sync::LazyLock};
 
 use multiversion::multiversion;
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 use rustfft::{FftPlanner, num_complex::Complex};
 
 use super::{cis::cis, pixel_mean::PixelMean, transform::PlaneWaves};
@@ -57,12 +57,7 @@ pub(crate) fn mean_square(waves: &PlaneWaves, grid: Grid) -> Array2<f64> {
     let scale = waves.scale();
     // Half a step aside where the middle lies between two places.
     let aside = |n: usize| if n.is_multiple_of(2) { 0.5 } else { 0.0 };
-    for j in 0..waves.re.len() {
-        let (x, y) = (waves.turns_x_per_mm[j] * step_mm, waves.turns_y_per_mm[j] * step_mm);
-        let (c, s) = cis(x * aside(n_x) + y * aside(n_y));
-        let (re, im) = (waves.re[j] * scale, waves.im[j] * scale);
-        spectrum.add((x, y), ((re * c - im * s) as f32, (re * s + im * c) as f32));
-    }
+    spread(&mut spectrum, waves, Lattice { step_mm, aside: (aside(n_x), aside(n_y)), scale });
     let squares = spectrum.squares(n_x, n_y, 1.0 / (scale * scale));
     mean.over(&squares, grid.n_rows, grid.n_columns)
 }
@@ -99,16 +94,24 @@ impl Spectrum {
     }
 
     /// Spreads a wave of these frequencies (turns a place) and this amplitude.
-    fn add(&mut self, turns: (f64, f64), amplitude: (f32, f32)) {
+    #[inline(always)]
+    fn add(&mut self, turns: (f64, f64), (amplitude_re, amplitude_im): (f32, f32)) {
         let ((column, across), (row, along)) = (start(turns.0, self.size_x), start(turns.1, self.size_y));
         let stride = self.size_x + WIDTH;
-        let from = row * stride + column;
-        let to = from + (WIDTH - 1) * stride + WIDTH;
         self.is_used[row..row + WIDTH].fill(true);
-        spread(&mut self.re[from..to], &mut self.im[from..to], stride, (across, along), amplitude);
+        for (i, weight) in along.into_iter().enumerate() {
+            let (wr, wi) = (weight * amplitude_re, weight * amplitude_im);
+            let from = (row + i) * stride + column;
+            for (sum, across) in self.re[from..from + WIDTH].iter_mut().zip(&across) {
+                *sum += wr * across;
+            }
+            for (sum, across) in self.im[from..from + WIDTH].iter_mut().zip(&across) {
+                *sum += wi * across;
+            }
+        }
     }
 
-    /// Returns the squares of the waves at `n_x` × `n_y` places about the middle, rows along y.
+    /// Returns the squares of the waves at `n_x` × `n_y` places about the middle, lines along y.
     fn squares(mut self, n_x: usize, n_y: usize, unscale: f64) -> Array2<f64> {
         let stride = self.size_x + WIDTH;
         // What was spread beyond an end belongs to the other.
@@ -132,18 +135,24 @@ impl Spectrum {
                 }
                 along_x.process_with_scratch(&mut line, &mut scratch);
                 let row = row % self.size_y;
-                for i in 0..n_x {
-                    columns[i * self.size_y + row] += line[(i + self.size_x - n_x / 2) % self.size_x];
+                let places = line[self.size_x - n_x / 2..].iter().chain(&line);
+                for (place, value) in columns.chunks_exact_mut(self.size_y).zip(places) {
+                    place[row] += value;
                 }
             }
             along_y.process_with_scratch(&mut columns, &mut scratch);
         });
         let (fade_x, fade_y) = (fades(n_x, self.size_x), fades(n_y, self.size_y));
-        Array2::from_shape_fn((n_y, n_x), |(row, column)| {
-            let value = columns[column * self.size_y + (row + self.size_y - n_y / 2) % self.size_y];
-            let (re, im) = (f64::from(value.re), f64::from(value.im));
-            (re * re + im * im) * unscale * fade_x[column] * fade_y[row]
-        })
+        let mut squares = Array2::zeros((n_x, n_y));
+        let lines = squares.axis_iter_mut(Axis(0)).zip(columns.chunks_exact(self.size_y)).zip(fade_x);
+        for ((mut line, column), fade) in lines {
+            let values = column[self.size_y - n_y / 2..].iter().chain(column);
+            for ((square, value), fade_y) in line.iter_mut().zip(values).zip(&fade_y) {
+                let (re, im) = (f64::from(value.re), f64::from(value.im));
+                *square = (re * re + im * im) * (unscale * fade * fade_y);
+            }
+        }
+        squares
     }
 }
 
@@ -152,6 +161,7 @@ thread_local! {
 }
 
 /// Returns the first grid point that a frequency is spread over, and the window's values there and after it.
+#[inline(always)]
 fn start(turns: f64, size: usize) -> (usize, [f32; WIDTH]) {
     let at = (turns - turns.floor()) * size as f64;
     let first = (at - 0.5 * WIDTH as f64).ceil();
@@ -159,22 +169,23 @@ fn start(turns: f64, size: usize) -> (usize, [f32; WIDTH]) {
     (index as usize % size, window((first - at + 0.5 * WIDTH as f64) as f32))
 }
 
+/// The places of a sum: their distance, how far the first of the middle two is from the middle in steps, and a factor
+/// for all amplitudes.
+#[derive(Clone, Copy)]
+struct Lattice {
+    step_mm: f64,
+    aside: (f64, f64),
+    scale: f64,
+}
+
 #[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
-fn spread(
-    re: &mut [f32],
-    im: &mut [f32],
-    stride: usize,
-    (across, along): ([f32; WIDTH], [f32; WIDTH]),
-    (amplitude_re, amplitude_im): (f32, f32),
-) {
-    for (row, weight) in along.into_iter().enumerate() {
-        let (wr, wi) = (weight * amplitude_re, weight * amplitude_im);
-        let re = &mut re[row * stride..][..WIDTH];
-        let im = &mut im[row * stride..][..WIDTH];
-        for i in 0..WIDTH {
-            re[i] += wr * across[i];
-            im[i] += wi * across[i];
-        }
+fn spread(spectrum: &mut Spectrum, waves: &PlaneWaves, lattice: Lattice) {
+    let Lattice { step_mm, aside, scale } = lattice;
+    for j in 0..waves.re.len() {
+        let (x, y) = (waves.turns_x_per_mm[j] * step_mm, waves.turns_y_per_mm[j] * step_mm);
+        let (c, s) = cis(x * aside.0 + y * aside.1);
+        let (re, im) = (waves.re[j] * scale, waves.im[j] * scale);
+        spectrum.add((x, y), ((re * c - im * s) as f32, (re * s + im * c) as f32));
     }
 }
 
@@ -223,16 +234,20 @@ fn window(t: f32) -> [f32; WIDTH] {
     values
 }
 
+/// Half the window's places and its values there times the weights of their integral.
+static HALF_WINDOW: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
+    gauss_legendre_on(24, 0.0, 0.5 * WIDTH as f64).into_iter().map(|(t, w)| (t, 2.0 * w * shape(t))).collect()
+});
+
 /// Returns one over the square of the window's transform at each place.
 fn fades(n: usize, size: usize) -> Vec<f64> {
-    let nodes = gauss_legendre_on(24, 0.0, 0.5 * WIDTH as f64);
-    (0..n)
-        .map(|i| {
-            let at = (i as f64 - (n / 2) as f64) / size as f64;
-            let transform: f64 = nodes.iter().map(|(t, w)| 2.0 * w * shape(*t) * cis(at * t).0).sum();
-            1.0 / (transform * transform)
-        })
-        .collect()
+    let fade = |from_middle: usize| {
+        let at = from_middle as f64 / size as f64;
+        let transform: f64 = HALF_WINDOW.iter().map(|(t, w)| w * cis(at * t).0).sum();
+        1.0 / (transform * transform)
+    };
+    let half: Vec<f64> = (0..=n / 2).map(fade).collect();
+    (0..n).map(|i| half[i.abs_diff(n / 2)]).collect()
 }
 
 #[cfg(test)]

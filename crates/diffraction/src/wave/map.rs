@@ -208,15 +208,21 @@ impl WaveMap {
     fn assemble(&self, grid: PupilGrid, wavelength_nm: f64, turn: DVec2, half: &Lists) -> WaveNodes {
         let (n_radii, n_azimuths) = (grid.n_radii, grid.n_azimuths);
         let n = grid.n_nodes();
-        let place = |node: usize| {
-            let (azimuth, radius) = (node / n_radii, node % n_radii);
-            let (mirrored, sign) = if 2 * azimuth > n_azimuths { (n_azimuths - azimuth, -1.0) } else { (azimuth, 1.0) };
-            (mirrored * n_radii + radius, sign)
+        // Each azimuth as its own in the half, and whether it is mirrored.
+        let azimuths = || {
+            let place = |j: usize| if 2 * j > n_azimuths { (n_azimuths - j, -1.0) } else { (j, 1.0) };
+            (0..n_azimuths).map(place).map(|(j, sign)| (j * n_radii..(j + 1) * n_radii, sign))
         };
         let [index, collected, centroid_x_mm, ..] =
             *self.numbers.first_chunk::<SCALARS>().expect("a map has its scalars");
-        let total: f64 = (0..n).map(|node| half.energy[place(node).0]).sum();
-        let along_x: f64 = (0..n).map(|node| place(node).0).map(|i| half.energy[i] * half.q_x[i]).sum::<f64>() / total;
+        let (mut total, mut along_x) = (0.0, 0.0);
+        for (span, _) in azimuths() {
+            for (e, q_x) in half.energy[span.clone()].iter().zip(&half.q_x[span]) {
+                total += e;
+                along_x += e * q_x;
+            }
+        }
+        let along_x = along_x / total;
         let per_mm = index / (wavelength_nm * 1e-6);
         let reference_mm = turn * (centroid_x_mm + along_x);
         let mut nodes = WaveNodes {
@@ -234,7 +240,7 @@ impl WaveMap {
             energy: Vec::with_capacity(n),
             amplitude_per_mm: Vec::with_capacity(n),
         };
-        for (i, sign) in (0..n).map(place) {
+        for (i, sign) in azimuths().flat_map(|(span, sign)| span.map(move |i| (i, sign))) {
             let q = turn.rotate(DVec2::new(half.q_x[i] - along_x, sign * half.q_y[i]));
             let d = turn.rotate(DVec2::new(half.d_x[i], sign * half.d_y[i]));
             let energy = half.energy[i] / total;

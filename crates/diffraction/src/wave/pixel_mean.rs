@@ -1,6 +1,6 @@
 //! Means over pixels of something sampled evenly.
 
-use ndarray::{Array2, ArrayView1, ArrayViewMut1, Axis};
+use ndarray::{Array2, Axis};
 
 /// Samples beyond each border of a window that the means of its outermost pixels draw on.
 const MARGIN: usize = 3;
@@ -37,20 +37,33 @@ impl PixelMean {
         n_pixels * self.samples_per_pixel + 2 * MARGIN
     }
 
-    /// Returns the mean over each pixel.
-    pub(crate) fn over(self, samples: &Array2<f64>, n_rows: usize, n_columns: usize) -> Array2<f64> {
-        let mut narrow = Array2::zeros((samples.nrows(), n_columns));
-        for (line, means) in samples.axis_iter(Axis(0)).zip(narrow.axis_iter_mut(Axis(0))) {
-            self.along(line, means);
+    /// Returns the mean over each pixel, rows along y, from samples in lines along y.
+    pub(crate) fn over(self, lines: &Array2<f64>, n_rows: usize, n_columns: usize) -> Array2<f64> {
+        let mut narrow = Array2::zeros((lines.nrows(), n_rows));
+        for (line, mut means) in lines.axis_iter(Axis(0)).zip(narrow.axis_iter_mut(Axis(0))) {
+            if let (Some(line), Some(means)) = (line.as_slice(), means.as_slice_mut()) {
+                self.along(line, means);
+            }
         }
-        let mut mean = Array2::zeros((n_rows, n_columns));
-        for (line, means) in narrow.axis_iter(Axis(1)).zip(mean.axis_iter_mut(Axis(1))) {
-            self.along(line, means);
+        // Now along x, whole lines at a time.
+        let mut mean = Array2::zeros((n_columns, n_rows));
+        let n = self.samples_per_pixel;
+        for (pixel, mut means) in mean.axis_iter_mut(Axis(0)).enumerate() {
+            let mut add = |line: usize, weight: f64| means.scaled_add(weight / n as f64, &narrow.row(line));
+            for i in 0..n {
+                add(MARGIN + pixel * n + i, 1.0);
+            }
+            for (border, sign) in [((pixel + 1) * n, 1.0), (pixel * n, -1.0)] {
+                for (i, weight) in BORDER.iter().enumerate() {
+                    add(border + MARGIN + i, sign * weight);
+                    add(border + MARGIN - 1 - i, -sign * weight);
+                }
+            }
         }
-        mean
+        mean.reversed_axes()
     }
 
-    fn along(self, samples: ArrayView1<'_, f64>, mut means: ArrayViewMut1<'_, f64>) {
+    fn along(self, samples: &[f64], means: &mut [f64]) {
         let n = self.samples_per_pixel;
         let per_pixel = 1.0 / n as f64;
         // The correction at the border before sample `MARGIN + at`.
@@ -60,7 +73,7 @@ impl PixelMean {
         let mut before = border(0);
         for (pixel, mean) in means.iter_mut().enumerate() {
             let after = border((pixel + 1) * n);
-            let sum: f64 = (0..n).map(|i| samples[MARGIN + pixel * n + i]).sum();
+            let sum: f64 = samples[MARGIN + pixel * n..][..n].iter().sum();
             *mean = (sum + after - before) * per_pixel;
             before = after;
         }
@@ -79,11 +92,11 @@ mod tests {
             let step = 1.0 / n_samples as f64;
             let n = mean.n_samples(n_pixels);
             let at = |i: usize| (i as f64 - 0.5 * (n as f64 - 1.0)) * step;
-            let samples = Array2::from_shape_fn((n, n), |(_, column)| at(column).powi(degree));
-            for ((_, pixel), found) in mean.over(&samples, n_pixels, n_pixels).indexed_iter() {
-                let left = pixel as f64 - 2.5;
+            let samples = Array2::from_shape_fn((n, n), |(x, y)| at(x).powi(degree) + 2.0 * at(y).powi(degree));
+            for ((row, column), found) in mean.over(&samples, n_pixels, n_pixels).indexed_iter() {
                 let whole = |x: f64| x.powi(degree + 1) / f64::from(degree + 1);
-                let expected = whole(left + 1.0) - whole(left);
+                let mean = |pixel: usize| whole(pixel as f64 - 1.5) - whole(pixel as f64 - 2.5);
+                let expected = mean(column) + 2.0 * mean(row);
                 // Rounding of numbers up to 3.5⁷.
                 assert!((found - expected).abs() < 1e-10, "{n_samples} {degree}: {found} {expected}");
             }
