@@ -6,7 +6,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::{
-    BankSettings, Diffraction, PsfError, RadialGeometry,
+    BankSettings, Diffraction, MeasuredError, PsfError, RadialGeometry,
     axis::{Axis, Stencil},
     dispersion::Dispersion,
     mesh::Mesh,
@@ -43,6 +43,7 @@ pub struct PsfBank {
     reference: MonoLens,
     /// Index around the stop at each of the colours.
     stop_indices: Vec<f64>,
+    error: Option<MeasuredError>,
 }
 
 impl PsfBank {
@@ -124,7 +125,17 @@ impl PsfBank {
             stop_indices: colors.iter().map(stop_index).collect::<Result<_, PsfError>>()?,
             reference: lens.at(settings.reference_wavelength_nm)?,
             settings: settings.clone(),
+            error: None,
         })
+    }
+
+    pub(crate) fn with_error(self, error: MeasuredError) -> Self {
+        Self { error: Some(error), ..self }
+    }
+
+    /// The error of its interpolation, if it was measured: see [`build_adaptive`](Self::build_adaptive).
+    pub fn error(&self) -> Option<MeasuredError> {
+        self.error
     }
 
     pub(crate) fn lens(&self) -> &Lens {

@@ -10,6 +10,7 @@
 //! This crate knows nothing of scenes or sensors.
 #![doc = include_str!("../README.md")]
 
+mod adaptive;
 mod axis;
 mod bank;
 mod count;
@@ -29,6 +30,7 @@ mod settings;
 mod splat;
 mod store;
 
+pub use adaptive::{AdaptiveSettings, MeasuredError};
 pub use bank::PsfBank;
 pub use count::{AuthorsBending, CountingFilm, FrontGrid, mean_place_mm, trace_as_authors};
 pub use drawing::{ModelUse, PsfQuery};

@@ -86,6 +86,11 @@ impl BankSettings {
         }
     }
 
+    /// The number of samples: fields × depths × wavelengths.
+    pub fn n_samples(&self) -> usize {
+        self.field_tans.len() * self.dioptres.len() * self.wavelengths_nm.len()
+    }
+
     pub(crate) fn check(&self) -> Result<(), PsfError> {
         let axis = |axis, found: &[f64], expected, is_good: &dyn Fn(f64) -> bool| match Axis::new(found.to_vec())
             .is_some()

@@ -8,7 +8,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    BankSettings, PsfBank, PsfError,
+    BankSettings, MeasuredError, PsfBank, PsfError,
     bank::Parts,
     mesh::Mesh,
     ray_map::{Record, Summary},
@@ -28,6 +28,8 @@ struct Header {
     n_fields: usize,
     /// Numbers of the waves of one sample; 0 where there are none.
     n_wave_numbers: usize,
+    /// The error of its interpolation, where it was measured.
+    error: Option<MeasuredError>,
 }
 
 impl PsfBank {
@@ -44,6 +46,7 @@ impl PsfBank {
             settings: self.settings().clone(),
             n_fields: self.n_fields(),
             n_wave_numbers: self.waves().first().map_or(0, |map| map.numbers().len()),
+            error: self.error(),
         };
         let text = ron::to_string(&header).map_err(|error| store_error(path, error))?;
         let mut bytes = format!("{text}\n").into_bytes();
@@ -125,7 +128,11 @@ impl PsfBank {
             signed_rms_mm,
         });
         let (records, summaries) = (records.collect(), summaries.collect());
-        Self::assemble(lens, &settings, Parts { n_fields: header.n_fields, records, summaries, waves })
+        let bank = Self::assemble(lens, &settings, Parts { n_fields: header.n_fields, records, summaries, waves })?;
+        Ok(match header.error {
+            Some(error) => bank.with_error(error),
+            None => bank,
+        })
     }
 
     /// Returns the bank from a file in `folder` that is named by what the lens and the settings are, or builds it and
@@ -187,10 +194,21 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for diffraction in [Diffraction::None, Diffraction::Hurb { gamma: 1.0 }, Diffraction::Wave] {
             let (lens, bank) = bank(diffraction);
+            let bank = match diffraction {
+                Diffraction::None => bank,
+                _ => bank.with_error(MeasuredError {
+                    median: 0.1,
+                    p90: 0.3,
+                    n_places: 7,
+                    pitch_um: 5.0,
+                    is_target_met: false,
+                }),
+            };
             let path = folder.path().join("a.psfbank");
             bank.save(&path).unwrap();
             let loaded = PsfBank::load(&path, &lens).unwrap();
             assert_eq!(loaded.settings(), bank.settings());
+            assert_eq!(loaded.error(), bank.error());
             for (x, y, dioptres, nm) in [(0.0, 0.0, 0.5, 550.0), (0.03, 0.05, 0.31, 477.0)] {
                 let at = DVec2::new(x, y);
                 assert_eq!(loaded.kernel(at, dioptres, nm, 5.0), bank.kernel(at, dioptres, nm, 5.0));

@@ -1,0 +1,229 @@
+//! Banks as fine as they need to be: samples are added until pictures between them are right.
+
+use dioptric_optics::Lens;
+use glam::DVec2;
+use rand::RngExt;
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{BankSettings, Diffraction, Kernel, PsfBank, PsfError};
+
+/// How right a bank is to be, and how large it may become.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AdaptiveSettings {
+    /// The median error that is wanted, as [`MeasuredError::median`].
+    pub target_median: f64,
+    /// The largest number of samples: fields × depths × wavelengths.
+    pub most_samples: usize,
+    /// Side of the pixels on which pictures are compared, µm.
+    pub pitch_um: f64,
+    /// Places at which they are compared.
+    pub n_places: usize,
+    /// The seed of the places.
+    pub seed: u64,
+}
+
+impl AdaptiveSettings {
+    /// A median error of 1 % on pixels of 5 µm, at 40 places, with at most 2,000 samples.
+    pub const STANDARD: Self = Self { target_median: 0.01, most_samples: 2000, pitch_um: 5.0, n_places: 40, seed: 1 };
+}
+
+/// The error of a bank's interpolation, measured at places that are no samples of it.
+///
+/// At each place the geometric picture is compared with that of a ray map traced right there: the sum over pixels of
+/// the differences' magnitudes, over the energy. 0 is perfect, 2 no overlap at all.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeasuredError {
+    /// Half the places have less.
+    pub median: f64,
+    /// Nine tenths of the places have less.
+    pub p90: f64,
+    /// How many places there were.
+    pub n_places: usize,
+    /// Side of the pixels, µm.
+    pub pitch_um: f64,
+    /// Whether the target was met; a bank that reached its largest size before has `false`.
+    pub is_target_met: bool,
+}
+
+/// The axes of a bank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Along {
+    Field,
+    Depth,
+    Color,
+}
+
+impl PsfBank {
+    /// Traces a bank with as many samples as its pictures need: it begins with those of `start`, measures the error at
+    /// held-back places, and adds samples along the axis whose refinement helps most, until the target is met or the
+    /// bank is as large as it may be.
+    ///
+    /// # Errors
+    /// Those of [`build`](Self::build), and when the adaptive settings make no sense.
+    pub fn build_adaptive(lens: &Lens, start: &BankSettings, wanted: &AdaptiveSettings) -> Result<Self, PsfError> {
+        let setting = |key, found: f64, expected| Err(PsfError::Setting { key, found, expected });
+        if wanted.target_median.is_nan() || wanted.target_median <= 0.0 {
+            return setting("target_median", wanted.target_median, "a number above 0");
+        }
+        if wanted.n_places < 4 {
+            return setting("n_places", wanted.n_places as f64, "4 or more");
+        }
+        // Bending and waves only smooth what geometry gets wrong.
+        let geometric = |settings: &BankSettings| BankSettings { diffraction: Diffraction::None, ..settings.clone() };
+        let mut settings = start.clone();
+        let truth = Truth::trace(lens, &geometric(&settings), wanted)?;
+        let mut error = truth.error_of(&Self::build(lens, &geometric(&settings))?, wanted);
+        while error.median > wanted.target_median {
+            let tried = [Along::Field, Along::Depth, Along::Color].into_iter().filter_map(|along| {
+                let finer = along.refined(&settings)?;
+                (finer.n_samples() <= wanted.most_samples).then_some(finer)
+            });
+            let mut best: Option<(BankSettings, MeasuredError, f64)> = None;
+            for finer in tried {
+                let found = truth.error_of(&Self::build(lens, &geometric(&finer))?, wanted);
+                // What it gains for what it costs.
+                let growth = finer.n_samples() as f64 / settings.n_samples() as f64;
+                let gain = (error.median / found.median.max(1e-9)).ln() / growth.ln();
+                if best.as_ref().is_none_or(|(_, _, most)| gain > *most) {
+                    best = Some((finer, found, gain));
+                }
+            }
+            let Some((finer, found, _)) = best else { break };
+            (settings, error) = (finer, found);
+        }
+        Ok(Self::build(lens, &settings)?.with_error(error))
+    }
+}
+
+impl Along {
+    /// Returns settings with half again as many samples along this axis, or `None` if it has but one.
+    fn refined(self, settings: &BankSettings) -> Option<BankSettings> {
+        let mut finer = settings.clone();
+        let list = match self {
+            Self::Field => &mut finer.field_tans,
+            Self::Depth => &mut finer.dioptres,
+            Self::Color => &mut finer.wavelengths_nm,
+        };
+        *list = resampled(list, (list.len() * 3).div_ceil(2))?;
+        Some(finer)
+    }
+}
+
+/// Returns `n` numbers that follow a list from end to end as it is spaced.
+fn resampled(list: &[f64], n: usize) -> Option<Vec<f64>> {
+    let last = list.len().checked_sub(1).filter(|last| *last > 0)?;
+    let at = |i: usize| {
+        let place = (i * last) as f64 / (n - 1) as f64;
+        let below = (place as usize).min(last - 1);
+        list[below] + (list[below + 1] - list[below]) * (place - below as f64)
+    };
+    let mut finer: Vec<f64> = (0..n).map(at).collect();
+    // The ends to the bit.
+    finer[n - 1] = list[last];
+    Some(finer)
+}
+
+/// Pictures traced where they are wanted.
+struct Truth {
+    /// Field, dioptres, wavelength (nm) and the picture.
+    places: Vec<(f64, f64, f64, Kernel)>,
+}
+
+impl Truth {
+    fn trace(lens: &Lens, settings: &BankSettings, wanted: &AdaptiveSettings) -> Result<Self, PsfError> {
+        settings.check()?;
+        let mut random = ChaCha8Rng::seed_from_u64(wanted.seed);
+        let mut between = |list: &[f64]| list[0] + (list[list.len() - 1] - list[0]) * random.random::<f64>();
+        let last = PsfBank::build(lens, settings)?.last_field_tan();
+        let fields = [0.0, last];
+        let drawn: Vec<(f64, f64, f64)> = (0..wanted.n_places)
+            .map(|_| (between(&fields), between(&settings.dioptres), between(&settings.wavelengths_nm)))
+            .collect();
+        let traced = |&(field, dioptres, nm): &(f64, f64, f64)| {
+            let here = BankSettings {
+                field_tans: if field > 0.0 { vec![0.0, field] } else { vec![0.0] },
+                dioptres: vec![dioptres],
+                wavelengths_nm: vec![nm],
+                ..settings.clone()
+            };
+            let kernel = PsfBank::build(lens, &here)?.kernel(DVec2::X * field, dioptres, nm, wanted.pitch_um);
+            Ok((field, dioptres, nm, kernel))
+        };
+        Ok(Self { places: drawn.par_iter().map(traced).collect::<Result<_, PsfError>>()? })
+    }
+
+    fn error_of(&self, bank: &PsfBank, wanted: &AdaptiveSettings) -> MeasuredError {
+        let mut errors: Vec<f64> = self
+            .places
+            .par_iter()
+            .map(|(field, dioptres, nm, truth)| {
+                difference(&bank.kernel(DVec2::X * *field, *dioptres, *nm, wanted.pitch_um), truth)
+            })
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        let quantile = |share: f64| errors[((errors.len() as f64 * share) as usize).min(errors.len() - 1)];
+        let median = quantile(0.5);
+        MeasuredError {
+            median,
+            p90: quantile(0.9),
+            n_places: errors.len(),
+            pitch_um: wanted.pitch_um,
+            is_target_met: median <= wanted.target_median,
+        }
+    }
+}
+
+/// Returns the L1 difference of two kernels about their middles, over the energy of the second.
+fn difference(a: &Kernel, b: &Kernel) -> f64 {
+    let side = a.samples.nrows().max(b.samples.nrows());
+    let at = |kernel: &Kernel, row: usize, column: usize| {
+        let margin = (side - kernel.samples.nrows()) / 2;
+        let place = row.checked_sub(margin).zip(column.checked_sub(margin));
+        place.and_then(|place| kernel.samples.get(place)).map_or(0.0, |e| f64::from(*e))
+    };
+    let places = (0..side).flat_map(|row| (0..side).map(move |column| (row, column)));
+    places.map(|(row, column)| (at(a, row, column) - at(b, row, column)).abs()).sum::<f64>() / b.sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_added_until_the_target_is_met_or_the_limit_is() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
+        let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+        let few = BankSettings {
+            field_tans: vec![0.0, 0.1, 0.2],
+            dioptres: vec![0.1, 1.0],
+            wavelengths_nm: vec![450.0, 650.0],
+            ..BankSettings::covering(film_mm, 0.2, (0.1, 1.0), (450.0, 650.0), Diffraction::None)
+        };
+        let wanted = AdaptiveSettings { target_median: 0.01, n_places: 16, ..AdaptiveSettings::STANDARD };
+        let plain = PsfBank::build(&lens, &few).unwrap();
+        assert_eq!(plain.error(), None);
+        let bank = PsfBank::build_adaptive(&lens, &few, &wanted).unwrap();
+        let error = bank.error().unwrap();
+        assert!(error.is_target_met && error.median <= 0.01 && error.p90 >= error.median, "{error:?}");
+        println!("{} samples: {error:?}", bank.settings().n_samples());
+        assert!(bank.settings().n_samples() > few.n_samples());
+        assert_eq!(bank.settings().field_tans.last(), few.field_tans.last());
+        // Measured once more, at other places, it is much the same.
+        let elsewhere = AdaptiveSettings { seed: 9, n_places: 30, ..wanted };
+        let again = Truth::trace(&lens, bank.settings(), &elsewhere).unwrap().error_of(&bank, &elsewhere);
+        assert!(again.median < 0.02, "{again:?}");
+
+        let tight = AdaptiveSettings { most_samples: few.n_samples() + 1, ..wanted };
+        let bank = PsfBank::build_adaptive(&lens, &few, &tight).unwrap();
+        assert!(!bank.error().unwrap().is_target_met && bank.settings().n_samples() == few.n_samples());
+        assert!(PsfBank::build_adaptive(&lens, &few, &AdaptiveSettings { target_median: 0.0, ..wanted }).is_err());
+    }
+
+    #[test]
+    fn lists_are_followed_from_end_to_end() {
+        assert_eq!(resampled(&[0.0, 1.0, 3.0], 5), Some(vec![0.0, 0.5, 1.0, 2.0, 3.0]));
+        assert_eq!(resampled(&[2.0], 3), None);
+    }
+}
