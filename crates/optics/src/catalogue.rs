@@ -40,6 +40,8 @@ const BUILT_IN: &str = include_str!("../data/glass/catalogue.csv");
 /// Osaka Gas Chemicals (OKP4, OKP4HT) and TOPAS (a cyclo-olefin copolymer, grade 5013).
 const PLASTICS: [(&str, f64, f64); 3] = [("OKP4", 1.607, 27.0), ("OKP4HT", 1.632, 23.0), ("COC", 1.533, 56.0)];
 
+const EYE_MEDIA: &str = include_str!("../data/glass/eye_media.csv");
+
 /// Names that other programs use for glasses of the built-in catalogue.
 const ALIASES: &[(&str, &str)] = &[
     ("FSILICA", "FUSEDSILICA"),
@@ -56,9 +58,11 @@ const ALIASES: &[(&str, &str)] = &[
 ];
 
 impl GlassCatalogue {
-    /// The built-in glasses: those of six makers and LZOS, and a few plastics, crystals and fluids.
+    /// The built-in glasses: those of six makers and LZOS, a few plastics, crystals and fluids, and the media of the eye
+    /// (`EYE:CORNEA`, `EYE:AQUEOUS`, `EYE:LENS`, `EYE:VITREOUS`).
     ///
-    /// The numbers are the refractiveindex.info database's (public domain, CC0 1.0), but for three plastics. Indices are relative to air, but
+    /// The numbers are the refractiveindex.info database's (public domain, CC0 1.0), but for three plastics and
+    /// for the eye, whose tables are iset3d's (MIT licence). Indices are relative to air, but
     /// for the fluids, whose source gives them relative to vacuum.
     pub fn built_in() -> &'static Self {
         static CATALOGUE: LazyLock<GlassCatalogue> = LazyLock::new(|| {
@@ -69,7 +73,7 @@ impl GlassCatalogue {
                 name: name.to_owned(),
                 glass: Glass::NdVd { nd, vd },
             });
-            GlassCatalogue::new(of_database.chain(plastics).collect())
+            GlassCatalogue::new(of_database.chain(plastics).chain(eye_media()).collect())
         });
         &CATALOGUE
     }
@@ -207,6 +211,21 @@ fn glass_of_row(row: &str) -> Option<CatalogueGlass> {
     Some(CatalogueGlass { maker: maker.to_owned(), name: name.to_owned(), glass })
 }
 
+/// Returns the media of the eye.
+fn eye_media() -> Vec<CatalogueGlass> {
+    let mut rows = EYE_MEDIA.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(','));
+    let names: Vec<&str> = rows.next().into_iter().flatten().skip(1).collect();
+    let numbers = |row: std::str::Split<char>| row.map(|cell| cell.parse().expect("a test reads every row")).collect();
+    let rows: Vec<Vec<f64>> = rows.map(numbers).collect();
+    let column = |i: usize| rows.iter().map(|row| row[i]).collect::<Vec<f64>>();
+    let medium = |(i, name): (usize, &&str)| CatalogueGlass {
+        maker: "EYE".to_owned(),
+        name: name.to_uppercase(),
+        glass: Glass::Tabulated { wavelengths_nm: column(0), indices: column(i + 1) },
+    };
+    names.iter().enumerate().map(medium).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -214,15 +233,23 @@ mod tests {
     #[test]
     fn every_row_is_read_and_makes_sense() {
         let catalogue = GlassCatalogue::built_in();
-        assert_eq!(catalogue.glasses().len(), 1694 + PLASTICS.len());
+        assert_eq!(catalogue.glasses().len(), 1694 + PLASTICS.len() + 4);
         for glass in catalogue.glasses() {
             glass.glass.check().unwrap();
             let (nd, vd) = glass.glass.nd_vd().unwrap_or_else(|| panic!("{}", glass.full_name()));
             assert!((1.0..2.5).contains(&nd) && (10.0..120.0).contains(&vd), "{} {nd} {vd}", glass.full_name());
             assert_eq!(catalogue.find(&glass.full_name()).unwrap(), glass);
         }
-        let makers = ["CDGM", "HIKARI", "HOYA", "LZOS", "MISC", "OHARA", "SCHOTT", "SUMITA"];
+        let makers = ["CDGM", "EYE", "HIKARI", "HOYA", "LZOS", "MISC", "OHARA", "SCHOTT", "SUMITA"];
         assert_eq!(catalogue.makers(), makers);
+    }
+
+    #[test]
+    fn cornea_of_the_eye_has_its_keratometric_neighbourhood() {
+        let cornea = GlassCatalogue::built_in().find("eye:cornea").unwrap();
+        // The index of the schematic eyes, 1.376, at the wavelength that they are stated for.
+        assert!((cornea.glass.index_at(589.3).unwrap() - 1.376).abs() < 2e-4);
+        assert_eq!(cornea.glass.range_nm(), Some((365.0, 1010.0)));
     }
 
     #[track_caller]

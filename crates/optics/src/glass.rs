@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{GlassCatalogue, OpticsError};
+use crate::{Air, GlassCatalogue, OpticsError};
 
 /// The helium d line, at which catalogues state the main index, nm.
 pub const D_LINE_NM: f64 = 587.5618;
@@ -13,6 +13,10 @@ pub const C_LINE_NM: f64 = 656.2725;
 
 /// A medium: its refractive index, relative to air, as a function of wavelength.
 ///
+/// Air is that of the catalogues, [`Air::CATALOGUE`], which has index 1 here; so a lens stands in such air. What else
+/// its light passes, as vacuum or warm air, is relative to that as well ([`Glass::AirAt`]). How the index of a glass
+/// itself changes with its temperature is not taken into account.
+///
 /// The formulas take vacuum wavelengths. A range, where one is stated, is where the index is known; asking beyond
 /// it is an error, never an extrapolation.
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
@@ -21,6 +25,8 @@ pub enum Glass {
     /// Air, of index 1 exactly: catalogue indices are relative to it.
     #[default]
     Air,
+    /// Air in another state than that of the catalogues, or vacuum.
+    AirAt(Air),
     /// A glass of the built-in [`GlassCatalogue`], by a name that means it alone, as `SCHOTT:N-BK7`.
     Named(String),
     /// A medium without dispersion.
@@ -115,6 +121,18 @@ impl Glass {
         }
     }
 
+    /// Returns the index relative to vacuum at a (vacuum) wavelength: that relative to air times the index of the air of
+    /// the catalogues.
+    ///
+    /// The few fluids whose source states the index relative to vacuum ([`GlassCatalogue::built_in`]) must not be
+    /// converted.
+    ///
+    /// # Errors
+    /// As [`index_at`](Self::index_at).
+    pub fn absolute_index_at(&self, wavelength_nm: f64) -> Result<f64, OpticsError> {
+        Ok(self.index_at(wavelength_nm)? * Air::CATALOGUE.index_at(wavelength_nm))
+    }
+
     /// Where the index is known, nm; `None` for a law without stated ends.
     pub fn range_nm(&self) -> Option<(f64, f64)> {
         match self {
@@ -137,6 +155,8 @@ impl Glass {
     pub fn describe(&self) -> String {
         match self {
             Self::Air => "air".to_owned(),
+            Self::AirAt(Air { pressure_pa: 0.0, .. }) => "vacuum".to_owned(),
+            Self::AirAt(air) => format!("air of {} °C and {} Pa", air.temperature_c, air.pressure_pa),
             Self::Named(name) => format!("the glass {name}"),
             Self::Constant { index } => format!("the medium of constant index {index}"),
             Self::Linear { index, reference_nm, .. } => {
@@ -171,6 +191,7 @@ impl Glass {
         };
         match self {
             Self::Air => Ok(()),
+            Self::AirAt(air) => air.check(),
             Self::Named(name) => GlassCatalogue::built_in().find(name).map(|_| ()),
             Self::Constant { index } => positive("index", *index),
             Self::Linear { index, reference_nm, slope_per_nm } => {
@@ -219,6 +240,7 @@ impl Glass {
         let um = 1e-3 * wavelength_nm;
         match self {
             Self::Air => 1.0,
+            Self::AirAt(air) => air.index_at(wavelength_nm) / Air::CATALOGUE.index_at(wavelength_nm),
             Self::Named(name) => named(name).map_or(f64::NAN, |glass| glass.index_unchecked(wavelength_nm)),
             Self::Constant { index } => *index,
             Self::Linear { index, reference_nm, slope_per_nm } => index + slope_per_nm * (wavelength_nm - reference_nm),
@@ -288,7 +310,7 @@ fn formula_index(formula: u8, coefficients: &[f64], um: f64) -> f64 {
     }
 }
 
-fn interpolate(at: &[f64], values: &[f64], x: f64) -> f64 {
+pub(crate) fn interpolate(at: &[f64], values: &[f64], x: f64) -> f64 {
     let above = at.partition_point(|&w| w < x).clamp(1, at.len().max(2) - 1);
     match (at.get(above - 1), at.get(above)) {
         (Some(&w0), Some(&w1)) => {
@@ -328,6 +350,21 @@ mod tests {
         assert!((a - 1.6112879519220324).abs() < 1e-15 && (b_um2 - 0.005769481453609457).abs() < 1e-16);
         let (nd, vd) = glass.nd_vd().unwrap();
         assert!((nd - 1.628).abs() < 1e-14 && (vd - 57.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn vacuum_and_absolute_indices_are_those_of_the_catalogue_times_air() {
+        let bk7 = Glass::Named("SCHOTT:N-BK7".to_owned());
+        let air = Air::CATALOGUE.index_at(D_LINE_NM);
+        let (relative, absolute) = (bk7.index_at(D_LINE_NM).unwrap(), bk7.absolute_index_at(D_LINE_NM).unwrap());
+        // Air of 20 °C has 1.000272 at the d line, so that the absolute index is larger by 4.1e-4.
+        assert!((absolute / relative - air).abs() < 1e-15 && (air - 1.000_272).abs() < 1e-6, "{air}");
+        let vacuum = Glass::AirAt(Air::VACUUM);
+        assert!((vacuum.absolute_index_at(D_LINE_NM).unwrap() - 1.0).abs() < 1e-15);
+        assert_eq!(Glass::AirAt(Air::CATALOGUE).index_at(500.0), Ok(1.0));
+        assert_eq!(vacuum.describe(), "vacuum");
+        let wrong = Glass::AirAt(Air { humidity: 1.5, ..Air::CATALOGUE });
+        assert_eq!(wrong.check().unwrap_err().to_string(), "glass: humidity is 1.5, expected 0 to 1");
     }
 
     #[test]

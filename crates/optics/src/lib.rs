@@ -8,11 +8,13 @@
 //! bend the rays, and trace on ([`MonoLens::trace_surfaces`]).
 #![doc = include_str!("../README.md")]
 
+mod air;
 pub mod analysis;
 mod beam;
 mod bundle;
 mod catalogue;
 mod error;
+mod extinction;
 mod formats;
 mod glass;
 mod layout;
@@ -29,10 +31,12 @@ mod seidel;
 mod surface;
 mod trace;
 
+pub use air::Air;
 pub use beam::Beam;
 pub use bundle::{ObjectPoint, rays_over_front, rays_towards};
 pub use catalogue::{CatalogueGlass, GlassCatalogue};
 pub use error::OpticsError;
+pub use extinction::Absorption;
 pub use formats::{Field, LensFile, Microlens, MissingGlass, ReadOptions};
 pub use glam;
 pub use glass::{C_LINE_NM, D_LINE_NM, F_LINE_NM, Glass};
