@@ -154,7 +154,7 @@ pub(crate) enum BlurKind {
 pub(crate) enum LensCommand {
     /// Lists the built-in lenses
     List,
-    /// Prints first-order data and third-order sums
+    /// Prints first-order data and, of a lens with an axis of symmetry, third-order sums
     Info(LensInfoArgs),
     /// Draws the lens with rays, as SVG or PNG
     Draw(LensDrawArgs),
@@ -220,7 +220,7 @@ pub(crate) enum GlassCommand {
         #[arg(long, value_name = "TEXT")]
         filter: Option<String>,
     },
-    /// Prints a glass's refractive index
+    /// Prints a glass's refractive index, and what 10 mm of it let through
     Show {
         /// Name of the glass, e.g. N-BK7
         name: String,
@@ -241,7 +241,7 @@ pub(crate) struct TraceArgs {
     /// Table to write [default: standard output]
     #[arg(long, short, value_name = "OUT.csv")]
     pub(crate) output: Option<PathBuf>,
-    /// Also takes the rays to a film this far behind the last vertex, mm
+    /// Also takes the rays to a film this far behind the last vertex, mm, curved as the lens file says
     #[arg(long, value_name = "D", allow_negative_numbers = true)]
     pub(crate) film_mm: Option<f64>,
     /// Diameter of the stop, mm [default: the lens's own]

@@ -42,9 +42,10 @@ fn show(name: &str, wavelengths_nm: &str, common: &Common) -> anyhow::Result<()>
     if let (Some(nd), Some(vd)) = (data.glass.nd, data.glass.vd) {
         writeln!(text, "n_d {nd:.6}   V_d {vd:.3}")?;
     }
-    writeln!(text, "\n{:>14} {:>12}", "wavelength nm", "index")?;
-    for (wavelength_nm, index) in data.wavelengths_nm.iter().zip(&data.indices) {
-        writeln!(text, "{wavelength_nm:>14} {index:>12.7}")?;
+    writeln!(text, "\n{:>14} {:>12} {:>14}", "wavelength nm", "index", "through 10 mm")?;
+    for (i, (wavelength_nm, index)) in data.wavelengths_nm.iter().zip(&data.indices).enumerate() {
+        let through = data.transmittances_10_mm[i].map_or("–".to_owned(), |share| format!("{share:.4}"));
+        writeln!(text, "{wavelength_nm:>14} {index:>12.7} {through:>14}")?;
     }
     print(&text)
 }

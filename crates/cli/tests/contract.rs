@@ -38,6 +38,48 @@ fn lens_info_has_its_keys_for_each_wavelength() {
 }
 
 #[test]
+fn lens_without_an_axis_of_symmetry_has_both_its_planes_and_no_sums() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("toric.ron"), TORIC).unwrap();
+    let records = json(folder.path(), &["lens", "info", "toric.ron", "--json"]);
+    let record = &records[0];
+    check_numbers(&record["x_plane"], "efl_mm bfl_mm f_number");
+    assert!(record.get("seidel").is_none(), "{record}");
+    // Into glass of index 1.5 the rear focus lies three radii behind a surface.
+    assert!((record["bfl_mm"].as_f64().unwrap() - 120.0).abs() < 1e-9, "{record}");
+    assert!((record["x_plane"]["bfl_mm"].as_f64().unwrap() - 60.0).abs() < 1e-9, "{record}");
+    assert!(output(folder.path(), &["lens", "info", "toric.ron"]).contains("x_plane bfl_mm"));
+    let glass = json(folder.path(), &["glass", "show", "N-BK7", "--wavelengths-nm", "300,550", "--json"]);
+    let through = glass["transmittances_10_mm"].as_array().unwrap();
+    assert!(through[0].is_null() && through[1].as_f64().unwrap() > 0.99, "{glass}");
+}
+
+/// A surface that bends twice as much along x, decentred, before a curved film.
+const TORIC: &str = r#"(
+    name: "toric",
+    source: "test",
+    surfaces: [
+        (radius_mm: 40.0, shape: Biconic(conic: 0.0, curvature_x_per_mm: 0.05, conic_x: 0.0), stop: true,
+         semi_aperture_mm: 4.0, medium: Constant(index: 1.5), thickness_mm: 0.0),
+    ],
+    moves: [(surfaces: (0, 0), decenter_mm: (0.5, 0.0, 0.0))],
+    image_radius_mm: -30.0,
+)"#;
+
+#[test]
+fn rays_of_a_table_end_on_a_curved_film() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("toric.ron"), TORIC).unwrap();
+    fs::write(folder.path().join("rays.csv"), "x_mm,y_mm,z_mm,l,m,n,wavelength_nm\n1,1,-5,0,0,1,550\n").unwrap();
+    let table = output(folder.path(), &["trace", "toric.ron", "--rays", "rays.csv", "--film-mm", "20"]);
+    let image: Vec<f64> =
+        table.lines().last().unwrap().split(',').skip(2).take(3).map(|cell| cell.parse().unwrap()).collect();
+    let (x, y, z) = (image[0], image[1], image[2]);
+    // The film's centre of curvature lies 30 mm before its vertex, which the decentre of the surface leaves in place.
+    assert!(((x * x + y * y + (z + 10.0).powi(2)).sqrt() - 30.0).abs() < 1e-12, "{table}");
+}
+
+#[test]
 fn psf_has_its_keys_in_both_modes() {
     let folder = tempfile::tempdir().unwrap();
     let common = [

@@ -1,6 +1,6 @@
 //! The glass catalogue as tables.
 
-use dioptric_optics::{CatalogueGlass, GlassCatalogue};
+use dioptric_optics::{CatalogueGlass, Glass, GlassCatalogue};
 use serde::Serialize;
 
 use crate::PipelineError;
@@ -32,6 +32,8 @@ pub struct GlassData {
     pub wavelengths_nm: Vec<f64>,
     /// The index relative to air at each of them.
     pub indices: Vec<f64>,
+    /// The share of light that 10 mm of the glass let through at each of them, reflections apart, where it is known.
+    pub transmittances_10_mm: Vec<Option<f64>>,
 }
 
 /// Returns the glasses whose name holds `part`, in any case; all for an empty part.
@@ -48,7 +50,10 @@ pub fn glass_rows(part: &str) -> Vec<GlassRow> {
 pub fn glass_data(name: &str, wavelengths_nm: &[f64]) -> Result<GlassData, PipelineError> {
     let found = GlassCatalogue::built_in().find(name)?;
     let indices = wavelengths_nm.iter().map(|&nm| found.glass.index_at(nm)).collect::<Result<_, _>>()?;
-    Ok(GlassData { glass: row(found), wavelengths_nm: wavelengths_nm.to_vec(), indices })
+    // Of a glass of the catalogue its name is looked up, for what it swallows is listed by names.
+    let named = Glass::Named(found.full_name());
+    let transmittances_10_mm = wavelengths_nm.iter().map(|&nm| named.internal_transmittance(nm, 10.0)).collect();
+    Ok(GlassData { glass: row(found), wavelengths_nm: wavelengths_nm.to_vec(), indices, transmittances_10_mm })
 }
 
 fn row(glass: &CatalogueGlass) -> GlassRow {

@@ -1,6 +1,6 @@
 //! A lens described in numbers.
 
-use dioptric_optics::{C_LINE_NM, F_LINE_NM, Lens, MonoLens, SeidelSettings, SeidelSums, Surface};
+use dioptric_optics::{C_LINE_NM, F_LINE_NM, FirstOrder, Lens, MonoLens, SeidelSettings, SeidelSums, Surface};
 use serde::Serialize;
 
 use crate::PipelineError;
@@ -38,10 +38,27 @@ pub struct LensData {
     /// The image of an object at the distance asked for.
     #[serde(flatten)]
     pub image: Option<ImageData>,
-    /// The third-order sums of the whole lens, mm: colour from the F to the C line.
-    pub seidel: SeidelSums,
+    /// The third-order sums of the whole lens, mm: colour from the F to the C line. Only a rotationally symmetric lens
+    /// has them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seidel: Option<SeidelSums>,
     /// The third-order sums of each surface, mm.
     pub seidel_surfaces: Vec<SeidelSums>,
+    /// What differs in the x–z plane, of a lens that is not rotationally symmetric; the rest is then of the y–z plane,
+    /// with tilts and decentres left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub x_plane: Option<PlaneData>,
+}
+
+/// First-order data of a lens in one plane through its axis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PlaneData {
+    /// Effective focal length, mm.
+    pub efl_mm: f64,
+    /// z of the rear focal point from the last vertex, mm.
+    pub bfl_mm: f64,
+    /// f-number for a far object.
+    pub f_number: f64,
 }
 
 /// What the data of a lens is about.
@@ -78,12 +95,17 @@ impl LensData {
     pub fn new(lens: &Lens, question: &LensQuestion) -> Result<Self, PipelineError> {
         let LensQuestion { wavelength_nm, distance_mm, field_deg } = *question;
         let mono = lens.at(wavelength_nm)?;
-        let seidel = lens.seidel(&SeidelSettings {
+        let x_plane = (!lens.is_rotational()).then(|| {
+            let FirstOrder { efl_mm, bfl_mm, f_number, .. } = mono.first_order_x();
+            PlaneData { efl_mm, bfl_mm, f_number }
+        });
+        let settings = SeidelSettings {
             wavelength_nm,
             colors_nm: [F_LINE_NM, C_LINE_NM],
             object_distance_mm: distance_mm.unwrap_or(f64::INFINITY),
             chief_slope: field_deg.to_radians().tan(),
-        })?;
+        };
+        let seidel = lens.is_rotational().then(|| lens.seidel(&settings)).transpose()?;
         let first = mono.first_order();
         Ok(Self {
             lens: lens.name().to_owned(),
@@ -99,8 +121,9 @@ impl LensData {
             exit_pupil_diameter_mm: first.exit_pupil_diameter_mm,
             f_number: first.f_number,
             image: distance_mm.map(|distance_mm| image_of(&mono, distance_mm)).transpose()?,
-            seidel: seidel.total,
-            seidel_surfaces: seidel.per_surface,
+            seidel: seidel.as_ref().map(|seidel| seidel.total),
+            seidel_surfaces: seidel.map(|seidel| seidel.per_surface).unwrap_or_default(),
+            x_plane,
         })
     }
 }

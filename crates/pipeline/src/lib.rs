@@ -45,7 +45,9 @@ pub use error::PipelineError;
 pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
 pub use lens_choice::{REFERENCE_WAVELENGTH_NM, open_lens};
 pub use lens_drawing::LensDrawing;
-pub use lens_table::{ImageData, LensData, LensQuestion, LensRow, SurfaceRow, built_in_lenses, surface_rows};
+pub use lens_table::{
+    ImageData, LensData, LensQuestion, LensRow, PlaneData, SurfaceRow, built_in_lenses, surface_rows,
+};
 pub use mosaic::{MosaicPlan, PsfMosaic};
 pub use numbers::parse_numbers;
 pub use plots::{Corner, LineChart, Series};

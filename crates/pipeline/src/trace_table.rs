@@ -24,7 +24,7 @@ pub struct RayTable {
 pub struct TraceSettings {
     /// Whether rims end rays.
     pub rims_clip: bool,
-    /// Takes the rays on to a film this far behind the last vertex, mm.
+    /// Takes the rays on to a film this far behind the last vertex, mm, of the shape that the lens states.
     pub film_mm: Option<f64>,
 }
 
@@ -165,7 +165,7 @@ fn trace_all(lens: &MonoLens, mut rays: RayBatch, settings: &TraceSettings) -> T
         after_surface.push(rays.clone());
     }
     let at_image = settings.film_mm.map(|film_mm| {
-        lens.to_film(&mut rays, film_mm);
+        lens.to_image_surface(&mut rays, film_mm);
         rays
     });
     Traced { after_surface, at_image }
