@@ -136,3 +136,41 @@ fn what_a_format_cannot_hold_is_named() {
     assert!(thin.to_omni_json().unwrap_err().to_string().contains("surface 0 is neither a sphere"));
     assert!(thin.write(Path::new("a.step")).unwrap_err().to_string().contains("expected .ron, .dat, .json or .zmx"));
 }
+
+#[test]
+fn glasses_of_the_lens_alone_go_into_a_catalogue_beside_the_zemax_file() {
+    let mut file = design();
+    let mut interfaces = file.lens.interfaces().to_vec();
+    let own = Glass::Sellmeier { b: vec![1.2, 0.3], c_um2: vec![0.01, 90.0], range_nm: Some((400.0, 800.0)) };
+    (interfaces[0].medium_after, interfaces[4].medium_after) = (own.clone(), own);
+    interfaces[1].medium_after = Glass::Cauchy { a: 1.6, b_um2: 0.008 };
+    file.lens = Lens::new("a design", "made up", interfaces, 3).unwrap();
+    assert!(file.to_zmx().unwrap_err().to_string().contains("a Sellmeier glass of 2 terms"));
+    let (zmx, agf) = file.to_zmx_and_agf("my lens").unwrap();
+    assert!(zmx.contains("GCAT MY_LENS\r\n") && agf.as_ref().is_some_and(|agf| agf.matches("NM ").count() == 2));
+
+    let folder = std::env::temp_dir().join(format!("dioptric-agf-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("my lens.zmx");
+    std::fs::write(&path, zmx).unwrap();
+    let alone = LensFile::read(&path, &ReadOptions::default()).unwrap_err().to_string();
+    std::fs::write(path.with_extension("agf"), agf.unwrap()).unwrap();
+    let again = LensFile::read(&path, &ReadOptions::default());
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert!(alone.contains("no glass is named 'PRIVATE1'"), "{alone}");
+    check_same(&again.unwrap().lens, &file.lens, 550.0);
+    assert_eq!(design().to_zmx_and_agf("x").unwrap(), (design().to_zmx().unwrap(), None));
+    let paper = LensFile::from(Lens::built_in("paper-2el").unwrap());
+    assert!(paper.to_zmx_and_agf("x").unwrap_err().to_string().contains("surface 0 has behind it the medium of"));
+}
+
+#[test]
+fn indices_of_a_dat_file_may_be_given_the_papers_slope() {
+    let file = read("a.dat", "67 1.5 1.65 25\n0 1.5 0 25\n-67 0 1 25\n");
+    let paper = Lens::built_in("paper-2el").unwrap();
+    let sloped = file.lens.with_slope(-0.04 / 300.0, 550.0).unwrap();
+    for nm in [400.0, 550.0, 700.0] {
+        check_same(&sloped, &paper, nm);
+    }
+    assert!(file.lens.with_slope(f64::NAN, 550.0).is_err());
+}

@@ -114,10 +114,73 @@ fn as_database_formula(formula: usize, c: &[f64]) -> Option<(u8, Vec<f64>)> {
         // Extended 2.
         12 => powers(&[2.0, -2.0, -4.0, -6.0, -8.0, 4.0, 6.0]),
         // Extended 3.
-        13 => powers(&[2.0, 4.0, -2.0, -4.0, -6.0, -8.0, -10.0, -12.0]),
+        13 => powers(&EXTENDED_3),
         _ => None,
     }
 }
+
+/// Returns the lines of a glass in a Zemax catalogue, or `None` where no formula of the format says the same.
+///
+/// A law without stated ends is given those of what light there is, 0.1 to 20 µm.
+pub(super) fn agf_lines(name: &str, glass: &Glass) -> Option<String> {
+    let (formula, coefficients) = as_agf_formula(glass)?;
+    let (nd, vd) = glass.nd_vd().unwrap_or((0.0, 0.0));
+    let (first_nm, last_nm) = glass.range_nm().unwrap_or((100.0, 20_000.0));
+    let numbers: Vec<String> = coefficients.iter().map(|c| format!("{c:e}")).collect();
+    Some(format!(
+        "NM {name} {formula} 0 {nd:.6} {vd:.3} 0 0\r\nCD {}\r\nLD {} {}\r\n",
+        numbers.join(" "),
+        first_nm / 1e3,
+        last_nm / 1e3
+    ))
+}
+
+/// Returns the formula of Zemax that says the same as a glass's law, with its coefficients.
+fn as_agf_formula(glass: &Glass) -> Option<(u8, Vec<f64>)> {
+    let sellmeier = |terms: Vec<(f64, f64)>| {
+        let (formula, n_terms) = [(2, 3), (6, 4), (11, 5)].into_iter().find(|(_, n)| terms.len() <= *n)?;
+        let rest = std::iter::repeat_n((0.0, 0.0), n_terms - terms.len());
+        Some((formula, terms.iter().copied().chain(rest).flat_map(|(k, l)| [k, l]).collect()))
+    };
+    // n = a + b/λ² + c/λ⁴ is n² of Schott's formula.
+    let squared =
+        |a: f64, b: f64, c: f64| Some((1, vec![a * a, 0.0, 2.0 * a * b, b * b + 2.0 * a * c, 2.0 * b * c, c * c]));
+    match glass {
+        Glass::Constant { index } => squared(*index, 0.0, 0.0),
+        Glass::Cauchy { a, b_um2 } => squared(*a, *b_um2, 0.0),
+        Glass::Sellmeier { b, c_um2, .. } => sellmeier(b.iter().copied().zip(c_um2.iter().copied()).collect()),
+        Glass::Formula { formula, coefficients, .. } => {
+            let c = |i: usize| coefficients.get(i).copied().unwrap_or(0.0);
+            let pairs: Vec<(f64, f64)> = (1..coefficients.len()).step_by(2).map(|i| (c(i), c(i + 1))).collect();
+            // The coefficients of these powers, if the pairs have no others.
+            let of_powers = |powers: &[f64]| {
+                let is_one = |(a, power): &(f64, f64)| *a == 0.0 || powers.contains(power);
+                let of = |p: &f64| pairs.iter().filter(|(_, power)| power == p).map(|(a, _)| a).sum::<f64>();
+                pairs.iter().all(is_one).then(|| powers.iter().map(of).collect::<Vec<f64>>())
+            };
+            // A constant is a term whose resonance is at 0.
+            let constant = (c(0) != 0.0).then_some((c(0), 0.0));
+            match formula {
+                1 => sellmeier(constant.into_iter().chain(pairs.iter().map(|(b, r)| (*b, r * r))).collect()),
+                2 => sellmeier(constant.into_iter().chain(pairs.iter().copied()).collect()),
+                3 => [(12, &[2.0, -2.0, -4.0, -6.0, -8.0, 4.0, 6.0][..]), (13, &EXTENDED_3)].into_iter().find_map(
+                    |(formula, powers)| Some((formula, [c(0)].into_iter().chain(of_powers(powers)?).collect())),
+                ),
+                5 => match (of_powers(&[-2.0, -4.0]), of_powers(&[-1.0, -3.5])) {
+                    (Some(even), _) => squared(c(0), even[0], even[1]),
+                    (None, Some(conrady)) => Some((5, vec![c(0), conrady[0], conrady[1]])),
+                    _ => None,
+                },
+                7 => Some((3, (0..6).map(c).collect())),
+                _ => None,
+            }
+        }
+        _ => None,
+    }
+}
+
+/// The powers of λ of Zemax's formula Extended 3.
+const EXTENDED_3: [f64; 8] = [2.0, 4.0, -2.0, -4.0, -6.0, -8.0, -10.0, -12.0];
 
 #[cfg(test)]
 mod tests {
@@ -164,6 +227,38 @@ mod tests {
             let c: Vec<f64> = (0..n_terms).flat_map(|_| [0.2, 0.05]).collect();
             check(formula, &c, root(1.0 + n_terms as f64 * 0.2 * 0.25 / 0.2));
         }
+    }
+
+    #[test]
+    fn laws_that_the_format_has_read_back_as_they_were() {
+        let formula = |formula: u8, coefficients: &[f64]| Glass::Formula {
+            formula,
+            coefficients: coefficients.to_vec(),
+            range_nm: Some((350.0, 1000.0)),
+        };
+        let sellmeier = Glass::Sellmeier { b: vec![1.0, 0.2], c_um2: vec![0.006, 100.0], range_nm: None };
+        for glass in [
+            Glass::Constant { index: 1.5 },
+            Glass::Cauchy { a: 1.5, b_um2: 0.006 },
+            sellmeier,
+            formula(1, &[0.35, 0.78, 0.1, 0.18, 4.4]),
+            formula(2, &[0.0, 1.0, 0.006, 0.2, 0.02, 1.0, 100.0, 0.01, 0.03]),
+            formula(3, &[2.25, -0.01, 2.0, 0.01, -2.0, 1e-4, -10.0]),
+            formula(5, &[1.5, 0.005, -2.0, 1e-4, -4.0]),
+            formula(5, &[1.5, 0.005, -1.0, 1e-4, -3.5]),
+            formula(7, &[1.5, 0.005, 1e-4, -1e-3, 1e-5, 1e-6]),
+        ] {
+            let text = agf_lines("MINE", &glass).unwrap();
+            let again = &glasses_from_agf(&text, "").ok().unwrap()[0].glass;
+            for nm in [400.0, 550.0, 900.0] {
+                let (a, b) = (glass.index_at(nm).unwrap(), again.index_at(nm).unwrap());
+                assert!((a - b).abs() < 4e-16, "{text}: {a} {b}");
+            }
+            assert_eq!(glass.range_nm().is_some(), again.range_nm() == glass.range_nm(), "{text}");
+        }
+        let paper = Glass::Linear { index: 1.65, reference_nm: 550.0, slope_per_nm: -1e-4 };
+        assert_eq!(agf_lines("PAPER", &paper), None);
+        assert_eq!(agf_lines("GAS", &formula(6, &[0.0, 0.05, 238.0])), None);
     }
 
     #[test]

@@ -97,10 +97,18 @@ impl LensFile {
     /// Reads a lens file, by its extension: `.ron` (our own), `.dat` or `.txt`, `.json` (ISET's omni format or
     /// `DeepLens`), `.zmx` (Zemax) or `.seq` (CODE V).
     ///
+    /// A glass catalogue beside a `.zmx` file that has its name and the extension `.agf` is read with it.
+    ///
     /// # Errors
     /// When the file cannot be read, is not what it should be, or holds what this crate cannot trace; the message
     /// names the file and, where it can, the line and key.
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self, OpticsError> {
+        let companion = path.with_extension("agf");
+        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zmx")) && companion.is_file() {
+            let mut options = options.clone();
+            options.catalogues.push(GlassCatalogue::read(&companion)?);
+            return Self::from_bytes(path, &bytes_of(path)?, &options);
+        }
         Self::from_bytes(path, &bytes_of(path)?, options)
     }
 

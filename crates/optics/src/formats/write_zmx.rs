@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use crate::{Glass, GlassCatalogue, OpticsError, Pose, Shape, Surface};
 
 use super::{
+    agf::agf_lines,
     lens_file::{Field, LensFile},
     write::{cannot, one_line},
 };
@@ -45,17 +46,54 @@ impl LensFile {
     ///
     /// # Errors
     /// When a glass is neither of the catalogue nor given by index and Abbe number: the format has no place for others.
+    /// [`to_zmx_and_agf`](Self::to_zmx_and_agf) gives them a catalogue of their own.
     pub fn to_zmx(&self) -> Result<String, OpticsError> {
+        let media = self.lens.interfaces().iter().enumerate().map(|(i, interface)| (i, &interface.medium_after));
+        let glasses = media.map(|(i, medium)| zmx_glass(i, medium)).collect::<Result<Vec<_>, _>>()?;
+        self.zmx_text(&glasses, None)
+    }
+
+    /// Returns the lens as a Zemax file, and as an `.agf` catalogue of this name its glasses that Zemax does not know, if
+    /// there are any. Beside the former and with its name, the latter is found when this crate reads it again.
+    ///
+    /// # Errors
+    /// When a glass has a law that the catalogue's formulas cannot say.
+    pub fn to_zmx_and_agf(&self, catalogue: &str) -> Result<(String, Option<String>), OpticsError> {
+        let mut private: Vec<&Glass> = Vec::new();
+        let mut lines = Vec::new();
+        for (i, interface) in self.lens.interfaces().iter().enumerate() {
+            let medium = &interface.medium_after;
+            let refusal = match zmx_glass(i, medium) {
+                Ok(line) => {
+                    lines.push(line);
+                    continue;
+                }
+                Err(refusal) => refusal,
+            };
+            let number = private.iter().position(|glass| *glass == medium).unwrap_or_else(|| {
+                private.push(medium);
+                private.len() - 1
+            });
+            if agf_lines("", medium).is_none() {
+                return Err(refusal);
+            }
+            let (nd, vd) = medium.nd_vd().unwrap_or((0.0, 0.0));
+            lines.push(format!("  GLAS {} 0 0 {nd:.6} {vd:.3}\r\n", private_name(number)));
+        }
+        let entry = |(i, glass): (usize, &&Glass)| agf_lines(&private_name(i), glass);
+        let entries: String = private.iter().enumerate().filter_map(entry).collect();
+        let agf = (!private.is_empty()).then(|| format!("CC glasses of {}\r\n{entries}", one_line(self.lens.name())));
+        let catalogue = one_line(catalogue).replace(' ', "_").to_uppercase();
+        Ok((self.zmx_text(&lines, agf.is_some().then_some(catalogue.as_str()))?, agf))
+    }
+
+    /// Returns the text with these lines of glass, one a surface.
+    fn zmx_text(&self, glasses: &[String], catalogue: Option<&str>) -> Result<String, OpticsError> {
         let lens = &self.lens;
-        let glasses: Vec<String> = lens
-            .interfaces()
-            .iter()
-            .enumerate()
-            .map(|(i, interface)| zmx_glass(i, &interface.medium_after))
-            .collect::<Result<_, _>>()?;
         let mut text = format!("MODE SEQ\r\nNAME {}\r\nNOTE 0 {}\r\n", one_line(lens.name()), one_line(lens.source()));
         text.push_str("UNIT MM X W X CM MR CPMM\r\nFLOA\r\n");
-        let makers = self.zmx_makers()?;
+        let mut makers = self.zmx_makers()?;
+        makers.extend(catalogue.map(str::to_owned));
         if !makers.is_empty() {
             let _ = write!(text, "GCAT {}\r\n", makers.join(" "));
         }
@@ -158,6 +196,11 @@ impl LensFile {
             let _ = write!(text, "PWAV {}\r\n", reference + 1);
         }
     }
+}
+
+/// Returns the name of a glass of the lens's own.
+fn private_name(number: usize) -> String {
+    format!("PRIVATE{}", number + 1)
 }
 
 /// Returns the line of a medium, or nothing for air.
