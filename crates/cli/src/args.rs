@@ -162,7 +162,7 @@ pub(crate) enum LensCommand {
     Convert {
         /// Lens to read, a file or the name of a built-in one
         input: String,
-        /// File to write
+        /// File to write; a .zmx file of a lens with glasses of its own gets a catalogue (.agf) beside it
         output: PathBuf,
     },
 }

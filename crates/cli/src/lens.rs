@@ -1,6 +1,6 @@
 //! `dioptric lens`: built-in lenses, first-order data, drawings, formats.
 
-use std::{fmt::Write, fs};
+use std::{fmt::Write, fs, path::Path};
 
 use anyhow::Context;
 use dioptric_pipeline::{
@@ -18,12 +18,34 @@ pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> 
         LensCommand::List => list(common),
         LensCommand::Info(arguments) => info(arguments, common),
         LensCommand::Draw(arguments) => draw(arguments, common),
-        LensCommand::Convert { input, output } => {
-            let staged = guarded(Staged::file(output)?);
-            convert_lens(input, output, staged.path())?;
-            Ok(staged.commit()?)
-        }
+        LensCommand::Convert { input, output } => convert(input, output, common),
     }
+}
+
+fn convert(input: &str, output: &Path, common: &Common) -> anyhow::Result<()> {
+    let converted = convert_lens(input, output)?;
+    for note in &converted.notes {
+        remark(common.quiet, note);
+    }
+    if let Some(glasses) = converted.glasses {
+        let beside = output.with_extension("agf");
+        // A catalogue that is not this lens's own is left alone.
+        if fs::read_to_string(&beside).is_ok_and(|there| there != glasses) || beside.is_dir() {
+            let beside = beside.display();
+            anyhow::bail!(
+                "{beside}: the lens needs a glass catalogue of this name, which is there already; choose another name"
+            );
+        }
+        write(&beside, &glasses)?;
+        remark(common.quiet, &format!("wrote the lens's own glasses to {}", beside.display()));
+    }
+    write(output, &converted.text)
+}
+
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    let staged = guarded(Staged::file(path)?);
+    fs::write(staged.path(), text).with_context(|| format!("cannot write {}", path.display()))?;
+    Ok(staged.commit()?)
 }
 
 fn list(common: &Common) -> anyhow::Result<()> {

@@ -4,7 +4,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::output;
+use common::{check_error, output};
 use serde_json::Value;
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
@@ -161,6 +161,23 @@ fn a_lens_is_drawn_and_converted() {
         // Indices are those of the d line; files keep them to 1e-9 or better.
         assert!((copy / original - 1.0).abs() < 1e-6, "{file}: {copy}, not {original}");
     }
+}
+
+#[test]
+fn glasses_of_a_lens_alone_are_converted_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = r#"(name: "own", source: "test", surfaces: [(radius_mm: 50.0, stop: true, semi_aperture_mm: 5.0,
+        medium: Cauchy(a: 1.5, b_um2: 0.005), thickness_mm: 3.0), (radius_mm: -50.0, semi_aperture_mm: 5.0,
+        thickness_mm: 0.0)])"#;
+    fs::write(folder.path().join("own.ron"), lens).unwrap();
+    output(folder.path(), &["lens", "convert", "own.ron", "copy.zmx"]);
+    assert!(fs::read_to_string(folder.path().join("copy.agf")).unwrap().contains("NM PRIVATE1 1 "));
+    let efl_mm = |file: &str| json(folder.path(), &["lens", "info", file, "--json"])[0]["efl_mm"].as_f64().unwrap();
+    assert!((efl_mm("copy.zmx") / efl_mm("own.ron") - 1.0).abs() < 1e-12);
+    // A catalogue that is another's is not written over.
+    fs::write(folder.path().join("other.agf"), "NM MINE 1").unwrap();
+    check_error(folder.path(), &["lens", "convert", "own.ron", "other.zmx"], &["other.agf", "choose another name"]);
+    assert!(!folder.path().join("other.zmx").exists());
 }
 
 #[test]

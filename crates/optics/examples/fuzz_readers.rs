@@ -1,7 +1,7 @@
 //! Reads N randomly changed files of every format, as the test `formats_robust` does with a few thousand.
 //!
-//! `cargo run --release -p dioptric-optics --example fuzz_readers -- 1000000 [first]`: mutants `first` and on of each
-//! seed. A panic names the seed and the mutant's number, and its input is left in `crash-NUMBER-NAME`.
+//! `cargo run --release -p dioptric-optics --example fuzz_readers -- 1000000 [first] [name]`: mutants `first` and on of
+//! each seed, or of those whose name holds this. A panic names the seed and the mutant's number, and its input is left in `crash-NUMBER-NAME`.
 #![expect(clippy::print_stdout, reason = "this is a command")]
 
 use std::{panic, time::Instant};
@@ -12,9 +12,11 @@ mod mutate;
 use mutate::{SEEDS, mutant, read};
 
 fn main() {
-    let mut arguments = std::env::args().skip(1).map(|word| word.parse::<u64>().unwrap_or(0));
-    let (n_mutants, first) = (arguments.next().unwrap_or(1000), arguments.next().unwrap_or(0));
-    for (name, seed) in SEEDS {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let number = |place: usize, otherwise: u64| words.get(place).map_or(otherwise, |word| word.parse().unwrap_or(0));
+    let (n_mutants, first) = (number(0, 1000), number(1, 0));
+    let part = words.get(2).map_or("", String::as_str);
+    for (name, seed) in SEEDS.into_iter().filter(|(name, _)| name.contains(part)) {
         let (start, mut slowest_s, mut n_read) = (Instant::now(), (0.0_f64, 0), 0_u64);
         let mut n_crashes = 0;
         for number in first..first + n_mutants {

@@ -40,7 +40,7 @@ pub use camera::{
     SensorChoice, StopChoice, WavelengthChoice, WhiteChoice,
 };
 pub use capture::{Capture, IrradianceSummary};
-pub use convert::convert_lens;
+pub use convert::{ConvertedLens, convert_lens};
 pub use error::PipelineError;
 pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
 pub use lens_choice::{REFERENCE_WAVELENGTH_NM, open_lens};
