@@ -128,12 +128,25 @@ fn trace_blocks<T: Real>(
     plan: &Plan<T>,
     goal: Goal,
     rays: &mut RaySlices<'_, T>,
+    note: impl FnMut(usize, &[Block<T>], usize),
+) {
+    // A few rays need not pay for the room of many.
+    match rays.fate.len() <= LANES {
+        true => trace_groups::<T, 1>(plan, goal, rays, note),
+        false => trace_groups::<T, BLOCKS>(plan, goal, rays, note),
+    }
+}
+
+fn trace_groups<T: Real, const B: usize>(
+    plan: &Plan<T>,
+    goal: Goal,
+    rays: &mut RaySlices<'_, T>,
     mut note: impl FnMut(usize, &[Block<T>], usize),
 ) {
     let (first_z, last_z) = plan.ends_z();
-    let (mut here, mut there) = ([Block::EMPTY; BLOCKS], [Block::EMPTY; BLOCKS]);
-    for start in (0..rays.fate.len()).step_by(LANES * BLOCKS) {
-        let n_blocks = (rays.fate.len() - start).div_ceil(LANES).min(BLOCKS);
+    let (mut here, mut there) = ([Block::EMPTY; B], [Block::EMPTY; B]);
+    for start in (0..rays.fate.len()).step_by(LANES * B) {
+        let n_blocks = (rays.fate.len() - start).div_ceil(LANES).min(B);
         let (mut from, mut to) = (&mut here[..n_blocks], &mut there[..n_blocks]);
         for (i, block) in from.iter_mut().enumerate() {
             *block = Block::load(rays, start + i * LANES, first_z);
@@ -192,7 +205,8 @@ fn fate_of<T: Real, const N: usize>(
 ) -> (RayFate, Ray<T>) {
     let Ray { l, m, n, .. } = *before;
     let there = Ray { l, m, n, ..after.ray(lane, T::ZERO) };
-    match (after.hit[lane] != T::NO, interface.is_within(there.x, there.y)) {
+    let is_hit = after.front[lane] != T::NO && there.x.abs() + there.y.abs() < T::INFINITY;
+    match (is_hit, interface.is_within(there.x, there.y)) {
         (false, _) => (RayFate::Missed { surface }, *before),
         (true, false) => (RayFate::Vignetted { surface }, there),
         (true, true) => (RayFate::TotalReflection { surface }, there),

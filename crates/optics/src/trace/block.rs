@@ -18,8 +18,8 @@ pub(super) struct Block<T: Real, const N: usize = LANES> {
     pub(super) opl: [T; N],
     /// Whether the ray is in flight.
     pub(super) alive: [T::Mask; N],
-    /// Whether the ray met the last surface at all.
-    pub(super) hit: [T::Mask; N],
+    /// Whether the crossing, if finite, was of the right sheet of the last surface.
+    pub(super) front: [T::Mask; N],
 }
 
 impl<T: Real, const N: usize> Block<T, N> {
@@ -33,7 +33,7 @@ impl<T: Real, const N: usize> Block<T, N> {
         n: [T::ONE; N],
         opl: [T::ZERO; N],
         alive: [T::NO; N],
-        hit: [T::NO; N],
+        front: [T::NO; N],
     };
 
     /// A ray, with z from a vertex that lies further along by `shift`.

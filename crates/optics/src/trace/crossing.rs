@@ -56,8 +56,8 @@ pub(super) struct Passed<T> {
     pub(super) ray: Ray<T>,
     /// Whether it goes on; if not, the rest says why.
     pub(super) goes_on: bool,
-    /// Whether it met the surface at all.
-    pub(super) is_hit: bool,
+    /// Whether its crossing, if it has a finite one, is of the right sheet.
+    pub(super) is_front: bool,
 }
 
 impl<T: Real> Interface<T> {
@@ -152,7 +152,7 @@ pub(super) fn refract<T: Real>(interface: &Interface<T>, ray: &Ray<T>, crossing:
         opl: longer(ray.opl, index_before, t),
     };
     let goes_on = interface.is_within(x, y) & is_front & (after2 >= T::ZERO);
-    Passed { ray: refracted, goes_on, is_hit: is_front & (t.abs() < T::INFINITY) }
+    Passed { ray: refracted, goes_on, is_front }
 }
 
 /// Moves a ray to the vertex plane, where nothing bends it.
@@ -163,7 +163,7 @@ pub(super) fn cross_plane<T: Real>(interface: &Interface<T>, ray: &Ray<T>) -> Pa
     let is_ahead = ray.n > T::ZERO;
     let moved = Ray { x, y, z: T::ZERO, opl: longer(ray.opl, interface.index_before, t), ..*ray };
     let goes_on = interface.is_within(x, y) & is_ahead;
-    Passed { ray: moved, goes_on, is_hit: is_ahead & (t.abs() < T::INFINITY) }
+    Passed { ray: moved, goes_on, is_front: is_ahead }
 }
 
 /// A path that goes on by `t` in a medium.

@@ -20,7 +20,7 @@ pub(super) trait Optic<T: Real> {
     /// Takes the rays of `from`, whose z counts from a vertex that lies before this one by `shift`, on to the surface
     /// and turns them there.
     ///
-    /// The new block says which rays are still in flight, and which met the surface; where one ended it holds what
+    /// The new block says which rays are still in flight, and which crossed the right sheet of it; where one ended it holds what
     /// [`Passed`] does.
     fn pass<const N: usize>(&self, shift: T, from: &Block<T, N>, to: &mut Block<T, N>);
 }
@@ -47,10 +47,10 @@ pub(super) fn pass_lanes<T: Real, const N: usize>(
     pass_one: impl Fn(usize, &Ray<T>) -> Passed<T>,
 ) {
     for i in 0..N {
-        let Passed { ray, goes_on, is_hit } = pass_one(i, &from.ray(i, shift));
+        let Passed { ray, goes_on, is_front } = pass_one(i, &from.ray(i, shift));
         to.set(i, &ray);
         to.alive[i] = if goes_on { from.alive[i] } else { T::NO };
-        to.hit[i] = T::mask(is_hit);
+        to.front[i] = T::mask(is_front);
     }
 }
 

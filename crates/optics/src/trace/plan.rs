@@ -31,23 +31,23 @@ pub(super) struct Pass<T> {
     pub(super) interface: Interface<T>,
 }
 
-/// The forms of surfaces; aspheres are sorted by how many powers they have.
+/// The forms of surfaces; aspheres are sorted by how many powers they have, and boxed so that a plan stays short.
 #[derive(Clone, Debug)]
 pub(super) enum Form<T> {
     Window(Window<T>),
     Sphere(Sphere<T>),
     Conic(Conic<T>),
     Even4(Asphere<T, EvenPowers<T, 4>>),
-    Even8(Asphere<T, EvenPowers<T, 8>>),
-    Even12(Asphere<T, EvenPowers<T, 12>>),
-    All10(Asphere<T, AllPowers<T, 10>>),
-    All20(Asphere<T, AllPowers<T, 20>>),
+    Even8(Box<Asphere<T, EvenPowers<T, 8>>>),
+    Even12(Box<Asphere<T, EvenPowers<T, 12>>>),
+    All10(Box<Asphere<T, AllPowers<T, 10>>>),
+    All20(Box<Asphere<T, AllPowers<T, 20>>>),
     Many(Asphere<T, ManyPowers<T>>),
     ThinLens(ThinLens<T>),
     TwoCurvatures(TwoCurvatures<T>),
 }
 
-/// Does the same with a form's optic, whichever it is.
+/// Does the same with a form's optic, whichever it is: by a plain reference, which the compiler knows to stand alone.
 macro_rules! with_optic {
     ($form:expr, $optic:ident => $result:expr) => {
         match $form {
@@ -55,10 +55,22 @@ macro_rules! with_optic {
             Form::Sphere($optic) => $result,
             Form::Conic($optic) => $result,
             Form::Even4($optic) => $result,
-            Form::Even8($optic) => $result,
-            Form::Even12($optic) => $result,
-            Form::All10($optic) => $result,
-            Form::All20($optic) => $result,
+            Form::Even8(boxed) => {
+                let $optic = &**boxed;
+                $result
+            }
+            Form::Even12(boxed) => {
+                let $optic = &**boxed;
+                $result
+            }
+            Form::All10(boxed) => {
+                let $optic = &**boxed;
+                $result
+            }
+            Form::All20(boxed) => {
+                let $optic = &**boxed;
+                $result
+            }
             Form::Many($optic) => $result,
             Form::ThinLens($optic) => $result,
             Form::TwoCurvatures($optic) => $result,
@@ -91,8 +103,8 @@ impl<T: Real> Form<T> {
                 let base = (ConicForm::new(curvature, T::of(*conic)), interface);
                 match from_r2.len() {
                     0..=4 => Self::Even4(asphere(base, EvenPowers(padded(&from_r2)))),
-                    5..=8 => Self::Even8(asphere(base, EvenPowers(padded(&from_r2)))),
-                    9..=12 => Self::Even12(asphere(base, EvenPowers(padded(&from_r2)))),
+                    5..=8 => Self::Even8(Box::new(asphere(base, EvenPowers(padded(&from_r2))))),
+                    9..=12 => Self::Even12(Box::new(asphere(base, EvenPowers(padded(&from_r2))))),
                     _ => {
                         let from_r1 = from_r2.iter().flat_map(|&a| [T::ZERO, T::of(a)]).collect();
                         Self::Many(asphere(base, ManyPowers(from_r1)))
@@ -102,8 +114,8 @@ impl<T: Real> Form<T> {
             Kind::OddAsphere { conic, coefficients } => {
                 let base = (ConicForm::new(curvature, T::of(*conic)), interface);
                 match coefficients.len() {
-                    0..=10 => Self::All10(asphere(base, AllPowers(padded(coefficients)))),
-                    11..=20 => Self::All20(asphere(base, AllPowers(padded(coefficients)))),
+                    0..=10 => Self::All10(Box::new(asphere(base, AllPowers(padded(coefficients))))),
+                    11..=20 => Self::All20(Box::new(asphere(base, AllPowers(padded(coefficients))))),
                     _ => Self::Many(asphere(base, ManyPowers(coefficients.iter().map(|&a| T::of(a)).collect()))),
                 }
             }
