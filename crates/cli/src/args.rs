@@ -38,7 +38,7 @@ pub(crate) struct Common {
 pub(crate) enum Command {
     /// Runs the whole camera: scene, lens, sensor, picture; with no arguments, the built-in demo
     Run(Box<RunArgs>),
-    /// Lists, describes, draws and converts lenses
+    /// Lists, describes, analyses, draws and converts lenses
     #[command(subcommand)]
     Lens(LensCommand),
     /// Lists and describes glasses
@@ -156,6 +156,8 @@ pub(crate) enum LensCommand {
     List,
     /// Prints first-order data and, of a lens with an axis of symmetry, third-order sums
     Info(LensInfoArgs),
+    /// Analyses the lens by real rays: spots, fans, wavefronts, field curvature, distortion, colour, illumination, focus
+    Analyze(LensAnalyzeArgs),
     /// Draws the lens with rays, as SVG or PNG
     Draw(LensDrawArgs),
     /// Writes a lens in another format, chosen by the extension
@@ -184,6 +186,40 @@ pub(crate) struct LensInfoArgs {
     /// Half field for the third-order sums, degrees
     #[arg(long, value_name = "A", default_value_t = 10.0)]
     pub(crate) field_deg: f64,
+}
+
+/// What to analyse of a lens.
+#[derive(Debug, Args)]
+pub(crate) struct LensAnalyzeArgs {
+    /// Lens, a file or the name of a built-in one
+    pub(crate) lens: String,
+    /// Field angles, degrees [default: 0, 0.5, 0.7 and 1 of where the light falls to a quarter]
+    #[arg(long, value_name = "LIST")]
+    pub(crate) fields_deg: Option<String>,
+    /// Wavelengths, nm: a list or first:last:step; that nearest to 550 is the reference
+    #[arg(long, value_name = "LIST", default_value = "450,550,650")]
+    pub(crate) wavelengths_nm: String,
+    /// Distance of the object from the first vertex, mm, or inf
+    #[arg(long, value_name = "D", default_value_t = f64::INFINITY)]
+    pub(crate) distance_mm: f64,
+    /// Stops the lens down to this f-number
+    #[arg(long, value_name = "N", conflicts_with = "stop_mm")]
+    pub(crate) f_number: Option<f64>,
+    /// Diameter of the stop, mm [default: the lens's own]
+    #[arg(long, value_name = "D")]
+    pub(crate) stop_mm: Option<f64>,
+    /// Places the film this far behind the last vertex, mm [default: where the spot on the axis is smallest]
+    #[arg(long, value_name = "D", conflicts_with = "focus_mm", allow_negative_numbers = true)]
+    pub(crate) film_mm: Option<f64>,
+    /// Places the film at the paraxial image of this distance from the first vertex, mm, or inf
+    #[arg(long, value_name = "D")]
+    pub(crate) focus_mm: Option<f64>,
+    /// Rings of rays in a spot: N of them have 1 + 3N(N + 1) rays
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    pub(crate) rings: usize,
+    /// Folder for analysis.json and the plots, as SVG and PNG
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// How to draw a lens.

@@ -17,6 +17,7 @@ pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> 
     match command {
         LensCommand::List => list(common),
         LensCommand::Info(arguments) => info(arguments, common),
+        LensCommand::Analyze(arguments) => crate::analyze::run(arguments, common),
         LensCommand::Draw(arguments) => draw(arguments, common),
         LensCommand::Convert { input, output } => convert(input, output, common),
     }

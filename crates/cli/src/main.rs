@@ -3,6 +3,7 @@
 //! `args` holds the words; each subcommand has its file and calls `dioptric-pipeline`, which does the work. An error
 //! ends in one sentence on standard error and a status that is not 0, and leaves no half-written file.
 
+mod analyze;
 mod args;
 mod glass;
 mod lens;

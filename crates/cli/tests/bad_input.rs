@@ -198,3 +198,15 @@ fn numbers_that_make_no_sense_are_named() {
         assert!(message.contains(word) || message.contains("unexpected argument"), "{arguments:?}: {message}");
     }
 }
+
+#[test]
+fn an_analysis_that_cannot_be_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let check = |more: &[&str], words: &[&str]| {
+        check_error(folder.path(), &[&["lens", "analyze", "dgauss-50mm", "--out", "plots"], more].concat(), words);
+    };
+    check(&["--fields-deg", "0,90"], &["fields_deg is 90", "below 89 degrees"]);
+    check(&["--fields-deg", "0,x"], &["--fields-deg", "'x'"]);
+    check(&["--distance-mm", "5"], &["forms no image"]);
+    check(&["--f-number", "1.2"], &["opens to at most"]);
+}

@@ -80,6 +80,46 @@ fn rays_of_a_table_end_on_a_curved_film() {
 }
 
 #[test]
+fn lens_analyze_has_its_keys_and_leaves_its_plots() {
+    let folder = tempfile::tempdir().unwrap();
+    let common = ["lens", "analyze", "tessar-50mm", "--fields-deg", "0,12", "--wavelengths-nm", "500,600", "--quiet"];
+    let stop = ["--f-number", "5.6", "--distance-mm", "3000", "--rings", "4"];
+    let analysis = json(folder.path(), &[&common[..], &stop, &["--out", "plots", "--json"]].concat());
+    check_numbers(&analysis, "distance_mm reference_nm efl_mm f_number working_f_number film_mm half_illumination_deg");
+    check_numbers(
+        &analysis["focus"],
+        "paraxial_film_mm axis_film_mm axis_rms_um fields_film_mm fields_rms_um wavefront_film_mm wavefront_rms_waves",
+    );
+    let of = |key: &str, n: usize| {
+        assert_eq!(analysis[key].as_array().unwrap().len(), n, "{key}");
+        analysis[key][n - 1].clone()
+    };
+    check_numbers(&of("axial_color", 2), "wavelength_nm paraxial_shift_mm rms_shift_mm");
+    let spot = of("spots", 4);
+    check_numbers(&spot, "field_deg wavelength_nm height_mm rms_um rms_about_chief_um radius_um sigma_x_um sigma_y_um");
+    check_numbers(&spot["wavefront"], "rms_waves peak_to_valley_waves strehl");
+    assert_eq!(spot["pupil"]["rho_max_mm"].as_array().unwrap().len(), 36);
+    let fan = of("fans", 4);
+    for key in ["places", "tangential_um", "sagittal_um", "tangential_waves", "sagittal_waves"] {
+        assert_eq!(fan[key].as_array().unwrap().len(), 41, "{key}");
+    }
+    check_numbers(
+        &of("fields", 2),
+        "height_mm distortion_tangent_percent distortion_angle_percent tangential_focus_mm sagittal_focus_mm \
+         relative_illumination",
+    );
+    let written: Value =
+        serde_json::from_str(&fs::read_to_string(folder.path().join("plots/analysis.json")).unwrap()).unwrap();
+    assert_eq!(written, analysis);
+    for name in ["analysis", "spots"] {
+        let file = |extension: &str| fs::read(folder.path().join(format!("plots/{name}.{extension}"))).unwrap();
+        assert!(file("svg").starts_with(b"<svg") && file("png").starts_with(b"\x89PNG"), "{name}");
+    }
+    let text = output(folder.path(), &[&common[..], &["--focus-mm", "2000"]].concat());
+    assert!(text.contains("least spot on the axis") && text.contains("f tan θ %"), "{text}");
+}
+
+#[test]
 fn psf_has_its_keys_in_both_modes() {
     let folder = tempfile::tempdir().unwrap();
     let common = [

@@ -14,6 +14,7 @@ mod covariance;
 mod error;
 mod hurb;
 mod huygens;
+mod opd;
 pub mod quadrature;
 mod stop_ray;
 mod wave;
@@ -26,6 +27,7 @@ pub use covariance::Covariance;
 pub use error::DiffractionError;
 pub use hurb::{Hurb, Spread};
 pub use huygens::HuygensSources;
+pub use opd::{best_wavefront_film_mm, opd_waves_at};
 pub use stop_ray::{StopRay, trace_stop_rays};
 pub use wave::{
     Peak, PhaseRange, Propagation, PupilEdge, PupilGrid, WaveMap, WaveNodes, WavePsf, WaveQuality, WaveWindow,

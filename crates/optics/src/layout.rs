@@ -264,8 +264,8 @@ fn film(lens: &Lens, layout: &Layout, fans: &[Fan], frame: &Frame, svg: &mut Str
     frame.label((frame.x(z_mm) + 3.0, frame.y(half_mm) - 6.0), "end", "film", svg);
 }
 
-/// Returns a colour that stands for a wavelength.
-fn wavelength_color(wavelength_nm: f64) -> String {
+/// Returns a colour that stands for a wavelength, as CSS writes it: the hue of its light, dark enough for lines on white.
+pub fn wavelength_color(wavelength_nm: f64) -> String {
     const HUES: [(f64, f64); 7] =
         [(400.0, 270.0), (450.0, 235.0), (490.0, 185.0), (530.0, 130.0), (580.0, 48.0), (620.0, 15.0), (700.0, 0.0)];
     let above = HUES.partition_point(|(nm, _)| *nm < wavelength_nm).clamp(1, HUES.len() - 1);

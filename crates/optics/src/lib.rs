@@ -40,7 +40,7 @@ pub use extinction::Absorption;
 pub use formats::{Field, LensFile, Microlens, MissingGlass, ReadOptions};
 pub use glam;
 pub use glass::{C_LINE_NM, D_LINE_NM, F_LINE_NM, Glass};
-pub use layout::Layout;
+pub use layout::{Layout, wavelength_color};
 pub use lens::{ImageSurface, Lens};
 pub use mono::MonoLens;
 pub use paraxial::{Conjugate, FirstOrder};

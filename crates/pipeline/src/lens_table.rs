@@ -1,6 +1,8 @@
 //! A lens described in numbers.
 
-use dioptric_optics::{C_LINE_NM, F_LINE_NM, FirstOrder, Lens, MonoLens, SeidelSettings, SeidelSums, Surface};
+use dioptric_optics::{
+    C_LINE_NM, F_LINE_NM, FirstOrder, Lens, MonoLens, SeidelSettings, SeidelSums, Surface, analysis::field_limit_deg,
+};
 use serde::Serialize;
 
 use crate::PipelineError;
@@ -13,28 +15,20 @@ use crate::PipelineError;
 pub struct LensData {
     /// The lens.
     pub lens: String,
-    /// Wavelength, nm.
-    pub wavelength_nm: f64,
-    /// Effective focal length, mm.
-    pub efl_mm: f64,
-    /// z of the rear focal point from the last vertex, mm.
-    pub bfl_mm: f64,
-    /// z of the front focal point from the first vertex, mm.
-    pub ffl_mm: f64,
-    /// z of the front principal plane from the first vertex, mm.
-    pub front_principal_mm: f64,
-    /// z of the rear principal plane from the last vertex, mm.
-    pub rear_principal_mm: f64,
-    /// z of the entrance pupil from the first vertex, mm.
-    pub entrance_pupil_z_mm: f64,
-    /// Diameter of the entrance pupil, mm.
-    pub entrance_pupil_diameter_mm: f64,
-    /// z of the exit pupil from the last vertex, mm.
-    pub exit_pupil_z_mm: f64,
-    /// Diameter of the exit pupil, mm.
-    pub exit_pupil_diameter_mm: f64,
-    /// f-number for a far object.
-    pub f_number: f64,
+    /// Focal lengths, principal planes, pupils and f-number at a wavelength.
+    #[serde(flatten)]
+    pub first_order: FirstOrder,
+    /// Exit-pupil diameter over entrance-pupil diameter.
+    pub pupil_magnification: f64,
+    /// Radius of the image surface if there were no astigmatism (Petzval's), mm; negative when it bends towards the lens.
+    /// Only a rotationally symmetric lens has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub petzval_radius_mm: Option<f64>,
+    /// The field angle at which the illumination of a far object falls to half, degrees: half the field of view, where
+    /// no film limits it.
+    pub half_light_field_deg: Option<f64>,
+    /// The field angle at which hardly any light is left, 1 %, degrees.
+    pub last_light_field_deg: Option<f64>,
     /// The image of an object at the distance asked for.
     #[serde(flatten)]
     pub image: Option<ImageData>,
@@ -109,23 +103,25 @@ impl LensData {
         let first = mono.first_order();
         Ok(Self {
             lens: lens.name().to_owned(),
-            wavelength_nm,
-            efl_mm: first.efl_mm,
-            bfl_mm: first.bfl_mm,
-            ffl_mm: first.ffl_mm,
-            front_principal_mm: first.front_principal_mm,
-            rear_principal_mm: first.rear_principal_mm,
-            entrance_pupil_z_mm: first.entrance_pupil_z_mm,
-            entrance_pupil_diameter_mm: first.entrance_pupil_diameter_mm,
-            exit_pupil_z_mm: first.exit_pupil_z_mm,
-            exit_pupil_diameter_mm: first.exit_pupil_diameter_mm,
-            f_number: first.f_number,
+            first_order: first,
+            pupil_magnification: first.pupil_magnification(),
+            petzval_radius_mm: lens.is_rotational().then(|| petzval_radius_mm(lens, &mono)).transpose()?,
+            half_light_field_deg: field_limit_deg(&mono, 0.5),
+            last_light_field_deg: field_limit_deg(&mono, 0.01),
             image: distance_mm.map(|distance_mm| image_of(&mono, distance_mm)).transpose()?,
             seidel: seidel.as_ref().map(|seidel| seidel.total),
             seidel_surfaces: seidel.map(|seidel| seidel.per_surface).unwrap_or_default(),
             x_plane,
         })
     }
+}
+
+/// Returns R of S4 = −H² / (n' R) (Welford 1986, 6.3): the same for any two rays.
+fn petzval_radius_mm(lens: &Lens, mono: &MonoLens) -> Result<f64, PipelineError> {
+    let any = SeidelSettings { wavelength_nm: mono.wavelength_nm(), ..SeidelSettings::far(0.1) };
+    let any = SeidelSettings { colors_nm: [mono.wavelength_nm(); 2], ..any };
+    let sums = lens.seidel(&any)?;
+    Ok(-sums.lagrange_mm * sums.lagrange_mm / (mono.image_index() * sums.total.s4))
 }
 
 fn image_of(lens: &MonoLens, distance_mm: f64) -> Result<ImageData, PipelineError> {
@@ -232,7 +228,7 @@ mod tests {
         let lens = Lens::built_in("paper-2el").unwrap();
         let data = LensData::new(&lens, &question(Some(8000.0))).unwrap();
         // PHYSICS, "paraxial anchors": five digits.
-        assert_relative_eq!(data.efl_mm, 51.9971, epsilon = 1e-4);
+        assert_relative_eq!(data.first_order.efl_mm, 51.9971, epsilon = 1e-4);
         assert_relative_eq!(data.image.unwrap().image_distance_mm, 51.4200, epsilon = 1e-4);
         assert!(LensData::new(&lens, &question(Some(-1.0))).is_err());
     }
@@ -243,7 +239,8 @@ mod tests {
         let json = serde_json::to_value(LensData::new(&lens, &question(Some(2000.0))).unwrap()).unwrap();
         for key in "efl_mm bfl_mm ffl_mm front_principal_mm rear_principal_mm entrance_pupil_z_mm \
                     entrance_pupil_diameter_mm exit_pupil_z_mm exit_pupil_diameter_mm f_number image_distance_mm \
-                    magnification working_f_number"
+                    wavelength_nm power_per_mm image_index pupil_magnification petzval_radius_mm \
+                    half_light_field_deg last_light_field_deg magnification working_f_number"
             .split_whitespace()
         {
             assert!(json[key].is_f64(), "{key}");
@@ -253,6 +250,20 @@ mod tests {
             let sum: f64 = of_surfaces.iter().map(|sums| sums[key].as_f64().unwrap()).sum();
             assert_relative_eq!(json["seidel"][key].as_f64().unwrap(), sum, epsilon = 1e-12);
         }
+    }
+
+    #[test]
+    fn petzval_radius_of_a_single_surface_is_its_own() {
+        // One surface: −n' R_p⁻¹ = (n' − n) / (n n' R) n', so R_p = −n R / (n' − n) for n = 1.
+        let ball = dioptric_optics::Interface {
+            surface: Surface::sphere(20.0, 2.0),
+            medium_after: dioptric_optics::Glass::Constant { index: 1.5 },
+            thickness_after_mm: 0.0,
+        };
+        let lens = Lens::new("ball", "test", vec![ball], 0).unwrap();
+        let data = LensData::new(&lens, &question(None)).unwrap();
+        assert_relative_eq!(data.petzval_radius_mm.unwrap(), -40.0, max_relative = 1e-12);
+        assert_relative_eq!(data.first_order.image_index, 1.5);
     }
 
     #[test]

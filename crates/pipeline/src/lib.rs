@@ -18,11 +18,13 @@ mod display;
 mod error;
 pub mod figures;
 mod glass_table;
+mod lens_analysis;
 mod lens_choice;
 mod lens_drawing;
 mod lens_table;
 mod mosaic;
 mod numbers;
+mod panel;
 mod plots;
 mod progress;
 mod psf_table;
@@ -43,6 +45,10 @@ pub use capture::{Capture, IrradianceSummary};
 pub use convert::{ConvertedLens, convert_lens};
 pub use error::PipelineError;
 pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
+pub use lens_analysis::{
+    AnalysisFilm, AnalysisRequest, AxialColorRow, FanRow, FieldRow, FocusData, LensAnalysis, PupilRow, SpotRow,
+    WavefrontRow,
+};
 pub use lens_choice::{REFERENCE_WAVELENGTH_NM, open_lens};
 pub use lens_drawing::LensDrawing;
 pub use lens_table::{

@@ -29,6 +29,34 @@ pub fn projected_solid_angle(lens: &MonoLens, point: &ObjectPoint, n_azimuths: u
     lens.image_index().powi(2) * (4.0 * area(1) - area(2)) / 3.0
 }
 
+/// The steepest field that is looked at, degrees.
+const STEEPEST_DEG: f64 = 88.0;
+
+/// Returns the field angle, degrees, at which the illumination of a far point has fallen to a share of that on the axis
+/// (by rims and cosines); `None` if none comes together on the axis, the steepest of 88° if it has not fallen so far.
+///
+/// Twice this angle is a lens's field of view where its film sets no limit.
+pub fn field_limit_deg(lens: &MonoLens, share: f64) -> Option<f64> {
+    const N_AZIMUTHS: usize = 48;
+    let cone = |field_deg: f64| {
+        let point = ObjectPoint::from_field(lens, DVec2::new(0.0, field_deg.to_radians().tan()), 0.0);
+        projected_solid_angle(lens, &point, N_AZIMUTHS)
+    };
+    let least = share * cone(0.0);
+    if least <= 0.0 {
+        return None;
+    }
+    // The first degree that is too dark, then halves of it.
+    let dark = (1..=STEEPEST_DEG as u32).map(f64::from).find(|&field_deg| cone(field_deg) < least);
+    let Some(mut dark) = dark else { return Some(STEEPEST_DEG) };
+    let mut bright = dark - 1.0;
+    while dark - bright > 1e-4 {
+        let middle = 0.5 * (bright + dark);
+        *(if cone(middle) < least { &mut dark } else { &mut bright }) = middle;
+    }
+    Some(bright)
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
@@ -80,5 +108,18 @@ mod tests {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(1.2, 0.0), 0.0);
         assert_eq!(projected_solid_angle(&lens, &point, 64), 0.0);
+    }
+
+    #[test]
+    fn the_field_ends_where_the_light_does() {
+        let slow = Lens::thin(50.0, 0.5).unwrap().at(550.0).unwrap();
+        // cos⁴ = 1/4 at 45°, but for the square of the aperture's angle, 2.5e-5.
+        assert!((field_limit_deg(&slow, 0.25).unwrap() - 45.0).abs() < 2e-3);
+        // Far light leaves a hole in parallel: it forms no image.
+        assert_eq!(field_limit_deg(&Lens::pinhole(0.2).unwrap().at(550.0).unwrap(), 0.25), None);
+        let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
+        let [half, tenth] = [0.5, 0.1].map(|share| field_limit_deg(&lens, share).unwrap());
+        assert!(5.0 < half && half < tenth && tenth < 35.0, "{half} {tenth}");
+        assert!(field_limit_deg(&Lens::built_in("fisheye-12.5mm").unwrap().at(550.0).unwrap(), 0.1).unwrap() > 70.0);
     }
 }

@@ -16,7 +16,7 @@ pub use aim::StopAim;
 pub use close_rays::AstigmaticFoci;
 pub use field_map::{Distortion, Projection};
 pub use focus::{Autofocus, FocusRays};
-pub use illumination::projected_solid_angle;
+pub use illumination::{field_limit_deg, projected_solid_angle};
 pub use pupil_places::{PupilCoordinates, PupilSampling, hexapolar, pupil_line};
 pub use ray_fan::RayFan;
 pub use spot::SpotDiagram;

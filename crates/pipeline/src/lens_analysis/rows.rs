@@ -1,0 +1,168 @@
+//! What an analysis of a lens says, as records.
+
+use serde::Serialize;
+
+/// The real-ray analysis of a lens.
+///
+/// Points lie straight above the axis as the photographer sees it. Heights and errors are in the picture frame, in which
+/// the image of such a point lies above the axis too: positive upwards. What has no value (no light, no such ray) is
+/// `null` in JSON.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LensAnalysis {
+    /// The lens.
+    pub lens: String,
+    /// Distance of the object before the first vertex, mm; infinite, `null` in JSON, for a far one.
+    pub distance_mm: f64,
+    /// The wavelength of fields, pupils and scales, nm.
+    pub reference_nm: f64,
+    /// All wavelengths, nm.
+    pub wavelengths_nm: Vec<f64>,
+    /// Effective focal length at the reference wavelength, mm.
+    pub efl_mm: f64,
+    /// f-number for a far object.
+    pub f_number: f64,
+    /// f-number of the cone at the image of this object.
+    pub working_f_number: f64,
+    /// Where the film is, behind the last vertex, mm.
+    pub film_mm: f64,
+    /// The field at which the illumination of a far object falls to half, degrees.
+    pub half_illumination_deg: Option<f64>,
+    /// Where the film would be best.
+    pub focus: FocusData,
+    /// Axial colour.
+    pub axial_color: Vec<AxialColorRow>,
+    /// Spots, wavefronts and pupils: fields outermost, then wavelengths.
+    pub spots: Vec<SpotRow>,
+    /// Fans, in the same order.
+    pub fans: Vec<FanRow>,
+    /// What depends on the field alone, at the fields asked for.
+    pub fields: Vec<FieldRow>,
+    /// The same at equal steps from the axis to the largest of them.
+    pub curves: Vec<FieldRow>,
+}
+
+/// Places of the film, behind the last vertex, mm, and how good they are.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FocusData {
+    /// The paraxial image at the reference wavelength.
+    pub paraxial_film_mm: Option<f64>,
+    /// The smallest spot on the axis, all wavelengths together.
+    pub axis_film_mm: Option<f64>,
+    /// Its root-mean-square radius, µm.
+    pub axis_rms_um: Option<f64>,
+    /// The least mean square of the spots of all fields.
+    pub fields_film_mm: Option<f64>,
+    /// Their root mean square, µm.
+    pub fields_rms_um: Option<f64>,
+    /// The least wavefront aberration on the axis at the reference wavelength.
+    pub wavefront_film_mm: Option<f64>,
+    /// Its root mean square, waves.
+    pub wavefront_rms_waves: Option<f64>,
+}
+
+/// Where a wavelength is in focus.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AxialColorRow {
+    /// Wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Its paraxial image less that of the reference wavelength, mm.
+    pub paraxial_shift_mm: f64,
+    /// The film of its smallest spot on the axis less that of the reference wavelength, mm.
+    pub rms_shift_mm: Option<f64>,
+}
+
+/// The image of one point at one wavelength.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SpotRow {
+    /// Field angle, degrees.
+    pub field_deg: f64,
+    /// Wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Height of the centroid, mm.
+    pub height_mm: Option<f64>,
+    /// Root-mean-square radius about the centroid, µm.
+    pub rms_um: Option<f64>,
+    /// Root-mean-square radius about the chief ray, µm.
+    pub rms_about_chief_um: Option<f64>,
+    /// Distance of the farthest ray from the chief ray, µm.
+    pub radius_um: Option<f64>,
+    /// Root mean square along x, across the field, µm.
+    pub sigma_x_um: Option<f64>,
+    /// Root mean square along y, along the field, µm.
+    pub sigma_y_um: Option<f64>,
+    /// The share of the rays through the stop that rims let pass.
+    pub transmission: f64,
+    /// The wavefront, about the film point for which it is best.
+    pub wavefront: Option<WavefrontRow>,
+    /// The true pupil.
+    pub pupil: Option<PupilRow>,
+    /// The rays' film points, µm from the chief ray of the reference wavelength.
+    #[serde(skip)]
+    pub points_um: Vec<(f64, f64)>,
+}
+
+/// The wavefront of a point over its true pupil.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WavefrontRow {
+    /// Root mean square, waves.
+    pub rms_waves: f64,
+    /// Largest less least, waves.
+    pub peak_to_valley_waves: f64,
+    /// Strehl's ratio.
+    pub strehl: f64,
+    /// Zernike coefficients over the unit disc of the paraxial pupil, in Noll's order from piston, waves rms.
+    pub zernike_waves: Vec<f64>,
+}
+
+/// The edge of the true, vignetted pupil of a point in the plane of the paraxial entrance pupil.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PupilRow {
+    /// z of that plane from the first vertex, mm.
+    pub z_mm: f64,
+    /// The centre that radii count from, mm from the axis (lens frame).
+    pub center_mm: [f64; 2],
+    /// Largest radius at equal steps of azimuth from +x towards +y, mm.
+    pub rho_max_mm: Vec<f64>,
+    /// Area, mm².
+    pub area_mm2: f64,
+}
+
+/// Aberrations along two lines across the stop.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FanRow {
+    /// Field angle, degrees.
+    pub field_deg: f64,
+    /// Wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Places along the lines, in units of the stop's radius.
+    pub places: Vec<f64>,
+    /// Transverse aberration along y of rays along y, µm from the chief ray of the same wavelength.
+    pub tangential_um: Vec<Option<f64>>,
+    /// Transverse aberration along x of rays along x, µm.
+    pub sagittal_um: Vec<Option<f64>>,
+    /// Optical path difference of rays along y, waves; positive for late light.
+    pub tangential_waves: Vec<Option<f64>>,
+    /// Optical path difference of rays along x, waves.
+    pub sagittal_waves: Vec<Option<f64>>,
+}
+
+/// What depends on the field alone.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FieldRow {
+    /// Field angle, degrees.
+    pub field_deg: f64,
+    /// Height of the chief ray at the reference wavelength, mm.
+    pub height_mm: Option<f64>,
+    /// Distortion against a height in step with the angle's tangent, percent.
+    pub distortion_tangent_percent: Option<f64>,
+    /// Distortion against a height in step with the angle, percent.
+    pub distortion_angle_percent: Option<f64>,
+    /// The focus of close rays in the plane of the field, mm behind the film.
+    pub tangential_focus_mm: Option<f64>,
+    /// The focus of close rays beside it, mm behind the film.
+    pub sagittal_focus_mm: Option<f64>,
+    /// Illumination over that on the axis.
+    pub relative_illumination: Option<f64>,
+    /// Chief-ray height at each wavelength less that at the reference, µm.
+    pub lateral_color_um: Vec<Option<f64>>,
+}

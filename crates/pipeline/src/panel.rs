@@ -1,0 +1,223 @@
+//! Small plots for sheets of many, as SVG: frame, ticks, lines and dots.
+
+use std::fmt::Write;
+
+use crate::plots::FONT;
+
+/// Room left of, above, right of and below the frame of a plot, px.
+const ROOM_PX: [f64; 4] = [48.0, 22.0, 14.0, 34.0];
+
+/// A small plot.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Panel {
+    pub(crate) title: String,
+    pub(crate) x_label: String,
+    pub(crate) y_label: String,
+    pub(crate) x_range: (f64, f64),
+    pub(crate) y_range: (f64, f64),
+    /// Widens the range of x about its middle until both axes have one scale.
+    pub(crate) is_to_scale: bool,
+    pub(crate) marks: Vec<Mark>,
+}
+
+/// What is drawn in a plot.
+#[derive(Clone, Debug)]
+pub(crate) struct Mark {
+    pub(crate) color: String,
+    pub(crate) kind: MarkKind,
+    /// Places; a line is broken at those that are not finite.
+    pub(crate) points: Vec<(f64, f64)>,
+}
+
+/// How places are marked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MarkKind {
+    Line,
+    Dashed,
+    Dots,
+}
+
+/// A sheet that plots are put on.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Sheet {
+    body: String,
+}
+
+impl Sheet {
+    /// Writes words; `weight` is CSS's.
+    pub(crate) fn text(&mut self, (x, y): (f64, f64), size: f64, (color, weight): (&str, &str), words: &str) {
+        let words = escaped(words);
+        let _ = writeln!(
+            self.body,
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" fill=\"{color}\" font-weight=\"{weight}\">{words}</text>"
+        );
+    }
+
+    /// Draws a plot into the rectangle at x, y of this width and height, px.
+    pub(crate) fn panel(&mut self, panel: &Panel, rectangle: [f64; 4]) {
+        panel.draw(rectangle, &mut self.body);
+    }
+
+    /// Returns the sheet as an SVG document of this size, px.
+    pub(crate) fn to_svg(&self, width: f64, height: f64) -> String {
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
+             viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"{FONT}\">\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n{}</svg>\n",
+            self.body
+        )
+    }
+}
+
+impl Panel {
+    fn draw(&self, [x, y, width, height]: [f64; 4], svg: &mut String) {
+        let [left, top, right, bottom] = ROOM_PX;
+        let (w, h) = (width - left - right, height - top - bottom);
+        let y_range = self.y_range;
+        let x_range = if self.is_to_scale {
+            let (middle, half) = (0.5 * (self.x_range.0 + self.x_range.1), 0.5 * (y_range.1 - y_range.0) * w / h);
+            (middle - half, middle + half)
+        } else {
+            self.x_range
+        };
+        let across = |value: f64| w * (value - x_range.0) / (x_range.1 - x_range.0);
+        let down = |value: f64| h * (y_range.1 - value) / (y_range.1 - y_range.0);
+        let _ = writeln!(
+            svg,
+            "<svg x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" font-size=\"10\">"
+        );
+        let mut text = |x: f64, y: f64, anchor: &str, more: &str, words: &str| {
+            let words = escaped(words);
+            let _ = writeln!(
+                svg,
+                "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" fill=\"#333\" {more}>{words}</text>"
+            );
+        };
+        text(left + 0.5 * w, top - 7.0, "middle", "font-size=\"11.5\" font-weight=\"bold\"", &self.title);
+        text(left + 0.5 * w, top + h + 28.0, "middle", "", &self.x_label);
+        let turn = format!("transform=\"rotate(-90 11 {:.1})\"", top + 0.5 * h);
+        text(11.0, top + 0.5 * h, "middle", &turn, &self.y_label);
+        let mut grid = String::new();
+        for (value, word) in ticks(x_range, w) {
+            text(left + across(value), top + h + 13.0, "middle", "", &word);
+            let _ = write!(grid, "M{:.1} 0V{h:.1}", across(value));
+        }
+        for (value, word) in ticks(y_range, h) {
+            text(left - 4.0, top + down(value) + 3.5, "end", "", &word);
+            let _ = write!(grid, "M0 {:.1}H{w:.1}", down(value));
+        }
+        // A nested drawing cuts off what lies outside the frame.
+        let _ = writeln!(
+            svg,
+            "<svg x=\"{left:.1}\" y=\"{top:.1}\" width=\"{w:.1}\" height=\"{h:.1}\">\n\
+             <path d=\"{grid}\" stroke=\"#e4e4e4\" stroke-width=\"0.7\"/>"
+        );
+        let mut axes = String::new();
+        if x_range.0 < 0.0 && x_range.1 > 0.0 {
+            let _ = write!(axes, "M{:.1} 0V{h:.1}", across(0.0));
+        }
+        if y_range.0 < 0.0 && y_range.1 > 0.0 {
+            let _ = write!(axes, "M0 {:.1}H{w:.1}", down(0.0));
+        }
+        let _ = writeln!(svg, "<path d=\"{axes}\" stroke=\"#aaaaaa\" stroke-width=\"0.8\"/>");
+        for mark in &self.marks {
+            mark.draw(&across, &down, svg);
+        }
+        let _ = writeln!(
+            svg,
+            "</svg>\n<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" fill=\"none\" \
+             stroke=\"#777\" stroke-width=\"0.8\"/>\n</svg>"
+        );
+    }
+}
+
+impl Mark {
+    fn draw(&self, across: &dyn Fn(f64) -> f64, down: &dyn Fn(f64) -> f64, svg: &mut String) {
+        let mut path = String::new();
+        let mut is_open = false;
+        for &(x, y) in &self.points {
+            let (x, y) = (across(x), down(y));
+            if !(x.is_finite() && y.is_finite()) {
+                is_open = false;
+                continue;
+            }
+            let letter = if is_open && self.kind != MarkKind::Dots { 'L' } else { 'M' };
+            let _ = write!(path, "{letter}{x:.2} {y:.2}");
+            if self.kind == MarkKind::Dots {
+                path.push_str("h.01");
+            }
+            is_open = true;
+        }
+        let style = match self.kind {
+            MarkKind::Line => "stroke-width=\"1.3\" stroke-linejoin=\"round\"",
+            MarkKind::Dashed => "stroke-width=\"1.3\" stroke-dasharray=\"5 3\"",
+            MarkKind::Dots => "stroke-width=\"1.7\" stroke-linecap=\"round\" stroke-opacity=\"0.75\"",
+        };
+        let _ = writeln!(svg, "<path d=\"{path}\" fill=\"none\" stroke=\"{}\" {style}/>", self.color);
+    }
+}
+
+/// Returns round numbers in a range, about one for every 45 px, and how to write them.
+fn ticks((first, last): (f64, f64), length_px: f64) -> Vec<(f64, String)> {
+    let span = last - first;
+    if !(span > 0.0 && span.is_finite()) {
+        return Vec::new();
+    }
+    let step = round_up(span * 45.0 / length_px.max(45.0));
+    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    let mut values = Vec::new();
+    let mut i = (first / step - 1e-9).ceil();
+    while i * step <= last + 1e-9 * span {
+        // Adding 0 turns −0 into 0.
+        values.push((i * step, format!("{:.decimals$}", i * step + 0.0)));
+        i += 1.0;
+    }
+    values
+}
+
+/// Returns the least of 1, 2 or 5 times a power of ten that is at least this large; 1 for what is no positive number.
+pub(crate) fn round_up(least: f64) -> f64 {
+    if !(least > 0.0 && least.is_finite()) {
+        return 1.0;
+    }
+    let power = 10_f64.powf(least.log10().floor());
+    [1.0, 2.0, 5.0].into_iter().map(|m| m * power).find(|v| *v >= least * (1.0 - 1e-12)).unwrap_or(10.0 * power)
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        let words = |range, px| ticks(range, px).into_iter().map(|(_, word)| word).collect::<Vec<_>>();
+        assert_eq!(words((-1.0, 1.0), 200.0), ["-1.0", "-0.5", "0.0", "0.5", "1.0"]);
+        assert_eq!(words((0.0, 23.0), 150.0), ["0", "10", "20"]);
+        assert!(words((1.0, 1.0), 100.0).is_empty());
+        assert_eq!([0.3, 2.0, 5.1, 0.0, f64::NAN].map(round_up), [0.5, 2.0, 10.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn lines_break_where_values_are_missing() {
+        let mark = |kind| Mark {
+            color: "#123456".to_owned(),
+            kind,
+            points: vec![(0.0, 0.0), (1.0, 1.0), (f64::NAN, 0.5), (0.5, 1.0)],
+        };
+        let panel =
+            |kind| Panel { x_range: (0.0, 1.0), y_range: (0.0, 1.0), marks: vec![mark(kind)], ..Panel::default() };
+        let draw = |kind| {
+            let mut sheet = Sheet::default();
+            sheet.panel(&panel(kind), [0.0, 0.0, 162.0, 156.0]);
+            sheet.to_svg(200.0, 200.0)
+        };
+        assert!(draw(MarkKind::Line).contains("\"M0.00 100.00L100.00 0.00M50.00 0.00\""));
+        assert!(draw(MarkKind::Dots).contains("M0.00 100.00h.01M100.00 0.00h.01M50.00 0.00h.01"));
+        let svg = draw(MarkKind::Dashed);
+        assert!(!svg.contains("NaN") && crate::svg_to_png(&svg, 1.0).is_ok());
+    }
+}
