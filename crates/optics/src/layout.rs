@@ -8,7 +8,8 @@ use glam::{DVec2, DVec3};
 
 use self::frame::Frame;
 use crate::{
-    Glass, Lens, MonoLens, ObjectPoint, OpticsError, Pose, PupilBoundary, RayBatch, Rims, Surface, rays_towards,
+    Glass, ImageSurface, Lens, MonoLens, ObjectPoint, OpticsError, Pose, PupilBoundary, RayBatch, Rims, Shape, Surface,
+    rays_towards,
 };
 
 /// What a drawing shows.
@@ -156,7 +157,7 @@ fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_mm: f64) -> Ve
         lens.trace_surfaces(surface..surface + 1, &mut rays, Rims::Clip);
         note(&mut lines, &rays, &before);
     }
-    lens.to_film(&mut rays, film_mm);
+    lens.to_image_surface(&mut rays, film_mm);
     let arrived = in_flight(&rays);
     note(&mut lines, &rays, &arrived);
     for (line, arrived) in lines.iter_mut().zip(arrived) {
@@ -259,9 +260,14 @@ fn film(lens: &Lens, layout: &Layout, fans: &[Fan], frame: &Frame, svg: &mut Str
     let arrived = fans.iter().flat_map(|fan| &fan.lines).filter(|line| line.reaches_film);
     let height = arrived.filter_map(|line| line.points.last()).map(|p| p.y.abs()).fold(0.0, f64::max);
     let half_mm = (1.06 * height).max(8.0 / frame.px_per_mm).min(frame.y_max_mm.max(-frame.y_min_mm));
-    let line = frame.path([DVec2::new(z_mm, -half_mm), DVec2::new(z_mm, half_mm)]);
-    let _ = writeln!(svg, "<path d=\"{line}\" stroke=\"#111\" stroke-width=\"2\"/>");
-    frame.label((frame.x(z_mm) + 3.0, frame.y(half_mm) - 6.0), "end", "film", svg);
+    let ImageSurface { curvature_per_mm, conic } = lens.image_surface();
+    let half_mm = half_mm.min(1.0 / curvature_per_mm.abs());
+    let surface = Surface { curvature_per_mm, shape: Shape::Conic { conic }, semi_aperture_mm: half_mm };
+    let points = outline(&surface, &lens.film_motion().after(&Pose::centered(z_mm)));
+    let top = points.last().copied().unwrap_or(DVec2::new(z_mm, half_mm));
+    let line = frame.path(points);
+    let _ = writeln!(svg, "<path d=\"{line}\" fill=\"none\" stroke=\"#111\" stroke-width=\"2\"/>");
+    frame.label((frame.x(top.x) + 3.0, frame.y(top.y) - 6.0), "end", "film", svg);
 }
 
 /// Returns a colour that stands for a wavelength, as CSS writes it: the hue of its light, dark enough for lines on white.
@@ -309,6 +315,23 @@ mod tests {
         assert_eq!(svg.matches(" Z\"").count(), 1);
         let svg = draw(&Lens::built_in("dgauss-50mm").unwrap(), &[0.0]);
         assert_eq!(svg.matches(" Z\"").count(), 6);
+    }
+
+    #[test]
+    fn tilted_elements_and_curved_films_are_drawn_where_rays_end() {
+        let lens = Lens::built_in("singlet-50mm").unwrap();
+        let tilt = crate::Move {
+            surfaces: (0, 1),
+            pivot_mm: 0.0,
+            decenter_mm: [0.0; 3],
+            tilt_deg: [20.0, 0.0, 0.0],
+            tilt_first: false,
+        };
+        let image_surface = ImageSurface { curvature_per_mm: -0.02, conic: 0.0 };
+        let askew = lens.clone().with_moves(vec![tilt]).unwrap().with_image_surface(image_surface).unwrap();
+        let (straight, askew) = (draw(&lens, &[0.0, 10.0]), draw(&askew, &[0.0, 10.0]));
+        assert!(!askew.contains("NaN") && !askew.contains("inf"), "{askew}");
+        assert!(straight.len() + 500 < askew.len(), "the film has more than two points");
     }
 
     #[test]
