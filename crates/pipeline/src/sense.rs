@@ -72,12 +72,7 @@ pub fn sense_irradiance(
 pub fn with_exposure_s(control: ExposureControl, time_s: f64) -> ExposureControl {
     ExposureControl::Manual(match control {
         ExposureControl::Manual(exposure) => Exposure { time_s, ..exposure },
-        ExposureControl::Auto(auto) => Exposure {
-            time_s,
-            analog_gain: auto.analog_gain,
-            gain_mode: auto.gain_mode,
-            temperature_c: auto.temperature_c,
-        },
+        ExposureControl::Auto(auto) => Exposure { time_s, ..auto.limit },
     })
 }
 

@@ -1,6 +1,6 @@
 //! Colours of the 24-patch chart in a picture, against what they should be.
 
-use dioptric_spectrum::{Illuminant, Lab, Observer, Xyz, adapt_bradford, color_checker_reflectances, delta_e_2000};
+use dioptric_spectrum::{Illuminant, Observer, Xyz, adapt_bradford, color_checker_reflectances, delta_e_2000};
 use ndarray::Array3;
 
 use crate::{SensorError, balance::fine_grid};
@@ -10,6 +10,8 @@ use crate::{SensorError, balance::fine_grid};
 pub struct ChartReport {
     /// The mean linear sRGB of each patch, row by row from dark skin to black, with the white patch at its luminance.
     pub linear_srgb: Vec<[f64; 3]>,
+    /// What the observer sees of each patch: linear sRGB, which has parts below 0 for a colour beyond its primaries.
+    pub wanted_linear_srgb: Vec<[f64; 3]>,
     /// ΔE₀₀ of each patch.
     pub delta_e: Vec<f64>,
 }
@@ -31,16 +33,26 @@ impl ChartReport {
             let reason = "has no light on its white patch".to_owned();
             return Err(SensorError::Unsuitable { what: "the chart", reason });
         }
-        let scale = ((wanted[18].l + 16.0) / 116.0).powi(3) / white;
+        let scale = wanted[18].luminance_cd_m2() / white;
         means.iter_mut().for_each(|rgb| *rgb = rgb.map(|v| v * scale));
         let lab = |rgb: &[f64; 3]| Xyz::from_linear_srgb(*rgb).to_lab(Xyz::D65);
-        let delta_e = means.iter().zip(&wanted).map(|(rgb, wanted)| delta_e_2000(lab(rgb), *wanted)).collect();
-        Ok(Self { linear_srgb: means, delta_e })
+        let delta_e = means.iter().zip(&wanted).map(|(rgb, wanted)| delta_e_2000(lab(rgb), wanted.to_lab(Xyz::D65)));
+        let delta_e = delta_e.collect();
+        let wanted_linear_srgb = wanted.iter().map(|xyz| xyz.to_linear_srgb()).collect();
+        Ok(Self { linear_srgb: means, wanted_linear_srgb, delta_e })
     }
 
     /// The mean ΔE₀₀.
     pub fn mean_delta_e(&self) -> f64 {
         self.delta_e.iter().sum::<f64>() / self.delta_e.len() as f64
+    }
+
+    /// The median ΔE₀₀.
+    pub fn median_delta_e(&self) -> f64 {
+        let mut sorted = self.delta_e.clone();
+        sorted.sort_by(f64::total_cmp);
+        let n = sorted.len();
+        0.5 * (sorted[(n - 1) / 2] + sorted[n / 2])
     }
 
     /// The largest ΔE₀₀.
@@ -49,15 +61,15 @@ impl ChartReport {
     }
 }
 
-/// Returns CIELAB of the patches under a light, moved to D65.
-fn wanted(light: Illuminant) -> Vec<Lab> {
+/// Returns XYZ of the patches under a light, moved to D65, white having Y = 1.
+fn wanted(light: Illuminant) -> Vec<Xyz> {
     let grid = fine_grid();
     let values = light.spectrum().sample_held(&grid);
     let white = Observer::Cie1931.xyz(&grid, &values);
     let relative = |xyz: Xyz| Xyz(xyz.0.map(|v| v / white.0[1]));
     let patch = |reflectance: &dioptric_spectrum::Spectrum| {
         let lit: Vec<f64> = reflectance.sample_held(&grid).iter().zip(&values).map(|(r, s)| r * s).collect();
-        adapt_bradford(relative(Observer::Cie1931.xyz(&grid, &lit)), relative(white), Xyz::D65).to_lab(Xyz::D65)
+        adapt_bradford(relative(Observer::Cie1931.xyz(&grid, &lit)), relative(white), Xyz::D65)
     };
     color_checker_reflectances().iter().map(|(_, reflectance)| patch(reflectance)).collect()
 }

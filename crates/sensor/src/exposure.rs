@@ -48,18 +48,9 @@ pub struct AutoExposure {
     pub metering: Metering,
     /// Where the metered signal is put, as a share of saturation.
     pub target_fraction: f64,
-    /// The longest time allowed, s.
+    /// The longest exposure allowed, infinity for no limit; its gain, readout and temperature are those of the shot.
     #[serde(default = "endless")]
-    pub max_time_s: f64,
-    /// The factor on the voltage after the pixel.
-    #[serde(default = "one")]
-    pub analog_gain: f64,
-    /// Which readout of a dual-gain pixel is used.
-    #[serde(default)]
-    pub gain_mode: GainMode,
-    /// The temperature of the chip, °C.
-    #[serde(default = "room_c")]
-    pub temperature_c: f64,
+    pub limit: Exposure,
 }
 
 /// What an automatic exposure looks at.
@@ -79,17 +70,17 @@ fn one() -> f64 {
     1.0
 }
 
-fn room_c() -> f64 {
+const fn room_c() -> f64 {
     25.0
 }
 
-fn endless() -> f64 {
-    f64::INFINITY
+fn endless() -> Exposure {
+    Exposure::seconds(f64::INFINITY)
 }
 
 impl Exposure {
     /// Returns an exposure of this time, of gain 1 and at 25 °C.
-    pub fn seconds(time_s: f64) -> Self {
+    pub const fn seconds(time_s: f64) -> Self {
         Self { time_s, analog_gain: 1.0, gain_mode: GainMode::Low, temperature_c: room_c() }
     }
 
@@ -124,15 +115,8 @@ impl Exposure {
 }
 
 impl AutoExposure {
-    /// Returns the metering that puts a share of saturation there, at gain 1 and 25 °C.
-    pub fn new(metering: Metering, target_fraction: f64) -> Self {
-        Self {
-            metering,
-            target_fraction,
-            max_time_s: f64::INFINITY,
-            analog_gain: 1.0,
-            gain_mode: GainMode::Low,
-            temperature_c: room_c(),
-        }
+    /// Returns the metering that puts a share of saturation there, at gain 1 and 25 °C, however long it takes.
+    pub const fn new(metering: Metering, target_fraction: f64) -> Self {
+        Self { metering, target_fraction, limit: Exposure::seconds(f64::INFINITY) }
     }
 }

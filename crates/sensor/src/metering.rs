@@ -22,28 +22,23 @@ impl Sensor {
         if !(auto.target_fraction > 0.0 && auto.target_fraction.is_finite()) {
             return wrong("target_fraction", auto.target_fraction, "a number above 0");
         }
-        if auto.max_time_s.is_nan() || auto.max_time_s <= 0.0 {
-            return wrong("max_time_s", auto.max_time_s, "a number above 0");
+        if auto.limit.time_s.is_nan() || auto.limit.time_s <= 0.0 {
+            return wrong("limit.time_s", auto.limit.time_s, "a number above 0");
         }
         if let Metering::Percentile(percent) = auto.metering
             && !(0.0..=100.0).contains(&percent)
         {
             return wrong("metering.percentile", percent, "a number from 0 to 100");
         }
-        let exposure = Exposure {
-            time_s: 0.0,
-            analog_gain: auto.analog_gain,
-            gain_mode: auto.gain_mode,
-            temperature_c: auto.temperature_c,
-        };
+        let exposure = Exposure { time_s: 0.0, ..auto.limit };
         exposure.check()?;
         let metered_e_per_s = rate.metered(auto.metering);
         let time_s = auto.target_fraction * self.saturation_e(&exposure) / metered_e_per_s;
-        match time_s.min(auto.max_time_s) {
+        match time_s.min(auto.limit.time_s) {
             time_s if time_s.is_finite() => Ok(Exposure { time_s, ..exposure }),
             _ => Err(SensorError::Unsuitable {
                 what: "the automatic exposure",
-                reason: "finds no light to meter, and max_time_s sets no limit".to_owned(),
+                reason: "finds no light to meter, and limit.time_s sets none".to_owned(),
             }),
         }
     }

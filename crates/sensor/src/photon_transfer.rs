@@ -30,7 +30,7 @@ impl FlatPoint {
     /// # Errors
     /// When the frames differ in size.
     pub fn measure(photons: f64, first: &Array2<f32>, second: &Array2<f32>) -> Result<Self, SensorError> {
-        check_sizes(&[first, second])?;
+        check_size(first.dim(), second.dim())?;
         let (mean_first, mean_second) = (mean(first), mean(second));
         let rows: Vec<f64> = (first.outer_iter().into_par_iter())
             .zip(second.outer_iter())
@@ -118,35 +118,14 @@ impl PhotonTransfer {
         (point.mean_dn - self.dark.mean_dn) / point.variance_dn2.sqrt()
     }
 
+    /// Returns the largest signal-to-noise ratio: that of the photons alone at saturation.
+    pub fn max_snr(&self) -> f64 {
+        self.saturation_e.sqrt()
+    }
+
     /// Returns the signal-to-noise ratio that the linear model gives for a number of electrons.
     pub fn model_snr(&self, electrons: f64) -> f64 {
         electrons / (electrons + self.dark_noise_e.powi(2) + QUANTISATION_VARIANCE / self.gain_dn_per_e.powi(2)).sqrt()
-    }
-}
-
-/// How pixels differ from each other.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NonUniformity {
-    /// Dark-signal non-uniformity, rms electrons.
-    pub dsnu_e: f64,
-    /// Photo-response non-uniformity, rms share.
-    pub prnu_fraction: f64,
-}
-
-impl NonUniformity {
-    /// Returns the non-uniformities that stacks of dark frames and of frames at half saturation show.
-    ///
-    /// The temporal noise that is left in the mean of a stack is taken away.
-    ///
-    /// # Errors
-    /// When a stack has fewer than two frames, or frames differ in size.
-    pub fn measure(dark: &[Array2<f32>], bright: &[Array2<f32>], gain_dn_per_e: f64) -> Result<Self, SensorError> {
-        let (dark_mean, dark_variance) = spatial(dark)?;
-        let (bright_mean, bright_variance) = spatial(bright)?;
-        Ok(Self {
-            dsnu_e: dark_variance.max(0.0).sqrt() / gain_dn_per_e,
-            prnu_fraction: (bright_variance - dark_variance).max(0.0).sqrt() / (bright_mean - dark_mean),
-        })
     }
 }
 
@@ -168,52 +147,20 @@ impl DarkCurrentEstimate {
     }
 }
 
-/// Returns the mean of a stack and the variance over its pixels without what temporal noise adds.
-fn spatial(stack: &[Array2<f32>]) -> Result<(f64, f64), SensorError> {
-    if stack.len() < 2 {
-        let (expected, found) = ("2 or more".to_owned(), stack.len().to_string());
-        return Err(SensorError::Shape { what: "frames of a stack", expected, found });
-    }
-    check_sizes(&stack.iter().collect::<Vec<_>>())?;
-    let n = stack.len() as f64;
-    let (rows, columns) = stack[0].dim();
-    // For each pixel the sum over frames and the sum of squares about the first frame, which keeps them small.
-    let row_sums: Vec<(f64, f64, f64)> = (0..rows)
-        .into_par_iter()
-        .map(|row| {
-            let mut sums = (0.0, 0.0, 0.0);
-            for column in 0..columns {
-                let values = || stack.iter().map(|frame| f64::from(frame[(row, column)]));
-                let average = values().sum::<f64>() / n;
-                let scatter: f64 = values().map(|v| (v - average).powi(2)).sum();
-                sums = (sums.0 + average, sums.1 + average * average, sums.2 + scatter / (n - 1.0));
-            }
-            sums
-        })
-        .collect();
-    let n_pixels = (rows * columns) as f64;
-    let total = row_sums.iter().fold((0.0, 0.0, 0.0), |t, s| (t.0 + s.0, t.1 + s.1, t.2 + s.2));
-    let (mean, temporal) = (total.0 / n_pixels, total.2 / n_pixels);
-    let variance = (total.1 - n_pixels * mean * mean) / (n_pixels - 1.0);
-    Ok((mean, variance - temporal / n))
-}
-
 fn mean(frame: &Array2<f32>) -> f64 {
     let rows: Vec<f64> =
         frame.outer_iter().into_par_iter().map(|row| row.iter().map(|&v| f64::from(v)).sum()).collect();
     rows.iter().sum::<f64>() / frame.len() as f64
 }
 
-fn check_sizes(frames: &[&Array2<f32>]) -> Result<(), SensorError> {
-    let size = frames[0].dim();
-    match frames.iter().find(|frame| frame.dim() != size) {
-        Some(frame) => {
-            let text = |(rows, columns): (usize, usize)| format!("{rows} × {columns}");
-            let (expected, found) = (text(size), text(frame.dim()));
-            Err(SensorError::Shape { what: "rows × columns of a flat frame", expected, found })
-        }
-        None => Ok(()),
+/// Checks that a frame has the size of the one before it.
+pub(crate) fn check_size(expected: (usize, usize), found: (usize, usize)) -> Result<(), SensorError> {
+    if expected == found {
+        return Ok(());
     }
+    let text = |(rows, columns): (usize, usize)| format!("{rows} × {columns}");
+    let (expected, found) = (text(expected), text(found));
+    Err(SensorError::Shape { what: "rows × columns of a flat frame", expected, found })
 }
 
 /// Returns the slope of the least-squares line.

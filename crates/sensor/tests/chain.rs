@@ -172,7 +172,7 @@ fn exposures_are_metered() {
     let image = band(plane);
     let rate = sensor.electron_rate(&Illumination::on_pixels(&image)).unwrap();
     let check = |metering, max_time_s, expected_e: f64| {
-        let auto = AutoExposure { max_time_s, ..AutoExposure::new(metering, 0.5) };
+        let auto = AutoExposure { limit: Exposure::seconds(max_time_s), ..AutoExposure::new(metering, 0.5) };
         let exposure = sensor.expose(&rate, &ExposureControl::Auto(auto)).unwrap();
         let at_dim = f64::from(rate.planes_e_per_s[0][(0, 0)]) * exposure.time_s;
         assert_relative_eq!(at_dim, expected_e, max_relative = 1e-5);

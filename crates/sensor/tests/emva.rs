@@ -4,8 +4,8 @@
 
 use approx::assert_relative_eq;
 use dioptric_sensor::{
-    Adc, DarkCurrent, DarkCurrentEstimate, ElectronRate, Exposure, FlatPoint, Noise, NonUniformity, PhotonTransfer,
-    RawPlane, Sensor,
+    Adc, DarkCurrent, DarkCurrentEstimate, ElectronRate, Exposure, FlatPoint, FrameStack, Noise, NonUniformity,
+    PhotonTransfer, RawPlane, Sensor,
 };
 use ndarray::Array2;
 
@@ -64,8 +64,10 @@ fn the_bench_finds_the_parameters_of_the_data_sheet() {
     assert_relative_eq!(transfer.saturation_e, 16_000.0, max_relative = 0.05);
 
     let uniformity = {
-        let stack = |electrons, first: u64| -> Vec<_> {
-            (0..64_u64).map(|i| frame(&sensor, electrons, time_s, first + i)).collect()
+        let stack = |electrons, first: u64| {
+            let mut stack = FrameStack::default();
+            (0..64_u64).for_each(|i| stack.add(&frame(&sensor, electrons, time_s, first + i)).unwrap());
+            stack
         };
         NonUniformity::measure(&stack(0.0, 1000), &stack(8_000.0, 2000), transfer.gain_dn_per_e).unwrap()
     };

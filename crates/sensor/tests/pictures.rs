@@ -6,7 +6,7 @@ mod common;
 
 use common::{PATCH, chart, lit, lit_by_d65};
 use dioptric_sensor::{
-    Adc, AutoExposure, Brightness, Cfa, Demosaic, Developed, ExposureControl, GainMode, Illumination, Metering, Noise,
+    Adc, AutoExposure, Brightness, Cfa, Demosaic, Developed, Exposure, ExposureControl, Illumination, Metering, Noise,
     Processing, Sensor, ToneCurve, WhiteBalance, psnr_db,
 };
 use dioptric_spectrum::{
@@ -15,14 +15,7 @@ use dioptric_spectrum::{
 use ndarray::Array2;
 
 /// Puts the brightest pixels but a few at 90 % of saturation.
-const WHITE_AT_90: ExposureControl = ExposureControl::Auto(AutoExposure {
-    metering: Metering::Percentile(99.5),
-    target_fraction: 0.9,
-    max_time_s: f64::INFINITY,
-    analog_gain: 1.0,
-    gain_mode: GainMode::Low,
-    temperature_c: 25.0,
-});
+const WHITE_AT_90: ExposureControl = ExposureControl::Auto(AutoExposure::new(Metering::Percentile(99.5), 0.9));
 
 fn develop(sensor: &Sensor, image: &SpectralImage, noise: &Noise, processing: &Processing) -> Developed {
     let capture = sensor.capture(&Illumination::on_pixels(image), &WHITE_AT_90, noise).unwrap();
@@ -172,8 +165,8 @@ fn noisy_psnr_db(path: &std::path::Path, strength: f64) -> f64 {
     let image = lit_by_d65(path);
     let sensor = Sensor::built_in("imx363").unwrap();
     // A short exposure at a high gain: 8 % of the well at white.
-    let control =
-        ExposureControl::Auto(AutoExposure { analog_gain: 11.0, ..AutoExposure::new(Metering::Percentile(99.5), 0.9) });
+    let limit = Exposure { analog_gain: 11.0, ..Exposure::seconds(f64::INFINITY) };
+    let control = ExposureControl::Auto(AutoExposure { limit, ..AutoExposure::new(Metering::Percentile(99.5), 0.9) });
     let processing = |denoise| Processing { denoise, ..Processing::for_light(Illuminant::D65) };
     let picture = |noise: Noise, strength| {
         let capture = sensor.capture(&Illumination::on_pixels(&image), &control, &noise).unwrap();
