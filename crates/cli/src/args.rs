@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::measure_args::MeasureCommand;
+
 /// Simulates a camera from the scene's spectral radiance to the final picture.
 #[derive(Debug, Parser)]
 #[command(name = "dioptric", version, propagate_version = true, max_term_width = 110)]
@@ -50,6 +52,9 @@ pub(crate) enum Command {
     Psf(PsfArgs),
     /// Exposes a sensor to an irradiance image and processes the picture
     Sense(SenseArgs),
+    /// Measures pictures, frames and sensors as a laboratory does
+    #[command(subcommand)]
+    Measure(MeasureCommand),
 }
 
 /// A run of the whole camera.
@@ -105,6 +110,15 @@ pub(crate) struct RunArgs {
     /// Exposure time, s [default: automatic]
     #[arg(long, value_name = "T")]
     pub(crate) exposure_s: Option<f64>,
+    /// Takes so many frames and merges them
+    #[arg(long, value_name = "N", conflicts_with = "bracket_stops")]
+    pub(crate) burst: Option<usize>,
+    /// Takes exposures that differ by powers of two and merges them, e.g. -4,-2,0
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(crate) bracket_stops: Option<String>,
+    /// Writes these files too: electrons, raw-tiff, raw-dng, picture-png16, picture-tiff8, picture-tiff16, picture-exr
+    #[arg(long, value_name = "LIST")]
+    pub(crate) also: Option<String>,
     /// Diffraction at the stop
     #[arg(long, value_name = "KIND", value_enum)]
     pub(crate) diffraction: Option<DiffractionKind>,
@@ -366,7 +380,19 @@ pub(crate) struct SenseArgs {
     /// Exposure time, s [default: automatic]
     #[arg(long, value_name = "T")]
     pub(crate) exposure_s: Option<f64>,
+    /// Distance of the exit pupil from the sensor, mm, for the chief-ray angle [default: light along the axis]
+    #[arg(long, value_name = "D")]
+    pub(crate) exit_pupil_mm: Option<f64>,
     /// White balance for this light [default: gray world]
     #[arg(long, value_name = "NAME")]
     pub(crate) illuminant: Option<String>,
+    /// Takes so many frames and merges them
+    #[arg(long, value_name = "N", conflicts_with = "bracket_stops")]
+    pub(crate) burst: Option<usize>,
+    /// Takes exposures that differ by powers of two and merges them, e.g. -4,-2,0
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(crate) bracket_stops: Option<String>,
+    /// Writes these files too: electrons, raw-tiff, raw-dng, picture-png16, picture-tiff8, picture-tiff16, picture-exr
+    #[arg(long, value_name = "LIST")]
+    pub(crate) also: Option<String>,
 }

@@ -7,6 +7,8 @@ mod analyze;
 mod args;
 mod glass;
 mod lens;
+mod measure;
+mod measure_args;
 mod psf;
 mod run;
 mod sense;
@@ -46,6 +48,7 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Psf(arguments) => psf::run(&arguments, &common),
         Command::Sense(arguments) => sense::run(&arguments, &common),
+        Command::Measure(command) => measure::run(&command, &common),
     }
 }
 

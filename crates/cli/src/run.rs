@@ -8,9 +8,9 @@ use std::{
 
 use anyhow::{Context, bail};
 use dioptric_pipeline::{
-    BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, Progress, Report, SceneChoice,
-    SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, WhiteChoice, parse_illuminant, parse_numbers,
-    with_exposure_s,
+    BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, FrameFile, FramesChoice, LensChoice, Progress,
+    Report, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, WhiteChoice, parse_illuminant,
+    parse_numbers, with_exposure_s,
 };
 
 use crate::{
@@ -132,6 +132,12 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
         }
         _ => bail!("--pixels and --pixel-um go together"),
     }
+    if let Some(frames) = frames_of(arguments.burst, arguments.bracket_stops.as_deref())? {
+        camera.frames = frames;
+    }
+    if let Some(list) = &arguments.also {
+        camera.outputs.also = FrameFile::parse_list(list)?;
+    }
     if let Some(time_s) = arguments.exposure_s {
         camera.exposure = with_exposure_s(camera.exposure, time_s);
     }
@@ -143,6 +149,15 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
         };
     }
     Ok(())
+}
+
+/// Returns how many frames the command line asks for.
+pub(crate) fn frames_of(burst: Option<usize>, bracket_stops: Option<&str>) -> anyhow::Result<Option<FramesChoice>> {
+    Ok(match (burst, bracket_stops) {
+        (Some(n), _) => Some(FramesChoice::Burst(n)),
+        (None, Some(list)) => Some(FramesChoice::BracketStops(parse_numbers("--bracket-stops", list)?)),
+        (None, None) => None,
+    })
 }
 
 fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {

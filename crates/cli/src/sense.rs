@@ -3,11 +3,13 @@
 use std::fmt::Write;
 
 use dioptric_pipeline::{
-    Camera, SenseRequest, SensorChoice, SensorStatistics, Staged, parse_illuminant, sense_irradiance, with_exposure_s,
+    Camera, FrameFile, Outputs, SenseRequest, SensorChoice, SensorStatistics, Staged, parse_illuminant,
+    sense_irradiance, with_exposure_s,
 };
 
 use crate::{
     args::{Common, SenseArgs},
+    run::frames_of,
     terminal::{guarded, print, print_json},
 };
 
@@ -19,9 +21,15 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
             Some(time_s) => with_exposure_s(demo.exposure, time_s),
             None => demo.exposure,
         },
+        frames: frames_of(arguments.burst, arguments.bracket_stops.as_deref())?.unwrap_or(demo.frames),
         processing: demo.processing,
         illuminant: arguments.illuminant.as_deref().map(parse_illuminant).transpose()?,
+        exit_pupil_mm: arguments.exit_pupil_mm,
         seed: common.seed.unwrap_or(demo.seed),
+        outputs: Outputs {
+            also: arguments.also.as_deref().map_or(Ok(Vec::new()), FrameFile::parse_list)?,
+            ..Outputs::default()
+        },
     };
     let staged = guarded(Staged::folder(&arguments.out)?);
     let statistics = sense_irradiance(&arguments.irradiance, &request, staged.path())?;

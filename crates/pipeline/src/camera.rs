@@ -12,7 +12,7 @@ use dioptric_spectrum::Illuminant;
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::{PipelineError, SceneChoice, check::Checker};
+use crate::{FramesChoice, Outputs, PipelineError, SceneChoice, check::Checker};
 
 /// The camera of the built-in demo.
 const DEMO: &str = include_str!("../../../fixtures/cameras/demo.ron");
@@ -46,6 +46,9 @@ pub struct Camera {
     /// The exposure.
     #[serde(default = "automatic")]
     pub exposure: ExposureControl,
+    /// How many frames the picture is made of.
+    #[serde(default)]
+    pub frames: FramesChoice,
     /// From the raw frame to the picture.
     #[serde(default)]
     pub processing: ProcessingChoice,
@@ -249,27 +252,6 @@ pub enum WavelengthChoice {
     ListNm(Vec<f64>),
 }
 
-/// What is written besides the picture and the report.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Outputs {
-    /// `irradiance.exr`, the spectral irradiance on the sensor.
-    pub irradiance: bool,
-    /// `depth.exr`, the depth that was used.
-    pub depth: bool,
-    /// `volts.exr`, the voltages of the pixels.
-    pub volts: bool,
-    /// `raw.png`, the digital numbers in 16 bits.
-    pub raw: bool,
-}
-
-impl Default for Outputs {
-    /// Everything.
-    fn default() -> Self {
-        Self { irradiance: true, depth: true, volts: true, raw: true }
-    }
-}
-
 fn one() -> u64 {
     1
 }
@@ -364,6 +346,7 @@ impl Camera {
             }
             WavelengthChoice::ListNm(list) => list.iter().try_for_each(|&nm| checker.positive("ListNm", nm))?,
         }
+        self.frames.check()?;
         self.scene.check(checker)
     }
 

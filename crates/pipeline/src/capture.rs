@@ -5,12 +5,12 @@ use std::path::Path;
 use dioptric_forward::{Coverage, bank_settings_for, irradiance};
 use dioptric_psf::PsfBank;
 use dioptric_scene::{BandWriter, ExrParts};
-use dioptric_sensor::{Developed, ElectronRate, Exposure, Illumination, Noise, Raw, Volts};
+use dioptric_sensor::{Developed, ElectronRate, Exposure, Illumination, Noise, Processing};
 use dioptric_spectrum::{Observer, Quantity};
 use ndarray::Array2;
 
 use crate::{
-    Camera, PipelineError, Progress, Shot, Stage,
+    Camera, Exposed, PipelineError, Progress, Shot, Stage,
     band_stream::band_stream,
     display::{LinearRgb, SpectrumToRgb},
 };
@@ -29,10 +29,10 @@ pub struct Capture {
     pub exposure: Exposure,
     /// The mean rate of photo-electrons.
     pub rate: ElectronRate,
-    /// The voltages at the pixels' outputs, before the analog gain.
-    pub volts: Volts,
-    /// The frame as the converter gives it.
-    pub raw: Raw,
+    /// The electrons, volts and raw frame of the first exposure, and all exposures merged.
+    pub exposed: Exposed,
+    /// From the raw frame to the picture.
+    pub processing: Processing,
     /// The picture.
     pub developed: Developed,
 }
@@ -80,15 +80,13 @@ impl Shot {
         progress.at(Stage::Sensor, 0.0);
         let noise = Noise::all(self.camera.seed);
         let exposure = self.sensor.expose(&rate, &self.camera.exposure)?;
-        let electrons = self.sensor.electrons(&rate, &exposure, &noise)?;
-        let volts = self.sensor.volts(&electrons, &exposure, &noise)?;
-        let raw = self.sensor.digitize(&volts, &exposure)?;
+        let exposed = self.camera.frames.expose(&self.sensor, &rate, &exposure, &noise)?;
 
         progress.at(Stage::Picture, 0.0);
         let processing = self.camera.processing.under(self.scene.light);
-        let developed = self.sensor.develop(&raw, &processing)?;
+        let developed = self.sensor.develop(exposed.developed_from(), &processing)?;
         progress.at(Stage::Picture, 1.0);
-        Ok(Capture { bank, irradiance, exposure, rate, volts, raw, developed })
+        Ok(Capture { bank, irradiance, exposure, rate, exposed, processing, developed })
     }
 
     /// Traces the point-spread functions that the scene and the film need.

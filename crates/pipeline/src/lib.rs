@@ -2,8 +2,8 @@
 //!
 //! A [`Camera`] is a file: it says everything about a shot. A [`Shot`] is a camera with all that it names opened, a
 //! [`Capture`] what came of it, stage by stage; [`Capture::write`] leaves frames, a picture and a report in a folder.
-//! Beside it stand the tables that the command line prints (lenses, glasses, traced rays, point-spread functions) and
-//! the [`figures`] of the paper, each a function that returns data.
+//! Beside it stand the tables that the command line prints (lenses, glasses, traced rays, point-spread functions), what
+//! a laboratory would [`measure`], and the [`figures`] of the paper, each a function that returns data.
 //!
 //! This crate alone sees every stage. It knows nothing of terminals: it prints nothing and reads no clock, and tells
 //! how far it is through [`Progress`].
@@ -17,11 +17,14 @@ mod convert;
 mod display;
 mod error;
 pub mod figures;
+mod frame_files;
+mod frames_choice;
 mod glass_table;
 mod lens_analysis;
 mod lens_choice;
 mod lens_drawing;
 mod lens_table;
+pub mod measure;
 mod mosaic;
 mod numbers;
 mod panel;
@@ -38,12 +41,14 @@ mod svg_png;
 mod trace_table;
 
 pub use camera::{
-    BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, Outputs, ProcessingChoice,
-    SensorChoice, StopChoice, WavelengthChoice, WhiteChoice,
+    BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, ProcessingChoice, SensorChoice,
+    StopChoice, WavelengthChoice, WhiteChoice,
 };
 pub use capture::{Capture, IrradianceSummary};
 pub use convert::{ConvertedLens, convert_lens};
 pub use error::PipelineError;
+pub use frame_files::{FrameFile, Outputs};
+pub use frames_choice::{Exposed, FramesChoice};
 pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
 pub use lens_analysis::{
     AnalysisFilm, AnalysisRequest, AxialColorRow, FanRow, FieldRow, FocusData, LensAnalysis, PupilRow, SpotRow,

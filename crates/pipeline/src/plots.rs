@@ -39,15 +39,28 @@ pub struct LineChart {
 pub enum Corner {
     /// Top right.
     TopRight,
+    /// Top left.
+    TopLeft,
     /// Bottom left.
     BottomLeft,
+    /// Bottom right.
+    BottomRight,
 }
 
 impl LineChart {
     /// Returns the plot as a self-contained SVG document.
     pub fn to_svg(&self, width_px: f64, height_px: f64) -> String {
+        self.drawn(width_px, height_px, |layout| layout)
+    }
+
+    /// Returns the plot with both axes logarithmic; ranges and points must be above 0.
+    pub fn to_logarithmic_svg(&self, width_px: f64, height_px: f64) -> String {
+        self.drawn(width_px, height_px, Layout::with_log_scale)
+    }
+
+    fn drawn(&self, width_px: f64, height_px: f64, scaled: impl Fn(Layout) -> Layout) -> String {
         let plots: Vec<Plot> = self.series.iter().map(|series| line(series).into()).collect();
-        let mut layout = Layout::auto_from_plots(&plots)
+        let mut layout = scaled(Layout::auto_from_plots(&plots))
             .with_width(width_px)
             .with_height(height_px)
             .with_title(self.title.clone())
@@ -66,7 +79,9 @@ impl LineChart {
         if self.series.iter().any(|series| series.label.is_some()) {
             layout = layout.with_legend_position(match self.legend {
                 Corner::TopRight => LegendPosition::InsideTopRight,
+                Corner::TopLeft => LegendPosition::InsideTopLeft,
                 Corner::BottomLeft => LegendPosition::InsideBottomLeft,
+                Corner::BottomRight => LegendPosition::InsideBottomRight,
             });
         }
         render_to_svg(plots, layout)

@@ -7,8 +7,8 @@ use dioptric_sensor::{Exposure, ExposureControl, Illumination, Noise};
 use dioptric_spectrum::{Illuminant, Quantity};
 
 use crate::{
-    Outputs, PipelineError, ProcessingChoice, SensorChoice, SensorStatistics,
-    report::{Frames, write_frames},
+    FramesChoice, Outputs, PipelineError, ProcessingChoice, SensorChoice, SensorStatistics,
+    frame_files::{Frames, write_frames},
 };
 
 /// How a sensor is exposed to an irradiance image.
@@ -18,12 +18,19 @@ pub struct SenseRequest {
     pub sensor: SensorChoice,
     /// The exposure.
     pub exposure: ExposureControl,
+    /// How many frames the picture is made of.
+    pub frames: FramesChoice,
     /// From the raw frame to the picture.
     pub processing: ProcessingChoice,
     /// The light that white balance goes by; the mean of the picture where it is not known.
     pub illuminant: Option<Illuminant>,
+    /// The distance of the exit pupil from the sensor, mm, from which each pixel's chief-ray angle follows; `None` for
+    /// light along the axis everywhere.
+    pub exit_pupil_mm: Option<f64>,
     /// The seed of all noise.
     pub seed: u64,
+    /// What is written besides the picture and the report; of irradiance and depth there is nothing to write.
+    pub outputs: Outputs,
 }
 
 /// Exposes a sensor to a spectral irradiance and writes volts, raw frame, picture and `report.json` into a folder.
@@ -52,18 +59,25 @@ pub fn sense_irradiance(
         Some(pitch_um) => Illumination::with_pitch_um(&irradiance, pitch_um),
         None => Illumination::on_pixels(&irradiance),
     };
+    let light = Illumination { exit_pupil_distance_mm: request.exit_pupil_mm, ..light };
     let rate = sensor.electron_rate(&light)?;
     let (rows, columns) = rate.planes_e_per_s[0].dim();
     let sensor = sensor.with_size(rows, columns);
     let noise = Noise::all(request.seed);
     let exposure = sensor.expose(&rate, &request.exposure)?;
-    let electrons = sensor.electrons(&rate, &exposure, &noise)?;
-    let volts = sensor.volts(&electrons, &exposure, &noise)?;
-    let raw = sensor.digitize(&volts, &exposure)?;
-    let developed = sensor.develop(&raw, &request.processing.under(request.illuminant))?;
-    let frames = Frames { sensor: &sensor, exposure: &exposure, rate: &rate, volts: &volts, raw: &raw };
+    let exposed = request.frames.expose(&sensor, &rate, &exposure, &noise)?;
+    let processing = request.processing.under(request.illuminant);
+    let developed = sensor.develop(exposed.developed_from(), &processing)?;
+    let frames = Frames {
+        sensor: &sensor,
+        exposure: &exposure,
+        rate: &rate,
+        exposed: &exposed,
+        processing: &processing,
+        light: request.illuminant.unwrap_or(Illuminant::D65),
+    };
     let statistics = SensorStatistics::new(&frames)?;
-    write_frames(&frames, &developed.picture, Outputs::default(), folder)?;
+    write_frames(&frames, &developed.picture, &request.outputs, folder)?;
     crate::report::write_json(&folder.join("report.json"), &statistics)?;
     Ok(statistics)
 }

@@ -1,47 +1,15 @@
 //! The stages of a sensor on a frame of 12 megapixels from 31 bands.
 
-use std::{borrow::Cow, hint::black_box, time::Duration};
+mod common;
 
+use std::{hint::black_box, time::Duration};
+
+use common::{COLUMNS, FourPlanes, ROWS};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use dioptric_sensor::{
     AutoExposure, Demosaic, Exposure, ExposureControl, Illumination, Metering, Noise, Processing, Sensor, demosaic,
 };
-use dioptric_spectrum::{Bands, Illuminant, Quantity, SpectrumError, WavelengthGrid};
-use ndarray::Array2;
-
-const ROWS: usize = 3024;
-const COLUMNS: usize = 4032;
-
-/// 31 bands that share four planes, so that the input does not fill the memory.
-struct FourPlanes {
-    grid: WavelengthGrid,
-    planes: Vec<Array2<f32>>,
-}
-
-impl FourPlanes {
-    fn new() -> Self {
-        let plane = |b: usize| {
-            Array2::from_shape_fn((ROWS, COLUMNS), |(r, c)| 1e-4 * (20.0 + ((r + b * c) as f32 * 0.01).sin() * 19.0))
-        };
-        let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).expect("a valid range");
-        Self { grid, planes: (0..4).map(plane).collect() }
-    }
-}
-
-impl Bands for FourPlanes {
-    fn quantity(&self) -> Quantity {
-        Quantity::Irradiance
-    }
-    fn grid(&self) -> &WavelengthGrid {
-        &self.grid
-    }
-    fn size(&self) -> (usize, usize) {
-        (ROWS, COLUMNS)
-    }
-    fn band(&self, band: usize) -> Result<Cow<'_, Array2<f32>>, SpectrumError> {
-        Ok(Cow::Borrowed(&self.planes[band % 4]))
-    }
-}
+use dioptric_spectrum::Illuminant;
 
 fn stages(criterion: &mut Criterion) {
     let sensor = Sensor::built_in("imx363").expect("it is built in");

@@ -44,6 +44,7 @@ impl Sensor {
         ];
         let not_negative = [
             ("read_noise_v", self.read_noise_v),
+            ("read_noise_e", self.read_noise_e.unwrap_or(0.0)),
             ("reset_noise_v", self.reset_noise_v),
             ("dark_current.e_per_s", self.dark_current.e_per_s),
             ("prnu_fraction", self.prnu_fraction),
@@ -62,6 +63,10 @@ impl Sensor {
             ("defects.dead_fraction", self.defects.dead_fraction),
         ];
         let finite = [("offset_v", self.offset_v), ("dark_current.at_c", self.dark_current.at_c)];
+        if self.read_noise_e.is_some() && self.read_noise_v != 0.0 {
+            let expected = "0, or none, where read_noise_e is given";
+            return Err(SensorError::value(&self.name, "read_noise_v", self.read_noise_v, expected));
+        }
         let wrong = |fields: &[(&str, f64)], right: fn(f64) -> bool, expected| {
             let found = fields.iter().find(|&&(_, value)| !(value.is_finite() && right(value)));
             found.map_or(Ok(()), |&(key, value)| Err(SensorError::value(&self.name, key, value, expected)))

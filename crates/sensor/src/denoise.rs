@@ -17,25 +17,89 @@ const NOISE_AT_SCALE: [f32; 4] = [0.889, 0.200, 0.0859, 0.0413];
 const THRESHOLD: f32 = 3.0;
 
 /// The noise of a filter's samples.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct SampleNoise {
-    /// Electrons a unit of the samples.
-    pub(crate) electrons_per_unit: f64,
-    /// Noise that does not depend on the signal, rms electrons.
-    pub(crate) floor_e: f64,
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum SampleNoise {
+    /// That of one frame: shot noise and a floor.
+    Frame {
+        /// Electrons a unit of the samples.
+        electrons_per_unit: f64,
+        /// Noise that does not depend on the signal, rms electrons.
+        floor_e: f64,
+    },
+    /// Any.
+    Table(NoiseTable),
 }
 
 impl SampleNoise {
     /// Returns the sample on a scale on which noise is 1.
-    fn stabilised(self, sample: f32) -> f32 {
-        let electrons = f64::from(sample) * self.electrons_per_unit;
-        (2.0 * (electrons + 0.375 + self.floor_e.powi(2)).max(0.0).sqrt()) as f32
+    fn stabilised(&self, sample: f32) -> f32 {
+        match self {
+            Self::Frame { electrons_per_unit, floor_e } => {
+                let electrons = f64::from(sample) * electrons_per_unit;
+                (2.0 * (electrons + 0.375 + floor_e.powi(2)).max(0.0).sqrt()) as f32
+            }
+            Self::Table(table) => table.stabilised(f64::from(sample)) as f32,
+        }
     }
 
     /// Returns the sample of a value on that scale; the mean comes out unbiased above a few electrons.
-    fn unstabilised(self, value: f32) -> f32 {
-        let half = 0.5 * f64::from(value.max(0.0));
-        ((half * half - 0.125 - self.floor_e.powi(2)) / self.electrons_per_unit) as f32
+    fn unstabilised(&self, value: f32) -> f32 {
+        match self {
+            Self::Frame { electrons_per_unit, floor_e } => {
+                let half = 0.5 * f64::from(value.max(0.0));
+                ((half * half - 0.125 - floor_e.powi(2)) / electrons_per_unit) as f32
+            }
+            Self::Table(table) => table.sample_of(f64::from(value)) as f32,
+        }
+    }
+}
+
+/// A scale on which noise is 1, for a noise that changes with the sample in any way: the integral of 1 / deviation.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct NoiseTable {
+    /// The value of the scale at samples that grow by squares; its first is at 0.
+    values: Vec<f64>,
+    /// The slope of the scale at 0, with which it goes on below.
+    slope_at_zero: f64,
+}
+
+/// Steps of the table, and the sample at its end.
+const TABLE_STEPS: usize = 4096;
+const TABLE_END: f64 = 1.5;
+
+impl NoiseTable {
+    /// Returns the scale of a standard deviation at each sample.
+    pub(crate) fn new(deviation: &dyn Fn(f64) -> f64) -> Self {
+        let mut values = vec![0.0; TABLE_STEPS + 1];
+        for k in 1..=TABLE_STEPS {
+            let (from, to) = (Self::sample_at(k as f64 - 1.0), Self::sample_at(k as f64));
+            values[k] = values[k - 1] + (to - from) / deviation(0.5 * (from + to));
+        }
+        Self { values, slope_at_zero: 1.0 / deviation(0.0) }
+    }
+
+    fn sample_at(place: f64) -> f64 {
+        TABLE_END * (place / TABLE_STEPS as f64).powi(2)
+    }
+
+    fn stabilised(&self, sample: f64) -> f64 {
+        if sample <= 0.0 {
+            return sample * self.slope_at_zero;
+        }
+        let place = (sample / TABLE_END).sqrt() * TABLE_STEPS as f64;
+        let below = (place as usize).min(TABLE_STEPS - 1);
+        let (from, to) = (Self::sample_at(below as f64), Self::sample_at(below as f64 + 1.0));
+        self.values[below] + (self.values[below + 1] - self.values[below]) * (sample - from) / (to - from)
+    }
+
+    fn sample_of(&self, value: f64) -> f64 {
+        if value <= 0.0 {
+            return value / self.slope_at_zero;
+        }
+        let above = self.values.partition_point(|v| *v < value).clamp(1, TABLE_STEPS);
+        let (low, high) = (self.values[above - 1], self.values[above]);
+        let (from, to) = (Self::sample_at(above as f64 - 1.0), Self::sample_at(above as f64));
+        from + (to - from) * (value - low) / (high - low)
     }
 }
 
@@ -55,7 +119,7 @@ fn denoise_mosaic(plane: &mut Array2<f32>, tile: &Tile, noise: &[SampleNoise], s
     let n_phases = tile.rows() * tile.columns();
     let (n_rows, n_columns) = plane.dim();
     let size = (n_rows.div_ceil(tile.rows()), n_columns.div_ceil(tile.columns()));
-    let noise_of = |phase: usize| noise[tile.filter_at(phase / tile.columns(), phase % tile.columns())];
+    let noise_of = |phase: usize| &noise[tile.filter_at(phase / tile.columns(), phase % tile.columns())];
     // A tile that hangs over the edge takes its missing samples from the tile before it.
     let inside =
         |place: usize, period: usize, n: usize| if place < n { place } else { place.saturating_sub(period).min(n - 1) };
@@ -184,10 +248,22 @@ mod tests {
 
     #[test]
     fn stabilising_and_back_is_the_same_but_for_the_known_eighth() {
-        let noise = SampleNoise { electrons_per_unit: 6000.0, floor_e: 3.0 };
+        let noise = SampleNoise::Frame { electrons_per_unit: 6000.0, floor_e: 3.0 };
         for sample in [0.0, 0.01, 0.5, 1.0] {
             let back = noise.unstabilised(noise.stabilised(sample));
             assert!((back - sample - 0.25 / 6000.0).abs() < 1e-6, "{sample} {back}");
+        }
+    }
+
+    #[test]
+    fn a_table_of_shot_noise_is_the_square_root() {
+        let deviation = |sample: f64| (sample.max(0.0) * 6000.0 + 9.0).sqrt() / 6000.0;
+        let table = NoiseTable::new(&deviation);
+        for sample in [-0.001, 0.0, 1e-4, 0.01, 0.5, 1.2] {
+            assert!((table.sample_of(table.stabilised(sample)) - sample).abs() < 1e-12, "{sample}");
+            // ∫ ds / σ(s) = 2 (√(n + 9) − 3).
+            let exact = 2.0 * ((sample.max(0.0) * 6000.0 + 9.0).sqrt() - 3.0) + sample.min(0.0) * 2000.0;
+            assert!((table.stabilised(sample) - exact).abs() < 1e-3, "{sample}");
         }
     }
 }

@@ -52,7 +52,7 @@ impl Raw {
     /// Returns the error of a frame that has no plane of digital numbers.
     pub(crate) fn without_numbers(&self, what: &'static str) -> SensorError {
         let found = match self.planes.as_slice() {
-            [RawPlane::Volts(_)] => "volts, from a sensor without converter",
+            [RawPlane::Volts(_), ..] => "volts, from a sensor without converter",
             _ => "several planes, from a sensor of stacked filters",
         };
         SensorError::Unsuitable {

@@ -2,7 +2,11 @@
 
 use ndarray::Array2;
 
-use crate::{Adc, Exposure, Raw, RawPlane, Sensor, SensorError, raw::Levels};
+use crate::{
+    Adc, Exposure, MergedFrame, Raw, RawPlane, Sensor, SensorError,
+    denoise::{NoiseTable, SampleNoise},
+    raw::Levels,
+};
 
 /// Samples above this share of saturation are not used: noise has begun to be clipped there.
 const USABLE_BELOW: f32 = 0.95;
@@ -36,6 +40,10 @@ impl Sensor {
                     |frame: &Raw| format!("{} × {} of {}", frame.size().0, frame.size().1, frame.filter_names.join(""));
                 return shape("rows × columns and filters of a frame to merge", text(first), text(frame));
             }
+            if !frame.merged.is_empty() {
+                let reason = "of merged frames cannot be merged again; give all frames at once".to_owned();
+                return Err(SensorError::Unsuitable { what: "a frame", reason });
+            }
             if frame.exposure.time_s <= 0.0 {
                 return Err(SensorError::value(
                     "a frame to merge",
@@ -46,7 +54,7 @@ impl Sensor {
             }
         }
         let linear: Vec<Vec<Array2<f32>>> = frames.iter().map(Raw::linear).collect();
-        let sources: Vec<Source> = frames.iter().map(|frame| Source::new(self, frame)).collect();
+        let sources: Vec<MergedFrame> = frames.iter().map(|frame| self.source_of(frame)).collect();
         // What saturates last sets the scale.
         let (shortest, scale) = (0..frames.len())
             .map(|i| (i, sources[i].saturation_e_per_s()))
@@ -62,7 +70,16 @@ impl Sensor {
         };
         let exposure = frames[shortest].exposure;
         let planes = (0..first.planes.len()).map(merge_plane).collect();
-        Ok(Raw { planes, levels: self.unit_levels(&exposure), exposure, ..first.clone() })
+        Ok(Raw { planes, levels: self.unit_levels(&exposure), exposure, merged: sources, ..first.clone() })
+    }
+
+    /// Returns what a frame is in a merge.
+    fn source_of(&self, frame: &Raw) -> MergedFrame {
+        MergedFrame {
+            time_s: frame.exposure.time_s,
+            saturation_e: frame.levels.saturation_e(),
+            floor_e: self.noise_floor_e(frame),
+        }
     }
 
     /// Returns the levels of samples that are shares of saturation.
@@ -82,30 +99,8 @@ impl Sensor {
     }
 }
 
-/// What a frame's samples say about the light.
-struct Source {
-    time_s: f64,
-    saturation_e: f64,
-    floor_e2: f64,
-}
-
-impl Source {
-    fn new(sensor: &Sensor, frame: &Raw) -> Self {
-        let noise = sensor.sample_noise(frame);
-        Self {
-            time_s: frame.exposure.time_s,
-            saturation_e: frame.levels.saturation_e(),
-            floor_e2: noise.floor_e.powi(2),
-        }
-    }
-
-    fn saturation_e_per_s(&self) -> f64 {
-        self.saturation_e / self.time_s
-    }
-}
-
 /// Returns the merged rate of one pixel, electrons a second, or `None` where every frame is saturated.
-fn merged_rate<'a, I: Iterator<Item = (&'a Source, f32)>>(samples: impl Fn() -> I) -> Option<f64> {
+fn merged_rate<'a, I: Iterator<Item = (&'a MergedFrame, f32)>>(samples: impl Fn() -> I) -> Option<f64> {
     let usable = || samples().filter(|(_, sample)| *sample < USABLE_BELOW);
     let (electrons, time_s) = usable().fold((0.0, 0.0), |(electrons, time_s), (source, sample)| {
         (electrons + f64::from(sample) * source.saturation_e, time_s + source.time_s)
@@ -116,8 +111,26 @@ fn merged_rate<'a, I: Iterator<Item = (&'a Source, f32)>>(samples: impl Fn() -> 
     let rough_e_per_s = (electrons / time_s).max(0.0);
     let (sum, weights) = usable().fold((0.0, 0.0), |(sum, weights), (source, sample)| {
         // One electron keeps a noiseless dark pixel's weight finite.
-        let weight = source.time_s.powi(2) / (rough_e_per_s * source.time_s + source.floor_e2 + 1.0);
+        let weight = source.time_s.powi(2) / (rough_e_per_s * source.time_s + source.floor_e.powi(2) + 1.0);
         (sum + weight * f64::from(sample) * source.saturation_e / source.time_s, weights + weight)
     });
     Some(sum / weights)
+}
+
+/// Returns the noise of a merged frame's samples, which are shares of the saturation that comes last.
+///
+/// At each level it is that of the mean over the frames that are not saturated there.
+pub(crate) fn merged_noise(frames: &[MergedFrame]) -> SampleNoise {
+    let scale = frames.iter().map(MergedFrame::saturation_e_per_s).fold(0.0, f64::max);
+    let deviation = |sample: f64| {
+        let e_per_s = sample.max(0.0) * scale;
+        let is_usable = |frame: &&MergedFrame| e_per_s < f64::from(USABLE_BELOW) * frame.saturation_e_per_s();
+        let weight =
+            |frame: &MergedFrame| frame.time_s.powi(2) / (e_per_s * frame.time_s + frame.floor_e.powi(2) + 1.0);
+        let weights: f64 = frames.iter().filter(is_usable).map(weight).sum();
+        let last = frames.iter().max_by(|a, b| a.saturation_e_per_s().total_cmp(&b.saturation_e_per_s()));
+        let weights = if weights > 0.0 { weights } else { last.map_or(1.0, weight) };
+        weights.sqrt().recip() / scale
+    };
+    SampleNoise::Table(NoiseTable::new(&deviation))
 }

@@ -91,6 +91,17 @@ mod tests {
     }
 
     #[test]
+    fn read_noise_may_be_given_in_electrons() {
+        let volts = Sensor::built_in("machine-vision-mono").unwrap();
+        let read_noise_e = Some(volts.read_noise_v / volts.conversion_gain_v_per_e);
+        let electrons = Sensor { read_noise_v: 0.0, read_noise_e, ..volts.clone() };
+        electrons.check().unwrap();
+        let mode = crate::GainMode::Low;
+        assert!((electrons.read_noise_v(mode) / volts.read_noise_v(mode) - 1.0).abs() < 1e-12);
+        assert_eq!(Sensor::from_ron(&electrons.to_ron(), "electrons").unwrap(), electrons);
+    }
+
+    #[test]
     fn what_is_wrong_is_named() {
         let good = Sensor::built_in("imx363").unwrap().to_ron();
         let check = |from: &str, to: &str, words: &[&str]| {
@@ -101,6 +112,7 @@ mod tests {
             }
         };
         check("pixel_pitch_um: 1.4", "pixel_pitch_um: -1.4", &["pixel_pitch_um", "-1.4", "above 0"]);
+        check("read_noise_e: None", "read_noise_e: Some(2.0)", &["read_noise_v", "read_noise_e"]);
         check("pixel_pitch_um: 1.4", "pixel_pitch_mm: 1.4", &["bad.ron:6", "pixel_pitch_mm"]);
         check("fill_factor: 1.0", "fill_factor: 1.5", &["fill_factor", "1.5", "0 to 1"]);
         check("rows: 3024", "rows: 0", &["rows", "1 or more"]);

@@ -88,8 +88,9 @@ impl PhotonTransfer {
             return Err(few(fitted.len()));
         }
         let signal = |p: &&FlatPoint| p.mean_dn - dark.mean_dn;
-        let gain_dn_per_e = slope(fitted.iter().map(|p| (signal(p), p.variance_dn2 - dark.variance_dn2)));
-        let responsivity = slope(fitted.iter().map(|p| (p.photons, signal(p))));
+        // The dark point fixes the line, so that its slope alone is fitted (EMVA 1288, 6.6).
+        let gain_dn_per_e = slope_from_zero(fitted.iter().map(|p| (signal(p), p.variance_dn2 - dark.variance_dn2)));
+        let responsivity = slope_from_zero(fitted.iter().map(|p| (p.photons, signal(p))));
         if !(gain_dn_per_e > 0.0 && responsivity > 0.0) {
             let reason = "needs a mean and a variance that rise with light".to_owned();
             return Err(SensorError::Unsuitable { what: "photon transfer", reason });
@@ -161,6 +162,12 @@ pub(crate) fn check_size(expected: (usize, usize), found: (usize, usize)) -> Res
     let text = |(rows, columns): (usize, usize)| format!("{rows} × {columns}");
     let (expected, found) = (text(expected), text(found));
     Err(SensorError::Shape { what: "rows × columns of a flat frame", expected, found })
+}
+
+/// Returns the slope of the least-squares line through zero.
+fn slope_from_zero(points: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (xy, xx) = points.fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + x * y, xx + x * x));
+    xy / xx
 }
 
 /// Returns the slope of the least-squares line.

@@ -11,6 +11,7 @@ use crate::{
     balance::gains,
     defects, demosaic,
     denoise::{SampleNoise, denoise},
+    hdr::merged_noise,
     metering::percentile,
 };
 
@@ -146,15 +147,20 @@ impl Sensor {
     }
 
     /// Returns the noise of a frame's samples in units of saturation.
-    pub(crate) fn sample_noise(&self, raw: &Raw) -> SampleNoise {
+    fn sample_noise(&self, raw: &Raw) -> SampleNoise {
+        if !raw.merged.is_empty() {
+            return merged_noise(&raw.merged);
+        }
+        SampleNoise::Frame { electrons_per_unit: raw.levels.saturation_e(), floor_e: self.noise_floor_e(raw) }
+    }
+
+    /// Returns the noise of a frame that does not depend on the signal, rms electrons.
+    pub(crate) fn noise_floor_e(&self, raw: &Raw) -> f64 {
         let volts = self.read_noise_v(raw.exposure.gain_mode).hypot(self.dsnu_v).hypot(self.row_noise_v);
         let rounding_v = if self.adc == Adc::Analog { 0.0 } else { raw.levels.step_v / 12.0_f64.sqrt() };
         let floor_v = (volts * raw.exposure.analog_gain).hypot(rounding_v);
         let dark_e = self.dark_current.at(raw.exposure.temperature_c) * raw.exposure.time_s;
-        SampleNoise {
-            electrons_per_unit: raw.levels.saturation_e(),
-            floor_e: (floor_v / raw.levels.volts_per_electron).hypot(dark_e.sqrt()),
-        }
+        (floor_v / raw.levels.volts_per_electron).hypot(dark_e.sqrt())
     }
 
     fn check_settings(&self, raw: &Raw, processing: &Processing) -> Result<(), SensorError> {
@@ -206,6 +212,13 @@ impl Sensor {
 }
 
 impl LinearPicture {
+    /// Returns the light at a brightness, not clipped, rows × columns × (red, green, blue) in the primaries of sRGB.
+    pub fn bright(mut self, brightness: Brightness) -> Array3<f32> {
+        let factor = factor(&self.light, brightness) as f32;
+        self.light.par_mapv_inplace(|v| v * factor);
+        self.light
+    }
+
     /// Returns the picture of a brightness, a tone curve and primaries; colours outside these are clipped.
     pub fn encode(self, brightness: Brightness, curve: ToneCurve, space: ColorSpace) -> Developed {
         let brightness = factor(&self.light, brightness);

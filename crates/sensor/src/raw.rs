@@ -20,6 +20,26 @@ pub struct Raw {
     pub exposure: Exposure,
     /// The time from one row's readout to the next, µs; row r is exposed r times this later than row 0.
     pub row_time_us: f64,
+    /// The frames that were merged into this one; empty for a frame as the converter gave it.
+    pub merged: Vec<MergedFrame>,
+}
+
+/// A frame that was merged with others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MergedFrame {
+    /// How long it was exposed, s.
+    pub time_s: f64,
+    /// The electrons at which it saturates.
+    pub saturation_e: f64,
+    /// Noise that does not depend on the signal, rms electrons.
+    pub floor_e: f64,
+}
+
+impl MergedFrame {
+    /// The rate at which it saturates, electrons a second.
+    pub fn saturation_e_per_s(&self) -> f64 {
+        self.saturation_e / self.time_s
+    }
 }
 
 /// The samples of a frame.
@@ -32,6 +52,14 @@ pub enum RawPlane {
 }
 
 impl RawPlane {
+    /// Returns the digital numbers, or `None` for volts.
+    pub fn dn(&self) -> Option<&Array2<u16>> {
+        match self {
+            Self::Dn(plane) => Some(plane),
+            Self::Volts(_) => None,
+        }
+    }
+
     /// Rows and columns.
     pub fn size(&self) -> (usize, usize) {
         match self {
@@ -94,6 +122,11 @@ impl Levels {
         (v - self.black_v) / (self.white_v - self.black_v)
     }
 
+    /// Whether samples rise with light along a straight line.
+    pub(crate) fn is_linear(&self) -> bool {
+        self.response == Response::Linear
+    }
+
     /// Returns the electrons at saturation, [`linear`](Self::linear) = 1.
     pub fn saturation_e(&self) -> f64 {
         (self.white_v - self.black_v) / self.volts_per_electron
@@ -101,6 +134,11 @@ impl Levels {
 }
 
 impl Raw {
+    /// Returns when the exposure of a row begins, s after that of row 0: later for each row of a rolling shutter.
+    pub fn row_start_s(&self, row: usize) -> f64 {
+        1e-6 * self.row_time_us * row as f64
+    }
+
     /// Rows and columns.
     pub fn size(&self) -> (usize, usize) {
         self.planes[0].size()

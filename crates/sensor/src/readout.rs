@@ -43,6 +43,7 @@ impl Sensor {
             levels,
             exposure: *exposure,
             row_time_us: self.row_time_us,
+            merged: Vec::new(),
         })
     }
 

@@ -51,7 +51,11 @@ pub struct Sensor {
     pub swing_v: f64,
     /// Read noise, rms V at the pixel's output (before the analog gain); with correlated double sampling where the
     /// sensor has it.
+    #[serde(default)]
     pub read_noise_v: f64,
+    /// The same in electrons, rms; either this or the volts.
+    #[serde(default)]
+    pub read_noise_e: Option<f64>,
     /// Reset (kTC) noise, rms V; added only without correlated double sampling.
     #[serde(default)]
     pub reset_noise_v: f64,
@@ -250,7 +254,8 @@ impl Sensor {
 
     /// Returns the read noise of a readout mode, rms V.
     pub fn read_noise_v(&self, mode: GainMode) -> f64 {
-        self.high(mode).map_or(self.read_noise_v, |high| high.read_noise_v)
+        let own_v = self.read_noise_e.map_or(self.read_noise_v, |electrons| electrons * self.conversion_gain_v_per_e);
+        self.high(mode).map_or(own_v, |high| high.read_noise_v)
     }
 
     fn high(&self, mode: GainMode) -> Option<HighGain> {

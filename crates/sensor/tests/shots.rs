@@ -9,7 +9,7 @@ use approx::assert_relative_eq;
 use common::chart;
 use dioptric_sensor::{
     Adc, AutoExposure, Cfa, ChartReport, ColorCorrection, Demosaic, Depth, ElectronRate, Exposure, ExposureControl,
-    Filter, Illumination, Metering, Noise, Picture, Processing, Raw, RawPlane, Sensor,
+    Filter, Illumination, Metering, Noise, Picture, Processing, Raw, RawPlane, Response, Sensor,
 };
 use dioptric_spectrum::{Illuminant, Spectrum};
 use ndarray::{Array2, Array3};
@@ -179,9 +179,13 @@ fn hot_and_dead_pixels_are_mended() {
 
 fn raw_of(name: &str) -> (Sensor, Raw) {
     let sensor = Sensor::built_in(name).unwrap();
+    let raw = chart_raw(&sensor);
+    (sensor, raw)
+}
+
+fn chart_raw(sensor: &Sensor) -> Raw {
     let control = ExposureControl::Auto(AutoExposure::new(Metering::Percentile(99.5), 0.9));
-    let capture = sensor.capture(&Illumination::on_pixels(&chart()), &control, &Noise::all(2)).unwrap();
-    (sensor, capture.raw)
+    sensor.capture(&Illumination::on_pixels(&chart()), &control, &Noise::all(2)).unwrap().raw
 }
 
 /// Returns the whole numbers of the tags of a little-endian TIFF file's first directory; fractions give two each.
@@ -253,7 +257,7 @@ fn what_cannot_be_written_says_why_and_leaves_nothing() {
     assert!(message(raw.write(&folder.path().join("raw.jpg"))).contains("png, tif or tiff"));
     assert!(message(raw.write(&folder.path().join("no/such/raw.png"))).contains("no/such"));
     let (ideal, planes) = raw_of("ideal");
-    assert!(message(ideal.write_dng(&planes, Illuminant::D65, &folder.path().join("a.dng"))).contains("stacked"));
+    assert!(message(ideal.write_dng(&planes, Illuminant::D65, &folder.path().join("a.dng"))).contains("volts"));
     let (d100, volts) = raw_of("nikon-d100");
     assert!(matches!(volts.planes[0], RawPlane::Volts(_)));
     assert!(message(d100.write_dng(&volts, Illuminant::D65, &folder.path().join("a.dng"))).contains("volts"));
@@ -262,16 +266,102 @@ fn what_cannot_be_written_says_why_and_leaves_nothing() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
+/// The sensors whose frames other readers open: four built in, and every kind of mosaic that DNG can hold.
+fn dng_sensors() -> Vec<(&'static str, Sensor)> {
+    let imx363 = Sensor::built_in("imx363").unwrap();
+    let two = |letters| Cfa::two_by_two(letters).unwrap();
+    let with = |cfa, filters: &[_]| Sensor { adc: imx363.adc, ..with_filters(cfa, filters) };
+    let mut sensors: Vec<(&str, Sensor)> = ["imx363", "mt9v024", "nikon-d5100", "machine-vision-mono"]
+        .map(|name| (name, Sensor::built_in(name).unwrap()))
+        .into();
+    sensors.extend([
+        ("bayer-rggb", with(two("RGGB"), &[R, G, B])),
+        ("bayer-bggr", with(two("BGGR"), &[R, G, B])),
+        ("bayer-grbg", with(two("GRBG"), &[R, G, B])),
+        ("bayer-gbrg", with(two("GBRG"), &[R, G, B])),
+        ("quad-bayer", with(two("RGGB").repeated(2), &[R, G, B])),
+        ("ryyb", with(two("RYYB"), &[R, Y, B])),
+        ("cyym", with(two("CYYM"), &[C, Y, M])),
+        ("rgbw", with(two("RGBW"), &[R, G, B, W])),
+        ("stacked", with(Cfa::Stacked, &[R, G, B])),
+        ("logarithmic", Sensor { response: Response::Logarithmic { knee_v: 0.05 }, ..with(two("RGGB"), &[R, G, B]) }),
+    ]);
+    sensors
+}
+
 /// Writes the frames that `scripts/check_dng.py` opens with other readers, where `DIOPTRIC_DNG_FOLDER` says.
 #[test]
 fn frames_for_other_readers_are_written_where_asked() {
     let kept = std::env::var_os("DIOPTRIC_DNG_FOLDER").map(std::path::PathBuf::from);
     let folder = tempfile::tempdir().unwrap();
     let folder = kept.as_deref().unwrap_or(folder.path());
-    for name in ["imx363", "mt9v024", "nikon-d5100", "machine-vision-mono"] {
-        let (sensor, raw) = raw_of(name);
-        sensor.write_dng(&raw, Illuminant::D65, &folder.join(format!("{name}.dng"))).unwrap();
-        raw.write(&folder.join(format!("{name}.png"))).unwrap();
-        assert!(folder.join(format!("{name}.dng")).exists());
+    for (name, sensor) in dng_sensors() {
+        let raw = chart_raw(&sensor);
+        let path = folder.join(format!("{name}.dng"));
+        sensor.write_dng(&raw, Illuminant::D65, &path).unwrap();
+        for (plane, filter) in raw.planes.iter().zip(&raw.filter_names) {
+            let one = Raw { planes: vec![plane.clone()], ..raw.clone() };
+            let png = if raw.planes.len() == 1 { format!("{name}.png") } else { format!("{name}.{filter}.png") };
+            one.write(&folder.join(png)).unwrap();
+        }
+        let tags = tags_of(&std::fs::read(&path).unwrap());
+        let n_planes = raw.planes.len();
+        assert_eq!((tags[&277][0] as usize, tags[&50717].len()), (n_planes, n_planes), "{name}");
+        match sensor.tile().unwrap().filter(|_| sensor.filters.len() > 1) {
+            // One filter and stacked ones have no mosaic: PhotometricInterpretation is LinearRaw.
+            None => assert!(tags[&262] == [34892] && !tags.contains_key(&33422), "{name}"),
+            Some(tile) => {
+                assert_eq!(tags[&33421], [tile.rows() as u32, tile.columns() as u32], "{name}");
+                let letters: String = tags[&33422].iter().map(|&code| char::from(b"RGBCMYW"[code as usize])).collect();
+                let expected: String = (0..tile.rows())
+                    .flat_map(|row| tile.row(row).to_vec())
+                    .map(|filter| sensor.filters[filter].name.clone())
+                    .collect();
+                assert_eq!(letters, expected, "{name}");
+            }
+        }
+        if sensor.filters.len() > 1 {
+            assert_eq!(tags[&50721].len(), 6 * sensor.filters.len(), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_bent_response_goes_with_the_table_that_straightens_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, sensor) = dng_sensors().into_iter().find(|(name, _)| *name == "logarithmic").unwrap();
+    let raw = chart_raw(&sensor);
+    let path = folder.path().join("log.dng");
+    sensor.write_dng(&raw, Illuminant::D65, &path).unwrap();
+    let tags = tags_of(&std::fs::read(&path).unwrap());
+    let (table, black, white) = (&tags[&50712], tags[&50714][0] / tags[&50714][1], tags[&50717][0]);
+    let linear = &raw.linear()[0];
+    for (dn, light) in raw.dn().unwrap().iter().zip(linear) {
+        let found = (f64::from(table[usize::from(*dn)]) - f64::from(black)) / f64::from(white - black);
+        // Codes of the table are whole numbers of 61 440.
+        assert!((found - f64::from(light.clamp(-0.06, 1.0))).abs() < 2e-5, "{dn}: {found}, not {light}");
+    }
+}
+
+#[test]
+fn what_dng_cannot_hold_is_refused_in_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("raw.dng");
+    let imx363 = Sensor::built_in("imx363").unwrap();
+    let clear = ("C", [1.0, 1.0, 1.0]);
+    let odd = [("1", R.1), ("2", G.1), ("3", B.1)];
+    let five = [R, G, B, W, Y];
+    let row = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+    for (what, cfa, filters) in [
+        ("two filters", Cfa::two_by_two("RCCC").unwrap(), &[R, clear][..]),
+        ("unknown filters", Cfa::two_by_two("1223").unwrap(), &odd),
+        ("five filters", Cfa::Mosaic(vec![row(&["R", "G", "B", "W", "Y"])]), &five),
+        ("four planes", Cfa::Stacked, &[R, G, B, W]),
+        ("a large tile", Cfa::two_by_two("RGGB").unwrap().repeated(8), &[R, G, B]),
+    ] {
+        let sensor = Sensor { adc: imx363.adc, ..with_filters(cfa, filters) };
+        let message = sensor.write_dng(&chart_raw(&sensor), Illuminant::D65, &path).unwrap_err().to_string();
+        assert!(message.starts_with("a DNG file has") && !message.contains('\n'), "{what}: {message}");
+        assert!(!path.exists());
     }
 }

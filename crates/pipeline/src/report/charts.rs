@@ -247,7 +247,7 @@ fn histogram(capture: &Capture, sensor: &SensorStatistics) -> LineChart {
         .iter()
         .map(|channel| {
             let n = channel.histogram.len() as f64;
-            let top = capture.raw.levels.top;
+            let top = capture.exposed.raw.levels.top;
             let center = |bin: usize| (bin as f64 + 0.5) / n * top;
             Series {
                 label: Some(channel.filter.clone()),
@@ -267,7 +267,7 @@ fn histogram(capture: &Capture, sensor: &SensorStatistics) -> LineChart {
         title: "Raw frame".to_owned(),
         x_label: "digital number".to_owned(),
         y_label: "pixels of the channel, %".to_owned(),
-        x_range: (0.0, capture.raw.levels.top),
+        x_range: (0.0, capture.exposed.raw.levels.top),
         y_range: (0.0, 1.05 * top.max(f64::MIN_POSITIVE)),
         series,
         legend: Corner::TopRight,

@@ -7,16 +7,15 @@ mod statistics;
 use std::{fs, path::Path};
 
 use dioptric_scene::write_planes_exr;
-use dioptric_sensor::{ElectronRate, Exposure, Picture, Raw, RawPlane, Sensor, Volts};
 use dioptric_spectrum::Illuminant;
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use serde::Serialize;
 
 pub use statistics::{ChannelStatistics, LossRow, SensorStatistics};
 
 use crate::{
-    Camera, Capture, LensData, Outputs, PipelineError, Shot,
+    Camera, Capture, LensData, PipelineError, Shot,
     capture::IRRADIANCE_FILE,
+    frame_files::{Frames, write_frames},
     report::charts::{Charts, Places},
 };
 
@@ -43,6 +42,10 @@ pub struct Report {
     pub losses: Vec<LossRow>,
     /// Factor on each channel that made white neutral.
     pub white_balance: Vec<f64>,
+    /// The matrix from balanced channels to linear sRGB, a row for each of red, green and blue.
+    pub color_matrix: [Vec<f64>; 3],
+    /// The mean ΔE₀₀ that is left of the 24-patch chart after the matrix; none where it was not fitted.
+    pub color_matrix_mean_delta_e: Option<f64>,
     /// How long each stage took, s.
     pub timings_s: Vec<(String, f64)>,
     /// The files beside the report.
@@ -100,7 +103,7 @@ impl Capture {
     /// # Errors
     /// When a file cannot be written.
     pub fn write(&self, shot: &Shot, folder: &Path, timings_s: &[(String, f64)]) -> Result<Report, PipelineError> {
-        let outputs = shot.camera.outputs;
+        let outputs = &shot.camera.outputs;
         let mut files = Vec::new();
         if outputs.irradiance {
             files.push(IRRADIANCE_FILE.to_owned());
@@ -157,88 +160,30 @@ impl Capture {
             sensor: SensorStatistics::new(&self.frames(shot))?,
             losses: statistics::losses(shot, &fields)?,
             white_balance: self.developed.balance.clone(),
+            color_matrix: self.developed.color.rows.clone(),
+            color_matrix_mean_delta_e: self.developed.color.mean_delta_e(),
             timings_s: timings_s.to_vec(),
             files,
         })
     }
 
     fn frames<'a>(&'a self, shot: &'a Shot) -> Frames<'a> {
-        Frames { sensor: &shot.sensor, exposure: &self.exposure, rate: &self.rate, volts: &self.volts, raw: &self.raw }
+        Frames {
+            sensor: &shot.sensor,
+            exposure: &self.exposure,
+            rate: &self.rate,
+            exposed: &self.exposed,
+            processing: &self.processing,
+            light: shot.scene.light.unwrap_or(Illuminant::D65),
+        }
     }
-}
-
-/// The frames of one exposure.
-#[derive(Clone, Copy)]
-pub(crate) struct Frames<'a> {
-    pub(crate) sensor: &'a Sensor,
-    pub(crate) exposure: &'a Exposure,
-    pub(crate) rate: &'a ElectronRate,
-    pub(crate) volts: &'a Volts,
-    pub(crate) raw: &'a Raw,
-}
-
-/// Writes the volts, the raw frame and the picture; returns the names of the files and the bytes of the picture's.
-pub(crate) fn write_frames(
-    frames: &Frames<'_>,
-    picture: &Picture,
-    outputs: Outputs,
-    folder: &Path,
-) -> Result<(Vec<String>, Vec<u8>), PipelineError> {
-    let mut names = vec!["picture.png".to_owned()];
-    if outputs.volts {
-        write_volts(frames, &folder.join("volts.exr"))?;
-        names.push("volts.exr".to_owned());
-    }
-    if outputs.raw {
-        names.extend(write_raw(frames.raw, folder)?);
-    }
-    let png = encode_png(&picture.to_rgb8(), (picture.columns(), picture.rows()), ExtendedColorType::Rgb8)?;
-    write_file(&folder.join("picture.png"), &png)?;
-    Ok((names, png))
-}
-
-fn write_volts(frames: &Frames<'_>, path: &Path) -> Result<(), PipelineError> {
-    let planes = &frames.volts.planes_v;
-    let names: Vec<&str> = match planes.len() {
-        1 => vec!["V"],
-        _ => frames.raw.filter_names.iter().map(String::as_str).collect(),
-    };
-    let planes: Vec<_> = names.into_iter().zip(planes).collect();
-    Ok(write_planes_exr(path, &planes, false)?)
-}
-
-/// Writes each plane of digital numbers as a 16-bit PNG; a sensor without a converter has none.
-fn write_raw(raw: &Raw, folder: &Path) -> Result<Vec<String>, PipelineError> {
-    let mut names = Vec::new();
-    for (plane, filter) in raw.planes.iter().zip(&raw.filter_names) {
-        let RawPlane::Dn(dn) = plane else { continue };
-        let name = if raw.planes.len() == 1 { "raw.png".to_owned() } else { format!("raw.{filter}.png") };
-        let bytes: Vec<u8> = dn.iter().flat_map(|dn| dn.to_ne_bytes()).collect();
-        let png = encode_png(&bytes, (dn.ncols(), dn.nrows()), ExtendedColorType::L16)?;
-        write_file(&folder.join(&name), &png)?;
-        names.push(name);
-    }
-    Ok(names)
 }
 
 /// Writes a value as JSON.
-pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), PipelineError> {
+pub(crate) fn write_json(path: &Path, value: &(impl Serialize + ?Sized)) -> Result<(), PipelineError> {
     let json = serde_json::to_vec_pretty(value)
         .map_err(|e| PipelineError::Write { path: path.to_owned(), reason: e.to_string() })?;
     write_file(path, &json)
-}
-
-/// Returns samples as the bytes of a PNG file; 16-bit samples in the machine's order.
-fn encode_png(
-    samples: &[u8],
-    (columns, rows): (usize, usize),
-    color: ExtendedColorType,
-) -> Result<Vec<u8>, PipelineError> {
-    let mut bytes = Vec::new();
-    PngEncoder::new(&mut bytes)
-        .write_image(samples, columns as u32, rows as u32, color)
-        .map_err(|e| PipelineError::Png { reason: e.to_string() })?;
-    Ok(bytes)
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), PipelineError> {

@@ -5,7 +5,7 @@ use dioptric_sensor::{Raw, RawPlane, Tile};
 use ndarray::Array2;
 use serde::Serialize;
 
-use crate::{LensData, LensQuestion, PipelineError, REFERENCE_WAVELENGTH_NM, Shot, report::Frames, spot::Spot};
+use crate::{LensData, LensQuestion, PipelineError, REFERENCE_WAVELENGTH_NM, Shot, frame_files::Frames, spot::Spot};
 
 /// Bins of a histogram of digital numbers.
 const BINS: usize = 128;
@@ -27,6 +27,10 @@ pub struct SensorStatistics {
     pub saturated_fraction: f64,
     /// Read noise, electrons.
     pub read_noise_e: f64,
+    /// The time from one row's readout to the next, µs; 0 for a global shutter.
+    pub row_time_us: f64,
+    /// How much later the last row is exposed than the first, ms.
+    pub last_row_later_ms: f64,
     /// A row a filter.
     pub channels: Vec<ChannelStatistics>,
 }
@@ -69,7 +73,8 @@ pub struct LossRow {
 
 impl SensorStatistics {
     pub(crate) fn new(frames: &Frames<'_>) -> Result<Self, PipelineError> {
-        let Frames { sensor, exposure, raw, .. } = *frames;
+        let Frames { sensor, exposure, exposed, .. } = *frames;
+        let raw = &exposed.raw;
         let tile = sensor.tile()?;
         let read_noise_e = sensor.read_noise_v(exposure.gain_mode) / sensor.conversion_gain_v_per_e(exposure.gain_mode);
         let channels =
@@ -81,13 +86,16 @@ impl SensorStatistics {
             saturation_e: sensor.saturation_e(exposure),
             saturated_fraction: raw.saturated_fraction(),
             read_noise_e,
+            row_time_us: raw.row_time_us,
+            last_row_later_ms: 1e3 * raw.row_start_s(raw.size().0 - 1),
             channels,
         })
     }
 }
 
 fn channel(frames: &Frames<'_>, tile: Option<&Tile>, filter: usize, read_noise_e: f64) -> ChannelStatistics {
-    let Frames { sensor, exposure, rate, raw, .. } = *frames;
+    let Frames { sensor, exposure, rate, exposed, .. } = *frames;
+    let raw = &exposed.raw;
     let electrons: Vec<f64> =
         of_filter(&rate.planes_e_per_s, tile, filter).map(|rate| f64::from(rate) * exposure.time_s).collect();
     let top = raw.levels.top;

@@ -47,6 +47,54 @@ pub fn read_picture(
         .map_err(|source| SceneError::Values { file: path.to_owned(), source })
 }
 
+/// The samples of a picture as they stand in its file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PictureSamples {
+    /// Each channel with its name: `Y` for grey, `R`, `G` and `B`, or what an EXR file calls it.
+    pub planes: Vec<(String, Array2<f32>)>,
+    /// The highest code of a file of whole numbers, 255 or 65 535; `None` for floating-point samples.
+    pub top: Option<u16>,
+}
+
+/// Reads the samples of a PNG, JPEG, TIFF or EXR file, neither scaled nor decoded; opacity is left out.
+///
+/// # Errors
+/// When the file is no such picture, or too large.
+pub fn read_picture_samples(path: &Path) -> Result<PictureSamples, SceneError> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+        return Ok(PictureSamples { planes: super::spectral_exr::read_planes_exr(path)?, top: None });
+    }
+    let picture = decode(path)?;
+    let (columns, rows) = (picture.width() as usize, picture.height() as usize);
+    let parted = |samples: Vec<f32>, names: &[&str]| {
+        let n = names.len();
+        let plane = |k: usize| {
+            let values = samples.iter().skip(k).step_by(n).copied().collect();
+            Array2::from_shape_vec((rows, columns), values).expect("a sample a pixel")
+        };
+        names.iter().enumerate().map(|(k, name)| ((*name).to_owned(), plane(k))).collect()
+    };
+    const RGB: [&str; 3] = ["R", "G", "B"];
+    let bytes = |samples: Vec<u8>| samples.into_iter().map(f32::from).collect();
+    let words = |samples: Vec<u16>| samples.into_iter().map(f32::from).collect();
+    let (planes, top) = match picture {
+        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
+            (parted(bytes(picture.into_luma8().into_raw()), &["Y"]), Some(u16::from(u8::MAX)))
+        }
+        DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => {
+            (parted(words(picture.into_luma16().into_raw()), &["Y"]), Some(u16::MAX))
+        }
+        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
+            (parted(bytes(picture.into_rgb8().into_raw()), &RGB), Some(u16::from(u8::MAX)))
+        }
+        DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => {
+            (parted(words(picture.into_rgb16().into_raw()), &RGB), Some(u16::MAX))
+        }
+        other => (parted(other.into_rgb32f().into_raw(), &RGB), None),
+    };
+    Ok(PictureSamples { planes, top })
+}
+
 /// Decodes a picture of any kind that the file's content tells.
 pub(crate) fn decode(path: &Path) -> Result<DynamicImage, SceneError> {
     let mut reader =
@@ -102,5 +150,25 @@ mod tests {
         std::fs::write(&path, b"\xff\xd8\xff\xe0 no more").unwrap();
         let message = decode(&path).unwrap_err().to_string();
         assert!(message.contains("broken.jpg: cannot be read"), "{message}");
+    }
+
+    #[test]
+    fn samples_are_those_of_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let check = |name: &str, picture: DynamicImage, names: &[&str], first: &[f32], top: Option<u16>| {
+            let path = folder.path().join(name);
+            picture.save(&path).unwrap();
+            let read = read_picture_samples(&path).unwrap();
+            let found: Vec<_> = read.planes.iter().map(|(name, plane)| (name.as_str(), plane[(1, 2)])).collect();
+            let expected: Vec<_> = names.iter().copied().zip(first.iter().copied()).collect();
+            assert_eq!((found, read.top), (expected, top), "{name}");
+        };
+        let rgb8 = image::RgbImage::from_fn(4, 3, |x, y| image::Rgb([x as u8, y as u8, 7]));
+        check("a.png", rgb8.into(), &["R", "G", "B"], &[2.0, 1.0, 7.0], Some(255));
+        let grey16 =
+            image::ImageBuffer::<image::Luma<u16>, _>::from_fn(4, 3, |x, y| image::Luma([(1000 * x + y) as u16]));
+        check("b.png", grey16.clone().into(), &["Y"], &[2001.0], Some(65535));
+        check("c.tif", grey16.into(), &["Y"], &[2001.0], Some(65535));
+        assert!(read_picture_samples(&folder.path().join("none.png")).unwrap_err().to_string().contains("none.png"));
     }
 }

@@ -1,0 +1,274 @@
+//! `dioptric measure`: a laboratory's measurements of pictures, frames and sensors.
+
+use std::{fmt::Write, path::Path};
+
+use dioptric_pipeline::{
+    SensorChoice, Staged,
+    measure::{
+        BenchRequest, ChartMeasurement, ChartRequest, CodeCurve, CompareRequest, Comparison, EdgeMeasurement,
+        EdgeRequest, Measurement, NoiseData, PixelRegion, PointRequest, PointSet, measure_bench, measure_frames,
+    },
+    parse_illuminant,
+};
+
+use crate::{
+    args::Common,
+    measure_args::{ColourArgs, CurveKind, MeasureCommand, MtfArgs, NoiseArgs, SpotArgs},
+    terminal::{guarded, print, print_json},
+};
+
+/// The seed where the user gives none.
+const SEED: u64 = 1;
+
+pub(crate) fn run(command: &MeasureCommand, common: &Common) -> anyhow::Result<()> {
+    match command {
+        MeasureCommand::Mtf(arguments) => mtf(arguments, common),
+        MeasureCommand::Spot(arguments) => spot(arguments, common),
+        MeasureCommand::Noise(arguments) => noise(arguments, common),
+        MeasureCommand::Colour(arguments) => colour(arguments, common),
+    }
+}
+
+fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
+    let request = EdgeRequest {
+        region: arguments.region.as_deref().map(PixelRegion::parse).transpose()?,
+        side: arguments.size,
+        mosaic: arguments.mosaic.clone(),
+        pixel_um: arguments.pixel_um,
+        curve: curve(arguments.picture_args.curve),
+    };
+    let finish = Finish::new("mtf", arguments.picture_args.out.as_deref(), common)?;
+    finish.with(&request.measure(&arguments.picture)?, mtf_table)
+}
+
+fn spot(arguments: &SpotArgs, common: &Common) -> anyhow::Result<()> {
+    let request = PointRequest {
+        window: arguments.window,
+        pixel_um: arguments.pixel_um,
+        background: arguments.background,
+        curve: curve(arguments.picture_args.curve),
+    };
+    let finish = Finish::new("spot", arguments.picture_args.out.as_deref(), common)?;
+    finish.with(&request.measure(&arguments.picture)?, spot_table)
+}
+
+fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {
+    let finish = Finish::new("noise", arguments.out.as_deref(), common)?;
+    let data = match (&arguments.frames, &arguments.sensor) {
+        (Some(frames), _) => measure_frames(frames)?,
+        (None, Some(sensor)) => {
+            let request = BenchRequest {
+                sensor: SensorChoice::named(sensor),
+                filter: arguments.filter.clone(),
+                side: arguments.size,
+                n_levels: arguments.levels,
+                n_stacked: arguments.stack,
+                wavelength_nm: arguments.wavelength_nm,
+                time_s: arguments.exposure_s,
+                analog_gain: arguments.analog_gain,
+                temperature_c: arguments.temperature_c,
+                seed: common.seed.unwrap_or(SEED),
+            };
+            // Frames and numbers may go to the same folder.
+            let is_shared = arguments.keep_frames == arguments.out;
+            let own = arguments.keep_frames.as_deref().filter(|_| !is_shared);
+            let kept = own.map(Staged::folder).transpose()?.map(guarded);
+            let folder = if is_shared { finish.staged.as_ref() } else { kept.as_ref() };
+            let data = measure_bench(&request, folder.map(Staged::path))?;
+            kept.map_or(Ok(()), Staged::commit)?;
+            data
+        }
+        (None, None) => anyhow::bail!("frames or --sensor are needed"),
+    };
+    finish.with(&data, noise_table)
+}
+
+fn colour(arguments: &ColourArgs, common: &Common) -> anyhow::Result<()> {
+    let curve = curve(arguments.picture_args.curve);
+    let out = arguments.picture_args.out.as_deref();
+    if let Some(against) = &arguments.against {
+        let request = CompareRequest {
+            pixels_per_degree: arguments.pixels_per_degree,
+            patch: arguments.patch.as_deref().map(PixelRegion::parse).transpose()?,
+            curve,
+        };
+        let finish = Finish::new("compare", out, common)?;
+        return finish.with(&request.compare(&arguments.picture, against)?, comparison_table);
+    }
+    let request = ChartRequest {
+        corners: arguments.corners.as_deref().map(ChartRequest::parse_corners).transpose()?,
+        light: arguments.illuminant.as_deref().map(parse_illuminant).transpose()?,
+        curve,
+    };
+    let finish = Finish::new("colour", out, common)?;
+    finish.with(&request.measure(&arguments.picture)?, chart_table)
+}
+
+fn curve(kind: CurveKind) -> CodeCurve {
+    match kind {
+        CurveKind::ByFile => CodeCurve::ByFile,
+        CurveKind::Linear => CodeCurve::Linear,
+        CurveKind::Srgb => CodeCurve::Srgb,
+    }
+}
+
+/// What becomes of a measurement: files in a folder, and numbers on standard output.
+struct Finish<'a> {
+    name: &'static str,
+    common: &'a Common,
+    staged: Option<Staged>,
+}
+
+impl<'a> Finish<'a> {
+    /// Tries the place before the work.
+    fn new(name: &'static str, folder: Option<&Path>, common: &'a Common) -> anyhow::Result<Self> {
+        let staged = folder.map(Staged::folder).transpose()?.map(guarded);
+        Ok(Self { name, common, staged })
+    }
+
+    fn with<M: Measurement>(
+        self,
+        measured: &M,
+        table: impl Fn(&M) -> Result<String, std::fmt::Error>,
+    ) -> anyhow::Result<()> {
+        if let Some(staged) = self.staged {
+            measured.write(self.name, staged.path())?;
+            staged.commit()?;
+        }
+        match (self.common.json, self.common.quiet) {
+            (true, _) => print_json(measured),
+            (false, true) => Ok(()),
+            (false, false) => print(&table(measured)?),
+        }
+    }
+}
+
+fn or_dash(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |v| format!("{v:.digits$}"))
+}
+
+fn mtf_table(measured: &EdgeMeasurement) -> Result<String, std::fmt::Error> {
+    let PixelRegion { column, row, columns, rows } = measured.region;
+    let mut text = format!(
+        "edge slanted by {:.2}° in {columns} × {rows} pixels from column {column}, row {row}\n\n",
+        measured.slant_deg
+    );
+    writeln!(
+        text,
+        "{:<12} {:>13} {:>13} {:>13} {:>13} {:>10}",
+        "channel", "MTF50 c/px", "MTF50P c/px", "MTF50 c/mm", "MTF50P c/mm", "at 0.5 c/px"
+    )?;
+    for channel in &measured.channels {
+        writeln!(
+            text,
+            "{:<12} {:>13} {:>13} {:>13} {:>13} {:>10}",
+            channel.channel,
+            or_dash(channel.mtf50_cycles_per_pixel, 4),
+            or_dash(channel.mtf50p_cycles_per_pixel, 4),
+            or_dash(channel.mtf50_cycles_per_mm, 2),
+            or_dash(channel.mtf50p_cycles_per_mm, 2),
+            or_dash(channel.response_at_nyquist, 4)
+        )?;
+    }
+    for channel in &measured.not_measured {
+        writeln!(text, "{:<12} {}", channel.channel, channel.reason)?;
+    }
+    Ok(text)
+}
+
+fn spot_table(measured: &PointSet) -> Result<String, std::fmt::Error> {
+    let mut text = format!("pixels of {} µm\n\n", measured.pixel_um);
+    writeln!(
+        text,
+        "{:>4} {:<8} {:>10} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}",
+        "spot", "channel", "column", "row", "rms µm", "σx µm", "σy µm", "EE50 µm", "EE80 µm", "LSF µm"
+    )?;
+    for spot in &measured.spots {
+        writeln!(
+            text,
+            "{:>4} {:<8} {:>10.3} {:>10.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9}",
+            spot.spot,
+            spot.channel,
+            spot.column,
+            spot.row,
+            spot.rms_radius_um,
+            spot.sigma_x_um,
+            spot.sigma_y_um,
+            spot.ee50_radius_um,
+            spot.ee80_radius_um,
+            or_dash(spot.lsf_fwhm_um, 3)
+        )?;
+    }
+    Ok(text)
+}
+
+fn noise_table(data: &NoiseData) -> Result<String, std::fmt::Error> {
+    let filter = data.filter.as_ref().map(|name| format!(", filter {name}")).unwrap_or_default();
+    let mut text =
+        format!("{}{filter}: {} frames of {} × {} pixels\n\n", data.source, data.n_frames, data.columns, data.rows);
+    let sheet = data.data_sheet.as_ref();
+    writeln!(text, "{:<34} {:>12} {:>12}", "", "measured", "data sheet")?;
+    for (name, measured, expected, digits) in [
+        ("system gain K, DN/e", Some(data.gain_dn_per_e), sheet.map(|s| s.gain_dn_per_e), 5),
+        ("quantum efficiency", data.quantum_efficiency, sheet.map(|s| s.quantum_efficiency), 4),
+        ("dark noise σd, e", Some(data.dark_noise_e), sheet.map(|s| s.dark_noise_e), 3),
+        ("saturation, e", Some(data.saturation_e), sheet.map(|s| s.saturation_e), 0),
+        ("DSNU, e", data.dsnu_e, sheet.map(|s| s.dsnu_e), 3),
+        ("PRNU, %", data.prnu_percent, sheet.map(|s| s.prnu_percent), 3),
+        ("dark current by mean, e/s", data.dark_current_by_mean_e_per_s, sheet.map(|s| s.dark_current_e_per_s), 3),
+        (
+            "dark current by variance, e/s",
+            data.dark_current_by_variance_e_per_s,
+            sheet.map(|s| s.dark_current_e_per_s),
+            3,
+        ),
+        ("absolute threshold, photons", data.threshold_photons, None, 2),
+        ("largest SNR, dB", Some(data.max_snr_db), None, 2),
+        ("dynamic range, dB", Some(data.dynamic_range_db), None, 2),
+        ("dynamic range, stops", Some(data.dynamic_range_stops), None, 2),
+        ("ISO by saturation (D55)", None, sheet.map(|s| s.iso_by_saturation), 1),
+        ("ISO by noise, SNR 40", None, sheet.and_then(|s| s.iso_by_noise_40), 1),
+        ("ISO by noise, SNR 10", None, sheet.and_then(|s| s.iso_by_noise_10), 1),
+    ] {
+        writeln!(text, "{name:<34} {:>12} {:>12}", or_dash(measured, digits), or_dash(expected, digits))?;
+    }
+    Ok(text)
+}
+
+fn chart_table(measured: &ChartMeasurement) -> Result<String, std::fmt::Error> {
+    let mut text = format!(
+        "ΔE00: mean {:.3}, median {:.3}, largest {:.3}\n\n",
+        measured.mean_delta_e, measured.median_delta_e, measured.max_delta_e
+    );
+    for patch in &measured.patches {
+        let [l, a, b] = patch.lab;
+        let [wl, wa, wb] = patch.wanted_lab;
+        writeln!(
+            text,
+            "{:<16} ΔE00 {:>7.3}   L*a*b* {l:>6.2} {a:>7.2} {b:>7.2}   wanted {wl:>6.2} {wa:>7.2} {wb:>7.2}",
+            patch.name, patch.delta_e
+        )?;
+    }
+    Ok(text)
+}
+
+fn comparison_table(measured: &Comparison) -> Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    let psnr = measured.psnr_db.map_or_else(|| "equal".to_owned(), |v| format!("{v:.2} dB"));
+    writeln!(text, "{:<28} {psnr}", "PSNR")?;
+    writeln!(text, "{:<28} {:.4}", "SSIM", measured.ssim)?;
+    let scielab = &measured.scielab;
+    writeln!(
+        text,
+        "{:<28} mean {:.3}, median {:.3}, 95 % {:.3}, largest {:.3}",
+        format!("S-CIELAB ΔE00 at {} px/°", measured.pixels_per_degree),
+        scielab.mean,
+        scielab.median,
+        scielab.p95,
+        scielab.max
+    )?;
+    if measured.vsnr.is_some() || measured.against_vsnr.is_some() {
+        writeln!(text, "{:<28} {} and {}", "VSNR", or_dash(measured.vsnr, 3), or_dash(measured.against_vsnr, 3))?;
+    }
+    Ok(text)
+}

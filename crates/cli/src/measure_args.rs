@@ -1,0 +1,149 @@
+//! The words of `dioptric measure`, and nothing else.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+/// Something to measure.
+#[derive(Debug, Subcommand)]
+pub(crate) enum MeasureCommand {
+    /// Spatial frequency response of a slanted edge: SFR, MTF50, MTF50P of each channel
+    Mtf(MtfArgs),
+    /// Pictures of points: centroid, second moments, encircled energy
+    Spot(SpotArgs),
+    /// Photon transfer after EMVA 1288, of flat and dark frames or of a sensor on a simulated bench
+    Noise(NoiseArgs),
+    /// Colours of a 24-patch chart (ΔE00), or two pictures compared (S-CIELAB, VSNR, PSNR, SSIM)
+    #[command(alias = "color")]
+    Colour(ColourArgs),
+}
+
+/// How a picture is read and where results go.
+#[derive(Debug, Args)]
+pub(crate) struct PictureArgs {
+    /// How samples stand for light
+    #[arg(long, value_name = "KIND", value_enum, default_value_t = CurveKind::ByFile)]
+    pub(crate) curve: CurveKind,
+    /// Folder for the numbers as JSON and the plots as SVG and PNG
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// How samples stand for light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CurveKind {
+    /// Linear for 16-bit grey and EXR, sRGB for everything else
+    ByFile,
+    /// Linear
+    Linear,
+    /// The curve of sRGB
+    Srgb,
+}
+
+/// A slanted edge.
+#[derive(Debug, Args)]
+pub(crate) struct MtfArgs {
+    /// Picture or raw frame: PNG, TIFF, JPEG, EXR
+    pub(crate) picture: PathBuf,
+    /// Where the edge is, pixels [default: the most edge-like square of the picture]
+    #[arg(long, value_name = "x,y,w,h")]
+    pub(crate) region: Option<String>,
+    /// Side of the square that is looked for, pixels [default: 64 samples of a channel]
+    #[arg(long, value_name = "N", conflicts_with = "region")]
+    pub(crate) size: Option<usize>,
+    /// Mosaic of a raw frame, a letter a filter from the top left pixel on, e.g. RGGB
+    #[arg(long, value_name = "LETTERS")]
+    pub(crate) mosaic: Option<String>,
+    /// Distance between pixels, µm, for cycles/mm
+    #[arg(long, value_name = "P")]
+    pub(crate) pixel_um: Option<f64>,
+    /// The picture and the results
+    #[command(flatten)]
+    pub(crate) picture_args: PictureArgs,
+}
+
+/// Pictures of points.
+#[derive(Debug, Args)]
+pub(crate) struct SpotArgs {
+    /// Picture: PNG, TIFF, JPEG, EXR
+    pub(crate) picture: PathBuf,
+    /// Side of the window about each point, an odd number of pixels [default: half way to its neighbours]
+    #[arg(long, value_name = "N")]
+    pub(crate) window: Option<usize>,
+    /// Distance between pixels, µm; at 1, lengths are in pixels
+    #[arg(long, value_name = "P", default_value_t = 1.0)]
+    pub(crate) pixel_um: f64,
+    /// Light between the points, highest code 1 [default: the median of the picture]
+    #[arg(long, value_name = "L", allow_negative_numbers = true)]
+    pub(crate) background: Option<f64>,
+    /// The picture and the results
+    #[command(flatten)]
+    pub(crate) picture_args: PictureArgs,
+}
+
+/// Flat and dark frames, or a sensor.
+#[derive(Debug, Args)]
+pub(crate) struct NoiseArgs {
+    /// Flat and dark frames, 16-bit PNG or TIFF: an EMVA descriptor file, or a folder with descriptor.txt or with
+    /// dark-0.png, dark-1.png, flat-01-0.png, flat-01-1.png …
+    #[arg(required_unless_present = "sensor", conflicts_with = "sensor")]
+    pub(crate) frames: Option<PathBuf>,
+    /// Sensor to put on a simulated bench, a file or the name of a built-in one
+    #[arg(long, value_name = "SENSOR")]
+    pub(crate) sensor: Option<String>,
+    /// Filter of the sensor [default: the one that sees the light best]
+    #[arg(long, value_name = "NAME", requires = "sensor")]
+    pub(crate) filter: Option<String>,
+    /// Wavelength of the light, nm [default: 550]
+    #[arg(long, value_name = "W", requires = "sensor")]
+    pub(crate) wavelength_nm: Option<f64>,
+    /// Side of the square of pixels [default: 512]
+    #[arg(long, value_name = "N", requires = "sensor")]
+    pub(crate) size: Option<usize>,
+    /// Levels of light, two frames each [default: 40]
+    #[arg(long, value_name = "N", requires = "sensor")]
+    pub(crate) levels: Option<usize>,
+    /// Frames of the stacks that show DSNU and PRNU [default: 64]
+    #[arg(long, value_name = "N", requires = "sensor")]
+    pub(crate) stack: Option<usize>,
+    /// Exposure time, s [default: 0.01]
+    #[arg(long, value_name = "T", requires = "sensor")]
+    pub(crate) exposure_s: Option<f64>,
+    /// Factor on the voltage [default: 1]
+    #[arg(long, value_name = "G", requires = "sensor")]
+    pub(crate) analog_gain: Option<f64>,
+    /// Temperature of the chip, °C [default: 25]
+    #[arg(long, value_name = "C", requires = "sensor", allow_negative_numbers = true)]
+    pub(crate) temperature_c: Option<f64>,
+    /// Keeps the frames as 16-bit PNG with a descriptor in this folder
+    #[arg(long, value_name = "DIR", requires = "sensor")]
+    pub(crate) keep_frames: Option<PathBuf>,
+    /// Folder for the numbers as JSON and the plots as SVG and PNG
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// A chart, or two pictures.
+#[derive(Debug, Args)]
+pub(crate) struct ColourArgs {
+    /// Picture: PNG, TIFF, JPEG, EXR
+    pub(crate) picture: PathBuf,
+    /// Corners of the chart, clockwise from the one beside dark skin, pixels [default: found in the picture]
+    #[arg(long, value_name = "x1,y1,…,x4,y4", conflicts_with = "against")]
+    pub(crate) corners: Option<String>,
+    /// Light on the chart: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3 [default: D65]
+    #[arg(long, value_name = "NAME", conflicts_with = "against")]
+    pub(crate) illuminant: Option<String>,
+    /// Compares with this picture instead
+    #[arg(long, value_name = "PICTURE")]
+    pub(crate) against: Option<PathBuf>,
+    /// Pixels a degree of the viewer's field, for S-CIELAB and VSNR
+    #[arg(long, value_name = "N", default_value_t = 60.0)]
+    pub(crate) pixels_per_degree: f64,
+    /// An even patch, whose visual SNR is told
+    #[arg(long, value_name = "x,y,w,h", requires = "against")]
+    pub(crate) patch: Option<String>,
+    /// The picture and the results
+    #[command(flatten)]
+    pub(crate) picture_args: PictureArgs,
+}

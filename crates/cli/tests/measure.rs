@@ -1,0 +1,266 @@
+//! `dioptric measure` on the built program: known pictures and frames in, their parameters out.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot set up its files fails")]
+
+mod common;
+
+use std::{fs, path::Path};
+
+use common::{check_error, output};
+use image::{GrayImage, ImageBuffer, Luma, Rgb};
+use serde_json::Value;
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    serde_json::from_str(&output(folder, arguments)).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// The profile of an edge blurred by a Gaussian: Φ(d / σ) by its series of sines (the transform of the MTF), which is
+/// exact to 1e-6 where d is less than 40 σ.
+fn blurred_edge(distance: f64, sigma: f64) -> f64 {
+    let step = 0.02 / sigma;
+    let term = |i: u32| {
+        let w = (f64::from(i) + 0.5) * step;
+        (w * distance).sin() * (-0.5 * (w * sigma).powi(2)).exp() / w
+    };
+    0.5 + step / std::f64::consts::PI * (0..350).map(term).sum::<f64>()
+}
+
+const SIGMA_PX: f64 = 0.8;
+
+/// A linear 16-bit grey picture with an edge slanted by 5°, from 10 to 70 % of full scale.
+fn edge_picture(side: u32, gain: impl Fn(u32, u32) -> f64) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+    let (sin, cos) = 5.0_f64.to_radians().sin_cos();
+    ImageBuffer::from_fn(side, side, |x, y| {
+        let half = 0.5 * f64::from(side);
+        let distance = (f64::from(x) - half) * cos + (f64::from(y) - half) * sin;
+        let light = 0.1 + 0.6 * blurred_edge(distance.clamp(-20.0, 20.0), SIGMA_PX);
+        Luma([(light * gain(x, y) * 65535.0).round() as u16])
+    })
+}
+
+/// Where the MTF of the blur is one half, cycles a pixel: exp(−2 (π σ f)²) = ½.
+fn half_frequency() -> f64 {
+    (0.5 * 2.0_f64.ln()).sqrt() / (std::f64::consts::PI * SIGMA_PX)
+}
+
+#[test]
+fn an_edge_is_found_and_has_its_mtf50() {
+    let folder = tempfile::tempdir().unwrap();
+    edge_picture(120, |_, _| 1.0).save(folder.path().join("edge.png")).unwrap();
+    let arguments = ["measure", "mtf", "edge.png", "--pixel-um", "4", "--json", "-o", "out"];
+    let measured = json(folder.path(), &arguments);
+    let channel = &measured["channels"][0];
+    // The bar of the e-SFR tests: MTF50 within 1 %.
+    let mtf50 = number(&channel["mtf50_cycles_per_pixel"]);
+    assert!((mtf50 / half_frequency() - 1.0).abs() < 0.01, "{mtf50}, not {}", half_frequency());
+    assert!((number(&channel["mtf50_cycles_per_mm"]) / (mtf50 * 250.0) - 1.0).abs() < 1e-9);
+    assert!((number(&measured["slant_deg"]) - 5.0).abs() < 0.1);
+    for name in ["mtf.json", "mtf.svg", "mtf.png"] {
+        assert!(fs::metadata(folder.path().join("out").join(name)).unwrap().len() > 1000, "{name}");
+    }
+    assert!(output(folder.path(), &["measure", "mtf", "edge.png"]).contains("MTF50P"));
+}
+
+#[test]
+fn a_mosaic_is_measured_filter_by_filter() {
+    let folder = tempfile::tempdir().unwrap();
+    // Filters of different sensitivity would look like edges themselves.
+    let gain = |x: u32, y: u32| [1.0, 0.6, 0.4][((x % 2) + (y % 2)) as usize];
+    edge_picture(200, gain).save(folder.path().join("raw.png")).unwrap();
+    let measured = json(folder.path(), &["measure", "mtf", "raw.png", "--mosaic", "RGGB", "--json"]);
+    let channels = measured["channels"].as_array().unwrap();
+    let names: Vec<&str> = channels.iter().map(|c| c["channel"].as_str().unwrap()).collect();
+    assert_eq!(names, ["R", "G", "B"]);
+    for channel in channels {
+        let mtf50 = number(&channel["mtf50_cycles_per_pixel"]);
+        assert!((mtf50 / half_frequency() - 1.0).abs() < 0.01, "{}: {mtf50}", channel["channel"]);
+    }
+}
+
+/// Points of Gaussian light in linear 16-bit grey: column, row and standard deviation, pixels.
+fn points_picture(points: &[(f64, f64, f64)]) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+    ImageBuffer::from_fn(160, 120, |x, y| {
+        let light = points.iter().enumerate().map(|(i, &(column, row, sigma))| {
+            let r2 = (f64::from(x) - column).powi(2) + (f64::from(y) - row).powi(2);
+            (0.8 - 0.2 * i as f64) * (-0.5 * r2 / (sigma * sigma)).exp()
+        });
+        Luma([((0.05 + light.sum::<f64>()) * 65535.0).round() as u16])
+    })
+}
+
+#[test]
+fn points_have_their_places_and_moments() {
+    let folder = tempfile::tempdir().unwrap();
+    points_picture(&[(100.3, 40.6, 3.0), (40.0, 80.25, 2.0)]).save(folder.path().join("points.png")).unwrap();
+    let measured = json(folder.path(), &["measure", "spot", "points.png", "--pixel-um", "2", "--json", "-o", "out"]);
+    let spots = measured["spots"].as_array().unwrap();
+    assert_eq!(spots.len(), 2);
+    for (spot, (column, row, sigma)) in spots.iter().zip([(100.3, 40.6, 3.0), (40.0, 80.25, 2.0)]) {
+        // Sixteen bits and windows of five standard deviations and more.
+        let close = |key: &str, expected: f64, within: f64| {
+            assert!((number(&spot[key]) - expected).abs() < within, "{key}: {} not {expected}", spot[key]);
+        };
+        close("column", column, 0.01);
+        close("row", row, 0.01);
+        close("centroid_x_mm", 2e-3 * (column - 79.5), 2e-5);
+        close("centroid_y_mm", 2e-3 * (59.5 - row), 2e-5);
+        close("sigma_x_um", 2.0 * sigma, 0.02);
+        close("rms_radius_um", 2.0 * sigma * 2.0_f64.sqrt(), 0.03);
+        // Encircled energy takes pixels as even squares, which widens the spot by a twelfth of a pixel squared.
+        let widened = (sigma * sigma + 1.0 / 12.0_f64).sqrt();
+        close("ee50_radius_um", 2.0 * widened * 1.1774, 0.03);
+        close("ee80_radius_um", 2.0 * widened * 1.7941, 0.03);
+    }
+    assert!(folder.path().join("out/spot.svg").exists() && folder.path().join("out/spot.json").exists());
+}
+
+#[test]
+fn a_sensor_on_the_bench_and_its_frames_from_files_agree() {
+    let folder = tempfile::tempdir().unwrap();
+    let bench =
+        ["measure", "noise", "--sensor", "machine-vision-mono", "--size", "128", "--levels", "20", "--stack", "16"];
+    let kept = ["--keep-frames", "frames", "--json", "-o", "frames"];
+    let simulated = json(folder.path(), &[&bench[..], &kept].concat());
+    let sheet = &simulated["data_sheet"];
+    // 128² pixels: the variance of each of 14 levels is known to 1.1 %, K to 0.6 %.
+    for (key, within) in [("gain_dn_per_e", 0.02), ("quantum_efficiency", 0.02), ("dark_noise_e", 0.04)] {
+        let ratio = number(&simulated[key]) / number(&sheet[key]);
+        assert!((ratio - 1.0).abs() < within, "{key}: {ratio}");
+    }
+    let from_files = json(folder.path(), &["measure", "noise", "frames", "--json"]);
+    for key in ["gain_dn_per_e", "dark_noise_e", "dsnu_e", "prnu_percent", "dynamic_range_db", "max_snr_db"] {
+        let [a, b] = [&simulated, &from_files].map(|data| number(&data[key]));
+        // The descriptor holds photons to six places.
+        assert!((a / b - 1.0).abs() < 1e-6, "{key}: {a} and {b}");
+    }
+    for name in ["noise.json", "photon-transfer.svg", "photon-transfer.png", "snr.svg", "snr.png"] {
+        assert!(folder.path().join("frames").join(name).exists(), "{name}");
+    }
+    // Without a descriptor the photons are not known, but the gain is.
+    fs::remove_file(folder.path().join("frames/descriptor.txt")).unwrap();
+    for entry in fs::read_dir(folder.path().join("frames")).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        // The dark frames of longer times do not belong to the flat frames.
+        if name.starts_with("dark") && !name.starts_with("dark-000") {
+            fs::remove_file(path).unwrap();
+        }
+    }
+    let by_name = json(folder.path(), &["measure", "noise", "frames", "--json"]);
+    assert!(by_name["quantum_efficiency"].is_null());
+    assert!((number(&by_name["gain_dn_per_e"]) / number(&simulated["gain_dn_per_e"]) - 1.0).abs() < 0.02);
+}
+
+/// 24 patches of even grey-ish colours in sRGB; the real ones come from `dioptric` itself in other tests.
+fn chart_picture(shift: u8) -> ImageBuffer<Rgb<u8>, Vec<u8>> {
+    // sRGB of the 24 patches as they are commonly printed (BabelColor's averages), D65.
+    const PATCHES: [[u8; 3]; 24] = [
+        [115, 82, 68],
+        [194, 150, 130],
+        [98, 122, 157],
+        [87, 108, 67],
+        [133, 128, 177],
+        [103, 189, 170],
+        [214, 126, 44],
+        [80, 91, 166],
+        [193, 90, 99],
+        [94, 60, 108],
+        [157, 188, 64],
+        [224, 163, 46],
+        [56, 61, 150],
+        [70, 148, 73],
+        [175, 54, 60],
+        [231, 199, 31],
+        [187, 86, 149],
+        [8, 133, 161],
+        [243, 243, 242],
+        [200, 200, 200],
+        [160, 160, 160],
+        [122, 122, 121],
+        [85, 85, 85],
+        [52, 52, 52],
+    ];
+    ImageBuffer::from_fn(280, 200, |x, y| {
+        let (i, j) = ((x as i32 - 20).div_euclid(40), (y as i32 - 20).div_euclid(40));
+        let inside = |v: u32| (v as i32 - 20).rem_euclid(40) >= 4;
+        if (0..6).contains(&i) && (0..4).contains(&j) && inside(x) && inside(y) {
+            let [r, g, b] = PATCHES[(6 * j + i) as usize];
+            Rgb([r.saturating_add(shift), g, b])
+        } else {
+            Rgb([20, 20, 20])
+        }
+    })
+}
+
+#[test]
+fn a_chart_is_found_and_two_pictures_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    chart_picture(0).save(folder.path().join("chart.png")).unwrap();
+    chart_picture(6).save(folder.path().join("reddish.png")).unwrap();
+    let found = json(folder.path(), &["measure", "colour", "chart.png", "--json", "-o", "out"]);
+    assert_eq!(found["patches"].as_array().unwrap().len(), 24);
+    // Published sRGB values, 8 bits and the charts of different years: a few ΔE at most.
+    assert!(number(&found["mean_delta_e"]) < 3.0, "{}", found["mean_delta_e"]);
+    let given =
+        json(folder.path(), &["measure", "colour", "chart.png", "--json", "--corners", "22,22,258,22,258,178,22,178"]);
+    assert!((number(&given["mean_delta_e"]) - number(&found["mean_delta_e"])).abs() < 0.05);
+    let reddish = json(folder.path(), &["measure", "colour", "reddish.png", "--json"]);
+    assert!(number(&reddish["mean_delta_e"]) > number(&found["mean_delta_e"]) + 0.5);
+    for name in ["colour.json", "colour-ab.svg", "colour-ab.png", "colour-delta-e.svg"] {
+        assert!(folder.path().join("out").join(name).exists(), "{name}");
+    }
+
+    let compare = ["measure", "colour", "chart.png", "--json", "--against"];
+    let same = json(folder.path(), &[&compare[..], &["chart.png"]].concat());
+    assert!(same["psnr_db"].is_null() && number(&same["scielab"]["max"]) < 1e-3);
+    assert!((number(&same["ssim"]) - 1.0).abs() < 1e-4);
+    let other = json(folder.path(), &[&compare[..], &["reddish.png", "--patch", "30,150,20,20", "-o", "cmp"]].concat());
+    // Red differs by 6 codes of 255 in the patches: 10 log10(3 / (share of patches × (6/255)²)).
+    let share = 36.0 * 36.0 * 24.0 / (280.0 * 200.0);
+    let expected = 10.0 * (3.0 / (share * (6.0_f64 / 255.0).powi(2))).log10();
+    assert!((number(&other["psnr_db"]) - expected).abs() < 0.05, "{} not {expected}", other["psnr_db"]);
+    assert!(number(&other["scielab"]["mean"]) > 0.5 && folder.path().join("cmp/scielab.png").exists());
+}
+
+#[test]
+fn bad_input_ends_in_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    GrayImage::from_pixel(64, 64, Luma([90])).save(path.join("even.png")).unwrap();
+    chart_picture(0).save(path.join("chart.png")).unwrap();
+    fs::write(path.join("text.png"), "no picture").unwrap();
+    fs::write(path.join("list.txt"), "b 10 many\n").unwrap();
+    fs::create_dir(path.join("empty")).unwrap();
+    for (arguments, words) in [
+        (&["mtf", "absent.png"][..], &["absent.png"][..]),
+        (&["mtf", "text.png"], &["text.png"]),
+        (&["mtf", "even.png"], &["even.png", "slanted edge"]),
+        (&["mtf", "even.png", "--region", "1,2,3"], &["--region", "x,y,w,h"]),
+        (&["mtf", "even.png", "--region", "40,0,64,64"], &["64 × 64", "40"]),
+        (&["mtf", "even.png", "--mosaic", "RGB"], &["--mosaic", "RGGB"]),
+        (&["mtf", "chart.png", "--mosaic", "RGGB"], &["--mosaic"]),
+        (&["mtf", "even.png", "--pixel-um", "0"], &["--pixel-um"]),
+        (&["mtf", "even.png", "-o", "even.png"], &["cannot write even.png"]),
+        (&["spot", "even.png"], &["even.png", "spot"]),
+        (&["spot", "chart.png", "--window", "4"], &["--window", "odd"]),
+        (&["noise", "absent"], &["absent"]),
+        (&["noise", "empty"], &["empty", "dark"]),
+        (&["noise", "list.txt"], &["list.txt:1", "many"]),
+        (&["noise", "--sensor", "no-such"], &["no-such", "imx363"]),
+        (&["noise", "--sensor", "imx363", "--filter", "X"], &["'X'", "R, G, B"]),
+        (&["noise", "--sensor", "imx363", "--wavelength-nm", "2000"], &["2000 nm"]),
+        (&["noise", "--sensor", "imx363", "--size", "2"], &["side", "2"]),
+        (&["colour", "even.png"], &["even.png", "chart", "corners"]),
+        (&["colour", "chart.png", "--corners", "0,0,1"], &["--corners"]),
+        (&["colour", "chart.png", "--corners", "0,0,900,0,900,900,0,900"], &["within"]),
+        (&["colour", "chart.png", "--illuminant", "D66"], &["D66", "D65"]),
+        (&["colour", "chart.png", "--against", "even.png"], &["280", "64 × 64"]),
+        (&["colour", "chart.png", "--against", "chart.png", "--pixels-per-degree", "0"], &["pixels_per_degree"]),
+    ] {
+        check_error(path, &[&["measure"], arguments].concat(), words);
+    }
+}

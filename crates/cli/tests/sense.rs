@@ -1,0 +1,144 @@
+//! `dioptric sense` on the built program: every file of a frame, bursts, brackets and oblique light.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot set up its files fails")]
+
+mod common;
+
+use std::{fs, path::Path};
+
+use common::{check_error, output};
+use image::{ColorType, DynamicImage};
+use serde_json::Value;
+
+/// An even target on 48 × 32 pixels of 200 µm.
+const CAMERA: &str = r#"(
+    name: "small",
+    lens: BuiltIn("dgauss-50mm"),
+    stop: FNumber(4.0),
+    focus: DistanceMm(2000.0),
+    film: Pixels(columns: 48, rows: 32, pitch_um: 200.0),
+    sensor: BuiltIn("nikon-d5100"),
+    scene: (source: Target(pattern: Uniform, columns: 32, rows: 32), field_of_view_deg: 14.0, depth_m: 2.0),
+    wavelengths: ListNm([450.0, 550.0, 650.0]),
+)"#;
+
+/// The data sheet of a colour camera with the pixels of that film.
+fn sheet() -> String {
+    let sheet = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../sensor/data/nikon-d5100.ron")).unwrap();
+    let sized = |line: &str| match line.trim_start().split(':').next() {
+        Some("rows") => "    rows: 32,".to_owned(),
+        Some("columns") => "    columns: 48,".to_owned(),
+        Some("pixel_pitch_um") => "    pixel_pitch_um: 200.0,".to_owned(),
+        Some("row_time_us") => String::new(),
+        _ => line.to_owned(),
+    };
+    let lines: Vec<String> = sheet.lines().map(sized).collect();
+    let text = lines.join("\n");
+    let end = text.rfind(')').unwrap();
+    format!("{}    row_time_us: 10.0,\n)", &text[..end])
+}
+
+/// Returns a folder with `light.exr`, a spectral irradiance, and `small.ron`, a sensor for it.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    fs::write(folder.path().join("small.ron"), sheet()).unwrap();
+    output(folder.path(), &["run", "camera.ron", "--out", "run", "--quiet"]);
+    fs::rename(folder.path().join("run/irradiance.exr"), folder.path().join("light.exr")).unwrap();
+    folder
+}
+
+fn sense(folder: &Path, sensor: &str, options: &[&str]) -> Value {
+    let arguments = [&["sense", "light.exr", "--sensor", sensor, "--out", "out", "--json"], options].concat();
+    serde_json::from_str(&output(folder, &arguments)).unwrap()
+}
+
+#[test]
+fn every_file_of_a_frame_is_written_and_reads_back() {
+    let folder = folder();
+    let all = "electrons,raw-tiff,raw-dng,picture-png16,picture-tiff8,picture-tiff16,picture-exr";
+    sense(folder.path(), "small.ron", &["--also", all]);
+    let open = |name: &str| -> DynamicImage { image::open(folder.path().join("out").join(name)).unwrap() };
+    assert_eq!(open("raw.png").color(), ColorType::L16);
+    assert_eq!(open("raw.tiff").into_luma16(), open("raw.png").into_luma16());
+    assert_eq!(open("picture.png").color(), ColorType::Rgb8);
+    assert_eq!(open("picture-8.tiff").into_rgb8(), open("picture.png").into_rgb8());
+    assert_eq!((open("picture-16.png").color(), open("picture-16.tiff").color()), (ColorType::Rgb16, ColorType::Rgb16));
+    assert_eq!(open("picture-16.tiff").into_rgb16(), open("picture-16.png").into_rgb16());
+    let dng = fs::read(folder.path().join("out/raw.dng")).unwrap();
+    assert_eq!(&dng[..4], b"II*\0");
+    // The EXR files open as planes: their mean is measured by the program itself.
+    for name in ["electrons.exr", "volts.exr", "picture.exr"] {
+        let path = format!("out/{name}");
+        let run = common::dioptric(folder.path(), &["measure", "spot", &path]);
+        // An even field has no spots, but it was read.
+        assert!(!String::from_utf8_lossy(&run.stderr).contains("cannot be read"), "{name}");
+        assert!(fs::metadata(folder.path().join(path)).unwrap().len() > 1000);
+    }
+    output(folder.path(), &["run", "camera.ron", "--out", "both", "--quiet", "--also", "electrons,raw-dng"]);
+    assert!(folder.path().join("both/electrons.exr").exists() && folder.path().join("both/raw.dng").exists());
+}
+
+/// Returns the standard deviation of the picture's green codes in the middle of the frame.
+fn noise(folder: &Path) -> f64 {
+    let picture = image::open(folder.join("out/picture-16.png")).unwrap().into_rgb16();
+    let middle = (8..24).flat_map(|y| (12..36).map(move |x| (x, y)));
+    let codes: Vec<f64> = middle.map(|(x, y)| f64::from(picture.get_pixel(x, y).0[1])).collect();
+    let mean = codes.iter().sum::<f64>() / codes.len() as f64;
+    (codes.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / codes.len() as f64).sqrt()
+}
+
+#[test]
+fn a_burst_is_less_noisy_and_a_bracket_is_a_picture_too() {
+    let folder = folder();
+    let metered = sense(folder.path(), "small.ron", &[])["exposure_time_s"].as_f64().unwrap();
+    // In the dark most noise is temporal.
+    let time_s = (0.01 * metered).to_string();
+    let short = ["--exposure-s", &time_s, "--also", "picture-png16"];
+    let single = sense(folder.path(), "small.ron", &short);
+    assert_eq!(single["row_time_us"].as_f64(), Some(10.0));
+    // 31 rows later, 10 µs each.
+    assert!((single["last_row_later_ms"].as_f64().unwrap() - 0.31).abs() < 1e-9);
+    let one = noise(folder.path());
+    sense(folder.path(), "small.ron", &[&short[..], &["--burst", "16"]].concat());
+    let sixteen = noise(folder.path());
+    // A quarter of the temporal noise; what is fixed to the chip stays.
+    assert!(sixteen < 0.5 * one, "{sixteen} of {one}");
+    sense(folder.path(), "small.ron", &[&short[..], &["--bracket-stops", "0,2,4"]].concat());
+    let bracket = noise(folder.path());
+    assert!(bracket < 0.5 * one, "{bracket} of {one}");
+}
+
+#[test]
+fn oblique_light_darkens_the_corners_of_a_sensor_that_minds_it() {
+    let folder = folder();
+    let sheet = sheet();
+    let end = sheet.rfind(')').unwrap();
+    let oblique = format!("{}    chief_ray_response: [(0.0, 1.0), (30.0, 0.2)],\n)", &sheet[..end]);
+    fs::write(folder.path().join("oblique.ron"), oblique).unwrap();
+    let mean = |options: &[&str]| {
+        let options = [&["--exposure-s", "1e-6"], options].concat();
+        sense(folder.path(), "oblique.ron", &options)["channels"][1]["mean_e"].as_f64().unwrap()
+    };
+    // The sensor is 9.6 mm wide: its edge is seen from the pupil at 26°.
+    assert!(mean(&["--exit-pupil-mm", "10"]) < 0.8 * mean(&[]));
+}
+
+#[test]
+fn what_cannot_be_asked_is_refused_in_one_sentence() {
+    let folder = folder();
+    for (options, words) in [
+        (&["--also", "electrons,jpeg"][..], &["--also", "'jpeg'", "raw-dng"][..]),
+        (&["--burst", "0"], &["Burst", "0"]),
+        (&["--bracket-stops", "0,many"], &["--bracket-stops", "many"]),
+        (&["--exit-pupil-mm", "0"], &["exit_pupil"]),
+    ] {
+        let arguments = [&["sense", "light.exr", "--sensor", "small.ron", "--out", "out"], options].concat();
+        check_error(folder.path(), &arguments, words);
+    }
+    let at = sheet().find("adc: Bits").unwrap();
+    let line = sheet()[at..].lines().next().unwrap().to_owned();
+    fs::write(folder.path().join("analog.ron"), sheet().replace(&line, "adc: Analog,")).unwrap();
+    let volts = ["sense", "light.exr", "--sensor", "analog.ron", "--out", "out", "--also", "raw-dng"];
+    check_error(folder.path(), &volts, &["a DNG file", "volts"]);
+}

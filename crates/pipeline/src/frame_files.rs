@@ -1,0 +1,187 @@
+//! The frames of one exposure as files: electrons, volts, raw and picture, in the formats asked for.
+
+use std::{fs, path::Path};
+
+use dioptric_scene::write_planes_exr;
+use dioptric_sensor::{Depth, ElectronRate, Exposure, Picture, Processing, Raw, Sensor};
+use dioptric_spectrum::Illuminant;
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use ndarray::{Array2, Axis};
+use serde::{Deserialize, Serialize};
+
+use crate::{Exposed, PipelineError};
+
+/// What is written besides the picture and the report.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Outputs {
+    /// `irradiance.exr`, the spectral irradiance on the sensor.
+    pub irradiance: bool,
+    /// `depth.exr`, the depth that was used.
+    pub depth: bool,
+    /// `volts.exr`, the voltages of the pixels.
+    pub volts: bool,
+    /// `raw.png`, the digital numbers in 16 bits.
+    pub raw: bool,
+    /// More files of the sensor's frames.
+    pub also: Vec<FrameFile>,
+}
+
+impl Default for Outputs {
+    /// Everything but the additional files.
+    fn default() -> Self {
+        Self { irradiance: true, depth: true, volts: true, raw: true, also: Vec::new() }
+    }
+}
+
+/// A file of a sensor's frame or of the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FrameFile {
+    /// `electrons.exr`: the electrons of each pixel.
+    Electrons,
+    /// `raw.tiff`: the digital numbers, 16 bits.
+    RawTiff,
+    /// `raw.dng`: the digital numbers with mosaic, levels and colour matrices.
+    RawDng,
+    /// `picture-16.png`: the picture, 16 bits.
+    PicturePng16,
+    /// `picture-8.tiff`: the picture, 8 bits.
+    PictureTiff8,
+    /// `picture-16.tiff`: the picture, 16 bits.
+    PictureTiff16,
+    /// `picture.exr`: the picture's light in the primaries of sRGB, linear and not clipped.
+    PictureExr,
+}
+
+impl FrameFile {
+    /// Every additional file with its name on the command line.
+    pub const NAMES: [(&'static str, Self); 7] = [
+        ("electrons", Self::Electrons),
+        ("raw-tiff", Self::RawTiff),
+        ("raw-dng", Self::RawDng),
+        ("picture-png16", Self::PicturePng16),
+        ("picture-tiff8", Self::PictureTiff8),
+        ("picture-tiff16", Self::PictureTiff16),
+        ("picture-exr", Self::PictureExr),
+    ];
+
+    /// Returns the files of a list of names, separated by commas.
+    ///
+    /// # Errors
+    /// Names the word that is no such file, and those that are.
+    pub fn parse_list(text: &str) -> Result<Vec<Self>, PipelineError> {
+        let known = || Self::NAMES.map(|(name, _)| name).join(", ");
+        let file = |word: &str| {
+            Self::NAMES.iter().find(|(name, _)| *name == word.trim()).map(|(_, file)| *file).ok_or_else(|| {
+                PipelineError::Value {
+                    origin: "the command line".to_owned(),
+                    key: "--also",
+                    found: format!("'{}'", word.trim()),
+                    expected: format!("one or more of {}", known()),
+                }
+            })
+        };
+        text.split(',').map(file).collect()
+    }
+}
+
+/// The frames of one exposure.
+#[derive(Clone, Copy)]
+pub(crate) struct Frames<'a> {
+    pub(crate) sensor: &'a Sensor,
+    pub(crate) exposure: &'a Exposure,
+    pub(crate) rate: &'a ElectronRate,
+    pub(crate) exposed: &'a Exposed,
+    pub(crate) processing: &'a Processing,
+    /// The light on the scene; D65 where it is not known.
+    pub(crate) light: Illuminant,
+}
+
+/// Writes the frames and the picture; returns the names of the files and the bytes of the 8-bit PNG picture.
+pub(crate) fn write_frames(
+    frames: &Frames<'_>,
+    picture: &Picture,
+    outputs: &Outputs,
+    folder: &Path,
+) -> Result<(Vec<String>, Vec<u8>), PipelineError> {
+    let mut names = vec!["picture.png".to_owned()];
+    if outputs.volts {
+        names.push(write_planes(frames, &frames.exposed.volts.planes_v, "V", "volts.exr", folder)?);
+    }
+    if outputs.raw && frames.exposed.raw.planes.iter().all(|plane| plane.dn().is_some()) {
+        names.extend(write_raw(&frames.exposed.raw, "png", folder)?);
+    }
+    for file in &outputs.also {
+        names.extend(write_also(frames, picture, *file, folder)?);
+    }
+    let mut png = Vec::new();
+    PngEncoder::new(&mut png)
+        .write_image(&picture.to_rgb8(), picture.columns() as u32, picture.rows() as u32, ExtendedColorType::Rgb8)
+        .map_err(|e| PipelineError::Png { reason: e.to_string() })?;
+    let path = folder.join("picture.png");
+    fs::write(&path, &png).map_err(|e| PipelineError::Write { path, reason: e.to_string() })?;
+    Ok((names, png))
+}
+
+fn write_also(
+    frames: &Frames<'_>,
+    picture: &Picture,
+    file: FrameFile,
+    folder: &Path,
+) -> Result<Vec<String>, PipelineError> {
+    let write_picture = |name: &str, depth| {
+        picture.write(&folder.join(name), depth)?;
+        Ok(vec![name.to_owned()])
+    };
+    match file {
+        FrameFile::Electrons => {
+            Ok(vec![write_planes(frames, &frames.exposed.electrons.planes_e, "e", "electrons.exr", folder)?])
+        }
+        FrameFile::RawTiff => write_raw(&frames.exposed.raw, "tiff", folder),
+        FrameFile::RawDng => {
+            frames.sensor.write_dng(&frames.exposed.raw, frames.light, &folder.join("raw.dng"))?;
+            Ok(vec!["raw.dng".to_owned()])
+        }
+        FrameFile::PicturePng16 => write_picture("picture-16.png", Depth::Sixteen),
+        FrameFile::PictureTiff8 => write_picture("picture-8.tiff", Depth::Eight),
+        FrameFile::PictureTiff16 => write_picture("picture-16.tiff", Depth::Sixteen),
+        FrameFile::PictureExr => {
+            // Developed once more, because the picture holds codes.
+            let light = frames.sensor.develop_linear(frames.exposed.developed_from(), frames.processing)?;
+            let light = light.bright(frames.processing.brightness);
+            let planes: Vec<Array2<f32>> = (0..3).map(|k| light.index_axis(Axis(2), k).to_owned()).collect();
+            let named: Vec<(&str, &Array2<f32>)> = ["R", "G", "B"].into_iter().zip(&planes).collect();
+            write_planes_exr(&folder.join("picture.exr"), &named, true)?;
+            Ok(vec!["picture.exr".to_owned()])
+        }
+    }
+}
+
+/// Writes planes of numbers as EXR: one channel of a name, or one a filter.
+fn write_planes(
+    frames: &Frames<'_>,
+    planes: &[Array2<f32>],
+    name: &str,
+    file: &str,
+    folder: &Path,
+) -> Result<String, PipelineError> {
+    let names: Vec<&str> = match planes.len() {
+        1 => vec![name],
+        _ => frames.exposed.raw.filter_names.iter().map(String::as_str).collect(),
+    };
+    let named: Vec<_> = names.into_iter().zip(planes).collect();
+    write_planes_exr(&folder.join(file), &named, false)?;
+    Ok(file.to_owned())
+}
+
+/// Writes each plane of digital numbers as a 16-bit grey picture.
+fn write_raw(raw: &Raw, extension: &str, folder: &Path) -> Result<Vec<String>, PipelineError> {
+    let names = raw.planes.iter().zip(&raw.filter_names).map(|(plane, filter)| {
+        let is_single = raw.planes.len() == 1;
+        let name = if is_single { format!("raw.{extension}") } else { format!("raw.{filter}.{extension}") };
+        let own = Raw { planes: vec![plane.clone()], ..raw.clone() };
+        own.write(&folder.join(&name))?;
+        Ok(name)
+    });
+    names.collect()
+}
