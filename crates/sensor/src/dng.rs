@@ -159,7 +159,8 @@ impl Tags<'_> {
         directory.write_tag(Tag::Unknown(CFA_REPEAT_PATTERN_DIM), &[tile.rows() as u16, tile.columns() as u16][..])?;
         let pattern: Vec<u8> = (0..tile.rows()).flat_map(|row| tile.row(row)).map(|&f| self.colors[f]).collect();
         directory.write_tag(Tag::Unknown(CFA_PATTERN), &pattern[..])?;
-        let planes: Vec<u8> = plane_order(&self.colors).iter().map(|&filter| self.colors[filter]).collect();
+        let planes: Vec<u8> =
+            plane_order(&self.colors, self.raw.tile.as_ref()).iter().map(|&filter| self.colors[filter]).collect();
         directory.write_tag(Tag::Unknown(CFA_PLANE_COLOR), &planes[..])?;
         directory.write_tag(Tag::Unknown(CFA_LAYOUT), 1_u16)
     }
@@ -168,7 +169,7 @@ impl Tags<'_> {
         &self,
         directory: &mut tiff::encoder::DirectoryEncoder<'_, W, tiff::encoder::TiffKindStandard>,
     ) -> Result<(), tiff::TiffError> {
-        let order = plane_order(&self.colors);
+        let order = plane_order(&self.colors, self.raw.tile.as_ref());
         for (matrix_tag, light_tag, light, number) in [
             (COLOR_MATRIX_1, CALIBRATION_ILLUMINANT_1, Illuminant::A, STANDARD_LIGHT_A),
             (COLOR_MATRIX_2, CALIBRATION_ILLUMINANT_2, Illuminant::D65, D65),

@@ -3,7 +3,7 @@
 use dioptric_spectrum::{Illuminant, Observer, Spectrum, Xyz, adapt_bradford, color_checker_reflectances};
 
 use crate::{
-    ColorMatrix, Raw, Sensor, SensorError,
+    ColorMatrix, Raw, Sensor, SensorError, Tile,
     balance::{fine_grid, white_response},
     least_squares::Normal,
 };
@@ -43,12 +43,18 @@ pub(crate) fn color_codes(raw: &Raw) -> Result<Vec<u8>, SensorError> {
 
 /// Returns the order in which a file counts the filters as planes.
 ///
-/// It is the sensor's own, but for cyan, magenta and yellow: readers that go back to dcraw count those in this order,
-/// whatever the file says.
-pub(crate) fn plane_order(codes: &[u8]) -> Vec<usize> {
+/// It is the sensor's own, but for mosaics of three: readers that go back to dcraw want the filter that lies on every
+/// second pixel as the second plane, and take no matrix whose first plane does not see X, so that the redder of the
+/// others comes first. For red, green and blue that is the usual order.
+pub(crate) fn plane_order(codes: &[u8], tile: Option<&Tile>) -> Vec<usize> {
+    const REDDEST_FIRST: [u8; 7] = [0, 4, 5, 6, 1, 2, 3];
     let mut order: Vec<usize> = (0..codes.len()).collect();
-    if codes.iter().all(|code| (3..=5).contains(code)) {
-        order.sort_by_key(|&filter| codes[filter]);
+    if let (3, Some(tile)) = (codes.len(), tile) {
+        let pixels = |filter: usize| (0..tile.rows()).flat_map(|row| tile.row(row)).filter(|f| **f == filter).count();
+        order.sort_by_key(|&filter| REDDEST_FIRST.iter().position(|code| *code == codes[filter]));
+        let most = (0..3).rev().max_by_key(|&place| pixels(order[place])).unwrap_or(1);
+        let filter = order.remove(most);
+        order.insert(1, filter);
     }
     order
 }
@@ -142,5 +148,20 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_filter_of_every_second_pixel_is_the_second_plane() {
+        let order = |letters: &str, names: &[&str]| {
+            let tile = crate::Cfa::two_by_two(letters).unwrap().resolve("test", names).unwrap().unwrap();
+            let codes: Vec<u8> =
+                names.iter().map(|name| KNOWN.iter().position(|known| known == name).unwrap() as u8).collect();
+            plane_order(&codes, Some(&tile)).iter().map(|&filter| names[filter]).collect::<String>()
+        };
+        assert_eq!(order("GBRG", &["R", "G", "B"]), "RGB");
+        assert_eq!(order("GBRG", &["B", "G", "R"]), "RGB");
+        assert_eq!(order("RYYB", &["R", "Y", "B"]), "RYB");
+        assert_eq!(order("CYYM", &["C", "Y", "M"]), "MYC");
+        assert_eq!(plane_order(&[0, 1, 2], None), [0, 1, 2]);
     }
 }
