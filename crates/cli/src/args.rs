@@ -141,6 +141,8 @@ pub(crate) enum DiffractionKind {
     HurbScene3d,
     /// Ray bending with constants fitted to Airy's pattern
     HurbCalibrated,
+    /// The sum of waves while the blur is small enough for it, ray bending (γ = 1) beyond
+    Wave,
 }
 
 /// What the picture makes white.
@@ -340,9 +342,15 @@ pub(crate) struct PsfArgs {
     /// Adds MTF tables at these frequencies, cycles/mm
     #[arg(long, value_name = "LIST")]
     pub(crate) mtf_per_mm: Option<String>,
-    /// Writes the pictures: an EXR with a layer a PSF, or a PNG or SVG mosaic
+    /// Writes the pictures: an EXR with a layer a PSF, or a PNG mosaic
     #[arg(long, short, value_name = "F")]
     pub(crate) output: Option<PathBuf>,
+    /// Writes plots into this folder: line and edge spread, MTF, encircled energy, MTF through focus; SVG and PNG
+    #[arg(long, value_name = "DIR")]
+    pub(crate) plots: Option<PathBuf>,
+    /// Weights of the wavelengths in the MTF of the whole light [default: all alike]
+    #[arg(long, value_name = "LIST", requires = "plots")]
+    pub(crate) spectral_weights: Option<String>,
 }
 
 /// Where the film is: at a focus or at a place.

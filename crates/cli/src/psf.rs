@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dioptric_pipeline::{FocusChoice, PsfRequest, PsfSampling, PsfSet, Staged, open_lens, parse_numbers};
+use dioptric_pipeline::{FocusChoice, PsfRequest, PsfSampling, PsfSet, Staged, drawing_file, open_lens, parse_numbers};
 
 use crate::{
     args::{Common, PsfArgs, PsfMode},
@@ -40,6 +40,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     };
     // The place is tried before the work.
     let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
+    let plots = arguments.plots.as_ref().map(|folder| Staged::folder(folder)).transpose()?.map(guarded);
     let bar = Bar::new(common.quiet);
     bar.show("tracing the lens", 0.0);
     let set = request.compute(&lens)?;
@@ -48,6 +49,20 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         set.write(staged.path())?;
         staged.commit()?;
         remark(common.quiet, &format!("wrote {}", path.display()));
+    }
+    if let (Some(staged), Some(folder)) = (plots, &arguments.plots) {
+        let weights = match &arguments.spectral_weights {
+            Some(list) => parse_numbers("--spectral-weights", list)?,
+            None => Vec::new(),
+        };
+        for (name, svg) in set.plots(&request.through_focus(&lens, &set)?, &weights)? {
+            for extension in ["svg", "png"] {
+                let path = staged.path().join(format!("{name}.{extension}"));
+                std::fs::write(&path, drawing_file(&svg, &path)?)?;
+            }
+        }
+        staged.commit()?;
+        remark(common.quiet, &format!("wrote plots into {}", folder.display()));
     }
     if common.json { print_json(&set.rows) } else { print(&table(&set)?) }
 }
@@ -72,12 +87,12 @@ fn table(set: &PsfSet) -> Result<String, std::fmt::Error> {
     for row in &set.rows {
         writeln!(
             text,
-            "{:>9.3} {:>12.1} {:>8.1} {:>12.5} {:>12.5} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>8.4}",
+            "{:>9.3} {:>12.1} {:>8.1} {:>12} {:>12} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>8.4}",
             row.field_deg,
             row.distance_mm,
             row.wavelength_nm,
-            row.centroid_x_mm,
-            row.centroid_y_mm,
+            fixed(row.centroid_x_mm),
+            fixed(row.centroid_y_mm),
             row.rms_radius_um,
             row.sigma_x_um,
             row.sigma_y_um,
@@ -85,6 +100,13 @@ fn table(set: &PsfSet) -> Result<String, std::fmt::Error> {
             row.ee50_radius_um,
             row.energy
         )?;
+        if let Some(share) = row.wave_share.filter(|_| row.is_of_waves()) {
+            write!(text, "{:>31} waves {:.0} %", "model", 100.0 * share)?;
+            writeln!(text, "{}", row.strehl.map_or_else(String::new, |strehl| format!(", Strehl ratio {strehl:.4}")))?;
+        }
+        if let Some(reason) = &row.fallback {
+            writeln!(text, "{:>31} bent rays in place of waves: {reason}", "model")?;
+        }
         for mtf in &row.mtf {
             writeln!(
                 text,
@@ -94,4 +116,21 @@ fn table(set: &PsfSet) -> Result<String, std::fmt::Error> {
         }
     }
     Ok(text)
+}
+
+/// Returns a number to five digits, and 0 without a sign.
+fn fixed(value: f64) -> String {
+    let text = format!("{value:.5}");
+    if text.trim_start_matches('-').bytes().all(|b| matches!(b, b'0' | b'.')) { text.replace('-', "") } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn nothing_has_no_sign() {
+        assert_eq!(
+            [-1e-9, 0.0, -0.0, -0.00001, 2.5].map(super::fixed),
+            ["0.00000", "0.00000", "0.00000", "-0.00001", "2.50000"]
+        );
+    }
 }

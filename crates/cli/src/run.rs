@@ -114,6 +114,7 @@ pub(crate) fn diffraction(kind: DiffractionKind) -> DiffractionChoice {
         DiffractionKind::Hurb => DiffractionChoice::Hurb { gamma: 1.0 },
         DiffractionKind::HurbScene3d => DiffractionChoice::Hurb { gamma: std::f64::consts::SQRT_2 },
         DiffractionKind::HurbCalibrated => DiffractionChoice::HurbCalibrated,
+        DiffractionKind::Wave => DiffractionChoice::Wave,
     }
 }
 

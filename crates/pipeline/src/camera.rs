@@ -146,6 +146,8 @@ pub enum DiffractionChoice {
     },
     /// Ray bending with constants fitted to Airy's pattern: better in focus, not in defocus.
     HurbCalibrated,
+    /// The sum of waves while the blur is small enough for it, ray bending (γ = 1) beyond.
+    Wave,
 }
 
 impl Default for DiffractionChoice {

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use dioptric_diffraction::Hurb;
+use dioptric_diffraction::{Hurb, PupilGrid, WaveNodes};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
-use dioptric_psf::{BankSettings, Diffraction, Picture, PsfBank};
+use dioptric_psf::{BankSettings, Diffraction, ModelUse, Picture, PsfBank, PsfQuery};
 use dioptric_scene::write_planes_exr;
 use image::{Rgb, RgbImage};
 use ndarray::Array2;
@@ -82,11 +82,30 @@ pub struct PsfRow {
     pub lsf_fwhm_um: f64,
     /// Radius about the centroid that holds half the energy, µm.
     pub ee50_radius_um: f64,
-    /// The share of the light that entered the stop's pupil (paper mode: the front rim's disc) that reaches the film.
+    /// Radius about the centroid that holds 80 % of the energy, µm.
+    pub ee80_radius_um: f64,
+    /// The area of the pupil that reaches the film over that of an axial point at the same distance and wavelength
+    /// (paper mode: the share of the rays over the front rim's disc).
     pub energy: f64,
+    /// The share of the picture that is the sum of waves; the rest is geometric or bent rays. Not in the paper mode.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wave_share: Option<f64>,
+    /// Why waves that were asked for were not summed, if so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fallback: Option<String>,
+    /// The Strehl ratio at the pattern's peak, where waves were summed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strehl: Option<f64>,
     /// Modulation at the frequencies asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mtf: Vec<MtfRow>,
+}
+
+impl PsfRow {
+    /// Whether any of the picture is the sum of waves.
+    pub fn is_of_waves(&self) -> bool {
+        self.wave_share.is_some_and(|share| share > 0.0)
+    }
 }
 
 /// The modulation at a spatial frequency.
@@ -199,6 +218,9 @@ impl PsfRequest {
         {
             return Err(self.wrong("rays", &n_across.to_string(), "2 to 20000"));
         }
+        if matches!(self.sampling, PsfSampling::Paper { .. }) && self.diffraction == DiffractionChoice::Wave {
+            return Err(self.wrong("diffraction", "wave", "bent rays or none in the paper mode"));
+        }
         match self.mtf_per_mm.iter().find(|f| !f.is_finite()) {
             Some(found) => Err(self.wrong("mtf_per_mm", &found.to_string(), "finite numbers")),
             None => Ok(()),
@@ -240,24 +262,54 @@ impl PsfRequest {
         let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
         let mono = lens.at(item.wavelength_nm)?;
         let point = ObjectPoint::from_field(&reference, item.field_tan(), item.dioptres);
-        let (spot, picture) = match (self.sampling, bank) {
+        let (spot, picture, model) = match (self.sampling, bank) {
             (PsfSampling::Pupil, Some(bank)) => {
-                let spot = Spot::through_pupil(lens, &mono, &point, film_mm)?;
+                let axial = ObjectPoint::from_field(&reference, DVec2::ZERO, item.dioptres);
+                let spot = Spot::through_pupil(&mono, &point, &axial, film_mm);
                 let is_lit = item.field_tan().length() <= bank.last_field_tan() && !spot.at_mm.is_empty();
-                let kernel =
-                    is_lit.then(|| bank.kernel(item.field_tan(), item.dioptres, item.wavelength_nm, self.pixel_um));
-                let picture = kernel.map_or_else(|| Array2::zeros((1, 1)), |kernel| kernel.samples);
-                (spot, self.size.map_or_else(|| picture.clone(), |size| resized(&picture, size)))
+                let drawn = is_lit.then(|| self.draw(item, bank));
+                let (picture, model) = drawn.map_or_else(|| (Array2::zeros((1, 1)), None), |(p, m)| (p, Some(m)));
+                (spot, self.size.map_or_else(|| picture.clone(), |size| resized(&picture, size)), model)
             }
             (PsfSampling::Pupil, None) => unreachable!("a bank is built for this sampling"),
             (PsfSampling::Paper { n_across }, _) => {
                 let paper = PaperRays { n_across, bending: self.diffraction.model(), seed: self.seed };
                 let spot = Spot::over_front(&mono, &point, film_mm, &paper);
                 let picture = self.counted(&spot);
-                (spot, picture)
+                (spot, picture, None)
             }
         };
-        Ok((self.measure(item, &spot, &picture), picture))
+        let mut row = self.measure(item, &spot, &picture);
+        if let Some(ModelUse { wave_share, fallback }) = model {
+            (row.wave_share, row.fallback) = (Some(wave_share), fallback);
+        }
+        if row.is_of_waves() {
+            let nodes = WaveNodes::trace(&mono, &point, film_mm, PupilGrid { n_radii: 24, n_azimuths: 96 }, None);
+            // Waves of a blur too large for these nodes have no peak to speak of.
+            row.strehl = nodes.and_then(|nodes| nodes.peak()).ok().map(|peak| peak.strehl);
+        }
+        Ok((row, picture))
+    }
+
+    /// Draws a picture: of the size asked for, or its own.
+    fn draw(&self, item: &Item, bank: &PsfBank) -> (Array2<f32>, ModelUse) {
+        let query = PsfQuery {
+            field_tan: item.field_tan(),
+            dioptres: item.dioptres,
+            wavelength_nm: item.wavelength_nm,
+            pitch_um: self.pixel_um,
+        };
+        match self.size {
+            // A picture is centred on the middle of a pixel, which an odd number has.
+            Some(size) if size % 2 == 1 => {
+                let (picture, model) = bank.picture(query, size);
+                (picture.mapv(|e| e as f32), model)
+            }
+            _ => {
+                let (kernel, model) = bank.kernel_and_model(query);
+                (kernel.samples, model)
+            }
+        }
     }
 
     fn measure(&self, item: &Item, spot: &Spot, picture: &Array2<f32>) -> PsfRow {
@@ -277,14 +329,19 @@ impl PsfRequest {
             field_deg: item.field_deg,
             distance_mm: item.distance_mm,
             wavelength_nm: item.wavelength_nm,
-            centroid_x_mm: centroid_mm.x,
-            centroid_y_mm: centroid_mm.y,
+            // Adding 0 takes the sign from a zero.
+            centroid_x_mm: centroid_mm.x + 0.0,
+            centroid_y_mm: centroid_mm.y + 0.0,
             rms_radius_um: sigma_um.length(),
             sigma_x_um: sigma_um.x,
             sigma_y_um: sigma_um.y,
             lsf_fwhm_um: measured.line_spread(0.0).full_width_at_half_maximum_um(),
             ee50_radius_um: measured.energy_radius_um(0.5),
+            ee80_radius_um: measured.energy_radius_um(0.8),
             energy: spot.energy,
+            wave_share: None,
+            fallback: None,
+            strehl: None,
             mtf: self
                 .mtf_per_mm
                 .iter()
@@ -392,6 +449,7 @@ impl DiffractionChoice {
             Self::None => None,
             Self::Hurb { gamma } => Some(Hurb::with_gamma(gamma)),
             Self::HurbCalibrated => Some(Hurb::CALIBRATED),
+            Self::Wave => Some(Hurb::PAPER),
         }
     }
 }
@@ -402,6 +460,7 @@ impl From<DiffractionChoice> for Diffraction {
             DiffractionChoice::None => Self::None,
             DiffractionChoice::Hurb { gamma } => Self::Hurb { gamma },
             DiffractionChoice::HurbCalibrated => Self::HurbCalibrated,
+            DiffractionChoice::Wave => Self::Wave,
         }
     }
 }
@@ -471,6 +530,24 @@ mod tests {
             assert!(json[key].is_f64(), "{key}");
         }
         assert_relative_eq!(json["mtf"][0]["radial"].as_f64().unwrap(), 1.0, epsilon = 1e-6);
+    }
+
+    #[test]
+    fn a_sharp_point_is_of_waves_and_a_blurred_one_is_not() {
+        let wave = PsfRequest {
+            fields_deg: vec![0.0],
+            distances_mm: vec![2000.0, 300.0],
+            wavelengths_nm: vec![550.0],
+            focus: FocusChoice::DistanceMm(2000.0),
+            diffraction: DiffractionChoice::Wave,
+            ..request()
+        };
+        let set = wave.compute(&Lens::built_in("dgauss-50mm").unwrap().with_f_number(8.0, 550.0).unwrap()).unwrap();
+        assert_eq!([set.rows[0].wave_share, set.rows[1].wave_share], [Some(1.0), Some(0.0)]);
+        let strehl = set.rows[0].strehl.unwrap();
+        assert!(strehl > 0.7 && strehl <= 1.0 && set.rows[1].strehl.is_none(), "{strehl}");
+        let paper = PsfRequest { sampling: PsfSampling::Paper { n_across: 21 }, ..wave };
+        assert!(paper.compute(&paper_lens()).is_err());
     }
 
     #[test]

@@ -2,10 +2,8 @@
 
 use dioptric_diffraction::{BendForm, Edge, Hurb, bend};
 use dioptric_optics::{
-    Interface, Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims, glam::DVec2, rays_over_front, rays_towards,
+    MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims, glam::DVec2, rays_over_front, rays_towards,
 };
-
-use crate::PipelineError;
 
 /// Rings and azimuths of the rays of a spot.
 const RINGS: usize = 24;
@@ -31,14 +29,9 @@ pub(crate) struct Moments {
 impl Spot {
     /// Sends rays evenly through the true pupil of a point.
     ///
-    /// `energy` is the share of the light that the stop alone would pass.
-    pub(crate) fn through_pupil(
-        lens: &Lens,
-        mono: &MonoLens,
-        point: &ObjectPoint,
-        film_mm: f64,
-    ) -> Result<Self, PipelineError> {
-        let Some(pupil) = PupilBoundary::find(mono, point, AZIMUTHS) else { return Ok(Self::default()) };
+    /// `energy` is the area of that pupil over that which an axial point sees.
+    pub(crate) fn through_pupil(mono: &MonoLens, point: &ObjectPoint, axial: &ObjectPoint, film_mm: f64) -> Self {
+        let Some(pupil) = PupilBoundary::find(mono, point, AZIMUTHS) else { return Self::default() };
         let (mut targets, mut areas) = (Vec::new(), Vec::new());
         for azimuth in 0..AZIMUTHS {
             let theta = std::f64::consts::TAU * azimuth as f64 / AZIMUTHS as f64;
@@ -53,11 +46,10 @@ impl Spot {
         let cones = solid_angles(point, &rays);
         mono.trace(&mut rays, Rims::Clip);
         mono.to_film(&mut rays, film_mm);
-        let open = open_lens(lens)?.at(mono.wavelength_nm())?;
-        let unvignetted_mm2 = PupilBoundary::find(&open, point, AZIMUTHS).map_or(0.0, |p| p.area_mm2());
+        let axial_mm2 = PupilBoundary::find(mono, axial, AZIMUTHS).map_or(f64::NAN, |p| p.area_mm2());
         let mut spot = Self::of_rays(&rays, |ray| areas[ray] * cones[ray]);
-        spot.energy = (pupil.area_mm2() / unvignetted_mm2).min(1.0);
-        Ok(spot)
+        spot.energy = pupil.area_mm2() / axial_mm2;
+        spot
     }
 
     /// Sends rays to a square grid over the front disc, as the paper does; `bending` also draws diffraction.
@@ -120,24 +112,10 @@ fn solid_angles(point: &ObjectPoint, rays: &RayBatch) -> Vec<f64> {
     }
 }
 
-/// Returns the lens with every rim but the stop's as wide as its surface allows, up to three times.
-fn open_lens(lens: &Lens) -> Result<Lens, PipelineError> {
-    let stop = lens.stop();
-    let opened = |(i, interface): (usize, &Interface)| {
-        let mut interface = interface.clone();
-        if i != stop {
-            let widest = 3.0 * interface.surface.semi_aperture_mm;
-            let fits = 0.999 / interface.surface.curvature_per_mm.abs();
-            interface.surface.semi_aperture_mm = widest.min(fits).max(interface.surface.semi_aperture_mm);
-        }
-        interface
-    };
-    let interfaces = lens.interfaces().iter().enumerate().map(opened).collect();
-    Ok(Lens::new(lens.name(), lens.source(), interfaces, stop)?)
-}
-
 #[cfg(test)]
 mod tests {
+    use dioptric_optics::Lens;
+
     use super::*;
 
     fn spot_at(field_deg: f64, distance_mm: f64) -> Spot {
@@ -145,7 +123,8 @@ mod tests {
         let mono = lens.at(550.0).unwrap();
         let film_mm = mono.film_mm_for(distance_mm).unwrap();
         let point = ObjectPoint::from_field(&mono, DVec2::new(field_deg.to_radians().tan(), 0.0), 1e3 / distance_mm);
-        Spot::through_pupil(&lens, &mono, &point, film_mm).unwrap()
+        let axial = ObjectPoint::from_field(&mono, DVec2::ZERO, 1e3 / distance_mm);
+        Spot::through_pupil(&mono, &point, &axial, film_mm)
     }
 
     #[test]

@@ -44,8 +44,7 @@ impl PsfBank {
     /// Fields, depths and wavelengths outside the bank are moved to its ends. The window holds the whole geometric
     /// picture, and of diffraction's Gaussians all but their far tails; the sum says how much.
     pub fn kernel(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Kernel {
-        let (energies, _) = self.draw(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um }, None);
-        render::kernel(&energies, self.settings().diffraction != Diffraction::None, pitch_um)
+        self.kernel_and_model(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um }).0
     }
 
     /// Returns the energy on each pixel of a window of `size` × `size` about the centroid, in the picture frame, and
@@ -54,9 +53,10 @@ impl PsfBank {
         self.draw(query, Some(size))
     }
 
-    /// Returns the whole picture, its side an odd number of pixels that is chosen to hold it, and the model.
-    pub fn whole_picture(&self, query: PsfQuery) -> (Array2<f64>, ModelUse) {
-        self.draw(query, None)
+    /// Returns [`kernel`](Self::kernel) with the model that drew it.
+    pub fn kernel_and_model(&self, query: PsfQuery) -> (Kernel, ModelUse) {
+        let (energies, model) = self.draw(query, None);
+        (render::kernel(&energies, self.settings().diffraction != Diffraction::None, query.pitch_um), model)
     }
 
     fn draw(&self, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {

@@ -1,5 +1,6 @@
 //! What can be wrong with a point spread function's settings.
 
+use dioptric_diffraction::DiffractionError;
 use dioptric_optics::OpticsError;
 
 /// A bank or point spread function that cannot be made.
@@ -8,6 +9,9 @@ pub enum PsfError {
     /// The lens cannot be traced.
     #[error(transparent)]
     Optics(#[from] OpticsError),
+    /// The waves of a point cannot be summed.
+    #[error(transparent)]
+    Diffraction(#[from] DiffractionError),
     /// An axis of the bank that is empty, or whose values do not ascend or are out of range.
     #[error("{axis} must be an ascending list of {expected}, found {found:?}")]
     Axis {

@@ -111,9 +111,17 @@ impl Picture {
     /// Returns the modulation for a wave along `direction_rad`, at `cycles_per_mm`: that of the pixel averages as they
     /// are, which includes the pixel's own.
     pub fn mtf(&self, direction_rad: f64, cycles_per_mm: f64) -> f64 {
-        let wave = DVec2::from_angle(direction_rad) * (2.0 * PI * cycles_per_mm * 1e-3);
-        let (real, imaginary) = (self.mean(|p| p.dot(wave).cos()), self.mean(|p| p.dot(wave).sin()));
+        let (real, imaginary) = self.optical_transfer(direction_rad, cycles_per_mm);
         real.hypot(imaginary)
+    }
+
+    /// Returns the real and imaginary part of the picture's Fourier transform for a wave along `direction_rad`: the
+    /// modulation and, as its angle, how far the wave is moved towards the direction.
+    ///
+    /// Those of several wavelengths can be added with weights; the modulation of the sum is that of the whole light.
+    pub fn optical_transfer(&self, direction_rad: f64, cycles_per_mm: f64) -> (f64, f64) {
+        let wave = DVec2::from_angle(direction_rad) * (2.0 * PI * cycles_per_mm * 1e-3);
+        (self.mean(|p| p.dot(wave).cos()), self.mean(|p| p.dot(wave).sin()))
     }
 
     /// Returns the share of the energy within `radius_um` of the centroid.

@@ -51,9 +51,13 @@ pub fn draw_all(told: &dyn Fn(&str)) -> Result<Vec<Drawing>, PipelineError> {
     let nm: Vec<f64> = figure3::grid().centers_nm().to_vec();
     let counted = figure2::counted(&nm, 401)?;
     let theory = figure2::theory(&nm);
-    drawings.push(Drawing::new("figure2.svg", meshes(&counted, &theory)));
+    drawings.push(Drawing::new("figure2.svg", meshes([&counted, &theory])));
+    let calibrated = figure2::hurb("HURB calibrated, closed form", &nm, Hurb::CALIBRATED);
+    let wave = figure2::wave(&nm)?;
+    let all = [&counted, &calibrated, &wave, &theory];
+    drawings.push(Drawing::new("figure2_all.svg", meshes(all)));
     let closed = figure2::hurb("HURB, closed form", &nm, Hurb::with_gamma(1.0));
-    drawings.push(Drawing::new("figure2.csv", figure2::table(&[counted, closed, theory])));
+    drawings.push(Drawing::new("figure2.csv", figure2::table(&[counted, closed, calibrated, wave, theory])));
     for (name, scale) in [("figure3", figure3::PRINTED_BLUR_SCALE), ("figure3_true_scale", 1.0)] {
         told("figure 3: chromatic aberration at 8 m and 2 m");
         drawings.push(Drawing::new(&format!("{name}.png"), png_bytes(&panels(scale)?)?));
@@ -86,12 +90,13 @@ fn mosaic(thumbnails: &[Thumbnail]) -> RgbImage {
     sheet
 }
 
-/// Returns two surfaces over place and wavelength, side by side, as one SVG document.
-fn meshes(left: &Surface, right: &Surface) -> String {
+/// Returns surfaces over place and wavelength, two side by side, as one SVG document; heights are over the last's peak.
+fn meshes<const N: usize>(surfaces: [&Surface; N]) -> String {
     const WIDTH: f64 = 560.0;
     const HEIGHT: f64 = 470.0;
-    let peak = right.profiles.iter().flat_map(|p| &p.values).copied().fold(0.0, f64::max);
-    let [left, right] = [left, right].map(|surface| {
+    let last = surfaces[N - 1];
+    let peak = last.profiles.iter().flat_map(|p| &p.values).copied().fold(0.0, f64::max);
+    let drawn = surfaces.map(|surface| {
         let heights = surface.profiles.iter().map(|p| p.values.iter().map(|v| v / peak).collect()).collect();
         let plot = Surface3DPlot::new(heights)
             .with_x_coords(surface.profiles[0].at_um.clone())
@@ -112,13 +117,16 @@ fn meshes(left: &Surface, right: &Surface) -> String {
             .with_font_family(FONT);
         render_to_svg(plots, layout)
     });
-    let shift = |svg: &str, x: f64| svg.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"0\" "), 1);
-    let body = |svg: &str| svg[svg.find("<svg ").unwrap_or(0)..].to_owned();
+    let part = |(i, svg): (usize, &String)| {
+        let (x, y) = ((i % 2) as f64 * WIDTH, (i / 2) as f64 * HEIGHT);
+        let svg = &svg[svg.find("<svg ").unwrap_or(0)..];
+        svg.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1)
+    };
+    let (width, height) = (2.0 * WIDTH, N.div_ceil(2) as f64 * HEIGHT);
+    let parts: Vec<String> = drawn.iter().enumerate().map(part).collect();
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{HEIGHT}\" viewBox=\"0 0 {0} {HEIGHT}\">\n{1}\n{2}\n</svg>\n",
-        2.0 * WIDTH,
-        shift(&body(&left), 0.0),
-        shift(&body(&right), WIDTH)
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n{}\n</svg>\n",
+        parts.join("\n")
     )
 }
 

@@ -66,8 +66,8 @@ pub struct LossRow {
     pub ended_by_rims: f64,
     /// The share that misses a surface or is totally reflected.
     pub missed_or_reflected: f64,
-    /// Of the light that the stop alone would pass, the share that reaches the film: relative illumination without
-    /// the cosines.
+    /// The area of the pupil that reaches the film over that of the axial pupil: relative illumination without the
+    /// cosines.
     pub vignetting: f64,
 }
 
@@ -152,10 +152,11 @@ pub(super) fn losses(shot: &Shot, field_tans: &[f64]) -> Result<Vec<LossRow>, Pi
         let pupil_z = mono.first_order().entrance_pupil_z_mm;
         1e3 / (mm + if pupil_z.is_finite() { pupil_z } else { 0.0 })
     });
-    field_tans.iter().map(|&field_tan| loss_row(shot, &mono, field_tan, dioptres)).collect()
+    Ok(field_tans.iter().map(|&field_tan| loss_row(shot, &mono, field_tan, dioptres)).collect())
 }
 
-fn loss_row(shot: &Shot, mono: &MonoLens, field_tan: f64, dioptres: f64) -> Result<LossRow, PipelineError> {
+fn loss_row(shot: &Shot, mono: &MonoLens, field_tan: f64, dioptres: f64) -> LossRow {
+    let axial = ObjectPoint::from_field(mono, DVec2::ZERO, dioptres);
     let point = ObjectPoint::from_field(mono, DVec2::new(field_tan, 0.0), dioptres);
     let mut rays = rays_over_front(mono, &point, LOSS_RAYS);
     mono.trace(&mut rays, Rims::Clip);
@@ -170,14 +171,14 @@ fn loss_row(shot: &Shot, mono: &MonoLens, field_tan: f64, dioptres: f64) -> Resu
         }
         otherwise += row.n_missed + row.n_totally_reflected;
     }
-    Ok(LossRow {
+    LossRow {
         field_deg: field_tan.atan().to_degrees(),
         reaches_film: share(losses.n_in_flight),
         ended_by_stop: share(by_stop),
         ended_by_rims: share(by_rims),
         missed_or_reflected: share(otherwise),
-        vignetting: Spot::through_pupil(&shot.lens, mono, &point, shot.film_mm)?.energy,
-    })
+        vignetting: Spot::through_pupil(mono, &point, &axial, shot.film_mm).energy,
+    }
 }
 
 /// The lens as it was used.
