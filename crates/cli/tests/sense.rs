@@ -142,3 +142,14 @@ fn what_cannot_be_asked_is_refused_in_one_sentence() {
     let volts = ["sense", "light.exr", "--sensor", "analog.ron", "--out", "out", "--also", "raw-dng"];
     check_error(folder.path(), &volts, &["a DNG file", "volts"]);
 }
+
+#[test]
+fn only_the_pixels_under_the_image_are_read() {
+    let folder = folder();
+    // 9.6 × 6.4 mm of light on 4.51 × 2.88 mm of pixels, and on the middle of 23.6 × 15.6 mm.
+    sense(folder.path(), "mt9v024", &[]);
+    let size = |name: &str| image::image_dimensions(folder.path().join(name)).unwrap();
+    assert_eq!(size("out/picture.png"), (752, 480));
+    sense(folder.path(), "nikon-d5100", &[]);
+    assert_eq!(size("out/picture.png"), (2008, 1339));
+}

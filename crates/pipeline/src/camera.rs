@@ -6,7 +6,8 @@ use std::{
 };
 
 use dioptric_sensor::{
-    AutoExposure, Brightness, ColorCorrection, Demosaic, ExposureControl, Metering, Processing, ToneCurve, WhiteBalance,
+    AutoExposure, Brightness, ColorCorrection, ColorSpace, Demosaic, ExposureControl, LensShading, Metering,
+    Processing, ToneCurve, WhiteBalance,
 };
 use dioptric_spectrum::Illuminant;
 use ron::extensions::Extensions;
@@ -179,7 +180,7 @@ pub enum SensorChoice {
 }
 
 /// From the raw frame to the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ProcessingChoice {
     /// How missing colours are filled in.
@@ -192,6 +193,13 @@ pub struct ProcessingChoice {
     pub curve: ToneCurve,
     /// How much noise is taken out of the raw frame: 0 none, 1 what is below three standard deviations.
     pub denoise: f64,
+    /// Pixels further than this above or below all their neighbours of the same filter are replaced, as a share of
+    /// saturation; left out, none are.
+    pub defect_threshold: Option<f64>,
+    /// The fall of light towards the corners that is undone; left out, it stays.
+    pub shading: Option<LensShading>,
+    /// The primaries of the picture.
+    pub space: ColorSpace,
 }
 
 impl Default for ProcessingChoice {
@@ -202,6 +210,9 @@ impl Default for ProcessingChoice {
             brightness: Brightness::AsExposed,
             curve: ToneCurve::Srgb,
             denoise: 0.0,
+            defect_threshold: None,
+            shading: None,
+            space: ColorSpace::Srgb,
         }
     }
 }
@@ -221,7 +232,7 @@ pub enum WhiteChoice {
 
 impl ProcessingChoice {
     /// Returns the sensor's processing under the light on the scene, if that is known.
-    pub fn under(self, known: Option<Illuminant>) -> Processing {
+    pub fn under(&self, known: Option<Illuminant>) -> Processing {
         let light = known.unwrap_or(Illuminant::D65);
         let (white_balance, color) = match self.white {
             WhiteChoice::Scene if known.is_some() => (WhiteBalance::Illuminant(light), ColorCorrection::Fitted(light)),
@@ -229,8 +240,17 @@ impl ProcessingChoice {
             WhiteChoice::Scene | WhiteChoice::GreyWorld => (WhiteBalance::GreyWorld, ColorCorrection::Fitted(light)),
             WhiteChoice::None => (WhiteBalance::None, ColorCorrection::None),
         };
-        let Self { demosaic, brightness, curve, denoise, .. } = self;
-        Processing { white_balance, demosaic, color, brightness, curve, denoise, ..Processing::for_light(light) }
+        Processing {
+            defect_threshold: self.defect_threshold,
+            shading: self.shading.clone(),
+            white_balance,
+            denoise: self.denoise,
+            demosaic: self.demosaic,
+            color,
+            brightness: self.brightness,
+            curve: self.curve,
+            space: self.space,
+        }
     }
 }
 
@@ -400,8 +420,11 @@ mod tests {
         let unknown = choice.under(None);
         assert_eq!(unknown.white_balance, WhiteBalance::GreyWorld);
         assert_eq!(unknown.color, ColorCorrection::Fitted(Illuminant::D65));
-        let asked = ProcessingChoice { white: WhiteChoice::Light(Illuminant::D50), ..choice };
+        let asked = ProcessingChoice { white: WhiteChoice::Light(Illuminant::D50), ..choice.clone() };
         assert_eq!(asked.under(None), Processing::for_light(Illuminant::D50));
+        let mended = ProcessingChoice { defect_threshold: Some(0.1), space: ColorSpace::DisplayP3, ..choice };
+        let processing = mended.under(Some(Illuminant::D65));
+        assert_eq!((processing.defect_threshold, processing.space), (Some(0.1), ColorSpace::DisplayP3));
     }
 
     #[test]

@@ -35,8 +35,8 @@ pub struct SenseRequest {
 
 /// Exposes a sensor to a spectral irradiance and writes volts, raw frame, picture and `report.json` into a folder.
 ///
-/// An image that states the distance between its samples is averaged over the sensor's pixels; one that does not has
-/// one sample a pixel.
+/// An image that states the distance between its samples is averaged over the sensor's pixels, as many as it covers; one
+/// that does not has one sample a pixel.
 ///
 /// # Errors
 /// When the image cannot be read or is no irradiance, the sensor is unknown, or a file cannot be written.
@@ -58,6 +58,14 @@ pub fn sense_irradiance(
         Some(pitch_um) if (pitch_um / sensor.pixel_pitch_um - 1.0).abs() < 1e-6 => Illumination::on_pixels(&irradiance),
         Some(pitch_um) => Illumination::with_pitch_um(&irradiance, pitch_um),
         None => Illumination::on_pixels(&irradiance),
+    };
+    let sensor = match light.pitch_um {
+        Some(pitch_um) => {
+            let covered = |n_samples: usize| (n_samples as f64 * pitch_um / sensor.pixel_pitch_um).round() as usize;
+            let (rows, columns) = (covered(irradiance.rows()), covered(irradiance.columns()));
+            sensor.with_size(rows.clamp(1, sensor.rows), columns.clamp(1, sensor.columns))
+        }
+        None => sensor,
     };
     let light = Illumination { exit_pupil_distance_mm: request.exit_pupil_mm, ..light };
     let rate = sensor.electron_rate(&light)?;
