@@ -155,6 +155,27 @@ fn psf_has_its_keys_in_both_modes() {
 }
 
 #[test]
+fn psf_writes_plots_and_says_which_model_drew() {
+    let folder = tempfile::tempdir().unwrap();
+    let common = ["psf", "dgauss-50mm", "--focus-mm", "2000", "--stop-mm", "4.2", "--diffraction", "wave", "--json"];
+    let plots = ["--wavelengths-nm", "500,600", "--plots", "plots", "--spectral-weights", "1,0.5"];
+    let records = json(folder.path(), &[&common[..], &plots].concat());
+    for record in records.as_array().unwrap() {
+        assert_eq!(record["wave_share"], 1.0);
+        check_numbers(record, "strehl ee80_radius_um");
+        assert_eq!(record["energy"], 1.0);
+    }
+    for name in ["lsf", "esf", "mtf", "encircled_energy", "through_focus"] {
+        assert!(fs::read_to_string(folder.path().join(format!("plots/{name}.svg"))).unwrap().contains("600 nm"));
+        assert!(fs::read(folder.path().join(format!("plots/{name}.png"))).unwrap().starts_with(b"\x89PNG"));
+    }
+    let text = output(folder.path(), &common[..8]);
+    assert!(text.contains("waves 100 %, Strehl ratio") && !text.contains("-0.00000"), "{text}");
+    let wrong = ["--wavelengths-nm", "500,600", "--plots", "others", "--spectral-weights", "1"];
+    common::check_error(folder.path(), &[&common[..], &wrong].concat(), &["spectral_weights", "2 numbers"]);
+}
+
+#[test]
 fn traced_rays_have_their_columns_and_seventeen_digits() {
     let folder = tempfile::tempdir().unwrap();
     let rays = "x_mm,y_mm,z_mm,l,m,n,wavelength_nm\n0,2,-10,0,0,1,550\n0,12.7,-10,0,0,1,550\n";
