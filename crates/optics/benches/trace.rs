@@ -3,7 +3,11 @@
 //! Times are core-seconds, those that the thread itself ran, so that other work on the machine disturbs little; only
 //! `trace/threads`, which compares one thread with all, goes by the clock and wants a quiet machine.
 
-use std::{hint::black_box, path::Path, time::Duration};
+use std::{
+    hint::black_box,
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use cpu_time::ThreadTime;
 use criterion::{
@@ -104,9 +108,32 @@ fn threads(criterion: &mut Criterion) {
     let rays = bundle(&lens, N_RAYS);
     let mut group = criterion.benchmark_group("trace/threads");
     group.throughput(Throughput::Elements((rays.len() * lens.n_surfaces()) as u64));
-    measure(&mut group, "one", &rays, |rays| lens.trace(rays, Rims::Clip));
-    measure(&mut group, "all", &rays, |rays| lens.trace_parallel(rays, Rims::Clip));
+    measure_in_place(&mut group, "one", &rays, |rays| lens.trace(rays, Rims::Clip));
+    measure_in_place(&mut group, "all", &rays, |rays| lens.trace_parallel(rays, Rims::Clip));
     group.finish();
+}
+
+/// Measures a trace of rays that each time start anew, in the same memory: new memory comes from afar, and threads
+/// share the way to it.
+fn measure_in_place(
+    group: &mut BenchmarkGroup<'_, WallTime>,
+    name: &str,
+    rays: &RayBatch,
+    run: impl Fn(&mut RayBatch),
+) {
+    let mut traced = rays.clone();
+    group.bench_function(name, |bencher| {
+        bencher.iter_custom(|rounds| {
+            let mut time = Duration::ZERO;
+            for _ in 0..rounds {
+                traced.clone_from(rays);
+                let start = Instant::now();
+                run(&mut traced);
+                time += start.elapsed();
+            }
+            time
+        });
+    });
 }
 
 /// The least that a ray-surface costs: two square roots and a division, on numbers that do not wait for each other.

@@ -3,7 +3,7 @@
 use std::{borrow::Cow, ops::Range};
 
 use glam::{DVec2, DVec3};
-use rayon::iter::ParallelIterator;
+use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::{
     Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, RayBatchF32, Rims, Shape, Surface,
@@ -192,10 +192,10 @@ impl MonoLens {
         let steps = self.steps_for(rays.object_z_mm);
         if let Some(poses) = self.poses() {
             let trace = |mut chunk| trace::trace_placed(&steps, poses, 0, rims, &mut chunk);
-            return rays.par_slices(CHUNK).for_each(trace);
+            return rays.par_slices(CHUNK).with_max_len(1).for_each(trace);
         }
         let plan = Plan::new(&steps, 0, rims);
-        rays.par_slices(CHUNK).for_each(|chunk| trace::trace_batch(&plan, Goal::LastSurface, chunk));
+        rays.par_slices(CHUNK).with_max_len(1).for_each(|chunk| trace::trace_batch(&plan, Goal::LastSurface, chunk));
     }
 
     /// Traces rays through all surfaces and straight on to the film plane, `film_mm` behind the last vertex.

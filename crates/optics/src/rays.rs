@@ -48,7 +48,7 @@ impl RayFate {
 ///
 /// All lists have the same length. Tracing moves each ray in flight to where it meets a surface and turns it there;
 /// a ray that ends stays where it ended.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct RayBatch {
     /// x of each ray's point, mm.
     pub x_mm: Vec<f64>,
@@ -70,6 +70,28 @@ pub struct RayBatch {
     ///
     /// Only the path length through an ideal lens needs it: no lens delays the light of every object plane rightly.
     pub object_z_mm: f64,
+}
+
+impl Clone for RayBatch {
+    fn clone(&self) -> Self {
+        let mut rays = Self::with_capacity(self.len());
+        rays.clone_from(self);
+        rays
+    }
+
+    /// Copies rays into the lists that stand, so that a batch traced again and again needs no new memory.
+    fn clone_from(&mut self, source: &Self) {
+        let Self { x_mm, y_mm, z_mm, l, m, n, opl_mm, fate, object_z_mm } = source;
+        self.x_mm.clone_from(x_mm);
+        self.y_mm.clone_from(y_mm);
+        self.z_mm.clone_from(z_mm);
+        self.l.clone_from(l);
+        self.m.clone_from(m);
+        self.n.clone_from(n);
+        self.opl_mm.clone_from(opl_mm);
+        self.fate.clone_from(fate);
+        self.object_z_mm = *object_z_mm;
+    }
 }
 
 impl Default for RayBatch {
