@@ -6,19 +6,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{check_error, output};
-
-/// A camera of a few pixels, so that a test takes a moment.
-const CAMERA: &str = r#"(
-    name: "small",
-    lens: BuiltIn("dgauss-50mm"),
-    stop: FNumber(4.0),
-    focus: DistanceMm(2000.0),
-    film: Pixels(columns: 24, rows: 16, pitch_um: 200.0),
-    sensor: BuiltIn("nikon-d5100"),
-    scene: (source: Target(pattern: Uniform, columns: 32, rows: 32), field_of_view_deg: 12.0, depth_m: 2.0),
-    wavelengths: ListNm([450.0, 550.0, 650.0]),
-)"#;
+use common::{CAMERA, check_error, output};
 
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -93,7 +81,7 @@ fn nan_and_negative_samples_are_named_with_their_place() {
         bytes[at..].copy_from_slice(&bad.to_le_bytes());
         fs::write(folder.path().join("light.exr"), bytes).unwrap();
         let arguments = ["sense", "light.exr", "--sensor", "nikon-d5100", "--out", "out"];
-        check_error(folder.path(), &arguments, &["row 15, column 23", "650 nm"]);
+        check_error(folder.path(), &arguments, &["row 31, column 47", "650 nm"]);
         fs::remove_file(folder.path().join("light.exr")).unwrap();
     }
 }

@@ -6,21 +6,9 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{check_error, output};
+use common::{CAMERA, check_error, output};
 use image::{ColorType, DynamicImage};
 use serde_json::Value;
-
-/// An even target on 48 × 32 pixels of 200 µm.
-const CAMERA: &str = r#"(
-    name: "small",
-    lens: BuiltIn("dgauss-50mm"),
-    stop: FNumber(4.0),
-    focus: DistanceMm(2000.0),
-    film: Pixels(columns: 48, rows: 32, pitch_um: 200.0),
-    sensor: BuiltIn("nikon-d5100"),
-    scene: (source: Target(pattern: Uniform, columns: 32, rows: 32), field_of_view_deg: 14.0, depth_m: 2.0),
-    wavelengths: ListNm([450.0, 550.0, 650.0]),
-)"#;
 
 /// The data sheet of a colour camera with the pixels of that film.
 fn sheet() -> String {

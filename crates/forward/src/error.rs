@@ -98,7 +98,7 @@ pub enum ForwardError {
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
     /// The receiver of the bands gave up.
-    #[error("band {band} could not be handed on: {source}")]
+    #[error("band {band} could not be handed on")]
     Sink {
         /// 0-based band.
         band: usize,

@@ -71,12 +71,12 @@ pub enum SceneError {
         reason: String,
     },
     /// Samples, depths or wavelengths of a file that cannot be.
-    #[error("{}: {source}", file.display())]
+    #[error("{}: {reason}", file.display())]
     Values {
         /// The file.
         file: PathBuf,
         /// What is wrong.
-        source: SpectrumError,
+        reason: SpectrumError,
     },
     /// Spectral data made in memory that cannot be.
     #[error(transparent)]

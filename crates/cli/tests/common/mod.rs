@@ -6,6 +6,19 @@ use std::{
     process::{Command, Output},
 };
 
+/// A camera before an even target, on 48 × 32 pixels of 200 µm: a run takes a moment.
+#[allow(dead_code, reason = "not every test file needs it")]
+pub(crate) const CAMERA: &str = r#"(
+    name: "small",
+    lens: BuiltIn("dgauss-50mm"),
+    stop: FNumber(4.0),
+    focus: DistanceMm(2000.0),
+    film: Pixels(columns: 48, rows: 32, pitch_um: 200.0),
+    sensor: BuiltIn("nikon-d5100"),
+    scene: (source: Target(pattern: Uniform, columns: 32, rows: 32), field_of_view_deg: 14.0, depth_m: 2.0),
+    wavelengths: ListNm([450.0, 550.0, 650.0]),
+)"#;
+
 /// Runs `dioptric` with these arguments in a folder.
 pub(crate) fn dioptric(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_dioptric"))
@@ -34,6 +47,8 @@ pub(crate) fn check_error(folder: &Path, arguments: &[&str], words: &[&str]) {
     assert!(!run.status.success(), "{arguments:?} succeeded");
     assert_eq!(message.lines().count(), 1, "{message}");
     assert!(message.starts_with("error: ") && !message.contains("panicked"), "{message}");
+    let parts: Vec<&str> = message.trim().split(": ").collect();
+    assert!((1..parts.len()).all(|i| !parts[..i].contains(&parts[i])), "said twice: {message}");
     for word in words {
         assert!(message.contains(word), "'{word}' in: {message}");
     }

@@ -32,7 +32,7 @@ pub fn read_band_folder(folder: &Path, wavelengths: Option<&WavelengthGrid>) -> 
             expected: "PNG or TIFF pictures whose names end in a wavelength in nm or in a number",
         });
     }
-    let values = |source| SceneError::Values { file: folder.to_owned(), source };
+    let values = |reason| SceneError::Values { file: folder.to_owned(), reason };
     let grid = match wavelengths {
         Some(grid) => grid.clone(),
         None => WavelengthGrid::new(wavelengths_of(folder, &pictures)?).map_err(values)?,

@@ -106,7 +106,7 @@ impl EnviCube {
     }
 
     fn image(self, quantity: Quantity) -> Result<SpectralImage, SceneError> {
-        let values = |source| SceneError::Values { file: self.file.clone(), source };
+        let values = |reason| SceneError::Values { file: self.file.clone(), reason };
         let image = SpectralImage::new(quantity, self.grid, self.planes).map_err(values)?;
         image.check_samples().map_err(values)?;
         Ok(image)
@@ -146,7 +146,7 @@ pub fn read_envi(header_path: &Path) -> Result<EnviCube, SceneError> {
     bands.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (wavelengths_nm, planes) = bands.into_iter().unzip();
     let grid = WavelengthGrid::new(wavelengths_nm)
-        .map_err(|source| SceneError::Values { file: header_path.to_owned(), source })?;
+        .map_err(|reason| SceneError::Values { file: header_path.to_owned(), reason })?;
     Ok(EnviCube {
         file: header_path.to_owned(),
         grid,

@@ -44,7 +44,7 @@ pub fn read_picture(
         })
         .collect();
     SpectralImage::new(Quantity::Radiance, grid.clone(), planes)
-        .map_err(|source| SceneError::Values { file: path.to_owned(), source })
+        .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })
 }
 
 /// The samples of a picture as they stand in its file.

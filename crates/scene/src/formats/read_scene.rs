@@ -67,7 +67,7 @@ pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Scene, SceneErro
                 None => view_beside(path, file.image.rows(), file.image.columns())?,
             };
             let in_file = |error| match error {
-                SceneError::Spectrum(source) => SceneError::Values { file: path.to_owned(), source },
+                SceneError::Spectrum(reason) => SceneError::Values { file: path.to_owned(), reason },
                 other => other,
             };
             let depth = file.depth_with(view_wanted(options, &file.image)?.or(view)).map_err(in_file)?;

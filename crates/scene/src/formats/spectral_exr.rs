@@ -144,7 +144,7 @@ impl RawLayer {
                 ));
             }
         };
-        let values = |source| SceneError::Values { file: path.to_owned(), source };
+        let values = |reason| SceneError::Values { file: path.to_owned(), reason };
         let grid = WavelengthGrid::new(bands.iter().map(|band| band.0).collect()).map_err(values)?;
         let planes = bands.into_iter().map(|band| band.2).collect();
         let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
