@@ -110,15 +110,8 @@ pub(crate) struct RunArgs {
     /// Exposure time, s [default: automatic]
     #[arg(long, value_name = "T")]
     pub(crate) exposure_s: Option<f64>,
-    /// Takes so many frames and merges them
-    #[arg(long, value_name = "N", conflicts_with = "bracket_stops")]
-    pub(crate) burst: Option<usize>,
-    /// Takes exposures that differ by powers of two and merges them, e.g. -4,-2,0
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(crate) bracket_stops: Option<String>,
-    /// Writes these files too: electrons, raw-tiff, raw-dng, picture-png16, picture-tiff8, picture-tiff16, picture-exr
-    #[arg(long, value_name = "LIST")]
-    pub(crate) also: Option<String>,
+    #[command(flatten)]
+    pub(crate) frames: FrameArgs,
     /// Diffraction at the stop
     #[arg(long, value_name = "KIND", value_enum)]
     pub(crate) diffraction: Option<DiffractionKind>,
@@ -128,6 +121,20 @@ pub(crate) struct RunArgs {
     /// Bands, nm: a list or first:last:step [default: those of the scene]
     #[arg(long, value_name = "LIST")]
     pub(crate) wavelengths_nm: Option<String>,
+}
+
+/// Which exposures are taken, and which files are written of them.
+#[derive(Debug, Args)]
+pub(crate) struct FrameArgs {
+    /// Takes so many frames and merges them
+    #[arg(long, value_name = "N", conflicts_with = "bracket_stops")]
+    pub(crate) burst: Option<usize>,
+    /// Takes exposures that differ by powers of two and merges them, e.g. -4,-2,0
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(crate) bracket_stops: Option<String>,
+    /// Writes these files too: electrons, raw-tiff, raw-dng, picture-png16, picture-tiff8, picture-tiff16, picture-exr
+    #[arg(long, value_name = "LIST")]
+    pub(crate) also: Option<String>,
 }
 
 /// What diffraction to compute.
@@ -394,13 +401,6 @@ pub(crate) struct SenseArgs {
     /// White balance for this light [default: gray world]
     #[arg(long, value_name = "NAME")]
     pub(crate) illuminant: Option<String>,
-    /// Takes so many frames and merges them
-    #[arg(long, value_name = "N", conflicts_with = "bracket_stops")]
-    pub(crate) burst: Option<usize>,
-    /// Takes exposures that differ by powers of two and merges them, e.g. -4,-2,0
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    pub(crate) bracket_stops: Option<String>,
-    /// Writes these files too: electrons, raw-tiff, raw-dng, picture-png16, picture-tiff8, picture-tiff16, picture-exr
-    #[arg(long, value_name = "LIST")]
-    pub(crate) also: Option<String>,
+    #[command(flatten)]
+    pub(crate) frames: FrameArgs,
 }

@@ -14,7 +14,7 @@ use dioptric_pipeline::{
 };
 
 use crate::{
-    args::{BlurKind, Common, DiffractionKind, RunArgs, WhiteKind},
+    args::{BlurKind, Common, DiffractionKind, FrameArgs, RunArgs, WhiteKind},
     terminal::{Bar, guarded, print, print_json, remark},
 };
 
@@ -133,10 +133,10 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
         }
         _ => bail!("--pixels and --pixel-um go together"),
     }
-    if let Some(frames) = frames_of(arguments.burst, arguments.bracket_stops.as_deref())? {
+    if let Some(frames) = frames_of(&arguments.frames)? {
         camera.frames = frames;
     }
-    if let Some(list) = &arguments.also {
+    if let Some(list) = &arguments.frames.also {
         camera.outputs.also = FrameFile::parse_list(list)?;
     }
     if let Some(time_s) = arguments.exposure_s {
@@ -153,8 +153,8 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
 }
 
 /// Returns how many frames the command line asks for.
-pub(crate) fn frames_of(burst: Option<usize>, bracket_stops: Option<&str>) -> anyhow::Result<Option<FramesChoice>> {
-    Ok(match (burst, bracket_stops) {
+pub(crate) fn frames_of(arguments: &FrameArgs) -> anyhow::Result<Option<FramesChoice>> {
+    Ok(match (arguments.burst, arguments.bracket_stops.as_deref()) {
         (Some(n), _) => Some(FramesChoice::Burst(n)),
         (None, Some(list)) => Some(FramesChoice::BracketStops(parse_numbers("--bracket-stops", list)?)),
         (None, None) => None,

@@ -21,13 +21,13 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
             Some(time_s) => with_exposure_s(demo.exposure, time_s),
             None => demo.exposure,
         },
-        frames: frames_of(arguments.burst, arguments.bracket_stops.as_deref())?.unwrap_or(demo.frames),
+        frames: frames_of(&arguments.frames)?.unwrap_or(demo.frames),
         processing: demo.processing,
         illuminant: arguments.illuminant.as_deref().map(parse_illuminant).transpose()?,
         exit_pupil_mm: arguments.exit_pupil_mm,
         seed: common.seed.unwrap_or(demo.seed),
         outputs: Outputs {
-            also: arguments.also.as_deref().map_or(Ok(Vec::new()), FrameFile::parse_list)?,
+            also: arguments.frames.also.as_deref().map_or(Ok(Vec::new()), FrameFile::parse_list)?,
             ..Outputs::default()
         },
     };
