@@ -29,14 +29,21 @@ pub(crate) struct Aim<'a> {
     z_mm: f64,
     start_z_mm: f64,
     reference_mm: DVec3,
+    /// Of the medium that the rays start in.
+    index: f64,
 }
 
 impl<'a> Aim<'a> {
     /// Aims at targets in the plane `z_mm`; rays start on the plane `start_z_mm`.
     pub(crate) fn new(point: &'a ObjectPoint, z_mm: f64, start_z_mm: f64) -> Self {
-        let aim = Self { point, z_mm, start_z_mm, reference_mm: DVec3::ZERO };
+        let aim = Self { point, z_mm, start_z_mm, reference_mm: DVec3::ZERO, index: 1.0 };
         let (reference_mm, _) = aim.start(DVec2::ZERO);
         Self { reference_mm, ..aim }
+    }
+
+    /// The same in a medium of this index.
+    pub(crate) fn within(self, index: f64) -> Self {
+        Self { index, ..self }
     }
 
     /// Returns the start and the direction of the ray towards a target.
@@ -51,7 +58,7 @@ impl<'a> Aim<'a> {
     #[inline(always)]
     pub(crate) fn ray(&self, target_mm: DVec2) -> (DVec3, DVec3, f64) {
         let (start_mm, direction) = self.start(target_mm);
-        (start_mm, direction, self.point.path_difference_mm(start_mm, self.reference_mm))
+        (start_mm, direction, self.index * self.point.path_difference_mm(start_mm, self.reference_mm))
     }
 }
 
@@ -75,11 +82,11 @@ impl MonoLens {
     /// Traces a beam to the film, `film_mm` behind the last vertex, and shows the rays there to `visit`, a few hundred
     /// at a time and in their order.
     ///
-    /// The same rays as those of [`rays_towards`](crate::rays_towards) from the first vertex plane and
+    /// The same rays as those of [`rays_towards`](Self::rays_towards) from the first vertex plane and
     /// [`trace_to_film`](Self::trace_to_film), to the bit, without storing them: for counting rays on pixels.
     pub fn trace_onto(&self, beam: &Beam<'_>, rims: Rims, film_mm: f64, mut visit: impl FnMut(&RayBatch)) {
         let plan = Plan::new(&self.steps_for(beam.point.z_mm()), 0, rims);
-        beam.for_each_lot(|rays| {
+        beam.for_each_lot(self.object_index(), |rays| {
             match self.poses() {
                 None => trace::trace_batch(&plan, Goal::Film { film_mm }, rays.slices()),
                 Some(_) => self.trace_to_film(rays, rims, film_mm),
@@ -92,7 +99,7 @@ impl MonoLens {
     pub fn trace_onto_f32(&self, beam: &Beam<'_>, rims: Rims, film_mm: f64, mut visit: impl FnMut(&RayBatchF32)) {
         let plan = Plan::new(self.steps(), 0, rims);
         let mut single = RayBatchF32::default();
-        beam.for_each_lot(|rays| {
+        beam.for_each_lot(self.object_index(), |rays| {
             single.set(rays);
             match self.poses() {
                 None => trace::trace_batch(&plan, Goal::Film { film_mm }, single.slices()),
@@ -105,8 +112,8 @@ impl MonoLens {
 
 impl Beam<'_> {
     /// Makes the rays, lot by lot in the same batch.
-    fn for_each_lot(&self, mut work: impl FnMut(&mut RayBatch)) {
-        let aim = Aim::new(&self.point, self.z_mm, 0.0);
+    fn for_each_lot(&self, index: f64, mut work: impl FnMut(&mut RayBatch)) {
+        let aim = Aim::new(&self.point, self.z_mm, 0.0).within(index);
         let mut rays = RayBatch { object_z_mm: self.point.z_mm(), ..RayBatch::default() };
         for targets_mm in self.targets_mm.chunks(LOT) {
             rays.resize(targets_mm.len());

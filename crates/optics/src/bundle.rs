@@ -63,10 +63,16 @@ impl ObjectPoint {
 /// Returns rays from an object point aimed at targets in the plane `z_mm`, started on the plane `start_z_mm`.
 ///
 /// Path lengths are those from the point, less that of the ray aimed at the axis in the same plane; so they are
-/// small numbers, exact however far the point is. Starting on the first vertex plane (`start_z_mm` = 0) keeps
+/// small numbers, exact however far the point is. They are those of an object in air; for any lens's own object space
+/// [`MonoLens::rays_towards`] has them. Starting on the first vertex plane (`start_z_mm` = 0) keeps
 /// positions exact too.
 pub fn rays_towards(point: &ObjectPoint, targets_mm: &[DVec2], z_mm: f64, start_z_mm: f64) -> RayBatch {
-    let aim = Aim::new(point, z_mm, start_z_mm);
+    rays_within(1.0, point, targets_mm, [z_mm, start_z_mm])
+}
+
+/// Returns such rays in a medium of this index, from the plane of the targets and that of the starts.
+fn rays_within(index: f64, point: &ObjectPoint, targets_mm: &[DVec2], [z_mm, start_z_mm]: [f64; 2]) -> RayBatch {
+    let aim = Aim::new(point, z_mm, start_z_mm).within(index);
     let mut rays = RayBatch::with_capacity(targets_mm.len());
     rays.object_z_mm = point.z_mm();
     for &target_mm in targets_mm {
@@ -74,6 +80,14 @@ pub fn rays_towards(point: &ObjectPoint, targets_mm: &[DVec2], z_mm: f64, start_
         rays.push(start_mm, direction, opl_mm);
     }
     rays
+}
+
+impl MonoLens {
+    /// Returns rays as [`rays_towards`](crate::rays_towards) does, with path lengths in the medium that the object of
+    /// this lens is in.
+    pub fn rays_towards(&self, point: &ObjectPoint, targets_mm: &[DVec2], z_mm: f64, start_z_mm: f64) -> RayBatch {
+        rays_within(self.object_index(), point, targets_mm, [z_mm, start_z_mm])
+    }
 }
 
 /// Returns rays from an object point to a square grid of `n_across`² points, of which those in a disc are kept, on
@@ -85,7 +99,7 @@ pub fn rays_over_front(lens: &MonoLens, point: &ObjectPoint, n_across: usize) ->
     let at = |i: usize| if n_across < 2 { 0.0 } else { 2.0 * i as f64 / (n_across - 1) as f64 - 1.0 };
     let grid = (0..n_across).flat_map(|row| (0..n_across).map(move |column| DVec2::new(at(column), at(row))));
     let targets: Vec<DVec2> = grid.filter(|p| p.length_squared() <= 1.0).map(|p| p * radius_mm).collect();
-    rays_towards(point, &targets, 0.0, 0.0)
+    lens.rays_towards(point, &targets, 0.0, 0.0)
 }
 
 #[cfg(test)]

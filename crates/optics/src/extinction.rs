@@ -71,9 +71,12 @@ fn absorption_per_mm(k: f64, wavelength_nm: f64) -> f64 {
 /// It stands beside the lens, so that a trace that does not ask for it pays nothing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Absorption {
+    /// Before the first surface.
+    object_per_mm: f64,
     /// Behind each surface.
     per_mm: Vec<f64>,
     unknown: Vec<usize>,
+    is_object_unknown: bool,
 }
 
 impl Lens {
@@ -95,7 +98,9 @@ impl Lens {
             }
             per_mm.push(k.map_or(0.0, |k| absorption_per_mm(k, wavelength_nm)));
         }
-        Ok(Absorption { per_mm, unknown })
+        let object = self.object_medium().extinction_at(wavelength_nm);
+        let object_per_mm = object.map_or(0.0, |k| absorption_per_mm(k, wavelength_nm));
+        Ok(Absorption { object_per_mm, per_mm, unknown, is_object_unknown: object.is_none() })
     }
 }
 
@@ -105,17 +110,21 @@ impl Absorption {
         &self.unknown
     }
 
+    /// Whether the extinction of the medium that the object is in is not known at the wavelength.
+    pub fn is_unknown_before(&self) -> bool {
+        self.is_object_unknown
+    }
+
     /// Traces rays through all surfaces of the lens, as [`MonoLens::trace`] does, and returns for each the share of its
-    /// light that the media on its way let through, to the last surface or to where it ended.
+    /// light that the media on its way let through, from where it starts to the last surface or to where it ended.
     ///
     /// The lens must be the one that the absorption was made of. The way from the last surface to the film is not
     /// counted. Rays pass the lens frame between surfaces, which moves them by some 1e-13 mm.
     pub fn trace(&self, lens: &MonoLens, rays: &mut RayBatch, rims: Rims) -> Vec<f64> {
         assert_eq!(self.per_mm.len(), lens.n_surfaces(), "the absorption of this lens");
         let mut depth = vec![0.0; rays.len()];
-        lens.trace_surfaces(0..1, rays, rims);
-        for surface in 1..lens.n_surfaces() {
-            let per_mm = self.per_mm[surface - 1];
+        for surface in 0..lens.n_surfaces() {
+            let per_mm = surface.checked_sub(1).map_or(self.object_per_mm, |before| self.per_mm[before]);
             let before: Vec<(DVec3, DVec3)> = match per_mm == 0.0 {
                 true => Vec::new(),
                 false => (0..rays.len()).map(|i| (rays.point_mm(i), rays.direction(i))).collect(),

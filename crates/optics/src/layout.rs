@@ -103,9 +103,14 @@ struct Line {
     reaches_film: bool,
 }
 
-fn fans(lens: &Lens, lenses: &[MonoLens], layout: &Layout) -> Vec<Fan> {
+/// Returns how far before the lens rays are drawn, mm.
+fn lead_mm(lens: &Lens, layout: &Layout) -> f64 {
     let track_mm = lens.last_vertex_z_mm() + layout.film_mm;
-    let lead_mm = layout.object_distance_mm.min(0.25 * track_mm + 0.3 * lens.front_semi_aperture_mm());
+    layout.object_distance_mm.min(0.25 * track_mm + 0.3 * lens.front_semi_aperture_mm())
+}
+
+fn fans(lens: &Lens, lenses: &[MonoLens], layout: &Layout) -> Vec<Fan> {
+    let lead_mm = lead_mm(lens, layout);
     let entrance_z_mm = lenses[0].first_order().entrance_pupil_z_mm;
     let entrance_z_mm = if entrance_z_mm.is_finite() { entrance_z_mm } else { 0.0 };
     let dioptres = 1e3 / (layout.object_distance_mm + entrance_z_mm);
@@ -166,8 +171,23 @@ fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_mm: f64) -> Ve
     lines
 }
 
+/// Draws the medium that the object is in, where that is not air, as far as rays are drawn before the lens.
+fn object_space(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
+    let medium = lens.object_medium();
+    if *medium == Glass::Air {
+        return;
+    }
+    let front = outline(&lens.interfaces()[0].surface, &lens.poses()[0]);
+    let back_z_mm = front.iter().map(|point| point.x).fold(f64::INFINITY, f64::min) - lead_mm(lens, layout);
+    let ends = [front[front.len() - 1], front[0]].map(|end| DVec2::new(back_z_mm, end.y));
+    let (fill, _) = glass_colors(medium);
+    let path = frame.path(front.into_iter().chain(ends));
+    let _ = writeln!(svg, "<path d=\"{path} Z\" fill=\"{fill}\" fill-opacity=\"0.6\"/>");
+}
+
 /// Draws what lies between two surfaces and is not air.
 fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
+    object_space(lens, layout, frame, svg);
     let (interfaces, poses) = (lens.interfaces(), lens.poses());
     let mut i = 0;
     while i < interfaces.len() {

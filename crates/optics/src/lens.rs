@@ -11,6 +11,7 @@ pub struct Lens {
     // the stop's semi-aperture is at most `full_stop_semi_aperture_mm`; the moves have been checked.
     name: String,
     source: String,
+    object_medium: Glass,
     interfaces: Vec<Interface>,
     stop: usize,
     full_stop_semi_aperture_mm: f64,
@@ -58,12 +59,24 @@ impl Lens {
         Ok(Self {
             name: name.into(),
             source: source.into(),
+            object_medium: Glass::Air,
             interfaces,
             stop,
             full_stop_semi_aperture_mm,
             moves: Vec::new(),
             image_surface: ImageSurface::default(),
         })
+    }
+
+    /// Returns the lens with its object in this medium, which reaches to the first surface: water or oil before an
+    /// immersion objective, glass around an object that is buried in it.
+    ///
+    /// # Errors
+    /// When the medium makes no sense.
+    pub fn with_object_medium(mut self, medium: Glass) -> Result<Self, OpticsError> {
+        medium.check()?;
+        self.object_medium = medium;
+        Ok(self)
     }
 
     /// Returns the lens with its surfaces tilted and decentred by these moves, and by no others.
@@ -152,6 +165,11 @@ impl Lens {
     /// Where the prescription comes from.
     pub fn source(&self) -> &str {
         &self.source
+    }
+
+    /// The medium that the object is in, up to the first surface.
+    pub fn object_medium(&self) -> &Glass {
+        &self.object_medium
     }
 
     /// The surfaces in the order that light meets them, each with the medium and distance that follow it.
@@ -277,10 +295,11 @@ impl Lens {
     /// When a number makes no sense.
     pub fn with_slope(&self, slope_per_nm: f64, reference_nm: f64) -> Result<Self, OpticsError> {
         let mut lens = self.clone();
-        for interface in &mut lens.interfaces {
-            if let Glass::Constant { index } = interface.medium_after {
-                interface.medium_after = Glass::Linear { index, reference_nm, slope_per_nm };
-                interface.medium_after.check()?;
+        let media = lens.interfaces.iter_mut().map(|interface| &mut interface.medium_after);
+        for medium in media.chain([&mut lens.object_medium]) {
+            if let Glass::Constant { index } = *medium {
+                *medium = Glass::Linear { index, reference_nm, slope_per_nm };
+                medium.check()?;
             }
         }
         Ok(lens)

@@ -42,7 +42,7 @@ struct Placed {
 impl MonoLens {
     pub(crate) fn new(lens: &Lens, wavelength_nm: f64) -> Result<Self, OpticsError> {
         let mut steps = Vec::with_capacity(lens.interfaces().len());
-        let mut index_before = 1.0;
+        let mut index_before = lens.object_medium().index_at(wavelength_nm)?;
         for (interface, vertex_z) in lens.interfaces().iter().zip(lens.vertices_z_mm()) {
             let index_after = interface.medium_after.index_at(wavelength_nm)?;
             let surface = &interface.surface;
@@ -114,6 +114,11 @@ impl MonoLens {
         self.steps[self.stop].index_after
     }
 
+    /// The refractive index of the object space.
+    pub fn object_index(&self) -> f64 {
+        self.first_order.object_index
+    }
+
     /// The refractive index of the image space.
     pub fn image_index(&self) -> f64 {
         self.first_order.image_index
@@ -145,6 +150,11 @@ impl MonoLens {
 
     pub(crate) fn poses(&self) -> Option<&[Pose]> {
         self.placed.as_ref().map(|placed| placed.poses.as_slice())
+    }
+
+    /// Returns where a point of the lens frame lies in the stop's own frame, mm from the middle of the stop.
+    pub fn in_stop_mm(&self, point_mm: DVec3) -> DVec2 {
+        self.poses().map_or(point_mm, |poses| poses[self.stop].to_own(point_mm)).truncate()
     }
 
     /// Returns the point of the first surface over this place of its vertex plane, mm; beyond its equator, the place.

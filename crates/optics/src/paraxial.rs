@@ -34,11 +34,24 @@ pub struct FirstOrder {
     pub exit_pupil_diameter_mm: f64,
     /// f-number for a far object: effective focal length over entrance-pupil diameter.
     pub f_number: f64,
+    /// Index of the object space.
+    pub object_index: f64,
     /// Index of the image space.
     pub image_index: f64,
 }
 
 impl FirstOrder {
+    /// Front focal length, from the front principal plane to the front focal point: −n / power, n being the index of the
+    /// object space, mm.
+    pub fn object_focal_mm(&self) -> f64 {
+        -self.object_index / self.power_per_mm
+    }
+
+    /// Rear focal length, from the rear principal plane to the rear focal point: n′ / power, mm.
+    pub fn image_focal_mm(&self) -> f64 {
+        self.image_index / self.power_per_mm
+    }
+
     /// Exit-pupil diameter over entrance-pupil diameter.
     pub fn pupil_magnification(&self) -> f64 {
         self.exit_pupil_diameter_mm / self.entrance_pupil_diameter_mm
@@ -170,6 +183,7 @@ pub(crate) fn first_order(steps: &[Step], stop: usize, wavelength_nm: f64) -> Fi
         exit_pupil_z_mm: -n1 * rear.b / rear.d,
         exit_pupil_diameter_mm: stop_diameter_mm / rear.d.abs(),
         f_number: (1.0 / power).abs() / entrance_pupil_diameter_mm,
+        object_index: n0,
         image_index: n1,
     }
 }

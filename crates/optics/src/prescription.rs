@@ -11,6 +11,9 @@ use crate::{Glass, ImageSurface, Interface, Lens, Move, OpticsError, Shape, Surf
 struct Prescription {
     name: String,
     source: String,
+    /// Left out for air.
+    #[serde(default, skip_serializing_if = "is_air")]
+    object_medium: Glass,
     surfaces: Vec<Row>,
     /// Tilts and decentres.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -86,6 +89,7 @@ pub(crate) fn lens_from_ron(text: &str) -> Result<Lens, TextError> {
     let curvature_per_mm = curvature_per_mm(interfaces.len(), "image_radius_mm", prescription.image_radius_mm)?;
     let image_surface = ImageSurface { curvature_per_mm, conic: prescription.image_conic };
     let lens = Lens::new(prescription.name, prescription.source, interfaces, stop)?;
+    let lens = lens.with_object_medium(prescription.object_medium)?;
     Ok(lens.with_moves(prescription.moves)?.with_image_surface(image_surface)?)
 }
 
@@ -116,6 +120,7 @@ impl Lens {
         let prescription = Prescription {
             name: self.name().to_owned(),
             source: self.source().to_owned(),
+            object_medium: self.object_medium().clone(),
             surfaces: self.interfaces().iter().enumerate().map(row).collect(),
             moves: self.moves().to_vec(),
             image_radius_mm: radius_mm(self.image_surface().curvature_per_mm),

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use dioptric_optics::{MonoLens, ObjectPoint, Rims, rays_towards};
+use dioptric_optics::{MonoLens, ObjectPoint, Rims};
 use glam::DVec2;
 use multiversion::multiversion;
 
@@ -75,7 +75,7 @@ impl WaveMap {
         }
         let half_mm = edge.half_sizes_mm();
         let (targets_mm, areas, places) = edge.places(half_mm);
-        let mut rays = rays_towards(point, &targets_mm, edge.z_mm, 0.0);
+        let mut rays = lens.rays_towards(point, &targets_mm, edge.z_mm, 0.0);
         lens.trace(&mut rays, Rims::Ignore);
         lens.to_film(&mut rays, film_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims, rays_towards};
+use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims};
 use glam::{DVec2, DVec3};
 
 use super::transform::PlaneWaves;
@@ -381,7 +381,7 @@ impl PupilCells {
         let steps = [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|u| u * self.step_mm);
         let targets_mm: Vec<DVec2> =
             steps.iter().flat_map(|step| self.targets_mm.iter().map(move |target| target + step)).collect();
-        let mut rays = rays_towards(point, &targets_mm, self.z_mm, 0.0);
+        let mut rays = lens.rays_towards(point, &targets_mm, self.z_mm, 0.0);
         lens.trace(&mut rays, Rims::Ignore);
         lens.to_film(&mut rays, film_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());

@@ -1,6 +1,6 @@
 //! Aiming at the real stop: the rays of an object point that pass given places of it.
 
-use glam::{DMat2, DVec2, DVec3};
+use glam::{DMat2, DVec2};
 
 use crate::{MonoLens, ObjectPoint, Rims, rays_towards};
 
@@ -92,11 +92,7 @@ impl<'a> Search<'a> {
         self.lens.trace_surfaces(0..self.lens.stop() + 1, &mut rays, Rims::Ignore);
         let radius_mm = self.lens.stop_semi_aperture_mm();
         let all = rays.n_in_flight() == N;
-        let in_stop = |point: DVec3| match self.lens.poses() {
-            Some(poses) => poses[self.lens.stop()].to_own(point),
-            None => point,
-        };
-        all.then(|| std::array::from_fn(|i| in_stop(rays.point_mm(i)).truncate() / radius_mm))
+        all.then(|| std::array::from_fn(|i| self.lens.in_stop_mm(rays.point_mm(i)) / radius_mm))
     }
 
     /// Returns how the place in the stop moves with the target, per mm.

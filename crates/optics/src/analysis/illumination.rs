@@ -2,10 +2,11 @@
 
 use glam::DVec2;
 
-use crate::{MonoLens, ObjectPoint, PupilBoundary, Rims, rays_towards};
+use crate::{MonoLens, ObjectPoint, PupilBoundary, Rims};
 
 /// Returns the projected solid angle of the cone of light that arrives at the image of a point, times the square of the
-/// image space's index, sr: the irradiance there for a uniform scene of radiance 1; 0 where no light gets through.
+/// image space's index over the object space's, sr: the irradiance there for a uniform scene of radiance 1; 0 where no
+/// light gets through.
 ///
 /// The solid angle is the area that the rays' direction cosines (l, m) fill; its edge is that of the true, vignetted
 /// pupil, found at `n_azimuths` (rounded up to an even number). It is exact for a sharp image; where aberrations are
@@ -17,7 +18,7 @@ pub fn projected_solid_angle(lens: &MonoLens, point: &ObjectPoint, n_azimuths: u
     let azimuth = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64);
     let edge = |(i, rho): (usize, &f64)| pupil.center_mm() + azimuth(i) * *rho;
     let targets_mm: Vec<DVec2> = pupil.rho_at_azimuths_mm().iter().enumerate().map(edge).collect();
-    let mut rays = rays_towards(point, &targets_mm, pupil.z_mm(), 0.0);
+    let mut rays = lens.rays_towards(point, &targets_mm, pupil.z_mm(), 0.0);
     lens.trace(&mut rays, Rims::Ignore);
     let cosines: Vec<DVec2> = (0..n).map(|i| rays.direction(i).truncate()).collect();
     let area = |step: usize| {
@@ -26,7 +27,7 @@ pub fn projected_solid_angle(lens: &MonoLens, point: &ObjectPoint, n_azimuths: u
         0.5 * pairs.map(|(a, b)| a.perp_dot(*b)).sum::<f64>().abs()
     };
     // A polygon falls short by the square of its sides; two of them tell by how much.
-    lens.image_index().powi(2) * (4.0 * area(1) - area(2)) / 3.0
+    (lens.image_index() / lens.object_index()).powi(2) * (4.0 * area(1) - area(2)) / 3.0
 }
 
 /// The steepest field that is looked at, degrees.
@@ -92,7 +93,7 @@ mod tests {
             };
             let lens = Lens::new("thick", "test", vec![front, back], 0).unwrap().at(550.0).unwrap();
             let far = ObjectPoint::Infinite(DVec3::Z);
-            let mut edge = rays_towards(&far, &[DVec2::new(0.0, 4.0)], 0.0, 0.0);
+            let mut edge = lens.rays_towards(&far, &[DVec2::new(0.0, 4.0)], 0.0, 0.0);
             lens.trace(&mut edge, Rims::Ignore);
             let expected = PI * (index * edge.m[0]).powi(2);
             // The polygon is off by the fourth power of its sides: (2π / n)⁴ / 30.

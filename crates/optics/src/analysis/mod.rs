@@ -4,6 +4,7 @@
 //! for any aperture and field. A ray that cannot be found or does not arrive is `None`, never an error.
 
 mod aim;
+mod aperture;
 mod close_rays;
 mod field_map;
 mod focus;
@@ -13,6 +14,7 @@ mod ray_fan;
 mod spot;
 
 pub use aim::StopAim;
+pub use aperture::NumericalApertures;
 pub use close_rays::AstigmaticFoci;
 pub use field_map::{Distortion, Projection};
 pub use focus::{Autofocus, FocusRays};

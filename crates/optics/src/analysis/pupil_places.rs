@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::aim::StopAim;
-use crate::{MonoLens, ObjectPoint, RayBatch, RayFate, Rims, rays_towards};
+use crate::{MonoLens, ObjectPoint, RayBatch, RayFate, Rims};
 
 /// What places in the pupil are fractions of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,21 +40,21 @@ impl PupilCoordinates {
     }
 
     /// Returns the rays from a point through these places, before the lens, with path lengths as those of
-    /// [`rays_towards`].
+    /// [`MonoLens::rays_towards`].
     ///
     /// A place of the stop that no ray reaches gives a ray that has ended, missing the stop.
     pub fn rays(&self, lens: &MonoLens, point: &ObjectPoint, places: &[DVec2]) -> RayBatch {
         match *self {
             Self::Entrance { z_mm, radius_mm } => {
                 let targets_mm: Vec<DVec2> = places.iter().map(|place| *place * radius_mm).collect();
-                rays_towards(point, &targets_mm, z_mm, 0.0)
+                lens.rays_towards(point, &targets_mm, z_mm, 0.0)
             }
             Self::Stop { radius_mm } => {
                 let scale = radius_mm / lens.stop_semi_aperture_mm();
                 let scaled: Vec<DVec2> = places.iter().map(|place| *place * scale).collect();
                 let aim = StopAim::find(lens, point, &scaled);
                 let targets_mm: Vec<DVec2> = aim.targets_mm().iter().map(|t| t.unwrap_or(DVec2::ZERO)).collect();
-                let mut rays = rays_towards(point, &targets_mm, aim.z_mm(), 0.0);
+                let mut rays = lens.rays_towards(point, &targets_mm, aim.z_mm(), 0.0);
                 for (fate, target) in rays.fate.iter_mut().zip(aim.targets_mm()) {
                     if target.is_none() {
                         *fate = RayFate::Missed { surface: lens.stop() as u16 };
@@ -78,11 +78,11 @@ pub struct PupilSampling {
 }
 
 impl PupilSampling {
-    /// Returns the rays of a point on the film, `film_mm` behind the last vertex, or where they ended.
+    /// Returns the rays of a point on the film as it is curved, `film_mm` behind the last vertex, or where they ended.
     pub fn rays_on_film(&self, lens: &MonoLens, point: &ObjectPoint, film_mm: f64) -> RayBatch {
         let mut rays = self.coordinates.rays(lens, point, &self.places);
         lens.trace(&mut rays, self.rims);
-        lens.to_film(&mut rays, film_mm);
+        lens.to_image_surface(&mut rays, film_mm);
         rays
     }
 

@@ -293,10 +293,7 @@ impl<'a> Seq<'a> {
         let n_surfaces = self.surfaces.len();
         let stop = self.surfaces.iter().position(|surface| surface.is_stop);
         let (object, image) = (&self.surfaces[0], &self.surfaces[n_surfaces - 1]);
-        if object.medium.is_some() {
-            let reason = "SO: an object space other than air is not supported".to_owned();
-            return Err(TextError { line: Some(object.line), reason });
-        }
+        let object_medium = object.medium.clone().unwrap_or(Glass::Air);
         let image_surface = ImageSurface { curvature_per_mm: image.curvature / mm, conic: image.conic };
         // The defocus on the image surface is part of the distance to the film; 1e10 and more is infinitely far.
         let defocus_mm = image.thickness * mm;
@@ -326,6 +323,7 @@ impl<'a> Seq<'a> {
             name: self.name.clone(),
             source: "a CODE V file".to_owned(),
             object_distance_mm,
+            object_medium,
             first_vertex_z_mm: 0.0,
             surfaces,
             moves,

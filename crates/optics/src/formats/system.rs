@@ -46,7 +46,7 @@ pub(super) enum Beam {
     EntrancePupil(f64),
     /// Focal length over entrance pupil.
     FNumber(f64),
-    /// Sine of the half angle at the object point, in air.
+    /// Numerical aperture at the object point: the index there times the sine of the half angle.
     ObjectAperture(f64),
 }
 
@@ -64,6 +64,7 @@ pub(super) struct System {
     pub(super) source: String,
     /// Distance from the object to the first surface, mm; infinite for a far object.
     pub(super) object_distance_mm: f64,
+    pub(super) object_medium: Glass,
     /// z along the axis of the first surface, in the count of the moves.
     pub(super) first_vertex_z_mm: f64,
     pub(super) surfaces: Vec<SystemSurface>,
@@ -133,6 +134,7 @@ impl System {
             Move { surfaces: (first, last.min(n_surfaces)), pivot_mm, ..*step }
         };
         let moves = self.moves.iter().map(in_lens).collect();
+        let lens = lens.with_object_medium(self.object_medium.clone())?;
         lens.with_moves(moves)?.with_image_surface(self.image_surface)
     }
 
@@ -141,7 +143,7 @@ impl System {
         let mut i = 0;
         while i < self.surfaces.len() && self.surfaces.len() > 1 {
             let medium_before = match i {
-                0 => &Glass::Air,
+                0 => &self.object_medium,
                 _ => &self.surfaces[i - 1].medium_after,
             };
             let surface = &self.surfaces[i];
@@ -210,7 +212,8 @@ impl System {
             Beam::Stop => return Err(plain("the beam fills the stop, but the stop's diameter is not stated")),
             Beam::EntrancePupil(diameter_mm) => diameter_mm,
             Beam::FNumber(f_number) => (first.efl_mm / f_number).abs(),
-            Beam::ObjectAperture(sine) => {
+            Beam::ObjectAperture(aperture) => {
+                let sine = aperture / first.object_index;
                 let distance_mm = self.object_distance_mm + first.entrance_pupil_z_mm;
                 2.0 * distance_mm * sine / (1.0 - sine * sine).sqrt()
             }
@@ -274,7 +277,7 @@ impl System {
                 let height_mm = DVec2::new(x_mm, y_mm) / mono.conjugate(distance_mm).magnification;
                 return Ok(ObjectPoint::Finite(height_mm.extend(-distance_mm)));
             }
-            Field::ImageHeight { x_mm, y_mm } => -DVec2::new(x_mm, y_mm) / first.efl_mm,
+            Field::ImageHeight { x_mm, y_mm } => -DVec2::new(x_mm, y_mm) / (first.efl_mm * first.object_index),
         };
         let dioptres = if distance_mm.is_finite() { 1e3 / (distance_mm + first.entrance_pupil_z_mm) } else { 0.0 };
         Ok(ObjectPoint::from_field(mono, tan, dioptres))

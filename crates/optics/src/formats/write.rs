@@ -49,7 +49,7 @@ impl LensFile {
     /// that at the reference wavelength, or at the d line where the file states none.
     ///
     /// # Errors
-    /// When a surface is a plane that is not the stop, an asphere or an ideal lens, or tilted or decentred, or the stop
+    /// When the object is not in air, a surface is a plane that is not the stop, an asphere or an ideal lens, or tilted or decentred, or the stop
     /// is curved.
     pub fn to_dat(&self) -> Result<String, OpticsError> {
         const FORMAT: &str = "a .dat file";
@@ -58,6 +58,7 @@ impl LensFile {
         if let Some(surface) = first_moved(lens) {
             return Err(cannot(FORMAT, surface, "is tilted or decentred"));
         }
+        check_air(FORMAT, lens)?;
         let efl_mm = lens.at(wavelength_nm)?.first_order().efl_mm;
         let mut text = format!(
             "# Name: {}\n# Indices at {wavelength_nm} nm. Focal length (mm):\n{efl_mm}\n",
@@ -87,7 +88,7 @@ impl LensFile {
     /// this crate reads (`"radius": null`, `"stop": true`), so that ISET refuses the file instead of misreading it.
     ///
     /// # Errors
-    /// When a surface is an odd asphere, a toroid or an ideal lens, the film is tilted or decentred, or a glass is not
+    /// When the object is not in air, a surface is an odd asphere, a toroid or an ideal lens, the film is tilted or decentred, or a glass is not
     /// known at one of the wavelengths.
     pub fn to_omni_json(&self) -> Result<String, OpticsError> {
         let mut wavelengths_nm = self.wavelengths_nm.clone();
@@ -100,6 +101,7 @@ impl LensFile {
         if lens.film_motion() != Pose::centered(0.0) {
             return Err(cannot(OMNI, lens.interfaces().len(), "(the film) is tilted or decentred"));
         }
+        check_air(OMNI, lens)?;
         let mut file = json!({
             "name": lens.name(),
             "description": lens.source(),
@@ -115,6 +117,17 @@ impl LensFile {
 }
 
 const OMNI: &str = "a .json file of ISET";
+
+/// Checks that the object of a lens is in air, as a format takes for granted.
+fn check_air(format: &'static str, lens: &Lens) -> Result<(), OpticsError> {
+    match lens.object_medium() {
+        Glass::Air => Ok(()),
+        medium => {
+            let reason = format!("the object is in {}, where the format knows only air", medium.describe());
+            Err(OpticsError::CannotWrite { format, reason })
+        }
+    }
+}
 
 /// Returns the first surface that does not stand where its distances alone put it.
 fn first_moved(lens: &Lens) -> Option<usize> {

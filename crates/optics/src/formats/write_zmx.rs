@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::{Glass, GlassCatalogue, OpticsError, Pose, Shape, Surface};
+use crate::{Glass, GlassCatalogue, Lens, OpticsError, Pose, Shape, Surface};
 
 use super::{
     agf::agf_lines,
@@ -48,8 +48,8 @@ impl LensFile {
     /// When a glass is neither of the catalogue nor given by index and Abbe number: the format has no place for others.
     /// [`to_zmx_and_agf`](Self::to_zmx_and_agf) gives them a catalogue of their own.
     pub fn to_zmx(&self) -> Result<String, OpticsError> {
-        let media = self.lens.interfaces().iter().enumerate().map(|(i, interface)| (i, &interface.medium_after));
-        let glasses = media.map(|(i, medium)| zmx_glass(i, medium)).collect::<Result<Vec<_>, _>>()?;
+        let glasses =
+            media(&self.lens).map(|(place, medium)| zmx_glass(place, medium)).collect::<Result<Vec<_>, _>>()?;
         self.zmx_text(&glasses, None)
     }
 
@@ -61,9 +61,8 @@ impl LensFile {
     pub fn to_zmx_and_agf(&self, catalogue: &str) -> Result<(String, Option<String>), OpticsError> {
         let mut private: Vec<&Glass> = Vec::new();
         let mut lines = Vec::new();
-        for (i, interface) in self.lens.interfaces().iter().enumerate() {
-            let medium = &interface.medium_after;
-            let refusal = match zmx_glass(i, medium) {
+        for (place, medium) in media(&self.lens) {
+            let refusal = match zmx_glass(place, medium) {
                 Ok(line) => {
                     lines.push(line);
                     continue;
@@ -87,7 +86,7 @@ impl LensFile {
         Ok((self.zmx_text(&lines, agf.is_some().then_some(catalogue.as_str()))?, agf))
     }
 
-    /// Returns the text with these lines of glass, one a surface.
+    /// Returns the text with these lines of glass, one for the object and one a surface.
     fn zmx_text(&self, glasses: &[String], catalogue: Option<&str>) -> Result<String, OpticsError> {
         let lens = &self.lens;
         let mut text = format!("MODE SEQ\r\nNAME {}\r\nNOTE 0 {}\r\n", one_line(lens.name()), one_line(lens.source()));
@@ -104,7 +103,7 @@ impl LensFile {
             Some(distance_mm) => format!("{:e}", distance_mm + gaps[0].thickness_mm),
             None => "INFINITY".to_owned(),
         };
-        let _ = write!(text, "SURF 0\r\n  TYPE STANDARD\r\n  CURV 0\r\n  DISZ {distance_mm}\r\n");
+        let _ = write!(text, "SURF 0\r\n  TYPE STANDARD\r\n  CURV 0\r\n  DISZ {distance_mm}\r\n{}", glasses[0]);
         gaps[0].write_break(&mut text, &mut n_written);
         for (i, interface) in lens.interfaces().iter().enumerate() {
             n_written += 1;
@@ -118,7 +117,7 @@ impl LensFile {
             let _ = write!(
                 text,
                 "  DISZ {thickness_mm:e}\r\n{}  DIAM {radius_mm:e} 1\r\n  CLAP 0 {radius_mm:e} 0\r\n",
-                glasses[i]
+                glasses[i + 1]
             );
             gaps[i + 1].write_break(&mut text, &mut n_written);
         }
@@ -152,7 +151,7 @@ impl LensFile {
     /// Returns the makers of the glasses, after a check that each glass's name means it in their company.
     fn zmx_makers(&self) -> Result<Vec<String>, OpticsError> {
         let mut makers: Vec<String> = Vec::new();
-        let named = self.lens.interfaces().iter().filter_map(|interface| match &interface.medium_after {
+        let named = media(&self.lens).filter_map(|(_, medium)| match medium {
             Glass::Named(name) => Some(GlassCatalogue::built_in().find(name)),
             _ => None,
         });
@@ -203,8 +202,14 @@ fn private_name(number: usize) -> String {
     format!("PRIVATE{}", number + 1)
 }
 
-/// Returns the line of a medium, or nothing for air.
-fn zmx_glass(i: usize, medium: &Glass) -> Result<String, OpticsError> {
+/// Returns the media of a lens: that of the object, and that behind each surface.
+fn media(lens: &Lens) -> impl Iterator<Item = (Option<usize>, &Glass)> {
+    let behind = lens.interfaces().iter().enumerate().map(|(i, interface)| (Some(i), &interface.medium_after));
+    std::iter::once((None, lens.object_medium())).chain(behind)
+}
+
+/// Returns the line of the medium behind a surface or around the object, or nothing for air.
+fn zmx_glass(surface: Option<usize>, medium: &Glass) -> Result<String, OpticsError> {
     let model = |nd: f64, vd: f64| format!("  GLAS ___BLANK 1 0 {nd:e} {vd:e}\r\n");
     match medium {
         Glass::Air => Ok(String::new()),
@@ -216,9 +221,11 @@ fn zmx_glass(i: usize, medium: &Glass) -> Result<String, OpticsError> {
             Ok(format!("  GLAS {} 0 0 {nd:.6} {vd:.3}\r\n", glass.name))
         }
         other => {
-            let what =
-                format!("has behind it {}, which is neither of the catalogue nor of n_d and V_d", other.describe());
-            Err(cannot("a .zmx file", i, &what))
+            let what = format!("{}, which is neither of the catalogue nor of n_d and V_d", other.describe());
+            Err(match surface {
+                Some(i) => cannot("a .zmx file", i, &format!("has behind it {what}")),
+                None => OpticsError::CannotWrite { format: "a .zmx file", reason: format!("the object is in {what}") },
+            })
         }
     }
 }

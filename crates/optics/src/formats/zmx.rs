@@ -161,10 +161,7 @@ impl Zmx {
             let reason = format!("the file has {} surfaces; expected an object and an image", self.surfaces.len());
             return Err(TextError { line: None, reason });
         };
-        if object.glass.is_some() {
-            let reason = "surface 0: an object space other than air is not supported".to_owned();
-            return Err(TextError { line: Some(object.line), reason });
-        }
+        let object_medium = object.medium(0, &glasses, &mut notes)?;
         let image_surface = ImageSurface { curvature_per_mm: image.curvature / mm, conic: image.conic };
         let last = self.surfaces.len() - 1;
         let mut surfaces: Vec<SystemSurface> = Vec::with_capacity(last);
@@ -200,6 +197,7 @@ impl Zmx {
             name: if self.name.is_empty() { name.to_owned() } else { self.name },
             source: if self.note.is_empty() { "a Zemax file".to_owned() } else { self.note },
             object_distance_mm,
+            object_medium,
             first_vertex_z_mm,
             surfaces,
             moves,

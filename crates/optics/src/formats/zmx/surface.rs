@@ -183,7 +183,7 @@ impl ZmxSurface {
         Ok(SystemMove { z_mm, step })
     }
 
-    fn medium(&self, number: usize, glasses: &Glasses, notes: &mut Vec<String>) -> Result<Glass, TextError> {
+    pub(super) fn medium(&self, number: usize, glasses: &Glasses, notes: &mut Vec<String>) -> Result<Glass, TextError> {
         let Some(stated) = &self.glass else { return Ok(Glass::Air) };
         let wrong =
             |reason: String| TextError { line: Some(stated.line), reason: format!("surface {number}: {reason}") };
