@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims, rays_towards};
+use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -52,7 +52,7 @@ impl HuygensSources {
         let step_mm = 1e-4 * pupil.rho_at_azimuths_mm().iter().copied().fold(f64::INFINITY, f64::min);
         let moved = [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|step| {
             let targets: Vec<DVec2> = cells.iter().map(|(target, _)| target + step * step_mm).collect();
-            let mut rays = rays_towards(point, &targets, pupil.z_mm(), 0.0);
+            let mut rays = lens.rays_towards(point, &targets, pupil.z_mm(), 0.0);
             lens.trace(&mut rays, Rims::Ignore);
             lens.to_film(&mut rays, film_mm);
             rays
@@ -99,6 +99,13 @@ impl HuygensSources {
     /// rayon pool.
     pub fn irradiance_per_mm2(&self, film_mm: &[DVec2]) -> Vec<f64> {
         film_mm.par_iter().map(|at| self.irradiance_at(at.extend(self.film_z_mm))).collect()
+    }
+
+    /// Returns the irradiance at a film point over that of the same sources all in phase there.
+    pub fn strehl_at(&self, film_mm: DVec2) -> f64 {
+        let at = film_mm.extend(self.film_z_mm);
+        let amplitude: f64 = self.sources.iter().map(|source| source.strength_mm / at.distance(source.at_mm)).sum();
+        self.irradiance_at(at) / (amplitude * self.wave_number_turns_per_mm).powi(2)
     }
 
     fn irradiance_at(&self, at: DVec3) -> f64 {

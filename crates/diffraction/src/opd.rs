@@ -5,7 +5,7 @@ use dioptric_optics::{MonoLens, ObjectPoint, analysis::PupilSampling};
 use crate::{DiffractionError, PupilGrid, ReferenceSphere, Wavefront, WavefrontReference};
 
 /// Returns the optical path of the rays through these places less that of the chief ray, waves, each up to the sphere
-/// about the chief ray's film point through the paraxial exit pupil: positive where the light comes late.
+/// about the chief ray's film point (of the film as it is curved) through the paraxial exit pupil: positive where the light comes late.
 ///
 /// The chief ray is that through the middle of the pupil as the sampling has it: of the real stop, if it aims at that.
 /// A ray that does not arrive has none; `None` altogether if not even the chief ray arrives.
@@ -19,7 +19,7 @@ pub fn opd_waves_at(
     if !chief.fate[0].is_in_flight() {
         return None;
     }
-    let sphere = ReferenceSphere::through_exit_pupil(lens, film_mm, chief.point_mm(0).truncate());
+    let sphere = ReferenceSphere::through_exit_pupil(lens, chief.point_mm(0));
     let chief_mm = sphere.paths_mm(lens, &chief)[0];
     let paths_mm = sphere.paths_mm(lens, &sampling.rays_on_film(lens, point, film_mm));
     let waves = |path_mm: f64| (path_mm - chief_mm) / (lens.wavelength_nm() * 1e-6);
@@ -94,7 +94,7 @@ mod tests {
         let film_mm = lens.film_mm_for(2000.0).unwrap();
         let wavefront =
             Wavefront::trace(&lens, &point, film_mm, PupilGrid::STANDARD, WavefrontReference::Chief).unwrap();
-        let coordinates = PupilCoordinates::entrance(&lens);
+        let coordinates = PupilCoordinates::stop(&lens);
         let sampling = PupilSampling { coordinates, places: wavefront.pupil.clone(), rims: Rims::Ignore };
         let waves = opd_waves_at(&lens, &point, film_mm, &sampling).unwrap();
         for (found, expected) in waves.iter().zip(&wavefront.opd_waves) {

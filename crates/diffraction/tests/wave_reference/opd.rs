@@ -23,7 +23,7 @@ fn wavefronts_agree_with_fifty_digits() {
             let film_mm = image_z_mm - mono.last_vertex_z_mm();
             mono.to_film(&mut rays, film_mm);
             // The first pupil point is the chief ray's.
-            let own = ReferenceSphere::through_exit_pupil(&mono, film_mm, rays.point_mm(0).truncate());
+            let own = ReferenceSphere::through_exit_pupil(&mono, rays.point_mm(0));
             let radius_mm = number(&row["reference_radius_mm"]).copysign(own.radius_mm);
             let paths_mm = ReferenceSphere { radius_mm, ..own }.paths_mm(&mono, &rays);
             let scale = 1.0 / (mono.wavelength_nm() * 1e-6);

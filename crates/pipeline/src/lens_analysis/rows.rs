@@ -110,7 +110,7 @@ pub struct WavefrontRow {
     pub peak_to_valley_waves: f64,
     /// Strehl's ratio.
     pub strehl: f64,
-    /// Zernike coefficients over the unit disc of the paraxial pupil, in Noll's order from piston, waves rms.
+    /// Zernike coefficients over the unit disc of the stop, in Noll's order from piston, waves rms.
     pub zernike_waves: Vec<f64>,
 }
 
