@@ -84,6 +84,7 @@ fn glass_may_be_a_name_a_code_or_an_index() {
     assert_eq!(medium("1.5168:64.17"), Glass::NdVd { nd: 1.5168, vd: 64.17 });
     assert_eq!(medium("517642"), Glass::NdVd { nd: 1.517, vd: 64.2 });
     assert_eq!(medium("517.642"), Glass::NdVd { nd: 1.517, vd: 64.2 });
+    assert_eq!(medium("516800.641700"), Glass::NdVd { nd: 1.5168, vd: 64.17 });
     assert_eq!(medium("1.5"), Glass::Constant { index: 1.5 });
     assert_eq!(medium("AIR"), Glass::Air);
 }
@@ -138,4 +139,14 @@ fn mistakes_are_told_by_line_and_command() {
     assert!(message("SI    0.0 0.5\n", "").contains("the file has no image surface (SI)"));
     assert!(message("SO ", "S ").contains("out of order; expected SO, the object, first"));
     assert!(message("YAN", "YIM").contains("fields of two kinds"));
+}
+
+#[test]
+fn object_may_be_infinitely_far_in_words_and_unannounced_radii_are_noted() {
+    assert_eq!(read(&DOUBLET.replace("0.1e11", "inf")).unwrap(), read(DOUBLET).unwrap());
+    let unsaid = DOUBLET.replace("RDM;LEN", "LEN");
+    let file = read(&unsaid).unwrap();
+    assert!(file.notes[0].starts_with("neither radii (RDM) nor curvatures (CUM) are announced"), "{:?}", file.notes);
+    let message = read(&unsaid.replace("-40.0 2.0", "-0.04 2.0")).unwrap_err().to_string();
+    assert!(message.contains("the numbers of S are taken for radii"), "{message}");
 }

@@ -104,7 +104,8 @@ fn code_v_lenses_load() {
     let power_per_mm = 0.5168 * (0.02 + 0.0125) - 0.5168_f64.powi(2) * 5.0 * 0.02 * 0.0125 / 1.5168;
     let efl_mm = file.lens.at(D_LINE_NM).unwrap().first_order().efl_mm;
     assert!((efl_mm * power_per_mm - 1.0).abs() < 1e-9, "{efl_mm}");
-    assert!(file.notes[0].contains("no surface is marked as the stop"));
+    assert!(file.notes[0].contains("neither radii (RDM) nor curvatures (CUM) are announced"), "{:?}", file.notes);
+    assert!(file.notes[1].contains("no surface is marked as the stop"));
 }
 
 #[test]

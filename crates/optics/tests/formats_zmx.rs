@@ -207,7 +207,59 @@ fn mistakes_are_told_by_line_and_keyword() {
     assert!(message("SURF 2", "SURF 7").contains("SURF: surface 7 where 2 was expected"));
     assert!(message("  STOP\n", "").contains("exactly one stop, but 0"));
     assert!(message("DISZ 5.0", "DISZ INFINITY").contains("surface 0: thickness is inf"));
-    assert!(message("ENPD 1.0E+1", "ENPD -1").contains("makes an entrance pupil of -1 mm"));
+    assert!(message("ENPD 1.0E+1", "ENPD -1").contains("the stated entrance pupil of -1 mm makes"));
     assert!(message("ENPD 1.0E+1", "ENPD 1e9").contains("does not fit"));
     assert!(read("").unwrap_err().to_string().contains("the file has 0 surfaces"));
+}
+
+#[test]
+fn solves_and_the_environment_are_noted_and_a_parameter_0_is_not() {
+    let text = SINGLET
+        .replace("  DISZ 60.0", "  DISZ 60.0\n  MAZH 0 0\n  PZUP 1 1 0 0")
+        .replace("  PARM 1 0\n", "  PARM 0 3\n  PARM 1 0\n")
+        .replace("ENPD 1.0E+1", "ENPD 1.0E+1\nENVD 35 1 1");
+    let file = read(&text).unwrap();
+    assert_eq!(file.lens, read(SINGLET).unwrap().lens);
+    assert!(file.notes[0].starts_with("the file's lens works at 35 °C and 1 atm (ENVD)"), "{:?}", file.notes);
+    assert!(file.notes[1].ends_with("the stored values stand at surface 2 (MAZH, PZUP)"), "{:?}", file.notes);
+    assert!(read(&text.replace("ENVD 35 1 1", "ENVD 35 1 0")).unwrap().notes[0].starts_with("solves"));
+}
+
+#[test]
+fn working_f_number_and_object_cone_set_the_stop() {
+    let near = SINGLET.replace("DISZ INFINITY", "DISZ 200");
+    let stop_mm = |beam: &str| read(&near.replace("ENPD 1.0E+1", beam)).unwrap().lens.stop_semi_aperture_mm();
+    let lens = read(&near).unwrap().lens;
+    // The stop is the first vertex: a cone of 2 degrees is 200 mm · tan 2° wide there, and the image-space slope of the
+    // marginal ray is the object-space one over the magnification.
+    let semi_aperture_mm = 200.0 * 2.0_f64.to_radians().tan();
+    assert!((stop_mm("OBNA 2 1") - semi_aperture_mm).abs() < 1e-12);
+    let magnification = lens.at(587.5618).unwrap().conjugate(200.0).magnification;
+    let f_number = 0.5 * (200.0 * magnification / semi_aperture_mm).abs();
+    assert!((stop_mm(&format!("FNUM {f_number} 1")) - semi_aperture_mm).abs() < 1e-12);
+    // A far object makes it the f-number.
+    let far_mm = |beam: &str| read(&SINGLET.replace("ENPD 1.0E+1", beam)).unwrap().lens.stop_semi_aperture_mm();
+    assert!((far_mm("FNUM 5 1") - far_mm("FNUM 5 0")).abs() < 1e-12);
+}
+
+#[test]
+fn stop_of_no_stated_width_is_as_wide_as_the_other_rims_let_it_be() {
+    let text = SINGLET
+        .replace("  STOP\n", "")
+        .replace("SURF 3", "SURF 4")
+        .replace("  DISZ 60.0\n", "  DISZ 20.0\nSURF 3\n  STOP\n  CURV 0\n  DISZ 40.0\n");
+    for beam in ["FLOA", "ENPD 0"] {
+        let file = read(&text.replace("ENPD 1.0E+1", beam)).unwrap();
+        assert!(file.notes[0].starts_with("no width of the beam or of the stop is stated"), "{:?}", file.notes);
+        // The only other rim is the first surface's, of 6 mm, which is the pupil of a far object.
+        let first = file.lens.at(587.5618).unwrap().first_order();
+        assert!((first.entrance_pupil_diameter_mm - 12.0).abs() < 1e-9, "{}", first.entrance_pupil_diameter_mm);
+    }
+}
+
+#[test]
+fn crystals_are_found_in_the_catalogues_that_zemax_keeps_them_in() {
+    let text = SINGLET.replace("GLAS N-BK7 0 0 1.5168 64.17", "GLAS BAF2").replace("SCHOTT MISC", "INFRARED");
+    let lens = read(&text).unwrap().lens;
+    assert_eq!(lens.interfaces()[0].medium_after, Glass::Named("MISC:BAF2".to_owned()));
 }

@@ -26,8 +26,17 @@ pub(super) fn lens_from_seq(text: &str, name: &str, glasses: Glasses) -> Result<
     for command in commands_of(text) {
         file.take(&command)?;
     }
-    file.into_system()?.build()
+    let is_mode_stated = file.is_mode_stated;
+    let built = file.into_system().and_then(System::build);
+    built.map_err(|TextError { line, reason }| match is_mode_stated {
+        true => TextError { line, reason },
+        false => TextError { line, reason: format!("{reason}; {MODE_UNSTATED}") },
+    })
 }
+
+/// What is done where the file leaves it to the program's settings.
+const MODE_UNSTATED: &str =
+    "neither radii (RDM) nor curvatures (CUM) are announced: the numbers of S are taken for radii";
 
 /// What a file says, in its own units.
 struct Seq<'a> {
@@ -35,6 +44,7 @@ struct Seq<'a> {
     name: String,
     mm_per_unit: f64,
     is_radius_mode: bool,
+    is_mode_stated: bool,
     beam: Option<Beam>,
     wavelengths_nm: Vec<f64>,
     /// Counted from 1.
@@ -64,6 +74,7 @@ impl<'a> Seq<'a> {
             name: name.to_owned(),
             mm_per_unit: 1.0,
             is_radius_mode: true,
+            is_mode_stated: false,
             beam: None,
             wavelengths_nm: Vec::new(),
             reference: 1,
@@ -88,8 +99,10 @@ impl<'a> Seq<'a> {
                     self.name = title.trim().to_owned();
                 }
             }
-            "RDM" => self.is_radius_mode = !is_no(command),
-            "CUM" => self.is_radius_mode = is_no(command),
+            "RDM" | "CUM" => {
+                self.is_radius_mode = (keyword == "RDM") != is_no(command);
+                self.is_mode_stated = true;
+            }
             "DIM" => self.mm_per_unit = mm_per_unit(command)?,
             "EPD" => self.beam = Some(Beam::EntrancePupil(command.number(1)?)),
             "FNO" => self.beam = Some(Beam::FNumber(command.number(1)?)),
@@ -164,7 +177,7 @@ impl<'a> Seq<'a> {
             (true, false) => 1.0 / value,
             _ => value,
         };
-        let thickness = if command.words.len() > 2 { command.number(2)? } else { 0.0 };
+        let thickness = if command.words.len() > 2 { command.distance(2)? } else { 0.0 };
         let medium = match command.words.get(3) {
             Some(word) => self.medium(word, command)?,
             None => None,
@@ -193,7 +206,7 @@ impl<'a> Seq<'a> {
                 }
             }
             "CUY" => self.surfaces[surface].curvature = command.number(place)?,
-            "THI" => self.surfaces[surface].thickness = command.number(place)?,
+            "THI" => self.surfaces[surface].thickness = command.distance(place)?,
             "GLA" | "GL1" => {
                 if let Some(word) = command.words.get(place) {
                     self.surfaces[surface].medium = self.medium(word, command)?;
@@ -289,6 +302,9 @@ impl<'a> Seq<'a> {
             let reason = "the file has no image surface (SI); expected SO, surfaces S and SI".to_owned();
             return Err(TextError { line: None, reason });
         }
+        if !self.is_mode_stated {
+            self.notes.push(MODE_UNSTATED.to_owned());
+        }
         let mm = self.mm_per_unit;
         let n_surfaces = self.surfaces.len();
         let stop = self.surfaces.iter().position(|surface| surface.is_stop);
@@ -374,16 +390,21 @@ fn mm_per_unit(command: &Command) -> Result<f64, TextError> {
     }
 }
 
-/// Returns the glass of a fictitious code: `1.5168:64.17`, `1.5168`, `517642` or `517.642`.
+/// Returns the glass of a fictitious code: `1.5168:64.17`, `1.5168`, `517642`, `517.642` or `516800.641700`.
 fn code_of(word: &str) -> Option<Glass> {
     if let Some((nd, vd)) = word.split_once(':') {
         return Some(model(nd.parse().ok()?, vd.parse().ok()?));
     }
-    let n_digits = word.bytes().filter(u8::is_ascii_digit).count();
-    if n_digits == 6 && (word.len() == 6 || (word.len() == 7 && word.as_bytes()[3] == b'.')) {
-        let (thousandths, tenths) =
-            (word.get(..3)?.parse::<f64>().ok()?, word.get(word.len() - 3..)?.parse::<f64>().ok()?);
-        return Some(model((1000.0 + thousandths) / 1000.0, tenths / 10.0));
+    let (nd, vd) = match word.split_once('.') {
+        Some(parts) => parts,
+        None if word.len() == 6 => word.split_at_checked(3)?,
+        None => ("", ""),
+    };
+    let is_code = |digits: &str| digits.len() >= 3 && digits.bytes().all(|sign| sign.is_ascii_digit());
+    if is_code(nd) && is_code(vd) {
+        // The digits of n_d − 1 behind its point, and those of V_d, of which two stand before its point.
+        let (nd, vd) = (format!("1.{nd}"), format!("{}.{}", &vd[..2], &vd[2..]));
+        return Some(model(nd.parse().ok()?, vd.parse().ok()?));
     }
     word.parse().ok().map(constant)
 }

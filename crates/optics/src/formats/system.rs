@@ -46,8 +46,26 @@ pub(super) enum Beam {
     EntrancePupil(f64),
     /// Focal length over entrance pupil.
     FNumber(f64),
+    /// One over twice the slope of the marginal ray in the image space, of the stated object, to first order.
+    WorkingFNumber(f64),
+    /// Half the angle of the cone at the object point, radians.
+    ObjectCone(f64),
     /// Numerical aperture at the object point: the index there times the sine of the half angle.
     ObjectAperture(f64),
+}
+
+impl Beam {
+    /// Returns what is stated, for messages.
+    fn in_words(self) -> String {
+        match self {
+            Self::Stop => "the stop".to_owned(),
+            Self::EntrancePupil(diameter_mm) => format!("the stated entrance pupil of {diameter_mm} mm"),
+            Self::FNumber(f_number) => format!("the stated f-number {f_number}"),
+            Self::WorkingFNumber(f_number) => format!("the stated working f-number {f_number}"),
+            Self::ObjectCone(angle_rad) => format!("the stated cone of {} degrees", angle_rad.to_degrees()),
+            Self::ObjectAperture(aperture) => format!("the stated aperture {aperture} at the object"),
+        }
+    }
 }
 
 /// The part of the pupil that a field uses: `center + (1 − compression) · pupil`, in pupil radii.
@@ -79,6 +97,8 @@ pub(super) struct System {
     pub(super) notes: Vec<String>,
 }
 
+/// How far from the axis a ray is that stands for those of first-order theory, mm.
+const NEAR_AXIS_MM: f64 = 1e-6;
 /// Directions in which rays are sent through the edge of the pupil.
 const N_AZIMUTHS: usize = 32;
 /// A rim that was found by rays is this much wider than they need, so that rounding does not cut them.
@@ -199,32 +219,66 @@ impl System {
     }
 
     /// Returns half the diameter of the stop that lets the stated beam through.
-    fn stop_semi_aperture_mm(&self, mono: &MonoLens) -> Result<f64, TextError> {
+    fn stop_semi_aperture_mm(&mut self, mono: &MonoLens) -> Result<f64, TextError> {
         let first = mono.first_order();
         let now_mm = mono.stop_semi_aperture_mm();
+        let is_rim_stated = self.surfaces[mono.stop()].semi_aperture_mm.is_some();
         let beam = match self.beam {
+            Some(Beam::EntrancePupil(0.0)) | None => Beam::Stop,
             Some(beam) => beam,
-            None if self.surfaces[mono.stop()].semi_aperture_mm.is_some() => Beam::Stop,
-            None => return Err(plain("neither an entrance pupil, an f-number nor the stop's diameter is stated")),
         };
+        let to_pupil_mm = self.object_distance_mm + first.entrance_pupil_z_mm;
         let pupil_mm = match beam {
-            Beam::Stop if self.surfaces[mono.stop()].semi_aperture_mm.is_some() => return Ok(now_mm),
-            Beam::Stop => return Err(plain("the beam fills the stop, but the stop's diameter is not stated")),
+            Beam::Stop if is_rim_stated => return Ok(now_mm),
+            Beam::Stop => return self.widest_stop_mm(mono),
             Beam::EntrancePupil(diameter_mm) => diameter_mm,
             Beam::FNumber(f_number) => (first.efl_mm / f_number).abs(),
-            Beam::ObjectAperture(aperture) => {
-                let sine = aperture / first.object_index;
-                let distance_mm = self.object_distance_mm + first.entrance_pupil_z_mm;
-                2.0 * distance_mm * sine / (1.0 - sine * sine).sqrt()
+            Beam::WorkingFNumber(f_number) if self.object_distance_mm.is_finite() => {
+                let magnification = mono.conjugate(self.object_distance_mm).magnification;
+                (to_pupil_mm * magnification / (first.object_index * f_number)).abs()
             }
+            Beam::WorkingFNumber(f_number) => (first.efl_mm / f_number).abs(),
+            Beam::ObjectCone(angle_rad) => 2.0 * to_pupil_mm * angle_rad.tan(),
+            Beam::ObjectAperture(aperture) => 2.0 * to_pupil_mm * (aperture / first.object_index).asin().tan(),
         };
         let semi_aperture_mm = now_mm * pupil_mm / first.entrance_pupil_diameter_mm;
         if semi_aperture_mm > 0.0 && semi_aperture_mm.is_finite() {
             return Ok(semi_aperture_mm);
         }
-        Err(plain(&format!(
-            "the stated beam ({beam:?}) makes an entrance pupil of {pupil_mm} mm; expected a positive one"
-        )))
+        let beam = beam.in_words();
+        Err(plain(&format!("{beam} makes an entrance pupil of {pupil_mm} mm; expected a positive one")))
+    }
+
+    /// Returns half the diameter of a stop of which the file says nothing: the widest axial beam, to first order, that
+    /// the rims of the other surfaces let through.
+    fn widest_stop_mm(&mut self, mono: &MonoLens) -> Result<f64, TextError> {
+        let first = mono.first_order();
+        let target = [DVec2::new(0.0, NEAR_AXIS_MM)];
+        let point = match self.object_distance_mm.is_finite() {
+            true => ObjectPoint::Finite(DVec3::new(0.0, 0.0, -self.object_distance_mm)),
+            false => ObjectPoint::from_field(mono, DVec2::ZERO, 0.0),
+        };
+        let mut rays = rays_towards(&point, &target, first.entrance_pupil_z_mm, 0.0);
+        let poses: Vec<Pose> = (0..mono.n_surfaces()).map(|i| Pose::centered(mono.vertex_z_mm(i))).collect();
+        let poses = mono.poses().unwrap_or(&poses);
+        let mut heights_mm = Vec::with_capacity(mono.n_surfaces());
+        for (surface, pose) in poses.iter().enumerate() {
+            mono.trace_surfaces(surface..surface + 1, &mut rays, Rims::Ignore);
+            heights_mm.push(pose.to_own(rays.point_mm(0)).truncate().length());
+        }
+        let at_stop_mm = heights_mm[mono.stop()];
+        let rims = self.surfaces.iter().map(|surface| surface.semi_aperture_mm);
+        let limits = rims.zip(&heights_mm).filter_map(|(rim_mm, height_mm)| Some(rim_mm? * at_stop_mm / height_mm));
+        let widest_mm = limits.filter(|limit_mm| *limit_mm > 0.0).fold(f64::INFINITY, f64::min);
+        if !(rays.fate[0].is_in_flight() && widest_mm.is_finite()) {
+            return Err(plain("neither an entrance pupil, an f-number nor the stop's diameter is stated"));
+        }
+        self.notes.push(format!(
+            "no width of the beam or of the stop is stated: the stop is as wide as the other rims let an axial beam be, \
+             {:.4} mm",
+            2.0 * widest_mm
+        ));
+        Ok(widest_mm)
     }
 
     /// Returns how far from the axis the rays of the stated fields and wavelengths meet each surface, mm.
@@ -258,7 +312,8 @@ impl System {
             None => Ok(widest_mm.iter().map(|semi_aperture_mm| semi_aperture_mm * SLACK).collect()),
             Some(surface) => Err(TextError {
                 line: Some(self.surfaces[surface].line),
-                reason: format!("surface {surface} has no diameter, and no ray of the stated fields reaches it"),
+                reason: "the surface here has no diameter, and no ray through the edge of the stated pupil reaches it"
+                    .to_owned(),
             }),
         }
     }

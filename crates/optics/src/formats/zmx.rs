@@ -94,6 +94,7 @@ struct Zmx {
     primary: usize,
     n_configurations: usize,
     surfaces: Vec<ZmxSurface>,
+    notes: Vec<String>,
 }
 
 impl Zmx {
@@ -126,10 +127,11 @@ impl Zmx {
             "ENPD" => self.beam = Some(Beam::EntrancePupil(line.number(0)?)),
             "FNUM" if line.number_or(1, 0.0)? == 0.0 => self.beam = Some(Beam::FNumber(line.number(0)?)),
             "OBNA" if line.number_or(1, 0.0)? == 0.0 => self.beam = Some(Beam::ObjectAperture(line.number(0)?)),
-            "FNUM" => return Err(line.wrong("the working f-number is not supported; state the entrance pupil")),
-            "OBNA" => return Err(line.wrong("the object cone angle is not supported; state the aperture or pupil")),
+            "FNUM" => self.beam = Some(Beam::WorkingFNumber(line.number(0)?)),
+            "OBNA" => self.beam = Some(Beam::ObjectCone(line.number(0)?.to_radians())),
+            "ENVD" => self.take_environment(line)?,
             "FLOA" => self.beam = Some(Beam::Stop),
-            "GCAT" => self.makers = line.words.iter().map(|&maker| maker.to_owned()).collect(),
+            "GCAT" => self.makers = makers(&line.words),
             "FTYP" => {
                 self.field_type = line.count(0)?;
                 self.n_fields = (line.words.len() > 2).then(|| line.count(2)).transpose()?;
@@ -150,10 +152,34 @@ impl Zmx {
         Ok(())
     }
 
+    /// Takes the temperature, the pressure and whether indices are to follow them.
+    fn take_environment(&mut self, line: &Line) -> Result<(), TextError> {
+        let (celsius, atmospheres) = (line.number_or(0, 20.0)?, line.number_or(1, 1.0)?);
+        if line.number_or(2, 0.0)? != 0.0 && (celsius != 20.0 || atmospheres != 1.0) {
+            self.notes.push(format!(
+                "the file's lens works at {celsius} °C and {atmospheres} atm (ENVD): indices are those of the catalogues, \
+                 and lengths as stated"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Returns a sentence on the solves and pickups, if there are any.
+    fn note_on_solves(&self) -> Option<String> {
+        let of_surface = |(number, surface): (usize, &ZmxSurface)| {
+            (!surface.solves.is_empty()).then(|| format!("{number} ({})", surface.solves.join(", ")))
+        };
+        let solves: Vec<String> = self.surfaces.iter().enumerate().filter_map(of_surface).collect();
+        let which = solves.join(", ");
+        (!solves.is_empty())
+            .then(|| format!("solves and pickups are not worked out anew: the stored values stand at surface {which}"))
+    }
+
     fn into_system(mut self, name: &str, mut glasses: Glasses) -> Result<System, TextError> {
         glasses.makers = std::mem::take(&mut self.makers);
         let mm = self.mm_per_unit.unwrap_or(1.0);
-        let mut notes = Vec::new();
+        let mut notes = std::mem::take(&mut self.notes);
+        notes.extend(self.note_on_solves());
         if self.n_configurations > 1 {
             notes.push(format!("of {} configurations the one that is stored is read", self.n_configurations));
         }
@@ -213,6 +239,14 @@ impl Zmx {
             notes,
         })
     }
+}
+
+/// Returns the makers whose glasses a file's catalogues hold. Zemax keeps crystals in catalogues of their own, which
+/// are of no one maker.
+fn makers(catalogues: &[&str]) -> Vec<String> {
+    let are_crystals = |name: &&str| ["INFRARED", "BIREFRINGENT"].contains(&name.to_uppercase().as_str());
+    let crystals = catalogues.iter().any(are_crystals).then_some("MISC");
+    catalogues.iter().copied().chain(crystals).map(str::to_owned).collect()
 }
 
 /// Returns the wavelength in nm whose micrometres a file states: the nearest number of ten digits, so that 0.486 is 486.

@@ -73,6 +73,14 @@ impl Command {
         }
     }
 
+    /// Returns a distance, which may be infinite.
+    pub(super) fn distance(&self, place: usize) -> Result<f64, TextError> {
+        match self.words.get(place).map(|word| word.to_uppercase()).as_deref() {
+            Some("INF" | "INFINITY") => Ok(f64::INFINITY),
+            _ => self.number(place),
+        }
+    }
+
     pub(super) fn numbers(&self) -> Result<Vec<f64>, TextError> {
         (1..self.words.len()).map(|place| self.number(place)).collect()
     }

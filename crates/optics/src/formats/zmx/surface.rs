@@ -25,6 +25,8 @@ pub(super) struct ZmxSurface {
     has_extra_data: bool,
     clear_radius: Option<f64>,
     pub(super) glass: Option<ZmxGlass>,
+    /// Keywords of the solves and pickups by which the program would find some of the numbers anew.
+    pub(super) solves: Vec<String>,
 }
 
 pub(super) struct ZmxGlass {
@@ -46,6 +48,10 @@ const OTHER_APERTURES: [(&str, &str); 9] = [
     ("UDAP", "a user-defined aperture"),
 ];
 
+/// Solves and pickups: a curvature, thickness or parameter picked up from another surface, and a thickness that brings
+/// the marginal or the chief ray to a height, or an edge to a width.
+const SOLVES: [&str; 6] = ["PKUP", "PZUP", "PPAR", "MAZH", "CHZH", "EDGE"];
+
 impl ZmxSurface {
     /// Returns a plane that begins at this line.
     pub(super) fn begin(line: usize) -> Self {
@@ -62,8 +68,12 @@ impl ZmxSurface {
             "DISZ" => self.thickness = line.number(0)?,
             "PARM" => {
                 let place = line.count(0)?;
-                if !(1..=200).contains(&place) {
-                    return Err(line.wrong(format!("parameter {place}; expected 1 to 200")));
+                // Newer files state a parameter 0 too, which means nothing to the surfaces that are read.
+                if place == 0 {
+                    return Ok(true);
+                }
+                if place > 200 {
+                    return Err(line.wrong(format!("parameter {place}; expected 0 to 200")));
                 }
                 self.parameters.resize(self.parameters.len().max(place), 0.0);
                 self.parameters[place - 1] = line.number(1)?;
@@ -89,6 +99,7 @@ impl ZmxSurface {
                 let (nd, vd) = (line.number_or(3, 0.0)?, line.number_or(4, 0.0)?);
                 self.glass = Some(ZmxGlass { line: line.number, name, nd_vd: (nd > 0.0).then_some((nd, vd)) });
             }
+            solve if SOLVES.contains(&solve) => self.solves.push(solve.to_owned()),
             keyword => {
                 if let Some((_, what)) = OTHER_APERTURES.iter().find(|(other, _)| *other == keyword) {
                     return Err(line.wrong(format!("{what} is not supported")));
