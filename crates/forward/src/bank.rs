@@ -132,10 +132,9 @@ impl Aim<'_> {
 
     /// Returns the radius of the blur on the axis, mm, from first-order optics.
     fn blur_radius_mm(&self) -> f64 {
-        let first_order = self.lens.first_order();
-        let from_vertex_mm = 1e3 / self.dioptres - first_order.entrance_pupil_z_mm;
+        let from_vertex_mm = 1e3 / self.dioptres - self.lens.projection_center_z_mm();
         let Ok(image_mm) = self.lens.film_mm_for(from_vertex_mm) else { return 0.0 };
-        let cone = 0.5 * first_order.exit_pupil_diameter_mm / (image_mm - first_order.exit_pupil_z_mm);
+        let cone = 0.5 / (self.lens.image_index() * self.lens.working_f_number(from_vertex_mm));
         (cone * (self.film_mm - image_mm)).abs()
     }
 

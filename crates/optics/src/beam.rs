@@ -51,6 +51,8 @@ impl<'a> Aim<'a> {
     fn start(&self, target_mm: DVec2) -> (DVec3, DVec3) {
         let target_mm = target_mm.extend(self.z_mm);
         let direction = self.point.direction_to(target_mm);
+        // Where the pupil appears behind the object, light runs as though it came from the target.
+        let direction = direction * 1.0_f64.copysign(direction.z);
         (target_mm + direction * ((self.start_z_mm - self.z_mm) / direction.z), direction)
     }
 

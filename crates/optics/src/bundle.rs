@@ -17,10 +17,10 @@ impl ObjectPoint {
     /// Returns the point seen from the paraxial entrance-pupil centre of `lens` under these tangents of field angles,
     /// `dioptres` = 1/Z away (Z the axial distance from that centre in metres; 0 is infinitely far).
     ///
-    /// A telecentric lens has no such centre; there the first vertex stands for it.
+    /// A telecentric lens has no such centre; there the first vertex stands for it
+    /// ([`MonoLens::projection_center_z_mm`]).
     pub fn from_field(lens: &MonoLens, field_tan: DVec2, dioptres: f64) -> Self {
-        let z_mm = lens.first_order().entrance_pupil_z_mm;
-        let center_z_mm = if z_mm.is_finite() { z_mm } else { 0.0 };
+        let center_z_mm = lens.projection_center_z_mm();
         if dioptres == 0.0 {
             return Self::Infinite(DVec3::new(-field_tan.x, -field_tan.y, 1.0).normalize());
         }

@@ -111,9 +111,7 @@ fn lead_mm(lens: &Lens, layout: &Layout) -> f64 {
 
 fn fans(lens: &Lens, lenses: &[MonoLens], layout: &Layout) -> Vec<Fan> {
     let lead_mm = lead_mm(lens, layout);
-    let entrance_z_mm = lenses[0].first_order().entrance_pupil_z_mm;
-    let entrance_z_mm = if entrance_z_mm.is_finite() { entrance_z_mm } else { 0.0 };
-    let dioptres = 1e3 / (layout.object_distance_mm + entrance_z_mm);
+    let dioptres = 1e3 / (layout.object_distance_mm + lenses[0].projection_center_z_mm());
     let mut fans = Vec::new();
     for (i, &field_tan) in layout.field_tans.iter().enumerate() {
         let point = ObjectPoint::from_field(&lenses[0], DVec2::new(0.0, -field_tan), dioptres);

@@ -7,13 +7,17 @@ use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::{
     Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, RayBatchF32, Rims, Shape, Surface,
-    paraxial::{self, Matrix},
+    paraxial::{self, MarginalRay, Matrix},
     pose,
     trace::{self, Goal, Kind, Plan, Step},
 };
 
 /// Rays that one task of [`MonoLens::trace_parallel`] traces.
 const CHUNK: usize = 4096;
+
+/// How far an entrance pupil may be for counting from its centre, over the first rim's radius: then counts are good to
+/// 1e-12 of the rim.
+const FARTHEST_PUPIL: f64 = 1e4;
 
 /// A lens at one wavelength, its indices resolved; tracing it cannot fail as a whole.
 #[derive(Clone, Debug)]
@@ -294,6 +298,24 @@ impl MonoLens {
     pub fn conjugate(&self, object_distance_mm: f64) -> Conjugate {
         let (before, after) = (self.steps[0].index_before, self.image_index());
         Matrix::of(&self.steps).image_of(-object_distance_mm, before, after)
+    }
+
+    /// Returns the working f-number for an object at this distance before the first vertex (infinite for a far one):
+    /// one over twice the sine of the image-side cone times the index there, by first order.
+    ///
+    /// It is `N (1 + |m| / m_p)` with `m_p` the magnification of the pupils, and holds where those are infinite too.
+    /// With it an unvignetted axial image of a Lambertian plane has `E = π L / (4 N_w²)` to 0.1 % at f/8, at any
+    /// magnification; the textbook's `N (1 + |m|)` has not, unless the pupils are equal.
+    pub fn working_f_number(&self, object_distance_mm: f64) -> f64 {
+        0.5 / MarginalRay::of(&self.steps, self.stop, object_distance_mm).reduced_slope_after.abs()
+    }
+
+    /// z from the first vertex of the point that fields and depths are counted from, mm: the centre of the paraxial
+    /// entrance pupil, or the first vertex where that is infinitely far or so far (10⁴ times the first rim) that a
+    /// count from it would lose digits.
+    pub fn projection_center_z_mm(&self) -> f64 {
+        let z_mm = self.first_order.entrance_pupil_z_mm;
+        if z_mm.abs() <= FARTHEST_PUPIL * self.front.semi_aperture_mm { z_mm } else { 0.0 }
     }
 
     /// Returns how far behind the last vertex the film is in focus for an object at this distance before the first.

@@ -56,13 +56,38 @@ impl FirstOrder {
     pub fn pupil_magnification(&self) -> f64 {
         self.exit_pupil_diameter_mm / self.entrance_pupil_diameter_mm
     }
+}
 
-    /// Returns the working f-number `N (1 + |m| / m_p)` at a magnification, `m_p` being that of the pupils.
+/// The paraxial ray from an axial object point to the edge of the stop.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MarginalRay {
+    /// Index times slope where it comes in: 0 for a far point.
+    pub(crate) reduced_slope: f64,
+    /// Height on the first vertex plane, mm.
+    pub(crate) height_mm: f64,
+    /// Index times slope where it leaves.
+    pub(crate) reduced_slope_after: f64,
+}
+
+impl MarginalRay {
+    /// Returns the ray from the point at `object_distance_mm` before the first vertex (infinite for a far one).
     ///
-    /// With it an unvignetted axial image of a Lambertian plane has `E = π L / (4 N_w²)` to 0.1 % at f/8, at any
-    /// magnification; the textbook's `N (1 + |m|)` has not, unless the pupils are equal.
-    pub fn working_f_number(&self, magnification: f64) -> f64 {
-        self.f_number * (1.0 + magnification.abs() / self.pupil_magnification())
+    /// Heights and slopes are infinite where no such ray reaches the stop's edge, as from a far point to the stop of a
+    /// lens that is telecentric on that side.
+    pub(crate) fn of(steps: &[Step], stop: usize, object_distance_mm: f64) -> Self {
+        let (front, whole) = (Matrix::up_to(steps, stop), Matrix::of(steps));
+        let edge_mm = steps[stop].semi_aperture;
+        if object_distance_mm.is_infinite() {
+            let height_mm = edge_mm / front.a.abs();
+            return Self { reduced_slope: 0.0, height_mm, reduced_slope_after: whole.c * height_mm };
+        }
+        let reduced_mm = object_distance_mm / steps[0].index_before;
+        let reduced_slope = (edge_mm / (front.a * reduced_mm + front.b)).copysign(1.0);
+        Self {
+            reduced_slope,
+            height_mm: reduced_slope * reduced_mm,
+            reduced_slope_after: reduced_slope * (whole.c * reduced_mm + whole.d),
+        }
     }
 }
 
@@ -87,6 +112,20 @@ pub(crate) struct Matrix {
 impl Matrix {
     const IDENTITY: Self = Self { a: 1.0, b: 0.0, c: 0.0, d: 1.0 };
 
+    /// Returns the matrix, with nothing in place of what is no more than rounding of sums of terms as large as these.
+    ///
+    /// So an afocal lens has no power and a telecentric one a pupil that is infinitely far, whatever the last digits of
+    /// its prescription.
+    fn cleared(self, terms: &Self) -> Self {
+        let clear = |element: f64, terms: f64| if element.abs() <= ROUNDING * terms { 0.0 } else { element };
+        Self {
+            a: clear(self.a, terms.a),
+            b: clear(self.b, terms.b),
+            c: clear(self.c, terms.c),
+            d: clear(self.d, terms.d),
+        }
+    }
+
     fn after_refraction(self, power: f64) -> Self {
         Self { c: self.c - power * self.a, d: self.d - power * self.b, ..self }
     }
@@ -97,23 +136,34 @@ impl Matrix {
 
     /// Returns the action from the first vertex of these steps to the last, that of the last's own power included.
     pub(crate) fn of(steps: &[Step]) -> Self {
+        Self::product(steps).cleared(&Self::terms(steps))
+    }
+
+    fn product(steps: &[Step]) -> Self {
+        Self::product_of(steps, |power| power, |reduced_mm| reduced_mm)
+    }
+
+    /// Returns the sums of the absolute terms that make the elements of the product.
+    fn terms(steps: &[Step]) -> Self {
+        Self::product_of(steps, |power| -power.abs(), f64::abs)
+    }
+
+    fn product_of(steps: &[Step], power: impl Fn(f64) -> f64, way: impl Fn(f64) -> f64) -> Self {
         let mut matrix = Self::IDENTITY;
         for (i, step) in steps.iter().enumerate() {
             if i > 0 {
-                matrix = matrix.after_transfer((step.vertex_z - steps[i - 1].vertex_z) / step.index_before);
+                matrix = matrix.after_transfer(way((step.vertex_z - steps[i - 1].vertex_z) / step.index_before));
             }
-            matrix = matrix.after_refraction(step.power());
+            matrix = matrix.after_refraction(power(step.power()));
         }
         matrix
     }
 
     /// Returns the action from the first vertex to just before the surface at `stop`.
     fn up_to(steps: &[Step], stop: usize) -> Self {
-        if stop == 0 {
-            return Self::IDENTITY;
-        }
-        let gap = steps[stop].vertex_z - steps[stop - 1].vertex_z;
-        Self::of(&steps[..stop]).after_transfer(gap / steps[stop].index_before)
+        let (before, gap_mm) = (&steps[..stop], reduced_gap_mm(steps, stop));
+        let terms = Self::terms(before).after_transfer(gap_mm.abs());
+        Self::product(before).after_transfer(gap_mm).cleared(&terms)
     }
 
     /// Returns the image of a point at `object_z` from the first vertex.
@@ -121,6 +171,11 @@ impl Matrix {
         // A ray of reduced slope 1 from the object point, or of height 1 from a far one.
         let (y, w) = if object_z.is_infinite() { (1.0, 0.0) } else { (-object_z / index_before, 1.0) };
         let (y2, w2) = (self.a * y + self.b * w, self.c * y + self.d * w);
+        // In the front focal plane, to rounding: the light leaves in parallel.
+        if w2.abs() <= ROUNDING * ((self.c * y).abs() + (self.d * w).abs()) {
+            let magnification = if w == 0.0 { 0.0 } else { f64::INFINITY };
+            return Conjugate { image_z_mm: f64::INFINITY, magnification };
+        }
         Conjugate { image_z_mm: -index_after * y2 / w2, magnification: w / w2 }
     }
 
@@ -133,6 +188,17 @@ impl Matrix {
             return f64::NEG_INFINITY;
         }
         -index_before * y / w
+    }
+}
+
+/// How much rounding may leave of a sum that vanishes, over the sum of its absolute terms.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// Returns the distance to a surface from the one before it over the index between them, mm; 0 for the first.
+fn reduced_gap_mm(steps: &[Step], surface: usize) -> f64 {
+    match surface {
+        0 => 0.0,
+        _ => (steps[surface].vertex_z - steps[surface - 1].vertex_z) / steps[surface].index_before,
     }
 }
 
@@ -167,7 +233,7 @@ pub(crate) fn first_order(steps: &[Step], stop: usize, wavelength_nm: f64) -> Fi
     let front = Matrix::up_to(steps, stop);
     let rear = Matrix::of(&steps[stop..]);
     let (n0, n1) = (steps[0].index_before, steps[steps.len() - 1].index_after);
-    let power = -whole.c;
+    let power = 0.0 - whole.c;
     let stop_diameter_mm = 2.0 * steps[stop].semi_aperture;
     let entrance_pupil_diameter_mm = stop_diameter_mm / front.a.abs();
     FirstOrder {
@@ -182,7 +248,7 @@ pub(crate) fn first_order(steps: &[Step], stop: usize, wavelength_nm: f64) -> Fi
         entrance_pupil_diameter_mm,
         exit_pupil_z_mm: -n1 * rear.b / rear.d,
         exit_pupil_diameter_mm: stop_diameter_mm / rear.d.abs(),
-        f_number: (1.0 / power).abs() / entrance_pupil_diameter_mm,
+        f_number: if power == 0.0 { f64::INFINITY } else { (1.0 / power).abs() / entrance_pupil_diameter_mm },
         object_index: n0,
         image_index: n1,
     }
@@ -190,7 +256,11 @@ pub(crate) fn first_order(steps: &[Step], stop: usize, wavelength_nm: f64) -> Fi
 
 #[cfg(test)]
 mod tests {
-    use crate::Lens;
+    use glam::{DVec2, DVec3};
+
+    use crate::{
+        Glass, Interface, Lens, ObjectPoint, PupilBoundary, Rims, Shape, Surface, analysis::StopAim, rays_towards,
+    };
 
     /// The published lengths have four decimals, the last off by one at times.
     const ANCHOR_MM: f64 = 1e-4;
@@ -251,7 +321,63 @@ mod tests {
         assert!((film_mm - 1.0 / (1.0 / 50.0 - 1.0 / 2_000.0)).abs() < 1e-12);
         assert!((mono.conjugate(2_000.0).magnification + film_mm / 2_000.0).abs() < 1e-15);
         let first = mono.first_order();
-        assert!((first.working_f_number(film_mm / 2_000.0) - film_mm / 10.0).abs() < 1e-12);
+        assert!((mono.working_f_number(2_000.0) - film_mm / 10.0).abs() < 1e-12);
+        assert!((mono.working_f_number(f64::INFINITY) - first.f_number).abs() < 1e-12);
+    }
+
+    fn train(parts: [(f64, f64, f64); 3], stop: usize) -> Lens {
+        let part = |(power_per_mm, semi_aperture_mm, thickness_after_mm)| Interface {
+            surface: Surface { shape: Shape::ThinLens { power_per_mm }, ..Surface::plane(semi_aperture_mm) },
+            medium_after: Glass::Air,
+            thickness_after_mm,
+        };
+        Lens::new("train", "test", parts.map(part).into(), stop).unwrap()
+    }
+
+    #[test]
+    fn telecentric_afocal_relay_has_no_power_and_pupils_without_end() {
+        // 1/49 and 1/81 are no binary numbers: what rounding leaves must not pass for a focal length.
+        let relay = train([(1.0 / 49.0, 20.0, 49.0), (0.0, 5.0, 81.0), (1.0 / 81.0, 30.0, 0.0)], 1);
+        let mono = relay.at(550.0).unwrap();
+        let first = mono.first_order();
+        assert_eq!((first.power_per_mm, first.efl_mm, first.f_number), (0.0, f64::INFINITY, f64::INFINITY));
+        for infinite in [first.entrance_pupil_z_mm, first.exit_pupil_z_mm, first.entrance_pupil_diameter_mm] {
+            assert!(infinite.is_infinite(), "{first:?}");
+        }
+        assert!(mono.film_mm_for(f64::INFINITY).is_err());
+        // Every object is imaged at 81/49 of its size; the cone is that of the stop seen from the second focus.
+        for object_mm in [20.0, 49.0, 300.0] {
+            let expected = -81.0 / 49.0;
+            assert!((mono.conjugate(object_mm).magnification - expected).abs() < 1e-12);
+            assert!((mono.working_f_number(object_mm) - 81.0 / 10.0).abs() < 1e-12);
+        }
+        assert_eq!(mono.projection_center_z_mm(), 0.0);
+    }
+
+    #[test]
+    fn object_in_the_front_focal_plane_is_imaged_infinitely_far() {
+        let lens = Lens::thin(49.0, 10.0).unwrap().at(550.0).unwrap();
+        assert_eq!(lens.conjugate(49.0).image_z_mm, f64::INFINITY);
+        assert!(lens.film_mm_for(49.0).is_err() && lens.film_mm_for(49.001).is_ok());
+    }
+
+    #[test]
+    fn light_reaches_a_lens_whose_pupil_appears_behind_the_object() {
+        // The stop lies beyond the rear focus: its image, the entrance pupil, lies 294 mm before the lens.
+        let hypercentric = train([(1.0 / 49.0, 300.0, 58.8), (0.0, 2.0, 30.0), (1.0 / 60.0, 300.0, 0.0)], 1);
+        let mono = hypercentric.at(550.0).unwrap();
+        assert!((mono.first_order().entrance_pupil_z_mm + 294.0).abs() < 1e-9);
+        for object_mm in [100.0, 280.0, 400.0] {
+            let point = ObjectPoint::Finite(DVec3::new(3.0, -2.0, -object_mm));
+            let pupil = PupilBoundary::find(&mono, &point, 32).unwrap();
+            assert!(pupil.center_mm().length() < 1e-9, "{object_mm}: {}", pupil.center_mm());
+            let aim = StopAim::find(&mono, &point, &[DVec2::ZERO, DVec2::new(0.6, -0.8)]);
+            let targets_mm: Vec<DVec2> = aim.targets_mm().iter().map(|target| target.unwrap()).collect();
+            let mut rays = rays_towards(&point, &targets_mm, aim.z_mm(), 0.0);
+            mono.trace_surfaces(0..2, &mut rays, Rims::Ignore);
+            assert!(rays.point_mm(0).truncate().length() < 1e-9);
+            assert!((rays.point_mm(1).truncate() - DVec2::new(1.2, -1.6)).length() < 1e-9);
+        }
     }
 
     #[test]

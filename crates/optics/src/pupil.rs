@@ -88,8 +88,7 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(lens: &'a MonoLens, point: &'a ObjectPoint) -> Self {
-        let z_mm = lens.first_order().entrance_pupil_z_mm;
-        Self { lens, point, z_mm: if z_mm.is_finite() { z_mm } else { 0.0 } }
+        Self { lens, point, z_mm: lens.projection_center_z_mm() }
     }
 
     fn clearances(&self, targets_mm: &[DVec2]) -> Vec<f64> {

@@ -5,7 +5,8 @@ use std::ops::AddAssign;
 use serde::Serialize;
 
 use crate::{
-    C_LINE_NM, D_LINE_NM, F_LINE_NM, Lens, OpticsError,
+    C_LINE_NM, D_LINE_NM, F_LINE_NM, Lens, MonoLens, OpticsError,
+    paraxial::MarginalRay,
     trace::{Kind, Step},
 };
 
@@ -64,7 +65,8 @@ pub struct SeidelSettings {
     pub colors_nm: [f64; 2],
     /// Distance of the object before the first vertex, mm; infinite for a far one.
     pub object_distance_mm: f64,
-    /// Slope dy/dz of the chief ray before the lens.
+    /// Slope dy/dz of the chief ray before the lens. Where the entrance pupil is too far for a slope to say where the
+    /// ray is, it is that of the line from the object point to the first vertex.
     pub chief_slope: f64,
 }
 
@@ -73,6 +75,17 @@ impl SeidelSettings {
     pub fn far(chief_slope: f64) -> Self {
         let (wavelength_nm, colors_nm) = (D_LINE_NM, [F_LINE_NM, C_LINE_NM]);
         Self { wavelength_nm, colors_nm, object_distance_mm: f64::INFINITY, chief_slope }
+    }
+
+    /// Returns the chief ray on the first vertex plane.
+    fn chief_ray(&self, lens: &MonoLens) -> Paraxial {
+        let (pupil_z_mm, center_z_mm) = (lens.first_order().entrance_pupil_z_mm, lens.projection_center_z_mm());
+        if pupil_z_mm == center_z_mm || self.object_distance_mm.is_infinite() {
+            return Paraxial { y: -pupil_z_mm * self.chief_slope, u: self.chief_slope };
+        }
+        let object_mm = -self.chief_slope * (self.object_distance_mm + center_z_mm);
+        let u = -object_mm / (self.object_distance_mm + pupil_z_mm);
+        Paraxial { y: object_mm + self.object_distance_mm * u, u }
     }
 }
 
@@ -96,7 +109,8 @@ impl Paraxial {
 impl Lens {
     /// Returns the Seidel sums of the lens for a full aperture.
     ///
-    /// The marginal ray passes the edge of the paraxial entrance pupil, the chief ray its centre. An ideal lens in
+    /// The marginal ray passes the edge of the paraxial entrance pupil, the chief ray its centre. (Of a far object and a
+    /// lens that is telecentric on its side, where such rays do not exist, the sums are infinite.) An ideal lens in
     /// the train adds nothing; a conic or asphere adds what its r⁴ term departs from the sphere.
     ///
     /// # Errors
@@ -105,17 +119,11 @@ impl Lens {
         self.check_rotational("a sum of Seidel aberrations")?;
         let mono = self.at(settings.wavelength_nm)?;
         let [short, long] = [self.at(settings.colors_nm[0])?, self.at(settings.colors_nm[1])?];
-        let first = mono.first_order();
-        let (pupil_z, pupil_radius) = (first.entrance_pupil_z_mm, 0.5 * first.entrance_pupil_diameter_mm);
-        let mut marginal = match settings.object_distance_mm.is_infinite() {
-            true => Paraxial { y: pupil_radius, u: 0.0 },
-            false => {
-                let u = pupil_radius / (pupil_z + settings.object_distance_mm);
-                Paraxial { y: settings.object_distance_mm * u, u }
-            }
-        };
-        let mut chief = Paraxial { y: -pupil_z * settings.chief_slope, u: settings.chief_slope };
-        let lagrange_mm = mono.steps()[0].index_before * (marginal.u * chief.y - chief.u * marginal.y);
+        let index_before = mono.steps()[0].index_before;
+        let ray = MarginalRay::of(mono.steps(), mono.stop(), settings.object_distance_mm);
+        let mut marginal = Paraxial { y: ray.height_mm, u: ray.reduced_slope / index_before };
+        let mut chief = settings.chief_ray(&mono);
+        let lagrange_mm = index_before * (marginal.u * chief.y - chief.u * marginal.y);
 
         let (mut per_surface, mut total) = (Vec::new(), SeidelSums::default());
         let steps = mono.steps();
@@ -210,6 +218,41 @@ mod tests {
         assert!(total.c2.abs() < 1e-15 && total.s5.abs() < 1e-15);
         // Astigmatism of a thin lens at the stop: S3 = H² φ.
         assert!((total.s3 - 0.25 * power).abs() < 1e-12);
+    }
+
+    #[test]
+    fn telecentric_lens_has_the_sums_of_one_that_nearly_is() {
+        // A stop in the rear focal plane of a singlet, and a hair before it.
+        let lens = |stop_mm: f64| {
+            let front = |radius_mm: f64, medium_after: Glass, thickness_after_mm: f64| Interface {
+                surface: Surface::sphere(radius_mm, 12.0),
+                medium_after,
+                thickness_after_mm,
+            };
+            let stop = Interface { surface: Surface::plane(3.0), medium_after: Glass::Air, thickness_after_mm: 0.0 };
+            let glass = Glass::NdVd { nd: 1.6, vd: 50.0 };
+            let surfaces = vec![front(60.0, glass, 5.0), front(-60.0, Glass::Air, stop_mm), stop];
+            Lens::new("telecentric", "test", surfaces, 2).unwrap()
+        };
+        let probe = lens(1.0);
+        let bfl_mm = probe.at(D_LINE_NM).unwrap().film_mm_for(f64::INFINITY).unwrap() + 1.0;
+        let settings = SeidelSettings { object_distance_mm: 90.0, ..SeidelSettings::far(0.05) };
+        let exact = lens(bfl_mm);
+        assert!(exact.at(D_LINE_NM).unwrap().first_order().entrance_pupil_z_mm.is_infinite());
+        let exact = exact.seidel(&settings).unwrap();
+        let near = lens(bfl_mm * (1.0 - 1e-6)).seidel(&settings).unwrap();
+        let pairs = |of: fn(&SeidelSums) -> f64| (of(&exact.total), of(&near.total));
+        let sums: [fn(&SeidelSums) -> f64; 7] = [|s| s.s1, |s| s.s2, |s| s.s3, |s| s.s4, |s| s.s5, |s| s.c1, |s| s.c2];
+        for (found, expected) in sums.map(pairs) {
+            assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
+        }
+        // The chief ray runs parallel to the axis at the height of the object.
+        assert!((exact.lagrange_mm.abs() - 0.05 * 90.0 * 3.0 / focal_length_mm(&probe)).abs() < 1e-9);
+    }
+
+    /// The focal length of the lens, which turns slopes before it into heights in its rear focal plane.
+    fn focal_length_mm(lens: &Lens) -> f64 {
+        lens.at(D_LINE_NM).unwrap().first_order().efl_mm
     }
 
     #[test]

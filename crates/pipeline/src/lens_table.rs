@@ -138,7 +138,7 @@ fn image_of(lens: &MonoLens, distance_mm: f64) -> Result<ImageData, PipelineErro
         distance_mm,
         image_distance_mm: conjugate.image_z_mm,
         magnification: conjugate.magnification,
-        working_f_number: lens.first_order().working_f_number(conjugate.magnification),
+        working_f_number: lens.working_f_number(distance_mm),
     })
 }
 

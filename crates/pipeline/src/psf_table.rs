@@ -160,8 +160,7 @@ impl PsfRequest {
             FocusChoice::FilmMm(film_mm) => film_mm,
             FocusChoice::NearObject => return Err(self.wrong("focus", "NearObject", "a distance or a film place")),
         };
-        let pupil_z = reference.first_order().entrance_pupil_z_mm;
-        let pupil_z_mm = if pupil_z.is_finite() { pupil_z } else { 0.0 };
+        let pupil_z_mm = reference.projection_center_z_mm();
         let mut items = Vec::new();
         for &field_deg in &self.fields_deg {
             for &distance_mm in &self.distances_mm {

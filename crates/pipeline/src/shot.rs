@@ -90,8 +90,7 @@ fn place_film(focus: FocusChoice, lens: &MonoLens, scene: &Scene) -> Result<f64,
         FocusChoice::DistanceMm(distance_mm) => Ok(lens.film_mm_for(distance_mm)?),
         FocusChoice::NearObject => {
             let z_mm = 1e3 * near_depth_m(scene)?;
-            let pupil_z = lens.first_order().entrance_pupil_z_mm;
-            Ok(lens.film_mm_for(z_mm - if pupil_z.is_finite() { pupil_z } else { 0.0 })?)
+            Ok(lens.film_mm_for(z_mm - lens.projection_center_z_mm())?)
         }
     }
 }
@@ -152,23 +151,13 @@ fn seen_evenly(view: &View, rows: usize, columns: usize) -> Result<(usize, usize
 
 /// Returns how far off axis the chief ray of a unit tangent lands, mm, by first order.
 fn height_per_tan_mm(lens: &MonoLens, film_mm: f64) -> f64 {
-    let first = lens.first_order();
-    let magnification = first.pupil_magnification();
-    if first.exit_pupil_z_mm.is_finite() && magnification.is_finite() {
-        (film_mm - first.exit_pupil_z_mm) / (first.image_index * magnification)
-    } else {
-        first.efl_mm
-    }
+    lens.film_scale_mm(film_mm).abs()
 }
 
 /// Returns by how much the chief ray of a field lands farther out than first order says; 1 where it does not get through.
 fn height_over_paraxial(lens: &MonoLens, tan: f64, film_mm: f64) -> f64 {
-    let pupil_z = lens.first_order().entrance_pupil_z_mm;
-    if !pupil_z.is_finite() {
-        return 1.0;
-    }
     let point = ObjectPoint::from_field(lens, DVec2::new(tan, 0.0), 0.0);
-    let mut rays = rays_towards(&point, &[DVec2::ZERO], pupil_z, 0.0);
+    let mut rays = rays_towards(&point, &[DVec2::ZERO], lens.projection_center_z_mm(), 0.0);
     lens.trace(&mut rays, Rims::Ignore);
     lens.to_film(&mut rays, film_mm);
     if rays.fate[0].is_in_flight() { rays.x_mm[0].abs() / (tan * height_per_tan_mm(lens, film_mm)) } else { 1.0 }
@@ -179,7 +168,7 @@ fn widest_blur_mm(lens: &MonoLens, film_mm: f64, scene: &Scene) -> Result<f64, P
     let first = lens.first_order();
     let (near_m, far_m) = scene.require_depth()?.range_m();
     let focus_dioptres = match lens.object_distance_mm_for(film_mm) {
-        Ok(distance_mm) => 1e3 / (distance_mm + first.entrance_pupil_z_mm),
+        Ok(distance_mm) => 1e3 / (distance_mm + lens.projection_center_z_mm()),
         Err(_) => return Ok(0.0),
     };
     let farthest = [1.0 / near_m, 1.0 / far_m].map(|d| (d - focus_dioptres).abs()).into_iter().fold(0.0, f64::max);

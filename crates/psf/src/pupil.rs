@@ -30,8 +30,7 @@ impl Pupil {
     /// Finds the pupil of a point whose pupil should be like this one, or from nothing if it is not.
     pub(crate) fn near(&self, lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
         let n_azimuths = self.rho_mm.len();
-        let z_mm = lens.first_order().entrance_pupil_z_mm;
-        let guess = Self { z_mm: if z_mm.is_finite() { z_mm } else { 0.0 }, ..self.clone() };
+        let guess = Self { z_mm: lens.projection_center_z_mm(), ..self.clone() };
         // Once to know where its centre is, once about that: any three digits of the first will do.
         let solved = guess
             .refined(lens, point, 1e-3 * TOLERANCE_MM.sqrt())

@@ -338,8 +338,9 @@ pub(super) fn propagation(lens: &MonoLens, film_mm: f64) -> Propagation {
     let first = lens.first_order();
     let (radius_mm, way_mm) = (0.5 * first.exit_pupil_diameter_mm, film_mm - first.exit_pupil_z_mm);
     let zones = first.image_index * radius_mm * radius_mm / (lens.wavelength_nm() * 1e-6 * way_mm.abs());
-    // A telecentric lens has a pupil infinitely large and far: 0/0 or infinite, and no reason for doubt.
-    if first.power_per_mm == 0.0 || zones < FEW_FRESNEL_ZONES { Propagation::Fresnel } else { Propagation::Debye }
+    // A telecentric lens has a pupil infinitely large and far: no reason for doubt, and no place for waves to begin.
+    let is_doubtful = way_mm.is_finite() && (first.power_per_mm == 0.0 || zones < FEW_FRESNEL_ZONES);
+    if is_doubtful { Propagation::Fresnel } else { Propagation::Debye }
 }
 
 /// The cells of a pupil in the entrance-pupil plane.

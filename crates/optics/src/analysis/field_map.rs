@@ -65,10 +65,10 @@ impl MonoLens {
     /// Returns the paraxial image height on a film over the tangent of the field angle at the entrance pupil, mm,
     /// positive for an image upside down: the focal length, for a film in the rear focal plane.
     pub fn film_scale_mm(&self, film_mm: f64) -> f64 {
-        let (steps, pupil_z_mm) = (self.steps(), self.first_order().entrance_pupil_z_mm);
+        let steps = self.steps();
         let matrix = Matrix::of(steps);
         // A ray of slope 1 through the middle of the entrance pupil; where that is infinitely far, of the first vertex.
-        let y = if pupil_z_mm.is_finite() { -pupil_z_mm } else { 0.0 };
+        let y = -self.projection_center_z_mm();
         let w = steps[0].index_before;
         matrix.a * y + matrix.b * w + film_mm * (matrix.c * y + matrix.d * w) / self.image_index()
     }

@@ -43,7 +43,7 @@ fn first_order_data_agree_to_twelve_digits() {
             check("fno_infinity", first.f_number, 0.0);
             check("image_from_Sk", conjugate.image_z_mm, 0.0);
             check("magnification", conjugate.magnification, 0.0);
-            check("fno_working_paraxial", first.working_f_number(conjugate.magnification), 0.0);
+            check("fno_working_paraxial", mono.working_f_number(distance_mm), 0.0);
             if distance_mm.is_finite() {
                 let back_mm = mono.object_distance_mm_for(conjugate.image_z_mm).unwrap();
                 assert!((back_mm - distance_mm).abs() <= 1e-11 * distance_mm, "{name}: {back_mm}");

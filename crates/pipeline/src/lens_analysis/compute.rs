@@ -65,8 +65,7 @@ impl AnalysisRequest {
         let lenses: Vec<MonoLens> = self.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
         let off = |i: &usize| (self.wavelengths_nm[*i] - REFERENCE_WAVELENGTH_NM).abs();
         let reference = (0..lenses.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0);
-        let first = lenses[reference].first_order();
-        let entrance_z_mm = if first.entrance_pupil_z_mm.is_finite() { first.entrance_pupil_z_mm } else { 0.0 };
+        let dioptres = 1e3 / (self.distance_mm + lenses[reference].projection_center_z_mm());
         let fields_deg = match &self.fields_deg {
             Some(fields_deg) => fields_deg.clone(),
             None => {
@@ -78,7 +77,7 @@ impl AnalysisRequest {
         let bench = Bench {
             lenses,
             reference,
-            dioptres: 1e3 / (self.distance_mm + entrance_z_mm),
+            dioptres,
             film_mm: 0.0,
             sampling: PupilSampling {
                 coordinates: PupilCoordinates::Stop { radius_mm: WITHIN_RIM * lens.stop_semi_aperture_mm() },
@@ -178,7 +177,7 @@ impl Bench {
             wavelengths_nm: request.wavelengths_nm.clone(),
             efl_mm: first.efl_mm,
             f_number: first.f_number,
-            working_f_number: first.working_f_number(self.reference().conjugate(request.distance_mm).magnification),
+            working_f_number: self.reference().working_f_number(request.distance_mm),
             film_mm: self.film_mm,
             half_illumination_deg: field_limit_deg(self.reference(), 0.5),
             focus: FocusData {

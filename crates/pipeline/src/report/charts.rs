@@ -44,8 +44,8 @@ impl Places {
         let wavelengths_nm =
             (0..4).map(|i| first + (last - first) * f64::from(i) / 3.0).map(f64::round).collect::<Vec<_>>();
         let focus = shot.focus_distance_mm.map_or(near, |mm| {
-            let pupil_z = shot.lens.at(REFERENCE_WAVELENGTH_NM).map_or(0.0, |l| l.first_order().entrance_pupil_z_mm);
-            1e3 / (mm + if pupil_z.is_finite() { pupil_z } else { 0.0 })
+            let pupil_z_mm = shot.lens.at(REFERENCE_WAVELENGTH_NM).map_or(0.0, |lens| lens.projection_center_z_mm());
+            1e3 / (mm + pupil_z_mm)
         });
         let corner_mm = shot.film.half_diagonal_mm();
         let geometry = bank.geometry(focus.clamp(far, near), REFERENCE_WAVELENGTH_NM);

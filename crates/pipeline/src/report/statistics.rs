@@ -148,10 +148,7 @@ fn raw_planes(raw: &Raw) -> Vec<Array2<f32>> {
 pub(super) fn losses(shot: &Shot, field_tans: &[f64]) -> Result<Vec<LossRow>, PipelineError> {
     let mono = shot.lens.at(REFERENCE_WAVELENGTH_NM)?;
     let (near_m, _) = shot.scene.require_depth()?.range_m();
-    let dioptres = shot.focus_distance_mm.map_or(1.0 / near_m, |mm| {
-        let pupil_z = mono.first_order().entrance_pupil_z_mm;
-        1e3 / (mm + if pupil_z.is_finite() { pupil_z } else { 0.0 })
-    });
+    let dioptres = shot.focus_distance_mm.map_or(1.0 / near_m, |mm| 1e3 / (mm + mono.projection_center_z_mm()));
     Ok(field_tans.iter().map(|&field_tan| loss_row(shot, &mono, field_tan, dioptres)).collect())
 }
 
