@@ -307,7 +307,12 @@ impl MonoLens {
     /// With it an unvignetted axial image of a Lambertian plane has `E = π L / (4 N_w²)` to 0.1 % at f/8, at any
     /// magnification; the textbook's `N (1 + |m|)` has not, unless the pupils are equal.
     pub fn working_f_number(&self, object_distance_mm: f64) -> f64 {
-        0.5 / MarginalRay::of(&self.steps, self.stop, object_distance_mm).reduced_slope_after.abs()
+        0.5 / self.marginal_ray(object_distance_mm).reduced_slope_after.abs()
+    }
+
+    /// Returns the paraxial ray from the axial point at this distance before the first vertex to the edge of the stop.
+    pub(crate) fn marginal_ray(&self, object_distance_mm: f64) -> MarginalRay {
+        MarginalRay::of(&self.steps, self.stop, object_distance_mm)
     }
 
     /// z from the first vertex of the point that fields and depths are counted from, mm: the centre of the paraxial

@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use crate::{
     C_LINE_NM, D_LINE_NM, F_LINE_NM, Lens, MonoLens, OpticsError,
-    paraxial::MarginalRay,
     trace::{Kind, Step},
 };
 
@@ -120,7 +119,7 @@ impl Lens {
         let mono = self.at(settings.wavelength_nm)?;
         let [short, long] = [self.at(settings.colors_nm[0])?, self.at(settings.colors_nm[1])?];
         let index_before = mono.steps()[0].index_before;
-        let ray = MarginalRay::of(mono.steps(), mono.stop(), settings.object_distance_mm);
+        let ray = mono.marginal_ray(settings.object_distance_mm);
         let mut marginal = Paraxial { y: ray.height_mm, u: ray.reduced_slope / index_before };
         let mut chief = settings.chief_ray(&mono);
         let lagrange_mm = index_before * (marginal.u * chief.y - chief.u * marginal.y);

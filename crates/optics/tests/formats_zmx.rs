@@ -4,7 +4,10 @@
 use std::path::Path;
 
 use dioptric_optics::{
-    CatalogueGlass, Field, Glass, GlassCatalogue, LensFile, MissingGlass, OpticsError, ReadOptions, Shape,
+    CatalogueGlass, Field, Glass, GlassCatalogue, Lens, LensFile, MissingGlass, ObjectPoint, OpticsError, ReadOptions,
+    Rims, Shape,
+    analysis::{PupilCoordinates, PupilSampling, hexapolar},
+    glam::DVec2,
 };
 
 const SINGLET: &str = "VERS 140124 258 36214
@@ -262,4 +265,65 @@ fn crystals_are_found_in_the_catalogues_that_zemax_keeps_them_in() {
     let text = SINGLET.replace("GLAS N-BK7 0 0 1.5168 64.17", "GLAS BAF2").replace("SCHOTT MISC", "INFRARED");
     let lens = read(&text).unwrap().lens;
     assert_eq!(lens.interfaces()[0].medium_after, Glass::Named("MISC:BAF2".to_owned()));
+}
+
+/// Returns a file that states no diameters: rows of curvature, distance, index behind, with the stop at `stop`.
+fn bare(head: &str, rows: &[(f64, f64, f64)], stop: usize) -> String {
+    let mut text = format!("MODE SEQ\nUNIT MM\n{head}\nWAVM 1 0.55 1\nSURF 0\n");
+    for (i, (curvature, distance, index)) in rows.iter().enumerate() {
+        text += &format!("  CURV {curvature}\n  DISZ {distance}\n");
+        text += if *index == 1.0 { "" } else { "  GLAS ___BLANK 1 0 " };
+        text += &if *index == 1.0 { String::new() } else { format!("{index} 0\n") };
+        text += &format!("SURF {}\n", i + 1);
+        text += if i + 1 == stop { "  STOP\n" } else { "" };
+    }
+    text + "  CURV 0\n  DISZ 0\n"
+}
+
+#[test]
+fn rims_of_a_wide_angle_lens_are_those_of_rays_aimed_at_its_stop() {
+    // Beyond 60° the paraxial pupil of a fisheye leads no ray through the stop.
+    let fisheye = Lens::built_in("fisheye-12.5mm").unwrap();
+    let mono = fisheye.at(550.0).unwrap();
+    let mut rows = vec![(0.0, 1e10, 1.0)];
+    rows.extend(fisheye.interfaces().iter().map(|interface| {
+        let index = interface.medium_after.index_at(550.0).unwrap();
+        (interface.surface.curvature_per_mm, interface.thickness_after_mm, index)
+    }));
+    let head = "FNUM 16 0\nFTYP 0 0 3 1\nXFLN 0 0 0\nYFLN 0 60 80";
+    let read = read(&bare(head, &rows, fisheye.stop() + 1)).unwrap().lens.at(550.0).unwrap();
+    let places = PupilSampling {
+        coordinates: PupilCoordinates::Stop { radius_mm: read.stop_semi_aperture_mm() * (1.0 - 1e-6) },
+        places: hexapolar(4),
+        rims: Rims::Clip,
+    };
+    for field_deg in [0.0, 60.0, 80.0_f64] {
+        let point = ObjectPoint::from_field(&mono, DVec2::new(0.0, -field_deg.to_radians().tan()), 0.0);
+        let rays = places.rays_on_film(&read, &point, 20.0);
+        assert_eq!(rays.n_in_flight(), rays.len(), "{field_deg}°");
+    }
+}
+
+#[test]
+fn telecentric_lens_is_read_with_its_numerical_aperture() {
+    // A plano-convex lens of focal length 100 mm with its stop in the rear focal plane, and what follows: NA 0.05 from
+    // the front focal plane fills a stop of 100 mm · tan(asin 0.05) in radius, to first order.
+    let rows = [
+        (0.0, 100.0, 1.0),
+        (0.02, 0.0, 1.5),
+        (0.0, 100.0, 1.0),
+        (0.0, 100.0, 1.0),
+        (0.02, 0.0, 1.5),
+        (0.0, 100.0, 1.0),
+    ];
+    let head = "OBNA 0.05 0\nFTYP 1 0 2 1\nXFLN 0 0\nYFLN 0 4";
+    let read = read(&bare(head, &rows, 3)).unwrap();
+    let lens = read.lens.at(550.0).unwrap();
+    assert!(lens.first_order().entrance_pupil_z_mm.is_infinite());
+    let expected_mm = 100.0 * (0.05f64).asin().tan();
+    assert!((lens.stop_semi_aperture_mm() / expected_mm - 1.0).abs() < 1e-12);
+    // The first rim holds the cone of the outermost point: its height and the cone's own, and what the aberration of
+    // the rays to the stop's edge adds (2 % were found).
+    let rim_mm = read.lens.front_semi_aperture_mm();
+    assert!((1.0..1.05).contains(&(rim_mm / (4.0 + expected_mm))), "{rim_mm}");
 }

@@ -23,7 +23,8 @@ fn lens(object_index: f64, rows: &[[f64; 4]], stop: usize) -> Lens {
         medium_after: constant(index),
         thickness_after_mm,
     };
-    let lens = Lens::new("immersed", "a test", rows.iter().map(interface).collect(), stop).expect("the rows make a lens");
+    let lens =
+        Lens::new("immersed", "a test", rows.iter().map(interface).collect(), stop).expect("the rows make a lens");
     lens.with_object_medium(constant(object_index)).expect("an index above 0")
 }
 

@@ -13,6 +13,8 @@ const SLOPE_STEP: f64 = 1e-5;
 const HIT: f64 = 1e-11;
 /// The shortest piece of the way from the axis to the point that is tried.
 const SHORTEST_PIECE: f64 = 1e-5;
+/// Pieces, and halvings of them, after which a way is given up; 20 lead to the edge of a fisheye.
+const MOST_PIECES: usize = 200;
 
 /// Rays of one object point, aimed at places of the real stop: where they cross the plane of the paraxial entrance
 /// pupil (of the first vertex, where that is infinitely far).
@@ -130,7 +132,10 @@ impl<'a> Search<'a> {
         let mut here = (0.0, self.newton(&point, place, first_mm)?);
         let mut rate_mm = DVec2::ZERO;
         let mut piece: f64 = 1.0;
-        while here.0 < 1.0 {
+        for _ in 0..MOST_PIECES {
+            if here.0 >= 1.0 {
+                return Some(here.1);
+            }
             let share = (here.0 + piece).min(1.0);
             let (point, place) = way(share);
             match self.newton(&point, place, here.1 + rate_mm * (share - here.0)) {
@@ -143,7 +148,7 @@ impl<'a> Search<'a> {
                 None => return None,
             }
         }
-        Some(here.1)
+        None
     }
 }
 

@@ -7,8 +7,8 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    Glass, ImageSurface, Interface, Lens, MonoLens, Move, ObjectPoint, OpticsError, Pose, Rims, Shape, Surface,
-    glass::D_LINE_NM, prescription::TextError, rays_towards,
+    Glass, ImageSurface, Interface, Lens, MonoLens, Move, ObjectPoint, OpticsError, Pose, RayBatch, Rims, Shape,
+    Surface, analysis::PupilCoordinates, glass::D_LINE_NM, prescription::TextError, rays_towards,
 };
 
 use super::lens_file::{Field, LensFile};
@@ -227,38 +227,37 @@ impl System {
             Some(Beam::EntrancePupil(0.0)) | None => Beam::Stop,
             Some(beam) => beam,
         };
-        let to_pupil_mm = self.object_distance_mm + first.entrance_pupil_z_mm;
-        let pupil_mm = match beam {
+        // The beam over the one that the stop as it is now lets through.
+        let slope_now = mono.marginal_ray(self.object_distance_mm).reduced_slope / first.object_index;
+        let ratio = match beam {
             Beam::Stop if is_rim_stated => return Ok(now_mm),
             Beam::Stop => return self.widest_stop_mm(mono),
-            Beam::EntrancePupil(diameter_mm) => diameter_mm,
-            Beam::FNumber(f_number) => (first.efl_mm / f_number).abs(),
-            Beam::WorkingFNumber(f_number) if self.object_distance_mm.is_finite() => {
-                let magnification = mono.conjugate(self.object_distance_mm).magnification;
-                (to_pupil_mm * magnification / (first.object_index * f_number)).abs()
-            }
-            Beam::WorkingFNumber(f_number) => (first.efl_mm / f_number).abs(),
-            Beam::ObjectCone(angle_rad) => 2.0 * to_pupil_mm * angle_rad.tan(),
-            Beam::ObjectAperture(aperture) => 2.0 * to_pupil_mm * (aperture / first.object_index).asin().tan(),
+            Beam::EntrancePupil(diameter_mm) => diameter_mm / first.entrance_pupil_diameter_mm,
+            Beam::FNumber(f_number) => first.f_number / f_number.abs(),
+            Beam::WorkingFNumber(f_number) => mono.working_f_number(self.object_distance_mm) / f_number.abs(),
+            Beam::ObjectCone(angle_rad) => angle_rad.tan() / slope_now,
+            Beam::ObjectAperture(aperture) => (aperture / first.object_index).asin().tan() / slope_now,
         };
-        let semi_aperture_mm = now_mm * pupil_mm / first.entrance_pupil_diameter_mm;
+        let semi_aperture_mm = now_mm * ratio;
         if semi_aperture_mm > 0.0 && semi_aperture_mm.is_finite() {
             return Ok(semi_aperture_mm);
         }
-        let beam = beam.in_words();
-        Err(plain(&format!("{beam} makes an entrance pupil of {pupil_mm} mm; expected a positive one")))
+        let (beam, pupil_mm) = (beam.in_words(), ratio * first.entrance_pupil_diameter_mm);
+        Err(plain(&format!(
+            "{beam} makes an entrance pupil of {pupil_mm} mm and a stop of {} mm; expected positive ones",
+            2.0 * semi_aperture_mm
+        )))
     }
 
     /// Returns half the diameter of a stop of which the file says nothing: the widest axial beam, to first order, that
     /// the rims of the other surfaces let through.
     fn widest_stop_mm(&mut self, mono: &MonoLens) -> Result<f64, TextError> {
-        let first = mono.first_order();
         let target = [DVec2::new(0.0, NEAR_AXIS_MM)];
         let point = match self.object_distance_mm.is_finite() {
             true => ObjectPoint::Finite(DVec3::new(0.0, 0.0, -self.object_distance_mm)),
             false => ObjectPoint::from_field(mono, DVec2::ZERO, 0.0),
         };
-        let mut rays = rays_towards(&point, &target, first.entrance_pupil_z_mm, 0.0);
+        let mut rays = rays_towards(&point, &target, mono.projection_center_z_mm(), 0.0);
         let poses: Vec<Pose> = (0..mono.n_surfaces()).map(|i| Pose::centered(mono.vertex_z_mm(i))).collect();
         let poses = mono.poses().unwrap_or(&poses);
         let mut heights_mm = Vec::with_capacity(mono.n_surfaces());
@@ -334,25 +333,30 @@ impl System {
             }
             Field::ImageHeight { x_mm, y_mm } => -DVec2::new(x_mm, y_mm) / (first.efl_mm * first.object_index),
         };
-        let dioptres = if distance_mm.is_finite() { 1e3 / (distance_mm + first.entrance_pupil_z_mm) } else { 0.0 };
+        let dioptres = 1e3 / (distance_mm + mono.projection_center_z_mm());
         Ok(ObjectPoint::from_field(mono, tan, dioptres))
     }
 }
 
 /// Widens the rims so that a ring of rays through the edge of the pupil, and the ray through its centre, pass.
+///
+/// They are aimed at the paraxial entrance pupil; where that leads them past the stop, as in a wide-angle lens, or where
+/// it is infinitely far, at the real stop.
 fn widen(widest_mm: &mut [f64], (mono, poses): (&MonoLens, &[Pose]), point: &ObjectPoint, vignetting: Vignetting) {
-    let first = mono.first_order();
-    if !first.entrance_pupil_z_mm.is_finite() {
-        return;
-    }
-    let radius_mm = 0.5 * first.entrance_pupil_diameter_mm;
     let on_ring = |i: usize| {
         let (sine, cosine) = (i as f64 * std::f64::consts::TAU / N_AZIMUTHS as f64).sin_cos();
-        radius_mm * (vignetting.center + (DVec2::ONE - vignetting.compression) * DVec2::new(cosine, sine))
+        vignetting.center + (DVec2::ONE - vignetting.compression) * DVec2::new(cosine, sine)
     };
-    let mut targets: Vec<DVec2> = (0..N_AZIMUTHS).map(on_ring).collect();
-    targets.push(radius_mm * vignetting.center);
-    let mut rays = rays_towards(point, &targets, first.entrance_pupil_z_mm, 0.0);
+    let mut places: Vec<DVec2> = (0..N_AZIMUTHS).map(on_ring).collect();
+    places.push(vignetting.center);
+    let coordinates = PupilCoordinates::entrance(mono);
+    let mut rays = coordinates.rays(mono, point, &places);
+    if coordinates != PupilCoordinates::stop(mono) && !fills_stop(mono, rays.clone(), &places) {
+        let aimed = PupilCoordinates::stop(mono).rays(mono, point, &places);
+        if aimed.n_in_flight() == places.len() {
+            rays = aimed;
+        }
+    }
     for (surface, widest_mm) in widest_mm.iter_mut().enumerate() {
         mono.trace_surfaces(surface..surface + 1, &mut rays, Rims::Ignore);
         for ray in (0..rays.len()).filter(|&ray| rays.fate[ray].is_in_flight()) {
@@ -362,6 +366,14 @@ fn widen(widest_mm: &mut [f64], (mono, poses): (&MonoLens, &[Pose]), point: &Obj
             }
         }
     }
+}
+
+/// Whether rays aimed at these places of the paraxial pupil pass the stop near them: within half its radius.
+fn fills_stop(mono: &MonoLens, mut rays: RayBatch, places: &[DVec2]) -> bool {
+    mono.trace_surfaces(0..mono.stop() + 1, &mut rays, Rims::Ignore);
+    let stop_mm = mono.stop_semi_aperture_mm();
+    let miss = |i: usize| (mono.in_stop_mm(rays.point_mm(i)).length() / stop_mm - places[i].length()).abs();
+    rays.n_in_flight() == rays.len() && (0..rays.len()).all(|i| miss(i) < 0.5)
 }
 
 /// Returns the widest rim that fits on a surface, mm.
