@@ -352,11 +352,18 @@ pub(crate) struct PsfArgs {
     /// Writes the pictures: an EXR with a layer a PSF, or a PNG mosaic
     #[arg(long, short, value_name = "F")]
     pub(crate) output: Option<PathBuf>,
-    /// Writes plots into this folder: line and edge spread, MTF, encircled energy, MTF through focus; SVG and PNG
+    /// Writes the table as CSV
+    #[arg(long, value_name = "F")]
+    pub(crate) csv: Option<PathBuf>,
+    /// Writes plots into this folder: line and edge spread, MTF, encircled and ensquared energy, MTF through focus;
+    /// SVG, PNG and the lines as CSV
     #[arg(long, value_name = "DIR")]
     pub(crate) plots: Option<PathBuf>,
-    /// Weights of the wavelengths in the MTF of the whole light [default: all alike]
-    #[arg(long, value_name = "LIST", requires = "plots")]
+    /// Adds a row for the light of all wavelengths together to those of each point
+    #[arg(long)]
+    pub(crate) whole_light: bool,
+    /// Weights of the wavelengths in the light of all together: rows, plots and mosaic [default: all alike]
+    #[arg(long, value_name = "LIST")]
     pub(crate) spectral_weights: Option<String>,
 }
 

@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use dioptric_pipeline::{FocusChoice, PsfRequest, PsfSampling, PsfSet, Staged, drawing_file, open_lens, parse_numbers};
+use dioptric_pipeline::{
+    FocusChoice, PsfRequest, PsfRow, PsfSampling, PsfSet, Staged, drawing_file, open_lens, parse_numbers, psf_csv,
+};
 
 use crate::{
     args::{Common, PsfArgs, PsfMode},
@@ -37,37 +39,61 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
             None => Vec::new(),
         },
         seed: common.seed.unwrap_or(SEED),
+        spectral_weights: match &arguments.spectral_weights {
+            Some(list) => parse_numbers("--spectral-weights", list)?,
+            None => Vec::new(),
+        },
     };
     // The place is tried before the work.
     let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
+    let csv = arguments.csv.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
     let plots = arguments.plots.as_ref().map(|folder| Staged::folder(folder)).transpose()?.map(guarded);
     let bar = Bar::new(common.quiet);
     bar.show("tracing the lens", 0.0);
     let set = request.compute(&lens)?;
     drop(bar);
+    let rows = match arguments.whole_light {
+        true => with_whole_light(&set, &request.mtf_per_mm),
+        false => set.rows.clone(),
+    };
+    if let (Some(staged), Some(path)) = (csv, &arguments.csv) {
+        std::fs::write(staged.path(), psf_csv(&rows))?;
+        staged.commit()?;
+        remark(common.quiet, &format!("wrote {}", path.display()));
+    }
     if let (Some(staged), Some(path)) = (staged, &arguments.output) {
         set.write(staged.path())?;
         staged.commit()?;
         remark(common.quiet, &format!("wrote {}", path.display()));
     }
     if let (Some(staged), Some(folder)) = (plots, &arguments.plots) {
-        let weights = match &arguments.spectral_weights {
-            Some(list) => parse_numbers("--spectral-weights", list)?,
-            None => Vec::new(),
-        };
-        for (name, svg) in set.plots(&request.through_focus(&lens, &set)?, &weights)? {
+        for (name, chart) in set.plots(&request.through_focus(&lens, &set)?) {
+            let svg = chart.to_svg(640.0, 420.0);
             for extension in ["svg", "png"] {
                 let path = staged.path().join(format!("{name}.{extension}"));
                 std::fs::write(&path, drawing_file(&svg, &path)?)?;
             }
+            std::fs::write(staged.path().join(format!("{name}.csv")), chart.to_csv())?;
         }
         staged.commit()?;
         remark(common.quiet, &format!("wrote plots into {}", folder.display()));
     }
-    if common.json { print_json(&set.rows) } else { print(&table(&set)?) }
+    if common.json { print_json(&rows) } else { print(&table(&set, &rows)?) }
 }
 
-fn table(set: &PsfSet) -> Result<String, std::fmt::Error> {
+/// Returns the rows with one more after those of each point: the light of all its wavelengths together.
+fn with_whole_light(set: &PsfSet, mtf_per_mm: &[f64]) -> Vec<PsfRow> {
+    let mut rows = set.rows.clone();
+    for whole in set.whole_light(mtf_per_mm).into_iter().rev() {
+        let row = whole.row;
+        let of_point = |other: &PsfRow| other.field_deg == row.field_deg && other.distance_mm == row.distance_mm;
+        let after = rows.iter().rposition(of_point).map_or(rows.len(), |last| last + 1);
+        rows.insert(after, row);
+    }
+    rows
+}
+
+fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
     let mut text = format!("film {:.4} mm behind the last vertex, pixels of {} µm\n\n", set.film_mm, set.pixel_um);
     writeln!(
         text,
@@ -84,13 +110,13 @@ fn table(set: &PsfSet) -> Result<String, std::fmt::Error> {
         "EE50 µm",
         "energy"
     )?;
-    for row in &set.rows {
+    for row in rows {
         writeln!(
             text,
-            "{:>9.3} {:>12.1} {:>8.1} {:>12} {:>12} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>8.4}",
+            "{:>9.3} {:>12.1} {:>8} {:>12} {:>12} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>8.4}",
             row.field_deg,
             row.distance_mm,
-            row.wavelength_nm,
+            if row.is_whole_light { "all".to_owned() } else { format!("{:.1}", row.wavelength_nm) },
             fixed(row.centroid_x_mm),
             fixed(row.centroid_y_mm),
             row.rms_radius_um,
@@ -100,6 +126,10 @@ fn table(set: &PsfSet) -> Result<String, std::fmt::Error> {
             row.ee50_radius_um,
             row.energy
         )?;
+        if row.energy > 0.0 && row.is_cut() {
+            let share = 100.0 * row.picture_share;
+            writeln!(text, "{:>31} holds {share:.1} % of the light: LSF and EE50 are of that part", "picture")?;
+        }
         if let Some(share) = row.wave_share.filter(|_| row.is_of_waves()) {
             write!(text, "{:>31} waves {:.0} %", "model", 100.0 * share)?;
             writeln!(text, "{}", row.strehl.map_or_else(String::new, |strehl| format!(", Strehl ratio {strehl:.4}")))?;

@@ -148,10 +148,46 @@ fn psf_has_its_keys_in_both_modes() {
             check_numbers(
                 record,
                 "field_deg distance_mm wavelength_nm centroid_x_mm centroid_y_mm rms_radius_um sigma_x_um \
-                 sigma_y_um lsf_fwhm_um ee50_radius_um energy",
+                 sigma_y_um lsf_fwhm_um ee50_radius_um energy second_moment_xy_um2 lsf_fwhm_y_um ee80_radius_um \
+                 es50_half_width_um es80_half_width_um picture_share",
             );
         }
     }
+}
+
+#[test]
+fn psf_adds_the_whole_light_and_writes_its_table_and_mosaic() {
+    let folder = tempfile::tempdir().unwrap();
+    let common =
+        ["psf", "paper-2el", "--fields-deg", "0,2", "--film-mm", "51.8145", "--stop-mm", "4", "--pixel-um", "4"];
+    let light = ["--wavelengths-nm", "500,600", "--whole-light", "--mtf-per-mm", "10", "--csv", "t.csv", "-o", "m.png"];
+    let records = json(folder.path(), &[&common[..], &light, &["--json"]].concat());
+    let is_whole = |record: &Value| record["is_whole_light"] == true;
+    assert_eq!(
+        records.as_array().unwrap().iter().map(is_whole).collect::<Vec<_>>(),
+        [false, false, true, false, false, true]
+    );
+    assert_eq!(records[2]["wavelength_nm"], 550.0);
+    check_numbers(&records[2]["mtf"][0], "cycles_per_mm radial tangential");
+    let csv = fs::read_to_string(folder.path().join("t.csv")).unwrap();
+    let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    assert!(names.contains(&"mtf_tangential_10_per_mm"), "{names:?}");
+    let rows: Vec<_> = lines.collect();
+    assert!(rows.len() == 6 && rows.iter().all(|row| row.len() == names.len()), "{csv}");
+    let column = names.iter().position(|name| *name == "ee80_radius_um").unwrap();
+    assert_eq!(rows[4][column].parse::<f64>().unwrap(), records[4]["ee80_radius_um"].as_f64().unwrap());
+    assert!(fs::read(folder.path().join("m.png")).unwrap().starts_with(b"\x89PNG"));
+    let text = output(folder.path(), &[&common[..], &light, &["--spectral-weights", "3,1", "--quiet"]].concat());
+    assert!(text.lines().filter(|line| line.contains(" all ")).count() == 2, "{text}");
+}
+
+#[test]
+fn a_picture_that_cannot_hold_its_light_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let common = ["psf", "singlet-50mm", "--focus-mm", "2000", "--pixel-um", "4", "--size", "31"];
+    let text = output(folder.path(), &common);
+    assert!(text.contains("% of the light"), "{text}");
 }
 
 #[test]
@@ -165,9 +201,10 @@ fn psf_writes_plots_and_says_which_model_drew() {
         check_numbers(record, "strehl ee80_radius_um");
         assert_eq!(record["energy"], 1.0);
     }
-    for name in ["lsf", "esf", "mtf", "encircled_energy", "through_focus"] {
+    for name in ["lsf", "esf", "mtf", "encircled_energy", "ensquared_energy", "through_focus"] {
         assert!(fs::read_to_string(folder.path().join(format!("plots/{name}.svg"))).unwrap().contains("600 nm"));
         assert!(fs::read(folder.path().join(format!("plots/{name}.png"))).unwrap().starts_with(b"\x89PNG"));
+        assert!(fs::read_to_string(folder.path().join(format!("plots/{name}.csv"))).unwrap().starts_with("line,style"));
     }
     let text = output(folder.path(), &common[..8]);
     assert!(text.contains("waves 100 %, Strehl ratio") && !text.contains("-0.00000"), "{text}");

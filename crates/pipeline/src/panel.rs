@@ -53,6 +53,14 @@ impl Sheet {
         );
     }
 
+    /// Draws a scale from a place to the right, px.
+    pub(crate) fn bar(&mut self, (x, y): (f64, f64), length: f64) {
+        let _ = writeln!(
+            self.body,
+            "<path d=\"M{x:.1} {y:.1}h{length:.2}m0 -4v8m-{length:.2} 0v-8\" fill=\"none\" stroke=\"#111111\" stroke-width=\"2\"/>"
+        );
+    }
+
     /// Draws a plot into the rectangle at x, y of this width and height, px.
     pub(crate) fn panel(&mut self, panel: &Panel, rectangle: [f64; 4]) {
         panel.draw(rectangle, &mut self.body);

@@ -1,5 +1,7 @@
 //! Line plots as SVG, in one style.
 
+use std::fmt::Write;
+
 use kuva::prelude::{Layout, LegendPosition, LinePlot, Plot, render_to_svg};
 
 /// A line of a plot.
@@ -56,6 +58,22 @@ impl LineChart {
     /// Returns the plot with both axes logarithmic; ranges and points must be above 0.
     pub fn to_logarithmic_svg(&self, width_px: f64, height_px: f64) -> String {
         self.drawn(width_px, height_px, Layout::with_log_scale)
+    }
+
+    /// Returns the lines as a table: the name of the line, whether it is solid or dashed, x and y.
+    ///
+    /// A line without a name is the other half of the one before it.
+    pub fn to_csv(&self) -> String {
+        let mut csv = format!("line,style,\"{}\",\"{}\"\n", self.x_label, self.y_label);
+        let mut name = "";
+        for series in &self.series {
+            name = series.label.as_deref().unwrap_or(name);
+            let style = if series.is_dashed { "dashed" } else { "solid" };
+            for (x, y) in &series.points {
+                let _ = writeln!(csv, "\"{name}\",{style},{x},{y}");
+            }
+        }
+        csv
     }
 
     fn drawn(&self, width_px: f64, height_px: f64, scaled: impl Fn(Layout) -> Layout) -> String {
@@ -124,5 +142,7 @@ mod tests {
         for word in ["<svg", "Line spread", "550 nm", "#00aa00"] {
             assert!(svg.contains(word), "{word}");
         }
+        let csv = chart.to_csv();
+        assert!(csv.starts_with("line,style,\"x, µm\",\"share per µm\"\n\"550 nm\",solid,-1,0\n"), "{csv}");
     }
 }

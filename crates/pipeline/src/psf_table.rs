@@ -6,19 +6,18 @@ use dioptric_diffraction::{Hurb, PupilGrid, WaveNodes};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
 use dioptric_psf::{BankSettings, Diffraction, ModelUse, Picture, PsfBank, PsfQuery};
 use dioptric_scene::write_planes_exr;
-use image::{Rgb, RgbImage};
 use ndarray::Array2;
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::{
-    DiffractionChoice, FocusChoice, PipelineError, REFERENCE_WAVELENGTH_NM,
-    display::{code, png_bytes},
+    DiffractionChoice, FocusChoice, PipelineError, PsfRow, REFERENCE_WAVELENGTH_NM,
+    display::png_bytes,
+    psf_row::{PointName, place_and_size},
     spot::{PaperRays, Spot},
 };
 
 /// Pixels along the side of the largest picture that is made.
-const LARGEST: usize = 4097;
+pub(crate) const LARGEST: usize = 4097;
 
 /// Which point-spread functions to compute, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +42,8 @@ pub struct PsfRequest {
     pub mtf_per_mm: Vec<f64>,
     /// The seed of the paper mode's diffraction.
     pub seed: u64,
+    /// Weights of the wavelengths in the light of all of them; none for all alike.
+    pub spectral_weights: Vec<f64>,
 }
 
 /// How the light of a point is sampled.
@@ -57,68 +58,6 @@ pub enum PsfSampling {
     },
 }
 
-/// What is measured of one point-spread function.
-///
-/// Positions are in the picture frame: a point to the right of the axis has a positive x.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PsfRow {
-    /// Field angle, degrees.
-    pub field_deg: f64,
-    /// Distance of the point before the first vertex, mm.
-    pub distance_mm: f64,
-    /// Wavelength, nm.
-    pub wavelength_nm: f64,
-    /// Centroid, to the right, mm from the axis.
-    pub centroid_x_mm: f64,
-    /// Centroid, upwards, mm from the axis.
-    pub centroid_y_mm: f64,
-    /// Root-mean-square distance from the centroid, µm: of rays where there is no diffraction, else of the picture.
-    pub rms_radius_um: f64,
-    /// Standard deviation along x, µm.
-    pub sigma_x_um: f64,
-    /// Standard deviation along y, µm.
-    pub sigma_y_um: f64,
-    /// Full width at half maximum of the line spread along x, µm.
-    pub lsf_fwhm_um: f64,
-    /// Radius about the centroid that holds half the energy, µm.
-    pub ee50_radius_um: f64,
-    /// Radius about the centroid that holds 80 % of the energy, µm.
-    pub ee80_radius_um: f64,
-    /// The area of the pupil that reaches the film over that of an axial point at the same distance and wavelength
-    /// (paper mode: the share of the rays over the front rim's disc).
-    pub energy: f64,
-    /// The share of the picture that is the sum of waves; the rest is geometric or bent rays. Not in the paper mode.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wave_share: Option<f64>,
-    /// Why waves that were asked for were not summed, if so.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub fallback: Option<String>,
-    /// The Strehl ratio at the pattern's peak, where waves were summed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub strehl: Option<f64>,
-    /// Modulation at the frequencies asked for.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub mtf: Vec<MtfRow>,
-}
-
-impl PsfRow {
-    /// Whether any of the picture is the sum of waves.
-    pub fn is_of_waves(&self) -> bool {
-        self.wave_share.is_some_and(|share| share > 0.0)
-    }
-}
-
-/// The modulation at a spatial frequency.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct MtfRow {
-    /// Spatial frequency, cycles per mm.
-    pub cycles_per_mm: f64,
-    /// Modulation of a wave along x, the radial direction.
-    pub radial: f64,
-    /// Modulation of a wave along y.
-    pub tangential: f64,
-}
-
 /// Point-spread functions with their pictures.
 #[derive(Clone, Debug)]
 pub struct PsfSet {
@@ -130,19 +69,21 @@ pub struct PsfSet {
     pub rows: Vec<PsfRow>,
     /// The energy on each pixel about the centroid, in the order of `rows`; the sum is at most 1.
     pub pictures: Vec<Array2<f32>>,
+    /// The weight of each wavelength in the light of all of them, in the order of the request.
+    pub spectral_weights: Vec<f64>,
 }
 
 /// One point-spread function to compute.
 #[derive(Clone, Copy)]
-struct Item {
-    field_deg: f64,
-    distance_mm: f64,
-    wavelength_nm: f64,
-    dioptres: f64,
+pub(crate) struct Item {
+    pub(crate) field_deg: f64,
+    pub(crate) distance_mm: f64,
+    pub(crate) wavelength_nm: f64,
+    pub(crate) dioptres: f64,
 }
 
 impl Item {
-    fn field_tan(&self) -> DVec2 {
+    pub(crate) fn field_tan(&self) -> DVec2 {
         DVec2::new(self.field_deg.to_radians().tan(), 0.0)
     }
 }
@@ -160,6 +101,24 @@ impl PsfRequest {
             FocusChoice::FilmMm(film_mm) => film_mm,
             FocusChoice::NearObject => return Err(self.wrong("focus", "NearObject", "a distance or a film place")),
         };
+        let items = self.items(lens)?;
+        let bank = match self.sampling {
+            PsfSampling::Pupil => Some(PsfBank::build(lens, &self.bank_settings(&items, film_mm))?),
+            PsfSampling::Paper { .. } => None,
+        };
+        let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> =
+            items.par_iter().map(|item| self.compute_one(item, lens, bank.as_ref(), film_mm)).collect();
+        let (rows, pictures) = computed?.into_iter().unzip();
+        let spectral_weights = match self.spectral_weights.is_empty() {
+            true => vec![1.0; self.wavelengths_nm.len()],
+            false => self.spectral_weights.clone(),
+        };
+        Ok(PsfSet { film_mm, pixel_um: self.pixel_um, rows, pictures, spectral_weights })
+    }
+
+    /// Returns the points: fields outermost, then distances, then wavelengths.
+    pub(crate) fn items(&self, lens: &Lens) -> Result<Vec<Item>, PipelineError> {
+        let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
         let pupil_z_mm = reference.projection_center_z_mm();
         let mut items = Vec::new();
         for &field_deg in &self.fields_deg {
@@ -178,14 +137,7 @@ impl PsfRequest {
                 }));
             }
         }
-        let bank = match self.sampling {
-            PsfSampling::Pupil => Some(PsfBank::build(lens, &self.bank_settings(&items, film_mm))?),
-            PsfSampling::Paper { .. } => None,
-        };
-        let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> =
-            items.par_iter().map(|item| self.compute_one(item, lens, bank.as_ref(), film_mm)).collect();
-        let (rows, pictures) = computed?.into_iter().unzip();
-        Ok(PsfSet { film_mm, pixel_um: self.pixel_um, rows, pictures })
+        Ok(items)
     }
 
     fn check(&self) -> Result<(), PipelineError> {
@@ -220,6 +172,12 @@ impl PsfRequest {
         if matches!(self.sampling, PsfSampling::Paper { .. }) && self.diffraction == DiffractionChoice::Wave {
             return Err(self.wrong("diffraction", "wave", "bent rays or none in the paper mode"));
         }
+        let (weights, n) = (&self.spectral_weights, self.wavelengths_nm.len());
+        let is_list = weights.len() == n && weights.iter().all(|w| *w >= 0.0) && weights.iter().sum::<f64>() > 0.0;
+        if !weights.is_empty() && !(is_list && weights.iter().all(|w| w.is_finite())) {
+            let expected = format!("{n} numbers of 0 or more, one a wavelength");
+            return Err(self.wrong("spectral_weights", &format!("{weights:?}"), &expected));
+        }
         match self.mtf_per_mm.iter().find(|f| !f.is_finite()) {
             Some(found) => Err(self.wrong("mtf_per_mm", &found.to_string(), "finite numbers")),
             None => Ok(()),
@@ -231,7 +189,7 @@ impl PsfRequest {
     }
 
     /// Settings with a sample at every point asked for, so that nothing is interpolated.
-    fn bank_settings(&self, items: &[Item], film_mm: f64) -> BankSettings {
+    pub(crate) fn bank_settings(&self, items: &[Item], film_mm: f64) -> BankSettings {
         let sorted = |values: &mut dyn Iterator<Item = f64>| {
             let mut values: Vec<f64> = values.collect();
             values.sort_by(f64::total_cmp);
@@ -313,44 +271,17 @@ impl PsfRequest {
 
     fn measure(&self, item: &Item, spot: &Spot, picture: &Array2<f32>) -> PsfRow {
         let measured = Picture::new(picture.view(), self.pixel_um);
-        let moments = spot.moments();
+        let (place_mm, mut second) = place_and_size(spot.moments());
         let is_of_rays = self.sampling == PsfSampling::Pupil && self.diffraction == DiffractionChoice::None;
-        let sigma_um = match moments {
-            None => DVec2::NAN,
-            Some(moments) if is_of_rays => moments.sigma_mm * 1e3,
-            Some(_) => {
-                let second = measured.second_moments_um2();
-                DVec2::new(second.xx.sqrt(), second.yy.sqrt())
-            }
-        };
-        let centroid_mm = moments.map_or(DVec2::NAN, |moments| moments.centroid_mm);
-        PsfRow {
-            field_deg: item.field_deg,
-            distance_mm: item.distance_mm,
-            wavelength_nm: item.wavelength_nm,
-            // Adding 0 takes the sign from a zero.
-            centroid_x_mm: centroid_mm.x + 0.0,
-            centroid_y_mm: centroid_mm.y + 0.0,
-            rms_radius_um: sigma_um.length(),
-            sigma_x_um: sigma_um.x,
-            sigma_y_um: sigma_um.y,
-            lsf_fwhm_um: measured.line_spread(0.0).full_width_at_half_maximum_um(),
-            ee50_radius_um: measured.energy_radius_um(0.5),
-            ee80_radius_um: measured.energy_radius_um(0.8),
-            energy: spot.energy,
-            wave_share: None,
-            fallback: None,
-            strehl: None,
-            mtf: self
-                .mtf_per_mm
-                .iter()
-                .map(|&cycles_per_mm| MtfRow {
-                    cycles_per_mm,
-                    radial: measured.mtf(0.0, cycles_per_mm),
-                    tangential: measured.mtf(std::f64::consts::FRAC_PI_2, cycles_per_mm),
-                })
-                .collect(),
+        if !is_of_rays && place_mm.is_finite() {
+            second = measured.second_moments_um2();
         }
+        let name =
+            PointName { field_deg: item.field_deg, distance_mm: item.distance_mm, wavelength_nm: item.wavelength_nm };
+        let row = PsfRow::measure(name, place_mm, second, &measured);
+        let picture_share = picture.iter().map(|e| f64::from(*e)).sum();
+        PsfRow { energy: spot.energy, picture_share, ..row }
+            .with_mtf(&self.mtf_per_mm, |direction, f| measured.mtf(direction, f))
     }
 
     /// Counts the rays of a spot on pixels about its centroid.
@@ -378,8 +309,8 @@ impl PsfRequest {
 }
 
 impl PsfSet {
-    /// Writes the pictures: an EXR with a channel a picture where the path ends in `.exr`, else a PNG mosaic with
-    /// wavelengths across, and fields and distances down, each exposed for its brightest pixel.
+    /// Writes the pictures: an EXR with a channel a picture where the path ends in `.exr`, else a labelled PNG
+    /// [`mosaic`](Self::mosaic).
     ///
     /// # Errors
     /// When the file cannot be written, or its name ends in neither.
@@ -388,7 +319,7 @@ impl PsfSet {
         match extension.as_str() {
             "exr" => self.write_exr(path),
             "png" => {
-                let png = png_bytes(&self.mosaic())?;
+                let png = png_bytes(&self.mosaic()?)?;
                 std::fs::write(path, png)
                     .map_err(|e| PipelineError::Write { path: path.to_owned(), reason: e.to_string() })
             }
@@ -421,29 +352,11 @@ impl PsfSet {
     fn side(&self) -> usize {
         self.pictures.iter().map(|picture| picture.nrows().max(picture.ncols())).max().unwrap_or(1)
     }
-
-    fn mosaic(&self) -> RgbImage {
-        let side = self.side();
-        let wavelengths = self.rows.iter().map(|row| row.wavelength_nm.to_bits());
-        let across = wavelengths.collect::<std::collections::BTreeSet<_>>().len().max(1);
-        let tile = side as u32 + 2;
-        let size = (across as u32 * tile, self.pictures.len().div_ceil(across) as u32 * tile);
-        let mut mosaic = RgbImage::from_pixel(size.0, size.1, Rgb([36, 36, 40]));
-        for (i, picture) in self.pictures.iter().enumerate() {
-            let top = picture.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-            let (x0, y0) = ((i % across) as u32 * tile + 1, (i / across) as u32 * tile + 1);
-            for ((row, column), value) in resized(picture, side).indexed_iter() {
-                let level = code(f64::from(value / top));
-                mosaic.put_pixel(x0 + column as u32, y0 + row as u32, Rgb([level; 3]));
-            }
-        }
-        mosaic
-    }
 }
 
 impl DiffractionChoice {
     /// The random bending of the paper mode.
-    fn model(self) -> Option<Hurb> {
+    pub(crate) fn model(self) -> Option<Hurb> {
         match self {
             Self::None => None,
             Self::Hurb { gamma } => Some(Hurb::with_gamma(gamma)),
@@ -493,6 +406,7 @@ mod tests {
             sampling: PsfSampling::Pupil,
             mtf_per_mm: vec![0.0, 10.0],
             seed: 1,
+            spectral_weights: vec![],
         }
     }
 

@@ -1,8 +1,10 @@
 //! Where the rays of a point land: centroid, moments and losses, without any pixels.
 
-use dioptric_diffraction::{BendForm, Edge, Hurb, bend};
+use dioptric_diffraction::{BendForm, Covariance, Edge, Hurb, bend};
 use dioptric_optics::{
-    MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims, glam::DVec2, rays_over_front, rays_towards,
+    MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
+    glam::{DVec2, Vec2Swizzles},
+    rays_over_front, rays_towards,
 };
 
 /// Rings and azimuths of the rays of a spot.
@@ -22,8 +24,8 @@ pub(crate) struct Spot {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moments {
     pub(crate) centroid_mm: DVec2,
-    /// Standard deviations along x and y, mm.
-    pub(crate) sigma_mm: DVec2,
+    /// Second moments about the centroid, mm².
+    pub(crate) second_mm2: Covariance,
 }
 
 impl Spot {
@@ -79,6 +81,16 @@ impl Spot {
         Self { at_mm, weights: weights.into_iter().map(|w| w / sum).collect(), energy: 0.0 }
     }
 
+    /// Returns the modulation of a wave along a direction from +x; no number if no light arrived.
+    pub(crate) fn modulation(&self, direction_rad: f64, cycles_per_mm: f64) -> f64 {
+        if self.at_mm.is_empty() {
+            return f64::NAN;
+        }
+        let wave = DVec2::from_angle(direction_rad) * (std::f64::consts::TAU * cycles_per_mm);
+        let sum = self.at_mm.iter().zip(&self.weights).map(|(p, w)| DVec2::from_angle(p.dot(wave)) * *w).sum::<DVec2>();
+        sum.length()
+    }
+
     /// Returns the place and the size of the spot, or `None` if no light arrived.
     pub(crate) fn moments(&self) -> Option<Moments> {
         if self.at_mm.is_empty() {
@@ -88,8 +100,10 @@ impl Spot {
             self.at_mm.iter().zip(&self.weights).map(|(&p, &w)| of(p) * w).sum()
         };
         let centroid_mm = mean(&|p| p);
-        let variance = mean(&|p| (p - centroid_mm) * (p - centroid_mm));
-        Some(Moments { centroid_mm, sigma_mm: DVec2::new(variance.x.sqrt(), variance.y.sqrt()) })
+        let squares = mean(&|p| (p - centroid_mm) * (p - centroid_mm));
+        let products = mean(&|p| (p - centroid_mm) * (p - centroid_mm).yx());
+        let second_mm2 = Covariance { xx: squares.x, xy: products.x, yy: squares.y };
+        Some(Moments { centroid_mm, second_mm2 })
     }
 }
 
@@ -133,7 +147,9 @@ mod tests {
         assert!((axial.energy - 1.0).abs() < 1e-12);
         let moments = axial.moments().unwrap();
         assert!(moments.centroid_mm.length() < 1e-9);
-        assert!((moments.sigma_mm.x - moments.sigma_mm.y).abs() < 1e-9);
+        let second = moments.second_mm2;
+        // Alike to rounding; σ is some µm.
+        assert!((second.xx.sqrt() - second.yy.sqrt()).abs() < 1e-9 && second.xy.abs() < 1e-12);
         let oblique = spot_at(24.0, 2000.0);
         assert!(oblique.energy > 0.2 && oblique.energy < 0.95, "{}", oblique.energy);
     }

@@ -221,6 +221,12 @@ impl PsfBank {
         rms * 1.9f64.sqrt()
     }
 
+    /// Returns how far from the centroid the farthest ray of a point lands, mm.
+    pub fn reach_mm(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> f64 {
+        let record = self.record(field_tan, dioptres, wavelength_nm);
+        (0..record.mesh.n_nodes()).map(|i| record.node(i).at_mm.length()).fold(0.0, f64::max)
+    }
+
     /// Returns the columns of samples (one field innermost) that a depth and wavelength draw on, with weights.
     fn columns(&self, dioptres: f64, wavelength_nm: f64) -> impl Iterator<Item = (usize, f64)> {
         let n_depths = self.dioptres.knots().len();

@@ -47,7 +47,12 @@ impl Picture {
         &self.energy
     }
 
-    fn at_um(&self, row: usize, column: usize) -> DVec2 {
+    /// Side of a pixel, µm.
+    pub fn pitch_um(&self) -> f64 {
+        self.pitch_um
+    }
+
+    pub(crate) fn at_um(&self, row: usize, column: usize) -> DVec2 {
         let (rows, columns) = self.energy.dim();
         let x = column as f64 - 0.5 * (columns as f64 - 1.0);
         let y = 0.5 * (rows as f64 - 1.0) - row as f64;
@@ -138,79 +143,6 @@ impl Picture {
         }
         (self.mean(|p| p.dot(wave).cos()), self.mean(|p| p.dot(wave).sin()))
     }
-
-    /// Returns the share of the energy within `radius_um` of the centroid.
-    pub fn encircled_energy(&self, radius_um: f64) -> f64 {
-        let center = self.centroid_um();
-        let half_diagonal = self.pitch_um * std::f64::consts::FRAC_1_SQRT_2;
-        self.energy
-            .indexed_iter()
-            .filter(|(_, e)| **e != 0.0)
-            .map(|((row, column), e)| {
-                let from_center = self.at_um(row, column) - center;
-                let distance = from_center.length();
-                if distance + half_diagonal <= radius_um {
-                    *e
-                } else if distance - half_diagonal >= radius_um {
-                    0.0
-                } else {
-                    e * share_inside(from_center, self.pitch_um, radius_um)
-                }
-            })
-            .sum()
-    }
-
-    /// Returns the radius about the centroid that holds `share` of the energy, µm.
-    pub fn energy_radius_um(&self, share: f64) -> f64 {
-        let center = self.centroid_um();
-        let half_diagonal = self.pitch_um * std::f64::consts::FRAC_1_SQRT_2;
-        let mut pixels: Vec<(f64, DVec2, f64)> = self
-            .energy
-            .indexed_iter()
-            .filter(|(_, e)| **e != 0.0)
-            .map(|((row, column), &e)| (self.at_um(row, column) - center, e))
-            .map(|(from_center, e)| (from_center.length(), from_center, e))
-            .collect();
-        pixels.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // What lies within a radius is at most the pixels whose centres are half a diagonal further out, and at least
-        // those half a diagonal further in; so the radius lies about where the sum of whole pixels reaches the share.
-        let mut sum = 0.0;
-        let reached = pixels.iter().position(|(_, _, e)| {
-            sum += e;
-            sum >= share
-        });
-        let (rows, columns) = self.energy.dim();
-        let Some(reached) = reached else { return self.pitch_um * (rows + columns) as f64 };
-        let around = pixels[reached].0;
-        let (mut low, mut high) = ((around - half_diagonal).max(0.0), around + half_diagonal);
-        let first = pixels.partition_point(|(distance, _, _)| distance + half_diagonal <= low);
-        let last = pixels.partition_point(|(distance, _, _)| distance - half_diagonal < high);
-        let inside: f64 = pixels[..first].iter().map(|(_, _, e)| e).sum();
-        let within = |radius_um: f64| {
-            let part =
-                |(_, from_center, e): &(f64, DVec2, f64)| e * share_inside(*from_center, self.pitch_um, radius_um);
-            inside + pixels[first..last].iter().map(part).sum::<f64>()
-        };
-        for _ in 0..48 {
-            let middle = 0.5 * (low + high);
-            if within(middle) < share {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        0.5 * (low + high)
-    }
-
-    /// Returns the share of the energy in a square of half-side `half_side_um` about the centroid.
-    pub fn ensquared_energy(&self, half_side_um: f64) -> f64 {
-        let center = self.centroid_um();
-        let overlap = |distance: f64| {
-            let half = 0.5 * self.pitch_um;
-            ((distance + half).min(half_side_um) - (distance - half).max(-half_side_um)).max(0.0) / self.pitch_um
-        };
-        self.mean(|p| overlap(p.x - center.x) * overlap(p.y - center.y))
-    }
 }
 
 impl From<&Kernel> for Picture {
@@ -246,20 +178,6 @@ fn transform(energies: &[f64], phase: impl Fn(usize) -> f64) -> (f64, f64) {
         let (sin, cos) = phase(i).sin_cos();
         (real + e * cos, imaginary + e * sin)
     })
-}
-
-/// Returns the share of a square about `center` that lies within a circle about the origin.
-fn share_inside(center: DVec2, side: f64, radius: f64) -> f64 {
-    let n = 16;
-    let inside = |i: i32| {
-        let at = |k: i32| side * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
-        let x = center.x + at(i);
-        // Exact along one direction, the midpoint rule along the other.
-        let reach = (radius * radius - x * x).max(0.0).sqrt();
-        let (low, high) = (center.y - 0.5 * side, center.y + 0.5 * side);
-        (high.min(reach) - low.max(-reach)).max(0.0) / side
-    };
-    (0..n).map(inside).sum::<f64>() / f64::from(n)
 }
 
 #[cfg(test)]
@@ -311,13 +229,6 @@ mod tests {
     }
 
     #[test]
-    fn even_energy_fills_circles_and_squares_by_area() {
-        let picture = Picture::new(Array2::from_elem((40, 40), 1.0).view(), 1.0);
-        assert_abs_diff_eq!(picture.encircled_energy(10.0), PI * 100.0 / 1600.0, epsilon = 1e-4);
-        assert_abs_diff_eq!(picture.ensquared_energy(7.25), 14.5 * 14.5 / 1600.0, epsilon = 1e-12);
-    }
-
-    #[test]
     fn waves_along_rows_are_those_of_any_direction() {
         let picture = gaussian(7.0, DVec2::new(40.3, 61.8));
         for right_angle in [0.0, 0.5 * PI, PI] {
@@ -326,17 +237,6 @@ mod tests {
             // The phase turns by 1e-9 of some radians.
             assert_abs_diff_eq!(on.0, off.0, epsilon = 1e-8);
             assert_abs_diff_eq!(on.1, off.1, epsilon = 1e-8);
-        }
-    }
-
-    #[test]
-    fn the_radius_of_a_share_holds_that_share() {
-        for sigma in [0.3, 3.0, 12.0] {
-            let picture = gaussian(sigma, DVec2::new(50.2, 49.1));
-            for share in [0.1, 0.5, 0.8, 0.95] {
-                // Bisection to the last bits; the sixteenfold midpoint rule makes the energy all but continuous.
-                assert_abs_diff_eq!(picture.encircled_energy(picture.energy_radius_um(share)), share, epsilon = 1e-9);
-            }
         }
     }
 }
