@@ -97,10 +97,12 @@ impl PsfSet {
         let mut lines = self
             .lines(plotted, |picture, direction| steps(reach_per_mm).map(|f| (f, picture.mtf(direction, f))).collect());
         if let Some(first) = self.points().next().filter(|point| point.len() > 1) {
+            let words = self.point_words(&self.rows[first.start]);
+            let name = [words, vec!["whole light".to_owned()]].concat().join(", ");
             let whole = self.whole_modulation(first);
             for (direction, is_dashed) in [(0.0, false), (FRAC_PI_2, true)] {
                 let points = steps(reach_per_mm).map(|f| (f, whole(direction, f))).collect();
-                let label = (!is_dashed).then(|| "whole light".to_owned());
+                let label = (!is_dashed).then(|| name.clone());
                 lines.push(Series { label, color: "#000000".to_owned(), points, is_dashed });
             }
         }
@@ -293,7 +295,7 @@ mod tests {
             assert!(chart.to_svg(640.0, 420.0).contains(expected), "{name}");
             assert!(chart.to_csv().lines().count() > 25, "{name}");
         }
-        assert!(plots[2].1.series.iter().any(|s| s.label.as_deref() == Some("whole light")));
+        assert!(plots[2].1.series.iter().any(|s| s.label.as_deref() == Some("0°, whole light")));
         let wrong = PsfRequest { spectral_weights: vec![1.0], ..request() };
         assert!(wrong.compute(&lens).is_err());
         assert!(PsfRequest { spectral_weights: vec![-1.0, 2.0], ..request() }.compute(&lens).is_err());

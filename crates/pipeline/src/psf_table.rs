@@ -173,8 +173,8 @@ impl PsfRequest {
             return Err(self.wrong("diffraction", "wave", "bent rays or none in the paper mode"));
         }
         let (weights, n) = (&self.spectral_weights, self.wavelengths_nm.len());
-        let is_list = weights.len() == n && weights.iter().all(|w| *w >= 0.0) && weights.iter().sum::<f64>() > 0.0;
-        if !weights.is_empty() && !(is_list && weights.iter().all(|w| w.is_finite())) {
+        let are_weights = weights.iter().all(|w| w.is_finite() && *w >= 0.0) && weights.iter().any(|w| *w > 0.0);
+        if !weights.is_empty() && (weights.len() != n || !are_weights) {
             let expected = format!("{n} numbers of 0 or more, one a wavelength");
             return Err(self.wrong("spectral_weights", &format!("{weights:?}"), &expected));
         }
