@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use glam::DVec2;
+
 use crate::{Glass, Interface, MonoLens, Move, OpticsError, Pose, Shape, Surface, formats, library, pose};
 
 /// A lens that has been checked and can be traced.
@@ -27,6 +29,14 @@ pub struct ImageSurface {
     pub curvature_per_mm: f64,
     /// The conic constant.
     pub conic: f64,
+}
+
+impl ImageSurface {
+    /// Returns how steeply the film rises at a place of its own plane, in x and y.
+    pub fn slope_at(&self, place_mm: DVec2) -> DVec2 {
+        let c = self.curvature_per_mm;
+        place_mm * (c / (1.0 - (1.0 + self.conic) * c * c * place_mm.length_squared()).sqrt())
+    }
 }
 
 impl Lens {

@@ -93,12 +93,16 @@ impl MonoLens {
     /// Focal lengths, principal planes and pupils in the x–z plane; those of [`first_order`](Self::first_order) unless
     /// a surface is curved differently along x and y.
     pub fn first_order_x(&self) -> FirstOrder {
+        paraxial::first_order(&self.steps_along_x(), self.stop, self.wavelength_nm)
+    }
+
+    /// Returns the steps as the x–z plane cuts them.
+    fn steps_along_x(&self) -> Vec<Step> {
         let along_x = |step: &Step| match &step.kind {
             Kind::Toric(toric) => Step { kind: Kind::Sphere, curvature: toric.vertex_curvatures()[0], ..step.clone() },
             _ => step.clone(),
         };
-        let steps: Vec<Step> = self.steps.iter().map(along_x).collect();
-        paraxial::first_order(&steps, self.stop, self.wavelength_nm)
+        self.steps.iter().map(along_x).collect()
     }
 
     /// The index of the surface that is the stop.
@@ -172,6 +176,15 @@ impl MonoLens {
     pub fn film_pose(&self, film_mm: f64) -> Pose {
         let centered = Pose::centered(self.last_vertex_z_mm() + film_mm);
         self.placed.as_ref().map_or(centered, |placed| placed.film.after(&centered))
+    }
+
+    /// Returns where a point of the lens frame lies on a film `film_mm` behind the last vertex, mm, along the film's own
+    /// x and y: those of the lens, unless the film is tilted or decentred.
+    pub fn on_film_mm(&self, point_mm: DVec3, film_mm: f64) -> DVec2 {
+        match &self.placed {
+            None => point_mm.truncate(),
+            Some(_) => self.film_pose(film_mm).to_own(point_mm).truncate(),
+        }
     }
 
     /// Traces rays through all surfaces, on this thread.
@@ -321,6 +334,13 @@ impl MonoLens {
     pub fn projection_center_z_mm(&self) -> f64 {
         let z_mm = self.first_order.entrance_pupil_z_mm;
         if z_mm.abs() <= FARTHEST_PUPIL * self.front.semi_aperture_mm { z_mm } else { 0.0 }
+    }
+
+    /// Returns the image in the x–z plane, which differs from that of [`conjugate`](Self::conjugate) where a surface is
+    /// curved differently along x and y.
+    pub fn conjugate_x(&self, object_distance_mm: f64) -> Conjugate {
+        let (before, after) = (self.steps[0].index_before, self.image_index());
+        Matrix::of(&self.steps_along_x()).image_of(-object_distance_mm, before, after)
     }
 
     /// Returns how far behind the last vertex the film is in focus for an object at this distance before the first.

@@ -25,42 +25,80 @@ impl AstigmaticFoci {
     /// They are the limit of real rays: slopes from five places of the pupil, with an error of its fourth power,
     /// 1e-11 of the focal length. So they hold for every shape of surface that can be traced.
     pub fn find(lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
-        let aim = StopAim::find(lens, point, &[DVec2::ZERO]);
-        let chief_mm = aim.targets_mm()[0]?;
+        let close = CloseRays::about_chief(lens, point)?;
         let across = match point {
             ObjectPoint::Finite(place) => place.truncate(),
             ObjectPoint::Infinite(direction) => -direction.truncate(),
         };
         let tangential = across.try_normalize().unwrap_or(DVec2::Y);
-        let focus_mm = |direction: DVec2| close_focus_mm(lens, point, &aim, chief_mm, direction);
+        let focus_mm = |direction: DVec2| close.focus_mm(direction);
         Some(Self { tangential_mm: focus_mm(tangential)?, sagittal_mm: focus_mm(tangential.perp())? })
     }
 }
 
-/// Returns where rays that differ from the chief ray in this direction of the pupil meet, from the last vertex, mm.
-fn close_focus_mm(
-    lens: &MonoLens,
-    point: &ObjectPoint,
-    aim: &StopAim,
-    chief_mm: DVec2,
-    direction: DVec2,
-) -> Option<f64> {
-    let radius_mm = match 0.5 * lens.first_order().entrance_pupil_diameter_mm {
-        radius_mm if radius_mm.is_finite() => radius_mm,
-        _ => lens.stop_semi_aperture_mm(),
-    };
-    let h = 0.5 * CLOSE * radius_mm;
-    let targets_mm = [-2.0, -1.0, 1.0, 2.0].map(|share| chief_mm + direction * (share * h));
-    let mut rays = rays_towards(point, &targets_mm, aim.z_mm(), 0.0);
-    lens.trace(&mut rays, Rims::Ignore);
-    lens.to_film(&mut rays, 0.0);
-    if rays.n_in_flight() < targets_mm.len() {
-        return None;
+/// Where the close rays of a pupil's own axes come nearest to the chief ray: what astigmatism is for a lens without an
+/// axis of symmetry.
+///
+/// Distances are along the film's axis from the last vertex, mm; infinite where the close rays leave in parallel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisFoci {
+    /// Of the rays beside the chief ray along x.
+    pub x_mm: f64,
+    /// Of the rays above and below it.
+    pub y_mm: f64,
+}
+
+impl AxisFoci {
+    /// Finds the foci on the real chief ray, as [`AstigmaticFoci::find`] does; `None` if there is none.
+    ///
+    /// Rays that pass the chief ray askew have their focus where they are nearest to it in the film's plane.
+    pub fn find(lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
+        let close = CloseRays::about_chief(lens, point)?;
+        Some(Self { x_mm: close.focus_mm(DVec2::X)?, y_mm: close.focus_mm(DVec2::Y)? })
     }
-    let slope = |of: &dyn Fn(usize) -> f64| 8.0 * (of(2) - of(1)) - (of(3) - of(0));
-    let place = slope(&|i| rays.point_mm(i).truncate().dot(direction));
-    let tangent = slope(&|i| rays.direction(i).truncate().dot(direction) / rays.n[i]);
-    Some(if tangent == 0.0 { f64::INFINITY } else { -place / tangent })
+}
+
+/// The rays close to a chief ray.
+struct CloseRays<'a> {
+    lens: &'a MonoLens,
+    point: &'a ObjectPoint,
+    aim: StopAim,
+    chief_mm: DVec2,
+}
+
+impl<'a> CloseRays<'a> {
+    fn about_chief(lens: &'a MonoLens, point: &'a ObjectPoint) -> Option<Self> {
+        let aim = StopAim::find(lens, point, &[DVec2::ZERO]);
+        let chief_mm = aim.targets_mm()[0]?;
+        Some(Self { lens, point, aim, chief_mm })
+    }
+
+    /// Returns where rays that differ from the chief ray in this direction of the pupil come nearest to it, from the last
+    /// vertex, mm.
+    fn focus_mm(&self, direction: DVec2) -> Option<f64> {
+        let Self { lens, point, aim, chief_mm } = self;
+        let radius_mm = match 0.5 * lens.first_order().entrance_pupil_diameter_mm {
+            radius_mm if radius_mm.is_finite() => radius_mm,
+            _ => lens.stop_semi_aperture_mm(),
+        };
+        let h = 0.5 * CLOSE * radius_mm;
+        let targets_mm = [-2.0, -1.0, 1.0, 2.0].map(|share| chief_mm + direction * (share * h));
+        let mut rays = rays_towards(point, &targets_mm, aim.z_mm(), 0.0);
+        lens.trace(&mut rays, Rims::Ignore);
+        lens.to_film(&mut rays, 0.0);
+        if rays.n_in_flight() < targets_mm.len() {
+            return None;
+        }
+        let turn = lens.film_pose(0.0).rotation.transpose();
+        let slope = |of: &dyn Fn(usize) -> DVec2| 8.0 * (of(2) - of(1)) - (of(3) - of(0));
+        let place = slope(&|i| lens.on_film_mm(rays.point_mm(i), 0.0));
+        let tangent = slope(&|i| {
+            let direction = turn * rays.direction(i);
+            direction.truncate() / direction.z
+        });
+        let squared = tangent.length_squared();
+        Some(if squared == 0.0 { f64::INFINITY } else { -place.dot(tangent) / squared })
+    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::pupil_places::{PupilCoordinates, PupilSampling};
-use crate::{MonoLens, ObjectPoint, Rims, paraxial::Matrix};
+use crate::{MonoLens, ObjectPoint, RayBatch, Rims, paraxial::Matrix};
 
 /// How an image without distortion grows with the field angle θ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,15 +51,22 @@ impl Distortion {
 }
 
 impl MonoLens {
-    /// Returns where the ray of a point through the middle of the real stop meets the film, mm, lens frame; rims do not
-    /// end it. `None` if there is no such ray.
+    /// Returns where the ray of a point through the middle of the real stop meets the film as it is curved, mm, in x and y
+    /// of the lens frame (of the film's own, where it is tilted or decentred); rims do not end it. `None` if there is no
+    /// such ray.
     ///
     /// Its difference between wavelengths is lateral colour.
     pub fn chief_film_point_mm(&self, point: &ObjectPoint, film_mm: f64) -> Option<DVec2> {
+        self.chief_ray_on_film(point, film_mm).map(|ray| self.on_film_mm(ray.point_mm(0), film_mm))
+    }
+
+    /// Returns the ray of a point through the middle of the real stop where it meets the film as it is curved; rims do
+    /// not end it. `None` if there is no such ray.
+    pub fn chief_ray_on_film(&self, point: &ObjectPoint, film_mm: f64) -> Option<RayBatch> {
         let coordinates = PupilCoordinates::stop(self);
         let sampling = PupilSampling { coordinates, places: vec![DVec2::ZERO], rims: Rims::Ignore };
-        let rays = sampling.rays_on_film(self, point, film_mm);
-        rays.fate[0].is_in_flight().then(|| rays.point_mm(0).truncate())
+        let ray = sampling.rays_on_film(self, point, film_mm);
+        ray.fate[0].is_in_flight().then_some(ray)
     }
 
     /// Returns the paraxial image height on a film over the tangent of the field angle at the entrance pupil, mm,

@@ -20,22 +20,49 @@ pub struct FocusRays {
     n_spots: usize,
 }
 
+/// Moves of a curved film after the first, at most, and the move that is none, mm.
+const ROUNDS: usize = 20;
+const AT_REST_MM: f64 = 1e-10;
+
+/// Returns which rays have arrived.
+fn arrived(rays: &RayBatch) -> impl Iterator<Item = usize> {
+    (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight())
+}
+
 impl FocusRays {
-    /// Adds a spot: the rays of one point, of several wavelengths if its colours are to coincide; all count alike.
+    /// Adds a spot: the rays of one point on a flat film, of several wavelengths if its colours are to coincide; all count
+    /// alike.
     pub fn add(&mut self, wavelengths: &[RayBatch]) {
-        let rays = || {
-            let arrived = |rays: &RayBatch, i: usize| rays.fate[i].is_in_flight();
-            let each = wavelengths.iter().flat_map(move |rays| (0..rays.len()).map(move |i| (rays, i)));
-            each.filter(move |(rays, i)| arrived(rays, *i))
-                .map(|(rays, i)| (rays.point_mm(i).truncate(), rays.direction(i).truncate() / rays.n[i]))
+        let ray = |rays: &RayBatch, i: usize| (rays.point_mm(i).truncate(), rays.direction(i).truncate() / rays.n[i]);
+        self.add_rays(
+            &wavelengths.iter().flat_map(|rays| arrived(rays).map(move |i| ray(rays, i))).collect::<Vec<_>>(),
+        );
+    }
+
+    /// Adds the spot of rays on the film of a lens, `film_mm` behind its last vertex, however it is curved and stands.
+    fn add_on_film(&mut self, lens: &MonoLens, film_mm: f64, wavelengths: &[RayBatch]) {
+        let pose = lens.film_pose(film_mm);
+        let ray = |rays: &RayBatch, i: usize| {
+            let place = lens.on_film_mm(rays.point_mm(i), film_mm);
+            let direction = pose.rotation.transpose() * rays.direction(i);
+            let slope = direction.truncate() / direction.z;
+            // As a sloping film moves on, a ray meets it sooner or later.
+            (place, slope / (1.0 - slope.dot(lens.image_surface().slope_at(place))))
         };
-        let n = rays().count() as f64;
+        self.add_rays(
+            &wavelengths.iter().flat_map(|rays| arrived(rays).map(move |i| ray(rays, i))).collect::<Vec<_>>(),
+        );
+    }
+
+    /// Adds a spot of rays: where each meets the film, and how that place moves as the film moves on.
+    fn add_rays(&mut self, rays: &[(DVec2, DVec2)]) {
+        let n = rays.len() as f64;
         if n < 1.0 {
             return;
         }
-        let (places, slopes) = rays().fold((DVec2::ZERO, DVec2::ZERO), |sum, ray| (sum.0 + ray.0, sum.1 + ray.1));
+        let (places, slopes) = rays.iter().fold((DVec2::ZERO, DVec2::ZERO), |sum, ray| (sum.0 + ray.0, sum.1 + ray.1));
         let (place, slope) = (places / n, slopes / n);
-        for (p, s) in rays() {
+        for &(p, s) in rays {
             self.size_mm2 += (p - place).length_squared() / n;
             self.slope_mm += (p - place).dot(s - slope) / n;
             self.bend += (s - slope).length_squared() / n;
@@ -70,12 +97,29 @@ impl Autofocus<'_> {
     /// Returns the film's distance behind the last vertex at which the spots are smallest, and their size there, both
     /// mm; `None` if no light gets through, or none that comes to a focus.
     ///
-    /// `film_mm` says from which film the rays are taken; it changes the result by rounding only.
+    /// `film_mm` says from which film the rays are taken; it changes the result by rounding only. A curved film comes to
+    /// rest in a few rounds.
     pub fn best_film_mm(&self, film_mm: f64) -> Option<(f64, f64)> {
+        let is_flat = self.lenses.iter().all(|lens| lens.image_surface().curvature_per_mm == 0.0);
+        let mut best = self.better_film_mm(film_mm)?;
+        for _ in 0..if is_flat { 0 } else { ROUNDS } {
+            let before_mm = best.0;
+            best = self.better_film_mm(before_mm)?;
+            if (best.0 - before_mm).abs() <= AT_REST_MM {
+                break;
+            }
+        }
+        Some(best)
+    }
+
+    /// Returns the best film as the rays on this one foretell it.
+    fn better_film_mm(&self, film_mm: f64) -> Option<(f64, f64)> {
         let mut rays = FocusRays::default();
         for point in self.points {
             let spot = |lens: &MonoLens| self.sampling.rays_on_film(lens, point, film_mm);
-            rays.add(&self.lenses.iter().map(spot).collect::<Vec<_>>());
+            if let Some(lens) = self.lenses.first() {
+                rays.add_on_film(lens, film_mm, &self.lenses.iter().map(spot).collect::<Vec<_>>());
+            }
         }
         let shift_mm = rays.shift_mm()?;
         Some((film_mm + shift_mm, rays.rms_mm(shift_mm)))
@@ -105,6 +149,26 @@ mod tests {
         assert!((film_mm - 1.0 / (1.0 / 50.0 - 1.0 / 2000.0)).abs() < 1e-11);
         // What is left is the square root of rounding in squares of 1 mm.
         assert!(rms_mm < 1e-7);
+    }
+
+    #[test]
+    fn a_curved_film_is_focused_as_a_whole() {
+        use crate::ImageSurface;
+        let flat = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
+        let curved = ImageSurface { curvature_per_mm: -1.0 / 60.0, conic: 0.0 };
+        let lens = flat.with_image_surface(curved).unwrap().at(550.0).unwrap();
+        let points = [0.0, 0.15, 0.3].map(|tan| ObjectPoint::from_field(&lens, DVec2::Y * tan, 0.0));
+        let sampling = sampling(&lens);
+        let focus = Autofocus { lenses: from_ref(&lens), points: &points, sampling: &sampling };
+        let (film_mm, rms_mm) = focus.best_film_mm(36.0).unwrap();
+        let found_mm = |film_mm: f64| {
+            let spot = |point| SpotDiagram::trace(&lens, point, film_mm, &sampling).rms_mm().unwrap();
+            (points.iter().map(|point| spot(point).powi(2)).sum::<f64>() / 3.0).sqrt()
+        };
+        assert!((found_mm(film_mm) - rms_mm).abs() < 1e-9, "{} {rms_mm}", found_mm(film_mm));
+        assert!(found_mm(film_mm - 0.02) > rms_mm && found_mm(film_mm + 0.02) > rms_mm);
+        // The start matters no more than to the last move.
+        assert!((focus.best_film_mm(34.0).unwrap().0 - film_mm).abs() < 1e-8);
     }
 
     #[test]

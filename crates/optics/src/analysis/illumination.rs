@@ -1,6 +1,6 @@
 //! How much light the exit cone holds.
 
-use glam::DVec2;
+use glam::{DQuat, DVec2, DVec3};
 
 use crate::{MonoLens, ObjectPoint, PupilBoundary, Rims};
 
@@ -13,6 +13,11 @@ use crate::{MonoLens, ObjectPoint, PupilBoundary, Rims};
 /// large, film points see slightly other pupils than the object point does. Its ratio to that on the axis is the
 /// relative illumination.
 pub fn projected_solid_angle(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> f64 {
+    projected_solid_angle_onto(lens, point, n_azimuths, DVec3::Z)
+}
+
+/// Returns the same for a film with this normal at the image, a unit vector of the lens frame.
+pub fn projected_solid_angle_onto(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize, normal: DVec3) -> f64 {
     let n = n_azimuths.max(16).next_multiple_of(2);
     let Some(pupil) = PupilBoundary::find(lens, point, n) else { return 0.0 };
     let azimuth = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64);
@@ -20,7 +25,10 @@ pub fn projected_solid_angle(lens: &MonoLens, point: &ObjectPoint, n_azimuths: u
     let targets_mm: Vec<DVec2> = pupil.rho_at_azimuths_mm().iter().enumerate().map(edge).collect();
     let mut rays = lens.rays_towards(point, &targets_mm, pupil.z_mm(), 0.0);
     lens.trace(&mut rays, Rims::Ignore);
-    let cosines: Vec<DVec2> = (0..n).map(|i| rays.direction(i).truncate()).collect();
+    let turn = DQuat::from_rotation_arc(normal, DVec3::Z);
+    let is_straight = normal == DVec3::Z;
+    let in_film = |direction: DVec3| if is_straight { direction } else { turn * direction };
+    let cosines: Vec<DVec2> = (0..n).map(|i| in_film(rays.direction(i)).truncate()).collect();
     let area = |step: usize| {
         let corners: Vec<DVec2> = cosines.iter().copied().step_by(step).collect();
         let pairs = corners.iter().zip(corners.iter().cycle().skip(1));
@@ -31,16 +39,21 @@ pub fn projected_solid_angle(lens: &MonoLens, point: &ObjectPoint, n_azimuths: u
 }
 
 /// The steepest field that is looked at, degrees.
-const STEEPEST_DEG: f64 = 88.0;
+pub const STEEPEST_FIELD_DEG: f64 = 88.0;
 
 /// Returns the field angle, degrees, at which the illumination of a far point has fallen to a share of that on the axis
 /// (by rims and cosines); `None` if none comes together on the axis, the steepest of 88° if it has not fallen so far.
 ///
 /// Twice this angle is a lens's field of view where its film sets no limit.
 pub fn field_limit_deg(lens: &MonoLens, share: f64) -> Option<f64> {
+    field_limit_along_deg(lens, share, DVec2::Y, 0.0)
+}
+
+/// Returns the same along a direction of the field, a unit vector, for points `dioptres` = 1/Z away.
+pub fn field_limit_along_deg(lens: &MonoLens, share: f64, direction: DVec2, dioptres: f64) -> Option<f64> {
     const N_AZIMUTHS: usize = 48;
     let cone = |field_deg: f64| {
-        let point = ObjectPoint::from_field(lens, DVec2::new(0.0, field_deg.to_radians().tan()), 0.0);
+        let point = ObjectPoint::from_field(lens, direction * field_deg.to_radians().tan(), dioptres);
         projected_solid_angle(lens, &point, N_AZIMUTHS)
     };
     let least = share * cone(0.0);
@@ -48,8 +61,8 @@ pub fn field_limit_deg(lens: &MonoLens, share: f64) -> Option<f64> {
         return None;
     }
     // The first degree that is too dark, then halves of it.
-    let dark = (1..=STEEPEST_DEG as u32).map(f64::from).find(|&field_deg| cone(field_deg) < least);
-    let Some(mut dark) = dark else { return Some(STEEPEST_DEG) };
+    let dark = (1..=STEEPEST_FIELD_DEG as u32).map(f64::from).find(|&field_deg| cone(field_deg) < least);
+    let Some(mut dark) = dark else { return Some(STEEPEST_FIELD_DEG) };
     let mut bright = dark - 1.0;
     while dark - bright > 1e-4 {
         let middle = 0.5 * (bright + dark);
@@ -61,8 +74,6 @@ pub fn field_limit_deg(lens: &MonoLens, share: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
-
-    use glam::DVec3;
 
     use super::*;
     use crate::{Glass, Interface, Lens, Surface};

@@ -6,6 +6,7 @@
 mod aim;
 mod aperture;
 mod close_rays;
+mod field_grid;
 mod field_map;
 mod focus;
 mod illumination;
@@ -15,10 +16,13 @@ mod spot;
 
 pub use aim::StopAim;
 pub use aperture::NumericalApertures;
-pub use close_rays::AstigmaticFoci;
+pub use close_rays::{AstigmaticFoci, AxisFoci};
+pub use field_grid::StraightMap;
 pub use field_map::{Distortion, Projection};
 pub use focus::{Autofocus, FocusRays};
-pub use illumination::{field_limit_deg, projected_solid_angle};
+pub use illumination::{
+    STEEPEST_FIELD_DEG, field_limit_along_deg, field_limit_deg, projected_solid_angle, projected_solid_angle_onto,
+};
 pub use pupil_places::{PupilCoordinates, PupilSampling, hexapolar, pupil_line};
 pub use ray_fan::RayFan;
 pub use spot::SpotDiagram;

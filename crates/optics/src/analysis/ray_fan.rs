@@ -8,22 +8,23 @@ use crate::{MonoLens, ObjectPoint};
 /// How far the rays through a line of pupil places miss the chief ray's film point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RayFan {
-    /// The film point of a ray less that of the chief ray, mm, lens frame, for each place; `None` for rays that do not
+    /// The film point of a ray less that of the chief ray, mm, along the film's x and y, for each place; `None` for rays that do not
     /// arrive.
     pub errors_mm: Vec<Option<DVec2>>,
 }
 
 impl RayFan {
-    /// Traces a fan to the film, `film_mm` behind the last vertex; `None` if not even the chief ray arrives.
+    /// Traces a fan to the film as it is curved, `film_mm` behind the last vertex; `None` if not even the chief ray arrives.
     pub fn trace(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, sampling: &PupilSampling) -> Option<Self> {
         let chief = sampling.chief().rays_on_film(lens, point, film_mm);
         if !chief.fate[0].is_in_flight() {
             return None;
         }
+        let chief_mm = lens.on_film_mm(chief.point_mm(0), film_mm);
         let rays = sampling.rays_on_film(lens, point, film_mm);
         let error = |i: usize| {
             let is_there = rays.fate[i].is_in_flight();
-            is_there.then(|| (rays.point_mm(i) - chief.point_mm(0)).truncate())
+            is_there.then(|| lens.on_film_mm(rays.point_mm(i), film_mm) - chief_mm)
         };
         Some(Self { errors_mm: (0..rays.len()).map(error).collect() })
     }

@@ -1,6 +1,6 @@
 //! Spot diagrams: where the rays of a point meet the film.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::pupil_places::PupilSampling;
 use crate::{MonoLens, ObjectPoint, RayBatch, RayFate};
@@ -8,7 +8,8 @@ use crate::{MonoLens, ObjectPoint, RayBatch, RayFate};
 /// Where the rays of one point at one wavelength meet the film, each counted alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpotDiagram {
-    /// The film points of the rays that arrive, mm, lens frame, in the order of their pupil places.
+    /// The film points of the rays that arrive, mm, in the order of their pupil places: x and y of the lens frame, or of
+    /// the film's own where it is tilted or decentred.
     pub points_mm: Vec<DVec2>,
     /// The film point of the chief ray (through the middle of the pupil, whether rims end it or not), mm.
     pub chief_mm: Option<DVec2>,
@@ -17,17 +18,22 @@ pub struct SpotDiagram {
 }
 
 impl SpotDiagram {
-    /// Traces rays through these places of the pupil to the film, `film_mm` behind the last vertex.
+    /// Traces rays through these places of the pupil to the film as it is curved, `film_mm` behind the last vertex.
     pub fn trace(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, sampling: &PupilSampling) -> Self {
         let rays = sampling.rays_on_film(lens, point, film_mm);
         let chief = sampling.chief().rays_on_film(lens, point, film_mm);
-        Self::of(&rays, chief.fate[0].is_in_flight().then(|| chief.point_mm(0).truncate()))
+        let chief_mm = chief.fate[0].is_in_flight().then(|| lens.on_film_mm(chief.point_mm(0), film_mm));
+        Self::on(|point_mm| lens.on_film_mm(point_mm, film_mm), &rays, chief_mm)
     }
 
     /// Returns the spot of rays that have been traced to the film.
     pub fn of(rays_on_film: &RayBatch, chief_mm: Option<DVec2>) -> Self {
+        Self::on(DVec3::truncate, rays_on_film, chief_mm)
+    }
+
+    fn on(film: impl Fn(DVec3) -> DVec2, rays_on_film: &RayBatch, chief_mm: Option<DVec2>) -> Self {
         let arrived = (0..rays_on_film.len()).filter(|&i| rays_on_film.fate[i].is_in_flight());
-        let points_mm = arrived.map(|i| rays_on_film.point_mm(i).truncate()).collect();
+        let points_mm = arrived.map(|i| film(rays_on_film.point_mm(i))).collect();
         Self { points_mm, chief_mm, fates: rays_on_film.fate.clone() }
     }
 
