@@ -91,6 +91,14 @@ pub enum OpticsError {
         /// How many surfaces the lens has.
         n_surfaces: usize,
     },
+    /// More apertures than any lens needs.
+    #[error("a lens has at most {most} apertures, found {n_apertures}")]
+    ApertureCount {
+        /// How many were found.
+        n_apertures: usize,
+        /// How many there may be.
+        most: usize,
+    },
     /// More moves than any lens needs.
     #[error("a lens has at most {most} moves, found {n_moves}")]
     MoveCount {

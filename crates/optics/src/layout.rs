@@ -1,12 +1,16 @@
 //! Drawings of a lens in its meridional plane, as SVG.
 
+mod aperture;
 mod frame;
 
 use std::fmt::Write;
 
 use glam::{DVec2, DVec3};
 
-use self::frame::Frame;
+use self::{
+    aperture::{extent_mm, outline, round_mm},
+    frame::Frame,
+};
 use crate::{
     Glass, ImageSurface, Lens, MonoLens, ObjectPoint, OpticsError, Pose, PupilBoundary, RayBatch, Rims, Shape, Surface,
     rays_towards,
@@ -57,6 +61,7 @@ impl Lens {
             frame.rays(fan, &mut svg);
         }
         stop(self, &frame, &mut svg);
+        aperture::obscurations(self, &frame, &mut svg);
         film(self, layout, &fans, &frame, &mut svg);
         let first = self.at(reference_nm)?.first_order();
         let words = match first.power_per_mm == 0.0 {
@@ -175,7 +180,7 @@ fn object_space(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
     if *medium == Glass::Air {
         return;
     }
-    let front = outline(&lens.interfaces()[0].surface, &lens.poses()[0]);
+    let front = outline(&lens.interfaces()[0].surface, &lens.poses()[0], extent_mm(lens, 0));
     let back_z_mm = front.iter().map(|point| point.x).fold(f64::INFINITY, f64::min) - lead_mm(lens, layout);
     let ends = [front[front.len() - 1], front[0]].map(|end| DVec2::new(back_z_mm, end.y));
     let (fill, _) = glass_colors(medium);
@@ -200,12 +205,12 @@ fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
             surface.curvature_per_mm == 0.0 && interfaces[j].medium_after == *medium
         };
         let last = (i + 1..interfaces.len()).find(|&j| !is_within(j));
-        let front = outline(&interfaces[i].surface, &poses[i]);
+        let front = outline(&interfaces[i].surface, &poses[i], extent_mm(lens, i));
         let back = match last {
-            Some(j) => outline(&interfaces[j].surface, &poses[j]),
+            Some(j) => outline(&interfaces[j].surface, &poses[j], extent_mm(lens, j)),
             None => {
                 let film_z_mm = lens.last_vertex_z_mm() + layout.film_mm;
-                outline(&Surface::plane(interfaces[i].surface.semi_aperture_mm), &Pose::centered(film_z_mm))
+                outline(&Surface::plane(1.0), &Pose::centered(film_z_mm), extent_mm(lens, i))
             }
         };
         let rim_mm = front[0].y.abs().max(back[0].y.abs());
@@ -228,22 +233,6 @@ fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
         );
         i = last.unwrap_or(interfaces.len());
     }
-}
-
-/// Returns the points of a surface from its lower rim to its upper one.
-fn outline(surface: &Surface, pose: &Pose) -> Vec<DVec2> {
-    const N: i32 = 32;
-    let at = |i: i32| {
-        // Denser towards the rim, which may lie on the equator to rounding.
-        let y = surface.semi_aperture_mm * (std::f64::consts::FRAC_PI_2 * f64::from(i) / f64::from(N)).sin();
-        let sag_mm = surface.sag_mm(y.abs() * (1.0 - 1e-12));
-        let point = pose.to_lens(DVec3::new(0.0, y, if sag_mm.is_finite() { sag_mm } else { 0.0 }));
-        DVec2::new(point.z, point.y)
-    };
-    if surface.curvature_per_mm == 0.0 && surface.sag_mm(surface.semi_aperture_mm) == 0.0 {
-        return vec![at(-N), at(N)];
-    }
-    (-N..=N).map(at).collect()
 }
 
 /// Tints a glass by its dispersion, crown blue and flint violet, and by its index.
@@ -281,7 +270,7 @@ fn film(lens: &Lens, layout: &Layout, fans: &[Fan], frame: &Frame, svg: &mut Str
     let ImageSurface { curvature_per_mm, conic } = lens.image_surface();
     let half_mm = half_mm.min(1.0 / curvature_per_mm.abs());
     let surface = Surface { curvature_per_mm, shape: Shape::Conic { conic }, semi_aperture_mm: half_mm };
-    let points = outline(&surface, &lens.film_motion().after(&Pose::centered(z_mm)));
+    let points = outline(&surface, &lens.film_motion().after(&Pose::centered(z_mm)), round_mm(&surface));
     let top = points.last().copied().unwrap_or(DVec2::new(z_mm, half_mm));
     let line = frame.path(points);
     let _ = writeln!(svg, "<path d=\"{line}\" fill=\"none\" stroke=\"#111\" stroke-width=\"2\"/>");

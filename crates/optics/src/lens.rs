@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use crate::{Glass, Interface, MonoLens, Move, OpticsError, Pose, Shape, Surface, formats, library, pose};
+use crate::{Aperture, Glass, Interface, MonoLens, Move, OpticsError, Pose, Shape, Surface, formats, library, pose};
 
 /// A lens that has been checked and can be traced.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,6 +18,7 @@ pub struct Lens {
     stop: usize,
     full_stop_semi_aperture_mm: f64,
     moves: Vec<Move>,
+    apertures: Vec<Aperture>,
     image_surface: ImageSurface,
 }
 
@@ -50,14 +51,35 @@ impl Lens {
         interfaces: Vec<Interface>,
         stop: usize,
     ) -> Result<Self, OpticsError> {
+        Self::new_with_apertures(name, source, interfaces, stop, Vec::new())
+    }
+
+    /// Returns the lens made of these interfaces, in air, whose surfaces have apertures beside their round rims.
+    ///
+    /// A surface with an opening must reach as far as the opening does within the rim, not as far as the whole rim.
+    ///
+    /// # Errors
+    /// When there are no surfaces, a number makes no sense, a rim or opening does not fit on its surface, or an aperture is
+    /// of a surface that is not there.
+    pub fn new_with_apertures(
+        name: impl Into<String>,
+        source: impl Into<String>,
+        interfaces: Vec<Interface>,
+        stop: usize,
+        apertures: Vec<Aperture>,
+    ) -> Result<Self, OpticsError> {
         if !(1..=MOST_SURFACES).contains(&interfaces.len()) {
             return Err(OpticsError::SurfaceCount { n_surfaces: interfaces.len() });
         }
         if stop >= interfaces.len() {
             return Err(OpticsError::Stops { n_stops: 0 });
         }
+        if apertures.len() > MOST_APERTURES {
+            return Err(OpticsError::ApertureCount { n_apertures: apertures.len(), most: MOST_APERTURES });
+        }
+        apertures.iter().try_for_each(|aperture| aperture.check(interfaces.len()))?;
         for (surface, interface) in interfaces.iter().enumerate() {
-            interface.surface.check(surface)?;
+            interface.surface.check(surface, &apertures)?;
             interface.medium_after.check()?;
             let found = interface.thickness_after_mm;
             if !found.is_finite() {
@@ -74,6 +96,7 @@ impl Lens {
             stop,
             full_stop_semi_aperture_mm,
             moves: Vec::new(),
+            apertures,
             image_surface: ImageSurface::default(),
         })
     }
@@ -197,6 +220,16 @@ impl Lens {
         &self.moves
     }
 
+    /// The openings and obscurations of surfaces beside their round rims; none for most lenses.
+    pub fn apertures(&self) -> &[Aperture] {
+        &self.apertures
+    }
+
+    /// The apertures of one surface.
+    pub(crate) fn apertures_of(&self, surface: usize) -> impl Iterator<Item = &Aperture> {
+        self.apertures.iter().filter(move |aperture| aperture.surface == surface)
+    }
+
     /// The shape of the film.
     pub fn image_surface(&self) -> ImageSurface {
         self.image_surface
@@ -219,10 +252,12 @@ impl Lens {
     }
 
     /// Whether every surface is one of revolution about the lens's axis: whether nothing is tilted, decentred or
-    /// curved differently along x and y.
+    /// curved differently along x and y, and there are no apertures but round rims.
     pub fn is_rotational(&self) -> bool {
         let is_round = |interface: &Interface| interface.surface.is_rotational();
-        self.interfaces.iter().all(is_round) && pose::motions(&self.moves, &self.vertices_z_mm()).is_none()
+        self.apertures.is_empty()
+            && self.interfaces.iter().all(is_round)
+            && pose::motions(&self.moves, &self.vertices_z_mm()).is_none()
     }
 
     /// Checks that the lens is rotationally symmetric; `task` says what needs that, in words.
@@ -326,6 +361,8 @@ impl Lens {
 
 /// The largest number of surfaces.
 const MOST_SURFACES: usize = 1000;
+/// The largest number of apertures: an opening and an obscuration of each surface.
+const MOST_APERTURES: usize = 2 * MOST_SURFACES;
 /// The largest number of moves: two breaks before each surface.
 const MOST_MOVES: usize = 2 * MOST_SURFACES;
 

@@ -10,6 +10,7 @@
 
 mod air;
 pub mod analysis;
+mod aperture;
 mod beam;
 mod bundle;
 mod catalogue;
@@ -32,6 +33,7 @@ mod surface;
 mod trace;
 
 pub use air::Air;
+pub use aperture::{Aperture, Outline};
 pub use beam::Beam;
 pub use bundle::{ObjectPoint, rays_over_front, rays_towards};
 pub use catalogue::{CatalogueGlass, GlassCatalogue};

@@ -53,7 +53,8 @@ impl MonoLens {
             let is_window = surface.curvature_per_mm == 0.0 && index_before == index_after;
             let kind = kind_of(surface, is_window);
             let (curvature, semi_aperture) = (surface.curvature_per_mm, surface.semi_aperture_mm);
-            steps.push(Step { kind, curvature, index_before, index_after, vertex_z, semi_aperture });
+            let apertures = lens.apertures_of(steps.len()).copied().collect();
+            steps.push(Step { kind, curvature, index_before, index_after, vertex_z, semi_aperture, apertures });
             index_before = index_after;
         }
         let first_order = paraxial::first_order(&steps, lens.stop(), wavelength_nm);
@@ -73,7 +74,8 @@ impl MonoLens {
 
     /// Whether the lens is rotationally symmetric, as [`Lens::is_rotational`].
     pub fn is_rotational(&self) -> bool {
-        self.placed.is_none() && !self.steps.iter().any(|step| matches!(step.kind, Kind::Toric(_)))
+        let is_round = |step: &Step| step.apertures.is_empty() && !matches!(step.kind, Kind::Toric(_));
+        self.placed.is_none() && self.steps.iter().all(is_round)
     }
 
     /// The wavelength, nm.

@@ -3,7 +3,7 @@
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::{Glass, ImageSurface, Interface, Lens, Move, OpticsError, Shape, Surface};
+use crate::{Aperture, Glass, ImageSurface, Interface, Lens, Move, OpticsError, Shape, Surface};
 
 /// A lens as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,6 +18,9 @@ struct Prescription {
     /// Tilts and decentres.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     moves: Vec<Move>,
+    /// Openings and obscurations beside the round rims.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    apertures: Vec<Aperture>,
     /// Left out for a flat film.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     image_radius_mm: Option<f64>,
@@ -88,7 +91,8 @@ pub(crate) fn lens_from_ron(text: &str) -> Result<Lens, TextError> {
     }
     let curvature_per_mm = curvature_per_mm(interfaces.len(), "image_radius_mm", prescription.image_radius_mm)?;
     let image_surface = ImageSurface { curvature_per_mm, conic: prescription.image_conic };
-    let lens = Lens::new(prescription.name, prescription.source, interfaces, stop)?;
+    let lens =
+        Lens::new_with_apertures(prescription.name, prescription.source, interfaces, stop, prescription.apertures)?;
     let lens = lens.with_object_medium(prescription.object_medium)?;
     Ok(lens.with_moves(prescription.moves)?.with_image_surface(image_surface)?)
 }
@@ -123,6 +127,7 @@ impl Lens {
             object_medium: self.object_medium().clone(),
             surfaces: self.interfaces().iter().enumerate().map(row).collect(),
             moves: self.moves().to_vec(),
+            apertures: self.apertures().to_vec(),
             image_radius_mm: radius_mm(self.image_surface().curvature_per_mm),
             image_conic: self.image_surface().conic,
         };

@@ -9,6 +9,9 @@ use crate::{
 
 /// The true, vignetted pupil that one object point sees at one wavelength: a region of the entrance-pupil plane,
 /// given by its edge at equally spaced azimuths about a centre.
+///
+/// The edge follows the round rims and the openings of surfaces; an obscuration ([`Aperture`](crate::Aperture)) is a
+/// hole in the region that is not part of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PupilBoundary {
     // Invariants: at least 3 radii, all finite and above 0.

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::{Glass, OpticsError, trace::Toric};
+use crate::{Aperture, Glass, OpticsError, trace::Toric};
 
 /// The shape of a surface, beyond its curvature at the vertex.
 ///
@@ -147,8 +147,9 @@ impl Surface {
         self.shape.is_rotational()
     }
 
-    /// Checks that the numbers make sense; `index` is the surface's place, for the message.
-    pub(crate) fn check(&self, surface: usize) -> Result<(), OpticsError> {
+    /// Checks that the numbers make sense, and that the surface reaches as far as its rim or, where it is among
+    /// `apertures`, its opening; `surface` is its place.
+    pub(crate) fn check(&self, surface: usize, apertures: &[Aperture]) -> Result<(), OpticsError> {
         let finite = |key, found: f64| match found.is_finite() {
             true => Ok(()),
             false => Err(OpticsError::Surface { surface, key, found, expected: "a finite number" }),
@@ -178,10 +179,21 @@ impl Surface {
             let key = "semi_aperture_mm";
             return Err(OpticsError::Surface { surface, key, found, expected: "a finite number above 0" });
         }
-        if let Some(section) = self.section_that_ends_within(found * (1.0 - 1e-9)) {
+        let mut openings =
+            apertures.iter().filter(|aperture| aperture.surface == surface && !aperture.is_obscuration).peekable();
+        let within = found * (1.0 - 1e-9);
+        let section = match openings.peek() {
+            None => self.section_that_ends_within(within),
+            // A surface ends somewhere in an opening where it does at the edge of the opening and of the rim.
+            Some(_) => openings
+                .flat_map(Aperture::edge_mm)
+                .map(|place| (place * (1.0 - 1e-9)).clamp_length_max(within))
+                .find(|place| !self.sag_at_mm(place.x, place.y).is_finite()),
+        };
+        if let Some(section) = section {
             let radius_mm = match &self.shape {
                 Shape::Biconic { curvature_x_per_mm, .. } | Shape::Toroid { curvature_x_per_mm, .. }
-                    if section.x != 0.0 =>
+                    if section.x != 0.0 && *curvature_x_per_mm != 0.0 =>
                 {
                     1.0 / curvature_x_per_mm
                 }
@@ -234,8 +246,8 @@ mod tests {
 
     #[test]
     fn rim_must_fit_on_its_sphere() {
-        assert!(Surface::sphere(5.0, 5.0).check(0).is_ok());
-        let message = Surface::sphere(5.0, 5.1).check(3).unwrap_err().to_string();
+        assert!(Surface::sphere(5.0, 5.0).check(0, &[]).is_ok());
+        let message = Surface::sphere(5.0, 5.1).check(3, &[]).unwrap_err().to_string();
         assert_eq!(message, "surface 3: a rim of 5.1 mm does not fit on a surface of radius 5 mm");
     }
 }

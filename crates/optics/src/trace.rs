@@ -4,6 +4,7 @@
 //! happens at a surface is vector code, one function for each kind of surface ([`kernel`]); this file brings the
 //! rays there, and writes those that end.
 
+mod aperture;
 mod asphere;
 mod block;
 mod crossing;
@@ -21,7 +22,7 @@ use multiversion::multiversion;
 
 use self::{
     block::{Block, LANES},
-    crossing::{Interface, Ray},
+    crossing::Ray,
     plan::Pass,
 };
 pub(crate) use self::{
@@ -30,7 +31,7 @@ pub(crate) use self::{
     real::Real,
     toric::Toric,
 };
-use crate::{RayFate, rays::RaySlices};
+use crate::{Aperture, RayFate, rays::RaySlices};
 
 /// Whether rims end rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +51,8 @@ pub(crate) struct Step {
     pub(crate) index_after: f64,
     pub(crate) vertex_z: f64,
     pub(crate) semi_aperture: f64,
+    /// Openings beside the round rim.
+    pub(crate) apertures: Vec<Aperture>,
 }
 
 /// The shapes, and what they need beyond a curvature.
@@ -102,7 +105,11 @@ pub(crate) fn trace_batch<T: Real>(plan: &Plan<T>, goal: Goal, mut rays: RaySlic
 /// axis; −∞ for a ray that does not get through.
 pub(crate) fn trace_clearances(plan: &Plan<f64>, mut rays: RaySlices<'_>, clearances: &mut [f64]) {
     trace_blocks(plan, Goal::LastSurface, &mut rays, |surface, blocks, start| {
-        kernel::keep_clearance(plan.passes[surface].semi_aperture, blocks, &mut clearances[start..]);
+        let pass = &plan.passes[surface];
+        kernel::keep_clearance(pass.semi_aperture, blocks, &mut clearances[start..]);
+        if !pass.apertures.is_empty() {
+            aperture::keep_clearance(&pass.apertures, blocks, &mut clearances[start..]);
+        }
     });
 }
 
@@ -155,7 +162,10 @@ fn trace_groups<T: Real, const B: usize>(
             kernel::approach(plan.index_before, from);
         }
         for (i, pass) in plan.passes.iter().enumerate() {
-            let is_any_ended = pass.form.pass_blocks(pass.shift, from, to);
+            let mut is_any_ended = pass.form.pass_blocks(pass.shift, from, to);
+            if pass.is_clipped_further() {
+                is_any_ended |= aperture::clip(&pass.apertures, to);
+            }
             note(i, to, start);
             (from, to) = (to, from);
             if is_any_ended {
@@ -188,7 +198,7 @@ impl<T: Real> At<'_, T> {
         for (i, (before, after)) in before.iter().zip(after).enumerate() {
             for lane in (0..LANES).filter(|&lane| before.alive[lane] != after.alive[lane]) {
                 let came = before.ray(lane, self.pass.shift);
-                let (fate, ray) = fate_of(self.surface, &self.pass.interface, &came, (after, lane));
+                let (fate, ray) = fate_of(self.surface, self.pass, &came, (after, lane));
                 let in_lens = Ray { z: ray.z + self.pass.vertex_z, ..ray };
                 rays.end(self.start + i * LANES + lane, &in_lens, fate);
             }
@@ -199,14 +209,14 @@ impl<T: Real> At<'_, T> {
 /// Returns how and where a ray ended that a lane held, with the direction in which it came.
 fn fate_of<T: Real, const N: usize>(
     surface: u16,
-    interface: &Interface<T>,
+    pass: &Pass<T>,
     before: &Ray<T>,
     (after, lane): (&Block<T, N>, usize),
 ) -> (RayFate, Ray<T>) {
     let Ray { l, m, n, .. } = *before;
     let there = Ray { l, m, n, ..after.ray(lane, T::ZERO) };
     let is_hit = after.front[lane] != T::NO && there.x.abs() + there.y.abs() < T::INFINITY;
-    match (is_hit, interface.is_within(there.x, there.y)) {
+    match (is_hit, pass.is_within(there.x, there.y)) {
         (false, _) => (RayFate::Missed { surface }, *before),
         (true, false) => (RayFate::Vignetted { surface }, there),
         (true, true) => (RayFate::TotalReflection { surface }, there),

@@ -121,8 +121,8 @@ fn inches_and_near_objects_are_converted() {
 
 #[test]
 fn what_cannot_be_traced_is_refused_by_name() {
-    assert!(message("  CIR 7.0", "  CIR OBS 1").contains("CIR: obscurations are not supported"));
-    assert!(message("  CIR 7.0", "  REX 3").contains("REX: apertures other than circles"));
+    assert!(message("  CIR 7.0", "  CIR HOL 1").contains("CIR: holes are not supported"));
+    assert!(message("  CIR 7.0", "  REX 3; ARO 30").contains("ARO: turned apertures are not supported"));
     assert!(message("  CIR 7.0", "  XDE 0; BEN").starts_with("lens.seq:19: BEN: this kind of tilt is not supported"));
     assert!(message("  CIR 7.0", "  AAS; AR 1E-5").contains("AR: higher terms of an anamorphic asphere"));
     assert!(message("  CIR 7.0", "  SPS ODD").contains("surfaces of the kind 'SPS ODD' are not supported"));

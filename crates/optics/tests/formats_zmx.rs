@@ -193,8 +193,8 @@ fn what_cannot_be_traced_is_refused_by_name() {
     assert!(message("TYPE EVENASPH", "TYPE TOROIDAL\n  XDAT 1 2").contains("Zernike terms (XDAT) of a toroid"));
     assert!(message("TYPE EVENASPH", "TYPE COORDBRK").contains("surface 1: a coordinate break cannot be the stop"));
     assert!(message("GLAS N-BK7", "GLAS MIRROR").contains("mirrors are not supported"));
-    assert!(message("  CONI", "  OBSC 0 1\n  CONI").contains("OBSC: a central obscuration is not supported"));
-    assert!(message("  CONI", "  OBDC 1 0\n  CONI").contains("OBDC: a decentred aperture"));
+    assert!(message("  CONI", "  OBSC 1 2\n  CONI").contains("OBSC: an obscuration with a hole"));
+    assert!(message("  CONI", "  SPID 1 4\n  CONI").contains("SPID: a spider is not supported"));
     assert!(message("MODE SEQ", "MODE NSC").contains("MODE: NSC is not supported; expected SEQ"));
     assert!(message("FTYP 0", "FTYP 7").contains("field type 7 is not supported"));
 }

@@ -51,7 +51,7 @@ pub(crate) fn lens_from_dat(text: &str, name: &str) -> Result<Lens, TextError> {
         let curvature_per_mm = if is_stop { 0.0 } else { 1.0 / radius_mm };
         let surface = Surface { curvature_per_mm, ..Surface::plane(0.5 * diameter_mm) };
         let checked = || {
-            surface.check(interfaces.len())?;
+            surface.check(interfaces.len(), &[])?;
             medium_after.check()?;
             if thickness_mm.is_finite() {
                 return Ok(());

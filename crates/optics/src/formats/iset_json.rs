@@ -74,7 +74,7 @@ fn rows_of(file: &Object, glasses: &Glasses) -> Result<Rows, TextError> {
             _ => return Err(plain(format!("{}: an elliptic rim is not supported", row.place("semi_aperture")))),
         };
         let surface = Surface { curvature_per_mm: curvatures_per_mm[1], shape, semi_aperture_mm };
-        let checked = surface.check(i).and_then(|()| medium_after.check());
+        let checked = surface.check(i, &[]).and_then(|()| medium_after.check());
         checked.map_err(|error| TextError { line: None, reason: format!("surfaces[{i}]: {error}") })?;
         interfaces.push(Interface { surface, medium_after, thickness_after_mm: row.number("thickness")? });
     }

@@ -189,6 +189,7 @@ impl<'a> Seq<'a> {
 
     /// Takes a command that belongs to a surface: the last, or the one that the first word after it names (`S3`).
     fn take_of_surface(&mut self, keyword: &str, command: &Command) -> Result<(), TextError> {
+        let command = &command.without_labels();
         let named = command.words.get(1).and_then(|word| self.surface_named(word));
         let place = if named.is_some() { 2 } else { 1 };
         let Some(surface) = named.or(self.surfaces.len().checked_sub(1)) else { return Ok(()) };
@@ -214,11 +215,13 @@ impl<'a> Seq<'a> {
             }
             "CIR" => match command.words.get(place).map(|word| word.to_uppercase()).as_deref() {
                 Some("EDG") => {}
-                Some("OBS" | "HOL") => return Err(command.wrong("obscurations are not supported")),
+                Some("HOL") => return Err(command.wrong("holes are not supported")),
+                Some("OBS") => self.surfaces[surface].obscuration.radius = Some(command.number(place + 1)?),
                 _ => self.surfaces[surface].clear_radius = Some(command.number(place)?),
             },
-            "REX" | "REY" | "ELX" | "ELY" => {
-                return Err(command.wrong("apertures other than circles are not supported"));
+            "REX" | "REY" | "ELX" | "ELY" | "ADX" | "ADY" => self.take_aperture(keyword, surface, command, place)?,
+            "ARO" if command.number(place)? != 0.0 => {
+                return Err(command.wrong("turned apertures are not supported"));
             }
             "XDE" | "YDE" | "ZDE" => {
                 let axis = usize::from(keyword.as_bytes()[0] - b'X');
@@ -258,6 +261,32 @@ impl<'a> Seq<'a> {
                     self.surfaces[surface].coefficients[power] = command.number(place)?;
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Takes half a width of an aperture along x or y, or the place of its middle there; `OBS` before the number makes
+    /// it an obscuration, `EDG` the outer edge, which bounds no light.
+    fn take_aperture(
+        &mut self,
+        keyword: &str,
+        surface: usize,
+        command: &Command,
+        place: usize,
+    ) -> Result<(), TextError> {
+        let axis = usize::from(keyword.ends_with('Y'));
+        let surface = &mut self.surfaces[surface];
+        let (aperture, place) = match command.words.get(place).map(|word| word.to_uppercase()).as_deref() {
+            Some("EDG") => return Ok(()),
+            Some("HOL") => return Err(command.wrong("holes are not supported")),
+            Some("OBS") => (&mut surface.obscuration, place + 1),
+            _ => (&mut surface.opening, place),
+        };
+        let number = command.number(place)?;
+        match &keyword[..2] {
+            "RE" => aperture.rectangle[axis] = Some(number),
+            "EL" => aperture.ellipse[axis] = Some(number),
+            _ => aperture.center[axis] = number,
         }
         Ok(())
     }

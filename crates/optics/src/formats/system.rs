@@ -7,8 +7,8 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    Glass, ImageSurface, Interface, Lens, MonoLens, Move, ObjectPoint, OpticsError, Pose, RayBatch, Rims, Shape,
-    Surface, analysis::PupilCoordinates, glass::D_LINE_NM, prescription::TextError, rays_towards,
+    Aperture, Glass, ImageSurface, Interface, Lens, MonoLens, Move, ObjectPoint, OpticsError, Pose, RayBatch, Rims,
+    Shape, Surface, analysis::PupilCoordinates, glass::D_LINE_NM, prescription::TextError, rays_towards,
 };
 
 use super::lens_file::{Field, LensFile};
@@ -26,6 +26,22 @@ pub(super) struct SystemSurface {
     pub(super) semi_aperture_mm: Option<f64>,
     /// Whether the rim is one that stops light, not merely where the program's rays went.
     pub(super) is_rim_fixed: bool,
+    /// What bounds light beside the rim, of whichever surface.
+    pub(super) apertures: Vec<Aperture>,
+}
+
+impl SystemSurface {
+    /// Returns the surface with an opening, and with a rim that is as wide as the opening and the surface need.
+    pub(super) fn with_aperture(mut self, aperture: Aperture) -> Self {
+        if !aperture.is_obscuration {
+            let reach_mm = aperture.reach_mm();
+            let is_rotational = self.shape.is_rotational();
+            self.semi_aperture_mm = Some(if is_rotational { reach_mm.min(widest_mm(&self)) } else { reach_mm });
+        }
+        self.is_rim_fixed = true;
+        self.apertures.push(aperture);
+        self
+    }
 }
 
 /// A tilt and decentre, with the z along the axis at which it happens: from the file's first surface.
@@ -144,7 +160,8 @@ impl System {
     /// Returns the lens of these surfaces, tilted and decentred as the file says.
     fn lens(&self, interfaces: Vec<Interface>, stop: usize) -> Result<Lens, OpticsError> {
         let n_surfaces = interfaces.len();
-        let lens = Lens::new(self.name.clone(), self.source.clone(), interfaces, stop)?;
+        let (name, source) = (self.name.clone(), self.source.clone());
+        let lens = Lens::new_with_apertures(name, source, interfaces, stop, self.apertures())?;
         let vertices_z_mm = lens.vertices_z_mm();
         let in_lens = |SystemMove { z_mm, step }: &SystemMove| {
             let (first, last) = step.surfaces;
@@ -156,6 +173,14 @@ impl System {
         let moves = self.moves.iter().map(in_lens).collect();
         let lens = lens.with_object_medium(self.object_medium.clone())?;
         lens.with_moves(moves)?.with_image_surface(self.image_surface)
+    }
+
+    /// Returns the apertures of all surfaces, each with the surface's number.
+    fn apertures(&self) -> Vec<Aperture> {
+        let of_surface = |(surface, stated): (usize, &SystemSurface)| {
+            stated.apertures.iter().map(move |&aperture| Aperture { surface, ..aperture }).collect::<Vec<_>>()
+        };
+        self.surfaces.iter().enumerate().flat_map(of_surface).collect()
     }
 
     /// Drops planes at which nothing happens to any ray.
@@ -195,6 +220,7 @@ impl System {
     /// Returns the lens with rims as wide as its surfaces allow where the file states none.
     fn provisional(&self, stop: usize) -> Result<Lens, TextError> {
         let mut interfaces = Vec::with_capacity(self.surfaces.len());
+        let apertures = self.apertures();
         for (i, surface) in self.surfaces.iter().enumerate() {
             let is_last = i + 1 == self.surfaces.len();
             let at_line = |error: OpticsError| TextError { line: Some(surface.line), reason: error.to_string() };
@@ -207,7 +233,7 @@ impl System {
                 medium_after: surface.medium_after.clone(),
                 thickness_after_mm: if is_last { 0.0 } else { surface.thickness_after_mm },
             };
-            interface.surface.check(i).and_then(|()| interface.medium_after.check()).map_err(at_line)?;
+            interface.surface.check(i, &apertures).and_then(|()| interface.medium_after.check()).map_err(at_line)?;
             if !interface.thickness_after_mm.is_finite() {
                 let found = interface.thickness_after_mm;
                 let expected = "a finite number: only the object may be infinitely far";

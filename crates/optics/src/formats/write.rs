@@ -59,6 +59,7 @@ impl LensFile {
             return Err(cannot(FORMAT, surface, "is tilted or decentred"));
         }
         check_air(FORMAT, lens)?;
+        check_round(FORMAT, lens)?;
         let efl_mm = lens.at(wavelength_nm)?.first_order().efl_mm;
         let mut text = format!(
             "# Name: {}\n# Indices at {wavelength_nm} nm. Focal length (mm):\n{efl_mm}\n",
@@ -102,6 +103,7 @@ impl LensFile {
             return Err(cannot(OMNI, lens.interfaces().len(), "(the film) is tilted or decentred"));
         }
         check_air(OMNI, lens)?;
+        check_round(OMNI, lens)?;
         let mut file = json!({
             "name": lens.name(),
             "description": lens.source(),
@@ -130,6 +132,14 @@ fn check_air(format: &'static str, lens: &Lens) -> Result<(), OpticsError> {
 }
 
 /// Returns the first surface that does not stand where its distances alone put it.
+/// Checks that all rims are circles about the axis, as these formats have them.
+fn check_round(format: &'static str, lens: &Lens) -> Result<(), OpticsError> {
+    match lens.apertures().first() {
+        None => Ok(()),
+        Some(aperture) => Err(cannot(format, aperture.surface, "has an aperture beside its round rim")),
+    }
+}
+
 fn first_moved(lens: &Lens) -> Option<usize> {
     lens.poses().iter().zip(lens.vertices_z_mm()).position(|(pose, z_mm)| *pose != Pose::centered(z_mm))
 }

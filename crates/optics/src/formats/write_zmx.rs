@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::{Glass, GlassCatalogue, Lens, OpticsError, Pose, Shape, Surface};
+use crate::{Aperture, Glass, GlassCatalogue, Lens, OpticsError, Outline, Pose, Shape, Surface};
 
 use super::{
     agf::agf_lines,
@@ -116,8 +116,9 @@ impl LensFile {
             let radius_mm = interface.surface.semi_aperture_mm;
             let _ = write!(
                 text,
-                "  DISZ {thickness_mm:e}\r\n{}  DIAM {radius_mm:e} 1\r\n  CLAP 0 {radius_mm:e} 0\r\n",
-                glasses[i + 1]
+                "  DISZ {thickness_mm:e}\r\n{}  DIAM {radius_mm:e} 1\r\n{}",
+                glasses[i + 1],
+                zmx_aperture(lens, i)?
             );
             gaps[i + 1].write_break(&mut text, &mut n_written);
         }
@@ -195,6 +196,33 @@ impl LensFile {
             let _ = write!(text, "PWAV {}\r\n", reference + 1);
         }
     }
+}
+
+/// Returns the lines of what bounds light at a surface, of which the format has one aperture a surface.
+fn zmx_aperture(lens: &Lens, surface: usize) -> Result<String, OpticsError> {
+    let rim_mm = lens.interfaces()[surface].surface.semi_aperture_mm;
+    let apertures: Vec<&Aperture> = lens.apertures_of(surface).collect();
+    let &[aperture] = apertures.as_slice() else {
+        if apertures.is_empty() {
+            return Ok(format!("  CLAP 0 {rim_mm:e} 0\r\n"));
+        }
+        return Err(cannot("a .zmx file", surface, "has several apertures"));
+    };
+    let [x_mm, y_mm] = aperture.center_mm;
+    let lines = match (aperture.outline, aperture.is_obscuration) {
+        (Outline::Circle { radius_mm }, true) if aperture.center_mm == [0.0; 2] => {
+            return Ok(format!("  CLAP {radius_mm:e} {rim_mm:e} 0\r\n"));
+        }
+        (_, true) => return Err(cannot("a .zmx file", surface, "has an obscuration that is no circle about the axis")),
+        // The format has no rim beside the opening.
+        _ if aperture.reach_mm() > rim_mm * (1.0 + 1e-12) => {
+            return Err(cannot("a .zmx file", surface, "has an opening that reaches beyond its rim"));
+        }
+        (Outline::Circle { radius_mm }, false) => format!("  CLAP 0 {radius_mm:e} 0\r\n"),
+        (Outline::Ellipse { half_x_mm, half_y_mm }, false) => format!("  ELAP {half_x_mm:e} {half_y_mm:e} 0\r\n"),
+        (Outline::Rectangle { half_x_mm, half_y_mm }, false) => format!("  SQAP {half_x_mm:e} {half_y_mm:e} 0\r\n"),
+    };
+    Ok(format!("{lines}  OBDC {x_mm:e} {y_mm:e}\r\n"))
 }
 
 /// Returns the name of a glass of the lens's own.

@@ -8,6 +8,7 @@ use super::{
     kernel::{Conic, Sphere, ThinLens, TwoCurvatures, Window, pass_blocks},
     real::Real,
 };
+use crate::Aperture;
 
 /// What to trace: surfaces, and where they lie.
 #[derive(Clone, Debug)]
@@ -29,6 +30,22 @@ pub(super) struct Pass<T> {
     pub(super) vertex_z: T,
     pub(super) semi_aperture: T,
     pub(super) interface: Interface<T>,
+    pub(super) apertures: Vec<Aperture>,
+    /// Whether rims end rays.
+    pub(super) rims: Rims,
+}
+
+impl<T: Real> Pass<T> {
+    /// Whether there is more to end rays than the round rim.
+    pub(super) fn is_clipped_further(&self) -> bool {
+        self.rims == Rims::Clip && !self.apertures.is_empty()
+    }
+
+    /// Whether a ray that meets the surface here is inside its rim and its apertures.
+    pub(super) fn is_within(&self, x: T, y: T) -> bool {
+        let is_clear = |aperture: &Aperture| aperture.is_clear_at(x.to_f64(), y.to_f64());
+        self.interface.is_within(x, y) && (!self.is_clipped_further() || self.apertures.iter().all(is_clear))
+    }
 }
 
 /// The forms of surfaces; aspheres are sorted by how many powers they have, and boxed so that a plan stays short.
@@ -170,6 +187,8 @@ impl<T: Real> Plan<T> {
                 vertex_z: T::of(step.vertex_z),
                 semi_aperture: T::of(step.semi_aperture),
                 interface,
+                apertures: step.apertures.clone(),
+                rims,
             }
         };
         Self {

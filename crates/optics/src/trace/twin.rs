@@ -17,10 +17,14 @@ pub(super) fn trace_one<T: Real>(plan: &Plan<T>, ray: &Ray<T>) -> (Ray<T>, RayFa
     from.alive = [T::YES];
     approach_lanes(plan.index_before, &mut from);
     let mut to = from;
-    for (surface, Pass { form, shift, vertex_z, interface, .. }) in plan.passes.iter().enumerate() {
+    for (surface, pass) in plan.passes.iter().enumerate() {
+        let Pass { form, shift, vertex_z, .. } = pass;
         form.pass(*shift, &from, &mut to);
+        if pass.is_clipped_further() && !pass.is_within(to.ray(0, T::ZERO).x, to.ray(0, T::ZERO).y) {
+            to.alive = [T::NO];
+        }
         if to.alive == [T::NO] {
-            let (fate, ended) = fate_of(surface as u16, interface, &from.ray(0, *shift), (&to, 0));
+            let (fate, ended) = fate_of(surface as u16, pass, &from.ray(0, *shift), (&to, 0));
             return (Ray { z: ended.z + *vertex_z, ..ended }, fate);
         }
         from = to;

@@ -73,6 +73,12 @@ impl Command {
         }
     }
 
+    /// Returns the command without the labels of apertures, as `L'A'`.
+    pub(super) fn without_labels(&self) -> Self {
+        let is_label = |word: &str| word.strip_prefix(['L', 'l']).is_some_and(|rest| rest.starts_with(['\'', '"']));
+        Self { line: self.line, words: self.words.iter().filter(|word| !is_label(word)).cloned().collect() }
+    }
+
     /// Returns a distance, which may be infinite.
     pub(super) fn distance(&self, place: usize) -> Result<f64, TextError> {
         match self.words.get(place).map(|word| word.to_uppercase()).as_deref() {

@@ -1,6 +1,6 @@
 //! A surface of a CODE V file.
 
-use crate::{Glass, Move, Shape, prescription::TextError};
+use crate::{Aperture, Glass, Move, Outline, Shape, prescription::TextError};
 
 use super::super::{
     shapes::{even_asphere, up_to_last},
@@ -19,6 +19,8 @@ pub(super) struct SeqSurface {
     /// From r⁴ on.
     pub(super) coefficients: [f64; 9],
     pub(super) clear_radius: Option<f64>,
+    pub(super) opening: SeqOpening,
+    pub(super) obscuration: SeqOpening,
     /// What differs along x, where something does.
     pub(super) kind: SeqKind,
     pub(super) curvature_x: f64,
@@ -29,6 +31,30 @@ pub(super) struct SeqSurface {
     pub(super) tilt_deg: [f64; 3],
     /// Whether the axis is back in its place behind the surface (DAR).
     pub(super) is_returned: bool,
+}
+
+/// An opening or obscuration that is no round rim, in the file's units.
+#[derive(Clone, Copy, Default)]
+pub(super) struct SeqOpening {
+    /// CIR, where it obscures.
+    pub(super) radius: Option<f64>,
+    /// REX, REY.
+    pub(super) rectangle: [Option<f64>; 2],
+    /// ELX, ELY.
+    pub(super) ellipse: [Option<f64>; 2],
+    /// ADX, ADY.
+    pub(super) center: [f64; 2],
+}
+
+impl SeqOpening {
+    /// Returns its shapes.
+    fn outlines(&self, mm: f64) -> impl Iterator<Item = Outline> {
+        let pair = |[x, y]: [Option<f64>; 2]| Some((x.or(y)? * mm, y.or(x)? * mm));
+        let circle = self.radius.map(|radius| Outline::Circle { radius_mm: radius * mm });
+        let rectangle = pair(self.rectangle).map(|(half_x_mm, half_y_mm)| Outline::Rectangle { half_x_mm, half_y_mm });
+        let ellipse = pair(self.ellipse).map(|(half_x_mm, half_y_mm)| Outline::Ellipse { half_x_mm, half_y_mm });
+        [circle, rectangle, ellipse].into_iter().flatten()
+    }
 }
 
 /// The kinds of surface that CODE V tells apart by a command of their own.
@@ -75,7 +101,7 @@ impl SeqSurface {
                 return Err(TextError { line: Some(self.line), reason });
             }
         };
-        Ok(SystemSurface {
+        let surface = SystemSurface {
             line: self.line,
             curvature_per_mm: self.curvature / mm,
             shape,
@@ -83,6 +109,24 @@ impl SeqSurface {
             thickness_after_mm: self.thickness * mm,
             semi_aperture_mm: self.clear_radius.map(|radius| radius * mm),
             is_rim_fixed: self.clear_radius.is_some(),
-        })
+            apertures: Vec::new(),
+        };
+        Ok(self.with_apertures(mm, surface))
+    }
+
+    /// Returns the surface with the openings and obscurations that the file states for it.
+    fn with_apertures(&self, mm: f64, mut surface: SystemSurface) -> SystemSurface {
+        let mut opening = self.opening;
+        // A circle off the axis is an opening; one about the axis is the rim.
+        if opening.center != [0.0; 2] {
+            opening.radius = self.clear_radius;
+        }
+        for (stated, is_obscuration) in [(opening, false), (self.obscuration, true)] {
+            let center_mm = stated.center.map(|place| place * mm);
+            for outline in stated.outlines(mm) {
+                surface = surface.with_aperture(Aperture { surface: 0, outline, center_mm, is_obscuration });
+            }
+        }
+        surface
     }
 }

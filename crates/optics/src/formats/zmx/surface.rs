@@ -1,6 +1,6 @@
 //! A surface of a Zemax file.
 
-use crate::{Glass, Move, Shape, prescription::TextError};
+use crate::{Aperture, Glass, Move, Outline, Shape, prescription::TextError};
 
 use super::super::{
     glasses::{Glasses, model},
@@ -23,7 +23,9 @@ pub(super) struct ZmxSurface {
     semi_diameter: Option<f64>,
     is_semi_diameter_fixed: bool,
     has_extra_data: bool,
-    clear_radius: Option<f64>,
+    /// Keyword and the two numbers behind it.
+    aperture: Option<(String, [f64; 2])>,
+    aperture_center: [f64; 2],
     pub(super) glass: Option<ZmxGlass>,
     /// Keywords of the solves and pickups by which the program would find some of the numbers anew.
     pub(super) solves: Vec<String>,
@@ -35,14 +37,9 @@ pub(super) struct ZmxGlass {
     nd_vd: Option<(f64, f64)>,
 }
 
-/// Keywords of apertures that are no circles around the axis.
-const OTHER_APERTURES: [(&str, &str); 9] = [
-    ("OBSC", "a central obscuration"),
+/// Keywords of apertures that are not read.
+const OTHER_APERTURES: [(&str, &str); 4] = [
     ("SPID", "a spider"),
-    ("SQAP", "a rectangular aperture"),
-    ("SQOB", "a rectangular obscuration"),
-    ("ELAP", "an elliptical aperture"),
-    ("ELOB", "an elliptical obscuration"),
     ("USAP", "a user-defined aperture"),
     ("USOB", "a user-defined obscuration"),
     ("UDAP", "a user-defined aperture"),
@@ -83,17 +80,18 @@ impl ZmxSurface {
                 self.semi_diameter = (semi_diameter > 0.0).then_some(semi_diameter);
                 self.is_semi_diameter_fixed = line.number_or(1, 0.0)? == 1.0;
             }
-            "CLAP" => {
-                if line.number(0)? > 0.0 {
-                    return Err(line.wrong("an aperture with a hole is not supported"));
+            "CLAP" | "OBSC" | "ELAP" | "ELOB" | "SQAP" | "SQOB" => {
+                let numbers = [line.number(0)?, line.number(1)?];
+                if line.keyword == "OBSC" && numbers[0] > 0.0 {
+                    return Err(line.wrong("an obscuration with a hole is not supported"));
                 }
-                self.clear_radius = Some(line.number(1)?);
+                self.aperture = Some((line.keyword.to_owned(), numbers));
             }
-            "XDAT" => self.has_extra_data |= line.number_or(1, 0.0)? != 0.0,
+            // The first of the extra data is how many terms there are.
+            "XDAT" if line.count(0)? == 1 => self.has_extra_data = line.number_or(1, 0.0)? != 0.0,
+            "XDAT" => {}
             "FLAP" => self.is_semi_diameter_fixed = true,
-            "OBDC" if line.number_or(0, 0.0)? != 0.0 || line.number_or(1, 0.0)? != 0.0 => {
-                return Err(line.wrong("a decentred aperture is not supported"));
-            }
+            "OBDC" => self.aperture_center = [line.number_or(0, 0.0)?, line.number_or(1, 0.0)?],
             "GLAS" => {
                 let name = line.words.first().copied().unwrap_or_default().to_owned();
                 let (nd, vd) = (line.number_or(3, 0.0)?, line.number_or(4, 0.0)?);
@@ -160,16 +158,41 @@ impl ZmxSurface {
             }
         };
         let medium_after = self.medium(number, glasses, notes)?;
-        let semi_aperture = self.clear_radius.or(self.semi_diameter);
-        Ok(SystemSurface {
+        let surface = SystemSurface {
             line: self.line,
             curvature_per_mm,
             shape,
             medium_after,
             thickness_after_mm: self.thickness * mm,
-            semi_aperture_mm: semi_aperture.map(|semi_aperture| semi_aperture * mm),
-            is_rim_fixed: semi_aperture.is_some() && (self.clear_radius.is_some() || self.is_semi_diameter_fixed),
-        })
+            semi_aperture_mm: self.semi_diameter.map(|semi_diameter| semi_diameter * mm),
+            is_rim_fixed: self.semi_diameter.is_some() && self.is_semi_diameter_fixed,
+            apertures: Vec::new(),
+        };
+        Ok(self.with_apertures(mm, surface))
+    }
+
+    /// Returns the surface with the aperture that the file states for it.
+    fn with_apertures(&self, mm: f64, surface: SystemSurface) -> SystemSurface {
+        let Some((keyword, [first, second])) = &self.aperture else { return surface };
+        let center_mm = self.aperture_center.map(|place| place * mm);
+        let of = |outline, is_obscuration| Aperture { surface: 0, outline, center_mm, is_obscuration };
+        let circle = |radius: f64| Outline::Circle { radius_mm: radius * mm };
+        let (half_x_mm, half_y_mm) = (first * mm, second * mm);
+        match keyword.as_str() {
+            // A round rim about the axis.
+            "CLAP" if *first == 0.0 && center_mm == [0.0; 2] => {
+                SystemSurface { semi_aperture_mm: Some(second * mm), is_rim_fixed: true, ..surface }
+            }
+            "CLAP" if *first == 0.0 => surface.with_aperture(of(circle(*second), false)),
+            "CLAP" if center_mm == [0.0; 2] => {
+                let ring = SystemSurface { semi_aperture_mm: Some(second * mm), ..surface };
+                ring.with_aperture(of(circle(*first), true))
+            }
+            "CLAP" => surface.with_aperture(of(circle(*second), false)).with_aperture(of(circle(*first), true)),
+            "OBSC" => surface.with_aperture(of(circle(*second), true)),
+            "ELAP" | "ELOB" => surface.with_aperture(of(Outline::Ellipse { half_x_mm, half_y_mm }, keyword == "ELOB")),
+            _ => surface.with_aperture(of(Outline::Rectangle { half_x_mm, half_y_mm }, keyword == "SQOB")),
+        }
     }
 
     /// Returns the move of everything from this coordinate break to the film, whose next surface is `first`.

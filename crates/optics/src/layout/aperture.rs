@@ -1,0 +1,56 @@
+//! How far drawn surfaces reach, and what stands before them.
+
+use std::fmt::Write as _;
+
+use glam::{DVec2, DVec3};
+
+use super::frame::Frame;
+use crate::{Lens, Pose, Surface};
+
+/// Returns how far a surface reaches down and up in the y–z plane, mm: its rim, or within it its openings.
+pub(super) fn extent_mm(lens: &Lens, surface: usize) -> [f64; 2] {
+    let rim = round_mm(&lens.interfaces()[surface].surface);
+    let openings = lens.apertures_of(surface).filter(|aperture| !aperture.is_obscuration);
+    openings.fold(rim, |[low, high], aperture| {
+        let (middle, half) = (aperture.center_mm[1], aperture.outline.half_widths_mm().y);
+        let (inner_low, inner_high) = (low.max(middle - half), high.min(middle + half));
+        if inner_low < inner_high { [inner_low, inner_high] } else { [low, high] }
+    })
+}
+
+/// Returns how far a round rim reaches down and up, mm.
+pub(super) fn round_mm(surface: &Surface) -> [f64; 2] {
+    [-surface.semi_aperture_mm, surface.semi_aperture_mm]
+}
+
+/// Returns the points of a surface from its lower end to its upper one.
+pub(super) fn outline(surface: &Surface, pose: &Pose, [low_mm, high_mm]: [f64; 2]) -> Vec<DVec2> {
+    const N: i32 = 32;
+    let at = |i: i32| {
+        // Denser towards the ends, which may lie on the equator to rounding.
+        let share = (std::f64::consts::FRAC_PI_2 * f64::from(i) / f64::from(N)).sin();
+        let y = 0.5 * (low_mm + high_mm) + 0.5 * (high_mm - low_mm) * share;
+        let sag_mm = surface.sag_mm(y.abs() * (1.0 - 1e-12));
+        let point = pose.to_lens(DVec3::new(0.0, y, if sag_mm.is_finite() { sag_mm } else { 0.0 }));
+        DVec2::new(point.z, point.y)
+    };
+    if surface.curvature_per_mm == 0.0 && surface.sag_mm(high_mm.abs()) == 0.0 {
+        return vec![at(-N), at(N)];
+    }
+    (-N..=N).map(at).collect()
+}
+
+/// Draws what stands before surfaces.
+pub(super) fn obscurations(lens: &Lens, frame: &Frame, svg: &mut String) {
+    let poses = lens.poses();
+    for aperture in lens.apertures().iter().filter(|aperture| aperture.is_obscuration) {
+        let (middle, half) = (aperture.center_mm[1], aperture.outline.half_widths_mm().y);
+        let surface = &lens.interfaces()[aperture.surface].surface;
+        let [low, high] = round_mm(surface);
+        let ends = [low.max(middle - half), high.min(middle + half)];
+        if ends[0] < ends[1] {
+            let path = frame.path(outline(surface, &poses[aperture.surface], ends));
+            let _ = writeln!(svg, "<path d=\"{path}\" fill=\"none\" stroke=\"#111\" stroke-width=\"3.5\"/>");
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Openings and obscurations that are no round rims: what they stop, and how files say so.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::{f64::consts::PI, path::Path};
+
+use dioptric_optics::{
+    Aperture, Glass, Interface, Layout, Lens, LensFile, Move, ObjectPoint, OpticsError, Outline, PupilBoundary,
+    RayBatch, RayBatchF32, RayFate, ReadOptions, Rims, Shape, Surface,
+    glam::{DVec2, DVec3},
+};
+
+const OPENING: Aperture = Aperture {
+    surface: 1,
+    outline: Outline::Rectangle { half_x_mm: 3.0, half_y_mm: 1.5 },
+    center_mm: [0.5, -1.0],
+    is_obscuration: false,
+};
+
+fn interfaces() -> Vec<Interface> {
+    let glass = Glass::Constant { index: 1.5 };
+    let row = |surface, medium_after, thickness_after_mm| Interface { surface, medium_after, thickness_after_mm };
+    vec![
+        row(Surface::sphere(50.0, 8.0), glass, 3.0),
+        row(Surface::plane(6.0), Glass::Air, 1.0),
+        row(Surface::plane(5.0), Glass::Air, 0.0),
+    ]
+}
+
+fn with(apertures: &[Aperture]) -> Lens {
+    Lens::new_with_apertures("open", "test", interfaces(), 2, apertures.to_vec()).unwrap()
+}
+
+/// Rays along z over a square.
+fn rays() -> RayBatch {
+    let place = |i: usize| DVec3::new(0.14 * (i % 91) as f64 - 6.3, 0.14 * (i / 91) as f64 - 6.3, -5.0);
+    let points: Vec<DVec3> = (0..91 * 91).map(place).collect();
+    RayBatch::from_points(&points, &vec![DVec3::Z; points.len()])
+}
+
+#[test]
+fn rays_end_at_the_surface_whose_apertures_stop_them_and_others_are_untouched() {
+    let ellipse = Outline::Ellipse { half_x_mm: 2.0, half_y_mm: 4.0 };
+    let hole =
+        Aperture { surface: 1, outline: Outline::Circle { radius_mm: 1.2 }, center_mm: [0.0; 2], is_obscuration: true };
+    for apertures in [vec![OPENING], vec![Aperture { outline: ellipse, ..OPENING }, hole], vec![hole]] {
+        let (bare, lens) = (with(&[]).at(550.0).unwrap(), with(&apertures).at(550.0).unwrap());
+        let (mut expected, mut found) = (rays(), rays());
+        bare.trace(&mut expected, Rims::Clip);
+        lens.trace(&mut found, Rims::Clip);
+        let mut at_opening = rays();
+        bare.trace_surfaces(0..2, &mut at_opening, Rims::Clip);
+        let mut n_stopped = 0;
+        for i in 0..found.len() {
+            let place = at_opening.point_mm(i);
+            let is_there = at_opening.fate[i].is_in_flight();
+            if is_there && !apertures.iter().all(|aperture| aperture.is_clear_at(place.x, place.y)) {
+                assert_eq!(found.fate[i], RayFate::Vignetted { surface: 1 });
+                assert_eq!(found.point_mm(i), place);
+                n_stopped += 1;
+            } else {
+                assert_eq!((found.fate[i], found.point_mm(i)), (expected.fate[i], expected.point_mm(i)));
+                assert_eq!(found.direction(i), expected.direction(i));
+            }
+        }
+        assert!(n_stopped > 100 && found.n_in_flight() > 100);
+        // On any number of threads, in single precision, and without rims.
+        let mut shared = rays();
+        lens.trace_parallel(&mut shared, Rims::Clip);
+        assert_eq!((&shared.fate, &shared.x_mm), (&found.fate, &found.x_mm));
+        let (mut single, mut open) = (RayBatchF32::from(&rays()), rays());
+        lens.trace_to_film_f32(&mut single, Rims::Clip, 90.0);
+        let differ = (0..found.len()).filter(|&i| single.fate[i] != found.fate[i]).count();
+        assert!(differ <= 4, "{differ} rays within rounding of an edge");
+        lens.trace(&mut open, Rims::Ignore);
+        assert_eq!(open.n_in_flight(), open.len());
+    }
+}
+
+#[test]
+fn apertures_move_with_their_surface() {
+    let shift =
+        Move { surfaces: (1, 1), pivot_mm: 0.0, decenter_mm: [0.7, 0.3, 0.0], tilt_deg: [0.0; 3], tilt_first: false };
+    let moved = with(&[OPENING]).with_moves(vec![shift]).unwrap().at(550.0).unwrap();
+    let [x, y] = OPENING.center_mm;
+    let still = with(&[Aperture { center_mm: [x + 0.7, y + 0.3], ..OPENING }]).at(550.0).unwrap();
+    let (mut one, mut other) = (rays(), rays());
+    moved.trace_surfaces(0..2, &mut one, Rims::Clip);
+    still.trace_surfaces(0..2, &mut other, Rims::Clip);
+    // The round rim of 6 mm moves too, which no ray of the opening sees.
+    let passes = |rays: &RayBatch| rays.fate.iter().map(|fate| fate.is_in_flight()).collect::<Vec<_>>();
+    assert_eq!(passes(&one), passes(&other));
+}
+
+#[test]
+fn pupil_has_the_area_of_the_opening() {
+    let plate = vec![Interface { surface: Surface::plane(6.0), medium_after: Glass::Air, thickness_after_mm: 0.0 }];
+    let area_mm2 = |outline| {
+        let opening = Aperture { surface: 0, outline, center_mm: [0.3, -0.2], is_obscuration: false };
+        let lens =
+            Lens::new_with_apertures("plate", "test", plate.clone(), 0, vec![opening]).unwrap().at(550.0).unwrap();
+        let point = ObjectPoint::from_field(&lens, DVec2::ZERO, 0.0);
+        PupilBoundary::find(&lens, &point, 1440).unwrap().area_mm2()
+    };
+    let (half_x_mm, half_y_mm) = (3.0, 1.5);
+    // Straight sides between 1440 places of an edge with corners: a part in 1e4.
+    assert!((area_mm2(Outline::Rectangle { half_x_mm, half_y_mm }) / 18.0 - 1.0).abs() < 3e-4);
+    assert!((area_mm2(Outline::Ellipse { half_x_mm, half_y_mm }) / (4.5 * PI) - 1.0).abs() < 3e-4);
+}
+
+#[test]
+fn lens_with_apertures_has_no_symmetry_and_comes_back_from_its_own_file() {
+    let lens = with(&[OPENING, Aperture { surface: 2, is_obscuration: true, ..OPENING }]);
+    assert!(!lens.is_rotational() && !lens.at(550.0).unwrap().is_rotational());
+    let read = |text: &str| LensFile::from_bytes(Path::new("a.ron"), text.as_bytes(), &ReadOptions::default());
+    assert_eq!(read(&lens.to_ron()).unwrap().lens, lens);
+    let wrong = lens.to_ron().replace("half_x_mm: 3.0", "half_x_mm: -3.0");
+    let message = read(&wrong).unwrap_err().to_string();
+    assert!(message.contains("surface 1: half the width of an aperture is -3, expected a number above 0"), "{message}");
+    let message = read(&lens.to_ron().replace("surface: 2", "surface: 7")).unwrap_err().to_string();
+    assert!(message.contains("surface of an aperture is 7"), "{message}");
+    for path in ["a.dat", "a.json"] {
+        let file = LensFile::from(with(&[OPENING]));
+        let refused = if path == "a.dat" { file.to_dat() } else { file.to_omni_json() };
+        let message = refused.unwrap_err().to_string();
+        assert!(message.contains("surface 1 has an aperture beside its round rim"), "{message}");
+    }
+}
+
+#[test]
+fn opening_may_be_longer_than_a_cylinder_is_wide() {
+    let bar = |half_x_mm: f64, half_y_mm: f64| {
+        let shape = Shape::Toroid { curvature_x_per_mm: 0.0, conic: 0.0, coefficients: Vec::new() };
+        let surface = Surface { shape, ..Surface::sphere(5.0, half_x_mm.hypot(half_y_mm)) };
+        let row = Interface { surface, medium_after: Glass::Air, thickness_after_mm: 0.0 };
+        let outline = Outline::Rectangle { half_x_mm, half_y_mm };
+        let opening = Aperture { surface: 0, outline, center_mm: [0.0; 2], is_obscuration: false };
+        Lens::new_with_apertures("bar", "test", vec![row], 0, vec![opening]).map(|_| ())
+    };
+    assert_eq!(bar(20.0, 5.0), Ok(()));
+    assert!(matches!(bar(20.0, 5.1), Err(OpticsError::RimBeyondSurface { surface: 0, .. })));
+}
+
+const ZMX: &str =
+    "MODE SEQ\nUNIT MM X W X CM MR CPMM\nENPD 10\nFTYP 0 0 1 1 0 0 0\nXFLN 0\nYFLN 0\nPWAV 1\nWAVM 1 0.55 1
+SURF 0\n  DISZ INFINITY\nSURF 1\n  STOP\n  CURV 0.02\n  DISZ 5\n  DIAM 6\nHERE\nSURF 2\n  DISZ 0\n";
+
+#[test]
+fn zemax_apertures_are_read_and_written() {
+    let read = |text: &str| LensFile::from_bytes(Path::new("a.zmx"), text.as_bytes(), &ReadOptions::default()).unwrap();
+    let circle = |radius_mm| Outline::Circle { radius_mm };
+    let (half_x_mm, half_y_mm) = (2.0, 3.0);
+    for (lines, expected) in [
+        ("CLAP 0 12.5 0", vec![]),
+        ("CLAP 1.5 12.5 0", vec![(circle(1.5), [0.0; 2], true)]),
+        ("CLAP 1.5 12.5 0\n  OBDC 2 -3", vec![(circle(12.5), [2.0, -3.0], false), (circle(1.5), [2.0, -3.0], true)]),
+        ("OBSC 0 1", vec![(circle(1.0), [0.0; 2], true)]),
+        ("SQAP 2 3 0", vec![(Outline::Rectangle { half_x_mm, half_y_mm }, [0.0; 2], false)]),
+        ("ELAP 2 3 0\n  OBDC 1 0", vec![(Outline::Ellipse { half_x_mm, half_y_mm }, [1.0, 0.0], false)]),
+        ("SQOB 2 3 0", vec![(Outline::Rectangle { half_x_mm, half_y_mm }, [0.0; 2], true)]),
+    ] {
+        let file = read(&ZMX.replace("HERE", lines));
+        let of = |&(outline, center_mm, is_obscuration)| Aperture { surface: 0, outline, center_mm, is_obscuration };
+        assert_eq!(file.lens.apertures(), expected.iter().map(of).collect::<Vec<_>>(), "{lines}");
+        // The stated pupil decides how wide the stop is.
+        assert!((file.lens.stop_semi_aperture_mm() - 5.0).abs() < 1e-12);
+        match expected.as_slice() {
+            [] | [(Outline::Circle { .. }, _, true)] => {
+                assert_eq!(read(&file.to_zmx().unwrap()).lens.apertures(), file.lens.apertures())
+            }
+            [(Outline::Rectangle { .. }, _, false)] => {
+                assert_eq!(read(&file.to_zmx().unwrap()).lens.apertures(), file.lens.apertures());
+            }
+            _ => {}
+        }
+    }
+    let inches = read(&ZMX.replace("UNIT MM", "UNIT IN").replace("HERE", "SQAP 2 3 0\n  OBDC 1 0"));
+    assert_eq!(inches.lens.apertures()[0].outline.half_widths_mm(), DVec2::new(50.8, 3.0 * 25.4));
+    assert_eq!(inches.lens.apertures()[0].center_mm, [25.4, 0.0]);
+}
+
+#[test]
+fn code_v_apertures_are_read() {
+    let text = "RDM\nDIM M\nEPD 4\nWL 550\nSO 0 1e11\nS 50 3 1.5\nSTO\nREX 2\nREY 3\nADY -1\nCIR OBS L'A' 0.5\n\
+        S -50 40\nELX S2 3; ELY S2 2\nCIR S2 EDG 9\nSI 0 0\n";
+    let lens = LensFile::from_bytes(Path::new("a.seq"), text.as_bytes(), &ReadOptions::default()).unwrap().lens;
+    let of = |surface, outline, center_mm, is_obscuration| Aperture { surface, outline, center_mm, is_obscuration };
+    let expected = [
+        of(0, Outline::Rectangle { half_x_mm: 2.0, half_y_mm: 3.0 }, [0.0, -1.0], false),
+        of(0, Outline::Circle { radius_mm: 0.5 }, [0.0; 2], true),
+        of(1, Outline::Ellipse { half_x_mm: 3.0, half_y_mm: 2.0 }, [0.0; 2], false),
+    ];
+    assert_eq!(lens.apertures(), expected);
+}
+
+#[test]
+fn drawing_shows_openings_and_obscurations() {
+    let layout = Layout {
+        film_mm: 90.0,
+        object_distance_mm: f64::INFINITY,
+        field_tans: vec![0.0],
+        wavelengths_nm: vec![550.0],
+        n_rays: 3,
+        width_px: 900.0,
+    };
+    let hole = Aperture { outline: Outline::Circle { radius_mm: 1.0 }, is_obscuration: true, ..OPENING };
+    let (bare, drawn) = (with(&[]).draw(&layout).unwrap(), with(&[hole]).draw(&layout).unwrap());
+    assert_eq!((bare.matches("3.5\"").count(), drawn.matches("3.5\"").count()), (0, 1));
+    assert_ne!(with(&[OPENING]).draw(&layout).unwrap(), bare);
+}
