@@ -4,7 +4,8 @@ use std::{fmt::Write, fs};
 
 use anyhow::Context;
 use dioptric_pipeline::{
-    AnalysisFilm, AnalysisRequest, LensAnalysis, Staged, StopChoice, open_lens, parse_numbers, svg_to_png,
+    AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, PipelineError, Staged,
+    StopChoice, open_lens, parse_numbers, parse_pairs, svg_to_png,
 };
 
 use crate::{
@@ -19,7 +20,7 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
     let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
     let lens = arguments.f_number.map_or(StopChoice::AsGiven, StopChoice::FNumber).apply(lens)?;
     let request = AnalysisRequest {
-        fields_deg: arguments.fields_deg.as_ref().map(|list| parse_numbers("--fields-deg", list)).transpose()?,
+        fields: fields(arguments)?,
         wavelengths_nm: parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?,
         distance_mm: arguments.distance_mm,
         film: match (arguments.film_mm, arguments.focus_mm) {
@@ -39,35 +40,71 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
         let cannot = || format!("cannot write {}", path.display());
         let json = serde_json::to_string_pretty(&analysis)? + "\n";
         fs::write(staged.path().join("analysis.json"), json).with_context(cannot)?;
-        for (name, svg) in [("analysis", analysis.page_svg()), ("spots", analysis.spots_svg())] {
+        for (name, svg) in [
+            ("analysis", analysis.page_svg()),
+            ("spots", analysis.spots_svg()),
+            ("opd", analysis.opd_svg()),
+            ("distortion", analysis.grid_svg()),
+        ] {
             let png = svg_to_png(&svg, PNG_SCALE)?;
             fs::write(staged.path().join(format!("{name}.svg")), svg).with_context(cannot)?;
             fs::write(staged.path().join(format!("{name}.png")), png).with_context(cannot)?;
         }
+        fs::write(staged.path().join("analysis.html"), analysis.html(&tables(&analysis)?)).with_context(cannot)?;
         staged.commit()?;
         remark(
             common.quiet,
-            &format!("wrote analysis.json, and analysis and spots as .svg and .png, in {}", path.display()),
+            &format!(
+                "wrote analysis.json, analysis.html, and analysis, spots, opd and distortion as .svg and .png, in {}",
+                path.display()
+            ),
         );
     }
     if common.json { print_json(&analysis) } else { print(&tables(&analysis)?) }
 }
 
+/// Returns the fields that are asked for.
+fn fields(arguments: &LensAnalyzeArgs) -> Result<AnalysisFields, PipelineError> {
+    Ok(match (&arguments.fields_deg, &arguments.fields_mm) {
+        (Some(list), _) => AnalysisFields::AnglesDeg(parse_pairs("--fields-deg", list)?),
+        (None, Some(list)) => AnalysisFields::HeightsMm(parse_pairs("--fields-mm", list)?),
+        (None, None) => AnalysisFields::ByLight,
+    })
+}
+
 fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
     let LensAnalysis { lens, efl_mm, f_number, film_mm, focus, .. } = analysis;
     let mut text =
-        format!("{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}, film {film_mm:.4} mm behind the last vertex\n\n");
+        format!("{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}, film {film_mm:.4} mm behind the last vertex\n");
+    if let Some(x) = analysis.x_plane {
+        writeln!(text, "along x: f = {:.4} mm, f/{:.3}", x.efl_mm, x.f_number)?;
+    }
+    if let Some(radius_mm) = analysis.film_radius_mm {
+        writeln!(text, "the film is curved by a radius of {radius_mm:.4} mm")?;
+    }
+    if let Some(aperture) = analysis.object_na {
+        let image = cell(analysis.image_na, 4);
+        writeln!(text, "NA {aperture:.4} at the object in n = {:.5}, {image} at the image", analysis.object_index)?;
+    }
+    for note in &analysis.notes {
+        writeln!(text, "note: {note}")?;
+    }
+    text += "\n";
     for (what, place, size, unit) in [
         ("paraxial image", focus.paraxial_film_mm, None, ""),
+        ("paraxial image along x", focus.paraxial_x_film_mm, None, ""),
         ("least spot on the axis", focus.axis_film_mm, focus.axis_rms_um, "µm rms"),
         ("least spots of all fields", focus.fields_film_mm, focus.fields_rms_um, "µm rms"),
         ("least wavefront on the axis", focus.wavefront_film_mm, focus.wavefront_rms_waves, "waves rms"),
     ] {
+        if place.is_none() && what.ends_with("along x") {
+            continue;
+        }
         let size = size.map_or(String::new(), |size| format!("  {size:.4} {unit}"));
         writeln!(text, "{what:<28} film {:>10} mm{size}", cell(place, 4))?;
     }
     let header = [
-        "field °",
+        "field",
         "λ nm",
         "height mm",
         "rms µm",
@@ -84,7 +121,7 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
     for spot in &analysis.spots {
         let wavefront = spot.wavefront.as_ref();
         text += &line(&[
-            format!("{:.3}", spot.field_deg),
+            field_cell(&spot.place),
             format!("{:.2}", spot.wavelength_nm),
             cell(spot.height_mm, 4),
             cell(spot.rms_um, 3),
@@ -98,18 +135,7 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
         ]);
     }
     text += "\n";
-    text += &line(&["field °", "height mm", "f tan θ %", "f θ %", "sag. mm", "tan. mm", "light"].map(str::to_owned));
-    for row in &analysis.fields {
-        text += &line(&[
-            format!("{:.3}", row.field_deg),
-            cell(row.height_mm, 4),
-            cell(row.distortion_tangent_percent, 4),
-            cell(row.distortion_angle_percent, 4),
-            cell(row.sagittal_focus_mm, 4),
-            cell(row.tangential_focus_mm, 4),
-            cell(row.relative_illumination, 4),
-        ]);
-    }
+    text += &field_table(analysis);
     text += "\n";
     text += &line(&["λ nm", "axial mm", "by spot mm"].map(str::to_owned));
     for row in &analysis.axial_color {
@@ -120,6 +146,38 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
         ]);
     }
     Ok(text)
+}
+
+fn field_table(analysis: &LensAnalysis) -> String {
+    let is_round = analysis.x_plane.is_none();
+    let (first, second) = if is_round { ("sag. mm", "tan. mm") } else { ("x foc. mm", "y foc. mm") };
+    let header = ["field", "height mm", "f tan θ %", "f θ %", first, second, "light"];
+    let mut text = line(&header.map(str::to_owned));
+    let foci = |row: &FieldRow| match is_round {
+        true => [row.sagittal_focus_mm, row.tangential_focus_mm],
+        false => [row.x_focus_mm, row.y_focus_mm],
+    };
+    for row in &analysis.fields {
+        let [first, second] = foci(row).map(|focus| cell(focus, 4));
+        text += &line(&[
+            field_cell(&row.place),
+            cell(row.height_mm, 4),
+            cell(row.distortion_tangent_percent, 4),
+            cell(row.distortion_angle_percent, 4),
+            first,
+            second,
+            cell(row.relative_illumination, 4),
+        ]);
+    }
+    text
+}
+
+/// Returns the name of a field: degrees with three decimals where it lies above the axis.
+fn field_cell(place: &FieldPlace) -> String {
+    match (place.object_mm, place.field_xy_deg) {
+        (None, [0.0, y_deg]) => format!("{y_deg:.3}°"),
+        _ => place.label(),
+    }
 }
 
 fn line(cells: &[String]) -> String {

@@ -216,9 +216,13 @@ pub(crate) struct LensInfoArgs {
 pub(crate) struct LensAnalyzeArgs {
     /// Lens, a file or the name of a built-in one
     pub(crate) lens: String,
-    /// Field angles, degrees [default: 0, 0.5, 0.7 and 1 of where the light falls to a quarter]
-    #[arg(long, value_name = "LIST")]
+    /// Field angles, degrees: above the axis as 0,10,20, or along x and y as 5/10 [default: 0, 0.5, 0.7 and 1 of where the
+    /// light falls to a quarter]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub(crate) fields_deg: Option<String>,
+    /// Fields as object points, mm from the axis, for an object at a finite distance: y, or x/y
+    #[arg(long, value_name = "LIST", conflicts_with = "fields_deg", allow_hyphen_values = true)]
+    pub(crate) fields_mm: Option<String>,
     /// Wavelengths, nm: a list or first:last:step; that nearest to 550 is the reference
     #[arg(long, value_name = "LIST", default_value = "450,550,650")]
     pub(crate) wavelengths_nm: String,
@@ -240,7 +244,7 @@ pub(crate) struct LensAnalyzeArgs {
     /// Rings of rays in a spot: N of them have 1 + 3N(N + 1) rays
     #[arg(long, value_name = "N", default_value_t = 12)]
     pub(crate) rings: usize,
-    /// Folder for analysis.json and the plots, as SVG and PNG
+    /// Folder for analysis.json, analysis.html and the plots (analysis, spots, opd, distortion) as SVG and PNG
     #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

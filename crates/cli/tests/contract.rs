@@ -85,7 +85,13 @@ fn lens_analyze_has_its_keys_and_leaves_its_plots() {
     let common = ["lens", "analyze", "tessar-50mm", "--fields-deg", "0,12", "--wavelengths-nm", "500,600", "--quiet"];
     let stop = ["--f-number", "5.6", "--distance-mm", "3000", "--rings", "4"];
     let analysis = json(folder.path(), &[&common[..], &stop, &["--out", "plots", "--json"]].concat());
-    check_numbers(&analysis, "distance_mm reference_nm efl_mm f_number working_f_number film_mm half_illumination_deg");
+    check_numbers(
+        &analysis,
+        "distance_mm reference_nm efl_mm f_number working_f_number film_mm half_illumination_deg object_index image_index \
+         object_na image_na",
+    );
+    assert_eq!(analysis["grid"].as_array().unwrap().len(), 121);
+    assert!(analysis["notes"].as_array().unwrap().is_empty() && analysis["x_plane"].is_null());
     check_numbers(
         &analysis["focus"],
         "paraxial_film_mm axis_film_mm axis_rms_um fields_film_mm fields_rms_um wavefront_film_mm wavefront_rms_waves",
@@ -111,12 +117,20 @@ fn lens_analyze_has_its_keys_and_leaves_its_plots() {
     let written: Value =
         serde_json::from_str(&fs::read_to_string(folder.path().join("plots/analysis.json")).unwrap()).unwrap();
     assert_eq!(written, analysis);
-    for name in ["analysis", "spots"] {
+    let page = fs::read_to_string(folder.path().join("plots/analysis.html")).unwrap();
+    assert!(page.contains("Optical path differences") && page.contains("least spot on the axis"));
+    for name in ["analysis", "spots", "opd", "distortion"] {
         let file = |extension: &str| fs::read(folder.path().join(format!("plots/{name}.{extension}"))).unwrap();
         assert!(file("svg").starts_with(b"<svg") && file("png").starts_with(b"\x89PNG"), "{name}");
     }
     let text = output(folder.path(), &[&common[..], &["--focus-mm", "2000"]].concat());
     assert!(text.contains("least spot on the axis") && text.contains("f tan θ %"), "{text}");
+    let fisheye = ["lens", "analyze", "fisheye-12.5mm", "--fields-deg", "30/40,89", "--rings", "2", "--quiet"];
+    let text = output(folder.path(), &fisheye);
+    assert!(text.contains("30.0°/40.0°") && text.contains("note: the field of 89.0° is cut to 88°"), "{text}");
+    let near = ["lens", "analyze", "tessar-50mm", "--distance-mm", "200", "--fields-mm", "0,-3/4", "--json", "--quiet"];
+    let spot = json(folder.path(), &near)["spots"][5].clone();
+    assert_eq!(spot["object_mm"], serde_json::json!([-3.0, 4.0]));
 }
 
 #[test]

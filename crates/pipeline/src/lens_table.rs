@@ -79,6 +79,14 @@ pub struct ImageData {
     pub working_f_number: f64,
 }
 
+impl PlaneData {
+    /// Returns that of the x–z plane.
+    pub(crate) fn of_x(mono: &MonoLens) -> Self {
+        let FirstOrder { efl_mm, bfl_mm, f_number, .. } = mono.first_order_x();
+        Self { efl_mm, bfl_mm, f_number }
+    }
+}
+
 impl LensData {
     /// Returns the data of a lens; with those of an image where an object distance is given.
     ///
@@ -89,10 +97,7 @@ impl LensData {
     pub fn new(lens: &Lens, question: &LensQuestion) -> Result<Self, PipelineError> {
         let LensQuestion { wavelength_nm, distance_mm, field_deg } = *question;
         let mono = lens.at(wavelength_nm)?;
-        let x_plane = (!lens.is_rotational()).then(|| {
-            let FirstOrder { efl_mm, bfl_mm, f_number, .. } = mono.first_order_x();
-            PlaneData { efl_mm, bfl_mm, f_number }
-        });
+        let x_plane = (!lens.is_rotational()).then(|| PlaneData::of_x(&mono));
         let settings = SeidelSettings {
             wavelength_nm,
             colors_nm: [F_LINE_NM, C_LINE_NM],

@@ -56,8 +56,8 @@ pub use frame_files::{FrameFile, Outputs};
 pub use frames_choice::{Exposed, FramesChoice};
 pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
 pub use lens_analysis::{
-    AnalysisFilm, AnalysisRequest, AxialColorRow, FanRow, FieldRow, FocusData, LensAnalysis, PupilRow, SpotRow,
-    WavefrontRow,
+    AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, FanRow, FieldPlace, FieldRow, FocusData, GridRow,
+    LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,
 };
 pub use lens_choice::{REFERENCE_WAVELENGTH_NM, open_lens};
 pub use lens_drawing::LensDrawing;
@@ -65,7 +65,7 @@ pub use lens_table::{
     ImageData, LensData, LensQuestion, LensRow, PlaneData, SurfaceRow, built_in_lenses, surface_rows,
 };
 pub use mosaic::{MosaicPlan, PsfMosaic};
-pub use numbers::parse_numbers;
+pub use numbers::{parse_numbers, parse_pairs};
 pub use plots::{Corner, LineChart, Series};
 pub use progress::{Progress, Silent, Stage};
 pub use psf_focus::ThroughFocus;

@@ -37,6 +37,24 @@ pub fn parse_numbers(what: &'static str, text: &str) -> Result<Vec<f64>, Pipelin
     Ok(numbers)
 }
 
+/// Returns the pairs of a list: `x/y`, or numbers and ranges as [`parse_numbers`] reads them, which are y with x = 0.
+///
+/// # Errors
+/// When an item is neither.
+pub fn parse_pairs(what: &'static str, text: &str) -> Result<Vec<[f64; 2]>, PipelineError> {
+    let mut pairs = Vec::new();
+    for item in text.split(',') {
+        match item.split_once('/') {
+            None => pairs.extend(parse_numbers(what, item)?.into_iter().map(|y| [0.0, y])),
+            Some((x, y)) => match [x, y].map(|part| part.trim().parse::<f64>().ok().filter(|v| !v.is_nan())) {
+                [Some(x), Some(y)] => pairs.push([x, y]),
+                _ => return Err(PipelineError::List { what, item: item.trim().to_owned() }),
+            },
+        }
+    }
+    Ok(pairs)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -53,6 +71,15 @@ mod tests {
         check("0:1:0.25", &[0.0, 0.25, 0.5, 0.75, 1.0]);
         check("400:690:100", &[400.0, 500.0, 600.0]);
         check("3:1:-1,7", &[3.0, 2.0, 1.0, 7.0]);
+    }
+
+    #[test]
+    fn pairs_mix_with_numbers() {
+        let found = parse_pairs("fields", "0, 5/10,-2/-1.5,10:20:10").unwrap();
+        assert_eq!(found, [[0.0, 0.0], [5.0, 10.0], [-2.0, -1.5], [0.0, 10.0], [0.0, 20.0]]);
+        for item in ["1/x", "1/2/3", "/"] {
+            assert!(parse_pairs("fields", item).unwrap_err().to_string().contains(item));
+        }
     }
 
     #[test]

@@ -30,11 +30,13 @@ pub(crate) struct Mark {
 }
 
 /// How places are marked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum MarkKind {
     Line,
     Dashed,
     Dots,
+    /// Filled rectangles of this width and height about the places.
+    Cells([f64; 2]),
 }
 
 /// A sheet that plots are put on.
@@ -141,6 +143,9 @@ impl Panel {
 
 impl Mark {
     fn draw(&self, across: &dyn Fn(f64) -> f64, down: &dyn Fn(f64) -> f64, svg: &mut String) {
+        if let MarkKind::Cells(sides) = self.kind {
+            return self.fill(sides, across, down, svg);
+        }
         let mut path = String::new();
         let mut is_open = false;
         for &(x, y) in &self.points {
@@ -159,9 +164,30 @@ impl Mark {
         let style = match self.kind {
             MarkKind::Line => "stroke-width=\"1.3\" stroke-linejoin=\"round\"",
             MarkKind::Dashed => "stroke-width=\"1.3\" stroke-dasharray=\"5 3\"",
-            MarkKind::Dots => "stroke-width=\"1.7\" stroke-linecap=\"round\" stroke-opacity=\"0.75\"",
+            MarkKind::Cells(_) | MarkKind::Dots => {
+                "stroke-width=\"1.7\" stroke-linecap=\"round\" stroke-opacity=\"0.75\""
+            }
         };
         let _ = writeln!(svg, "<path d=\"{path}\" fill=\"none\" stroke=\"{}\" {style}/>", self.color);
+    }
+
+    /// Fills a rectangle about each place.
+    fn fill(
+        &self,
+        [width, height]: [f64; 2],
+        across: &dyn Fn(f64) -> f64,
+        down: &dyn Fn(f64) -> f64,
+        svg: &mut String,
+    ) {
+        let mut path = String::new();
+        for &(x, y) in self.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
+            let [left, right] = [-0.5, 0.5].map(|side| across(x + side * width));
+            let [top, bottom] = [0.5, -0.5].map(|side| down(y + side * height));
+            let _ = write!(path, "M{left:.1} {top:.1}H{right:.1}V{bottom:.1}H{left:.1}Z");
+        }
+        // Without smoothed edges, which would leave seams between neighbours.
+        let color = &self.color;
+        let _ = writeln!(svg, "<path d=\"{path}\" fill=\"{color}\" shape-rendering=\"crispEdges\"/>");
     }
 }
 
@@ -207,6 +233,17 @@ mod tests {
         assert_eq!(words((0.0, 23.0), 150.0), ["0", "10", "20"]);
         assert!(words((1.0, 1.0), 100.0).is_empty());
         assert_eq!([0.3, 2.0, 5.1, 0.0, f64::NAN].map(round_up), [0.5, 2.0, 10.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn cells_meet_without_gaps() {
+        let kind = MarkKind::Cells([0.5, 1.0]);
+        let marks = vec![Mark { color: "#123456".to_owned(), kind, points: vec![(0.25, 0.5), (0.75, 0.5)] }];
+        let panel = Panel { x_range: (0.0, 1.0), y_range: (0.0, 1.0), marks, ..Panel::default() };
+        let mut sheet = Sheet::default();
+        sheet.panel(&panel, [0.0, 0.0, 162.0, 156.0]);
+        let svg = sheet.to_svg(200.0, 200.0);
+        assert!(svg.contains("M0.0 0.0H50.0V100.0H0.0ZM50.0 0.0H100.0V100.0H50.0Z"), "{svg}");
     }
 
     #[test]

@@ -4,18 +4,22 @@ use dioptric_diffraction::{PupilGrid, Wavefront, WavefrontReference, best_wavefr
 use dioptric_optics::{
     Lens, MonoLens, ObjectPoint, PupilBoundary, Rims,
     analysis::{
-        AstigmaticFoci, Autofocus, Distortion, Projection, PupilCoordinates, PupilSampling, RayFan, SpotDiagram,
-        field_limit_deg, hexapolar, projected_solid_angle, pupil_line,
+        AstigmaticFoci, Autofocus, AxisFoci, Distortion, NumericalApertures, Projection, PupilCoordinates,
+        PupilSampling, RayFan, SpotDiagram, StraightMap, field_limit_deg, hexapolar, projected_solid_angle_onto,
+        pupil_line,
     },
-    glam::DVec2,
+    glam::{DVec2, DVec3},
 };
 use rayon::prelude::*;
 
-use super::rows::{AxialColorRow, FanRow, FieldRow, FocusData, LensAnalysis, PupilRow, SpotRow, WavefrontRow};
-use crate::{PipelineError, REFERENCE_WAVELENGTH_NM};
+use super::{
+    request::{AnalysisFilm, AnalysisRequest, Field},
+    rows::{
+        AxialColorRow, FanRow, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,
+    },
+};
+use crate::{PipelineError, PlaneData, REFERENCE_WAVELENGTH_NM};
 
-/// The share of the axial illumination down to which fields are chosen where none are given.
-const DIMMEST: f64 = 0.25;
 /// Steps of the curves over field.
 const CURVE_STEPS: usize = 40;
 /// Places along a fan.
@@ -25,35 +29,13 @@ const EDGE_AZIMUTHS: usize = 128;
 const TOLD_AZIMUTHS: usize = 36;
 /// The share of the stop's radius that the outermost rays keep to, so that rounding does not end them at its rim.
 const WITHIN_RIM: f64 = 1.0 - 1e-9;
+/// Cells of a map across the stop: an odd number, so that there is one in the middle.
+const MAP_CELLS: usize = 31;
+/// Lines of a grid of fields in each direction, and the widest angle that it goes to.
+pub(super) const GRID_LINES: usize = 11;
+const WIDEST_GRID_DEG: f64 = 60.0;
 /// Zernike coefficients that are told: up to the sixth degree, less its last.
 const ZERNIKE_TERMS: usize = 22;
-
-/// Where the film is for an analysis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AnalysisFilm {
-    /// Where the spot on the axis is smallest, all wavelengths together.
-    BestFocus,
-    /// At the paraxial image, at the reference wavelength, of an object this far before the first vertex, mm.
-    FocusMm(f64),
-    /// This far behind the last vertex, mm.
-    FilmMm(f64),
-}
-
-/// What to analyse a lens for.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AnalysisRequest {
-    /// Field angles at the entrance pupil, degrees; `None` for 0, 0.5, 0.7 and 1 of the field at which the illumination
-    /// falls to a quarter.
-    pub fields_deg: Option<Vec<f64>>,
-    /// Wavelengths, nm; that nearest to 550 nm is the reference.
-    pub wavelengths_nm: Vec<f64>,
-    /// Distance of the object before the first vertex, mm; infinity for a far one.
-    pub distance_mm: f64,
-    /// Where the film is.
-    pub film: AnalysisFilm,
-    /// Rings of rays in a spot diagram.
-    pub n_rings: usize,
-}
 
 impl AnalysisRequest {
     /// Analyses a lens.
@@ -65,19 +47,20 @@ impl AnalysisRequest {
         let lenses: Vec<MonoLens> = self.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
         let off = |i: &usize| (self.wavelengths_nm[*i] - REFERENCE_WAVELENGTH_NM).abs();
         let reference = (0..lenses.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0);
-        let dioptres = 1e3 / (self.distance_mm + lenses[reference].projection_center_z_mm());
-        let fields_deg = match &self.fields_deg {
-            Some(fields_deg) => fields_deg.clone(),
-            None => {
-                let limit_deg = field_limit_deg(&lenses[reference], DIMMEST).unwrap_or(0.0);
-                // A tenth of a degree is a round number.
-                [0.0, 0.5, 0.7, 1.0].map(|share| (share * limit_deg * 10.0).floor() / 10.0).to_vec()
-            }
-        };
+        let way_mm = self.distance_mm + lenses[reference].projection_center_z_mm();
+        if way_mm == 0.0 {
+            return Err(PipelineError::Value {
+                origin: "the analysis".to_owned(),
+                key: "distance_mm",
+                found: self.distance_mm.to_string(),
+                expected: "an object that does not lie in the entrance pupil".to_owned(),
+            });
+        }
+        let (fields, notes) = self.fields_of(&lenses[reference], way_mm);
         let bench = Bench {
             lenses,
             reference,
-            dioptres,
+            dioptres: 1e3 / way_mm,
             film_mm: 0.0,
             sampling: PupilSampling {
                 coordinates: PupilCoordinates::Stop { radius_mm: WITHIN_RIM * lens.stop_semi_aperture_mm() },
@@ -85,29 +68,7 @@ impl AnalysisRequest {
                 rims: Rims::Clip,
             },
         };
-        bench.analyse(self, lens, fields_deg)
-    }
-
-    fn check(&self) -> Result<(), PipelineError> {
-        let wrong = |key, found: f64, expected: &str| PipelineError::Value {
-            origin: "the analysis".to_owned(),
-            key,
-            found: found.to_string(),
-            expected: expected.to_owned(),
-        };
-        if let Some(field) = self.fields_deg.iter().flatten().find(|f| !(0.0..89.0).contains(*f)) {
-            return Err(wrong("fields_deg", *field, "angles from 0 to below 89 degrees"));
-        }
-        if self.wavelengths_nm.is_empty() || self.fields_deg.as_ref().is_some_and(Vec::is_empty) {
-            return Err(wrong("the number of fields or wavelengths", 0.0, "at least 1"));
-        }
-        if self.distance_mm.is_nan() || self.distance_mm <= 0.0 {
-            return Err(wrong("distance_mm", self.distance_mm, "a number above 0, or inf"));
-        }
-        if !(1..=200).contains(&self.n_rings) {
-            return Err(wrong("rings", self.n_rings as f64, "1 to 200"));
-        }
-        Ok(())
+        bench.analyse(self, lens, (fields, notes))
     }
 }
 
@@ -125,22 +86,22 @@ impl Bench {
         &self.lenses[self.reference]
     }
 
-    /// The point straight above the axis, the same for all wavelengths.
-    fn point(&self, field_deg: f64) -> ObjectPoint {
-        ObjectPoint::from_field(self.reference(), DVec2::new(0.0, field_deg.to_radians().tan()), self.dioptres)
+    /// The point of a field, the same for all wavelengths.
+    fn point(&self, field_tan: DVec2) -> ObjectPoint {
+        ObjectPoint::from_field(self.reference(), field_tan, self.dioptres)
     }
 
     fn analyse(
         mut self,
         request: &AnalysisRequest,
         lens: &Lens,
-        fields_deg: Vec<f64>,
+        (fields, notes): (Vec<Field>, Vec<String>),
     ) -> Result<LensAnalysis, PipelineError> {
         let paraxial = self.reference().film_mm_for(request.distance_mm);
         let best = |points: &[ObjectPoint], lenses: &[MonoLens], from_mm: f64| {
             Autofocus { lenses, points, sampling: &self.sampling }.best_film_mm(from_mm)
         };
-        let axis = self.point(0.0);
+        let axis = self.point(DVec2::ZERO);
         let on_axis = paraxial.as_ref().ok().and_then(|&film_mm| best(&[axis], &self.lenses, film_mm));
         self.film_mm = match (request.film, on_axis) {
             (AnalysisFilm::FilmMm(film_mm), _) => film_mm,
@@ -149,7 +110,7 @@ impl Bench {
             (AnalysisFilm::BestFocus, None) => paraxial.clone()?,
         };
         let from_mm = paraxial.as_ref().map_or(self.film_mm, |film_mm| *film_mm);
-        let points: Vec<ObjectPoint> = fields_deg.iter().map(|&field_deg| self.point(field_deg)).collect();
+        let points: Vec<ObjectPoint> = fields.iter().map(|field| self.point(field.tan)).collect();
         let over_fields = best(&points, &self.lenses, from_mm);
         let wavefront = on_axis.and_then(|(film_mm, _)| {
             best_wavefront_film_mm(self.reference(), &axis, film_mm, PupilGrid::STANDARD).ok()
@@ -163,18 +124,33 @@ impl Bench {
             rms_shift_mm: own_focus(lens).zip(reference_focus).map(|(own, reference)| own - reference),
         };
         let first = self.reference().first_order();
-        let pairs: Vec<(f64, &MonoLens)> =
-            fields_deg.iter().flat_map(|&field_deg| self.lenses.iter().map(move |lens| (field_deg, lens))).collect();
-        let last_deg = fields_deg.iter().copied().fold(0.0, f64::max);
-        let curve_fields: Vec<f64> = (0..=CURVE_STEPS).map(|i| last_deg * i as f64 / CURVE_STEPS as f64).collect();
-        let axial_cone = projected_solid_angle(self.reference(), &axis, EDGE_AZIMUTHS);
-        let field_rows =
-            |fields: &[f64]| fields.par_iter().map(|&field_deg| self.field_row(field_deg, axial_cone)).collect();
+        let pairs: Vec<(&Field, &MonoLens)> =
+            fields.iter().flat_map(|field| self.lenses.iter().map(move |lens| (field, lens))).collect();
+        let by_angle = |a: &&Field, b: &&Field| a.place.field_deg.total_cmp(&b.place.field_deg);
+        let last = fields.iter().max_by(by_angle);
+        let curve = |last: &Field| (0..=CURVE_STEPS).map(|i| last.at_share(i as f64 / CURVE_STEPS as f64)).collect();
+        let curve_fields: Vec<Field> = last.map(curve).unwrap_or_default();
+        let straight = StraightMap::of(self.reference(), self.dioptres, self.film_mm);
+        let axial_cone = self.cone(&axis);
+        let field_rows = |fields: &[Field]| {
+            fields.par_iter().map(|field| self.field_row(field, (straight.as_ref(), axial_cone))).collect()
+        };
+        let apertures = NumericalApertures::find(self.reference(), &axis);
+        let is_round = self.reference().is_rotational();
+        let conjugate_x = self.reference().conjugate_x(request.distance_mm);
+        let film_curvature = self.reference().image_surface().curvature_per_mm;
         Ok(LensAnalysis {
             lens: lens.name().to_owned(),
             distance_mm: request.distance_mm,
             reference_nm: self.reference().wavelength_nm(),
             wavelengths_nm: request.wavelengths_nm.clone(),
+            notes,
+            object_index: first.object_index,
+            image_index: first.image_index,
+            object_na: apertures.map(|found| found.object).filter(|_| request.distance_mm.is_finite()),
+            image_na: apertures.map(|found| found.image),
+            x_plane: (!is_round).then(|| PlaneData::of_x(self.reference())),
+            film_radius_mm: (film_curvature != 0.0).then(|| 1.0 / film_curvature),
             efl_mm: first.efl_mm,
             f_number: first.f_number,
             working_f_number: self.reference().working_f_number(request.distance_mm),
@@ -182,6 +158,7 @@ impl Bench {
             half_illumination_deg: field_limit_deg(self.reference(), 0.5),
             focus: FocusData {
                 paraxial_film_mm: paraxial.ok(),
+                paraxial_x_film_mm: (!is_round).then_some(conjugate_x.image_z_mm),
                 axis_film_mm: on_axis.map(|found| found.0),
                 axis_rms_um: on_axis.map(|found| 1e3 * found.1),
                 fields_film_mm: over_fields.map(|found| found.0),
@@ -190,15 +167,17 @@ impl Bench {
                 wavefront_rms_waves: wavefront.map(|found| found.1),
             },
             axial_color: self.lenses.iter().map(axial_color).collect(),
-            spots: pairs.par_iter().map(|&(field_deg, lens)| self.spot_row(field_deg, lens)).collect(),
-            fans: pairs.par_iter().map(|&(field_deg, lens)| self.fan_row(field_deg, lens)).collect(),
-            fields: field_rows(&fields_deg),
+            spots: pairs.par_iter().map(|&(field, lens)| self.spot_row(field, lens)).collect(),
+            fans: pairs.par_iter().map(|&(field, lens)| self.fan_row(field, lens)).collect(),
+            opd_maps: pairs.par_iter().map(|&(field, lens)| self.opd_map(field, lens)).collect(),
+            grid: straight.map_or_else(Vec::new, |straight| self.grid(&fields, &straight)),
+            fields: field_rows(&fields),
             curves: field_rows(&curve_fields),
         })
     }
 
-    fn spot_row(&self, field_deg: f64, lens: &MonoLens) -> SpotRow {
-        let point = self.point(field_deg);
+    fn spot_row(&self, field: &Field, lens: &MonoLens) -> SpotRow {
+        let point = self.point(field.tan);
         let spot = SpotDiagram::trace(lens, &point, self.film_mm, &self.sampling);
         let um = |mm: Option<f64>| mm.map(|mm| 1e3 * mm);
         let sigma_mm = spot.sigma_mm();
@@ -212,9 +191,10 @@ impl Bench {
         let wavefront =
             Wavefront::trace(lens, &point, self.film_mm, PupilGrid::STANDARD, WavefrontReference::Best).ok();
         SpotRow {
-            field_deg,
+            place: field.place,
             wavelength_nm: lens.wavelength_nm(),
-            height_mm: spot.centroid_mm().map(|centroid_mm| 0.0 - centroid_mm.y),
+            height_mm: spot.centroid_mm().map(|centroid_mm| 0.0 - centroid_mm.dot(field.direction)),
+            image_mm: spot.centroid_mm().map(in_picture),
             rms_um: um(spot.rms_mm()),
             rms_about_chief_um: um(spot.rms_about_chief_mm()),
             radius_um: um(spot.radius_about_chief_mm()),
@@ -229,14 +209,14 @@ impl Bench {
             }),
             pupil,
             points_um: center_mm.map_or(Vec::new(), |center_mm| {
-                let in_picture = |p: &DVec2| (center_mm - *p) * 1e3;
-                spot.points_mm.iter().map(in_picture).map(|p| (p.x, p.y)).collect()
+                let from_center = |p: &DVec2| (center_mm - *p) * 1e3;
+                spot.points_mm.iter().map(from_center).map(|p| (p.x, p.y)).collect()
             }),
         }
     }
 
-    fn fan_row(&self, field_deg: f64, lens: &MonoLens) -> FanRow {
-        let point = self.point(field_deg);
+    fn fan_row(&self, field: &Field, lens: &MonoLens) -> FanRow {
+        let point = self.point(field.tan);
         let along = |direction: DVec2| {
             let sampling = PupilSampling { places: pupil_line(direction, FAN_PLACES), ..self.sampling.clone() };
             let none = || vec![None; FAN_PLACES];
@@ -248,7 +228,7 @@ impl Bench {
         };
         let ((tangential_um, tangential_waves), (sagittal_um, sagittal_waves)) = (along(DVec2::Y), along(DVec2::X));
         FanRow {
-            field_deg,
+            place: field.place,
             wavelength_nm: lens.wavelength_nm(),
             places: pupil_line(DVec2::X, FAN_PLACES).iter().map(|place| place.x).collect(),
             tangential_um,
@@ -258,128 +238,101 @@ impl Bench {
         }
     }
 
-    fn field_row(&self, field_deg: f64, axial_cone: f64) -> FieldRow {
-        let (point, lens) = (self.point(field_deg), self.reference());
-        let field = (field_deg.to_radians().tan(), self.dioptres);
-        let distortion = |projection| Distortion::of(lens, field, self.film_mm, projection);
-        let percent = |projection| distortion(projection).map(|found| 100.0 * found.relative());
-        let foci = AstigmaticFoci::find(lens, &point);
-        let height_mm =
-            |lens: &MonoLens| lens.chief_film_point_mm(&point, self.film_mm).map(|place_mm| 0.0 - place_mm.y);
+    fn field_row(&self, field: &Field, (straight, axial_cone): (Option<&StraightMap>, f64)) -> FieldRow {
+        let (point, lens) = (self.point(field.tan), self.reference());
+        let place_mm = |lens: &MonoLens| lens.chief_film_point_mm(&point, self.film_mm);
+        let height_mm = |lens: &MonoLens| place_mm(lens).map(|place_mm| 0.0 - place_mm.dot(field.direction));
         let reference_mm = height_mm(lens);
         let shift_um =
             |lens: &MonoLens| height_mm(lens).zip(reference_mm).map(|(own, reference)| 1e3 * (own - reference));
+        let [against_tangent, against_angle] = self.distortions(field, straight, place_mm(lens));
+        // Along the axis from where the chief ray meets the film, which may be curved.
+        let film_mm = self.film_mm + self.chief_on_film(&point).map_or(0.0, |own| own.z);
+        let foci = AstigmaticFoci::find(lens, &point);
+        let axes = (!lens.is_rotational()).then(|| AxisFoci::find(lens, &point)).flatten();
         FieldRow {
-            field_deg,
+            place: field.place,
             height_mm: reference_mm,
-            distortion_tangent_percent: percent(Projection::Tangent),
-            distortion_angle_percent: percent(Projection::Angle),
-            tangential_focus_mm: foci.map(|foci| foci.tangential_mm - self.film_mm),
-            sagittal_focus_mm: foci.map(|foci| foci.sagittal_mm - self.film_mm),
-            relative_illumination: (axial_cone > 0.0)
-                .then(|| projected_solid_angle(lens, &point, EDGE_AZIMUTHS) / axial_cone),
+            image_mm: place_mm(lens).map(in_picture),
+            distortion_tangent_percent: against_tangent.map(|relative| 100.0 * relative),
+            distortion_angle_percent: against_angle.map(|relative| 100.0 * relative),
+            tangential_focus_mm: foci.map(|foci| foci.tangential_mm - film_mm),
+            sagittal_focus_mm: foci.map(|foci| foci.sagittal_mm - film_mm),
+            x_focus_mm: axes.map(|foci| foci.x_mm - film_mm),
+            y_focus_mm: axes.map(|foci| foci.y_mm - film_mm),
+            relative_illumination: (axial_cone > 0.0).then(|| self.cone(&point) / axial_cone),
             lateral_color_um: self.lenses.iter().map(shift_um).collect(),
         }
     }
+
+    /// Returns the relative distortion against the tangent of the field and against its angle: that of the paraxial scale
+    /// or, for a lens without an axis of symmetry, of the straight map of small fields.
+    fn distortions(&self, field: &Field, straight: Option<&StraightMap>, chief_mm: Option<DVec2>) -> [Option<f64>; 2] {
+        let field_tan = field.tan.length();
+        if self.reference().is_rotational() {
+            let field = (field_tan, self.dioptres);
+            return [Projection::Tangent, Projection::Angle]
+                .map(|projection| Some(Distortion::of(self.reference(), field, self.film_mm, projection)?.relative()));
+        }
+        let against = |tan: DVec2| Some(straight?.relative(tan, chief_mm?));
+        let angle_over_tan = if field_tan == 0.0 { 1.0 } else { field_tan.atan() / field_tan };
+        [against(field.tan), against(field.tan * angle_over_tan)]
+    }
+
+    /// Returns where the chief ray meets the film, in the film's own frame, mm.
+    fn chief_on_film(&self, point: &ObjectPoint) -> Option<DVec3> {
+        let ray = self.reference().chief_ray_on_film(point, self.film_mm)?;
+        Some(self.reference().film_pose(self.film_mm).to_own(ray.point_mm(0)))
+    }
+
+    /// Returns the projected solid angle of a point's light on the film as it slopes there.
+    fn cone(&self, point: &ObjectPoint) -> f64 {
+        let lens = self.reference();
+        let slope = self.chief_on_film(point).map(|own| lens.image_surface().slope_at(own.truncate()));
+        let normal = slope.map_or(DVec3::Z, |slope| (-slope).extend(1.0).normalize());
+        let normal = lens.film_pose(self.film_mm).rotation * normal;
+        projected_solid_angle_onto(lens, point, EDGE_AZIMUTHS, normal)
+    }
+
+    fn opd_map(&self, field: &Field, lens: &MonoLens) -> OpdMap {
+        let at = |i: usize| (2 * i + 1) as f64 / MAP_CELLS as f64 - 1.0;
+        let cells = (0..MAP_CELLS).flat_map(|row| (0..MAP_CELLS).map(move |column| DVec2::new(at(column), at(row))));
+        let cells: Vec<DVec2> = cells.collect();
+        let is_inside = |cell: &DVec2| cell.length_squared() < 1.0;
+        let places = cells.iter().copied().filter(is_inside).collect();
+        let sampling = PupilSampling { places, ..self.sampling.clone() };
+        let found = opd_waves_at(lens, &self.point(field.tan), self.film_mm, &sampling).unwrap_or_default();
+        let mut found = found.into_iter();
+        let waves = cells.iter().map(|cell| if is_inside(cell) { found.next().flatten() } else { None }).collect();
+        OpdMap { place: field.place, wavelength_nm: lens.wavelength_nm(), n_across: MAP_CELLS, waves }
+    }
+
+    /// Returns a grid of chief rays that reaches as far as the fields do.
+    fn grid(&self, fields: &[Field], straight: &StraightMap) -> Vec<GridRow> {
+        let widest = |of: &dyn Fn(DVec2) -> f64| fields.iter().map(|field| of(field.tan)).fold(0.0, f64::max);
+        let [x, y] = [widest(&|tan| tan.x.abs()), widest(&|tan| tan.y.abs())];
+        // A row of fields is the half diagonal of a square.
+        let half = match x == 0.0 || y == 0.0 {
+            true => DVec2::splat(x.max(y) * std::f64::consts::FRAC_1_SQRT_2),
+            false => DVec2::new(x, y),
+        };
+        let half = half.min(DVec2::splat(WIDEST_GRID_DEG.to_radians().tan()));
+        let at = |i: usize| 2.0 * i as f64 / (GRID_LINES - 1) as f64 - 1.0;
+        let places = (0..GRID_LINES).flat_map(|row| (0..GRID_LINES).map(move |column| DVec2::new(at(column), at(row))));
+        let places: Vec<DVec2> = places.map(|place| place * half).collect();
+        let row = |&tan: &DVec2| GridRow {
+            field_xy_deg: tan.to_array().map(|tan| tan.atan().to_degrees()),
+            image_mm: self.reference().chief_film_point_mm(&self.point(tan), self.film_mm).map(in_picture),
+            straight_mm: in_picture(straight.at_mm(tan)),
+        };
+        places.par_iter().map(row).collect()
+    }
+}
+
+/// Returns a place on the film in the picture frame, which is turned by half a turn.
+fn in_picture(film_mm: DVec2) -> [f64; 2] {
+    [0.0 - film_mm.x, 0.0 - film_mm.y]
 }
 
 #[cfg(test)]
-mod tests {
-    use dioptric_psf::{BankSettings, Diffraction, PsfBank};
-
-    use super::*;
-
-    fn request(fields_deg: Vec<f64>) -> AnalysisRequest {
-        AnalysisRequest {
-            fields_deg: Some(fields_deg),
-            wavelengths_nm: vec![450.0, 550.0, 650.0],
-            distance_mm: f64::INFINITY,
-            film: AnalysisFilm::BestFocus,
-            n_rings: 6,
-        }
-    }
-
-    #[test]
-    fn every_part_is_there_and_agrees_with_the_others() {
-        let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
-        let analysis = request(vec![0.0, 10.0]).compute(&lens).unwrap();
-        assert_eq!((analysis.spots.len(), analysis.fans.len(), analysis.fields.len()), (6, 6, 2));
-        assert_eq!((analysis.reference_nm, analysis.film_mm), (550.0, analysis.focus.axis_film_mm.unwrap()));
-        let on_axis = &analysis.spots[1];
-        // Rims end no ray of the axis, and its spot is round.
-        assert_eq!(on_axis.transmission, 1.0);
-        assert!((on_axis.sigma_x_um.unwrap() / on_axis.sigma_y_um.unwrap() - 1.0).abs() < 1e-9);
-        let oblique = &analysis.spots[4];
-        assert!(oblique.height_mm.unwrap() > 8.5 && oblique.height_mm.unwrap() < 9.2);
-        assert_eq!(oblique.wavefront.as_ref().unwrap().zernike_waves.len(), ZERNIKE_TERMS);
-        let (last, curve_end) = (&analysis.fields[1], &analysis.curves[CURVE_STEPS]);
-        assert_eq!(last, curve_end);
-        assert_eq!(last.lateral_color_um[1], Some(0.0));
-        assert!((analysis.fields[0].relative_illumination.unwrap() - 1.0).abs() < 1e-12);
-        let svg = analysis.page_svg();
-        assert!(svg.contains("field curvature") && svg.contains("550 nm (reference)") && !svg.contains("NaN"));
-        assert!(analysis.spots_svg().contains("10.0°, 650 nm"));
-    }
-
-    #[test]
-    fn a_fan_ends_in_its_spot() {
-        let lens = Lens::built_in("tessar-50mm").unwrap();
-        let analysis = request(vec![12.0]).compute(&lens).unwrap();
-        for (spot, fan) in analysis.spots.iter().zip(&analysis.fans) {
-            let largest =
-                fan.tangential_um.iter().chain(&fan.sagittal_um).flatten().fold(0.0_f64, |m, e| m.max(e.abs()));
-            // The spot has more rays, but none beyond the same rims and stop by much.
-            assert!(largest > 0.4 * spot.radius_um.unwrap() && largest < 1.2 * spot.radius_um.unwrap(), "{largest}");
-            // The slope of the path difference is the transverse error: it vanishes at the chief ray's place.
-            let middle = FAN_PLACES / 2;
-            assert_eq!((fan.tangential_um[middle], fan.tangential_waves[middle]), (Some(0.0), Some(0.0)));
-        }
-    }
-
-    #[test]
-    fn illumination_is_that_of_the_ray_map() {
-        let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(8.0, 550.0).unwrap();
-        let analysis = request(vec![0.0, 5.0, 10.0]).compute(&lens).unwrap();
-        let tan = 12f64.to_radians().tan();
-        let settings = BankSettings::covering(analysis.film_mm, tan, (0.0, 0.0), (550.0, 550.0), Diffraction::None);
-        let geometry = PsfBank::build(&lens, &settings).unwrap().geometry(0.0, 550.0);
-        let on_axis = geometry.irradiance_per_radiance(0.0);
-        for row in &analysis.fields {
-            let expected = geometry.irradiance_per_radiance(row.field_deg.to_radians().tan()) / on_axis;
-            // Forward and backward illumination differ by 0.01 to 0.16 % where no rim but the stop's counts; the map's
-            // own interpolation adds as much.
-            assert!((row.relative_illumination.unwrap() / expected - 1.0).abs() < 3e-3, "{row:?} {expected}");
-        }
-    }
-
-    #[test]
-    fn fields_are_chosen_where_none_are_given() {
-        let lens = Lens::built_in("fisheye-12.5mm").unwrap();
-        let analysis = AnalysisRequest { fields_deg: None, ..request(vec![]) }.compute(&lens).unwrap();
-        assert_eq!(analysis.fields.len(), 4);
-        assert!(analysis.fields[3].field_deg > 80.0 && analysis.fields[3].distortion_tangent_percent.unwrap() < -80.0);
-        assert!(analysis.fans[11].tangential_um[FAN_PLACES / 2].is_some(), "the chief ray is found");
-    }
-
-    #[test]
-    fn what_makes_no_sense_is_refused() {
-        let lens = Lens::built_in("dgauss-50mm").unwrap();
-        let good = request(vec![0.0]);
-        for (wrong, word) in [
-            (AnalysisRequest { fields_deg: Some(vec![89.0]), ..good.clone() }, "fields_deg is 89"),
-            (AnalysisRequest { wavelengths_nm: vec![], ..good.clone() }, "at least 1"),
-            (AnalysisRequest { distance_mm: -1.0, ..good.clone() }, "distance_mm is -1"),
-            (AnalysisRequest { n_rings: 0, ..good.clone() }, "rings is 0"),
-            (AnalysisRequest { distance_mm: 10.0, ..good.clone() }, "forms no image"),
-        ] {
-            let message = wrong.compute(&lens).unwrap_err().to_string();
-            assert!(message.contains(word), "{message}");
-        }
-        // A pinhole has no focus, but works with a film.
-        let pinhole = Lens::pinhole(0.5).unwrap();
-        assert!(good.compute(&pinhole).is_err());
-        let analysis = AnalysisRequest { film: AnalysisFilm::FilmMm(40.0), ..request(vec![0.0, 20.0]) };
-        let analysis = analysis.compute(&pinhole).unwrap();
-        assert!(analysis.fields[1].distortion_tangent_percent.unwrap().abs() < 1e-9);
-    }
-}
+mod tests;

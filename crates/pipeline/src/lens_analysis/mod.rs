@@ -1,8 +1,14 @@
 //! A lens analysed by real rays: numbers and plots.
 
 mod compute;
+mod html;
+mod maps;
 mod page;
+mod request;
 mod rows;
 
-pub use compute::{AnalysisFilm, AnalysisRequest};
-pub use rows::{AxialColorRow, FanRow, FieldRow, FocusData, LensAnalysis, PupilRow, SpotRow, WavefrontRow};
+pub use request::{AnalysisFields, AnalysisFilm, AnalysisRequest};
+pub use rows::{
+    AxialColorRow, FanRow, FieldPlace, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow,
+    WavefrontRow,
+};

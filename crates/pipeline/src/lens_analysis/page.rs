@@ -6,8 +6,8 @@ use super::rows::{FanRow, FieldRow, LensAnalysis, SpotRow};
 use crate::panel::{Mark, MarkKind, Panel, Sheet};
 
 /// Margin of a page, and the room for its words above, px.
-const MARGIN_PX: f64 = 24.0;
-const HEAD_PX: f64 = 84.0;
+pub(super) const MARGIN_PX: f64 = 24.0;
+pub(super) const HEAD_PX: f64 = 84.0;
 /// Size of the plots of a field, and of those over field, px.
 const SMALL_PX: [f64; 2] = [268.0, 196.0];
 const LARGE_PX: [f64; 2] = [268.0, 300.0];
@@ -50,7 +50,7 @@ impl LensAnalysis {
         for (i, spot) in self.spots.iter().enumerate() {
             let place = [(i % n_wavelengths) as f64, (i / n_wavelengths) as f64];
             let mut panel = self.spot_panel(std::slice::from_ref(spot), range_um);
-            panel.title = format!("{:.1}°, {:.0} nm{}", spot.field_deg, spot.wavelength_nm, rms_words(spot));
+            panel.title = format!("{}, {:.0} nm{}", spot.place.label(), spot.wavelength_nm, rms_words(spot));
             let (x, y) = (MARGIN_PX + SIDE_PX[0] * place[0], HEAD_PX + SIDE_PX[1] * place[1]);
             sheet.panel(&panel, [x, y, SIDE_PX[0], SIDE_PX[1]]);
         }
@@ -60,14 +60,22 @@ impl LensAnalysis {
     }
 
     /// Writes what is analysed, and what colours mean.
-    fn head(&self, sheet: &mut Sheet, what: &str) {
+    pub(super) fn head(&self, sheet: &mut Sheet, what: &str) {
         sheet.text((MARGIN_PX, 32.0), 19.0, ("#111", "bold"), &format!("{} — {what}", self.lens));
         let object = match self.distance_mm.is_infinite() {
             true => "object far away".to_owned(),
-            false => format!("object at {:.0} mm", self.distance_mm),
+            false => format!("object at {} mm", short(self.distance_mm)),
         };
+        let medium = match self.object_index == 1.0 {
+            true => String::new(),
+            false => format!(" in n = {:.4}", self.object_index),
+        };
+        let aperture = self.object_na.map_or(String::new(), |aperture| format!(" · NA {aperture:.3}"));
+        let film = self.film_radius_mm.map_or(String::new(), |radius_mm| format!(", curved by R = {radius_mm:.2} mm"));
+        let along_x =
+            self.x_plane.map_or(String::new(), |x| format!(" (along x {:.3} mm · f/{:.2})", x.efl_mm, x.f_number));
         let words = format!(
-            "f = {:.3} mm · f/{:.2} · {object} · film {:.4} mm behind the last vertex",
+            "f = {:.3} mm · f/{:.2}{along_x}{aperture} · {object}{medium} · film {:.4} mm behind the last vertex{film}",
             self.efl_mm, self.f_number, self.film_mm
         );
         sheet.text((MARGIN_PX, 52.0), 12.5, ("#333", "normal"), &words);
@@ -96,7 +104,7 @@ impl LensAnalysis {
         }));
         let reference = spots.iter().find(|spot| spot.wavelength_nm == self.reference_nm).or(spots.first());
         Panel {
-            title: reference.map_or(String::new(), |spot| format!("{:.1}°{}", spot.field_deg, rms_words(spot))),
+            title: reference.map_or(String::new(), |spot| format!("{}{}", spot.place.label(), rms_words(spot))),
             x_label: "x, µm (circle: Airy's first zero)".to_owned(),
             y_label: "y, µm".to_owned(),
             x_range: (-range_um, range_um),
@@ -108,7 +116,7 @@ impl LensAnalysis {
 
     /// The plots over field, and that of axial colour.
     fn field_panels(&self) -> [Panel; 5] {
-        let last = self.curves.last().map_or(1.0, |row| row.field_deg).max(1e-3);
+        let last = self.curves.last().map_or(1.0, |row| row.place.field_deg).max(1e-3);
         let upright = |title: &str, x_label: &str, half: f64, marks: Vec<Mark>| Panel {
             title: title.to_owned(),
             x_label: x_label.to_owned(),
@@ -121,12 +129,24 @@ impl LensAnalysis {
         let curve = |color: &str, kind: MarkKind, of: &dyn Fn(&FieldRow) -> Option<f64>| Mark {
             color: color.to_owned(),
             kind,
-            points: self.curves.iter().map(|row| (of(row).unwrap_or(f64::NAN), row.field_deg)).collect(),
+            points: self.curves.iter().map(|row| (of(row).unwrap_or(f64::NAN), row.place.field_deg)).collect(),
         };
-        let bends = vec![
-            curve(PAIR[0], MarkKind::Line, &|row| row.sagittal_focus_mm),
-            curve(PAIR[1], MarkKind::Dashed, &|row| row.tangential_focus_mm),
-        ];
+        let (bends, bend_label) = match self.x_plane {
+            None => (
+                vec![
+                    curve(PAIR[0], MarkKind::Line, &|row| row.sagittal_focus_mm),
+                    curve(PAIR[1], MarkKind::Dashed, &|row| row.tangential_focus_mm),
+                ],
+                "focus, mm: — sagittal, - - tangential",
+            ),
+            Some(_) => (
+                vec![
+                    curve(PAIR[0], MarkKind::Line, &|row| row.x_focus_mm),
+                    curve(PAIR[1], MarkKind::Dashed, &|row| row.y_focus_mm),
+                ],
+                "focus, mm: — of x, - - of y",
+            ),
+        };
         let distortions = vec![
             curve(PAIR[0], MarkKind::Line, &|row| row.distortion_tangent_percent),
             curve(PAIR[1], MarkKind::Dashed, &|row| row.distortion_angle_percent),
@@ -140,11 +160,13 @@ impl LensAnalysis {
             points: self
                 .curves
                 .iter()
-                .map(|row| (row.field_deg, row.relative_illumination.unwrap_or(f64::NAN)))
+                .map(|row| (row.place.field_deg, row.relative_illumination.unwrap_or(f64::NAN)))
                 .collect(),
         };
+        let lights = self.curves.iter().filter_map(|row| row.relative_illumination);
+        let brightest = 1.05 * lights.fold(1.0, f64::max);
         [
-            upright("field curvature", "focus, mm: — sagittal, - - tangential", half_range_x(&bends), bends),
+            upright("field curvature", bend_label, half_range_x(&bends), bends),
             upright("distortion", "%: — against tan θ, - - against θ", half_range_x(&distortions), distortions),
             upright("lateral colour", "µm from the reference", half_range_x(&colors), colors),
             Panel {
@@ -152,7 +174,7 @@ impl LensAnalysis {
                 x_label: "field, °".to_owned(),
                 y_label: "over that on the axis".to_owned(),
                 x_range: (0.0, last),
-                y_range: (0.0, 1.05),
+                y_range: (0.0, brightest),
                 is_to_scale: false,
                 marks: vec![brightness],
             },
@@ -189,6 +211,11 @@ impl LensAnalysis {
             marks,
         }
     }
+}
+
+/// Writes a length with as many decimals as a short one needs.
+fn short(mm: f64) -> String {
+    if mm >= 100.0 { format!("{mm:.0}") } else { format!("{mm:.3}") }
 }
 
 fn rms_words(spot: &SpotRow) -> String {
@@ -231,16 +258,16 @@ fn fan_panels(fans: &[FanRow], ranges: &Ranges) -> [Panel; 4] {
             .collect(),
     };
     [
-        panel("tangential rays", "εy, µm", ranges.fan_um, &|fan| &fan.tangential_um),
-        panel("sagittal rays", "εx, µm", ranges.fan_um, &|fan| &fan.sagittal_um),
-        panel("tangential path", "waves", ranges.waves, &|fan| &fan.tangential_waves),
-        panel("sagittal path", "waves", ranges.waves, &|fan| &fan.sagittal_waves),
+        panel("rays along y", "εy, µm", ranges.fan_um, &|fan| &fan.tangential_um),
+        panel("rays along x", "εx, µm", ranges.fan_um, &|fan| &fan.sagittal_um),
+        panel("path along y", "waves", ranges.waves, &|fan| &fan.tangential_waves),
+        panel("path along x", "waves", ranges.waves, &|fan| &fan.sagittal_waves),
     ]
 }
 
-/// Returns a round number that holds all these values, with some room.
-fn half_range(values: impl Iterator<Item = f64>) -> f64 {
-    let largest = 1.02 * values.filter(|v| v.is_finite()).map(f64::abs).fold(1e-9, f64::max);
+/// Returns a round number that holds all these values, with some room; of nothing but rounding, a thousandth.
+pub(super) fn half_range(values: impl Iterator<Item = f64>) -> f64 {
+    let largest = 1.02 * values.filter(|v| v.is_finite()).map(f64::abs).fold(1e-3, f64::max);
     let power = 10_f64.powf(largest.log10().floor());
     let round = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
     round.into_iter().map(|m| m * power).find(|v| *v >= largest).unwrap_or(10.0 * power)

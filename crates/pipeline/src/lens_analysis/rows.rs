@@ -2,10 +2,13 @@
 
 use serde::Serialize;
 
+use crate::PlaneData;
+
 /// The real-ray analysis of a lens.
 ///
-/// Points lie straight above the axis as the photographer sees it. Heights and errors are in the picture frame, in which
-/// the image of such a point lies above the axis too: positive upwards. What has no value (no light, no such ray) is
+/// Fields are positive to the right and upwards as the photographer sees them. Heights and errors are in the picture frame,
+/// in which the image of a point above the axis lies above the axis too. On a curved film they are along its x and y, seen
+/// along the axis. What has no value (no light, no such ray) is
 /// `null` in JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LensAnalysis {
@@ -17,14 +20,28 @@ pub struct LensAnalysis {
     pub reference_nm: f64,
     /// All wavelengths, nm.
     pub wavelengths_nm: Vec<f64>,
+    /// What there is to say of the request, a sentence each.
+    pub notes: Vec<String>,
+    /// Index of the object space at the reference wavelength.
+    pub object_index: f64,
+    /// Index of the image space.
+    pub image_index: f64,
+    /// Numerical aperture at the object, index times sine, of real rays; none for a far object.
+    pub object_na: Option<f64>,
+    /// Numerical aperture at the image, of real rays.
+    pub image_na: Option<f64>,
     /// Effective focal length at the reference wavelength, mm.
     pub efl_mm: f64,
     /// f-number for a far object.
     pub f_number: f64,
     /// f-number of the cone at the image of this object.
     pub working_f_number: f64,
+    /// The first order of the x–z plane, where it is not that of the y–z plane, which the numbers above are of.
+    pub x_plane: Option<PlaneData>,
     /// Where the film is, behind the last vertex, mm.
     pub film_mm: f64,
+    /// Radius of the film, mm, positive where its centre lies behind; none for a flat one.
+    pub film_radius_mm: Option<f64>,
     /// The field at which the illumination of a far object falls to half, degrees.
     pub half_illumination_deg: Option<f64>,
     /// Where the film would be best.
@@ -39,6 +56,59 @@ pub struct LensAnalysis {
     pub fields: Vec<FieldRow>,
     /// The same at equal steps from the axis to the largest of them.
     pub curves: Vec<FieldRow>,
+    /// Chief rays of a grid of fields, rows from its lower left.
+    pub grid: Vec<GridRow>,
+    /// Path differences over the whole stop, in the order of the spots.
+    #[serde(skip)]
+    pub opd_maps: Vec<OpdMap>,
+}
+
+/// A point of the field.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FieldPlace {
+    /// Angle from the axis at the entrance pupil, degrees.
+    pub field_deg: f64,
+    /// Angles in the x–z and in the y–z plane, degrees.
+    pub field_xy_deg: [f64; 2],
+    /// The object point, mm from the axis, where it was asked for so.
+    pub object_mm: Option<[f64; 2]>,
+}
+
+impl FieldPlace {
+    /// Returns the field in a few characters: `12.0°`, `5.0°/10.0°` along x and y, or `0.05 mm`.
+    pub fn label(&self) -> String {
+        match (self.object_mm, self.field_xy_deg) {
+            (Some([0.0, y_mm]), _) => format!("{y_mm} mm"),
+            (Some([x_mm, y_mm]), _) => format!("{x_mm}/{y_mm} mm"),
+            (None, [0.0, y_deg]) => format!("{y_deg:.1}°"),
+            (None, [x_deg, y_deg]) => format!("{x_deg:.1}°/{y_deg:.1}°"),
+        }
+    }
+}
+
+/// A chief ray of a grid of fields on the film, at the reference wavelength.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GridRow {
+    /// Angles in the x–z and in the y–z plane, degrees.
+    pub field_xy_deg: [f64; 2],
+    /// Where it lands, mm.
+    pub image_mm: Option<[f64; 2]>,
+    /// Where it would land with the scale and shear of small fields, mm.
+    pub straight_mm: [f64; 2],
+}
+
+/// Optical path differences of one point at one wavelength over the stop, against the sphere about the chief ray's image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpdMap {
+    /// The point of the field.
+    pub place: FieldPlace,
+    /// Wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Cells across the stop.
+    pub n_across: usize,
+    /// Waves in each cell, positive for late light: rows from the bottom of the stop, each from its left (lens frame); none
+    /// outside the pupil.
+    pub waves: Vec<Option<f64>>,
 }
 
 /// Places of the film, behind the last vertex, mm, and how good they are.
@@ -46,6 +116,8 @@ pub struct LensAnalysis {
 pub struct FocusData {
     /// The paraxial image at the reference wavelength.
     pub paraxial_film_mm: Option<f64>,
+    /// That in the x–z plane, for lenses without an axis of symmetry.
+    pub paraxial_x_film_mm: Option<f64>,
     /// The smallest spot on the axis, all wavelengths together.
     pub axis_film_mm: Option<f64>,
     /// Its root-mean-square radius, µm.
@@ -74,21 +146,24 @@ pub struct AxialColorRow {
 /// The image of one point at one wavelength.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SpotRow {
-    /// Field angle, degrees.
-    pub field_deg: f64,
+    /// The point of the field.
+    #[serde(flatten)]
+    pub place: FieldPlace,
     /// Wavelength, nm.
     pub wavelength_nm: f64,
-    /// Height of the centroid, mm.
+    /// Height of the centroid in the direction of the field, mm.
     pub height_mm: Option<f64>,
+    /// The centroid, mm.
+    pub image_mm: Option<[f64; 2]>,
     /// Root-mean-square radius about the centroid, µm.
     pub rms_um: Option<f64>,
     /// Root-mean-square radius about the chief ray, µm.
     pub rms_about_chief_um: Option<f64>,
     /// Distance of the farthest ray from the chief ray, µm.
     pub radius_um: Option<f64>,
-    /// Root mean square along x, across the field, µm.
+    /// Root mean square along x, µm: across a field above the axis.
     pub sigma_x_um: Option<f64>,
-    /// Root mean square along y, along the field, µm.
+    /// Root mean square along y, µm.
     pub sigma_y_um: Option<f64>,
     /// The share of the rays through the stop that rims let pass.
     pub transmission: f64,
@@ -130,8 +205,9 @@ pub struct PupilRow {
 /// Aberrations along two lines across the stop.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FanRow {
-    /// Field angle, degrees.
-    pub field_deg: f64,
+    /// The point of the field.
+    #[serde(flatten)]
+    pub place: FieldPlace,
     /// Wavelength, nm.
     pub wavelength_nm: f64,
     /// Places along the lines, in units of the stop's radius.
@@ -149,18 +225,25 @@ pub struct FanRow {
 /// What depends on the field alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FieldRow {
-    /// Field angle, degrees.
-    pub field_deg: f64,
-    /// Height of the chief ray at the reference wavelength, mm.
+    /// The point of the field.
+    #[serde(flatten)]
+    pub place: FieldPlace,
+    /// Height of the chief ray at the reference wavelength in the direction of the field, mm.
     pub height_mm: Option<f64>,
+    /// Where it lands, mm.
+    pub image_mm: Option<[f64; 2]>,
     /// Distortion against a height in step with the angle's tangent, percent.
     pub distortion_tangent_percent: Option<f64>,
     /// Distortion against a height in step with the angle, percent.
     pub distortion_angle_percent: Option<f64>,
-    /// The focus of close rays in the plane of the field, mm behind the film.
+    /// The focus of close rays in the plane of the field, mm along the axis behind the film where the chief ray meets it.
     pub tangential_focus_mm: Option<f64>,
     /// The focus of close rays beside it, mm behind the film.
     pub sagittal_focus_mm: Option<f64>,
+    /// The focus of close rays beside the chief ray along x, mm behind the film; for lenses without an axis of symmetry.
+    pub x_focus_mm: Option<f64>,
+    /// The same along y.
+    pub y_focus_mm: Option<f64>,
     /// Illumination over that on the axis.
     pub relative_illumination: Option<f64>,
     /// Chief-ray height at each wavelength less that at the reference, µm.
