@@ -79,6 +79,10 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
         return print_json(&data);
     }
     let mut text = format!("{}\n{}\n\n", lens.name(), lens.source());
+    let object_medium = lens.object_medium().describe();
+    if object_medium != "air" {
+        writeln!(text, "object in {object_medium}\n")?;
+    }
     text += &surface_table(&surface_rows(&lens))?;
     text += "\n";
     text += &data_table(&data)?;

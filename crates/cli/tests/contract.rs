@@ -134,6 +134,24 @@ fn lens_analyze_has_its_keys_and_leaves_its_plots() {
 }
 
 #[test]
+fn an_objective_in_water_is_told_and_analysed() {
+    let folder = tempfile::tempdir().unwrap();
+    let water = "(name: \"dipping\", source: \"a test\", object_medium: Constant(index: 1.33), surfaces: [
+        (semi_aperture_mm: 2.0, medium: Constant(index: 1.52), thickness_mm: 1.2),
+        (stop: true, radius_mm: -1.25, semi_aperture_mm: 0.4, thickness_mm: 0.0)])";
+    fs::write(folder.path().join("water.ron"), water).unwrap();
+    assert!(
+        output(folder.path(), &["lens", "info", "water.ron"]).contains("object in the medium of constant index 1.33")
+    );
+    let fields = ["--distance-mm", "4", "--fields-mm", "0,0.2", "--rings", "3", "--quiet"];
+    let text = output(folder.path(), &[&["lens", "analyze", "water.ron"][..], &fields].concat());
+    assert!(text.contains("at the object in n = 1.33000") && text.contains("0.2 mm"), "{text}");
+    let draw = ["lens", "draw", "water.ron", "--distance-mm", "4", "--fields-deg", "0", "-o", "water.svg", "--quiet"];
+    output(folder.path(), &draw);
+    assert!(fs::read_to_string(folder.path().join("water.svg")).unwrap().contains("fill-opacity=\"0.6\""));
+}
+
+#[test]
 fn psf_has_its_keys_in_both_modes() {
     let folder = tempfile::tempdir().unwrap();
     let common = [
