@@ -115,6 +115,12 @@ pub(crate) struct RunArgs {
     /// Diffraction at the stop
     #[arg(long, value_name = "KIND", value_enum)]
     pub(crate) diffraction: Option<DiffractionKind>,
+    /// How point-spread functions are sampled
+    #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error")]
+    pub(crate) bank: Option<BankKind>,
+    /// Samples point-spread functions as finely as this median error needs, a share of the energy, e.g. 0.01
+    #[arg(long, value_name = "E")]
+    pub(crate) bank_error: Option<f64>,
     /// How the scene is blurred
     #[arg(long, value_name = "MODE", value_enum)]
     pub(crate) blur: Option<BlurKind>,
@@ -150,6 +156,15 @@ pub(crate) enum DiffractionKind {
     HurbCalibrated,
     /// The sum of waves while the blur is small enough for it, ray bending (γ = 1) beyond
     Wave,
+}
+
+/// How point-spread functions are sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BankKind {
+    /// Rays of 9 fields, 9 depths and 4 wavelengths, interpolated
+    Standard,
+    /// Pictures of the same samples, blended as in the paper, for comparison only
+    Paper,
 }
 
 /// What the picture makes white.
@@ -350,6 +365,12 @@ pub(crate) struct PsfArgs {
     /// Rays along the side of the paper mode's square grid
     #[arg(long, value_name = "N", default_value_t = 201)]
     pub(crate) rays: usize,
+    /// Draws from a bank over the range of the points, not traced at each, and tells the error of that
+    #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error")]
+    pub(crate) bank: Option<BankKind>,
+    /// Draws from a bank sampled as finely as this median error needs, a share of the energy, e.g. 0.01
+    #[arg(long, value_name = "E")]
+    pub(crate) bank_error: Option<f64>,
     /// Adds MTF tables at these frequencies, cycles/mm
     #[arg(long, value_name = "LIST")]
     pub(crate) mtf_per_mm: Option<String>,

@@ -3,11 +3,12 @@
 use std::fmt::Write;
 
 use dioptric_pipeline::{
-    FocusChoice, PsfRequest, PsfRow, PsfSampling, PsfSet, Staged, drawing_file, open_lens, parse_numbers, psf_csv,
+    BankChoice, FocusChoice, PsfRequest, PsfRow, PsfSampling, PsfSet, Staged, drawing_file, open_lens, parse_numbers,
+    psf_csv,
 };
 
 use crate::{
-    args::{Common, PsfArgs, PsfMode},
+    args::{BankKind, Common, PsfArgs, PsfMode},
     run::diffraction,
     terminal::{Bar, guarded, print, print_json, remark},
 };
@@ -34,6 +35,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
             PsfMode::Pupil => PsfSampling::Pupil,
             PsfMode::Paper => PsfSampling::Paper { n_across: arguments.rays },
         },
+        bank: bank(arguments.bank, arguments.bank_error),
         mtf_per_mm: match &arguments.mtf_per_mm {
             Some(list) => parse_numbers("--mtf-per-mm", list)?,
             None => Vec::new(),
@@ -93,8 +95,21 @@ fn with_whole_light(set: &PsfSet, mtf_per_mm: &[f64]) -> Vec<PsfRow> {
     rows
 }
 
+fn bank(kind: Option<BankKind>, error: Option<f64>) -> Option<BankChoice> {
+    match (kind, error) {
+        (_, Some(error)) => Some(BankChoice::Within { error }),
+        (Some(BankKind::Standard), None) => Some(BankChoice::Standard),
+        (Some(BankKind::Paper), None) => Some(BankChoice::Paper),
+        (None, None) => None,
+    }
+}
+
 fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
-    let mut text = format!("film {:.4} mm behind the last vertex, pixels of {} µm\n\n", set.film_mm, set.pixel_um);
+    let mut text = format!("film {:.4} mm behind the last vertex, pixels of {} µm\n", set.film_mm, set.pixel_um);
+    if let Some(bank) = &set.bank {
+        writeln!(text, "{}", bank.in_words())?;
+    }
+    text.push('\n');
     writeln!(
         text,
         "{:>9} {:>12} {:>8} {:>12} {:>12} {:>10} {:>10} {:>10} {:>10} {:>10} {:>8}",
@@ -126,7 +141,7 @@ fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
             row.ee50_radius_um,
             row.energy
         )?;
-        if row.energy > 0.0 && row.is_cut() {
+        if row.is_cut() {
             let share = 100.0 * row.picture_share;
             writeln!(text, "{:>31} holds {share:.1} % of the light: LSF and EE50 are of that part", "picture")?;
         }

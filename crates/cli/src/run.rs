@@ -8,13 +8,13 @@ use std::{
 
 use anyhow::{Context, bail};
 use dioptric_pipeline::{
-    BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, FrameFile, FramesChoice, LensChoice, Progress,
-    Report, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, WhiteChoice, parse_illuminant,
-    parse_numbers, with_exposure_s,
+    BankChoice, BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, FrameFile, FramesChoice, LensChoice,
+    Progress, Report, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, WhiteChoice,
+    parse_illuminant, parse_numbers, with_exposure_s,
 };
 
 use crate::{
-    args::{BlurKind, Common, DiffractionKind, FrameArgs, RunArgs, WhiteKind},
+    args::{BankKind, BlurKind, Common, DiffractionKind, FrameArgs, RunArgs, WhiteKind},
     terminal::{Bar, guarded, print, print_json, remark},
 };
 
@@ -100,6 +100,15 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) {
     if let Some(kind) = arguments.diffraction {
         camera.diffraction = diffraction(kind);
     }
+    if let Some(kind) = arguments.bank {
+        camera.bank = match kind {
+            BankKind::Standard => BankChoice::Standard,
+            BankKind::Paper => BankChoice::Paper,
+        };
+    }
+    if let Some(error) = arguments.bank_error {
+        camera.bank = BankChoice::Within { error };
+    }
     if let Some(kind) = arguments.blur {
         camera.blur = match kind {
             BlurKind::Layered => BlurChoice::Layered,
@@ -171,13 +180,14 @@ fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
 fn summary(report: &Report, out: &Path) -> String {
     let total_s: f64 = report.timings_s.iter().map(|(_, seconds)| seconds).sum();
     format!(
-        "{}: {} × {} pixels, {} bands, {:.2} ms, {:.1} s\n{}\n",
+        "{}: {} × {} pixels, {} bands, {:.2} ms, {:.1} s\n{}{}\n",
         report.camera.name,
         report.film.columns,
         report.film.rows,
         report.irradiance.wavelengths_nm.len(),
         1e3 * report.sensor.exposure_time_s,
         total_s,
+        report.psf_bank.as_ref().map_or_else(String::new, |bank| format!("point spreads: {}\n", bank.in_words())),
         out.join("report.html").display(),
     )
 }

@@ -215,6 +215,24 @@ fn psf_adds_the_whole_light_and_writes_its_table_and_mosaic() {
 }
 
 #[test]
+fn psf_tells_the_error_of_the_bank_that_it_draws_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let common =
+        ["psf", "dgauss-50mm", "--stop-mm", "8", "--focus-mm", "2000", "--fields-deg", "0,5", "--distances-mm"];
+    let common = [&common[..], &["1000,1500,4000", "--pixel-um", "5"]].concat();
+    let error = |more: &[&str]| {
+        let records = json(folder.path(), &[&common[..], more, &["--json"]].concat());
+        check_numbers(&records[1]["bank"], "median_error p90_error n_fields n_depths n_wavelengths n_places pitch_um");
+        records[1]["bank"]["median_error"].as_f64().unwrap()
+    };
+    let (within, paper) = (error(&["--bank-error", "0.01"]), error(&["--bank", "paper"]));
+    assert!(within <= 0.01 && paper > 0.1, "{within} {paper}");
+    let text = output(folder.path(), &[&common[..], &["--bank", "standard"]].concat());
+    assert!(text.contains("rays interpolated between 9 fields") && text.contains("median"), "{text}");
+    common::check_error(folder.path(), &[&common[..], &["--bank-error", "0"]].concat(), &["bank_error", "above 0"]);
+}
+
+#[test]
 fn a_picture_that_cannot_hold_its_light_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let common = ["psf", "singlet-50mm", "--focus-mm", "2000", "--pixel-um", "4", "--size", "31"];

@@ -13,7 +13,7 @@ use dioptric_spectrum::Illuminant;
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::{FramesChoice, Outputs, PipelineError, SceneChoice, check::Checker};
+use crate::{BankChoice, FramesChoice, Outputs, PipelineError, SceneChoice, check::Checker};
 
 /// The camera of the built-in demo.
 const DEMO: &str = include_str!("../../../fixtures/cameras/demo.ron");
@@ -39,6 +39,9 @@ pub struct Camera {
     /// Diffraction at the stop.
     #[serde(default)]
     pub diffraction: DiffractionChoice,
+    /// How the point-spread functions are sampled.
+    #[serde(default)]
+    pub bank: BankChoice,
     /// How the point-spread functions are laid over the scene.
     #[serde(default)]
     pub blur: BlurChoice,
@@ -355,6 +358,9 @@ impl Camera {
         if let DiffractionChoice::Hurb { gamma } = self.diffraction {
             checker.positive("gamma", gamma)?;
         }
+        if let BankChoice::Within { error } = self.bank {
+            checker.positive("error", error)?;
+        }
         match &self.exposure {
             ExposureControl::Manual(exposure) => checker.positive("time_s", exposure.time_s)?,
             ExposureControl::Auto(auto) => checker.positive("target_fraction", auto.target_fraction)?,
@@ -459,5 +465,7 @@ mod tests {
         check_error(&SHORT.replace("2000.0", "0"), &["shot.ron:5", "DistanceMm"]);
         let film = "film: Pixels(columns: 0, rows: 4, pitch_um: 1.0),\n    sensor:";
         check_error(&SHORT.replace("sensor:", film), &["shot.ron:6", "columns", "0"]);
+        let bank = "bank: Within(error: -0.1),\n    sensor:";
+        check_error(&SHORT.replace("sensor:", bank), &["shot.ron:6", "error", "-0.1"]);
     }
 }

@@ -99,7 +99,7 @@ impl Shot {
             grid: self.grid(),
             diffraction: self.camera.diffraction.into(),
         })?;
-        Ok(PsfBank::build(&self.lens, &settings)?)
+        self.camera.bank.build(&self.lens, settings, self.film.pitch_um)
     }
 
     /// Images the scene band by band; the sensor collects electrons beside it, and the file grows.

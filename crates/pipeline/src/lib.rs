@@ -10,6 +10,7 @@
 #![doc = include_str!("../README.md")]
 
 mod band_stream;
+mod bank_choice;
 mod camera;
 mod capture;
 mod check;
@@ -45,6 +46,7 @@ mod staged;
 mod svg_png;
 mod trace_table;
 
+pub use bank_choice::{BankChoice, BankData};
 pub use camera::{
     BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, ProcessingChoice, SensorChoice,
     StopChoice, WavelengthChoice, WhiteChoice,

@@ -23,8 +23,9 @@ const LEFT: u32 = 104;
 const TOP: u32 = 44;
 /// Room under a row of tiles for its scale, pixels.
 const SCALE: u32 = 22;
-/// The share of a picture's energy that its tile holds.
-const HELD: f64 = 0.995;
+/// The share of a picture's energy that a square within its tile holds; the far tails of diffraction would leave the
+/// rest of it small.
+const HELD: f64 = 0.98;
 
 impl PsfSet {
     /// Draws all pictures: wavelengths across, with the whole light of all of them in colour at the end of each row;
@@ -74,7 +75,7 @@ impl PsfSet {
 
     /// Returns the side of the square that holds nearly all light of each picture of a point and of them all, µm.
     fn row_side_um(&self, point: Range<usize>) -> f64 {
-        let own = point.clone().filter(|i| self.rows[*i].energy > 0.0).map(|i| self.pictures[i].view());
+        let own = point.clone().filter(|i| !self.rows[*i].is_dark()).map(|i| self.pictures[i].view());
         let whole = self.whole_light_of(point).map(|light| light.picture);
         let side = |picture: ndarray::ArrayView2<'_, f32>| {
             2.0 * dioptric_psf::Picture::new(picture, self.pixel_um).energy_half_side_um(HELD)
@@ -106,6 +107,10 @@ impl PsfSet {
             let y = f64::from(layout.corner(row, 0).1);
             sheet.text((8.0, y + 16.0), 13.0, ink, &format!("{}°", number(first.field_deg)));
             sheet.text((8.0, y + 34.0), 13.0, ink, &distance(first.distance_mm));
+            if point.clone().all(|i| self.rows[i].is_dark()) {
+                sheet.text((8.0, y + 52.0), 12.0, soft, "dark");
+                continue;
+            }
             let bar_um = round_down(0.45 * side_um);
             let bar_px = bar_um / side_um * f64::from(layout.tile);
             let below = y + f64::from(layout.tile) + 9.0;

@@ -7,7 +7,7 @@ use dioptric_optics::glam::DVec2;
 use dioptric_psf::Picture;
 use serde::Serialize;
 
-use crate::spot::Moments;
+use crate::{BankData, spot::Moments};
 
 /// What is measured of one point-spread function.
 ///
@@ -62,6 +62,9 @@ pub struct PsfRow {
     /// The Strehl ratio at the pattern's peak, where waves were summed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strehl: Option<f64>,
+    /// The bank from which it was drawn, where it was not traced.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bank: Option<BankData>,
     /// Modulation at the frequencies asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mtf: Vec<MtfRow>,
@@ -90,7 +93,8 @@ impl PsfRow {
     /// Measures a picture whose light lies at this place and has these second moments, µm².
     pub(crate) fn measure(name: PointName, place_mm: DVec2, second: Covariance, picture: &Picture) -> Self {
         let [encircled, ensquared] = [picture.encircled(), picture.ensquared()];
-        let width_um = |direction: f64| picture.line_spread(direction).full_width_at_half_maximum_um();
+        let lit = |value: f64| if picture.energy().sum() > 0.0 { value } else { f64::NAN };
+        let width_um = |direction: f64| lit(picture.line_spread(direction).full_width_at_half_maximum_um());
         let (sigma_x_um, sigma_y_um) = (second.xx.sqrt(), second.yy.sqrt());
         Self {
             field_deg: name.field_deg,
@@ -106,15 +110,16 @@ impl PsfRow {
             second_moment_xy_um2: second.xy + 0.0,
             lsf_fwhm_um: width_um(0.0),
             lsf_fwhm_y_um: width_um(FRAC_PI_2),
-            ee50_radius_um: encircled.reach_um(0.5),
-            ee80_radius_um: encircled.reach_um(0.8),
-            es50_half_width_um: ensquared.reach_um(0.5),
-            es80_half_width_um: ensquared.reach_um(0.8),
+            ee50_radius_um: lit(encircled.reach_um(0.5)),
+            ee80_radius_um: lit(encircled.reach_um(0.8)),
+            es50_half_width_um: lit(ensquared.reach_um(0.5)),
+            es80_half_width_um: lit(ensquared.reach_um(0.8)),
             energy: 0.0,
             picture_share: 0.0,
             wave_share: None,
             fallback: None,
             strehl: None,
+            bank: None,
             mtf: Vec::new(),
         }
     }
@@ -129,9 +134,14 @@ impl PsfRow {
         Self { mtf: cycles_per_mm.iter().map(row).collect(), ..self }
     }
 
+    /// Whether none of the point's light reaches the film: all that is measured of it is then no number.
+    pub fn is_dark(&self) -> bool {
+        self.energy.is_nan() || self.energy <= 0.0
+    }
+
     /// Whether so much of the light lies beside the picture that its metrics are not those of the point.
     pub fn is_cut(&self) -> bool {
-        self.picture_share < 0.97
+        !self.is_dark() && self.picture_share < 0.97
     }
 
     /// Whether any of the picture is the sum of waves.

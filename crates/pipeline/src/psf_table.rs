@@ -4,13 +4,13 @@ use std::path::Path;
 
 use dioptric_diffraction::{Hurb, PupilGrid, WaveNodes};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
-use dioptric_psf::{BankSettings, Diffraction, ModelUse, Picture, PsfBank, PsfQuery};
+use dioptric_psf::{BankSettings, Diffraction, Interpolation, ModelUse, Picture, PsfBank, PsfQuery};
 use dioptric_scene::write_planes_exr;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    DiffractionChoice, FocusChoice, PipelineError, PsfRow, REFERENCE_WAVELENGTH_NM,
+    BankChoice, BankData, DiffractionChoice, FocusChoice, PipelineError, PsfRow, REFERENCE_WAVELENGTH_NM,
     display::png_bytes,
     psf_row::{PointName, place_and_size},
     spot::{PaperRays, Spot},
@@ -38,6 +38,8 @@ pub struct PsfRequest {
     pub size: Option<usize>,
     /// How the light is sampled.
     pub sampling: PsfSampling,
+    /// A bank over the range of the points from which they are drawn; `None` to trace each of them.
+    pub bank: Option<BankChoice>,
     /// Spatial frequencies of the MTF tables, cycles per mm.
     pub mtf_per_mm: Vec<f64>,
     /// The seed of the paper mode's diffraction.
@@ -69,6 +71,8 @@ pub struct PsfSet {
     pub rows: Vec<PsfRow>,
     /// The energy on each pixel about the centroid, in the order of `rows`; the sum is at most 1.
     pub pictures: Vec<Array2<f32>>,
+    /// How the bank was sampled, where points were drawn from one and not traced.
+    pub bank: Option<BankData>,
     /// The weight of each wavelength in the light of all of them, in the order of the request.
     pub spectral_weights: Vec<f64>,
 }
@@ -103,17 +107,19 @@ impl PsfRequest {
         };
         let items = self.items(lens)?;
         let bank = match self.sampling {
-            PsfSampling::Pupil => Some(PsfBank::build(lens, &self.bank_settings(&items, film_mm))?),
+            PsfSampling::Pupil => Some(self.build_bank(lens, &items, film_mm)?),
             PsfSampling::Paper { .. } => None,
         };
         let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> =
             items.par_iter().map(|item| self.compute_one(item, lens, bank.as_ref(), film_mm)).collect();
-        let (rows, pictures) = computed?.into_iter().unzip();
+        let (mut rows, pictures): (Vec<PsfRow>, _) = computed?.into_iter().unzip();
         let spectral_weights = match self.spectral_weights.is_empty() {
             true => vec![1.0; self.wavelengths_nm.len()],
             false => self.spectral_weights.clone(),
         };
-        Ok(PsfSet { film_mm, pixel_um: self.pixel_um, rows, pictures, spectral_weights })
+        let bank = bank.as_ref().and_then(BankData::of);
+        rows.iter_mut().for_each(|row| row.bank.clone_from(&bank));
+        Ok(PsfSet { film_mm, pixel_um: self.pixel_um, rows, pictures, bank, spectral_weights })
     }
 
     /// Returns the points: fields outermost, then distances, then wavelengths.
@@ -172,6 +178,14 @@ impl PsfRequest {
         if matches!(self.sampling, PsfSampling::Paper { .. }) && self.diffraction == DiffractionChoice::Wave {
             return Err(self.wrong("diffraction", "wave", "bent rays or none in the paper mode"));
         }
+        if let Some(BankChoice::Within { error }) = self.bank
+            && !(error.is_finite() && error > 0.0)
+        {
+            return Err(self.wrong("bank_error", &error.to_string(), "a number above 0"));
+        }
+        if self.bank.is_some() && self.sampling != PsfSampling::Pupil {
+            return Err(self.wrong("bank", "a bank", "none in the paper mode, which counts the rays of each point"));
+        }
         let (weights, n) = (&self.spectral_weights, self.wavelengths_nm.len());
         let are_weights = weights.iter().all(|w| w.is_finite() && *w >= 0.0) && weights.iter().any(|w| *w > 0.0);
         if !weights.is_empty() && (weights.len() != n || !are_weights) {
@@ -186,6 +200,17 @@ impl PsfRequest {
 
     fn wrong(&self, key: &'static str, found: &str, expected: &str) -> PipelineError {
         PipelineError::Value { origin: "psf".to_owned(), key, found: found.to_owned(), expected: expected.to_owned() }
+    }
+
+    /// Returns a bank with a sample at every point, or over their range where that was asked for.
+    fn build_bank(&self, lens: &Lens, items: &[Item], film_mm: f64) -> Result<PsfBank, PipelineError> {
+        let exact = self.bank_settings(items, film_mm);
+        let Some(choice) = self.bank else { return Ok(PsfBank::build(lens, &exact)?) };
+        let ends = |list: &[f64]| (list[0], list[list.len() - 1]);
+        let (_, last_field_tan) = ends(&exact.field_tans);
+        let (dioptres, wavelengths_nm) = (ends(&exact.dioptres), ends(&exact.wavelengths_nm));
+        let standard = BankSettings::covering(film_mm, last_field_tan, dioptres, wavelengths_nm, exact.diffraction);
+        choice.build(lens, standard, self.pixel_um)
     }
 
     /// Settings with a sample at every point asked for, so that nothing is interpolated.
@@ -206,6 +231,7 @@ impl PsfRequest {
             n_rings: 24,
             n_azimuths: 96,
             diffraction: self.diffraction.into(),
+            interpolation: Interpolation::Rays,
         }
     }
 
@@ -404,6 +430,7 @@ mod tests {
             pixel_um: 2.0,
             size: None,
             sampling: PsfSampling::Pupil,
+            bank: None,
             mtf_per_mm: vec![0.0, 10.0],
             seed: 1,
             spectral_weights: vec![],
@@ -464,6 +491,31 @@ mod tests {
     }
 
     #[test]
+    fn points_drawn_from_a_bank_are_nearly_the_traced_ones() {
+        let request =
+            PsfRequest { fields_deg: vec![0.0, 1.7, 5.0], distances_mm: vec![1000.0, 1700.0, 8000.0], ..request() };
+        let traced = request.compute(&paper_lens()).unwrap();
+        assert_eq!((traced.bank.is_none(), traced.rows[0].bank.is_none()), (true, true));
+        let drawn =
+            PsfRequest { bank: Some(BankChoice::Within { error: 0.02 }), ..request }.compute(&paper_lens()).unwrap();
+        let data = drawn.rows[3].bank.as_ref().unwrap();
+        assert!(data.median_error <= 0.02 && data.n_places == 24, "{data:?}");
+        for (a, b) in traced.rows.iter().zip(&drawn.rows) {
+            // Blurs of tens of µm whose outlines are right to some hundredths of a pixel.
+            assert_relative_eq!(a.ee80_radius_um, b.ee80_radius_um, max_relative = 0.03, epsilon = 0.3);
+        }
+    }
+
+    #[test]
+    fn a_dark_point_has_no_size() {
+        let request = PsfRequest { fields_deg: vec![0.0, 60.0], ..request() };
+        let set = request.compute(&paper_lens()).unwrap();
+        assert!(!set.rows[0].is_dark() && set.rows[2].is_dark() && !set.rows[2].is_cut());
+        assert!(set.rows[2].ee50_radius_um.is_nan() && set.rows[2].lsf_fwhm_um.is_nan());
+        assert!(set.mosaic().is_ok() && set.whole_light(&[]).len() == 1);
+    }
+
+    #[test]
     fn a_size_asked_for_is_kept() {
         for (sampling, size) in [(PsfSampling::Pupil, 33), (PsfSampling::Paper { n_across: 51 }, 75)] {
             let set = PsfRequest { sampling, size: Some(size), ..request() }.compute(&paper_lens()).unwrap();
@@ -480,6 +532,8 @@ mod tests {
             PsfRequest { pixel_um: 0.0, ..request() },
             PsfRequest { size: Some(0), ..request() },
             PsfRequest { focus: FocusChoice::NearObject, ..request() },
+            PsfRequest { bank: Some(BankChoice::Within { error: f64::NAN }), ..request() },
+            PsfRequest { bank: Some(BankChoice::Paper), sampling: PsfSampling::Paper { n_across: 21 }, ..request() },
         ] {
             assert!(wrong.compute(&paper_lens()).is_err(), "{wrong:?}");
         }

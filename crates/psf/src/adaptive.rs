@@ -7,7 +7,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{BankSettings, Diffraction, Kernel, PsfBank, PsfError};
+use crate::{BankSettings, Diffraction, Interpolation, Kernel, PsfBank, PsfError};
 
 /// How right a bank is to be, and how large it may become.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,17 +16,40 @@ pub struct AdaptiveSettings {
     pub target_median: f64,
     /// The largest number of samples: fields × depths × wavelengths.
     pub most_samples: usize,
+    /// Where the error is measured.
+    pub places: ErrorPlaces,
+}
+
+impl AdaptiveSettings {
+    /// A median error of 1 % at the standard places, with at most 2,000 samples.
+    pub const STANDARD: Self = Self { target_median: 0.01, most_samples: 2000, places: ErrorPlaces::STANDARD };
+}
+
+/// Where the error of a bank is measured: at places drawn evenly over its field, depths and wavelengths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorPlaces {
     /// Side of the pixels on which pictures are compared, µm.
     pub pitch_um: f64,
-    /// Places at which they are compared.
+    /// How many places.
     pub n_places: usize,
     /// The seed of the places.
     pub seed: u64,
 }
 
-impl AdaptiveSettings {
-    /// A median error of 1 % on pixels of 5 µm, at 40 places, with at most 2,000 samples.
-    pub const STANDARD: Self = Self { target_median: 0.01, most_samples: 2000, pitch_um: 5.0, n_places: 40, seed: 1 };
+impl ErrorPlaces {
+    /// Pixels of 5 µm, 40 places.
+    pub const STANDARD: Self = Self { pitch_um: 5.0, n_places: 40, seed: 1 };
+
+    fn check(&self) -> Result<(), PsfError> {
+        let setting = |key, found: f64, expected| Err(PsfError::Setting { key, found, expected });
+        if self.n_places < 4 {
+            return setting("n_places", self.n_places as f64, "4 or more");
+        }
+        if !(self.pitch_um.is_finite() && self.pitch_um > 0.0) {
+            return setting("pitch_um", self.pitch_um, "a number above 0");
+        }
+        Ok(())
+    }
 }
 
 /// The error of a bank's interpolation, measured at places that are no samples of it.
@@ -43,8 +66,15 @@ pub struct MeasuredError {
     pub n_places: usize,
     /// Side of the pixels, µm.
     pub pitch_um: f64,
-    /// Whether the target was met; a bank that reached its largest size before has `false`.
-    pub is_target_met: bool,
+    /// The median that was wanted, if any was.
+    pub target_median: Option<f64>,
+}
+
+impl MeasuredError {
+    /// Whether the target was met, if there was one; a bank that reached its largest size before has `false`.
+    pub fn is_target_met(&self) -> bool {
+        self.target_median.is_none_or(|target| self.median <= target)
+    }
 }
 
 /// The axes of a bank.
@@ -67,14 +97,13 @@ impl PsfBank {
         if wanted.target_median.is_nan() || wanted.target_median <= 0.0 {
             return setting("target_median", wanted.target_median, "a number above 0");
         }
-        if wanted.n_places < 4 {
-            return setting("n_places", wanted.n_places as f64, "4 or more");
-        }
+        wanted.places.check()?;
         // Bending and waves only smooth what geometry gets wrong.
         let geometric = |settings: &BankSettings| BankSettings { diffraction: Diffraction::None, ..settings.clone() };
         let mut settings = start.clone();
-        let truth = Truth::trace(lens, &geometric(&settings), wanted)?;
-        let mut error = truth.error_of(&Self::build(lens, &geometric(&settings))?, wanted);
+        let first = Self::build(lens, &geometric(&settings))?;
+        let truth = Truth::trace(&first, &wanted.places);
+        let mut error = truth.error_of(&first);
         while error.median > wanted.target_median {
             let tried = [Along::Field, Along::Depth, Along::Color].into_iter().filter_map(|along| {
                 let finer = along.refined(&settings)?;
@@ -82,7 +111,7 @@ impl PsfBank {
             });
             let mut best: Option<(BankSettings, MeasuredError, f64)> = None;
             for finer in tried {
-                let found = truth.error_of(&Self::build(lens, &geometric(&finer))?, wanted);
+                let found = truth.error_of(&Self::build(lens, &geometric(&finer))?);
                 // What it gains for what it costs.
                 let growth = finer.n_samples() as f64 / settings.n_samples() as f64;
                 let gain = (error.median / found.median.max(1e-9)).ln() / growth.ln();
@@ -93,7 +122,19 @@ impl PsfBank {
             let Some((finer, found, _)) = best else { break };
             (settings, error) = (finer, found);
         }
-        Ok(Self::build(lens, &settings)?.with_error(error))
+        let target_median = Some(wanted.target_median);
+        Ok(Self::build(lens, &settings)?.with_error(MeasuredError { target_median, ..error }))
+    }
+
+    /// Returns the bank with the error of its interpolation measured.
+    ///
+    /// # Errors
+    /// When the places make no sense.
+    pub fn with_measured_error(self, places: &ErrorPlaces) -> Result<Self, PsfError> {
+        places.check()?;
+        let geometric = self.geometric();
+        let error = Truth::trace(&geometric, places).error_of(&geometric);
+        Ok(self.with_error(error))
     }
 }
 
@@ -127,17 +168,18 @@ fn resampled(list: &[f64], n: usize) -> Option<Vec<f64>> {
 
 /// Pictures traced where they are wanted.
 struct Truth {
+    pitch_um: f64,
     /// Field, dioptres, wavelength (nm) and the picture.
     places: Vec<(f64, f64, f64, Kernel)>,
 }
 
 impl Truth {
-    fn trace(lens: &Lens, settings: &BankSettings, wanted: &AdaptiveSettings) -> Result<Self, PsfError> {
-        settings.check()?;
+    /// Traces pictures at places within what a bank covers; places that turn out to be dark are left out.
+    fn trace(bank: &PsfBank, wanted: &ErrorPlaces) -> Self {
+        let settings = bank.settings();
         let mut random = ChaCha8Rng::seed_from_u64(wanted.seed);
         let mut between = |list: &[f64]| list[0] + (list[list.len() - 1] - list[0]) * random.random::<f64>();
-        let last = PsfBank::build(lens, settings)?.last_field_tan();
-        let fields = [0.0, last];
+        let fields = [0.0, bank.last_field_tan()];
         let drawn: Vec<(f64, f64, f64)> = (0..wanted.n_places)
             .map(|_| (between(&fields), between(&settings.dioptres), between(&settings.wavelengths_nm)))
             .collect();
@@ -146,31 +188,34 @@ impl Truth {
                 field_tans: if field > 0.0 { vec![0.0, field] } else { vec![0.0] },
                 dioptres: vec![dioptres],
                 wavelengths_nm: vec![nm],
+                interpolation: Interpolation::Rays,
                 ..settings.clone()
             };
-            let kernel = PsfBank::build(lens, &here)?.kernel(DVec2::X * field, dioptres, nm, wanted.pitch_um);
-            Ok((field, dioptres, nm, kernel))
+            let there = PsfBank::build(bank.lens(), &here).ok().filter(|bank| bank.last_field_tan() == field)?;
+            Some((field, dioptres, nm, there.kernel(DVec2::X * field, dioptres, nm, wanted.pitch_um)))
         };
-        Ok(Self { places: drawn.par_iter().map(traced).collect::<Result<_, PsfError>>()? })
+        Self { pitch_um: wanted.pitch_um, places: drawn.par_iter().filter_map(traced).collect() }
     }
 
-    fn error_of(&self, bank: &PsfBank, wanted: &AdaptiveSettings) -> MeasuredError {
+    fn error_of(&self, bank: &PsfBank) -> MeasuredError {
         let mut errors: Vec<f64> = self
             .places
             .par_iter()
             .map(|(field, dioptres, nm, truth)| {
-                difference(&bank.kernel(DVec2::X * *field, *dioptres, *nm, wanted.pitch_um), truth)
+                difference(&bank.kernel(DVec2::X * *field, *dioptres, *nm, self.pitch_um), truth)
             })
             .collect();
         errors.sort_by(f64::total_cmp);
-        let quantile = |share: f64| errors[((errors.len() as f64 * share) as usize).min(errors.len() - 1)];
-        let median = quantile(0.5);
+        let quantile = |share: f64| {
+            let last = errors.len().saturating_sub(1);
+            errors.get(((errors.len() as f64 * share) as usize).min(last)).copied().unwrap_or(f64::NAN)
+        };
         MeasuredError {
-            median,
+            median: quantile(0.5),
             p90: quantile(0.9),
             n_places: errors.len(),
-            pitch_um: wanted.pitch_um,
-            is_target_met: median <= wanted.target_median,
+            pitch_um: self.pitch_um,
+            target_median: None,
         }
     }
 }
@@ -201,24 +246,30 @@ mod tests {
             wavelengths_nm: vec![450.0, 650.0],
             ..BankSettings::covering(film_mm, 0.2, (0.1, 1.0), (450.0, 650.0), Diffraction::None)
         };
-        let wanted = AdaptiveSettings { target_median: 0.01, n_places: 16, ..AdaptiveSettings::STANDARD };
+        let places = ErrorPlaces { n_places: 16, ..ErrorPlaces::STANDARD };
+        let wanted = AdaptiveSettings { target_median: 0.01, places, ..AdaptiveSettings::STANDARD };
         let plain = PsfBank::build(&lens, &few).unwrap();
         assert_eq!(plain.error(), None);
         let bank = PsfBank::build_adaptive(&lens, &few, &wanted).unwrap();
         let error = bank.error().unwrap();
-        assert!(error.is_target_met && error.median <= 0.01 && error.p90 >= error.median, "{error:?}");
+        assert!(error.is_target_met() && error.median <= 0.01 && error.p90 >= error.median, "{error:?}");
         println!("{} samples: {error:?}", bank.settings().n_samples());
         assert!(bank.settings().n_samples() > few.n_samples());
         assert_eq!(bank.settings().field_tans.last(), few.field_tans.last());
         // Measured once more, at other places, it is much the same.
-        let elsewhere = AdaptiveSettings { seed: 9, n_places: 30, ..wanted };
-        let again = Truth::trace(&lens, bank.settings(), &elsewhere).unwrap().error_of(&bank, &elsewhere);
-        assert!(again.median < 0.02, "{again:?}");
+        let elsewhere = ErrorPlaces { seed: 9, n_places: 30, ..places };
+        let again = bank.clone().with_measured_error(&elsewhere).unwrap().error().unwrap();
+        assert!(again.median < 0.02 && again.is_target_met(), "{again:?}");
+        // What is bent has the error of what is not: it is that of rays.
+        let bent = BankSettings { diffraction: Diffraction::Hurb { gamma: 1.0 }, ..bank.settings().clone() };
+        let bent = PsfBank::build(&lens, &bent).unwrap().with_measured_error(&elsewhere).unwrap().error().unwrap();
+        assert!((bent.median - again.median).abs() < 1e-6, "{bent:?} {again:?}");
 
         let tight = AdaptiveSettings { most_samples: few.n_samples() + 1, ..wanted };
         let bank = PsfBank::build_adaptive(&lens, &few, &tight).unwrap();
-        assert!(!bank.error().unwrap().is_target_met && bank.settings().n_samples() == few.n_samples());
+        assert!(!bank.error().unwrap().is_target_met() && bank.settings().n_samples() == few.n_samples());
         assert!(PsfBank::build_adaptive(&lens, &few, &AdaptiveSettings { target_median: 0.0, ..wanted }).is_err());
+        assert!(plain.with_measured_error(&ErrorPlaces { n_places: 1, ..places }).is_err());
     }
 
     #[test]

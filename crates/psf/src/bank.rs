@@ -133,7 +133,14 @@ impl PsfBank {
         Self { error: Some(error), ..self }
     }
 
-    /// The error of its interpolation, if it was measured: see [`build_adaptive`](Self::build_adaptive).
+    /// Returns the bank without diffraction: of rays alone.
+    pub(crate) fn geometric(&self) -> Self {
+        let settings = BankSettings { diffraction: Diffraction::None, ..self.settings.clone() };
+        Self { settings, waves: vec![], ..self.clone() }
+    }
+
+    /// The error of its interpolation, if it was measured: see [`build_adaptive`](Self::build_adaptive) and
+    /// [`with_measured_error`](Self::with_measured_error).
     pub fn error(&self) -> Option<MeasuredError> {
         self.error
     }

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use crate::{
-    Diffraction, Kernel, PsfBank,
+    Diffraction, Interpolation, Kernel, PsfBank,
     ray_map::Record,
     render::{self, Bending, Layout},
 };
@@ -60,6 +60,14 @@ impl PsfBank {
     }
 
     fn draw(&self, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
+        match self.settings().interpolation {
+            Interpolation::Rays => self.draw_rays(query, side),
+            Interpolation::Images => self.blend(query, side),
+        }
+    }
+
+    /// Draws interpolated rays or waves.
+    pub(crate) fn draw_rays(&self, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
         let record = self.record(query.field_tan.length(), query.dioptres, query.wavelength_nm);
         let layout = self.layout(&record, query, side);
         let share = self.share_of(&layout);

@@ -13,6 +13,7 @@
 mod adaptive;
 mod axis;
 mod bank;
+mod blend;
 mod count;
 mod dispersion;
 mod drawing;
@@ -31,7 +32,7 @@ mod settings;
 mod splat;
 mod store;
 
-pub use adaptive::{AdaptiveSettings, MeasuredError};
+pub use adaptive::{AdaptiveSettings, ErrorPlaces, MeasuredError};
 pub use bank::PsfBank;
 pub use count::{AuthorsBending, CountingFilm, FrontGrid, mean_place_mm, trace_as_authors};
 pub use drawing::{ModelUse, PsfQuery};
@@ -41,4 +42,4 @@ pub use geometry::RadialGeometry;
 pub use kernel::Kernel;
 pub use metrics::{Picture, Profile};
 pub use raster::Raster;
-pub use settings::{BankSettings, Diffraction};
+pub use settings::{BankSettings, Diffraction, Interpolation};

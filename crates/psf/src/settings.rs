@@ -34,6 +34,17 @@ impl Diffraction {
     }
 }
 
+/// How a bank finds what lies between its samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Interpolation {
+    /// Rays are interpolated, and pictures drawn from them: quadratic in field, dioptres and dispersion.
+    #[default]
+    Rays,
+    /// Pictures are blended, as in the paper: linear in the field's tangent, in metres of depth and in nanometres, each
+    /// of sum 1. Between samples a blend shows the pictures of both, not the one between: for comparison only.
+    Images,
+}
+
 /// What a bank covers, and how finely.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -54,6 +65,9 @@ pub struct BankSettings {
     pub n_azimuths: usize,
     /// How diffraction is taken into account.
     pub diffraction: Diffraction,
+    /// How what lies between samples is found.
+    #[serde(default)]
+    pub interpolation: Interpolation,
 }
 
 impl BankSettings {
@@ -83,6 +97,22 @@ impl BankSettings {
             n_rings: 12,
             n_azimuths: 48,
             diffraction,
+            interpolation: Interpolation::Rays,
+        }
+    }
+
+    /// Returns the settings with at most 4 fields, 3 depths and 3 wavelengths from end to end of the same ranges: what
+    /// a bank may begin with whose samples are chosen by its error.
+    pub fn coarse(&self) -> Self {
+        let few = |list: &[f64], n: usize| match list.len() {
+            own if own <= n => list.to_vec(),
+            own => (0..n).map(|i| list[(2 * i * (own - 1) + n - 1) / (2 * (n - 1))]).collect(),
+        };
+        Self {
+            field_tans: few(&self.field_tans, 4),
+            dioptres: few(&self.dioptres, 3),
+            wavelengths_nm: few(&self.wavelengths_nm, 3),
+            ..self.clone()
         }
     }
 
@@ -130,4 +160,22 @@ fn spaced((first, last): (f64, f64), n: usize) -> Vec<f64> {
 
 fn inverse_square(wavelength_nm: f64) -> f64 {
     1.0 / (wavelength_nm * wavelength_nm)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coarse_settings_keep_the_ends() {
+        let fine = BankSettings::covering(52.0, 0.3, (0.0, 1.0), (400.0, 700.0), Diffraction::None);
+        let coarse = fine.coarse();
+        assert_eq!(coarse.n_samples(), 36);
+        let ends = |list: &[f64]| (list[0], list[list.len() - 1]);
+        assert_eq!(ends(&coarse.field_tans), ends(&fine.field_tans));
+        assert_eq!(ends(&coarse.dioptres), ends(&fine.dioptres));
+        assert_eq!(ends(&coarse.wavelengths_nm), ends(&fine.wavelengths_nm));
+        assert!(coarse.check().is_ok());
+        assert_eq!(coarse.coarse(), coarse);
+    }
 }

@@ -14,7 +14,7 @@ use crate::{
     ray_map::{Record, Summary},
 };
 
-const FORMAT: &str = "dioptric psf bank 2";
+const FORMAT: &str = "dioptric psf bank 3";
 
 /// The first line of a file.
 #[derive(Serialize, Deserialize)]
@@ -201,7 +201,7 @@ mod tests {
                     p90: 0.3,
                     n_places: 7,
                     pitch_um: 5.0,
-                    is_target_met: false,
+                    target_median: Some(0.05),
                 }),
             };
             let path = folder.path().join("a.psfbank");

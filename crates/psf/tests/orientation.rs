@@ -3,7 +3,7 @@
 
 use dioptric_diffraction::Covariance;
 use dioptric_optics::{Lens, MonoLens, ObjectPoint, SeidelSettings, analysis::AstigmaticFoci, glam::DVec2};
-use dioptric_psf::{BankSettings, Diffraction, Picture, PsfBank};
+use dioptric_psf::{BankSettings, Diffraction, Interpolation, Picture, PsfBank};
 
 /// Returns a bank with a sample at the axis and at this field, of a far point.
 fn bank_at(lens: &Lens, film_mm: f64, field_tan: f64, wavelengths_nm: &[f64]) -> PsfBank {
@@ -16,6 +16,7 @@ fn bank_at(lens: &Lens, film_mm: f64, field_tan: f64, wavelengths_nm: &[f64]) ->
         n_rings: 24,
         n_azimuths: 96,
         diffraction: Diffraction::None,
+        interpolation: Interpolation::Rays,
     };
     PsfBank::build(lens, &settings).unwrap()
 }

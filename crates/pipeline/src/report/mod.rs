@@ -13,7 +13,7 @@ use serde::Serialize;
 pub use statistics::{ChannelStatistics, LossRow, SensorStatistics};
 
 use crate::{
-    Camera, Capture, LensData, PipelineError, Shot,
+    BankData, Camera, Capture, LensData, PipelineError, Shot,
     capture::IRRADIANCE_FILE,
     frame_files::{Frames, write_frames},
     report::charts::{Charts, Places},
@@ -34,6 +34,8 @@ pub struct Report {
     pub film: FilmData,
     /// The scene.
     pub scene: SceneData,
+    /// How the point-spread functions were sampled, and the error of what lies between.
+    pub psf_bank: Option<BankData>,
     /// The irradiance on the film.
     pub irradiance: IrradianceData,
     /// What the sensor saw.
@@ -151,6 +153,7 @@ impl Capture {
                 mean_luminance_cd_m2: shot.scene.mean_luminance_cd_m2(),
                 light: shot.scene.light,
             },
+            psf_bank: BankData::of(&self.bank),
             irradiance: IrradianceData {
                 wavelengths_nm: shot.grid().centers_nm().to_vec(),
                 mean_w_m2_nm: self.irradiance.mean.clone(),

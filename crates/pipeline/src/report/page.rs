@@ -65,6 +65,7 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
                 settings => page.shot.camera.to_ron(),
                 picture => data_uri(page.picture_png),
                 lens_svg => Value::from_safe_string(drawing.to_svg(&page.shot.lens).unwrap_or_default()),
+                bank => page.report.psf_bank.as_ref().map(crate::BankData::in_words),
                 mosaic => mosaic_src,
                 mosaic_fields => mosaic.fields_deg,
                 mosaic_depths => mosaic.depths_m,
