@@ -338,6 +338,9 @@ pub(crate) struct PsfArgs {
     /// Field angles, degrees
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true)]
     pub(crate) fields_deg: String,
+    /// How far above the axis all of these fields lie, degrees
+    #[arg(long, value_name = "A", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) field_y_deg: f64,
     /// Distances of the points from the first vertex, mm; inf for a star
     #[arg(long, value_name = "LIST", default_value = "2000")]
     pub(crate) distances_mm: String,

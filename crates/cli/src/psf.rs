@@ -25,6 +25,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     };
     let request = PsfRequest {
         fields_deg: parse_numbers("--fields-deg", &arguments.fields_deg)?,
+        field_y_deg: arguments.field_y_deg,
         distances_mm: parse_numbers("--distances-mm", &arguments.distances_mm)?,
         wavelengths_nm: parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?,
         focus,
@@ -106,6 +107,9 @@ fn bank(kind: Option<BankKind>, error: Option<f64>) -> Option<BankChoice> {
 
 fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
     let mut text = format!("film {:.4} mm behind the last vertex, pixels of {} µm\n", set.film_mm, set.pixel_um);
+    if let Some(row) = rows.first().filter(|row| row.field_y_deg != 0.0) {
+        writeln!(text, "all fields {}° above the axis", row.field_y_deg)?;
+    }
     if let Some(bank) = &set.bank {
         writeln!(text, "{}", bank.in_words())?;
     }

@@ -233,6 +233,28 @@ fn psf_tells_the_error_of_the_bank_that_it_draws_from() {
 }
 
 #[test]
+fn psf_of_a_lens_without_an_axis_of_symmetry() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = r#"(name: "two powers", source: "test", surfaces: [
+        (radius_mm: 40.0, shape: Biconic(conic: 0.0, curvature_x_per_mm: 0.02, conic_x: 0.0), stop: true, semi_aperture_mm: 2.0, medium: Constant(index: 1.5), thickness_mm: 1.0),
+        (radius_mm: -40.0, semi_aperture_mm: 3.0, thickness_mm: 0.0),
+    ])"#;
+    fs::write(folder.path().join("two.ron"), lens).unwrap();
+    let common =
+        ["psf", "two.ron", "--film-mm", "39.7", "--fields-deg=-2,0,2", "--field-y-deg", "1", "--pixel-um", "5"];
+    let light = ["--distances-mm", "inf", "--plots", "plots", "-o", "m.png", "--json"];
+    let records = json(folder.path(), &[&common[..], &light].concat());
+    check_numbers(&records[0], "field_y_deg sigma_x_um second_moment_xy_um2 centroid_y_mm");
+    let number = |i: usize, key: &str| records[i][key].as_f64().unwrap();
+    // Mirrored in x, and longer across than up, where the focus is nearer.
+    assert!((number(0, "sigma_x_um") / number(2, "sigma_x_um") - 1.0).abs() < 1e-3);
+    assert!((number(0, "centroid_x_mm") + number(2, "centroid_x_mm")).abs() < 1e-6);
+    assert!(number(1, "sigma_x_um") > 2.0 * number(1, "sigma_y_um"), "{records}");
+    assert!(folder.path().join("plots/through_focus.csv").exists());
+    common::check_error(folder.path(), &[&common[..], &["--bank", "standard"]].concat(), &["bank", "axis of symmetry"]);
+}
+
+#[test]
 fn a_picture_that_cannot_hold_its_light_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let common = ["psf", "singlet-50mm", "--focus-mm", "2000", "--pixel-um", "4", "--size", "31"];

@@ -36,6 +36,7 @@ mod psf_light;
 mod psf_mosaic;
 mod psf_plots;
 mod psf_row;
+mod psf_source;
 mod psf_table;
 mod report;
 mod scene_choice;

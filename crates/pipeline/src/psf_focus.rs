@@ -3,11 +3,12 @@
 use std::f64::consts::FRAC_PI_2;
 
 use dioptric_optics::{Lens, ObjectPoint};
-use dioptric_psf::{Picture, PsfBank, PsfQuery};
+use dioptric_psf::Picture;
 use rayon::prelude::*;
 
 use crate::{
     PipelineError, PsfRequest, PsfSampling, PsfSet,
+    psf_source::PsfSource,
     psf_table::Item,
     spot::{PaperRays, Spot},
 };
@@ -83,8 +84,8 @@ impl Here<'_> {
     fn modulations(&self) -> Result<Vec<(f64, f64)>, PipelineError> {
         match self.request.sampling {
             PsfSampling::Pupil => {
-                let bank = PsfBank::build(self.lens, &self.request.bank_settings(self.items, self.film_mm))?;
-                Ok(self.items.par_iter().map(|item| self.of_picture(item, &bank)).collect())
+                let source = self.request.exact_source(self.lens, self.items, self.film_mm)?;
+                Ok(self.items.par_iter().map(|item| self.of_picture(item, &source)).collect())
             }
             PsfSampling::Paper { n_across } => {
                 let rays = PaperRays { n_across, bending: self.request.diffraction.model(), seed: self.request.seed };
@@ -93,34 +94,27 @@ impl Here<'_> {
         }
     }
 
-    fn of_picture(&self, item: &Item, bank: &PsfBank) -> (f64, f64) {
-        if item.field_tan().length() > bank.last_field_tan() {
-            return (f64::NAN, f64::NAN);
-        }
-        let picture = self.window(item, bank);
+    fn of_picture(&self, item: &Item, source: &PsfSource) -> (f64, f64) {
+        let Some(Window { picture, held }) = self.window(item, source) else { return (f64::NAN, f64::NAN) };
         let modulation = |direction| {
-            let own = picture.picture.mtf(direction, self.cycles_per_mm) * picture.held;
-            (own * self.pixels(self.request.pixel_um) / self.pixels(picture.picture.pitch_um())).min(1.0)
+            let own = picture.mtf(direction, self.cycles_per_mm) * held;
+            (own * self.pixels(self.request.pixel_um) / self.pixels(picture.pitch_um())).min(1.0)
         };
         (modulation(0.0), modulation(FRAC_PI_2))
     }
 
-    /// Draws a point on the coarsest pixels that do, in a window that is not too large.
-    fn window(&self, item: &Item, bank: &PsfBank) -> Window {
-        let reach_um = 1e3 * bank.reach_mm(item.field_tan().length(), item.dioptres, item.wavelength_nm);
-        let pitch_um = pitch_um(self.request.pixel_um, self.cycles_per_mm, reach_um);
-        let query = PsfQuery {
-            field_tan: item.field_tan(),
-            dioptres: item.dioptres,
-            wavelength_nm: item.wavelength_nm,
-            pitch_um,
-        };
+    /// Draws a point on the coarsest pixels that do, in a window that is not too large; `None` of a dark point.
+    fn window(&self, item: &Item, source: &PsfSource) -> Option<Window> {
+        let asked_um = self.request.pixel_um;
+        let reach_um = 1e3 * source.reach_mm(item.query(asked_um))?;
+        let pitch_um = pitch_um(asked_um, self.cycles_per_mm, reach_um);
+        let query = item.query(pitch_um);
         if 2.0 * reach_um > pitch_um * LARGEST_WINDOW as f64 {
-            let (energy, _) = bank.picture(query, LARGEST_WINDOW);
-            return Window { held: energy.sum(), picture: Picture::new(energy.view(), pitch_um) };
+            let (energy, _) = source.picture(query, LARGEST_WINDOW)?;
+            return Some(Window { held: energy.sum(), picture: Picture::new(energy.view(), pitch_um) });
         }
-        let (kernel, _) = bank.kernel_and_model(query);
-        Window { held: 1.0, picture: Picture::from(&kernel) }
+        let (kernel, _) = source.kernel(query)?;
+        Some(Window { held: 1.0, picture: Picture::from(&kernel) })
     }
 
     fn of_rays(&self, item: &Item, rays: &PaperRays) -> Result<(f64, f64), PipelineError> {

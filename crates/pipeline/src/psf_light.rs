@@ -57,8 +57,13 @@ impl PsfSet {
     fn whole(&self, point: Range<usize>, mtf_per_mm: &[f64]) -> Option<WholeLight> {
         let (centroid_mm, parts) = self.parts(point.clone())?;
         let mut second = Covariance::default();
-        let mut name =
-            PointName { field_deg: 0.0, distance_mm: self.rows[point.start].distance_mm, wavelength_nm: 0.0 };
+        let first = &self.rows[point.start];
+        let mut name = PointName {
+            field_deg: first.field_deg,
+            field_y_deg: first.field_y_deg,
+            distance_mm: first.distance_mm,
+            wavelength_nm: 0.0,
+        };
         let (mut energy, mut picture_share, mut wave_share) = (0.0, 0.0, Some(0.0));
         for part in &parts {
             let (row, w) = (&self.rows[part.index], part.share);
@@ -70,7 +75,6 @@ impl PsfSet {
             picture_share += w * row.picture_share;
             wave_share = wave_share.zip(row.wave_share).map(|(sum, share)| sum + w * share);
         }
-        name.field_deg = self.rows[point.start].field_deg;
         let picture = self.summed(&parts, self.side_of(&parts));
         let pictures: Vec<(f64, DVec2, Picture)> = match mtf_per_mm.is_empty() {
             true => vec![],

@@ -100,12 +100,12 @@ impl PsfSet {
                 sheet.text((x, f64::from(y0) - 7.0), 13.0, ink, "all together");
             }
         }
-        let note = "each tile exposed for its brightest pixel; the field lies to the right";
+        let note = "each tile exposed for its brightest pixel; fields to the right, y up";
         sheet.text((f64::from(x0), 14.0), 11.0, soft, note);
         for (row, (point, side_um)) in points.iter().zip(sides_um).enumerate() {
             let first: &PsfRow = &self.rows[point.start];
             let y = f64::from(layout.corner(row, 0).1);
-            sheet.text((8.0, y + 16.0), 13.0, ink, &format!("{}°", number(first.field_deg)));
+            sheet.text((8.0, y + 16.0), 13.0, ink, &field(first));
             sheet.text((8.0, y + 34.0), 13.0, ink, &distance(first.distance_mm));
             if point.clone().all(|i| self.rows[i].is_dark()) {
                 sheet.text((8.0, y + 52.0), 12.0, soft, "dark");
@@ -179,6 +179,13 @@ fn round_down(most: f64) -> f64 {
 
 fn is_round(value: f64) -> bool {
     (round_up(value) / value - 1.0).abs() < 1e-9
+}
+
+fn field(row: &PsfRow) -> String {
+    match row.field_y_deg {
+        0.0 => format!("{}°", number(row.field_deg)),
+        y => format!("{}°, y {}°", number(row.field_deg), number(y)),
+    }
 }
 
 fn length(um: f64) -> String {

@@ -256,6 +256,7 @@ mod tests {
     fn request() -> PsfRequest {
         PsfRequest {
             fields_deg: vec![0.0, 5.0],
+            field_y_deg: 0.0,
             distances_mm: vec![8000.0],
             wavelengths_nm: vec![450.0, 600.0],
             focus: FocusChoice::FilmMm(51.8145),

@@ -14,8 +14,11 @@ use crate::{BankData, spot::Moments};
 /// Positions are in the picture frame: a point to the right of the axis has a positive x.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PsfRow {
-    /// Field angle, degrees.
+    /// Field angle to the right, degrees.
     pub field_deg: f64,
+    /// Field angle upwards, degrees.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub field_y_deg: f64,
     /// Distance of the point before the first vertex, mm.
     pub distance_mm: f64,
     /// Wavelength, nm; of a whole light, the mean.
@@ -85,6 +88,7 @@ pub struct MtfRow {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PointName {
     pub(crate) field_deg: f64,
+    pub(crate) field_y_deg: f64,
     pub(crate) distance_mm: f64,
     pub(crate) wavelength_nm: f64,
 }
@@ -98,6 +102,7 @@ impl PsfRow {
         let (sigma_x_um, sigma_y_um) = (second.xx.sqrt(), second.yy.sqrt());
         Self {
             field_deg: name.field_deg,
+            field_y_deg: name.field_y_deg,
             distance_mm: name.distance_mm,
             wavelength_nm: name.wavelength_nm,
             is_whole_light: false,
@@ -173,7 +178,7 @@ pub(crate) fn place_and_size(moments: Option<Moments>) -> (DVec2, Covariance) {
 /// Returns rows as a table with a line of names; modulations are named by their frequency.
 pub fn psf_csv(rows: &[PsfRow]) -> String {
     let mut csv =
-        "field_deg,distance_mm,wavelength_nm,is_whole_light,centroid_x_mm,centroid_y_mm,rms_radius_um,sigma_x_um,\
+        "field_deg,field_y_deg,distance_mm,wavelength_nm,is_whole_light,centroid_x_mm,centroid_y_mm,rms_radius_um,sigma_x_um,\
                    sigma_y_um,second_moment_xy_um2,lsf_fwhm_um,lsf_fwhm_y_um,ee50_radius_um,ee80_radius_um,\
                    es50_half_width_um,es80_half_width_um,energy,picture_share,wave_share,strehl"
             .to_owned();
@@ -200,7 +205,8 @@ pub fn psf_csv(rows: &[PsfRow]) -> String {
             row.energy,
             row.picture_share,
         ];
-        let _ = write!(csv, "{},{},{},{}", row.field_deg, row.distance_mm, row.wavelength_nm, row.is_whole_light);
+        let PsfRow { field_deg, field_y_deg, distance_mm, wavelength_nm, is_whole_light, .. } = row;
+        let _ = write!(csv, "{field_deg},{field_y_deg},{distance_mm},{wavelength_nm},{is_whole_light}");
         for value in numbers {
             let _ = write!(csv, ",{value}");
         }
@@ -216,4 +222,9 @@ pub fn psf_csv(rows: &[PsfRow]) -> String {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
 fn is_false(value: &bool) -> bool {
     !value
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }

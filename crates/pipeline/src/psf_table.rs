@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dioptric_diffraction::{Hurb, PupilGrid, WaveNodes};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
-use dioptric_psf::{BankSettings, Diffraction, Interpolation, ModelUse, Picture, PsfBank, PsfQuery};
+use dioptric_psf::{Diffraction, ModelUse, Picture, PsfQuery};
 use dioptric_scene::write_planes_exr;
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -13,6 +13,7 @@ use crate::{
     BankChoice, BankData, DiffractionChoice, FocusChoice, PipelineError, PsfRow, REFERENCE_WAVELENGTH_NM,
     display::png_bytes,
     psf_row::{PointName, place_and_size},
+    psf_source::PsfSource,
     spot::{PaperRays, Spot},
 };
 
@@ -24,6 +25,8 @@ pub(crate) const LARGEST: usize = 4097;
 pub struct PsfRequest {
     /// Field angles at the entrance pupil, to the right of the picture, degrees.
     pub fields_deg: Vec<f64>,
+    /// How far above the axis all of these fields lie, degrees.
+    pub field_y_deg: f64,
     /// Distances of the points before the first vertex, mm; infinity for a star.
     pub distances_mm: Vec<f64>,
     /// Wavelengths, nm.
@@ -81,6 +84,7 @@ pub struct PsfSet {
 #[derive(Clone, Copy)]
 pub(crate) struct Item {
     pub(crate) field_deg: f64,
+    pub(crate) field_y_deg: f64,
     pub(crate) distance_mm: f64,
     pub(crate) wavelength_nm: f64,
     pub(crate) dioptres: f64,
@@ -88,7 +92,13 @@ pub(crate) struct Item {
 
 impl Item {
     pub(crate) fn field_tan(&self) -> DVec2 {
-        DVec2::new(self.field_deg.to_radians().tan(), 0.0)
+        DVec2::new(self.field_deg.to_radians().tan(), self.field_y_deg.to_radians().tan())
+    }
+
+    /// Returns what to ask of a source on pixels of this size.
+    pub(crate) fn query(&self, pitch_um: f64) -> PsfQuery {
+        let Self { dioptres, wavelength_nm, .. } = *self;
+        PsfQuery { field_tan: self.field_tan(), dioptres, wavelength_nm, pitch_um }
     }
 }
 
@@ -106,18 +116,18 @@ impl PsfRequest {
             FocusChoice::NearObject => return Err(self.wrong("focus", "NearObject", "a distance or a film place")),
         };
         let items = self.items(lens)?;
-        let bank = match self.sampling {
-            PsfSampling::Pupil => Some(self.build_bank(lens, &items, film_mm)?),
+        let source = match self.sampling {
+            PsfSampling::Pupil => Some(self.source(lens, &items, film_mm)?),
             PsfSampling::Paper { .. } => None,
         };
         let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> =
-            items.par_iter().map(|item| self.compute_one(item, lens, bank.as_ref(), film_mm)).collect();
+            items.par_iter().map(|item| self.compute_one(item, lens, source.as_ref(), film_mm)).collect();
         let (mut rows, pictures): (Vec<PsfRow>, _) = computed?.into_iter().unzip();
         let spectral_weights = match self.spectral_weights.is_empty() {
             true => vec![1.0; self.wavelengths_nm.len()],
             false => self.spectral_weights.clone(),
         };
-        let bank = bank.as_ref().and_then(BankData::of);
+        let bank = source.as_ref().and_then(PsfSource::data);
         rows.iter_mut().for_each(|row| row.bank.clone_from(&bank));
         Ok(PsfSet { film_mm, pixel_um: self.pixel_um, rows, pictures, bank, spectral_weights })
     }
@@ -137,6 +147,7 @@ impl PsfRequest {
                 let dioptres = 1e3 / z_mm;
                 items.extend(self.wavelengths_nm.iter().map(|&wavelength_nm| Item {
                     field_deg,
+                    field_y_deg: self.field_y_deg,
                     distance_mm,
                     wavelength_nm,
                     dioptres,
@@ -147,7 +158,7 @@ impl PsfRequest {
     }
 
     fn check(&self) -> Result<(), PipelineError> {
-        for &field in &self.fields_deg {
+        for &field in self.fields_deg.iter().chain([&self.field_y_deg]) {
             if field.is_nan() || field.abs() >= 89.9 {
                 return Err(self.wrong("fields_deg", &field.to_string(), "angles below 89.9 degrees"));
             }
@@ -198,59 +209,25 @@ impl PsfRequest {
         }
     }
 
-    fn wrong(&self, key: &'static str, found: &str, expected: &str) -> PipelineError {
+    pub(crate) fn wrong(&self, key: &'static str, found: &str, expected: &str) -> PipelineError {
         PipelineError::Value { origin: "psf".to_owned(), key, found: found.to_owned(), expected: expected.to_owned() }
-    }
-
-    /// Returns a bank with a sample at every point, or over their range where that was asked for.
-    fn build_bank(&self, lens: &Lens, items: &[Item], film_mm: f64) -> Result<PsfBank, PipelineError> {
-        let exact = self.bank_settings(items, film_mm);
-        let Some(choice) = self.bank else { return Ok(PsfBank::build(lens, &exact)?) };
-        let ends = |list: &[f64]| (list[0], list[list.len() - 1]);
-        let (_, last_field_tan) = ends(&exact.field_tans);
-        let (dioptres, wavelengths_nm) = (ends(&exact.dioptres), ends(&exact.wavelengths_nm));
-        let standard = BankSettings::covering(film_mm, last_field_tan, dioptres, wavelengths_nm, exact.diffraction);
-        choice.build(lens, standard, self.pixel_um)
-    }
-
-    /// Settings with a sample at every point asked for, so that nothing is interpolated.
-    pub(crate) fn bank_settings(&self, items: &[Item], film_mm: f64) -> BankSettings {
-        let sorted = |values: &mut dyn Iterator<Item = f64>| {
-            let mut values: Vec<f64> = values.collect();
-            values.sort_by(f64::total_cmp);
-            values.dedup();
-            values
-        };
-        let field_tans = items.iter().map(|item| item.field_tan().length());
-        BankSettings {
-            film_mm,
-            reference_wavelength_nm: REFERENCE_WAVELENGTH_NM,
-            field_tans: sorted(&mut field_tans.chain([0.0])),
-            dioptres: sorted(&mut items.iter().map(|item| item.dioptres)),
-            wavelengths_nm: sorted(&mut items.iter().map(|item| item.wavelength_nm)),
-            n_rings: 24,
-            n_azimuths: 96,
-            diffraction: self.diffraction.into(),
-            interpolation: Interpolation::Rays,
-        }
     }
 
     fn compute_one(
         &self,
         item: &Item,
         lens: &Lens,
-        bank: Option<&PsfBank>,
+        source: Option<&PsfSource>,
         film_mm: f64,
     ) -> Result<(PsfRow, Array2<f32>), PipelineError> {
         let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
         let mono = lens.at(item.wavelength_nm)?;
         let point = ObjectPoint::from_field(&reference, item.field_tan(), item.dioptres);
-        let (spot, picture, model) = match (self.sampling, bank) {
-            (PsfSampling::Pupil, Some(bank)) => {
+        let (spot, picture, model) = match (self.sampling, source) {
+            (PsfSampling::Pupil, Some(source)) => {
                 let axial = ObjectPoint::from_field(&reference, DVec2::ZERO, item.dioptres);
                 let spot = Spot::through_pupil(&mono, &point, &axial, film_mm);
-                let is_lit = item.field_tan().length() <= bank.last_field_tan() && !spot.at_mm.is_empty();
-                let drawn = is_lit.then(|| self.draw(item, bank));
+                let drawn = if spot.at_mm.is_empty() { None } else { self.draw(item, source) };
                 let (picture, model) = drawn.map_or_else(|| (Array2::zeros((1, 1)), None), |(p, m)| (p, Some(m)));
                 (spot, self.size.map_or_else(|| picture.clone(), |size| resized(&picture, size)), model)
             }
@@ -274,24 +251,15 @@ impl PsfRequest {
         Ok((row, picture))
     }
 
-    /// Draws a picture: of the size asked for, or its own.
-    fn draw(&self, item: &Item, bank: &PsfBank) -> (Array2<f32>, ModelUse) {
-        let query = PsfQuery {
-            field_tan: item.field_tan(),
-            dioptres: item.dioptres,
-            wavelength_nm: item.wavelength_nm,
-            pitch_um: self.pixel_um,
-        };
+    /// Draws a picture: of the size asked for, or its own; `None` of a dark point.
+    fn draw(&self, item: &Item, source: &PsfSource) -> Option<(Array2<f32>, ModelUse)> {
+        let query = item.query(self.pixel_um);
         match self.size {
             // A picture is centred on the middle of a pixel, which an odd number has.
             Some(size) if size % 2 == 1 => {
-                let (picture, model) = bank.picture(query, size);
-                (picture.mapv(|e| e as f32), model)
+                source.picture(query, size).map(|(picture, model)| (picture.mapv(|e| e as f32), model))
             }
-            _ => {
-                let (kernel, model) = bank.kernel_and_model(query);
-                (kernel.samples, model)
-            }
+            _ => source.kernel(query).map(|(kernel, model)| (kernel.samples, model)),
         }
     }
 
@@ -302,8 +270,12 @@ impl PsfRequest {
         if !is_of_rays && place_mm.is_finite() {
             second = measured.second_moments_um2();
         }
-        let name =
-            PointName { field_deg: item.field_deg, distance_mm: item.distance_mm, wavelength_nm: item.wavelength_nm };
+        let name = PointName {
+            field_deg: item.field_deg,
+            field_y_deg: item.field_y_deg,
+            distance_mm: item.distance_mm,
+            wavelength_nm: item.wavelength_nm,
+        };
         let row = PsfRow::measure(name, place_mm, second, &measured);
         let picture_share = picture.iter().map(|e| f64::from(*e)).sum();
         PsfRow { energy: spot.energy, picture_share, ..row }
@@ -423,6 +395,7 @@ mod tests {
     fn request() -> PsfRequest {
         PsfRequest {
             fields_deg: vec![0.0, 5.0],
+            field_y_deg: 0.0,
             distances_mm: vec![8000.0],
             wavelengths_nm: vec![450.0, 650.0],
             focus: FocusChoice::FilmMm(51.8145),
@@ -507,9 +480,23 @@ mod tests {
     }
 
     #[test]
+    fn fields_above_the_axis_are_turned_ones() {
+        let beside = PsfRequest { fields_deg: vec![5.0], ..request() }.compute(&paper_lens()).unwrap();
+        let above = PsfRequest { fields_deg: vec![0.0], field_y_deg: 5.0, ..request() }.compute(&paper_lens()).unwrap();
+        for (a, b) in beside.rows.iter().zip(&above.rows) {
+            assert_relative_eq!(a.centroid_x_mm, b.centroid_y_mm, epsilon = 1e-6);
+            assert_relative_eq!(a.sigma_x_um, b.sigma_y_um, max_relative = 1e-3);
+            assert_relative_eq!(a.lsf_fwhm_um, b.lsf_fwhm_y_um, max_relative = 1e-2);
+        }
+        assert!(PsfRequest { field_y_deg: 90.0, ..request() }.compute(&paper_lens()).is_err());
+    }
+
+    #[test]
     fn a_dark_point_has_no_size() {
-        let request = PsfRequest { fields_deg: vec![0.0, 60.0], ..request() };
-        let set = request.compute(&paper_lens()).unwrap();
+        // A microscope sees nothing at 10°.
+        let focus = FocusChoice::DistanceMm(2000.0);
+        let request = PsfRequest { fields_deg: vec![0.0, 10.0], distances_mm: vec![2000.0], focus, ..request() };
+        let set = request.compute(&Lens::built_in("microscope-20x").unwrap()).unwrap();
         assert!(!set.rows[0].is_dark() && set.rows[2].is_dark() && !set.rows[2].is_cut());
         assert!(set.rows[2].ee50_radius_um.is_nan() && set.rows[2].lsf_fwhm_um.is_nan());
         assert!(set.mosaic().is_ok() && set.whole_light(&[]).len() == 1);

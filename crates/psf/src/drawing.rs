@@ -70,17 +70,7 @@ impl PsfBank {
     pub(crate) fn draw_rays(&self, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
         let record = self.record(query.field_tan.length(), query.dioptres, query.wavelength_nm);
         let layout = self.layout(&record, query, side);
-        let share = self.share_of(&layout);
-        if share == 0.0 {
-            return (layout.draw(), ModelUse { wave_share: 0.0, fallback: None });
-        }
-        match self.wave_energies(query, layout.side()) {
-            Ok(waves) if share == 1.0 => (waves, ModelUse { wave_share: 1.0, fallback: None }),
-            Ok(waves) => {
-                (waves * share + layout.draw() * (1.0 - share), ModelUse { wave_share: share, fallback: None })
-            }
-            Err(error) => (layout.draw(), ModelUse { wave_share: 0.0, fallback: Some(error.to_string()) }),
-        }
+        composed(layout, self.settings().diffraction, |side| self.wave_energies(query, side))
     }
 
     /// Returns how much of a kernel is wave optics, and not uncertainty bending: 1 or 0, or between them where they are
@@ -91,14 +81,7 @@ impl PsfBank {
     pub fn wave_share(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> f64 {
         let record = self.record(field_tan, dioptres, wavelength_nm);
         let query = PsfQuery { field_tan: DVec2::X * field_tan, dioptres, wavelength_nm, pitch_um };
-        self.share_of(&self.layout(&record, query, None))
-    }
-
-    fn share_of(&self, layout: &Layout<'_>) -> f64 {
-        match self.settings().diffraction {
-            Diffraction::Wave => (2.0 - (layout.bandwidth() / ALL_WAVE).log2()).clamp(1.0, 2.0) - 1.0,
-            _ => 0.0,
-        }
+        wave_share_of(&self.layout(&record, query, None), self.settings().diffraction)
     }
 
     fn layout<'a>(&self, record: &'a Record, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
@@ -124,5 +107,29 @@ impl PsfBank {
         let point = ObjectPoint::from_field(self.reference(), field_tan, dioptres.clamp(least, most));
         let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::Centroid };
         Ok(wave_psf(&lens, &point, self.settings().film_mm, &window, WaveQuality::default())?.samples)
+    }
+}
+
+/// Draws a layout, with waves of a window of a given side in so far as the setting and its blur want them.
+pub(crate) fn composed(
+    layout: Layout<'_>,
+    diffraction: Diffraction,
+    waves: impl FnOnce(usize) -> Result<Array2<f64>, DiffractionError>,
+) -> (Array2<f64>, ModelUse) {
+    let share = wave_share_of(&layout, diffraction);
+    if share == 0.0 {
+        return (layout.draw(), ModelUse { wave_share: 0.0, fallback: None });
+    }
+    match waves(layout.side()) {
+        Ok(waves) if share == 1.0 => (waves, ModelUse { wave_share: 1.0, fallback: None }),
+        Ok(waves) => (waves * share + layout.draw() * (1.0 - share), ModelUse { wave_share: share, fallback: None }),
+        Err(error) => (layout.draw(), ModelUse { wave_share: 0.0, fallback: Some(error.to_string()) }),
+    }
+}
+
+fn wave_share_of(layout: &Layout<'_>, diffraction: Diffraction) -> f64 {
+    match diffraction {
+        Diffraction::Wave => (2.0 - (layout.bandwidth() / ALL_WAVE).log2()).clamp(1.0, 2.0) - 1.0,
+        _ => 0.0,
     }
 }

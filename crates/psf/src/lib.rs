@@ -19,6 +19,7 @@ mod dispersion;
 mod drawing;
 mod energy;
 mod error;
+mod field_bank;
 mod geometry;
 mod kernel;
 mod mesh;
@@ -38,6 +39,7 @@ pub use count::{AuthorsBending, CountingFilm, FrontGrid, mean_place_mm, trace_as
 pub use drawing::{ModelUse, PsfQuery};
 pub use energy::EnclosedEnergy;
 pub use error::PsfError;
+pub use field_bank::{FieldBank, FieldBankSettings};
 pub use geometry::RadialGeometry;
 pub use kernel::Kernel;
 pub use metrics::{Picture, Profile};

@@ -1,0 +1,138 @@
+//! Banks over a field of two dimensions: the same as turned ones where the lens is symmetric, and right where it is not.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use dioptric_optics::{Glass, Interface, Lens, Shape, Surface, glam::DVec2};
+use dioptric_psf::{
+    BankSettings, Diffraction, FieldBank, FieldBankSettings, Interpolation, Kernel, Picture, PsfBank, PsfQuery,
+};
+
+fn settings(film_mm: f64, tans_x: Vec<f64>, tans_y: Vec<f64>, diffraction: Diffraction) -> FieldBankSettings {
+    FieldBankSettings {
+        film_mm,
+        reference_wavelength_nm: 550.0,
+        tans_x,
+        tans_y,
+        dioptres: vec![0.2, 0.6, 1.0],
+        wavelengths_nm: vec![450.0, 550.0, 650.0],
+        n_rings: 12,
+        n_azimuths: 48,
+        diffraction,
+    }
+}
+
+fn difference(a: &Kernel, b: &Kernel) -> f64 {
+    let side = a.samples.nrows().max(b.samples.nrows());
+    let at = |kernel: &Kernel, row: usize, column: usize| {
+        let margin = (side - kernel.samples.nrows()) / 2;
+        let place = row.checked_sub(margin).zip(column.checked_sub(margin));
+        place.and_then(|place| kernel.samples.get(place)).map_or(0.0, |e| f64::from(*e))
+    };
+    (0..side * side).map(|i| (at(a, i / side, i % side) - at(b, i / side, i % side)).abs()).sum()
+}
+
+#[test]
+fn of_a_symmetric_lens_it_is_the_turned_bank() {
+    let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
+    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let tans: Vec<f64> = (-3..=3).map(|i| 0.05 * f64::from(i)).collect();
+    for (diffraction, most) in [(Diffraction::None, 0.05), (Diffraction::Hurb { gamma: 1.0 }, 0.05)] {
+        let plane = settings(film_mm, tans.clone(), tans.clone(), diffraction);
+        let turned = BankSettings {
+            film_mm,
+            reference_wavelength_nm: 550.0,
+            field_tans: (0..8).map(|i| 0.031 * f64::from(i)).collect(),
+            dioptres: plane.dioptres.clone(),
+            wavelengths_nm: plane.wavelengths_nm.clone(),
+            n_rings: 12,
+            n_azimuths: 48,
+            diffraction,
+            interpolation: Interpolation::Rays,
+        };
+        let turned = PsfBank::build(&lens, &turned).unwrap();
+        let plane = FieldBank::build(&lens, &plane).unwrap();
+        for (x, y, dioptres, nm) in [(0.05, 0.1, 0.2, 450.0), (-0.12, 0.06, 0.9, 600.0), (0.0, -0.13, 0.7, 550.0)] {
+            let query = PsfQuery { field_tan: DVec2::new(x, y), dioptres, wavelength_nm: nm, pitch_um: 5.0 };
+            let (a, model) = plane.kernel_and_model(query).unwrap();
+            let (b, _) = turned.kernel_and_model(query);
+            let l1 = difference(&a, &b);
+            println!("{diffraction:?} {x} {y}: {l1}");
+            // Each interpolates to a per cent, and the mesh of one is turned in the pupil of the other: outlines of 48
+            // corners cut a per cent or two of a blur's pixels differently.
+            assert!(l1 < most && model.wave_share == 0.0, "{x} {y} {dioptres} {nm}: {l1}");
+            let radius_mm = turned.geometry(dioptres, nm).image_radius_mm(query.field_tan.length());
+            let centroid_mm = plane.centroid_mm(query.field_tan, dioptres, nm).unwrap();
+            // Distortion is of third order in the field: quadratics miss it by some µm of many mm.
+            assert!((centroid_mm - query.field_tan.normalize() * radius_mm).length() < 0.01, "{centroid_mm}");
+        }
+    }
+}
+
+/// Returns a biconvex lens of 50 mm across and 40 mm up, f/10, its stop in front.
+fn astigmatic() -> Lens {
+    let index = 1.5;
+    let surface = |radius_mm: f64, radius_x_mm: f64| Surface {
+        shape: Shape::Biconic { conic: 0.0, curvature_x_per_mm: 1.0 / radius_x_mm, conic_x: 0.0 },
+        ..Surface::sphere(radius_mm, 2.2)
+    };
+    let interface = |surface, index, thickness_after_mm| Interface {
+        surface,
+        medium_after: Glass::Constant { index },
+        thickness_after_mm,
+    };
+    let interfaces = vec![interface(surface(40.0, 50.0), index, 1.0), interface(surface(-40.0, -50.0), 1.0, 0.0)];
+    Lens::new("astigmatic", "a test", interfaces, 0).unwrap()
+}
+
+#[test]
+fn a_lens_of_two_powers_has_its_lines_across_and_up() {
+    let lens = astigmatic();
+    let mono = lens.at(550.0).unwrap();
+    let [up_mm, across_mm] = [mono.first_order(), mono.first_order_x()].map(|first| first.bfl_mm);
+    assert!(across_mm - up_mm > 5.0, "{across_mm} {up_mm}");
+    let moments = |film_mm: f64, at: DVec2| {
+        let mut settings = settings(film_mm, vec![-0.02, 0.0, 0.02], vec![-0.02, 0.0, 0.02], Diffraction::None);
+        settings.dioptres = vec![0.0];
+        let bank = FieldBank::build(&lens, &settings).unwrap();
+        let query = PsfQuery { field_tan: at, dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 4.0 };
+        Picture::from(&bank.kernel_and_model(query).unwrap().0).second_moments_um2()
+    };
+    let (at_up, at_across) = (moments(up_mm, DVec2::ZERO), moments(across_mm, DVec2::ZERO));
+    // A far point's rays of the plane upwards come together first: there the light is a line across.
+    assert!(at_up.xx > 100.0 * at_up.yy && at_across.yy > 100.0 * at_across.xx, "{at_up:?} {at_across:?}");
+    // Fields that mirror each other have pictures that do.
+    let [a, b] = [DVec2::new(0.015, 0.013), DVec2::new(0.015, -0.013)].map(|at| moments(0.5 * (up_mm + across_mm), at));
+    assert!(
+        (a.xx - b.xx).abs() < 1e-3 * a.xx && (a.yy - b.yy).abs() < 1e-3 * a.yy && (a.xy + b.xy).abs() < 1e-3 * a.xx
+    );
+    assert!(
+        PsfBank::build(&lens, &BankSettings::covering(up_mm, 0.1, (0.0, 0.0), (550.0, 550.0), Diffraction::None))
+            .is_err()
+    );
+}
+
+#[test]
+fn waves_of_a_lens_of_two_powers_are_summed_and_dark_fields_are_none() {
+    let lens = astigmatic();
+    let mono = lens.at(550.0).unwrap();
+    let film_mm = 0.5 * (mono.first_order().bfl_mm + mono.first_order_x().bfl_mm);
+    let wide = FieldBankSettings {
+        dioptres: vec![0.0],
+        ..settings(film_mm, vec![0.0, 0.01], vec![0.0], Diffraction::Hurb { gamma: 1.0 })
+    };
+    let query = PsfQuery { field_tan: DVec2::ZERO, dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 4.0 };
+    assert!(FieldBank::build(&lens, &wide).unwrap().kernel_and_model(query).is_some());
+    // A microscope sees nothing at 10°.
+    let microscope = Lens::built_in("microscope-20x").unwrap();
+    let beside = FieldBankSettings { film_mm: 0.2194, tans_x: vec![0.0, 0.18], ..wide.clone() };
+    let bank = FieldBank::build(&microscope, &beside).unwrap();
+    let at = |tan_x: f64| bank.picture(PsfQuery { field_tan: DVec2::new(tan_x, 0.0), ..query }, 9);
+    assert!(at(0.0).is_some() && at(0.18).is_none() && at(0.1).is_none());
+    assert!(bank.centroid_mm(DVec2::new(0.18, 0.0), 0.0, 550.0).is_none());
+    let narrow = lens.with_stop_diameter_mm(1.0).unwrap();
+    let waves = FieldBankSettings { diffraction: Diffraction::Wave, tans_x: vec![0.0], ..wide.clone() };
+    let (picture, model) = FieldBank::build(&narrow, &waves).unwrap().picture(query, 201).unwrap();
+    assert!(model.wave_share > 0.9 && model.fallback.is_none(), "{model:?}");
+    // Most of an Airy pattern of some 50 µm and a blur of 100 µm is on 0.8 mm.
+    assert!(picture.sum() > 0.97 && picture.sum() < 1.001, "{}", picture.sum());
+    assert!(FieldBank::build(&lens, &FieldBankSettings { tans_x: vec![0.1, 0.0], ..wide }).is_err());
+}
