@@ -294,6 +294,11 @@ fn design_programs_say_what_the_object_is_in() {
         SURF 2\n TYPE STANDARD\n CURV -0.8\n DISZ 10\nSURF 3\n TYPE STANDARD\n CURV 0\n DISZ 0\n";
     let seq = "RDM;LEN\nDIM M\nWL 587.6\nREF 1\nNAO 0.9\nYOB 0.0\nSO 0.0 0.5 1.515:42\nS 0.0 1.0 NBK7_SCHOTT\nSTO\n\
         S -1.25 10.0\nSI 0.0 0.0\nGO\n";
+    let deeplens = r#"{"info": "oil", "surfaces": [
+        {"type": "Stop", "r": 0.3, "c": 0.0, "d": 0.0, "mat1": "1.515/42", "mat2": "1.515/42"},
+        {"type": "Spheric", "r": 0.5, "roc": -5, "d": 1.0, "mat1": "1.515/42", "mat2": "air"}]}"#;
+    let buried = read("oil.json", deeplens).unwrap().lens;
+    assert!((buried.object_medium().index_at(587.561_8).unwrap() - 1.515).abs() < 1e-6);
     for (name, text) in [("oil.zmx", zmx), ("oil.seq", seq)] {
         let file = read(name, text).unwrap();
         assert!(

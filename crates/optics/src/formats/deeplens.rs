@@ -21,7 +21,7 @@ pub(super) fn is_deeplens(value: &Value) -> bool {
 pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -> Result<LensFile, TextError> {
     let file = Object::new(value, "")?;
     let mut interfaces: Vec<Interface> = Vec::new();
-    let mut stops = Vec::new();
+    let (mut stops, mut object_medium) = (Vec::new(), Glass::Air);
     let rows = file.objects("surfaces")?;
     for (i, row) in rows.iter().enumerate() {
         let wrong =
@@ -35,7 +35,10 @@ pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -
         }
         let shape = shape(kind, row)?;
         let curvature_per_mm = if matches!(kind, "Plane" | "ThinLens") { 0.0 } else { curvature_per_mm(row)? };
-        let before = interfaces.last().map_or(&Glass::Air, |interface| &interface.medium_after);
+        if let (0, Some(name)) = (i, row.text("mat1")) {
+            object_medium = medium(name, glasses).map_err(|reason| wrong("mat1", reason))?;
+        }
+        let before = interfaces.last().map_or(&object_medium, |interface| &interface.medium_after);
         if let Some(name) = row.text("mat1")
             && medium(name, glasses).map_err(|reason| wrong("mat1", reason))? != *before
         {
@@ -57,7 +60,8 @@ pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -
     }
     let &[stop] = stops.as_slice() else { return Err(OpticsError::Stops { n_stops: stops.len() }.into()) };
     let source = file.text("info").unwrap_or("a DeepLens file");
-    let mut read = LensFile::of_lens(Lens::new(name, source, interfaces, stop)?);
+    let lens = Lens::new(name, source, interfaces, stop)?.with_object_medium(object_medium)?;
+    let mut read = LensFile::of_lens(lens);
     if let (Some(sensor), Some(last)) = (file.get("d_sensor"), rows.last()) {
         read.film_mm = Some(number(sensor, "d_sensor")? - last.number_or("d", 0.0)?);
     }
