@@ -26,7 +26,8 @@ impl Covariance {
 
     /// Returns the variances along the narrow and the wide axis.
     pub fn axes(self) -> (f64, f64) {
-        let (middle, half) = (0.5 * (self.xx + self.yy), (0.5 * (self.xx - self.yy)).hypot(self.xy));
+        let (middle, aside) = (0.5 * (self.xx + self.yy), 0.5 * (self.xx - self.yy));
+        let half = (aside * aside + self.xy * self.xy).sqrt();
         let wide = middle + half;
         // The product of the two is the determinant: no cancellation.
         let narrow = if wide > 0.0 { (self.xx * self.yy - self.xy * self.xy).max(0.0) / wide } else { 0.0 };

@@ -49,7 +49,8 @@ impl Hurb {
     /// `wave_number_per_mm` is k = 2πn/λ in the medium of the stop. The tangent of the spread is taken for the spread
     /// itself: they differ where a ray passes within a wavelength of the edge.
     pub fn sigma(self, distance_mm: f64, radius_mm: f64, wave_number_per_mm: f64) -> f64 {
-        let tangent = (self.edge / distance_mm).hypot(self.floor / radius_mm) / (2.0 * wave_number_per_mm);
+        let (edge, floor) = (self.edge / distance_mm, self.floor / radius_mm);
+        let tangent = (edge * edge + floor * floor).sqrt() / (2.0 * wave_number_per_mm);
         // Below 1e-4 the arc is its tangent to 3e-9.
         if tangent < 1e-4 { tangent } else { tangent.atan() }
     }

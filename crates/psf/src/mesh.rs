@@ -35,7 +35,11 @@ impl Mesh {
 
     /// Returns the place of a node in a list: all of ring 0 are the centre.
     pub(crate) fn node(self, ring: usize, j: usize) -> usize {
-        if ring == 0 { 0 } else { 1 + (ring - 1) * self.n_azimuths + j % self.n_azimuths }
+        if ring == 0 {
+            0
+        } else {
+            1 + (ring - 1) * self.n_azimuths + if j < self.n_azimuths { j } else { j % self.n_azimuths }
+        }
     }
 
     /// Returns the polar places (share of the radius, azimuth) of all nodes in order.

@@ -5,6 +5,7 @@
 //! rounding. Folds do no harm: every triangle counts by the magnitude of its area.
 
 use glam::DVec2;
+use multiversion::multiversion;
 use ndarray::Array2;
 
 use crate::mesh::Mesh;
@@ -57,6 +58,7 @@ impl Raster {
 
     /// Returns the energy per area of a triangle, negative if it runs the other way; or deposits it, if it covers next
     /// to nothing or a part of one pixel, and returns 0.
+    #[inline(always)]
     fn density(&mut self, [a, b, c]: [DVec2; 3], energy: f64) -> f64 {
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         if energy == 0.0 || !(low.is_finite() && high.is_finite() && self.meets(low, high)) {
@@ -78,30 +80,7 @@ impl Raster {
     /// Deposits energies on the cells of a mesh whose nodes lie at these places, each as by
     /// [`quadrilateral`](Self::quadrilateral); edges between two cells are walked once.
     pub(crate) fn mesh(&mut self, mesh: Mesh, at: &[DVec2], energies: &[f64]) {
-        let corners = |ring, j| mesh.corners(ring, j).map(|node| at[node]);
-        let densities: Vec<[f64; 2]> = mesh
-            .cells()
-            .zip(energies)
-            .map(|((ring, j), &energy)| {
-                let [a, b, c, d] = corners(ring, j);
-                let share = mesh.outer_share(ring);
-                if energy != 0.0 && a.min(b).min(c.min(d)).floor() == a.max(b).max(c.max(d)).floor() {
-                    self.point(a, energy);
-                    return [0.0; 2];
-                }
-                [self.density([a, b, c], share * energy), self.density([a, c, d], (1.0 - share) * energy)]
-            })
-            .collect();
-        let n = mesh.n_azimuths;
-        for ((ring, j), [outer, inner]) in mesh.cells().zip(&densities) {
-            let [a, b, c, _] = corners(ring, j);
-            // The neighbours run along the same edges the other way.
-            let [_, before] = densities[ring * n + (j + n - 1) % n];
-            let beyond = densities.get((ring + 1) * n + j).map_or(0.0, |[_, inner]| *inner);
-            self.edge(a, b, outer - before);
-            self.edge(b, c, outer - beyond);
-            self.edge(a, c, inner - outer);
-        }
+        deposit_mesh(self, mesh, at, energies);
     }
 
     /// Deposits energy on a quadrilateral a, b, c, d, given in order, as two triangles: `first_share` of it evenly on a,
@@ -126,6 +105,7 @@ impl Raster {
         Array2::from_shape_vec((self.rows, self.columns), self.direct).expect("as many pixels as there are")
     }
 
+    #[inline(always)]
     fn meets(&self, low: DVec2, high: DVec2) -> bool {
         high.x >= 0.0 && high.y >= 0.0 && low.x < self.columns as f64 && low.y < self.rows as f64
     }
@@ -143,6 +123,7 @@ impl Raster {
 
     /// Adds an edge, cut at the borders of the grid. What lies to the left still covers the row; what lies to the
     /// right does not.
+    #[inline(always)]
     fn edge(&mut self, from: DVec2, to: DVec2, density: f64) {
         if density == 0.0 {
             return;
@@ -166,6 +147,7 @@ impl Raster {
     }
 
     /// Adds the piece of an edge within one row; `share` is its height times the density.
+    #[inline(always)]
     fn span(&mut self, row: usize, (x, x_next): (f64, f64), share: f64) {
         let width = self.columns as f64;
         let (low, high) = if x < x_next { (x, x_next) } else { (x_next, x) };
@@ -196,6 +178,37 @@ impl Raster {
             self.edges[start + column] += part * (1.0 - into);
             self.edges[start + column + 1] += part * into;
             from = to;
+        }
+    }
+}
+
+/// The work of [`Raster::mesh`], compiled for the instructions that round a number too.
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn deposit_mesh(raster: &mut Raster, mesh: Mesh, at: &[DVec2], energies: &[f64]) {
+    let n = mesh.n_azimuths;
+    let mut densities = Vec::with_capacity(energies.len());
+    for (ring, energies) in energies.chunks_exact(n).enumerate() {
+        let share = mesh.outer_share(ring);
+        for (j, &energy) in energies.iter().enumerate() {
+            let [a, b, c, d] = mesh.corners(ring, j).map(|node| at[node]);
+            if energy != 0.0 && a.min(b).min(c.min(d)).floor() == a.max(b).max(c.max(d)).floor() {
+                raster.point(a, energy);
+                densities.push([0.0; 2]);
+                continue;
+            }
+            let (outer, inner) = (share * energy, (1.0 - share) * energy);
+            densities.push([raster.density([a, b, c], outer), raster.density([a, c, d], inner)]);
+        }
+    }
+    for (ring, row) in densities.chunks_exact(n).enumerate() {
+        for (j, [outer, inner]) in row.iter().enumerate() {
+            let [a, b, c, _] = mesh.corners(ring, j).map(|node| at[node]);
+            // The neighbours run along the same edges the other way.
+            let [_, before] = row[if j == 0 { n - 1 } else { j - 1 }];
+            let beyond = densities.get((ring + 1) * n + j).map_or(0.0, |[_, inner]| *inner);
+            raster.edge(a, b, outer - before);
+            raster.edge(b, c, outer - beyond);
+            raster.edge(a, c, inner - outer);
         }
     }
 }

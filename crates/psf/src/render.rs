@@ -7,9 +7,10 @@ use ndarray::Array2;
 use crate::{
     Kernel,
     kernel::trim,
+    mesh::Mesh,
     raster::Raster,
     ray_map::{Node, Record},
-    splat,
+    splat::{self, Gaussian},
 };
 
 /// Half the side of the largest window, pixels.
@@ -97,13 +98,18 @@ impl<'a> Layout<'a> {
         let mut energies: Vec<f64> = record.energies().iter().map(|e| f64::from(*e)).collect();
         if let Some(bending) = self.bending {
             // What is bent is deposited as Gaussians, and is then no part of the mesh.
-            for ((ring, j), energy) in record.mesh.cells().zip(&mut energies) {
-                let corners = record.mesh.corners(ring, j).map(|node| self.nodes[node]);
-                let cell = Cell { corners, inner: ring as f64, energy: *energy };
-                if draw_bent(&mut raster, record, &cell, bending) {
-                    *energy = 0.0;
+            let mut gaussians = vec![];
+            for (ring, energies) in energies.chunks_exact_mut(record.mesh.n_azimuths).enumerate() {
+                let ring = Ring::new(record.mesh, ring);
+                for (j, energy) in energies.iter_mut().enumerate() {
+                    let corners = record.mesh.corners(ring.number, j).map(|node| self.nodes[node]);
+                    let cell = Cell { corners, ring, energy: *energy };
+                    if cell.bend(&mut gaussians, raster.size(), bending) {
+                        *energy = 0.0;
+                    }
                 }
             }
+            splat::deposit(&mut raster, &gaussians);
         }
         let at: Vec<DVec2> = self.nodes.iter().map(|node| node.at_mm).collect();
         raster.mesh(record.mesh, &at, &energies);
@@ -125,11 +131,39 @@ fn unit(record: &Record, nodes: &[Node], bending: Bending) -> f64 {
     per_cosine * std::f64::consts::PI / (wave_number_per_mm * radius_mm)
 }
 
+/// A ring of cells of the mesh.
+#[derive(Clone, Copy)]
+struct Ring {
+    number: usize,
+    /// How many rings there are from this one to the edge.
+    n_to_edge: usize,
+    /// The shares of the pupil's radius at both sides.
+    inner_share: f64,
+    outer_share: f64,
+}
+
+impl Ring {
+    fn new(mesh: Mesh, number: usize) -> Self {
+        let (inner_share, outer_share) = (mesh.share(number as f64), mesh.share((number + 1) as f64));
+        Self { number, n_to_edge: mesh.n_rings - number, inner_share, outer_share }
+    }
+
+    /// Returns how many pieces its spread needs: it doubles over the last few.
+    fn edge_pieces(self, is_blurred: bool) -> usize {
+        match (self.n_to_edge, is_blurred) {
+            (1, false) => 6,
+            (1, true) => 3,
+            (2 | 3, false) => 3,
+            (4..=6, false) => 2,
+            _ => 1,
+        }
+    }
+}
+
 /// A cell of the mesh with its corners: inner, outer, outer next, inner next.
 struct Cell {
     corners: [Node; 4],
-    /// Number of the ring inside it.
-    inner: f64,
+    ring: Ring,
     energy: f64,
 }
 
@@ -148,11 +182,10 @@ impl Cell {
     }
 
     /// Whether next to nothing of the cell's light, bent as at its middle and as near its outer side, meets the picture.
-    fn is_beyond(&self, raster: &Raster, bending: Bending) -> bool {
+    fn is_beyond(&self, (rows, columns): (usize, usize), bending: Bending) -> bool {
         let spread = [0.5, 0.9].map(|a| bending.covariance(&self.at(a, 0.5)).axes().1.sqrt());
         let reach = DVec2::splat(FAR * spread[0].max(spread[1]));
         let [a, b, c, d] = self.corners.map(|node| node.at_mm);
-        let (rows, columns) = raster.size();
         let (low, high) = (a.min(b).min(c.min(d)) - reach, a.max(b).max(c.max(d)) + reach);
         high.x < 0.0 || high.y < 0.0 || low.x > columns as f64 || low.y > rows as f64
     }
@@ -161,6 +194,60 @@ impl Cell {
     fn sides(&self, a: f64, b: f64) -> (DVec2, DVec2) {
         let [p, q, r, s] = self.corners.map(|node| node.at_mm);
         ((q - p) * (1.0 - b) + (r - s) * b, (s - p) * (1.0 - a) + (r - q) * a)
+    }
+
+    /// Adds the Gaussians of a cell whose rays are bent, unless bending is so small beside it that a polygon will do.
+    fn bend(&self, gaussians: &mut Vec<Gaussian>, size: (usize, usize), bending: Bending) -> bool {
+        let (along, around) = self.sides(0.5, 0.5);
+        let covariance = bending.covariance(&self.at(0.5, 0.5));
+        let (_, wide) = covariance.axes();
+        let widened =
+            Covariance { xx: covariance.xx + PIXEL_VARIANCE, yy: covariance.yy + PIXEL_VARIANCE, ..covariance };
+        let (n_along, n_around) = (in_sigmas(along, widened), in_sigmas(around, widened));
+        // Cells of a blur lie side by side: what one loses to its neighbour it gets back.
+        let narrow = match along.length().min(around.length()) {
+            side if side > WIDE_CELL => PART_OF_A_WIDE_CELL,
+            side if side > NARROW_CELL => PART_OF_A_PIXEL,
+            _ => NARROW,
+        };
+        if wide < narrow * narrow || (n_along > POLYGON && n_around > POLYGON) {
+            return false;
+        }
+        if self.is_beyond(size, bending) {
+            return true;
+        }
+        // A piece of this many standard deviations across leaves a ripple of 2 %, which pixels and neighbours hide.
+        const PIECE: f64 = 2.7;
+        let pieces = |n_sigmas: f64| (n_sigmas / PIECE).ceil().clamp(1.0, 64.0) as usize;
+        // Out of focus, where a cell is larger than a pixel, the tails of single rings hardly show.
+        let is_blurred = around.length() > 1.0;
+        let n_along = pieces(n_along).max(self.ring.edge_pieces(is_blurred));
+        self.add_pieces(gaussians, (n_along, pieces(n_around)), bending);
+        true
+    }
+
+    /// Adds a Gaussian for each of so many pieces outwards and around.
+    fn add_pieces(&self, gaussians: &mut Vec<Gaussian>, (n_along, n_around): (usize, usize), bending: Bending) {
+        let (share_inner, share_outer) = (self.ring.inner_share, self.ring.outer_share);
+        let whole = share_outer * share_outer - share_inner * share_inner;
+        // Pieces crowd towards the edge like rings do, only more so: there the spread grows like 1/distance.
+        let (gap_inner, gap_outer) = ((1.0 - share_inner).sqrt(), (1.0 - share_outer).max(0.0).sqrt());
+        let share = |i: usize| 1.0 - (gap_inner + (gap_outer - gap_inner) * i as f64 / n_along as f64).powi(2);
+        for i in 0..n_along {
+            let (inner, outer) = (share(i), share(i + 1));
+            let place = |share: f64| (share - share_inner) / (share_outer - share_inner);
+            let (a, step_a) = (place(0.5 * (inner + outer)), place(outer) - place(inner));
+            let energy = self.energy * (outer * outer - inner * inner) / whole / n_around as f64;
+            for j in 0..n_around {
+                let b = (j as f64 + 0.5) / n_around as f64;
+                let node = self.at(a, b);
+                let (along, around) = self.sides(a, b);
+                let footprint = |side: DVec2| Covariance::along(side / 12f64.sqrt());
+                let covariance =
+                    bending.covariance(&node).plus(footprint(along * step_a)).plus(footprint(around / n_around as f64));
+                gaussians.push(Gaussian { at: node.at_mm, covariance, energy });
+            }
+        }
     }
 }
 
@@ -173,66 +260,6 @@ impl Bending {
         let on_film = |d: DVec2| node.along_l_mm * d.x + node.along_m_mm * d.y;
         Covariance::along(on_film(radial) * spread.radial)
             .plus(Covariance::along(on_film(radial.perp()) * spread.across))
-    }
-}
-
-/// Draws a cell whose rays are bent as Gaussians, unless bending is so small beside it that a polygon will do.
-fn draw_bent(raster: &mut Raster, record: &Record, cell: &Cell, bending: Bending) -> bool {
-    let (along, around) = cell.sides(0.5, 0.5);
-    let covariance = bending.covariance(&cell.at(0.5, 0.5));
-    let (_, wide) = covariance.axes();
-    let widened = Covariance { xx: covariance.xx + PIXEL_VARIANCE, yy: covariance.yy + PIXEL_VARIANCE, ..covariance };
-    let (n_along, n_around) = (in_sigmas(along, widened), in_sigmas(around, widened));
-    // Cells of a blur lie side by side: what one loses to its neighbour it gets back.
-    let narrow = match along.length().min(around.length()) {
-        side if side > WIDE_CELL => PART_OF_A_WIDE_CELL,
-        side if side > NARROW_CELL => PART_OF_A_PIXEL,
-        _ => NARROW,
-    };
-    if wide < narrow * narrow || (n_along > POLYGON && n_around > POLYGON) {
-        return false;
-    }
-    if cell.is_beyond(raster, bending) {
-        return true;
-    }
-    // A piece of this many standard deviations across leaves a ripple of 2 %, which pixels and neighbours hide.
-    const PIECE: f64 = 2.7;
-    let pieces = |n_sigmas: f64| (n_sigmas / PIECE).ceil().clamp(1.0, 64.0) as usize;
-    // Out of focus, where a cell is larger than a pixel, the tails of single rings hardly show.
-    let is_blurred = around.length() > 1.0;
-    let (n_around, n_along) = (pieces(n_around), pieces(n_along).max(edge_pieces(record, cell.inner, is_blurred)));
-    let mesh = record.mesh;
-    let (share_inner, share_outer) = (mesh.share(cell.inner), mesh.share(cell.inner + 1.0));
-    let whole = share_outer * share_outer - share_inner * share_inner;
-    // Pieces crowd towards the edge like rings do, only more so: there the spread grows like 1/distance.
-    let (gap_inner, gap_outer) = ((1.0 - share_inner).sqrt(), (1.0 - share_outer).max(0.0).sqrt());
-    let share = |i: usize| 1.0 - (gap_inner + (gap_outer - gap_inner) * i as f64 / n_along as f64).powi(2);
-    for i in 0..n_along {
-        let (inner, outer) = (share(i), share(i + 1));
-        let place = |share: f64| (share - share_inner) / (share_outer - share_inner);
-        let (a, step_a) = (place(0.5 * (inner + outer)), place(outer) - place(inner));
-        let energy = cell.energy * (outer * outer - inner * inner) / whole / n_around as f64;
-        for j in 0..n_around {
-            let b = (j as f64 + 0.5) / n_around as f64;
-            let node = cell.at(a, b);
-            let (along, around) = cell.sides(a, b);
-            let footprint = |side: DVec2| Covariance::along(side / 12f64.sqrt());
-            let covariance =
-                bending.covariance(&node).plus(footprint(along * step_a)).plus(footprint(around / n_around as f64));
-            splat::deposit(raster, node.at_mm, covariance, energy);
-        }
-    }
-    true
-}
-
-/// Returns how many pieces the spread of a ring needs: it doubles over the last few.
-fn edge_pieces(record: &Record, inner: f64, is_blurred: bool) -> usize {
-    match (record.mesh.n_rings - inner as usize, is_blurred) {
-        (1, false) => 6,
-        (1, true) => 3,
-        (2 | 3, false) => 3,
-        (4..=6, false) => 2,
-        _ => 1,
     }
 }
 
