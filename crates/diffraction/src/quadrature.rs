@@ -1,9 +1,20 @@
 //! Gauss–Legendre quadrature.
 
-use std::f64::consts::PI;
+use std::{f64::consts::PI, sync::OnceLock};
+
+/// Rules of fewer nodes than this are computed once: each takes some 10 n² operations.
+const KEPT: usize = 256;
 
 /// Returns `n` nodes and weights on [−1, 1]: exact for polynomials of degree 2n − 1.
 pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+    static RULES: [OnceLock<Vec<(f64, f64)>>; KEPT] = [const { OnceLock::new() }; KEPT];
+    match RULES.get(n) {
+        Some(rule) => rule.get_or_init(|| computed(n)).clone(),
+        None => computed(n),
+    }
+}
+
+fn computed(n: usize) -> Vec<(f64, f64)> {
     (0..n)
         .map(|i| {
             let mut x = -((i as f64 + 0.75) / (n as f64 + 0.5) * PI).cos();

@@ -82,7 +82,7 @@ pub struct WavePsf {
     pub n_nodes: usize,
     /// The range of phases over the pupil's radius, radians.
     pub bandwidth: f64,
-    /// Points along each side of a pixel.
+    /// Points along each side of a pixel; many waves are integrated another way, and as well as by these or better.
     pub points_per_pixel: usize,
 }
 
@@ -200,7 +200,7 @@ impl WaveNodes {
                 .psf(&WaveWindow { center: WindowCenter::At(center_mm), ..*window }, points_per_pixel);
         }
         let bandwidth = self.check(reach_mm)?;
-        let pitch_mm = window.pitch_um * 1e-3;
+        let (pitch_mm, unit_mm) = (window.pitch_um * 1e-3, self.airy_unit_mm());
         let is_rule = points_per_pixel.is_none();
         let points_per_pixel = match points_per_pixel {
             Some(0) => {
@@ -209,16 +209,14 @@ impl WaveNodes {
             }
             Some(n) => n,
             // A hundredth to spare, so that a pitch of just λN/2 is not pushed over by rounding.
-            None => (2.0 * pitch_mm / self.airy_unit_mm() - 0.01).ceil().max(1.0) as usize + 1,
+            None => (2.0 * pitch_mm / unit_mm - 0.01).ceil().max(1.0) as usize + 1,
         };
-        let waves = self.plane_waves();
-        let grid =
-            Grid { n_rows: window.rows, n_columns: window.columns, pitch_mm, samples_per_pixel: points_per_pixel };
-        let mean = if is_rule && grid.is_cheaper(self.len()) {
-            gridded::mean_square(&waves, grid)
+        let grid = Grid::new(window.rows, window.columns, pitch_mm, unit_mm);
+        let mean = if is_rule && grid.is_cheaper(self.len(), points_per_pixel) {
+            gridded::mean_square(&self.plane_waves(grid.origin_mm()), grid)
         } else {
             let axis = |n_pixels| SampleAxis::new(n_pixels, pitch_mm, points_per_pixel);
-            transform::mean_square(&waves, &axis(window.columns), &axis(window.rows))
+            transform::mean_square(&self.plane_waves(DVec2::ZERO), &axis(window.columns), &axis(window.rows))
         };
         // In a film's rows y ascends, as it does down a picture; its x ascends to the picture's left.
         let samples = mean.slice(s![.., ..;-1]).mapv(|per_mm2| per_mm2 * pitch_mm * pitch_mm);

@@ -1,8 +1,9 @@
 //! Gaussians deposited on pixels.
 //!
-//! Each Gaussian is sampled line by line, eight samples at a time, in single precision; the exponential is a
-//! polynomial, so that the compiler makes vectors of it. It is compiled for the base instruction set and for AVX2, chosen
-//! at run time, without fused multiply-add and with every sum in a fixed order: all machines give the same bits.
+//! Each Gaussian is sampled on eight columns of pixels at a time, in single precision. Down a column its values are
+//! products: each is the last times a ratio, which itself changes by a constant factor. The compiler makes vectors of
+//! that, for the base instruction set and for AVX2, chosen at run time, without fused multiply-add and with every sum in
+//! a fixed order: all machines give the same bits.
 
 use dioptric_diffraction::Covariance;
 use glam::DVec2;
@@ -18,7 +19,7 @@ const FINEST: usize = 5;
 /// A Gaussian is sampled at this many samples a standard deviation, or more: its sum is then good to 3·10⁻⁴, and to
 /// much better where Gaussians overlap.
 const SAMPLES_PER_SIGMA: f64 = 0.6;
-/// Samples that are computed together.
+/// Columns of pixels that are computed together.
 const LANES: usize = 8;
 
 /// A Gaussian to be deposited; lengths in pixels.
@@ -43,20 +44,18 @@ pub(crate) fn deposit(raster: &mut Raster, gaussians: &[Gaussian]) {
     }
 }
 
-/// Pixels in single precision, their rows longer than the picture's so that a group of samples may run over the edge.
+/// Pixels in single precision, their rows longer than the picture's so that eight columns may run over the edge.
 struct Film {
     rows: usize,
     columns: usize,
     stride: usize,
     sums: Vec<f32>,
-    /// Samples of one row of pixels.
-    samples: Vec<f32>,
 }
 
 impl Film {
     fn new((rows, columns): (usize, usize)) -> Self {
         let stride = columns + LANES;
-        Self { rows, columns, stride, sums: vec![0.0; rows * stride], samples: vec![0.0; columns * FINEST + 2 * LANES] }
+        Self { rows, columns, stride, sums: vec![0.0; rows * stride] }
     }
 }
 
@@ -74,37 +73,44 @@ fn add_all(film: &mut Film, gaussians: &[Gaussian]) {
     }
 }
 
-/// A Gaussian in units of samples, as `peak · 2^(fall_y dy² + fall_x (dx − shear dy)²)`; places count from a corner of a
-/// sample near its middle, so that single precision does.
+/// A Gaussian in units of samples: `peak · 2^(fall_x dx² + fall_y (dy − shear dx)²)`. Places count from a corner of a
+/// pixel near its middle, so that single precision does.
 struct Sampled {
+    /// Column and row of the pixel.
     corner: (i32, i32),
     at: (f32, f32),
     peak: f32,
     fall_x: f32,
     fall_y: f32,
     shear: f32,
-    sigma_y: f32,
-    /// In a line.
     sigma_x: f32,
+    /// At one x.
+    sigma_y: f32,
 }
 
-/// Neighbouring lines of samples through a Gaussian: their middles, the powers of 2 there, and the samples that they
-/// reach.
-struct Lines {
-    centers: [f32; LANES],
-    falls: [f32; LANES],
-    firsts: [i32; LANES],
-    ends: [i32; LANES],
+/// Samples of eight columns on a few lines, and where the first lies from the Gaussian's middle.
+struct Block {
+    column: usize,
+    line: usize,
+    n_lines: usize,
+    from_x: f32,
+    from_y: f32,
 }
 
-/// The middles of samples, from the first's edge.
-const MIDDLES: [f32; LANES] = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5];
+/// The numbers of the lanes.
+const COUNT: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 /// Beyond this power of 2 nothing is deposited.
 const LEAST: f32 = (-0.5 * REACH * REACH * std::f64::consts::LOG2_E) as f32;
+/// That power: the least value over the peak.
+const EDGE: f32 = 3.354_626_3e-4;
 /// What is held within the reach.
 const INSIDE: f64 = 1.0 - 3.354_626_279_025_118_5e-4;
-/// Places further than this from the picture, in samples, are not seen.
-const FAR: f64 = 1e6;
+/// Places further than this from the picture, in pixels, are not seen.
+const FAR: f64 = 1e5;
+/// Lines between two computations of the exponential, at most: products carry its error, which grows to 5·10⁻⁵.
+const MOST_LINES: f32 = 32.0;
+/// The same in standard deviations: what comes within reach there begins above 2⁻¹¹⁰, which single precision holds.
+const MOST_SIGMAS: f32 = 8.0;
 
 impl Sampled {
     /// Returns a Gaussian for samples, `divisions` to a pixel's side.
@@ -122,150 +128,112 @@ impl Sampled {
             c.yy += lift;
         }
         let determinant = c.xx * c.yy - c.xy * c.xy;
-        let at = (gaussian.at * divisions as f64).clamp(DVec2::splat(-FAR), DVec2::splat(FAR));
+        let at = gaussian.at.clamp(DVec2::splat(-FAR), DVec2::splat(FAR));
         let corner = at.floor();
-        let per_yy = 1.0 / c.yy;
+        let within = (at - corner) * divisions as f64;
+        let per_xx = 1.0 / c.xx;
+        let variance_y = determinant * per_xx;
         Self {
             corner: (corner.x as i32, corner.y as i32),
-            at: ((at.x - corner.x) as f32, (at.y - corner.y) as f32),
+            at: (within.x as f32, within.y as f32),
             peak: (gaussian.energy / (std::f64::consts::TAU * INSIDE * determinant.sqrt())) as f32,
-            fall_x: (-0.5 * std::f64::consts::LOG2_E * c.yy / determinant) as f32,
-            fall_y: (-0.5 * std::f64::consts::LOG2_E * per_yy) as f32,
-            shear: (c.xy * per_yy) as f32,
-            sigma_y: c.yy.sqrt() as f32,
-            sigma_x: (determinant * per_yy).sqrt() as f32,
+            fall_x: (-0.5 * std::f64::consts::LOG2_E * per_xx) as f32,
+            fall_y: (-0.5 * std::f64::consts::LOG2_E / variance_y) as f32,
+            shear: (c.xy * per_xx) as f32,
+            sigma_x: c.xx.sqrt() as f32,
+            sigma_y: variance_y.sqrt() as f32,
         }
     }
 
-    /// Adds it to the pixels, a few rows at a time.
+    /// Adds it to the pixels, eight columns at a time.
     #[inline(always)]
     fn add<const DIVISIONS: usize>(&self, film: &mut Film) {
-        let divisions = DIVISIONS as i32;
-        let reach = REACH as f32 * self.sigma_y;
-        let first = (self.corner.1 + round(self.at.1 - reach)).max(0) / divisions;
-        let end = (self.corner.1 + round(self.at.1 + reach)).min(film.rows as i32 * divisions);
-        let end = (end + divisions - 1) / divisions;
-        // As many rows as have their lines computed together.
-        let n_rows = LANES / DIVISIONS;
-        let mut row = first;
-        while row < end {
-            let lines = self.lines(row * divisions - self.corner.1);
-            for i in 0..n_rows.min((end - row) as usize) {
-                self.add_row::<DIVISIONS>(film, row as usize + i, &lines, i * DIVISIONS);
+        let per_pixel = 1.0 / DIVISIONS as f32;
+        let reach = REACH as f32 * self.sigma_x;
+        let first = (self.corner.0 + floor((self.at.0 - reach) * per_pixel)).max(0);
+        let end = (self.corner.0 + floor((self.at.0 + reach) * per_pixel) + 1).min(film.columns as i32);
+        let mut column = first;
+        while column < end {
+            self.add_columns::<DIVISIONS>(film, column as usize);
+            column += LANES as i32;
+        }
+    }
+
+    /// Adds what falls on eight columns, the first of which is given.
+    #[inline(always)]
+    fn add_columns<const DIVISIONS: usize>(&self, film: &mut Film, column: usize) {
+        // How far the first and last samples lie from the middle, and which lines come within reach between them.
+        let from = ((column as i32 - self.corner.0) * DIVISIONS as i32) as f32 + 0.5 - self.at.0;
+        let to = from + (LANES * DIVISIONS - 1) as f32;
+        let reach_x = REACH as f32 * self.sigma_x;
+        let (from_x, to_x) = (from.max(-reach_x), to.min(reach_x));
+        let (y_from, y_to) = (self.shear * from_x, self.shear * to_x);
+        let nearest = from_x.max(-to_x).max(0.0);
+        let reach_y = ((self.fall_x * nearest * nearest - LEAST).max(0.0) * (2.0 / std::f32::consts::LOG2_E)).sqrt()
+            * self.sigma_y;
+        let corner = self.corner.1 * DIVISIONS as i32;
+        let first = (corner + floor(self.at.1 + y_from.min(y_to) - reach_y)).max(0);
+        let end = (corner + floor(self.at.1 + y_from.max(y_to) + reach_y) + 1).min((film.rows * DIVISIONS) as i32);
+        let most = (MOST_SIGMAS * self.sigma_y).clamp(2.0, MOST_LINES) as i32;
+        let mut line = first;
+        while line < end {
+            let n = most.min(end - line);
+            let from_y = (line - corner) as f32 + 0.5 - self.at.1;
+            self.add_lines::<DIVISIONS>(
+                film,
+                Block { column, line: line as usize, n_lines: n as usize, from_x: from, from_y },
+            );
+            line += n;
+        }
+    }
+
+    /// Adds what falls on a block: exponentials on its first line, and products from line to line.
+    #[inline(always)]
+    fn add_lines<const DIVISIONS: usize>(&self, film: &mut Film, block: Block) {
+        let (mut values, mut ratios) = ([[0.0; LANES]; DIVISIONS], [[0.0; LANES]; DIVISIONS]);
+        for (phase, (values, ratios)) in values.iter_mut().zip(&mut ratios).enumerate() {
+            let from_x = block.from_x + phase as f32;
+            for ((value, ratio), count) in values.iter_mut().zip(ratios).zip(COUNT) {
+                let dx = from_x + count * DIVISIONS as f32;
+                let dy = block.from_y - self.shear * dx;
+                *value = exp2(self.fall_x * (dx * dx) + self.fall_y * (dy * dy));
+                *ratio = exp2(self.fall_y * (1.0 + 2.0 * dy));
             }
-            row += n_rows as i32;
         }
-    }
-
-    /// Returns the lines from one on.
-    #[inline(always)]
-    fn lines(&self, first: i32) -> Lines {
-        let start = first as f32 - self.at.1;
-        let mut lines = Lines { centers: [0.0; LANES], falls: [0.0; LANES], firsts: [0; LANES], ends: [0; LANES] };
-        for lane in 0..LANES {
-            let dy = start + MIDDLES[lane];
-            let fall = self.fall_y * (dy * dy);
-            let center = self.at.0 + self.shear * dy;
-            // Where the exponent comes to its least.
-            let reach = ((fall - LEAST).max(0.0) * (2.0 / std::f32::consts::LOG2_E)).sqrt() * self.sigma_x;
-            lines.centers[lane] = center;
-            lines.falls[lane] = fall;
-            lines.firsts[lane] = self.corner.0 + round(center - reach);
-            lines.ends[lane] = self.corner.0 + round(center + reach);
-        }
-        lines
-    }
-
-    /// Adds what falls on a row of pixels, whose lines begin with one of these.
-    #[inline(always)]
-    fn add_row<const DIVISIONS: usize>(&self, film: &mut Film, row: usize, lines: &Lines, from: usize) {
-        let (mut first, mut end) = (i32::MAX, i32::MIN);
-        for line in from..from + DIVISIONS {
-            first = first.min(lines.firsts[line]);
-            end = end.max(lines.ends[line]);
-        }
-        let n_samples = (film.columns * DIVISIONS) as i32;
-        let (first, end) = (first.max(0), end.min(n_samples));
-        if first >= end {
-            return;
-        }
-        let pixel = first as usize / DIVISIONS;
-        let sums = &mut film.sums[row * film.stride + pixel..(row + 1) * film.stride];
-        let from_corner = |sample: i32| (sample - self.corner.0) as f32;
-        let (mut start, end) = (from_corner((pixel * DIVISIONS) as i32), from_corner(end));
-        // The compiler cannot count the turns of these loops, and makes its vectors of a group, not of several.
-        if DIVISIONS == 1 {
-            for sums in sums.chunks_exact_mut(LANES) {
-                if start >= end {
-                    break;
+        let change = exp2(2.0 * self.fall_y);
+        for line in block.line..block.line + block.n_lines {
+            let mut total = [0.0; LANES];
+            for (values, ratios) in values.iter_mut().zip(&mut ratios) {
+                for ((sum, value), ratio) in total.iter_mut().zip(values).zip(ratios) {
+                    *sum += if *value >= EDGE { *value } else { 0.0 };
+                    *value *= *ratio;
+                    *ratio *= change;
                 }
-                for (sum, value) in sums.iter_mut().zip(self.values::<DIVISIONS>(lines, from, start)) {
-                    *sum += value;
-                }
-                start += LANES as f32;
             }
-            return;
-        }
-        let mut n_samples = 0;
-        for samples in film.samples.chunks_exact_mut(LANES) {
-            if start >= end {
-                break;
-            }
-            samples.copy_from_slice(&self.values::<DIVISIONS>(lines, from, start));
-            start += LANES as f32;
-            n_samples += LANES;
-        }
-        film.samples[n_samples..][..DIVISIONS].fill(0.0);
-        let n_pixels = n_samples.div_ceil(DIVISIONS);
-        for (sum, samples) in sums.iter_mut().zip(film.samples.chunks_exact(DIVISIONS)).take(n_pixels) {
-            *sum += samples.iter().sum::<f32>();
-        }
-    }
-
-    /// Returns the sums over the lines of a row of pixels, of the samples from a place along x on.
-    #[inline(always)]
-    fn values<const DIVISIONS: usize>(&self, lines: &Lines, from: usize, start: f32) -> [f32; LANES] {
-        let mut sums = [0.0; LANES];
-        for line in from..from + DIVISIONS {
-            let (start, fall) = (start - lines.centers[line], lines.falls[line]);
-            let mut exponents = MIDDLES;
-            for exponent in &mut exponents {
-                let dx = start + *exponent;
-                *exponent = fall + self.fall_x * (dx * dx);
-            }
-            for (sum, power) in sums.iter_mut().zip(powers_of_2(exponents)) {
-                *sum += power;
+            let sums = &mut film.sums[line / DIVISIONS * film.stride + block.column..][..LANES];
+            for (sum, total) in sums.iter_mut().zip(total) {
+                *sum += self.peak * total;
             }
         }
-        sums.map(|sum| self.peak * sum)
     }
 }
 
-const SHIFT: f32 = 12_582_912.0;
-
-/// Returns the whole number nearest to one below 4 million: the sample within a place, for ends of spans the first whose
-/// middle lies beyond it.
-#[inline(always)]
-fn round(x: f32) -> i32 {
-    (x.clamp(-4e6, 4e6) + SHIFT).to_bits() as i32 - SHIFT.to_bits() as i32
-}
-
-/// Returns 2^x for x from `LEAST` to 0, to 3e-7 of itself, and 0 below: quicker than the library's, and the same bits
+/// Returns 2^x to 3e-7 of itself, 0 below 2⁻¹²⁶ and 2¹²⁶ above that: quicker than the library's, and the same bits
 /// everywhere.
 #[inline(always)]
-fn powers_of_2(x: [f32; LANES]) -> [f32; LANES] {
-    x.map(|x| {
-        let shifted = x + SHIFT;
-        let t = x - (shifted - SHIFT);
-        // Taylor's series of e^(t ln 2) over |t| < 0.5.
-        let mut power = TERMS[0];
-        for term in &TERMS[1..] {
-            power = power * t + term;
-        }
-        // The whole number of doublings is in the last bits of the shifted sum; it goes to the exponent.
-        let bits = power.to_bits().wrapping_add(shifted.to_bits() << 23);
-        f32::from_bits(if x >= LEAST { bits } else { 0 })
-    })
+fn exp2(x: f32) -> f32 {
+    const SHIFT: f32 = 12_582_912.0;
+    let most = if x < 126.0 { x } else { 126.0 };
+    let shifted = most + SHIFT;
+    let t = most - (shifted - SHIFT);
+    // Taylor's series of e^(t ln 2) over |t| < 0.5.
+    let mut power = TERMS[0];
+    for term in &TERMS[1..] {
+        power = power * t + term;
+    }
+    // The whole number of doublings is in the last bits of the shifted sum; it goes to the exponent.
+    let bits = power.to_bits().wrapping_add(shifted.to_bits() << 23);
+    f32::from_bits(if x > -126.0 { bits } else { 0 })
 }
 
 /// `(ln 2)^k / k!`, the highest first.
@@ -280,6 +248,11 @@ const TERMS: [f32; 7] = {
     }
     terms
 };
+
+#[inline(always)]
+fn floor(x: f32) -> i32 {
+    x.floor() as i32
+}
 
 #[cfg(test)]
 mod tests {
@@ -316,14 +289,11 @@ mod tests {
 
     #[test]
     fn the_powers_are_the_librarys() {
-        for i in -1154..0 {
-            let x: [f32; LANES] = std::array::from_fn(|lane| (i as f32 + 0.125 * lane as f32) * 0.01);
-            for (x, power) in x.into_iter().zip(powers_of_2(x)) {
-                let expected = f64::from(x).exp2();
-                assert!((f64::from(power) / expected - 1.0).abs() < 3e-7, "{x}: {power} {expected}");
-            }
+        for i in -12_500..12_500 {
+            let x = i as f32 * 0.01;
+            let expected = f64::from(x).exp2();
+            assert!((f64::from(exp2(x)) / expected - 1.0).abs() < 3e-7, "{x}: {} {expected}", exp2(x));
         }
-        assert_eq!(powers_of_2([-11.6; LANES]), [0.0; LANES]);
     }
 
     #[test]

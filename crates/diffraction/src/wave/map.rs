@@ -207,7 +207,6 @@ impl WaveMap {
     /// Mirrors the half pupil, turns it to its field and counts from the centroid.
     fn assemble(&self, grid: PupilGrid, wavelength_nm: f64, turn: DVec2, half: &Lists) -> WaveNodes {
         let (n_radii, n_azimuths) = (grid.n_radii, grid.n_azimuths);
-        let n = grid.n_nodes();
         // Each azimuth as its own in the half, and whether it is mirrored.
         let azimuths = || {
             let place = |j: usize| if 2 * j > n_azimuths { (n_azimuths - j, -1.0) } else { (j, 1.0) };
@@ -225,6 +224,7 @@ impl WaveMap {
         let along_x = along_x / total;
         let per_mm = index / (wavelength_nm * 1e-6);
         let reference_mm = turn * (centroid_x_mm + along_x);
+        let list = || vec![0.0; grid.n_nodes()];
         let mut nodes = WaveNodes {
             wavelength_nm,
             image_index: index,
@@ -232,25 +232,37 @@ impl WaveMap {
             propagation: Propagation::Debye,
             reference_mm,
             collected,
-            q_x_mm: Vec::with_capacity(n),
-            q_y_mm: Vec::with_capacity(n),
-            d_x: Vec::with_capacity(n),
-            d_y: Vec::with_capacity(n),
-            phi_mm: Vec::with_capacity(n),
-            energy: Vec::with_capacity(n),
-            amplitude_per_mm: Vec::with_capacity(n),
+            q_x_mm: list(),
+            q_y_mm: list(),
+            d_x: list(),
+            d_y: list(),
+            phi_mm: list(),
+            energy: list(),
+            amplitude_per_mm: list(),
         };
-        for (i, sign) in azimuths().flat_map(|(span, sign)| span.map(move |i| (i, sign))) {
-            let q = turn.rotate(DVec2::new(half.q_x[i] - along_x, sign * half.q_y[i]));
-            let d = turn.rotate(DVec2::new(half.d_x[i], sign * half.d_y[i]));
-            let energy = half.energy[i] / total;
-            nodes.q_x_mm.push(q.x);
-            nodes.q_y_mm.push(q.y);
-            nodes.d_x.push(d.x);
-            nodes.d_y.push(d.y);
-            nodes.phi_mm.push(half.phi_mm[i] + index * along_x * half.d_x[i]);
-            nodes.energy.push(energy);
-            nodes.amplitude_per_mm.push(per_mm * (energy * half.jacobian[i].abs()).sqrt());
+        for ((span, sign), to) in azimuths().zip((0..).step_by(n_radii)) {
+            let to = to..to + n_radii;
+            let rotate = |x: &mut [f64], y: &mut [f64], from_x: &[f64], from_y: &[f64], along_x: f64| {
+                for ((x, y), (from_x, from_y)) in x.iter_mut().zip(y).zip(from_x.iter().zip(from_y)) {
+                    let (from_x, from_y) = (from_x - along_x, sign * from_y);
+                    *x = turn.x * from_x - turn.y * from_y;
+                    *y = turn.y * from_x + turn.x * from_y;
+                }
+            };
+            let (q_x, q_y) = (&half.q_x[span.clone()], &half.q_y[span.clone()]);
+            rotate(&mut nodes.q_x_mm[to.clone()], &mut nodes.q_y_mm[to.clone()], q_x, q_y, along_x);
+            let (d_x, d_y) = (&half.d_x[span.clone()], &half.d_y[span.clone()]);
+            rotate(&mut nodes.d_x[to.clone()], &mut nodes.d_y[to.clone()], d_x, d_y, 0.0);
+            for (phi, (from, d_x)) in nodes.phi_mm[to.clone()].iter_mut().zip(half.phi_mm[span.clone()].iter().zip(d_x))
+            {
+                *phi = from + index * along_x * d_x;
+            }
+            let (energy, jacobian) = (&half.energy[span.clone()], &half.jacobian[span]);
+            let to = nodes.energy[to.clone()].iter_mut().zip(&mut nodes.amplitude_per_mm[to]);
+            for ((share, amplitude), (energy, jacobian)) in to.zip(energy.iter().zip(jacobian)) {
+                *share = energy / total;
+                *amplitude = per_mm * (*share * jacobian.abs()).sqrt();
+            }
         }
         nodes
     }

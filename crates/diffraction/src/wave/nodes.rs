@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims};
 use glam::{DVec2, DVec3};
+use multiversion::multiversion;
 
 use super::transform::PlaneWaves;
 use crate::{DiffractionError, quadrature::gauss_legendre_on};
@@ -228,10 +229,8 @@ impl WaveNodes {
     }
 
     fn mean(&self, x: &[f64], y: &[f64]) -> DVec2 {
-        let weighted = self.energy.iter().zip(x.iter().zip(y));
-        let (sum, total) =
-            weighted.fold((DVec2::ZERO, 0.0), |(sum, total), (e, (x, y))| (sum + *e * DVec2::new(*x, *y), total + e));
-        sum / total
+        let [total, x, y] = sums(&self.energy, x, y);
+        DVec2::new(x, y) / total
     }
 
     /// Returns the numerical aperture: the index times the largest difference of a direction from the mean one, at
@@ -290,7 +289,7 @@ impl WaveNodes {
     /// Returns the irradiance at one film point, per mm² for unit transmitted energy: the sum written out, in double
     /// precision.
     pub fn irradiance_per_mm2(&self, film_mm: DVec2) -> f64 {
-        let waves = self.plane_waves();
+        let waves = self.plane_waves(DVec2::ZERO);
         let at = film_mm - self.reference_mm;
         let (mut re, mut im) = (0.0, 0.0);
         for j in 0..self.len() {
@@ -306,22 +305,71 @@ impl WaveNodes {
         self.amplitude_per_mm.iter().sum::<f64>().powi(2)
     }
 
-    /// Returns the waves with the common piston and tilt taken out, which |U|² does not feel.
-    pub(crate) fn plane_waves(&self) -> PlaneWaves {
+    /// Returns the waves with the common piston and tilt taken out, which |U|² does not feel; places count from
+    /// `origin_mm` beside the reference.
+    pub(crate) fn plane_waves(&self, origin_mm: DVec2) -> PlaneWaves {
+        let n = self.len();
+        let list = || vec![0.0; n];
+        let mut waves = PlaneWaves { re: list(), im: list(), turns_x_per_mm: list(), turns_y_per_mm: list() };
         let per_mm = 1.0 / (self.wavelength_nm * 1e-6);
         let (mean, piston_mm) = (self.mean_direction(), self.phi_mm.first().copied().unwrap_or(0.0));
-        let turns = |d: &[f64], mean: f64| d.iter().map(|d| self.image_index * (d - mean) * per_mm).collect();
-        let phases = self.phi_mm.iter().map(|phi| super::cis::cis((phi - piston_mm) * per_mm));
-        let (re, im) = phases.zip(&self.amplitude_per_mm).map(|((c, s), a)| (a * c, a * s)).unzip();
-        let (turns_x_per_mm, turns_y_per_mm) = (turns(&self.d_x, mean.x), turns(&self.d_y, mean.y));
-        PlaneWaves { re, im, turns_x_per_mm, turns_y_per_mm }
+        for (turns, d, mean) in
+            [(&mut waves.turns_x_per_mm, &self.d_x, mean.x), (&mut waves.turns_y_per_mm, &self.d_y, mean.y)]
+        {
+            for (turns, d) in turns.iter_mut().zip(d) {
+                *turns = self.image_index * (d - mean) * per_mm;
+            }
+        }
+        for ((turns, phi), (x, y)) in
+            waves.re.iter_mut().zip(&self.phi_mm).zip(waves.turns_x_per_mm.iter().zip(&waves.turns_y_per_mm))
+        {
+            *turns = (phi - piston_mm) * per_mm + (x * origin_mm.x + y * origin_mm.y);
+        }
+        turn_to_phasors(&mut waves.re, &mut waves.im, &self.amplitude_per_mm);
+        waves
     }
 }
 
-fn largest(x: &[f64], y: &[f64], from: DVec2) -> f64 {
-    let squares = x.iter().zip(y).map(|(x, y)| from.distance_squared(DVec2::new(*x, *y)));
-    squares.fold(0.0, f64::max).sqrt()
+/// Replaces phases in turns by the waves of these amplitudes: real and imaginary parts.
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn turn_to_phasors(re: &mut [f64], im: &mut [f64], amplitudes: &[f64]) {
+    for ((re, im), amplitude) in re.iter_mut().zip(im).zip(amplitudes) {
+        let (c, s) = super::cis::cis(*re);
+        (*re, *im) = (amplitude * c, amplitude * s);
+    }
 }
+
+/// Returns the largest distance of points from one.
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn largest(x: &[f64], y: &[f64], from: DVec2) -> f64 {
+    let square = |x: f64, y: f64| (x - from.x) * (x - from.x) + (y - from.y) * (y - from.y);
+    let mut most = [0.0_f64; LANES];
+    let (x_groups, y_groups) = (x.chunks_exact(LANES), y.chunks_exact(LANES));
+    let rest = x_groups.remainder().iter().zip(y_groups.remainder());
+    for (x, y) in x_groups.zip(y_groups) {
+        for lane in 0..LANES {
+            let square = square(x[lane], y[lane]);
+            most[lane] = if square > most[lane] { square } else { most[lane] };
+        }
+    }
+    rest.map(|(x, y)| square(*x, *y)).chain(most).fold(0.0, f64::max).sqrt()
+}
+
+/// Returns the sums of a list, and of its products with two others; numbers eight apart are added first.
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn sums(weights: &[f64], x: &[f64], y: &[f64]) -> [f64; 3] {
+    let mut partial = [[0.0; LANES]; 3];
+    for ((w, x), y) in weights.chunks(LANES).zip(x.chunks(LANES)).zip(y.chunks(LANES)) {
+        for (lane, ((w, x), y)) in w.iter().zip(x).zip(y).enumerate() {
+            partial[0][lane] += w;
+            partial[1][lane] += w * x;
+            partial[2][lane] += w * y;
+        }
+    }
+    partial.map(|lanes| lanes.iter().sum())
+}
+
+const LANES: usize = 8;
 
 /// Returns the nodes of a star-shaped region, given its edge at each azimuth, and the areas of their cells.
 pub(crate) fn polar(grid: PupilGrid, rho_max: impl Fn(usize) -> f64) -> impl Iterator<Item = (DVec2, f64)> {

@@ -160,7 +160,7 @@ fn as_powers(parity: Parity, sum: &[f64]) -> Vec<f64> {
 }
 
 /// Replaces the lower triangle of a symmetric matrix by Cholesky's factor, or returns `None` if it is singular.
-fn factor(matrix: &mut [f64], n: usize) -> Option<()> {
+pub(super) fn factor(matrix: &mut [f64], n: usize) -> Option<()> {
     let largest = (0..n).map(|i| matrix[i * n + i]).fold(0.0, f64::max);
     for i in 0..n {
         let (above, below) = matrix.split_at_mut(i * n);
@@ -178,7 +178,7 @@ fn factor(matrix: &mut [f64], n: usize) -> Option<()> {
 }
 
 /// Solves by Cholesky's factor, in place.
-fn solve(lower: &[f64], n: usize, right: &mut [f64]) {
+pub(super) fn solve(lower: &[f64], n: usize, right: &mut [f64]) {
     for i in 0..n {
         let dot: f64 = lower[i * n..][..i].iter().zip(&right[..i]).map(|(l, r)| l * r).sum();
         right[i] = (right[i] - dot) / lower[i * n + i];

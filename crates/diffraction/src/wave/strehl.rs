@@ -39,7 +39,7 @@ impl WaveNodes {
         let half = (6..=wanted).rev().find(|&half| nodes.check(reach_mm(half)).is_ok()).unwrap_or(6);
         nodes.check(reach_mm(half))?;
         let axis = SampleAxis::new(2 * half + 1, 0.25 * unit_mm, 1);
-        let lattice = transform::mean_square(&nodes.plane_waves(), &axis, &axis);
+        let lattice = transform::mean_square(&nodes.plane_waves(DVec2::ZERO), &axis, &axis);
         let highest = lattice.indexed_iter().max_by(|a, b| a.1.total_cmp(b.1));
         let (row, column) = highest.map_or((half, half), |(place, _)| place);
         let place = |i: usize| (i as f64 - half as f64) * 0.25 * unit_mm;
