@@ -44,8 +44,11 @@ impl Mesh {
 
     /// Returns the polar places (share of the radius, azimuth) of all nodes in order.
     pub(crate) fn nodes(self) -> impl Iterator<Item = (f64, f64)> {
-        let rings = (1..=self.n_rings).flat_map(move |ring| (0..self.n_azimuths).map(move |j| (ring, j)));
-        std::iter::once((0.0, 0.0)).chain(rings.map(move |(i, j)| (self.share(i as f64), self.azimuth(j as f64))))
+        let ring = move |ring: usize| {
+            let share = self.share(ring as f64);
+            (0..self.n_azimuths).map(move |j| (share, self.azimuth(j as f64)))
+        };
+        std::iter::once((0.0, 0.0)).chain((1..=self.n_rings).flat_map(ring))
     }
 
     /// Returns the ring and azimuth numbers of all cells in order: cell (i, j) lies between rings i and i + 1.

@@ -150,6 +150,7 @@ impl Task<'_> {
         let pupil_mm2: f64 = energies.iter().sum();
         energies.iter_mut().for_each(|e| *e /= pupil_mm2);
 
+        let outer_shares: Vec<f64> = (0..self.mesh.n_rings).map(|ring| self.mesh.outer_share(ring)).collect();
         let centroid_mm: DVec2 = self
             .mesh
             .cells()
@@ -157,7 +158,7 @@ impl Task<'_> {
             .map(|((ring, j), e)| {
                 let [a, b, c, d] = self.mesh.corners(ring, j).map(|node| nodes[node].at_mm);
                 // That of the two triangles that will be drawn.
-                let outer = self.mesh.outer_share(ring);
+                let outer = outer_shares[ring];
                 (a + c + outer * b + (1.0 - outer) * d) * (e / 3.0)
             })
             .sum();
@@ -214,15 +215,17 @@ impl Task<'_> {
     fn cell_areas(self, weights: &[f64], rho_mm: &[f64]) -> Vec<f64> {
         let mesh = self.mesh;
         let wedge = mesh.azimuth(1.0);
-        mesh.cells()
-            .map(|(ring, j)| {
-                let (inner, outer) = (mesh.share(ring as f64), mesh.share((ring + 1) as f64));
+        let ring = |ring: usize| {
+            let (inner, outer) = (mesh.share(ring as f64), mesh.share((ring + 1) as f64));
+            let sector = 0.5 * wedge * (outer * outer - inner * inner);
+            (0..mesh.n_azimuths).map(move |j| {
                 // The mean of the squares at both sides: the trapezoid rule around the pupil.
                 let square = 0.5 * (rho_mm[j].powi(2) + rho_mm[(j + 1) % mesh.n_azimuths].powi(2));
                 let weight = mesh.corners(ring, j).map(|node| weights[node]).iter().sum::<f64>() / 4.0;
-                0.5 * wedge * (outer * outer - inner * inner) * square * weight
+                sector * square * weight
             })
-            .collect()
+        };
+        (0..mesh.n_rings).flat_map(ring).collect()
     }
 
     fn signed_rms_mm(self, nodes: &[Node], targets: &[DVec2], energies: &[f64]) -> f64 {

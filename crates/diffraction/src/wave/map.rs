@@ -173,7 +173,7 @@ impl WaveMap {
         let step = TAU / grid.n_azimuths as f64;
         let [index, _, _, half_x, half_y, _] = *self.numbers.first_chunk::<SCALARS>().expect("a map has its scalars");
         let mut sector = Sector::new(n_radii);
-        let mut half = Lists::default();
+        let mut half = Lists::with_capacity((half_azimuths + 1) * n_radii);
         for j in 0..=half_azimuths {
             let rho_mm = self.edge_mm(step * j as f64);
             let (c, s) = super::cis::cis(j as f64 / grid.n_azimuths as f64);
@@ -355,6 +355,7 @@ struct Rays {
 struct Sector {
     /// In units of the pupil's half axes.
     radii: Vec<f64>,
+    /// dx, dy, Φ and brightness.
     values: [Vec<f64>; 4],
     along: [Vec<f64>; 3],
     around: [Vec<f64>; 3],
@@ -381,30 +382,35 @@ impl Sector {
 
     /// Computes all lists from the radii.
     fn fill(&mut self, rays: &Rays, index: f64) {
-        let of = [&rays.values[..], &rays.along[..], &rays.around[..]].concat();
-        let lists = self.values.iter_mut().chain(&mut self.along).chain(&mut self.around);
-        for (ray, values) in of.iter().zip(lists) {
-            evaluate(ray, &self.radii, values);
-        }
-        for i in 0..self.radii.len() {
-            let [x_r, y_r, phi_r] = [0, 1, 2].map(|f: usize| self.along[f][i]);
-            let [x_a, y_a, phi_a] = [0, 1, 2].map(|f: usize| self.around[f][i]);
-            let determinant = x_r * y_a - x_a * y_r;
-            // dΦ = −n q·dd, outwards and around.
-            self.q_x[i] = -(phi_r * y_a - phi_a * y_r) / (index * determinant);
-            self.q_y[i] = -(x_r * phi_a - x_a * phi_r) / (index * determinant);
-            self.jacobian[i] = determinant / self.radii[i];
-        }
+        fill_sector(self, rays, index);
     }
 }
 
 #[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
-fn evaluate(ray: &Ray, radii: &[f64], values: &mut [f64]) {
-    horner(ray, radii, values);
+fn fill_sector(sector: &mut Sector, rays: &Rays, index: f64) {
+    let of = rays.values.iter().chain(&rays.along).chain(&rays.around);
+    let lists = sector.values.iter_mut().chain(&mut sector.along).chain(&mut sector.around);
+    for (ray, values) in of.zip(lists) {
+        horner(ray, &sector.radii, values);
+    }
+    for value in &mut sector.values[3] {
+        *value = super::cis::exp(*value);
+    }
+    let n = sector.radii.len();
+    let [x_r, y_r, phi_r] = sector.along.each_ref().map(|list| &list[..n]);
+    let [x_a, y_a, phi_a] = sector.around.each_ref().map(|list| &list[..n]);
+    let (q_x, q_y, jacobian) = (&mut sector.q_x[..n], &mut sector.q_y[..n], &mut sector.jacobian[..n]);
+    for i in 0..n {
+        let determinant = x_r[i] * y_a[i] - x_a[i] * y_r[i];
+        // dΦ = −n q·dd, outwards and around.
+        let factor = -1.0 / (index * determinant);
+        q_x[i] = (phi_r[i] * y_a[i] - phi_a[i] * y_r[i]) * factor;
+        q_y[i] = (x_r[i] * phi_a[i] - x_a[i] * phi_r[i]) * factor;
+        jacobian[i] = determinant / sector.radii[i];
+    }
 }
 
 /// The nodes of half a pupil.
-#[derive(Default)]
 struct Lists {
     d_x: Vec<f64>,
     d_y: Vec<f64>,
@@ -418,10 +424,16 @@ struct Lists {
 }
 
 impl Lists {
+    fn with_capacity(n: usize) -> Self {
+        let list = || Vec::with_capacity(n);
+        Self { d_x: list(), d_y: list(), phi_mm: list(), q_x: list(), q_y: list(), energy: list(), jacobian: list() }
+    }
+
     fn append(&mut self, sector: &Sector, areas_mm2: impl Iterator<Item = f64>, unit_mm2: f64) {
-        for (i, area) in areas_mm2.enumerate() {
-            self.energy.push(area * sector.values[3][i].exp());
-            self.jacobian.push(sector.jacobian[i] * area / unit_mm2);
+        let per_unit = 1.0 / unit_mm2;
+        for (area, (brightness, jacobian)) in areas_mm2.zip(sector.values[3].iter().zip(&sector.jacobian)) {
+            self.energy.push(area * brightness);
+            self.jacobian.push(jacobian * area * per_unit);
         }
         self.d_x.extend(&sector.values[0]);
         self.d_y.extend(&sector.values[1]);

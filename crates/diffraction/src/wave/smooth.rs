@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use multiversion::multiversion;
+
 /// The highest power of the radius.
 pub(super) const DEGREE: usize = 12;
 
@@ -105,14 +107,10 @@ impl Places {
             for ((value, zernike), (m, _)) in basis.iter_mut().zip(zernikes).zip(parity.terms()) {
                 *value = angular[*m] * zernike.iter().map(|(k, c)| c * powers[*k]).sum::<f64>();
             }
-            for i in 0..n {
-                let scaled = basis[i] * weight;
-                for (sum, b) in gram[i * n..][..=i].iter_mut().zip(&basis) {
-                    *sum += scaled * b;
-                }
-                for (right, values) in right.iter_mut().zip(values) {
-                    right[i] += scaled * values[place];
-                }
+            add_products(&mut gram, &basis, *weight);
+            for (right, values) in right.iter_mut().zip(values) {
+                let scaled = weight * values[place];
+                right.iter_mut().zip(&basis).for_each(|(sum, b)| *sum += scaled * b);
             }
         }
         factor(&mut gram, n)?;
@@ -120,6 +118,17 @@ impl Places {
             solve(&gram, n, &mut right);
             as_powers(parity, &right)
         }))
+    }
+}
+
+/// Adds the products of a list's numbers, times a weight, to the lower triangle of a matrix.
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn add_products(gram: &mut [f64], basis: &[f64], weight: f64) {
+    for (i, (row, b)) in gram.chunks_exact_mut(basis.len()).zip(basis).enumerate() {
+        let scaled = b * weight;
+        for (sum, b) in row[..=i].iter_mut().zip(basis) {
+            *sum += scaled * b;
+        }
     }
 }
 
@@ -192,14 +201,22 @@ pub(super) fn solve(lower: &[f64], n: usize, right: &mut [f64]) {
     }
 }
 
-/// Sets each sum to the polynomial at each radius.
+/// Sets each value to the polynomial at each radius.
 #[inline(always)]
 pub(super) fn horner(ray: &Ray, radii: &[f64], values: &mut [f64]) {
-    values.fill(ray[DEGREE]);
-    for c in ray[..DEGREE].iter().rev() {
-        for (value, r) in values.iter_mut().zip(radii) {
-            *value = *value * r + c;
+    const LANES: usize = 8;
+    let (mut radii, mut values) = (radii.chunks_exact(LANES), values.chunks_exact_mut(LANES));
+    for (radii, values) in (&mut radii).zip(&mut values) {
+        let mut sums = [ray[DEGREE]; LANES];
+        for c in ray[..DEGREE].iter().rev() {
+            for (sum, r) in sums.iter_mut().zip(radii) {
+                *sum = *sum * r + c;
+            }
         }
+        values.copy_from_slice(&sums);
+    }
+    for (value, r) in values.into_remainder().iter_mut().zip(radii.remainder()) {
+        *value = ray[..DEGREE].iter().rev().fold(ray[DEGREE], |sum, c| sum * r + c);
     }
 }
 
