@@ -141,28 +141,11 @@ pub fn wave_nodes(
         nodes.check(reach_mm)?;
         return Ok(nodes);
     }
-    enough_nodes(PupilGrid::STANDARD, reach_mm, trace)
-}
-
-/// Returns as many nodes as places up to `reach_mm` from their reference need, beginning with a grid.
-fn enough_nodes(
-    first: PupilGrid,
-    reach_mm: f64,
-    of: impl Fn(PupilGrid) -> Result<WaveNodes, DiffractionError>,
-) -> Result<WaveNodes, DiffractionError> {
-    let mut nodes = of(first)?;
-    // More nodes reach nearer to the edge, and may find that still more are needed: hence the hundredth to spare.
-    loop {
-        let PhaseRange { rays, window } = nodes.phase_range(reach_mm);
-        if nodes.grid.covers(PupilGrid::needed(PhaseRange { rays, window })) {
-            return Ok(nodes);
-        }
-        let bandwidth = rays + window;
-        if bandwidth > LARGEST_BANDWIDTH {
-            return Err(DiffractionError::TooBlurred { bandwidth, limit: LARGEST_BANDWIDTH });
-        }
-        nodes = of(PupilGrid::needed(PhaseRange { rays: 1.01 * rays, window: 1.01 * window }).max(nodes.grid))?;
+    let mut nodes = trace(PupilGrid::STANDARD)?;
+    while let Some(grid) = nodes.finer_grid(reach_mm)? {
+        nodes = trace(grid)?;
     }
+    Ok(nodes)
 }
 
 impl WaveWindow {
@@ -182,6 +165,22 @@ impl WaveWindow {
 }
 
 impl WaveNodes {
+    /// Returns the grid that is to be tried instead of this one for places up to `reach_mm` from the reference, or `None`
+    /// if this one does.
+    fn finer_grid(&self, reach_mm: f64) -> Result<Option<PupilGrid>, DiffractionError> {
+        let PhaseRange { rays, window } = self.phase_range(reach_mm);
+        if self.grid.covers(PupilGrid::needed(PhaseRange { rays, window })) {
+            return Ok(None);
+        }
+        let bandwidth = rays + window;
+        if bandwidth > LARGEST_BANDWIDTH {
+            return Err(DiffractionError::TooBlurred { bandwidth, limit: LARGEST_BANDWIDTH });
+        }
+        // More nodes reach nearer to the edge, and may find that still more are needed: hence the hundredth to spare.
+        let needed = PupilGrid::needed(PhaseRange { rays: 1.01 * rays, window: 1.01 * window });
+        Ok(Some(needed.max(self.grid)))
+    }
+
     /// Returns the point spread function on a window, with this many points along each side of a pixel (`None`:
     /// ⌈2 p / λN⌉ + 1).
     ///
@@ -213,7 +212,7 @@ impl WaveNodes {
         };
         let grid = Grid::new(window.rows, window.columns, pitch_mm, unit_mm);
         let mean = if is_rule && grid.is_cheaper(self.len(), points_per_pixel) {
-            gridded::mean_square(&self.plane_waves(grid.origin_mm()), grid)
+            gridded::mean_square(|waves| self.fill_plane_waves(waves, grid.origin_mm()), grid)
         } else {
             let axis = |n_pixels| SampleAxis::new(n_pixels, pitch_mm, points_per_pixel);
             transform::mean_square(&self.plane_waves(DVec2::ZERO), &axis(window.columns), &axis(window.rows))

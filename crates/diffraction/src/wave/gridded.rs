@@ -12,7 +12,11 @@ use multiversion::multiversion;
 use ndarray::Array2;
 use rustfft::{FftPlanner, num_complex::Complex};
 
-use super::{cis::cis, pixel_mean::PixelMean, transform::PlaneWaves};
+use super::{
+    cis::cis,
+    pixel_mean::{PixelMean, Room},
+    transform::PlaneWaves,
+};
 use crate::quadrature::gauss_legendre_on;
 
 /// Points of the grid that a wave is spread over, each way.
@@ -72,16 +76,19 @@ impl Grid {
     }
 }
 
-/// Returns the mean of |Σ waves|² over each pixel, for waves counted from [`Grid::origin_mm`]: rows along y, columns
-/// along x, both ascending.
-pub(crate) fn mean_square(waves: &PlaneWaves, grid: Grid) -> Array2<f64> {
+/// Returns the mean of |Σ waves|² over each pixel, for waves counted from [`Grid::origin_mm`] that `fill` puts in an
+/// old list: rows along y, columns along x, both ascending.
+pub(crate) fn mean_square(fill: impl FnOnce(&mut PlaneWaves), grid: Grid) -> Array2<f64> {
     let (n_x, n_y) = grid.n_places();
     SPACE.with_borrow_mut(|space| {
+        fill(&mut space.waves);
+        let waves = std::mem::take(&mut space.waves);
         space.resize(grid_size(n_x), grid_size(n_y));
         let scale = waves.scale();
-        spread(space, waves, grid.step_mm(), scale);
-        let squares = space.squares(n_x, n_y, 1.0 / (scale * scale));
-        grid.mean.over(&squares, grid.n_rows, grid.n_columns)
+        spread(space, &waves, grid.step_mm(), scale);
+        space.waves = waves;
+        space.transform(n_x, n_y, 1.0 / (scale * scale));
+        grid.mean.over(&space.squares, grid.n_rows, grid.n_columns, &mut space.room)
     })
 }
 
@@ -101,7 +108,7 @@ fn grid_size(n_places: usize) -> usize {
 }
 
 thread_local! {
-    /// One for each thread: clearing and asking for memory took a tenth of the time.
+    /// One for each thread: asking for memory and giving it back took a tenth of the time.
     static SPACE: RefCell<Space> = RefCell::new(Space::new());
 }
 
@@ -116,6 +123,10 @@ struct Space {
     lines: Vec<Complex<f32>>,
     columns: Vec<Complex<f32>>,
     scratch: Vec<Complex<f32>>,
+    /// Of the last sum, in lines along y.
+    squares: Vec<f64>,
+    waves: PlaneWaves,
+    room: Room,
     planner: FftPlanner<f32>,
     /// By the numbers of places and of points.
     fades: HashMap<(usize, usize), Vec<f64>>,
@@ -132,6 +143,9 @@ impl Space {
             lines: vec![],
             columns: vec![],
             scratch: vec![],
+            squares: vec![],
+            waves: PlaneWaves::default(),
+            room: Room::default(),
             planner: FftPlanner::new(),
             fades: HashMap::new(),
         }
@@ -167,8 +181,8 @@ impl Space {
         }
     }
 
-    /// Returns the squares of the waves at `n_x` × `n_y` places about the middle, in lines along y.
-    fn squares(&mut self, n_x: usize, n_y: usize, unscale: f64) -> Vec<f64> {
+    /// Computes the squares of the waves at `n_x` × `n_y` places about the middle.
+    fn transform(&mut self, n_x: usize, n_y: usize, unscale: f64) {
         let (along_x, along_y) =
             (self.planner.plan_fft_inverse(self.size_x), self.planner.plan_fft_inverse(self.size_y));
         let n_scratch = along_x.get_inplace_scratch_len().max(along_y.get_inplace_scratch_len());
@@ -181,8 +195,8 @@ impl Space {
             self.fades.entry((n, size)).or_insert_with(|| fades(n, size));
         }
         let (fade_x, fade_y) = (&self.fades[&(n_x, self.size_x)], &self.fades[&(n_y, self.size_y)]);
-        let mut squares = vec![0.0; n_x * n_y];
-        let lines = squares.chunks_exact_mut(n_y).zip(self.columns.chunks_exact(self.size_y)).zip(fade_x);
+        self.squares.resize(n_x * n_y, 0.0);
+        let lines = self.squares.chunks_exact_mut(n_y).zip(self.columns.chunks_exact(self.size_y)).zip(fade_x);
         for ((line, column), fade) in lines {
             // Places below the middle are at the column's end.
             let (below, above) = line.split_at_mut(n_y / 2);
@@ -190,7 +204,6 @@ impl Space {
             square(&column[self.size_y - n_y / 2..], unscale * fade, fade_below, below);
             square(column, unscale * fade, fade_above, above);
         }
-        squares
     }
 
     /// Puts the rows that hold anything one after the other as complex numbers.
@@ -353,7 +366,7 @@ mod tests {
             (5000, 11, 12, 0.03, 2.0),
         ] {
             let grid = Grid::new(n_rows, n_columns, pitch_mm, 0.01);
-            let found = mean_square(&waves(n, 50.0, turns, grid.origin_mm()), grid);
+            let found = mean_square(|list| *list = waves(n, 50.0, turns, grid.origin_mm()), grid);
             let n_points = (2.0 * pitch_mm / 0.01_f64).ceil() as usize + 4;
             let axis = |n_pixels| SampleAxis::new(n_pixels, pitch_mm, n_points);
             let waves = waves(n, 50.0, turns, DVec2::ZERO);
@@ -367,10 +380,10 @@ mod tests {
 
     #[test]
     fn a_single_wave_is_even() {
-        let waves =
+        let wave =
             PlaneWaves { re: vec![2.0], im: vec![0.0], turns_x_per_mm: vec![-37.0], turns_y_per_mm: vec![412.0] };
         let grid = Grid::new(20, 33, 0.01, 0.01);
-        for value in mean_square(&waves, grid) {
+        for value in mean_square(|list| *list = wave, grid) {
             // Single precision and the window's own error, on an amplitude of 2.
             assert!((value - 4.0).abs() < 2e-5, "{value}");
         }

@@ -1,13 +1,13 @@
 //! The light of a point over its pupil as smooth functions, which can be interpolated between points.
 
-use std::f64::consts::TAU;
+use std::{cell::RefCell, f64::consts::TAU};
 
 use dioptric_optics::{MonoLens, ObjectPoint, Rims};
 use glam::DVec2;
 use multiversion::multiversion;
 
 use super::{
-    Propagation, PupilGrid, WaveNodes, WavePsf, WaveWindow, WindowCenter, enough_nodes,
+    Propagation, PupilGrid, WaveNodes, WavePsf, WaveWindow, WindowCenter,
     nodes::{along_rays, propagation, solid_angle_per_area},
     smooth::{Azimuth, Parity, Places, Ray, horner, radial_slope},
 };
@@ -167,13 +167,21 @@ impl WaveMap {
     /// # Errors
     /// When the rays do not fill the directions one to one.
     pub fn nodes(&self, grid: PupilGrid, wavelength_nm: f64, turn: DVec2) -> Result<WaveNodes, DiffractionError> {
+        let mut room = Room { half: Lists::default(), nodes: WaveNodes::none() };
+        self.fill(&mut room, grid, wavelength_nm, turn)?;
+        Ok(room.nodes)
+    }
+
+    /// Computes the nodes in place of others.
+    fn fill(&self, room: &mut Room, grid: PupilGrid, wavelength_nm: f64, turn: DVec2) -> Result<(), DiffractionError> {
+        let half = &mut room.half;
         let half_azimuths = grid.n_azimuths / 2;
         let n_radii = grid.n_radii;
         let radii = gauss_legendre_on(n_radii, 0.0, 1.0);
         let step = TAU / grid.n_azimuths as f64;
         let [index, _, _, half_x, half_y, _] = *self.numbers.first_chunk::<SCALARS>().expect("a map has its scalars");
         let mut sector = Sector::new(n_radii);
-        let mut half = Lists::with_capacity((half_azimuths + 1) * n_radii);
+        half.clear();
         for j in 0..=half_azimuths {
             let rho_mm = self.edge_mm(step * j as f64);
             let (c, s) = super::cis::cis(j as f64 / grid.n_azimuths as f64);
@@ -189,7 +197,10 @@ impl WaveMap {
         if !half.jacobian.iter().all(|j| j * half.jacobian[0] > 0.0) {
             return Err(DiffractionError::Folded { wavelength_nm });
         }
-        Ok(self.assemble(grid, wavelength_nm, turn, &half))
+        room.nodes.wavelength_nm = wavelength_nm;
+        room.nodes.grid = grid;
+        self.assemble(&mut room.nodes, turn, half);
+        Ok(())
     }
 
     /// The functions along an azimuth.
@@ -205,7 +216,8 @@ impl WaveMap {
     }
 
     /// Mirrors the half pupil, turns it to its field and counts from the centroid.
-    fn assemble(&self, grid: PupilGrid, wavelength_nm: f64, turn: DVec2, half: &Lists) -> WaveNodes {
+    fn assemble(&self, nodes: &mut WaveNodes, turn: DVec2, half: &Lists) {
+        let WaveNodes { wavelength_nm, grid, .. } = *nodes;
         let (n_radii, n_azimuths) = (grid.n_radii, grid.n_azimuths);
         // Each azimuth as its own in the half, and whether it is mirrored.
         let azimuths = || {
@@ -223,23 +235,19 @@ impl WaveMap {
         }
         let along_x = along_x / total;
         let per_mm = index / (wavelength_nm * 1e-6);
-        let reference_mm = turn * (centroid_x_mm + along_x);
-        let list = || vec![0.0; grid.n_nodes()];
-        let mut nodes = WaveNodes {
-            wavelength_nm,
-            image_index: index,
-            grid,
-            propagation: Propagation::Debye,
-            reference_mm,
-            collected,
-            q_x_mm: list(),
-            q_y_mm: list(),
-            d_x: list(),
-            d_y: list(),
-            phi_mm: list(),
-            energy: list(),
-            amplitude_per_mm: list(),
-        };
+        nodes.reference_mm = turn * (centroid_x_mm + along_x);
+        (nodes.image_index, nodes.collected) = (index, collected);
+        for list in [
+            &mut nodes.q_x_mm,
+            &mut nodes.q_y_mm,
+            &mut nodes.d_x,
+            &mut nodes.d_y,
+            &mut nodes.phi_mm,
+            &mut nodes.energy,
+            &mut nodes.amplitude_per_mm,
+        ] {
+            list.resize(grid.n_nodes(), 0.0);
+        }
         for ((span, sign), to) in azimuths().zip((0..).step_by(n_radii)) {
             let to = to..to + n_radii;
             let rotate = |x: &mut [f64], y: &mut [f64], from_x: &[f64], from_y: &[f64], along_x: f64| {
@@ -264,7 +272,6 @@ impl WaveMap {
                 *amplitude = per_mm * (*share * jacobian.abs()).sqrt();
             }
         }
-        nodes
     }
 
     /// Returns the point spread function about the centroid, on a window of so many rows and columns of a pitch, with as
@@ -282,11 +289,26 @@ impl WaveMap {
     ) -> Result<WavePsf, DiffractionError> {
         let window = WaveWindow { pitch_um, rows, columns, center: WindowCenter::Centroid };
         let reach_mm = window.check()?;
-        // A few nodes tell how many are needed.
-        let few = PupilGrid { n_radii: 8, n_azimuths: 32 };
-        let nodes = enough_nodes(few, reach_mm, |grid| self.nodes(grid, wavelength_nm, turn))?;
-        nodes.psf(&WaveWindow { center: WindowCenter::At(nodes.reference_mm), ..window }, None)
+        ROOM.with_borrow_mut(|room| {
+            // A few nodes tell how many are needed.
+            self.fill(room, PupilGrid { n_radii: 8, n_azimuths: 32 }, wavelength_nm, turn)?;
+            while let Some(grid) = room.nodes.finer_grid(reach_mm)? {
+                self.fill(room, grid, wavelength_nm, turn)?;
+            }
+            room.nodes.psf(&WaveWindow { center: WindowCenter::At(room.nodes.reference_mm), ..window }, None)
+        })
     }
+}
+
+thread_local! {
+    /// One for each thread: asking for memory and giving it back took as long as the nodes.
+    static ROOM: RefCell<Room> = RefCell::new(Room { half: Lists::default(), nodes: WaveNodes::none() });
+}
+
+/// The nodes of a sum and of half of its pupil.
+struct Room {
+    half: Lists,
+    nodes: WaveNodes,
 }
 
 impl PupilEdge<'_> {
@@ -411,6 +433,7 @@ fn fill_sector(sector: &mut Sector, rays: &Rays, index: f64) {
 }
 
 /// The nodes of half a pupil.
+#[derive(Default)]
 struct Lists {
     d_x: Vec<f64>,
     d_y: Vec<f64>,
@@ -424,9 +447,18 @@ struct Lists {
 }
 
 impl Lists {
-    fn with_capacity(n: usize) -> Self {
-        let list = || Vec::with_capacity(n);
-        Self { d_x: list(), d_y: list(), phi_mm: list(), q_x: list(), q_y: list(), energy: list(), jacobian: list() }
+    fn clear(&mut self) {
+        for list in [
+            &mut self.d_x,
+            &mut self.d_y,
+            &mut self.phi_mm,
+            &mut self.q_x,
+            &mut self.q_y,
+            &mut self.energy,
+            &mut self.jacobian,
+        ] {
+            list.clear();
+        }
     }
 
     fn append(&mut self, sector: &Sector, areas_mm2: impl Iterator<Item = f64>, unit_mm2: f64) {

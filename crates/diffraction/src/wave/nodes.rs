@@ -208,6 +208,26 @@ impl WaveNodes {
         })
     }
 
+    /// Returns no nodes at all.
+    pub(super) fn none() -> Self {
+        let grid = PupilGrid { n_radii: 0, n_azimuths: 0 };
+        Self {
+            wavelength_nm: 0.0,
+            image_index: 1.0,
+            grid,
+            propagation: Propagation::Debye,
+            reference_mm: DVec2::ZERO,
+            collected: 0.0,
+            q_x_mm: vec![],
+            q_y_mm: vec![],
+            d_x: vec![],
+            d_y: vec![],
+            phi_mm: vec![],
+            energy: vec![],
+            amplitude_per_mm: vec![],
+        }
+    }
+
     /// The number of nodes.
     pub fn len(&self) -> usize {
         self.energy.len()
@@ -308,9 +328,16 @@ impl WaveNodes {
     /// Returns the waves with the common piston and tilt taken out, which |U|² does not feel; places count from
     /// `origin_mm` beside the reference.
     pub(crate) fn plane_waves(&self, origin_mm: DVec2) -> PlaneWaves {
-        let n = self.len();
-        let list = || vec![0.0; n];
-        let mut waves = PlaneWaves { re: list(), im: list(), turns_x_per_mm: list(), turns_y_per_mm: list() };
+        let mut waves = PlaneWaves::default();
+        self.fill_plane_waves(&mut waves, origin_mm);
+        waves
+    }
+
+    /// The same, in an old list.
+    pub(crate) fn fill_plane_waves(&self, waves: &mut PlaneWaves, origin_mm: DVec2) {
+        for list in [&mut waves.re, &mut waves.im, &mut waves.turns_x_per_mm, &mut waves.turns_y_per_mm] {
+            list.resize(self.len(), 0.0);
+        }
         let per_mm = 1.0 / (self.wavelength_nm * 1e-6);
         let (mean, piston_mm) = (self.mean_direction(), self.phi_mm.first().copied().unwrap_or(0.0));
         for (turns, d, mean) in
@@ -326,7 +353,6 @@ impl WaveNodes {
             *turns = (phi - piston_mm) * per_mm + (x * origin_mm.x + y * origin_mm.y);
         }
         turn_to_phasors(&mut waves.re, &mut waves.im, &self.amplitude_per_mm);
-        waves
     }
 }
 
