@@ -9,6 +9,7 @@ use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
 /// 64 × 64 pixels of under a fifth of λN at f/8 and 550 nm: two points along each side of a pixel.
 const WINDOW: WaveWindow = WaveWindow { pitch_um: 0.85, rows: 64, columns: 64, center: WindowCenter::Centroid };
 
+/// The bars: a picture of 64 × 64 pixels from 576 nodes in 1 ms, from 1536 nodes in 3 ms, on one core.
 fn transform(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("wave/64x64");
     for (n_radii, n_azimuths) in [(12, 48), (16, 96)] {
@@ -24,6 +25,7 @@ fn transform(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// The nodes of a real lens, and a picture from the trace to the pixels.
 fn from_the_lens(criterion: &mut Criterion) {
     let lens = Lens::built_in("dgauss-50mm").and_then(|lens| lens.with_f_number(8.0, 550.0)).expect("it is built in");
     let lens = lens.at(550.0).expect("the glass is known");

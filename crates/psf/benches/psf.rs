@@ -1,4 +1,4 @@
-//! Building a bank and drawing from it.
+//! Building a bank and drawing from it, on one core.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 
 use std::time::Duration;
@@ -20,18 +20,22 @@ fn settings(lens: &Lens, diffraction: Diffraction) -> BankSettings {
     BankSettings { field_tans: (0..10).map(|i| 0.2 * f64::from(i) / 9.0).collect(), ..settings }
 }
 
+/// The bar: ray maps with wave data of 10 fields × 9 depths over 400–700 nm in 0.5 s.
 fn build(criterion: &mut Criterion) {
+    let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let mut group = criterion.benchmark_group("bank/build_10x9x4");
     group.sample_size(10);
     let lens = dgauss(4.0);
     for (name, diffraction) in [("geometric", Diffraction::None), ("hurb", HURB), ("wave", Diffraction::Wave)] {
         group.bench_function(name, |bencher| {
-            bencher.iter(|| PsfBank::build(&lens, &settings(&lens, diffraction)).unwrap());
+            bencher.iter(|| one_core.install(|| PsfBank::build(&lens, &settings(&lens, diffraction)).unwrap()));
         });
     }
 }
 
 /// One kernel of a size of its own on pixels of 5 µm, from the mesh of 12 × 48.
+///
+/// The bars: an interpolated geometric one in 0.3 ms, and one of a blurred point with uncertainty bending in 0.5 ms.
 fn kernel(criterion: &mut Criterion) {
     let lens = dgauss(4.0);
     for (name, diffraction) in [("geometric", Diffraction::None), ("hurb", HURB)] {
@@ -61,6 +65,8 @@ fn waves(criterion: &mut Criterion) {
 }
 
 /// All 10 fields × 9 depths × 31 wavelengths of a bank with waves where they serve, 64 × 64 pixels of 2 µm each.
+///
+/// The bar: 6 s, at f/4 as at f/8.
 fn all(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("bank/all_2790_pictures_64x64");
     group.sample_size(10).warm_up_time(Duration::from_millis(1));

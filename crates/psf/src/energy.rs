@@ -194,7 +194,8 @@ mod tests {
 
     fn gaussian(sigma: f64, at: DVec2) -> Picture {
         let mut raster = Raster::new(101, 101);
-        splat::deposit(&mut raster, at, Covariance { xx: sigma * sigma, xy: 0.0, yy: sigma * sigma }, 1.0);
+        let covariance = Covariance { xx: sigma * sigma, xy: 0.0, yy: sigma * sigma };
+        splat::deposit(&mut raster, &[splat::Gaussian { at, covariance, energy: 1.0 }]);
         Picture::new(raster.finish().view(), 2.0)
     }
 

@@ -3,6 +3,7 @@
 use dioptric_diffraction::{StopRay, trace_stop_rays};
 use dioptric_optics::{MonoLens, ObjectPoint, Rims, rays_towards};
 use glam::DVec2;
+use multiversion::multiversion;
 
 use crate::{
     mesh::{Mesh, polar},
@@ -49,10 +50,7 @@ impl Record {
             sum.numbers.iter_mut().for_each(|number| *number *= weight as f32);
         }
         for (record, weight) in weighted {
-            let weight = weight as f32;
-            for (number, other) in sum.numbers.iter_mut().zip(&record.numbers) {
-                *number += weight * other;
-            }
+            add_scaled(&mut sum.numbers, &record.numbers, weight as f32);
         }
         Some(sum)
     }
@@ -92,6 +90,13 @@ impl Record {
     /// The energies of the cells; their sum is 1.
     pub(crate) fn energies(&self) -> &[f32] {
         &self.numbers[self.numbers.len() - self.mesh.n_cells()..]
+    }
+}
+
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn add_scaled(sums: &mut [f32], numbers: &[f32], weight: f32) {
+    for (sum, number) in sums.iter_mut().zip(numbers) {
+        *sum += weight * number;
     }
 }
 

@@ -98,7 +98,7 @@ impl<'a> Layout<'a> {
         let mut energies: Vec<f64> = record.energies().iter().map(|e| f64::from(*e)).collect();
         if let Some(bending) = self.bending {
             // What is bent is deposited as Gaussians, and is then no part of the mesh.
-            let mut gaussians = vec![];
+            let mut gaussians = Vec::with_capacity(2 * record.mesh.n_cells());
             for (ring, energies) in energies.chunks_exact_mut(record.mesh.n_azimuths).enumerate() {
                 let ring = Ring::new(record.mesh, ring);
                 for (j, energy) in energies.iter_mut().enumerate() {

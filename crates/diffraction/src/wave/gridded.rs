@@ -248,11 +248,14 @@ fn square(values: &[Complex<f32>], factor: f64, fades: &[f64], squares: &mut [f6
 /// Returns the first grid point that a frequency is spread over, and the window's values there and after it.
 #[inline(always)]
 fn start(turns: f64, size: usize) -> (usize, [f32; WIDTH]) {
-    let at = (turns - turns.floor()) * size as u32 as f64;
+    // In 32 bits: conversions of longer numbers take several steps.
+    let n = size as i32;
+    let at = (turns - turns.floor()) * f64::from(n);
     let first = (at - 0.5 * WIDTH as f64).ceil();
-    let index = first as i32 as usize;
-    let index = if first < 0.0 { (first as i32 + size as i32) as usize } else { index };
-    (if index < size { index } else { index - size }, window((first - at + 0.5 * WIDTH as f64) as f32))
+    let index = first as i32;
+    let index = if index < 0 { index + n } else { index };
+    let index = if index < n { index } else { index - n };
+    (index as usize, window((first - at + 0.5 * WIDTH as f64) as f32))
 }
 
 #[multiversion(targets("x86_64+avx2", "x86_64+avx"))]

@@ -3,7 +3,10 @@
 use dioptric_diffraction::ReferenceSphere;
 use dioptric_optics::{Rims, glam::DVec2, rays_towards};
 
-use crate::lens::{NAMES, Reference, number, numbers};
+use crate::{
+    lens::Reference,
+    reader::{NAMES, number, numbers},
+};
 
 #[test]
 #[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]

@@ -11,7 +11,10 @@ use dioptric_diffraction::{
 use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Rims, glam::DVec2, rays_towards};
 use serde_json::Value;
 
-use crate::lens::{NAMES, Reference, json, number, numbers};
+use crate::{
+    lens::Reference,
+    reader::{NAMES, json, number, numbers},
+};
 
 /// Phase over the pupil's radius up to which the reference's 32 squares along it can be trusted: 3 radians a square.
 const TRUSTED_BANDWIDTH: f64 = 100.0;
@@ -52,6 +55,7 @@ impl Expected {
         }
         let error = difference / self.values.iter().sum::<f64>();
         let (least, most) = self.peaks;
+        println!("{what}: L1 {error:.4}, peak {peak:.4} where the tools have {least:.4} to {most:.4}");
         assert!(error <= 0.05, "{what}: L1 {error}");
         assert!((0.98 * least..1.02 * most).contains(&peak), "{what}: peak {peak}, expected {least} to {most}");
     }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::lens::{NAMES, json, lens, number};
+use crate::reader::{NAMES, json, lens, number};
 
 #[test]
 #[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
@@ -58,7 +58,7 @@ fn focus_shifts_with_wavelength_as_published() {
     for name in NAMES {
         let Some(file) = json(name) else { return };
         let (lens, shift) = (lens(&file), &file["chromatic_focal_shift"]);
-        for (i, wavelength_nm) in crate::lens::numbers(&shift["wavelength_nm"]).into_iter().enumerate() {
+        for (i, wavelength_nm) in crate::reader::numbers(&shift["wavelength_nm"]).into_iter().enumerate() {
             let first = lens.at(wavelength_nm).unwrap().first_order();
             let (bfl, efl) = (number(&shift["bfl_mm"][i]), number(&shift["efl_mm"][i]));
             assert!((first.bfl_mm - bfl).abs() <= 1e-12 * efl, "{name}: {} {bfl}", first.bfl_mm);

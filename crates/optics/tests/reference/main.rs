@@ -4,5 +4,6 @@
 mod first_order;
 mod lens;
 mod rays;
+mod reader;
 mod seidel;
 mod spots;

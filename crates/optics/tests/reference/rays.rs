@@ -3,7 +3,7 @@
 use dioptric_optics::{Lens, MonoLens, RayBatch, RayFate, Rims, glam::DVec3};
 use serde_json::Value;
 
-use crate::lens::{NAMES, json, lens, number, numbers};
+use crate::reader::{NAMES, json, lens, number, numbers};
 
 /// The largest differences of one lens's rays.
 #[derive(Debug, Default)]

@@ -2,7 +2,7 @@
 
 use dioptric_optics::{Lens, SeidelSettings, SeidelSums};
 
-use crate::lens::{NAMES, json, lens, number, numbers};
+use crate::reader::{NAMES, json, lens, number, numbers};
 
 fn list(sums: &SeidelSums) -> [f64; 7] {
     [sums.s1, sums.s2, sums.s3, sums.s4, sums.s5, sums.c1, sums.c2]

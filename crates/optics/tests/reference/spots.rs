@@ -7,7 +7,7 @@ use dioptric_optics::{
 };
 use serde_json::Value;
 
-use crate::lens::{NAMES, json, lens, number, numbers};
+use crate::reader::{NAMES, json, lens, number, numbers};
 
 /// Returns the object point at a fraction of the largest field.
 fn object_point(spec: &Value, fractions: &[f64]) -> ObjectPoint {
