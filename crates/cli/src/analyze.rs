@@ -18,7 +18,6 @@ const PNG_SCALE: f64 = 1.5;
 
 pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Result<()> {
     let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
-    let lens = arguments.f_number.map_or(StopChoice::AsGiven, StopChoice::FNumber).apply(lens)?;
     let request = AnalysisRequest {
         fields: fields(arguments)?,
         wavelengths_nm: parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?,
@@ -30,6 +29,8 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
         },
         n_rings: arguments.rings,
     };
+    let stop = arguments.f_number.map_or(StopChoice::AsGiven, StopChoice::FNumber);
+    let lens = stop.apply_at(lens, request.reference_nm())?;
     // The place is tried before the work.
     let staged = arguments.out.as_ref().map(|path| Staged::folder(path)).transpose()?.map(guarded);
     let bar = Bar::new(common.quiet);

@@ -68,11 +68,14 @@ fn list(common: &Common) -> anyhow::Result<()> {
 fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
     let wavelengths_nm = parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?;
+    let ends = |ends: (f64, f64), nm: &f64| (ends.0.min(*nm), ends.1.max(*nm));
+    let (first_nm, last_nm) = wavelengths_nm.iter().fold((f64::INFINITY, 0.0), ends);
+    let instead_of_f_and_c_nm = (first_nm < last_nm).then_some([first_nm, last_nm]);
     let data: Vec<LensData> = wavelengths_nm
         .iter()
         .map(|&wavelength_nm| {
             let LensInfoArgs { distance_mm, field_deg, .. } = *arguments;
-            LensData::new(&lens, &LensQuestion { wavelength_nm, distance_mm, field_deg })
+            LensData::new(&lens, &LensQuestion { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm })
         })
         .collect::<Result<_, _>>()?;
     if common.json {
@@ -116,7 +119,7 @@ fn data_table(data: &[LensData]) -> anyhow::Result<String> {
             for name in sums.keys() {
                 write!(text, "{:<28}", format!("{key} {name}"))?;
                 for record in &records {
-                    write!(text, " {:>14}", number(&record[key][name]))?;
+                    write!(text, " {:>14}", number(name, &record[key][name]))?;
                 }
                 text += "\n";
             }
@@ -124,15 +127,20 @@ fn data_table(data: &[LensData]) -> anyhow::Result<String> {
         }
         write!(text, "{key:<28}")?;
         for record in &records {
-            write!(text, " {:>14}", number(&record[key]))?;
+            write!(text, " {:>14}", number(key, &record[key]))?;
         }
         text += "\n";
     }
     Ok(text)
 }
 
-fn number(value: &serde_json::Value) -> String {
+/// Returns a cell: what JSON has no number for is infinite, or nothing where only its absence makes sense.
+fn number(key: &str, value: &serde_json::Value) -> String {
+    if let Some([first, last]) = value.as_array().map(Vec::as_slice) {
+        return format!("{} {}", number(key, first), number(key, last));
+    }
     match value.as_f64() {
+        None if key.ends_with("_deg") || key.ends_with("colors_nm") || key.starts_with('C') => "–".to_owned(),
         Some(v) if v == 0.0 || (1e-3..1e6).contains(&v.abs()) => format!("{v:.6}"),
         Some(v) => format!("{v:.5e}"),
         None => "inf".to_owned(),

@@ -124,7 +124,7 @@ pub enum OpticsError {
         task: &'static str,
     },
     /// A stop wider than the lens allows.
-    #[error("the stop of {lens} opens to at most {largest_mm} mm (f/{smallest_f_number:.3}), asked for {asked_mm} mm")]
+    #[error("the stop of {lens} opens to at most {largest_mm} mm{}, asked for {asked_mm} mm", f_number_words(*smallest_f_number))]
     StopTooWide {
         /// The lens.
         lens: String,
@@ -132,7 +132,7 @@ pub enum OpticsError {
         asked_mm: f64,
         /// The largest diameter, mm.
         largest_mm: f64,
-        /// The f-number of that diameter.
+        /// The f-number of that diameter at the d line; NaN where the lens has none.
         smallest_f_number: f64,
     },
     /// A quantity that must be positive.
@@ -207,4 +207,9 @@ fn in_words(names: &[String]) -> String {
         [first @ .., last] if !first.is_empty() => format!("{} or {last}", first.join(", ")),
         _ => names.concat(),
     }
+}
+
+/// Returns an f-number in brackets, or nothing for what is none.
+fn f_number_words(f_number: f64) -> String {
+    if f_number.is_finite() { format!(" (f/{f_number:.3})") } else { String::new() }
 }

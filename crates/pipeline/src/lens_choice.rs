@@ -10,6 +10,12 @@ use crate::{LensChoice, PipelineError, SensorChoice, StopChoice};
 /// The wavelength of f-numbers, fields and focus where nothing else is said, nm.
 pub const REFERENCE_WAVELENGTH_NM: f64 = 550.0;
 
+/// Returns that of these wavelengths which is nearest to 550 nm: the one that fields, f-numbers and focus are told of.
+pub(crate) fn nearest_to_reference_nm(wavelengths_nm: &[f64]) -> f64 {
+    let off = |nm: &f64| (nm - REFERENCE_WAVELENGTH_NM).abs();
+    wavelengths_nm.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(REFERENCE_WAVELENGTH_NM)
+}
+
 impl LensChoice {
     /// Returns what `LENS` on the command line means: a built-in name where it is one, a path where it looks like one or
     /// is one, else a name that is not known.
@@ -39,9 +45,17 @@ impl StopChoice {
     /// # Errors
     /// When the stop does not open so far.
     pub fn apply(self, lens: Lens) -> Result<Lens, PipelineError> {
+        self.apply_at(lens, REFERENCE_WAVELENGTH_NM)
+    }
+
+    /// Returns the lens with its stop set; an f-number is that at this wavelength, nm.
+    ///
+    /// # Errors
+    /// When the stop does not open so far, or a glass is not known at the wavelength.
+    pub fn apply_at(self, lens: Lens, wavelength_nm: f64) -> Result<Lens, PipelineError> {
         Ok(match self {
             Self::AsGiven => lens,
-            Self::FNumber(n) => lens.with_f_number(n, REFERENCE_WAVELENGTH_NM)?,
+            Self::FNumber(n) => lens.with_f_number(n, wavelength_nm)?,
             Self::DiameterMm(d) => lens.with_stop_diameter_mm(d)?,
         })
     }

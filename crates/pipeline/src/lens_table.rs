@@ -32,8 +32,9 @@ pub struct LensData {
     /// The image of an object at the distance asked for.
     #[serde(flatten)]
     pub image: Option<ImageData>,
-    /// The third-order sums of the whole lens, mm: colour from the F to the C line. Only a rotationally symmetric lens
-    /// has them.
+    /// The two wavelengths between which the third-order sums count colour, nm; `None` where their colour is unknown.
+    pub seidel_colors_nm: Option<[f64; 2]>,
+    /// The third-order sums of the whole lens, mm. Only a rotationally symmetric lens has them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seidel: Option<SeidelSums>,
     /// The third-order sums of each surface, mm.
@@ -64,6 +65,17 @@ pub struct LensQuestion {
     pub distance_mm: Option<f64>,
     /// Half field of the third-order sums, degrees.
     pub field_deg: f64,
+    /// The two wavelengths, the shorter first, between which those sums count colour where the lens is not known at the
+    /// F and C lines, as one for the infrared; without them the sums have no colour.
+    pub instead_of_f_and_c_nm: Option<[f64; 2]>,
+}
+
+impl LensQuestion {
+    /// Returns the wavelengths between which colour is counted, nm.
+    fn colors_nm(&self, lens: &Lens) -> Option<[f64; 2]> {
+        let is_known = |lines_nm: &[f64; 2]| lines_nm.iter().all(|&nm| lens.at(nm).is_ok());
+        [Some([F_LINE_NM, C_LINE_NM]), self.instead_of_f_and_c_nm].into_iter().flatten().find(is_known)
+    }
 }
 
 /// The paraxial image of an object.
@@ -93,18 +105,24 @@ impl LensData {
     /// The third-order sums are those of an object at that distance, else of a far one.
     ///
     /// # Errors
-    /// When a glass is not known at the wavelength or at the F and C lines, or the distance is not above 0.
+    /// When a glass is not known at the wavelength, or the distance is not above 0.
     pub fn new(lens: &Lens, question: &LensQuestion) -> Result<Self, PipelineError> {
-        let LensQuestion { wavelength_nm, distance_mm, field_deg } = *question;
+        let LensQuestion { wavelength_nm, distance_mm, field_deg, .. } = *question;
         let mono = lens.at(wavelength_nm)?;
         let x_plane = (!lens.is_rotational()).then(|| PlaneData::of_x(&mono));
+        let colors_nm = question.colors_nm(lens);
         let settings = SeidelSettings {
             wavelength_nm,
-            colors_nm: [F_LINE_NM, C_LINE_NM],
+            colors_nm: colors_nm.unwrap_or([wavelength_nm; 2]),
             object_distance_mm: distance_mm.unwrap_or(f64::INFINITY),
             chief_slope: field_deg.to_radians().tan(),
         };
-        let seidel = lens.is_rotational().then(|| lens.seidel(&settings)).transpose()?;
+        let mut seidel = lens.is_rotational().then(|| lens.seidel(&settings)).transpose()?;
+        if let (Some(seidel), None) = (&mut seidel, colors_nm) {
+            for sums in seidel.per_surface.iter_mut().chain([&mut seidel.total]) {
+                (sums.c1, sums.c2) = (f64::NAN, f64::NAN);
+            }
+        }
         let first = mono.first_order();
         Ok(Self {
             lens: lens.name().to_owned(),
@@ -114,6 +132,7 @@ impl LensData {
             half_light_field_deg: field_limit_deg(&mono, 0.5),
             last_light_field_deg: field_limit_deg(&mono, 0.01),
             image: distance_mm.map(|distance_mm| image_of(&mono, distance_mm)).transpose()?,
+            seidel_colors_nm: colors_nm,
             seidel: seidel.as_ref().map(|seidel| seidel.total),
             seidel_surfaces: seidel.map(|seidel| seidel.per_surface).unwrap_or_default(),
             x_plane,
@@ -225,7 +244,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn question(distance_mm: Option<f64>) -> LensQuestion {
-        LensQuestion { wavelength_nm: 550.0, distance_mm, field_deg: 10.0 }
+        LensQuestion { wavelength_nm: 550.0, distance_mm, field_deg: 10.0, instead_of_f_and_c_nm: None }
     }
 
     #[test]
@@ -255,6 +274,34 @@ mod tests {
             let sum: f64 = of_surfaces.iter().map(|sums| sums[key].as_f64().unwrap()).sum();
             assert_relative_eq!(json["seidel"][key].as_f64().unwrap(), sum, epsilon = 1e-12);
         }
+    }
+
+    #[test]
+    fn infrared_lens_counts_colour_between_the_wavelengths_asked_for() {
+        // Germanium's kind: known from 2 to 14 µm only.
+        let glass = dioptric_optics::Glass::Sellmeier {
+            b: vec![14.76, 0.24],
+            c_um2: vec![0.19, 1530.0],
+            range_nm: Some((2e3, 14e3)),
+        };
+        let front = dioptric_optics::Interface {
+            surface: Surface::sphere(50.0, 12.0),
+            medium_after: glass,
+            thickness_after_mm: 0.0,
+        };
+        let lens = Lens::new("infrared", "test", vec![front], 0).unwrap();
+        let question = LensQuestion { wavelength_nm: 10e3, ..question(None) };
+        let data = LensData::new(&lens, &question).unwrap();
+        assert!(data.seidel_colors_nm.is_none() && data.seidel.unwrap().c1.is_nan() && data.seidel.unwrap().s1 > 0.0);
+        let ends = LensQuestion { instead_of_f_and_c_nm: Some([8e3, 12e3]), ..question };
+        let data = LensData::new(&lens, &ends).unwrap();
+        assert_eq!(data.seidel_colors_nm, Some([8e3, 12e3]));
+        // C1 of one surface with the marginal ray coming in straight: A y Δ(δn/n) = c y² δn/n.
+        let index = |nm: f64| lens.at(nm).unwrap().image_index();
+        let expected = 12.0 * 12.0 / 50.0 * (index(8e3) - index(12e3)) / index(10e3);
+        assert_relative_eq!(data.seidel.unwrap().c1, expected, max_relative = 1e-12);
+        let narrower = LensQuestion { instead_of_f_and_c_nm: Some([1e3, 12e3]), ..question };
+        assert!(LensData::new(&lens, &narrower).unwrap().seidel_colors_nm.is_none());
     }
 
     #[test]

@@ -18,7 +18,7 @@ use super::{
         AxialColorRow, FanRow, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,
     },
 };
-use crate::{PipelineError, PlaneData, REFERENCE_WAVELENGTH_NM};
+use crate::{PipelineError, PlaneData, lens_choice::nearest_to_reference_nm};
 
 /// Steps of the curves over field.
 const CURVE_STEPS: usize = 40;
@@ -38,6 +38,11 @@ const WIDEST_GRID_DEG: f64 = 60.0;
 const ZERNIKE_TERMS: usize = 22;
 
 impl AnalysisRequest {
+    /// The reference wavelength, nm: of fields, pupils, f-numbers and focus.
+    pub fn reference_nm(&self) -> f64 {
+        nearest_to_reference_nm(&self.wavelengths_nm)
+    }
+
     /// Analyses a lens.
     ///
     /// # Errors
@@ -45,8 +50,8 @@ impl AnalysisRequest {
     pub fn compute(&self, lens: &Lens) -> Result<LensAnalysis, PipelineError> {
         self.check()?;
         let lenses: Vec<MonoLens> = self.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
-        let off = |i: &usize| (self.wavelengths_nm[*i] - REFERENCE_WAVELENGTH_NM).abs();
-        let reference = (0..lenses.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0);
+        let reference_nm = self.reference_nm();
+        let reference = self.wavelengths_nm.iter().position(|&nm| nm == reference_nm).unwrap_or(0);
         let way_mm = self.distance_mm + lenses[reference].projection_center_z_mm();
         if way_mm == 0.0 {
             return Err(PipelineError::Value {

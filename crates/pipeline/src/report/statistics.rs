@@ -184,6 +184,7 @@ pub(super) fn lens_data(shot: &Shot, corner_tan: f64) -> Result<LensData, Pipeli
         wavelength_nm: REFERENCE_WAVELENGTH_NM,
         distance_mm: shot.focus_distance_mm,
         field_deg: corner_tan.atan().to_degrees(),
+        instead_of_f_and_c_nm: None,
     };
     LensData::new(&shot.lens, &question)
 }
