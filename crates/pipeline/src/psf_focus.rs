@@ -47,9 +47,13 @@ impl PsfRequest {
     /// Those of [`compute`](Self::compute).
     pub fn through_focus(&self, lens: &Lens, set: &PsfSet) -> Result<ThroughFocus, PipelineError> {
         let cycles_per_mm = self.mtf_per_mm.iter().copied().find(|f| *f > 0.0).unwrap_or(FREQUENCY_PER_MM);
-        let reference = lens.at(crate::REFERENCE_WAVELENGTH_NM)?;
+        let reference = self.reference(lens)?;
         let first = reference.first_order();
-        let f_number = (set.film_mm - first.exit_pupil_z_mm) / first.exit_pupil_diameter_mm;
+        // A telecentric lens has the cone of its object's image on any film.
+        let f_number = match (set.film_mm - first.exit_pupil_z_mm) / first.exit_pupil_diameter_mm {
+            f_number if f_number.is_finite() => f_number,
+            _ => reference.working_f_number(self.distances_mm.first().copied().unwrap_or(f64::INFINITY)),
+        };
         // Where the blur is 1.2 periods wide, the modulation of an even disc is at its first zero.
         let reach_mm = match 1.5 * 1.22 * f_number.abs() / cycles_per_mm {
             reach if reach.is_finite() => reach.min(5.0),
@@ -118,7 +122,7 @@ impl Here<'_> {
     }
 
     fn of_rays(&self, item: &Item, rays: &PaperRays) -> Result<(f64, f64), PipelineError> {
-        let reference = self.lens.at(crate::REFERENCE_WAVELENGTH_NM)?;
+        let reference = self.request.reference(self.lens)?;
         let mono = self.lens.at(item.wavelength_nm)?;
         let point = ObjectPoint::from_field(&reference, item.field_tan(), item.dioptres);
         let spot = Spot::over_front(&mono, &point, self.film_mm, rays);

@@ -4,7 +4,7 @@ use dioptric_optics::Lens;
 use dioptric_psf::{BankSettings, FieldBank, FieldBankSettings, Interpolation, Kernel, ModelUse, PsfBank, PsfQuery};
 use ndarray::Array2;
 
-use crate::{BankData, PipelineError, PsfRequest, REFERENCE_WAVELENGTH_NM, psf_table::Item};
+use crate::{BankData, PipelineError, PsfRequest, psf_table::Item};
 
 /// Rings and azimuths of the rays through a pupil.
 const RINGS: usize = 24;
@@ -26,22 +26,26 @@ impl PsfRequest {
             let found = format!("a bank of {}", lens.name());
             return Err(self.wrong("bank", &found, "none: of a lens without an axis of symmetry each point is traced"));
         }
-        let exact = self.turned_settings(items, film_mm);
+        let reference_wavelength_nm = self.reference(lens)?.wavelength_nm();
+        let exact = self.turned_settings(items, film_mm, reference_wavelength_nm);
         let ends = |list: &[f64]| (list[0], list[list.len() - 1]);
         let (_, last_field_tan) = ends(&exact.field_tans);
         let (dioptres, wavelengths_nm) = (ends(&exact.dioptres), ends(&exact.wavelengths_nm));
         let standard = BankSettings::covering(film_mm, last_field_tan, dioptres, wavelengths_nm, exact.diffraction);
+        let standard = BankSettings { reference_wavelength_nm, ..standard };
         Ok(PsfSource::Turned(choice.build(lens, standard, self.pixel_um)?))
     }
 
     /// Returns a bank with a sample at every point, so that nothing is interpolated.
     pub(crate) fn exact_source(&self, lens: &Lens, items: &[Item], film_mm: f64) -> Result<PsfSource, PipelineError> {
+        let reference_wavelength_nm = self.reference(lens)?.wavelength_nm();
         if lens.is_rotational() {
-            return Ok(PsfSource::Turned(PsfBank::build(lens, &self.turned_settings(items, film_mm))?));
+            let settings = self.turned_settings(items, film_mm, reference_wavelength_nm);
+            return Ok(PsfSource::Turned(PsfBank::build(lens, &settings)?));
         }
         let settings = FieldBankSettings {
             film_mm,
-            reference_wavelength_nm: REFERENCE_WAVELENGTH_NM,
+            reference_wavelength_nm,
             tans_x: sorted(items.iter().map(|item| item.field_tan().x)),
             tans_y: sorted(items.iter().map(|item| item.field_tan().y)),
             dioptres: sorted(items.iter().map(|item| item.dioptres)),
@@ -53,10 +57,10 @@ impl PsfRequest {
         Ok(PsfSource::Plane(FieldBank::build(lens, &settings)?))
     }
 
-    fn turned_settings(&self, items: &[Item], film_mm: f64) -> BankSettings {
+    fn turned_settings(&self, items: &[Item], film_mm: f64, reference_wavelength_nm: f64) -> BankSettings {
         BankSettings {
             film_mm,
-            reference_wavelength_nm: REFERENCE_WAVELENGTH_NM,
+            reference_wavelength_nm,
             field_tans: sorted(items.iter().map(|item| item.field_tan().length()).chain([0.0])),
             dioptres: sorted(items.iter().map(|item| item.dioptres)),
             wavelengths_nm: sorted(items.iter().map(|item| item.wavelength_nm)),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dioptric_diffraction::{Hurb, PupilGrid, WaveNodes};
-use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
+use dioptric_optics::{Lens, MonoLens, ObjectPoint, glam::DVec2};
 use dioptric_psf::{Diffraction, ModelUse, Picture, PsfQuery};
 use dioptric_scene::write_planes_exr;
 use ndarray::Array2;
@@ -12,11 +12,14 @@ use rayon::prelude::*;
 use crate::{
     BankChoice, BankData, DiffractionChoice, FocusChoice, PipelineError, PsfRow, REFERENCE_WAVELENGTH_NM,
     display::png_bytes,
+    lens_choice::nearest_to_reference_nm,
     psf_row::{PointName, place_and_size},
     psf_source::PsfSource,
     spot::{PaperRays, Spot},
 };
 
+/// Wavelengths that are seen.
+const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
 /// Pixels along the side of the largest picture that is made.
 pub(crate) const LARGEST: usize = 4097;
 
@@ -109,7 +112,7 @@ impl PsfRequest {
     /// When a number makes no sense, a glass is not known at a wavelength, or the lens cannot be focused.
     pub fn compute(&self, lens: &Lens) -> Result<PsfSet, PipelineError> {
         self.check()?;
-        let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
+        let reference = self.reference(lens)?;
         let film_mm = match self.focus {
             FocusChoice::DistanceMm(distance_mm) => reference.film_mm_for(distance_mm)?,
             FocusChoice::FilmMm(film_mm) => film_mm,
@@ -132,9 +135,17 @@ impl PsfRequest {
         Ok(PsfSet { film_mm, pixel_um: self.pixel_um, rows, pictures, bank, spectral_weights })
     }
 
+    /// Returns the lens at the wavelength of fields and focus: 550 nm; where the lens is not known at it, or no
+    /// wavelength asked for is visible, that of them which is nearest to it.
+    pub(crate) fn reference(&self, lens: &Lens) -> Result<MonoLens, PipelineError> {
+        let asked_nm = nearest_to_reference_nm(&self.wavelengths_nm);
+        let usual = lens.at(REFERENCE_WAVELENGTH_NM).ok().filter(|_| VISIBLE_NM.contains(&asked_nm));
+        Ok(usual.map_or_else(|| lens.at(asked_nm), Ok)?)
+    }
+
     /// Returns the points: fields outermost, then distances, then wavelengths.
     pub(crate) fn items(&self, lens: &Lens) -> Result<Vec<Item>, PipelineError> {
-        let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
+        let reference = self.reference(lens)?;
         let pupil_z_mm = reference.projection_center_z_mm();
         let mut items = Vec::new();
         for &field_deg in &self.fields_deg {
@@ -220,7 +231,7 @@ impl PsfRequest {
         source: Option<&PsfSource>,
         film_mm: f64,
     ) -> Result<(PsfRow, Array2<f32>), PipelineError> {
-        let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
+        let reference = self.reference(lens)?;
         let mono = lens.at(item.wavelength_nm)?;
         let point = ObjectPoint::from_field(&reference, item.field_tan(), item.dioptres);
         let (spot, picture, model) = match (self.sampling, source) {
@@ -391,6 +402,7 @@ fn resized(picture: &Array2<f32>, size: usize) -> Array2<f32> {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+    use dioptric_optics::{Glass, Interface, Surface};
 
     fn request() -> PsfRequest {
         PsfRequest {
@@ -500,6 +512,36 @@ mod tests {
         assert!(!set.rows[0].is_dark() && set.rows[2].is_dark() && !set.rows[2].is_cut());
         assert!(set.rows[2].ee50_radius_um.is_nan() && set.rows[2].lsf_fwhm_um.is_nan());
         assert!(set.mosaic().is_ok() && set.whole_light(&[]).len() == 1);
+    }
+
+    #[test]
+    fn infrared_light_is_focused_by_itself() {
+        let glass = Glass::Sellmeier { b: vec![14.76, 0.24], c_um2: vec![0.19, 1530.0], range_nm: Some((2e3, 14e3)) };
+        let side = |radius_mm: f64, medium_after: Glass, thickness_after_mm: f64| Interface {
+            surface: Surface::sphere(radius_mm, 6.0),
+            medium_after,
+            thickness_after_mm,
+        };
+        let lens = Lens::new("infrared", "test", vec![side(50.0, glass, 3.0), side(70.0, Glass::Air, 0.0)], 0).unwrap();
+        let infrared = PsfRequest {
+            fields_deg: vec![0.0],
+            distances_mm: vec![f64::INFINITY],
+            wavelengths_nm: vec![10e3],
+            focus: FocusChoice::DistanceMm(f64::INFINITY),
+            diffraction: DiffractionChoice::Wave,
+            pixel_um: 10.0,
+            ..request()
+        };
+        let set = infrared.compute(&lens).unwrap();
+        assert_eq!(set.film_mm, lens.at(10e3).unwrap().film_mm_for(f64::INFINITY).unwrap());
+        assert!(set.rows[0].strehl.unwrap() > 0.8, "{:?}", set.rows[0]);
+        assert!(infrared.through_focus(&lens, &set).is_ok());
+        // Ultraviolet light is focused by itself too, in any lens; visible light for 550 nm.
+        let reference_nm = |nm: f64| {
+            let request = PsfRequest { wavelengths_nm: vec![nm], ..request() };
+            request.reference(&paper_lens()).unwrap().wavelength_nm()
+        };
+        assert_eq!([355.0, 450.0, 1064.0].map(reference_nm), [355.0, 550.0, 1064.0]);
     }
 
     #[test]
