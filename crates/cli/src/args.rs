@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use dioptric_pipeline::{LensReading, MissingGlassChoice};
 
 use crate::measure_args::MeasureCommand;
 
@@ -204,7 +205,48 @@ pub(crate) enum LensCommand {
         input: String,
         /// File to write; a .zmx file of a lens with glasses of its own gets a catalogue (.agf) beside it
         output: PathBuf,
+        #[command(flatten)]
+        reading: LensReadingArgs,
     },
+}
+
+/// What a lens file leaves open.
+#[derive(Debug, Args)]
+pub(crate) struct LensReadingArgs {
+    /// Glass catalogue to look in before the built-in one, .agf or .yml; may be given several times
+    #[arg(long, value_name = "F")]
+    pub(crate) glasses: Vec<PathBuf>,
+    /// What to do with a glass that no catalogue has
+    #[arg(long, value_enum, default_value_t = MissingGlassArg::Refuse)]
+    pub(crate) missing_glass: MissingGlassArg,
+    /// Change of index a nm, about 550 nm, of media with one stated index, as .dat files have (the paper: -0.000133)
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub(crate) slope_per_nm: Option<f64>,
+}
+
+/// What to do with a glass that no catalogue has.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum MissingGlassArg {
+    /// Refuse the lens, and say which glass is missing
+    Refuse,
+    /// Take the index and the Abbe number that the file states for it
+    NdVd,
+    /// Take the built-in glass nearest to them
+    Nearest,
+}
+
+impl LensReadingArgs {
+    pub(crate) fn reading(&self) -> LensReading {
+        LensReading {
+            glasses: self.glasses.clone(),
+            missing_glass: match self.missing_glass {
+                MissingGlassArg::Refuse => MissingGlassChoice::Refuse,
+                MissingGlassArg::NdVd => MissingGlassChoice::FromNdVd,
+                MissingGlassArg::Nearest => MissingGlassChoice::Nearest,
+            },
+            slope_per_nm: self.slope_per_nm,
+        }
+    }
 }
 
 /// What to print about a lens.
@@ -224,6 +266,8 @@ pub(crate) struct LensInfoArgs {
     /// Half field for the third-order sums, degrees
     #[arg(long, value_name = "A", default_value_t = 10.0)]
     pub(crate) field_deg: f64,
+    #[command(flatten)]
+    pub(crate) reading: LensReadingArgs,
 }
 
 /// What to analyse of a lens.
@@ -269,6 +313,8 @@ pub(crate) struct LensAnalyzeArgs {
 pub(crate) struct LensDrawArgs {
     /// Lens, a file or the name of a built-in one
     pub(crate) lens: String,
+    #[command(flatten)]
+    pub(crate) reading: LensReadingArgs,
     /// File to write, .svg or .png
     #[arg(long, short, visible_alias = "out", value_name = "F")]
     pub(crate) output: PathBuf,

@@ -4,7 +4,7 @@ use std::{fmt::Write, fs, path::Path};
 
 use anyhow::Context;
 use dioptric_pipeline::{
-    LensData, LensDrawing, LensQuestion, Staged, SurfaceRow, built_in_lenses, convert_lens, drawing_file, open_lens,
+    LensData, LensDrawing, LensQuestion, LensReading, Staged, SurfaceRow, built_in_lenses, convert_lens, drawing_file,
     parse_numbers, surface_rows,
 };
 
@@ -19,15 +19,18 @@ pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> 
         LensCommand::Info(arguments) => info(arguments, common),
         LensCommand::Analyze(arguments) => crate::analyze::run(arguments, common),
         LensCommand::Draw(arguments) => draw(arguments, common),
-        LensCommand::Convert { input, output } => convert(input, output, common),
+        LensCommand::Convert { input, output, reading } => convert(input, output, &reading.reading(), common),
     }
 }
 
-fn convert(input: &str, output: &Path, common: &Common) -> anyhow::Result<()> {
-    let converted = convert_lens(input, output)?;
-    for note in &converted.notes {
-        remark(common.quiet, note);
-    }
+/// Tells what the file of a lens says that is done otherwise or not at all.
+fn tell(notes: &[String], common: &Common) {
+    notes.iter().for_each(|note| remark(common.quiet, note));
+}
+
+fn convert(input: &str, output: &Path, reading: &LensReading, common: &Common) -> anyhow::Result<()> {
+    let converted = convert_lens(input, output, reading)?;
+    tell(&converted.notes, common);
     if let Some(glasses) = converted.glasses {
         let beside = output.with_extension("agf");
         // A catalogue that is not this lens's own is left alone.
@@ -66,7 +69,8 @@ fn list(common: &Common) -> anyhow::Result<()> {
 }
 
 fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
-    let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
+    let (lens, notes) = arguments.reading.reading().open_stopped(&arguments.lens, arguments.stop_mm)?;
+    tell(&notes, common);
     let wavelengths_nm = parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?;
     let ends = |ends: (f64, f64), nm: &f64| (ends.0.min(*nm), ends.1.max(*nm));
     let (first_nm, last_nm) = wavelengths_nm.iter().fold((f64::INFINITY, 0.0), ends);
@@ -148,7 +152,8 @@ fn number(key: &str, value: &serde_json::Value) -> String {
 }
 
 fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
-    let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
+    let (lens, notes) = arguments.reading.reading().open_stopped(&arguments.lens, arguments.stop_mm)?;
+    tell(&notes, common);
     let drawing = LensDrawing {
         fields_deg: parse_numbers("--fields-deg", &arguments.fields_deg)?,
         distance_mm: arguments.distance_mm,

@@ -334,6 +334,37 @@ fn a_lens_is_drawn_and_converted() {
 }
 
 #[test]
+fn what_a_lens_file_leaves_open_is_closed_by_options() {
+    let folder = tempfile::tempdir().unwrap();
+    let zmx = "MODE SEQ\nUNIT MM\nENPD 5\nWAVM 1 0.55 1\nSURF 0\n  DISZ INFINITY\nSURF 1\n  STOP\n  CURV 0.02\n  DISZ 2\n  \
+        GLAS MINE 0 0 1.6 40\nSURF 2\n  DISZ 90\n  MAZH 0 0\nSURF 3\n  DISZ 0\n";
+    fs::write(folder.path().join("lens.zmx"), zmx).unwrap();
+    fs::write(folder.path().join("my.agf"), "NM MINE 2\nCD 1.25 0\nLD 0.3 1.0\n").unwrap();
+    check_error(folder.path(), &["lens", "info", "lens.zmx"], &["lens.zmx:11", "no glass is named 'MINE'"]);
+    let efl_mm = |options: &[&str]| {
+        let arguments = [&["lens", "info", "lens.zmx", "--json", "--quiet"], options].concat();
+        json(folder.path(), &arguments)[0]["efl_mm"].as_f64().unwrap()
+    };
+    // A plano-convex lens of radius 50 mm: f = R/(n − 1), and n = 1.5 in the catalogue at any wavelength.
+    assert!((efl_mm(&["--glasses", "my.agf"]) - 100.0).abs() < 1e-9);
+    let of_nd_vd_mm = efl_mm(&["--missing-glass", "nd-vd"]);
+    assert!((of_nd_vd_mm - 50.0 / 0.602).abs() < 0.2, "{of_nd_vd_mm}");
+    check_error(folder.path(), &["lens", "info", "lens.zmx", "--glasses", "none.agf"], &["none.agf"]);
+
+    let dat = "50\n67\t1.5\t1.65\t25\n0\t1.5\t1.65\t25\n-67\t0\t1\t25\n";
+    fs::write(folder.path().join("2el.dat"), dat).unwrap();
+    let power = |wavelength_nm: &str, slope: &str| {
+        let options = ["--wavelengths-nm", wavelength_nm, "--slope-per-nm", slope];
+        let arguments = [&["lens", "info", "2el.dat", "--json"][..], &options].concat();
+        json(folder.path(), &arguments)[0]["power_per_mm"].as_f64().unwrap()
+    };
+    assert_eq!(power("550", "-0.0001"), power("400", "0"));
+    assert!(power("400", "-0.0001") > 1.02 * power("400", "0"));
+    output(folder.path(), &["lens", "convert", "2el.dat", "2el.ron", "--slope-per-nm", "-0.0001"]);
+    assert!(fs::read_to_string(folder.path().join("2el.ron")).unwrap().contains("slope_per_nm: -0.0001"));
+}
+
+#[test]
 fn glasses_of_a_lens_alone_are_converted_with_it() {
     let folder = tempfile::tempdir().unwrap();
     let lens = r#"(name: "own", source: "test", surfaces: [(radius_mm: 50.0, stop: true, semi_aperture_mm: 5.0,

@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_optics::{LensFile, ReadOptions};
-
-use crate::{LensChoice, PipelineError};
+use crate::{LensReading, PipelineError};
 
 /// A lens in the format of another file.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,11 +22,8 @@ pub struct ConvertedLens {
 ///
 /// # Errors
 /// When there is no such lens, or the format cannot hold it.
-pub fn convert_lens(input: &str, target: &Path) -> Result<ConvertedLens, PipelineError> {
-    let mut file = match LensChoice::named(input) {
-        LensChoice::File(path) => LensFile::read(&path, &ReadOptions::default())?,
-        other => LensFile::from(other.open()?),
-    };
+pub fn convert_lens(input: &str, target: &Path, reading: &LensReading) -> Result<ConvertedLens, PipelineError> {
+    let mut file = reading.open(input)?;
     let notes = std::mem::take(&mut file.notes);
     let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let (text, glasses) = match extension.as_str() {

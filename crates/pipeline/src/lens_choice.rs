@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dioptric_optics::Lens;
+use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions};
 use dioptric_sensor::Sensor;
 
 use crate::{LensChoice, PipelineError, SensorChoice, StopChoice};
@@ -82,6 +82,63 @@ impl SensorChoice {
 fn is_path(text: &str) -> bool {
     let path = Path::new(text);
     path.extension().is_some() || text.contains(std::path::MAIN_SEPARATOR) || path.exists()
+}
+
+/// What a lens file leaves open, and how to close it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LensReading {
+    /// Glass catalogues (`.agf`, `.yml`) to look in before the built-in one.
+    pub glasses: Vec<PathBuf>,
+    /// What to do with a glass that no catalogue has.
+    pub missing_glass: MissingGlassChoice,
+    /// The change of index a nanometre, about [`REFERENCE_WAVELENGTH_NM`], of the media of which only one index is stated.
+    pub slope_per_nm: Option<f64>,
+}
+
+/// What to do with a glass that no catalogue has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MissingGlassChoice {
+    /// Refuse the lens and say which glass is missing.
+    #[default]
+    Refuse,
+    /// Take the index and Abbe number that the file states for it, if any.
+    FromNdVd,
+    /// Take the built-in glass nearest to them.
+    Nearest,
+}
+
+impl LensReading {
+    /// Returns the lens that `LENS` on the command line means, with its stop set to `stop_mm` where given, and what its file
+    /// says and this program does otherwise or not at all, a sentence each.
+    ///
+    /// # Errors
+    /// When there is no such lens, its file or a catalogue cannot be read, or the stop does not open so far.
+    pub fn open_stopped(&self, text: &str, stop_mm: Option<f64>) -> Result<(Lens, Vec<String>), PipelineError> {
+        let LensFile { lens, notes, .. } = self.open(text)?;
+        Ok((stop_mm.map_or(StopChoice::AsGiven, StopChoice::DiameterMm).apply(lens)?, notes))
+    }
+
+    /// Returns the lens that `LENS` on the command line means, and what its file says of it.
+    ///
+    /// # Errors
+    /// When there is no such lens, or its file or a catalogue cannot be read.
+    pub fn open(&self, text: &str) -> Result<LensFile, PipelineError> {
+        let catalogues = self.glasses.iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
+        let missing_glass = match self.missing_glass {
+            MissingGlassChoice::Refuse => MissingGlass::Refuse,
+            MissingGlassChoice::FromNdVd => MissingGlass::FromNdVd,
+            MissingGlassChoice::Nearest => MissingGlass::Nearest,
+        };
+        let options = ReadOptions { catalogues, missing_glass };
+        let mut file = match LensChoice::named(text) {
+            LensChoice::File(path) => LensFile::read(&path, &options)?,
+            other => LensFile::from(other.open()?),
+        };
+        if let Some(slope_per_nm) = self.slope_per_nm {
+            file.lens = file.lens.with_slope(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
+        }
+        Ok(file)
+    }
 }
 
 /// Returns the lens that `LENS` on the command line means, with its stop set to `stop_mm` where given.
