@@ -157,6 +157,34 @@ fn files_written_trace_the_same() {
 }
 
 #[test]
+fn tilts_written_about_their_pivots_keep_every_length_of_the_axis() {
+    let wide =
+        PLATE.replace("ENPD 4", "ENPD 8").replace("DISZ 7", "DISZ 7\n  DIAM 20").replace("SURF 4", "SURF 4\n  DIAM 20");
+    for tilt_deg in [[30.0, 0.0, 0.0], [0.01, -0.02, 3.0], [0.0, 0.0, 45.0]] {
+        for (surfaces, pivot_mm) in [((1, 2), 0.0), ((1, 2), 3.0), ((2, 2), -4.0)] {
+            let mut file = read("plate.zmx", &wide);
+            let plate = Move { tilt_deg, pivot_mm, decenter_mm: [0.3, -0.1, 0.0], ..still(surfaces) };
+            file.lens = file.lens.with_moves(vec![plate]).unwrap();
+            let again = read("again.zmx", &file.to_zmx().unwrap());
+            let lengths = |file: &LensFile| {
+                let gaps = file.lens.interfaces().iter().map(|interface| interface.thickness_after_mm);
+                gaps.chain(file.film_mm).collect::<Vec<_>>()
+            };
+            // The last gap of a lens is the film's.
+            let n_gaps = file.lens.interfaces().len() - 1;
+            let (mut expected, mut found) = (lengths(&file), lengths(&again));
+            expected.remove(n_gaps);
+            found.remove(n_gaps);
+            for (expected, found) in expected.into_iter().zip(found) {
+                // A pivot is known to rounding over the square of the tilt: 1e-16 mm over 1e-7.
+                assert!((expected - found).abs() < 1e-8, "{tilt_deg:?}: {expected} {found}");
+            }
+            assert_same(&again, &file);
+        }
+    }
+}
+
+#[test]
 fn toroid_is_written_and_read_in_any_unit() {
     let toroid = Shape::Toroid { curvature_x_per_mm: 0.0, conic: 0.5, coefficients: vec![1e-3, 0.0, -2e-7] };
     let surface = Surface { shape: toroid.clone(), ..Surface::sphere(40.0, 5.0) };

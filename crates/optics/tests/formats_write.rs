@@ -174,3 +174,32 @@ fn indices_of_a_dat_file_may_be_given_the_papers_slope() {
     }
     assert!(file.lens.with_slope(f64::NAN, 550.0).is_err());
 }
+
+#[test]
+fn makers_are_listed_in_an_order_in_which_every_name_means_its_glass() {
+    let lens_of = |glasses: [&str; 2]| {
+        let interface = |glass: &str| Interface {
+            surface: Surface::sphere(50.0, 5.0),
+            medium_after: Glass::Named(glass.to_owned()),
+            thickness_after_mm: 1.0,
+        };
+        let mut interfaces = glasses.map(interface).to_vec();
+        interfaces.push(Interface { medium_after: Glass::Air, ..interface(glasses[0]) });
+        LensFile::from(Lens::new("two makers", "test", interfaces, 0).unwrap())
+    };
+    // Both makers have an F2, one alone an SK16.
+    for (glasses, makers) in [
+        (["HIKARI:SK16", "SCHOTT:F2"], "GCAT SCHOTT HIKARI"),
+        (["SCHOTT:F2", "HIKARI:SK16"], "GCAT SCHOTT HIKARI"),
+        (["HIKARI:SK16", "HIKARI:F2"], "GCAT HIKARI"),
+    ] {
+        let file = lens_of(glasses);
+        let text = file.to_zmx().unwrap();
+        assert!(text.contains(&format!("{makers}\r\n")), "{text}");
+        let again = read("a.zmx", &text).lens;
+        let media = |lens: &Lens| lens.interfaces().iter().map(|at| at.medium_after.clone()).collect::<Vec<_>>();
+        assert_eq!(media(&again), media(&file.lens));
+    }
+    let message = lens_of(["HIKARI:F2", "SCHOTT:F2"]).to_zmx().unwrap_err().to_string();
+    assert!(message.contains("and a glass of another maker have one name"), "{message}");
+}

@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
-use crate::{Aperture, Glass, GlassCatalogue, Lens, OpticsError, Outline, Pose, Shape, Surface};
+use glam::DVec2;
+
+use crate::{Aperture, CatalogueGlass, Glass, GlassCatalogue, Lens, OpticsError, Outline, Pose, Shape, Surface};
 
 use super::{
     agf::agf_lines,
@@ -13,29 +15,51 @@ use super::{
 /// The way from one surface to the next: a distance along the axis, and a coordinate break where the next stands off it.
 struct Gap {
     thickness_mm: f64,
-    turn: Option<Pose>,
+    turn: Option<Turn>,
 }
+
+/// A coordinate break: a shift along x and y, the turn of a pose, and a way along the turned axis.
+struct Turn {
+    shift_mm: DVec2,
+    tilt_deg: [f64; 3],
+    thickness_mm: f64,
+}
+
+/// The least 1 − cos of a tilt that is taken to turn about a point of the axis; below, the point is lost in rounding.
+const LEAST_TILT: f64 = 1e-10;
 
 impl Gap {
     /// Returns the gap of this way, which is `straight_mm` long where it follows the axis.
+    ///
+    /// Before and behind a tilt the pieces of the axis together are as long as it is straight: that is so where they
+    /// meet at the tilt's pivot, and lengths along the axis come back as they were.
     fn new(way: &Pose, straight_mm: f64) -> Self {
         let straight = Pose::centered(straight_mm);
         // What rounding leaves of a motion and its return.
         if way.inverse().after(&straight).is_rest() {
             return Self { thickness_mm: straight_mm, turn: None };
         }
-        Self { thickness_mm: way.vertex_mm.z, turn: Some(*way) }
+        let axis = way.rotation.z_axis;
+        let is_tilted = 1.0 - axis.z > LEAST_TILT;
+        let behind_mm = if is_tilted { (straight_mm - way.vertex_mm.z) / (1.0 - axis.z) } else { 0.0 };
+        Self::turned(way, behind_mm)
+    }
+
+    /// Returns the gap of this way with this much of it behind the break.
+    fn turned(way: &Pose, behind_mm: f64) -> Self {
+        let pivot_mm = way.vertex_mm - way.rotation.z_axis * behind_mm;
+        let turn = Turn { shift_mm: pivot_mm.truncate(), tilt_deg: way.tilt_deg(), thickness_mm: behind_mm };
+        Self { thickness_mm: pivot_mm.z, turn: Some(turn) }
     }
 
     fn write_break(&self, text: &mut String, n_written: &mut usize) {
-        let Some(turn) = &self.turn else { return };
+        let Some(Turn { shift_mm, tilt_deg: [x, y, z], thickness_mm }) = &self.turn else { return };
         *n_written += 1;
         let _ = write!(text, "SURF {n_written}\r\n  TYPE COORDBRK\r\n  CURV 0\r\n");
-        let [x, y, z] = turn.tilt_deg();
-        for (place, parameter) in (1..).zip([turn.vertex_mm.x, turn.vertex_mm.y, x, y, z, 0.0]) {
+        for (place, parameter) in (1..).zip([shift_mm.x, shift_mm.y, *x, *y, *z, 0.0]) {
             let _ = write!(text, "  PARM {place} {parameter:e}\r\n");
         }
-        text.push_str("  DISZ 0\r\n");
+        let _ = write!(text, "  DISZ {thickness_mm:e}\r\n");
     }
 }
 
@@ -140,7 +164,9 @@ impl LensFile {
         let gap = |(i, pose): (usize, Pose)| {
             let way = std::mem::replace(&mut before, pose).inverse().after(&pose);
             let straight_mm = match i.checked_sub(1) {
-                None => 0.0,
+                // Behind a far object the axis has no length to keep.
+                None if way.is_rest() => 0.0,
+                None => return Gap::turned(&way, 0.0),
                 Some(i) if i + 1 == lens.interfaces().len() => self.film_mm.unwrap_or(0.0),
                 Some(i) => lens.interfaces()[i].thickness_after_mm,
             };
@@ -149,24 +175,29 @@ impl LensFile {
         lens.poses().into_iter().chain([film]).enumerate().map(gap).collect()
     }
 
-    /// Returns the makers of the glasses, after a check that each glass's name means it in their company.
+    /// Returns the makers of the glasses, in an order in which each glass's name means it.
     fn zmx_makers(&self) -> Result<Vec<String>, OpticsError> {
-        let mut makers: Vec<String> = Vec::new();
         let named = media(&self.lens).filter_map(|(_, medium)| match medium {
             Glass::Named(name) => Some(GlassCatalogue::built_in().find(name)),
             _ => None,
         });
-        let named = named.collect::<Result<Vec<_>, _>>()?;
-        for glass in &named {
-            if !makers.contains(&glass.maker) {
-                makers.push(glass.maker.clone());
-            }
-        }
-        for glass in named {
-            if GlassCatalogue::built_in().find_among(&glass.name, &makers)? != glass {
-                let reason = format!("{} and a glass of another maker have one name", glass.full_name());
+        let mut left: Vec<&CatalogueGlass> = named.collect::<Result<_, _>>()?;
+        let mut makers: Vec<String> = Vec::new();
+        while let Some(first) = left.first() {
+            // Next comes a maker of whom no name left means another glass.
+            let means_its_own = |maker: &&String| {
+                let listed = std::slice::from_ref(*maker);
+                left.iter().all(|glass| match GlassCatalogue::built_in().find_among(&glass.name, listed) {
+                    Ok(meant) if meant.maker == **maker => meant == *glass,
+                    _ => glass.maker != **maker,
+                })
+            };
+            let Some(maker) = left.iter().map(|glass| &glass.maker).find(means_its_own).cloned() else {
+                let reason = format!("{} and a glass of another maker have one name", first.full_name());
                 return Err(OpticsError::CannotWrite { format: "a .zmx file", reason });
-            }
+            };
+            left.retain(|glass| glass.maker != maker);
+            makers.push(maker);
         }
         Ok(makers)
     }
