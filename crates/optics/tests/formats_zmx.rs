@@ -176,6 +176,19 @@ fn catalogues_of_the_file_decide_between_makers() {
 }
 
 #[test]
+fn glass_of_a_maker_that_the_file_does_not_name_is_told() {
+    let notes = |makers: &str| {
+        let text = SINGLET.replace("N-BK7", "S-FPL53").replace("GCAT SCHOTT MISC", makers);
+        read(&text).unwrap().notes
+    };
+    let expected = "glass 'S-FPL53' is in none of the file's catalogues (SCHOTT, MISC): it is OHARA:S-FPL53";
+    assert!(notes("GCAT SCHOTT MISC").iter().any(|note| note == expected), "{:?}", notes("GCAT SCHOTT MISC"));
+    for silent in ["GCAT SCHOTT OHARA", ""] {
+        assert!(!notes(silent).iter().any(|note| note.contains("S-FPL53")));
+    }
+}
+
+#[test]
 fn odd_powers_and_square_terms_are_read() {
     let shape = |from: &str, to: &str| {
         let file = read(&SINGLET.replace(from, to)).unwrap();

@@ -38,7 +38,7 @@ impl<'a> Glasses<'a> {
             }
         }
         let error = match GlassCatalogue::built_in().find_among(name, &self.makers) {
-            Ok(entry) => return found(Glass::Named(entry.full_name())),
+            Ok(entry) => return Ok(self.built_in(name, entry)),
             Err(error) => error,
         };
         self.instead(name, nd_vd).ok_or_else(|| {
@@ -48,6 +48,19 @@ impl<'a> Glasses<'a> {
             };
             format!("{error}{stated}")
         })
+    }
+
+    /// Returns a glass of the built-in catalogue, with a note where its maker is none of those that the file names.
+    fn built_in(&self, name: &str, entry: &CatalogueGlass) -> Found {
+        let full_name = entry.full_name();
+        let is_of_file = self.makers.iter().any(|maker| maker.eq_ignore_ascii_case(&entry.maker));
+        let note = (!self.makers.is_empty() && !is_of_file).then(|| {
+            format!(
+                "glass '{name}' is in none of the file's catalogues ({}): it is {full_name}",
+                self.makers.join(", ")
+            )
+        });
+        Found { glass: Glass::Named(full_name), note }
     }
 
     /// Returns what stands for a glass that no catalogue has, where that was asked for.

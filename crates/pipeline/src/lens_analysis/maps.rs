@@ -113,7 +113,7 @@ fn map_panel(map: &OpdMap, half: f64) -> Panel {
     };
     let ends = waves().fold((f64::INFINITY, f64::NEG_INFINITY), |e, w| (e.0.min(w), e.1.max(w)));
     let reach = match ends.1 >= ends.0 {
-        true => format!(", {:.2} waves across", ends.1 - ends.0),
+        true => format!(", {:.2} λ P–V", ends.1 - ends.0),
         false => ", dark".to_owned(),
     };
     Panel {

@@ -151,7 +151,7 @@ fn maps_hold_the_aberration_of_the_wavefront() {
         assert!((rms / expected - 1.0).abs() < 0.05, "{rms} {expected}");
     }
     let svg = analysis.opd_svg();
-    assert!(svg.contains("waves late") && svg.contains("waves across") && !svg.contains("NaN"));
+    assert!(svg.contains("waves late") && svg.contains("λ P–V") && !svg.contains("NaN"));
     assert!(analysis.grid_svg().contains("chief rays") && !analysis.grid_svg().contains("NaN"));
     assert!(analysis.html("a < b").contains("<pre>a &lt; b</pre>"));
 }
