@@ -98,12 +98,12 @@ pub enum ForwardError {
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
     /// The receiver of the bands gave up.
-    #[error("band {band} could not be handed on")]
+    #[error("band {band} could not be handed on: {reason}")]
     Sink {
         /// 0-based band.
         band: usize,
         /// Why.
-        source: SinkError,
+        reason: SinkError,
     },
 }
 

@@ -207,7 +207,7 @@ impl<'a> Plan<'a> {
                     })
                     .collect();
                 for (&band, picture) in group.iter().zip(pictures) {
-                    sink(band, picture?).map_err(|source| ForwardError::Sink { band, source })?;
+                    sink(band, picture?).map_err(|reason| ForwardError::Sink { band, reason })?;
                 }
             }
             lower = upper;
@@ -215,7 +215,7 @@ impl<'a> Plan<'a> {
         let last = n_bands - 1;
         let picture = self.render_band(source, last, &lower)?;
         progress(1.0);
-        sink(last, picture).map_err(|source| ForwardError::Sink { band: last, source })
+        sink(last, picture).map_err(|reason| ForwardError::Sink { band: last, reason })
     }
 
     fn maps_at(&self, band: usize) -> Vec<RadialMap> {

@@ -19,6 +19,7 @@ use dioptric_optics::{
     rays_towards,
 };
 use multiversion::multiversion;
+use rayon::prelude::*;
 
 /// Time that this thread ran.
 struct CoreTime;
@@ -104,12 +105,34 @@ fn trace(criterion: &mut Criterion<CoreTime>) {
 }
 
 fn threads(criterion: &mut Criterion) {
-    let (lens, _) = double_gauss();
+    let (lens, film_mm) = double_gauss();
     let rays = bundle(&lens, N_RAYS);
     let mut group = criterion.benchmark_group("trace/threads");
     group.throughput(Throughput::Elements((rays.len() * lens.n_surfaces()) as u64));
-    measure_in_place(&mut group, "one", &rays, |rays| lens.trace(rays, Rims::Clip));
-    measure_in_place(&mut group, "all", &rays, |rays| lens.trace_parallel(rays, Rims::Clip));
+    measure_in_place(&mut group, "batch/one", &rays, |rays| lens.trace(rays, Rims::Clip));
+    measure_in_place(&mut group, "batch/all", &rays, |rays| lens.trace_parallel(rays, Rims::Clip));
+
+    // Ten batches that threads share among them, made as they are traced and nowhere kept.
+    let targets_mm = targets(&lens, N_RAYS, 1.1);
+    let place = |batch: usize| {
+        let point = ObjectPoint::from_field(&lens, DVec2::new(0.01 * batch as f64, 0.0), 0.5);
+        let beam = Beam { point, targets_mm: &targets_mm, z_mm: lens.first_order().entrance_pupil_z_mm };
+        let mut sum = DVec2::ZERO;
+        lens.trace_onto(&beam, Rims::Clip, film_mm, |rays| {
+            for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
+                sum += DVec2::new(rays.x_mm[i], rays.y_mm[i]);
+            }
+        });
+        sum
+    };
+    const N_BATCHES: usize = 10;
+    group.throughput(Throughput::Elements((N_BATCHES * N_RAYS * (lens.n_surfaces() + 1)) as u64));
+    group.bench_function("batches/one", |bencher| {
+        bencher.iter(|| (0..N_BATCHES).map(place).collect::<Vec<_>>());
+    });
+    group.bench_function("batches/all", |bencher| {
+        bencher.iter(|| (0..N_BATCHES).into_par_iter().with_max_len(1).map(place).collect::<Vec<_>>());
+    });
     group.finish();
 }
 
