@@ -396,6 +396,9 @@ pub(crate) struct PsfArgs {
     /// Where the film is
     #[command(flatten)]
     pub(crate) film: FilmPlace,
+    /// Stops the lens down to this f-number
+    #[arg(long, value_name = "N", conflicts_with = "stop_mm")]
+    pub(crate) f_number: Option<f64>,
     /// Diameter of the stop, mm [default: the lens's own]
     #[arg(long, value_name = "D")]
     pub(crate) stop_mm: Option<f64>,

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use dioptric_pipeline::{
-    BankChoice, FocusChoice, PsfRequest, PsfRow, PsfSampling, PsfSet, Staged, drawing_file, open_lens, parse_numbers,
-    psf_csv,
+    BankChoice, FocusChoice, PsfRequest, PsfRow, PsfSampling, PsfSet, Staged, StopChoice, drawing_file, open_lens,
+    parse_numbers, psf_csv,
 };
 
 use crate::{
@@ -47,6 +47,9 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
             None => Vec::new(),
         },
     };
+    let stop = arguments.f_number.map_or(StopChoice::AsGiven, StopChoice::FNumber);
+    let reference_nm = request.reference_nm(&lens)?;
+    let lens = stop.apply_at(lens, reference_nm)?;
     // The place is tried before the work.
     let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
     let csv = arguments.csv.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);

@@ -215,6 +215,19 @@ fn psf_adds_the_whole_light_and_writes_its_table_and_mosaic() {
 }
 
 #[test]
+fn psf_out_of_focus_is_as_wide_as_the_f_number_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let rms_um = |f_number: &str| {
+        let lens = ["psf", "dgauss-50mm", "--f-number", f_number];
+        let place = ["--focus-mm", "2000", "--distances-mm", "1000", "--pixel-um", "5", "--json"];
+        json(folder.path(), &[&lens[..], &place].concat())[0]["rms_radius_um"].as_f64().unwrap()
+    };
+    // Aberrations are some hundredths of the blur at f/5.6.
+    assert!((rms_um("5.6") / rms_um("11.2") - 2.0).abs() < 0.05, "{} {}", rms_um("5.6"), rms_um("11.2"));
+    check_error(folder.path(), &["psf", "dgauss-50mm", "--f-number", "1", "--focus-mm", "2000"], &["stop"]);
+}
+
+#[test]
 fn psf_tells_the_error_of_the_bank_that_it_draws_from() {
     let folder = tempfile::tempdir().unwrap();
     let common =

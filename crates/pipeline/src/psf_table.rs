@@ -135,12 +135,20 @@ impl PsfRequest {
         Ok(PsfSet { film_mm, pixel_um: self.pixel_um, rows, pictures, bank, spectral_weights })
     }
 
-    /// Returns the lens at the wavelength of fields and focus: 550 nm; where the lens is not known at it, or no
-    /// wavelength asked for is visible, that of them which is nearest to it.
+    /// Returns the lens at [`reference_nm`](Self::reference_nm).
     pub(crate) fn reference(&self, lens: &Lens) -> Result<MonoLens, PipelineError> {
         let asked_nm = nearest_to_reference_nm(&self.wavelengths_nm);
         let usual = lens.at(REFERENCE_WAVELENGTH_NM).ok().filter(|_| VISIBLE_NM.contains(&asked_nm));
         Ok(usual.map_or_else(|| lens.at(asked_nm), Ok)?)
+    }
+
+    /// The wavelength of fields, focus and f-numbers, nm: 550; where the lens is not known at it, or no wavelength asked
+    /// for is visible, that of them which is nearest to it.
+    ///
+    /// # Errors
+    /// When the lens is not known at that wavelength.
+    pub fn reference_nm(&self, lens: &Lens) -> Result<f64, PipelineError> {
+        Ok(self.reference(lens)?.wavelength_nm())
     }
 
     /// Returns the points: fields outermost, then distances, then wavelengths.
