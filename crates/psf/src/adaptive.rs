@@ -202,7 +202,7 @@ impl Truth {
             .places
             .par_iter()
             .map(|(field, dioptres, nm, truth)| {
-                difference(&bank.kernel(DVec2::X * *field, *dioptres, *nm, self.pitch_um), truth)
+                bank.kernel(DVec2::X * *field, *dioptres, *nm, self.pitch_um).difference_from(truth)
             })
             .collect();
         errors.sort_by(f64::total_cmp);
@@ -218,18 +218,6 @@ impl Truth {
             target_median: None,
         }
     }
-}
-
-/// Returns the L1 difference of two kernels about their middles, over the energy of the second.
-fn difference(a: &Kernel, b: &Kernel) -> f64 {
-    let side = a.samples.nrows().max(b.samples.nrows());
-    let at = |kernel: &Kernel, row: usize, column: usize| {
-        let margin = (side - kernel.samples.nrows()) / 2;
-        let place = row.checked_sub(margin).zip(column.checked_sub(margin));
-        place.and_then(|place| kernel.samples.get(place)).map_or(0.0, |e| f64::from(*e))
-    };
-    let places = (0..side).flat_map(|row| (0..side).map(move |column| (row, column)));
-    places.map(|(row, column)| (at(a, row, column) - at(b, row, column)).abs()).sum::<f64>() / b.sum()
 }
 
 #[cfg(test)]

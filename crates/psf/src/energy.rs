@@ -186,18 +186,10 @@ mod tests {
     use std::f64::consts::PI;
 
     use approx::assert_abs_diff_eq;
-    use dioptric_diffraction::Covariance;
     use ndarray::Array2;
 
     use super::*;
-    use crate::{raster::Raster, splat};
-
-    fn gaussian(sigma: f64, at: DVec2) -> Picture {
-        let mut raster = Raster::new(101, 101);
-        let covariance = Covariance { xx: sigma * sigma, xy: 0.0, yy: sigma * sigma };
-        splat::deposit(&mut raster, &[splat::Gaussian { at, covariance, energy: 1.0 }]);
-        Picture::new(raster.finish().view(), 2.0)
-    }
+    use crate::metrics::tests::gaussian;
 
     #[test]
     fn even_energy_fills_circles_and_squares_by_area() {

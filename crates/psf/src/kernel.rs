@@ -24,6 +24,19 @@ impl Kernel {
         self.samples.iter().map(|&e| f64::from(e)).sum()
     }
 
+    /// Returns the L1 difference from another kernel of the same pixels, middle on middle, over the other's energy: 0
+    /// where they are equal, 2 where they hold as much and share no pixel.
+    pub fn difference_from(&self, other: &Self) -> f64 {
+        let side = self.samples.nrows().max(other.samples.nrows());
+        let at = |kernel: &Self, row: usize, column: usize| {
+            let margin = (side - kernel.samples.nrows()) / 2;
+            let place = row.checked_sub(margin).zip(column.checked_sub(margin));
+            place.and_then(|place| kernel.samples.get(place)).map_or(0.0, |e| f64::from(*e))
+        };
+        let places = (0..side).flat_map(|row| (0..side).map(move |column| (row, column)));
+        places.map(|(row, column)| (at(self, row, column) - at(other, row, column)).abs()).sum::<f64>() / other.sum()
+    }
+
     /// Returns the kernel with the sum 1.
     pub fn normalized(mut self) -> Self {
         let scale = (1.0 / self.sum()) as f32;

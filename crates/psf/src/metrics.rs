@@ -181,13 +181,14 @@ fn transform(energies: &[f64], phase: impl Fn(usize) -> f64) -> (f64, f64) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use approx::assert_abs_diff_eq;
 
     use super::*;
     use crate::{raster::Raster, splat};
 
-    fn gaussian(sigma: f64, at: DVec2) -> Picture {
+    /// A Gaussian of this many pixels about a place on 101 × 101 pixels of 2 µm.
+    pub(crate) fn gaussian(sigma: f64, at: DVec2) -> Picture {
         let mut raster = Raster::new(101, 101);
         let covariance = Covariance { xx: sigma * sigma, xy: 0.0, yy: sigma * sigma };
         splat::deposit(&mut raster, &[splat::Gaussian { at, covariance, energy: 1.0 }]);
