@@ -9,6 +9,20 @@ use std::{
     path::{Path, PathBuf},
 };
 
+/// The lenses of the shared reference data (`reference/optics/NAME.json`).
+pub const REFERENCE_LENSES: [&str; 10] = [
+    "achromat_krakenos",
+    "asphere_al1815c",
+    "canon_ef50_f18_1m",
+    "cooke_triplet",
+    "double_gauss_f2",
+    "microscope_20x",
+    "relay_1to1",
+    "singlet_lb1471a",
+    "telephoto_laikin",
+    "wideangle_100",
+];
+
 /// Returns the workspace's root folder.
 pub fn workspace_root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

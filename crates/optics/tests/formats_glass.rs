@@ -3,21 +3,9 @@
 
 use std::fs;
 
+use dioptric_golden::REFERENCE_LENSES;
 use dioptric_optics::{C_LINE_NM, D_LINE_NM, F_LINE_NM, GlassCatalogue};
 use serde_json::Value;
-
-const LENSES: [&str; 10] = [
-    "achromat_krakenos",
-    "asphere_al1815c",
-    "canon_ef50_f18_1m",
-    "cooke_triplet",
-    "double_gauss_f2",
-    "microscope_20x",
-    "relay_1to1",
-    "singlet_lb1471a",
-    "telephoto_laikin",
-    "wideangle_100",
-];
 
 fn json(path: &str) -> Option<Value> {
     let path = dioptric_golden::shared(path)?;
@@ -28,7 +16,7 @@ fn json(path: &str) -> Option<Value> {
 #[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
 fn named_glasses_of_the_reference_lenses_have_their_index_to_1e_15() {
     let mut n_checked = 0;
-    for lens in LENSES {
+    for lens in REFERENCE_LENSES {
         let Some(file) = json(&format!("reference/optics/{lens}.json")) else { return };
         for surface in file["lens"]["surfaces"].as_array().unwrap() {
             let material = &surface["material_after"];

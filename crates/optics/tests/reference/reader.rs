@@ -8,19 +8,7 @@ use std::fs;
 use dioptric_optics::{Glass, Interface, Lens, Shape, Surface};
 use serde_json::Value;
 
-/// The names of the reference lenses.
-pub(crate) const NAMES: [&str; 10] = [
-    "achromat_krakenos",
-    "asphere_al1815c",
-    "canon_ef50_f18_1m",
-    "cooke_triplet",
-    "double_gauss_f2",
-    "microscope_20x",
-    "relay_1to1",
-    "singlet_lb1471a",
-    "telephoto_laikin",
-    "wideangle_100",
-];
+pub(crate) use dioptric_golden::REFERENCE_LENSES as NAMES;
 
 /// Reads one JSON file of the reference, or says that the test is skipped.
 pub(crate) fn json(name: &str) -> Option<Value> {
