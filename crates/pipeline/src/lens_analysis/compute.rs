@@ -96,6 +96,25 @@ impl Bench {
         ObjectPoint::from_field(self.reference(), field_tan, self.dioptres)
     }
 
+    /// Returns the film with the least spots of these points, mm, and their size, mm rms.
+    fn best(&self, points: &[ObjectPoint], lenses: &[MonoLens], from_mm: f64) -> Option<(f64, f64)> {
+        Autofocus { lenses, points, sampling: &self.sampling }.best_film_mm(from_mm)
+    }
+
+    /// Returns where each wavelength of a point on the axis focuses; films are sought about `from_mm`.
+    fn axial_color(&self, distance_mm: f64, from_mm: f64) -> Vec<AxialColorRow> {
+        let axis = [self.point(DVec2::ZERO)];
+        let focus_mm = |lens: &MonoLens| self.best(&axis, std::slice::from_ref(lens), from_mm).map(|found| found.0);
+        let reference_focus_mm = focus_mm(self.reference());
+        let image_z_mm = |lens: &MonoLens| lens.conjugate(distance_mm).image_z_mm;
+        let row = |lens: &MonoLens| AxialColorRow {
+            wavelength_nm: lens.wavelength_nm(),
+            paraxial_shift_mm: image_z_mm(lens) - image_z_mm(self.reference()),
+            rms_shift_mm: focus_mm(lens).zip(reference_focus_mm).map(|(own, reference)| own - reference),
+        };
+        self.lenses.iter().map(row).collect()
+    }
+
     fn analyse(
         mut self,
         request: &AnalysisRequest,
@@ -103,11 +122,8 @@ impl Bench {
         (fields, notes): (Vec<Field>, Vec<String>),
     ) -> Result<LensAnalysis, PipelineError> {
         let paraxial = self.reference().film_mm_for(request.distance_mm);
-        let best = |points: &[ObjectPoint], lenses: &[MonoLens], from_mm: f64| {
-            Autofocus { lenses, points, sampling: &self.sampling }.best_film_mm(from_mm)
-        };
         let axis = self.point(DVec2::ZERO);
-        let on_axis = paraxial.as_ref().ok().and_then(|&film_mm| best(&[axis], &self.lenses, film_mm));
+        let on_axis = paraxial.as_ref().ok().and_then(|&film_mm| self.best(&[axis], &self.lenses, film_mm));
         self.film_mm = match (request.film, on_axis) {
             (AnalysisFilm::FilmMm(film_mm), _) => film_mm,
             (AnalysisFilm::FocusMm(distance_mm), _) => self.reference().film_mm_for(distance_mm)?,
@@ -116,25 +132,14 @@ impl Bench {
         };
         let from_mm = paraxial.as_ref().map_or(self.film_mm, |film_mm| *film_mm);
         let points: Vec<ObjectPoint> = fields.iter().map(|field| self.point(field.tan)).collect();
-        let over_fields = best(&points, &self.lenses, from_mm);
+        let over_fields = self.best(&points, &self.lenses, from_mm);
         let wavefront = on_axis.and_then(|(film_mm, _)| {
             best_wavefront_film_mm(self.reference(), &axis, film_mm, PupilGrid::STANDARD).ok()
         });
-        let own_focus = |lens: &MonoLens| best(&[axis], std::slice::from_ref(lens), from_mm).map(|found| found.0);
-        let reference_focus = own_focus(self.reference());
-        let image_z_mm = |lens: &MonoLens| lens.conjugate(request.distance_mm).image_z_mm;
-        let axial_color = |lens: &MonoLens| AxialColorRow {
-            wavelength_nm: lens.wavelength_nm(),
-            paraxial_shift_mm: image_z_mm(lens) - image_z_mm(self.reference()),
-            rms_shift_mm: own_focus(lens).zip(reference_focus).map(|(own, reference)| own - reference),
-        };
         let first = self.reference().first_order();
         let pairs: Vec<(&Field, &MonoLens)> =
             fields.iter().flat_map(|field| self.lenses.iter().map(move |lens| (field, lens))).collect();
-        let by_angle = |a: &&Field, b: &&Field| a.place.field_deg.total_cmp(&b.place.field_deg);
-        let last = fields.iter().max_by(by_angle);
-        let curve = |last: &Field| (0..=CURVE_STEPS).map(|i| last.at_share(i as f64 / CURVE_STEPS as f64)).collect();
-        let curve_fields: Vec<Field> = last.map(curve).unwrap_or_default();
+        let curve_fields = curve_fields(&fields);
         let straight = StraightMap::of(self.reference(), self.dioptres, self.film_mm);
         let axial_cone = self.cone(&axis);
         let field_rows = |fields: &[Field]| {
@@ -171,7 +176,7 @@ impl Bench {
                 wavefront_film_mm: wavefront.map(|found| found.0),
                 wavefront_rms_waves: wavefront.map(|found| found.1),
             },
-            axial_color: self.lenses.iter().map(axial_color).collect(),
+            axial_color: self.axial_color(request.distance_mm, from_mm),
             spots: pairs.par_iter().map(|&(field, lens)| self.spot_row(field, lens)).collect(),
             fans: pairs.par_iter().map(|&(field, lens)| self.fan_row(field, lens)).collect(),
             opd_maps: pairs.par_iter().map(|&(field, lens)| self.opd_map(field, lens)).collect(),
@@ -337,6 +342,13 @@ impl Bench {
 /// Returns a place on the film in the picture frame, which is turned by half a turn.
 fn in_picture(film_mm: DVec2) -> [f64; 2] {
     [0.0 - film_mm.x, 0.0 - film_mm.y]
+}
+
+/// Returns the fields that curves are drawn over: from the axis to the widest of these.
+fn curve_fields(fields: &[Field]) -> Vec<Field> {
+    let last = fields.iter().max_by(|a, b| a.place.field_deg.total_cmp(&b.place.field_deg));
+    let curve = |last: &Field| (0..=CURVE_STEPS).map(|i| last.at_share(i as f64 / CURVE_STEPS as f64)).collect();
+    last.map(curve).unwrap_or_default()
 }
 
 #[cfg(test)]
