@@ -1,9 +1,9 @@
 //! CODE V sequence files (`.seq`): commands, of which `S` adds a surface and `;` or a line's end ends each.
 //!
 //! Read are radii or curvatures, thicknesses, glasses of the catalogue or of a private one (`PRV` … `END`), conics, even
-//! aspheres, Y toroids and anamorphic conics (`AAS`), decentres and tilts (basic or `DAR`), circular apertures, the
-//! pupil, fields and wavelengths. Commands that
-//! change no ray (solves, variables, labels) are passed over; what changes rays and cannot be traced is refused.
+//! aspheres, cylinders (`CYL`), toroids (`YTO`, `XTO`) and anamorphic conics (`AAS`), decentres and tilts (basic, `DAR` or
+//! `REV`), apertures, the pupil, fields and wavelengths. Commands that change no ray (solves, variables, labels) are passed
+//! over; what changes rays and cannot be traced is refused.
 
 mod command;
 mod surface;
@@ -12,7 +12,7 @@ use crate::{CatalogueGlass, Glass, ImageSurface, prescription::TextError};
 
 use self::{
     command::{Command, commands_of},
-    surface::{SeqKind, SeqSurface},
+    surface::SeqSurface,
 };
 use super::{
     glasses::{Glasses, constant, model},
@@ -193,102 +193,21 @@ impl<'a> Seq<'a> {
         let named = command.words.get(1).and_then(|word| self.surface_named(word));
         let place = if named.is_some() { 2 } else { 1 };
         let Some(surface) = named.or(self.surfaces.len().checked_sub(1)) else { return Ok(()) };
-        let is_asphere = "ABCDEFGHJ".find(keyword).filter(|_| keyword.len() == 1);
         match keyword {
             "STO" => {
                 self.surfaces.iter_mut().for_each(|surface| surface.is_stop = false);
                 self.surfaces[surface].is_stop = true;
+                Ok(())
             }
-            "K" => self.surfaces[surface].conic = command.number(place)?,
-            "RDY" => {
-                self.surfaces[surface].curvature = match command.number(place)? {
-                    0.0 => 0.0,
-                    radius => 1.0 / radius,
-                }
-            }
-            "CUY" => self.surfaces[surface].curvature = command.number(place)?,
-            "THI" => self.surfaces[surface].thickness = command.distance(place)?,
             "GLA" | "GL1" => {
                 if let Some(word) = command.words.get(place) {
                     self.surfaces[surface].medium = self.medium(word, command)?;
                 }
+                Ok(())
             }
-            "CIR" => match command.words.get(place).map(|word| word.to_uppercase()).as_deref() {
-                Some("EDG") => {}
-                Some("HOL") => return Err(command.wrong("holes are not supported")),
-                Some("OBS") => self.surfaces[surface].obscuration.radius = Some(command.number(place + 1)?),
-                _ => self.surfaces[surface].clear_radius = Some(command.number(place)?),
-            },
-            "REX" | "REY" | "ELX" | "ELY" | "ADX" | "ADY" => self.take_aperture(keyword, surface, command, place)?,
-            "ARO" if command.number(place)? != 0.0 => {
-                return Err(command.wrong("turned apertures are not supported"));
-            }
-            "XDE" | "YDE" | "ZDE" => {
-                let axis = usize::from(keyword.as_bytes()[0] - b'X');
-                self.surfaces[surface].decenter[axis] = command.number(place)?;
-            }
-            "ADE" | "BDE" | "CDE" => {
-                let axis = usize::from(keyword.as_bytes()[0] - b'A');
-                self.surfaces[surface].tilt_deg[axis] = command.number(place)?;
-            }
-            "DAR" => self.surfaces[surface].is_returned = true,
-            "REV" | "BEN" | "RET" | "GLB" => {
-                return Err(command.wrong("this kind of tilt is not supported; expected XDE to CDE, alone or with DAR"));
-            }
-            "YTO" => self.surfaces[surface].kind = SeqKind::Toroid,
-            "AAS" => self.surfaces[surface].kind = SeqKind::Biconic,
-            "KX" => self.surfaces[surface].conic_x = command.number(place)?,
-            "KY" => self.surfaces[surface].conic = command.number(place)?,
-            "CUX" => self.surfaces[surface].curvature_x = command.number(place)?,
-            "RDX" => {
-                self.surfaces[surface].curvature_x = match command.number(place)? {
-                    0.0 => 0.0,
-                    radius => 1.0 / radius,
-                }
-            }
-            "AR" | "BR" | "CR" | "DR" | "AP" | "BP" | "CP" | "DP" if command.number(place)? != 0.0 => {
-                return Err(command.wrong("higher terms of an anamorphic asphere are not supported"));
-            }
-            "CYL" | "XTO" | "SPS" | "SPL" | "GRT" | "DIF" | "HOE" => {
-                let what = command.words.join(" ");
-                return Err(command.wrong(format!(
-                    "surfaces of the kind '{what}' are not supported; expected spheres, K, ASP, YTO and AAS"
-                )));
-            }
-            "RMD" => return Err(command.wrong("mirrors are not supported")),
-            _ => {
-                if let Some(power) = is_asphere {
-                    self.surfaces[surface].coefficients[power] = command.number(place)?;
-                }
-            }
+            "RMD" => Err(command.wrong("mirrors are not supported")),
+            _ => self.surfaces[surface].take(keyword, command, place),
         }
-        Ok(())
-    }
-
-    /// Takes half a width of an aperture along x or y, or the place of its middle there; `OBS` before the number makes
-    /// it an obscuration, `EDG` the outer edge, which bounds no light.
-    fn take_aperture(
-        &mut self,
-        keyword: &str,
-        surface: usize,
-        command: &Command,
-        place: usize,
-    ) -> Result<(), TextError> {
-        let axis = usize::from(keyword.ends_with('Y'));
-        let surface = &mut self.surfaces[surface];
-        let (aperture, place) = match command.words.get(place).map(|word| word.to_uppercase()).as_deref() {
-            Some("EDG") => return Ok(()),
-            Some("HOL") => return Err(command.wrong("holes are not supported")),
-            Some("OBS") => (&mut surface.obscuration, place + 1),
-            _ => (&mut surface.opening, place),
-        };
-        let number = command.number(place)?;
-        match &keyword[..2] {
-            "RE" => aperture.rectangle[axis] = Some(number),
-            "EL" => aperture.ellipse[axis] = Some(number),
-            _ => aperture.center[axis] = number,
-        }
-        Ok(())
     }
 
     /// Returns the surface that a word as `S3`, `SO` or `SI` names.
@@ -314,6 +233,8 @@ impl<'a> Seq<'a> {
             Some(glass) => glass,
             None => {
                 let name = match word.rsplit_once('_') {
+                    // The program's own catalogue of crystals and other media that are of no one maker.
+                    Some((name, maker)) if maker.eq_ignore_ascii_case("SPECIAL") => format!("MISC:{name}"),
                     Some((name, maker)) if !maker.is_empty() => format!("{maker}:{name}"),
                     _ => word.to_owned(),
                 };
@@ -347,7 +268,7 @@ impl<'a> Seq<'a> {
         let mut surfaces = Vec::with_capacity(n_surfaces);
         let (mut moves, mut z_mm) = (Vec::new(), 0.0);
         for (i, surface) in self.surfaces[1..].iter().enumerate() {
-            moves.extend(surface.own_move(i, mm, z_mm));
+            moves.extend(surface.moves(i, mm, z_mm));
             z_mm += surface.thickness * mm;
             if i + 2 < n_surfaces {
                 surfaces.push(surface.in_mm(mm)?);
@@ -356,6 +277,8 @@ impl<'a> Seq<'a> {
         if let Some(last) = surfaces.last_mut() {
             last.thickness_after_mm += defocus_mm;
         }
+        // What a reversed image would move stands behind it.
+        moves.retain(|step| step.step.surfaces.0 <= surfaces.len());
         // Without a stop the first surface is it, as in the program.
         let stop = match stop {
             Some(stop) => stop.checked_sub(1),

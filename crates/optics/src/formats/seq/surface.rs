@@ -2,9 +2,12 @@
 
 use crate::{Aperture, Glass, Move, Outline, Shape, prescription::TextError};
 
-use super::super::{
-    shapes::{even_asphere, up_to_last},
-    system::{SystemMove, SystemSurface},
+use super::{
+    super::{
+        shapes::{even_asphere, up_to_last},
+        system::{SystemMove, SystemSurface},
+    },
+    command::Command,
 };
 
 /// A surface as the file states it, in the file's units; the first is the object, the last the image.
@@ -29,8 +32,19 @@ pub(super) struct SeqSurface {
     pub(super) decenter: [f64; 3],
     /// ADE, BDE, CDE.
     pub(super) tilt_deg: [f64; 3],
-    /// Whether the axis is back in its place behind the surface (DAR).
-    pub(super) is_returned: bool,
+    pub(super) axis: SeqAxis,
+}
+
+/// What decentres and tilts of a surface do to the axis behind it.
+#[derive(Clone, Copy, Default, PartialEq)]
+pub(super) enum SeqAxis {
+    /// It goes on as the surface has bent it.
+    #[default]
+    Bent,
+    /// It is back in its place behind the surface (DAR).
+    Returned,
+    /// The surface stands on the axis, which is bent behind it by what undoes the numbers (REV).
+    Reversed,
 }
 
 /// An opening or obscuration that is no round rim, in the file's units.
@@ -47,6 +61,14 @@ pub(super) struct SeqOpening {
 }
 
 impl SeqOpening {
+    /// Returns the opening in a frame that is turned by a right angle about z.
+    fn turned(mut self) -> Self {
+        self.rectangle.swap(0, 1);
+        self.ellipse.swap(0, 1);
+        self.center = [self.center[1], -self.center[0]];
+        self
+    }
+
     /// Returns its shapes.
     fn outlines(&self, mm: f64) -> impl Iterator<Item = Outline> {
         let pair = |[x, y]: [Option<f64>; 2]| Some((x.or(y)? * mm, y.or(x)? * mm));
@@ -64,47 +86,170 @@ pub(super) enum SeqKind {
     Rotational,
     /// YTO: the curve in the y–z plane turned about an axis parallel to y.
     Toroid,
+    /// XTO: the curve in the x–z plane turned about an axis parallel to x.
+    ToroidX,
+    /// CYL: straight along x or along y.
+    Cylinder,
     /// AAS: a conic each along x and y.
     Biconic,
 }
 
 impl SeqSurface {
-    /// Returns the tilt and decentre at this surface, if there is one.
-    ///
-    /// Of the program's angles those about x and y turn by the left-hand rule, that about z by the right-hand rule.
-    pub(super) fn own_move(&self, surface: usize, mm: f64, z_mm: f64) -> Option<SystemMove> {
-        let [a, b, c] = self.tilt_deg;
-        let step = Move {
-            surfaces: (surface, if self.is_returned { surface } else { usize::MAX }),
-            pivot_mm: 0.0,
-            decenter_mm: self.decenter.map(|shift| shift * mm),
-            tilt_deg: [-a, -b, c],
-            tilt_first: false,
+    /// Takes a command of this surface, whose first number is at a place among the command's words.
+    pub(super) fn take(&mut self, keyword: &str, command: &Command, place: usize) -> Result<(), TextError> {
+        match keyword {
+            "THI" => self.thickness = command.distance(place)?,
+            "CIR" => match command.words.get(place).map(|word| word.to_uppercase()).as_deref() {
+                Some("EDG") => {}
+                Some("HOL") => return Err(command.wrong("holes are not supported")),
+                Some("OBS") => self.obscuration.radius = Some(command.number(place + 1)?),
+                _ => self.clear_radius = Some(command.number(place)?),
+            },
+            "REX" | "REY" | "ELX" | "ELY" | "ADX" | "ADY" => self.take_aperture(keyword, command, place)?,
+            "ARO" if command.number(place)? != 0.0 => {
+                return Err(command.wrong("turned apertures are not supported"));
+            }
+            "XDE" | "YDE" | "ZDE" => {
+                self.decenter[usize::from(keyword.as_bytes()[0] - b'X')] = command.number(place)?
+            }
+            "ADE" | "BDE" | "CDE" => {
+                self.tilt_deg[usize::from(keyword.as_bytes()[0] - b'A')] = command.number(place)?
+            }
+            "DAR" => self.axis = SeqAxis::Returned,
+            "REV" => self.axis = SeqAxis::Reversed,
+            "BEN" => return Err(command.wrong("tilts that bend the axis at a mirror are not supported")),
+            "RET" | "GLB" => {
+                return Err(
+                    command.wrong("this kind of tilt is not supported; expected XDE to CDE, alone, with DAR or REV")
+                );
+            }
+            "XOD" | "YOD" | "ZOD" if command.number(place)? != 0.0 => {
+                return Err(command.wrong("tilts about another point than the vertex are not supported"));
+            }
+            _ => self.take_shape(keyword, command, place)?,
+        }
+        Ok(())
+    }
+
+    /// Takes what a command says of the surface's shape.
+    fn take_shape(&mut self, keyword: &str, command: &Command, place: usize) -> Result<(), TextError> {
+        let curvature = || command.number(place).map(|radius| if radius == 0.0 { 0.0 } else { 1.0 / radius });
+        match keyword {
+            "RDY" => self.curvature = curvature()?,
+            "RDX" => self.curvature_x = curvature()?,
+            "CUY" => self.curvature = command.number(place)?,
+            "CUX" => self.curvature_x = command.number(place)?,
+            "K" | "KY" => self.conic = command.number(place)?,
+            "KX" => self.conic_x = command.number(place)?,
+            "YTO" => self.kind = SeqKind::Toroid,
+            "XTO" => self.kind = SeqKind::ToroidX,
+            "CYL" => self.kind = SeqKind::Cylinder,
+            "AAS" => self.kind = SeqKind::Biconic,
+            "AR" | "BR" | "CR" | "DR" | "AP" | "BP" | "CP" | "DP" if command.number(place)? != 0.0 => {
+                return Err(command.wrong("higher terms of an anamorphic asphere are not supported"));
+            }
+            "SPS" | "SPL" | "GRT" | "DIF" | "HOE" => {
+                let what = command.words.join(" ");
+                return Err(command.wrong(format!(
+                    "surfaces of the kind '{what}' are not supported; expected spheres, K, ASP, CYL, YTO, XTO and AAS"
+                )));
+            }
+            _ => {
+                if let Some(power) = "ABCDEFGHJ".find(keyword).filter(|_| keyword.len() == 1) {
+                    self.coefficients[power] = command.number(place)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes half a width of an aperture along x or y, or the place of its middle there; `OBS` before the number makes
+    /// it an obscuration, `EDG` the outer edge, which bounds no light.
+    fn take_aperture(&mut self, keyword: &str, command: &Command, place: usize) -> Result<(), TextError> {
+        let axis = usize::from(keyword.ends_with('Y'));
+        let (aperture, place) = match command.words.get(place).map(|word| word.to_uppercase()).as_deref() {
+            Some("EDG") => return Ok(()),
+            Some("HOL") => return Err(command.wrong("holes are not supported")),
+            Some("OBS") => (&mut self.obscuration, place + 1),
+            _ => (&mut self.opening, place),
         };
+        let number = command.number(place)?;
+        match &keyword[..2] {
+            "RE" => aperture.rectangle[axis] = Some(number),
+            "EL" => aperture.ellipse[axis] = Some(number),
+            _ => aperture.center[axis] = number,
+        }
+        Ok(())
+    }
+
+    /// Returns the tilts and decentres at this surface, whose number and z along the axis are these.
+    ///
+    /// Of the program's angles those about x and y turn by the left-hand rule, that about z by the right-hand rule; each
+    /// is about the axis that those before it have made. `REV` undoes the same numbers behind the surface. So read them
+    /// ray-optics, whose author came from the program (`euler2opt` in `util/misc_math.py`, `DecenterData` in
+    /// `elem/surface.py`), and Geopter; one turn alone is the same in all readers.
+    pub(super) fn moves(&self, surface: usize, mm: f64, z_mm: f64) -> Vec<SystemMove> {
+        let [a, b, c] = self.tilt_deg;
         let is_moved = self.decenter.iter().chain(&self.tilt_deg).any(|&v| v != 0.0);
-        is_moved.then_some(SystemMove { z_mm, step })
+        let decenter_mm = self.decenter.map(|shift| shift * mm);
+        let last = if self.axis == SeqAxis::Returned { surface } else { usize::MAX };
+        let there =
+            Move { surfaces: (surface, last), pivot_mm: 0.0, decenter_mm, tilt_deg: [-a, -b, c], tilt_first: false };
+        let own = match self.axis {
+            SeqAxis::Bent | SeqAxis::Returned => there,
+            SeqAxis::Reversed => Move {
+                surfaces: (surface + 1, last),
+                decenter_mm: decenter_mm.map(|shift| -shift),
+                tilt_deg: [a, b, -c],
+                tilt_first: true,
+                ..there
+            },
+        };
+        let turn = Move { surfaces: (surface, surface), decenter_mm: [0.0; 3], tilt_deg: [0.0, 0.0, 90.0], ..there };
+        let turn = self.is_turned().then_some(SystemMove { z_mm, step: turn });
+        let own = is_moved.then_some(SystemMove { z_mm, step: own });
+        own.into_iter().chain(turn).collect()
+    }
+
+    /// Whether the surface is one whose curve is along x: a toroid about an axis parallel to y that is turned by a right
+    /// angle about z. Its y is then the file's −x, its x the file's y.
+    fn is_turned(&self) -> bool {
+        let is_plain = self.conic == 0.0 && self.coefficients.iter().all(|&a| a == 0.0);
+        match self.kind {
+            // A cylinder of circles about an axis along y is one without a turn.
+            SeqKind::ToroidX => self.curvature != 0.0 || !is_plain,
+            SeqKind::Cylinder => self.curvature_x != 0.0 && !is_plain,
+            _ => false,
+        }
+    }
+
+    fn shape(&self, mm: f64) -> Result<Shape, TextError> {
+        let mut from_r2 = vec![0.0];
+        from_r2.extend(self.coefficients.iter().zip(1..).map(|(a, i)| a * mm.powi(-1 - 2 * i)));
+        let curvature_x = if self.is_turned() { self.curvature } else { self.curvature_x };
+        let (conic, curvature_x_per_mm) = (self.conic, curvature_x / mm);
+        let wrong = |reason: &str| TextError { line: Some(self.line), reason: reason.to_owned() };
+        match self.kind {
+            SeqKind::Rotational => Ok(even_asphere(conic, &from_r2)),
+            SeqKind::Cylinder if self.curvature != 0.0 && self.curvature_x != 0.0 => {
+                Err(wrong("CYL: a cylinder is curved along x and along y; expected one of them"))
+            }
+            SeqKind::Toroid | SeqKind::ToroidX | SeqKind::Cylinder => {
+                Ok(Shape::Toroid { curvature_x_per_mm, conic, coefficients: up_to_last(from_r2) })
+            }
+            SeqKind::Biconic if self.coefficients.iter().all(|&a| a == 0.0) => {
+                Ok(Shape::Biconic { conic, curvature_x_per_mm, conic_x: self.conic_x })
+            }
+            SeqKind::Biconic => Err(wrong("AAS: higher terms of an anamorphic asphere are not supported")),
+        }
     }
 
     pub(super) fn in_mm(&self, mm: f64) -> Result<SystemSurface, TextError> {
-        let mut from_r2 = vec![0.0];
-        from_r2.extend(self.coefficients.iter().zip(1..).map(|(a, i)| a * mm.powi(-1 - 2 * i)));
-        let curvature_x_per_mm = self.curvature_x / mm;
-        let conic = self.conic;
-        let shape = match self.kind {
-            SeqKind::Rotational => even_asphere(conic, &from_r2),
-            SeqKind::Toroid => Shape::Toroid { curvature_x_per_mm, conic, coefficients: up_to_last(from_r2) },
-            SeqKind::Biconic if self.coefficients.iter().all(|&a| a == 0.0) => {
-                Shape::Biconic { conic, curvature_x_per_mm, conic_x: self.conic_x }
-            }
-            SeqKind::Biconic => {
-                let reason = "AAS: higher terms of an anamorphic asphere are not supported".to_owned();
-                return Err(TextError { line: Some(self.line), reason });
-            }
-        };
+        let curvature = if self.is_turned() { self.curvature_x } else { self.curvature };
         let surface = SystemSurface {
             line: self.line,
-            curvature_per_mm: self.curvature / mm,
-            shape,
+            curvature_per_mm: curvature / mm,
+            shape: self.shape(mm)?,
             medium_after: self.medium.clone().unwrap_or_default(),
             thickness_after_mm: self.thickness * mm,
             semi_aperture_mm: self.clear_radius.map(|radius| radius * mm),
@@ -122,6 +267,7 @@ impl SeqSurface {
             opening.radius = self.clear_radius;
         }
         for (stated, is_obscuration) in [(opening, false), (self.obscuration, true)] {
+            let stated = if self.is_turned() { stated.turned() } else { stated };
             let center_mm = stated.center.map(|place| place * mm);
             for outline in stated.outlines(mm) {
                 surface = surface.with_aperture(Aperture { surface: 0, outline, center_mm, is_obscuration });
