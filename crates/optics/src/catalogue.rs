@@ -35,9 +35,11 @@ pub struct GlassCatalogue {
 }
 
 const BUILT_IN: &str = include_str!("../data/glass/catalogue.csv");
+const CRYSTALS: &str = include_str!("../data/glass/crystals.csv");
 
-/// Plastics of phone lenses, of which data sheets state but the index at the d line and the Abbe number: those of
-/// Osaka Gas Chemicals (OKP4, OKP4HT) and TOPAS (a cyclo-olefin copolymer, grade 5013).
+/// Plastics of phone lenses by the index at the d line and the Abbe number: OKP4 and OKP4HT of the maker's table of their
+/// properties (Osaka Gas Chemicals), and a cyclo-olefin copolymer, whose maker's Zemax catalogue states 1.5332 and 56.15
+/// (TOPAS 5013LS-01), its sheets 1.533 and 56.
 const PLASTICS: [(&str, f64, f64); 3] = [("OKP4", 1.607, 27.0), ("OKP4HT", 1.632, 23.0), ("COC", 1.533, 56.0)];
 
 /// Corning 7980, the fused silica of many catalogue lenses: Sellmeier coefficients of the maker's data sheet, `b` and
@@ -61,21 +63,25 @@ const ALIASES: &[(&str, &str)] = &[
     ("MGF2", "MGF2O"),
     ("SAPPHIRE", "SAPPHIREO"),
     ("AL2O3", "SAPPHIREO"),
+    ("GE", "GERMANIUM"),
+    ("SI", "SILICON"),
+    ("CALCITE", "CALCITEO"),
+    ("QUARTZ", "QUARTZO"),
     // Schott's glass of this name, with lead and arsenic, had the coefficients that its successor's data sheet states.
     ("BK7", "NBK7"),
     ("HPFS7980", "C7980"),
 ];
 
 impl GlassCatalogue {
-    /// The built-in glasses: those of six makers and LZOS, a few plastics, crystals and fluids, and the media of the eye
-    /// (`EYE:CORNEA`, `EYE:AQUEOUS`, `EYE:LENS`, `EYE:VITREOUS`).
+    /// The built-in glasses: those of six makers and LZOS, a few plastics, crystals and fluids, infrared glasses, and the
+    /// media of the eye (`EYE:CORNEA`, `EYE:AQUEOUS`, `EYE:LENS`, `EYE:VITREOUS`).
     ///
     /// The numbers are the refractiveindex.info database's (public domain, CC0 1.0), but for three plastics and
     /// for the eye, whose tables are iset3d's (MIT licence). Indices are relative to air, but
     /// for the fluids, whose source gives them relative to vacuum.
     pub fn built_in() -> &'static Self {
         static CATALOGUE: LazyLock<GlassCatalogue> = LazyLock::new(|| {
-            let rows = BUILT_IN.lines().filter(|line| !line.starts_with('#'));
+            let rows = BUILT_IN.lines().chain(CRYSTALS.lines()).filter(|line| !line.starts_with('#'));
             let of_database = rows.map(|row| glass_of_row(row).expect("a test reads every row"));
             let plastics = PLASTICS.map(|(name, nd, vd)| CatalogueGlass {
                 maker: "MISC".to_owned(),
@@ -248,15 +254,55 @@ mod tests {
     #[test]
     fn every_row_is_read_and_makes_sense() {
         let catalogue = GlassCatalogue::built_in();
-        assert_eq!(catalogue.glasses().len(), 1694 + PLASTICS.len() + 1 + 4);
+        assert_eq!(catalogue.glasses().len(), 1694 + 30 + PLASTICS.len() + 1 + 4);
+        let mut n_infrared = 0;
         for glass in catalogue.glasses() {
             glass.glass.check().unwrap();
-            let (nd, vd) = glass.glass.nd_vd().unwrap_or_else(|| panic!("{}", glass.full_name()));
-            assert!((1.0..2.5).contains(&nd) && (10.0..120.0).contains(&vd), "{} {nd} {vd}", glass.full_name());
             assert_eq!(catalogue.find(&glass.full_name()).unwrap(), glass);
+            let (first_nm, last_nm) = glass.glass.range_nm().unwrap_or((400.0, 700.0));
+            match glass.glass.nd_vd() {
+                Some((nd, vd)) => {
+                    assert!((1.0..2.7).contains(&nd) && (8.0..120.0).contains(&vd), "{} {nd} {vd}", glass.full_name());
+                }
+                None => {
+                    assert!(last_nm > 10_000.0, "{}", glass.full_name());
+                    n_infrared += 1;
+                }
+            }
+            for nm in [first_nm, 0.5 * (first_nm + last_nm), last_nm] {
+                let index = glass.glass.index_at(nm).unwrap();
+                assert!((1.0..4.2).contains(&index), "{} {nm} {index}", glass.full_name());
+            }
         }
-        let makers = ["CDGM", "CORNING", "EYE", "HIKARI", "HOYA", "LZOS", "MISC", "OHARA", "SCHOTT", "SUMITA"];
+        assert_eq!(n_infrared, 15);
+        let makers =
+            ["AMI", "CDGM", "CORNING", "EYE", "HIKARI", "HOYA", "LZOS", "MISC", "OHARA", "SCHOTT", "SUMITA", "VITRON"];
         assert_eq!(catalogue.makers(), makers);
+    }
+
+    /// Numbers of other papers and handbooks than those whose formulas are embedded; the samples differ by about as much.
+    #[test]
+    fn infrared_materials_have_the_indices_of_other_measurements() {
+        let check = |name: &str, um: f64, expected: f64, tolerance: f64| {
+            let found = GlassCatalogue::built_in().find(name).unwrap().glass.index_at(1e3 * um).unwrap();
+            assert!((found - expected).abs() <= tolerance, "{name} at {um} um: {found}, expected {expected}");
+        };
+        // H. H. Li's critical tables of germanium and silicon (1980).
+        check("germanium", 4.0, 4.0242, 2e-3);
+        check("Ge", 10.0, 4.0025, 2e-3);
+        check("SILICON", 2.0, 3.4510, 3e-3);
+        check("Si", 10.0, 3.4150, 3e-3);
+        // Sellmeier coefficients of the Handbook of Optics: b, then c in square micrometres.
+        let handbook = |b: [f64; 3], c: [f64; 3], um: f64| {
+            let w2 = um * um;
+            b.iter().zip(c).fold(1.0, |n2, (b, c)| n2 + b * w2 / (w2 - c)).sqrt()
+        };
+        let silver = |um| handbook([2.062508, 0.9461465, 4.300785], [1.07963322e-2, 5.94721379e-2, 5020.74704], um);
+        let caesium = |um| handbook([0.9533786, 0.8303809, 2.847172], [8.20189243e-3, 2.79396908e-2, 14164.6892], um);
+        for um in [1.0, 4.0, 10.0] {
+            check("AgCl", um, silver(um), 2e-4);
+            check("CsBr", um, caesium(um), 6e-4);
+        }
     }
 
     #[test]

@@ -241,12 +241,12 @@ impl Zmx {
     }
 }
 
-/// Returns the makers whose glasses a file's catalogues hold. Zemax keeps crystals in catalogues of their own, which
-/// are of no one maker.
+/// Returns the makers whose glasses a file's catalogues hold. Zemax keeps crystals and infrared glasses in catalogues of
+/// their own, which are of no one maker.
 fn makers(catalogues: &[&str]) -> Vec<String> {
     let are_crystals = |name: &&str| ["INFRARED", "BIREFRINGENT"].contains(&name.to_uppercase().as_str());
-    let crystals = catalogues.iter().any(are_crystals).then_some("MISC");
-    catalogues.iter().copied().chain(crystals).map(str::to_owned).collect()
+    let crystals: &[&str] = if catalogues.iter().any(are_crystals) { &["MISC", "AMI", "VITRON"] } else { &[] };
+    catalogues.iter().chain(crystals).map(|&name| name.to_owned()).collect()
 }
 
 /// Returns the wavelength in nm whose micrometres a file states: the nearest number of ten digits, so that 0.486 is 486.
