@@ -36,7 +36,8 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
 
 impl Glass {
     /// Returns the extinction coefficient k at a wavelength, where it is known: for 1,625 of the named glasses, from
-    /// about 360 to 1060 nm, with straight lines between the points of the measurement. Air has none.
+    /// about 360 to 1060 nm, and for those whose file states it, with straight lines between the points of the
+    /// measurement. Air has none.
     ///
     /// The numbers are the makers' measurements of internal transmission, as refractiveindex.info has them; below about
     /// 1e-8 they scatter by a fifth.
@@ -47,8 +48,10 @@ impl Glass {
                 let glass = GlassCatalogue::built_in().find(name).ok()?;
                 let (grid, values) = TABLE.rows.get(&glass.full_name())?;
                 let grid_nm = &TABLE.grids_nm[*grid];
-                let is_known = (*grid_nm.first()?..=*grid_nm.last()?).contains(&wavelength_nm);
-                is_known.then(|| 1e-9 * interpolate(grid_nm, values, wavelength_nm))
+                within(grid_nm, wavelength_nm).then(|| 1e-9 * interpolate(grid_nm, values, wavelength_nm))
+            }
+            Self::Absorbing { wavelengths_nm, extinctions, .. } => {
+                within(wavelengths_nm, wavelength_nm).then(|| interpolate(wavelengths_nm, extinctions, wavelength_nm))
             }
             _ => None,
         }
@@ -59,6 +62,32 @@ impl Glass {
     pub fn internal_transmittance(&self, wavelength_nm: f64, path_mm: f64) -> Option<f64> {
         self.extinction_at(wavelength_nm).map(|k| (-absorption_per_mm(k, wavelength_nm) * path_mm).exp())
     }
+}
+
+impl Glass {
+    /// Returns the glass with extinction coefficients k at wavelengths (nm), in any order; the glass itself where there
+    /// are none. Of several at one wavelength the first stands.
+    pub(crate) fn with_extinction(self, mut rows: Vec<(f64, f64)>) -> Self {
+        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        rows.dedup_by_key(|row| row.0);
+        if rows.is_empty() {
+            return self;
+        }
+        let (wavelengths_nm, extinctions) = rows.into_iter().unzip();
+        Self::Absorbing { law: Box::new(self), wavelengths_nm, extinctions }
+    }
+}
+
+/// Returns the extinction coefficient of a medium that lets this share of light of a (vacuum) wavelength through, k of
+/// Beer and Lambert's law `exp(−4π k d / λ)`.
+pub(crate) fn extinction_of_share(share: f64, wavelength_nm: f64, path_mm: f64) -> f64 {
+    // A share of one is a k of 0, not of −0.
+    (1e-6 * wavelength_nm / (4.0 * std::f64::consts::PI) * -share.ln() / path_mm).max(0.0)
+}
+
+/// Whether a wavelength is within an ascending table.
+fn within(grid_nm: &[f64], wavelength_nm: f64) -> bool {
+    matches!((grid_nm.first(), grid_nm.last()), (Some(first), Some(last)) if (*first..=*last).contains(&wavelength_nm))
 }
 
 /// Returns what a medium of this extinction coefficient swallows on its way, 1/mm.

@@ -1,8 +1,12 @@
 //! Media and their refractive index as a function of wavelength.
 
+mod formula;
+
 use serde::{Deserialize, Serialize};
 
 use crate::{Air, GlassCatalogue, OpticsError};
+
+use self::formula::formula_index;
 
 /// The helium d line, at which catalogues state the main index, nm.
 pub const D_LINE_NM: f64 = 587.5618;
@@ -82,6 +86,15 @@ pub enum Glass {
         /// The index at each.
         indices: Vec<f64>,
     },
+    /// A medium whose extinction coefficient is known too, by a table with straight lines between its points.
+    Absorbing {
+        /// The law of the index: any of the others.
+        law: Box<Self>,
+        /// Ascending wavelengths of the table, nm.
+        wavelengths_nm: Vec<f64>,
+        /// The extinction coefficient k at each.
+        extinctions: Vec<f64>,
+    },
 }
 
 impl Glass {
@@ -137,6 +150,7 @@ impl Glass {
     pub fn range_nm(&self) -> Option<(f64, f64)> {
         match self {
             Self::Named(name) => named(name)?.range_nm(),
+            Self::Absorbing { law, .. } => law.range_nm(),
             Self::Sellmeier { range_nm, .. } | Self::Formula { range_nm, .. } => *range_nm,
             Self::Tabulated { wavelengths_nm, .. } => Some((*wavelengths_nm.first()?, *wavelengths_nm.last()?)),
             _ => None,
@@ -167,6 +181,7 @@ impl Glass {
             Self::Sellmeier { b, .. } => format!("a Sellmeier glass of {} terms", b.len()),
             Self::Formula { formula, .. } => format!("a glass of formula {formula}"),
             Self::Tabulated { wavelengths_nm, .. } => format!("a glass tabulated at {} points", wavelengths_nm.len()),
+            Self::Absorbing { law, .. } => law.describe(),
         }
     }
 
@@ -223,15 +238,19 @@ impl Glass {
             Self::Tabulated { wavelengths_nm, indices } => {
                 same_length("number of points", indices.len(), wavelengths_nm.len())?;
                 indices.iter().try_for_each(|&v| positive("index", v))?;
-                let mut previous = 0.0;
-                for &found in wavelengths_nm {
-                    if !(found > previous && found.is_finite()) {
-                        let expected = "ascending positive wavelengths";
-                        return Err(OpticsError::Glass { key: "wavelengths_nm", found, expected });
-                    }
-                    previous = found;
+                check_ascending(wavelengths_nm)
+            }
+            Self::Absorbing { law, wavelengths_nm, extinctions } => {
+                let fault = |key, found, expected| Err(OpticsError::Glass { key, found, expected });
+                if matches!(**law, Self::Absorbing { .. }) {
+                    return fault("number of tables of extinction", 2.0, "one");
                 }
-                Ok(())
+                law.check()?;
+                same_length("number of points", extinctions.len(), wavelengths_nm.len())?;
+                if let Some(&found) = extinctions.iter().find(|k| !(k.is_finite() && **k >= 0.0)) {
+                    return fault("extinction", found, "a finite number of at least 0");
+                }
+                check_ascending(wavelengths_nm)
             }
         }
     }
@@ -255,6 +274,7 @@ impl Glass {
             }
             Self::Formula { formula, coefficients, .. } => formula_index(*formula, coefficients, um),
             Self::Tabulated { wavelengths_nm, indices } => interpolate(wavelengths_nm, indices, wavelength_nm),
+            Self::Absorbing { law, .. } => law.index_unchecked(wavelength_nm),
         }
     }
 }
@@ -272,42 +292,22 @@ fn check_range(range_nm: Option<(f64, f64)>) -> Result<(), OpticsError> {
     }
 }
 
+fn check_ascending(wavelengths_nm: &[f64]) -> Result<(), OpticsError> {
+    let mut previous = 0.0;
+    for &found in wavelengths_nm {
+        if !(found > previous && found.is_finite()) {
+            let expected = "ascending positive wavelengths";
+            return Err(OpticsError::Glass { key: "wavelengths_nm", found, expected });
+        }
+        previous = found;
+    }
+    Ok(())
+}
+
 fn cauchy_coefficients(nd: f64, vd: f64) -> (f64, f64) {
     let inverse_square = |nm: f64| 1.0 / (1e-6 * nm * nm);
     let b_um2 = (nd - 1.0) / vd / (inverse_square(F_LINE_NM) - inverse_square(C_LINE_NM));
     (nd - b_um2 * inverse_square(D_LINE_NM), b_um2)
-}
-
-/// Returns the index by a formula of refractiveindex.info; NaN where it has none.
-fn formula_index(formula: u8, coefficients: &[f64], um: f64) -> f64 {
-    let c = |i: usize| coefficients.get(i).copied().unwrap_or(0.0);
-    let pairs = || (1..coefficients.len()).step_by(2).map(|i| (c(i), c(i + 1)));
-    let w2 = um * um;
-    match formula {
-        1 => pairs().fold(1.0 + c(0), |n2, (b, r)| n2 + b * w2 / (w2 - r * r)).sqrt(),
-        2 => pairs().fold(1.0 + c(0), |n2, (b, r)| n2 + b * w2 / (w2 - r)).sqrt(),
-        3 => pairs().fold(c(0), |n2, (b, power)| n2 + b * um.powf(power)).sqrt(),
-        4 => {
-            let resonance = |i: usize| match c(i) {
-                0.0 => 0.0,
-                b => b * um.powf(c(i + 1)) / (w2 - c(i + 2).powf(c(i + 3))),
-            };
-            let tail = (9..coefficients.len()).step_by(2).map(|i| c(i) * um.powf(c(i + 1)));
-            (c(0) + resonance(1) + resonance(5) + tail.sum::<f64>()).sqrt()
-        }
-        5 => pairs().fold(c(0), |n, (b, power)| n + b * um.powf(power)),
-        6 => pairs().fold(1.0 + c(0), |n, (b, r)| n + b / (r - 1.0 / w2)),
-        7 => {
-            let l = 1.0 / (w2 - 0.028);
-            c(0) + c(1) * l + c(2) * l * l + c(3) * w2 + c(4) * w2 * w2 + c(5) * w2 * w2 * w2
-        }
-        8 => {
-            let k = c(0) + c(1) * w2 / (w2 - c(2)) + c(3) * w2;
-            ((1.0 + 2.0 * k) / (1.0 - k)).sqrt()
-        }
-        9 => (c(0) + c(1) / (w2 - c(2)) + c(3) * (um - c(4)) / ((um - c(4)).powi(2) + c(5))).sqrt(),
-        _ => f64::NAN,
-    }
 }
 
 pub(crate) fn interpolate(at: &[f64], values: &[f64], x: f64) -> f64 {

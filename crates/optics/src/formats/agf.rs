@@ -1,16 +1,28 @@
-//! Zemax glass catalogues (`.agf`): of each glass the name and formula (`NM`), coefficients (`CD`) and range (`LD`).
+//! Zemax glass catalogues (`.agf`): of each glass the name and formula (`NM`), coefficients (`CD`), range (`LD`) and
+//! internal transmission (`IT`).
 
-use crate::{CatalogueGlass, Glass, prescription::TextError};
+use crate::{CatalogueGlass, Glass, extinction::extinction_of_share, prescription::TextError};
 
 use super::zmx::nm_of_um;
 
 /// A glass whose lines are being read.
+#[derive(Default)]
 struct Entry {
     line: usize,
     name: String,
     formula: usize,
     coefficients: Vec<f64>,
     range_nm: Option<(f64, f64)>,
+    /// Wavelengths, the shares of light let through there, and through what thickness.
+    transmissions: Vec<Transmission>,
+}
+
+/// A line `IT` of a glass.
+#[derive(Clone, Copy)]
+struct Transmission {
+    wavelength_nm: f64,
+    share: f64,
+    path_mm: f64,
 }
 
 /// Reads the glasses of a catalogue.
@@ -31,7 +43,7 @@ pub(super) fn glasses_from_agf(text: &str, maker: &str) -> Result<Vec<CatalogueG
                 // Some catalogues write the whole number as 2.0.
                 let formula = number(formula, line, keyword)?;
                 let (name, formula) = (name.to_owned(), formula as usize);
-                entry = Some(Entry { line, name, formula, coefficients: Vec::new(), range_nm: None });
+                entry = Some(Entry { line, name, formula, ..Default::default() });
             }
             ("CD", Some(entry)) => entry.coefficients = numbers()?,
             ("LD", Some(entry)) => {
@@ -39,6 +51,11 @@ pub(super) fn glasses_from_agf(text: &str, maker: &str) -> Result<Vec<CatalogueG
                     return Err(wrong(line, keyword, "expected the shortest and longest wavelength"));
                 };
                 entry.range_nm = Some((nm_of_um(first_um), nm_of_um(last_um)));
+            }
+            ("IT", Some(entry)) => {
+                if let &[um, share, path_mm, ..] = numbers()?.as_slice() {
+                    entry.transmissions.push(Transmission { wavelength_nm: nm_of_um(um), share, path_mm });
+                }
             }
             ("CD" | "LD", None) => return Err(wrong(line, keyword, "no glass (NM) before it")),
             _ => {}
@@ -72,10 +89,33 @@ impl Entry {
         let Some((formula, coefficients)) = as_database_formula(self.formula, &self.coefficients) else {
             return Err(wrong(format!("formula {} is not known; expected 1 to 13", self.formula)));
         };
-        let glass = Glass::Formula { formula, coefficients, range_nm: self.range_nm };
+        let law = Glass::Formula { formula, coefficients, range_nm: self.range_nm };
+        let glass = law.with_extinction(extinctions(&self.transmissions));
         glass.check().map_err(|error| wrong(error.to_string()))?;
         Ok(CatalogueGlass { maker: maker.to_owned(), name: self.name.clone(), glass })
     }
+}
+
+/// Returns the extinction coefficients at the wavelengths where a glass's lines state them.
+///
+/// Of several thicknesses at one wavelength the largest that lets light through tells most. Where nothing gets through, k
+/// is not known: it is given for the longest row of wavelengths without such. A share of 1 everywhere is what the program
+/// writes where it knows nothing, and says nothing here; nor does a share beyond 0 to 1.
+fn extinctions(transmissions: &[Transmission]) -> Vec<(f64, f64)> {
+    let makes_sense = |t: &&Transmission| (0.0..=1.0).contains(&t.share) && t.path_mm > 0.0 && t.wavelength_nm > 0.0;
+    let mut rows: Vec<Transmission> = transmissions.iter().filter(makes_sense).copied().collect();
+    rows.sort_by(|a, b| a.wavelength_nm.total_cmp(&b.wavelength_nm).then(b.path_mm.total_cmp(&a.path_mm)));
+    let at_one_wavelength = rows.chunk_by(|a, b| a.wavelength_nm == b.wavelength_nm);
+    let telling: Vec<Transmission> =
+        at_one_wavelength.map(|rows| *rows.iter().find(|row| row.share > 0.0).unwrap_or(&rows[0])).collect();
+    let runs = telling.split(|row| row.share == 0.0);
+    let longest = runs.max_by_key(|run| run.len()).unwrap_or_default();
+    if longest.iter().all(|row| row.share == 1.0) {
+        return Vec::new();
+    }
+    let extinction =
+        |row: &Transmission| (row.wavelength_nm, extinction_of_share(row.share, row.wavelength_nm, row.path_mm));
+    longest.iter().map(extinction).collect()
 }
 
 /// Returns one of Zemax's formulas as the formula of refractiveindex.info that says the same, λ in µm in both.
@@ -127,12 +167,20 @@ pub(super) fn agf_lines(name: &str, glass: &Glass) -> Option<String> {
     let (nd, vd) = glass.nd_vd().unwrap_or((0.0, 0.0));
     let (first_nm, last_nm) = glass.range_nm().unwrap_or((100.0, 20_000.0));
     let numbers: Vec<String> = coefficients.iter().map(|c| format!("{c:e}")).collect();
-    Some(format!(
+    let law = format!(
         "NM {name} {formula} 0 {nd:.6} {vd:.3} 0 0\r\nCD {}\r\nLD {} {}\r\n",
         numbers.join(" "),
         first_nm / 1e3,
         last_nm / 1e3
-    ))
+    );
+    Some(law + &transmission_lines(glass))
+}
+
+/// Returns the lines `IT` of a glass that is no glass of the built-in catalogue: through 10 mm.
+fn transmission_lines(glass: &Glass) -> String {
+    let Glass::Absorbing { wavelengths_nm, .. } = glass else { return String::new() };
+    let line = |&nm: &f64| Some(format!("IT {} {:e} 10\r\n", nm / 1e3, glass.internal_transmittance(nm, 10.0)?));
+    wavelengths_nm.iter().filter_map(line).collect()
 }
 
 /// Returns the formula of Zemax that says the same as a glass's law, with its coefficients.
@@ -175,6 +223,7 @@ fn as_agf_formula(glass: &Glass) -> Option<(u8, Vec<f64>)> {
                 _ => None,
             }
         }
+        Glass::Absorbing { law, .. } => as_agf_formula(law),
         _ => None,
     }
 }
@@ -199,6 +248,34 @@ mod tests {
         assert_eq!(glasses[0].glass.range_nm(), Some((300.0, 2500.0)));
         let expected = (2.25_f64 - 0.01 * 0.25 + 0.02 / 0.25).sqrt();
         assert!((glasses[1].glass.index_at(500.0).unwrap() - expected).abs() < 1e-15);
+    }
+
+    /// Beer and Lambert: what two thicknesses let through is what each does, multiplied.
+    #[test]
+    fn internal_transmission_is_read_with_its_thickness() {
+        let with = |lines: &str| {
+            let text = format!("NM G 1 0\nCD 2.25\nLD 0.3 2.5\n{lines}");
+            glasses_from_agf(&text, "").ok().unwrap().swap_remove(0).glass
+        };
+        let glass = with("IT 0.5 0.9 25\nIT 0.4 0.25 10\nIT 0.4 0.03125 25\nIT 0.35 0 25\nIT 0.7 1 25\n");
+        let share = |nm: f64, mm: f64| glass.internal_transmittance(nm, mm).unwrap();
+        assert!((share(500.0, 25.0) - 0.9).abs() < 1e-15 && (share(500.0, 50.0) - 0.81).abs() < 1e-15);
+        assert!((share(400.0, 5.0) - 0.5).abs() < 1e-15, "the law of 25 mm is that of 10 mm");
+        assert_eq!((share(700.0, 1e6), glass.index_at(400.0).unwrap()), (1.0, 1.5));
+        // k is a straight line between its points, and not known where nothing gets through.
+        let k = |nm: f64| glass.extinction_at(nm).unwrap();
+        assert!((k(450.0) - 0.5 * (k(400.0) + k(500.0))).abs() < 1e-20);
+        assert_eq!((glass.extinction_at(399.0), glass.extinction_at(701.0)), (None, None));
+        // 5e-7 m · ln(1/0.9) / (4π · 0.025 m).
+        assert!((k(500.0) - 1.676_864_69e-7).abs() < 1e-15, "{}", k(500.0));
+        for nothing in ["", "IT 0.4 1 25\nIT 0.5 1 25\n", "IT 0.4 0 25\n", "IT 0.4 1.2 25\nIT 0.5 0.9 0\nIT 0.6 0.5\n"]
+        {
+            assert_eq!(with(nothing), with(""), "{nothing}");
+        }
+        let again = with(&transmission_lines(&glass));
+        for nm in [400.0, 450.0, 555.5] {
+            assert!((again.extinction_at(nm).unwrap() / k(nm) - 1.0).abs() < 1e-12);
+        }
     }
 
     /// Each formula at 0.5 µm, where λ² = 1/4, against its definition worked out by hand.

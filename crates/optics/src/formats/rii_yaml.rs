@@ -1,7 +1,8 @@
 //! Pages of the refractiveindex.info database (`.yml`): the dispersion formula or the table of one material.
 //!
 //! The pages use little of YAML: under `DATA:` a list of blocks, each with a `type` and either `coefficients` and
-//! `wavelength_range` or, after `data: |`, rows of numbers. Of the blocks the first that gives an index is read.
+//! `wavelength_range` or, after `data: |`, rows of numbers. Of the blocks the first that gives an index is read, and the
+//! first that gives an extinction coefficient.
 
 use crate::{CatalogueGlass, Glass, prescription::TextError};
 
@@ -55,7 +56,11 @@ pub(super) fn glass_from_yaml(text: &str, name: &str) -> Result<CatalogueGlass, 
         let reason = "no refractive index in the file; expected DATA with a formula or a table of n".to_owned();
         return Err(TextError { line: None, reason });
     };
-    Ok(CatalogueGlass { maker: String::new(), name: name.to_owned(), glass: block.glass()? })
+    let absorbing = blocks.iter().find(|block| matches!(block.kind.as_str(), "tabulated k" | "tabulated nk"));
+    let extinctions = absorbing.map(Block::extinctions).transpose()?.unwrap_or_default();
+    let glass = block.glass()?.with_extinction(extinctions);
+    glass.check().map_err(|error| TextError { line: Some(block.line), reason: error.to_string() })?;
+    Ok(CatalogueGlass { maker: String::new(), name: name.to_owned(), glass })
 }
 
 fn wrong(line: usize, key: &str, reason: &str) -> TextError {
@@ -98,18 +103,27 @@ impl Block {
                 range_nm: self.range_um.map(|(first, last)| (nm_of_um(first), nm_of_um(last))),
             },
             None => {
-                let n_columns = if self.kind == "tabulated nk" { 3 } else { 2 };
-                if self.rows.iter().any(|row| row.len() != n_columns) {
-                    return Err(wrong(self.line, "data", &format!("expected {n_columns} numbers in each row")));
-                }
-                let mut rows: Vec<(f64, f64)> = self.rows.iter().map(|row| (nm_of_um(row[0]), row[1])).collect();
+                let mut rows = self.column(1)?;
                 rows.sort_by(|a, b| a.0.total_cmp(&b.0));
                 let (wavelengths_nm, indices) = rows.into_iter().unzip();
                 Glass::Tabulated { wavelengths_nm, indices }
             }
         };
-        glass.check().map_err(|error| TextError { line: Some(self.line), reason: error.to_string() })?;
         Ok(glass)
+    }
+
+    /// Returns the extinction coefficients of the table, each with its wavelength in nm.
+    fn extinctions(&self) -> Result<Vec<(f64, f64)>, TextError> {
+        self.column(if self.kind == "tabulated nk" { 2 } else { 1 })
+    }
+
+    /// Returns a column of the table, each number with its wavelength in nm.
+    fn column(&self, column: usize) -> Result<Vec<(f64, f64)>, TextError> {
+        let n_columns = if self.kind == "tabulated nk" { 3 } else { 2 };
+        if self.rows.iter().any(|row| row.len() != n_columns) {
+            return Err(wrong(self.line, "data", &format!("expected {n_columns} numbers in each row")));
+        }
+        Ok(self.rows.iter().map(|row| (nm_of_um(row[0]), row[column])).collect())
     }
 }
 
@@ -128,13 +142,19 @@ mod tests {
         let found = glass_from_yaml(FORMULA, "N-BK7").ok().unwrap();
         assert_eq!((found.full_name().as_str(), found.glass.range_nm()), ("N-BK7", Some((300.0, 2500.0))));
         assert!((found.glass.index_at(587.5618).unwrap() - 1.5168).abs() < 1e-6);
+        assert_eq!(found.glass.extinction_at(400.0), Some(1e-8));
+        let negative = glass_from_yaml(&FORMULA.replace("1e-8", "-1e-8"), "").err().unwrap();
+        assert!(negative.reason.contains("extinction is -0.00000001"), "{}", negative.reason);
     }
 
     #[test]
-    fn table_is_sorted_and_its_absorption_left_out() {
+    fn table_is_sorted_and_read_with_its_absorption() {
         let found = glass_from_yaml(TABLE, "").ok().unwrap().glass;
-        assert_eq!(found, Glass::Tabulated { wavelengths_nm: vec![400.0, 500.0], indices: vec![1.6, 1.5] });
-        assert!(glass_from_yaml(&TABLE.replace("nk", "n").replace(" 0.1", "").replace(" 0.2", ""), "").is_ok());
+        let law = Glass::Tabulated { wavelengths_nm: vec![400.0, 500.0], indices: vec![1.6, 1.5] };
+        assert_eq!((found.extinction_at(400.0), found.extinction_at(500.0)), (Some(0.2), Some(0.1)));
+        assert_eq!(found.index_at(400.0).unwrap(), 1.6);
+        let plain = TABLE.replace("nk", "n").replace(" 0.1", "").replace(" 0.2", "");
+        assert_eq!(glass_from_yaml(&plain, "").ok().unwrap().glass, law);
     }
 
     #[test]
