@@ -77,6 +77,27 @@ fn vignetting_of_a_field_narrows_the_rims_it_needs() {
     assert!(last_rim_mm(&far_field) < 0.97 * last_rim_mm(&whole));
 }
 
+/// Light of a positive field angle rises: behind the stop its upper edge is the outer one. (The pupil is
+/// half as wide along x, so that no other point of its edge is further from the axis.)
+#[test]
+fn upper_edge_of_a_positive_field_is_the_outer_one() {
+    let rim_mm = |keys: &str| {
+        let text = format!(
+            "RDM\nEPD 10\nWL 550\nYAN 20\nVUX 0.5\nVLX 0.5\n{keys}\nSO 0 1E10\nS 0 10\n STO\nS 0 5 1.5\nS 0 50\nSI 0\n"
+        );
+        read(&text).unwrap().lens.interfaces()[1].surface.semi_aperture_mm
+    };
+    let shift_mm = 10.0 * 20_f64.to_radians().tan();
+    for (keys, edge_mm) in [("", 5.0), ("VUY 0.5", 2.5), ("VLY 0.5", 5.0)] {
+        // The rims are wider by 1e-9, against rounding.
+        assert!((rim_mm(keys) - (edge_mm + shift_mm)).abs() < 2e-8, "{keys}: {}", rim_mm(keys));
+    }
+    let zemax = "MODE SEQ\nENPD 10\nFTYP 0 0 1 1\nYFLN 20\nVDYN -0.25\nVCYN 0.25\nVCXN 0.5\nWAVM 1 0.55 1\nPWAV 1\nSURF 0\nDISZ INFINITY\n\
+                 SURF 1\nSTOP\nDISZ 10\nSURF 2\nDISZ 5\nGLAS ___BLANK 1 0 1.5 0\nSURF 3\nDISZ 50\nSURF 4\n";
+    let file = LensFile::from_bytes(Path::new("a.zmx"), zemax.as_bytes(), &ReadOptions::default()).unwrap();
+    assert!((file.lens.interfaces()[1].surface.semi_aperture_mm - (2.5 + shift_mm)).abs() < 2e-8);
+}
+
 #[test]
 fn glass_may_be_a_name_a_code_or_an_index() {
     assert_eq!(medium("SCHOTT:N-BK7"), Glass::Named("SCHOTT:N-BK7".to_owned()));

@@ -46,7 +46,8 @@ pub struct Microlens {
 /// A point of the field, as lens files name them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Field {
-    /// The angle in object space, degrees, at the entrance pupil.
+    /// The angle in object space, degrees, at the entrance pupil: positive where the chief ray's slope is, as light from an
+    /// object at negative coordinates has it. So Zemax's manual says, and so ray-optics reads CODE V's (`obj_coords`).
     Angle {
         /// In the x–z plane.
         x_deg: f64,

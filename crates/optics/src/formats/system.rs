@@ -343,12 +343,12 @@ impl System {
         }
     }
 
-    /// Returns the object point of a field.
+    /// Returns the object point of a field: of an angle one below the axis where the light is to rise.
     fn object_point(&self, mono: &MonoLens, field: Field) -> Result<ObjectPoint, TextError> {
         let first = mono.first_order();
         let distance_mm = self.object_distance_mm;
         let tan = match field {
-            Field::Angle { x_deg, y_deg } => DVec2::new(x_deg.to_radians().tan(), y_deg.to_radians().tan()),
+            Field::Angle { x_deg, y_deg } => -DVec2::new(x_deg.to_radians().tan(), y_deg.to_radians().tan()),
             Field::ObjectHeight { x_mm, y_mm } if distance_mm.is_finite() => {
                 return Ok(ObjectPoint::Finite(DVec3::new(x_mm, y_mm, -distance_mm)));
             }
