@@ -7,7 +7,9 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{BankSettings, Diffraction, Interpolation, Kernel, PsfBank, PsfError};
+use crate::{
+    BankSettings, Diffraction, FieldBank, FieldBankSettings, Interpolation, Kernel, PsfBank, PsfError, PsfQuery,
+};
 
 /// How right a bank is to be, and how large it may become.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -138,6 +140,18 @@ impl PsfBank {
     }
 }
 
+impl FieldBank {
+    /// Returns the error of the bank's interpolation, measured at places within what it covers.
+    ///
+    /// # Errors
+    /// When the places make no sense.
+    pub fn measured_error(&self, places: &ErrorPlaces) -> Result<MeasuredError, PsfError> {
+        places.check()?;
+        let geometric = self.geometric();
+        Ok(Truth::trace(&geometric, places).error_of(&geometric))
+    }
+}
+
 impl Along {
     /// Returns settings with half again as many samples along this axis, or `None` if it has but one.
     fn refined(self, settings: &BankSettings) -> Option<BankSettings> {
@@ -166,44 +180,97 @@ fn resampled(list: &[f64], n: usize) -> Option<Vec<f64>> {
     Some(finer)
 }
 
+/// A bank whose pictures can be compared with traced ones.
+trait Sampled: Sync {
+    /// Returns a place within what it covers, each coordinate from the next number between 0 and 1.
+    fn place(&self, pitch_um: f64, part: &mut dyn FnMut() -> f64) -> PsfQuery;
+
+    /// Returns the picture of a place, traced there; `None` of a dark one.
+    fn traced(&self, place: PsfQuery) -> Option<Kernel>;
+
+    /// Returns the picture of a place as it interpolates it; `None` of one that it takes to be dark.
+    fn interpolated(&self, place: PsfQuery) -> Option<Kernel>;
+}
+
+fn between(list: &[f64], part: f64) -> f64 {
+    list[0] + (list[list.len() - 1] - list[0]) * part
+}
+
+impl Sampled for PsfBank {
+    fn place(&self, pitch_um: f64, part: &mut dyn FnMut() -> f64) -> PsfQuery {
+        PsfQuery {
+            field_tan: DVec2::X * between(&[0.0, self.last_field_tan()], part()),
+            dioptres: between(&self.settings().dioptres, part()),
+            wavelength_nm: between(&self.settings().wavelengths_nm, part()),
+            pitch_um,
+        }
+    }
+
+    fn traced(&self, place: PsfQuery) -> Option<Kernel> {
+        let field = place.field_tan.x;
+        let here = BankSettings {
+            field_tans: if field > 0.0 { vec![0.0, field] } else { vec![0.0] },
+            dioptres: vec![place.dioptres],
+            wavelengths_nm: vec![place.wavelength_nm],
+            interpolation: Interpolation::Rays,
+            ..self.settings().clone()
+        };
+        let there = Self::build(self.lens(), &here).ok().filter(|bank| bank.last_field_tan() == field)?;
+        there.interpolated(place)
+    }
+
+    fn interpolated(&self, place: PsfQuery) -> Option<Kernel> {
+        Some(self.kernel_and_model(place).0)
+    }
+}
+
+impl Sampled for FieldBank {
+    fn place(&self, pitch_um: f64, part: &mut dyn FnMut() -> f64) -> PsfQuery {
+        PsfQuery {
+            field_tan: DVec2::new(between(&self.settings().tans_x, part()), between(&self.settings().tans_y, part())),
+            dioptres: between(&self.settings().dioptres, part()),
+            wavelength_nm: between(&self.settings().wavelengths_nm, part()),
+            pitch_um,
+        }
+    }
+
+    fn traced(&self, place: PsfQuery) -> Option<Kernel> {
+        let here = FieldBankSettings {
+            tans_x: vec![place.field_tan.x],
+            tans_y: vec![place.field_tan.y],
+            dioptres: vec![place.dioptres],
+            wavelengths_nm: vec![place.wavelength_nm],
+            ..self.settings().clone()
+        };
+        Self::build(self.lens(), &here).ok()?.interpolated(place)
+    }
+
+    fn interpolated(&self, place: PsfQuery) -> Option<Kernel> {
+        Some(self.kernel_and_model(place)?.0)
+    }
+}
+
 /// Pictures traced where they are wanted.
 struct Truth {
     pitch_um: f64,
-    /// Field, dioptres, wavelength (nm) and the picture.
-    places: Vec<(f64, f64, f64, Kernel)>,
+    places: Vec<(PsfQuery, Kernel)>,
 }
 
 impl Truth {
     /// Traces pictures at places within what a bank covers; places that turn out to be dark are left out.
-    fn trace(bank: &PsfBank, wanted: &ErrorPlaces) -> Self {
-        let settings = bank.settings();
+    fn trace(bank: &impl Sampled, wanted: &ErrorPlaces) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(wanted.seed);
-        let mut between = |list: &[f64]| list[0] + (list[list.len() - 1] - list[0]) * random.random::<f64>();
-        let fields = [0.0, bank.last_field_tan()];
-        let drawn: Vec<(f64, f64, f64)> = (0..wanted.n_places)
-            .map(|_| (between(&fields), between(&settings.dioptres), between(&settings.wavelengths_nm)))
-            .collect();
-        let traced = |&(field, dioptres, nm): &(f64, f64, f64)| {
-            let here = BankSettings {
-                field_tans: if field > 0.0 { vec![0.0, field] } else { vec![0.0] },
-                dioptres: vec![dioptres],
-                wavelengths_nm: vec![nm],
-                interpolation: Interpolation::Rays,
-                ..settings.clone()
-            };
-            let there = PsfBank::build(bank.lens(), &here).ok().filter(|bank| bank.last_field_tan() == field)?;
-            Some((field, dioptres, nm, there.kernel(DVec2::X * field, dioptres, nm, wanted.pitch_um)))
-        };
+        let mut part = || random.random::<f64>();
+        let drawn: Vec<PsfQuery> = (0..wanted.n_places).map(|_| bank.place(wanted.pitch_um, &mut part)).collect();
+        let traced = |place: &PsfQuery| Some((*place, bank.traced(*place)?));
         Self { pitch_um: wanted.pitch_um, places: drawn.par_iter().filter_map(traced).collect() }
     }
 
-    fn error_of(&self, bank: &PsfBank) -> MeasuredError {
+    fn error_of(&self, bank: &impl Sampled) -> MeasuredError {
         let mut errors: Vec<f64> = self
             .places
             .par_iter()
-            .map(|(field, dioptres, nm, truth)| {
-                bank.kernel(DVec2::X * *field, *dioptres, *nm, self.pitch_um).difference_from(truth)
-            })
+            .filter_map(|(place, truth)| Some(bank.interpolated(*place)?.difference_from(truth)))
             .collect();
         errors.sort_by(f64::total_cmp);
         let quantile = |share: f64| {

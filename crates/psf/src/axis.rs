@@ -35,8 +35,7 @@ impl Axis {
         let n = self.knots.len();
         let at = at.clamp(self.knots[0], self.knots[n - 1]);
         if n <= 2 {
-            let fraction = if n == 2 { (at - self.knots[0]) / (self.knots[1] - self.knots[0]) } else { 0.0 };
-            return Stencil { n, first: 0, weights: [1.0 - fraction, fraction, 0.0, 0.0] };
+            return self.linear(at);
         }
         let above = self.knots.partition_point(|&k| k < at).clamp(1, n - 1);
         let nearest = if at - self.knots[above - 1] < self.knots[above] - at { above - 1 } else { above };
@@ -61,6 +60,39 @@ impl Axis {
             others.map(|j| (at - k[j]) / (k[i] - k[j])).product()
         };
         Stencil { n: 4, first, weights: std::array::from_fn(weight) }
+    }
+
+    /// Returns the weights of the straight line between the knots on both sides of a place, which is moved into the axis.
+    pub(crate) fn linear(&self, at: f64) -> Stencil {
+        let n = self.knots.len();
+        let at = at.clamp(self.knots[0], self.knots[n - 1]);
+        if n == 1 {
+            return Stencil { n: 1, first: 0, weights: [1.0, 0.0, 0.0, 0.0] };
+        }
+        let first = self.knots.partition_point(|&k| k < at).clamp(1, n - 1) - 1;
+        let fraction = (at - self.knots[first]) / (self.knots[first + 1] - self.knots[first]);
+        Stencil { n: 2, first, weights: [1.0 - fraction, fraction, 0.0, 0.0] }
+    }
+
+    /// Returns Lagrange's weights of the value and of its slope at a place, from the up to four knots about it: cubic on
+    /// an axis of four knots or more. Beyond the axis the polynomial goes on.
+    pub(crate) fn value_and_slope(&self, at: f64) -> [Stencil; 2] {
+        let n = self.knots.len().min(4);
+        let first = self.knots.partition_point(|&k| k < at).saturating_sub(n.div_ceil(2)).min(self.knots.len() - n);
+        let k = &self.knots[first..first + n];
+        let (mut value, mut slope) = ([0.0; 4], [0.0; 4]);
+        for i in 0..n {
+            let others = || (0..n).filter(move |j| *j != i);
+            value[i] = others().map(|j| (at - k[j]) / (k[i] - k[j])).product();
+            // The product rule, factor by factor.
+            slope[i] = others()
+                .map(|m| {
+                    let rest = others().filter(|j| *j != m).map(|j| (at - k[j]) / (k[i] - k[j]));
+                    rest.product::<f64>() / (k[i] - k[m])
+                })
+                .sum();
+        }
+        [value, slope].map(|weights| Stencil { n, first, weights })
     }
 }
 
@@ -97,6 +129,21 @@ mod tests {
         assert_eq!(axis.cubic(2.0).iter().collect::<Vec<_>>(), [(3, 1.0)]);
         let few = Axis::new(vec![0.0, 1.0, 2.0]).unwrap();
         assert_eq!(few.cubic(0.3), few.stencil(0.3));
+    }
+
+    #[test]
+    fn cubics_have_their_slopes_and_go_on() {
+        let axis = Axis::new(vec![0.0, 0.5, 1.5, 2.0, 4.0]).unwrap();
+        let f = |x: f64| 3.0 - x + 0.7 * x * x - 0.3 * x.powi(3);
+        for x in [-0.3, 0.0, 0.1, 0.5, 1.7, 4.0, 4.4] {
+            let [value, slope] =
+                axis.value_and_slope(x).map(|stencil| stencil.iter().map(|(i, w)| w * f(axis.knots()[i])).sum::<f64>());
+            assert!((value - f(x)).abs() < 1e-12, "at {x}: {value}");
+            assert!((slope - (-1.0 + 1.4 * x - 0.9 * x * x)).abs() < 1e-12, "at {x}: {slope}");
+        }
+        let two = Axis::new(vec![1.0, 3.0]).unwrap();
+        let [value, slope] = two.value_and_slope(1.5).map(|stencil| stencil.iter().collect::<Vec<_>>());
+        assert_eq!((value, slope), (vec![(0, 0.75), (1, 0.25)], vec![(0, -0.5), (1, 0.5)]));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::{
     dispersion::Dispersion,
     mesh::Mesh,
     pupil::Pupil,
-    ray_map::{Record, Summary, Task},
+    ray_map::{RIM_OVER_RMS, Record, Summary, Task},
 };
 
 /// Azimuths at which the pupil's edge is found for the wave sum.
@@ -224,8 +224,7 @@ impl PsfBank {
                 weight * (a + (b - a) * fraction)
             })
             .sum();
-        // r² = 0.95 R² and the mean square is R²/2.
-        rms * 1.9f64.sqrt()
+        rms * RIM_OVER_RMS
     }
 
     /// Returns how far from the centroid the farthest ray of a point lands, mm.

@@ -13,7 +13,7 @@ use crate::{
     drawing::composed,
     mesh::Mesh,
     pupil::Pupil,
-    ray_map::{Record, Task},
+    ray_map::{Record, Summary, Task},
     render::{self, Bending, Layout},
 };
 
@@ -49,13 +49,13 @@ pub struct FieldBankSettings {
 pub struct FieldBank {
     // Invariant: `samples` are indexed by (wavelength, depth, y, x), x innermost.
     settings: FieldBankSettings,
-    x: Axis,
-    y: Axis,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
     dioptres: Axis,
     /// Wavelengths in reverse, by the measure of the lens's dispersion.
     colors: Axis,
     dispersion: Dispersion,
-    samples: Vec<Option<Sample>>,
+    pub(crate) samples: Vec<Option<Sample>>,
     lens: Lens,
     reference: MonoLens,
     /// Index around the stop at each of the colours.
@@ -64,12 +64,46 @@ pub struct FieldBank {
 
 /// The ray map of a point that is seen.
 #[derive(Clone, Debug)]
-struct Sample {
-    record: Record,
-    centroid_mm: DVec2,
+pub(crate) struct Sample {
+    pub(crate) record: Record,
+    pub(crate) summary: Summary,
 }
 
 impl FieldBankSettings {
+    /// Fields across and up in a bank that covers a rectangle of them: cubics through the centroids of this many leave
+    /// errors of some tenths of a micrometre.
+    const N_FIELDS: usize = 11;
+
+    /// Returns the settings that cover fields from one pair of tangents to another, even in angle, and all else as
+    /// [`BankSettings::covering`] does.
+    pub fn covering(
+        film_mm: f64,
+        (first_tan, last_tan): (DVec2, DVec2),
+        dioptres: (f64, f64),
+        wavelengths_nm: (f64, f64),
+        diffraction: Diffraction,
+    ) -> Self {
+        let turned = BankSettings::covering(film_mm, 0.0, dioptres, wavelengths_nm, diffraction);
+        let tans = |first: f64, last: f64| -> Vec<f64> {
+            let (low, high, n) = (first.atan(), last.atan(), Self::N_FIELDS);
+            let mut tans: Vec<f64> = (0..n).map(|i| (low + (high - low) * i as f64 / (n - 1) as f64).tan()).collect();
+            // The ends to the bit.
+            (tans[0], tans[n - 1]) = (first, last);
+            tans
+        };
+        Self {
+            film_mm,
+            reference_wavelength_nm: turned.reference_wavelength_nm,
+            tans_x: tans(first_tan.x, last_tan.x),
+            tans_y: tans(first_tan.y, last_tan.y),
+            dioptres: turned.dioptres,
+            wavelengths_nm: turned.wavelengths_nm,
+            n_rings: turned.n_rings,
+            n_azimuths: turned.n_azimuths,
+            diffraction,
+        }
+    }
+
     fn check(&self) -> Result<(), PsfError> {
         for (axis, found) in [("tans_x", &self.tans_x), ("tans_y", &self.tans_y)] {
             if Axis::new(found.clone()).is_none() {
@@ -124,7 +158,7 @@ impl FieldBank {
             let pupil = Pupil::find(task.lens, &task.point(), mesh.n_azimuths)?;
             let pupil = pupil.near(task.lens, &task.point())?;
             let traced = task.trace(&pupil, has_stop)?;
-            Some(Sample { record: traced.record(mesh, has_stop), centroid_mm: traced.summary.centroid_mm })
+            Some(Sample { record: traced.record(mesh, has_stop), summary: traced.summary })
         };
         let samples = tasks.par_iter().map(sample).collect();
         let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
@@ -148,10 +182,20 @@ impl FieldBank {
         &self.settings
     }
 
+    /// Returns the bank without diffraction: of rays alone.
+    pub(crate) fn geometric(&self) -> Self {
+        let settings = FieldBankSettings { diffraction: Diffraction::None, ..self.settings.clone() };
+        Self { settings, ..self.clone() }
+    }
+
+    pub(crate) fn lens(&self) -> &Lens {
+        &self.lens
+    }
+
     /// Returns where the centroid of a point lands, mm, picture frame; `None` where samples about it are dark.
     pub fn centroid_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<DVec2> {
         let weighted = self.stencil(field_tan, dioptres, wavelength_nm);
-        weighted.into_iter().map(|(i, weight)| Some(self.samples[i].as_ref()?.centroid_mm * weight)).sum()
+        weighted.into_iter().map(|(i, weight)| Some(self.samples[i].as_ref()?.summary.centroid_mm * weight)).sum()
     }
 
     /// Returns how far from the centroid the farthest ray of a point lands, mm; `None` where samples about it are dark.
@@ -163,27 +207,31 @@ impl FieldBank {
     /// Returns the point spread function of a point about its centroid, with the model that drew it, as
     /// [`PsfBank::kernel_and_model`](crate::PsfBank::kernel_and_model); `None` where samples about it are dark.
     pub fn kernel_and_model(&self, query: PsfQuery) -> Option<(Kernel, ModelUse)> {
-        let (energies, model) = self.draw(query, None)?;
-        Some((render::kernel(&energies, self.settings.diffraction != Diffraction::None, query.pitch_um), model))
+        Some(self.kernel_of(&self.record(query.field_tan, query.dioptres, query.wavelength_nm)?, query))
+    }
+
+    /// Draws the kernel of a point's ray map.
+    pub(crate) fn kernel_of(&self, record: &Record, query: PsfQuery) -> (Kernel, ModelUse) {
+        let (energies, model) = self.draw(record, query, None);
+        (render::kernel(&energies, self.settings.diffraction != Diffraction::None, query.pitch_um), model)
     }
 
     /// Returns the energy on each pixel of a window of `size` × `size` about the centroid, with the model that drew it,
     /// as [`PsfBank::picture`](crate::PsfBank::picture); `None` where samples about it are dark.
     pub fn picture(&self, query: PsfQuery, size: usize) -> Option<(Array2<f64>, ModelUse)> {
-        self.draw(query, Some(size))
+        Some(self.draw(&self.record(query.field_tan, query.dioptres, query.wavelength_nm)?, query, Some(size)))
     }
 
-    fn draw(&self, query: PsfQuery, side: Option<usize>) -> Option<(Array2<f64>, ModelUse)> {
+    fn draw(&self, record: &Record, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
         let PsfQuery { field_tan, dioptres, pitch_um, .. } = query;
         let wavelength_nm = self.within_colors(query.wavelength_nm);
-        let record = self.record(field_tan, dioptres, wavelength_nm)?;
         let bending = self.settings.diffraction.model().map(|model| {
             let colors = self.colors.stencil(self.dispersion.coordinate(wavelength_nm));
             let index = colors.iter().map(|(i, weight)| weight * self.stop_indices[i]).sum();
             Bending { model, edge: Edge::new(self.reference.stop_semi_aperture_mm(), wavelength_nm, index) }
         });
         // Nothing is turned: every field has its own samples.
-        let layout = Layout::new(&record, DVec2::X, bending, pitch_um).with_side(side);
+        let layout = Layout::new(record, DVec2::X, bending, pitch_um).with_side(side);
         let waves = |side: usize| {
             let lens = self.lens.at(wavelength_nm)?;
             let within = |list: &[f64], at: f64| at.clamp(list[0], list[list.len() - 1]);
@@ -193,7 +241,7 @@ impl FieldBank {
             let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::Centroid };
             Ok(wave_psf(&lens, &point, self.settings.film_mm, &window, WaveQuality::default())?.samples)
         };
-        Some(composed(layout, self.settings.diffraction, waves))
+        composed(layout, self.settings.diffraction, waves)
     }
 
     fn record(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<Record> {
@@ -203,21 +251,26 @@ impl FieldBank {
     }
 
     /// Returns the samples that a point draws on, with their weights.
-    fn stencil(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Vec<(usize, f64)> {
-        let [n_x, n_y, n_depths] = [&self.x, &self.y, &self.dioptres].map(|axis| axis.knots().len());
+    pub(crate) fn stencil(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Vec<(usize, f64)> {
+        let (n_x, n_y) = (self.x.knots().len(), self.y.knots().len());
         let (x, y) = (self.x.stencil(field_tan.x), self.y.stencil(field_tan.y));
-        let depths = self.dioptres.stencil(dioptres);
-        let colors = self.colors.stencil(self.dispersion.coordinate(self.within_colors(wavelength_nm)));
         let mut weighted = Vec::with_capacity(81);
-        for (c, wc) in colors.iter() {
-            for (d, wd) in depths.iter() {
-                for (j, wy) in y.iter() {
-                    let row = ((c * n_depths + d) * n_y + j) * n_x;
-                    weighted.extend(x.iter().map(|(i, wx)| (row + i, wc * wd * wy * wx)));
-                }
+        for (plane, weight) in self.planes(dioptres, wavelength_nm) {
+            for (j, wy) in y.iter() {
+                let row = (plane * n_y + j) * n_x;
+                weighted.extend(x.iter().map(|(i, wx)| (row + i, weight * wy * wx)));
             }
         }
         weighted
+    }
+
+    /// Returns the planes of fields, one a wavelength and depth, that these draw on, with their weights.
+    pub(crate) fn planes(&self, dioptres: f64, wavelength_nm: f64) -> Vec<(usize, f64)> {
+        let n_depths = self.dioptres.knots().len();
+        let depths = self.dioptres.stencil(dioptres);
+        let colors = self.colors.stencil(self.dispersion.coordinate(self.within_colors(wavelength_nm)));
+        let planes = |(c, wc): (usize, f64)| depths.iter().map(move |(d, wd)| (c * n_depths + d, wc * wd));
+        colors.iter().flat_map(|color| planes(color).collect::<Vec<_>>()).collect()
     }
 
     fn within_colors(&self, wavelength_nm: f64) -> f64 {

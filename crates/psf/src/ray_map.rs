@@ -87,6 +87,15 @@ impl Record {
         Node { at_mm, in_stop, along_l_mm, along_m_mm }
     }
 
+    /// Returns the rms distance of the energy from the centroid, mm, cells taken at the means of their corners.
+    pub(crate) fn rms_mm(&self) -> f64 {
+        let square = |((ring, j), energy): ((usize, usize), &f32)| {
+            let corners = self.mesh.corners(ring, j).map(|node| self.node(node).at_mm);
+            (corners.into_iter().sum::<DVec2>() / 4.0).length_squared() * f64::from(*energy)
+        };
+        self.mesh.cells().zip(self.energies()).map(square).sum::<f64>().sqrt()
+    }
+
     /// The energies of the cells; their sum is 1.
     pub(crate) fn energies(&self) -> &[f32] {
         &self.numbers[self.numbers.len() - self.mesh.n_cells()..]
@@ -111,6 +120,9 @@ pub(crate) struct Summary {
     /// before it reached the film.
     pub(crate) signed_rms_mm: f64,
 }
+
+/// The radius that holds 95 % of an even disc over its rms radius: r² = 0.95 R², and the mean square is R²/2.
+pub(crate) const RIM_OVER_RMS: f64 = 1.378_404_875_209_022;
 
 /// A point and how to trace it.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,207 @@
+//! A bank over a field of two dimensions, made ready to image scenes: it has an answer for every place of the film.
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use crate::{
+    FieldBank, FieldGeometry, Kernel, ModelUse, PsfError, PsfQuery,
+    field_bank::Sample,
+    field_geometry::{Area, Landed, Landing},
+    ray_map::{RIM_OVER_RMS, Record},
+};
+
+/// A [`FieldBank`] with the way back from the film to the field, for lenses without an axis of symmetry.
+///
+/// Fields that see no light get none; the centroids beyond the last lit fields go on straight, and their kernels, which
+/// nothing needs but blends at the edge of the light, are those of the nearest lit field.
+#[derive(Clone, Debug)]
+pub struct ImagingBank {
+    // Invariant: all lists are indexed as the bank's samples are: by (wavelength, depth, y, x), x innermost, or the first two.
+    bank: FieldBank,
+    /// For each sample the nearest lit one of its depth and wavelength.
+    nearest_lit: Vec<usize>,
+    centroids_mm: Vec<DVec2>,
+    pupils_mm2: Vec<f64>,
+    /// One a wavelength and depth.
+    geometries: Vec<FieldGeometry>,
+}
+
+impl ImagingBank {
+    /// Makes a bank ready.
+    ///
+    /// # Errors
+    /// When it has fewer than two fields across or up, or fewer than two lit ones each way at some depth and wavelength.
+    pub fn new(bank: FieldBank) -> Result<Self, PsfError> {
+        let (n_x, n_y) = (bank.x.knots().len(), bank.y.knots().len());
+        for (axis, n) in [("tans_x", n_x), ("tans_y", n_y)] {
+            if n < 2 {
+                let (found, expected) = (n as f64, "2 fields or more, to tell which is seen where");
+                return Err(PsfError::Setting { key: axis, found, expected });
+            }
+        }
+        let n_plane = n_x * n_y;
+        let (mut nearest_lit, mut centroids_mm, mut pupils_mm2) = (vec![], vec![], vec![]);
+        for (plane, samples) in bank.samples.chunks_exact(n_plane).enumerate() {
+            let lit: Vec<Option<DVec2>> =
+                samples.iter().map(|sample| Some(sample.as_ref()?.summary.centroid_mm)).collect();
+            let Some(whole) = straight_on(lit.clone(), n_x) else {
+                let dioptres = bank.settings().dioptres[plane % bank.settings().dioptres.len()];
+                let nm = &bank.settings().wavelengths_nm;
+                let wavelength_nm = nm[nm.len() - 1 - plane / bank.settings().dioptres.len()];
+                return Err(PsfError::Dark { lens: bank.lens().name().to_owned(), dioptres, wavelength_nm });
+            };
+            centroids_mm.extend(whole);
+            nearest_lit.extend((0..n_plane).map(|at| plane * n_plane + nearest(&lit, at, n_x)));
+            pupils_mm2.extend(samples.iter().map(|s| s.as_ref().map_or(0.0, |s| s.summary.pupil_mm2)));
+        }
+        let mut this = Self { bank, nearest_lit, centroids_mm, pupils_mm2, geometries: vec![] };
+        let area = Area::around(this.centroids_mm.iter().copied()).expect("there are samples");
+        let n_planes = this.centroids_mm.len() / n_plane;
+        this.geometries =
+            (0..n_planes).into_par_iter().map(|plane| this.landing([(plane, 1.0)].into_iter()).inverse(area)).collect();
+        Ok(this)
+    }
+
+    /// The bank of ray maps.
+    pub fn bank(&self) -> &FieldBank {
+        &self.bank
+    }
+
+    /// Whether the fields at the rim of the bank see no light, at any depth and wavelength: then nothing lights the film from
+    /// beyond them.
+    pub fn is_dark_at_rim(&self) -> bool {
+        let (n_x, n_y) = (self.bank.x.knots().len(), self.bank.y.knots().len());
+        let is_rim = |at: usize| {
+            let (row, column) = (at / n_x % n_y, at % n_x);
+            row == 0 || column == 0 || row == n_y - 1 || column == n_x - 1
+        };
+        self.pupils_mm2.iter().enumerate().all(|(at, pupil_mm2)| !is_rim(at) || *pupil_mm2 == 0.0)
+    }
+
+    /// Returns which field is seen where on the film, and how bright, at one depth and wavelength.
+    pub fn geometry(&self, dioptres: f64, wavelength_nm: f64) -> FieldGeometry {
+        let planes = self.bank.planes(dioptres, wavelength_nm);
+        FieldGeometry::mix(planes.iter().map(|&(plane, weight)| (&self.geometries[plane], weight)))
+            .expect("every stencil has a knot")
+    }
+
+    /// Returns where the centroid of a point lands, mm, picture frame.
+    pub fn centroid_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> DVec2 {
+        self.landed(field_tan, dioptres, wavelength_nm).at_mm
+    }
+
+    /// Returns irradiance on the film over radiance of a locally uniform scene, sr, as [`FieldGeometry::at`] does.
+    pub fn irradiance_per_radiance(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        self.landed(field_tan, dioptres, wavelength_nm).irradiance_per_radiance()
+    }
+
+    fn landed(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Landed {
+        self.landing(self.bank.planes(dioptres, wavelength_nm).into_iter()).of(field_tan)
+    }
+
+    /// Returns where the fields land in a weighted sum of depths and wavelengths.
+    fn landing(&self, planes: impl Iterator<Item = (usize, f64)>) -> Landing<'_> {
+        let (x, y) = (&self.bank.x, &self.bank.y);
+        let n = x.knots().len() * y.knots().len();
+        let (mut centroids_mm, mut pupils_mm2) = (vec![DVec2::ZERO; n], vec![0.0; n]);
+        for (plane, weight) in planes {
+            for at in 0..n {
+                centroids_mm[at] += self.centroids_mm[plane * n + at] * weight;
+                pupils_mm2[at] += self.pupils_mm2[plane * n + at] * weight;
+            }
+        }
+        Landing { x, y, centroids_mm, pupils_mm2 }
+    }
+
+    /// Returns the point spread function of a point about its centroid, as
+    /// [`PsfBank::kernel`](crate::PsfBank::kernel) does; of a dark one that of the nearest lit field.
+    pub fn kernel(&self, query: PsfQuery) -> Kernel {
+        self.kernel_and_model(query).0
+    }
+
+    /// Returns [`kernel`](Self::kernel) with the model that drew it.
+    pub fn kernel_and_model(&self, query: PsfQuery) -> (Kernel, ModelUse) {
+        let samples = self.samples(query.field_tan, query.dioptres, query.wavelength_nm);
+        let record = Record::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
+        self.bank.kernel_of(&record.expect("every stencil has a knot"), query)
+    }
+
+    /// Returns the signed radius of the circle of confusion, mm, as
+    /// [`PsfBank::blur_radius_mm`](crate::PsfBank::blur_radius_mm) does.
+    pub fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        let samples = self.samples(field_tan, dioptres, wavelength_nm);
+        RIM_OVER_RMS * samples.map(|(sample, weight)| weight * sample.summary.signed_rms_mm).sum::<f64>()
+    }
+
+    /// Returns the radius of what astigmatism and other aberrations leave of a point even in focus, mm, with its blur: that
+    /// of an even disc of the rms radius of the rays, to 95 % of its energy.
+    pub fn spread_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        let samples = self.samples(field_tan, dioptres, wavelength_nm);
+        let record = Record::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
+        RIM_OVER_RMS * record.map_or(0.0, |record| record.rms_mm())
+    }
+
+    /// Returns the samples that a point draws on, dark ones replaced by the nearest lit.
+    fn samples(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> impl Iterator<Item = (&Sample, f64)> {
+        let weighted = self.bank.stencil(field_tan, dioptres, wavelength_nm);
+        weighted.into_iter().filter_map(|(i, weight)| Some((self.bank.samples[self.nearest_lit[i]].as_ref()?, weight)))
+    }
+}
+
+/// Returns the index of the lit sample nearest to one on a grid of this many columns.
+fn nearest(lit: &[Option<DVec2>], at: usize, n_columns: usize) -> usize {
+    let place = |i: usize| ((i / n_columns) as i64, (i % n_columns) as i64);
+    let (row, column) = place(at);
+    let square = |i: usize| (place(i).0 - row).pow(2) + (place(i).1 - column).pow(2);
+    (0..lit.len()).filter(|&i| lit[i].is_some()).min_by_key(|&i| square(i)).unwrap_or(at)
+}
+
+/// Fills the gaps of a grid of places by going on straight from two neighbours in a line, or returns `None` where there are
+/// no two.
+fn straight_on(mut places: Vec<Option<DVec2>>, n_columns: usize) -> Option<Vec<DVec2>> {
+    let n_rows = places.len() / n_columns;
+    while places.iter().any(Option::is_none) {
+        let at = |row: i64, column: i64| {
+            let is_inside = (0..n_rows as i64).contains(&row) && (0..n_columns as i64).contains(&column);
+            is_inside.then(|| places[row as usize * n_columns + column as usize]).flatten()
+        };
+        let filled: Vec<Option<DVec2>> = (0..places.len())
+            .map(|i| {
+                let (row, column) = ((i / n_columns) as i64, (i % n_columns) as i64);
+                let ways = [(0, 1), (0, -1), (1, 0), (-1, 0)];
+                let found: Vec<DVec2> = ways
+                    .into_iter()
+                    .filter_map(|(down, right)| {
+                        let near = at(row + down, column + right)?;
+                        Some(2.0 * near - at(row + 2 * down, column + 2 * right)?)
+                    })
+                    .collect();
+                places[i].or_else(|| (!found.is_empty()).then(|| found.iter().sum::<DVec2>() / found.len() as f64))
+            })
+            .collect();
+        if filled == places {
+            return None;
+        }
+        places = filled;
+    }
+    places.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_filled_straight_on() {
+        let place = |i: usize| DVec2::new((i % 4) as f64, 10.0 * (i / 4) as f64);
+        let mut places: Vec<Option<DVec2>> = (0..12).map(|i| Some(place(i))).collect();
+        for gap in [3, 7, 11, 2] {
+            places[gap] = None;
+        }
+        let whole = straight_on(places.clone(), 4).unwrap();
+        assert!(whole.iter().enumerate().all(|(i, at)| (*at - place(i)).length() < 1e-12), "{whole:?}");
+        assert_eq!(nearest(&places, 3, 4), 6);
+        assert_eq!(nearest(&places, 11, 4), 10);
+        assert_eq!(straight_on(vec![None, Some(DVec2::ONE), None, None], 2), None);
+    }
+}
