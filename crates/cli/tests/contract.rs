@@ -268,6 +268,32 @@ fn psf_of_a_lens_without_an_axis_of_symmetry() {
 }
 
 #[test]
+fn run_takes_a_picture_through_a_tilted_lens() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = r#"(name: "askew", source: "test", surfaces: [
+        (radius_mm: 50.0, semi_aperture_mm: 6.0, medium: Constant(index: 1.5), thickness_mm: 3.0),
+        (stop: true, radius_mm: -50.0, semi_aperture_mm: 4.0, thickness_mm: 0.0),
+    ], moves: [(surfaces: (0, 1), tilt_deg: (5.0, 0.0, 0.0))])"#;
+    fs::write(folder.path().join("askew.ron"), lens).unwrap();
+    let camera = common::CAMERA
+        .replace("BuiltIn(\"dgauss-50mm\")", "File(\"askew.ron\")")
+        .replace("FNumber(4.0)", "FNumber(8.0)")
+        .replace("Pixels(columns: 48, rows: 32, pitch_um: 200.0)", "Scene");
+    fs::write(folder.path().join("camera.ron"), camera).unwrap();
+    let told = output(folder.path(), &["run", "camera.ron", "--out", "out"]);
+    assert!(told.contains("121 fields"), "{told}");
+    let report: Value =
+        serde_json::from_str(&fs::read_to_string(folder.path().join("out/report.json")).unwrap()).unwrap();
+    assert!(report["psf_bank"]["median_error"].as_f64().unwrap() < 0.05, "{report}");
+    // The scene fills the film to its rim: no corner is dark.
+    let picture = image::open(folder.path().join("out/picture.png")).unwrap().to_rgb8();
+    let (columns, rows) = picture.dimensions();
+    for (x, y) in [(0, 0), (columns - 1, 0), (0, rows - 1), (columns - 1, rows - 1), (columns / 2, rows / 2)] {
+        assert!(picture.get_pixel(x, y).0[1] > 60, "{x} {y}: {:?}", picture.get_pixel(x, y));
+    }
+}
+
+#[test]
 fn a_picture_that_cannot_hold_its_light_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let common = ["psf", "singlet-50mm", "--focus-mm", "2000", "--pixel-um", "4", "--size", "31"];

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 
 use crate::{
-    RadialMap,
+    FilmMap,
     convolve::{DIRECT_BLOCK, Direct, MAX_DIRECT, fast_size, multiply_add, with_fft},
     occlusion::BlurredLayer,
     sampler::{IdealLayer, Rectangle, Sampler, Surface},
@@ -19,7 +19,7 @@ const CELLS_AT_ONCE: usize = 32;
 /// What to blur.
 pub(crate) struct LayerTask<'a> {
     pub(crate) sampler: &'a Sampler,
-    pub(crate) map: &'a RadialMap,
+    pub(crate) map: &'a FilmMap,
     pub(crate) layer: usize,
     pub(crate) surfaces: &'a [Surface<'a>],
     pub(crate) cells: &'a [Cell],

@@ -3,7 +3,7 @@
 use glam::DVec2;
 use ndarray::Array2;
 
-use crate::{Kernels, RadialMap};
+use crate::{FilmMap, Kernels, RadialMap};
 
 /// A lens by formula: uniform discs of blur, one irradiance per radiance everywhere, distortion where asked for.
 ///
@@ -44,6 +44,9 @@ impl Default for DiscLens {
 }
 
 impl Kernels for DiscLens {
+    fn is_symmetric(&self) -> bool {
+        true
+    }
     fn wavelengths_nm(&self) -> (f64, f64) {
         (100.0, 10_000.0)
     }
@@ -53,18 +56,18 @@ impl Kernels for DiscLens {
     fn is_dark_beyond_reach(&self) -> bool {
         true
     }
-    fn radial_map(&self, _dioptres: f64, wavelength_nm: f64, reach_mm: f64) -> RadialMap {
+    fn film_map(&self, _dioptres: f64, wavelength_nm: f64, reach_mm: f64) -> FilmMap {
         let scale_mm = self.focal_mm * (1.0 + self.lateral_per_nm * (wavelength_nm - 550.0));
         let tan_at = |r: f64| Some(r / scale_mm * (1.0 + self.distortion_per_mm2 * r * r));
-        RadialMap::tabulate(reach_mm, tan_at, |_| self.irradiance_per_radiance)
+        RadialMap::tabulate(reach_mm, tan_at, |_| self.irradiance_per_radiance).into()
     }
     fn kernel(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Array2<f32> {
-        let radius_mm = self.blur_radius_mm(field_tan.length(), dioptres, wavelength_nm).abs();
+        let radius_mm = self.blur_radius_mm(field_tan, dioptres, wavelength_nm).abs();
         disc(1e3 * radius_mm / pitch_um)
     }
-    fn blur_radius_mm(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> f64 {
+    fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         let focus_dioptres = self.focus_dioptres + self.axial_per_nm * (wavelength_nm - 550.0);
-        1e-3 * self.radius_um_per_dioptre * (dioptres - focus_dioptres) * (1.0 + self.growth * field_tan)
+        1e-3 * self.radius_um_per_dioptre * (dioptres - focus_dioptres) * (1.0 + self.growth * field_tan.length())
     }
 }
 

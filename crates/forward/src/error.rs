@@ -91,6 +91,14 @@ pub enum ForwardError {
         /// Wavelength, nm.
         wavelength_nm: f64,
     },
+    /// No light reaches the middle of the film.
+    #[error("no light of the scene reaches the middle of the film through {lens} at {wavelength_nm} nm")]
+    DarkFilm {
+        /// Name of the lens.
+        lens: String,
+        /// Wavelength, nm.
+        wavelength_nm: f64,
+    },
     /// The lens could not be traced.
     #[error(transparent)]
     Lens(#[from] dioptric_optics::OpticsError),

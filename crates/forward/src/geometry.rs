@@ -1,6 +1,8 @@
 //! Where the light of a scene lands, and how much of it.
 
+use dioptric_psf::FieldGeometry;
 use dioptric_spectrum::WavelengthGrid;
+use glam::DVec2;
 
 use crate::{Film, ForwardError, Kernels};
 
@@ -61,14 +63,99 @@ impl RadialMap {
     }
 
     /// Returns the field at a place of the film, mm from the axis; beyond the reach, that of the last place in it.
-    pub fn field_tan(&self, x_mm: f64, y_mm: f64) -> (f64, f64) {
-        let radius2_mm2 = x_mm * x_mm + y_mm * y_mm;
-        if let Some((tan_per_mm, _)) = self.at(radius2_mm2) {
-            return (x_mm * tan_per_mm, y_mm * tan_per_mm);
+    pub fn field_tan(&self, place_mm: DVec2) -> DVec2 {
+        if let Some((tan_per_mm, _)) = self.at(place_mm.length_squared()) {
+            return place_mm * tan_per_mm;
         }
         let tan = self.tan_per_mm[self.tan_per_mm.len() - 1] * self.reach_mm;
-        let radius_mm = radius2_mm2.sqrt();
-        (x_mm / radius_mm * tan, y_mm / radius_mm * tan)
+        place_mm / place_mm.length() * tan
+    }
+}
+
+/// From places of the film to the fields seen there, and the irradiance that they get; for one depth and wavelength.
+#[derive(Clone, Debug)]
+pub enum FilmMap {
+    /// Of a lens with an axis of symmetry.
+    Radial(RadialMap),
+    /// Of any other.
+    Plane(FieldGeometry),
+}
+
+impl From<RadialMap> for FilmMap {
+    fn from(map: RadialMap) -> Self {
+        Self::Radial(map)
+    }
+}
+
+impl From<FieldGeometry> for FilmMap {
+    fn from(map: FieldGeometry) -> Self {
+        Self::Plane(map)
+    }
+}
+
+impl FilmMap {
+    /// Returns the field seen at a place of the film (mm from the axis, x right, y up) and the irradiance per radiance (sr);
+    /// `None` where nothing is seen.
+    #[inline]
+    pub fn at(&self, place_mm: DVec2) -> Option<(DVec2, f64)> {
+        match self {
+            Self::Radial(map) => {
+                map.at(place_mm.length_squared()).map(|(tan_per_mm, gain)| (place_mm * tan_per_mm, gain))
+            }
+            Self::Plane(map) => map.at(place_mm),
+        }
+    }
+
+    /// Returns the field at a place of the film; where nothing is seen, that of a place near by.
+    pub fn field_tan(&self, place_mm: DVec2) -> DVec2 {
+        match self {
+            Self::Radial(map) => map.field_tan(place_mm),
+            Self::Plane(map) => map.nearest_field_tan(place_mm),
+        }
+    }
+
+    /// Returns the field per mm of film at the axis, 1/mm: the root of how much field an area of film sees.
+    pub(crate) fn tan_per_mm(&self, over_mm: f64) -> f64 {
+        match self {
+            Self::Radial(map) => map.at(0.0).map_or(0.0, |(tan_per_mm, _)| tan_per_mm),
+            Self::Plane(map) => {
+                let tan = |place_mm: DVec2| map.nearest_field_tan(place_mm);
+                let across = tan(DVec2::X * over_mm) - tan(DVec2::NEG_X * over_mm);
+                let up = tan(DVec2::Y * over_mm) - tan(DVec2::NEG_Y * over_mm);
+                across.perp_dot(up).abs().sqrt() / (2.0 * over_mm)
+            }
+        }
+    }
+
+    /// Returns how far from the axis the corners of the film lie up to which something is seen, mm; `None` where all of it is.
+    fn ends_before(&self, film: &Film) -> Option<f64> {
+        let corner_mm = film.half_diagonal_mm();
+        match self {
+            Self::Radial(map) => (map.reach_mm() < corner_mm).then_some(map.reach_mm()),
+            Self::Plane(map) => {
+                let half_mm = 0.5e-3 * film.pitch_um * DVec2::new(film.columns as f64, film.rows as f64);
+                // Out along lines to the corners and the middles of the sides.
+                let ways = [
+                    (1.0, 1.0),
+                    (-1.0, 1.0),
+                    (1.0, -1.0),
+                    (-1.0, -1.0),
+                    (1.0, 0.0),
+                    (-1.0, 0.0),
+                    (0.0, 1.0),
+                    (0.0, -1.0),
+                ];
+                let reach = |way: DVec2| {
+                    const STEPS: u32 = 64;
+                    let seen = (0..=STEPS)
+                        .map(|i| way * f64::from(i) / f64::from(STEPS))
+                        .take_while(|at| map.at(*at).is_some());
+                    seen.last().filter(|at| *at != way).map(|at| at.length())
+                };
+                let ends = ways.into_iter().filter_map(|(x, y)| reach(DVec2::new(x, y) * half_mm));
+                ends.min_by(f64::total_cmp)
+            }
+        }
     }
 }
 
@@ -90,8 +177,8 @@ impl FilmFrame {
     }
 
     /// Returns the place (x right, y up, mm from the axis) of a row and column, which may lie outside the film.
-    pub(crate) fn place_mm(&self, row: f64, column: f64) -> (f64, f64) {
-        ((column - self.center_column) * self.pitch_mm, (self.center_row - row) * self.pitch_mm)
+    pub(crate) fn place_mm(&self, row: f64, column: f64) -> DVec2 {
+        DVec2::new((column - self.center_column) * self.pitch_mm, (self.center_row - row) * self.pitch_mm)
     }
 
     pub(crate) fn center(&self) -> (f64, f64) {
@@ -129,8 +216,7 @@ pub(crate) fn check_reach(
     let corner_mm = film.half_diagonal_mm();
     for &wavelength_nm in grid.centers_nm() {
         for dioptres in [dioptres.0, dioptres.1] {
-            let reach_mm = kernels.radial_map(dioptres, wavelength_nm, 1.1 * corner_mm).reach_mm();
-            if reach_mm < corner_mm {
+            if let Some(reach_mm) = kernels.film_map(dioptres, wavelength_nm, 1.1 * corner_mm).ends_before(film) {
                 return Err(ForwardError::FilmBeyondField { corner_mm, reach_mm, wavelength_nm });
             }
         }
@@ -147,7 +233,7 @@ mod tests {
         let tan_at = |r: f64| Some(r / 50.0 * (1.0 + 1e-4 * r * r));
         let map = RadialMap::tabulate(20.0, tan_at, |tan| 1.0 / (1.0 + tan * tan).powi(2));
         for r in [0.0_f64, 0.01, 3.3, 12.0, 19.9] {
-            let (tan, _) = map.field_tan(r, 0.0);
+            let tan = map.field_tan(DVec2::new(r, 0.0)).x;
             let expected = tan_at(r).unwrap();
             // A thousandth of a 4 µm pixel at 50 mm.
             assert!((tan - expected).abs() < 1e-7, "{r} mm: {tan} {expected}");
@@ -161,7 +247,7 @@ mod tests {
         let map = RadialMap::tabulate(20.0, |r| (r < 15.0).then_some(r / 50.0), |_| 1.0);
         assert!((map.reach_mm() - 15.0).abs() < 0.02);
         assert!(map.at(16.0 * 16.0).is_none());
-        let (x, y) = map.field_tan(30.0, 40.0);
-        assert!((x - 0.6 * 0.3).abs() < 1e-3 && (y - 0.8 * 0.3).abs() < 1e-3);
+        let tan = map.field_tan(DVec2::new(30.0, 40.0));
+        assert!((tan - 0.3 * DVec2::new(0.6, 0.8)).length() < 1e-3);
     }
 }

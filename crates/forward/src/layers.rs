@@ -1,5 +1,7 @@
 //! Depth layers: even steps of blur radius, with tent weights between them.
 
+use glam::DVec2;
+
 use crate::Kernels;
 
 /// The depths at which the scene is blurred, nearest first.
@@ -19,20 +21,24 @@ pub(crate) struct Layers {
 pub(crate) struct Blurs<'a> {
     pub(crate) kernels: &'a dyn Kernels,
     pub(crate) pitch_mm: f64,
-    /// Field of the film's corner.
-    pub(crate) corner_tan: f64,
+    /// A few fields from end to end of the film.
+    pub(crate) fields: &'a [DVec2],
     pub(crate) wavelengths_nm: &'a [f64],
 }
 
 impl Blurs<'_> {
-    /// Fields from the axis to the corner at a band: tangent and wavelength.
-    fn samples(&self, band: usize) -> impl Iterator<Item = (f64, f64)> {
+    /// The fields at a band: tangents and wavelength.
+    fn samples(&self, band: usize) -> impl Iterator<Item = (DVec2, f64)> {
         let wavelength_nm = self.wavelengths_nm[band];
-        [0.0, 0.5, 1.0].into_iter().map(move |part| (part * self.corner_tan, wavelength_nm))
+        self.fields.iter().map(move |&tan| (tan, wavelength_nm))
     }
 
-    fn blur_px(&self, (tan, wavelength_nm): (f64, f64), dioptres: f64) -> f64 {
+    fn blur_px(&self, (tan, wavelength_nm): (DVec2, f64), dioptres: f64) -> f64 {
         self.kernels.blur_radius_mm(tan, dioptres, wavelength_nm) / self.pitch_mm
+    }
+
+    fn spread_px(&self, (tan, wavelength_nm): (DVec2, f64), dioptres: f64) -> f64 {
+        self.kernels.spread_mm(tan, dioptres, wavelength_nm) / self.pitch_mm
     }
 }
 
@@ -45,15 +51,15 @@ impl Layers {
     /// Lays layers over a range of dioptres (farthest, nearest), at most `step_px` of blur radius apart.
     pub(crate) fn over(range: (f64, f64), step_px: f64, lens: &Blurs<'_>) -> Self {
         let last = lens.wavelengths_nm.len() - 1;
-        let samples: Vec<(f64, f64)> = [0, last / 2, last].into_iter().flat_map(|band| lens.samples(band)).collect();
-        let blur_px = |sample: &(f64, f64), dioptres: f64| lens.blur_px(*sample, dioptres);
+        let samples: Vec<(DVec2, f64)> = [0, last / 2, last].into_iter().flat_map(|band| lens.samples(band)).collect();
+        let blur_px = |sample: &(DVec2, f64), dioptres: f64| lens.blur_px(*sample, dioptres);
         let change_px = samples.iter().map(|s| (blur_px(s, range.1) - blur_px(s, range.0)).abs()).fold(0.0, f64::max);
         let mut dioptres = vec![0.5 * (range.0 + range.1)];
         let mut px_per_dioptre = 0.0;
         if change_px > NEGLIGIBLE_PX {
             px_per_dioptre = change_px / (range.1 - range.0);
             // Blur is linear in dioptres, so the line through the ends crosses 0 at the focus.
-            let focus = |s: &(f64, f64)| {
+            let focus = |s: &(DVec2, f64)| {
                 let (far, near) = (blur_px(s, range.0), blur_px(s, range.1));
                 range.0 + (range.1 - range.0) * far / (far - near)
             };
@@ -74,7 +80,7 @@ impl Layers {
             dioptres[last] = range.0;
         }
         let radius_px =
-            dioptres.iter().map(|&d| samples.iter().map(|s| blur_px(s, d).abs()).fold(0.0, f64::max)).collect();
+            dioptres.iter().map(|&d| samples.iter().map(|s| lens.spread_px(*s, d)).fold(0.0, f64::max)).collect();
         Self { dioptres, radius_px, px_per_dioptre }
     }
 
@@ -157,9 +163,11 @@ mod tests {
     use super::*;
     use crate::DiscLens;
 
+    const FIELDS: [DVec2; 3] = [DVec2::ZERO, DVec2::new(0.05, 0.0), DVec2::new(0.1, 0.0)];
+
     fn layers(range: (f64, f64), step_px: f64) -> Layers {
         let kernels = DiscLens { focus_dioptres: 10.0, ..DiscLens::default() };
-        let lens = Blurs { kernels: &kernels, pitch_mm: 1e-3, corner_tan: 0.1, wavelengths_nm: &[550.0] };
+        let lens = Blurs { kernels: &kernels, pitch_mm: 1e-3, fields: &FIELDS, wavelengths_nm: &[550.0] };
         Layers::over(range, step_px, &lens)
     }
 
@@ -167,7 +175,7 @@ mod tests {
     fn bands_share_psfs_only_while_the_blur_stays() {
         let lens = DiscLens { focus_dioptres: 10.0, axial_per_nm: 0.002, ..DiscLens::default() };
         let wavelengths_nm: Vec<f64> = (0..31).map(|i| 400.0 + 10.0 * f64::from(i)).collect();
-        let lens = Blurs { kernels: &lens, pitch_mm: 1e-3, corner_tan: 0.1, wavelengths_nm: &wavelengths_nm };
+        let lens = Blurs { kernels: &lens, pitch_mm: 1e-3, fields: &FIELDS, wavelengths_nm: &wavelengths_nm };
         let layers = Layers::over((5.0, 12.0), 2.0, &lens);
         // 0.02 pixels a band: 12 bands make 0.24 pixels.
         assert_eq!(layers.chromatic_knots(0.25, &lens), [0, 12, 24, 30]);

@@ -15,6 +15,7 @@ struct Readme;
 mod bank;
 mod blur;
 mod convolve;
+mod coverage;
 mod disc_lens;
 mod error;
 mod film;
@@ -30,10 +31,11 @@ mod tiles;
 #[cfg(test)]
 mod acceptance;
 
-pub use bank::{Coverage, bank_settings_for, irradiance};
+pub use bank::irradiance;
+pub use coverage::{Coverage, bank_settings_for, field_bank_settings_for};
 pub use disc_lens::DiscLens;
 pub use error::{ForwardError, SinkError};
 pub use film::{BlurMode, Film, Settings};
-pub use geometry::RadialMap;
+pub use geometry::{FilmMap, RadialMap};
 pub use kernels::Kernels;
 pub use render::{Behind, Sink, Source, render};

@@ -7,11 +7,12 @@ use std::{
 
 use dioptric_scene::View;
 use dioptric_spectrum::{Bands, DepthMap, Quantity, SpectrumError};
+use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    BlurMode, Film, ForwardError, Kernels, RadialMap, Settings, SinkError,
+    BlurMode, Film, FilmMap, ForwardError, Kernels, Settings, SinkError,
     blur::{LayerTask, blur_layer},
     geometry::{FilmFrame, check_reach},
     hidden::{EdgeRule, Fill, reach_of_edges},
@@ -140,8 +141,8 @@ impl<'a> Plan<'a> {
         let wavelengths_nm = source.radiance.grid().centers_nm().to_vec();
         let middle_nm = wavelengths_nm[wavelengths_nm.len() / 2];
         let corner_mm = film.half_diagonal_mm();
-        let (corner_tan, _) = kernels.radial_map(dioptres.0, middle_nm, corner_mm).field_tan(corner_mm, 0.0);
-        let blurs = Blurs { kernels, pitch_mm: 1e-3 * film.pitch_um, corner_tan, wavelengths_nm: &wavelengths_nm };
+        let fields = blur_fields(kernels, &kernels.film_map(dioptres.0, middle_nm, corner_mm), film);
+        let blurs = Blurs { kernels, pitch_mm: 1e-3 * film.pitch_um, fields: &fields, wavelengths_nm: &wavelengths_nm };
         let layers = Layers::over(dioptres, settings.layer_step_px, &blurs);
         let kernel_bands = layers.chromatic_knots(settings.chromatic_step_px, &blurs);
         let places = source.depth.z_m().mapv(|z| layers.place_of(z));
@@ -149,15 +150,15 @@ impl<'a> Plan<'a> {
         let pad_px = (0..layers.len()).map(|l| layers.radius_px_at(l as f32)).fold(0.0, f64::max) * 2.0 + 8.0;
         let cell_size = settings.knot_spacing_px;
         let reach_mm = corner_mm + 1e-3 * film.pitch_um * std::f64::consts::SQRT_2 * (pad_px + cell_size as f64);
-        let maps_at = |wavelength_nm: f64| -> Vec<RadialMap> {
-            layers.dioptres().iter().map(|&d| kernels.radial_map(d, wavelength_nm, reach_mm)).collect()
+        let maps_at = |wavelength_nm: f64| -> Vec<FilmMap> {
+            layers.dioptres().iter().map(|&d| kernels.film_map(d, wavelength_nm, reach_mm)).collect()
         };
         let maps = maps_at(middle_nm);
         let sampler = Sampler::new(source.view, FilmFrame::new(film), &maps[0]);
         let hidden = hidden_samples(source, &layers, settings, &sampler);
-        let ends: Vec<RadialMap> = [wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1], middle_nm]
+        let ends: Vec<FilmMap> = [wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1], middle_nm]
             .into_iter()
-            .flat_map(|w| [0, layers.len() - 1].map(|l| kernels.radial_map(layers.dioptres()[l], w, reach_mm)))
+            .flat_map(|w| [0, layers.len() - 1].map(|l| kernels.film_map(layers.dioptres()[l], w, reach_mm)))
             .collect();
         let surfaces: Vec<&Array2<f32>> = std::iter::once(&places).chain(hidden.places()).collect();
         let active = active_cells(
@@ -218,9 +219,9 @@ impl<'a> Plan<'a> {
         sink(last, picture).map_err(|reason| ForwardError::Sink { band: last, reason })
     }
 
-    fn maps_at(&self, band: usize) -> Vec<RadialMap> {
+    fn maps_at(&self, band: usize) -> Vec<FilmMap> {
         let wavelength_nm = self.wavelengths_nm[band];
-        let map = |&dioptres: &f64| self.kernels.radial_map(dioptres, wavelength_nm, self.reach_mm);
+        let map = |&dioptres: &f64| self.kernels.film_map(dioptres, wavelength_nm, self.reach_mm);
         self.layers.dioptres().iter().map(map).collect()
     }
 
@@ -272,6 +273,18 @@ impl<'a> Plan<'a> {
     }
 }
 
+/// Returns a few fields over the film, of which the blur tells that of all: from the axis outwards, or all over it.
+fn blur_fields(kernels: &dyn Kernels, map: &FilmMap, film: &Film) -> Vec<DVec2> {
+    if kernels.is_symmetric() {
+        let corner = map.field_tan(DVec2::X * film.half_diagonal_mm());
+        return [0.0, 0.5, 1.0].map(|part| part * corner).to_vec();
+    }
+    let half_mm = 0.5e-3 * film.pitch_um * DVec2::new(film.columns as f64, film.rows as f64);
+    let parts = [-1.0, 0.0, 1.0];
+    let places = parts.iter().flat_map(|&up| parts.iter().map(move |&across| DVec2::new(across, up)));
+    places.map(|place| map.field_tan(place * half_mm)).collect()
+}
+
 /// Returns the kernels of all layers between two bands.
 fn mixed(lower: &[LayerKernels], upper: &[LayerKernels], fraction: f32) -> Vec<LayerKernels> {
     lower.iter().zip(upper).map(|(lower, upper)| lower.mixed(upper, fraction)).collect()
@@ -307,7 +320,7 @@ fn hidden_samples(source: &Source<'_>, layers: &Layers, settings: &Settings, sam
 fn active_cells(
     cells: &[Cell],
     sampler: &Sampler,
-    maps: &[RadialMap],
+    maps: &[FilmMap],
     surfaces: &[&Array2<f32>],
     n_layers: usize,
 ) -> Vec<Vec<Cell>> {
@@ -321,7 +334,7 @@ fn active_cells(
 fn layers_in(
     cell: &Cell,
     sampler: &Sampler,
-    maps: &[RadialMap],
+    maps: &[FilmMap],
     surfaces: &[&Array2<f32>],
     n_layers: usize,
 ) -> Vec<bool> {
@@ -332,10 +345,9 @@ fn layers_in(
     let side = cell.size as f64;
     let along = |first: i64, k: usize| first as f64 - 0.5 + side * k as f64 / STEPS as f64;
     for (map, k) in maps.iter().flat_map(|map| (0..(STEPS + 1) * (STEPS + 1)).map(move |k| (map, k))) {
-        let (x_mm, y_mm) =
-            sampler.frame.place_mm(along(first_row, k / (STEPS + 1)), along(first_column, k % (STEPS + 1)));
-        let (tan_x, tan_y) = map.field_tan(x_mm, y_mm);
-        let (row, column) = sampler.view.position_of(tan_x, tan_y);
+        let place_mm = sampler.frame.place_mm(along(first_row, k / (STEPS + 1)), along(first_column, k % (STEPS + 1)));
+        let tan = map.field_tan(place_mm);
+        let (row, column) = sampler.view.position_of(tan.x, tan.y);
         (top, bottom) = (top.min(row), bottom.max(row));
         (left, right) = (left.min(column), right.max(column));
     }

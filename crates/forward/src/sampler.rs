@@ -3,7 +3,7 @@
 use dioptric_scene::View;
 use ndarray::Array2;
 
-use crate::{RadialMap, geometry::FilmFrame, layers::tent};
+use crate::{FilmMap, geometry::FilmFrame, layers::tent};
 
 /// A rectangle of film pixels, which may reach beyond the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,8 +57,8 @@ pub(crate) struct IdealLayer {
 
 impl Sampler {
     /// Returns the sampler that takes as many samples a pixel as the scene has at the axis.
-    pub(crate) fn new(view: View, frame: FilmFrame, map: &RadialMap) -> Self {
-        let tan_per_px = map.at(0.0).map_or(0.0, |(tan_per_mm, _)| tan_per_mm * frame.pitch_mm());
+    pub(crate) fn new(view: View, frame: FilmFrame, map: &FilmMap) -> Self {
+        let tan_per_px = map.tan_per_mm(frame.pitch_mm()) * frame.pitch_mm();
         let scene_per_film = view.focal_px * tan_per_px;
         // A quarter finer than the film does no harm.
         let per_pixel = (scene_per_film - 0.25).ceil().clamp(1.0, 16.0) as usize;
@@ -71,7 +71,7 @@ impl Sampler {
     pub(crate) fn sample(
         &self,
         rectangle: Rectangle,
-        map: &RadialMap,
+        map: &FilmMap,
         layer: usize,
         surfaces: &[Surface<'_>],
         ideal: &mut IdealLayer,
@@ -88,12 +88,12 @@ impl Sampler {
                 let (mut pixel_light, mut pixel_cover) = (0.0, 0.0);
                 for part in 0..n * n {
                     let offset = |k: usize| (k as f64 + 0.5) / n as f64 - 0.5;
-                    let (x, y) = self.frame.place_mm(
+                    let place_mm = self.frame.place_mm(
                         (rectangle.first_row + row as i64) as f64 + offset(part / n),
                         (rectangle.first_column + column as i64) as f64 + offset(part % n),
                     );
-                    let Some((tan_per_mm, gain)) = map.at(x * x + y * y) else { continue };
-                    let (v, u) = self.view.position_of(x * tan_per_mm, y * tan_per_mm);
+                    let Some((tan, gain)) = map.at(place_mm) else { continue };
+                    let (v, u) = self.view.position_of(tan.x, tan.y);
                     for surface in surfaces {
                         let (l, c) = at(surface, v, u, layer);
                         pixel_light += l * gain as f32;

@@ -6,7 +6,7 @@ use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{Film, Kernels, RadialMap, Settings, geometry::FilmFrame, layers::Layers};
+use crate::{Film, FilmMap, Kernels, Settings, geometry::FilmFrame, layers::Layers};
 
 /// A point of the film at which the PSF is computed: pixels to the right of the axis and below it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -16,16 +16,36 @@ pub(crate) struct Knot {
 }
 
 impl Knot {
-    /// Returns the knot of the same distance from the axis in the first octant, right and up.
-    pub(crate) fn canonical(self) -> Self {
-        let (a, b) = (self.right.abs(), self.down.abs());
-        Self { right: a.max(b), down: -a.min(b) }
+    /// Returns the field at the knot.
+    fn field_tan(self, map: &FilmMap, pitch_mm: f64) -> DVec2 {
+        map.field_tan(DVec2::new(f64::from(self.right), -f64::from(self.down)) * pitch_mm)
+    }
+}
+
+/// Which knots have kernels that follow from each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Symmetry {
+    /// Those that mirror each other about the axes and their diagonals.
+    Octants,
+    /// None.
+    None,
+}
+
+impl Symmetry {
+    pub(crate) fn of(kernels: &dyn Kernels) -> Self {
+        if kernels.is_symmetric() { Self::Octants } else { Self::None }
     }
 
-    /// Returns the field at the knot.
-    fn field_tan(self, map: &RadialMap, pitch_mm: f64) -> DVec2 {
-        let (x, y) = map.field_tan(f64::from(self.right) * pitch_mm, -f64::from(self.down) * pitch_mm);
-        DVec2::new(x, y)
+    /// Returns the knot whose kernel a knot's follows from: that of the same distance from the axis in the first octant,
+    /// right and up, or itself.
+    fn canonical(self, knot: Knot) -> Knot {
+        match self {
+            Self::Octants => {
+                let (a, b) = (knot.right.abs(), knot.down.abs());
+                Knot { right: a.max(b), down: -a.min(b) }
+            }
+            Self::None => knot,
+        }
     }
 }
 
@@ -87,15 +107,16 @@ pub(crate) fn cells_over(film: &Film, pad_px: usize, size: usize) -> Vec<Cell> {
 pub(crate) struct LayerKernels {
     /// Samples along a side of every kernel; odd.
     pub(crate) width: usize,
+    symmetry: Symmetry,
     by_knot: BTreeMap<Knot, Vec<f32>>,
 }
 
 impl LayerKernels {
     /// Takes kernels of any odd sizes, scales each to a sum of 1 and pads them to one size.
-    pub(crate) fn new(kernels: Vec<(Knot, Array2<f32>)>) -> Self {
+    pub(crate) fn new(symmetry: Symmetry, kernels: Vec<(Knot, Array2<f32>)>) -> Self {
         let width = kernels.iter().map(|(_, k)| k.nrows().max(k.ncols())).max().unwrap_or(1);
         let by_knot = kernels.into_iter().map(|(knot, kernel)| (knot, padded(&kernel, width))).collect();
-        Self { width, by_knot }
+        Self { width, symmetry, by_knot }
     }
 
     /// Returns the kernels between two wavelengths.
@@ -105,12 +126,15 @@ impl LayerKernels {
             let (a, b) = (widened(a, self.width, width), widened(&other.by_knot[knot], other.width, width));
             (*knot, a.iter().zip(&b).map(|(a, b)| a + fraction * (b - a)).collect())
         };
-        Self { width, by_knot: self.by_knot.iter().map(mix).collect() }
+        Self { width, symmetry: self.symmetry, by_knot: self.by_knot.iter().map(mix).collect() }
     }
 
     /// Returns the kernel at a knot anywhere on the film: that of its canonical knot, mirrored.
     pub(crate) fn at(&self, knot: Knot) -> Vec<f32> {
-        let kernel = &self.by_knot[&knot.canonical()];
+        let kernel = &self.by_knot[&self.symmetry.canonical(knot)];
+        if self.symmetry == Symmetry::None {
+            return kernel.clone();
+        }
         let (n, last) = (self.width, self.width - 1);
         let swap = knot.down.abs() > knot.right.abs();
         let (flip_columns, flip_rows) = (knot.right < 0, knot.down > 0);
@@ -152,6 +176,7 @@ fn widened(kernel: &[f32], width: usize, to: usize) -> Vec<f32> {
 pub(crate) struct Tiling {
     /// Of each layer, the cells with something in them.
     pub(crate) cells: Vec<Vec<Cell>>,
+    symmetry: Symmetry,
     /// Of each layer, the canonical knots of its cells.
     knots: Vec<BTreeSet<Knot>>,
 }
@@ -160,18 +185,20 @@ impl Tiling {
     /// Halves the cells of each layer until the PSF half-way between the knots is met.
     pub(crate) fn new(
         active: Vec<Vec<Cell>>,
-        maps: &[RadialMap],
+        maps: &[FilmMap],
         layers: &Layers,
         film: &Film,
         wavelength_nm: f64,
         kernels: &dyn Kernels,
         settings: &Settings,
     ) -> Self {
+        let symmetry = Symmetry::of(kernels);
         let cells: Vec<Vec<Cell>> = active
             .into_par_iter()
             .enumerate()
             .map(|(layer, cells)| {
                 let mut probe = Probe {
+                    symmetry,
                     kernel_at: &|knot: Knot| {
                         let field_tan = knot.field_tan(&maps[layer], 1e-3 * film.pitch_um);
                         kernels.kernel(field_tan, layers.dioptres()[layer], wavelength_nm, film.pitch_um)
@@ -182,15 +209,15 @@ impl Tiling {
                 cells.into_iter().flat_map(|cell| probe.halved_until(cell, settings.max_edge_error)).collect()
             })
             .collect();
-        let knots =
-            cells.iter().map(|cells| cells.iter().flat_map(|c| c.knots().map(Knot::canonical)).collect()).collect();
-        Self { cells, knots }
+        let canonical = |cell: &Cell| cell.knots().map(|knot| symmetry.canonical(knot));
+        let knots = cells.iter().map(|cells| cells.iter().flat_map(canonical).collect()).collect();
+        Self { cells, symmetry, knots }
     }
 
     /// Computes the kernels of all layers at a wavelength; none for a layer without cells.
     pub(crate) fn kernels_at(
         &self,
-        maps: &[RadialMap],
+        maps: &[FilmMap],
         layers: &Layers,
         film: &Film,
         wavelength_nm: f64,
@@ -210,12 +237,13 @@ impl Tiling {
         for (layer, knot, kernel) in computed {
             by_layer[layer].push((knot, kernel));
         }
-        by_layer.into_iter().map(LayerKernels::new).collect()
+        by_layer.into_iter().map(|kernels| LayerKernels::new(self.symmetry, kernels)).collect()
     }
 }
 
 /// Tells where the PSF cannot be interpolated across a cell.
 struct Probe<'a> {
+    symmetry: Symmetry,
     kernel_at: &'a dyn Fn(Knot) -> Array2<f32>,
     kernels: BTreeMap<Knot, Array2<f32>>,
     errors: BTreeMap<(Knot, usize), f64>,
@@ -231,18 +259,18 @@ impl Probe<'_> {
 
     /// Returns the largest error of the edge spread function, of edges along rows and columns, mid-cell.
     fn edge_error(&mut self, cell: &Cell) -> f64 {
-        let key = (cell.middle().canonical(), cell.size);
+        let key = (self.symmetry.canonical(cell.middle()), cell.size);
         if let Some(&error) = self.errors.get(&key) {
             return error;
         }
         let wanted: Vec<Knot> = cell.knots().into_iter().chain([cell.middle()]).collect();
         for knot in &wanted {
-            let canonical = knot.canonical();
+            let canonical = self.symmetry.canonical(*knot);
             let kernel_at = self.kernel_at;
             self.kernels.entry(canonical).or_insert_with(|| kernel_at(canonical));
         }
-        let canonical = wanted.iter().map(|k| k.canonical());
-        let kernels = LayerKernels::new(canonical.map(|k| (k, self.kernels[&k].clone())).collect());
+        let canonical = wanted.iter().map(|&k| self.symmetry.canonical(k));
+        let kernels = LayerKernels::new(self.symmetry, canonical.map(|k| (k, self.kernels[&k].clone())).collect());
         let turned: Vec<Vec<f32>> = wanted.iter().map(|&knot| kernels.at(knot)).collect();
         let difference: Vec<f64> = (0..kernels.width * kernels.width)
             .map(|i| f64::from(turned[4][i]) - 0.25 * turned[..4].iter().map(|k| f64::from(k[i])).sum::<f64>())
@@ -298,7 +326,7 @@ mod tests {
             kernel[((2.0 - y) as usize, (2.0 + x) as usize)] = 1.0;
             kernel
         };
-        let kernels = LayerKernels::new(vec![(Knot { right: 64, down: -32 }, comet(2.0, 1.0))]);
+        let kernels = LayerKernels::new(Symmetry::Octants, vec![(Knot { right: 64, down: -32 }, comet(2.0, 1.0))]);
         for (right, down, x, y) in [
             (64, -32, 2.0, 1.0),
             (-64, -32, -2.0, 1.0),
@@ -310,6 +338,12 @@ mod tests {
         ] {
             let expected: Vec<f32> = comet(x, y).into_iter().collect();
             assert_eq!(kernels.at(Knot { right, down }), expected, "at {right}, {down}");
+        }
+        let both =
+            [(64, comet(2.0, 1.0)), (-64, comet(1.0, 0.0))].map(|(right, comet)| (Knot { right, down: 9 }, comet));
+        let kernels = LayerKernels::new(Symmetry::None, both.to_vec());
+        for (knot, comet) in both {
+            assert_eq!(kernels.at(knot), comet.into_iter().collect::<Vec<_>>());
         }
     }
 }

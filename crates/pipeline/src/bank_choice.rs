@@ -4,7 +4,7 @@ use dioptric_optics::Lens;
 use dioptric_psf::{AdaptiveSettings, BankSettings, ErrorPlaces, Interpolation, PsfBank};
 use serde::{Deserialize, Serialize};
 
-use crate::PipelineError;
+use crate::{CameraBank, PipelineError};
 
 /// Places at which the error of a bank is measured: few, for it is told of every run.
 const N_PLACES: usize = 24;
@@ -30,7 +30,7 @@ pub enum BankChoice {
 impl BankChoice {
     /// Traces the bank, and measures the error of its interpolation on pixels of this size.
     pub(crate) fn build(self, lens: &Lens, standard: BankSettings, pitch_um: f64) -> Result<PsfBank, PipelineError> {
-        let places = ErrorPlaces { pitch_um, n_places: N_PLACES, ..ErrorPlaces::STANDARD };
+        let places = places(pitch_um);
         Ok(match self {
             Self::Standard => PsfBank::build(lens, &standard)?.with_measured_error(&places)?,
             Self::Paper => {
@@ -43,6 +43,23 @@ impl BankChoice {
             }
         })
     }
+
+    /// Returns where the error of a bank of a lens without an axis of symmetry is measured, or says that the choice is not
+    /// for such a one.
+    pub(crate) fn places_of_plane(self, lens: &Lens, pitch_um: f64) -> Result<ErrorPlaces, PipelineError> {
+        match self {
+            Self::Standard => Ok(places(pitch_um)),
+            Self::Within { .. } | Self::Paper => {
+                let reason =
+                    format!("only the standard one is for a lens without an axis of symmetry, as {} is", lens.name());
+                Err(PipelineError::Unsuitable { what: "bank", reason })
+            }
+        }
+    }
+}
+
+fn places(pitch_um: f64) -> ErrorPlaces {
+    ErrorPlaces { pitch_um, n_places: N_PLACES, ..ErrorPlaces::STANDARD }
 }
 
 /// How a bank was sampled, and the error of what lies between its samples.
@@ -73,6 +90,27 @@ pub struct BankData {
 }
 
 impl BankData {
+    /// Returns what is known of a camera's bank.
+    pub fn of_camera(bank: &CameraBank) -> Option<Self> {
+        match bank {
+            CameraBank::Turned(bank) => Self::of(bank),
+            CameraBank::Plane { bank, error } => {
+                let settings = bank.bank().settings();
+                Some(Self {
+                    interpolation: "rays",
+                    n_fields: settings.tans_x.len() * settings.tans_y.len(),
+                    n_depths: settings.dioptres.len(),
+                    n_wavelengths: settings.wavelengths_nm.len(),
+                    median_error: error.median,
+                    p90_error: error.p90,
+                    n_places: error.n_places,
+                    pitch_um: error.pitch_um,
+                    wanted_error: error.target_median,
+                })
+            }
+        }
+    }
+
     /// Returns what is known of a bank whose error was measured.
     pub fn of(bank: &PsfBank) -> Option<Self> {
         let (settings, error) = (bank.settings(), bank.error()?);

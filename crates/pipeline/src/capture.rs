@@ -2,15 +2,14 @@
 
 use std::path::Path;
 
-use dioptric_forward::{Coverage, bank_settings_for, irradiance};
-use dioptric_psf::PsfBank;
+use dioptric_forward::{Coverage, irradiance};
 use dioptric_scene::{BandWriter, ExrParts};
 use dioptric_sensor::{Developed, ElectronRate, Exposure, Illumination, Noise, Processing};
 use dioptric_spectrum::{Observer, Quantity};
 use ndarray::Array2;
 
 use crate::{
-    Camera, Exposed, PipelineError, Progress, Shot, Stage,
+    Camera, CameraBank, Exposed, PipelineError, Progress, Shot, Stage,
     band_stream::band_stream,
     display::{LinearRgb, SpectrumToRgb},
 };
@@ -22,7 +21,7 @@ pub(crate) const IRRADIANCE_FILE: &str = "irradiance.exr";
 #[derive(Clone, Debug)]
 pub struct Capture {
     /// The point-spread functions.
-    pub bank: PsfBank,
+    pub bank: CameraBank,
     /// The irradiance on the film, in brief; the cube itself is in the file.
     pub irradiance: IrradianceSummary,
     /// The exposure, metered or given.
@@ -90,22 +89,22 @@ impl Shot {
     }
 
     /// Traces the point-spread functions that the scene and the film need.
-    fn trace_bank(&self) -> Result<PsfBank, PipelineError> {
-        let settings = bank_settings_for(&Coverage {
+    fn trace_bank(&self) -> Result<CameraBank, PipelineError> {
+        let coverage = Coverage {
             lens: &self.lens,
             film: &self.film,
             film_mm: self.film_mm,
             depth_range_m: self.scene.require_depth()?.range_m(),
             grid: self.grid(),
             diffraction: self.camera.diffraction.into(),
-        })?;
-        self.camera.bank.build(&self.lens, settings, self.film.pitch_um)
+        };
+        CameraBank::build(self.camera.bank, &coverage)
     }
 
     /// Images the scene band by band; the sensor collects electrons beside it, and the file grows.
     fn expose_to_scene(
         &self,
-        bank: &PsfBank,
+        bank: &CameraBank,
         folder: Option<&Path>,
         progress: &dyn Progress,
     ) -> Result<(ElectronRate, IrradianceSummary), PipelineError> {
@@ -130,7 +129,7 @@ impl Shot {
             });
             let imaged = irradiance(
                 &self.scene,
-                bank,
+                bank.kernels(),
                 &self.film,
                 &self.blur,
                 &|fraction| progress.at(Stage::Irradiance, fraction),

@@ -1,13 +1,13 @@
 //! Point-spread functions in colour, laid out over field and depth as in Figure 1.
 
 use dioptric_optics::glam::DVec2;
-use dioptric_psf::{Kernel, PsfBank};
+use dioptric_psf::{Kernel, PsfQuery};
 use dioptric_spectrum::WavelengthGrid;
 use image::{Rgb, RgbImage, imageops};
 use ndarray::Array2;
 
 use crate::{
-    REFERENCE_WAVELENGTH_NM,
+    CameraBank, REFERENCE_WAVELENGTH_NM,
     display::{LinearRgb, SpectrumToRgb, enlarged},
 };
 
@@ -31,8 +31,8 @@ pub struct PsfMosaic {
 /// What a mosaic shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MosaicPlan {
-    /// Tangents of the field angles.
-    pub field_tans: Vec<f64>,
+    /// Fields, tangents across and up.
+    pub field_tans: Vec<DVec2>,
     /// Depths, dioptres.
     pub dioptres: Vec<f64>,
     /// Wavelengths of the white point, of equal energy.
@@ -45,7 +45,7 @@ pub struct MosaicPlan {
 
 impl PsfMosaic {
     /// Draws the mosaic from a bank.
-    pub fn draw(bank: &PsfBank, plan: &MosaicPlan) -> Self {
+    pub fn draw(bank: &CameraBank, plan: &MosaicPlan) -> Self {
         let widest = |&dioptres: &f64| plan.tile_um.unwrap_or_else(|| widest_um(bank, plan, dioptres));
         let tiles_um: Vec<f64> = plan.dioptres.iter().map(widest).collect();
         let white = vec![1.0; plan.grid.len()];
@@ -63,7 +63,7 @@ impl PsfMosaic {
             }
         }
         Self {
-            fields_deg: plan.field_tans.iter().map(|tan| tan.atan().to_degrees()).collect(),
+            fields_deg: plan.field_tans.iter().map(|tan| tan.length().atan().to_degrees()).collect(),
             depths_m: plan.dioptres.iter().map(|d| 1.0 / d).collect(),
             tiles_um,
             tiles,
@@ -93,44 +93,46 @@ impl PsfMosaic {
 /// One point-spread function of a bank.
 #[derive(Clone, Copy)]
 struct Point {
-    field_tan: f64,
+    field_tan: DVec2,
     dioptres: f64,
     wavelength_nm: f64,
 }
 
 impl Point {
-    fn kernel(&self, bank: &PsfBank, pitch_um: f64) -> Kernel {
-        bank.kernel(DVec2::new(self.field_tan, 0.0), self.dioptres, self.wavelength_nm, pitch_um)
+    fn kernel(&self, bank: &CameraBank, pitch_um: f64) -> Kernel {
+        let Self { field_tan, dioptres, wavelength_nm } = *self;
+        bank.kernel(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um })
     }
 
-    /// How far to the right of the reference wavelength's image this one lies, µm: lateral colour.
-    fn lateral_color_um(&self, bank: &PsfBank) -> f64 {
-        let at = |nm: f64| bank.geometry(self.dioptres, nm).image_radius_mm(self.field_tan);
+    /// How far from the reference wavelength's image this one lies, µm, right and up: lateral colour.
+    fn lateral_color_um(&self, bank: &CameraBank) -> DVec2 {
+        let at = |nm: f64| bank.centroid_mm(self.field_tan, self.dioptres, nm);
         1e3 * (at(self.wavelength_nm) - at(REFERENCE_WAVELENGTH_NM))
     }
 }
 
 /// Returns a point-spread function in a window that is centred on the image of the reference wavelength.
-fn window(bank: &PsfBank, point: &Point, pitch_um: f64, size: usize) -> Array2<f32> {
+fn window(bank: &CameraBank, point: &Point, pitch_um: f64, size: usize) -> Array2<f32> {
     let kernel = point.kernel(bank, pitch_um).samples;
-    let shift = (point.lateral_color_um(bank) / pitch_um).round() as isize;
+    let shift = (point.lateral_color_um(bank) / pitch_um).round();
+    let (right, up) = (shift.x as isize, shift.y as isize);
     let (rows, columns) = kernel.dim();
     let offset = |n: usize| n as isize / 2 - size as isize / 2;
     Array2::from_shape_fn((size, size), |(row, column)| {
-        let (r, c) = (row as isize + offset(rows), column as isize + offset(columns) - shift);
+        let (r, c) = (row as isize + offset(rows) + up, column as isize + offset(columns) - right);
         if r < 0 || c < 0 { 0.0 } else { kernel.get((r as usize, c as usize)).copied().unwrap_or(0.0) }
     })
 }
 
 /// Returns the side of a tile that holds all but the tails of every point-spread function of a depth, µm.
-fn widest_um(bank: &PsfBank, plan: &MosaicPlan, dioptres: f64) -> f64 {
+fn widest_um(bank: &CameraBank, plan: &MosaicPlan, dioptres: f64) -> f64 {
     let (first, last) = plan.grid.range_nm();
     let mut reach_um: f64 = 5.0;
     for &field_tan in &plan.field_tans {
         for wavelength_nm in [first, last] {
             let point = Point { field_tan, dioptres, wavelength_nm };
-            let blur_um = 1e3 * bank.blur_radius_mm(field_tan, dioptres, wavelength_nm).abs();
-            reach_um = reach_um.max(blur_um + point.lateral_color_um(bank).abs());
+            let blur_um = 1e3 * bank.kernels().spread_mm(field_tan, dioptres, wavelength_nm);
+            reach_um = reach_um.max(blur_um + point.lateral_color_um(bank).length());
         }
     }
     2.6 * reach_um
@@ -140,15 +142,15 @@ fn widest_um(bank: &PsfBank, plan: &MosaicPlan, dioptres: f64) -> f64 {
 mod tests {
     use super::*;
     use dioptric_optics::Lens;
-    use dioptric_psf::{BankSettings, Diffraction};
+    use dioptric_psf::{BankSettings, Diffraction, PsfBank};
 
     #[test]
     fn a_mosaic_has_a_tile_a_field_and_depth() {
         let lens = Lens::built_in("paper-2el").unwrap().with_stop_diameter_mm(4.0).unwrap();
         let settings = BankSettings::covering(51.8145, 0.06, (0.0625, 0.5), (400.0, 700.0), Diffraction::None);
-        let bank = PsfBank::build(&lens, &settings).unwrap();
+        let bank = CameraBank::Turned(Box::new(PsfBank::build(&lens, &settings).unwrap()));
         let plan = MosaicPlan {
-            field_tans: vec![0.0, 0.05],
+            field_tans: vec![DVec2::ZERO, DVec2::new(0.05, 0.0)],
             dioptres: vec![0.0625, 0.25, 0.5],
             grid: WavelengthGrid::uniform(400.0, 700.0, 50.0).unwrap(),
             tile_px: 31,

@@ -116,15 +116,13 @@ fn size_film(
             let view = scene.require_view()?;
             let (rows, columns) = seen_evenly(&view, scene.rows(), scene.columns())?;
             let (half_rows, half_columns) = (0.5 * rows as f64, 0.5 * columns as f64);
-            let paraxial_um = 1e3 * height_per_tan_mm(lens, film_mm) / view.focal_px;
-            // Barrel distortion draws the rim of the scene inwards, and blur mixes it with the dark beyond.
-            let seen = [(half_columns, 0.0), (0.0, half_rows), (half_columns, half_rows)]
-                .map(|(x, y)| DVec2::new(x, y).length() / view.focal_px)
-                .map(|tan| height_over_paraxial(lens, tan, film_mm))
-                .into_iter()
-                .fold(1.0, f64::min);
-            let half_um =
-                seen * paraxial_um * half_rows.min(half_columns) - 1e3 * widest_blur_mm(lens, film_mm, scene)?;
+            let half = DVec2::new(half_columns, half_rows);
+            let seen_um = match lens.is_rotational() {
+                true => seen_pitch_um(lens, film_mm, &view, half),
+                false => seen_pitch_of_any_um(lens, film_mm, &view, half),
+            };
+            // Blur mixes the rim of the scene with the dark beyond.
+            let half_um = seen_um * half_rows.min(half_columns) - 1e3 * widest_blur_mm(lens, film_mm, scene)?;
             let pitch_um = half_um / half_rows.min(half_columns);
             if !(pitch_um.is_finite() && pitch_um > 0.0) {
                 let reason = format!("the film at {film_mm} mm sees no upright picture of the scene");
@@ -133,6 +131,32 @@ fn size_film(
             Film { rows, columns, pitch_um }
         }
     })
+}
+
+/// Returns the pitch at which the scene, `half` a size across and up in samples, just fills the film, µm: by first order, but
+/// no more than barrel distortion leaves of it, which draws the rim of the scene inwards.
+fn seen_pitch_um(lens: &MonoLens, film_mm: f64, view: &View, half: DVec2) -> f64 {
+    let paraxial_um = 1e3 * height_per_tan_mm(lens, film_mm) / view.focal_px;
+    let seen = [DVec2::new(half.x, 0.0), DVec2::new(0.0, half.y), half]
+        .map(|place| height_over_paraxial(lens, place.length() / view.focal_px, film_mm))
+        .into_iter()
+        .fold(1.0, f64::min);
+    seen * paraxial_um
+}
+
+/// Returns the same of a lens without an axis of symmetry, by the chief rays of the scene's border.
+fn seen_pitch_of_any_um(lens: &MonoLens, film_mm: f64, view: &View, half: DVec2) -> f64 {
+    const ALONG: i32 = 4;
+    let parts = (-ALONG..=ALONG).map(|i| f64::from(i) / f64::from(ALONG));
+    let border = parts.flat_map(|part| {
+        [DVec2::new(part, 1.0), DVec2::new(part, -1.0), DVec2::new(1.0, part), DVec2::new(-1.0, part)]
+    });
+    // The film ends where the first point of the border lies on it.
+    let pitch_um = |part: DVec2| {
+        let at_mm = chief_ray_mm(lens, part * half / view.focal_px, film_mm)?;
+        Some(1e3 * (at_mm / half).abs().max_element())
+    };
+    border.filter_map(pitch_um).fold(f64::INFINITY, f64::min)
 }
 
 /// Returns the rows and columns of the largest film about the axis that the scene fills.
@@ -156,11 +180,17 @@ fn height_per_tan_mm(lens: &MonoLens, film_mm: f64) -> f64 {
 
 /// Returns by how much the chief ray of a field lands farther out than first order says; 1 where it does not get through.
 fn height_over_paraxial(lens: &MonoLens, tan: f64, film_mm: f64) -> f64 {
-    let point = ObjectPoint::from_field(lens, DVec2::new(tan, 0.0), 0.0);
+    let landed = chief_ray_mm(lens, DVec2::new(tan, 0.0), film_mm);
+    landed.map_or(1.0, |at_mm| at_mm.x.abs() / (tan * height_per_tan_mm(lens, film_mm)))
+}
+
+/// Returns where the ray of a far field through the middle of the paraxial entrance pupil lands, mm.
+fn chief_ray_mm(lens: &MonoLens, field_tan: DVec2, film_mm: f64) -> Option<DVec2> {
+    let point = ObjectPoint::from_field(lens, field_tan, 0.0);
     let mut rays = rays_towards(&point, &[DVec2::ZERO], lens.projection_center_z_mm(), 0.0);
     lens.trace(&mut rays, Rims::Ignore);
     lens.to_film(&mut rays, film_mm);
-    if rays.fate[0].is_in_flight() { rays.x_mm[0].abs() / (tan * height_per_tan_mm(lens, film_mm)) } else { 1.0 }
+    rays.fate[0].is_in_flight().then(|| rays.point_mm(0).truncate())
 }
 
 /// Returns the radius of the largest blur of the scene on the axis, mm, by first order.
@@ -180,6 +210,7 @@ fn widest_blur_mm(lens: &MonoLens, film_mm: f64, scene: &Scene) -> Result<f64, P
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+    use dioptric_optics::Move;
 
     #[test]
     fn a_unit_tangent_lands_a_focal_length_off_axis_at_infinity_focus() {
@@ -188,6 +219,30 @@ mod tests {
         assert_relative_eq!(height_per_tan_mm(&lens, first.bfl_mm), first.efl_mm, max_relative = 1e-9);
         let hole = Lens::pinhole(0.2).unwrap().at(550.0).unwrap();
         assert_relative_eq!(height_per_tan_mm(&hole, 40.0), 40.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn a_film_of_a_lens_without_an_axis_ends_where_the_scene_does() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap();
+        let (view, half) =
+            (View { focal_px: 1000.0, center_x_px: 300.0, center_y_px: 200.0 }, DVec2::new(300.0, 200.0));
+        let mono = lens.at(550.0).unwrap();
+        let film_mm = mono.first_order().bfl_mm;
+        let straight_um = seen_pitch_um(&mono, film_mm, &view, half);
+        // A symmetric lens: both ways lead to the same, but for how distortion is sampled.
+        assert_relative_eq!(seen_pitch_of_any_um(&mono, film_mm, &view, half), straight_um, max_relative = 2e-3);
+        let whole = (0, lens.interfaces().len() - 1);
+        let aside = Move {
+            surfaces: whole,
+            pivot_mm: 0.0,
+            decenter_mm: [1.0, 0.0, 0.0],
+            tilt_deg: [0.0; 3],
+            tilt_first: false,
+        };
+        let aside = lens.with_moves(vec![aside]).unwrap().at(550.0).unwrap();
+        // A lens 1 mm to the side moves the picture of a far scene by 1 mm: half the film's width of 15 mm loses that.
+        let shift_um = straight_um - seen_pitch_of_any_um(&aside, film_mm, &view, half);
+        assert_relative_eq!(shift_um, 1e3 / half.x, max_relative = 0.02);
     }
 
     #[test]

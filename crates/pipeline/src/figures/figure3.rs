@@ -1,6 +1,6 @@
 //! Figure 3: three targets at 8 m and at 2 m through the paper's two-element lens, focused for 8 m.
 
-use dioptric_forward::{Film, Kernels, RadialMap, Settings, Source, render};
+use dioptric_forward::{Film, FilmMap, Kernels, RadialMap, Settings, Source, render};
 use dioptric_psf::paper::{FIGURE_3_FILM_MM, figure_3_psfs, figure_3_rms_um, two_element_lens};
 use dioptric_scene::{Target, View};
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
@@ -86,6 +86,9 @@ fn on_pixels(energy: &Array2<f64>, pitch_um: f64, new_pitch_um: f64) -> Array2<f
 }
 
 impl Kernels for CountedPsfs {
+    fn is_symmetric(&self) -> bool {
+        true
+    }
     fn wavelengths_nm(&self) -> (f64, f64) {
         (self.wavelengths_nm[0], self.wavelengths_nm[self.wavelengths_nm.len() - 1])
     }
@@ -95,13 +98,13 @@ impl Kernels for CountedPsfs {
     fn is_dark_beyond_reach(&self) -> bool {
         true
     }
-    fn radial_map(&self, _dioptres: f64, _wavelength_nm: f64, reach_mm: f64) -> RadialMap {
-        RadialMap::tabulate(reach_mm, |radius_mm| Some(radius_mm / FIGURE_3_FILM_MM), |_| 1.0)
+    fn film_map(&self, _dioptres: f64, _wavelength_nm: f64, reach_mm: f64) -> FilmMap {
+        RadialMap::tabulate(reach_mm, |radius_mm| Some(radius_mm / FIGURE_3_FILM_MM), |_| 1.0).into()
     }
     fn kernel(&self, _field_tan: DVec2, _dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Array2<f32> {
         on_pixels(&self.psfs[self.nearest(wavelength_nm)], COUNTING_PITCH_UM, pitch_um)
     }
-    fn blur_radius_mm(&self, _field_tan: f64, _dioptres: f64, wavelength_nm: f64) -> f64 {
+    fn blur_radius_mm(&self, _field_tan: DVec2, _dioptres: f64, wavelength_nm: f64) -> f64 {
         self.radii_mm[self.nearest(wavelength_nm)]
     }
 }

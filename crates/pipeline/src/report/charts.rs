@@ -1,10 +1,10 @@
 //! The plots of the report.
 
 use dioptric_optics::glam::DVec2;
-use dioptric_psf::{Picture, PsfBank};
+use dioptric_psf::{Picture, PsfQuery};
 
 use super::statistics::SensorStatistics;
-use crate::{Capture, Corner, LineChart, REFERENCE_WAVELENGTH_NM, Series, Shot, display::wavelength_color};
+use crate::{CameraBank, Capture, Corner, LineChart, REFERENCE_WAVELENGTH_NM, Series, Shot, display::wavelength_color};
 
 /// Points of a curve.
 const POINTS: usize = 64;
@@ -23,8 +23,8 @@ pub(super) struct Charts {
 
 /// The places of the scene that the plots are about.
 pub(super) struct Places {
-    /// The largest field of the film, as its tangent.
-    pub(super) corner_tan: f64,
+    /// The field of the film's corner, tangents across and up.
+    pub(super) corner: DVec2,
     /// The depth in focus, dioptres, moved into the range of the bank.
     pub(super) focus_dioptres: f64,
     /// A few depths from far to near, dioptres.
@@ -36,8 +36,7 @@ pub(super) struct Places {
 impl Places {
     pub(super) fn of(shot: &Shot, capture: &Capture) -> Self {
         let bank = &capture.bank;
-        let settings = bank.settings();
-        let (far, near) = (settings.dioptres[0], settings.dioptres[settings.dioptres.len() - 1]);
+        let (far, near) = bank.kernels().dioptres();
         let steps = if near - far > 1e-6 { 4 } else { 1 };
         let (first, last) = shot.grid().range_nm();
         // Four wavelengths from end to end, and the reference in place of the nearest where it is among them.
@@ -47,14 +46,24 @@ impl Places {
             let pupil_z_mm = shot.lens.at(REFERENCE_WAVELENGTH_NM).map_or(0.0, |lens| lens.projection_center_z_mm());
             1e3 / (mm + pupil_z_mm)
         });
-        let corner_mm = shot.film.half_diagonal_mm();
-        let geometry = bank.geometry(focus.clamp(far, near), REFERENCE_WAVELENGTH_NM);
         Self {
-            corner_tan: geometry.field_tan(corner_mm).unwrap_or(bank.last_field_tan()),
+            corner: bank.corner_tan(&shot.film, focus.clamp(far, near), REFERENCE_WAVELENGTH_NM),
             focus_dioptres: focus.clamp(far, near),
             dioptres: (0..steps).map(|i| far + (near - far) * i as f64 / (steps as f64 - 1.0).max(1.0)).collect(),
             wavelengths_nm: if last > first { wavelengths_nm } else { vec![first] },
         }
+    }
+}
+
+impl Places {
+    /// The size of the largest field of the film, as its tangent.
+    pub(super) fn corner_tan(&self) -> f64 {
+        self.corner.length()
+    }
+
+    /// Returns the field at a share of the way from the axis to the corner.
+    pub(super) fn field(&self, share: f64) -> DVec2 {
+        share * self.corner
     }
 }
 
@@ -71,21 +80,21 @@ impl Charts {
     }
 }
 
-fn picture(bank: &PsfBank, field_tan: f64, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Picture {
-    Picture::from(&bank.kernel(DVec2::new(field_tan, 0.0), dioptres, wavelength_nm, pitch_um))
+fn picture(bank: &CameraBank, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Picture {
+    Picture::from(&bank.kernel(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um }))
 }
 
 /// Line spreads on the axis, in focus, over wavelength.
-fn lsf(shot: &Shot, bank: &PsfBank, places: &Places) -> LineChart {
+fn lsf(shot: &Shot, bank: &CameraBank, places: &Places) -> LineChart {
     let spreads: Vec<_> = places
         .wavelengths_nm
         .iter()
         .map(|&nm| {
             // As fine as the narrowest line asks for.
             let airy_um = 1e-3 * nm * shot.lens.at(nm).map_or(4.0, |l| l.first_order().f_number);
-            let blur_um = 1e3 * bank.blur_radius_mm(0.0, places.focus_dioptres, nm).abs();
+            let blur_um = 1e3 * bank.kernels().blur_radius_mm(DVec2::ZERO, places.focus_dioptres, nm).abs();
             let pitch_um = (0.1 * airy_um).max(0.02 * blur_um);
-            (nm, picture(bank, 0.0, places.focus_dioptres, nm, pitch_um).line_spread(0.0))
+            (nm, picture(bank, DVec2::ZERO, places.focus_dioptres, nm, pitch_um).line_spread(0.0))
         })
         .collect();
     let reach_um = spreads
@@ -121,23 +130,19 @@ fn lsf(shot: &Shot, bank: &PsfBank, places: &Places) -> LineChart {
 }
 
 /// Modulation up to the sensor's Nyquist frequency on the axis and towards the corner, in focus and at the far end.
-fn mtf(shot: &Shot, bank: &PsfBank, places: &Places) -> LineChart {
+fn mtf(shot: &Shot, bank: &CameraBank, places: &Places) -> LineChart {
     let nyquist_per_mm = 500.0 / shot.film.pitch_um;
     let pitch_um = (shot.film.pitch_um / 8.0).min(2.0);
     let far = places.dioptres[0];
+    let (radial, focus) = (places.corner.to_angle(), places.focus_dioptres);
+    let tangential = radial + std::f64::consts::FRAC_PI_2;
     let mut lines = vec![
-        ("axis, in focus", 0.0, places.focus_dioptres, 0.0, "#1b6ca8"),
-        ("70 % field, radial", 0.7 * places.corner_tan, places.focus_dioptres, 0.0, "#c2571a"),
-        (
-            "70 % field, tangential",
-            0.7 * places.corner_tan,
-            places.focus_dioptres,
-            std::f64::consts::FRAC_PI_2,
-            "#7a9e2c",
-        ),
+        ("axis, in focus", DVec2::ZERO, focus, 0.0, "#1b6ca8"),
+        ("70 % field, radial", places.field(0.7), focus, radial, "#c2571a"),
+        ("70 % field, tangential", places.field(0.7), focus, tangential, "#7a9e2c"),
     ];
     if (far - places.focus_dioptres).abs() > 1e-6 {
-        lines.push(("axis, far end of the scene", 0.0, far, 0.0, "#777788"));
+        lines.push(("axis, far end of the scene", DVec2::ZERO, far, 0.0, "#777788"));
     }
     let series = lines
         .into_iter()
@@ -166,18 +171,18 @@ fn mtf(shot: &Shot, bank: &PsfBank, places: &Places) -> LineChart {
     }
 }
 
-fn over_field(places: &Places, of: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+fn over_field(places: &Places, of: impl Fn(DVec2) -> f64) -> Vec<(f64, f64)> {
     (0..=POINTS)
-        .map(|i| places.corner_tan * i as f64 / POINTS as f64)
-        .map(|tan| (tan.atan().to_degrees(), of(tan)))
+        .map(|i| places.field(i as f64 / POINTS as f64))
+        .map(|tan| (tan.length().atan().to_degrees(), of(tan)))
         .collect()
 }
 
-fn illumination(bank: &PsfBank, places: &Places) -> LineChart {
-    let geometry = bank.geometry(places.focus_dioptres, REFERENCE_WAVELENGTH_NM);
-    let axis = geometry.irradiance_per_radiance(0.0);
-    let real = over_field(places, |tan| geometry.irradiance_per_radiance(tan) / axis);
-    let cosines = over_field(places, |tan| tan.atan().cos().powi(4));
+fn illumination(bank: &CameraBank, places: &Places) -> LineChart {
+    let gain = |tan| bank.irradiance_per_radiance(tan, places.focus_dioptres, REFERENCE_WAVELENGTH_NM);
+    let axis = gain(DVec2::ZERO);
+    let real = over_field(places, |tan| gain(tan) / axis);
+    let cosines = over_field(places, |tan| tan.length().atan().cos().powi(4));
     let series = |label: &str, color: &str, points, is_dashed| Series {
         label: Some(label.to_owned()),
         color: color.to_owned(),
@@ -188,25 +193,26 @@ fn illumination(bank: &PsfBank, places: &Places) -> LineChart {
         title: "Relative illumination".to_owned(),
         x_label: "field angle, degrees".to_owned(),
         y_label: "share of the axis".to_owned(),
-        x_range: (0.0, places.corner_tan.atan().to_degrees()),
+        x_range: (0.0, places.corner_tan().atan().to_degrees()),
         y_range: (0.0, 1.05),
         series: vec![series("this lens", "#1b6ca8", real, false), series("cos⁴", "#999999", cosines, true)],
         legend: Corner::BottomLeft,
     }
 }
 
-fn distortion(bank: &PsfBank, places: &Places) -> LineChart {
+fn distortion(bank: &CameraBank, places: &Places) -> LineChart {
+    let at = |tan, nm| bank.centroid_mm(tan, places.focus_dioptres, nm);
+    // Heights count from where the axis lands, which a tilted lens moves.
+    let axis_mm = at(DVec2::ZERO, REFERENCE_WAVELENGTH_NM);
+    let small = places.field(1e-3);
+    let scale_mm = at(small, REFERENCE_WAVELENGTH_NM).distance(axis_mm) / small.length();
     let curves: Vec<Series> = places
         .wavelengths_nm
         .iter()
         .map(|&nm| {
-            let geometry = bank.geometry(places.focus_dioptres, nm);
-            let reference = bank.geometry(places.focus_dioptres, REFERENCE_WAVELENGTH_NM);
-            let small = 1e-3 * places.corner_tan;
-            let scale = reference.image_radius_mm(small) / small;
             let points = over_field(places, |tan| {
-                let tan = tan.max(small);
-                100.0 * (geometry.image_radius_mm(tan) / (scale * tan) - 1.0)
+                let tan = if tan.length() > small.length() { tan } else { small };
+                100.0 * (at(tan, nm).distance(axis_mm) / (scale_mm * tan.length()) - 1.0)
             });
             Series { label: Some(format!("{nm:.0} nm")), color: wavelength_color(nm), points, is_dashed: false }
         })
@@ -218,7 +224,7 @@ fn distortion(bank: &PsfBank, places: &Places) -> LineChart {
         title: "Distortion and lateral colour".to_owned(),
         x_label: "field angle, degrees".to_owned(),
         y_label: "image height against f · tan, %".to_owned(),
-        x_range: (0.0, places.corner_tan.atan().to_degrees()),
+        x_range: (0.0, places.corner_tan().atan().to_degrees()),
         y_range: (low - margin, high + margin),
         series: curves,
         legend: Corner::BottomLeft,

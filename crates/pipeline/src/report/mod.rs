@@ -136,12 +136,12 @@ impl Capture {
 
     fn report(&self, shot: &Shot, timings_s: &[(String, f64)], files: Vec<String>) -> Result<Report, PipelineError> {
         let places = Places::of(shot, self);
-        let fields: Vec<f64> = [0.0, 0.35, 0.7, 1.0].iter().map(|share| share * places.corner_tan).collect();
+        let fields = [0.0, 0.35, 0.7, 1.0].map(|share| places.field(share));
         let (near_m, far_m) = shot.scene.require_depth()?.range_m();
         Ok(Report {
             dioptric: env!("CARGO_PKG_VERSION"),
             camera: shot.camera.clone(),
-            lens: statistics::lens_data(shot, places.corner_tan)?,
+            lens: statistics::lens_data(shot, places.corner_tan())?,
             film_mm: shot.film_mm,
             film: FilmData { columns: shot.film.columns, rows: shot.film.rows, pitch_um: shot.film.pitch_um },
             scene: SceneData {
@@ -153,7 +153,7 @@ impl Capture {
                 mean_luminance_cd_m2: shot.scene.mean_luminance_cd_m2(),
                 light: shot.scene.light,
             },
-            psf_bank: BankData::of(&self.bank),
+            psf_bank: BankData::of_camera(&self.bank),
             irradiance: IrradianceData {
                 wavelengths_nm: shot.grid().centers_nm().to_vec(),
                 mean_w_m2_nm: self.irradiance.mean.clone(),

@@ -51,7 +51,10 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
     let charts = page.charts;
     let svg = |chart: &crate::LineChart| Value::from_safe_string(chart.to_svg(CHART.0, CHART.1));
     let drawing = LensDrawing {
-        fields_deg: [0.0, 0.7, 1.0].iter().map(|share| (share * page.places.corner_tan).atan().to_degrees()).collect(),
+        fields_deg: [0.0, 0.7, 1.0]
+            .iter()
+            .map(|share| (share * page.places.corner_tan()).atan().to_degrees())
+            .collect(),
         distance_mm: page.shot.focus_distance_mm.unwrap_or(f64::INFINITY),
         wavelengths_nm: vec![crate::REFERENCE_WAVELENGTH_NM],
         film_mm: Some(page.shot.film_mm),
@@ -94,7 +97,7 @@ fn embedded(picture: &RgbImage) -> String {
 
 fn mosaic(page: &Page<'_>) -> Result<(PsfMosaic, String), PipelineError> {
     let plan = MosaicPlan {
-        field_tans: [0.0, 0.35, 0.7, 0.95].iter().map(|share| share * page.places.corner_tan).collect(),
+        field_tans: [0.0, 0.35, 0.7, 0.95].iter().map(|share| page.places.field(*share)).collect(),
         dioptres: page.places.dioptres.clone(),
         grid: page.shot.grid().clone(),
         tile_px: 95,

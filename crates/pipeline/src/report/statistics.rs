@@ -145,16 +145,16 @@ fn raw_planes(raw: &Raw) -> Vec<Array2<f32>> {
 }
 
 /// Returns where the light of a few fields goes, at the reference wavelength and the depth in focus.
-pub(super) fn losses(shot: &Shot, field_tans: &[f64]) -> Result<Vec<LossRow>, PipelineError> {
+pub(super) fn losses(shot: &Shot, field_tans: &[DVec2]) -> Result<Vec<LossRow>, PipelineError> {
     let mono = shot.lens.at(REFERENCE_WAVELENGTH_NM)?;
     let (near_m, _) = shot.scene.require_depth()?.range_m();
     let dioptres = shot.focus_distance_mm.map_or(1.0 / near_m, |mm| 1e3 / (mm + mono.projection_center_z_mm()));
     Ok(field_tans.iter().map(|&field_tan| loss_row(shot, &mono, field_tan, dioptres)).collect())
 }
 
-fn loss_row(shot: &Shot, mono: &MonoLens, field_tan: f64, dioptres: f64) -> LossRow {
+fn loss_row(shot: &Shot, mono: &MonoLens, field_tan: DVec2, dioptres: f64) -> LossRow {
     let axial = ObjectPoint::from_field(mono, DVec2::ZERO, dioptres);
-    let point = ObjectPoint::from_field(mono, DVec2::new(field_tan, 0.0), dioptres);
+    let point = ObjectPoint::from_field(mono, field_tan, dioptres);
     let mut rays = rays_over_front(mono, &point, LOSS_RAYS);
     mono.trace(&mut rays, Rims::Clip);
     let losses = rays.losses();
@@ -169,7 +169,7 @@ fn loss_row(shot: &Shot, mono: &MonoLens, field_tan: f64, dioptres: f64) -> Loss
         otherwise += row.n_missed + row.n_totally_reflected;
     }
     LossRow {
-        field_deg: field_tan.atan().to_degrees(),
+        field_deg: field_tan.length().atan().to_degrees(),
         reaches_film: share(losses.n_in_flight),
         ended_by_stop: share(by_stop),
         ended_by_rims: share(by_rims),

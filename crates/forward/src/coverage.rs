@@ -1,0 +1,224 @@
+//! The sampling of point spread functions that a scene and a film need.
+
+use dioptric_optics::{Lens, MonoLens, ObjectPoint, PupilBoundary, Rims, rays_towards};
+use dioptric_psf::{BankSettings, Diffraction, FieldBankSettings};
+use dioptric_spectrum::WavelengthGrid;
+use glam::{DMat2, DVec2};
+
+use crate::{Film, ForwardError};
+
+/// What a bank must cover, and through which lens.
+#[derive(Clone, Copy, Debug)]
+pub struct Coverage<'a> {
+    /// The lens, its stop set.
+    pub lens: &'a Lens,
+    /// The film.
+    pub film: &'a Film,
+    /// Distance of the film behind the last vertex, mm.
+    pub film_mm: f64,
+    /// Nearest and farthest depth of the scene, m; the farthest may be infinite.
+    pub depth_range_m: (f64, f64),
+    /// The bands.
+    pub grid: &'a WavelengthGrid,
+    /// How diffraction is taken into account.
+    pub diffraction: Diffraction,
+}
+
+impl Coverage<'_> {
+    /// Returns the farthest and nearest depth, dioptres.
+    fn dioptres(&self) -> Result<(f64, f64), ForwardError> {
+        let (near_m, far_m) = self.depth_range_m;
+        if near_m > 0.0 && near_m <= far_m {
+            return Ok((1.0 / far_m, 1.0 / near_m));
+        }
+        let (what, value) = ("the nearest depth", near_m);
+        Err(ForwardError::Setting { what, value, expected: "above 0 and no larger than the farthest, m" })
+    }
+
+    /// Hands the lens at the ends of the wavelengths, looking at the ends of the depths, one after the other.
+    fn for_each_end(&self, mut look: impl FnMut(&Aim<'_>) -> Result<(), ForwardError>) -> Result<(), ForwardError> {
+        let (far, near) = self.dioptres()?;
+        let (first_nm, last_nm) = self.grid.range_nm();
+        let BankSettings { reference_wavelength_nm, .. } =
+            BankSettings::covering(self.film_mm, 0.0, (far, near), (first_nm, last_nm), self.diffraction);
+        let reference = self.lens.at(reference_wavelength_nm)?;
+        for wavelength_nm in [first_nm, last_nm] {
+            let lens = self.lens.at(wavelength_nm)?;
+            for dioptres in [far, near] {
+                look(&Aim { lens: &lens, reference: &reference, dioptres, film_mm: self.film_mm })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns the settings of a bank that serves a scene on a film: fields to beyond the film's corner, depths from end
+/// to end in dioptres, wavelengths evenly in 1/λ².
+///
+/// # Errors
+/// When the film has no area, or the lens has no index at a wavelength of the grid or is not rotationally symmetric:
+/// for that there is [`field_bank_settings_for`].
+pub fn bank_settings_for(coverage: &Coverage<'_>) -> Result<BankSettings, ForwardError> {
+    coverage.film.check()?;
+    coverage.lens.check_rotational("a bank of point spread functions over field angle alone")?;
+    let mut last_field_tan = 0.0_f64;
+    coverage.for_each_end(|aim| {
+        // The border of the film is blurred by light from beyond it.
+        let reach_mm = 1.02 * coverage.film.half_diagonal_mm() + aim.axial_blur_mm();
+        last_field_tan = last_field_tan.max(aim.field_tan_at(reach_mm));
+        Ok(())
+    })?;
+    let (dioptres, wavelengths_nm) = (coverage.dioptres()?, coverage.grid.range_nm());
+    Ok(BankSettings::covering(coverage.film_mm, last_field_tan, dioptres, wavelengths_nm, coverage.diffraction))
+}
+
+/// Returns the settings of a bank over a field of two dimensions that serves a scene on a film, through any lens: fields to
+/// beyond the film's sides, the rest as [`bank_settings_for`] does.
+///
+/// # Errors
+/// When the film has no area, the lens has no index at a wavelength of the grid, or no light reaches the middle of the film.
+pub fn field_bank_settings_for(coverage: &Coverage<'_>) -> Result<FieldBankSettings, ForwardError> {
+    coverage.film.check()?;
+    let half_mm = 0.5e-3 * coverage.film.pitch_um * DVec2::new(coverage.film.columns as f64, coverage.film.rows as f64);
+    let (mut first, mut last) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    coverage.for_each_end(|aim| {
+        let wavelength_nm = aim.lens.wavelength_nm();
+        let dark = || ForwardError::DarkFilm { lens: coverage.lens.name().to_owned(), wavelength_nm };
+        let center = aim.field_at_middle().ok_or_else(dark)?;
+        let beyond_mm = 1.02 * half_mm + aim.blur_mm(center);
+        let (low, high) = aim.fields_over(center, beyond_mm);
+        (first, last) = (first.min(low), last.max(high));
+        Ok(())
+    })?;
+    let (dioptres, wavelengths_nm) = (coverage.dioptres()?, coverage.grid.range_nm());
+    Ok(FieldBankSettings::covering(coverage.film_mm, (first, last), dioptres, wavelengths_nm, coverage.diffraction))
+}
+
+/// A lens looking at one depth.
+struct Aim<'a> {
+    lens: &'a MonoLens,
+    reference: &'a MonoLens,
+    dioptres: f64,
+    film_mm: f64,
+}
+
+/// The widest fields that are sought: 60 is 89°.
+const WIDEST_TAN: f64 = 60.0;
+
+impl Aim<'_> {
+    /// Returns where the middle of the light of a field lands, mm, picture frame; `None` where no light gets through.
+    fn lands_mm(&self, field_tan: DVec2) -> Option<DVec2> {
+        Some(self.pupil_lands_mm(field_tan, &[])?[0])
+    }
+
+    /// Returns where rays of a field land, mm, picture frame: that through the middle of the pupil, and those at these
+    /// azimuths of its edge. `None` where the first does not get through; others that fail are left out.
+    fn pupil_lands_mm(&self, field_tan: DVec2, azimuths: &[f64]) -> Option<Vec<DVec2>> {
+        let point = ObjectPoint::from_field(self.reference, field_tan, self.dioptres);
+        let pupil = PupilBoundary::find(self.lens, &point, 16)?;
+        let edge =
+            azimuths.iter().map(|&azimuth| pupil.center_mm() + DVec2::from_angle(azimuth) * pupil.rho_max_mm(azimuth));
+        let targets: Vec<DVec2> = std::iter::once(pupil.center_mm()).chain(edge).collect();
+        let mut rays = rays_towards(&point, &targets, pupil.z_mm(), 0.0);
+        self.lens.trace(&mut rays, Rims::Ignore);
+        self.lens.to_film(&mut rays, self.film_mm);
+        if !rays.fate[0].is_in_flight() {
+            return None;
+        }
+        Some((0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()).map(|i| -rays.point_mm(i).truncate()).collect())
+    }
+
+    /// Returns the radius of the blur on the axis, mm, from first-order optics.
+    fn axial_blur_mm(&self) -> f64 {
+        let from_vertex_mm = 1e3 / self.dioptres - self.lens.projection_center_z_mm();
+        let Ok(image_mm) = self.lens.film_mm_for(from_vertex_mm) else { return 0.0 };
+        let cone = 0.5 / (self.lens.image_index() * self.lens.working_f_number(from_vertex_mm));
+        (cone * (self.film_mm - image_mm)).abs()
+    }
+
+    /// Returns how far from the middle of a field's light its farthest ray lands, mm.
+    fn blur_mm(&self, field_tan: DVec2) -> f64 {
+        let azimuths: Vec<f64> = (0..16).map(|i| f64::from(i) / 16.0 * std::f64::consts::TAU).collect();
+        let landed = self.pupil_lands_mm(field_tan, &azimuths).unwrap_or_default();
+        landed.iter().map(|at| at.distance(landed[0])).fold(0.0, f64::max)
+    }
+
+    /// Returns the field that lands this far off axis, or the last that gets through.
+    fn field_tan_at(&self, reach_mm: f64) -> f64 {
+        let is_within = |tan: f64| self.lands_mm(DVec2::X * tan).map(|at| at.x.abs() < reach_mm);
+        let (mut low, mut high) = (0.0, 0.01);
+        // Widen until the light lands beyond, or there is none.
+        while high < WIDEST_TAN && is_within(high) == Some(true) {
+            (low, high) = (high, 1.3 * high);
+        }
+        for _ in 0..24 {
+            let middle = 0.5 * (low + high);
+            if is_within(middle) == Some(true) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        // Just beyond, so that the reach itself is covered — or, where light ends, seen to be dark.
+        high * (1.0 + 1e-3)
+    }
+
+    /// Returns the field whose light lands on the axis: by Newton's method from that along the axis.
+    fn field_at_middle(&self) -> Option<DVec2> {
+        let mut field_tan = DVec2::ZERO;
+        for _ in 0..12 {
+            const BY: f64 = 1e-4;
+            let at = self.lands_mm(field_tan)?;
+            let slope = DMat2::from_cols(
+                (self.lands_mm(field_tan + DVec2::X * BY)? - at) / BY,
+                (self.lands_mm(field_tan + DVec2::Y * BY)? - at) / BY,
+            );
+            let step = slope.inverse() * at;
+            if !step.is_finite() {
+                return None;
+            }
+            field_tan -= step;
+            // A hundredth of a degree is near enough to begin from.
+            if step.length() < 2e-4 {
+                return Some(field_tan);
+            }
+        }
+        None
+    }
+
+    /// Returns the corners of the rectangle of fields that holds all that land within `half_mm` of the axis, across and up.
+    fn fields_over(&self, center: DVec2, half_mm: DVec2) -> (DVec2, DVec2) {
+        const ALONG: i32 = 8;
+        let is_within = |field_tan: DVec2| self.lands_mm(field_tan).is_some_and(|at| at.abs().cmplt(half_mm).all());
+        // Sides: left, bottom, right, top, as distances from the centre.
+        let mut sides = [1e-3; 4];
+        let corners =
+            |sides: &[f64; 4]| (center - DVec2::new(sides[0], sides[1]), center + DVec2::new(sides[2], sides[3]));
+        let sees_film = |sides: &[f64; 4], side: usize| {
+            let (low, high) = corners(sides);
+            (0..=ALONG).any(|i| {
+                let part = low + (high - low) * (f64::from(i) / f64::from(ALONG));
+                is_within(match side {
+                    0 => DVec2::new(low.x, part.y),
+                    1 => DVec2::new(part.x, low.y),
+                    2 => DVec2::new(high.x, part.y),
+                    _ => DVec2::new(part.x, high.y),
+                })
+            })
+        };
+        // A side goes out until nothing along it lands on the film; others may then have to follow.
+        loop {
+            let mut has_grown = false;
+            for side in 0..4 {
+                while sides[side] < WIDEST_TAN && sees_film(&sides, side) {
+                    sides[side] *= 1.15;
+                    has_grown = true;
+                }
+            }
+            if !has_grown {
+                break;
+            }
+        }
+        corners(&sides)
+    }
+}
