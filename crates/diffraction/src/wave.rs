@@ -1,20 +1,24 @@
 //! Point spread functions of wave optics, from traced rays.
 //!
-//! Every node of the true, vignetted pupil sends a plane wave to the film, with the phase that its optical path gives
-//! it (the angular eikonal) and the amplitude of the energy that it carries per range of directions. The waves are
-//! summed at the Gauss–Legendre points of each pixel, and their square is integrated over the pixel. No exit pupil is
-//! built and nothing is resampled, so any pitch, origin, field, vignetting and image medium will do.
+//! Every node of the true, vignetted pupil sends a wave to the film from the sphere about the image through the middle of the
+//! exit pupil, with the phase that its optical path gives it (the angular eikonal) and the amplitude of the energy that it
+//! carries per range of directions. On the film the waves are as good as plane. They are
+//! summed at the Gauss–Legendre points of each pixel, and their square is integrated over the pixel. Nothing is resampled, so any
+//! pitch, origin, field, vignetting and image medium will do.
 //!
 //! What comes out is normalised by the pupil's energy, never by the window's: the sum is the share of the light that
 //! the window holds. Polarisation is left out.
 
 mod axis;
+mod cells;
 pub(crate) mod cis;
+mod grid;
 mod gridded;
 mod map;
 mod nodes;
 mod pixel_mean;
 mod polychromatic;
+mod propagation;
 mod smooth;
 mod strehl;
 mod transform;
@@ -25,11 +29,13 @@ use ndarray::{Array2, s};
 
 use crate::DiffractionError;
 use axis::SampleAxis;
+pub(crate) use cells::PupilCells;
+pub use grid::{PhaseRange, PupilGrid};
 use gridded::Grid;
 pub use map::{PupilEdge, WaveMap};
-pub use nodes::{PhaseRange, Propagation, PupilGrid, WaveNodes};
-pub(crate) use nodes::{polar, solid_angle_per_area};
+pub use nodes::WaveNodes;
 pub use polychromatic::polychromatic_psf;
+pub use propagation::Propagation;
 pub use strehl::Peak;
 
 /// Where the middle of a window lies.
@@ -168,16 +174,16 @@ impl WaveNodes {
     /// Returns the grid that is to be tried instead of this one for places up to `reach_mm` from the reference, or `None`
     /// if this one does.
     fn finer_grid(&self, reach_mm: f64) -> Result<Option<PupilGrid>, DiffractionError> {
-        let PhaseRange { rays, window } = self.phase_range(reach_mm);
-        if self.grid.covers(PupilGrid::needed(PhaseRange { rays, window })) {
+        let range = self.phase_range(reach_mm);
+        if self.grid.covers(PupilGrid::needed(range)) {
             return Ok(None);
         }
-        let bandwidth = rays + window;
+        let bandwidth = range.total();
         if bandwidth > LARGEST_BANDWIDTH {
             return Err(DiffractionError::TooBlurred { bandwidth, limit: LARGEST_BANDWIDTH });
         }
         // More nodes reach nearer to the edge, and may find that still more are needed: hence the hundredth to spare.
-        let needed = PupilGrid::needed(PhaseRange { rays: 1.01 * rays, window: 1.01 * window });
+        let needed = PupilGrid::needed(range.scaled(1.01));
         Ok(Some(needed.max(self.grid)))
     }
 

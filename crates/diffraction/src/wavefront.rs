@@ -1,11 +1,11 @@
 //! Wavefronts: by how much the paths of a pupil's rays differ from a perfect lens's.
 
-use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims, analysis::StopAim};
+use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Rims, analysis::StopAim};
 use glam::{DVec2, DVec3};
 
 use crate::{
     DiffractionError, PupilGrid,
-    wave::{cis::cis, polar, solid_angle_per_area},
+    wave::{PupilCells, cis::cis},
     zernike::fit_noll,
 };
 
@@ -104,8 +104,7 @@ impl Wavefront {
         reference: WavefrontReference,
     ) -> Result<Self, DiffractionError> {
         let wavelength_nm = lens.wavelength_nm();
-        let boundary = boundary_of(lens, point, grid).ok_or(DiffractionError::NoLight { wavelength_nm })?;
-        let Traced { energy, in_stop, rays } = Traced::new(lens, point, film_mm, (&boundary, grid.n_radii))?;
+        let Traced { energy, in_stop, rays } = Traced::new(lens, point, film_mm, grid)?;
         let chief = rays.len() - 1;
         let sphere = ReferenceSphere::through_exit_pupil(lens, rays.point_mm(chief));
         let paths_mm = sphere.paths_mm(lens, &rays);
@@ -174,21 +173,10 @@ impl Wavefront {
 }
 
 impl Traced {
-    /// Traces the nodes of a pupil, `n_radii` along each of its azimuths, and the chief ray.
-    fn new(
-        lens: &MonoLens,
-        point: &ObjectPoint,
-        film_mm: f64,
-        (boundary, n_radii): (&PupilBoundary, usize),
-    ) -> Result<Self, DiffractionError> {
-        let (center_mm, z_mm, rho_mm) = (boundary.center_mm(), boundary.z_mm(), boundary.rho_at_azimuths_mm());
-        let grid = PupilGrid { n_radii, n_azimuths: rho_mm.len() };
-        let (mut targets_mm, areas): (Vec<DVec2>, Vec<f64>) =
-            polar(grid, |azimuth| rho_mm[azimuth]).map(|(offset, area)| (center_mm + offset, area)).unzip();
-        let taken = |(target, area): (&DVec2, &f64)| area * solid_angle_per_area(point, target.extend(z_mm));
-        let mut energy: Vec<f64> = targets_mm.iter().zip(&areas).map(taken).collect();
-        let total: f64 = energy.iter().sum();
-        energy.iter_mut().for_each(|e| *e /= total);
+    /// Traces the nodes of a pupil and the chief ray.
+    fn new(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, grid: PupilGrid) -> Result<Self, DiffractionError> {
+        let PupilCells { mut targets_mm, energy, z_mm, center_mm, .. } = PupilCells::find(lens, point, grid)
+            .ok_or(DiffractionError::NoLight { wavelength_nm: lens.wavelength_nm() })?;
 
         // Of a strongly vignetted pupil the chief ray need not get through the rims.
         targets_mm.push(chief_target_mm(lens, point, z_mm).unwrap_or(center_mm));
@@ -216,26 +204,6 @@ fn chief_target_mm(lens: &MonoLens, point: &ObjectPoint, z_mm: f64) -> Option<DV
     let mut ray = lens.rays_towards(point, &[target_mm], z_mm, 0.0);
     lens.trace(&mut ray, Rims::Ignore);
     ray.fate[0].is_in_flight().then_some(target_mm)
-}
-
-/// The share to which sums over the azimuths of an elongated pupil are exact, and the most azimuths for that.
-const AZIMUTH_ERROR: f64 = 1e-6;
-const MOST_AZIMUTHS: usize = 1024;
-
-/// Finds the pupil of a point at the azimuths of a grid, or at as many more as one that is long and narrow needs.
-///
-/// About the centre of an ellipse of axes a and b, ρ² has harmonics of 2θ that fall like ((a − b) / (a + b))ᵏ, so that
-/// sums over n azimuths err by the (n / 2)-th of them.
-fn boundary_of(lens: &MonoLens, point: &ObjectPoint, grid: PupilGrid) -> Option<PupilBoundary> {
-    let boundary = PupilBoundary::find(lens, point, grid.n_azimuths)?;
-    let rho_mm = boundary.rho_at_azimuths_mm();
-    let ends = rho_mm.iter().fold((f64::INFINITY, 0.0_f64), |ends, rho| (ends.0.min(*rho), ends.1.max(*rho)));
-    let ratio = (ends.1 - ends.0) / (ends.1 + ends.0);
-    let needed = (2.0 * AZIMUTH_ERROR.ln() / ratio.ln()).ceil().min(MOST_AZIMUTHS as f64) as usize;
-    if needed <= rho_mm.len() {
-        return Some(boundary);
-    }
-    PupilBoundary::find(lens, point, needed.next_multiple_of(2))
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ fn traced_thin_lens_has_the_pattern_of_its_hankel_transform() {
         let lens = Lens::thin(50.0, 50.0 / f_number).unwrap().at(wavelength_nm).unwrap();
         let unit_um = wavelength_nm * 1e-3 * f_number;
         let nodes = WaveNodes::trace(&lens, &ObjectPoint::Infinite(DVec3::Z), 50.0, PupilGrid::STANDARD, None).unwrap();
-        assert_eq!(nodes.propagation, Propagation::Debye);
+        assert_eq!(nodes.propagation, Propagation::Fresnel);
         let psf = nodes.psf(&window(unit_um / 6.0, 41), Some(1)).unwrap();
         let (mut difference, mut sum) = (0.0, 0.0);
         for ((row, column), share) in psf.samples.indexed_iter() {
@@ -70,7 +70,7 @@ fn against_huygens(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, pitch_um:
     let points = WaveQuality { points_per_pixel: Some(1), ..WaveQuality::default() };
     let psf = wave_psf(lens, point, film_mm, &window(pitch_um, 25), points).unwrap();
     let places: Vec<DVec2> = psf.samples.indexed_iter().map(|((row, column), _)| psf.pixel_mm(row, column)).collect();
-    let huygens = HuygensSources::trace(lens, point, film_mm, psf.center_mm, n_rings).unwrap();
+    let huygens = HuygensSources::trace(lens, point, film_mm, psf.center_mm, 2 * n_rings).unwrap();
     let area = (pitch_um * 1e-3).powi(2);
     let expected = huygens.irradiance_per_mm2(&places);
     let difference: f64 = psf.samples.iter().zip(&expected).map(|(a, b)| (a - b * area).abs()).sum();

@@ -85,14 +85,23 @@ impl Aperture {
     /// How far inside the opening a place is, mm: 0 at the edge, negative outside. Of an ellipse it is only of the right
     /// sign, and of the right size along its axes; an obscuration is as though it were not there.
     pub(crate) fn clearance_mm(&self, x_mm: f64, y_mm: f64) -> f64 {
+        self.clearance_of_side_mm(x_mm, y_mm).0
+    }
+
+    /// The same, and which of a rectangle's four sides it counts from; 0 of others.
+    pub(crate) fn clearance_of_side_mm(&self, x_mm: f64, y_mm: f64) -> (f64, usize) {
         if self.is_obscuration {
-            return f64::INFINITY;
+            return (f64::INFINITY, 0);
         }
         let from_center = DVec2::new(x_mm, y_mm) - DVec2::from_array(self.center_mm);
         let half = self.outline.half_widths_mm();
         match self.outline {
-            Outline::Rectangle { .. } => (half - from_center.abs()).min_element(),
-            _ => (1.0 - (from_center / half).length()) * half.min_element(),
+            Outline::Rectangle { .. } => {
+                let inside = half - from_center.abs();
+                let (least, side) = if inside.x < inside.y { (inside.x, 0) } else { (inside.y, 1) };
+                (least, 2 * side + usize::from(from_center[side] < 0.0))
+            }
+            _ => ((1.0 - (from_center / half).length()) * half.min_element(), 0),
         }
     }
 

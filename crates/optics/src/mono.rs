@@ -78,6 +78,32 @@ impl MonoLens {
         self.placed.is_none() && self.steps.iter().all(is_round)
     }
 
+    /// The number of obscurations, of all surfaces.
+    pub fn n_obscurations(&self) -> usize {
+        self.steps.iter().flat_map(|step| &step.apertures).filter(|aperture| aperture.is_obscuration).count()
+    }
+
+    /// Returns the lens with some of its obscurations (counted through all surfaces) inverted: they pass what they
+    /// stopped, and nothing else. Its other obscurations are taken away.
+    ///
+    /// What lenses with holes let through is thus a sum of pupils without: the whole, less those of each obscuration
+    /// inverted, plus those of each two of them, and so on.
+    #[must_use]
+    pub fn with_obscurations_inverted(&self, inverted: &[usize]) -> Self {
+        let (mut lens, mut n) = (self.clone(), 0);
+        for step in &mut lens.steps {
+            step.apertures.retain_mut(|aperture| {
+                if !aperture.is_obscuration {
+                    return true;
+                }
+                aperture.is_obscuration = false;
+                n += 1;
+                inverted.contains(&(n - 1))
+            });
+        }
+        lens
+    }
+
     /// The wavelength, nm.
     pub fn wavelength_nm(&self) -> f64 {
         self.wavelength_nm

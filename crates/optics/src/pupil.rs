@@ -1,5 +1,7 @@
 //! The pupil that an object point sees.
 
+mod corners;
+
 use glam::DVec2;
 
 use crate::{
@@ -11,7 +13,8 @@ use crate::{
 /// given by its edge at equally spaced azimuths about a centre.
 ///
 /// The edge follows the round rims and the openings of surfaces; an obscuration ([`Aperture`](crate::Aperture)) is a
-/// hole in the region that is not part of it.
+/// hole in the region that is not part of it. The hole is itself the pupil of the lens
+/// [with the obscuration inverted](MonoLens::with_obscurations_inverted).
 #[derive(Clone, Debug, PartialEq)]
 pub struct PupilBoundary {
     // Invariants: at least 3 radii, all finite and above 0.
@@ -137,10 +140,15 @@ impl<'a> Search<'a> {
 
     /// Returns the edge as seen from a point inside, found to `edge_mm` of clearance.
     fn boundary(&self, center_mm: DVec2, n_azimuths: usize, edge_mm: f64) -> Option<PupilBoundary> {
+        let rho_mm = self.edge_mm(center_mm, PupilBoundary::azimuths(n_azimuths), edge_mm)?;
+        Some(PupilBoundary { center_mm, z_mm: self.z_mm, rho_mm })
+    }
+
+    /// Returns how far the edge is from a point inside in each direction, mm, found to `edge_mm` of clearance.
+    fn edge_mm(&self, center_mm: DVec2, directions: impl Iterator<Item = DVec2>, edge_mm: f64) -> Option<Vec<f64>> {
         let at_center = self.clearances(&[center_mm])[0];
         let edge_mm = edge_mm.min(0.01 * at_center);
-        let mut edges: Vec<Edge> =
-            PupilBoundary::azimuths(n_azimuths).map(|direction| Edge::new(direction, at_center)).collect();
+        let mut edges: Vec<Edge> = directions.map(|direction| Edge::new(direction, at_center)).collect();
         for _ in 0..EDGE_ROUNDS {
             let mut open: Vec<&mut Edge> = edges.iter_mut().filter(|edge| !edge.is_found(edge_mm)).collect();
             if open.is_empty() {
@@ -153,9 +161,8 @@ impl<'a> Search<'a> {
                 edge.note(rho, clearance);
             }
         }
-        let rho_mm: Vec<f64> = edges.iter().map(|edge| edge.inner.0).collect();
         let is_whole = edges.iter().all(|edge| edge.outer.is_some() && edge.inner.0 > 0.0);
-        is_whole.then_some(PupilBoundary { center_mm, z_mm: self.z_mm, rho_mm })
+        is_whole.then(|| edges.iter().map(|edge| edge.inner.0).collect())
     }
 }
 

@@ -7,8 +7,9 @@ use glam::DVec2;
 use multiversion::multiversion;
 
 use super::{
-    Propagation, PupilGrid, WaveNodes, WavePsf, WaveWindow, WindowCenter,
-    nodes::{along_rays, propagation, solid_angle_per_area},
+    PupilGrid, WaveNodes, WavePsf, WaveWindow, WindowCenter,
+    cells::solid_angle_per_area,
+    propagation::{Waves, has_few_zones},
     smooth::{Azimuth, Parity, Places, Ray, horner, radial_slope},
 };
 use crate::{DiffractionError, quadrature::gauss_legendre_on};
@@ -70,7 +71,7 @@ impl WaveMap {
     ) -> Result<Self, DiffractionError> {
         let wavelength_nm = lens.wavelength_nm();
         let folded = DiffractionError::Folded { wavelength_nm };
-        if propagation(lens, film_mm) == Propagation::Fresnel {
+        if has_few_zones(lens, film_mm) {
             return Err(folded);
         }
         let half_mm = edge.half_sizes_mm();
@@ -88,7 +89,7 @@ impl WaveMap {
         let half_collected: f64 = taken.iter().sum();
         // The other half of the pupil mirrors this one.
         let centroid_x_mm = taken.iter().zip(&rays.x_mm).map(|(e, x)| e * x).sum::<f64>() / half_collected;
-        let waves = along_rays(&rays, DVec2::new(centroid_x_mm, 0.0), lens.image_index());
+        let waves = Waves::of(&rays, DVec2::new(centroid_x_mm, 0.0), lens, film_mm);
         let piston_mm = waves.phi_mm[0];
         let phi_mm: Vec<f64> = waves.phi_mm.iter().map(|phi| phi - piston_mm).collect();
         let d_x: Vec<f64> = waves.d.iter().map(|d| d.x).collect();

@@ -52,30 +52,41 @@ impl Reference {
     /// Returns where to aim in the entrance-pupil plane for pupil coordinates: fractions of its radius, or of that of
     /// the real stop, which rays of the main wavelength are then made to meet.
     pub(crate) fn target_mm(&self, point: &ObjectPoint, pupil: DVec2) -> DVec2 {
-        let paraxial = pupil * self.pupil_radius_mm;
+        self.targets_mm(point, [pupil])[0]
+    }
+
+    /// The same for many places.
+    pub(crate) fn targets_mm(&self, point: &ObjectPoint, pupil: impl IntoIterator<Item = DVec2>) -> Vec<DVec2> {
         if self.file["lens"]["pupil_mode"] == "paraxial_ep" {
-            return paraxial;
+            return pupil.into_iter().map(|place| place * self.pupil_radius_mm).collect();
         }
         let mono = self.lens.at(number(&self.file["lens"]["primary_nm"])).unwrap();
-        let wanted = pupil * number(&self.file["lens"]["stop_radius_real_axis"]);
-        let miss = |target: DVec2| {
-            let mut rays = rays_towards(point, &[target], self.pupil_z_mm, 0.0);
+        let radius_mm = number(&self.file["lens"]["stop_radius_real_axis"]);
+        let wanted: Vec<DVec2> = pupil.into_iter().map(|place| place * radius_mm).collect();
+        let misses = |targets: &[DVec2]| -> Vec<DVec2> {
+            let mut rays = rays_towards(point, targets, self.pupil_z_mm, 0.0);
             mono.trace_surfaces(0..mono.stop() + 1, &mut rays, Rims::Ignore);
-            assert!(rays.fate[0].is_in_flight(), "aim lost at {target}");
-            rays.point_mm(0).truncate() - wanted
+            assert_eq!(rays.n_in_flight(), rays.len(), "an aim is lost");
+            (0..rays.len()).map(|i| rays.point_mm(i).truncate() - wanted[i]).collect()
         };
         // The pupil of a wide lens moves with the field; the centre of the true one is a good start.
         let start = PupilBoundary::find(&mono, point, 64).unwrap().center_mm();
-        let mut target = start;
+        let mut targets = vec![start; wanted.len()];
         for _ in 0..40 {
-            let here = miss(target);
-            if here.length() < 1e-13 {
+            let here = misses(&targets);
+            if here.iter().all(|miss| miss.length() < 1e-13) {
                 break;
             }
-            let slope = |u: DVec2| (miss(target + u * 1e-6) - miss(target - u * 1e-6)) / 2e-6;
-            let step = DMat2::from_cols(slope(DVec2::X), slope(DVec2::Y)).inverse() * here;
-            target -= step * (0.3 / step.length()).min(1.0);
+            let moved = |by: DVec2| misses(&targets.iter().map(|target| target + by * 1e-6).collect::<Vec<_>>());
+            let [px, mx, py, my] = [DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(moved);
+            for i in 0..targets.len() {
+                let slopes = DMat2::from_cols((px[i] - mx[i]) / 2e-6, (py[i] - my[i]) / 2e-6);
+                let step = slopes.inverse() * here[i];
+                if step.length() > 0.0 {
+                    targets[i] -= step * (0.3 / step.length()).min(1.0);
+                }
+            }
         }
-        target
+        targets
     }
 }
