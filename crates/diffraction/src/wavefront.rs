@@ -71,8 +71,11 @@ pub struct Wavefront {
     /// Where the rays pass the real stop, in units of its radius, from its middle: the unvignetted pupil is the unit
     /// disc, at any field.
     pub pupil: Vec<DVec2>,
-    /// Share of the energy at each place; the sum is 1.
+    /// Share of the energy at each place; the sum is 1. Behind an obscuration there are as many places of positive as of
+    /// negative energy, so that nothing of it remains in sums.
     pub energy: Vec<f64>,
+    /// Whether light takes this way: `false` behind an obscuration.
+    pub is_clear: Vec<bool>,
     /// Optical path less the reference's, waves: positive where the light comes late.
     pub opd_waves: Vec<f64>,
     /// The film point about which the wave converges best (of its reference), mm, lens frame.
@@ -82,6 +85,7 @@ pub struct Wavefront {
 /// Places of a true pupil and the rays through them.
 struct Traced {
     energy: Vec<f64>,
+    is_clear: Vec<bool>,
     /// Where the rays pass the stop, in units of its radius.
     in_stop: Vec<DVec2>,
     /// On the film; the chief ray comes last.
@@ -104,13 +108,13 @@ impl Wavefront {
         reference: WavefrontReference,
     ) -> Result<Self, DiffractionError> {
         let wavelength_nm = lens.wavelength_nm();
-        let Traced { energy, in_stop, rays } = Traced::new(lens, point, film_mm, grid)?;
+        let Traced { energy, is_clear, in_stop, rays } = Traced::new(lens, point, film_mm, grid)?;
         let chief = rays.len() - 1;
         let sphere = ReferenceSphere::through_exit_pupil(lens, rays.point_mm(chief));
         let paths_mm = sphere.paths_mm(lens, &rays);
         let opd_waves = paths_mm[..chief].iter().map(|p| (p - paths_mm[chief]) / (wavelength_nm * 1e-6)).collect();
         let center_mm = sphere.center_mm.truncate();
-        let mut wavefront = Self { wavelength_nm, pupil: in_stop, energy, opd_waves, center_mm };
+        let mut wavefront = Self { wavelength_nm, pupil: in_stop, energy, is_clear, opd_waves, center_mm };
         if reference == WavefrontReference::Best {
             let directions: Vec<DVec2> = (0..chief).map(|i| rays.direction(i).truncate()).collect();
             wavefront.take_out_tilt(&directions, lens.image_index());
@@ -148,9 +152,10 @@ impl Wavefront {
         self.mean(|w| (w - mean).powi(2)).sqrt()
     }
 
-    /// Returns the difference of the largest and the least aberration, waves.
+    /// Returns the difference of the largest and the least aberration of what light there is, waves.
     pub fn peak_to_valley_waves(&self) -> f64 {
-        let ends = self.opd_waves.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |e, w| (e.0.min(*w), e.1.max(*w)));
+        let clear = self.opd_waves.iter().zip(&self.is_clear).filter_map(|(w, is_clear)| is_clear.then_some(w));
+        let ends = clear.fold((f64::INFINITY, f64::NEG_INFINITY), |e, w| (e.0.min(*w), e.1.max(*w)));
         ends.1 - ends.0
     }
 
@@ -178,6 +183,15 @@ impl Traced {
         let PupilCells { mut targets_mm, energy, z_mm, center_mm, .. } = PupilCells::find(lens, point, grid)
             .ok_or(DiffractionError::NoLight { wavelength_nm: lens.wavelength_nm() })?;
 
+        let is_clear = match lens.n_obscurations() {
+            0 => vec![true; energy.len()],
+            _ => {
+                let mut rays = lens.rays_towards(point, &targets_mm, z_mm, 0.0);
+                lens.trace(&mut rays, Rims::Clip);
+                rays.fate.iter().map(|fate| fate.is_in_flight()).collect()
+            }
+        };
+
         // Of a strongly vignetted pupil the chief ray need not get through the rims.
         targets_mm.push(chief_target_mm(lens, point, z_mm).unwrap_or(center_mm));
         let mut rays = lens.rays_towards(point, &targets_mm, z_mm, 0.0);
@@ -189,7 +203,7 @@ impl Traced {
         lens.to_image_surface(&mut rays, film_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         match n_lost {
-            0 => Ok(Self { energy, in_stop, rays }),
+            0 => Ok(Self { energy, is_clear, in_stop, rays }),
             _ => Err(DiffractionError::LostRays { wavelength_nm: lens.wavelength_nm(), n_lost, n_rays }),
         }
     }

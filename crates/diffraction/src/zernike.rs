@@ -60,17 +60,18 @@ fn radial(n: u32, m: u32, rho: f64) -> f64 {
 /// Returns the coefficients of the first `n_terms` polynomials that fit the values best, by weighted least squares.
 ///
 /// The points need not fill the disc, but must tell the polynomials apart; a polynomial that they do not tell from
-/// those before it gets the coefficient 0.
+/// those before it gets the coefficient 0. Weights are those of a quadrature: some may be negative, where a hole is
+/// taken away from a whole.
 pub fn fit_noll(points: &[DVec2], values: &[f64], weights: &[f64], n_terms: usize) -> Vec<f64> {
     // Gram and Schmidt, each column made orthogonal twice, which is as good as Householder.
-    let scaled = |value: f64, weight: f64| value * weight.max(0.0).sqrt();
-    let mut rest: Vec<f64> = values.iter().zip(weights).map(|(v, w)| scaled(*v, *w)).collect();
+    let dot = |a: &[f64], b: &[f64]| -> f64 { weights.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum() };
+    let mut rest = values.to_vec();
     let mut basis: Vec<Vec<f64>> = Vec::with_capacity(n_terms);
     let mut upper = vec![vec![0.0; n_terms]; n_terms];
     let mut along = vec![0.0; n_terms];
     for term in 0..n_terms {
-        let mut column: Vec<f64> = points.iter().zip(weights).map(|(p, w)| scaled(noll(term + 1, *p), *w)).collect();
-        let length = dot(&column, &column).sqrt();
+        let mut column: Vec<f64> = points.iter().map(|p| noll(term + 1, *p)).collect();
+        let length = dot(&column, &column).max(0.0).sqrt();
         for _ in 0..2 {
             for (row, q) in basis.iter().enumerate() {
                 let share = dot(q, &column);
@@ -78,7 +79,7 @@ pub fn fit_noll(points: &[DVec2], values: &[f64], weights: &[f64], n_terms: usiz
                 subtract(&mut column, q, share);
             }
         }
-        let left = dot(&column, &column).sqrt();
+        let left = dot(&column, &column).max(0.0).sqrt();
         let is_new = left > 1e-10 * length;
         upper[term][term] = if is_new { left } else { 0.0 };
         column.iter_mut().for_each(|c| *c = if is_new { *c / left } else { 0.0 });
@@ -92,10 +93,6 @@ pub fn fit_noll(points: &[DVec2], values: &[f64], weights: &[f64], n_terms: usiz
         coefficients[term] = if upper[term][term] > 0.0 { (along[term] - above) / upper[term][term] } else { 0.0 };
     }
     coefficients
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn subtract(from: &mut [f64], what: &[f64], times: f64) {
