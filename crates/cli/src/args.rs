@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dioptric_pipeline::{LensReading, MissingGlassChoice};
 
-use crate::measure_args::MeasureCommand;
+use crate::{measure_args::MeasureCommand, movement_args::MovementArgs};
 
 /// Simulates a camera from the scene's spectral radiance to the final picture.
 #[derive(Debug, Parser)]
@@ -84,6 +84,8 @@ pub(crate) struct RunArgs {
     /// Places the film this far behind the last vertex, mm
     #[arg(long, value_name = "D")]
     pub(crate) film_mm: Option<f64>,
+    #[command(flatten)]
+    pub(crate) movements: MovementArgs,
     /// Horizontal field of view of the scene, degrees
     #[arg(long, value_name = "A")]
     pub(crate) fov_deg: Option<f64>,

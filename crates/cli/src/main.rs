@@ -9,6 +9,7 @@ mod glass;
 mod lens;
 mod measure;
 mod measure_args;
+mod movement_args;
 mod psf;
 mod run;
 mod sense;

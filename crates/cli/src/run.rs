@@ -97,6 +97,7 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) {
     if let Some(d) = arguments.film_mm {
         camera.focus = FocusChoice::FilmMm(d);
     }
+    arguments.movements.change(&mut camera.movements);
     if let Some(kind) = arguments.diffraction {
         camera.diffraction = diffraction(kind);
     }

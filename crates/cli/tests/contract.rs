@@ -273,18 +273,21 @@ fn run_takes_a_picture_through_a_tilted_lens() {
     let lens = r#"(name: "askew", source: "test", surfaces: [
         (radius_mm: 50.0, semi_aperture_mm: 6.0, medium: Constant(index: 1.5), thickness_mm: 3.0),
         (stop: true, radius_mm: -50.0, semi_aperture_mm: 4.0, thickness_mm: 0.0),
-    ], moves: [(surfaces: (0, 1), tilt_deg: (5.0, 0.0, 0.0))])"#;
-    fs::write(folder.path().join("askew.ron"), lens).unwrap();
+    ])"#;
+    fs::write(folder.path().join("lens.ron"), lens).unwrap();
     let camera = common::CAMERA
-        .replace("BuiltIn(\"dgauss-50mm\")", "File(\"askew.ron\")")
+        .replace("BuiltIn(\"dgauss-50mm\")", "File(\"lens.ron\")")
         .replace("FNumber(4.0)", "FNumber(8.0)")
         .replace("Pixels(columns: 48, rows: 32, pitch_um: 200.0)", "Scene");
     fs::write(folder.path().join("camera.ron"), camera).unwrap();
-    let told = output(folder.path(), &["run", "camera.ron", "--out", "out"]);
+    let moved = ["--tilt-deg", "5", "--swing-deg=-1", "--rise-mm", "0.5"];
+    let told = output(folder.path(), &[&["run", "camera.ron", "--out", "out"][..], &moved].concat());
     assert!(told.contains("121 fields"), "{told}");
     let report: Value =
         serde_json::from_str(&fs::read_to_string(folder.path().join("out/report.json")).unwrap()).unwrap();
     assert!(report["psf_bank"]["median_error"].as_f64().unwrap() < 0.05, "{report}");
+    let movements = serde_json::json!({"tilt_deg": 5.0, "swing_deg": -1.0, "rise_mm": 0.5, "shift_mm": 0.0});
+    assert_eq!(report["camera"]["movements"], movements);
     // The scene fills the film to its rim: no corner is dark.
     let picture = image::open(folder.path().join("out/picture.png")).unwrap().to_rgb8();
     let (columns, rows) = picture.dimensions();

@@ -13,7 +13,7 @@ use dioptric_spectrum::Illuminant;
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::{BankChoice, FramesChoice, Outputs, PipelineError, SceneChoice, check::Checker};
+use crate::{BankChoice, FramesChoice, Movements, Outputs, PipelineError, SceneChoice, check::Checker};
 
 /// The camera of the built-in demo.
 const DEMO: &str = include_str!("../../../fixtures/cameras/demo.ron");
@@ -31,6 +31,9 @@ pub struct Camera {
     /// How far its stop is open.
     #[serde(default)]
     pub stop: StopChoice,
+    /// How it is turned and moved before the film.
+    #[serde(default)]
+    pub movements: Movements,
     /// Where the film is.
     pub focus: FocusChoice,
     /// How large the film is.
@@ -349,6 +352,12 @@ impl Camera {
             FocusChoice::DistanceMm(d) => checker.positive("DistanceMm", d)?,
             FocusChoice::FilmMm(d) => checker.finite("FilmMm", d)?,
             FocusChoice::NearObject => {}
+        }
+        let Movements { tilt_deg, swing_deg, rise_mm, shift_mm } = self.movements;
+        for (key, value) in
+            [("tilt_deg", tilt_deg), ("swing_deg", swing_deg), ("rise_mm", rise_mm), ("shift_mm", shift_mm)]
+        {
+            checker.finite(key, value)?;
         }
         if let FilmChoice::Pixels { columns, rows, pitch_um } = self.film {
             checker.count("columns", columns, 1..=65_536)?;

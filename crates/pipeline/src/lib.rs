@@ -28,6 +28,7 @@ mod lens_drawing;
 mod lens_table;
 pub mod measure;
 mod mosaic;
+mod movements;
 mod numbers;
 mod panel;
 mod plots;
@@ -70,6 +71,7 @@ pub use lens_table::{
     ImageData, LensData, LensQuestion, LensRow, PlaneData, SurfaceRow, built_in_lenses, surface_rows,
 };
 pub use mosaic::{MosaicPlan, PsfMosaic};
+pub use movements::Movements;
 pub use numbers::{parse_numbers, parse_pairs};
 pub use plots::{Corner, LineChart, Series};
 pub use progress::{Progress, Silent, Stage};

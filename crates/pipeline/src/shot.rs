@@ -43,7 +43,7 @@ impl Shot {
     pub fn open(camera: &Camera, progress: &dyn Progress) -> Result<Self, PipelineError> {
         camera.validate()?;
         progress.at(Stage::Scene, 0.0);
-        let lens = camera.stop.apply(camera.lens.open()?)?;
+        let lens = camera.movements.apply(camera.stop.apply(camera.lens.open()?)?)?;
         let sensor = camera.sensor.open()?;
         let scene = camera.scene.open(camera.wavelengths.grid()?.as_ref())?;
         let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
