@@ -1,6 +1,7 @@
 //! The pupil that an object point sees.
 
 mod corners;
+mod holes;
 
 use glam::DVec2;
 

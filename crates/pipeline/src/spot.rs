@@ -31,7 +31,7 @@ pub(crate) struct Moments {
 impl Spot {
     /// Sends rays evenly through the true pupil of a point.
     ///
-    /// `energy` is the area of that pupil over that which an axial point sees.
+    /// `energy` is the area of that pupil over that which an axial point sees, both without what obscurations stop.
     pub(crate) fn through_pupil(mono: &MonoLens, point: &ObjectPoint, axial: &ObjectPoint, film_mm: f64) -> Self {
         let Some(pupil) = PupilBoundary::find(mono, point, AZIMUTHS) else { return Self::default() };
         let (mut targets, mut areas) = (Vec::new(), Vec::new());
@@ -48,9 +48,12 @@ impl Spot {
         let cones = solid_angles(point, &rays);
         mono.trace(&mut rays, Rims::Clip);
         mono.to_film(&mut rays, film_mm);
-        let axial_mm2 = PupilBoundary::find(mono, axial, AZIMUTHS).map_or(f64::NAN, |p| p.area_mm2());
+        let area_mm2 = |point: &ObjectPoint| {
+            mono.over_clear_pupil(&|lens| PupilBoundary::find(lens, point, AZIMUTHS).map_or(0.0, |p| p.area_mm2()))
+        };
+        let seen_mm2 = if mono.n_obscurations() == 0 { pupil.area_mm2() } else { area_mm2(point) };
         let mut spot = Self::of_rays(&rays, |ray| areas[ray] * cones[ray]);
-        spot.energy = pupil.area_mm2() / axial_mm2;
+        spot.energy = Some(area_mm2(axial)).filter(|area| *area > 0.0).map_or(f64::NAN, |area| seen_mm2 / area);
         spot
     }
 

@@ -1,7 +1,7 @@
 //! Where the nodes of the pupil mesh land on the film: the map from which a point spread function is drawn.
 
 use dioptric_diffraction::{StopRay, trace_stop_rays};
-use dioptric_optics::{MonoLens, ObjectPoint, Rims, rays_towards};
+use dioptric_optics::{MonoLens, ObjectPoint, RayFate, Rims, rays_towards};
 use glam::DVec2;
 use multiversion::multiversion;
 
@@ -164,7 +164,13 @@ impl Task<'_> {
         let mut nodes = self.land(point, &targets, pupil.z_mm, has_stop)?;
         let weights = self.weights(point, &targets, pupil.z_mm);
         let mut energies = self.cell_areas(&weights, &pupil.rho_mm);
+        if self.lens.n_obscurations() > 0 {
+            energies.iter_mut().zip(self.clear_shares(point, pupil)).for_each(|(e, share)| *e *= share);
+        }
         let pupil_mm2: f64 = energies.iter().sum();
+        if pupil_mm2 <= 0.0 {
+            return None;
+        }
         energies.iter_mut().for_each(|e| *e /= pupil_mm2);
 
         let outer_shares: Vec<f64> = (0..self.mesh.n_rings).map(|ring| self.mesh.outer_share(ring)).collect();
@@ -243,6 +249,36 @@ impl Task<'_> {
             })
         };
         (0..mesh.n_rings).flat_map(ring).collect()
+    }
+
+    /// Returns how much of each cell obscurations leave clear: of 8 × 8 rays through it.
+    fn clear_shares(self, point: &ObjectPoint, pupil: &Pupil) -> Vec<f64> {
+        const N: usize = 8;
+        let mesh = self.mesh;
+        let place = |ring: usize, j: usize, k: usize| {
+            let middle = |i: usize| (i as f64 + 0.5) / N as f64;
+            let (out, around) = (middle(k / N), middle(k % N));
+            let inner_outer = [mesh.share(ring as f64), mesh.share((ring + 1) as f64)].map(|share| share * share);
+            // Even in area.
+            let share = (inner_outer[0] + (inner_outer[1] - inner_outer[0]) * out).sqrt();
+            let [rho, next] = [j, j + 1].map(|j| pupil.rho_mm[j % mesh.n_azimuths]);
+            polar(pupil.center_mm, share * (rho + (next - rho) * around), mesh.azimuth(j as f64 + around))
+        };
+        let targets: Vec<DVec2> = mesh
+            .cells()
+            .flat_map(|(ring, j)| (0..N * N).map(move |k| (ring, j, k)))
+            .map(|(r, j, k)| place(r, j, k))
+            .collect();
+        let passed = |lens: &MonoLens| {
+            let mut rays = rays_towards(point, &targets, pupil.z_mm, 0.0);
+            lens.trace(&mut rays, Rims::Clip);
+            rays.fate
+        };
+        // Rims end some rays of the outermost cells, whose areas have that already.
+        let (holed, whole) = (passed(self.lens), passed(&self.lens.with_obscurations_inverted(&[])));
+        let n_passed = |fates: &[RayFate]| fates.iter().filter(|fate| fate.is_in_flight()).count();
+        let share = |(holed, whole)| n_passed(holed) as f64 / n_passed(whole).max(1) as f64;
+        holed.chunks(N * N).zip(whole.chunks(N * N)).map(share).collect()
     }
 
     fn signed_rms_mm(self, nodes: &[Node], targets: &[DVec2], energies: &[f64]) -> f64 {

@@ -1,7 +1,7 @@
 //! Banks over a field of two dimensions: the same as turned ones where the lens is symmetric, and right where it is not.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
-use dioptric_optics::{Glass, Interface, Lens, Shape, Surface, glam::DVec2};
+use dioptric_optics::{Aperture, Glass, Interface, Lens, Outline, Shape, Surface, glam::DVec2};
 use dioptric_psf::{
     BankSettings, Diffraction, FieldBank, FieldBankSettings, Interpolation, Picture, PsfBank, PsfQuery,
 };
@@ -125,4 +125,34 @@ fn waves_of_a_lens_of_two_powers_are_summed_and_dark_fields_are_none() {
     // Most of an Airy pattern of some 50 µm and a blur of 100 µm is on 0.8 mm.
     assert!(picture.sum() > 0.97 && picture.sum() < 1.001, "{}", picture.sum());
     assert!(FieldBank::build(&lens, &FieldBankSettings { tans_x: vec![0.1, 0.0], ..wide }).is_err());
+}
+
+#[test]
+fn an_obscured_lens_blurs_to_rings() {
+    let thin = Lens::thin(50.0, 10.0).unwrap();
+    let hole =
+        Aperture { surface: 0, outline: Outline::Circle { radius_mm: 2.5 }, center_mm: [0.0; 2], is_obscuration: true };
+    let lens = Lens::new_with_apertures("annulus", "test", thin.interfaces().to_vec(), 0, vec![hole]).unwrap();
+    // 2 mm before the focus the rays fill the ring from 0.1 to 0.2 mm.
+    let ring = FieldBankSettings {
+        dioptres: vec![0.0],
+        wavelengths_nm: vec![550.0],
+        n_rings: 24,
+        ..settings(48.0, vec![0.0], vec![0.0], Diffraction::None)
+    };
+    let bank = FieldBank::build(&lens, &ring).unwrap();
+    let query = PsfQuery { field_tan: DVec2::ZERO, dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 10.0 };
+    let (picture, _) = bank.picture(query, 61).unwrap();
+    let within = |reach_mm: f64| -> f64 {
+        let pixels = picture.indexed_iter();
+        let inside = pixels.filter(|((row, column), _)| {
+            DVec2::new(*column as f64 - 30.0, *row as f64 - 30.0).length() * 0.01 <= reach_mm
+        });
+        inside.map(|(_, e)| *e).sum()
+    };
+    assert!((picture.sum() - 1.0).abs() < 1e-6);
+    assert!(within(0.085) < 1e-9, "{}", within(0.085));
+    // Pixels cut the circle, and cells of 4 µm the hole.
+    let expected = (0.15f64.powi(2) - 0.01) / 0.03;
+    assert!((within(0.15) - expected).abs() < 0.02, "{} {expected}", within(0.15));
 }

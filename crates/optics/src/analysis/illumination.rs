@@ -9,7 +9,7 @@ use crate::{MonoLens, ObjectPoint, PupilBoundary, Rims};
 /// light gets through.
 ///
 /// The solid angle is the area that the rays' direction cosines (l, m) fill; its edge is that of the true, vignetted
-/// pupil, found at `n_azimuths` (rounded up to an even number). It is exact for a sharp image; where aberrations are
+/// pupil, found at `n_azimuths` (rounded up to an even number), less what obscurations stop. It is exact for a sharp image; where aberrations are
 /// large, film points see slightly other pupils than the object point does. Its ratio to that on the axis is the
 /// relative illumination.
 pub fn projected_solid_angle(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> f64 {
@@ -18,7 +18,11 @@ pub fn projected_solid_angle(lens: &MonoLens, point: &ObjectPoint, n_azimuths: u
 
 /// Returns the same for a film with this normal at the image, a unit vector of the lens frame.
 pub fn projected_solid_angle_onto(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize, normal: DVec3) -> f64 {
-    let n = n_azimuths.max(16).next_multiple_of(2);
+    lens.over_clear_pupil(&|lens| whole_cone(lens, point, n_azimuths.max(16).next_multiple_of(2), normal))
+}
+
+/// Returns the projected solid angle where there are no obscurations.
+fn whole_cone(lens: &MonoLens, point: &ObjectPoint, n: usize, normal: DVec3) -> f64 {
     let Some(pupil) = PupilBoundary::find(lens, point, n) else { return 0.0 };
     let azimuth = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64);
     let edge = |(i, rho): (usize, &f64)| pupil.center_mm() + azimuth(i) * *rho;

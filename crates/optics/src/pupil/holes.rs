@@ -1,0 +1,79 @@
+//! Sums over pupils with holes.
+
+use crate::MonoLens;
+
+impl MonoLens {
+    /// Returns a quantity that adds up over the pupil (its area, a solid angle), for what obscurations leave clear of it;
+    /// `of` gives it for lenses without any, and 0 where no light gets through.
+    ///
+    /// It is that of the lens without obscurations, less those of each obscuration inverted, plus those of each two of
+    /// them, and so on.
+    pub fn over_clear_pupil(&self, of: &dyn Fn(&Self) -> f64) -> f64 {
+        match self.n_obscurations() {
+            0 => of(self),
+            _ => of(&self.with_obscurations_inverted(&[])) - self.stopped(of, &mut vec![]),
+        }
+    }
+
+    /// Returns what is stopped by all of these obscurations and at least one behind them, each place counted once.
+    fn stopped(&self, of: &dyn Fn(&Self) -> f64, by: &mut Vec<usize>) -> f64 {
+        let mut sum = 0.0;
+        for next in by.last().map_or(0, |last| last + 1)..self.n_obscurations() {
+            by.push(next);
+            let here = of(&self.with_obscurations_inverted(by));
+            if here != 0.0 {
+                sum += here - self.stopped(of, by);
+            }
+            by.pop();
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use glam::DVec3;
+
+    use crate::{Aperture, Lens, MonoLens, ObjectPoint, Outline, PupilBoundary, analysis::projected_solid_angle};
+
+    fn lens(apertures: &[(Outline, [f64; 2])]) -> MonoLens {
+        let thin = Lens::thin(50.0, 10.0).unwrap();
+        let aperture = |&(outline, center_mm)| Aperture { surface: 0, outline, center_mm, is_obscuration: true };
+        let apertures = apertures.iter().map(aperture).collect();
+        let lens = Lens::new_with_apertures("holed", "test", thin.interfaces().to_vec(), 0, apertures);
+        lens.unwrap().at(550.0).unwrap()
+    }
+
+    #[test]
+    fn what_two_discs_stop_is_counted_once() {
+        let disc = |radius_mm, x| (Outline::Circle { radius_mm }, [x, 0.0]);
+        // Apart; within one another; over one another by the lens of two circles of radius 1 at a distance of 1; under a third;
+        // outside the rim.
+        let overlap = 2.0 * PI / 3.0 - 0.75f64.sqrt();
+        for (apertures, stopped_mm2) in [
+            (vec![disc(1.0, 2.0), disc(1.5, -2.0)], 3.25 * PI),
+            (vec![disc(2.0, 0.0), disc(1.0, 0.5)], 4.0 * PI),
+            (vec![disc(1.0, 0.5), disc(1.0, -0.5)], 2.0 * PI - overlap),
+            (vec![disc(1.0, 0.5), disc(1.0, -0.5), disc(3.0, 0.0)], 9.0 * PI),
+            (vec![disc(1.0, 7.0)], 0.0),
+        ] {
+            let lens = lens(&apertures);
+            let point = ObjectPoint::Infinite(DVec3::Z);
+            let area = |lens: &MonoLens| PupilBoundary::find(lens, &point, 720).map_or(0.0, |pupil| pupil.area_mm2());
+            let found = lens.over_clear_pupil(&area);
+            // 720 azimuths about a kink of the edge: a part in 1e5.
+            assert!((found - (25.0 * PI - stopped_mm2)).abs() < 1e-3, "{apertures:?}: {found}");
+        }
+    }
+
+    #[test]
+    fn an_annulus_lights_the_film_by_its_own_cone() {
+        let holed = lens(&[(Outline::Circle { radius_mm: 2.5 }, [0.0; 2])]);
+        let point = ObjectPoint::Infinite(DVec3::Z);
+        let sine2 = |radius_mm: f64| radius_mm * radius_mm / (radius_mm * radius_mm + 2500.0);
+        let found = projected_solid_angle(&holed, &point, 64);
+        assert!((found / (PI * (sine2(5.0) - sine2(2.5))) - 1.0).abs() < 1e-5, "{found}");
+    }
+}
