@@ -4,33 +4,26 @@ use std::{fmt::Write, fs};
 
 use anyhow::Context;
 use dioptric_pipeline::{
-    AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, PipelineError, Staged,
-    StopChoice, open_lens, parse_numbers, parse_pairs, svg_to_png,
+    AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensUse, Staged, StopChoice,
+    parse_numbers, parse_pairs, svg_to_png,
 };
 
 use crate::{
     args::{Common, LensAnalyzeArgs},
+    lens::{list_of, open, tell_taken},
     terminal::{Bar, guarded, print, print_json, remark},
 };
 
 /// Pixels of the plots as PNG for each of the drawing's own.
 const PNG_SCALE: f64 = 1.5;
+/// Wavelengths where neither the command nor the lens's file names some, nm.
+const USUAL_NM: [f64; 3] = [450.0, 550.0, 650.0];
 
 pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Result<()> {
-    let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
-    let request = AnalysisRequest {
-        fields: fields(arguments)?,
-        wavelengths_nm: parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?,
-        distance_mm: arguments.distance_mm,
-        film: match (arguments.film_mm, arguments.focus_mm) {
-            (Some(film_mm), _) => AnalysisFilm::FilmMm(film_mm),
-            (None, Some(distance_mm)) => AnalysisFilm::FocusMm(distance_mm),
-            (None, None) => AnalysisFilm::BestFocus,
-        },
-        n_rings: arguments.rings,
-    };
+    let used = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?;
+    let request = request(arguments, &used, common)?;
     let stop = arguments.f_number.map_or(StopChoice::AsGiven, StopChoice::FNumber);
-    let lens = stop.apply_at(lens, request.reference_nm())?;
+    let lens = stop.apply_at(used.lens, request.reference_nm())?;
     // The place is tried before the work.
     let staged = arguments.out.as_ref().map(|path| Staged::folder(path)).transpose()?.map(guarded);
     let bar = Bar::new(common.quiet);
@@ -64,17 +57,85 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
     if common.json { print_json(&analysis) } else { print(&tables(&analysis)?) }
 }
 
-/// Returns the fields that are asked for.
-fn fields(arguments: &LensAnalyzeArgs) -> Result<AnalysisFields, PipelineError> {
-    Ok(match (&arguments.fields_deg, &arguments.fields_mm) {
-        (Some(list), _) => AnalysisFields::AnglesDeg(parse_pairs("--fields-deg", list)?),
-        (None, Some(list)) => AnalysisFields::HeightsMm(parse_pairs("--fields-mm", list)?),
-        (None, None) => AnalysisFields::ByLight,
-    })
+/// Returns what is asked for; where it is not said, what the lens's file says.
+fn request(arguments: &LensAnalyzeArgs, used: &LensUse, common: &Common) -> anyhow::Result<AnalysisRequest> {
+    let mut taken = Vec::new();
+    let wavelengths_nm = match &arguments.wavelengths_nm {
+        Some(list) => parse_numbers("--wavelengths-nm", list)?,
+        None => used.wavelengths_or(&USUAL_NM),
+    };
+    if arguments.wavelengths_nm.is_none() && wavelengths_nm != USUAL_NM {
+        taken.push(format!("wavelengths of {} nm", list_of(&wavelengths_nm)));
+    }
+    let mut request = AnalysisRequest {
+        fields: AnalysisFields::ByLight,
+        main_wavelength_nm: used.reference_nm.filter(|_| arguments.wavelengths_nm.is_none()),
+        wavelengths_nm,
+        distance_mm: arguments.distance_mm.unwrap_or(used.distance_mm),
+        film: match (arguments.film_mm, arguments.focus_mm) {
+            (Some(film_mm), _) => AnalysisFilm::FilmMm(film_mm),
+            (None, Some(distance_mm)) => AnalysisFilm::FocusMm(distance_mm),
+            (None, None) => AnalysisFilm::BestFocus,
+        },
+        n_rings: arguments.rings,
+    };
+    if arguments.distance_mm.is_none() && request.distance_mm.is_finite() {
+        taken.push(format!("an object at {} mm", list_of(&[request.distance_mm])));
+    }
+    let of_file = used.analysis_fields(request.reference_nm());
+    request.fields = match (&arguments.fields_deg, &arguments.fields_mm, of_file) {
+        (Some(list), _, _) => AnalysisFields::AnglesDeg(parse_pairs("--fields-deg", list)?),
+        (None, Some(list), _) => AnalysisFields::HeightsMm(parse_pairs("--fields-mm", list)?),
+        // Places of an object elsewhere say nothing of this one.
+        (None, None, Some(AnalysisFields::HeightsMm(_))) if arguments.distance_mm.is_some() => AnalysisFields::ByLight,
+        (None, None, Some(fields)) => {
+            taken.push(in_words(&fields));
+            fields
+        }
+        (None, None, None) => AnalysisFields::ByLight,
+    };
+    tell_taken(&taken, common);
+    Ok(request)
+}
+
+/// Returns fields as people name them.
+fn in_words(fields: &AnalysisFields) -> String {
+    let list = |pairs: &[[f64; 2]]| {
+        let one = |[x, y]: &[f64; 2]| {
+            if *x == 0.0 { list_of(&[*y]) } else { format!("{}/{}", list_of(&[*x]), list_of(&[*y])) }
+        };
+        pairs.iter().map(one).collect::<Vec<_>>().join(", ")
+    };
+    match fields {
+        AnalysisFields::ByLight => "fields by light".to_owned(),
+        AnalysisFields::AnglesDeg(pairs) => format!("fields of {} degrees", list(pairs)),
+        AnalysisFields::HeightsMm(pairs) => format!("object points at {} mm", list(pairs)),
+    }
 }
 
 fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
-    let LensAnalysis { lens, efl_mm, f_number, film_mm, focus, .. } = analysis;
+    let mut text = head(analysis)?;
+    text += "\n";
+    text += &focus_table(analysis)?;
+    text += "\n";
+    text += &spot_table(analysis);
+    text += "\n";
+    text += &field_table(analysis);
+    text += "\n";
+    text += &line(&["λ nm", "axial mm", "by spot mm"].map(str::to_owned));
+    for row in &analysis.axial_color {
+        text += &line(&[
+            format!("{:.2}", row.wavelength_nm),
+            format!("{:.4}", row.paraxial_shift_mm),
+            cell(row.rms_shift_mm, 4),
+        ]);
+    }
+    Ok(text)
+}
+
+/// Returns what is said of the whole lens.
+fn head(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
+    let LensAnalysis { lens, efl_mm, f_number, film_mm, .. } = analysis;
     let mut text =
         format!("{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}, film {film_mm:.4} mm behind the last vertex\n");
     if let Some(x) = analysis.x_plane {
@@ -90,7 +151,12 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
     for note in &analysis.notes {
         writeln!(text, "note: {note}")?;
     }
-    text += "\n";
+    Ok(text)
+}
+
+fn focus_table(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
+    let focus = &analysis.focus;
+    let mut text = String::new();
     for (what, place, size, unit) in [
         ("paraxial image", focus.paraxial_film_mm, None, ""),
         ("paraxial image along x", focus.paraxial_x_film_mm, None, ""),
@@ -104,6 +170,10 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
         let size = size.map_or(String::new(), |size| format!("  {size:.4} {unit}"));
         writeln!(text, "{what:<28} film {:>10} mm{size}", cell(place, 4))?;
     }
+    Ok(text)
+}
+
+fn spot_table(analysis: &LensAnalysis) -> String {
     let header = [
         "field",
         "λ nm",
@@ -117,8 +187,7 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
         "rms waves",
         "Strehl",
     ];
-    text += "\n";
-    text += &line(&header.map(str::to_owned));
+    let mut text = line(&header.map(str::to_owned));
     for spot in &analysis.spots {
         let wavefront = spot.wavefront.as_ref();
         text += &line(&[
@@ -135,18 +204,7 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
             cell(wavefront.map(|w| w.strehl), 4),
         ]);
     }
-    text += "\n";
-    text += &field_table(analysis);
-    text += "\n";
-    text += &line(&["λ nm", "axial mm", "by spot mm"].map(str::to_owned));
-    for row in &analysis.axial_color {
-        text += &line(&[
-            format!("{:.2}", row.wavelength_nm),
-            format!("{:.4}", row.paraxial_shift_mm),
-            cell(row.rms_shift_mm, 4),
-        ]);
-    }
-    Ok(text)
+    text
 }
 
 fn field_table(analysis: &LensAnalysis) -> String {

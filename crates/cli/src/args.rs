@@ -256,9 +256,10 @@ impl LensReadingArgs {
 pub(crate) struct LensInfoArgs {
     /// Lens, a file or the name of a built-in one
     pub(crate) lens: String,
-    /// Wavelengths, nm: a list or first:last:step
-    #[arg(long, value_name = "LIST", default_value = "550")]
-    pub(crate) wavelengths_nm: String,
+    /// Wavelengths, nm: a list or first:last:step [default: 550; of a lens not known there, its file's, else one that its
+    /// glasses know]
+    #[arg(long, value_name = "LIST")]
+    pub(crate) wavelengths_nm: Option<String>,
     /// Also images an object at this distance from the first vertex, mm
     #[arg(long, value_name = "D")]
     pub(crate) distance_mm: Option<f64>,
@@ -277,19 +278,20 @@ pub(crate) struct LensInfoArgs {
 pub(crate) struct LensAnalyzeArgs {
     /// Lens, a file or the name of a built-in one
     pub(crate) lens: String,
-    /// Field angles, degrees: above the axis as 0,10,20, or along x and y as 5/10 [default: 0, 0.5, 0.7 and 1 of where the
-    /// light falls to a quarter]
+    /// Field angles, degrees: above the axis as 0,10,20, or along x and y as 5/10 [default: those of the lens's file, else 0,
+    /// 0.5, 0.7 and 1 of where the light falls to a quarter]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub(crate) fields_deg: Option<String>,
     /// Fields as object points, mm from the axis, for an object at a finite distance: y, or x/y
     #[arg(long, value_name = "LIST", conflicts_with = "fields_deg", allow_hyphen_values = true)]
     pub(crate) fields_mm: Option<String>,
-    /// Wavelengths, nm: a list or first:last:step; that nearest to 550 is the reference
-    #[arg(long, value_name = "LIST", default_value = "450,550,650")]
-    pub(crate) wavelengths_nm: String,
-    /// Distance of the object from the first vertex, mm, or inf
-    #[arg(long, value_name = "D", default_value_t = f64::INFINITY)]
-    pub(crate) distance_mm: f64,
+    /// Wavelengths, nm: a list or first:last:step; that nearest to 550 is the reference [default: those of the lens's file,
+    /// with its reference, else 450,550,650, or three that its glasses know]
+    #[arg(long, value_name = "LIST")]
+    pub(crate) wavelengths_nm: Option<String>,
+    /// Distance of the object from the first vertex, mm, or inf [default: that of the lens's file, else inf]
+    #[arg(long, value_name = "D")]
+    pub(crate) distance_mm: Option<f64>,
     /// Stops the lens down to this f-number
     #[arg(long, value_name = "N", conflicts_with = "stop_mm")]
     pub(crate) f_number: Option<f64>,
@@ -302,6 +304,8 @@ pub(crate) struct LensAnalyzeArgs {
     /// Places the film at the paraxial image of this distance from the first vertex, mm, or inf
     #[arg(long, value_name = "D")]
     pub(crate) focus_mm: Option<f64>,
+    #[command(flatten)]
+    pub(crate) reading: LensReadingArgs,
     /// Rings of rays in a spot: N of them have 1 + 3N(N + 1) rays
     #[arg(long, value_name = "N", default_value_t = 12)]
     pub(crate) rings: usize,
@@ -320,21 +324,22 @@ pub(crate) struct LensDrawArgs {
     /// File to write, .svg or .png
     #[arg(long, short, visible_alias = "out", value_name = "F")]
     pub(crate) output: PathBuf,
-    /// Field angles of the ray fans, degrees
-    #[arg(long, value_name = "LIST", default_value = "0,10")]
-    pub(crate) fields_deg: String,
-    /// Distance of the object, mm, or inf
-    #[arg(long, value_name = "D", default_value_t = f64::INFINITY)]
-    pub(crate) distance_mm: f64,
+    /// Field angles of the ray fans, degrees [default: those of the lens's file, else 0,10]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(crate) fields_deg: Option<String>,
+    /// Distance of the object, mm, or inf [default: that of the lens's file, else inf]
+    #[arg(long, value_name = "D")]
+    pub(crate) distance_mm: Option<f64>,
     /// Diameter of the stop, mm [default: the lens's own]
     #[arg(long, value_name = "D")]
     pub(crate) stop_mm: Option<f64>,
     /// Film distance behind the last vertex, mm [default: in focus]
     #[arg(long, value_name = "D")]
     pub(crate) film_mm: Option<f64>,
-    /// Wavelengths of the rays, nm: a list or first:last:step; focus and f-number are those of the first
-    #[arg(long, alias = "wavelength-nm", value_name = "LIST", default_value = "550")]
-    pub(crate) wavelengths_nm: String,
+    /// Wavelengths of the rays, nm: a list or first:last:step; focus and f-number are those of the first [default: the
+    /// reference of the lens's file, else 550, or one that its glasses know]
+    #[arg(long, alias = "wavelength-nm", value_name = "LIST")]
+    pub(crate) wavelengths_nm: Option<String>,
 }
 
 /// Something to do with glasses.

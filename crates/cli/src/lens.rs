@@ -4,8 +4,8 @@ use std::{fmt::Write, fs, path::Path};
 
 use anyhow::Context;
 use dioptric_pipeline::{
-    LensData, LensDrawing, LensQuestion, LensReading, Staged, SurfaceRow, built_in_lenses, convert_lens, drawing_file,
-    parse_numbers, surface_rows,
+    LensData, LensDrawing, LensQuestion, LensReading, LensUse, REFERENCE_WAVELENGTH_NM, Staged, SurfaceRow,
+    built_in_lenses, convert_lens, drawing_file, parse_numbers, placement_lines, surface_rows,
 };
 
 use crate::{
@@ -23,9 +23,37 @@ pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> 
     }
 }
 
+/// Returns the lens with its stop set, and what its file says of its use; tells what is done otherwise than the file says.
+pub(crate) fn open(
+    text: &str,
+    reading: &LensReading,
+    stop_mm: Option<f64>,
+    common: &Common,
+) -> anyhow::Result<LensUse> {
+    let used = reading.open_stopped(text, stop_mm)?;
+    tell(&used.notes, common);
+    Ok(used)
+}
+
+/// Returns numbers as a list for people: of many the first three and the last.
+pub(crate) fn list_of(numbers: &[f64]) -> String {
+    let words: Vec<String> = numbers.iter().map(|number| format!("{}", (number * 1e4).round() / 1e4)).collect();
+    match words.as_slice() {
+        [a, b, c, .., last] if words.len() > 6 => format!("{a}, {b}, {c}, … {last}"),
+        _ => words.join(", "),
+    }
+}
+
 /// Tells what the file of a lens says that is done otherwise or not at all.
 fn tell(notes: &[String], common: &Common) {
     notes.iter().for_each(|note| remark(common.quiet, note));
+}
+
+/// Tells in a line what was taken from the file of a lens, where it was.
+pub(crate) fn tell_taken(taken: &[String], common: &Common) {
+    if !taken.is_empty() {
+        remark(common.quiet, &format!("taken from the lens's file: {}", taken.join("; ")));
+    }
 }
 
 fn convert(input: &str, output: &Path, reading: &LensReading, common: &Common) -> anyhow::Result<()> {
@@ -69,9 +97,21 @@ fn list(common: &Common) -> anyhow::Result<()> {
 }
 
 fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
-    let (lens, notes) = arguments.reading.reading().open_stopped(&arguments.lens, arguments.stop_mm)?;
-    tell(&notes, common);
-    let wavelengths_nm = parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?;
+    let used = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?;
+    let lens = &used.lens;
+    let wavelengths_nm = match &arguments.wavelengths_nm {
+        Some(list) => parse_numbers("--wavelengths-nm", list)?,
+        None if used.is_known_at(REFERENCE_WAVELENGTH_NM) => vec![REFERENCE_WAVELENGTH_NM],
+        None => {
+            let wavelengths_nm = used.wavelengths_or(&[REFERENCE_WAVELENGTH_NM]);
+            let list = list_of(&wavelengths_nm);
+            remark(
+                common.quiet,
+                &format!("the lens is not known at {REFERENCE_WAVELENGTH_NM} nm: it is told of at {list} nm"),
+            );
+            wavelengths_nm
+        }
+    };
     let ends = |ends: (f64, f64), nm: &f64| (ends.0.min(*nm), ends.1.max(*nm));
     let (first_nm, last_nm) = wavelengths_nm.iter().fold((f64::INFINITY, 0.0), ends);
     let instead_of_f_and_c_nm = (first_nm < last_nm).then_some([first_nm, last_nm]);
@@ -79,7 +119,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
         .iter()
         .map(|&wavelength_nm| {
             let LensInfoArgs { distance_mm, field_deg, .. } = *arguments;
-            LensData::new(&lens, &LensQuestion { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm })
+            LensData::new(lens, &LensQuestion { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm })
         })
         .collect::<Result<_, _>>()?;
     if common.json {
@@ -90,7 +130,10 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     if object_medium != "air" {
         writeln!(text, "object in {object_medium}\n")?;
     }
-    text += &surface_table(&surface_rows(&lens))?;
+    text += &surface_table(&surface_rows(lens))?;
+    for line in placement_lines(lens) {
+        writeln!(text, "{line}")?;
+    }
     text += "\n";
     text += &data_table(&data)?;
     print(&text)
@@ -106,6 +149,9 @@ fn surface_table(rows: &[SurfaceRow]) -> Result<String, std::fmt::Error> {
             text,
             "{surface:>7} {radius_mm:>12.4} {thickness_mm:>12.4} {diameter_mm:>12.4}  {medium_after}{stop}"
         )?;
+        for remark in &row.remarks {
+            writeln!(text, "{:>8}{remark}", "")?;
+        }
     }
     Ok(text)
 }
@@ -141,7 +187,7 @@ fn data_table(data: &[LensData]) -> anyhow::Result<String> {
 /// Returns a cell: what JSON has no number for is infinite, or nothing where only its absence makes sense.
 fn number(key: &str, value: &serde_json::Value) -> String {
     if let Some([first, last]) = value.as_array().map(Vec::as_slice) {
-        return format!("{} {}", number(key, first), number(key, last));
+        return format!("{first}–{last}");
     }
     match value.as_f64() {
         None if key.ends_with("_deg") || key.ends_with("colors_nm") || key.starts_with('C') => "–".to_owned(),
@@ -152,16 +198,35 @@ fn number(key: &str, value: &serde_json::Value) -> String {
 }
 
 fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
-    let (lens, notes) = arguments.reading.reading().open_stopped(&arguments.lens, arguments.stop_mm)?;
-    tell(&notes, common);
-    let drawing = LensDrawing {
-        fields_deg: parse_numbers("--fields-deg", &arguments.fields_deg)?,
-        distance_mm: arguments.distance_mm,
-        wavelengths_nm: parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?,
-        film_mm: arguments.film_mm,
+    let used = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?;
+    let mut taken = Vec::new();
+    let wavelengths_nm = match &arguments.wavelengths_nm {
+        Some(list) => parse_numbers("--wavelengths-nm", list)?,
+        None => {
+            let wavelength_nm = used.wavelength_or_usual();
+            if wavelength_nm != REFERENCE_WAVELENGTH_NM {
+                taken.push(format!("{wavelength_nm} nm"));
+            }
+            vec![wavelength_nm]
+        }
     };
+    let distance_mm = arguments.distance_mm.unwrap_or(used.distance_mm);
+    if arguments.distance_mm.is_none() && distance_mm.is_finite() {
+        taken.push(format!("an object at {} mm", list_of(&[distance_mm])));
+    }
+    let of_file_deg = wavelengths_nm.first().and_then(|&nm| used.drawing_fields_deg(nm));
+    let fields_deg = match (&arguments.fields_deg, of_file_deg) {
+        (Some(list), _) => parse_numbers("--fields-deg", list)?,
+        (None, Some(fields_deg)) => {
+            taken.push(format!("fields of {} degrees", list_of(&fields_deg)));
+            fields_deg
+        }
+        (None, None) => vec![0.0, 10.0],
+    };
+    tell_taken(&taken, common);
+    let drawing = LensDrawing { fields_deg, distance_mm, wavelengths_nm, film_mm: arguments.film_mm };
     let path = &arguments.output;
-    let bytes = drawing_file(&drawing.to_svg(&lens)?, path)?;
+    let bytes = drawing_file(&drawing.to_svg(&used.lens)?, path)?;
     let staged = guarded(Staged::file(path)?);
     fs::write(staged.path(), bytes).with_context(|| format!("cannot write {}", path.display()))?;
     staged.commit()?;

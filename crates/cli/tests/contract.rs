@@ -345,6 +345,31 @@ fn traced_rays_have_their_columns_and_seventeen_digits() {
     assert!(fs::read_to_string(folder.path().join("out.csv")).unwrap().lines().count() > 14);
 }
 
+/// A germanium lens of a design program's file: what it says of its use stands where the command says nothing.
+#[test]
+fn use_that_a_file_states_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let seq = "RDM\nTITLE 'ir'\nEPD 20\nWL 12000 10000 8000\nREF 2\nYOB 0 3 5\nSO 0 400\nS 100 5 GERMANIUM\n STO; ASP; K -0.5; A 1E-8\n\
+               S 140 100\nSI 0\n";
+    fs::write(folder.path().join("ir.seq"), seq).unwrap();
+    let info = output(folder.path(), &["lens", "info", "ir.seq"]);
+    assert!(info.contains("conic -0.5, 1e-8 r⁴") && info.contains("MISC:GERMANIUM"), "{info}");
+    let analysis = json(folder.path(), &["lens", "analyze", "ir.seq", "--rings", "3", "--json"]);
+    assert_eq!((analysis["reference_nm"].as_f64(), analysis["distance_mm"].as_f64()), (Some(10_000.0), Some(400.0)));
+    assert_eq!(analysis["fields"][2]["object_mm"][1].as_f64(), Some(5.0));
+    let maps = analysis["opd_maps"].as_array().unwrap();
+    assert_eq!((maps.len(), maps[0]["waves"].as_array().unwrap().len()), (9, 31 * 31));
+    // What is asked for goes before.
+    let far =
+        ["lens", "analyze", "ir.seq", "--rings", "3", "--distance-mm", "inf", "--wavelengths-nm", "9000", "--json"];
+    let far = json(folder.path(), &far);
+    assert!(far["distance_mm"].is_null() && far["reference_nm"] == 9000.0 && far["fields"][1]["object_mm"].is_null());
+    output(folder.path(), &["lens", "draw", "ir.seq", "-o", "ir.svg"]);
+    // 5 mm at 400 mm before the stop, and the f-number at the file's main wavelength.
+    let drawing = fs::read_to_string(folder.path().join("ir.svg")).unwrap();
+    assert!(drawing.contains("0.7°") && drawing.contains("f/5.33"), "{drawing}");
+}
+
 #[test]
 fn lists_name_what_is_built_in() {
     let folder = tempfile::tempdir().unwrap();

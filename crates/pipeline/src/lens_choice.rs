@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions};
 use dioptric_sensor::Sensor;
 
-use crate::{LensChoice, PipelineError, SensorChoice, StopChoice};
+use crate::{LensChoice, LensUse, PipelineError, SensorChoice, StopChoice};
 
 /// The wavelength of f-numbers, fields and focus where nothing else is said, nm.
 pub const REFERENCE_WAVELENGTH_NM: f64 = 550.0;
@@ -109,13 +109,14 @@ pub enum MissingGlassChoice {
 
 impl LensReading {
     /// Returns the lens that `LENS` on the command line means, with its stop set to `stop_mm` where given, and what its file
-    /// says and this program does otherwise or not at all, a sentence each.
+    /// says of its use.
     ///
     /// # Errors
     /// When there is no such lens, its file or a catalogue cannot be read, or the stop does not open so far.
-    pub fn open_stopped(&self, text: &str, stop_mm: Option<f64>) -> Result<(Lens, Vec<String>), PipelineError> {
-        let LensFile { lens, notes, .. } = self.open(text)?;
-        Ok((stop_mm.map_or(StopChoice::AsGiven, StopChoice::DiameterMm).apply(lens)?, notes))
+    pub fn open_stopped(&self, text: &str, stop_mm: Option<f64>) -> Result<LensUse, PipelineError> {
+        let mut used = LensUse::of(self.open(text)?);
+        used.lens = stop_mm.map_or(StopChoice::AsGiven, StopChoice::DiameterMm).apply(used.lens)?;
+        Ok(used)
     }
 
     /// Returns the lens that `LENS` on the command line means, and what its file says of it.

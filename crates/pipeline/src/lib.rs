@@ -26,6 +26,7 @@ mod lens_analysis;
 mod lens_choice;
 mod lens_drawing;
 mod lens_table;
+mod lens_use;
 pub mod measure;
 mod mosaic;
 mod movements;
@@ -46,6 +47,7 @@ mod sense;
 mod shot;
 mod spot;
 mod staged;
+mod surface_table;
 mod svg_png;
 mod trace_table;
 
@@ -67,9 +69,8 @@ pub use lens_analysis::{
 };
 pub use lens_choice::{LensReading, MissingGlassChoice, REFERENCE_WAVELENGTH_NM, open_lens};
 pub use lens_drawing::LensDrawing;
-pub use lens_table::{
-    ImageData, LensData, LensQuestion, LensRow, PlaneData, SurfaceRow, built_in_lenses, surface_rows,
-};
+pub use lens_table::{ImageData, LensData, LensQuestion, LensRow, PlaneData, built_in_lenses};
+pub use lens_use::LensUse;
 pub use mosaic::{MosaicPlan, PsfMosaic};
 pub use movements::Movements;
 pub use numbers::{parse_numbers, parse_pairs};
@@ -84,5 +85,6 @@ pub use scene_choice::{SceneChoice, SceneSource};
 pub use sense::{SenseRequest, parse_illuminant, sense_irradiance, with_exposure_s};
 pub use shot::Shot;
 pub use staged::Staged;
+pub use surface_table::{SurfaceRow, placement_lines, surface_rows};
 pub use svg_png::{drawing_file, svg_to_png};
 pub use trace_table::{RayTable, TraceError, TraceSettings};

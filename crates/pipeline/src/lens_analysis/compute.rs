@@ -40,7 +40,8 @@ const ZERNIKE_TERMS: usize = 22;
 impl AnalysisRequest {
     /// The reference wavelength, nm: of fields, pupils, f-numbers and focus.
     pub fn reference_nm(&self) -> f64 {
-        nearest_to_reference_nm(&self.wavelengths_nm)
+        let stated = self.main_wavelength_nm.filter(|nm| self.wavelengths_nm.contains(nm));
+        stated.unwrap_or_else(|| nearest_to_reference_nm(&self.wavelengths_nm))
     }
 
     /// Analyses a lens.

@@ -47,8 +47,10 @@ impl AnalysisFields {
 pub struct AnalysisRequest {
     /// The points of the field.
     pub fields: AnalysisFields,
-    /// Wavelengths, nm; that nearest to 550 nm is the reference.
+    /// Wavelengths, nm.
     pub wavelengths_nm: Vec<f64>,
+    /// Which of them is the reference, nm; `None` for that nearest to 550 nm.
+    pub main_wavelength_nm: Option<f64>,
     /// Distance of the object before the first vertex, mm; infinity for a far one.
     pub distance_mm: f64,
     /// Where the film is.

@@ -59,7 +59,6 @@ pub struct LensAnalysis {
     /// Chief rays of a grid of fields, rows from its lower left.
     pub grid: Vec<GridRow>,
     /// Path differences over the whole stop, in the order of the spots.
-    #[serde(skip)]
     pub opd_maps: Vec<OpdMap>,
 }
 
@@ -98,9 +97,10 @@ pub struct GridRow {
 }
 
 /// Optical path differences of one point at one wavelength over the stop, against the sphere about the chief ray's image.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OpdMap {
     /// The point of the field.
+    #[serde(flatten)]
     pub place: FieldPlace,
     /// Wavelength, nm.
     pub wavelength_nm: f64,
@@ -244,7 +244,8 @@ pub struct FieldRow {
     pub x_focus_mm: Option<f64>,
     /// The same along y.
     pub y_focus_mm: Option<f64>,
-    /// Illumination over that on the axis.
+    /// Illumination over that on the axis, by the solid angles of the cones that light the image: that of a sharp image. Where
+    /// aberrations reach over places that are lit differently, the film's differs.
     pub relative_illumination: Option<f64>,
     /// Chief-ray height at each wavelength less that at the reference, µm.
     pub lateral_color_um: Vec<Option<f64>>,

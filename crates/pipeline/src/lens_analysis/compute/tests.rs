@@ -8,6 +8,7 @@ fn request(fields_deg: Vec<f64>) -> AnalysisRequest {
     AnalysisRequest {
         fields: AnalysisFields::above_axis_deg(&fields_deg),
         wavelengths_nm: vec![450.0, 550.0, 650.0],
+        main_wavelength_nm: None,
         distance_mm: f64::INFINITY,
         film: AnalysisFilm::BestFocus,
         n_rings: 6,
