@@ -167,7 +167,7 @@ fn focus_table(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
         if place.is_none() && what.ends_with("along x") {
             continue;
         }
-        let size = size.map_or(String::new(), |size| format!("  {size:.4} {unit}"));
+        let size = size.filter(|size| size.is_finite()).map_or(String::new(), |size| format!("  {size:.4} {unit}"));
         writeln!(text, "{what:<28} film {:>10} mm{size}", cell(place, 4))?;
     }
     Ok(text)

@@ -49,9 +49,9 @@ pub fn placement_lines(lens: &Lens) -> Vec<String> {
     for step in lens.moves() {
         let (first, last) = step.surfaces;
         let of = if first == last { name(first) } else { format!("{} to {}", name(first), name(last)) };
-        let [dx, dy, dz] = step.decenter_mm;
-        let [x, y, z] = step.tilt_deg;
-        let pivot = match step.pivot_mm {
+        let [dx, dy, dz] = step.decenter_mm.map(short);
+        let [x, y, z] = step.tilt_deg.map(short);
+        let pivot = match short(step.pivot_mm) {
             0.0 => String::new(),
             pivot_mm => format!(", about a point {pivot_mm} mm behind the vertex"),
         };
@@ -72,21 +72,29 @@ fn shape_in_words(surface: &Surface) -> Option<String> {
     let along_x = |curvature_per_mm: f64| format!("radius {} mm along x", number(radius_mm(curvature_per_mm)));
     Some(match &surface.shape {
         Shape::Sphere => return None,
-        Shape::Conic { conic } => format!("conic {conic}"),
+        Shape::Conic { conic } => format!("conic {}", short(*conic)),
         Shape::EvenAsphere { conic, coefficients } => {
-            format!("conic {conic}{}", terms("r", coefficients, |i| 2 * i + 4))
+            format!("conic {}{}", short(*conic), terms("r", coefficients, |i| 2 * i + 4))
         }
-        Shape::OddAsphere { conic, coefficients } => format!("conic {conic}{}", terms("r", coefficients, |i| i + 1)),
+        Shape::OddAsphere { conic, coefficients } => {
+            format!("conic {}{}", short(*conic), terms("r", coefficients, |i| i + 1))
+        }
         Shape::ThinLens { power_per_mm } => format!("ideal thin lens of f = {} mm", number(1.0 / power_per_mm)),
         Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
+            let (conic_x, conic) = (short(*conic_x), short(*conic));
             format!("biconic: {}, conic {conic_x} along x and {conic} along y", along_x(*curvature_x_per_mm))
         }
         Shape::Toroid { curvature_x_per_mm, conic, coefficients } => {
             let terms = terms("y", coefficients, |i| 2 * i + 2);
-            format!("toroid: {}, conic {conic} along y{terms}", along_x(*curvature_x_per_mm))
+            format!("toroid: {}, conic {} along y{terms}", along_x(*curvature_x_per_mm), short(*conic))
         }
         other => format!("{other:?}"),
     })
+}
+
+/// Returns a number to seven digits, as single-precision files know it, and no −0.
+fn short(value: f64) -> f64 {
+    format!("{value:.6e}").parse().unwrap_or(value) + 0.0
 }
 
 /// Returns a length with four decimals, or its infinity.
@@ -101,7 +109,7 @@ fn terms(variable: &str, coefficients: &[f64], power: impl Fn(usize) -> usize) -
         power.to_string().bytes().map(|digit| digits[usize::from(digit - b'0')]).collect::<String>()
     };
     let terms = coefficients.iter().enumerate().filter(|(_, a)| **a != 0.0);
-    terms.map(|(i, a)| format!(", {a:e} {variable}{}", raised(power(i)))).collect()
+    terms.map(|(i, a)| format!(", {:e} {variable}{}", short(*a), raised(power(i)))).collect()
 }
 
 fn openings_in_words(lens: &Lens, surface: usize) -> Vec<String> {
@@ -143,7 +151,7 @@ mod tests {
                 medium: Constant(index: 1.5), thickness_mm: 1.0),
             (radius_mm: 80.0, semi_aperture_mm: 5.0, thickness_mm: 0.0),
         ],
-        moves: [(surfaces: (1, 2), tilt_deg: (1.5, 0.0, 0.0)), (surfaces: (4, 4), decenter_mm: (0.0, 0.1, 0.0))],
+        moves: [(surfaces: (1, 2), tilt_deg: (1.50000001, -0.0, 0.0)), (surfaces: (4, 4), decenter_mm: (0.0, 0.1, 0.0))],
         apertures: [(surface: 3, outline: Rectangle(half_x_mm: 4.0, half_y_mm: 2.0), center_mm: (0.0, 0.5)),
             (surface: 3, outline: Circle(radius_mm: 0.5), is_obscuration: true)])"#;
         let path = std::path::Path::new("all.ron");
