@@ -79,7 +79,7 @@ mod tests {
         let lens = Lens::built_in("dgauss-50mm").unwrap();
         let turned = Movements { tilt_deg: 3.0, swing_deg: 2.0, ..Movements::default() }.apply(lens.clone()).unwrap();
         let mono = turned.at(550.0).unwrap();
-        let axis = DVec2::new(2f64.to_radians().tan(), -3f64.to_radians().tan() / 2f64.to_radians().cos());
+        let axis = DVec2::new(2f64.to_radians().tan() / 3f64.to_radians().cos(), -3f64.to_radians().tan());
         let film_z_mm: f64 =
             lens.interfaces().iter().map(|i| i.thickness_after_mm).sum::<f64>() + mono.first_order().bfl_mm;
         let straight = axis * (film_z_mm - mono.projection_center_z_mm());
