@@ -8,8 +8,9 @@ use serde::Serialize;
 
 use crate::{
     Diffraction, Interpolation, Kernel, PsfBank,
+    bend::Bending,
     ray_map::Record,
-    render::{self, Bending, Layout},
+    render::{self, Layout},
 };
 
 /// The largest range of phases, radians, at which a kernel is wave optics alone; at twice that there is none.

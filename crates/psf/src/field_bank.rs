@@ -9,12 +9,13 @@ use rayon::prelude::*;
 use crate::{
     BankSettings, Diffraction, Interpolation, Kernel, ModelUse, PsfError, PsfQuery,
     axis::Axis,
+    bend::Bending,
     dispersion::Dispersion,
     drawing::composed,
     mesh::Mesh,
     pupil::Pupil,
     ray_map::{Record, Summary, Task},
-    render::{self, Bending, Layout},
+    render::{self, Layout},
 };
 
 /// What a bank over a field of two dimensions covers, and how finely.

@@ -1,6 +1,6 @@
 //! A point spread function on pixels.
 
-use ndarray::Array2;
+use ndarray::{Array2, s};
 
 /// A point spread function on square pixels: odd × odd, its centroid in the middle of the middle pixel, in the
 /// picture frame (row 0 is the top).
@@ -49,8 +49,11 @@ impl Kernel {
 pub(crate) fn trim(energy: &Array2<f64>, share: f64) -> Array2<f32> {
     let middle = energy.nrows() / 2;
     let mut by_ring = vec![0.0; middle + 1];
-    for ((row, column), e) in energy.indexed_iter() {
-        by_ring[row.abs_diff(middle).max(column.abs_diff(middle))] += e;
+    for (row, energies) in energy.rows().into_iter().enumerate() {
+        let from_middle = row.abs_diff(middle);
+        for (column, e) in energies.iter().enumerate() {
+            by_ring[from_middle.max(column.abs_diff(middle))] += e;
+        }
     }
     let wanted = share * by_ring.iter().sum::<f64>();
     let mut held = 0.0;
@@ -61,9 +64,8 @@ pub(crate) fn trim(energy: &Array2<f64>, share: f64) -> Array2<f32> {
             held >= wanted
         })
         .unwrap_or(middle);
-    Array2::from_shape_fn((2 * reach + 1, 2 * reach + 1), |(row, column)| {
-        energy[(row + middle - reach, column + middle - reach)] as f32
-    })
+    let (first, end) = (middle - reach, middle + reach + 1);
+    energy.slice(s![first..end, first..end]).mapv(|e| e as f32)
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@
 mod adaptive;
 mod axis;
 mod bank;
+mod bend;
 mod blend;
 mod count;
 mod dispersion;
@@ -27,13 +28,17 @@ mod kernel;
 mod mesh;
 mod metrics;
 pub mod paper;
+mod power;
+mod profile;
 mod pupil;
 mod raster;
 mod ray_map;
 mod render;
+mod ring;
 mod settings;
 mod splat;
 mod store;
+mod stroke;
 
 pub use adaptive::{AdaptiveSettings, ErrorPlaces, MeasuredError};
 pub use bank::PsfBank;

@@ -188,6 +188,10 @@ fn deposit_mesh(raster: &mut Raster, mesh: Mesh, at: &[DVec2], energies: &[f64])
     let n = mesh.n_azimuths;
     let mut densities = Vec::with_capacity(energies.len());
     for (ring, energies) in energies.chunks_exact(n).enumerate() {
+        if energies.iter().all(|energy| *energy == 0.0) {
+            densities.resize(densities.len() + n, [0.0; 2]);
+            continue;
+        }
         let share = mesh.outer_share(ring);
         for (j, &energy) in energies.iter().enumerate() {
             let [a, b, c, d] = mesh.corners(ring, j).map(|node| at[node]);
@@ -201,6 +205,9 @@ fn deposit_mesh(raster: &mut Raster, mesh: Mesh, at: &[DVec2], energies: &[f64])
         }
     }
     for (ring, row) in densities.chunks_exact(n).enumerate() {
+        if densities[ring * n..].iter().take(2 * n).all(|pair| *pair == [0.0; 2]) {
+            continue;
+        }
         for (j, [outer, inner]) in row.iter().enumerate() {
             let [a, b, c, _] = mesh.corners(ring, j).map(|node| at[node]);
             // The neighbours run along the same edges the other way.

@@ -1,0 +1,128 @@
+//! What pixels in a row hold of a soft step: a table from which strokes are drawn.
+
+use std::sync::LazyLock;
+
+/// Pixels that are drawn together.
+pub(crate) const LANES: usize = 8;
+/// Bits of a place within a pixel.
+pub(crate) const PLACE_BITS: u32 = 16;
+/// Bits of those by which a profile's rows are told apart; between rows it is read in proportion.
+pub(crate) const ROW_BITS: u32 = 4;
+const ROWS: usize = 1 << ROW_BITS;
+/// Pixels of a row of a profile, and the one in which its step begins.
+const WIDTH: usize = 24;
+const MIDDLE: i32 = 11;
+
+/// For places of a step from one side of a pixel to the other: the share of what lies beyond it on pixels in a row,
+/// where the step is a normal distribution's.
+pub(crate) struct Profile([[f32; WIDTH]; ROWS + 1]);
+
+/// Profiles by variance: sixty-four an octave from 2⁻⁸ to 1 pixels².
+static PROFILES: LazyLock<Vec<Profile>> =
+    LazyLock::new(|| (0..PER_OCTAVE * OCTAVES).map(|number| Profile::new(variance_of(number))).collect());
+
+const PER_OCTAVE: usize = 1 << PER_OCTAVE_BITS;
+const PER_OCTAVE_BITS: u32 = 6;
+const OCTAVES: usize = 8;
+/// The number that the bits of the least variance would have.
+const FIRST: usize = (127 - OCTAVES) << PER_OCTAVE_BITS;
+
+pub(crate) fn profiles() -> &'static [Profile] {
+    &PROFILES
+}
+
+/// Returns the number of the profile for a variance in pixels², of the nearest that there is.
+#[inline(always)]
+pub(crate) fn profile_number(variance: f32) -> usize {
+    // The leading bits are those of the logarithm.
+    let bits = (variance.to_bits() >> (23 - PER_OCTAVE_BITS)) as usize;
+    bits.clamp(FIRST, FIRST + PER_OCTAVE * OCTAVES - 1) - FIRST
+}
+
+/// Returns the variance in the middle of those of a number.
+fn variance_of(number: usize) -> f64 {
+    let (octave, part) = (number / PER_OCTAVE, number % PER_OCTAVE);
+    (1.0 + (part as f64 + 0.5) / PER_OCTAVE as f64) * 0.5f64.powi((OCTAVES - octave) as i32)
+}
+
+impl Profile {
+    fn new(variance: f64) -> Self {
+        // Reading between two rows widens a little.
+        let sigma = (variance - 1.0 / (6.0 * (ROWS * ROWS) as f64)).sqrt();
+        Self(std::array::from_fn(|row| {
+            let step = f64::from(MIDDLE) + row as f64 / ROWS as f64;
+            let beyond = |pixel: usize| sigma * normal_integral((pixel as f64 - step) / sigma);
+            std::array::from_fn(|pixel| (beyond(pixel + 1) - beyond(pixel)) as f32)
+        }))
+    }
+
+    /// Adds to eight pixels, from `base` on, what they hold between two places, of so much a pixel. The places are a
+    /// whole number of rows apart.
+    #[inline(always)]
+    pub(crate) fn add_between(&self, (near, far): (i32, i32), base: i32, value: f32, pixels: &mut [f32; LANES]) {
+        const IN_ROW: i32 = (1 << (PLACE_BITS - ROW_BITS)) - 1;
+        // Both sides are as far behind a row.
+        let after = value * ((near & IN_ROW) as f32 * (1.0 / (IN_ROW + 1) as f32));
+        let before = value - after;
+        let ((n0, n1), (f0, f1)) = (self.rows(near, base), self.rows(far, base));
+        for i in 0..LANES {
+            pixels[i] += (n0[i] - f0[i]) * before + (n1[i] - f1[i]) * after;
+        }
+    }
+
+    /// Returns what eight pixels, from `base` on, hold of steps at the row before a place and at that after.
+    #[inline(always)]
+    fn rows(&self, place: i32, base: i32) -> (&[f32], &[f32]) {
+        let row = ((place >> (PLACE_BITS - ROW_BITS)) as usize) % ROWS;
+        let first = ((base - (place >> PLACE_BITS) + MIDDLE) as usize) % (WIDTH - LANES);
+        (&self.0[row][first..first + LANES], &self.0[row + 1][first..first + LANES])
+    }
+}
+
+/// Returns the integral of the normal distribution's share below z, up to z, to 1e-7, with the same bits everywhere.
+fn normal_integral(z: f64) -> f64 {
+    if z.abs() > 5.5 {
+        return z.max(0.0);
+    }
+    // Taylor's series of the density integrated twice; its largest term is below e^16.
+    let (mut power, mut sum, mut n) = (z * z, 0.5 * z * z, 0.0);
+    while power.abs() > 1e-10 {
+        n += 1.0;
+        power *= -z * z / (2.0 * n);
+        sum += power / ((2.0 * n + 1.0) * (2.0 * n + 2.0));
+    }
+    0.5 * z + (1.0 + sum) / std::f64::consts::TAU.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sharp_step_covers_what_is_beyond_it_and_a_soft_one_as_much() {
+        for number in [0, 160, PER_OCTAVE * OCTAVES - 1] {
+            let profile = &profiles()[number];
+            for place in [0, 1 << 14, 3 << 14] {
+                let (row, _) = profile.rows(place, -3);
+                let beyond = 5.0 - f64::from(place) / f64::from(1 << PLACE_BITS);
+                let sum: f64 = row.iter().map(|&share| f64::from(share)).sum();
+                // The widest reaches past the eight pixels: ∫Φ up to −3 is 3.82e-4.
+                assert!((sum - beyond).abs() < 3.9e-4, "{number} {place}: {sum} {beyond}");
+            }
+        }
+        // ∫Φ up to 0 is the density there; up to 1 it is Φ(1) + φ(1).
+        assert!((normal_integral(0.0) - 0.398_942_280).abs() < 1e-9);
+        assert!((normal_integral(1.0) - (0.841_344_746 + 0.241_970_725)).abs() < 1e-8);
+        assert!((normal_integral(-5.4)).abs() < 1e-7 && (normal_integral(5.4) - 5.4).abs() < 1e-7);
+    }
+
+    #[test]
+    fn a_variance_finds_its_profile() {
+        for variance in [0.004f32, 0.01, 0.1, 0.5, 0.72, 0.99] {
+            let found = variance_of(profile_number(variance));
+            // Half of a 64th of the octave's lower end.
+            assert!((found / f64::from(variance) - 1.0).abs() < 0.0079, "{variance} {found}");
+        }
+        assert_eq!((profile_number(0.0), profile_number(7.0)), (0, PER_OCTAVE * OCTAVES - 1));
+    }
+}

@@ -1,0 +1,145 @@
+//! Rings of the pupil's mesh, and how they are cut into pieces.
+
+use crate::mesh::Mesh;
+
+/// A ring of cells of the mesh.
+#[derive(Clone, Copy)]
+pub(crate) struct Ring {
+    /// How many rings there are from this one to the edge.
+    n_to_edge: usize,
+    /// The shares of the pupil's radius at both sides.
+    inner_share: f64,
+    outer_share: f64,
+}
+
+/// A piece of a cell: its place, from 0 on the inner side to 1 on the outer, its width there, and its part of the area.
+#[derive(Clone, Copy)]
+pub(crate) struct Piece {
+    pub(crate) at: f64,
+    pub(crate) step: f64,
+    pub(crate) share_of_area: f64,
+}
+
+impl Piece {
+    pub(crate) const WHOLE: Self = Self { at: 0.5, step: 1.0, share_of_area: 1.0 };
+}
+
+impl Ring {
+    pub(crate) fn new(mesh: Mesh, number: usize) -> Self {
+        let (inner_share, outer_share) = (mesh.share(number as f64), mesh.share((number + 1) as f64));
+        Self { n_to_edge: mesh.n_rings - number, inner_share, outer_share }
+    }
+
+    /// Returns how many pieces the ring's spread needs, if its wide axis in the middle is so many pixels: it doubles
+    /// over the last few rings, which is no matter below a pixel.
+    pub(crate) fn edge_pieces(self, wide: f64) -> usize {
+        match self.n_to_edge {
+            1 => 3,
+            2 | 3 if wide > 0.3 => 2,
+            4..=6 if wide > 0.6 => 2,
+            _ => 1,
+        }
+    }
+
+    /// Returns so many pieces of equal steps, for light that they tile.
+    pub(crate) fn equal_pieces(self, n: usize) -> impl Iterator<Item = Piece> {
+        (0..n).map(move |i| {
+            let step = |i: f64| i / n as f64;
+            let (from, to) = (self.share(step(i as f64)), self.share(step((i + 1) as f64)));
+            let whole = self.outer_share * self.outer_share - self.inner_share * self.inner_share;
+            Piece {
+                at: self.place(0.5 * (from + to)),
+                step: self.place(to) - self.place(from),
+                share_of_area: (to * to - from * from) / whole,
+            }
+        })
+    }
+
+    /// Returns pieces by Gauss's rule, for light whose spread is wider than they are.
+    pub(crate) fn gauss_pieces(self, n: usize) -> impl Iterator<Item = Piece> {
+        let rule = RULES[n.clamp(1, RULES.len()) - 1];
+        // The area between u and u + du goes with share · dshare/du, a cubic.
+        let area = move |u: f64| self.share(u) * (self.gap_inner() - self.range() * u);
+        let whole: f64 = rule.iter().map(|&(u, weight)| weight * area(u)).sum();
+        let mut from = 0.0;
+        rule.iter().map(move |&(u, weight)| {
+            let (start, to) = (from, from + weight);
+            from = to;
+            Piece {
+                at: self.place(self.share(u)),
+                step: self.place(self.share(to)) - self.place(self.share(start)),
+                share_of_area: weight * area(u) / whole,
+            }
+        })
+    }
+
+    /// Returns the share of the pupil's radius `u` of the way outwards, on a scale on which pieces crowd towards the
+    /// edge like rings do, only more so: there the spread grows like 1/distance.
+    fn share(self, u: f64) -> f64 {
+        1.0 - (self.gap_inner() - self.range() * u).powi(2)
+    }
+
+    fn gap_inner(self) -> f64 {
+        (1.0 - self.inner_share).sqrt()
+    }
+
+    fn range(self) -> f64 {
+        self.gap_inner() - (1.0 - self.outer_share).max(0.0).sqrt()
+    }
+
+    fn place(self, share: f64) -> f64 {
+        (share - self.inner_share) / (self.outer_share - self.inner_share)
+    }
+}
+
+/// Gauss's rules on 0 to 1: places and weights.
+const RULES: [&[(f64, f64)]; 4] = [
+    &[(0.5, 1.0)],
+    &[(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)],
+    &[
+        (0.112_701_665_379_258_3, 0.277_777_777_777_777_8),
+        (0.5, 0.444_444_444_444_444_4),
+        (0.887_298_334_620_741_7, 0.277_777_777_777_777_8),
+    ],
+    &[
+        (0.069_431_844_202_973_7, 0.173_927_422_568_726_9),
+        (0.330_009_478_207_571_9, 0.326_072_577_431_273_1),
+        (0.669_990_521_792_428_1, 0.326_072_577_431_273_1),
+        (0.930_568_155_797_026_3, 0.173_927_422_568_726_9),
+    ],
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_make_up_their_ring() {
+        let mesh = Mesh { n_rings: 12, n_azimuths: 48 };
+        for number in [0, 5, 11] {
+            let ring = Ring::new(mesh, number);
+            for n in 1..=4 {
+                for pieces in [ring.equal_pieces(n).collect::<Vec<_>>(), ring.gauss_pieces(n).collect()] {
+                    assert_eq!(pieces.len(), n);
+                    let sum = |of: fn(&Piece) -> f64| -> f64 { pieces.iter().map(of).sum() };
+                    assert!((sum(|p| p.share_of_area) - 1.0).abs() < 1e-12 && (sum(|p| p.step) - 1.0).abs() < 1e-12);
+                    assert!(pieces.windows(2).all(|pair| pair[0].at < pair[1].at));
+                    assert!(pieces.iter().all(|p| p.at > 0.0 && p.at < 1.0));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn gausss_rule_integrates_over_the_ring_what_grows_towards_its_edge() {
+        let ring = Ring::new(Mesh { n_rings: 12, n_azimuths: 48 }, 11);
+        // The mean over the ring's area of √(1 − share), by the substitution share = 1 − gap².
+        let gap = (1.0 - ring.inner_share).sqrt();
+        let exact = 4.0 * (gap.powi(3) / 3.0 - gap.powi(5) / 5.0) / (1.0 - ring.inner_share.powi(2));
+        let mean: f64 = ring
+            .gauss_pieces(3)
+            .map(|p| p.share_of_area * (1.0 - ring.inner_share - p.at * (1.0 - ring.inner_share)).sqrt())
+            .sum();
+        assert!((mean / exact - 1.0).abs() < 1e-12, "{mean} {exact}");
+    }
+}
