@@ -142,8 +142,9 @@ impl Cell {
     fn bend(&self, splats: &mut Vec<Splat>, ring: Ring, bending: Bending) {
         let n_edge = ring.edge_pieces(self.wide);
         let n_tiles = ((self.n_sigmas.0 / PIECE).ceil() as usize).clamp(n_edge, 64);
-        // Where the spread is wider than the pieces, Gauss's rule; where they lie side by side, equal ones.
-        if n_tiles == 1 {
+        // Where the spread is wider than the pieces, Gauss's rule; where they lie side by side, equal ones. Wedges about the
+        // middle hold the most of their light near their outer sides: drawn as even strips they would leave a dot there.
+        if n_tiles == 1 && !ring.is_innermost() {
             self.add(splats, &Piece::WHOLE, self.middle, bending);
         } else if self.n_sigmas.0 < n_edge as f64 {
             ring.gauss_pieces(n_edge).for_each(|piece| self.add_piece(splats, &piece, bending));

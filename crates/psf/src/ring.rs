@@ -41,16 +41,27 @@ impl Ring {
         }
     }
 
-    /// Returns so many pieces of equal steps, for light that they tile.
+    /// Whether it is the innermost ring, whose cells have a point for their inner side.
+    pub(crate) fn is_innermost(self) -> bool {
+        self.inner_share == 0.0
+    }
+
+    /// Returns so many pieces of equal steps, for light that they tile: each where its area has its centroid, and as wide as
+    /// an even step of the area's variance is.
     pub(crate) fn equal_pieces(self, n: usize) -> impl Iterator<Item = Piece> {
         (0..n).map(move |i| {
             let step = |i: f64| i / n as f64;
             let (from, to) = (self.share(step(i as f64)), self.share(step((i + 1) as f64)));
             let whole = self.outer_share * self.outer_share - self.inner_share * self.inner_share;
+            let area = to * to - from * from;
+            // The area between shares s and s + ds goes with s ds.
+            let mean = 2.0 / 3.0 * (to.powi(3) - from.powi(3)) / area;
+            let variance = 0.5 * (to * to + from * from) - mean * mean;
+            let width = (12.0 * variance).max(0.0).sqrt();
             Piece {
-                at: self.place(0.5 * (from + to)),
-                step: self.place(to) - self.place(from),
-                share_of_area: (to * to - from * from) / whole,
+                at: self.place(mean),
+                step: width / (self.outer_share - self.inner_share),
+                share_of_area: area / whole,
             }
         })
     }
@@ -121,13 +132,36 @@ mod tests {
             for n in 1..=4 {
                 for pieces in [ring.equal_pieces(n).collect::<Vec<_>>(), ring.gauss_pieces(n).collect()] {
                     assert_eq!(pieces.len(), n);
-                    let sum = |of: fn(&Piece) -> f64| -> f64 { pieces.iter().map(of).sum() };
-                    assert!((sum(|p| p.share_of_area) - 1.0).abs() < 1e-12 && (sum(|p| p.step) - 1.0).abs() < 1e-12);
+                    assert!((pieces.iter().map(|p| p.share_of_area).sum::<f64>() - 1.0).abs() < 1e-12);
                     assert!(pieces.windows(2).all(|pair| pair[0].at < pair[1].at));
                     assert!(pieces.iter().all(|p| p.at > 0.0 && p.at < 1.0));
                 }
+                assert!((ring.gauss_pieces(n).map(|p| p.step).sum::<f64>() - 1.0).abs() < 1e-12);
             }
         }
+    }
+
+    #[test]
+    fn pieces_have_the_moments_of_the_rings_area() {
+        let mesh = Mesh { n_rings: 12, n_azimuths: 48 };
+        for number in [0, 5, 11] {
+            let ring = Ring::new(mesh, number);
+            let (from, to) = (ring.inner_share, ring.outer_share);
+            let mean_power =
+                |k: i32| 2.0 / f64::from(k + 2) * (to.powi(k + 2) - from.powi(k + 2)) / (to * to - from * from);
+            for n in 1..=4 {
+                let share = |p: &Piece| from + p.at * (to - from);
+                let (mut mean, mut square) = (0.0, 0.0);
+                for piece in ring.equal_pieces(n) {
+                    let width = piece.step * (to - from);
+                    mean += piece.share_of_area * share(&piece);
+                    square += piece.share_of_area * (share(&piece).powi(2) + width * width / 12.0);
+                }
+                assert!((mean - mean_power(1)).abs() < 1e-12 && (square - mean_power(2)).abs() < 1e-12, "{number} {n}");
+            }
+        }
+        // A wedge: two thirds of the way out.
+        assert!((Ring::new(mesh, 0).equal_pieces(1).next().unwrap().at - 2.0 / 3.0).abs() < 1e-12);
     }
 
     #[test]

@@ -74,3 +74,30 @@ fn bent_rays_have_the_edge_of_waves_and_geometry_has_not() {
         assert!(case.f_number != 8.0 || found[1].1 < 0.0195, "{}: {found:?}", case.name);
     }
 }
+
+#[test]
+fn bent_blurs_have_no_dot_in_their_middle() {
+    let lens = Lens::thin(50.0, 12.5).unwrap();
+    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    for (pitch_um, dioptres) in [(1.0, 0.9), (2.0, 0.9), (2.0, 0.7), (1.0, 0.6), (4.0, 1.5)] {
+        let diffraction = Diffraction::Hurb { gamma: 1.0 };
+        let settings = BankSettings::covering(film_mm, 0.0, (dioptres, dioptres), (550.0, 550.0), diffraction);
+        let bank = PsfBank::build(&lens, &settings).unwrap();
+        let query = PsfQuery { field_tan: DVec2::ZERO, dioptres, wavelength_nm: 550.0, pitch_um };
+        let picture = bank.picture(query, 301).0;
+        let radius_px = 1e3 * bank.blur_radius_mm(0.0, dioptres, 550.0).abs() / pitch_um;
+        // Rings about the middle, a few pixels wide; a blur without aberrations is even.
+        let ring = |from: f64, to: f64| {
+            let at = |(r, c): (usize, usize)| (r as f64 - 150.0).hypot(c as f64 - 150.0);
+            let within: Vec<f64> =
+                picture.indexed_iter().filter(|&(place, _)| (from..to).contains(&at(place))).map(|(_, e)| *e).collect();
+            within.iter().sum::<f64>() / within.len() as f64
+        };
+        let even = ring(0.2 * radius_px, 0.6 * radius_px);
+        let worst = (0..8)
+            .map(|i| ring(2.0 * f64::from(i), 2.0 * f64::from(i) + 2.0) / even - 1.0)
+            .fold(0.0, |w: f64, e| if e.abs() > w.abs() { e } else { w });
+        println!("{pitch_um} um, radius {radius_px:.1} px: {worst:.3}");
+        assert!(worst.abs() < 0.1, "{pitch_um} {dioptres}: {worst}");
+    }
+}
