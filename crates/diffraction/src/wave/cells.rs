@@ -29,10 +29,16 @@ pub(crate) struct PupilCells {
 impl PupilCells {
     /// Finds the pupil of a point, and lays nodes over it: `None` if no light gets through.
     pub(crate) fn find(lens: &MonoLens, point: &ObjectPoint, grid: PupilGrid) -> Option<Self> {
-        let mut cells = Self::of_region(&lens.with_obscurations_inverted(&[]), point, grid)?;
-        if lens.n_obscurations() > 0 {
-            cells.cut_holes(lens, (point, grid), &mut vec![]);
-        }
+        let mut parts: Option<Self> = None;
+        lens.for_each_clear_part(&mut |part, sign| {
+            let Some(region) = Self::of_region(part, point, grid) else { return false };
+            match &mut parts {
+                None => parts = Some(region),
+                Some(cells) => cells.add(region, sign),
+            }
+            true
+        });
+        let mut cells = parts?;
         cells.collected = cells.energy.iter().sum();
         let collected = cells.collected;
         cells.energy.iter_mut().for_each(|energy| *energy /= collected);
@@ -41,20 +47,12 @@ impl PupilCells {
         (collected > 0.0 && gross < LARGEST_HOLE).then_some(cells)
     }
 
-    /// Takes away what all of the obscurations `of` stop together with further ones, and gives back what they stop twice.
-    fn cut_holes(&mut self, lens: &MonoLens, within: (&ObjectPoint, PupilGrid), of: &mut Vec<usize>) {
-        for next in of.last().map_or(0, |last| last + 1)..lens.n_obscurations() {
-            of.push(next);
-            if let Some(hole) = Self::of_region(&lens.with_obscurations_inverted(of), within.0, within.1) {
-                let sign = if of.len() % 2 == 1 { -1.0 } else { 1.0 };
-                self.step_mm = self.step_mm.min(hole.step_mm);
-                self.targets_mm.extend(hole.targets_mm);
-                self.areas_mm2.extend(hole.areas_mm2.iter().map(|area| sign * area));
-                self.energy.extend(hole.energy.iter().map(|energy| sign * energy));
-                self.cut_holes(lens, within, of);
-            }
-            of.pop();
-        }
+    /// Adds a further region, as clear or as a hole.
+    fn add(&mut self, region: Self, sign: f64) {
+        self.step_mm = self.step_mm.min(region.step_mm);
+        self.targets_mm.extend(region.targets_mm);
+        self.areas_mm2.extend(region.areas_mm2.iter().map(|area| sign * area));
+        self.energy.extend(region.energy.iter().map(|energy| sign * energy));
     }
 
     /// Lays nodes over the pupil of a lens without obscurations; energies are solid angles.

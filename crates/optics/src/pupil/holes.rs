@@ -3,29 +3,39 @@
 use crate::MonoLens;
 
 impl MonoLens {
-    /// Returns a quantity that adds up over the pupil (its area, a solid angle), for what obscurations leave clear of it;
-    /// `of` gives it for lenses without any, and 0 where no light gets through.
+    /// Hands the lens as a sum of lenses without obscurations, each with its sign: the lens without them, less that of each
+    /// obscuration inverted, plus those of each two of them, and so on.
     ///
-    /// It is that of the lens without obscurations, less those of each obscuration inverted, plus those of each two of
-    /// them, and so on.
-    pub fn over_clear_pupil(&self, of: &dyn Fn(&Self) -> f64) -> f64 {
-        match self.n_obscurations() {
-            0 => of(self),
-            _ => of(&self.with_obscurations_inverted(&[])) - self.stopped(of, &mut vec![]),
+    /// `visit` returns whether light gets through; where none does, none gets through with further obscurations inverted,
+    /// and those are left out. The number of parts doubles with each obscuration that lies over all others.
+    pub fn for_each_clear_part(&self, visit: &mut dyn FnMut(&Self, f64) -> bool) {
+        if self.n_obscurations() == 0 {
+            visit(self, 1.0);
+        } else if visit(&self.with_obscurations_inverted(&[]), 1.0) {
+            self.visit_inverted(visit, &mut vec![]);
         }
     }
 
-    /// Returns what is stopped by all of these obscurations and at least one behind them, each place counted once.
-    fn stopped(&self, of: &dyn Fn(&Self) -> f64, by: &mut Vec<usize>) -> f64 {
-        let mut sum = 0.0;
-        for next in by.last().map_or(0, |last| last + 1)..self.n_obscurations() {
-            by.push(next);
-            let here = of(&self.with_obscurations_inverted(by));
-            if here != 0.0 {
-                sum += here - self.stopped(of, by);
+    fn visit_inverted(&self, visit: &mut dyn FnMut(&Self, f64) -> bool, inverted: &mut Vec<usize>) {
+        for next in inverted.last().map_or(0, |last| last + 1)..self.n_obscurations() {
+            inverted.push(next);
+            let sign = if inverted.len() % 2 == 1 { -1.0 } else { 1.0 };
+            if visit(&self.with_obscurations_inverted(inverted), sign) {
+                self.visit_inverted(visit, inverted);
             }
-            by.pop();
+            inverted.pop();
         }
+    }
+
+    /// Returns a quantity that adds up over the pupil (its area, a solid angle), for what obscurations leave clear of it;
+    /// `of` gives it for lenses without any, and 0 where no light gets through.
+    pub fn over_clear_pupil(&self, of: &dyn Fn(&Self) -> f64) -> f64 {
+        let mut sum = 0.0;
+        self.for_each_clear_part(&mut |part, sign| {
+            let here = of(part);
+            sum += sign * here;
+            here != 0.0
+        });
         sum
     }
 }
