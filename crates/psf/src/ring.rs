@@ -1,5 +1,9 @@
 //! Rings of the pupil's mesh, and how they are cut into pieces.
 
+use std::sync::LazyLock;
+
+use dioptric_diffraction::quadrature::gauss_legendre_on;
+
 use crate::mesh::Mesh;
 
 /// A ring of cells of the mesh.
@@ -68,7 +72,7 @@ impl Ring {
 
     /// Returns pieces by Gauss's rule, for light whose spread is wider than they are.
     pub(crate) fn gauss_pieces(self, n: usize) -> impl Iterator<Item = Piece> {
-        let rule = RULES[n.clamp(1, RULES.len()) - 1];
+        let rule: &'static [(f64, f64)] = &RULES[n.clamp(1, MOST_GAUSS_PIECES) - 1];
         // The area between u and u + du goes with share · dshare/du, a cubic.
         let area = move |u: f64| self.share(u) * (self.gap_inner() - self.range() * u);
         let whole: f64 = rule.iter().map(|&(u, weight)| weight * area(u)).sum();
@@ -103,22 +107,12 @@ impl Ring {
     }
 }
 
-/// Gauss's rules on 0 to 1: places and weights.
-const RULES: [&[(f64, f64)]; 4] = [
-    &[(0.5, 1.0)],
-    &[(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)],
-    &[
-        (0.112_701_665_379_258_3, 0.277_777_777_777_777_8),
-        (0.5, 0.444_444_444_444_444_4),
-        (0.887_298_334_620_741_7, 0.277_777_777_777_777_8),
-    ],
-    &[
-        (0.069_431_844_202_973_7, 0.173_927_422_568_726_9),
-        (0.330_009_478_207_571_9, 0.326_072_577_431_273_1),
-        (0.669_990_521_792_428_1, 0.326_072_577_431_273_1),
-        (0.930_568_155_797_026_3, 0.173_927_422_568_726_9),
-    ],
-];
+/// The most pieces of a cell by Gauss's rule.
+const MOST_GAUSS_PIECES: usize = 4;
+
+/// Gauss's rules on 0 to 1 of one place and more: places and weights.
+static RULES: LazyLock<[Vec<(f64, f64)>; MOST_GAUSS_PIECES]> =
+    LazyLock::new(|| std::array::from_fn(|i| gauss_legendre_on(i + 1, 0.0, 1.0)));
 
 #[cfg(test)]
 mod tests {
