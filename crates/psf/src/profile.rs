@@ -79,19 +79,10 @@ impl Profile {
     }
 }
 
-/// Returns the integral of the normal distribution's share below z, up to z, to 1e-7, with the same bits everywhere.
+/// Returns the integral of the normal distribution's share below z, up to z: z Φ(z) + φ(z), by functions that have the same
+/// bits everywhere.
 fn normal_integral(z: f64) -> f64 {
-    if z.abs() > 5.5 {
-        return z.max(0.0);
-    }
-    // Taylor's series of the density integrated twice; its largest term is below e^16.
-    let (mut power, mut sum, mut n) = (z * z, 0.5 * z * z, 0.0);
-    while power.abs() > 1e-10 {
-        n += 1.0;
-        power *= -z * z / (2.0 * n);
-        sum += power / ((2.0 * n + 1.0) * (2.0 * n + 2.0));
-    }
-    0.5 * z + (1.0 + sum) / std::f64::consts::TAU.sqrt()
+    0.5 * z * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2) + libm::exp(-0.5 * z * z) / std::f64::consts::TAU.sqrt()
 }
 
 #[cfg(test)]
