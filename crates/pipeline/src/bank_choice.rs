@@ -1,7 +1,7 @@
 //! How finely point-spread functions are sampled, and what that leaves wrong.
 
 use dioptric_optics::Lens;
-use dioptric_psf::{AdaptiveSettings, BankSettings, ErrorPlaces, Interpolation, PsfBank};
+use dioptric_psf::{AdaptiveSettings, BankSettings, ErrorPlaces, Interpolation, MeasuredError, PsfBank};
 use serde::{Deserialize, Serialize};
 
 use crate::{CameraBank, PipelineError};
@@ -96,17 +96,9 @@ impl BankData {
             CameraBank::Turned(bank) => Self::of(bank),
             CameraBank::Plane { bank, error } => {
                 let settings = bank.bank().settings();
-                Some(Self {
-                    interpolation: "rays",
-                    n_fields: settings.tans_x.len() * settings.tans_y.len(),
-                    n_depths: settings.dioptres.len(),
-                    n_wavelengths: settings.wavelengths_nm.len(),
-                    median_error: error.median,
-                    p90_error: error.p90,
-                    n_places: error.n_places,
-                    pitch_um: error.pitch_um,
-                    wanted_error: error.target_median,
-                })
+                let n_fields = settings.tans_x.len() * settings.tans_y.len();
+                let (n_depths, n_wavelengths) = (settings.dioptres.len(), settings.wavelengths_nm.len());
+                Some(Self::new("rays", (n_fields, n_depths, n_wavelengths), *error))
             }
         }
     }
@@ -115,20 +107,30 @@ impl BankData {
     pub fn of(bank: &PsfBank) -> Option<Self> {
         let (settings, error) = (bank.settings(), bank.error()?);
         let last = bank.last_field_tan();
-        Some(Self {
-            interpolation: match settings.interpolation {
-                Interpolation::Rays => "rays",
-                Interpolation::Images => "images",
-            },
-            n_fields: settings.field_tans.iter().filter(|tan| **tan <= last).count(),
-            n_depths: settings.dioptres.len(),
-            n_wavelengths: settings.wavelengths_nm.len(),
+        let n_fields = settings.field_tans.iter().filter(|tan| **tan <= last).count();
+        let interpolation = match settings.interpolation {
+            Interpolation::Rays => "rays",
+            Interpolation::Images => "images",
+        };
+        Some(Self::new(interpolation, (n_fields, settings.dioptres.len(), settings.wavelengths_nm.len()), error))
+    }
+
+    fn new(
+        interpolation: &'static str,
+        (n_fields, n_depths, n_wavelengths): (usize, usize, usize),
+        error: MeasuredError,
+    ) -> Self {
+        Self {
+            interpolation,
+            n_fields,
+            n_depths,
+            n_wavelengths,
             median_error: error.median,
             p90_error: error.p90,
             n_places: error.n_places,
             pitch_um: error.pitch_um,
             wanted_error: error.target_median,
-        })
+        }
     }
 
     /// Says it in one line.

@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec2};
 
-use crate::axis::Axis;
+use crate::axis::{Axis, Stencil};
 
 /// Nodes of a table along each side.
 const NODES: usize = 129;
@@ -127,12 +127,12 @@ impl Landing<'_> {
         let n_x = self.x.knots().len();
         let [x, x_slope] = self.x.value_and_slope(field_tan.x);
         let [y, y_slope] = self.y.value_and_slope(field_tan.y);
-        let sum = |x: &crate::axis::Stencil, y: &crate::axis::Stencil| -> DVec2 {
+        let sum = |x: &Stencil, y: &Stencil| -> DVec2 {
             y.iter()
                 .map(|(j, wy)| x.iter().map(|(i, wx)| self.centroids_mm[j * n_x + i] * (wx * wy)).sum::<DVec2>())
                 .sum()
         };
-        let pupil = |x: &crate::axis::Stencil, y: &crate::axis::Stencil| {
+        let pupil = |x: &Stencil, y: &Stencil| {
             let terms = y.iter().flat_map(|(j, wy)| x.iter().map(move |(i, wx)| (j * n_x + i, wx * wy)));
             terms.fold((0.0, true), |(sum, lit), (node, weight)| {
                 (sum + weight * self.pupils_mm2[node], lit && self.pupils_mm2[node] > 0.0)

@@ -4,7 +4,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::{
-    FieldBank, FieldGeometry, Kernel, ModelUse, PsfError, PsfQuery,
+    FieldBank, FieldGeometry, Kernel, PsfError, PsfQuery,
     field_bank::Sample,
     field_geometry::{Area, Landed, Landing},
     ray_map::{RIM_OVER_RMS, Record},
@@ -116,14 +116,9 @@ impl ImagingBank {
     /// Returns the point spread function of a point about its centroid, as
     /// [`PsfBank::kernel`](crate::PsfBank::kernel) does; of a dark one that of the nearest lit field.
     pub fn kernel(&self, query: PsfQuery) -> Kernel {
-        self.kernel_and_model(query).0
-    }
-
-    /// Returns [`kernel`](Self::kernel) with the model that drew it.
-    pub fn kernel_and_model(&self, query: PsfQuery) -> (Kernel, ModelUse) {
         let samples = self.samples(query.field_tan, query.dioptres, query.wavelength_nm);
         let record = Record::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
-        self.bank.kernel_of(&record.expect("every stencil has a knot"), query)
+        self.bank.kernel_of(&record.expect("every stencil has a knot"), query).0
     }
 
     /// Returns the signed radius of the circle of confusion, mm, as
