@@ -88,47 +88,99 @@ pub(super) struct Places {
     pub(super) polar: Vec<(f64, Azimuth, f64)>,
 }
 
+/// Places that are fitted together.
+const LANES: usize = 4;
+/// The number of even terms, of which there are more than of odd ones, rounded up to whole [`LANES`]: to each power k of the
+/// radius belong k/2 + 1.
+const MOST_TERMS: usize = {
+    let (mut n, mut k) = (0, 0);
+    while k <= DEGREE {
+        n += k / 2 + 1;
+        k += 1;
+    }
+    n.next_multiple_of(LANES)
+};
+/// The terms at places, each place a row.
+type Basis = [[f64; MOST_TERMS]; LANES];
+
 impl Places {
     /// Returns the coefficients of the functions of one parity that meet these values best, each list a function;
     /// `None` where the places do not tell the terms apart.
     pub(super) fn fit<const N: usize>(&self, parity: Parity, values: [&[f64]; N]) -> Option<[Vec<f64>; N]> {
         // Zernike's polynomials are nearly orthogonal over a pupil that nearly fills the disc; powers are not.
-        let zernikes = zernikes(parity);
         let n = parity.n_terms();
-        let mut gram = vec![0.0; n * n];
-        let mut right = [(); N].map(|()| vec![0.0; n]);
-        let mut basis = vec![0.0; n];
-        for (place, (radius, azimuth, weight)) in self.polar.iter().enumerate() {
-            let mut powers = [1.0; DEGREE + 1];
-            for k in 1..=DEGREE {
-                powers[k] = powers[k - 1] * radius;
+        let mut gram = vec![0.0; n * MOST_TERMS];
+        let mut right = [[0.0; MOST_TERMS]; N];
+        for (group, places) in self.polar.chunks(LANES).enumerate() {
+            let (mut basis, mut weighted) = ([[0.0; MOST_TERMS]; LANES], [[0.0; LANES]; N]);
+            for (lane, (.., weight)) in places.iter().enumerate() {
+                for (weighted, values) in weighted.iter_mut().zip(values) {
+                    weighted[lane] = weight * values[group * LANES + lane];
+                }
             }
-            let angular = if parity == Parity::Even { &azimuth.cos } else { &azimuth.sin };
-            for ((value, zernike), (m, _)) in basis.iter_mut().zip(zernikes).zip(parity.terms()) {
-                *value = angular[*m] * zernike.iter().map(|(k, c)| c * powers[*k]).sum::<f64>();
-            }
-            add_products(&mut gram, &basis, *weight);
-            for (right, values) in right.iter_mut().zip(values) {
-                let scaled = weight * values[place];
-                right.iter_mut().zip(&basis).for_each(|(sum, b)| *sum += scaled * b);
+            fill(&mut basis, parity, zernikes(parity), places);
+            add_products(&mut gram, &basis, places);
+            for (right, weighted) in right.iter_mut().zip(weighted) {
+                add_sums(right, &basis, weighted);
             }
         }
+        let mut gram: Vec<f64> = gram.chunks_exact(MOST_TERMS).flat_map(|row| row[..n].iter().copied()).collect();
         factor(&mut gram, n)?;
         Some(right.map(|mut right| {
-            solve(&gram, n, &mut right);
-            as_powers(parity, &right)
+            solve(&gram, n, &mut right[..n]);
+            as_powers(parity, &right[..n])
         }))
     }
 }
 
-/// Adds the products of a list's numbers, times a weight, to the lower triangle of a matrix.
+/// Sets the terms at up to four places, those of the others to 0.
 #[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
-fn add_products(gram: &mut [f64], basis: &[f64], weight: f64) {
-    for (i, (row, b)) in gram.chunks_exact_mut(basis.len()).zip(basis).enumerate() {
-        let scaled = b * weight;
-        for (sum, b) in row[..=i].iter_mut().zip(basis) {
-            *sum += scaled * b;
+fn fill(basis: &mut Basis, parity: Parity, zernikes: &[Vec<(usize, f64)>], places: &[(f64, Azimuth, f64)]) {
+    let mut angular = [[0.0; LANES]; DEGREE + 1];
+    let mut powers = [[0.0; LANES]; DEGREE + 1];
+    for (lane, (radius, azimuth, _)) in places.iter().enumerate() {
+        let of = if parity == Parity::Even { &azimuth.cos } else { &azimuth.sin };
+        let mut power = 1.0;
+        for k in 0..=DEGREE {
+            (angular[k][lane], powers[k][lane]) = (of[k], power);
+            power *= radius;
         }
+    }
+    for (term, (zernike, (m, _))) in zernikes.iter().zip(parity.terms()).enumerate() {
+        let mut values = [0.0; LANES];
+        for (k, c) in zernike {
+            for (value, power) in values.iter_mut().zip(&powers[*k]) {
+                *value += c * power;
+            }
+        }
+        for ((row, value), angular) in basis.iter_mut().zip(values).zip(angular[*m]) {
+            row[term] = value * angular;
+        }
+    }
+}
+
+/// Adds the products of terms, times the places' weights, to the lower triangle of a matrix; something may be added above it.
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn add_products(gram: &mut [f64], basis: &Basis, places: &[(f64, Azimuth, f64)]) {
+    let mut weights = [0.0; LANES];
+    for (weight, (.., of_place)) in weights.iter_mut().zip(places) {
+        *weight = *of_place;
+    }
+    let [b0, b1, b2, b3] = basis;
+    for (i, row) in gram.chunks_exact_mut(MOST_TERMS).enumerate() {
+        let [w0, w1, w2, w3] = std::array::from_fn(|lane| basis[lane][i] * weights[lane]);
+        let n = (i + 1).next_multiple_of(LANES).min(MOST_TERMS);
+        for ((((sum, b0), b1), b2), b3) in row[..n].iter_mut().zip(&b0[..n]).zip(&b1[..n]).zip(&b2[..n]).zip(&b3[..n]) {
+            *sum += (w0 * b0 + w1 * b1) + (w2 * b2 + w3 * b3);
+        }
+    }
+}
+
+/// Adds the sums over places of a function, times the places' weights, and the terms.
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn add_sums(sums: &mut [f64; MOST_TERMS], [b0, b1, b2, b3]: &Basis, [w0, w1, w2, w3]: [f64; LANES]) {
+    for ((((sum, b0), b1), b2), b3) in sums.iter_mut().zip(b0).zip(b1).zip(b2).zip(b3) {
+        *sum += (w0 * b0 + w1 * b1) + (w2 * b2 + w3 * b3);
     }
 }
 
