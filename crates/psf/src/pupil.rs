@@ -123,18 +123,20 @@ fn next_guess((r0, f0): (f64, f64), (r1, f1): (f64, f64), inside: f64, outside: 
 
 /// Returns how far from `from` a ray leaves a closed polygon that it starts in.
 fn ray_to_polygon(from: DVec2, direction: DVec2, polygon: &[DVec2]) -> f64 {
+    // On which side of the ray's line a corner is: one sign for both sides of the polygon that meet there.
+    let across = |corner: DVec2| direction.perp_dot(corner - from);
     let mut furthest: f64 = 0.0;
-    for (i, a) in polygon.iter().enumerate() {
-        let b = polygon[(i + 1) % polygon.len()];
-        let (side, to_a) = (b - *a, *a - from);
-        let across = direction.perp_dot(side);
-        let along_side = to_a.perp_dot(direction) / across;
-        let along_ray = to_a.perp_dot(side) / across;
-        if (-1e-9..=1.0 + 1e-9).contains(&along_side) && along_ray.is_finite() {
-            furthest = furthest.max(along_ray);
+    let Some(mut a) = polygon.last().copied() else { return furthest };
+    let mut across_a = across(a);
+    for &b in polygon {
+        let across_b = across(b);
+        if (across_a <= 0.0) != (across_b <= 0.0) {
+            let place = a + (b - a) * (across_a / (across_a - across_b));
+            furthest = furthest.max(direction.dot(place - from));
         }
+        (a, across_a) = (b, across_b);
     }
-    furthest
+    furthest / direction.length_squared()
 }
 
 #[cfg(test)]
