@@ -66,7 +66,7 @@ fn turn(rays: &RayBatch, ray: usize, edge: Edge, model: Hurb, form: BendForm, ra
     let before = rays.direction(ray);
     let point = rays.point_mm(ray).truncate();
     let r_mm = point.length();
-    let spread = model.spread(r_mm, edge.radius_mm, edge.wave_number_per_mm);
+    let spread = model.spread(r_mm, edge);
     let radial = if r_mm > 0.0 { point / r_mm } else { DVec2::X };
     loop {
         let (a, b): (f64, f64) = (StandardNormal.sample(random), StandardNormal.sample(random));
@@ -109,7 +109,7 @@ mod tests {
         for form in [BendForm::DirectionCosines, BendForm::Angles] {
             let mut rays = bundle(n, DVec3::new(0.0, 0.8, 0.0));
             bend(&mut rays, edge, Hurb::PAPER, form, 7);
-            let wanted = Hurb::PAPER.spread(0.8, 1.0, edge.wave_number_per_mm);
+            let wanted = Hurb::PAPER.spread(0.8, edge);
             // Two standard errors of a width from n draws: √(1/2n) = 0.16 %.
             assert!((rms(&rays.m) / wanted.radial - 1.0).abs() < 0.0032);
             assert!((rms(&rays.l) / wanted.across - 1.0).abs() < 0.0032);

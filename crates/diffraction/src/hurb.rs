@@ -6,9 +6,10 @@
 
 use std::f64::consts::PI;
 
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::quadrature::gauss_legendre_on;
+use crate::{Covariance, Edge, quadrature::gauss_legendre_on};
 
 /// The two constants of uncertainty bending: `tan σ = √((edge/d)² + (floor/R)²) / (2k)` for an edge at the distance d
 /// in a round stop of radius R.
@@ -44,28 +45,47 @@ impl Hurb {
         Self { edge: gamma, floor: 0.0 }
     }
 
-    /// Returns the standard deviation of a direction cosine for an edge at `distance_mm` in a stop of `radius_mm`.
+    /// Returns the standard deviation of a direction cosine for an edge at `distance_mm`, of a round stop.
     ///
-    /// `wave_number_per_mm` is k = 2πn/λ in the medium of the stop. The tangent of the spread is taken for the spread
-    /// itself: they differ where a ray passes within a wavelength of the edge.
-    pub fn sigma(self, distance_mm: f64, radius_mm: f64, wave_number_per_mm: f64) -> f64 {
-        let (edge, floor) = (self.edge / distance_mm, self.floor / radius_mm);
-        let tangent = (edge * edge + floor * floor).sqrt() / (2.0 * wave_number_per_mm);
-        // The arc's series: up to a hundredth what it leaves out is below 1e-13 of it.
-        let square = tangent * tangent;
-        if square < 1e-4 { tangent * (1.0 - square * (1.0 / 3.0 - square * (1.0 / 5.0))) } else { tangent.atan() }
+    /// The arc tangent of the model's tangent is taken for the spread of the cosine: they differ where a ray passes
+    /// within a wavelength of the edge.
+    pub fn sigma(self, distance_mm: f64, edge: Edge) -> f64 {
+        self.variance(1.0 / (distance_mm * distance_mm), edge).sqrt()
     }
 
     /// Returns the spread of a ray that crosses a round stop `r_mm` from its centre.
     ///
     /// The distances to the edge are R − r along the radius and the half-chord √(R² − r²) across it.
-    pub fn spread(self, r_mm: f64, radius_mm: f64, wave_number_per_mm: f64) -> Spread {
-        let clearance = (radius_mm - r_mm).max(1e-12 * radius_mm);
-        let half_chord = (clearance * (radius_mm + r_mm)).sqrt();
-        Spread {
-            radial: self.sigma(clearance, radius_mm, wave_number_per_mm),
-            across: self.sigma(half_chord, radius_mm, wave_number_per_mm),
-        }
+    pub fn spread(self, r_mm: f64, edge: Edge) -> Spread {
+        let (radial, across) = self.variances(r_mm, edge);
+        Spread { radial: radial.sqrt(), across: across.sqrt() }
+    }
+
+    /// Returns the covariance of the direction cosines of a ray that crosses a round stop at `stop_mm` from its centre.
+    #[inline]
+    pub fn covariance(self, stop_mm: DVec2, edge: Edge) -> Covariance {
+        let square = stop_mm.length_squared();
+        let (radial, across) = self.variances(square.sqrt(), edge);
+        // In the middle the two are equal.
+        let more = (radial - across) / square.max(f64::MIN_POSITIVE);
+        let Covariance { xx, xy, yy } = Covariance::along(stop_mm);
+        Covariance { xx: across + more * xx, xy: more * xy, yy: across + more * yy }
+    }
+
+    /// Returns the variances along the radius and across it.
+    #[inline]
+    fn variances(self, r_mm: f64, edge: Edge) -> (f64, f64) {
+        let clearance = (edge.radius_mm - r_mm).max(1e-12 * edge.radius_mm);
+        let across_middle = edge.radius_mm + r_mm;
+        let each = 1.0 / (clearance * clearance * across_middle);
+        (self.variance(across_middle * each, edge), self.variance(clearance * each, edge))
+    }
+
+    /// Returns the variance for an edge at a distance of which 1 over the square is given, 1/mm².
+    #[inline]
+    fn variance(self, per_distance_squared: f64, edge: Edge) -> f64 {
+        let (floor, k) = (self.floor / edge.radius_mm, 2.0 * edge.wave_number_per_mm);
+        arc_squared((self.edge * self.edge * per_distance_squared + floor * floor) / (k * k))
     }
 
     /// Returns the modulation of an ideal lens in focus at the frequency `s`, in units of 1/(λN).
@@ -110,6 +130,32 @@ impl Hurb {
             .sum()
     }
 }
+
+/// Returns the square of the angle whose tangent's square is given, without branches: to rounding up to a tangent of 0.1,
+/// to 1e-10 up to 1, and to 1e-6 beyond.
+#[inline]
+fn arc_squared(tangent_squared: f64) -> f64 {
+    // The tangent of half the angle, twice: at most that of π/8.
+    let half = |square: f64| {
+        let more = 1.0 + (1.0 + square).sqrt();
+        square / (more * more)
+    };
+    let square = half(half(tangent_squared));
+    let series = ARC_SQUARED.iter().rev().fold(0.0, |sum, term| term - square * sum);
+    16.0 * square * series
+}
+
+/// The series of arctan²√x over x: (1 + 1/3 + … + 1/(2n − 1))/n, with alternating signs.
+const ARC_SQUARED: [f64; 8] = {
+    let mut terms = [0.0; 8];
+    let (mut n, mut sum) = (0, 0.0);
+    while n < 8 {
+        sum += 1.0 / (2 * n + 1) as f64;
+        terms[n] = sum / (n + 1) as f64;
+        n += 1;
+    }
+    terms
+};
 
 /// Returns the mean over the azimuth of a function of its cosine squared.
 fn mean_over_azimuth(value: impl Fn(f64) -> f64) -> f64 {
@@ -181,10 +227,38 @@ mod tests {
 
     #[test]
     fn spread_is_inversely_related_to_the_distance_of_the_edge() {
-        let k = 2.0 * PI / 550e-6;
-        let (far, near) = (Hurb::PAPER.spread(0.0, 1.0, k), Hurb::PAPER.spread(0.9, 1.0, k));
+        let edge = Edge::new(1.0, 550.0, 1.0);
+        let (far, near) = (Hurb::PAPER.spread(0.0, edge), Hurb::PAPER.spread(0.9, edge));
         assert_abs_diff_eq!(near.radial / far.radial, 10.0, epsilon = 1e-4);
         assert_abs_diff_eq!(near.across / far.across, 1.0 / 0.19f64.sqrt(), epsilon = 1e-4);
         assert_eq!(far.radial, far.across);
+    }
+
+    #[test]
+    fn the_spread_of_a_cosine_is_the_arc_of_the_models_tangent() {
+        for model in [Hurb::PAPER, Hurb::CALIBRATED] {
+            for (distance_mm, limit) in
+                [(1.0, 1e-14), (0.01, 1e-14), (1e-3, 1e-14), (1e-4, 1e-12), (3e-5, 1e-10), (1e-9, 1e-6)]
+            {
+                let edge = Edge::new(1.0, 550.0, 1.5);
+                let tangent = (model.edge / distance_mm).hypot(model.floor) / (2.0 * edge.wave_number_per_mm);
+                let off = model.sigma(distance_mm, edge) / tangent.atan() - 1.0;
+                assert!(off.abs() < limit, "{distance_mm}: {off}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_covariance_has_the_spread_along_the_radius_and_across_it() {
+        let edge = Edge::new(2.0, 450.0, 1.0);
+        for (r_mm, angle) in [(0.0, 0.0), (1e-9, 2.0), (0.7, 0.4), (1.99, -2.2)] {
+            let axis = DVec2::from_angle(angle);
+            let Spread { radial, across } = Hurb::CALIBRATED.spread(r_mm, edge);
+            let (narrow, wide) = Hurb::CALIBRATED.covariance(axis * r_mm, edge).axes();
+            assert!((narrow.sqrt() / across - 1.0).abs() < 1e-9 && (wide.sqrt() / radial - 1.0).abs() < 1e-9);
+            let wanted = Covariance::along(axis * radial).plus(Covariance::along(axis.perp() * across));
+            let found = Hurb::CALIBRATED.covariance(axis * r_mm, edge);
+            assert!((found.xy - wanted.xy).abs() < 1e-12 * wide && (found.xx - wanted.xx).abs() < 1e-12 * wide);
+        }
     }
 }

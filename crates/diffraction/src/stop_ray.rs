@@ -25,12 +25,7 @@ pub struct StopRay {
 impl StopRay {
     /// Returns the covariance on the film, mm², of the ray's Gaussian.
     pub fn film_covariance_mm2(&self, edge: Edge, model: Hurb) -> Covariance {
-        let r_mm = self.stop_mm.length();
-        let spread = model.spread(r_mm, edge.radius_mm, edge.wave_number_per_mm);
-        let radial = if r_mm > 0.0 { self.stop_mm / r_mm } else { DVec2::X };
-        let on_film = |d: DVec2| self.along_l_mm * d.x + self.along_m_mm * d.y;
-        Covariance::along(on_film(radial) * spread.radial)
-            .plus(Covariance::along(on_film(radial.perp()) * spread.across))
+        model.covariance(self.stop_mm, edge).mapped(self.along_l_mm, self.along_m_mm)
     }
 }
 

@@ -2,12 +2,15 @@
 
 use dioptric_diffraction::{Covariance, Edge, Hurb};
 use glam::DVec2;
+use multiversion::multiversion;
 
 use crate::{
     mesh::Mesh,
+    profile::LANES,
+    raster::Raster,
     ray_map::Node,
-    ring::{Piece, Ring},
-    splat::Splat,
+    ring::{Cut, PIECE, Piece, Ring},
+    splat::{Film, Splat, Splats},
 };
 
 /// A cell this many standard deviations across, both ways, is drawn as a polygon.
@@ -24,14 +27,21 @@ const PART_OF_A_WIDE_CELL: f64 = 0.25;
 const FAR: f64 = 5.0;
 /// Variance, pixels², that a pixel's own size adds when the need for subdivision is judged.
 const PIXEL_VARIANCE: f64 = 0.12;
-/// A piece of this many standard deviations across leaves a ripple of 2 %, which pixels and neighbours hide.
-const PIECE: f64 = 2.7;
 
 /// Uncertainty bending at the stop.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bending {
     pub(crate) model: Hurb,
     pub(crate) edge: Edge,
+}
+
+impl Bending {
+    /// Returns the Gaussian of a ray on the film, pixels².
+    #[inline(always)]
+    fn covariance(self, node: &Node) -> Covariance {
+        let at_stop = self.model.covariance(node.in_stop * self.edge.radius_mm, self.edge);
+        at_stop.mapped(node.along_l_mm, node.along_m_mm)
+    }
 }
 
 /// A mesh on pixels and the energies of its cells.
@@ -45,87 +55,184 @@ pub(crate) struct BentMesh<'a> {
 }
 
 impl BentMesh<'_> {
-    /// Takes from the energies of the cells, ring by ring, what bending spreads, as splats.
-    pub(crate) fn take(&self, energies: &mut [f64]) -> Vec<Splat> {
-        let mut splats = Vec::with_capacity(2 * self.mesh.n_cells());
+    /// Takes from the energies of the cells what bending spreads, and deposits it.
+    pub(crate) fn deposit(&self, energies: &mut [f64], raster: &mut Raster) {
+        let (mut bent, mut splats, mut film) = (BentCells::default(), Splats::default(), None);
         for (number, energies) in energies.chunks_exact_mut(self.mesh.n_azimuths).enumerate() {
-            let ring = Ring::new(self.mesh, number);
-            for (j, energy) in energies.iter_mut().enumerate() {
-                let corners = self.mesh.corners(number, j).map(|node| self.nodes[node]);
-                let cell = Cell::new(corners, *energy, self.bending);
-                if !cell.is_still() {
-                    *energy = 0.0;
-                    if !cell.is_beyond(self.size, self.bending) {
-                        cell.bend(&mut splats, ring, self.bending);
+            draw_ring(self, number, energies, &mut bent, &mut splats);
+            if !splats.is_empty() {
+                film.get_or_insert_with(|| Film::new(self.size)).add(&splats);
+                splats.clear();
+            }
+        }
+        if let Some(film) = film {
+            film.add_to(raster);
+        }
+    }
+
+    /// Takes the cells of a ring that bending spreads.
+    #[inline(always)]
+    fn take_ring(&self, number: usize, energies: &mut [f64], bent: &mut BentCells) {
+        let ring = Ring::new(self.mesh, number);
+        bent.clear();
+        for (group, energies) in energies.chunks_mut(LANES).enumerate() {
+            let mut cells = [Cell::default(); LANES];
+            let mut middles = [Sample::default(); LANES];
+            for i in 0..energies.len() {
+                let [a, b, c, d] = self.mesh.corners(number, group * LANES + i);
+                cells[i] = Cell { corners: [self.nodes[a], self.nodes[b], self.nodes[c], self.nodes[d]] };
+                middles[i] = cells[i].sample(0.5, 0.5);
+            }
+            let looks = Looks::new(&middles, self.bending);
+            for (i, energy) in energies.iter_mut().enumerate() {
+                if !looks.is_still(i) {
+                    let energy = std::mem::take(energy);
+                    if !cells[i].is_beyond(looks.wide2[i], self.size, self.bending) {
+                        bent.add(
+                            &cells[i],
+                            energy,
+                            ring.cut(looks.wide2[i].sqrt(), looks.out_in_sigmas2[i].sqrt()),
+                            ring,
+                        );
                     }
                 }
             }
         }
-        splats
     }
 }
 
-impl Bending {
-    /// Returns a ray with its Gaussian.
-    #[inline(always)]
-    fn bend(self, node: Node) -> Bent {
-        let r = node.in_stop.length().min(1.0);
-        let spread = self.model.spread(r * self.edge.radius_mm, self.edge.radius_mm, self.edge.wave_number_per_mm);
-        let radial = node.in_stop.try_normalize().unwrap_or(DVec2::X);
-        let on_film = |d: DVec2| node.along_l_mm * d.x + node.along_m_mm * d.y;
-        let (radial, across) = (on_film(radial) * spread.radial, on_film(radial.perp()) * spread.across);
-        Bent { at: node.at_mm, covariance: Covariance::along(radial).plus(Covariance::along(across)) }
-    }
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn draw_ring(mesh: &BentMesh, number: usize, energies: &mut [f64], bent: &mut BentCells, splats: &mut Splats) {
+    mesh.take_ring(number, energies, bent);
+    bent.draw(mesh.bending, splats);
 }
 
-/// Where a ray lands, in pixels, and its Gaussian there.
+/// Cells of a ring that bending spreads, and the parts of them that are drawn.
+#[derive(Default)]
+struct BentCells {
+    cells: Vec<Cell>,
+    parts: Vec<Part>,
+    /// Parts of those parts, side by side around.
+    side_by_side: Vec<Part>,
+    /// How the last cell was cut, and its pieces: those of others are often the same.
+    cut: Option<Cut>,
+    pieces: Vec<Piece>,
+}
+
+/// A part of a cell.
 #[derive(Clone, Copy)]
-struct Bent {
-    at: DVec2,
-    covariance: Covariance,
-}
-
-/// A cell of the mesh with its corners: inner, outer, outer next, inner next.
-struct Cell {
-    corners: [Node; 4],
+struct Part {
+    /// The number of its cell.
+    cell: usize,
+    /// Its middle and its lengths as shares of the cell, outwards and around.
+    middle: (f64, f64),
+    lengths: (f64, f64),
     energy: f64,
-    middle: Bent,
-    /// The wide axis of the Gaussian in the middle, pixels.
-    wide: f64,
-    /// The shorter of the cell's lengths outwards and around, pixels.
-    least_length: f64,
-    /// Both lengths in standard deviations, the pixel's included.
-    n_sigmas: (f64, f64),
 }
 
-impl Cell {
-    fn new(corners: [Node; 4], energy: f64, bending: Bending) -> Self {
-        let middle = bending.bend(between(&corners, 0.5, 0.5));
-        let (along, around) = sides(&corners, 0.5, 0.5);
-        let widened = widened(middle.covariance);
-        Self {
-            corners,
-            energy,
-            middle,
-            wide: middle.covariance.axes().1.sqrt(),
-            least_length: along.length_squared().min(around.length_squared()).sqrt(),
-            n_sigmas: (in_sigmas(along, widened), in_sigmas(around, widened)),
+impl BentCells {
+    fn clear(&mut self) {
+        self.cells.clear();
+        self.parts.clear();
+        self.side_by_side.clear();
+        self.cut = None;
+    }
+
+    /// Adds the pieces of a cell.
+    #[inline(always)]
+    fn add(&mut self, cell: &Cell, energy: f64, cut: Cut, ring: Ring) {
+        if self.cut != Some(cut) {
+            self.cut = Some(cut);
+            self.pieces = ring.pieces(cut);
+        }
+        let number = self.cells.len();
+        self.cells.push(*cell);
+        for piece in &self.pieces {
+            let energy = energy * piece.share_of_area;
+            self.parts.push(Part { cell: number, middle: (piece.at, 0.5), lengths: (piece.step, 1.0), energy });
         }
     }
 
-    /// Whether bending is so small beside the cell that it is drawn as it is.
-    fn is_still(&self) -> bool {
-        // Cells of a blur lie side by side: what one loses to its neighbour it gets back.
-        let narrow = match self.least_length {
-            side if side > WIDE_CELL => PART_OF_A_WIDE_CELL,
-            side if side > NARROW_CELL => PART_OF_A_PIXEL,
-            _ => NARROW,
+    /// Draws the parts as splats side by side around, each as wide as its Gaussian is long or narrow enough for it.
+    #[inline(always)]
+    fn draw(&mut self, bending: Bending, splats: &mut Splats) {
+        for parts in self.parts.chunks(LANES) {
+            let samples = samples(&self.cells, parts);
+            let looks = Looks::new(&samples, bending);
+            for (i, part) in parts.iter().enumerate() {
+                let n = looks.n_around(i);
+                if n == 1 {
+                    splats.push(looks.splat(&samples[i], part, i));
+                } else {
+                    let share = 1.0 / f64::from(n);
+                    self.side_by_side.extend((0..n).map(|j| Part {
+                        middle: (part.middle.0, (f64::from(j) + 0.5) * share),
+                        lengths: (part.lengths.0, share),
+                        energy: part.energy * share,
+                        ..*part
+                    }));
+                }
+            }
+        }
+        for parts in self.side_by_side.chunks(LANES) {
+            let samples = samples(&self.cells, parts);
+            let looks = Looks::new(&samples, bending);
+            for (i, part) in parts.iter().enumerate() {
+                splats.push(looks.splat(&samples[i], part, i));
+            }
+        }
+    }
+}
+
+/// Returns the rays in the middles of up to eight parts of cells.
+#[inline(always)]
+fn samples(cells: &[Cell], parts: &[Part]) -> [Sample; LANES] {
+    let mut samples = [Sample::default(); LANES];
+    for (sample, part) in samples.iter_mut().zip(parts) {
+        *sample = cells[part.cell].sample(part.middle.0, part.middle.1);
+    }
+    samples
+}
+
+/// A cell of the mesh with its corners: inner, outer, outer next, inner next.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    corners: [Node; 4],
+}
+
+/// A ray between the corners of a cell, and the cell's sides through it, outwards and around, pixels.
+#[derive(Clone, Copy, Default)]
+struct Sample {
+    node: Node,
+    out: DVec2,
+    around: DVec2,
+}
+
+impl Cell {
+    /// Returns what lies `a` of the way outwards and `b` around.
+    #[inline(always)]
+    fn sample(&self, a: f64, b: f64) -> Sample {
+        let [p, q, r, s] = &self.corners;
+        let weights = [(1.0 - a) * (1.0 - b), a * (1.0 - b), a * b, (1.0 - a) * b];
+        let mix = |p: DVec2, q: DVec2, r: DVec2, s: DVec2| {
+            (p * weights[0] + q * weights[1]) + (r * weights[2] + s * weights[3])
         };
-        self.wide < narrow || self.n_sigmas.0.min(self.n_sigmas.1) > POLYGON
+        Sample {
+            node: Node {
+                at_mm: mix(p.at_mm, q.at_mm, r.at_mm, s.at_mm),
+                in_stop: mix(p.in_stop, q.in_stop, r.in_stop, s.in_stop),
+                along_l_mm: mix(p.along_l_mm, q.along_l_mm, r.along_l_mm, s.along_l_mm),
+                along_m_mm: mix(p.along_m_mm, q.along_m_mm, r.along_m_mm, s.along_m_mm),
+            },
+            out: (q.at_mm - p.at_mm) * (1.0 - b) + (r.at_mm - s.at_mm) * b,
+            around: (s.at_mm - p.at_mm) * (1.0 - a) + (r.at_mm - q.at_mm) * a,
+        }
     }
 
-    /// Whether next to nothing of the cell's light, bent as at its middle and as near its outer side, meets the picture.
-    fn is_beyond(&self, (rows, columns): (usize, usize), bending: Bending) -> bool {
+    /// Whether next to nothing of the cell's light, bent as at its middle, with the variance given, and as near its outer
+    /// side, meets the picture.
+    #[inline(always)]
+    fn is_beyond(&self, wide2: f64, (rows, columns): (usize, usize), bending: Bending) -> bool {
         let [a, b, c, d] = self.corners.map(|node| node.at_mm);
         let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
         let end = DVec2::new(columns as f64, rows as f64);
@@ -133,75 +240,81 @@ impl Cell {
         if !is_apart(low, high) {
             return false;
         }
-        let near_edge = bending.bend(between(&self.corners, 0.9, 0.5)).covariance.axes().1.sqrt();
-        let reach = DVec2::splat(FAR * self.wide.max(near_edge));
+        let near_edge = bending.covariance(&self.sample(0.9, 0.5).node).axes().1;
+        let reach = DVec2::splat(FAR * wide2.max(near_edge).sqrt());
         is_apart(low - reach, high + reach)
     }
+}
 
-    /// Adds the splats of the cell.
-    fn bend(&self, splats: &mut Vec<Splat>, ring: Ring, bending: Bending) {
-        let n_edge = ring.edge_pieces(self.wide);
-        let n_tiles = ((self.n_sigmas.0 / PIECE).ceil() as usize).clamp(n_edge, 64);
-        // Where the spread is wider than the pieces, Gauss's rule; where they lie side by side, equal ones. Wedges about the
-        // middle hold the most of their light near their outer sides: drawn as even strips they would leave a dot there.
-        if n_tiles == 1 && !ring.is_innermost() {
-            self.add(splats, &Piece::WHOLE, self.middle, bending);
-        } else if self.n_sigmas.0 < n_edge as f64 {
-            ring.gauss_pieces(n_edge).for_each(|piece| self.add_piece(splats, &piece, bending));
-        } else {
-            ring.equal_pieces(n_tiles).for_each(|piece| self.add_piece(splats, &piece, bending));
+/// The Gaussians of eight rays, pixels², and how the cells about them compare. The compiler makes vectors of it: nothing in
+/// its setup branches.
+struct Looks {
+    covariance: [[f64; LANES]; 3],
+    /// The variance along the wide axis.
+    wide2: [f64; LANES],
+    /// The squares of the sides outwards and around, pixels², and in standard deviations, a pixel's included.
+    out2: [f64; LANES],
+    around2: [f64; LANES],
+    out_in_sigmas2: [f64; LANES],
+    around_in_sigmas2: [f64; LANES],
+}
+
+impl Looks {
+    #[inline(always)]
+    fn new(samples: &[Sample; LANES], bending: Bending) -> Self {
+        let none = [0.0; LANES];
+        let (mut covariance, mut wide2) = ([none; 3], none);
+        let (mut out2, mut around2, mut out_in_sigmas2, mut around_in_sigmas2) = (none, none, none, none);
+        for i in 0..LANES {
+            let Sample { node, out, around } = samples[i];
+            let c = bending.covariance(&node);
+            let widened = Covariance { xx: c.xx + PIXEL_VARIANCE, yy: c.yy + PIXEL_VARIANCE, ..c };
+            (covariance[0][i], covariance[1][i], covariance[2][i]) = (c.xx, c.xy, c.yy);
+            wide2[i] = c.axes().1;
+            out2[i] = out.length_squared();
+            around2[i] = around.length_squared();
+            out_in_sigmas2[i] = in_sigmas2(out, widened);
+            around_in_sigmas2[i] = in_sigmas2(around, widened);
+        }
+        Self { covariance, wide2, out2, around2, out_in_sigmas2, around_in_sigmas2 }
+    }
+
+    /// Whether bending is so small beside the cell that it is drawn as it is.
+    #[inline(always)]
+    fn is_still(&self, i: usize) -> bool {
+        // Cells of a blur lie side by side: what one loses to its neighbour it gets back.
+        let narrow = match self.out2[i].min(self.around2[i]) {
+            side2 if side2 > WIDE_CELL * WIDE_CELL => PART_OF_A_WIDE_CELL,
+            side2 if side2 > NARROW_CELL * NARROW_CELL => PART_OF_A_PIXEL,
+            _ => NARROW,
+        };
+        self.wide2[i] < narrow * narrow || self.out_in_sigmas2[i].min(self.around_in_sigmas2[i]) > POLYGON * POLYGON
+    }
+
+    /// Returns how many splats side by side a part needs that has a cell's whole length around.
+    #[inline(always)]
+    fn n_around(&self, i: usize) -> u32 {
+        let (long2, narrow2) = (self.around2[i] / self.wide2[i], self.around_in_sigmas2[i] / (PIECE * PIECE));
+        long2.min(narrow2).sqrt().ceil().clamp(1.0, 64.0) as u32
+    }
+
+    /// Returns the splat of a part.
+    #[inline(always)]
+    fn splat(&self, sample: &Sample, part: &Part, i: usize) -> Splat {
+        let [xx, xy, yy] = self.covariance.map(|of_all| of_all[i]);
+        let along = Covariance::along(sample.out * (part.lengths.0 / 12f64.sqrt()));
+        Splat {
+            at: sample.node.at_mm,
+            covariance: Covariance { xx, xy, yy }.plus(along),
+            side: sample.around * part.lengths.1,
+            energy: part.energy,
         }
     }
-
-    fn add_piece(&self, splats: &mut Vec<Splat>, piece: &Piece, bending: Bending) {
-        self.add(splats, piece, bending.bend(between(&self.corners, piece.at, 0.5)), bending);
-    }
-
-    /// Adds the splats of a piece side by side around, each as wide as its Gaussian is long or narrow enough for it.
-    fn add(&self, splats: &mut Vec<Splat>, piece: &Piece, middle: Bent, bending: Bending) {
-        let (_, around) = sides(&self.corners, piece.at, 0.5);
-        let n_long = (around.length_squared() / middle.covariance.axes().1).sqrt();
-        let n_narrow = in_sigmas(around, widened(middle.covariance)) / PIECE;
-        let n = n_long.min(n_narrow).ceil().clamp(1.0, 64.0) as usize;
-        let energy = self.energy * piece.share_of_area / n as f64;
-        for j in 0..n {
-            let b = (j as f64 + 0.5) / n as f64;
-            let Bent { at, covariance } =
-                if n == 1 { middle } else { bending.bend(between(&self.corners, piece.at, b)) };
-            let (along, _) = sides(&self.corners, piece.at, b);
-            let covariance = covariance.plus(Covariance::along(along * (piece.step / 12f64.sqrt())));
-            splats.push(Splat { at, covariance, side: around / n as f64, energy });
-        }
-    }
 }
 
-/// Returns what lies between corners, `a` of the way outwards and `b` around.
+/// Returns the square of a side's length in standard deviations of a Gaussian.
 #[inline(always)]
-fn between(corners: &[Node; 4], a: f64, b: f64) -> Node {
-    let weights = [(1.0 - a) * (1.0 - b), a * (1.0 - b), a * b, (1.0 - a) * b];
-    let mix = |of: fn(&Node) -> DVec2| -> DVec2 { corners.iter().zip(weights).map(|(node, w)| of(node) * w).sum() };
-    Node {
-        at_mm: mix(|n| n.at_mm),
-        in_stop: mix(|n| n.in_stop),
-        along_l_mm: mix(|n| n.along_l_mm),
-        along_m_mm: mix(|n| n.along_m_mm),
-    }
-}
-
-/// Returns the sides of a cell through a place in it: outwards and around.
-#[inline(always)]
-fn sides(corners: &[Node; 4], a: f64, b: f64) -> (DVec2, DVec2) {
-    let [p, q, r, s] = [0, 1, 2, 3].map(|corner| corners[corner].at_mm);
-    ((q - p) * (1.0 - b) + (r - s) * b, (s - p) * (1.0 - a) + (r - q) * a)
-}
-
-/// Returns a covariance with that of a pixel.
-fn widened(c: Covariance) -> Covariance {
-    Covariance { xx: c.xx + PIXEL_VARIANCE, yy: c.yy + PIXEL_VARIANCE, ..c }
-}
-
-/// Returns the length of a side in standard deviations of a Gaussian.
-fn in_sigmas(side: DVec2, c: Covariance) -> f64 {
+fn in_sigmas2(side: DVec2, c: Covariance) -> f64 {
     let determinant = c.xx * c.yy - c.xy * c.xy;
-    ((c.yy * side.x * side.x - 2.0 * c.xy * side.x * side.y + c.xx * side.y * side.y) / determinant).sqrt()
+    (c.yy * side.x * side.x - 2.0 * c.xy * side.x * side.y + c.xx * side.y * side.y) / determinant
 }

@@ -191,7 +191,7 @@ pub(crate) mod tests {
     pub(crate) fn gaussian(sigma: f64, at: DVec2) -> Picture {
         let mut raster = Raster::new(101, 101);
         let covariance = Covariance { xx: sigma * sigma, xy: 0.0, yy: sigma * sigma };
-        splat::deposit(&mut raster, &[splat::Splat { side: DVec2::ZERO, at, covariance, energy: 1.0 }]);
+        splat::deposit(&mut raster, splat::Splat { side: DVec2::ZERO, at, covariance, energy: 1.0 });
         Picture::new(raster.finish().view(), 2.0)
     }
 

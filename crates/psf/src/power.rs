@@ -33,6 +33,7 @@ const TERMS: [f32; 7] = {
 
 /// Powers whose exponents are a parabola's values at equal steps: each is the last times a ratio, which changes by a
 /// constant factor.
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Powers {
     pub(crate) value: f32,
     pub(crate) ratio: f32,

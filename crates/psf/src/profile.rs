@@ -17,38 +17,46 @@ const MIDDLE: i32 = 11;
 /// where the step is a normal distribution's.
 pub(crate) struct Profile([[f32; WIDTH]; ROWS + 1]);
 
-/// Profiles by variance: sixty-four an octave from 2⁻⁸ to 1 pixels².
+/// Profiles by variance, up to 1 pixel².
 static PROFILES: LazyLock<Vec<Profile>> =
-    LazyLock::new(|| (0..PER_OCTAVE * OCTAVES).map(|number| Profile::new(variance_of(number))).collect());
+    LazyLock::new(|| (0..N_PROFILES).map(|number| Profile::new(variance_of(number))).collect());
 
-const PER_OCTAVE: usize = 1 << PER_OCTAVE_BITS;
-const PER_OCTAVE_BITS: u32 = 6;
-const OCTAVES: usize = 8;
-/// The number that the bits of the least variance would have.
-const FIRST: usize = (127 - OCTAVES) << PER_OCTAVE_BITS;
+/// What is added to variances before they are told apart, pixels²: of the narrowest Gaussians, pixels see little.
+const PART_OF_A_PIXEL: f32 = 0.0625;
+/// Sixteen profiles to each doubling of the sum: a hundred kilobytes. What a stroke has above its profile widens its even part.
+const PER_DOUBLING_BITS: u32 = 4;
+const UNTOLD_BITS: u32 = f32::MANTISSA_DIGITS - 1 - PER_DOUBLING_BITS;
+/// The number that the bits of the part alone would have.
+const FIRST: usize = (PART_OF_A_PIXEL.to_bits() >> UNTOLD_BITS) as usize;
+const N_PROFILES: usize = ((1.0 + PART_OF_A_PIXEL).to_bits() >> UNTOLD_BITS) as usize - FIRST + 1;
 
 pub(crate) fn profiles() -> &'static [Profile] {
     &PROFILES
 }
 
-/// Returns the number of the profile for a variance in pixels², of the nearest that there is.
+/// Returns the variance of the next profile below one in pixels².
 #[inline(always)]
-pub(crate) fn profile_number(variance: f32) -> usize {
+pub(crate) fn variance_below(variance: f32) -> f32 {
     // The leading bits are those of the logarithm.
-    let bits = (variance.to_bits() >> (23 - PER_OCTAVE_BITS)) as usize;
-    bits.clamp(FIRST, FIRST + PER_OCTAVE * OCTAVES - 1) - FIRST
+    let sum = variance.clamp(0.0, 1.0) + PART_OF_A_PIXEL;
+    f32::from_bits(sum.to_bits() >> UNTOLD_BITS << UNTOLD_BITS) - PART_OF_A_PIXEL
 }
 
-/// Returns the variance in the middle of those of a number.
-fn variance_of(number: usize) -> f64 {
-    let (octave, part) = (number / PER_OCTAVE, number % PER_OCTAVE);
-    (1.0 + (part as f64 + 0.5) / PER_OCTAVE as f64) * 0.5f64.powi((OCTAVES - octave) as i32)
+/// Returns the number of the profile of a variance that there is.
+#[inline(always)]
+pub(crate) fn profile_number(variance: f32) -> usize {
+    ((variance + PART_OF_A_PIXEL).to_bits() >> UNTOLD_BITS) as usize - FIRST
+}
+
+/// Returns the variance of the profile of a number.
+fn variance_of(number: usize) -> f32 {
+    f32::from_bits(((FIRST + number) << UNTOLD_BITS) as u32) - PART_OF_A_PIXEL
 }
 
 impl Profile {
-    fn new(variance: f64) -> Self {
-        // Reading between two rows widens a little.
-        let sigma = (variance - 1.0 / (6.0 * (ROWS * ROWS) as f64)).sqrt();
+    fn new(variance: f32) -> Self {
+        // Reading between two rows widens a little. The sharpest step is next to none for a row.
+        let sigma = (f64::from(variance) - 1.0 / (6.0 * (ROWS * ROWS) as f64)).max(1e-4).sqrt();
         Self(std::array::from_fn(|row| {
             let step = f64::from(MIDDLE) + row as f64 / ROWS as f64;
             let beyond = |pixel: usize| sigma * normal_integral((pixel as f64 - step) / sigma);
@@ -91,7 +99,7 @@ mod tests {
 
     #[test]
     fn a_sharp_step_covers_what_is_beyond_it_and_a_soft_one_as_much() {
-        for number in [0, 160, PER_OCTAVE * OCTAVES - 1] {
+        for number in [0, 30, N_PROFILES - 1] {
             let profile = &profiles()[number];
             for place in [0, 1 << 14, 3 << 14] {
                 let (row, _) = profile.rows(place, -3);
@@ -108,12 +116,13 @@ mod tests {
     }
 
     #[test]
-    fn a_variance_finds_its_profile() {
-        for variance in [0.004f32, 0.01, 0.1, 0.5, 0.72, 0.99] {
-            let found = variance_of(profile_number(variance));
-            // Half of a 64th of the octave's lower end.
-            assert!((found / f64::from(variance) - 1.0).abs() < 0.0079, "{variance} {found}");
+    fn a_variance_finds_the_profile_below_it() {
+        assert_eq!((variance_of(0), variance_of(N_PROFILES - 1)), (0.0, 1.0));
+        for variance in [0.0f32, 0.004, 0.01, 0.1, 0.5, 0.72, 0.99, 1.0] {
+            let below = variance_below(variance);
+            assert!((0.0..=(variance + PART_OF_A_PIXEL) / 16.0).contains(&(variance - below)), "{variance} {below}");
+            assert_eq!(variance_of(profile_number(below)), below);
         }
-        assert_eq!((profile_number(0.0), profile_number(7.0)), (0, PER_OCTAVE * OCTAVES - 1));
+        assert_eq!((variance_below(-1.0), variance_below(7.0)), (0.0, 1.0));
     }
 }

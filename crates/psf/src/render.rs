@@ -10,7 +10,6 @@ use crate::{
     kernel::trim,
     raster::Raster,
     ray_map::{Node, Record},
-    splat,
 };
 
 /// Half the side of the largest window, pixels.
@@ -78,7 +77,7 @@ impl<'a> Layout<'a> {
         let at: Vec<DVec2> = self.nodes.iter().map(|node| node.at_mm).collect();
         if let Some(bending) = self.bending {
             let bent = BentMesh { mesh: record.mesh, nodes: &self.nodes, bending, size: raster.size() };
-            splat::deposit(&mut raster, &bent.take(&mut energies));
+            bent.deposit(&mut energies, &mut raster);
         }
         raster.mesh(record.mesh, &at, &energies);
         raster.finish()

@@ -6,6 +6,9 @@ use dioptric_diffraction::quadrature::gauss_legendre_on;
 
 use crate::mesh::Mesh;
 
+/// A piece of this many standard deviations across leaves a ripple of 2 %, which pixels and neighbours hide.
+pub(crate) const PIECE: f64 = 2.7;
+
 /// A ring of cells of the mesh.
 #[derive(Clone, Copy)]
 pub(crate) struct Ring {
@@ -24,8 +27,14 @@ pub(crate) struct Piece {
     pub(crate) share_of_area: f64,
 }
 
-impl Piece {
-    pub(crate) const WHOLE: Self = Self { at: 0.5, step: 1.0, share_of_area: 1.0 };
+/// How the cells of a ring are cut from the inner side to the outer.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cut {
+    Whole,
+    /// Into so many, by Gauss's rule.
+    Gauss(usize),
+    /// Into so many of equal steps.
+    Equal(usize),
 }
 
 impl Ring {
@@ -36,7 +45,7 @@ impl Ring {
 
     /// Returns how many pieces the ring's spread needs, if its wide axis in the middle is so many pixels: it doubles
     /// over the last few rings, which is no matter below a pixel.
-    pub(crate) fn edge_pieces(self, wide: f64) -> usize {
+    fn edge_pieces(self, wide: f64) -> usize {
         match self.n_to_edge {
             1 => 3,
             2 | 3 if wide > 0.3 => 2,
@@ -45,14 +54,34 @@ impl Ring {
         }
     }
 
-    /// Whether it is the innermost ring, whose cells have a point for their inner side.
-    pub(crate) fn is_innermost(self) -> bool {
-        self.inner_share == 0.0
+    /// Returns how cells are cut which are so many standard deviations long, if in their middles the wide axis has so many
+    /// pixels.
+    pub(crate) fn cut(self, wide: f64, n_sigmas: f64) -> Cut {
+        let n_edge = self.edge_pieces(wide);
+        let n_tiles = ((n_sigmas / PIECE).ceil() as usize).clamp(n_edge, 64);
+        // Where the spread is wider than the pieces, Gauss's rule; where they lie side by side, equal ones. Wedges about
+        // the middle hold the most of their light near their outer sides: drawn as even strips they would leave a dot there.
+        if n_tiles == 1 && self.inner_share > 0.0 {
+            Cut::Whole
+        } else if n_sigmas < n_edge as f64 {
+            Cut::Gauss(n_edge)
+        } else {
+            Cut::Equal(n_tiles)
+        }
+    }
+
+    /// Returns the pieces of a cell that is cut like that.
+    pub(crate) fn pieces(self, cut: Cut) -> Vec<Piece> {
+        match cut {
+            Cut::Whole => vec![Piece { at: 0.5, step: 1.0, share_of_area: 1.0 }],
+            Cut::Gauss(n) => self.gauss_pieces(n).collect(),
+            Cut::Equal(n) => self.equal_pieces(n).collect(),
+        }
     }
 
     /// Returns so many pieces of equal steps, for light that they tile: each where its area has its centroid, and as wide as
     /// an even step of the area's variance is.
-    pub(crate) fn equal_pieces(self, n: usize) -> impl Iterator<Item = Piece> {
+    fn equal_pieces(self, n: usize) -> impl Iterator<Item = Piece> {
         (0..n).map(move |i| {
             let step = |i: f64| i / n as f64;
             let (from, to) = (self.share(step(i as f64)), self.share(step((i + 1) as f64)));
@@ -71,7 +100,7 @@ impl Ring {
     }
 
     /// Returns pieces by Gauss's rule, for light whose spread is wider than they are.
-    pub(crate) fn gauss_pieces(self, n: usize) -> impl Iterator<Item = Piece> {
+    fn gauss_pieces(self, n: usize) -> impl Iterator<Item = Piece> {
         let rule: &'static [(f64, f64)] = &RULES[n.clamp(1, MOST_GAUSS_PIECES) - 1];
         // The area between u and u + du goes with share · dshare/du, a cubic.
         let area = move |u: f64| self.share(u) * (self.gap_inner() - self.range() * u);

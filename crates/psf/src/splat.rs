@@ -13,7 +13,7 @@ use crate::{
     power::exp2,
     profile::{LANES, Profile, profiles},
     raster::Raster,
-    stroke::{Lines, Stroke},
+    stroke::{Lines, Strokes},
 };
 
 /// How many standard deviations of a Gaussian are deposited; what lies beyond, 3·10⁻⁴, is spread over the rest.
@@ -29,6 +29,9 @@ pub(crate) struct Splat {
 }
 
 impl Splat {
+    const NOTHING: Self =
+        Self { at: DVec2::ZERO, covariance: Covariance { xx: 0.0, xy: 0.0, yy: 0.0 }, side: DVec2::ZERO, energy: 0.0 };
+
     /// Whether the Gaussian's narrow axis is 0.6 pixels or more: samples a pixel apart then miss 3·10⁻⁴ of it, and much
     /// less where Gaussians overlap.
     #[inline(always)]
@@ -45,39 +48,72 @@ impl Splat {
     }
 }
 
-/// Deposits splats, integrated over the pixels. What falls outside is lost.
-pub(crate) fn deposit(raster: &mut Raster, splats: &[Splat]) {
-    if splats.is_empty() {
-        return;
+/// Splats, the narrow from the broad: they are drawn in two ways.
+#[derive(Default)]
+pub(crate) struct Splats {
+    narrow: Vec<Splat>,
+    broad: Vec<Splat>,
+}
+
+impl Splats {
+    #[inline(always)]
+    pub(crate) fn push(&mut self, splat: Splat) {
+        if splat.is_broad() { &mut self.broad } else { &mut self.narrow }.push(splat);
     }
-    let (n_rows, n_columns) = raster.size();
-    let mut film = Film { rows: Lines::new(n_rows, n_columns), columns: Lines::new(n_columns, n_rows) };
-    add_all(&mut film, splats, profiles());
-    for (row, pixels) in raster.pixels_mut().chunks_exact_mut(n_columns).enumerate() {
-        for (pixel, sum) in pixels.iter_mut().zip(film.rows.line(row)) {
-            *pixel += f64::from(*sum);
-        }
-        for (pixel, sum) in pixels.iter_mut().zip(film.columns.across(row)) {
-            *pixel += f64::from(*sum);
-        }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.narrow.is_empty() && self.broad.is_empty()
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.narrow.clear();
+        self.broad.clear();
     }
 }
 
 /// The picture twice: by rows, and by columns for the strokes along x.
-struct Film {
+pub(crate) struct Film {
     rows: Lines,
     columns: Lines,
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
-fn add_all(film: &mut Film, splats: &[Splat], profiles: &[Profile]) {
-    for splat in splats {
-        if splat.is_broad() {
-            Sampled::new(splat).add(&mut film.rows);
-        } else {
-            let stroke = Stroke::new(splat);
-            stroke.add(profiles, if stroke.is_along_x { &mut film.columns } else { &mut film.rows });
+impl Film {
+    /// Returns a dark film of so many rows and columns.
+    pub(crate) fn new((n_rows, n_columns): (usize, usize)) -> Self {
+        Self { rows: Lines::new(n_rows, n_columns), columns: Lines::new(n_columns, n_rows) }
+    }
+
+    /// Deposits splats, integrated over the pixels. What falls outside is lost.
+    pub(crate) fn add(&mut self, splats: &Splats) {
+        add_all(self, splats, profiles());
+    }
+
+    /// Adds the pixels to a raster's of the same size.
+    pub(crate) fn add_to(&self, raster: &mut Raster) {
+        let (_, n_columns) = raster.size();
+        for (row, pixels) in raster.pixels_mut().chunks_exact_mut(n_columns).enumerate() {
+            for (pixel, sum) in pixels.iter_mut().zip(self.rows.line(row)) {
+                *pixel += f64::from(*sum);
+            }
+            for (pixel, sum) in pixels.iter_mut().zip(self.columns.across(row)) {
+                *pixel += f64::from(*sum);
+            }
         }
+    }
+}
+
+#[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
+fn add_all(film: &mut Film, splats: &Splats, profiles: &[Profile]) {
+    let (n_rows, n_columns) = (film.rows.n_lines, film.columns.n_lines);
+    let (groups, rest) = splats.narrow.as_chunks();
+    for group in groups {
+        Strokes::new(group, (n_rows, n_columns)).add(LANES, profiles, &mut film.rows, &mut film.columns);
+    }
+    let mut last = [Splat::NOTHING; LANES];
+    last[..rest.len()].copy_from_slice(rest);
+    Strokes::new(&last, (n_rows, n_columns)).add(rest.len(), profiles, &mut film.rows, &mut film.columns);
+    for splat in &splats.broad {
+        Sampled::new(splat).add(&mut film.rows);
     }
 }
 
@@ -207,6 +243,15 @@ impl Sampled {
     }
 }
 
+/// Deposits one splat.
+#[cfg(test)]
+pub(crate) fn deposit(raster: &mut Raster, splat: Splat) {
+    let (mut splats, mut film) = (Splats::default(), Film::new(raster.size()));
+    splats.push(splat);
+    film.add(&splats);
+    film.add_to(raster);
+}
+
 #[inline(always)]
 fn floor(x: f32) -> i32 {
     x.floor() as i32
@@ -218,7 +263,7 @@ mod tests {
 
     fn deposited(at: DVec2, covariance: Covariance) -> ndarray::Array2<f64> {
         let mut raster = Raster::new(61, 61);
-        deposit(&mut raster, &[Splat { at, covariance, side: DVec2::ZERO, energy: 1.0 }]);
+        deposit(&mut raster, Splat { at, covariance, side: DVec2::ZERO, energy: 1.0 });
         raster.finish()
     }
 

@@ -5,18 +5,19 @@
 //! pixels holds of it is read from a table of integrals: no sample is finer than a pixel, and what is spread evenly
 //! over some width, as the light of a cell is, needs no more than what is not.
 
-use dioptric_diffraction::Covariance;
+use std::ops::Range;
+
 use glam::DVec2;
 
 use crate::{
     power::{Powers, exp2},
-    profile::{LANES, PLACE_BITS, Profile, ROW_BITS, profile_number},
+    profile::{LANES, PLACE_BITS, Profile, ROW_BITS, profile_number, variance_below},
     splat::Splat,
 };
 
 /// The finest subdivision of a pixel along a stroke. What is shorter than its samples allow is lengthened to
 /// 0.12 pixels, which on pixels makes next to no difference.
-const FINEST: i32 = 5;
+const FINEST: f64 = 5.0;
 /// A stroke has this many samples a standard deviation of its length, or more.
 const SAMPLES_PER_SIGMA: f64 = 0.6;
 /// From one sample to the next a stroke moves across by its width over this, or less.
@@ -28,7 +29,7 @@ const INSIDE: f64 = 0.999_681_782_819_684_9;
 /// Places further than this from the picture, in pixels, are not seen.
 const FAR: f64 = 1e4;
 /// Samples between two computations of the exponential: products carry its error, which grows to 5·10⁻⁵.
-const MOST_SAMPLES: i32 = 32;
+const MOST_SAMPLES: usize = 32;
 /// The largest even width, in sixteenths of a pixel.
 const WIDEST: f64 = 80.0;
 
@@ -57,115 +58,164 @@ impl Lines {
     }
 }
 
-/// A stroke; lengths in pixels, "along" counting lines and "across" the pixels of each. Places across have
-/// [`PLACE_BITS`] behind the point.
-pub(crate) struct Stroke {
-    pub(crate) is_along_x: bool,
-    /// Line and pixel of the corner from which places count.
-    corner: (i32, i32),
+/// A stroke; lengths in pixels, "along" counting lines and "across" the pixels of each. All its numbers are of one type, so
+/// that eight strokes are set up together: see [`Strokes`].
+struct Stroke {
+    /// 1 for a stroke along x, 0 for one along y.
+    along_x: f32,
+    /// Line and pixel of the corner from which places count, and the place of the middle.
+    corner: (f32, f32),
     at: (f32, f32),
-    divisions: i32,
+    /// Samples to a line.
+    divisions: f32,
     /// The energy of a sample in the middle.
     peak: f32,
     /// The power of 2 that falls with the square of the distance along.
     fall: f32,
     /// Movement across for a step along.
     slope: f32,
-    /// From the middle to one side of the even width.
-    half: i32,
-    reach: f32,
-    profile: usize,
+    /// The variance of the profile across, and the even width there in sixteenths of a pixel.
+    softness: f32,
+    sixteenths: f32,
+    /// The first sample, the one after the last, and the energies from the first on.
+    first: f32,
+    end: f32,
+    powers: Powers,
+}
+
+/// Eight strokes, each of their numbers side by side. The compiler makes vectors of their setup: nothing in it branches.
+pub(crate) struct Strokes([[f32; LANES]; 16]);
+
+impl Strokes {
+    /// Returns the strokes of splats on a picture of so many rows and columns.
+    #[inline(always)]
+    pub(crate) fn new(splats: &[Splat; LANES], size: (usize, usize)) -> Self {
+        let size = (size.0 as f32, size.1 as f32);
+        let mut numbers = [[0.0; LANES]; 16];
+        for i in 0..LANES {
+            for (of_all, number) in numbers.iter_mut().zip(Stroke::new(&splats[i], size).into_numbers()) {
+                of_all[i] = number;
+            }
+        }
+        Self(numbers)
+    }
+
+    /// Adds the first strokes to the pixels of the rows, or of the columns where they are along x.
+    #[inline(always)]
+    pub(crate) fn add(&self, n: usize, profiles: &[Profile], rows: &mut Lines, columns: &mut Lines) {
+        for i in 0..n {
+            let stroke = Stroke::from_numbers(self.0.map(|of_all| of_all[i]));
+            let film = if stroke.along_x > 0.5 { &mut *columns } else { &mut *rows };
+            stroke.add(profiles, film);
+        }
+    }
 }
 
 impl Stroke {
     #[inline(always)]
-    pub(crate) fn new(splat: &Splat) -> Self {
+    fn new(splat: &Splat, (n_rows, n_columns): (f32, f32)) -> Self {
         let whole = splat.whole();
-        let at = splat.at.clamp(DVec2::splat(-FAR), DVec2::splat(FAR));
         let is_along_x = whole.xx >= whole.yy;
-        let turned = |v: DVec2| if is_along_x { v } else { DVec2::new(v.y, v.x) };
-        let (at, side) = (turned(at), turned(splat.side));
-        let Covariance { xx, xy, yy } = splat.covariance;
-        let (soft_along, soft_across) = if is_along_x { (xx, yy) } else { (yy, xx) };
-        let total_along = if is_along_x { whole.xx } else { whole.yy };
+        let turned = |x: f64, y: f64| if is_along_x { (x, y) } else { (y, x) };
+        let at = splat.at.clamp(DVec2::splat(-FAR), DVec2::splat(FAR));
+        let at = turned(at.x, at.y);
+        let side = turned(splat.side.x, splat.side.y);
+        let (soft_along, soft_across) = turned(splat.covariance.xx, splat.covariance.yy);
+        let n_lines = if is_along_x { n_columns } else { n_rows };
 
-        const LEAST: f64 = SAMPLES_PER_SIGMA * SAMPLES_PER_SIGMA / (FINEST * FINEST) as f64;
-        let total_along = total_along.max(LEAST);
-        let soft = |slope: f64| (soft_across - 2.0 * slope * xy + slope * slope * soft_along).max(0.0);
-        let (mut divisions, mut step_variance, mut per_along) = (1, 1.0 / 12.0, 1.0 / (total_along + 1.0 / 12.0));
-        let square = |n: i32| f64::from(n * n);
-        let slope = whole.xy * per_along;
+        const LEAST: f64 = SAMPLES_PER_SIGMA * SAMPLES_PER_SIGMA / (FINEST * FINEST);
+        let total_along = whole.xx.max(whole.yy).max(LEAST);
+        let soft = |slope: f64| (soft_across - 2.0 * slope * splat.covariance.xy + slope * slope * soft_along).max(0.0);
+        let slope = whole.xy / (total_along + 1.0 / 12.0);
         let needed = (SAMPLES_PER_SIGMA * SAMPLES_PER_SIGMA)
             .max(SAMPLES_PER_WIDTH * SAMPLES_PER_WIDTH * slope * slope * total_along / soft(slope).max(LEAST));
-        while divisions < FINEST && square(divisions) * total_along < needed {
-            divisions += 1;
-        }
-        if divisions > 1 {
-            // A box of one sample has the variance 1/12: sampling with that added is the box integral to fourth order.
-            step_variance /= square(divisions);
-            per_along = 1.0 / (total_along + step_variance);
-        }
+        let divisions = (needed / total_along).sqrt().ceil().clamp(1.0, FINEST);
+        // A box of one sample has the variance 1/12: sampling with that added is the box integral to fourth order.
+        let step_variance = 1.0 / (12.0 * divisions * divisions);
+        let per_along = 1.0 / (total_along + step_variance);
         let slope = whole.xy * per_along;
         let sigma = (total_along + step_variance).sqrt();
-        let width = (side.y - slope * side.x).abs();
+        let width = (side.1 - slope * side.0).abs();
         const SIXTEENTHS: f64 = (1 << ROW_BITS) as f64;
-        let sixteenths = (SIXTEENTHS * width).round().clamp(1.0, WIDEST);
+        // What is beside the even width and above the softness of a profile widens the even width.
+        let least = (SIXTEENTHS * width).floor().clamp(1.0, WIDEST) / SIXTEENTHS;
+        let rest = soft(slope) + slope * slope * step_variance + (width * width - least * least) / 12.0;
+        let softness = variance_below(rest as f32);
+        let square = least * least + 12.0 * (rest - f64::from(softness)).max(0.0);
+        let sixteenths = (SIXTEENTHS * square.sqrt() + 0.5).floor().clamp(1.0, WIDEST);
         let drawn = sixteenths / SIXTEENTHS;
-        let variance = soft(slope) + slope * slope * step_variance + (width * width - drawn * drawn) / 12.0;
-        let corner = at.floor();
-        let within = at - corner;
-        let per_sigma = sigma * per_along;
+        let corner = (at.0.floor(), at.1.floor());
         const NORM: f64 = 0.398_942_280_401_432_7 / INSIDE;
-        Self {
-            is_along_x,
-            corner: (corner.x as i32, corner.y as i32),
-            at: (within.x as f32, within.y as f32),
-            divisions,
-            peak: (splat.energy * NORM * per_sigma / (f64::from(divisions) * drawn)) as f32,
+        let mut stroke = Self {
+            along_x: if is_along_x { 1.0 } else { 0.0 },
+            corner: (corner.0 as f32, corner.1 as f32),
+            at: ((at.0 - corner.0) as f32, (at.1 - corner.1) as f32),
+            divisions: divisions as f32,
+            peak: (splat.energy * NORM * sigma * per_along / (divisions * drawn)) as f32,
             fall: (-0.5 * std::f64::consts::LOG2_E * per_along) as f32,
             slope: slope as f32,
-            half: (sixteenths as i32) << (PLACE_BITS - ROW_BITS - 1),
-            reach: (REACH * sigma) as f32,
-            profile: profile_number(variance as f32),
+            softness,
+            sixteenths: sixteenths as f32,
+            first: 0.0,
+            end: 0.0,
+            powers: Powers::default(),
+        };
+        let (middle, reach) = (stroke.corner.0 + stroke.at.0, (REACH * sigma) as f32);
+        stroke.first = ((middle - reach) * stroke.divisions - 0.5).ceil().max(0.0);
+        stroke.end = ((middle + reach) * stroke.divisions - 0.5).ceil().min(n_lines * stroke.divisions);
+        stroke.powers = stroke.powers_from(stroke.first);
+        stroke
+    }
+
+    /// Returns how far a sample lies along from the middle.
+    #[inline(always)]
+    fn along(&self, sample: f32) -> f32 {
+        (sample - self.corner.0 * self.divisions + 0.5) / self.divisions - self.at.0
+    }
+
+    /// Returns the energies of samples from one on.
+    #[inline(always)]
+    fn powers_from(&self, sample: f32) -> Powers {
+        let (along, step) = (self.along(sample), 1.0 / self.divisions);
+        Powers {
+            value: self.peak * exp2(self.fall * (along * along)),
+            ratio: exp2(self.fall * (step * (step + 2.0 * along))),
+            change: exp2(2.0 * self.fall * (step * step)),
         }
     }
 
     /// Adds it to the pixels of lines.
     #[inline(always)]
-    pub(crate) fn add(&self, profiles: &[Profile], film: &mut Lines) {
-        let (profile, divisions) = (&profiles[self.profile], self.divisions);
-        let per_line = divisions as f32;
-        let corner = self.corner.0 * divisions;
-        let first = (corner + ceil((self.at.0 - self.reach) * per_line - 0.5)).max(0);
-        let end = (corner + ceil((self.at.0 + self.reach) * per_line - 0.5)).min(film.n_lines as i32 * divisions);
-        let mut from = first;
+    fn add(mut self, profiles: &[Profile], film: &mut Lines) {
+        let (divisions, end) = (self.divisions as usize, self.end as usize);
+        let mut from = self.first as usize;
         while from < end {
             // Whole lines, but for the first.
             let to = (from - from % divisions + MOST_SAMPLES / divisions * divisions).min(end);
-            self.add_samples(profile, film, from, to);
+            self.add_samples(profiles, film, from..to);
             from = to;
+            if from < end {
+                self.powers = self.powers_from(from as f32);
+            }
         }
     }
 
     /// Adds samples by products from one to the next.
     #[inline(always)]
-    fn add_samples(&self, profile: &Profile, film: &mut Lines, from: i32, to: i32) {
-        let (divisions, half) = (self.divisions, self.half);
-        let step = 1.0 / divisions as f32;
-        let along = ((from - self.corner.0 * divisions) as f32 + 0.5) * step - self.at.0;
-        let mut powers = Powers {
-            value: self.peak * exp2(self.fall * (along * along)),
-            ratio: exp2(self.fall * (step * (step + 2.0 * along))),
-            change: exp2(2.0 * self.fall * (step * step)),
-        };
+    fn add_samples(&self, profiles: &[Profile], film: &mut Lines, samples: Range<usize>) {
+        let profile = &profiles[profile_number(self.softness)];
+        let half = (self.sixteenths as i32) << (PLACE_BITS - ROW_BITS - 1);
+        let divisions = self.divisions as usize;
+        let along = self.along(samples.start as f32);
         let mut place = ((self.at.1 + self.slope * along) * ONE) as i32 - HALF_A_PIXEL;
-        let across = (self.slope * step * ONE) as i32;
-        let margin = self.corner.1 + LANES as i32;
-        let (mut sample, mut line) = (from, from / divisions);
-        while sample < to {
-            let sums = &mut film.sums[line as usize * film.stride..][..film.stride];
+        let across = (self.slope / self.divisions * ONE) as i32;
+        let margin = self.corner.1 as i32 + LANES as i32;
+        let mut powers = self.powers;
+        let (mut sample, mut line) = (samples.start, samples.start / divisions);
+        while sample < samples.end {
+            let sums = &mut film.sums[line * film.stride..][..film.stride];
             line += 1;
-            let end = (line * divisions).min(to);
+            let end = (line * divisions).min(samples.end);
             while sample < end {
                 let (middle, value) = (place, powers.next());
                 place += across;
@@ -178,14 +228,43 @@ impl Stroke {
             }
         }
     }
+
+    #[inline(always)]
+    fn into_numbers(self) -> [f32; 16] {
+        let Self { along_x, corner, at, divisions, peak, fall, slope, softness, sixteenths, first, end, powers } = self;
+        let Powers { value, ratio, change } = powers;
+        [
+            along_x, corner.0, corner.1, at.0, at.1, divisions, peak, fall, slope, softness, sixteenths, first, end,
+            value, ratio, change,
+        ]
+    }
+
+    #[inline(always)]
+    fn from_numbers(numbers: [f32; 16]) -> Self {
+        let [
+            along_x,
+            line,
+            pixel,
+            along,
+            across,
+            divisions,
+            peak,
+            fall,
+            slope,
+            softness,
+            sixteenths,
+            first,
+            end,
+            value,
+            ratio,
+            change,
+        ] = numbers;
+        let (corner, at, powers) = ((line, pixel), (along, across), Powers { value, ratio, change });
+        Self { along_x, corner, at, divisions, peak, fall, slope, softness, sixteenths, first, end, powers }
+    }
 }
 
 /// Pixels that are drawn before the one in the middle. It is the pixel that a place is in, half a pixel before it.
 const BEFORE: i32 = 3;
 const HALF_A_PIXEL: i32 = 1 << (PLACE_BITS - 1);
 const ONE: f32 = (1 << PLACE_BITS) as f32;
-
-#[inline(always)]
-fn ceil(x: f32) -> i32 {
-    x.ceil() as i32
-}
