@@ -9,9 +9,10 @@ use dioptric_pipeline::{
 };
 
 use crate::{
-    args::{Common, LensAnalyzeArgs},
+    args::Common,
     lens::{list_of, open, tell_taken},
-    terminal::{Bar, guarded, print, print_json, remark},
+    lens_args::LensAnalyzeArgs,
+    terminal::{Bar, fixed, guarded, print, print_json, remark},
 };
 
 /// Pixels of the plots as PNG for each of the drawing's own.
@@ -245,7 +246,7 @@ fn line(cells: &[String]) -> String {
 
 fn cell(value: Option<f64>, decimals: usize) -> String {
     match value {
-        Some(value) if value.is_finite() => format!("{value:.decimals$}"),
+        Some(value) if value.is_finite() => fixed(value, decimals),
         _ => "–".to_owned(),
     }
 }

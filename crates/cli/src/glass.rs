@@ -5,7 +5,8 @@ use std::fmt::Write;
 use dioptric_pipeline::{GlassRow, glass_data, glass_rows, parse_numbers};
 
 use crate::{
-    args::{Common, GlassCommand},
+    args::Common,
+    lens_args::GlassCommand,
     terminal::{print, print_json},
 };
 

@@ -9,7 +9,8 @@ use dioptric_pipeline::{
 };
 
 use crate::{
-    args::{Common, LensCommand, LensDrawArgs, LensInfoArgs},
+    args::Common,
+    lens_args::{LensCommand, LensDrawArgs, LensInfoArgs},
     terminal::{guarded, print, print_json, remark},
 };
 
@@ -45,7 +46,7 @@ pub(crate) fn list_of(numbers: &[f64]) -> String {
 }
 
 /// Tells what the file of a lens says that is done otherwise or not at all.
-fn tell(notes: &[String], common: &Common) {
+pub(crate) fn tell(notes: &[String], common: &Common) {
     notes.iter().for_each(|note| remark(common.quiet, note));
 }
 

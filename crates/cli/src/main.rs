@@ -7,6 +7,7 @@ mod analyze;
 mod args;
 mod glass;
 mod lens;
+mod lens_args;
 mod measure;
 mod measure_args;
 mod movement_args;
@@ -46,7 +47,7 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Run(arguments) => run::run(&arguments, &common),
         Command::Lens(command) => lens::run(&command, &common),
         Command::Glass(command) => glass::run(&command, &common),
-        Command::Trace(arguments) => trace::run(&arguments),
+        Command::Trace(arguments) => trace::run(&arguments, &common),
         Command::Psf(arguments) => psf::run(&arguments, &common),
         Command::Sense(arguments) => sense::run(&arguments, &common),
         Command::Measure(command) => measure::run(&command, &common),

@@ -3,21 +3,22 @@
 use std::fmt::Write;
 
 use dioptric_pipeline::{
-    BankChoice, FocusChoice, PsfRequest, PsfRow, PsfSampling, PsfSet, Staged, StopChoice, drawing_file, open_lens,
-    parse_numbers, psf_csv,
+    BankChoice, FocusChoice, PsfRequest, PsfRow, PsfSampling, PsfSet, Staged, StopChoice, drawing_file, parse_numbers,
+    psf_csv,
 };
 
 use crate::{
     args::{BankKind, Common, PsfArgs, PsfMode},
+    lens::open,
     run::diffraction,
-    terminal::{Bar, guarded, print, print_json, remark},
+    terminal::{Bar, fixed, guarded, print, print_json, remark},
 };
 
 /// The seed where the user gives none.
 const SEED: u64 = 1;
 
 pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
-    let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
+    let lens = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?.lens;
     let focus = match (arguments.film.focus_mm, arguments.film.film_mm) {
         (Some(distance_mm), _) => FocusChoice::DistanceMm(distance_mm),
         (None, Some(film_mm)) => FocusChoice::FilmMm(film_mm),
@@ -139,8 +140,8 @@ fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
             row.field_deg,
             row.distance_mm,
             if row.is_whole_light { "all".to_owned() } else { format!("{:.1}", row.wavelength_nm) },
-            fixed(row.centroid_x_mm),
-            fixed(row.centroid_y_mm),
+            fixed(row.centroid_x_mm, 5),
+            fixed(row.centroid_y_mm, 5),
             row.rms_radius_um,
             row.sigma_x_um,
             row.sigma_y_um,
@@ -168,21 +169,4 @@ fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
         }
     }
     Ok(text)
-}
-
-/// Returns a number to five digits, and 0 without a sign.
-fn fixed(value: f64) -> String {
-    let text = format!("{value:.5}");
-    if text.trim_start_matches('-').bytes().all(|b| matches!(b, b'0' | b'.')) { text.replace('-', "") } else { text }
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn nothing_has_no_sign() {
-        assert_eq!(
-            [-1e-9, 0.0, -0.0, -0.00001, 2.5].map(super::fixed),
-            ["0.00000", "0.00000", "0.00000", "-0.00001", "2.50000"]
-        );
-    }
 }

@@ -9,12 +9,13 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_pipeline::{
     BankChoice, BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, FrameFile, FramesChoice, LensChoice,
-    Progress, Report, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, WhiteChoice,
+    LensReading, Progress, Report, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, WhiteChoice,
     parse_illuminant, parse_numbers, with_exposure_s,
 };
 
 use crate::{
     args::{BankKind, BlurKind, Common, DiffractionKind, FrameArgs, RunArgs, WhiteKind},
+    lens::tell,
     terminal::{Bar, guarded, print, print_json, remark},
 };
 
@@ -29,6 +30,7 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     let report = capture.write(&shot, staged.path(), &timings)?;
     staged.commit()?;
     drop(clock);
+    tell(&shot.lens_notes, common);
     if common.json {
         return print_json(&report);
     }
@@ -82,9 +84,11 @@ fn change_scene(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> 
 fn change_lens(camera: &mut Camera, arguments: &RunArgs) {
     if let Some(lens) = &arguments.lens {
         camera.lens = LensChoice::named(lens);
-        // The f-number in the file was meant for another lens.
+        // The f-number in the file was meant for another lens, and so was what it says of glasses.
         camera.stop = StopChoice::AsGiven;
+        camera.lens_reading = LensReading::default();
     }
+    arguments.reading.change(&mut camera.lens_reading);
     if let Some(n) = arguments.f_number {
         camera.stop = StopChoice::FNumber(n);
     }

@@ -43,6 +43,12 @@ pub(crate) fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     print(&(serde_json::to_string_pretty(value)? + "\n"))
 }
 
+/// Returns a number to so many decimals, and 0 without a sign.
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    if text.trim_start_matches('-').bytes().all(|b| matches!(b, b'0' | b'.')) { text.replace('-', "") } else { text }
+}
+
 /// Returns the error of a failed write to standard output; a closed pipe is told apart.
 pub(crate) fn output_error(error: io::Error) -> anyhow::Error {
     if error.kind() == io::ErrorKind::BrokenPipe { ClosedPipe.into() } else { error.into() }
@@ -111,5 +117,16 @@ impl Drop for Bar {
         if let Some(bar) = &self.0 {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn nothing_has_no_sign() {
+        assert_eq!(
+            [-1e-9, 0.0, -0.0, -0.00001, 2.5].map(|value| super::fixed(value, 5)),
+            ["0.00000", "0.00000", "0.00000", "-0.00001", "2.50000"]
+        );
     }
 }

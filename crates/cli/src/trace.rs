@@ -3,15 +3,16 @@
 use std::{fs::File, io, path::Path};
 
 use anyhow::Context;
-use dioptric_pipeline::{RayTable, Staged, TraceError, TraceSettings, open_lens};
+use dioptric_pipeline::{RayTable, Staged, TraceError, TraceSettings};
 
 use crate::{
-    args::TraceArgs,
+    args::{Common, TraceArgs},
+    lens::open,
     terminal::{guarded, output_error},
 };
 
-pub(crate) fn run(arguments: &TraceArgs) -> anyhow::Result<()> {
-    let lens = open_lens(&arguments.lens, arguments.stop_mm)?;
+pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> {
+    let lens = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?.lens;
     let rays = RayTable::open(&arguments.rays)?;
     let settings = TraceSettings { rims_clip: !arguments.no_clip, film_mm: arguments.film_mm };
     let Some(path) = &arguments.output else {

@@ -4,7 +4,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{check_error, output};
+use common::{CAMERA, check_error, output};
 use serde_json::Value;
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
@@ -417,6 +417,26 @@ fn what_a_lens_file_leaves_open_is_closed_by_options() {
     let of_nd_vd_mm = efl_mm(&["--missing-glass", "nd-vd"]);
     assert!((of_nd_vd_mm - 50.0 / 0.602).abs() < 0.2, "{of_nd_vd_mm}");
     check_error(folder.path(), &["lens", "info", "lens.zmx", "--glasses", "none.agf"], &["none.agf"]);
+
+    // A lens is read alike wherever one is named; a camera file says it too, and paths in it follow the file.
+    check_error(folder.path(), &["psf", "lens.zmx", "--focus-mm", "inf"], &["no glass is named 'MINE'"]);
+    let psf = ["psf", "lens.zmx", "--focus-mm", "inf", "--json", "--quiet", "--glasses", "my.agf"];
+    assert_eq!(json(folder.path(), &psf).as_array().unwrap().len(), 1);
+    fs::write(folder.path().join("rays.csv"), "x_mm,y_mm,z_mm,l,m,n,wavelength_nm\n1,0,-10,0,0,1,550\n").unwrap();
+    let rays = ["trace", "lens.zmx", "--rays", "rays.csv", "--glasses", "my.agf", "--film-mm", "90"];
+    // A header, two surfaces and the film.
+    assert_eq!(output(folder.path(), &rays).lines().count(), 4);
+    let camera = CAMERA.replace("BuiltIn(\"dgauss-50mm\")", "File(\"lens.zmx\")").replace("FNumber(4.0)", "AsGiven");
+    fs::write(folder.path().join("shot.ron"), &camera).unwrap();
+    check_error(folder.path(), &["run", "shot.ron", "--out", "out"], &["no glass is named 'MINE'"]);
+    output(folder.path(), &["run", "shot.ron", "--out", "out", "--glasses", "my.agf"]);
+    let report = fs::read_to_string(folder.path().join("out/report.json")).unwrap();
+    assert!(report.contains("\"my.agf\""));
+    let reading = "lens_reading: (glasses: [\"../my.agf\"]),\n    stop:";
+    let camera = camera.replace("lens.zmx", "../lens.zmx").replace("stop:", reading);
+    fs::create_dir(folder.path().join("shots")).unwrap();
+    fs::write(folder.path().join("shots/shot.ron"), camera).unwrap();
+    output(folder.path(), &["run", "shots/shot.ron", "--out", "out2"]);
 
     let dat = "50\n67\t1.5\t1.65\t25\n0\t1.5\t1.65\t25\n-67\t0\t1\t25\n";
     fs::write(folder.path().join("2el.dat"), dat).unwrap();

@@ -13,7 +13,7 @@ use dioptric_spectrum::Illuminant;
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::{BankChoice, FramesChoice, Movements, Outputs, PipelineError, SceneChoice, check::Checker};
+use crate::{BankChoice, FramesChoice, LensReading, Movements, Outputs, PipelineError, SceneChoice, check::Checker};
 
 /// The camera of the built-in demo.
 const DEMO: &str = include_str!("../../../fixtures/cameras/demo.ron");
@@ -28,6 +28,9 @@ pub struct Camera {
     pub name: String,
     /// The lens.
     pub lens: LensChoice,
+    /// What the lens's file leaves open.
+    #[serde(default)]
+    pub lens_reading: LensReading,
     /// How far its stop is open.
     #[serde(default)]
     pub stop: StopChoice,
@@ -342,6 +345,9 @@ impl Camera {
             LensChoice::Pinhole { diameter_mm } => checker.positive("diameter_mm", *diameter_mm)?,
             LensChoice::BuiltIn(_) | LensChoice::File(_) => {}
         }
+        if let Some(slope_per_nm) = self.lens_reading.slope_per_nm {
+            checker.finite("slope_per_nm", slope_per_nm)?;
+        }
         match self.stop {
             StopChoice::FNumber(n) => checker.positive("FNumber", n)?,
             StopChoice::DiameterMm(d) => checker.positive("DiameterMm", d)?,
@@ -389,6 +395,9 @@ impl Camera {
 
     fn resolve_paths(&mut self, folder: &Path) {
         if let LensChoice::File(path) = &mut self.lens {
+            *path = folder.join(&path);
+        }
+        for path in &mut self.lens_reading.glasses {
             *path = folder.join(&path);
         }
         if let SensorChoice::File(path) = &mut self.sensor {

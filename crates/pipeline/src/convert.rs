@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{LensReading, PipelineError};
+use crate::{LensChoice, LensReading, PipelineError};
 
 /// A lens in the format of another file.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +23,7 @@ pub struct ConvertedLens {
 /// # Errors
 /// When there is no such lens, or the format cannot hold it.
 pub fn convert_lens(input: &str, target: &Path, reading: &LensReading) -> Result<ConvertedLens, PipelineError> {
-    let mut file = reading.open(input)?;
+    let mut file = LensChoice::named(input).open(reading)?;
     let notes = std::mem::take(&mut file.notes);
     let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let (text, glasses) = match extension.as_str() {

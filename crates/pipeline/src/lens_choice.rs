@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions};
 use dioptric_sensor::Sensor;
+use serde::{Deserialize, Serialize};
 
 use crate::{LensChoice, LensUse, PipelineError, SensorChoice, StopChoice};
 
@@ -25,17 +26,21 @@ impl LensChoice {
         if !is_built_in && is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
     }
 
-    /// Returns the lens.
+    /// Returns the lens, and what its file says of it.
     ///
     /// # Errors
-    /// When there is none of that name, or the file cannot be read.
-    pub fn open(&self) -> Result<Lens, PipelineError> {
-        Ok(match self {
-            Self::BuiltIn(name) => Lens::built_in(name)?,
-            Self::File(path) => Lens::read(path)?,
-            Self::Thin { focal_length_mm, diameter_mm } => Lens::thin(*focal_length_mm, *diameter_mm)?,
-            Self::Pinhole { diameter_mm } => Lens::pinhole(*diameter_mm)?,
-        })
+    /// When there is none of that name, or its file or a catalogue cannot be read.
+    pub fn open(&self, reading: &LensReading) -> Result<LensFile, PipelineError> {
+        let mut file = match self {
+            Self::File(path) => LensFile::read(path, &reading.options()?)?,
+            Self::BuiltIn(name) => LensFile::from(Lens::built_in(name)?),
+            Self::Thin { focal_length_mm, diameter_mm } => LensFile::from(Lens::thin(*focal_length_mm, *diameter_mm)?),
+            Self::Pinhole { diameter_mm } => LensFile::from(Lens::pinhole(*diameter_mm)?),
+        };
+        if let Some(slope_per_nm) = reading.slope_per_nm {
+            file.lens = file.lens.with_slope(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
+        }
+        Ok(file)
     }
 }
 
@@ -85,7 +90,8 @@ fn is_path(text: &str) -> bool {
 }
 
 /// What a lens file leaves open, and how to close it.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct LensReading {
     /// Glass catalogues (`.agf`, `.yml`) to look in before the built-in one.
     pub glasses: Vec<PathBuf>,
@@ -96,7 +102,8 @@ pub struct LensReading {
 }
 
 /// What to do with a glass that no catalogue has.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub enum MissingGlassChoice {
     /// Refuse the lens and say which glass is missing.
     #[default]
@@ -114,41 +121,21 @@ impl LensReading {
     /// # Errors
     /// When there is no such lens, its file or a catalogue cannot be read, or the stop does not open so far.
     pub fn open_stopped(&self, text: &str, stop_mm: Option<f64>) -> Result<LensUse, PipelineError> {
-        let mut used = LensUse::of(self.open(text)?);
+        let mut used = LensUse::of(LensChoice::named(text).open(self)?);
         used.lens = stop_mm.map_or(StopChoice::AsGiven, StopChoice::DiameterMm).apply(used.lens)?;
         Ok(used)
     }
 
-    /// Returns the lens that `LENS` on the command line means, and what its file says of it.
-    ///
-    /// # Errors
-    /// When there is no such lens, or its file or a catalogue cannot be read.
-    pub fn open(&self, text: &str) -> Result<LensFile, PipelineError> {
+    /// Returns it as what reads the files is told.
+    fn options(&self) -> Result<ReadOptions, PipelineError> {
         let catalogues = self.glasses.iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
         let missing_glass = match self.missing_glass {
             MissingGlassChoice::Refuse => MissingGlass::Refuse,
             MissingGlassChoice::FromNdVd => MissingGlass::FromNdVd,
             MissingGlassChoice::Nearest => MissingGlass::Nearest,
         };
-        let options = ReadOptions { catalogues, missing_glass };
-        let mut file = match LensChoice::named(text) {
-            LensChoice::File(path) => LensFile::read(&path, &options)?,
-            other => LensFile::from(other.open()?),
-        };
-        if let Some(slope_per_nm) = self.slope_per_nm {
-            file.lens = file.lens.with_slope(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
-        }
-        Ok(file)
+        Ok(ReadOptions { catalogues, missing_glass })
     }
-}
-
-/// Returns the lens that `LENS` on the command line means, with its stop set to `stop_mm` where given.
-///
-/// # Errors
-/// When there is no such lens, its file cannot be read, or the stop does not open so far.
-pub fn open_lens(text: &str, stop_mm: Option<f64>) -> Result<Lens, PipelineError> {
-    let lens = LensChoice::named(text).open()?;
-    stop_mm.map_or(StopChoice::AsGiven, StopChoice::DiameterMm).apply(lens)
 }
 
 #[cfg(test)]
@@ -166,10 +153,11 @@ mod tests {
 
     #[test]
     fn a_stop_is_set() {
-        let lens = open_lens("dgauss-50mm", Some(8.0)).unwrap();
+        let open = |text: &str, stop_mm| LensReading::default().open_stopped(text, stop_mm);
+        let lens = open("dgauss-50mm", Some(8.0)).unwrap().lens;
         assert_eq!(lens.stop_semi_aperture_mm(), 4.0);
-        assert!(open_lens("dgauss-50mm", Some(80.0)).is_err());
-        let message = open_lens("no-such-lens", None).unwrap_err().to_string();
+        assert!(open("dgauss-50mm", Some(80.0)).is_err());
+        let message = open("no-such-lens", None).unwrap_err().to_string();
         assert!(message.contains("no-such-lens") && message.contains("dgauss-50mm"), "{message}");
     }
 }

@@ -21,6 +21,8 @@ pub struct Shot {
     pub camera: Camera,
     /// The lens, its stop set.
     pub lens: Lens,
+    /// What its file says and this program does otherwise or not at all, a sentence each.
+    pub lens_notes: Vec<String>,
     /// What stands before it.
     pub scene: Scene,
     /// The raster of pixels.
@@ -43,7 +45,8 @@ impl Shot {
     pub fn open(camera: &Camera, progress: &dyn Progress) -> Result<Self, PipelineError> {
         camera.validate()?;
         progress.at(Stage::Scene, 0.0);
-        let lens = camera.movements.apply(camera.stop.apply(camera.lens.open()?)?)?;
+        let lens_file = camera.lens.open(&camera.lens_reading)?;
+        let lens = camera.movements.apply(camera.stop.apply(lens_file.lens)?)?;
         let sensor = camera.sensor.open()?;
         let scene = camera.scene.open(camera.wavelengths.grid()?.as_ref())?;
         let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
@@ -61,7 +64,17 @@ impl Shot {
         };
         let blur = Settings { mode, ..Settings::default() };
         progress.at(Stage::Scene, 1.0);
-        Ok(Self { camera: camera.clone(), lens, scene, film, film_mm, focus_distance_mm, sensor, blur })
+        Ok(Self {
+            camera: camera.clone(),
+            lens,
+            lens_notes: lens_file.notes,
+            scene,
+            film,
+            film_mm,
+            focus_distance_mm,
+            sensor,
+            blur,
+        })
     }
 
     /// The bands.
