@@ -44,14 +44,10 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<Camera> {
         Some(path) => Camera::read(path)?,
         None => Camera::demo()?,
     };
+    if arguments.camera.is_none() {
+        change_demo(&mut camera, arguments);
+    }
     if let Some(scene) = &arguments.scene {
-        // The demo's film, focus and bands are made for its own scene.
-        if arguments.camera.is_none() {
-            camera.film = FilmChoice::Scene;
-            camera.focus = FocusChoice::NearObject;
-            camera.wavelengths = WavelengthChoice::Scene;
-            camera.name = format!("{}, 50 mm double Gauss", stem_of(scene));
-        }
         camera.scene = SceneChoice::of_file(scene.clone());
     }
     change_scene(&mut camera, arguments)?;
@@ -64,6 +60,30 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<Camera> {
         camera.wavelengths = WavelengthChoice::ListNm(parse_numbers("--wavelengths-nm", list)?);
     }
     Ok(camera)
+}
+
+/// Changes what the demo has for its own lens and scene alone: the film and the name, and with the scene focus and bands.
+fn change_demo(camera: &mut Camera, arguments: &RunArgs) {
+    if arguments.scene.is_some() {
+        camera.focus = FocusChoice::NearObject;
+        camera.wavelengths = WavelengthChoice::Scene;
+    }
+    if arguments.scene.is_some() || arguments.lens.is_some() {
+        camera.film = FilmChoice::Scene;
+    }
+    let scene = arguments.scene.as_deref().map_or_else(|| "Still life".to_owned(), stem_of);
+    let lens = match arguments.lens.as_deref().map(LensChoice::named) {
+        Some(LensChoice::File(path)) => stem_of(&path),
+        Some(_) => arguments.lens.clone().unwrap_or_default(),
+        None => "50 mm double Gauss".to_owned(),
+    };
+    let stop = match (arguments.f_number, arguments.stop_mm) {
+        (Some(n), _) => format!(" at f/{n}"),
+        (None, Some(mm)) => format!(", stop {mm} mm"),
+        (None, None) if arguments.lens.is_none() => " at f/4".to_owned(),
+        (None, None) => String::new(),
+    };
+    camera.name = format!("{scene}, {lens}{stop}");
 }
 
 fn stem_of(path: &Path) -> String {
@@ -227,5 +247,38 @@ impl Progress for Clock {
             stages.push((stage, Instant::now()));
         }
         self.bar.show(stage.title(), fraction);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::args::{Cli, Command};
+
+    fn camera(options: &[&str]) -> Camera {
+        let cli = Cli::parse_from([&["dioptric", "run"], options].concat());
+        let Command::Run(arguments) = &cli.command else { panic!("another command") };
+        camera_of(arguments, &cli.common).unwrap()
+    }
+
+    #[test]
+    fn the_demo_is_itself_until_something_is_changed() {
+        assert_eq!(camera(&[]), Camera::demo().unwrap());
+    }
+
+    #[test]
+    fn another_lens_or_scene_has_a_film_and_a_name_of_its_own() {
+        let film = Camera::demo().unwrap().film;
+        for (options, name, is_demos_film) in [
+            (&["--f-number", "8"][..], "Still life, 50 mm double Gauss at f/8", true),
+            (&["--lens", "designs/tele.zmx"], "Still life, tele", false),
+            (&["--lens", "fisheye-12.5mm", "--f-number", "5.6"], "Still life, fisheye-12.5mm at f/5.6", false),
+            (&["--scene", "a/room.exr", "--stop-mm", "3"], "room, 50 mm double Gauss, stop 3 mm", false),
+        ] {
+            let camera = camera(options);
+            assert_eq!((camera.name.as_str(), camera.film == film), (name, is_demos_film));
+        }
     }
 }

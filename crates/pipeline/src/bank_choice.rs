@@ -4,7 +4,7 @@ use dioptric_optics::Lens;
 use dioptric_psf::{AdaptiveSettings, BankSettings, ErrorPlaces, Interpolation, MeasuredError, PsfBank};
 use serde::{Deserialize, Serialize};
 
-use crate::{CameraBank, PipelineError};
+use crate::{CameraBank, PipelineError, psf_plots::number};
 
 /// Places at which the error of a bank is measured: few, for it is told of every run.
 const N_PLACES: usize = 24;
@@ -139,7 +139,8 @@ impl BankData {
             "rays" => "rays interpolated between",
             _ => "pictures blended between",
         };
-        let Self { n_fields, n_depths, n_wavelengths, n_places, pitch_um, .. } = self;
+        let Self { n_fields, n_depths, n_wavelengths, n_places, .. } = self;
+        let pitch_um = number(self.pitch_um);
         let missed = match self.wanted_error {
             Some(wanted) if self.median_error > wanted => format!("; {wanted} was asked for"),
             _ => String::new(),
