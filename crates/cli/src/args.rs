@@ -123,6 +123,9 @@ pub(crate) struct RunArgs {
     /// Diffraction at the stop
     #[arg(long, value_name = "KIND", value_enum)]
     pub(crate) diffraction: Option<DiffractionKind>,
+    /// Strength γ of ray bending, in place of that of its kind
+    #[arg(long, value_name = "G", allow_negative_numbers = true)]
+    pub(crate) gamma: Option<f64>,
     /// How point-spread functions are sampled
     #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error")]
     pub(crate) bank: Option<BankKind>,
@@ -248,6 +251,9 @@ pub(crate) struct PsfArgs {
     /// Diffraction at the stop
     #[arg(long, value_name = "KIND", value_enum, default_value_t = DiffractionKind::None)]
     pub(crate) diffraction: DiffractionKind,
+    /// Strength γ of ray bending, in place of that of its kind
+    #[arg(long, value_name = "G", allow_negative_numbers = true)]
+    pub(crate) gamma: Option<f64>,
     /// Pixel of the pictures and of the metrics, µm
     #[arg(long, value_name = "P", default_value_t = 1.0)]
     pub(crate) pixel_um: f64,

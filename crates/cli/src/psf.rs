@@ -10,7 +10,7 @@ use dioptric_pipeline::{
 use crate::{
     args::{BankKind, Common, PsfArgs, PsfMode},
     lens::open,
-    run::diffraction,
+    run::{diffraction, with_gamma},
     terminal::{Bar, fixed, guarded, print, print_json, remark},
 };
 
@@ -30,7 +30,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         distances_mm: parse_numbers("--distances-mm", &arguments.distances_mm)?,
         wavelengths_nm: parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?,
         focus,
-        diffraction: diffraction(arguments.diffraction),
+        diffraction: with_gamma(diffraction(arguments.diffraction), arguments.gamma)?,
         pixel_um: arguments.pixel_um,
         size: arguments.size,
         sampling: match arguments.mode {

@@ -51,7 +51,7 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<Camera> {
         camera.scene = SceneChoice::of_file(scene.clone());
     }
     change_scene(&mut camera, arguments)?;
-    change_lens(&mut camera, arguments);
+    change_lens(&mut camera, arguments)?;
     change_sensor(&mut camera, arguments)?;
     if let Some(seed) = common.seed {
         camera.seed = seed;
@@ -101,7 +101,7 @@ fn change_scene(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> 
     Ok(())
 }
 
-fn change_lens(camera: &mut Camera, arguments: &RunArgs) {
+fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
     if let Some(lens) = &arguments.lens {
         camera.lens = LensChoice::named(lens);
         // The f-number in the file was meant for another lens, and so was what it says of glasses.
@@ -125,6 +125,7 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) {
     if let Some(kind) = arguments.diffraction {
         camera.diffraction = diffraction(kind);
     }
+    camera.diffraction = with_gamma(camera.diffraction, arguments.gamma)?;
     if let Some(kind) = arguments.bank {
         camera.bank = match kind {
             BankKind::Standard => BankChoice::Standard,
@@ -139,6 +140,19 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) {
             BlurKind::Layered => BlurChoice::Layered,
             BlurKind::Pointwise => BlurChoice::Pointwise,
         };
+    }
+    Ok(())
+}
+
+/// Returns bent rays with another strength, where one is asked for.
+pub(crate) fn with_gamma(choice: DiffractionChoice, gamma: Option<f64>) -> anyhow::Result<DiffractionChoice> {
+    match (choice, gamma) {
+        (_, None) => Ok(choice),
+        (DiffractionChoice::Hurb { .. }, Some(gamma)) if gamma.is_finite() && gamma > 0.0 => {
+            Ok(DiffractionChoice::Hurb { gamma })
+        }
+        (DiffractionChoice::Hurb { .. }, Some(gamma)) => bail!("--gamma is {gamma}, expected a finite number above 0"),
+        (_, Some(_)) => bail!("--gamma is the strength of bent rays, expected with --diffraction hurb"),
     }
 }
 

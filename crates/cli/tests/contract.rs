@@ -493,3 +493,29 @@ fn threads_change_no_bit_of_any_frame() {
         serde_json::from_str(&fs::read_to_string(folder.path().join("one/report.json")).unwrap()).unwrap();
     assert_eq!((report["film"]["columns"].as_u64(), report["camera"]["seed"].as_u64()), (Some(48), Some(7)));
 }
+
+#[test]
+fn bent_rays_have_the_strength_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    // Of an ideal lens of long focus, nothing but bending widens a star.
+    let lens = r#"(name: "ideal", source: "test", surfaces: [(shape: ThinLens(power_per_mm: 0.005),
+        semi_aperture_mm: 2.0, stop: true, thickness_mm: 0.0)])"#;
+    fs::write(folder.path().join("ideal.ron"), lens).unwrap();
+    let psf = ["psf", "ideal.ron", "--distances-mm", "inf", "--focus-mm", "inf", "--json"];
+    let width_um = |options: &[&str]| {
+        let row = json(folder.path(), &[&psf[..], options].concat())[0].clone();
+        row["lsf_fwhm_um"].as_f64().unwrap()
+    };
+    let widths = [&["--gamma", "1"][..], &["--gamma", "2"], &[]]
+        .map(|gamma| width_um(&[&["--diffraction", "hurb"], gamma].concat()));
+    // The width goes with γ; λN is 27.5 µm, pixels of 1 µm widen it by some thousandths.
+    assert!((widths[1] / widths[0] - 2.0).abs() < 0.01 && widths[0] == widths[2], "{widths:?}");
+    assert!((width_um(&["--diffraction", "hurb-scene3d", "--gamma", "1"]) - widths[0]).abs() < 1e-12);
+    for (options, words) in [
+        (&["--diffraction", "hurb", "--gamma", "-1"][..], ["--gamma is -1", "above 0"]),
+        (&["--gamma", "1"], ["--gamma", "--diffraction hurb"]),
+        (&["--diffraction", "wave", "--gamma", "1"], ["--gamma", "--diffraction hurb"]),
+    ] {
+        check_error(folder.path(), &[&psf[..], options].concat(), &words);
+    }
+}
