@@ -104,6 +104,12 @@ impl Pose {
         Self { vertex_mm: self.to_own(DVec3::ZERO), rotation: self.rotation.transpose() }
     }
 
+    /// Whether another surface stands on the same axis and is not turned about it, to rounding.
+    pub(crate) fn is_coaxial(&self, other: &Self) -> bool {
+        let between = self.inverse().after(other);
+        Self { vertex_mm: between.vertex_mm * DVec3::new(1.0, 1.0, 0.0), ..between }.is_rest()
+    }
+
     /// Whether nothing moves, to rounding.
     pub(crate) fn is_rest(&self) -> bool {
         let turned = (self.rotation - DMat3::IDENTITY).to_cols_array();

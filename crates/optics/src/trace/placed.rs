@@ -1,4 +1,6 @@
-//! Tracing through surfaces that are tilted or decentred: each in its own frame, by the kernel for centred ones.
+//! Tracing through surfaces that are tilted or decentred: those on one axis in its frame, by the kernels for centred ones.
+
+use std::ops::Range;
 
 use glam::DVec3;
 
@@ -12,18 +14,39 @@ use crate::{Pose, RayFate, rays::RaySlices};
 /// Traces rays given in the lens frame through these steps, each of which stands as its pose says; `first` is the
 /// number of the first of them.
 pub(crate) fn trace_placed(steps: &[Step], poses: &[Pose], first: usize, rims: Rims, rays: &mut RaySlices<'_>) {
-    for (i, (step, pose)) in steps.iter().zip(poses).enumerate() {
-        let own = [Step { vertex_z: 0.0, ..step.clone() }];
-        in_frame(pose, rays, |rays| trace_batch(&Plan::new(&own, first + i, rims), Goal::LastSurface, rays));
+    let mut number = first;
+    for group in coaxial(poses) {
+        let (pose, own) = in_own_frame(&steps[group.clone()], &poses[group]);
+        in_frame(&pose, rays, |rays| trace_batch(&Plan::new(&own, number, rims), Goal::LastSurface, rays));
+        number += own.len();
     }
 }
 
 /// Does what [`trace_clearances`] does; distances are those from each surface's own axis.
 pub(crate) fn placed_clearances(steps: &[Step], poses: &[Pose], rays: &mut RaySlices<'_>, clearances: &mut [f64]) {
-    for (step, pose) in steps.iter().zip(poses) {
-        let own = [Step { vertex_z: 0.0, ..step.clone() }];
-        in_frame(pose, rays, |rays| trace_clearances(&Plan::new(&own, 0, Rims::Ignore), rays, clearances));
+    for group in coaxial(poses) {
+        let (pose, own) = in_own_frame(&steps[group.clone()], &poses[group]);
+        in_frame(&pose, rays, |rays| trace_clearances(&Plan::new(&own, 0, Rims::Ignore), rays, clearances));
     }
+}
+
+/// Returns the surfaces in groups that stand on one axis each, as those of a lens do that is tilted as a whole: for a group
+/// rays change their frame once.
+fn coaxial(poses: &[Pose]) -> impl Iterator<Item = Range<usize>> {
+    let mut start = 0;
+    std::iter::from_fn(move || {
+        let first = poses.get(start)?;
+        let n = poses[start..].iter().take_while(|pose| first.is_coaxial(pose)).count();
+        start += n;
+        Some(start - n..start)
+    })
+}
+
+/// Returns the frame of the first of the surfaces of a group, and all of them as centred ones in it.
+fn in_own_frame(steps: &[Step], poses: &[Pose]) -> (Pose, Vec<Step>) {
+    let frame = poses[0];
+    let own = |(step, pose): (&Step, &Pose)| Step { vertex_z: frame.to_own(pose.vertex_mm).z, ..step.clone() };
+    (frame, steps.iter().zip(poses).map(own).collect())
 }
 
 /// Moves every ray in flight along its line to the x–y plane of a frame, in a medium of this index.
