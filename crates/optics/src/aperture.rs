@@ -71,6 +71,11 @@ impl Outline {
 }
 
 impl Aperture {
+    /// Whether it is a circle about the surface's axis.
+    pub fn is_rotational(&self) -> bool {
+        matches!(self.outline, Outline::Circle { .. }) && self.center_mm == [0.0; 2]
+    }
+
     /// Whether a ray passes that meets the surface here.
     pub fn is_clear_at(&self, x_mm: f64, y_mm: f64) -> bool {
         let from_center = DVec2::new(x_mm, y_mm) - DVec2::from_array(self.center_mm);

@@ -252,10 +252,10 @@ impl Lens {
     }
 
     /// Whether every surface is one of revolution about the lens's axis: whether nothing is tilted, decentred or
-    /// curved differently along x and y, and there are no apertures but round rims.
+    /// curved differently along x and y, and all apertures are circles about it.
     pub fn is_rotational(&self) -> bool {
         let is_round = |interface: &Interface| interface.surface.is_rotational();
-        self.apertures.is_empty()
+        self.apertures.iter().all(Aperture::is_rotational)
             && self.interfaces.iter().all(is_round)
             && pose::motions(&self.moves, &self.vertices_z_mm()).is_none()
     }

@@ -6,7 +6,8 @@ use glam::{DVec2, DVec3};
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::{
-    Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, RayBatchF32, Rims, Shape, Surface,
+    Aperture, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, RayBatchF32, Rims, Shape,
+    Surface,
     paraxial::{self, MarginalRay, Matrix},
     pose,
     trace::{self, Goal, Kind, Plan, Step},
@@ -74,7 +75,8 @@ impl MonoLens {
 
     /// Whether the lens is rotationally symmetric, as [`Lens::is_rotational`].
     pub fn is_rotational(&self) -> bool {
-        let is_round = |step: &Step| step.apertures.is_empty() && !matches!(step.kind, Kind::Toric(_));
+        let is_round =
+            |step: &Step| step.apertures.iter().all(Aperture::is_rotational) && !matches!(step.kind, Kind::Toric(_));
         self.placed.is_none() && self.steps.iter().all(is_round)
     }
 

@@ -365,8 +365,11 @@ impl ColumnTracer<'_> {
     }
 }
 
-/// Returns the waves of a point, if they are smooth over its pupil.
+/// Returns the waves of a point, if they are smooth over its pupil and that has no holes.
 fn wave_map(task: &Task<'_>, pupil: &Pupil) -> Option<WaveMap> {
+    if task.lens.n_obscurations() > 0 {
+        return None;
+    }
     let point = task.point();
     let pupil = pupil.resampled(WAVE_AZIMUTHS).near(task.lens, &point)?;
     let edge = PupilEdge { center_x_mm: pupil.center_mm.x, z_mm: pupil.z_mm, rho_mm: &pupil.rho_mm };

@@ -156,3 +156,44 @@ fn an_obscured_lens_blurs_to_rings() {
     let expected = (0.15f64.powi(2) - 0.01) / 0.03;
     assert!((within(0.15) - expected).abs() < 0.02, "{} {expected}", within(0.15));
 }
+
+#[test]
+fn a_lens_with_a_round_hole_is_drawn_alike_by_both_banks() {
+    let thin = Lens::thin(50.0, 5.0).unwrap();
+    let hole =
+        Aperture { surface: 0, outline: Outline::Circle { radius_mm: 1.0 }, center_mm: [0.0; 2], is_obscuration: true };
+    let lens = Lens::new_with_apertures("annulus", "test", thin.interfaces().to_vec(), 0, vec![hole]).unwrap();
+    let film_mm = 50.05;
+    for diffraction in [Diffraction::None, Diffraction::Wave] {
+        let plane = FieldBankSettings {
+            dioptres: vec![0.0],
+            wavelengths_nm: vec![550.0],
+            ..settings(film_mm, vec![0.06], vec![0.08], diffraction)
+        };
+        let turned = BankSettings {
+            film_mm,
+            reference_wavelength_nm: plane.reference_wavelength_nm,
+            field_tans: vec![0.0, 0.1],
+            dioptres: vec![0.0],
+            wavelengths_nm: vec![550.0],
+            n_rings: plane.n_rings,
+            n_azimuths: plane.n_azimuths,
+            diffraction,
+            interpolation: Interpolation::Rays,
+        };
+        let query = PsfQuery { field_tan: DVec2::new(0.06, 0.08), dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 1.0 };
+        let (of_plane, model) = FieldBank::build(&lens, &plane).unwrap().picture(query, 41).unwrap();
+        let (of_turned, again) = PsfBank::build(&lens, &turned).unwrap().picture(query, 41);
+        assert_eq!(
+            (model.wave_share, again.wave_share),
+            if diffraction == Diffraction::Wave { (1.0, 1.0) } else { (0.0, 0.0) }
+        );
+        let off: f64 = (&of_plane - &of_turned).iter().map(|e| e.abs()).sum();
+        // Meshes of rays are turned with the field by one bank alone; waves are summed from the same nodes by both.
+        let limit = if diffraction == Diffraction::Wave { 1e-9 } else { 0.03 };
+        assert!(off < limit, "{diffraction:?}: {off}");
+        // The hole takes light from the middle of the blur, not from around it.
+        let middle = of_turned[(20, 20)] / of_turned.sum();
+        assert!(diffraction == Diffraction::Wave || middle < 1e-9, "{middle}");
+    }
+}
