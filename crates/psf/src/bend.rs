@@ -27,6 +27,8 @@ const PART_OF_A_WIDE_CELL: f64 = 0.25;
 const FAR: f64 = 5.0;
 /// Variance, pixels², that a pixel's own size adds when the need for subdivision is judged.
 const PIXEL_VARIANCE: f64 = 0.12;
+/// How much of the distance by which neighbours' Gaussians come apart at one standard deviation each is made softer.
+const FAN: f64 = 1.5;
 
 /// Uncertainty bending at the stop.
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +59,8 @@ pub(crate) struct BentMesh<'a> {
 impl BentMesh<'_> {
     /// Takes from the energies of the cells what bending spreads, and deposits it.
     pub(crate) fn deposit(&self, energies: &mut [f64], raster: &mut Raster) {
-        let (mut bent, mut splats, mut film) = (BentCells::default(), Splats::default(), None);
+        let mut bent = BentCells { azimuth_step: self.mesh.azimuth(1.0), ..BentCells::default() };
+        let (mut splats, mut film) = (Splats::default(), None);
         for (number, energies) in energies.chunks_exact_mut(self.mesh.n_azimuths).enumerate() {
             draw_ring(self, number, energies, &mut bent, &mut splats);
             if !splats.is_empty() {
@@ -117,6 +120,8 @@ struct BentCells {
     /// How the last cell was cut, and its pieces: those of others are often the same.
     cut: Option<Cut>,
     pieces: Vec<Piece>,
+    /// The azimuth from one cell to the next, radians.
+    azimuth_step: f64,
 }
 
 /// A part of a cell.
@@ -162,7 +167,7 @@ impl BentCells {
             for (i, part) in parts.iter().enumerate() {
                 let n = looks.n_around(i);
                 if n == 1 {
-                    splats.push(looks.splat(&samples[i], part, i));
+                    splats.push(looks.splat(&samples[i], part, (i, self.azimuth_step)));
                 } else {
                     let share = 1.0 / f64::from(n);
                     self.side_by_side.extend((0..n).map(|j| Part {
@@ -178,7 +183,7 @@ impl BentCells {
             let samples = samples(&self.cells, parts);
             let looks = Looks::new(&samples, bending);
             for (i, part) in parts.iter().enumerate() {
-                splats.push(looks.splat(&samples[i], part, i));
+                splats.push(looks.splat(&samples[i], part, (i, self.azimuth_step)));
             }
         }
     }
@@ -299,14 +304,26 @@ impl Looks {
     }
 
     /// Returns the splat of a part.
+    ///
+    /// Gaussians along the radii of the stop fan out. Far from a blur's edge the splats of neighbours would leave gaps, 48
+    /// spokes, so each is softened across by how far it comes apart from the next; but by less than a part's own side,
+    /// for in focus they all meet in the middle.
     #[inline(always)]
-    fn splat(&self, sample: &Sample, part: &Part, i: usize) -> Splat {
+    fn splat(&self, sample: &Sample, part: &Part, (i, azimuth_step): (usize, f64)) -> Splat {
         let [xx, xy, yy] = self.covariance.map(|of_all| of_all[i]);
         let along = Covariance::along(sample.out * (part.lengths.0 / 12f64.sqrt()));
+        let side = sample.around * part.lengths.1;
+        let (apart, side2) = (self.wide2[i] * (azimuth_step * part.lengths.1).powi(2), side.length_squared());
+        let softness = FAN * apart * side2 / ((apart + side2) * (apart + side2)).max(f64::MIN_POSITIVE);
+        let fan = Covariance {
+            xx: softness * side.x * side.x,
+            xy: softness * side.x * side.y,
+            yy: softness * side.y * side.y,
+        };
         Splat {
             at: sample.node.at_mm,
-            covariance: Covariance { xx, xy, yy }.plus(along),
-            side: sample.around * part.lengths.1,
+            covariance: Covariance { xx, xy, yy }.plus(along).plus(fan),
+            side,
             energy: part.energy,
         }
     }

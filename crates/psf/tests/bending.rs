@@ -7,7 +7,7 @@ use dioptric_optics::{
     glam::{DVec2, DVec3},
     rays_towards,
 };
-use dioptric_psf::{BankSettings, Diffraction, Kernel, PsfBank};
+use dioptric_psf::{BankSettings, Diffraction, Interpolation, Kernel, PsfBank, PsfQuery};
 
 const PITCH_UM: f64 = 4.0;
 
@@ -96,5 +96,40 @@ fn kernels_are_those_of_rays_bent_at_random() {
         );
         // The noise of the counts and the error of the drawing are independent.
         assert!(l1 < noise.hypot(tolerance), "f/{f_number}, {field_tan}, {dioptres} D: {l1}, noise {noise}");
+    }
+}
+
+#[test]
+fn light_beyond_the_edge_of_a_blur_is_even_around_it() {
+    // 1 mm behind the focus of f/8: a disc of 62.5 µm radius; λN is 4.4 µm.
+    let lens = Lens::thin(50.0, 6.25).unwrap();
+    let settings = BankSettings {
+        film_mm: 51.0,
+        reference_wavelength_nm: 550.0,
+        field_tans: vec![0.0, 0.1],
+        dioptres: vec![0.0],
+        wavelengths_nm: vec![550.0],
+        n_rings: 12,
+        n_azimuths: 48,
+        diffraction: Diffraction::Hurb { gamma: 1.0 },
+        interpolation: Interpolation::Rays,
+    };
+    let bank = PsfBank::build(&lens, &settings).unwrap();
+    let query = PsfQuery { field_tan: DVec2::ZERO, dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 1.0 };
+    let (picture, _) = bank.picture(query, 241);
+    for radius in [70.0, 80.0, 90.0] {
+        // Between pixels, by straight lines.
+        let at = |azimuth: f64| {
+            let place = DVec2::splat(120.0) + DVec2::from_angle(azimuth) * radius;
+            let (corner, part) = (place.floor(), place.fract());
+            let pixel = |right: usize, down: usize| picture[(corner.y as usize + down, corner.x as usize + right)];
+            let row = |down| pixel(0, down) * (1.0 - part.x) + pixel(1, down) * part.x;
+            row(0) * (1.0 - part.y) + row(1) * part.y
+        };
+        let values: Vec<f64> = (0..720).map(|i| at(f64::from(i).to_radians() / 2.0)).collect();
+        let mean = values.iter().sum::<f64>() / 720.0;
+        let rms = (values.iter().map(|v| (v / mean - 1.0).powi(2)).sum::<f64>() / 720.0).sqrt();
+        // 48 Gaussians side by side that do not fan out leave 13 to 16 %; a share of a hundredth of the disc's own brightness.
+        assert!(rms < 0.08 && mean > 0.0, "{radius} µm: {rms}");
     }
 }
