@@ -310,7 +310,7 @@ impl Looks {
     /// for in focus they all meet in the middle.
     #[inline(always)]
     fn splat(&self, sample: &Sample, part: &Part, (i, azimuth_step): (usize, f64)) -> Splat {
-        let [xx, xy, yy] = self.covariance.map(|of_all| of_all[i]);
+        let [xx, xy, yy] = [self.covariance[0][i], self.covariance[1][i], self.covariance[2][i]];
         let along = Covariance::along(sample.out * (part.lengths.0 / 12f64.sqrt()));
         let side = sample.around * part.lengths.1;
         let (apart, side2) = (self.wide2[i] * (azimuth_step * part.lengths.1).powi(2), side.length_squared());

@@ -5,8 +5,6 @@
 //! pixels holds of it is read from a table of integrals: no sample is finer than a pixel, and what is spread evenly
 //! over some width, as the light of a cell is, needs no more than what is not.
 
-use std::ops::Range;
-
 use glam::DVec2;
 
 use crate::{
@@ -77,21 +75,22 @@ struct Stroke {
     /// The variance of the profile across, and the even width there in sixteenths of a pixel.
     softness: f32,
     sixteenths: f32,
-    /// The first sample, the one after the last, and the energies from the first on.
+    /// The first sample and its line, the one after the last, and the energies from the first on.
     first: f32,
+    line: f32,
     end: f32,
     powers: Powers,
 }
 
 /// Eight strokes, each of their numbers side by side. The compiler makes vectors of their setup: nothing in it branches.
-pub(crate) struct Strokes([[f32; LANES]; 16]);
+pub(crate) struct Strokes([[f32; LANES]; 17]);
 
 impl Strokes {
     /// Returns the strokes of splats on a picture of so many rows and columns.
     #[inline(always)]
     pub(crate) fn new(splats: &[Splat; LANES], size: (usize, usize)) -> Self {
         let size = (size.0 as f32, size.1 as f32);
-        let mut numbers = [[0.0; LANES]; 16];
+        let mut numbers = [[0.0; LANES]; 17];
         for i in 0..LANES {
             for (of_all, number) in numbers.iter_mut().zip(Stroke::new(&splats[i], size).into_numbers()) {
                 of_all[i] = number;
@@ -104,7 +103,11 @@ impl Strokes {
     #[inline(always)]
     pub(crate) fn add(&self, n: usize, profiles: &[Profile], rows: &mut Lines, columns: &mut Lines) {
         for i in 0..n {
-            let stroke = Stroke::from_numbers(self.0.map(|of_all| of_all[i]));
+            let mut numbers = [0.0; 17];
+            for (number, of_all) in numbers.iter_mut().zip(&self.0) {
+                *number = of_all[i];
+            }
+            let stroke = Stroke::from_numbers(numbers);
             let film = if stroke.along_x > 0.5 { &mut *columns } else { &mut *rows };
             stroke.add(profiles, film);
         }
@@ -157,12 +160,14 @@ impl Stroke {
             softness,
             sixteenths: sixteenths as f32,
             first: 0.0,
+            line: 0.0,
             end: 0.0,
             powers: Powers::default(),
         };
         let (middle, reach) = (stroke.corner.0 + stroke.at.0, (REACH * sigma) as f32);
         stroke.first = ((middle - reach) * stroke.divisions - 0.5).ceil().max(0.0);
         stroke.end = ((middle + reach) * stroke.divisions - 0.5).ceil().min(n_lines * stroke.divisions);
+        stroke.line = ((stroke.first + 0.5) / stroke.divisions).floor();
         stroke.powers = stroke.powers_from(stroke.first);
         stroke
     }
@@ -184,66 +189,54 @@ impl Stroke {
         }
     }
 
-    /// Adds it to the pixels of lines.
+    /// Adds it to the pixels of lines, by products from one sample to the next.
     #[inline(always)]
     fn add(mut self, profiles: &[Profile], film: &mut Lines) {
-        let (divisions, end) = (self.divisions as usize, self.end as usize);
-        let mut from = self.first as usize;
-        while from < end {
-            // Whole lines, but for the first.
-            let to = (from - from % divisions + MOST_SAMPLES / divisions * divisions).min(end);
-            self.add_samples(profiles, film, from..to);
-            from = to;
-            if from < end {
-                self.powers = self.powers_from(from as f32);
-            }
-        }
-    }
-
-    /// Adds samples by products from one to the next.
-    #[inline(always)]
-    fn add_samples(&self, profiles: &[Profile], film: &mut Lines, samples: Range<usize>) {
         let profile = &profiles[profile_number(self.softness)];
         let half = (self.sixteenths as i32) << (PLACE_BITS - ROW_BITS - 1);
-        let divisions = self.divisions as usize;
-        let along = self.along(samples.start as f32);
-        let mut place = ((self.at.1 + self.slope * along) * ONE) as i32 - HALF_A_PIXEL;
         let across = (self.slope / self.divisions * ONE) as i32;
         let margin = self.corner.1 as i32 + LANES as i32;
-        let mut powers = self.powers;
-        let (mut sample, mut line) = (samples.start, samples.start / divisions);
-        while sample < samples.end {
-            let sums = &mut film.sums[line * film.stride..][..film.stride];
-            line += 1;
-            let end = (line * divisions).min(samples.end);
-            while sample < end {
-                let (middle, value) = (place, powers.next());
+        let (divisions, n) = (self.divisions as u32, (self.end - self.first) as usize);
+        // Where the line begins, and how many samples are left of it.
+        let mut left = ((self.line + 1.0) * self.divisions - self.first) as u32;
+        let mut line = self.line as usize * film.stride;
+        for done in (0..n).step_by(MOST_SAMPLES) {
+            let from = self.first + done as f32;
+            if done > 0 {
+                self.powers = self.powers_from(from);
+            }
+            let mut place = ((self.at.1 + self.slope * self.along(from)) * ONE) as i32 - HALF_A_PIXEL;
+            for _ in done..n.min(done + MOST_SAMPLES) {
+                let (middle, value) = (place, self.powers.next());
                 place += across;
-                sample += 1;
                 let base = (middle >> PLACE_BITS) - BEFORE;
+                let sums = &mut film.sums[line..][..film.stride];
                 if let Some(pixels) = sums.get_mut((base + margin) as usize..).and_then(<[f32]>::first_chunk_mut) {
                     let sides = (middle + HALF_A_PIXEL - half, middle + HALF_A_PIXEL + half);
                     profile.add_between(sides, base, value, pixels);
                 }
+                left -= 1;
+                (line, left) = if left == 0 { (line + film.stride, divisions) } else { (line, left) };
             }
         }
     }
 
     #[inline(always)]
-    fn into_numbers(self) -> [f32; 16] {
-        let Self { along_x, corner, at, divisions, peak, fall, slope, softness, sixteenths, first, end, powers } = self;
+    fn into_numbers(self) -> [f32; 17] {
+        let Self { along_x, corner, at, divisions, peak, fall, slope, softness, sixteenths, first, line, end, powers } =
+            self;
         let Powers { value, ratio, change } = powers;
         [
-            along_x, corner.0, corner.1, at.0, at.1, divisions, peak, fall, slope, softness, sixteenths, first, end,
-            value, ratio, change,
+            along_x, corner.0, corner.1, at.0, at.1, divisions, peak, fall, slope, softness, sixteenths, first, line,
+            end, value, ratio, change,
         ]
     }
 
     #[inline(always)]
-    fn from_numbers(numbers: [f32; 16]) -> Self {
+    fn from_numbers(numbers: [f32; 17]) -> Self {
         let [
             along_x,
-            line,
+            line_of_corner,
             pixel,
             along,
             across,
@@ -254,13 +247,14 @@ impl Stroke {
             softness,
             sixteenths,
             first,
+            line,
             end,
             value,
             ratio,
             change,
         ] = numbers;
-        let (corner, at, powers) = ((line, pixel), (along, across), Powers { value, ratio, change });
-        Self { along_x, corner, at, divisions, peak, fall, slope, softness, sixteenths, first, end, powers }
+        let (corner, at, powers) = ((line_of_corner, pixel), (along, across), Powers { value, ratio, change });
+        Self { along_x, corner, at, divisions, peak, fall, slope, softness, sixteenths, first, line, end, powers }
     }
 }
 
