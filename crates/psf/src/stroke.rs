@@ -82,15 +82,18 @@ struct Stroke {
     powers: Powers,
 }
 
+/// How many numbers a stroke has.
+const NUMBERS: usize = 17;
+
 /// Eight strokes, each of their numbers side by side. The compiler makes vectors of their setup: nothing in it branches.
-pub(crate) struct Strokes([[f32; LANES]; 17]);
+pub(crate) struct Strokes([[f32; LANES]; NUMBERS]);
 
 impl Strokes {
     /// Returns the strokes of splats on a picture of so many rows and columns.
     #[inline(always)]
     pub(crate) fn new(splats: &[Splat; LANES], size: (usize, usize)) -> Self {
         let size = (size.0 as f32, size.1 as f32);
-        let mut numbers = [[0.0; LANES]; 17];
+        let mut numbers = [[0.0; LANES]; NUMBERS];
         for i in 0..LANES {
             for (of_all, number) in numbers.iter_mut().zip(Stroke::new(&splats[i], size).into_numbers()) {
                 of_all[i] = number;
@@ -103,7 +106,7 @@ impl Strokes {
     #[inline(always)]
     pub(crate) fn add(&self, n: usize, profiles: &[Profile], rows: &mut Lines, columns: &mut Lines) {
         for i in 0..n {
-            let mut numbers = [0.0; 17];
+            let mut numbers = [0.0; NUMBERS];
             for (number, of_all) in numbers.iter_mut().zip(&self.0) {
                 *number = of_all[i];
             }
@@ -222,7 +225,7 @@ impl Stroke {
     }
 
     #[inline(always)]
-    fn into_numbers(self) -> [f32; 17] {
+    fn into_numbers(self) -> [f32; NUMBERS] {
         let Self { along_x, corner, at, divisions, peak, fall, slope, softness, sixteenths, first, line, end, powers } =
             self;
         let Powers { value, ratio, change } = powers;
@@ -233,7 +236,7 @@ impl Stroke {
     }
 
     #[inline(always)]
-    fn from_numbers(numbers: [f32; 17]) -> Self {
+    fn from_numbers(numbers: [f32; NUMBERS]) -> Self {
         let [
             along_x,
             line_of_corner,
