@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::{
     PipelineError, PsfRequest, PsfSampling, PsfSet,
+    psf_request::Item,
     psf_source::PsfSource,
-    psf_table::Item,
     spot::{PaperRays, Spot},
 };
 

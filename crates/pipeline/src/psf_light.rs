@@ -11,8 +11,8 @@ use ndarray::Array2;
 use crate::{
     PsfRow, PsfSet,
     display::{LinearRgb, SpectrumToRgb},
+    psf_request::LARGEST,
     psf_row::PointName,
-    psf_table::LARGEST,
 };
 
 /// The light of all wavelengths of one point, each laid where it lands.

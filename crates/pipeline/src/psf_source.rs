@@ -4,7 +4,7 @@ use dioptric_optics::Lens;
 use dioptric_psf::{BankSettings, FieldBank, FieldBankSettings, Interpolation, Kernel, ModelUse, PsfBank, PsfQuery};
 use ndarray::Array2;
 
-use crate::{BankData, PipelineError, PsfRequest, psf_table::Item};
+use crate::{BankData, PipelineError, PsfRequest, psf_request::Item};
 
 /// Rings and azimuths of the rays through a pupil.
 const RINGS: usize = 24;
