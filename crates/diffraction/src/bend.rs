@@ -1,33 +1,15 @@
 //! Uncertainty bending of single rays: random, in the two forms that are in use.
 
-use std::f64::consts::PI;
-
 use dioptric_optics::RayBatch;
 use glam::{DVec2, DVec3};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::Hurb;
+use crate::{Edge, Hurb};
 
 /// Rays that share a stream of random numbers: results do not depend on how many threads share the work.
 const CHUNK: usize = 4096;
-
-/// A round edge that bends rays, centred on the axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
-    /// Radius of the opening, mm.
-    pub radius_mm: f64,
-    /// 2πn/λ in the medium where the rays are bent, 1/mm.
-    pub wave_number_per_mm: f64,
-}
-
-impl Edge {
-    /// Returns an edge in a medium of this index, for light of this vacuum wavelength.
-    pub fn new(radius_mm: f64, wavelength_nm: f64, index: f64) -> Self {
-        Self { radius_mm, wave_number_per_mm: 2.0 * PI * index / (wavelength_nm * 1e-6) }
-    }
-}
 
 /// How a deviation turns a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

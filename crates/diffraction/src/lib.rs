@@ -22,10 +22,10 @@ mod wavefront;
 mod width;
 pub mod zernike;
 
-pub use bend::{BendForm, Edge, bend};
+pub use bend::{BendForm, bend};
 pub use covariance::Covariance;
 pub use error::DiffractionError;
-pub use hurb::{Hurb, Spread};
+pub use hurb::{Edge, Hurb, Spread};
 pub use huygens::HuygensSources;
 pub use opd::{best_wavefront_film_mm, opd_waves_at};
 pub use stop_ray::{StopRay, trace_stop_rays};
