@@ -148,10 +148,7 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
 pub(crate) fn with_gamma(choice: DiffractionChoice, gamma: Option<f64>) -> anyhow::Result<DiffractionChoice> {
     match (choice, gamma) {
         (_, None) => Ok(choice),
-        (DiffractionChoice::Hurb { .. }, Some(gamma)) if gamma.is_finite() && gamma > 0.0 => {
-            Ok(DiffractionChoice::Hurb { gamma })
-        }
-        (DiffractionChoice::Hurb { .. }, Some(gamma)) => bail!("--gamma is {gamma}, expected a finite number above 0"),
+        (DiffractionChoice::Hurb { .. }, Some(gamma)) => Ok(DiffractionChoice::Hurb { gamma }),
         (_, Some(_)) => bail!("--gamma is the strength of bent rays, expected with --diffraction hurb"),
     }
 }

@@ -137,6 +137,11 @@ impl PsfRequest {
                 return Err(self.wrong("wavelengths_nm", &wavelength.to_string(), "numbers above 0"));
             }
         }
+        if let DiffractionChoice::Hurb { gamma } = self.diffraction
+            && !(gamma.is_finite() && gamma > 0.0)
+        {
+            return Err(self.wrong("gamma", &gamma.to_string(), "a finite number above 0"));
+        }
         if !(self.pixel_um.is_finite() && self.pixel_um > 0.0) {
             return Err(self.wrong("pixel_um", &self.pixel_um.to_string(), "a number above 0"));
         }
