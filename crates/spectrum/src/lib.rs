@@ -18,6 +18,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod cancel;
 mod color;
 mod display;
 mod error;
@@ -26,6 +27,7 @@ mod illuminant;
 mod image;
 mod spectrum;
 
+pub use cancel::{Cancel, Cancelled};
 pub use color::{Lab, Observer, Xyz, adapt_bradford, delta_e_2000, srgb_decode, srgb_encode};
 pub use display::Display;
 pub use error::SpectrumError;
