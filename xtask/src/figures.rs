@@ -3,11 +3,11 @@
 use std::{fs, path::Path};
 
 use anyhow::Context;
-use dioptric_pipeline::figures;
+use dioptric_report::draw_all;
 
 /// Draws every figure and writes it into a folder.
 pub(crate) fn run(folder: &Path) -> anyhow::Result<()> {
-    let drawings = figures::draw_all(&|name| println!("{name}"))?;
+    let drawings = draw_all(&|name| println!("{name}"))?;
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     for drawing in drawings {
         let path = folder.join(&drawing.name);

@@ -16,8 +16,10 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("forward", &["spectrum", "optics", "psf", "scene"]),
     ("sensor", &["spectrum"]),
     ("pipeline", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor"]),
-    ("cli", &["pipeline"]),
-    ("xtask", &["pipeline"]),
+    ("analysis", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline"]),
+    ("report", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline", "analysis"]),
+    ("cli", &["pipeline", "analysis", "report"]),
+    ("xtask", &["report"]),
 ];
 
 /// Compares the table with `cargo metadata` and names the first thing that differs.

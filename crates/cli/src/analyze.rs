@@ -3,10 +3,9 @@
 use std::{fmt::Write, fs};
 
 use anyhow::Context;
-use dioptric_pipeline::{
-    AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensUse, Staged, StopChoice,
-    parse_numbers, parse_pairs, svg_to_png,
-};
+use dioptric_analysis::{AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensUse};
+use dioptric_pipeline::{Staged, StopChoice, parse_numbers, parse_pairs};
+use dioptric_report::{AnalysisPlots, svg_to_png};
 
 use crate::{
     args::Common,
@@ -34,18 +33,19 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
     if let (Some(staged), Some(path)) = (staged, &arguments.out) {
         let cannot = || format!("cannot write {}", path.display());
         let json = serde_json::to_string_pretty(&analysis)? + "\n";
+        let plots = AnalysisPlots(&analysis);
         fs::write(staged.path().join("analysis.json"), json).with_context(cannot)?;
         for (name, svg) in [
-            ("analysis", analysis.page_svg()),
-            ("spots", analysis.spots_svg()),
-            ("opd", analysis.opd_svg()),
-            ("distortion", analysis.grid_svg()),
+            ("analysis", plots.page_svg()),
+            ("spots", plots.spots_svg()),
+            ("opd", plots.opd_svg()),
+            ("distortion", plots.grid_svg()),
         ] {
             let png = svg_to_png(&svg, PNG_SCALE)?;
             fs::write(staged.path().join(format!("{name}.svg")), svg).with_context(cannot)?;
             fs::write(staged.path().join(format!("{name}.png")), png).with_context(cannot)?;
         }
-        fs::write(staged.path().join("analysis.html"), analysis.html(&tables(&analysis)?)).with_context(cannot)?;
+        fs::write(staged.path().join("analysis.html"), plots.html(&tables(&analysis)?)).with_context(cannot)?;
         staged.commit()?;
         remark(
             common.quiet,

@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use dioptric_pipeline::{GlassRow, glass_data, glass_rows, parse_numbers};
+use dioptric_analysis::{GlassRow, glass_data, glass_rows};
+use dioptric_pipeline::parse_numbers;
 
 use crate::{
     args::Common,

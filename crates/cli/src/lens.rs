@@ -3,10 +3,11 @@
 use std::{fmt::Write, fs, path::Path};
 
 use anyhow::Context;
-use dioptric_pipeline::{
-    LensData, LensDrawing, LensQuestion, LensReading, LensUse, REFERENCE_WAVELENGTH_NM, Staged, SurfaceRow,
-    built_in_lenses, convert_lens, drawing_file, parse_numbers, placement_lines, surface_rows,
+use dioptric_analysis::{
+    LensData, LensQuestion, LensUse, SurfaceRow, built_in_lenses, convert_lens, placement_lines, surface_rows,
 };
+use dioptric_pipeline::{LensReading, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
+use dioptric_report::{LensDrawing, drawing_file};
 
 use crate::{
     args::Common,
@@ -31,7 +32,7 @@ pub(crate) fn open(
     stop_mm: Option<f64>,
     common: &Common,
 ) -> anyhow::Result<LensUse> {
-    let used = reading.open_stopped(text, stop_mm)?;
+    let used = LensUse::open(text, reading, stop_mm)?;
     tell(&used.notes, common);
     Ok(used)
 }

@@ -2,14 +2,13 @@
 
 use std::{fmt::Write, path::Path};
 
-use dioptric_pipeline::{
-    SensorChoice, Staged,
-    measure::{
-        BenchRequest, ChartMeasurement, ChartRequest, CodeCurve, CompareRequest, Comparison, EdgeMeasurement,
-        EdgeRequest, Measurement, NoiseData, PixelRegion, PointRequest, PointSet, measure_bench, measure_frames,
-    },
-    parse_illuminant,
+use dioptric_analysis::measure::{
+    BenchRequest, ChartMeasurement, ChartRequest, CodeCurve, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest,
+    Measurement, NoiseData, PixelRegion, PointRequest, PointSet, measure_bench, measure_frames,
 };
+use dioptric_pipeline::{SensorChoice, Staged, parse_illuminant};
+
+use dioptric_report::write_measurement;
 
 use crate::{
     args::Common,
@@ -132,7 +131,7 @@ impl<'a> Finish<'a> {
         table: impl Fn(&M) -> Result<String, std::fmt::Error>,
     ) -> anyhow::Result<()> {
         if let Some(staged) = self.staged {
-            measured.write(self.name, staged.path())?;
+            write_measurement(measured, self.name, staged.path())?;
             staged.commit()?;
         }
         match (self.common.json, self.common.quiet) {

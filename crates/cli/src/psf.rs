@@ -2,10 +2,9 @@
 
 use std::fmt::Write;
 
-use dioptric_pipeline::{
-    BankChoice, FocusChoice, PsfRequest, PsfRow, PsfSampling, PsfSet, Staged, StopChoice, drawing_file, parse_numbers,
-    psf_csv,
-};
+use dioptric_analysis::{PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
+use dioptric_pipeline::{BankChoice, FocusChoice, Staged, StopChoice, parse_numbers};
+use dioptric_report::{chart_svg, drawing_file, write_psfs};
 
 use crate::{
     args::{BankKind, Common, PsfArgs, PsfMode},
@@ -69,13 +68,13 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         remark(common.quiet, &format!("wrote {}", path.display()));
     }
     if let (Some(staged), Some(path)) = (staged, &arguments.output) {
-        set.write(staged.path())?;
+        write_psfs(&set, staged.path())?;
         staged.commit()?;
         remark(common.quiet, &format!("wrote {}", path.display()));
     }
     if let (Some(staged), Some(folder)) = (plots, &arguments.plots) {
-        for (name, chart) in set.plots(&request.through_focus(&lens, &set)?) {
-            let svg = chart.to_svg(640.0, 420.0);
+        for (name, chart) in set.charts(&request.through_focus(&lens, &set)?) {
+            let svg = chart_svg(&chart, 640.0, 420.0);
             for extension in ["svg", "png"] {
                 let path = staged.path().join(format!("{name}.{extension}"));
                 std::fs::write(&path, drawing_file(&svg, &path)?)?;

@@ -7,11 +7,14 @@ use std::{
 };
 
 use anyhow::{Context, bail};
+use dioptric_analysis::RunReport;
 use dioptric_pipeline::{
     BankChoice, BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, FrameFile, FramesChoice, LensChoice,
-    LensReading, Progress, Report, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, WhiteChoice,
+    LensReading, Progress, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, WhiteChoice,
     parse_illuminant, parse_numbers, with_exposure_s,
 };
+
+use dioptric_report::write_run;
 
 use crate::{
     args::{BankKind, BlurKind, Common, DiffractionKind, FrameArgs, RunArgs, WhiteKind},
@@ -27,7 +30,7 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     let (shot, capture) = camera.capture(Some(staged.path()), &clock)?;
     let timings = clock.timings();
     clock.at(Stage::Report, 0.0);
-    let report = capture.write(&shot, staged.path(), &timings)?;
+    let report = write_run(&shot, &capture, staged.path(), &timings)?;
     staged.commit()?;
     drop(clock);
     tell(&shot.lens_notes, common);
@@ -213,7 +216,7 @@ fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
         .with_context(|| format!("--pixels is '{text}', expected WxH, as 640x480"))
 }
 
-fn summary(report: &Report, out: &Path) -> String {
+fn summary(report: &RunReport, out: &Path) -> String {
     let total_s: f64 = report.timings_s.iter().map(|(_, seconds)| seconds).sum();
     format!(
         "{}: {} × {} pixels, {} bands, {:.2} ms, {:.1} s\n{}{}\n",

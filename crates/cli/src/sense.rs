@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
+use dioptric_analysis::SensorStatistics;
 use dioptric_pipeline::{
-    Camera, FrameFile, Outputs, SenseRequest, SensorChoice, SensorStatistics, Staged, parse_illuminant,
-    sense_irradiance, with_exposure_s,
+    Camera, FrameFile, Outputs, SenseRequest, SensorChoice, Staged, parse_illuminant, with_exposure_s,
 };
+use dioptric_report::write_sensed;
 
 use crate::{
     args::{Common, SenseArgs},
@@ -32,7 +33,7 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
         },
     };
     let staged = guarded(Staged::folder(&arguments.out)?);
-    let statistics = sense_irradiance(&arguments.irradiance, &request, staged.path())?;
+    let statistics = write_sensed(&request.sense(&arguments.irradiance)?, &request.outputs, staged.path())?;
     staged.commit()?;
     match (common.json, common.quiet) {
         (true, _) => print_json(&statistics),

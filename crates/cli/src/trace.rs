@@ -3,7 +3,8 @@
 use std::{fs::File, io, path::Path};
 
 use anyhow::Context;
-use dioptric_pipeline::{RayTable, Staged, TraceError, TraceSettings};
+use dioptric_analysis::{RayTable, TraceError, TraceSettings};
+use dioptric_pipeline::Staged;
 
 use crate::{
     args::{Common, TraceArgs},

@@ -1,20 +1,18 @@
-//! Spectra as colours on a screen, and pictures as PNG.
+//! Spectra as colors on a screen.
 
 use dioptric_spectrum::{Observer, SpectralImage, WavelengthGrid, Xyz, srgb_encode};
-use image::{ImageEncoder, RgbImage, codecs::png::PngEncoder};
+use image::RgbImage;
 use ndarray::Array2;
 
-use crate::PipelineError;
-
 /// Turns spectra on one grid into linear sRGB.
-pub(crate) struct SpectrumToRgb {
+pub struct SpectrumToRgb {
     /// Weights of red, green and blue, a list of one a band each.
     weights: [Vec<f64>; 3],
 }
 
 impl SpectrumToRgb {
     /// For spectra seen as they are; Y of 1 lux or cd/m² becomes linear 1.
-    pub(crate) fn new(grid: &WavelengthGrid) -> Self {
+    pub fn new(grid: &WavelengthGrid) -> Self {
         let xyz = Observer::Cie1931.weights(grid);
         let mut weights = [0, 1, 2].map(|_| vec![0.0; grid.len()]);
         for band in 0..grid.len() {
@@ -27,7 +25,7 @@ impl SpectrumToRgb {
     }
 
     /// For spectra of which this one is to look white, linear (1, 1, 1).
-    pub(crate) fn with_white(grid: &WavelengthGrid, white: &[f64]) -> Self {
+    pub fn with_white(grid: &WavelengthGrid, white: &[f64]) -> Self {
         let mut it = Self::new(grid);
         for list in &mut it.weights {
             let sum: f64 = list.iter().zip(white).map(|(w, v)| w * v).sum();
@@ -37,31 +35,33 @@ impl SpectrumToRgb {
     }
 
     /// The weights of a band on red, green and blue.
-    pub(crate) fn of_band(&self, band: usize) -> [f64; 3] {
+    pub fn of_band(&self, band: usize) -> [f64; 3] {
         [self.weights[0][band], self.weights[1][band], self.weights[2][band]]
     }
 }
 
 /// A picture in linear sRGB, summed a band at a time.
 #[derive(Clone, Debug)]
-pub(crate) struct LinearRgb {
-    pub(crate) planes: [Array2<f32>; 3],
+pub struct LinearRgb {
+    /// Red, green and blue.
+    pub planes: [Array2<f32>; 3],
 }
 
 impl LinearRgb {
-    pub(crate) fn black(rows: usize, columns: usize) -> Self {
+    /// A picture without light.
+    pub fn black(rows: usize, columns: usize) -> Self {
         Self { planes: [(); 3].map(|()| Array2::zeros((rows, columns))) }
     }
 
     /// Adds a band seen in this colour.
-    pub(crate) fn add(&mut self, band: &Array2<f32>, rgb: [f64; 3]) {
+    pub fn add(&mut self, band: &Array2<f32>, rgb: [f64; 3]) {
         for (plane, weight) in self.planes.iter_mut().zip(rgb) {
             plane.scaled_add(weight as f32, band);
         }
     }
 
     /// Returns the picture of all bands of an image.
-    pub(crate) fn of_image(image: &SpectralImage) -> Self {
+    pub fn of_image(image: &SpectralImage) -> Self {
         let to_rgb = SpectrumToRgb::new(image.grid());
         let mut rgb = Self::black(image.rows(), image.columns());
         for (band, plane) in image.planes().iter().enumerate() {
@@ -71,7 +71,7 @@ impl LinearRgb {
     }
 
     /// Returns the picture with colours that a screen cannot show moved towards the grey of their luminance until it can.
-    pub(crate) fn within_gamut(mut self) -> Self {
+    pub fn within_gamut(mut self) -> Self {
         let [red, green, blue] = &mut self.planes;
         ndarray::Zip::from(red).and(green).and(blue).for_each(|r, g, b| {
             let least = r.min(*g).min(*b);
@@ -87,14 +87,14 @@ impl LinearRgb {
     }
 
     /// Returns the level below which this share of all samples lie.
-    pub(crate) fn level_at(&self, share: f64) -> f64 {
+    pub fn level_at(&self, share: f64) -> f64 {
         let mut values: Vec<f32> = self.planes.iter().flatten().copied().collect();
         let index = ((values.len() - 1) as f64 * share) as usize;
         *values.select_nth_unstable_by(index, f32::total_cmp).1 as f64
     }
 
     /// Returns the 8-bit picture in which linear `white` is full.
-    pub(crate) fn to_srgb(&self, white: f64) -> RgbImage {
+    pub fn to_srgb(&self, white: f64) -> RgbImage {
         let (rows, columns) = self.planes[0].dim();
         RgbImage::from_fn(columns as u32, rows as u32, |x, y| {
             let at = (y as usize, x as usize);
@@ -104,12 +104,12 @@ impl LinearRgb {
 }
 
 /// Returns the 8-bit sRGB code of a linear value.
-pub(crate) fn code(linear: f64) -> u8 {
+pub fn code(linear: f64) -> u8 {
     (255.0 * srgb_encode(linear)).round() as u8
 }
 
 /// Returns the colour of a single wavelength as `#rrggbb`, bright enough for a line on white.
-pub(crate) fn wavelength_color(wavelength_nm: f64) -> String {
+pub fn wavelength_color(wavelength_nm: f64) -> String {
     // Beyond the visible the colour is that of its end.
     let grid = WavelengthGrid::new(vec![wavelength_nm.clamp(405.0, 680.0)]).expect("a wavelength in the visible");
     let rgb = Observer::Cie1931.xyz(&grid, &[1.0]).to_linear_srgb().map(|v| v.max(0.0));
@@ -119,22 +119,6 @@ pub(crate) fn wavelength_color(wavelength_nm: f64) -> String {
     let level = (0.35 / luminance).min(1.0);
     let [r, g, b] = rgb.map(|v| code(v / most * level));
     format!("#{r:02x}{g:02x}{b:02x}")
-}
-
-/// Returns a picture as the bytes of a PNG file.
-pub(crate) fn png_bytes(picture: &RgbImage) -> Result<Vec<u8>, PipelineError> {
-    let mut bytes = Vec::new();
-    PngEncoder::new(&mut bytes)
-        .write_image(picture, picture.width(), picture.height(), image::ExtendedColorType::Rgb8)
-        .map_err(|e| PipelineError::Png { reason: e.to_string() })?;
-    Ok(bytes)
-}
-
-/// Returns the picture enlarged by a whole number, samples staying sharp.
-pub(crate) fn enlarged(picture: &RgbImage, factor: u32) -> RgbImage {
-    RgbImage::from_fn(picture.width() * factor, picture.height() * factor, |x, y| {
-        *picture.get_pixel(x / factor, y / factor)
-    })
 }
 
 #[cfg(test)]

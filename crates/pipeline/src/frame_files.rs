@@ -87,18 +87,26 @@ impl FrameFile {
 
 /// The frames of one exposure.
 #[derive(Clone, Copy)]
-pub(crate) struct Frames<'a> {
-    pub(crate) sensor: &'a Sensor,
-    pub(crate) exposure: &'a Exposure,
-    pub(crate) rate: &'a ElectronRate,
-    pub(crate) exposed: &'a Exposed,
-    pub(crate) processing: &'a Processing,
+pub struct Frames<'a> {
+    /// The sensor.
+    pub sensor: &'a Sensor,
+    /// The exposure, metered or given.
+    pub exposure: &'a Exposure,
+    /// The mean rate of photo-electrons.
+    pub rate: &'a ElectronRate,
+    /// The frames.
+    pub exposed: &'a Exposed,
+    /// From the raw frame to the picture.
+    pub processing: &'a Processing,
     /// The light on the scene; D65 where it is not known.
-    pub(crate) light: Illuminant,
+    pub light: Illuminant,
 }
 
 /// Writes the frames and the picture; returns the names of the files and the bytes of the 8-bit PNG picture.
-pub(crate) fn write_frames(
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write_frames(
     frames: &Frames<'_>,
     picture: &Picture,
     outputs: &Outputs,

@@ -55,6 +55,14 @@ pub fn parse_pairs(what: &'static str, text: &str) -> Result<Vec<[f64; 2]>, Pipe
     Ok(pairs)
 }
 
+/// Returns a number without the digits that rounding left behind: to a thousandth.
+pub fn number(value: f64) -> String {
+    if value.is_infinite() {
+        return if value > 0.0 { "∞" } else { "−∞" }.to_owned();
+    }
+    format!("{}", (value * 1e3).round() / 1e3 + 0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,13 +3,10 @@
 use std::path::Path;
 
 use dioptric_scene::read_spectral_exr;
-use dioptric_sensor::{Exposure, ExposureControl, Illumination, Noise};
+use dioptric_sensor::{Developed, ElectronRate, Exposure, ExposureControl, Illumination, Noise, Processing, Sensor};
 use dioptric_spectrum::{Illuminant, Quantity};
 
-use crate::{
-    FramesChoice, Outputs, PipelineError, ProcessingChoice, SensorChoice, SensorStatistics,
-    frame_files::{Frames, write_frames},
-};
+use crate::{Exposed, Frames, FramesChoice, Outputs, PipelineError, ProcessingChoice, SensorChoice};
 
 /// How a sensor is exposed to an irradiance image.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,61 +30,94 @@ pub struct SenseRequest {
     pub outputs: Outputs,
 }
 
-/// Exposes a sensor to a spectral irradiance and writes volts, raw frame, picture and `report.json` into a folder.
-///
-/// An image that states the distance between its samples is averaged over the sensor's pixels, as many as it covers; one
-/// that does not has one sample a pixel.
-///
-/// # Errors
-/// When the image cannot be read or is no irradiance, the sensor is unknown, or a file cannot be written.
-pub fn sense_irradiance(
-    image: &Path,
-    request: &SenseRequest,
-    folder: &Path,
-) -> Result<SensorStatistics, PipelineError> {
-    let sensor = request.sensor.open()?;
-    let irradiance = read_spectral_exr(image)?.image;
-    let in_file = |reason: String| PipelineError::Read { path: image.to_owned(), reason };
-    if irradiance.quantity() != Quantity::Irradiance {
-        let unit = irradiance.quantity().unit();
-        return Err(in_file(format!("its unit is {unit}, expected an irradiance, {}", Quantity::Irradiance.unit())));
-    }
-    irradiance.check_samples().map_err(|e| in_file(e.to_string()))?;
-    let light = match irradiance.pitch_um() {
-        // The image lies on these very pixels.
-        Some(pitch_um) if (pitch_um / sensor.pixel_pitch_um - 1.0).abs() < 1e-6 => Illumination::on_pixels(&irradiance),
-        Some(pitch_um) => Illumination::with_pitch_um(&irradiance, pitch_um),
-        None => Illumination::on_pixels(&irradiance),
-    };
-    let sensor = match light.pitch_um {
-        Some(pitch_um) => {
-            let covered = |n_samples: usize| (n_samples as f64 * pitch_um / sensor.pixel_pitch_um).round() as usize;
-            let (rows, columns) = (covered(irradiance.rows()), covered(irradiance.columns()));
-            sensor.with_size(rows.clamp(1, sensor.rows), columns.clamp(1, sensor.columns))
+/// What a sensor made of an irradiance image.
+#[derive(Clone, Debug)]
+pub struct Sensed {
+    /// The sensor, of the size that the image covers.
+    pub sensor: Sensor,
+    /// The exposure, metered or given.
+    pub exposure: Exposure,
+    /// The mean rate of photo-electrons.
+    pub rate: ElectronRate,
+    /// The frames.
+    pub exposed: Exposed,
+    /// From the raw frame to the picture.
+    pub processing: Processing,
+    /// The picture.
+    pub developed: Developed,
+    /// The light on the scene; D65 where it is not known.
+    pub light: Illuminant,
+}
+
+impl Sensed {
+    /// What is written of the frames.
+    pub fn frames(&self) -> Frames<'_> {
+        Frames {
+            sensor: &self.sensor,
+            exposure: &self.exposure,
+            rate: &self.rate,
+            exposed: &self.exposed,
+            processing: &self.processing,
+            light: self.light,
         }
-        None => sensor,
-    };
-    let light = Illumination { exit_pupil_distance_mm: request.exit_pupil_mm, ..light };
-    let rate = sensor.electron_rate(&light)?;
-    let (rows, columns) = rate.planes_e_per_s[0].dim();
-    let sensor = sensor.with_size(rows, columns);
-    let noise = Noise::all(request.seed);
-    let exposure = sensor.expose(&rate, &request.exposure)?;
-    let exposed = request.frames.expose(&sensor, &rate, &exposure, &noise)?;
-    let processing = request.processing.under(request.illuminant);
-    let developed = sensor.develop(exposed.developed_from(), &processing)?;
-    let frames = Frames {
-        sensor: &sensor,
-        exposure: &exposure,
-        rate: &rate,
-        exposed: &exposed,
-        processing: &processing,
-        light: request.illuminant.unwrap_or(Illuminant::D65),
-    };
-    let statistics = SensorStatistics::new(&frames)?;
-    write_frames(&frames, &developed.picture, &request.outputs, folder)?;
-    crate::report::write_json(&folder.join("report.json"), &statistics)?;
-    Ok(statistics)
+    }
+}
+
+impl SenseRequest {
+    /// Exposes the sensor to a spectral irradiance and develops the picture.
+    ///
+    /// An image that states the distance between its samples is averaged over the sensor's pixels, as many as it covers; one
+    /// that does not has one sample a pixel.
+    ///
+    /// # Errors
+    /// When the image cannot be read or is no irradiance, the sensor is unknown, or an exposure cannot be metered.
+    pub fn sense(&self, image: &Path) -> Result<Sensed, PipelineError> {
+        let sensor = self.sensor.open()?;
+        let irradiance = read_spectral_exr(image)?.image;
+        let in_file = |reason: String| PipelineError::Read { path: image.to_owned(), reason };
+        if irradiance.quantity() != Quantity::Irradiance {
+            let unit = irradiance.quantity().unit();
+            return Err(in_file(format!(
+                "its unit is {unit}, expected an irradiance, {}",
+                Quantity::Irradiance.unit()
+            )));
+        }
+        irradiance.check_samples().map_err(|e| in_file(e.to_string()))?;
+        let light = match irradiance.pitch_um() {
+            // The image lies on these very pixels.
+            Some(pitch_um) if (pitch_um / sensor.pixel_pitch_um - 1.0).abs() < 1e-6 => {
+                Illumination::on_pixels(&irradiance)
+            }
+            Some(pitch_um) => Illumination::with_pitch_um(&irradiance, pitch_um),
+            None => Illumination::on_pixels(&irradiance),
+        };
+        let sensor = match light.pitch_um {
+            Some(pitch_um) => {
+                let covered = |n_samples: usize| (n_samples as f64 * pitch_um / sensor.pixel_pitch_um).round() as usize;
+                let (rows, columns) = (covered(irradiance.rows()), covered(irradiance.columns()));
+                sensor.with_size(rows.clamp(1, sensor.rows), columns.clamp(1, sensor.columns))
+            }
+            None => sensor,
+        };
+        let light = Illumination { exit_pupil_distance_mm: self.exit_pupil_mm, ..light };
+        let rate = sensor.electron_rate(&light)?;
+        let (rows, columns) = rate.planes_e_per_s[0].dim();
+        let sensor = sensor.with_size(rows, columns);
+        let noise = Noise::all(self.seed);
+        let exposure = sensor.expose(&rate, &self.exposure)?;
+        let exposed = self.frames.expose(&sensor, &rate, &exposure, &noise)?;
+        let processing = self.processing.under(self.illuminant);
+        let developed = sensor.develop(exposed.developed_from(), &processing)?;
+        Ok(Sensed {
+            sensor,
+            exposure,
+            rate,
+            exposed,
+            processing,
+            developed,
+            light: self.illuminant.unwrap_or(Illuminant::D65),
+        })
+    }
 }
 
 /// Returns the exposure with its time set by hand; gain and temperature stay.

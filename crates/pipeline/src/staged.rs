@@ -5,6 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use serde::Serialize;
+
 use crate::PipelineError;
 
 /// A file or folder of results that is written beside its place and moved there at the end.
@@ -122,6 +124,24 @@ fn move_entries(from: &Path, to: &Path) -> io::Result<()> {
         fs::rename(entry.path(), to.join(entry.file_name()))?;
     }
     fs::remove_dir(from)
+}
+
+/// Writes a value as JSON.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_json(path: &Path, value: &(impl Serialize + ?Sized)) -> Result<(), PipelineError> {
+    let json = serde_json::to_vec_pretty(value)
+        .map_err(|e| PipelineError::Write { path: path.to_owned(), reason: e.to_string() })?;
+    write_file(path, &json)
+}
+
+/// Writes bytes to a file.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), PipelineError> {
+    fs::write(path, bytes).map_err(|e| PipelineError::Write { path: path.to_owned(), reason: e.to_string() })
 }
 
 #[cfg(test)]

@@ -1,0 +1,358 @@
+//! The numbers of an analysis.
+
+use dioptric_diffraction::{PupilGrid, Wavefront, WavefrontReference, best_wavefront_film_mm, opd_waves_at};
+use dioptric_optics::{
+    Lens, MonoLens, ObjectPoint, PupilBoundary, Rims,
+    analysis::{
+        AstigmaticFoci, Autofocus, AxisFoci, Distortion, NumericalApertures, Projection, PupilCoordinates,
+        PupilSampling, RayFan, SpotDiagram, StraightMap, field_limit_deg, hexapolar, projected_solid_angle_onto,
+        pupil_line,
+    },
+    glam::{DVec2, DVec3},
+};
+use rayon::prelude::*;
+
+use super::{
+    request::{AnalysisFilm, AnalysisRequest, Field},
+    rows::{
+        AxialColorRow, FanRow, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,
+    },
+};
+use crate::PlaneData;
+use dioptric_pipeline::{PipelineError, nearest_to_reference_nm};
+
+/// Steps of the curves over field.
+const CURVE_STEPS: usize = 40;
+/// Places along a fan.
+const FAN_PLACES: usize = 41;
+/// Azimuths of a pupil's edge for the illumination, and those that are told.
+const EDGE_AZIMUTHS: usize = 128;
+const TOLD_AZIMUTHS: usize = 36;
+/// The share of the stop's radius that the outermost rays keep to, so that rounding does not end them at its rim.
+const WITHIN_RIM: f64 = 1.0 - 1e-9;
+/// Cells of a map across the stop: an odd number, so that there is one in the middle.
+const MAP_CELLS: usize = 31;
+/// Lines of a grid of fields in each direction, and the widest angle that it goes to.
+/// Lines of the grid of a distortion plot, each way.
+pub const GRID_LINES: usize = 11;
+const WIDEST_GRID_DEG: f64 = 60.0;
+/// Zernike coefficients that are told: up to the sixth degree, less its last.
+const ZERNIKE_TERMS: usize = 22;
+
+impl AnalysisRequest {
+    /// The reference wavelength, nm: of fields, pupils, f-numbers and focus.
+    pub fn reference_nm(&self) -> f64 {
+        let stated = self.main_wavelength_nm.filter(|nm| self.wavelengths_nm.contains(nm));
+        stated.unwrap_or_else(|| nearest_to_reference_nm(&self.wavelengths_nm))
+    }
+
+    /// Analyses a lens.
+    ///
+    /// # Errors
+    /// When a number makes no sense, a glass is not known at a wavelength, or the lens has no focus and no film is given.
+    pub fn compute(&self, lens: &Lens) -> Result<LensAnalysis, PipelineError> {
+        self.check()?;
+        let lenses: Vec<MonoLens> = self.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
+        let reference_nm = self.reference_nm();
+        let reference = self.wavelengths_nm.iter().position(|&nm| nm == reference_nm).unwrap_or(0);
+        let way_mm = self.distance_mm + lenses[reference].projection_center_z_mm();
+        if way_mm == 0.0 {
+            return Err(PipelineError::Value {
+                origin: "the analysis".to_owned(),
+                key: "distance_mm",
+                found: self.distance_mm.to_string(),
+                expected: "an object that does not lie in the entrance pupil".to_owned(),
+            });
+        }
+        let (fields, notes) = self.fields_of(&lenses[reference], way_mm);
+        let bench = Bench {
+            lenses,
+            reference,
+            dioptres: 1e3 / way_mm,
+            film_mm: 0.0,
+            sampling: PupilSampling {
+                coordinates: PupilCoordinates::Stop { radius_mm: WITHIN_RIM * lens.stop_semi_aperture_mm() },
+                places: hexapolar(self.n_rings),
+                rims: Rims::Clip,
+            },
+        };
+        bench.analyse(self, lens, (fields, notes))
+    }
+}
+
+/// A lens at all wavelengths, with its object and film.
+struct Bench {
+    lenses: Vec<MonoLens>,
+    reference: usize,
+    dioptres: f64,
+    film_mm: f64,
+    sampling: PupilSampling,
+}
+
+impl Bench {
+    fn reference(&self) -> &MonoLens {
+        &self.lenses[self.reference]
+    }
+
+    /// The point of a field, the same for all wavelengths.
+    fn point(&self, field_tan: DVec2) -> ObjectPoint {
+        ObjectPoint::from_field(self.reference(), field_tan, self.dioptres)
+    }
+
+    /// Returns the film with the least spots of these points, mm, and their size, mm rms.
+    fn best(&self, points: &[ObjectPoint], lenses: &[MonoLens], from_mm: f64) -> Option<(f64, f64)> {
+        Autofocus { lenses, points, sampling: &self.sampling }.best_film_mm(from_mm)
+    }
+
+    /// Returns where each wavelength of a point on the axis focuses; films are sought about `from_mm`.
+    fn axial_color(&self, distance_mm: f64, from_mm: f64) -> Vec<AxialColorRow> {
+        let axis = [self.point(DVec2::ZERO)];
+        let focus_mm = |lens: &MonoLens| self.best(&axis, std::slice::from_ref(lens), from_mm).map(|found| found.0);
+        let reference_focus_mm = focus_mm(self.reference());
+        let image_z_mm = |lens: &MonoLens| lens.conjugate(distance_mm).image_z_mm;
+        let row = |lens: &MonoLens| AxialColorRow {
+            wavelength_nm: lens.wavelength_nm(),
+            paraxial_shift_mm: image_z_mm(lens) - image_z_mm(self.reference()),
+            rms_shift_mm: focus_mm(lens).zip(reference_focus_mm).map(|(own, reference)| own - reference),
+        };
+        self.lenses.iter().map(row).collect()
+    }
+
+    fn analyse(
+        mut self,
+        request: &AnalysisRequest,
+        lens: &Lens,
+        (fields, notes): (Vec<Field>, Vec<String>),
+    ) -> Result<LensAnalysis, PipelineError> {
+        let paraxial = self.reference().film_mm_for(request.distance_mm);
+        let axis = self.point(DVec2::ZERO);
+        let on_axis = paraxial.as_ref().ok().and_then(|&film_mm| self.best(&[axis], &self.lenses, film_mm));
+        self.film_mm = match (request.film, on_axis) {
+            (AnalysisFilm::FilmMm(film_mm), _) => film_mm,
+            (AnalysisFilm::FocusMm(distance_mm), _) => self.reference().film_mm_for(distance_mm)?,
+            (AnalysisFilm::BestFocus, Some((film_mm, _))) => film_mm,
+            (AnalysisFilm::BestFocus, None) => paraxial.clone()?,
+        };
+        let from_mm = paraxial.as_ref().map_or(self.film_mm, |film_mm| *film_mm);
+        let points: Vec<ObjectPoint> = fields.iter().map(|field| self.point(field.tan)).collect();
+        let over_fields = self.best(&points, &self.lenses, from_mm);
+        let wavefront = on_axis.and_then(|(film_mm, _)| {
+            best_wavefront_film_mm(self.reference(), &axis, film_mm, PupilGrid::STANDARD).ok()
+        });
+        let first = self.reference().first_order();
+        let pairs: Vec<(&Field, &MonoLens)> =
+            fields.iter().flat_map(|field| self.lenses.iter().map(move |lens| (field, lens))).collect();
+        let curve_fields = curve_fields(&fields);
+        let straight = StraightMap::of(self.reference(), self.dioptres, self.film_mm);
+        let axial_cone = self.cone(&axis);
+        let field_rows = |fields: &[Field]| {
+            fields.par_iter().map(|field| self.field_row(field, (straight.as_ref(), axial_cone))).collect()
+        };
+        let apertures = NumericalApertures::find(self.reference(), &axis);
+        let is_round = self.reference().is_rotational();
+        let conjugate_x = self.reference().conjugate_x(request.distance_mm);
+        let film_curvature = self.reference().image_surface().curvature_per_mm;
+        Ok(LensAnalysis {
+            lens: lens.name().to_owned(),
+            distance_mm: request.distance_mm,
+            reference_nm: self.reference().wavelength_nm(),
+            wavelengths_nm: request.wavelengths_nm.clone(),
+            notes,
+            object_index: first.object_index,
+            image_index: first.image_index,
+            object_na: apertures.map(|found| found.object).filter(|_| request.distance_mm.is_finite()),
+            image_na: apertures.map(|found| found.image),
+            x_plane: (!is_round).then(|| PlaneData::of_x(self.reference())),
+            film_radius_mm: (film_curvature != 0.0).then(|| 1.0 / film_curvature),
+            efl_mm: first.efl_mm,
+            f_number: first.f_number,
+            working_f_number: self.reference().working_f_number(request.distance_mm),
+            film_mm: self.film_mm,
+            half_illumination_deg: field_limit_deg(self.reference(), 0.5),
+            focus: FocusData {
+                paraxial_film_mm: paraxial.ok(),
+                paraxial_x_film_mm: (!is_round).then_some(conjugate_x.image_z_mm),
+                axis_film_mm: on_axis.map(|found| found.0),
+                axis_rms_um: on_axis.map(|found| 1e3 * found.1),
+                fields_film_mm: over_fields.map(|found| found.0),
+                fields_rms_um: over_fields.map(|found| 1e3 * found.1),
+                wavefront_film_mm: wavefront.map(|found| found.0),
+                wavefront_rms_waves: wavefront.map(|found| found.1),
+            },
+            axial_color: self.axial_color(request.distance_mm, from_mm),
+            spots: pairs.par_iter().map(|&(field, lens)| self.spot_row(field, lens)).collect(),
+            fans: pairs.par_iter().map(|&(field, lens)| self.fan_row(field, lens)).collect(),
+            opd_maps: pairs.par_iter().map(|&(field, lens)| self.opd_map(field, lens)).collect(),
+            grid: straight.map_or_else(Vec::new, |straight| self.grid(&fields, &straight)),
+            fields: field_rows(&fields),
+            curves: field_rows(&curve_fields),
+        })
+    }
+
+    fn spot_row(&self, field: &Field, lens: &MonoLens) -> SpotRow {
+        let point = self.point(field.tan);
+        let spot = SpotDiagram::trace(lens, &point, self.film_mm, &self.sampling);
+        let um = |mm: Option<f64>| mm.map(|mm| 1e3 * mm);
+        let sigma_mm = spot.sigma_mm();
+        let center_mm = self.reference().chief_film_point_mm(&point, self.film_mm).or(spot.centroid_mm());
+        let pupil = PupilBoundary::find(lens, &point, TOLD_AZIMUTHS).map(|pupil| PupilRow {
+            z_mm: pupil.z_mm(),
+            center_mm: pupil.center_mm().to_array(),
+            rho_max_mm: pupil.rho_at_azimuths_mm().to_vec(),
+            area_mm2: pupil.area_mm2(),
+        });
+        let wavefront =
+            Wavefront::trace(lens, &point, self.film_mm, PupilGrid::STANDARD, WavefrontReference::Best).ok();
+        SpotRow {
+            place: field.place,
+            wavelength_nm: lens.wavelength_nm(),
+            height_mm: spot.centroid_mm().map(|centroid_mm| 0.0 - centroid_mm.dot(field.direction)),
+            image_mm: spot.centroid_mm().map(in_picture),
+            rms_um: um(spot.rms_mm()),
+            rms_about_chief_um: um(spot.rms_about_chief_mm()),
+            radius_um: um(spot.radius_about_chief_mm()),
+            sigma_x_um: um(sigma_mm.map(|sigma| sigma.x)),
+            sigma_y_um: um(sigma_mm.map(|sigma| sigma.y)),
+            transmission: spot.transmission(),
+            wavefront: wavefront.map(|wavefront| WavefrontRow {
+                rms_waves: wavefront.rms_waves(),
+                peak_to_valley_waves: wavefront.peak_to_valley_waves(),
+                strehl: wavefront.strehl(),
+                zernike_waves: wavefront.zernike_waves(ZERNIKE_TERMS),
+            }),
+            pupil,
+            points_um: center_mm.map_or(Vec::new(), |center_mm| {
+                let from_center = |p: &DVec2| (center_mm - *p) * 1e3;
+                spot.points_mm.iter().map(from_center).map(|p| (p.x, p.y)).collect()
+            }),
+        }
+    }
+
+    fn fan_row(&self, field: &Field, lens: &MonoLens) -> FanRow {
+        let point = self.point(field.tan);
+        let along = |direction: DVec2| {
+            let sampling = PupilSampling { places: pupil_line(direction, FAN_PLACES), ..self.sampling.clone() };
+            let none = || vec![None; FAN_PLACES];
+            let errors_um = RayFan::trace(lens, &point, self.film_mm, &sampling).map_or_else(none, |fan| {
+                // The picture frame is the lens frame turned by half a turn.
+                fan.errors_mm.iter().map(|error| error.map(|mm| -1e3 * mm.dot(direction))).collect()
+            });
+            (errors_um, opd_waves_at(lens, &point, self.film_mm, &sampling).unwrap_or_else(none))
+        };
+        let ((tangential_um, tangential_waves), (sagittal_um, sagittal_waves)) = (along(DVec2::Y), along(DVec2::X));
+        FanRow {
+            place: field.place,
+            wavelength_nm: lens.wavelength_nm(),
+            places: pupil_line(DVec2::X, FAN_PLACES).iter().map(|place| place.x).collect(),
+            tangential_um,
+            sagittal_um,
+            tangential_waves,
+            sagittal_waves,
+        }
+    }
+
+    fn field_row(&self, field: &Field, (straight, axial_cone): (Option<&StraightMap>, f64)) -> FieldRow {
+        let (point, lens) = (self.point(field.tan), self.reference());
+        let place_mm = |lens: &MonoLens| lens.chief_film_point_mm(&point, self.film_mm);
+        let height_mm = |lens: &MonoLens| place_mm(lens).map(|place_mm| 0.0 - place_mm.dot(field.direction));
+        let reference_mm = height_mm(lens);
+        let shift_um =
+            |lens: &MonoLens| height_mm(lens).zip(reference_mm).map(|(own, reference)| 1e3 * (own - reference));
+        let [against_tangent, against_angle] = self.distortions(field, straight, place_mm(lens));
+        // Along the axis from where the chief ray meets the film, which may be curved.
+        let film_mm = self.film_mm + self.chief_on_film(&point).map_or(0.0, |own| own.z);
+        let foci = AstigmaticFoci::find(lens, &point);
+        let axes = (!lens.is_rotational()).then(|| AxisFoci::find(lens, &point)).flatten();
+        FieldRow {
+            place: field.place,
+            height_mm: reference_mm,
+            image_mm: place_mm(lens).map(in_picture),
+            distortion_tangent_percent: against_tangent.map(|relative| 100.0 * relative),
+            distortion_angle_percent: against_angle.map(|relative| 100.0 * relative),
+            tangential_focus_mm: foci.map(|foci| foci.tangential_mm - film_mm),
+            sagittal_focus_mm: foci.map(|foci| foci.sagittal_mm - film_mm),
+            x_focus_mm: axes.map(|foci| foci.x_mm - film_mm),
+            y_focus_mm: axes.map(|foci| foci.y_mm - film_mm),
+            relative_illumination: (axial_cone > 0.0).then(|| self.cone(&point) / axial_cone),
+            lateral_color_um: self.lenses.iter().map(shift_um).collect(),
+        }
+    }
+
+    /// Returns the relative distortion against the tangent of the field and against its angle: that of the paraxial scale
+    /// or, for a lens without an axis of symmetry, of the straight map of small fields.
+    fn distortions(&self, field: &Field, straight: Option<&StraightMap>, chief_mm: Option<DVec2>) -> [Option<f64>; 2] {
+        let field_tan = field.tan.length();
+        if self.reference().is_rotational() {
+            let field = (field_tan, self.dioptres);
+            return [Projection::Tangent, Projection::Angle]
+                .map(|projection| Some(Distortion::of(self.reference(), field, self.film_mm, projection)?.relative()));
+        }
+        let against = |tan: DVec2| Some(straight?.relative(tan, chief_mm?));
+        let angle_over_tan = if field_tan == 0.0 { 1.0 } else { field_tan.atan() / field_tan };
+        [against(field.tan), against(field.tan * angle_over_tan)]
+    }
+
+    /// Returns where the chief ray meets the film, in the film's own frame, mm.
+    fn chief_on_film(&self, point: &ObjectPoint) -> Option<DVec3> {
+        let ray = self.reference().chief_ray_on_film(point, self.film_mm)?;
+        Some(self.reference().film_pose(self.film_mm).to_own(ray.point_mm(0)))
+    }
+
+    /// Returns the projected solid angle of a point's light on the film as it slopes there.
+    fn cone(&self, point: &ObjectPoint) -> f64 {
+        let lens = self.reference();
+        let slope = self.chief_on_film(point).map(|own| lens.image_surface().slope_at(own.truncate()));
+        let normal = slope.map_or(DVec3::Z, |slope| (-slope).extend(1.0).normalize());
+        let normal = lens.film_pose(self.film_mm).rotation * normal;
+        projected_solid_angle_onto(lens, point, EDGE_AZIMUTHS, normal)
+    }
+
+    fn opd_map(&self, field: &Field, lens: &MonoLens) -> OpdMap {
+        let at = |i: usize| (2 * i + 1) as f64 / MAP_CELLS as f64 - 1.0;
+        let cells = (0..MAP_CELLS).flat_map(|row| (0..MAP_CELLS).map(move |column| DVec2::new(at(column), at(row))));
+        let cells: Vec<DVec2> = cells.collect();
+        let is_inside = |cell: &DVec2| cell.length_squared() < 1.0;
+        let places = cells.iter().copied().filter(is_inside).collect();
+        let sampling = PupilSampling { places, ..self.sampling.clone() };
+        let found = opd_waves_at(lens, &self.point(field.tan), self.film_mm, &sampling).unwrap_or_default();
+        let mut found = found.into_iter();
+        let waves = cells.iter().map(|cell| if is_inside(cell) { found.next().flatten() } else { None }).collect();
+        OpdMap { place: field.place, wavelength_nm: lens.wavelength_nm(), n_across: MAP_CELLS, waves }
+    }
+
+    /// Returns a grid of chief rays that reaches as far as the fields do.
+    fn grid(&self, fields: &[Field], straight: &StraightMap) -> Vec<GridRow> {
+        let widest = |of: &dyn Fn(DVec2) -> f64| fields.iter().map(|field| of(field.tan)).fold(0.0, f64::max);
+        let [x, y] = [widest(&|tan| tan.x.abs()), widest(&|tan| tan.y.abs())];
+        // A row of fields is the half diagonal of a square.
+        let half = match x == 0.0 || y == 0.0 {
+            true => DVec2::splat(x.max(y) * std::f64::consts::FRAC_1_SQRT_2),
+            false => DVec2::new(x, y),
+        };
+        let half = half.min(DVec2::splat(WIDEST_GRID_DEG.to_radians().tan()));
+        let at = |i: usize| 2.0 * i as f64 / (GRID_LINES - 1) as f64 - 1.0;
+        let places = (0..GRID_LINES).flat_map(|row| (0..GRID_LINES).map(move |column| DVec2::new(at(column), at(row))));
+        let places: Vec<DVec2> = places.map(|place| place * half).collect();
+        let row = |&tan: &DVec2| GridRow {
+            field_xy_deg: tan.to_array().map(|tan| tan.atan().to_degrees()),
+            image_mm: self.reference().chief_film_point_mm(&self.point(tan), self.film_mm).map(in_picture),
+            straight_mm: in_picture(straight.at_mm(tan)),
+        };
+        places.par_iter().map(row).collect()
+    }
+}
+
+/// Returns a place on the film in the picture frame, which is turned by half a turn.
+fn in_picture(film_mm: DVec2) -> [f64; 2] {
+    [0.0 - film_mm.x, 0.0 - film_mm.y]
+}
+
+/// Returns the fields that curves are drawn over: from the axis to the widest of these.
+fn curve_fields(fields: &[Field]) -> Vec<Field> {
+    let last = fields.iter().max_by(|a, b| a.place.field_deg.total_cmp(&b.place.field_deg));
+    let curve = |last: &Field| (0..=CURVE_STEPS).map(|i| last.at_share(i as f64 / CURVE_STEPS as f64)).collect();
+    last.map(curve).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,44 @@
+//! Lenses from one file format to another.
+
+use std::path::Path;
+
+use dioptric_pipeline::{LensChoice, LensReading, PipelineError};
+
+/// A lens in the format of another file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConvertedLens {
+    /// The text of the file.
+    pub text: String,
+    /// The text of a glass catalogue (`.agf`) that belongs beside it with the same name, if it needs one.
+    pub glasses: Option<String>,
+    /// What the file read says and this program does otherwise or not at all, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Returns the lens that `input` means (a file or a built-in name) in the format that `target`'s extension tells.
+///
+/// What the file read says beside the lens (film, fields, wavelengths) is kept where the format has a place for it; a
+/// `.json` file has the indices from 400 to 700 nm all the same.
+///
+/// # Errors
+/// When there is no such lens, or the format cannot hold it.
+pub fn convert_lens(input: &str, target: &Path, reading: &LensReading) -> Result<ConvertedLens, PipelineError> {
+    let mut file = LensChoice::named(input).open(reading)?;
+    let notes = std::mem::take(&mut file.notes);
+    let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let (text, glasses) = match extension.as_str() {
+        "ron" => (file.lens.to_ron(), None),
+        "dat" => (file.to_dat()?, None),
+        "json" => {
+            file.wavelengths_nm.clear();
+            (file.to_omni_json()?, None)
+        }
+        "zmx" => file.to_zmx_and_agf(&target.file_stem().unwrap_or_default().to_string_lossy())?,
+        _ => {
+            let expected = "expected .ron, .dat, .json (ISET) or .zmx";
+            let reason = format!("'.{extension}' is no lens format that can be written; {expected}");
+            return Err(PipelineError::Write { path: target.to_owned(), reason });
+        }
+    };
+    Ok(ConvertedLens { text, glasses, notes })
+}

@@ -1,0 +1,216 @@
+//! A lens and how it is meant to be used, as far as its file says: what stands where a command is not told otherwise.
+
+use dioptric_optics::{Field, Lens, LensFile, glam::DVec2};
+
+use crate::AnalysisFields;
+use dioptric_pipeline::{
+    LensChoice, LensReading, PipelineError, REFERENCE_WAVELENGTH_NM, StopChoice, nearest_to_reference_nm,
+};
+
+/// A lens, and what its file says of its use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LensUse {
+    /// The lens.
+    pub lens: Lens,
+    /// What the file says and this program does otherwise or not at all, a sentence each.
+    pub notes: Vec<String>,
+    /// The wavelengths that the file names, of those at which all media are known, nm.
+    pub wavelengths_nm: Vec<f64>,
+    /// The one of them that is the main one, nm.
+    pub reference_nm: Option<f64>,
+    /// Distance of the object before the first vertex, mm; infinite where it is far or not stated.
+    pub distance_mm: f64,
+    /// The points of the field, as the file names them.
+    fields: Vec<Field>,
+}
+
+impl LensUse {
+    /// Returns the lens that `LENS` on the command line means, with its stop set to `stop_mm` where given, and what its file
+    /// says of its use.
+    ///
+    /// # Errors
+    /// When there is no such lens, its file or a catalogue cannot be read, or the stop does not open so far.
+    pub fn open(text: &str, reading: &LensReading, stop_mm: Option<f64>) -> Result<Self, PipelineError> {
+        let mut used = Self::of(LensChoice::named(text).open(reading)?);
+        used.lens = stop_mm.map_or(StopChoice::AsGiven, StopChoice::DiameterMm).apply(used.lens)?;
+        Ok(used)
+    }
+
+    /// Returns what a file says.
+    pub fn of(file: LensFile) -> Self {
+        let is_known = |nm: &f64| file.lens.at(*nm).is_ok();
+        let wavelengths_nm: Vec<f64> = file.wavelengths_nm.iter().copied().filter(is_known).collect();
+        Self {
+            reference_nm: file.reference_wavelength_nm.filter(|nm| wavelengths_nm.contains(nm)),
+            wavelengths_nm,
+            distance_mm: file.object_distance_mm.unwrap_or(f64::INFINITY),
+            fields: file.fields,
+            lens: file.lens,
+            notes: file.notes,
+        }
+    }
+
+    /// Whether all media of the lens are known at a wavelength.
+    pub fn is_known_at(&self, wavelength_nm: f64) -> bool {
+        self.lens.at(wavelength_nm).is_ok()
+    }
+
+    /// Returns the wavelengths that stand for those not asked for, nm: the file's; else the usual ones; else, of a lens
+    /// that is not known there, as many evenly within the range that its media are known in.
+    pub fn wavelengths_or(&self, usual_nm: &[f64]) -> Vec<f64> {
+        match (self.wavelengths_nm.is_empty(), known_range_nm(&self.lens)) {
+            (false, _) => self.wavelengths_nm.clone(),
+            (true, Some((first_nm, last_nm))) if !usual_nm.iter().all(|&nm| self.is_known_at(nm)) => {
+                let step_nm = (last_nm - first_nm) / (usual_nm.len() + 1) as f64;
+                (1..=usual_nm.len()).map(|i| (first_nm + step_nm * i as f64).round()).collect()
+            }
+            _ => usual_nm.to_vec(),
+        }
+    }
+
+    /// Returns the one wavelength that stands where none is asked for, nm: the file's main one, else as
+    /// [`wavelengths_or`](Self::wavelengths_or) with 550 nm.
+    pub fn wavelength_or_usual(&self) -> f64 {
+        let among = || nearest_to_reference_nm(&self.wavelengths_or(&[REFERENCE_WAVELENGTH_NM]));
+        self.reference_nm.unwrap_or_else(among)
+    }
+
+    /// Returns the points of the field that the file names, by first-order optics at a wavelength where it states image
+    /// heights; `None` where it names none.
+    ///
+    /// Design programs state where light goes to: a positive angle is one of rising light, of an object below the axis. Of a
+    /// lens with an axis of symmetry that is the same, and the numbers stay as they are.
+    pub fn analysis_fields(&self, wavelength_nm: f64) -> Option<AnalysisFields> {
+        let mono = self.lens.at(wavelength_nm).ok()?;
+        let first = mono.first_order();
+        let sign = if mono.is_rotational() { 1.0 } else { -1.0 };
+        let far = |tan: DVec2| tan.to_array().map(|tan| tan.atan().to_degrees());
+        let (mut angles_deg, mut heights_mm) = (Vec::new(), Vec::new());
+        for field in &self.fields {
+            match *field {
+                // Not −0.
+                Field::Angle { x_deg, y_deg } => angles_deg.push([x_deg, y_deg].map(|deg| sign * deg + 0.0)),
+                Field::ObjectHeight { x_mm, y_mm } => heights_mm.push([x_mm, y_mm]),
+                Field::ImageHeight { x_mm, y_mm } if self.distance_mm.is_finite() => {
+                    let scale = -sign / mono.conjugate(self.distance_mm).magnification;
+                    heights_mm.push([scale * x_mm, scale * y_mm]);
+                }
+                Field::ImageHeight { x_mm, y_mm } => {
+                    angles_deg.push(far(sign * DVec2::new(x_mm, y_mm) / (first.efl_mm * first.object_index)));
+                }
+            }
+        }
+        match (angles_deg.is_empty(), heights_mm.is_empty()) {
+            (false, true) => Some(AnalysisFields::AnglesDeg(angles_deg)),
+            (true, false) if self.distance_mm.is_finite() => Some(AnalysisFields::HeightsMm(heights_mm)),
+            _ => None,
+        }
+    }
+
+    /// Returns the field angles in the plane of a drawing, degrees, each once; `None` where the file names none.
+    ///
+    /// Of a lens with an axis of symmetry they are the angles from the axis, of others those in the y–z plane.
+    pub fn drawing_fields_deg(&self, wavelength_nm: f64) -> Option<Vec<f64>> {
+        let mono = self.lens.at(wavelength_nm).ok()?;
+        let way_mm = self.distance_mm + mono.projection_center_z_mm();
+        let is_rotational = mono.is_rotational();
+        let degrees = |tan: DVec2| if is_rotational && tan.x != 0.0 { tan.length() } else { tan.y }.atan().to_degrees();
+        let of_angles = |[x_deg, y_deg]: &[f64; 2]| match *x_deg == 0.0 {
+            true => *y_deg,
+            false => degrees(DVec2::new(x_deg.to_radians().tan(), y_deg.to_radians().tan())),
+        };
+        let mut fields_deg: Vec<f64> = match self.analysis_fields(wavelength_nm)? {
+            AnalysisFields::AnglesDeg(angles) => angles.iter().map(of_angles).collect(),
+            AnalysisFields::HeightsMm(heights) => heights.iter().map(|&h| degrees(DVec2::from(h) / way_mm)).collect(),
+            AnalysisFields::ByLight => return None,
+        };
+        fields_deg.retain(|field| field.abs() < 89.9);
+        fields_deg.sort_by(f64::total_cmp);
+        fields_deg.dedup();
+        (!fields_deg.is_empty()).then_some(fields_deg)
+    }
+}
+
+/// Returns the range in which all media of a lens are known, nm; `None` where none of them states an end.
+fn known_range_nm(lens: &Lens) -> Option<(f64, f64)> {
+    let media = lens.interfaces().iter().map(|interface| &interface.medium_after).chain([lens.object_medium()]);
+    let narrower = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1.min(b.1));
+    media.filter_map(|medium| medium.range_nm()).reduce(narrower).filter(|(first, last)| first < last)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use dioptric_optics::ReadOptions;
+
+    use super::*;
+
+    fn of_file(path: &str, text: &str) -> LensUse {
+        LensUse::of(LensFile::from_bytes(Path::new(path), text.as_bytes(), &ReadOptions::default()).unwrap())
+    }
+
+    fn read(keys: &str, glass: &str) -> LensUse {
+        let text = format!("RDM\nEPD 5\n{keys}\nS 50 5 {glass}\n STO\nS -50 60\nSI 0\n");
+        of_file("a.seq", &text)
+    }
+
+    #[test]
+    fn fields_of_every_kind_are_those_of_the_file() {
+        let fields = |keys: &str| {
+            let lens = read(keys, "1.5");
+            (lens.analysis_fields(550.0), lens.drawing_fields_deg(550.0))
+        };
+        let angles = |list: &[[f64; 2]]| Some(AnalysisFields::AnglesDeg(list.to_vec()));
+        assert_eq!(
+            fields("YAN 0 7 10\nSO 0 1E10"),
+            (angles(&[[0.0, 0.0], [0.0, 7.0], [0.0, 10.0]]), Some(vec![0.0, 7.0, 10.0]))
+        );
+        let heights = |list: &[[f64; 2]]| Some(AnalysisFields::HeightsMm(list.to_vec()));
+        let (of_heights, drawn) = fields("YOB 0 -3\nXOB 0 4\nSO 0 200");
+        assert_eq!(of_heights, heights(&[[0.0, 0.0], [4.0, -3.0]]));
+        // The stop is the first surface: 5 mm from the axis at 200 mm.
+        assert!((drawn.unwrap()[1] - (5.0_f64 / 200.0).atan().to_degrees()).abs() < 1e-12);
+        // A far image height h is seen under h/f.
+        let efl_mm = read("SO 0 1E10", "1.5").lens.at(550.0).unwrap().first_order().efl_mm;
+        let Some(AnalysisFields::AnglesDeg(found)) = fields("YIM 0 5\nSO 0 1E10").0 else { panic!("angles") };
+        assert!((found[1][1].to_radians().tan() - 5.0 / efl_mm).abs() < 1e-15);
+        let Some(AnalysisFields::HeightsMm(found)) = fields("YIM 0 5\nSO 0 200").0 else { panic!("heights") };
+        let magnification = read("SO 0 1E10", "1.5").lens.at(550.0).unwrap().conjugate(200.0).magnification;
+        assert!((found[1][1] + 5.0 / magnification).abs() < 1e-12 && found[1][1] > 0.0);
+        assert_eq!(fields("SO 0 1E10"), (None, None));
+    }
+
+    #[test]
+    fn angle_of_rising_light_is_an_object_below_a_lens_without_symmetry() {
+        let lens = read("YAN 0 10\nSO 0 1E10", "1.5\n CYL; CUX 0");
+        assert_eq!(lens.drawing_fields_deg(550.0), Some(vec![-10.0, 0.0]));
+    }
+
+    #[test]
+    fn wavelengths_are_those_of_the_file_or_within_what_its_glasses_know() {
+        let wavelengths = |keys: &str, glass: &str| {
+            let lens = read(keys, glass);
+            (lens.wavelengths_or(&[450.0, 550.0, 650.0]), lens.wavelength_or_usual())
+        };
+        assert_eq!(wavelengths("WL 656 588 486\nREF 2\nSO 0 1E10", "1.5"), (vec![656.0, 588.0, 486.0], 588.0));
+        assert_eq!(wavelengths("WL 500 10000\nREF 2\nSO 0 1E10", "GERMANIUM"), (vec![10_000.0], 10_000.0));
+        assert_eq!(wavelengths("SO 0 1E10", "NBK7_SCHOTT"), (vec![450.0, 550.0, 650.0], 550.0));
+        let text = "(name: \"ir\", source: \"test\", surfaces: [(radius_mm: 50.0, stop: true, semi_aperture_mm: 5.0,
+            medium: Named(\"MISC:GERMANIUM\"), thickness_mm: 2.0), (radius_mm: 70.0, semi_aperture_mm: 5.0,
+            thickness_mm: 0.0)])";
+        let infrared = of_file("a.ron", text);
+        assert_eq!(infrared.wavelengths_or(&[450.0, 550.0, 650.0]), [5000.0, 8000.0, 11_000.0]);
+        assert_eq!(infrared.wavelength_or_usual(), 8000.0);
+    }
+
+    #[test]
+    fn stop_is_set() {
+        let open = |text: &str, stop_mm| LensUse::open(text, &LensReading::default(), stop_mm);
+        let lens = open("dgauss-50mm", Some(8.0)).unwrap().lens;
+        assert_eq!(lens.stop_semi_aperture_mm(), 4.0);
+        assert!(open("dgauss-50mm", Some(80.0)).is_err());
+        let message = open("no-such-lens", None).unwrap_err().to_string();
+        assert!(message.contains("no-such-lens") && message.contains("dgauss-50mm"), "{message}");
+    }
+}

@@ -1,0 +1,80 @@
+//! The glass catalogue as tables.
+
+use dioptric_optics::{CatalogueGlass, Glass, GlassCatalogue};
+use serde::Serialize;
+
+use dioptric_pipeline::PipelineError;
+
+/// A glass as a row of a list.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GlassRow {
+    /// What its maker calls it.
+    pub name: String,
+    /// Who makes it.
+    pub maker: String,
+    /// Index at the helium d line.
+    pub nd: Option<f64>,
+    /// Abbe number.
+    pub vd: Option<f64>,
+    /// Where its index is known from, nm.
+    pub first_nm: Option<f64>,
+    /// Where its index is known to, nm.
+    pub last_nm: Option<f64>,
+}
+
+/// A glass with its index at some wavelengths.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GlassData {
+    /// The glass.
+    #[serde(flatten)]
+    pub glass: GlassRow,
+    /// Wavelengths, nm.
+    pub wavelengths_nm: Vec<f64>,
+    /// The index relative to air at each of them.
+    pub indices: Vec<f64>,
+    /// The share of light that 10 mm of the glass let through at each of them, reflections apart, where it is known.
+    pub transmittances_10_mm: Vec<Option<f64>>,
+}
+
+/// Returns the glasses whose name holds `part`, in any case; all for an empty part.
+pub fn glass_rows(part: &str) -> Vec<GlassRow> {
+    let part = part.to_lowercase();
+    let catalogue = GlassCatalogue::built_in();
+    catalogue.glasses().iter().filter(|g| g.full_name().to_lowercase().contains(&part)).map(row).collect()
+}
+
+/// Returns a glass of the catalogue with its index at these wavelengths, nm.
+///
+/// # Errors
+/// When the name means no glass or several, or the glass is not known at a wavelength.
+pub fn glass_data(name: &str, wavelengths_nm: &[f64]) -> Result<GlassData, PipelineError> {
+    let found = GlassCatalogue::built_in().find(name)?;
+    let indices = wavelengths_nm.iter().map(|&nm| found.glass.index_at(nm)).collect::<Result<_, _>>()?;
+    // Of a glass of the catalogue its name is looked up, for what it swallows is listed by names.
+    let named = Glass::Named(found.full_name());
+    let transmittances_10_mm = wavelengths_nm.iter().map(|&nm| named.internal_transmittance(nm, 10.0)).collect();
+    Ok(GlassData { glass: row(found), wavelengths_nm: wavelengths_nm.to_vec(), indices, transmittances_10_mm })
+}
+
+fn row(glass: &CatalogueGlass) -> GlassRow {
+    let (nd, vd) = glass.glass.nd_vd().unzip();
+    let (first_nm, last_nm) = glass.glass.range_nm().unzip();
+    GlassRow { name: glass.name.clone(), maker: glass.maker.clone(), nd, vd, first_nm, last_nm }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bk7_is_found_with_its_index() {
+        assert!(glass_rows("n-bk7").iter().any(|row| row.name == "N-BK7"));
+        assert!(glass_rows("").len() > 1000);
+        let data = glass_data("SCHOTT:N-BK7", &[587.5618]).unwrap();
+        // The maker's data sheet: n_d 1.51680.
+        assert!((data.indices[0] - 1.5168).abs() < 5e-6);
+        let message = glass_data("N-BK7", &[100.0]).unwrap_err().to_string();
+        assert!(message.contains("100 nm"), "{message}");
+        assert!(glass_data("no such glass", &[500.0]).is_err());
+    }
+}

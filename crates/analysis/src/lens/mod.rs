@@ -1,0 +1,24 @@
+//! Lenses as tables: first-order data, surfaces, glasses, explicit rays, and an analysis by real rays.
+
+mod compute;
+mod convert;
+mod defaults;
+mod glass_table;
+mod request;
+mod rows;
+mod surface_table;
+mod table;
+mod trace_table;
+
+pub use compute::GRID_LINES;
+pub use convert::{ConvertedLens, convert_lens};
+pub use defaults::LensUse;
+pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
+pub use request::{AnalysisFields, AnalysisFilm, AnalysisRequest};
+pub use rows::{
+    AxialColorRow, FanRow, FieldPlace, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow,
+    WavefrontRow,
+};
+pub use surface_table::{SurfaceRow, placement_lines, surface_rows};
+pub use table::{ImageData, LensData, LensQuestion, LensRow, PlaneData, built_in_lenses};
+pub use trace_table::{RayTable, TraceError, TraceSettings};

@@ -1,0 +1,203 @@
+//! What to analyse a lens for.
+
+use dioptric_optics::{
+    MonoLens,
+    analysis::{STEEPEST_FIELD_DEG, field_limit_along_deg},
+    glam::DVec2,
+};
+
+use super::rows::FieldPlace;
+use dioptric_pipeline::PipelineError;
+
+/// The share of the axial illumination down to which fields are chosen where none are given.
+const DIMMEST: f64 = 0.25;
+
+/// Where the film is for an analysis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AnalysisFilm {
+    /// Where the spot on the axis is smallest, all wavelengths together.
+    BestFocus,
+    /// At the paraxial image, at the reference wavelength, of an object this far before the first vertex, mm.
+    FocusMm(f64),
+    /// This far behind the last vertex, mm.
+    FilmMm(f64),
+}
+
+/// The points of the field that are looked at.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AnalysisFields {
+    /// 0, 0.5, 0.7 and 1 of the field above the axis at which the illumination falls to a quarter; of a lens that is not
+    /// rotationally symmetric the axis, that field above it, that beside it, and 0.7 of both.
+    ByLight,
+    /// Angles at the entrance pupil in the x–z and the y–z plane, degrees.
+    AnglesDeg(Vec<[f64; 2]>),
+    /// Places of the object point along x and y, mm from the axis; the object must not be far away.
+    HeightsMm(Vec<[f64; 2]>),
+}
+
+impl AnalysisFields {
+    /// Returns angles above the axis, degrees.
+    pub fn above_axis_deg(angles_deg: &[f64]) -> Self {
+        Self::AnglesDeg(angles_deg.iter().map(|&angle_deg| [0.0, angle_deg]).collect())
+    }
+}
+
+/// What to analyse a lens for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AnalysisRequest {
+    /// The points of the field.
+    pub fields: AnalysisFields,
+    /// Wavelengths, nm.
+    pub wavelengths_nm: Vec<f64>,
+    /// Which of them is the reference, nm; `None` for that nearest to 550 nm.
+    pub main_wavelength_nm: Option<f64>,
+    /// Distance of the object before the first vertex, mm; infinity for a far one.
+    pub distance_mm: f64,
+    /// Where the film is.
+    pub film: AnalysisFilm,
+    /// Rings of rays in a spot diagram.
+    pub n_rings: usize,
+}
+
+/// A point of the field: its name, and the tangents of its angles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Field {
+    pub(super) place: FieldPlace,
+    pub(super) tan: DVec2,
+    /// The unit vector from the axis to the point; upwards on the axis.
+    pub(super) direction: DVec2,
+}
+
+impl Field {
+    fn of_angles([x_deg, y_deg]: [f64; 2]) -> Self {
+        let tan = DVec2::new(x_deg.to_radians().tan(), y_deg.to_radians().tan());
+        let field_deg = if x_deg == 0.0 { y_deg.abs() } else { tan.length().atan().to_degrees() };
+        let place = FieldPlace { field_deg, field_xy_deg: [x_deg, y_deg], object_mm: None };
+        Self { place, tan, direction: direction_of(tan) }
+    }
+
+    fn of_tan(tan: DVec2) -> Self {
+        let field_xy_deg = tan.to_array().map(|tan| tan.atan().to_degrees());
+        let place = FieldPlace { field_deg: tan.length().atan().to_degrees(), field_xy_deg, object_mm: None };
+        Self { place, tan, direction: direction_of(tan) }
+    }
+
+    /// Returns the field at a share of the angle from the axis.
+    pub(super) fn at_share(&self, share: f64) -> Self {
+        let [x_deg, y_deg] = self.place.field_xy_deg;
+        let field = match x_deg == 0.0 {
+            true => Self::of_angles([x_deg, share * y_deg]),
+            false => Self::of_tan(self.direction * (share * self.place.field_deg).to_radians().tan()),
+        };
+        Self { direction: self.direction, ..field }
+    }
+}
+
+fn direction_of(tan: DVec2) -> DVec2 {
+    match tan.x == 0.0 {
+        true => DVec2::new(0.0, if tan.y < 0.0 { -1.0 } else { 1.0 }),
+        false => tan.normalize(),
+    }
+}
+
+impl AnalysisRequest {
+    /// Checks what does not depend on the lens.
+    pub(super) fn check(&self) -> Result<(), PipelineError> {
+        let n_fields = match &self.fields {
+            AnalysisFields::ByLight => 1,
+            AnalysisFields::AnglesDeg(fields) => {
+                let all = fields.iter().flatten();
+                if let Some(field) = all.clone().find(|field| !(-90.0..90.0).contains(*field) || **field == -90.0) {
+                    return Err(wrong("fields_deg", *field, "angles above -90 and below 90 degrees"));
+                }
+                fields.len()
+            }
+            AnalysisFields::HeightsMm(fields) => {
+                if let Some(field) = fields.iter().flatten().find(|field| !field.is_finite()) {
+                    return Err(wrong("fields_mm", *field, "finite places of object points"));
+                }
+                if self.distance_mm.is_infinite() {
+                    return Err(wrong("distance_mm", self.distance_mm, "a finite one for fields in mm"));
+                }
+                fields.len()
+            }
+        };
+        if self.wavelengths_nm.is_empty() || n_fields == 0 {
+            return Err(wrong("the number of fields or wavelengths", 0.0, "at least 1"));
+        }
+        if self.distance_mm.is_nan() || self.distance_mm <= 0.0 {
+            return Err(wrong("distance_mm", self.distance_mm, "a number above 0, or inf"));
+        }
+        if !(1..=200).contains(&self.n_rings) {
+            return Err(wrong("rings", self.n_rings as f64, "1 to 200"));
+        }
+        Ok(())
+    }
+
+    /// Returns the fields of a lens, of which none is steeper than rays are looked for, and what there is to say of them.
+    pub(super) fn fields_of(&self, lens: &MonoLens, way_mm: f64) -> (Vec<Field>, Vec<String>) {
+        let steepest_tan = STEEPEST_FIELD_DEG.to_radians().tan();
+        let mut notes = Vec::new();
+        let fields: Vec<Field> = match &self.fields {
+            AnalysisFields::ByLight => {
+                let (fields, is_cut) = by_light(lens, 1e3 / way_mm);
+                if is_cut {
+                    notes.push(format!(
+                        "the light has not fallen to a quarter at {STEEPEST_FIELD_DEG}°, the steepest field that is \
+                         looked at: the fields are shares of that"
+                    ));
+                }
+                fields
+            }
+            AnalysisFields::AnglesDeg(angles_deg) => {
+                angles_deg.iter().map(|&angles| Field::of_angles(angles)).collect()
+            }
+            AnalysisFields::HeightsMm(heights_mm) => {
+                let of_height = |&height_mm: &[f64; 2]| {
+                    let field = Field::of_tan(DVec2::from_array(height_mm) / way_mm);
+                    Field { place: FieldPlace { object_mm: Some(height_mm), ..field.place }, ..field }
+                };
+                heights_mm.iter().map(of_height).collect()
+            }
+        };
+        let cut = |field: Field| match field.tan.length() > steepest_tan {
+            true => {
+                notes.push(format!(
+                    "the field of {} is cut to {STEEPEST_FIELD_DEG}°, the steepest that is looked at",
+                    field.place.label()
+                ));
+                match field.place.field_xy_deg {
+                    [0.0, y_deg] => Field::of_angles([0.0, STEEPEST_FIELD_DEG.copysign(y_deg)]),
+                    _ => Field::of_tan(field.direction * steepest_tan),
+                }
+            }
+            false => field,
+        };
+        let fields = fields.into_iter().map(cut).collect();
+        (fields, notes)
+    }
+}
+
+/// Returns fields up to where the light falls to a quarter, and whether that is beyond the steepest.
+fn by_light(lens: &MonoLens, dioptres: f64) -> (Vec<Field>, bool) {
+    let limit_deg = |direction| field_limit_along_deg(lens, DIMMEST, direction, dioptres).unwrap_or(0.0);
+    let y_deg = limit_deg(DVec2::Y);
+    // A tenth of a degree is a round number; a field narrower than that has none.
+    let round = |angle_deg: f64| match angle_deg >= 1.0 {
+        true => (angle_deg * 10.0).floor() / 10.0,
+        false => angle_deg,
+    };
+    if lens.is_rotational() {
+        let fields = [0.0, 0.5, 0.7, 1.0].map(|share| Field::of_angles([0.0, round(share * y_deg)]));
+        return (fields.to_vec(), y_deg >= STEEPEST_FIELD_DEG);
+    }
+    let x_deg = limit_deg(DVec2::X);
+    let fields = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.7, 0.7]];
+    let fields = fields.map(|[x, y]| Field::of_angles([round(x * x_deg), round(y * y_deg)]));
+    (fields.to_vec(), x_deg.max(y_deg) >= STEEPEST_FIELD_DEG)
+}
+
+fn wrong(key: &'static str, found: f64, expected: &str) -> PipelineError {
+    let (origin, expected) = ("the analysis".to_owned(), expected.to_owned());
+    PipelineError::Value { origin, key, found: found.to_string(), expected }
+}

@@ -1,0 +1,290 @@
+//! A lens described in numbers.
+
+use dioptric_optics::{
+    C_LINE_NM, F_LINE_NM, FirstOrder, Lens, MonoLens, SeidelSettings, SeidelSums, analysis::field_limit_deg,
+};
+use serde::Serialize;
+
+use dioptric_pipeline::PipelineError;
+
+/// The first-order data and third-order sums of a lens at one wavelength.
+///
+/// z of things in front is from the first vertex, of things behind from the last. What is infinite is left out of
+/// JSON as `null`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LensData {
+    /// The lens.
+    pub lens: String,
+    /// Focal lengths, principal planes, pupils and f-number at a wavelength.
+    #[serde(flatten)]
+    pub first_order: FirstOrder,
+    /// Exit-pupil diameter over entrance-pupil diameter.
+    pub pupil_magnification: f64,
+    /// Radius of the image surface if there were no astigmatism (Petzval's), mm; negative when it bends towards the lens.
+    /// Only a rotationally symmetric lens has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub petzval_radius_mm: Option<f64>,
+    /// The field angle at which the illumination of a far object falls to half, degrees: half the field of view, where
+    /// no film limits it.
+    pub half_light_field_deg: Option<f64>,
+    /// The field angle at which hardly any light is left, 1 %, degrees.
+    pub last_light_field_deg: Option<f64>,
+    /// The image of an object at the distance asked for.
+    #[serde(flatten)]
+    pub image: Option<ImageData>,
+    /// The two wavelengths between which the third-order sums count colour, nm; `None` where their colour is unknown.
+    pub seidel_colors_nm: Option<[f64; 2]>,
+    /// The third-order sums of the whole lens, mm. Only a rotationally symmetric lens has them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seidel: Option<SeidelSums>,
+    /// The third-order sums of each surface, mm.
+    pub seidel_surfaces: Vec<SeidelSums>,
+    /// What differs in the x–z plane, of a lens that is not rotationally symmetric; the rest is then of the y–z plane,
+    /// with tilts and decentres left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub x_plane: Option<PlaneData>,
+}
+
+/// First-order data of a lens in one plane through its axis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PlaneData {
+    /// Effective focal length, mm.
+    pub efl_mm: f64,
+    /// z of the rear focal point from the last vertex, mm.
+    pub bfl_mm: f64,
+    /// f-number for a far object.
+    pub f_number: f64,
+}
+
+/// What the data of a lens is about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensQuestion {
+    /// Wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Distance of an object before the first vertex, mm, of which the image is wanted.
+    pub distance_mm: Option<f64>,
+    /// Half field of the third-order sums, degrees.
+    pub field_deg: f64,
+    /// The two wavelengths, the shorter first, between which those sums count colour where the lens is not known at the
+    /// F and C lines, as one for the infrared; without them the sums have no colour.
+    pub instead_of_f_and_c_nm: Option<[f64; 2]>,
+}
+
+impl LensQuestion {
+    /// Returns the wavelengths between which colour is counted, nm.
+    fn colors_nm(&self, lens: &Lens) -> Option<[f64; 2]> {
+        let is_known = |lines_nm: &[f64; 2]| lines_nm.iter().all(|&nm| lens.at(nm).is_ok());
+        [Some([F_LINE_NM, C_LINE_NM]), self.instead_of_f_and_c_nm].into_iter().flatten().find(is_known)
+    }
+}
+
+/// The paraxial image of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ImageData {
+    /// Distance of the object before the first vertex, mm.
+    pub distance_mm: f64,
+    /// z of the image from the last vertex, mm.
+    pub image_distance_mm: f64,
+    /// Lateral magnification, negative for an image upside down.
+    pub magnification: f64,
+    /// f-number of the cone at the image.
+    pub working_f_number: f64,
+}
+
+impl PlaneData {
+    /// Returns that of the x–z plane.
+    pub(crate) fn of_x(mono: &MonoLens) -> Self {
+        let FirstOrder { efl_mm, bfl_mm, f_number, .. } = mono.first_order_x();
+        Self { efl_mm, bfl_mm, f_number }
+    }
+}
+
+impl LensData {
+    /// Returns the data of a lens; with those of an image where an object distance is given.
+    ///
+    /// The third-order sums are those of an object at that distance, else of a far one.
+    ///
+    /// # Errors
+    /// When a glass is not known at the wavelength, or the distance is not above 0.
+    pub fn new(lens: &Lens, question: &LensQuestion) -> Result<Self, PipelineError> {
+        let LensQuestion { wavelength_nm, distance_mm, field_deg, .. } = *question;
+        let mono = lens.at(wavelength_nm)?;
+        let x_plane = (!lens.is_rotational()).then(|| PlaneData::of_x(&mono));
+        let colors_nm = question.colors_nm(lens);
+        let settings = SeidelSettings {
+            wavelength_nm,
+            colors_nm: colors_nm.unwrap_or([wavelength_nm; 2]),
+            object_distance_mm: distance_mm.unwrap_or(f64::INFINITY),
+            chief_slope: field_deg.to_radians().tan(),
+        };
+        let mut seidel = lens.is_rotational().then(|| lens.seidel(&settings)).transpose()?;
+        if let (Some(seidel), None) = (&mut seidel, colors_nm) {
+            for sums in seidel.per_surface.iter_mut().chain([&mut seidel.total]) {
+                (sums.c1, sums.c2) = (f64::NAN, f64::NAN);
+            }
+        }
+        let first = mono.first_order();
+        Ok(Self {
+            lens: lens.name().to_owned(),
+            first_order: first,
+            pupil_magnification: first.pupil_magnification(),
+            petzval_radius_mm: lens.is_rotational().then(|| petzval_radius_mm(lens, &mono)).transpose()?,
+            half_light_field_deg: field_limit_deg(&mono, 0.5),
+            last_light_field_deg: field_limit_deg(&mono, 0.01),
+            image: distance_mm.map(|distance_mm| image_of(&mono, distance_mm)).transpose()?,
+            seidel_colors_nm: colors_nm,
+            seidel: seidel.as_ref().map(|seidel| seidel.total),
+            seidel_surfaces: seidel.map(|seidel| seidel.per_surface).unwrap_or_default(),
+            x_plane,
+        })
+    }
+}
+
+/// Returns R of S4 = −H² / (n' R) (Welford 1986, 6.3): the same for any two rays.
+fn petzval_radius_mm(lens: &Lens, mono: &MonoLens) -> Result<f64, PipelineError> {
+    let any = SeidelSettings { wavelength_nm: mono.wavelength_nm(), ..SeidelSettings::far(0.1) };
+    let any = SeidelSettings { colors_nm: [mono.wavelength_nm(); 2], ..any };
+    let sums = lens.seidel(&any)?;
+    Ok(-sums.lagrange_mm * sums.lagrange_mm / (mono.image_index() * sums.total.s4))
+}
+
+fn image_of(lens: &MonoLens, distance_mm: f64) -> Result<ImageData, PipelineError> {
+    if distance_mm.is_nan() || distance_mm <= 0.0 {
+        return Err(PipelineError::Value {
+            origin: "the object".to_owned(),
+            key: "distance_mm",
+            found: distance_mm.to_string(),
+            expected: "a number above 0, or inf".to_owned(),
+        });
+    }
+    let conjugate = lens.conjugate(distance_mm);
+    Ok(ImageData {
+        distance_mm,
+        image_distance_mm: conjugate.image_z_mm,
+        magnification: conjugate.magnification,
+        working_f_number: lens.working_f_number(distance_mm),
+    })
+}
+
+/// A built-in lens as a row of a list.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LensRow {
+    /// The name that `LENS` takes.
+    pub name: String,
+    /// Effective focal length at 550 nm, mm.
+    pub efl_mm: f64,
+    /// f-number wide open.
+    pub f_number: f64,
+    /// Number of surfaces, the stop included.
+    pub surfaces: usize,
+    /// Where the prescription comes from.
+    pub source: String,
+}
+
+/// Returns the built-in lenses.
+///
+/// # Errors
+/// Never; the built-in lenses are held to by tests.
+pub fn built_in_lenses() -> Result<Vec<LensRow>, PipelineError> {
+    Lens::built_in_names()
+        .map(|name| {
+            let lens = Lens::built_in(name)?;
+            let first = lens.at(dioptric_pipeline::REFERENCE_WAVELENGTH_NM)?.first_order();
+            Ok(LensRow {
+                name: name.to_owned(),
+                efl_mm: first.efl_mm,
+                f_number: first.f_number,
+                surfaces: lens.interfaces().len(),
+                source: lens.source().to_owned(),
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use dioptric_optics::Surface;
+
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn question(distance_mm: Option<f64>) -> LensQuestion {
+        LensQuestion { wavelength_nm: 550.0, distance_mm, field_deg: 10.0, instead_of_f_and_c_nm: None }
+    }
+
+    #[test]
+    fn the_papers_lens_has_its_focal_length() {
+        let lens = Lens::built_in("paper-2el").unwrap();
+        let data = LensData::new(&lens, &question(Some(8000.0))).unwrap();
+        // PHYSICS, "paraxial anchors": five digits.
+        assert_relative_eq!(data.first_order.efl_mm, 51.9971, epsilon = 1e-4);
+        assert_relative_eq!(data.image.unwrap().image_distance_mm, 51.4200, epsilon = 1e-4);
+        assert!(LensData::new(&lens, &question(Some(-1.0))).is_err());
+    }
+
+    #[test]
+    fn json_has_the_keys_of_the_contract() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap();
+        let json = serde_json::to_value(LensData::new(&lens, &question(Some(2000.0))).unwrap()).unwrap();
+        for key in "efl_mm bfl_mm ffl_mm front_principal_mm rear_principal_mm entrance_pupil_z_mm \
+                    entrance_pupil_diameter_mm exit_pupil_z_mm exit_pupil_diameter_mm f_number image_distance_mm \
+                    wavelength_nm power_per_mm image_index pupil_magnification petzval_radius_mm \
+                    half_light_field_deg last_light_field_deg magnification working_f_number"
+            .split_whitespace()
+        {
+            assert!(json[key].is_f64(), "{key}");
+        }
+        for key in ["S1", "S2", "S3", "S4", "S5", "C1", "C2"] {
+            let of_surfaces = json["seidel_surfaces"].as_array().unwrap();
+            let sum: f64 = of_surfaces.iter().map(|sums| sums[key].as_f64().unwrap()).sum();
+            assert_relative_eq!(json["seidel"][key].as_f64().unwrap(), sum, epsilon = 1e-12);
+        }
+    }
+
+    #[test]
+    fn infrared_lens_counts_colour_between_the_wavelengths_asked_for() {
+        // Germanium's kind: known from 2 to 14 µm only.
+        let glass = dioptric_optics::Glass::Sellmeier {
+            b: vec![14.76, 0.24],
+            c_um2: vec![0.19, 1530.0],
+            range_nm: Some((2e3, 14e3)),
+        };
+        let front = dioptric_optics::Interface {
+            surface: Surface::sphere(50.0, 12.0),
+            medium_after: glass,
+            thickness_after_mm: 0.0,
+        };
+        let lens = Lens::new("infrared", "test", vec![front], 0).unwrap();
+        let question = LensQuestion { wavelength_nm: 10e3, ..question(None) };
+        let data = LensData::new(&lens, &question).unwrap();
+        assert!(data.seidel_colors_nm.is_none() && data.seidel.unwrap().c1.is_nan() && data.seidel.unwrap().s1 > 0.0);
+        let ends = LensQuestion { instead_of_f_and_c_nm: Some([8e3, 12e3]), ..question };
+        let data = LensData::new(&lens, &ends).unwrap();
+        assert_eq!(data.seidel_colors_nm, Some([8e3, 12e3]));
+        // C1 of one surface with the marginal ray coming in straight: A y Δ(δn/n) = c y² δn/n.
+        let index = |nm: f64| lens.at(nm).unwrap().image_index();
+        let expected = 12.0 * 12.0 / 50.0 * (index(8e3) - index(12e3)) / index(10e3);
+        assert_relative_eq!(data.seidel.unwrap().c1, expected, max_relative = 1e-12);
+        let narrower = LensQuestion { instead_of_f_and_c_nm: Some([1e3, 12e3]), ..question };
+        assert!(LensData::new(&lens, &narrower).unwrap().seidel_colors_nm.is_none());
+    }
+
+    #[test]
+    fn petzval_radius_of_a_single_surface_is_its_own() {
+        // One surface: −n' R_p⁻¹ = (n' − n) / (n n' R) n', so R_p = −n R / (n' − n) for n = 1.
+        let ball = dioptric_optics::Interface {
+            surface: Surface::sphere(20.0, 2.0),
+            medium_after: dioptric_optics::Glass::Constant { index: 1.5 },
+            thickness_after_mm: 0.0,
+        };
+        let lens = Lens::new("ball", "test", vec![ball], 0).unwrap();
+        let data = LensData::new(&lens, &question(None)).unwrap();
+        assert_relative_eq!(data.petzval_radius_mm.unwrap(), -40.0, max_relative = 1e-12);
+        assert_relative_eq!(data.first_order.image_index, 1.5);
+    }
+
+    #[test]
+    fn built_in_lenses_have_rows() {
+        assert!(built_in_lenses().unwrap().iter().any(|row| row.name == "dgauss-50mm"));
+    }
+}

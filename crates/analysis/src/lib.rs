@@ -1,0 +1,26 @@
+//! What people ask of lenses, point spread functions, sensors and runs, as data: tables, metrics and charts.
+//!
+//! [`AnalysisRequest`] and [`LensData`] are about lenses, [`PsfRequest`] about point spread functions, [`measure`] about
+//! pictures, frames and sensors, [`RunReport`] about a run of the whole camera. A chart is a [`LineChart`]: lines, axes
+//! and labels, which the crate `report` draws.
+//!
+//! This crate draws nothing, writes no pages and knows nothing of terminals.
+#![doc = include_str!("../README.md")]
+
+mod chart;
+mod lens;
+pub mod measure;
+mod psf;
+mod run;
+
+pub use chart::{Corner, LineChart, Scale, Series};
+pub use lens::{
+    AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ConvertedLens, FanRow, FieldPlace, FieldRow,
+    FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis, LensData, LensQuestion, LensRow,
+    LensUse, OpdMap, PlaneData, PupilRow, RayTable, SpotRow, SurfaceRow, TraceError, TraceSettings, WavefrontRow,
+    built_in_lenses, convert_lens, glass_data, glass_rows, placement_lines, surface_rows,
+};
+pub use psf::{MtfRow, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, WholeLight, psf_csv};
+pub use run::{
+    ChannelStatistics, FilmData, IrradianceData, LossRow, RunCharts, RunPlaces, RunReport, SceneData, SensorStatistics,
+};

@@ -1,0 +1,264 @@
+//! The spatial frequency response of a slanted edge in a picture.
+
+use std::path::Path;
+
+use dioptric_sensor::{EdgeResponse, find_edge};
+use ndarray::{Array2, ArrayView2, s};
+use serde::Serialize;
+
+use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion, channel_color};
+use crate::{Corner, LineChart, Scale, Series};
+use dioptric_pipeline::PipelineError;
+
+/// The side of the region that is looked for, in samples of one channel.
+const SIDE: usize = 64;
+/// The most letters a mosaic may have.
+const MOST_LETTERS: usize = 64;
+
+/// How an edge is measured.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EdgeRequest {
+    /// Where the edge is; looked for where it is not given.
+    pub region: Option<PixelRegion>,
+    /// The side of the region that is looked for, pixels.
+    pub side: Option<usize>,
+    /// The mosaic of a raw frame, a letter a filter row by row, such as `RGGB`.
+    pub mosaic: Option<String>,
+    /// The distance between pixels, µm.
+    pub pixel_um: Option<f64>,
+    /// How samples stand for light.
+    pub curve: CodeCurve,
+}
+
+/// The responses of an edge, a channel each.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EdgeMeasurement {
+    /// The file.
+    pub picture: String,
+    /// The region that was measured.
+    pub region: PixelRegion,
+    /// The slant of the edge, degrees from the nearest of rows and columns.
+    pub slant_deg: f64,
+    /// The distance between pixels, µm, where it was given.
+    pub pixel_um: Option<f64>,
+    /// A response a channel.
+    pub channels: Vec<EdgeChannel>,
+    /// Channels in which the edge cannot be measured.
+    pub not_measured: Vec<UnmeasuredChannel>,
+}
+
+/// The response of one channel.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EdgeChannel {
+    /// The channel.
+    pub channel: String,
+    /// The frequency at which half the response is left, cycles a pixel.
+    pub mtf50_cycles_per_pixel: Option<f64>,
+    /// The frequency beyond the peak at which half the peak is left, cycles a pixel.
+    pub mtf50p_cycles_per_pixel: Option<f64>,
+    /// The first of these in cycles a millimetre, where the distance between pixels was given.
+    pub mtf50_cycles_per_mm: Option<f64>,
+    /// The second in cycles a millimetre.
+    pub mtf50p_cycles_per_mm: Option<f64>,
+    /// The response at half a cycle a pixel; none where the channel's samples are too far apart to tell.
+    pub response_at_nyquist: Option<f64>,
+    /// Frequencies, cycles a pixel.
+    pub frequencies_cycles_per_pixel: Vec<f64>,
+    /// The response at each frequency, 1 at 0.
+    pub response: Vec<f64>,
+}
+
+/// A channel in which the edge cannot be measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct UnmeasuredChannel {
+    /// The channel.
+    pub channel: String,
+    /// Why.
+    pub reason: String,
+}
+
+impl EdgeRequest {
+    /// Measures the edge of a picture file.
+    ///
+    /// In a picture of R, G and B the luminance is measured too; in a mosaic each filter by itself, over all its places
+    /// in the tile.
+    ///
+    /// # Errors
+    /// When the file cannot be read, there is no edge, or a setting does not go with the picture.
+    pub fn measure(&self, path: &Path) -> Result<EdgeMeasurement, PipelineError> {
+        if let Some(value) = self.pixel_um.filter(|v| !(*v > 0.0 && v.is_finite())) {
+            return Err(wrong("--pixel-um", value.to_string(), "a number above 0"));
+        }
+        let picture = MeasuredPicture::open(path, self.curve)?;
+        let samples = self.samples(&picture)?;
+        let region = self.region(&picture, samples.period)?;
+        let mut measured: Vec<(String, EdgeResponse)> = Vec::new();
+        let mut not_measured = Vec::new();
+        for (channel, parts) in &samples.channels {
+            let responses: Result<Vec<EdgeResponse>, _> =
+                parts.iter().map(|part| EdgeResponse::measure(&part.of(region, samples.period))).collect();
+            match responses {
+                Ok(responses) => measured.push((channel.clone(), mean_response(&responses, samples.period))),
+                Err(error) => {
+                    not_measured.push(UnmeasuredChannel { channel: channel.clone(), reason: error.to_string() });
+                }
+            }
+        }
+        match (measured.last(), not_measured.first()) {
+            (Some((_, last)), _) => Ok(EdgeMeasurement {
+                picture: picture.name,
+                region,
+                slant_deg: last.slant_deg,
+                pixel_um: self.pixel_um,
+                channels: measured.iter().map(|(name, response)| self.channel(name, response)).collect(),
+                not_measured,
+            }),
+            (None, first) => {
+                let reason = first.map_or_else(|| "has no channel".to_owned(), |first| first.reason.clone());
+                Err(PipelineError::Read { path: path.to_owned(), reason })
+            }
+        }
+    }
+
+    /// Parts a picture into channels.
+    fn samples<'a>(&self, picture: &'a MeasuredPicture) -> Result<Samples<'a>, PipelineError> {
+        let Some(letters) = &self.mosaic else {
+            let whole = |plane| vec![Part { plane: Plane::Borrowed(plane), first: (0, 0) }];
+            let mut channels: Vec<(String, Vec<Part<'a>>)> =
+                picture.planes.iter().map(|(name, plane)| (name.clone(), whole(plane))).collect();
+            if picture.rgb().is_ok() && picture.planes.len() > 1 {
+                let part = Part { plane: Plane::Owned(picture.luminance()), first: (0, 0) };
+                channels.push(("luminance".to_owned(), vec![part]));
+            }
+            return Ok(Samples { period: 1, channels });
+        };
+        let [(_, plane)] = picture.planes.as_slice() else {
+            return Err(wrong("--mosaic", format!("'{letters}'"), "a raw frame of one channel beside it"));
+        };
+        let letters: Vec<char> = letters.chars().collect();
+        let period = (1..=8).find(|n| n * n == letters.len()).filter(|n| n * n <= MOST_LETTERS);
+        let Some(period) = period.filter(|_| letters.iter().all(|c| c.is_alphanumeric())) else {
+            let found = letters.iter().collect::<String>();
+            return Err(wrong("--mosaic", format!("'{found}'"), "the letters of a square tile, as RGGB"));
+        };
+        let mut channels: Vec<(String, Vec<Part<'a>>)> = Vec::new();
+        for (index, letter) in letters.iter().enumerate() {
+            let part = Part { plane: Plane::Borrowed(plane), first: (index / period, index % period) };
+            match channels.iter_mut().find(|(name, _)| *name == letter.to_string()) {
+                Some((_, parts)) => parts.push(part),
+                None => channels.push((letter.to_string(), vec![part])),
+            }
+        }
+        Ok(Samples { period, channels })
+    }
+
+    /// Returns the region given, or the most edge-like square.
+    fn region(&self, picture: &MeasuredPicture, period: usize) -> Result<PixelRegion, PipelineError> {
+        let (rows, columns) = picture.size();
+        if let Some(region) = self.region {
+            return region.check_within((rows, columns));
+        }
+        let in_file = |reason: String| PipelineError::Read { path: picture.name.clone().into(), reason };
+        // The colours of a mosaic would look like edges: each tile becomes one sample.
+        let luminance = picture.luminance();
+        let binned = Array2::from_shape_fn((rows / period, columns / period), |(r, c)| {
+            let tile = luminance.slice(s![r * period..(r + 1) * period, c * period..(c + 1) * period]);
+            tile.sum() / (period * period) as f32
+        });
+        let most = binned.nrows().min(binned.ncols());
+        let side = self.side.map_or(SIDE.min(most), |side| side / period);
+        let (row, column) = find_edge(&binned, side).map_err(|e| in_file(e.to_string()))?;
+        let (rows, columns) = (side * period, side * period);
+        Ok(PixelRegion { row: row * period, column: column * period, rows, columns })
+    }
+
+    fn channel(&self, name: &str, response: &EdgeResponse) -> EdgeChannel {
+        let per_mm = |cycles_per_pixel: f64| self.pixel_um.map(|um| cycles_per_pixel / um * 1e3);
+        let (mtf50, mtf50p) = (response.mtf50(), response.mtf50p());
+        let last = response.frequencies.last().copied().unwrap_or(0.0);
+        EdgeChannel {
+            channel: name.to_owned(),
+            mtf50_cycles_per_pixel: mtf50,
+            mtf50p_cycles_per_pixel: mtf50p,
+            mtf50_cycles_per_mm: mtf50.and_then(per_mm),
+            mtf50p_cycles_per_mm: mtf50p.and_then(per_mm),
+            response_at_nyquist: (last > 0.5 - 1e-9).then(|| response.at(0.5)),
+            frequencies_cycles_per_pixel: response.frequencies.clone(),
+            response: response.response.clone(),
+        }
+    }
+}
+
+/// The channels of a picture, each in one or more parts with a sample every `period` pixels.
+struct Samples<'a> {
+    period: usize,
+    channels: Vec<(String, Vec<Part<'a>>)>,
+}
+
+enum Plane<'a> {
+    Borrowed(&'a Array2<f32>),
+    Owned(Array2<f32>),
+}
+
+struct Part<'a> {
+    plane: Plane<'a>,
+    /// The first row and column in the tile.
+    first: (usize, usize),
+}
+
+impl Part<'_> {
+    /// Returns the part's samples in a region.
+    fn of(&self, region: PixelRegion, period: usize) -> ArrayView2<'_, f32> {
+        let plane = match &self.plane {
+            Plane::Borrowed(plane) => plane,
+            Plane::Owned(plane) => plane,
+        };
+        // The tile begins at pixel 0 of the picture, wherever the region does.
+        let offset = |first: usize, start: usize| (first + period - start % period) % period;
+        let (row, column) = (offset(self.first.0, region.row), offset(self.first.1, region.column));
+        region.of(plane).slice_move(s![row..; period, column..; period])
+    }
+}
+
+/// Returns the mean of responses, with frequencies in cycles a pixel where samples are `period` pixels apart.
+fn mean_response(parts: &[EdgeResponse], period: usize) -> EdgeResponse {
+    let n = parts.len() as f64;
+    let mean = |of: &dyn Fn(&EdgeResponse) -> f64| parts.iter().map(of).sum::<f64>() / n;
+    EdgeResponse {
+        frequencies: parts[0].frequencies.iter().map(|f| f / period as f64).collect(),
+        response: (0..parts[0].response.len()).map(|i| mean(&|part| part.response[i])).collect(),
+        slant_deg: mean(&|part| part.slant_deg),
+    }
+}
+
+fn wrong(key: &'static str, found: String, expected: &str) -> PipelineError {
+    PipelineError::Value { origin: "the command line".to_owned(), key, found, expected: expected.to_owned() }
+}
+
+impl Measurement for EdgeMeasurement {
+    fn charts(&self) -> Vec<(String, LineChart)> {
+        let series = self.channels.iter().map(|channel| Series {
+            label: Some(channel.channel.clone()),
+            color: channel_color(&channel.channel),
+            points: channel
+                .frequencies_cycles_per_pixel
+                .iter()
+                .copied()
+                .zip(channel.response.iter().copied())
+                .collect(),
+            is_dashed: channel.channel == "luminance",
+        });
+        let highest = self.channels.iter().flat_map(|c| &c.response).copied().fold(1.0, f64::max);
+        let chart = LineChart {
+            title: format!("Spatial frequency response, edge slanted by {:.2}°", self.slant_deg),
+            x_label: "cycles a pixel".to_owned(),
+            y_label: "response".to_owned(),
+            x_range: (0.0, 1.0),
+            y_range: (0.0, (10.0 * highest).ceil() / 10.0),
+            series: series.collect(),
+            legend: Corner::TopRight,
+            scale: Scale::Linear,
+        };
+        vec![("mtf".to_owned(), chart)]
+    }
+}

@@ -1,0 +1,39 @@
+//! What a laboratory measures: pictures and frames in, numbers and charts out.
+
+mod chart;
+mod compare;
+mod edge;
+mod frames;
+mod noise;
+mod noise_charts;
+mod open;
+mod points;
+mod region;
+
+use serde::Serialize;
+
+pub use chart::{ChartMeasurement, ChartRequest, PatchRow};
+pub use compare::{CompareRequest, Comparison, DeltaESummary};
+pub use edge::{EdgeChannel, EdgeMeasurement, EdgeRequest, UnmeasuredChannel};
+pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, measure_bench, measure_frames};
+pub use open::{CodeCurve, MeasuredPicture};
+pub use points::{PointRequest, PointRow, PointSet};
+pub use region::PixelRegion;
+
+use crate::LineChart;
+
+/// Numbers that were measured, with plots of them.
+pub trait Measurement: Serialize {
+    /// Returns the plots, each with the name of its file.
+    fn charts(&self) -> Vec<(String, LineChart)>;
+}
+
+/// The colour of a channel's line: its own where the name is a colour's.
+fn channel_color(name: &str) -> String {
+    match name {
+        "R" => "#c03030".to_owned(),
+        "G" => "#208a35".to_owned(),
+        "B" => "#2f55c8".to_owned(),
+        _ => "#333340".to_owned(),
+    }
+}

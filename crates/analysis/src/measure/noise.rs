@@ -1,0 +1,414 @@
+//! Noise as EMVA standard 1288 tells it: photon transfer from flat and dark frames, simulated or from files.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use dioptric_sensor::{
+    Bench, BenchSettings, DarkCurrentEstimate, Exposure, FlatPoint, FrameStack, NonUniformity, PhotonTransfer, Raw,
+    RawPlane,
+};
+use dioptric_spectrum::Illuminant;
+use ndarray::Array2;
+use serde::Serialize;
+
+use super::frames::{DESCRIPTOR_FILE, FileSeries, descriptor, find_series, read_frame};
+use dioptric_pipeline::{PipelineError, SensorChoice};
+
+/// The light for which ISO speeds are told.
+const ISO_LIGHT: Illuminant = Illuminant::D55;
+/// Signal-to-noise ratios of ISO 12232's noise-based speeds: excellent and acceptable.
+const ISO_SNR: [f64; 2] = [40.0, 10.0];
+/// How far exposure times of flat frames may lie apart.
+const SAME_TIME: f64 = 1e-6;
+
+/// A sensor to be put on the simulated bench.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BenchRequest {
+    /// The sensor.
+    pub sensor: SensorChoice,
+    /// The filter; the one that sees the light best where it is not given.
+    pub filter: Option<String>,
+    /// The side of the square of pixels; 512 where it is not given.
+    pub side: Option<usize>,
+    /// Levels of light, two frames each; 40 where it is not given.
+    pub n_levels: Option<usize>,
+    /// Frames of each stack that shows the non-uniformities; 64 where it is not given.
+    pub n_stacked: Option<usize>,
+    /// The wavelength of the light, nm; 550 where it is not given.
+    pub wavelength_nm: Option<f64>,
+    /// The exposure time, s; 0.01 where it is not given.
+    pub time_s: Option<f64>,
+    /// The factor on the voltage; 1 where it is not given.
+    pub analog_gain: Option<f64>,
+    /// The temperature of the chip, °C; 25 where it is not given.
+    pub temperature_c: Option<f64>,
+    /// The seed of all noise.
+    pub seed: u64,
+}
+
+impl BenchRequest {
+    fn settings(&self) -> BenchSettings {
+        let standard = BenchSettings::default();
+        BenchSettings {
+            side: self.side.unwrap_or(standard.side),
+            n_levels: self.n_levels.unwrap_or(standard.n_levels),
+            n_stacked: self.n_stacked.unwrap_or(standard.n_stacked),
+            wavelength_nm: self.wavelength_nm.unwrap_or(standard.wavelength_nm),
+            exposure: Exposure {
+                time_s: self.time_s.unwrap_or(standard.exposure.time_s),
+                analog_gain: self.analog_gain.unwrap_or(standard.exposure.analog_gain),
+                temperature_c: self.temperature_c.unwrap_or(standard.exposure.temperature_c),
+                ..standard.exposure
+            },
+            seed: self.seed,
+        }
+    }
+}
+
+/// Parameters of EMVA standard 1288, release 3.1.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NoiseData {
+    /// The sensor, or the file or folder of frames.
+    pub source: String,
+    /// The filter in front of the pixels, where it is known.
+    pub filter: Option<String>,
+    /// Rows of pixels.
+    pub rows: usize,
+    /// Columns of pixels.
+    pub columns: usize,
+    /// The number of frames.
+    pub n_frames: usize,
+    /// The system gain K, DN an electron.
+    pub gain_dn_per_e: f64,
+    /// DN a photon; none where photons were not counted.
+    pub responsivity_dn_per_photon: Option<f64>,
+    /// Electrons a photon on the whole area of a pixel.
+    pub quantum_efficiency: Option<f64>,
+    /// The temporal dark noise σd without that of rounding, electrons.
+    pub dark_noise_e: f64,
+    /// The electrons at which the variance is largest.
+    pub saturation_e: f64,
+    /// The photons at which it is.
+    pub saturation_photons: Option<f64>,
+    /// The electrons at which signal and noise are equal.
+    pub threshold_e: f64,
+    /// The photons at which they are.
+    pub threshold_photons: Option<f64>,
+    /// Saturation over threshold, dB.
+    pub dynamic_range_db: f64,
+    /// The same in powers of two.
+    pub dynamic_range_stops: f64,
+    /// The largest signal-to-noise ratio, dB.
+    pub max_snr_db: f64,
+    /// Dark-signal non-uniformity, rms electrons; none without stacks of three frames or more.
+    pub dsnu_e: Option<f64>,
+    /// Photo-response non-uniformity, rms percent.
+    pub prnu_percent: Option<f64>,
+    /// The dark current from the rise of the mean, electrons a second; none without dark frames of several times.
+    pub dark_current_by_mean_e_per_s: Option<f64>,
+    /// The dark current from the rise of the variance.
+    pub dark_current_by_variance_e_per_s: Option<f64>,
+    /// What the sensor's data sheet says of the same; none for frames from files.
+    pub data_sheet: Option<NoiseDataSheet>,
+    /// The points of the photon transfer, darkness first.
+    pub points: Vec<NoisePoint>,
+}
+
+/// What a sensor's data sheet says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NoiseDataSheet {
+    /// The system gain, DN an electron.
+    pub gain_dn_per_e: f64,
+    /// Electrons a photon on the whole area of a pixel.
+    pub quantum_efficiency: f64,
+    /// Read noise and the shot noise of the dark current, electrons.
+    pub dark_noise_e: f64,
+    /// The electrons at which a pixel saturates.
+    pub saturation_e: f64,
+    /// DSNU and the columns' offsets, rms electrons.
+    pub dsnu_e: f64,
+    /// PRNU and the columns' gains, rms percent.
+    pub prnu_percent: f64,
+    /// The dark current, electrons a second.
+    pub dark_current_e_per_s: f64,
+    /// The saturation-based ISO speed in daylight (D55).
+    pub iso_by_saturation: f64,
+    /// The noise-based ISO speed at a signal-to-noise ratio of 40; none where PRNU never lets it.
+    pub iso_by_noise_40: Option<f64>,
+    /// The noise-based ISO speed at a ratio of 10.
+    pub iso_by_noise_10: Option<f64>,
+}
+
+/// A point of the photon transfer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct NoisePoint {
+    /// The photons that fell on a pixel, where they were counted.
+    pub photons: Option<f64>,
+    /// The mean of both frames, DN.
+    pub mean_dn: f64,
+    /// The temporal variance, DN².
+    pub variance_dn2: f64,
+    /// The electrons that the mean stands for.
+    pub electrons: f64,
+    /// The signal-to-noise ratio; none in the dark.
+    pub snr: Option<f64>,
+    /// The ratio that the linear model gives for as many electrons.
+    pub model_snr: Option<f64>,
+}
+
+/// Puts a sensor on the simulated bench; its frames are kept as 16-bit PNG with a descriptor where a folder is given.
+///
+/// # Errors
+/// When the sensor cannot be opened, a setting makes no sense or a frame cannot be written.
+pub fn measure_bench(request: &BenchRequest, frames_folder: Option<&Path>) -> Result<NoiseData, PipelineError> {
+    let sensor = request.sensor.open()?;
+    let bench = Bench::new(&sensor, request.settings(), request.filter.as_deref())?;
+    let mut collected = Collected::default();
+    let mut kept = Vec::new();
+    let mut number = 0;
+    for (index, series) in bench.series().iter().enumerate() {
+        let mut files = Vec::new();
+        let mut taken = Taken::new(Some(series.time_s), Some(series.photons));
+        for shot in 0..series.n_frames {
+            let raw = bench.frame(series, number)?;
+            number += 1;
+            if let Some(folder) = frames_folder {
+                let kind = if series.photons > 0.0 { "flat" } else { "dark" };
+                let name = format!("{kind}-{index:03}-{shot:03}.png");
+                raw.write(&folder.join(&name))?;
+                files.push(PathBuf::from(name));
+            }
+            taken.add(numbers_of(&raw))?;
+        }
+        kept.push(FileSeries { time_s: Some(series.time_s), photons: Some(series.photons), files });
+        collected.add(taken)?;
+    }
+    if let Some(folder) = frames_folder {
+        let bits = u32::from(bench.sensor().adc.top_dn().unwrap_or(u16::MAX)).count_ones();
+        let path = folder.join(DESCRIPTOR_FILE);
+        let text = descriptor(bits, bench.settings().side, &kept);
+        fs::write(&path, text).map_err(|e| PipelineError::Write { path, reason: e.to_string() })?;
+    }
+    let data = collected.analyse(sensor.name.clone())?;
+    Ok(NoiseData { filter: Some(bench.filter().to_owned()), data_sheet: Some(data_sheet(&bench)), ..data })
+}
+
+/// Measures the frames that a descriptor file lists, or of a folder.
+///
+/// A folder holds `descriptor.txt`, or PNG or TIFF files named `dark…` and `flat…`; frames under equal light differ in
+/// name after the last `-` or `_` only, and their photons are then not known.
+///
+/// # Errors
+/// When a file cannot be read or is no grey picture of whole numbers, frames differ in size, or there are too few.
+pub fn measure_frames(path: &Path) -> Result<NoiseData, PipelineError> {
+    let in_file = |error: PipelineError| match error {
+        PipelineError::Sensor(error) => PipelineError::Read { path: path.to_owned(), reason: error.to_string() },
+        PipelineError::Unsuitable { what, reason } => {
+            PipelineError::Read { path: path.to_owned(), reason: format!("{what} {reason}") }
+        }
+        other => other,
+    };
+    let mut collected = Collected::default();
+    for series in find_series(path)? {
+        let mut taken = Taken::new(series.time_s, series.photons);
+        for file in &series.files {
+            let frame = read_frame(file)?;
+            taken.add(frame).map_err(|e| PipelineError::Read { path: file.clone(), reason: e.to_string() })?;
+        }
+        collected.add(taken).map_err(in_file)?;
+    }
+    collected.analyse(path.display().to_string()).map_err(in_file)
+}
+
+fn numbers_of(raw: &Raw) -> Array2<f32> {
+    match &raw.planes[0] {
+        RawPlane::Dn(dn) => dn.mapv(f32::from),
+        RawPlane::Volts(volts) => volts.clone(),
+    }
+}
+
+fn data_sheet(bench: &Bench) -> NoiseDataSheet {
+    let (sensor, exposure) = (bench.sensor(), bench.settings().exposure);
+    let gain_v_per_e = sensor.conversion_gain_v_per_e(exposure.gain_mode);
+    let step_v = sensor.adc.step_v(sensor.swing_v).unwrap_or(1.0);
+    let dark_e_per_s = sensor.dark_current.at(exposure.temperature_c);
+    let read_e = sensor.read_noise_v(exposure.gain_mode).hypot(sensor.row_noise_v) / gain_v_per_e;
+    let [iso_40, iso_10] = ISO_SNR.map(|snr| sensor.iso_by_noise(ISO_LIGHT, &exposure, snr));
+    NoiseDataSheet {
+        gain_dn_per_e: gain_v_per_e * exposure.analog_gain / step_v,
+        quantum_efficiency: bench.quantum_efficiency(),
+        dark_noise_e: read_e.hypot((dark_e_per_s * exposure.time_s).sqrt()),
+        saturation_e: sensor.saturation_e(&exposure),
+        dsnu_e: sensor.dsnu_v.hypot(sensor.column_offset_v) / gain_v_per_e,
+        prnu_percent: 100.0 * sensor.prnu_fraction.hypot(sensor.column_gain_fraction),
+        dark_current_e_per_s: dark_e_per_s,
+        iso_by_saturation: sensor.iso_by_saturation(ISO_LIGHT, &exposure),
+        iso_by_noise_40: iso_40,
+        iso_by_noise_10: iso_10,
+    }
+}
+
+/// The frames of one series: the first two make a point, three and more a stack.
+struct Taken {
+    time_s: Option<f64>,
+    photons: Option<f64>,
+    first: Vec<Array2<f32>>,
+    stack: FrameStack,
+}
+
+impl Taken {
+    fn new(time_s: Option<f64>, photons: Option<f64>) -> Self {
+        Self { time_s, photons, first: Vec::new(), stack: FrameStack::default() }
+    }
+
+    fn add(&mut self, frame: Array2<f32>) -> Result<(), PipelineError> {
+        self.stack.add(&frame)?;
+        if self.first.len() < 2 {
+            self.first.push(frame);
+        }
+        Ok(())
+    }
+}
+
+/// A series when its frames are gone.
+struct Measured {
+    time_s: Option<f64>,
+    photons: Option<f64>,
+    point: FlatPoint,
+    stack: Option<FrameStack>,
+}
+
+impl Measured {
+    fn is_dark(&self) -> bool {
+        self.photons == Some(0.0)
+    }
+}
+
+/// All series of a bench.
+#[derive(Default)]
+struct Collected {
+    series: Vec<Measured>,
+    size: Option<(usize, usize)>,
+    n_frames: usize,
+}
+
+impl Collected {
+    fn add(&mut self, taken: Taken) -> Result<(), PipelineError> {
+        let Taken { time_s, photons, first, stack } = taken;
+        let [a, b] = first.as_slice() else {
+            return Err(too_few(format!("a series has {} frames, expected 2 or more", first.len())));
+        };
+        if let Some((rows, columns)) = self.size.filter(|size| *size != a.dim()) {
+            let found = format!("{} × {}", a.nrows(), a.ncols());
+            return Err(too_few(format!("have {rows} × {columns} and {found} pixels, expected frames of one size")));
+        }
+        self.size = Some(a.dim());
+        self.n_frames += stack.n_frames();
+        let point = FlatPoint::measure(photons.unwrap_or(0.0), a, b)?;
+        self.series.push(Measured { time_s, photons, point, stack: (stack.n_frames() > 2).then_some(stack) });
+        Ok(())
+    }
+
+    fn analyse(&self, source: String) -> Result<NoiseData, PipelineError> {
+        let flats: Vec<&Measured> = self.series.iter().filter(|s| !s.is_dark()).collect();
+        let times: Vec<f64> = flats.iter().filter_map(|s| s.time_s).collect();
+        let time_s = times.first().copied();
+        if times.iter().any(|t| (t / times[0] - 1.0).abs() > SAME_TIME) {
+            let reason = "differ in exposure time, expected one time and light of several levels".to_owned();
+            return Err(PipelineError::Unsuitable { what: "the flat frames", reason });
+        }
+        // The dark frames of the flat frames' own time, or the nearest to it.
+        let distance = |s: &Measured| (s.time_s.unwrap_or(0.0) - time_s.unwrap_or(0.0)).abs();
+        let dark = self.series.iter().filter(|s| s.is_dark()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let dark = dark.ok_or_else(|| too_few("have no dark series among them".to_owned()))?;
+        let are_counted = flats.iter().all(|s| s.photons.is_some());
+        // Where photons were not counted the signal stands for them: only ratios to it are then told.
+        let points: Vec<FlatPoint> = flats
+            .iter()
+            .map(|s| FlatPoint { photons: s.photons.unwrap_or(s.point.mean_dn - dark.point.mean_dn), ..s.point })
+            .collect();
+        let transfer = PhotonTransfer::fit(dark.point, &points)?;
+        let uniformity = self.uniformity(&transfer)?;
+        let current = self.dark_current(&transfer);
+        let (rows, columns) = self.size.unwrap_or_default();
+        let counted = |value: f64| are_counted.then_some(value);
+        let threshold_e = transfer.threshold_photons * transfer.quantum_efficiency;
+        Ok(NoiseData {
+            source,
+            filter: None,
+            rows,
+            columns,
+            n_frames: self.n_frames,
+            gain_dn_per_e: transfer.gain_dn_per_e,
+            responsivity_dn_per_photon: counted(transfer.responsivity_dn_per_photon),
+            quantum_efficiency: counted(transfer.quantum_efficiency),
+            dark_noise_e: transfer.dark_noise_e,
+            saturation_e: transfer.saturation_e,
+            saturation_photons: counted(transfer.saturation_e / transfer.quantum_efficiency),
+            threshold_e,
+            threshold_photons: counted(transfer.threshold_photons),
+            dynamic_range_db: transfer.dynamic_range_db,
+            dynamic_range_stops: (transfer.saturation_e / threshold_e).log2(),
+            max_snr_db: 20.0 * transfer.max_snr().log10(),
+            dsnu_e: uniformity.map(|u| u.dsnu_e),
+            prnu_percent: uniformity.map(|u| 100.0 * u.prnu_fraction),
+            dark_current_by_mean_e_per_s: current.map(|c| c.by_mean_e_per_s),
+            dark_current_by_variance_e_per_s: current.map(|c| c.by_variance_e_per_s),
+            data_sheet: None,
+            points: noise_points(&transfer, are_counted),
+        })
+    }
+
+    /// Returns the non-uniformities, where there are stacks of dark frames and of frames about half saturation.
+    fn uniformity(&self, transfer: &PhotonTransfer) -> Result<Option<NonUniformity>, PipelineError> {
+        let dark_dn = transfer.dark.mean_dn;
+        let from_half =
+            |s: &Measured| ((s.point.mean_dn - dark_dn) / transfer.gain_dn_per_e / transfer.saturation_e - 0.5).abs();
+        let stacked = |is_dark: bool| self.series.iter().filter(move |s| s.is_dark() == is_dark && s.stack.is_some());
+        let bright = stacked(false).min_by(|a, b| from_half(a).total_cmp(&from_half(b)));
+        let (Some(dark), Some(bright)) = (stacked(true).next(), bright) else { return Ok(None) };
+        match (&dark.stack, &bright.stack) {
+            (Some(dark), Some(bright)) => Ok(Some(NonUniformity::measure(dark, bright, transfer.gain_dn_per_e)?)),
+            _ => Ok(None),
+        }
+    }
+
+    /// Returns the dark current, where dark frames were taken at three times or more.
+    fn dark_current(&self, transfer: &PhotonTransfer) -> Option<DarkCurrentEstimate> {
+        let mut points: Vec<(f64, FlatPoint)> = self
+            .series
+            .iter()
+            .filter(|s| s.is_dark() && s.stack.is_none())
+            .filter_map(|s| Some((s.time_s?, s.point)))
+            .collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points.dedup_by(|a, b| (a.0 - b.0).abs() <= SAME_TIME * b.0);
+        (points.len() >= 3).then(|| DarkCurrentEstimate::fit(&points, transfer.gain_dn_per_e))
+    }
+}
+
+fn noise_points(transfer: &PhotonTransfer, are_counted: bool) -> Vec<NoisePoint> {
+    [transfer.dark]
+        .iter()
+        .chain(&transfer.points)
+        .enumerate()
+        .map(|(index, point)| {
+            let electrons = (point.mean_dn - transfer.dark.mean_dn) / transfer.gain_dn_per_e;
+            let is_lit = index > 0 && point.variance_dn2 > 0.0;
+            NoisePoint {
+                photons: (are_counted || index == 0).then_some(point.photons),
+                mean_dn: point.mean_dn,
+                variance_dn2: point.variance_dn2,
+                electrons,
+                snr: is_lit.then(|| transfer.snr(point)),
+                model_snr: (index > 0).then(|| transfer.model_snr(electrons)),
+            }
+        })
+        .collect()
+}
+
+fn too_few(reason: String) -> PipelineError {
+    PipelineError::Unsuitable { what: "the frames", reason }
+}

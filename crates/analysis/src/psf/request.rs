@@ -1,0 +1,182 @@
+//! Which point-spread functions to compute, and how.
+
+use dioptric_optics::{Lens, MonoLens, glam::DVec2};
+use dioptric_psf::PsfQuery;
+
+use dioptric_pipeline::{
+    BankChoice, DiffractionChoice, FocusChoice, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm,
+};
+
+/// Wavelengths that are seen.
+const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
+/// Pixels along the side of the largest picture that is made.
+pub(crate) const LARGEST: usize = 4097;
+
+/// Which point-spread functions to compute, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PsfRequest {
+    /// Field angles at the entrance pupil, to the right of the picture, degrees.
+    pub fields_deg: Vec<f64>,
+    /// How far above the axis all of these fields lie, degrees.
+    pub field_y_deg: f64,
+    /// Distances of the points before the first vertex, mm; infinity for a star.
+    pub distances_mm: Vec<f64>,
+    /// Wavelengths, nm.
+    pub wavelengths_nm: Vec<f64>,
+    /// Where the film is; a near object has no meaning here.
+    pub focus: FocusChoice,
+    /// Diffraction at the stop.
+    pub diffraction: DiffractionChoice,
+    /// Side of a pixel, µm.
+    pub pixel_um: f64,
+    /// Pixels along the side of a picture; `None` to hold the spot.
+    pub size: Option<usize>,
+    /// How the light is sampled.
+    pub sampling: PsfSampling,
+    /// A bank over the range of the points from which they are drawn; `None` to trace each of them.
+    pub bank: Option<BankChoice>,
+    /// Spatial frequencies of the MTF tables, cycles per mm.
+    pub mtf_per_mm: Vec<f64>,
+    /// The seed of the paper mode's diffraction.
+    pub seed: u64,
+    /// Weights of the wavelengths in the light of all of them; none for all alike.
+    pub spectral_weights: Vec<f64>,
+}
+
+/// How the light of a point is sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PsfSampling {
+    /// Rays through the true pupil, drawn with exact energy.
+    Pupil,
+    /// The paper's: rays on a square grid over the front rim, counted a pixel.
+    Paper {
+        /// Rays along the side of the grid.
+        n_across: usize,
+    },
+}
+
+/// One point-spread function to compute.
+#[derive(Clone, Copy)]
+pub(crate) struct Item {
+    pub(crate) field_deg: f64,
+    pub(crate) field_y_deg: f64,
+    pub(crate) distance_mm: f64,
+    pub(crate) wavelength_nm: f64,
+    pub(crate) dioptres: f64,
+}
+
+impl Item {
+    pub(crate) fn field_tan(&self) -> DVec2 {
+        DVec2::new(self.field_deg.to_radians().tan(), self.field_y_deg.to_radians().tan())
+    }
+
+    /// Returns what to ask of a source on pixels of this size.
+    pub(crate) fn query(&self, pitch_um: f64) -> PsfQuery {
+        let Self { dioptres, wavelength_nm, .. } = *self;
+        PsfQuery { field_tan: self.field_tan(), dioptres, wavelength_nm, pitch_um }
+    }
+}
+
+impl PsfRequest {
+    /// Returns the lens at [`reference_nm`](Self::reference_nm).
+    pub(crate) fn reference(&self, lens: &Lens) -> Result<MonoLens, PipelineError> {
+        let asked_nm = nearest_to_reference_nm(&self.wavelengths_nm);
+        let usual = lens.at(REFERENCE_WAVELENGTH_NM).ok().filter(|_| VISIBLE_NM.contains(&asked_nm));
+        Ok(usual.map_or_else(|| lens.at(asked_nm), Ok)?)
+    }
+
+    /// The wavelength of fields, focus and f-numbers, nm: 550; where the lens is not known at it, or no wavelength asked
+    /// for is visible, that of them which is nearest to it.
+    ///
+    /// # Errors
+    /// When the lens is not known at that wavelength.
+    pub fn reference_nm(&self, lens: &Lens) -> Result<f64, PipelineError> {
+        Ok(self.reference(lens)?.wavelength_nm())
+    }
+
+    /// Returns the points: fields outermost, then distances, then wavelengths.
+    pub(crate) fn items(&self, lens: &Lens) -> Result<Vec<Item>, PipelineError> {
+        let reference = self.reference(lens)?;
+        let pupil_z_mm = reference.projection_center_z_mm();
+        let mut items = Vec::new();
+        for &field_deg in &self.fields_deg {
+            for &distance_mm in &self.distances_mm {
+                let z_mm = distance_mm + pupil_z_mm;
+                if z_mm <= 0.0 {
+                    let found = distance_mm.to_string();
+                    return Err(self.wrong("distances_mm", &found, "points before the entrance pupil"));
+                }
+                let dioptres = 1e3 / z_mm;
+                items.extend(self.wavelengths_nm.iter().map(|&wavelength_nm| Item {
+                    field_deg,
+                    field_y_deg: self.field_y_deg,
+                    distance_mm,
+                    wavelength_nm,
+                    dioptres,
+                }));
+            }
+        }
+        Ok(items)
+    }
+
+    pub(crate) fn check(&self) -> Result<(), PipelineError> {
+        for &field in self.fields_deg.iter().chain([&self.field_y_deg]) {
+            if field.is_nan() || field.abs() >= 89.9 {
+                return Err(self.wrong("fields_deg", &field.to_string(), "angles below 89.9 degrees"));
+            }
+        }
+        for &distance in &self.distances_mm {
+            if distance.is_nan() || distance <= 0.0 {
+                return Err(self.wrong("distances_mm", &distance.to_string(), "numbers above 0, or inf"));
+            }
+        }
+        for &wavelength in &self.wavelengths_nm {
+            if !(wavelength.is_finite() && wavelength > 0.0) {
+                return Err(self.wrong("wavelengths_nm", &wavelength.to_string(), "numbers above 0"));
+            }
+        }
+        if let DiffractionChoice::Hurb { gamma } = self.diffraction
+            && !(gamma.is_finite() && gamma > 0.0)
+        {
+            return Err(self.wrong("gamma", &gamma.to_string(), "a finite number above 0"));
+        }
+        if !(self.pixel_um.is_finite() && self.pixel_um > 0.0) {
+            return Err(self.wrong("pixel_um", &self.pixel_um.to_string(), "a number above 0"));
+        }
+        if let Some(size) = self.size
+            && !(1..=LARGEST).contains(&size)
+        {
+            return Err(self.wrong("size", &size.to_string(), &format!("1 to {LARGEST}")));
+        }
+        if let PsfSampling::Paper { n_across } = self.sampling
+            && !(2..=20_000).contains(&n_across)
+        {
+            return Err(self.wrong("rays", &n_across.to_string(), "2 to 20000"));
+        }
+        if matches!(self.sampling, PsfSampling::Paper { .. }) && self.diffraction == DiffractionChoice::Wave {
+            return Err(self.wrong("diffraction", "wave", "bent rays or none in the paper mode"));
+        }
+        if let Some(BankChoice::Within { error }) = self.bank
+            && !(error.is_finite() && error > 0.0)
+        {
+            return Err(self.wrong("bank_error", &error.to_string(), "a number above 0"));
+        }
+        if self.bank.is_some() && self.sampling != PsfSampling::Pupil {
+            return Err(self.wrong("bank", "a bank", "none in the paper mode, which counts the rays of each point"));
+        }
+        let (weights, n) = (&self.spectral_weights, self.wavelengths_nm.len());
+        let are_weights = weights.iter().all(|w| w.is_finite() && *w >= 0.0) && weights.iter().any(|w| *w > 0.0);
+        if !weights.is_empty() && (weights.len() != n || !are_weights) {
+            let expected = format!("{n} numbers of 0 or more, one a wavelength");
+            return Err(self.wrong("spectral_weights", &format!("{weights:?}"), &expected));
+        }
+        match self.mtf_per_mm.iter().find(|f| !f.is_finite()) {
+            Some(found) => Err(self.wrong("mtf_per_mm", &found.to_string(), "finite numbers")),
+            None => Ok(()),
+        }
+    }
+
+    pub(crate) fn wrong(&self, key: &'static str, found: &str, expected: &str) -> PipelineError {
+        PipelineError::Value { origin: "psf".to_owned(), key, found: found.to_owned(), expected: expected.to_owned() }
+    }
+}

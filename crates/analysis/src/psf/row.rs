@@ -1,0 +1,231 @@
+//! What is measured of one point-spread function.
+
+use std::{f64::consts::FRAC_PI_2, fmt::Write};
+
+use dioptric_diffraction::Covariance;
+use dioptric_optics::glam::DVec2;
+use dioptric_psf::Picture;
+use serde::Serialize;
+
+use super::spot::Moments;
+use dioptric_pipeline::BankData;
+
+/// What is measured of one point-spread function.
+///
+/// Positions are in the picture frame: a point to the right of the axis has a positive x.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PsfRow {
+    /// Field angle to the right, degrees.
+    pub field_deg: f64,
+    /// Field angle upwards, degrees.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub field_y_deg: f64,
+    /// Distance of the point before the first vertex, mm.
+    pub distance_mm: f64,
+    /// Wavelength, nm; of a whole light, the mean.
+    pub wavelength_nm: f64,
+    /// Whether this is the light of all wavelengths of the point together.
+    #[serde(skip_serializing_if = "is_false")]
+    pub is_whole_light: bool,
+    /// Centroid, to the right, mm from the axis.
+    pub centroid_x_mm: f64,
+    /// Centroid, upwards, mm from the axis.
+    pub centroid_y_mm: f64,
+    /// Root-mean-square distance from the centroid, µm: of rays where there is no diffraction, else of the picture.
+    pub rms_radius_um: f64,
+    /// Standard deviation along x, µm.
+    pub sigma_x_um: f64,
+    /// Standard deviation along y, µm.
+    pub sigma_y_um: f64,
+    /// Mean of the product of the distances from the centroid along x and along y, µm²: what the two standard
+    /// deviations do not say of an oblique picture.
+    pub second_moment_xy_um2: f64,
+    /// Full width at half maximum of the line spread along x, µm.
+    pub lsf_fwhm_um: f64,
+    /// The same along y.
+    pub lsf_fwhm_y_um: f64,
+    /// Radius about the centroid that holds half the energy, µm.
+    pub ee50_radius_um: f64,
+    /// Radius about the centroid that holds 80 % of the energy, µm.
+    pub ee80_radius_um: f64,
+    /// Half the side of the square about the centroid that holds half the energy, µm.
+    pub es50_half_width_um: f64,
+    /// Half the side of the square about the centroid that holds 80 % of the energy, µm.
+    pub es80_half_width_um: f64,
+    /// The area of the pupil that reaches the film over that of an axial point at the same distance and wavelength
+    /// (paper mode: the share of the rays over the front rim's disc).
+    pub energy: f64,
+    /// The share of the point's light that lies on the picture: what the picture's metrics are of.
+    pub picture_share: f64,
+    /// The share of the picture that is the sum of waves; the rest is geometric or bent rays. Not in the paper mode.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wave_share: Option<f64>,
+    /// Why waves that were asked for were not summed, if so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fallback: Option<String>,
+    /// The Strehl ratio at the pattern's peak, where waves were summed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strehl: Option<f64>,
+    /// The bank from which it was drawn, where it was not traced.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bank: Option<BankData>,
+    /// Modulation at the frequencies asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mtf: Vec<MtfRow>,
+}
+
+/// The modulation at a spatial frequency.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MtfRow {
+    /// Spatial frequency, cycles per mm.
+    pub cycles_per_mm: f64,
+    /// Modulation of a wave along x, the radial direction.
+    pub radial: f64,
+    /// Modulation of a wave along y.
+    pub tangential: f64,
+}
+
+/// Which point a row is of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PointName {
+    pub(crate) field_deg: f64,
+    pub(crate) field_y_deg: f64,
+    pub(crate) distance_mm: f64,
+    pub(crate) wavelength_nm: f64,
+}
+
+impl PsfRow {
+    /// Measures a picture whose light lies at this place and has these second moments, µm².
+    pub(crate) fn measure(name: PointName, place_mm: DVec2, second: Covariance, picture: &Picture) -> Self {
+        let [encircled, ensquared] = [picture.encircled(), picture.ensquared()];
+        let lit = |value: f64| if picture.energy().sum() > 0.0 { value } else { f64::NAN };
+        let width_um = |direction: f64| lit(picture.line_spread(direction).full_width_at_half_maximum_um());
+        let (sigma_x_um, sigma_y_um) = (second.xx.sqrt(), second.yy.sqrt());
+        Self {
+            field_deg: name.field_deg,
+            field_y_deg: name.field_y_deg,
+            distance_mm: name.distance_mm,
+            wavelength_nm: name.wavelength_nm,
+            is_whole_light: false,
+            // Adding 0 takes the sign from a zero.
+            centroid_x_mm: place_mm.x + 0.0,
+            centroid_y_mm: place_mm.y + 0.0,
+            rms_radius_um: sigma_x_um.hypot(sigma_y_um),
+            sigma_x_um,
+            sigma_y_um,
+            second_moment_xy_um2: second.xy + 0.0,
+            lsf_fwhm_um: width_um(0.0),
+            lsf_fwhm_y_um: width_um(FRAC_PI_2),
+            ee50_radius_um: lit(encircled.reach_um(0.5)),
+            ee80_radius_um: lit(encircled.reach_um(0.8)),
+            es50_half_width_um: lit(ensquared.reach_um(0.5)),
+            es80_half_width_um: lit(ensquared.reach_um(0.8)),
+            energy: 0.0,
+            picture_share: 0.0,
+            wave_share: None,
+            fallback: None,
+            strehl: None,
+            bank: None,
+            mtf: Vec::new(),
+        }
+    }
+
+    /// Returns the row with the modulations at these frequencies, of a wave along a direction from +x.
+    pub(crate) fn with_mtf(self, cycles_per_mm: &[f64], modulation: impl Fn(f64, f64) -> f64) -> Self {
+        let row = |&cycles_per_mm: &f64| MtfRow {
+            cycles_per_mm,
+            radial: modulation(0.0, cycles_per_mm),
+            tangential: modulation(FRAC_PI_2, cycles_per_mm),
+        };
+        Self { mtf: cycles_per_mm.iter().map(row).collect(), ..self }
+    }
+
+    /// Whether none of the point's light reaches the film: all that is measured of it is then no number.
+    pub fn is_dark(&self) -> bool {
+        self.energy.is_nan() || self.energy <= 0.0
+    }
+
+    /// Whether so much of the light lies beside the picture that its metrics are not those of the point.
+    pub fn is_cut(&self) -> bool {
+        !self.is_dark() && self.picture_share < 0.97
+    }
+
+    /// Whether any of the picture is the sum of waves.
+    pub fn is_of_waves(&self) -> bool {
+        self.wave_share.is_some_and(|share| share > 0.0)
+    }
+
+    /// The centroid, mm.
+    pub(crate) fn centroid_mm(&self) -> DVec2 {
+        DVec2::new(self.centroid_x_mm, self.centroid_y_mm)
+    }
+
+    /// The second moments about the centroid, µm².
+    pub(crate) fn second_moments_um2(&self) -> Covariance {
+        Covariance { xx: self.sigma_x_um.powi(2), xy: self.second_moment_xy_um2, yy: self.sigma_y_um.powi(2) }
+    }
+}
+
+/// Returns where the light of a spot lies, and its second moments in µm²; numbers that are none where it has no light.
+pub(crate) fn place_and_size(moments: Option<Moments>) -> (DVec2, Covariance) {
+    match moments {
+        Some(Moments { centroid_mm, second_mm2: m }) => {
+            (centroid_mm, Covariance { xx: 1e6 * m.xx, xy: 1e6 * m.xy, yy: 1e6 * m.yy })
+        }
+        None => (DVec2::NAN, Covariance { xx: f64::NAN, xy: f64::NAN, yy: f64::NAN }),
+    }
+}
+
+/// Returns rows as a table with a line of names; modulations are named by their frequency.
+pub fn psf_csv(rows: &[PsfRow]) -> String {
+    let mut csv =
+        "field_deg,field_y_deg,distance_mm,wavelength_nm,is_whole_light,centroid_x_mm,centroid_y_mm,rms_radius_um,sigma_x_um,\
+                   sigma_y_um,second_moment_xy_um2,lsf_fwhm_um,lsf_fwhm_y_um,ee50_radius_um,ee80_radius_um,\
+                   es50_half_width_um,es80_half_width_um,energy,picture_share,wave_share,strehl"
+            .to_owned();
+    for mtf in rows.first().map_or(&[][..], |row| &row.mtf) {
+        let f = mtf.cycles_per_mm;
+        let _ = write!(csv, ",mtf_radial_{f}_per_mm,mtf_tangential_{f}_per_mm");
+    }
+    csv.push('\n');
+    let or_empty = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+    for row in rows {
+        let numbers = [
+            row.centroid_x_mm,
+            row.centroid_y_mm,
+            row.rms_radius_um,
+            row.sigma_x_um,
+            row.sigma_y_um,
+            row.second_moment_xy_um2,
+            row.lsf_fwhm_um,
+            row.lsf_fwhm_y_um,
+            row.ee50_radius_um,
+            row.ee80_radius_um,
+            row.es50_half_width_um,
+            row.es80_half_width_um,
+            row.energy,
+            row.picture_share,
+        ];
+        let PsfRow { field_deg, field_y_deg, distance_mm, wavelength_nm, is_whole_light, .. } = row;
+        let _ = write!(csv, "{field_deg},{field_y_deg},{distance_mm},{wavelength_nm},{is_whole_light}");
+        for value in numbers {
+            let _ = write!(csv, ",{value}");
+        }
+        let _ = write!(csv, ",{},{}", or_empty(row.wave_share), or_empty(row.strehl));
+        for mtf in &row.mtf {
+            let _ = write!(csv, ",{},{}", mtf.radial, mtf.tangential);
+        }
+        csv.push('\n');
+    }
+    csv
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}

@@ -1,0 +1,169 @@
+//! The modulation of point-spread functions as the film moves.
+
+use std::f64::consts::FRAC_PI_2;
+
+use dioptric_optics::{Lens, ObjectPoint};
+use dioptric_psf::Picture;
+use rayon::prelude::*;
+
+use super::request::Item;
+use super::source::PsfSource;
+use super::spot::{PaperRays, Spot};
+use crate::{PsfRequest, PsfSampling, PsfSet};
+use dioptric_pipeline::PipelineError;
+
+/// Steps of the film to each side of its place.
+const STEPS: i32 = 12;
+/// The frequency where none is asked for, cycles per mm.
+const FREQUENCY_PER_MM: f64 = 30.0;
+/// Pixels in a period of the wave: fewer and what they average away is no longer known well, more and large blurs cost
+/// too much.
+const PIXELS_A_PERIOD: f64 = 8.0;
+/// The largest window, pixels along its side: 75 periods.
+const LARGEST_WINDOW: usize = 601;
+
+/// The modulation at one frequency as the film moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ThroughFocus {
+    /// Spatial frequency, cycles per mm.
+    pub cycles_per_mm: f64,
+    /// How far the film is moved away from the lens, mm.
+    pub shifts_mm: Vec<f64>,
+    /// The rows of the set that were followed: those that its plots show.
+    pub rows: Vec<usize>,
+    /// For each of these, the modulations of waves along the radial direction and across it.
+    pub modulations: Vec<Vec<(f64, f64)>>,
+}
+
+impl PsfRequest {
+    /// Computes the modulation at the first of the frequencies asked for (or 30 cycles per mm) while the film moves by
+    /// so much that the sharpest of the pictures is blurred past it.
+    ///
+    /// Only what plots show is followed, on pixels as coarse as the frequency allows; the modulation is that of the
+    /// pixels asked for. Light that falls outside 75 periods counts as unmodulated.
+    ///
+    /// # Errors
+    /// Those of [`compute`](Self::compute).
+    pub fn through_focus(&self, lens: &Lens, set: &PsfSet) -> Result<ThroughFocus, PipelineError> {
+        let cycles_per_mm = self.mtf_per_mm.iter().copied().find(|f| *f > 0.0).unwrap_or(FREQUENCY_PER_MM);
+        let reference = self.reference(lens)?;
+        let first = reference.first_order();
+        // A telecentric lens has the cone of its object's image on any film.
+        let f_number = match (set.film_mm - first.exit_pupil_z_mm) / first.exit_pupil_diameter_mm {
+            f_number if f_number.is_finite() => f_number,
+            _ => reference.working_f_number(self.distances_mm.first().copied().unwrap_or(f64::INFINITY)),
+        };
+        // Where the blur is 1.2 periods wide, the modulation of an even disc is at its first zero.
+        let reach_mm = match 1.5 * 1.22 * f_number.abs() / cycles_per_mm {
+            reach if reach.is_finite() => reach.min(5.0),
+            _ => 1.0,
+        };
+        let shifts_mm: Vec<f64> = (-STEPS..=STEPS).map(|i| reach_mm * f64::from(i) / f64::from(STEPS)).collect();
+        let rows = set.plotted();
+        let all = self.items(lens)?;
+        let items: Vec<Item> = rows.iter().map(|row| all[*row]).collect();
+        let mut modulations = vec![Vec::with_capacity(shifts_mm.len()); rows.len()];
+        for shift_mm in &shifts_mm {
+            let here = Here { request: self, lens, items: &items, film_mm: set.film_mm + shift_mm, cycles_per_mm };
+            for (found, modulation) in modulations.iter_mut().zip(here.modulations()?) {
+                found.push(modulation);
+            }
+        }
+        Ok(ThroughFocus { cycles_per_mm, shifts_mm, rows, modulations })
+    }
+}
+
+/// A place of the film.
+struct Here<'a> {
+    request: &'a PsfRequest,
+    lens: &'a Lens,
+    items: &'a [Item],
+    film_mm: f64,
+    cycles_per_mm: f64,
+}
+
+impl Here<'_> {
+    /// Returns the modulations along and across of each point.
+    fn modulations(&self) -> Result<Vec<(f64, f64)>, PipelineError> {
+        match self.request.sampling {
+            PsfSampling::Pupil => {
+                let source = self.request.exact_source(self.lens, self.items, self.film_mm)?;
+                Ok(self.items.par_iter().map(|item| self.of_picture(item, &source)).collect())
+            }
+            PsfSampling::Paper { n_across } => {
+                let rays = PaperRays { n_across, bending: self.request.diffraction.model(), seed: self.request.seed };
+                self.items.par_iter().map(|item| self.of_rays(item, &rays)).collect()
+            }
+        }
+    }
+
+    fn of_picture(&self, item: &Item, source: &PsfSource) -> (f64, f64) {
+        let Some(Window { picture, held }) = self.window(item, source) else { return (f64::NAN, f64::NAN) };
+        let modulation = |direction| {
+            let own = picture.mtf(direction, self.cycles_per_mm) * held;
+            (own * self.pixels(self.request.pixel_um) / self.pixels(picture.pitch_um())).min(1.0)
+        };
+        (modulation(0.0), modulation(FRAC_PI_2))
+    }
+
+    /// Draws a point on the coarsest pixels that do, in a window that is not too large; `None` of a dark point.
+    fn window(&self, item: &Item, source: &PsfSource) -> Option<Window> {
+        let asked_um = self.request.pixel_um;
+        let reach_um = 1e3 * source.reach_mm(item.query(asked_um))?;
+        let pitch_um = pitch_um(asked_um, self.cycles_per_mm, reach_um);
+        let query = item.query(pitch_um);
+        if 2.0 * reach_um > pitch_um * LARGEST_WINDOW as f64 {
+            let (energy, _) = source.picture(query, LARGEST_WINDOW)?;
+            return Some(Window { held: energy.sum(), picture: Picture::new(energy.view(), pitch_um) });
+        }
+        let (kernel, _) = source.kernel(query)?;
+        Some(Window { held: 1.0, picture: Picture::from(&kernel) })
+    }
+
+    fn of_rays(&self, item: &Item, rays: &PaperRays) -> Result<(f64, f64), PipelineError> {
+        let reference = self.request.reference(self.lens)?;
+        let mono = self.lens.at(item.wavelength_nm)?;
+        let point = ObjectPoint::from_field(&reference, item.field_tan(), item.dioptres);
+        let spot = Spot::over_front(&mono, &point, self.film_mm, rays);
+        let pixels = self.pixels(self.request.pixel_um);
+        Ok((spot.modulation(0.0, self.cycles_per_mm) * pixels, spot.modulation(FRAC_PI_2, self.cycles_per_mm) * pixels))
+    }
+
+    /// Returns the modulation that square pixels leave of the wave.
+    fn pixels(&self, pitch_um: f64) -> f64 {
+        let x = std::f64::consts::PI * 1e-3 * pitch_um * self.cycles_per_mm;
+        if x == 0.0 { 1.0 } else { (x.sin() / x).abs() }
+    }
+}
+
+/// A picture and the share of the light that it holds.
+struct Window {
+    picture: Picture,
+    held: f64,
+}
+
+/// Returns the side of the pixels on which a modulation is computed, µm: those asked for where the blur is small, up to
+/// an eighth of a period where it is large.
+fn pitch_um(asked_um: f64, cycles_per_mm: f64, reach_um: f64) -> f64 {
+    let coarsest_um = 1e3 / (PIXELS_A_PERIOD * cycles_per_mm);
+    // A blur of fewer pixels costs nothing, and what is sharper than a pixel would be read off wrongly.
+    let fine_um = reach_um / 32.0;
+    asked_um.max(coarsest_um.min(fine_um))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_stay_small_whatever_the_blur() {
+        for (cycles_per_mm, reach_um) in [(30.0, 0.5), (30.0, 40.0), (30.0, 900.0), (2.0, 900.0), (200.0, 3000.0)] {
+            let pitch = pitch_um(0.1, cycles_per_mm, reach_um);
+            let held_px = (2.0 * reach_um / pitch).min(LARGEST_WINDOW as f64);
+            assert!(pitch >= 0.1 && pitch <= 1e3 / (8.0 * cycles_per_mm), "{pitch}");
+            // The window is cut only where it holds 75 periods.
+            assert!(held_px <= 64.0 + 1e-9 || pitch * held_px * 1e-3 * cycles_per_mm <= 75.2, "{held_px} of {pitch}");
+        }
+        assert_eq!(pitch_um(5.0, 30.0, 900.0), 5.0);
+    }
+}

@@ -1,0 +1,307 @@
+//! The plots of the report.
+
+use dioptric_optics::glam::DVec2;
+use dioptric_psf::{Picture, PsfQuery};
+
+use crate::SensorStatistics;
+use crate::{Corner, LineChart, Scale, Series};
+use dioptric_pipeline::{CameraBank, Capture, REFERENCE_WAVELENGTH_NM, Shot, display::wavelength_color};
+
+/// Points of a curve.
+const POINTS: usize = 64;
+/// Colours of the channels of a frame that are not red, green or blue.
+const OTHER_CHANNEL: &str = "#555566";
+
+/// The plots of the report.
+#[derive(Clone, Debug)]
+pub struct RunCharts {
+    /// Line spread functions.
+    pub lsf: LineChart,
+    /// Modulation transfer.
+    pub mtf: LineChart,
+    /// Relative illumination.
+    pub illumination: LineChart,
+    /// Distortion.
+    pub distortion: LineChart,
+    /// Mean spectral irradiance.
+    pub spectrum: LineChart,
+    /// Digital numbers.
+    pub histogram: LineChart,
+}
+
+/// The places of the scene that the plots are about.
+#[derive(Clone, Debug)]
+pub struct RunPlaces {
+    /// The field of the film's corner, tangents across and up.
+    pub corner: DVec2,
+    /// The depth in focus, dioptres, moved into the range of the bank.
+    pub focus_dioptres: f64,
+    /// A few depths from far to near, dioptres.
+    pub dioptres: Vec<f64>,
+    /// A few wavelengths, nm.
+    pub wavelengths_nm: Vec<f64>,
+}
+
+impl RunPlaces {
+    /// Returns the places of a run.
+    pub fn of(shot: &Shot, capture: &Capture) -> Self {
+        let bank = &capture.bank;
+        let (far, near) = bank.kernels().dioptres();
+        let steps = if near - far > 1e-6 { 4 } else { 1 };
+        let (first, last) = shot.grid().range_nm();
+        // Four wavelengths from end to end, and the reference in place of the nearest where it is among them.
+        let wavelengths_nm =
+            (0..4).map(|i| first + (last - first) * f64::from(i) / 3.0).map(f64::round).collect::<Vec<_>>();
+        let focus = shot.focus_distance_mm.map_or(near, |mm| {
+            let pupil_z_mm = shot.lens.at(REFERENCE_WAVELENGTH_NM).map_or(0.0, |lens| lens.projection_center_z_mm());
+            1e3 / (mm + pupil_z_mm)
+        });
+        Self {
+            corner: bank.corner_tan(&shot.film, focus.clamp(far, near), REFERENCE_WAVELENGTH_NM),
+            focus_dioptres: focus.clamp(far, near),
+            dioptres: (0..steps).map(|i| far + (near - far) * i as f64 / (steps as f64 - 1.0).max(1.0)).collect(),
+            wavelengths_nm: if last > first { wavelengths_nm } else { vec![first] },
+        }
+    }
+}
+
+impl RunPlaces {
+    /// The size of the largest field of the film, as its tangent.
+    pub fn corner_tan(&self) -> f64 {
+        self.corner.length()
+    }
+
+    /// Returns the field at a share of the way from the axis to the corner.
+    pub fn field(&self, share: f64) -> DVec2 {
+        share * self.corner
+    }
+}
+
+impl RunCharts {
+    /// Draws up the charts of a run.
+    pub fn of(shot: &Shot, capture: &Capture, places: &RunPlaces, sensor: &SensorStatistics) -> Self {
+        Self {
+            lsf: lsf(shot, &capture.bank, places),
+            mtf: mtf(shot, &capture.bank, places),
+            illumination: illumination(&capture.bank, places),
+            distortion: distortion(&capture.bank, places),
+            spectrum: spectrum(shot, capture),
+            histogram: histogram(capture, sensor),
+        }
+    }
+}
+
+fn picture(bank: &CameraBank, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Picture {
+    Picture::from(&bank.kernel(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um }))
+}
+
+/// Line spreads on the axis, in focus, over wavelength.
+fn lsf(shot: &Shot, bank: &CameraBank, places: &RunPlaces) -> LineChart {
+    let spreads: Vec<_> = places
+        .wavelengths_nm
+        .iter()
+        .map(|&nm| {
+            // As fine as the narrowest line asks for.
+            let airy_um = 1e-3 * nm * shot.lens.at(nm).map_or(4.0, |l| l.first_order().f_number);
+            let blur_um = 1e3 * bank.kernels().blur_radius_mm(DVec2::ZERO, places.focus_dioptres, nm).abs();
+            let pitch_um = (0.1 * airy_um).max(0.02 * blur_um);
+            (nm, picture(bank, DVec2::ZERO, places.focus_dioptres, nm, pitch_um).line_spread(0.0))
+        })
+        .collect();
+    let reach_um = spreads
+        .iter()
+        .map(|(_, spread)| 2.5 * spread.full_width_at_half_maximum_um())
+        .filter(|reach| reach.is_finite())
+        .fold(1.0, f64::max);
+    let top = spreads.iter().flat_map(|(_, spread)| &spread.values).copied().fold(0.0, f64::max);
+    let series = spreads
+        .iter()
+        .map(|(nm, spread)| Series {
+            label: Some(format!("{nm:.0} nm")),
+            color: wavelength_color(*nm),
+            points: spread
+                .at_um
+                .iter()
+                .zip(&spread.values)
+                .filter(|(x, _)| x.abs() <= reach_um)
+                .map(|(&x, &y)| (x, y))
+                .collect(),
+            is_dashed: false,
+        })
+        .collect();
+    LineChart {
+        title: "Line spread on the axis, in focus".to_owned(),
+        x_label: "x on the film, µm".to_owned(),
+        y_label: "share per µm".to_owned(),
+        x_range: (-reach_um, reach_um),
+        y_range: (0.0, 1.05 * top),
+        series,
+        legend: Corner::TopRight,
+        scale: Scale::Linear,
+    }
+}
+
+/// Modulation up to the sensor's Nyquist frequency on the axis and towards the corner, in focus and at the far end.
+fn mtf(shot: &Shot, bank: &CameraBank, places: &RunPlaces) -> LineChart {
+    let nyquist_per_mm = 500.0 / shot.film.pitch_um;
+    let pitch_um = (shot.film.pitch_um / 8.0).min(2.0);
+    let far = places.dioptres[0];
+    let (radial, focus) = (places.corner.to_angle(), places.focus_dioptres);
+    let tangential = radial + std::f64::consts::FRAC_PI_2;
+    let mut lines = vec![
+        ("axis, in focus", DVec2::ZERO, focus, 0.0, "#1b6ca8"),
+        ("70 % field, radial", places.field(0.7), focus, radial, "#c2571a"),
+        ("70 % field, tangential", places.field(0.7), focus, tangential, "#7a9e2c"),
+    ];
+    if (far - places.focus_dioptres).abs() > 1e-6 {
+        lines.push(("axis, far end of the scene", DVec2::ZERO, far, 0.0, "#777788"));
+    }
+    let series = lines
+        .into_iter()
+        .map(|(label, field_tan, dioptres, direction, color)| {
+            let spot = picture(bank, field_tan, dioptres, REFERENCE_WAVELENGTH_NM, pitch_um);
+            let points = (0..=POINTS)
+                .map(|i| nyquist_per_mm * i as f64 / POINTS as f64)
+                .map(|f| (f, spot.mtf(direction, f)))
+                .collect();
+            Series {
+                label: Some(label.to_owned()),
+                color: color.to_owned(),
+                points,
+                is_dashed: label.ends_with("tangential"),
+            }
+        })
+        .collect();
+    LineChart {
+        title: format!("Modulation of the lens at {REFERENCE_WAVELENGTH_NM:.0} nm"),
+        x_label: "cycles per mm".to_owned(),
+        y_label: "modulation".to_owned(),
+        x_range: (0.0, nyquist_per_mm),
+        y_range: (0.0, 1.05),
+        series,
+        legend: Corner::BottomLeft,
+        scale: Scale::Linear,
+    }
+}
+
+fn over_field(places: &RunPlaces, of: impl Fn(DVec2) -> f64) -> Vec<(f64, f64)> {
+    (0..=POINTS)
+        .map(|i| places.field(i as f64 / POINTS as f64))
+        .map(|tan| (tan.length().atan().to_degrees(), of(tan)))
+        .collect()
+}
+
+fn illumination(bank: &CameraBank, places: &RunPlaces) -> LineChart {
+    let gain = |tan| bank.irradiance_per_radiance(tan, places.focus_dioptres, REFERENCE_WAVELENGTH_NM);
+    let axis = gain(DVec2::ZERO);
+    let real = over_field(places, |tan| gain(tan) / axis);
+    let cosines = over_field(places, |tan| tan.length().atan().cos().powi(4));
+    let series = |label: &str, color: &str, points, is_dashed| Series {
+        label: Some(label.to_owned()),
+        color: color.to_owned(),
+        points,
+        is_dashed,
+    };
+    LineChart {
+        title: "Relative illumination".to_owned(),
+        x_label: "field angle, degrees".to_owned(),
+        y_label: "share of the axis".to_owned(),
+        x_range: (0.0, places.corner_tan().atan().to_degrees()),
+        y_range: (0.0, 1.05),
+        series: vec![series("this lens", "#1b6ca8", real, false), series("cos⁴", "#999999", cosines, true)],
+        legend: Corner::BottomLeft,
+        scale: Scale::Linear,
+    }
+}
+
+fn distortion(bank: &CameraBank, places: &RunPlaces) -> LineChart {
+    let at = |tan, nm| bank.centroid_mm(tan, places.focus_dioptres, nm);
+    // Heights count from where the axis lands, which a tilted lens moves.
+    let axis_mm = at(DVec2::ZERO, REFERENCE_WAVELENGTH_NM);
+    let small = places.field(1e-3);
+    let scale_mm = at(small, REFERENCE_WAVELENGTH_NM).distance(axis_mm) / small.length();
+    let curves: Vec<Series> = places
+        .wavelengths_nm
+        .iter()
+        .map(|&nm| {
+            let points = over_field(places, |tan| {
+                let tan = if tan.length() > small.length() { tan } else { small };
+                100.0 * (at(tan, nm).distance(axis_mm) / (scale_mm * tan.length()) - 1.0)
+            });
+            Series { label: Some(format!("{nm:.0} nm")), color: wavelength_color(nm), points, is_dashed: false }
+        })
+        .collect();
+    let values = || curves.iter().flat_map(|curve| curve.points.iter().map(|p| p.1));
+    let (low, high) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
+    let margin = 0.08 * (high - low).max(0.01);
+    LineChart {
+        title: "Distortion and lateral colour".to_owned(),
+        x_label: "field angle, degrees".to_owned(),
+        y_label: "image height against f · tan, %".to_owned(),
+        x_range: (0.0, places.corner_tan().atan().to_degrees()),
+        y_range: (low - margin, high + margin),
+        series: curves,
+        legend: Corner::BottomLeft,
+        scale: Scale::Linear,
+    }
+}
+
+fn spectrum(shot: &Shot, capture: &Capture) -> LineChart {
+    let points: Vec<(f64, f64)> =
+        shot.grid().centers_nm().iter().zip(&capture.irradiance.mean).map(|(&nm, &e)| (nm, 1e3 * e)).collect();
+    let top = points.iter().map(|p| p.1).fold(0.0, f64::max);
+    let (first, last) = shot.grid().range_nm();
+    LineChart {
+        title: "Mean spectral irradiance on the film".to_owned(),
+        x_label: "wavelength, nm".to_owned(),
+        y_label: "mW m⁻² nm⁻¹".to_owned(),
+        x_range: if last > first { (first, last) } else { (first - 1.0, first + 1.0) },
+        y_range: (0.0, 1.05 * top.max(f64::MIN_POSITIVE)),
+        series: vec![Series { label: None, color: "#1b6ca8".to_owned(), points, is_dashed: false }],
+        legend: Corner::TopRight,
+        scale: Scale::Linear,
+    }
+}
+
+fn histogram(capture: &Capture, sensor: &SensorStatistics) -> LineChart {
+    let series: Vec<Series> = sensor
+        .channels
+        .iter()
+        .map(|channel| {
+            let n = channel.histogram.len() as f64;
+            let top = capture.exposed.raw.levels.top;
+            let center = |bin: usize| (bin as f64 + 0.5) / n * top;
+            Series {
+                label: Some(channel.filter.clone()),
+                color: channel_color(&channel.filter).to_owned(),
+                points: channel
+                    .histogram
+                    .iter()
+                    .enumerate()
+                    .map(|(bin, &share)| (center(bin), 100.0 * share))
+                    .collect(),
+                is_dashed: false,
+            }
+        })
+        .collect();
+    let top = series.iter().flat_map(|s| &s.points).map(|p| p.1).fold(0.0, f64::max);
+    LineChart {
+        title: "Raw frame".to_owned(),
+        x_label: "digital number".to_owned(),
+        y_label: "pixels of the channel, %".to_owned(),
+        x_range: (0.0, capture.exposed.raw.levels.top),
+        y_range: (0.0, 1.05 * top.max(f64::MIN_POSITIVE)),
+        series,
+        legend: Corner::TopRight,
+        scale: Scale::Linear,
+    }
+}
+
+fn channel_color(filter: &str) -> &'static str {
+    match filter.chars().next().map(|c| c.to_ascii_lowercase()) {
+        Some('r') => "#c23b22",
+        Some('g') => "#2e8b3d",
+        Some('b') => "#2855b5",
+        _ => OTHER_CHANNEL,
+    }
+}

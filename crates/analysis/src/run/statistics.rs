@@ -1,0 +1,196 @@
+//! Numbers of a capture: what the sensor saw and what the lens lost.
+
+use dioptric_optics::{MonoLens, ObjectPoint, Rims, glam::DVec2, rays_over_front};
+use dioptric_sensor::{Raw, RawPlane, Tile};
+use ndarray::Array2;
+use serde::Serialize;
+
+use crate::psf::spot::Spot;
+use crate::{LensData, LensQuestion};
+use dioptric_pipeline::{Frames, PipelineError, REFERENCE_WAVELENGTH_NM, Shot};
+
+/// Bins of a histogram of digital numbers.
+const BINS: usize = 128;
+/// Rays along the side of the grid that counts losses.
+const LOSS_RAYS: usize = 101;
+
+/// What the sensor saw.
+#[derive(Clone, Debug, Serialize)]
+pub struct SensorStatistics {
+    /// The sensor.
+    pub sensor: String,
+    /// Exposure time, s.
+    pub exposure_time_s: f64,
+    /// Factor on the voltage.
+    pub analog_gain: f64,
+    /// Electrons at which a pixel saturates.
+    pub saturation_e: f64,
+    /// The share of samples at saturation.
+    pub saturated_fraction: f64,
+    /// Read noise, electrons.
+    pub read_noise_e: f64,
+    /// The time from one row's readout to the next, µs; 0 for a global shutter.
+    pub row_time_us: f64,
+    /// How much later the last row is exposed than the first, ms.
+    pub last_row_later_ms: f64,
+    /// A row a filter.
+    pub channels: Vec<ChannelStatistics>,
+}
+
+/// What the pixels behind one filter saw.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChannelStatistics {
+    /// The filter.
+    pub filter: String,
+    /// Mean electrons.
+    pub mean_e: f64,
+    /// Largest mean electrons of a pixel.
+    pub max_e: f64,
+    /// Signal-to-noise ratio at the mean, dB (shot and read noise).
+    pub snr_db: f64,
+    /// Mean sample of the raw frame: digital number, or volts.
+    pub mean_raw: f64,
+    /// The share of pixels in each bin of digital numbers from 0 to the top.
+    #[serde(skip)]
+    pub histogram: Vec<f64>,
+}
+
+/// Where the light of a field goes: shares of what enters the front rim's disc.
+#[derive(Clone, Debug, Serialize)]
+pub struct LossRow {
+    /// Field angle, degrees.
+    pub field_deg: f64,
+    /// The share that reaches the film.
+    pub reaches_film: f64,
+    /// The share that the stop ends.
+    pub ended_by_stop: f64,
+    /// The share that other rims end.
+    pub ended_by_rims: f64,
+    /// The share that misses a surface or is totally reflected.
+    pub missed_or_reflected: f64,
+    /// The area of the pupil that reaches the film over that of the axial pupil: relative illumination without the
+    /// cosines.
+    pub vignetting: f64,
+}
+
+impl SensorStatistics {
+    /// Returns the numbers of one exposure.
+    ///
+    /// # Errors
+    /// When the filters of the sensor do not tile.
+    pub fn new(frames: &Frames<'_>) -> Result<Self, PipelineError> {
+        let Frames { sensor, exposure, exposed, .. } = *frames;
+        let raw = &exposed.raw;
+        let tile = sensor.tile()?;
+        let read_noise_e = sensor.read_noise_v(exposure.gain_mode) / sensor.conversion_gain_v_per_e(exposure.gain_mode);
+        let channels =
+            (0..sensor.filters.len()).map(|filter| channel(frames, tile.as_ref(), filter, read_noise_e)).collect();
+        Ok(Self {
+            sensor: sensor.name.clone(),
+            exposure_time_s: exposure.time_s,
+            analog_gain: exposure.analog_gain,
+            saturation_e: sensor.saturation_e(exposure),
+            saturated_fraction: raw.saturated_fraction(),
+            read_noise_e,
+            row_time_us: raw.row_time_us,
+            last_row_later_ms: 1e3 * raw.row_start_s(raw.size().0 - 1),
+            channels,
+        })
+    }
+}
+
+fn channel(frames: &Frames<'_>, tile: Option<&Tile>, filter: usize, read_noise_e: f64) -> ChannelStatistics {
+    let Frames { sensor, exposure, rate, exposed, .. } = *frames;
+    let raw = &exposed.raw;
+    let electrons: Vec<f64> =
+        of_filter(&rate.planes_e_per_s, tile, filter).map(|rate| f64::from(rate) * exposure.time_s).collect();
+    let top = raw.levels.top;
+    let raw = raw_planes(raw);
+    let samples: Vec<f64> = of_filter(&raw, tile, filter).map(f64::from).collect();
+    let mean_of = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let mean_e = mean_of(&electrons);
+    let mut histogram = vec![0.0; BINS];
+    for sample in &samples {
+        let bin = (sample / top * BINS as f64) as usize;
+        histogram[bin.min(BINS - 1)] += 1.0 / samples.len() as f64;
+    }
+    ChannelStatistics {
+        filter: sensor.filters[filter].name.clone(),
+        mean_e,
+        max_e: electrons.iter().copied().fold(0.0, f64::max),
+        snr_db: 20.0 * (mean_e / (mean_e + read_noise_e.powi(2)).sqrt()).log10(),
+        mean_raw: mean_of(&samples),
+        histogram,
+    }
+}
+
+/// Returns the samples of the pixels behind a filter.
+fn of_filter<'a>(
+    planes: &'a [Array2<f32>],
+    tile: Option<&'a Tile>,
+    filter: usize,
+) -> Box<dyn Iterator<Item = f32> + 'a> {
+    match tile {
+        None => Box::new(planes[filter].iter().copied()),
+        Some(tile) => Box::new(
+            planes[0]
+                .indexed_iter()
+                .filter_map(move |((row, column), &value)| (tile.filter_at(row, column) == filter).then_some(value)),
+        ),
+    }
+}
+
+fn raw_planes(raw: &Raw) -> Vec<Array2<f32>> {
+    raw.planes
+        .iter()
+        .map(|plane| match plane {
+            RawPlane::Dn(dn) => dn.mapv(f32::from),
+            RawPlane::Volts(volts) => volts.clone(),
+        })
+        .collect()
+}
+
+/// Returns where the light of a few fields goes, at the reference wavelength and the depth in focus.
+pub(super) fn losses(shot: &Shot, field_tans: &[DVec2]) -> Result<Vec<LossRow>, PipelineError> {
+    let mono = shot.lens.at(REFERENCE_WAVELENGTH_NM)?;
+    let (near_m, _) = shot.scene.require_depth()?.range_m();
+    let dioptres = shot.focus_distance_mm.map_or(1.0 / near_m, |mm| 1e3 / (mm + mono.projection_center_z_mm()));
+    Ok(field_tans.iter().map(|&field_tan| loss_row(shot, &mono, field_tan, dioptres)).collect())
+}
+
+fn loss_row(shot: &Shot, mono: &MonoLens, field_tan: DVec2, dioptres: f64) -> LossRow {
+    let axial = ObjectPoint::from_field(mono, DVec2::ZERO, dioptres);
+    let point = ObjectPoint::from_field(mono, field_tan, dioptres);
+    let mut rays = rays_over_front(mono, &point, LOSS_RAYS);
+    mono.trace(&mut rays, Rims::Clip);
+    let losses = rays.losses();
+    let share = |n: usize| n as f64 / rays.len() as f64;
+    let (mut by_stop, mut by_rims, mut otherwise) = (0, 0, 0);
+    for (surface, row) in losses.by_surface.iter().enumerate() {
+        if surface == mono.stop() {
+            by_stop += row.n_vignetted;
+        } else {
+            by_rims += row.n_vignetted;
+        }
+        otherwise += row.n_missed + row.n_totally_reflected;
+    }
+    LossRow {
+        field_deg: field_tan.length().atan().to_degrees(),
+        reaches_film: share(losses.n_in_flight),
+        ended_by_stop: share(by_stop),
+        ended_by_rims: share(by_rims),
+        missed_or_reflected: share(otherwise),
+        vignetting: Spot::through_pupil(mono, &point, &axial, shot.film_mm).energy,
+    }
+}
+
+/// The lens as it was used.
+pub(super) fn lens_data(shot: &Shot, corner_tan: f64) -> Result<LensData, PipelineError> {
+    let question = LensQuestion {
+        wavelength_nm: REFERENCE_WAVELENGTH_NM,
+        distance_mm: shot.focus_distance_mm,
+        field_deg: corner_tan.atan().to_degrees(),
+        instead_of_f_and_c_nm: None,
+    };
+    LensData::new(&shot.lens, &question)
+}

@@ -1,0 +1,181 @@
+//! How finely point-spread functions are sampled, and what that leaves wrong.
+
+use dioptric_optics::Lens;
+use dioptric_psf::{AdaptiveSettings, BankSettings, ErrorPlaces, Interpolation, MeasuredError, PsfBank};
+use serde::{Deserialize, Serialize};
+
+use crate::{CameraBank, PipelineError, number};
+
+/// Places at which the error of a bank is measured: few, for it is told of every run.
+const N_PLACES: usize = 24;
+/// The most samples of a bank that is to be as good as asked for: some 100 MB.
+const MOST_SAMPLES: usize = 4000;
+
+/// How the point-spread functions of a lens are sampled over field, depth and wavelength.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum BankChoice {
+    /// Rays of 9 fields, 9 depths and 4 wavelengths, interpolated.
+    #[default]
+    Standard,
+    /// Rays of as few samples as a median error needs.
+    Within {
+        /// The median, over places between samples, of the sum of the differences' magnitudes over the energy.
+        error: f64,
+    },
+    /// The paper's: pictures of the standard samples, blended. For comparison only.
+    Paper,
+}
+
+impl BankChoice {
+    /// Traces the bank, and measures the error of its interpolation on pixels of this size.
+    pub fn build(self, lens: &Lens, standard: BankSettings, pitch_um: f64) -> Result<PsfBank, PipelineError> {
+        let places = places(pitch_um);
+        Ok(match self {
+            Self::Standard => PsfBank::build(lens, &standard)?.with_measured_error(&places)?,
+            Self::Paper => {
+                let images = BankSettings { interpolation: Interpolation::Images, ..standard };
+                PsfBank::build(lens, &images)?.with_measured_error(&places)?
+            }
+            Self::Within { error } => {
+                let wanted = AdaptiveSettings { target_median: error, most_samples: MOST_SAMPLES, places };
+                PsfBank::build_adaptive(lens, &standard.coarse(), &wanted)?
+            }
+        })
+    }
+
+    /// Returns where the error of a bank of a lens without an axis of symmetry is measured, or says that the choice is not
+    /// for such a one.
+    pub fn places_of_plane(self, lens: &Lens, pitch_um: f64) -> Result<ErrorPlaces, PipelineError> {
+        match self {
+            Self::Standard => Ok(places(pitch_um)),
+            Self::Within { .. } | Self::Paper => {
+                let reason =
+                    format!("only the standard one is for a lens without an axis of symmetry, as {} is", lens.name());
+                Err(PipelineError::Unsuitable { what: "bank", reason })
+            }
+        }
+    }
+}
+
+fn places(pitch_um: f64) -> ErrorPlaces {
+    ErrorPlaces { pitch_um, n_places: N_PLACES, ..ErrorPlaces::STANDARD }
+}
+
+/// How a bank was sampled, and the error of what lies between its samples.
+///
+/// Errors are those of pictures without diffraction at places drawn at random: the sum over pixels of the differences'
+/// magnitudes from pictures traced there, over the energy. 0 is perfect, 2 no overlap at all.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BankData {
+    /// What is interpolated: rays or images.
+    pub interpolation: &'static str,
+    /// Field angles that see light.
+    pub n_fields: usize,
+    /// Depths.
+    pub n_depths: usize,
+    /// Wavelengths.
+    pub n_wavelengths: usize,
+    /// Half the places have less.
+    pub median_error: f64,
+    /// Nine tenths of the places have less.
+    pub p90_error: f64,
+    /// How many places there were.
+    pub n_places: usize,
+    /// Side of the pixels on which pictures were compared, µm.
+    pub pitch_um: f64,
+    /// The median that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wanted_error: Option<f64>,
+}
+
+impl BankData {
+    /// Returns what is known of a camera's bank.
+    pub fn of_camera(bank: &CameraBank) -> Option<Self> {
+        match bank {
+            CameraBank::Turned(bank) => Self::of(bank),
+            CameraBank::Plane { bank, error } => {
+                let settings = bank.bank().settings();
+                let n_fields = settings.tans_x.len() * settings.tans_y.len();
+                let (n_depths, n_wavelengths) = (settings.dioptres.len(), settings.wavelengths_nm.len());
+                Some(Self::new("rays", (n_fields, n_depths, n_wavelengths), *error))
+            }
+        }
+    }
+
+    /// Returns what is known of a bank whose error was measured.
+    pub fn of(bank: &PsfBank) -> Option<Self> {
+        let (settings, error) = (bank.settings(), bank.error()?);
+        let last = bank.last_field_tan();
+        let n_fields = settings.field_tans.iter().filter(|tan| **tan <= last).count();
+        let interpolation = match settings.interpolation {
+            Interpolation::Rays => "rays",
+            Interpolation::Images => "images",
+        };
+        Some(Self::new(interpolation, (n_fields, settings.dioptres.len(), settings.wavelengths_nm.len()), error))
+    }
+
+    fn new(
+        interpolation: &'static str,
+        (n_fields, n_depths, n_wavelengths): (usize, usize, usize),
+        error: MeasuredError,
+    ) -> Self {
+        Self {
+            interpolation,
+            n_fields,
+            n_depths,
+            n_wavelengths,
+            median_error: error.median,
+            p90_error: error.p90,
+            n_places: error.n_places,
+            pitch_um: error.pitch_um,
+            wanted_error: error.target_median,
+        }
+    }
+
+    /// Says it in one line.
+    pub fn in_words(&self) -> String {
+        let kind = match self.interpolation {
+            "rays" => "rays interpolated between",
+            _ => "pictures blended between",
+        };
+        let Self { n_fields, n_depths, n_wavelengths, n_places, .. } = self;
+        let pitch_um = number(self.pitch_um);
+        let missed = match self.wanted_error {
+            Some(wanted) if self.median_error > wanted => format!("; {wanted} was asked for"),
+            _ => String::new(),
+        };
+        format!(
+            "{kind} {n_fields} fields × {n_depths} depths × {n_wavelengths} wavelengths; error on pixels of {pitch_um} \
+             µm at {n_places} places: median {:.2} %, nine tenths below {:.2} %{missed}",
+            100.0 * self.median_error,
+            100.0 * self.p90_error,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dioptric_psf::Diffraction;
+
+    use super::*;
+
+    #[test]
+    fn a_bank_has_the_error_asked_for_with_fewer_samples_and_the_papers_has_much_more() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
+        let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+        let standard = BankSettings::covering(film_mm, 0.2, (0.2, 1.0), (420.0, 680.0), Diffraction::None);
+        let data = |choice: BankChoice| BankData::of(&choice.build(&lens, standard.clone(), 5.0).unwrap()).unwrap();
+        let [rays, within, paper] =
+            [BankChoice::Standard, BankChoice::Within { error: 0.02 }, BankChoice::Paper].map(data);
+        for data in [&rays, &within, &paper] {
+            println!("{}", data.in_words());
+        }
+        let n = |data: &BankData| data.n_fields * data.n_depths * data.n_wavelengths;
+        assert_eq!((n(&rays), n(&paper)), (324, 324));
+        assert!(n(&within) < 324 && within.median_error <= 0.02, "{within:?}");
+        assert!(rays.median_error < 0.01 && paper.median_error > 20.0 * rays.median_error, "{rays:?} {paper:?}");
+        assert!(paper.in_words().starts_with("pictures blended") && !within.in_words().contains("asked for"));
+        assert!(BankChoice::Within { error: -1.0 }.build(&lens, standard.clone(), 5.0).is_err());
+    }
+}

@@ -1,0 +1,142 @@
+//! Lenses and sensors as people name them: a built-in name or a file.
+
+use std::path::{Path, PathBuf};
+
+use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions};
+use dioptric_sensor::Sensor;
+use serde::{Deserialize, Serialize};
+
+use crate::{LensChoice, PipelineError, SensorChoice, StopChoice};
+
+/// The wavelength of f-numbers, fields and focus where nothing else is said, nm.
+pub const REFERENCE_WAVELENGTH_NM: f64 = 550.0;
+
+/// Returns that of these wavelengths which is nearest to 550 nm: the one that fields, f-numbers and focus are told of.
+pub fn nearest_to_reference_nm(wavelengths_nm: &[f64]) -> f64 {
+    let off = |nm: &f64| (nm - REFERENCE_WAVELENGTH_NM).abs();
+    wavelengths_nm.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(REFERENCE_WAVELENGTH_NM)
+}
+
+impl LensChoice {
+    /// Returns what `LENS` on the command line means: a built-in name where it is one, a path where it looks like one or
+    /// is one, else a name that is not known.
+    pub fn named(text: &str) -> Self {
+        // Names such as fisheye-12.5mm look as though they had an extension.
+        let is_built_in = Lens::built_in_names().any(|name| name == text);
+        if !is_built_in && is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
+    }
+
+    /// Returns the lens, and what its file says of it.
+    ///
+    /// # Errors
+    /// When there is none of that name, or its file or a catalogue cannot be read.
+    pub fn open(&self, reading: &LensReading) -> Result<LensFile, PipelineError> {
+        let mut file = match self {
+            Self::File(path) => LensFile::read(path, &reading.options()?)?,
+            Self::BuiltIn(name) => LensFile::from(Lens::built_in(name)?),
+            Self::Thin { focal_length_mm, diameter_mm } => LensFile::from(Lens::thin(*focal_length_mm, *diameter_mm)?),
+            Self::Pinhole { diameter_mm } => LensFile::from(Lens::pinhole(*diameter_mm)?),
+        };
+        if let Some(slope_per_nm) = reading.slope_per_nm {
+            file.lens = file.lens.with_slope(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
+        }
+        Ok(file)
+    }
+}
+
+impl StopChoice {
+    /// Returns the lens with its stop set.
+    ///
+    /// # Errors
+    /// When the stop does not open so far.
+    pub fn apply(self, lens: Lens) -> Result<Lens, PipelineError> {
+        self.apply_at(lens, REFERENCE_WAVELENGTH_NM)
+    }
+
+    /// Returns the lens with its stop set; an f-number is that at this wavelength, nm.
+    ///
+    /// # Errors
+    /// When the stop does not open so far, or a glass is not known at the wavelength.
+    pub fn apply_at(self, lens: Lens, wavelength_nm: f64) -> Result<Lens, PipelineError> {
+        Ok(match self {
+            Self::AsGiven => lens,
+            Self::FNumber(n) => lens.with_f_number(n, wavelength_nm)?,
+            Self::DiameterMm(d) => lens.with_stop_diameter_mm(d)?,
+        })
+    }
+}
+
+impl SensorChoice {
+    /// Returns what `SENSOR` on the command line means: a path where it looks like one or is one, else a built-in name.
+    pub fn named(text: &str) -> Self {
+        if is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
+    }
+
+    /// Returns the sensor.
+    ///
+    /// # Errors
+    /// When there is none of that name, or the file cannot be read.
+    pub fn open(&self) -> Result<Sensor, PipelineError> {
+        Ok(match self {
+            Self::BuiltIn(name) => Sensor::built_in(name)?,
+            Self::File(path) => Sensor::read(path)?,
+        })
+    }
+}
+
+fn is_path(text: &str) -> bool {
+    let path = Path::new(text);
+    path.extension().is_some() || text.contains(std::path::MAIN_SEPARATOR) || path.exists()
+}
+
+/// What a lens file leaves open, and how to close it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LensReading {
+    /// Glass catalogues (`.agf`, `.yml`) to look in before the built-in one.
+    pub glasses: Vec<PathBuf>,
+    /// What to do with a glass that no catalogue has.
+    pub missing_glass: MissingGlassChoice,
+    /// The change of index a nanometre, about [`REFERENCE_WAVELENGTH_NM`], of the media of which only one index is stated.
+    pub slope_per_nm: Option<f64>,
+}
+
+/// What to do with a glass that no catalogue has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum MissingGlassChoice {
+    /// Refuse the lens and say which glass is missing.
+    #[default]
+    Refuse,
+    /// Take the index and Abbe number that the file states for it, if any.
+    FromNdVd,
+    /// Take the built-in glass nearest to them.
+    Nearest,
+}
+
+impl LensReading {
+    /// Returns it as what reads the files is told.
+    fn options(&self) -> Result<ReadOptions, PipelineError> {
+        let catalogues = self.glasses.iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
+        let missing_glass = match self.missing_glass {
+            MissingGlassChoice::Refuse => MissingGlass::Refuse,
+            MissingGlassChoice::FromNdVd => MissingGlass::FromNdVd,
+            MissingGlassChoice::Nearest => MissingGlass::Nearest,
+        };
+        Ok(ReadOptions { catalogues, missing_glass })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_paths_are_told_apart() {
+        assert_eq!(LensChoice::named("dgauss-50mm"), LensChoice::BuiltIn("dgauss-50mm".to_owned()));
+        assert_eq!(LensChoice::named("fisheye-12.5mm"), LensChoice::BuiltIn("fisheye-12.5mm".to_owned()));
+        for path in ["lens.dat", "./lens", "folder/lens"] {
+            assert_eq!(LensChoice::named(path), LensChoice::File(PathBuf::from(path)));
+        }
+    }
+}

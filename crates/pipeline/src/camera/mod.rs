@@ -1,0 +1,528 @@
+//! The camera file: everything about a shot, in one RON file.
+
+mod bank;
+mod check;
+mod frames;
+mod lens;
+mod movements;
+mod resolved;
+mod scene;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use dioptric_sensor::{
+    AutoExposure, Brightness, ColorCorrection, ColorSpace, Demosaic, ExposureControl, LensShading, Metering,
+    Processing, ToneCurve, WhiteBalance,
+};
+use dioptric_spectrum::Illuminant;
+use ron::extensions::Extensions;
+use serde::{Deserialize, Serialize};
+
+pub use bank::{BankChoice, BankData};
+pub use frames::{Exposed, FramesChoice};
+pub use lens::{LensReading, MissingGlassChoice, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+pub use movements::Movements;
+pub use resolved::Shot;
+pub use scene::{SceneChoice, SceneSource};
+
+use self::check::Checker;
+use crate::{Outputs, PipelineError};
+
+/// The camera of the built-in demo.
+const DEMO: &str = include_str!("../../../../fixtures/cameras/demo.ron");
+
+/// A camera and what stands before it.
+///
+/// Everything that may be left out of a file has a default; paths are relative to the file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// What to call the shot.
+    pub name: String,
+    /// The lens.
+    pub lens: LensChoice,
+    /// What the lens's file leaves open.
+    #[serde(default)]
+    pub lens_reading: LensReading,
+    /// How far its stop is open.
+    #[serde(default)]
+    pub stop: StopChoice,
+    /// How it is turned and moved before the film.
+    #[serde(default)]
+    pub movements: Movements,
+    /// Where the film is.
+    pub focus: FocusChoice,
+    /// How large the film is.
+    #[serde(default)]
+    pub film: FilmChoice,
+    /// Diffraction at the stop.
+    #[serde(default)]
+    pub diffraction: DiffractionChoice,
+    /// How the point-spread functions are sampled.
+    #[serde(default)]
+    pub bank: BankChoice,
+    /// How the point-spread functions are laid over the scene.
+    #[serde(default)]
+    pub blur: BlurChoice,
+    /// The sensor.
+    pub sensor: SensorChoice,
+    /// The exposure.
+    #[serde(default = "automatic")]
+    pub exposure: ExposureControl,
+    /// How many frames the picture is made of.
+    #[serde(default)]
+    pub frames: FramesChoice,
+    /// From the raw frame to the picture.
+    #[serde(default)]
+    pub processing: ProcessingChoice,
+    /// What stands before the camera.
+    pub scene: SceneChoice,
+    /// The bands that are simulated.
+    #[serde(default)]
+    pub wavelengths: WavelengthChoice,
+    /// The seed of all noise.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// What is written.
+    #[serde(default)]
+    pub outputs: Outputs,
+}
+
+/// Which lens.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum LensChoice {
+    /// A built-in lens by name.
+    BuiltIn(String),
+    /// A lens file.
+    File(PathBuf),
+    /// An ideal thin lens, free of aberrations.
+    Thin {
+        /// Focal length, mm.
+        focal_length_mm: f64,
+        /// Diameter of its rim, which is the stop, mm.
+        diameter_mm: f64,
+    },
+    /// A hole without a lens; needs a focus of `FilmMm`.
+    Pinhole {
+        /// Diameter, mm.
+        diameter_mm: f64,
+    },
+}
+
+/// How far the stop is open.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum StopChoice {
+    /// As the lens file says.
+    #[default]
+    AsGiven,
+    /// At this f-number, for an object at infinity and the reference wavelength.
+    FNumber(f64),
+    /// At this diameter of the stop, mm.
+    DiameterMm(f64),
+}
+
+/// Where the film is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum FocusChoice {
+    /// In focus for an object at this distance from the first vertex, mm.
+    DistanceMm(f64),
+    /// At this distance from the last vertex, mm.
+    FilmMm(f64),
+    /// In focus for the near part of the scene: the depth that 2 % of its samples do not reach.
+    NearObject,
+}
+
+/// How large the film is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum FilmChoice {
+    /// The pixels of the sensor.
+    #[default]
+    Sensor,
+    /// As many pixels as the scene has samples, of such a pitch that they see the scene's field. The sensor's
+    /// pixels are taken to be of this size.
+    Scene,
+    /// Pixels of the user's choice. The sensor's pixels are taken to be of this size.
+    Pixels {
+        /// Columns.
+        columns: usize,
+        /// Rows.
+        rows: usize,
+        /// Distance between pixels, µm.
+        pitch_um: f64,
+    },
+}
+
+/// What diffraction is computed at the stop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum DiffractionChoice {
+    /// None: rays only.
+    None,
+    /// Heisenberg-uncertainty ray bending.
+    Hurb {
+        /// Strength: 1 is the paper's and Freniere's, √2 that of `Scene3D` since 2015.
+        gamma: f64,
+    },
+    /// Ray bending with constants fitted to Airy's pattern: better in focus, not in defocus.
+    HurbCalibrated,
+    /// The sum of waves while the blur is small enough for it, ray bending (γ = 1) beyond.
+    Wave,
+}
+
+impl Default for DiffractionChoice {
+    /// HURB as in the paper.
+    fn default() -> Self {
+        Self::Hurb { gamma: 1.0 }
+    }
+}
+
+impl DiffractionChoice {
+    /// The random bending of the paper mode.
+    pub fn model(self) -> Option<dioptric_diffraction::Hurb> {
+        match self {
+            Self::None => None,
+            Self::Hurb { gamma } => Some(dioptric_diffraction::Hurb::with_gamma(gamma)),
+            Self::HurbCalibrated => Some(dioptric_diffraction::Hurb::CALIBRATED),
+            Self::Wave => Some(dioptric_diffraction::Hurb::PAPER),
+        }
+    }
+}
+
+impl From<DiffractionChoice> for dioptric_psf::Diffraction {
+    fn from(choice: DiffractionChoice) -> Self {
+        match choice {
+            DiffractionChoice::None => Self::None,
+            DiffractionChoice::Hurb { gamma } => Self::Hurb { gamma },
+            DiffractionChoice::HurbCalibrated => Self::HurbCalibrated,
+            DiffractionChoice::Wave => Self::Wave,
+        }
+    }
+}
+
+/// How the point-spread functions are laid over the scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum BlurChoice {
+    /// In layers of depth, near ones hiding far ones.
+    #[default]
+    Layered,
+    /// Each sample spread on its own, as in the paper.
+    Pointwise,
+}
+
+/// Which sensor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum SensorChoice {
+    /// A built-in sensor by name.
+    BuiltIn(String),
+    /// A sensor file.
+    File(PathBuf),
+}
+
+/// From the raw frame to the picture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ProcessingChoice {
+    /// How missing colours are filled in.
+    pub demosaic: Demosaic,
+    /// What is made white.
+    pub white: WhiteChoice,
+    /// How bright the picture is made.
+    pub brightness: Brightness,
+    /// The curve from light to codes.
+    pub curve: ToneCurve,
+    /// How much noise is taken out of the raw frame: 0 none, 1 what is below three standard deviations.
+    pub denoise: f64,
+    /// Pixels further than this above or below all their neighbours of the same filter are replaced, as a share of
+    /// saturation; left out, none are.
+    pub defect_threshold: Option<f64>,
+    /// The fall of light towards the corners that is undone; left out, it stays.
+    pub shading: Option<LensShading>,
+    /// The primaries of the picture.
+    pub space: ColorSpace,
+}
+
+impl Default for ProcessingChoice {
+    fn default() -> Self {
+        Self {
+            demosaic: Demosaic::Directional,
+            white: WhiteChoice::Scene,
+            brightness: Brightness::AsExposed,
+            curve: ToneCurve::Srgb,
+            denoise: 0.0,
+            defect_threshold: None,
+            shading: None,
+            space: ColorSpace::Srgb,
+        }
+    }
+}
+
+/// What is made white, and how colours are corrected.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum WhiteChoice {
+    /// The light on the scene, with colours corrected for it; the mean of the picture where the light is not known.
+    Scene,
+    /// This light, with colours corrected for it.
+    Light(Illuminant),
+    /// The mean of the picture, with colours corrected for the light on the scene, or for D65 where it is not known.
+    GreyWorld,
+    /// Nothing: channels are shown as they are.
+    None,
+}
+
+impl ProcessingChoice {
+    /// Returns the sensor's processing under the light on the scene, if that is known.
+    pub fn under(&self, known: Option<Illuminant>) -> Processing {
+        let light = known.unwrap_or(Illuminant::D65);
+        let (white_balance, color) = match self.white {
+            WhiteChoice::Scene if known.is_some() => (WhiteBalance::Illuminant(light), ColorCorrection::Fitted(light)),
+            WhiteChoice::Light(other) => (WhiteBalance::Illuminant(other), ColorCorrection::Fitted(other)),
+            WhiteChoice::Scene | WhiteChoice::GreyWorld => (WhiteBalance::GreyWorld, ColorCorrection::Fitted(light)),
+            WhiteChoice::None => (WhiteBalance::None, ColorCorrection::None),
+        };
+        Processing {
+            defect_threshold: self.defect_threshold,
+            shading: self.shading.clone(),
+            white_balance,
+            denoise: self.denoise,
+            demosaic: self.demosaic,
+            color,
+            brightness: self.brightness,
+            curve: self.curve,
+            space: self.space,
+        }
+    }
+}
+
+/// The bands that are simulated.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum WavelengthChoice {
+    /// Those of the scene; 400–700 nm in steps of 10 nm where it has none of its own.
+    #[default]
+    Scene,
+    /// Equal steps.
+    Range {
+        /// First band, nm.
+        first_nm: f64,
+        /// Last band, nm.
+        last_nm: f64,
+        /// Step, nm.
+        step_nm: f64,
+    },
+    /// These bands, nm.
+    ListNm(Vec<f64>),
+}
+
+fn one() -> u64 {
+    1
+}
+
+/// Just not saturating: the pixel that 99 % of all pixels do not exceed is put at 90 % of saturation.
+pub(crate) fn automatic() -> ExposureControl {
+    ExposureControl::Auto(AutoExposure::new(Metering::Percentile(99.0), 0.9))
+}
+
+impl Camera {
+    /// The camera of the built-in demo: nothing but this crate is needed to run it.
+    ///
+    /// # Errors
+    /// Never; the file is held to by a test.
+    pub fn demo() -> Result<Self, PipelineError> {
+        Self::parse(DEMO, Path::new("demo.ron"))
+    }
+
+    /// Reads a camera file.
+    ///
+    /// # Errors
+    /// Names the file, the line and the key that is wrong, and what was expected.
+    pub fn read(path: &Path) -> Result<Self, PipelineError> {
+        let text = fs::read_to_string(path)
+            .map_err(|e| PipelineError::Read { path: path.to_owned(), reason: e.to_string() })?;
+        Self::parse(&text, path)
+    }
+
+    /// Reads a camera from text; paths in it are relative to the folder of `path`, which also names it in errors.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, path: &Path) -> Result<Self, PipelineError> {
+        let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
+        let mut camera: Self = options.from_str(text).map_err(|e| PipelineError::Syntax {
+            path: path.to_owned(),
+            line: e.span.start.line,
+            column: e.span.start.col,
+            reason: e.code.to_string(),
+        })?;
+        camera.check(&Checker::of_file(path, text))?;
+        camera.resolve_paths(path.parent().unwrap_or(Path::new("")));
+        Ok(camera)
+    }
+
+    /// Checks every number; what was typed on a command line may be checked again.
+    ///
+    /// # Errors
+    /// Names the first key that is wrong and what was expected.
+    pub fn validate(&self) -> Result<(), PipelineError> {
+        self.check(&Checker::of_settings(&self.name))
+    }
+
+    fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
+        match &self.lens {
+            LensChoice::Thin { focal_length_mm, diameter_mm } => {
+                checker.positive("focal_length_mm", *focal_length_mm)?;
+                checker.positive("diameter_mm", *diameter_mm)?;
+            }
+            LensChoice::Pinhole { diameter_mm } => checker.positive("diameter_mm", *diameter_mm)?,
+            LensChoice::BuiltIn(_) | LensChoice::File(_) => {}
+        }
+        if let Some(slope_per_nm) = self.lens_reading.slope_per_nm {
+            checker.finite("slope_per_nm", slope_per_nm)?;
+        }
+        match self.stop {
+            StopChoice::FNumber(n) => checker.positive("FNumber", n)?,
+            StopChoice::DiameterMm(d) => checker.positive("DiameterMm", d)?,
+            StopChoice::AsGiven => {}
+        }
+        match self.focus {
+            FocusChoice::DistanceMm(d) if d == f64::INFINITY => {}
+            FocusChoice::DistanceMm(d) => checker.positive("DistanceMm", d)?,
+            FocusChoice::FilmMm(d) => checker.finite("FilmMm", d)?,
+            FocusChoice::NearObject => {}
+        }
+        let Movements { tilt_deg, swing_deg, rise_mm, shift_mm } = self.movements;
+        for (key, value) in
+            [("tilt_deg", tilt_deg), ("swing_deg", swing_deg), ("rise_mm", rise_mm), ("shift_mm", shift_mm)]
+        {
+            checker.finite(key, value)?;
+        }
+        if let FilmChoice::Pixels { columns, rows, pitch_um } = self.film {
+            checker.count("columns", columns, 1..=65_536)?;
+            checker.count("rows", rows, 1..=65_536)?;
+            checker.positive("pitch_um", pitch_um)?;
+        }
+        if let DiffractionChoice::Hurb { gamma } = self.diffraction {
+            checker.positive("gamma", gamma)?;
+        }
+        if let BankChoice::Within { error } = self.bank {
+            checker.positive("error", error)?;
+        }
+        match &self.exposure {
+            ExposureControl::Manual(exposure) => checker.positive("time_s", exposure.time_s)?,
+            ExposureControl::Auto(auto) => checker.positive("target_fraction", auto.target_fraction)?,
+        }
+        match &self.wavelengths {
+            WavelengthChoice::Scene => {}
+            WavelengthChoice::Range { first_nm, last_nm, step_nm } => {
+                checker.positive("first_nm", *first_nm)?;
+                checker.positive("last_nm", *last_nm)?;
+                checker.positive("step_nm", *step_nm)?;
+            }
+            WavelengthChoice::ListNm(list) => list.iter().try_for_each(|&nm| checker.positive("ListNm", nm))?,
+        }
+        self.frames.check()?;
+        self.scene.check(checker)
+    }
+
+    fn resolve_paths(&mut self, folder: &Path) {
+        if let LensChoice::File(path) = &mut self.lens {
+            *path = folder.join(&path);
+        }
+        for path in &mut self.lens_reading.glasses {
+            *path = folder.join(&path);
+        }
+        if let SensorChoice::File(path) = &mut self.sensor {
+            *path = folder.join(&path);
+        }
+        self.scene.resolve_paths(folder);
+    }
+
+    /// Returns the camera as the text of a camera file.
+    pub fn to_ron(&self) -> String {
+        let style = ron::ser::PrettyConfig::new().extensions(Extensions::IMPLICIT_SOME);
+        ron::ser::to_string_pretty(self, style).expect("every part of a camera can be written as RON")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHORT: &str = r#"(
+    name: "short",
+    lens: BuiltIn("dgauss-50mm"),
+    stop: FNumber(4.0),
+    focus: DistanceMm(2000.0),
+    sensor: File("my/sensor.ron"),
+    scene: (source: File("scene.exr")),
+)"#;
+
+    fn parse(text: &str) -> Result<Camera, PipelineError> {
+        Camera::parse(text, Path::new("folder/shot.ron"))
+    }
+
+    #[test]
+    fn the_demo_is_a_camera() {
+        let demo = Camera::demo().unwrap();
+        demo.validate().unwrap();
+        assert_eq!(parse(&demo.to_ron()).unwrap(), demo);
+    }
+
+    #[test]
+    fn white_goes_by_the_light_where_that_is_known() {
+        let choice = ProcessingChoice::default();
+        assert_eq!(choice.under(Some(Illuminant::A)), Processing::for_light(Illuminant::A));
+        let unknown = choice.under(None);
+        assert_eq!(unknown.white_balance, WhiteBalance::GreyWorld);
+        assert_eq!(unknown.color, ColorCorrection::Fitted(Illuminant::D65));
+        let asked = ProcessingChoice { white: WhiteChoice::Light(Illuminant::D50), ..choice.clone() };
+        assert_eq!(asked.under(None), Processing::for_light(Illuminant::D50));
+        let mended = ProcessingChoice { defect_threshold: Some(0.1), space: ColorSpace::DisplayP3, ..choice };
+        let processing = mended.under(Some(Illuminant::D65));
+        assert_eq!((processing.defect_threshold, processing.space), (Some(0.1), ColorSpace::DisplayP3));
+    }
+
+    #[test]
+    fn what_is_left_out_has_a_default_and_paths_follow_the_file() {
+        let camera = parse(SHORT).unwrap();
+        assert_eq!((camera.seed, camera.film, camera.blur), (1, FilmChoice::Sensor, BlurChoice::Layered));
+        assert_eq!(camera.diffraction, DiffractionChoice::Hurb { gamma: 1.0 });
+        assert_eq!(camera.sensor, SensorChoice::File(PathBuf::from("folder/my/sensor.ron")));
+    }
+
+    #[track_caller]
+    fn check_error(text: &str, words: &[&str]) {
+        let message = parse(text).unwrap_err().to_string();
+        for word in words {
+            assert!(message.contains(word), "'{word}' in: {message}");
+        }
+        assert!(!message.contains('\n'), "{message}");
+    }
+
+    #[test]
+    fn a_wrong_key_is_named_with_its_line() {
+        check_error(&SHORT.replace("focus:", "fokus:"), &["folder/shot.ron:5", "fokus"]);
+        check_error(&SHORT.replace("BuiltIn", "BuildIn"), &["shot.ron:3", "BuildIn"]);
+        check_error(&SHORT[..60], &["shot.ron"]);
+        check_error("", &["shot.ron:1"]);
+    }
+
+    #[test]
+    fn a_number_out_of_range_is_named_with_its_line() {
+        check_error(&SHORT.replace("4.0", "NaN"), &["shot.ron:4", "FNumber", "NaN"]);
+        check_error(&SHORT.replace("4.0", "-4.0"), &["shot.ron:4", "FNumber", "-4"]);
+        check_error(&SHORT.replace("2000.0", "0"), &["shot.ron:5", "DistanceMm"]);
+        let film = "film: Pixels(columns: 0, rows: 4, pitch_um: 1.0),\n    sensor:";
+        check_error(&SHORT.replace("sensor:", film), &["shot.ron:6", "columns", "0"]);
+        let bank = "bank: Within(error: -0.1),\n    sensor:";
+        check_error(&SHORT.replace("sensor:", bank), &["shot.ron:6", "error", "-0.1"]);
+    }
+}

@@ -1,0 +1,147 @@
+//! The figures as pictures and drawings.
+
+use dioptric_diffraction::Hurb;
+use dioptric_spectrum::WavelengthGrid;
+use image::{Rgb, RgbImage, imageops};
+use kuva::{
+    plot::surface3d::Surface3DPlot,
+    prelude::{ColorMap, Layout, Plot, render_to_svg},
+};
+
+use crate::{plots::FONT, png::enlarged, png::png_bytes};
+use dioptric_pipeline::{
+    PipelineError,
+    display::{LinearRgb, SpectrumToRgb},
+    figures::{
+        figure1::{self, Thumbnail},
+        figure2::{self, Surface},
+        figure3,
+    },
+};
+
+/// A file to be written: its name and what is in it.
+#[derive(Clone, Debug)]
+pub struct Drawing {
+    /// File name.
+    pub name: String,
+    /// Contents.
+    pub bytes: Vec<u8>,
+}
+
+impl Drawing {
+    fn new(name: &str, bytes: impl Into<Vec<u8>>) -> Self {
+        Self { name: name.to_owned(), bytes: bytes.into() }
+    }
+}
+
+/// Returns Figures 1 to 3 at full quality: pictures, drawings, and the tables behind them.
+///
+/// `told` is given the name of each figure before it is made.
+///
+/// # Errors
+/// When something cannot be computed or encoded; the built-in set-ups can.
+pub fn draw_all(told: &dyn Fn(&str)) -> Result<Vec<Drawing>, PipelineError> {
+    told("figure 1: point spread functions over field and depth");
+    let thumbnails = figure1::thumbnails(401)?;
+    let mut drawings = vec![
+        Drawing::new("figure1.png", png_bytes(&mosaic(&thumbnails))?),
+        Drawing::new("figure1.csv", figure1::table(&thumbnails)),
+    ];
+    told("figure 2: line spread functions by ray bending and by theory");
+    let nm: Vec<f64> = figure3::grid().centers_nm().to_vec();
+    let counted = figure2::counted(&nm, 401)?;
+    let theory = figure2::theory(&nm);
+    drawings.push(Drawing::new("figure2.svg", meshes([&counted, &theory])));
+    let calibrated = figure2::hurb("HURB calibrated, closed form", &nm, Hurb::CALIBRATED);
+    let wave = figure2::wave(&nm)?;
+    let all = [&counted, &calibrated, &wave, &theory];
+    drawings.push(Drawing::new("figure2_all.svg", meshes(all)));
+    let closed = figure2::hurb("HURB, closed form", &nm, Hurb::with_gamma(1.0));
+    drawings.push(Drawing::new("figure2.csv", figure2::table(&[counted, closed, calibrated, wave, theory])));
+    for (name, scale) in [("figure3", figure3::PRINTED_BLUR_SCALE), ("figure3_true_scale", 1.0)] {
+        told("figure 3: chromatic aberration at 8 m and 2 m");
+        drawings.push(Drawing::new(&format!("{name}.png"), png_bytes(&panels(scale)?)?));
+    }
+    drawings.push(Drawing::new("figure3.csv", figure3::table()?));
+    Ok(drawings)
+}
+
+/// Returns the pictures of Figure 1 side by side: fields to the right, depths downwards, nearest on top.
+fn mosaic(thumbnails: &[Thumbnail]) -> RgbImage {
+    const FACTOR: u32 = 3;
+    const GAP: u32 = 6;
+    let side = figure1::FILM.n_pixels as u32 * FACTOR;
+    let fields = figure1::HEIGHTS_AT_16_M_MM.len() as u32;
+    let depths = figure1::DEPTHS_MM.len() as u32;
+    let grid = WavelengthGrid::new(figure1::WAVELENGTHS_NM.to_vec()).expect("the wavelengths ascend");
+    let to_rgb = SpectrumToRgb::with_white(&grid, &vec![1.0; grid.len()]);
+    let mut sheet =
+        RgbImage::from_pixel(fields * (side + GAP) + GAP, depths * (side + GAP) + GAP, Rgb([255, 255, 255]));
+    for (i, thumbnail) in thumbnails.iter().enumerate() {
+        let mut picture = LinearRgb::black(figure1::FILM.n_pixels, figure1::FILM.n_pixels);
+        for (band, counts) in thumbnail.counts.iter().enumerate() {
+            picture.add(&counts.mapv(|n| n as f32), to_rgb.of_band(band));
+        }
+        let tile = enlarged(&picture.to_srgb(picture.level_at(0.999).max(1e-9)), FACTOR);
+        let (column, row) = (i as u32 % fields, i as u32 / fields);
+        let (x, y) = (GAP + column * (side + GAP), GAP + row * (side + GAP));
+        imageops::replace(&mut sheet, &tile, i64::from(x), i64::from(y));
+    }
+    sheet
+}
+
+/// Returns surfaces over place and wavelength, two side by side, as one SVG document; heights are over the last's peak.
+fn meshes<const N: usize>(surfaces: [&Surface; N]) -> String {
+    const WIDTH: f64 = 560.0;
+    const HEIGHT: f64 = 470.0;
+    let last = surfaces[N - 1];
+    let peak = last.profiles.iter().flat_map(|p| &p.values).copied().fold(0.0, f64::max);
+    let drawn = surfaces.map(|surface| {
+        let heights = surface.profiles.iter().map(|p| p.values.iter().map(|v| v / peak).collect()).collect();
+        let plot = Surface3DPlot::new(heights)
+            .with_x_coords(surface.profiles[0].at_um.clone())
+            .with_y_coords(surface.wavelengths_nm.clone())
+            .with_z_colormap(ColorMap::Viridis)
+            .with_wireframe_color("#00000066")
+            .with_wireframe_width(0.4)
+            .with_azimuth(-60.0)
+            .with_elevation(28.0)
+            .with_x_label("place, µm")
+            .with_y_label("wavelength, nm")
+            .with_z_label("relative irradiance");
+        let plots = vec![Plot::Surface3D(plot)];
+        let layout = Layout::auto_from_plots(&plots)
+            .with_width(WIDTH)
+            .with_height(HEIGHT)
+            .with_title(surface.name)
+            .with_font_family(FONT);
+        render_to_svg(plots, layout)
+    });
+    let part = |(i, svg): (usize, &String)| {
+        let (x, y) = ((i % 2) as f64 * WIDTH, (i / 2) as f64 * HEIGHT);
+        let svg = &svg[svg.find("<svg ").unwrap_or(0)..];
+        svg.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1)
+    };
+    let (width, height) = (2.0 * WIDTH, N.div_ceil(2) as f64 * HEIGHT);
+    let parts: Vec<String> = drawn.iter().enumerate().map(part).collect();
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n{}\n</svg>\n",
+        parts.join("\n")
+    )
+}
+
+/// Returns the six pictures of Figure 3: targets to the right, 8 m above 2 m.
+fn panels(blur_scale: f64) -> Result<RgbImage, PipelineError> {
+    const SIDE: u32 = 300;
+    let mut sheet = RgbImage::new(3 * SIDE, 2 * SIDE);
+    for (row, distance_mm) in figure3::DISTANCES_MM.into_iter().enumerate() {
+        for (column, target) in figure3::targets().iter().enumerate() {
+            let irradiance = figure3::irradiance(target, distance_mm, blur_scale)?;
+            let rgb = LinearRgb::of_image(&irradiance).within_gamut();
+            let picture = rgb.to_srgb(rgb.level_at(1.0));
+            let tile = imageops::resize(&picture, SIDE, SIDE, imageops::FilterType::Triangle);
+            imageops::replace(&mut sheet, &tile, i64::from(column as u32 * SIDE), i64::from(row as u32 * SIDE));
+        }
+    }
+    Ok(sheet)
+}

@@ -1,0 +1,78 @@
+//! A lens with rays through it, drawn as SVG.
+
+use dioptric_optics::{Layout, Lens};
+
+use dioptric_pipeline::{PipelineError, REFERENCE_WAVELENGTH_NM};
+
+/// Rays of each fan.
+const RAYS: usize = 9;
+/// Width of the drawing, pixels.
+const WIDTH_PX: f64 = 1100.0;
+
+/// What is drawn with a lens.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LensDrawing {
+    /// Field angles at the entrance pupil, degrees; a fan of rays each.
+    pub fields_deg: Vec<f64>,
+    /// Distance of the object before the first vertex, mm; infinity for a far one.
+    pub distance_mm: f64,
+    /// Wavelengths of the rays, nm; focus and f-number are those of the first.
+    pub wavelengths_nm: Vec<f64>,
+    /// Distance of the film behind the last vertex, mm; `None` for where the object is in focus.
+    pub film_mm: Option<f64>,
+}
+
+impl LensDrawing {
+    /// Returns the drawing as an SVG document, to scale.
+    ///
+    /// # Errors
+    /// When a field is not below 89.9°, a glass is not known at the wavelength, or the lens cannot be focused.
+    pub fn to_svg(&self, lens: &Lens) -> Result<String, PipelineError> {
+        if let Some(field) = self.fields_deg.iter().find(|field| field.is_nan() || field.abs() >= 89.9) {
+            return Err(PipelineError::Value {
+                origin: "the drawing".to_owned(),
+                key: "fields_deg",
+                found: field.to_string(),
+                expected: "angles below 89.9 degrees".to_owned(),
+            });
+        }
+        let film_mm = match self.film_mm {
+            Some(film_mm) => film_mm,
+            None => {
+                let reference_nm = self.wavelengths_nm.first().copied().unwrap_or(REFERENCE_WAVELENGTH_NM);
+                lens.at(reference_nm)?.film_mm_for(self.distance_mm)?
+            }
+        };
+        Ok(lens.draw(&Layout {
+            film_mm,
+            object_distance_mm: self.distance_mm,
+            field_tans: self.fields_deg.iter().map(|field| field.to_radians().tan()).collect(),
+            wavelengths_nm: self.wavelengths_nm.clone(),
+            n_rays: RAYS,
+            width_px: WIDTH_PX,
+        })?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drawing() -> LensDrawing {
+        LensDrawing { fields_deg: vec![0.0, 14.0], distance_mm: 2000.0, wavelengths_nm: vec![550.0], film_mm: None }
+    }
+
+    #[test]
+    fn a_lens_is_drawn() {
+        let svg = drawing().to_svg(&Lens::built_in("dgauss-50mm").unwrap()).unwrap();
+        assert!(svg.starts_with("<svg") && svg.contains("dgauss-50mm") && !svg.contains("NaN"));
+    }
+
+    #[test]
+    fn a_field_beyond_the_horizon_is_refused() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap();
+        for wrong in [90.0, f64::NAN] {
+            assert!(LensDrawing { fields_deg: vec![wrong], ..drawing() }.to_svg(&lens).is_err());
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! Pictures, plots and pages of what the other crates compute.
+//!
+//! This crate alone draws: line charts, lens drawings, panels of an analysis, mosaics of point spread functions, the
+//! paper's figures, and the page of a run. A program that shows data in its own way does without it.
+#![doc = include_str!("../README.md")]
+
+mod figures;
+mod lens;
+mod measurement;
+mod panel;
+mod plots;
+mod png;
+mod psf;
+mod run;
+mod svg_png;
+
+pub use figures::{Drawing, draw_all};
+pub use lens::{AnalysisPlots, LensDrawing};
+pub use measurement::write_measurement;
+pub use plots::chart_svg;
+pub use psf::{MosaicPlan, PsfMosaic, psf_mosaic, write_psfs};
+pub use run::{write_run, write_sensed};
+pub use svg_png::{drawing_file, svg_to_png};

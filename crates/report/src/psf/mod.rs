@@ -1,0 +1,7 @@
+//! Pictures of point spread functions.
+
+mod mosaic;
+mod mosaic_page;
+
+pub use mosaic::{MosaicPlan, PsfMosaic};
+pub use mosaic_page::{psf_mosaic, write_psfs};

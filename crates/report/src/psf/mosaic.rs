@@ -1,0 +1,165 @@
+//! Point-spread functions in colour, laid out over field and depth as in Figure 1.
+
+use dioptric_optics::glam::DVec2;
+use dioptric_psf::{Kernel, PsfQuery};
+use dioptric_spectrum::WavelengthGrid;
+use image::{Rgb, RgbImage, imageops};
+use ndarray::Array2;
+
+use crate::png::enlarged;
+use dioptric_pipeline::{CameraBank, REFERENCE_WAVELENGTH_NM, display::LinearRgb, display::SpectrumToRgb};
+
+/// Space between tiles, pixels, and its grey.
+const GAP: u32 = 3;
+const PAPER: Rgb<u8> = Rgb([36, 36, 40]);
+
+/// Point-spread functions over field (across) and depth (down), each as an observer sees a white point.
+#[derive(Clone, Debug)]
+pub struct PsfMosaic {
+    /// Field angles, degrees; a column each.
+    pub fields_deg: Vec<f64>,
+    /// Depths from the entrance pupil, m; a row each.
+    pub depths_m: Vec<f64>,
+    /// Side of the tiles of each row on the film, µm.
+    pub tiles_um: Vec<f64>,
+    /// Tiles row by row, each normalised to its brightest pixel.
+    tiles: Vec<RgbImage>,
+}
+
+/// What a mosaic shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MosaicPlan {
+    /// Fields, tangents across and up.
+    pub field_tans: Vec<DVec2>,
+    /// Depths, dioptres.
+    pub dioptres: Vec<f64>,
+    /// Wavelengths of the white point, of equal energy.
+    pub grid: WavelengthGrid,
+    /// Pixels along the side of a tile, odd.
+    pub tile_px: usize,
+    /// Side of a tile on the film, µm; `None` for one that holds the largest of its row.
+    pub tile_um: Option<f64>,
+}
+
+impl PsfMosaic {
+    /// Draws the mosaic from a bank.
+    pub fn draw(bank: &CameraBank, plan: &MosaicPlan) -> Self {
+        let widest = |&dioptres: &f64| plan.tile_um.unwrap_or_else(|| widest_um(bank, plan, dioptres));
+        let tiles_um: Vec<f64> = plan.dioptres.iter().map(widest).collect();
+        let white = vec![1.0; plan.grid.len()];
+        let to_rgb = SpectrumToRgb::with_white(&plan.grid, &white);
+        let mut tiles = Vec::new();
+        for (&dioptres, tile_um) in plan.dioptres.iter().zip(&tiles_um) {
+            let pitch_um = tile_um / plan.tile_px as f64;
+            for &field_tan in &plan.field_tans {
+                let mut light = LinearRgb::black(plan.tile_px, plan.tile_px);
+                for (band, &wavelength_nm) in plan.grid.centers_nm().iter().enumerate() {
+                    let point = Point { field_tan, dioptres, wavelength_nm };
+                    light.add(&window(bank, &point, pitch_um, plan.tile_px), to_rgb.of_band(band));
+                }
+                tiles.push(light.to_srgb(light.level_at(1.0).max(f64::MIN_POSITIVE)));
+            }
+        }
+        Self {
+            fields_deg: plan.field_tans.iter().map(|tan| tan.length().atan().to_degrees()).collect(),
+            depths_m: plan.dioptres.iter().map(|d| 1.0 / d).collect(),
+            tiles_um,
+            tiles,
+        }
+    }
+
+    /// Returns the tile of a depth and field, counted from 0.
+    pub fn tile(&self, depth: usize, field: usize) -> &RgbImage {
+        &self.tiles[depth * self.fields_deg.len() + field]
+    }
+
+    /// Returns all tiles as one picture, each pixel enlarged by a whole number.
+    pub fn to_picture(&self, factor: u32) -> RgbImage {
+        let side = self.tiles[0].width() * factor;
+        let span = |n: usize| n as u32 * (side + GAP) + GAP;
+        let mut picture = RgbImage::from_pixel(span(self.fields_deg.len()), span(self.depths_m.len()), PAPER);
+        for row in 0..self.depths_m.len() {
+            for column in 0..self.fields_deg.len() {
+                let at = |i: usize| i64::from(GAP) + i as i64 * i64::from(side + GAP);
+                imageops::replace(&mut picture, &enlarged(self.tile(row, column), factor), at(column), at(row));
+            }
+        }
+        picture
+    }
+}
+
+/// One point-spread function of a bank.
+#[derive(Clone, Copy)]
+struct Point {
+    field_tan: DVec2,
+    dioptres: f64,
+    wavelength_nm: f64,
+}
+
+impl Point {
+    fn kernel(&self, bank: &CameraBank, pitch_um: f64) -> Kernel {
+        let Self { field_tan, dioptres, wavelength_nm } = *self;
+        bank.kernel(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um })
+    }
+
+    /// How far from the reference wavelength's image this one lies, µm, right and up: lateral colour.
+    fn lateral_color_um(&self, bank: &CameraBank) -> DVec2 {
+        let at = |nm: f64| bank.centroid_mm(self.field_tan, self.dioptres, nm);
+        1e3 * (at(self.wavelength_nm) - at(REFERENCE_WAVELENGTH_NM))
+    }
+}
+
+/// Returns a point-spread function in a window that is centred on the image of the reference wavelength.
+fn window(bank: &CameraBank, point: &Point, pitch_um: f64, size: usize) -> Array2<f32> {
+    let kernel = point.kernel(bank, pitch_um).samples;
+    let shift = (point.lateral_color_um(bank) / pitch_um).round();
+    let (right, up) = (shift.x as isize, shift.y as isize);
+    let (rows, columns) = kernel.dim();
+    let offset = |n: usize| n as isize / 2 - size as isize / 2;
+    Array2::from_shape_fn((size, size), |(row, column)| {
+        let (r, c) = (row as isize + offset(rows) + up, column as isize + offset(columns) - right);
+        if r < 0 || c < 0 { 0.0 } else { kernel.get((r as usize, c as usize)).copied().unwrap_or(0.0) }
+    })
+}
+
+/// Returns the side of a tile that holds all but the tails of every point-spread function of a depth, µm.
+fn widest_um(bank: &CameraBank, plan: &MosaicPlan, dioptres: f64) -> f64 {
+    let (first, last) = plan.grid.range_nm();
+    let mut reach_um: f64 = 5.0;
+    for &field_tan in &plan.field_tans {
+        for wavelength_nm in [first, last] {
+            let point = Point { field_tan, dioptres, wavelength_nm };
+            let blur_um = 1e3 * bank.kernels().spread_mm(field_tan, dioptres, wavelength_nm);
+            reach_um = reach_um.max(blur_um + point.lateral_color_um(bank).length());
+        }
+    }
+    2.6 * reach_um
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dioptric_optics::Lens;
+    use dioptric_psf::{BankSettings, Diffraction, PsfBank};
+
+    #[test]
+    fn a_mosaic_has_a_tile_a_field_and_depth() {
+        let lens = Lens::built_in("paper-2el").unwrap().with_stop_diameter_mm(4.0).unwrap();
+        let settings = BankSettings::covering(51.8145, 0.06, (0.0625, 0.5), (400.0, 700.0), Diffraction::None);
+        let bank = CameraBank::Turned(Box::new(PsfBank::build(&lens, &settings).unwrap()));
+        let plan = MosaicPlan {
+            field_tans: vec![DVec2::ZERO, DVec2::new(0.05, 0.0)],
+            dioptres: vec![0.0625, 0.25, 0.5],
+            grid: WavelengthGrid::uniform(400.0, 700.0, 50.0).unwrap(),
+            tile_px: 31,
+            tile_um: None,
+        };
+        let mosaic = PsfMosaic::draw(&bank, &plan);
+        let picture = mosaic.to_picture(2);
+        assert_eq!((picture.width(), picture.height()), (2 * 65 + 3, 3 * 65 + 3));
+        // Nothing is bright at the rim of a tile; its middle is.
+        let tile = mosaic.tile(0, 0);
+        assert!(tile.get_pixel(0, 0).0.iter().all(|&v| v < 60));
+        assert!(tile.pixels().any(|p| p.0.contains(&255)));
+    }
+}

@@ -1,0 +1,241 @@
+//! Point-spread functions side by side: wavelengths across, fields and distances down, with labels and scales.
+
+use std::{ops::Range, path::Path};
+
+use image::{Rgb, RgbImage, imageops};
+use ndarray::Array2;
+
+use crate::{
+    panel::{Sheet, round_up},
+    png::png_bytes,
+    svg_to_png,
+};
+use dioptric_analysis::{PsfRow, PsfSet};
+use dioptric_pipeline::{PipelineError, display::LinearRgb, display::code, number};
+
+/// Side of a tile where there is room, pixels.
+const TILE: u32 = 168;
+/// The longest sum of tiles, pixels.
+const LONGEST: u32 = 18_000;
+/// Space between tiles, left of them for the names of points, and above them for those of wavelengths, pixels.
+const GAP: u32 = 6;
+const LEFT: u32 = 104;
+const TOP: u32 = 44;
+/// Room under a row of tiles for its scale, pixels.
+const SCALE: u32 = 22;
+/// The share of a picture's energy that a square within its tile holds; the far tails of diffraction would leave the
+/// rest of it small.
+const HELD: f64 = 0.98;
+
+/// Draws all pictures: wavelengths across, with the whole light of all of them in colour at the end of each row;
+/// fields and distances down.
+///
+/// Each tile is exposed for its brightest pixel. The tiles of a row are of one scale, told by the bar below them,
+/// about the centroid; x runs to the right, y up.
+///
+/// # Errors
+/// When there are more rows than a picture holds.
+pub fn psf_mosaic(set: &PsfSet) -> Result<RgbImage, PipelineError> {
+    let n_colors = set.spectral_weights.len();
+    let n_columns = if n_colors > 1 { n_colors + 1 } else { n_colors } as u32;
+    let points: Vec<Range<usize>> = set.points().collect();
+    let tile = TILE.min(LONGEST / n_columns.max(1)).min((LONGEST / points.len().max(1) as u32).saturating_sub(SCALE));
+    if tile < 8 {
+        let reason = format!("{} points are too many for one picture", points.len());
+        return Err(PipelineError::Png { reason });
+    }
+    let layout = Layout { tile, n_columns, n_rows: points.len() as u32 };
+    let sides_um: Vec<f64> = points.iter().map(|point| row_side_um(set, point.clone())).collect();
+    let png = svg_to_png(&words(set, &layout, &points, &sides_um), 1.0)?;
+    let mut sheet = image::load_from_memory_with_format(&png, image::ImageFormat::Png)
+        .map_err(|e| PipelineError::Png { reason: e.to_string() })?
+        .to_rgb8();
+    for (row, (point, side_um)) in points.iter().zip(&sides_um).enumerate() {
+        let side_px = side_um / set.pixel_um;
+        for (column, i) in point.clone().enumerate() {
+            let gray = resampled(&set.pictures[i], side_px, tile as usize);
+            let top = gray.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+            let picture =
+                RgbImage::from_fn(tile, tile, |x, y| Rgb([code(f64::from(gray[(y as usize, x as usize)] / top)); 3]));
+            layout.put(&mut sheet, &picture, row, column);
+        }
+        if n_colors > 1 {
+            let color = set.color_of(point.clone()).unwrap_or_else(|| LinearRgb::black(1, 1));
+            let planes = color.planes.each_ref().map(|plane| resampled(plane, side_px, tile as usize));
+            let light = LinearRgb { planes };
+            let picture = light.to_srgb(light.level_at(1.0).max(f64::MIN_POSITIVE));
+            layout.put(&mut sheet, &picture, row, n_colors);
+        }
+    }
+    Ok(sheet)
+}
+
+/// Returns the side of the square that holds nearly all light of each picture of a point and of them all, µm.
+fn row_side_um(set: &PsfSet, point: Range<usize>) -> f64 {
+    let own = point.clone().filter(|i| !set.rows[*i].is_dark()).map(|i| set.pictures[i].view());
+    let whole = set.whole_light_of(point).map(|light| light.picture);
+    let side = |picture: ndarray::ArrayView2<'_, f32>| {
+        2.0 * dioptric_psf::Picture::new(picture, set.pixel_um).energy_half_side_um(HELD)
+    };
+    let widest = own.map(side).chain(whole.as_ref().map(|picture| side(picture.view()))).fold(0.0, f64::max);
+    // A rim of a tenth, and never less than a few pixels.
+    (1.1 * widest).max(5.0 * set.pixel_um)
+}
+
+/// Returns everything but the tiles, as SVG.
+fn words(set: &PsfSet, layout: &Layout, points: &[Range<usize>], sides_um: &[f64]) -> String {
+    let mut sheet = Sheet::default();
+    let (ink, soft) = (("#111111", "bold"), ("#555555", "normal"));
+    let (x0, y0) = layout.corner(0, 0);
+    if let Some(point) = points.first() {
+        for (column, i) in point.clone().enumerate() {
+            let words = format!("{} nm", number(set.rows[i].wavelength_nm));
+            sheet.text((f64::from(layout.corner(0, column).0), f64::from(y0) - 7.0), 13.0, ink, &words);
+        }
+        if set.spectral_weights.len() > 1 {
+            let x = f64::from(layout.corner(0, set.spectral_weights.len()).0);
+            sheet.text((x, f64::from(y0) - 7.0), 13.0, ink, "all together");
+        }
+    }
+    let note = "each tile exposed for its brightest pixel; fields to the right, y up";
+    sheet.text((f64::from(x0), 14.0), 11.0, soft, note);
+    for (row, (point, side_um)) in points.iter().zip(sides_um).enumerate() {
+        let first: &PsfRow = &set.rows[point.start];
+        let y = f64::from(layout.corner(row, 0).1);
+        sheet.text((8.0, y + 16.0), 13.0, ink, &field(first));
+        sheet.text((8.0, y + 34.0), 13.0, ink, &distance(first.distance_mm));
+        if point.clone().all(|i| set.rows[i].is_dark()) {
+            sheet.text((8.0, y + 52.0), 12.0, soft, "dark");
+            continue;
+        }
+        let bar_um = round_down(0.45 * side_um);
+        let bar_px = bar_um / side_um * f64::from(layout.tile);
+        let below = y + f64::from(layout.tile) + 9.0;
+        sheet.bar((f64::from(x0), below), bar_px);
+        sheet.text((f64::from(x0) + bar_px + 6.0, below + 4.0), 12.0, ink, &length(bar_um));
+    }
+    let (width, height) = layout.size();
+    sheet.to_svg(f64::from(width), f64::from(height))
+}
+
+/// Writes the pictures of point spread functions: an EXR with a channel a picture where the path ends in `.exr`, a labelled
+/// PNG [mosaic](psf_mosaic) where it ends in `.png`.
+///
+/// # Errors
+/// When the file cannot be written, or its name ends in neither.
+pub fn write_psfs(set: &PsfSet, path: &Path) -> Result<(), PipelineError> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let cannot = |reason: String| PipelineError::Write { path: path.to_owned(), reason };
+    match extension.as_str() {
+        "exr" => set.write_exr(path),
+        "png" => std::fs::write(path, png_bytes(&psf_mosaic(set)?)?).map_err(|e| cannot(e.to_string())),
+        _ => Err(cannot(format!("'.{extension}' is no format of pictures here; expected .exr or .png"))),
+    }
+}
+
+/// Where tiles lie.
+struct Layout {
+    tile: u32,
+    n_columns: u32,
+    n_rows: u32,
+}
+
+impl Layout {
+    /// Returns the top left corner of a tile, pixels.
+    fn corner(&self, row: usize, column: usize) -> (u32, u32) {
+        (LEFT + column as u32 * (self.tile + GAP), TOP + row as u32 * (self.tile + SCALE))
+    }
+
+    fn size(&self) -> (u32, u32) {
+        // Room for the note above a single column.
+        let width = (LEFT + self.n_columns * (self.tile + GAP)).max(LEFT + 420);
+        (width, TOP + self.n_rows * (self.tile + SCALE))
+    }
+
+    fn put(&self, sheet: &mut RgbImage, tile: &RgbImage, row: usize, column: usize) {
+        let (x, y) = self.corner(row, column);
+        imageops::replace(sheet, tile, i64::from(x), i64::from(y));
+    }
+}
+
+/// Returns the square of `side_px` pixels about the middle of a picture as `n` × `n` means over areas.
+fn resampled(picture: &Array2<f32>, side_px: f64, n: usize) -> Array2<f32> {
+    let step = side_px / n as f64;
+    let shares = |i: usize, length: usize| {
+        // Pixel k covers k to k + 1; the middle of the picture is that of its middle pixel.
+        let low = (length / 2) as f64 + 0.5 - 0.5 * side_px + step * i as f64;
+        let high = low + step;
+        let first = low.floor().max(0.0) as usize;
+        let last = (high.ceil().max(0.0) as usize).min(length);
+        (first..last).map(move |k| (k, ((k + 1) as f64).min(high) - (k as f64).max(low))).collect::<Vec<_>>()
+    };
+    let (rows, columns) = picture.dim();
+    let across: Vec<Vec<(usize, f64)>> = (0..n).map(|i| shares(i, columns)).collect();
+    let down: Vec<Vec<(usize, f64)>> = (0..n).map(|i| shares(i, rows)).collect();
+    Array2::from_shape_fn((n, n), |(row, column)| {
+        let sum: f64 = down[row]
+            .iter()
+            .flat_map(|(r, a)| across[column].iter().map(move |(c, b)| a * b * f64::from(picture[(*r, *c)])))
+            .sum();
+        (sum / (step * step)) as f32
+    })
+}
+
+/// Returns the largest of 1, 2 or 5 times a power of ten that is no larger.
+fn round_down(most: f64) -> f64 {
+    let up = round_up(most);
+    let lower = [0.5, 0.4, 0.2].into_iter().map(|share| up * share);
+    std::iter::once(up).chain(lower).find(|v| *v <= most * (1.0 + 1e-9) && is_round(*v)).unwrap_or(up)
+}
+
+fn is_round(value: f64) -> bool {
+    (round_up(value) / value - 1.0).abs() < 1e-9
+}
+
+fn field(row: &PsfRow) -> String {
+    match row.field_y_deg {
+        0.0 => format!("{}°", number(row.field_deg)),
+        y => format!("{}°, y {}°", number(row.field_deg), number(y)),
+    }
+}
+
+fn length(um: f64) -> String {
+    if um >= 1000.0 { format!("{} mm", number(1e-3 * um)) } else { format!("{} µm", number(um)) }
+}
+
+fn distance(mm: f64) -> String {
+    match mm {
+        mm if mm.is_infinite() => "∞".to_owned(),
+        mm if mm >= 1000.0 => format!("{} m", number(1e-3 * mm)),
+        mm => format!("{} mm", number(mm)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_abs_diff_eq;
+
+    use super::*;
+
+    #[test]
+    fn a_picture_resampled_keeps_its_place_and_its_level() {
+        let mut picture = Array2::zeros((5, 5));
+        picture[(2, 2)] = 1.0;
+        picture[(1, 3)] = 0.5;
+        // Three pixels across nine: each becomes three by three.
+        let tile = resampled(&picture, 3.0, 9);
+        assert_eq!((tile[(4, 4)], tile[(3, 3)], tile[(2, 6)], tile[(0, 0)]), (1.0, 1.0, 0.5, 0.0));
+        // Finer than pixels or coarser, all light within is there.
+        for (side, n) in [(5.0, 2), (5.0, 7), (9.0, 4)] {
+            let mean = resampled(&picture, side, n).mean().unwrap();
+            assert_abs_diff_eq!(f64::from(mean) * side * side, 1.5, epsilon = 1e-5);
+        }
+    }
+
+    #[test]
+    fn scales_are_round_and_fit() {
+        assert_eq!([9.9, 10.0, 1.2, 49.0, 0.07].map(round_down), [5.0, 10.0, 1.0, 20.0, 0.05]);
+        assert_eq!([200.0, 2000.0, 0.5].map(length), ["200 µm", "2 mm", "0.5 µm"]);
+        assert_eq!([f64::INFINITY, 2500.0, 300.0].map(distance), ["∞", "2.5 m", "300 mm"]);
+    }
+}

@@ -1,0 +1,176 @@
+//! The page of the report: a template filled with numbers, drawings and embedded pictures.
+
+use base64::{Engine, engine::general_purpose::STANDARD};
+use image::RgbImage;
+use minijinja::{AutoEscape, Environment, Value, context, value::Serde};
+use ndarray::Array2;
+use serde::Serialize;
+
+use crate::{LensDrawing, MosaicPlan, PsfMosaic, chart_svg, png::png_bytes};
+use dioptric_analysis::{LineChart, RunCharts, RunPlaces, RunReport};
+use dioptric_pipeline::{
+    BankData, Capture, PipelineError, REFERENCE_WAVELENGTH_NM, Shot, display::LinearRgb, display::code,
+    display::wavelength_color,
+};
+
+const TEMPLATE: &str = include_str!("report.html.j2");
+/// Width and height of a plot, pixels.
+const CHART: (f64, f64) = (560.0, 340.0);
+/// Widest small picture, pixels.
+const THUMBNAIL: usize = 480;
+
+/// Everything that the page shows.
+pub(super) struct Page<'a> {
+    pub(super) shot: &'a Shot,
+    pub(super) capture: &'a Capture,
+    pub(super) report: &'a RunReport,
+    pub(super) places: &'a RunPlaces,
+    pub(super) charts: &'a RunCharts,
+    pub(super) picture_png: &'a [u8],
+}
+
+/// A picture in the page with the words below it.
+#[derive(Serialize)]
+struct Figure {
+    src: String,
+    caption: String,
+}
+
+/// Returns the page as HTML.
+pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    let wrong = |error: minijinja::Error| PipelineError::Unsuitable {
+        what: "the report's template",
+        reason: error.to_string(),
+    };
+    environment.add_filter("fixed", |value: f64, digits: usize| format!("{value:.digits$}"));
+    environment.add_template("report", TEMPLATE).map_err(wrong)?;
+    let charts = page.charts;
+    let svg = |chart: &LineChart| Value::from_safe_string(chart_svg(chart, CHART.0, CHART.1));
+    let drawing = LensDrawing {
+        fields_deg: [0.0, 0.7, 1.0]
+            .iter()
+            .map(|share| (share * page.places.corner_tan()).atan().to_degrees())
+            .collect(),
+        distance_mm: page.shot.focus_distance_mm.unwrap_or(f64::INFINITY),
+        wavelengths_nm: vec![REFERENCE_WAVELENGTH_NM],
+        film_mm: Some(page.shot.film_mm),
+    };
+    let (mosaic, mosaic_src) = mosaic(page)?;
+    environment
+        .get_template("report")
+        .and_then(|template| {
+            template.render(context! {
+                report => Value::from(Serde(page.report)),
+                settings => page.shot.camera.to_ron(),
+                picture => data_uri(page.picture_png),
+                lens_svg => Value::from_safe_string(drawing.to_svg(&page.shot.lens).unwrap_or_default()),
+                bank => page.report.psf_bank.as_ref().map(BankData::in_words),
+                mosaic => mosaic_src,
+                mosaic_fields => mosaic.fields_deg,
+                mosaic_depths => mosaic.depths_m,
+                mosaic_tiles_um => mosaic.tiles_um,
+                lsf => svg(&charts.lsf),
+                mtf => svg(&charts.mtf),
+                illumination => svg(&charts.illumination),
+                distortion => svg(&charts.distortion),
+                spectrum => svg(&charts.spectrum),
+                histogram => svg(&charts.histogram),
+                seen => seen(&page.capture.irradiance.seen),
+                bands => Value::from(Serde(bands(page))),
+                depth => depth(page),
+            })
+        })
+        .map_err(wrong)
+}
+
+fn data_uri(png: &[u8]) -> String {
+    format!("data:image/png;base64,{}", STANDARD.encode(png))
+}
+
+fn embedded(picture: &RgbImage) -> String {
+    png_bytes(picture).map(|png| data_uri(&png)).unwrap_or_default()
+}
+
+fn mosaic(page: &Page<'_>) -> Result<(PsfMosaic, String), PipelineError> {
+    let plan = MosaicPlan {
+        field_tans: [0.0, 0.35, 0.7, 0.95].iter().map(|share| page.places.field(*share)).collect(),
+        dioptres: page.places.dioptres.clone(),
+        grid: page.shot.grid().clone(),
+        tile_px: 95,
+        tile_um: None,
+    };
+    let mosaic = PsfMosaic::draw(&page.capture.bank, &plan);
+    let src = data_uri(&png_bytes(&mosaic.to_picture(1))?);
+    Ok((mosaic, src))
+}
+
+/// The irradiance as an observer sees it, exposed for its brightest per cent.
+fn seen(light: &LinearRgb) -> String {
+    embedded(&thumbnail(&light.to_srgb(light.level_at(0.99).max(f64::MIN_POSITIVE))))
+}
+
+/// A few bands, each in its colour and exposed alike.
+fn bands(page: &Page<'_>) -> Vec<Figure> {
+    let bands = &page.capture.irradiance.bands;
+    let top = bands.iter().map(|(_, plane)| level_at(plane, 0.995)).fold(f64::MIN_POSITIVE, f64::max);
+    bands
+        .iter()
+        .map(|(nm, plane)| {
+            let tint = tint(*nm);
+            let picture = RgbImage::from_fn(plane.ncols() as u32, plane.nrows() as u32, |x, y| {
+                let value = f64::from(plane[(y as usize, x as usize)]) / top;
+                image::Rgb(tint.map(|t| code(value * t)))
+            });
+            Figure {
+                src: embedded(&thumbnail(&picture)),
+                caption: format!("{nm:.0} nm, full scale {:.3} mW m⁻² nm⁻¹", 1e3 * top),
+            }
+        })
+        .collect()
+}
+
+/// The colour of a band, its largest part 1.
+fn tint(wavelength_nm: f64) -> [f64; 3] {
+    let text = wavelength_color(wavelength_nm);
+    let parts = [1, 3, 5].map(|i| u8::from_str_radix(&text[i..i + 2], 16).map_or(0.0, f64::from));
+    let most = parts.iter().copied().fold(1.0, f64::max);
+    // A pale rest keeps detail visible in deep blue and red.
+    parts.map(|v| 0.15 + 0.85 * v / most)
+}
+
+/// Depth in dioptres, near bright.
+fn depth(page: &Page<'_>) -> String {
+    let Some(depth) = &page.shot.scene.depth else { return String::new() };
+    let (near_m, far_m) = depth.range_m();
+    let (far, near) = (1.0 / far_m, 1.0 / near_m);
+    let z_m = depth.z_m();
+    let picture = RgbImage::from_fn(z_m.ncols() as u32, z_m.nrows() as u32, |x, y| {
+        let dioptres = 1.0 / f64::from(z_m[(y as usize, x as usize)]);
+        let share = if near > far { (dioptres - far) / (near - far) } else { 1.0 };
+        let level = (30.0 + 210.0 * share).round() as u8;
+        image::Rgb([level, level, level])
+    });
+    embedded(&thumbnail(&picture))
+}
+
+fn level_at(plane: &Array2<f32>, share: f64) -> f64 {
+    let mut values: Vec<f32> = plane.iter().copied().collect();
+    let index = ((values.len() - 1) as f64 * share) as usize;
+    f64::from(*values.select_nth_unstable_by(index, f32::total_cmp).1)
+}
+
+/// Returns the picture made smaller by a whole number where it is wide.
+fn thumbnail(picture: &RgbImage) -> RgbImage {
+    let factor = (picture.width() as usize).div_ceil(THUMBNAIL).max(1) as u32;
+    if factor == 1 {
+        return picture.clone();
+    }
+    image::imageops::resize(
+        picture,
+        (picture.width() / factor).max(1),
+        (picture.height() / factor).max(1),
+        image::imageops::FilterType::Triangle,
+    )
+}
