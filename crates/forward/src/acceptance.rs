@@ -6,7 +6,7 @@ use dioptric_scene::View;
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, s};
 
-use crate::{Behind, BlurMode, DiscLens, Film, ForwardError, Kernels, Settings, Source, render};
+use crate::{BlurMode, DiscLens, Film, ForwardError, Kernels, OccludedLayer, Settings, Source, render};
 
 /// Smooth noise between 0 and 1, half mixed with a chequerboard of squares of this size.
 fn texture(rows: usize, columns: usize, square: usize, seed: u32) -> Array2<f32> {
@@ -67,7 +67,7 @@ fn depth(dioptres: &Array2<f32>) -> DepthMap {
 
 impl Pixels {
     fn source(&self) -> Source<'_> {
-        Source { radiance: &self.radiance, depth: &self.depth, view: self.view, behind: None }
+        Source { radiance: &self.radiance, depth: &self.depth, view: self.view, occluded: None }
     }
 }
 
@@ -211,7 +211,7 @@ fn depth_edges_are_four_times_better_than_scattered_points() {
     let (edge, off) = SlantedPlane::errors(&picture(&pixels.source(), BlurMode::Layered), &truth);
     let (paper_edge, paper_off) = SlantedPlane::errors(&picture(&pixels.source(), BlurMode::Pointwise), &truth);
     let (radiance, depth) = scene.behind();
-    let known = Source { behind: Some(Behind { radiance: &radiance, depth: &depth }), ..pixels.source() };
+    let known = Source { occluded: Some(OccludedLayer { radiance: &radiance, depth: &depth }), ..pixels.source() };
     let (known_edge, known_off) = SlantedPlane::errors(&picture(&known, BlurMode::Layered), &truth);
     println!(
         "layered {edge:.4} / {off:.4}, known {known_edge:.4} / {known_off:.4}, pointwise {paper_edge:.4} / {paper_off:.4}"
@@ -250,7 +250,7 @@ fn check_two_layers(front_blur: f64, back_blur: f64) {
     let scene = pixels(radiance, &dioptres);
     let hidden = image(vec![back.clone()], vec![550.0]);
     let hidden_depth = depth(&Array2::from_elem((n, n), (20.0 + back_blur) as f32));
-    let source = Source { behind: Some(Behind { radiance: &hidden, depth: &hidden_depth }), ..scene.source() };
+    let source = Source { occluded: Some(OccludedLayer { radiance: &hidden, depth: &hidden_depth }), ..scene.source() };
     // One step from the near to the far layer, so that both lie on a layer.
     let settings = Settings { layer_step_px: front_blur - back_blur, ..Settings::default() };
     let picture = rendered(&source, &lens(), &scene.film, &settings).remove(0);

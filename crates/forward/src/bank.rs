@@ -5,7 +5,7 @@ use dioptric_scene::Scene;
 use glam::DVec2;
 use ndarray::Array2;
 
-use crate::{Behind, Film, FilmMap, ForwardError, Kernels, RadialMap, Settings, Sink, Source, render};
+use crate::{Film, FilmMap, ForwardError, Kernels, RadialMap, Settings, Sink, Source, render};
 
 impl Kernels for PsfBank {
     fn is_symmetric(&self) -> bool {
@@ -92,9 +92,5 @@ pub fn irradiance(
     progress: &(dyn Fn(f64) + Sync),
     sink: &mut Sink<'_>,
 ) -> Result<(), ForwardError> {
-    let depth = scene.depth.as_ref().ok_or_else(|| ForwardError::MissingDepth { scene: scene.name.clone() })?;
-    let view = scene.view.ok_or_else(|| ForwardError::MissingView { scene: scene.name.clone() })?;
-    let behind = scene.hidden.as_ref().map(|hidden| Behind { radiance: &hidden.radiance, depth: &hidden.depth });
-    let source = Source { radiance: &scene.radiance, depth, view, behind };
-    render(&source, bank, film, settings, progress, sink)
+    render(&Source::of_scene(scene)?, bank, film, settings, progress, sink)
 }

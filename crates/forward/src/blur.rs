@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use dioptric_spectrum::{Cancel, Cancelled};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 
@@ -11,6 +12,7 @@ use crate::{
     occlusion::BlurredLayer,
     sampler::{IdealLayer, Rectangle, Sampler, Surface},
     tiles::{Cell, Knot, LayerKernels},
+    work::Work,
 };
 
 /// Cells blurred before their results are added up: bounds the memory, and keeps the order of the sums.
@@ -49,18 +51,29 @@ struct BlurredCell {
     cover: Option<Vec<f32>>,
 }
 
-/// Blurs a layer into `out`, which must be clear.
-pub(crate) fn blur_layer(task: &LayerTask<'_>, out: &mut BlurredLayer) {
-    let turned = turned(task);
+/// Blurs a layer into `out`, which must be clear; each cell counts as `cell_units` of work.
+pub(crate) fn blur_layer(
+    task: &LayerTask<'_>,
+    out: &mut BlurredLayer,
+    work: &Work<'_>,
+    cell_units: u64,
+) -> Result<(), Cancelled> {
+    let turned = turned(task, work.cancel())?;
     for cells in task.cells.chunks(CELLS_AT_ONCE) {
-        let blurred: Vec<Option<BlurredCell>> = cells.par_iter().map(|cell| blur_cell(task, &turned, cell)).collect();
+        let blur = |cell| {
+            let blurred = blur_cell(task, &turned, cell, work.cancel());
+            work.advance(cell_units);
+            blurred
+        };
+        let blurred: Vec<Option<BlurredCell>> = cells.par_iter().map(blur).collect::<Result<_, Cancelled>>()?;
         for cell in blurred.iter().flatten() {
             add_cell(task, cell, out);
         }
     }
+    Ok(())
 }
 
-fn turned(task: &LayerTask<'_>) -> Turned {
+fn turned(task: &LayerTask<'_>, cancel: &Cancel) -> Result<Turned, Cancelled> {
     let kernels = task.kernels;
     let mut knots: Vec<Knot> = task.cells.iter().flat_map(Cell::knots).collect();
     knots.sort_unstable();
@@ -70,7 +83,7 @@ fn turned(task: &LayerTask<'_>) -> Turned {
         task.cells.iter().fold((usize::MAX, 1), |(low, high), cell| (low.min(cell.size), high.max(cell.size)));
     // Direct blocks take the PSF as constant; where cells had to be halved it varies too fast for that.
     if kernels.width <= MAX_DIRECT && smallest == largest {
-        return Turned::Samples(samples.into_iter().collect());
+        return Ok(Turned::Samples(samples.into_iter().collect()));
     }
     let size = fast_size(largest + kernels.width - 1);
     let mut distinct: Vec<&Vec<f32>> = vec![];
@@ -87,39 +100,45 @@ fn turned(task: &LayerTask<'_>) -> Turned {
         .par_iter()
         .zip(twins)
         .map(|((knot, kernel), twin)| {
+            cancel.check()?;
             let mut values = vec![];
             with_fft(size, |fft| fft.forward(kernel, kernels.width, &mut values));
-            (*knot, Spectrum { values, twin })
+            Ok((*knot, Spectrum { values, twin }))
         })
-        .collect();
-    Turned::Spectra { by_knot, size }
+        .collect::<Result<_, Cancelled>>()?;
+    Ok(Turned::Spectra { by_knot, size })
 }
 
-fn blur_cell(task: &LayerTask<'_>, turned: &Turned, cell: &Cell) -> Option<BlurredCell> {
+fn blur_cell(
+    task: &LayerTask<'_>,
+    turned: &Turned,
+    cell: &Cell,
+    cancel: &Cancel,
+) -> Result<Option<BlurredCell>, Cancelled> {
     let half = task.kernels.width / 2;
     let (first_row, first_column) = cell.first_pixel(&task.sampler.frame);
     let whole = Rectangle { first_row, first_column, rows: cell.size, columns: cell.size };
-    let source = whole.clipped(task.film_rows, task.film_columns, half)?;
+    let Some(source) = whole.clipped(task.film_rows, task.film_columns, half) else { return Ok(None) };
     let mut ideal = IdealLayer::default();
-    if !task.sampler.sample(source, task.map, task.layer, task.surfaces, &mut ideal) {
-        return None;
+    if !task.sampler.sample(source, task.map, task.layer, task.surfaces, &mut ideal, cancel)? {
+        return Ok(None);
     }
     let blend = Blend::new(cell, &source, &task.sampler.frame);
     let spread = |values: &[f32]| match turned {
-        Turned::Samples(kernels) => spread_directly(values, &source, &blend, kernels, task.kernels.width),
+        Turned::Samples(kernels) => Ok(spread_directly(values, &source, &blend, kernels, task.kernels.width)),
         Turned::Spectra { by_knot, size } => {
-            spread_by_transform(values, &source, &blend, by_knot, *size, task.kernels.width)
+            spread_by_transform(values, &source, &blend, (by_knot, *size), task.kernels.width, cancel)
         }
     };
-    let light = spread(&ideal.light);
-    let cover = task.with_cover.then(|| spread(&ideal.cover));
+    let light = spread(&ideal.light)?;
+    let cover = task.with_cover.then(|| spread(&ideal.cover)).transpose()?;
     let at = Rectangle {
         first_row: source.first_row - half as i64,
         first_column: source.first_column - half as i64,
         rows: source.rows + 2 * half,
         columns: source.columns + 2 * half,
     };
-    Some(BlurredCell { at, light, cover })
+    Ok(Some(BlurredCell { at, light, cover }))
 }
 
 /// How the kernels at the four corners of a cell share its pixels: bilinearly.
@@ -182,14 +201,13 @@ fn spread_by_transform(
     values: &[f32],
     source: &Rectangle,
     blend: &Blend,
-    spectra: &BTreeMap<Knot, Spectrum>,
-    size: usize,
+    (spectra, size): (&BTreeMap<Knot, Spectrum>, usize),
     width: usize,
-) -> Vec<f32> {
+    cancel: &Cancel,
+) -> Result<Vec<f32>, Cancelled> {
     let corners = blend.knots.map(|knot| &spectra[&knot]);
-    let mut out = vec![];
     with_fft(size, |fft| {
-        let mut spectrum = vec![];
+        let (mut spectrum, mut out) = (vec![], vec![]);
         let mut sum = vec![Complex::new(0.0, 0.0); fft.spectrum_len()];
         if corners.iter().all(|corner| corner.twin == corners[0].twin) {
             fft.forward(values, source.columns, &mut spectrum);
@@ -197,6 +215,7 @@ fn spread_by_transform(
         } else {
             let mut windowed = vec![0.0; values.len()];
             for (corner, kernel) in corners.iter().enumerate() {
+                cancel.check()?;
                 for (row, (windowed, values)) in
                     windowed.chunks_exact_mut(source.columns).zip(values.chunks_exact(source.columns)).enumerate()
                 {
@@ -208,9 +227,10 @@ fn spread_by_transform(
                 multiply_add(&mut sum, &spectrum, &kernel.values);
             }
         }
+        cancel.check()?;
         fft.inverse(&mut sum, source.rows + width - 1, source.columns + width - 1, &mut out);
-    });
-    out
+        Ok(out)
+    })
 }
 
 /// Adds what of a blurred cell lies on the film.

@@ -1,6 +1,6 @@
 //! What can keep a scene from being imaged.
 
-use dioptric_spectrum::SpectrumError;
+use dioptric_spectrum::{Cancelled, SpectrumError};
 
 /// A scene that cannot be imaged through a lens.
 #[derive(Debug, thiserror::Error)]
@@ -24,19 +24,43 @@ pub enum ForwardError {
         unit: &'static str,
     },
     /// Two planes that must be of one size.
-    #[error("{what} is {found_rows} x {found_columns} samples, expected {rows} x {columns} as the radiance")]
+    #[error("{what} is {found_rows} x {found_columns} samples, expected {rows} x {columns} as the depth map")]
     Size {
-        /// What was compared with the radiance.
+        /// What was compared with the depth map.
         what: &'static str,
         /// Its rows.
         found_rows: usize,
         /// Its columns.
         found_columns: usize,
-        /// Rows of the radiance.
+        /// Rows of the depth map.
         rows: usize,
-        /// Columns of the radiance.
+        /// Columns of the depth map.
         columns: usize,
     },
+    /// A band at another wavelength than that for which a plan was made.
+    #[error("band {band} of the radiance is at {found_nm} nm, but the imaging was planned for {planned_nm} nm")]
+    OtherBand {
+        /// 0-based band.
+        band: usize,
+        /// Its centre, nm.
+        found_nm: f64,
+        /// That of the plan, nm.
+        planned_nm: f64,
+    },
+    /// A band that a plan does not have.
+    #[error("there is no band {band}: the imaging was planned for {n_bands} bands, counted from 0")]
+    NoSuchBand {
+        /// The band asked for.
+        band: usize,
+        /// The number of bands of the plan.
+        n_bands: usize,
+    },
+    /// A plan was made with the depth of a hidden layer whose radiance is not given.
+    #[error("the imaging was planned with a hidden layer, but its radiance is missing")]
+    MissingOccludedRadiance,
+    /// The work was cancelled.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// A film of no area.
     #[error("a film of {rows} x {columns} pixels of {pitch_um} um has no area")]
     EmptyFilm {

@@ -1,7 +1,7 @@
 //! Where the light of a scene lands, and how much of it.
 
 use dioptric_psf::FieldGeometry;
-use dioptric_spectrum::WavelengthGrid;
+use dioptric_spectrum::{Cancel, WavelengthGrid};
 use glam::DVec2;
 
 use crate::{Film, ForwardError, Kernels};
@@ -196,6 +196,7 @@ pub(crate) fn check_reach(
     grid: &WavelengthGrid,
     dioptres: (f64, f64),
     film: &Film,
+    cancel: &Cancel,
 ) -> Result<(), ForwardError> {
     let (first_nm, last_nm) = kernels.wavelengths_nm();
     // A thousandth of a nanometre forgives grids that were written with few digits.
@@ -216,6 +217,7 @@ pub(crate) fn check_reach(
     let corner_mm = film.half_diagonal_mm();
     for &wavelength_nm in grid.centers_nm() {
         for dioptres in [dioptres.0, dioptres.1] {
+            cancel.check()?;
             if let Some(reach_mm) = kernels.film_map(dioptres, wavelength_nm, 1.1 * corner_mm).ends_before(film) {
                 return Err(ForwardError::FilmBeyondField { corner_mm, reach_mm, wavelength_nm });
             }

@@ -4,6 +4,7 @@
 //! side gets a second sample, behind the first, filled from the far side alone: coarser and coarser means of the
 //! picture are tried until the hole is filled (push–pull), and a mean counts only if it lies behind.
 
+use dioptric_spectrum::{Cancel, Cancelled};
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -39,19 +40,22 @@ pub(crate) struct EdgeRule<'a> {
 
 impl Fill {
     /// Finds the near sides of the depth edges of a map of distances, and what lies behind them.
-    pub(crate) fn find(distances: &Array2<f32>, rule: &EdgeRule<'_>) -> Self {
-        let reach = reach_of_edges(distances, rule);
-        let pyramid = Pyramid::over(distances, rule.jump);
+    pub(crate) fn find(distances: &Array2<f32>, rule: &EdgeRule<'_>, cancel: &Cancel) -> Result<Self, Cancelled> {
+        let reach = reach_of_edges(distances, rule, cancel)?;
+        let pyramid = Pyramid::over(distances, rule.jump, cancel)?;
         let columns = distances.ncols();
         let filled: Vec<(usize, f32, Vec<Term>)> = (0..distances.len())
             .into_par_iter()
             .filter(|&sample| reach[sample] > 0.0)
             .filter_map(|sample| {
+                if let Err(cancelled) = cancel.check() {
+                    return Some(Err(cancelled));
+                }
                 let (row, column) = (sample / columns, sample % columns);
                 let (distance, terms) = pyramid.behind(row, column, distances[(row, column)] + 0.5 * rule.jump)?;
-                Some((sample, distance, terms))
+                Some(Ok((sample, distance, terms)))
             })
-            .collect();
+            .collect::<Result<_, Cancelled>>()?;
         let mut fill =
             Self { distances: Array2::from_elem(distances.dim(), f32::NAN), pyramid, holes: vec![], terms: vec![] };
         for (sample, distance, terms) in filled {
@@ -60,7 +64,15 @@ impl Fill {
             fill.terms.extend(terms);
             fill.holes.push(Hole { sample: sample as u32, terms: (first, fill.terms.len() as u32) });
         }
-        fill
+        Ok(fill)
+    }
+
+    /// The bytes of memory of the fill.
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.distances.len() * size_of::<f32>()
+            + size_of_val(self.holes.as_slice())
+            + size_of_val(self.terms.as_slice())
+            + self.pyramid.size_bytes()
     }
 
     /// Whether there is no second sample at all.
@@ -69,21 +81,31 @@ impl Fill {
     }
 
     /// Returns the second samples of a band, 0 where there is none.
-    pub(crate) fn samples(&self, plane: &Array2<f32>) -> Array2<f32> {
-        let means = self.pyramid.means_of(plane);
+    pub(crate) fn samples(&self, plane: &Array2<f32>, cancel: &Cancel) -> Result<Array2<f32>, Cancelled> {
+        let means = self.pyramid.means_of(plane, cancel)?;
         let mut filled = Array2::zeros(plane.dim());
         let columns = plane.ncols();
-        for hole in &self.holes {
+        for (index, hole) in self.holes.iter().enumerate() {
+            check_every(1 << 12, index, cancel)?;
             let terms = &self.terms[hole.terms.0 as usize..hole.terms.1 as usize];
             let value = terms.iter().map(|term| term.weight * means[term.cell as usize]).sum();
             filled[(hole.sample as usize / columns, hole.sample as usize % columns)] = value;
         }
-        filled
+        Ok(filled)
     }
 }
 
+/// Checks for cancelling once in `n` items.
+fn check_every(n: usize, index: usize, cancel: &Cancel) -> Result<(), Cancelled> {
+    if index.is_multiple_of(n) { cancel.check() } else { Ok(()) }
+}
+
 /// Returns, for each sample, how far an edge's blur still reaches beyond it into the near surface; 0 where none does.
-pub(crate) fn reach_of_edges(distances: &Array2<f32>, rule: &EdgeRule<'_>) -> Vec<f32> {
+pub(crate) fn reach_of_edges(
+    distances: &Array2<f32>,
+    rule: &EdgeRule<'_>,
+    cancel: &Cancel,
+) -> Result<Vec<f32>, Cancelled> {
     let (rows, columns) = distances.dim();
     let mut reach = vec![0.0_f32; rows * columns];
     // Soft edges drop over a few samples, so neighbours up to three samples away are compared.
@@ -92,6 +114,7 @@ pub(crate) fn reach_of_edges(distances: &Array2<f32>, rule: &EdgeRule<'_>) -> Ve
     let inside =
         |row: isize, column: isize| (0..rows as isize).contains(&row) && (0..columns as isize).contains(&column);
     for ((row, column), &distance) in distances.indexed_iter() {
+        check_every(columns, column, cancel)?;
         for (down, right) in OFFSETS {
             let (r, c) = (row as isize + down, column as isize + right);
             if inside(r, c) {
@@ -107,6 +130,7 @@ pub(crate) fn reach_of_edges(distances: &Array2<f32>, rule: &EdgeRule<'_>) -> Ve
     // Two sweeps spread the reach over the near surface, down to 0, a sample a step; farther surfaces stop it.
     let mut spread = |from: [(isize, isize, f32); 4], order: &mut dyn Iterator<Item = usize>| {
         for sample in order {
+            check_every(columns, sample, cancel)?;
             let (row, column) = (sample / columns, sample % columns);
             for (down, right, cost) in from {
                 let (r, c) = (row as isize + down, column as isize + right);
@@ -116,11 +140,12 @@ pub(crate) fn reach_of_edges(distances: &Array2<f32>, rule: &EdgeRule<'_>) -> Ve
                 }
             }
         }
+        Ok(())
     };
     let diagonal = std::f32::consts::SQRT_2;
-    spread([(0, -1, 1.0), (-1, 0, 1.0), (-1, -1, diagonal), (-1, 1, diagonal)], &mut (0..rows * columns));
-    spread([(0, 1, 1.0), (1, 0, 1.0), (1, 1, diagonal), (1, -1, diagonal)], &mut (0..rows * columns).rev());
-    reach
+    spread([(0, -1, 1.0), (-1, 0, 1.0), (-1, -1, diagonal), (-1, 1, diagonal)], &mut (0..rows * columns))?;
+    spread([(0, 1, 1.0), (1, 0, 1.0), (1, 1, diagonal), (1, -1, diagonal)], &mut (0..rows * columns).rev())?;
+    Ok(reach)
 }
 
 /// Means over cells of 1, 2, 4 … samples, each over the farthest surface in the cell only.
@@ -140,7 +165,7 @@ struct Level {
 }
 
 impl Pyramid {
-    fn over(distances: &Array2<f32>, jump: f32) -> Self {
+    fn over(distances: &Array2<f32>, jump: f32, cancel: &Cancel) -> Result<Self, Cancelled> {
         let (rows, columns) = distances.dim();
         let mut levels = vec![Level {
             first_cell: 0,
@@ -151,11 +176,16 @@ impl Pyramid {
         }];
         let mut children = vec![];
         while levels[levels.len() - 1].rows.max(levels[levels.len() - 1].columns) > 1 {
-            let (level, members) = levels[levels.len() - 1].halved(jump);
+            let (level, members) = levels[levels.len() - 1].halved(jump, cancel)?;
             levels.push(level);
             children.extend(members);
         }
-        Self { levels, children }
+        Ok(Self { levels, children })
+    }
+
+    fn size_bytes(&self) -> usize {
+        let cells: usize = self.levels.iter().map(|level| level.distances.len()).sum();
+        2 * cells * size_of::<f32>() + size_of_val(self.children.as_slice())
     }
 
     /// Returns the distance and the terms of what lies behind `limit` around a sample, or `None` if nothing does.
@@ -199,12 +229,13 @@ impl Pyramid {
     }
 
     /// Returns the means of a band over every cell of every level.
-    fn means_of(&self, plane: &Array2<f32>) -> Vec<f32> {
+    fn means_of(&self, plane: &Array2<f32>, cancel: &Cancel) -> Result<Vec<f32>, Cancelled> {
         let mut means: Vec<f32> = plane.iter().copied().collect();
         let n_first = means.len();
         for pair in self.levels.windows(2) {
             let (fine, coarse) = (&pair[0], &pair[1]);
             for cell in 0..coarse.rows * coarse.columns {
+                check_every(1 << 12, cell, cancel)?;
                 let members = self.children[coarse.first_cell - n_first + cell];
                 let (mut sum, mut weight) = (0.0, 0.0);
                 for (child, _) in fine.children_of(cell, coarse.columns, members) {
@@ -214,16 +245,17 @@ impl Pyramid {
                 means.push(sum / weight);
             }
         }
-        means
+        Ok(means)
     }
 }
 
 impl Level {
     /// Returns the level of half as many cells each way, and which children each of its cells is the mean of.
-    fn halved(&self, jump: f32) -> (Self, Vec<[bool; 4]>) {
+    fn halved(&self, jump: f32, cancel: &Cancel) -> Result<(Self, Vec<[bool; 4]>), Cancelled> {
         let (rows, columns) = (self.rows.div_ceil(2), self.columns.div_ceil(2));
         let (mut distances, mut shares, mut members) = (vec![], vec![], vec![]);
         for cell in 0..rows * columns {
+            check_every(1 << 12, cell, cancel)?;
             let all = || self.children_of(cell, columns, [true; 4]);
             let farthest = all().map(|(child, _)| self.distances[child]).fold(f32::NEG_INFINITY, f32::max);
             let mut member = [false; 4];
@@ -241,7 +273,7 @@ impl Level {
             members.push(member);
         }
         let first_cell = self.first_cell + self.rows * self.columns;
-        (Self { first_cell, rows, columns, distances, shares }, members)
+        Ok((Self { first_cell, rows, columns, distances, shares }, members))
     }
 
     /// Returns the cells of this level that lie in a cell of the next, of those that `members` names.
@@ -265,7 +297,7 @@ mod tests {
     #[test]
     fn a_continuous_surface_hides_nothing() {
         let slope = Array2::from_shape_fn((40, 60), |(_, column)| 0.2 * column as f32);
-        assert!(Fill::find(&slope, &rule(1.5)).is_empty());
+        assert!(Fill::find(&slope, &rule(1.5), &Cancel::new()).unwrap().is_empty());
     }
 
     #[test]
@@ -273,8 +305,8 @@ mod tests {
         let is_near = |row: usize, column: usize| row.abs_diff(30) < 12 && column.abs_diff(30) < 12;
         let distances = Array2::from_shape_fn((60, 60), |(r, c)| if is_near(r, c) { 1.0 } else { 8.0 });
         let plane = distances.mapv(|distance| if distance < 2.0 { 100.0 } else { 3.0 });
-        let fill = Fill::find(&distances, &rule(1.5));
-        let samples = fill.samples(&plane);
+        let fill = Fill::find(&distances, &rule(1.5), &Cancel::new()).unwrap();
+        let samples = fill.samples(&plane, &Cancel::new()).unwrap();
         for ((row, column), &distance) in fill.distances.indexed_iter() {
             let inset = 12_usize.saturating_sub(row.abs_diff(30).max(column.abs_diff(30)));
             if is_near(row, column) && inset <= 6 {
@@ -290,7 +322,7 @@ mod tests {
     #[test]
     fn middle_surface_fills_behind_the_near_one_and_the_far_one_behind_the_middle() {
         let distances = Array2::from_shape_fn((32, 96), |(_, column)| [1.0, 5.0, 9.0][column / 32]);
-        let fill = Fill::find(&distances, &rule(1.5));
+        let fill = Fill::find(&distances, &rule(1.5), &Cancel::new()).unwrap();
         assert!((fill.distances[(16, 30)] - 5.0).abs() < 0.1);
         assert!((fill.distances[(16, 62)] - 9.0).abs() < 0.1);
         assert!(fill.distances[(16, 33)].is_nan() && fill.distances[(16, 66)].is_nan());

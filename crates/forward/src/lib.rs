@@ -23,13 +23,19 @@ mod geometry;
 mod hidden;
 mod kernels;
 mod layers;
+mod occluded;
 mod occlusion;
+mod plan;
 mod render;
 mod sampler;
+mod source;
 mod tiles;
+mod work;
 
 #[cfg(test)]
 mod acceptance;
+#[cfg(test)]
+mod plan_tests;
 
 pub use bank::irradiance;
 pub use coverage::{Coverage, bank_settings_for, field_bank_settings_for};
@@ -38,4 +44,6 @@ pub use error::{ForwardError, SinkError};
 pub use film::{BlurMode, Film, Settings};
 pub use geometry::{FilmMap, RadialMap};
 pub use kernels::Kernels;
-pub use render::{Behind, Sink, Source, render};
+pub use plan::{BandKernels, ImagingPlan, ImagingSpec};
+pub use render::{Sink, render};
+pub use source::{BandRadiance, OccludedLayer, SceneGeometry, SceneRadiance, Source};

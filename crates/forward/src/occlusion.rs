@@ -1,5 +1,6 @@
 //! Layers laid one behind the other until every pixel is covered.
 
+use dioptric_spectrum::{Cancel, Cancelled};
 use ndarray::{Array2, Zip};
 
 /// A blurred layer: its light and its cover, and the part of each row that it touches.
@@ -65,8 +66,9 @@ impl Composite {
     }
 
     /// Lays a layer behind those before it, and wipes it.
-    pub(crate) fn lay_behind(&mut self, layer: &mut BlurredLayer) {
+    pub(crate) fn lay_behind(&mut self, layer: &mut BlurredLayer, cancel: &Cancel) -> Result<(), Cancelled> {
         for (row, &(start, end)) in layer.touched.iter().enumerate() {
+            cancel.check()?;
             for column in start..end {
                 let cover = layer.cover[(row, column)];
                 let uncovered = &mut self.uncovered[(row, column)];
@@ -79,6 +81,7 @@ impl Composite {
             }
         }
         layer.clear();
+        Ok(())
     }
 
     /// Adds a layer's light as if it hid nothing, and wipes it.
@@ -116,7 +119,7 @@ mod tests {
     fn composite(layers: &[(f32, f32)]) -> f32 {
         let mut picture = Composite::new(1, 1);
         for &(light, cover) in layers {
-            picture.lay_behind(&mut layer(light, cover));
+            picture.lay_behind(&mut layer(light, cover), &Cancel::new()).unwrap();
         }
         picture.finish()[(0, 0)]
     }

@@ -1,6 +1,7 @@
 //! The ideal picture of a layer: what an aberration-free lens of the same geometry would put on the film.
 
 use dioptric_scene::View;
+use dioptric_spectrum::{Cancel, Cancelled};
 use ndarray::Array2;
 
 use crate::{FilmMap, geometry::FilmFrame, layers::tent};
@@ -75,7 +76,8 @@ impl Sampler {
         layer: usize,
         surfaces: &[Surface<'_>],
         ideal: &mut IdealLayer,
-    ) -> bool {
+        cancel: &Cancel,
+    ) -> Result<bool, Cancelled> {
         let IdealLayer { light, cover } = ideal;
         light.clear();
         cover.clear();
@@ -84,6 +86,7 @@ impl Sampler {
         let layer = layer as f32;
         let mut total = 0.0;
         for row in 0..rectangle.rows {
+            cancel.check()?;
             for column in 0..rectangle.columns {
                 let (mut pixel_light, mut pixel_cover) = (0.0, 0.0);
                 for part in 0..n * n {
@@ -105,7 +108,7 @@ impl Sampler {
                 total += pixel_cover;
             }
         }
-        total > 0.0
+        Ok(total > 0.0)
     }
 }
 

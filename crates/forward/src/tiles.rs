@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{Film, FilmMap, Kernels, Settings, geometry::FilmFrame, layers::Layers};
+use crate::{Film, FilmMap, Kernels, Settings, geometry::FilmFrame, layers::Layers, sampler::Sampler, work::Work};
 
 /// A point of the film at which the PSF is computed: pixels to the right of the axis and below it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -119,6 +120,16 @@ impl LayerKernels {
         Self { width, symmetry, by_knot }
     }
 
+    /// The number of kernels.
+    pub(crate) fn n_kernels(&self) -> usize {
+        self.by_knot.len()
+    }
+
+    /// The bytes of memory of the kernels' samples.
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.by_knot.len() * self.width * self.width * size_of::<f32>()
+    }
+
     /// Returns the kernels between two wavelengths.
     pub(crate) fn mixed(&self, other: &Self, fraction: f32) -> Self {
         let width = self.width.max(other.width);
@@ -191,7 +202,8 @@ impl Tiling {
         wavelength_nm: f64,
         kernels: &dyn Kernels,
         settings: &Settings,
-    ) -> Self {
+        work: &Work<'_>,
+    ) -> Result<Self, Cancelled> {
         let symmetry = Symmetry::of(kernels);
         let cells: Vec<Vec<Cell>> = active
             .into_par_iter()
@@ -205,13 +217,29 @@ impl Tiling {
                     },
                     kernels: BTreeMap::new(),
                     errors: BTreeMap::new(),
+                    cancel: work.cancel(),
                 };
-                cells.into_iter().flat_map(|cell| probe.halved_until(cell, settings.max_edge_error)).collect()
+                let mut halved = vec![];
+                for cell in cells {
+                    probe.halve_until(cell, settings.max_edge_error, &mut halved)?;
+                    work.advance(1);
+                }
+                Ok(halved)
             })
-            .collect();
+            .collect::<Result<_, Cancelled>>()?;
         let canonical = |cell: &Cell| cell.knots().map(|knot| symmetry.canonical(knot));
         let knots = cells.iter().map(|cells| cells.iter().flat_map(canonical).collect()).collect();
-        Self { cells, symmetry, knots }
+        Ok(Self { cells, symmetry, knots })
+    }
+
+    /// The number of canonical knots, all layers together.
+    pub(crate) fn n_knots(&self) -> usize {
+        self.knots.iter().map(BTreeSet::len).sum()
+    }
+
+    /// The bytes of memory of the cells and the knots.
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.cells.iter().map(|cells| size_of_val(cells.as_slice())).sum::<usize>() + self.n_knots() * size_of::<Knot>()
     }
 
     /// Computes the kernels of all layers at a wavelength; none for a layer without cells.
@@ -222,23 +250,89 @@ impl Tiling {
         film: &Film,
         wavelength_nm: f64,
         kernels: &dyn Kernels,
-    ) -> Vec<LayerKernels> {
+        work: &Work<'_>,
+    ) -> Result<Vec<LayerKernels>, Cancelled> {
         let wanted: Vec<(usize, Knot)> =
             self.knots.iter().enumerate().flat_map(|(layer, knots)| knots.iter().map(move |&k| (layer, k))).collect();
         let computed: Vec<(usize, Knot, Array2<f32>)> = wanted
             .into_par_iter()
             .map(|(layer, knot)| {
+                work.check()?;
                 let field_tan = knot.field_tan(&maps[layer], 1e-3 * film.pitch_um);
                 let dioptres = layers.dioptres()[layer];
-                (layer, knot, kernels.kernel(field_tan, dioptres, wavelength_nm, film.pitch_um))
+                let kernel = kernels.kernel(field_tan, dioptres, wavelength_nm, film.pitch_um);
+                work.advance(1);
+                Ok((layer, knot, kernel))
             })
-            .collect();
+            .collect::<Result<_, Cancelled>>()?;
         let mut by_layer: Vec<Vec<(Knot, Array2<f32>)>> = vec![vec![]; layers.len()];
         for (layer, knot, kernel) in computed {
             by_layer[layer].push((knot, kernel));
         }
-        by_layer.into_iter().map(|kernels| LayerKernels::new(self.symmetry, kernels)).collect()
+        Ok(by_layer.into_iter().map(|kernels| LayerKernels::new(self.symmetry, kernels)).collect())
     }
+}
+
+/// Returns, for each layer, the cells in which the scene has anything at its depth.
+pub(crate) fn active_cells(
+    cells: &[Cell],
+    sampler: &Sampler,
+    maps: &[FilmMap],
+    surfaces: &[&Array2<f32>],
+    n_layers: usize,
+    cancel: &Cancel,
+) -> Result<Vec<Vec<Cell>>, Cancelled> {
+    let found: Vec<Vec<bool>> = cells
+        .par_iter()
+        .map(|cell| {
+            cancel.check()?;
+            Ok(layers_in(cell, sampler, maps, surfaces, n_layers))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let of_layer =
+        |layer| cells.iter().zip(&found).filter(move |(_, found): &(_, &Vec<bool>)| found[layer]).map(|(&c, _)| c);
+    Ok((0..n_layers).map(|layer| of_layer(layer).collect()).collect())
+}
+
+fn layers_in(
+    cell: &Cell,
+    sampler: &Sampler,
+    maps: &[FilmMap],
+    surfaces: &[&Array2<f32>],
+    n_layers: usize,
+) -> Vec<bool> {
+    const STEPS: usize = 4;
+    let (rows, columns) = surfaces[0].dim();
+    let (mut top, mut bottom, mut left, mut right) = (f64::MAX, f64::MIN, f64::MAX, f64::MIN);
+    let (first_row, first_column) = cell.first_pixel(&sampler.frame);
+    let side = cell.size as f64;
+    let along = |first: i64, k: usize| first as f64 - 0.5 + side * k as f64 / STEPS as f64;
+    for (map, k) in maps.iter().flat_map(|map| (0..(STEPS + 1) * (STEPS + 1)).map(move |k| (map, k))) {
+        let place_mm = sampler.frame.place_mm(along(first_row, k / (STEPS + 1)), along(first_column, k % (STEPS + 1)));
+        let tan = map.field_tan(place_mm);
+        let (row, column) = sampler.view.position_of(tan.x, tan.y);
+        (top, bottom) = (top.min(row), bottom.max(row));
+        (left, right) = (left.min(column), right.max(column));
+    }
+    // Beyond the edge the scene goes on in the dark at the depth of the edge; two samples of slack for curved maps.
+    let clamp = |low: f64, high: f64, n: usize| {
+        let last = (n - 1) as f64;
+        (low.floor() - 2.0).clamp(0.0, last) as usize..=(high.ceil() + 2.0).clamp(0.0, last) as usize
+    };
+    let mut found = vec![false; n_layers];
+    for row in clamp(top, bottom, rows) {
+        for column in clamp(left, right, columns) {
+            for surface in surfaces {
+                let place = surface[(row, column)];
+                if !place.is_nan() {
+                    let below = place as usize;
+                    found[below] = true;
+                    found[(below + usize::from(place.fract() > 0.0)).min(n_layers - 1)] = true;
+                }
+            }
+        }
+    }
+    found
 }
 
 /// Tells where the PSF cannot be interpolated across a cell.
@@ -247,24 +341,27 @@ struct Probe<'a> {
     kernel_at: &'a dyn Fn(Knot) -> Array2<f32>,
     kernels: BTreeMap<Knot, Array2<f32>>,
     errors: BTreeMap<(Knot, usize), f64>,
+    cancel: &'a Cancel,
 }
 
 impl Probe<'_> {
-    fn halved_until(&mut self, cell: Cell, max_edge_error: f64) -> Vec<Cell> {
-        if cell.size / 2 < SMALLEST || self.edge_error(&cell) <= max_edge_error {
-            return vec![cell];
+    fn halve_until(&mut self, cell: Cell, max_edge_error: f64, out: &mut Vec<Cell>) -> Result<(), Cancelled> {
+        if cell.size / 2 < SMALLEST || self.edge_error(&cell)? <= max_edge_error {
+            out.push(cell);
+            return Ok(());
         }
-        cell.quarters().into_iter().flat_map(|quarter| self.halved_until(quarter, max_edge_error)).collect()
+        cell.quarters().into_iter().try_for_each(|quarter| self.halve_until(quarter, max_edge_error, out))
     }
 
     /// Returns the largest error of the edge spread function, of edges along rows and columns, mid-cell.
-    fn edge_error(&mut self, cell: &Cell) -> f64 {
+    fn edge_error(&mut self, cell: &Cell) -> Result<f64, Cancelled> {
         let key = (self.symmetry.canonical(cell.middle()), cell.size);
         if let Some(&error) = self.errors.get(&key) {
-            return error;
+            return Ok(error);
         }
         let wanted: Vec<Knot> = cell.knots().into_iter().chain([cell.middle()]).collect();
         for knot in &wanted {
+            self.cancel.check()?;
             let canonical = self.symmetry.canonical(*knot);
             let kernel_at = self.kernel_at;
             self.kernels.entry(canonical).or_insert_with(|| kernel_at(canonical));
@@ -277,7 +374,7 @@ impl Probe<'_> {
             .collect();
         let error = edge_spread_peak(&difference, kernels.width);
         self.errors.insert(key, error);
-        error
+        Ok(error)
     }
 }
 

@@ -1,0 +1,82 @@
+//! The second samples of a scene: what lies behind near surfaces, close to their edges.
+
+use dioptric_spectrum::{Cancel, Cancelled, DepthMap};
+use ndarray::Array2;
+
+use crate::{
+    BlurMode, SceneGeometry, Settings,
+    hidden::{EdgeRule, Fill, reach_of_edges},
+    layers::Layers,
+    work::plane_of,
+};
+
+/// Where the second samples come from, and their places among the layers (NaN where there is none).
+pub(crate) enum OccludedSamples {
+    Nothing,
+    Estimated { fill: Box<Fill>, places: Array2<f32> },
+    Known(Array2<f32>),
+}
+
+impl OccludedSamples {
+    /// Finds where blurred edges show what lies behind them.
+    pub(crate) fn find(
+        scene: &SceneGeometry<'_>,
+        layers: &Layers,
+        settings: &Settings,
+        scene_per_film: f64,
+        cancel: &Cancel,
+    ) -> Result<Self, Cancelled> {
+        if layers.len() == 1 || settings.mode == BlurMode::Pointwise {
+            return Ok(Self::Nothing);
+        }
+        let reach =
+            |distance: f32| layers.radius_px_at(layers.place_of_distance(distance)) as f32 * scene_per_film as f32;
+        let rule = EdgeRule { jump: settings.depth_edge_px as f32, reach: &reach };
+        let size = scene.size();
+        let distances = |depth: &DepthMap| {
+            let z_m = depth.z_m();
+            plane_of(size, cancel, |row, column| layers.distance_px(z_m[(row, column)]))
+        };
+        let front = distances(scene.depth)?;
+        if let Some(depth) = scene.occluded_depth {
+            let (known, reach) = (distances(depth)?, reach_of_edges(&front, &rule, cancel)?);
+            let place = |row: usize, column: usize| {
+                let distance = known[(row, column)];
+                let shows = reach[row * size.1 + column] > 0.0 && distance > front[(row, column)] + 0.5 * rule.jump;
+                if shows { layers.place_of_distance(distance) } else { f32::NAN }
+            };
+            return Ok(Self::Known(plane_of(size, cancel, place)?));
+        }
+        let fill = Fill::find(&front, &rule, cancel)?;
+        if fill.is_empty() {
+            return Ok(Self::Nothing);
+        }
+        let place = |row: usize, column: usize| {
+            let distance = fill.distances[(row, column)];
+            if distance.is_nan() { f32::NAN } else { layers.place_of_distance(distance) }
+        };
+        let places = plane_of(size, cancel, place)?;
+        Ok(Self::Estimated { fill: Box::new(fill), places })
+    }
+
+    /// The places of the second samples among the layers.
+    pub(crate) fn places(&self) -> Option<&Array2<f32>> {
+        match self {
+            Self::Nothing => None,
+            Self::Estimated { places, .. } | Self::Known(places) => Some(places),
+        }
+    }
+
+    /// Whether the light of the second samples is given, not estimated.
+    pub(crate) fn needs_radiance(&self) -> bool {
+        matches!(self, Self::Known(_))
+    }
+
+    /// The bytes of memory beside the places.
+    pub(crate) fn size_bytes(&self) -> usize {
+        match self {
+            Self::Estimated { fill, .. } => fill.size_bytes(),
+            Self::Nothing | Self::Known(_) => 0,
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! A plan that is used again, held to one that is made for a single use.
+
+use std::sync::{
+    Arc, Mutex,
+    atomic::{AtomicUsize, Ordering},
+};
+
+use dioptric_scene::View;
+use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use glam::DVec2;
+use ndarray::Array2;
+
+use crate::{
+    BandRadiance, DiscLens, Film, FilmMap, ForwardError, ImagingPlan, ImagingSpec, Kernels, SceneGeometry, Settings,
+    Source, render,
+};
+
+const ROWS: usize = 60;
+const COLUMNS: usize = 90;
+
+/// A near disc over a slanted plane, under a lens of 1 mm and pixels of 1 µm, in bands that blur differently.
+struct Scene {
+    radiance: SpectralImage,
+    depth: DepthMap,
+    lens: Arc<DiscLens>,
+}
+
+impl Scene {
+    fn new() -> Self {
+        let wavelengths_nm: Vec<f64> = (0..7).map(|i| 500.0 + 20.0 * f64::from(i)).collect();
+        let plane = |band: usize| {
+            Array2::from_shape_fn((ROWS, COLUMNS), move |(r, c)| ((r / 7 + c / 5 + band) % 3) as f32 + 0.2)
+        };
+        let grid = WavelengthGrid::new(wavelengths_nm).unwrap();
+        let is_near = |r: usize, c: usize| r.abs_diff(30).pow(2) + c.abs_diff(45).pow(2) < 200;
+        let dioptres = |(r, c)| if is_near(r, c) { 27.0 } else { 18.0 + 0.03 * c as f32 };
+        Self {
+            radiance: SpectralImage::new(Quantity::Radiance, grid, (0..7).map(plane).collect()).unwrap(),
+            depth: DepthMap::new(Array2::from_shape_fn((ROWS, COLUMNS), |at| 1.0 / dioptres(at))).unwrap(),
+            lens: Arc::new(DiscLens { focus_dioptres: 20.0, axial_per_nm: 0.006, growth: 2.0, ..DiscLens::default() }),
+        }
+    }
+
+    fn view(&self) -> View {
+        View { focal_px: 1000.0, center_x_px: 44.5, center_y_px: 29.5 }
+    }
+
+    fn geometry(&self) -> SceneGeometry<'_> {
+        SceneGeometry { depth: &self.depth, view: self.view(), occluded_depth: None }
+    }
+
+    fn spec(&self) -> ImagingSpec {
+        ImagingSpec {
+            film: Film { rows: ROWS, columns: COLUMNS, pitch_um: 1.0 },
+            grid: WavelengthGrid::new((0..7).map(|i| 500.0 + 20.0 * f64::from(i)).collect()).unwrap(),
+            settings: Settings::default(),
+        }
+    }
+
+    fn plan(&self) -> ImagingPlan {
+        ImagingPlan::new(self.lens.clone(), &self.geometry(), self.spec(), &|_| {}, &Cancel::new()).unwrap()
+    }
+
+    fn band(&self, plan: &ImagingPlan, band: usize) -> Array2<f32> {
+        let front = &self.radiance.planes()[band];
+        plan.image(band, BandRadiance { front, occluded: None }, &Cancel::new()).unwrap()
+    }
+
+    fn rendered(&self) -> Vec<Array2<f32>> {
+        let source = Source { radiance: &self.radiance, depth: &self.depth, view: self.view(), occluded: None };
+        let ImagingSpec { film, settings, .. } = self.spec();
+        let mut bands = vec![];
+        render(&source, self.lens.as_ref(), &film, &settings, &|_| {}, &mut |_, band| {
+            bands.push(band);
+            Ok(())
+        })
+        .unwrap();
+        bands
+    }
+}
+
+/// Any band, in any order, any number of times, whether kernels are kept or not, is what `render` makes of it.
+#[test]
+fn planned_bands_equal_rendered_ones() {
+    let scene = Scene::new();
+    let rendered = scene.rendered();
+    for plan in [scene.plan(), scene.plan().with_kernel_budget(0)] {
+        for band in [5, 0, 6, 5, 3] {
+            assert_eq!(scene.band(&plan, band), rendered[band], "band {band}");
+        }
+        let mut streamed = vec![];
+        let source = Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None };
+        plan.stream(&source.light(), &|_| {}, &Cancel::new(), &mut |band, picture| {
+            assert_eq!(band, streamed.len());
+            streamed.push(picture);
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(streamed, rendered);
+    }
+}
+
+#[test]
+fn light_changes_without_another_plan() {
+    let scene = Scene::new();
+    let plan = scene.plan();
+    let first = scene.band(&plan, 2);
+    let brighter = scene.radiance.planes()[2].mapv(|v| 4.0 * v);
+    let second = plan.image(2, BandRadiance { front: &brighter, occluded: None }, &Cancel::new()).unwrap();
+    // A factor of 4 changes no mantissa.
+    assert_eq!(second, first.mapv(|v| 4.0 * v));
+}
+
+#[test]
+fn size_counts_kept_kernels() {
+    let scene = Scene::new();
+    let plan = scene.plan();
+    let empty = plan.size_bytes();
+    // Depth layers of all samples and the second samples behind edges, at least.
+    assert!(empty >= 2 * 4 * ROWS * COLUMNS, "{empty}");
+    let kernels = plan.kernels(0, &Cancel::new()).unwrap();
+    assert!(kernels.n_kernels() > 0);
+    assert_eq!(plan.size_bytes(), empty + kernels.size_bytes());
+    plan.kernels(0, &Cancel::new()).unwrap();
+    assert_eq!(plan.size_bytes(), empty + kernels.size_bytes());
+    let keeps_none = scene.plan().with_kernel_budget(kernels.size_bytes() - 1);
+    keeps_none.kernels(0, &Cancel::new()).unwrap();
+    assert_eq!(keeps_none.size_bytes(), empty);
+}
+
+/// A lens that cancels the work when it has been asked for a number of kernels, and counts them all.
+struct Cancelling {
+    lens: DiscLens,
+    at: usize,
+    asked: AtomicUsize,
+    cancel: Cancel,
+}
+
+impl Kernels for Cancelling {
+    fn is_symmetric(&self) -> bool {
+        self.lens.is_symmetric()
+    }
+    fn wavelengths_nm(&self) -> (f64, f64) {
+        self.lens.wavelengths_nm()
+    }
+    fn dioptres(&self) -> (f64, f64) {
+        self.lens.dioptres()
+    }
+    fn is_dark_beyond_reach(&self) -> bool {
+        self.lens.is_dark_beyond_reach()
+    }
+    fn film_map(&self, dioptres: f64, wavelength_nm: f64, reach_mm: f64) -> FilmMap {
+        self.lens.film_map(dioptres, wavelength_nm, reach_mm)
+    }
+    fn kernel(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Array2<f32> {
+        if self.asked.fetch_add(1, Ordering::Relaxed) + 1 == self.at {
+            self.cancel.cancel();
+        }
+        self.lens.kernel(field_tan, dioptres, wavelength_nm, pitch_um)
+    }
+    fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm)
+    }
+}
+
+/// Cancelled while it plans or while it computes kernels, the work ends with the kernels then begun, one a thread.
+#[test]
+fn cancelled_work_ends_at_once() {
+    let scene = Scene::new();
+    let attempt = |at: usize| {
+        let cancel = Cancel::new();
+        let lens = DiscLens::clone(&scene.lens);
+        let lens = Arc::new(Cancelling { lens, at, asked: AtomicUsize::new(0), cancel: cancel.clone() });
+        let plan = ImagingPlan::new(lens.clone(), &scene.geometry(), scene.spec(), &|_| {}, &cancel);
+        let n_planned = lens.asked.load(Ordering::Relaxed);
+        let ended = plan.and_then(|plan| {
+            let front = &scene.radiance.planes()[0];
+            plan.image(0, BandRadiance { front, occluded: None }, &cancel)
+        });
+        (n_planned, lens.asked.load(Ordering::Relaxed), ended)
+    };
+    let (n_planned, n_all, done) = attempt(usize::MAX);
+    assert!(done.is_ok() && n_planned > 10 && n_all > n_planned + 10, "{n_planned} of {n_all}");
+    for at in [3, n_planned + 3] {
+        let (_, asked, ended) = attempt(at);
+        assert!(matches!(ended, Err(ForwardError::Cancelled(_))), "{ended:?}");
+        assert!(asked <= at + rayon::current_num_threads(), "{asked} kernels, cancelled at {at}");
+    }
+}
+
+/// Cancelled while bands are imaged, no further band is handed on.
+#[test]
+fn cancelled_stream_hands_on_no_more() {
+    let scene = Scene::new();
+    let plan = scene.plan();
+    let cancel = Cancel::new();
+    let source = Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None };
+    let seen = Mutex::new(0.0);
+    let progress = |fraction: f64| {
+        *seen.lock().unwrap() = fraction;
+        if fraction > 0.5 {
+            cancel.cancel();
+        }
+    };
+    let mut n_bands = 0;
+    let ended = plan.stream(&source.light(), &progress, &cancel, &mut |_, _| {
+        n_bands += 1;
+        Ok(())
+    });
+    assert!(matches!(ended, Err(ForwardError::Cancelled(_))));
+    assert!(n_bands < 7 && *seen.lock().unwrap() < 0.9, "{n_bands} bands, progress {}", seen.lock().unwrap());
+}
+
+#[test]
+fn radiance_of_another_scene_is_refused() {
+    let scene = Scene::new();
+    let plan = scene.plan();
+    let message = |band: usize, front: &Array2<f32>| {
+        plan.image(band, BandRadiance { front, occluded: None }, &Cancel::new()).unwrap_err().to_string()
+    };
+    assert!(message(0, &Array2::zeros((ROWS, 7))).contains("60 x 7"));
+    assert!(message(7, &Array2::zeros((ROWS, COLUMNS))).contains("no band 7"));
+    let grid = WavelengthGrid::new((0..7).map(|i| 500.0 + 21.0 * f64::from(i)).collect()).unwrap();
+    let other = SpectralImage::zeros(Quantity::Radiance, grid, ROWS, COLUMNS);
+    let source = Source { radiance: &other, depth: &scene.depth, view: scene.view(), occluded: None };
+    let error = plan.stream(&source.light(), &|_| {}, &Cancel::new(), &mut |_, _| Ok(())).unwrap_err();
+    assert!(error.to_string().contains("521 nm"), "{error}");
+}
