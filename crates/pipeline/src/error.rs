@@ -7,7 +7,7 @@ use dioptric_optics::OpticsError;
 use dioptric_psf::PsfError;
 use dioptric_scene::SceneError;
 use dioptric_sensor::SensorError;
-use dioptric_spectrum::SpectrumError;
+use dioptric_spectrum::{Cancelled, SpectrumError};
 
 /// A camera that cannot be built, run or written down.
 #[derive(Debug, thiserror::Error)]
@@ -84,16 +84,25 @@ pub enum PipelineError {
     Sensor(#[from] SensorError),
     /// The point-spread functions.
     #[error(transparent)]
-    Psf(#[from] PsfError),
+    Psf(PsfError),
     /// The scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The blur.
     #[error(transparent)]
-    Forward(#[from] ForwardError),
+    Forward(ForwardError),
     /// Spectral data.
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
+    /// Work that was stopped on request.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// A temporary file that cannot be written.
+    #[error("cannot keep the irradiance in a temporary file: {reason}")]
+    Spill {
+        /// Why.
+        reason: String,
+    },
     /// A part of the camera that does not go with another.
     #[error("{what}: {reason}")]
     Unsuitable {
@@ -102,4 +111,22 @@ pub enum PipelineError {
         /// Why.
         reason: String,
     },
+}
+
+impl From<PsfError> for PipelineError {
+    fn from(error: PsfError) -> Self {
+        match error {
+            PsfError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Psf(other),
+        }
+    }
+}
+
+impl From<ForwardError> for PipelineError {
+    fn from(error: ForwardError) -> Self {
+        match error {
+            ForwardError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Forward(other),
+        }
+    }
 }

@@ -15,6 +15,7 @@ pub mod figures;
 mod frame_files;
 mod numbers;
 mod progress;
+mod quality;
 mod sense;
 mod staged;
 mod stages;
@@ -22,7 +23,7 @@ mod stages;
 pub use camera::{
     BankChoice, BankData, BlurChoice, Camera, DiffractionChoice, Exposed, FilmChoice, FocusChoice, FramesChoice,
     LensChoice, LensReading, MissingGlassChoice, Movements, ProcessingChoice, REFERENCE_WAVELENGTH_NM, SceneChoice,
-    SceneSource, SensorChoice, Shot, StopChoice, WavelengthChoice, WhiteChoice, nearest_to_reference_nm,
+    SceneSource, SensorChoice, StopChoice, WavelengthChoice, WhiteChoice, nearest_to_reference_nm,
 };
 pub use error::PipelineError;
 pub use frame_files::{FrameFile, Frames, Outputs, write_frames};
@@ -30,4 +31,8 @@ pub use numbers::{number, parse_numbers, parse_pairs};
 pub use progress::{Progress, Silent, Stage};
 pub use sense::{SenseRequest, Sensed, parse_illuminant, with_exposure_s};
 pub use staged::{Staged, write_file, write_json};
-pub use stages::{CameraBank, Capture, IRRADIANCE_FILE, IrradianceSummary};
+pub use quality::Quality;
+pub use stages::{
+    Capture, FilmPlace, FrameSet, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera, RESUME_FILE, ResolvedLens,
+    ResolvedScene, Resumed, SceneSummary, StageCounts,
+};

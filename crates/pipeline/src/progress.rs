@@ -7,9 +7,11 @@ pub enum Stage {
     Scene,
     /// Tracing the lens into a bank of point-spread functions.
     Lens,
-    /// From the scene to irradiance on the film, and on to electrons.
+    /// Laying layers of depth and point spread functions over the film.
+    Plan,
+    /// From the scene to irradiance on the film.
     Irradiance,
-    /// Exposure, noise, conversion.
+    /// Electrons, exposure, noise, conversion.
     Sensor,
     /// From the raw frame to the picture.
     Picture,
@@ -19,13 +21,14 @@ pub enum Stage {
 
 impl Stage {
     /// All stages, in their order.
-    pub const ALL: [Self; 6] = [Self::Scene, Self::Lens, Self::Irradiance, Self::Sensor, Self::Picture, Self::Report];
+    pub const ALL: [Self; 7] = [Self::Scene, Self::Lens, Self::Plan, Self::Irradiance, Self::Sensor, Self::Picture, Self::Report];
 
     /// What the stage does, in a few words.
     pub fn title(self) -> &'static str {
         match self {
             Self::Scene => "reading the scene",
             Self::Lens => "tracing the lens",
+            Self::Plan => "planning the imaging",
             Self::Irradiance => "scene to irradiance",
             Self::Sensor => "exposing the sensor",
             Self::Picture => "developing the picture",

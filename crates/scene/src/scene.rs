@@ -158,6 +158,51 @@ impl Scene {
         })
     }
 
+    /// Returns the scene with blocks of samples averaged into one, `factor` each way; what is left over at the right and at
+    /// the bottom is left out. A depth is that of the sample in the middle of its block.
+    ///
+    /// # Errors
+    /// When the scene is smaller than a block, or the factor is 0.
+    pub fn binned(&self, factor: usize) -> Result<Self, SceneError> {
+        if factor == 1 {
+            return Ok(self.clone());
+        }
+        if factor == 0 || self.rows() < factor || self.columns() < factor {
+            return Err(SceneError::Setting {
+                what: "the side of a block of samples",
+                value: factor.to_string(),
+                expected: format!("1 to {}", self.rows().min(self.columns())),
+            });
+        }
+        let (rows, columns) = (self.rows() / factor, self.columns() / factor);
+        let share = 1.0 / (factor * factor) as f32;
+        let mean = |plane: &Array2<f32>| {
+            Array2::from_shape_fn((rows, columns), |(row, column)| {
+                let (top, left) = (row * factor, column * factor);
+                share * plane.slice(s![top..top + factor, left..left + factor]).sum()
+            })
+        };
+        let image = |image: &SpectralImage| {
+            SpectralImage::new(image.quantity(), image.grid().clone(), image.planes().iter().map(mean).collect())
+        };
+        let depth = |depth: &DepthMap| {
+            let middle = |i: usize| i * factor + factor / 2;
+            DepthMap::new(Array2::from_shape_fn((rows, columns), |(r, c)| depth.z_m()[(middle(r), middle(c))]))
+        };
+        let hidden = match &self.hidden {
+            Some(h) => Some(HiddenLayer { radiance: image(&h.radiance)?, depth: depth(&h.depth)? }),
+            None => None,
+        };
+        Ok(Self {
+            name: self.name.clone(),
+            radiance: image(&self.radiance)?,
+            depth: self.depth.as_ref().map(depth).transpose()?,
+            view: self.view.map(|view| view.binned(factor)),
+            hidden,
+            light: self.light,
+        })
+    }
+
     /// Returns the scene on other bands.
     ///
     /// Between band centres radiance runs in straight lines; a band wider than those of the scene takes the mean

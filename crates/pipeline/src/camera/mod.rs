@@ -5,7 +5,6 @@ mod check;
 mod frames;
 mod lens;
 mod movements;
-mod resolved;
 mod scene;
 
 use std::{
@@ -17,7 +16,7 @@ use dioptric_sensor::{
     AutoExposure, Brightness, ColorCorrection, ColorSpace, Demosaic, ExposureControl, LensShading, Metering,
     Processing, ToneCurve, WhiteBalance,
 };
-use dioptric_spectrum::Illuminant;
+use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +24,6 @@ pub use bank::{BankChoice, BankData};
 pub use frames::{Exposed, FramesChoice};
 pub use lens::{LensReading, MissingGlassChoice, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 pub use movements::Movements;
-pub use resolved::Shot;
 pub use scene::{SceneChoice, SceneSource};
 
 use self::check::Checker;
@@ -320,6 +318,20 @@ pub enum WavelengthChoice {
     },
     /// These bands, nm.
     ListNm(Vec<f64>),
+}
+
+impl WavelengthChoice {
+    /// Returns the bands asked for, or `None` for those of the scene.
+    ///
+    /// # Errors
+    /// When they do not ascend or the step does not lead from first to last.
+    pub fn grid(&self) -> Result<Option<WavelengthGrid>, PipelineError> {
+        Ok(match self {
+            Self::Scene => None,
+            Self::Range { first_nm, last_nm, step_nm } => Some(WavelengthGrid::uniform(*first_nm, *last_nm, *step_nm)?),
+            Self::ListNm(list) => Some(WavelengthGrid::new(list.clone())?),
+        })
+    }
 }
 
 fn one() -> u64 {

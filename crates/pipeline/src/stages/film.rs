@@ -1,100 +1,80 @@
-//! A camera with everything it names opened: the lens, the scene, the film and the sensor.
+//! Where the film is, and how large it is.
 
-use dioptric_forward::{BlurMode, Film, Settings};
-use dioptric_optics::{Lens, MonoLens, ObjectPoint, Rims, glam::DVec2, rays_towards};
+use dioptric_forward::Film;
+use dioptric_optics::{MonoLens, ObjectPoint, Rims, glam::DVec2, rays_towards};
 use dioptric_scene::{Scene, View};
-use dioptric_sensor::Sensor;
-use dioptric_spectrum::WavelengthGrid;
+use serde::{Deserialize, Serialize};
 
-use crate::{
-    BlurChoice, Camera, FilmChoice, FocusChoice, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, Stage,
-    WavelengthChoice,
+use super::{
+    lens::ResolvedLens,
+    scene::ResolvedScene,
+    spec::{FilmInputs, Raster},
 };
+use crate::{FocusChoice, PipelineError};
 
 /// The share of the scene's samples that may be nearer than the near object.
 const NEAR_SHARE: f64 = 0.02;
 
-/// A camera with everything it names opened and fitted together.
-#[derive(Clone, Debug)]
-pub struct Shot {
-    /// The camera as it was asked for.
-    pub camera: Camera,
-    /// The lens, its stop set.
-    pub lens: Lens,
-    /// What its file says and this program does otherwise or not at all, a sentence each.
-    pub lens_notes: Vec<String>,
-    /// What stands before it.
-    pub scene: Scene,
-    /// The raster of pixels.
-    pub film: Film,
+/// The film behind the lens.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FilmPlace {
+    /// Rows of samples of the irradiance.
+    pub rows: usize,
+    /// Columns of samples of the irradiance.
+    pub columns: usize,
+    /// Distance between samples, µm.
+    pub pitch_um: f64,
+    /// Pixels of the sensor that are one sample, each way: 1 but for a preview.
+    pub binning: usize,
     /// Distance of the film behind the last vertex, mm.
-    pub film_mm: f64,
+    pub film_distance_mm: f64,
     /// Distance before the first vertex that is in focus, mm, where there is one.
     pub focus_distance_mm: Option<f64>,
-    /// The sensor, of the film's size.
-    pub sensor: Sensor,
-    /// How the point-spread functions are laid over the scene.
-    pub blur: Settings,
+    /// Distance of the film behind the exit pupil, mm; `None` of a telecentric lens.
+    pub exit_pupil_distance_mm: Option<f64>,
 }
 
-impl Shot {
-    /// Opens everything that a camera names.
-    ///
-    /// # Errors
-    /// When a number makes no sense, a name is unknown, a file cannot be read, or parts do not go together.
-    pub fn open(camera: &Camera, progress: &dyn Progress) -> Result<Self, PipelineError> {
-        camera.validate()?;
-        progress.at(Stage::Scene, 0.0);
-        let lens_file = camera.lens.open(&camera.lens_reading)?;
-        let lens = camera.movements.apply(camera.stop.apply(lens_file.lens)?)?;
-        let sensor = camera.sensor.open()?;
-        let scene = camera.scene.open(camera.wavelengths.grid()?.as_ref())?;
-        let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
-        // Every glass must be known at every band before any work is done.
-        for &wavelength_nm in scene.radiance.grid().centers_nm() {
-            lens.at(wavelength_nm)?;
+impl FilmPlace {
+    /// The raster of samples.
+    pub fn film(&self) -> Film {
+        Film { rows: self.rows, columns: self.columns, pitch_um: self.pitch_um }
+    }
+
+    /// The distance between the pixels of the sensor on this film, µm.
+    pub fn pixel_pitch_um(&self) -> f64 {
+        self.pitch_um / self.binning as f64
+    }
+}
+
+/// Places the film and chooses its samples.
+pub(super) fn place(
+    inputs: &FilmInputs,
+    lens: &ResolvedLens,
+    resolved: &ResolvedScene,
+) -> Result<FilmPlace, PipelineError> {
+    let (reference, scene) = (&lens.reference, &resolved.scene);
+    let film_distance_mm = place_film(inputs.focus, reference, scene)?;
+    let (film, binning) = match inputs.raster {
+        Raster::Pixels(full) => {
+            let binning = inputs.geometry.quality.film_binning(full.columns);
+            let fewer = |n: usize| (n / binning).max(1);
+            let pitch_um = full.pitch_um * binning as f64;
+            (Film { rows: fewer(full.rows), columns: fewer(full.columns), pitch_um }, binning)
         }
-        let film_mm = place_film(camera.focus, &reference, &scene)?;
-        let focus_distance_mm = reference.object_distance_mm_for(film_mm).ok();
-        let film = size_film(camera.film, &reference, film_mm, &scene, &sensor)?;
-        let sensor = Sensor { pixel_pitch_um: film.pitch_um, ..sensor.with_size(film.rows, film.columns) };
-        let mode = match camera.blur {
-            BlurChoice::Layered => BlurMode::Layered,
-            BlurChoice::Pointwise => BlurMode::Pointwise,
-        };
-        let blur = Settings { mode, ..Settings::default() };
-        progress.at(Stage::Scene, 1.0);
-        Ok(Self {
-            camera: camera.clone(),
-            lens,
-            lens_notes: lens_file.notes,
-            scene,
-            film,
-            film_mm,
-            focus_distance_mm,
-            sensor,
-            blur,
-        })
-    }
-
-    /// The bands.
-    pub fn grid(&self) -> &WavelengthGrid {
-        self.scene.radiance.grid()
-    }
-}
-
-impl WavelengthChoice {
-    /// Returns the bands asked for, or `None` for those of the scene.
-    ///
-    /// # Errors
-    /// When they do not ascend or the step does not lead from first to last.
-    pub fn grid(&self) -> Result<Option<WavelengthGrid>, PipelineError> {
-        Ok(match self {
-            Self::Scene => None,
-            Self::Range { first_nm, last_nm, step_nm } => Some(WavelengthGrid::uniform(*first_nm, *last_nm, *step_nm)?),
-            Self::ListNm(list) => Some(WavelengthGrid::new(list.clone())?),
-        })
-    }
+        // As coarse as the scene is by now.
+        Raster::Scene => (size_film(reference, film_distance_mm, scene)?, resolved.binning),
+    };
+    let exit_pupil_z_mm = reference.first_order().exit_pupil_z_mm;
+    Ok(FilmPlace {
+        rows: film.rows,
+        columns: film.columns,
+        pitch_um: film.pitch_um,
+        binning,
+        film_distance_mm,
+        focus_distance_mm: reference.object_distance_mm_for(film_distance_mm).ok(),
+        exit_pupil_distance_mm: exit_pupil_z_mm.is_finite().then_some(film_distance_mm - exit_pupil_z_mm),
+    })
 }
 
 fn place_film(focus: FocusChoice, lens: &MonoLens, scene: &Scene) -> Result<f64, PipelineError> {
@@ -115,35 +95,24 @@ fn near_depth_m(scene: &Scene) -> Result<f64, PipelineError> {
     Ok(f64::from(*depths.select_nth_unstable_by(index, f32::total_cmp).1))
 }
 
-fn size_film(
-    choice: FilmChoice,
-    lens: &MonoLens,
-    film_mm: f64,
-    scene: &Scene,
-    sensor: &Sensor,
-) -> Result<Film, PipelineError> {
-    Ok(match choice {
-        FilmChoice::Sensor => Film { rows: sensor.rows, columns: sensor.columns, pitch_um: sensor.pixel_pitch_um },
-        FilmChoice::Pixels { columns, rows, pitch_um } => Film { rows, columns, pitch_um },
-        FilmChoice::Scene => {
-            let view = scene.require_view()?;
-            let (rows, columns) = seen_evenly(&view, scene.rows(), scene.columns())?;
-            let (half_rows, half_columns) = (0.5 * rows as f64, 0.5 * columns as f64);
-            let half = DVec2::new(half_columns, half_rows);
-            let seen_um = match lens.is_rotational() {
-                true => seen_pitch_um(lens, film_mm, &view, half),
-                false => seen_pitch_of_any_um(lens, film_mm, &view, half),
-            };
-            // Blur mixes the rim of the scene with the dark beyond.
-            let half_um = seen_um * half_rows.min(half_columns) - 1e3 * widest_blur_mm(lens, film_mm, scene)?;
-            let pitch_um = half_um / half_rows.min(half_columns);
-            if !(pitch_um.is_finite() && pitch_um > 0.0) {
-                let reason = format!("the film at {film_mm} mm sees no upright picture of the scene");
-                return Err(PipelineError::Unsuitable { what: "film: Scene", reason });
-            }
-            Film { rows, columns, pitch_um }
-        }
-    })
+/// Returns as many pixels as the scene has samples about the axis, of such a pitch that they see the scene's field.
+fn size_film(lens: &MonoLens, film_mm: f64, scene: &Scene) -> Result<Film, PipelineError> {
+    let view = scene.require_view()?;
+    let (rows, columns) = seen_evenly(&view, scene.rows(), scene.columns())?;
+    let (half_rows, half_columns) = (0.5 * rows as f64, 0.5 * columns as f64);
+    let half = DVec2::new(half_columns, half_rows);
+    let seen_um = match lens.is_rotational() {
+        true => seen_pitch_um(lens, film_mm, &view, half),
+        false => seen_pitch_of_any_um(lens, film_mm, &view, half),
+    };
+    // Blur mixes the rim of the scene with the dark beyond.
+    let half_um = seen_um * half_rows.min(half_columns) - 1e3 * widest_blur_mm(lens, film_mm, scene)?;
+    let pitch_um = half_um / half_rows.min(half_columns);
+    if !(pitch_um.is_finite() && pitch_um > 0.0) {
+        let reason = format!("the film at {film_mm} mm sees no upright picture of the scene");
+        return Err(PipelineError::Unsuitable { what: "film: Scene", reason });
+    }
+    Ok(Film { rows, columns, pitch_um })
 }
 
 /// Returns the pitch at which the scene, `half` a size across and up in samples, just fills the film, µm: by first order, but

@@ -1,0 +1,28 @@
+//! The frames of the sensor: exposure, noise, conversion.
+
+use dioptric_sensor::{ElectronRate, Exposure, Sensor};
+
+use super::{Watch, spec::FrameInputs};
+use crate::{Exposed, PipelineError, Stage};
+
+/// What a sensor gives for one picture, and how it was exposed.
+#[derive(Clone, Debug)]
+pub struct FrameSet {
+    /// The exposure, metered or given.
+    pub exposure: Exposure,
+    /// The electrons, volts and raw frame of the first exposure, and all exposures merged.
+    pub exposed: Exposed,
+}
+
+pub(super) fn expose(
+    inputs: &FrameInputs,
+    sensor: &Sensor,
+    rate: &ElectronRate,
+    watch: &Watch<'_>,
+) -> Result<FrameSet, PipelineError> {
+    watch.progress.at(Stage::Sensor, 0.5);
+    watch.cancel.check()?;
+    let exposure = sensor.expose(rate, &inputs.exposure)?;
+    let exposed = inputs.frames.expose(sensor, rate, &exposure, &inputs.noise)?;
+    Ok(FrameSet { exposure, exposed })
+}

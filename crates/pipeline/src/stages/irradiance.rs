@@ -1,0 +1,279 @@
+//! The spectral irradiance on the film: imaged band by band, kept in memory or in a file.
+
+use std::{
+    borrow::Cow,
+    fs::File,
+    io::{Read, Seek, SeekFrom, Write},
+    path::Path,
+    sync::{Mutex, PoisonError},
+};
+
+use dioptric_forward::{ImagingPlan, Source};
+use dioptric_scene::{BandWriter, ExrParts, Scene, read_spectral_exr};
+use dioptric_spectrum::{Bands, Observer, Quantity, SpectrumError, WavelengthGrid};
+use ndarray::Array2;
+
+use super::{Watch, film::FilmPlace};
+use crate::{
+    PipelineError, Stage,
+    display::{LinearRgb, SpectrumToRgb},
+};
+
+/// The name of the file of spectral irradiance.
+pub const IRRADIANCE_FILE: &str = "irradiance.exr";
+
+/// The spectral irradiance on the film, W m⁻² nm⁻¹, bands × rows × columns.
+///
+/// Its bands are in memory, or in a temporary file where they would take more than was allowed.
+#[derive(Debug)]
+pub struct Irradiance {
+    grid: WavelengthGrid,
+    size: (usize, usize),
+    pitch_um: f64,
+    planes: Planes,
+    /// Means, largest samples and a few bands.
+    pub summary: IrradianceSummary,
+}
+
+/// Where the bands are.
+#[derive(Debug)]
+enum Planes {
+    Memory(Vec<Array2<f32>>),
+    /// All bands one after the other, little-endian.
+    File(Mutex<File>),
+}
+
+/// Spectral irradiance in brief.
+#[derive(Clone, Debug)]
+pub struct IrradianceSummary {
+    /// Mean over the film of each band, W m⁻² nm⁻¹.
+    pub mean: Vec<f64>,
+    /// Largest sample of each band, W m⁻² nm⁻¹.
+    pub max: Vec<f64>,
+    /// Mean illuminance, lux.
+    pub mean_lux: f64,
+    /// A few whole bands, each with its wavelength, nm.
+    pub bands: Vec<(f64, Array2<f32>)>,
+    /// All bands as an observer sees them, linear sRGB in lux.
+    pub seen: LinearRgb,
+}
+
+impl Irradiance {
+    /// Returns the bytes that the samples take.
+    pub fn size_bytes(&self) -> u64 {
+        size_bytes(self.size, self.grid.len())
+    }
+
+    /// Whether the bands are in a file and not in memory.
+    pub fn is_spilled(&self) -> bool {
+        matches!(self.planes, Planes::File(_))
+    }
+
+    /// The distance between samples on the film, µm.
+    pub fn pitch_um(&self) -> f64 {
+        self.pitch_um
+    }
+
+    /// Writes it as spectral EXR.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_exr(&self, path: &Path) -> Result<(), PipelineError> {
+        let parts = ExrParts { pitch_um: Some(self.pitch_um), ..ExrParts::default() };
+        let mut file = BandWriter::create(path, Quantity::Irradiance, &self.grid, self.size, &parts)?;
+        for band in 0..self.grid.len() {
+            file.write_band(band, &*self.band(band)?)?;
+        }
+        Ok(file.finish()?)
+    }
+
+    /// Reads it from a spectral EXR; one without a distance between samples has that of the film given.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or holds no irradiance.
+    pub fn read_exr(path: &Path, pitch_um: Option<f64>) -> Result<Self, PipelineError> {
+        let image = read_spectral_exr(path)?.image;
+        let in_file = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
+        if image.quantity() != Quantity::Irradiance {
+            let (found, expected) = (image.quantity().unit(), Quantity::Irradiance.unit());
+            return Err(in_file(format!("its unit is {found}, expected an irradiance, {expected}")));
+        }
+        image.check_samples().map_err(|e| in_file(e.to_string()))?;
+        let pitch_um = image.pitch_um().or(pitch_um);
+        let pitch_um = pitch_um.ok_or_else(|| in_file("it states no distance between its samples".to_owned()))?;
+        let (grid, size) = (image.grid().clone(), (image.rows(), image.columns()));
+        let mut summing = Summing::new(&grid, size);
+        let planes = image.into_planes();
+        for (band, plane) in planes.iter().enumerate() {
+            summing.add(band, plane);
+        }
+        Ok(Self { grid, size, pitch_um, planes: Planes::Memory(planes), summary: summing.summary })
+    }
+}
+
+impl Bands for Irradiance {
+    fn quantity(&self) -> Quantity {
+        Quantity::Irradiance
+    }
+
+    fn grid(&self) -> &WavelengthGrid {
+        &self.grid
+    }
+
+    fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    fn band(&self, band: usize) -> Result<Cow<'_, Array2<f32>>, SpectrumError> {
+        match &self.planes {
+            Planes::Memory(planes) => match planes.get(band) {
+                Some(plane) => Ok(Cow::Borrowed(plane)),
+                None => Err(SpectrumError::Band { band, reason: format!("there are {} bands", planes.len()) }),
+            },
+            Planes::File(file) => {
+                let unreadable = |e: std::io::Error| SpectrumError::Band { band, reason: e.to_string() };
+                let n_samples = self.size.0 * self.size.1;
+                let mut bytes = vec![0; 4 * n_samples];
+                let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+                file.seek(SeekFrom::Start(band as u64 * bytes.len() as u64)).map_err(unreadable)?;
+                file.read_exact(&mut bytes).map_err(unreadable)?;
+                let samples = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+                let plane = Array2::from_shape_vec(self.size, samples).expect("as many samples as were asked for");
+                Ok(Cow::Owned(plane))
+            }
+        }
+    }
+}
+
+fn size_bytes((rows, columns): (usize, usize), n_bands: usize) -> u64 {
+    4 * rows as u64 * columns as u64 * n_bands as u64
+}
+
+/// Images the scene; bands that together take more than `memory_bytes` go to a temporary file.
+pub(super) fn image(
+    plan: &ImagingPlan,
+    scene: &Scene,
+    place: &FilmPlace,
+    memory_bytes: u64,
+    watch: &Watch<'_>,
+) -> Result<Irradiance, PipelineError> {
+    let (grid, size) = (scene.radiance.grid().clone(), (place.rows, place.columns));
+    let is_spilled = size_bytes(size, grid.len()) > memory_bytes;
+    let cannot = |e: std::io::Error| PipelineError::Spill { reason: e.to_string() };
+    let mut file = if is_spilled { Some(tempfile::tempfile().map_err(cannot)?) } else { None };
+    let mut planes = Vec::new();
+    let mut summing = Summing::new(&grid, size);
+    let source = Source::of_scene(scene)?;
+    let progress = |fraction| watch.progress.at(Stage::Irradiance, fraction);
+    plan.stream(&source.light(), &progress, watch.cancel, &mut |band, plane| {
+        summing.add(band, &plane);
+        match &mut file {
+            Some(file) => {
+                let bytes: Vec<u8> = plane.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+                file.write_all(&bytes)?;
+            }
+            None => planes.push(plane),
+        }
+        Ok(())
+    })?;
+    let planes = file.map_or(Planes::Memory(planes), |file| Planes::File(Mutex::new(file)));
+    Ok(Irradiance { grid, size, pitch_um: place.pitch_um, planes, summary: summing.summary })
+}
+
+/// Sums up bands as they come.
+struct Summing {
+    wavelengths_nm: Vec<f64>,
+    to_rgb: SpectrumToRgb,
+    luminous: Vec<f64>,
+    chosen: Vec<usize>,
+    summary: IrradianceSummary,
+}
+
+impl Summing {
+    fn new(grid: &WavelengthGrid, (rows, columns): (usize, usize)) -> Self {
+        let [_, luminous, _] = Observer::Cie1931.weights(grid);
+        let (first, last) = grid.range_nm();
+        let mut chosen: Vec<usize> =
+            (0..4).map(|i| grid.nearest(first + (last - first) * f64::from(i) / 3.0)).collect();
+        chosen.dedup();
+        let summary = IrradianceSummary {
+            mean: Vec::with_capacity(grid.len()),
+            max: Vec::with_capacity(grid.len()),
+            mean_lux: 0.0,
+            bands: Vec::new(),
+            seen: LinearRgb::black(rows, columns),
+        };
+        Self { wavelengths_nm: grid.centers_nm().to_vec(), to_rgb: SpectrumToRgb::new(grid), luminous, chosen, summary }
+    }
+
+    fn add(&mut self, band: usize, plane: &Array2<f32>) {
+        let mean = plane.iter().map(|&e| f64::from(e)).sum::<f64>() / plane.len() as f64;
+        self.summary.mean.push(mean);
+        self.summary.max.push(plane.iter().copied().fold(0.0, f32::max).into());
+        self.summary.mean_lux += self.luminous[band] * mean;
+        self.summary.seen.add(plane, self.to_rgb.of_band(band));
+        if self.chosen.contains(&band) {
+            self.summary.bands.push((self.wavelengths_nm[band], plane.clone()));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dioptric_forward::{DiscLens, ImagingSpec, Settings};
+    use dioptric_scene::View;
+    use dioptric_spectrum::{Cancel, DepthMap, SpectralImage};
+
+    use super::*;
+    use crate::Silent;
+
+    fn image_with(memory_bytes: u64) -> Irradiance {
+        let grid = WavelengthGrid::uniform(450.0, 650.0, 100.0).unwrap();
+        let radiance = (0..3).map(|band| {
+            Array2::from_shape_fn((24, 30), |(row, column)| ((row * 7 + column * 3 + band) % 11) as f32)
+        });
+        let image = SpectralImage::new(Quantity::Radiance, grid.clone(), radiance.collect()).unwrap();
+        let view = View { focal_px: 5000.0, center_x_px: 14.5, center_y_px: 11.5 };
+        let depth = Some(DepthMap::flat(24, 30, 2.0).unwrap());
+        let scene = Scene { depth, view: Some(view), ..Scene::new("test", image) };
+        let place = FilmPlace {
+            rows: 16,
+            columns: 20,
+            pitch_um: 10.0,
+            binning: 1,
+            film_distance_mm: 50.0,
+            focus_distance_mm: None,
+            exit_pupil_distance_mm: None,
+        };
+        let lens = DiscLens { focus_dioptres: 1.0, radius_um_per_dioptre: 20.0, focal_mm: 50.0, ..DiscLens::default() };
+        let spec = ImagingSpec { film: place.film(), grid, settings: Settings::default() };
+        let cancel = Cancel::new();
+        let geometry = Source::of_scene(&scene).unwrap().geometry();
+        let plan = ImagingPlan::new(std::sync::Arc::new(lens), &geometry, spec, &|_| {}, &cancel).unwrap();
+        image(&plan, &scene, &place, memory_bytes, &Watch { progress: &Silent, cancel: &cancel }).unwrap()
+    }
+
+    #[test]
+    fn spilled_bands_are_those_in_memory() {
+        let (kept, spilled) = (image_with(u64::MAX), image_with(100));
+        assert!(!kept.is_spilled() && spilled.is_spilled());
+        for band in [2, 0, 1] {
+            assert_eq!(kept.band(band).unwrap(), spilled.band(band).unwrap());
+        }
+        assert_eq!(kept.summary.mean, spilled.summary.mean);
+        assert!(kept.band(3).is_err() && spilled.band(3).is_err());
+    }
+
+    #[test]
+    fn file_gives_back_the_same_bits() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("irradiance.exr");
+        let made = image_with(u64::MAX);
+        made.write_exr(&path).unwrap();
+        let read = Irradiance::read_exr(&path, None).unwrap();
+        assert_eq!((read.pitch_um(), read.grid()), (made.pitch_um(), made.grid()));
+        for band in 0..3 {
+            assert_eq!(read.band(band).unwrap(), made.band(band).unwrap());
+        }
+    }
+}

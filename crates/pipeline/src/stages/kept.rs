@@ -1,0 +1,375 @@
+//! A camera that is kept and changed.
+
+use std::sync::Arc;
+
+use dioptric_forward::ImagingPlan;
+use dioptric_psf::LensImageModel;
+use dioptric_scene::Scene;
+use dioptric_sensor::{Developed, ElectronRate, Processing, Sensor};
+use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, WavelengthGrid};
+
+use super::{
+    Watch, bank, electrons,
+    film::{self, FilmPlace},
+    frames::{self, FrameSet},
+    irradiance::{self, Irradiance},
+    lens::{self, ResolvedLens},
+    plan,
+    scene::{self, ResolvedScene, SceneSummary},
+    slot::Slot,
+    spec::{
+        BankInputs, ElectronInputs, FilmInputs, FrameInputs, GeometryInputs, IrradianceInputs, LensInputs,
+        PictureInputs, PlanInputs, SceneInputs,
+    },
+};
+use crate::{Camera, Frames, PipelineError, Progress, Quality, Stage};
+
+/// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
+const MEMORY_BYTES: u64 = 2 << 30;
+
+/// A camera whose results are kept: change it and ask again, and only what the change touches is computed.
+///
+/// Clones and changed cameras ([`with`](Self::with)) share what is kept, so that going back to an earlier setting costs
+/// nothing. Results are the same to the bit whether they were kept or made anew, and for any number of threads.
+///
+/// ```
+/// use dioptric_pipeline::{Camera, FilmChoice, KeptCamera, SceneSource, Silent, WavelengthChoice};
+/// use dioptric_spectrum::Cancel;
+///
+/// let mut camera = Camera::demo()?;
+/// camera.film = FilmChoice::Pixels { columns: 48, rows: 32, pitch_um: 660.0 };
+/// camera.scene.source = SceneSource::StillLife { columns: 54, rows: 36 };
+/// camera.wavelengths = WavelengthChoice::ListNm(vec![450.0, 550.0, 650.0]);
+/// let kept = KeptCamera::new(camera);
+/// let first = kept.capture(&Silent, &Cancel::new())?;
+/// // Another seed: the scene is imaged no second time.
+/// let second = kept.with(|camera| camera.seed = 2).capture(&Silent, &Cancel::new())?;
+/// assert!(std::sync::Arc::ptr_eq(&first.irradiance, &second.irradiance));
+/// assert_ne!(first.frames.exposed.volts.planes_v, second.frames.exposed.volts.planes_v);
+/// # Ok::<(), dioptric_pipeline::PipelineError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct KeptCamera {
+    camera: Camera,
+    quality: Quality,
+    memory_bytes: u64,
+    kept: Arc<KeptResults>,
+}
+
+/// The results of all stages.
+#[derive(Debug)]
+pub(super) struct KeptResults {
+    pub(super) lens: Slot<LensInputs, ResolvedLens>,
+    pub(super) scene: Slot<SceneInputs, ResolvedScene>,
+    pub(super) summary: Slot<SceneInputs, SceneSummary>,
+    pub(super) depth: Slot<GeometryInputs, DepthMap>,
+    pub(super) film: Slot<FilmInputs, FilmPlace>,
+    pub(super) bank: Slot<BankInputs, LensImageModel>,
+    pub(super) plan: Slot<PlanInputs, ImagingPlan>,
+    pub(super) irradiance: Slot<IrradianceInputs, Irradiance>,
+    pub(super) electrons: Slot<ElectronInputs, ElectronRate>,
+    pub(super) frames: Slot<FrameInputs, FrameSet>,
+    pub(super) picture: Slot<PictureInputs, Developed>,
+}
+
+impl Default for KeptResults {
+    /// Keeps one or two results of what is large and a few of what is small.
+    fn default() -> Self {
+        Self {
+            lens: Slot::new(8),
+            scene: Slot::new(2),
+            summary: Slot::new(8),
+            depth: Slot::new(2),
+            film: Slot::new(8),
+            bank: Slot::new(4),
+            plan: Slot::new(2),
+            irradiance: Slot::new(2),
+            electrons: Slot::new(2),
+            frames: Slot::new(2),
+            picture: Slot::new(4),
+        }
+    }
+}
+
+/// How often each stage was run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StageCounts {
+    /// Lenses resolved.
+    pub lens: usize,
+    /// Scenes read or made.
+    pub scene: usize,
+    /// Films placed.
+    pub film: usize,
+    /// Models of a lens's image traced.
+    pub bank: usize,
+    /// Imagings planned.
+    pub plan: usize,
+    /// Scenes imaged.
+    pub irradiance: usize,
+    /// Electron rates collected.
+    pub electrons: usize,
+    /// Sets of frames taken.
+    pub frames: usize,
+    /// Pictures developed.
+    pub picture: usize,
+}
+
+/// What came of a camera, stage by stage.
+#[derive(Clone, Debug)]
+pub struct Capture {
+    /// The camera.
+    pub camera: Camera,
+    /// How finely it was simulated.
+    pub quality: Quality,
+    /// The lens.
+    pub lens: Arc<ResolvedLens>,
+    /// The scene, in brief.
+    pub scene: Arc<SceneSummary>,
+    /// The film.
+    pub place: Arc<FilmPlace>,
+    /// The sensor, of the film's size.
+    pub sensor: Sensor,
+    /// The irradiance on the film.
+    pub irradiance: Arc<Irradiance>,
+    /// The mean rate of photo-electrons.
+    pub rate: Arc<ElectronRate>,
+    /// The frames.
+    pub frames: Arc<FrameSet>,
+    /// From the raw frame to the picture.
+    pub processing: Processing,
+    /// The picture.
+    pub developed: Arc<Developed>,
+}
+
+impl Capture {
+    /// The bands.
+    pub fn grid(&self) -> &WavelengthGrid {
+        self.irradiance.grid()
+    }
+
+    /// What is written of the frames.
+    pub fn frame_parts(&self) -> Frames<'_> {
+        Frames {
+            sensor: &self.sensor,
+            exposure: &self.frames.exposure,
+            rate: &self.rate,
+            exposed: &self.frames.exposed,
+            processing: &self.processing,
+            light: self.scene.light.unwrap_or(Illuminant::D65),
+        }
+    }
+}
+
+impl KeptCamera {
+    /// A camera of which nothing is computed yet, at full quality.
+    pub fn new(camera: Camera) -> Self {
+        Self { camera, quality: Quality::Full, memory_bytes: MEMORY_BYTES, kept: Arc::default() }
+    }
+
+    /// Returns the camera changed; what is kept is shared.
+    #[must_use]
+    pub fn with(&self, change: impl FnOnce(&mut Camera)) -> Self {
+        let mut changed = self.clone();
+        change(&mut changed.camera);
+        changed
+    }
+
+    /// Returns the camera at another quality; what is kept is shared.
+    #[must_use]
+    pub fn with_quality(&self, quality: Quality) -> Self {
+        Self { quality, ..self.clone() }
+    }
+
+    /// Returns the camera with irradiance of more than so many bytes kept in a temporary file instead of memory.
+    #[must_use]
+    pub fn with_memory_bytes(&self, memory_bytes: u64) -> Self {
+        Self { memory_bytes, ..self.clone() }
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The quality.
+    pub fn quality(&self) -> Quality {
+        self.quality
+    }
+
+    /// How often each stage was run, by this camera and all that share its results.
+    pub fn stage_counts(&self) -> StageCounts {
+        let kept = &*self.kept;
+        StageCounts {
+            lens: kept.lens.n_made(),
+            scene: kept.scene.n_made(),
+            film: kept.film.n_made(),
+            bank: kept.bank.n_made(),
+            plan: kept.plan.n_made(),
+            irradiance: kept.irradiance.n_made(),
+            electrons: kept.electrons.n_made(),
+            frames: kept.frames.n_made(),
+            picture: kept.picture.n_made(),
+        }
+    }
+
+    /// Takes the picture; stages whose inputs are as before hand out what they kept.
+    ///
+    /// # Errors
+    /// When a number makes no sense, a name is unknown, a file cannot be read, parts do not go together, or the work is
+    /// cancelled.
+    pub fn capture(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Capture, PipelineError> {
+        self.camera.validate()?;
+        let inputs = PictureInputs::of(&self.camera, self.quality)?;
+        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let frame_inputs = &inputs.frames;
+        let electron_inputs = &frame_inputs.electrons;
+        let irradiance_inputs = &electron_inputs.irradiance;
+
+        let lens = chain.lens(&irradiance_inputs.plan.bank.film.lens)?;
+        check_glasses(&lens, self.camera.wavelengths.grid()?.as_ref())?;
+        let irradiance = chain.irradiance(irradiance_inputs)?;
+        let place = chain.film(&irradiance_inputs.plan.bank.film, &irradiance_inputs.scene)?;
+        let scene = chain.summary(&irradiance_inputs.scene)?;
+        let rate = chain.electrons(electron_inputs)?;
+        let sensor = electrons::on_film(&electron_inputs.sensor, &place);
+        let frames = chain.frames(frame_inputs)?;
+        let processing = self.camera.processing.under(scene.light);
+        let developed = chain.picture(inputs.clone(), &processing)?;
+        progress.at(Stage::Picture, 1.0);
+        let (camera, quality) = (self.camera.clone(), self.quality);
+        Ok(Capture { camera, quality, lens, scene, place, sensor, irradiance, rate, frames, processing, developed })
+    }
+
+    /// Returns the model of the lens's image that the picture was made with, traced now where it is not kept.
+    ///
+    /// # Errors
+    /// As [`capture`](Self::capture).
+    pub fn model(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<LensImageModel>, PipelineError> {
+        let inputs = self.irradiance_inputs()?;
+        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        chain.bank(&inputs.plan.bank, &inputs.scene)
+    }
+
+    /// Returns the depth of each sample of the scene, m; of a camera that continues a run, what that wrote of it.
+    ///
+    /// # Errors
+    /// As [`capture`](Self::capture).
+    pub fn depth(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<DepthMap>, PipelineError> {
+        let inputs = self.irradiance_inputs()?;
+        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        if let Some(kept) = self.kept.depth.get(&inputs.scene.geometry) {
+            return Ok(kept);
+        }
+        let scene = chain.scene(&inputs.scene)?;
+        Ok(self.kept.depth.put(inputs.scene.geometry, scene.scene.require_depth()?.clone()))
+    }
+
+    pub(super) fn irradiance_inputs(&self) -> Result<IrradianceInputs, PipelineError> {
+        Ok(PictureInputs::of(&self.camera, self.quality)?.frames.electrons.irradiance)
+    }
+
+    pub(super) fn results(&self) -> &KeptResults {
+        &self.kept
+    }
+}
+
+/// Checks that every medium of the lens is known at bands that are known before the scene is.
+fn check_glasses(lens: &ResolvedLens, grid: Option<&WavelengthGrid>) -> Result<(), PipelineError> {
+    for &wavelength_nm in grid.iter().flat_map(|grid| grid.centers_nm()) {
+        lens.lens.at(wavelength_nm)?;
+    }
+    Ok(())
+}
+
+/// The stages in their order, each asking for the ones it needs.
+struct Chain<'a> {
+    kept: &'a KeptResults,
+    memory_bytes: u64,
+    watch: Watch<'a>,
+}
+
+impl Chain<'_> {
+    fn lens(&self, inputs: &LensInputs) -> Result<Arc<ResolvedLens>, PipelineError> {
+        self.kept.lens.get_or_make(inputs.clone(), lens::resolve)
+    }
+
+    fn scene(&self, inputs: &SceneInputs) -> Result<Arc<ResolvedScene>, PipelineError> {
+        self.kept.scene.get_or_make(inputs.clone(), |inputs| {
+            self.watch.progress.at(Stage::Scene, 0.0);
+            self.watch.cancel.check()?;
+            let scene = scene::open(inputs)?;
+            self.watch.progress.at(Stage::Scene, 1.0);
+            Ok(scene)
+        })
+    }
+
+    fn summary(&self, inputs: &SceneInputs) -> Result<Arc<SceneSummary>, PipelineError> {
+        self.kept.summary.get_or_make(inputs.clone(), |inputs| SceneSummary::of(&self.scene(inputs)?.scene))
+    }
+
+    fn film(&self, inputs: &FilmInputs, scene: &SceneInputs) -> Result<Arc<FilmPlace>, PipelineError> {
+        self.kept.film.get_or_make(inputs.clone(), |inputs| {
+            let scene = self.scene(scene)?;
+            film::place(inputs, &*self.lens(&inputs.lens)?, &scene)
+        })
+    }
+
+    fn bank(&self, inputs: &BankInputs, scene: &SceneInputs) -> Result<Arc<LensImageModel>, PipelineError> {
+        self.kept.bank.get_or_make(inputs.clone(), |inputs| {
+            let summary = self.summary(scene)?;
+            let (lens, place) = (self.lens(&inputs.film.lens)?, self.film(&inputs.film, scene)?);
+            // Every medium must be known at every band before rays are traced.
+            let grid = summary.grid()?;
+            check_glasses(&lens, Some(&grid))?;
+            self.watch.progress.at(Stage::Lens, 0.0);
+            bank::build(inputs, &lens, &place, (summary.near_m, summary.far_m), &grid, &self.watch)
+        })
+    }
+
+    fn plan(&self, inputs: &PlanInputs, scene: &SceneInputs) -> Result<Arc<ImagingPlan>, PipelineError> {
+        self.kept.plan.get_or_make(inputs.clone(), |inputs| {
+            let model = self.bank(&inputs.bank, scene)?;
+            let (place, resolved) = (self.film(&inputs.bank.film, scene)?, self.scene(scene)?);
+            plan::plan(inputs, model, &place, &resolved.scene, &self.watch)
+        })
+    }
+
+    fn irradiance(&self, inputs: &IrradianceInputs) -> Result<Arc<Irradiance>, PipelineError> {
+        self.kept.irradiance.get_or_make(inputs.clone(), |inputs| {
+            let plan = self.plan(&inputs.plan, &inputs.scene)?;
+            let resolved = self.scene(&inputs.scene)?;
+            let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
+            let scene: &Scene = &resolved.scene;
+            irradiance::image(&plan, scene, &place, self.memory_bytes, &self.watch)
+        })
+    }
+
+    fn electrons(&self, inputs: &ElectronInputs) -> Result<Arc<ElectronRate>, PipelineError> {
+        self.kept.electrons.get_or_make(inputs.clone(), |inputs| {
+            let irradiance = self.irradiance(&inputs.irradiance)?;
+            let place = self.film(&inputs.irradiance.plan.bank.film, &inputs.irradiance.scene)?;
+            electrons::collect(&irradiance, &electrons::on_film(&inputs.sensor, &place), &place, &self.watch)
+        })
+    }
+
+    fn frames(&self, inputs: &FrameInputs) -> Result<Arc<FrameSet>, PipelineError> {
+        self.kept.frames.get_or_make(inputs.clone(), |inputs| {
+            let irradiance = &inputs.electrons.irradiance;
+            let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
+            let rate = self.electrons(&inputs.electrons)?;
+            frames::expose(inputs, &electrons::on_film(&inputs.electrons.sensor, &place), &rate, &self.watch)
+        })
+    }
+
+    fn picture(&self, inputs: PictureInputs, processing: &Processing) -> Result<Arc<Developed>, PipelineError> {
+        self.kept.picture.get_or_make(inputs, |inputs| {
+            self.watch.progress.at(Stage::Picture, 0.0);
+            self.watch.cancel.check()?;
+            let irradiance = &inputs.frames.electrons.irradiance;
+            let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
+            let frames = self.frames(&inputs.frames)?;
+            let sensor = electrons::on_film(&inputs.frames.electrons.sensor, &place);
+            Ok(sensor.develop(frames.exposed.developed_from(), processing)?)
+        })
+    }
+}

@@ -1,0 +1,24 @@
+//! The lens: read, its stop set, moved before the film.
+
+use dioptric_optics::{Lens, MonoLens};
+
+use super::spec::LensInputs;
+use crate::{PipelineError, REFERENCE_WAVELENGTH_NM};
+
+/// A lens ready for use.
+#[derive(Clone, Debug)]
+pub struct ResolvedLens {
+    /// The lens, its stop set and its movements applied.
+    pub lens: Lens,
+    /// The lens at the reference wavelength.
+    pub reference: MonoLens,
+    /// What its file states and this program does otherwise or not at all, a sentence each.
+    pub notes: Vec<String>,
+}
+
+pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError> {
+    let file = inputs.choice.open(&inputs.reading)?;
+    let lens = inputs.movements.apply(inputs.stop.apply(file.lens)?)?;
+    let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
+    Ok(ResolvedLens { lens, reference, notes: file.notes })
+}

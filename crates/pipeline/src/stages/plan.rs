@@ -1,0 +1,27 @@
+//! The plan of the imaging: all of it that does not depend on the light in the scene.
+
+use std::sync::Arc;
+
+use dioptric_forward::{BlurMode, ImagingPlan, ImagingSpec, Settings, Source};
+use dioptric_psf::LensImageModel;
+use dioptric_scene::Scene;
+
+use super::{Watch, film::FilmPlace, spec::PlanInputs};
+use crate::{BlurChoice, PipelineError, Stage};
+
+pub(super) fn plan(
+    inputs: &PlanInputs,
+    model: Arc<LensImageModel>,
+    place: &FilmPlace,
+    scene: &Scene,
+    watch: &Watch<'_>,
+) -> Result<ImagingPlan, PipelineError> {
+    let mode = match inputs.blur {
+        BlurChoice::Layered => BlurMode::Layered,
+        BlurChoice::Pointwise => BlurMode::Pointwise,
+    };
+    let settings = Settings { mode, ..Settings::default() };
+    let spec = ImagingSpec { film: place.film(), grid: scene.radiance.grid().clone(), settings };
+    let progress = |fraction| watch.progress.at(Stage::Plan, fraction);
+    Ok(ImagingPlan::new(model, &Source::of_scene(scene)?.geometry(), spec, &progress, watch.cancel)?)
+}

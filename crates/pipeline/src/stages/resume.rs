@@ -1,0 +1,119 @@
+//! A run continued from its folder: what it imaged is taken from there as long as nothing before it changed.
+
+use std::{fs, path::Path};
+
+use dioptric_scene::read_planes_exr;
+use dioptric_spectrum::DepthMap;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    film::FilmPlace,
+    irradiance::{IRRADIANCE_FILE, Irradiance},
+    kept::{Capture, KeptCamera},
+    scene::SceneSummary,
+    spec::FileStamp,
+};
+use crate::{Camera, PipelineError, Quality, write_file};
+
+/// The name of the file from which a run is continued.
+pub const RESUME_FILE: &str = "kept.ron";
+
+/// What the file holds: the camera as it was, and what the stages after the imaging need.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Kept {
+    camera: Camera,
+    files: Vec<FileStamp>,
+    scene: SceneSummary,
+    place: FilmPlace,
+}
+
+/// A camera that continues a run.
+#[derive(Clone, Debug)]
+pub struct Resumed {
+    /// The camera of the run, with what the run left.
+    pub camera: KeptCamera,
+    /// Files that changed since, for which the scene is imaged anew.
+    pub notes: Vec<String>,
+}
+
+impl KeptCamera {
+    /// Writes what is needed to continue from a folder that holds the irradiance of this capture.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_resume_file(&self, capture: &Capture, folder: &Path) -> Result<(), PipelineError> {
+        let inputs = self.irradiance_inputs()?;
+        let kept = Kept {
+            camera: self.camera().clone(),
+            files: inputs.files().cloned().collect(),
+            scene: (*capture.scene).clone(),
+            place: (*capture.place).clone(),
+        };
+        let text = ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::new())
+            .map_err(|e| PipelineError::Write { path: folder.join(RESUME_FILE), reason: e.to_string() })?;
+        write_file(&folder.join(RESUME_FILE), text.as_bytes())
+    }
+
+    /// Returns the camera of a run with the irradiance that it left in its folder.
+    ///
+    /// Changes of exposure, sensor, noise and processing start there; any other change images the scene anew, as does a
+    /// file that is no longer what it was.
+    ///
+    /// # Errors
+    /// When the folder holds no run at full quality that wrote its irradiance, or a file of it cannot be read.
+    pub fn resume(folder: &Path) -> Result<Resumed, PipelineError> {
+        let path = folder.join(RESUME_FILE);
+        let unreadable = |reason: String| PipelineError::Read { path: path.clone(), reason };
+        let text = fs::read_to_string(&path).map_err(|e| unreadable(e.to_string()))?;
+        let kept: Kept = ron::from_str(&text).map_err(|e| PipelineError::Syntax {
+            path: path.clone(),
+            line: e.span.start.line,
+            column: e.span.start.col,
+            reason: e.code.to_string(),
+        })?;
+        let camera = Self::new(kept.camera.clone()).with_quality(Quality::Full);
+        let inputs = camera.irradiance_inputs()?;
+        let notes: Vec<String> = inputs
+            .files()
+            .filter(|now| !kept.files.contains(now))
+            .map(|now| format!("{} is not what it was in the run", now.path().display()))
+            .collect();
+        if !notes.is_empty() {
+            return Ok(Resumed { camera, notes });
+        }
+        let irradiance = Irradiance::read_exr(&folder.join(IRRADIANCE_FILE), Some(kept.place.pitch_um))?;
+        kept.check(&irradiance).map_err(unreadable)?;
+        let results = camera.results();
+        if let Some(depth) = read_depth(&folder.join("depth.exr"), (kept.scene.rows, kept.scene.columns)) {
+            results.depth.put(inputs.scene.geometry.clone(), depth);
+        }
+        results.film.put(inputs.plan.bank.film.clone(), kept.place);
+        results.summary.put(inputs.scene.clone(), kept.scene);
+        results.irradiance.put(inputs, irradiance);
+        Ok(Resumed { camera, notes })
+    }
+}
+
+impl Kept {
+    /// Returns why an irradiance cannot be that of the run.
+    fn check(&self, irradiance: &Irradiance) -> Result<(), String> {
+        use dioptric_spectrum::Bands;
+        let (found, expected) = (irradiance.size(), (self.place.rows, self.place.columns));
+        if found != expected {
+            return Err(format!("{IRRADIANCE_FILE} has {} × {} samples, expected {} × {}", found.1, found.0, expected.1, expected.0));
+        }
+        let (found, expected) = (irradiance.grid().len(), self.scene.wavelengths_nm.len());
+        if found != expected {
+            return Err(format!("{IRRADIANCE_FILE} has {found} bands, expected {expected}"));
+        }
+        Ok(())
+    }
+}
+
+/// Returns the depth that a run wrote, if it did and it is of the scene's size.
+fn read_depth(path: &Path, size: (usize, usize)) -> Option<DepthMap> {
+    let planes = read_planes_exr(path).ok()?;
+    let (_, z_m) = planes.into_iter().find(|(name, _)| name == "Z")?;
+    (z_m.dim() == size).then(|| DepthMap::new(z_m).ok()).flatten()
+}

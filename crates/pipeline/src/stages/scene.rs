@@ -1,0 +1,109 @@
+//! What stands before the camera, at the resolution and on the bands that a quality asks for.
+
+use dioptric_scene::Scene;
+use dioptric_spectrum::{DepthMap, Illuminant, WavelengthGrid};
+use serde::{Deserialize, Serialize};
+
+use super::spec::{GeometryInputs, SceneInputs};
+use crate::{PipelineError, Quality, SceneChoice, SceneSource};
+
+/// A scene in brief: what the stages after the imaging need of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSummary {
+    /// Where it came from.
+    pub name: String,
+    /// Columns of samples.
+    pub columns: usize,
+    /// Rows of samples.
+    pub rows: usize,
+    /// Nearest depth, m.
+    pub near_m: f64,
+    /// Farthest depth, m.
+    pub far_m: f64,
+    /// Mean luminance, cd/m².
+    pub mean_luminance_cd_m2: f64,
+    /// The light on it, where that is known.
+    pub light: Option<Illuminant>,
+    /// Centers of its bands, nm.
+    pub wavelengths_nm: Vec<f64>,
+}
+
+impl SceneSummary {
+    pub(super) fn of(scene: &Scene) -> Result<Self, PipelineError> {
+        let (near_m, far_m) = scene.require_depth()?.range_m();
+        Ok(Self {
+            name: scene.name.clone(),
+            columns: scene.columns(),
+            rows: scene.rows(),
+            near_m,
+            far_m,
+            mean_luminance_cd_m2: scene.mean_luminance_cd_m2(),
+            light: scene.light,
+            wavelengths_nm: scene.radiance.grid().centers_nm().to_vec(),
+        })
+    }
+
+    /// The bands.
+    ///
+    /// # Errors
+    /// When a summary that was read from a file has wavelengths that are no bands.
+    pub fn grid(&self) -> Result<WavelengthGrid, PipelineError> {
+        Ok(WavelengthGrid::new(self.wavelengths_nm.clone())?)
+    }
+}
+
+/// A scene as it is imaged.
+#[derive(Clone, Debug)]
+pub struct ResolvedScene {
+    /// The scene.
+    pub scene: Scene,
+    /// Samples of the source that are one of the scene, each way.
+    pub binning: usize,
+}
+
+/// Reads or makes the scene.
+///
+/// A full scene has the samples and bands of its source. Of a lower quality a computed scene is made with fewer of both,
+/// and one from a file is averaged over blocks of samples and over wider bands; a depth is that of the middle of its block.
+pub(super) fn open(inputs: &SceneInputs) -> Result<ResolvedScene, PipelineError> {
+    let GeometryInputs { source, wavelengths, quality, field_of_view_deg, depth_m, .. } = &inputs.geometry;
+    let wanted = wavelengths.grid()?;
+    let choice = |source| SceneChoice {
+        source,
+        field_of_view_deg: *field_of_view_deg,
+        depth_m: *depth_m,
+        illuminant: inputs.illuminant,
+        illuminance_lux: inputs.illuminance_lux,
+        mean_luminance_cd_m2: inputs.mean_luminance_cd_m2,
+    };
+    let fewer = |n: usize, binning: usize| (n / binning).max(1);
+    let computed = match source {
+        SceneSource::File(_) => None,
+        SceneSource::StillLife { columns, rows } => {
+            let binning = quality.scene_binning(*columns);
+            let (columns, rows) = (fewer(*columns, binning), fewer(*rows, binning));
+            Some((SceneSource::StillLife { columns, rows }, binning))
+        }
+        SceneSource::Target { pattern, columns, rows } => {
+            let binning = quality.scene_binning(*columns);
+            let (columns, rows) = (fewer(*columns, binning), fewer(*rows, binning));
+            Some((SceneSource::Target { pattern: *pattern, columns, rows }, binning))
+        }
+    };
+    match computed {
+        _ if *quality == Quality::Full => {
+            Ok(ResolvedScene { scene: choice(source.clone()).open(wanted.as_ref())?, binning: 1 })
+        }
+        Some((thinned, binning)) => {
+            let bands = wanted.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
+            Ok(ResolvedScene { scene: choice(thinned).open(Some(&quality.bands_of(&bands)?))?, binning })
+        }
+        None => {
+            let whole = choice(source.clone()).open(wanted.as_ref())?;
+            let bands = quality.bands_of(whole.radiance.grid())?;
+            let binning = quality.scene_binning(whole.columns());
+            Ok(ResolvedScene { scene: whole.resampled(&bands)?.binned(binning)?, binning })
+        }
+    }
+}

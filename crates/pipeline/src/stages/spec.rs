@@ -1,0 +1,216 @@
+//! What each stage is made from: parts of the camera, each stage's holding those of the stages before it.
+//!
+//! Two cameras with equal inputs of a stage share its result. This module is the table of what a change recomputes.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+use dioptric_forward::Film;
+use dioptric_sensor::{ExposureControl, Noise, Sensor};
+use dioptric_spectrum::Illuminant;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    BankChoice, BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, FramesChoice, LensChoice, LensReading,
+    Movements, PipelineError, ProcessingChoice, Quality, SceneSource, StopChoice, WavelengthChoice,
+};
+
+/// A file as it was when it was looked at, so that a change of it is seen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct FileStamp {
+    path: PathBuf,
+    /// Length and time of the last change; `None` where the file cannot be looked at, which reading it will report.
+    state: Option<(u64, Option<SystemTime>)>,
+}
+
+impl FileStamp {
+    fn of(path: &Path) -> Self {
+        let state = fs::metadata(path).ok().map(|data| (data.len(), data.modified().ok()));
+        Self { path: path.to_owned(), state }
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// The lens, its stop set, moved before the film.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct LensInputs {
+    pub(crate) choice: LensChoice,
+    pub(crate) reading: LensReading,
+    pub(crate) stop: StopChoice,
+    pub(crate) movements: Movements,
+    files: Vec<FileStamp>,
+}
+
+/// Where the samples of the scene are: all that imaging is planned from.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct GeometryInputs {
+    pub(crate) source: SceneSource,
+    pub(crate) field_of_view_deg: Option<f64>,
+    pub(crate) depth_m: Option<f64>,
+    pub(crate) wavelengths: WavelengthChoice,
+    pub(crate) quality: Quality,
+    files: Vec<FileStamp>,
+}
+
+/// The light in the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct SceneInputs {
+    pub(crate) geometry: GeometryInputs,
+    pub(crate) illuminant: Option<Illuminant>,
+    pub(crate) illuminance_lux: f64,
+    pub(crate) mean_luminance_cd_m2: Option<f64>,
+}
+
+/// The place and the raster of the film.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct FilmInputs {
+    pub(crate) lens: LensInputs,
+    pub(crate) geometry: GeometryInputs,
+    pub(crate) focus: FocusChoice,
+    pub(crate) raster: Raster,
+}
+
+/// The pixels of the film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Raster {
+    /// So many, of this size.
+    Pixels(Film),
+    /// As many as the scene has samples.
+    Scene,
+}
+
+/// The point spread functions of the lens.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct BankInputs {
+    pub(crate) film: FilmInputs,
+    pub(crate) diffraction: DiffractionChoice,
+    pub(crate) bank: BankChoice,
+}
+
+/// The plan of the imaging.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PlanInputs {
+    pub(crate) bank: BankInputs,
+    pub(crate) blur: BlurChoice,
+}
+
+/// The spectral irradiance on the film.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct IrradianceInputs {
+    pub(crate) plan: PlanInputs,
+    pub(crate) scene: SceneInputs,
+}
+
+/// The mean rate of photo-electrons.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ElectronInputs {
+    pub(crate) irradiance: IrradianceInputs,
+    pub(crate) sensor: Sensor,
+}
+
+/// The frames of the sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct FrameInputs {
+    pub(crate) electrons: ElectronInputs,
+    pub(crate) exposure: ExposureControl,
+    pub(crate) frames: FramesChoice,
+    pub(crate) noise: Noise,
+}
+
+/// The picture.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PictureInputs {
+    pub(crate) frames: FrameInputs,
+    pub(crate) processing: ProcessingChoice,
+}
+
+impl LensInputs {
+    pub(crate) fn of(camera: &Camera) -> Self {
+        let lens_file = match &camera.lens {
+            LensChoice::File(path) => Some(FileStamp::of(path)),
+            _ => None,
+        };
+        let catalogues = camera.lens_reading.glasses.iter().map(|path| FileStamp::of(path));
+        Self {
+            choice: camera.lens.clone(),
+            reading: camera.lens_reading.clone(),
+            stop: camera.stop,
+            movements: camera.movements,
+            files: lens_file.into_iter().chain(catalogues).collect(),
+        }
+    }
+}
+
+impl SceneInputs {
+    pub(crate) fn of(camera: &Camera, quality: Quality) -> Self {
+        let scene = &camera.scene;
+        Self {
+            geometry: GeometryInputs {
+                source: scene.source.clone(),
+                field_of_view_deg: scene.field_of_view_deg,
+                depth_m: scene.depth_m,
+                wavelengths: camera.wavelengths.clone(),
+                quality,
+                files: match &scene.source {
+                    SceneSource::File(path) => vec![FileStamp::of(path)],
+                    _ => Vec::new(),
+                },
+            },
+            illuminant: scene.illuminant,
+            illuminance_lux: scene.illuminance_lux,
+            mean_luminance_cd_m2: scene.mean_luminance_cd_m2,
+        }
+    }
+}
+
+impl IrradianceInputs {
+    pub(crate) fn of(camera: &Camera, sensor: &Sensor, quality: Quality) -> Self {
+        let scene = SceneInputs::of(camera, quality);
+        let raster = match camera.film {
+            FilmChoice::Sensor => {
+                Raster::Pixels(Film { rows: sensor.rows, columns: sensor.columns, pitch_um: sensor.pixel_pitch_um })
+            }
+            FilmChoice::Pixels { columns, rows, pitch_um } => Raster::Pixels(Film { rows, columns, pitch_um }),
+            FilmChoice::Scene => Raster::Scene,
+        };
+        let film = FilmInputs {
+            lens: LensInputs::of(camera),
+            geometry: scene.geometry.clone(),
+            focus: camera.focus,
+            raster,
+        };
+        let bank = BankInputs { film, diffraction: camera.diffraction, bank: camera.bank };
+        Self { plan: PlanInputs { bank, blur: camera.blur }, scene }
+    }
+}
+
+impl IrradianceInputs {
+    /// Returns the files that the irradiance is made from.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &FileStamp> {
+        self.plan.bank.film.lens.files.iter().chain(&self.scene.geometry.files)
+    }
+}
+
+impl PictureInputs {
+    /// Returns the inputs of the whole chain; those of the stages before the picture are parts of it.
+    ///
+    /// # Errors
+    /// When the sensor cannot be read.
+    pub(crate) fn of(camera: &Camera, quality: Quality) -> Result<Self, PipelineError> {
+        let sensor = camera.sensor.open()?;
+        let irradiance = IrradianceInputs::of(camera, &sensor, quality);
+        let frames = FrameInputs {
+            electrons: ElectronInputs { irradiance, sensor },
+            exposure: camera.exposure,
+            frames: camera.frames.clone(),
+            noise: Noise::all(camera.seed),
+        };
+        Ok(Self { frames, processing: camera.processing.clone() })
+    }
+}
