@@ -1,11 +1,12 @@
 //! The plots of the report.
 
 use dioptric_optics::glam::DVec2;
-use dioptric_psf::{Picture, PsfQuery};
+use dioptric_psf::{LensImage, LensImageModel, Picture, PsfQuery};
 
+use super::Run;
 use crate::SensorStatistics;
 use crate::{Corner, LineChart, Scale, Series};
-use dioptric_pipeline::{CameraBank, Capture, REFERENCE_WAVELENGTH_NM, Shot, display::wavelength_color};
+use dioptric_pipeline::{Capture, REFERENCE_WAVELENGTH_NM, display::wavelength_color};
 
 /// Points of a curve.
 const POINTS: usize = 64;
@@ -44,20 +45,20 @@ pub struct RunPlaces {
 
 impl RunPlaces {
     /// Returns the places of a run.
-    pub fn of(shot: &Shot, capture: &Capture) -> Self {
-        let bank = &capture.bank;
-        let (far, near) = bank.kernels().dioptres();
+    pub fn of(run: &Run<'_>) -> Self {
+        let (bank, place) = (run.model, &run.capture.place);
+        let (far, near) = bank.dioptres();
         let steps = if near - far > 1e-6 { 4 } else { 1 };
-        let (first, last) = shot.grid().range_nm();
+        let (first, last) = run.capture.grid().range_nm();
         // Four wavelengths from end to end, and the reference in place of the nearest where it is among them.
         let wavelengths_nm =
             (0..4).map(|i| first + (last - first) * f64::from(i) / 3.0).map(f64::round).collect::<Vec<_>>();
-        let focus = shot.focus_distance_mm.map_or(near, |mm| {
-            let pupil_z_mm = shot.lens.at(REFERENCE_WAVELENGTH_NM).map_or(0.0, |lens| lens.projection_center_z_mm());
+        let focus = place.focus_distance_mm.map_or(near, |mm| {
+            let pupil_z_mm = run.capture.lens.reference.projection_center_z_mm();
             1e3 / (mm + pupil_z_mm)
         });
         Self {
-            corner: bank.corner_tan(&shot.film, focus.clamp(far, near), REFERENCE_WAVELENGTH_NM),
+            corner: bank.corner_field_tan(place.film().half_size_mm(), focus.clamp(far, near), REFERENCE_WAVELENGTH_NM),
             focus_dioptres: focus.clamp(far, near),
             dioptres: (0..steps).map(|i| far + (near - far) * i as f64 / (steps as f64 - 1.0).max(1.0)).collect(),
             wavelengths_nm: if last > first { wavelengths_nm } else { vec![first] },
@@ -79,31 +80,32 @@ impl RunPlaces {
 
 impl RunCharts {
     /// Draws up the charts of a run.
-    pub fn of(shot: &Shot, capture: &Capture, places: &RunPlaces, sensor: &SensorStatistics) -> Self {
+    pub fn of(run: &Run<'_>, places: &RunPlaces, sensor: &SensorStatistics) -> Self {
         Self {
-            lsf: lsf(shot, &capture.bank, places),
-            mtf: mtf(shot, &capture.bank, places),
-            illumination: illumination(&capture.bank, places),
-            distortion: distortion(&capture.bank, places),
-            spectrum: spectrum(shot, capture),
-            histogram: histogram(capture, sensor),
+            lsf: lsf(run, places),
+            mtf: mtf(run, places),
+            illumination: illumination(run.model, places),
+            distortion: distortion(run.model, places),
+            spectrum: spectrum(run.capture),
+            histogram: histogram(run.capture, sensor),
         }
     }
 }
 
-fn picture(bank: &CameraBank, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Picture {
+fn picture(bank: &LensImageModel, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Picture {
     Picture::from(&bank.kernel(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um }))
 }
 
 /// Line spreads on the axis, in focus, over wavelength.
-fn lsf(shot: &Shot, bank: &CameraBank, places: &RunPlaces) -> LineChart {
+fn lsf(run: &Run<'_>, places: &RunPlaces) -> LineChart {
+    let bank = run.model;
     let spreads: Vec<_> = places
         .wavelengths_nm
         .iter()
         .map(|&nm| {
             // As fine as the narrowest line asks for.
-            let airy_um = 1e-3 * nm * shot.lens.at(nm).map_or(4.0, |l| l.first_order().f_number);
-            let blur_um = 1e3 * bank.kernels().blur_radius_mm(DVec2::ZERO, places.focus_dioptres, nm).abs();
+            let airy_um = 1e-3 * nm * run.capture.lens.lens.at(nm).map_or(4.0, |l| l.first_order().f_number);
+            let blur_um = 1e3 * bank.blur_radius_mm(DVec2::ZERO, places.focus_dioptres, nm).abs();
             let pitch_um = (0.1 * airy_um).max(0.02 * blur_um);
             (nm, picture(bank, DVec2::ZERO, places.focus_dioptres, nm, pitch_um).line_spread(0.0))
         })
@@ -142,9 +144,10 @@ fn lsf(shot: &Shot, bank: &CameraBank, places: &RunPlaces) -> LineChart {
 }
 
 /// Modulation up to the sensor's Nyquist frequency on the axis and towards the corner, in focus and at the far end.
-fn mtf(shot: &Shot, bank: &CameraBank, places: &RunPlaces) -> LineChart {
-    let nyquist_per_mm = 500.0 / shot.film.pitch_um;
-    let pitch_um = (shot.film.pitch_um / 8.0).min(2.0);
+fn mtf(run: &Run<'_>, places: &RunPlaces) -> LineChart {
+    let bank = run.model;
+    let nyquist_per_mm = 500.0 / run.capture.place.pitch_um;
+    let pitch_um = (run.capture.place.pitch_um / 8.0).min(2.0);
     let far = places.dioptres[0];
     let (radial, focus) = (places.corner.to_angle(), places.focus_dioptres);
     let tangential = radial + std::f64::consts::FRAC_PI_2;
@@ -191,7 +194,7 @@ fn over_field(places: &RunPlaces, of: impl Fn(DVec2) -> f64) -> Vec<(f64, f64)> 
         .collect()
 }
 
-fn illumination(bank: &CameraBank, places: &RunPlaces) -> LineChart {
+fn illumination(bank: &LensImageModel, places: &RunPlaces) -> LineChart {
     let gain = |tan| bank.irradiance_per_radiance(tan, places.focus_dioptres, REFERENCE_WAVELENGTH_NM);
     let axis = gain(DVec2::ZERO);
     let real = over_field(places, |tan| gain(tan) / axis);
@@ -214,7 +217,7 @@ fn illumination(bank: &CameraBank, places: &RunPlaces) -> LineChart {
     }
 }
 
-fn distortion(bank: &CameraBank, places: &RunPlaces) -> LineChart {
+fn distortion(bank: &LensImageModel, places: &RunPlaces) -> LineChart {
     let at = |tan, nm| bank.centroid_mm(tan, places.focus_dioptres, nm);
     // Heights count from where the axis lands, which a tilted lens moves.
     let axis_mm = at(DVec2::ZERO, REFERENCE_WAVELENGTH_NM);
@@ -246,11 +249,11 @@ fn distortion(bank: &CameraBank, places: &RunPlaces) -> LineChart {
     }
 }
 
-fn spectrum(shot: &Shot, capture: &Capture) -> LineChart {
+fn spectrum(capture: &Capture) -> LineChart {
     let points: Vec<(f64, f64)> =
-        shot.grid().centers_nm().iter().zip(&capture.irradiance.mean).map(|(&nm, &e)| (nm, 1e3 * e)).collect();
+        capture.grid().centers_nm().iter().zip(&capture.irradiance.summary.mean).map(|(&nm, &e)| (nm, 1e3 * e)).collect();
     let top = points.iter().map(|p| p.1).fold(0.0, f64::max);
-    let (first, last) = shot.grid().range_nm();
+    let (first, last) = run.capture.grid().range_nm();
     LineChart {
         title: "Mean spectral irradiance on the film".to_owned(),
         x_label: "wavelength, nm".to_owned(),
@@ -269,7 +272,7 @@ fn histogram(capture: &Capture, sensor: &SensorStatistics) -> LineChart {
         .iter()
         .map(|channel| {
             let n = channel.histogram.len() as f64;
-            let top = capture.exposed.raw.levels.top;
+            let top = capture.frames.exposed.raw.levels.top;
             let center = |bin: usize| (bin as f64 + 0.5) / n * top;
             Series {
                 label: Some(channel.filter.clone()),
@@ -289,7 +292,7 @@ fn histogram(capture: &Capture, sensor: &SensorStatistics) -> LineChart {
         title: "Raw frame".to_owned(),
         x_label: "digital number".to_owned(),
         y_label: "pixels of the channel, %".to_owned(),
-        x_range: (0.0, capture.exposed.raw.levels.top),
+        x_range: (0.0, capture.frames.exposed.raw.levels.top),
         y_range: (0.0, 1.05 * top.max(f64::MIN_POSITIVE)),
         series,
         legend: Corner::TopRight,

@@ -3,14 +3,26 @@
 mod charts;
 mod statistics;
 
-use dioptric_pipeline::{BankData, Camera, Capture, PipelineError, Shot};
-use dioptric_spectrum::Illuminant;
+use dioptric_pipeline::{BankData, Camera, Capture, PipelineError};
+use dioptric_psf::LensImageModel;
+use dioptric_spectrum::{DepthMap, Illuminant};
 use serde::Serialize;
 
 pub use charts::{RunCharts, RunPlaces};
 pub use statistics::{ChannelStatistics, LossRow, SensorStatistics};
 
 use crate::LensData;
+
+/// A run that is looked at: what came of it, and the model of the lens's image that it was made with.
+#[derive(Clone, Copy, Debug)]
+pub struct Run<'a> {
+    /// What came of it.
+    pub capture: &'a Capture,
+    /// The model.
+    pub model: &'a LensImageModel,
+    /// The depth of the scene's samples, where it is at hand.
+    pub depth: Option<&'a DepthMap>,
+}
 
 /// Numbers of a run, as `report.json` has them.
 #[derive(Clone, Debug, Serialize)]
@@ -98,38 +110,38 @@ impl RunReport {
     /// # Errors
     /// When the scene has no depth, or a glass is not known at the reference wavelength.
     pub fn new(
-        shot: &Shot,
-        capture: &Capture,
+        run: &Run<'_>,
         timings_s: &[(String, f64)],
         files: Vec<String>,
     ) -> Result<Self, PipelineError> {
-        let places = RunPlaces::of(shot, capture);
+        let places = RunPlaces::of(run);
         let fields = [0.0, 0.35, 0.7, 1.0].map(|share| places.field(share));
-        let (near_m, far_m) = shot.scene.require_depth()?.range_m();
+        let capture = run.capture;
+        let (place, scene) = (&capture.place, &capture.scene);
         Ok(Self {
             dioptric: env!("CARGO_PKG_VERSION"),
-            camera: shot.camera.clone(),
-            lens: statistics::lens_data(shot, places.corner_tan())?,
-            film_mm: shot.film_mm,
-            film: FilmData { columns: shot.film.columns, rows: shot.film.rows, pitch_um: shot.film.pitch_um },
+            camera: capture.camera.clone(),
+            lens: statistics::lens_data(capture, places.corner_tan())?,
+            film_mm: place.film_distance_mm,
+            film: FilmData { columns: place.columns, rows: place.rows, pitch_um: place.pitch_um },
             scene: SceneData {
-                name: shot.scene.name.clone(),
-                columns: shot.scene.columns(),
-                rows: shot.scene.rows(),
-                near_m,
-                far_m,
-                mean_luminance_cd_m2: shot.scene.mean_luminance_cd_m2(),
-                light: shot.scene.light,
+                name: scene.name.clone(),
+                columns: scene.columns,
+                rows: scene.rows,
+                near_m: scene.near_m,
+                far_m: scene.far_m,
+                mean_luminance_cd_m2: scene.mean_luminance_cd_m2,
+                light: scene.light,
             },
-            psf_bank: BankData::of_camera(&capture.bank),
+            psf_bank: BankData::of(run.model),
             irradiance: IrradianceData {
-                wavelengths_nm: shot.grid().centers_nm().to_vec(),
-                mean_w_m2_nm: capture.irradiance.mean.clone(),
-                max_w_m2_nm: capture.irradiance.max.clone(),
-                mean_lux: capture.irradiance.mean_lux,
+                wavelengths_nm: capture.grid().centers_nm().to_vec(),
+                mean_w_m2_nm: capture.irradiance.summary.mean.clone(),
+                max_w_m2_nm: capture.irradiance.summary.max.clone(),
+                mean_lux: capture.irradiance.summary.mean_lux,
             },
-            sensor: SensorStatistics::new(&capture.frames(shot))?,
-            losses: statistics::losses(shot, &fields)?,
+            sensor: SensorStatistics::new(&capture.frame_parts())?,
+            losses: statistics::losses(capture, &fields)?,
             white_balance: capture.developed.balance.clone(),
             color_matrix: capture.developed.color.rows.clone(),
             color_matrix_mean_delta_e: capture.developed.color.mean_delta_e(),

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::psf::spot::Spot;
 use crate::{LensData, LensQuestion};
-use dioptric_pipeline::{Frames, PipelineError, REFERENCE_WAVELENGTH_NM, Shot};
+use dioptric_pipeline::{Capture, Frames, PipelineError, REFERENCE_WAVELENGTH_NM};
 
 /// Bins of a histogram of digital numbers.
 const BINS: usize = 128;
@@ -151,14 +151,15 @@ fn raw_planes(raw: &Raw) -> Vec<Array2<f32>> {
 }
 
 /// Returns where the light of a few fields goes, at the reference wavelength and the depth in focus.
-pub(super) fn losses(shot: &Shot, field_tans: &[DVec2]) -> Result<Vec<LossRow>, PipelineError> {
-    let mono = shot.lens.at(REFERENCE_WAVELENGTH_NM)?;
-    let (near_m, _) = shot.scene.require_depth()?.range_m();
-    let dioptres = shot.focus_distance_mm.map_or(1.0 / near_m, |mm| 1e3 / (mm + mono.projection_center_z_mm()));
-    Ok(field_tans.iter().map(|&field_tan| loss_row(shot, &mono, field_tan, dioptres)).collect())
+pub(super) fn losses(capture: &Capture, field_tans: &[DVec2]) -> Result<Vec<LossRow>, PipelineError> {
+    let mono = &capture.lens.reference;
+    let beside_focus = 1.0 / capture.scene.near_m;
+    let focus_mm = capture.place.focus_distance_mm;
+    let dioptres = focus_mm.map_or(beside_focus, |mm| 1e3 / (mm + mono.projection_center_z_mm()));
+    Ok(field_tans.iter().map(|&field_tan| loss_row(mono, capture.place.film_distance_mm, field_tan, dioptres)).collect())
 }
 
-fn loss_row(shot: &Shot, mono: &MonoLens, field_tan: DVec2, dioptres: f64) -> LossRow {
+fn loss_row(mono: &MonoLens, film_distance_mm: f64, field_tan: DVec2, dioptres: f64) -> LossRow {
     let axial = ObjectPoint::from_field(mono, DVec2::ZERO, dioptres);
     let point = ObjectPoint::from_field(mono, field_tan, dioptres);
     let mut rays = rays_over_front(mono, &point, LOSS_RAYS);
@@ -180,17 +181,17 @@ fn loss_row(shot: &Shot, mono: &MonoLens, field_tan: DVec2, dioptres: f64) -> Lo
         ended_by_stop: share(by_stop),
         ended_by_rims: share(by_rims),
         missed_or_reflected: share(otherwise),
-        vignetting: Spot::through_pupil(mono, &point, &axial, shot.film_mm).energy,
+        vignetting: Spot::through_pupil(mono, &point, &axial, film_distance_mm).energy,
     }
 }
 
 /// The lens as it was used.
-pub(super) fn lens_data(shot: &Shot, corner_tan: f64) -> Result<LensData, PipelineError> {
+pub(super) fn lens_data(capture: &Capture, corner_tan: f64) -> Result<LensData, PipelineError> {
     let question = LensQuestion {
         wavelength_nm: REFERENCE_WAVELENGTH_NM,
-        distance_mm: shot.focus_distance_mm,
+        distance_mm: capture.place.focus_distance_mm,
         field_deg: corner_tan.atan().to_degrees(),
         instead_of_f_and_c_nm: None,
     };
-    LensData::new(&shot.lens, &question)
+    LensData::new(&capture.lens.lens, &question)
 }

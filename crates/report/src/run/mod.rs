@@ -1,45 +1,47 @@
-//! The files of a run: irradiance, frames, picture, `report.json` and a self-contained `report.html`.
+//! The files of a run: irradiance, frames, picture, `report.html` and `report.json`.
 
 mod page;
 
 use std::path::Path;
 
-use dioptric_analysis::{RunCharts, RunPlaces, RunReport, SensorStatistics};
+use dioptric_analysis::{Run, RunCharts, RunPlaces, RunReport, SensorStatistics};
 use dioptric_pipeline::{
-    Capture, IRRADIANCE_FILE, Outputs, PipelineError, Sensed, Shot, write_file, write_frames, write_json,
+    IRRADIANCE_FILE, Outputs, PipelineError, Sensed, write_file, write_frames, write_json,
 };
 use dioptric_scene::write_planes_exr;
 
-/// Writes everything of a run but the irradiance, which was streamed, into a folder, and returns the report.
+/// Writes everything of a run into a folder, and returns the report.
 ///
-/// `timings_s` is what the caller measured of each stage; the library reads no clock.
+/// `timings_s` returns how long each stage has taken so far, and is asked last of all, so that `report.json` counts the
+/// writing of the other files too; the library reads no clock.
 ///
 /// # Errors
 /// When a file cannot be written.
 pub fn write_run(
-    shot: &Shot,
-    capture: &Capture,
+    run: &Run<'_>,
     folder: &Path,
-    timings_s: &[(String, f64)],
+    timings_s: &dyn Fn() -> Vec<(String, f64)>,
 ) -> Result<RunReport, PipelineError> {
-    let outputs = &shot.camera.outputs;
+    let capture = run.capture;
+    let outputs = &capture.camera.outputs;
     let mut files = Vec::new();
     if outputs.irradiance {
+        capture.irradiance.write_exr(&folder.join(IRRADIANCE_FILE))?;
         files.push(IRRADIANCE_FILE.to_owned());
     }
-    if outputs.depth {
-        let depth = shot.scene.require_depth()?;
+    if let Some(depth) = run.depth.filter(|_| outputs.depth) {
         write_planes_exr(&folder.join("depth.exr"), &[("Z", depth.z_m())], true)?;
         files.push("depth.exr".to_owned());
     }
-    let (frame_files, png) = write_frames(&capture.frames(shot), &capture.developed.picture, outputs, folder)?;
+    let (frame_files, png) = write_frames(&capture.frame_parts(), &capture.developed.picture, outputs, folder)?;
     files.extend(frame_files);
-    let report = RunReport::new(shot, capture, timings_s, files)?;
-    write_json(&folder.join("report.json"), &report)?;
-    let places = RunPlaces::of(shot, capture);
-    let charts = RunCharts::of(shot, capture, &places, &report.sensor);
-    let page = page::Page { shot, capture, report: &report, places: &places, charts: &charts, picture_png: &png };
+    let report = RunReport::new(run, &timings_s(), files)?;
+    let places = RunPlaces::of(run);
+    let charts = RunCharts::of(run, &places, &report.sensor);
+    let page = page::Page { run, report: &report, places: &places, charts: &charts, picture_png: &png };
     write_file(&folder.join("report.html"), page::render(&page)?.as_bytes())?;
+    let report = RunReport { timings_s: timings_s(), ..report };
+    write_json(&folder.join("report.json"), &report)?;
     Ok(report)
 }
 

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use crate::{LensDrawing, MosaicPlan, PsfMosaic, chart_svg, png::png_bytes};
-use dioptric_analysis::{LineChart, RunCharts, RunPlaces, RunReport};
+use dioptric_analysis::{LineChart, Run, RunCharts, RunPlaces, RunReport};
 use dioptric_pipeline::{
     BankData, Capture, PipelineError, REFERENCE_WAVELENGTH_NM, Shot, display::LinearRgb, display::code,
     display::wavelength_color,
@@ -21,8 +21,7 @@ const THUMBNAIL: usize = 480;
 
 /// Everything that the page shows.
 pub(super) struct Page<'a> {
-    pub(super) shot: &'a Shot,
-    pub(super) capture: &'a Capture,
+    pub(super) run: &'a Run<'a>,
     pub(super) report: &'a RunReport,
     pub(super) places: &'a RunPlaces,
     pub(super) charts: &'a RunCharts,
@@ -53,9 +52,9 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
             .iter()
             .map(|share| (share * page.places.corner_tan()).atan().to_degrees())
             .collect(),
-        distance_mm: page.shot.focus_distance_mm.unwrap_or(f64::INFINITY),
+        distance_mm: page.run.capture.place.focus_distance_mm.unwrap_or(f64::INFINITY),
         wavelengths_nm: vec![REFERENCE_WAVELENGTH_NM],
-        film_mm: Some(page.shot.film_mm),
+        film_mm: Some(page.run.capture.place.film_distance_mm),
     };
     let (mosaic, mosaic_src) = mosaic(page)?;
     environment
@@ -63,9 +62,9 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
         .and_then(|template| {
             template.render(context! {
                 report => Value::from(Serde(page.report)),
-                settings => page.shot.camera.to_ron(),
+                settings => page.run.capture.camera.to_ron(),
                 picture => data_uri(page.picture_png),
-                lens_svg => Value::from_safe_string(drawing.to_svg(&page.shot.lens).unwrap_or_default()),
+                lens_svg => Value::from_safe_string(drawing.to_svg(&page.run.capture.lens.lens).unwrap_or_default()),
                 bank => page.report.psf_bank.as_ref().map(BankData::in_words),
                 mosaic => mosaic_src,
                 mosaic_fields => mosaic.fields_deg,
@@ -77,7 +76,7 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
                 distortion => svg(&charts.distortion),
                 spectrum => svg(&charts.spectrum),
                 histogram => svg(&charts.histogram),
-                seen => seen(&page.capture.irradiance.seen),
+                seen => seen(&page.run.capture.irradiance.summary.seen),
                 bands => Value::from(Serde(bands(page))),
                 depth => depth(page),
             })
@@ -97,11 +96,11 @@ fn mosaic(page: &Page<'_>) -> Result<(PsfMosaic, String), PipelineError> {
     let plan = MosaicPlan {
         field_tans: [0.0, 0.35, 0.7, 0.95].iter().map(|share| page.places.field(*share)).collect(),
         dioptres: page.places.dioptres.clone(),
-        grid: page.shot.grid().clone(),
+        grid: page.run.capture.grid().clone(),
         tile_px: 95,
         tile_um: None,
     };
-    let mosaic = PsfMosaic::draw(&page.capture.bank, &plan);
+    let mosaic = PsfMosaic::draw(page.run.model, &plan);
     let src = data_uri(&png_bytes(&mosaic.to_picture(1))?);
     Ok((mosaic, src))
 }
@@ -113,7 +112,7 @@ fn seen(light: &LinearRgb) -> String {
 
 /// A few bands, each in its colour and exposed alike.
 fn bands(page: &Page<'_>) -> Vec<Figure> {
-    let bands = &page.capture.irradiance.bands;
+    let bands = &page.run.capture.irradiance.summary.bands;
     let top = bands.iter().map(|(_, plane)| level_at(plane, 0.995)).fold(f64::MIN_POSITIVE, f64::max);
     bands
         .iter()
@@ -142,7 +141,7 @@ fn tint(wavelength_nm: f64) -> [f64; 3] {
 
 /// Depth in dioptres, near bright.
 fn depth(page: &Page<'_>) -> String {
-    let Some(depth) = &page.shot.scene.depth else { return String::new() };
+    let Some(depth) = page.run.depth else { return String::new() };
     let (near_m, far_m) = depth.range_m();
     let (far, near) = (1.0 / far_m, 1.0 / near_m);
     let z_m = depth.z_m();
