@@ -1,6 +1,6 @@
 //! The sampling of point spread functions that a scene and a film need.
 
-use dioptric_optics::{Lens, MonoLens, ObjectPoint, PupilBoundary, Rims, rays_towards};
+use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, Rims, rays_towards};
 use dioptric_psf::{BankSettings, Diffraction, FieldBankSettings};
 use dioptric_spectrum::WavelengthGrid;
 use glam::{DMat2, DVec2};
@@ -125,7 +125,7 @@ impl Aim<'_> {
         if !rays.fate[0].is_in_flight() {
             return None;
         }
-        Some((0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()).map(|i| -rays.point_mm(i).truncate()).collect())
+        Some(self.lens.landed(&rays, self.film_mm).map(FilmPoint::in_picture_mm).collect())
     }
 
     /// Returns the radius of the blur on the axis, mm, from first-order optics.

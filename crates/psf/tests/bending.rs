@@ -1,9 +1,9 @@
 //! Drawn uncertainty bending, held to random bending at the stop.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
-use dioptric_diffraction::{BendForm, Edge, Hurb, bend};
+use dioptric_diffraction::{Edge, Hurb, HurbForm, SampledHurb};
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
+    FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
     glam::{DVec2, DVec3},
     rays_towards,
 };
@@ -45,7 +45,7 @@ fn difference(lens: &Lens, kernel: &Kernel, field_tan: f64, dioptres: f64, film_
             mono.trace_surfaces(mono.stop() + 1..mono.n_surfaces(), &mut rays, Rims::Ignore);
         }
         mono.to_film(&mut rays, film_mm);
-        (0..rays.len()).map(|ray| -rays.point_mm(ray).truncate()).collect::<Vec<DVec2>>()
+        mono.landed(&rays, film_mm).map(FilmPoint::in_picture_mm).collect::<Vec<DVec2>>()
     };
     let straight = land(behind.clone());
     let centroid = straight.iter().sum::<DVec2>() / straight.len() as f64;
@@ -55,7 +55,9 @@ fn difference(lens: &Lens, kernel: &Kernel, field_tan: f64, dioptres: f64, film_
     let mut counts = vec![0.0f64; side * side];
     for round in 0..n_rounds {
         let mut rays = behind.clone();
-        bend(&mut rays, edge, Hurb::with_gamma(gamma), BendForm::DirectionCosines, round);
+        let form = HurbForm::DirectionCosines;
+        let hurb = SampledHurb { model: Hurb::with_gamma(gamma), edge, form, seed: round };
+        hurb.apply(&mut rays, &mono.stop_pose());
         for at in land(rays) {
             let at = (at - centroid) * (1e3 / PITCH_UM);
             let (column, row) = (at.x + 0.5 * side as f64, 0.5 * side as f64 - at.y);
