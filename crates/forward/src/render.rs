@@ -1,5 +1,6 @@
 //! The whole way from a scene to the irradiance on the film, band by band.
 
+use dioptric_psf::{FilmMap, LensImage};
 use std::{
     borrow::Cow,
     sync::atomic::{AtomicUsize, Ordering},
@@ -12,7 +13,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    BlurMode, Film, FilmMap, ForwardError, Kernels, Settings, SinkError,
+    BlurMode, Film, ForwardError, Settings, SinkError,
     blur::{LayerTask, blur_layer},
     geometry::{FilmFrame, check_reach},
     hidden::{EdgeRule, Fill, reach_of_edges},
@@ -57,7 +58,7 @@ pub type Sink<'a> = dyn FnMut(usize, Array2<f32>) -> Result<(), SinkError> + 'a;
 /// for the corner of the film, or when a band cannot be read or handed on.
 pub fn render(
     source: &Source<'_>,
-    kernels: &dyn Kernels,
+    kernels: &dyn LensImage,
     film: &Film,
     settings: &Settings,
     progress: &(dyn Fn(f64) + Sync),
@@ -99,7 +100,7 @@ fn check_source(source: &Source<'_>) -> Result<(), ForwardError> {
 
 /// What is the same for all bands.
 struct Plan<'a> {
-    kernels: &'a dyn Kernels,
+    kernels: &'a dyn LensImage,
     film: &'a Film,
     settings: &'a Settings,
     wavelengths_nm: Vec<f64>,
@@ -134,7 +135,7 @@ impl<'a> Plan<'a> {
     fn new(
         source: &Source<'_>,
         dioptres: (f64, f64),
-        kernels: &'a dyn Kernels,
+        kernels: &'a dyn LensImage,
         film: &'a Film,
         settings: &'a Settings,
     ) -> Self {
@@ -274,7 +275,7 @@ impl<'a> Plan<'a> {
 }
 
 /// Returns a few fields over the film, of which the blur tells that of all: from the axis outwards, or all over it.
-fn blur_fields(kernels: &dyn Kernels, map: &FilmMap, film: &Film) -> Vec<DVec2> {
+fn blur_fields(kernels: &dyn LensImage, map: &FilmMap, film: &Film) -> Vec<DVec2> {
     if kernels.is_symmetric() {
         let corner = map.field_tan(DVec2::X * film.half_diagonal_mm());
         return [0.0, 0.5, 1.0].map(|part| part * corner).to_vec();

@@ -1,12 +1,13 @@
 //! The film cut into square cells, with a knot for the PSF at each corner.
 
+use dioptric_psf::{FilmMap, LensImage, PsfQuery};
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{Film, FilmMap, Kernels, Settings, geometry::FilmFrame, layers::Layers};
+use crate::{Film, Settings, geometry::FilmFrame, layers::Layers};
 
 /// A point of the film at which the PSF is computed: pixels to the right of the axis and below it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -32,7 +33,7 @@ pub(crate) enum Symmetry {
 }
 
 impl Symmetry {
-    pub(crate) fn of(kernels: &dyn Kernels) -> Self {
+    pub(crate) fn of(kernels: &dyn LensImage) -> Self {
         if kernels.is_symmetric() { Self::Octants } else { Self::None }
     }
 
@@ -189,7 +190,7 @@ impl Tiling {
         layers: &Layers,
         film: &Film,
         wavelength_nm: f64,
-        kernels: &dyn Kernels,
+        kernels: &dyn LensImage,
         settings: &Settings,
     ) -> Self {
         let symmetry = Symmetry::of(kernels);
@@ -201,7 +202,9 @@ impl Tiling {
                     symmetry,
                     kernel_at: &|knot: Knot| {
                         let field_tan = knot.field_tan(&maps[layer], 1e-3 * film.pitch_um);
-                        kernels.kernel(field_tan, layers.dioptres()[layer], wavelength_nm, film.pitch_um)
+                        kernels
+                            .kernel(PsfQuery::new(field_tan, layers.dioptres()[layer], wavelength_nm, film.pitch_um))
+                            .samples
                     },
                     kernels: BTreeMap::new(),
                     errors: BTreeMap::new(),
@@ -221,7 +224,7 @@ impl Tiling {
         layers: &Layers,
         film: &Film,
         wavelength_nm: f64,
-        kernels: &dyn Kernels,
+        kernels: &dyn LensImage,
     ) -> Vec<LayerKernels> {
         let wanted: Vec<(usize, Knot)> =
             self.knots.iter().enumerate().flat_map(|(layer, knots)| knots.iter().map(move |&k| (layer, k))).collect();
@@ -230,7 +233,7 @@ impl Tiling {
             .map(|(layer, knot)| {
                 let field_tan = knot.field_tan(&maps[layer], 1e-3 * film.pitch_um);
                 let dioptres = layers.dioptres()[layer];
-                (layer, knot, kernels.kernel(field_tan, dioptres, wavelength_nm, film.pitch_um))
+                (layer, knot, kernels.kernel(PsfQuery::new(field_tan, dioptres, wavelength_nm, film.pitch_um)).samples)
             })
             .collect();
         let mut by_layer: Vec<Vec<(Knot, Array2<f32>)>> = vec![vec![]; layers.len()];

@@ -7,7 +7,7 @@ use dioptric_optics::{
     glam::{DVec2, DVec3},
     rays_towards,
 };
-use dioptric_psf::{BankSettings, Diffraction, Interpolation, Kernel, PsfBank, PsfQuery};
+use dioptric_psf::{BankSettings, Diffraction, FieldSampling, Interpolation, Kernel, LensImageModel, PsfQuery};
 
 const PITCH_UM: f64 = 4.0;
 
@@ -86,11 +86,15 @@ fn kernels_are_those_of_rays_bent_at_random() {
         let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
         let gamma = 1.0;
         let settings = BankSettings {
-            field_tans: vec![0.0, 0.1],
+            fields: FieldSampling::Radial(vec![0.0, 0.1]),
             ..BankSettings::covering(film_mm, 0.1, (dioptres, dioptres), (550.0, 550.0), Diffraction::Hurb { gamma })
         };
-        let kernel =
-            PsfBank::build(&lens, &settings).unwrap().kernel(DVec2::new(field_tan, 0.0), dioptres, 550.0, PITCH_UM);
+        let kernel = LensImageModel::build(&lens, &settings).unwrap().kernel(PsfQuery::new(
+            DVec2::new(field_tan, 0.0),
+            dioptres,
+            550.0,
+            PITCH_UM,
+        ));
         let (l1, noise) = difference(&lens, &kernel, field_tan, dioptres, film_mm, gamma);
         println!(
             "f/{f_number}, {field_tan}, {dioptres} D: {l1:.4}, noise {noise:.4}, drawing {:.4}",
@@ -108,7 +112,7 @@ fn light_beyond_the_edge_of_a_blur_is_even_around_it() {
     let settings = BankSettings {
         film_mm: 51.0,
         reference_wavelength_nm: 550.0,
-        field_tans: vec![0.0, 0.1],
+        fields: FieldSampling::Radial(vec![0.0, 0.1]),
         dioptres: vec![0.0],
         wavelengths_nm: vec![550.0],
         n_rings: 12,
@@ -116,9 +120,9 @@ fn light_beyond_the_edge_of_a_blur_is_even_around_it() {
         diffraction: Diffraction::Hurb { gamma: 1.0 },
         interpolation: Interpolation::Rays,
     };
-    let bank = PsfBank::build(&lens, &settings).unwrap();
+    let bank = LensImageModel::build(&lens, &settings).unwrap();
     let query = PsfQuery { field_tan: DVec2::ZERO, dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 1.0 };
-    let (picture, _) = bank.picture(query, 241);
+    let (picture, _) = bank.picture(query, 241).unwrap();
     for radius in [70.0, 80.0, 90.0] {
         // Between pixels, by straight lines.
         let at = |azimuth: f64| {
