@@ -22,5 +22,6 @@ pub use lens::{
 };
 pub use psf::{MtfRow, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, WholeLight, psf_csv};
 pub use run::{
-    ChannelStatistics, FilmData, IrradianceData, LossRow, Run, RunCharts, RunPlaces, RunReport, SceneData, SensorStatistics,
+    ChannelStatistics, FilmData, IrradianceData, LossRow, Run, RunCharts, RunPlaces, RunReport, SceneData,
+    SensorStatistics,
 };

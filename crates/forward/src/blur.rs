@@ -1,5 +1,6 @@
 //! One layer in one band: its ideal picture, spread by PSFs that vary over the film.
 
+use dioptric_psf::FilmMap;
 use std::collections::BTreeMap;
 
 use dioptric_spectrum::{Cancel, Cancelled};
@@ -7,7 +8,6 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 
 use crate::{
-    FilmMap,
     convolve::{DIRECT_BLOCK, Direct, MAX_DIRECT, fast_size, multiply_add, with_fft},
     occlusion::BlurredLayer,
     sampler::{IdealLayer, Rectangle, Sampler, Surface},

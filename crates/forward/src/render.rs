@@ -1,10 +1,11 @@
 //! The whole way from a scene to the irradiance on the film, band by band, for one use.
 
+use dioptric_psf::LensImage;
 use dioptric_spectrum::Cancel;
 use ndarray::Array2;
 
 use crate::{
-    Film, ForwardError, ImagingSpec, Kernels, Settings, SinkError, Source,
+    Film, ForwardError, ImagingSpec, Settings, SinkError, Source,
     plan::{Layout, Watch},
 };
 
@@ -22,7 +23,7 @@ pub type Sink<'a> = dyn FnMut(usize, Array2<f32>) -> Result<(), SinkError> + 'a;
 /// for the corner of the film, or when a band cannot be read or handed on.
 pub fn render(
     source: &Source<'_>,
-    kernels: &dyn Kernels,
+    kernels: &dyn LensImage,
     film: &Film,
     settings: &Settings,
     progress: &(dyn Fn(f64) + Sync),

@@ -1,5 +1,6 @@
 //! The film cut into square cells, with a knot for the PSF at each corner.
 
+use dioptric_psf::{FilmMap, LensImage, PsfQuery};
 use std::collections::{BTreeMap, BTreeSet};
 
 use dioptric_spectrum::{Cancel, Cancelled};
@@ -7,7 +8,7 @@ use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{Film, FilmMap, Kernels, Settings, geometry::FilmFrame, layers::Layers, sampler::Sampler, work::Work};
+use crate::{Film, Settings, geometry::FilmFrame, layers::Layers, sampler::Sampler, work::Work};
 
 /// A point of the film at which the PSF is computed: pixels to the right of the axis and below it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,7 +34,7 @@ pub(crate) enum Symmetry {
 }
 
 impl Symmetry {
-    pub(crate) fn of(kernels: &dyn Kernels) -> Self {
+    pub(crate) fn of(kernels: &dyn LensImage) -> Self {
         if kernels.is_symmetric() { Self::Octants } else { Self::None }
     }
 
@@ -200,7 +201,7 @@ impl Tiling {
         layers: &Layers,
         film: &Film,
         wavelength_nm: f64,
-        kernels: &dyn Kernels,
+        kernels: &dyn LensImage,
         settings: &Settings,
         work: &Work<'_>,
     ) -> Result<Self, Cancelled> {
@@ -213,7 +214,9 @@ impl Tiling {
                     symmetry,
                     kernel_at: &|knot: Knot| {
                         let field_tan = knot.field_tan(&maps[layer], 1e-3 * film.pitch_um);
-                        kernels.kernel(field_tan, layers.dioptres()[layer], wavelength_nm, film.pitch_um)
+                        kernels
+                            .kernel(PsfQuery::new(field_tan, layers.dioptres()[layer], wavelength_nm, film.pitch_um))
+                            .samples
                     },
                     kernels: BTreeMap::new(),
                     errors: BTreeMap::new(),
@@ -249,7 +252,7 @@ impl Tiling {
         layers: &Layers,
         film: &Film,
         wavelength_nm: f64,
-        kernels: &dyn Kernels,
+        kernels: &dyn LensImage,
         work: &Work<'_>,
     ) -> Result<Vec<LayerKernels>, Cancelled> {
         let wanted: Vec<(usize, Knot)> =
@@ -260,7 +263,7 @@ impl Tiling {
                 work.check()?;
                 let field_tan = knot.field_tan(&maps[layer], 1e-3 * film.pitch_um);
                 let dioptres = layers.dioptres()[layer];
-                let kernel = kernels.kernel(field_tan, dioptres, wavelength_nm, film.pitch_um);
+                let kernel = kernels.kernel(PsfQuery::new(field_tan, dioptres, wavelength_nm, film.pitch_um)).samples;
                 work.advance(1);
                 Ok((layer, knot, kernel))
             })

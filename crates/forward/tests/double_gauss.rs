@@ -2,9 +2,9 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by panicking and shows its numbers")]
 
-use dioptric_forward::{Coverage, Film, Settings, bank_settings_for, irradiance};
+use dioptric_forward::{Film, PsfDomain, Settings, irradiance};
 use dioptric_optics::{Lens, ObjectPoint, Rims, rays_over_front};
-use dioptric_psf::{Diffraction, PsfBank};
+use dioptric_psf::{Diffraction, LensImageModel};
 use dioptric_scene::{Scene, View};
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
@@ -26,7 +26,7 @@ impl Camera {
     }
 
     fn image(&self, scene: &Scene, diffraction: Diffraction, settings: &Settings) -> Vec<Array2<f32>> {
-        let coverage = Coverage {
+        let domain = PsfDomain {
             lens: &self.lens,
             film: &self.film,
             film_mm: self.film_mm,
@@ -34,7 +34,7 @@ impl Camera {
             grid: scene.radiance.grid(),
             diffraction,
         };
-        let bank = PsfBank::build(&self.lens, &bank_settings_for(&coverage).unwrap()).unwrap();
+        let bank = LensImageModel::build(&self.lens, &domain.settings().unwrap()).unwrap();
         let mut bands = vec![];
         irradiance(scene, &bank, &self.film, settings, &|_| {}, &mut |_, band| {
             bands.push(band);

@@ -29,10 +29,10 @@ pub use error::PipelineError;
 pub use frame_files::{FrameFile, Frames, Outputs, write_frames};
 pub use numbers::{number, parse_numbers, parse_pairs};
 pub use progress::{Progress, Silent, Stage};
+pub use quality::Quality;
 pub use sense::{SenseRequest, Sensed, parse_illuminant, with_exposure_s};
 pub use staged::{Staged, write_file, write_json};
-pub use quality::Quality;
 pub use stages::{
-    Capture, FilmPlace, FrameSet, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera, RESUME_FILE, ResolvedLens,
-    ResolvedScene, Resumed, SceneSummary, StageCounts,
+    Capture, FilmPlace, FrameSet, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera, RESUME_FILE,
+    ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,
 };

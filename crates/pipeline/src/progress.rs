@@ -21,7 +21,8 @@ pub enum Stage {
 
 impl Stage {
     /// All stages, in their order.
-    pub const ALL: [Self; 7] = [Self::Scene, Self::Lens, Self::Plan, Self::Irradiance, Self::Sensor, Self::Picture, Self::Report];
+    pub const ALL: [Self; 7] =
+        [Self::Scene, Self::Lens, Self::Plan, Self::Irradiance, Self::Sensor, Self::Picture, Self::Report];
 
     /// What the stage does, in a few words.
     pub fn title(self) -> &'static str {

@@ -49,19 +49,6 @@ impl View {
         (self.center_y_px - self.focal_px * tan_y, self.center_x_px + self.focal_px * tan_x)
     }
 
-    /// Returns the view of the picture in which blocks of samples, `factor` each way, are one.
-    #[must_use]
-    pub fn binned(self, factor: usize) -> Self {
-        let factor = factor as f64;
-        // The middle of the first block lies half its side, less half a sample, from the first sample.
-        let center = |px: f64| (px - 0.5 * (factor - 1.0)) / factor;
-        Self {
-            focal_px: self.focal_px / factor,
-            center_x_px: center(self.center_x_px),
-            center_y_px: center(self.center_y_px),
-        }
-    }
-
     /// Returns the angle from the left edge of the first column to the right edge of the last.
     pub fn horizontal_fov_deg(&self, columns: usize) -> f64 {
         let left = (self.center_x_px + 0.5) / self.focal_px;

@@ -250,8 +250,13 @@ fn distortion(bank: &LensImageModel, places: &RunPlaces) -> LineChart {
 }
 
 fn spectrum(capture: &Capture) -> LineChart {
-    let points: Vec<(f64, f64)> =
-        capture.grid().centers_nm().iter().zip(&capture.irradiance.summary.mean).map(|(&nm, &e)| (nm, 1e3 * e)).collect();
+    let points: Vec<(f64, f64)> = capture
+        .grid()
+        .centers_nm()
+        .iter()
+        .zip(&capture.irradiance.summary.mean)
+        .map(|(&nm, &e)| (nm, 1e3 * e))
+        .collect();
     let top = points.iter().map(|p| p.1).fold(0.0, f64::max);
     let (first, last) = run.capture.grid().range_nm();
     LineChart {

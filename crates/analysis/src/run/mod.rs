@@ -109,11 +109,7 @@ impl RunReport {
     ///
     /// # Errors
     /// When the scene has no depth, or a glass is not known at the reference wavelength.
-    pub fn new(
-        run: &Run<'_>,
-        timings_s: &[(String, f64)],
-        files: Vec<String>,
-    ) -> Result<Self, PipelineError> {
+    pub fn new(run: &Run<'_>, timings_s: &[(String, f64)], files: Vec<String>) -> Result<Self, PipelineError> {
         let places = RunPlaces::of(run);
         let fields = [0.0, 0.35, 0.7, 1.0].map(|share| places.field(share));
         let capture = run.capture;

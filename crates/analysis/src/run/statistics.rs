@@ -156,7 +156,10 @@ pub(super) fn losses(capture: &Capture, field_tans: &[DVec2]) -> Result<Vec<Loss
     let beside_focus = 1.0 / capture.scene.near_m;
     let focus_mm = capture.place.focus_distance_mm;
     let dioptres = focus_mm.map_or(beside_focus, |mm| 1e3 / (mm + mono.projection_center_z_mm()));
-    Ok(field_tans.iter().map(|&field_tan| loss_row(mono, capture.place.film_distance_mm, field_tan, dioptres)).collect())
+    Ok(field_tans
+        .iter()
+        .map(|&field_tan| loss_row(mono, capture.place.film_distance_mm, field_tan, dioptres))
+        .collect())
 }
 
 fn loss_row(mono: &MonoLens, film_distance_mm: f64, field_tan: DVec2, dioptres: f64) -> LossRow {

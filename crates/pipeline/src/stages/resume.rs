@@ -101,7 +101,10 @@ impl Kept {
         use dioptric_spectrum::Bands;
         let (found, expected) = (irradiance.size(), (self.place.rows, self.place.columns));
         if found != expected {
-            return Err(format!("{IRRADIANCE_FILE} has {} × {} samples, expected {} × {}", found.1, found.0, expected.1, expected.0));
+            return Err(format!(
+                "{IRRADIANCE_FILE} has {} × {} samples, expected {} × {}",
+                found.1, found.0, expected.1, expected.0
+            ));
         }
         let (found, expected) = (irradiance.grid().len(), self.scene.wavelengths_nm.len());
         if found != expected {

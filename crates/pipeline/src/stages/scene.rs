@@ -1,7 +1,7 @@
 //! What stands before the camera, at the resolution and on the bands that a quality asks for.
 
 use dioptric_scene::Scene;
-use dioptric_spectrum::{DepthMap, Illuminant, WavelengthGrid};
+use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
 use super::spec::{GeometryInputs, SceneInputs};

@@ -179,12 +179,8 @@ impl IrradianceInputs {
             FilmChoice::Pixels { columns, rows, pitch_um } => Raster::Pixels(Film { rows, columns, pitch_um }),
             FilmChoice::Scene => Raster::Scene,
         };
-        let film = FilmInputs {
-            lens: LensInputs::of(camera),
-            geometry: scene.geometry.clone(),
-            focus: camera.focus,
-            raster,
-        };
+        let film =
+            FilmInputs { lens: LensInputs::of(camera), geometry: scene.geometry.clone(), focus: camera.focus, raster };
         let bank = BankInputs { film, diffraction: camera.diffraction, bank: camera.bank };
         Self { plan: PlanInputs { bank, blur: camera.blur }, scene }
     }

@@ -5,9 +5,7 @@ mod page;
 use std::path::Path;
 
 use dioptric_analysis::{Run, RunCharts, RunPlaces, RunReport, SensorStatistics};
-use dioptric_pipeline::{
-    IRRADIANCE_FILE, Outputs, PipelineError, Sensed, write_file, write_frames, write_json,
-};
+use dioptric_pipeline::{IRRADIANCE_FILE, Outputs, PipelineError, Sensed, write_file, write_frames, write_json};
 use dioptric_scene::write_planes_exr;
 
 /// Writes everything of a run into a folder, and returns the report.
