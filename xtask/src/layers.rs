@@ -18,7 +18,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("pipeline", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor"]),
     ("analysis", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline"]),
     ("report", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline", "analysis"]),
-    ("cli", &["pipeline", "analysis", "report"]),
+    ("cli", &["spectrum", "pipeline", "analysis", "report"]),
     ("xtask", &["report"]),
 ];
 

@@ -61,6 +61,17 @@ pub(crate) enum Command {
     Measure(MeasureCommand),
 }
 
+/// How finely a picture is simulated.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum QualityKind {
+    /// At most 480 columns and 5 bands: at once
+    Preview,
+    /// At most 960 columns and 11 bands
+    Draft,
+    /// Every pixel and every band
+    Full,
+}
+
 /// A run of the whole camera.
 #[derive(Debug, Args)]
 pub(crate) struct RunArgs {
@@ -69,9 +80,15 @@ pub(crate) struct RunArgs {
     /// Scene to photograph: spectral EXR, ENVI header, folder of band PNGs, or a picture
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
-    /// Folder for the results
-    #[arg(long, short, value_name = "DIR", default_value = "dioptric-out")]
-    pub(crate) out: PathBuf,
+    /// Folder for the results [default: dioptric-out, or that of --from]
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Continues from the folder of a finished run: its camera, and its irradiance where no change touches it
+    #[arg(long, value_name = "DIR", conflicts_with = "camera")]
+    pub(crate) from: Option<PathBuf>,
+    /// How finely the picture is simulated
+    #[arg(long, value_name = "QUALITY", value_enum, default_value = "full")]
+    pub(crate) quality: QualityKind,
     /// Lens, a file or the name of a built-in one
     #[arg(long, value_name = "LENS")]
     pub(crate) lens: Option<String>,

@@ -7,47 +7,62 @@ use std::{
 };
 
 use anyhow::{Context, bail};
-use dioptric_analysis::RunReport;
+use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
-    BankChoice, BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, FrameFile, FramesChoice, LensChoice,
-    LensReading, Progress, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice, WhiteChoice,
-    parse_illuminant, parse_numbers, with_exposure_s,
+    BankChoice, BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, FrameFile, FramesChoice, KeptCamera,
+    LensChoice, LensReading, Progress, Quality, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice,
+    WhiteChoice, parse_illuminant, parse_numbers, with_exposure_s,
 };
-
 use dioptric_report::write_run;
+use dioptric_spectrum::Cancel;
 
 use crate::{
-    args::{BankKind, BlurKind, Common, DiffractionKind, FrameArgs, RunArgs, WhiteKind},
+    args::{BankKind, BlurKind, Common, DiffractionKind, FrameArgs, QualityKind, RunArgs, WhiteKind},
     lens::tell,
     terminal::{Bar, guarded, print, print_json, remark},
 };
 
+/// Where results go when nothing else is asked for.
+const OUT: &str = "dioptric-out";
+
 pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
-    let camera = camera_of(arguments, common)?;
-    camera.validate()?;
-    let staged = guarded(Staged::folder(&arguments.out)?);
-    let clock = Clock::new(common.quiet);
-    let (shot, capture) = camera.capture(Some(staged.path()), &clock)?;
-    let timings = clock.timings();
+    let kept = camera_of(arguments, common)?;
+    kept.camera().validate()?;
+    let out = arguments.out.as_deref().or(arguments.from.as_deref()).unwrap_or(Path::new(OUT));
+    let staged = guarded(Staged::folder(out)?);
+    let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
+    let capture = kept.capture(&clock, &cancel)?;
+    let model = kept.model(&clock, &cancel)?;
+    let depth = kept.depth(&clock, &cancel)?;
     clock.at(Stage::Report, 0.0);
-    let report = write_run(&shot, &capture, staged.path(), &timings)?;
+    let run = Run { capture: &capture, model: &model, depth: Some(&depth) };
+    let report = write_run(&run, staged.path(), &|| clock.timings())?;
+    if capture.camera.outputs.irradiance && capture.quality == Quality::Full {
+        kept.write_resume_file(&capture, staged.path())?;
+    }
     staged.commit()?;
     drop(clock);
-    tell(&shot.lens_notes, common);
+    tell(&capture.lens.notes, common);
     if common.json {
         return print_json(&report);
     }
     remark(common.quiet, "");
-    if common.quiet { Ok(()) } else { print(&summary(&report, &arguments.out)) }
+    if common.quiet { Ok(()) } else { print(&summary(&report, out)) }
 }
 
-/// Returns the camera of the file, or the demo, with what the command line changes.
-fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<Camera> {
-    let mut camera = match &arguments.camera {
-        Some(path) => Camera::read(path)?,
-        None => Camera::demo()?,
+/// Returns the camera of the file, of the run to continue or of the demo, with what the command line changes.
+fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera> {
+    let kept = match (&arguments.from, &arguments.camera) {
+        (Some(folder), _) => {
+            let resumed = KeptCamera::resume(folder)?;
+            tell(&resumed.notes, common);
+            resumed.camera
+        }
+        (None, Some(path)) => KeptCamera::new(Camera::read(path)?),
+        (None, None) => KeptCamera::new(Camera::demo()?),
     };
-    if arguments.camera.is_none() {
+    let mut camera = kept.camera().clone();
+    if arguments.camera.is_none() && arguments.from.is_none() {
         change_demo(&mut camera, arguments);
     }
     if let Some(scene) = &arguments.scene {
@@ -62,7 +77,12 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<Camera> {
     if let Some(list) = &arguments.wavelengths_nm {
         camera.wavelengths = WavelengthChoice::ListNm(parse_numbers("--wavelengths-nm", list)?);
     }
-    Ok(camera)
+    let quality = match arguments.quality {
+        QualityKind::Preview => Quality::Preview,
+        QualityKind::Draft => Quality::Draft,
+        QualityKind::Full => Quality::Full,
+    };
+    Ok(kept.with(|own| *own = camera).with_quality(quality))
 }
 
 /// Changes what the demo has for its own lens and scene alone: the film and the name, and with the scene focus and bands.
@@ -274,7 +294,7 @@ mod tests {
     fn camera(options: &[&str]) -> Camera {
         let cli = Cli::parse_from([&["dioptric", "run"], options].concat());
         let Command::Run(arguments) = &cli.command else { panic!("another command") };
-        camera_of(arguments, &cli.common).unwrap()
+        camera_of(arguments, &cli.common).unwrap().camera().clone()
     }
 
     #[test]

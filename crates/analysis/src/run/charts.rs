@@ -258,7 +258,7 @@ fn spectrum(capture: &Capture) -> LineChart {
         .map(|(&nm, &e)| (nm, 1e3 * e))
         .collect();
     let top = points.iter().map(|p| p.1).fold(0.0, f64::max);
-    let (first, last) = run.capture.grid().range_nm();
+    let (first, last) = capture.grid().range_nm();
     LineChart {
         title: "Mean spectral irradiance on the film".to_owned(),
         x_label: "wavelength, nm".to_owned(),

@@ -192,7 +192,7 @@ fn widest_blur_mm(lens: &MonoLens, film_mm: f64, scene: &Scene) -> Result<f64, P
 mod tests {
     use super::*;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
-    use dioptric_optics::Move;
+    use dioptric_optics::{Lens, Move};
 
     #[test]
     fn a_unit_tangent_lands_a_focal_length_off_axis_at_infinity_focus() {

@@ -229,12 +229,12 @@ mod tests {
 
     fn image_with(memory_bytes: u64) -> Irradiance {
         let grid = WavelengthGrid::uniform(450.0, 650.0, 100.0).unwrap();
-        let radiance = (0..3)
+        let planes = (0..3)
             .map(|band| Array2::from_shape_fn((24, 30), |(row, column)| ((row * 7 + column * 3 + band) % 11) as f32));
-        let image = SpectralImage::new(Quantity::Radiance, grid.clone(), radiance.collect()).unwrap();
+        let radiance = SpectralImage::new(Quantity::Radiance, grid.clone(), planes.collect()).unwrap();
         let view = View { focal_px: 5000.0, center_x_px: 14.5, center_y_px: 11.5 };
         let depth = Some(DepthMap::flat(24, 30, 2.0).unwrap());
-        let scene = Scene { depth, view: Some(view), ..Scene::new("test", image) };
+        let scene = Scene { depth, view: Some(view), ..Scene::new("test", radiance) };
         let place = FilmPlace {
             rows: 16,
             columns: 20,

@@ -9,8 +9,7 @@ use serde::Serialize;
 use crate::{LensDrawing, MosaicPlan, PsfMosaic, chart_svg, png::png_bytes};
 use dioptric_analysis::{LineChart, Run, RunCharts, RunPlaces, RunReport};
 use dioptric_pipeline::{
-    BankData, Capture, PipelineError, REFERENCE_WAVELENGTH_NM, Shot, display::LinearRgb, display::code,
-    display::wavelength_color,
+    BankData, PipelineError, REFERENCE_WAVELENGTH_NM, display::LinearRgb, display::code, display::wavelength_color,
 };
 
 const TEMPLATE: &str = include_str!("report.html.j2");

@@ -1,0 +1,180 @@
+//! A camera that is kept and changed computes what the change touches, and no more.
+
+use dioptric_pipeline::{
+    BlurChoice, Camera, Capture, DiffractionChoice, FilmChoice, FocusChoice, KeptCamera, Quality, SceneSource,
+    SensorChoice, Silent, StageCounts, StopChoice, WavelengthChoice, WhiteChoice, with_exposure_s,
+};
+use dioptric_spectrum::{Bands, Cancel};
+
+/// The demo on a film of 48 × 32 pixels and three bands.
+fn small() -> Camera {
+    let mut camera = Camera::demo().unwrap();
+    camera.film = FilmChoice::Pixels { columns: 48, rows: 32, pitch_um: 660.0 };
+    camera.scene.source = SceneSource::StillLife { columns: 54, rows: 36 };
+    camera.wavelengths = WavelengthChoice::ListNm(vec![450.0, 550.0, 650.0]);
+    camera
+}
+
+fn capture(kept: &KeptCamera) -> Capture {
+    kept.capture(&Silent, &Cancel::new()).unwrap()
+}
+
+/// The bits of a capture from the irradiance to the picture.
+fn bits(capture: &Capture) -> (Vec<u32>, Vec<u16>) {
+    let irradiance = (0..capture.grid().len()).flat_map(|band| {
+        capture.irradiance.band(band).unwrap().iter().map(|sample| sample.to_bits()).collect::<Vec<_>>()
+    });
+    let picture = capture.developed.picture.to_rgb8();
+    (irradiance.collect(), picture.iter().map(|&code| u16::from(code)).collect())
+}
+
+/// Checks which stages a change of the camera runs again: lens, scene, film, bank, plan, irradiance, electrons, frames,
+/// picture; and that the picture is that of a camera of which nothing was kept.
+#[track_caller]
+fn check(change: impl Fn(&mut Camera), expected: [usize; 9]) {
+    let kept = KeptCamera::new(small());
+    capture(&kept);
+    let before = kept.stage_counts();
+    let changed = kept.with(&change);
+    let again = capture(&changed);
+    let after = kept.stage_counts();
+    let runs = |count: fn(&StageCounts) -> usize| count(&after) - count(&before);
+    let found = [
+        runs(|c| c.lens),
+        runs(|c| c.scene),
+        runs(|c| c.film),
+        runs(|c| c.bank),
+        runs(|c| c.plan),
+        runs(|c| c.irradiance),
+        runs(|c| c.electrons),
+        runs(|c| c.frames),
+        runs(|c| c.picture),
+    ];
+    assert_eq!(found, expected);
+    assert_eq!(bits(&again), bits(&capture(&KeptCamera::new(changed.camera().clone()))));
+}
+
+#[test]
+fn nothing_changed_runs_nothing() {
+    check(|_| {}, [0; 9]);
+    check(|camera| camera.name = "another".to_owned(), [0; 9]);
+}
+
+#[test]
+fn exposure_and_noise_start_at_the_frames() {
+    let frames = [0, 0, 0, 0, 0, 0, 0, 1, 1];
+    check(|camera| camera.seed = 7, frames);
+    check(|camera| camera.exposure = with_exposure_s(camera.exposure, 0.002), frames);
+}
+
+#[test]
+fn processing_changes_the_picture_alone() {
+    check(|camera| camera.processing.white = WhiteChoice::GreyWorld, [0, 0, 0, 0, 0, 0, 0, 0, 1]);
+    check(|camera| camera.processing.denoise = 0.5, [0, 0, 0, 0, 0, 0, 0, 0, 1]);
+}
+
+#[test]
+fn sensor_starts_at_the_electrons() {
+    check(|camera| camera.sensor = SensorChoice::BuiltIn("imx363".to_owned()), [0, 0, 0, 0, 0, 0, 1, 1, 1]);
+}
+
+#[test]
+fn focus_diffraction_and_blur_start_at_film_bank_and_plan() {
+    check(|camera| camera.focus = FocusChoice::DistanceMm(2000.0), [0, 0, 1, 1, 1, 1, 1, 1, 1]);
+    check(|camera| camera.diffraction = DiffractionChoice::None, [0, 0, 0, 1, 1, 1, 1, 1, 1]);
+    check(|camera| camera.blur = BlurChoice::Pointwise, [0, 0, 0, 0, 1, 1, 1, 1, 1]);
+}
+
+#[test]
+fn stop_resolves_the_lens_and_keeps_the_scene() {
+    check(|camera| camera.stop = StopChoice::FNumber(8.0), [1, 0, 1, 1, 1, 1, 1, 1, 1]);
+}
+
+#[test]
+fn brighter_scene_keeps_the_plan() {
+    check(|camera| camera.scene.mean_luminance_cd_m2 = Some(300.0), [0, 1, 0, 0, 0, 1, 1, 1, 1]);
+}
+
+#[test]
+fn going_back_costs_nothing() {
+    let kept = KeptCamera::new(small());
+    capture(&kept);
+    capture(&kept.with(|camera| camera.focus = FocusChoice::DistanceMm(2000.0)));
+    let before = kept.stage_counts();
+    capture(&kept);
+    assert_eq!(kept.stage_counts(), before);
+}
+
+#[test]
+fn cancelled_capture_is_an_error_and_keeps_nothing_wrong() {
+    let kept = KeptCamera::new(small());
+    let cancel = Cancel::new();
+    cancel.cancel();
+    let error = kept.capture(&Silent, &cancel).unwrap_err();
+    assert_eq!(error.to_string(), "the work was cancelled");
+    assert_eq!(bits(&capture(&kept)), bits(&capture(&KeptCamera::new(small()))));
+}
+
+#[test]
+fn spilled_irradiance_makes_the_same_picture() {
+    let kept = KeptCamera::new(small());
+    let spilled = KeptCamera::new(small()).with_memory_bytes(1000);
+    let (in_memory, in_file) = (capture(&kept), capture(&spilled));
+    assert!(in_file.irradiance.is_spilled() && !in_memory.irradiance.is_spilled());
+    assert_eq!(bits(&in_memory), bits(&in_file));
+}
+
+#[test]
+fn continued_run_images_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let kept = KeptCamera::new(small());
+    let first = capture(&kept);
+    first.irradiance.write_exr(&folder.path().join("irradiance.exr")).unwrap();
+    kept.write_resume_file(&first, folder.path()).unwrap();
+
+    let resumed = KeptCamera::resume(folder.path()).unwrap();
+    assert!(resumed.notes.is_empty());
+    let same = capture(&resumed.camera);
+    assert_eq!(bits(&same), bits(&first));
+    let exposed = capture(&resumed.camera.with(|camera| camera.seed = 5));
+    let counts = resumed.camera.stage_counts();
+    assert_eq!((counts.scene, counts.bank, counts.irradiance, counts.electrons), (0, 0, 0, 1));
+    assert_eq!(bits(&exposed), bits(&capture(&kept.with(|camera| camera.seed = 5))));
+    // A change before the irradiance images the scene anew, and rightly.
+    let focus = |camera: &mut Camera| camera.focus = FocusChoice::DistanceMm(2000.0);
+    assert_eq!(bits(&capture(&resumed.camera.with(focus))), bits(&capture(&kept.with(focus))));
+}
+
+#[test]
+fn folder_without_a_run_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = KeptCamera::resume(folder.path()).unwrap_err().to_string();
+    assert!(error.contains("kept.ron"), "{error}");
+}
+
+/// A preview has every second pixel of each line of the film here, and fewer bands: its light is that of the full picture
+/// averaged, to a few per cent of its mean.
+#[test]
+fn preview_shows_the_full_picture() {
+    let mut camera = small();
+    camera.film = FilmChoice::Pixels { columns: 600, rows: 400, pitch_um: 52.8 };
+    camera.scene.source = SceneSource::StillLife { columns: 680, rows: 454 };
+    camera.wavelengths = WavelengthChoice::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 30.0 };
+    let kept = KeptCamera::new(camera);
+    let (full, preview) = (capture(&kept), capture(&kept.with_quality(Quality::Preview)));
+    let (whole, few) = (&full.irradiance.summary.seen.planes, &preview.irradiance.summary.seen.planes);
+    assert_eq!((preview.place.binning, few[0].dim()), (2, (200, 300)));
+    let mean = f64::from(whole[1].sum()) / whole[1].len() as f64;
+    for (whole, few) in whole.iter().zip(few) {
+        let squares: f64 = few
+            .indexed_iter()
+            .map(|((r, c), &value)| {
+                let block = whole.slice(ndarray::s![2 * r..2 * r + 2, 2 * c..2 * c + 2]);
+                f64::from(value - block.sum() / 4.0).powi(2)
+            })
+            .sum();
+        let rms = (squares / few.len() as f64).sqrt() / mean;
+        println!("rms {rms:.4} of the mean");
+        assert!(rms < 0.2, "{rms}");
+    }
+}
