@@ -341,6 +341,9 @@ pub(crate) struct SenseArgs {
     /// Sensor, a file or the name of a built-in one
     #[arg(long, value_name = "SENSOR")]
     pub(crate) sensor: String,
+    /// Distance between the sensor's pixels, µm [default: the sensor's own]; that of the image's samples makes each a pixel
+    #[arg(long, value_name = "P")]
+    pub(crate) pixel_um: Option<f64>,
     /// Folder for the results
     #[arg(long, short, value_name = "DIR")]
     pub(crate) out: PathBuf,

@@ -10,6 +10,7 @@ use dioptric_report::write_sensed;
 
 use crate::{
     args::{Common, SenseArgs},
+    lens::tell,
     run::frames_of,
     terminal::{guarded, print, print_json},
 };
@@ -18,6 +19,7 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
     let demo = Camera::demo()?;
     let request = SenseRequest {
         sensor: SensorChoice::named(&arguments.sensor),
+        pixel_um: arguments.pixel_um,
         exposure: match arguments.exposure_s {
             Some(time_s) => with_exposure_s(demo.exposure, time_s),
             None => demo.exposure,
@@ -33,8 +35,10 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
         },
     };
     let staged = guarded(Staged::folder(&arguments.out)?);
-    let statistics = write_sensed(&request.sense(&arguments.irradiance)?, &request.outputs, staged.path())?;
+    let sensed = request.sense(&arguments.irradiance)?;
+    let statistics = write_sensed(&sensed, &request.outputs, staged.path())?;
     staged.commit()?;
+    tell(&sensed.notes, common);
     match (common.json, common.quiet) {
         (true, _) => print_json(&statistics),
         (false, true) => Ok(()),

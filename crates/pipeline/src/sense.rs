@@ -2,17 +2,22 @@
 
 use std::path::Path;
 
-use dioptric_scene::read_spectral_exr;
 use dioptric_sensor::{Developed, ElectronRate, Exposure, ExposureControl, Illumination, Noise, Processing, Sensor};
-use dioptric_spectrum::{Illuminant, Quantity};
+use dioptric_spectrum::{Bands, Cancel, Illuminant};
 
-use crate::{Exposed, Frames, FramesChoice, Outputs, PipelineError, ProcessingChoice, SensorChoice};
+use crate::{
+    FrameSet, Frames, FramesChoice, Irradiance, Outputs, PipelineError, ProcessingChoice, SensorChoice, Silent, number,
+    stages::{ShutterInputs, Watch, expose},
+};
 
 /// How a sensor is exposed to an irradiance image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SenseRequest {
     /// The sensor; where the image has another pitch or size, its pixels are laid over the image's middle.
     pub sensor: SensorChoice,
+    /// The distance between the sensor's pixels, µm, where it is not the sensor's own: that of the samples of an image gives
+    /// one pixel a sample, as in the run that made it.
+    pub pixel_um: Option<f64>,
     /// The exposure.
     pub exposure: ExposureControl,
     /// How many frames the picture is made of.
@@ -35,28 +40,28 @@ pub struct SenseRequest {
 pub struct Sensed {
     /// The sensor, of the size that the image covers.
     pub sensor: Sensor,
-    /// The exposure, metered or given.
-    pub exposure: Exposure,
     /// The mean rate of photo-electrons.
     pub rate: ElectronRate,
-    /// The frames.
-    pub exposed: Exposed,
+    /// The exposure and the frames.
+    pub frames: FrameSet,
     /// From the raw frame to the picture.
     pub processing: Processing,
     /// The picture.
     pub developed: Developed,
     /// The light on the scene; D65 where it is not known.
     pub light: Illuminant,
+    /// What a user should know of how the image was laid over the pixels, a sentence each.
+    pub notes: Vec<String>,
 }
 
 impl Sensed {
     /// What is written of the frames.
-    pub fn frames(&self) -> Frames<'_> {
+    pub fn frame_parts(&self) -> Frames<'_> {
         Frames {
             sensor: &self.sensor,
-            exposure: &self.exposure,
+            exposure: &self.frames.exposure,
             rate: &self.rate,
-            exposed: &self.exposed,
+            exposed: &self.frames.exposed,
             processing: &self.processing,
             light: self.light,
         }
@@ -73,49 +78,47 @@ impl SenseRequest {
     /// When the image cannot be read or is no irradiance, the sensor is unknown, or an exposure cannot be metered.
     pub fn sense(&self, image: &Path) -> Result<Sensed, PipelineError> {
         let sensor = self.sensor.open()?;
-        let irradiance = read_spectral_exr(image)?.image;
-        let in_file = |reason: String| PipelineError::Read { path: image.to_owned(), reason };
-        if irradiance.quantity() != Quantity::Irradiance {
-            let unit = irradiance.quantity().unit();
-            return Err(in_file(format!(
-                "its unit is {unit}, expected an irradiance, {}",
-                Quantity::Irradiance.unit()
-            )));
-        }
-        irradiance.check_samples().map_err(|e| in_file(e.to_string()))?;
-        let light = match irradiance.pitch_um() {
-            // The image lies on these very pixels.
-            Some(pitch_um) if (pitch_um / sensor.pixel_pitch_um - 1.0).abs() < 1e-6 => {
-                Illumination::on_pixels(&irradiance)
-            }
-            Some(pitch_um) => Illumination::with_pitch_um(&irradiance, pitch_um),
-            None => Illumination::on_pixels(&irradiance),
-        };
-        let sensor = match light.pitch_um {
-            Some(pitch_um) => {
-                let covered = |n_samples: usize| (n_samples as f64 * pitch_um / sensor.pixel_pitch_um).round() as usize;
-                let (rows, columns) = (covered(irradiance.rows()), covered(irradiance.columns()));
-                sensor.with_size(rows.clamp(1, sensor.rows), columns.clamp(1, sensor.columns))
-            }
+        let sensor = match self.pixel_um {
+            Some(pixel_pitch_um) => Sensor { pixel_pitch_um, ..sensor },
             None => sensor,
         };
+        // One that states no distance between its samples has one a pixel.
+        let irradiance = Irradiance::read_exr(image, Some(sensor.pixel_pitch_um))?;
+        let (sample_um, pixel_um) = (irradiance.pitch_um(), sensor.pixel_pitch_um);
+        let (rows, columns) = irradiance.size();
+        let (light, sensor) = if (sample_um / pixel_um - 1.0).abs() < 1e-6 {
+            (Illumination::on_pixels(&irradiance), sensor.with_size(rows, columns))
+        } else {
+            let covered = |n_samples: usize, most: usize| {
+                ((n_samples as f64 * sample_um / pixel_um).round() as usize).clamp(1, most)
+            };
+            let covering = sensor.with_size(covered(rows, sensor.rows), covered(columns, sensor.columns));
+            (Illumination::with_pitch_um(&irradiance, sample_um), covering)
+        };
+        let mut notes = Vec::new();
+        if !(0.5..=2.0).contains(&(sample_um / pixel_um)) {
+            notes.push(format!(
+                "the image has a sample every {} µm and the sensor a pixel every {} µm: samples are laid over pixels by area",
+                number(sample_um),
+                number(pixel_um)
+            ));
+        }
         let light = Illumination { exit_pupil_distance_mm: self.exit_pupil_mm, ..light };
         let rate = sensor.electron_rate(&light)?;
-        let (rows, columns) = rate.planes_e_per_s[0].dim();
-        let sensor = sensor.with_size(rows, columns);
-        let noise = Noise::all(self.seed);
-        let exposure = sensor.expose(&rate, &self.exposure)?;
-        let exposed = self.frames.expose(&sensor, &rate, &exposure, &noise)?;
+        let shutter =
+            ShutterInputs { exposure: self.exposure, frames: self.frames.clone(), noise: Noise::all(self.seed) };
+        let watch = Watch { progress: &Silent, cancel: &Cancel::new() };
+        let frames = expose(&shutter, &sensor, &rate, &watch)?;
         let processing = self.processing.under(self.illuminant);
-        let developed = sensor.develop(exposed.developed_from(), &processing)?;
+        let developed = sensor.develop(frames.exposed.developed_from(), &processing)?;
         Ok(Sensed {
             sensor,
-            exposure,
             rate,
-            exposed,
+            frames,
             processing,
             developed,
             light: self.illuminant.unwrap_or(Illuminant::D65),
+            notes,
         })
     }
 }

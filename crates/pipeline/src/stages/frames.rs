@@ -2,7 +2,7 @@
 
 use dioptric_sensor::{ElectronRate, Exposure, Sensor};
 
-use super::{Watch, spec::FrameInputs};
+use super::{Watch, spec::ShutterInputs};
 use crate::{Exposed, PipelineError, Stage};
 
 /// What a sensor gives for one picture, and how it was exposed.
@@ -14,8 +14,8 @@ pub struct FrameSet {
     pub exposed: Exposed,
 }
 
-pub(super) fn expose(
-    inputs: &FrameInputs,
+pub(crate) fn expose(
+    inputs: &ShutterInputs,
     sensor: &Sensor,
     rate: &ElectronRate,
     watch: &Watch<'_>,

@@ -357,7 +357,7 @@ impl Chain<'_> {
             let irradiance = &inputs.electrons.irradiance;
             let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
             let rate = self.electrons(&inputs.electrons)?;
-            frames::expose(inputs, &electrons::on_film(&inputs.electrons.sensor, &place), &rate, &self.watch)
+            frames::expose(&inputs.shutter, &electrons::on_film(&inputs.electrons.sensor, &place), &rate, &self.watch)
         })
     }
 

@@ -30,6 +30,9 @@ mod spec;
 
 use dioptric_spectrum::Cancel;
 
+pub(crate) use frames::expose;
+pub(crate) use spec::ShutterInputs;
+
 pub use film::FilmPlace;
 pub use frames::FrameSet;
 pub use irradiance::{IRRADIANCE_FILE, Irradiance, IrradianceSummary};

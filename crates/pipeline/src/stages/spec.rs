@@ -118,6 +118,12 @@ pub(crate) struct ElectronInputs {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FrameInputs {
     pub(crate) electrons: ElectronInputs,
+    pub(crate) shutter: ShutterInputs,
+}
+
+/// How the sensor is exposed and read.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ShutterInputs {
     pub(crate) exposure: ExposureControl,
     pub(crate) frames: FramesChoice,
     pub(crate) noise: Noise,
@@ -203,9 +209,11 @@ impl PictureInputs {
         let irradiance = IrradianceInputs::of(camera, &sensor, quality);
         let frames = FrameInputs {
             electrons: ElectronInputs { irradiance, sensor },
-            exposure: camera.exposure,
-            frames: camera.frames.clone(),
-            noise: Noise::all(camera.seed),
+            shutter: ShutterInputs {
+                exposure: camera.exposure,
+                frames: camera.frames.clone(),
+                noise: Noise::all(camera.seed),
+            },
         };
         Ok(Self { frames, processing: camera.processing.clone() })
     }

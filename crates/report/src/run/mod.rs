@@ -48,7 +48,7 @@ pub fn write_run(
 /// # Errors
 /// When a file cannot be written.
 pub fn write_sensed(sensed: &Sensed, outputs: &Outputs, folder: &Path) -> Result<SensorStatistics, PipelineError> {
-    let frames = sensed.frames();
+    let frames = sensed.frame_parts();
     let statistics = SensorStatistics::new(&frames)?;
     write_frames(&frames, &sensed.developed.picture, outputs, folder)?;
     write_json(&folder.join("report.json"), &statistics)?;
