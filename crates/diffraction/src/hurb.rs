@@ -6,12 +6,12 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec2;
+use dioptric_optics::StopPoint;
 use serde::{Deserialize, Serialize};
 
 use crate::{Covariance, quadrature::gauss_legendre_on};
 
-/// A round edge that bends rays, centred on the axis.
+/// A round edge at which rays are deviated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
     /// Radius of the opening, mm.
@@ -77,14 +77,15 @@ impl Hurb {
         Spread { radial: radial.sqrt(), across: across.sqrt() }
     }
 
-    /// Returns the covariance of the direction cosines of a ray that crosses a round stop at `stop_mm` from its centre.
+    /// Returns the covariance of the direction cosines, along the stop's own axes, of a ray that crosses a round stop at a
+    /// place.
     #[inline]
-    pub fn covariance(self, stop_mm: DVec2, edge: Edge) -> Covariance {
-        let square = stop_mm.length_squared();
+    pub fn covariance(self, at: StopPoint, edge: Edge) -> Covariance {
+        let square = at.mm.length_squared();
         let (radial, across) = self.variances(square.sqrt(), edge);
         // In the middle the two are equal.
         let more = (radial - across) / square.max(f64::MIN_POSITIVE);
-        let Covariance { xx, xy, yy } = Covariance::along(stop_mm);
+        let Covariance { xx, xy, yy } = Covariance::along(at.mm);
         Covariance { xx: across + more * xx, xy: more * xy, yy: across + more * yy }
     }
 
@@ -183,6 +184,7 @@ fn mean_over_azimuth(value: impl Fn(f64) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use approx::assert_abs_diff_eq;
+    use glam::DVec2;
 
     use super::*;
     use crate::{airy, width::full_width_at_half_maximum};
@@ -271,10 +273,10 @@ mod tests {
         for (r_mm, angle) in [(0.0, 0.0), (1e-9, 2.0), (0.7, 0.4), (1.99, -2.2)] {
             let axis = DVec2::from_angle(angle);
             let Spread { radial, across } = Hurb::CALIBRATED.spread(r_mm, edge);
-            let (narrow, wide) = Hurb::CALIBRATED.covariance(axis * r_mm, edge).axes();
+            let (narrow, wide) = Hurb::CALIBRATED.covariance(StopPoint { mm: axis * r_mm }, edge).axes();
             assert!((narrow.sqrt() / across - 1.0).abs() < 1e-9 && (wide.sqrt() / radial - 1.0).abs() < 1e-9);
             let wanted = Covariance::along(axis * radial).plus(Covariance::along(axis.perp() * across));
-            let found = Hurb::CALIBRATED.covariance(axis * r_mm, edge);
+            let found = Hurb::CALIBRATED.covariance(StopPoint { mm: axis * r_mm }, edge);
             assert!((found.xy - wanted.xy).abs() < 1e-12 * wide && (found.xx - wanted.xx).abs() < 1e-12 * wide);
         }
     }

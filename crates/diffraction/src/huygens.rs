@@ -4,22 +4,22 @@ mod cells;
 
 use std::f64::consts::TAU;
 
-use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Rims};
+use dioptric_optics::{ImageSurface, MonoLens, ObjectPoint, RayBatch, Rims};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use crate::DiffractionError;
+use crate::{DiffractionError, wave::FilmRays};
 use cells::{Cell, cells};
 
 /// Secondary sources on a sphere about an image point, each with its exact distance to every film point.
 #[derive(Clone, Debug)]
 pub struct HuygensSources {
     wave_number_turns_per_mm: f64,
-    film_z_mm: f64,
+    film: ImageSurface,
     sources: Vec<Source>,
 }
 
-/// A point of the wave in the exit sphere.
+/// A point of the wave in the exit sphere, in the frame of the film.
 #[derive(Clone, Copy, Debug)]
 struct Source {
     at_mm: DVec3,
@@ -34,7 +34,7 @@ const STEP: f64 = 1e-5;
 
 impl HuygensSources {
     /// Traces sources within the vignetted pupil of a point, `n_across` cells along its width and height, and carries
-    /// them back from the film to the sphere about `center_mm` (a film point, lens frame) through the centre of the exit
+    /// them back from the film to the sphere about `center_mm` (a place of the film, along its own x and y) through the centre of the exit
     /// pupil or, where that is infinitely far, through the last vertex.
     ///
     /// The pupil is what rays get through with their rims, tried on a square grid, and rims are followed through its
@@ -58,12 +58,12 @@ impl HuygensSources {
         let beside = Beside::trace(lens, point, film_mm, (&cells, z_mm, STEP * widest_mm))?;
 
         // Carry every ray back to the sphere.
-        let film_z_mm = lens.last_vertex_z_mm() + film_mm;
-        let exit_z_mm = lens.first_order().exit_pupil_z_mm;
-        let exit_z_mm = lens.last_vertex_z_mm() + if exit_z_mm.is_finite() { exit_z_mm } else { 0.0 };
-        let center = center_mm.extend(film_z_mm);
-        let radius_mm = center.distance(DVec3::Z * exit_z_mm).copysign(film_z_mm - exit_z_mm);
-        let on_sphere = beside.rays.each_ref().map(|rays| back_to_sphere(rays, center, radius_mm));
+        let pose = lens.film_pose(film_mm);
+        let on_film = beside.rays.each_ref().map(|rays| FilmRays::new(rays, lens, film_mm));
+        let exit_mm = on_film[0].exit_pupil_mm.unwrap_or_else(|| pose.to_own(lens.film_pose(0.0).vertex_mm));
+        let center = on_film[0].film_point_mm(center_mm);
+        let radius_mm = center.distance(exit_mm).copysign(-exit_mm.z);
+        let on_sphere = on_film.each_ref().map(|rays| back_to_sphere(rays, center, radius_mm));
 
         // Give each its share of the energy and its cell of the sphere.
         let energies: Vec<f64> = (0..cells.len()).map(|i| cells[i].area_mm2 * beside.brightness(i)).collect();
@@ -74,12 +74,17 @@ impl HuygensSources {
             let (at_mm, back_mm) = on_sphere[0][i];
             let paths_mm = &beside.rays[0].opl_mm;
             let turns = (paths_mm[i] - lens.image_index() * back_mm - paths_mm[0]) * per_mm;
-            // A plane takes up the part of the flux that goes through it.
-            let cosine = ((center - at_mm).z / radius_mm).abs();
+            // The film takes up the part of the flux that goes through it: per area of its vertex plane.
+            let slope = lens.image_surface().slope_at(center_mm);
+            let cosine = ((center - at_mm).dot(DVec3::new(-slope.x, -slope.y, 1.0)) / radius_mm).abs();
             let strength_mm = (energies[i] / total * cell.area_mm2 * stretch * cosine).sqrt();
             Source { at_mm, turns: turns.fract(), strength_mm }
         });
-        Ok(Self { wave_number_turns_per_mm: lens.image_index() * per_mm, film_z_mm, sources: sources.collect() })
+        Ok(Self {
+            wave_number_turns_per_mm: lens.image_index() * per_mm,
+            film: lens.image_surface(),
+            sources: sources.collect(),
+        })
     }
 
     /// The number of sources.
@@ -90,20 +95,25 @@ impl HuygensSources {
     /// Returns the irradiance at film points, per mm² for unit transmitted energy, on the threads of the current
     /// rayon pool.
     pub fn irradiance_per_mm2(&self, film_mm: &[DVec2]) -> Vec<f64> {
-        film_mm.par_iter().map(|at| self.irradiance_at(at.extend(self.film_z_mm))).collect()
+        film_mm.par_iter().map(|at| self.irradiance_at(self.point_mm(*at))).collect()
     }
 
     /// Returns the irradiance at a film point over that of the same sources all in phase there.
     pub fn strehl_at(&self, film_mm: DVec2) -> f64 {
-        let at = film_mm.extend(self.film_z_mm);
+        let at = self.point_mm(film_mm);
         let amplitude: f64 = self.sources.iter().map(|source| source.strength_mm / at.distance(source.at_mm)).sum();
         self.irradiance_at(at) / (amplitude * self.wave_number_turns_per_mm).powi(2)
+    }
+
+    /// Returns the point of the film over a place.
+    fn point_mm(&self, place_mm: DVec2) -> DVec3 {
+        place_mm.extend(self.film.sag_at_mm(place_mm))
     }
 
     fn irradiance_at(&self, at: DVec3) -> f64 {
         let (mut re, mut im) = (0.0, 0.0);
         for source in &self.sources {
-            let distance_mm = at.distance(source.at_mm) * (self.film_z_mm - source.at_mm.z).signum();
+            let distance_mm = at.distance(source.at_mm) * (at.z - source.at_mm.z).signum();
             let (s, c) = (TAU * (source.turns + self.wave_number_turns_per_mm * distance_mm).fract()).sin_cos();
             let strength = source.strength_mm / distance_mm;
             re += strength * c;
@@ -160,13 +170,13 @@ impl Beside {
 }
 
 /// Returns where rays on the film have crossed a sphere, and how far back that is.
-fn back_to_sphere(rays: &RayBatch, center: DVec3, radius_mm: f64) -> Vec<(DVec3, f64)> {
+fn back_to_sphere(rays: &FilmRays, center: DVec3, radius_mm: f64) -> Vec<(DVec3, f64)> {
     let crossing = |i: usize| {
-        let (film, direction) = (rays.point_mm(i), rays.direction(i));
+        let (film, direction) = (rays.points_mm[i], rays.directions[i]);
         let q = film - center;
         let along = q.dot(direction);
         let back_mm = along + (along * along + radius_mm * radius_mm - q.length_squared()).sqrt().copysign(radius_mm);
         (film - direction * back_mm, back_mm)
     };
-    (0..rays.len()).map(crossing).collect()
+    (0..rays.points_mm.len()).map(crossing).collect()
 }

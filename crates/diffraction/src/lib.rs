@@ -9,25 +9,25 @@
 #![doc = include_str!("../README.md")]
 
 pub mod airy;
-mod bend;
 mod covariance;
 mod error;
 mod hurb;
 mod huygens;
 mod opd;
 pub mod quadrature;
+mod sampled_hurb;
 mod stop_ray;
 mod wave;
 mod wavefront;
 mod width;
 pub mod zernike;
 
-pub use bend::{BendForm, bend};
 pub use covariance::Covariance;
 pub use error::DiffractionError;
 pub use hurb::{Edge, Hurb, Spread};
 pub use huygens::HuygensSources;
 pub use opd::{best_wavefront_film_mm, opd_waves_at};
+pub use sampled_hurb::{HurbForm, SampledHurb};
 pub use stop_ray::{StopRay, trace_stop_rays};
 pub use wave::{
     Peak, PhaseRange, Propagation, PupilEdge, PupilGrid, WaveMap, WaveNodes, WavePsf, WaveQuality, WaveWindow,

@@ -1,6 +1,6 @@
 //! How a deviation at the stop moves a ray on the film.
 
-use dioptric_optics::{MonoLens, RayBatch, Rims};
+use dioptric_optics::{FilmPoint, MonoLens, Pose, RayBatch, Rims, StopPoint};
 use glam::{DVec2, DVec3};
 
 use crate::{Covariance, Edge, Hurb};
@@ -12,11 +12,12 @@ const STEP: f64 = 1e-5;
 /// A ray as far as diffraction at the stop is concerned.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StopRay {
-    /// Where the ray meets the film, mm, lens frame.
-    pub film_mm: DVec2,
-    /// Where it crosses the stop, mm from its centre.
-    pub stop_mm: DVec2,
-    /// Movement on the film for a unit change of the direction cosine along x behind the stop, mm.
+    /// Where the ray meets the film.
+    pub film: FilmPoint,
+    /// Where it crosses the stop.
+    pub stop: StopPoint,
+    /// Movement on the film, along its own axes, for a unit change of the direction cosine along the stop's own x behind the
+    /// stop, mm.
     pub along_l_mm: DVec2,
     /// The same along y.
     pub along_m_mm: DVec2,
@@ -25,11 +26,12 @@ pub struct StopRay {
 impl StopRay {
     /// Returns the covariance on the film, mm², of the ray's Gaussian.
     pub fn film_covariance_mm2(&self, edge: Edge, model: Hurb) -> Covariance {
-        model.covariance(self.stop_mm, edge).mapped(self.along_l_mm, self.along_m_mm)
+        model.covariance(self.stop, edge).mapped(self.along_l_mm, self.along_m_mm)
     }
 }
 
-/// Traces rays to the film, ignoring rims, and finds how deviations at the stop move them there.
+/// Traces rays to the film as it is curved, `film_mm` behind the last vertex, ignoring rims, and finds how deviations at the
+/// stop move them there.
 ///
 /// The rays start in object space; those that end on the way are `None`. Each costs four more rays behind the stop.
 pub fn trace_stop_rays(lens: &MonoLens, mut rays: RayBatch, film_mm: f64) -> Vec<Option<StopRay>> {
@@ -40,34 +42,32 @@ pub fn trace_stop_rays(lens: &MonoLens, mut rays: RayBatch, film_mm: f64) -> Vec
             lens.trace_surfaces(behind..end, &mut rays, Rims::Ignore);
         }
         lens.to_film(&mut rays, film_mm);
-        rays
+        let places = lens.film_points(&rays, film_mm);
+        (rays.fate, places)
     };
-    let moved = [DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|d| on_film(turned(&rays, d * STEP)));
-    let stop_mm: Vec<DVec2> = (0..rays.len()).map(|ray| rays.point_mm(ray).truncate()).collect();
+    let stop_pose = lens.stop_pose();
+    let deviated = [DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|d| on_film(turned(&rays, &stop_pose, d * STEP)));
+    let stop = lens.stop_points(&rays);
     let straight = on_film(rays);
-    (0..straight.len())
+    (0..stop.len())
         .map(|ray| {
-            let all = moved.iter().chain([&straight]);
-            all.clone().all(|batch| batch.fate[ray].is_in_flight()).then(|| {
-                let slope = |i: usize| (moved[i].point_mm(ray) - moved[i + 1].point_mm(ray)).truncate() / (2.0 * STEP);
-                StopRay {
-                    film_mm: straight.point_mm(ray).truncate(),
-                    stop_mm: stop_mm[ray],
-                    along_l_mm: slope(0),
-                    along_m_mm: slope(2),
-                }
+            let all = deviated.iter().chain([&straight]);
+            all.clone().all(|(fate, _)| fate[ray].is_in_flight()).then(|| {
+                let slope = |i: usize| (deviated[i].1[ray].mm - deviated[i + 1].1[ray].mm) / (2.0 * STEP);
+                StopRay { film: straight.1[ray], stop: stop[ray], along_l_mm: slope(0), along_m_mm: slope(2) }
             })
         })
         .collect()
 }
 
-/// Returns the rays with their direction cosines along x and y changed.
-fn turned(rays: &RayBatch, by: DVec2) -> RayBatch {
+/// Returns the rays with their direction cosines along the stop's own x and y changed.
+fn turned(rays: &RayBatch, stop_pose: &Pose, by: DVec2) -> RayBatch {
     let mut rays = rays.clone();
     for ray in 0..rays.len() {
-        let cosines = rays.direction(ray).truncate() + by;
+        let cosines = stop_pose.direction_to_own(rays.direction(ray)).truncate() + by;
         let rest = 1.0 - cosines.length_squared();
-        rays.set_direction(ray, DVec3::new(cosines.x, cosines.y, rest.max(0.0).sqrt()));
+        let direction = DVec3::new(cosines.x, cosines.y, rest.max(0.0).sqrt());
+        rays.set_direction(ray, stop_pose.direction_to_lens(direction));
     }
     rays
 }
@@ -80,7 +80,7 @@ mod tests {
     use dioptric_optics::Lens;
 
     use super::*;
-    use crate::{BendForm, bend};
+    use crate::{HurbForm, SampledHurb};
 
     /// `n` points spread evenly over the disc of radius 1 (Vogel's spiral).
     fn vogel(n: usize) -> impl Iterator<Item = DVec2> {
@@ -114,7 +114,7 @@ mod tests {
             let values = splats.iter().map(|ray| {
                 let ray = ray.unwrap();
                 let variance = ray.film_covariance_mm2(edge, model).xx / (unit * unit);
-                let from = u - ray.film_mm.x / unit;
+                let from = u - ray.film.mm.x / unit;
                 (-0.5 * from * from / variance).exp() / (2.0 * PI * variance).sqrt()
             });
             values.sum::<f64>() / n_rays as f64
@@ -139,7 +139,8 @@ mod tests {
         for (model, width) in [(Hurb::PAPER, 0.6174), (Hurb::SCENE3D, 0.8732)] {
             let (lens, mut rays, edge, unit) = figure_2(n_rays, 550.0);
             lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Rims::Clip);
-            bend(&mut rays, edge, model, BendForm::DirectionCosines, 3);
+            let form = HurbForm::DirectionCosines;
+            SampledHurb { model, edge, form, seed: 3 }.apply(&mut rays, &lens.stop_pose());
             lens.to_film(&mut rays, FILM_MM);
             let share = |limit: f64| rays.x_mm.iter().filter(|x| x.abs() < limit * unit).count() as f64 / n_rays as f64;
             for limit in [0.25 * width, 0.5 * width, width, 3.0] {
@@ -159,7 +160,7 @@ mod tests {
             // Slopes here are within 1/40 of the axis: cos⁻³ is within 1e-3 of 1.
             assert!((ray.along_l_mm - DVec2::X * FILM_MM).length() < 2e-3 * FILM_MM);
             assert!((ray.along_m_mm - DVec2::Y * FILM_MM).length() < 2e-3 * FILM_MM);
-            assert!(ray.film_mm.length() < 1e-9);
+            assert!(ray.film.mm.length() < 1e-9);
         }
     }
 }

@@ -35,6 +35,7 @@ use gridded::Grid;
 pub use map::{PupilEdge, WaveMap};
 pub use nodes::WaveNodes;
 pub use polychromatic::polychromatic_psf;
+pub(crate) use propagation::FilmRays;
 pub use propagation::Propagation;
 pub use strehl::Peak;
 
@@ -43,7 +44,7 @@ pub use strehl::Peak;
 pub enum WindowCenter {
     /// On the centroid of the light.
     Centroid,
-    /// At this point of the film, mm, lens frame.
+    /// At this place of the film, mm along its own x and y.
     At(DVec2),
 }
 
@@ -78,9 +79,9 @@ pub struct WavePsf {
     pub samples: Array2<f64>,
     /// Side of a pixel, µm.
     pub pitch_um: f64,
-    /// The film point in the middle of the window, mm, lens frame.
+    /// The place on the film in the middle of the window, mm along its own x and y.
     pub center_mm: DVec2,
-    /// The centroid of all the light, mm on the film, lens frame; of the light outside the window too.
+    /// The centroid of all the light, mm along the film's own x and y; of the light outside the window too.
     pub centroid_mm: DVec2,
     /// The share of the transmitted energy that the window holds: the sum of the samples.
     pub captured: f64,
@@ -98,7 +99,7 @@ impl WavePsf {
         self.samples.slice(s![.., ..;-1]).to_owned()
     }
 
-    /// Returns the film point in the middle of a pixel, mm, lens frame.
+    /// Returns the place on the film in the middle of a pixel, mm along its own x and y.
     pub fn pixel_mm(&self, row: usize, column: usize) -> DVec2 {
         let from_middle = |i: usize, n: usize| i as f64 - 0.5 * (n as f64 - 1.0);
         let (rows, columns) = self.samples.dim();

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     DiffractionError, PupilGrid,
-    wave::{PupilCells, cis::cis},
+    wave::{FilmRays, PupilCells, cis::cis},
     zernike::fit_noll,
 };
 
@@ -78,7 +78,7 @@ pub struct Wavefront {
     pub is_clear: Vec<bool>,
     /// Optical path less the reference's, waves: positive where the light comes late.
     pub opd_waves: Vec<f64>,
-    /// The film point about which the wave converges best (of its reference), mm, lens frame.
+    /// The place on the film about which the wave converges best (of its reference), mm along its own x and y.
     pub center_mm: DVec2,
 }
 
@@ -113,10 +113,12 @@ impl Wavefront {
         let sphere = ReferenceSphere::through_exit_pupil(lens, rays.point_mm(chief));
         let paths_mm = sphere.paths_mm(lens, &rays);
         let opd_waves = paths_mm[..chief].iter().map(|p| (p - paths_mm[chief]) / (wavelength_nm * 1e-6)).collect();
-        let center_mm = sphere.center_mm.truncate();
+        let center_mm = lens.film_point(sphere.center_mm, film_mm).mm;
         let mut wavefront = Self { wavelength_nm, pupil: in_stop, energy, is_clear, opd_waves, center_mm };
         if reference == WavefrontReference::Best {
-            let directions: Vec<DVec2> = (0..chief).map(|i| rays.direction(i).truncate()).collect();
+            let on_film = FilmRays::new(&rays, lens, film_mm);
+            let directions: Vec<DVec2> =
+                (0..chief).map(|i| on_film.along_film(on_film.directions[i], center_mm)).collect();
             wavefront.take_out_tilt(&directions, lens.image_index());
         }
         Ok(wavefront)
@@ -198,9 +200,9 @@ impl Traced {
         let behind = lens.stop() + 1;
         lens.trace_surfaces(0..behind, &mut rays, Rims::Ignore);
         let stop_mm = lens.stop_semi_aperture_mm();
-        let in_stop = (0..energy.len()).map(|i| lens.in_stop_mm(rays.point_mm(i)) / stop_mm).collect();
+        let in_stop = (0..energy.len()).map(|i| lens.stop_point(rays.point_mm(i)).mm / stop_mm).collect();
         lens.trace_surfaces(behind..lens.n_surfaces(), &mut rays, Rims::Ignore);
-        lens.to_image_surface(&mut rays, film_mm);
+        lens.to_film(&mut rays, film_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         match n_lost {
             0 => Ok(Self { energy, is_clear, in_stop, rays }),

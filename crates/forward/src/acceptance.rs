@@ -2,11 +2,12 @@
 
 use std::sync::Mutex;
 
+use dioptric_psf::{LensImage, PsfQuery};
 use dioptric_scene::View;
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, s};
 
-use crate::{BlurMode, DiscLens, Film, ForwardError, Kernels, OccludedLayer, Settings, Source, render};
+use crate::{BlurMode, DiscLens, Film, ForwardError, OccludedLayer, Settings, Source, render};
 
 /// Smooth noise between 0 and 1, half mixed with a chequerboard of squares of this size.
 fn texture(rows: usize, columns: usize, square: usize, seed: u32) -> Array2<f32> {
@@ -71,7 +72,7 @@ impl Pixels {
     }
 }
 
-fn rendered(source: &Source<'_>, lens: &dyn Kernels, film: &Film, settings: &Settings) -> Vec<Array2<f32>> {
+fn rendered(source: &Source<'_>, lens: &dyn LensImage, film: &Film, settings: &Settings) -> Vec<Array2<f32>> {
     let mut bands = vec![];
     let mut sink = |band: usize, picture: Array2<f32>| {
         assert_eq!(band, bands.len());
@@ -254,7 +255,7 @@ fn check_two_layers(front_blur: f64, back_blur: f64) {
     // One step from the near to the far layer, so that both lie on a layer.
     let settings = Settings { layer_step_px: front_blur - back_blur, ..Settings::default() };
     let picture = rendered(&source, &lens(), &scene.film, &settings).remove(0);
-    let kernel = |blur: f64| lens().kernel(glam::DVec2::ZERO, 20.0 + blur, 550.0, 1.0);
+    let kernel = |blur: f64| lens().kernel(PsfQuery::new(glam::DVec2::ZERO, 20.0 + blur, 550.0, 1.0)).samples;
     let front_light = convolved(&(&front * &mask), &kernel(front_blur));
     let front_cover = convolved(&mask, &kernel(front_blur));
     let back_light = convolved(&back, &kernel(back_blur));
@@ -285,7 +286,8 @@ fn one_kernel_convolves_as_the_sum_does_and_keeps_energy() {
         for mode in [BlurMode::Layered, BlurMode::Pointwise] {
             let settings = Settings { mode, ..Settings::default() };
             let picture = rendered(&scene.source(), &lens(), &scene.film, &settings).remove(0);
-            let expected = convolved(&plane, &lens().kernel(glam::DVec2::ZERO, 20.0 + blur, 550.0, 1.0));
+            let expected =
+                convolved(&plane, &lens().kernel(PsfQuery::new(glam::DVec2::ZERO, 20.0 + blur, 550.0, 1.0)).samples);
             for (a, b) in picture.iter().zip(&expected) {
                 assert!((f64::from(*a) - b).abs() <= 1e-5, "blur {blur}: {a} {b}");
             }
@@ -337,7 +339,10 @@ fn interpolating_over_the_field_meets_the_edge_error_asked_for() {
             let mut strip = Array2::<f32>::zeros((rows, columns));
             strip.column_mut(column).assign(&bar.column(column));
             let tan = (column as f64 - 191.5) * 1e-3;
-            truth += &convolved(&strip, &lens.kernel(glam::DVec2::new(tan.abs(), 0.0), 26.0, 550.0, 1.0));
+            truth += &convolved(
+                &strip,
+                &lens.kernel(PsfQuery::new(glam::DVec2::new(tan.abs(), 0.0), 26.0, 550.0, 1.0)).samples,
+            );
         }
         // Far enough from the axis that a disc of the column is one of the rows near the middle, too.
         (24..100)
@@ -368,7 +373,7 @@ fn splines_match_a_kernel_per_pixel() {
     let mut truth = Array2::<f64>::zeros((N, N));
     for ((row, column), &value) in star.indexed_iter() {
         let tan = glam::DVec2::new(column as f64 - middle, middle - row as f64) * 1e-3;
-        let kernel = lens.kernel(tan, 25.0, 550.0, 1.0);
+        let kernel = lens.kernel(PsfQuery::new(tan, 25.0, 550.0, 1.0)).samples;
         let (half, sum) = (kernel.nrows() / 2, kernel.sum());
         for ((r, c), &weight) in kernel.indexed_iter() {
             let (r, c) = ((row + r).wrapping_sub(half), (column + c).wrapping_sub(half));

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use dioptric_psf::FilmMap;
 use dioptric_spectrum::{Cancel, Cancelled};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 
 use crate::{
-    FilmMap,
     convolve::{STRIP_COLUMNS, STRIP_ROWS, Strip, fast_size, multiply_add, with_fft},
     knot_kernels::{KnotKernel, LayerKernels, edge_spread_peak},
     occlusion::BlurredLayer,

@@ -1,15 +1,15 @@
 //! The sampling of point spread functions that a scene and a film need.
 
-use dioptric_optics::{Lens, MonoLens, ObjectPoint, PupilBoundary, Rims, rays_towards};
-use dioptric_psf::{BankSettings, Diffraction, FieldBankSettings};
-use dioptric_spectrum::WavelengthGrid;
+use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, Rims, rays_towards};
+use dioptric_psf::{BankSettings, Diffraction};
+use dioptric_spectrum::{DepthMap, WavelengthGrid};
 use glam::{DMat2, DVec2};
 
 use crate::{Film, ForwardError};
 
-/// What a bank must cover, and through which lens.
+/// What the model of a lens's image must cover, and through which lens.
 #[derive(Clone, Copy, Debug)]
-pub struct Coverage<'a> {
+pub struct PsfDomain<'a> {
     /// The lens, its stop set.
     pub lens: &'a Lens,
     /// The film.
@@ -24,7 +24,7 @@ pub struct Coverage<'a> {
     pub diffraction: Diffraction,
 }
 
-impl Coverage<'_> {
+impl PsfDomain<'_> {
     /// Returns the farthest and nearest depth, dioptres.
     fn dioptres(&self) -> Result<(f64, f64), ForwardError> {
         let (near_m, far_m) = self.depth_range_m;
@@ -50,48 +50,82 @@ impl Coverage<'_> {
         }
         Ok(())
     }
+
+    /// Returns the settings of a model that serves a scene on a film, whatever the symmetry of the lens: standard numbers of
+    /// samples, of which [`BankSettings::with_counts`] makes others.
+    ///
+    /// # Errors
+    /// When the film has no area, the lens has no index at a wavelength of the grid, or no light reaches the middle of the film.
+    pub fn settings(&self) -> Result<BankSettings, ForwardError> {
+        check_depth(self.lens, self.grid, self.depth_range_m.0, None)?;
+        if self.lens.is_rotational() { self.radial_settings() } else { self.grid_settings() }
+    }
+
+    /// Returns such settings for a lens with an axis of symmetry: fields along a radius to beyond the film's corner, depths
+    /// from end to end in dioptres, wavelengths evenly in 1/λ².
+    ///
+    /// # Errors
+    /// When the film has no area, or the lens has no index at a wavelength of the grid or is not rotationally symmetric.
+    pub fn radial_settings(&self) -> Result<BankSettings, ForwardError> {
+        self.film.check()?;
+        self.lens.check_rotational("a bank of point spread functions over field angle alone")?;
+        let mut last_field_tan = 0.0_f64;
+        self.for_each_end(|aim| {
+            // The border of the film is blurred by light from beyond it.
+            let extent_mm = 1.02 * self.film.half_diagonal_mm() + aim.axial_blur_mm();
+            last_field_tan = last_field_tan.max(aim.field_tan_at(extent_mm));
+            Ok(())
+        })?;
+        let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
+        Ok(BankSettings::covering(self.film_mm, last_field_tan, dioptres, wavelengths_nm, self.diffraction))
+    }
+
+    /// Returns such settings for any lens: a grid of fields to beyond the film's sides, the rest as
+    /// [`radial_settings`](Self::radial_settings) does.
+    ///
+    /// # Errors
+    /// When the film has no area, the lens has no index at a wavelength of the grid, or no light reaches the middle of the film.
+    pub fn grid_settings(&self) -> Result<BankSettings, ForwardError> {
+        self.film.check()?;
+        let half_mm = self.film.half_size_mm();
+        let (mut first, mut last) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        self.for_each_end(|aim| {
+            let wavelength_nm = aim.lens.wavelength_nm();
+            let dark = || ForwardError::DarkFilm { lens: self.lens.name().to_owned(), wavelength_nm };
+            let center = aim.field_at_middle().ok_or_else(dark)?;
+            let beyond_mm = 1.02 * half_mm + aim.blur_mm(center);
+            let (low, high) = aim.fields_over(center, beyond_mm);
+            (first, last) = (first.min(low), last.max(high));
+            Ok(())
+        })?;
+        let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
+        Ok(BankSettings::covering_grid(self.film_mm, (first, last), dioptres, wavelengths_nm, self.diffraction))
+    }
 }
 
-/// Returns the settings of a bank that serves a scene on a film: fields to beyond the film's corner, depths from end
-/// to end in dioptres, wavelengths evenly in 1/λ².
+/// Checks that no part of a scene lies inside a lens.
 ///
 /// # Errors
-/// When the film has no area, or the lens has no index at a wavelength of the grid or is not rotationally symmetric:
-/// for that there is [`field_bank_settings_for`].
-pub fn bank_settings_for(coverage: &Coverage<'_>) -> Result<BankSettings, ForwardError> {
-    coverage.film.check()?;
-    coverage.lens.check_rotational("a bank of point spread functions over field angle alone")?;
-    let mut last_field_tan = 0.0_f64;
-    coverage.for_each_end(|aim| {
-        // The border of the film is blurred by light from beyond it.
-        let reach_mm = 1.02 * coverage.film.half_diagonal_mm() + aim.axial_blur_mm();
-        last_field_tan = last_field_tan.max(aim.field_tan_at(reach_mm));
-        Ok(())
-    })?;
-    let (dioptres, wavelengths_nm) = (coverage.dioptres()?, coverage.grid.range_nm());
-    Ok(BankSettings::covering(coverage.film_mm, last_field_tan, dioptres, wavelengths_nm, coverage.diffraction))
+/// Names the nearest sample, where it is no farther from the entrance pupil than the first surface of the lens is, or when the lens
+/// has no index at the middle wavelength of the grid.
+pub fn check_depth_map(lens: &Lens, grid: &WavelengthGrid, depth: &DepthMap) -> Result<(), ForwardError> {
+    let nearest = depth.z_m().indexed_iter().min_by(|a, b| a.1.total_cmp(b.1));
+    nearest.map_or(Ok(()), |(place, &z_m)| check_depth(lens, grid, f64::from(z_m), Some(place)))
 }
 
-/// Returns the settings of a bank over a field of two dimensions that serves a scene on a film, through any lens: fields to
-/// beyond the film's sides, the rest as [`bank_settings_for`] does.
-///
-/// # Errors
-/// When the film has no area, the lens has no index at a wavelength of the grid, or no light reaches the middle of the film.
-pub fn field_bank_settings_for(coverage: &Coverage<'_>) -> Result<FieldBankSettings, ForwardError> {
-    coverage.film.check()?;
-    let half_mm = 0.5e-3 * coverage.film.pitch_um * DVec2::new(coverage.film.columns as f64, coverage.film.rows as f64);
-    let (mut first, mut last) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    coverage.for_each_end(|aim| {
-        let wavelength_nm = aim.lens.wavelength_nm();
-        let dark = || ForwardError::DarkFilm { lens: coverage.lens.name().to_owned(), wavelength_nm };
-        let center = aim.field_at_middle().ok_or_else(dark)?;
-        let beyond_mm = 1.02 * half_mm + aim.blur_mm(center);
-        let (low, high) = aim.fields_over(center, beyond_mm);
-        (first, last) = (first.min(low), last.max(high));
-        Ok(())
-    })?;
-    let (dioptres, wavelengths_nm) = (coverage.dioptres()?, coverage.grid.range_nm());
-    Ok(FieldBankSettings::covering(coverage.film_mm, (first, last), dioptres, wavelengths_nm, coverage.diffraction))
+fn check_depth(
+    lens: &Lens,
+    grid: &WavelengthGrid,
+    depth_m: f64,
+    place: Option<(usize, usize)>,
+) -> Result<(), ForwardError> {
+    let centers_nm = grid.centers_nm();
+    let least_m = 1e-3 * lens.at(centers_nm[centers_nm.len() / 2])?.projection_center_z_mm();
+    // Depths of a map are in single precision.
+    if depth_m > 0.0 && depth_m <= least_m * (1.0 + 1e-6) {
+        return Err(ForwardError::DepthInsideLens { depth_m, place, lens: lens.name().to_owned(), least_m });
+    }
+    Ok(())
 }
 
 /// A lens looking at one depth.
@@ -125,7 +159,7 @@ impl Aim<'_> {
         if !rays.fate[0].is_in_flight() {
             return None;
         }
-        Some((0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()).map(|i| -rays.point_mm(i).truncate()).collect())
+        Some(self.lens.landed(&rays, self.film_mm).map(FilmPoint::in_picture_mm).collect())
     }
 
     /// Returns the radius of the blur on the axis, mm, from first-order optics.

@@ -1,9 +1,8 @@
 //! A lens by formula, whose blur is a uniform disc.
 
+use dioptric_psf::{FilmMap, Kernel, LensImage, PsfQuery, RadialMap};
 use glam::DVec2;
 use ndarray::Array2;
-
-use crate::{FilmMap, Kernels, RadialMap};
 
 /// A lens by formula: uniform discs of blur, one irradiance per radiance everywhere, distortion where asked for.
 ///
@@ -43,7 +42,7 @@ impl Default for DiscLens {
     }
 }
 
-impl Kernels for DiscLens {
+impl LensImage for DiscLens {
     fn is_symmetric(&self) -> bool {
         true
     }
@@ -53,17 +52,18 @@ impl Kernels for DiscLens {
     fn dioptres(&self) -> (f64, f64) {
         (0.0, 1000.0)
     }
-    fn is_dark_beyond_reach(&self) -> bool {
+    fn is_dark_beyond_extent(&self) -> bool {
         true
     }
-    fn film_map(&self, _dioptres: f64, wavelength_nm: f64, reach_mm: f64) -> FilmMap {
+    fn film_map(&self, _dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
         let scale_mm = self.focal_mm * (1.0 + self.lateral_per_nm * (wavelength_nm - 550.0));
         let tan_at = |r: f64| Some(r / scale_mm * (1.0 + self.distortion_per_mm2 * r * r));
-        RadialMap::tabulate(reach_mm, tan_at, |_| self.irradiance_per_radiance).into()
+        RadialMap::tabulate(extent_mm, tan_at, |_| self.irradiance_per_radiance).into()
     }
-    fn kernel(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Array2<f32> {
+    fn kernel(&self, query: PsfQuery) -> Kernel {
+        let PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um } = query;
         let radius_mm = self.blur_radius_mm(field_tan, dioptres, wavelength_nm).abs();
-        disc(1e3 * radius_mm / pitch_um)
+        Kernel { samples: disc(1e3 * radius_mm / pitch_um), pitch_um }
     }
     fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         let focus_dioptres = self.focus_dioptres + self.axial_per_nm * (wavelength_nm - 550.0);

@@ -1,5 +1,7 @@
 //! The film and the settings of a forward rendering.
 
+use glam::DVec2;
+
 use crate::ForwardError;
 
 /// The raster of the sensor's pixels; the optical axis passes through its centre.
@@ -19,6 +21,11 @@ impl Film {
     /// Returns half the diagonal, corner to centre, mm.
     pub fn half_diagonal_mm(&self) -> f64 {
         0.5e-3 * self.pitch_um * f64::hypot(self.rows as f64, self.columns as f64)
+    }
+
+    /// Returns half the width and half the height, mm: the corner at the top right as it is seen from the center.
+    pub fn half_size_mm(&self) -> DVec2 {
+        0.5e-3 * self.pitch_um * DVec2::new(self.columns as f64, self.rows as f64)
     }
 
     /// Checks that the film has an area.

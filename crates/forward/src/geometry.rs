@@ -1,163 +1,10 @@
 //! Where the light of a scene lands, and how much of it.
 
-use dioptric_psf::FieldGeometry;
+use dioptric_psf::{FilmMap, LensImage};
 use dioptric_spectrum::{Cancel, WavelengthGrid};
 use glam::DVec2;
 
-use crate::{Film, ForwardError, Kernels};
-
-/// From a distance on the film to the field seen there, and the irradiance that it gets; for one depth and wavelength.
-///
-/// The map is that of the centroids of the PSFs, so distortion and lateral colour are in it.
-#[derive(Clone, Debug)]
-pub struct RadialMap {
-    // Invariants: at least two entries, evenly spaced in the square of the distance, as many gains as ratios.
-    entries_per_mm2: f64,
-    tan_per_mm: Vec<f64>,
-    irradiance_per_radiance: Vec<f64>,
-    reach_mm: f64,
-}
-
-impl RadialMap {
-    /// Entries of the table: an error below 1e-6 for the smooth maps of lenses.
-    const N_ENTRIES: usize = 1025;
-
-    /// Tabulates a lens up to `reach_mm` off axis.
-    ///
-    /// `tan_at` gives the field seen at a distance on the film, mm, `None` where nothing is; `gain_at` the irradiance
-    /// per radiance of a field, sr.
-    pub fn tabulate(reach_mm: f64, tan_at: impl Fn(f64) -> Option<f64>, gain_at: impl Fn(f64) -> f64) -> Self {
-        let n = Self::N_ENTRIES;
-        let entries_per_mm2 = (n - 1) as f64 / (reach_mm * reach_mm);
-        let (mut tan_per_mm, mut irradiance_per_radiance) = (Vec::with_capacity(n), Vec::with_capacity(n));
-        for entry in 0..n {
-            // At the axis the ratio is 0/0; a thousandth of the first step stands for it.
-            let radius_mm = (f64::max(entry as f64, 1e-6) / entries_per_mm2).sqrt();
-            let Some(tan) = tan_at(radius_mm) else { break };
-            tan_per_mm.push(tan / radius_mm);
-            irradiance_per_radiance.push(gain_at(tan));
-        }
-        let reach_mm = (tan_per_mm.len().saturating_sub(1) as f64 / entries_per_mm2).sqrt();
-        if tan_per_mm.len() < 2 {
-            (tan_per_mm, irradiance_per_radiance) = (vec![0.0; 2], vec![0.0; 2]);
-        }
-        Self { entries_per_mm2, tan_per_mm, irradiance_per_radiance, reach_mm }
-    }
-
-    /// How far from the axis anything is seen, mm.
-    pub fn reach_mm(&self) -> f64 {
-        self.reach_mm
-    }
-
-    /// Returns the field per mm of film (1/mm) and the irradiance per radiance (sr) where the squared distance
-    /// from the axis is `radius2_mm2`; `None` beyond the reach.
-    pub fn at(&self, radius2_mm2: f64) -> Option<(f64, f64)> {
-        let place = radius2_mm2 * self.entries_per_mm2;
-        let below = place as usize;
-        if below + 1 >= self.tan_per_mm.len() {
-            return None;
-        }
-        let fraction = place - below as f64;
-        let mix = |table: &[f64]| table[below] + fraction * (table[below + 1] - table[below]);
-        Some((mix(&self.tan_per_mm), mix(&self.irradiance_per_radiance)))
-    }
-
-    /// Returns the field at a place of the film, mm from the axis; beyond the reach, that of the last place in it.
-    pub fn field_tan(&self, place_mm: DVec2) -> DVec2 {
-        if let Some((tan_per_mm, _)) = self.at(place_mm.length_squared()) {
-            return place_mm * tan_per_mm;
-        }
-        let tan = self.tan_per_mm[self.tan_per_mm.len() - 1] * self.reach_mm;
-        place_mm / place_mm.length() * tan
-    }
-}
-
-/// From places of the film to the fields seen there, and the irradiance that they get; for one depth and wavelength.
-#[derive(Clone, Debug)]
-pub enum FilmMap {
-    /// Of a lens with an axis of symmetry.
-    Radial(RadialMap),
-    /// Of any other.
-    Plane(FieldGeometry),
-}
-
-impl From<RadialMap> for FilmMap {
-    fn from(map: RadialMap) -> Self {
-        Self::Radial(map)
-    }
-}
-
-impl From<FieldGeometry> for FilmMap {
-    fn from(map: FieldGeometry) -> Self {
-        Self::Plane(map)
-    }
-}
-
-impl FilmMap {
-    /// Returns the field seen at a place of the film (mm from the axis, x right, y up) and the irradiance per radiance (sr);
-    /// `None` where nothing is seen.
-    #[inline]
-    pub fn at(&self, place_mm: DVec2) -> Option<(DVec2, f64)> {
-        match self {
-            Self::Radial(map) => {
-                map.at(place_mm.length_squared()).map(|(tan_per_mm, gain)| (place_mm * tan_per_mm, gain))
-            }
-            Self::Plane(map) => map.at(place_mm),
-        }
-    }
-
-    /// Returns the field at a place of the film; where nothing is seen, that of a place near by.
-    pub fn field_tan(&self, place_mm: DVec2) -> DVec2 {
-        match self {
-            Self::Radial(map) => map.field_tan(place_mm),
-            Self::Plane(map) => map.nearest_field_tan(place_mm),
-        }
-    }
-
-    /// Returns the field per mm of film at the axis, 1/mm: the root of how much field an area of film sees.
-    pub(crate) fn tan_per_mm(&self, over_mm: f64) -> f64 {
-        match self {
-            Self::Radial(map) => map.at(0.0).map_or(0.0, |(tan_per_mm, _)| tan_per_mm),
-            Self::Plane(map) => {
-                let tan = |place_mm: DVec2| map.nearest_field_tan(place_mm);
-                let across = tan(DVec2::X * over_mm) - tan(DVec2::NEG_X * over_mm);
-                let up = tan(DVec2::Y * over_mm) - tan(DVec2::NEG_Y * over_mm);
-                across.perp_dot(up).abs().sqrt() / (2.0 * over_mm)
-            }
-        }
-    }
-
-    /// Returns how far from the axis the corners of the film lie up to which something is seen, mm; `None` where all of it is.
-    fn ends_before(&self, film: &Film) -> Option<f64> {
-        let corner_mm = film.half_diagonal_mm();
-        match self {
-            Self::Radial(map) => (map.reach_mm() < corner_mm).then_some(map.reach_mm()),
-            Self::Plane(map) => {
-                let half_mm = 0.5e-3 * film.pitch_um * DVec2::new(film.columns as f64, film.rows as f64);
-                // Out along lines to the corners and the middles of the sides.
-                let ways = [
-                    (1.0, 1.0),
-                    (-1.0, 1.0),
-                    (1.0, -1.0),
-                    (-1.0, -1.0),
-                    (1.0, 0.0),
-                    (-1.0, 0.0),
-                    (0.0, 1.0),
-                    (0.0, -1.0),
-                ];
-                let reach = |way: DVec2| {
-                    const STEPS: u32 = 64;
-                    let seen = (0..=STEPS)
-                        .map(|i| way * f64::from(i) / f64::from(STEPS))
-                        .take_while(|at| map.at(*at).is_some());
-                    seen.last().filter(|at| *at != way).map(|at| at.length())
-                };
-                let ends = ways.into_iter().filter_map(|(x, y)| reach(DVec2::new(x, y) * half_mm));
-                ends.min_by(f64::total_cmp)
-            }
-        }
-    }
-}
+use crate::{Film, ForwardError};
 
 /// A place on the film in pixels: columns to the right of the axis and rows below it.
 #[derive(Clone, Copy, Debug)]
@@ -192,33 +39,33 @@ impl FilmFrame {
 
 /// Checks that the bands, the depths and the film lie within what is known of the lens.
 pub(crate) fn check_reach(
-    kernels: &dyn Kernels,
+    lens: &dyn LensImage,
     grid: &WavelengthGrid,
     dioptres: (f64, f64),
     film: &Film,
     cancel: &Cancel,
 ) -> Result<(), ForwardError> {
-    let (first_nm, last_nm) = kernels.wavelengths_nm();
+    let (first_nm, last_nm) = lens.wavelengths_nm();
     // A thousandth of a nanometre forgives grids that were written with few digits.
     if let Some(&wavelength_nm) =
         grid.centers_nm().iter().find(|&&center| center < first_nm - 1e-3 || center > last_nm + 1e-3)
     {
         return Err(ForwardError::WavelengthOutside { wavelength_nm, first_nm, last_nm });
     }
-    let (far, near) = kernels.dioptres();
+    let (far, near) = lens.dioptres();
     let slack = 1e-4 * near.max(dioptres.1);
     if dioptres.0 < far - slack || dioptres.1 > near + slack {
         let [far_m, near_m, bank_far_m, bank_near_m] = [dioptres.0, dioptres.1, far, near].map(|d| 1.0 / d);
         return Err(ForwardError::DepthOutside { near_m, far_m, bank_near_m, bank_far_m });
     }
-    if kernels.is_dark_beyond_reach() {
+    if lens.is_dark_beyond_extent() {
         return Ok(());
     }
     let corner_mm = film.half_diagonal_mm();
     for &wavelength_nm in grid.centers_nm() {
         for dioptres in [dioptres.0, dioptres.1] {
             cancel.check()?;
-            if let Some(reach_mm) = kernels.film_map(dioptres, wavelength_nm, 1.1 * corner_mm).ends_before(film) {
+            if let Some(reach_mm) = ends_before(&lens.film_map(dioptres, wavelength_nm, 1.1 * corner_mm), film) {
                 return Err(ForwardError::FilmBeyondField { corner_mm, reach_mm, wavelength_nm });
             }
         }
@@ -226,30 +73,24 @@ pub(crate) fn check_reach(
     Ok(())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn map_follows_a_lens_with_distortion() {
-        let tan_at = |r: f64| Some(r / 50.0 * (1.0 + 1e-4 * r * r));
-        let map = RadialMap::tabulate(20.0, tan_at, |tan| 1.0 / (1.0 + tan * tan).powi(2));
-        for r in [0.0_f64, 0.01, 3.3, 12.0, 19.9] {
-            let tan = map.field_tan(DVec2::new(r, 0.0)).x;
-            let expected = tan_at(r).unwrap();
-            // A thousandth of a 4 µm pixel at 50 mm.
-            assert!((tan - expected).abs() < 1e-7, "{r} mm: {tan} {expected}");
-            let gain = map.at(r * r).unwrap().1;
-            assert!((gain - (1.0 + expected * expected).powi(-2)).abs() < 1e-6);
+/// Returns how far from the axis the corners of the film lie up to which something is seen, mm; `None` where all of it is.
+fn ends_before(map: &FilmMap, film: &Film) -> Option<f64> {
+    let corner_mm = film.half_diagonal_mm();
+    match map {
+        FilmMap::Radial(map) => (map.extent_mm() < corner_mm).then_some(map.extent_mm()),
+        FilmMap::Plane(map) => {
+            let half_mm = film.half_size_mm();
+            // Out along lines to the corners and the middles of the sides.
+            let ways =
+                [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)];
+            let reach = |way: DVec2| {
+                const STEPS: u32 = 64;
+                let seen =
+                    (0..=STEPS).map(|i| way * f64::from(i) / f64::from(STEPS)).take_while(|at| map.at(*at).is_some());
+                seen.last().filter(|at| *at != way).map(|at| at.length())
+            };
+            let ends = ways.into_iter().filter_map(|(x, y)| reach(DVec2::new(x, y) * half_mm));
+            ends.min_by(f64::total_cmp)
         }
-    }
-
-    #[test]
-    fn field_ends_where_the_lens_does() {
-        let map = RadialMap::tabulate(20.0, |r| (r < 15.0).then_some(r / 50.0), |_| 1.0);
-        assert!((map.reach_mm() - 15.0).abs() < 0.02);
-        assert!(map.at(16.0 * 16.0).is_none());
-        let tan = map.field_tan(DVec2::new(30.0, 40.0));
-        assert!((tan - 0.3 * DVec2::new(0.6, 0.8)).length() < 1e-3);
     }
 }

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use dioptric_psf::LensImage;
 use ndarray::Array2;
 
-use crate::{Kernels, tiles::Knot};
+use crate::tiles::Knot;
 
 /// Which knots have kernels that follow from each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,8 +17,8 @@ pub(crate) enum Symmetry {
 }
 
 impl Symmetry {
-    pub(crate) fn of(kernels: &dyn Kernels) -> Self {
-        if kernels.is_symmetric() { Self::Octants } else { Self::None }
+    pub(crate) fn of(lens: &dyn LensImage) -> Self {
+        if lens.is_symmetric() { Self::Octants } else { Self::None }
     }
 
     /// Returns the knot whose kernel a knot's follows from: that of the same distance from the axis in the first octant,

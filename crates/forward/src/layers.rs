@@ -1,8 +1,7 @@
 //! Depth layers: even steps of blur radius, with tent weights between them.
 
+use dioptric_psf::LensImage;
 use glam::DVec2;
-
-use crate::Kernels;
 
 /// The depths at which the scene is blurred, nearest first.
 ///
@@ -19,7 +18,7 @@ pub(crate) struct Layers {
 
 /// The blur of a lens on a film, sampled over the field and the bands.
 pub(crate) struct Blurs<'a> {
-    pub(crate) kernels: &'a dyn Kernels,
+    pub(crate) kernels: &'a dyn LensImage,
     pub(crate) pitch_mm: f64,
     /// A few fields from end to end of the film.
     pub(crate) fields: &'a [DVec2],

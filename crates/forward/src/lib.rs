@@ -1,18 +1,17 @@
 //! From a scene and the PSFs of a lens to spectral irradiance on the film.
 //!
-//! Every sample of the scene is put where the centroid of its PSF lies (distortion and lateral colour included),
+//! Every sample of the scene is put where the centroid of its PSF lies (distortion and lateral color included),
 //! given the irradiance that the pupil passes, and spread by the PSF of its place, depth and wavelength. Surfaces at
 //! different depths are blurred in layers and laid one behind the other, so that near ones hide far ones.
 //!
 //! Radiance is W m⁻² sr⁻¹ nm⁻¹, irradiance W m⁻² nm⁻¹, absolute throughout. Row 0 of a picture is its top.
 //!
-//! This crate knows nothing of sensors, and of a lens only what [`Kernels`] asks.
+//! This crate knows nothing of sensors, and of a lens only what [`LensImage`](dioptric_psf::LensImage) asks.
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-mod bank;
 mod blur;
 mod convolve;
 mod coverage;
@@ -21,7 +20,7 @@ mod error;
 mod film;
 mod geometry;
 mod hidden;
-mod kernels;
+mod irradiance;
 mod knot_kernels;
 mod layers;
 mod occluded;
@@ -39,13 +38,11 @@ mod acceptance;
 #[cfg(test)]
 mod plan_tests;
 
-pub use bank::irradiance;
-pub use coverage::{Coverage, bank_settings_for, field_bank_settings_for};
+pub use coverage::{PsfDomain, check_depth_map};
 pub use disc_lens::DiscLens;
 pub use error::{ForwardError, SinkError};
 pub use film::{BlurMode, Film, Settings};
-pub use geometry::{FilmMap, RadialMap};
-pub use kernels::Kernels;
+pub use irradiance::irradiance;
 pub use plan::{BandKernels, ImagingPlan, ImagingSpec};
 pub use render::{Sink, render};
 pub use source::{BandRadiance, OccludedLayer, SceneGeometry, SceneRadiance, Source};

@@ -6,13 +6,14 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
+use dioptric_psf::{FilmMap, LensImage};
 use dioptric_spectrum::{Cancel, Cancelled, WavelengthGrid};
 use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    BandRadiance, BlurMode, Film, FilmMap, ForwardError, Kernels, SceneGeometry, SceneRadiance, Settings, Sink,
+    BandRadiance, BlurMode, Film, ForwardError, SceneGeometry, SceneRadiance, Settings, Sink,
     blur::{LayerTask, blur_layer},
     geometry::{FilmFrame, check_reach},
     knot_kernels::LayerKernels,
@@ -68,7 +69,7 @@ pub struct ImagingSpec {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct ImagingPlan {
-    lens: Arc<dyn Kernels + Send>,
+    lens: Arc<dyn LensImage + Send>,
     layout: Layout,
 }
 
@@ -118,7 +119,7 @@ impl ImagingPlan {
     /// When the parts of the scene do not fit each other, when the lens is not known for the wavelengths or depths or
     /// for the corner of the film, or when the work is cancelled.
     pub fn new(
-        lens: Arc<dyn Kernels + Send>,
+        lens: Arc<dyn LensImage + Send>,
         scene: &SceneGeometry<'_>,
         spec: ImagingSpec,
         progress: &(dyn Fn(f64) + Sync),
@@ -238,7 +239,7 @@ const PATCH_UNITS: u64 = 8;
 
 impl Layout {
     pub(crate) fn new(
-        lens: &dyn Kernels,
+        lens: &dyn LensImage,
         scene: &SceneGeometry<'_>,
         spec: ImagingSpec,
         progress: &Progress<'_>,
@@ -285,7 +286,7 @@ impl Layout {
         let work = Work::new(cancel, progress, range, active.iter().map(Vec::len).sum::<usize>() as u64);
         let stopwatch = Stopwatch::default();
         let film_lens = FilmLens {
-            kernels: lens,
+            image: lens,
             film,
             layers: &layers,
             maps: &maps,
@@ -312,14 +313,14 @@ impl Layout {
         if band < n_bands { Ok(()) } else { Err(ForwardError::NoSuchBand { band, n_bands }) }
     }
 
-    fn maps_at(&self, lens: &dyn Kernels, band: usize) -> Vec<FilmMap> {
+    fn maps_at(&self, lens: &dyn LensImage, band: usize) -> Vec<FilmMap> {
         let wavelength_nm = self.spec.grid.centers_nm()[band];
         let map = |&dioptres: &f64| lens.film_map(dioptres, wavelength_nm, self.reach_mm);
         self.layers.dioptres().iter().map(map).collect()
     }
 
     /// Returns the kernels of a band, between the two bands around it at which they are computed.
-    fn kernels(&self, lens: &dyn Kernels, band: usize, work: &Work<'_>) -> Result<BandKernels, Cancelled> {
+    fn kernels(&self, lens: &dyn LensImage, band: usize, work: &Work<'_>) -> Result<BandKernels, Cancelled> {
         let above = self.kernel_bands.partition_point(|&knot| knot < band);
         let upper = self.kernel_bands[above];
         if upper == band {
@@ -332,7 +333,7 @@ impl Layout {
     }
 
     /// Returns the kernels of a band at which they are computed, kept or new.
-    fn computed_kernels(&self, lens: &dyn Kernels, band: usize, work: &Work<'_>) -> Result<BandKernels, Cancelled> {
+    fn computed_kernels(&self, lens: &dyn LensImage, band: usize, work: &Work<'_>) -> Result<BandKernels, Cancelled> {
         if let Some(kernels) = self.kept().by_band.get(&band) {
             work.advance(kernels.n_kernels() as u64 * KERNEL_UNITS);
             return Ok(kernels.clone());
@@ -340,7 +341,7 @@ impl Layout {
         let maps = self.maps_at(lens, band);
         let wavelength_nm = self.spec.grid.centers_nm()[band];
         let film_lens = FilmLens {
-            kernels: lens,
+            image: lens,
             film: &self.spec.film,
             layers: &self.layers,
             maps: &maps,
@@ -360,7 +361,7 @@ impl Layout {
 
     pub(crate) fn stream(
         &self,
-        lens: &dyn Kernels,
+        lens: &dyn LensImage,
         radiance: &SceneRadiance<'_>,
         watch: &Watch<'_>,
         sink: &mut Sink<'_>,
@@ -398,7 +399,7 @@ impl Layout {
     /// Reads a band and images it.
     fn image_of(
         &self,
-        lens: &dyn Kernels,
+        lens: &dyn LensImage,
         band: usize,
         kernels: &BandKernels,
         radiance: &SceneRadiance<'_>,
@@ -415,7 +416,7 @@ impl Layout {
 
     fn image(
         &self,
-        lens: &dyn Kernels,
+        lens: &dyn LensImage,
         band: usize,
         kernels: &BandKernels,
         light: BandRadiance<'_>,
@@ -462,7 +463,7 @@ impl Layout {
 }
 
 /// Returns a few fields over the film, of which the blur tells that of all: from the axis outwards, or all over it.
-fn blur_fields(kernels: &dyn Kernels, map: &FilmMap, film: &Film) -> Vec<DVec2> {
+fn blur_fields(kernels: &dyn LensImage, map: &FilmMap, film: &Film) -> Vec<DVec2> {
     if kernels.is_symmetric() {
         let corner = map.field_tan(DVec2::X * film.half_diagonal_mm());
         return [0.0, 0.5, 1.0].map(|part| part * corner).to_vec();

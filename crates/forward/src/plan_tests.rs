@@ -8,14 +8,15 @@ use std::{
     time::Duration,
 };
 
+use dioptric_psf::{FilmMap, Kernel, LensImage, PsfQuery};
 use dioptric_scene::View;
 use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
 use ndarray::Array2;
 
 use crate::{
-    BandRadiance, DiscLens, Film, FilmMap, ForwardError, ImagingPlan, ImagingSpec, ImagingTimes, Kernels,
-    SceneGeometry, Settings, Source, render,
+    BandRadiance, DiscLens, Film, ForwardError, ImagingPlan, ImagingSpec, ImagingTimes, SceneGeometry, Settings,
+    Source, render,
 };
 
 const ROWS: usize = 60;
@@ -139,7 +140,7 @@ struct Cancelling {
     cancel: Cancel,
 }
 
-impl Kernels for Cancelling {
+impl LensImage for Cancelling {
     fn is_symmetric(&self) -> bool {
         self.lens.is_symmetric()
     }
@@ -149,17 +150,17 @@ impl Kernels for Cancelling {
     fn dioptres(&self) -> (f64, f64) {
         self.lens.dioptres()
     }
-    fn is_dark_beyond_reach(&self) -> bool {
-        self.lens.is_dark_beyond_reach()
+    fn is_dark_beyond_extent(&self) -> bool {
+        self.lens.is_dark_beyond_extent()
     }
-    fn film_map(&self, dioptres: f64, wavelength_nm: f64, reach_mm: f64) -> FilmMap {
-        self.lens.film_map(dioptres, wavelength_nm, reach_mm)
+    fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
+        self.lens.film_map(dioptres, wavelength_nm, extent_mm)
     }
-    fn kernel(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Array2<f32> {
+    fn kernel(&self, query: PsfQuery) -> Kernel {
         if self.asked.fetch_add(1, Ordering::Relaxed) + 1 == self.at {
             self.cancel.cancel();
         }
-        self.lens.kernel(field_tan, dioptres, wavelength_nm, pitch_um)
+        self.lens.kernel(query)
     }
     fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm)

@@ -1,10 +1,11 @@
 //! The ideal picture of a layer: what an aberration-free lens of the same geometry would put on the film.
 
+use dioptric_psf::FilmMap;
 use dioptric_scene::View;
 use dioptric_spectrum::{Cancel, Cancelled};
 use ndarray::Array2;
 
-use crate::{FilmMap, geometry::FilmFrame, layers::tent};
+use crate::{geometry::FilmFrame, layers::tent};
 
 /// A rectangle of film pixels, which may reach beyond the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,13 +7,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use dioptric_psf::{FilmMap, LensImage, PsfQuery};
 use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    Film, FilmMap, Kernels, Settings,
+    Film, Settings,
     geometry::FilmFrame,
     knot_kernels::{KnotKernel, LayerKernels, Symmetry, edge_spread_peak},
     layers::Layers,
@@ -214,7 +215,7 @@ fn around(cell: &Cell) -> impl Iterator<Item = (Cell, [usize; 2])> {
 
 /// A lens at one wavelength, its maps and kernels on the film.
 pub(crate) struct FilmLens<'a> {
-    pub(crate) kernels: &'a dyn Kernels,
+    pub(crate) image: &'a dyn LensImage,
     pub(crate) film: &'a Film,
     pub(crate) layers: &'a Layers,
     /// Of each layer.
@@ -227,7 +228,8 @@ impl FilmLens<'_> {
     fn kernel(&self, layer: usize, knot: Knot) -> KnotKernel {
         let pitch_um = self.film.pitch_um;
         let field_tan = knot.field_tan(&self.maps[layer], 1e-3 * pitch_um);
-        KnotKernel::new(&self.kernels.kernel(field_tan, self.layers.dioptres()[layer], self.wavelength_nm, pitch_um))
+        let query = PsfQuery::new(field_tan, self.layers.dioptres()[layer], self.wavelength_nm, pitch_um);
+        KnotKernel::new(&self.image.kernel(query).samples)
     }
 
     /// Computes the kernels of canonical knots of a layer.
@@ -265,7 +267,7 @@ impl Tiling {
         settings: &Settings,
         work: &Work<'_>,
     ) -> Result<Self, Cancelled> {
-        let symmetry = Symmetry::of(lens.kernels);
+        let symmetry = Symmetry::of(lens.image);
         let patches: Vec<Vec<Patch>> = active
             .into_par_iter()
             .enumerate()

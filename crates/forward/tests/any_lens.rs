@@ -2,13 +2,11 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
-use dioptric_forward::{
-    Coverage, Film, ForwardError, Kernels, Settings, bank_settings_for, field_bank_settings_for, irradiance,
-};
+use dioptric_forward::{Film, ForwardError, PsfDomain, Settings, irradiance};
 use dioptric_optics::{
     Glass, Interface, Lens, Move, ObjectPoint, PupilBoundary, Rims, Shape, Surface, rays_over_front,
 };
-use dioptric_psf::{Diffraction, FieldBank, ImagingBank, PsfBank};
+use dioptric_psf::{Diffraction, LensImage, LensImageModel};
 use dioptric_scene::{Scene, View};
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
@@ -24,19 +22,19 @@ struct Camera {
 }
 
 impl Camera {
-    fn coverage(&self) -> Coverage<'_> {
+    fn domain(&self) -> PsfDomain<'_> {
         let Self { lens, film, film_mm, depth_range_m, grid } = self;
-        Coverage { lens, film, film_mm: *film_mm, depth_range_m: *depth_range_m, grid, diffraction: Diffraction::None }
+        PsfDomain { lens, film, film_mm: *film_mm, depth_range_m: *depth_range_m, grid, diffraction: Diffraction::None }
     }
 
-    fn any_lens(&self) -> ImagingBank {
-        let settings = field_bank_settings_for(&self.coverage()).unwrap();
-        ImagingBank::new(FieldBank::build(&self.lens, &settings).unwrap()).unwrap()
+    fn any_lens(&self) -> LensImageModel {
+        let settings = self.domain().grid_settings().unwrap();
+        LensImageModel::build(&self.lens, &settings).unwrap()
     }
 
-    fn image(&self, kernels: &dyn Kernels, scene: &Scene) -> Vec<Array2<f32>> {
+    fn image(&self, lens: &dyn LensImage, scene: &Scene) -> Vec<Array2<f32>> {
         let mut bands = vec![];
-        irradiance(scene, kernels, &self.film, &Settings::default(), &|_| {}, &mut |_, band| {
+        irradiance(scene, lens, &self.film, &Settings::default(), &|_| {}, &mut |_, band| {
             bands.push(band);
             Ok(())
         })
@@ -74,7 +72,7 @@ fn of_a_symmetric_lens_the_picture_is_that_of_the_turned_bank() {
     let bars = Array2::from_shape_fn((240, 340), |(r, c)| if (r / 13 + c / 11) % 2 == 0 { 1.0 } else { 0.2 });
     let z_m = Array2::from_shape_fn((240, 340), |(_, c)| if c < 150 { 1.0 } else { 1.5 });
     let scene = scene(vec![bars; 3], &camera.grid, z_m, 545.0);
-    let turned = PsfBank::build(&camera.lens, &bank_settings_for(&camera.coverage()).unwrap()).unwrap();
+    let turned = LensImageModel::build(&camera.lens, &camera.domain().radial_settings().unwrap()).unwrap();
     let any = camera.any_lens();
     for (band, (a, b)) in camera.image(&any, &scene).iter().zip(camera.image(&turned, &scene)).enumerate() {
         let mean = b.mean().unwrap();
@@ -127,7 +125,7 @@ fn a_uniform_plane_gets_the_pupil_over_both_magnifications() {
     println!("{across_mm:.3} mm across, {up_mm:.3} mm up: ratio {ratio:.6}");
     // The bank's pupil is an outline of 48 corners.
     assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
-    assert!(matches!(bank_settings_for(&camera.coverage()), Err(ForwardError::Lens(_))));
+    assert!(matches!(camera.domain().radial_settings(), Err(ForwardError::Lens(_))));
 }
 
 #[test]
@@ -204,6 +202,6 @@ fn a_lens_that_sends_no_light_to_the_film_is_told() {
     let film = Film { rows: 24, columns: 36, pitch_um: 100.0 };
     let grid = WavelengthGrid::new(vec![550.0]).unwrap();
     let camera = Camera { lens, film, film_mm: 30.0, depth_range_m: (1.0, 2.0), grid };
-    let error = field_bank_settings_for(&camera.coverage()).unwrap_err();
+    let error = camera.domain().grid_settings().unwrap_err();
     assert!(matches!(error, ForwardError::DarkFilm { .. }), "{error}");
 }

@@ -2,9 +2,9 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by panicking and shows its numbers")]
 
-use dioptric_forward::{Coverage, Film, Settings, Source, bank_settings_for, render};
+use dioptric_forward::{Film, PsfDomain, Settings, Source, render};
 use dioptric_optics::{Lens, ObjectPoint, PupilBoundary, Rims, rays_towards};
-use dioptric_psf::{Diffraction, PsfBank};
+use dioptric_psf::{Diffraction, FieldSampling, LensImageModel};
 use dioptric_scene::View;
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
@@ -24,7 +24,7 @@ struct Case {
 
 struct Uniform {
     lens: Lens,
-    bank: PsfBank,
+    bank: LensImageModel,
     film: Film,
     film_mm: f64,
     plane_m: f64,
@@ -39,7 +39,7 @@ impl Uniform {
         let grid = WavelengthGrid::new(vec![WAVELENGTH_NM]).unwrap();
         let plane_m = 1e-3 * (case.plane_mm + mono.projection_center_z_mm());
         let film_mm = mono.film_mm_for(case.focus_mm).unwrap();
-        let coverage = Coverage {
+        let domain = PsfDomain {
             lens: &lens,
             film: &film,
             film_mm,
@@ -47,9 +47,13 @@ impl Uniform {
             grid: &grid,
             diffraction: Diffraction::None,
         };
-        let bank = PsfBank::build(&lens, &bank_settings_for(&coverage).unwrap()).unwrap();
+        let settings = domain.settings().unwrap();
+        let bank = LensImageModel::build(&lens, &settings).unwrap();
+        let last_tan = match &settings.fields {
+            FieldSampling::Radial(tans) => tans[tans.len() - 1],
+            _ => panic!("a lens with an axis of symmetry has fields along a radius"),
+        };
         // A hundred samples over twice the film, all of one radiance.
-        let last_tan = bank.last_field_tan();
         let view = View { focal_px: 49.0 / last_tan, center_x_px: 49.5, center_y_px: 49.5 };
         let radiance = SpectralImage::new(Quantity::Radiance, grid, vec![Array2::ones((100, 100))]).unwrap();
         let depth = DepthMap::flat(100, 100, plane_m).unwrap();
@@ -63,23 +67,24 @@ impl Uniform {
         Self { lens, bank, film, film_mm, plane_m, picture }
     }
 
-    /// Returns the largest second difference along rows and columns, over the mean.
+    /// Returns the largest second difference along rows and columns, over the mean, and where: of neighbors, less that of pixels
+    /// eight apart, which is the curvature that a smooth picture has on both scales.
     fn worst_step(&self) -> (f64, (usize, usize)) {
+        const APART: usize = 8;
         let mean = f64::from(self.picture.mean().unwrap());
         let (rows, columns) = self.picture.dim();
-        let at = |row: usize, column: usize| f64::from(self.picture[(row, column)]) / mean;
-        let mut worst = (0.0, (0, 0));
-        for row in 1..rows - 1 {
-            for column in 1..columns - 1 {
-                let here = 2.0 * at(row, column);
-                let down = (at(row - 1, column) + at(row + 1, column) - here).abs();
-                let across = (at(row, column - 1) + at(row, column + 1) - here).abs();
-                if down.max(across) > worst.0 {
-                    worst = (down.max(across), (row, column));
-                }
-            }
-        }
-        worst
+        let bend = |(row, column): (usize, usize), (down, across): (usize, usize)| {
+            let at = |row: usize, column: usize| f64::from(self.picture[(row, column)]) / mean;
+            at(row - down, column - across) + at(row + down, column + across) - 2.0 * at(row, column)
+        };
+        let far = (APART * APART) as f64;
+        let inner = (APART..rows - APART).flat_map(|row| (APART..columns - APART).map(move |column| (row, column)));
+        let steps = inner.map(|at| {
+            let down = bend(at, (1, 0)) - bend(at, (APART, 0)) / far;
+            let across = bend(at, (0, 1)) - bend(at, (0, APART)) / far;
+            (down.abs().max(across.abs()), at)
+        });
+        steps.fold((0.0, (0, 0)), |worst, here| if here.0 > worst.0 { here } else { worst })
     }
 
     /// Returns the largest difference from the irradiance by traced rays, as a share of it, and where, mm.
@@ -98,7 +103,7 @@ impl Uniform {
     fn solid_angle(&self, place_mm: DVec2) -> f64 {
         const N: usize = 128;
         let mono = self.lens.at(WAVELENGTH_NM).unwrap();
-        let geometry = self.bank.geometry(1.0 / self.plane_m, WAVELENGTH_NM);
+        let geometry = self.bank.radial_geometry(1.0 / self.plane_m, WAVELENGTH_NM).unwrap();
         let tan = geometry.field_tan(place_mm.length()).unwrap();
         let tan_per_mm = tan / place_mm.length();
         let cosines: Vec<DVec2> = (0..N)
@@ -112,8 +117,7 @@ impl Uniform {
                     let mut rays = rays_towards(&point, &[target], pupil.z_mm(), 0.0);
                     mono.trace(&mut rays, Rims::Ignore);
                     let cosine = rays.direction(0).truncate();
-                    mono.to_film(&mut rays, self.film_mm);
-                    let off_mm = place_mm + rays.point_mm(0).truncate();
+                    let off_mm = place_mm - mono.landed(&rays, self.film_mm).next().unwrap().in_picture_mm();
                     if off_mm.length() < 1e-6 {
                         return cosine;
                     }

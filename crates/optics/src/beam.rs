@@ -89,9 +89,9 @@ impl MonoLens {
     pub fn trace_onto(&self, beam: &Beam<'_>, rims: Rims, film_mm: f64, mut visit: impl FnMut(&RayBatch)) {
         let plan = Plan::new(&self.steps_for(beam.point.z_mm()), 0, rims);
         beam.for_each_lot(self.object_index(), |rays| {
-            match self.poses() {
-                None => trace::trace_batch(&plan, Goal::Film { film_mm }, rays.slices()),
-                Some(_) => self.trace_to_film(rays, rims, film_mm),
+            match self.has_plain_film() {
+                true => trace::trace_batch(&plan, Goal::Film { film_mm }, rays.slices()),
+                false => self.trace_to_film(rays, rims, film_mm),
             }
             visit(rays);
         });
@@ -103,9 +103,9 @@ impl MonoLens {
         let mut single = RayBatchF32::default();
         beam.for_each_lot(self.object_index(), |rays| {
             single.set(rays);
-            match self.poses() {
-                None => trace::trace_batch(&plan, Goal::Film { film_mm }, single.slices()),
-                Some(_) => self.trace_to_film_f32(&mut single, rims, film_mm),
+            match self.has_plain_film() {
+                true => trace::trace_batch(&plan, Goal::Film { film_mm }, single.slices()),
+                false => self.trace_to_film_f32(&mut single, rims, film_mm),
             }
             visit(&single);
         });

@@ -165,7 +165,7 @@ fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_mm: f64) -> Ve
         lens.trace_surfaces(surface..surface + 1, &mut rays, Rims::Clip);
         note(&mut lines, &rays, &before);
     }
-    lens.to_image_surface(&mut rays, film_mm);
+    lens.to_film(&mut rays, film_mm);
     let arrived = in_flight(&rays);
     note(&mut lines, &rays, &arrived);
     for (line, arrived) in lines.iter_mut().zip(arrived) {

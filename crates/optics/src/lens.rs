@@ -33,6 +33,12 @@ pub struct ImageSurface {
 }
 
 impl ImageSurface {
+    /// Returns how far the film at a place of its own plane lies behind its vertex, mm; NaN beyond its equator.
+    pub fn sag_at_mm(&self, place_mm: DVec2) -> f64 {
+        let (c, square) = (self.curvature_per_mm, place_mm.length_squared());
+        c * square / (1.0 + (1.0 - (1.0 + self.conic) * c * c * square).sqrt())
+    }
+
     /// Returns how steeply the film rises at a place of its own plane, in x and y.
     pub fn slope_at(&self, place_mm: DVec2) -> DVec2 {
         let c = self.curvature_per_mm;

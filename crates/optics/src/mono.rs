@@ -191,7 +191,7 @@ impl MonoLens {
     }
 
     /// Returns where a point of the lens frame lies in the stop's own frame, mm from the middle of the stop.
-    pub fn in_stop_mm(&self, point_mm: DVec3) -> DVec2 {
+    pub(crate) fn in_stop_mm(&self, point_mm: DVec3) -> DVec2 {
         self.poses().map_or(point_mm, |poses| poses[self.stop].to_own(point_mm)).truncate()
     }
 
@@ -210,7 +210,7 @@ impl MonoLens {
 
     /// Returns where a point of the lens frame lies on a film `film_mm` behind the last vertex, mm, along the film's own
     /// x and y: those of the lens, unless the film is tilted or decentred.
-    pub fn on_film_mm(&self, point_mm: DVec3, film_mm: f64) -> DVec2 {
+    pub(crate) fn on_film_mm(&self, point_mm: DVec3, film_mm: f64) -> DVec2 {
         match &self.placed {
             None => point_mm.truncate(),
             Some(_) => self.film_pose(film_mm).to_own(point_mm).truncate(),
@@ -255,11 +255,11 @@ impl MonoLens {
         rays.par_slices(CHUNK).with_max_len(1).for_each(|chunk| trace::trace_batch(&plan, Goal::LastSurface, chunk));
     }
 
-    /// Traces rays through all surfaces and straight on to the film plane, `film_mm` behind the last vertex.
+    /// Traces rays through all surfaces and straight on to the film, `film_mm` behind the last vertex.
     ///
     /// What [`trace`](Self::trace) and [`to_film`](Self::to_film) do, in one go.
     pub fn trace_to_film(&self, rays: &mut RayBatch, rims: Rims, film_mm: f64) {
-        if self.placed.is_some() {
+        if !self.has_plain_film() {
             self.trace(rays, rims);
             return self.to_film(rays, film_mm);
         }
@@ -267,13 +267,13 @@ impl MonoLens {
         trace::trace_batch(&plan, Goal::Film { film_mm }, rays.slices());
     }
 
-    /// Traces rays in single precision through all surfaces and straight on to the film plane, `film_mm` behind the
-    /// last vertex.
+    /// Traces rays in single precision through all surfaces and straight on to the film, `film_mm` behind the last
+    /// vertex.
     ///
     /// They land within 0.05 µm of where [`trace_to_film`](Self::trace_to_film) lands them. Through tilted and
-    /// decentred surfaces they go in double precision, no faster than there.
+    /// decentred surfaces and to curved films they go in double precision, no faster than there.
     pub fn trace_to_film_f32(&self, rays: &mut RayBatchF32, rims: Rims, film_mm: f64) {
-        if self.placed.is_some() {
+        if !self.has_plain_film() {
             let mut wide = rays.widened();
             self.trace_to_film(&mut wide, rims, film_mm);
             return rays.set_rounded(&wide, |point, _| point);
@@ -306,11 +306,23 @@ impl MonoLens {
         Cow::Owned(steps)
     }
 
-    /// Moves rays straight on to the film plane, `film_mm` behind the last vertex, however the film is curved.
+    /// Moves rays straight on to the film as it is curved, its vertex `film_mm` behind the last vertex.
     ///
-    /// Where the film itself is moved, points stay in the lens frame; [`film_pose`](Self::film_pose) takes them to the
-    /// film's own.
+    /// A ray that does not meet a curved film ends as one that missed the surface after the last. Points stay in the lens
+    /// frame; [`film_points`](Self::film_points) gives the places on the film itself.
     pub fn to_film(&self, rays: &mut RayBatch, film_mm: f64) {
+        let ImageSurface { curvature_per_mm, conic } = self.image_surface;
+        if curvature_per_mm == 0.0 {
+            return self.to_film_plane(rays, film_mm);
+        }
+        let medium = (self.image_index(), self.n_surfaces() as u16);
+        let pose = self.film_pose(film_mm);
+        trace::move_to_placed_conic(&pose, [curvature_per_mm, conic], medium, &mut rays.slices());
+    }
+
+    /// Moves rays straight on to the plane through the film's vertex, `film_mm` behind the last vertex, however the film is
+    /// curved.
+    pub fn to_film_plane(&self, rays: &mut RayBatch, film_mm: f64) {
         match &self.placed {
             None => trace::move_to_plane(rays.slices(), self.last_vertex_z_mm() + film_mm, self.image_index()),
             Some(_) => {
@@ -319,22 +331,14 @@ impl MonoLens {
         }
     }
 
+    /// Whether every surface is centred and the film flat: then lens and film are traced in one go.
+    pub(crate) fn has_plain_film(&self) -> bool {
+        self.placed.is_none() && self.image_surface.curvature_per_mm == 0.0
+    }
+
     /// The shape of the film.
     pub fn image_surface(&self) -> ImageSurface {
         self.image_surface
-    }
-
-    /// Moves rays straight on to the film as it is curved, its vertex `film_mm` behind the last vertex.
-    ///
-    /// A ray that does not meet it ends as one that missed the surface after the last.
-    pub fn to_image_surface(&self, rays: &mut RayBatch, film_mm: f64) {
-        let ImageSurface { curvature_per_mm, conic } = self.image_surface;
-        if curvature_per_mm == 0.0 {
-            return self.to_film(rays, film_mm);
-        }
-        let medium = (self.image_index(), self.n_surfaces() as u16);
-        let pose = self.film_pose(film_mm);
-        trace::move_to_placed_conic(&pose, [curvature_per_mm, conic], medium, &mut rays.slices());
     }
 
     /// Returns the image of the axial point at `object_distance_mm` before the first vertex (infinite for far ones).

@@ -94,6 +94,16 @@ impl Pose {
         self.rotation.transpose() * (point_mm - self.vertex_mm)
     }
 
+    /// Returns the direction in the lens frame for one of the surface's own frame.
+    pub fn direction_to_lens(&self, direction: DVec3) -> DVec3 {
+        self.rotation * direction
+    }
+
+    /// Returns the direction in the surface's own frame for one of the lens frame.
+    pub fn direction_to_own(&self, direction: DVec3) -> DVec3 {
+        self.rotation.transpose() * direction
+    }
+
     /// Returns the motion that first does the other and then this one.
     pub fn after(&self, other: &Self) -> Self {
         Self { vertex_mm: self.to_lens(other.vertex_mm), rotation: self.rotation * other.rotation }

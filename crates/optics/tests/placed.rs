@@ -206,8 +206,8 @@ fn rays_end_on_a_curved_film() {
     let mut rays = bundle(&curved, 200);
     curved.trace(&mut rays, Rims::Clip);
     let (mut flat, behind) = (rays.clone(), rays.clone());
-    curved.to_image_surface(&mut rays, film_mm);
-    curved.to_film(&mut flat, film_mm);
+    curved.to_film(&mut rays, film_mm);
+    curved.to_film_plane(&mut flat, film_mm);
     let center = DVec3::Z * (curved.last_vertex_z_mm() + film_mm - 40.0);
     assert!(rays.n_in_flight() > 50);
     for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
@@ -219,13 +219,13 @@ fn rays_end_on_a_curved_film() {
     // On a film that is flat by default both are one.
     let flat_lens = lens.at(550.0).unwrap();
     let mut same = behind;
-    flat_lens.to_image_surface(&mut same, film_mm);
+    flat_lens.to_film(&mut same, film_mm);
     assert_eq!(same, flat);
     // A small ball does not fill the field.
     let ball = ImageSurface { curvature_per_mm: -1.0, conic: 0.0 };
     let ball = Lens::built_in("dgauss-50mm").unwrap().with_image_surface(ball).unwrap().at(550.0).unwrap();
     let mut rays = bundle(&ball, 200);
     ball.trace(&mut rays, Rims::Clip);
-    ball.to_image_surface(&mut rays, film_mm);
+    ball.to_film(&mut rays, film_mm);
     assert!(rays.fate.contains(&RayFate::Missed { surface: 11 }));
 }

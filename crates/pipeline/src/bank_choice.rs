@@ -1,10 +1,11 @@
 //! How finely point-spread functions are sampled, and what that leaves wrong.
 
 use dioptric_optics::Lens;
-use dioptric_psf::{AdaptiveSettings, BankSettings, ErrorPlaces, Interpolation, MeasuredError, PsfBank};
+use dioptric_psf::{AdaptiveSettings, BankSettings, ErrorPlaces, FieldSampling, Interpolation, LensImageModel};
+use dioptric_spectrum::Cancel;
 use serde::{Deserialize, Serialize};
 
-use crate::{CameraBank, PipelineError, psf_plots::number};
+use crate::{PipelineError, psf_plots::number};
 
 /// Places at which the error of a bank is measured: few, for it is told of every run.
 const N_PLACES: usize = 24;
@@ -28,38 +29,35 @@ pub enum BankChoice {
 }
 
 impl BankChoice {
-    /// Traces the bank, and measures the error of its interpolation on pixels of this size.
-    pub(crate) fn build(self, lens: &Lens, standard: BankSettings, pitch_um: f64) -> Result<PsfBank, PipelineError> {
-        let places = places(pitch_um);
-        Ok(match self {
-            Self::Standard => PsfBank::build(lens, &standard)?.with_measured_error(&places)?,
-            Self::Paper => {
-                let images = BankSettings { interpolation: Interpolation::Images, ..standard };
-                PsfBank::build(lens, &images)?.with_measured_error(&places)?
-            }
+    /// Traces a model of a lens's image, and measures the error of its interpolation on pixels of this size.
+    ///
+    /// `standard` has the standard numbers of samples.
+    pub(crate) fn build(
+        self,
+        lens: &Lens,
+        standard: BankSettings,
+        pitch_um: f64,
+        progress: &(dyn Fn(f64) + Sync),
+        cancel: &Cancel,
+    ) -> Result<LensImageModel, PipelineError> {
+        let places = ErrorPlaces { pitch_um, n_places: N_PLACES, ..ErrorPlaces::STANDARD };
+        if self != Self::Standard && !matches!(standard.fields, FieldSampling::Radial(_)) {
+            let reason =
+                format!("only the standard one is for a lens without an axis of symmetry, as {} is", lens.name());
+            return Err(PipelineError::Unsuitable { what: "bank", reason });
+        }
+        let settings = match self {
+            Self::Standard => standard,
+            Self::Paper => BankSettings { interpolation: Interpolation::Images, ..standard },
             Self::Within { error } => {
                 let wanted = AdaptiveSettings { target_median: error, most_samples: MOST_SAMPLES, places };
-                PsfBank::build_adaptive(lens, &standard.coarse(), &wanted)?
+                return Ok(LensImageModel::build_adaptive(lens, &standard.coarse(), &wanted, progress, cancel)?);
             }
-        })
+        };
+        let model = LensImageModel::build_with(lens, &settings, progress, cancel)?;
+        let error = model.measured_error(&places, cancel)?;
+        Ok(model.with_error(error))
     }
-
-    /// Returns where the error of a bank of a lens without an axis of symmetry is measured, or says that the choice is not
-    /// for such a one.
-    pub(crate) fn places_of_plane(self, lens: &Lens, pitch_um: f64) -> Result<ErrorPlaces, PipelineError> {
-        match self {
-            Self::Standard => Ok(places(pitch_um)),
-            Self::Within { .. } | Self::Paper => {
-                let reason =
-                    format!("only the standard one is for a lens without an axis of symmetry, as {} is", lens.name());
-                Err(PipelineError::Unsuitable { what: "bank", reason })
-            }
-        }
-    }
-}
-
-fn places(pitch_um: f64) -> ErrorPlaces {
-    ErrorPlaces { pitch_um, n_places: N_PLACES, ..ErrorPlaces::STANDARD }
 }
 
 /// How a bank was sampled, and the error of what lies between its samples.
@@ -90,47 +88,23 @@ pub struct BankData {
 }
 
 impl BankData {
-    /// Returns what is known of a camera's bank.
-    pub fn of_camera(bank: &CameraBank) -> Option<Self> {
-        match bank {
-            CameraBank::Turned(bank) => Self::of(bank),
-            CameraBank::Plane { bank, error } => {
-                let settings = bank.bank().settings();
-                let n_fields = settings.tans_x.len() * settings.tans_y.len();
-                let (n_depths, n_wavelengths) = (settings.dioptres.len(), settings.wavelengths_nm.len());
-                Some(Self::new("rays", (n_fields, n_depths, n_wavelengths), *error))
-            }
-        }
-    }
-
-    /// Returns what is known of a bank whose error was measured.
-    pub fn of(bank: &PsfBank) -> Option<Self> {
-        let (settings, error) = (bank.settings(), bank.error()?);
-        let last = bank.last_field_tan();
-        let n_fields = settings.field_tans.iter().filter(|tan| **tan <= last).count();
-        let interpolation = match settings.interpolation {
-            Interpolation::Rays => "rays",
-            Interpolation::Images => "images",
-        };
-        Some(Self::new(interpolation, (n_fields, settings.dioptres.len(), settings.wavelengths_nm.len()), error))
-    }
-
-    fn new(
-        interpolation: &'static str,
-        (n_fields, n_depths, n_wavelengths): (usize, usize, usize),
-        error: MeasuredError,
-    ) -> Self {
-        Self {
-            interpolation,
-            n_fields,
-            n_depths,
-            n_wavelengths,
+    /// Returns how a model was sampled, if its error was measured.
+    pub fn of(model: &LensImageModel) -> Option<Self> {
+        let (settings, error) = (model.settings(), model.error()?);
+        Some(Self {
+            interpolation: match settings.interpolation {
+                Interpolation::Rays => "rays",
+                Interpolation::Images => "images",
+            },
+            n_fields: model.n_fields(),
+            n_depths: settings.dioptres.len(),
+            n_wavelengths: settings.wavelengths_nm.len(),
             median_error: error.median,
             p90_error: error.p90,
             n_places: error.n_places,
             pitch_um: error.pitch_um,
             wanted_error: error.target_median,
-        }
+        })
     }
 
     /// Says it in one line.
@@ -165,7 +139,8 @@ mod tests {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
         let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
         let standard = BankSettings::covering(film_mm, 0.2, (0.2, 1.0), (420.0, 680.0), Diffraction::None);
-        let data = |choice: BankChoice| BankData::of(&choice.build(&lens, standard.clone(), 5.0).unwrap()).unwrap();
+        let build = |choice: BankChoice| choice.build(&lens, standard.clone(), 5.0, &|_| {}, &Cancel::new());
+        let data = |choice: BankChoice| BankData::of(&build(choice).unwrap()).unwrap();
         let [rays, within, paper] =
             [BankChoice::Standard, BankChoice::Within { error: 0.02 }, BankChoice::Paper].map(data);
         for data in [&rays, &within, &paper] {
@@ -176,6 +151,6 @@ mod tests {
         assert!(n(&within) < 324 && within.median_error <= 0.02, "{within:?}");
         assert!(rays.median_error < 0.01 && paper.median_error > 20.0 * rays.median_error, "{rays:?} {paper:?}");
         assert!(paper.in_words().starts_with("pictures blended") && !within.in_words().contains("asked for"));
-        assert!(BankChoice::Within { error: -1.0 }.build(&lens, standard.clone(), 5.0).is_err());
+        assert!(build(BankChoice::Within { error: -1.0 }).is_err());
     }
 }

@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use dioptric_forward::{Coverage, irradiance};
+use dioptric_forward::{PsfDomain, irradiance};
+use dioptric_psf::LensImageModel;
 use dioptric_scene::{BandWriter, ExrParts};
 use dioptric_sensor::{Developed, ElectronRate, Exposure, Illumination, Noise, Processing};
-use dioptric_spectrum::{Observer, Quantity};
+use dioptric_spectrum::{Cancel, Observer, Quantity};
 use ndarray::Array2;
 
 use crate::{
-    Camera, CameraBank, Exposed, PipelineError, Progress, Shot, Stage,
+    Camera, Exposed, PipelineError, Progress, Shot, Stage,
     band_stream::band_stream,
     display::{LinearRgb, SpectrumToRgb},
 };
@@ -21,7 +22,7 @@ pub(crate) const IRRADIANCE_FILE: &str = "irradiance.exr";
 #[derive(Clone, Debug)]
 pub struct Capture {
     /// The point-spread functions.
-    pub bank: CameraBank,
+    pub bank: LensImageModel,
     /// The irradiance on the film, in brief; the cube itself is in the file.
     pub irradiance: IrradianceSummary,
     /// The exposure, metered or given.
@@ -89,8 +90,8 @@ impl Shot {
     }
 
     /// Traces the point-spread functions that the scene and the film need.
-    fn trace_bank(&self) -> Result<CameraBank, PipelineError> {
-        let coverage = Coverage {
+    fn trace_bank(&self) -> Result<LensImageModel, PipelineError> {
+        let domain = PsfDomain {
             lens: &self.lens,
             film: &self.film,
             film_mm: self.film_mm,
@@ -98,13 +99,14 @@ impl Shot {
             grid: self.grid(),
             diffraction: self.camera.diffraction.into(),
         };
-        CameraBank::build(self.camera.bank, &coverage)
+        let pitch_um = self.film.pitch_um;
+        self.camera.bank.build(&self.lens, domain.settings()?, pitch_um, &|_| {}, &Cancel::new())
     }
 
     /// Images the scene band by band; the sensor collects electrons beside it, and the file grows.
     fn expose_to_scene(
         &self,
-        bank: &CameraBank,
+        bank: &LensImageModel,
         folder: Option<&Path>,
         progress: &dyn Progress,
     ) -> Result<(ElectronRate, IrradianceSummary), PipelineError> {
@@ -129,7 +131,7 @@ impl Shot {
             });
             let imaged = irradiance(
                 &self.scene,
-                bank.kernels(),
+                bank,
                 &self.film,
                 &self.blur,
                 &|fraction| progress.at(Stage::Irradiance, fraction),

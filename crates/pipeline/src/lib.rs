@@ -12,7 +12,6 @@
 mod band_stream;
 mod bank_choice;
 mod camera;
-mod camera_bank;
 mod capture;
 mod check;
 mod convert;
@@ -57,7 +56,6 @@ pub use camera::{
     BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, ProcessingChoice, SensorChoice,
     StopChoice, WavelengthChoice, WhiteChoice,
 };
-pub use camera_bank::CameraBank;
 pub use capture::{Capture, IrradianceSummary};
 pub use convert::{ConvertedLens, convert_lens};
 pub use error::PipelineError;

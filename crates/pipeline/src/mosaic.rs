@@ -1,13 +1,13 @@
 //! Point-spread functions in colour, laid out over field and depth as in Figure 1.
 
 use dioptric_optics::glam::DVec2;
-use dioptric_psf::{Kernel, PsfQuery};
+use dioptric_psf::{Kernel, LensImage, LensImageModel, PsfQuery};
 use dioptric_spectrum::WavelengthGrid;
 use image::{Rgb, RgbImage, imageops};
 use ndarray::Array2;
 
 use crate::{
-    CameraBank, REFERENCE_WAVELENGTH_NM,
+    REFERENCE_WAVELENGTH_NM,
     display::{LinearRgb, SpectrumToRgb, enlarged},
 };
 
@@ -45,7 +45,7 @@ pub struct MosaicPlan {
 
 impl PsfMosaic {
     /// Draws the mosaic from a bank.
-    pub fn draw(bank: &CameraBank, plan: &MosaicPlan) -> Self {
+    pub fn draw(bank: &LensImageModel, plan: &MosaicPlan) -> Self {
         let widest = |&dioptres: &f64| plan.tile_um.unwrap_or_else(|| widest_um(bank, plan, dioptres));
         let tiles_um: Vec<f64> = plan.dioptres.iter().map(widest).collect();
         let white = vec![1.0; plan.grid.len()];
@@ -99,20 +99,20 @@ struct Point {
 }
 
 impl Point {
-    fn kernel(&self, bank: &CameraBank, pitch_um: f64) -> Kernel {
+    fn kernel(&self, bank: &LensImageModel, pitch_um: f64) -> Kernel {
         let Self { field_tan, dioptres, wavelength_nm } = *self;
         bank.kernel(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um })
     }
 
     /// How far from the reference wavelength's image this one lies, µm, right and up: lateral colour.
-    fn lateral_color_um(&self, bank: &CameraBank) -> DVec2 {
+    fn lateral_color_um(&self, bank: &LensImageModel) -> DVec2 {
         let at = |nm: f64| bank.centroid_mm(self.field_tan, self.dioptres, nm);
         1e3 * (at(self.wavelength_nm) - at(REFERENCE_WAVELENGTH_NM))
     }
 }
 
 /// Returns a point-spread function in a window that is centred on the image of the reference wavelength.
-fn window(bank: &CameraBank, point: &Point, pitch_um: f64, size: usize) -> Array2<f32> {
+fn window(bank: &LensImageModel, point: &Point, pitch_um: f64, size: usize) -> Array2<f32> {
     let kernel = point.kernel(bank, pitch_um).samples;
     let shift = (point.lateral_color_um(bank) / pitch_um).round();
     let (right, up) = (shift.x as isize, shift.y as isize);
@@ -125,13 +125,13 @@ fn window(bank: &CameraBank, point: &Point, pitch_um: f64, size: usize) -> Array
 }
 
 /// Returns the side of a tile that holds all but the tails of every point-spread function of a depth, µm.
-fn widest_um(bank: &CameraBank, plan: &MosaicPlan, dioptres: f64) -> f64 {
+fn widest_um(bank: &LensImageModel, plan: &MosaicPlan, dioptres: f64) -> f64 {
     let (first, last) = plan.grid.range_nm();
     let mut reach_um: f64 = 5.0;
     for &field_tan in &plan.field_tans {
         for wavelength_nm in [first, last] {
             let point = Point { field_tan, dioptres, wavelength_nm };
-            let blur_um = 1e3 * bank.kernels().spread_mm(field_tan, dioptres, wavelength_nm);
+            let blur_um = 1e3 * bank.spread_mm(field_tan, dioptres, wavelength_nm);
             reach_um = reach_um.max(blur_um + point.lateral_color_um(bank).length());
         }
     }
@@ -142,13 +142,13 @@ fn widest_um(bank: &CameraBank, plan: &MosaicPlan, dioptres: f64) -> f64 {
 mod tests {
     use super::*;
     use dioptric_optics::Lens;
-    use dioptric_psf::{BankSettings, Diffraction, PsfBank};
+    use dioptric_psf::{BankSettings, Diffraction};
 
     #[test]
     fn a_mosaic_has_a_tile_a_field_and_depth() {
         let lens = Lens::built_in("paper-2el").unwrap().with_stop_diameter_mm(4.0).unwrap();
         let settings = BankSettings::covering(51.8145, 0.06, (0.0625, 0.5), (400.0, 700.0), Diffraction::None);
-        let bank = CameraBank::Turned(Box::new(PsfBank::build(&lens, &settings).unwrap()));
+        let bank = LensImageModel::build(&lens, &settings).unwrap();
         let plan = MosaicPlan {
             field_tans: vec![DVec2::ZERO, DVec2::new(0.05, 0.0)],
             dioptres: vec![0.0625, 0.25, 0.5],

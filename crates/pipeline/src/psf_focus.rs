@@ -3,13 +3,12 @@
 use std::f64::consts::FRAC_PI_2;
 
 use dioptric_optics::{Lens, ObjectPoint};
-use dioptric_psf::Picture;
+use dioptric_psf::{LensImageModel, Picture};
 use rayon::prelude::*;
 
 use crate::{
     PipelineError, PsfRequest, PsfSampling, PsfSet,
     psf_request::Item,
-    psf_source::PsfSource,
     spot::{PaperRays, Spot},
 };
 
@@ -98,7 +97,7 @@ impl Here<'_> {
         }
     }
 
-    fn of_picture(&self, item: &Item, source: &PsfSource) -> (f64, f64) {
+    fn of_picture(&self, item: &Item, source: &LensImageModel) -> (f64, f64) {
         let Some(Window { picture, held }) = self.window(item, source) else { return (f64::NAN, f64::NAN) };
         let modulation = |direction| {
             let own = picture.mtf(direction, self.cycles_per_mm) * held;
@@ -108,16 +107,16 @@ impl Here<'_> {
     }
 
     /// Draws a point on the coarsest pixels that do, in a window that is not too large; `None` of a dark point.
-    fn window(&self, item: &Item, source: &PsfSource) -> Option<Window> {
+    fn window(&self, item: &Item, source: &LensImageModel) -> Option<Window> {
         let asked_um = self.request.pixel_um;
-        let reach_um = 1e3 * source.reach_mm(item.query(asked_um))?;
+        let reach_um = 1e3 * source.extent_mm(item.field_tan(), item.dioptres, item.wavelength_nm)?;
         let pitch_um = pitch_um(asked_um, self.cycles_per_mm, reach_um);
         let query = item.query(pitch_um);
         if 2.0 * reach_um > pitch_um * LARGEST_WINDOW as f64 {
             let (energy, _) = source.picture(query, LARGEST_WINDOW)?;
             return Some(Window { held: energy.sum(), picture: Picture::new(energy.view(), pitch_um) });
         }
-        let (kernel, _) = source.kernel(query)?;
+        let (kernel, _) = source.kernel_and_model(query)?;
         Some(Window { held: 1.0, picture: Picture::from(&kernel) })
     }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dioptric_diffraction::{PupilGrid, WaveNodes};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
-use dioptric_psf::{ModelUse, Picture};
+use dioptric_psf::{LensImageModel, ModelUse, Picture};
 use dioptric_scene::write_planes_exr;
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -14,7 +14,6 @@ use crate::{
     display::png_bytes,
     psf_request::{Item, LARGEST},
     psf_row::{PointName, place_and_size},
-    psf_source::PsfSource,
     spot::{PaperRays, Spot},
 };
 
@@ -60,7 +59,7 @@ impl PsfRequest {
             true => vec![1.0; self.wavelengths_nm.len()],
             false => self.spectral_weights.clone(),
         };
-        let bank = source.as_ref().and_then(PsfSource::data);
+        let bank = source.as_ref().and_then(BankData::of);
         rows.iter_mut().for_each(|row| row.bank.clone_from(&bank));
         Ok(PsfSet { film_mm, pixel_um: self.pixel_um, rows, pictures, bank, spectral_weights })
     }
@@ -69,7 +68,7 @@ impl PsfRequest {
         &self,
         item: &Item,
         lens: &Lens,
-        source: Option<&PsfSource>,
+        source: Option<&LensImageModel>,
         film_mm: f64,
     ) -> Result<(PsfRow, Array2<f32>), PipelineError> {
         let reference = self.reference(lens)?;
@@ -104,14 +103,14 @@ impl PsfRequest {
     }
 
     /// Draws a picture: of the size asked for, or its own; `None` of a dark point.
-    fn draw(&self, item: &Item, source: &PsfSource) -> Option<(Array2<f32>, ModelUse)> {
+    fn draw(&self, item: &Item, source: &LensImageModel) -> Option<(Array2<f32>, ModelUse)> {
         let query = item.query(self.pixel_um);
         match self.size {
             // A picture is centred on the middle of a pixel, which an odd number has.
             Some(size) if size % 2 == 1 => {
                 source.picture(query, size).map(|(picture, model)| (picture.mapv(|e| e as f32), model))
             }
-            _ => source.kernel(query).map(|(kernel, model)| (kernel.samples, model)),
+            _ => source.kernel_and_model(query).map(|(kernel, model)| (kernel.samples, model)),
         }
     }
 

@@ -203,7 +203,7 @@ fn chief_ray_mm(lens: &MonoLens, field_tan: DVec2, film_mm: f64) -> Option<DVec2
     let mut rays = rays_towards(&point, &[DVec2::ZERO], lens.projection_center_z_mm(), 0.0);
     lens.trace(&mut rays, Rims::Ignore);
     lens.to_film(&mut rays, film_mm);
-    rays.fate[0].is_in_flight().then(|| rays.point_mm(0).truncate())
+    rays.fate[0].is_in_flight().then(|| lens.film_point(rays.point_mm(0), film_mm).mm)
 }
 
 /// Returns the radius of the largest blur of the scene on the axis, mm, by first order.

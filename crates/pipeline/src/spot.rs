@@ -1,8 +1,8 @@
 //! Where the rays of a point land: centroid, moments and losses, without any pixels.
 
-use dioptric_diffraction::{BendForm, Covariance, Edge, Hurb, bend};
+use dioptric_diffraction::{Covariance, Edge, Hurb, HurbForm, SampledHurb};
 use dioptric_optics::{
-    MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
+    FilmPoint, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
     glam::{DVec2, Vec2Swizzles},
     rays_over_front, rays_towards,
 };
@@ -52,7 +52,7 @@ impl Spot {
             mono.over_clear_pupil(&|lens| PupilBoundary::find(lens, point, AZIMUTHS).map_or(0.0, |p| p.area_mm2()))
         };
         let seen_mm2 = if mono.n_obscurations() == 0 { pupil.area_mm2() } else { area_mm2(point) };
-        let mut spot = Self::of_rays(&rays, |ray| areas[ray] * cones[ray]);
+        let mut spot = Self::of_rays(mono, film_mm, &rays, |ray| areas[ray] * cones[ray]);
         spot.energy = Some(area_mm2(axial)).filter(|area| *area > 0.0).map_or(f64::NAN, |area| seen_mm2 / area);
         spot
     }
@@ -66,19 +66,20 @@ impl Spot {
         mono.trace_surfaces(0..stop + 1, &mut rays, Rims::Clip);
         if let Some(model) = paper.bending {
             let edge = Edge::new(mono.stop_semi_aperture_mm(), mono.wavelength_nm(), mono.stop_medium_index());
-            bend(&mut rays, edge, model, BendForm::Angles, paper.seed);
+            let hurb = SampledHurb { model, edge, form: HurbForm::Angles, seed: paper.seed };
+            hurb.apply(&mut rays, &mono.stop_pose());
         }
         mono.trace_surfaces(stop + 1..mono.n_surfaces(), &mut rays, Rims::Clip);
         mono.to_film(&mut rays, film_mm);
-        let mut spot = Self::of_rays(&rays, |_| 1.0);
+        let mut spot = Self::of_rays(mono, film_mm, &rays, |_| 1.0);
         spot.energy = spot.at_mm.len() as f64 / rays.len().max(1) as f64;
         spot
     }
 
-    fn of_rays(rays: &RayBatch, weight: impl Fn(usize) -> f64) -> Self {
+    /// Gathers the rays that reached the film.
+    fn of_rays(mono: &MonoLens, film_mm: f64, rays: &RayBatch, weight: impl Fn(usize) -> f64) -> Self {
         let passed: Vec<usize> = (0..rays.len()).filter(|&ray| rays.fate[ray].is_in_flight()).collect();
-        // The film turned by 180°: upright as the photographer sees it.
-        let at_mm = passed.iter().map(|&ray| -DVec2::new(rays.x_mm[ray], rays.y_mm[ray])).collect();
+        let at_mm = mono.landed(rays, film_mm).map(FilmPoint::in_picture_mm).collect();
         let weights: Vec<f64> = passed.iter().map(|&ray| weight(ray)).collect();
         let sum: f64 = weights.iter().sum();
         Self { at_mm, weights: weights.into_iter().map(|w| w / sum).collect(), energy: 0.0 }

@@ -165,7 +165,7 @@ fn trace_all(lens: &MonoLens, mut rays: RayBatch, settings: &TraceSettings) -> T
         after_surface.push(rays.clone());
     }
     let at_image = settings.film_mm.map(|film_mm| {
-        lens.to_image_surface(&mut rays, film_mm);
+        lens.to_film(&mut rays, film_mm);
         rays
     });
     Traced { after_surface, at_image }

@@ -1,6 +1,7 @@
 //! Banks as fine as they need to be: samples are added until pictures between them are right.
 
 use dioptric_optics::Lens;
+use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
 use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -8,7 +9,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    BankSettings, Diffraction, FieldBank, FieldBankSettings, Interpolation, Kernel, PsfBank, PsfError, PsfQuery,
+    BankSettings, Diffraction, FieldSampling, Interpolation, Kernel, LensImageModel, PsfError, PsfQuery,
+    general::GeneralBank, rotational::RotationalBank,
 };
 
 /// How right a bank is to be, and how large it may become.
@@ -87,25 +89,38 @@ enum Along {
     Color,
 }
 
-impl PsfBank {
-    /// Traces a bank with as many samples as its pictures need: it begins with those of `start`, measures the error at
-    /// held-back places, and adds samples along the axis whose refinement helps most, until the target is met or the
-    /// bank is as large as it may be.
+impl LensImageModel {
+    /// Traces as many samples as pictures between them need, of a lens with an axis of symmetry: it begins with those of
+    /// `start`, measures the error at held-back places, and adds samples along the axis whose refinement helps most, until
+    /// the target is met or there are as many as there may be.
     ///
     /// # Errors
-    /// Those of [`build`](Self::build), and when the adaptive settings make no sense.
-    pub fn build_adaptive(lens: &Lens, start: &BankSettings, wanted: &AdaptiveSettings) -> Result<Self, PsfError> {
+    /// Those of [`build_with`](Self::build_with), and when the adaptive settings make no sense or `start` is not along a
+    /// radius.
+    pub fn build_adaptive(
+        lens: &Lens,
+        start: &BankSettings,
+        wanted: &AdaptiveSettings,
+        progress: &(dyn Fn(f64) + Sync),
+        cancel: &Cancel,
+    ) -> Result<Self, PsfError> {
         let setting = |key, found: f64, expected| Err(PsfError::Setting { key, found, expected });
         if wanted.target_median.is_nan() || wanted.target_median <= 0.0 {
             return setting("target_median", wanted.target_median, "a number above 0");
         }
         wanted.places.check()?;
-        // Bending and waves only smooth what geometry gets wrong.
-        let geometric = |settings: &BankSettings| BankSettings { diffraction: Diffraction::None, ..settings.clone() };
+        if !matches!(start.fields, FieldSampling::Radial(_)) {
+            return setting("fields", start.fields.len() as f64, "fields along a radius");
+        }
+        // HURB and waves only smooth what geometry gets wrong.
+        let geometric = |settings: &BankSettings| {
+            let settings = BankSettings { diffraction: Diffraction::None, ..settings.clone() };
+            RotationalBank::build(lens, &settings, &|_| {}, cancel)
+        };
         let mut settings = start.clone();
-        let first = Self::build(lens, &geometric(&settings))?;
-        let truth = Truth::trace(&first, &wanted.places);
-        let mut error = truth.error_of(&first);
+        let first = geometric(&settings)?;
+        let truth = Truth::trace(&first, &wanted.places, cancel)?;
+        let mut error = truth.error_of(&first, cancel)?;
         while error.median > wanted.target_median {
             let tried = [Along::Field, Along::Depth, Along::Color].into_iter().filter_map(|along| {
                 let finer = along.refined(&settings)?;
@@ -113,7 +128,7 @@ impl PsfBank {
             });
             let mut best: Option<(BankSettings, MeasuredError, f64)> = None;
             for finer in tried {
-                let found = truth.error_of(&Self::build(lens, &geometric(&finer))?);
+                let found = truth.error_of(&geometric(&finer)?, cancel)?;
                 // What it gains for what it costs.
                 let growth = finer.n_samples() as f64 / settings.n_samples() as f64;
                 let gain = (error.median / found.median.max(1e-9)).ln() / growth.ln();
@@ -125,30 +140,22 @@ impl PsfBank {
             (settings, error) = (finer, found);
         }
         let target_median = Some(wanted.target_median);
-        Ok(Self::build(lens, &settings)?.with_error(MeasuredError { target_median, ..error }))
+        Ok(Self::build_with(lens, &settings, progress, cancel)?.with_error(MeasuredError { target_median, ..error }))
     }
 
-    /// Returns the bank with the error of its interpolation measured.
+    /// Returns the error of the model's interpolation, measured at places within what it covers.
     ///
     /// # Errors
-    /// When the places make no sense.
-    pub fn with_measured_error(self, places: &ErrorPlaces) -> Result<Self, PsfError> {
+    /// When the places make no sense, or the work was cancelled.
+    pub fn measured_error(&self, places: &ErrorPlaces, cancel: &Cancel) -> Result<MeasuredError, PsfError> {
         places.check()?;
-        let geometric = self.geometric();
-        let error = Truth::trace(&geometric, places).error_of(&geometric);
-        Ok(self.with_error(error))
-    }
-}
-
-impl FieldBank {
-    /// Returns the error of the bank's interpolation, measured at places within what it covers.
-    ///
-    /// # Errors
-    /// When the places make no sense.
-    pub fn measured_error(&self, places: &ErrorPlaces) -> Result<MeasuredError, PsfError> {
-        places.check()?;
-        let geometric = self.geometric();
-        Ok(Truth::trace(&geometric, places).error_of(&geometric))
+        fn measured(bank: &impl Sampled, places: &ErrorPlaces, cancel: &Cancel) -> Result<MeasuredError, PsfError> {
+            Ok(Truth::trace(bank, places, cancel)?.error_of(bank, cancel)?)
+        }
+        match self.form() {
+            Ok(bank) => measured(&bank.geometric(), places, cancel),
+            Err(bank) => measured(&bank.geometric(), places, cancel),
+        }
     }
 }
 
@@ -157,7 +164,10 @@ impl Along {
     fn refined(self, settings: &BankSettings) -> Option<BankSettings> {
         let mut finer = settings.clone();
         let list = match self {
-            Self::Field => &mut finer.field_tans,
+            Self::Field => match &mut finer.fields {
+                FieldSampling::Radial(tans) => tans,
+                FieldSampling::Grid { .. } | FieldSampling::Points { .. } => return None,
+            },
             Self::Depth => &mut finer.dioptres,
             Self::Color => &mut finer.wavelengths_nm,
         };
@@ -186,7 +196,7 @@ trait Sampled: Sync {
     fn place(&self, pitch_um: f64, part: &mut dyn FnMut() -> f64) -> PsfQuery;
 
     /// Returns the picture of a place, traced there; `None` of a dark one.
-    fn traced(&self, place: PsfQuery) -> Option<Kernel>;
+    fn traced(&self, place: PsfQuery, cancel: &Cancel) -> Option<Kernel>;
 
     /// Returns the picture of a place as it interpolates it; `None` of one that it takes to be dark.
     fn interpolated(&self, place: PsfQuery) -> Option<Kernel>;
@@ -196,7 +206,7 @@ fn between(list: &[f64], part: f64) -> f64 {
     list[0] + (list[list.len() - 1] - list[0]) * part
 }
 
-impl Sampled for PsfBank {
+impl Sampled for RotationalBank {
     fn place(&self, pitch_um: f64, part: &mut dyn FnMut() -> f64) -> PsfQuery {
         PsfQuery {
             field_tan: DVec2::X * between(&[0.0, self.last_field_tan()], part()),
@@ -206,16 +216,17 @@ impl Sampled for PsfBank {
         }
     }
 
-    fn traced(&self, place: PsfQuery) -> Option<Kernel> {
+    fn traced(&self, place: PsfQuery, cancel: &Cancel) -> Option<Kernel> {
         let field = place.field_tan.x;
         let here = BankSettings {
-            field_tans: if field > 0.0 { vec![0.0, field] } else { vec![0.0] },
+            fields: FieldSampling::Radial(if field > 0.0 { vec![0.0, field] } else { vec![0.0] }),
             dioptres: vec![place.dioptres],
             wavelengths_nm: vec![place.wavelength_nm],
             interpolation: Interpolation::Rays,
             ..self.settings().clone()
         };
-        let there = Self::build(self.lens(), &here).ok().filter(|bank| bank.last_field_tan() == field)?;
+        let there =
+            Self::build(self.lens(), &here, &|_| {}, cancel).ok().filter(|bank| bank.last_field_tan() == field)?;
         there.interpolated(place)
     }
 
@@ -224,25 +235,25 @@ impl Sampled for PsfBank {
     }
 }
 
-impl Sampled for FieldBank {
+impl Sampled for GeneralBank {
     fn place(&self, pitch_um: f64, part: &mut dyn FnMut() -> f64) -> PsfQuery {
+        let (tans_x, tans_y) = self.settings().fields.axes();
         PsfQuery {
-            field_tan: DVec2::new(between(&self.settings().tans_x, part()), between(&self.settings().tans_y, part())),
+            field_tan: DVec2::new(between(tans_x, part()), between(tans_y, part())),
             dioptres: between(&self.settings().dioptres, part()),
             wavelength_nm: between(&self.settings().wavelengths_nm, part()),
             pitch_um,
         }
     }
 
-    fn traced(&self, place: PsfQuery) -> Option<Kernel> {
-        let here = FieldBankSettings {
-            tans_x: vec![place.field_tan.x],
-            tans_y: vec![place.field_tan.y],
+    fn traced(&self, place: PsfQuery, cancel: &Cancel) -> Option<Kernel> {
+        let here = BankSettings {
+            fields: FieldSampling::Points { tans_x: vec![place.field_tan.x], tans_y: vec![place.field_tan.y] },
             dioptres: vec![place.dioptres],
             wavelengths_nm: vec![place.wavelength_nm],
             ..self.settings().clone()
         };
-        Self::build(self.lens(), &here).ok()?.interpolated(place)
+        Self::build(self.lens(), &here, &|_| {}, cancel).ok()?.interpolated(place)
     }
 
     fn interpolated(&self, place: PsfQuery) -> Option<Kernel> {
@@ -258,32 +269,39 @@ struct Truth {
 
 impl Truth {
     /// Traces pictures at places within what a bank covers; places that turn out to be dark are left out.
-    fn trace(bank: &impl Sampled, wanted: &ErrorPlaces) -> Self {
+    fn trace(bank: &impl Sampled, wanted: &ErrorPlaces, cancel: &Cancel) -> Result<Self, Cancelled> {
         let mut random = ChaCha8Rng::seed_from_u64(wanted.seed);
         let mut part = || random.random::<f64>();
         let drawn: Vec<PsfQuery> = (0..wanted.n_places).map(|_| bank.place(wanted.pitch_um, &mut part)).collect();
-        let traced = |place: &PsfQuery| Some((*place, bank.traced(*place)?));
-        Self { pitch_um: wanted.pitch_um, places: drawn.par_iter().filter_map(traced).collect() }
+        let traced = |place: &PsfQuery| {
+            cancel.check()?;
+            Ok(bank.traced(*place, cancel).map(|kernel| (*place, kernel)))
+        };
+        let places: Vec<Option<(PsfQuery, Kernel)>> = drawn.par_iter().map(traced).collect::<Result<_, Cancelled>>()?;
+        // What a cancelled trace could not finish is not dark.
+        cancel.check()?;
+        Ok(Self { pitch_um: wanted.pitch_um, places: places.into_iter().flatten().collect() })
     }
 
-    fn error_of(&self, bank: &impl Sampled) -> MeasuredError {
-        let mut errors: Vec<f64> = self
-            .places
-            .par_iter()
-            .filter_map(|(place, truth)| Some(bank.interpolated(*place)?.difference_from(truth)))
-            .collect();
+    fn error_of(&self, bank: &impl Sampled, cancel: &Cancel) -> Result<MeasuredError, Cancelled> {
+        let error = |(place, truth): &(PsfQuery, Kernel)| {
+            cancel.check()?;
+            Ok(bank.interpolated(*place).map(|kernel| kernel.difference_from(truth)))
+        };
+        let errors: Vec<Option<f64>> = self.places.par_iter().map(error).collect::<Result<_, Cancelled>>()?;
+        let mut errors: Vec<f64> = errors.into_iter().flatten().collect();
         errors.sort_by(f64::total_cmp);
         let quantile = |share: f64| {
             let last = errors.len().saturating_sub(1);
             errors.get(((errors.len() as f64 * share) as usize).min(last)).copied().unwrap_or(f64::NAN)
         };
-        MeasuredError {
+        Ok(MeasuredError {
             median: quantile(0.5),
             p90: quantile(0.9),
             n_places: errors.len(),
             pitch_um: self.pitch_um,
             target_median: None,
-        }
+        })
     }
 }
 
@@ -296,35 +314,37 @@ mod tests {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
         let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
         let few = BankSettings {
-            field_tans: vec![0.0, 0.1, 0.2],
+            fields: FieldSampling::Radial(vec![0.0, 0.1, 0.2]),
             dioptres: vec![0.1, 1.0],
             wavelengths_nm: vec![450.0, 650.0],
             ..BankSettings::covering(film_mm, 0.2, (0.1, 1.0), (450.0, 650.0), Diffraction::None)
         };
         let places = ErrorPlaces { n_places: 16, ..ErrorPlaces::STANDARD };
         let wanted = AdaptiveSettings { target_median: 0.01, places, ..AdaptiveSettings::STANDARD };
-        let plain = PsfBank::build(&lens, &few).unwrap();
+        let adaptive =
+            |wanted: &AdaptiveSettings| LensImageModel::build_adaptive(&lens, &few, wanted, &|_| {}, &Cancel::new());
+        let plain = LensImageModel::build(&lens, &few).unwrap();
         assert_eq!(plain.error(), None);
-        let bank = PsfBank::build_adaptive(&lens, &few, &wanted).unwrap();
+        let bank = adaptive(&wanted).unwrap();
         let error = bank.error().unwrap();
         assert!(error.is_target_met() && error.median <= 0.01 && error.p90 >= error.median, "{error:?}");
         println!("{} samples: {error:?}", bank.settings().n_samples());
         assert!(bank.settings().n_samples() > few.n_samples());
-        assert_eq!(bank.settings().field_tans.last(), few.field_tans.last());
+        assert_eq!(bank.settings().fields.axes().0.last(), few.fields.axes().0.last());
         // Measured once more, at other places, it is much the same.
         let elsewhere = ErrorPlaces { seed: 9, n_places: 30, ..places };
-        let again = bank.clone().with_measured_error(&elsewhere).unwrap().error().unwrap();
+        let again = bank.measured_error(&elsewhere, &Cancel::new()).unwrap();
         assert!(again.median < 0.02 && again.is_target_met(), "{again:?}");
         // What is bent has the error of what is not: it is that of rays.
         let bent = BankSettings { diffraction: Diffraction::Hurb { gamma: 1.0 }, ..bank.settings().clone() };
-        let bent = PsfBank::build(&lens, &bent).unwrap().with_measured_error(&elsewhere).unwrap().error().unwrap();
+        let bent = LensImageModel::build(&lens, &bent).unwrap().measured_error(&elsewhere, &Cancel::new()).unwrap();
         assert!((bent.median - again.median).abs() < 1e-6, "{bent:?} {again:?}");
 
         let tight = AdaptiveSettings { most_samples: few.n_samples() + 1, ..wanted };
-        let bank = PsfBank::build_adaptive(&lens, &few, &tight).unwrap();
+        let bank = adaptive(&tight).unwrap();
         assert!(!bank.error().unwrap().is_target_met() && bank.settings().n_samples() == few.n_samples());
-        assert!(PsfBank::build_adaptive(&lens, &few, &AdaptiveSettings { target_median: 0.0, ..wanted }).is_err());
-        assert!(plain.with_measured_error(&ErrorPlaces { n_places: 1, ..places }).is_err());
+        assert!(adaptive(&AdaptiveSettings { target_median: 0.0, ..wanted }).is_err());
+        assert!(plain.measured_error(&ErrorPlaces { n_places: 1, ..places }, &Cancel::new()).is_err());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! A mesh whose rays are bent at the stop, as splats.
 
 use dioptric_diffraction::{Covariance, Edge, Hurb};
+use dioptric_optics::StopPoint;
 use glam::DVec2;
 use multiversion::multiversion;
 
@@ -41,7 +42,7 @@ impl Bending {
     /// Returns the Gaussian of a ray on the film, pixels².
     #[inline(always)]
     fn covariance(self, node: &Node) -> Covariance {
-        let at_stop = self.model.covariance(node.in_stop * self.edge.radius_mm, self.edge);
+        let at_stop = self.model.covariance(StopPoint { mm: node.in_stop * self.edge.radius_mm }, self.edge);
         at_stop.mapped(node.along_l_mm, node.along_m_mm)
     }
 }

@@ -3,8 +3,8 @@
 //! Kept so that the paper can be reproduced. For anything else a [`PsfBank`](crate::PsfBank) needs a thousandth of the
 //! rays, keeps the light that is lost, and has no noise.
 
-use dioptric_diffraction::{BendForm, Edge, Hurb, bend};
-use dioptric_optics::{Beam, MonoLens, ObjectPoint, RayBatch, Rims, rays_towards};
+use dioptric_diffraction::{Edge, Hurb, HurbForm, SampledHurb};
+use dioptric_optics::{Beam, FilmPoint, MonoLens, ObjectPoint, RayBatch, Rims, rays_towards};
 use glam::{DVec2, DVec3};
 use ndarray::Array2;
 use rand::RngExt;
@@ -35,7 +35,7 @@ pub struct CountingFilm {
     pub n_pixels: usize,
     /// Side, mm.
     pub side_mm: f64,
-    /// Place of its middle in the lens frame, mm.
+    /// Place of its middle on the film, mm along the film's own x and y.
     pub center_mm: DVec2,
 }
 
@@ -74,37 +74,39 @@ pub fn trace_as_authors(lens: &MonoLens, rays: &mut RayBatch, film_mm: f64, bend
         lens.trace_surfaces(surface..surface + 1, rays, Rims::Clip);
         if let Some(AuthorsBending { model, seed }) = bending {
             let edge = Edge::new(lens.semi_aperture_mm(surface), lens.wavelength_nm(), 1.0);
-            bend(rays, edge, model, BendForm::Angles, seed.wrapping_add(surface as u64));
+            let seed = seed.wrapping_add(surface as u64);
+            let hurb = SampledHurb { model, edge, form: HurbForm::Angles, seed };
+            hurb.apply(rays, &lens.surface_pose(surface));
         }
     }
     lens.to_film(rays, film_mm);
 }
 
 impl CountingFilm {
-    /// Returns how many rays in flight fall on each pixel: row 0 has the largest y, column 0 the smallest x.
+    /// Returns how many places fall on each pixel: row 0 has the largest y, column 0 the smallest x.
     ///
     /// The first column stays empty, as it did for the authors.
-    pub fn count(self, rays: &RayBatch) -> Array2<f64> {
+    pub fn count(self, landed: impl IntoIterator<Item = FilmPoint>) -> Array2<f64> {
         let mut counts = Array2::zeros((self.n_pixels, self.n_pixels));
-        self.add(rays, &mut counts);
+        self.add(landed, &mut counts);
         counts
     }
 
-    /// Returns what [`count`](Self::count) does for the rays of a beam on the plane `film_mm` behind the lens, without
+    /// Returns what [`count`](Self::count) does for the rays of a beam on the film, `film_mm` behind the lens, without
     /// storing them.
     pub fn count_beam(self, lens: &MonoLens, beam: &Beam<'_>, film_mm: f64) -> Array2<f64> {
         let mut counts = Array2::zeros((self.n_pixels, self.n_pixels));
-        lens.trace_onto(beam, Rims::Clip, film_mm, |rays| self.add(rays, &mut counts));
+        lens.trace_onto(beam, Rims::Clip, film_mm, |rays| self.add(lens.landed(rays, film_mm), &mut counts));
         counts
     }
 
-    fn add(self, rays: &RayBatch, counts: &mut Array2<f64>) {
+    fn add(self, landed: impl IntoIterator<Item = FilmPoint>, counts: &mut Array2<f64>) {
         let pixels_per_mm = self.n_pixels as f64 / self.side_mm;
         let middle = 0.5 * (self.n_pixels as f64 + 1.0);
         let last = self.n_pixels as f64;
-        for ray in (0..rays.len()).filter(|&ray| rays.fate[ray].is_in_flight()) {
+        for place in landed {
             // Places count from 1.
-            let at = (rays.point_mm(ray).truncate() - self.center_mm) * pixels_per_mm;
+            let at = (place.mm - self.center_mm) * pixels_per_mm;
             let (row, column) = ((middle - at.y).round(), (middle + at.x).round());
             if (2.0..=last).contains(&column) && (1.0..=last).contains(&row) {
                 counts[(row as usize - 1, column as usize - 1)] += 1.0;
@@ -118,11 +120,10 @@ impl CountingFilm {
     }
 }
 
-/// Returns the mean place of the rays in flight, mm, or `None` if there are none.
-pub fn mean_place_mm(rays: &RayBatch) -> Option<DVec2> {
-    let flying: Vec<usize> = (0..rays.len()).filter(|&ray| rays.fate[ray].is_in_flight()).collect();
-    let sum: DVec2 = flying.iter().map(|&ray| rays.point_mm(ray).truncate()).sum();
-    (!flying.is_empty()).then(|| sum / flying.len() as f64)
+/// Returns the mean place, mm, or `None` if there are none.
+pub fn mean_place_mm(landed: impl IntoIterator<Item = FilmPoint>) -> Option<DVec2> {
+    let (sum, n) = landed.into_iter().fold((DVec2::ZERO, 0.0), |(sum, n), place| (sum + place.mm, n + 1.0));
+    (n > 0.0).then(|| sum / n)
 }
 
 #[cfg(test)]
@@ -146,8 +147,7 @@ mod tests {
     fn the_authors_film_loses_its_first_column() {
         let film = CountingFilm { n_pixels: 5, side_mm: 5.0, center_mm: DVec2::new(1.0, 0.0) };
         let places = [(-1.0, 0.0), (0.0, 0.0), (1.4, 2.4), (3.4, -2.4), (3.6, 0.0)];
-        let points: Vec<DVec3> = places.map(|(x, y)| DVec3::new(x, y, 0.0)).to_vec();
-        let counts = film.count(&RayBatch::from_points(&points, &[DVec3::Z; 5]));
+        let counts = film.count(places.map(|(x, y)| FilmPoint { mm: DVec2::new(x, y) }));
         let mut expected = Array2::zeros((5, 5));
         for at in [(2, 1), (0, 2), (4, 4)] {
             expected[at] = 1.0;
@@ -163,11 +163,11 @@ mod tests {
         let (film_mm, targets_mm) = (52.0, grid.targets_mm(&lens));
         let mut rays = grid.rays(&lens, source_mm);
         lens.trace_to_film(&mut rays, Rims::Clip, film_mm);
-        let center_mm = mean_place_mm(&rays).unwrap();
+        let center_mm = mean_place_mm(lens.landed(&rays, film_mm)).unwrap();
         let film = CountingFilm { n_pixels: 64, side_mm: 1.0, center_mm };
         let beam = Beam { point: ObjectPoint::Finite(source_mm), targets_mm: &targets_mm, z_mm: 0.0 };
         let counts = film.count_beam(&lens, &beam, film_mm);
         assert!(counts.sum() > 1e3);
-        assert_eq!(counts, film.count(&rays));
+        assert_eq!(counts, film.count(lens.landed(&rays, film_mm)));
     }
 }

@@ -7,10 +7,11 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use crate::{
-    Diffraction, Interpolation, Kernel, PsfBank,
+    Diffraction, Interpolation, Kernel,
     bend::Bending,
     ray_map::Record,
     render::{self, Layout},
+    rotational::RotationalBank,
 };
 
 /// The largest range of phases, radians, at which a kernel is wave optics alone; at twice that there is none.
@@ -39,23 +40,23 @@ pub struct ModelUse {
     pub fallback: Option<String>,
 }
 
-impl PsfBank {
-    /// Returns the point spread function of a point, on pixels of a pitch, about its centroid.
-    ///
-    /// Fields, depths and wavelengths outside the bank are moved to its ends. The window holds the whole geometric
-    /// picture, and of diffraction's Gaussians all but their far tails; the sum says how much.
-    pub fn kernel(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Kernel {
-        self.kernel_and_model(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um }).0
+impl PsfQuery {
+    /// Returns the query of a point in this field, at this depth and wavelength, on pixels of this side.
+    pub fn new(field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Self {
+        Self { field_tan, dioptres, wavelength_nm, pitch_um }
     }
+}
 
+impl RotationalBank {
     /// Returns the energy on each pixel of a window of `size` × `size` about the centroid, in the picture frame, and
-    /// the model that drew it. The energy of the point is 1; what falls outside is lost.
-    pub fn picture(&self, query: PsfQuery, size: usize) -> (Array2<f64>, ModelUse) {
+    /// the model that drew it.
+    pub(crate) fn picture(&self, query: PsfQuery, size: usize) -> (Array2<f64>, ModelUse) {
         self.draw(query, Some(size))
     }
 
-    /// Returns [`kernel`](Self::kernel) with the model that drew it.
-    pub fn kernel_and_model(&self, query: PsfQuery) -> (Kernel, ModelUse) {
+    /// Returns the point spread function of a point about its centroid and the model that drew it. Fields outside the bank
+    /// are moved to its ends.
+    pub(crate) fn kernel_and_model(&self, query: PsfQuery) -> (Kernel, ModelUse) {
         let (energies, model) = self.draw(query, None);
         (render::kernel(&energies, self.settings().diffraction != Diffraction::None, query.pitch_um), model)
     }
@@ -74,14 +75,9 @@ impl PsfBank {
         composed(layout, self.settings().diffraction, |side| self.wave_energies(query, side))
     }
 
-    /// Returns how much of a kernel is wave optics, and not uncertainty bending: 1 or 0, or between them where they are
-    /// blended. It is 0 unless the bank has [`Diffraction::Wave`].
-    ///
-    /// It falls with the range of phases B over the pupil that the sum has to follow, on a scale of its logarithm: from
-    /// 1 at B = 200 to 0 at B = 400, a blur of about ten waves of defocus.
-    pub fn wave_share(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> f64 {
-        let record = self.record(field_tan, dioptres, wavelength_nm);
-        let query = PsfQuery { field_tan: DVec2::X * field_tan, dioptres, wavelength_nm, pitch_um };
+    /// Returns how much of a kernel is wave optics.
+    pub(crate) fn wave_fraction(&self, query: PsfQuery) -> f64 {
+        let record = self.record(query.field_tan.length(), query.dioptres, query.wavelength_nm);
         wave_share_of(&self.layout(&record, query, None), self.settings().diffraction)
     }
 
@@ -128,7 +124,8 @@ pub(crate) fn composed(
     }
 }
 
-fn wave_share_of(layout: &Layout<'_>, diffraction: Diffraction) -> f64 {
+/// Returns how much of a layout is wave optics: 1 up to a range of phases of 200, falling with its logarithm to 0 at 400.
+pub(crate) fn wave_share_of(layout: &Layout<'_>, diffraction: Diffraction) -> f64 {
     match diffraction {
         Diffraction::Wave => (2.0 - (layout.bandwidth() / ALL_WAVE).log2()).clamp(1.0, 2.0) - 1.0,
         _ => 0.0,

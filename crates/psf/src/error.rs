@@ -2,6 +2,7 @@
 
 use dioptric_diffraction::DiffractionError;
 use dioptric_optics::OpticsError;
+use dioptric_spectrum::Cancelled;
 
 /// A bank or point spread function that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -42,12 +43,7 @@ pub enum PsfError {
         /// Wavelength, nm.
         wavelength_nm: f64,
     },
-    /// A bank's file that cannot be read or written.
-    #[error("{}: {reason}", path.display())]
-    File {
-        /// The file.
-        path: std::path::PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
+    /// The work was stopped on request.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }

@@ -1,5 +1,6 @@
 //! From places on the film back to fields, for lenses without an axis of symmetry.
 
+use dioptric_spectrum::{Cancel, Cancelled};
 use glam::{DMat2, DVec2};
 
 use crate::axis::{Axis, Stencil};
@@ -178,7 +179,7 @@ impl Landing<'_> {
     }
 
     /// Tabulates the inverse over an area of the film.
-    pub(crate) fn inverse(&self, area: Area) -> FieldGeometry {
+    pub(crate) fn inverse(&self, area: Area, cancel: &Cancel) -> Result<FieldGeometry, Cancelled> {
         let n_x = self.x.knots().len();
         let step_mm = area.step_mm();
         let nearest = |place_mm: DVec2| {
@@ -188,6 +189,7 @@ impl Landing<'_> {
         };
         let mut nodes = Vec::with_capacity(NODES * NODES);
         for row in 0..NODES {
+            cancel.check()?;
             let mut beside: Option<DVec2> = None;
             for column in 0..NODES {
                 let place_mm = area.first_mm + step_mm * DVec2::new(column as f64, row as f64);
@@ -198,7 +200,7 @@ impl Landing<'_> {
                 );
             }
         }
-        FieldGeometry { area, nodes }
+        Ok(FieldGeometry { area, nodes })
     }
 }
 
@@ -225,7 +227,8 @@ mod tests {
     fn places_are_traced_back_to_their_fields() {
         let (x, y) = (axis(0.4, 11), axis(0.3, 11));
         let landing = landing(&x, &y, |_| 100.0);
-        let geometry = landing.inverse(Area::around(landing.centroids_mm.iter().copied()).unwrap());
+        let geometry =
+            landing.inverse(Area::around(landing.centroids_mm.iter().copied()).unwrap(), &Cancel::new()).unwrap();
         for (across, up) in [(0.0, 0.0), (0.31, -0.22), (-0.37, 0.27), (0.12, 0.05)] {
             let field_tan = DVec2::new(across, up);
             let (found, gain) = geometry.at(land(field_tan)).unwrap();
@@ -248,7 +251,8 @@ mod tests {
     fn light_ends_without_swings() {
         let (x, y) = (axis(0.4, 11), axis(0.3, 11));
         let landing = landing(&x, &y, |tan| if tan.x > 0.25 { 0.0 } else { 100.0 });
-        let geometry = landing.inverse(Area::around(landing.centroids_mm.iter().copied()).unwrap());
+        let geometry =
+            landing.inverse(Area::around(landing.centroids_mm.iter().copied()).unwrap(), &Cancel::new()).unwrap();
         let full = geometry.at(land(DVec2::new(0.1, 0.0))).unwrap().1;
         for i in 0..40 {
             let at = DVec2::new(0.01 * f64::from(i), 0.0);
@@ -264,7 +268,7 @@ mod tests {
         let (x, y) = (axis(0.4, 5), axis(0.3, 5));
         let landing = landing(&x, &y, |_| 100.0);
         let area = Area { first_mm: DVec2::splat(-5.0), last_mm: DVec2::splat(5.0) };
-        let geometry = landing.inverse(area);
+        let geometry = landing.inverse(area, &Cancel::new()).unwrap();
         let mixed = FieldGeometry::mix([(&geometry, 0.75), (&geometry, 0.25)].into_iter()).unwrap();
         let at = DVec2::new(1.3, -2.2);
         assert!((mixed.at(at).unwrap().0 - geometry.at(at).unwrap().0).length() < 1e-15);

@@ -1,6 +1,7 @@
 //! Point spread functions over field, depth and wavelength.
 //!
-//! A [`PsfBank`] keeps where rays land, interpolates rays, and draws them on pixels with exact energy. [`Picture`]
+//! A [`LensImageModel`] keeps where rays land, interpolates rays, and draws them on pixels with exact energy; [`LensImage`] is
+//! what imaging a scene asks of it. [`Picture`]
 //! measures any point spread function.
 //!
 //! Lengths are millimetres in the lens and on the film, micrometres on pixels; wavelengths nanometres; fields are
@@ -12,7 +13,6 @@
 
 mod adaptive;
 mod axis;
-mod bank;
 mod bend;
 mod blend;
 mod count;
@@ -20,13 +20,16 @@ mod dispersion;
 mod drawing;
 mod energy;
 mod error;
-mod field_bank;
 mod field_geometry;
+mod field_to_film;
+mod film_map;
+mod general;
 mod geometry;
-mod imaging;
 mod kernel;
+mod lens_image;
 mod mesh;
 mod metrics;
+mod model;
 pub mod paper;
 mod power;
 mod profile;
@@ -35,22 +38,23 @@ mod raster;
 mod ray_map;
 mod render;
 mod ring;
+mod rotational;
 mod settings;
 mod splat;
-mod store;
 mod stroke;
+mod watch;
 
 pub use adaptive::{AdaptiveSettings, ErrorPlaces, MeasuredError};
-pub use bank::PsfBank;
 pub use count::{AuthorsBending, CountingFilm, FrontGrid, mean_place_mm, trace_as_authors};
 pub use drawing::{ModelUse, PsfQuery};
 pub use energy::EnclosedEnergy;
 pub use error::PsfError;
-pub use field_bank::{FieldBank, FieldBankSettings};
 pub use field_geometry::FieldGeometry;
+pub use film_map::{FilmMap, RadialMap};
 pub use geometry::RadialGeometry;
-pub use imaging::ImagingBank;
 pub use kernel::Kernel;
+pub use lens_image::LensImage;
 pub use metrics::{Picture, Profile};
+pub use model::LensImageModel;
 pub use raster::Raster;
-pub use settings::{BankSettings, Diffraction, Interpolation};
+pub use settings::{BankSettings, Diffraction, FieldSampling, Interpolation, SampleCounts};

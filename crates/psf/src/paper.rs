@@ -59,8 +59,11 @@ pub fn counted_psfs(
 /// or `None` if none of them arrives.
 pub fn film_center_mm(lenses: &[MonoLens], source_mm: DVec3, film_mm: f64) -> Option<DVec2> {
     let coarse = FrontGrid { n_across: 26, jitter_seed: None };
-    let means: Vec<DVec2> =
-        lenses.iter().filter_map(|lens| mean_place_mm(&land(lens, source_mm, film_mm, coarse))).collect();
+    let mean_mm = |lens: &MonoLens| {
+        let rays = land(lens, source_mm, film_mm, coarse);
+        mean_place_mm(lens.landed(&rays, film_mm))
+    };
+    let means: Vec<DVec2> = lenses.iter().filter_map(mean_mm).collect();
     (!means.is_empty()).then(|| means.iter().sum::<DVec2>() / means.len() as f64)
 }
 
@@ -141,7 +144,8 @@ impl Figure2 {
         let bending = crate::AuthorsBending { model, seed: seed.wrapping_add(1) };
         trace_as_authors(&lens, &mut rays, FIGURE_2_FILM_MM, Some(bending));
         let film = CountingFilm { n_pixels: self.n_pixels, side_mm: 1e-3 * self.side_um(), center_mm: DVec2::ZERO };
-        Ok(Picture::new(film.count(&rays).view(), film.pitch_um()).line_spread(0.0))
+        let counts = film.count(lens.landed(&rays, FIGURE_2_FILM_MM));
+        Ok(Picture::new(counts.view(), film.pitch_um()).line_spread(0.0))
     }
 }
 
@@ -203,7 +207,8 @@ mod tests {
             let widest =
                 (0..4).max_by(|&a, &b| number(&point[a], "sigma_x_mm").total_cmp(&number(&point[b], "sigma_x_mm")));
             let widest = widest.unwrap();
-            let mean = mean_place_mm(&land(&lenses[widest], source_mm, ARRAY_FILM_MM, grid)).unwrap();
+            let rays = land(&lenses[widest], source_mm, ARRAY_FILM_MM, grid);
+            let mean = mean_place_mm(lenses[widest].landed(&rays, ARRAY_FILM_MM)).unwrap();
             let center_mm = mean - DVec2::X * number(&point[widest], "window_centroid_dx_mm");
             let film = CountingFilm { center_mm, ..film };
             for (row, counts) in point.iter().zip(counted_psfs(&lenses, source_mm, ARRAY_FILM_MM, grid, film)) {

@@ -1,7 +1,7 @@
 //! Where the nodes of the pupil mesh land on the film: the map from which a point spread function is drawn.
 
 use dioptric_diffraction::{StopRay, trace_stop_rays};
-use dioptric_optics::{MonoLens, ObjectPoint, RayFate, Rims, rays_towards};
+use dioptric_optics::{FilmPoint, MonoLens, ObjectPoint, RayFate, Rims, rays_towards};
 use glam::DVec2;
 use multiversion::multiversion;
 
@@ -197,8 +197,8 @@ impl Task<'_> {
         let landed: Vec<Option<Node>> = if has_stop {
             let radius_mm = self.lens.stop_semi_aperture_mm();
             let node = |ray: StopRay| Node {
-                at_mm: -ray.film_mm,
-                in_stop: ray.stop_mm / radius_mm,
+                at_mm: ray.film.in_picture_mm(),
+                in_stop: ray.stop.mm / radius_mm,
                 along_l_mm: -ray.along_l_mm,
                 along_m_mm: -ray.along_m_mm,
             };
@@ -206,8 +206,9 @@ impl Task<'_> {
         } else {
             self.lens.trace(&mut rays, Rims::Ignore);
             self.lens.to_film(&mut rays, self.film_mm);
-            let node = |ray| Node { at_mm: -rays.point_mm(ray).truncate(), ..Node::default() };
-            (0..rays.len()).map(|ray| rays.fate[ray].is_in_flight().then(|| node(ray))).collect()
+            let node = |at: FilmPoint| Node { at_mm: at.in_picture_mm(), ..Node::default() };
+            let places = self.lens.film_points(&rays, self.film_mm);
+            places.into_iter().zip(&rays.fate).map(|(at, fate)| fate.is_in_flight().then(|| node(at))).collect()
         };
         let mut nodes = vec![landed[0]?];
         for (i, node) in landed.into_iter().enumerate().skip(1) {

@@ -1,13 +1,13 @@
 //! Drawn uncertainty bending, held to random bending at the stop.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
-use dioptric_diffraction::{BendForm, Edge, Hurb, bend};
+use dioptric_diffraction::{Edge, Hurb, HurbForm, SampledHurb};
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
+    FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
     glam::{DVec2, DVec3},
     rays_towards,
 };
-use dioptric_psf::{BankSettings, Diffraction, Interpolation, Kernel, PsfBank, PsfQuery};
+use dioptric_psf::{BankSettings, Diffraction, FieldSampling, Interpolation, Kernel, LensImageModel, PsfQuery};
 
 const PITCH_UM: f64 = 4.0;
 
@@ -45,7 +45,7 @@ fn difference(lens: &Lens, kernel: &Kernel, field_tan: f64, dioptres: f64, film_
             mono.trace_surfaces(mono.stop() + 1..mono.n_surfaces(), &mut rays, Rims::Ignore);
         }
         mono.to_film(&mut rays, film_mm);
-        (0..rays.len()).map(|ray| -rays.point_mm(ray).truncate()).collect::<Vec<DVec2>>()
+        mono.landed(&rays, film_mm).map(FilmPoint::in_picture_mm).collect::<Vec<DVec2>>()
     };
     let straight = land(behind.clone());
     let centroid = straight.iter().sum::<DVec2>() / straight.len() as f64;
@@ -55,7 +55,9 @@ fn difference(lens: &Lens, kernel: &Kernel, field_tan: f64, dioptres: f64, film_
     let mut counts = vec![0.0f64; side * side];
     for round in 0..n_rounds {
         let mut rays = behind.clone();
-        bend(&mut rays, edge, Hurb::with_gamma(gamma), BendForm::DirectionCosines, round);
+        let form = HurbForm::DirectionCosines;
+        let hurb = SampledHurb { model: Hurb::with_gamma(gamma), edge, form, seed: round };
+        hurb.apply(&mut rays, &mono.stop_pose());
         for at in land(rays) {
             let at = (at - centroid) * (1e3 / PITCH_UM);
             let (column, row) = (at.x + 0.5 * side as f64, 0.5 * side as f64 - at.y);
@@ -84,11 +86,15 @@ fn kernels_are_those_of_rays_bent_at_random() {
         let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
         let gamma = 1.0;
         let settings = BankSettings {
-            field_tans: vec![0.0, 0.1],
+            fields: FieldSampling::Radial(vec![0.0, 0.1]),
             ..BankSettings::covering(film_mm, 0.1, (dioptres, dioptres), (550.0, 550.0), Diffraction::Hurb { gamma })
         };
-        let kernel =
-            PsfBank::build(&lens, &settings).unwrap().kernel(DVec2::new(field_tan, 0.0), dioptres, 550.0, PITCH_UM);
+        let kernel = LensImageModel::build(&lens, &settings).unwrap().kernel(PsfQuery::new(
+            DVec2::new(field_tan, 0.0),
+            dioptres,
+            550.0,
+            PITCH_UM,
+        ));
         let (l1, noise) = difference(&lens, &kernel, field_tan, dioptres, film_mm, gamma);
         println!(
             "f/{f_number}, {field_tan}, {dioptres} D: {l1:.4}, noise {noise:.4}, drawing {:.4}",
@@ -106,7 +112,7 @@ fn light_beyond_the_edge_of_a_blur_is_even_around_it() {
     let settings = BankSettings {
         film_mm: 51.0,
         reference_wavelength_nm: 550.0,
-        field_tans: vec![0.0, 0.1],
+        fields: FieldSampling::Radial(vec![0.0, 0.1]),
         dioptres: vec![0.0],
         wavelengths_nm: vec![550.0],
         n_rings: 12,
@@ -114,9 +120,9 @@ fn light_beyond_the_edge_of_a_blur_is_even_around_it() {
         diffraction: Diffraction::Hurb { gamma: 1.0 },
         interpolation: Interpolation::Rays,
     };
-    let bank = PsfBank::build(&lens, &settings).unwrap();
+    let bank = LensImageModel::build(&lens, &settings).unwrap();
     let query = PsfQuery { field_tan: DVec2::ZERO, dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 1.0 };
-    let (picture, _) = bank.picture(query, 241);
+    let (picture, _) = bank.picture(query, 241).unwrap();
     for radius in [70.0, 80.0, 90.0] {
         // Between pixels, by straight lines.
         let at = |azimuth: f64| {

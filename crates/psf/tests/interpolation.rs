@@ -2,7 +2,10 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_optics::{Lens, glam::DVec2};
-use dioptric_psf::{BankSettings, Diffraction, ErrorPlaces, Interpolation, Kernel, Picture, PsfBank};
+use dioptric_psf::{
+    BankSettings, Diffraction, ErrorPlaces, FieldSampling, Interpolation, Kernel, LensImageModel, Picture, PsfQuery,
+};
+use dioptric_spectrum::Cancel;
 use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
@@ -47,22 +50,22 @@ impl Errors {
 
 /// Compares a bank with banks that have a sample right where it is asked, at 60 random places.
 fn errors_of(lens: &Lens, settings: &BankSettings) -> (Errors, Errors) {
-    let bank = PsfBank::build(lens, settings).unwrap();
+    let bank = LensImageModel::build(lens, settings).unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let mut between = |list: &[f64]| list[0] + (list[list.len() - 1] - list[0]) * random.random::<f64>();
     let (mut l1, mut esf) = (vec![], vec![]);
     for _ in 0..60 {
         let (field, dioptres, nm) =
-            (between(&settings.field_tans), between(&settings.dioptres), between(&settings.wavelengths_nm));
+            (between(settings.fields.axes().0), between(&settings.dioptres), between(&settings.wavelengths_nm));
         let exact = BankSettings {
-            field_tans: vec![0.0, field],
+            fields: FieldSampling::Radial(vec![0.0, field]),
             dioptres: vec![dioptres],
             wavelengths_nm: vec![nm],
             ..settings.clone()
         };
         let at = DVec2::new(field, 0.0);
-        let exact = PsfBank::build(lens, &exact).unwrap().kernel(at, dioptres, nm, PITCH_UM);
-        let (a, b) = differences(&bank.kernel(at, dioptres, nm, PITCH_UM), &exact);
+        let exact = LensImageModel::build(lens, &exact).unwrap().kernel(PsfQuery::new(at, dioptres, nm, PITCH_UM));
+        let (a, b) = differences(&bank.kernel(PsfQuery::new(at, dioptres, nm, PITCH_UM)), &exact);
         l1.push(a);
         esf.push(b);
     }
@@ -75,7 +78,7 @@ fn the_double_gauss_is_met_from_288_samples() {
     let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
     let last = 18f64.to_radians().tan();
     let settings = BankSettings {
-        field_tans: (0..8).map(|i| last * f64::from(i) / 7.0).collect(),
+        fields: FieldSampling::Radial((0..8).map(|i| last * f64::from(i) / 7.0).collect()),
         ..BankSettings::covering(film_mm, last, (0.05, 1.2), (420.0, 680.0), Diffraction::None)
     };
     let (l1, esf) = errors_of(&lens, &settings);
@@ -91,7 +94,7 @@ fn the_papers_lens_is_met_from_48_samples() {
     let last = 12f64.to_radians().tan();
     let covering = BankSettings::covering(film_mm, last, (0.05, 1.2), (420.0, 680.0), Diffraction::None);
     let settings = BankSettings {
-        field_tans: (0..4).map(|i| last * f64::from(i) / 3.0).collect(),
+        fields: FieldSampling::Radial((0..4).map(|i| last * f64::from(i) / 3.0).collect()),
         dioptres: (0..4).map(|i| 0.05 + 1.15 * f64::from(i) / 3.0).collect(),
         wavelengths_nm: vec![420.0, 505.6, 680.0],
         ..covering
@@ -108,13 +111,13 @@ fn blended_pictures_are_far_from_what_lies_between_them() {
     let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
     let last = 18f64.to_radians().tan();
     let rays = BankSettings {
-        field_tans: (0..8).map(|i| last * f64::from(i) / 7.0).collect(),
+        fields: FieldSampling::Radial((0..8).map(|i| last * f64::from(i) / 7.0).collect()),
         ..BankSettings::covering(film_mm, last, (0.05, 1.2), (420.0, 680.0), Diffraction::None)
     };
     let images = BankSettings { interpolation: Interpolation::Images, ..rays.clone() };
     let places = ErrorPlaces { n_places: 60, ..ErrorPlaces::STANDARD };
     let error = |settings: &BankSettings| {
-        PsfBank::build(&lens, settings).unwrap().with_measured_error(&places).unwrap().error().unwrap()
+        LensImageModel::build(&lens, settings).unwrap().measured_error(&places, &Cancel::new()).unwrap()
     };
     let (rays, images) = (error(&rays), error(&images));
     println!("rays {} {}, images {} {}", rays.median, rays.p90, images.median, images.p90);

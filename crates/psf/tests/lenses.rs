@@ -3,8 +3,8 @@
 
 use std::f64::consts::PI;
 
-use dioptric_optics::{Lens, ObjectPoint, PupilBoundary, Rims, glam::DVec2, rays_towards};
-use dioptric_psf::{BankSettings, Diffraction, Kernel, Picture, PsfBank};
+use dioptric_optics::{FilmPoint, Lens, ObjectPoint, PupilBoundary, Rims, glam::DVec2, rays_towards};
+use dioptric_psf::{BankSettings, Diffraction, FieldSampling, Kernel, LensImageModel, Picture, PsfQuery};
 
 #[test]
 fn every_built_in_lens_has_a_bank() {
@@ -26,11 +26,11 @@ fn every_built_in_lens_has_a_bank() {
             n_azimuths: 24,
             ..BankSettings::covering(film_mm, 0.1, dioptres, (486.0, 656.0), Diffraction::Hurb { gamma: 1.0 })
         };
-        let bank = PsfBank::build(&lens, &settings).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let last = bank.last_field_tan();
-        let geometry = bank.geometry(dioptres.0, 550.0);
+        let bank = LensImageModel::build(&lens, &settings).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let last = bank.settings().fields.axes().0[bank.n_fields() - 1];
+        let geometry = bank.radial_geometry(dioptres.0, 550.0).unwrap();
         let radius_mm = geometry.image_radius_mm(0.5 * last);
-        let sum = bank.kernel(DVec2::new(0.3 * last, 0.4 * last), dioptres.0, 550.0, 4.0).sum();
+        let sum = bank.kernel(PsfQuery::new(DVec2::new(0.3 * last, 0.4 * last), dioptres.0, 550.0, 4.0)).sum();
         assert!(sum > 0.9 && sum < 1.001, "{name}: {sum}");
         if last > 0.0 {
             assert!(radius_mm > 0.0, "{name}: {radius_mm}");
@@ -45,9 +45,9 @@ fn a_pinhole_casts_its_shadow() {
     let (diameter_mm, film_mm) = (0.5, 50.0);
     let lens = Lens::pinhole(diameter_mm).unwrap();
     let settings = BankSettings::covering(film_mm, 0.3, (0.0, 2.0), (550.0, 550.0), Diffraction::None);
-    let bank = PsfBank::build(&lens, &settings).unwrap();
+    let bank = LensImageModel::build(&lens, &settings).unwrap();
     for (field_tan, dioptres) in [(0.0, 0.0), (0.2, 1.0), (0.3, 2.0)] {
-        let geometry = bank.geometry(dioptres, 550.0);
+        let geometry = bank.radial_geometry(dioptres, 550.0).unwrap();
         // A near point lights the near side of the hole more: the centroid moves by parts of R²/Z.
         assert!((geometry.image_radius_mm(field_tan) - film_mm * field_tan).abs() < 1e-4);
         // E/L = A cos⁴ / f², with the whole pupil in one direction.
@@ -56,10 +56,10 @@ fn a_pinhole_casts_its_shadow() {
         assert!((geometry.irradiance_per_radiance(field_tan) / expected - 1.0).abs() < 1e-3);
         // A disc of the pinhole's size, seen from the point.
         let radius_um = 0.5e3 * diameter_mm * (1.0 + film_mm * dioptres * 1e-3);
-        let kernel = bank.kernel(DVec2::new(field_tan, 0.0), dioptres, 550.0, 5.0);
+        let kernel = bank.kernel(PsfQuery::new(DVec2::new(field_tan, 0.0), dioptres, 550.0, 5.0));
         let rms_um = Picture::from(&kernel).rms_radius_um();
         assert!((rms_um / (radius_um / 2f64.sqrt()) - 1.0).abs() < 0.005, "{rms_um} {radius_um}");
-        assert!(bank.blur_radius_mm(field_tan, dioptres, 550.0) > 0.0);
+        assert!(bank.blur_radius_mm(DVec2::X * field_tan, dioptres, 550.0) > 0.0);
     }
 }
 
@@ -70,15 +70,15 @@ fn an_ideal_lens_follows_the_thin_lens_equation() {
     let film_mm = lens.at(550.0).unwrap().film_mm_for(1000.0).unwrap();
     assert!((film_mm - 1000.0 * 50.0 / 950.0).abs() < 1e-9);
     let settings = BankSettings::covering(film_mm, 0.2, (0.0, 3.0), (550.0, 550.0), Diffraction::None);
-    let bank = PsfBank::build(&lens, &settings).unwrap();
+    let bank = LensImageModel::build(&lens, &settings).unwrap();
     for dioptres in [0.0, 0.4, 0.9, 1.3, 2.7] {
         // Circle of confusion: radius × film × (difference of vergences); 95 % of an even disc is within 0.975 of it.
         let expected_mm = 0.5 * diameter_mm * film_mm * (dioptres - 1.0) * 1e-3 * 0.95f64.sqrt();
-        let blur_mm = bank.blur_radius_mm(0.1, dioptres, 550.0);
+        let blur_mm = bank.blur_radius_mm(DVec2::X * 0.1, dioptres, 550.0);
         // The rms radius of the mesh's cells is 0.5 % short of the disc's.
         assert!((blur_mm / expected_mm - 1.0).abs() < 0.01, "{dioptres}: {blur_mm} {expected_mm}");
         // cos⁴ is exact for a thin lens and a far film but for the size of the pupil.
-        let geometry = bank.geometry(dioptres, 550.0);
+        let geometry = bank.radial_geometry(dioptres, 550.0).unwrap();
         let on_axis = PI * (0.5 * diameter_mm / film_mm).powi(2);
         let expected = on_axis * (1.0 + 0.15f64 * 0.15).powi(-2);
         assert!((geometry.irradiance_per_radiance(0.15) / expected - 1.0).abs() < 3e-3);
@@ -102,8 +102,7 @@ fn counted(lens: &Lens, like: &Kernel, field_tan: f64, dioptres: f64, film_mm: f
     let mut rays = rays_towards(&point, &targets, boundary.z_mm(), 0.0);
     mono.trace(&mut rays, Rims::Clip);
     mono.to_film(&mut rays, film_mm);
-    let landed: Vec<DVec2> =
-        (0..n).filter(|&i| rays.fate[i].is_in_flight()).map(|i| -rays.point_mm(i).truncate()).collect();
+    let landed: Vec<DVec2> = mono.landed(&rays, film_mm).map(FilmPoint::in_picture_mm).collect();
     let centroid = landed.iter().sum::<DVec2>() / landed.len() as f64;
     let side = like.samples.nrows();
     let mut counts = vec![0.0; side * side];
@@ -123,11 +122,11 @@ fn a_mesh_of_576_rays_is_as_good_as_a_million_counted_ones() {
     let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
     for (field_tan, dioptres, pitch_um) in [(0.1, 0.05, 5.0), (0.1, 0.3, 3.0), (0.05, 1.0, 5.0)] {
         let settings = BankSettings {
-            field_tans: vec![0.0, field_tan],
+            fields: FieldSampling::Radial(vec![0.0, field_tan]),
             ..BankSettings::covering(film_mm, 0.1, (dioptres, dioptres), (550.0, 550.0), Diffraction::None)
         };
-        let bank = PsfBank::build(&lens, &settings).unwrap();
-        let kernel = bank.kernel(DVec2::new(field_tan, 0.0), dioptres, 550.0, pitch_um);
+        let bank = LensImageModel::build(&lens, &settings).unwrap();
+        let kernel = bank.kernel(PsfQuery::new(DVec2::new(field_tan, 0.0), dioptres, 550.0, pitch_um));
         assert!(kernel.samples.nrows() >= 20);
         let counts = counted(&lens, &kernel, field_tan, dioptres, film_mm);
         let l1: f64 = kernel.samples.iter().zip(&counts).map(|(a, b)| (f64::from(*a) - b).abs()).sum();
@@ -137,7 +136,12 @@ fn a_mesh_of_576_rays_is_as_good_as_a_million_counted_ones() {
         assert!(l1 < 0.015f64.hypot(noise), "{field_tan}, {dioptres} D: {l1}");
         // Without noise: against sixteen times as many nodes.
         let fine = BankSettings { n_rings: 48, n_azimuths: 192, ..settings };
-        let fine = PsfBank::build(&lens, &fine).unwrap().kernel(DVec2::new(field_tan, 0.0), dioptres, 550.0, pitch_um);
+        let fine = LensImageModel::build(&lens, &fine).unwrap().kernel(PsfQuery::new(
+            DVec2::new(field_tan, 0.0),
+            dioptres,
+            550.0,
+            pitch_um,
+        ));
         let margin = (fine.samples.nrows() as i64 - kernel.samples.nrows() as i64) / 2;
         let at = |row: usize, column: usize| {
             let (row, column) = (row as i64 - margin, column as i64 - margin);

@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_optics::{Lens, glam::DVec2};
-use dioptric_psf::{BankSettings, Diffraction, Picture, PsfBank, PsfQuery};
+use dioptric_psf::{BankSettings, Diffraction, FieldSampling, LensImageModel, Picture, PsfQuery};
 use ndarray::Array2;
 
 const PITCH_UM: f64 = 4.0;
@@ -36,13 +36,13 @@ fn picture(case: &Case, diffraction: Diffraction) -> Array2<f64> {
     let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
     let field_tan = DVec2::X * case.field_deg.to_radians().tan();
     let settings = BankSettings {
-        field_tans: if field_tan.x > 0.0 { vec![0.0, field_tan.x] } else { vec![0.0] },
+        fields: FieldSampling::Radial(if field_tan.x > 0.0 { vec![0.0, field_tan.x] } else { vec![0.0] }),
         n_rings: 24,
         n_azimuths: 96,
         ..BankSettings::covering(film_mm, field_tan.x, (case.dioptres, case.dioptres), (550.0, 550.0), diffraction)
     };
     let query = PsfQuery { field_tan, dioptres: case.dioptres, wavelength_nm: 550.0, pitch_um: PITCH_UM };
-    let (picture, model) = PsfBank::build(&lens, &settings).unwrap().picture(query, SIZE);
+    let (picture, model) = LensImageModel::build(&lens, &settings).unwrap().picture(query, SIZE).unwrap();
     assert_eq!(model.wave_share, if diffraction == Diffraction::Wave { 1.0 } else { 0.0 }, "{}", case.name);
     assert_eq!(model.fallback, None);
     picture
@@ -82,10 +82,10 @@ fn bent_blurs_have_no_dot_in_their_middle() {
     for (pitch_um, dioptres) in [(1.0, 0.9), (2.0, 0.9), (2.0, 0.7), (1.0, 0.6), (4.0, 1.5)] {
         let diffraction = Diffraction::Hurb { gamma: 1.0 };
         let settings = BankSettings::covering(film_mm, 0.0, (dioptres, dioptres), (550.0, 550.0), diffraction);
-        let bank = PsfBank::build(&lens, &settings).unwrap();
+        let bank = LensImageModel::build(&lens, &settings).unwrap();
         let query = PsfQuery { field_tan: DVec2::ZERO, dioptres, wavelength_nm: 550.0, pitch_um };
-        let picture = bank.picture(query, 301).0;
-        let radius_px = 1e3 * bank.blur_radius_mm(0.0, dioptres, 550.0).abs() / pitch_um;
+        let picture = bank.picture(query, 301).unwrap().0;
+        let radius_px = 1e3 * bank.blur_radius_mm(DVec2::X * 0.0, dioptres, 550.0).abs() / pitch_um;
         // Rings about the middle, a few pixels wide; a blur without aberrations is even.
         let ring = |from: f64, to: f64| {
             let at = |(r, c): (usize, usize)| (r as f64 - 150.0).hypot(c as f64 - 150.0);

@@ -3,14 +3,14 @@
 
 use dioptric_diffraction::Covariance;
 use dioptric_optics::{Lens, MonoLens, ObjectPoint, SeidelSettings, analysis::AstigmaticFoci, glam::DVec2};
-use dioptric_psf::{BankSettings, Diffraction, Interpolation, Picture, PsfBank};
+use dioptric_psf::{BankSettings, Diffraction, FieldSampling, Interpolation, LensImageModel, Picture, PsfQuery};
 
 /// Returns a bank with a sample at the axis and at this field, of a far point.
-fn bank_at(lens: &Lens, film_mm: f64, field_tan: f64, wavelengths_nm: &[f64]) -> PsfBank {
+fn bank_at(lens: &Lens, film_mm: f64, field_tan: f64, wavelengths_nm: &[f64]) -> LensImageModel {
     let settings = BankSettings {
         film_mm,
         reference_wavelength_nm: 550.0,
-        field_tans: vec![0.0, field_tan],
+        fields: FieldSampling::Radial(vec![0.0, field_tan]),
         dioptres: vec![0.0],
         wavelengths_nm: wavelengths_nm.to_vec(),
         n_rings: 24,
@@ -18,7 +18,7 @@ fn bank_at(lens: &Lens, film_mm: f64, field_tan: f64, wavelengths_nm: &[f64]) ->
         diffraction: Diffraction::None,
         interpolation: Interpolation::Rays,
     };
-    PsfBank::build(lens, &settings).unwrap()
+    LensImageModel::build(lens, &settings).unwrap()
 }
 
 /// Returns where the chief ray of a far point in a field to the right lands, mm to the right of the picture.
@@ -66,7 +66,7 @@ fn coma_points_as_its_seidel_sum_says() {
         let expected_mm = -s2 / (2.0 * slope);
         let film_mm = paraxial_film_mm(&mono);
         let bank = bank_at(&lens, film_mm, field_tan, &[550.0]);
-        let centroid_mm = bank.geometry(0.0, 550.0).image_radius_mm(field_tan);
+        let centroid_mm = bank.radial_geometry(0.0, 550.0).unwrap().image_radius_mm(field_tan);
         let found_mm = centroid_mm - chief_mm(&lens, film_mm, field_tan, 550.0);
         println!("{name}: {:.5} µm of coma, {:.5} expected", 1e3 * found_mm, 1e3 * expected_mm);
         // What is of fifth order falls with the square of the f-number, to some hundredths at f/24.
@@ -87,17 +87,18 @@ fn the_head_of_a_comet_is_at_the_chief_ray() {
         let foci = AstigmaticFoci::find(&mono, &point).unwrap();
         let film_mm = 0.5 * (foci.tangential_mm + foci.sagittal_mm);
         let bank = bank_at(&lens, film_mm, field_tan, &[550.0]);
-        let chief_from_centroid_um =
-            1e3 * (chief_mm(&lens, film_mm, field_tan, 550.0) - bank.geometry(0.0, 550.0).image_radius_mm(field_tan));
+        let chief_from_centroid_um = 1e3
+            * (chief_mm(&lens, film_mm, field_tan, 550.0)
+                - bank.radial_geometry(0.0, 550.0).unwrap().image_radius_mm(field_tan));
         let pitch_um = 0.2 * chief_from_centroid_um.abs();
-        let kernel = bank.kernel(DVec2::new(field_tan, 0.0), 0.0, 550.0, pitch_um);
+        let kernel = bank.kernel(PsfQuery::new(DVec2::new(field_tan, 0.0), 0.0, 550.0, pitch_um));
         let head_um = brightest_um(&Picture::from(&kernel)).x;
         println!("{name}: head at {head_um:.2} µm, chief ray at {chief_from_centroid_um:.2} µm of the centroid");
         assert!(head_um * chief_from_centroid_um > 0.0, "{name}");
         // To two pixels of a fifth of the distance: the head is where rays crowd about the chief ray.
         assert!((head_um - chief_from_centroid_um).abs() < 0.45 * chief_from_centroid_um.abs(), "{name}");
         // The comet in a field above is the same comet, turned.
-        let above = Picture::from(&bank.kernel(DVec2::new(0.0, field_tan), 0.0, 550.0, pitch_um));
+        let above = Picture::from(&bank.kernel(PsfQuery::new(DVec2::new(0.0, field_tan), 0.0, 550.0, pitch_um)));
         assert!((brightest_um(&above).y - head_um).abs() < 1.01 * pitch_um, "{name}");
     }
 }
@@ -105,7 +106,7 @@ fn the_head_of_a_comet_is_at_the_chief_ray() {
 /// Returns the second moments of a far point in a field of this length and direction, on pixels of this size.
 fn moments(lens: &Lens, film_mm: f64, field_tan: DVec2, pitch_um: f64) -> Covariance {
     let bank = bank_at(lens, film_mm, field_tan.length(), &[550.0]);
-    Picture::from(&bank.kernel(field_tan, 0.0, 550.0, pitch_um)).second_moments_um2()
+    Picture::from(&bank.kernel(PsfQuery::new(field_tan, 0.0, 550.0, pitch_um))).second_moments_um2()
 }
 
 #[test]
@@ -146,10 +147,10 @@ fn colours_are_ordered_as_their_chief_rays() {
         let field_tan = 0.08;
         let film_mm = paraxial_film_mm(&lens.at(550.0).unwrap());
         let bank = bank_at(&lens, film_mm, field_tan, &nm);
-        if bank.last_field_tan() < field_tan {
+        if bank.settings().fields.axes().0[bank.n_fields() - 1] < field_tan {
             continue;
         }
-        let centroids = nm.map(|nm| 1e3 * bank.geometry(0.0, nm).image_radius_mm(field_tan));
+        let centroids = nm.map(|nm| 1e3 * bank.radial_geometry(0.0, nm).unwrap().image_radius_mm(field_tan));
         let chiefs = nm.map(|nm| 1e3 * chief_mm(&lens, film_mm, field_tan, nm));
         println!(
             "{name}: centroids {:.2} {:.2}, chief rays {:.2} {:.2} µm off green",

@@ -3,7 +3,7 @@
 
 use dioptric_diffraction::{WaveQuality, WaveWindow, WindowCenter, wave_psf};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
-use dioptric_psf::{BankSettings, Diffraction, PsfBank, PsfQuery};
+use dioptric_psf::{BankSettings, Diffraction, FieldSampling, LensImageModel, PsfQuery};
 use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
@@ -13,17 +13,17 @@ const SIZE: usize = 64;
 /// Returns the sorted L1 differences, from directly traced patterns, of those that are waves alone at random places of
 /// a bank; and how many of the places those are.
 fn errors(lens: &Lens, settings: &BankSettings, n_places: usize) -> Vec<f64> {
-    let bank = PsfBank::build(lens, settings).unwrap();
+    let bank = LensImageModel::build(lens, settings).unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(7);
     let mut between = |list: &[f64]| list[0] + (list[list.len() - 1] - list[0]) * random.random::<f64>();
     let reference = lens.at(settings.reference_wavelength_nm).unwrap();
     let mut errors = vec![];
     for _ in 0..n_places {
         let (field, dioptres, wavelength_nm) =
-            (between(&settings.field_tans), between(&settings.dioptres), between(&settings.wavelengths_nm));
+            (between(settings.fields.axes().0), between(&settings.dioptres), between(&settings.wavelengths_nm));
         let field_tan = DVec2::from_angle(0.7) * field;
         let query = PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um: PITCH_UM };
-        let (found, model) = bank.picture(query, SIZE);
+        let (found, model) = bank.picture(query, SIZE).unwrap();
         assert_eq!(model.fallback, None);
         if model.wave_share < 1.0 {
             continue;
@@ -56,7 +56,7 @@ fn the_double_gauss_at_f_8_is_met_from_few_samples() {
             (0..n).map(|i| a + (b - a) * i as f64 / (n - 1) as f64).collect()
         };
         let settings = BankSettings {
-            field_tans: even(n_fields, (0.0, last)),
+            fields: FieldSampling::Radial(even(n_fields, (0.0, last))),
             dioptres: even(n_depths, (0.3, 0.7)),
             wavelengths_nm: even(n_colors, (680f64.powi(-2), 420f64.powi(-2)))
                 .iter()
@@ -85,7 +85,7 @@ fn the_double_gauss_at_f_4_is_met_from_288_samples() {
     let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
     let last = 18f64.to_radians().tan();
     let settings = BankSettings {
-        field_tans: (0..8).map(|i| last * f64::from(i) / 7.0).collect(),
+        fields: FieldSampling::Radial((0..8).map(|i| last * f64::from(i) / 7.0).collect()),
         ..BankSettings::covering(film_mm, last, (0.05, 1.2), (420.0, 680.0), Diffraction::Wave)
     };
     let errors = errors(&lens, &settings, 250);

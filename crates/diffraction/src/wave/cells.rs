@@ -2,10 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims};
+use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, Rims};
 use glam::{DVec2, DVec3};
 
-use super::{grid::PupilGrid, propagation::Waves};
+use super::{
+    grid::PupilGrid,
+    propagation::{FilmRays, Waves},
+};
 use crate::{DiffractionError, quadrature::gauss_legendre_on};
 
 /// The cells of a pupil in the entrance-pupil plane, azimuth by azimuth.
@@ -81,7 +84,7 @@ impl PupilCells {
         lens: &MonoLens,
         point: &ObjectPoint,
         film_mm: f64,
-    ) -> Result<RayBatch, DiffractionError> {
+    ) -> Result<FilmRays, DiffractionError> {
         let steps = [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|u| u * self.step_mm);
         let targets_mm: Vec<DVec2> =
             steps.iter().flat_map(|step| self.targets_mm.iter().map(move |target| target + step)).collect();
@@ -90,13 +93,14 @@ impl PupilCells {
         lens.to_film(&mut rays, film_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         match n_lost {
-            0 => Ok(rays),
+            0 => Ok(FilmRays::new(&rays, lens, film_mm)),
             _ => Err(DiffractionError::LostRays { wavelength_nm: lens.wavelength_nm(), n_lost, n_rays }),
         }
     }
 
-    pub(super) fn centroid_mm(&self, rays: &RayBatch) -> DVec2 {
-        self.energy.iter().enumerate().map(|(i, e)| *e * rays.point_mm(i).truncate()).sum()
+    /// Returns the mean place on the film.
+    pub(super) fn centroid_mm(&self, rays: &FilmRays) -> DVec2 {
+        self.energy.iter().enumerate().map(|(i, e)| *e * rays.place_mm(i)).sum()
     }
 
     /// Returns the area of each cell in (dx, dy), negative in holes, or `None` if directions fold over one another.

@@ -9,7 +9,7 @@ use multiversion::multiversion;
 use super::{
     PupilGrid, WaveNodes, WavePsf, WaveWindow, WindowCenter,
     cells::solid_angle_per_area,
-    propagation::{Waves, has_few_zones},
+    propagation::{FilmRays, Waves, has_few_zones},
     smooth::{Azimuth, Parity, Places, Ray, horner, radial_slope},
 };
 use crate::{DiffractionError, quadrature::gauss_legendre_on};
@@ -88,8 +88,10 @@ impl WaveMap {
         let taken: Vec<f64> = brightness.iter().zip(&areas).map(|(b, area)| b * area).collect();
         let half_collected: f64 = taken.iter().sum();
         // The other half of the pupil mirrors this one.
-        let centroid_x_mm = taken.iter().zip(&rays.x_mm).map(|(e, x)| e * x).sum::<f64>() / half_collected;
-        let waves = Waves::of(&rays, DVec2::new(centroid_x_mm, 0.0), lens, film_mm);
+        let rays = FilmRays::new(&rays, lens, film_mm);
+        let moment_mm = taken.iter().enumerate().map(|(i, e)| e * rays.place_mm(i).x).sum::<f64>();
+        let centroid_x_mm = moment_mm / half_collected;
+        let waves = Waves::of(&rays, DVec2::new(centroid_x_mm, 0.0));
         let piston_mm = waves.phi_mm[0];
         let phi_mm: Vec<f64> = waves.phi_mm.iter().map(|phi| phi - piston_mm).collect();
         let d_x: Vec<f64> = waves.d.iter().map(|d| d.x).collect();

@@ -17,7 +17,7 @@ use crate::DiffractionError;
 /// The light of one object point at one wavelength on the film, as plane waves: one for each node of the pupil.
 ///
 /// The wave at the film point `reference + δ` is `U = Σ amplitude · exp(i k (Φ + n d·δ))`, k = 2π/λ in vacuum, and
-/// its square is the irradiance per mm² of a point whose transmitted energy is 1. Everything is in the lens frame.
+/// its square is the irradiance per mm² of a point whose transmitted energy is 1. Everything is in the film's own frame.
 /// The lists have one length and go azimuth by azimuth, `grid.n_radii` nodes from the inside outwards each; they can be
 /// filled by hand, from interpolated ray maps for one.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,18 +70,18 @@ impl WaveNodes {
         let cells = PupilCells::find(lens, point, grid).ok_or(DiffractionError::NoLight { wavelength_nm })?;
         let rays = cells.trace(lens, point, film_mm)?;
         let centroid_mm = cells.centroid_mm(&rays);
-        let mut waves = Waves::of(&rays, centroid_mm, lens, film_mm);
+        let mut waves = Waves::of(&rays, centroid_mm);
         let mut areas = cells.direction_areas(&waves);
         if areas.is_none() {
             // Where the pupil's own image is folded, the rays behind it need not be.
-            waves = Waves::along_rays(&rays, centroid_mm, lens, film_mm);
+            waves = Waves::along_rays(&rays, centroid_mm);
             areas = cells.direction_areas(&waves);
         }
         let areas = areas.ok_or(DiffractionError::Folded { wavelength_nm })?;
         let n = cells.n_nodes();
         let per_mm = lens.image_index() / (wavelength_nm * 1e-6);
         let amplitude = |(area, e): (&f64, &f64)| (per_mm * (area * e).sqrt()).copysign(*e);
-        let q = |at: &[f64], from: f64| at[..n].iter().map(|x| x - from).collect();
+        let q = |of: fn(DVec2) -> f64| (0..n).map(|i| of(rays.place_mm(i)) - of(centroid_mm)).collect();
         let nodes = Self {
             wavelength_nm,
             image_index: lens.image_index(),
@@ -89,8 +89,8 @@ impl WaveNodes {
             propagation: waves.propagation,
             reference_mm: centroid_mm,
             collected: cells.collected,
-            q_x_mm: q(&rays.x_mm, centroid_mm.x),
-            q_y_mm: q(&rays.y_mm, centroid_mm.y),
+            q_x_mm: q(|place| place.x),
+            q_y_mm: q(|place| place.y),
             d_x: waves.d[..n].iter().map(|d| d.x).collect(),
             d_y: waves.d[..n].iter().map(|d| d.y).collect(),
             phi_mm: waves.phi_mm[..n].to_vec(),

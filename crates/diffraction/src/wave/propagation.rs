@@ -1,6 +1,6 @@
 //! How rays on the film stand for waves.
 
-use dioptric_optics::{MonoLens, RayBatch};
+use dioptric_optics::{ImageSurface, MonoLens, RayBatch};
 use glam::{DVec2, DVec3};
 
 /// How the light gets from the lens to the film.
@@ -26,55 +26,77 @@ pub(super) fn has_few_zones(lens: &MonoLens, film_mm: f64) -> bool {
     way_mm.is_finite() && (first.power_per_mm == 0.0 || zones < FEW_FRESNEL_ZONES)
 }
 
+/// Rays where they meet the film, in the film's own frame: z is 0 on a flat film.
+pub(crate) struct FilmRays {
+    /// Where the rays meet the film, mm.
+    pub(crate) points_mm: Vec<DVec3>,
+    /// Unit directions.
+    pub(crate) directions: Vec<DVec3>,
+    /// Optical paths from the object, mm.
+    pub(crate) opl_mm: Vec<f64>,
+    /// The middle of the exit pupil, mm; `None` where it is infinitely far.
+    pub(crate) exit_pupil_mm: Option<DVec3>,
+    shape: ImageSurface,
+    image_index: f64,
+}
+
+impl FilmRays {
+    /// Takes rays that are on the film, `film_mm` behind the last vertex, into its frame.
+    pub(crate) fn new(rays: &RayBatch, lens: &MonoLens, film_mm: f64) -> Self {
+        let pose = lens.film_pose(film_mm);
+        let exit_z_mm = lens.first_order().exit_pupil_z_mm;
+        Self {
+            points_mm: (0..rays.len()).map(|i| pose.to_own(rays.point_mm(i))).collect(),
+            directions: (0..rays.len()).map(|i| pose.direction_to_own(rays.direction(i))).collect(),
+            opl_mm: rays.opl_mm.clone(),
+            exit_pupil_mm: exit_z_mm.is_finite().then(|| pose.to_own(lens.film_pose(exit_z_mm).vertex_mm)),
+            shape: lens.image_surface(),
+            image_index: lens.image_index(),
+        }
+    }
+
+    /// Returns where a ray lies on the film, mm from its vertex.
+    pub(crate) fn place_mm(&self, ray: usize) -> DVec2 {
+        self.points_mm[ray].truncate()
+    }
+
+    /// Returns the point of the film over a place.
+    pub(crate) fn film_point_mm(&self, place_mm: DVec2) -> DVec3 {
+        place_mm.extend(self.shape.sag_at_mm(place_mm))
+    }
+
+    /// Returns by how much the path of a wave of this direction grows with the place on the film, along x and y, about a
+    /// place.
+    pub(crate) fn along_film(&self, direction: DVec3, about_mm: DVec2) -> DVec2 {
+        direction.truncate() + direction.z * self.shape.slope_at(about_mm)
+    }
+}
+
 /// Directions of waves, and optical paths along them to the reference point.
 ///
-/// The directions are those by which phases grow along x and y of the lens frame on the film: of a tilted film not
-/// only the waves' own x and y.
+/// The directions are those by which phases grow along the film's own x and y: of a curved film not only the waves' own x
+/// and y.
 pub(super) struct Waves {
     pub(super) propagation: Propagation,
     pub(super) d: Vec<DVec2>,
     pub(super) phi_mm: Vec<f64>,
 }
 
-/// A film: where its vertex is in the lens frame, and how its z grows with x and y.
-#[derive(Clone, Copy)]
-struct Film {
-    vertex_mm: DVec3,
-    slope: DVec2,
-}
-
-impl Film {
-    fn new(lens: &MonoLens, film_mm: f64) -> Self {
-        let pose = lens.film_pose(film_mm);
-        let normal = pose.rotation.z_axis;
-        Self { vertex_mm: pose.vertex_mm, slope: -normal.truncate() / normal.z }
-    }
-
-    fn point_mm(&self, at_mm: DVec2) -> DVec3 {
-        at_mm.extend(self.vertex_mm.z + self.slope.dot(at_mm - self.vertex_mm.truncate()))
-    }
-
-    fn along(&self, direction: DVec3) -> DVec2 {
-        direction.truncate() + direction.z * self.slope
-    }
-}
-
 impl Waves {
     /// Returns the waves that rays on the film stand for, with paths to a film point: spherical ones where that can be.
-    pub(super) fn of(rays: &RayBatch, reference_mm: DVec2, lens: &MonoLens, film_mm: f64) -> Self {
-        Self::from_exit_pupil(rays, reference_mm, lens, film_mm)
-            .unwrap_or_else(|| Self::along_rays(rays, reference_mm, lens, film_mm))
+    pub(super) fn of(rays: &FilmRays, reference_mm: DVec2) -> Self {
+        Self::from_exit_pupil(rays, reference_mm).unwrap_or_else(|| Self::along_rays(rays, reference_mm))
     }
 
     /// Each ray as a plane wave.
-    pub(super) fn along_rays(rays: &RayBatch, reference_mm: DVec2, lens: &MonoLens, film_mm: f64) -> Self {
-        let film = Film::new(lens, film_mm);
+    pub(super) fn along_rays(rays: &FilmRays, reference_mm: DVec2) -> Self {
+        let center_mm = rays.film_point_mm(reference_mm);
         let wave = |i: usize| {
-            let d = film.along(rays.direction(i));
-            let q = rays.point_mm(i).truncate() - reference_mm;
-            (d, rays.opl_mm[i] - lens.image_index() * q.dot(d))
+            let direction = rays.directions[i];
+            let q = rays.points_mm[i] - center_mm;
+            (rays.along_film(direction, reference_mm), rays.opl_mm[i] - rays.image_index * q.dot(direction))
         };
-        let (d, phi_mm) = (0..rays.len()).map(wave).unzip();
+        let (d, phi_mm) = (0..rays.points_mm.len()).map(wave).unzip();
         Self { propagation: Propagation::Debye, d, phi_mm }
     }
 
@@ -83,27 +105,22 @@ impl Waves {
     ///
     /// To a place δ beside the reference they all go further by the same δ²/2R, which |U|² does not feel, and
     /// by d·δ: so they are summed like plane waves, and like Huygens' to the next order, δ² NA²/R.
-    fn from_exit_pupil(rays: &RayBatch, reference_mm: DVec2, lens: &MonoLens, film_mm: f64) -> Option<Self> {
-        let film = Film::new(lens, film_mm);
-        let exit_z_mm = lens.first_order().exit_pupil_z_mm;
-        if !exit_z_mm.is_finite() {
-            return None;
-        }
-        let center_mm = film.point_mm(reference_mm);
+    fn from_exit_pupil(rays: &FilmRays, reference_mm: DVec2) -> Option<Self> {
+        let pupil_mm = rays.exit_pupil_mm?;
+        let center_mm = rays.film_point_mm(reference_mm);
         // A pupil behind the film is a virtual one: the waves run backwards to it.
-        let pupil_mm = lens.film_pose(exit_z_mm).vertex_mm;
-        let radius_mm = center_mm.distance(pupil_mm).copysign(film_mm - exit_z_mm);
+        let radius_mm = center_mm.distance(pupil_mm).copysign(-pupil_mm.z);
         let wave = |i: usize| {
-            let direction = rays.direction(i);
-            let q = rays.point_mm(i) - center_mm;
+            let direction = rays.directions[i];
+            let q = rays.points_mm[i] - center_mm;
             let along = q.dot(direction);
             let excess_mm = (along * along - q.length_squared()) / radius_mm;
             // How much further back than the radius the ray has crossed the sphere.
             let beyond_mm = along + excess_mm / (1.0 + (1.0 + excess_mm / radius_mm).sqrt());
-            let d = film.along(direction + (direction * beyond_mm - q) / radius_mm);
-            (d, rays.opl_mm[i] - lens.image_index() * beyond_mm)
+            let d = rays.along_film(direction + (direction * beyond_mm - q) / radius_mm, reference_mm);
+            (d, rays.opl_mm[i] - rays.image_index * beyond_mm)
         };
-        let (d, phi_mm): (Vec<DVec2>, Vec<f64>) = (0..rays.len()).map(wave).unzip();
+        let (d, phi_mm): (Vec<DVec2>, Vec<f64>) = (0..rays.points_mm.len()).map(wave).unzip();
         phi_mm.iter().all(|phi| phi.is_finite()).then_some(Self { propagation: Propagation::Fresnel, d, phi_mm })
     }
 }

@@ -7,9 +7,9 @@ mod by_formula;
 
 use std::{path::Path, time::Instant};
 
-use dioptric_forward::{BlurMode, Coverage, Film, Settings, bank_settings_for, irradiance};
+use dioptric_forward::{BlurMode, Film, PsfDomain, Settings, irradiance};
 use dioptric_optics::Lens;
-use dioptric_psf::{Diffraction, PsfBank};
+use dioptric_psf::{Diffraction, LensImageModel};
 use dioptric_scene::{ReadOptions, read_scene, write_preview_png};
 use dioptric_spectrum::{Illuminant, Observer, Quantity, SpectralImage, WavelengthGrid, Xyz};
 
@@ -30,15 +30,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mono = lens.at(550.0)?;
     let focus_mm = 1e3 * focus_m.parse::<f64>()? - mono.first_order().entrance_pupil_z_mm;
     let start = Instant::now();
-    let settings = bank_settings_for(&Coverage {
+    let domain = PsfDomain {
         lens: &lens,
         film: &film,
         film_mm: mono.film_mm_for(focus_mm)?,
         depth_range_m: scene.require_depth()?.range_m(),
         grid: scene.radiance.grid(),
         diffraction: Diffraction::Hurb { gamma: 1.0 },
-    })?;
-    let bank = PsfBank::build(&lens, &settings)?;
+    };
+    let settings = domain.settings()?;
+    let bank = LensImageModel::build(&lens, &settings)?;
     let bank_s = start.elapsed().as_secs_f64();
     let mut planes = vec![];
     irradiance(&scene, &bank, &film, &Settings { mode, ..Settings::default() }, &|_| {}, &mut |_, plane| {

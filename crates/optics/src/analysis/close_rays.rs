@@ -85,7 +85,7 @@ impl<'a> CloseRays<'a> {
         let targets_mm = [-2.0, -1.0, 1.0, 2.0].map(|share| chief_mm + direction * (share * h));
         let mut rays = rays_towards(point, &targets_mm, aim.z_mm(), 0.0);
         lens.trace(&mut rays, Rims::Ignore);
-        lens.to_film(&mut rays, 0.0);
+        lens.to_film_plane(&mut rays, 0.0);
         if rays.n_in_flight() < targets_mm.len() {
             return None;
         }

@@ -82,7 +82,7 @@ impl PupilSampling {
     pub fn rays_on_film(&self, lens: &MonoLens, point: &ObjectPoint, film_mm: f64) -> RayBatch {
         let mut rays = self.coordinates.rays(lens, point, &self.places);
         lens.trace(&mut rays, self.rims);
-        lens.to_image_surface(&mut rays, film_mm);
+        lens.to_film(&mut rays, film_mm);
         rays
     }
 

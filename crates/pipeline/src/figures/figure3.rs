@@ -1,7 +1,8 @@
 //! Figure 3: three targets at 8 m and at 2 m through the paper's two-element lens, focused for 8 m.
 
-use dioptric_forward::{Film, FilmMap, Kernels, RadialMap, Settings, Source, render};
+use dioptric_forward::{Film, Settings, Source, render};
 use dioptric_psf::paper::{FIGURE_3_FILM_MM, figure_3_psfs, figure_3_rms_um, two_element_lens};
+use dioptric_psf::{FilmMap, Kernel, LensImage, PsfQuery, RadialMap};
 use dioptric_scene::{Target, View};
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
@@ -85,7 +86,7 @@ fn on_pixels(energy: &Array2<f64>, pitch_um: f64, new_pitch_um: f64) -> Array2<f
     along.dot(energy).dot(&along.t()).mapv(|v| v as f32)
 }
 
-impl Kernels for CountedPsfs {
+impl LensImage for CountedPsfs {
     fn is_symmetric(&self) -> bool {
         true
     }
@@ -95,14 +96,15 @@ impl Kernels for CountedPsfs {
     fn dioptres(&self) -> (f64, f64) {
         (0.0, 1.0)
     }
-    fn is_dark_beyond_reach(&self) -> bool {
+    fn is_dark_beyond_extent(&self) -> bool {
         true
     }
-    fn film_map(&self, _dioptres: f64, _wavelength_nm: f64, reach_mm: f64) -> FilmMap {
-        RadialMap::tabulate(reach_mm, |radius_mm| Some(radius_mm / FIGURE_3_FILM_MM), |_| 1.0).into()
+    fn film_map(&self, _dioptres: f64, _wavelength_nm: f64, extent_mm: f64) -> FilmMap {
+        RadialMap::tabulate(extent_mm, |radius_mm| Some(radius_mm / FIGURE_3_FILM_MM), |_| 1.0).into()
     }
-    fn kernel(&self, _field_tan: DVec2, _dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Array2<f32> {
-        on_pixels(&self.psfs[self.nearest(wavelength_nm)], COUNTING_PITCH_UM, pitch_um)
+    fn kernel(&self, query: PsfQuery) -> Kernel {
+        let PsfQuery { wavelength_nm, pitch_um, .. } = query;
+        Kernel { samples: on_pixels(&self.psfs[self.nearest(wavelength_nm)], COUNTING_PITCH_UM, pitch_um), pitch_um }
     }
     fn blur_radius_mm(&self, _field_tan: DVec2, _dioptres: f64, wavelength_nm: f64) -> f64 {
         self.radii_mm[self.nearest(wavelength_nm)]

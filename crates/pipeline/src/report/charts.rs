@@ -1,10 +1,10 @@
 //! The plots of the report.
 
 use dioptric_optics::glam::DVec2;
-use dioptric_psf::{Picture, PsfQuery};
+use dioptric_psf::{LensImage, LensImageModel, Picture, PsfQuery};
 
 use super::statistics::SensorStatistics;
-use crate::{CameraBank, Capture, Corner, LineChart, REFERENCE_WAVELENGTH_NM, Series, Shot, display::wavelength_color};
+use crate::{Capture, Corner, LineChart, REFERENCE_WAVELENGTH_NM, Series, Shot, display::wavelength_color};
 
 /// Points of a curve.
 const POINTS: usize = 64;
@@ -36,7 +36,7 @@ pub(super) struct Places {
 impl Places {
     pub(super) fn of(shot: &Shot, capture: &Capture) -> Self {
         let bank = &capture.bank;
-        let (far, near) = bank.kernels().dioptres();
+        let (far, near) = bank.dioptres();
         let steps = if near - far > 1e-6 { 4 } else { 1 };
         let (first, last) = shot.grid().range_nm();
         // Four wavelengths from end to end, and the reference in place of the nearest where it is among them.
@@ -47,7 +47,7 @@ impl Places {
             1e3 / (mm + pupil_z_mm)
         });
         Self {
-            corner: bank.corner_tan(&shot.film, focus.clamp(far, near), REFERENCE_WAVELENGTH_NM),
+            corner: bank.corner_field_tan(shot.film.half_size_mm(), focus.clamp(far, near), REFERENCE_WAVELENGTH_NM),
             focus_dioptres: focus.clamp(far, near),
             dioptres: (0..steps).map(|i| far + (near - far) * i as f64 / (steps as f64 - 1.0).max(1.0)).collect(),
             wavelengths_nm: if last > first { wavelengths_nm } else { vec![first] },
@@ -80,19 +80,19 @@ impl Charts {
     }
 }
 
-fn picture(bank: &CameraBank, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Picture {
+fn picture(bank: &LensImageModel, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Picture {
     Picture::from(&bank.kernel(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um }))
 }
 
 /// Line spreads on the axis, in focus, over wavelength.
-fn lsf(shot: &Shot, bank: &CameraBank, places: &Places) -> LineChart {
+fn lsf(shot: &Shot, bank: &LensImageModel, places: &Places) -> LineChart {
     let spreads: Vec<_> = places
         .wavelengths_nm
         .iter()
         .map(|&nm| {
             // As fine as the narrowest line asks for.
             let airy_um = 1e-3 * nm * shot.lens.at(nm).map_or(4.0, |l| l.first_order().f_number);
-            let blur_um = 1e3 * bank.kernels().blur_radius_mm(DVec2::ZERO, places.focus_dioptres, nm).abs();
+            let blur_um = 1e3 * bank.blur_radius_mm(DVec2::ZERO, places.focus_dioptres, nm).abs();
             let pitch_um = (0.1 * airy_um).max(0.02 * blur_um);
             (nm, picture(bank, DVec2::ZERO, places.focus_dioptres, nm, pitch_um).line_spread(0.0))
         })
@@ -130,7 +130,7 @@ fn lsf(shot: &Shot, bank: &CameraBank, places: &Places) -> LineChart {
 }
 
 /// Modulation up to the sensor's Nyquist frequency on the axis and towards the corner, in focus and at the far end.
-fn mtf(shot: &Shot, bank: &CameraBank, places: &Places) -> LineChart {
+fn mtf(shot: &Shot, bank: &LensImageModel, places: &Places) -> LineChart {
     let nyquist_per_mm = 500.0 / shot.film.pitch_um;
     let pitch_um = (shot.film.pitch_um / 8.0).min(2.0);
     let far = places.dioptres[0];
@@ -178,7 +178,7 @@ fn over_field(places: &Places, of: impl Fn(DVec2) -> f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-fn illumination(bank: &CameraBank, places: &Places) -> LineChart {
+fn illumination(bank: &LensImageModel, places: &Places) -> LineChart {
     let gain = |tan| bank.irradiance_per_radiance(tan, places.focus_dioptres, REFERENCE_WAVELENGTH_NM);
     let axis = gain(DVec2::ZERO);
     let real = over_field(places, |tan| gain(tan) / axis);
@@ -200,7 +200,7 @@ fn illumination(bank: &CameraBank, places: &Places) -> LineChart {
     }
 }
 
-fn distortion(bank: &CameraBank, places: &Places) -> LineChart {
+fn distortion(bank: &LensImageModel, places: &Places) -> LineChart {
     let at = |tan, nm| bank.centroid_mm(tan, places.focus_dioptres, nm);
     // Heights count from where the axis lands, which a tilted lens moves.
     let axis_mm = at(DVec2::ZERO, REFERENCE_WAVELENGTH_NM);

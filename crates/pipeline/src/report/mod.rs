@@ -153,7 +153,7 @@ impl Capture {
                 mean_luminance_cd_m2: shot.scene.mean_luminance_cd_m2(),
                 light: shot.scene.light,
             },
-            psf_bank: BankData::of_camera(&self.bank),
+            psf_bank: BankData::of(&self.bank),
             irradiance: IrradianceData {
                 wavelengths_nm: shot.grid().centers_nm().to_vec(),
                 mean_w_m2_nm: self.irradiance.mean.clone(),

@@ -1,5 +1,5 @@
 use dioptric_optics::{Glass, ImageSurface, Interface, Move, Shape, Surface};
-use dioptric_psf::{BankSettings, Diffraction, PsfBank};
+use dioptric_psf::{BankSettings, Diffraction, LensImageModel};
 
 use super::*;
 use crate::AnalysisFields;
@@ -57,7 +57,7 @@ fn illumination_is_that_of_the_ray_map() {
     let analysis = request(vec![0.0, 5.0, 10.0]).compute(&lens).unwrap();
     let tan = 12f64.to_radians().tan();
     let settings = BankSettings::covering(analysis.film_mm, tan, (0.0, 0.0), (550.0, 550.0), Diffraction::None);
-    let geometry = PsfBank::build(&lens, &settings).unwrap().geometry(0.0, 550.0);
+    let geometry = LensImageModel::build(&lens, &settings).unwrap().radial_geometry(0.0, 550.0).unwrap();
     let on_axis = geometry.irradiance_per_radiance(0.0);
     for row in &analysis.fields {
         let expected = geometry.irradiance_per_radiance(row.place.field_deg.to_radians().tan()) / on_axis;

@@ -1,17 +1,19 @@
-//! The bank: ray maps over field, depth and wavelength, from which any point spread function is drawn.
+//! Ray maps of a rotationally symmetric lens, over field along one radius, depth and wavelength.
 
 use dioptric_diffraction::{PupilEdge, WaveMap};
 use dioptric_optics::{Lens, MonoLens};
+use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::{
-    BankSettings, Diffraction, MeasuredError, PsfError, RadialGeometry,
+    BankSettings, Diffraction, FieldSampling, PsfError, RadialGeometry,
     axis::{Axis, Stencil},
     dispersion::Dispersion,
     mesh::Mesh,
     pupil::Pupil,
     ray_map::{RIM_OVER_RMS, Record, Summary, Task},
+    watch::Watch,
 };
 
 /// Azimuths at which the pupil's edge is found for the wave sum.
@@ -21,12 +23,10 @@ const GEOMETRY_STEPS: usize = 3;
 /// The field that stands for the axis where a ratio of height to field is needed, as a share of the largest.
 const NEAR_AXIS: f64 = 1e-3;
 
-/// Ray maps of a rotationally symmetric lens over field, depth and wavelength.
-///
-/// It interpolates rays, not pictures: 50 to 300 samples are better than thousands of blended ones. Image height
-/// and brightness are kept apart from blur, in a finer table.
+/// Ray maps of a rotationally symmetric lens over field, depth and wavelength. Image height and brightness are in a table
+/// finer in the field.
 #[derive(Clone, Debug)]
-pub struct PsfBank {
+pub(crate) struct RotationalBank {
     // Invariant: `records`, `waves` and `summaries` are indexed by (wavelength, depth, field), the field innermost.
     settings: BankSettings,
     fields: Axis,
@@ -43,25 +43,26 @@ pub struct PsfBank {
     reference: MonoLens,
     /// Index around the stop at each of the colours.
     stop_indices: Vec<f64>,
-    error: Option<MeasuredError>,
 }
 
-impl PsfBank {
-    /// Traces a bank on all threads.
+impl RotationalBank {
+    /// Traces the samples on all threads.
     ///
     /// Fields that see no light at some depth or wavelength are left out, and those beyond them.
-    ///
-    /// # Errors
-    /// When the settings make no sense, the lens has no index at a wavelength or is not rotationally symmetric, or not
-    /// even the axis sees light.
-    pub fn build(lens: &Lens, settings: &BankSettings) -> Result<Self, PsfError> {
+    pub(crate) fn build(
+        lens: &Lens,
+        settings: &BankSettings,
+        progress: &(dyn Fn(f64) + Sync),
+        cancel: &Cancel,
+    ) -> Result<Self, PsfError> {
         settings.check()?;
         lens.check_rotational("a bank of point spread functions")?;
+        let field_tans = radius(settings);
         let reference = lens.at(settings.reference_wavelength_nm)?;
         let lenses: Vec<MonoLens> =
             settings.wavelengths_nm.iter().rev().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
         let mesh = Mesh { n_rings: settings.n_rings, n_azimuths: settings.n_azimuths };
-        let geometry_fields = geometry_fields(&settings.field_tans);
+        let geometry_fields = geometry_fields(field_tans);
         let axial = Task {
             lens: &reference,
             reference: &reference,
@@ -77,8 +78,11 @@ impl PsfBank {
         })?;
         let columns: Vec<(&MonoLens, f64)> =
             lenses.iter().flat_map(|lens| settings.dioptres.iter().map(move |&d| (lens, d))).collect();
-        let tracer = ColumnTracer { settings, reference: &reference, geometry_fields: &geometry_fields, mesh, seed };
-        let traced: Vec<Column> = columns.par_iter().map(|&(lens, dioptres)| tracer.column(lens, dioptres)).collect();
+        let watch = Watch::new(columns.len() * geometry_fields.len(), progress, cancel);
+        let tracer =
+            ColumnTracer { settings, reference: &reference, geometry_fields: &geometry_fields, mesh, seed, watch };
+        let trace = |&(lens, dioptres): &(&MonoLens, f64)| tracer.column(lens, dioptres);
+        let traced: Vec<Column> = columns.par_iter().map(trace).collect::<Result<_, Cancelled>>()?;
 
         let n_lit = traced.iter().map(|column| column.summaries.len()).min().unwrap_or(0);
         if n_lit == 0 {
@@ -103,17 +107,16 @@ impl PsfBank {
     }
 
     /// Puts a bank together from what was traced.
-    pub(crate) fn assemble(lens: &Lens, settings: &BankSettings, parts: Parts) -> Result<Self, PsfError> {
-        settings.check()?;
+    fn assemble(lens: &Lens, settings: &BankSettings, parts: Parts) -> Result<Self, PsfError> {
         let Parts { n_fields, records, summaries, waves } = parts;
         let colors: Vec<f64> = settings.wavelengths_nm.iter().rev().copied().collect();
         let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
         let stop_index = |&nm: &f64| Ok(lens.at(nm)?.stop_medium_index());
         let axis = |knots: Vec<f64>| Axis::new(knots).expect("the settings were checked");
-        let mut geometry_fields = geometry_fields(&settings.field_tans);
+        let mut geometry_fields = geometry_fields(radius(settings));
         geometry_fields.truncate(Self::n_geometry(n_fields));
         Ok(Self {
-            fields: axis(settings.field_tans[..n_fields].to_vec()),
+            fields: axis(radius(settings)[..n_fields].to_vec()),
             dioptres: axis(settings.dioptres.clone()),
             colors: axis(colors.iter().map(|&nm| dispersion.coordinate(nm)).collect()),
             dispersion,
@@ -125,12 +128,7 @@ impl PsfBank {
             stop_indices: colors.iter().map(stop_index).collect::<Result<_, PsfError>>()?,
             reference: lens.at(settings.reference_wavelength_nm)?,
             settings: settings.clone(),
-            error: None,
         })
-    }
-
-    pub(crate) fn with_error(self, error: MeasuredError) -> Self {
-        Self { error: Some(error), ..self }
     }
 
     /// Returns the bank without diffraction: of rays alone.
@@ -139,14 +137,13 @@ impl PsfBank {
         Self { settings, waves: vec![], ..self.clone() }
     }
 
-    /// The error of its interpolation, if it was measured: see [`build_adaptive`](Self::build_adaptive) and
-    /// [`with_measured_error`](Self::with_measured_error).
-    pub fn error(&self) -> Option<MeasuredError> {
-        self.error
-    }
-
     pub(crate) fn lens(&self) -> &Lens {
         &self.lens
+    }
+
+    /// The fields that see light.
+    pub(crate) fn field_tans(&self) -> &[f64] {
+        self.fields.knots()
     }
 
     pub(crate) fn n_fields(&self) -> usize {
@@ -154,20 +151,8 @@ impl PsfBank {
     }
 
     /// Returns how many fields the table of image heights has, for so many of the bank.
-    pub(crate) fn n_geometry(n_fields: usize) -> usize {
+    fn n_geometry(n_fields: usize) -> usize {
         n_fields.saturating_sub(1) * GEOMETRY_STEPS + 1
-    }
-
-    pub(crate) fn records(&self) -> &[Record] {
-        &self.records
-    }
-
-    pub(crate) fn summaries(&self) -> &[Summary] {
-        &self.summaries
-    }
-
-    pub(crate) fn waves(&self) -> &[WaveMap] {
-        &self.waves
     }
 
     pub(crate) fn reference(&self) -> &MonoLens {
@@ -181,18 +166,18 @@ impl PsfBank {
     }
 
     /// What the bank was asked to cover.
-    pub fn settings(&self) -> &BankSettings {
+    pub(crate) fn settings(&self) -> &BankSettings {
         &self.settings
     }
 
     /// The largest field that sees light, as its tangent.
-    pub fn last_field_tan(&self) -> f64 {
+    pub(crate) fn last_field_tan(&self) -> f64 {
         let knots = self.fields.knots();
         knots[knots.len() - 1]
     }
 
     /// Returns where centroids land and how bright they are, at one depth and wavelength.
-    pub fn geometry(&self, dioptres: f64, wavelength_nm: f64) -> RadialGeometry {
+    pub(crate) fn geometry(&self, dioptres: f64, wavelength_nm: f64) -> RadialGeometry {
         let n = self.geometry_fields.len();
         let mut magnification_mm = vec![0.0; n];
         let mut pupil_mm2 = vec![0.0; n];
@@ -209,7 +194,7 @@ impl PsfBank {
     ///
     /// It is that of the part of the ray map that is linear in the pupil, scaled so that an even disc of this size
     /// has 95 % of its energy within it. So it goes smoothly through 0, where aberrations keep a spot from vanishing.
-    pub fn blur_radius_mm(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> f64 {
+    pub(crate) fn blur_radius_mm(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> f64 {
         let n = self.geometry_fields.len();
         let at = field_tan.clamp(0.0, self.geometry_fields[n - 1]);
         let above = self.geometry_fields.partition_point(|&f| f < at).clamp(1.min(n - 1), n - 1);
@@ -228,7 +213,7 @@ impl PsfBank {
     }
 
     /// Returns how far from the centroid the farthest ray of a point lands, mm.
-    pub fn reach_mm(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> f64 {
+    pub(crate) fn extent_mm(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> f64 {
         let record = self.record(field_tan, dioptres, wavelength_nm);
         (0..record.mesh.n_nodes()).map(|i| record.node(i).at_mm.length()).fold(0.0, f64::max)
     }
@@ -289,12 +274,12 @@ impl PsfBank {
 
 /// What was traced, in the order of the bank.
 #[derive(Default)]
-pub(crate) struct Parts {
-    pub(crate) n_fields: usize,
-    pub(crate) records: Vec<Record>,
-    pub(crate) summaries: Vec<Summary>,
+struct Parts {
+    n_fields: usize,
+    records: Vec<Record>,
+    summaries: Vec<Summary>,
     /// As many as there are records, or none.
-    pub(crate) waves: Vec<WaveMap>,
+    waves: Vec<WaveMap>,
 }
 
 /// All fields of one depth and wavelength.
@@ -313,6 +298,7 @@ struct ColumnTracer<'a> {
     geometry_fields: &'a [f64],
     mesh: Mesh,
     seed: Pupil,
+    watch: Watch<'a>,
 }
 
 impl ColumnTracer<'_> {
@@ -328,12 +314,13 @@ impl ColumnTracer<'_> {
     }
 
     /// Traces field by field, up to the first that sees no light.
-    fn column(&self, lens: &MonoLens, dioptres: f64) -> Column {
+    fn column(&self, lens: &MonoLens, dioptres: f64) -> Result<Column, Cancelled> {
         let has_stop = self.settings.diffraction != Diffraction::None;
         let mut column = Column::default();
         let mut pupil = self.seed.clone();
         let mut has_waves = self.settings.diffraction == Diffraction::Wave;
         for (i, &field) in self.geometry_fields.iter().enumerate() {
+            self.watch.check()?;
             let is_knot = i % GEOMETRY_STEPS == 0;
             let here = self.task(lens, field, dioptres);
             let Some(found) = pupil.near(lens, &here.point()) else { break };
@@ -343,7 +330,7 @@ impl ColumnTracer<'_> {
             // Height over field has its limit on the axis.
             summary.centroid_mm /= field;
             if i == 0 {
-                let last = self.settings.field_tans.last().copied();
+                let last = radius(self.settings).last().copied();
                 let near_axis = NEAR_AXIS * last.filter(|f| *f > 0.0).unwrap_or(0.1);
                 let beside = self.task(lens, near_axis, dioptres);
                 let Some(nearby) = pupil.near(lens, &beside.point()) else { break };
@@ -351,6 +338,7 @@ impl ColumnTracer<'_> {
                 summary.centroid_mm = beside.summary.centroid_mm / near_axis;
             }
             column.summaries.push(summary);
+            self.watch.done(1);
             if !is_knot {
                 continue;
             }
@@ -361,7 +349,8 @@ impl ColumnTracer<'_> {
                 column.waves.extend(map);
             }
         }
-        column
+        self.watch.done(self.geometry_fields.len() - column.summaries.len());
+        Ok(column)
     }
 }
 
@@ -374,6 +363,14 @@ fn wave_map(task: &Task<'_>, pupil: &Pupil) -> Option<WaveMap> {
     let pupil = pupil.resampled(WAVE_AZIMUTHS).near(task.lens, &point)?;
     let edge = PupilEdge { center_x_mm: pupil.center_mm.x, z_mm: pupil.z_mm, rho_mm: &pupil.rho_mm };
     WaveMap::trace(task.lens, &point, task.film_mm, edge).ok()
+}
+
+/// Returns the fields of settings for a lens with an axis of symmetry.
+fn radius(settings: &BankSettings) -> &[f64] {
+    match &settings.fields {
+        FieldSampling::Radial(tans) => tans,
+        FieldSampling::Grid { .. } | FieldSampling::Points { .. } => unreachable!("another model samples these"),
+    }
 }
 
 /// Returns the fields with others evenly between them.

@@ -2,54 +2,33 @@
 
 use dioptric_diffraction::{Edge, WaveQuality, WaveWindow, WindowCenter, wave_psf};
 use dioptric_optics::{Lens, MonoLens, ObjectPoint};
+use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    BankSettings, Diffraction, Interpolation, Kernel, ModelUse, PsfError, PsfQuery,
+    BankSettings, Diffraction, Kernel, ModelUse, PsfError, PsfQuery,
     axis::Axis,
     bend::Bending,
     dispersion::Dispersion,
-    drawing::composed,
+    drawing::{composed, wave_share_of},
     mesh::Mesh,
     pupil::Pupil,
-    ray_map::{Record, Summary, Task},
+    ray_map::{RIM_OVER_RMS, Record, Summary, Task},
     render::{self, Layout},
+    watch::Watch,
 };
-
-/// What a bank over a field of two dimensions covers, and how finely.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FieldBankSettings {
-    /// Distance of the film behind the last vertex, mm.
-    pub film_mm: f64,
-    /// The wavelength whose paraxial entrance pupil fields and depths count from, nm.
-    pub reference_wavelength_nm: f64,
-    /// Tangents of fields to the right of the picture, ascending, of either sign.
-    pub tans_x: Vec<f64>,
-    /// Tangents of fields upwards, ascending, of either sign.
-    pub tans_y: Vec<f64>,
-    /// Depths in dioptres (1/Z, Z in metres from the entrance pupil, 0 is infinitely far), ascending.
-    pub dioptres: Vec<f64>,
-    /// Wavelengths, nm, ascending.
-    pub wavelengths_nm: Vec<f64>,
-    /// Rings of the mesh in the pupil.
-    pub n_rings: usize,
-    /// Nodes on a ring, at least 8.
-    pub n_azimuths: usize,
-    /// How diffraction is taken into account.
-    pub diffraction: Diffraction,
-}
 
 /// Ray maps of a lens over a grid of fields to the right and upwards, depths and wavelengths.
 ///
 /// It asks nothing of the lens: surfaces may be tilted, biconic or toroidal. Of a rotationally symmetric one a
-/// [`PsfBank`](crate::PsfBank) is the same with far fewer samples. Rays are interpolated, quadratic along each axis;
-/// waves are traced where they are asked for.
+/// [`RotationalBank`](crate::rotational::RotationalBank) is the same with far fewer samples. Rays are interpolated,
+/// quadratic along each axis; waves are traced where they are asked for.
 #[derive(Clone, Debug)]
-pub struct FieldBank {
+pub(crate) struct GeneralBank {
     // Invariant: `samples` are indexed by (wavelength, depth, y, x), x innermost.
-    settings: FieldBankSettings,
+    settings: BankSettings,
     pub(crate) x: Axis,
     pub(crate) y: Axis,
     dioptres: Axis,
@@ -70,71 +49,16 @@ pub(crate) struct Sample {
     pub(crate) summary: Summary,
 }
 
-impl FieldBankSettings {
-    /// Fields across and up in a bank that covers a rectangle of them: cubics through the centroids of this many leave
-    /// errors of some tenths of a micrometre.
-    const N_FIELDS: usize = 11;
-
-    /// Returns the settings that cover fields from one pair of tangents to another, even in angle, and all else as
-    /// [`BankSettings::covering`] does.
-    pub fn covering(
-        film_mm: f64,
-        (first_tan, last_tan): (DVec2, DVec2),
-        dioptres: (f64, f64),
-        wavelengths_nm: (f64, f64),
-        diffraction: Diffraction,
-    ) -> Self {
-        let turned = BankSettings::covering(film_mm, 0.0, dioptres, wavelengths_nm, diffraction);
-        let tans = |first: f64, last: f64| -> Vec<f64> {
-            let (low, high, n) = (first.atan(), last.atan(), Self::N_FIELDS);
-            let mut tans: Vec<f64> = (0..n).map(|i| (low + (high - low) * i as f64 / (n - 1) as f64).tan()).collect();
-            // The ends to the bit.
-            (tans[0], tans[n - 1]) = (first, last);
-            tans
-        };
-        Self {
-            film_mm,
-            reference_wavelength_nm: turned.reference_wavelength_nm,
-            tans_x: tans(first_tan.x, last_tan.x),
-            tans_y: tans(first_tan.y, last_tan.y),
-            dioptres: turned.dioptres,
-            wavelengths_nm: turned.wavelengths_nm,
-            n_rings: turned.n_rings,
-            n_azimuths: turned.n_azimuths,
-            diffraction,
-        }
-    }
-
-    fn check(&self) -> Result<(), PsfError> {
-        for (axis, found) in [("tans_x", &self.tans_x), ("tans_y", &self.tans_y)] {
-            if Axis::new(found.clone()).is_none() {
-                let expected = "finite tangents";
-                return Err(PsfError::Axis { axis, expected, found: found.clone() });
-            }
-        }
-        // The rest is that of any bank.
-        BankSettings {
-            film_mm: self.film_mm,
-            reference_wavelength_nm: self.reference_wavelength_nm,
-            field_tans: vec![0.0],
-            dioptres: self.dioptres.clone(),
-            wavelengths_nm: self.wavelengths_nm.clone(),
-            n_rings: self.n_rings,
-            n_azimuths: self.n_azimuths,
-            diffraction: self.diffraction,
-            interpolation: Interpolation::Rays,
-        }
-        .check()
-    }
-}
-
-impl FieldBank {
-    /// Traces a bank on all threads. Points that no light of reaches the film are dark.
-    ///
-    /// # Errors
-    /// When the settings make no sense, or the lens has no index at a wavelength.
-    pub fn build(lens: &Lens, settings: &FieldBankSettings) -> Result<Self, PsfError> {
+impl GeneralBank {
+    /// Traces the samples on all threads. Points that no light of reaches the film are dark.
+    pub(crate) fn build(
+        lens: &Lens,
+        settings: &BankSettings,
+        progress: &(dyn Fn(f64) + Sync),
+        cancel: &Cancel,
+    ) -> Result<Self, PsfError> {
         settings.check()?;
+        let (tans_x, tans_y) = settings.fields.axes();
         let reference = lens.at(settings.reference_wavelength_nm)?;
         let nm: Vec<f64> = settings.wavelengths_nm.iter().rev().copied().collect();
         let lenses: Vec<MonoLens> = nm.iter().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
@@ -142,8 +66,8 @@ impl FieldBank {
         let mut tasks = Vec::new();
         for lens in &lenses {
             for &dioptres in &settings.dioptres {
-                for &tan_y in &settings.tans_y {
-                    tasks.extend(settings.tans_x.iter().map(|&tan_x| Task {
+                for &tan_y in tans_y {
+                    tasks.extend(tans_x.iter().map(|&tan_x| Task {
                         lens,
                         reference: &reference,
                         field_tan: DVec2::new(tan_x, tan_y),
@@ -161,12 +85,19 @@ impl FieldBank {
             let traced = task.trace(&pupil, has_stop)?;
             Some(Sample { record: traced.record(mesh, has_stop), summary: traced.summary })
         };
-        let samples = tasks.par_iter().map(sample).collect();
+        let watch = Watch::new(tasks.len(), progress, cancel);
+        let watched = |task: &Task<'_>| {
+            watch.check()?;
+            let sample = sample(task);
+            watch.done(1);
+            Ok(sample)
+        };
+        let samples = tasks.par_iter().map(watched).collect::<Result<_, Cancelled>>()?;
         let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
         let axis = |knots: Vec<f64>| Axis::new(knots).expect("the settings were checked");
         Ok(Self {
-            x: axis(settings.tans_x.clone()),
-            y: axis(settings.tans_y.clone()),
+            x: axis(tans_x.to_vec()),
+            y: axis(tans_y.to_vec()),
             dioptres: axis(settings.dioptres.clone()),
             colors: axis(nm.iter().map(|&nm| dispersion.coordinate(nm)).collect()),
             dispersion,
@@ -179,13 +110,13 @@ impl FieldBank {
     }
 
     /// What the bank was asked to cover.
-    pub fn settings(&self) -> &FieldBankSettings {
+    pub(crate) fn settings(&self) -> &BankSettings {
         &self.settings
     }
 
     /// Returns the bank without diffraction: of rays alone.
     pub(crate) fn geometric(&self) -> Self {
-        let settings = FieldBankSettings { diffraction: Diffraction::None, ..self.settings.clone() };
+        let settings = BankSettings { diffraction: Diffraction::None, ..self.settings.clone() };
         Self { settings, ..self.clone() }
     }
 
@@ -194,20 +125,20 @@ impl FieldBank {
     }
 
     /// Returns where the centroid of a point lands, mm, picture frame; `None` where samples about it are dark.
-    pub fn centroid_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<DVec2> {
+    pub(crate) fn centroid_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<DVec2> {
         let weighted = self.stencil(field_tan, dioptres, wavelength_nm);
         weighted.into_iter().map(|(i, weight)| Some(self.samples[i].as_ref()?.summary.centroid_mm * weight)).sum()
     }
 
     /// Returns how far from the centroid the farthest ray of a point lands, mm; `None` where samples about it are dark.
-    pub fn reach_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<f64> {
+    pub(crate) fn extent_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<f64> {
         let record = self.record(field_tan, dioptres, wavelength_nm)?;
         Some((0..record.mesh.n_nodes()).map(|i| record.node(i).at_mm.length()).fold(0.0, f64::max))
     }
 
-    /// Returns the point spread function of a point about its centroid, with the model that drew it, as
-    /// [`PsfBank::kernel_and_model`](crate::PsfBank::kernel_and_model); `None` where samples about it are dark.
-    pub fn kernel_and_model(&self, query: PsfQuery) -> Option<(Kernel, ModelUse)> {
+    /// Returns the point spread function of a point about its centroid, with the model that drew it; `None` where samples
+    /// about it are dark.
+    pub(crate) fn kernel_and_model(&self, query: PsfQuery) -> Option<(Kernel, ModelUse)> {
         Some(self.kernel_of(&self.record(query.field_tan, query.dioptres, query.wavelength_nm)?, query))
     }
 
@@ -217,14 +148,19 @@ impl FieldBank {
         (render::kernel(&energies, self.settings.diffraction != Diffraction::None, query.pitch_um), model)
     }
 
-    /// Returns the energy on each pixel of a window of `size` × `size` about the centroid, with the model that drew it,
-    /// as [`PsfBank::picture`](crate::PsfBank::picture); `None` where samples about it are dark.
-    pub fn picture(&self, query: PsfQuery, size: usize) -> Option<(Array2<f64>, ModelUse)> {
+    /// Returns the energy on each pixel of a window of `size` × `size` about the centroid, with the model that drew it;
+    /// `None` where samples about it are dark.
+    pub(crate) fn picture(&self, query: PsfQuery, size: usize) -> Option<(Array2<f64>, ModelUse)> {
         Some(self.draw(&self.record(query.field_tan, query.dioptres, query.wavelength_nm)?, query, Some(size)))
     }
 
-    fn draw(&self, record: &Record, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
-        let PsfQuery { field_tan, dioptres, pitch_um, .. } = query;
+    /// Returns how much of a kernel is wave optics; 0 of dark points.
+    pub(crate) fn wave_fraction(&self, query: PsfQuery) -> f64 {
+        let record = self.record(query.field_tan, query.dioptres, query.wavelength_nm);
+        record.map_or(0.0, |record| wave_share_of(&self.layout(&record, query, None), self.settings.diffraction))
+    }
+
+    fn layout<'a>(&self, record: &'a Record, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
         let wavelength_nm = self.within_colors(query.wavelength_nm);
         let bending = self.settings.diffraction.model().map(|model| {
             let colors = self.colors.stencil(self.dispersion.coordinate(wavelength_nm));
@@ -232,7 +168,13 @@ impl FieldBank {
             Bending { model, edge: Edge::new(self.reference.stop_semi_aperture_mm(), wavelength_nm, index) }
         });
         // Nothing is turned: every field has its own samples.
-        let layout = Layout::new(record, DVec2::X, bending, pitch_um).with_side(side);
+        Layout::new(record, DVec2::X, bending, query.pitch_um).with_side(side)
+    }
+
+    fn draw(&self, record: &Record, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
+        let PsfQuery { field_tan, dioptres, pitch_um, .. } = query;
+        let wavelength_nm = self.within_colors(query.wavelength_nm);
+        let layout = self.layout(record, query, side);
         let waves = |side: usize| {
             let lens = self.lens.at(wavelength_nm)?;
             let within = |list: &[f64], at: f64| at.clamp(list[0], list[list.len() - 1]);
@@ -249,6 +191,47 @@ impl FieldBank {
         let weighted = self.stencil(field_tan, dioptres, wavelength_nm);
         let records = weighted.into_iter().map(|(i, weight)| Some((&self.samples[i].as_ref()?.record, weight)));
         Record::mix(records.collect::<Option<Vec<_>>>()?.into_iter())
+    }
+
+    /// Returns the signed radius of the circle of confusion, mm.
+    ///
+    /// `nearest_lit` says for each sample which one stands for it if it is dark; without, dark ones count as nothing.
+    pub(crate) fn blur_radius_mm(
+        &self,
+        nearest_lit: Option<&[usize]>,
+        field_tan: DVec2,
+        dioptres: f64,
+        wavelength_nm: f64,
+    ) -> f64 {
+        let samples = self.lit_samples(nearest_lit, field_tan, dioptres, wavelength_nm);
+        RIM_OVER_RMS * samples.map(|(sample, weight)| weight * sample.summary.signed_rms_mm).sum::<f64>()
+    }
+
+    /// Returns the radius of what astigmatism and other aberrations leave of a point even in focus, mm, with its blur: that
+    /// of an even disc of the rms radius of the rays, to 95 % of its energy.
+    pub(crate) fn spread_mm(
+        &self,
+        nearest_lit: Option<&[usize]>,
+        field_tan: DVec2,
+        dioptres: f64,
+        wavelength_nm: f64,
+    ) -> f64 {
+        let samples = self.lit_samples(nearest_lit, field_tan, dioptres, wavelength_nm);
+        let record = Record::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
+        RIM_OVER_RMS * record.map_or(0.0, |record| record.rms_mm())
+    }
+
+    /// Returns the samples that a point draws on, with their weights; dark ones replaced by those that stand for them.
+    pub(crate) fn lit_samples<'a>(
+        &'a self,
+        nearest_lit: Option<&'a [usize]>,
+        field_tan: DVec2,
+        dioptres: f64,
+        wavelength_nm: f64,
+    ) -> impl Iterator<Item = (&'a Sample, f64)> {
+        let weighted = self.stencil(field_tan, dioptres, wavelength_nm);
+        let lit = move |i: usize| nearest_lit.map_or(i, |nearest| nearest[i]);
+        weighted.into_iter().filter_map(move |(i, weight)| Some((self.samples[lit(i)].as_ref()?, weight)))
     }
 
     /// Returns the samples that a point draws on, with their weights.

@@ -1,23 +1,23 @@
-//! A bank over a field of two dimensions, made ready to image scenes: it has an answer for every place of the film.
+//! Between a grid of fields and the film, both ways: where each field lands, and which is seen at each place.
 
+use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::{
-    FieldBank, FieldGeometry, Kernel, PsfError, PsfQuery,
-    field_bank::Sample,
+    FieldGeometry, Kernel, PsfError, PsfQuery,
     field_geometry::{Area, Landed, Landing},
-    ray_map::{RIM_OVER_RMS, Record},
+    general::GeneralBank,
+    ray_map::Record,
 };
 
-/// A [`FieldBank`] with the way back from the film to the field, for lenses without an axis of symmetry.
+/// Where the fields of a [`GeneralBank`] land on the film, and which field is seen at each place.
 ///
 /// Fields that see no light get none; the centroids beyond the last lit fields go on straight, and their kernels, which
 /// nothing needs but blends at the edge of the light, are those of the nearest lit field.
 #[derive(Clone, Debug)]
-pub struct ImagingBank {
+pub(crate) struct FieldToFilm {
     // Invariant: all lists are indexed as the bank's samples are: by (wavelength, depth, y, x), x innermost, or the first two.
-    bank: FieldBank,
     /// For each sample the nearest lit one of its depth and wavelength.
     nearest_lit: Vec<usize>,
     centroids_mm: Vec<DVec2>,
@@ -26,22 +26,17 @@ pub struct ImagingBank {
     geometries: Vec<FieldGeometry>,
 }
 
-impl ImagingBank {
-    /// Makes a bank ready.
+impl FieldToFilm {
+    /// Tabulates the way back from the film.
     ///
     /// # Errors
-    /// When it has fewer than two fields across or up, or fewer than two lit ones each way at some depth and wavelength.
-    pub fn new(bank: FieldBank) -> Result<Self, PsfError> {
+    /// When the bank has fewer than two lit fields each way at some depth and wavelength, or the work was cancelled.
+    pub(crate) fn new(bank: &GeneralBank, cancel: &Cancel) -> Result<Self, PsfError> {
         let (n_x, n_y) = (bank.x.knots().len(), bank.y.knots().len());
-        for (axis, n) in [("tans_x", n_x), ("tans_y", n_y)] {
-            if n < 2 {
-                let (found, expected) = (n as f64, "2 fields or more, to tell which is seen where");
-                return Err(PsfError::Setting { key: axis, found, expected });
-            }
-        }
         let n_plane = n_x * n_y;
         let (mut nearest_lit, mut centroids_mm, mut pupils_mm2) = (vec![], vec![], vec![]);
         for (plane, samples) in bank.samples.chunks_exact(n_plane).enumerate() {
+            cancel.check()?;
             let lit: Vec<Option<DVec2>> =
                 samples.iter().map(|sample| Some(sample.as_ref()?.summary.centroid_mm)).collect();
             let Some(whole) = straight_on(lit.clone(), n_x) else {
@@ -54,23 +49,23 @@ impl ImagingBank {
             nearest_lit.extend((0..n_plane).map(|at| plane * n_plane + nearest(&lit, at, n_x)));
             pupils_mm2.extend(samples.iter().map(|s| s.as_ref().map_or(0.0, |s| s.summary.pupil_mm2)));
         }
-        let mut this = Self { bank, nearest_lit, centroids_mm, pupils_mm2, geometries: vec![] };
+        let mut this = Self { nearest_lit, centroids_mm, pupils_mm2, geometries: vec![] };
         let area = Area::around(this.centroids_mm.iter().copied()).expect("there are samples");
         let n_planes = this.centroids_mm.len() / n_plane;
-        this.geometries =
-            (0..n_planes).into_par_iter().map(|plane| this.landing([(plane, 1.0)].into_iter()).inverse(area)).collect();
+        let inverse = |plane| this.landing(bank, [(plane, 1.0)].into_iter()).inverse(area, cancel);
+        this.geometries = (0..n_planes).into_par_iter().map(inverse).collect::<Result<_, Cancelled>>()?;
         Ok(this)
     }
 
-    /// The bank of ray maps.
-    pub fn bank(&self) -> &FieldBank {
-        &self.bank
+    /// For each sample of the bank the nearest lit one of its depth and wavelength.
+    pub(crate) fn nearest_lit(&self) -> &[usize] {
+        &self.nearest_lit
     }
 
     /// Whether the fields at the rim of the bank see no light, at any depth and wavelength: then nothing lights the film from
     /// beyond them.
-    pub fn is_dark_at_rim(&self) -> bool {
-        let (n_x, n_y) = (self.bank.x.knots().len(), self.bank.y.knots().len());
+    pub(crate) fn is_dark_at_rim(&self, bank: &GeneralBank) -> bool {
+        let (n_x, n_y) = (bank.x.knots().len(), bank.y.knots().len());
         let is_rim = |at: usize| {
             let (row, column) = (at / n_x % n_y, at % n_x);
             row == 0 || column == 0 || row == n_y - 1 || column == n_x - 1
@@ -79,29 +74,35 @@ impl ImagingBank {
     }
 
     /// Returns which field is seen where on the film, and how bright, at one depth and wavelength.
-    pub fn geometry(&self, dioptres: f64, wavelength_nm: f64) -> FieldGeometry {
-        let planes = self.bank.planes(dioptres, wavelength_nm);
+    pub(crate) fn geometry(&self, bank: &GeneralBank, dioptres: f64, wavelength_nm: f64) -> FieldGeometry {
+        let planes = bank.planes(dioptres, wavelength_nm);
         FieldGeometry::mix(planes.iter().map(|&(plane, weight)| (&self.geometries[plane], weight)))
             .expect("every stencil has a knot")
     }
 
     /// Returns where the centroid of a point lands, mm, picture frame.
-    pub fn centroid_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> DVec2 {
-        self.landed(field_tan, dioptres, wavelength_nm).at_mm
+    pub(crate) fn centroid_mm(&self, bank: &GeneralBank, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> DVec2 {
+        self.landed(bank, field_tan, dioptres, wavelength_nm).at_mm
     }
 
     /// Returns irradiance on the film over radiance of a locally uniform scene, sr, as [`FieldGeometry::at`] does.
-    pub fn irradiance_per_radiance(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        self.landed(field_tan, dioptres, wavelength_nm).irradiance_per_radiance()
+    pub(crate) fn irradiance_per_radiance(
+        &self,
+        bank: &GeneralBank,
+        field_tan: DVec2,
+        dioptres: f64,
+        wavelength_nm: f64,
+    ) -> f64 {
+        self.landed(bank, field_tan, dioptres, wavelength_nm).irradiance_per_radiance()
     }
 
-    fn landed(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Landed {
-        self.landing(self.bank.planes(dioptres, wavelength_nm).into_iter()).of(field_tan)
+    fn landed(&self, bank: &GeneralBank, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Landed {
+        self.landing(bank, bank.planes(dioptres, wavelength_nm).into_iter()).of(field_tan)
     }
 
     /// Returns where the fields land in a weighted sum of depths and wavelengths.
-    fn landing(&self, planes: impl Iterator<Item = (usize, f64)>) -> Landing<'_> {
-        let (x, y) = (&self.bank.x, &self.bank.y);
+    fn landing<'a>(&self, bank: &'a GeneralBank, planes: impl Iterator<Item = (usize, f64)>) -> Landing<'a> {
+        let (x, y) = (&bank.x, &bank.y);
         let n = x.knots().len() * y.knots().len();
         let (mut centroids_mm, mut pupils_mm2) = (vec![DVec2::ZERO; n], vec![0.0; n]);
         for (plane, weight) in planes {
@@ -113,33 +114,12 @@ impl ImagingBank {
         Landing { x, y, centroids_mm, pupils_mm2 }
     }
 
-    /// Returns the point spread function of a point about its centroid, as
-    /// [`PsfBank::kernel`](crate::PsfBank::kernel) does; of a dark one that of the nearest lit field.
-    pub fn kernel(&self, query: PsfQuery) -> Kernel {
-        let samples = self.samples(query.field_tan, query.dioptres, query.wavelength_nm);
+    /// Returns the point spread function of a point about its centroid; of a dark one that of the nearest lit field.
+    pub(crate) fn kernel(&self, bank: &GeneralBank, query: PsfQuery) -> Kernel {
+        let PsfQuery { field_tan, dioptres, wavelength_nm, .. } = query;
+        let samples = bank.lit_samples(Some(&self.nearest_lit), field_tan, dioptres, wavelength_nm);
         let record = Record::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
-        self.bank.kernel_of(&record.expect("every stencil has a knot"), query).0
-    }
-
-    /// Returns the signed radius of the circle of confusion, mm, as
-    /// [`PsfBank::blur_radius_mm`](crate::PsfBank::blur_radius_mm) does.
-    pub fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        let samples = self.samples(field_tan, dioptres, wavelength_nm);
-        RIM_OVER_RMS * samples.map(|(sample, weight)| weight * sample.summary.signed_rms_mm).sum::<f64>()
-    }
-
-    /// Returns the radius of what astigmatism and other aberrations leave of a point even in focus, mm, with its blur: that
-    /// of an even disc of the rms radius of the rays, to 95 % of its energy.
-    pub fn spread_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        let samples = self.samples(field_tan, dioptres, wavelength_nm);
-        let record = Record::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
-        RIM_OVER_RMS * record.map_or(0.0, |record| record.rms_mm())
-    }
-
-    /// Returns the samples that a point draws on, dark ones replaced by the nearest lit.
-    fn samples(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> impl Iterator<Item = (&Sample, f64)> {
-        let weighted = self.bank.stencil(field_tan, dioptres, wavelength_nm);
-        weighted.into_iter().filter_map(|(i, weight)| Some((self.bank.samples[self.nearest_lit[i]].as_ref()?, weight)))
+        bank.kernel_of(&record.expect("every stencil has a knot"), query).0
     }
 }
 
