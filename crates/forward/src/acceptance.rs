@@ -1,8 +1,8 @@
 //! The whole way, held to closed forms and to pictures integrated over the pupil.
 
-use dioptric_psf::{LensImage, PsfQuery};
 use std::sync::Mutex;
 
+use dioptric_psf::{LensImage, PsfQuery};
 use dioptric_scene::View;
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, s};
@@ -356,6 +356,35 @@ fn interpolating_over_the_field_meets_the_edge_error_asked_for() {
     );
     println!("edge error {coarse:.4} with one spacing, {fine:.4} with cells halved");
     assert!(fine <= 0.012 && fine < 0.5 * coarse, "{fine} against {coarse}");
+}
+
+/// A star of 36 spokes, spread by kernels between knots and by one kernel for each pixel.
+#[test]
+fn splines_match_a_kernel_per_pixel() {
+    const N: usize = 160;
+    let lens = DiscLens { growth: 6.0, ..lens() };
+    let middle = 0.5 * (N as f64 - 1.0);
+    let star = Array2::from_shape_fn((N, N), |(r, c)| {
+        let (x, y) = (c as f64 - middle, r as f64 - middle);
+        if (18.0 * y.atan2(x)).sin() > 0.0 { 1.0_f32 } else { 0.1 }
+    });
+    let scene = pixels(star.clone(), &Array2::from_elem((N, N), 25.0));
+    let picture = rendered(&scene.source(), &lens, &scene.film, &Settings::default()).remove(0);
+    let mut truth = Array2::<f64>::zeros((N, N));
+    for ((row, column), &value) in star.indexed_iter() {
+        let tan = glam::DVec2::new(column as f64 - middle, middle - row as f64) * 1e-3;
+        let kernel = lens.kernel(PsfQuery::new(tan, 25.0, 550.0, 1.0)).samples;
+        let (half, sum) = (kernel.nrows() / 2, kernel.sum());
+        for ((r, c), &weight) in kernel.indexed_iter() {
+            let (r, c) = ((row + r).wrapping_sub(half), (column + c).wrapping_sub(half));
+            if r < N && c < N {
+                truth[(r, c)] += f64::from(value * weight / sum);
+            }
+        }
+    }
+    let error = rms(picture.iter().zip(&truth).map(|(a, b)| f64::from(*a) - b)) / truth.mean().unwrap();
+    println!("splines against a kernel for each pixel: {error:.5} of the mean");
+    assert!(error <= 0.005, "{error}");
 }
 
 #[test]

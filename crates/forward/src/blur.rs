@@ -1,17 +1,19 @@
 //! One layer in one band: its ideal picture, spread by PSFs that vary over the film.
 
-use dioptric_psf::FilmMap;
 use std::collections::BTreeMap;
 
+use dioptric_psf::FilmMap;
 use dioptric_spectrum::{Cancel, Cancelled};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 
 use crate::{
-    convolve::{DIRECT_BLOCK, Direct, MAX_DIRECT, fast_size, multiply_add, with_fft},
+    convolve::{STRIP_COLUMNS, STRIP_ROWS, Strip, fast_size, multiply_add, with_fft},
+    knot_kernels::{KnotKernel, LayerKernels, edge_spread_peak},
     occlusion::BlurredLayer,
     sampler::{IdealLayer, Rectangle, Sampler, Surface},
-    tiles::{Cell, Knot, LayerKernels},
+    stopwatch::{Part, Stopwatch},
+    tiles::{Knot, LARGEST, Patch, polynomials},
     work::Work,
 };
 
@@ -24,24 +26,13 @@ pub(crate) struct LayerTask<'a> {
     pub(crate) map: &'a FilmMap,
     pub(crate) layer: usize,
     pub(crate) surfaces: &'a [Surface<'a>],
-    pub(crate) cells: &'a [Cell],
+    pub(crate) patches: &'a [Patch],
     pub(crate) kernels: &'a LayerKernels,
     pub(crate) film_rows: usize,
     pub(crate) film_columns: usize,
     /// Whether the blurred cover is wanted beside the light.
     pub(crate) with_cover: bool,
-}
-
-/// The kernels of a layer at every knot, turned to its place, in the form in which they are used.
-enum Turned {
-    Samples(BTreeMap<Knot, Vec<f32>>),
-    Spectra { by_knot: BTreeMap<Knot, Spectrum>, size: usize },
-}
-
-/// A kernel's spectrum; equal kernels share a `twin` number.
-struct Spectrum {
-    values: Vec<Complex<f32>>,
-    twin: usize,
+    pub(crate) stopwatch: &'a Stopwatch,
 }
 
 /// The blurred light and cover of a cell.
@@ -51,185 +42,249 @@ struct BlurredCell {
     cover: Option<Vec<f32>>,
 }
 
-/// Blurs a layer into `out`, which must be clear; each cell counts as `cell_units` of work.
+/// Blurs a layer into `out`, which must be clear; each patch counts as `patch_units` of work.
 pub(crate) fn blur_layer(
     task: &LayerTask<'_>,
     out: &mut BlurredLayer,
     work: &Work<'_>,
-    cell_units: u64,
+    patch_units: u64,
 ) -> Result<(), Cancelled> {
-    let turned = turned(task, work.cancel())?;
-    for cells in task.cells.chunks(CELLS_AT_ONCE) {
-        let blur = |cell| {
-            let blurred = blur_cell(task, &turned, cell, work.cancel());
-            work.advance(cell_units);
+    let mut knots: Vec<Knot> =
+        task.patches.iter().flat_map(|patch| patch.shares.iter().map(|&(knot, _)| knot)).collect();
+    knots.sort_unstable();
+    knots.dedup();
+    let kernels: BTreeMap<Knot, KnotKernel> = knots.into_par_iter().map(|knot| (knot, task.kernels.at(knot))).collect();
+    for patches in task.patches.chunks(CELLS_AT_ONCE) {
+        let blur = |patch| {
+            let blurred = blur_patch(task, &kernels, patch, work.cancel());
+            work.advance(patch_units);
             blurred
         };
-        let blurred: Vec<Option<BlurredCell>> = cells.par_iter().map(blur).collect::<Result<_, Cancelled>>()?;
-        for cell in blurred.iter().flatten() {
-            add_cell(task, cell, out);
-        }
+        let blurred: Vec<Option<BlurredCell>> = patches.par_iter().map(blur).collect::<Result<_, Cancelled>>()?;
+        task.stopwatch.time(Part::Compositing, || {
+            blurred.iter().flatten().for_each(|cell| add_cell(task, cell, out));
+        });
     }
     Ok(())
 }
 
-fn turned(task: &LayerTask<'_>, cancel: &Cancel) -> Result<Turned, Cancelled> {
-    let kernels = task.kernels;
-    let mut knots: Vec<Knot> = task.cells.iter().flat_map(Cell::knots).collect();
-    knots.sort_unstable();
-    knots.dedup();
-    let samples: Vec<(Knot, Vec<f32>)> = knots.into_par_iter().map(|knot| (knot, kernels.at(knot))).collect();
-    let (smallest, largest) =
-        task.cells.iter().fold((usize::MAX, 1), |(low, high), cell| (low.min(cell.size), high.max(cell.size)));
-    // Direct blocks take the PSF as constant; where cells had to be halved it varies too fast for that.
-    if kernels.width <= MAX_DIRECT && smallest == largest {
-        return Ok(Turned::Samples(samples.into_iter().collect()));
-    }
-    let size = fast_size(largest + kernels.width - 1);
-    let mut distinct: Vec<&Vec<f32>> = vec![];
-    let mut twins = vec![];
-    for (_, kernel) in &samples {
-        // Only a lens without field dependence has equal kernels, and then all are; few need to be compared.
-        let twin = distinct.iter().take(2).position(|other| *other == kernel);
-        twins.push(twin.unwrap_or(distinct.len()));
-        if twin.is_none() {
-            distinct.push(kernel);
-        }
-    }
-    let by_knot = samples
-        .par_iter()
-        .zip(twins)
-        .map(|((knot, kernel), twin)| {
-            cancel.check()?;
-            let mut values = vec![];
-            with_fft(size, |fft| fft.forward(kernel, kernels.width, &mut values));
-            Ok((*knot, Spectrum { values, twin }))
-        })
-        .collect::<Result<_, Cancelled>>()?;
-    Ok(Turned::Spectra { by_knot, size })
-}
-
-fn blur_cell(
+fn blur_patch(
     task: &LayerTask<'_>,
-    turned: &Turned,
-    cell: &Cell,
+    kernels: &BTreeMap<Knot, KnotKernel>,
+    patch: &Patch,
     cancel: &Cancel,
 ) -> Result<Option<BlurredCell>, Cancelled> {
-    let half = task.kernels.width / 2;
+    let cell = &patch.cell;
+    let width = patch.shares.iter().map(|(knot, _)| kernels[knot].width).max().unwrap_or(1);
+    let half = width / 2;
     let (first_row, first_column) = cell.first_pixel(&task.sampler.frame);
     let whole = Rectangle { first_row, first_column, rows: cell.size, columns: cell.size };
     let Some(source) = whole.clipped(task.film_rows, task.film_columns, half) else { return Ok(None) };
     let mut ideal = IdealLayer::default();
-    if !task.sampler.sample(source, task.map, task.layer, task.surfaces, &mut ideal, cancel)? {
+    let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, &mut ideal, cancel);
+    if !task.stopwatch.time(Part::Sampling, sample)? {
         return Ok(None);
     }
-    let blend = Blend::new(cell, &source, &task.sampler.frame);
-    let spread = |values: &[f32]| match turned {
-        Turned::Samples(kernels) => Ok(spread_directly(values, &source, &blend, kernels, task.kernels.width)),
-        Turned::Spectra { by_knot, size } => {
-            spread_by_transform(values, &source, &blend, (by_knot, *size), task.kernels.width, cancel)
-        }
+    let expansion = Expansion::of(patch, kernels, width, cancel)?;
+    let mut planes = vec![ideal.light.as_slice()];
+    if task.with_cover {
+        // What a surface covers is 1 all over it, however its kernels change.
+        let share = (1.0 / expansion.uniform_response(cell.size)) as f32;
+        ideal.cover.iter_mut().for_each(|cover| *cover *= share);
+        planes.push(&ideal.cover);
+    }
+    let places = Places::new(patch, &source, task.sampler);
+    let spread = if expansion.is_better_direct(&source, planes.len()) {
+        task.stopwatch.time(Part::Direct, || spread_directly(&planes, &places, &expansion, cancel))
+    } else {
+        task.stopwatch.time(Part::Transforms, || spread_by_transform(&planes, &places, &expansion, cancel))
     };
-    let light = spread(&ideal.light)?;
-    let cover = task.with_cover.then(|| spread(&ideal.cover)).transpose()?;
+    let mut spread = spread?.into_iter();
     let at = Rectangle {
         first_row: source.first_row - half as i64,
         first_column: source.first_column - half as i64,
         rows: source.rows + 2 * half,
         columns: source.columns + 2 * half,
     };
-    Ok(Some(BlurredCell { at, light, cover }))
+    let light = spread.next().unwrap_or_default();
+    Ok(Some(BlurredCell { at, light, cover: spread.next() }))
 }
 
-/// How the kernels at the four corners of a cell share its pixels: bilinearly.
-struct Blend {
-    knots: [Knot; 4],
-    /// Place of the first pixel's centre from the corner, in parts of the cell: down and across.
-    start: (f32, f32),
-    step: f32,
-}
-
-impl Blend {
-    fn new(cell: &Cell, source: &Rectangle, frame: &crate::geometry::FilmFrame) -> Self {
-        let (center_row, center_column) = frame.center();
-        let step = 1.0 / cell.size as f64;
-        let down = (source.first_row as f64 - center_row - f64::from(cell.corner.down)) * step;
-        let across = (source.first_column as f64 - center_column - f64::from(cell.corner.right)) * step;
-        Self { knots: cell.knots(), start: (down as f32, across as f32), step: step as f32 }
-    }
-
-    /// Returns the shares of the four corners at a row and column of the source.
-    fn shares(&self, row: f32, column: f32) -> [f32; 4] {
-        let (down, across) = (self.start.0 + row * self.step, self.start.1 + column * self.step);
-        [(1.0 - down) * (1.0 - across), (1.0 - down) * across, down * (1.0 - across), down * across]
-    }
-}
-
-fn spread_directly(
-    values: &[f32],
-    source: &Rectangle,
-    blend: &Blend,
-    kernels: &BTreeMap<Knot, Vec<f32>>,
+/// The kernel over a cell: a sum of squares of samples, each times a polynomial down and one across the cell.
+struct Expansion {
     width: usize,
-) -> Vec<f32> {
-    let corners = blend.knots.map(|knot| kernels[&knot].as_slice());
-    let (block_rows, block_columns) = DIRECT_BLOCK;
-    let stride = source.columns.next_multiple_of(block_columns) + width - 1;
-    let mut out = vec![0.0; (source.rows.next_multiple_of(block_rows) + width - 1) * stride];
-    let (mut direct, mut kernel) = (Direct::default(), vec![0.0; width * width]);
-    for top in (0..source.rows).step_by(block_rows) {
-        for left in (0..source.columns).step_by(block_columns) {
-            let (n_rows, n_columns) = (block_rows.min(source.rows - top), block_columns.min(source.columns - left));
-            let lines: Vec<&[f32]> =
-                (top..top + n_rows).map(|row| &values[row * source.columns + left..][..n_columns]).collect();
-            if lines.iter().all(|line| line.iter().all(|&v| v == 0.0)) {
-                continue;
+    terms: Vec<Term>,
+}
+
+struct Term {
+    /// Numbers of the polynomials.
+    down: usize,
+    across: usize,
+    samples: Vec<f32>,
+}
+
+/// A term that changes no edge by more than this is left out.
+const NEGLIGIBLE: f64 = 1e-5;
+
+/// Multiplications that take about as long as the transform of a sample.
+const COST_OF_TRANSFORM: usize = 64;
+
+impl Expansion {
+    fn of(
+        patch: &Patch,
+        kernels: &BTreeMap<Knot, KnotKernel>,
+        width: usize,
+        cancel: &Cancel,
+    ) -> Result<Self, Cancelled> {
+        let mut terms = vec![];
+        for product in 0..9 {
+            cancel.check()?;
+            let (down, across) = (product / 3, product % 3);
+            let mut samples = vec![0.0; width * width];
+            for (knot, shares) in patch.shares.iter().filter(|(_, shares)| shares[product] != 0.0) {
+                kernels[knot].add_to(&mut samples, width, shares[product]);
             }
-            let middle = |first: usize, n: usize| first as f32 + 0.5 * (n as f32 - 1.0);
-            let [a, b, c, d] = blend.shares(middle(top, n_rows), middle(left, n_columns));
-            for (i, value) in kernel.iter_mut().enumerate() {
-                *value = a * corners[0][i] + b * corners[1][i] + c * corners[2][i] + d * corners[3][i];
+            let largest = LARGEST[down] * LARGEST[across];
+            if product == 0 || largest * edge_spread_peak(&samples, width) > NEGLIGIBLE {
+                terms.push(Term { down, across, samples });
             }
-            direct.add(&lines, &kernel, width, &mut out[top * stride + left..], stride);
+        }
+        Ok(Self { width, terms })
+    }
+
+    /// Returns what these kernels make of a uniform plane of 1, to the second moments (docs/forward.md, eq. 2).
+    fn uniform_response(&self, cell_size: usize) -> f64 {
+        let middle = (self.width / 2) as f64;
+        let moment = |term: &Term| -> f64 {
+            let of = |(i, sample): (usize, &f32)| {
+                let (down, across) = ((i / self.width) as f64 - middle, (i % self.width) as f64 - middle);
+                f64::from(*sample) * down.powi(term.down as i32) * across.powi(term.across as i32)
+            };
+            term.samples.iter().enumerate().map(of).sum()
+        };
+        let second = self.terms.iter().filter(|term| term.down + term.across == 2);
+        let excess = second.map(moment).sum::<f64>() / (cell_size * cell_size) as f64;
+        // The expansion holds while it is small.
+        1.0 + excess.clamp(-0.2, 0.2)
+    }
+
+    /// The number of polynomials across the cell.
+    fn n_across(&self) -> usize {
+        1 + self.terms.iter().map(|term| term.across).max().unwrap_or(0)
+    }
+
+    /// The side of the transforms of a rectangle.
+    fn transform_size(&self, source: &Rectangle) -> usize {
+        fast_size(source.rows.max(source.columns) + self.width - 1)
+    }
+
+    /// Whether a sum takes less time than transforms.
+    fn is_better_direct(&self, source: &Rectangle, n_planes: usize) -> bool {
+        let lanes = source.rows * (source.columns + self.width - 1);
+        let direct = n_planes * self.n_across() * self.width * self.width * lanes;
+        let n_transforms = self.terms.len() + n_planes * (self.terms.len() + 1);
+        direct <= n_transforms * self.transform_size(source).pow(2) * COST_OF_TRANSFORM
+    }
+
+    /// Returns the kernel at a place down the cell, for each polynomial across it.
+    fn at_row(&self, down: &[f32; 3], kernels: &mut [f32]) {
+        kernels.fill(0.0);
+        let n = self.width * self.width;
+        for term in &self.terms {
+            let factor = down[term.down];
+            let kernel = &mut kernels[term.across * n..][..n];
+            kernel.iter_mut().zip(&term.samples).for_each(|(kernel, sample)| *kernel += factor * sample);
         }
     }
-    let (rows, columns) = (source.rows + width - 1, source.columns + width - 1);
-    out.chunks_exact(stride).take(rows).flat_map(|line| &line[..columns]).copied().collect()
 }
 
-fn spread_by_transform(
-    values: &[f32],
-    source: &Rectangle,
-    blend: &Blend,
-    (spectra, size): (&BTreeMap<Knot, Spectrum>, usize),
-    width: usize,
+/// The polynomials of a cell at the rows and columns of a rectangle in it.
+struct Places {
+    down: Vec<[f32; 3]>,
+    across: Vec<[f32; 3]>,
+}
+
+impl Places {
+    fn new(patch: &Patch, source: &Rectangle, sampler: &Sampler) -> Self {
+        let at = |row: usize, column: usize| {
+            let (row, column) = (source.first_row + row as i64, source.first_column + column as i64);
+            patch.cell.place_of(&sampler.frame, row, column)
+        };
+        Self {
+            down: (0..source.rows).map(|row| polynomials(at(row, 0).0 as f32)).collect(),
+            across: (0..source.columns).map(|column| polynomials(at(0, column).1 as f32)).collect(),
+        }
+    }
+}
+
+/// Spreads planes by sums: exactly the kernel of each row, and along a row that of each sample.
+fn spread_directly(
+    planes: &[&[f32]],
+    places: &Places,
+    expansion: &Expansion,
     cancel: &Cancel,
-) -> Result<Vec<f32>, Cancelled> {
-    let corners = blend.knots.map(|knot| &spectra[&knot]);
-    with_fft(size, |fft| {
-        let (mut spectrum, mut out) = (vec![], vec![]);
-        let mut sum = vec![Complex::new(0.0, 0.0); fft.spectrum_len()];
-        if corners.iter().all(|corner| corner.twin == corners[0].twin) {
-            fft.forward(values, source.columns, &mut spectrum);
-            multiply_add(&mut sum, &spectrum, &corners[0].values);
-        } else {
-            let mut windowed = vec![0.0; values.len()];
-            for (corner, kernel) in corners.iter().enumerate() {
+) -> Result<Vec<Vec<f32>>, Cancelled> {
+    let (rows, columns) = (places.down.len(), places.across.len());
+    let (width, n_across) = (expansion.width, expansion.n_across());
+    let (out_rows, out_columns) = (rows + width - 1, columns + width - 1);
+    let mut out = vec![vec![0.0; out_rows * out_columns]; planes.len()];
+    let mut strip = Strip::new(width, n_across);
+    for top in (0..rows).step_by(STRIP_ROWS) {
+        let n_rows = STRIP_ROWS.min(rows - top);
+        for (row, down) in places.down[top..top + n_rows].iter().enumerate() {
+            cancel.check()?;
+            expansion.at_row(down, strip.kernels_of_row(row));
+        }
+        for left in (0..columns).step_by(STRIP_COLUMNS) {
+            let across = &places.across[left..(left + STRIP_COLUMNS).min(columns)];
+            for (values, out) in planes.iter().zip(&mut out) {
                 cancel.check()?;
-                for (row, (windowed, values)) in
-                    windowed.chunks_exact_mut(source.columns).zip(values.chunks_exact(source.columns)).enumerate()
-                {
-                    for (column, (windowed, value)) in windowed.iter_mut().zip(values).enumerate() {
-                        *windowed = value * blend.shares(row as f32, column as f32)[corner];
+                let lines = (top..top + n_rows).map(|row| &values[row * columns + left..][..across.len()]);
+                if strip.load(lines, across) {
+                    strip.add_to(&mut out[top * out_columns + left..], out_columns);
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Spreads planes by transforms: the sum over the terms of what each does to a plane times its polynomials.
+fn spread_by_transform(
+    planes: &[&[f32]],
+    places: &Places,
+    expansion: &Expansion,
+    cancel: &Cancel,
+) -> Result<Vec<Vec<f32>>, Cancelled> {
+    let (rows, columns, width) = (places.down.len(), places.across.len(), expansion.width);
+    let size = fast_size(rows.max(columns) + width - 1);
+    with_fft(size, |fft| {
+        let (mut kernel, mut spectrum) = (vec![], vec![]);
+        let mut sums = vec![vec![Complex::new(0.0, 0.0); fft.spectrum_len()]; planes.len()];
+        let mut weighted = vec![0.0; rows * columns];
+        for term in &expansion.terms {
+            cancel.check()?;
+            fft.forward(&term.samples, width, &mut kernel);
+            for (values, sum) in planes.iter().zip(&mut sums) {
+                cancel.check()?;
+                let lines = weighted.chunks_exact_mut(columns).zip(values.chunks_exact(columns));
+                for ((weighted, values), down) in lines.zip(&places.down) {
+                    let down = down[term.down];
+                    for ((weighted, value), across) in weighted.iter_mut().zip(values).zip(&places.across) {
+                        *weighted = value * (down * across[term.across]);
                     }
                 }
-                fft.forward(&windowed, source.columns, &mut spectrum);
-                multiply_add(&mut sum, &spectrum, &kernel.values);
+                fft.forward(&weighted, columns, &mut spectrum);
+                multiply_add(sum, &spectrum, &kernel);
             }
         }
-        cancel.check()?;
-        fft.inverse(&mut sum, source.rows + width - 1, source.columns + width - 1, &mut out);
-        Ok(out)
+        let inverse = |mut sum: Vec<Complex<f32>>| {
+            cancel.check()?;
+            let mut out = vec![];
+            fft.inverse(&mut sum, rows + width - 1, columns + width - 1, &mut out);
+            Ok(out)
+        };
+        sums.into_iter().map(inverse).collect()
     })
 }
 

@@ -135,29 +135,42 @@ pub(crate) fn multiply_add(sum: &mut [Complex<f32>], a: &[Complex<f32>], b: &[Co
 /// Samples of the output that stay in registers together.
 const LANES: usize = 32;
 
-/// The widest kernel for which direct convolution is used, samples.
-pub(crate) const MAX_DIRECT: usize = 25;
+/// Rows of samples that are convolved directly at once.
+pub(crate) const STRIP_ROWS: usize = 16;
 
-/// The block of samples that is convolved directly at once: rows and columns.
-pub(crate) const DIRECT_BLOCK: (usize, usize) = (16, 32);
+/// Columns of samples that are convolved directly at once, at most.
+pub(crate) const STRIP_COLUMNS: usize = 128;
 
-/// Adds the full convolution of a block of [`DIRECT_BLOCK`] size with a square kernel of `width` samples to `out`,
-/// which begins at the block's first sample less half a kernel and has `stride` samples a row.
+/// Adds the full convolution of a strip of samples to `out`, which begins at the strip's first sample less half a kernel and
+/// has `stride` samples a row.
 ///
-/// `padded` holds the block's rows with `width − 1` zeros before each and at least as many behind.
+/// A strip has planes of samples, each with a kernel of `width` × `width` samples of its own for every row. `padded`
+/// holds the rows of the planes with `width − 1` zeros before each and at least as many behind.
 #[multiversion::multiversion(targets("x86_64+avx2", "aarch64+neon"))]
-fn convolve_padded(padded: &[f32], padded_stride: usize, kernel: &[f32], width: usize, out: &mut [f32], stride: usize) {
-    let (n_rows, n_columns) = DIRECT_BLOCK;
+fn convolve_padded(
+    padded: &[f32],
+    padded_stride: usize,
+    kernels: &[f32],
+    (width, n_planes): (usize, usize),
+    n_columns: usize,
+    (out, stride): (&mut [f32], usize),
+) {
+    let kernel_len = width * width;
+    let n_rows = padded.len() / (n_planes * padded_stride);
     for row in 0..n_rows + width - 1 {
         let kernel_rows = (row + 1).saturating_sub(n_rows)..width.min(row + 1);
         for first in (0..n_columns + width - 1).step_by(LANES) {
             let mut sum = [0.0_f32; LANES];
             for kernel_row in kernel_rows.clone() {
-                let samples = &padded[(row - kernel_row) * padded_stride + first..][..LANES + width - 1];
-                let weights = &kernel[kernel_row * width..][..width];
-                for (j, weight) in weights.iter().rev().enumerate() {
-                    for (sum, sample) in sum.iter_mut().zip(&samples[j..j + LANES]) {
-                        *sum += weight * sample;
+                let source = row - kernel_row;
+                for plane in 0..n_planes {
+                    let line = (source * n_planes + plane) * padded_stride;
+                    let samples = &padded[line + first..][..LANES + width - 1];
+                    let kernel = (source * n_planes + plane) * kernel_len + kernel_row * width;
+                    for (j, weight) in kernels[kernel..][..width].iter().rev().enumerate() {
+                        for (sum, sample) in sum.iter_mut().zip(&samples[j..j + LANES]) {
+                            *sum += weight * sample;
+                        }
                     }
                 }
             }
@@ -169,24 +182,55 @@ fn convolve_padded(padded: &[f32], padded_stride: usize, kernel: &[f32], width: 
     }
 }
 
-/// Working memory of direct convolution.
-#[derive(Default)]
-pub(crate) struct Direct {
+/// A strip of samples and the kernels of its rows, which change along a row as polynomials.
+pub(crate) struct Strip {
+    width: usize,
+    n_polynomials: usize,
+    n_columns: usize,
+    padded_stride: usize,
     padded: Vec<f32>,
+    kernels: Vec<f32>,
 }
 
-impl Direct {
-    /// Adds the full convolution of `block` (rows of `columns` samples, at most [`DIRECT_BLOCK`]) with a square
-    /// kernel of `width` samples to `out`, whose first sample belongs to the block's first less half a kernel.
-    pub(crate) fn add(&mut self, block: &[&[f32]], kernel: &[f32], width: usize, out: &mut [f32], stride: usize) {
-        let (n_rows, n_columns) = DIRECT_BLOCK;
-        let padded_stride = (n_columns + width - 1).next_multiple_of(LANES) + width - 1;
+impl Strip {
+    /// Returns an empty strip for kernels of `width` samples a side.
+    pub(crate) fn new(width: usize, n_polynomials: usize) -> Self {
+        let kernels = vec![0.0; STRIP_ROWS * n_polynomials * width * width];
+        Self { width, n_polynomials, n_columns: 0, padded_stride: 0, padded: vec![], kernels }
+    }
+
+    /// The kernels of a row, one for each polynomial.
+    pub(crate) fn kernels_of_row(&mut self, row: usize) -> &mut [f32] {
+        let n = self.n_polynomials * self.width * self.width;
+        &mut self.kernels[row * n..][..n]
+    }
+
+    /// Takes rows of samples, at most [`STRIP_ROWS`] × [`STRIP_COLUMNS`], and the polynomials at their columns; returns whether
+    /// there is anything but zeros.
+    pub(crate) fn load<'a>(&mut self, lines: impl Iterator<Item = &'a [f32]>, polynomials: &[[f32; 3]]) -> bool {
+        let width = self.width;
+        self.n_columns = polynomials.len();
+        self.padded_stride = (self.n_columns + width - 1).next_multiple_of(LANES) + width - 1;
         self.padded.clear();
-        self.padded.resize(n_rows * padded_stride, 0.0);
-        for (row, samples) in block.iter().enumerate() {
-            self.padded[row * padded_stride + width - 1..][..samples.len()].copy_from_slice(samples);
+        let mut has_light = false;
+        for line in lines {
+            for plane in 0..self.n_polynomials {
+                let start = self.padded.len();
+                self.padded.resize(start + self.padded_stride, 0.0);
+                let padded = &mut self.padded[start + width - 1..];
+                for ((padded, sample), polynomials) in padded.iter_mut().zip(line).zip(polynomials) {
+                    *padded = sample * polynomials[plane];
+                    has_light |= *sample != 0.0;
+                }
+            }
         }
-        convolve_padded(&self.padded, padded_stride, kernel, width, out, stride);
+        has_light
+    }
+
+    /// Adds the full convolution of the strip to `out`, whose first sample belongs to the strip's first less half a kernel.
+    pub(crate) fn add_to(&self, out: &mut [f32], stride: usize) {
+        let shape = (self.width, self.n_polynomials);
+        convolve_padded(&self.padded, self.padded_stride, &self.kernels, shape, self.n_columns, (out, stride));
     }
 }
 
@@ -243,19 +287,33 @@ mod tests {
     }
 
     #[test]
-    fn direct_blocks_convolve_as_the_sum_does() {
-        for (rows, columns, width) in [(16, 32, 1), (16, 32, 7), (11, 5, 25), (16, 32, 25)] {
-            let (block, kernel) = (noise(rows * columns, 3), noise(width * width, 4));
-            let stride = DIRECT_BLOCK.1 + width - 1;
-            let mut out = vec![0.0; (DIRECT_BLOCK.0 + width - 1) * stride];
-            let lines: Vec<&[f32]> = block.chunks(columns).collect();
-            Direct::default().add(&lines, &kernel, width, &mut out, stride);
-            let expected = brute_force(&block, rows, columns, &kernel, width);
-            for (row, expected) in expected.chunks(columns + width - 1).enumerate() {
-                for (a, b) in out[row * stride..].iter().zip(expected) {
-                    assert!((f64::from(*a) - b).abs() <= 1e-5 * b.max(1.0), "{a} {b}");
+    fn strips_convolve_as_the_sum_does() {
+        for (rows, columns, width) in [(16, 32, 1), (16, 32, 7), (11, 5, 25), (16, 128, 25)] {
+            let block = noise(rows * columns, 3);
+            // Three kernels for each row, and three polynomials along it.
+            let kernels: Vec<Vec<f32>> = (0..3 * rows as u32).map(|i| noise(width * width, 4 + i)).collect();
+            let polynomials: Vec<[f32; 3]> =
+                (0..columns).map(|column| [1.0, 0.01 * column as f32, 1e-4 * (column * column) as f32]).collect();
+            let stride = columns + width - 1;
+            let mut strip = Strip::new(width, 3);
+            for row in 0..rows {
+                strip.kernels_of_row(row).copy_from_slice(&kernels[3 * row..3 * row + 3].concat());
+            }
+            let mut out = vec![0.0; (rows + width - 1) * stride];
+            assert!(strip.load(block.chunks(columns), &polynomials));
+            strip.add_to(&mut out, stride);
+            let mut expected = vec![0.0; out.len()];
+            for (row, line) in block.chunks(columns).enumerate() {
+                for plane in 0..3 {
+                    let weighted: Vec<f32> = line.iter().zip(&polynomials).map(|(v, p)| v * p[plane]).collect();
+                    let spread = brute_force(&weighted, 1, columns, &kernels[3 * row + plane], width);
+                    expected[row * stride..].iter_mut().zip(spread).for_each(|(sum, v)| *sum += v);
                 }
             }
+            for (a, b) in out.iter().zip(&expected) {
+                assert!((f64::from(*a) - b).abs() <= 1e-5 * b.max(1.0), "{a} {b}");
+            }
+            assert!(!strip.load(vec![0.0; columns].chunks(columns), &polynomials));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, Rims, rays_towards};
 use dioptric_psf::{BankSettings, Diffraction};
-use dioptric_spectrum::WavelengthGrid;
+use dioptric_spectrum::{DepthMap, WavelengthGrid};
 use glam::{DMat2, DVec2};
 
 use crate::{Film, ForwardError};
@@ -57,6 +57,7 @@ impl PsfDomain<'_> {
     /// # Errors
     /// When the film has no area, the lens has no index at a wavelength of the grid, or no light reaches the middle of the film.
     pub fn settings(&self) -> Result<BankSettings, ForwardError> {
+        check_depth(self.lens, self.grid, self.depth_range_m.0, None)?;
         if self.lens.is_rotational() { self.radial_settings() } else { self.grid_settings() }
     }
 
@@ -100,6 +101,31 @@ impl PsfDomain<'_> {
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
         Ok(BankSettings::covering_grid(self.film_mm, (first, last), dioptres, wavelengths_nm, self.diffraction))
     }
+}
+
+/// Checks that no part of a scene lies inside a lens.
+///
+/// # Errors
+/// Names the nearest sample, where it is no farther from the entrance pupil than the first surface of the lens is, or when the lens
+/// has no index at the middle wavelength of the grid.
+pub fn check_depth_map(lens: &Lens, grid: &WavelengthGrid, depth: &DepthMap) -> Result<(), ForwardError> {
+    let nearest = depth.z_m().indexed_iter().min_by(|a, b| a.1.total_cmp(b.1));
+    nearest.map_or(Ok(()), |(place, &z_m)| check_depth(lens, grid, f64::from(z_m), Some(place)))
+}
+
+fn check_depth(
+    lens: &Lens,
+    grid: &WavelengthGrid,
+    depth_m: f64,
+    place: Option<(usize, usize)>,
+) -> Result<(), ForwardError> {
+    let centers_nm = grid.centers_nm();
+    let least_m = 1e-3 * lens.at(centers_nm[centers_nm.len() / 2])?.projection_center_z_mm();
+    // Depths of a map are in single precision.
+    if depth_m > 0.0 && depth_m <= least_m * (1.0 + 1e-6) {
+        return Err(ForwardError::DepthInsideLens { depth_m, place, lens: lens.name().to_owned(), least_m });
+    }
+    Ok(())
 }
 
 /// A lens looking at one depth.

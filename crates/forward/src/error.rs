@@ -103,6 +103,21 @@ pub enum ForwardError {
         /// Farthest depth of the bank, m.
         bank_far_m: f64,
     },
+    /// A depth that lies inside the lens.
+    #[error(
+        "the scene is {depth_m:.5} m away{}, which lies inside {lens}: its first surface is {least_m:.4} m from its entrance pupil, where depth begins",
+        in_words(*.place)
+    )]
+    DepthInsideLens {
+        /// The depth, m.
+        depth_m: f64,
+        /// The sample that has it, row and column, where that is known.
+        place: Option<(usize, usize)>,
+        /// Name of the lens.
+        lens: String,
+        /// Depth of the first surface, m.
+        least_m: f64,
+    },
     /// The corner of the film sees a field that was not traced, or that the lens does not pass.
     #[error(
         "the film's corner is {corner_mm:.3} mm off axis, but at {wavelength_nm} nm the lens was traced only to {reach_mm:.3} mm"
@@ -137,6 +152,10 @@ pub enum ForwardError {
         /// Why.
         reason: SinkError,
     },
+}
+
+fn in_words(place: Option<(usize, usize)>) -> String {
+    place.map_or_else(String::new, |(row, column)| format!(" at row {row}, column {column}"))
 }
 
 /// Why a receiver of bands gave up.

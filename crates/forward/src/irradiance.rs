@@ -7,7 +7,7 @@ use crate::{Film, ForwardError, Settings, Sink, Source, render};
 
 /// Images a scene with depth through a lens: hands the irradiance on the film, W m⁻² nm⁻¹, to `sink` band by band.
 ///
-/// `progress` is told the part that is done, from 0 to 1. The result does not depend on the number of threads.
+/// `progress` receives the fraction that is done, from 0 to 1. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// When the scene has no depth or no view, when the lens's image does not cover its wavelengths or depths or the corner of

@@ -1,6 +1,6 @@
 //! From a scene and the PSFs of a lens to spectral irradiance on the film.
 //!
-//! Every sample of the scene is put where the centroid of its PSF lies (distortion and lateral colour included),
+//! Every sample of the scene is put where the centroid of its PSF lies (distortion and lateral color included),
 //! given the irradiance that the pupil passes, and spread by the PSF of its place, depth and wavelength. Surfaces at
 //! different depths are blurred in layers and laid one behind the other, so that near ones hide far ones.
 //!
@@ -21,6 +21,7 @@ mod film;
 mod geometry;
 mod hidden;
 mod irradiance;
+mod knot_kernels;
 mod layers;
 mod occluded;
 mod occlusion;
@@ -28,6 +29,7 @@ mod plan;
 mod render;
 mod sampler;
 mod source;
+mod stopwatch;
 mod tiles;
 mod work;
 
@@ -36,7 +38,7 @@ mod acceptance;
 #[cfg(test)]
 mod plan_tests;
 
-pub use coverage::PsfDomain;
+pub use coverage::{PsfDomain, check_depth_map};
 pub use disc_lens::DiscLens;
 pub use error::{ForwardError, SinkError};
 pub use film::{BlurMode, Film, Settings};
@@ -44,3 +46,4 @@ pub use irradiance::irradiance;
 pub use plan::{BandKernels, ImagingPlan, ImagingSpec};
 pub use render::{Sink, render};
 pub use source::{BandRadiance, OccludedLayer, SceneGeometry, SceneRadiance, Source};
+pub use stopwatch::{Clock, ImagingTimes};

@@ -66,7 +66,7 @@ impl Composite {
     }
 
     /// Lays a layer behind those before it, and wipes it.
-    pub(crate) fn lay_behind(&mut self, layer: &mut BlurredLayer, cancel: &Cancel) -> Result<(), Cancelled> {
+    pub(crate) fn composite_under(&mut self, layer: &mut BlurredLayer, cancel: &Cancel) -> Result<(), Cancelled> {
         for (row, &(start, end)) in layer.touched.iter().enumerate() {
             cancel.check()?;
             for column in start..end {
@@ -119,7 +119,7 @@ mod tests {
     fn composite(layers: &[(f32, f32)]) -> f32 {
         let mut picture = Composite::new(1, 1);
         for &(light, cover) in layers {
-            picture.lay_behind(&mut layer(light, cover), &Cancel::new()).unwrap();
+            picture.composite_under(&mut layer(light, cover), &Cancel::new()).unwrap();
         }
         picture.finish()[(0, 0)]
     }

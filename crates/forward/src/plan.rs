@@ -16,11 +16,13 @@ use crate::{
     BandRadiance, BlurMode, Film, ForwardError, SceneGeometry, SceneRadiance, Settings, Sink,
     blur::{LayerTask, blur_layer},
     geometry::{FilmFrame, check_reach},
+    knot_kernels::LayerKernels,
     layers::{Blurs, Layers},
     occluded::OccludedSamples,
     occlusion::{BlurredLayer, Composite},
     sampler::{Sampler, Surface},
-    tiles::{LayerKernels, Tiling, active_cells, cells_over},
+    stopwatch::{Clock, ImagingTimes, Part, Stopwatch},
+    tiles::{Cell, FilmLens, Tiling, active_cells, cells_over, joined_for},
     work::{Progress, Work, plane_of},
 };
 
@@ -136,6 +138,18 @@ impl ImagingPlan {
         self
     }
 
+    /// Returns the plan that adds up, by a clock, the time that its parts take; see [`times`](Self::times).
+    #[must_use]
+    pub fn with_clock(mut self, clock: Arc<Clock>) -> Self {
+        self.layout.stopwatch = Stopwatch::of(clock);
+        self
+    }
+
+    /// Returns where the time of imaging went since the plan got a clock, summed over threads; nothing without one.
+    pub fn times(&self) -> ImagingTimes {
+        self.layout.stopwatch.times()
+    }
+
     /// What the plan was made for.
     pub fn spec(&self) -> &ImagingSpec {
         &self.layout.spec
@@ -208,6 +222,7 @@ pub(crate) struct Layout {
     /// How far off axis light is taken from, mm.
     reach_mm: f64,
     kept: Mutex<KeptKernels>,
+    stopwatch: Stopwatch,
 }
 
 /// Kernels of the bands at which they are computed, as many as the budget allows.
@@ -218,9 +233,9 @@ struct KeptKernels {
     by_band: BTreeMap<usize, BandKernels>,
 }
 
-/// Units of work of a kernel and of a cell of the film in one band, about in proportion to their time.
+/// Units of work of a kernel and of a patch of the film in one band, about in proportion to their time.
 const KERNEL_UNITS: u64 = 1;
-const CELL_UNITS: u64 = 8;
+const PATCH_UNITS: u64 = 8;
 
 impl Layout {
     pub(crate) fn new(
@@ -253,12 +268,12 @@ impl Layout {
         // The 95 % radius of a blur, doubled, holds all but the faintest of its light.
         let pad_px = (0..layers.len()).map(|l| layers.radius_px_at(l as f32)).fold(0.0, f64::max) * 2.0 + 8.0;
         let cell_size = settings.knot_spacing_px;
-        let reach_mm = corner_mm + 1e-3 * film.pitch_um * std::f64::consts::SQRT_2 * (pad_px + cell_size as f64);
+        let reach_mm = corner_mm + 1e-3 * film.pitch_um * std::f64::consts::SQRT_2 * (pad_px + 2.0 * cell_size as f64);
         let maps: Vec<FilmMap> = layers.dioptres().iter().map(|&d| lens.film_map(d, middle_nm, reach_mm)).collect();
         let sampler = Sampler::new(scene.view, FilmFrame::new(film), &maps[0]);
         let occluded = OccludedSamples::find(scene, &layers, settings, sampler.scene_per_film, cancel)?;
 
-        // Find the cells in which a layer has anything, and halve them until PSFs can be interpolated across them.
+        // Find the cells in which a layer has anything, and halve them until the spline follows the PSFs.
         let ends: Vec<FilmMap> = [wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1], middle_nm]
             .into_iter()
             .flat_map(|w| [0, layers.len() - 1].map(|l| lens.film_map(layers.dioptres()[l], w, reach_mm)))
@@ -266,10 +281,21 @@ impl Layout {
         let surfaces: Vec<&Array2<f32>> = std::iter::once(&places).chain(occluded.places()).collect();
         let cells = cells_over(film, pad_px.ceil() as usize, cell_size);
         let active = active_cells(&cells, &sampler, &ends, &surfaces, layers.len(), cancel)?;
+        let joined = |(layer, cells)| joined_for(2.0 * layers.radius_px_at(layer as f32), cells);
+        let active: Vec<Vec<Cell>> = active.into_iter().enumerate().map(joined).collect();
         let work = Work::new(cancel, progress, range, active.iter().map(Vec::len).sum::<usize>() as u64);
-        let tiling = Tiling::new(active, &maps, &layers, film, middle_nm, lens, settings, &work)?;
+        let stopwatch = Stopwatch::default();
+        let film_lens = FilmLens {
+            image: lens,
+            film,
+            layers: &layers,
+            maps: &maps,
+            wavelength_nm: middle_nm,
+            stopwatch: &stopwatch,
+        };
+        let tiling = Tiling::new(active, &film_lens, settings, &work)?;
         let kept = Mutex::new(KeptKernels { budget_bytes: KERNEL_BUDGET_BYTES, ..KeptKernels::default() });
-        Ok(Self { kernel_bands, layers, sampler, tiling, places, occluded, reach_mm, kept, spec })
+        Ok(Self { kernel_bands, layers, sampler, tiling, places, occluded, reach_mm, kept, stopwatch, spec })
     }
 
     fn size_bytes(&self) -> usize {
@@ -313,8 +339,16 @@ impl Layout {
             return Ok(kernels.clone());
         }
         let maps = self.maps_at(lens, band);
-        let (film, wavelength_nm) = (&self.spec.film, self.spec.grid.centers_nm()[band]);
-        let by_layer = self.tiling.kernels_at(&maps, &self.layers, film, wavelength_nm, lens, work)?;
+        let wavelength_nm = self.spec.grid.centers_nm()[band];
+        let film_lens = FilmLens {
+            image: lens,
+            film: &self.spec.film,
+            layers: &self.layers,
+            maps: &maps,
+            wavelength_nm,
+            stopwatch: &self.stopwatch,
+        };
+        let by_layer = self.tiling.kernels_at(&film_lens, work)?;
         let kernels = BandKernels { by_layer: Arc::new(by_layer) };
         let mut kept = self.kept();
         let size_bytes = kernels.size_bytes();
@@ -333,9 +367,9 @@ impl Layout {
         sink: &mut Sink<'_>,
     ) -> Result<(), ForwardError> {
         let n_bands = self.spec.grid.len();
-        let n_cells = self.tiling.cells.iter().map(Vec::len).sum::<usize>() as u64;
+        let n_patches = self.tiling.n_patches() as u64;
         let n_kernels = self.tiling.n_knots() as u64 * self.kernel_bands.len() as u64;
-        let n_units = n_cells * n_bands as u64 * CELL_UNITS + n_kernels * KERNEL_UNITS;
+        let n_units = n_patches * n_bands as u64 * PATCH_UNITS + n_kernels * KERNEL_UNITS;
         let work = Work::new(watch.cancel, watch.progress, watch.range, n_units);
         let mut hand_on = |band, picture| sink(band, picture).map_err(|reason| ForwardError::Sink { band, reason });
         let mut lower = self.computed_kernels(lens, 0, &work)?;
@@ -401,26 +435,30 @@ impl Layout {
         let Film { rows, columns, .. } = self.spec.film;
         let hides = self.spec.settings.mode == BlurMode::Layered && self.layers.len() > 1;
         let (mut picture, mut blurred) = (Composite::new(rows, columns), BlurredLayer::new(rows, columns));
-        for (layer, cells) in self.tiling.cells.iter().enumerate() {
+        for (layer, patches) in self.tiling.patches.iter().enumerate() {
             let task = LayerTask {
                 sampler: &self.sampler,
                 map: &maps[layer],
                 layer,
                 surfaces: &surfaces,
-                cells,
+                patches,
                 kernels: &kernels.by_layer[layer],
                 film_rows: rows,
                 film_columns: columns,
                 with_cover: hides,
+                stopwatch: &self.stopwatch,
             };
-            blur_layer(&task, &mut blurred, work, CELL_UNITS)?;
-            if hides {
-                picture.lay_behind(&mut blurred, work.cancel())?;
-            } else {
+            blur_layer(&task, &mut blurred, work, PATCH_UNITS)?;
+            self.stopwatch.time(Part::Compositing, || {
+                if hides {
+                    return picture.composite_under(&mut blurred, work.cancel());
+                }
                 picture.add(&mut blurred);
-            }
+                Ok(())
+            })?;
         }
-        Ok(if hides { picture.finish() } else { picture.finish_sum() })
+        let finish = || if hides { picture.finish() } else { picture.finish_sum() };
+        Ok(self.stopwatch.time(Part::Compositing, finish))
     }
 }
 

@@ -1,8 +1,11 @@
 //! A plan that is used again, held to one that is made for a single use.
 
-use std::sync::{
-    Arc, Mutex,
-    atomic::{AtomicUsize, Ordering},
+use std::{
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Duration,
 };
 
 use dioptric_psf::{FilmMap, Kernel, LensImage, PsfQuery};
@@ -12,7 +15,8 @@ use glam::DVec2;
 use ndarray::Array2;
 
 use crate::{
-    BandRadiance, DiscLens, Film, ForwardError, ImagingPlan, ImagingSpec, SceneGeometry, Settings, Source, render,
+    BandRadiance, DiscLens, Film, ForwardError, ImagingPlan, ImagingSpec, ImagingTimes, SceneGeometry, Settings,
+    Source, render,
 };
 
 const ROWS: usize = 60;
@@ -149,8 +153,8 @@ impl LensImage for Cancelling {
     fn is_dark_beyond_extent(&self) -> bool {
         self.lens.is_dark_beyond_extent()
     }
-    fn film_map(&self, dioptres: f64, wavelength_nm: f64, reach_mm: f64) -> FilmMap {
-        self.lens.film_map(dioptres, wavelength_nm, reach_mm)
+    fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
+        self.lens.film_map(dioptres, wavelength_nm, extent_mm)
     }
     fn kernel(&self, query: PsfQuery) -> Kernel {
         if self.asked.fetch_add(1, Ordering::Relaxed) + 1 == self.at {
@@ -225,4 +229,26 @@ fn radiance_of_another_scene_is_refused() {
     let source = Source { radiance: &other, depth: &scene.depth, view: scene.view(), occluded: None };
     let error = plan.stream(&source.light(), &|_| {}, &Cancel::new(), &mut |_, _| Ok(())).unwrap_err();
     assert!(error.to_string().contains("521 nm"), "{error}");
+}
+
+#[test]
+fn times_are_those_of_the_clock() {
+    let scene = Scene::new();
+    let ticks = Arc::new(AtomicUsize::new(0));
+    let clock = {
+        let ticks = ticks.clone();
+        move || Duration::from_millis(ticks.fetch_add(1, Ordering::Relaxed) as u64)
+    };
+    let plan = scene.plan().with_clock(Arc::new(clock));
+    assert_eq!(plan.times(), ImagingTimes::default());
+    scene.band(&plan, 1);
+    let ImagingTimes { kernels, sampling, transforms, direct, compositing } = plan.times();
+    let spread = transforms + direct;
+    // Each part takes at least the tick between its two looks at the clock.
+    for (part, time) in [("kernels", kernels), ("sampling", sampling), ("spreading", spread), ("layers", compositing)] {
+        assert!(time >= Duration::from_millis(1), "{part}");
+    }
+    let timeless = scene.plan();
+    scene.band(&timeless, 1);
+    assert_eq!(timeless.times(), ImagingTimes::default());
 }

@@ -23,7 +23,7 @@ pub type Sink<'a> = dyn FnMut(usize, Array2<f32>) -> Result<(), SinkError> + 'a;
 /// for the corner of the film, or when a band cannot be read or handed on.
 pub fn render(
     source: &Source<'_>,
-    kernels: &dyn LensImage,
+    lens: &dyn LensImage,
     film: &Film,
     settings: &Settings,
     progress: &(dyn Fn(f64) + Sync),
@@ -34,6 +34,6 @@ pub fn render(
     source.light().check(source.geometry().size(), &spec.grid)?;
     let cancel = Cancel::new();
     progress(0.0);
-    let layout = Layout::new(kernels, &source.geometry(), spec, progress, (0.0, PLANNED), &cancel)?;
-    layout.stream(kernels, &source.light(), &Watch { progress, range: (PLANNED, 1.0), cancel: &cancel }, sink)
+    let layout = Layout::new(lens, &source.geometry(), spec, progress, (0.0, PLANNED), &cancel)?;
+    layout.stream(lens, &source.light(), &Watch { progress, range: (PLANNED, 1.0), cancel: &cancel }, sink)
 }

@@ -1,14 +1,27 @@
-//! The film cut into square cells, with a knot for the PSF at each corner.
+//! The film cut into square cells, and PSFs that change smoothly across them.
+//!
+//! Over a layer the kernel is a quadratic B-spline of the place on the film (docs/forward.md): each cell has a knot at its middle,
+//! and the kernel at a place is a mean, with smooth weights that sum to 1, of those of the nine knots around it. Where that is
+//! not near enough to the kernel of the lens, cells are halved and knots added; a coarser spline is a finer one as well
+//! (Chaikin's subdivision), so cells of different size meet smoothly.
 
-use dioptric_psf::{FilmMap, LensImage, PsfQuery};
 use std::collections::{BTreeMap, BTreeSet};
 
+use dioptric_psf::{FilmMap, LensImage, PsfQuery};
 use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{Film, Settings, geometry::FilmFrame, layers::Layers, sampler::Sampler, work::Work};
+use crate::{
+    Film, Settings,
+    geometry::FilmFrame,
+    knot_kernels::{KnotKernel, LayerKernels, Symmetry, edge_spread_peak},
+    layers::Layers,
+    sampler::Sampler,
+    stopwatch::{Part, Stopwatch},
+    work::Work,
+};
 
 /// A point of the film at which the PSF is computed: pixels to the right of the axis and below it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -24,71 +37,77 @@ impl Knot {
     }
 }
 
-/// Which knots have kernels that follow from each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Symmetry {
-    /// Those that mirror each other about the axes and their diagonals.
-    Octants,
-    /// None.
-    None,
-}
-
-impl Symmetry {
-    pub(crate) fn of(kernels: &dyn LensImage) -> Self {
-        if kernels.is_symmetric() { Self::Octants } else { Self::None }
-    }
-
-    /// Returns the knot whose kernel a knot's follows from: that of the same distance from the axis in the first octant,
-    /// right and up, or itself.
-    fn canonical(self, knot: Knot) -> Knot {
-        match self {
-            Self::Octants => {
-                let (a, b) = (knot.right.abs(), knot.down.abs());
-                Knot { right: a.max(b), down: -a.min(b) }
-            }
-            Self::None => knot,
-        }
-    }
-}
-
-/// A square of the film, which may reach beyond its edges.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A square of the film, which may reach beyond its edges: `across` and `down` sides from the axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Cell {
-    /// The corner at the top left.
-    pub(crate) corner: Knot,
-    /// Length of a side, pixels.
+    pub(crate) down: i32,
+    pub(crate) across: i32,
+    /// Length of a side, pixels; even.
     pub(crate) size: usize,
 }
 
 /// Cells are not halved below this size, pixels.
 const SMALLEST: usize = 16;
 
+/// Weights of three knots in a row at the middle of the second's cell.
+const AT_MIDDLE: [f64; 3] = [0.125, 0.75, 0.125];
+
+/// From the coefficients of three knots in a row to those of the polynomials 1, u and u² − 1/12 in the second's cell,
+/// where u runs from −1/2 to 1/2.
+const TO_POLYNOMIALS: [[f64; 3]; 3] = [[1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], [-0.5, 0.0, 0.5], [0.5, -1.0, 0.5]];
+
+/// Returns the three polynomials at u, parts of a cell from its middle.
+pub(crate) fn polynomials(u: f32) -> [f32; 3] {
+    [1.0, u, u * u - 1.0 / 12.0]
+}
+
+/// The largest magnitude of each polynomial within a cell.
+pub(crate) const LARGEST: [f64; 3] = [1.0, 0.5, 1.0 / 6.0];
+
 impl Cell {
-    /// The corners: top left, top right, bottom left, bottom right.
-    pub(crate) fn knots(&self) -> [Knot; 4] {
-        let Knot { right, down } = self.corner;
-        let size = self.size as i32;
-        [(0, 0), (size, 0), (0, size), (size, size)].map(|(r, d)| Knot { right: right + r, down: down + d })
+    /// The knot of the cell, at its middle.
+    pub(crate) fn knot(&self) -> Knot {
+        let (size, half) = (self.size as i32, (self.size / 2) as i32);
+        Knot { right: self.across * size + half, down: self.down * size + half }
     }
 
-    fn middle(&self) -> Knot {
-        let half = (self.size / 2) as i32;
-        Knot { right: self.corner.right + half, down: self.corner.down + half }
+    /// Returns the cell so many places below and to the right.
+    fn beside(&self, down: i32, across: i32) -> Self {
+        Self { down: self.down + down, across: self.across + across, size: self.size }
     }
 
-    fn quarters(&self) -> [Self; 4] {
-        let half = (self.size / 2) as i32;
-        let Knot { right, down } = self.corner;
-        [(0, 0), (half, 0), (0, half), (half, half)]
-            .map(|(r, d)| Self { corner: Knot { right: right + r, down: down + d }, size: self.size / 2 })
+    fn parent(&self) -> Self {
+        Self { down: self.down.div_euclid(2), across: self.across.div_euclid(2), size: 2 * self.size }
+    }
+
+    fn children(&self) -> [Self; 4] {
+        let child =
+            |down, across| Self { down: 2 * self.down + down, across: 2 * self.across + across, size: self.size / 2 };
+        [child(0, 0), child(0, 1), child(1, 0), child(1, 1)]
+    }
+
+    /// Whether it may be halved: its quarters need a knot on whole pixels.
+    fn is_divisible(&self) -> bool {
+        self.size / 2 >= SMALLEST && self.size.is_multiple_of(4)
     }
 
     /// The row and column of the first pixel whose centre lies in the cell.
     pub(crate) fn first_pixel(&self, frame: &FilmFrame) -> (i64, i64) {
         let (center_row, center_column) = frame.center();
+        let size = self.size as f64;
         (
-            (f64::from(self.corner.down) + center_row).ceil() as i64,
-            (f64::from(self.corner.right) + center_column).ceil() as i64,
+            (f64::from(self.down) * size + center_row).ceil() as i64,
+            (f64::from(self.across) * size + center_column).ceil() as i64,
+        )
+    }
+
+    /// Returns how far a pixel's centre lies below and to the right of the middle, in parts of the cell.
+    pub(crate) fn place_of(&self, frame: &FilmFrame, row: i64, column: i64) -> (f64, f64) {
+        let (center_row, center_column) = frame.center();
+        let size = self.size as f64;
+        (
+            (row as f64 - center_row) / size - f64::from(self.down) - 0.5,
+            (column as f64 - center_column) / size - f64::from(self.across) - 0.5,
         )
     }
 }
@@ -96,143 +115,176 @@ impl Cell {
 /// Returns the cells of a film and of a border of `pad_px` around it.
 pub(crate) fn cells_over(film: &Film, pad_px: usize, size: usize) -> Vec<Cell> {
     let reach = |n: usize| ((0.5 * n as f64 + pad_px as f64) / size as f64).ceil() as i32;
-    let (across, along) = (reach(film.columns), reach(film.rows));
-    let step = size as i32;
-    (-along..along)
-        .flat_map(|row| (-across..across).map(move |column| (row, column)))
-        .map(|(row, column)| Cell { corner: Knot { right: column * step, down: row * step }, size })
-        .collect()
+    let (columns, rows) = (reach(film.columns), reach(film.rows));
+    (-rows..rows).flat_map(|down| (-columns..columns).map(move |across| Cell { down, across, size })).collect()
 }
 
-/// The kernels of one layer at one wavelength, at the canonical knots.
-#[derive(Clone, Debug)]
-pub(crate) struct LayerKernels {
-    /// Samples along a side of every kernel; odd.
-    pub(crate) width: usize,
-    symmetry: Symmetry,
-    by_knot: BTreeMap<Knot, Vec<f32>>,
+/// Cells are not joined to larger ones than this, pixels.
+const LARGEST_JOINED: usize = 512;
+
+/// Returns the cells that hold these, at least as wide as a blur: of smaller ones, transforms are mostly border.
+pub(crate) fn joined_for(blur_px: f64, mut cells: Vec<Cell>) -> Vec<Cell> {
+    while cells.first().is_some_and(|cell| (cell.size as f64) < blur_px && 2 * cell.size <= LARGEST_JOINED) {
+        let parents: BTreeSet<Cell> = cells.iter().map(Cell::parent).collect();
+        cells = parents.into_iter().collect();
+    }
+    cells
 }
 
-impl LayerKernels {
-    /// Takes kernels of any odd sizes, scales each to a sum of 1 and pads them to one size.
-    pub(crate) fn new(symmetry: Symmetry, kernels: Vec<(Knot, Array2<f32>)>) -> Self {
-        let width = kernels.iter().map(|(_, k)| k.nrows().max(k.ncols())).max().unwrap_or(1);
-        let by_knot = kernels.into_iter().map(|(knot, kernel)| (knot, padded(&kernel, width))).collect();
-        Self { width, symmetry, by_knot }
-    }
+/// A cell, and how the kernels of knots around it make up those of its samples.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Patch {
+    pub(crate) cell: Cell,
+    /// The knots that take part, each with its share of the nine products of polynomials: down × across, row by row.
+    pub(crate) shares: Vec<(Knot, [f32; 9])>,
+}
 
-    /// The number of kernels.
-    pub(crate) fn n_kernels(&self) -> usize {
-        self.by_knot.len()
-    }
+/// A mesh of cells over a layer: those of one size, and halves of them where knots were added.
+struct Mesh {
+    size: usize,
+    /// Smaller cells whose knot has a kernel of its own.
+    added: BTreeSet<Cell>,
+}
 
-    /// The bytes of memory of the kernels' samples.
-    pub(crate) fn size_bytes(&self) -> usize {
-        self.by_knot.len() * self.width * self.width * size_of::<f32>()
-    }
+/// Knots with weights.
+type Weights = BTreeMap<Knot, f64>;
 
-    /// Returns the kernels between two wavelengths.
-    pub(crate) fn mixed(&self, other: &Self, fraction: f32) -> Self {
-        let width = self.width.max(other.width);
-        let mix = |(knot, a): (&Knot, &Vec<f32>)| {
-            let (a, b) = (widened(a, self.width, width), widened(&other.by_knot[knot], other.width, width));
-            (*knot, a.iter().zip(&b).map(|(a, b)| a + fraction * (b - a)).collect())
-        };
-        Self { width, symmetry: self.symmetry, by_knot: self.by_knot.iter().map(mix).collect() }
-    }
-
-    /// Returns the kernel at a knot anywhere on the film: that of its canonical knot, mirrored.
-    pub(crate) fn at(&self, knot: Knot) -> Vec<f32> {
-        let kernel = &self.by_knot[&self.symmetry.canonical(knot)];
-        if self.symmetry == Symmetry::None {
-            return kernel.clone();
+impl Mesh {
+    /// Returns the spline's coefficient at the knot of a cell: a kernel of its own, or what the coarser spline comes to.
+    fn coefficient(&self, cell: &Cell) -> Weights {
+        if cell.size == self.size || self.added.contains(cell) {
+            return BTreeMap::from([(cell.knot(), 1.0)]);
         }
-        let (n, last) = (self.width, self.width - 1);
-        let swap = knot.down.abs() > knot.right.abs();
-        let (flip_columns, flip_rows) = (knot.right < 0, knot.down > 0);
-        let mut turned = Vec::with_capacity(n * n);
-        for row in 0..n {
-            let row = if flip_rows { last - row } else { row };
-            for column in 0..n {
-                let column = if flip_columns { last - column } else { column };
-                let (r, c) = if swap { (last - column, last - row) } else { (row, column) };
-                turned.push(kernel[r * n + c]);
+        // Three quarters of the coarser cell that it lies in, one of the next in its direction, each way.
+        let parent = cell.parent();
+        let toward = |place: i32| if place.rem_euclid(2) == 0 { -1 } else { 1 };
+        let (down, across) = (toward(cell.down), toward(cell.across));
+        let parents = [(0, 0, 9.0), (down, 0, 3.0), (0, across, 3.0), (down, across, 1.0)];
+        let terms = parents.map(|(down, across, weight)| (parent.beside(down, across), weight / 16.0));
+        self.sum(terms.into_iter())
+    }
+
+    /// Returns a weighted sum of coefficients.
+    fn sum(&self, terms: impl Iterator<Item = (Cell, f64)>) -> Weights {
+        let mut sum = Weights::new();
+        for (cell, weight) in terms {
+            for (knot, part) in self.coefficient(&cell) {
+                *sum.entry(knot).or_default() += weight * part;
             }
         }
-        turned
+        sum
+    }
+
+    /// Returns the weights of knots in the kernel at the middle of a cell.
+    fn at_middle(&self, cell: &Cell) -> Weights {
+        self.sum(around(cell).map(|(cell, [down, across])| (cell, AT_MIDDLE[down] * AT_MIDDLE[across])))
+    }
+
+    /// Whether knots were added whose weight is not zero all over a cell, so that it is no polynomial.
+    fn is_divided(&self, cell: &Cell) -> bool {
+        let quarter = cell.children()[0];
+        let mut near = (-1..=2).flat_map(|down| (-1..=2).map(move |across| (down, across)));
+        near.any(|(down, across)| self.added.contains(&quarter.beside(down, across)))
+    }
+
+    /// Puts the patches of a cell, or of its parts, into `patches`.
+    fn patches_of(&self, cell: Cell, patches: &mut Vec<Patch>) {
+        if cell.is_divisible() && self.is_divided(&cell) {
+            cell.children().into_iter().for_each(|child| self.patches_of(child, patches));
+            return;
+        }
+        let mut shares: BTreeMap<Knot, [f64; 9]> = BTreeMap::new();
+        for (near, [down, across]) in around(&cell) {
+            for (knot, part) in self.coefficient(&near) {
+                let share = shares.entry(knot).or_default();
+                for (i, share) in share.iter_mut().enumerate() {
+                    *share += part * TO_POLYNOMIALS[i / 3][down] * TO_POLYNOMIALS[i % 3][across];
+                }
+            }
+        }
+        let shares = shares.into_iter().map(|(knot, share)| (knot, share.map(|s| s as f32))).collect();
+        patches.push(Patch { cell, shares });
     }
 }
 
-fn padded(kernel: &Array2<f32>, width: usize) -> Vec<f32> {
-    let (rows, columns) = kernel.dim();
-    let (top, left) = ((width - rows) / 2, (width - columns) / 2);
-    let sum: f64 = kernel.iter().map(|&v| f64::from(v)).sum();
-    let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
-    let mut samples = vec![0.0; width * width];
-    for ((row, column), &value) in kernel.indexed_iter() {
-        samples[(top + row) * width + left + column] = (f64::from(value) * scale) as f32;
-    }
-    samples
+/// Returns a cell and those around it, each with its number down and across.
+fn around(cell: &Cell) -> impl Iterator<Item = (Cell, [usize; 2])> {
+    let cell = *cell;
+    (0..9_usize).map(move |i| (cell.beside((i / 3) as i32 - 1, (i % 3) as i32 - 1), [i / 3, i % 3]))
 }
 
-fn widened(kernel: &[f32], width: usize, to: usize) -> Vec<f32> {
-    let margin = (to - width) / 2;
-    let mut samples = vec![0.0; to * to];
-    for (row, line) in kernel.chunks_exact(width).enumerate() {
-        samples[(margin + row) * to + margin..][..width].copy_from_slice(line);
-    }
-    samples
+/// A lens at one wavelength, its maps and kernels on the film.
+pub(crate) struct FilmLens<'a> {
+    pub(crate) image: &'a dyn LensImage,
+    pub(crate) film: &'a Film,
+    pub(crate) layers: &'a Layers,
+    /// Of each layer.
+    pub(crate) maps: &'a [FilmMap],
+    pub(crate) wavelength_nm: f64,
+    pub(crate) stopwatch: &'a Stopwatch,
 }
 
-/// The cells of every layer, fine enough for the PSF to be interpolated across them.
+impl FilmLens<'_> {
+    fn kernel(&self, layer: usize, knot: Knot) -> KnotKernel {
+        let pitch_um = self.film.pitch_um;
+        let field_tan = knot.field_tan(&self.maps[layer], 1e-3 * pitch_um);
+        let query = PsfQuery::new(field_tan, self.layers.dioptres()[layer], self.wavelength_nm, pitch_um);
+        KnotKernel::new(&self.image.kernel(query).samples)
+    }
+
+    /// Computes the kernels of canonical knots of a layer.
+    fn layer_kernels(
+        &self,
+        layer: usize,
+        knots: impl IntoIterator<Item = Knot>,
+        work: &Work<'_>,
+    ) -> Result<BTreeMap<Knot, KnotKernel>, Cancelled> {
+        let knots: Vec<Knot> = knots.into_iter().collect();
+        let computed = knots.into_par_iter().map(|knot| {
+            work.check()?;
+            let kernel = self.stopwatch.time(Part::Kernels, || self.kernel(layer, knot));
+            work.advance(1);
+            Ok((knot, kernel))
+        });
+        computed.collect()
+    }
+}
+
+/// The patches of every layer, fine enough for the spline to follow the PSF.
 pub(crate) struct Tiling {
-    /// Of each layer, the cells with something in them.
-    pub(crate) cells: Vec<Vec<Cell>>,
+    /// Of each layer, those with something in them.
+    pub(crate) patches: Vec<Vec<Patch>>,
     symmetry: Symmetry,
-    /// Of each layer, the canonical knots of its cells.
+    /// Of each layer, the canonical knots of its patches.
     knots: Vec<BTreeSet<Knot>>,
 }
 
 impl Tiling {
-    /// Halves the cells of each layer until the PSF half-way between the knots is met.
+    /// Halves the cells of each layer until the spline is as near to the kernels of the lens as the settings ask.
     pub(crate) fn new(
         active: Vec<Vec<Cell>>,
-        maps: &[FilmMap],
-        layers: &Layers,
-        film: &Film,
-        wavelength_nm: f64,
-        kernels: &dyn LensImage,
+        lens: &FilmLens<'_>,
         settings: &Settings,
         work: &Work<'_>,
     ) -> Result<Self, Cancelled> {
-        let symmetry = Symmetry::of(kernels);
-        let cells: Vec<Vec<Cell>> = active
+        let symmetry = Symmetry::of(lens.image);
+        let patches: Vec<Vec<Patch>> = active
             .into_par_iter()
             .enumerate()
             .map(|(layer, cells)| {
-                let mut probe = Probe {
-                    symmetry,
-                    kernel_at: &|knot: Knot| {
-                        let field_tan = knot.field_tan(&maps[layer], 1e-3 * film.pitch_um);
-                        kernels
-                            .kernel(PsfQuery::new(field_tan, layers.dioptres()[layer], wavelength_nm, film.pitch_um))
-                            .samples
-                    },
-                    kernels: BTreeMap::new(),
-                    errors: BTreeMap::new(),
-                    cancel: work.cancel(),
-                };
-                let mut halved = vec![];
-                for cell in cells {
-                    probe.halve_until(cell, settings.max_edge_error, &mut halved)?;
-                    work.advance(1);
-                }
-                Ok(halved)
+                let Some(first) = cells.first() else { return Ok(vec![]) };
+                let mut mesh = Mesh { size: first.size, added: BTreeSet::new() };
+                let mut probe = Probe { lens, layer, symmetry, kernels: BTreeMap::new() };
+                probe.refine(&mut mesh, &cells, settings.max_edge_error, work)?;
+                let mut patches = vec![];
+                cells.into_iter().for_each(|cell| mesh.patches_of(cell, &mut patches));
+                Ok(patches)
             })
             .collect::<Result<_, Cancelled>>()?;
-        let canonical = |cell: &Cell| cell.knots().map(|knot| symmetry.canonical(knot));
-        let knots = cells.iter().map(|cells| cells.iter().flat_map(canonical).collect()).collect();
-        Ok(Self { cells, symmetry, knots })
+        let canonical =
+            |patch: &Patch| -> Vec<Knot> { patch.shares.iter().map(|&(knot, _)| symmetry.canonical(knot)).collect() };
+        let knots = patches.iter().map(|patches| patches.iter().flat_map(canonical).collect()).collect();
+        Ok(Self { patches, symmetry, knots })
     }
 
     /// The number of canonical knots, all layers together.
@@ -240,40 +292,104 @@ impl Tiling {
         self.knots.iter().map(BTreeSet::len).sum()
     }
 
-    /// The bytes of memory of the cells and the knots.
+    /// The number of patches, all layers together.
+    pub(crate) fn n_patches(&self) -> usize {
+        self.patches.iter().map(Vec::len).sum()
+    }
+
+    /// The bytes of memory of the patches and the knots.
     pub(crate) fn size_bytes(&self) -> usize {
-        self.cells.iter().map(|cells| size_of_val(cells.as_slice())).sum::<usize>() + self.n_knots() * size_of::<Knot>()
+        let of_patch = |patch: &Patch| size_of::<Patch>() + size_of_val(patch.shares.as_slice());
+        self.patches.iter().flatten().map(of_patch).sum::<usize>() + self.n_knots() * size_of::<Knot>()
     }
 
     /// Computes the kernels of all layers at a wavelength; none for a layer without cells.
-    pub(crate) fn kernels_at(
-        &self,
-        maps: &[FilmMap],
-        layers: &Layers,
-        film: &Film,
-        wavelength_nm: f64,
-        kernels: &dyn LensImage,
-        work: &Work<'_>,
-    ) -> Result<Vec<LayerKernels>, Cancelled> {
-        let wanted: Vec<(usize, Knot)> =
-            self.knots.iter().enumerate().flat_map(|(layer, knots)| knots.iter().map(move |&k| (layer, k))).collect();
-        let computed: Vec<(usize, Knot, Array2<f32>)> = wanted
-            .into_par_iter()
-            .map(|(layer, knot)| {
-                work.check()?;
-                let field_tan = knot.field_tan(&maps[layer], 1e-3 * film.pitch_um);
-                let dioptres = layers.dioptres()[layer];
-                let kernel = kernels.kernel(PsfQuery::new(field_tan, dioptres, wavelength_nm, film.pitch_um)).samples;
-                work.advance(1);
-                Ok((layer, knot, kernel))
-            })
-            .collect::<Result<_, Cancelled>>()?;
-        let mut by_layer: Vec<Vec<(Knot, Array2<f32>)>> = vec![vec![]; layers.len()];
-        for (layer, knot, kernel) in computed {
-            by_layer[layer].push((knot, kernel));
-        }
-        Ok(by_layer.into_iter().map(|kernels| LayerKernels::new(self.symmetry, kernels)).collect())
+    pub(crate) fn kernels_at(&self, lens: &FilmLens<'_>, work: &Work<'_>) -> Result<Vec<LayerKernels>, Cancelled> {
+        let layers = self.knots.par_iter().enumerate().map(|(layer, knots)| {
+            let by_knot = lens.layer_kernels(layer, knots.iter().copied(), work)?;
+            Ok(LayerKernels::new(self.symmetry, by_knot))
+        });
+        layers.collect()
     }
+}
+
+/// Finds where the spline over a layer is too coarse.
+struct Probe<'a> {
+    lens: &'a FilmLens<'a>,
+    layer: usize,
+    symmetry: Symmetry,
+    /// Those computed so far, at canonical knots.
+    kernels: BTreeMap<Knot, KnotKernel>,
+}
+
+impl Probe<'_> {
+    /// Adds knots to a mesh, in the quarters of cells at whose middle the spline is off by more than an edge error.
+    fn refine(
+        &mut self,
+        mesh: &mut Mesh,
+        cells: &[Cell],
+        max_edge_error: f64,
+        work: &Work<'_>,
+    ) -> Result<(), Cancelled> {
+        let mut candidates: Vec<Cell> = cells.iter().copied().filter(Cell::is_divisible).collect();
+        while !candidates.is_empty() {
+            let splines: Vec<(Cell, Weights)> = candidates.iter().map(|cell| (*cell, mesh.at_middle(cell))).collect();
+            let wanted: BTreeSet<Knot> = splines
+                .iter()
+                .flat_map(|(_, weights)| weights.keys())
+                .map(|&knot| self.symmetry.canonical(knot))
+                .filter(|knot| !self.kernels.contains_key(knot))
+                .collect();
+            let unobserved = Work::unobserved(work.cancel());
+            self.kernels.extend(self.lens.layer_kernels(self.layer, wanted, &unobserved)?);
+            let known = LayerKernels::new(self.symmetry, std::mem::take(&mut self.kernels));
+            let errors: Vec<f64> = splines
+                .par_iter()
+                .map(|(cell, weights)| {
+                    work.check()?;
+                    let difference = spline_error(&known, cell.knot(), weights);
+                    let edge_error = edge_spread_peak(&difference.samples, difference.width);
+                    Ok((edge_error / max_edge_error).max(shading_error(&difference, cell.size) / MAX_SHADING_ERROR))
+                })
+                .collect::<Result<_, Cancelled>>()?;
+            self.kernels = known.into_kernels();
+            let too_coarse = candidates.iter().zip(errors).filter(|(_, error)| *error > 1.0);
+            let added: Vec<Cell> = too_coarse.flat_map(|(cell, _)| cell.children()).collect();
+            mesh.added.extend(added.iter().copied());
+            candidates = added.into_iter().filter(Cell::is_divisible).collect();
+        }
+        work.advance(cells.len() as u64);
+        Ok(())
+    }
+}
+
+/// Largest relative error of the irradiance of a uniform plane that a spline may cause where knots can be added.
+const MAX_SHADING_ERROR: f64 = 1e-3;
+
+/// Returns the kernel at a knot less that of a spline.
+fn spline_error(kernels: &LayerKernels, knot: Knot, spline: &Weights) -> KnotKernel {
+    let terms = || spline.iter().map(|(&at, &weight)| (at, -weight)).chain([(knot, 1.0)]);
+    let kernels: Vec<(KnotKernel, f64)> = terms().map(|(at, weight)| (kernels.at(at), weight)).collect();
+    let width = kernels.iter().map(|(kernel, _)| kernel.width).max().unwrap_or(1);
+    let mut samples = vec![0.0; width * width];
+    for (kernel, weight) in kernels {
+        kernel.add_to(&mut samples, width, weight as f32);
+    }
+    KnotKernel { width, samples }
+}
+
+/// Returns by how much the irradiance of a uniform plane changes when a difference of kernels is added at knots half
+/// a cell apart: half the second derivative of its second moments (docs/forward.md, eq. 2).
+fn shading_error(difference: &KnotKernel, cell_size: usize) -> f64 {
+    let width = difference.width;
+    let middle = (width / 2) as f64;
+    let moments = difference.samples.iter().enumerate().map(|(i, &sample)| {
+        let (row, column) = ((i / width) as f64 - middle, (i % width) as f64 - middle);
+        f64::from(sample) * (row * row + column * column)
+    });
+    // The spline of one knot has the second derivative −2 over the square of its cell.
+    let half_cell = 0.5 * cell_size as f64;
+    moments.sum::<f64>().abs() / (half_cell * half_cell)
 }
 
 /// Returns, for each layer, the cells in which the scene has anything at its depth.
@@ -338,60 +454,6 @@ fn layers_in(
     found
 }
 
-/// Tells where the PSF cannot be interpolated across a cell.
-struct Probe<'a> {
-    symmetry: Symmetry,
-    kernel_at: &'a dyn Fn(Knot) -> Array2<f32>,
-    kernels: BTreeMap<Knot, Array2<f32>>,
-    errors: BTreeMap<(Knot, usize), f64>,
-    cancel: &'a Cancel,
-}
-
-impl Probe<'_> {
-    fn halve_until(&mut self, cell: Cell, max_edge_error: f64, out: &mut Vec<Cell>) -> Result<(), Cancelled> {
-        if cell.size / 2 < SMALLEST || self.edge_error(&cell)? <= max_edge_error {
-            out.push(cell);
-            return Ok(());
-        }
-        cell.quarters().into_iter().try_for_each(|quarter| self.halve_until(quarter, max_edge_error, out))
-    }
-
-    /// Returns the largest error of the edge spread function, of edges along rows and columns, mid-cell.
-    fn edge_error(&mut self, cell: &Cell) -> Result<f64, Cancelled> {
-        let key = (self.symmetry.canonical(cell.middle()), cell.size);
-        if let Some(&error) = self.errors.get(&key) {
-            return Ok(error);
-        }
-        let wanted: Vec<Knot> = cell.knots().into_iter().chain([cell.middle()]).collect();
-        for knot in &wanted {
-            self.cancel.check()?;
-            let canonical = self.symmetry.canonical(*knot);
-            let kernel_at = self.kernel_at;
-            self.kernels.entry(canonical).or_insert_with(|| kernel_at(canonical));
-        }
-        let canonical = wanted.iter().map(|&k| self.symmetry.canonical(k));
-        let kernels = LayerKernels::new(self.symmetry, canonical.map(|k| (k, self.kernels[&k].clone())).collect());
-        let turned: Vec<Vec<f32>> = wanted.iter().map(|&knot| kernels.at(knot)).collect();
-        let difference: Vec<f64> = (0..kernels.width * kernels.width)
-            .map(|i| f64::from(turned[4][i]) - 0.25 * turned[..4].iter().map(|k| f64::from(k[i])).sum::<f64>())
-            .collect();
-        let error = edge_spread_peak(&difference, kernels.width);
-        self.errors.insert(key, error);
-        Ok(error)
-    }
-}
-
-/// Returns the largest magnitude of the edge spread functions, along rows and columns, of a kernel.
-pub(crate) fn edge_spread_peak(kernel: &[f64], width: usize) -> f64 {
-    let (mut down, mut right, mut peak) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for i in 0..width {
-        down += kernel[i * width..][..width].iter().sum::<f64>();
-        right += kernel.iter().skip(i).step_by(width).sum::<f64>();
-        peak = peak.max(down.abs()).max(right.abs());
-    }
-    peak
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -418,32 +480,89 @@ mod tests {
         }
     }
 
-    #[test]
-    fn kernels_are_mirrored_with_their_knots() {
-        // A comet pointing away from the axis at (tan 2, 1): right and up.
-        let comet = |x: f64, y: f64| {
-            let mut kernel = Array2::zeros((5, 5));
-            kernel[((2.0 - y) as usize, (2.0 + x) as usize)] = 1.0;
-            kernel
-        };
-        let kernels = LayerKernels::new(Symmetry::Octants, vec![(Knot { right: 64, down: -32 }, comet(2.0, 1.0))]);
-        for (right, down, x, y) in [
-            (64, -32, 2.0, 1.0),
-            (-64, -32, -2.0, 1.0),
-            (64, 32, 2.0, -1.0),
-            (32, -64, 1.0, 2.0),
-            (-32, 64, -1.0, -2.0),
-            (32, 64, 1.0, -2.0),
-            (-32, -64, -1.0, 2.0),
-        ] {
-            let expected: Vec<f32> = comet(x, y).into_iter().collect();
-            assert_eq!(kernels.at(Knot { right, down }), expected, "at {right}, {down}");
+    /// A mesh of 64-pixel cells of which one is halved, and one of its quarters again.
+    fn mesh() -> (Mesh, Vec<Patch>) {
+        let marked = Cell { down: 0, across: 0, size: 64 };
+        let again = marked.children()[3];
+        let added = marked.children().into_iter().chain(again.children()).collect();
+        let mesh = Mesh { size: 64, added };
+        let mut patches = vec![];
+        for (down, across) in (-2..3).flat_map(|down| (-2..3).map(move |across| (down, across))) {
+            mesh.patches_of(Cell { down, across, size: 64 }, &mut patches);
         }
-        let both =
-            [(64, comet(2.0, 1.0)), (-64, comet(1.0, 0.0))].map(|(right, comet)| (Knot { right, down: 9 }, comet));
-        let kernels = LayerKernels::new(Symmetry::None, both.to_vec());
-        for (knot, comet) in both {
-            assert_eq!(kernels.at(knot), comet.into_iter().collect::<Vec<_>>());
+        (mesh, patches)
+    }
+
+    /// Returns the spline through values at knots, at a place in pixels below and to the right of the axis.
+    fn spline(patches: &[Patch], value_at: &dyn Fn(Knot) -> f64, down: f64, right: f64) -> f64 {
+        let is_in = |patch: &&Patch| {
+            let size = patch.cell.size as f64;
+            let (u, v) = (right / size - f64::from(patch.cell.across), down / size - f64::from(patch.cell.down));
+            (0.0..1.0).contains(&u) && (0.0..1.0).contains(&v)
+        };
+        let patch = patches.iter().find(is_in).unwrap();
+        let size = patch.cell.size as f64;
+        let down = polynomials((down / size - f64::from(patch.cell.down) - 0.5) as f32);
+        let across = polynomials((right / size - f64::from(patch.cell.across) - 0.5) as f32);
+        let weight =
+            |shares: &[f32; 9]| (0..9).map(|i| f64::from(shares[i] * down[i / 3] * across[i % 3])).sum::<f64>();
+        patch.shares.iter().map(|(knot, shares)| weight(shares) * value_at(*knot)).sum()
+    }
+
+    #[test]
+    fn weights_of_knots_sum_to_one() {
+        let (_, patches) = mesh();
+        for patch in patches {
+            for product in 0..9 {
+                let sum: f32 = patch.shares.iter().map(|(_, shares)| shares[product]).sum();
+                let expected = if product == 0 { 1.0 } else { 0.0 };
+                assert!((sum - expected).abs() < 1e-6, "{sum} of {:?}", patch.cell);
+            }
+        }
+    }
+
+    #[test]
+    fn patches_cover_cells_once() {
+        let (_, patches) = mesh();
+        let area: usize = patches.iter().map(|patch| patch.cell.size.pow(2)).sum();
+        assert_eq!(area, 25 * 64 * 64);
+        assert_eq!(patches.iter().map(|patch| patch.cell.size).min(), Some(16));
+    }
+
+    /// A plane is reproduced exactly, whatever the sizes of the cells.
+    #[test]
+    fn linear_kernels_are_met_everywhere() {
+        let (_, patches) = mesh();
+        let plane = |knot: Knot| 3.0 + 0.02 * f64::from(knot.right) - 0.05 * f64::from(knot.down);
+        for (down, right) in [(0.3, 0.7), (31.0, 33.0), (50.2, 47.9), (-40.0, 90.0), (64.1, 15.9)] {
+            let value = spline(&patches, &plane, down, right);
+            // Single precision of the shares.
+            assert!((value - (3.0 + 0.02 * right - 0.05 * down)).abs() < 1e-4, "{value} at {down}, {right}");
+        }
+    }
+
+    /// Values and slopes have no steps across the borders of patches of any size.
+    #[test]
+    fn slopes_go_on_across_borders() {
+        let (_, patches) = mesh();
+        let wild = |knot: Knot| (0.7 * f64::from(knot.right)).sin() + (0.3 * f64::from(knot.down * knot.right)).cos();
+        let (near, far) = (1e-3, 0.5);
+        for border in [-64.0, 0.0, 16.0, 32.0, 48.0, 64.0, 80.0] {
+            for along in [-50.0, -10.0, 5.0, 20.0, 40.0, 70.0, 100.0] {
+                for is_down in [true, false] {
+                    let at = |by: f64| {
+                        let (a, b) = (border + by, along);
+                        if is_down { spline(&patches, &wild, a, b) } else { spline(&patches, &wild, b, a) }
+                    };
+                    assert!((at(near) - at(-near)).abs() < 1e-3, "a step at {border}, {along}");
+                    let slopes = [at(far) - at(0.0), at(0.0) - at(-far)].map(|rise| rise / far);
+                    // The curvature is at most the largest second difference of the values over the smallest cell's square.
+                    assert!(
+                        (slopes[0] - slopes[1]).abs() < 8.0 / 256.0 * far,
+                        "a kink at {border}, {along}: {slopes:?}"
+                    );
+                }
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by panicking and shows its numbers")]
 
-use dioptric_forward::{Film, PsfDomain, Settings, irradiance};
+use dioptric_forward::{Film, PsfDomain, Settings, check_depth_map, irradiance};
 use dioptric_optics::{Lens, ObjectPoint, Rims, rays_over_front};
 use dioptric_psf::{Diffraction, LensImageModel};
 use dioptric_scene::{Scene, View};
@@ -143,4 +143,33 @@ fn psfs_shared_between_bands_are_as_good_as_one_for_each() {
     println!("PSFs shared between bands: rms error {worst:.5} of the mean");
     // A quarter of a pixel of blur, interpolated, is less than a tenth of the error that two layers leave.
     assert!(worst < 1e-3, "{worst}");
+}
+
+/// Depth begins at the entrance pupil, some centimeters behind the first surface.
+#[test]
+fn depth_inside_the_lens_is_refused() {
+    let camera = Camera::new(4.0, 2.0, Film { rows: 24, columns: 36, pitch_um: 100.0 });
+    let grid = WavelengthGrid::new(vec![550.0]).unwrap();
+    let refused = |z_m: f32| {
+        let mut depth = Array2::from_elem((10, 12), 2.0_f32);
+        depth[(3, 7)] = z_m;
+        let depth = DepthMap::new(depth).unwrap();
+        let mapped = check_depth_map(&camera.lens, &grid, &depth);
+        let domain = PsfDomain {
+            lens: &camera.lens,
+            film: &camera.film,
+            film_mm: camera.film_mm,
+            depth_range_m: depth.range_m(),
+            grid: &grid,
+            diffraction: Diffraction::None,
+        };
+        assert_eq!(mapped.is_err(), domain.settings().is_err(), "{z_m} m");
+        mapped.err().map(|error| error.to_string())
+    };
+    let least_m = 1e-3 * camera.lens.at(550.0).unwrap().projection_center_z_mm() as f32;
+    for z_m in [1e-4, 0.5 * least_m, 0.999 * least_m] {
+        let message = refused(z_m).unwrap();
+        assert!(message.contains("row 3, column 7") && message.contains("inside dgauss-50mm"), "{message}");
+    }
+    assert_eq!(refused(least_m + 0.3), None);
 }

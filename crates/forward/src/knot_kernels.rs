@@ -1,0 +1,205 @@
+//! Kernels at knots of the film.
+
+use std::collections::BTreeMap;
+
+use dioptric_psf::LensImage;
+use ndarray::Array2;
+
+use crate::tiles::Knot;
+
+/// Which knots have kernels that follow from each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Symmetry {
+    /// Those that mirror each other about the axes and their diagonals.
+    Octants,
+    /// None.
+    None,
+}
+
+impl Symmetry {
+    pub(crate) fn of(lens: &dyn LensImage) -> Self {
+        if lens.is_symmetric() { Self::Octants } else { Self::None }
+    }
+
+    /// Returns the knot whose kernel a knot's follows from: that of the same distance from the axis in the first octant,
+    /// right and up, or itself.
+    pub(crate) fn canonical(self, knot: Knot) -> Knot {
+        match self {
+            Self::Octants => {
+                let (a, b) = (knot.right.abs(), knot.down.abs());
+                Knot { right: a.max(b), down: -a.min(b) }
+            }
+            Self::None => knot,
+        }
+    }
+}
+
+/// A kernel whose samples sum to 1.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct KnotKernel {
+    /// Samples along a side; odd.
+    pub(crate) width: usize,
+    pub(crate) samples: Vec<f32>,
+}
+
+impl KnotKernel {
+    /// Takes a kernel of odd sides, scales it to a sum of 1 and pads it to a square.
+    pub(crate) fn new(kernel: &Array2<f32>) -> Self {
+        let (rows, columns) = kernel.dim();
+        let width = rows.max(columns);
+        let (top, left) = ((width - rows) / 2, (width - columns) / 2);
+        let sum: f64 = kernel.iter().map(|&v| f64::from(v)).sum();
+        let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+        let mut samples = vec![0.0; width * width];
+        for ((row, column), &value) in kernel.indexed_iter() {
+            samples[(top + row) * width + left + column] = (f64::from(value) * scale) as f32;
+        }
+        Self { width, samples }
+    }
+
+    /// Adds the kernel times a factor to a square of `width` samples a side, at least its own, middle on middle.
+    pub(crate) fn add_to(&self, sum: &mut [f32], width: usize, factor: f32) {
+        let margin = (width - self.width) / 2;
+        for (row, samples) in self.samples.chunks_exact(self.width).enumerate() {
+            let line = &mut sum[(margin + row) * width + margin..][..self.width];
+            line.iter_mut().zip(samples).for_each(|(sum, sample)| *sum += factor * sample);
+        }
+    }
+
+    fn mixed(&self, other: &Self, fraction: f32) -> Self {
+        let width = self.width.max(other.width);
+        let mut samples = vec![0.0; width * width];
+        self.add_to(&mut samples, width, 1.0 - fraction);
+        other.add_to(&mut samples, width, fraction);
+        Self { width, samples }
+    }
+
+    /// Returns the kernel of a canonical knot turned to another: mirrored about the axes and the diagonal.
+    fn mirrored(&self, knot: Knot) -> Self {
+        let (n, last) = (self.width, self.width - 1);
+        let swap = knot.down.abs() > knot.right.abs();
+        let (flip_columns, flip_rows) = (knot.right < 0, knot.down > 0);
+        let mut samples = Vec::with_capacity(n * n);
+        for row in 0..n {
+            let row = if flip_rows { last - row } else { row };
+            for column in 0..n {
+                let column = if flip_columns { last - column } else { column };
+                let (r, c) = if swap { (last - column, last - row) } else { (row, column) };
+                samples.push(self.samples[r * n + c]);
+            }
+        }
+        Self { width: n, samples }
+    }
+}
+
+/// The kernels of one layer at one wavelength, at the canonical knots.
+#[derive(Clone, Debug)]
+pub(crate) struct LayerKernels {
+    symmetry: Symmetry,
+    by_knot: BTreeMap<Knot, KnotKernel>,
+}
+
+impl LayerKernels {
+    pub(crate) fn new(symmetry: Symmetry, by_knot: BTreeMap<Knot, KnotKernel>) -> Self {
+        Self { symmetry, by_knot }
+    }
+
+    /// The number of kernels.
+    pub(crate) fn n_kernels(&self) -> usize {
+        self.by_knot.len()
+    }
+
+    /// The bytes of memory of the kernels' samples.
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.by_knot.values().map(|kernel| size_of_val(kernel.samples.as_slice())).sum()
+    }
+
+    /// Returns the kernels between two wavelengths.
+    pub(crate) fn mixed(&self, other: &Self, fraction: f32) -> Self {
+        let mix = |(knot, kernel): (&Knot, &KnotKernel)| (*knot, kernel.mixed(&other.by_knot[knot], fraction));
+        Self { symmetry: self.symmetry, by_knot: self.by_knot.iter().map(mix).collect() }
+    }
+
+    /// Returns the kernels of the canonical knots.
+    pub(crate) fn into_kernels(self) -> BTreeMap<Knot, KnotKernel> {
+        self.by_knot
+    }
+
+    /// Returns the kernel at a knot anywhere on the film: that of its canonical knot, mirrored.
+    pub(crate) fn at(&self, knot: Knot) -> KnotKernel {
+        let kernel = &self.by_knot[&self.symmetry.canonical(knot)];
+        match self.symmetry {
+            Symmetry::Octants => kernel.mirrored(knot),
+            Symmetry::None => kernel.clone(),
+        }
+    }
+}
+
+/// Returns the largest magnitude of the edge spread functions, along rows and columns, of a kernel.
+pub(crate) fn edge_spread_peak(kernel: &[f32], width: usize) -> f64 {
+    let mut by_column = vec![0.0_f64; width];
+    let (mut down, mut peak) = (0.0_f64, 0.0_f64);
+    for line in kernel.chunks_exact(width) {
+        for (sum, &value) in by_column.iter_mut().zip(line) {
+            *sum += f64::from(value);
+        }
+        down += line.iter().map(|&value| f64::from(value)).sum::<f64>();
+        peak = peak.max(down.abs());
+    }
+    let mut right = 0.0;
+    for sum in by_column {
+        right += sum;
+        peak = peak.max(right.abs());
+    }
+    peak
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A comet pointing away from the axis at (tan 2, 1): right and up.
+    fn comet(x: f64, y: f64) -> KnotKernel {
+        let mut kernel = Array2::zeros((5, 5));
+        kernel[((2.0 - y) as usize, (2.0 + x) as usize)] = 1.0;
+        KnotKernel::new(&kernel)
+    }
+
+    #[test]
+    fn kernels_are_mirrored_with_their_knots() {
+        let one = BTreeMap::from([(Knot { right: 64, down: -32 }, comet(2.0, 1.0))]);
+        let kernels = LayerKernels::new(Symmetry::Octants, one);
+        for (right, down, x, y) in [
+            (64, -32, 2.0, 1.0),
+            (-64, -32, -2.0, 1.0),
+            (64, 32, 2.0, -1.0),
+            (32, -64, 1.0, 2.0),
+            (-32, 64, -1.0, -2.0),
+            (32, 64, 1.0, -2.0),
+            (-32, -64, -1.0, 2.0),
+        ] {
+            assert_eq!(kernels.at(Knot { right, down }), comet(x, y), "at {right}, {down}");
+        }
+        let both = [(64, comet(2.0, 1.0)), (-64, comet(1.0, 0.0))].map(|(right, k)| (Knot { right, down: 9 }, k));
+        let kernels = LayerKernels::new(Symmetry::None, BTreeMap::from(both.clone()));
+        for (knot, comet) in both {
+            assert_eq!(kernels.at(knot), comet);
+        }
+    }
+
+    #[test]
+    fn mixed_kernels_keep_their_sum() {
+        let (small, large) = (KnotKernel::new(&Array2::ones((3, 3))), KnotKernel::new(&Array2::ones((7, 5))));
+        let mixed = small.mixed(&large, 0.25);
+        assert_eq!(mixed.width, 7);
+        assert!((mixed.samples.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+        assert!((mixed.samples[3 * 7 + 3] - (0.75 / 9.0 + 0.25 / 35.0)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn edge_spread_of_a_shift_is_its_share() {
+        // A tenth of the light moved by one column changes an edge by a tenth.
+        let difference = [0.0, 0.0, 0.0, 0.0, -0.1, 0.1, 0.0, 0.0, 0.0];
+        assert!((edge_spread_peak(&difference, 3) - 0.1).abs() < 1e-7);
+    }
+}

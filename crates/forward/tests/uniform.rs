@@ -1,0 +1,175 @@
+//! A uniform plane through lenses whose PSFs change over the field: no seams, and the relative illumination of real rays.
+
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by panicking and shows its numbers")]
+
+use dioptric_forward::{Film, PsfDomain, Settings, Source, render};
+use dioptric_optics::{Lens, ObjectPoint, PupilBoundary, Rims, rays_towards};
+use dioptric_psf::{Diffraction, FieldSampling, LensImageModel};
+use dioptric_scene::View;
+use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use glam::DVec2;
+use ndarray::Array2;
+
+const WAVELENGTH_NM: f64 = 550.0;
+
+/// A strip of film from the axis' neighborhood to the corner of a square film, and the depth of a plane.
+struct Case {
+    lens: &'static str,
+    f_number: f64,
+    focus_mm: f64,
+    plane_mm: f64,
+    columns: usize,
+    pitch_um: f64,
+}
+
+struct Uniform {
+    lens: Lens,
+    bank: LensImageModel,
+    film: Film,
+    film_mm: f64,
+    plane_m: f64,
+    picture: Array2<f32>,
+}
+
+impl Uniform {
+    fn new(case: &Case) -> Self {
+        let lens = Lens::built_in(case.lens).unwrap().with_f_number(case.f_number, WAVELENGTH_NM).unwrap();
+        let mono = lens.at(WAVELENGTH_NM).unwrap();
+        let film = Film { rows: 48, columns: case.columns, pitch_um: case.pitch_um };
+        let grid = WavelengthGrid::new(vec![WAVELENGTH_NM]).unwrap();
+        let plane_m = 1e-3 * (case.plane_mm + mono.projection_center_z_mm());
+        let film_mm = mono.film_mm_for(case.focus_mm).unwrap();
+        let domain = PsfDomain {
+            lens: &lens,
+            film: &film,
+            film_mm,
+            depth_range_m: (plane_m, plane_m),
+            grid: &grid,
+            diffraction: Diffraction::None,
+        };
+        let settings = domain.settings().unwrap();
+        let bank = LensImageModel::build(&lens, &settings).unwrap();
+        let last_tan = match &settings.fields {
+            FieldSampling::Radial(tans) => tans[tans.len() - 1],
+            _ => panic!("a lens with an axis of symmetry has fields along a radius"),
+        };
+        // A hundred samples over twice the film, all of one radiance.
+        let view = View { focal_px: 49.0 / last_tan, center_x_px: 49.5, center_y_px: 49.5 };
+        let radiance = SpectralImage::new(Quantity::Radiance, grid, vec![Array2::ones((100, 100))]).unwrap();
+        let depth = DepthMap::flat(100, 100, plane_m).unwrap();
+        let source = Source { radiance: &radiance, depth: &depth, view, occluded: None };
+        let mut picture = Array2::zeros((0, 0));
+        render(&source, &bank, &film, &Settings::default(), &|_| {}, &mut |_, band| {
+            picture = band;
+            Ok(())
+        })
+        .unwrap();
+        Self { lens, bank, film, film_mm, plane_m, picture }
+    }
+
+    /// Returns the largest second difference along rows and columns, over the mean, and where: of neighbors, less that of pixels
+    /// eight apart, which is the curvature that a smooth picture has on both scales.
+    fn worst_step(&self) -> (f64, (usize, usize)) {
+        const APART: usize = 8;
+        let mean = f64::from(self.picture.mean().unwrap());
+        let (rows, columns) = self.picture.dim();
+        let bend = |(row, column): (usize, usize), (down, across): (usize, usize)| {
+            let at = |row: usize, column: usize| f64::from(self.picture[(row, column)]) / mean;
+            at(row - down, column - across) + at(row + down, column + across) - 2.0 * at(row, column)
+        };
+        let far = (APART * APART) as f64;
+        let inner = (APART..rows - APART).flat_map(|row| (APART..columns - APART).map(move |column| (row, column)));
+        let steps = inner.map(|at| {
+            let down = bend(at, (1, 0)) - bend(at, (APART, 0)) / far;
+            let across = bend(at, (0, 1)) - bend(at, (0, APART)) / far;
+            (down.abs().max(across.abs()), at)
+        });
+        steps.fold((0.0, (0, 0)), |worst, here| if here.0 > worst.0 { here } else { worst })
+    }
+
+    /// Returns the largest difference from the irradiance by traced rays, as a share of it, and where, mm.
+    fn worst_illumination(&self) -> (f64, f64) {
+        let row = self.film.rows / 2;
+        let differences = (8..self.film.columns).step_by((self.film.columns - 16) / 13).map(|column| {
+            let (x, y) = (column as f64 + 0.5 - 0.5 * self.film.columns as f64, -0.5);
+            let place_mm = 1e-3 * self.film.pitch_um * DVec2::new(x, y);
+            (f64::from(self.picture[(row, column)]) / self.solid_angle(place_mm) - 1.0, place_mm.length())
+        });
+        differences.fold((0.0, 0.0), |worst: (f64, f64), here| if here.0.abs() > worst.0.abs() { here } else { worst })
+    }
+
+    /// Returns the projected solid angle of the light that a place of the film gets from the plane, picture frame: the area
+    /// that the direction cosines of the rays fill which land there, each from the edge of its own point's pupil.
+    fn solid_angle(&self, place_mm: DVec2) -> f64 {
+        const N: usize = 128;
+        let mono = self.lens.at(WAVELENGTH_NM).unwrap();
+        let geometry = self.bank.radial_geometry(1.0 / self.plane_m, WAVELENGTH_NM).unwrap();
+        let tan = geometry.field_tan(place_mm.length()).unwrap();
+        let tan_per_mm = tan / place_mm.length();
+        let cosines: Vec<DVec2> = (0..N)
+            .map(|i| {
+                let azimuth = std::f64::consts::TAU * i as f64 / N as f64;
+                let mut field_tan = place_mm * tan_per_mm;
+                for _ in 0..60 {
+                    let point = ObjectPoint::from_field(&mono, field_tan, 1.0 / self.plane_m);
+                    let pupil = PupilBoundary::find(&mono, &point, 64).unwrap();
+                    let target = pupil.center_mm() + DVec2::from_angle(azimuth) * pupil.rho_max_mm(azimuth);
+                    let mut rays = rays_towards(&point, &[target], pupil.z_mm(), 0.0);
+                    mono.trace(&mut rays, Rims::Ignore);
+                    let cosine = rays.direction(0).truncate();
+                    let off_mm = place_mm - mono.landed(&rays, self.film_mm).next().unwrap().in_picture_mm();
+                    if off_mm.length() < 1e-6 {
+                        return cosine;
+                    }
+                    field_tan += off_mm * (0.8 * tan_per_mm);
+                }
+                panic!("no ray from the edge of the pupil lands at {place_mm}");
+            })
+            .collect();
+        let pairs = cosines.iter().zip(cosines.iter().cycle().skip(1));
+        // A polygon of N sides falls short of a circle by (2 π / N)² / 6.
+        0.5 * pairs.map(|(a, b)| a.perp_dot(*b)).sum::<f64>().abs()
+            * (1.0 + (std::f64::consts::TAU / N as f64).powi(2) / 6.0)
+    }
+}
+
+#[track_caller]
+fn check(case: &Case, flatness: f64) {
+    let uniform = Uniform::new(case);
+    let (step, at) = uniform.worst_step();
+    let (error, radius_mm) = uniform.worst_illumination();
+    let Case { lens, f_number, .. } = case;
+    println!(
+        "{lens} f/{f_number}: second difference {step:.2e} at {at:?}, illumination {error:+.2e} at {radius_mm:.2} mm"
+    );
+    assert!(step <= 1e-4, "{lens} f/{f_number}: {step} at {at:?}");
+    assert!(error.abs() <= flatness, "{lens} f/{f_number}: {error} at {radius_mm} mm");
+}
+
+/// Seams were steps of 2.8 % of the mean, at multiples of 16 and 32 pixels from the axis.
+#[test]
+fn wide_double_gauss_has_no_seams() {
+    let lens = "dgauss-50mm";
+    check(&Case { lens, f_number: 2.03, focus_mm: 2000.0, plane_mm: 2000.0, columns: 1086, pitch_um: 20.8333 }, 2e-3);
+}
+
+#[test]
+fn wide_tessar_has_no_seams() {
+    check(
+        &Case {
+            lens: "tessar-50mm",
+            f_number: 4.5,
+            focus_mm: 2000.0,
+            plane_mm: 2000.0,
+            columns: 724,
+            pitch_um: 20.8333,
+        },
+        2e-3,
+    );
+}
+
+#[test]
+fn defocused_lens_has_no_seams() {
+    let lens = "dgauss-50mm";
+    check(&Case { lens, f_number: 2.03, focus_mm: 2000.0, plane_mm: 400.0, columns: 543, pitch_um: 41.6667 }, 2e-3);
+}
