@@ -13,6 +13,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("diffraction", &["spectrum", "optics"]),
     ("psf", &["spectrum", "optics", "diffraction"]),
     ("scene", &["spectrum"]),
+    ("world", &["spectrum", "optics"]),
     ("forward", &["spectrum", "optics", "psf", "scene"]),
     ("sensor", &["spectrum"]),
     ("pipeline", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor"]),
