@@ -14,6 +14,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("psf", &["spectrum", "optics", "diffraction"]),
     ("scene", &["spectrum"]),
     ("world", &["spectrum", "optics"]),
+    ("backward", &["spectrum", "optics", "diffraction", "world"]),
     ("forward", &["spectrum", "optics", "psf", "scene"]),
     ("sensor", &["spectrum"]),
     ("pipeline", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor"]),
