@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use dioptric_spectrum::Cancelled;
+
 /// A world that cannot be read or built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WorldError {
@@ -67,6 +69,9 @@ pub enum WorldError {
         /// How many are allowed.
         limit: u64,
     },
+    /// Work that was stopped on request before it was done.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 impl WorldError {

@@ -3,11 +3,14 @@
 use glam::{DVec3, Vec3};
 use std::f32::consts::TAU;
 
+use dioptric_spectrum::{Observer, Spectrum, WavelengthGrid};
+
 use crate::{
-    Hit, LightId, SpectralCurve,
+    Beyond, Hit, LightId, SkyImage, SpectralCurve, WorldError,
     mesh::triangle_area,
     sampling::{Distribution, Frame, cone, on_disc, on_triangle},
     shape::{Quadric, Shape},
+    sky::SampledSky,
     world::{PlacedKind, PlacedShape},
 };
 
@@ -46,6 +49,43 @@ pub enum Light {
         /// Radiance, W m⁻² sr⁻¹ nm⁻¹.
         radiance: SpectralCurve,
     },
+    /// The radiance of a picture of all directions.
+    SkyImage(SkyImage),
+}
+
+/// How much light a lamp gives in all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Flux {
+    /// Radiant flux from 360 to 830 nm, W.
+    Watts(f64),
+    /// Luminous flux (CIE 1931), lm.
+    Lumens(f64),
+}
+
+impl Flux {
+    /// Returns the spectrum of this shape that gives the flux over an étendue: 4π sr for the intensity of a point, π
+    /// times the glowing area (m² sr) for the radiance of a surface, 1 m² for the irradiance of a square meter.
+    ///
+    /// # Errors
+    /// When the shape has no light to scale, or a number is not positive and finite.
+    pub fn spectrum(self, shape: &Spectrum, etendue: f64) -> Result<SpectralCurve, WorldError> {
+        let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0).expect("a valid range");
+        let values = shape.sample_or_zero(&fine);
+        let values = if shape.values().len() == 1 { vec![shape.values()[0]; values.len()] } else { values };
+        let (wanted, given) = match self {
+            Self::Watts(watts) => (watts, fine.integrate(&values)),
+            Self::Lumens(lumens) => (lumens, Observer::Cie1931.xyz(&fine, &values).luminance_cd_m2()),
+        };
+        let scale = wanted / (given * etendue);
+        if !(scale >= 0.0 && scale.is_finite() && given > 0.0) {
+            return Err(WorldError::Setting {
+                what: "the flux of a light",
+                value: format!("{wanted}"),
+                expected: "a finite number of watts or lumens, of a spectrum that has some between 360 and 830 nm",
+            });
+        }
+        Ok(SpectralCurve::new(shape, Beyond::Zero).scaled(scale as f32))
+    }
 }
 
 /// The glow of a surface.
@@ -86,6 +126,7 @@ pub(crate) struct Lights {
 #[derive(Clone, Debug)]
 enum Source {
     Alone(Light),
+    Sky(Box<SampledSky>),
     Area(AreaLight),
 }
 
@@ -101,7 +142,13 @@ struct AreaLight {
 impl Lights {
     /// Returns the lights of a world: those that are no shapes, then the glowing shapes of the root group.
     pub(crate) fn new(alone: Vec<Light>, shapes: &mut [PlacedShape], scene_radius_m: f64) -> Self {
-        let mut lights: Vec<Source> = alone.into_iter().map(Source::Alone).collect();
+        let mut lights: Vec<Source> = alone
+            .into_iter()
+            .map(|light| match light {
+                Light::SkyImage(sky) => Source::Sky(Box::new(SampledSky::new(sky))),
+                light => Source::Alone(light),
+            })
+            .collect();
         for (index, shape) in shapes.iter_mut().enumerate() {
             let (Some(emission), true) = (&shape.emission, shape.group == 0) else { continue };
             let parts = match &shape.kind {
@@ -138,6 +185,17 @@ impl Lights {
         let light = LightId(index as u32);
         match &self.lights[index] {
             Source::Alone(alone) => alone.sample(from, u, wavelengths_nm, probability, light),
+            Source::Sky(sky) => {
+                let (direction, pdf) = sky.sample(u)?;
+                Some(LightSample {
+                    direction,
+                    distance_m: f32::INFINITY,
+                    radiance: sky.radiance(direction, wavelengths_nm),
+                    pdf: pdf * probability,
+                    is_delta: false,
+                    light,
+                })
+            }
             Source::Area(area) => {
                 let (direction, distance_m, pdf, is_front) = area.sample(shapes, from, rest, u)?;
                 let is_lit = is_front || area.emission.is_two_sided;
@@ -162,22 +220,25 @@ impl Lights {
     }
 
     /// The radiance of the sky in a direction.
-    pub(crate) fn sky<const N: usize>(&self, _direction: Vec3, wavelengths_nm: &[f32; N]) -> [f32; N] {
+    pub(crate) fn sky<const N: usize>(&self, direction: Vec3, wavelengths_nm: &[f32; N]) -> [f32; N] {
         let mut sum = [0.0; N];
         for light in &self.lights {
-            if let Source::Alone(Light::Sky { radiance }) = light {
-                let radiance = radiance.at(wavelengths_nm);
-                sum = std::array::from_fn(|i| sum[i] + radiance[i]);
-            }
+            let radiance = match light {
+                Source::Alone(Light::Sky { radiance }) => radiance.at(wavelengths_nm),
+                Source::Sky(sky) => sky.radiance(direction, wavelengths_nm),
+                Source::Alone(_) | Source::Area(_) => continue,
+            };
+            sum = std::array::from_fn(|i| sum[i] + radiance[i]);
         }
         sum
     }
 
     /// The density with which `sample` draws a direction of the sky.
-    pub(crate) fn sky_pdf(&self, _direction: Vec3) -> f32 {
+    pub(crate) fn sky_pdf(&self, direction: Vec3) -> f32 {
         let each = self.lights.iter().enumerate().map(|(index, light)| match light {
             Source::Alone(Light::Sky { .. }) => self.pick.probability(index) / (2.0 * TAU),
-            _ => 0.0,
+            Source::Sky(sky) => self.pick.probability(index) * sky.pdf(direction),
+            Source::Alone(_) | Source::Area(_) => 0.0,
         });
         each.sum()
     }
@@ -195,6 +256,8 @@ impl Source {
             }
             Self::Alone(Light::Distant { irradiance, .. }) => area * mean(irradiance),
             Self::Alone(Light::Sky { radiance }) => 4.0 * std::f64::consts::PI * area * mean(radiance),
+            Self::Sky(sky) => 4.0 * std::f64::consts::PI * area * sky.mean(),
+            Self::Alone(Light::SkyImage(_)) => 0.0,
             Self::Area(light) => {
                 let sides = if light.emission.is_two_sided { 2.0 } else { 1.0 };
                 sides * std::f64::consts::PI * light.parts.total() * mean(&light.emission.radiance)
@@ -245,6 +308,8 @@ impl Light {
                 is_delta: false,
                 light,
             }),
+            // Held as a `SampledSky`.
+            Self::SkyImage(_) => None,
         }
     }
 }
@@ -387,5 +452,56 @@ impl Quadric {
     /// The density of `sample_area` at a point of the surface, 1/m².
     fn area_pdf(&self, point: Vec3) -> f32 {
         (1.0 / (self.own_area() * self.area_ratio_at(point.as_dvec3()))) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dioptric_spectrum::Illuminant;
+
+    #[test]
+    fn flux_is_given_in_full() {
+        let d65 = Illuminant::D65.spectrum();
+        let intensity = Flux::Lumens(1000.0).spectrum(&d65, 4.0 * std::f64::consts::PI).unwrap();
+        let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0).unwrap();
+        let values: Vec<f64> = fine.centers_nm().iter().map(|&w| f64::from(intensity.at(&[w as f32])[0])).collect();
+        let candela = Observer::Cie1931.xyz(&fine, &values).luminance_cd_m2();
+        assert!((candela * 4.0 * std::f64::consts::PI / 1000.0 - 1.0).abs() < 1e-4);
+        let watts = Flux::Watts(60.0).spectrum(&Spectrum::constant(3.0), 1.0).unwrap();
+        // 471 bands of 1 nm.
+        assert!((watts.at(&[500.0])[0] - 60.0 / 471.0).abs() < 1e-6);
+        assert!(Flux::Watts(f64::NAN).spectrum(&d65, 1.0).is_err());
+        assert!(Flux::Watts(1.0).spectrum(&Spectrum::constant(0.0), 1.0).is_err());
+    }
+
+    fn sample(light: &Light, from: Vec3) -> Option<LightSample<1>> {
+        light.sample(from, [0.3, 0.6], &[550.0], 0.5, LightId(0))
+    }
+
+    #[test]
+    fn point_falls_off_by_distance_squared() {
+        let light = Light::Point { position: DVec3::new(0.0, 3.0, 0.0), intensity: SpectralCurve::constant(18.0) };
+        let seen = sample(&light, Vec3::ZERO).unwrap();
+        assert_eq!((seen.radiance, seen.distance_m, seen.direction), ([2.0], 3.0, Vec3::Y));
+        assert!(seen.is_delta && sample(&light, Vec3::new(0.0, 3.0, 0.0)).is_none());
+    }
+
+    #[test]
+    fn spot_ends_at_its_cone() {
+        let [inner_rad, outer_rad] = [20.0_f64, 30.0].map(f64::to_radians);
+        let light = Light::Spot {
+            position: DVec3::ZERO,
+            direction: DVec3::Z,
+            intensity: SpectralCurve::constant(1.0),
+            inner_rad,
+            outer_rad,
+        };
+        let at = |degrees: f32| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            sample(&light, Vec3::new(sin, 0.0, cos)).map_or(0.0, |seen| seen.radiance[0])
+        };
+        assert!((at(0.0) - 1.0).abs() < 1e-6 && (at(19.5) - 1.0).abs() < 1e-6);
+        assert!(at(25.0) > 0.4 && at(25.0) < 0.6 && at(30.5) == 0.0 && at(180.0) == 0.0);
     }
 }

@@ -217,7 +217,7 @@ mod tests {
     fn placed(shape: Shape) -> Quadric {
         shape.check().unwrap();
         let place = DAffine3::from_translation(DVec3::new(0.0, 0.0, 5.0))
-            * DAffine3::from_rotation_x(0.3)
+            * DAffine3::from_rotation_x(1.1)
             * DAffine3::from_scale(DVec3::new(2.0, 1.0, 1.5));
         Quadric::new(shape, place)
     }
@@ -263,7 +263,7 @@ mod tests {
                     assert!(p.cmpge(low - 1e-9).all() && p.cmple(high + 1e-9).all(), "{p} in {low} to {high}");
                 }
             }
-            assert!(n_met > 100);
+            assert!(n_met > 50, "{n_met}");
         }
     }
 

@@ -3,13 +3,14 @@
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
-    Bsdf, Emission, Hit, Light, LightSample, Material, Ray, Shape, Texture, TriangleMesh, WorldCamera, WorldError,
-    bsdf::Lobe,
+    Bsdf, Emission, Hit, Light, LightSample, Material, Ray, Relief, Shape, Texture, TriangleMesh, WorldCamera,
+    WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
     light::Lights,
+    material::{Surface, Surfaces},
     mesh::normal_matrix,
-    sampling::Frame,
     shape::Quadric,
+    texture::{MAX_DEPTH, Textures},
 };
 
 macro_rules! ids {
@@ -47,7 +48,7 @@ impl GroupId {
 #[derive(Debug)]
 pub struct World {
     geometry: Geometry,
-    materials: Vec<(String, Material)>,
+    surfaces: Vec<Surface>,
     textures: Vec<Texture>,
     lights: Lights,
     cameras: Vec<WorldCamera>,
@@ -117,19 +118,8 @@ impl World {
     ///
     /// `outgoing` has length 1 and points away from the surface, against the ray that met it.
     pub fn bsdf<const N: usize>(&self, hit: &Hit, outgoing: Vec3, wavelengths_nm: &[f32; N]) -> Bsdf<N> {
-        let frame = Frame::about_with(hit.shading_normal, hit.dp_du);
-        let lobe = match &self.materials[hit.material.0 as usize].1 {
-            Material::Matte { reflectance } => {
-                Lobe::Diffuse { reflectance: self.spectral(*reflectance, wavelengths_nm).map(|r| r.clamp(0.0, 1.0)) }
-            }
-        };
-        Bsdf::new(frame, hit.geometric_normal, outgoing, lobe)
-    }
-
-    fn spectral<const N: usize>(&self, texture: TextureId, wavelengths_nm: &[f32; N]) -> [f32; N] {
-        match &self.textures[texture.0 as usize] {
-            Texture::Curve(curve) => curve.at(wavelengths_nm),
-        }
+        let surfaces = Surfaces { surfaces: &self.surfaces, textures: Textures(&self.textures) };
+        surfaces.bsdf(hit, outgoing, wavelengths_nm)
     }
 
     /// Returns the radiance, W m⁻² sr⁻¹ nm⁻¹, that the surface at a hit gives of itself towards `outgoing`.
@@ -188,7 +178,7 @@ impl World {
 
     /// The names of the materials, in the order of their numbers.
     pub fn material_names(&self) -> impl ExactSizeIterator<Item = &str> {
-        self.materials.iter().map(|(name, _)| name.as_str())
+        self.surfaces.iter().map(|surface| surface.name.as_str())
     }
 
     /// The cameras that came with the world.
@@ -340,7 +330,7 @@ pub struct WorldBuilder {
     shapes: Vec<NewShape>,
     n_groups: u32,
     instances: Vec<(GroupId, DAffine3)>,
-    materials: Vec<(String, Material)>,
+    surfaces: Vec<Surface>,
     textures: Vec<Texture>,
     lights: Vec<Light>,
     cameras: Vec<WorldCamera>,
@@ -371,7 +361,7 @@ impl WorldBuilder {
             shapes: Vec::new(),
             n_groups: 1,
             instances: Vec::new(),
-            materials: Vec::new(),
+            surfaces: Vec::new(),
             textures: Vec::new(),
             lights: Vec::new(),
             cameras: Vec::new(),
@@ -387,8 +377,13 @@ impl WorldBuilder {
 
     /// Adds a material; names are for people and needn't differ.
     pub fn add_material(&mut self, name: &str, material: Material) -> MaterialId {
-        self.materials.push((name.to_owned(), material));
-        MaterialId(self.materials.len() as u32 - 1)
+        self.add_material_with(name, material, None)
+    }
+
+    /// Adds a material with relief.
+    pub fn add_material_with(&mut self, name: &str, material: Material, relief: Option<Relief>) -> MaterialId {
+        self.surfaces.push(Surface::new(name.to_owned(), material, relief));
+        MaterialId(self.surfaces.len() as u32 - 1)
     }
 
     /// Stands a shape in the world.
@@ -458,7 +453,7 @@ impl WorldBuilder {
     /// When a part names another that isn't there, a shape has no extent, or a transform can't be undone.
     pub fn build(self) -> Result<World, WorldError> {
         self.check()?;
-        let Self { shapes, n_groups, instances, materials, textures, lights, cameras, notes } = self;
+        let Self { shapes, n_groups, instances, surfaces, textures, lights, cameras, notes } = self;
         let mut placed: Vec<PlacedShape> = shapes.into_iter().map(NewShape::placed).collect();
         let instances: Vec<Instance> = instances
             .into_iter()
@@ -482,7 +477,7 @@ impl WorldBuilder {
         let radius_m = if low.cmple(high).all() { 0.5 * (high - low).length() } else { 1.0 };
         let lights = Lights::new(lights, &mut placed, radius_m);
         let geometry = Geometry { shapes: placed, instances, groups };
-        Ok(World { geometry, materials, textures, lights, cameras, notes })
+        Ok(World { geometry, surfaces, textures, lights, cameras, notes })
     }
 
     fn check(&self) -> Result<(), WorldError> {
@@ -502,7 +497,7 @@ impl WorldBuilder {
         }
         for shape in &self.shapes {
             shape.shape.check()?;
-            named("a shape", "material", shape.material.0, self.materials.len())?;
+            named("a shape", "material", shape.material.0, self.surfaces.len())?;
             named("a shape", "group", shape.group.0, self.n_groups as usize)?;
         }
         for (group, _) in &self.instances {
@@ -515,9 +510,26 @@ impl WorldBuilder {
                 });
             }
         }
-        for (_, material) in &self.materials {
-            let Material::Matte { reflectance } = material;
-            named("a material", "texture", reflectance.0, self.textures.len())?;
+        for surface in &self.surfaces {
+            let relief = surface.relief.map(|relief| match relief {
+                Relief::Heights(texture) | Relief::Normals(texture) => texture,
+            });
+            for texture in surface.material.textures().into_iter().chain(relief) {
+                named("a material", "texture", texture.0, self.textures.len())?;
+            }
+        }
+        Surfaces::check_blends(&self.surfaces)?;
+        // Textures are made of earlier ones, so that none is made of itself, and aren't nested too deep for a stack.
+        let mut depths = vec![0; self.textures.len()];
+        for (index, texture) in self.textures.iter().enumerate() {
+            for part in texture.parts() {
+                named("a texture", "earlier texture", part.0, index)?;
+                depths[index] = depths[index].max(depths[part.0 as usize] + 1);
+            }
+            if depths[index] > MAX_DEPTH {
+                let what = "textures within textures";
+                return Err(WorldError::TooMany { what, n: depths[index] as u64, limit: MAX_DEPTH as u64 });
+            }
         }
         Ok(())
     }

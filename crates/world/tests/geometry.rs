@@ -77,7 +77,9 @@ fn tree_finds_the_nearest_triangle() {
         .collect();
     let mut n_hits = 0;
     for _ in 0..2000 {
-        let ray = Ray { origin: 5.0 * direction(&mut rng), direction: direction(&mut rng) };
+        let origin = 5.0 * direction(&mut rng);
+        let aim = 3.0 * unit(&mut rng) * direction(&mut rng) - origin;
+        let ray = Ray { origin, direction: aim.normalize() };
         let hit = world.intersect(&ray, f32::INFINITY);
         let length = hit.map_or(100.0, |hit| hit.distance_m);
         n_hits += usize::from(hit.is_some());
@@ -236,6 +238,7 @@ fn sampled_lights_equal_cast_rays() {
             let world = builder.build().unwrap();
             let mut rng = ChaCha8Rng::seed_from_u64(5);
             let n = 60_000;
+            let mut n_missed = 0;
             let (mut by_rays, mut by_light, mut pdf_of_light, mut light_squared) = (0.0, 0.0, 0.0, 0.0);
             for _ in 0..n {
                 let out = direction(&mut rng);
@@ -253,7 +256,11 @@ fn sampled_lights_equal_cast_rays() {
                     let value = f64::from(light.radiance[0] * light.direction.z.max(0.0) / light.pdf);
                     by_light += value / f64::from(n);
                     light_squared += value * value / f64::from(n);
-                    let hit = world.intersect(&ray_to(light.direction), f32::INFINITY).expect("nothing is before it");
+                    // A ray to the very rim can miss it by a rounding.
+                    let Some(hit) = world.intersect(&ray_to(light.direction), f32::INFINITY) else {
+                        n_missed += 1;
+                        continue;
+                    };
                     let ratio = world.light_pdf(Vec3::ZERO, &hit) / light.pdf;
                     // A grazing point's cosine is as exact as the point itself.
                     assert!((ratio - 1.0).abs() < 0.02 || light.pdf > 50.0, "{shape:?}: {ratio} at {light:?}");
@@ -262,6 +269,7 @@ fn sampled_lights_equal_cast_rays() {
             let sigma = ((light_squared - by_light * by_light) / f64::from(n)).sqrt();
             // Casting 60 000 rays over the sphere has an error of about 1.5 % for lights of this size.
             assert!((by_light - by_rays).abs() < 0.05 * by_rays + 4.0 * sigma, "{shape:?}: {by_light} {by_rays}");
+            assert!(n_missed < n / 1000, "{shape:?}: {n_missed}");
             assert!(pdf_of_light > 0.3 && pdf_of_light < 1.06, "{shape:?}: {pdf_of_light}");
         }
     }
