@@ -13,6 +13,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("diffraction", &["spectrum", "optics"]),
     ("psf", &["spectrum", "optics", "diffraction"]),
     ("scene", &["spectrum"]),
+    ("world", &["spectrum", "optics"]),
+    ("backward", &["spectrum", "optics", "diffraction", "world"]),
     ("forward", &["spectrum", "optics", "psf", "scene"]),
     ("sensor", &["spectrum"]),
     ("pipeline", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor"]),

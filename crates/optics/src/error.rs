@@ -153,6 +153,14 @@ pub enum OpticsError {
         /// The distance given, mm.
         distance_mm: f64,
     },
+    /// A film that rays cannot leave towards the lens.
+    #[error("the film of {lens} lies {film_distance_mm} mm behind the last vertex, expected a distance above 0")]
+    FilmInLens {
+        /// The lens.
+        lens: String,
+        /// The distance given, mm.
+        film_distance_mm: f64,
+    },
     /// A name that names nothing.
     #[error("no {kind} is named '{name}'; {known}")]
     Unknown {

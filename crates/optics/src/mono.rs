@@ -29,6 +29,7 @@ pub struct MonoLens {
     steps: Vec<Step>,
     stop: usize,
     front: Surface,
+    rear: Surface,
     image_surface: ImageSurface,
     /// Where surfaces stand, if not all are centred.
     placed: Option<Placed>,
@@ -61,12 +62,14 @@ impl MonoLens {
         let first_order = paraxial::first_order(&steps, lens.stop(), wavelength_nm);
         let motions = pose::motions(lens.moves(), &lens.vertices_z_mm());
         let placed = motions.map(|motions| Placed { poses: lens.poses(), film: motions[steps.len()] });
+        let steps_end = steps.len() - 1;
         Ok(Self {
             name: lens.name().to_owned(),
             wavelength_nm,
             steps,
             stop: lens.stop(),
             front: lens.interfaces()[0].surface.clone(),
+            rear: lens.interfaces()[steps_end].surface.clone(),
             image_surface: lens.image_surface(),
             placed,
             first_order,
@@ -190,6 +193,11 @@ impl MonoLens {
         self.placed.as_ref().map(|placed| placed.poses.as_slice())
     }
 
+    /// The name of the lens.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
     /// Returns where a point of the lens frame lies in the stop's own frame, mm from the middle of the stop.
     pub(crate) fn in_stop_mm(&self, point_mm: DVec3) -> DVec2 {
         self.poses().map_or(point_mm, |poses| poses[self.stop].to_own(point_mm)).truncate()
@@ -200,6 +208,11 @@ impl MonoLens {
         let sag_mm = self.front.sag_at_mm(place_mm.x, place_mm.y);
         let point = place_mm.extend(if sag_mm.is_finite() { sag_mm } else { 0.0 });
         self.poses().map_or(point, |poses| poses[0].to_lens(point))
+    }
+
+    /// Returns the z of the last surface over this place of its vertex plane, mm, in its own frame; NaN beyond its equator.
+    pub(crate) fn last_sag_mm(&self, place_mm: DVec2) -> f64 {
+        self.rear.sag_at_mm(place_mm.x, place_mm.y)
     }
 
     /// Where a film stands that lies `film_mm` behind the last vertex.

@@ -43,6 +43,18 @@ impl RayBatchF32 {
         self.set_rounded(rays, |point_mm, direction| point_mm - direction * point_mm.dot(direction));
     }
 
+    /// Adds a ray in flight, rounded as it stands: for rays that start near the lens.
+    pub fn push(&mut self, point_mm: DVec3, direction: DVec3) {
+        let (point_mm, direction) = (point_mm.as_vec3(), direction.as_vec3());
+        self.x_mm.push(point_mm.x);
+        self.y_mm.push(point_mm.y);
+        self.z_mm.push(point_mm.z);
+        self.l.push(direction.x);
+        self.m.push(direction.y);
+        self.n.push(direction.z);
+        self.fate.push(RayFate::InFlight);
+    }
+
     /// Rounds rays, those in flight from another point of their lines.
     pub(crate) fn set_rounded(&mut self, rays: &RayBatch, move_mm: impl Fn(DVec3, DVec3) -> DVec3) {
         let lists = [&mut self.x_mm, &mut self.y_mm, &mut self.z_mm, &mut self.l, &mut self.m, &mut self.n];

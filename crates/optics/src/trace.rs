@@ -26,7 +26,7 @@ use self::{
     plan::Pass,
 };
 pub(crate) use self::{
-    placed::{move_to_placed_conic, move_to_placed_plane, placed_clearances, trace_placed},
+    placed::{move_to_placed_conic, move_to_placed_plane, placed_clearances, trace_placed, trace_placed_by},
     plan::Plan,
     real::Real,
     toric::Toric,
@@ -158,7 +158,7 @@ fn trace_groups<T: Real, const B: usize>(
         for (i, block) in from.iter_mut().enumerate() {
             *block = Block::load(rays, start + i * LANES, first_z);
         }
-        if plan.first == 0 {
+        if plan.approaches {
             kernel::approach(plan.index_before, from);
         }
         for (i, pass) in plan.passes.iter().enumerate() {
@@ -169,7 +169,7 @@ fn trace_groups<T: Real, const B: usize>(
             note(i, to, start);
             (from, to) = (to, from);
             if is_any_ended {
-                let at = At { pass, surface: (plan.first + i) as u16, start };
+                let at = At { pass, surface: plan.surface(i), start };
                 at.end_rays(to, from, rays);
                 if !from.iter().any(Block::is_any_alive) {
                     break;

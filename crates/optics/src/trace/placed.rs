@@ -14,11 +14,21 @@ use crate::{Pose, RayFate, rays::RaySlices};
 /// Traces rays given in the lens frame through these steps, each of which stands as its pose says; `first` is the
 /// number of the first of them.
 pub(crate) fn trace_placed(steps: &[Step], poses: &[Pose], first: usize, rims: Rims, rays: &mut RaySlices<'_>) {
-    let mut number = first;
+    trace_placed_by(steps, poses, |own, place| Plan::new(own, first + place, rims), rays);
+}
+
+/// Traces such rays by a plan for each group of surfaces on one axis, made of its steps and the place of the first of them
+/// among all.
+pub(crate) fn trace_placed_by(
+    steps: &[Step],
+    poses: &[Pose],
+    plan: impl Fn(&[Step], usize) -> Plan<f64>,
+    rays: &mut RaySlices<'_>,
+) {
     for group in coaxial(poses) {
+        let place = group.start;
         let (pose, own) = in_own_frame(&steps[group.clone()], &poses[group]);
-        in_frame(&pose, rays, |rays| trace_batch(&Plan::new(&own, number, rims), Goal::LastSurface, rays));
-        number += own.len();
+        in_frame(&pose, rays, |rays| trace_batch(&plan(&own, place), Goal::LastSurface, rays));
     }
 }
 

@@ -15,7 +15,11 @@ use crate::Aperture;
 pub(crate) struct Plan<T> {
     pub(super) passes: Vec<Pass<T>>,
     /// The number of the first surface.
-    pub(super) first: usize,
+    first: usize,
+    /// Whether the numbers of the surfaces go down, as those of a lens met from behind do.
+    is_reversed: bool,
+    /// Whether rays may come from far away.
+    pub(super) approaches: bool,
     /// The index before the first surface, and behind the last.
     pub(super) index_before: T,
     pub(super) index_after: T,
@@ -193,10 +197,23 @@ impl<T: Real> Plan<T> {
         };
         Self {
             first,
+            is_reversed: false,
+            approaches: first == 0,
             index_before: T::of(begin.index_before),
             index_after: T::of(end.index_after),
             passes: steps.iter().map(pass).collect(),
         }
+    }
+
+    /// Plans a trace from behind through these steps, which are mirrored; `first` is the number of the first of them in
+    /// the lens as it was, and the others count down from it.
+    pub(crate) fn reversed(steps: &[Step], first: usize, rims: Rims, approaches: bool) -> Self {
+        Self { is_reversed: true, approaches, ..Self::new(steps, first, rims) }
+    }
+
+    /// The number of a surface of the plan.
+    pub(super) fn surface(&self, place: usize) -> u16 {
+        (if self.is_reversed { self.first - place } else { self.first + place }) as u16
     }
 
     /// z of the vertex that rays start before, and of the last.

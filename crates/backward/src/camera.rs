@@ -1,0 +1,190 @@
+//! Cameras: a pinhole, a thin lens by formula, and any lens of `dioptric-optics`.
+
+use dioptric_spectrum::Quantity;
+use dioptric_world::{
+    Ray,
+    glam::{DVec2, DVec3, Vec3},
+};
+
+use crate::{BackwardError, LensCamera, PixelGrid, Placement, Sampler, packets::PACKET};
+
+/// A camera in a world.
+#[derive(Clone, Debug)]
+pub enum Camera {
+    /// A pinhole: its picture is of spectral radiance.
+    Pinhole(Pinhole),
+    /// A thin lens by formula: its picture is of the mean radiance over the lens.
+    ThinLens(ThinLens),
+    /// A lens: its picture is of spectral irradiance on the film.
+    Lens(Box<LensCamera>),
+}
+
+/// A pinhole at the camera's origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pinhole {
+    /// Where it stands.
+    pub placement: Placement,
+    /// The picture.
+    pub pixels: PixelGrid,
+    /// The tangents of half the angles across the picture's width and height.
+    pub half_tangents: DVec2,
+    /// How many surfaces are looked through: 0 shows what is seen, 1 what the first hides, and so on.
+    pub layer: u32,
+}
+
+/// A thin lens in the plane z = 0 of the camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThinLens {
+    /// What it sees through its middle.
+    pub view: Pinhole,
+    /// Its radius, m.
+    pub radius_m: f64,
+    /// The distance of the plane that is sharp, m.
+    pub focus_distance_m: f64,
+}
+
+/// Rays of some pixels for the packet of one sample.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct CameraRays {
+    /// For each pixel one ray that all wavelengths share, or one a wavelength.
+    pub(crate) rays: Vec<Ray>,
+    /// What the radiance along each ray counts; 0 where the lens blocks it.
+    pub(crate) weights: Vec<f32>,
+    /// Whether all wavelengths share a ray.
+    pub(crate) is_shared: bool,
+}
+
+/// A pixel that is sampled, and the numbers it draws.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PixelSample {
+    pub(crate) pixel: usize,
+    pub(crate) random: Sampler,
+}
+
+impl Camera {
+    /// The pixels of the picture.
+    pub fn pixels(&self) -> PixelGrid {
+        match self {
+            Self::Pinhole(pinhole) => pinhole.pixels,
+            Self::ThinLens(lens) => lens.view.pixels,
+            Self::Lens(lens) => lens.pixels(),
+        }
+    }
+
+    /// What the samples of the picture are.
+    pub fn quantity(&self) -> Quantity {
+        match self {
+            Self::Pinhole(_) | Self::ThinLens(_) => Quantity::Radiance,
+            Self::Lens(_) => Quantity::Irradiance,
+        }
+    }
+
+    /// The distance between pixels on the film, µm, where there is one.
+    pub fn pitch_um(&self) -> Option<f64> {
+        match self {
+            Self::Pinhole(_) | Self::ThinLens(_) => None,
+            Self::Lens(lens) => Some(lens.pitch_um()),
+        }
+    }
+
+    /// How many surfaces are looked through.
+    pub(crate) fn layer(&self) -> u32 {
+        if let Self::Pinhole(pinhole) = self { pinhole.layer } else { 0 }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), BackwardError> {
+        self.pixels().check()?;
+        let view = match self {
+            Self::Pinhole(view) => view,
+            Self::ThinLens(lens) => {
+                for (what, found) in
+                    [("the radius of a thin lens in m", lens.radius_m), ("its focus in m", lens.focus_distance_m)]
+                {
+                    if !(found > 0.0 && found.is_finite()) {
+                        return Err(BackwardError::setting(what, found, "a finite length above 0"));
+                    }
+                }
+                &lens.view
+            }
+            Self::Lens(_) => return Ok(()),
+        };
+        let tangents = view.half_tangents;
+        match tangents.min_element() > 0.0 && tangents.is_finite() {
+            true => Ok(()),
+            false => Err(BackwardError::setting("half the angle of view", tangents, "tangents above 0")),
+        }
+    }
+
+    /// Makes the rays of a sample of some pixels, for the wavelengths of these nodes.
+    pub(crate) fn rays(&self, samples: &[PixelSample], nodes: &[usize; PACKET], out: &mut CameraRays) {
+        out.rays.clear();
+        out.weights.clear();
+        match self {
+            Self::Pinhole(pinhole) => {
+                out.is_shared = true;
+                for &PixelSample { pixel, random } in samples {
+                    let [x, y, ..] = random.camera();
+                    out.push(pinhole.ray(pixel, [x, y]), 1.0);
+                }
+            }
+            Self::ThinLens(lens) => {
+                out.is_shared = true;
+                for &PixelSample { pixel, random } in samples {
+                    out.push(lens.ray(pixel, random.camera()), 1.0);
+                }
+            }
+            Self::Lens(lens) => lens.rays(samples, nodes, out),
+        }
+    }
+}
+
+impl CameraRays {
+    pub(crate) fn push(&mut self, ray: Ray, weight: f32) {
+        self.rays.push(ray);
+        self.weights.push(weight);
+    }
+}
+
+impl Pinhole {
+    /// Returns the direction, in the camera's frame and of length 1 along z, to a place in a pixel.
+    fn towards(&self, pixel: usize, in_pixel: [f64; 2]) -> DVec3 {
+        let [s, t] = self.pixels.share(pixel, in_pixel);
+        DVec3::new((2.0 * s - 1.0) * self.half_tangents.x, (1.0 - 2.0 * t) * self.half_tangents.y, 1.0)
+    }
+
+    /// Returns the ray of a place in a pixel.
+    pub(crate) fn ray(&self, pixel: usize, in_pixel: [f64; 2]) -> Ray {
+        world_ray(&self.placement, DVec3::ZERO, self.towards(pixel, in_pixel))
+    }
+}
+
+impl ThinLens {
+    fn ray(&self, pixel: usize, [x, y, u, v]: [f64; 4]) -> Ray {
+        let focus_m = self.view.towards(pixel, [x, y]) * self.focus_distance_m;
+        let start_m = (on_disc(u, v) * self.radius_m).extend(0.0);
+        world_ray(&self.view.placement, start_m, focus_m - start_m)
+    }
+}
+
+/// Returns the ray from a point of the camera's frame, m.
+pub(crate) fn world_ray(placement: &Placement, start_m: DVec3, direction: DVec3) -> Ray {
+    let place = &placement.world_from_camera;
+    let direction = place.transform_vector3(direction).normalize().as_vec3();
+    Ray { origin: place.transform_point3(start_m).as_vec3(), direction: renormalized(direction) }
+}
+
+/// Makes up for the rounding of a direction to single precision.
+pub(crate) fn renormalized(direction: Vec3) -> Vec3 {
+    direction * (1.5 - 0.5 * direction.length_squared())
+}
+
+/// Returns a point of the unit disc, evenly spread, neighbours staying neighbours (Shirley & Chiu 1997).
+pub(crate) fn on_disc(u: f64, v: f64) -> DVec2 {
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+    let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    if x == 0.0 && y == 0.0 {
+        return DVec2::ZERO;
+    }
+    let (r, angle) = if x.abs() > y.abs() { (x, FRAC_PI_4 * y / x) } else { (y, FRAC_PI_2 - FRAC_PI_4 * x / y) };
+    r * DVec2::from_angle(angle)
+}

@@ -1,0 +1,151 @@
+//! Radiance along a ray: path tracing with sampled lights, without bias.
+//!
+//! At each surface a light is drawn and looked for, and a direction is drawn from the surface's own scattering; light
+//! that both could have found is shared between them by the balance heuristic (Veach 1997, ch. 9). Paths end by Russian
+//! roulette. A packet of wavelengths shares the path until it meets a surface that disperses it; there each goes on alone.
+
+use dioptric_world::{Ray, World, glam::Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::Sampler;
+
+/// How much of the light is followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum LightPaths {
+    /// All of it, however often it is scattered.
+    #[default]
+    Full,
+    /// At most so many scatterings.
+    UpTo(u32),
+    /// Light that comes straight from its source, or from it by one scattering.
+    Direct,
+    /// What shines by itself, seen directly.
+    Emission,
+}
+
+impl LightPaths {
+    fn most_scatterings(self) -> u32 {
+        match self {
+            Self::Full => u32::MAX,
+            Self::UpTo(most) => most,
+            Self::Direct => 1,
+            Self::Emission => 0,
+        }
+    }
+}
+
+/// Scatterings from which on Russian roulette may end a path.
+const ROULETTE_FROM: u32 = 3;
+/// The greatest chance to go on.
+const MOST_LIKELY: f32 = 0.95;
+/// Pairs of numbers that a scattering takes.
+const PAIRS: u32 = 3;
+/// The first pair of the first scattering; pairs before it are the camera's.
+const FIRST_PAIR: u32 = 8;
+
+/// What light is found along rays of a world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Integrator<'a> {
+    pub(crate) world: &'a World,
+    pub(crate) paths: LightPaths,
+    /// The most that one scattered path may add to a sample, W m⁻² sr⁻¹ nm⁻¹; no limit, which would bias, unless asked for.
+    pub(crate) clamp: Option<f32>,
+}
+
+/// A path on its way.
+#[derive(Clone, Copy)]
+struct Path<const N: usize> {
+    ray: Ray,
+    /// The share of radiance that reaches the camera.
+    throughput: [f32; N],
+    /// Where it was scattered last and the density of its direction; `None` where no drawn light could have found it.
+    scattered: Option<(Vec3, f32)>,
+    n_scatterings: u32,
+}
+
+impl Integrator<'_> {
+    /// Returns an estimate of the radiance along a ray at these wavelengths.
+    pub(crate) fn radiance<const N: usize>(&self, ray: Ray, wavelengths_nm: &[f32; N], random: &Sampler) -> [f32; N] {
+        self.follow(Path { ray, throughput: [1.0; N], scattered: None, n_scatterings: 0 }, wavelengths_nm, random)
+    }
+
+    fn follow<const N: usize>(&self, mut path: Path<N>, wavelengths_nm: &[f32; N], random: &Sampler) -> [f32; N] {
+        let mut sum = [0.0; N];
+        loop {
+            let Path { ray, throughput, scattered, n_scatterings } = path;
+            // Beyond everything lies the sky.
+            let Some(hit) = self.world.intersect(&ray, f32::INFINITY) else {
+                let share = scattered.map_or(1.0, |(_, pdf)| share(pdf, self.world.sky_pdf(ray.direction)));
+                let sky = self.world.sky(ray.direction, wavelengths_nm);
+                self.add(&mut sum, n_scatterings, &throughput, &sky.map(|l| l * share));
+                return sum;
+            };
+            // Dispersion takes the packet apart: every wavelength meets this surface again by itself.
+            let bsdf = self.world.bsdf(&hit, -ray.direction, wavelengths_nm);
+            let is_last = n_scatterings >= self.paths.most_scatterings();
+            if N > 1 && !is_last && bsdf.is_dispersive() {
+                for i in 0..N {
+                    let own = Path { ray, throughput: [throughput[i]], scattered, n_scatterings };
+                    sum[i] += self.follow(own, &[wavelengths_nm[i]], random)[0];
+                }
+                return sum;
+            }
+            // The surface may shine.
+            let glow = self.world.emission(&hit, -ray.direction, wavelengths_nm);
+            if glow.iter().any(|&l| l > 0.0) {
+                let share = scattered.map_or(1.0, |(from, pdf)| share(pdf, self.world.light_pdf(from, &hit)));
+                self.add(&mut sum, n_scatterings, &throughput, &glow.map(|l| l * share));
+            }
+            if is_last {
+                return sum;
+            }
+            // Look for a light.
+            let pair = FIRST_PAIR + PAIRS * n_scatterings;
+            let [[u_light, u_lobe], u_place, u_direction] = [0, 1, 2].map(|i| random.pair(pair + i));
+            if !bsdf.is_delta()
+                && let Some(light) = self.world.sample_light(hit.point, u_light, u_place, wavelengths_nm)
+            {
+                let factor = bsdf.eval(light.direction);
+                let is_lit = light.pdf > 0.0 && factor.iter().zip(&light.radiance).any(|(f, l)| f * l > 0.0);
+                if is_lit && !self.world.is_occluded(&hit.ray_towards(light.direction), light.distance_m) {
+                    let share = if light.is_delta { 1.0 } else { share(light.pdf, bsdf.pdf(light.direction)) };
+                    let found = std::array::from_fn(|i| factor[i] * light.radiance[i] * (share / light.pdf));
+                    self.add(&mut sum, n_scatterings + 1, &throughput, &found);
+                }
+            }
+            // Go on in a direction that the surface scatters from.
+            let Some(next) = bsdf.sample(u_lobe, u_direction) else { return sum };
+            path.ray = hit.ray_towards(next.incident);
+            path.throughput = std::array::from_fn(|i| throughput[i] * next.weight[i]);
+            path.scattered = if next.is_delta { None } else { Some((hit.point, next.pdf)) };
+            path.n_scatterings += 1;
+            let greatest = path.throughput.iter().copied().fold(0.0, f32::max);
+            if !(greatest > 0.0) {
+                return sum;
+            }
+            if path.n_scatterings >= ROULETTE_FROM {
+                let chance = greatest.min(MOST_LIKELY);
+                if random.pair(pair + ROULETTE)[0] >= chance {
+                    return sum;
+                }
+                path.throughput = path.throughput.map(|share| share / chance);
+            }
+        }
+    }
+
+    /// Adds light that was scattered so often.
+    fn add<const N: usize>(&self, sum: &mut [f32; N], n_scatterings: u32, throughput: &[f32; N], light: &[f32; N]) {
+        let most = self.clamp.filter(|_| n_scatterings > 1).unwrap_or(f32::INFINITY);
+        for i in 0..N {
+            sum[i] += (throughput[i] * light[i]).min(most);
+        }
+    }
+}
+
+/// Far from the pairs of scatterings: that of the roulette.
+const ROULETTE: u32 = 0x4000_0000;
+
+/// Returns the share of light found with the first density that is counted there, where the second could find it too.
+fn share(pdf: f32, other: f32) -> f32 {
+    pdf / (pdf + other)
+}

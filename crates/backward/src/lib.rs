@@ -1,0 +1,39 @@
+//! Backward rendering: from the film through a lens into a spectral three-dimensional world, in absolute units.
+//!
+//! A [`Renderer`] makes passes over a picture of a [`World`](dioptric_world::World) as a [`Camera`] sees it; each is an independent, unbiased
+//! estimate of spectral irradiance on the film (W m⁻² nm⁻¹), and their spread the standard error of the picture. Eight
+//! wavelengths are sampled at once, each through its own path in the lens and, where those differ, its own in the world.
+//! Pictures depend on the seed and not on threads.
+//!
+//! Lens lengths are millimeters in the frame of `dioptric-optics`; worlds are in meters. Pictures are upright as the
+//! photographer sees them, row 0 at the top. This crate knows nothing of sensors.
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+mod auxiliary;
+mod camera;
+mod checkpoint;
+mod error;
+mod film;
+mod integrator;
+mod lens_camera;
+mod output;
+mod packets;
+mod placement;
+mod renderer;
+mod sampler;
+mod world_camera;
+
+pub use auxiliary::{Auxiliary, auxiliary, layered_depth};
+pub use camera::{Camera, Pinhole, ThinLens};
+pub use error::BackwardError;
+pub use integrator::LightPaths;
+pub use lens_camera::{LensCamera, LensCameraSettings, LensOrigin};
+pub use output::{write_auxiliary_exr, write_rendering_exr};
+pub use packets::BandSampling;
+pub use placement::{PixelGrid, Placement, Rendering};
+pub use renderer::{Bands, RenderSettings, Renderer};
+pub use sampler::Sampler;
+pub use world_camera::distance_ahead_m;

@@ -1,0 +1,182 @@
+//! The numbers that samples are made of: Owen-scrambled Sobol points, drawn by their indices alone.
+//!
+//! A number depends on the seed, the pixel, the pass, the sample and the dimension, and on nothing that was drawn before; so
+//! pictures do not depend on threads. Within a pass the samples of a pixel are one scrambled net: the four camera
+//! dimensions are the first four of Sobol's sequence (direction numbers of Joe & Kuo 2008), every later pair is its
+//! first two, shuffled and scrambled anew. Scrambling hashes as Burley, "Practical hash-based Owen scrambling"
+//! (JCGT 9, 2020), with the constants of Vegdahl's improved Laine–Karras hash (2021).
+
+/// Draws the numbers of one sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sampler {
+    key: u32,
+    index: u32,
+}
+
+/// 2⁻³²: numbers are 32 bits deep.
+const UNIT: f64 = 1.0 / 4_294_967_296.0;
+/// 2⁻²⁴, for numbers in single precision that stay below 1.
+const UNIT_F32: f32 = 1.0 / 16_777_216.0;
+
+impl Sampler {
+    /// Returns the numbers of a sample of a pixel in a pass; passes are independent of each other.
+    pub fn new(seed: u64, pixel: u32, pass: u32, sample: u32) -> Self {
+        let key = mix(seed as u32 ^ mix((seed >> 32) as u32 ^ 0x9e37_79b9));
+        Self { key: mix(mix(key ^ mix(pixel)).wrapping_add(mix(pass ^ 0x85eb_ca6b))), index: sample }
+    }
+
+    /// Returns the four numbers of the camera, in [0, 1): a place in the pixel, and one in the pupil.
+    pub fn camera(&self) -> [f64; 4] {
+        let index = scrambled(self.index, self.key);
+        std::array::from_fn(|dimension| {
+            f64::from(scrambled(sobol(index, dimension), mix(self.key ^ (dimension as u32 + 1)))) * UNIT
+        })
+    }
+
+    /// Returns a pair of numbers in [0, 1); pairs of other numbers are independent of it.
+    pub fn pair(&self, pair: u32) -> [f32; 2] {
+        let key = mix(self.key ^ mix(pair.wrapping_add(0x5bd1_e995)));
+        let index = scrambled(self.index, key);
+        [0, 1].map(|dimension| {
+            let bits = scrambled(sobol(index, dimension), mix(key ^ (dimension as u32 + 1)));
+            (bits >> 8) as f32 * UNIT_F32
+        })
+    }
+}
+
+/// Returns a number as good as random for each number (the finalizer of `MurmurHash3`).
+pub(crate) fn mix(mut v: u32) -> u32 {
+    v ^= v >> 16;
+    v = v.wrapping_mul(0x85eb_ca6b);
+    v ^= v >> 13;
+    v = v.wrapping_mul(0xc2b2_ae35);
+    v ^ (v >> 16)
+}
+
+/// Permutes the 2³² fractions as Owen: which half of each half is swapped hangs on all bits above it.
+fn scrambled(v: u32, key: u32) -> u32 {
+    let mut x = v.reverse_bits();
+    x ^= x.wrapping_mul(0x3d20_adea);
+    x = x.wrapping_add(key);
+    x = x.wrapping_mul((key >> 16) | 1);
+    x ^= x.wrapping_mul(0x0552_6c56);
+    x ^= x.wrapping_mul(0x53a2_2864);
+    x.reverse_bits()
+}
+
+/// Returns the point of this index of Sobol's sequence in a dimension from 0 to 3.
+fn sobol(index: u32, dimension: usize) -> u32 {
+    if dimension == 0 {
+        return index.reverse_bits();
+    }
+    let (mut bits, mut point) = (index, 0);
+    while bits != 0 {
+        point ^= DIRECTIONS[dimension][bits.trailing_zeros() as usize];
+        bits &= bits - 1;
+    }
+    point
+}
+
+/// Direction numbers of the first four dimensions.
+const DIRECTIONS: [[u32; 32]; 4] = {
+    // Degree, coefficients and first numbers of each polynomial; the first dimension needs none.
+    let polynomials: [(usize, u32, [u32; 3]); 4] =
+        [(0, 0, [1; 3]), (1, 0, [1; 3]), (2, 1, [1, 3, 0]), (3, 1, [1, 3, 1])];
+    let mut all = [[0; 32]; 4];
+    let mut dimension = 0;
+    while dimension < 4 {
+        let (degree, coefficients, first) = polynomials[dimension];
+        let mut i = 0;
+        while i < 32 {
+            all[dimension][i] = if degree == 0 {
+                1 << (31 - i)
+            } else if i < degree {
+                first[i] << (31 - i)
+            } else {
+                let mut v = all[dimension][i - degree] ^ (all[dimension][i - degree] >> degree);
+                let mut k = 1;
+                while k < degree {
+                    if (coefficients >> (degree - 1 - k)) & 1 == 1 {
+                        v ^= all[dimension][i - k];
+                    }
+                    k += 1;
+                }
+                v
+            };
+            i += 1;
+        }
+        dimension += 1;
+    }
+    all
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every box of sides 2^-i and 2^-(6-i) holds one of 64 points: what makes a (0, 6, 2)-net.
+    fn assert_net(points: &[[f64; 2]]) {
+        for i in 0..=6 {
+            let (columns, rows) = (1 << i, 1 << (6 - i));
+            let mut counts = vec![0; 64];
+            for p in points {
+                counts[(p[0] * f64::from(columns)) as usize * rows as usize + (p[1] * f64::from(rows)) as usize] += 1;
+            }
+            assert!(counts.iter().all(|&n| n == 1), "{columns} x {rows}: {counts:?}");
+        }
+    }
+
+    #[test]
+    fn pairs_are_nets() {
+        for pixel in 0..5 {
+            for pair in [0, 1, 77] {
+                let points: Vec<[f64; 2]> =
+                    (0..64).map(|i| Sampler::new(1, pixel, 2, i).pair(pair).map(f64::from)).collect();
+                assert_net(&points);
+            }
+            let camera: Vec<[f64; 4]> = (0..64).map(|i| Sampler::new(1, pixel, 2, i).camera()).collect();
+            assert_net(&camera.iter().map(|p| [p[0], p[1]]).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn each_camera_dimension_is_stratified() {
+        for dimension in 0..4 {
+            let mut places: Vec<usize> =
+                (0..256).map(|i| (Sampler::new(3, 9, 0, i).camera()[dimension] * 256.0) as usize).collect();
+            places.sort_unstable();
+            assert_eq!(places, (0..256).collect::<Vec<_>>());
+        }
+    }
+
+    /// The root mean square error of the mean of a smooth function of the pupil falls far below that of random points.
+    #[test]
+    fn pupil_integrals_converge_fast() {
+        let value = |p: [f64; 4]| (3.0 * p[2]).cos() * (2.0 * p[3] + p[0]).exp();
+        let cosine = 3.0_f64.sin() / 3.0;
+        let exponential = 0.5 * (2.0_f64.exp() - 1.0) * (1.0_f64.exp() - 1.0);
+        let error = |pixel| {
+            let sum: f64 = (0..1024).map(|i| value(Sampler::new(0, pixel, 0, i).camera())).sum();
+            sum / 1024.0 - cosine * exponential
+        };
+        let rms = ((0..64).map(|pixel| error(pixel).powi(2)).sum::<f64>() / 64.0).sqrt();
+        let mean = (0..64).map(error).sum::<f64>() / 64.0;
+        // Random points: the standard deviation of the function, 2.5, over the root of 1024, 0.08.
+        assert!(rms < 2e-3, "{rms}");
+        assert!(mean.abs() < 4.0 * rms / 8.0, "{mean} {rms}");
+    }
+
+    #[test]
+    fn pairs_and_pixels_are_independent() {
+        let correlation = |a: &dyn Fn(u32) -> f32, b: &dyn Fn(u32) -> f32| {
+            (0..4096).map(|i| f64::from((a(i) - 0.5) * (b(i) - 0.5))).sum::<f64>() / 4096.0 * 12.0
+        };
+        let a = |i| Sampler::new(1, i, 0, 0).pair(0)[0];
+        // One over the root of 4096 is 0.016.
+        assert!(correlation(&a, &|i| Sampler::new(1, i, 0, 0).pair(1)[0]).abs() < 0.06);
+        assert!(correlation(&a, &|i| Sampler::new(1, i, 1, 0).pair(0)[0]).abs() < 0.06);
+        assert!(correlation(&a, &|i| Sampler::new(2, i, 0, 0).pair(0)[0]).abs() < 0.06);
+        assert!(correlation(&a, &|i| Sampler::new(1, i + 1, 0, 0).pair(0)[0]).abs() < 0.06);
+        assert!(correlation(&a, &|i| Sampler::new(1, i, 0, 0).camera()[0] as f32).abs() < 0.06);
+    }
+}

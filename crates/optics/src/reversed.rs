@@ -1,0 +1,240 @@
+//! A lens met from behind: rays from the film back into the scene.
+//!
+//! The lens is mirrored at the plane z = 0, and its surfaces are met in the opposite order, so that the kernels of the
+//! forward trace do the work: the same digits, surfaces and fates.
+
+use glam::{DMat3, DVec3};
+
+use crate::{
+    MonoLens, Pose, RayBatch, RayBatchF32, Rims,
+    rays::RaySlices,
+    trace::{self, Goal, Kind, Plan, Real, Step, Toric},
+};
+
+/// A lens at one wavelength, traced from the film to the scene.
+///
+/// Rays are given and returned in the lens frame; those on their way to the scene have directions with z below 0. A fate
+/// names the surface by its place in the lens, counted from the scene as ever.
+#[derive(Clone, Debug)]
+pub struct ReversedLens {
+    forward: MonoLens,
+    /// Where surfaces stand in the mirrored frame, the last first, if not all are centred.
+    poses: Option<Vec<Pose>>,
+    /// Plans for each part, of a far object and with rims.
+    plans: [Plan<f64>; 3],
+    plans_f32: [Plan<f32>; 3],
+}
+
+/// What to trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    /// All surfaces.
+    Whole = 0,
+    /// Those behind the stop, and on to the stop, which turns nothing.
+    ToStop = 1,
+    /// The stop, where it turns rays, and those before it.
+    FromStop = 2,
+}
+
+impl MonoLens {
+    /// Returns the lens for rays from the film to the scene.
+    pub fn reversed(&self) -> ReversedLens {
+        let poses = self.poses().map(|poses| poses.iter().rev().map(mirrored_pose).collect());
+        let steps = |part: Part| part_of(&mirrored_steps(self, f64::NEG_INFINITY), self.stop(), part);
+        let parts = [Part::Whole, Part::ToStop, Part::FromStop];
+        ReversedLens {
+            poses,
+            plans: parts.map(|part| plan_of(&steps(part), part, self.first_of(part), Rims::Clip)),
+            plans_f32: parts.map(|part| plan_of(&steps(part), part, self.first_of(part), Rims::Clip)),
+            forward: self.clone(),
+        }
+    }
+
+    /// The surface that a part begins with.
+    fn first_of(&self, part: Part) -> usize {
+        if part == Part::FromStop { self.stop() } else { self.n_surfaces() - 1 }
+    }
+}
+
+impl ReversedLens {
+    /// The lens, as it is traced forward.
+    pub fn forward(&self) -> &MonoLens {
+        &self.forward
+    }
+
+    /// Where the stop stands: in its frame diffraction turns rays between [`trace_to_stop`](Self::trace_to_stop) and
+    /// [`trace_from_stop`](Self::trace_from_stop).
+    pub fn stop_pose(&self) -> Pose {
+        let stop = self.forward.stop();
+        self.forward.poses().map_or(Pose::centered(self.forward.vertex_z_mm(stop)), |poses| poses[stop])
+    }
+
+    /// Traces rays from the image space through all surfaces, on this thread.
+    ///
+    /// Each ray in flight ends on the first surface, bent into the object space, or where it was lost.
+    pub fn trace(&self, rays: &mut RayBatch, rims: Rims) {
+        self.trace_part(Part::Whole, rays, rims);
+    }
+
+    /// Traces rays from the image space through the surfaces behind the stop and on to the stop, whose rim ends them.
+    ///
+    /// A stop that refracts has not done so yet: rays are in the medium behind it, where forward rays are diffracted.
+    pub fn trace_to_stop(&self, rays: &mut RayBatch, rims: Rims) {
+        self.trace_part(Part::ToStop, rays, rims);
+    }
+
+    /// Traces rays that are at the stop on through it and the surfaces before it.
+    pub fn trace_from_stop(&self, rays: &mut RayBatch, rims: Rims) {
+        self.trace_part(Part::FromStop, rays, rims);
+    }
+
+    /// Traces rays in single precision as [`trace`](Self::trace) does, with rims.
+    ///
+    /// They must start near the last vertex. Through tilted and decentred surfaces they go in double precision.
+    pub fn trace_f32(&self, rays: &mut RayBatchF32) {
+        self.trace_part_f32(Part::Whole, rays);
+    }
+
+    /// Does the same to the stop, as [`trace_to_stop`](Self::trace_to_stop).
+    pub fn trace_to_stop_f32(&self, rays: &mut RayBatchF32) {
+        self.trace_part_f32(Part::ToStop, rays);
+    }
+
+    /// Does the same from the stop on, as [`trace_from_stop`](Self::trace_from_stop).
+    pub fn trace_from_stop_f32(&self, rays: &mut RayBatchF32) {
+        self.trace_part_f32(Part::FromStop, rays);
+    }
+
+    /// Returns for each ray from the image space the least over the surfaces of semi-aperture less distance from the
+    /// axis, mm; −∞ for one that does not get through. Openings count as rims, obscurations do not.
+    ///
+    /// With `to_stop` the surfaces are those behind the stop and the stop.
+    pub(crate) fn clearances_mm(&self, rays: &mut RayBatch, to_stop: bool) -> Vec<f64> {
+        let part = if to_stop { Part::ToStop } else { Part::Whole };
+        let steps = part_of(&mirrored_steps(&self.forward, rays.object_z_mm), self.forward.stop(), part);
+        let mut clearances_mm = vec![f64::INFINITY; rays.len()];
+        let mut slices = rays.slices();
+        mirror(&mut slices);
+        match self.poses_of(part) {
+            Some(poses) => trace::placed_clearances(&steps, poses, &mut slices, &mut clearances_mm),
+            None => {
+                let plan = plan_of(&steps, part, self.forward.first_of(part), Rims::Ignore);
+                trace::trace_clearances(&plan, slices, &mut clearances_mm);
+            }
+        }
+        mirror(&mut rays.slices());
+        clearances_mm
+    }
+
+    fn trace_part(&self, part: Part, rays: &mut RayBatch, rims: Rims) {
+        let object_z_mm = rays.object_z_mm;
+        let is_planned = rims == Rims::Clip && object_z_mm == f64::NEG_INFINITY;
+        let mut slices = rays.slices();
+        mirror(&mut slices);
+        let steps = || part_of(&mirrored_steps(&self.forward, object_z_mm), self.forward.stop(), part);
+        let first = self.forward.first_of(part);
+        match self.poses_of(part) {
+            Some(poses) => {
+                let plan = |own: &[Step], place: usize| Plan::reversed(own, first - place, rims, place == 0);
+                trace::trace_placed_by(&steps(), poses, plan, &mut slices);
+            }
+            None if is_planned => trace::trace_batch(&self.plans[part as usize], Goal::LastSurface, slices),
+            None => trace::trace_batch(&plan_of(&steps(), part, first, rims), Goal::LastSurface, slices),
+        }
+        mirror(&mut rays.slices());
+    }
+
+    fn trace_part_f32(&self, part: Part, rays: &mut RayBatchF32) {
+        if self.poses.is_some() {
+            let mut wide = rays.widened();
+            self.trace_part(part, &mut wide, Rims::Clip);
+            return rays.set_rounded(&wide, |point, _| point);
+        }
+        let mut slices = rays.slices();
+        mirror(&mut slices);
+        trace::trace_batch(&self.plans_f32[part as usize], Goal::LastSurface, slices);
+        mirror(&mut rays.slices());
+    }
+
+    /// The poses of the surfaces of a part.
+    fn poses_of(&self, part: Part) -> Option<&[Pose]> {
+        let stop_place = self.forward.n_surfaces() - 1 - self.forward.stop();
+        self.poses.as_ref().map(|poses| match part {
+            Part::Whole => &poses[..],
+            Part::ToStop => &poses[..=stop_place],
+            Part::FromStop => &poses[stop_place..],
+        })
+    }
+}
+
+fn plan_of<T: Real>(steps: &[Step], part: Part, first: usize, rims: Rims) -> Plan<T> {
+    Plan::reversed(steps, first, rims, part != Part::FromStop)
+}
+
+/// Mirrors rays at the plane z = 0.
+fn mirror<T: Real>(rays: &mut RaySlices<'_, T>) {
+    for z in rays.z.iter_mut().chain(rays.n.iter_mut()) {
+        *z = -*z;
+    }
+}
+
+fn mirrored_pose(pose: &Pose) -> Pose {
+    let flip = DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0));
+    Pose { vertex_mm: flip * pose.vertex_mm, rotation: flip * pose.rotation * flip }
+}
+
+/// Returns the steps of a lens mirrored at z = 0, the last first.
+fn mirrored_steps(lens: &MonoLens, object_z_mm: f64) -> Vec<Step> {
+    lens.steps_for(object_z_mm).iter().rev().map(mirrored).collect()
+}
+
+fn mirrored(step: &Step) -> Step {
+    let negated = |list: &[f64]| list.iter().map(|a| -a).collect();
+    let kind = match &step.kind {
+        Kind::Window => Kind::Window,
+        Kind::Sphere => Kind::Sphere,
+        Kind::Conic { conic } => Kind::Conic { conic: *conic },
+        Kind::EvenAsphere { conic, a2, coefficients } => {
+            Kind::EvenAsphere { conic: *conic, a2: -a2, coefficients: negated(coefficients) }
+        }
+        Kind::OddAsphere { conic, coefficients } => {
+            Kind::OddAsphere { conic: *conic, coefficients: negated(coefficients) }
+        }
+        Kind::ThinLens { power, object_z } => {
+            // The object plane of rays that go back is the image plane of those that come.
+            let image_z = step.index_after / (step.index_before / object_z + power);
+            Kind::ThinLens { power: *power, object_z: -image_z }
+        }
+        Kind::Toric(Toric::Biconic { c, k }) => Kind::Toric(Toric::Biconic { c: c.map(|c| -c), k: *k }),
+        Kind::Toric(Toric::Toroid { c, conic, coefficients }) => {
+            let coefficients = negated(coefficients);
+            Kind::Toric(Toric::Toroid { c: c.map(|c| -c), conic: *conic, coefficients })
+        }
+    };
+    Step {
+        kind,
+        curvature: -step.curvature,
+        index_before: step.index_after,
+        index_after: step.index_before,
+        vertex_z: -step.vertex_z,
+        ..step.clone()
+    }
+}
+
+/// Returns the steps of a part of a mirrored lens whose stop is the surface of this number.
+fn part_of(steps: &[Step], stop: usize, part: Part) -> Vec<Step> {
+    let stop_place = steps.len() - 1 - stop;
+    match part {
+        Part::Whole => steps.to_vec(),
+        Part::FromStop => steps[stop_place..].to_vec(),
+        Part::ToStop => {
+            let mut steps = steps[..=stop_place].to_vec();
+            let stop = &mut steps[stop_place];
+            stop.index_after = stop.index_before;
+            if matches!(stop.kind, Kind::ThinLens { .. }) {
+                stop.kind = Kind::Window;
+            }
+            steps
+        }
+    }
+}

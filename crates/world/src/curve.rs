@@ -1,0 +1,218 @@
+//! Functions of wavelength, ready for rendering.
+
+use std::sync::{Arc, OnceLock};
+
+use dioptric_spectrum::Spectrum;
+
+use crate::upsample::{SmoothReflectance, d65_of_unit_mean};
+
+/// A function of wavelength that is quick to look up and cheap to copy.
+///
+/// It is a number, points with straight lines between them, or the smooth spectrum of a color. A spectrum of many points
+/// is tabulated every nanometer, to which points between whole nanometers are moved by linear interpolation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpectralCurve {
+    kind: Kind,
+    scale: f32,
+    /// Over 400–700 nm, scale included.
+    mean: f32,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Kind {
+    Constant,
+    Knots {
+        knots: Arc<[(f32, f32)]>,
+        beyond: Beyond,
+    },
+    Table {
+        first_nm: f32,
+        values: Arc<[f32]>,
+        beyond: Beyond,
+    },
+    Smooth(SmoothReflectance),
+    /// A smooth spectrum times D65.
+    SmoothLight(SmoothReflectance),
+}
+
+/// What a curve is beyond the ends of its table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Beyond {
+    /// Its end values: for reflectances and indices.
+    Held,
+    /// Nothing: for emission.
+    Zero,
+}
+
+/// Tables begin and end within this range, nm.
+const RANGE_NM: (f64, f64) = (200.0, 2500.0);
+/// Spectra of more points than this are tabulated.
+const MAX_KNOTS: usize = 64;
+
+impl SpectralCurve {
+    /// Returns the curve that is the same at every wavelength.
+    pub fn constant(value: f32) -> Self {
+        Self { kind: Kind::Constant, scale: value, mean: value }
+    }
+
+    /// Returns the curve of a spectrum. A spectrum of one point is constant; what lies outside 200–2500 nm may be left
+    /// out.
+    pub fn new(spectrum: &Spectrum, beyond: Beyond) -> Self {
+        let knots_nm = spectrum.wavelengths_nm();
+        if let [value] = spectrum.values() {
+            return Self::constant(*value as f32);
+        }
+        if knots_nm.len() <= MAX_KNOTS {
+            let knots = knots_nm.iter().zip(spectrum.values()).map(|(w, v)| (*w as f32, *v as f32)).collect();
+            return Self::of(Kind::Knots { knots, beyond });
+        }
+        let (low, high) = RANGE_NM;
+        let first_nm = knots_nm[0].clamp(low, high).floor();
+        let last_nm = knots_nm[knots_nm.len() - 1].clamp(low, high).ceil();
+        let n = (last_nm - first_nm) as usize + 1;
+        let values = (0..n).map(|i| spectrum.at_held(first_nm + i as f64) as f32).collect();
+        Self::of(Kind::Table { first_nm: first_nm as f32, values, beyond })
+    }
+
+    /// Returns the smooth reflectance of a linear sRGB color seen under D65; it is clamped to [0, 1].
+    pub fn from_rgb_reflectance(rgb: [f32; 3]) -> Self {
+        Self::of(Kind::Smooth(SmoothReflectance::of_rgb(rgb)))
+    }
+
+    /// Returns the light of a linear sRGB color: D65 times a smooth spectrum; 0 outside the table of D65.
+    ///
+    /// Its scale is that of pbrt, 4th version: (1, 1, 1) is as bright as an even spectrum of 1 per nm, that is 72 983
+    /// cd m⁻² where the curve is a radiance in W m⁻² sr⁻¹ nm⁻¹.
+    pub fn from_rgb_light(rgb: [f32; 3]) -> Self {
+        let rgb = rgb.map(|v| if v.is_finite() { v.max(0.0) } else { 0.0 });
+        let largest = rgb.into_iter().fold(0.0, f32::max);
+        if largest == 0.0 {
+            return Self::constant(0.0);
+        }
+        Self::of(Kind::SmoothLight(SmoothReflectance::of_rgb(rgb.map(|v| v / largest)))).scaled(largest)
+    }
+
+    /// Returns [`from_rgb_light`](Self::from_rgb_light) of one color at these wavelengths, nm.
+    pub(crate) fn light_at<const N: usize>(rgb: [f32; 3], wavelengths_nm: &[f32; N]) -> [f32; N] {
+        let largest = rgb.into_iter().fold(0.0, f32::max);
+        if !(largest > 0.0 && largest.is_finite()) {
+            return [0.0; N];
+        }
+        let share = SmoothReflectance::of_rgb(rgb.map(|v| v / largest)).at(wavelengths_nm);
+        let white = d65().at(wavelengths_nm);
+        std::array::from_fn(|lane| largest * share[lane] * white[lane])
+    }
+
+    fn of(kind: Kind) -> Self {
+        let curve = Self { kind, scale: 1.0, mean: 0.0 };
+        let mean = (0..=60).map(|i| curve.at(&[400.0 + 5.0 * i as f32])[0]).sum::<f32>() / 61.0;
+        Self { mean, ..curve }
+    }
+
+    /// Returns the values at these wavelengths, nm.
+    pub fn at<const N: usize>(&self, wavelengths_nm: &[f32; N]) -> [f32; N] {
+        match &self.kind {
+            Kind::Constant => [self.scale; N],
+            Kind::Knots { knots, beyond } => wavelengths_nm.map(|w| self.scale * between_knots(knots, *beyond, w)),
+            Kind::Table { first_nm, values, beyond } => {
+                wavelengths_nm.map(|w| self.scale * in_table(w - first_nm, values, *beyond))
+            }
+            Kind::Smooth(smooth) => smooth.at(wavelengths_nm).map(|v| self.scale * v),
+            Kind::SmoothLight(smooth) => {
+                let (share, white) = (smooth.at(wavelengths_nm), d65().at(wavelengths_nm));
+                std::array::from_fn(|lane| self.scale * share[lane] * white[lane])
+            }
+        }
+    }
+
+    /// Returns the curve with every value multiplied.
+    #[must_use]
+    pub fn scaled(self, factor: f32) -> Self {
+        Self { scale: self.scale * factor, mean: self.mean * factor, ..self }
+    }
+
+    /// Returns a function of every value of a curve, its points moved.
+    #[must_use]
+    pub(crate) fn mapped(&self, function: impl Fn(f32) -> f32) -> Self {
+        let of = |v: f32| function(self.scale * v);
+        match &self.kind {
+            Kind::Constant => Self::constant(function(self.scale)),
+            Kind::Knots { knots, beyond } => {
+                Self::of(Kind::Knots { knots: knots.iter().map(|(w, v)| (*w, of(*v))).collect(), beyond: *beyond })
+            }
+            Kind::Table { first_nm, values, beyond } => Self::of(Kind::Table {
+                first_nm: *first_nm,
+                values: values.iter().map(|v| of(*v)).collect(),
+                beyond: *beyond,
+            }),
+            Kind::Smooth(_) | Kind::SmoothLight(_) => {
+                let every_5_nm = (60..=220).map(|i| 5.0 * i as f32);
+                let values = every_5_nm.map(|w| (w, function(self.at(&[w])[0]))).collect();
+                Self::of(Kind::Knots { knots: values, beyond: Beyond::Held })
+            }
+        }
+    }
+
+    /// The mean over 400–700 nm.
+    pub fn mean_visible(&self) -> f32 {
+        self.mean
+    }
+}
+
+fn d65() -> &'static SpectralCurve {
+    static D65: OnceLock<SpectralCurve> = OnceLock::new();
+    D65.get_or_init(|| SpectralCurve::new(&d65_of_unit_mean(), Beyond::Zero))
+}
+
+fn between_knots(knots: &[(f32, f32)], beyond: Beyond, wavelength_nm: f32) -> f32 {
+    let above = knots.partition_point(|(w, _)| *w < wavelength_nm);
+    let last = knots.len() - 1;
+    if above == 0 || above > last {
+        let (end_nm, value) = knots[above.min(last)];
+        return if beyond == Beyond::Held || wavelength_nm == end_nm { value } else { 0.0 };
+    }
+    let ((w0, v0), (w1, v1)) = (knots[above - 1], knots[above]);
+    v0 + (v1 - v0) * (wavelength_nm - w0) / (w1 - w0)
+}
+
+fn in_table(along_nm: f32, values: &[f32], beyond: Beyond) -> f32 {
+    let last = values.len() - 1;
+    if beyond == Beyond::Zero && !(along_nm >= 0.0 && along_nm <= last as f32) {
+        return 0.0;
+    }
+    let along_nm = along_nm.clamp(0.0, last as f32);
+    let below = (along_nm as usize).min(last.saturating_sub(1));
+    let above = (below + 1).min(last);
+    values[below] + (along_nm - below as f32) * (values[above] - values[below])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curve_follows_its_spectrum() {
+        let few = Spectrum::new(vec![400.0, 500.5, 700.0], vec![1.0, 3.0, 0.0]).unwrap();
+        let many_nm: Vec<f64> = (0..=100).map(|i| 400.0 + 3.0 * f64::from(i)).collect();
+        let many = Spectrum::new(many_nm.clone(), many_nm.iter().map(|w| (w / 40.0).sin()).collect()).unwrap();
+        for spectrum in [few, many] {
+            let held = SpectralCurve::new(&spectrum, Beyond::Held);
+            let zero = SpectralCurve::new(&spectrum, Beyond::Zero);
+            for wavelength_nm in [400.0, 417.3, 490.0, 600.0, 699.9, 700.0] {
+                let expected = spectrum.at_held(f64::from(wavelength_nm)) as f32;
+                assert!((held.at(&[wavelength_nm])[0] - expected).abs() < 2e-5, "{wavelength_nm}");
+                assert_eq!(held.at(&[wavelength_nm]), zero.at(&[wavelength_nm]));
+            }
+            let ends = [spectrum.values()[0], spectrum.values()[spectrum.values().len() - 1]].map(|v| v as f32);
+            assert_eq!((held.at(&[300.0, 900.0]), zero.at(&[399.9, 700.1])), (ends, [0.0; 2]));
+            assert_eq!(held.clone().scaled(2.0).at(&[450.0])[0], 2.0 * held.at(&[450.0])[0]);
+            let squared = held.mapped(|v| v * v);
+            assert!((squared.at(&[400.0])[0] - held.at(&[400.0])[0].powi(2)).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn constants_have_no_ends() {
+        assert_eq!(SpectralCurve::new(&Spectrum::constant(0.5), Beyond::Zero).at(&[100.0, 5000.0]), [0.5; 2]);
+    }
+}

@@ -1,0 +1,81 @@
+//! What can be wrong with a world or its files.
+
+use std::path::PathBuf;
+
+use dioptric_spectrum::Cancelled;
+
+/// A world that cannot be read or built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WorldError {
+    /// A file that cannot be read: absent, truncated, or of another format.
+    #[error("{}: cannot be read: {reason}", file.display())]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A line of a text file that cannot be used.
+    #[error("{}: line {line}: {reason}", file.display())]
+    Line {
+        /// The file.
+        file: PathBuf,
+        /// 1-based line.
+        line: usize,
+        /// What is wrong and what was expected.
+        reason: String,
+    },
+    /// A file whose kind the name does not tell.
+    #[error("{}: expected a .pbrt, .gltf, .glb, .obj or .ply file", file.display())]
+    UnknownKind {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A mesh with vertices or triangles that cannot be.
+    #[error("mesh: {reason}")]
+    Mesh {
+        /// What is wrong and what was expected.
+        reason: String,
+    },
+    /// A number outside its range.
+    #[error("{what} is {value}: expected {expected}")]
+    Setting {
+        /// Which number.
+        what: &'static str,
+        /// What was given.
+        value: String,
+        /// What would do.
+        expected: &'static str,
+    },
+    /// Part of a world that names another part that is not there.
+    #[error("{what} names {target} {index}, of which there are {n}")]
+    Dangling {
+        /// What names it.
+        what: &'static str,
+        /// What is named.
+        target: &'static str,
+        /// Its number.
+        index: usize,
+        /// How many there are.
+        n: usize,
+    },
+    /// More parts than are looked after.
+    #[error("{what}: {n}: expected {limit} at most")]
+    TooMany {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many.
+        n: u64,
+        /// How many are allowed.
+        limit: u64,
+    },
+    /// Work that was stopped on request before it was done.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl WorldError {
+    pub(crate) fn mesh(reason: String) -> Self {
+        Self::Mesh { reason }
+    }
+}

@@ -1,0 +1,400 @@
+//! Worlds of pbrt files, versions 2 to 4.
+//!
+//! A file that says `WorldEnd` is of version 3 or before, else of version 4; one that names a `SurfaceIntegrator` or
+//! `Renderer` is of version 2.
+
+mod camera;
+mod lights;
+mod materials;
+mod params;
+mod shapes;
+mod spectra;
+mod textures;
+mod tokens;
+
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+};
+
+use dioptric_spectrum::Cancel;
+use glam::{DAffine3, DMat4, DVec3};
+
+use self::{
+    camera::CameraWords,
+    params::Params,
+    tokens::{Token, Tokens},
+};
+use super::read_bytes;
+use crate::{Emission, GroupId, Material, MaterialId, SpectralCurve, Texture, TextureId, WorldBuilder, WorldError};
+
+/// The most bytes that a file and all that it includes may have.
+const MAX_BYTES: u64 = 1 << 31;
+/// How deep files may include each other, and attributes be nested.
+const MAX_DEPTH: usize = 32;
+
+/// Reads a file and all that it includes.
+pub(super) fn read(path: &Path, metres_per_unit: f64, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
+    let mut reader = Reader::new(path, metres_per_unit, cancel);
+    reader.read_file(path, 0)?;
+    Ok(reader.builder)
+}
+
+/// What is wrong in the line being read, or in another file.
+enum Fault {
+    Here(String),
+    Elsewhere(WorldError),
+}
+
+impl From<String> for Fault {
+    fn from(reason: String) -> Self {
+        Self::Here(reason)
+    }
+}
+
+impl From<WorldError> for Fault {
+    fn from(error: WorldError) -> Self {
+        Self::Elsewhere(error)
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Version {
+    Two,
+    Three,
+    Four,
+}
+
+/// What holds for the shapes that follow.
+#[derive(Clone, Debug)]
+struct Attributes {
+    /// File units from object units.
+    place: DAffine3,
+    material: MaterialId,
+    glow: Option<Emission>,
+    is_reversed: bool,
+}
+
+struct Reader<'c> {
+    builder: WorldBuilder,
+    metres_per_unit: f64,
+    folder: PathBuf,
+    version: Version,
+    bytes_left: u64,
+    attributes: Attributes,
+    saved: Vec<Attributes>,
+    places: HashMap<String, DAffine3>,
+    camera: CameraWords,
+    is_in_world: bool,
+    materials: HashMap<String, MaterialId>,
+    spectrum_textures: HashMap<String, TextureId>,
+    number_textures: HashMap<String, TextureId>,
+    /// Curves of names, so that each is tabulated once.
+    named_curves: HashMap<String, SpectralCurve>,
+    objects: HashMap<String, GroupId>,
+    object: Option<GroupId>,
+    cancel: &'c Cancel,
+}
+
+impl<'c> Reader<'c> {
+    fn new(path: &Path, metres_per_unit: f64, cancel: &'c Cancel) -> Self {
+        let mut builder = WorldBuilder::new();
+        let half = builder.add_texture(Texture::Curve(SpectralCurve::constant(0.5)));
+        let material = builder.add_material("default", Material::Matte { reflectance: half });
+        let attributes = Attributes { place: DAffine3::IDENTITY, material, glow: None, is_reversed: false };
+        Self {
+            builder,
+            metres_per_unit,
+            folder: path.parent().unwrap_or(Path::new("")).to_owned(),
+            version: Version::Four,
+            bytes_left: MAX_BYTES,
+            attributes,
+            saved: Vec::new(),
+            places: HashMap::new(),
+            camera: CameraWords::default(),
+            is_in_world: false,
+            materials: HashMap::new(),
+            spectrum_textures: HashMap::new(),
+            number_textures: HashMap::new(),
+            named_curves: HashMap::new(),
+            objects: HashMap::new(),
+            object: None,
+            cancel,
+        }
+    }
+
+    fn read_file(&mut self, path: &Path, depth: usize) -> Result<(), WorldError> {
+        let bytes = read_bytes(path, self.bytes_left)?;
+        self.bytes_left -= bytes.len() as u64;
+        // Names and comments may be in any old encoding.
+        let text = String::from_utf8_lossy(&bytes);
+        if depth == 0 && text.contains("WorldEnd") {
+            self.version = Version::Three;
+        }
+        let mut tokens = Tokens::new(&text);
+        loop {
+            self.cancel.check()?;
+            let at = |line: usize, reason: String| WorldError::Line { file: path.to_owned(), line, reason };
+            let next = tokens.next().map_err(|reason| at(tokens.line(), reason))?;
+            let Some((token, line)) = next else { return Ok(()) };
+            let done = match token {
+                Token::Word(directive) => self.directive(directive, &mut tokens, depth),
+                other => Err(Fault::Here(format!("expected a directive such as Shape, found {other:?}"))),
+            };
+            done.map_err(|fault| match fault {
+                Fault::Here(reason) => at(line, reason),
+                Fault::Elsewhere(error) => error,
+            })?;
+        }
+    }
+
+    fn directive(&mut self, directive: &str, tokens: &mut Tokens<'_>, depth: usize) -> Result<(), Fault> {
+        match directive {
+            "Include" | "Import" => return self.include(text(directive, tokens)?, depth),
+            "WorldBegin" => self.begin_world()?,
+            "WorldEnd" => {}
+            "AttributeBegin" | "TransformBegin" => self.save()?,
+            "AttributeEnd" => self.attributes = self.saved.pop().ok_or_else(|| no_begin(directive))?,
+            "TransformEnd" => self.attributes.place = self.saved.pop().ok_or_else(|| no_begin(directive))?.place,
+            "ReverseOrientation" => self.attributes.is_reversed ^= true,
+            "Identity" | "Translate" | "Scale" | "Rotate" | "LookAt" | "Transform" | "ConcatTransform" => {
+                self.transform(directive, tokens)?;
+            }
+            "CoordinateSystem" => {
+                let name = text(directive, tokens)?.to_owned();
+                self.places.insert(name, self.attributes.place);
+            }
+            "CoordSysTransform" => {
+                let name = text(directive, tokens)?;
+                self.attributes.place =
+                    *self.places.get(name).ok_or_else(|| format!("no coordinate system has the name '{name}'"))?;
+            }
+            "ActiveTransform" => {
+                if !matches!(tokens.next()?, Some((Token::Word(_), _))) {
+                    return Err("ActiveTransform: expected All, StartTime or EndTime".to_owned().into());
+                }
+                self.builder.note("ActiveTransform: motion isn't followed; later transforms hold for all times");
+            }
+            "TransformTimes" => {
+                numbers::<2>(directive, tokens)?;
+            }
+            "ObjectBegin" => {
+                let name = text(directive, tokens)?.to_owned();
+                if self.object.is_some() {
+                    return Err("ObjectBegin within an object".to_owned().into());
+                }
+                self.save()?;
+                let group = self.builder.add_group();
+                self.object = Some(group);
+                self.objects.insert(name, group);
+            }
+            "ObjectEnd" => {
+                self.object.take().ok_or_else(|| no_begin(directive))?;
+                self.attributes = self.saved.pop().ok_or_else(|| no_begin(directive))?;
+            }
+            "ObjectInstance" => {
+                let name = text(directive, tokens)?;
+                let group = *self.objects.get(name).ok_or_else(|| format!("no object has the name '{name}'"))?;
+                if self.object.is_some() {
+                    return Err("ObjectInstance within an object".to_owned().into());
+                }
+                // Shapes of the object are in metres already.
+                let to_metres = DAffine3::from_scale(DVec3::splat(self.metres_per_unit));
+                let place = to_metres * self.checked_place()? * to_metres.inverse();
+                self.builder.add_instance(group, place);
+            }
+            "Texture" => return self.texture(tokens),
+            "NamedMaterial" => {
+                let name = text(directive, tokens)?;
+                self.attributes.material =
+                    *self.materials.get(name).ok_or_else(|| format!("no material has the name '{name}'"))?;
+            }
+            _ => return self.directive_with_params(directive, tokens),
+        }
+        Ok(())
+    }
+
+    /// Reads the directives of the form `Directive "kind" parameters`.
+    fn directive_with_params(&mut self, directive: &str, tokens: &mut Tokens<'_>) -> Result<(), Fault> {
+        match directive {
+            "Camera" | "Film" | "Shape" | "LightSource" | "AreaLightSource" | "Material" | "MakeNamedMaterial"
+            | "Sampler" | "PixelFilter" | "Integrator" | "Accelerator" | "ColorSpace" | "MakeNamedMedium"
+            | "Attribute" | "SurfaceIntegrator" | "VolumeIntegrator" | "Renderer" | "Volume" => {}
+            "MediumInterface" => {
+                while let Some(Token::Text(_)) = tokens.peek()? {
+                    tokens.next()?;
+                }
+                self.builder.note("MediumInterface: media aren't followed; space is clear");
+                return Ok(());
+            }
+            "Option" => {
+                Params::read(tokens)?;
+                return Ok(());
+            }
+            _ => return Err(format!("'{directive}' is no directive of pbrt").into()),
+        }
+        let kind = text(directive, tokens)?;
+        let params = Params::read(tokens)?;
+        match directive {
+            "Camera" => self.camera.set_camera(kind, &params, self.attributes.place),
+            "Film" => self.camera.set_film(&params),
+            "Shape" => self.shape(kind, &params)?,
+            "LightSource" => self.light(kind, &params)?,
+            "AreaLightSource" => self.attributes.glow = Some(self.glow(&params)?),
+            "Material" => {
+                let material = self.material(kind, kind, &params)?;
+                self.attributes.material = material;
+            }
+            "MakeNamedMaterial" => {
+                let of_kind = params.text("type").unwrap_or("matte");
+                let material = self.material(kind, of_kind, &params)?;
+                self.materials.insert(kind.to_owned(), material);
+            }
+            "ColorSpace" if kind != "srgb" => {
+                self.builder.note(format!("ColorSpace \"{kind}\": colors are taken as sRGB"));
+            }
+            "MakeNamedMedium" | "Volume" | "Attribute" => {
+                self.builder.note(format!("{directive} \"{kind}\": not supported, left out"));
+                return Ok(());
+            }
+            "SurfaceIntegrator" | "VolumeIntegrator" | "Renderer" => {
+                self.version = Version::Two;
+                return Ok(());
+            }
+            // How a picture is computed is the renderer's affair.
+            _ => return Ok(()),
+        }
+        let unused = params.unused();
+        if !unused.is_empty() && directive != "Film" && directive != "Camera" {
+            let unused = unused.join(", ");
+            self.builder.note(format!("{directive} \"{kind}\": not supported and left out: {unused}"));
+        }
+        Ok(())
+    }
+
+    fn include(&mut self, name: &str, depth: usize) -> Result<(), Fault> {
+        if depth >= MAX_DEPTH {
+            return Err(format!("Include \"{name}\": files include each other deeper than {MAX_DEPTH}").into());
+        }
+        match self.find_file(name) {
+            Some(path) => Ok(self.read_file(&path, depth + 1)?),
+            None => {
+                self.builder.note(format!("Include \"{name}\": no such file, left out"));
+                Ok(())
+            }
+        }
+    }
+
+    /// Returns a file that is named in the world's, beside which it is looked for.
+    fn find_file(&self, name: &str) -> Option<PathBuf> {
+        let path = self.folder.join(name);
+        path.is_file().then_some(path)
+    }
+
+    fn begin_world(&mut self) -> Result<(), Fault> {
+        if self.is_in_world {
+            return Err("a second WorldBegin".to_owned().into());
+        }
+        self.is_in_world = true;
+        if let Some(camera) = self.camera.finish(self.metres_per_unit)? {
+            self.builder.add_camera(camera);
+        }
+        self.attributes.place = DAffine3::IDENTITY;
+        self.places.insert("world".to_owned(), DAffine3::IDENTITY);
+        Ok(())
+    }
+
+    fn save(&mut self) -> Result<(), Fault> {
+        if self.saved.len() >= 1 << 16 {
+            return Err("attributes nested deeper than 65536".to_owned().into());
+        }
+        self.saved.push(self.attributes.clone());
+        Ok(())
+    }
+
+    fn transform(&mut self, directive: &str, tokens: &mut Tokens<'_>) -> Result<(), Fault> {
+        let place = &mut self.attributes.place;
+        match directive {
+            "Identity" => *place = DAffine3::IDENTITY,
+            "Translate" => *place *= DAffine3::from_translation(DVec3::from_array(numbers(directive, tokens)?)),
+            "Scale" => *place *= DAffine3::from_scale(DVec3::from_array(numbers(directive, tokens)?)),
+            "Rotate" => {
+                let [degrees, x, y, z] = numbers(directive, tokens)?;
+                let axis = DVec3::new(x, y, z).try_normalize().ok_or("Rotate: an axis without length".to_owned())?;
+                *place *= DAffine3::from_axis_angle(axis, degrees.to_radians());
+            }
+            "LookAt" => {
+                let n: [f64; 9] = numbers(directive, tokens)?;
+                *place *= look_at(n).ok_or("LookAt: eye, aim and up don't span a view".to_owned())?;
+            }
+            _ => {
+                let is_open = tokens.peek()? == Some(Token::Open);
+                if is_open {
+                    tokens.next()?;
+                }
+                let m = DMat4::from_cols_array(&numbers(directive, tokens)?);
+                if is_open && tokens.next()?.map(|(token, _)| token) != Some(Token::Close) {
+                    return Err(format!("{directive}: expected 16 numbers in brackets").into());
+                }
+                let row = m.row(3);
+                if row.truncate() != DVec3::ZERO || row.w == 0.0 {
+                    return Err(format!("{directive}: its last row is {row}, expected 0, 0, 0, 1").into());
+                }
+                let affine = DAffine3::from_mat4(m * (1.0 / row.w));
+                *place = if directive == "Transform" { affine } else { *place * affine };
+            }
+        }
+        Ok(())
+    }
+
+    /// The transform of what stands here, once it is sure that it can be undone.
+    fn checked_place(&self) -> Result<DAffine3, Fault> {
+        let place = self.attributes.place;
+        let determinant = place.matrix3.determinant();
+        if place.is_finite() && determinant.is_normal() && place.inverse().is_finite() {
+            Ok(place)
+        } else {
+            Err("the current transform flattens what it moves".to_owned().into())
+        }
+    }
+
+    /// Metres from the units of an object that stands here.
+    fn place_m(&self) -> Result<DAffine3, Fault> {
+        Ok(DAffine3::from_scale(DVec3::splat(self.metres_per_unit)) * self.checked_place()?)
+    }
+}
+
+fn no_begin(directive: &str) -> String {
+    format!("{directive} without its beginning")
+}
+
+/// Returns the camera-from-world transform of pbrt's `LookAt`: +z from the eye to the aim, +y as near to up as can be.
+fn look_at(n: [f64; 9]) -> Option<DAffine3> {
+    let [eye, aim, up] = [0, 3, 6].map(|i| DVec3::new(n[i], n[i + 1], n[i + 2]));
+    let z = (aim - eye).try_normalize()?;
+    // Left-handed: x to the right as seen along z with y up.
+    let x = up.try_normalize()?.cross(z).try_normalize()?;
+    let world_from_camera = DAffine3::from_cols(x, z.cross(x), z, eye);
+    Some(world_from_camera.inverse())
+}
+
+fn text<'a>(directive: &str, tokens: &mut Tokens<'a>) -> Result<&'a str, String> {
+    match tokens.next()? {
+        Some((Token::Text(text), _)) => Ok(text),
+        other => Err(format!("{directive}: expected a name in quotes, found {:?}", other.map(|(token, _)| token))),
+    }
+}
+
+fn numbers<const N: usize>(directive: &str, tokens: &mut Tokens<'_>) -> Result<[f64; N], String> {
+    let mut numbers = [0.0; N];
+    for number in &mut numbers {
+        match tokens.next()? {
+            Some((Token::Number(value), _)) => *number = value,
+            other => {
+                let found = other.map(|(token, _)| token);
+                return Err(format!("{directive}: expected {N} numbers, found {found:?}"));
+            }
+        }
+    }
+    Ok(numbers)
+}

@@ -1,0 +1,110 @@
+//! Shapes of pbrt files.
+
+use glam::{DAffine3, DVec3, Vec2, Vec3};
+
+use super::{Fault, Reader, params::Params};
+use crate::{GroupId, Material, Shape, TriangleMesh, read_ply};
+
+impl Reader<'_> {
+    pub(super) fn shape(&mut self, kind: &str, params: &Params<'_>) -> Result<(), Fault> {
+        let mut place = self.place_m()?;
+        let number = |name: &str, default: f64| params.number(name).unwrap_or(default);
+        let shape = match kind {
+            "trianglemesh" => Shape::Mesh(triangles(params)?),
+            "loopsubdiv" => {
+                self.builder.note("Shape \"loopsubdiv\": its control mesh, not smoothed");
+                params.find_any(&["nlevels", "levels"]);
+                Shape::Mesh(triangles(params)?)
+            }
+            "bilinearmesh" => {
+                self.builder.note("Shape \"bilinearmesh\": two triangles a patch");
+                Shape::Mesh(patches(params)?)
+            }
+            "plymesh" => {
+                let file = params.text("filename").ok_or("a plymesh without filename".to_owned())?;
+                match self.find_file(file) {
+                    Some(path) => Shape::Mesh(read_ply(&path)?),
+                    None => {
+                        self.builder.note(format!("Shape \"plymesh\": no file '{file}', left out"));
+                        return Ok(());
+                    }
+                }
+            }
+            "sphere" => Shape::Sphere { radius_m: number("radius", 1.0) },
+            "disk" => {
+                place *= DAffine3::from_translation(DVec3::Z * number("height", 0.0));
+                Shape::Disc { radius_m: number("radius", 1.0), inner_radius_m: number("innerradius", 0.0) }
+            }
+            "cylinder" => Shape::Cylinder {
+                radius_m: number("radius", 1.0),
+                z_min_m: number("zmin", -1.0),
+                z_max_m: number("zmax", 1.0),
+            },
+            _ => {
+                self.builder.note(format!("Shape \"{kind}\": not supported, left out"));
+                return Ok(());
+            }
+        };
+        shape.check().map_err(|e| e.to_string())?;
+        let glow = self.attributes.glow.clone();
+        let mut material = self.attributes.material;
+        if params.number("alpha") == Some(0.0) {
+            material = self.builder.add_material("open", Material::Open);
+        }
+        let group = self.object.unwrap_or(GroupId::ROOT);
+        let id = self.builder.add_shape_to(group, shape, place, material, glow);
+        if self.attributes.is_reversed {
+            self.builder.reverse(id);
+        }
+        Ok(())
+    }
+}
+
+/// The vertices of a mesh and the indices of its faces of `N` corners.
+fn mesh<const N: usize>(params: &Params<'_>) -> Result<(TriangleMesh, Vec<[u32; N]>), Fault> {
+    let threes = |name: &str| -> Result<Vec<Vec3>, Fault> {
+        let numbers = params.numbers(name).unwrap_or(&[]);
+        if !numbers.len().is_multiple_of(3) {
+            return Err(format!("{} numbers in '{name}': expected three a vertex", numbers.len()).into());
+        }
+        Ok(numbers.chunks_exact(3).map(|n| DVec3::from_slice(n).as_vec3()).collect())
+    };
+    let positions = threes("P")?;
+    let normals = threes("N")?;
+    let uvs = params.find_any(&["uv", "st"]).map_or(&[][..], |param| param.numbers.as_slice());
+    let uvs: Vec<Vec2> = uvs.chunks_exact(2).map(|n| Vec2::new(n[0] as f32, n[1] as f32)).collect();
+    let whole: Vec<f64> = (0..N).map(|i| i as f64).collect();
+    let indices = match params.numbers("indices") {
+        Some(indices) => indices,
+        None if positions.len() == N => &whole,
+        None => return Err("a mesh without indices".to_owned().into()),
+    };
+    if !indices.len().is_multiple_of(N) {
+        return Err(format!("{} indices: expected {N} a face", indices.len()).into());
+    }
+    let index = |n: f64| {
+        let is_sound = n >= 0.0 && n.fract() == 0.0 && n < positions.len() as f64;
+        if is_sound { Ok(n as u32) } else { Err(format!("the index {n} in a mesh of {} vertices", positions.len())) }
+    };
+    let mut faces = Vec::with_capacity(indices.len() / N);
+    for face in indices.chunks_exact(N) {
+        let mut corners = [0; N];
+        for (corner, n) in corners.iter_mut().zip(face) {
+            *corner = index(*n)?;
+        }
+        faces.push(corners);
+    }
+    Ok((TriangleMesh { positions, normals, uvs, triangles: Vec::new() }, faces))
+}
+
+fn triangles(params: &Params<'_>) -> Result<TriangleMesh, Fault> {
+    let (mesh, triangles) = mesh::<3>(params)?;
+    Ok(TriangleMesh { triangles, ..mesh })
+}
+
+/// Patches have their corners row by row: (0, 0), (1, 0), (0, 1), (1, 1).
+fn patches(params: &Params<'_>) -> Result<TriangleMesh, Fault> {
+    let (mesh, patches) = mesh::<4>(params)?;
+    let triangles = patches.iter().flat_map(|&[a, b, c, d]| [[a, b, d], [a, d, c]]).collect();
+    Ok(TriangleMesh { triangles, ..mesh })
+}

@@ -1,0 +1,52 @@
+//! Three-dimensional spectral worlds: geometry, materials, lights and their files.
+//!
+//! A [`World`] answers what a renderer asks: where a ray meets a surface ([`World::intersect`]), how that surface
+//! scatters light ([`World::bsdf`]) and glows ([`World::emission`]), which light falls on a point
+//! ([`World::sample_light`]) and what comes from beyond all surfaces ([`World::sky`]). Lengths are metres, wavelengths
+//! nanometres, radiance W m⁻² sr⁻¹ nm⁻¹. Rays and hits are in f32, placed exactly on their surfaces and left by more
+//! than their rounding error; transforms and shapes in closed form are computed in f64.
+//!
+//! This crate knows nothing of cameras' optics, of integrators or of films: [`WorldCamera`] is what a file says.
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+mod bsdf;
+mod camera;
+mod curve;
+mod error;
+mod formats;
+mod fresnel;
+mod group;
+mod image_texture;
+mod light;
+mod material;
+mod mesh;
+mod metals;
+mod microfacet;
+mod ray;
+mod sampling;
+mod shape;
+mod sky;
+mod texture;
+mod triangle;
+mod upsample;
+mod world;
+
+pub use bsdf::{Bsdf, BsdfSample};
+pub use camera::{CameraKind, WorldCamera};
+pub use curve::{Beyond, SpectralCurve};
+pub use error::WorldError;
+pub use formats::{ReadOptions, read_obj, read_ply, read_world};
+pub use glam;
+pub use image_texture::{Encoding, ImageTexture, Wrap};
+pub use light::{Emission, Flux, Light, LightSample};
+pub use material::{Material, Relief, Roughness};
+pub use mesh::TriangleMesh;
+pub use metals::MetalKind;
+pub use ray::{Hit, Ray};
+pub use shape::Shape;
+pub use sky::{SkyImage, SkyMapping};
+pub use texture::{Texture, UvMapping};
+pub use world::{GroupId, InstanceId, LightId, MaterialId, ShapeId, TextureId, World, WorldBuilder};

@@ -1,0 +1,261 @@
+//! World files: what becomes of their words, that all real ones load, and that no malformed one does harm.
+
+use std::path::{Path, PathBuf};
+
+use dioptric_spectrum::Cancel;
+use dioptric_world::{
+    CameraKind, Ray, ReadOptions, World, WorldError,
+    glam::{DVec3, Vec3},
+    read_world,
+};
+use proptest::prelude::*;
+
+fn read(path: &Path) -> Result<World, WorldError> {
+    read_world(path, &ReadOptions::default(), &Cancel::new())
+}
+
+fn read_text(text: &str) -> Result<World, WorldError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("world.pbrt");
+    std::fs::write(&path, text).unwrap();
+    read(&path)
+}
+
+fn hit(world: &World, origin: [f32; 3], direction: [f32; 3]) -> Option<dioptric_world::Hit> {
+    let ray = Ray { origin: Vec3::from_array(origin), direction: Vec3::from_array(direction).normalize() };
+    world.intersect(&ray, f32::INFINITY)
+}
+
+const SMALL: &str = r#"
+# A small world of most words.
+LookAt 0 1 -5  0 0 0  0 1 0
+Camera "perspective" "float fov" [40] "float lensradius" 0.02 "float focaldistance" [5]
+Film "rgb" "integer xresolution" [300] "integer yresolution" [200] "string filename" "x.exr"
+Sampler "halton" "integer pixelsamples" 16
+Integrator "volpath"
+WorldBegin
+LightSource "distant" "rgb L" [ 2 2 2 ] "point3 from" [ 0 1 0 ] "point3 to" [ 0 0 0 ]
+LightSource "point" "spectrum I" [ 400 1 700 1 ] "float scale" 5
+MakeNamedMaterial "shiny" "string type" "conductor" "spectrum eta" "metal-Au-eta" "spectrum k" "metal-Au-k" "float roughness" 0.1
+Texture "board" "spectrum" "checkerboard" "float uscale" 8 "float vscale" 8 "rgb tex1" [ .8 .1 .1 ]
+AttributeBegin
+  Translate 0 -1 0
+  Material "diffuse" "texture reflectance" "board"
+  Shape "trianglemesh" "integer indices" [ 0 1 2 0 2 3 ]
+    "point3 P" [ -5 0 -5  -5 0 5  5 0 5  5 0 -5 ] "point2 uv" [ 0 0 0 1 1 1 1 0 ]
+AttributeEnd
+ObjectBegin "ball"
+  NamedMaterial "shiny"
+  Shape "sphere" "float radius" .5
+ObjectEnd
+AttributeBegin
+  Translate 2 0 0
+  ObjectInstance "ball"
+AttributeEnd
+AttributeBegin
+  Scale -1 1 1
+  Translate 2 0 0
+  ObjectInstance "ball"
+AttributeEnd
+AttributeBegin
+  AreaLightSource "diffuse" "blackbody L" [ 3000 ] "float scale" 2
+  Translate 0 3 0
+  Rotate 90 1 0 0
+  Shape "disk" "float radius" .5
+AttributeEnd
+Shape "curve" "float width" 2
+"#;
+
+#[test]
+fn small_world_is_what_it_says() {
+    let world = read_text(SMALL).unwrap();
+    assert_eq!((world.n_lights(), world.n_primitives()), (3, 4));
+    assert!(world.notes().iter().any(|note| note.contains("curve")), "{:?}", world.notes());
+    let floor = hit(&world, [1.0, 0.0, 1.0], [0.0, -1.0, 0.0]).unwrap();
+    assert!((floor.distance_m - 1.0).abs() < 1e-6 && floor.geometric_normal.y.abs() > 0.999);
+    // Fields of 1.25 m: (1, 1) lies in the field (4, 4), which is red; the next one is black.
+    let red = world.bsdf(&floor, Vec3::Y, &[450.0, 650.0]).albedo();
+    assert!(red[1] > 0.6 && red[0] < 0.3, "{red:?}");
+    let black = hit(&world, [1.0, 0.0, 2.0], [0.0, -1.0, 0.0]).unwrap();
+    assert_eq!(world.bsdf(&black, Vec3::Y, &[450.0, 650.0]).albedo(), [0.0; 2]);
+    for x in [2.0, -2.0] {
+        let ball = hit(&world, [x, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap();
+        assert!((ball.distance_m - 4.5).abs() < 1e-5 && ball.geometric_normal.z < -0.99 && ball.instance.is_some());
+        let gold = world.bsdf(&ball, Vec3::NEG_Z, &[450.0, 680.0]).albedo();
+        assert!((gold[0] - 0.385).abs() < 0.03 && gold[1] > 0.94, "{gold:?}");
+    }
+    // The disc was turned to shine down.
+    let lamp = hit(&world, [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]).unwrap();
+    assert!(world.emission(&lamp, Vec3::NEG_Y, &[600.0])[0] > 0.0);
+    assert_eq!(world.emission(&lamp, Vec3::Y, &[600.0]), [0.0]);
+    let camera = &world.cameras()[0];
+    assert_eq!(camera.resolution, (300, 200));
+    assert!(camera.world_from_camera.translation.abs_diff_eq(DVec3::new(0.0, 1.0, -5.0), 1e-12));
+    let forwards = camera.world_from_camera.transform_vector3(DVec3::Z);
+    assert!(forwards.abs_diff_eq(DVec3::new(0.0, -1.0, 5.0).normalize(), 1e-12));
+    assert!(matches!(camera.kind, CameraKind::Perspective { fov_deg: 40.0, lens_radius_m: 0.02, .. }));
+}
+
+/// The same scene in millimetres is the same world, light included.
+#[test]
+fn units_scale_lengths_and_keep_light() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("world.pbrt");
+    std::fs::write(&path, SMALL).unwrap();
+    let small = read_world(&path, &ReadOptions { metres_per_unit: 0.001 }, &Cancel::new()).unwrap();
+    let large = read(&path).unwrap();
+    let ball = hit(&small, [0.002, 0.0, -0.005], [0.0, 0.0, 1.0]).unwrap();
+    assert!((ball.distance_m - 0.0045).abs() < 1e-8);
+    let at =
+        |world: &World, p: Vec3| world.sample_light(p, 0.5, [0.3, 0.4], &[550.0]).map(|s| (s.direction, s.radiance));
+    let (a, b) = (at(&small, Vec3::new(0.0, -1e-3, 0.0)), at(&large, Vec3::NEG_Y));
+    let (Some((da, la)), Some((db, lb))) = (a, b) else { panic!("both are lit: {a:?} {b:?}") };
+    assert!(da.abs_diff_eq(db, 1e-5) && (la[0] / lb[0] - 1.0).abs() < 1e-4, "{la:?} {lb:?}");
+    let camera = &small.cameras()[0];
+    assert!(camera.world_from_camera.translation.abs_diff_eq(DVec3::new(0.0, 0.001, -0.005), 1e-12));
+    assert!(matches!(camera.kind, CameraKind::Perspective { focus_distance_m: 0.005, .. }));
+}
+
+#[test]
+fn explicit_spectra_of_lights_keep_their_mean() {
+    // A light of the third version has the radiance that it names; the fourth scales it to a weighted mean of 1.
+    let text = r#"WorldBegin AreaLightSource "diffuse" "spectrum L" [ 360 3 830 3 ] "float scale" 2 Shape "sphere" "#;
+    let radiance = |text: &str| {
+        let world = read_text(text).unwrap();
+        let ball = hit(&world, [0.0, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap();
+        world.emission(&ball, Vec3::NEG_Z, &[550.0])[0]
+    };
+    assert!((radiance(text) - 2.0).abs() < 1e-5);
+    assert!((radiance(&format!("{text} WorldEnd")) - 6.0).abs() < 1e-5);
+}
+
+#[test]
+fn faults_are_named_with_their_line() {
+    for (text, line, word) in [
+        ("WorldBegin\nShape sphere", 2, "quotes"),
+        ("WorldBegin\nShap \"sphere\"", 2, "Shap"),
+        ("WorldBegin\n\nTranslate 1 2", 3, "3 numbers"),
+        ("WorldBegin\nTranslate 1 2 1e999", 2, "1e999"),
+        ("WorldBegin\nShape \"sphere\" \"float radius\" -1", 2, "radius"),
+        ("WorldBegin\nShape \"trianglemesh\" \"integer indices\" [0 1 9] \"point P\" [0 0 0 1 0 0 0 1 0]", 2, "9"),
+        ("WorldBegin\nAttributeEnd", 2, "AttributeEnd"),
+        ("WorldBegin\nNamedMaterial \"none of these\"", 2, "none of these"),
+        ("WorldBegin\nObjectInstance \"x\"", 2, "'x'"),
+        ("WorldBegin\nScale 0 0 0\nShape \"sphere\"", 3, "flattens"),
+        ("WorldBegin\nMaterial \"matte\" \"texture Kd\" \"gone\"", 2, "gone"),
+        ("LookAt 0 0 0  0 0 0  0 1 0", 1, "LookAt"),
+        ("WorldBegin\nMaterial \"matte\" \"spectrum Kd\" [ 400 1 300 1 ]", 2, "300"),
+        ("WorldBegin\nShape \"sphere", 2, "quoted"),
+    ] {
+        let message = read_text(text).unwrap_err().to_string();
+        let is_named = message.contains("world.pbrt") && message.contains(&format!("line {line}:"));
+        assert!(is_named && message.contains(word), "{text}: {message}");
+    }
+}
+
+#[test]
+fn files_that_include_themselves_end() {
+    let message = read_text("Include \"world.pbrt\"").unwrap_err().to_string();
+    assert!(message.contains("deeper"), "{message}");
+    assert!(read_text("Include \"gone.pbrt\"").unwrap().notes()[0].contains("gone.pbrt"));
+}
+
+#[test]
+fn cancelled_reading_stops() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("world.pbrt");
+    std::fs::write(&path, SMALL).unwrap();
+    let cancel = Cancel::new();
+    cancel.cancel();
+    assert!(matches!(read_world(&path, &ReadOptions::default(), &cancel), Err(WorldError::Cancelled(_))));
+}
+
+#[test]
+fn unknown_kinds_are_refused() {
+    assert!(read(Path::new("world.xyz")).unwrap_err().to_string().contains(".pbrt"));
+    assert!(read(Path::new("gone.pbrt")).unwrap_err().to_string().contains("gone.pbrt"));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// A world with some bytes changed, moved or cut out is a world or one sentence.
+    #[test]
+    fn mutated_worlds_never_panic(
+        edits in prop::collection::vec((0..SMALL.len(), any::<u8>(), 0..4_usize), 1..6),
+        splice in prop::option::of((0..SMALL.len(), 0..SMALL.len(), 0..60_usize)),
+    ) {
+        let mut bytes = SMALL.as_bytes().to_vec();
+        if let Some((from, to, n)) = splice {
+            let piece = bytes[from..(from + n).min(bytes.len())].to_vec();
+            bytes.splice(to..to, piece);
+        }
+        for (at, byte, n_cut) in edits {
+            let at = at.min(bytes.len() - 8);
+            bytes[at] = b' ' + byte % 95;
+            bytes.drain(at + 1..at + 1 + n_cut);
+        }
+        let text = String::from_utf8_lossy(&bytes);
+        if let Err(error) = read_text(&text) {
+            prop_assert!(!error.to_string().contains('\n'));
+        }
+    }
+}
+
+fn shared(place: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(place)
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "reads the shared reference data")]
+fn all_reference_scenes_load() {
+    let folders = ["data/scenes3d", "data/paper/indestructibleObject", "reference/render"];
+    let mut paths: Vec<PathBuf> = folders.iter().map(|folder| shared(folder)).collect();
+    let mut worlds = 0;
+    while let Some(path) = paths.pop() {
+        if path.is_dir() {
+            paths.extend(path.read_dir().unwrap().map(|entry| entry.unwrap().path()));
+            continue;
+        }
+        let kind = path.extension().map(|e| e.to_string_lossy().into_owned());
+        if !matches!(kind.as_deref(), Some("pbrt" | "ply" | "obj" | "gltf" | "glb")) {
+            continue;
+        }
+        // Parts of files that are included by others name materials that aren't theirs.
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if name.ends_with("_geometry.pbrt") || name == "default-geom.pbrt" {
+            continue;
+        }
+        let world = read(&path).unwrap_or_else(|error| panic!("{error}"));
+        println!(
+            "{}: {} primitives, {} lights, notes {:?}",
+            path.display(),
+            world.n_primitives(),
+            world.n_lights(),
+            world.notes()
+        );
+        worlds += 1;
+    }
+    assert!(worlds > 20, "{worlds}");
+}
+
+/// The paper's Figure 4: its object is met where its camera looks, and its materials have their textures.
+#[test]
+#[cfg_attr(not(has_shared), ignore = "reads the shared reference data")]
+fn figure_4_is_seen_by_its_camera() {
+    let path = shared("data/paper/indestructibleObject/mainDefocused.pbrt");
+    let world = read_world(&path, &ReadOptions { metres_per_unit: 0.001 }, &Cancel::new()).unwrap();
+    let camera = &world.cameras()[0];
+    let CameraKind::Lens { focal_length_mm, film_distance_mm, film_diagonal_mm, .. } = camera.kind else {
+        panic!("{camera:?}")
+    };
+    assert_eq!((focal_length_mm, film_distance_mm, film_diagonal_mm), (Some(50.0), Some(137.0), 70.0));
+    // In focus at 1/f − 1/137 mm: about 79 mm, where FIGURES has the object.
+    let origin = camera.world_from_camera.translation.as_vec3();
+    let forwards = camera.world_from_camera.transform_vector3(DVec3::Z).normalize().as_vec3();
+    let seen = world.intersect(&Ray { origin, direction: forwards }, f32::INFINITY).expect("the object is ahead");
+    assert!((0.05..0.12).contains(&seen.distance_m), "{}", seen.distance_m);
+    let missing: Vec<_> = world.notes().iter().filter(|note| note.contains("brickDiffuse")).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+    assert!(world.notes().iter().any(|note| note.contains("rockDiffuse.tga")), "{:?}", world.notes());
+}
