@@ -97,7 +97,7 @@ impl Shot {
             film_mm: self.film_mm,
             depth_range_m: self.scene.require_depth()?.range_m(),
             grid: self.grid(),
-            diffraction: self.camera.diffraction.into(),
+            diffraction: self.camera.diffraction,
         };
         let pitch_um = self.film.pitch_um;
         self.camera.bank.build(&self.lens, domain.settings()?, pitch_um, &|_| {}, &Cancel::new())

@@ -51,10 +51,13 @@ mod surface_table;
 mod svg_png;
 mod trace_table;
 
+pub use dioptric_optics::MissingGlass;
+pub use dioptric_psf::Diffraction;
+
 pub use bank_choice::{BankChoice, BankData};
 pub use camera::{
-    BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, ProcessingChoice, SensorChoice,
-    StopChoice, WavelengthChoice, WhiteChoice,
+    BlurChoice, Camera, FilmChoice, FocusChoice, LensChoice, ProcessingChoice, SensorChoice, StopChoice,
+    WavelengthChoice, WhiteChoice,
 };
 pub use capture::{Capture, IrradianceSummary};
 pub use convert::{ConvertedLens, convert_lens};
@@ -66,7 +69,7 @@ pub use lens_analysis::{
     AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, FanRow, FieldPlace, FieldRow, FocusData, GridRow,
     LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,
 };
-pub use lens_choice::{LensReading, MissingGlassChoice, REFERENCE_WAVELENGTH_NM};
+pub use lens_choice::{LensReading, REFERENCE_WAVELENGTH_NM};
 pub use lens_drawing::LensDrawing;
 pub use lens_table::{ImageData, LensData, LensQuestion, LensRow, PlaneData, built_in_lenses};
 pub use lens_use::LensUse;

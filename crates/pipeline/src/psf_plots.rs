@@ -251,7 +251,7 @@ mod tests {
     use dioptric_optics::Lens;
 
     use super::*;
-    use crate::{DiffractionChoice, FocusChoice, PsfRequest, PsfSampling};
+    use crate::{Diffraction, FocusChoice, PsfRequest, PsfSampling};
 
     fn request() -> PsfRequest {
         PsfRequest {
@@ -260,7 +260,7 @@ mod tests {
             distances_mm: vec![8000.0],
             wavelengths_nm: vec![450.0, 600.0],
             focus: FocusChoice::FilmMm(51.8145),
-            diffraction: DiffractionChoice::Hurb { gamma: 1.0 },
+            diffraction: Diffraction::Hurb { gamma: 1.0 },
             pixel_um: 4.0,
             size: None,
             sampling: PsfSampling::Pupil,
@@ -329,7 +329,7 @@ mod tests {
             fields_deg: vec![0.0, 1.0, 2.0],
             distances_mm: vec![4000.0, 8000.0],
             wavelengths_nm: vec![450.0, 550.0, 650.0],
-            diffraction: DiffractionChoice::None,
+            diffraction: Diffraction::None,
             ..request()
         };
         let set = request.compute(&lens).unwrap();

@@ -10,7 +10,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    BankData, DiffractionChoice, FocusChoice, PipelineError, PsfRequest, PsfRow, PsfSampling,
+    BankData, Diffraction, FocusChoice, PipelineError, PsfRequest, PsfRow, PsfSampling,
     display::png_bytes,
     psf_request::{Item, LARGEST},
     psf_row::{PointName, place_and_size},
@@ -84,7 +84,7 @@ impl PsfRequest {
             }
             (PsfSampling::Pupil, None) => unreachable!("a bank is built for this sampling"),
             (PsfSampling::Paper { n_across }, _) => {
-                let paper = PaperRays { n_across, bending: self.diffraction.model(), seed: self.seed };
+                let paper = PaperRays { n_across, bending: self.diffraction.hurb(), seed: self.seed };
                 let spot = Spot::over_front(&mono, &point, film_mm, &paper);
                 let picture = self.counted(&spot);
                 (spot, picture, None)
@@ -117,7 +117,7 @@ impl PsfRequest {
     fn measure(&self, item: &Item, spot: &Spot, picture: &Array2<f32>) -> PsfRow {
         let measured = Picture::new(picture.view(), self.pixel_um);
         let (place_mm, mut second) = place_and_size(spot.moments());
-        let is_of_rays = self.sampling == PsfSampling::Pupil && self.diffraction == DiffractionChoice::None;
+        let is_of_rays = self.sampling == PsfSampling::Pupil && self.diffraction == Diffraction::None;
         if !is_of_rays && place_mm.is_finite() {
             second = measured.second_moments_um2();
         }
@@ -229,7 +229,7 @@ mod tests {
             distances_mm: vec![8000.0],
             wavelengths_nm: vec![450.0, 650.0],
             focus: FocusChoice::FilmMm(51.8145),
-            diffraction: DiffractionChoice::None,
+            diffraction: Diffraction::None,
             pixel_um: 2.0,
             size: None,
             sampling: PsfSampling::Pupil,
@@ -282,7 +282,7 @@ mod tests {
             distances_mm: vec![2000.0, 300.0],
             wavelengths_nm: vec![550.0],
             focus: FocusChoice::DistanceMm(2000.0),
-            diffraction: DiffractionChoice::Wave,
+            diffraction: Diffraction::Wave,
             ..request()
         };
         let set = wave.compute(&Lens::built_in("dgauss-50mm").unwrap().with_f_number(8.0, 550.0).unwrap()).unwrap();
@@ -346,7 +346,7 @@ mod tests {
             distances_mm: vec![f64::INFINITY],
             wavelengths_nm: vec![10e3],
             focus: FocusChoice::DistanceMm(f64::INFINITY),
-            diffraction: DiffractionChoice::Wave,
+            diffraction: Diffraction::Wave,
             pixel_um: 10.0,
             ..request()
         };
