@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
-    BankChoice, BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, FrameFile, FramesChoice, KeptCamera,
+    BankChoice, BlurChoice, Camera, Diffraction, FilmChoice, FocusChoice, FrameFile, FramesChoice, KeptCamera,
     LensChoice, LensReading, Progress, Quality, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice,
     WhiteChoice, parse_illuminant, parse_numbers, with_exposure_s,
 };
@@ -168,21 +168,21 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
 }
 
 /// Returns bent rays with another strength, where one is asked for.
-pub(crate) fn with_gamma(choice: DiffractionChoice, gamma: Option<f64>) -> anyhow::Result<DiffractionChoice> {
+pub(crate) fn with_gamma(choice: Diffraction, gamma: Option<f64>) -> anyhow::Result<Diffraction> {
     match (choice, gamma) {
         (_, None) => Ok(choice),
-        (DiffractionChoice::Hurb { .. }, Some(gamma)) => Ok(DiffractionChoice::Hurb { gamma }),
+        (Diffraction::Hurb { .. }, Some(gamma)) => Ok(Diffraction::Hurb { gamma }),
         (_, Some(_)) => bail!("--gamma is the strength of bent rays, expected with --diffraction hurb"),
     }
 }
 
-pub(crate) fn diffraction(kind: DiffractionKind) -> DiffractionChoice {
+pub(crate) fn diffraction(kind: DiffractionKind) -> Diffraction {
     match kind {
-        DiffractionKind::None => DiffractionChoice::None,
-        DiffractionKind::Hurb => DiffractionChoice::Hurb { gamma: 1.0 },
-        DiffractionKind::HurbScene3d => DiffractionChoice::Hurb { gamma: std::f64::consts::SQRT_2 },
-        DiffractionKind::HurbCalibrated => DiffractionChoice::HurbCalibrated,
-        DiffractionKind::Wave => DiffractionChoice::Wave,
+        DiffractionKind::None => Diffraction::None,
+        DiffractionKind::Hurb => Diffraction::Hurb { gamma: 1.0 },
+        DiffractionKind::HurbScene3d => Diffraction::Hurb { gamma: std::f64::consts::SQRT_2 },
+        DiffractionKind::HurbCalibrated => Diffraction::HurbCalibrated,
+        DiffractionKind::Wave => Diffraction::Wave,
     }
 }
 

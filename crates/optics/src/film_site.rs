@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::{ImageSurface, MonoLens};
+use crate::MonoLens;
 
 /// A place on the film, in the lens frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,14 +11,6 @@ pub struct FilmSite {
     pub point_mm: DVec3,
     /// The unit normal of the film there, along the light.
     pub normal: DVec3,
-}
-
-impl ImageSurface {
-    /// Returns how far behind its vertex plane the film lies over a place of that plane, mm; NaN where it does not reach.
-    pub fn sag_at_mm(&self, place_mm: DVec2) -> f64 {
-        let (c, r2) = (self.curvature_per_mm, place_mm.length_squared());
-        c * r2 / (1.0 + (1.0 - (1.0 + self.conic) * c * c * r2).sqrt())
-    }
 }
 
 impl MonoLens {

@@ -20,10 +20,13 @@ mod sense;
 mod staged;
 mod stages;
 
+pub use dioptric_optics::MissingGlass;
+pub use dioptric_psf::Diffraction;
+
 pub use camera::{
-    BankChoice, BankData, BlurChoice, Camera, DiffractionChoice, Exposed, FilmChoice, FocusChoice, FramesChoice,
-    LensChoice, LensReading, MissingGlassChoice, Movements, ProcessingChoice, REFERENCE_WAVELENGTH_NM, SceneChoice,
-    SceneSource, SensorChoice, StopChoice, WavelengthChoice, WhiteChoice, nearest_to_reference_nm,
+    BankChoice, BankData, BlurChoice, Camera, Exposed, FilmChoice, FocusChoice, FramesChoice, LensChoice, LensReading,
+    Movements, ProcessingChoice, REFERENCE_WAVELENGTH_NM, SceneChoice, SceneSource, SensorChoice, StopChoice,
+    WavelengthChoice, WhiteChoice, nearest_to_reference_nm,
 };
 pub use error::PipelineError;
 pub use frame_files::{FrameFile, Frames, Outputs, write_frames};

@@ -1,8 +1,8 @@
 //! A camera that is kept and changed computes what the change touches, and no more.
 
 use dioptric_pipeline::{
-    BlurChoice, Camera, Capture, DiffractionChoice, FilmChoice, FocusChoice, KeptCamera, Quality, SceneSource,
-    SensorChoice, Silent, StageCounts, StopChoice, WavelengthChoice, WhiteChoice, with_exposure_s,
+    BlurChoice, Camera, Capture, Diffraction, FilmChoice, FocusChoice, KeptCamera, Quality, SceneSource, SensorChoice,
+    Silent, StageCounts, StopChoice, WavelengthChoice, WhiteChoice, with_exposure_s,
 };
 use dioptric_spectrum::{Bands, Cancel};
 
@@ -81,7 +81,7 @@ fn sensor_starts_at_the_electrons() {
 #[test]
 fn focus_diffraction_and_blur_start_at_film_bank_and_plan() {
     check(|camera| camera.focus = FocusChoice::DistanceMm(2000.0), [0, 0, 1, 1, 1, 1, 1, 1, 1]);
-    check(|camera| camera.diffraction = DiffractionChoice::None, [0, 0, 0, 1, 1, 1, 1, 1, 1]);
+    check(|camera| camera.diffraction = Diffraction::None, [0, 0, 0, 1, 1, 1, 1, 1, 1]);
     check(|camera| camera.blur = BlurChoice::Pointwise, [0, 0, 0, 0, 1, 1, 1, 1, 1]);
 }
 

@@ -83,7 +83,7 @@ impl RotationalBank {
 
     fn layout<'a>(&self, record: &'a Record, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
         let turn = query.field_tan.try_normalize().unwrap_or(DVec2::X);
-        let bending = self.settings().diffraction.model().map(|model| {
+        let bending = self.settings().diffraction.hurb().map(|model| {
             let index = self.stop_index(query.wavelength_nm);
             Bending { model, edge: Edge::new(self.reference().stop_semi_aperture_mm(), query.wavelength_nm, index) }
         });

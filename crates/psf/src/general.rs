@@ -162,7 +162,7 @@ impl GeneralBank {
 
     fn layout<'a>(&self, record: &'a Record, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
         let wavelength_nm = self.within_colors(query.wavelength_nm);
-        let bending = self.settings.diffraction.model().map(|model| {
+        let bending = self.settings.diffraction.hurb().map(|model| {
             let colors = self.colors.stencil(self.dispersion.coordinate(wavelength_nm));
             let index = colors.iter().map(|(i, weight)| weight * self.stop_indices[i]).sum();
             Bending { model, edge: Edge::new(self.reference.stop_semi_aperture_mm(), wavelength_nm, index) }

@@ -12,20 +12,42 @@ use crate::{PsfError, axis::Axis};
 pub enum Diffraction {
     /// Not at all: geometric optics.
     None,
-    /// Uncertainty bending at the stop with a factor γ: 1 as in the paper, √2 as in later versions of its code.
+    /// Heisenberg uncertainty ray bending (HURB) at the stop.
     Hurb {
-        /// The factor.
+        /// The factor γ, above 0: 1 as in the paper and in Freniere's, √2 in `Scene3D` since 2015.
         gamma: f64,
     },
-    /// Uncertainty bending with constants calibrated to Airy's pattern: better in focus, not in defocus.
+    /// HURB with constants fitted to Airy's pattern: better in focus, not in defocus.
     HurbCalibrated,
-    /// Wave optics while the blur is small enough for it, uncertainty bending (γ = 1) beyond, blended over an octave:
+    /// The diffraction integral while the blur is small enough for it, HURB (γ = 1) beyond, blended over an octave:
     /// see [`LensImageModel::wave_fraction`](crate::LensImageModel::wave_fraction).
     Wave,
 }
 
+impl Default for Diffraction {
+    /// HURB as in the paper.
+    fn default() -> Self {
+        Self::Hurb { gamma: 1.0 }
+    }
+}
+
 impl Diffraction {
-    pub(crate) fn model(self) -> Option<Hurb> {
+    /// Checks that γ is a finite number above 0.
+    ///
+    /// # Errors
+    /// When it is not.
+    pub fn check(self) -> Result<(), PsfError> {
+        match self {
+            Self::Hurb { gamma } if !(gamma.is_finite() && gamma > 0.0) => {
+                Err(PsfError::Setting { key: "gamma", found: gamma, expected: "a finite number above 0" })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the constants of HURB, or `None` without diffraction; with waves, those of what takes their place where the
+    /// blur is large.
+    pub fn hurb(self) -> Option<Hurb> {
         match self {
             Self::None => None,
             Self::Hurb { gamma } => Some(Hurb::with_gamma(gamma)),
@@ -275,10 +297,7 @@ impl BankSettings {
         setting("film_mm", self.film_mm, "a finite number", self.film_mm.is_finite())?;
         setting("n_rings", self.n_rings as f64, "2 or more", self.n_rings >= 2)?;
         setting("n_azimuths", self.n_azimuths as f64, "8 or more", self.n_azimuths >= 8)?;
-        if let Diffraction::Hurb { gamma } = self.diffraction {
-            setting("gamma", gamma, "a finite number above 0", gamma.is_finite() && gamma > 0.0)?;
-        }
-        Ok(())
+        self.diffraction.check()
     }
 }
 
@@ -332,5 +351,38 @@ mod tests {
         assert_eq!(ends(&coarse.wavelengths_nm), ends(&fine.wavelengths_nm));
         assert!(coarse.check().is_ok());
         assert_eq!(coarse.coarse(), coarse);
+    }
+
+    /// The words of camera files.
+    #[test]
+    fn diffraction_has_its_words() {
+        for (text, diffraction) in [
+            ("None", Diffraction::None),
+            ("Hurb(gamma:1.5)", Diffraction::Hurb { gamma: 1.5 }),
+            ("HurbCalibrated", Diffraction::HurbCalibrated),
+            ("Wave", Diffraction::Wave),
+        ] {
+            assert_eq!(ron::from_str::<Diffraction>(text).unwrap(), diffraction);
+            let written = ron::to_string(&diffraction).unwrap();
+            assert_eq!(ron::from_str::<Diffraction>(&written).unwrap(), diffraction);
+            assert!(diffraction.check().is_ok());
+        }
+        for gamma in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let message = Diffraction::Hurb { gamma }.check().unwrap_err().to_string();
+            assert!(message.starts_with("gamma is ") && message.ends_with("a finite number above 0"), "{message}");
+        }
+    }
+
+    #[test]
+    fn counts_keep_the_ranges() {
+        let fine = BankSettings::covering(52.0, 0.3, (0.0, 1.0), (400.0, 700.0), Diffraction::None);
+        assert_eq!(fine.with_counts(SampleCounts::STANDARD), fine);
+        let corners = (DVec2::new(-0.3, -0.2), DVec2::new(0.25, 0.2));
+        let grid = BankSettings::covering_grid(52.0, corners, (0.0, 1.0), (400.0, 700.0), Diffraction::None);
+        assert_eq!(grid.with_counts(SampleCounts::STANDARD), grid);
+        let preview = grid.with_counts(SampleCounts::PREVIEW);
+        assert_eq!(preview.n_samples(), 5 * 5 * 4 * 2);
+        assert_eq!(preview.fields.axes().0[0], -0.3);
+        assert!(preview.check().is_ok());
     }
 }

@@ -2,7 +2,7 @@
 
 use dioptric_analysis::{AnalysisFields, AnalysisFilm, AnalysisRequest, PsfRequest, PsfSampling};
 use dioptric_optics::{Glass, Interface, Lens, Shape, Surface};
-use dioptric_pipeline::{DiffractionChoice, FocusChoice};
+use dioptric_pipeline::{Diffraction, FocusChoice};
 use dioptric_report::{AnalysisPlots, psf_mosaic};
 
 fn analysis_request() -> AnalysisRequest {
@@ -64,7 +64,7 @@ fn mosaic_has_a_tile_for_each_picture() {
         distances_mm: vec![4000.0, 8000.0],
         wavelengths_nm: vec![450.0, 550.0, 650.0],
         focus: FocusChoice::FilmMm(51.8145),
-        diffraction: DiffractionChoice::None,
+        diffraction: Diffraction::None,
         pixel_um: 2.0,
         size: None,
         sampling: PsfSampling::Pupil,

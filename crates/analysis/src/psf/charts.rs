@@ -246,7 +246,8 @@ mod tests {
 
     use super::*;
     use crate::{PsfRequest, PsfSampling};
-    use dioptric_pipeline::{DiffractionChoice, FocusChoice};
+    use dioptric_pipeline::FocusChoice;
+    use dioptric_psf::Diffraction;
 
     fn request() -> PsfRequest {
         PsfRequest {
@@ -255,7 +256,7 @@ mod tests {
             distances_mm: vec![8000.0],
             wavelengths_nm: vec![450.0, 600.0],
             focus: FocusChoice::FilmMm(51.8145),
-            diffraction: DiffractionChoice::Hurb { gamma: 1.0 },
+            diffraction: Diffraction::Hurb { gamma: 1.0 },
             pixel_um: 4.0,
             size: None,
             sampling: PsfSampling::Pupil,
@@ -327,7 +328,7 @@ mod tests {
             fields_deg: vec![0.0, 1.0, 2.0],
             distances_mm: vec![4000.0, 8000.0],
             wavelengths_nm: vec![450.0, 550.0, 650.0],
-            diffraction: DiffractionChoice::None,
+            diffraction: Diffraction::None,
             ..request()
         };
         let set = request.compute(&lens).unwrap();

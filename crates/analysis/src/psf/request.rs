@@ -1,11 +1,9 @@
 //! Which point-spread functions to compute, and how.
 
 use dioptric_optics::{Lens, MonoLens, glam::DVec2};
-use dioptric_psf::PsfQuery;
+use dioptric_psf::{Diffraction, PsfError, PsfQuery};
 
-use dioptric_pipeline::{
-    BankChoice, DiffractionChoice, FocusChoice, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm,
-};
+use dioptric_pipeline::{BankChoice, FocusChoice, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 
 /// Wavelengths that are seen.
 const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
@@ -26,7 +24,7 @@ pub struct PsfRequest {
     /// Where the film is; a near object has no meaning here.
     pub focus: FocusChoice,
     /// Diffraction at the stop.
-    pub diffraction: DiffractionChoice,
+    pub diffraction: Diffraction,
     /// Side of a pixel, µm.
     pub pixel_um: f64,
     /// Pixels along the side of a picture; `None` to hold the spot.
@@ -135,10 +133,8 @@ impl PsfRequest {
                 return Err(self.wrong("wavelengths_nm", &wavelength.to_string(), "numbers above 0"));
             }
         }
-        if let DiffractionChoice::Hurb { gamma } = self.diffraction
-            && !(gamma.is_finite() && gamma > 0.0)
-        {
-            return Err(self.wrong("gamma", &gamma.to_string(), "a finite number above 0"));
+        if let Err(PsfError::Setting { key, found, expected }) = self.diffraction.check() {
+            return Err(self.wrong(key, &found.to_string(), expected));
         }
         if !(self.pixel_um.is_finite() && self.pixel_um > 0.0) {
             return Err(self.wrong("pixel_um", &self.pixel_um.to_string(), "a number above 0"));
@@ -153,7 +149,7 @@ impl PsfRequest {
         {
             return Err(self.wrong("rays", &n_across.to_string(), "2 to 20000"));
         }
-        if matches!(self.sampling, PsfSampling::Paper { .. }) && self.diffraction == DiffractionChoice::Wave {
+        if matches!(self.sampling, PsfSampling::Paper { .. }) && self.diffraction == Diffraction::Wave {
             return Err(self.wrong("diffraction", "wave", "bent rays or none in the paper mode"));
         }
         if let Some(BankChoice::Within { error }) = self.bank

@@ -63,7 +63,7 @@ impl PsfRequest {
             wavelengths_nm: sorted(items.iter().map(|item| item.wavelength_nm)),
             n_rings: RINGS,
             n_azimuths: AZIMUTHS,
-            diffraction: self.diffraction.into(),
+            diffraction: self.diffraction,
             interpolation: Interpolation::Rays,
         }
     }

@@ -13,7 +13,8 @@ use super::request::{Item, LARGEST};
 use super::row::{PointName, place_and_size};
 use super::spot::{PaperRays, Spot};
 use crate::{PsfRequest, PsfRow, PsfSampling};
-use dioptric_pipeline::{BankData, DiffractionChoice, FocusChoice, PipelineError};
+use dioptric_pipeline::{BankData, FocusChoice, PipelineError};
+use dioptric_psf::Diffraction;
 
 /// Point-spread functions with their pictures.
 #[derive(Clone, Debug)]
@@ -82,7 +83,7 @@ impl PsfRequest {
             }
             (PsfSampling::Pupil, None) => unreachable!("a bank is built for this sampling"),
             (PsfSampling::Paper { n_across }, _) => {
-                let paper = PaperRays { n_across, bending: self.diffraction.model(), seed: self.seed };
+                let paper = PaperRays { n_across, bending: self.diffraction.hurb(), seed: self.seed };
                 let spot = Spot::over_front(&mono, &point, film_mm, &paper);
                 let picture = self.counted(&spot);
                 (spot, picture, None)
@@ -115,7 +116,7 @@ impl PsfRequest {
     fn measure(&self, item: &Item, spot: &Spot, picture: &Array2<f32>) -> PsfRow {
         let measured = Picture::new(picture.view(), self.pixel_um);
         let (place_mm, mut second) = place_and_size(spot.moments());
-        let is_of_rays = self.sampling == PsfSampling::Pupil && self.diffraction == DiffractionChoice::None;
+        let is_of_rays = self.sampling == PsfSampling::Pupil && self.diffraction == Diffraction::None;
         if !is_of_rays && place_mm.is_finite() {
             second = measured.second_moments_um2();
         }
@@ -210,7 +211,7 @@ mod tests {
             distances_mm: vec![8000.0],
             wavelengths_nm: vec![450.0, 650.0],
             focus: FocusChoice::FilmMm(51.8145),
-            diffraction: DiffractionChoice::None,
+            diffraction: Diffraction::None,
             pixel_um: 2.0,
             size: None,
             sampling: PsfSampling::Pupil,
@@ -263,7 +264,7 @@ mod tests {
             distances_mm: vec![2000.0, 300.0],
             wavelengths_nm: vec![550.0],
             focus: FocusChoice::DistanceMm(2000.0),
-            diffraction: DiffractionChoice::Wave,
+            diffraction: Diffraction::Wave,
             ..request()
         };
         let set = wave.compute(&Lens::built_in("dgauss-50mm").unwrap().with_f_number(8.0, 550.0).unwrap()).unwrap();
@@ -327,7 +328,7 @@ mod tests {
             distances_mm: vec![f64::INFINITY],
             wavelengths_nm: vec![10e3],
             focus: FocusChoice::DistanceMm(f64::INFINITY),
-            diffraction: DiffractionChoice::Wave,
+            diffraction: Diffraction::Wave,
             pixel_um: 10.0,
             ..request()
         };

@@ -90,7 +90,7 @@ impl Here<'_> {
                 Ok(self.items.par_iter().map(|item| self.of_picture(item, &source)).collect())
             }
             PsfSampling::Paper { n_across } => {
-                let rays = PaperRays { n_across, bending: self.request.diffraction.model(), seed: self.request.seed };
+                let rays = PaperRays { n_across, bending: self.request.diffraction.hurb(), seed: self.request.seed };
                 self.items.par_iter().map(|item| self.of_rays(item, &rays)).collect()
             }
         }

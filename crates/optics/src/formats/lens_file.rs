@@ -2,6 +2,8 @@
 
 use std::{fs, path::Path};
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
     GlassCatalogue, Lens, OpticsError,
     prescription::{TextError, lens_from_ron},
@@ -71,7 +73,7 @@ pub enum Field {
 }
 
 /// What to do with a glass that no catalogue has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum MissingGlass {
     /// Refuse the file and say which glass is missing.
     #[default]

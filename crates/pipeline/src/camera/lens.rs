@@ -96,34 +96,16 @@ pub struct LensReading {
     /// Glass catalogues (`.agf`, `.yml`) to look in before the built-in one.
     pub glasses: Vec<PathBuf>,
     /// What to do with a glass that no catalogue has.
-    pub missing_glass: MissingGlassChoice,
+    pub missing_glass: MissingGlass,
     /// The change of index a nanometre, about [`REFERENCE_WAVELENGTH_NM`], of the media of which only one index is stated.
     pub slope_per_nm: Option<f64>,
-}
-
-/// What to do with a glass that no catalogue has.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub enum MissingGlassChoice {
-    /// Refuse the lens and say which glass is missing.
-    #[default]
-    Refuse,
-    /// Take the index and Abbe number that the file states for it, if any.
-    FromNdVd,
-    /// Take the built-in glass nearest to them.
-    Nearest,
 }
 
 impl LensReading {
     /// Returns it as what reads the files is told.
     fn options(&self) -> Result<ReadOptions, PipelineError> {
         let catalogues = self.glasses.iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
-        let missing_glass = match self.missing_glass {
-            MissingGlassChoice::Refuse => MissingGlass::Refuse,
-            MissingGlassChoice::FromNdVd => MissingGlass::FromNdVd,
-            MissingGlassChoice::Nearest => MissingGlass::Nearest,
-        };
-        Ok(ReadOptions { catalogues, missing_glass })
+        Ok(ReadOptions { catalogues, missing_glass: self.missing_glass })
     }
 }
 

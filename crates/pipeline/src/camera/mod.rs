@@ -12,6 +12,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use dioptric_psf::{Diffraction, PsfError};
 use dioptric_sensor::{
     AutoExposure, Brightness, ColorCorrection, ColorSpace, Demosaic, ExposureControl, LensShading, Metering,
     Processing, ToneCurve, WhiteBalance,
@@ -58,7 +59,7 @@ pub struct Camera {
     pub film: FilmChoice,
     /// Diffraction at the stop.
     #[serde(default)]
-    pub diffraction: DiffractionChoice,
+    pub diffraction: Diffraction,
     /// How the point-spread functions are sampled.
     #[serde(default)]
     pub bank: BankChoice,
@@ -155,53 +156,6 @@ pub enum FilmChoice {
         /// Distance between pixels, µm.
         pitch_um: f64,
     },
-}
-
-/// What diffraction is computed at the stop.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub enum DiffractionChoice {
-    /// None: rays only.
-    None,
-    /// Heisenberg-uncertainty ray bending.
-    Hurb {
-        /// Strength: 1 is the paper's and Freniere's, √2 that of `Scene3D` since 2015.
-        gamma: f64,
-    },
-    /// Ray bending with constants fitted to Airy's pattern: better in focus, not in defocus.
-    HurbCalibrated,
-    /// The sum of waves while the blur is small enough for it, ray bending (γ = 1) beyond.
-    Wave,
-}
-
-impl Default for DiffractionChoice {
-    /// HURB as in the paper.
-    fn default() -> Self {
-        Self::Hurb { gamma: 1.0 }
-    }
-}
-
-impl DiffractionChoice {
-    /// The random bending of the paper mode.
-    pub fn model(self) -> Option<dioptric_diffraction::Hurb> {
-        match self {
-            Self::None => None,
-            Self::Hurb { gamma } => Some(dioptric_diffraction::Hurb::with_gamma(gamma)),
-            Self::HurbCalibrated => Some(dioptric_diffraction::Hurb::CALIBRATED),
-            Self::Wave => Some(dioptric_diffraction::Hurb::PAPER),
-        }
-    }
-}
-
-impl From<DiffractionChoice> for dioptric_psf::Diffraction {
-    fn from(choice: DiffractionChoice) -> Self {
-        match choice {
-            DiffractionChoice::None => Self::None,
-            DiffractionChoice::Hurb { gamma } => Self::Hurb { gamma },
-            DiffractionChoice::HurbCalibrated => Self::HurbCalibrated,
-            DiffractionChoice::Wave => Self::Wave,
-        }
-    }
 }
 
 /// How the point-spread functions are laid over the scene.
@@ -421,8 +375,8 @@ impl Camera {
             checker.count("rows", rows, 1..=65_536)?;
             checker.positive("pitch_um", pitch_um)?;
         }
-        if let DiffractionChoice::Hurb { gamma } = self.diffraction {
-            checker.positive("gamma", gamma)?;
+        if let Err(PsfError::Setting { key, found, expected }) = self.diffraction.check() {
+            checker.wrong(key, &found.to_string(), expected)?;
         }
         if let BankChoice::Within { error } = self.bank {
             checker.positive("error", error)?;
@@ -506,7 +460,7 @@ mod tests {
     fn what_is_left_out_has_a_default_and_paths_follow_the_file() {
         let camera = parse(SHORT).unwrap();
         assert_eq!((camera.seed, camera.film, camera.blur), (1, FilmChoice::Sensor, BlurChoice::Layered));
-        assert_eq!(camera.diffraction, DiffractionChoice::Hurb { gamma: 1.0 });
+        assert_eq!(camera.diffraction, Diffraction::Hurb { gamma: 1.0 });
         assert_eq!(camera.sensor, SensorChoice::File(PathBuf::from("folder/my/sensor.ron")));
     }
 

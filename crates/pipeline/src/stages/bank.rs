@@ -22,7 +22,7 @@ pub(super) fn build(
         film_mm: place.film_distance_mm,
         depth_range_m,
         grid,
-        diffraction: inputs.diffraction.into(),
+        diffraction: inputs.diffraction,
     };
     let standard = domain.settings()?;
     let progress = |fraction| watch.progress.at(Stage::Lens, fraction);

@@ -14,7 +14,7 @@ use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    BankChoice, BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, FramesChoice, LensChoice, LensReading,
+    BankChoice, BlurChoice, Camera, Diffraction, FilmChoice, FocusChoice, FramesChoice, LensChoice, LensReading,
     Movements, PipelineError, ProcessingChoice, Quality, SceneSource, StopChoice, WavelengthChoice,
 };
 
@@ -89,7 +89,7 @@ pub(crate) enum Raster {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct BankInputs {
     pub(crate) film: FilmInputs,
-    pub(crate) diffraction: DiffractionChoice,
+    pub(crate) diffraction: Diffraction,
     pub(crate) bank: BankChoice,
 }
 

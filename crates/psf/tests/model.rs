@@ -1,0 +1,110 @@
+//! The model of a lens's image as a whole: progress, cancelling, sampling for previews.
+
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::sync::Mutex;
+
+use dioptric_optics::{Lens, Move, glam::DVec2};
+use dioptric_psf::{
+    BankSettings, Diffraction, ErrorPlaces, FieldSampling, LensImage, LensImageModel, PsfError, SampleCounts,
+};
+use dioptric_spectrum::Cancel;
+
+const HURB: Diffraction = Diffraction::Hurb { gamma: 1.0 };
+
+fn double_gauss() -> (Lens, f64) {
+    let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
+    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    (lens, film_mm)
+}
+
+fn along_radius(film_mm: f64) -> BankSettings {
+    BankSettings::covering(film_mm, 0.2, (0.1, 1.2), (420.0, 680.0), HURB)
+}
+
+fn over_grid(film_mm: f64) -> BankSettings {
+    let corners = (DVec2::new(-0.2, -0.15), DVec2::new(0.2, 0.15));
+    BankSettings::covering_grid(film_mm, corners, (0.1, 1.2), (420.0, 680.0), HURB).with_counts(SampleCounts::PREVIEW)
+}
+
+/// Reports ascend to 1 on one thread, step by step.
+#[test]
+fn progress_ascends_to_one() {
+    let (lens, film_mm) = double_gauss();
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    for settings in [along_radius(film_mm).with_counts(SampleCounts::PREVIEW), over_grid(film_mm)] {
+        let heard = Mutex::new(vec![]);
+        let progress = |part: f64| heard.lock().unwrap().push(part);
+        one.install(|| LensImageModel::build_with(&lens, &settings, &progress, &Cancel::new())).unwrap();
+        let heard = heard.into_inner().unwrap();
+        assert!(heard.len() > 30, "{}", heard.len());
+        assert!(heard.windows(2).all(|pair| pair[0] <= pair[1]), "{heard:?}");
+        assert_eq!(heard.last(), Some(&1.0));
+    }
+}
+
+/// After the request each thread ends the one sample that it is at, some milliseconds, and begins no other.
+#[test]
+fn cancelled_build_begins_no_more_samples() {
+    let (lens, film_mm) = double_gauss();
+    for n_threads in [1, 2] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+        for settings in [along_radius(film_mm), over_grid(film_mm)] {
+            let cancel = Cancel::new();
+            let after = Mutex::new(0);
+            let progress = |_: f64| {
+                *after.lock().unwrap() += usize::from(cancel.is_cancelled());
+                cancel.cancel();
+            };
+            let error = pool.install(|| LensImageModel::build_with(&lens, &settings, &progress, &cancel)).unwrap_err();
+            assert!(matches!(error, PsfError::Cancelled(_)), "{error}");
+            assert!(*after.lock().unwrap() < n_threads, "{} samples were begun", after.lock().unwrap());
+        }
+    }
+}
+
+/// Measuring the error, and sampling until it is met, end with a request too.
+#[test]
+fn cancelled_measurement_has_no_result() {
+    let (lens, film_mm) = double_gauss();
+    let settings = along_radius(film_mm).with_counts(SampleCounts::PREVIEW);
+    let model = LensImageModel::build(&lens, &settings).unwrap();
+    let cancel = Cancel::new();
+    cancel.cancel();
+    let error = model.measured_error(&ErrorPlaces::STANDARD, &cancel).unwrap_err();
+    assert!(matches!(error, PsfError::Cancelled(_)), "{error}");
+    let wanted = dioptric_psf::AdaptiveSettings::STANDARD;
+    let error = LensImageModel::build_adaptive(&lens, &settings, &wanted, &|_| {}, &cancel).unwrap_err();
+    assert!(matches!(error, PsfError::Cancelled(_)), "{error}");
+}
+
+/// The figure that the documentation of [`SampleCounts::PREVIEW`] states.
+#[test]
+fn preview_blurs_err_by_few_per_cent() {
+    let (lens, film_mm) = double_gauss();
+    let preview = along_radius(film_mm).with_counts(SampleCounts::PREVIEW);
+    let places = ErrorPlaces { n_places: 24, ..ErrorPlaces::STANDARD };
+    for settings in [preview, over_grid(film_mm)] {
+        let model = LensImageModel::build(&lens, &settings).unwrap();
+        let error = model.measured_error(&places, &Cancel::new()).unwrap();
+        println!("{} samples: {error:?}", settings.n_samples());
+        assert!(error.median < 0.1, "{error:?}");
+    }
+}
+
+/// Single points of a placed lens have pictures, but no scene can be imaged through them.
+#[test]
+fn single_points_see_no_film() {
+    let (lens, film_mm) = double_gauss();
+    let tilt =
+        Move { surfaces: (2, 3), pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg: [0.3, 0.0, 0.0], tilt_first: false };
+    let lens = lens.with_moves(vec![tilt]).unwrap();
+    let fields = FieldSampling::Points { tans_x: vec![0.0, 0.1], tans_y: vec![0.0] };
+    let settings = BankSettings { fields, dioptres: vec![0.5], ..along_radius(film_mm) };
+    let points = LensImageModel::build(&lens, &settings).unwrap();
+    assert!(points.centroid_mm(DVec2::X * 0.1, 0.5, 550.0).is_finite());
+    assert!(points.film_map(0.5, 550.0, 10.0).at(DVec2::ZERO).is_none());
+    let one = FieldSampling::Grid { tans_x: vec![0.0, 0.1], tans_y: vec![0.0] };
+    let message = LensImageModel::build(&lens, &BankSettings { fields: one, ..settings }).unwrap_err().to_string();
+    assert!(message.starts_with("tans_y is 1, expected 2 fields or more"), "{message}");
+}
