@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 pub use bank::{BankChoice, BankData};
 pub use frames::{Exposed, FramesChoice};
-pub use lens::{LensReading, MissingGlassChoice, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+pub use lens::{LensReading, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 pub use movements::Movements;
 pub use scene::{SceneChoice, SceneSource};
 
