@@ -4,12 +4,12 @@ use std::path::Path;
 
 use dioptric_forward::{Coverage, irradiance};
 use dioptric_scene::{BandWriter, ExrParts};
-use dioptric_sensor::{Developed, ElectronRate, Exposure, Illumination, Noise, Processing};
+use dioptric_sensor::{Developed, ElectronRate, ExitPupil, Exposure, Illumination, Noise, Processing};
 use dioptric_spectrum::{Observer, Quantity};
 use ndarray::Array2;
 
 use crate::{
-    Camera, CameraBank, Exposed, PipelineError, Progress, Shot, Stage,
+    Camera, CameraBank, Exposed, Movements, PipelineError, Progress, Shot, Stage,
     band_stream::band_stream,
     display::{LinearRgb, SpectrumToRgb},
 };
@@ -77,12 +77,12 @@ impl Shot {
         let (rate, irradiance) = self.expose_to_scene(&bank, folder, progress)?;
 
         progress.at(Stage::Sensor, 0.0);
-        let noise = Noise::all(self.camera.seed);
+        let noise = Noise { sources: self.camera.noise, ..Noise::all(self.camera.seed) };
         let exposure = self.sensor.expose(&rate, &self.camera.exposure)?;
         let exposed = self.camera.frames.expose(&self.sensor, &rate, &exposure, &noise)?;
 
         progress.at(Stage::Picture, 0.0);
-        let processing = self.camera.processing.under(self.scene.light);
+        let processing = self.camera.processing.under(self.scene.light.as_ref().map(|light| &light.illuminant));
         let developed = self.sensor.develop(exposed.developed_from(), &processing)?;
         progress.at(Stage::Picture, 1.0);
         Ok(Capture { bank, irradiance, exposure, rate, exposed, processing, developed })
@@ -99,6 +99,18 @@ impl Shot {
             diffraction: self.camera.diffraction.into(),
         };
         CameraBank::build(self.camera.bank, &coverage)
+    }
+
+    /// Returns where chief rays come from, or `None` where the exit pupil is infinitely far or the sensor minds no angle.
+    fn exit_pupil(&self) -> Result<Option<ExitPupil>, PipelineError> {
+        let z_mm = self.lens.at(crate::REFERENCE_WAVELENGTH_NM)?.first_order().exit_pupil_z_mm;
+        if !z_mm.is_finite() || self.sensor.chief_ray_response.is_empty() {
+            return Ok(None);
+        }
+        // A lens moved up and to the right moves its axis so on the film, which the picture shows turned by 180°. That
+        // a tilted axis meets the film elsewhere is left out.
+        let Movements { rise_mm, shift_mm, .. } = self.camera.movements;
+        Ok(Some(ExitPupil { distance_mm: self.film_mm - z_mm, axis_mm: [-shift_mm, rise_mm] }))
     }
 
     /// Images the scene band by band; the sensor collects electrons beside it, and the file grows.
@@ -119,12 +131,11 @@ impl Shot {
         };
         let mut summary = Summing::new(self);
         let (sender, stream) = band_stream(Quantity::Irradiance, self.grid(), size);
-        let exit_pupil_z_mm = self.lens.at(crate::REFERENCE_WAVELENGTH_NM)?.first_order().exit_pupil_z_mm;
-        let exit_pupil_distance_mm = exit_pupil_z_mm.is_finite().then_some(self.film_mm - exit_pupil_z_mm);
+        let exit_pupil = self.exit_pupil()?;
         let (imaged, collected) = std::thread::scope(|scope| {
             // The collector owns the stream: when it gives up, sending fails instead of waiting.
             let collecting = scope.spawn(move || {
-                let light = Illumination { irradiance: &stream, pitch_um: None, exit_pupil_distance_mm };
+                let light = Illumination { irradiance: &stream, pitch_um: None, exit_pupil };
                 self.sensor.electron_rate(&light)
             });
             let imaged = irradiance(

@@ -45,6 +45,7 @@ mod psf_table;
 mod report;
 mod scene_choice;
 mod sense;
+mod sensor_options;
 mod shot;
 mod spot;
 mod staged;
@@ -54,8 +55,8 @@ mod trace_table;
 
 pub use bank_choice::{BankChoice, BankData};
 pub use camera::{
-    BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, ProcessingChoice, SensorChoice,
-    StopChoice, WavelengthChoice, WhiteChoice,
+    BlurChoice, Camera, DiffractionChoice, FilmChoice, FocusChoice, LensChoice, SensorChoice, StopChoice,
+    WavelengthChoice,
 };
 pub use camera_bank::CameraBank;
 pub use capture::{Capture, IrradianceSummary};
@@ -84,7 +85,8 @@ pub use psf_row::{MtfRow, PsfRow, psf_csv};
 pub use psf_table::PsfSet;
 pub use report::{ChannelStatistics, FilmData, IrradianceData, LossRow, Report, SceneData, SensorStatistics};
 pub use scene_choice::{SceneChoice, SceneSource};
-pub use sense::{SenseRequest, parse_illuminant, sense_irradiance, with_exposure_s};
+pub use sense::{SenseRequest, parse_illuminant, parse_white, sense_irradiance, with_analog_gain, with_exposure_s};
+pub use sensor_options::SensorOptions;
 pub use shot::Shot;
 pub use staged::Staged;
 pub use surface_table::{SurfaceRow, placement_lines, surface_rows};

@@ -1,10 +1,10 @@
-//! Which colour filter lies on which pixel.
+//! Which color filter lies on which pixel.
 
 use serde::{Deserialize, Serialize};
 
 use crate::SensorError;
 
-/// The colour filter array: which filter lies on which pixel.
+/// The color filter array: which filter lies on which pixel.
 ///
 /// In a data sheet `Mosaic([["R", "G"], ["G", "B"]])`; a monochrome sensor is `Mosaic([["Y"]])`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,4 +1,4 @@
-//! Colours of the 24-patch chart in a picture, against what they should be.
+//! Colors of the 24-patch chart in a picture, against what they should be.
 
 use dioptric_spectrum::{Illuminant, Observer, Xyz, adapt_bradford, color_checker_reflectances, delta_e_2000};
 use ndarray::Array3;
@@ -10,7 +10,7 @@ use crate::{SensorError, balance::fine_grid};
 pub struct ChartReport {
     /// The mean linear sRGB of each patch, row by row from dark skin to black, with the white patch at its luminance.
     pub linear_srgb: Vec<[f64; 3]>,
-    /// What the observer sees of each patch: linear sRGB, which has parts below 0 for a colour beyond its primaries.
+    /// What the observer sees of each patch: linear sRGB, which has parts below 0 for a color beyond its primaries.
     pub wanted_linear_srgb: Vec<[f64; 3]>,
     /// ΔE₀₀ of each patch.
     pub delta_e: Vec<f64>,
@@ -25,7 +25,7 @@ impl ChartReport {
     ///
     /// # Errors
     /// When the chart is not within the picture or its patches are smaller than three pixels.
-    pub fn measure(light_rgb: &Array3<f32>, corners: [(f64, f64); 4], light: Illuminant) -> Result<Self, SensorError> {
+    pub fn measure(light_rgb: &Array3<f32>, corners: [(f64, f64); 4], light: &Illuminant) -> Result<Self, SensorError> {
         let wanted = wanted(light);
         let mut means = (0..24).map(|patch| patch_mean(light_rgb, corners, patch)).collect::<Result<Vec<_>, _>>()?;
         let white = Xyz::from_linear_srgb(means[18]).luminance_cd_m2();
@@ -62,7 +62,7 @@ impl ChartReport {
 }
 
 /// Returns XYZ of the patches under a light, moved to D65, white having Y = 1.
-fn wanted(light: Illuminant) -> Vec<Xyz> {
+fn wanted(light: &Illuminant) -> Vec<Xyz> {
     let grid = fine_grid();
     let values = light.spectrum().sample_held(&grid);
     let white = Observer::Cie1931.xyz(&grid, &values);

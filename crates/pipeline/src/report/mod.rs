@@ -6,8 +6,8 @@ mod statistics;
 
 use std::{fs, path::Path};
 
-use dioptric_scene::write_planes_exr;
-use dioptric_spectrum::Illuminant;
+use dioptric_scene::{SceneLight, write_planes_exr};
+use dioptric_spectrum::{ColorTemperature, Illuminant};
 use serde::Serialize;
 
 pub use statistics::{ChannelStatistics, LossRow, SensorStatistics};
@@ -81,7 +81,9 @@ pub struct SceneData {
     /// Mean luminance, cd/m².
     pub mean_luminance_cd_m2: f64,
     /// The light on it, where that is known.
-    pub light: Option<Illuminant>,
+    pub light: Option<SceneLight>,
+    /// Its correlated color temperature.
+    pub light_temperature: Option<ColorTemperature>,
 }
 
 /// The irradiance of a run.
@@ -151,7 +153,8 @@ impl Capture {
                 near_m,
                 far_m,
                 mean_luminance_cd_m2: shot.scene.mean_luminance_cd_m2(),
-                light: shot.scene.light,
+                light: shot.scene.light.clone(),
+                light_temperature: shot.scene.light.as_ref().map(|light| light.illuminant.color_temperature()),
             },
             psf_bank: BankData::of_camera(&self.bank),
             irradiance: IrradianceData {
@@ -177,7 +180,8 @@ impl Capture {
             rate: &self.rate,
             exposed: &self.exposed,
             processing: &self.processing,
-            light: shot.scene.light.unwrap_or(Illuminant::D65),
+            grid: shot.grid(),
+            light: shot.scene.light.as_ref().map_or(Illuminant::D65, |light| light.illuminant.clone()),
         }
     }
 }
