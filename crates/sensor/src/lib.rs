@@ -6,6 +6,7 @@
 //!
 #![doc = include_str!("../README.md")]
 
+mod acuity;
 mod balance;
 mod bench;
 mod blur;
@@ -52,6 +53,7 @@ mod speed;
 mod tone;
 mod uniformity;
 
+pub use acuity::Viewing;
 pub use balance::WhiteBalance;
 pub use bench::{Bench, BenchSeries, BenchSettings};
 pub use capture::Capture;
