@@ -181,6 +181,13 @@ mod tests {
     }
 
     #[test]
+    fn a_tile_needs_filters_up_to_its_last() {
+        // Red, green and blue of red, green, blue and clear; a single clear one.
+        assert_eq!((tile("RGGB").n_filters(), tile("RCCC").n_filters(), tile("RRRR").n_filters()), (3, 4, 1));
+        assert_eq!((Tile::single(0).n_filters(), Tile::single(3).n_filters()), (1, 4));
+    }
+
+    #[test]
     fn others_are_not_bayer() {
         assert_eq!(tile("RCCC").bayer(), None);
         assert_eq!(tile("RRGB").bayer(), None);
