@@ -114,15 +114,16 @@ pub(crate) struct RunArgs {
     /// Depth of a scene that has none, m
     #[arg(long, value_name = "Z")]
     pub(crate) depth_m: Option<f64>,
-    /// Light on the scene, which lights reflectances and is made white: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3
-    #[arg(long, value_name = "NAME")]
+    /// Light to put the scene under: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3, a temperature (3200K), a chromaticity
+    /// (0.46,0.414) or a CSV file of its spectrum; scenes of unknown light cannot be relit
+    #[arg(long, value_name = "LIGHT")]
     pub(crate) illuminant: Option<String>,
-    /// Illuminance on a scene of reflectances, or of a picture's white, lux
+    /// Illuminance on the scene, or of a picture's white, lux
     #[arg(long, value_name = "LUX")]
     pub(crate) illuminance_lux: Option<f64>,
-    /// What the picture makes white [default: the light on the scene; the mean of a scene of unknown light]
-    #[arg(long, value_name = "KIND", value_enum)]
-    pub(crate) white: Option<WhiteKind>,
+    /// Light that is on a scene of radiance whose file does not state it, as --illuminant has it
+    #[arg(long, value_name = "LIGHT")]
+    pub(crate) scene_light: Option<String>,
     /// Sensor, a file or the name of a built-in one
     #[arg(long, value_name = "SENSOR")]
     pub(crate) sensor: Option<String>,
@@ -169,6 +170,23 @@ pub(crate) struct FrameArgs {
     /// Writes these files too: electrons, raw-tiff, raw-dng, picture-png16, picture-tiff8, picture-tiff16, picture-exr
     #[arg(long, value_name = "LIST")]
     pub(crate) also: Option<String>,
+    /// Switches noise on: all, none, or a list of photon, dark-current, read, reset, row, prnu, dsnu, column, defects;
+    /// all,-NAME leaves one out [default: all]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(crate) noise: Option<String>,
+    /// Factor on the voltage after the pixel [default: 1]
+    #[arg(long, value_name = "G")]
+    pub(crate) analog_gain: Option<f64>,
+    /// What the picture makes white: scene (its light, or its mean where that is unknown), none, gray-world, white-patch,
+    /// shades-of-gray, gray-edge, patch:X,Y,W,H, or a light as --illuminant has it [default: scene]
+    #[arg(long, value_name = "WHITE")]
+    pub(crate) white: Option<String>,
+    /// How missing colors are found: nearest, bilinear, malvar, directional, directional-ratio
+    #[arg(long, value_name = "METHOD")]
+    pub(crate) demosaic: Option<String>,
+    /// What becomes of light beyond saturation: clip (channel by channel), reconstruct [default: reconstruct]
+    #[arg(long, value_name = "KIND")]
+    pub(crate) highlights: Option<String>,
 }
 
 /// What diffraction to compute.
@@ -193,17 +211,6 @@ pub(crate) enum BankKind {
     Standard,
     /// Pictures of the same samples, blended as in the paper, for comparison only
     Paper,
-}
-
-/// What the picture makes white.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum WhiteKind {
-    /// The light on the scene
-    Scene,
-    /// The mean of the picture
-    GreyWorld,
-    /// Nothing: the sensor's own colours
-    None,
 }
 
 /// How the scene is blurred.
@@ -353,8 +360,9 @@ pub(crate) struct SenseArgs {
     /// Distance of the exit pupil from the sensor, mm, for the chief-ray angle [default: light along the axis]
     #[arg(long, value_name = "D")]
     pub(crate) exit_pupil_mm: Option<f64>,
-    /// White balance for this light [default: gray world]
-    #[arg(long, value_name = "NAME")]
+    /// The light on the scene, which is made white: a name, a temperature, a chromaticity or a CSV file, as for `run`
+    /// [default: unknown]
+    #[arg(long, value_name = "LIGHT")]
     pub(crate) illuminant: Option<String>,
     #[command(flatten)]
     pub(crate) frames: FrameArgs,

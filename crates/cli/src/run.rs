@@ -10,14 +10,14 @@ use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
     BankChoice, BlurChoice, Camera, Diffraction, FilmChoice, FocusChoice, FrameFile, FramesChoice, KeptCamera,
-    LensChoice, LensReading, Progress, Quality, SceneChoice, SensorChoice, Stage, Staged, StopChoice, WavelengthChoice,
-    WhiteChoice, parse_illuminant, parse_numbers, with_exposure_s,
+    LensChoice, LensReading, Progress, Quality, SceneChoice, SensorChoice, SensorOptions, Stage, Staged, StopChoice,
+    WavelengthChoice, parse_illuminant, parse_numbers, with_exposure_s,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
 
 use crate::{
-    args::{BankKind, BlurKind, Common, DiffractionKind, FrameArgs, QualityKind, RunArgs, WhiteKind},
+    args::{BankKind, BlurKind, Common, DiffractionKind, FrameArgs, QualityKind, RunArgs},
     lens::tell,
     terminal::{Bar, guarded, print, print_json, remark},
 };
@@ -43,6 +43,7 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     staged.commit()?;
     drop(clock);
     tell(&capture.lens.notes, common);
+    tell(&report.sensor.notes, common);
     if common.json {
         return print_json(&report);
     }
@@ -117,9 +118,12 @@ fn change_scene(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> 
     let scene = &mut camera.scene;
     scene.field_of_view_deg = arguments.fov_deg.or(scene.field_of_view_deg);
     scene.depth_m = arguments.depth_m.or(scene.depth_m);
-    scene.illuminance_lux = arguments.illuminance_lux.unwrap_or(scene.illuminance_lux);
+    scene.illuminance_lux = arguments.illuminance_lux.or(scene.illuminance_lux);
     if let Some(name) = &arguments.illuminant {
         scene.illuminant = Some(parse_illuminant(name)?);
+    }
+    if let Some(light) = &arguments.scene_light {
+        scene.light = Some(parse_illuminant(light)?);
     }
     Ok(())
 }
@@ -210,14 +214,19 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
     if let Some(time_s) = arguments.exposure_s {
         camera.exposure = with_exposure_s(camera.exposure, time_s);
     }
-    if let Some(kind) = arguments.white {
-        camera.processing.white = match kind {
-            WhiteKind::Scene => WhiteChoice::Scene,
-            WhiteKind::GreyWorld => WhiteChoice::GreyWorld,
-            WhiteKind::None => WhiteChoice::None,
-        };
+    let options = sensor_options(&arguments.frames);
+    Ok(options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing)?)
+}
+
+/// Returns what the command line changes of the sensor's frames and of the picture.
+pub(crate) fn sensor_options(arguments: &FrameArgs) -> SensorOptions {
+    SensorOptions {
+        noise: arguments.noise.clone(),
+        analog_gain: arguments.analog_gain,
+        white: arguments.white.clone(),
+        demosaic: arguments.demosaic.clone(),
+        highlights: arguments.highlights.clone(),
     }
-    Ok(())
 }
 
 /// Returns how many frames the command line asks for.

@@ -11,21 +11,24 @@ use dioptric_report::write_sensed;
 use crate::{
     args::{Common, SenseArgs},
     lens::tell,
-    run::frames_of,
+    run::{frames_of, sensor_options},
     terminal::{guarded, print, print_json},
 };
 
 pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> {
     let demo = Camera::demo()?;
+    let (mut noise, mut exposure, mut processing) = (demo.noise, demo.exposure, demo.processing);
+    if let Some(time_s) = arguments.exposure_s {
+        exposure = with_exposure_s(exposure, time_s);
+    }
+    sensor_options(&arguments.frames).apply(&mut noise, &mut exposure, &mut processing)?;
     let request = SenseRequest {
         sensor: SensorChoice::named(&arguments.sensor),
         pixel_um: arguments.pixel_um,
-        exposure: match arguments.exposure_s {
-            Some(time_s) => with_exposure_s(demo.exposure, time_s),
-            None => demo.exposure,
-        },
+        exposure,
         frames: frames_of(&arguments.frames)?.unwrap_or(demo.frames),
-        processing: demo.processing,
+        processing,
+        noise,
         illuminant: arguments.illuminant.as_deref().map(parse_illuminant).transpose()?,
         exit_pupil_mm: arguments.exit_pupil_mm,
         seed: common.seed.unwrap_or(demo.seed),
@@ -39,6 +42,7 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
     let statistics = write_sensed(&sensed, &request.outputs, staged.path())?;
     staged.commit()?;
     tell(&sensed.notes, common);
+    tell(&statistics.notes, common);
     match (common.json, common.quiet) {
         (true, _) => print_json(&statistics),
         (false, true) => Ok(()),

@@ -113,6 +113,31 @@ fn oblique_light_darkens_the_corners_of_a_sensor_that_minds_it() {
 }
 
 #[test]
+fn noise_and_white_are_chosen_on_the_command_line() {
+    let folder = folder();
+    let raw = |options: &[&str]| {
+        sense(folder.path(), "small.ron", &[&["--exposure-s", "1e-6"], options].concat());
+        image::open(folder.path().join("out/raw.png")).unwrap().into_luma16()
+    };
+    assert_eq!(raw(&["--noise", "none", "--seed", "1"]), raw(&["--noise", "none", "--seed", "2"]));
+    assert_ne!(raw(&["--noise", "photon", "--seed", "1"]), raw(&["--noise", "photon", "--seed", "2"]));
+    assert_eq!(
+        raw(&["--noise", "all,-photon,read"]),
+        raw(&["--noise", "dark-current,reset,row,prnu,dsnu,column,defects"])
+    );
+    let gain = |options: &[&str]| sense(folder.path(), "small.ron", options)["analog_gain"].as_f64();
+    assert_eq!(gain(&["--analog-gain", "4"]), Some(4.0));
+    // Of an even field that is its own white, red and blue are as green.
+    for white in ["patch:4,4,24,16", "gray-world", "shades-of-gray"] {
+        let options = ["--white", white, "--demosaic", "bilinear", "--highlights", "clip", "--noise", "none"];
+        sense(folder.path(), "small.ron", &options);
+        let picture = image::open(folder.path().join("out/picture.png")).unwrap().into_rgb8();
+        let [r, g, b] = picture.get_pixel(24, 16).0.map(i32::from);
+        assert!((r - g).abs() <= 1 && (b - g).abs() <= 1, "{white}: {r} {g} {b}");
+    }
+}
+
+#[test]
 fn what_cannot_be_asked_is_refused_in_one_sentence() {
     let folder = folder();
     for (options, words) in [
@@ -120,6 +145,13 @@ fn what_cannot_be_asked_is_refused_in_one_sentence() {
         (&["--burst", "0"], &["Burst", "0"]),
         (&["--bracket-stops", "0,many"], &["--bracket-stops", "many"]),
         (&["--exit-pupil-mm", "0"], &["exit_pupil"]),
+        (&["--noise", "hiss"], &["'hiss'", "dark-current"]),
+        (&["--white", "sunny"], &["'sunny'", "gray-edge", "patch:"]),
+        (&["--white", "patch:0,0,9000,2"], &["patch", "within"]),
+        (&["--demosaic", "best"], &["'best'", "directional-ratio"]),
+        (&["--highlights", "burn"], &["'burn'", "reconstruct"]),
+        (&["--analog-gain", "-1"], &["analog_gain"]),
+        (&["--illuminant", "0.9,0.3"], &["chromaticity", "0.9"]),
     ] {
         let arguments = [&["sense", "light.exr", "--sensor", "small.ron", "--out", "out"], options].concat();
         check_error(folder.path(), &arguments, words);

@@ -66,6 +66,14 @@ pub enum PipelineError {
         /// What would do.
         expected: String,
     },
+    /// A setting of the sensor, of its exposure or of its processing that cannot be.
+    #[error("{origin}: {reason}")]
+    Setting {
+        /// The file and line, or the camera's name.
+        origin: String,
+        /// What is wrong and what was expected.
+        reason: dioptric_sensor::SensorError,
+    },
     /// A row of a table that cannot be used.
     #[error("{}:{line}: {reason}", path.display())]
     Table {

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use dioptric_scene::write_planes_exr;
 use dioptric_sensor::{Depth, ElectronRate, Exposure, Picture, Processing, Raw, Sensor};
-use dioptric_spectrum::Illuminant;
+use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
@@ -86,7 +86,7 @@ impl FrameFile {
 }
 
 /// The frames of one exposure.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Frames<'a> {
     /// The sensor.
     pub sensor: &'a Sensor,
@@ -98,6 +98,8 @@ pub struct Frames<'a> {
     pub exposed: &'a Exposed,
     /// From the raw frame to the picture.
     pub processing: &'a Processing,
+    /// The bands of the irradiance.
+    pub grid: &'a WavelengthGrid,
     /// The light on the scene; D65 where it is not known.
     pub light: Illuminant,
 }
@@ -147,7 +149,7 @@ fn write_also(
         }
         FrameFile::RawTiff => write_raw(&frames.exposed.raw, "tiff", folder),
         FrameFile::RawDng => {
-            frames.sensor.write_dng(&frames.exposed.raw, frames.light, &folder.join("raw.dng"))?;
+            frames.sensor.write_dng(&frames.exposed.raw, &frames.light, &folder.join("raw.dng"))?;
             Ok(vec!["raw.dng".to_owned()])
         }
         FrameFile::PicturePng16 => write_picture("picture-16.png", Depth::Sixteen),

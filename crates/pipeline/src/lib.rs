@@ -25,15 +25,15 @@ pub use dioptric_psf::Diffraction;
 
 pub use camera::{
     BankChoice, BankData, BlurChoice, Camera, Exposed, FilmChoice, FocusChoice, FramesChoice, LensChoice, LensReading,
-    Movements, ProcessingChoice, REFERENCE_WAVELENGTH_NM, SceneChoice, SceneSource, SensorChoice, StopChoice,
-    WavelengthChoice, WhiteChoice, nearest_to_reference_nm,
+    Movements, REFERENCE_WAVELENGTH_NM, SceneChoice, SceneSource, SensorChoice, SensorOptions, StopChoice,
+    WavelengthChoice, nearest_to_reference_nm,
 };
 pub use error::PipelineError;
 pub use frame_files::{FrameFile, Frames, Outputs, write_frames};
 pub use numbers::{number, parse_numbers, parse_pairs};
 pub use progress::{Progress, Silent, Stage};
 pub use quality::Quality;
-pub use sense::{SenseRequest, Sensed, parse_illuminant, with_exposure_s};
+pub use sense::{SenseRequest, Sensed, parse_illuminant, parse_white, with_analog_gain, with_exposure_s};
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     Capture, FilmPlace, FrameSet, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera, RESUME_FILE,

@@ -2,11 +2,14 @@
 
 use std::path::Path;
 
-use dioptric_sensor::{Developed, ElectronRate, Exposure, ExposureControl, Illumination, Noise, Processing, Sensor};
-use dioptric_spectrum::{Bands, Cancel, Illuminant};
+use dioptric_sensor::{
+    AutoExposure, Developed, ElectronRate, ExitPupil, Exposure, ExposureControl, Illumination, Noise, NoiseSources,
+    Processing, Sensor, WhiteBalance,
+};
+use dioptric_spectrum::{Bands, Cancel, Illuminant, Spectrum, WavelengthGrid};
 
 use crate::{
-    FrameSet, Frames, FramesChoice, Irradiance, Outputs, PipelineError, ProcessingChoice, SensorChoice, Silent, number,
+    FrameSet, Frames, FramesChoice, Irradiance, Outputs, PipelineError, SensorChoice, Silent, number,
     stages::{ShutterInputs, Watch, expose},
 };
 
@@ -23,7 +26,9 @@ pub struct SenseRequest {
     /// How many frames the picture is made of.
     pub frames: FramesChoice,
     /// From the raw frame to the picture.
-    pub processing: ProcessingChoice,
+    pub processing: Processing,
+    /// Which sources of noise are on.
+    pub noise: NoiseSources,
     /// The light that white balance goes by; the mean of the picture where it is not known.
     pub illuminant: Option<Illuminant>,
     /// The distance of the exit pupil from the sensor, mm, from which each pixel's chief-ray angle follows; `None` for
@@ -50,6 +55,8 @@ pub struct Sensed {
     pub developed: Developed,
     /// The light on the scene; D65 where it is not known.
     pub light: Illuminant,
+    /// The bands of the image.
+    pub grid: WavelengthGrid,
     /// What a user should know of how the image was laid over the pixels, a sentence each.
     pub notes: Vec<String>,
 }
@@ -63,7 +70,8 @@ impl Sensed {
             rate: &self.rate,
             exposed: &self.frames.exposed,
             processing: &self.processing,
-            light: self.light,
+            light: self.light.clone(),
+            grid: &self.grid,
         }
     }
 }
@@ -103,13 +111,16 @@ impl SenseRequest {
                 number(pixel_um)
             ));
         }
-        let light = Illumination { exit_pupil_distance_mm: self.exit_pupil_mm, ..light };
+        let light = Illumination { exit_pupil: self.exit_pupil_mm.map(ExitPupil::centered), ..light };
         let rate = sensor.electron_rate(&light)?;
-        let shutter =
-            ShutterInputs { exposure: self.exposure, frames: self.frames.clone(), noise: Noise::all(self.seed) };
+        let shutter = ShutterInputs {
+            exposure: self.exposure,
+            frames: self.frames.clone(),
+            noise: Noise { sources: self.noise, ..Noise::all(self.seed) },
+        };
         let watch = Watch { progress: &Silent, cancel: &Cancel::new() };
         let frames = expose(&shutter, &sensor, &rate, &watch)?;
-        let processing = self.processing.under(self.illuminant);
+        let processing = self.processing.under(self.illuminant.as_ref());
         let developed = sensor.develop(frames.exposed.developed_from(), &processing)?;
         Ok(Sensed {
             sensor,
@@ -117,7 +128,8 @@ impl SenseRequest {
             frames,
             processing,
             developed,
-            light: self.illuminant.unwrap_or(Illuminant::D65),
+            light: self.illuminant.clone().unwrap_or(Illuminant::D65),
+            grid: irradiance.grid().clone(),
             notes,
         })
     }
@@ -131,10 +143,66 @@ pub fn with_exposure_s(control: ExposureControl, time_s: f64) -> ExposureControl
     })
 }
 
-/// Returns the light of a name, in any case.
+/// Returns the exposure with another analog gain; time and temperature stay.
+pub fn with_analog_gain(control: ExposureControl, analog_gain: f64) -> ExposureControl {
+    match control {
+        ExposureControl::Manual(exposure) => ExposureControl::Manual(Exposure { analog_gain, ..exposure }),
+        ExposureControl::Auto(auto) => {
+            ExposureControl::Auto(AutoExposure { limit: Exposure { analog_gain, ..auto.limit }, ..auto })
+        }
+    }
+}
+
+/// Returns the light of a name (in any case), a temperature (`3200K`), a chromaticity (`0.46,0.414`) or a CSV file whose first
+/// two columns are wavelengths in nm and spectral power.
 ///
 /// # Errors
-/// When no light has that name.
-pub fn parse_illuminant(name: &str) -> Result<Illuminant, PipelineError> {
-    Ok(Illuminant::named(name)?)
+/// When the text is none of these, or there can be no such light.
+pub fn parse_illuminant(text: &str) -> Result<Illuminant, PipelineError> {
+    let path = Path::new(text);
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+        return read_light(path);
+    }
+    Ok(Illuminant::parse(text)?)
+}
+
+/// Returns the white of a command line: a word of [`WhiteBalance::parse`], or the CSV file of a light's spectrum.
+///
+/// # Errors
+/// As [`WhiteBalance::parse`] and [`parse_illuminant`].
+pub fn parse_white(text: &str) -> Result<WhiteBalance, PipelineError> {
+    let path = Path::new(text);
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+        return Ok(WhiteBalance::Light(read_light(path)?));
+    }
+    Ok(WhiteBalance::parse(text)?)
+}
+
+fn read_light(path: &Path) -> Result<Illuminant, PipelineError> {
+    let unreadable = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .map_err(|e| unreadable(e.to_string()))?;
+    let (mut wavelengths_nm, mut values) = (Vec::new(), Vec::new());
+    for (number, record) in reader.records().enumerate() {
+        let record = record.map_err(|e| unreadable(e.to_string()))?;
+        let line = record.position().map_or(number as u64 + 1, csv::Position::line);
+        let number_at = |column: usize| record.get(column).and_then(|text| text.parse::<f64>().ok());
+        match (number_at(0), number_at(1)) {
+            (Some(nm), Some(value)) => {
+                wavelengths_nm.push(nm);
+                values.push(value);
+            }
+            // Names of the columns.
+            _ if number == 0 => {}
+            _ => return Err(unreadable(format!("line {line} is not a wavelength in nm and a power"))),
+        }
+    }
+    let light = Spectrum::new(wavelengths_nm, values).map(Illuminant::Spectrum);
+    let checked = light.and_then(|light| light.check().map(|()| light));
+    checked.map_err(|e| unreadable(e.to_string()))
 }

@@ -87,6 +87,16 @@ pub enum SceneError {
         /// The scene.
         name: String,
     },
+    /// A scene under a light that is not known, which another cannot take the place of.
+    #[error("{name}: the {what} on the scene is not known, so that it cannot be put under another: {instead}")]
+    UnknownLight {
+        /// The scene.
+        name: String,
+        /// What of the light is not known.
+        what: String,
+        /// What would do.
+        instead: String,
+    },
     /// A scene without camera data that the next stage needs.
     #[error("{name}: the scene has no camera data: give its horizontal field of view in degrees")]
     MissingView {

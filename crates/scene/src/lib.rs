@@ -18,6 +18,7 @@
 
 mod error;
 mod formats;
+mod light;
 mod preview;
 mod resample;
 mod scene;
@@ -31,6 +32,7 @@ pub use formats::{
     read_picture, read_picture_samples, read_planes_exr, read_scene, read_spectral_exr, write_planes_exr,
     write_scene_exr, write_spectral_exr,
 };
+pub use light::SceneLight;
 pub use preview::{srgb_preview, write_preview_png};
 pub use resample::{reflectance_under, resampled};
 pub use scene::{HiddenLayer, Scene};

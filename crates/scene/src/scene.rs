@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use dioptric_spectrum::{DepthMap, Illuminant, Observer, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{DepthMap, Observer, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, s};
 
-use crate::{SceneError, View, resample::resampled};
+use crate::{SceneError, SceneLight, View, resample::resampled};
 
 /// What stands before the camera, as seen from the projection centre.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub struct Scene {
     /// What lies behind the first surface, where that is known.
     pub hidden: Option<HiddenLayer>,
     /// The light on it, where that is known: what a white balance may go by.
-    pub light: Option<Illuminant>,
+    pub light: Option<SceneLight>,
 }
 
 /// What would be seen if the object at the centre of each sample were taken away.
@@ -154,7 +154,7 @@ impl Scene {
             depth: self.depth.as_ref().map(|d| DepthMap::new(plane(d.z_m()))).transpose()?,
             view: self.view.map(|v| v.cropped(rows.start, columns.start)),
             hidden,
-            light: self.light,
+            light: self.light.clone(),
         })
     }
 
@@ -221,7 +221,7 @@ impl Scene {
             depth: self.depth.clone(),
             view: self.view,
             hidden,
-            light: self.light,
+            light: self.light.clone(),
         })
     }
 

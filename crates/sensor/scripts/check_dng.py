@@ -93,11 +93,11 @@ def main(folder):
             r, c = PATCH * (i // 6) + 8, PATCH * (i % 6) + 8
             return rgb[r : r + 8, c : c + 8].mean(axis=(0, 1))
 
-        grey = patch(20)
-        assert np.ptp(grey) < 8, f"{name}: grey is {grey}"
+        gray = patch(20)
+        assert np.ptp(gray) < 8, f"{name}: gray is {gray}"
         assert patch(14).argmax() == 0 and patch(13).argmax() == 1 and patch(12).argmax() == 2, name
         print(
-            f"{line}, grey {grey.round(1).tolist()}, red {patch(14).round().tolist()}, "
+            f"{line}, gray {gray.round(1).tolist()}, red {patch(14).round().tolist()}, "
             f"green {patch(13).round().tolist()}, blue {patch(12).round().tolist()}: ok"
         )
 

@@ -24,7 +24,7 @@ from emva1288.process.results import Results1288
 BAR = 0.3
 
 
-def analysed(images):
+def analyzed(images):
     loaded = LoadImageData(images, loglevel=40)
     return Results1288(Data1288(loaded.data, loglevel=40).data, loglevel=40)
 
@@ -34,7 +34,7 @@ def main(folder):
     ours = json.loads((folder / "noise.json").read_text())
     flat_time = next(time for time, points in images["temporal"].items() if len(points) > 2)
     flats = images["temporal"][flat_time]
-    theirs = analysed({"temporal": {flat_time: flats}, "spatial": images["spatial"]})
+    theirs = analyzed({"temporal": {flat_time: flats}, "spatial": images["spatial"]})
     rows = [
         ("K", ours["gain_dn_per_e"], theirs.K, "DN/e"),
         ("QE", 100 * ours["quantum_efficiency"], theirs.QE, "%"),
@@ -49,7 +49,7 @@ def main(folder):
         # The package wants light at every time, but the dark current is read off the dark frames alone.
         lit = max(flats)
         temporal = {time: {0.0: points[0.0], lit: flats[lit]} for time, points in dark_times.items()}
-        dark = analysed({"temporal": temporal, "spatial": images["spatial"]})
+        dark = analyzed({"temporal": temporal, "spatial": images["spatial"]})
         per_s = dark.u_I_mean_DN / theirs.K
         rows.append(("dark current", ours["dark_current_by_mean_e_per_s"], per_s, "e/s"))
     worst = []

@@ -1,10 +1,10 @@
-//! Which colour filter lies on which pixel.
+//! Which color filter lies on which pixel.
 
 use serde::{Deserialize, Serialize};
 
 use crate::SensorError;
 
-/// The colour filter array: which filter lies on which pixel.
+/// The color filter array: which filter lies on which pixel.
 ///
 /// In a data sheet `Mosaic([["R", "G"], ["G", "B"]])`; a monochrome sensor is `Mosaic([["Y"]])`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -178,6 +178,13 @@ mod tests {
                 assert_eq!(bayer.is_green(row, column), tile(letters).filter_at(row, column) == 1, "{letters}");
             }
         }
+    }
+
+    #[test]
+    fn a_tile_needs_filters_up_to_its_last() {
+        // Red, green and blue of red, green, blue and clear; a single clear one.
+        assert_eq!((tile("RGGB").n_filters(), tile("RCCC").n_filters(), tile("RRRR").n_filters()), (3, 4, 1));
+        assert_eq!((Tile::single(0).n_filters(), Tile::single(3).n_filters()), (1, 4));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Colours of the 24-patch chart in a picture, against what they should be.
+//! Colors of the 24-patch chart in a picture, against what they should be.
 
 use dioptric_spectrum::{Illuminant, Observer, Xyz, adapt_bradford, color_checker_reflectances, delta_e_2000};
 use ndarray::Array3;
@@ -10,7 +10,7 @@ use crate::{SensorError, balance::fine_grid};
 pub struct ChartReport {
     /// The mean linear sRGB of each patch, row by row from dark skin to black, with the white patch at its luminance.
     pub linear_srgb: Vec<[f64; 3]>,
-    /// What the observer sees of each patch: linear sRGB, which has parts below 0 for a colour beyond its primaries.
+    /// What the observer sees of each patch: linear sRGB, which has parts below 0 for a color beyond its primaries.
     pub wanted_linear_srgb: Vec<[f64; 3]>,
     /// ΔE₀₀ of each patch.
     pub delta_e: Vec<f64>,
@@ -25,7 +25,7 @@ impl ChartReport {
     ///
     /// # Errors
     /// When the chart is not within the picture or its patches are smaller than three pixels.
-    pub fn measure(light_rgb: &Array3<f32>, corners: [(f64, f64); 4], light: Illuminant) -> Result<Self, SensorError> {
+    pub fn measure(light_rgb: &Array3<f32>, corners: [(f64, f64); 4], light: &Illuminant) -> Result<Self, SensorError> {
         let wanted = wanted(light);
         let mut means = (0..24).map(|patch| patch_mean(light_rgb, corners, patch)).collect::<Result<Vec<_>, _>>()?;
         let white = Xyz::from_linear_srgb(means[18]).luminance_cd_m2();
@@ -62,7 +62,7 @@ impl ChartReport {
 }
 
 /// Returns XYZ of the patches under a light, moved to D65, white having Y = 1.
-fn wanted(light: Illuminant) -> Vec<Xyz> {
+fn wanted(light: &Illuminant) -> Vec<Xyz> {
     let grid = fine_grid();
     let values = light.spectrum().sample_held(&grid);
     let white = Observer::Cie1931.xyz(&grid, &values);
@@ -104,4 +104,105 @@ fn patch_mean(picture: &Array3<f32>, corners: [(f64, f64); 4], patch: usize) -> 
         }
     }
     Ok(sum.map(|v| v / n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dioptric_spectrum::Lab;
+
+    const SIDE: usize = 12;
+    const CORNERS: [(f64, f64); 4] = [(-0.5, -0.5), (-0.5, 71.5), (47.5, 71.5), (47.5, -0.5)];
+
+    /// The chart as an observer sees it under a light, `scale` times as bright, with something else on the borders of patches.
+    fn chart(light: &Illuminant, scale: f64) -> Array3<f32> {
+        let colors = wanted(light).into_iter().map(Xyz::to_linear_srgb).collect::<Vec<_>>();
+        Array3::from_shape_fn((4 * SIDE, 6 * SIDE, 3), |(row, column, k)| {
+            let is_border = |i: usize| !(3..9).contains(&(i % SIDE));
+            match is_border(row) || is_border(column) {
+                true => 0.7,
+                false => (scale * colors[6 * (row / SIDE) + column / SIDE][k]) as f32,
+            }
+        })
+    }
+
+    fn lab(rgb: [f64; 3]) -> Lab {
+        Xyz::from_linear_srgb(rgb).to_lab(Xyz::D65)
+    }
+
+    #[test]
+    fn the_chart_itself_is_without_error() {
+        for light in [Illuminant::D65, Illuminant::A] {
+            let report = ChartReport::measure(&chart(&light, 0.37), CORNERS, &light).unwrap();
+            assert_eq!((report.delta_e.len(), report.linear_srgb.len(), report.wanted_linear_srgb.len()), (24, 24, 24));
+            // Single precision; the white of sRGB has five digits.
+            assert!(report.max_delta_e() < 2e-3, "{light:?}: {:?}", report.delta_e);
+            for (found, wanted) in report.linear_srgb.iter().zip(&report.wanted_linear_srgb) {
+                assert!(found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < 1e-5), "{found:?} {wanted:?}");
+            }
+        }
+        // White is neutral under every light, and as bright as its reflectance.
+        let report = ChartReport::measure(&chart(&Illuminant::A, 1.0), CORNERS, &Illuminant::A).unwrap();
+        let [r, g, b] = report.wanted_linear_srgb[18];
+        assert!((0.85..0.95).contains(&g) && (r - g).abs() < 0.03 && (b - g).abs() < 0.05, "{r} {g} {b}");
+        // The light matters: what was taken under A is off under D65.
+        let wrong = ChartReport::measure(&chart(&Illuminant::A, 1.0), CORNERS, &Illuminant::D65).unwrap();
+        assert!(wrong.mean_delta_e() > 1.0);
+    }
+
+    #[test]
+    fn a_wrong_patch_has_its_difference() {
+        let mut picture = chart(&Illuminant::D65, 1.0);
+        let darker = |rgb: [f64; 3]| [0.5 * rgb[0], rgb[1], rgb[2]];
+        let colors = wanted(&Illuminant::D65).into_iter().map(Xyz::to_linear_srgb).collect::<Vec<_>>();
+        for patch in [3, 14, 20] {
+            let (top, left) = (SIDE * (patch / 6), SIDE * (patch % 6));
+            picture.slice_mut(ndarray::s![top + 3..top + 9, left + 3..left + 9, 0]).mapv_inplace(|v| 0.5 * v);
+        }
+        let report = ChartReport::measure(&picture, CORNERS, &Illuminant::D65).unwrap();
+        for (patch, color) in colors.iter().enumerate() {
+            let changed = if [3, 14, 20].contains(&patch) { darker(*color) } else { *color };
+            let expected = delta_e_2000(lab(changed), lab(*color));
+            assert!((report.delta_e[patch] - expected).abs() < 2e-3, "{patch}: {}", report.delta_e[patch]);
+        }
+        assert!(report.max_delta_e() > 5.0 && report.median_delta_e() < 2e-3);
+    }
+
+    #[test]
+    fn a_turned_chart_is_the_same() {
+        let upright = chart(&Illuminant::D65, 1.0);
+        let turned = upright.slice(ndarray::s![..;-1, ..;-1, ..]).to_owned();
+        let corners = [CORNERS[2], CORNERS[3], CORNERS[0], CORNERS[1]];
+        let found = ChartReport::measure(&turned, corners, &Illuminant::D65).unwrap();
+        assert!(found.max_delta_e() < 2e-3, "{:?}", found.delta_e);
+        // Read upright its dark skin is the black.
+        let wrong = ChartReport::measure(&turned, CORNERS, &Illuminant::D65).unwrap();
+        assert!(wrong.delta_e[0] > 10.0);
+    }
+
+    #[test]
+    fn mean_median_and_largest_differ() {
+        let of = |delta_e: &[f64]| ChartReport {
+            linear_srgb: Vec::new(),
+            wanted_linear_srgb: Vec::new(),
+            delta_e: delta_e.to_vec(),
+        };
+        let even = of(&[3.0, 1.0, 2.0, 10.0]);
+        assert_eq!((even.mean_delta_e(), even.median_delta_e(), even.max_delta_e()), (4.0, 2.5, 10.0));
+        assert_eq!(of(&[5.0, 1.0, 3.0]).median_delta_e(), 3.0);
+    }
+
+    #[test]
+    fn dark_and_absent_charts_are_refused() {
+        let picture = chart(&Illuminant::D65, 1.0);
+        let measured = |picture: &Array3<f32>, corners| ChartReport::measure(picture, corners, &Illuminant::D65);
+        let mut dark = picture.clone();
+        // The white patch is the first of the last row.
+        dark.slice_mut(ndarray::s![3 * SIDE.., ..SIDE, ..]).fill(0.0);
+        assert!(measured(&dark, CORNERS).unwrap_err().to_string().contains("no light"));
+        for (row, column) in [(-20.0, 0.0), (0.0, -20.0), (30.0, 0.0), (0.0, 30.0)] {
+            let moved = CORNERS.map(|(r, c)| (r + row, c + column));
+            assert!(measured(&picture, moved).unwrap_err().to_string().contains("within 48 × 72"), "{row} {column}");
+        }
+    }
 }

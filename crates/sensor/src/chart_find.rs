@@ -1,7 +1,7 @@
 //! A 24-patch chart found in a picture.
 //!
 //! Even patches are parted by their borders; those of like size that lie on a common lattice are the chart, and of the
-//! ways to turn it the one whose colours fit best is taken.
+//! ways to turn it the one whose colors fit best is taken.
 
 use dioptric_spectrum::Illuminant;
 use ndarray::{Array2, Array3};
@@ -31,7 +31,7 @@ pub type ChartCorners = [(f64, f64); 4];
 ///
 /// # Errors
 /// When there is no such chart, or patches are under about five pixels.
-pub fn find_chart(light_rgb: &Array3<f32>, light: Illuminant) -> Result<ChartCorners, SensorError> {
+pub fn find_chart(light_rgb: &Array3<f32>, light: &Illuminant) -> Result<ChartCorners, SensorError> {
     let factor = light_rgb.dim().0.max(light_rgb.dim().1).div_ceil(SEARCH_SIDE).max(1);
     let logs = binned_logs(light_rgb, factor);
     let lattice = BORDERS.iter().filter_map(|&border| best_lattice(&patches(&logs, border))).max_by(|a, b| {
@@ -157,7 +157,7 @@ fn best_lattice(patches: &[Patch]) -> Option<Lattice> {
     best
 }
 
-/// Returns the steps from a patch to its eight nearest neighbours.
+/// Returns the steps from a patch to its eight nearest neighbors.
 fn nearest_steps(like: &[Patch], start: &Patch) -> Vec<(f64, f64)> {
     let mut steps: Vec<(f64, f64)> = like
         .iter()
@@ -274,7 +274,7 @@ mod tests {
         color_checker_reflectances().iter().map(|(_, reflectance)| color(reflectance)).collect()
     }
 
-    /// A chart on dark grey: patches of 30 pixels in steps of `step`, turned by an angle and seen at a slant.
+    /// A chart on dark gray: patches of 30 pixels in steps of `step`, turned by an angle and seen at a slant.
     fn picture(turn_deg: f64, step: f64, slant: f64) -> Array3<f32> {
         let colors = colors();
         let (sin, cos) = turn_deg.to_radians().sin_cos();
@@ -306,9 +306,9 @@ mod tests {
             (8.0, 40.0, 0.1),
         ] {
             let picture = picture(turn_deg, step, slant);
-            let corners = find_chart(&picture, Illuminant::D65)
+            let corners = find_chart(&picture, &Illuminant::D65)
                 .unwrap_or_else(|e| panic!("turned by {turn_deg}°, step {step}, slant {slant}: {e}"));
-            let report = ChartReport::measure(&picture, corners, Illuminant::D65).unwrap();
+            let report = ChartReport::measure(&picture, corners, &Illuminant::D65).unwrap();
             // Single precision and the 2 nm grid of the reference leave less than this.
             assert!(report.max_delta_e() < 0.1, "turned by {turn_deg}°: {:.2}", report.max_delta_e());
         }
@@ -316,7 +316,7 @@ mod tests {
 
     #[test]
     fn a_picture_without_a_chart_says_so() {
-        let none = |picture: Array3<f32>| find_chart(&picture, Illuminant::D65).unwrap_err().to_string();
+        let none = |picture: Array3<f32>| find_chart(&picture, &Illuminant::D65).unwrap_err().to_string();
         assert!(none(Array3::zeros((50, 50, 3))).contains("not found"));
         assert!(
             none(Array3::from_shape_fn((90, 90, 3), |(r, c, i)| ((r * 7 + c * 13 + i) % 11) as f32))

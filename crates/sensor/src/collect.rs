@@ -19,24 +19,52 @@ const BANDS_AT_ONCE: usize = 4;
 pub struct Illumination<'a> {
     /// Spectral irradiance, W m⁻² nm⁻¹; a few bands are asked for at a time.
     pub irradiance: &'a dyn Bands,
-    /// The distance between the irradiance's samples on the film, µm, both centred on the axis: pixels then average
+    /// The distance between the irradiance's samples on the film, µm, both centerd on the axis: pixels then average
     /// over their apertures, and the frame has the sensor's rows and columns. `None` when there is one sample
     /// (already averaged) a pixel: the frame then has the size of the irradiance, from the tile's first pixel on.
     pub pitch_um: Option<f64>,
-    /// The distance of the lens's exit pupil, mm, from which the chief-ray angle of each pixel follows; `None` for
-    /// light along the axis everywhere.
-    pub exit_pupil_distance_mm: Option<f64>,
+    /// Where the light of each pixel comes from, from which its chief-ray angle follows; `None` for light along the
+    /// axis everywhere.
+    pub exit_pupil: Option<ExitPupil>,
+}
+
+/// Where the exit pupil of the lens stands before the frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExitPupil {
+    /// Its distance before the film, mm; negative where it lies behind the film. The chief ray of a pixel is the line
+    /// through both, so that the sign does not change its angle; 0 is refused.
+    pub distance_mm: f64,
+    /// Where its axis meets the film, mm from the middle of the frame: to the right and down, as the picture is seen.
+    pub axis_mm: [f64; 2],
+}
+
+impl ExitPupil {
+    /// Returns a pupil before the middle of the frame.
+    pub fn centered(distance_mm: f64) -> Self {
+        Self { distance_mm, axis_mm: [0.0; 2] }
+    }
+
+    fn check(&self) -> Result<(), SensorError> {
+        let wrong = |key, value, expected| Err(SensorError::value("the illumination", key, value, expected));
+        if self.distance_mm == 0.0 || !self.distance_mm.is_finite() {
+            return wrong("exit_pupil.distance_mm", self.distance_mm, "a number other than 0");
+        }
+        match self.axis_mm.into_iter().find(|mm| !mm.is_finite()) {
+            Some(mm) => wrong("exit_pupil.axis_mm", mm, "a finite number"),
+            None => Ok(()),
+        }
+    }
 }
 
 impl<'a> Illumination<'a> {
     /// Returns light given by one sample a pixel.
     pub fn on_pixels(irradiance: &'a dyn Bands) -> Self {
-        Self { irradiance, pitch_um: None, exit_pupil_distance_mm: None }
+        Self { irradiance, pitch_um: None, exit_pupil: None }
     }
 
     /// Returns light sampled at a pitch of its own.
     pub fn with_pitch_um(irradiance: &'a dyn Bands, pitch_um: f64) -> Self {
-        Self { irradiance, pitch_um: Some(pitch_um), exit_pupil_distance_mm: None }
+        Self { irradiance, pitch_um: Some(pitch_um), exit_pupil: None }
     }
 }
 
@@ -106,16 +134,15 @@ struct PixelOptics {
     size: (usize, usize),
     overlaps: Option<(Overlaps, Overlaps)>,
     optical_crosstalk: Option<[[f64; 3]; 3]>,
-    exit_pupil_distance_mm: Option<f64>,
+    exit_pupil: Option<ExitPupil>,
 }
 
 impl PixelOptics {
     fn new(sensor: &Sensor, light: &Illumination<'_>) -> Result<Self, SensorError> {
-        for (key, value) in [("pitch_um", light.pitch_um), ("exit_pupil_distance_mm", light.exit_pupil_distance_mm)] {
-            if let Some(value) = value.filter(|&v| !(v > 0.0 && v.is_finite())) {
-                return Err(SensorError::value("the illumination", key, value, "a number above 0"));
-            }
+        if let Some(pitch_um) = light.pitch_um.filter(|&v| !(v > 0.0 && v.is_finite())) {
+            return Err(SensorError::value("the illumination", "pitch_um", pitch_um, "a number above 0"));
         }
+        light.exit_pupil.map_or(Ok(()), |pupil| pupil.check())?;
         let (n_rows, n_columns) = light.irradiance.size();
         let side_um = sensor.pixel_pitch_um * sensor.fill_factor.sqrt();
         let overlaps = |n_samples, pitch_um, n_pixels| {
@@ -126,7 +153,7 @@ impl PixelOptics {
             size: if light.pitch_um.is_some() { (sensor.rows, sensor.columns) } else { (n_rows, n_columns) },
             overlaps: light.pitch_um.map(axes),
             optical_crosstalk: sensor.optical_crosstalk,
-            exit_pupil_distance_mm: light.exit_pupil_distance_mm,
+            exit_pupil: light.exit_pupil.filter(|_| !sensor.chief_ray_response.is_empty()),
         })
     }
 
@@ -147,12 +174,15 @@ impl PixelOptics {
 
     /// Returns the rate after the chief-ray response and the spread of electrons.
     fn after_filters(&self, sensor: &Sensor, mut rate: Array2<f32>) -> Array2<f32> {
-        if let Some(distance_mm) = self.exit_pupil_distance_mm.filter(|_| !sensor.chief_ray_response.is_empty()) {
+        if let Some(ExitPupil { distance_mm, axis_mm: [right_mm, down_mm] }) = self.exit_pupil {
             let (n_rows, n_columns) = rate.dim();
-            let middle = (0.5 * (n_rows as f64 - 1.0), 0.5 * (n_columns as f64 - 1.0));
+            let pitch_mm = 1e-3 * sensor.pixel_pitch_um;
+            let (middle_row, middle_column) = (0.5 * (n_rows as f64 - 1.0), 0.5 * (n_columns as f64 - 1.0));
             ndarray::Zip::indexed(&mut rate).par_for_each(|(row, column), value| {
-                let radius_mm = 1e-3 * sensor.pixel_pitch_um * (row as f64 - middle.0).hypot(column as f64 - middle.1);
-                *value *= sensor.chief_ray_factor((radius_mm / distance_mm).atan().to_degrees()) as f32;
+                let y_mm = pitch_mm * (row as f64 - middle_row) - down_mm;
+                let x_mm = pitch_mm * (column as f64 - middle_column) - right_mm;
+                let angle_deg = (x_mm.hypot(y_mm) / distance_mm.abs()).atan().to_degrees();
+                *value *= sensor.chief_ray_factor(angle_deg) as f32;
             });
         }
         match &sensor.electrical_crosstalk {

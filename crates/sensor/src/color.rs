@@ -9,10 +9,15 @@ use crate::{
     least_squares::Normal,
 };
 
-/// How the sensor's channels become colours.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// How the sensor's channels become colors.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum ColorCorrection {
-    /// The first three channels are taken as red, green and blue; one channel alone is grey.
+    /// A matrix fitted under the light that white is balanced for; where white is found in the picture, under the light on
+    /// the scene if that is known, and else under the black body or daylight that comes nearest. None where white is not
+    /// balanced.
+    #[default]
+    Auto,
+    /// The first three channels are taken as red, green and blue; one channel alone is gray.
     None,
     /// A matrix fitted to the sensor, the 1931 observer and the 24-patch chart under this light.
     Fitted(Illuminant),
@@ -26,7 +31,7 @@ pub struct ColorMatrix {
     /// For linear red, green and blue the factor of each channel. Rows of a fitted matrix sum to 1, so that what is
     /// balanced stays neutral.
     pub rows: [Vec<f64>; 3],
-    /// ΔE₀₀ of each training colour; empty where the matrix was not fitted.
+    /// ΔE₀₀ of each training color; empty where the matrix was not fitted.
     pub delta_e: Vec<f64>,
 }
 
@@ -39,10 +44,10 @@ impl ColorMatrix {
 
     /// Returns the matrix fitted to a sensor and reflectances under a light.
     ///
-    /// The sensor's channels are balanced for the light; the colours wanted are those that the 1931 observer sees,
-    /// moved from the light's white to that of sRGB (Bradford). The sum of squared differences is minimised, in
+    /// The sensor's channels are balanced for the light; the colors wanted are those that the 1931 observer sees,
+    /// moved from the light's white to that of sRGB (Bradford). The sum of squared differences is minimized, in
     /// lightness, chroma and hue with the weights of chroma that ΔE₀₀ has, starting from the best linear fit.
-    pub fn fit(sensor: &Sensor, light: Illuminant, reflectances: &[Spectrum]) -> Self {
+    pub fn fit(sensor: &Sensor, light: &Illuminant, reflectances: &[Spectrum]) -> Self {
         let training = Training::new(sensor, light, reflectances);
         let n_channels = sensor.filters.len();
         let mut parameters = training.linear_fit();
@@ -54,7 +59,7 @@ impl ColorMatrix {
         Self { rows, delta_e }
     }
 
-    /// The mean ΔE₀₀ of the training colours, or `None` where the matrix was not fitted.
+    /// The mean ΔE₀₀ of the training colors, or `None` where the matrix was not fitted.
     pub fn mean_delta_e(&self) -> Option<f64> {
         let n = self.delta_e.len();
         (n > 0).then(|| self.delta_e.iter().sum::<f64>() / n as f64)
@@ -81,7 +86,7 @@ fn rows_of(parameters: &[f64], n_channels: usize) -> [Vec<f64>; 3] {
 
 /// What a matrix is fitted to.
 struct Training {
-    /// Balanced channels of each colour, white being all 1.
+    /// Balanced channels of each color, white being all 1.
     channels: Vec<Vec<f64>>,
     /// Linear sRGB wanted.
     rgb: Vec<[f64; 3]>,
@@ -89,7 +94,7 @@ struct Training {
 }
 
 impl Training {
-    fn new(sensor: &Sensor, light: Illuminant, reflectances: &[Spectrum]) -> Self {
+    fn new(sensor: &Sensor, light: &Illuminant, reflectances: &[Spectrum]) -> Self {
         let grid = fine_grid();
         let light_values = light.spectrum().sample_held(&grid);
         let weights = sensor.electron_weights(&grid);
@@ -170,7 +175,7 @@ impl Training {
         }
     }
 
-    /// Returns the weighted differences of all colours in lightness, chroma and hue.
+    /// Returns the weighted differences of all colors in lightness, chroma and hue.
     fn residuals(&self, rows: &[Vec<f64>; 3]) -> Vec<f64> {
         let difference = |(channels, wanted): (&Vec<f64>, &Lab)| {
             let got = lab_of(apply(rows, channels));
@@ -205,7 +210,7 @@ mod tests {
 
     #[test]
     fn a_sensor_that_sees_like_the_observer_is_corrected_exactly() {
-        let matrix = ColorMatrix::fit(&Sensor::built_in("ideal").unwrap(), Illuminant::D65, &chart());
+        let matrix = ColorMatrix::fit(&Sensor::built_in("ideal").unwrap(), &Illuminant::D65, &chart());
         // What is left comes from 5 nm steps in the sensor's curves.
         assert!(matrix.mean_delta_e().unwrap() < 0.1, "{:?}", matrix.mean_delta_e());
     }
@@ -219,7 +224,7 @@ mod tests {
             ("nikon-d100", Illuminant::D65, 3.0),
         ] {
             let sensor = Sensor::built_in(name).unwrap();
-            let matrix = ColorMatrix::fit(&sensor, light, &chart());
+            let matrix = ColorMatrix::fit(&sensor, &light, &chart());
             let mean = matrix.mean_delta_e().unwrap();
             assert!(mean < most, "{name} under {light:?}: {mean}");
             for row in &matrix.rows {
@@ -229,9 +234,9 @@ mod tests {
     }
 
     #[test]
-    fn one_channel_is_grey() {
+    fn one_channel_is_gray() {
         let mono = Sensor::built_in("machine-vision-mono").unwrap();
-        assert_eq!(ColorMatrix::fit(&mono, Illuminant::D65, &chart()).rows, [vec![1.0], vec![1.0], vec![1.0]]);
+        assert_eq!(ColorMatrix::fit(&mono, &Illuminant::D65, &chart()).rows, [vec![1.0], vec![1.0], vec![1.0]]);
         assert_eq!(ColorMatrix::identity(1).apply(&[0.3]), [0.3; 3]);
         assert_eq!(ColorMatrix::identity(4).apply(&[0.1, 0.2, 0.3, 0.4]), [0.1, 0.2, 0.3]);
     }

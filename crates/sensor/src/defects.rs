@@ -1,11 +1,11 @@
-//! Pixels that stand out of their neighbours, replaced.
+//! Pixels that stand out of their neighbors, replaced.
 
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::Tile;
 
-/// Replaces each pixel that lies more than `threshold` above or below all its nearest neighbours of the same filter by
+/// Replaces each pixel that lies more than `threshold` above or below all its nearest neighbors of the same filter by
 /// their median, and returns how many there were.
 ///
 /// The threshold is in units of the values, 1 being saturation. Two defects next to each other of one filter hide each
@@ -22,23 +22,23 @@ fn correct_plane(plane: &mut Array2<f32>, step: (usize, usize), threshold: f32) 
         .flat_map_iter(|row| {
             let plane = &*plane;
             (0..n_columns).filter_map(move |column| {
-                let (mut neighbours, mut n) = ([0.0_f32; 8], 0);
+                let (mut neighbors, mut n) = ([0.0_f32; 8], 0);
                 for (dr, dc) in [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)] {
                     let r = row.wrapping_add_signed(dr * step.0 as isize);
                     let c = column.wrapping_add_signed(dc * step.1 as isize);
                     if r < n_rows && c < n_columns {
-                        neighbours[n] = plane[(r, c)];
+                        neighbors[n] = plane[(r, c)];
                         n += 1;
                     }
                 }
-                let neighbours = &mut neighbours[..n];
-                let (low, high) = neighbours.iter().fold((f32::MAX, f32::MIN), |(l, h), &v| (l.min(v), h.max(v)));
+                let neighbors = &mut neighbors[..n];
+                let (low, high) = neighbors.iter().fold((f32::MAX, f32::MIN), |(l, h), &v| (l.min(v), h.max(v)));
                 let value = plane[(row, column)];
                 if n < 3 || (low - threshold..=high + threshold).contains(&value) {
                     return None;
                 }
-                neighbours.sort_by(f32::total_cmp);
-                Some((row, column, 0.5 * (neighbours[(n - 1) / 2] + neighbours[n / 2])))
+                neighbors.sort_by(f32::total_cmp);
+                Some((row, column, 0.5 * (neighbors[(n - 1) / 2] + neighbors[n / 2])))
             })
         })
         .collect();

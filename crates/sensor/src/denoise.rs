@@ -32,18 +32,18 @@ pub(crate) enum SampleNoise {
 
 impl SampleNoise {
     /// Returns the sample on a scale on which noise is 1.
-    fn stabilised(&self, sample: f32) -> f32 {
+    fn stabilized(&self, sample: f32) -> f32 {
         match self {
             Self::Frame { electrons_per_unit, floor_e } => {
                 let electrons = f64::from(sample) * electrons_per_unit;
                 (2.0 * (electrons + 0.375 + floor_e.powi(2)).max(0.0).sqrt()) as f32
             }
-            Self::Table(table) => table.stabilised(f64::from(sample)) as f32,
+            Self::Table(table) => table.stabilized(f64::from(sample)) as f32,
         }
     }
 
     /// Returns the sample of a value on that scale; the mean comes out unbiased above a few electrons.
-    fn unstabilised(&self, value: f32) -> f32 {
+    fn unstabilized(&self, value: f32) -> f32 {
         match self {
             Self::Frame { electrons_per_unit, floor_e } => {
                 let half = 0.5 * f64::from(value.max(0.0));
@@ -82,7 +82,7 @@ impl NoiseTable {
         TABLE_END * (place / TABLE_STEPS as f64).powi(2)
     }
 
-    fn stabilised(&self, sample: f64) -> f64 {
+    fn stabilized(&self, sample: f64) -> f64 {
         if sample <= 0.0 {
             return sample * self.slope_at_zero;
         }
@@ -129,7 +129,7 @@ fn denoise_mosaic(plane: &mut Array2<f32>, tile: &Tile, noise: &[SampleNoise], s
             Array2::from_shape_fn(size, |(r, c)| {
                 let row = inside(r * tile.rows() + phase / tile.columns(), tile.rows(), n_rows);
                 let column = inside(c * tile.columns() + phase % tile.columns(), tile.columns(), n_columns);
-                noise_of(phase).stabilised(plane[(row, column)])
+                noise_of(phase).stabilized(plane[(row, column)])
             })
         })
         .collect();
@@ -144,7 +144,7 @@ fn denoise_mosaic(plane: &mut Array2<f32>, tile: &Tile, noise: &[SampleNoise], s
     plane.outer_iter_mut().into_par_iter().enumerate().for_each(|(row, mut values)| {
         for (column, value) in values.iter_mut().enumerate() {
             let phase = (row % tile.rows()) * tile.columns() + column % tile.columns();
-            *value = noise_of(phase).unstabilised(back[phase][(row / tile.rows(), column / tile.columns())]);
+            *value = noise_of(phase).unstabilized(back[phase][(row / tile.rows(), column / tile.columns())]);
         }
     });
 }
@@ -247,10 +247,10 @@ mod tests {
     }
 
     #[test]
-    fn stabilising_and_back_is_the_same_but_for_the_known_eighth() {
+    fn stabilizing_and_back_is_the_same_but_for_the_known_eighth() {
         let noise = SampleNoise::Frame { electrons_per_unit: 6000.0, floor_e: 3.0 };
         for sample in [0.0, 0.01, 0.5, 1.0] {
-            let back = noise.unstabilised(noise.stabilised(sample));
+            let back = noise.unstabilized(noise.stabilized(sample));
             assert!((back - sample - 0.25 / 6000.0).abs() < 1e-6, "{sample} {back}");
         }
     }
@@ -260,10 +260,10 @@ mod tests {
         let deviation = |sample: f64| (sample.max(0.0) * 6000.0 + 9.0).sqrt() / 6000.0;
         let table = NoiseTable::new(&deviation);
         for sample in [-0.001, 0.0, 1e-4, 0.01, 0.5, 1.2] {
-            assert!((table.sample_of(table.stabilised(sample)) - sample).abs() < 1e-12, "{sample}");
+            assert!((table.sample_of(table.stabilized(sample)) - sample).abs() < 1e-12, "{sample}");
             // ∫ ds / σ(s) = 2 (√(n + 9) − 3).
             let exact = 2.0 * ((sample.max(0.0) * 6000.0 + 9.0).sqrt() - 3.0) + sample.min(0.0) * 2000.0;
-            assert!((table.stabilised(sample) - exact).abs() < 1e-3, "{sample}");
+            assert!((table.stabilized(sample) - exact).abs() < 1e-3, "{sample}");
         }
     }
 }

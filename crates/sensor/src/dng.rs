@@ -47,11 +47,11 @@ const LINEAR_RAW: u16 = 34892;
 /// Values of the calibration illuminants (EXIF light sources).
 const STANDARD_LIGHT_A: u16 = 17;
 const D65: u16 = 21;
-/// The code of no light after a linearisation table; room below it for noise.
+/// The code of no light after a linearization table; room below it for noise.
 const LINEARIZED_BLACK: f64 = 4096.0;
 
 impl Sensor {
-    /// Writes a frame as DNG: its digital numbers with mosaic, levels, colour matrices for A and D65, and the neutral of
+    /// Writes a frame as DNG: its digital numbers with mosaic, levels, color matrices for A and D65, and the neutral of
     /// `light`.
     ///
     /// A single filter and stacked filters are written without a mosaic (`LinearRaw`); a response that is not a straight
@@ -60,7 +60,7 @@ impl Sensor {
     /// # Errors
     /// When the frame is in volts, or its filters are not one, three, or (in a mosaic) four of R, G, B, C, M, Y and W, or
     /// the tile is too large; or the file cannot be written; then there is no file.
-    pub fn write_dng(&self, raw: &Raw, light: Illuminant, path: &Path) -> Result<(), SensorError> {
+    pub fn write_dng(&self, raw: &Raw, light: &Illuminant, path: &Path) -> Result<(), SensorError> {
         raw.check()?;
         let planes: Option<Vec<_>> = raw.planes.iter().map(RawPlane::dn).collect();
         let planes = planes.ok_or_else(|| raw.without_numbers("a DNG file"))?;
@@ -86,7 +86,7 @@ impl Sensor {
 struct Tags<'a> {
     sensor: &'a Sensor,
     raw: &'a Raw,
-    light: Illuminant,
+    light: &'a Illuminant,
     /// The number that DNG has for each filter; empty for a monochrome sensor.
     colors: Vec<u8>,
 }
@@ -174,7 +174,7 @@ impl Tags<'_> {
             (COLOR_MATRIX_1, CALIBRATION_ILLUMINANT_1, Illuminant::A, STANDARD_LIGHT_A),
             (COLOR_MATRIX_2, CALIBRATION_ILLUMINANT_2, Illuminant::D65, D65),
         ] {
-            let rows = camera_from_xyz(self.sensor, light);
+            let rows = camera_from_xyz(self.sensor, &light);
             let matrix: Vec<SRational> = order
                 .iter()
                 .flat_map(|&filter| rows[filter])

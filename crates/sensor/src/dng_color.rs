@@ -1,4 +1,4 @@
-//! What a DNG file says about colour: the numbers of the filters, and matrices from XYZ to the camera.
+//! What a DNG file says about color: the numbers of the filters, and matrices from XYZ to the camera.
 
 use dioptric_spectrum::{Illuminant, Observer, Spectrum, Xyz, adapt_bradford, color_checker_reflectances};
 
@@ -64,7 +64,7 @@ pub(crate) fn plane_order(codes: &[u8], tile: Option<&Tile>) -> Vec<usize> {
 ///
 /// For three channels it is the inverse of the matrix by which we develop; for more, which have none, the least-squares
 /// fit to the chart.
-pub(crate) fn camera_from_xyz(sensor: &Sensor, light: Illuminant) -> Vec<[f64; 3]> {
+pub(crate) fn camera_from_xyz(sensor: &Sensor, light: &Illuminant) -> Vec<[f64; 3]> {
     let white = white_response(sensor, light);
     let brightest = white.iter().copied().fold(0.0, f64::max);
     let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
@@ -99,7 +99,7 @@ pub(crate) fn camera_from_xyz(sensor: &Sensor, light: Illuminant) -> Vec<[f64; 3
 }
 
 /// Returns the matrix from XYZ under a light to balanced channels.
-fn balanced_from_xyz(srgb_from_balanced: [[f64; 3]; 3], light: Illuminant) -> [[f64; 3]; 3] {
+fn balanced_from_xyz(srgb_from_balanced: [[f64; 3]; 3], light: &Illuminant) -> [[f64; 3]; 3] {
     let balanced_from_srgb = inverse(srgb_from_balanced);
     let grid = fine_grid();
     let light_xyz = Observer::Cie1931.xyz(&grid, &light.spectrum().sample_held(&grid));
@@ -139,9 +139,9 @@ mod tests {
             for light in [Illuminant::A, Illuminant::D65] {
                 let grid = fine_grid();
                 let xyz = Observer::Cie1931.xyz(&grid, &light.spectrum().sample_held(&grid)).0;
-                let white = white_response(&sensor, light);
+                let white = white_response(&sensor, &light);
                 let brightest = white.iter().copied().fold(0.0, f64::max);
-                for (row, white) in camera_from_xyz(&sensor, light).iter().zip(&white) {
+                for (row, white) in camera_from_xyz(&sensor, &light).iter().zip(&white) {
                     let neutral: f64 = row.iter().zip(xyz).map(|(m, v)| m * v / xyz[1]).sum();
                     // Bradford's D65 has five digits; the fit weighs the white a hundredfold, not without end.
                     assert!((neutral - white / brightest).abs() < 1e-3, "{light:?}: {neutral}");

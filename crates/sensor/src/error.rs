@@ -55,8 +55,18 @@ pub enum SensorError {
         /// What would do.
         expected: &'static str,
     },
-    /// A colour filter array that is not a full rectangle of known filters.
-    #[error("the colour filter array of {owner}: {reason}")]
+    /// A word that names nothing.
+    #[error("{what}: '{found}' is not known, expected one of {expected}")]
+    Word {
+        /// What was looked for.
+        what: &'static str,
+        /// The word given.
+        found: String,
+        /// The words that would do.
+        expected: String,
+    },
+    /// A color filter array that is not a full rectangle of known filters.
+    #[error("the color filter array of {owner}: {reason}")]
     Cfa {
         /// The sensor.
         owner: String,

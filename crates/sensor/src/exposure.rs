@@ -8,7 +8,7 @@ use crate::{Sensor, SensorError};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exposure {
-    /// How long the shutter is open, s.
+    /// How long the shutter is open, s; 0 is a bias frame, of read noise and offsets alone.
     pub time_s: f64,
     /// The factor on the voltage after the pixel; 2 doubles the signal.
     #[serde(default = "one")]
@@ -34,7 +34,7 @@ pub enum GainMode {
 /// How the exposure is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ExposureControl {
-    /// By hand.
+    /// By hand; a time of 0 is a bias frame.
     Manual(Exposure),
     /// By metering the light on the sensor.
     Auto(AutoExposure),
@@ -58,7 +58,7 @@ pub struct AutoExposure {
 pub enum Metering {
     /// The mean of all pixels.
     Mean,
-    /// The mean of all pixels, weighted towards the centre with a Gaussian of a quarter of the width and height.
+    /// The mean of all pixels, weighted towards the center with a Gaussian of a quarter of the width and height.
     CenterWeighted,
     /// The brightest pixel.
     Peak,
@@ -114,7 +114,45 @@ impl Exposure {
     }
 }
 
+impl ExposureControl {
+    /// Checks every number, so that a wrong one is found before there is any light.
+    ///
+    /// # Errors
+    /// Names the first number that makes no sense and what was expected: a time of 0 s or more by hand; by metering a
+    /// target above 0, a percentile of 0 to 100 and a longest time above 0; a gain above 0 and a finite temperature.
+    pub fn check(&self) -> Result<(), SensorError> {
+        match self {
+            Self::Manual(exposure) => exposure.check(),
+            Self::Auto(auto) => auto.check(),
+        }
+    }
+}
+
+impl Metering {
+    pub(crate) fn check(self) -> Result<(), SensorError> {
+        match self {
+            Self::Percentile(percent) if !(0.0..=100.0).contains(&percent) => {
+                Err(SensorError::value("the automatic exposure", "Percentile", percent, "a number from 0 to 100"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 impl AutoExposure {
+    fn check(&self) -> Result<(), SensorError> {
+        let wrong = |key, value, expected| Err(SensorError::value("the automatic exposure", key, value, expected));
+        if !(self.target_fraction > 0.0 && self.target_fraction.is_finite()) {
+            return wrong("target_fraction", self.target_fraction, "a number above 0");
+        }
+        if self.limit.time_s.is_nan() || self.limit.time_s <= 0.0 {
+            return wrong("limit.time_s", self.limit.time_s, "a number above 0");
+        }
+        self.metering.check()?;
+        // The longest time may be without end, which no exposure is.
+        Exposure { time_s: 0.0, ..self.limit }.check()
+    }
+
     /// Returns the metering that puts a share of saturation there, at gain 1 and 25 °C, however long it takes.
     pub const fn new(metering: Metering, target_fraction: f64) -> Self {
         Self { metering, target_fraction, limit: Exposure::seconds(f64::INFINITY) }

@@ -35,7 +35,7 @@ impl Picture {
 }
 
 impl Raw {
-    /// Writes the digital numbers of a mosaic or monochrome frame as 16-bit grey PNG or TIFF, by the path's extension.
+    /// Writes the digital numbers of a mosaic or monochrome frame as 16-bit gray PNG or TIFF, by the path's extension.
     ///
     /// The codes are those of the converter, not stretched.
     ///

@@ -5,7 +5,9 @@ use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::{ElectronRate, Electrons, Exposure, Noise, Sensor, SensorError, noise::Kind, poisson::poisson};
+use crate::{
+    ElectronRate, Electrons, Exposure, Noise, NoiseSource, Sensor, SensorError, noise::Kind, poisson::poisson,
+};
 
 impl Sensor {
     /// Returns the electrons in each pixel at the end of an exposure, clipped at the full well.
@@ -33,7 +35,7 @@ impl Sensor {
     }
 }
 
-/// What sets a pixel apart from its neighbours.
+/// What sets a pixel apart from its neighbors.
 #[derive(Clone, Copy)]
 struct RowPixel {
     sensitivity: f64,
@@ -74,10 +76,12 @@ impl<'a> Shutter<'a> {
     fn expose_row(&self, plane: usize, row: usize, values: &mut [f32], pixels: &mut [RowPixel]) {
         self.fixed_pattern(plane, row, pixels);
         let mut rng = self.noise.rng(Kind::Photon, plane, row);
+        let [with_photon_noise, with_dark_noise] =
+            [NoiseSource::Photon, NoiseSource::DarkCurrent].map(|source| self.noise.has(source));
         let top_e = if self.sensor.blooming_fraction > 0.0 { f64::INFINITY } else { self.full_well_e };
         for (value, pixel) in values.iter_mut().zip(pixels) {
             let light_e = f64::from(*value) * self.time_s * pixel.sensitivity;
-            let electrons = match (self.noise.photon, self.noise.dark_current) {
+            let electrons = match (with_photon_noise, with_dark_noise) {
                 (true, true) => poisson(light_e + pixel.dark_e, &mut rng),
                 (true, false) => poisson(light_e, &mut rng) + pixel.dark_e,
                 (false, true) => light_e + poisson(pixel.dark_e, &mut rng),
@@ -90,7 +94,7 @@ impl<'a> Shutter<'a> {
     /// Sets what each pixel of a row is like.
     fn fixed_pattern(&self, plane: usize, row: usize, pixels: &mut [RowPixel]) {
         pixels.fill(RowPixel { sensitivity: 1.0, dark_e: self.dark_e });
-        if self.noise.prnu && self.sensor.prnu_fraction > 0.0 {
+        if self.noise.has(NoiseSource::Prnu) && self.sensor.prnu_fraction > 0.0 {
             let mut rng = self.noise.rng(Kind::Prnu, plane, row);
             for pixel in pixels.iter_mut() {
                 let g: f64 = StandardNormal.sample(&mut rng);
@@ -98,7 +102,7 @@ impl<'a> Shutter<'a> {
             }
         }
         let defects = self.sensor.defects;
-        if self.noise.defects && defects.hot_fraction + defects.dead_fraction > 0.0 {
+        if self.noise.has(NoiseSource::Defects) && defects.hot_fraction + defects.dead_fraction > 0.0 {
             let mut rng = self.noise.rng(Kind::Defects, plane, row);
             for pixel in pixels.iter_mut() {
                 let lot: f64 = rng.random();
@@ -113,7 +117,7 @@ impl<'a> Shutter<'a> {
 
     /// Lets the electrons above the full well spill up and down the columns, then clips.
     ///
-    /// Of what a pixel cannot hold, half of the spilling share goes each way; what a full neighbour gets it hands on in
+    /// Of what a pixel cannot hold, half of the spilling share goes each way; what a full neighbor gets it hands on in
     /// the same direction. The rest is drained.
     fn spill(&self, electrons: &mut Array2<f32>) {
         let share = 0.5 * self.sensor.blooming_fraction;

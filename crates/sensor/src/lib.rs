@@ -6,6 +6,7 @@
 //!
 #![doc = include_str!("../README.md")]
 
+mod acuity;
 mod balance;
 mod bench;
 mod blur;
@@ -26,6 +27,7 @@ mod exposure;
 mod files;
 mod frames;
 mod hdr;
+mod highlights;
 mod integrate;
 mod least_squares;
 mod library;
@@ -51,20 +53,22 @@ mod speed;
 mod tone;
 mod uniformity;
 
+pub use acuity::Viewing;
 pub use balance::WhiteBalance;
 pub use bench::{Bench, BenchSeries, BenchSettings};
 pub use capture::Capture;
 pub use cfa::{Bayer, Cfa, Tile};
 pub use chart::ChartReport;
 pub use chart_find::{ChartCorners, find_chart};
-pub use collect::Illumination;
+pub use collect::{ExitPupil, Illumination};
 pub use color::{ColorCorrection, ColorMatrix};
 pub use demosaic::{Demosaic, demosaic};
 pub use error::SensorError;
 pub use exposure::{AutoExposure, Exposure, ExposureControl, GainMode, Metering};
 pub use files::Depth;
 pub use frames::{ElectronRate, Electrons, Volts};
-pub use noise::Noise;
+pub use highlights::Highlights;
+pub use noise::{Noise, NoiseSource, NoiseSources};
 pub use photon_transfer::{DarkCurrentEstimate, FlatPoint, PhotonTransfer};
 pub use picture::Picture;
 pub use points::{PointWindow, find_points};

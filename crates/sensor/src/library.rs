@@ -117,7 +117,7 @@ mod tests {
         check("fill_factor: 1.0", "fill_factor: 1.5", &["fill_factor", "1.5", "0 to 1"]);
         check("rows: 3024", "rows: 0", &["rows", "1 or more"]);
         check("bits: 10", "bits: 17", &["adc.bits", "17", "1 to 16"]);
-        check("name: \"G\"", "name: \"X\"", &["colour filter array", "'G'", "R, X, B"]);
+        check("name: \"G\"", "name: \"X\"", &["color filter array", "'G'", "R, X, B"]);
         check("rows: 3024", "rows: many", &["bad.ron:4", "integer"]);
         assert!(Sensor::built_in("imx000").unwrap_err().to_string().contains("imx363"));
         assert!(Sensor::read(Path::new("no/such.ron")).unwrap_err().to_string().contains("such.ron"));

@@ -10,6 +10,7 @@ impl Sensor {
     /// # Errors
     /// When a setting makes no sense, or there is no light to meter and no longest time to fall back on.
     pub fn expose(&self, rate: &ElectronRate, control: &ExposureControl) -> Result<Exposure, SensorError> {
+        control.check()?;
         let exposure = match control {
             ExposureControl::Manual(exposure) => *exposure,
             ExposureControl::Auto(auto) => self.meter(rate, auto)?,
@@ -18,21 +19,8 @@ impl Sensor {
     }
 
     fn meter(&self, rate: &ElectronRate, auto: &AutoExposure) -> Result<Exposure, SensorError> {
-        let wrong = |key, value, expected| Err(SensorError::value("the automatic exposure", key, value, expected));
-        if !(auto.target_fraction > 0.0 && auto.target_fraction.is_finite()) {
-            return wrong("target_fraction", auto.target_fraction, "a number above 0");
-        }
-        if auto.limit.time_s.is_nan() || auto.limit.time_s <= 0.0 {
-            return wrong("limit.time_s", auto.limit.time_s, "a number above 0");
-        }
-        if let Metering::Percentile(percent) = auto.metering
-            && !(0.0..=100.0).contains(&percent)
-        {
-            return wrong("metering.percentile", percent, "a number from 0 to 100");
-        }
         let exposure = Exposure { time_s: 0.0, ..auto.limit };
-        exposure.check()?;
-        let metered_e_per_s = rate.metered(auto.metering);
+        let metered_e_per_s = rate.metered(auto.metering)?;
         let time_s = auto.target_fraction * self.saturation_e(&exposure) / metered_e_per_s;
         match time_s.min(auto.limit.time_s) {
             time_s if time_s.is_finite() => Ok(Exposure { time_s, ..exposure }),
@@ -46,10 +34,14 @@ impl Sensor {
 
 impl ElectronRate {
     /// Returns the metered rate, electrons a second.
-    pub fn metered(&self, metering: Metering) -> f64 {
+    ///
+    /// # Errors
+    /// When a percentile is not a number from 0 to 100.
+    pub fn metered(&self, metering: Metering) -> Result<f64, SensorError> {
+        metering.check()?;
         let planes = &self.planes_e_per_s;
         let n_pixels = planes.iter().map(|plane| plane.len()).sum::<usize>() as f64;
-        match metering {
+        Ok(match metering {
             // Rows are summed one by one and then in order, so that the sum is the same for any number of threads.
             Metering::Mean => planes.iter().map(|plane| weighted_sum(plane, |_, _| 1.0)).sum::<f64>() / n_pixels,
             Metering::CenterWeighted => {
@@ -65,7 +57,7 @@ impl ElectronRate {
             }
             Metering::Peak => f64::from(planes.iter().flatten().fold(0.0_f32, |peak, &v| peak.max(v))),
             Metering::Percentile(percent) => percentile(planes.iter().flatten().copied().collect(), percent),
-        }
+        })
     }
 }
 

@@ -93,7 +93,7 @@ mod tests {
 
     use super::*;
 
-    /// The exact distribution about its mode, by the ratio of neighbours and normalised: none of the code under test.
+    /// The exact distribution about its mode, by the ratio of neighbors and normalised: none of the code under test.
     fn exact(mean: f64) -> (usize, Vec<f64>) {
         let mode = mean.floor() as usize;
         // Ten standard deviations and 40 more hold all but 1e-20.

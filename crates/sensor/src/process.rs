@@ -6,81 +6,113 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, LensShading, Picture, Raw, Sensor,
+    Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Highlights, LensShading, Picture, Raw, Sensor,
     SensorError, ToneCurve, WhiteBalance,
-    balance::gains,
+    balance::{gains, light_of_gains},
     defects, demosaic,
     denoise::{SampleNoise, denoise},
     hdr::merged_noise,
+    highlights::{Saturated, dimmed, reconstruct},
     metering::percentile,
 };
 
 /// What is done to a raw frame, in this order.
+///
+/// Everything that is left out of a file is as in [`Processing::default`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Processing {
-    /// Pixels further than this above or below all their neighbours of the same filter are replaced, as a share of
+    /// Pixels further than this above or below all their neighbors of the same filter are replaced, as a share of
     /// saturation; left out, none are.
-    #[serde(default)]
     pub defect_threshold: Option<f64>,
-    /// The fall of light towards the corners that is undone.
-    #[serde(default)]
+    /// The fall of light towards the corners that is undone; left out, it stays.
     pub shading: Option<LensShading>,
-    /// How white is made neutral; channels are clipped at saturation afterwards.
-    pub white_balance: WhiteBalance,
     /// How much noise is taken out of the raw frame: 0 none, 1 what is below three standard deviations.
-    #[serde(default)]
     pub denoise: f64,
-    /// How the missing colours are found.
+    /// What is made white.
+    #[serde(alias = "white_balance")]
+    pub white: WhiteBalance,
+    /// What becomes of light beyond saturation.
+    pub highlights: Highlights,
+    /// How the missing colors are found.
     pub demosaic: Demosaic,
-    /// How channels become colours.
+    /// How channels become colors.
     pub color: ColorCorrection,
     /// How bright the picture is made.
     pub brightness: Brightness,
     /// The curve from light to codes.
     pub curve: ToneCurve,
     /// The primaries of the picture.
-    #[serde(default)]
     pub space: ColorSpace,
 }
 
-impl Processing {
-    /// Returns the usual processing of a scene under a known light.
-    pub fn for_light(light: Illuminant) -> Self {
+impl Default for Processing {
+    /// White by the light on the scene, highlights rebuilt, the best demosaic, as bright as exposed, and sRGB.
+    fn default() -> Self {
         Self {
             defect_threshold: None,
             shading: None,
             denoise: 0.0,
-            white_balance: WhiteBalance::Illuminant(light),
-            demosaic: Demosaic::Directional,
-            color: ColorCorrection::Fitted(light),
+            white: WhiteBalance::Scene,
+            highlights: Highlights::Reconstruct,
+            demosaic: Demosaic::DirectionalRatio,
+            color: ColorCorrection::Auto,
             brightness: Brightness::AsExposed,
             curve: ToneCurve::Srgb,
             space: ColorSpace::Srgb,
         }
     }
+}
 
-    /// Returns the processing of the paper's Figure 4: bilinear, no balance, no colour correction, a power of 0.6.
+impl Processing {
+    /// Returns the usual processing of a scene under a known light.
+    pub fn for_light(light: Illuminant) -> Self {
+        Self { white: WhiteBalance::Light(light), ..Self::default() }
+    }
+
+    /// Returns the plain chain: directional interpolation of differences, and channels clipped one by one.
+    pub fn plain() -> Self {
+        Self { highlights: Highlights::Clip, demosaic: Demosaic::Directional, ..Self::default() }
+    }
+
+    /// Returns the processing of the paper's Figure 4: bilinear, no balance, no color correction, a power of 0.6.
     pub fn paper() -> Self {
         Self {
-            defect_threshold: None,
-            shading: None,
-            denoise: 0.0,
-            white_balance: WhiteBalance::None,
+            white: WhiteBalance::None,
             demosaic: Demosaic::Bilinear,
             color: ColorCorrection::None,
-            brightness: Brightness::AsExposed,
             curve: ToneCurve::Gamma(0.6),
-            space: ColorSpace::Srgb,
+            ..Self::plain()
         }
+    }
+
+    /// Returns the processing under the light on the scene, if that is known: `Scene` and `Auto` become what they stand for.
+    #[must_use]
+    pub fn under(&self, light: Option<&Illuminant>) -> Self {
+        let white = match (&self.white, light) {
+            (WhiteBalance::Scene, Some(light)) => WhiteBalance::Light(light.clone()),
+            (WhiteBalance::Scene, None) => WhiteBalance::GrayWorld,
+            (other, _) => other.clone(),
+        };
+        let color = match (&self.color, &white, light) {
+            (ColorCorrection::Auto, WhiteBalance::None, _) => ColorCorrection::None,
+            (ColorCorrection::Auto, WhiteBalance::Light(light), _) | (ColorCorrection::Auto, _, Some(light)) => {
+                ColorCorrection::Fitted(light.clone())
+            }
+            (other, ..) => other.clone(),
+        };
+        Self { white, color, ..self.clone() }
     }
 }
 
 /// Linear light in the primaries of sRGB.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearPicture {
-    /// Light, rows × columns × (red, green, blue); not clipped: colours outside sRGB have negative parts.
+    /// Light, rows × columns × (red, green, blue); not clipped: colors outside sRGB have negative parts, and rebuilt
+    /// highlights parts above 1.
     pub light: Array3<f32>,
+    /// What becomes of light above 1 in a picture.
+    pub highlights: Highlights,
     /// The factor on each channel that made white neutral.
     pub balance: Vec<f64>,
     /// The matrix from balanced channels to linear sRGB.
@@ -116,9 +148,14 @@ impl Sensor {
     pub fn develop_linear(&self, raw: &Raw, processing: &Processing) -> Result<LinearPicture, SensorError> {
         raw.check()?;
         self.check_settings(raw, processing)?;
+        let processing = processing.under(None);
         let tile = raw.tile.as_ref();
         let n_channels = self.filters.len();
         let mut planes = raw.linear();
+        let saturated = match processing.highlights {
+            Highlights::Clip => None,
+            Highlights::Reconstruct => Saturated::find(&planes, tile, n_channels, self.saturated_from(raw)),
+        };
         if let Some(threshold) = processing.defect_threshold {
             defects::correct(&mut planes, tile, threshold as f32);
         }
@@ -129,21 +166,32 @@ impl Sensor {
             let noise = vec![self.sample_noise(raw); n_channels];
             denoise(&mut planes, tile, &noise, processing.denoise);
         }
-        let balance = gains(self, &planes, tile, &processing.white_balance);
-        weigh(&mut planes, tile, &balance);
-        let channels = match tile {
+        let balance = gains(self, &planes, tile, &processing.white)?;
+        weigh(&mut planes, tile, &balance, processing.highlights);
+        let mut channels = match tile {
             Some(tile) => demosaic(&planes[0], tile, n_channels, processing.demosaic)?,
-            None => planes,
+            None => planes.into_iter().map(|plane| plane.as_standard_layout().into_owned()).collect(),
+        };
+        if let Some(saturated) = saturated {
+            reconstruct(&mut channels, &saturated, &balance);
+        }
+        let fitted = |light: &Illuminant| {
+            let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
+            ColorMatrix::fit(self, light, &chart)
         };
         let color = match &processing.color {
             ColorCorrection::None => ColorMatrix::identity(n_channels),
-            ColorCorrection::Fitted(light) => {
-                let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
-                ColorMatrix::fit(self, *light, &chart)
-            }
+            ColorCorrection::Auto => fitted(&light_of_gains(self, &balance)),
+            ColorCorrection::Fitted(light) => fitted(light),
             ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), delta_e: Vec::new() },
         };
-        Ok(LinearPicture { light: mix(&channels, &color), balance, color })
+        Ok(LinearPicture { light: mix(&channels, &color), highlights: processing.highlights, balance, color })
+    }
+
+    /// Returns the share of saturation from which on a sample is taken to be saturated: three deviations of noise below it.
+    fn saturated_from(&self, raw: &Raw) -> f32 {
+        let noise = self.noise_floor_e(raw) / raw.levels.saturation_e();
+        (0.998 - 3.0 * noise).max(0.9) as f32
     }
 
     /// Returns the noise of a frame's samples in units of saturation.
@@ -177,24 +225,14 @@ impl Sensor {
         if raw.filter_names.len() != n_channels {
             return shape("filters of the raw frame", n_channels, raw.filter_names.len());
         }
-        if let WhiteBalance::Gains(gains) = &processing.white_balance {
-            if gains.len() != n_channels {
-                return shape("white balance gains", n_channels, gains.len());
-            }
-            if let Some(&gain) = gains.iter().find(|&&g| !(g > 0.0 && g.is_finite())) {
-                return Err(SensorError::value("the processing", "white_balance.gains", gain, "a number above 0"));
-            }
-        }
-        if let WhiteBalance::WhitePatch { percentile } = processing.white_balance
-            && !(0.0..=100.0).contains(&percentile)
-        {
-            let expected = "a number from 0 to 100";
-            return Err(SensorError::value("the processing", "white_balance.percentile", percentile, expected));
+        processing.white.check(n_channels)?;
+        if let ColorCorrection::Fitted(light) = &processing.color {
+            light.check()?;
         }
         if let ColorCorrection::Matrix(rows) = &processing.color
             && let Some(row) = rows.iter().find(|row| row.len() != n_channels)
         {
-            return shape("factors in a row of the colour matrix", n_channels, row.len());
+            return shape("factors in a row of the color matrix", n_channels, row.len());
         }
         let (key, value, right) = match processing.brightness {
             Brightness::AsExposed => ("", 1.0, true),
@@ -219,28 +257,32 @@ impl LinearPicture {
         self.light
     }
 
-    /// Returns the picture of a brightness, a tone curve and primaries; colours outside these are clipped.
+    /// Returns the picture of a brightness, a tone curve and primaries; colors outside these are clipped, but for highlights that
+    /// keep their hue.
     pub fn encode(self, brightness: Brightness, curve: ToneCurve, space: ColorSpace) -> Developed {
         let brightness = factor(&self.light, brightness);
         let table = curve.table();
+        let keeps_hue = self.highlights == Highlights::Reconstruct;
         let mut codes = self.light;
         let all = codes.as_slice_mut().expect("linear pictures are made contiguous");
         all.par_chunks_exact_mut(3).for_each(|pixel| {
             let light = space.from_linear_srgb([0, 1, 2].map(|i| pixel[i] * brightness as f32));
+            let light = if keeps_hue { dimmed(light) } else { light };
             pixel.iter_mut().zip(light).for_each(|(code, light)| *code = table.encode(light));
         });
         Developed { picture: Picture { codes }, balance: self.balance, color: self.color, brightness }
     }
 }
 
-/// Multiplies each channel by its factor and clips it at saturation.
-fn weigh(planes: &mut [Array2<f32>], tile: Option<&crate::Tile>, balance: &[f64]) {
+/// Multiplies each channel by its factor, and clips it at the saturation of the least sensitive where highlights are clipped.
+fn weigh(planes: &mut [Array2<f32>], tile: Option<&crate::Tile>, balance: &[f64], highlights: Highlights) {
+    let top = if highlights == Highlights::Clip { 1.0 } else { f32::INFINITY };
     for (number, plane) in planes.iter_mut().enumerate() {
         plane.outer_iter_mut().into_par_iter().enumerate().for_each(|(row, mut values)| {
             let filters = tile.map_or(std::slice::from_ref(&number), |tile| tile.row(row));
             let gains: Vec<f32> = filters.iter().map(|&filter| balance[filter] as f32).collect();
             let gains = gains.iter().cycle();
-            values.iter_mut().zip(gains).for_each(|(value, gain)| *value = (*value * gain).min(1.0));
+            values.iter_mut().zip(gains).for_each(|(value, gain)| *value = (*value * gain).min(top));
         });
     }
 }

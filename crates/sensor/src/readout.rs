@@ -4,7 +4,9 @@ use ndarray::Array2;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::{Electrons, Exposure, Noise, Raw, RawPlane, Sensor, SensorError, Volts, noise::Kind, raw::Levels};
+use crate::{
+    Electrons, Exposure, Noise, NoiseSource, Raw, RawPlane, Sensor, SensorError, Volts, noise::Kind, raw::Levels,
+};
 
 impl Sensor {
     /// Returns the voltages at the pixels' outputs: not amplified and not clipped, so that noise keeps its shape.
@@ -85,22 +87,26 @@ struct Readout<'a> {
 impl<'a> Readout<'a> {
     fn new(sensor: &Sensor, exposure: &Exposure, noise: &'a Noise, plane: usize, n_columns: usize) -> Self {
         let gain_v_per_e = sensor.conversion_gain_v_per_e(exposure.gain_mode);
-        let on = |switch: bool, rms: f64| if switch { rms } else { 0.0 };
+        let on = |source: NoiseSource, rms: f64| if noise.has(source) { rms } else { 0.0 };
         let mut gain_rng = noise.rng(Kind::ColumnGain, plane, 0);
         let mut offset_rng = noise.rng(Kind::ColumnOffset, plane, 0);
         let column = |_| {
             let (g, o): (f64, f64) = (StandardNormal.sample(&mut gain_rng), StandardNormal.sample(&mut offset_rng));
-            let gain = gain_v_per_e * (1.0 + on(noise.column, sensor.column_gain_fraction) * g);
-            (gain as f32, (on(noise.column, sensor.column_offset_v) * o) as f32)
+            let gain = gain_v_per_e * (1.0 + on(NoiseSource::Column, sensor.column_gain_fraction) * g);
+            (gain as f32, (on(NoiseSource::Column, sensor.column_offset_v) * o) as f32)
         };
         Self {
             noise,
             plane,
             columns: (0..n_columns).map(column).collect(),
-            read_noise_v: on(noise.read, sensor.read_noise_v(exposure.gain_mode)),
-            reset_noise_v: on(noise.reset && !sensor.correlated_double_sampling, sensor.reset_noise_v),
-            row_noise_v: on(noise.row, sensor.row_noise_v),
-            dsnu_v: on(noise.dsnu, sensor.dsnu_v),
+            read_noise_v: on(NoiseSource::Read, sensor.read_noise_v(exposure.gain_mode)),
+            reset_noise_v: if sensor.correlated_double_sampling {
+                0.0
+            } else {
+                on(NoiseSource::Reset, sensor.reset_noise_v)
+            },
+            row_noise_v: on(NoiseSource::Row, sensor.row_noise_v),
+            dsnu_v: on(NoiseSource::Dsnu, sensor.dsnu_v),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Spatial CIELAB: colour differences as the eye sees them at a distance, and the visual signal-to-noise ratio.
+//! Spatial CIELAB: color differences as the eye sees them at a distance, and the visual signal-to-noise ratio.
 //!
 //! Zhang & Wandell, "A spatial extension of CIELAB for digital color-image reproduction", SID Journal 5 (1997): the
 //! picture is parted into light–dark, red–green and blue–yellow, each is blurred as the eye blurs it, and CIELAB is taken
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::{SensorError, blur::gaussian_blur, similarity::check_sizes};
 
-/// Opponent colours from XYZ (the paper's equation for the 1931 observer).
+/// Opponent colors from XYZ (the paper's equation for the 1931 observer).
 const OPPONENT_FROM_XYZ: [[f64; 3]; 3] = [[0.279, 0.72, -0.107], [-0.449, 0.29, -0.077], [0.086, -0.59, 0.501]];
 const XYZ_FROM_OPPONENT: [[f64; 3]; 3] = [
     [0.626_554_504, -1.867_177_598, -0.153_156_373],
@@ -18,7 +18,7 @@ const XYZ_FROM_OPPONENT: [[f64; 3]; 3] = [
     [1.505_650_755, 1.421_323_772, 2.536_021_080],
 ];
 
-/// The eye's blur of each opponent colour: weights, and spreads s of exp(−r² / s²) in degrees (the paper's table 1).
+/// The eye's blur of each opponent color: weights, and spreads s of exp(−r² / s²) in degrees (the paper's table 1).
 const KERNELS: [&[(f64, f64)]; 3] = [
     &[(0.921, 0.0283), (0.105, 0.133), (-0.108, 4.336)],
     &[(0.531, 0.0392), (0.330, 0.494)],
@@ -45,7 +45,7 @@ pub fn scielab_delta_e(
     Ok(Array2::from_shape_vec((rows, columns), delta_e).expect("one difference a pixel"))
 }
 
-/// Returns the visual signal-to-noise ratio of an even patch in linear sRGB: one over the rms colour difference (ΔE₀₀ of
+/// Returns the visual signal-to-noise ratio of an even patch in linear sRGB: one over the rms color difference (ΔE₀₀ of
 /// S-CIELAB) of its pixels from their mean, as seen at a number of pixels a degree.
 ///
 /// After Farrell, Okincha, Parmar & Wandell, "Using visible SNR (vSNR) to compare the image quality of pixel binning and
@@ -74,7 +74,7 @@ fn seen(linear: &Array3<f32>, pixels_per_degree: f64) -> Result<Array2<Lab>, Sen
         let plane = Array2::from_shape_fn((rows, columns), |(r, c)| {
             xyz_at(r, c).iter().zip(weights).map(|(v, w)| v * w).sum::<f64>() as f32
         });
-        // The weights are made to sum to 1, so that an even picture keeps its colour.
+        // The weights are made to sum to 1, so that an even picture keeps its color.
         let total: f64 = KERNELS[opponent].iter().map(|(weight, _)| weight).sum();
         let mut sum = Array2::<f32>::zeros((rows, columns));
         for (weight, spread_deg) in KERNELS[opponent] {
@@ -114,8 +114,8 @@ mod tests {
             assert!((f64::from(value) - wanted).abs() < 1e-2, "{value} instead of {wanted}");
         }
         let checkered = Array3::from_shape_fn((40, 40, 3), |(r, c, _)| if (r + c) % 2 == 0 { 0.7 } else { 0.3 });
-        let grey = even([0.5; 3]);
-        let mean = |ppd| f64::from(scielab_delta_e(&checkered, &grey, ppd).unwrap().mean().unwrap());
+        let gray = even([0.5; 3]);
+        let mean = |ppd| f64::from(scielab_delta_e(&checkered, &gray, ppd).unwrap().mean().unwrap());
         assert!(mean(10.0) > 5.0 && mean(100.0) < 0.5, "{} {}", mean(10.0), mean(100.0));
         assert!(scielab_delta_e(&a, &b, 0.0).is_err());
     }

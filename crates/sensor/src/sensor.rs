@@ -31,11 +31,11 @@ pub struct Sensor {
     pub columns: usize,
     /// The distance between pixels, µm; pixels are square.
     pub pixel_pitch_um: f64,
-    /// The share of the pixel's area that collects light, 0–1. Below 1 the aperture is a centred square.
+    /// The share of the pixel's area that collects light, 0–1. Below 1 the aperture is a centerd square.
     pub fill_factor: f64,
     /// Which filter lies on which pixel.
     pub cfa: Cfa,
-    /// The colour filters, each with the quantum efficiency of a pixel behind it.
+    /// The color filters, each with the quantum efficiency of a pixel behind it.
     pub filters: Vec<Filter>,
     /// Glass over the whole array: infrared cut, cover glass, anti-alias filter.
     #[serde(default)]
@@ -111,13 +111,14 @@ pub struct Sensor {
     pub blooming_fraction: f64,
 }
 
-/// A colour filter with the pixel behind it.
+/// A color filter with the pixel behind it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Filter {
     /// The name that the mosaic uses, often one letter.
     pub name: String,
-    /// Electrons a photon that falls on the pixel's aperture; 0 beyond the table.
+    /// Electrons a photon that falls on the pixel's aperture; 0 beyond the table, but for the rest of a band whose center
+    /// the table holds.
     pub quantum_efficiency: Spectrum,
 }
 
@@ -185,6 +186,9 @@ fn yes() -> bool {
     true
 }
 
+/// A table that ends below this share of its peak is taken to have ended with the filter.
+const DARK_END: f64 = 0.01;
+
 /// Planck's constant × the speed of light, J m.
 const HC_J_M: f64 = 6.626_070_15e-34 * 299_792_458.0;
 
@@ -217,22 +221,27 @@ impl Sensor {
 
     /// Returns the electrons an incident photon of a wavelength makes behind a filter, with all layers.
     pub fn quantum_efficiency(&self, filter: usize, wavelength_nm: f64) -> f64 {
-        let layers: f64 = self.filter_stack.iter().map(|l| l.transmittance.at_held(wavelength_nm)).product();
-        self.filters[filter].quantum_efficiency.at_or_zero(wavelength_nm) * layers
+        self.filters[filter].quantum_efficiency.at_or_zero(wavelength_nm) * self.layers_transmittance(wavelength_nm)
     }
 
     /// Returns, for each filter and band, the electrons a second that an irradiance of 1 W m⁻² nm⁻¹ makes in a pixel.
     ///
-    /// The quantum efficiency × the wavelength is averaged over the width of the band.
+    /// The quantum efficiency × the wavelength is averaged over the width of the band. In a band whose center lies within
+    /// a filter's table the end values of the table are held; one whose center lies beyond collects what the table holds
+    /// of it, and nothing of the rest: [`bands_beyond_tables`](Self::bands_beyond_tables) lists those.
     pub fn electron_weights(&self, grid: &WavelengthGrid) -> Vec<Vec<f64>> {
         let area_m2 = 1e-12 * self.pixel_pitch_um.powi(2) * self.fill_factor;
         (0..self.filters.len())
             .map(|filter| {
+                let table = &self.filters[filter].quantum_efficiency;
                 let weight = |(&center_nm, &width_nm): (&f64, &f64)| {
+                    let (first_nm, last_nm) = table.range_nm();
+                    let is_within = (first_nm..=last_nm).contains(&center_nm);
+                    let in_table = |nm: f64| if is_within { nm.clamp(first_nm, last_nm) } else { nm };
                     let n = (2.0 * width_nm).ceil().max(1.0) as usize;
                     let mean = (0..n)
                         .map(|i| center_nm + width_nm * ((i as f64 + 0.5) / n as f64 - 0.5))
-                        .map(|nm| self.quantum_efficiency(filter, nm) * 1e-9 * nm)
+                        .map(|nm| table.at_or_zero(in_table(nm)) * self.layers_transmittance(nm) * 1e-9 * nm)
                         .sum::<f64>()
                         / n as f64;
                     area_m2 * width_nm * mean / HC_J_M
@@ -240,6 +249,33 @@ impl Sensor {
                 grid.centers_nm().iter().zip(grid.widths_nm()).map(weight).collect()
             })
             .collect()
+    }
+
+    /// Returns, for each filter whose quantum efficiency is not known in some bands, a sentence that names them.
+    ///
+    /// No electrons are counted there: a table that ends at 0 loses nothing, one that does not ends the filter abruptly,
+    /// and only the latter are listed.
+    pub fn bands_beyond_tables(&self, grid: &WavelengthGrid) -> Vec<String> {
+        let (first_band_nm, last_band_nm) = grid.range_nm();
+        let sentence = |filter: &Filter| {
+            let table = &filter.quantum_efficiency;
+            let (first_nm, last_nm) = table.range_nm();
+            let peak = table.values().iter().copied().fold(0.0, f64::max);
+            let is_cut = |nm: f64| table.at_held(nm) > DARK_END * peak;
+            let is_beyond = first_band_nm < first_nm && is_cut(first_nm) || last_band_nm > last_nm && is_cut(last_nm);
+            is_beyond.then(|| {
+                format!(
+                    "the quantum efficiency of {} of {} is known from {first_nm} to {last_nm} nm, and taken as 0 in the \
+                     bands beyond, which reach from {first_band_nm} to {last_band_nm} nm",
+                    filter.name, self.name
+                )
+            })
+        };
+        self.filters.iter().filter_map(sentence).collect()
+    }
+
+    fn layers_transmittance(&self, wavelength_nm: f64) -> f64 {
+        self.filter_stack.iter().map(|l| l.transmittance.at_held(wavelength_nm)).product()
     }
 
     /// Returns the conversion gain of a readout mode, V an electron.

@@ -35,7 +35,7 @@ pub struct ShadingMap {
 }
 
 impl ShadingMap {
-    /// Returns the map that makes a frame of an evenly lit grey field even, 1 where each filter is brightest.
+    /// Returns the map that makes a frame of an evenly lit gray field even, 1 where each filter is brightest.
     ///
     /// Each cell takes the mean of its pixels, so that noise averages out.
     ///

@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use crate::SensorError;
 
 /// How bright the picture is made.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Brightness {
     /// As exposed: saturation of the least sensitive channel is white.
+    #[default]
     AsExposed,
     /// Multiplied by a factor.
     Factor(f64),
@@ -22,15 +23,16 @@ pub enum Brightness {
 }
 
 /// The curve from linear light to codes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum ToneCurve {
     /// None: codes are linear light.
     Linear,
     /// The curve of sRGB and Display P3 (IEC 61966-2-1).
+    #[default]
     Srgb,
     /// A power law: code = light^exponent.
     Gamma(f64),
-    /// The curve of sRGB after an S about middle grey; 0 is none, 1 strong.
+    /// The curve of sRGB after an S about middle gray; 0 is none, 1 strong.
     Filmic {
         /// 0 to 1.
         contrast: f64,
@@ -56,7 +58,7 @@ impl ToneCurve {
             Self::Srgb => srgb_encode(light),
             Self::Gamma(exponent) => light.powf(exponent),
             Self::Filmic { contrast } => {
-                // In codes, so that the S is about middle grey: a blend with the smooth step 3 x² − 2 x³.
+                // In codes, so that the S is about middle gray: a blend with the smooth step 3 x² − 2 x³.
                 let code = srgb_encode(light);
                 code + contrast * (code * code * (3.0 - 2.0 * code) - code)
             }

@@ -5,7 +5,7 @@
 use approx::assert_relative_eq;
 use dioptric_sensor::{
     Adc, AutoExposure, Cfa, Exposure, ExposureControl, Filter, GainMode, HighGain, Illumination, Metering, Noise,
-    RawPlane, Sensor,
+    NoiseSource, RawPlane, Sensor,
 };
 use dioptric_spectrum::{Quantity, SpectralImage, Spectrum, WavelengthGrid};
 use ndarray::{Array2, array};
@@ -21,7 +21,7 @@ fn photon_counter() -> Sensor {
 }
 
 #[test]
-fn a_milliwatt_in_ten_nanometres_gives_3987_photons() {
+fn a_milliwatt_in_ten_nanometers_gives_3987_photons() {
     // 1e-3 W m⁻² nm⁻¹ × 10 nm × (4 µm)² × 0.9 × 10 ms × 550 nm / (h c).
     let sensor = Sensor { pixel_pitch_um: 4.0, fill_factor: 0.9, ..photon_counter() };
     let rate = sensor.electron_rate(&Illumination::on_pixels(&band(array![[1e-3]]))).unwrap();
@@ -139,8 +139,8 @@ fn switching_one_noise_off_leaves_the_others_as_they_were() {
         sensor.capture(&Illumination::on_pixels(&image), &control, &noise).unwrap().volts.planes_v.remove(0)
     };
     let none = volts(Noise::none());
-    let (dsnu, read) = (Noise { dsnu: true, ..Noise::none() }, Noise { read: true, seed: 3, ..Noise::none() });
-    let both = volts(Noise { dsnu: true, ..read });
+    let (dsnu, read) = (Noise::only(0, &[NoiseSource::Dsnu]), Noise::only(3, &[NoiseSource::Read]));
+    let both = volts(Noise::only(3, &[NoiseSource::Dsnu, NoiseSource::Read]));
     let sum = &(&volts(dsnu) - &none) + &(&volts(read) - &none);
     for (a, b) in (&both - &none).iter().zip(&sum) {
         // Differences of voltages near 0.4 V in single precision.
@@ -181,9 +181,52 @@ fn exposures_are_metered() {
     check(Metering::Peak, f64::INFINITY, 5_000.0);
     check(Metering::Mean, f64::INFINITY, 50_000.0 / 1.09);
     check(Metering::Peak, 1e-3, 443.0 * (3986.9966 / 0.9 / 4430.0));
+    for wrong in [f64::NAN, -1.0, 100.1] {
+        let metering = Metering::Percentile(wrong);
+        for message in [
+            rate.metered(metering).unwrap_err().to_string(),
+            ExposureControl::Auto(AutoExposure::new(metering, 0.5)).check().unwrap_err().to_string(),
+        ] {
+            assert!(message.contains("Percentile") && message.contains("0 to 100"), "{message}");
+        }
+    }
     let dark = sensor.electron_rate(&Illumination::on_pixels(&band(Array2::zeros((4, 4))))).unwrap();
     let auto = ExposureControl::Auto(AutoExposure::new(Metering::Mean, 0.5));
     assert!(sensor.expose(&dark, &auto).unwrap_err().to_string().contains("no light"));
+}
+
+#[test]
+fn no_time_is_a_bias_frame() {
+    let sensor = Sensor { read_noise_v: 1e-3, ..photon_counter() };
+    let image = band(Array2::from_elem((64, 64), 1e-2));
+    let control = |time_s| ExposureControl::Manual(Exposure::seconds(time_s));
+    let bias = sensor.capture(&Illumination::on_pixels(&image), &control(0.0), &Noise::all(1)).unwrap();
+    assert!(bias.electrons.planes_e[0].iter().all(|&e| e == 0.0));
+    // The standard error of a deviation from 4096 pixels is 1.1 %.
+    assert_relative_eq!(f64::from(bias.volts.planes_v[0].std(0.0)), 1e-3, max_relative = 0.05);
+    for wrong in [-1e-3, f64::NAN, f64::INFINITY] {
+        assert!(control(wrong).check().unwrap_err().to_string().contains("time_s"), "{wrong}");
+    }
+}
+
+#[test]
+fn the_last_band_of_a_table_is_whole() {
+    let flat = |first_nm: f64, last_nm: f64| {
+        let quantum_efficiency = Spectrum::new(vec![first_nm, last_nm], vec![0.5, 0.5]).unwrap();
+        Sensor { filters: vec![Filter { name: "Y".to_owned(), quantum_efficiency }], ..photon_counter() }
+    };
+    let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
+    let (short, long) = (flat(400.0, 700.0), flat(300.0, 800.0));
+    // The tables end at the centers of the outermost bands.
+    assert_eq!(short.electron_weights(&grid), long.electron_weights(&grid));
+    assert!(short.bands_beyond_tables(&grid).is_empty());
+    // Bands whose centers lie beyond collect nothing, and are named.
+    let shorter = flat(400.0, 680.0);
+    assert_eq!(shorter.electron_weights(&grid)[0][29..], [0.0; 2]);
+    let sentences = shorter.bands_beyond_tables(&grid);
+    assert!(sentences.len() == 1 && sentences[0].contains("400 to 680 nm"), "{sentences:?}");
+    // A filter that has ended where its table does loses nothing.
+    assert!(Sensor::built_in("nikon-d5100").unwrap().bands_beyond_tables(&grid).is_empty());
 }
 
 #[test]

@@ -90,9 +90,9 @@ fn the_grain_of_figure_4_is_that_of_the_authors_picture() {
     let ours = grain(&ours_noisy.codes, &ours_clean.codes);
     let told = |grain: &Grain| format!("{:.4?} {:.3?} {:.3?}", grain.deviation, grain.correlation, grain.phases);
     let both = format!("ours {}\ntheirs {}", told(&ours), told(&theirs));
-    // Red and blue lie on a quarter of the pixels each: bilinear interpolation makes neighbours alike by 2/3, diagonal
+    // Red and blue lie on a quarter of the pixels each: bilinear interpolation makes neighbors alike by 2/3, diagonal
     // ones by 4/9. Of 120² pixels, 3600 are independent: three standard errors are 0.05. Green is left out here: the
-    // authors' colour transform mixes red and blue noise into it.
+    // authors' color transform mixes red and blue noise into it.
     for k in [0, 2] {
         for ((ours, theirs), lag) in ours.correlation[k].iter().zip(&theirs.correlation[k]).zip(LAGS) {
             assert!((ours - theirs).abs() < 0.05, "channel {k}, lag {lag:?}: {ours:.3}, theirs {theirs:.3}\n{both}");
@@ -102,7 +102,7 @@ fn the_grain_of_figure_4_is_that_of_the_authors_picture() {
             assert!((ours - theirs).abs() < 0.12, "channel {k}: {both}");
         }
     }
-    // How grainy: of a power of 0.6, 0.05 V of 1.15 V. Their colour transform and stretch are not known, only that they
+    // How grainy: of a power of 0.6, 0.05 V of 1.15 V. Their color transform and stretch are not known, only that they
     // amplify; ours is the plain sensor, so that theirs must be as grainy or more, within a factor of two and a half.
     for k in 0..3 {
         let ratio = theirs.deviation[k] / ours.deviation[k];

@@ -1,16 +1,17 @@
-//! Pictures: colours of a chart, and demosaics held to a sensor that has every filter in every pixel.
+//! Pictures: colors of a chart, and demosaics held to a sensor that has every filter in every pixel.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by a panic")]
 
 mod common;
 
-use common::{PATCH, chart, lit, lit_by_d65};
+use common::{PATCH, chart, chart_under, lit, lit_by_d65};
 use dioptric_sensor::{
-    Adc, AutoExposure, Brightness, Cfa, Demosaic, Developed, Exposure, ExposureControl, Illumination, Metering, Noise,
-    Processing, Sensor, ToneCurve, WhiteBalance, psnr_db,
+    Adc, AutoExposure, Brightness, Cfa, ChartReport, Demosaic, Developed, Exposure, ExposureControl, Highlights,
+    Illumination, Metering, Noise, Picture, Processing, Sensor, ToneCurve, WhiteBalance, psnr_db,
 };
 use dioptric_spectrum::{
-    Illuminant, Lab, Observer, SpectralImage, WavelengthGrid, Xyz, color_checker_reflectances, delta_e_2000,
+    Illuminant, Lab, Observer, Quantity, SpectralImage, WavelengthGrid, Xyz, color_checker_reflectances, delta_e_2000,
+    srgb_decode,
 };
 use ndarray::Array2;
 
@@ -39,7 +40,7 @@ fn chart_delta_e(sensor: &Sensor, noise: &Noise) -> Vec<f64> {
         .collect();
     let got: Vec<[f64; 3]> = (0..24)
         .map(|patch| {
-            // The middle of the patch, away from its neighbours.
+            // The middle of the patch, away from its neighbors.
             let (row, column) = (PATCH * (patch / 6) + 8, PATCH * (patch % 6) + 8);
             let mean = |i: usize| {
                 let view = linear.light.slice(ndarray::s![row..row + 8, column..column + 8, i]);
@@ -68,6 +69,26 @@ fn a_chart_through_a_phones_sensor_keeps_its_colors() {
 }
 
 #[test]
+fn charts_keep_their_colors_under_four_lights() {
+    for (name, most) in [("imx363", 2.5), ("nikon-d5100", 2.5)] {
+        let sensor = Sensor::built_in(name).unwrap();
+        for light in [Illuminant::A, Illuminant::D65, Illuminant::Fl2, Illuminant::Fl11] {
+            let image = chart_under(&light);
+            // The white patch is made white, and nothing is told of the light.
+            let (row, column) = (3 * PATCH, 0);
+            let patch = WhiteBalance::Patch { left: column + 4, top: row + 4, width: PATCH - 8, height: PATCH - 8 };
+            let processing = Processing { white: patch, ..Processing::default() };
+            let capture = sensor.capture(&Illumination::on_pixels(&image), &WHITE_AT_90, &Noise::none()).unwrap();
+            let linear = sensor.develop_linear(&capture.raw, &processing.under(Some(&light))).unwrap();
+            let (height, width) = ((4 * PATCH) as f64 - 0.5, (6 * PATCH) as f64 - 0.5);
+            let corners = [(-0.5, -0.5), (-0.5, width), (height, width), (height, -0.5)];
+            let report = ChartReport::measure(&linear.light, corners, &light).unwrap();
+            assert!(report.mean_delta_e() < most, "{name} under {light:?}: {:.2}", report.mean_delta_e());
+        }
+    }
+}
+
+#[test]
 fn a_chart_through_an_observing_sensor_is_exact() {
     let delta_e = chart_delta_e(&Sensor::built_in("ideal").unwrap(), &Noise::none());
     // Bands of 10 nm and steps of 5 nm in the sensor's curves are what is left.
@@ -75,7 +96,7 @@ fn a_chart_through_an_observing_sensor_is_exact() {
 }
 
 #[test]
-fn monochrome_gives_a_grey_picture() {
+fn monochrome_gives_a_gray_picture() {
     let sensor = Sensor::built_in("machine-vision-mono").unwrap();
     let developed = develop(&sensor, &chart(), &Noise::all(1), &Processing::for_light(Illuminant::D65));
     assert_eq!(developed.balance, [1.0]);
@@ -90,20 +111,63 @@ fn white_is_found_by_every_balance() {
     let grid = WavelengthGrid::uniform(380.0, 730.0, 10.0).unwrap();
     // A hill that is its own mirror image, so that the pixels of each filter have the same mean.
     let slope = |i: usize| (i as f32 - 31.5).abs();
-    let grey = Array2::from_shape_fn((64, 64), |(r, c)| 0.5 - 0.004 * (slope(r) + slope(c)));
-    let planes = vec![grey; grid.len()];
+    let gray = Array2::from_shape_fn((64, 64), |(r, c)| 0.5 - 0.004 * (slope(r) + slope(c)));
+    let planes = vec![gray; grid.len()];
     let image = lit(grid, planes);
-    for white_balance in [
-        WhiteBalance::GreyWorld,
+    for white in [
+        WhiteBalance::GrayWorld,
         WhiteBalance::WhitePatch { percentile: 99.0 },
-        WhiteBalance::Illuminant(Illuminant::D65),
+        WhiteBalance::Light(Illuminant::D65),
+        WhiteBalance::ShadesOfGray { exponent: 6.0 },
+        WhiteBalance::GrayEdge { exponent: 6.0, sigma_px: 1.0 },
+        WhiteBalance::Patch { left: 8, top: 16, width: 48, height: 32 },
     ] {
-        let processing = Processing { white_balance: white_balance.clone(), ..Processing::for_light(Illuminant::D65) };
+        let processing = Processing { white: white.clone(), ..Processing::for_light(Illuminant::D65) };
         let developed = develop(&sensor, &image, &Noise::none(), &processing);
         let mean = |i: usize| developed.picture.codes.index_axis(ndarray::Axis(2), i).mean().unwrap();
         let (red, green, blue) = (mean(0), mean(1), mean(2));
         // The mean of 4096 pixels of 10 bits each.
-        assert!((red - green).abs() < 2e-3 && (blue - green).abs() < 2e-3, "{white_balance:?}: {red} {green} {blue}");
+        assert!((red - green).abs() < 2e-3 && (blue - green).abs() < 2e-3, "{white:?}: {red} {green} {blue}");
+    }
+}
+
+/// Returns CIELAB of the middle of a picture.
+fn middle_lab(picture: &Picture) -> Lab {
+    let (row, column) = (picture.rows() / 2, picture.columns() / 2);
+    let linear = [0, 1, 2].map(|k| srgb_decode(f64::from(picture.codes[(row, column, k)])));
+    Xyz::from_linear_srgb(linear).to_lab(Xyz::D65)
+}
+
+#[test]
+fn a_blown_lamp_keeps_its_hue() {
+    let sensor = Sensor::built_in("nikon-d5100").unwrap();
+    let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
+    let lamp = Illuminant::Blackbody(2600.0).white_radiance(&grid, 1.0);
+    let ground = Illuminant::D65.white_radiance(&grid, 0.002);
+    let shape = |r: usize, c: usize| (-((r as f64 - 32.0).powi(2) + (c as f64 - 32.0).powi(2)) / 72.0).exp();
+    let plane = |b: usize| Array2::from_shape_fn((64, 64), |(r, c)| (lamp[b] * shape(r, c) + ground[b]) as f32);
+    let planes = (0..grid.len()).map(plane).collect();
+    let image = SpectralImage::new(Quantity::Irradiance, grid, planes).unwrap();
+    let light = Illumination::on_pixels(&image);
+    let metered = ExposureControl::Auto(AutoExposure::new(Metering::Peak, 0.8));
+    let dim = sensor.capture(&light, &metered, &Noise::none()).unwrap();
+    let processing = Processing::for_light(Illuminant::D65);
+    let wanted = middle_lab(&sensor.develop(&dim.raw, &processing).unwrap().picture);
+    for times in [1.6, 3.0, 20.0] {
+        let longer = Exposure { time_s: times * dim.exposure.time_s, ..dim.exposure };
+        let blown = sensor.capture(&light, &ExposureControl::Manual(longer), &Noise::all(1)).unwrap();
+        let lab = |highlights| {
+            let processing = Processing { highlights, ..processing.clone() };
+            middle_lab(&sensor.develop(&blown.raw, &processing).unwrap().picture)
+        };
+        let (kept, clipped) = (lab(Highlights::Reconstruct), lab(Highlights::Clip));
+        let hue_deg = |lab: Lab| lab.b.atan2(lab.a).to_degrees();
+        let chroma = |lab: Lab| lab.a.hypot(lab.b);
+        assert!((hue_deg(kept) - hue_deg(wanted)).abs() < 5.0, "{times}: {kept:?}, not {wanted:?}");
+        assert!(chroma(kept) > 0.8 * chroma(wanted), "{times}: {kept:?}, not {wanted:?}");
+        // Cut channel by channel it turns to yellow, then white.
+        let turned = (hue_deg(clipped) - hue_deg(wanted)).abs() > 5.0 || chroma(clipped) < 0.5 * chroma(wanted);
+        assert!(turned, "{times}: {clipped:?}, not far from {wanted:?}");
     }
 }
 
@@ -122,10 +186,11 @@ fn brightness_is_put_where_it_is_asked() {
     assert!((luminances[luminances.len() / 2] - 0.18).abs() < 1e-3);
 }
 
-const METHODS: [Demosaic; 4] = [Demosaic::Nearest, Demosaic::Bilinear, Demosaic::Malvar, Demosaic::Directional];
+const METHODS: [Demosaic; 5] =
+    [Demosaic::Nearest, Demosaic::Bilinear, Demosaic::Malvar, Demosaic::Directional, Demosaic::DirectionalRatio];
 
 /// Returns the PSNR of each method, dB, of codes against those of a sensor with every filter in every pixel.
-fn demosaic_psnr_db(path: &std::path::Path, cfa: &Cfa) -> [f64; 4] {
+fn demosaic_psnr_db(path: &std::path::Path, cfa: &Cfa) -> [f64; 5] {
     let image = lit_by_d65(path);
     let mosaic = Sensor { cfa: cfa.clone(), adc: Adc::Analog, ..Sensor::built_in("imx363").unwrap() };
     let full = Sensor { cfa: Cfa::Stacked, ..mosaic.clone() };
@@ -143,9 +208,11 @@ fn the_good_demosaic_beats_bilinear_by_three_decibels() {
     for name in ["cave_chart_and_stuffed_toy", "cave_stuffed_toys_256"] {
         let path = dioptric_golden::shared(&format!("data/scenes/{name}.reflectance.exr")).unwrap();
         for letters in ["RGGB", "GBRG"] {
-            let [nearest, bilinear, malvar, directional] = demosaic_psnr_db(&path, &Cfa::two_by_two(letters).unwrap());
-            let quoted = format!("{name} {letters}: {nearest:.2} {bilinear:.2} {malvar:.2} {directional:.2}");
+            let found = demosaic_psnr_db(&path, &Cfa::two_by_two(letters).unwrap());
+            let [nearest, bilinear, malvar, directional, ratio] = found;
+            let quoted = format!("{name} {letters}: {found:.2?}");
             assert!(nearest < bilinear && bilinear < malvar && bilinear + 3.0 <= directional, "{quoted}");
+            assert!(directional + 1.0 <= ratio, "{quoted}");
         }
     }
 }
@@ -155,7 +222,7 @@ fn the_good_demosaic_beats_bilinear_by_three_decibels() {
 fn other_mosaics_gain_from_detail() {
     let path = dioptric_golden::shared("data/scenes/cave_stuffed_toys_256.reflectance.exr").unwrap();
     let quad = Cfa::two_by_two("RGGB").unwrap().repeated(2);
-    let [nearest, bilinear, _, directional] = demosaic_psnr_db(&path, &quad);
+    let [nearest, bilinear, _, directional, _] = demosaic_psnr_db(&path, &quad);
     let quoted = format!("quad Bayer: {nearest:.2} {bilinear:.2} {directional:.2}");
     assert!(nearest < bilinear && bilinear < directional, "{quoted}");
 }

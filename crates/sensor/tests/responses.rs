@@ -8,8 +8,8 @@ mod common;
 use approx::assert_relative_eq;
 use common::{PATCH, chart};
 use dioptric_sensor::{
-    Adc, AutoExposure, Capture, ChartReport, ElectronRate, Exposure, ExposureControl, Illumination, LensShading,
-    LinearPicture, Metering, Noise, Processing, Raw, Response, Sensor, ShadingMap,
+    Adc, AutoExposure, Capture, ChartReport, ElectronRate, ExitPupil, Exposure, ExposureControl, Illumination,
+    LensShading, LinearPicture, Metering, Noise, Processing, Raw, Response, Sensor, ShadingMap,
 };
 use dioptric_spectrum::{Illuminant, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
@@ -18,6 +18,12 @@ use ndarray::Array2;
 fn sensor(response: Response) -> Sensor {
     let adc = Adc::Bits { bits: 12, black_level_dn: 64, step_v: None };
     Sensor { adc, response, ..Sensor::built_in("imx363").unwrap() }
+}
+
+/// Returns one 10 nm band about 550 nm.
+fn band(plane: Array2<f32>) -> SpectralImage {
+    let grid = WavelengthGrid::uniform(550.0, 550.0, 10.0).unwrap();
+    SpectralImage::new(Quantity::Irradiance, grid, vec![plane]).unwrap()
 }
 
 fn bent_responses(swing_v: f64) -> [Response; 2] {
@@ -54,13 +60,13 @@ fn a_bent_response_is_undone_by_the_time_there_is_a_picture() {
         assert_ne!(capture.raw.dn(), metered.raw.dn());
         let light = developed(&bent, &capture.raw).light;
         let worst = light.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        // A step of 1/4032 is up to 7 times as much light where a curve is flattest, and the colour matrix doubles it.
+        // A step of 1/4032 is up to 7 times as much light where a curve is flattest, and the color matrix doubles it.
         assert!(worst < 0.01, "{response:?}: {worst}");
         let corners = {
             let (rows, columns) = (4.0 * PATCH as f64 - 0.5, 6.0 * PATCH as f64 - 0.5);
             [(-0.5, -0.5), (-0.5, columns), (rows, columns), (rows, -0.5)]
         };
-        let report = ChartReport::measure(&light, corners, Illuminant::D65).unwrap();
+        let report = ChartReport::measure(&light, corners, &Illuminant::D65).unwrap();
         assert!(report.mean_delta_e() < 2.5, "{response:?}: {:.2}", report.mean_delta_e());
     }
 }
@@ -127,7 +133,8 @@ fn oblique_light_is_lost_by_the_table_and_shading_correction_brings_it_back() {
     let image = SpectralImage::new(Quantity::Irradiance, grid, planes).unwrap();
     // The corner is 2 mm from the axis: with the pupil 5.5 mm away its chief ray comes in at 20°.
     let distance_mm = 2.0 / 20.0_f64.to_radians().tan();
-    let light = Illumination { exit_pupil_distance_mm: Some(distance_mm), ..Illumination::on_pixels(&image) };
+    let exit_pupil = Some(ExitPupil::centered(distance_mm));
+    let light = Illumination { exit_pupil, ..Illumination::on_pixels(&image) };
     let control = ExposureControl::Auto(AutoExposure::new(Metering::Peak, 0.8));
     let capture = sensor.capture(&light, &control, &Noise::none()).unwrap();
     let linear = &capture.raw.linear()[0];
@@ -146,6 +153,33 @@ fn oblique_light_is_lost_by_the_table_and_shading_correction_brings_it_back() {
     let plain = sensor.develop_linear(&capture.raw, &Processing::for_light(Illuminant::E)).unwrap().light;
     let fall = |light: &ndarray::Array3<f32>| light[(2, 2, 1)] / light[(60, 80, 1)];
     assert!(fall(&plain) < 0.65 && (fall(&corrected) - 1.0).abs() < 0.03, "{} {}", fall(&plain), fall(&corrected));
+}
+
+#[test]
+fn chief_rays_follow_the_exit_pupil() {
+    let even = band(Array2::from_elem((41, 61), 1e-3));
+    let table = vec![(0.0, 1.0), (45.0, 0.1)];
+    let sensor = Sensor { chief_ray_response: table, pixel_pitch_um: 50.0, ..sensor(Response::Linear) };
+    let rate = |sensor: &Sensor, exit_pupil| {
+        let light = Illumination { exit_pupil: Some(exit_pupil), ..Illumination::on_pixels(&even) };
+        sensor.electron_rate(&light).map(|rate| rate.planes_e_per_s[0].clone())
+    };
+    let before = rate(&sensor, ExitPupil::centered(3.0)).unwrap();
+    assert!(before[(20, 0)] < 0.7 * before[(20, 30)]);
+    // A chief ray is a line: which side of the film the pupil lies on does not turn it.
+    assert_eq!(rate(&sensor, ExitPupil::centered(-3.0)).unwrap(), before);
+    // With the axis half a millimeter to the right and 0.3 mm down, so is the frame of rates.
+    let aside = rate(&sensor, ExitPupil { distance_mm: 3.0, axis_mm: [0.5, 0.3] }).unwrap();
+    for (row, column) in [(20, 30), (3, 12), (30, 48)] {
+        // Pixels of the same filter; the places round differently.
+        assert_relative_eq!(aside[(row + 6, column + 10)], before[(row, column)], max_relative = 1e-6);
+    }
+    // A sensor that does not mind the angle takes a pupil on either side too.
+    let plain = Sensor { chief_ray_response: Vec::new(), ..sensor.clone() };
+    assert_eq!(rate(&plain, ExitPupil::centered(-3.0)).unwrap(), rate(&plain, ExitPupil::centered(3.0)).unwrap());
+    for wrong in [0.0, f64::NAN, f64::INFINITY] {
+        assert!(rate(&sensor, ExitPupil::centered(wrong)).unwrap_err().to_string().contains("exit_pupil"), "{wrong}");
+    }
 }
 
 /// Returns the rms difference of the light of two pictures over the patches' middles.

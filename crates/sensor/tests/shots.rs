@@ -1,4 +1,4 @@
-//! Bursts and brackets, every colour filter array, and files.
+//! Bursts and brackets, every color filter array, and files.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by a panic")]
 
@@ -9,7 +9,7 @@ use approx::assert_relative_eq;
 use common::chart;
 use dioptric_sensor::{
     Adc, AutoExposure, Cfa, ChartReport, ColorCorrection, Demosaic, Depth, ElectronRate, Exposure, ExposureControl,
-    Filter, Illumination, Metering, Noise, Picture, Processing, Raw, RawPlane, Response, Sensor,
+    Filter, Illumination, Metering, Noise, NoiseSource, Picture, Processing, Raw, RawPlane, Response, Sensor,
 };
 use dioptric_spectrum::{Illuminant, Spectrum};
 use ndarray::{Array2, Array3};
@@ -87,7 +87,7 @@ const Y: (&str, [f64; 3]) = ("Y", [1.0, 1.0, 0.0]);
 const W: (&str, [f64; 3]) = ("W", [1.0, 1.0, 1.0]);
 
 #[test]
-fn every_colour_filter_array_keeps_the_chart() {
+fn every_color_filter_array_keeps_the_chart() {
     let two = |letters| Cfa::two_by_two(letters).unwrap();
     let rgbw = {
         let row = |names: &str| names.chars().map(String::from).collect();
@@ -115,15 +115,15 @@ fn every_colour_filter_array_keeps_the_chart() {
             let (rows, columns, _) = linear.light.dim();
             let corners =
                 [(0, 0), (0, columns), (rows, columns), (rows, 0)].map(|(r, c)| (r as f64 - 0.5, c as f64 - 0.5));
-            let report = ChartReport::measure(&linear.light, corners, Illuminant::D65).unwrap();
-            // All these filters span the same colours as imx363's own, whose matrix has a mean of 1.84.
+            let report = ChartReport::measure(&linear.light, corners, &Illuminant::D65).unwrap();
+            // All these filters span the same colors as imx363's own, whose matrix has a mean of 1.84.
             assert!(report.mean_delta_e() < 2.5, "{name} {demosaic:?}: {:.2}", report.mean_delta_e());
         }
     }
 }
 
 #[test]
-fn a_car_camera_of_red_and_clear_sees_grey_and_red() {
+fn a_car_camera_of_red_and_clear_sees_gray_and_red() {
     let sensor = with_filters(Cfa::two_by_two("RCCC").unwrap(), &[R, ("C", [1.0, 1.0, 1.0])]);
     let control = ExposureControl::Auto(AutoExposure::new(Metering::Peak, 0.9));
     let capture = sensor.capture(&Illumination::on_pixels(&chart()), &control, &Noise::none()).unwrap();
@@ -157,7 +157,7 @@ fn a_multispectral_mosaic_comes_from_a_table() {
     let capture = sensor.capture(&Illumination::on_pixels(&chart()), &control, &Noise::none()).unwrap();
     let linear = sensor.develop_linear(&capture.raw, &Processing::for_light(Illuminant::D65)).unwrap();
     assert_eq!(linear.color.rows[0].len(), 9);
-    // Nine bands see colour better than three.
+    // Nine bands see color better than three.
     assert!(linear.color.mean_delta_e().unwrap() < 1.0, "{:?}", linear.color.mean_delta_e());
 }
 
@@ -166,7 +166,7 @@ fn hot_and_dead_pixels_are_mended() {
     let defects = dioptric_sensor::Defects { hot_fraction: 0.002, hot_e_per_s: 1e6, dead_fraction: 0.002 };
     let sensor = Sensor { defects, prnu_fraction: 0.0, ..Sensor::built_in("imx363").unwrap() };
     let rate = ElectronRate { planes_e_per_s: vec![Array2::from_elem((120, 160), 2e5)] };
-    let raw = expose(&sensor, &rate, &Exposure::seconds(0.01), &Noise { defects: true, ..Noise::none() });
+    let raw = expose(&sensor, &rate, &Exposure::seconds(0.01), &Noise::only(0, &[NoiseSource::Defects]));
     let processing = Processing { color: ColorCorrection::None, ..Processing::for_light(Illuminant::D65) };
     let spread = |defect_threshold| {
         let processing = Processing { defect_threshold, ..processing.clone() };
@@ -220,7 +220,7 @@ fn raw_numbers_come_back_from_png_tiff_and_dng() {
         assert!(back.pixels().zip(dn).all(|(pixel, &dn)| pixel.0[0] == dn), "{name}");
     }
     let path = folder.path().join("raw.dng");
-    sensor.write_dng(&raw, Illuminant::D65, &path).unwrap();
+    sensor.write_dng(&raw, &Illuminant::D65, &path).unwrap();
     let tags = tags_of(&std::fs::read(&path).unwrap());
     assert_eq!(tags[&262], [32803]);
     assert_eq!(tags[&33421], [2, 2]);
@@ -257,10 +257,10 @@ fn what_cannot_be_written_says_why_and_leaves_nothing() {
     assert!(message(raw.write(&folder.path().join("raw.jpg"))).contains("png, tif or tiff"));
     assert!(message(raw.write(&folder.path().join("no/such/raw.png"))).contains("no/such"));
     let (ideal, planes) = raw_of("ideal");
-    assert!(message(ideal.write_dng(&planes, Illuminant::D65, &folder.path().join("a.dng"))).contains("volts"));
+    assert!(message(ideal.write_dng(&planes, &Illuminant::D65, &folder.path().join("a.dng"))).contains("volts"));
     let (d100, volts) = raw_of("nikon-d100");
     assert!(matches!(volts.planes[0], RawPlane::Volts(_)));
-    assert!(message(d100.write_dng(&volts, Illuminant::D65, &folder.path().join("a.dng"))).contains("volts"));
+    assert!(message(d100.write_dng(&volts, &Illuminant::D65, &folder.path().join("a.dng"))).contains("volts"));
     let odd = Sensor { filters: vec![], ..sensor };
     assert!(odd.check().is_err());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
@@ -298,7 +298,7 @@ fn frames_for_other_readers_are_written_where_asked() {
     for (name, sensor) in dng_sensors() {
         let raw = chart_raw(&sensor);
         let path = folder.join(format!("{name}.dng"));
-        sensor.write_dng(&raw, Illuminant::D65, &path).unwrap();
+        sensor.write_dng(&raw, &Illuminant::D65, &path).unwrap();
         for (plane, filter) in raw.planes.iter().zip(&raw.filter_names) {
             let one = Raw { planes: vec![plane.clone()], ..raw.clone() };
             let png = if raw.planes.len() == 1 { format!("{name}.png") } else { format!("{name}.{filter}.png") };
@@ -332,7 +332,7 @@ fn a_bent_response_goes_with_the_table_that_straightens_it() {
     let (_, sensor) = dng_sensors().into_iter().find(|(name, _)| *name == "logarithmic").unwrap();
     let raw = chart_raw(&sensor);
     let path = folder.path().join("log.dng");
-    sensor.write_dng(&raw, Illuminant::D65, &path).unwrap();
+    sensor.write_dng(&raw, &Illuminant::D65, &path).unwrap();
     let tags = tags_of(&std::fs::read(&path).unwrap());
     let (table, black, white) = (&tags[&50712], tags[&50714][0] / tags[&50714][1], tags[&50717][0]);
     let linear = &raw.linear()[0];
@@ -360,7 +360,7 @@ fn what_dng_cannot_hold_is_refused_in_one_sentence() {
         ("a large tile", Cfa::two_by_two("RGGB").unwrap().repeated(8), &[R, G, B]),
     ] {
         let sensor = Sensor { adc: imx363.adc, ..with_filters(cfa, filters) };
-        let message = sensor.write_dng(&chart_raw(&sensor), Illuminant::D65, &path).unwrap_err().to_string();
+        let message = sensor.write_dng(&chart_raw(&sensor), &Illuminant::D65, &path).unwrap_err().to_string();
         assert!(message.starts_with("a DNG file has") && !message.contains('\n'), "{what}: {message}");
         assert!(!path.exists());
     }

@@ -1,10 +1,10 @@
-//! What an observer sees of a spectrum, and how far apart two colours are.
+//! What an observer sees of a spectrum, and how far apart two colors are.
 
 use std::sync::LazyLock;
 
 use crate::{Spectrum, WavelengthGrid};
 
-// CIE 018:2019 colour-matching functions, 1 nm, as collected in colour-science 0.4.7 (BSD-3-Clause).
+// CIE 018:2019 color-matching functions, 1 nm, as collected in colour-science 0.4.7 (BSD-3-Clause).
 const CMF: &str = include_str!("../data/cie_cmf_1nm.csv");
 
 /// Lumens a watt at the peak of V(λ) (SI, 683.002 for the CMF table).
@@ -29,7 +29,7 @@ pub enum Observer {
 }
 
 impl Observer {
-    /// The colour-matching functions x̄, ȳ, z̄.
+    /// The color-matching functions x̄, ȳ, z̄.
     pub fn matching_functions(self) -> &'static [Spectrum; 3] {
         match self {
             Self::Cie1931 => &CIE1931,
@@ -47,7 +47,7 @@ impl Observer {
                 .iter()
                 .zip(grid.widths_nm())
                 .map(|(&center, &width)| {
-                    // The table is given every nanometre: a mean of points half a nanometre apart is exact to 1e-4.
+                    // The table is given every nanometer: a mean of points half a nanometer apart is exact to 1e-4.
                     let n = (2.0 * width).ceil().max(1.0) as usize;
                     let mean = (0..n)
                         .map(|i| bar.at_or_zero(center + width * ((i as f64 + 0.5) / n as f64 - 0.5)))
@@ -105,7 +105,7 @@ impl Xyz {
     }
 }
 
-/// A colour in CIELAB.
+/// A color in CIELAB.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lab {
     /// Lightness, 0–100.
@@ -158,7 +158,7 @@ pub fn srgb_decode(code: f64) -> f64 {
     if code <= 0.040_45 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Returns the colour difference ΔE₀₀ (CIE 142-2001, with k's of 1).
+/// Returns the color difference ΔE₀₀ (CIE 142-2001, with k's of 1).
 pub fn delta_e_2000(first: Lab, second: Lab) -> f64 {
     let c_mean7 = (0.5 * (first.a.hypot(first.b) + second.a.hypot(second.b))).powi(7);
     let g = 0.5 * (1.0 - (c_mean7 / (c_mean7 + 25.0_f64.powi(7))).sqrt());

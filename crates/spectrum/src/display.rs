@@ -22,11 +22,11 @@ impl Display {
         }
     }
 
-    /// Returns the spectra of red, green and blue such that an sRGB picture shown on this display keeps its colour.
+    /// Returns the spectra of red, green and blue such that an sRGB picture shown on this display keeps its color.
     ///
     /// The primaries are mixed so that linear sRGB (r, g, b) gives its own tristimulus values, white having the
     /// luminance `white_cd_m2`. A mixture can have negative parts: a display of smaller gamut than sRGB cannot show
-    /// every colour; the sum over one pixel is then clipped at 0 by the caller.
+    /// every color; the sum over one pixel is then clipped at 0 by the caller.
     pub fn srgb_basis(&self, grid: &WavelengthGrid, white_cd_m2: f64) -> [Vec<f64>; 3] {
         let sampled = self.primaries.each_ref().map(|p| p.sample_or_zero(grid));
         let columns = sampled.each_ref().map(|values| Observer::Cie1931.xyz(grid, values).0);
@@ -54,7 +54,7 @@ mod tests {
     use approx::assert_abs_diff_eq;
 
     #[test]
-    fn a_lifted_colour_is_seen_as_it_was() {
+    fn a_lifted_color_is_seen_as_it_was() {
         let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
         let basis = Display::apple_studio().srgb_basis(&grid, 100.0);
         let rgb = [0.8, 0.3, 0.1];

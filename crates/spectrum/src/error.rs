@@ -44,7 +44,7 @@ pub enum SpectrumError {
         "the {wavelength_nm} nm band holds {value} at row {row}, column {column}: expected a finite number, 0 or more"
     )]
     Sample {
-        /// Centre of the band, nm.
+        /// Center of the band, nm.
         wavelength_nm: f64,
         /// Row of the sample.
         row: usize,
@@ -62,6 +62,16 @@ pub enum SpectrumError {
         column: usize,
         /// What stood there, m.
         value: f32,
+    },
+    /// A light that there cannot be.
+    #[error("{what} is {found}, expected {expected}")]
+    Light {
+        /// What of the light is wrong.
+        what: &'static str,
+        /// What stood there.
+        found: String,
+        /// What would do.
+        expected: String,
     },
     /// A name that names nothing.
     #[error("no {kind} is named '{name}'; known: {known}")]

@@ -4,19 +4,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::SpectrumError;
 
-/// A list of ascending band centres, each with the width that it stands for.
+/// A list of ascending band centers, each with the width that it stands for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct WavelengthGrid {
-    // Invariants: centres ascend and are finite and positive; as many widths, all positive.
+    // Invariants: centers ascend and are finite and positive; as many widths, all positive.
     centers_nm: Vec<f64>,
     widths_nm: Vec<f64>,
 }
 
 impl WavelengthGrid {
-    /// Returns a grid on these band centres; each band reaches half-way to its neighbours.
+    /// Returns a grid on these band centers; each band reaches half-way to its neighbors.
     ///
-    /// The first and the last band are symmetric about their centre; a single band is 1 nm wide.
+    /// The first and the last band are symmetric about their center; a single band is 1 nm wide.
     ///
     /// # Errors
     /// When the list is empty, not ascending, or not finite and positive.
@@ -51,7 +51,7 @@ impl WavelengthGrid {
         Ok(Self { centers_nm, widths_nm })
     }
 
-    /// The band centres, nm.
+    /// The band centers, nm.
     pub fn centers_nm(&self) -> &[f64] {
         &self.centers_nm
     }
@@ -67,12 +67,12 @@ impl WavelengthGrid {
         self.centers_nm.len()
     }
 
-    /// The first and the last band centre, nm.
+    /// The first and the last band center, nm.
     pub fn range_nm(&self) -> (f64, f64) {
         (self.centers_nm[0], self.centers_nm[self.len() - 1])
     }
 
-    /// Returns the band whose centre is nearest.
+    /// Returns the band whose center is nearest.
     pub fn nearest(&self, wavelength_nm: f64) -> usize {
         let above = self.centers_nm.partition_point(|&c| c < wavelength_nm).min(self.len() - 1);
         let below = above.saturating_sub(1);
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn widths_reach_half_way_to_the_neighbours() {
+    fn widths_reach_half_way_to_the_neighbors() {
         let grid = WavelengthGrid::new(vec![400.0, 410.0, 440.0]).unwrap();
         assert_eq!(grid.widths_nm(), [10.0, 20.0, 30.0]);
     }

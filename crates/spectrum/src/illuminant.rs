@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Observer, Spectrum, SpectrumError, WavelengthGrid};
+use crate::{Observer, Spectrum, SpectrumError, WavelengthGrid, Xyz};
 
 // CIE 015 and CIE 191 tables as collected in colour-science 0.4.7 (BSD-3-Clause).
 const ILLUMINANTS: &str = include_str!("../data/cie_illuminants_5nm.csv");
@@ -10,8 +10,8 @@ const DAYLIGHT_BASIS: &str = include_str!("../data/cie_daylight_basis.csv");
 // Average of 30 charts measured by BabelColor (D. Pascale), as collected in colour-science 0.4.7.
 const COLOR_CHECKER: &str = include_str!("../data/colorchecker_babelcolor_average.csv");
 
-/// A light, by name or by temperature.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// A light, by name, by temperature, by chromaticity or by its measured spectrum.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Illuminant {
     /// Incandescent light, CIE A.
     A,
@@ -33,8 +33,20 @@ pub enum Illuminant {
     LedB3,
     /// A black body of this temperature, K.
     Blackbody(f64),
-    /// The daylight of this correlated colour temperature, 4000–25000 K.
+    /// The daylight of this correlated color temperature, 4000–25000 K.
     Daylight(f64),
+    /// A smooth light of this chromaticity of the 1931 observer.
+    ///
+    /// It is the black body (below 5000 K) or the daylight of the nearest color temperature times exp(a t + b t²), t
+    /// being the wavelength from 550 nm in units of 150 nm, held beyond ±1.2.
+    Chromaticity {
+        /// x.
+        x: f64,
+        /// y.
+        y: f64,
+    },
+    /// A measured relative spectral power; beyond its table the end values are held.
+    Spectrum(Spectrum),
 }
 
 impl Illuminant {
@@ -66,8 +78,87 @@ impl Illuminant {
         })
     }
 
+    /// Returns the light of a name (in any case), of a temperature (`3200K`) or of a chromaticity (`0.46,0.414`).
+    ///
+    /// A temperature is that of a black body below 5000 K, and of a daylight from there on.
+    ///
+    /// # Errors
+    /// When the text is none of these, or names a light that [`check`](Self::check) refuses.
+    pub fn parse(text: &str) -> Result<Self, SpectrumError> {
+        let kelvin = text.strip_suffix(['K', 'k']).and_then(|number| number.trim().parse().ok());
+        let point = || {
+            let (x, y) = text.split_once(',')?;
+            Some(Self::Chromaticity { x: x.trim().parse().ok()?, y: y.trim().parse().ok()? })
+        };
+        let light = match kelvin {
+            Some(kelvin) => Self::of_temperature(kelvin),
+            None => point().map_or_else(|| Self::named(text), Ok)?,
+        };
+        light.check().map(|()| light)
+    }
+
+    /// Returns the black body of a temperature below 5000 K, and the daylight of a temperature from there on.
+    pub fn of_temperature(kelvin: f64) -> Self {
+        if kelvin < DAYLIGHT_FROM_K { Self::Blackbody(kelvin) } else { Self::Daylight(kelvin) }
+    }
+
+    /// Checks that there can be such a light.
+    ///
+    /// # Errors
+    /// When a temperature is not 500–100 000 K (black body) or 4000–25 000 K (daylight), no smooth light has the
+    /// chromaticity, or a spectrum has a negative value or none above 0.
+    pub fn check(&self) -> Result<(), SpectrumError> {
+        let within = |what, kelvin: f64, least: f64, most: f64| match (least..=most).contains(&kelvin) {
+            true => Ok(()),
+            false => Err(SpectrumError::Light {
+                what,
+                found: format!("{kelvin} K"),
+                expected: format!("{least} to {most} K"),
+            }),
+        };
+        match self {
+            Self::Blackbody(kelvin) => within("the temperature of a black body", *kelvin, 500.0, 100_000.0),
+            Self::Daylight(kelvin) => within("the temperature of a daylight", *kelvin, 4000.0, 25_000.0),
+            Self::Chromaticity { x, y } => {
+                let wrong = || SpectrumError::Light {
+                    what: "the chromaticity of a light",
+                    found: format!("{x}, {y}"),
+                    expected: "x, y of a whitish light".to_owned(),
+                };
+                if !(*x > 0.0 && *y > 0.0 && x + y < 1.0) {
+                    return Err(wrong());
+                }
+                let [cx, cy] = self.chromaticity();
+                // A thousandth is less than an eye sees.
+                if (cx - x).hypot(cy - y) < 1e-3 { Ok(()) } else { Err(wrong()) }
+            }
+            Self::Spectrum(spectrum) => {
+                let negative = spectrum.values().iter().copied().find(|v| *v < 0.0);
+                let wrong = negative.or(spectrum.values().iter().all(|v| *v == 0.0).then_some(0.0));
+                wrong.map_or(Ok(()), |value| {
+                    Err(SpectrumError::Light {
+                        what: "the spectrum of a light",
+                        found: value.to_string(),
+                        expected: "values of 0 or more, one above 0".to_owned(),
+                    })
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the chromaticity x, y for the 1931 observer.
+    pub fn chromaticity(&self) -> [f64; 2] {
+        Observer::Cie1931.xyz(&visible(), &self.spectrum().sample_held(&visible())).chromaticity()
+    }
+
+    /// Returns the correlated color temperature.
+    pub fn color_temperature(&self) -> ColorTemperature {
+        ColorTemperature::of_chromaticity(self.chromaticity())
+    }
+
     /// Returns the relative spectral power; the scale is that of its table (100 at 560 nm for most).
-    pub fn spectrum(self) -> Spectrum {
+    pub fn spectrum(&self) -> Spectrum {
         let table = |name| Spectrum::from_embedded_csv(ILLUMINANTS, name).expect("the embedded table has this column");
         match self {
             Self::A => blackbody(2855.5).scaled(100.0 / blackbody(2855.5).at_held(560.0)),
@@ -79,14 +170,16 @@ impl Illuminant {
             Self::Fl2 => table("FL2"),
             Self::Fl11 => table("FL11"),
             Self::LedB3 => table("LED-B3"),
-            Self::Blackbody(kelvin) => blackbody(kelvin),
-            Self::Daylight(kelvin) => daylight(kelvin),
+            Self::Blackbody(kelvin) => blackbody(*kelvin),
+            Self::Daylight(kelvin) => daylight(*kelvin),
+            Self::Chromaticity { x, y } => of_chromaticity([*x, *y]),
+            Self::Spectrum(spectrum) => spectrum.clone(),
         }
     }
 
     /// Returns the radiance of a perfect white diffuser under this light, W m⁻² sr⁻¹ nm⁻¹ a band,
     /// at an illuminance in lux (luminance = illuminance / π).
-    pub fn white_radiance(self, grid: &WavelengthGrid, illuminance_lux: f64) -> Vec<f64> {
+    pub fn white_radiance(&self, grid: &WavelengthGrid, illuminance_lux: f64) -> Vec<f64> {
         let spectrum = self.spectrum();
         // The luminance comes from the full 1 nm table, not from the caller's grid.
         let fine = WavelengthGrid::uniform(360.0, 830.0, 1.0).expect("a valid range");
@@ -96,24 +189,127 @@ impl Illuminant {
     }
 }
 
+/// Where the CIE turns from black bodies to daylights as reference lights (CIE 13.3), K.
+const DAYLIGHT_FROM_K: f64 = 5000.0;
+
+/// The bands on which lights are compared, every 5 nm.
+fn visible() -> WavelengthGrid {
+    WavelengthGrid::uniform(360.0, 830.0, 5.0).expect("a valid range")
+}
+
+/// A correlated color temperature: that of the black body whose color is nearest, in CIE 1960 u, v.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ColorTemperature {
+    /// The temperature, K; moved into 1000–40 000.
+    pub kelvin: f64,
+    /// How far the color lies from that of the black body (Duv); above 0 on the green side.
+    pub duv: f64,
+}
+
+impl ColorTemperature {
+    /// Returns the correlated color temperature of a chromaticity x, y (CIE 15:2018, 9.5).
+    pub fn of_chromaticity(xy: [f64; 2]) -> Self {
+        let weights = Observer::Cie1931.weights(&visible());
+        let grid = visible();
+        let planckian = |mired: f64| {
+            let values: Vec<f64> = grid.centers_nm().iter().map(|&nm| planck(nm, 1e6 / mired)).collect();
+            let xyz = weights.each_ref().map(|w| w.iter().zip(&values).map(|(w, v)| w * v).sum::<f64>());
+            uv(Xyz(xyz).chromaticity())
+        };
+        let wanted = uv(xy);
+        let distance = |mired: f64| {
+            let [u, v] = planckian(mired);
+            (u - wanted[0]).hypot(v - wanted[1])
+        };
+        // The nearest of steps of 15 mired, then its surroundings by golden section.
+        const STEP: f64 = 15.0;
+        let nearest = (0..=65).map(|i| 25.0 + STEP * f64::from(i)).min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+        let nearest = nearest.expect("there are steps");
+        let (mut low, mut high) = ((nearest - STEP).max(25.0), (nearest + STEP).min(1000.0));
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        while high - low > 1e-4 {
+            let (a, b) = (high - golden * (high - low), low + golden * (high - low));
+            if distance(a) < distance(b) { high = b } else { low = a }
+        }
+        let mired = 0.5 * (low + high);
+        let [_, v] = planckian(mired);
+        Self { kelvin: 1e6 / mired, duv: distance(mired).copysign(wanted[1] - v) }
+    }
+}
+
+/// Returns CIE 1960 u, v of a chromaticity x, y.
+fn uv([x, y]: [f64; 2]) -> [f64; 2] {
+    let denominator = -2.0 * x + 12.0 * y + 3.0;
+    [4.0 * x / denominator, 6.0 * y / denominator]
+}
+
+/// Returns the spectrum of [`Illuminant::Chromaticity`].
+fn of_chromaticity(wanted: [f64; 2]) -> Spectrum {
+    let kelvin = ColorTemperature::of_chromaticity(wanted).kelvin;
+    let base = Illuminant::of_temperature(kelvin).spectrum();
+    let grid = WavelengthGrid::uniform(300.0, 830.0, 5.0).expect("a valid range");
+    let base = base.sample_held(&grid);
+    let tilted = |[a, b]: [f64; 2]| -> Vec<f64> {
+        let factor = |nm: &f64| {
+            let t = ((nm - 550.0) / 150.0).clamp(-1.2, 1.2);
+            (a * t + b * t * t).exp()
+        };
+        grid.centers_nm().iter().map(factor).zip(&base).map(|(f, s)| f * s).collect()
+    };
+    let weights = Observer::Cie1931.weights(&grid);
+    let miss = |p: [f64; 2]| {
+        let values = tilted(p);
+        let xyz = weights.each_ref().map(|w| w.iter().zip(&values).map(|(w, v)| w * v).sum::<f64>());
+        let [x, y] = Xyz(xyz).chromaticity();
+        [x - wanted[0], y - wanted[1]]
+    };
+    // Newton's method; steps are held so that a far chromaticity does not overflow.
+    const STEP: f64 = 1e-5;
+    let mut p = [0.0; 2];
+    for _ in 0..40 {
+        let now = miss(p);
+        let slopes = [0, 1].map(|i| {
+            let mut moved = p;
+            moved[i] += STEP;
+            let next = miss(moved);
+            [(next[0] - now[0]) / STEP, (next[1] - now[1]) / STEP]
+        });
+        let determinant = slopes[0][0] * slopes[1][1] - slopes[1][0] * slopes[0][1];
+        if determinant.abs() < 1e-12 {
+            break;
+        }
+        let step = [
+            (now[1] * slopes[1][0] - now[0] * slopes[1][1]) / determinant,
+            (now[0] * slopes[0][1] - now[1] * slopes[0][0]) / determinant,
+        ];
+        for (p, step) in p.iter_mut().zip(step) {
+            *p = (*p + step.clamp(-1.0, 1.0)).clamp(-20.0, 20.0);
+        }
+        if step[0].hypot(step[1]) < 1e-10 {
+            break;
+        }
+    }
+    Spectrum::new(grid.centers_nm().to_vec(), tilted(p)).expect("exponentials of held numbers are finite")
+}
+
+/// Returns the spectral radiance of a black body at one wavelength, W m⁻² sr⁻¹ nm⁻¹ (Planck's law).
+fn planck(wavelength_nm: f64, kelvin: f64) -> f64 {
+    const C1L: f64 = 1.191_042_972e-16; // 2 h c², W m² sr⁻¹
+    const C2: f64 = 1.438_776_877e-2;
+    let m = wavelength_nm * 1e-9;
+    1e-9 * C1L / (m.powi(5) * (C2 / (m * kelvin)).exp_m1())
+}
+
 /// Returns the spectral radiance of a black body, W m⁻² sr⁻¹ nm⁻¹, every 5 nm from 300 to 1100 nm.
 ///
 /// Planck's law with c₂ = 1.438 776 877 × 10⁻² m K.
 pub fn blackbody(kelvin: f64) -> Spectrum {
-    const C1L: f64 = 1.191_042_972e-16; // 2 h c², W m² sr⁻¹
-    const C2: f64 = 1.438_776_877e-2;
     let wavelengths_nm: Vec<f64> = (0..=160).map(|i| 300.0 + 5.0 * f64::from(i)).collect();
-    let values = wavelengths_nm
-        .iter()
-        .map(|nm| {
-            let m = nm * 1e-9;
-            1e-9 * C1L / (m.powi(5) * (C2 / (m * kelvin)).exp_m1())
-        })
-        .collect();
+    let values = wavelengths_nm.iter().map(|&nm| planck(nm, kelvin)).collect();
     Spectrum::new(wavelengths_nm, values).expect("Planck's law is finite at a positive temperature")
 }
 
-/// Returns the CIE daylight of a correlated colour temperature, 100 at 560 nm (CIE 015:2018, 4.1.2).
+/// Returns the CIE daylight of a correlated color temperature, 100 at 560 nm (CIE 015:2018, 4.1.2).
 ///
 /// The temperature is moved into 4000–25000 K, where the formulas hold.
 pub fn daylight(kelvin: f64) -> Spectrum {
@@ -170,6 +366,59 @@ mod tests {
             assert_abs_diff_eq!(cx, x, epsilon = 1.5e-4);
             assert_abs_diff_eq!(cy, y, epsilon = 1.5e-4);
         }
+    }
+
+    #[test]
+    fn color_temperatures_are_those_of_the_tables() {
+        // CIE 15:2018 gives D65 6504 K and D50 5003 K; A is a black body of 2856 K; FL2 4230 K, FL11 4000 K.
+        for (light, kelvin, within) in [
+            (Illuminant::D65, 6504.0, 6.0),
+            (Illuminant::D50, 5003.0, 5.0),
+            (Illuminant::A, 2855.5, 1.0),
+            (Illuminant::Blackbody(4321.0), 4321.0, 1.0),
+            (Illuminant::Fl2, 4230.0, 10.0),
+            (Illuminant::Fl11, 4000.0, 10.0),
+        ] {
+            let found = light.color_temperature();
+            assert_abs_diff_eq!(found.kelvin, kelvin, epsilon = within);
+        }
+        // Daylight lies above the black bodies, by about 0.003.
+        let d65 = Illuminant::D65.color_temperature();
+        assert!((0.0028..0.0036).contains(&d65.duv), "{d65:?}");
+        assert!(Illuminant::Blackbody(3000.0).color_temperature().duv.abs() < 1e-5);
+    }
+
+    #[test]
+    fn light_of_a_chromaticity_has_it() {
+        for xy in [[0.46, 0.414], [0.3127, 0.329], [0.3127, 0.350], [0.38, 0.36], [0.28, 0.29]] {
+            let light = Illuminant::parse(&format!("{},{}", xy[0], xy[1])).unwrap();
+            let [x, y] = light.chromaticity();
+            assert_abs_diff_eq!(x, xy[0], epsilon = 1e-4);
+            assert_abs_diff_eq!(y, xy[1], epsilon = 1e-4);
+            assert!(light.spectrum().values().iter().all(|v| *v > 0.0));
+        }
+    }
+
+    #[test]
+    fn impossible_lights_are_refused() {
+        assert_eq!(Illuminant::parse("3200K").unwrap(), Illuminant::Blackbody(3200.0));
+        assert_eq!(Illuminant::parse("6500 k").unwrap(), Illuminant::Daylight(6500.0));
+        assert_eq!(Illuminant::parse("fl2").unwrap(), Illuminant::Fl2);
+        for (text, word) in [
+            ("-3K", "500 to"),
+            ("nanK", "D65"),
+            ("30000K", "25000 K"),
+            ("0.9,0.3", "whitish"),
+            ("0,0.3", "whitish"),
+            ("D66", "D65"),
+            ("0.3,0.3,0.3", "D65"),
+        ] {
+            let message = Illuminant::parse(text).unwrap_err().to_string();
+            assert!(message.contains(word), "{text}: {message}");
+        }
+        let dark = Spectrum::new(vec![400.0, 700.0], vec![0.0, 0.0]).unwrap();
+        assert!(Illuminant::Spectrum(dark).check().is_err());
+        assert!(Illuminant::Blackbody(f64::NAN).check().is_err());
     }
 
     #[test]

@@ -184,7 +184,7 @@ impl Bands for SpectralImage {
     }
 }
 
-/// Distance along the axis from the projection centre, in metres, a value a sample.
+/// Distance along the axis from the projection center, in metres, a value a sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthMap {
     // Invariant: every value is above 0; infinity is allowed (sky).

@@ -1,6 +1,6 @@
-//! Wavelength grids, spectra, spectral images, illuminants, observers and colour.
+//! Wavelength grids, spectra, spectral images, illuminants, observers and color.
 //!
-//! Wavelengths are nanometres. Spectral radiance is W m⁻² sr⁻¹ nm⁻¹, spectral irradiance
+//! Wavelengths are nanometers. Spectral radiance is W m⁻² sr⁻¹ nm⁻¹, spectral irradiance
 //! W m⁻² nm⁻¹. Row 0 of an image is its top, upright as the photographer sees it.
 //!
 //! This crate is the bottom layer: it knows nothing of lenses, scenes, sensors or files.
@@ -32,6 +32,6 @@ pub use color::{Lab, Observer, Xyz, adapt_bradford, delta_e_2000, srgb_decode, s
 pub use display::Display;
 pub use error::SpectrumError;
 pub use grid::WavelengthGrid;
-pub use illuminant::{Illuminant, blackbody, color_checker_reflectances, daylight};
+pub use illuminant::{ColorTemperature, Illuminant, blackbody, color_checker_reflectances, daylight};
 pub use image::{Bands, DepthMap, Quantity, SpectralImage};
 pub use spectrum::Spectrum;

@@ -51,6 +51,11 @@ impl Spectrum {
         &self.wavelengths_nm
     }
 
+    /// The first and the last wavelength of the table, nm.
+    pub fn range_nm(&self) -> (f64, f64) {
+        (self.wavelengths_nm[0], self.wavelengths_nm[self.wavelengths_nm.len() - 1])
+    }
+
     /// The values of the table.
     pub fn values(&self) -> &[f64] {
         &self.values
@@ -72,16 +77,16 @@ impl Spectrum {
 
     /// Returns the value at a wavelength; beyond the table it is 0.
     pub fn at_or_zero(&self, wavelength_nm: f64) -> f64 {
-        let last = self.wavelengths_nm[self.wavelengths_nm.len() - 1];
-        if wavelength_nm < self.wavelengths_nm[0] || wavelength_nm > last { 0.0 } else { self.at_held(wavelength_nm) }
+        let (first, last) = self.range_nm();
+        if wavelength_nm < first || wavelength_nm > last { 0.0 } else { self.at_held(wavelength_nm) }
     }
 
-    /// Returns [`at_held`](Self::at_held) at each band centre.
+    /// Returns [`at_held`](Self::at_held) at each band center.
     pub fn sample_held(&self, grid: &WavelengthGrid) -> Vec<f64> {
         grid.centers_nm().iter().map(|&w| self.at_held(w)).collect()
     }
 
-    /// Returns [`at_or_zero`](Self::at_or_zero) at each band centre.
+    /// Returns [`at_or_zero`](Self::at_or_zero) at each band center.
     pub fn sample_or_zero(&self, grid: &WavelengthGrid) -> Vec<f64> {
         grid.centers_nm().iter().map(|&w| self.at_or_zero(w)).collect()
     }

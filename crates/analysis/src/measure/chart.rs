@@ -11,7 +11,7 @@ use crate::{Corner, LineChart, Scale, Series};
 use dioptric_pipeline::{PipelineError, display::code, parse_numbers};
 
 /// How a chart is measured.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ChartRequest {
     /// The chart's corners as row and column: beside dark skin, bluish green, black and white; looked for where they are
     /// not given.
@@ -79,16 +79,16 @@ impl ChartRequest {
     /// # Errors
     /// When the file cannot be read or there is no chart in it.
     pub fn measure(&self, path: &Path) -> Result<ChartMeasurement, PipelineError> {
-        let light = self.light.unwrap_or(Illuminant::D65);
+        let light = self.light.clone().unwrap_or(Illuminant::D65);
         let picture = MeasuredPicture::open(path, self.curve)?;
         let light_rgb = picture.rgb()?;
         let in_file =
             |e: dioptric_sensor::SensorError| PipelineError::Read { path: path.to_owned(), reason: e.to_string() };
         let corners = match self.corners {
             Some(corners) => corners,
-            None => find_chart(&light_rgb, light).map_err(in_file)?,
+            None => find_chart(&light_rgb, &light).map_err(in_file)?,
         };
-        let report = ChartReport::measure(&light_rgb, corners, light).map_err(in_file)?;
+        let report = ChartReport::measure(&light_rgb, corners, &light).map_err(in_file)?;
         let lab = |rgb: [f64; 3]| {
             let lab = Xyz::from_linear_srgb(rgb).to_lab(Xyz::D65);
             [lab.l, lab.a, lab.b]

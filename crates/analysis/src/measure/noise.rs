@@ -235,7 +235,7 @@ fn data_sheet(bench: &Bench) -> NoiseDataSheet {
     let step_v = sensor.adc.step_v(sensor.swing_v).unwrap_or(1.0);
     let dark_e_per_s = sensor.dark_current.at(exposure.temperature_c);
     let read_e = sensor.read_noise_v(exposure.gain_mode).hypot(sensor.row_noise_v) / gain_v_per_e;
-    let [iso_40, iso_10] = ISO_SNR.map(|snr| sensor.iso_by_noise(ISO_LIGHT, &exposure, snr));
+    let [iso_40, iso_10] = ISO_SNR.map(|snr| sensor.iso_by_noise(&ISO_LIGHT, &exposure, snr));
     NoiseDataSheet {
         gain_dn_per_e: gain_v_per_e * exposure.analog_gain / step_v,
         quantum_efficiency: bench.quantum_efficiency(),
@@ -244,7 +244,7 @@ fn data_sheet(bench: &Bench) -> NoiseDataSheet {
         dsnu_e: sensor.dsnu_v.hypot(sensor.column_offset_v) / gain_v_per_e,
         prnu_percent: 100.0 * sensor.prnu_fraction.hypot(sensor.column_gain_fraction),
         dark_current_e_per_s: dark_e_per_s,
-        iso_by_saturation: sensor.iso_by_saturation(ISO_LIGHT, &exposure),
+        iso_by_saturation: sensor.iso_by_saturation(&ISO_LIGHT, &exposure),
         iso_by_noise_40: iso_40,
         iso_by_noise_10: iso_10,
     }

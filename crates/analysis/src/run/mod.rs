@@ -5,7 +5,8 @@ mod statistics;
 
 use dioptric_pipeline::{BankData, Camera, Capture, PipelineError};
 use dioptric_psf::LensImageModel;
-use dioptric_spectrum::{DepthMap, Illuminant};
+use dioptric_scene::SceneLight;
+use dioptric_spectrum::{ColorTemperature, DepthMap};
 use serde::Serialize;
 
 pub use charts::{RunCharts, RunPlaces};
@@ -86,7 +87,9 @@ pub struct SceneData {
     /// Mean luminance, cd/m².
     pub mean_luminance_cd_m2: f64,
     /// The light on it, where that is known.
-    pub light: Option<Illuminant>,
+    pub light: Option<SceneLight>,
+    /// Its correlated color temperature.
+    pub light_temperature: Option<ColorTemperature>,
 }
 
 /// The irradiance of a run.
@@ -127,7 +130,8 @@ impl RunReport {
                 near_m: scene.near_m,
                 far_m: scene.far_m,
                 mean_luminance_cd_m2: scene.mean_luminance_cd_m2,
-                light: scene.light,
+                light: scene.light.clone(),
+                light_temperature: scene.light.as_ref().map(|light| light.illuminant.color_temperature()),
             },
             psf_bank: BankData::of(run.model),
             irradiance: IrradianceData {

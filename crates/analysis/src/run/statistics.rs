@@ -33,6 +33,8 @@ pub struct SensorStatistics {
     pub row_time_us: f64,
     /// How much later the last row is exposed than the first, ms.
     pub last_row_later_ms: f64,
+    /// What the data sheet leaves open, a sentence each.
+    pub notes: Vec<String>,
     /// A row a filter.
     pub channels: Vec<ChannelStatistics>,
 }
@@ -79,7 +81,7 @@ impl SensorStatistics {
     /// # Errors
     /// When the filters of the sensor do not tile.
     pub fn new(frames: &Frames<'_>) -> Result<Self, PipelineError> {
-        let Frames { sensor, exposure, exposed, .. } = *frames;
+        let Frames { sensor, exposure, exposed, .. } = frames;
         let raw = &exposed.raw;
         let tile = sensor.tile()?;
         let read_noise_e = sensor.read_noise_v(exposure.gain_mode) / sensor.conversion_gain_v_per_e(exposure.gain_mode);
@@ -94,13 +96,14 @@ impl SensorStatistics {
             read_noise_e,
             row_time_us: raw.row_time_us,
             last_row_later_ms: 1e3 * raw.row_start_s(raw.size().0 - 1),
+            notes: sensor.bands_beyond_tables(frames.grid),
             channels,
         })
     }
 }
 
 fn channel(frames: &Frames<'_>, tile: Option<&Tile>, filter: usize, read_noise_e: f64) -> ChannelStatistics {
-    let Frames { sensor, exposure, rate, exposed, .. } = *frames;
+    let Frames { sensor, exposure, rate, exposed, .. } = frames;
     let raw = &exposed.raw;
     let electrons: Vec<f64> =
         of_filter(&rate.planes_e_per_s, tile, filter).map(|rate| f64::from(rate) * exposure.time_s).collect();

@@ -2,6 +2,8 @@
 
 use std::{ops::RangeInclusive, path::Path};
 
+use dioptric_sensor::SensorError;
+
 use crate::PipelineError;
 
 /// Where numbers come from, for the error that names them.
@@ -57,6 +59,15 @@ impl<'a> Checker<'a> {
             None => self.origin.clone(),
         };
         Err(PipelineError::Value { origin, key, found: found.to_owned(), expected: expected.to_owned() })
+    }
+
+    /// Returns an error of the sensor's with the place of its key.
+    pub(crate) fn of_sensor(&self, error: SensorError) -> PipelineError {
+        let SensorError::Value { key, .. } = &error else { return error.into() };
+        // The last part of a key is its word in the file.
+        let line = self.line_of(key.rsplit('.').next().unwrap_or(key));
+        let origin = line.map_or_else(|| self.origin.clone(), |line| format!("{}:{line}", self.origin));
+        PipelineError::Setting { origin, reason: error }
     }
 
     /// Returns the 1-based line where a key first stands as a whole word, outside comments.

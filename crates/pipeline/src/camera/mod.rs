@@ -6,6 +6,7 @@ mod frames;
 mod lens;
 mod movements;
 mod scene;
+mod sensor_options;
 
 use std::{
     fs,
@@ -13,11 +14,8 @@ use std::{
 };
 
 use dioptric_psf::{Diffraction, PsfError};
-use dioptric_sensor::{
-    AutoExposure, Brightness, ColorCorrection, ColorSpace, Demosaic, ExposureControl, LensShading, Metering,
-    Processing, ToneCurve, WhiteBalance,
-};
-use dioptric_spectrum::{Illuminant, WavelengthGrid};
+use dioptric_sensor::{AutoExposure, ExposureControl, Metering, NoiseSources, Processing};
+use dioptric_spectrum::WavelengthGrid;
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +24,7 @@ pub use frames::{Exposed, FramesChoice};
 pub use lens::{LensReading, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 pub use movements::Movements;
 pub use scene::{SceneChoice, SceneSource};
+pub use sensor_options::SensorOptions;
 
 use self::check::Checker;
 use crate::{Outputs, PipelineError};
@@ -71,12 +70,15 @@ pub struct Camera {
     /// The exposure.
     #[serde(default = "automatic")]
     pub exposure: ExposureControl,
+    /// Which sources of noise are on.
+    #[serde(default)]
+    pub noise: NoiseSources,
     /// How many frames the picture is made of.
     #[serde(default)]
     pub frames: FramesChoice,
     /// From the raw frame to the picture.
     #[serde(default)]
-    pub processing: ProcessingChoice,
+    pub processing: Processing,
     /// What stands before the camera.
     pub scene: SceneChoice,
     /// The bands that are simulated.
@@ -177,81 +179,6 @@ pub enum SensorChoice {
     BuiltIn(String),
     /// A sensor file.
     File(PathBuf),
-}
-
-/// From the raw frame to the picture.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ProcessingChoice {
-    /// How missing colours are filled in.
-    pub demosaic: Demosaic,
-    /// What is made white.
-    pub white: WhiteChoice,
-    /// How bright the picture is made.
-    pub brightness: Brightness,
-    /// The curve from light to codes.
-    pub curve: ToneCurve,
-    /// How much noise is taken out of the raw frame: 0 none, 1 what is below three standard deviations.
-    pub denoise: f64,
-    /// Pixels further than this above or below all their neighbours of the same filter are replaced, as a share of
-    /// saturation; left out, none are.
-    pub defect_threshold: Option<f64>,
-    /// The fall of light towards the corners that is undone; left out, it stays.
-    pub shading: Option<LensShading>,
-    /// The primaries of the picture.
-    pub space: ColorSpace,
-}
-
-impl Default for ProcessingChoice {
-    fn default() -> Self {
-        Self {
-            demosaic: Demosaic::Directional,
-            white: WhiteChoice::Scene,
-            brightness: Brightness::AsExposed,
-            curve: ToneCurve::Srgb,
-            denoise: 0.0,
-            defect_threshold: None,
-            shading: None,
-            space: ColorSpace::Srgb,
-        }
-    }
-}
-
-/// What is made white, and how colours are corrected.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum WhiteChoice {
-    /// The light on the scene, with colours corrected for it; the mean of the picture where the light is not known.
-    Scene,
-    /// This light, with colours corrected for it.
-    Light(Illuminant),
-    /// The mean of the picture, with colours corrected for the light on the scene, or for D65 where it is not known.
-    GreyWorld,
-    /// Nothing: channels are shown as they are.
-    None,
-}
-
-impl ProcessingChoice {
-    /// Returns the sensor's processing under the light on the scene, if that is known.
-    pub fn under(&self, known: Option<Illuminant>) -> Processing {
-        let light = known.unwrap_or(Illuminant::D65);
-        let (white_balance, color) = match self.white {
-            WhiteChoice::Scene if known.is_some() => (WhiteBalance::Illuminant(light), ColorCorrection::Fitted(light)),
-            WhiteChoice::Light(other) => (WhiteBalance::Illuminant(other), ColorCorrection::Fitted(other)),
-            WhiteChoice::Scene | WhiteChoice::GreyWorld => (WhiteBalance::GreyWorld, ColorCorrection::Fitted(light)),
-            WhiteChoice::None => (WhiteBalance::None, ColorCorrection::None),
-        };
-        Processing {
-            defect_threshold: self.defect_threshold,
-            shading: self.shading.clone(),
-            white_balance,
-            denoise: self.denoise,
-            demosaic: self.demosaic,
-            color,
-            brightness: self.brightness,
-            curve: self.curve,
-            space: self.space,
-        }
-    }
 }
 
 /// The bands that are simulated.
@@ -381,10 +308,7 @@ impl Camera {
         if let BankChoice::Within { error } = self.bank {
             checker.positive("error", error)?;
         }
-        match &self.exposure {
-            ExposureControl::Manual(exposure) => checker.positive("time_s", exposure.time_s)?,
-            ExposureControl::Auto(auto) => checker.positive("target_fraction", auto.target_fraction)?,
-        }
+        self.exposure.check().map_err(|error| checker.of_sensor(error))?;
         match &self.wavelengths {
             WavelengthChoice::Scene => {}
             WavelengthChoice::Range { first_nm, last_nm, step_nm } => {
@@ -420,6 +344,9 @@ impl Camera {
 
 #[cfg(test)]
 mod tests {
+    use dioptric_sensor::{NoiseSource, WhiteBalance};
+    use dioptric_spectrum::Illuminant;
+
     use super::*;
 
     const SHORT: &str = r#"(
@@ -443,17 +370,29 @@ mod tests {
     }
 
     #[test]
-    fn white_goes_by_the_light_where_that_is_known() {
-        let choice = ProcessingChoice::default();
-        assert_eq!(choice.under(Some(Illuminant::A)), Processing::for_light(Illuminant::A));
-        let unknown = choice.under(None);
-        assert_eq!(unknown.white_balance, WhiteBalance::GreyWorld);
-        assert_eq!(unknown.color, ColorCorrection::Fitted(Illuminant::D65));
-        let asked = ProcessingChoice { white: WhiteChoice::Light(Illuminant::D50), ..choice.clone() };
-        assert_eq!(asked.under(None), Processing::for_light(Illuminant::D50));
-        let mended = ProcessingChoice { defect_threshold: Some(0.1), space: ColorSpace::DisplayP3, ..choice };
-        let processing = mended.under(Some(Illuminant::D65));
-        assert_eq!((processing.defect_threshold, processing.space), (Some(0.1), ColorSpace::DisplayP3));
+    fn processing_keeps_its_old_words() {
+        let of = |processing: &str| {
+            let with = format!("processing: ({processing}),\n    sensor:");
+            parse(&SHORT.replace("sensor:", &with)).unwrap().processing
+        };
+        assert_eq!(of(""), Processing::default());
+        assert_eq!(of("white: GreyWorld"), Processing { white: WhiteBalance::GrayWorld, ..Processing::default() });
+        assert_eq!(of("white: Light(D50), curve: Srgb"), Processing::for_light(Illuminant::D50));
+        assert_eq!(of("demosaic: Directional, highlights: Clip"), Processing::plain());
+        let light = "white: Light(Chromaticity(x: 0.46, y: 0.414))";
+        assert_eq!(of(light), Processing::for_light(Illuminant::Chromaticity { x: 0.46, y: 0.414 }));
+    }
+
+    #[test]
+    fn noise_is_switched_in_the_file() {
+        let of = |noise: &str| {
+            let with = format!("noise: {noise},\n    sensor:");
+            parse(&SHORT.replace("sensor:", &with)).unwrap().noise
+        };
+        assert_eq!(parse(SHORT).unwrap().noise, NoiseSources::ALL);
+        assert_eq!(of("None"), NoiseSources::NONE);
+        assert_eq!(of("Only([Photon])"), NoiseSources::only(&[NoiseSource::Photon]));
+        check_error(&SHORT.replace("sensor:", "noise: Only([Hiss]),\n    sensor:"), &["shot.ron:6", "Hiss"]);
     }
 
     #[test]
@@ -490,5 +429,13 @@ mod tests {
         check_error(&SHORT.replace("sensor:", film), &["shot.ron:6", "columns", "0"]);
         let bank = "bank: Within(error: -0.1),\n    sensor:";
         check_error(&SHORT.replace("sensor:", bank), &["shot.ron:6", "error", "-0.1"]);
+        for (metering, value) in [("Percentile(NaN)", "NaN"), ("Percentile(-3)", "-3"), ("Percentile(101)", "101")] {
+            let exposure = format!("exposure: Auto((metering: {metering}, target_fraction: 0.9)),\n    sensor:");
+            check_error(&SHORT.replace("sensor:", &exposure), &["shot.ron:6", "Percentile", value, "0 to 100"]);
+        }
+        let manual = |time_s: &str| format!("exposure: Manual((time_s: {time_s})),\n    sensor:");
+        check_error(&SHORT.replace("sensor:", &manual("-0.1")), &["shot.ron:6", "time_s", "-0.1"]);
+        // A time of 0 is a bias frame.
+        parse(&SHORT.replace("sensor:", &manual("0.0"))).unwrap();
     }
 }

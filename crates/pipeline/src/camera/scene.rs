@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_scene::{Pattern, ReadOptions, Scene, StillLife, Target, TargetLight, read_scene};
+use dioptric_scene::{Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, read_scene};
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
@@ -24,12 +24,18 @@ pub struct SceneChoice {
     /// One depth for the whole scene, m; for files that hold no depth, and for targets.
     #[serde(default)]
     pub depth_m: Option<f64>,
-    /// The light on the scene: it lights reflectances and targets (D65 if left out), and is what white balance goes by.
+    /// The light that the scene is put under: it lights reflectances and targets (D65 if left out), and takes the place of
+    /// the light on all others (their own if left out), where that is known.
     #[serde(default)]
     pub illuminant: Option<Illuminant>,
-    /// Its illuminance, lux; for a picture, that of a white in it.
-    #[serde(default = "thousand")]
-    pub illuminance_lux: f64,
+    /// Its illuminance, lux; for a picture, that of a white in it. Left out, 1000 for reflectances, targets and pictures, and
+    /// its own for a scene that has one.
+    #[serde(default)]
+    pub illuminance_lux: Option<f64>,
+    /// The light that is on a file of radiance, which does not state it itself: what white balance goes by, and what
+    /// `illuminant` takes the place of.
+    #[serde(default)]
+    pub light: Option<Illuminant>,
     /// Scales the radiance to this mean luminance, cd/m²; nothing is scaled unless this is given.
     #[serde(default)]
     pub mean_luminance_cd_m2: Option<f64>,
@@ -59,9 +65,8 @@ pub enum SceneSource {
     },
 }
 
-fn thousand() -> f64 {
-    1000.0
-}
+/// The illuminance on what has none of its own, lux.
+const USUAL_LUX: f64 = 1000.0;
 
 impl SceneChoice {
     /// A file, with the defaults for all else.
@@ -71,7 +76,8 @@ impl SceneChoice {
             field_of_view_deg: None,
             depth_m: None,
             illuminant: None,
-            illuminance_lux: thousand(),
+            illuminance_lux: None,
+            light: None,
             mean_luminance_cd_m2: None,
         }
     }
@@ -88,7 +94,14 @@ impl SceneChoice {
         if let Some(luminance) = self.mean_luminance_cd_m2 {
             checker.positive("mean_luminance_cd_m2", luminance)?;
         }
-        checker.positive("illuminance_lux", self.illuminance_lux)?;
+        if let Some(lux) = self.illuminance_lux {
+            checker.positive("illuminance_lux", lux)?;
+        }
+        for (key, light) in [("illuminant", &self.illuminant), ("light", &self.light)] {
+            if let Some(Err(error)) = light.as_ref().map(Illuminant::check) {
+                return checker.wrong(key, &error.to_string(), "a light");
+            }
+        }
         match self.source {
             SceneSource::File(_) => Ok(()),
             SceneSource::StillLife { columns, rows } => check_size(checker, columns, rows),
@@ -110,14 +123,15 @@ impl SceneChoice {
     /// When a file cannot be read, lacks what is needed or holds what cannot be.
     pub fn open(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
         let own_or = || wanted.cloned().map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok);
-        let light = self.illuminant.unwrap_or(Illuminant::D65);
+        let light = self.illuminant.clone().unwrap_or(Illuminant::D65);
+        let illuminance_lux = self.illuminance_lux.unwrap_or(USUAL_LUX);
         let mut scene = match &self.source {
             SceneSource::File(path) => {
                 let options = ReadOptions {
                     grid: wanted.cloned(),
                     light,
-                    illuminance_lux: self.illuminance_lux,
-                    picture_white_cd_m2: self.illuminance_lux / PI,
+                    illuminance_lux,
+                    picture_white_cd_m2: illuminance_lux / PI,
                     depth_m: self.depth_m,
                     horizontal_fov_deg: self.field_of_view_deg,
                     ..ReadOptions::default()
@@ -130,7 +144,7 @@ impl SceneChoice {
                 rows: *rows,
                 columns: *columns,
                 light: TargetLight::Illuminant(light),
-                luminance_cd_m2: self.illuminance_lux / PI,
+                luminance_cd_m2: illuminance_lux / PI,
                 dark: 0.02,
                 supersampling: 4,
                 horizontal_fov_deg: self.field_of_view_deg.unwrap_or(f64::NAN),
@@ -138,7 +152,12 @@ impl SceneChoice {
             }
             .scene(&own_or()?)?,
         };
-        scene.light = self.illuminant.or(scene.light);
+        if let (None, Some(illuminant)) = (&scene.light, &self.light) {
+            scene.light = Some(SceneLight { illuminant: illuminant.clone(), illuminance_lux: None });
+        }
+        if self.illuminant.is_some() || self.illuminance_lux.is_some() {
+            scene.relight(self.illuminant.as_ref(), self.illuminance_lux)?;
+        }
         scene.require_depth()?;
         scene.require_view()?;
         if let Some(wanted_cd_m2) = self.mean_luminance_cd_m2 {
@@ -157,4 +176,52 @@ impl SceneChoice {
 fn check_size(checker: &Checker<'_>, columns: usize, rows: usize) -> Result<(), PipelineError> {
     checker.count("columns", columns, 1..=65_536)?;
     checker.count("rows", rows, 1..=65_536)
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+    use dioptric_scene::{ExrParts, write_spectral_exr};
+    use dioptric_spectrum::{Quantity, SpectralImage};
+    use ndarray::Array2;
+
+    use super::*;
+
+    /// A file of gray under 100 lx of D65, which does not say so.
+    fn radiance_file(folder: &Path) -> PathBuf {
+        let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
+        let white = Illuminant::D65.white_radiance(&grid, 100.0);
+        let planes = white.iter().map(|&w| Array2::from_elem((4, 6), 0.18 * w as f32)).collect();
+        let image = SpectralImage::new(Quantity::Radiance, grid, planes).unwrap();
+        let path = folder.join("room.exr");
+        write_spectral_exr(&path, &image, &ExrParts::default()).unwrap();
+        path
+    }
+
+    #[test]
+    fn only_scenes_of_known_light_are_relit() {
+        let folder = tempfile::tempdir().unwrap();
+        let of_file = SceneChoice::of_file(radiance_file(folder.path()));
+        let bare = SceneChoice { depth_m: Some(2.0), field_of_view_deg: Some(20.0), ..of_file };
+        // As it is, it is opened, and what light it is under is not known.
+        assert!(bare.open(None).unwrap().light.is_none());
+        for asked in [
+            SceneChoice { illuminant: Some(Illuminant::A), ..bare.clone() },
+            SceneChoice { illuminance_lux: Some(5.0), ..bare.clone() },
+        ] {
+            let message = asked.open(None).unwrap_err().to_string();
+            assert!(message.contains("room.exr") && message.contains("not known"), "{message}");
+        }
+        // Once its light is stated, it is put under another: the same gray, of the same luminance.
+        let stated = SceneChoice { light: Some(Illuminant::D65), illuminant: Some(Illuminant::A), ..bare.clone() };
+        let relit = stated.open(None).unwrap();
+        let white = Illuminant::A.white_radiance(relit.radiance.grid(), 100.0);
+        for (found, white) in relit.radiance.spectrum_at(1, 2).iter().zip(white) {
+            // Single precision.
+            assert_relative_eq!(*found, 0.18 * white, max_relative = 1e-6);
+        }
+        assert_eq!(relit.light.unwrap().illuminant, Illuminant::A);
+        // Its illuminance is still not known.
+        assert!(SceneChoice { illuminance_lux: Some(5.0), ..stated }.open(None).is_err());
+    }
 }

@@ -1,6 +1,6 @@
 //! The mean rate of photo-electrons in each pixel.
 
-use dioptric_sensor::{ElectronRate, Illumination, Sensor};
+use dioptric_sensor::{ElectronRate, ExitPupil, Illumination, Sensor};
 
 use super::{Watch, film::FilmPlace, irradiance::Irradiance};
 use crate::{PipelineError, Stage};
@@ -19,10 +19,11 @@ pub(super) fn collect(
 ) -> Result<ElectronRate, PipelineError> {
     watch.progress.at(Stage::Sensor, 0.0);
     watch.cancel.check()?;
-    let light = Illumination {
-        // Pixels of a binned film are the full film's, farther apart: angles are those of the places they stand for.
-        exit_pupil_distance_mm: place.exit_pupil_distance_mm.map(|mm| mm / place.binning as f64),
-        ..Illumination::on_pixels(irradiance)
-    };
+    // Pixels of a binned film are the full film's, farther apart: angles are those of the places they stand for.
+    let closer = |mm: f64| mm / place.binning as f64;
+    let pupil = place.exit_pupil_distance_mm.filter(|_| !sensor.chief_ray_response.is_empty());
+    let exit_pupil =
+        pupil.map(|mm| ExitPupil { distance_mm: closer(mm), axis_mm: place.exit_pupil_axis_mm.map(closer) });
+    let light = Illumination { exit_pupil, ..Illumination::on_pixels(irradiance) };
     Ok(sensor.electron_rate(&light)?)
 }

@@ -10,7 +10,7 @@ use super::{
     scene::ResolvedScene,
     spec::{FilmInputs, Raster},
 };
-use crate::{FocusChoice, PipelineError};
+use crate::{FocusChoice, Movements, PipelineError};
 
 /// The share of the scene's samples that may be nearer than the near object.
 const NEAR_SHARE: f64 = 0.02;
@@ -31,8 +31,11 @@ pub struct FilmPlace {
     pub film_distance_mm: f64,
     /// Distance before the first vertex that is in focus, mm, where there is one.
     pub focus_distance_mm: Option<f64>,
-    /// Distance of the film behind the exit pupil, mm; `None` of a telecentric lens.
+    /// Distance of the film behind the exit pupil, mm, below 0 where the pupil lies behind the film; `None` of a telecentric
+    /// lens.
     pub exit_pupil_distance_mm: Option<f64>,
+    /// Where the axis of the exit pupil meets the film, mm to the right and upwards in the picture.
+    pub exit_pupil_axis_mm: [f64; 2],
 }
 
 impl FilmPlace {
@@ -65,6 +68,10 @@ pub(super) fn place(
         // As coarse as the scene is by now.
         Raster::Scene => (size_film(reference, film_distance_mm, scene)?, resolved.binning),
     };
+    // A lens moved up and to the right moves its axis so on the film, which the picture shows turned by 180°. That a tilted
+    // axis meets the film elsewhere is left out.
+    let Movements { rise_mm, shift_mm, .. } = inputs.lens.movements;
+    let exit_pupil_axis_mm = [-shift_mm, rise_mm];
     let exit_pupil_z_mm = reference.first_order().exit_pupil_z_mm;
     Ok(FilmPlace {
         rows: film.rows,
@@ -74,6 +81,7 @@ pub(super) fn place(
         film_distance_mm,
         focus_distance_mm: reference.object_distance_mm_for(film_distance_mm).ok(),
         exit_pupil_distance_mm: exit_pupil_z_mm.is_finite().then_some(film_distance_mm - exit_pupil_z_mm),
+        exit_pupil_axis_mm,
     })
 }
 

@@ -155,7 +155,8 @@ impl Capture {
             rate: &self.rate,
             exposed: &self.frames.exposed,
             processing: &self.processing,
-            light: self.scene.light.unwrap_or(Illuminant::D65),
+            grid: self.grid(),
+            light: self.scene.light.as_ref().map_or(Illuminant::D65, |light| light.illuminant.clone()),
         }
     }
 }
@@ -233,7 +234,7 @@ impl KeptCamera {
         let rate = chain.electrons(electron_inputs)?;
         let sensor = electrons::on_film(&electron_inputs.sensor, &place);
         let frames = chain.frames(frame_inputs)?;
-        let processing = self.camera.processing.under(scene.light);
+        let processing = self.camera.processing.under(scene.light.as_ref().map(|light| &light.illuminant));
         let developed = chain.picture(inputs.clone(), &processing)?;
         progress.at(Stage::Picture, 1.0);
         let (camera, quality) = (self.camera.clone(), self.quality);

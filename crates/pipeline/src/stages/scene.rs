@@ -1,7 +1,7 @@
 //! What stands before the camera, at the resolution and on the bands that a quality asks for.
 
-use dioptric_scene::Scene;
-use dioptric_spectrum::{Illuminant, WavelengthGrid};
+use dioptric_scene::{Scene, SceneLight};
+use dioptric_spectrum::WavelengthGrid;
 use serde::{Deserialize, Serialize};
 
 use super::spec::{GeometryInputs, SceneInputs};
@@ -24,7 +24,7 @@ pub struct SceneSummary {
     /// Mean luminance, cd/m².
     pub mean_luminance_cd_m2: f64,
     /// The light on it, where that is known.
-    pub light: Option<Illuminant>,
+    pub light: Option<SceneLight>,
     /// Centers of its bands, nm.
     pub wavelengths_nm: Vec<f64>,
 }
@@ -39,7 +39,7 @@ impl SceneSummary {
             near_m,
             far_m,
             mean_luminance_cd_m2: scene.mean_luminance_cd_m2(),
-            light: scene.light,
+            light: scene.light.clone(),
             wavelengths_nm: scene.radiance.grid().centers_nm().to_vec(),
         })
     }
@@ -73,7 +73,8 @@ pub(super) fn open(inputs: &SceneInputs) -> Result<ResolvedScene, PipelineError>
         source,
         field_of_view_deg: *field_of_view_deg,
         depth_m: *depth_m,
-        illuminant: inputs.illuminant,
+        illuminant: inputs.illuminant.clone(),
+        light: inputs.light.clone(),
         illuminance_lux: inputs.illuminance_lux,
         mean_luminance_cd_m2: inputs.mean_luminance_cd_m2,
     };

@@ -9,13 +9,13 @@ use std::{
 };
 
 use dioptric_forward::Film;
-use dioptric_sensor::{ExposureControl, Noise, Sensor};
+use dioptric_sensor::{ExposureControl, Noise, Processing, Sensor};
 use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     BankChoice, BlurChoice, Camera, Diffraction, FilmChoice, FocusChoice, FramesChoice, LensChoice, LensReading,
-    Movements, PipelineError, ProcessingChoice, Quality, SceneSource, StopChoice, WavelengthChoice,
+    Movements, PipelineError, Quality, SceneSource, StopChoice, WavelengthChoice,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -63,7 +63,8 @@ pub(crate) struct GeometryInputs {
 pub(crate) struct SceneInputs {
     pub(crate) geometry: GeometryInputs,
     pub(crate) illuminant: Option<Illuminant>,
-    pub(crate) illuminance_lux: f64,
+    pub(crate) illuminance_lux: Option<f64>,
+    pub(crate) light: Option<Illuminant>,
     pub(crate) mean_luminance_cd_m2: Option<f64>,
 }
 
@@ -133,7 +134,7 @@ pub(crate) struct ShutterInputs {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PictureInputs {
     pub(crate) frames: FrameInputs,
-    pub(crate) processing: ProcessingChoice,
+    pub(crate) processing: Processing,
 }
 
 impl LensInputs {
@@ -168,7 +169,8 @@ impl SceneInputs {
                     _ => Vec::new(),
                 },
             },
-            illuminant: scene.illuminant,
+            illuminant: scene.illuminant.clone(),
+            light: scene.light.clone(),
             illuminance_lux: scene.illuminance_lux,
             mean_luminance_cd_m2: scene.mean_luminance_cd_m2,
         }
@@ -212,7 +214,7 @@ impl PictureInputs {
             shutter: ShutterInputs {
                 exposure: camera.exposure,
                 frames: camera.frames.clone(),
-                noise: Noise::all(camera.seed),
+                noise: Noise { sources: camera.noise, ..Noise::all(camera.seed) },
             },
         };
         Ok(Self { frames, processing: camera.processing.clone() })

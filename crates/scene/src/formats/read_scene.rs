@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use dioptric_spectrum::{Display, Illuminant, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{Display, Illuminant, Quantity, SpectralImage, Spectrum, WavelengthGrid};
 
 use super::{camera::view_beside, read_band_folder, read_envi, read_picture, read_spectral_exr};
-use crate::{HiddenLayer, Scene, SceneError, View, reflectance_under, resampled};
+use crate::{HiddenLayer, Scene, SceneError, SceneLight, View, reflectance_under, resampled};
 
 /// What a file may leave open.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,9 +80,10 @@ pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Scene, SceneErro
                 Some(grid) => grid.clone(),
                 None => WavelengthGrid::uniform(400.0, 700.0, 10.0)?,
             };
-            let image = read_picture(path, &Display::apple_studio(), &grid, options.picture_white_cd_m2)?;
-            // The white of sRGB.
-            finish(path, name, Contents { light: Some(Illuminant::D65), ..Contents::of(image) }, options)
+            let display = Display::apple_studio();
+            let image = read_picture(path, &display, &grid, options.picture_white_cd_m2)?;
+            let light = Some(white_of(&display, options.picture_white_cd_m2)?);
+            finish(path, name, Contents { light, ..Contents::of(image) }, options)
         }
         _ if !path.exists() => Err(super::beside::unreadable(path, "there is no such file")),
         _ => Err(SceneError::UnknownKind { file: path.to_owned() }),
@@ -95,7 +96,7 @@ struct Contents {
     depth: Option<dioptric_spectrum::DepthMap>,
     view: Option<View>,
     hidden: Option<HiddenLayer>,
-    light: Option<Illuminant>,
+    light: Option<SceneLight>,
 }
 
 impl Contents {
@@ -115,7 +116,7 @@ fn finish(path: &Path, name: String, contents: Contents, options: &ReadOptions) 
         None => None,
     };
     let light = match contents.image.quantity() {
-        Quantity::Reflectance => Some(options.light),
+        Quantity::Reflectance => Some(SceneLight::new(options.light.clone(), options.illuminance_lux)),
         _ => contents.light,
     };
     let radiance = lit(contents.image, options)?;
@@ -126,6 +127,15 @@ fn finish(path: &Path, name: String, contents: Contents, options: &ReadOptions) 
     };
     scene.validate()?;
     Ok(scene)
+}
+
+/// Returns the light whose perfect white is that of a picture on a display.
+fn white_of(display: &Display, white_cd_m2: f64) -> Result<SceneLight, SceneError> {
+    let grid = WavelengthGrid::uniform(380.0, 780.0, 1.0)?;
+    let [r, g, b] = display.srgb_basis(&grid, 1.0);
+    let white = (0..grid.len()).map(|band| (r[band] + g[band] + b[band]).max(0.0)).collect();
+    let spectrum = Spectrum::new(grid.centers_nm().to_vec(), white)?;
+    Ok(SceneLight::new(Illuminant::Spectrum(spectrum), std::f64::consts::PI * white_cd_m2))
 }
 
 fn view_wanted(options: &ReadOptions, image: &SpectralImage) -> Result<Option<View>, SceneError> {
@@ -166,7 +176,7 @@ mod tests {
         let options = ReadOptions { depth_m: Some(2.0), horizontal_fov_deg: Some(30.0), ..ReadOptions::default() };
         let scene = read_scene(&path, &options).unwrap();
         assert_eq!(scene.require_depth().unwrap().range_m(), (2.0, 2.0));
-        assert_eq!(scene.light, Some(Illuminant::D65));
+        assert_eq!(scene.light, Some(SceneLight::new(Illuminant::D65, 1000.0)));
         assert_relative_eq!(scene.require_view().unwrap().horizontal_fov_deg(8), 30.0, max_relative = 1e-12);
         let beyond = ReadOptions { grid: Some(WavelengthGrid::uniform(300.0, 700.0, 10.0).unwrap()), ..options };
         assert!(read_scene(&path, &beyond).is_err());

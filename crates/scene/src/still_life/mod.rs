@@ -1,6 +1,7 @@
 //! A still life made by formula: the built-in demonstration scene.
 
 mod filter;
+mod light_probe;
 mod lights;
 mod material;
 mod noise;
@@ -17,6 +18,7 @@ use dioptric_spectrum::WavelengthGrid;
 use glam::{DMat3, DVec3};
 
 use crate::{HiddenLayer, Scene, SceneError, View};
+use light_probe::light_on_grays;
 use render::{Eye, Which, picture};
 
 /// How the still life is pictured.
@@ -44,7 +46,8 @@ impl StillLife {
     /// and a printed card at 1 m; a vase, books, a bottle behind; a chair at 2.5 m; a sideboard, books, a lamp, a
     /// picture and small bulbs at the far wall. Reflectances are those of the chart or smooth formulas. Daylight of
     /// 6200 K comes through the window, light of a 2850 K black body from two lamps; light bounced once is traced,
-    /// and what bounces more is taken as even. A mirror image has the depth of the mirror.
+    /// and what bounces more is taken as even. A mirror image has the depth of the mirror. The light that is stated for the
+    /// scene is the mixture on the grays of the chart, measured on them.
     ///
     /// The result does not depend on the number of threads.
     ///
@@ -73,7 +76,7 @@ impl StillLife {
             depth: Some(first.depth),
             view: Some(view),
             hidden,
-            light: Some(shade::WINDOW),
+            light: Some(light_on_grays(&world)?),
         })
     }
 }
@@ -104,6 +107,19 @@ mod tests {
         let first = scene.require_depth().unwrap().z_m();
         assert!(hidden.depth.z_m().iter().zip(first).all(|(behind, first)| behind >= first));
         assert!(hidden.depth.z_m().iter().zip(first).any(|(behind, first)| behind > &(first + 1.0)));
+    }
+
+    #[test]
+    fn the_light_stated_is_that_on_the_grays() {
+        let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
+        let scene = StillLife::new(96, 64).scene(&grid).unwrap();
+        let light = scene.light.unwrap();
+        // Between the lamps of 2850 K and the window of 6200 K.
+        let found = light.illuminant.color_temperature();
+        assert!((4000.0..5500.0).contains(&found.kelvin) && found.duv.abs() < 0.02, "{found:?}");
+        assert!((100.0..2000.0).contains(&light.illuminance_lux.unwrap()), "{light:?}");
+        // The size of the picture does not matter.
+        assert_eq!(StillLife::new(30, 20).scene(&grid).unwrap().light, Some(light));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use dioptric_spectrum::{
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use crate::{Scene, SceneError};
+use crate::{Scene, SceneError, SceneLight};
 
 /// What is drawn on a target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,7 +48,7 @@ pub enum Pattern {
 }
 
 /// The shape of a target's spectrum.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TargetLight {
     /// The same power in every nanometre.
     EqualEnergy,
@@ -60,7 +60,7 @@ pub enum TargetLight {
 
 impl TargetLight {
     /// Returns the relative spectral power.
-    fn spectrum(self) -> Spectrum {
+    fn spectrum(&self) -> Spectrum {
         match self {
             Self::EqualEnergy => Spectrum::constant(1.0),
             Self::EqualPhotons => {
@@ -144,11 +144,13 @@ impl Target {
                 SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?
             }
         };
-        let light = match self.light {
-            TargetLight::EqualEnergy => Some(Illuminant::E),
-            TargetLight::EqualPhotons => None,
-            TargetLight::Illuminant(light) => Some(light),
+        let illuminant = match &self.light {
+            TargetLight::EqualEnergy => Illuminant::E,
+            TargetLight::EqualPhotons => Illuminant::Spectrum(self.light.spectrum()),
+            TargetLight::Illuminant(light) => light.clone(),
         };
+        // White is a perfect diffuser.
+        let light = Some(SceneLight::new(illuminant, std::f64::consts::PI * self.luminance_cd_m2));
         Scene { light, ..Scene::new(self.name(), radiance) }
             .or_flat_depth_m(self.distance_m)?
             .or_horizontal_fov_deg(self.horizontal_fov_deg)

@@ -1,9 +1,9 @@
-//! Colour differences along edges (Pekkucuksen & Altunbasak, ICIP 2010), block by block.
+//! Color differences along edges (Pekkucuksen & Altunbasak, ICIP 2010), block by block.
 //!
-//! The green − red and green − blue differences are smooth where the colours themselves are not. They are estimated
+//! The green − red and green − blue differences are smooth where the colors themselves are not. They are estimated
 //! along rows and along columns, averaged over four pixels to the north, south, west and east, and these four are
-//! mixed by how little the differences change that way. Beside saturated colours the differences are not smooth
-//! either, so every estimate is held to the values of its neighbours.
+//! mixed by how little the differences change that way. Beside saturated colors the differences are not smooth
+//! either, so every estimate is held to the values of its neighbors.
 
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -18,7 +18,27 @@ const BLOCK: (usize, usize) = (128, 256);
 /// Keeps the weights finite where nothing changes: far below one digital number of a frame of 0 … 1.
 const LEAST_GRADIENT: f32 = 1e-6;
 
+/// How the estimates of four directions are mixed.
+#[derive(Clone, Copy)]
+pub(super) struct Mixing {
+    /// Pixels of each direction that are averaged, at most 5: more are less noisy, fewer keep finer colors.
+    pub(super) n_averaged: usize,
+    /// The power of the change by which a direction counts less.
+    pub(super) exponent: i32,
+}
+
+/// Returns one plane a channel, mixed as in the paper.
 pub(super) fn demosaic(values: &Array2<f32>, bayer: Bayer, n_channels: usize) -> Vec<Array2<f32>> {
+    demosaic_mixing(values, bayer, n_channels, Mixing { n_averaged: 5, exponent: 2 })
+}
+
+/// Returns one plane a channel.
+pub(super) fn demosaic_mixing(
+    values: &Array2<f32>,
+    bayer: Bayer,
+    n_channels: usize,
+    mixing: Mixing,
+) -> Vec<Array2<f32>> {
     let (n_rows, n_columns) = values.dim();
     let mut channels = vec![Array2::<f32>::zeros((n_rows, n_columns)); n_channels];
     let mut strips: Vec<Vec<&mut [f32]>> = (0..n_rows.div_ceil(BLOCK.0)).map(|_| Vec::new()).collect();
@@ -32,7 +52,7 @@ pub(super) fn demosaic(values: &Array2<f32>, bayer: Bayer, n_channels: usize) ->
         for first_column in (0..n_columns).step_by(BLOCK.1) {
             let size = (n_strip_rows, BLOCK.1.min(n_columns - first_column));
             let block = Block::cut(values, (first_row, first_column), size, MARGIN);
-            planes.fill(&block, bayer);
+            planes.fill(&block, bayer, mixing);
             for row in 0..size.0 {
                 let from = (row + MARGIN) * block.width + MARGIN;
                 let to = row * n_columns + first_column;
@@ -50,14 +70,14 @@ pub(super) fn demosaic(values: &Array2<f32>, bayer: Bayer, n_channels: usize) ->
 /// The planes of one block, kept from block to block.
 #[derive(Default)]
 struct Planes {
-    /// Green minus the other colour of the row or column, estimated along rows and along columns.
+    /// Green minus the other color of the row or column, estimated along rows and along columns.
     along_rows: Vec<f32>,
     along_columns: Vec<f32>,
     /// How much these change along their direction, summed over five pixels across it.
     change_along_rows: Vec<f32>,
     change_along_columns: Vec<f32>,
     scratch: Vec<f32>,
-    /// Green minus the other colour, at the pixels of the other colours.
+    /// Green minus the other color, at the pixels of the other colors.
     difference: Vec<f32>,
     green: Vec<f32>,
     even: Vec<f32>,
@@ -65,21 +85,21 @@ struct Planes {
 }
 
 impl Planes {
-    fn fill(&mut self, block: &Block, bayer: Bayer) {
+    fn fill(&mut self, block: &Block, bayer: Bayer, mixing: Mixing) {
         self.estimate_differences(block, bayer);
         self.sum_changes(block.width);
-        self.mix_directions(block, bayer);
+        self.mix_directions(block, bayer, mixing);
         self.other_colors(block, bayer);
     }
 
-    /// Estimates green minus the other colour at each pixel, along rows and along columns.
+    /// Estimates green minus the other color at each pixel, along rows and along columns.
     fn estimate_differences(&mut self, block: &Block, bayer: Bayer) {
         let (v, w) = (&block.values, block.width);
         for plane in [&mut self.along_rows, &mut self.along_columns] {
             plane.clear();
             plane.resize(v.len(), 0.0);
         }
-        // The missing colour is the mean of the neighbours plus half the curvature of the pixel's own colour.
+        // The missing color is the mean of the neighbors plus half the curvature of the pixel's own color.
         let estimate = |i: usize, step: usize| {
             let own = v[i];
             let missing = 0.5 * (v[i - step] + v[i + step]) + 0.25 * (2.0 * own - v[i - 2 * step] - v[i + 2 * step]);
@@ -117,13 +137,15 @@ impl Planes {
     }
 
     /// Mixes the means of the four directions into one difference, and gives green.
-    fn mix_directions(&mut self, block: &Block, bayer: Bayer) {
+    fn mix_directions(&mut self, block: &Block, bayer: Bayer, mixing: Mixing) {
         let (v, w) = (&block.values, block.width);
+        let Mixing { n_averaged, exponent } = mixing;
+        let share = 1.0 / n_averaged as f32;
         self.difference.clear();
         self.difference.resize(v.len(), 0.0);
         self.green.clone_from(v);
         for row in 7..v.len() / w - 7 {
-            // Greens alternate along a row: the first pixel of another colour, then every second.
+            // Greens alternate along a row: the first pixel of another color, then every second.
             let first = 7 + usize::from(bayer.is_green(row, 7));
             for column in (first..w - 7).step_by(2) {
                 let i = row * w + column;
@@ -132,13 +154,14 @@ impl Planes {
                     (&self.along_rows, &self.change_along_rows, 1),
                     (&self.along_columns, &self.change_along_columns, w),
                 ] {
-                    let five = |p: &[f32], first: usize| {
-                        p[first] + p[first + step] + p[first + 2 * step] + p[first + 3 * step] + p[first + 4 * step]
+                    let five = |first: usize| {
+                        let c = changes;
+                        c[first] + c[first + step] + c[first + 2 * step] + c[first + 3 * step] + c[first + 4 * step]
                     };
-                    for first in [i - 4 * step, i] {
-                        let change = five(changes, first) + LEAST_GRADIENT;
-                        let weight = 1.0 / (change * change);
-                        sum += weight * 0.2 * five(plane, first);
+                    for (first_change, first) in [(i - 4 * step, i - (n_averaged - 1) * step), (i, i)] {
+                        let weight = (five(first_change) + LEAST_GRADIENT).powi(exponent).recip();
+                        let estimates: f32 = (0..n_averaged).map(|k| plane[first + k * step]).sum();
+                        sum += weight * share * estimates;
                         weights += weight;
                     }
                 }
@@ -150,7 +173,7 @@ impl Planes {
         }
     }
 
-    /// Gives the other two colours from green and the differences.
+    /// Gives the other two colors from green and the differences.
     fn other_colors(&mut self, block: &Block, bayer: Bayer) {
         let (v, w) = (&block.values, block.width);
         let d = &self.difference;
@@ -159,7 +182,7 @@ impl Planes {
             plane.resize(v.len(), 0.0);
         }
         for row in 11..v.len() / w - 11 {
-            // The colour of this row's own pixels, and that of the rows above and below.
+            // The color of this row's own pixels, and that of the rows above and below.
             let (own, other) =
                 if row % 2 == 0 { (&mut self.even, &mut self.odd) } else { (&mut self.odd, &mut self.even) };
             for column in 11..w - 11 {
@@ -168,7 +191,7 @@ impl Planes {
                 let (beside, across) = ([i - 1, i + 1], [i - w, i + w]);
                 let corners = [i - w - 1, i - w + 1, i + w - 1, i + w + 1];
                 if bayer.is_green(row, column) {
-                    // Both neighbours along the row are of this row's colour; above and below lie the other's.
+                    // Both neighbors along the row are of this row's color; above and below lie the other's.
                     let (left, right) = (d[i - 1], d[i + 1]);
                     let (above, below) = (d[i - w], d[i + w]);
                     let row_difference = 0.25 * (left + right + diagonal(d, i - w, w) + diagonal(d, i + w, w));
@@ -184,11 +207,11 @@ impl Planes {
     }
 }
 
-/// Holds an estimate of one colour to the values of its neighbours.
+/// Holds an estimate of one color to the values of its neighbors.
 ///
-/// It may leave their range only as far as `guide`, a colour known here, is from the mean of its values there
-/// (`guides`), and by less where the guide is the brighter colour: an edge of a saturated colour says nothing about
-/// colours that are absent.
+/// It may leave their range only as far as `guide`, a color known here, is from the mean of its values there
+/// (`guides`), and by less where the guide is the brighter color: an edge of a saturated color says nothing about
+/// colors that are absent.
 #[inline]
 fn held<const N: usize>(estimate: f32, neighbors: [f32; N], guide: f32, guides: [f32; N]) -> f32 {
     let mean = |values: &[f32; N]| values.iter().sum::<f32>() / N as f32;
@@ -199,7 +222,7 @@ fn held<const N: usize>(estimate: f32, neighbors: [f32; N], guide: f32, guides: 
     estimate.clamp(low - slack, high + slack)
 }
 
-/// Returns the other colour's difference at a pixel of a non-green colour, from the diagonals about it.
+/// Returns the other color's difference at a pixel of a non-green color, from the diagonals about it.
 #[inline]
 fn diagonal(d: &[f32], i: usize, w: usize) -> f32 {
     let near = d[i - w - 1] + d[i - w + 1] + d[i + w - 1] + d[i + w + 1];
@@ -253,11 +276,11 @@ mod tests {
     }
 
     #[test]
-    fn a_grey_edge_stays_sharp_and_grey() {
+    fn a_gray_edge_stays_sharp_and_gray() {
         // Of a step of 0.87: a twentieth of it where the edge is as sharp as pixels allow.
         for (softness_px, most) in [(0.2, 0.05), (0.5, 0.005), (1.0, 0.002)] {
-            let grey = disc(softness_px);
-            let errors = worst_errors(&[grey.clone(), grey.clone(), grey]);
+            let gray = disc(softness_px);
+            let errors = worst_errors(&[gray.clone(), gray.clone(), gray]);
             assert!(errors.iter().all(|&error| error < most), "{softness_px} px: {errors:?}");
         }
     }

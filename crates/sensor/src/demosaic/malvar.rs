@@ -1,5 +1,5 @@
 //! Malvar, He & Cutler, "High-quality linear interpolation for demosaicing of Bayer-patterned color images",
-//! ICASSP 2004: bilinear interpolation with a Laplacian of the pixel's own colour added.
+//! ICASSP 2004: bilinear interpolation with a Laplacian of the pixel's own color added.
 
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -22,10 +22,10 @@ pub(super) fn demosaic(values: &Array2<f32>, bayer: Bayer, n_channels: usize) ->
         let block = Block::cut(values, (row, 0), (1, n_columns), MARGIN);
         let (own, other) = (bayer.other_of_row(row), bayer.other_of_row(row + 1));
         (0..n_columns).for_each(|column| {
-            let at = Neighbours::new(&block, column);
+            let at = Neighbors::new(&block, column);
             if bayer.is_green(row, column) {
                 out[bayer.green][column] = at.center;
-                // The other colour of this row lies left and right, that of the next rows above and below.
+                // The other color of this row lies left and right, that of the next rows above and below.
                 out[own][column] = at.beside_green(at.left_right, at.left_right_2, at.up_down_2);
                 out[other][column] = at.beside_green(at.up_down, at.up_down_2, at.left_right_2);
             } else {
@@ -39,8 +39,8 @@ pub(super) fn demosaic(values: &Array2<f32>, bayer: Bayer, n_channels: usize) ->
     channels
 }
 
-/// Sums of the neighbours of a pixel.
-struct Neighbours {
+/// Sums of the neighbors of a pixel.
+struct Neighbors {
     center: f32,
     left_right: f32,
     up_down: f32,
@@ -49,7 +49,7 @@ struct Neighbours {
     diagonal: f32,
 }
 
-impl Neighbours {
+impl Neighbors {
     fn new(block: &Block, column: usize) -> Self {
         let at = |row: usize, column: usize| block.values[row * block.width + column];
         let c = column + MARGIN;
@@ -63,7 +63,7 @@ impl Neighbours {
         }
     }
 
-    /// Returns the colour whose samples lie next to a green pixel: `near` on both sides, and green two pixels away
+    /// Returns the color whose samples lie next to a green pixel: `near` on both sides, and green two pixels away
     /// along and across that direction.
     fn beside_green(&self, near: f32, along_2: f32, across_2: f32) -> f32 {
         (5.0 * self.center + 4.0 * near - along_2 - self.diagonal + 0.5 * across_2) / 8.0

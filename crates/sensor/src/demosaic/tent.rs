@@ -1,20 +1,20 @@
-//! Methods for any mosaic: the nearest pixel of a colour, or neighbours weighted by a tent.
+//! Methods for any mosaic: the nearest pixel of a color, or neighbors weighted by a tent.
 
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::Tile;
 
-/// For each phase of the tile and each channel, the neighbours that count: row and column steps, and weight.
-type Neighbourhoods = Vec<Vec<Vec<(isize, isize, f32)>>>;
+/// For each phase of the tile and each channel, the neighbors that count: row and column steps, and weight.
+type Neighborhoods = Vec<Vec<Vec<(isize, isize, f32)>>>;
 
-/// Returns the neighbourhoods that a rule makes of the pixels of one channel within a tile of each phase; the rule is
+/// Returns the neighborhoods that a rule makes of the pixels of one channel within a tile of each phase; the rule is
 /// told whether the pixel in the middle is one of them.
-fn neighbourhoods(
+fn neighborhoods(
     tile: &Tile,
     n_channels: usize,
     rule: impl Fn(Vec<(isize, isize)>, bool) -> Vec<(isize, isize, f32)>,
-) -> Neighbourhoods {
+) -> Neighborhoods {
     let (rows, columns) = (tile.rows() as isize, tile.columns() as isize);
     let phase = |number: usize| {
         let (row, column) = ((number / tile.columns()) as isize, (number % tile.columns()) as isize);
@@ -31,7 +31,7 @@ fn neighbourhoods(
     (0..tile.rows() * tile.columns()).map(phase).collect()
 }
 
-/// What is made of a pixel's neighbours.
+/// What is made of a pixel's neighbors.
 #[derive(Clone, Copy, PartialEq)]
 enum Take {
     /// Their weighted mean.
@@ -40,10 +40,10 @@ enum Take {
     First,
 }
 
-/// Returns planes in which each pixel is taken from its neighbours inside the frame.
-fn gather(values: &Array2<f32>, tile: &Tile, neighbourhoods: &Neighbourhoods, take: Take) -> Vec<Array2<f32>> {
+/// Returns planes in which each pixel is taken from its neighbors inside the frame.
+fn gather(values: &Array2<f32>, tile: &Tile, neighborhoods: &Neighborhoods, take: Take) -> Vec<Array2<f32>> {
     let (n_rows, n_columns) = values.dim();
-    let n_channels = neighbourhoods[0].len();
+    let n_channels = neighborhoods[0].len();
     let values = values.as_standard_layout();
     let samples = values.as_slice().expect("a standard layout is contiguous");
     let channel = |channel: usize| {
@@ -53,7 +53,7 @@ fn gather(values: &Array2<f32>, tile: &Tile, neighbourhoods: &Neighbourhoods, ta
             let phases = (row % tile.rows()) * tile.columns();
             for (column, out) in out.iter_mut().enumerate() {
                 let (mut sum, mut weights) = (0.0, 0.0);
-                for &(dr, dc, weight) in &neighbourhoods[phases + column % tile.columns()][channel] {
+                for &(dr, dc, weight) in &neighborhoods[phases + column % tile.columns()][channel] {
                     let (r, c) = (row.wrapping_add_signed(dr), column.wrapping_add_signed(dc));
                     if r < n_rows && c < n_columns {
                         sum += weight * samples[r * n_columns + c];
@@ -71,28 +71,28 @@ fn gather(values: &Array2<f32>, tile: &Tile, neighbourhoods: &Neighbourhoods, ta
     (0..n_channels).map(channel).collect()
 }
 
-/// Returns each colour from its nearest pixel; of equally near ones, the first in reading order inside the frame.
+/// Returns each color from its nearest pixel; of equally near ones, the first in reading order inside the frame.
 pub(super) fn nearest(values: &Array2<f32>, tile: &Tile, n_channels: usize) -> Vec<Array2<f32>> {
     let rule = |mut same: Vec<(isize, isize)>, _| {
         same.sort_by_key(|&(dr, dc)| (dr * dr + dc * dc, dr, dc));
         same.into_iter().map(|(dr, dc)| (dr, dc, 1.0)).collect()
     };
-    gather(values, tile, &neighbourhoods(tile, n_channels, rule), Take::First)
+    gather(values, tile, &neighborhoods(tile, n_channels, rule), Take::First)
 }
 
-/// Returns each colour as the mean of its pixels under a tent; a pixel keeps its own colour as it is.
+/// Returns each color as the mean of its pixels under a tent; a pixel keeps its own color as it is.
 pub(super) fn bilinear(values: &Array2<f32>, tile: &Tile, n_channels: usize) -> Vec<Array2<f32>> {
     let rule = |same, own| if own { vec![(0, 0, 1.0)] } else { under_tent(tile, same) };
-    gather(values, tile, &neighbourhoods(tile, n_channels, rule), Take::Mean)
+    gather(values, tile, &neighborhoods(tile, n_channels, rule), Take::Mean)
 }
 
-/// Returns each colour as its mean under a tent, times what the pixel's own colour shows of finer detail.
+/// Returns each color as its mean under a tent, times what the pixel's own color shows of finer detail.
 ///
-/// The detail is the pixel's value over the tent's mean of its own colour. Where colours go up and down together, as
+/// The detail is the pixel's value over the tent's mean of its own color. Where colors go up and down together, as
 /// they mostly do, this sharpens them all.
 pub(super) fn with_detail(values: &Array2<f32>, tile: &Tile, n_channels: usize) -> Vec<Array2<f32>> {
     let rule = |same, _| under_tent(tile, same);
-    let mut planes = gather(values, tile, &neighbourhoods(tile, n_channels, rule), Take::Mean);
+    let mut planes = gather(values, tile, &neighborhoods(tile, n_channels, rule), Take::Mean);
     let (n_rows, n_columns) = values.dim();
     for row in 0..n_rows {
         for column in 0..n_columns {

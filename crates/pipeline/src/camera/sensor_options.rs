@@ -1,0 +1,51 @@
+//! What a command line changes of the sensor's frames and of the picture.
+
+use dioptric_sensor::{Demosaic, ExposureControl, Highlights, NoiseSources, Processing};
+
+use crate::{PipelineError, sense::parse_white, with_analog_gain};
+
+/// Changes to noise, gain and processing as words; what is `None` stays.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SensorOptions {
+    /// Sources of noise, as [`NoiseSources::parse`] has them.
+    pub noise: Option<String>,
+    /// The factor on the voltage after the pixel.
+    pub analog_gain: Option<f64>,
+    /// A white, as [`parse_white`](crate::parse_white) has it.
+    pub white: Option<String>,
+    /// A demosaic, as [`Demosaic::parse`] has it.
+    pub demosaic: Option<String>,
+    /// What becomes of highlights, as [`Highlights::parse`] has it.
+    pub highlights: Option<String>,
+}
+
+impl SensorOptions {
+    /// Changes what is asked for.
+    ///
+    /// # Errors
+    /// Names the word that is not known, and those that are.
+    pub fn apply(
+        &self,
+        noise: &mut NoiseSources,
+        exposure: &mut ExposureControl,
+        processing: &mut Processing,
+    ) -> Result<(), PipelineError> {
+        if let Some(list) = &self.noise {
+            *noise = NoiseSources::parse(list)?;
+        }
+        if let Some(gain) = self.analog_gain {
+            *exposure = with_analog_gain(*exposure, gain);
+            exposure.check()?;
+        }
+        if let Some(white) = &self.white {
+            processing.white = parse_white(white)?;
+        }
+        if let Some(method) = &self.demosaic {
+            processing.demosaic = Demosaic::parse(method)?;
+        }
+        if let Some(kind) = &self.highlights {
+            processing.highlights = Highlights::parse(kind)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,301 @@
+//! Highlights that are beyond what pixels hold.
+//!
+//! A light of more than a pixel holds saturates its channels one after the other, and clipping each by itself turns its hue: an
+//! orange lamp becomes yellow, then white. Here the missing channels are found from the channels that are left and
+//! the color of the bright surroundings, and where nothing is left the color alone is kept. The color is carried into what is
+//! saturated by a pyramid of means that is filled from its coarse levels (Gortler et al., "The lumigraph", SIGGRAPH 1996,
+//! "pull-push"); that color changes less than brightness where light is blown is what Zhang & Brainard ("Estimation of saturated
+//! pixel values in digital color imaging", J. Opt. Soc. Am. A 21, 2004) rest on.
+
+use ndarray::Array2;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{SensorError, Tile};
+
+/// What becomes of light beyond saturation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Highlights {
+    /// Each channel is cut at the saturation of the least sensitive: hues turn, and all that is blown is white at most.
+    Clip,
+    /// Saturated channels are rebuilt from the others and the color about them; what is then brighter than white keeps its
+    /// hue in the picture.
+    #[default]
+    Reconstruct,
+}
+
+impl Highlights {
+    /// Returns the kind of a name: `clip` or `reconstruct`.
+    ///
+    /// # Errors
+    /// When the name is another.
+    pub fn parse(name: &str) -> Result<Self, SensorError> {
+        match name.to_ascii_lowercase().as_str() {
+            "clip" => Ok(Self::Clip),
+            "reconstruct" => Ok(Self::Reconstruct),
+            _ => Err(SensorError::Word {
+                what: "a treatment of highlights",
+                found: name.to_owned(),
+                expected: "clip, reconstruct".to_owned(),
+            }),
+        }
+    }
+}
+
+/// How far demosaicing carries a saturated sample, pixels.
+const SPILL_PX: usize = 2;
+/// A rebuilt channel is at most so many times its saturation.
+const MOST: f32 = 16.0;
+
+/// Which channels are saturated in or next to each pixel, a bit a channel.
+pub(crate) struct Saturated {
+    bits: Array2<u32>,
+}
+
+impl Saturated {
+    /// Returns the saturated channels of a raw frame in units of saturation, or `None` where there are none.
+    pub(crate) fn find(planes: &[Array2<f32>], tile: Option<&Tile>, n_channels: usize, level: f32) -> Option<Self> {
+        if n_channels > 32 || !planes.iter().any(|plane| plane.par_iter().any(|&v| v >= level)) {
+            return None;
+        }
+        let (rows, columns) = planes[0].dim();
+        let bit =
+            |number: usize, row: usize, column: usize| 1_u32 << tile.map_or(number, |tile| tile.filter_at(row, column));
+        let mut bits = Array2::<u32>::zeros((rows, columns));
+        for (number, plane) in planes.iter().enumerate() {
+            ndarray::Zip::indexed(&mut bits).and(plane).par_for_each(|(row, column), bits, &v| {
+                if v >= level {
+                    *bits |= bit(number, row, column);
+                }
+            });
+        }
+        // Stacked filters are not interpolated.
+        let bits = if tile.is_some() { spread(&spread(&bits).reversed_axes()).reversed_axes() } else { bits };
+        Some(Self { bits: bits.as_standard_layout().into_owned() })
+    }
+}
+
+/// Returns flags that are also set so many rows above and below.
+fn spread(bits: &Array2<u32>) -> Array2<u32> {
+    let (rows, columns) = bits.dim();
+    let mut spread = Array2::<u32>::zeros((rows, columns));
+    spread.outer_iter_mut().into_par_iter().enumerate().for_each(|(row, mut out)| {
+        for from in row.saturating_sub(SPILL_PX)..(row + SPILL_PX + 1).min(rows) {
+            out.zip_mut_with(&bits.row(from), |out, &bits| *out |= bits);
+        }
+    });
+    spread
+}
+
+/// Rebuilds the saturated channels of balanced light; `levels` is the balanced saturation of each channel.
+pub(crate) fn reconstruct(channels: &mut [Array2<f32>], saturated: &Saturated, levels: &[f64]) {
+    let colors = surrounding_colors(channels, saturated);
+    let (rows, columns) = saturated.bits.dim();
+    let levels: Vec<f32> = levels.iter().map(|&level| level as f32).collect();
+    let mut lines: Vec<Vec<&mut [f32]>> = (0..rows).map(|_| Vec::with_capacity(channels.len())).collect();
+    for channel in channels.iter_mut() {
+        let all = channel.as_slice_mut().expect("demosaiced planes are contiguous");
+        all.chunks_mut(columns).zip(&mut lines).for_each(|(line, row)| row.push(line));
+    }
+    lines.into_par_iter().enumerate().for_each(|(row, mut line)| {
+        for column in 0..columns {
+            let bits = saturated.bits[(row, column)];
+            if bits != 0 {
+                let color = colors.at(row, column);
+                let is_saturated = |k: usize| bits >> k & 1 == 1;
+                let scale = scale(&line, column, &color, &levels, &is_saturated);
+                for (k, line) in line.iter_mut().enumerate().filter(|(k, _)| is_saturated(*k)) {
+                    line[column] = (scale * color[k]).min(MOST * levels[k]).max(line[column]);
+                }
+            }
+        }
+    });
+}
+
+/// Returns what the surrounding color is multiplied by at one pixel.
+fn scale(
+    line: &[&mut [f32]],
+    column: usize,
+    color: &[f32],
+    levels: &[f32],
+    is_saturated: &dyn Fn(usize) -> bool,
+) -> f32 {
+    let (mut left, mut of_color) = (0.0, 0.0);
+    for (k, line) in line.iter().enumerate().filter(|(k, _)| !is_saturated(*k)) {
+        left += line[column].max(0.0);
+        of_color += color[k];
+    }
+    if of_color > 0.0 {
+        return left / of_color;
+    }
+    // Nothing is left: the least light of this color that saturates every channel.
+    let needed = color.iter().zip(levels).map(|(&color, &level)| if color > 0.0 { level / color } else { 0.0 });
+    needed.fold(0.0, f32::max)
+}
+
+/// Colors of unsaturated light, carried into what is saturated, on a raster of half the resolution.
+struct Colors {
+    columns: usize,
+    n_channels: usize,
+    /// For each place the channels, which sum to 1.
+    values: Vec<f32>,
+}
+
+impl Colors {
+    fn at(&self, row: usize, column: usize) -> Vec<f32> {
+        let first = ((row / 2) * self.columns + column / 2) * self.n_channels;
+        self.values[first..first + self.n_channels].to_vec()
+    }
+}
+
+/// One level of the pyramid: for each place the sums of the channels and of the weights.
+struct Level {
+    rows: usize,
+    columns: usize,
+    sums: Vec<f32>,
+}
+
+fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated) -> Colors {
+    let n = channels.len();
+    // The color at a place is the mean of light weighted by the square of its brightness: bright surroundings are those
+    // of what is blown.
+    let (rows, columns) = saturated.bits.dim();
+    let (half_rows, half_columns) = (rows.div_ceil(2), columns.div_ceil(2));
+    let mut sums = vec![0.0_f32; half_rows * half_columns * n];
+    sums.par_chunks_mut(half_columns * n).enumerate().for_each(|(half_row, line)| {
+        for (half_column, place) in line.chunks_exact_mut(n).enumerate() {
+            for row in 2 * half_row..(2 * half_row + 2).min(rows) {
+                for column in 2 * half_column..(2 * half_column + 2).min(columns) {
+                    if saturated.bits[(row, column)] == 0 {
+                        let brightness: f32 = channels.iter().map(|plane| plane[(row, column)].max(0.0)).sum();
+                        for (sum, plane) in place.iter_mut().zip(channels) {
+                            *sum += brightness * brightness * plane[(row, column)].max(0.0);
+                        }
+                    }
+                }
+            }
+        }
+    });
+    let mut pyramid = vec![Level { rows: half_rows, columns: half_columns, sums }];
+    while pyramid.last().is_some_and(|level| level.rows > 1 || level.columns > 1) {
+        let finer = &pyramid[pyramid.len() - 1];
+        pyramid.push(finer.halved(n));
+    }
+    // From the coarsest down, places without light take the color of the place above them.
+    for index in (0..pyramid.len() - 1).rev() {
+        let (finer, coarser) = pyramid.split_at_mut(index + 1);
+        finer[index].fill_from(&coarser[0], n);
+    }
+    let Level { columns, sums: mut values, .. } = pyramid.swap_remove(0);
+    values.par_chunks_exact_mut(n).for_each(|place| {
+        let sum: f32 = place.iter().sum();
+        place.iter_mut().for_each(|v| *v = if sum > 0.0 { *v / sum } else { 1.0 / n as f32 });
+    });
+    Colors { columns, n_channels: n, values }
+}
+
+impl Level {
+    /// Returns the level of half as many rows and columns.
+    fn halved(&self, n: usize) -> Self {
+        let (rows, columns) = (self.rows.div_ceil(2), self.columns.div_ceil(2));
+        let mut sums = vec![0.0; rows * columns * n];
+        sums.par_chunks_mut(columns * n).enumerate().for_each(|(row, line)| {
+            for fine_row in 2 * row..(2 * row + 2).min(self.rows) {
+                for fine_column in 0..self.columns {
+                    let from = (fine_row * self.columns + fine_column) * n;
+                    let to = fine_column / 2 * n;
+                    for k in 0..n {
+                        line[to + k] += self.sums[from + k];
+                    }
+                }
+            }
+        });
+        Self { rows, columns, sums }
+    }
+
+    /// Gives places without light the mean of the four places of the coarser level about them.
+    fn fill_from(&mut self, coarser: &Self, n: usize) {
+        let columns = self.columns;
+        self.sums.par_chunks_mut(columns * n).enumerate().for_each(|(row, line)| {
+            for (column, place) in line.chunks_exact_mut(n).enumerate() {
+                if place.iter().all(|v| *v == 0.0) {
+                    let beside = |i: usize, last: usize| {
+                        let other = if i % 2 == 0 { (i / 2).saturating_sub(1) } else { i / 2 + 1 };
+                        [(i / 2, 0.75), (other.min(last), 0.25)]
+                    };
+                    for (r, down) in beside(row, coarser.rows - 1) {
+                        for (c, across) in beside(column, coarser.columns - 1) {
+                            let from = (r * coarser.columns + c) * n;
+                            for (k, v) in place.iter_mut().enumerate() {
+                                *v += 0.25 * down * across * coarser.sums[from + k];
+                            }
+                        }
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// Returns light of at most 1 in every part: what is brighter is dimmed as a whole, so that it keeps its hue.
+#[inline]
+pub(crate) fn dimmed([r, g, b]: [f32; 3]) -> [f32; 3] {
+    let most = r.max(g).max(b);
+    if most > 1.0 { [r / most, g / most, b / most] } else { [r, g, b] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Cfa;
+
+    /// A lamp of one color, brightest in the middle, on a dim ground of another.
+    fn lamp(color: [f32; 3], peak: f32) -> [Array2<f32>; 3] {
+        [0, 1, 2].map(|k| {
+            Array2::from_shape_fn((60, 80), |(r, c)| {
+                let squared = (r as f32 - 29.5).powi(2) + (c as f32 - 39.5).powi(2);
+                peak * color[k] * (-squared / 200.0).exp() + [0.004, 0.006, 0.01][k]
+            })
+        })
+    }
+
+    #[test]
+    fn a_blown_lamp_keeps_its_color() {
+        let (truth, levels) = (lamp([1.0, 0.5, 0.19], 4.0), [1.5, 1.0, 1.3]);
+        let mut channels = truth.clone().map(|plane| plane.to_owned());
+        for (plane, level) in channels.iter_mut().zip(levels) {
+            plane.mapv_inplace(|v| v.min(level as f32));
+        }
+        let shares: Vec<Array2<f32>> = channels.iter().zip(levels).map(|(p, level)| p / level as f32).collect();
+        let saturated = Saturated::find(&shares, None, 3, 0.999).unwrap();
+        reconstruct(&mut channels, &saturated, &levels);
+        for (row, column) in [(30, 40), (30, 46), (25, 33), (36, 40)] {
+            let [r, g, b] = [0, 1, 2].map(|k| channels[k][(row, column)]);
+            let [tr, tg, tb] = [0, 1, 2].map(|k| truth[k][(row, column)]);
+            // Blue never saturates: it tells how bright the lamp is. The ground mixes in by less than a tenth.
+            assert!((r / tr - 1.0).abs() < 0.1 && (g / tg - 1.0).abs() < 0.1 && b == tb, "{r} {g} {b}: {tr} {tg} {tb}");
+        }
+    }
+
+    #[test]
+    fn all_blown_is_of_the_color_around() {
+        let levels = [1.0; 3];
+        let mut channels = lamp([1.0, 0.5, 0.19], 40.0).map(|plane| plane.mapv(|v| v.min(1.0)));
+        let saturated = Saturated::find(&channels, None, 3, 0.999).unwrap();
+        reconstruct(&mut channels, &saturated, &levels);
+        let [r, g, b] = dimmed([0, 1, 2].map(|k| channels[k][(30, 40)]));
+        assert!(r == 1.0 && (g - 0.5).abs() < 0.05 && (b - 0.19).abs() < 0.04, "{r} {g} {b}");
+    }
+
+    #[test]
+    fn a_frame_below_saturation_has_none() {
+        let planes = [Array2::from_elem((6, 6), 0.9)];
+        let tile = Cfa::two_by_two("RGGB").unwrap().resolve("test", &["R", "G", "B"]).unwrap().unwrap();
+        assert!(Saturated::find(&planes, Some(&tile), 3, 0.99).is_none());
+        let mut one = planes[0].clone();
+        one[(2, 2)] = 1.0;
+        let found = Saturated::find(&[one], Some(&tile), 3, 0.99).unwrap();
+        // Red, and as far as interpolation carries it.
+        assert_eq!((found.bits[(0, 0)], found.bits[(4, 4)], found.bits[(5, 2)], found.bits[(2, 5)]), (1, 1, 0, 0));
+    }
+}
