@@ -2,8 +2,9 @@
 
 use dioptric_pipeline::{
     BlurChoice, Camera, Capture, Diffraction, FilmChoice, FocusChoice, KeptCamera, Quality, SceneSource, SensorChoice,
-    Silent, StageCounts, StopChoice, WavelengthChoice, WhiteChoice, with_exposure_s,
+    Silent, StageCounts, StopChoice, WavelengthChoice, with_exposure_s,
 };
+use dioptric_sensor::WhiteBalance;
 use dioptric_spectrum::{Bands, Cancel};
 
 /// The demo on a film of 48 × 32 pixels and three bands.

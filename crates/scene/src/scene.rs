@@ -199,7 +199,7 @@ impl Scene {
             depth: self.depth.as_ref().map(depth).transpose()?,
             view: self.view.map(|view| view.binned(factor)),
             hidden,
-            light: self.light,
+            light: self.light.clone(),
         })
     }
 
