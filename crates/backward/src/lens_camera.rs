@@ -7,7 +7,7 @@
 
 use dioptric_diffraction::{Edge, Hurb, Spread};
 use dioptric_optics::{
-    ExitPupilBounds, Lens, PupilReach, RayBatch, RayBatchF32, ReversedLens, Rims,
+    ExitPupilBounds, Lens, PupilReach, RayBatch, RayBatchF32, ReversedLens, Vignetting,
     glam::{DVec2, DVec3, Vec3},
 };
 use dioptric_world::Ray;
@@ -213,7 +213,7 @@ impl LensCamera {
         let stop_pose = lens.stop_pose();
         let at_stop = |aims_mm: &[DVec2], moved_mm: DVec2| {
             let mut rays = rays_to(aims_mm, moved_mm);
-            lens.trace_to_stop(&mut rays, Rims::Ignore);
+            lens.trace_to_stop(&mut rays, Vignetting::Off);
             let place = |i: usize| rays.fate[i].is_in_flight().then(|| stop_pose.to_own(rays.point_mm(i)).truncate());
             (0..rays.len()).map(place).collect::<Vec<Option<DVec2>>>()
         };
@@ -228,7 +228,7 @@ impl LensCamera {
             }
         }
         let mut rays = rays_to(&aims_mm, DVec2::ZERO);
-        lens.trace(&mut rays, Rims::Ignore);
+        lens.trace(&mut rays, Vignetting::Off);
         let seen = |i: usize| {
             let is_seen = sites[i].is_some() && rays.fate[i].is_in_flight();
             is_seen.then(|| self.in_world(rays.point_mm(i), rays.direction(i)))

@@ -62,7 +62,8 @@ impl Camera {
                         lens.with_stop_diameter_mm(aperture_diameter_mm.min(full_mm))?
                     }
                 };
-                let lens = if *has_dispersion { lens.with_slope(PAPER_SLOPE_PER_NM, FOCUS_NM)? } else { lens };
+                let lens =
+                    if *has_dispersion { lens.with_linear_dispersion(PAPER_SLOPE_PER_NM, FOCUS_NM)? } else { lens };
                 let film_distance_mm = match (film_distance_mm, focus_distance_m) {
                     (Some(film_distance_mm), _) => *film_distance_mm,
                     (None, Some(focus_m)) => film_distance_for(&lens, *focus_m)?,

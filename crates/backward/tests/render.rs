@@ -8,7 +8,7 @@ use dioptric_backward::{
     PixelGrid, Placement, RenderSettings, Renderer, Rendering, ThinLens, auxiliary, layered_depth,
 };
 use dioptric_diffraction::Hurb;
-use dioptric_optics::{Glass, Lens, Move, glam::DVec2};
+use dioptric_optics::{CoordinateBreak, Glass, Lens, glam::DVec2};
 use dioptric_spectrum::{Cancel, WavelengthGrid};
 use dioptric_world::{
     Emission, Light, Material, Shape, SpectralCurve, Texture, TriangleMesh, World, WorldBuilder,
@@ -144,7 +144,7 @@ fn immersion_lowers_irradiance_by_index_squared() {
 fn camera_turned_as_whole_sees_same_sky() {
     let bands = bands(&[550.0]);
     let lens = Lens::built_in("dgauss-50mm").unwrap();
-    let turn = Move {
+    let turn = CoordinateBreak {
         surfaces: (0, lens.interfaces().len()),
         pivot_mm: 12.0,
         decenter_mm: [5.0, -3.0, 1.0],

@@ -2,7 +2,8 @@
 //!
 //! Freniere et al., SPIE 3780 (1999): a ray that passes an edge at the distance d is known to within d, so that its
 //! transverse momentum is not: `tan σ = γ / (2 k d)`, a Gaussian. It gives the width of Airy's pattern, its
-//! scaling with wavelength and f-number, and a good edge in defocus; it does not give rings.
+//! scaling with wavelength and f-number, and a good edge in defocus; it does not give rings. `docs/hurb.md` derives what is
+//! computed from it; comments name its equations.
 
 use std::f64::consts::PI;
 
@@ -13,14 +14,14 @@ use crate::{Covariance, quadrature::gauss_legendre_on};
 
 /// A round edge at which rays are deviated.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
+pub struct CircularStop {
     /// Radius of the opening, mm.
     pub radius_mm: f64,
     /// 2πn/λ in the medium where the rays are bent, 1/mm.
     pub wave_number_per_mm: f64,
 }
 
-impl Edge {
+impl CircularStop {
     /// Returns an edge in a medium of this index, for light of this vacuum wavelength.
     pub fn new(radius_mm: f64, wavelength_nm: f64, index: f64) -> Self {
         Self { radius_mm, wave_number_per_mm: 2.0 * PI * index / (wavelength_nm * 1e-6) }
@@ -40,7 +41,7 @@ pub struct Hurb {
 
 /// The spread of one ray: standard deviations of its direction cosines.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
+pub struct AngularSpread {
     /// Along the radius of the stop.
     pub radial: f64,
     /// Across it.
@@ -65,23 +66,24 @@ impl Hurb {
     ///
     /// The arc tangent of the model's tangent is taken for the spread of the cosine: they differ where a ray passes
     /// within a wavelength of the edge.
-    pub fn sigma(self, distance_mm: f64, edge: Edge) -> f64 {
+    pub fn sigma(self, distance_mm: f64, edge: CircularStop) -> f64 {
         self.variance(1.0 / (distance_mm * distance_mm), edge).sqrt()
     }
 
     /// Returns the spread of a ray that crosses a round stop `r_mm` from its centre.
     ///
     /// The distances to the edge are R − r along the radius and the half-chord √(R² − r²) across it.
-    pub fn spread(self, r_mm: f64, edge: Edge) -> Spread {
+    pub fn spread(self, r_mm: f64, edge: CircularStop) -> AngularSpread {
         let (radial, across) = self.variances(r_mm, edge);
-        Spread { radial: radial.sqrt(), across: across.sqrt() }
+        AngularSpread { radial: radial.sqrt(), across: across.sqrt() }
     }
 
     /// Returns the covariance of the direction cosines, along the stop's own axes, of a ray that crosses a round stop at a
     /// place.
     #[inline]
-    pub fn covariance(self, at: StopPoint, edge: Edge) -> Covariance {
+    pub fn covariance(self, at: StopPoint, edge: CircularStop) -> Covariance {
         let square = at.mm.length_squared();
+        // C = σ_t² 1 + (σ_r² − σ_t²) r̂ r̂ᵀ (eq. 3).
         let (radial, across) = self.variances(square.sqrt(), edge);
         // In the middle the two are equal.
         let more = (radial - across) / square.max(f64::MIN_POSITIVE);
@@ -91,7 +93,8 @@ impl Hurb {
 
     /// Returns the variances along the radius and across it.
     #[inline]
-    fn variances(self, r_mm: f64, edge: Edge) -> (f64, f64) {
+    fn variances(self, r_mm: f64, edge: CircularStop) -> (f64, f64) {
+        // The distances R − r and √(R² − r²) (eqs. 2a and 2b), as squares and without cancellation.
         let clearance = (edge.radius_mm - r_mm).max(1e-12 * edge.radius_mm);
         let across_middle = edge.radius_mm + r_mm;
         let each = 1.0 / (clearance * clearance * across_middle);
@@ -100,7 +103,7 @@ impl Hurb {
 
     /// Returns the variance for an edge at a distance of which 1 over the square is given, 1/mm².
     #[inline]
-    fn variance(self, per_distance_squared: f64, edge: Edge) -> f64 {
+    fn variance(self, per_distance_squared: f64, edge: CircularStop) -> f64 {
         let (floor, k) = (self.floor / edge.radius_mm, 2.0 * edge.wave_number_per_mm);
         arc_squared((self.edge * self.edge * per_distance_squared + floor * floor) / (k * k))
     }
@@ -246,7 +249,7 @@ mod tests {
 
     #[test]
     fn spread_is_inversely_related_to_the_distance_of_the_edge() {
-        let edge = Edge::new(1.0, 550.0, 1.0);
+        let edge = CircularStop::new(1.0, 550.0, 1.0);
         let (far, near) = (Hurb::PAPER.spread(0.0, edge), Hurb::PAPER.spread(0.9, edge));
         assert_abs_diff_eq!(near.radial / far.radial, 10.0, epsilon = 1e-4);
         assert_abs_diff_eq!(near.across / far.across, 1.0 / 0.19f64.sqrt(), epsilon = 1e-4);
@@ -259,7 +262,7 @@ mod tests {
             for (distance_mm, limit) in
                 [(1.0, 1e-14), (0.01, 1e-14), (1e-3, 1e-14), (1e-4, 1e-12), (3e-5, 1e-10), (1e-9, 1e-6), (0.0, 1e-6)]
             {
-                let edge = Edge::new(1.0, 550.0, 1.5);
+                let edge = CircularStop::new(1.0, 550.0, 1.5);
                 let tangent = (model.edge / distance_mm).hypot(model.floor) / (2.0 * edge.wave_number_per_mm);
                 let off = model.sigma(distance_mm, edge) / tangent.atan() - 1.0;
                 assert!(off.abs() < limit, "{distance_mm}: {off}");
@@ -269,10 +272,10 @@ mod tests {
 
     #[test]
     fn the_covariance_has_the_spread_along_the_radius_and_across_it() {
-        let edge = Edge::new(2.0, 450.0, 1.0);
+        let edge = CircularStop::new(2.0, 450.0, 1.0);
         for (r_mm, angle) in [(0.0, 0.0), (1e-9, 2.0), (0.7, 0.4), (1.99, -2.2)] {
             let axis = DVec2::from_angle(angle);
-            let Spread { radial, across } = Hurb::CALIBRATED.spread(r_mm, edge);
+            let AngularSpread { radial, across } = Hurb::CALIBRATED.spread(r_mm, edge);
             let (narrow, wide) = Hurb::CALIBRATED.covariance(StopPoint { mm: axis * r_mm }, edge).axes();
             assert!((narrow.sqrt() / across - 1.0).abs() < 1e-9 && (wide.sqrt() / radial - 1.0).abs() < 1e-9);
             let wanted = Covariance::along(axis * radial).plus(Covariance::along(axis.perp() * across));

@@ -6,7 +6,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use crate::{Edge, Hurb};
+use crate::{CircularStop, Hurb};
 
 /// Rays that share a stream of random numbers: results do not depend on how many threads share the work.
 const CHUNK: usize = 4096;
@@ -27,7 +27,7 @@ pub struct SampledHurb {
     /// The constants of the model.
     pub model: Hurb,
     /// The edge.
-    pub edge: Edge,
+    pub edge: CircularStop,
     /// How a deviation changes the direction of a ray.
     pub form: HurbForm,
     /// The seed: ray `i` draws from its stream `i / 4096`.
@@ -102,7 +102,7 @@ mod tests {
 
     fn in_air(seed: u64) -> SampledHurb {
         let form = HurbForm::DirectionCosines;
-        SampledHurb { model: Hurb::PAPER, edge: Edge::new(1.0, 550.0, 1.0), form, seed }
+        SampledHurb { model: Hurb::PAPER, edge: CircularStop::new(1.0, 550.0, 1.0), form, seed }
     }
 
     fn rms(values: &[f64]) -> f64 {
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn deviations_have_the_spread_of_the_model() {
-        let edge = Edge::new(1.0, 550.0, 1.5);
+        let edge = CircularStop::new(1.0, 550.0, 1.5);
         let n = 200_000;
         for form in [HurbForm::DirectionCosines, HurbForm::Angles] {
             let mut rays = bundle(n, DVec3::new(0.0, 0.8, 0.0));

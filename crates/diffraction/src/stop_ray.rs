@@ -1,9 +1,9 @@
 //! How a deviation at the stop moves a ray on the film.
 
-use dioptric_optics::{FilmPoint, MonoLens, Pose, RayBatch, Rims, StopPoint};
+use dioptric_optics::{FilmPoint, MonoLens, Pose, RayBatch, StopPoint, Vignetting};
 use glam::{DVec2, DVec3};
 
-use crate::{Covariance, Edge, Hurb};
+use crate::{CircularStop, Covariance, Hurb};
 
 /// Step of a direction cosine for the difference quotients: the truncation error, of order its square, and the
 /// rounding error, 1e-16 over it, are both below 1e-9 of the derivative.
@@ -25,7 +25,7 @@ pub struct StopRay {
 
 impl StopRay {
     /// Returns the covariance on the film, mm², of the ray's Gaussian.
-    pub fn film_covariance_mm2(&self, edge: Edge, model: Hurb) -> Covariance {
+    pub fn film_covariance_mm2(&self, edge: CircularStop, model: Hurb) -> Covariance {
         model.covariance(self.stop, edge).mapped(self.along_l_mm, self.along_m_mm)
     }
 }
@@ -36,10 +36,10 @@ impl StopRay {
 /// The rays start in object space; those that end on the way are `None`. Each costs four more rays behind the stop.
 pub fn trace_stop_rays(lens: &MonoLens, mut rays: RayBatch, film_mm: f64) -> Vec<Option<StopRay>> {
     let (behind, end) = (lens.stop() + 1, lens.n_surfaces());
-    lens.trace_surfaces(0..behind, &mut rays, Rims::Ignore);
+    lens.trace_surfaces(0..behind, &mut rays, Vignetting::Off);
     let on_film = |mut rays: RayBatch| {
         if behind < end {
-            lens.trace_surfaces(behind..end, &mut rays, Rims::Ignore);
+            lens.trace_surfaces(behind..end, &mut rays, Vignetting::Off);
         }
         lens.to_film(&mut rays, film_mm);
         let places = lens.film_points(&rays, film_mm);
@@ -92,7 +92,7 @@ mod tests {
     const RADIUS_MM: f64 = 1.136_35;
 
     /// The lens of Figure 2, its rays from the point at 2 m, and λN of its image.
-    fn figure_2(n_rays: usize, wavelength_nm: f64) -> (MonoLens, RayBatch, Edge, f64) {
+    fn figure_2(n_rays: usize, wavelength_nm: f64) -> (MonoLens, RayBatch, CircularStop, f64) {
         let lens = Lens::thin(50.0, 2.0 * RADIUS_MM).unwrap().at(wavelength_nm).unwrap();
         let (points, directions): (Vec<DVec3>, Vec<DVec3>) = vogel(n_rays)
             .map(|p| {
@@ -102,7 +102,7 @@ mod tests {
             .unzip();
         let mut rays = RayBatch::from_points(&points, &directions);
         rays.object_z_mm = -OBJECT_MM;
-        let edge = Edge::new(RADIUS_MM, wavelength_nm, 1.0);
+        let edge = CircularStop::new(RADIUS_MM, wavelength_nm, 1.0);
         (lens, rays, edge, wavelength_nm * 1e-6 * FILM_MM / (2.0 * RADIUS_MM))
     }
 
@@ -138,7 +138,7 @@ mod tests {
         let n_rays = 400_000;
         for (model, width) in [(Hurb::PAPER, 0.6174), (Hurb::SCENE3D, 0.8732)] {
             let (lens, mut rays, edge, unit) = figure_2(n_rays, 550.0);
-            lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Rims::Clip);
+            lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Vignetting::On);
             let form = HurbForm::DirectionCosines;
             SampledHurb { model, edge, form, seed: 3 }.apply(&mut rays, &lens.stop_pose());
             lens.to_film(&mut rays, FILM_MM);

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by panicking and shows its numbers")]
 
 use dioptric_forward::{Film, PsfDomain, Settings, Source, render};
-use dioptric_optics::{Lens, ObjectPoint, PupilBoundary, Rims, rays_towards};
+use dioptric_optics::{Lens, ObjectPoint, PupilBoundary, Vignetting, rays_towards};
 use dioptric_psf::{Diffraction, FieldSampling, LensImageModel};
 use dioptric_scene::View;
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
@@ -115,7 +115,7 @@ impl Uniform {
                     let pupil = PupilBoundary::find(&mono, &point, 64).unwrap();
                     let target = pupil.center_mm() + DVec2::from_angle(azimuth) * pupil.rho_max_mm(azimuth);
                     let mut rays = rays_towards(&point, &[target], pupil.z_mm(), 0.0);
-                    mono.trace(&mut rays, Rims::Ignore);
+                    mono.trace(&mut rays, Vignetting::Off);
                     let cosine = rays.direction(0).truncate();
                     let off_mm = place_mm - mono.landed(&rays, self.film_mm).next().unwrap().in_picture_mm();
                     if off_mm.length() < 1e-6 {

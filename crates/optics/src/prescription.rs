@@ -3,7 +3,7 @@
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::{Aperture, Glass, ImageSurface, Interface, Lens, Move, OpticsError, Shape, Surface};
+use crate::{Aperture, CoordinateBreak, Glass, ImageSurface, Interface, Lens, OpticsError, Shape, Surface};
 
 /// A lens as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,7 +17,7 @@ struct Prescription {
     surfaces: Vec<Row>,
     /// Tilts and decentres.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    moves: Vec<Move>,
+    moves: Vec<CoordinateBreak>,
     /// Openings and obscurations beside the round rims.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     apertures: Vec<Aperture>,

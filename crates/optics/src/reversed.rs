@@ -6,7 +6,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::{
-    MonoLens, Pose, RayBatch, RayBatchF32, Rims,
+    MonoLens, Pose, RayBatch, RayBatchF32, Vignetting,
     rays::RaySlices,
     trace::{self, Goal, Kind, Plan, Real, Step, Toric},
 };
@@ -44,8 +44,8 @@ impl MonoLens {
         let parts = [Part::Whole, Part::ToStop, Part::FromStop];
         ReversedLens {
             poses,
-            plans: parts.map(|part| plan_of(&steps(part), part, self.first_of(part), Rims::Clip)),
-            plans_f32: parts.map(|part| plan_of(&steps(part), part, self.first_of(part), Rims::Clip)),
+            plans: parts.map(|part| plan_of(&steps(part), part, self.first_of(part), Vignetting::On)),
+            plans_f32: parts.map(|part| plan_of(&steps(part), part, self.first_of(part), Vignetting::On)),
             forward: self.clone(),
         }
     }
@@ -72,19 +72,19 @@ impl ReversedLens {
     /// Traces rays from the image space through all surfaces, on this thread.
     ///
     /// Each ray in flight ends on the first surface, bent into the object space, or where it was lost.
-    pub fn trace(&self, rays: &mut RayBatch, rims: Rims) {
+    pub fn trace(&self, rays: &mut RayBatch, rims: Vignetting) {
         self.trace_part(Part::Whole, rays, rims);
     }
 
     /// Traces rays from the image space through the surfaces behind the stop and on to the stop, whose rim ends them.
     ///
     /// A stop that refracts has not done so yet: rays are in the medium behind it, where forward rays are diffracted.
-    pub fn trace_to_stop(&self, rays: &mut RayBatch, rims: Rims) {
+    pub fn trace_to_stop(&self, rays: &mut RayBatch, rims: Vignetting) {
         self.trace_part(Part::ToStop, rays, rims);
     }
 
     /// Traces rays that are at the stop on through it and the surfaces before it.
-    pub fn trace_from_stop(&self, rays: &mut RayBatch, rims: Rims) {
+    pub fn trace_from_stop(&self, rays: &mut RayBatch, rims: Vignetting) {
         self.trace_part(Part::FromStop, rays, rims);
     }
 
@@ -118,7 +118,7 @@ impl ReversedLens {
         match self.poses_of(part) {
             Some(poses) => trace::placed_clearances(&steps, poses, &mut slices, &mut clearances_mm),
             None => {
-                let plan = plan_of(&steps, part, self.forward.first_of(part), Rims::Ignore);
+                let plan = plan_of(&steps, part, self.forward.first_of(part), Vignetting::Off);
                 trace::trace_clearances(&plan, slices, &mut clearances_mm);
             }
         }
@@ -126,9 +126,9 @@ impl ReversedLens {
         clearances_mm
     }
 
-    fn trace_part(&self, part: Part, rays: &mut RayBatch, rims: Rims) {
+    fn trace_part(&self, part: Part, rays: &mut RayBatch, rims: Vignetting) {
         let object_z_mm = rays.object_z_mm;
-        let is_planned = rims == Rims::Clip && object_z_mm == f64::NEG_INFINITY;
+        let is_planned = rims == Vignetting::On && object_z_mm == f64::NEG_INFINITY;
         let mut slices = rays.slices();
         mirror(&mut slices);
         let steps = || part_of(&mirrored_steps(&self.forward, object_z_mm), self.forward.stop(), part);
@@ -147,7 +147,7 @@ impl ReversedLens {
     fn trace_part_f32(&self, part: Part, rays: &mut RayBatchF32) {
         if self.poses.is_some() {
             let mut wide = rays.widened();
-            self.trace_part(part, &mut wide, Rims::Clip);
+            self.trace_part(part, &mut wide, Vignetting::On);
             return rays.set_rounded(&wide, |point, _| point);
         }
         let mut slices = rays.slices();
@@ -167,7 +167,7 @@ impl ReversedLens {
     }
 }
 
-fn plan_of<T: Real>(steps: &[Step], part: Part, first: usize, rims: Rims) -> Plan<T> {
+fn plan_of<T: Real>(steps: &[Step], part: Part, first: usize, rims: Vignetting) -> Plan<T> {
     Plan::reversed(steps, first, rims, part != Part::FromStop)
 }
 

@@ -13,10 +13,10 @@ mod placed;
 mod plan;
 mod real;
 #[cfg(test)]
+mod scalar_reference;
+#[cfg(test)]
 mod tests;
 mod toric;
-#[cfg(test)]
-mod twin;
 
 use multiversion::multiversion;
 
@@ -35,11 +35,11 @@ use crate::{Aperture, RayFate, rays::RaySlices};
 
 /// Whether rims end rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rims {
+pub enum Vignetting {
     /// A ray that meets a surface outside its rim ends there.
-    Clip,
+    On,
     /// Surfaces reach as far as their shape does.
-    Ignore,
+    Off,
 }
 
 /// A surface with its indices resolved.

@@ -2,8 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_optics::{
-    Aperture, ExitPupilBounds, Glass, ImageSurface, Interface, Lens, MonoLens, Move, Outline, PupilReach, RayBatch,
-    RayBatchF32, RayFate, Rims, Shape, Surface,
+    Aperture, CoordinateBreak, ExitPupilBounds, Glass, ImageSurface, Interface, Lens, MonoLens, Outline, PupilReach,
+    RayBatch, RayBatchF32, RayFate, Shape, Surface, Vignetting,
     glam::{DVec2, DVec3},
 };
 use rand::{RngExt, SeedableRng};
@@ -15,8 +15,13 @@ fn lenses() -> Vec<(String, Lens, f64)> {
     let mut all: Vec<Lens> = Lens::built_in_names().map(|name| Lens::built_in(name).unwrap()).collect();
     let gauss = Lens::built_in("dgauss-50mm").unwrap();
     let last = gauss.interfaces().len() - 1;
-    let movement =
-        |surfaces, decenter_mm, tilt_deg| Move { surfaces, pivot_mm: 10.0, decenter_mm, tilt_deg, tilt_first: false };
+    let movement = |surfaces, decenter_mm, tilt_deg| CoordinateBreak {
+        surfaces,
+        pivot_mm: 10.0,
+        decenter_mm,
+        tilt_deg,
+        tilt_first: false,
+    };
     let whole = movement((0, last), [3.0, -2.0, 0.0], [4.0, -3.0, 1.0]);
     let group = movement((2, 4), [0.1, 0.05, 0.0], [0.3, 0.2, 0.0]);
     let film = movement((last + 1, last + 1), [0.0, 1.0, 0.2], [5.0, 2.0, 10.0]);
@@ -88,14 +93,14 @@ fn light_returns_the_way_it_came() {
         let lens = lens.at(550.0).unwrap();
         let (_, start) = from_film(&lens, film_mm, half_film_mm(&lens, film_mm), 4000, 1);
         let mut rays = start.clone();
-        lens.reversed().trace(&mut rays, Rims::Clip);
+        lens.reversed().trace(&mut rays, Vignetting::On);
         assert!(rays.n_in_flight() > 10, "{name}: {}", rays.n_in_flight());
         let mut home = RayBatch::with_capacity(start.len());
         for i in 0..rays.len() {
             home.push(rays.point_mm(i), -rays.direction(i), 0.0);
         }
         home.fate.clone_from(&rays.fate);
-        lens.trace(&mut home, Rims::Ignore);
+        lens.trace(&mut home, Vignetting::Off);
         for i in (0..home.len()).filter(|&i| home.fate[i].is_in_flight()) {
             assert!(off_line_mm(&home, i, start.point_mm(i)) < 1e-11, "{name} ray {i}");
             assert!((home.direction(i) + start.direction(i)).length() < 1e-12, "{name} ray {i}");
@@ -117,14 +122,14 @@ fn rims_end_the_same_rays_both_ways() {
         let lens = lens.at(550.0).unwrap();
         let (_, start) = from_film(&lens, film_mm, half_film_mm(&lens, film_mm), 4000, 2);
         let (mut clipped, mut free) = (start.clone(), start.clone());
-        lens.reversed().trace(&mut clipped, Rims::Clip);
-        lens.reversed().trace(&mut free, Rims::Ignore);
+        lens.reversed().trace(&mut clipped, Vignetting::On);
+        lens.reversed().trace(&mut free, Vignetting::Off);
         let mut home = RayBatch::with_capacity(start.len());
         for i in 0..free.len() {
             home.push(free.point_mm(i), -free.direction(i), 0.0);
         }
         home.fate.clone_from(&free.fate);
-        lens.trace(&mut home, Rims::Clip);
+        lens.trace(&mut home, Vignetting::On);
         let mut n_lost = 0;
         for i in (0..start.len()).filter(|&i| free.fate[i].is_in_flight()) {
             assert_eq!(home.fate[i].is_in_flight(), clipped.fate[i].is_in_flight(), "{name} ray {i}");
@@ -146,14 +151,14 @@ fn pause_at_the_stop_changes_nothing() {
         let reversed = lens.at(550.0).unwrap().reversed();
         let (_, start) = from_film(reversed.forward(), film_mm, half_film_mm(reversed.forward(), film_mm), 2000, 3);
         let (mut whole, mut parts) = (start.clone(), start);
-        reversed.trace(&mut whole, Rims::Clip);
-        reversed.trace_to_stop(&mut parts, Rims::Clip);
+        reversed.trace(&mut whole, Vignetting::On);
+        reversed.trace_to_stop(&mut parts, Vignetting::On);
         let edge_mm = reversed.forward().stop_semi_aperture_mm();
         for i in (0..parts.len()).filter(|&i| parts.fate[i].is_in_flight()) {
             let own_mm = reversed.stop_pose().to_own(parts.point_mm(i));
             assert!(own_mm.truncate().length() <= edge_mm + 1e-12, "{name}");
         }
-        reversed.trace_from_stop(&mut parts, Rims::Clip);
+        reversed.trace_from_stop(&mut parts, Vignetting::On);
         for i in 0..whole.len() {
             assert_eq!(whole.fate[i].is_in_flight(), parts.fate[i].is_in_flight(), "{name} ray {i}");
             let apart_mm = (whole.point_mm(i) - parts.point_mm(i)).length();
@@ -176,7 +181,7 @@ fn single_precision_keeps_scene_rays() {
             (narrow.l[i], narrow.m[i], narrow.n[i]) = direction.as_vec3().into();
         }
         let mut wide = start;
-        lens.reversed().trace(&mut wide, Rims::Clip);
+        lens.reversed().trace(&mut wide, Vignetting::On);
         lens.reversed().trace_f32(&mut narrow);
         let both = |i: &usize| wide.fate[*i].is_in_flight() && narrow.fate[*i].is_in_flight();
         let kept: Vec<usize> = (0..wide.len()).filter(both).collect();
@@ -206,8 +211,8 @@ fn no_light_passes_outside_the_bounds() {
                 let (places, start) = from_film(reversed.forward(), film_mm, half_mm, 30_000, 10 + seed as u64);
                 let mut rays = start.clone();
                 match reach {
-                    PupilReach::WholeLens => reversed.trace(&mut rays, Rims::Clip),
-                    PupilReach::Stop => reversed.trace_to_stop(&mut rays, Rims::Clip),
+                    PupilReach::WholeLens => reversed.trace(&mut rays, Vignetting::On),
+                    PupilReach::Stop => reversed.trace_to_stop(&mut rays, Vignetting::On),
                 }
                 for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
                     n_lit += 1;
@@ -242,7 +247,7 @@ fn bounds_waste_few_rays() {
                 let site = reversed.forward().film_site(place, film_mm).unwrap();
                 rays.push(target, (target - site.point_mm).normalize(), 0.0);
             }
-            reversed.trace(&mut rays, Rims::Clip);
+            reversed.trace(&mut rays, Vignetting::On);
             let share = rays.n_in_flight() as f64 / rays.len() as f64;
             assert!(share > least, "f/{f_number} at {place}: {share}");
         }

@@ -1,6 +1,6 @@
 //! Point spread functions drawn from a bank, by the model that suits each.
 
-use dioptric_diffraction::{DiffractionError, Edge, WaveQuality, WaveWindow, WindowCenter, wave_psf};
+use dioptric_diffraction::{CircularStop, DiffractionError, WaveQuality, WaveWindow, WindowCenter, wave_psf};
 use dioptric_optics::ObjectPoint;
 use glam::DVec2;
 use ndarray::Array2;
@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use crate::{
     Diffraction, Interpolation, Kernel,
-    bend::Bending,
-    ray_map::Record,
+    hurb_splatter::StopHurb,
+    ray_map::RayMap,
     render::{self, Layout},
     rotational::RotationalBank,
 };
@@ -81,11 +81,14 @@ impl RotationalBank {
         wave_share_of(&self.layout(&record, query, None), self.settings().diffraction)
     }
 
-    fn layout<'a>(&self, record: &'a Record, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
+    fn layout<'a>(&self, record: &'a RayMap, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
         let turn = query.field_tan.try_normalize().unwrap_or(DVec2::X);
         let bending = self.settings().diffraction.hurb().map(|model| {
             let index = self.stop_index(query.wavelength_nm);
-            Bending { model, edge: Edge::new(self.reference().stop_semi_aperture_mm(), query.wavelength_nm, index) }
+            StopHurb {
+                model,
+                edge: CircularStop::new(self.reference().stop_semi_aperture_mm(), query.wavelength_nm, index),
+            }
         });
         Layout::new(record, turn, bending, query.pitch_um).with_side(side)
     }

@@ -8,7 +8,7 @@ use crate::{
     FieldGeometry, Kernel, PsfError, PsfQuery,
     field_geometry::{Area, Landed, Landing},
     general::GeneralBank,
-    ray_map::Record,
+    ray_map::RayMap,
 };
 
 /// Where the fields of a [`GeneralBank`] land on the film, and which field is seen at each place.
@@ -118,7 +118,7 @@ impl FieldToFilm {
     pub(crate) fn kernel(&self, bank: &GeneralBank, query: PsfQuery) -> Kernel {
         let PsfQuery { field_tan, dioptres, wavelength_nm, .. } = query;
         let samples = bank.lit_samples(Some(&self.nearest_lit), field_tan, dioptres, wavelength_nm);
-        let record = Record::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
+        let record = RayMap::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
         bank.kernel_of(&record.expect("every stencil has a knot"), query).0
     }
 }

@@ -1,6 +1,6 @@
 //! Ray maps of any lens, over a field of two dimensions.
 
-use dioptric_diffraction::{Edge, WaveQuality, WaveWindow, WindowCenter, wave_psf};
+use dioptric_diffraction::{CircularStop, WaveQuality, WaveWindow, WindowCenter, wave_psf};
 use dioptric_optics::{Lens, MonoLens, ObjectPoint};
 use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
@@ -10,12 +10,12 @@ use rayon::prelude::*;
 use crate::{
     BankSettings, Diffraction, Kernel, ModelUse, PsfError, PsfQuery,
     axis::Axis,
-    bend::Bending,
     dispersion::Dispersion,
     drawing::{composed, wave_share_of},
+    hurb_splatter::StopHurb,
     mesh::Mesh,
     pupil::Pupil,
-    ray_map::{RIM_OVER_RMS, Record, Summary, Task},
+    ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, RayMapMoments},
     render::{self, Layout},
     watch::Watch,
 };
@@ -45,8 +45,8 @@ pub(crate) struct GeneralBank {
 /// The ray map of a point that is seen.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
-    pub(crate) record: Record,
-    pub(crate) summary: Summary,
+    pub(crate) record: RayMap,
+    pub(crate) summary: RayMapMoments,
 }
 
 impl GeneralBank {
@@ -67,7 +67,7 @@ impl GeneralBank {
         for lens in &lenses {
             for &dioptres in &settings.dioptres {
                 for &tan_y in tans_y {
-                    tasks.extend(tans_x.iter().map(|&tan_x| Task {
+                    tasks.extend(tans_x.iter().map(|&tan_x| RayMapJob {
                         lens,
                         reference: &reference,
                         field_tan: DVec2::new(tan_x, tan_y),
@@ -79,14 +79,14 @@ impl GeneralBank {
             }
         }
         let has_stop = settings.diffraction != Diffraction::None;
-        let sample = |task: &Task<'_>| {
+        let sample = |task: &RayMapJob<'_>| {
             let pupil = Pupil::find(task.lens, &task.point(), mesh.n_azimuths)?;
             let pupil = pupil.near(task.lens, &task.point())?;
             let traced = task.trace(&pupil, has_stop)?;
             Some(Sample { record: traced.record(mesh, has_stop), summary: traced.summary })
         };
         let watch = Watch::new(tasks.len(), progress, cancel);
-        let watched = |task: &Task<'_>| {
+        let watched = |task: &RayMapJob<'_>| {
             watch.check()?;
             let sample = sample(task);
             watch.done(1);
@@ -143,7 +143,7 @@ impl GeneralBank {
     }
 
     /// Draws the kernel of a point's ray map.
-    pub(crate) fn kernel_of(&self, record: &Record, query: PsfQuery) -> (Kernel, ModelUse) {
+    pub(crate) fn kernel_of(&self, record: &RayMap, query: PsfQuery) -> (Kernel, ModelUse) {
         let (energies, model) = self.draw(record, query, None);
         (render::kernel(&energies, self.settings.diffraction != Diffraction::None, query.pitch_um), model)
     }
@@ -160,18 +160,18 @@ impl GeneralBank {
         record.map_or(0.0, |record| wave_share_of(&self.layout(&record, query, None), self.settings.diffraction))
     }
 
-    fn layout<'a>(&self, record: &'a Record, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
+    fn layout<'a>(&self, record: &'a RayMap, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
         let wavelength_nm = self.within_colors(query.wavelength_nm);
         let bending = self.settings.diffraction.hurb().map(|model| {
             let colors = self.colors.stencil(self.dispersion.coordinate(wavelength_nm));
             let index = colors.iter().map(|(i, weight)| weight * self.stop_indices[i]).sum();
-            Bending { model, edge: Edge::new(self.reference.stop_semi_aperture_mm(), wavelength_nm, index) }
+            StopHurb { model, edge: CircularStop::new(self.reference.stop_semi_aperture_mm(), wavelength_nm, index) }
         });
         // Nothing is turned: every field has its own samples.
         Layout::new(record, DVec2::X, bending, query.pitch_um).with_side(side)
     }
 
-    fn draw(&self, record: &Record, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
+    fn draw(&self, record: &RayMap, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
         let PsfQuery { field_tan, dioptres, pitch_um, .. } = query;
         let wavelength_nm = self.within_colors(query.wavelength_nm);
         let layout = self.layout(record, query, side);
@@ -187,10 +187,10 @@ impl GeneralBank {
         composed(layout, self.settings.diffraction, waves)
     }
 
-    fn record(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<Record> {
+    fn record(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<RayMap> {
         let weighted = self.stencil(field_tan, dioptres, wavelength_nm);
         let records = weighted.into_iter().map(|(i, weight)| Some((&self.samples[i].as_ref()?.record, weight)));
-        Record::mix(records.collect::<Option<Vec<_>>>()?.into_iter())
+        RayMap::mix(records.collect::<Option<Vec<_>>>()?.into_iter())
     }
 
     /// Returns the signed radius of the circle of confusion, mm.
@@ -217,7 +217,7 @@ impl GeneralBank {
         wavelength_nm: f64,
     ) -> f64 {
         let samples = self.lit_samples(nearest_lit, field_tan, dioptres, wavelength_nm);
-        let record = Record::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
+        let record = RayMap::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
         RIM_OVER_RMS * record.map_or(0.0, |record| record.rms_mm())
     }
 

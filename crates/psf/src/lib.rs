@@ -13,8 +13,8 @@
 
 mod adaptive;
 mod axis;
-mod bend;
 mod blend;
+mod blurred_edge;
 mod count;
 mod dispersion;
 mod drawing;
@@ -25,14 +25,15 @@ mod field_to_film;
 mod film_map;
 mod general;
 mod geometry;
+mod hurb_splatter;
 mod kernel;
 mod lens_image;
 mod mesh;
 mod metrics;
 mod model;
+mod narrow_gaussian;
 pub mod paper;
 mod power;
-mod profile;
 mod pupil;
 mod raster;
 mod ray_map;
@@ -41,7 +42,6 @@ mod ring;
 mod rotational;
 mod settings;
 mod splat;
-mod stroke;
 mod watch;
 
 pub use adaptive::{AdaptiveSettings, ErrorPlaces, MeasuredError};

@@ -1,7 +1,7 @@
 //! Where the nodes of the pupil mesh land on the film: the map from which a point spread function is drawn.
 
 use dioptric_diffraction::{StopRay, trace_stop_rays};
-use dioptric_optics::{FilmPoint, MonoLens, ObjectPoint, RayFate, Rims, rays_towards};
+use dioptric_optics::{FilmPoint, MonoLens, ObjectPoint, RayFate, Vignetting, rays_towards};
 use glam::DVec2;
 use multiversion::multiversion;
 
@@ -31,13 +31,13 @@ const STOP_LISTS: usize = 6;
 ///
 /// Records of the same mesh can be added with weights; any such sum with weights of sum 1 is again a record.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Record {
+pub(crate) struct RayMap {
     pub(crate) mesh: Mesh,
     pub(crate) has_stop: bool,
     pub(crate) numbers: Vec<f32>,
 }
 
-impl Record {
+impl RayMap {
     pub(crate) fn length(mesh: Mesh, has_stop: bool) -> usize {
         (PLACE_LISTS + if has_stop { STOP_LISTS } else { 0 }) * mesh.n_nodes() + mesh.n_cells()
     }
@@ -111,7 +111,7 @@ fn add_scaled(sums: &mut [f32], numbers: &[f32], weight: f32) {
 
 /// What a ray map says of its point as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Summary {
+pub(crate) struct RayMapMoments {
     /// Centroid on the film, mm, picture frame.
     pub(crate) centroid_mm: DVec2,
     /// Area of the pupil, mm², weighted with cos⁴ of the angle, or for near points with what stands for it.
@@ -126,7 +126,7 @@ pub(crate) const RIM_OVER_RMS: f64 = 1.378_404_875_209_022;
 
 /// A point and how to trace it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Task<'a> {
+pub(crate) struct RayMapJob<'a> {
     pub(crate) lens: &'a MonoLens,
     /// The lens at the wavelength whose entrance pupil fields and depths count from.
     pub(crate) reference: &'a MonoLens,
@@ -140,10 +140,10 @@ pub(crate) struct Task<'a> {
 pub(crate) struct Traced {
     pub(crate) nodes: Vec<Node>,
     pub(crate) energies: Vec<f64>,
-    pub(crate) summary: Summary,
+    pub(crate) summary: RayMapMoments,
 }
 
-impl Task<'_> {
+impl RayMapJob<'_> {
     /// The point in the lens frame.
     pub(crate) fn point(self) -> ObjectPoint {
         ObjectPoint::from_field(self.reference, self.field_tan, self.dioptres)
@@ -187,7 +187,7 @@ impl Task<'_> {
             .sum();
         nodes.iter_mut().for_each(|node| node.at_mm -= centroid_mm);
         let signed_rms_mm = self.signed_rms_mm(&nodes, &targets, &energies);
-        Some(Traced { nodes, energies, summary: Summary { centroid_mm, pupil_mm2, signed_rms_mm } })
+        Some(Traced { nodes, energies, summary: RayMapMoments { centroid_mm, pupil_mm2, signed_rms_mm } })
     }
 
     /// Returns where rays aimed at the pupil land, in the picture frame. A ray that fails at the pupil's very edge
@@ -204,7 +204,7 @@ impl Task<'_> {
             };
             trace_stop_rays(self.lens, rays, self.film_mm).into_iter().map(|ray| ray.map(node)).collect()
         } else {
-            self.lens.trace(&mut rays, Rims::Ignore);
+            self.lens.trace(&mut rays, Vignetting::Off);
             self.lens.to_film(&mut rays, self.film_mm);
             let node = |at: FilmPoint| Node { at_mm: at.in_picture_mm(), ..Node::default() };
             let places = self.lens.film_points(&rays, self.film_mm);
@@ -272,10 +272,10 @@ impl Task<'_> {
             .collect();
         let passed = |lens: &MonoLens| {
             let mut rays = rays_towards(point, &targets, pupil.z_mm, 0.0);
-            lens.trace(&mut rays, Rims::Clip);
+            lens.trace(&mut rays, Vignetting::On);
             rays.fate
         };
-        // Rims end some rays of the outermost cells, whose areas have that already.
+        // Vignetting end some rays of the outermost cells, whose areas have that already.
         let (holed, whole) = (passed(self.lens), passed(&self.lens.with_obscurations_inverted(&[])));
         let n_passed = |fates: &[RayFate]| fates.iter().filter(|fate| fate.is_in_flight()).count();
         let share = |(holed, whole)| n_passed(holed) as f64 / n_passed(whole).max(1) as f64;
@@ -301,7 +301,7 @@ impl Task<'_> {
 }
 
 impl Traced {
-    pub(crate) fn record(&self, mesh: Mesh, has_stop: bool) -> Record {
-        Record::from_nodes(mesh, has_stop, &self.nodes, &self.energies)
+    pub(crate) fn record(&self, mesh: Mesh, has_stop: bool) -> RayMap {
+        RayMap::from_nodes(mesh, has_stop, &self.nodes, &self.energies)
     }
 }

@@ -1,15 +1,15 @@
 //! Pictures drawn from ray maps.
 
-use dioptric_diffraction::Edge;
+use dioptric_diffraction::CircularStop;
 use glam::DVec2;
 use ndarray::Array2;
 
 use crate::{
     Kernel,
-    bend::{Bending, BentMesh},
+    hurb_splatter::{HurbSplatter, StopHurb},
     kernel::trim,
     raster::Raster,
-    ray_map::{Node, Record},
+    ray_map::{Node, RayMap},
 };
 
 /// Half the side of the largest window, pixels.
@@ -21,9 +21,9 @@ const TAILS: f64 = 12.0;
 
 /// A ray map turned to its field and scaled to pixels, and the window that holds it.
 pub(crate) struct Layout<'a> {
-    record: &'a Record,
+    record: &'a RayMap,
     nodes: Vec<Node>,
-    bending: Option<Bending>,
+    bending: Option<StopHurb>,
     /// The geometric picture's reach from the centroid, pixels.
     reach: f64,
     /// λN, pixels; 0 without diffraction.
@@ -35,7 +35,7 @@ pub(crate) struct Layout<'a> {
 
 impl<'a> Layout<'a> {
     /// Returns the layout of a ray map; `turn` is the direction of the field in the picture.
-    pub(crate) fn new(record: &'a Record, turn: DVec2, bending: Option<Bending>, pitch_um: f64) -> Self {
+    pub(crate) fn new(record: &'a RayMap, turn: DVec2, bending: Option<StopHurb>, pitch_um: f64) -> Self {
         let scale = 1e3 / pitch_um;
         let mut nodes: Vec<Node> = (0..record.mesh.n_nodes()).map(|i| record.node(i)).collect();
         for node in &mut nodes {
@@ -76,7 +76,7 @@ impl<'a> Layout<'a> {
         let mut energies: Vec<f64> = record.energies().iter().map(|e| f64::from(*e)).collect();
         let at: Vec<DVec2> = self.nodes.iter().map(|node| node.at_mm).collect();
         if let Some(bending) = self.bending {
-            let bent = BentMesh { mesh: record.mesh, nodes: &self.nodes, bending, size: raster.size() };
+            let bent = HurbSplatter { mesh: record.mesh, nodes: &self.nodes, bending, size: raster.size() };
             bent.deposit(&mut energies, &mut raster);
         }
         raster.mesh(record.mesh, &at, &energies);
@@ -91,9 +91,9 @@ pub(crate) fn kernel(energies: &Array2<f64>, is_diffracted: bool, pitch_um: f64)
 }
 
 /// Returns λN in pixels: what the Gaussian of a ray through the middle of the stop would give.
-fn unit(record: &Record, nodes: &[Node], bending: Bending) -> f64 {
+fn unit(record: &RayMap, nodes: &[Node], bending: StopHurb) -> f64 {
     let center = nodes[record.mesh.node(0, 0)];
     let per_cosine = center.along_l_mm.length().max(center.along_m_mm.length());
-    let Edge { radius_mm, wave_number_per_mm } = bending.edge;
+    let CircularStop { radius_mm, wave_number_per_mm } = bending.edge;
     per_cosine * std::f64::consts::PI / (wave_number_per_mm * radius_mm)
 }

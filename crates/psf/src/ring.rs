@@ -1,4 +1,4 @@
-//! Rings of the pupil's mesh, and how they are cut into pieces.
+//! Rings of the pupil's mesh, and how they are cut into pieces (`docs/hurb.md`, "From cells to Gaussians").
 
 use std::sync::LazyLock;
 
@@ -83,11 +83,12 @@ impl Ring {
     /// an even step of the area's variance is.
     fn equal_pieces(self, n: usize) -> impl Iterator<Item = Piece> {
         (0..n).map(move |i| {
+            // The sides of the piece, on a scale that crowds towards the edge (eq. 5).
             let step = |i: f64| i / n as f64;
             let (from, to) = (self.share(step(i as f64)), self.share(step((i + 1) as f64)));
             let whole = self.outer_share * self.outer_share - self.inner_share * self.inner_share;
             let area = to * to - from * from;
-            // The area between shares s and s + ds goes with s ds.
+            // Centroid and variance of its area, which goes with s ds (eq. 6).
             let mean = 2.0 / 3.0 * (to.powi(3) - from.powi(3)) / area;
             let variance = 0.5 * (to * to + from * from) - mean * mean;
             let width = (12.0 * variance).max(0.0).sqrt();

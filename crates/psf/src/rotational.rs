@@ -1,6 +1,6 @@
 //! Ray maps of a rotationally symmetric lens, over field along one radius, depth and wavelength.
 
-use dioptric_diffraction::{PupilEdge, WaveMap};
+use dioptric_diffraction::{PupilFunctionFit, PupilOutline};
 use dioptric_optics::{Lens, MonoLens};
 use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
@@ -12,7 +12,7 @@ use crate::{
     dispersion::Dispersion,
     mesh::Mesh,
     pupil::Pupil,
-    ray_map::{RIM_OVER_RMS, Record, Summary, Task},
+    ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, RayMapMoments},
     watch::Watch,
 };
 
@@ -34,11 +34,11 @@ pub(crate) struct RotationalBank {
     /// Wavelengths in reverse, by the measure of the lens's dispersion.
     colors: Axis,
     dispersion: Dispersion,
-    records: Vec<Record>,
+    records: Vec<RayMap>,
     geometry_fields: Vec<f64>,
-    summaries: Vec<Summary>,
+    summaries: Vec<RayMapMoments>,
     /// As many as there are records, or none.
-    waves: Vec<WaveMap>,
+    waves: Vec<PupilFunctionFit>,
     lens: Lens,
     reference: MonoLens,
     /// Index around the stop at each of the colours.
@@ -63,7 +63,7 @@ impl RotationalBank {
             settings.wavelengths_nm.iter().rev().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
         let mesh = Mesh { n_rings: settings.n_rings, n_azimuths: settings.n_azimuths };
         let geometry_fields = geometry_fields(field_tans);
-        let axial = Task {
+        let axial = RayMapJob {
             lens: &reference,
             reference: &reference,
             field_tan: DVec2::ZERO,
@@ -231,7 +231,7 @@ impl RotationalBank {
     }
 
     /// Returns the interpolated waves of a point in a field along +x, or `None` if the bank has none.
-    pub(crate) fn wave_map(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> Option<WaveMap> {
+    pub(crate) fn wave_map(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> Option<PupilFunctionFit> {
         if self.waves.is_empty() {
             return None;
         }
@@ -246,16 +246,16 @@ impl RotationalBank {
                 weighted.extend(fields.iter().map(|(f, wf)| (&self.waves[column + f], wc * wd * wf)));
             }
         }
-        WaveMap::mix(weighted.into_iter())
+        PupilFunctionFit::mix(weighted.into_iter())
     }
 
-    pub(crate) fn record(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> Record {
+    pub(crate) fn record(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> RayMap {
         let n = self.fields.knots().len();
         let fields = self.fields.stencil(field_tan);
         let weighted = self.columns(dioptres, wavelength_nm).flat_map(|(column, weight)| {
             fields.iter().map(|(f, w)| (&self.records[column * n + f], w * weight)).collect::<Vec<_>>()
         });
-        Record::mix(weighted).expect("every stencil has a knot")
+        RayMap::mix(weighted).expect("every stencil has a knot")
     }
 
     pub(crate) fn within_colors(&self, wavelength_nm: f64) -> f64 {
@@ -276,19 +276,19 @@ impl RotationalBank {
 #[derive(Default)]
 struct Parts {
     n_fields: usize,
-    records: Vec<Record>,
-    summaries: Vec<Summary>,
+    records: Vec<RayMap>,
+    summaries: Vec<RayMapMoments>,
     /// As many as there are records, or none.
-    waves: Vec<WaveMap>,
+    waves: Vec<PupilFunctionFit>,
 }
 
 /// All fields of one depth and wavelength.
 #[derive(Default)]
 struct Column {
-    records: Vec<Record>,
-    summaries: Vec<Summary>,
+    records: Vec<RayMap>,
+    summaries: Vec<RayMapMoments>,
     /// Up to the first field whose waves are not smooth.
-    waves: Vec<WaveMap>,
+    waves: Vec<PupilFunctionFit>,
 }
 
 /// How columns are traced.
@@ -302,8 +302,8 @@ struct ColumnTracer<'a> {
 }
 
 impl ColumnTracer<'_> {
-    fn task<'a>(&'a self, lens: &'a MonoLens, field_tan: f64, dioptres: f64) -> Task<'a> {
-        Task {
+    fn task<'a>(&'a self, lens: &'a MonoLens, field_tan: f64, dioptres: f64) -> RayMapJob<'a> {
+        RayMapJob {
             lens,
             reference: self.reference,
             field_tan: DVec2::new(field_tan, 0.0),
@@ -355,14 +355,14 @@ impl ColumnTracer<'_> {
 }
 
 /// Returns the waves of a point, if they are smooth over its pupil and that has no holes.
-fn wave_map(task: &Task<'_>, pupil: &Pupil) -> Option<WaveMap> {
+fn wave_map(task: &RayMapJob<'_>, pupil: &Pupil) -> Option<PupilFunctionFit> {
     if task.lens.n_obscurations() > 0 {
         return None;
     }
     let point = task.point();
     let pupil = pupil.resampled(WAVE_AZIMUTHS).near(task.lens, &point)?;
-    let edge = PupilEdge { center_x_mm: pupil.center_mm.x, z_mm: pupil.z_mm, rho_mm: &pupil.rho_mm };
-    WaveMap::trace(task.lens, &point, task.film_mm, edge).ok()
+    let edge = PupilOutline { center_x_mm: pupil.center_mm.x, z_mm: pupil.z_mm, rho_mm: &pupil.rho_mm };
+    PupilFunctionFit::trace(task.lens, &point, task.film_mm, edge).ok()
 }
 
 /// Returns the fields of settings for a lens with an axis of symmetry.

@@ -3,17 +3,17 @@
 //! A broad Gaussian is sampled on eight columns of pixels at a time, in single precision. Down a column its values are
 //! products: each is the last times a ratio, which itself changes by a constant factor. The compiler makes vectors of
 //! that, for the base instruction set and for AVX2, chosen at run time, without fused multiply-add and with every sum in
-//! a fixed order: all machines give the same bits. Narrow ones are [strokes](crate::stroke).
+//! a fixed order: all machines give the same bits. The derivation is in `docs/hurb.md`. Narrow ones are [strokes](crate::narrow_gaussian).
 
 use dioptric_diffraction::Covariance;
 use glam::DVec2;
 use multiversion::multiversion;
 
 use crate::{
+    blurred_edge::{BlurredEdgeTable, LANES, profiles},
+    narrow_gaussian::{NarrowGaussians, PaddedRows},
     power::exp2,
-    profile::{LANES, Profile, profiles},
     raster::Raster,
-    stroke::{Lines, Strokes},
 };
 
 /// How many standard deviations of a Gaussian are deposited; what lies beyond, 3·10⁻⁴, is spread over the rest.
@@ -72,15 +72,15 @@ impl Splats {
 }
 
 /// The picture twice: by rows, and by columns for the strokes along x.
-pub(crate) struct Film {
-    rows: Lines,
-    columns: Lines,
+pub(crate) struct SplatBuffer {
+    rows: PaddedRows,
+    columns: PaddedRows,
 }
 
-impl Film {
+impl SplatBuffer {
     /// Returns a dark film of so many rows and columns.
     pub(crate) fn new((n_rows, n_columns): (usize, usize)) -> Self {
-        Self { rows: Lines::new(n_rows, n_columns), columns: Lines::new(n_columns, n_rows) }
+        Self { rows: PaddedRows::new(n_rows, n_columns), columns: PaddedRows::new(n_columns, n_rows) }
     }
 
     /// Deposits splats, integrated over the pixels. What falls outside is lost.
@@ -103,15 +103,15 @@ impl Film {
 }
 
 #[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
-fn add_all(film: &mut Film, splats: &Splats, profiles: &[Profile]) {
+fn add_all(film: &mut SplatBuffer, splats: &Splats, profiles: &[BlurredEdgeTable]) {
     let (n_rows, n_columns) = (film.rows.n_lines, film.columns.n_lines);
     let (groups, rest) = splats.narrow.as_chunks();
     for group in groups {
-        Strokes::new(group, (n_rows, n_columns)).add(LANES, profiles, &mut film.rows, &mut film.columns);
+        NarrowGaussians::new(group, (n_rows, n_columns)).add(LANES, profiles, &mut film.rows, &mut film.columns);
     }
     let mut last = [Splat::NOTHING; LANES];
     last[..rest.len()].copy_from_slice(rest);
-    Strokes::new(&last, (n_rows, n_columns)).add(rest.len(), profiles, &mut film.rows, &mut film.columns);
+    NarrowGaussians::new(&last, (n_rows, n_columns)).add(rest.len(), profiles, &mut film.rows, &mut film.columns);
     for splat in &splats.broad {
         Sampled::new(splat).add(&mut film.rows);
     }
@@ -159,14 +159,16 @@ const MOST_SIGMAS: f32 = 8.0;
 impl Sampled {
     #[inline(always)]
     fn new(splat: &Splat) -> Self {
-        // A box of one pixel has the variance 1/12: sampling with that added is the box integral to fourth order.
+        // Add the variance of a pixel's box, 1/12 a side: samples are then box integrals to fourth order (eq. 8).
         let mut c = splat.whole();
         c.xx += 1.0 / 12.0;
         c.yy += 1.0 / 12.0;
+        // Count places from a pixel's corner, so that single precision does.
         let determinant = c.xx * c.yy - c.xy * c.xy;
         let at = splat.at.clamp(DVec2::splat(-FAR), DVec2::splat(FAR));
         let corner = at.floor();
         let within = at - corner;
+        // The exponent as squares of dx and of dy less its mean at that dx (eq. 9), in powers of 2.
         let per_xx = 1.0 / c.xx;
         let variance_y = determinant * per_xx;
         Self {
@@ -183,7 +185,7 @@ impl Sampled {
 
     /// Adds it to the pixels of rows, eight columns at a time.
     #[inline(always)]
-    fn add(&self, rows: &mut Lines) {
+    fn add(&self, rows: &mut PaddedRows) {
         let reach = REACH as f32 * self.sigma_x;
         let first = (self.corner.0 + floor(self.at.0 - reach)).max(0);
         let end = (self.corner.0 + floor(self.at.0 + reach) + 1).min(rows.n_pixels as i32);
@@ -196,13 +198,14 @@ impl Sampled {
 
     /// Adds what falls on eight columns, the first of which is given.
     #[inline(always)]
-    fn add_columns(&self, rows: &mut Lines, column: usize) {
+    fn add_columns(&self, rows: &mut PaddedRows, column: usize) {
         // How far the first and last samples lie from the middle, and which rows come within reach between them.
         let from = (column as i32 - self.corner.0) as f32 + 0.5 - self.at.0;
         let to = from + (LANES - 1) as f32;
         let reach_x = REACH as f32 * self.sigma_x;
         let (from_x, to_x) = (from.max(-reach_x), to.min(reach_x));
         let (y_from, y_to) = (self.shear * from_x, self.shear * to_x);
+        // What the exponent leaves for dy at the column nearest to the middle.
         let nearest = from_x.max(-to_x).max(0.0);
         let reach_y = ((self.fall_x * nearest * nearest - LEAST).max(0.0) * (2.0 / std::f32::consts::LOG2_E)).sqrt()
             * self.sigma_y;
@@ -221,7 +224,7 @@ impl Sampled {
 
     /// Adds what falls on a block: exponentials on its first row, and products from row to row.
     #[inline(always)]
-    fn add_block(&self, rows: &mut Lines, block: Block) {
+    fn add_block(&self, rows: &mut PaddedRows, block: Block) {
         let (mut values, mut ratios) = ([0.0; LANES], [0.0; LANES]);
         for ((value, ratio), count) in values.iter_mut().zip(&mut ratios).zip(COUNT) {
             let dx = block.from_x + count;
@@ -246,7 +249,7 @@ impl Sampled {
 /// Deposits one splat.
 #[cfg(test)]
 pub(crate) fn deposit(raster: &mut Raster, splat: Splat) {
-    let (mut splats, mut film) = (Splats::default(), Film::new(raster.size()));
+    let (mut splats, mut film) = (Splats::default(), SplatBuffer::new(raster.size()));
     splats.push(splat);
     film.add(&splats);
     film.add_to(raster);

@@ -1,9 +1,9 @@
 //! Drawn uncertainty bending, held to random bending at the stop.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
-use dioptric_diffraction::{Edge, Hurb, HurbForm, SampledHurb};
+use dioptric_diffraction::{CircularStop, Hurb, HurbForm, SampledHurb};
 use dioptric_optics::{
-    FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
+    FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Vignetting,
     glam::{DVec2, DVec3},
     rays_towards,
 };
@@ -23,11 +23,11 @@ fn rays_at_stop(lens: &MonoLens, point: &ObjectPoint, n_rays: usize) -> RayBatch
         })
         .collect();
     let mut rays = rays_towards(point, &targets, boundary.z_mm(), 0.0);
-    lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Rims::Clip);
-    // Rims behind the stop clip the straight ray, not the bent one.
+    lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Vignetting::On);
+    // Vignetting behind the stop clip the straight ray, not the bent one.
     let mut straight = rays.clone();
     if lens.stop() + 1 < lens.n_surfaces() {
-        lens.trace_surfaces(lens.stop() + 1..lens.n_surfaces(), &mut straight, Rims::Clip);
+        lens.trace_surfaces(lens.stop() + 1..lens.n_surfaces(), &mut straight, Vignetting::On);
     }
     let kept: Vec<usize> = (0..n_rays).filter(|&ray| straight.fate[ray].is_in_flight()).collect();
     let points: Vec<DVec3> = kept.iter().map(|&ray| rays.point_mm(ray)).collect();
@@ -42,14 +42,14 @@ fn difference(lens: &Lens, kernel: &Kernel, field_tan: f64, dioptres: f64, film_
     let behind = rays_at_stop(&mono, &point, 100_000);
     let land = |mut rays: RayBatch| {
         if mono.stop() + 1 < mono.n_surfaces() {
-            mono.trace_surfaces(mono.stop() + 1..mono.n_surfaces(), &mut rays, Rims::Ignore);
+            mono.trace_surfaces(mono.stop() + 1..mono.n_surfaces(), &mut rays, Vignetting::Off);
         }
         mono.to_film(&mut rays, film_mm);
         mono.landed(&rays, film_mm).map(FilmPoint::in_picture_mm).collect::<Vec<DVec2>>()
     };
     let straight = land(behind.clone());
     let centroid = straight.iter().sum::<DVec2>() / straight.len() as f64;
-    let edge = Edge::new(mono.stop_semi_aperture_mm(), 550.0, mono.stop_medium_index());
+    let edge = CircularStop::new(mono.stop_semi_aperture_mm(), 550.0, mono.stop_medium_index());
     let n_rounds = 10;
     let side = kernel.samples.nrows();
     let mut counts = vec![0.0f64; side * side];

@@ -2,8 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
-use dioptric_diffraction::{Edge, Hurb, trace_stop_rays};
-use dioptric_optics::{Glass, ImageSurface, Interface, Lens, Move, ObjectPoint, Surface, rays_towards};
+use dioptric_diffraction::{CircularStop, Hurb, trace_stop_rays};
+use dioptric_optics::{CoordinateBreak, Glass, ImageSurface, Interface, Lens, ObjectPoint, Surface, rays_towards};
 use dioptric_psf::{BankSettings, Diffraction, FieldSampling, Interpolation, LensImageModel, PsfQuery};
 use glam::{DMat2, DVec2};
 
@@ -15,7 +15,7 @@ fn double_gauss() -> Lens {
 
 /// The lens with surfaces `first..=last` moved; the film counts as the one after the last.
 fn placed(lens: &Lens, surfaces: (usize, usize), decenter_mm: [f64; 3], tilt_deg: [f64; 3]) -> Lens {
-    let step = Move { surfaces, pivot_mm: 0.0, decenter_mm, tilt_deg, tilt_first: false };
+    let step = CoordinateBreak { surfaces, pivot_mm: 0.0, decenter_mm, tilt_deg, tilt_first: false };
     lens.clone().with_moves(vec![step]).unwrap()
 }
 
@@ -48,7 +48,7 @@ fn decentred_stop_keeps_hurb_rays() {
     let mono = lens.at(NM).unwrap();
     let moved = placed(&lens, all, [shift.x, shift.y, 0.0], [0.0; 3]).at(NM).unwrap();
     let (film_mm, z_mm) = (mono.first_order().bfl_mm + 0.2, mono.projection_center_z_mm());
-    let edge = Edge::new(mono.stop_semi_aperture_mm(), NM, 1.0);
+    let edge = CircularStop::new(mono.stop_semi_aperture_mm(), NM, 1.0);
     // More than half the stop's radius: before, part of the pupil counted as outside the edge.
     assert!(shift.length() > 0.5 * edge.radius_mm, "{}", edge.radius_mm);
     for field_tan in [DVec2::ZERO, DVec2::new(0.1, 0.05)] {

@@ -4,7 +4,7 @@
 
 use std::sync::Mutex;
 
-use dioptric_optics::{Lens, Move, glam::DVec2};
+use dioptric_optics::{CoordinateBreak, Lens, glam::DVec2};
 use dioptric_psf::{
     BankSettings, Diffraction, ErrorPlaces, FieldSampling, LensImage, LensImageModel, PsfError, SampleCounts,
 };
@@ -96,8 +96,13 @@ fn preview_blurs_err_by_few_per_cent() {
 #[test]
 fn single_points_see_no_film() {
     let (lens, film_mm) = double_gauss();
-    let tilt =
-        Move { surfaces: (2, 3), pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg: [0.3, 0.0, 0.0], tilt_first: false };
+    let tilt = CoordinateBreak {
+        surfaces: (2, 3),
+        pivot_mm: 0.0,
+        decenter_mm: [0.0; 3],
+        tilt_deg: [0.3, 0.0, 0.0],
+        tilt_first: false,
+    };
     let lens = lens.with_moves(vec![tilt]).unwrap();
     let fields = FieldSampling::Points { tans_x: vec![0.0, 0.1], tans_y: vec![0.0] };
     let settings = BankSettings { fields, dioptres: vec![0.5], ..along_radius(film_mm) };

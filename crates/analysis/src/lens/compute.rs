@@ -2,7 +2,7 @@
 
 use dioptric_diffraction::{PupilGrid, Wavefront, WavefrontReference, best_wavefront_film_mm, opd_waves_at};
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, PupilBoundary, Rims,
+    Lens, MonoLens, ObjectPoint, PupilBoundary, Vignetting,
     analysis::{
         AstigmaticFoci, Autofocus, AxisFoci, Distortion, NumericalApertures, Projection, PupilCoordinates,
         PupilSampling, RayFan, SpotDiagram, StraightMap, field_limit_deg, hexapolar, projected_solid_angle_onto,
@@ -73,7 +73,7 @@ impl AnalysisRequest {
             sampling: PupilSampling {
                 coordinates: PupilCoordinates::Stop { radius_mm: WITHIN_RIM * lens.stop_semi_aperture_mm() },
                 places: hexapolar(self.n_rings),
-                rims: Rims::Clip,
+                rims: Vignetting::On,
             },
         };
         bench.analyse(self, lens, (fields, notes))

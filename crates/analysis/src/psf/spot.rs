@@ -1,8 +1,8 @@
 //! Where the rays of a point land: centroid, moments and losses, without any pixels.
 
-use dioptric_diffraction::{Covariance, Edge, Hurb, HurbForm, SampledHurb};
+use dioptric_diffraction::{CircularStop, Covariance, Hurb, HurbForm, SampledHurb};
 use dioptric_optics::{
-    FilmPoint, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
+    FilmPoint, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Vignetting,
     glam::{DVec2, Vec2Swizzles},
     rays_over_front, rays_towards,
 };
@@ -46,7 +46,7 @@ impl Spot {
         }
         let mut rays = rays_towards(point, &targets, pupil.z_mm(), 0.0);
         let cones = solid_angles(point, &rays);
-        mono.trace(&mut rays, Rims::Clip);
+        mono.trace(&mut rays, Vignetting::On);
         mono.to_film(&mut rays, film_mm);
         let area_mm2 = |point: &ObjectPoint| {
             mono.over_clear_pupil(&|lens| PupilBoundary::find(lens, point, AZIMUTHS).map_or(0.0, |p| p.area_mm2()))
@@ -63,13 +63,13 @@ impl Spot {
     pub(crate) fn over_front(mono: &MonoLens, point: &ObjectPoint, film_mm: f64, paper: &PaperRays) -> Self {
         let mut rays = rays_over_front(mono, point, paper.n_across);
         let stop = mono.stop();
-        mono.trace_surfaces(0..stop + 1, &mut rays, Rims::Clip);
+        mono.trace_surfaces(0..stop + 1, &mut rays, Vignetting::On);
         if let Some(model) = paper.bending {
-            let edge = Edge::new(mono.stop_semi_aperture_mm(), mono.wavelength_nm(), mono.stop_medium_index());
+            let edge = CircularStop::new(mono.stop_semi_aperture_mm(), mono.wavelength_nm(), mono.stop_medium_index());
             let hurb = SampledHurb { model, edge, form: HurbForm::Angles, seed: paper.seed };
             hurb.apply(&mut rays, &mono.stop_pose());
         }
-        mono.trace_surfaces(stop + 1..mono.n_surfaces(), &mut rays, Rims::Clip);
+        mono.trace_surfaces(stop + 1..mono.n_surfaces(), &mut rays, Vignetting::On);
         mono.to_film(&mut rays, film_mm);
         let mut spot = Self::of_rays(mono, film_mm, &rays, |_| 1.0);
         spot.energy = spot.at_mm.len() as f64 / rays.len().max(1) as f64;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, Rims};
+use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, Vignetting};
 use glam::{DVec2, DVec3};
 
 use super::{
@@ -89,7 +89,7 @@ impl PupilCells {
         let targets_mm: Vec<DVec2> =
             steps.iter().flat_map(|step| self.targets_mm.iter().map(move |target| target + step)).collect();
         let mut rays = lens.rays_towards(point, &targets_mm, self.z_mm, 0.0);
-        lens.trace(&mut rays, Rims::Ignore);
+        lens.trace(&mut rays, Vignetting::Off);
         lens.to_film(&mut rays, film_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         match n_lost {
@@ -103,7 +103,7 @@ impl PupilCells {
         self.energy.iter().enumerate().map(|(i, e)| *e * rays.place_mm(i)).sum()
     }
 
-    /// Returns the area of each cell in (dx, dy), negative in holes, or `None` if directions fold over one another.
+    /// Returns the area Δ of each cell in (dx, dy) (`docs/wave.md`, eq. 5), negative in holes, or `None` if directions fold over one another.
     pub(super) fn direction_areas(&self, waves: &Waves) -> Option<Vec<f64>> {
         let n = self.n_nodes();
         let slope = |plus: usize, node: usize| {

@@ -1,13 +1,15 @@
 //! The light of a point over its pupil as smooth functions, which can be interpolated between points.
+//!
+//! The derivation is in `docs/wave.md`, which comments name by its equations.
 
 use std::{cell::RefCell, f64::consts::TAU};
 
-use dioptric_optics::{MonoLens, ObjectPoint, Rims};
+use dioptric_optics::{MonoLens, ObjectPoint, Vignetting};
 use glam::DVec2;
 use multiversion::multiversion;
 
 use super::{
-    PupilGrid, WaveNodes, WavePsf, WaveWindow, WindowCenter,
+    PupilGrid, PupilSamples, WavePsf, WaveWindow, WindowCenter,
     cells::solid_angle_per_area,
     propagation::{FilmRays, Waves, has_few_zones},
     smooth::{Azimuth, Parity, Places, Ray, horner, radial_slope},
@@ -16,7 +18,7 @@ use crate::{DiffractionError, quadrature::gauss_legendre_on};
 
 /// The edge of a pupil that is symmetric about its x axis, in the entrance-pupil plane.
 #[derive(Clone, Copy, Debug)]
-pub struct PupilEdge<'a> {
+pub struct PupilOutline<'a> {
     /// What the distances count from, mm from the axis along x.
     pub center_x_mm: f64,
     /// z of the plane from the first vertex, mm.
@@ -33,19 +35,46 @@ pub struct PupilEdge<'a> {
 /// the pupil is then symmetric about x. Coordinates over the pupil count from its middle in units of twice its rms
 /// width and height, so that pupils of different vignetting correspond.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WaveMap {
-    // Invariant: SCALARS, then the coefficients of dx, dy, Φ (mm) and ln brightness, then the edge from azimuth 0 to π.
-    numbers: Vec<f64>,
+pub struct PupilFunctionFit {
+    scalars: Scalars,
+    /// The coefficients of dx, dy, Φ (mm) and ln brightness, one function after the other: see [`span`].
+    coefficients: Vec<f64>,
+    /// The distance of the outline from the middle, mm, at even azimuths from 0 to π.
+    outline_mm: Vec<f64>,
 }
 
-/// Numbers before the functions: image index, what the pupil collects, centroid along x (mm), half width and half
-/// height of the pupil (mm), error of the fit (waves rms).
-const SCALARS: usize = 6;
+/// What a fit has beside functions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Scalars {
+    image_index: f64,
+    /// What the whole pupil takes in, as [`PupilSamples::collected`].
+    collected: f64,
+    /// The centroid of the light along x, mm.
+    centroid_x_mm: f64,
+    /// Half the width and half the height of the pupil, mm.
+    half_mm: DVec2,
+    /// Error of the polynomials, waves rms.
+    error_waves: f64,
+}
+
+impl Scalars {
+    /// Returns these with each number changed by that of others.
+    fn zipped(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
+        Self {
+            image_index: of(self.image_index, other.image_index),
+            collected: of(self.collected, other.collected),
+            centroid_x_mm: of(self.centroid_x_mm, other.centroid_x_mm),
+            half_mm: DVec2::new(of(self.half_mm.x, other.half_mm.x), of(self.half_mm.y, other.half_mm.y)),
+            error_waves: of(self.error_waves, other.error_waves),
+        }
+    }
+}
+
 /// Radii at which functions are fitted, and every how many azimuths of the edge.
 const FIT_RADII: usize = 12;
 const FIT_AZIMUTHS: usize = 48;
 
-/// The places of a function in the list of numbers.
+/// The places of a function's coefficients.
 fn span(function: usize) -> (Parity, std::ops::Range<usize>) {
     let (even, odd) = (Parity::Even.n_terms(), Parity::Odd.n_terms());
     let (parity, start) = match function {
@@ -54,10 +83,10 @@ fn span(function: usize) -> (Parity, std::ops::Range<usize>) {
         2 => (Parity::Even, even + odd),
         _ => (Parity::Even, 2 * even + odd),
     };
-    (parity, SCALARS + start..SCALARS + start + parity.n_terms())
+    (parity, start..start + parity.n_terms())
 }
 
-impl WaveMap {
+impl PupilFunctionFit {
     /// Traces the light of a point in a field along x to the film, `film_mm` behind the last vertex, and fits it.
     ///
     /// # Errors
@@ -67,31 +96,35 @@ impl WaveMap {
         lens: &MonoLens,
         point: &ObjectPoint,
         film_mm: f64,
-        edge: PupilEdge<'_>,
+        edge: PupilOutline<'_>,
     ) -> Result<Self, DiffractionError> {
         let wavelength_nm = lens.wavelength_nm();
         let folded = DiffractionError::Folded { wavelength_nm };
         if has_few_zones(lens, film_mm) {
             return Err(folded);
         }
+        // Trace rays through half the pupil, which the other half mirrors.
         let half_mm = edge.half_sizes_mm();
         let (targets_mm, areas, places) = edge.places(half_mm);
         let mut rays = lens.rays_towards(point, &targets_mm, edge.z_mm, 0.0);
-        lens.trace(&mut rays, Rims::Ignore);
+        lens.trace(&mut rays, Vignetting::Off);
         lens.to_film(&mut rays, film_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         if n_lost > 0 {
             return Err(DiffractionError::LostRays { wavelength_nm, n_lost, n_rays });
         }
+        // The energy of each place: its area times the solid angle an area is seen under.
         let brightness: Vec<f64> =
             targets_mm.iter().map(|target| solid_angle_per_area(point, target.extend(edge.z_mm))).collect();
         let taken: Vec<f64> = brightness.iter().zip(&areas).map(|(b, area)| b * area).collect();
         let half_collected: f64 = taken.iter().sum();
         // The other half of the pupil mirrors this one.
+        // The waves that the rays stand for, about the centroid (eqs. 1 to 4).
         let rays = FilmRays::new(&rays, lens, film_mm);
         let moment_mm = taken.iter().enumerate().map(|(i, e)| e * rays.place_mm(i).x).sum::<f64>();
         let centroid_x_mm = moment_mm / half_collected;
         let waves = Waves::of(&rays, DVec2::new(centroid_x_mm, 0.0));
+        // Fit directions, eikonal and brightness with polynomials that are even or odd about x.
         let piston_mm = waves.phi_mm[0];
         let phi_mm: Vec<f64> = waves.phi_mm.iter().map(|phi| phi - piston_mm).collect();
         let d_x: Vec<f64> = waves.d.iter().map(|d| d.x).collect();
@@ -101,29 +134,15 @@ impl WaveMap {
             places.fit(Parity::Even, [&d_x, &phi_mm, &ln_brightness]).ok_or_else(|| folded.clone())?;
         let [fit_y] = places.fit(Parity::Odd, [&d_y]).ok_or(folded)?;
         let error_waves = rms_error(&places, &fit_phi, &phi_mm) / (wavelength_nm * 1e-6);
-        let mut numbers =
-            vec![lens.image_index(), 2.0 * half_collected, centroid_x_mm, half_mm.x, half_mm.y, error_waves];
-        for fit in [&fit_x, &fit_y, &fit_phi, &fit_b] {
-            numbers.extend(fit);
-        }
-        numbers.extend(&edge.rho_mm[..=edge.rho_mm.len() / 2]);
-        Ok(Self { numbers })
-    }
-
-    /// Returns a map from the list of its numbers, or `None` if there are not `4 n + 1` azimuths of its edge in it.
-    pub fn from_numbers(numbers: Vec<f64>) -> Option<Self> {
-        let n_edge = numbers.len().checked_sub(span(3).1.end)?;
-        (n_edge > 4 && (n_edge - 1).is_multiple_of(2)).then_some(Self { numbers })
-    }
-
-    /// All that interpolation mixes, as one list.
-    pub fn numbers(&self) -> &[f64] {
-        &self.numbers
-    }
-
-    /// Returns how many numbers a map has, of a pupil whose edge is known at `n_azimuths`.
-    pub fn n_numbers(n_azimuths: usize) -> usize {
-        span(3).1.end + n_azimuths / 2 + 1
+        let coefficients = [fit_x, fit_y, fit_phi, fit_b].concat();
+        let scalars = Scalars {
+            image_index: lens.image_index(),
+            collected: 2.0 * half_collected,
+            centroid_x_mm,
+            half_mm,
+            error_waves,
+        };
+        Ok(Self { scalars, coefficients, outline_mm: edge.rho_mm[..=edge.rho_mm.len() / 2].to_vec() })
     }
 
     /// Returns the sum of maps with weights of sum 1, or `None` of none; all edges must be known at the same azimuths.
@@ -131,9 +150,18 @@ impl WaveMap {
         let mut sum: Option<Self> = None;
         for (map, weight) in weighted {
             match &mut sum {
-                None => sum = Some(Self { numbers: map.numbers.iter().map(|x| x * weight).collect() }),
+                None => {
+                    let scaled = |list: &[f64]| list.iter().map(|x| x * weight).collect();
+                    sum = Some(Self {
+                        scalars: map.scalars.zipped(map.scalars, |x, _| x * weight),
+                        coefficients: scaled(&map.coefficients),
+                        outline_mm: scaled(&map.outline_mm),
+                    });
+                }
                 Some(sum) => {
-                    for (total, x) in sum.numbers.iter_mut().zip(&map.numbers) {
+                    sum.scalars = sum.scalars.zipped(map.scalars, |total, x| total + weight * x);
+                    let lists = [(&mut sum.coefficients, &map.coefficients), (&mut sum.outline_mm, &map.outline_mm)];
+                    for (total, x) in lists.into_iter().flat_map(|(total, x)| total.iter_mut().zip(x)) {
                         *total += weight * x;
                     }
                 }
@@ -144,12 +172,12 @@ impl WaveMap {
 
     /// How far the polynomials are from the traced eikonal, waves rms: of a mixed map, of those that it is mixed from.
     pub fn error_waves(&self) -> f64 {
-        self.numbers[5]
+        self.scalars.error_waves
     }
 
     /// Returns the distance of the edge from the middle at an azimuth, mm: exact where it was found, else a cubic.
     fn edge_mm(&self, azimuth: f64) -> f64 {
-        let edge = &self.numbers[span(3).1.end..];
+        let edge = &self.outline_mm;
         let half = edge.len() as i64 - 1;
         let place = (azimuth / TAU).rem_euclid(1.0) * (2 * half) as f64;
         let (below, t) = (place.floor() as i64, place.fract());
@@ -169,8 +197,8 @@ impl WaveMap {
     ///
     /// # Errors
     /// When the rays do not fill the directions one to one.
-    pub fn nodes(&self, grid: PupilGrid, wavelength_nm: f64, turn: DVec2) -> Result<WaveNodes, DiffractionError> {
-        let mut room = Room { half: Lists::default(), nodes: WaveNodes::none() };
+    pub fn nodes(&self, grid: PupilGrid, wavelength_nm: f64, turn: DVec2) -> Result<PupilSamples, DiffractionError> {
+        let mut room = Room { half: Lists::default(), nodes: PupilSamples::none() };
         self.fill(&mut room, grid, wavelength_nm, turn)?;
         Ok(room.nodes)
     }
@@ -182,7 +210,7 @@ impl WaveMap {
         let n_radii = grid.n_radii;
         let radii = gauss_legendre_on(n_radii, 0.0, 1.0);
         let step = TAU / grid.n_azimuths as f64;
-        let [index, _, _, half_x, half_y, _] = *self.numbers.first_chunk::<SCALARS>().expect("a map has its scalars");
+        let Scalars { image_index: index, half_mm: DVec2 { x: half_x, y: half_y }, .. } = self.scalars;
         let mut sector = Sector::new(n_radii);
         half.clear();
         for j in 0..=half_azimuths {
@@ -210,7 +238,7 @@ impl WaveMap {
     fn rays_along(&self, azimuth: &Azimuth) -> Rays {
         let of = |function: usize| {
             let (parity, span) = span(function);
-            (azimuth.value(parity, &self.numbers[span.clone()]), azimuth.slope(parity, &self.numbers[span]))
+            (azimuth.value(parity, &self.coefficients[span.clone()]), azimuth.slope(parity, &self.coefficients[span]))
         };
         let ((d_x, around_x), (d_y, around_y), (phi, around_phi)) = (of(0), of(1), of(2));
         let (brightness, _) = of(3);
@@ -219,16 +247,16 @@ impl WaveMap {
     }
 
     /// Mirrors the half pupil, turns it to its field and counts from the centroid.
-    fn assemble(&self, nodes: &mut WaveNodes, turn: DVec2, half: &Lists) {
-        let WaveNodes { wavelength_nm, grid, .. } = *nodes;
+    fn assemble(&self, nodes: &mut PupilSamples, turn: DVec2, half: &Lists) {
+        let PupilSamples { wavelength_nm, grid, .. } = *nodes;
         let (n_radii, n_azimuths) = (grid.n_radii, grid.n_azimuths);
         // Each azimuth as its own in the half, and whether it is mirrored.
         let azimuths = || {
             let place = |j: usize| if 2 * j > n_azimuths { (n_azimuths - j, -1.0) } else { (j, 1.0) };
             (0..n_azimuths).map(place).map(|(j, sign)| (j * n_radii..(j + 1) * n_radii, sign))
         };
-        let [index, collected, centroid_x_mm, ..] =
-            *self.numbers.first_chunk::<SCALARS>().expect("a map has its scalars");
+        let Scalars { image_index: index, collected, centroid_x_mm, .. } = self.scalars;
+        // The energy of both halves and its centroid, from which places count.
         let (mut total, mut along_x) = (0.0, 0.0);
         for (span, _) in azimuths() {
             for (e, q_x) in half.energy[span.clone()].iter().zip(&half.q_x[span]) {
@@ -251,6 +279,7 @@ impl WaveMap {
         ] {
             list.resize(grid.n_nodes(), 0.0);
         }
+        // Mirror and turn each azimuth; amplitudes from energies and Jacobians (eq. 5).
         for ((span, sign), to) in azimuths().zip((0..).step_by(n_radii)) {
             let to = to..to + n_radii;
             let rotate = |x: &mut [f64], y: &mut [f64], from_x: &[f64], from_y: &[f64], along_x: f64| {
@@ -305,16 +334,16 @@ impl WaveMap {
 
 thread_local! {
     /// One for each thread: asking for memory and giving it back took as long as the nodes.
-    static ROOM: RefCell<Room> = RefCell::new(Room { half: Lists::default(), nodes: WaveNodes::none() });
+    static ROOM: RefCell<Room> = RefCell::new(Room { half: Lists::default(), nodes: PupilSamples::none() });
 }
 
 /// The nodes of a sum and of half of its pupil.
 struct Room {
     half: Lists,
-    nodes: WaveNodes,
+    nodes: PupilSamples,
 }
 
-impl PupilEdge<'_> {
+impl PupilOutline<'_> {
     fn azimuth(&self, i: usize) -> DVec2 {
         let (c, s) = super::cis::cis(i as f64 / self.rho_mm.len() as f64);
         DVec2::new(c, s)

@@ -1,4 +1,4 @@
-//! How rays on the film stand for waves.
+//! How rays on the film stand for waves: equations 1 to 4 of `docs/wave.md`.
 
 use dioptric_optics::{ImageSurface, MonoLens, RayBatch};
 use glam::{DVec2, DVec3};
@@ -88,7 +88,7 @@ impl Waves {
         Self::from_exit_pupil(rays, reference_mm).unwrap_or_else(|| Self::along_rays(rays, reference_mm))
     }
 
-    /// Each ray as a plane wave.
+    /// Each ray as a plane wave (eq. 2).
     pub(super) fn along_rays(rays: &FilmRays, reference_mm: DVec2) -> Self {
         let center_mm = rays.film_point_mm(reference_mm);
         let wave = |i: usize| {
@@ -115,7 +115,7 @@ impl Waves {
             let q = rays.points_mm[i] - center_mm;
             let along = q.dot(direction);
             let excess_mm = (along * along - q.length_squared()) / radius_mm;
-            // How much further back than the radius the ray has crossed the sphere.
+            // How much further back than the radius the ray has crossed the sphere (eq. 3), and the way from there (eq. 4).
             let beyond_mm = along + excess_mm / (1.0 + (1.0 + excess_mm / radius_mm).sqrt());
             let d = rays.along_film(direction + (direction * beyond_mm - q) / radius_mm, reference_mm);
             (d, rays.opl_mm[i] - rays.image_index * beyond_mm)

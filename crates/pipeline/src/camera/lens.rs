@@ -38,7 +38,7 @@ impl LensChoice {
             Self::Pinhole { diameter_mm } => LensFile::from(Lens::pinhole(*diameter_mm)?),
         };
         if let Some(slope_per_nm) = reading.slope_per_nm {
-            file.lens = file.lens.with_slope(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
+            file.lens = file.lens.with_linear_dispersion(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
         }
         Ok(file)
     }

@@ -1,4 +1,5 @@
-//! What pixels in a row hold of a soft step: a table from which strokes are drawn.
+//! What pixels in a row hold of an edge blurred by a Gaussian: the table from which narrow Gaussians are drawn (`docs/hurb.md`,
+//! eqs. 13 to 15).
 
 use std::sync::LazyLock;
 
@@ -15,11 +16,11 @@ const MIDDLE: i32 = 11;
 
 /// For places of a step from one side of a pixel to the other: the share of what lies beyond it on pixels in a row,
 /// where the step is a normal distribution's.
-pub(crate) struct Profile([[f32; WIDTH]; ROWS + 1]);
+pub(crate) struct BlurredEdgeTable([[f32; WIDTH]; ROWS + 1]);
 
 /// Profiles by variance, up to 1 pixel².
-static PROFILES: LazyLock<Vec<Profile>> =
-    LazyLock::new(|| (0..N_PROFILES).map(|number| Profile::new(variance_of(number))).collect());
+static PROFILES: LazyLock<Vec<BlurredEdgeTable>> =
+    LazyLock::new(|| (0..N_PROFILES).map(|number| BlurredEdgeTable::new(variance_of(number))).collect());
 
 /// What is added to variances before they are told apart, pixels²: of the narrowest Gaussians, pixels see little.
 const PART_OF_A_PIXEL: f32 = 0.0625;
@@ -30,7 +31,7 @@ const UNTOLD_BITS: u32 = f32::MANTISSA_DIGITS - 1 - PER_DOUBLING_BITS;
 const FIRST: usize = (PART_OF_A_PIXEL.to_bits() >> UNTOLD_BITS) as usize;
 const N_PROFILES: usize = ((1.0 + PART_OF_A_PIXEL).to_bits() >> UNTOLD_BITS) as usize - FIRST + 1;
 
-pub(crate) fn profiles() -> &'static [Profile] {
+pub(crate) fn profiles() -> &'static [BlurredEdgeTable] {
     &PROFILES
 }
 
@@ -53,7 +54,7 @@ fn variance_of(number: usize) -> f32 {
     f32::from_bits(((FIRST + number) << UNTOLD_BITS) as u32) - PART_OF_A_PIXEL
 }
 
-impl Profile {
+impl BlurredEdgeTable {
     fn new(variance: f32) -> Self {
         // Reading between two rows widens a little. The sharpest step is next to none for a row.
         let sigma = (f64::from(variance) - 1.0 / (6.0 * (ROWS * ROWS) as f64)).max(1e-4).sqrt();

@@ -1,6 +1,6 @@
-//! Gaussians that are narrow on pixels: strokes.
+//! Gaussians that are narrow on pixels.
 //!
-//! Along the pixel axis in which it is wider, a stroke is sampled at every pixel, or a few times a pixel where it is
+//! The derivation is in `docs/hurb.md`, which comments name by its equations. Along the pixel axis in which it is wider, one is sampled at every pixel, or a few times a pixel where it is
 //! short or steep; there its values are products, as down the columns of a broad Gaussian. Across, what each of eight
 //! pixels holds of it is read from a table of integrals: no sample is finer than a pixel, and what is spread evenly
 //! over some width, as the light of a cell is, needs no more than what is not.
@@ -8,17 +8,17 @@
 use glam::DVec2;
 
 use crate::{
+    blurred_edge::{BlurredEdgeTable, LANES, PLACE_BITS, ROW_BITS, profile_number, variance_below},
     power::{Powers, exp2},
-    profile::{LANES, PLACE_BITS, Profile, ROW_BITS, profile_number, variance_below},
     splat::Splat,
 };
 
-/// The finest subdivision of a pixel along a stroke. What is shorter than its samples allow is lengthened to
+/// The finest subdivision of a pixel along a Gaussian. What is shorter than its samples allow is lengthened to
 /// 0.12 pixels, which on pixels makes next to no difference.
 const FINEST: f64 = 5.0;
-/// A stroke has this many samples a standard deviation of its length, or more.
+/// A Gaussian has this many samples a standard deviation of its length, or more.
 const SAMPLES_PER_SIGMA: f64 = 0.6;
-/// From one sample to the next a stroke moves across by its width over this, or less.
+/// From one sample to the next a Gaussian moves across by its width over this, or less.
 const SAMPLES_PER_WIDTH: f64 = 0.4;
 /// How many standard deviations of its length are drawn; what lies beyond, 3·10⁻⁴, is spread over the rest.
 const REACH: f64 = 3.6;
@@ -31,15 +31,15 @@ const MOST_SAMPLES: usize = 32;
 /// The largest even width, in sixteenths of a pixel.
 const WIDEST: f64 = 80.0;
 
-/// Lines of pixels in single precision, each longer at both ends so that eight pixels may run over the edge.
-pub(crate) struct Lines {
+/// PaddedRows of pixels in single precision, each longer at both ends so that eight pixels may run over the edge.
+pub(crate) struct PaddedRows {
     pub(crate) n_lines: usize,
     pub(crate) n_pixels: usize,
     pub(crate) stride: usize,
     pub(crate) sums: Vec<f32>,
 }
 
-impl Lines {
+impl PaddedRows {
     pub(crate) fn new(n_lines: usize, n_pixels: usize) -> Self {
         let stride = n_pixels + 2 * LANES;
         Self { n_lines, n_pixels, stride, sums: vec![0.0; n_lines * stride] }
@@ -57,8 +57,8 @@ impl Lines {
 }
 
 /// A stroke; lengths in pixels, "along" counting lines and "across" the pixels of each. All its numbers are of one type, so
-/// that eight strokes are set up together: see [`Strokes`].
-struct Stroke {
+/// that eight strokes are set up together: see [`NarrowGaussians`].
+struct NarrowGaussian {
     /// 1 for a stroke along x, 0 for one along y.
     along_x: f32,
     /// Line and pixel of the corner from which places count, and the place of the middle.
@@ -86,16 +86,16 @@ struct Stroke {
 const NUMBERS: usize = 17;
 
 /// Eight strokes, each of their numbers side by side. The compiler makes vectors of their setup: nothing in it branches.
-pub(crate) struct Strokes([[f32; LANES]; NUMBERS]);
+pub(crate) struct NarrowGaussians([[f32; LANES]; NUMBERS]);
 
-impl Strokes {
+impl NarrowGaussians {
     /// Returns the strokes of splats on a picture of so many rows and columns.
     #[inline(always)]
     pub(crate) fn new(splats: &[Splat; LANES], size: (usize, usize)) -> Self {
         let size = (size.0 as f32, size.1 as f32);
         let mut numbers = [[0.0; LANES]; NUMBERS];
         for i in 0..LANES {
-            for (of_all, number) in numbers.iter_mut().zip(Stroke::new(&splats[i], size).into_numbers()) {
+            for (of_all, number) in numbers.iter_mut().zip(NarrowGaussian::new(&splats[i], size).into_numbers()) {
                 of_all[i] = number;
             }
         }
@@ -104,22 +104,23 @@ impl Strokes {
 
     /// Adds the first strokes to the pixels of the rows, or of the columns where they are along x.
     #[inline(always)]
-    pub(crate) fn add(&self, n: usize, profiles: &[Profile], rows: &mut Lines, columns: &mut Lines) {
+    pub(crate) fn add(&self, n: usize, profiles: &[BlurredEdgeTable], rows: &mut PaddedRows, columns: &mut PaddedRows) {
         for i in 0..n {
             let mut numbers = [0.0; NUMBERS];
             for (number, of_all) in numbers.iter_mut().zip(&self.0) {
                 *number = of_all[i];
             }
-            let stroke = Stroke::from_numbers(numbers);
+            let stroke = NarrowGaussian::from_numbers(numbers);
             let film = if stroke.along_x > 0.5 { &mut *columns } else { &mut *rows };
             stroke.add(profiles, film);
         }
     }
 }
 
-impl Stroke {
+impl NarrowGaussian {
     #[inline(always)]
     fn new(splat: &Splat, (n_rows, n_columns): (f32, f32)) -> Self {
+        // Choose the axis along: that in which the Gaussian is wider; swap x and y for it.
         let whole = splat.whole();
         let is_along_x = whole.xx >= whole.yy;
         let turned = |x: f64, y: f64| if is_along_x { (x, y) } else { (y, x) };
@@ -129,6 +130,7 @@ impl Stroke {
         let (soft_along, soft_across) = turned(splat.covariance.xx, splat.covariance.yy);
         let n_lines = if is_along_x { n_columns } else { n_rows };
 
+        // Choose the samples to a line from the length and from how far the profile moves across (eq. 16).
         const LEAST: f64 = SAMPLES_PER_SIGMA * SAMPLES_PER_SIGMA / (FINEST * FINEST);
         let total_along = whole.xx.max(whole.yy).max(LEAST);
         let soft = |slope: f64| (soft_across - 2.0 * slope * splat.covariance.xy + slope * slope * soft_along).max(0.0);
@@ -136,20 +138,23 @@ impl Stroke {
         let needed = (SAMPLES_PER_SIGMA * SAMPLES_PER_SIGMA)
             .max(SAMPLES_PER_WIDTH * SAMPLES_PER_WIDTH * slope * slope * total_along / soft(slope).max(LEAST));
         let divisions = (needed / total_along).sqrt().ceil().clamp(1.0, FINEST);
-        // A box of one sample has the variance 1/12: sampling with that added is the box integral to fourth order.
+        // Add the variance of a sample's box: samples are then box integrals to fourth order (eqs. 10 to 12).
         let step_variance = 1.0 / (12.0 * divisions * divisions);
         let per_along = 1.0 / (total_along + step_variance);
         let slope = whole.xy * per_along;
         let sigma = (total_along + step_variance).sqrt();
+        // The profile across: the even width that the side leaves (eq. 14)…
         let width = (side.1 - slope * side.0).abs();
         const SIXTEENTHS: f64 = (1 << ROW_BITS) as f64;
-        // What is beside the even width and above the softness of a profile widens the even width.
+        // … and the conditional variance (eq. 13). The table has widths of whole sixteenths and some variances: what is
+        // beyond those widens the even width, so that the whole variance is kept (eq. 15).
         let least = (SIXTEENTHS * width).floor().clamp(1.0, WIDEST) / SIXTEENTHS;
         let rest = soft(slope) + slope * slope * step_variance + (width * width - least * least) / 12.0;
         let softness = variance_below(rest as f32);
         let square = least * least + 12.0 * (rest - f64::from(softness)).max(0.0);
         let sixteenths = (SIXTEENTHS * square.sqrt() + 0.5).floor().clamp(1.0, WIDEST);
         let drawn = sixteenths / SIXTEENTHS;
+        // The energy of the sample in the middle (eq. 11), over the width that it is spread on.
         let corner = (at.0.floor(), at.1.floor());
         const NORM: f64 = 0.398_942_280_401_432_7 / INSIDE;
         let mut stroke = Self {
@@ -167,6 +172,7 @@ impl Stroke {
             end: 0.0,
             powers: Powers::default(),
         };
+        // The samples within reach that lie on the picture.
         let (middle, reach) = (stroke.corner.0 + stroke.at.0, (REACH * sigma) as f32);
         stroke.first = ((middle - reach) * stroke.divisions - 0.5).ceil().max(0.0);
         stroke.end = ((middle + reach) * stroke.divisions - 0.5).ceil().min(n_lines * stroke.divisions);
@@ -194,7 +200,7 @@ impl Stroke {
 
     /// Adds it to the pixels of lines, by products from one sample to the next.
     #[inline(always)]
-    fn add(mut self, profiles: &[Profile], film: &mut Lines) {
+    fn add(mut self, profiles: &[BlurredEdgeTable], film: &mut PaddedRows) {
         let profile = &profiles[profile_number(self.softness)];
         let half = (self.sixteenths as i32) << (PLACE_BITS - ROW_BITS - 1);
         let across = (self.slope / self.divisions * ONE) as i32;

@@ -1,17 +1,19 @@
-//! A mesh whose rays are bent at the stop, as splats.
+//! A pupil mesh whose rays HURB spreads at the stop, as Gaussians on pixels.
+//!
+//! The derivation is in `docs/hurb.md`, which comments name by its equations.
 
-use dioptric_diffraction::{Covariance, Edge, Hurb};
+use dioptric_diffraction::{CircularStop, Covariance, Hurb};
 use dioptric_optics::StopPoint;
 use glam::DVec2;
 use multiversion::multiversion;
 
 use crate::{
+    blurred_edge::LANES,
     mesh::Mesh,
-    profile::LANES,
     raster::Raster,
     ray_map::Node,
     ring::{Cut, PIECE, Piece, Ring},
-    splat::{Film, Splat, Splats},
+    splat::{Splat, SplatBuffer, Splats},
 };
 
 /// A cell this many standard deviations across, both ways, is drawn as a polygon.
@@ -33,39 +35,40 @@ const FAN: f64 = 1.5;
 
 /// Uncertainty bending at the stop.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Bending {
+pub(crate) struct StopHurb {
     pub(crate) model: Hurb,
-    pub(crate) edge: Edge,
+    pub(crate) edge: CircularStop,
 }
 
-impl Bending {
+impl StopHurb {
     /// Returns the Gaussian of a ray on the film, pixels².
     #[inline(always)]
     fn covariance(self, node: &Node) -> Covariance {
+        // Project the spread at the stop onto the film: Σ = J C Jᵀ (eqs. 3 and 4).
         let at_stop = self.model.covariance(StopPoint { mm: node.in_stop * self.edge.radius_mm }, self.edge);
         at_stop.mapped(node.along_l_mm, node.along_m_mm)
     }
 }
 
 /// A mesh on pixels and the energies of its cells.
-pub(crate) struct BentMesh<'a> {
+pub(crate) struct HurbSplatter<'a> {
     pub(crate) mesh: Mesh,
     /// In pixels.
     pub(crate) nodes: &'a [Node],
-    pub(crate) bending: Bending,
+    pub(crate) bending: StopHurb,
     /// Rows and columns of the picture.
     pub(crate) size: (usize, usize),
 }
 
-impl BentMesh<'_> {
+impl HurbSplatter<'_> {
     /// Takes from the energies of the cells what bending spreads, and deposits it.
     pub(crate) fn deposit(&self, energies: &mut [f64], raster: &mut Raster) {
-        let mut bent = BentCells { azimuth_step: self.mesh.azimuth(1.0), ..BentCells::default() };
+        let mut bent = SpreadCells { azimuth_step: self.mesh.azimuth(1.0), ..SpreadCells::default() };
         let (mut splats, mut film) = (Splats::default(), None);
         for (number, energies) in energies.chunks_exact_mut(self.mesh.n_azimuths).enumerate() {
             draw_ring(self, number, energies, &mut bent, &mut splats);
             if !splats.is_empty() {
-                film.get_or_insert_with(|| Film::new(self.size)).add(&splats);
+                film.get_or_insert_with(|| SplatBuffer::new(self.size)).add(&splats);
                 splats.clear();
             }
         }
@@ -76,18 +79,20 @@ impl BentMesh<'_> {
 
     /// Takes the cells of a ring that bending spreads.
     #[inline(always)]
-    fn take_ring(&self, number: usize, energies: &mut [f64], bent: &mut BentCells) {
+    fn take_ring(&self, number: usize, energies: &mut [f64], bent: &mut SpreadCells) {
         let ring = Ring::new(self.mesh, number);
         bent.clear();
         for (group, energies) in energies.chunks_mut(LANES).enumerate() {
             let mut cells = [Cell::default(); LANES];
             let mut middles = [Sample::default(); LANES];
+            // The Gaussians in the middles of eight cells.
             for i in 0..energies.len() {
                 let [a, b, c, d] = self.mesh.corners(number, group * LANES + i);
                 cells[i] = Cell { corners: [self.nodes[a], self.nodes[b], self.nodes[c], self.nodes[d]] };
                 middles[i] = cells[i].sample(0.5, 0.5);
             }
             let looks = Looks::new(&middles, self.bending);
+            // Leave narrow ones to polygons, cut the others into pieces outwards.
             for (i, energy) in energies.iter_mut().enumerate() {
                 if !looks.is_still(i) {
                     let energy = std::mem::take(energy);
@@ -106,14 +111,14 @@ impl BentMesh<'_> {
 }
 
 #[multiversion(targets("x86_64+avx2", "x86_64+avx"))]
-fn draw_ring(mesh: &BentMesh, number: usize, energies: &mut [f64], bent: &mut BentCells, splats: &mut Splats) {
+fn draw_ring(mesh: &HurbSplatter, number: usize, energies: &mut [f64], bent: &mut SpreadCells, splats: &mut Splats) {
     mesh.take_ring(number, energies, bent);
     bent.draw(mesh.bending, splats);
 }
 
 /// Cells of a ring that bending spreads, and the parts of them that are drawn.
 #[derive(Default)]
-struct BentCells {
+struct SpreadCells {
     cells: Vec<Cell>,
     parts: Vec<Part>,
     /// Parts of those parts, side by side around.
@@ -136,7 +141,7 @@ struct Part {
     energy: f64,
 }
 
-impl BentCells {
+impl SpreadCells {
     fn clear(&mut self) {
         self.cells.clear();
         self.parts.clear();
@@ -161,7 +166,8 @@ impl BentCells {
 
     /// Draws the parts as splats side by side around, each as wide as its Gaussian is long or narrow enough for it.
     #[inline(always)]
-    fn draw(&mut self, bending: Bending, splats: &mut Splats) {
+    fn draw(&mut self, bending: StopHurb, splats: &mut Splats) {
+        // Parts no longer around than their Gaussians are wide, and those to be cut around.
         for parts in self.parts.chunks(LANES) {
             let samples = samples(&self.cells, parts);
             let looks = Looks::new(&samples, bending);
@@ -180,6 +186,7 @@ impl BentCells {
                 }
             }
         }
+        // The parts of those that were cut.
         for parts in self.side_by_side.chunks(LANES) {
             let samples = samples(&self.cells, parts);
             let looks = Looks::new(&samples, bending);
@@ -238,7 +245,7 @@ impl Cell {
     /// Whether next to nothing of the cell's light, bent as at its middle, with the variance given, and as near its outer
     /// side, meets the picture.
     #[inline(always)]
-    fn is_beyond(&self, wide2: f64, (rows, columns): (usize, usize), bending: Bending) -> bool {
+    fn is_beyond(&self, wide2: f64, (rows, columns): (usize, usize), bending: StopHurb) -> bool {
         let [a, b, c, d] = self.corners.map(|node| node.at_mm);
         let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
         let end = DVec2::new(columns as f64, rows as f64);
@@ -267,7 +274,7 @@ struct Looks {
 
 impl Looks {
     #[inline(always)]
-    fn new(samples: &[Sample; LANES], bending: Bending) -> Self {
+    fn new(samples: &[Sample; LANES], bending: StopHurb) -> Self {
         let none = [0.0; LANES];
         let (mut covariance, mut wide2) = ([none; 3], none);
         let (mut out2, mut around2, mut out_in_sigmas2, mut around_in_sigmas2) = (none, none, none, none);
@@ -312,8 +319,10 @@ impl Looks {
     #[inline(always)]
     fn splat(&self, sample: &Sample, part: &Part, (i, azimuth_step): (usize, f64)) -> Splat {
         let [xx, xy, yy] = [self.covariance[0][i], self.covariance[1][i], self.covariance[2][i]];
+        // Fold the side outwards into the covariance; the one around stays an even side (eq. 7).
         let along = Covariance::along(sample.out * (part.lengths.0 / 12f64.sqrt()));
         let side = sample.around * part.lengths.1;
+        // Soften along the side around by what neighbors come apart at one standard deviation (eq. 7a).
         let (apart, side2) = (self.wide2[i] * (azimuth_step * part.lengths.1).powi(2), side.length_squared());
         let softness = FAN * apart * side2 / ((apart + side2) * (apart + side2)).max(f64::MIN_POSITIVE);
         let fan = Covariance {
