@@ -30,16 +30,16 @@ pub(crate) struct LayerTask<'a> {
     pub(crate) kernels: &'a LayerKernels,
     pub(crate) film_rows: usize,
     pub(crate) film_columns: usize,
-    /// Whether the blurred cover is wanted beside the light.
-    pub(crate) with_cover: bool,
+    /// Whether the blurred alpha is wanted beside the light.
+    pub(crate) with_alpha: bool,
     pub(crate) stopwatch: &'a Stopwatch,
 }
 
-/// The blurred light and cover of a cell.
+/// The blurred light and alpha of a cell.
 struct BlurredCell {
     at: Rectangle,
     light: Vec<f32>,
-    cover: Option<Vec<f32>>,
+    alpha: Option<Vec<f32>>,
 }
 
 /// Blurs a layer into `out`, which must be clear; each patch counts as `patch_units` of work.
@@ -87,11 +87,11 @@ fn blur_patch(
     }
     let expansion = Expansion::of(patch, kernels, width, cancel)?;
     let mut planes = vec![ideal.light.as_slice()];
-    if task.with_cover {
+    if task.with_alpha {
         // What a surface covers is 1 all over it, however its kernels change.
         let share = (1.0 / expansion.uniform_response(cell.size)) as f32;
-        ideal.cover.iter_mut().for_each(|cover| *cover *= share);
-        planes.push(&ideal.cover);
+        ideal.alpha.iter_mut().for_each(|alpha| *alpha *= share);
+        planes.push(&ideal.alpha);
     }
     let places = Places::new(patch, &source, task.sampler);
     let spread = if expansion.is_better_direct(&source, planes.len()) {
@@ -107,7 +107,7 @@ fn blur_patch(
         columns: source.columns + 2 * half,
     };
     let light = spread.next().unwrap_or_default();
-    Ok(Some(BlurredCell { at, light, cover: spread.next() }))
+    Ok(Some(BlurredCell { at, light, alpha: spread.next() }))
 }
 
 /// The kernel over a cell: a sum of squares of samples, each times a polynomial down and one across the cell.
@@ -124,7 +124,7 @@ struct Term {
 }
 
 /// A term that changes no edge by more than this is left out.
-const NEGLIGIBLE: f64 = 1e-5;
+const NEGLIGIBLE: f64 = 4e-6;
 
 /// Multiplications that take about as long as the transform of a sample.
 const COST_OF_TRANSFORM: usize = 64;
@@ -296,7 +296,7 @@ fn add_cell(task: &LayerTask<'_>, cell: &BlurredCell, out: &mut BlurredLayer) {
     for row in 0..on_film.rows {
         let first = (row + skip_rows) * cell.at.columns + skip_columns;
         let part = first..first + on_film.columns;
-        let cover = cell.cover.as_ref().map(|cover| &cover[part.clone()]);
-        out.add_row(on_film.first_row as usize + row, on_film.first_column as usize, &cell.light[part], cover);
+        let alpha = cell.alpha.as_ref().map(|alpha| &alpha[part.clone()]);
+        out.add_row(on_film.first_row as usize + row, on_film.first_column as usize, &cell.light[part], alpha);
     }
 }

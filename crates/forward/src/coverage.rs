@@ -178,8 +178,8 @@ impl Aim<'_> {
     }
 
     /// Returns the field that lands this far off axis, or the last that gets through.
-    fn field_tan_at(&self, reach_mm: f64) -> f64 {
-        let is_within = |tan: f64| self.lands_mm(DVec2::X * tan).map(|at| at.x.abs() < reach_mm);
+    fn field_tan_at(&self, extent_mm: f64) -> f64 {
+        let is_within = |tan: f64| self.lands_mm(DVec2::X * tan).map(|at| at.x.abs() < extent_mm);
         let (mut low, mut high) = (0.0, 0.01);
         // Widen until the light lands beyond, or there is none.
         while high < WIDEST_TAN && is_within(high) == Some(true) {
@@ -224,7 +224,7 @@ impl Aim<'_> {
     fn fields_over(&self, center: DVec2, half_mm: DVec2) -> (DVec2, DVec2) {
         const ALONG: i32 = 8;
         let is_within = |field_tan: DVec2| self.lands_mm(field_tan).is_some_and(|at| at.abs().cmplt(half_mm).all());
-        // Sides: left, bottom, right, top, as distances from the centre.
+        // Sides: left, bottom, right, top, as distances from the center.
         let mut sides = [1e-3; 4];
         let corners =
             |sides: &[f64; 4]| (center - DVec2::new(sides[0], sides[1]), center + DVec2::new(sides[2], sides[3]));

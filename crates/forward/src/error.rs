@@ -42,7 +42,7 @@ pub enum ForwardError {
     OtherBand {
         /// 0-based band.
         band: usize,
-        /// Its centre, nm.
+        /// Its center, nm.
         found_nm: f64,
         /// That of the plan, nm.
         planned_nm: f64,
@@ -120,13 +120,13 @@ pub enum ForwardError {
     },
     /// The corner of the film sees a field that was not traced, or that the lens does not pass.
     #[error(
-        "the film's corner is {corner_mm:.3} mm off axis, but at {wavelength_nm} nm the lens was traced only to {reach_mm:.3} mm"
+        "the film's corner is {corner_mm:.3} mm off axis, but at {wavelength_nm} nm the lens was traced only to {extent_mm:.3} mm"
     )]
     FilmBeyondField {
         /// Half the film's diagonal, mm.
         corner_mm: f64,
-        /// How far from the axis the traced field reaches, mm.
-        reach_mm: f64,
+        /// The extent of the traced field from the axis, mm.
+        extent_mm: f64,
         /// Wavelength, nm.
         wavelength_nm: f64,
     },

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::ForwardError;
 
-/// The raster of the sensor's pixels; the optical axis passes through its centre.
+/// The raster of the sensor's pixels; the optical axis passes through its center.
 ///
 /// Row 0 is the top of the picture, upright as the photographer sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Film {
 }
 
 impl Film {
-    /// Returns half the diagonal, corner to centre, mm.
+    /// Returns half the diagonal, corner to center, mm.
     pub fn half_diagonal_mm(&self) -> f64 {
         0.5e-3 * self.pitch_um * f64::hypot(self.rows as f64, self.columns as f64)
     }
@@ -61,11 +61,12 @@ pub struct Settings {
     /// Distance between the points of the film at which the PSF is computed, pixels. Cells in which the
     /// interpolated PSF is off by more than `max_edge_error` are halved.
     pub knot_spacing_px: usize,
-    /// Largest error of the edge spread function that interpolation over the field may cause.
+    /// Largest error of the edge spread function that interpolation over the field may cause; a uniform plane may be off by
+    /// a tenth of it.
     pub max_edge_error: f64,
     /// Distance between depth layers, pixels of blur radius.
     pub layer_step_px: f64,
-    /// A change of blur radius between neighbours that counts as a depth edge, pixels.
+    /// A change of blur radius between neighbors that counts as a depth edge, pixels.
     pub depth_edge_px: f64,
     /// Largest change of blur radius between wavelengths among which PSFs are interpolated, pixels.
     pub chromatic_step_px: f64,

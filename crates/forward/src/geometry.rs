@@ -38,7 +38,7 @@ impl FilmFrame {
 }
 
 /// Checks that the bands, the depths and the film lie within what is known of the lens.
-pub(crate) fn check_reach(
+pub(crate) fn check_extent(
     lens: &dyn LensImage,
     grid: &WavelengthGrid,
     dioptres: (f64, f64),
@@ -65,8 +65,8 @@ pub(crate) fn check_reach(
     for &wavelength_nm in grid.centers_nm() {
         for dioptres in [dioptres.0, dioptres.1] {
             cancel.check()?;
-            if let Some(reach_mm) = ends_before(&lens.film_map(dioptres, wavelength_nm, 1.1 * corner_mm), film) {
-                return Err(ForwardError::FilmBeyondField { corner_mm, reach_mm, wavelength_nm });
+            if let Some(extent_mm) = ends_before(&lens.film_map(dioptres, wavelength_nm, 1.1 * corner_mm), film) {
+                return Err(ForwardError::FilmBeyondField { corner_mm, extent_mm, wavelength_nm });
             }
         }
     }

@@ -32,7 +32,7 @@ struct Term {
 
 /// What counts as an edge. Distances are behind the nearest thing, in pixels of blur radius.
 pub(crate) struct EdgeRule<'a> {
-    /// Difference of distances between neighbours that is a depth edge.
+    /// Difference of distances between neighbors that is a depth edge.
     pub(crate) jump: f32,
     /// Largest radius, in samples of the scene, of the blur at a distance.
     pub(crate) reach: &'a (dyn Fn(f32) -> f32 + Sync),
@@ -108,7 +108,7 @@ pub(crate) fn reach_of_edges(
 ) -> Result<Vec<f32>, Cancelled> {
     let (rows, columns) = distances.dim();
     let mut reach = vec![0.0_f32; rows * columns];
-    // Soft edges drop over a few samples, so neighbours up to three samples away are compared.
+    // Soft edges drop over a few samples, so neighbors up to three samples away are compared.
     const OFFSETS: [(isize, isize); 12] =
         [(0, 1), (0, -1), (1, 0), (-1, 0), (0, 2), (0, -2), (2, 0), (-2, 0), (0, 3), (0, -3), (3, 0), (-3, 0)];
     let inside =

@@ -68,12 +68,12 @@ impl Layers {
                 .filter(|d| d.is_finite())
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), d| (low.min(d), high.max(d)));
             let margin = NEAR_FOCUS_PX / px_per_dioptre;
+            let in_focus = if low.is_finite() { (low - margin, high + margin) } else { range };
             let (low, high) = ((low - margin).clamp(range.0, range.1), (high + margin).clamp(range.0, range.1));
             dioptres = vec![range.1];
             for (end, step_px) in [(high, step_px), (low, 0.5 * step_px), (range.0, step_px)] {
                 let start = dioptres[dioptres.len() - 1];
-                let n_steps = ((start - end) * px_per_dioptre / step_px - 1e-6).ceil().max(0.0) as usize;
-                dioptres.extend((1..=n_steps).map(|i| start + (end - start) * i as f64 / n_steps as f64));
+                dioptres.extend(steps(start, end, in_focus, (px_per_dioptre, step_px)));
             }
             let last = dioptres.len() - 1;
             dioptres[last] = range.0;
@@ -120,17 +120,17 @@ impl Layers {
         ((self.dioptres[0] - 1.0 / f64::from(depth_m)) * self.px_per_dioptre) as f32
     }
 
-    /// Returns where a depth lies among the layers: 0 at the nearest, 1 at the next.
-    pub(crate) fn place_of(&self, depth_m: f32) -> f32 {
-        self.place_at(1.0 / f64::from(depth_m))
+    /// Returns the layer coordinate of a depth: 0 at the nearest, 1 at the next.
+    pub(crate) fn coordinate_of(&self, depth_m: f32) -> f32 {
+        self.coordinate_at(1.0 / f64::from(depth_m))
     }
 
-    /// Returns where a distance behind the nearest layer, in pixels of blur radius, lies among the layers.
-    pub(crate) fn place_of_distance(&self, distance_px: f32) -> f32 {
-        self.place_at(self.dioptres[0] - f64::from(distance_px) / self.px_per_dioptre)
+    /// Returns the layer coordinate of a distance behind the nearest layer, in pixels of blur radius.
+    pub(crate) fn coordinate_of_distance(&self, distance_px: f32) -> f32 {
+        self.coordinate_at(self.dioptres[0] - f64::from(distance_px) / self.px_per_dioptre)
     }
 
-    fn place_at(&self, dioptres: f64) -> f32 {
+    fn coordinate_at(&self, dioptres: f64) -> f32 {
         let last = self.len() - 1;
         let above = self.dioptres.partition_point(|&d| d > dioptres);
         if above == 0 || last == 0 {
@@ -143,18 +143,51 @@ impl Layers {
         ((above - 1) as f64 + (near - dioptres) / (near - far)) as f32
     }
 
-    /// Returns the largest blur radius of the samples at a place among the layers, pixels.
-    pub(crate) fn radius_px_at(&self, place: f32) -> f64 {
-        let below = (place as usize).min(self.len() - 1);
+    /// Returns the largest blur radius of the samples at a layer coordinate, pixels.
+    pub(crate) fn radius_px_at(&self, coordinate: f32) -> f64 {
+        let below = (coordinate as usize).min(self.len() - 1);
         let above = (below + 1).min(self.len() - 1);
         f64::max(self.radius_px[below], self.radius_px[above])
     }
 }
 
-/// Returns the share of a sample at `place` that belongs to a layer; 0 where there is no sample (NaN).
+/// A step of blur radius between layers, as a share of it, that does no more harm than the step of a small blur.
+const STEP_OF_RADIUS: f64 = 0.06;
+
+/// Returns the dioptres of layers from `start` (left out) to `end`: evenly in blur radius, in steps of at most `step_px`, while
+/// the blur is small, in steps in proportion to its radius where it is wide. `focus` is the range where anything is nearly in focus.
+fn steps(start: f64, end: f64, focus: (f64, f64), (px_per_dioptre, step_px): (f64, f64)) -> Vec<f64> {
+    let wide_px = step_px / STEP_OF_RADIUS;
+    // The number of steps from focus to a blur, with its sign: linear, then logarithmic with the same slope.
+    let steps_to = |dioptres: f64| {
+        let beyond = (dioptres - focus.1).max(0.0) - (focus.0 - dioptres).max(0.0);
+        let blur_px = beyond.abs() * px_per_dioptre;
+        let n = if blur_px <= wide_px { blur_px } else { wide_px * (1.0 + (blur_px / wide_px).ln()) } / step_px;
+        n.copysign(beyond)
+    };
+    let blur_after = |n: f64| {
+        let px = n * step_px;
+        if px <= wide_px { px } else { wide_px * (px / wide_px - 1.0).exp() }
+    };
+    let (first, last) = (steps_to(start), steps_to(end));
+    if first == last {
+        // Within the range in focus.
+        let n_steps = ((start - end) * px_per_dioptre / step_px - 1e-6).ceil().max(0.0) as usize;
+        return (1..=n_steps).map(|i| start + (end - start) * i as f64 / n_steps as f64).collect();
+    }
+    let n_steps = ((first - last) - 1e-6).ceil().max(1.0) as usize;
+    let at = |i: usize| {
+        let n = first + (last - first) * i as f64 / n_steps as f64;
+        let beyond = blur_after(n.abs()) / px_per_dioptre;
+        if n > 0.0 { focus.1 + beyond } else { focus.0 - beyond }
+    };
+    (1..n_steps).map(at).chain([end]).collect()
+}
+
+/// Returns the share of a sample at a layer coordinate that belongs to a layer; 0 where there is no sample (NaN).
 #[inline]
-pub(crate) fn tent(place: f32, layer: f32) -> f32 {
-    (1.0 - (place - layer).abs()).max(0.0)
+pub(crate) fn tent(coordinate: f32, layer: f32) -> f32 {
+    (1.0 - (coordinate - layer).abs()).max(0.0)
 }
 
 #[cfg(test)]
@@ -191,27 +224,40 @@ mod tests {
             let step_px = if pair[0] > 14.0 + 1e-9 || pair[1] < 6.0 - 1e-9 { 2.0 } else { 1.0 };
             assert!(pair[0] > pair[1] && pair[0] - pair[1] <= step_px + 1e-9, "{pair:?}");
         }
-        assert_eq!(layers.place_of(1.0 / 25.0), 0.0);
-        assert_eq!(layers.place_of(f32::INFINITY), last as f32);
-        let place = layers.place_of(1.0 / 9.3);
+        assert_eq!(layers.coordinate_of(1.0 / 25.0), 0.0);
+        assert_eq!(layers.coordinate_of(f32::INFINITY), last as f32);
+        let place = layers.coordinate_of(1.0 / 9.3);
         let between = dioptres[place as usize]
             + f64::from(place.fract()) * (dioptres[place as usize + 1] - dioptres[place as usize]);
         assert!((between - 9.3).abs() < 1e-5, "{between}");
         assert!((layers.distance_px(1.0 / 9.3) - 15.7).abs() < 1e-4);
-        assert!((layers.place_of_distance(15.7) - place).abs() < 1e-4);
+        assert!((layers.coordinate_of_distance(15.7) - place).abs() < 1e-4);
+    }
+
+    /// Beyond 33 pixels of blur layers lie 6 % apart: thousands of pixels need some tens of layers.
+    #[test]
+    fn wide_blurs_have_steps_in_proportion() {
+        let layers = layers((2.0, 3010.0), 2.0);
+        let dioptres = layers.dioptres();
+        assert_eq!((dioptres[0], dioptres[layers.len() - 1]), (3010.0, 2.0));
+        assert!(layers.len() < 120, "{}", layers.len());
+        for pair in dioptres.windows(2) {
+            let (step, blur) = (pair[0] - pair[1], (pair[0] - 10.0).max(10.0 - pair[1]));
+            assert!(pair[0] > pair[1] && step <= 2.0_f64.max(0.062 * blur) + 1e-9, "{pair:?}");
+        }
     }
 
     #[test]
     fn a_flat_scene_has_one_layer() {
         let layers = layers((5.0, 5.0), 2.0);
-        assert_eq!((layers.len(), layers.dioptres()[0], layers.place_of(0.2)), (1, 5.0, 0.0));
+        assert_eq!((layers.len(), layers.dioptres()[0], layers.coordinate_of(0.2)), (1, 5.0, 0.0));
     }
 
     #[test]
     fn weights_of_a_sample_sum_to_one() {
         let layers = layers((2.0, 25.0), 2.0);
         for depth_m in [0.04, 0.05, 0.0833, 0.2, 0.5] {
-            let place = layers.place_of(depth_m);
+            let place = layers.coordinate_of(depth_m);
             let sum: f32 = (0..layers.len()).map(|l| tent(place, l as f32)).sum();
             assert!((sum - 1.0).abs() < 1e-6);
         }

@@ -26,6 +26,7 @@ mod layers;
 mod occluded;
 mod occlusion;
 mod plan;
+mod raster;
 mod render;
 mod sampler;
 mod source;

@@ -10,10 +10,10 @@ use crate::{
     work::plane_of,
 };
 
-/// Where the second samples come from, and their places among the layers (NaN where there is none).
+/// Where the second samples come from, and their layer coordinates (NaN where there is none).
 pub(crate) enum OccludedSamples {
     Nothing,
-    Estimated { fill: Box<Fill>, places: Array2<f32> },
+    Estimated { fill: Box<Fill>, layer_coordinates: Array2<f32> },
     Known(Array2<f32>),
 }
 
@@ -30,7 +30,7 @@ impl OccludedSamples {
             return Ok(Self::Nothing);
         }
         let reach =
-            |distance: f32| layers.radius_px_at(layers.place_of_distance(distance)) as f32 * scene_per_film as f32;
+            |distance: f32| layers.radius_px_at(layers.coordinate_of_distance(distance)) as f32 * scene_per_film as f32;
         let rule = EdgeRule { jump: settings.depth_edge_px as f32, reach: &reach };
         let size = scene.size();
         let distances = |depth: &DepthMap| {
@@ -43,7 +43,7 @@ impl OccludedSamples {
             let place = |row: usize, column: usize| {
                 let distance = known[(row, column)];
                 let shows = reach[row * size.1 + column] > 0.0 && distance > front[(row, column)] + 0.5 * rule.jump;
-                if shows { layers.place_of_distance(distance) } else { f32::NAN }
+                if shows { layers.coordinate_of_distance(distance) } else { f32::NAN }
             };
             return Ok(Self::Known(plane_of(size, cancel, place)?));
         }
@@ -53,17 +53,17 @@ impl OccludedSamples {
         }
         let place = |row: usize, column: usize| {
             let distance = fill.distances[(row, column)];
-            if distance.is_nan() { f32::NAN } else { layers.place_of_distance(distance) }
+            if distance.is_nan() { f32::NAN } else { layers.coordinate_of_distance(distance) }
         };
-        let places = plane_of(size, cancel, place)?;
-        Ok(Self::Estimated { fill: Box::new(fill), places })
+        let layer_coordinates = plane_of(size, cancel, place)?;
+        Ok(Self::Estimated { fill: Box::new(fill), layer_coordinates })
     }
 
-    /// The places of the second samples among the layers.
-    pub(crate) fn places(&self) -> Option<&Array2<f32>> {
+    /// The layer_coordinates of the second samples among the layers.
+    pub(crate) fn layer_coordinates(&self) -> Option<&Array2<f32>> {
         match self {
             Self::Nothing => None,
-            Self::Estimated { places, .. } | Self::Known(places) => Some(places),
+            Self::Estimated { layer_coordinates, .. } | Self::Known(layer_coordinates) => Some(layer_coordinates),
         }
     }
 
@@ -72,7 +72,7 @@ impl OccludedSamples {
         matches!(self, Self::Known(_))
     }
 
-    /// The bytes of memory beside the places.
+    /// The bytes of memory beside the layer_coordinates.
     pub(crate) fn size_bytes(&self) -> usize {
         match self {
             Self::Estimated { fill, .. } => fill.size_bytes(),

@@ -2,7 +2,7 @@
 
 use std::{
     borrow::Cow,
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, PoisonError},
 };
 
@@ -15,12 +15,13 @@ use rayon::prelude::*;
 use crate::{
     BandRadiance, BlurMode, Film, ForwardError, SceneGeometry, SceneRadiance, Settings, Sink,
     blur::{LayerTask, blur_layer},
-    geometry::{FilmFrame, check_reach},
+    geometry::check_extent,
     knot_kernels::LayerKernels,
     layers::{Blurs, Layers},
     occluded::OccludedSamples,
     occlusion::{BlurredLayer, Composite},
-    sampler::{Sampler, Surface},
+    raster::LayerRaster,
+    sampler::Surface,
     stopwatch::{Clock, ImagingTimes, Part, Stopwatch},
     tiles::{Cell, FilmLens, Tiling, active_cells, cells_over, joined_for},
     work::{Progress, Work, plane_of},
@@ -175,7 +176,7 @@ impl ImagingPlan {
     /// When there is no such band, when the radiance is not that of the planned samples, or when the work is cancelled.
     pub fn image(&self, band: usize, radiance: BandRadiance<'_>, cancel: &Cancel) -> Result<Array2<f32>, ForwardError> {
         self.layout.check_band(band)?;
-        radiance.check(self.layout.places.dim(), self.layout.occluded.needs_radiance())?;
+        radiance.check(self.layout.layer_coordinates.dim(), self.layout.occluded.needs_radiance())?;
         let work = Work::unobserved(cancel);
         let kernels = self.layout.kernels(self.lens.as_ref(), band, &work)?;
         Ok(self.layout.image(self.lens.as_ref(), band, &kernels, radiance, &work)?)
@@ -195,7 +196,7 @@ impl ImagingPlan {
         cancel: &Cancel,
         sink: &mut Sink<'_>,
     ) -> Result<(), ForwardError> {
-        radiance.check(self.layout.places.dim(), &self.layout.spec.grid)?;
+        radiance.check(self.layout.layer_coordinates.dim(), &self.layout.spec.grid)?;
         progress(0.0);
         self.layout.stream(self.lens.as_ref(), radiance, &Watch { progress, range: (0.0, 1.0), cancel }, sink)
     }
@@ -215,12 +216,13 @@ pub(crate) struct Layout {
     /// The bands at which PSFs are computed; between them they are interpolated.
     kernel_bands: Vec<usize>,
     layers: Layers,
-    sampler: Sampler,
+    /// Of each layer.
+    rasters: Vec<LayerRaster>,
     tiling: Tiling,
-    places: Array2<f32>,
+    layer_coordinates: Array2<f32>,
     occluded: OccludedSamples,
     /// How far off axis light is taken from, mm.
-    reach_mm: f64,
+    extent_mm: f64,
     kept: Mutex<KeptKernels>,
     stopwatch: Stopwatch,
 }
@@ -252,7 +254,7 @@ impl Layout {
         scene.check()?;
         let (near_m, far_m) = scene.depth.range_m();
         let dioptres = (1.0 / far_m, 1.0 / near_m);
-        check_reach(lens, grid, dioptres, film, cancel)?;
+        check_extent(lens, grid, dioptres, film, cancel)?;
 
         // Lay layers over the depths.
         let wavelengths_nm = grid.centers_nm();
@@ -263,31 +265,43 @@ impl Layout {
         let layers = Layers::over(dioptres, settings.layer_step_px, &blurs);
         let kernel_bands = layers.chromatic_knots(settings.chromatic_step_px, &blurs);
         let z_m = scene.depth.z_m();
-        let places = plane_of(z_m.dim(), cancel, |row, column| layers.place_of(z_m[(row, column)]))?;
+        let layer_coordinates = plane_of(z_m.dim(), cancel, |row, column| layers.coordinate_of(z_m[(row, column)]))?;
 
-        // The 95 % radius of a blur, doubled, holds all but the faintest of its light.
-        let pad_px = (0..layers.len()).map(|l| layers.radius_px_at(l as f32)).fold(0.0, f64::max) * 2.0 + 8.0;
+        let pad_px = (0..layers.len()).map(|l| pad_for(layers.radius_px_at(l as f32))).fold(0.0, f64::max);
         let cell_size = settings.knot_spacing_px;
-        let reach_mm = corner_mm + 1e-3 * film.pitch_um * std::f64::consts::SQRT_2 * (pad_px + 2.0 * cell_size as f64);
-        let maps: Vec<FilmMap> = layers.dioptres().iter().map(|&d| lens.film_map(d, middle_nm, reach_mm)).collect();
-        let sampler = Sampler::new(scene.view, FilmFrame::new(film), &maps[0]);
-        let occluded = OccludedSamples::find(scene, &layers, settings, sampler.scene_per_film, cancel)?;
+        let extent_mm = corner_mm + 1e-3 * film.pitch_um * std::f64::consts::SQRT_2 * (pad_px + 2.0 * cell_size as f64);
+        let maps: Vec<FilmMap> = layers.dioptres().iter().map(|&d| lens.film_map(d, middle_nm, extent_mm)).collect();
+        let radius_px: Vec<f64> = (0..layers.len()).map(|layer| layers.radius_px_at(layer as f32)).collect();
+        let raster = |(&radius_px, map)| LayerRaster::new(film, LayerRaster::factor_for(radius_px), scene.view, map);
+        let rasters: Vec<LayerRaster> = radius_px.iter().zip(&maps).map(raster).collect();
+        let scene_per_film = LayerRaster::new(film, 1, scene.view, &maps[0]).sampler.scene_per_film;
+        let occluded = OccludedSamples::find(scene, &layers, settings, scene_per_film, cancel)?;
 
         // Find the cells in which a layer has anything, and halve them until the spline follows the PSFs.
         let ends: Vec<FilmMap> = [wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1], middle_nm]
             .into_iter()
-            .flat_map(|w| [0, layers.len() - 1].map(|l| lens.film_map(layers.dioptres()[l], w, reach_mm)))
+            .flat_map(|w| [0, layers.len() - 1].map(|l| lens.film_map(layers.dioptres()[l], w, extent_mm)))
             .collect();
-        let surfaces: Vec<&Array2<f32>> = std::iter::once(&places).chain(occluded.places()).collect();
-        let cells = cells_over(film, pad_px.ceil() as usize, cell_size);
-        let active = active_cells(&cells, &sampler, &ends, &surfaces, layers.len(), cancel)?;
-        let joined = |(layer, cells)| joined_for(2.0 * layers.radius_px_at(layer as f32), cells);
-        let active: Vec<Vec<Cell>> = active.into_iter().enumerate().map(joined).collect();
+        let surfaces: Vec<&Array2<f32>> =
+            std::iter::once(&layer_coordinates).chain(occluded.layer_coordinates()).collect();
+        let mut active: Vec<Vec<Cell>> = vec![vec![]; layers.len()];
+        let factors: BTreeSet<usize> = rasters.iter().map(|raster| raster.factor).collect();
+        for factor in factors {
+            let members: Vec<usize> = (0..layers.len()).filter(|&layer| rasters[layer].factor == factor).collect();
+            let LayerRaster { film, sampler, .. } = &rasters[members[0]];
+            let pad_px = members.iter().map(|&layer| pad_for(radius_px[layer])).fold(0.0, f64::max) / factor as f64;
+            let cells = cells_over(film, pad_px.ceil() as usize, cell_size);
+            let mut found = active_cells(&cells, sampler, &ends, &surfaces, layers.len(), cancel)?;
+            for layer in members {
+                let blur_px = 2.0 * radius_px[layer] / factor as f64;
+                active[layer] = joined_for(blur_px, std::mem::take(&mut found[layer]));
+            }
+        }
         let work = Work::new(cancel, progress, range, active.iter().map(Vec::len).sum::<usize>() as u64);
         let stopwatch = Stopwatch::default();
         let film_lens = FilmLens {
             image: lens,
-            film,
+            rasters: &rasters,
             layers: &layers,
             maps: &maps,
             wavelength_nm: middle_nm,
@@ -295,11 +309,23 @@ impl Layout {
         };
         let tiling = Tiling::new(active, &film_lens, settings, &work)?;
         let kept = Mutex::new(KeptKernels { budget_bytes: KERNEL_BUDGET_BYTES, ..KeptKernels::default() });
-        Ok(Self { kernel_bands, layers, sampler, tiling, places, occluded, reach_mm, kept, stopwatch, spec })
+        Ok(Self {
+            kernel_bands,
+            layers,
+            rasters,
+            tiling,
+            layer_coordinates,
+            occluded,
+            extent_mm,
+            kept,
+            stopwatch,
+            spec,
+        })
     }
 
     fn size_bytes(&self) -> usize {
-        let planes = (self.places.len() + self.occluded.places().map_or(0, Array2::len)) * size_of::<f32>();
+        let planes = (self.layer_coordinates.len() + self.occluded.layer_coordinates().map_or(0, Array2::len))
+            * size_of::<f32>();
         planes + self.occluded.size_bytes() + self.tiling.size_bytes() + self.kept().size_bytes
     }
 
@@ -315,7 +341,7 @@ impl Layout {
 
     fn maps_at(&self, lens: &dyn LensImage, band: usize) -> Vec<FilmMap> {
         let wavelength_nm = self.spec.grid.centers_nm()[band];
-        let map = |&dioptres: &f64| lens.film_map(dioptres, wavelength_nm, self.reach_mm);
+        let map = |&dioptres: &f64| lens.film_map(dioptres, wavelength_nm, self.extent_mm);
         self.layers.dioptres().iter().map(map).collect()
     }
 
@@ -342,7 +368,7 @@ impl Layout {
         let wavelength_nm = self.spec.grid.centers_nm()[band];
         let film_lens = FilmLens {
             image: lens,
-            film: &self.spec.film,
+            rasters: &self.rasters,
             layers: &self.layers,
             maps: &maps,
             wavelength_nm,
@@ -410,7 +436,7 @@ impl Layout {
         let needed = radiance.occluded.filter(|_| self.occluded.needs_radiance());
         let occluded = needed.map(|occluded| occluded.band(band)).transpose()?;
         let light = BandRadiance { front: &front, occluded: occluded.as_deref() };
-        light.check(self.places.dim(), self.occluded.needs_radiance())?;
+        light.check(self.layer_coordinates.dim(), self.occluded.needs_radiance())?;
         Ok(self.image(lens, band, kernels, light, work)?)
     }
 
@@ -428,27 +454,34 @@ impl Layout {
             OccludedSamples::Estimated { fill, .. } => Some(Cow::Owned(fill.samples(light.front, work.cancel())?)),
             OccludedSamples::Known(_) => light.occluded.map(Cow::Borrowed),
         };
-        let mut surfaces = vec![Surface { radiance: light.front, places: &self.places }];
-        if let (Some(radiance), Some(places)) = (&occluded, self.occluded.places()) {
-            surfaces.push(Surface { radiance, places });
+        let mut surfaces = vec![Surface { radiance: light.front, layer_coordinates: &self.layer_coordinates }];
+        if let (Some(radiance), Some(layer_coordinates)) = (&occluded, self.occluded.layer_coordinates()) {
+            surfaces.push(Surface { radiance, layer_coordinates });
         }
         let Film { rows, columns, .. } = self.spec.film;
         let hides = self.spec.settings.mode == BlurMode::Layered && self.layers.len() > 1;
         let (mut picture, mut blurred) = (Composite::new(rows, columns), BlurredLayer::new(rows, columns));
         for (layer, patches) in self.tiling.patches.iter().enumerate() {
+            let LayerRaster { factor, film, sampler } = &self.rasters[layer];
             let task = LayerTask {
-                sampler: &self.sampler,
+                sampler,
                 map: &maps[layer],
                 layer,
                 surfaces: &surfaces,
                 patches,
                 kernels: &kernels.by_layer[layer],
-                film_rows: rows,
-                film_columns: columns,
-                with_cover: hides,
+                film_rows: film.rows,
+                film_columns: film.columns,
+                with_alpha: hides,
                 stopwatch: &self.stopwatch,
             };
-            blur_layer(&task, &mut blurred, work, PATCH_UNITS)?;
+            if *factor == 1 {
+                blur_layer(&task, &mut blurred, work, PATCH_UNITS)?;
+            } else if !patches.is_empty() {
+                let mut coarse = BlurredLayer::new(film.rows, film.columns);
+                blur_layer(&task, &mut coarse, work, PATCH_UNITS)?;
+                self.stopwatch.time(Part::Compositing, || blurred.add_magnified(&coarse, *factor, work.cancel()))?;
+            }
             self.stopwatch.time(Part::Compositing, || {
                 if hides {
                     return picture.composite_under(&mut blurred, work.cancel());
@@ -460,6 +493,12 @@ impl Layout {
         let finish = || if hides { picture.finish() } else { picture.finish_sum() };
         Ok(self.stopwatch.time(Part::Compositing, finish))
     }
+}
+
+/// Returns how far beyond the film light is taken from, pixels: the 95 % radius of a blur, doubled, holds all but the
+/// faintest of its light.
+fn pad_for(radius_px: f64) -> f64 {
+    2.0 * radius_px + 8.0
 }
 
 /// Returns a few fields over the film, of which the blur tells that of all: from the axis outwards, or all over it.

@@ -30,12 +30,12 @@ impl Rectangle {
     }
 }
 
-/// One surface of the scene in one band: its radiance and its places among the layers.
+/// One surface of the scene in one band: its radiance and its layer coordinates.
 #[derive(Clone, Copy)]
 pub(crate) struct Surface<'a> {
     pub(crate) radiance: &'a Array2<f32>,
     /// NaN where the surface has no sample.
-    pub(crate) places: &'a Array2<f32>,
+    pub(crate) layer_coordinates: &'a Array2<f32>,
 }
 
 /// Resamples surfaces of the scene on the film.
@@ -53,17 +53,17 @@ pub(crate) struct Sampler {
 pub(crate) struct IdealLayer {
     /// Irradiance, W m⁻² nm⁻¹.
     pub(crate) light: Vec<f32>,
-    /// Share of each pixel that the layer covers.
-    pub(crate) cover: Vec<f32>,
+    /// Alpha: the share of each pixel that the layer covers.
+    pub(crate) alpha: Vec<f32>,
 }
 
 impl Sampler {
-    /// Returns the sampler that takes as many samples a pixel as the scene has at the axis.
-    pub(crate) fn new(view: View, frame: FilmFrame, map: &FilmMap) -> Self {
+    /// Returns the sampler that takes as many samples a pixel as the scene has at the axis, at most `most` each way.
+    pub(crate) fn new(view: View, frame: FilmFrame, map: &FilmMap, most: usize) -> Self {
         let tan_per_px = map.tan_per_mm(frame.pitch_mm()) * frame.pitch_mm();
         let scene_per_film = view.focal_px * tan_per_px;
         // A quarter finer than the film does no harm.
-        let per_pixel = (scene_per_film - 0.25).ceil().clamp(1.0, 16.0) as usize;
+        let per_pixel = (scene_per_film - 0.25).ceil().clamp(1.0, most as f64) as usize;
         Self { view, frame, per_pixel, scene_per_film }
     }
 
@@ -79,17 +79,17 @@ impl Sampler {
         ideal: &mut IdealLayer,
         cancel: &Cancel,
     ) -> Result<bool, Cancelled> {
-        let IdealLayer { light, cover } = ideal;
+        let IdealLayer { light, alpha } = ideal;
         light.clear();
-        cover.clear();
+        alpha.clear();
         let n = self.per_pixel;
         let share = 1.0 / (n * n) as f32;
         let layer = layer as f32;
         let mut total = 0.0;
         for row in 0..rectangle.rows {
-            cancel.check()?;
             for column in 0..rectangle.columns {
-                let (mut pixel_light, mut pixel_cover) = (0.0, 0.0);
+                cancel.check()?;
+                let (mut pixel_light, mut pixel_alpha) = (0.0, 0.0);
                 for part in 0..n * n {
                     let offset = |k: usize| (k as f64 + 0.5) / n as f64 - 0.5;
                     let place_mm = self.frame.place_mm(
@@ -101,12 +101,12 @@ impl Sampler {
                     for surface in surfaces {
                         let (l, c) = at(surface, v, u, layer);
                         pixel_light += l * gain as f32;
-                        pixel_cover += c;
+                        pixel_alpha += c;
                     }
                 }
                 light.push(pixel_light * share);
-                cover.push(pixel_cover * share);
-                total += pixel_cover;
+                alpha.push(pixel_alpha * share);
+                total += pixel_alpha;
             }
         }
         Ok(total > 0.0)
@@ -116,7 +116,7 @@ impl Sampler {
 /// Returns radiance × weight and weight of a layer between the samples of a surface.
 #[inline]
 fn at(surface: &Surface<'_>, row: f64, column: f64, layer: f32) -> (f32, f32) {
-    let (rows, columns) = surface.places.dim();
+    let (rows, columns) = surface.layer_coordinates.dim();
     let (last_row, last_column) = ((rows - 1) as f64, (columns - 1) as f64);
     let is_inside = row >= -0.5 && column >= -0.5 && row <= last_row + 0.5 && column <= last_column + 0.5;
     let (row, column) = (row.clamp(0.0, last_row), column.clamp(0.0, last_column));
@@ -129,11 +129,11 @@ fn at(surface: &Surface<'_>, row: f64, column: f64, layer: f32) -> (f32, f32) {
         (bottom, left, down * (1.0 - across)),
         (bottom, right, down * across),
     ];
-    let (mut light, mut cover) = (0.0, 0.0);
+    let (mut light, mut alpha) = (0.0, 0.0);
     for (r, c, share) in corners {
-        let weight = share * tent(surface.places[(r, c)], layer);
+        let weight = share * tent(surface.layer_coordinates[(r, c)], layer);
         light += weight * surface.radiance[(r, c)];
-        cover += weight;
+        alpha += weight;
     }
-    if is_inside { (light, cover) } else { (0.0, cover) }
+    if is_inside { (light, alpha) } else { (0.0, alpha) }
 }

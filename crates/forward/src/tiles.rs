@@ -18,6 +18,7 @@ use crate::{
     geometry::FilmFrame,
     knot_kernels::{KnotKernel, LayerKernels, Symmetry, edge_spread_peak},
     layers::Layers,
+    raster::LayerRaster,
     sampler::Sampler,
     stopwatch::{Part, Stopwatch},
     work::Work,
@@ -91,7 +92,7 @@ impl Cell {
         self.size / 2 >= SMALLEST && self.size.is_multiple_of(4)
     }
 
-    /// The row and column of the first pixel whose centre lies in the cell.
+    /// The row and column of the first pixel whose center lies in the cell.
     pub(crate) fn first_pixel(&self, frame: &FilmFrame) -> (i64, i64) {
         let (center_row, center_column) = frame.center();
         let size = self.size as f64;
@@ -101,7 +102,7 @@ impl Cell {
         )
     }
 
-    /// Returns how far a pixel's centre lies below and to the right of the middle, in parts of the cell.
+    /// Returns how far a pixel's center lies below and to the right of the middle, in parts of the cell.
     pub(crate) fn place_of(&self, frame: &FilmFrame, row: i64, column: i64) -> (f64, f64) {
         let (center_row, center_column) = frame.center();
         let size = self.size as f64;
@@ -216,7 +217,8 @@ fn around(cell: &Cell) -> impl Iterator<Item = (Cell, [usize; 2])> {
 /// A lens at one wavelength, its maps and kernels on the film.
 pub(crate) struct FilmLens<'a> {
     pub(crate) image: &'a dyn LensImage,
-    pub(crate) film: &'a Film,
+    /// Of each layer.
+    pub(crate) rasters: &'a [LayerRaster],
     pub(crate) layers: &'a Layers,
     /// Of each layer.
     pub(crate) maps: &'a [FilmMap],
@@ -226,7 +228,7 @@ pub(crate) struct FilmLens<'a> {
 
 impl FilmLens<'_> {
     fn kernel(&self, layer: usize, knot: Knot) -> KnotKernel {
-        let pitch_um = self.film.pitch_um;
+        let pitch_um = self.rasters[layer].film.pitch_um;
         let field_tan = knot.field_tan(&self.maps[layer], 1e-3 * pitch_um);
         let query = PsfQuery::new(field_tan, self.layers.dioptres()[layer], self.wavelength_nm, pitch_um);
         KnotKernel::new(&self.image.kernel(query).samples)
@@ -349,11 +351,11 @@ impl Probe<'_> {
                     work.check()?;
                     let difference = spline_error(&known, cell.knot(), weights);
                     let edge_error = edge_spread_peak(&difference.samples, difference.width);
-                    Ok((edge_error / max_edge_error).max(shading_error(&difference, cell.size) / MAX_SHADING_ERROR))
+                    Ok(edge_error.max(shading_error(&difference, cell.size) / SHADING_PER_EDGE_ERROR))
                 })
                 .collect::<Result<_, Cancelled>>()?;
             self.kernels = known.into_kernels();
-            let too_coarse = candidates.iter().zip(errors).filter(|(_, error)| *error > 1.0);
+            let too_coarse = candidates.iter().zip(errors).filter(|(_, error)| *error > max_edge_error);
             let added: Vec<Cell> = too_coarse.flat_map(|(cell, _)| cell.children()).collect();
             mesh.added.extend(added.iter().copied());
             candidates = added.into_iter().filter(Cell::is_divisible).collect();
@@ -363,8 +365,9 @@ impl Probe<'_> {
     }
 }
 
-/// Largest relative error of the irradiance of a uniform plane that a spline may cause where knots can be added.
-const MAX_SHADING_ERROR: f64 = 1e-3;
+/// The largest relative error of the irradiance of a uniform plane that a spline may cause where knots can be added, as a part
+/// of the largest error of edges: .1 % by default.
+const SHADING_PER_EDGE_ERROR: f64 = 0.1;
 
 /// Returns the kernel at a knot less that of a spline.
 fn spline_error(kernels: &LayerKernels, knot: Knot, spline: &Weights) -> KnotKernel {

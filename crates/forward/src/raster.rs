@@ -1,0 +1,43 @@
+//! The raster on which a layer is imaged: the film's, or a coarser one where the blur is wide.
+
+use dioptric_psf::FilmMap;
+use dioptric_scene::View;
+
+use crate::{Film, geometry::FilmFrame, sampler::Sampler};
+
+/// Blur radius, in pixels of the film, from which a layer is imaged on a coarser raster.
+const WIDE_PX: f64 = 64.0;
+
+/// The most samples of the scene a pixel of the film, each way.
+const MOST_SAMPLES: usize = 16;
+
+/// The same of a coarser raster: a blur holds thousands of its pixels, over which what is missed averages out.
+const MOST_SAMPLES_OF_WIDE: usize = 8;
+
+/// The pixels on which a layer is imaged; they have the film's axis in their middle.
+pub(crate) struct LayerRaster {
+    /// Pixels of the film along a side of a pixel of this raster: a power of two.
+    pub(crate) factor: usize,
+    pub(crate) film: Film,
+    pub(crate) sampler: Sampler,
+}
+
+impl LayerRaster {
+    /// Returns the factor for a blur: 1, or that with which its radius is 32 to 64 pixels.
+    pub(crate) fn factor_for(blur_px: f64) -> usize {
+        let mut factor = 1;
+        while blur_px > WIDE_PX * factor as f64 {
+            factor *= 2;
+        }
+        factor
+    }
+
+    /// Returns the raster of pixels `factor` times as wide as the film's, which reaches beyond its edges.
+    pub(crate) fn new(film: &Film, factor: usize, view: View, map: &FilmMap) -> Self {
+        let n = |n: usize| if factor == 1 { n } else { n.div_ceil(factor) + 2 };
+        let coarse = Film { rows: n(film.rows), columns: n(film.columns), pitch_um: factor as f64 * film.pitch_um };
+        let most = if factor == 1 { MOST_SAMPLES } else { MOST_SAMPLES_OF_WIDE };
+        let sampler = Sampler::new(view, FilmFrame::new(&coarse), map, most);
+        Self { factor, film: coarse, sampler }
+    }
+}
