@@ -406,7 +406,7 @@ mod tests {
         assert_eq!(Illuminant::parse("fl2").unwrap(), Illuminant::Fl2);
         for (text, word) in [
             ("-3K", "500 to"),
-            ("nanK", "D65"),
+            ("nanK", "25000 K"),
             ("30000K", "25000 K"),
             ("0.9,0.3", "whitish"),
             ("0,0.3", "whitish"),
