@@ -5,7 +5,7 @@
 //! for parallel planes cos⁴θ A/z². L is the radiance along the ray that leaves the lens, 0 where the lens blocks it;
 //! along a ray L/n² stays the same.
 
-use dioptric_diffraction::{Edge, Hurb, Spread};
+use dioptric_diffraction::{CircularStop, Hurb, AngularSpread};
 use dioptric_optics::{
     ExitPupilBounds, Lens, PupilReach, RayBatch, RayBatchF32, ReversedLens, Vignetting,
     glam::{DVec2, DVec3, Vec3},
@@ -262,14 +262,14 @@ fn is_achromatic(lens: &Lens, wavelengths_nm: &[f64]) -> Result<bool, BackwardEr
 /// The pair of normal numbers of a sample is the same for all its wavelengths.
 fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, samples: &[PixelSample]) {
     let forward = lens.forward();
-    let edge = Edge::new(forward.stop_semi_aperture_mm(), forward.wavelength_nm(), forward.stop_medium_index());
+    let edge = CircularStop::new(forward.stop_semi_aperture_mm(), forward.wavelength_nm(), forward.stop_medium_index());
     let pose = lens.stop_pose();
     let to_own = pose.rotation.transpose();
     for (i, sample) in samples.iter().enumerate().filter(|(i, _)| rays.fate[*i].is_in_flight()).collect::<Vec<_>>() {
         let point_mm = pose.to_own(Vec3::new(rays.x_mm[i], rays.y_mm[i], rays.z_mm[i]).as_dvec3()).truncate();
         let before = to_own * Vec3::new(rays.l[i], rays.m[i], rays.n[i]).as_dvec3();
         let r_mm = point_mm.length();
-        let Spread { radial, across } = model.spread(r_mm, edge);
+        let AngularSpread { radial, across } = model.spread(r_mm, edge);
         let axis = if r_mm > 0.0 { point_mm / r_mm } else { DVec2::X };
         // Draw again where the ray would be turned back, which only those within a wavelength of the edge can be.
         let drawn = (0..REDRAWS).find_map(|pair| {
