@@ -1,5 +1,6 @@
 //! The files of a run: irradiance, frames, picture, `report.json` and a self-contained `report.html`.
 
+mod html;
 mod page;
 
 use std::path::Path;
@@ -38,7 +39,7 @@ pub fn write_run(
     write_json(&folder.join("report.json"), &report)?;
     let places = RunPlaces::of(shot, capture);
     let charts = RunCharts::of(shot, capture, &places, &report.sensor);
-    let page = page::Page { shot, capture, report: &report, places: &places, charts: &charts, picture_png: &png };
+    let page = html::Page { shot, capture, report: &report, places: &places, charts: &charts, picture_png: &png };
     write_file(&folder.join("report.html"), page::render(&page)?.as_bytes())?;
     Ok(report)
 }
