@@ -9,7 +9,7 @@ const TURN_DEG: f64 = 30.0;
 const TILT_DEG: f64 = 28.0;
 /// Pixels of the box's base and height for each pixel of the drawing's width.
 const BASE: f64 = 0.46;
-const TALL: f64 = 0.42;
+const TALL: f64 = 0.38;
 /// Viridis of matplotlib (CC0): dark violet to yellow, of even steps in lightness, told apart by the color-blind.
 const COLORS: [[u8; 3]; 11] = [
     [0x44, 0x01, 0x54],
@@ -98,7 +98,7 @@ impl View {
         let ends = |values: &[f64]| (values.first().copied().unwrap_or(0.0), values.last().copied().unwrap_or(1.0));
         Self {
             ranges: [ends(mesh.x), ends(mesh.y), (0.0, mesh.highest)],
-            middle: (0.53 * width, 0.665 * height),
+            middle: (0.53 * width, 0.68 * height),
             base_px: BASE * width,
             tall_px: TALL * width,
         }
@@ -114,6 +114,12 @@ impl View {
         (self.middle.0 + right * self.base_px, self.middle.1 - up)
     }
 
+    /// Returns round numbers along an axis and how to write them.
+    fn ticks(&self, i: usize) -> Vec<(f64, String)> {
+        // Numbers above each other need less room than those side by side.
+        ticks(self.ranges[i], if i == 2 { 1.3 * self.tall_px } else { self.base_px })
+    }
+
     /// Returns a line through places as the data of a path.
     fn line(&self, places: &[[f64; 3]]) -> String {
         let points: Vec<String> =
@@ -124,7 +130,7 @@ impl View {
     /// Draws base, back walls and the lines of round numbers on them, all of which the surface hides.
     fn draw_walls(&self, svg: &mut String) {
         let [x, y, z] = self.ranges;
-        let at = |i: usize| ticks(self.ranges[i], self.base_px).into_iter().map(|(value, _)| value);
+        let at = |i: usize| self.ticks(i).into_iter().map(|(value, _)| value);
         let mut grid = String::new();
         for value in at(0) {
             grid += &self.line(&[[value, y.0, z.0], [value, y.1, z.0], [value, y.1, z.1]]);
@@ -163,17 +169,17 @@ impl View {
             format!(" font-size=\"12\" transform=\"rotate({degrees:.1} {:.1} {:.1})\"", at.0, at.1)
         };
         let middle = |range: (f64, f64)| 0.5 * (range.0 + range.1);
-        for (value, word) in ticks(x, self.base_px) {
+        for (value, word) in self.ticks(0) {
             text(beside(self.place([value, y.0, z.0]), -4.0, 15.0), "end", "", &word);
         }
-        let at = beside(self.place([middle(x), y.0, z.0]), -28.0, 42.0);
+        let at = beside(self.place([middle(x), y.0, z.0]), -20.0, 42.0);
         text(at, "middle", &turned([x.0, y.0, z.0], [x.1, y.0, z.0], at), labels[0]);
-        for (value, word) in ticks(y, self.base_px) {
+        for (value, word) in self.ticks(1) {
             text(beside(self.place([x.1, value, z.0]), 6.0, 12.0), "start", "", &word);
         }
         let at = beside(self.place([x.1, middle(y), z.0]), 38.0, 34.0);
         text(at, "middle", &turned([x.1, y.0, z.0], [x.1, y.1, z.0], at), labels[1]);
-        for (value, word) in ticks(z, self.tall_px) {
+        for (value, word) in self.ticks(2) {
             text(beside(self.place([x.0, y.0, value]), -7.0, 4.0), "end", "", &word);
         }
         let at = beside(self.place([x.0, y.0, middle(z)]), -40.0, 0.0);

@@ -1,9 +1,9 @@
-//! Charts and panels look as they did: small golden drawings in `fixtures/golden/report`, to be opened in a browser.
+//! Charts and lens drawings look as they did: small golden drawings in `fixtures/golden/report`, to be opened in a browser.
 
-use dioptric_analysis::{AnalysisFields, AnalysisFilm, AnalysisRequest, Corner, LineChart, Scale, Series};
+use dioptric_analysis::{Corner, LineChart, Scale, Series};
 use dioptric_golden::check_svg;
 use dioptric_optics::Lens;
-use dioptric_report::{AnalysisPlots, LensDrawing, chart_svg};
+use dioptric_report::{LensDrawing, chart_svg};
 
 /// Drawings state places to a tenth of a pixel, which may round to the other side.
 const ROUNDING_PX: f64 = 0.11;
@@ -72,18 +72,4 @@ fn drawn_lens_is_the_golden_one() {
         LensDrawing { fields_deg: vec![0.0, 3.0], distance_mm: 2000.0, wavelengths_nm: vec![550.0], film_mm: None };
     let svg = drawing.to_svg(&Lens::built_in("paper-2el").unwrap()).unwrap();
     check_svg("report/lens.svg", &svg, ROUNDING_PX);
-}
-
-#[test]
-fn distortion_grid_is_the_golden_one() {
-    let request = AnalysisRequest {
-        fields: AnalysisFields::above_axis_deg(&[0.0, 10.0]),
-        wavelengths_nm: vec![550.0],
-        main_wavelength_nm: None,
-        distance_mm: f64::INFINITY,
-        film: AnalysisFilm::BestFocus,
-        n_rings: 3,
-    };
-    let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
-    check_svg("report/distortion.svg", &AnalysisPlots(&request.compute(&lens).unwrap()).grid_svg(), ROUNDING_PX);
 }
