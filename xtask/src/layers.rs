@@ -7,7 +7,8 @@ use cargo_metadata::{DependencyKind, MetadataCommand};
 ///
 /// A crate may use those named, and they must stand above it in the table.
 const LAYERS: &[(&str, &[&str])] = &[
-    ("golden", &[]),
+    ("golden-macros", &[]),
+    ("golden", &["golden-macros"]),
     ("spectrum", &[]),
     ("optics", &["spectrum"]),
     ("diffraction", &["spectrum", "optics"]),

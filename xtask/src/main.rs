@@ -1,18 +1,22 @@
-//! Project chores: `cargo xtask layers`, `cargo xtask figures [--out DIR]`.
+//! Project chores: `cargo xtask layers`, `modules`, `packages`, `figures [--out DIR]`.
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool talks to its user")]
 
 mod figures;
 mod layers;
+mod modules;
+mod packages;
 
 use std::{path::Path, process::ExitCode};
 
-const USAGE: &str = "usage: cargo xtask layers | figures [--out DIR]";
+const USAGE: &str = "usage: cargo xtask layers | modules | packages | figures [--out DIR]";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["layers"] => layers::run(),
+        ["modules"] => modules::run(),
+        ["packages"] => packages::run(),
         ["figures"] => figures::run(Path::new("docs/figures")),
         ["figures", "--out", folder] => figures::run(Path::new(folder)),
         _ => Err(anyhow::anyhow!(USAGE)),

@@ -5,7 +5,7 @@
 //! for parallel planes cos⁴θ A/z². L is the radiance along the ray that leaves the lens, 0 where the lens blocks it;
 //! along a ray L/n² stays the same.
 
-use dioptric_diffraction::{CircularStop, Hurb, AngularSpread};
+use dioptric_diffraction::{AngularSpread, CircularStop, Hurb};
 use dioptric_optics::{
     ExitPupilBounds, Lens, PupilReach, RayBatch, RayBatchF32, ReversedLens, Vignetting,
     glam::{DVec2, DVec3, Vec3},

@@ -5,13 +5,13 @@ use std::{fmt::Write, fs};
 use anyhow::Context;
 use dioptric_analysis::{AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensUse};
 use dioptric_pipeline::{Staged, StopChoice, parse_numbers, parse_pairs};
-use dioptric_report::{AnalysisPlots, svg_to_png};
+use dioptric_report::{AnalysisPlots, DRAWS_PNG, write_drawing};
 
 use crate::{
     args::Common,
     lens::{list_of, open, tell_taken},
     lens_args::LensAnalyzeArgs,
-    terminal::{Bar, fixed, guarded, print, print_json, remark},
+    terminal::{Bar, fixed, guarded, print, print_json, remark, remark_on_png},
 };
 
 /// Pixels of the plots as PNG for each of the drawing's own.
@@ -41,19 +41,19 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
             ("opd", plots.opd_svg()),
             ("distortion", plots.grid_svg()),
         ] {
-            let png = svg_to_png(&svg, PNG_SCALE)?;
-            fs::write(staged.path().join(format!("{name}.svg")), svg).with_context(cannot)?;
-            fs::write(staged.path().join(format!("{name}.png")), png).with_context(cannot)?;
+            write_drawing(&svg, staged.path(), name, PNG_SCALE)?;
         }
         fs::write(staged.path().join("analysis.html"), plots.html(&tables(&analysis)?)).with_context(cannot)?;
         staged.commit()?;
         remark(
             common.quiet,
             &format!(
-                "wrote analysis.json, analysis.html, and analysis, spots, opd and distortion as .svg and .png, in {}",
+                "wrote analysis.json, analysis.html, and analysis, spots, opd and distortion as {}, in {}",
+                if DRAWS_PNG { ".svg and .png" } else { ".svg" },
                 path.display()
             ),
         );
+        remark_on_png(common.quiet);
     }
     if common.json { print_json(&analysis) } else { print(&tables(&analysis)?) }
 }

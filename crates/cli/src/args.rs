@@ -306,7 +306,7 @@ pub(crate) struct PsfArgs {
     #[arg(long, value_name = "F")]
     pub(crate) csv: Option<PathBuf>,
     /// Writes plots into this folder: line and edge spread, MTF, encircled and ensquared energy, MTF through focus;
-    /// SVG, PNG and the lines as CSV
+    /// SVG and the lines as CSV; PNG too in a build with the feature png
     #[arg(long, value_name = "DIR")]
     pub(crate) plots: Option<PathBuf>,
     /// Adds a row for the light of all wavelengths together to those of each point

@@ -7,7 +7,7 @@ use dioptric_analysis::{
     LensData, LensQuestion, LensUse, SurfaceRow, built_in_lenses, convert_lens, placement_lines, surface_rows,
 };
 use dioptric_pipeline::{LensReading, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
-use dioptric_report::{LensDrawing, drawing_file};
+use dioptric_report::{LensDrawing, check_drawing_name, drawing_file};
 
 use crate::{
     args::Common,
@@ -200,6 +200,7 @@ fn number(key: &str, value: &serde_json::Value) -> String {
 }
 
 fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
+    check_drawing_name(&arguments.output)?;
     let used = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?;
     let mut taken = Vec::new();
     let wavelengths_nm = match &arguments.wavelengths_nm {

@@ -14,7 +14,7 @@ pub(crate) enum LensCommand {
     Info(LensInfoArgs),
     /// Analyses the lens by real rays: spots, fans, wavefronts, field curvature, distortion, colour, illumination, focus
     Analyze(LensAnalyzeArgs),
-    /// Draws the lens with rays, as SVG or PNG
+    /// Draws the lens with rays, as SVG or, in a build with the feature png, PNG
     Draw(LensDrawArgs),
     /// Writes a lens in another format, chosen by the extension
     Convert {
@@ -133,7 +133,8 @@ pub(crate) struct LensAnalyzeArgs {
     /// Rings of rays in a spot: N of them have 1 + 3N(N + 1) rays
     #[arg(long, value_name = "N", default_value_t = 12)]
     pub(crate) rings: usize,
-    /// Folder for analysis.json, analysis.html and the plots (analysis, spots, opd, distortion) as SVG and PNG
+    /// Folder for analysis.json, analysis.html and the plots (analysis, spots, opd, distortion) as SVG; as PNG too in a
+    /// build with the feature png
     #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }
@@ -145,7 +146,7 @@ pub(crate) struct LensDrawArgs {
     pub(crate) lens: String,
     #[command(flatten)]
     pub(crate) reading: LensReadingArgs,
-    /// File to write, .svg or .png
+    /// File to write: .svg, or .png in a build with the feature png
     #[arg(long, short, visible_alias = "out", value_name = "F")]
     pub(crate) output: PathBuf,
     /// Field angles of the ray fans, degrees [default: those of the lens's file, else 0,10]

@@ -13,7 +13,7 @@ use dioptric_report::write_measurement;
 use crate::{
     args::Common,
     measure_args::{ColourArgs, CurveKind, MeasureCommand, MtfArgs, NoiseArgs, SpotArgs},
-    terminal::{guarded, print, print_json},
+    terminal::{guarded, print, print_json, remark_on_png},
 };
 
 /// The seed where the user gives none.
@@ -133,6 +133,7 @@ impl<'a> Finish<'a> {
         if let Some(staged) = self.staged {
             write_measurement(measured, self.name, staged.path())?;
             staged.commit()?;
+            remark_on_png(self.common.quiet);
         }
         match (self.common.json, self.common.quiet) {
             (true, _) => print_json(measured),

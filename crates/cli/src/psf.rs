@@ -4,14 +4,17 @@ use std::fmt::Write;
 
 use dioptric_analysis::{PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
 use dioptric_pipeline::{BankChoice, FocusChoice, Staged, StopChoice, parse_numbers};
-use dioptric_report::{chart_svg, drawing_file, write_psfs};
+use dioptric_report::{chart_svg, write_drawing, write_psfs};
 
 use crate::{
     args::{BankKind, Common, PsfArgs, PsfMode},
     lens::open,
     run::{diffraction, with_gamma},
-    terminal::{Bar, fixed, guarded, print, print_json, remark},
+    terminal::{Bar, fixed, guarded, print, print_json, remark, remark_on_png},
 };
+
+/// Pixels of a plot as PNG for each of the drawing's own.
+const PNG_SCALE: f64 = 2.0;
 
 /// The seed where the user gives none.
 const SEED: u64 = 1;
@@ -75,14 +78,12 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     if let (Some(staged), Some(folder)) = (plots, &arguments.plots) {
         for (name, chart) in set.charts(&request.through_focus(&lens, &set)?) {
             let svg = chart_svg(&chart, 640.0, 420.0);
-            for extension in ["svg", "png"] {
-                let path = staged.path().join(format!("{name}.{extension}"));
-                std::fs::write(&path, drawing_file(&svg, &path)?)?;
-            }
+            write_drawing(&svg, staged.path(), &name, PNG_SCALE)?;
             std::fs::write(staged.path().join(format!("{name}.csv")), chart.to_csv())?;
         }
         staged.commit()?;
         remark(common.quiet, &format!("wrote plots into {}", folder.display()));
+        remark_on_png(common.quiet);
     }
     if common.json { print_json(&rows) } else { print(&table(&set, &rows)?) }
 }

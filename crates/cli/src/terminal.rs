@@ -11,6 +11,7 @@ use std::{
 };
 
 use dioptric_pipeline::Staged;
+use dioptric_report::{DRAWS_PNG, PNG_REMEDY};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -66,6 +67,13 @@ pub(crate) fn print_error(error: &anyhow::Error) {
 pub(crate) fn remark(quiet: bool, text: &str) {
     if !quiet {
         eprintln!("{text}");
+    }
+}
+
+/// Tells how to get PNG beside SVG drawings, where this build does not write it.
+pub(crate) fn remark_on_png(quiet: bool) {
+    if !DRAWS_PNG {
+        remark(quiet, &format!("note: {PNG_REMEDY}"));
     }
 }
 

@@ -165,6 +165,12 @@ fn a_place_that_cannot_be_written_to_is_named_before_the_work() {
     check_error(folder.path(), &["run", "camera.ron", "--out", "file"], &["cannot write file"]);
     check_error(folder.path(), &["run", "camera.ron", "--out", "file/out"], &["cannot write file/out"]);
     check_error(folder.path(), &["lens", "draw", "dgauss-50mm", "-o", "file/lens.svg"], &["cannot write"]);
+    let png = ["lens", "draw", "dgauss-50mm", "-o", "lens.png"];
+    if cfg!(feature = "png") {
+        output(folder.path(), &png);
+    } else {
+        check_error(folder.path(), &png, &["lens.png", "--features png"]);
+    }
     let psf = ["psf", "dgauss-50mm", "--focus-mm", "2000", "-o", "file/psf.exr"];
     check_error(folder.path(), &psf, &["cannot write"]);
 }

@@ -13,7 +13,7 @@ fn json(path: &str) -> Option<Value> {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn named_glasses_of_the_reference_lenses_have_their_index_to_1e_15() {
     let mut n_checked = 0;
     for lens in REFERENCE_LENSES {
@@ -41,7 +41,7 @@ fn named_glasses_of_the_reference_lenses_have_their_index_to_1e_15() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn every_glass_has_the_index_and_abbe_number_of_its_source() {
     let Some(file) = json("data/glass/glass_subset.json") else { return };
     let glasses = file["glasses"].as_array().unwrap();

@@ -21,7 +21,7 @@ fn check(name: &str, n_surfaces: usize, stop: usize, efl_mm: f64, bfl_mm: f64) {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn lenses_of_iset_have_their_published_focal_lengths() {
     check("2el.XXdeg.50mm.dat", 3, 1, 51.997, 51.080);
     check("2el.XXdeg.50mm.json", 3, 1, 51.997, 51.080);
@@ -34,7 +34,7 @@ fn lenses_of_iset_have_their_published_focal_lengths() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn cooke_triplet_of_iset_and_the_spectral_double_gauss_load() {
     let Some(file) = read("cooke40deg-zemax.json") else { return };
     let lens = file.unwrap().lens;
@@ -51,7 +51,7 @@ fn cooke_triplet_of_iset_and_the_spectral_double_gauss_load() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn lenses_of_deeplens_load_with_their_film() {
     let Some(file) = read("deeplens_ef50mm_f1.8.json") else { return };
     let file = file.unwrap();
@@ -72,7 +72,7 @@ fn lenses_of_deeplens_load_with_their_film() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn zemax_triplet_loads_as_wide_as_its_pupil_and_fields_need() {
     let Some(file) = read("optiland_lens1.zmx") else { return };
     let file = file.unwrap();
@@ -86,7 +86,7 @@ fn zemax_triplet_loads_as_wide_as_its_pupil_and_fields_need() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn code_v_lenses_load() {
     let Some(file) = read("optiland_cooke_triplet.seq") else { return };
     let file = file.unwrap();
@@ -109,7 +109,7 @@ fn code_v_lenses_load() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn agf_catalogue_has_the_index_of_the_built_in_glass() {
     let Some(path) = dioptric_golden::shared("data/lenses/tiny_schott.agf") else { return };
     let catalogue = GlassCatalogue::read(&path).unwrap();

@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    #[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+    #[dioptric_golden::needs_shared]
     fn figure_3_has_the_authors_rms_radii() {
         let Some(rows) = table("reference/paper/fig3_2El_D4_onaxis_rms.csv") else { return };
         assert_eq!(rows.len(), 62);
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    #[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+    #[dioptric_golden::needs_shared]
     fn the_stored_array_has_the_authors_moments() {
         let Some(rows) = table("reference/paper/psfstructure_2El_10mmAp_moments.csv") else { return };
         assert_eq!(rows.len(), 80);
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    #[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+    #[dioptric_golden::needs_shared]
     fn figure_2_has_the_authors_widths() {
         let Some(rows) = table("reference/paper/fig2_hurb_lsf.csv") else { return };
         assert_eq!(rows.len(), 93);

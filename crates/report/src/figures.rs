@@ -1,14 +1,11 @@
 //! The figures as pictures and drawings.
 
 use dioptric_diffraction::Hurb;
+use dioptric_psf::Profile;
 use dioptric_spectrum::WavelengthGrid;
 use image::{Rgb, RgbImage, imageops};
-use kuva::{
-    plot::surface3d::Surface3DPlot,
-    prelude::{ColorMap, Layout, Plot, render_to_svg},
-};
 
-use crate::{plots::FONT, png::enlarged, png::png_bytes};
+use crate::{mesh::Mesh, png::enlarged, png::png_bytes};
 use dioptric_pipeline::{
     PipelineError,
     display::{LinearRgb, SpectrumToRgb},
@@ -96,37 +93,23 @@ fn meshes<const N: usize>(surfaces: [&Surface; N]) -> String {
     const HEIGHT: f64 = 470.0;
     let last = surfaces[N - 1];
     let peak = last.profiles.iter().flat_map(|p| &p.values).copied().fold(0.0, f64::max);
-    let drawn = surfaces.map(|surface| {
-        let heights = surface.profiles.iter().map(|p| p.values.iter().map(|v| v / peak).collect()).collect();
-        let plot = Surface3DPlot::new(heights)
-            .with_x_coords(surface.profiles[0].at_um.clone())
-            .with_y_coords(surface.wavelengths_nm.clone())
-            .with_z_colormap(ColorMap::Viridis)
-            .with_wireframe_color("#00000066")
-            .with_wireframe_width(0.4)
-            .with_azimuth(-60.0)
-            .with_elevation(28.0)
-            .with_x_label("place, µm")
-            .with_y_label("wavelength, nm")
-            .with_z_label("relative irradiance");
-        let plots = vec![Plot::Surface3D(plot)];
-        let layout = Layout::auto_from_plots(&plots)
-            .with_width(WIDTH)
-            .with_height(HEIGHT)
-            .with_title(surface.name)
-            .with_font_family(FONT);
-        render_to_svg(plots, layout)
-    });
-    let part = |(i, svg): (usize, &String)| {
-        let (x, y) = ((i % 2) as f64 * WIDTH, (i / 2) as f64 * HEIGHT);
-        let svg = &svg[svg.find("<svg ").unwrap_or(0)..];
-        svg.replacen("<svg ", &format!("<svg x=\"{x}\" y=\"{y}\" "), 1)
+    let part = |(i, surface): (usize, &Surface)| {
+        let over_peak = |profile: &Profile| profile.values.iter().map(|v| v / peak).collect();
+        let heights: Vec<Vec<f64>> = surface.profiles.iter().map(over_peak).collect();
+        let mesh = Mesh {
+            title: surface.name,
+            labels: ["place, µm", "wavelength, nm", "relative irradiance"],
+            x: &surface.profiles[0].at_um,
+            y: &surface.wavelengths_nm,
+            highest: heights.iter().flatten().copied().fold(1.0, f64::max),
+            heights,
+        };
+        mesh.to_svg([(i % 2) as f64 * WIDTH, (i / 2) as f64 * HEIGHT, WIDTH, HEIGHT])
     };
     let (width, height) = (2.0 * WIDTH, N.div_ceil(2) as f64 * HEIGHT);
-    let parts: Vec<String> = drawn.iter().enumerate().map(part).collect();
+    let parts: String = surfaces.into_iter().enumerate().map(part).collect();
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n{}\n</svg>\n",
-        parts.join("\n")
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n{parts}</svg>\n"
     )
 }
 

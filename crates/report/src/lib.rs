@@ -4,20 +4,27 @@
 //! paper's figures, and the page of a run. A program that shows data in its own way does without it.
 #![doc = include_str!("../README.md")]
 
+mod axis;
+mod drawing_file;
 mod figures;
 mod lens;
+mod lettering;
 mod measurement;
+mod mesh;
 mod panel;
 mod plots;
 mod png;
 mod psf;
 mod run;
+#[cfg(feature = "png")]
 mod svg_png;
 
+pub use drawing_file::{DRAWS_PNG, PNG_REMEDY, check_drawing_name, drawing_file, write_drawing};
 pub use figures::{Drawing, draw_all};
 pub use lens::{AnalysisPlots, LensDrawing};
 pub use measurement::write_measurement;
 pub use plots::chart_svg;
 pub use psf::{MosaicPlan, PsfMosaic, psf_mosaic, write_psfs};
 pub use run::{write_run, write_sensed};
-pub use svg_png::{drawing_file, svg_to_png};
+#[cfg(feature = "png")]
+pub use svg_png::svg_to_png;

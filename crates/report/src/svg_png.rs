@@ -1,9 +1,6 @@
-//! SVG drawings as PNG pictures, and as the file that a name asks for.
+//! SVG drawings as PNG pictures.
 
-use std::{
-    path::Path,
-    sync::{Arc, LazyLock},
-};
+use std::sync::{Arc, LazyLock};
 
 use resvg::{
     tiny_skia::{Color, Pixmap, Transform},
@@ -12,8 +9,6 @@ use resvg::{
 
 use dioptric_pipeline::PipelineError;
 
-/// Pixels of a PNG file for each of the drawing's own.
-const FILE_SCALE: f64 = 2.0;
 /// The longest side of a picture, pixels.
 const LONGEST_PX: f64 = 20_000.0;
 
@@ -50,23 +45,6 @@ pub fn svg_to_png(svg: &str, scale: f64) -> Result<Vec<u8>, PipelineError> {
     pixels.encode_png().map_err(|e| cannot(e.to_string()))
 }
 
-/// Returns what to write to `target` for a drawing: the SVG itself, or a PNG of twice its size, by the name's
-/// extension.
-///
-/// # Errors
-/// When the extension is neither, or the PNG cannot be made.
-pub fn drawing_file(svg: &str, target: &Path) -> Result<Vec<u8>, PipelineError> {
-    let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    match extension.as_str() {
-        "svg" => Ok(svg.as_bytes().to_vec()),
-        "png" => svg_to_png(svg, FILE_SCALE),
-        _ => Err(PipelineError::Write {
-            path: target.to_owned(),
-            reason: format!("'.{extension}' is no format of drawings here; expected .svg or .png"),
-        }),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -87,7 +65,7 @@ mod tests {
 
     #[test]
     fn words_are_drawn_in_any_font_that_is_asked_for() {
-        for font in ["Helvetica, Arial, sans-serif", "system-ui", crate::plots::FONT] {
+        for font in ["Helvetica, Arial, sans-serif", "system-ui", crate::lettering::FONT] {
             let svg = format!(
                 "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"90\" height=\"30\">\
                  <text x=\"5\" y=\"22\" font-size=\"18\" font-family=\"{font}\">µm ° λ</text></svg>"
@@ -104,8 +82,5 @@ mod tests {
             let message = svg_to_png(svg, scale).unwrap_err().to_string();
             assert!(message.contains(word), "{message}");
         }
-        let message = drawing_file(SQUARE, Path::new("a.pdf")).unwrap_err().to_string();
-        assert!(message.contains("'.pdf' is no format of drawings here; expected .svg or .png"), "{message}");
-        assert_eq!(drawing_file(SQUARE, Path::new("a.SVG")).unwrap(), SQUARE.as_bytes());
     }
 }

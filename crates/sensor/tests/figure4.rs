@@ -77,7 +77,7 @@ fn exposed(clean: &Array3<f32>, read_noise_v: f64) -> Picture {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn the_grain_of_figure_4_is_that_of_the_authors_picture() {
     let clean = codes("indestructibleObject10mmApProcessed.png");
     let theirs = grain(&codes("indestructibleObject10mmApProcessed_.05ReadNoise.png"), &clean);

@@ -203,7 +203,7 @@ fn demosaic_psnr_db(path: &std::path::Path, cfa: &Cfa) -> [f64; 5] {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn the_good_demosaic_beats_bilinear_by_three_decibels() {
     for name in ["cave_chart_and_stuffed_toy", "cave_stuffed_toys_256"] {
         let path = dioptric_golden::shared(&format!("data/scenes/{name}.reflectance.exr")).unwrap();
@@ -218,7 +218,7 @@ fn the_good_demosaic_beats_bilinear_by_three_decibels() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn other_mosaics_gain_from_detail() {
     let path = dioptric_golden::shared("data/scenes/cave_stuffed_toys_256.reflectance.exr").unwrap();
     let quad = Cfa::two_by_two("RGGB").unwrap().repeated(2);
@@ -243,7 +243,7 @@ fn noisy_psnr_db(path: &std::path::Path, strength: f64) -> f64 {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn denoising_brings_a_noisy_picture_nearer_to_the_clean_one() {
     for name in ["cave_chart_and_stuffed_toy", "cave_stuffed_toys_256"] {
         let path = dioptric_golden::shared(&format!("data/scenes/{name}.reflectance.exr")).unwrap();

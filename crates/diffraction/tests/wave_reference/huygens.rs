@@ -146,7 +146,7 @@ fn images_in_a_medium() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn every_reference_lens() {
     for name in NAMES {
         let (Some(reference), Some(psf)) = (Reference::open(name), json(&format!("{name}.psf"))) else { return };

@@ -9,7 +9,7 @@ use crate::{
 };
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn wavefronts_agree_with_fifty_digits() {
     for name in NAMES {
         let Some(reference) = Reference::open(name) else { return };

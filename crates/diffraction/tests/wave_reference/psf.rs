@@ -177,7 +177,7 @@ fn trusted_rows() -> Vec<(Reference, f64, Vec<Value>)> {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn sums_over_the_same_pupil_agree_on_and_off_axis() {
     let (mut n_compared, mut n_too_coarse) = (0, 0);
     for (reference, film_mm, rows) in trusted_rows() {
@@ -217,7 +217,7 @@ fn sums_over_the_same_pupil_agree_on_and_off_axis() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn psfs_of_the_vignetted_pupil_agree_on_axis() {
     let mut n_compared = 0;
     for (reference, film_mm, rows) in trusted_rows() {

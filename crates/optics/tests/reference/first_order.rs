@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::reader::{NAMES, json, lens, number};
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn first_order_data_agree_to_twelve_digits() {
     for name in NAMES {
         let Some(file) = json(name) else { return };
@@ -53,7 +53,7 @@ fn first_order_data_agree_to_twelve_digits() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn focus_shifts_with_wavelength_as_published() {
     for name in NAMES {
         let Some(file) = json(name) else { return };

@@ -5,7 +5,7 @@ use dioptric_optics::{C_LINE_NM, D_LINE_NM, F_LINE_NM};
 use crate::reader::{NAMES, glass, json, number};
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn indices_agree_to_rounding() {
     for name in NAMES {
         let Some(file) = json(name) else { return };

@@ -66,7 +66,7 @@ fn is_at_a_rim(lens: &Lens, row: &Value) -> bool {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn rays_agree_with_fifty_digits_on_every_surface() {
     for name in NAMES {
         let (Some(file), Some(rays)) = (json(name), json(&format!("{name}.rays"))) else { return };

@@ -9,7 +9,7 @@ fn list(sums: &SeidelSums) -> [f64; 7] {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn seidel_sums_agree_surface_by_surface() {
     for name in NAMES {
         let Some(file) = json(name) else { return };

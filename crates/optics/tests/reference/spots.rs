@@ -52,7 +52,7 @@ fn compare(name: &str, spot: &SpotDiagram, expected: &Value) -> f64 {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn spots_agree_with_the_reference_to_nine_digits() {
     for name in NAMES {
         let Some(file) = json(name) else { return };

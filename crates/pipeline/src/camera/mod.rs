@@ -30,7 +30,7 @@ use self::check::Checker;
 use crate::{Outputs, PipelineError};
 
 /// The camera of the built-in demo.
-const DEMO: &str = include_str!("../../../../fixtures/cameras/demo.ron");
+const DEMO: &str = include_str!("../../data/demo.ron");
 
 /// A camera and what stands before it.
 ///

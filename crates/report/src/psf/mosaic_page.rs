@@ -6,9 +6,9 @@ use image::{Rgb, RgbImage, imageops};
 use ndarray::Array2;
 
 use crate::{
-    panel::{Sheet, round_up},
+    axis::round_up,
+    lettering::{Ink, Weight, write},
     png::png_bytes,
-    svg_to_png,
 };
 use dioptric_analysis::{PsfRow, PsfSet};
 use dioptric_pipeline::{PipelineError, display::LinearRgb, display::code, number};
@@ -46,10 +46,9 @@ pub fn psf_mosaic(set: &PsfSet) -> Result<RgbImage, PipelineError> {
     }
     let layout = Layout { tile, n_columns, n_rows: points.len() as u32 };
     let sides_um: Vec<f64> = points.iter().map(|point| row_side_um(set, point.clone())).collect();
-    let png = svg_to_png(&words(set, &layout, &points, &sides_um), 1.0)?;
-    let mut sheet = image::load_from_memory_with_format(&png, image::ImageFormat::Png)
-        .map_err(|e| PipelineError::Png { reason: e.to_string() })?
-        .to_rgb8();
+    let (width, height) = layout.size();
+    let mut sheet = RgbImage::from_pixel(width, height, Rgb([255; 3]));
+    label(&mut sheet, set, &layout, &points, &sides_um);
     for (row, (point, side_um)) in points.iter().zip(&sides_um).enumerate() {
         let side_px = side_um / set.pixel_um;
         for (column, i) in point.clone().enumerate() {
@@ -82,40 +81,52 @@ fn row_side_um(set: &PsfSet, point: Range<usize>) -> f64 {
     (1.1 * widest).max(5.0 * set.pixel_um)
 }
 
-/// Returns everything but the tiles, as SVG.
-fn words(set: &PsfSet, layout: &Layout, points: &[Range<usize>], sides_um: &[f64]) -> String {
-    let mut sheet = Sheet::default();
-    let (ink, soft) = (("#111111", "bold"), ("#555555", "normal"));
+/// Names of points and wavelengths, in black, and what is less to be seen, in gray.
+const NAME: Ink = Ink { em_px: 13.0, weight: Weight::Bold, color: [0x11; 3] };
+const NOTE: Ink = Ink { em_px: 11.0, weight: Weight::Regular, color: [0x55; 3] };
+
+/// Writes everything but the tiles.
+fn label(sheet: &mut RgbImage, set: &PsfSet, layout: &Layout, points: &[Range<usize>], sides_um: &[f64]) {
     let (x0, y0) = layout.corner(0, 0);
     if let Some(point) = points.first() {
         for (column, i) in point.clone().enumerate() {
             let words = format!("{} nm", number(set.rows[i].wavelength_nm));
-            sheet.text((f64::from(layout.corner(0, column).0), f64::from(y0) - 7.0), 13.0, ink, &words);
+            write(sheet, (f64::from(layout.corner(0, column).0), f64::from(y0) - 7.0), &NAME, &words);
         }
         if set.spectral_weights.len() > 1 {
             let x = f64::from(layout.corner(0, set.spectral_weights.len()).0);
-            sheet.text((x, f64::from(y0) - 7.0), 13.0, ink, "all together");
+            write(sheet, (x, f64::from(y0) - 7.0), &NAME, "all together");
         }
     }
     let note = "each tile exposed for its brightest pixel; fields to the right, y up";
-    sheet.text((f64::from(x0), 14.0), 11.0, soft, note);
+    write(sheet, (f64::from(x0), 14.0), &NOTE, note);
     for (row, (point, side_um)) in points.iter().zip(sides_um).enumerate() {
         let first: &PsfRow = &set.rows[point.start];
         let y = f64::from(layout.corner(row, 0).1);
-        sheet.text((8.0, y + 16.0), 13.0, ink, &field(first));
-        sheet.text((8.0, y + 34.0), 13.0, ink, &distance(first.distance_mm));
+        write(sheet, (8.0, y + 16.0), &NAME, &field(first));
+        write(sheet, (8.0, y + 34.0), &NAME, &distance(first.distance_mm));
         if point.clone().all(|i| set.rows[i].is_dark()) {
-            sheet.text((8.0, y + 52.0), 12.0, soft, "dark");
+            write(sheet, (8.0, y + 52.0), &Ink { em_px: 12.0, ..NOTE }, "dark");
             continue;
         }
         let bar_um = round_down(0.45 * side_um);
         let bar_px = bar_um / side_um * f64::from(layout.tile);
-        let below = y + f64::from(layout.tile) + 9.0;
-        sheet.bar((f64::from(x0), below), bar_px);
-        sheet.text((f64::from(x0) + bar_px + 6.0, below + 4.0), 12.0, ink, &length(bar_um));
+        let below = layout.corner(row, 0).1 + layout.tile + 9;
+        draw_bar(sheet, (x0, below), bar_px.round() as u32);
+        let place = (f64::from(x0) + bar_px + 6.0, f64::from(below) + 4.0);
+        write(sheet, place, &Ink { em_px: 12.0, ..NAME }, &length(bar_um));
     }
-    let (width, height) = layout.size();
-    sheet.to_svg(f64::from(width), f64::from(height))
+}
+
+/// Draws a scale from a place to the right: a line of two pixels with an upright one at each end.
+fn draw_bar(sheet: &mut RgbImage, (x, y): (u32, u32), length: u32) {
+    let upright = |x: u32| (x..x + 2).flat_map(move |x| (y - 4..y + 4).map(move |y| (x, y)));
+    let line = (x..x + length).flat_map(|x| [(x, y - 1), (x, y)]);
+    for (x, y) in line.chain(upright(x)).chain(upright((x + length).saturating_sub(2).max(x))) {
+        if let Some(pixel) = sheet.get_pixel_mut_checked(x, y) {
+            *pixel = Rgb(NAME.color);
+        }
+    }
 }
 
 /// Writes the pictures of point spread functions: an EXR with a channel a picture where the path ends in `.exr`, a labelled
@@ -230,6 +241,15 @@ mod tests {
             let mean = resampled(&picture, side, n).mean().unwrap();
             assert_abs_diff_eq!(f64::from(mean) * side * side, 1.5, epsilon = 1e-5);
         }
+    }
+
+    #[test]
+    fn a_bar_has_its_length() {
+        let mut sheet = RgbImage::from_pixel(60, 20, Rgb([255; 3]));
+        draw_bar(&mut sheet, (5, 10), 40);
+        let dark = |y: u32| (0..60).filter(|x| sheet.get_pixel(*x, y).0[0] < 128).collect::<Vec<u32>>();
+        assert_eq!(dark(10), (5..45).collect::<Vec<u32>>());
+        assert_eq!(dark(7), [5, 6, 43, 44]);
     }
 
     #[test]

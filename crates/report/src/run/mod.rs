@@ -1,5 +1,6 @@
 //! The files of a run: irradiance, frames, picture, `report.html` and `report.json`.
 
+mod html;
 mod page;
 
 use std::path::Path;
@@ -36,7 +37,7 @@ pub fn write_run(
     let report = RunReport::new(run, &timings_s(), files)?;
     let places = RunPlaces::of(run);
     let charts = RunCharts::of(run, &places, &report.sensor);
-    let page = page::Page { run, report: &report, places: &places, charts: &charts, picture_png: &png };
+    let page = html::Page { run, report: &report, places: &places, charts: &charts, picture_png: &png };
     write_file(&folder.join("report.html"), page::render(&page)?.as_bytes())?;
     let report = RunReport { timings_s: timings_s(), ..report };
     write_json(&folder.join("report.json"), &report)?;

@@ -1,51 +1,20 @@
-//! The page of the report: a template filled with numbers, drawings and embedded pictures.
+//! The page of the report: what it shows, and its embedded pictures.
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use image::RgbImage;
-use minijinja::{AutoEscape, Environment, Value, context, value::Serde};
 use ndarray::Array2;
-use serde::Serialize;
 
-use crate::{LensDrawing, MosaicPlan, PsfMosaic, chart_svg, png::png_bytes};
-use dioptric_analysis::{LineChart, Run, RunCharts, RunPlaces, RunReport};
+use super::html::{Figure, Page, Pictures, write_page};
+use crate::{LensDrawing, MosaicPlan, PsfMosaic, png::png_bytes};
 use dioptric_pipeline::{
-    BankData, PipelineError, REFERENCE_WAVELENGTH_NM, display::LinearRgb, display::code, display::wavelength_color,
+    PipelineError, REFERENCE_WAVELENGTH_NM, display::LinearRgb, display::code, display::wavelength_color,
 };
 
-const TEMPLATE: &str = include_str!("report.html.j2");
-/// Width and height of a plot, pixels.
-const CHART: (f64, f64) = (560.0, 340.0);
 /// Widest small picture, pixels.
 const THUMBNAIL: usize = 480;
 
-/// Everything that the page shows.
-pub(super) struct Page<'a> {
-    pub(super) run: &'a Run<'a>,
-    pub(super) report: &'a RunReport,
-    pub(super) places: &'a RunPlaces,
-    pub(super) charts: &'a RunCharts,
-    pub(super) picture_png: &'a [u8],
-}
-
-/// A picture in the page with the words below it.
-#[derive(Serialize)]
-struct Figure {
-    src: String,
-    caption: String,
-}
-
 /// Returns the page as HTML.
 pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
-    let mut environment = Environment::new();
-    environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    let wrong = |error: minijinja::Error| PipelineError::Unsuitable {
-        what: "the report's template",
-        reason: error.to_string(),
-    };
-    environment.add_filter("fixed", |value: f64, digits: usize| format!("{value:.digits$}"));
-    environment.add_template("report", TEMPLATE).map_err(wrong)?;
-    let charts = page.charts;
-    let svg = |chart: &LineChart| Value::from_safe_string(chart_svg(chart, CHART.0, CHART.1));
     let drawing = LensDrawing {
         fields_deg: [0.0, 0.7, 1.0]
             .iter()
@@ -55,32 +24,15 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
         wavelengths_nm: vec![REFERENCE_WAVELENGTH_NM],
         film_mm: Some(page.run.capture.place.film_distance_mm),
     };
-    let (mosaic, mosaic_src) = mosaic(page)?;
-    environment
-        .get_template("report")
-        .and_then(|template| {
-            template.render(context! {
-                report => Value::from(Serde(page.report)),
-                settings => page.run.capture.camera.to_ron(),
-                picture => data_uri(page.picture_png),
-                lens_svg => Value::from_safe_string(drawing.to_svg(&page.run.capture.lens.lens).unwrap_or_default()),
-                bank => page.report.psf_bank.as_ref().map(BankData::in_words),
-                mosaic => mosaic_src,
-                mosaic_fields => mosaic.fields_deg,
-                mosaic_depths => mosaic.depths_m,
-                mosaic_tiles_um => mosaic.tiles_um,
-                lsf => svg(&charts.lsf),
-                mtf => svg(&charts.mtf),
-                illumination => svg(&charts.illumination),
-                distortion => svg(&charts.distortion),
-                spectrum => svg(&charts.spectrum),
-                histogram => svg(&charts.histogram),
-                seen => seen(&page.run.capture.irradiance.summary.seen),
-                bands => Value::from(Serde(bands(page))),
-                depth => depth(page),
-            })
-        })
-        .map_err(wrong)
+    let pictures = Pictures {
+        picture: data_uri(page.picture_png),
+        lens_svg: drawing.to_svg(&page.run.capture.lens.lens).unwrap_or_default(),
+        mosaic: mosaic(page)?,
+        seen: seen(&page.run.capture.irradiance.summary.seen),
+        bands: bands(page),
+        depth: depth(page),
+    };
+    Ok(write_page(page, &pictures))
 }
 
 fn data_uri(png: &[u8]) -> String {

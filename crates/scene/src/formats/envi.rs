@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    #[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+    #[dioptric_golden::needs_shared]
     fn the_corn_kernel_is_a_reflectance() {
         let Some(path) = dioptric_golden::shared("data/scenes/envi_corn_kernel/4-22-22_right_same_B73_top_00.hdr")
         else {

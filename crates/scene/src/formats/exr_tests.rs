@@ -253,7 +253,7 @@ fn no_mutation_of_a_file_makes_the_reader_panic() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+#[dioptric_golden::needs_shared]
 fn the_real_files_are_read() {
     let Some(folder) = dioptric_golden::shared("data/scenes") else { return };
     for (name, quantity, size, bands, has_depth) in [

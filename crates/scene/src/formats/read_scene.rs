@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    #[cfg_attr(not(has_shared), ignore = "needs the shared reference data")]
+    #[dioptric_golden::needs_shared]
     fn the_real_scenes_have_depth_and_camera_data() {
         let Some(folder) = dioptric_golden::shared("data/scenes") else { return };
         let piano = read_scene(&folder.join("piano3d.radiance_depth.exr"), &ReadOptions::default()).unwrap();
