@@ -501,7 +501,8 @@ mod tests {
 
     /// In a furnace of radiance 1 (n² inside a medium) nothing gets brighter; what absorbs nothing and isn't rough stays
     /// as it is, and what is rough loses only what its small mirrors send into each other: head on at least the share
-    /// α² / (1 + α²) of tilts over 45°, 4 % at α = 0.2 and 26 % at 0.6, which is why the bounds are wide.
+    /// α² / (1 + α²) of tilts over 45°, 4 % at α = 0.2 and 26 % at 0.6, and more at grazing angles, where tilts send light
+    /// into the surface: the lower bounds only say that no kind of light is left out.
     #[test]
     fn white_furnace_stays_white() {
         let glass = |rough| Lobe::Dielectric { index: [1.5], rough };
@@ -510,14 +511,14 @@ mod tests {
         let cases = [
             (Lobe::Diffuse { reflectance: [0.5], transmittance: [0.5] }, 0.999, 1.001),
             (white_metal(None), 0.999, 1.001),
-            (white_metal(mild), 0.90, 1.001),
-            (white_metal(rough), 0.60, 1.001),
+            (white_metal(mild), 0.80, 1.001),
+            (white_metal(rough), 0.45, 1.001),
             (glass(None), 0.999, 1.001),
-            (glass(mild), 0.90, 1.001),
-            (glass(rough), 0.60, 1.001),
+            (glass(mild), 0.80, 1.001),
+            (glass(rough), 0.45, 1.001),
             (coated(1.0, None), 0.997, 1.003),
-            (coated(1.0, mild), 0.90, 1.02),
-            (coated(1.0, rough), 0.75, 1.02),
+            (coated(1.0, mild), 0.80, 1.02),
+            (coated(1.0, rough), 0.60, 1.02),
             (Lobe::Open, 0.999, 1.001),
         ];
         for (lobe, least, most) in cases {

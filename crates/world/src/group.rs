@@ -14,6 +14,7 @@ use obvhs::{
 use rayon::prelude::*;
 
 use crate::{
+    WorldError,
     shape::{Quadric, placed_bounds},
     triangle::{ShearedRay, TriangleHit},
 };
@@ -101,6 +102,21 @@ impl GroupParts {
     }
 }
 
+impl GroupParts {
+    /// Checks that everything lies within 1e12 m of the origin, so that areas of boxes stay finite.
+    pub(crate) fn check_extent(&self) -> Result<(), WorldError> {
+        let is_near = |corner: Vec3A| corner.is_finite() && corner.abs().max_element() <= 1e12;
+        match self.boxes.iter().find(|aabb| !is_near(aabb.min) || !is_near(aabb.max)) {
+            None => Ok(()),
+            Some(aabb) => Err(WorldError::Setting {
+                what: "the extent of a shape",
+                value: format!("{} to {} m", aabb.min, aabb.max),
+                expected: "coordinates within 1e12 m of the origin",
+            }),
+        }
+    }
+}
+
 /// One box of a list, as the tree's builder wants it.
 struct PaddedBox(Aabb);
 
@@ -118,7 +134,7 @@ impl Group {
             boxes.iter().fold((Vec3A::MAX, Vec3A::MIN), |(low, high), aabb| (low.min(aabb.min), high.max(aabb.max)));
         // Rounding moves the crossing of a ray with the side of a box by a few ulps of the coordinates.
         let largest = bounds.0.abs().max(bounds.1.abs()).max_element();
-        let pad = if largest.is_finite() { 4.0 * f32::EPSILON * largest } else { 0.0 };
+        let pad = if largest.is_finite() { 4.0 * f32::EPSILON * largest.max(1e-3) } else { 0.0 };
         let boxes: Vec<PaddedBox> =
             boxes.into_par_iter().enumerate().map(|(index, b)| PaddedBox(padded(b, pad, index as u32))).collect();
         let tree = build_tree(&boxes);
@@ -196,7 +212,12 @@ impl GroupRay {
     fn new(origin: Vec3, direction: Vec3, t_max: f32) -> Self {
         let shortened = SHORTENED * Vec3A::from(direction);
         // A component of 0 is as good as one so small that the ray doesn't move along it.
-        let inverse = |d: f32| if d.abs() < 1e-18 { 1e18_f32.copysign(d) } else { 1.0 / d };
+        // The tree takes −0 for positive.
+        let inverse = |d: f32| match d {
+            d if d.abs() >= 1e-18 => 1.0 / d,
+            d if d < 0.0 => -1e18,
+            _ => 1e18,
+        };
         Self {
             tree: TreeRay {
                 origin: origin.into(),

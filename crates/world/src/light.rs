@@ -415,7 +415,7 @@ impl Quadric {
                 .all(|d| d.abs() < 1e-9 * scale * scale);
         let to_center = self.place().translation - from.as_dvec3();
         let sin = radius_m * scale / to_center.length();
-        if !is_round || !(sin < 0.9999) {
+        if !is_round || sin.is_nan() || sin >= 0.9999 {
             return None;
         }
         // 1 − cos without cancellation for small cones.

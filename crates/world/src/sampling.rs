@@ -52,11 +52,11 @@ impl Frame {
         if x == Vec3::ZERO { Self::about(z) } else { Self { x, y: z.cross(x), z } }
     }
 
-    pub(crate) fn to_local(&self, v: Vec3) -> Vec3 {
+    pub(crate) fn to_local(self, v: Vec3) -> Vec3 {
         Vec3::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }
 
-    pub(crate) fn to_world(&self, v: Vec3) -> Vec3 {
+    pub(crate) fn to_world(self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }
 }

@@ -145,7 +145,7 @@ impl Quadric {
                 let nearest = -o2.dot(d2) / d2.length_squared();
                 let off_axis = o2 + nearest * d2;
                 let half_chord_squared = (radius_m * radius_m - off_axis.length_squared()) / d2.length_squared();
-                if !(half_chord_squared >= 0.0) {
+                if half_chord_squared.is_nan() || half_chord_squared < 0.0 {
                     return None;
                 }
                 let half_chord = half_chord_squared.sqrt();

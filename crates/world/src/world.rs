@@ -43,8 +43,9 @@ impl GroupId {
 
 /// Geometry, materials, lights and cameras, checked and ready to be asked.
 ///
-/// The frame is right-handed in itself, with lengths in metres; which axis is up is the file's affair. Worlds don't
-/// change; they are made by a [`WorldBuilder`], a reader, or [`World::still_life`].
+/// Lengths are metres. The frame is the file's: as they are shown, pbrt's files are left-handed (x right, y up, z away) and
+/// glTF's right-handed (z towards the viewer); nothing here depends on which. Worlds don't change; they are made by a
+/// [`WorldBuilder`] or by [`read_world`](crate::read_world).
 #[derive(Debug)]
 pub struct World {
     geometry: Geometry,
@@ -442,8 +443,12 @@ impl WorldBuilder {
     /// Adds a sentence about what wasn't understood, once.
     pub fn note(&mut self, note: impl Into<String>) {
         let note = note.into();
-        if !self.notes.contains(&note) {
+        const LIMIT: usize = 500;
+        if self.notes.len() < LIMIT && !self.notes.contains(&note) {
             self.notes.push(note);
+            if self.notes.len() == LIMIT {
+                self.notes.push("and more that isn't listed".to_owned());
+            }
         }
     }
 
@@ -463,6 +468,7 @@ impl WorldBuilder {
         for (index, shape) in placed.iter().enumerate() {
             shape.add_to(&mut parts[shape.group as usize], index as u32);
         }
+        parts.iter().try_for_each(GroupParts::check_extent)?;
         // Groups first, so that the root knows how large they are.
         let mut groups: Vec<Group> = parts.drain(1..).map(Group::build).collect();
         let mut root = parts.remove(0);
@@ -472,6 +478,7 @@ impl WorldBuilder {
                 root.add_instance(instance, of, index as u32);
             }
         }
+        root.check_extent()?;
         groups.insert(0, Group::build(root));
         let (low, high) = groups[0].bounds();
         let radius_m = if low.cmple(high).all() { 0.5 * (high - low).length() } else { 1.0 };

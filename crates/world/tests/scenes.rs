@@ -202,6 +202,40 @@ proptest! {
     }
 }
 
+/// Our own Figure 4: every word of it is understood, and its camera is in focus on the eye before a wall of bricks.
+#[test]
+fn metronome_is_in_focus_on_its_eye() {
+    let world = read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/worlds/metronome.pbrt")).unwrap();
+    assert!(world.notes().is_empty(), "{:?}", world.notes());
+    let names: Vec<&str> = world.material_names().collect();
+    let camera = &world.cameras()[0];
+    let origin = camera.world_from_camera.translation.as_vec3();
+    // Along the axis, and towards points of the picture plane 1 m ahead.
+    let seen = |x: f64, y: f64| {
+        let direction = camera.world_from_camera.transform_vector3(DVec3::new(x, y, 1.0)).normalize().as_vec3();
+        let hit = world
+            .intersect(&Ray { origin, direction }, f32::INFINITY)
+            .expect("the floor and the wall fill the picture");
+        let depth_m = hit.distance_m * (x * x + y * y + 1.0).sqrt().recip() as f32;
+        (names[hit.material.0 as usize], depth_m)
+    };
+    let (name, depth_m) = seen(0.0, 0.0);
+    // 1/50 mm − 1/137 mm = 1/78.74 mm.
+    assert!(name == "ink" && (depth_m - 0.07874).abs() < 2e-4, "{name} {depth_m}");
+    let corners = [(-0.17, 0.15), (0.17, 0.15), (0.0, -0.17), (-0.02, 0.0)].map(|(x, y)| seen(x, y).0);
+    assert!(corners[0].starts_with("brick") || corners[0] == "mortar", "{corners:?}");
+    assert!(corners[1].starts_with("brick") || corners[1] == "mortar", "{corners:?}");
+    assert!(matches!(corners[2], "floor" | "cherry") && corners[3] == "iris", "{corners:?}");
+    // Illuminance on the eye, facing the flash: a few thousand lux, as a flash lamp gives.
+    let eye = seen(0.0, 0.0).1 * camera.world_from_camera.transform_vector3(DVec3::Z).as_vec3() + origin;
+    let lit: f32 = (0..64)
+        .filter_map(|i| world.sample_light(eye, (i as f32 + 0.5) / 64.0, [0.5, 0.5], &[555.0]))
+        .filter(|sample| sample.is_delta)
+        .map(|sample| sample.radiance[0] / sample.pdf / 64.0)
+        .sum();
+    assert!((500.0..20_000.0).contains(&(lit * 72_983.0)), "{} lx", lit * 72_983.0);
+}
+
 fn shared(place: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(place)
 }

@@ -147,6 +147,7 @@ impl Reader<'_> {
             self.builder.note(format!("a mesh of {:?}: only triangles are supported, left out", primitive.mode()));
             return Ok(());
         }
+        self.check_types(primitive)?;
         let buffers = &self.buffers;
         let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
         let Some(positions) = reader.read_positions() else { return Ok(()) };
@@ -166,6 +167,33 @@ impl Reader<'_> {
         let (material, glow) = self.material(&primitive.material())?;
         self.builder.add_shape(Shape::Mesh(mesh), place, material, glow);
         Ok(())
+    }
+
+    /// Checks that attributes have the types that the crate's readers take for granted.
+    fn check_types(&self, primitive: &gltf::Primitive<'_>) -> Result<(), WorldError> {
+        use accessor::{DataType, Dimensions};
+        let is_integer = |of: DataType| matches!(of, DataType::U8 | DataType::U16 | DataType::U32);
+        let attributes = primitive.attributes().map(|(semantic, accessor)| {
+            let (of, dimensions) = (accessor.data_type(), accessor.dimensions());
+            let is_sound = match semantic {
+                gltf::Semantic::Positions | gltf::Semantic::Normals => {
+                    of == DataType::F32 && dimensions == Dimensions::Vec3
+                }
+                gltf::Semantic::TexCoords(_) => {
+                    matches!(of, DataType::F32 | DataType::U8 | DataType::U16) && dimensions == Dimensions::Vec2
+                }
+                _ => true,
+            };
+            (accessor.index(), is_sound)
+        });
+        let indices = primitive.indices().map(|accessor| {
+            let is_sound = is_integer(accessor.data_type()) && accessor.dimensions() == Dimensions::Scalar;
+            (accessor.index(), is_sound)
+        });
+        match attributes.chain(indices).find(|(_, is_sound)| !is_sound) {
+            None => Ok(()),
+            Some((index, _)) => Err(self.fault(format!("accessor {index} is of a type that its use doesn't allow"))),
+        }
     }
 
     /// Metals mirror their color; others are a base below a clear coat of index 1.5, as glTF's own model has it.
@@ -350,5 +378,24 @@ mod tests {
         assert!(read_text(&file("3", 4)).unwrap_err().to_string().contains("accessor 0"));
         assert!(read_text(&file("4000000000", 3)).unwrap_err().to_string().contains("accessor 1"));
         assert!(read_text("{}").is_err());
+        let floats = file("1", 3).replace("\"componentType\":5123", "\"componentType\":5126");
+        assert!(read_text(&floats).unwrap_err().to_string().contains("accessor 1"));
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::prelude::ProptestConfig::with_cases(300))]
+
+        /// A file with some bytes changed is a world or one sentence.
+        #[test]
+        fn mutated_files_never_panic(
+            edits in proptest::collection::vec((0..1500_usize, proptest::prelude::any::<u8>()), 1..5),
+        ) {
+            let mut bytes = file("3", 3).into_bytes();
+            let n = bytes.len();
+            for (at, byte) in edits {
+                bytes[at % n] = b' ' + byte % 95;
+            }
+            let _ = read_text(&String::from_utf8_lossy(&bytes));
+        }
     }
 }

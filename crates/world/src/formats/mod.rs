@@ -30,7 +30,8 @@ impl Default for ReadOptions {
 /// Reads a world from a file: `.pbrt` (text of versions 2 to 4), `.gltf` and `.glb`, or a bare mesh as `.obj` or `.ply`.
 ///
 /// A bare mesh is gray (reflectance 0.5) under a sky of radiance 1 W m⁻² sr⁻¹ nm⁻¹. What of a file isn't understood is
-/// named in [`World::notes`] with what stands in its place. Reading takes at most 256 times the memory of the bytes read.
+/// named in [`World::notes`] with what stands in its place. Reading takes at most 256 times the memory of the bytes read,
+/// and pictures at most 2²⁸ samples each.
 ///
 /// # Errors
 /// When the file can't be read or is malformed, with its line where it has lines; when it has more than 2³¹ bytes, those
