@@ -190,6 +190,9 @@ fn number(key: &str, value: &serde_json::Value) -> String {
     if let Some([first, last]) = value.as_array().map(Vec::as_slice) {
         return format!("{first}–{last}");
     }
+    if let Some(is_so) = value.as_bool() {
+        return if is_so { "yes" } else { "no" }.to_owned();
+    }
     match value.as_f64() {
         None if key.ends_with("_deg") || key.ends_with("colors_nm") || key.starts_with('C') => "–".to_owned(),
         Some(v) if v == 0.0 || (1e-3..1e6).contains(&v.abs()) => format!("{v:.6}"),

@@ -11,6 +11,7 @@
 mod air;
 pub mod analysis;
 mod aperture;
+mod axial;
 mod beam;
 mod bundle;
 mod catalogue;
@@ -34,6 +35,7 @@ mod trace;
 
 pub use air::Air;
 pub use aperture::{Aperture, Outline};
+pub use axial::AxialBeam;
 pub use beam::Beam;
 pub use bundle::{ObjectPoint, rays_over_front, rays_towards};
 pub use catalogue::{CatalogueGlass, GlassCatalogue};
@@ -47,7 +49,7 @@ pub use lens::{ImageSurface, Lens};
 pub use mono::MonoLens;
 pub use paraxial::{Conjugate, FirstOrder};
 pub use pose::{Move, Pose};
-pub use pupil::PupilBoundary;
+pub use pupil::{PupilBoundary, PupilPlane};
 pub use rays::{Losses, RayBatch, RayFate, SurfaceLosses};
 pub use rays_f32::RayBatchF32;
 pub use seidel::{Seidel, SeidelSettings, SeidelSums};

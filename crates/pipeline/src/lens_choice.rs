@@ -123,6 +123,8 @@ impl LensReading {
     pub fn open_stopped(&self, text: &str, stop_mm: Option<f64>) -> Result<LensUse, PipelineError> {
         let mut used = LensUse::of(LensChoice::named(text).open(self)?);
         used.lens = stop_mm.map_or(StopChoice::AsGiven, StopChoice::DiameterMm).apply(used.lens)?;
+        let mono = used.lens.at(used.wavelength_or_usual());
+        used.notes.extend(mono.ok().and_then(|mono| mono.note_on_limit()));
         Ok(used)
     }
 

@@ -67,7 +67,7 @@ impl Shot {
         Ok(Self {
             camera: camera.clone(),
             lens,
-            lens_notes: lens_file.notes,
+            lens_notes: lens_file.notes.into_iter().chain(reference.note_on_limit()).collect(),
             scene,
             film,
             film_mm,
