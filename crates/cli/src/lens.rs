@@ -102,6 +102,11 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     let lens = &used.lens;
     let wavelengths_nm = match &arguments.wavelengths_nm {
         Some(list) => parse_numbers("--wavelengths-nm", list)?,
+        None if used.reference_nm.is_some() => {
+            let wavelength_nm = used.wavelength_or_usual();
+            tell_taken(&[format!("{wavelength_nm} nm")], common);
+            vec![wavelength_nm]
+        }
         None if used.is_known_at(REFERENCE_WAVELENGTH_NM) => vec![REFERENCE_WAVELENGTH_NM],
         None => {
             let wavelengths_nm = used.wavelengths_or(&[REFERENCE_WAVELENGTH_NM]);
@@ -120,6 +125,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
         .iter()
         .map(|&wavelength_nm| {
             let LensInfoArgs { distance_mm, field_deg, .. } = *arguments;
+            let distance_mm = distance_mm.or(Some(used.distance_mm).filter(|mm| mm.is_finite()));
             LensData::new(lens, &LensQuestion { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm })
         })
         .collect::<Result<_, _>>()?;

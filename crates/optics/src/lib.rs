@@ -41,7 +41,7 @@ pub use bundle::{ObjectPoint, rays_over_front, rays_towards};
 pub use catalogue::{CatalogueGlass, GlassCatalogue};
 pub use error::OpticsError;
 pub use extinction::Absorption;
-pub use formats::{Field, LensFile, Microlens, MissingGlass, ReadOptions};
+pub use formats::{Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};
 pub use glam;
 pub use glass::{C_LINE_NM, D_LINE_NM, F_LINE_NM, Glass};
 pub use layout::{Layout, wavelength_color};

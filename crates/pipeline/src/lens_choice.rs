@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions};
+use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions, SeqNumbers};
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
@@ -31,8 +31,10 @@ impl LensChoice {
     /// # Errors
     /// When there is none of that name, or its file or a catalogue cannot be read.
     pub fn open(&self, reading: &LensReading) -> Result<LensFile, PipelineError> {
+        // Catalogues are read, and refused, for a lens of any kind.
+        let options = reading.options()?;
         let mut file = match self {
-            Self::File(path) => LensFile::read(path, &reading.options()?)?,
+            Self::File(path) => LensFile::read(path, &options)?,
             Self::BuiltIn(name) => LensFile::from(Lens::built_in(name)?),
             Self::Thin { focal_length_mm, diameter_mm } => LensFile::from(Lens::thin(*focal_length_mm, *diameter_mm)?),
             Self::Pinhole { diameter_mm } => LensFile::from(Lens::pinhole(*diameter_mm)?),
@@ -99,6 +101,18 @@ pub struct LensReading {
     pub missing_glass: MissingGlassChoice,
     /// The change of index a nanometre, about [`REFERENCE_WAVELENGTH_NM`], of the media of which only one index is stated.
     pub slope_per_nm: Option<f64>,
+    /// What the numbers of surfaces are in a CODE V file that says neither radii nor curvatures; `None` for what is plausible.
+    pub seq_numbers: Option<SeqNumbersChoice>,
+}
+
+/// What the numbers of surfaces are in a CODE V file that does not say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum SeqNumbersChoice {
+    /// Radii of curvature.
+    Radii,
+    /// Curvatures.
+    Curvatures,
 }
 
 /// What to do with a glass that no catalogue has.
@@ -136,7 +150,11 @@ impl LensReading {
             MissingGlassChoice::FromNdVd => MissingGlass::FromNdVd,
             MissingGlassChoice::Nearest => MissingGlass::Nearest,
         };
-        Ok(ReadOptions { catalogues, missing_glass })
+        let seq_numbers = self.seq_numbers.map(|numbers| match numbers {
+            SeqNumbersChoice::Radii => SeqNumbers::Radii,
+            SeqNumbersChoice::Curvatures => SeqNumbers::Curvatures,
+        });
+        Ok(ReadOptions { catalogues, missing_glass, seq_numbers })
     }
 }
 

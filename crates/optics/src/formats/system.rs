@@ -354,6 +354,13 @@ impl System {
                 return Ok(ObjectPoint::Finite(DVec3::new(x_mm, y_mm, -distance_mm)));
             }
             Field::ObjectHeight { .. } => return Err(plain("a field is an object height, but the object is far away")),
+            Field::RealImageHeight { x_mm, y_mm } => {
+                let film_mm = self.surfaces.last().map(|last| last.thickness_after_mm).filter(|mm| mm.is_finite());
+                let dioptres = 1e3 / (distance_mm + mono.projection_center_z_mm());
+                let tan = film_mm.and_then(|film| mono.field_tan_of_image(DVec2::new(x_mm, y_mm), film, dioptres));
+                let missed = || format!("no chief ray meets the image at the stated height of {x_mm}, {y_mm} mm");
+                tan.ok_or_else(|| plain(&missed()))?
+            }
             Field::ImageHeight { x_mm, y_mm } if distance_mm.is_finite() => {
                 let height_mm = DVec2::new(x_mm, y_mm) / mono.conjugate(distance_mm).magnification;
                 return Ok(ObjectPoint::Finite(height_mm.extend(-distance_mm)));
