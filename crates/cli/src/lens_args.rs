@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
-use dioptric_pipeline::{LensReading, MissingGlassChoice, SeqNumbersChoice};
+use dioptric_pipeline::{LensReading, MissingGlass, SeqNumbersChoice};
 
 /// Something to do with lenses.
 #[derive(Debug, Subcommand)]
@@ -78,9 +78,9 @@ impl LensReadingArgs {
         }
         if let Some(missing_glass) = self.missing_glass {
             reading.missing_glass = match missing_glass {
-                MissingGlassArg::Refuse => MissingGlassChoice::Refuse,
-                MissingGlassArg::NdVd => MissingGlassChoice::FromNdVd,
-                MissingGlassArg::Nearest => MissingGlassChoice::Nearest,
+                MissingGlassArg::Refuse => MissingGlass::Refuse,
+                MissingGlassArg::NdVd => MissingGlass::FromNdVd,
+                MissingGlassArg::Nearest => MissingGlass::Nearest,
             };
         }
         if let Some(numbers) = self.seq_numbers {

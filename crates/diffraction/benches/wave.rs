@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use dioptric_diffraction::{PupilGrid, WaveNodes, WaveQuality, WaveWindow, WindowCenter, wave_psf};
+use dioptric_diffraction::{PupilGrid, PupilSamples, WaveQuality, WaveWindow, WindowCenter, wave_psf};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
 
 /// 64 × 64 pixels of under a fifth of λN at f/8 and 550 nm: two points along each side of a pixel.
@@ -14,7 +14,7 @@ fn transform(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("wave/64x64");
     for (n_radii, n_azimuths) in [(12, 48), (16, 96)] {
         let grid = PupilGrid { n_radii, n_azimuths };
-        let nodes = WaveNodes::perfect(1.0 / 16.0, 1.0, 550.0, grid).expect("the aperture is real");
+        let nodes = PupilSamples::perfect(1.0 / 16.0, 1.0, 550.0, grid).expect("the aperture is real");
         let id = |points: usize| BenchmarkId::new(format!("{}_nodes", grid.n_nodes()), format!("{points}_points"));
         for points in [1, 2] {
             group.bench_with_input(id(points), &nodes, |bencher, nodes| {
@@ -32,7 +32,7 @@ fn from_the_lens(criterion: &mut Criterion) {
     let point = ObjectPoint::from_field(&lens, DVec2::new(0.1, 0.0), 0.5);
     let film_mm = lens.film_mm_for(2000.0).expect("the lens focuses");
     criterion.bench_function("wave/dgauss_f8/nodes", |bencher| {
-        bencher.iter(|| black_box(WaveNodes::trace(&lens, &point, film_mm, PupilGrid::STANDARD, None).is_ok()));
+        bencher.iter(|| black_box(PupilSamples::trace(&lens, &point, film_mm, PupilGrid::STANDARD, None).is_ok()));
     });
     criterion.bench_function("wave/dgauss_f8/psf", |bencher| {
         bencher.iter(|| black_box(wave_psf(&lens, &point, film_mm, &WINDOW, WaveQuality::default()).is_ok()));

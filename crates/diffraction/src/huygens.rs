@@ -4,7 +4,7 @@ mod cells;
 
 use std::f64::consts::TAU;
 
-use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Rims};
+use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Vignetting};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -133,7 +133,7 @@ impl Beside {
             let targets: Vec<DVec2> = cells.iter().map(|cell| cell.at_mm + step * step_mm).collect();
             let mut rays = lens.rays_towards(point, &targets, z_mm, 0.0);
             let from: Vec<DVec3> = (0..rays.len()).map(|i| rays.direction(i)).collect();
-            lens.trace(&mut rays, Rims::Ignore);
+            lens.trace(&mut rays, Vignetting::Off);
             lens.to_film(&mut rays, film_mm);
             (rays, from)
         });

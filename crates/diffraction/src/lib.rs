@@ -30,8 +30,8 @@ pub use huygens::HuygensSources;
 pub use opd::{best_wavefront_film_mm, opd_waves_at};
 pub use stop_ray::{StopRay, trace_stop_rays};
 pub use wave::{
-    Peak, PhaseRange, Propagation, PupilEdge, PupilGrid, WaveMap, WaveNodes, WavePsf, WaveQuality, WaveWindow,
-    WindowCenter, polychromatic_psf, wave_nodes, wave_psf,
+    Peak, PhaseRange, Propagation, PupilFunctionFit, PupilGrid, PupilOutline, PupilSamples, WavePsf, WaveQuality,
+    WaveWindow, WindowCenter, polychromatic_psf, pupil_samples, wave_psf,
 };
 pub use wavefront::{ReferenceSphere, Wavefront, WavefrontReference};
 pub use width::full_width_at_half_maximum;

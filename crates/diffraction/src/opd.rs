@@ -61,7 +61,7 @@ pub fn best_wavefront_film_mm(
 #[cfg(test)]
 mod tests {
     use dioptric_optics::{
-        Lens, Rims,
+        Lens, Vignetting,
         analysis::{PupilCoordinates, pupil_line},
     };
     use glam::{DVec2, DVec3};
@@ -76,7 +76,7 @@ mod tests {
         let sampling = PupilSampling {
             coordinates: PupilCoordinates::entrance(&lens),
             places: pupil_line(DVec2::Y, 5),
-            rims: Rims::Ignore,
+            rims: Vignetting::Off,
         };
         let waves = opd_waves_at(&lens, &FAR, 49.9, &sampling).unwrap();
         let sine2 = 0.05f64.powi(2) / (1.0 + 0.05f64.powi(2));
@@ -95,7 +95,7 @@ mod tests {
         let wavefront =
             Wavefront::trace(&lens, &point, film_mm, PupilGrid::STANDARD, WavefrontReference::Chief).unwrap();
         let coordinates = PupilCoordinates::stop(&lens);
-        let sampling = PupilSampling { coordinates, places: wavefront.pupil.clone(), rims: Rims::Ignore };
+        let sampling = PupilSampling { coordinates, places: wavefront.pupil.clone(), rims: Vignetting::Off };
         let waves = opd_waves_at(&lens, &point, film_mm, &sampling).unwrap();
         for (found, expected) in waves.iter().zip(&wavefront.opd_waves) {
             assert!((found.unwrap() - expected).abs() < 1e-8);
@@ -111,7 +111,7 @@ mod tests {
             let edge = PupilSampling {
                 coordinates: PupilCoordinates::entrance(&lens),
                 places: vec![DVec2::Y],
-                rims: Rims::Ignore,
+                rims: Vignetting::Off,
             };
             let marginal = edge.rays_on_film(&lens, &FAR, paraxial_mm);
             let marginal_mm = paraxial_mm - marginal.y_mm[0] * marginal.n[0] / marginal.m[0];

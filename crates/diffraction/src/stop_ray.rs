@@ -1,6 +1,6 @@
 //! How a deviation at the stop moves a ray on the film.
 
-use dioptric_optics::{MonoLens, RayBatch, Rims};
+use dioptric_optics::{MonoLens, RayBatch, Vignetting};
 use glam::{DVec2, DVec3};
 
 use crate::{Covariance, Edge, Hurb};
@@ -34,10 +34,10 @@ impl StopRay {
 /// The rays start in object space; those that end on the way are `None`. Each costs four more rays behind the stop.
 pub fn trace_stop_rays(lens: &MonoLens, mut rays: RayBatch, film_mm: f64) -> Vec<Option<StopRay>> {
     let (behind, end) = (lens.stop() + 1, lens.n_surfaces());
-    lens.trace_surfaces(0..behind, &mut rays, Rims::Ignore);
+    lens.trace_surfaces(0..behind, &mut rays, Vignetting::Off);
     let on_film = |mut rays: RayBatch| {
         if behind < end {
-            lens.trace_surfaces(behind..end, &mut rays, Rims::Ignore);
+            lens.trace_surfaces(behind..end, &mut rays, Vignetting::Off);
         }
         lens.to_film(&mut rays, film_mm);
         rays
@@ -138,7 +138,7 @@ mod tests {
         let n_rays = 400_000;
         for (model, width) in [(Hurb::PAPER, 0.6174), (Hurb::SCENE3D, 0.8732)] {
             let (lens, mut rays, edge, unit) = figure_2(n_rays, 550.0);
-            lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Rims::Clip);
+            lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Vignetting::On);
             bend(&mut rays, edge, model, BendForm::DirectionCosines, 3);
             lens.to_film(&mut rays, FILM_MM);
             let share = |limit: f64| rays.x_mm.iter().filter(|x| x.abs() < limit * unit).count() as f64 / n_rays as f64;

@@ -32,8 +32,8 @@ use axis::SampleAxis;
 pub(crate) use cells::PupilCells;
 pub use grid::{PhaseRange, PupilGrid};
 use gridded::Grid;
-pub use map::{PupilEdge, WaveMap};
-pub use nodes::WaveNodes;
+pub use map::{PupilFunctionFit, PupilOutline};
+pub use nodes::PupilSamples;
 pub use polychromatic::polychromatic_psf;
 pub use propagation::Propagation;
 pub use strehl::Peak;
@@ -122,25 +122,25 @@ pub fn wave_psf(
     window: &WaveWindow,
     quality: WaveQuality,
 ) -> Result<WavePsf, DiffractionError> {
-    wave_nodes(lens, point, film_mm, window, quality)?.psf(window, quality.points_per_pixel)
+    pupil_samples(lens, point, film_mm, window, quality)?.psf(window, quality.points_per_pixel)
 }
 
 /// Returns the nodes that [`wave_psf`] sums: as many as `quality` says, or the window needs.
 ///
 /// # Errors
 /// Those of [`wave_psf`].
-pub fn wave_nodes(
+pub fn pupil_samples(
     lens: &MonoLens,
     point: &ObjectPoint,
     film_mm: f64,
     window: &WaveWindow,
     quality: WaveQuality,
-) -> Result<WaveNodes, DiffractionError> {
+) -> Result<PupilSamples, DiffractionError> {
     let reference_mm = match window.center {
         WindowCenter::Centroid => None,
         WindowCenter::At(film_mm) => Some(film_mm),
     };
-    let trace = |grid| WaveNodes::trace(lens, point, film_mm, grid, reference_mm);
+    let trace = |grid| PupilSamples::trace(lens, point, film_mm, grid, reference_mm);
     let reach_mm = window.check()?;
     if let Some(grid) = quality.nodes {
         let nodes = trace(grid)?;
@@ -170,7 +170,7 @@ impl WaveWindow {
     }
 }
 
-impl WaveNodes {
+impl PupilSamples {
     /// Returns the grid that is to be tried instead of this one for places up to `reach_mm` from the reference, or `None`
     /// if this one does.
     fn finer_grid(&self, reach_mm: f64) -> Result<Option<PupilGrid>, DiffractionError> {

@@ -1,6 +1,6 @@
 //! Wavefronts: by how much the paths of a pupil's rays differ from a perfect lens's.
 
-use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Rims, analysis::StopAim};
+use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Vignetting, analysis::StopAim};
 use glam::{DVec2, DVec3};
 
 use crate::{
@@ -187,7 +187,7 @@ impl Traced {
             0 => vec![true; energy.len()],
             _ => {
                 let mut rays = lens.rays_towards(point, &targets_mm, z_mm, 0.0);
-                lens.trace(&mut rays, Rims::Clip);
+                lens.trace(&mut rays, Vignetting::On);
                 rays.fate.iter().map(|fate| fate.is_in_flight()).collect()
             }
         };
@@ -196,11 +196,11 @@ impl Traced {
         targets_mm.push(chief_target_mm(lens, point, z_mm).unwrap_or(center_mm));
         let mut rays = lens.rays_towards(point, &targets_mm, z_mm, 0.0);
         let behind = lens.stop() + 1;
-        lens.trace_surfaces(0..behind, &mut rays, Rims::Ignore);
+        lens.trace_surfaces(0..behind, &mut rays, Vignetting::Off);
         let stop_mm = lens.stop_semi_aperture_mm();
         let in_stop = (0..energy.len()).map(|i| lens.in_stop_mm(rays.point_mm(i)) / stop_mm).collect();
-        lens.trace_surfaces(behind..lens.n_surfaces(), &mut rays, Rims::Ignore);
-        lens.to_image_surface(&mut rays, film_mm);
+        lens.trace_surfaces(behind..lens.n_surfaces(), &mut rays, Vignetting::Off);
+        lens.to_film(&mut rays, film_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         match n_lost {
             0 => Ok(Self { energy, is_clear, in_stop, rays }),
@@ -216,7 +216,7 @@ fn chief_target_mm(lens: &MonoLens, point: &ObjectPoint, z_mm: f64) -> Option<DV
     let direction = point.direction_to(target_mm);
     let target_mm = (target_mm + direction * ((z_mm - aim.z_mm()) / direction.z)).truncate();
     let mut ray = lens.rays_towards(point, &[target_mm], z_mm, 0.0);
-    lens.trace(&mut ray, Rims::Ignore);
+    lens.trace(&mut ray, Vignetting::Off);
     ray.fate[0].is_in_flight().then_some(target_mm)
 }
 

@@ -4,15 +4,15 @@
 use std::f64::consts::TAU;
 
 use dioptric_diffraction::{
-    DiffractionError, PhaseRange, PupilGrid, WaveNodes, WavePsf, WaveWindow, WindowCenter, airy,
+    DiffractionError, PhaseRange, PupilGrid, PupilSamples, WavePsf, WaveWindow, WindowCenter, airy,
     quadrature::gauss_legendre_on,
 };
 use dioptric_optics::glam::DVec2;
 
 const CENTER: WindowCenter = WindowCenter::At(DVec2::ZERO);
 
-fn perfect(f_number: f64, wavelength_nm: f64) -> WaveNodes {
-    WaveNodes::perfect(0.5 / f_number, 1.0, wavelength_nm, PupilGrid::STANDARD).unwrap()
+fn perfect(f_number: f64, wavelength_nm: f64) -> PupilSamples {
+    PupilSamples::perfect(0.5 / f_number, 1.0, wavelength_nm, PupilGrid::STANDARD).unwrap()
 }
 
 /// Returns the largest-to-least error measure Σ|a − b| / Σ b of a psf against theory.
@@ -108,7 +108,7 @@ fn window_captures_what_theory_says() {
     // ±10 λN hold 98.0 to 98.2 %, and ±40 λN at least 99.4 %.
     for (half, least, most) in [(10.0, 0.980, 0.982), (40.0, 0.994, 0.996)] {
         let grid = PupilGrid::needed(PhaseRange { rays: 0.0, along_radius: 0.0, window: TAU / 2.0 * half * 1.415 });
-        let nodes = WaveNodes::perfect(0.125, 1.0, 550.0, grid).unwrap();
+        let nodes = PupilSamples::perfect(0.125, 1.0, 550.0, grid).unwrap();
         let n = (2.0 * half) as usize;
         let window = WaveWindow { pitch_um: 2.2, rows: n, columns: n, center: CENTER };
         let psf = nodes.psf(&window, None).unwrap();
@@ -121,7 +121,7 @@ fn window_captures_what_theory_says() {
 fn pixels_are_integrated_as_well_as_the_rule_promises() {
     // The pitch in λN, and the L1 error that the rule's number of points may leave.
     for (pitch, most) in [(0.5, 3e-3), (1.0, 2e-3), (2.0, 1.5e-3), (4.0, 2.5e-3)] {
-        let nodes = WaveNodes::perfect(0.1, 1.0, 550.0, PupilGrid { n_radii: 24, n_azimuths: 96 }).unwrap();
+        let nodes = PupilSamples::perfect(0.1, 1.0, 550.0, PupilGrid { n_radii: 24, n_azimuths: 96 }).unwrap();
         let n = (16.0 / pitch) as usize | 1;
         let window = WaveWindow { pitch_um: pitch * 2.75, rows: n, columns: n, center: CENTER };
         let psf = nodes.psf(&window, None).unwrap();

@@ -4,8 +4,8 @@
 use std::f64::consts::{PI, TAU};
 
 use dioptric_diffraction::{
-    DiffractionError, HuygensSources, Propagation, PupilGrid, WaveNodes, WavePsf, WaveQuality, WaveWindow,
-    WindowCenter, airy::bessel_j, polychromatic_psf, quadrature::gauss_legendre_on, wave_nodes, wave_psf,
+    DiffractionError, HuygensSources, Propagation, PupilGrid, PupilSamples, WavePsf, WaveQuality, WaveWindow,
+    WindowCenter, airy::bessel_j, polychromatic_psf, pupil_samples, quadrature::gauss_legendre_on, wave_psf,
 };
 use dioptric_optics::{
     Glass, Interface, Lens, MonoLens, ObjectPoint, Surface,
@@ -50,7 +50,8 @@ fn traced_thin_lens_has_the_pattern_of_its_hankel_transform() {
     for (f_number, wavelength_nm) in [(2.0, 400.0), (2.0, 700.0), (8.0, 550.0), (22.0, 550.0)] {
         let lens = Lens::thin(50.0, 50.0 / f_number).unwrap().at(wavelength_nm).unwrap();
         let unit_um = wavelength_nm * 1e-3 * f_number;
-        let nodes = WaveNodes::trace(&lens, &ObjectPoint::Infinite(DVec3::Z), 50.0, PupilGrid::STANDARD, None).unwrap();
+        let nodes =
+            PupilSamples::trace(&lens, &ObjectPoint::Infinite(DVec3::Z), 50.0, PupilGrid::STANDARD, None).unwrap();
         assert_eq!(nodes.propagation, Propagation::Fresnel);
         let psf = nodes.psf(&window(unit_um / 6.0, 41), Some(1)).unwrap();
         let (mut difference, mut sum) = (0.0, 0.0);
@@ -94,8 +95,8 @@ fn half_again_as_many_nodes_change_little() {
         let lens = dgauss(f_number);
         let (point, film_mm) = (field(&lens, degrees, 0.5), lens.film_mm_for(2000.0).unwrap() + shift_mm);
         let window = window(2.0, 48);
-        let nodes = wave_nodes(&lens, &point, film_mm, &window, WaveQuality::default()).unwrap();
-        let more = WaveNodes::trace(&lens, &point, film_mm, nodes.grid.scaled(1.5), None).unwrap();
+        let nodes = pupil_samples(&lens, &point, film_mm, &window, WaveQuality::default()).unwrap();
+        let more = PupilSamples::trace(&lens, &point, film_mm, nodes.grid.scaled(1.5), None).unwrap();
         let error = l1(&nodes.psf(&window, None).unwrap(), &more.psf(&window, None).unwrap());
         assert!(error < 1e-3, "f/{f_number} at {degrees}°, {shift_mm} mm: {error}");
     }
@@ -151,7 +152,7 @@ fn image_in_a_medium_is_smaller_by_its_index() {
     let lens = glass(1.5);
     let film_mm = lens.film_mm_for(f64::INFINITY).unwrap();
     let far = ObjectPoint::Infinite(DVec3::Z);
-    let nodes = WaveNodes::trace(&lens, &far, film_mm, PupilGrid::STANDARD, None).unwrap();
+    let nodes = PupilSamples::trace(&lens, &far, film_mm, PupilGrid::STANDARD, None).unwrap();
     // NA is that of a pupil of 2 mm at 40 mm, in air: it does not change on a plane window behind.
     assert!((nodes.numerical_aperture() / 0.05 - 1.0).abs() < 0.01, "{}", nodes.numerical_aperture());
     let error = against_huygens(&lens, &far, film_mm, 1.5, 40);
@@ -166,7 +167,7 @@ fn pinhole_sends_spherical_waves() {
         (ObjectPoint::Finite(DVec3::new(30.0, -10.0, -400.0)), 30.0),
         (ObjectPoint::Infinite(DVec3::Z), 10.0),
     ] {
-        let nodes = WaveNodes::trace(&lens, &point, film_mm, PupilGrid::STANDARD, None).unwrap();
+        let nodes = PupilSamples::trace(&lens, &point, film_mm, PupilGrid::STANDARD, None).unwrap();
         assert_eq!(nodes.propagation, Propagation::Fresnel);
         let error = against_huygens(&lens, &point, film_mm, 0.6 * film_mm, 40);
         assert!(error < 5e-3, "{film_mm} mm: {error}");
@@ -217,7 +218,7 @@ fn strehl_ratio_of_small_aberrations_is_that_of_their_rms() {
     let film_mm = lens.film_mm_for(2000.0).unwrap();
     let point = field(&lens, 0.0, 0.5);
     for shift_mm in [-0.02, 0.02] {
-        let nodes = WaveNodes::trace(&lens, &point, film_mm + shift_mm, PupilGrid::STANDARD, None).unwrap();
+        let nodes = PupilSamples::trace(&lens, &point, film_mm + shift_mm, PupilGrid::STANDARD, None).unwrap();
         let peak = nodes.peak().unwrap();
         let wavefront = dioptric_diffraction::Wavefront::trace(
             &lens,

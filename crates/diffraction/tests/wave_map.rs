@@ -1,18 +1,19 @@
 //! Waves as smooth functions over the pupil, held to traced nodes.
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-use dioptric_diffraction::{PupilEdge, WaveMap, WavePsf, WaveQuality, WaveWindow, WindowCenter, wave_psf};
+use dioptric_diffraction::{PupilFunctionFit, PupilOutline, WavePsf, WaveQuality, WaveWindow, WindowCenter, wave_psf};
 use dioptric_optics::{Lens, MonoLens, ObjectPoint, PupilBoundary, glam::DVec2};
 
 fn dgauss(f_number: f64, wavelength_nm: f64) -> MonoLens {
     Lens::built_in("dgauss-50mm").unwrap().with_f_number(f_number, 550.0).unwrap().at(wavelength_nm).unwrap()
 }
 
-fn map(lens: &MonoLens, field_tan: f64, dioptres: f64, film_mm: f64) -> WaveMap {
+fn map(lens: &MonoLens, field_tan: f64, dioptres: f64, film_mm: f64) -> PupilFunctionFit {
     let point = ObjectPoint::from_field(lens, DVec2::new(field_tan, 0.0), dioptres);
     let pupil = PupilBoundary::find(lens, &point, 96).unwrap();
-    let edge = PupilEdge { center_x_mm: pupil.center_mm().x, z_mm: pupil.z_mm(), rho_mm: pupil.rho_at_azimuths_mm() };
-    WaveMap::trace(lens, &point, film_mm, edge).unwrap()
+    let edge =
+        PupilOutline { center_x_mm: pupil.center_mm().x, z_mm: pupil.z_mm(), rho_mm: pupil.rho_at_azimuths_mm() };
+    PupilFunctionFit::trace(lens, &point, film_mm, edge).unwrap()
 }
 
 fn l1(a: &WavePsf, b: &WavePsf) -> f64 {
@@ -48,9 +49,9 @@ fn fitted_waves_give_the_pattern_of_traced_ones() {
 fn the_numbers_are_all_there_is() {
     let lens = dgauss(8.0, 550.0);
     let map = map(&lens, 0.1, 0.5, lens.film_mm_for(2000.0).unwrap());
-    assert_eq!(map.numbers().len(), WaveMap::n_numbers(96));
-    assert_eq!(WaveMap::from_numbers(map.numbers().to_vec()).unwrap(), map);
-    assert_eq!(WaveMap::mix([(&map, 0.25), (&map, 0.75)].into_iter()).unwrap().numbers()[3], map.numbers()[3]);
-    assert!(WaveMap::from_numbers(vec![0.0; 40]).is_none());
-    assert!(WaveMap::mix(std::iter::empty()).is_none());
+    assert_eq!(map.numbers().len(), PupilFunctionFit::n_numbers(96));
+    assert_eq!(PupilFunctionFit::from_numbers(map.numbers().to_vec()).unwrap(), map);
+    assert_eq!(PupilFunctionFit::mix([(&map, 0.25), (&map, 0.75)].into_iter()).unwrap().numbers()[3], map.numbers()[3]);
+    assert!(PupilFunctionFit::from_numbers(vec![0.0; 40]).is_none());
+    assert!(PupilFunctionFit::mix(std::iter::empty()).is_none());
 }

@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use dioptric_diffraction::{
-    DiffractionError, HuygensSources, PupilGrid, WaveNodes, WaveQuality, WaveWindow, Wavefront, WavefrontReference,
+    DiffractionError, HuygensSources, PupilGrid, PupilSamples, WaveQuality, WaveWindow, Wavefront, WavefrontReference,
     WindowCenter, airy::bessel_j, quadrature::gauss_legendre_on, wave_psf,
 };
 use dioptric_optics::{
@@ -57,7 +57,7 @@ fn annulus(hole: f64, radius: f64) -> f64 {
 
 /// Compares the sum at places of a window of ±`reach` λN with a closed form per mm².
 #[track_caller]
-fn check_places(nodes: &WaveNodes, reach: f64, expected: impl Fn(DVec2) -> f64, tolerance: f64) {
+fn check_places(nodes: &PupilSamples, reach: f64, expected: impl Fn(DVec2) -> f64, tolerance: f64) {
     let (mut difference, mut sum) = (0.0, 0.0);
     for k in 0..33 * 33 {
         let at = DVec2::new(f64::from(k % 33) - 16.0, f64::from(k / 33) - 16.0) * (reach / 16.0 * UNIT_MM);
@@ -72,7 +72,7 @@ fn check_places(nodes: &WaveNodes, reach: f64, expected: impl Fn(DVec2) -> f64, 
 fn annulus_has_its_closed_form() {
     for hole in [0.2, 0.5, 0.8] {
         let lens = thin(vec![disc(0.5 * DIAMETER_MM * hole, [0.0; 2])]);
-        let nodes = WaveNodes::trace(&lens, &far(), FOCAL_MM, PupilGrid::STANDARD, None).unwrap();
+        let nodes = PupilSamples::trace(&lens, &far(), FOCAL_MM, PupilGrid::STANDARD, None).unwrap();
         assert!((nodes.collected / (PI / 4.0 * DIAMETER_MM.powi(2) * (1.0 - hole * hole)) - 1.0).abs() < 1e-9);
         assert!((nodes.energy.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         let irradiance = |radius: f64| nodes.irradiance_per_mm2(DVec2::X * (radius * UNIT_MM)) * UNIT_MM * UNIT_MM;
@@ -109,7 +109,7 @@ fn rectangle_has_its_sinc() {
     for (half_x_mm, half_y_mm, center_mm) in [(1.5, 1.5, [0.0; 2]), (2.0, 0.7, [0.0; 2]), (0.8, 1.1, [-0.6, 0.9])] {
         let lens = thin(vec![aperture(Outline::Rectangle { half_x_mm, half_y_mm }, center_mm, false)]);
         let grid = PupilGrid { n_radii: 16, n_azimuths: 64 };
-        let nodes = WaveNodes::trace(&lens, &far(), FOCAL_MM, grid, None).unwrap();
+        let nodes = PupilSamples::trace(&lens, &far(), FOCAL_MM, grid, None).unwrap();
         assert!((nodes.collected / (4.0 * half_x_mm * half_y_mm) - 1.0).abs() < 1e-6, "{}", nodes.collected);
         let turns_per_mm = 1.0 / (WAVELENGTH_NM * 1e-6 * FOCAL_MM);
         let expected = |at: DVec2| {
@@ -125,7 +125,7 @@ fn rectangle_has_its_sinc() {
 fn ellipse_has_airys_pattern_stretched() {
     let (half_x_mm, half_y_mm) = (2.0, 0.9);
     let lens = thin(vec![aperture(Outline::Ellipse { half_x_mm, half_y_mm }, [0.2, -0.1], false)]);
-    let nodes = WaveNodes::trace(&lens, &far(), FOCAL_MM, PupilGrid::STANDARD, None).unwrap();
+    let nodes = PupilSamples::trace(&lens, &far(), FOCAL_MM, PupilGrid::STANDARD, None).unwrap();
     let per_mm = 1.0 / (WAVELENGTH_NM * 1e-6 * FOCAL_MM);
     let expected = |at: DVec2| {
         let v = TAU * per_mm * (at * DVec2::new(half_x_mm, half_y_mm)).length();
@@ -141,7 +141,7 @@ fn decentred_discs_and_a_spider_are_a_sum_of_their_transforms() {
     let (hub_mm, vane_mm, spot_mm, spot) = (0.6, 0.1, 0.3, DVec2::new(1.3, 0.9));
     let outer_mm = 0.5 * DIAMETER_MM;
     let lens = thin(vec![vane(3.0, vane_mm), disc(hub_mm, [0.0; 2]), disc(spot_mm, spot.to_array())]);
-    let nodes = WaveNodes::trace(&lens, &far(), FOCAL_MM, PupilGrid { n_radii: 20, n_azimuths: 80 }, None).unwrap();
+    let nodes = PupilSamples::trace(&lens, &far(), FOCAL_MM, PupilGrid { n_radii: 20, n_azimuths: 80 }, None).unwrap();
     let per_mm = TAU / (WAVELENGTH_NM * 1e-6 * FOCAL_MM);
     // The hub and the vane by lines along the vane, of the length that both leave open.
     let amplitude = |at: DVec2| {
@@ -218,13 +218,13 @@ fn wavefront_of_an_annulus_has_its_defocus() {
     assert!(found < 1.0 - hole * hole && found > 1.0 - (hole + 0.026).powi(2), "{found}");
     let expected = sinc(edge_waves * (1.0 - hole * hole)).powi(2);
     assert!((wavefront.strehl() - expected).abs() < 2e-3, "{} {expected}", wavefront.strehl());
-    let nodes = WaveNodes::trace(&lens, &far(), film_mm, PupilGrid::STANDARD, None).unwrap();
+    let nodes = PupilSamples::trace(&lens, &far(), film_mm, PupilGrid::STANDARD, None).unwrap();
     assert!((nodes.peak().unwrap().strehl - expected).abs() < 2e-3, "{:?}", nodes.peak());
 }
 
 #[test]
 fn pupil_that_is_all_hole_is_dark() {
     let lens = thin(vec![disc(3.0, [0.0; 2])]);
-    let dark = WaveNodes::trace(&lens, &far(), FOCAL_MM, PupilGrid::STANDARD, None).unwrap_err();
+    let dark = PupilSamples::trace(&lens, &far(), FOCAL_MM, PupilGrid::STANDARD, None).unwrap_err();
     assert_eq!(dark, DiffractionError::NoLight { wavelength_nm: WAVELENGTH_NM });
 }

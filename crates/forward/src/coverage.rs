@@ -1,6 +1,6 @@
 //! The sampling of point spread functions that a scene and a film need.
 
-use dioptric_optics::{Lens, MonoLens, ObjectPoint, PupilBoundary, Rims, rays_towards};
+use dioptric_optics::{Lens, MonoLens, ObjectPoint, PupilBoundary, Vignetting, rays_towards};
 use dioptric_psf::{BankSettings, Diffraction, FieldBankSettings};
 use dioptric_spectrum::WavelengthGrid;
 use glam::{DMat2, DVec2};
@@ -120,7 +120,7 @@ impl Aim<'_> {
             azimuths.iter().map(|&azimuth| pupil.center_mm() + DVec2::from_angle(azimuth) * pupil.rho_max_mm(azimuth));
         let targets: Vec<DVec2> = std::iter::once(pupil.center_mm()).chain(edge).collect();
         let mut rays = rays_towards(&point, &targets, pupil.z_mm(), 0.0);
-        self.lens.trace(&mut rays, Rims::Ignore);
+        self.lens.trace(&mut rays, Vignetting::Off);
         self.lens.to_film(&mut rays, self.film_mm);
         if !rays.fate[0].is_in_flight() {
             return None;

@@ -6,7 +6,7 @@ use dioptric_forward::{
     Coverage, Film, ForwardError, Kernels, Settings, bank_settings_for, field_bank_settings_for, irradiance,
 };
 use dioptric_optics::{
-    Glass, Interface, Lens, Move, ObjectPoint, PupilBoundary, Rims, Shape, Surface, rays_over_front,
+    CoordinateBreak, Glass, Interface, Lens, ObjectPoint, PupilBoundary, Shape, Surface, Vignetting, rays_over_front,
 };
 use dioptric_psf::{Diffraction, FieldBank, ImagingBank, PsfBank};
 use dioptric_scene::{Scene, View};
@@ -60,8 +60,8 @@ fn double_gauss() -> Lens {
     Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap()
 }
 
-fn turned(surfaces: (usize, usize), pivot_mm: f64, tilt_deg: [f64; 3]) -> Move {
-    Move { surfaces, pivot_mm, decenter_mm: [0.0; 3], tilt_deg, tilt_first: false }
+fn turned(surfaces: (usize, usize), pivot_mm: f64, tilt_deg: [f64; 3]) -> CoordinateBreak {
+    CoordinateBreak { surfaces, pivot_mm, decenter_mm: [0.0; 3], tilt_deg, tilt_first: false }
 }
 
 #[test]
@@ -115,7 +115,7 @@ fn a_uniform_plane_gets_the_pupil_over_both_magnifications() {
     let center_mm = |field_tan: DVec2| {
         let point = ObjectPoint::from_field(&mono, field_tan, 0.0);
         let mut rays = rays_over_front(&mono, &point, 1000);
-        mono.trace(&mut rays, Rims::Clip);
+        mono.trace(&mut rays, Vignetting::On);
         mono.to_film(&mut rays, film_mm);
         let through: Vec<usize> = (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()).collect();
         through.iter().map(|&i| rays.point_mm(i).truncate()).sum::<DVec2>() / through.len() as f64
@@ -135,7 +135,7 @@ fn a_point_lands_where_the_rays_of_a_bent_lens_do() {
     let lens = double_gauss();
     let last = lens.interfaces().len() - 1;
     // The rear group turned both ways and moved aside.
-    let group = Move { decenter_mm: [0.2, -0.3, 0.0], ..turned((last - 3, last), 3.0, [1.0, -0.7, 0.0]) };
+    let group = CoordinateBreak { decenter_mm: [0.2, -0.3, 0.0], ..turned((last - 3, last), 3.0, [1.0, -0.7, 0.0]) };
     let lens = lens.with_moves(vec![group]).unwrap();
     let grid = WavelengthGrid::new(vec![420.0, 550.0, 680.0]).unwrap();
     let film = Film { rows: 600, columns: 900, pitch_um: 24.0 };
@@ -153,7 +153,7 @@ fn a_point_lands_where_the_rays_of_a_bent_lens_do() {
             let lens = camera.lens.at(wavelength_nm).unwrap();
             let point = ObjectPoint::from_field(&reference, DVec2::new(tan_x, tan_y), 1.0 / z_m);
             let mut rays = rays_over_front(&lens, &point, 400);
-            lens.trace(&mut rays, Rims::Clip);
+            lens.trace(&mut rays, Vignetting::On);
             lens.to_film(&mut rays, film_mm);
             let through: Vec<usize> = (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()).collect();
             let mean = |of: &[f64]| through.iter().map(|&i| of[i]).sum::<f64>() / through.len() as f64;

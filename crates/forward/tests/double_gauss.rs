@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by panicking and shows its numbers")]
 
 use dioptric_forward::{Coverage, Film, Settings, bank_settings_for, irradiance};
-use dioptric_optics::{Lens, ObjectPoint, Rims, rays_over_front};
+use dioptric_optics::{Lens, ObjectPoint, Vignetting, rays_over_front};
 use dioptric_psf::{Diffraction, PsfBank};
 use dioptric_scene::{Scene, View};
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
@@ -101,7 +101,7 @@ fn a_point_lands_where_its_rays_do() {
             let lens = camera.lens.at(wavelength_nm).unwrap();
             let point = ObjectPoint::from_field(&reference, DVec2::new(tan_x, tan_y), 1.0 / z_m);
             let mut rays = rays_over_front(&lens, &point, 400);
-            lens.trace(&mut rays, Rims::Clip);
+            lens.trace(&mut rays, Vignetting::On);
             lens.to_film(&mut rays, camera.film_mm);
             let through: Vec<usize> = (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()).collect();
             let mean = |of: &[f64]| through.iter().map(|&i| of[i]).sum::<f64>() / through.len() as f64;

@@ -15,8 +15,8 @@ use criterion::{
     measurement::{Measurement, ValueFormatter, WallTime},
 };
 use dioptric_optics::{
-    Beam, Glass, Interface, Lens, MonoLens, ObjectPoint, RayBatch, RayBatchF32, Rims, Shape, Surface, glam::DVec2,
-    rays_towards,
+    Beam, Glass, Interface, Lens, MonoLens, ObjectPoint, RayBatch, RayBatchF32, Shape, Surface, Vignetting,
+    glam::DVec2, rays_towards,
 };
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -96,9 +96,9 @@ fn trace(criterion: &mut Criterion<CoreTime>) {
         let rays = bundle(&lens, n_rays);
         group.throughput(Throughput::Elements((n_rays * (lens.n_surfaces() + 1)) as u64));
         let named = |name: &str| format!("{name}/{n_rays}");
-        measure(&mut group, &named("f64"), &rays, |rays| lens.trace_to_film(rays, Rims::Clip, film_mm));
+        measure(&mut group, &named("f64"), &rays, |rays| lens.trace_to_film(rays, Vignetting::On, film_mm));
         measure(&mut group, &named("f32"), &RayBatchF32::from(&rays), |rays| {
-            lens.trace_to_film_f32(rays, Rims::Clip, film_mm);
+            lens.trace_to_film_f32(rays, Vignetting::On, film_mm);
         });
     }
     group.finish();
@@ -109,8 +109,8 @@ fn threads(criterion: &mut Criterion) {
     let rays = bundle(&lens, N_RAYS);
     let mut group = criterion.benchmark_group("trace/threads");
     group.throughput(Throughput::Elements((rays.len() * lens.n_surfaces()) as u64));
-    measure_in_place(&mut group, "batch/one", &rays, |rays| lens.trace(rays, Rims::Clip));
-    measure_in_place(&mut group, "batch/all", &rays, |rays| lens.trace_parallel(rays, Rims::Clip));
+    measure_in_place(&mut group, "batch/one", &rays, |rays| lens.trace(rays, Vignetting::On));
+    measure_in_place(&mut group, "batch/all", &rays, |rays| lens.trace_parallel(rays, Vignetting::On));
 
     // Ten batches that threads share among them, made as they are traced and nowhere kept.
     let targets_mm = targets(&lens, N_RAYS, 1.1);
@@ -118,7 +118,7 @@ fn threads(criterion: &mut Criterion) {
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.01 * batch as f64, 0.0), 0.5);
         let beam = Beam { point, targets_mm: &targets_mm, z_mm: lens.first_order().entrance_pupil_z_mm };
         let mut sum = DVec2::ZERO;
-        lens.trace_onto(&beam, Rims::Clip, film_mm, |rays| {
+        lens.trace_onto(&beam, Vignetting::On, film_mm, |rays| {
             for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
                 sum += DVec2::new(rays.x_mm[i], rays.y_mm[i]);
             }
@@ -250,7 +250,7 @@ fn trace_aspheres(criterion: &mut Criterion<CoreTime>) {
     for (name, lens) in lenses.iter().filter_map(|(name, lens)| Some((name, lens.as_ref()?))) {
         let rays = bundle(lens, N_RAYS);
         group.throughput(Throughput::Elements((rays.len() * lens.n_surfaces()) as u64));
-        measure(&mut group, &format!("{name}/f64"), &rays, |rays| lens.trace(rays, Rims::Clip));
+        measure(&mut group, &format!("{name}/f64"), &rays, |rays| lens.trace(rays, Vignetting::On));
     }
     group.finish();
 }
@@ -264,7 +264,7 @@ fn count(criterion: &mut Criterion<CoreTime>) {
     let beam = Beam { point, targets_mm: &targets_mm, z_mm: lens.first_order().entrance_pupil_z_mm };
     // The chief ray lands in the middle of pixels of 3 µm.
     let mut middle = DVec2::ZERO;
-    lens.trace_onto(&Beam { targets_mm: &[DVec2::ZERO], ..beam }, Rims::Clip, film_mm, |rays| {
+    lens.trace_onto(&Beam { targets_mm: &[DVec2::ZERO], ..beam }, Vignetting::On, film_mm, |rays| {
         middle = rays.point_mm(0).truncate();
     });
     let pixel = |x_mm: f64, y_mm: f64| {
@@ -277,7 +277,7 @@ fn count(criterion: &mut Criterion<CoreTime>) {
     group.bench_function("f64", |bencher| {
         bencher.iter(|| {
             let mut counts = vec![0_u32; SIDE * SIDE];
-            lens.trace_onto(&beam, Rims::Clip, film_mm, |rays| {
+            lens.trace_onto(&beam, Vignetting::On, film_mm, |rays| {
                 for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
                     if let Some(pixel) = pixel(rays.x_mm[i], rays.y_mm[i]) {
                         counts[pixel] += 1;
@@ -291,7 +291,7 @@ fn count(criterion: &mut Criterion<CoreTime>) {
     group.bench_function("f32", |bencher| {
         bencher.iter(|| {
             let mut counts = vec![0_u32; SIDE * SIDE];
-            lens.trace_onto_f32(&beam, Rims::Clip, film_mm, |rays| {
+            lens.trace_onto_f32(&beam, Vignetting::On, film_mm, |rays| {
                 for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
                     if let Some(pixel) = pixel(rays.x_mm[i].into(), rays.y_mm[i].into()) {
                         counts[pixel] += 1;

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    Aperture, MonoLens, ObjectPoint, RayBatch, Rims, rays_towards,
+    Aperture, MonoLens, ObjectPoint, RayBatch, Vignetting, rays_towards,
     trace::{self, Goal, Kind, Plan},
 };
 
@@ -98,7 +98,7 @@ impl AxialSearch<'_> {
         let steps = self.lens.steps_for(rays.object_z_mm);
         let (mut least_mm, mut limiting_surface, mut stop_radius_mm) = (f64::INFINITY, 0, f64::NAN);
         for (surface, step) in steps.iter().enumerate() {
-            let plan = Plan::new(&steps[surface..=surface], surface, Rims::Ignore);
+            let plan = Plan::new(&steps[surface..=surface], surface, Vignetting::Off);
             trace::trace_batch(&plan, Goal::LastSurface, rays.slices());
             let openings = step.apertures.iter().map(|aperture| aperture.clearance_mm(0.0, rays.y_mm[0]));
             let clearance_mm = openings.fold(step.semi_aperture - rays.y_mm[0].abs(), f64::min);

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use multiversion::multiversion;
 
 use crate::{
-    MonoLens, ObjectPoint, RayBatch, RayBatchF32, RayFate, Rims,
+    MonoLens, ObjectPoint, RayBatch, RayBatchF32, RayFate, Vignetting,
     rays::RaySlices,
     trace::{self, Goal, Plan},
 };
@@ -86,7 +86,7 @@ impl MonoLens {
     ///
     /// The same rays as those of [`rays_towards`](Self::rays_towards) from the first vertex plane and
     /// [`trace_to_film`](Self::trace_to_film), to the bit, without storing them: for counting rays on pixels.
-    pub fn trace_onto(&self, beam: &Beam<'_>, rims: Rims, film_mm: f64, mut visit: impl FnMut(&RayBatch)) {
+    pub fn trace_onto(&self, beam: &Beam<'_>, rims: Vignetting, film_mm: f64, mut visit: impl FnMut(&RayBatch)) {
         let plan = Plan::new(&self.steps_for(beam.point.z_mm()), 0, rims);
         beam.for_each_lot(self.object_index(), |rays| {
             match self.poses() {
@@ -98,7 +98,7 @@ impl MonoLens {
     }
 
     /// Traces a beam as [`trace_onto`](Self::trace_onto) does, in single precision: within 0.05 µm, and faster.
-    pub fn trace_onto_f32(&self, beam: &Beam<'_>, rims: Rims, film_mm: f64, mut visit: impl FnMut(&RayBatchF32)) {
+    pub fn trace_onto_f32(&self, beam: &Beam<'_>, rims: Vignetting, film_mm: f64, mut visit: impl FnMut(&RayBatchF32)) {
         let plan = Plan::new(self.steps(), 0, rims);
         let mut single = RayBatchF32::default();
         beam.for_each_lot(self.object_index(), |rays| {
@@ -128,7 +128,7 @@ impl Beam<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Lens, Move, rays_towards};
+    use crate::{CoordinateBreak, Lens, rays_towards};
 
     fn targets() -> Vec<DVec2> {
         (0..1000).map(|i| 0.4 * f64::from(i).sqrt() * DVec2::from_angle(2.4 * f64::from(i))).collect()
@@ -137,7 +137,7 @@ mod tests {
     /// Gathers the rays that a beam shows.
     fn shown(lens: &MonoLens, beam: &Beam<'_>, film_mm: f64) -> RayBatch {
         let mut all = RayBatch { object_z_mm: beam.point.z_mm(), ..RayBatch::default() };
-        lens.trace_onto(beam, Rims::Clip, film_mm, |rays| {
+        lens.trace_onto(beam, Vignetting::On, film_mm, |rays| {
             for i in 0..rays.len() {
                 all.push(rays.point_mm(i), rays.direction(i), rays.opl_mm[i]);
             }
@@ -151,7 +151,13 @@ mod tests {
     fn beam_is_the_stored_rays_to_the_bit() {
         let centered = Lens::built_in("dgauss-50mm").unwrap();
         let tilt_deg = [0.5, 0.0, 0.0];
-        let tilt = Move { surfaces: (2, 3), pivot_mm: 0.0, decenter_mm: [0.1, 0.0, 0.0], tilt_deg, tilt_first: false };
+        let tilt = CoordinateBreak {
+            surfaces: (2, 3),
+            pivot_mm: 0.0,
+            decenter_mm: [0.1, 0.0, 0.0],
+            tilt_deg,
+            tilt_first: false,
+        };
         let tilted = centered.clone().with_moves(vec![tilt]).unwrap();
         let targets_mm = targets();
         for lens in [centered, tilted] {
@@ -160,15 +166,15 @@ mod tests {
                 let point = ObjectPoint::from_field(&lens, DVec2::new(0.1, 0.05), dioptres);
                 let beam = Beam { point, targets_mm: &targets_mm, z_mm: 20.0 };
                 let mut stored = rays_towards(&point, &targets_mm, 20.0, 0.0);
-                lens.trace_to_film(&mut stored, Rims::Clip, 36.5);
+                lens.trace_to_film(&mut stored, Vignetting::On, 36.5);
                 let found = shown(&lens, &beam, 36.5);
                 assert!(found.n_in_flight() > 500 && found.n_in_flight() < 1000);
                 assert_eq!(found, stored);
 
                 let mut single = RayBatchF32::from(&rays_towards(&point, &targets_mm, 20.0, 0.0));
-                lens.trace_to_film_f32(&mut single, Rims::Clip, 36.5);
+                lens.trace_to_film_f32(&mut single, Vignetting::On, 36.5);
                 let mut x_mm: Vec<f32> = Vec::new();
-                lens.trace_onto_f32(&beam, Rims::Clip, 36.5, |rays| x_mm.extend(&rays.x_mm));
+                lens.trace_onto_f32(&beam, Vignetting::On, 36.5, |rays| x_mm.extend(&rays.x_mm));
                 assert_eq!(x_mm, single.x_mm);
             }
         }
@@ -179,7 +185,7 @@ mod tests {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         let beam = Beam { point: ObjectPoint::Infinite(DVec3::Z), targets_mm: &[], z_mm: 0.0 };
         let mut n_shown = 0;
-        lens.trace_onto(&beam, Rims::Clip, 36.0, |_| n_shown += 1);
+        lens.trace_onto(&beam, Vignetting::On, 36.0, |_| n_shown += 1);
         assert_eq!(n_shown, 0);
     }
 }

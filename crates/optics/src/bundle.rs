@@ -114,7 +114,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::{Lens, Rims};
+    use crate::{Lens, Vignetting};
 
     #[test]
     fn path_lengths_do_not_depend_on_the_start_plane() {
@@ -126,7 +126,7 @@ mod tests {
             let point = ObjectPoint::from_field(&lens, DVec2::new(0.2, 0.1), dioptres);
             let paths = |start_z_mm: f64| {
                 let mut rays = rays_towards(&point, &targets, z_mm, start_z_mm);
-                lens.trace(&mut rays, Rims::Clip);
+                lens.trace(&mut rays, Vignetting::On);
                 lens.to_film(&mut rays, film_mm);
                 [rays.opl_mm[1] - rays.opl_mm[0], rays.opl_mm[2] - rays.opl_mm[0]]
             };

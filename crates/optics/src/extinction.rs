@@ -4,7 +4,7 @@ use std::{collections::HashMap, sync::LazyLock};
 
 use glam::DVec3;
 
-use crate::{Glass, GlassCatalogue, Lens, MonoLens, OpticsError, RayBatch, Rims, glass::interpolate};
+use crate::{Glass, GlassCatalogue, Lens, MonoLens, OpticsError, RayBatch, Vignetting, glass::interpolate};
 
 const BUILT_IN: &str = include_str!("../data/glass/extinction.csv");
 
@@ -149,7 +149,7 @@ impl Absorption {
     ///
     /// The lens must be the one that the absorption was made of. The way from the last surface to the film is not
     /// counted. Rays pass the lens frame between surfaces, which moves them by some 1e-13 mm.
-    pub fn trace(&self, lens: &MonoLens, rays: &mut RayBatch, rims: Rims) -> Vec<f64> {
+    pub fn trace(&self, lens: &MonoLens, rays: &mut RayBatch, rims: Vignetting) -> Vec<f64> {
         assert_eq!(self.per_mm.len(), lens.n_surfaces(), "the absorption of this lens");
         let mut depth = vec![0.0; rays.len()];
         for surface in 0..lens.n_surfaces() {
@@ -217,7 +217,7 @@ mod tests {
         let tilted = DVec3::new(0.0, sine, (1.0 - sine * sine).sqrt());
         let mut rays = RayBatch::from_points(&[DVec3::ZERO; 3], &[DVec3::Z, tilted, tilted]);
         rays.y_mm[2] = 30.0;
-        let shares = absorption.trace(&lens, &mut rays, Rims::Clip);
+        let shares = absorption.trace(&lens, &mut rays, Vignetting::On);
         let index = glass.index_at(420.0).unwrap();
         let path_mm = 8.0 / (1.0 - (sine / index).powi(2)).sqrt();
         for (share, path_mm) in shares.iter().zip([8.0, path_mm, 0.0]) {
@@ -227,7 +227,7 @@ mod tests {
         assert!(shares[0] < 0.95);
         // The rays themselves are those of a trace in one go.
         let mut same = RayBatch::from_points(&[DVec3::ZERO; 2], &[DVec3::Z, tilted]);
-        lens.trace(&mut same, Rims::Clip);
+        lens.trace(&mut same, Vignetting::On);
         assert!((same.point_mm(1) - rays.point_mm(1)).length() < 1e-13 && same.fate[..] == rays.fate[..2]);
     }
 }

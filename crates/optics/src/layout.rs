@@ -12,7 +12,8 @@ use self::{
     frame::Frame,
 };
 use crate::{
-    Glass, ImageSurface, Lens, MonoLens, ObjectPoint, OpticsError, Pose, PupilBoundary, RayBatch, Rims, Shape, Surface,
+    Glass, ImageSurface, Lens, MonoLens, ObjectPoint, OpticsError, Pose, PupilBoundary, RayBatch, Shape, Surface,
+    Vignetting,
 };
 
 /// What a drawing shows.
@@ -161,10 +162,10 @@ fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_mm: f64) -> Ve
     let in_flight = |rays: &RayBatch| rays.fate.iter().map(|fate| fate.is_in_flight()).collect::<Vec<_>>();
     for surface in 0..lens.n_surfaces() {
         let before = in_flight(&rays);
-        lens.trace_surfaces(surface..surface + 1, &mut rays, Rims::Clip);
+        lens.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::On);
         note(&mut lines, &rays, &before);
     }
-    lens.to_image_surface(&mut rays, film_mm);
+    lens.to_film(&mut rays, film_mm);
     let arrived = in_flight(&rays);
     note(&mut lines, &rays, &arrived);
     for (line, arrived) in lines.iter_mut().zip(arrived) {
@@ -326,7 +327,7 @@ mod tests {
     #[test]
     fn tilted_elements_and_curved_films_are_drawn_where_rays_end() {
         let lens = Lens::built_in("singlet-50mm").unwrap();
-        let tilt = crate::Move {
+        let tilt = crate::CoordinateBreak {
             surfaces: (0, 1),
             pivot_mm: 0.0,
             decenter_mm: [0.0; 3],

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use crate::{Aperture, Glass, Interface, MonoLens, Move, OpticsError, Pose, Shape, Surface, formats, library, pose};
+use crate::{
+    Aperture, CoordinateBreak, Glass, Interface, MonoLens, OpticsError, Pose, Shape, Surface, formats, library, pose,
+};
 
 /// A lens that has been checked and can be traced.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,7 +19,7 @@ pub struct Lens {
     interfaces: Vec<Interface>,
     stop: usize,
     full_stop_semi_aperture_mm: f64,
-    moves: Vec<Move>,
+    moves: Vec<CoordinateBreak>,
     apertures: Vec<Aperture>,
     image_surface: ImageSurface,
 }
@@ -118,7 +120,7 @@ impl Lens {
     ///
     /// # Errors
     /// When a move is of surfaces that are not there, or has a number that makes no sense.
-    pub fn with_moves(mut self, moves: Vec<Move>) -> Result<Self, OpticsError> {
+    pub fn with_moves(mut self, moves: Vec<CoordinateBreak>) -> Result<Self, OpticsError> {
         moves.iter().enumerate().try_for_each(|(i, step)| step.check(i, self.interfaces.len()))?;
         if moves.len() > MOST_MOVES {
             return Err(OpticsError::MoveCount { n_moves: moves.len(), most: MOST_MOVES });
@@ -216,7 +218,7 @@ impl Lens {
     }
 
     /// The tilts and decentres of surfaces, groups and the film; none for a centred lens.
-    pub fn moves(&self) -> &[Move] {
+    pub fn moves(&self) -> &[CoordinateBreak] {
         &self.moves
     }
 
@@ -349,7 +351,7 @@ impl Lens {
     ///
     /// # Errors
     /// When a number makes no sense.
-    pub fn with_slope(&self, slope_per_nm: f64, reference_nm: f64) -> Result<Self, OpticsError> {
+    pub fn with_linear_dispersion(&self, slope_per_nm: f64, reference_nm: f64) -> Result<Self, OpticsError> {
         let mut lens = self.clone();
         let media = lens.interfaces.iter_mut().map(|interface| &mut interface.medium_after);
         for medium in media.chain([&mut lens.object_medium]) {

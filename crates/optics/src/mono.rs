@@ -6,8 +6,8 @@ use glam::{DVec2, DVec3};
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::{
-    Aperture, AxialBeam, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, RayBatchF32, Rims,
-    Shape, Surface,
+    Aperture, AxialBeam, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, RayBatchF32, Shape,
+    Surface, Vignetting,
     paraxial::{self, MarginalRay, Matrix},
     pose,
     trace::{self, Goal, Kind, Plan, Step},
@@ -280,7 +280,7 @@ impl MonoLens {
     /// Traces rays through all surfaces, on this thread.
     ///
     /// Each ray in flight ends on the last surface, bent into the image space, or where it was lost.
-    pub fn trace(&self, rays: &mut RayBatch, rims: Rims) {
+    pub fn trace(&self, rays: &mut RayBatch, rims: Vignetting) {
         self.trace_surfaces(0..self.n_surfaces(), rays, rims);
     }
 
@@ -288,7 +288,7 @@ impl MonoLens {
     ///
     /// The rays must lie in the medium before the first of them. Behind the stop, for one, directions may be changed
     /// before the trace goes on with the next surface.
-    pub fn trace_surfaces(&self, surfaces: Range<usize>, rays: &mut RayBatch, rims: Rims) {
+    pub fn trace_surfaces(&self, surfaces: Range<usize>, rays: &mut RayBatch, rims: Vignetting) {
         let first = surfaces.start;
         let steps = self.steps_for(rays.object_z_mm);
         match self.poses() {
@@ -305,7 +305,7 @@ impl MonoLens {
     /// Traces rays through all surfaces on the threads of the current rayon pool.
     ///
     /// The result is that of [`trace`](Self::trace), to the bit.
-    pub fn trace_parallel(&self, rays: &mut RayBatch, rims: Rims) {
+    pub fn trace_parallel(&self, rays: &mut RayBatch, rims: Vignetting) {
         let steps = self.steps_for(rays.object_z_mm);
         if let Some(poses) = self.poses() {
             let trace = |mut chunk| trace::trace_placed(&steps, poses, 0, rims, &mut chunk);
@@ -318,7 +318,7 @@ impl MonoLens {
     /// Traces rays through all surfaces and straight on to the film plane, `film_mm` behind the last vertex.
     ///
     /// What [`trace`](Self::trace) and [`to_film`](Self::to_film) do, in one go.
-    pub fn trace_to_film(&self, rays: &mut RayBatch, rims: Rims, film_mm: f64) {
+    pub fn trace_to_film(&self, rays: &mut RayBatch, rims: Vignetting, film_mm: f64) {
         if self.placed.is_some() {
             self.trace(rays, rims);
             return self.to_film(rays, film_mm);
@@ -332,7 +332,7 @@ impl MonoLens {
     ///
     /// They land within 0.05 µm of where [`trace_to_film`](Self::trace_to_film) lands them. Through tilted and
     /// decentred surfaces they go in double precision, no faster than there.
-    pub fn trace_to_film_f32(&self, rays: &mut RayBatchF32, rims: Rims, film_mm: f64) {
+    pub fn trace_to_film_f32(&self, rays: &mut RayBatchF32, rims: Vignetting, film_mm: f64) {
         if self.placed.is_some() {
             let mut wide = rays.widened();
             self.trace_to_film(&mut wide, rims, film_mm);
@@ -387,7 +387,7 @@ impl MonoLens {
     /// Moves rays straight on to the film as it is curved, its vertex `film_mm` behind the last vertex.
     ///
     /// A ray that does not meet it ends as one that missed the surface after the last.
-    pub fn to_image_surface(&self, rays: &mut RayBatch, film_mm: f64) {
+    pub fn to_film(&self, rays: &mut RayBatch, film_mm: f64) {
         let ImageSurface { curvature_per_mm, conic } = self.image_surface;
         if curvature_per_mm == 0.0 {
             return self.to_film(rays, film_mm);

@@ -275,7 +275,7 @@ mod tests {
     use glam::{DVec2, DVec3};
 
     use crate::{
-        Glass, Interface, Lens, ObjectPoint, PupilBoundary, Rims, Shape, Surface, analysis::StopAim, rays_towards,
+        Glass, Interface, Lens, ObjectPoint, PupilBoundary, Shape, Surface, Vignetting, analysis::StopAim, rays_towards,
     };
 
     /// The published lengths have four decimals, the last off by one at times.
@@ -390,7 +390,7 @@ mod tests {
             let aim = StopAim::find(&mono, &point, &[DVec2::ZERO, DVec2::new(0.6, -0.8)]);
             let targets_mm: Vec<DVec2> = aim.targets_mm().iter().map(|target| target.unwrap()).collect();
             let mut rays = rays_towards(&point, &targets_mm, aim.z_mm(), 0.0);
-            mono.trace_surfaces(0..2, &mut rays, Rims::Ignore);
+            mono.trace_surfaces(0..2, &mut rays, Vignetting::Off);
             assert!(rays.point_mm(0).truncate().length() < 1e-9);
             assert!((rays.point_mm(1).truncate() - DVec2::new(1.2, -1.6)).length() < 1e-9);
         }

@@ -15,7 +15,7 @@ use crate::OpticsError;
 /// same surfaces; so a group may be tilted, and within it a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Move {
+pub struct CoordinateBreak {
     /// The first and the last surface that are moved, counted from 0. The film counts as the one after the last: a move
     /// that ends there bends the axis for good.
     pub surfaces: (usize, usize),
@@ -34,7 +34,7 @@ pub struct Move {
     pub tilt_first: bool,
 }
 
-impl Move {
+impl CoordinateBreak {
     /// Checks the move of a lens of this many surfaces; `number` is its place in the list, for the message.
     pub(crate) fn check(&self, number: usize, n_surfaces: usize) -> Result<(), OpticsError> {
         let (first, last) = self.surfaces;
@@ -130,11 +130,11 @@ impl Pose {
 }
 
 /// The motions that moves make: of each surface, and of the film; `None` where nothing moves.
-pub(crate) fn motions(moves: &[Move], vertices_z_mm: &[f64]) -> Option<Vec<Pose>> {
+pub(crate) fn motions(moves: &[CoordinateBreak], vertices_z_mm: &[f64]) -> Option<Vec<Pose>> {
     let n_surfaces = vertices_z_mm.len();
     let motion = |place: usize| {
-        let of = |step: &&Move| (step.surfaces.0..=step.surfaces.1).contains(&place);
-        let pivot_z_mm = |step: &Move| vertices_z_mm[step.surfaces.0.min(n_surfaces - 1)] + step.pivot_mm;
+        let of = |step: &&CoordinateBreak| (step.surfaces.0..=step.surfaces.1).contains(&place);
+        let pivot_z_mm = |step: &CoordinateBreak| vertices_z_mm[step.surfaces.0.min(n_surfaces - 1)] + step.pivot_mm;
         let whole =
             moves.iter().filter(of).fold(Pose::IDENTITY, |whole, step| whole.after(&step.motion(pivot_z_mm(step))));
         if whole.is_rest() { Pose::IDENTITY } else { whole }
@@ -147,9 +147,9 @@ pub(crate) fn motions(moves: &[Move], vertices_z_mm: &[f64]) -> Option<Vec<Pose>
 mod tests {
     use super::*;
 
-    fn tilted(surfaces: (usize, usize)) -> Move {
+    fn tilted(surfaces: (usize, usize)) -> CoordinateBreak {
         let (decenter_mm, tilt_deg) = ([0.1, -0.2, 0.3], [10.0, -20.0, 30.0]);
-        Move { surfaces, pivot_mm: 1.5, decenter_mm, tilt_deg, tilt_first: false }
+        CoordinateBreak { surfaces, pivot_mm: 1.5, decenter_mm, tilt_deg, tilt_first: false }
     }
 
     #[test]
@@ -164,8 +164,8 @@ mod tests {
         for (found, expected) in pose.tilt_deg().into_iter().zip([10.0, -20.0, 30.0]) {
             assert!((found - expected).abs() < 1e-13);
         }
-        let gimbal = Move { tilt_deg: [25.0, 90.0, 15.0], ..tilted((0, 0)) }.motion(0.0);
-        let again = Move { tilt_deg: gimbal.tilt_deg(), ..tilted((0, 0)) }.motion(0.0);
+        let gimbal = CoordinateBreak { tilt_deg: [25.0, 90.0, 15.0], ..tilted((0, 0)) }.motion(0.0);
+        let again = CoordinateBreak { tilt_deg: gimbal.tilt_deg(), ..tilted((0, 0)) }.motion(0.0);
         // An angle whose sine is 1 is known to the root of the rounding.
         let apart = (gimbal.rotation - again.rotation).to_cols_array();
         assert!(apart.iter().all(|v| v.abs() < 1e-7), "{apart:?}");
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn break_and_its_return_leave_the_rest_in_place() {
-        let back = Move {
+        let back = CoordinateBreak {
             surfaces: (2, 3),
             // The return happens at the same pivot, 1.5 mm behind the vertex of surface 0.
             pivot_mm: 1.5 - 9.0,
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn moves_of_nothing_are_none() {
-        let still = Move { decenter_mm: [0.0; 3], tilt_deg: [0.0; 3], ..tilted((0, 3)) };
+        let still = CoordinateBreak { decenter_mm: [0.0; 3], tilt_deg: [0.0; 3], ..tilted((0, 3)) };
         assert_eq!(motions(&[still], &[0.0, 4.0, 9.0]), None);
         assert_eq!(motions(&[], &[0.0]), None);
     }
@@ -199,13 +199,13 @@ mod tests {
     #[test]
     fn moves_of_surfaces_that_are_not_there_are_refused() {
         assert!(tilted((0, 3)).check(0, 3).is_ok());
-        let message = |wrong: Move| wrong.check(1, 3).unwrap_err().to_string();
+        let message = |wrong: CoordinateBreak| wrong.check(1, 3).unwrap_err().to_string();
         assert_eq!(
             message(tilted((0, 4))),
             "move 1 is of surfaces 0 to 4, expected a first and a last of 0 to 3 (the film)"
         );
         assert!(message(tilted((2, 1))).starts_with("move 1 is of surfaces 2 to 1"));
-        let wrong = Move { pivot_mm: f64::NAN, ..tilted((0, 0)) };
+        let wrong = CoordinateBreak { pivot_mm: f64::NAN, ..tilted((0, 0)) };
         assert_eq!(message(wrong), "move 1 has the number NaN, expected finite numbers below 1e9");
     }
 }

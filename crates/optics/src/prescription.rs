@@ -3,7 +3,9 @@
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::{Aperture, Field, Glass, ImageSurface, Interface, Lens, LensFile, Move, OpticsError, Shape, Surface};
+use crate::{
+    Aperture, CoordinateBreak, Field, Glass, ImageSurface, Interface, Lens, LensFile, OpticsError, Shape, Surface,
+};
 
 /// A lens as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,7 +19,7 @@ struct Prescription {
     surfaces: Vec<Row>,
     /// Tilts and decentres.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    moves: Vec<Move>,
+    moves: Vec<CoordinateBreak>,
     /// Openings and obscurations beside the round rims.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     apertures: Vec<Aperture>,

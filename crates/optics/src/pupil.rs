@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 
 pub use self::plane::PupilPlane;
 use crate::{
-    MonoLens, ObjectPoint, RayBatch, Rims,
+    MonoLens, ObjectPoint, RayBatch, Vignetting,
     trace::{self, Plan},
 };
 
@@ -394,7 +394,7 @@ impl MonoLens {
         let steps = self.steps_for(rays.object_z_mm);
         match self.poses() {
             None => {
-                let plan = Plan::new(&steps, 0, Rims::Ignore);
+                let plan = Plan::new(&steps, 0, Vignetting::Off);
                 trace::trace_clearances(&plan, rays.slices(), &mut clearances_mm);
             }
             Some(poses) => trace::placed_clearances(&steps, poses, &mut rays.slices(), &mut clearances_mm),
@@ -446,7 +446,7 @@ mod tests {
             };
             for (offset_mm, n_passed) in [(0.0, 48), (1e-8, 0)] {
                 let mut rays = rays_towards(&point, &at(offset_mm), pupil.z_mm(), 0.0);
-                lens.trace(&mut rays, Rims::Clip);
+                lens.trace(&mut rays, Vignetting::On);
                 assert_eq!(rays.n_in_flight(), n_passed, "{name} at {field_deg} degrees");
             }
         }

@@ -35,7 +35,7 @@ use crate::{Aperture, RayFate, rays::RaySlices};
 
 /// Whether rims end rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rims {
+pub enum Vignetting {
     /// A ray that meets a surface outside its rim ends there.
     Clip,
     /// Surfaces reach as far as their shape does.

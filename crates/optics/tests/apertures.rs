@@ -4,8 +4,8 @@
 use std::{f64::consts::PI, path::Path};
 
 use dioptric_optics::{
-    Aperture, Glass, Interface, Layout, Lens, LensFile, Move, ObjectPoint, OpticsError, Outline, PupilBoundary,
-    RayBatch, RayBatchF32, RayFate, ReadOptions, Rims, Shape, Surface,
+    Aperture, CoordinateBreak, Glass, Interface, Layout, Lens, LensFile, ObjectPoint, OpticsError, Outline,
+    PupilBoundary, RayBatch, RayBatchF32, RayFate, ReadOptions, Shape, Surface, Vignetting,
     glam::{DVec2, DVec3},
 };
 
@@ -45,10 +45,10 @@ fn rays_end_at_the_surface_whose_apertures_stop_them_and_others_are_untouched() 
     for apertures in [vec![OPENING], vec![Aperture { outline: ellipse, ..OPENING }, hole], vec![hole]] {
         let (bare, lens) = (with(&[]).at(550.0).unwrap(), with(&apertures).at(550.0).unwrap());
         let (mut expected, mut found) = (rays(), rays());
-        bare.trace(&mut expected, Rims::Clip);
-        lens.trace(&mut found, Rims::Clip);
+        bare.trace(&mut expected, Vignetting::On);
+        lens.trace(&mut found, Vignetting::On);
         let mut at_opening = rays();
-        bare.trace_surfaces(0..2, &mut at_opening, Rims::Clip);
+        bare.trace_surfaces(0..2, &mut at_opening, Vignetting::On);
         let mut n_stopped = 0;
         for i in 0..found.len() {
             let place = at_opening.point_mm(i);
@@ -65,27 +65,32 @@ fn rays_end_at_the_surface_whose_apertures_stop_them_and_others_are_untouched() 
         assert!(n_stopped > 100 && found.n_in_flight() > 100);
         // On any number of threads, in single precision, and without rims.
         let mut shared = rays();
-        lens.trace_parallel(&mut shared, Rims::Clip);
+        lens.trace_parallel(&mut shared, Vignetting::On);
         assert_eq!((&shared.fate, &shared.x_mm), (&found.fate, &found.x_mm));
         let (mut single, mut open) = (RayBatchF32::from(&rays()), rays());
-        lens.trace_to_film_f32(&mut single, Rims::Clip, 90.0);
+        lens.trace_to_film_f32(&mut single, Vignetting::On, 90.0);
         let differ = (0..found.len()).filter(|&i| single.fate[i] != found.fate[i]).count();
         assert!(differ <= 4, "{differ} rays within rounding of an edge");
-        lens.trace(&mut open, Rims::Ignore);
+        lens.trace(&mut open, Vignetting::Off);
         assert_eq!(open.n_in_flight(), open.len());
     }
 }
 
 #[test]
 fn apertures_move_with_their_surface() {
-    let shift =
-        Move { surfaces: (1, 1), pivot_mm: 0.0, decenter_mm: [0.7, 0.3, 0.0], tilt_deg: [0.0; 3], tilt_first: false };
+    let shift = CoordinateBreak {
+        surfaces: (1, 1),
+        pivot_mm: 0.0,
+        decenter_mm: [0.7, 0.3, 0.0],
+        tilt_deg: [0.0; 3],
+        tilt_first: false,
+    };
     let moved = with(&[OPENING]).with_moves(vec![shift]).unwrap().at(550.0).unwrap();
     let [x, y] = OPENING.center_mm;
     let still = with(&[Aperture { center_mm: [x + 0.7, y + 0.3], ..OPENING }]).at(550.0).unwrap();
     let (mut one, mut other) = (rays(), rays());
-    moved.trace_surfaces(0..2, &mut one, Rims::Clip);
-    still.trace_surfaces(0..2, &mut other, Rims::Clip);
+    moved.trace_surfaces(0..2, &mut one, Vignetting::On);
+    still.trace_surfaces(0..2, &mut other, Vignetting::On);
     // The round rim of 6 mm moves too, which no ray of the opening sees.
     let passes = |rays: &RayBatch| rays.fate.iter().map(|fate| fate.is_in_flight()).collect::<Vec<_>>();
     assert_eq!(passes(&one), passes(&other));

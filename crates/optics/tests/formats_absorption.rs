@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use dioptric_optics::{GlassCatalogue, LensFile, RayBatch, ReadOptions, Rims, glam::DVec3};
+use dioptric_optics::{GlassCatalogue, LensFile, RayBatch, ReadOptions, Vignetting, glam::DVec3};
 
 const AGF: &str = "NM MINE 1 0\nCD 2.25\nLD 0.3 2.5\nIT 0.5 0.8 20\nIT 0.6 0.9 20\n";
 const ZMX: &str = "MODE SEQ\nENPD 4\nWAVM 1 0.5 1\nPWAV 1\nSURF 0\nDISZ INFINITY\nSURF 1\nSTOP\nDISZ 10\nGLAS MINE 0 0 1.5 0\n\
@@ -23,7 +23,7 @@ fn shares(file: &LensFile) -> (Vec<f64>, f64) {
     let mono = file.lens.at(500.0).unwrap();
     let mut rays = RayBatch::from_points(&[DVec3::ZERO; 2], &[DVec3::Z, leaning]);
     // The leaning ray leaves the plate beside its rim.
-    (absorption.trace(&mono, &mut rays, Rims::Ignore), 10.0 / (1.0 - (0.6_f64 / 1.5).powi(2)).sqrt())
+    (absorption.trace(&mono, &mut rays, Vignetting::Off), 10.0 / (1.0 - (0.6_f64 / 1.5).powi(2)).sqrt())
 }
 
 #[test]

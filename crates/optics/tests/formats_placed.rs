@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use dioptric_optics::{
-    Glass, ImageSurface, Interface, Lens, LensFile, Move, RayBatch, ReadOptions, Rims, Shape, Surface,
+    CoordinateBreak, Glass, ImageSurface, Interface, Lens, LensFile, RayBatch, ReadOptions, Shape, Surface, Vignetting,
     glam::{DVec2, DVec3},
 };
 
@@ -49,7 +49,7 @@ fn on_film(lens: &Lens, film_mm: f64) -> Vec<Option<DVec2>> {
     let starts: Vec<DVec3> = (0..81).map(start).collect();
     let direction = DVec3::new(0.02, -0.03, 1.0).normalize();
     let mut rays = RayBatch::from_points(&starts, &[direction; 81]);
-    mono.trace(&mut rays, Rims::Clip);
+    mono.trace(&mut rays, Vignetting::On);
     mono.to_film(&mut rays, film_mm);
     let pose = mono.film_pose(film_mm);
     let place = |i: usize| rays.fate[i].is_in_flight().then(|| pose.to_own(rays.point_mm(i)).truncate());
@@ -71,8 +71,8 @@ fn assert_same(a: &LensFile, b: &LensFile) {
     }
 }
 
-fn still(surfaces: (usize, usize)) -> Move {
-    Move { surfaces, pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg: [0.0; 3], tilt_first: false }
+fn still(surfaces: (usize, usize)) -> CoordinateBreak {
+    CoordinateBreak { surfaces, pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg: [0.0; 3], tilt_first: false }
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn tilted_plate_of_a_zemax_file_shifts_light_and_its_return_puts_the_film_back()
     assert_eq!(file.lens.image_surface(), ImageSurface { curvature_per_mm: -0.05, conic: 0.25 });
     let mono = file.lens.at(550.0).unwrap();
     let mut rays = RayBatch::from_points(&[DVec3::ZERO], &[DVec3::Z]);
-    mono.trace(&mut rays, Rims::Clip);
+    mono.trace(&mut rays, Vignetting::On);
     mono.to_film(&mut rays, 20.0);
     let (sine, cosine) = 30_f64.to_radians().sin_cos();
     let shift_mm = -7.0 * sine * (1.0 - cosine / (2.25 - sine * sine).sqrt());
@@ -90,7 +90,7 @@ fn tilted_plate_of_a_zemax_file_shifts_light_and_its_return_puts_the_film_back()
     let film = DVec3::new(0.0, -7.0 * sine, 10.0 + 7.0 * cosine + 20.0);
     assert!((mono.film_pose(20.0).vertex_mm - film).length() < 1e-14);
     assert!((rays.point_mm(0) - DVec3::new(0.0, shift_mm, film.z)).length() < 1e-13, "{}", rays.point_mm(0));
-    // Rims that the file leaves out are as wide as the tilted beam needs them.
+    // Vignetting that the file leaves out are as wide as the tilted beam needs them.
     assert!((file.lens.interfaces()[1].surface.semi_aperture_mm - 2.0 / cosine).abs() < 1e-6);
 }
 
@@ -121,9 +121,9 @@ fn design() -> LensFile {
     interfaces[4].thickness_after_mm = 0.0;
     let lens = Lens::new("placed", "test", interfaces, 2).unwrap();
     let moves = vec![
-        Move { decenter_mm: [0.1, -0.2, 0.0], tilt_deg: [2.0, -1.0, 5.0], ..still((0, 0)) },
-        Move { decenter_mm: [0.4, 0.1, 0.0], tilt_deg: [1.0, 1.5, -20.0], pivot_mm: 1.25, ..still((3, 4)) },
-        Move { tilt_deg: [-3.0, 0.5, 0.0], tilt_first: true, ..still((4, 4)) },
+        CoordinateBreak { decenter_mm: [0.1, -0.2, 0.0], tilt_deg: [2.0, -1.0, 5.0], ..still((0, 0)) },
+        CoordinateBreak { decenter_mm: [0.4, 0.1, 0.0], tilt_deg: [1.0, 1.5, -20.0], pivot_mm: 1.25, ..still((3, 4)) },
+        CoordinateBreak { tilt_deg: [-3.0, 0.5, 0.0], tilt_first: true, ..still((4, 4)) },
     ];
     let mut file = LensFile::from(lens.with_moves(moves).unwrap());
     file.film_mm = Some(55.0);
@@ -144,7 +144,7 @@ fn files_written_trace_the_same() {
 
     let mut bent = design();
     let mut moves = bent.lens.moves().to_vec();
-    moves.push(Move { tilt_deg: [4.0, 0.0, 0.0], ..still((5, 5)) });
+    moves.push(CoordinateBreak { tilt_deg: [4.0, 0.0, 0.0], ..still((5, 5)) });
     let image_surface = ImageSurface { curvature_per_mm: -0.01, conic: 0.5 };
     bent.lens = bent.lens.with_moves(moves).unwrap().with_image_surface(image_surface).unwrap();
     let zmx = read("a.zmx", &bent.to_zmx().unwrap());
@@ -163,7 +163,7 @@ fn tilts_written_about_their_pivots_keep_every_length_of_the_axis() {
     for tilt_deg in [[30.0, 0.0, 0.0], [0.01, -0.02, 3.0], [0.0, 0.0, 45.0]] {
         for (surfaces, pivot_mm) in [((1, 2), 0.0), ((1, 2), 3.0), ((2, 2), -4.0)] {
             let mut file = read("plate.zmx", &wide);
-            let plate = Move { tilt_deg, pivot_mm, decenter_mm: [0.3, -0.1, 0.0], ..still(surfaces) };
+            let plate = CoordinateBreak { tilt_deg, pivot_mm, decenter_mm: [0.3, -0.1, 0.0], ..still(surfaces) };
             file.lens = file.lens.with_moves(vec![plate]).unwrap();
             let again = read("again.zmx", &file.to_zmx().unwrap());
             let lengths = |file: &LensFile| {

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use dioptric_optics::{
-    Lens, LensFile, Move, RayBatch, ReadOptions, Rims, Shape,
+    CoordinateBreak, Lens, LensFile, RayBatch, ReadOptions, Shape, Vignetting,
     glam::{DVec2, DVec3},
 };
 
@@ -27,8 +27,8 @@ fn read(text: &str) -> LensFile {
         .unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-fn still(surfaces: (usize, usize)) -> Move {
-    Move { surfaces, pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg: [0.0; 3], tilt_first: false }
+fn still(surfaces: (usize, usize)) -> CoordinateBreak {
+    CoordinateBreak { surfaces, pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg: [0.0; 3], tilt_first: false }
 }
 
 /// Where rays through a lens meet the film, in the film's own frame; with `swap` x and y change places before and after.
@@ -40,7 +40,7 @@ fn on_film(file: &LensFile, swap: bool) -> Vec<Option<DVec2>> {
     let starts: Vec<DVec3> = (0..81).map(start).collect();
     let direction = turn(DVec3::new(0.02, -0.03, 1.0).normalize());
     let mut rays = RayBatch::from_points(&starts, &[direction; 81]);
-    mono.trace(&mut rays, Rims::Clip);
+    mono.trace(&mut rays, Vignetting::On);
     mono.to_film(&mut rays, film_mm);
     let pose = mono.film_pose(film_mm);
     let place = |i: usize| {
@@ -67,11 +67,11 @@ fn assert_same(a: &[Option<DVec2>], b: &[Option<DVec2>], n_least: usize) {
 fn turns_about_x_and_y_are_left_handed() {
     let file = read(SEQ);
     let expected = [
-        Move { decenter_mm: [0.1, 0.2, 0.3], tilt_deg: [-2.0, -3.0, 4.0], ..still((1, 1)) },
-        Move { tilt_deg: [1.0, 0.0, 0.0], ..still((2, 3)) },
+        CoordinateBreak { decenter_mm: [0.1, 0.2, 0.3], tilt_deg: [-2.0, -3.0, 4.0], ..still((1, 1)) },
+        CoordinateBreak { tilt_deg: [1.0, 0.0, 0.0], ..still((2, 3)) },
     ];
     // A plane in air that is not the stop does nothing, and is dropped; what it turns is not.
-    let merged = Move { surfaces: (2, 2), pivot_mm: 10.0, ..expected[1] };
+    let merged = CoordinateBreak { surfaces: (2, 2), pivot_mm: 10.0, ..expected[1] };
     assert_eq!(file.lens.moves(), [expected[0], merged]);
     assert_eq!(file.lens.image_surface().curvature_per_mm, -1.0 / 30.0);
     assert_eq!(file.film_mm, Some(30.0));
@@ -88,7 +88,7 @@ fn leaning_front_bends_light_as_a_prism_does() {
     let lean = 3_f64.to_radians();
     assert!((normal - DVec3::new(0.0, lean.sin(), lean.cos())).length() < 1e-15, "{normal}");
     let mut rays = RayBatch::from_points(&[DVec3::new(0.0, 0.0, -5.0)], &[DVec3::Z]);
-    mono.trace(&mut rays, Rims::Clip);
+    mono.trace(&mut rays, Vignetting::On);
     // Snell at the leaning front, of the angles to its normal, and then at the upright back.
     let within = lean - (lean.sin() / 1.5).asin();
     assert!((rays.direction(0).y - 1.5 * within.sin()).abs() < 1e-15, "{}", rays.direction(0));
@@ -179,7 +179,7 @@ fn cylinder_focuses_in_one_plane() {
         let lens: &Lens = &file.lens;
         let mono = lens.at(550.0).unwrap();
         let mut rays = RayBatch::from_points(&[start], &[DVec3::Z]);
-        mono.trace_surfaces(0..1, &mut rays, Rims::Clip);
+        mono.trace_surfaces(0..1, &mut rays, Vignetting::On);
         rays.direction(0)
     };
     let (along_x, along_y) = (DVec3::new(1.5, 0.0, -3.0), DVec3::new(0.0, 1.5, -3.0));

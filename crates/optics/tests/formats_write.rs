@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use dioptric_optics::{
-    Field, Glass, Interface, Lens, LensFile, ObjectPoint, RayBatch, ReadOptions, Rims, Shape, Surface, glam::DVec2,
-    rays_towards,
+    Field, Glass, Interface, Lens, LensFile, ObjectPoint, RayBatch, ReadOptions, Shape, Surface, Vignetting,
+    glam::DVec2, rays_towards,
 };
 
 fn read(name: &str, text: &str) -> LensFile {
@@ -21,7 +21,7 @@ fn traced(lens: &Lens, wavelength_nm: f64) -> RayBatch {
     let targets: Vec<DVec2> = (0..441).map(|i| DVec2::new(at(i / 21), at(i % 21))).collect();
     let point = ObjectPoint::from_field(&mono, DVec2::new(0.0, 0.01), 0.0);
     let mut rays = rays_towards(&point, &targets, first.entrance_pupil_z_mm, 0.0);
-    mono.trace(&mut rays, Rims::Clip);
+    mono.trace(&mut rays, Vignetting::On);
     rays
 }
 
@@ -168,11 +168,11 @@ fn glasses_of_the_lens_alone_go_into_a_catalogue_beside_the_zemax_file() {
 fn indices_of_a_dat_file_may_be_given_the_papers_slope() {
     let file = read("a.dat", "67 1.5 1.65 25\n0 1.5 0 25\n-67 0 1 25\n");
     let paper = Lens::built_in("paper-2el").unwrap();
-    let sloped = file.lens.with_slope(-0.04 / 300.0, 550.0).unwrap();
+    let sloped = file.lens.with_linear_dispersion(-0.04 / 300.0, 550.0).unwrap();
     for nm in [400.0, 550.0, 700.0] {
         check_same(&sloped, &paper, nm);
     }
-    assert!(file.lens.with_slope(f64::NAN, 550.0).is_err());
+    assert!(file.lens.with_linear_dispersion(f64::NAN, 550.0).is_err());
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dioptric_optics::{
     CatalogueGlass, Field, Glass, GlassCatalogue, Lens, LensFile, MissingGlass, ObjectPoint, OpticsError, ReadOptions,
-    Rims, Shape,
+    Shape, Vignetting,
     analysis::{PupilCoordinates, PupilSampling, hexapolar},
     glam::DVec2,
 };
@@ -308,7 +308,7 @@ fn rims_of_a_wide_angle_lens_are_those_of_rays_aimed_at_its_stop() {
     let places = PupilSampling {
         coordinates: PupilCoordinates::Stop { radius_mm: read.stop_semi_aperture_mm() * (1.0 - 1e-6) },
         places: hexapolar(4),
-        rims: Rims::Clip,
+        rims: Vignetting::On,
     };
     for field_deg in [0.0, 60.0, 80.0_f64] {
         let point = ObjectPoint::from_field(&mono, DVec2::new(0.0, -field_deg.to_radians().tan()), 0.0);

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use dioptric_optics::{
-    Glass, Interface, Lens, LensFile, MonoLens, ObjectPoint, OpticsError, RayBatch, ReadOptions, Rims, SeidelSettings,
-    Surface,
+    Glass, Interface, Lens, LensFile, MonoLens, ObjectPoint, OpticsError, RayBatch, ReadOptions, SeidelSettings,
+    Surface, Vignetting,
     analysis::{AstigmaticFoci, NumericalApertures, PupilCoordinates, PupilSampling, projected_solid_angle},
     glam::{DVec2, DVec3},
 };
@@ -40,7 +40,7 @@ fn fan(lens: &MonoLens, z_mm: f64, steepest_deg: f64) -> RayBatch {
         .map(|angle| DVec3::new(0.6 * angle.sin(), 0.8 * angle.sin(), angle.cos()))
         .collect();
     let mut rays = RayBatch::from_points(&vec![DVec3::Z * z_mm; directions.len()], &directions);
-    lens.trace(&mut rays, Rims::Clip);
+    lens.trace(&mut rays, Vignetting::On);
     assert_eq!(rays.n_in_flight(), rays.len());
     rays
 }
@@ -188,7 +188,7 @@ fn an_objective_in_water_has_optilands_numbers() {
     ] {
         let direction = DVec3::new(l, m, (1.0f64 - l * l - m * m).sqrt());
         let mut rays = RayBatch::from_points(&[DVec3::new(0.0, y_mm, -0.25)], &[direction]);
-        lens.trace(&mut rays, Rims::Ignore);
+        lens.trace(&mut rays, Vignetting::Off);
         lens.to_film(&mut rays, 30.0);
         let found = [rays.x_mm[0], rays.y_mm[0], rays.m[0], rays.opl_mm[0]];
         for (found, expected) in found.iter().zip(expected) {
@@ -209,7 +209,7 @@ fn only_ratios_of_indices_bend_rays() {
     let sampling = PupilSampling {
         coordinates: PupilCoordinates::stop(&lens),
         places: vec![DVec2::ZERO, DVec2::new(0.3, -0.5), DVec2::new(-0.7, 0.1)],
-        rims: Rims::Ignore,
+        rims: Vignetting::Off,
     };
     let (here, there) = (sampling.rays_on_film(&lens, &point, 5.0), sampling.rays_on_film(&dense, &point, 5.0));
     for i in 0..here.len() {
@@ -254,7 +254,7 @@ fn a_path_in_water_counts_with_its_index_and_swallows_light() {
     assert!(!absorption.is_unknown_before() && absorption.unknown_behind().is_empty());
     let direction = DVec3::new(0.0, 0.3, (1.0f64 - 0.09).sqrt());
     let mut rays = RayBatch::from_points(&[DVec3::Z * -8.0; 2], &[DVec3::Z, direction]);
-    let shares = absorption.trace(&buried.at(420.0).unwrap(), &mut rays, Rims::Clip);
+    let shares = absorption.trace(&buried.at(420.0).unwrap(), &mut rays, Vignetting::On);
     for (share, path_mm) in shares.iter().zip([8.0, 8.0 / direction.z]) {
         assert!((share - glass.internal_transmittance(420.0, path_mm).unwrap()).abs() < 1e-15);
     }

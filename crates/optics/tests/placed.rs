@@ -2,14 +2,14 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_optics::{
-    Glass, ImageSurface, Interface, Lens, MonoLens, Move, ObjectPoint, PupilBoundary, RayBatch, RayFate, Rims,
-    SeidelSettings, Shape, Surface,
+    CoordinateBreak, Glass, ImageSurface, Interface, Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, RayFate,
+    SeidelSettings, Shape, Surface, Vignetting,
     glam::{DMat3, DVec2, DVec3},
     rays_towards,
 };
 
-fn still(surfaces: (usize, usize)) -> Move {
-    Move { surfaces, pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg: [0.0; 3], tilt_first: false }
+fn still(surfaces: (usize, usize)) -> CoordinateBreak {
+    CoordinateBreak { surfaces, pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg: [0.0; 3], tilt_first: false }
 }
 
 /// A plate of glass between planes.
@@ -55,10 +55,10 @@ fn assert_near(a: &RayBatch, b: &RayBatch, tolerance_mm: f64) {
 fn tilted_plate_shifts_a_ray_sideways() {
     let (index, thickness_mm) = (1.5168, 7.0);
     for tilt_deg in [5.0_f64, 30.0, -45.0] {
-        let tilt = Move { tilt_deg: [tilt_deg, 0.0, 0.0], ..still((0, 1)) };
+        let tilt = CoordinateBreak { tilt_deg: [tilt_deg, 0.0, 0.0], ..still((0, 1)) };
         let lens = plate(index, thickness_mm).with_moves(vec![tilt]).unwrap().at(550.0).unwrap();
         let mut rays = RayBatch::from_points(&[DVec3::new(0.3, 0.2, -30.0)], &[DVec3::Z]);
-        lens.trace(&mut rays, Rims::Clip);
+        lens.trace(&mut rays, Vignetting::On);
         lens.to_film(&mut rays, 25.0);
         let (sine, cosine) = tilt_deg.to_radians().sin_cos();
         // The ray turns towards the normal, which leans to −y for a positive turn about x.
@@ -72,10 +72,10 @@ fn tilted_plate_shifts_a_ray_sideways() {
 #[test]
 fn wedge_bends_a_ray_as_a_prism_does() {
     let (index, wedge_deg) = (1.6, 12.0_f64);
-    let tilt = Move { tilt_deg: [0.0, wedge_deg, 0.0], ..still((1, 1)) };
+    let tilt = CoordinateBreak { tilt_deg: [0.0, wedge_deg, 0.0], ..still((1, 1)) };
     let lens = plate(index, 5.0).with_moves(vec![tilt]).unwrap().at(550.0).unwrap();
     let mut rays = RayBatch::from_points(&[DVec3::new(0.0, 0.0, -1.0)], &[DVec3::Z]);
-    lens.trace(&mut rays, Rims::Clip);
+    lens.trace(&mut rays, Vignetting::On);
     // Into the plate head-on; out of it at the wedge's angle: sin(wedge + deviation) = n sin(wedge).
     let deviation = (index * wedge_deg.to_radians().sin()).asin() - wedge_deg.to_radians();
     assert!((rays.l[0] + deviation.sin()).abs() < 1e-15, "{} {}", rays.l[0], deviation.sin());
@@ -85,7 +85,8 @@ fn wedge_bends_a_ray_as_a_prism_does() {
 fn whole_lens_moved_is_its_rays_moved_back() {
     let lens = Lens::built_in("dgauss-50mm").unwrap();
     let n = lens.interfaces().len();
-    let step = Move { pivot_mm: 13.0, decenter_mm: [1.5, -0.7, 2.0], tilt_deg: [8.0, -5.0, 20.0], ..still((0, n)) };
+    let step =
+        CoordinateBreak { pivot_mm: 13.0, decenter_mm: [1.5, -0.7, 2.0], tilt_deg: [8.0, -5.0, 20.0], ..still((0, n)) };
     let (film_mm, centered) = (36.5, lens.at(550.0).unwrap());
     let placed = lens.with_moves(vec![step]).unwrap();
     assert!(!placed.is_rotational());
@@ -93,9 +94,9 @@ fn whole_lens_moved_is_its_rays_moved_back() {
     let pose = placed.film_pose(-centered.last_vertex_z_mm());
     let start = bundle(&centered, 1000);
     let (mut expected, mut found) = (start.clone(), moved(&start, pose.rotation, pose.vertex_mm));
-    centered.trace(&mut expected, Rims::Clip);
+    centered.trace(&mut expected, Vignetting::On);
     centered.to_film(&mut expected, film_mm);
-    placed.trace_parallel(&mut found, Rims::Clip);
+    placed.trace_parallel(&mut found, Vignetting::On);
     placed.to_film(&mut found, film_mm);
     assert!(expected.n_in_flight() > 200 && expected.losses().by_surface.len() > 3);
     // Some hundred roundings of numbers of the order of 100 mm, of which steep rays make a few times more.
@@ -107,15 +108,15 @@ fn decentred_group_is_rays_shifted_between_the_groups() {
     let lens = Lens::built_in("dgauss-50mm").unwrap();
     let (n, first) = (lens.interfaces().len(), 6);
     let shift_mm = DVec3::new(0.4, -0.3, 0.0);
-    let step = Move { decenter_mm: shift_mm.into(), ..still((first, n - 1)) };
+    let step = CoordinateBreak { decenter_mm: shift_mm.into(), ..still((first, n - 1)) };
     let centered = lens.at(550.0).unwrap();
     let placed = lens.with_moves(vec![step]).unwrap().at(550.0).unwrap();
     let start = bundle(&centered, 500);
     let (mut front, mut found) = (start.clone(), start);
-    centered.trace_surfaces(0..first, &mut front, Rims::Clip);
+    centered.trace_surfaces(0..first, &mut front, Vignetting::On);
     let mut shifted = moved(&front, DMat3::IDENTITY, -shift_mm);
-    centered.trace_surfaces(first..n, &mut shifted, Rims::Clip);
-    placed.trace(&mut found, Rims::Clip);
+    centered.trace_surfaces(first..n, &mut shifted, Vignetting::On);
+    placed.trace(&mut found, Vignetting::On);
     for i in (0..found.len()).filter(|&i| front.fate[i].is_in_flight()) {
         assert_eq!(found.fate[i], shifted.fate[i]);
         assert!((found.point_mm(i) - shifted.point_mm(i) - shift_mm).length() < 1e-12);
@@ -129,7 +130,7 @@ fn decentred_group_is_rays_shifted_between_the_groups() {
 #[test]
 fn pupil_of_a_decentred_lens_is_decentred() {
     let lens = Lens::built_in("dgauss-50mm").unwrap();
-    let step = Move { decenter_mm: [30.0, 5.0, 0.0], ..still((0, lens.interfaces().len())) };
+    let step = CoordinateBreak { decenter_mm: [30.0, 5.0, 0.0], ..still((0, lens.interfaces().len())) };
     let lens = lens.with_moves(vec![step]).unwrap().at(550.0).unwrap();
     // Thirty millimetres off, the axis of the lens frame does not even cross the lens.
     let point = ObjectPoint::Infinite(DVec3::new(0.0, 0.1, 1.0).normalize());
@@ -150,20 +151,22 @@ fn pupil_of_a_decentred_lens_is_decentred() {
 fn tilt_and_its_return_change_no_bit() {
     let lens = Lens::built_in("asphere-15mm").unwrap();
     let n = lens.interfaces().len();
-    let there = Move { pivot_mm: 1.0, tilt_deg: [3.0, 4.0, 5.0], decenter_mm: [0.1, 0.2, 0.3], ..still((0, n)) };
-    let back = Move { tilt_deg: [-3.0, -4.0, -5.0], decenter_mm: [-0.1, -0.2, -0.3], tilt_first: true, ..there };
+    let there =
+        CoordinateBreak { pivot_mm: 1.0, tilt_deg: [3.0, 4.0, 5.0], decenter_mm: [0.1, 0.2, 0.3], ..still((0, n)) };
+    let back =
+        CoordinateBreak { tilt_deg: [-3.0, -4.0, -5.0], decenter_mm: [-0.1, -0.2, -0.3], tilt_first: true, ..there };
     let again = lens.clone().with_moves(vec![there, back]).unwrap();
     assert!(again.is_rotational() && again.check_rotational("a test").is_ok());
     let (a, b) = (lens.at(550.0).unwrap(), again.at(550.0).unwrap());
     let (mut rays, mut same) = (bundle(&a, 300), bundle(&a, 300));
-    a.trace(&mut rays, Rims::Clip);
-    b.trace(&mut same, Rims::Clip);
+    a.trace(&mut rays, Vignetting::On);
+    b.trace(&mut same, Vignetting::On);
     assert_eq!(rays, same);
 }
 
 #[test]
 fn what_needs_symmetry_refuses_a_lens_without() {
-    let step = Move { decenter_mm: [0.1, 0.0, 0.0], ..still((0, 0)) };
+    let step = CoordinateBreak { decenter_mm: [0.1, 0.0, 0.0], ..still((0, 0)) };
     let lens = plate(1.5, 3.0).with_moves(vec![step]).unwrap();
     let message = lens.seidel(&SeidelSettings::far(0.1)).unwrap_err().to_string();
     let expected = "a sum of Seidel aberrations needs a lens that is centred and rotationally symmetric, \
@@ -181,8 +184,8 @@ fn file_and_back_keeps_moves_shapes_and_the_film() {
     let interfaces = vec![interface(biconic, Glass::Constant { index: 1.5 }), interface(toroid, Glass::Air)];
     let lens = Lens::new("anamorphic", "test", interfaces, 0).unwrap();
     let moves = vec![
-        Move { tilt_deg: [1.0, 2.0, 3.0], tilt_first: true, ..still((1, 2)) },
-        Move { decenter_mm: [0.1, 0.0, -0.2], pivot_mm: 0.7, ..still((0, 0)) },
+        CoordinateBreak { tilt_deg: [1.0, 2.0, 3.0], tilt_first: true, ..still((1, 2)) },
+        CoordinateBreak { decenter_mm: [0.1, 0.0, -0.2], pivot_mm: 0.7, ..still((0, 0)) },
     ];
     let image_surface = ImageSurface { curvature_per_mm: -1.0 / 12.0, conic: 0.25 };
     let lens = lens.with_moves(moves).unwrap().with_image_surface(image_surface).unwrap();
@@ -204,9 +207,9 @@ fn rays_end_on_a_curved_film() {
     assert!(curved.is_rotational(), "a curved film is no tilt");
     let film_mm = 36.5;
     let mut rays = bundle(&curved, 200);
-    curved.trace(&mut rays, Rims::Clip);
+    curved.trace(&mut rays, Vignetting::On);
     let (mut flat, behind) = (rays.clone(), rays.clone());
-    curved.to_image_surface(&mut rays, film_mm);
+    curved.to_film(&mut rays, film_mm);
     curved.to_film(&mut flat, film_mm);
     let center = DVec3::Z * (curved.last_vertex_z_mm() + film_mm - 40.0);
     assert!(rays.n_in_flight() > 50);
@@ -219,13 +222,13 @@ fn rays_end_on_a_curved_film() {
     // On a film that is flat by default both are one.
     let flat_lens = lens.at(550.0).unwrap();
     let mut same = behind;
-    flat_lens.to_image_surface(&mut same, film_mm);
+    flat_lens.to_film(&mut same, film_mm);
     assert_eq!(same, flat);
     // A small ball does not fill the field.
     let ball = ImageSurface { curvature_per_mm: -1.0, conic: 0.0 };
     let ball = Lens::built_in("dgauss-50mm").unwrap().with_image_surface(ball).unwrap().at(550.0).unwrap();
     let mut rays = bundle(&ball, 200);
-    ball.trace(&mut rays, Rims::Clip);
-    ball.to_image_surface(&mut rays, film_mm);
+    ball.trace(&mut rays, Vignetting::On);
+    ball.to_film(&mut rays, film_mm);
     assert!(rays.fate.contains(&RayFate::Missed { surface: 11 }));
 }

@@ -70,7 +70,7 @@ fn widest_lens_has_light_at_every_field() {
 
 #[test]
 fn crescent_pupils_are_found_whole() {
-    // Rims far apart in the light's direction: what passes a singlet or asphere from the side is no disc.
+    // Vignetting far apart in the light's direction: what passes a singlet or asphere from the side is no disc.
     check("asphere", &built_in("asphere-15mm"), &[60.0, 68.0, 72.0], 1000, 2e-3);
     let lens = built_in("asphere-15mm");
     let parts = PupilBoundary::find_parts(&lens, &far(72.0), N_AZIMUTHS);

@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_optics::{
-    Glass, Interface, Lens, MonoLens, ObjectPoint, RayBatch, RayFate, Rims, Shape, Surface,
+    Glass, Interface, Lens, MonoLens, ObjectPoint, RayBatch, RayFate, Shape, Surface, Vignetting,
     glam::{DVec2, DVec3},
     rays_towards,
 };
@@ -22,7 +22,7 @@ fn traced(lens: &MonoLens, direction: DVec3) -> RayBatch {
     let place = |i: usize| 5.0 * (i as f64 / 60.0).sqrt() * DVec2::from_angle(2.4 * i as f64);
     let targets: Vec<DVec2> = (0..60).map(place).collect();
     let mut rays = rays_towards(&ObjectPoint::Infinite(direction.normalize()), &targets, 0.0, -20.0);
-    lens.trace(&mut rays, Rims::Clip);
+    lens.trace(&mut rays, Vignetting::On);
     rays
 }
 
@@ -95,7 +95,7 @@ fn toroid_has_a_focal_line_for_each_of_its_radii() {
     let height_mm = 1e-3;
     let starts = [DVec3::new(height_mm, 0.0, -1.0), DVec3::new(0.0, height_mm, -1.0)];
     let mut rays = RayBatch::from_points(&starts, &[DVec3::Z; 2]);
-    lens.trace(&mut rays, Rims::Clip);
+    lens.trace(&mut rays, Vignetting::On);
     let crosses_mm = [-rays.x_mm[0] / rays.l[0], -rays.y_mm[1] / rays.m[1]];
     for (found_mm, radius_mm) in crosses_mm.into_iter().zip([radius_x_mm, radius_y_mm]) {
         // Spherical aberration at this height is of the order of its square over the radius.
@@ -125,7 +125,7 @@ fn rays_end_on_the_surface_that_the_formula_states() {
 fn rays_beside_the_surface_miss_it() {
     let lens = single(10.0, biconic(8.0, 0.0, 0.0));
     let mut rays = RayBatch::from_points(&[DVec3::new(8.1, 0.0, -5.0), DVec3::new(3.0, 3.0, -5.0)], &[DVec3::Z; 2]);
-    lens.trace(&mut rays, Rims::Ignore);
+    lens.trace(&mut rays, Vignetting::Off);
     assert_eq!(rays.fate, [RayFate::Missed { surface: 0 }, RayFate::InFlight]);
 }
 

@@ -6,7 +6,7 @@
 
 use std::hint::black_box;
 
-use dioptric_optics::{Lens, RayBatch, RayBatchF32, Rims};
+use dioptric_optics::{Lens, RayBatch, RayBatchF32, Vignetting};
 use iced_x86::{Decoder, DecoderOptions, Instruction, Mnemonic as M};
 use multiversion::multiversion;
 use object::{Object, ObjectSection, ObjectSymbol};
@@ -70,8 +70,8 @@ fn arithmetic_of(path_end: &str) -> Vec<Arithmetic> {
     // So that the linker keeps the kernel.
     let lens = Lens::built_in("dgauss-50mm").and_then(|lens| lens.at(550.0)).expect("the lens is built in");
     let mut rays = black_box(RayBatch::default());
-    lens.trace_to_film(&mut rays, Rims::Clip, 36.0);
-    lens.trace_to_film_f32(&mut RayBatchF32::from(&rays), Rims::Clip, 36.0);
+    lens.trace_to_film(&mut rays, Vignetting::On, 36.0);
+    lens.trace_to_film_f32(&mut RayBatchF32::from(&rays), Vignetting::On, 36.0);
     found
 }
 

@@ -40,7 +40,7 @@ impl LensChoice {
             Self::Pinhole { diameter_mm } => LensFile::from(Lens::pinhole(*diameter_mm)?),
         };
         if let Some(slope_per_nm) = reading.slope_per_nm {
-            file.lens = file.lens.with_slope(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
+            file.lens = file.lens.with_linear_dispersion(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
         }
         Ok(file)
     }
@@ -98,7 +98,7 @@ pub struct LensReading {
     /// Glass catalogues (`.agf`, `.yml`) to look in before the built-in one.
     pub glasses: Vec<PathBuf>,
     /// What to do with a glass that no catalogue has.
-    pub missing_glass: MissingGlassChoice,
+    pub missing_glass: MissingGlass,
     /// The change of index a nanometre, about [`REFERENCE_WAVELENGTH_NM`], of the media of which only one index is stated.
     pub slope_per_nm: Option<f64>,
     /// What the numbers of surfaces are in a CODE V file that says neither radii nor curvatures; `None` for what is plausible.
@@ -118,7 +118,7 @@ pub enum SeqNumbersChoice {
 /// What to do with a glass that no catalogue has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum MissingGlassChoice {
+pub enum MissingGlass {
     /// Refuse the lens and say which glass is missing.
     #[default]
     Refuse,
@@ -146,9 +146,9 @@ impl LensReading {
     fn options(&self) -> Result<ReadOptions, PipelineError> {
         let catalogues = self.glasses.iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
         let missing_glass = match self.missing_glass {
-            MissingGlassChoice::Refuse => MissingGlass::Refuse,
-            MissingGlassChoice::FromNdVd => MissingGlass::FromNdVd,
-            MissingGlassChoice::Nearest => MissingGlass::Nearest,
+            MissingGlass::Refuse => MissingGlass::Refuse,
+            MissingGlass::FromNdVd => MissingGlass::FromNdVd,
+            MissingGlass::Nearest => MissingGlass::Nearest,
         };
         let seq_numbers = self.seq_numbers.map(|numbers| match numbers {
             SeqNumbersChoice::Radii => SeqNumbers::Radii,

@@ -68,7 +68,7 @@ pub use lens_analysis::{
     AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, FanRow, FieldPlace, FieldRow, FocusData, GridRow,
     LensAnalysis, OpdMap, PupilRow, SpotRow, WavefrontRow,
 };
-pub use lens_choice::{LensReading, MissingGlassChoice, REFERENCE_WAVELENGTH_NM, SeqNumbersChoice};
+pub use lens_choice::{LensReading, MissingGlass, REFERENCE_WAVELENGTH_NM, SeqNumbersChoice};
 pub use lens_drawing::LensDrawing;
 pub use lens_table::{ImageData, LensData, LensQuestion, LensRow, PlaneData, built_in_lenses};
 pub use lens_use::LensUse;

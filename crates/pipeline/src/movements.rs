@@ -1,6 +1,6 @@
 //! The movements of a view camera: the lens turned and moved before the film.
 
-use dioptric_optics::{Lens, Move};
+use dioptric_optics::{CoordinateBreak, Lens};
 use serde::{Deserialize, Serialize};
 
 use crate::{PipelineError, REFERENCE_WAVELENGTH_NM};
@@ -31,7 +31,7 @@ impl Movements {
             return Ok(lens);
         }
         let pupil_z_mm = lens.at(REFERENCE_WAVELENGTH_NM)?.projection_center_z_mm();
-        let whole = Move {
+        let whole = CoordinateBreak {
             surfaces: (0, lens.interfaces().len() - 1),
             // The pupil of a lens that is telecentric before the object is infinitely far.
             pivot_mm: if pupil_z_mm.is_finite() { pupil_z_mm } else { 0.0 },
@@ -48,7 +48,7 @@ impl Movements {
 
 #[cfg(test)]
 mod tests {
-    use dioptric_optics::{ObjectPoint, Rims, glam::DVec2, rays_towards};
+    use dioptric_optics::{ObjectPoint, Vignetting, glam::DVec2, rays_towards};
 
     use super::*;
 
@@ -57,7 +57,7 @@ mod tests {
         let mono = lens.at(550.0).unwrap();
         let point = ObjectPoint::from_field(&mono, field_tan, 0.0);
         let mut rays = rays_towards(&point, &[DVec2::ZERO], mono.projection_center_z_mm(), 0.0);
-        mono.trace(&mut rays, Rims::Ignore);
+        mono.trace(&mut rays, Vignetting::Off);
         mono.to_film(&mut rays, mono.first_order().bfl_mm);
         -rays.point_mm(0).truncate()
     }

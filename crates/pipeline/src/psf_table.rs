@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_diffraction::{PupilGrid, WaveNodes};
+use dioptric_diffraction::{PupilGrid, PupilSamples};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
 use dioptric_psf::{ModelUse, Picture};
 use dioptric_scene::write_planes_exr;
@@ -96,7 +96,7 @@ impl PsfRequest {
             (row.wave_share, row.fallback) = (Some(wave_share), fallback);
         }
         if row.is_of_waves() {
-            let nodes = WaveNodes::trace(&mono, &point, film_mm, PupilGrid { n_radii: 24, n_azimuths: 96 }, None);
+            let nodes = PupilSamples::trace(&mono, &point, film_mm, PupilGrid { n_radii: 24, n_azimuths: 96 }, None);
             // Waves of a blur too large for these nodes have no peak to speak of.
             row.strehl = nodes.and_then(|nodes| nodes.peak()).ok().map(|peak| peak.strehl);
         }

@@ -1,7 +1,7 @@
 //! A camera with everything it names opened: the lens, the scene, the film and the sensor.
 
 use dioptric_forward::{BlurMode, Film, Settings};
-use dioptric_optics::{Lens, MonoLens, ObjectPoint, Rims, glam::DVec2, rays_towards};
+use dioptric_optics::{Lens, MonoLens, ObjectPoint, Vignetting, glam::DVec2, rays_towards};
 use dioptric_scene::{Scene, View};
 use dioptric_sensor::Sensor;
 use dioptric_spectrum::WavelengthGrid;
@@ -201,7 +201,7 @@ fn height_over_paraxial(lens: &MonoLens, tan: f64, film_mm: f64) -> f64 {
 fn chief_ray_mm(lens: &MonoLens, field_tan: DVec2, film_mm: f64) -> Option<DVec2> {
     let point = ObjectPoint::from_field(lens, field_tan, 0.0);
     let mut rays = rays_towards(&point, &[DVec2::ZERO], lens.projection_center_z_mm(), 0.0);
-    lens.trace(&mut rays, Rims::Ignore);
+    lens.trace(&mut rays, Vignetting::Off);
     lens.to_film(&mut rays, film_mm);
     rays.fate[0].is_in_flight().then(|| rays.point_mm(0).truncate())
 }
@@ -223,7 +223,7 @@ fn widest_blur_mm(lens: &MonoLens, film_mm: f64, scene: &Scene) -> Result<f64, P
 mod tests {
     use super::*;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
-    use dioptric_optics::Move;
+    use dioptric_optics::CoordinateBreak;
 
     #[test]
     fn a_unit_tangent_lands_a_focal_length_off_axis_at_infinity_focus() {
@@ -245,7 +245,7 @@ mod tests {
         // A symmetric lens: both ways lead to the same, but for how distortion is sampled.
         assert_relative_eq!(seen_pitch_of_any_um(&mono, film_mm, &view, half), straight_um, max_relative = 2e-3);
         let whole = (0, lens.interfaces().len() - 1);
-        let aside = Move {
+        let aside = CoordinateBreak {
             surfaces: whole,
             pivot_mm: 0.0,
             decenter_mm: [1.0, 0.0, 0.0],

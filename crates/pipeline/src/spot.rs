@@ -2,7 +2,7 @@
 
 use dioptric_diffraction::{BendForm, Covariance, Edge, Hurb, bend};
 use dioptric_optics::{
-    MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
+    MonoLens, ObjectPoint, PupilBoundary, RayBatch, Vignetting,
     glam::{DVec2, DVec3, Vec2Swizzles},
     rays_over_front,
 };
@@ -49,7 +49,7 @@ impl Spot {
         }
         let mut rays = plane.rays(mono, point, &targets);
         let cones = solid_angles(point, &rays);
-        mono.trace(&mut rays, Rims::Clip);
+        mono.trace(&mut rays, Vignetting::On);
         mono.to_film(&mut rays, film_mm);
         let area_mm2 = |point: &ObjectPoint| {
             let whole = |lens: &MonoLens| area_of(point, &PupilBoundary::find_parts(lens, point, AZIMUTHS));
@@ -67,12 +67,12 @@ impl Spot {
     pub(crate) fn over_front(mono: &MonoLens, point: &ObjectPoint, film_mm: f64, paper: &PaperRays) -> Self {
         let mut rays = rays_over_front(mono, point, paper.n_across);
         let stop = mono.stop();
-        mono.trace_surfaces(0..stop + 1, &mut rays, Rims::Clip);
+        mono.trace_surfaces(0..stop + 1, &mut rays, Vignetting::On);
         if let Some(model) = paper.bending {
             let edge = Edge::new(mono.stop_semi_aperture_mm(), mono.wavelength_nm(), mono.stop_medium_index());
             bend(&mut rays, edge, model, BendForm::Angles, paper.seed);
         }
-        mono.trace_surfaces(stop + 1..mono.n_surfaces(), &mut rays, Rims::Clip);
+        mono.trace_surfaces(stop + 1..mono.n_surfaces(), &mut rays, Vignetting::On);
         mono.to_film(&mut rays, film_mm);
         let mut spot = Self::of_rays(&rays, |_| 1.0);
         spot.energy = spot.at_mm.len() as f64 / rays.len().max(1) as f64;

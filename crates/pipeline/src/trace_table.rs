@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_optics::{Lens, MonoLens, RayBatch, RayFate, Rims, glam::DVec3};
+use dioptric_optics::{Lens, MonoLens, RayBatch, RayFate, Vignetting, glam::DVec3};
 
 use crate::PipelineError;
 
@@ -158,14 +158,14 @@ struct Traced {
 }
 
 fn trace_all(lens: &MonoLens, mut rays: RayBatch, settings: &TraceSettings) -> Traced {
-    let rims = if settings.rims_clip { Rims::Clip } else { Rims::Ignore };
+    let rims = if settings.rims_clip { Vignetting::On } else { Vignetting::Off };
     let mut after_surface = Vec::with_capacity(lens.n_surfaces());
     for surface in 0..lens.n_surfaces() {
         lens.trace_surfaces(surface..surface + 1, &mut rays, rims);
         after_surface.push(rays.clone());
     }
     let at_image = settings.film_mm.map(|film_mm| {
-        lens.to_image_surface(&mut rays, film_mm);
+        lens.to_film(&mut rays, film_mm);
         rays
     });
     Traced { after_surface, at_image }

@@ -1,6 +1,6 @@
 //! The bank: ray maps over field, depth and wavelength, from which any point spread function is drawn.
 
-use dioptric_diffraction::{PupilEdge, WaveMap};
+use dioptric_diffraction::{PupilFunctionFit, PupilOutline};
 use dioptric_optics::{Lens, MonoLens};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -38,7 +38,7 @@ pub struct PsfBank {
     geometry_fields: Vec<f64>,
     summaries: Vec<Summary>,
     /// As many as there are records, or none.
-    waves: Vec<WaveMap>,
+    waves: Vec<PupilFunctionFit>,
     lens: Lens,
     reference: MonoLens,
     /// Index around the stop at each of the colours.
@@ -166,7 +166,7 @@ impl PsfBank {
         &self.summaries
     }
 
-    pub(crate) fn waves(&self) -> &[WaveMap] {
+    pub(crate) fn waves(&self) -> &[PupilFunctionFit] {
         &self.waves
     }
 
@@ -246,7 +246,7 @@ impl PsfBank {
     }
 
     /// Returns the interpolated waves of a point in a field along +x, or `None` if the bank has none.
-    pub(crate) fn wave_map(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> Option<WaveMap> {
+    pub(crate) fn wave_map(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> Option<PupilFunctionFit> {
         if self.waves.is_empty() {
             return None;
         }
@@ -261,7 +261,7 @@ impl PsfBank {
                 weighted.extend(fields.iter().map(|(f, wf)| (&self.waves[column + f], wc * wd * wf)));
             }
         }
-        WaveMap::mix(weighted.into_iter())
+        PupilFunctionFit::mix(weighted.into_iter())
     }
 
     pub(crate) fn record(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> Record {
@@ -294,7 +294,7 @@ pub(crate) struct Parts {
     pub(crate) records: Vec<Record>,
     pub(crate) summaries: Vec<Summary>,
     /// As many as there are records, or none.
-    pub(crate) waves: Vec<WaveMap>,
+    pub(crate) waves: Vec<PupilFunctionFit>,
 }
 
 /// All fields of one depth and wavelength.
@@ -303,7 +303,7 @@ struct Column {
     records: Vec<Record>,
     summaries: Vec<Summary>,
     /// Up to the first field whose waves are not smooth.
-    waves: Vec<WaveMap>,
+    waves: Vec<PupilFunctionFit>,
 }
 
 /// How columns are traced.
@@ -366,14 +366,14 @@ impl ColumnTracer<'_> {
 }
 
 /// Returns the waves of a point, if they are smooth over its pupil and that has no holes.
-fn wave_map(task: &Task<'_>, pupil: &Pupil) -> Option<WaveMap> {
+fn wave_map(task: &Task<'_>, pupil: &Pupil) -> Option<PupilFunctionFit> {
     if task.lens.n_obscurations() > 0 {
         return None;
     }
     let point = task.point();
     let pupil = pupil.resampled(WAVE_AZIMUTHS).near(task.lens, &point)?;
-    let edge = PupilEdge { center_x_mm: pupil.center_mm.x, z_mm: pupil.z_mm, rho_mm: &pupil.rho_mm };
-    WaveMap::trace(task.lens, &point, task.film_mm, edge).ok()
+    let edge = PupilOutline { center_x_mm: pupil.center_mm.x, z_mm: pupil.z_mm, rho_mm: &pupil.rho_mm };
+    PupilFunctionFit::trace(task.lens, &point, task.film_mm, edge).ok()
 }
 
 /// Returns the fields with others evenly between them.

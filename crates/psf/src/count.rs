@@ -4,7 +4,7 @@
 //! rays, keeps the light that is lost, and has no noise.
 
 use dioptric_diffraction::{BendForm, Edge, Hurb, bend};
-use dioptric_optics::{Beam, MonoLens, ObjectPoint, RayBatch, Rims, rays_towards};
+use dioptric_optics::{Beam, MonoLens, ObjectPoint, RayBatch, Vignetting, rays_towards};
 use glam::{DVec2, DVec3};
 use ndarray::Array2;
 use rand::RngExt;
@@ -71,7 +71,7 @@ impl FrontGrid {
 /// For a single ideal lens that is right; for others it spreads light too much, and is kept for comparison only.
 pub fn trace_as_authors(lens: &MonoLens, rays: &mut RayBatch, film_mm: f64, bending: Option<AuthorsBending>) {
     for surface in 0..lens.n_surfaces() {
-        lens.trace_surfaces(surface..surface + 1, rays, Rims::Clip);
+        lens.trace_surfaces(surface..surface + 1, rays, Vignetting::On);
         if let Some(AuthorsBending { model, seed }) = bending {
             let edge = Edge::new(lens.semi_aperture_mm(surface), lens.wavelength_nm(), 1.0);
             bend(rays, edge, model, BendForm::Angles, seed.wrapping_add(surface as u64));
@@ -94,7 +94,7 @@ impl CountingFilm {
     /// storing them.
     pub fn count_beam(self, lens: &MonoLens, beam: &Beam<'_>, film_mm: f64) -> Array2<f64> {
         let mut counts = Array2::zeros((self.n_pixels, self.n_pixels));
-        lens.trace_onto(beam, Rims::Clip, film_mm, |rays| self.add(rays, &mut counts));
+        lens.trace_onto(beam, Vignetting::On, film_mm, |rays| self.add(rays, &mut counts));
         counts
     }
 
@@ -162,7 +162,7 @@ mod tests {
         let source_mm = DVec3::new(100.0, 0.0, -2_000.0);
         let (film_mm, targets_mm) = (52.0, grid.targets_mm(&lens));
         let mut rays = grid.rays(&lens, source_mm);
-        lens.trace_to_film(&mut rays, Rims::Clip, film_mm);
+        lens.trace_to_film(&mut rays, Vignetting::On, film_mm);
         let center_mm = mean_place_mm(&rays).unwrap();
         let film = CountingFilm { n_pixels: 64, side_mm: 1.0, center_mm };
         let beam = Beam { point: ObjectPoint::Finite(source_mm), targets_mm: &targets_mm, z_mm: 0.0 };

@@ -1,7 +1,7 @@
 //! Where the nodes of the pupil mesh land on the film: the map from which a point spread function is drawn.
 
 use dioptric_diffraction::{StopRay, trace_stop_rays};
-use dioptric_optics::{MonoLens, ObjectPoint, RayFate, Rims, rays_towards};
+use dioptric_optics::{MonoLens, ObjectPoint, RayFate, Vignetting, rays_towards};
 use glam::DVec2;
 use multiversion::multiversion;
 
@@ -204,7 +204,7 @@ impl Task<'_> {
             };
             trace_stop_rays(self.lens, rays, self.film_mm).into_iter().map(|ray| ray.map(node)).collect()
         } else {
-            self.lens.trace(&mut rays, Rims::Ignore);
+            self.lens.trace(&mut rays, Vignetting::Off);
             self.lens.to_film(&mut rays, self.film_mm);
             let node = |ray| Node { at_mm: -rays.point_mm(ray).truncate(), ..Node::default() };
             (0..rays.len()).map(|ray| rays.fate[ray].is_in_flight().then(|| node(ray))).collect()
@@ -271,10 +271,10 @@ impl Task<'_> {
             .collect();
         let passed = |lens: &MonoLens| {
             let mut rays = rays_towards(point, &targets, pupil.z_mm, 0.0);
-            lens.trace(&mut rays, Rims::Clip);
+            lens.trace(&mut rays, Vignetting::On);
             rays.fate
         };
-        // Rims end some rays of the outermost cells, whose areas have that already.
+        // Vignetting end some rays of the outermost cells, whose areas have that already.
         let (holed, whole) = (passed(self.lens), passed(&self.lens.with_obscurations_inverted(&[])));
         let n_passed = |fates: &[RayFate]| fates.iter().filter(|fate| fate.is_in_flight()).count();
         let share = |(holed, whole)| n_passed(holed) as f64 / n_passed(whole).max(1) as f64;

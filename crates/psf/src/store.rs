@@ -2,7 +2,7 @@
 
 use std::{fs, io::Write, path::Path};
 
-use dioptric_diffraction::WaveMap;
+use dioptric_diffraction::PupilFunctionFit;
 use dioptric_optics::Lens;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -118,7 +118,7 @@ impl PsfBank {
         let waves = match header.n_wave_numbers {
             0 => vec![],
             n => {
-                let maps = wave_numbers.chunks(n).map(|numbers| WaveMap::from_numbers(numbers.to_vec()));
+                let maps = wave_numbers.chunks(n).map(|numbers| PupilFunctionFit::from_numbers(numbers.to_vec()));
                 maps.collect::<Option<_>>().ok_or_else(|| not_a_bank(path))?
             }
         };

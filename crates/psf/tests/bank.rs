@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_diffraction::airy;
-use dioptric_optics::{Lens, Move, glam::DVec2};
+use dioptric_optics::{CoordinateBreak, Lens, glam::DVec2};
 use dioptric_psf::{BankSettings, Diffraction, Picture, PsfBank};
 
 fn dgauss(f_number: f64) -> Lens {
@@ -35,8 +35,13 @@ fn axial_brightness_is_that_of_the_working_f_number() {
 
 #[test]
 fn lens_without_an_axis_of_symmetry_is_refused() {
-    let step =
-        Move { surfaces: (0, 0), pivot_mm: 0.0, decenter_mm: [0.1, 0.0, 0.0], tilt_deg: [0.0; 3], tilt_first: false };
+    let step = CoordinateBreak {
+        surfaces: (0, 0),
+        pivot_mm: 0.0,
+        decenter_mm: [0.1, 0.0, 0.0],
+        tilt_deg: [0.0; 3],
+        tilt_first: false,
+    };
     let lens = dgauss(4.0).with_moves(vec![step]).unwrap();
     let settings = BankSettings::covering(36.5, 0.1, (0.5, 0.5), (550.0, 550.0), Diffraction::None);
     let message = PsfBank::build(&lens, &settings).unwrap_err().to_string();

@@ -3,7 +3,7 @@
 
 use dioptric_diffraction::{BendForm, Edge, Hurb, bend};
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims,
+    Lens, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Vignetting,
     glam::{DVec2, DVec3},
     rays_towards,
 };
@@ -23,11 +23,11 @@ fn rays_at_stop(lens: &MonoLens, point: &ObjectPoint, n_rays: usize) -> RayBatch
         })
         .collect();
     let mut rays = rays_towards(point, &targets, boundary.z_mm(), 0.0);
-    lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Rims::Clip);
-    // Rims behind the stop clip the straight ray, not the bent one.
+    lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Vignetting::On);
+    // Vignetting behind the stop clip the straight ray, not the bent one.
     let mut straight = rays.clone();
     if lens.stop() + 1 < lens.n_surfaces() {
-        lens.trace_surfaces(lens.stop() + 1..lens.n_surfaces(), &mut straight, Rims::Clip);
+        lens.trace_surfaces(lens.stop() + 1..lens.n_surfaces(), &mut straight, Vignetting::On);
     }
     let kept: Vec<usize> = (0..n_rays).filter(|&ray| straight.fate[ray].is_in_flight()).collect();
     let points: Vec<DVec3> = kept.iter().map(|&ray| rays.point_mm(ray)).collect();
@@ -42,7 +42,7 @@ fn difference(lens: &Lens, kernel: &Kernel, field_tan: f64, dioptres: f64, film_
     let behind = rays_at_stop(&mono, &point, 100_000);
     let land = |mut rays: RayBatch| {
         if mono.stop() + 1 < mono.n_surfaces() {
-            mono.trace_surfaces(mono.stop() + 1..mono.n_surfaces(), &mut rays, Rims::Ignore);
+            mono.trace_surfaces(mono.stop() + 1..mono.n_surfaces(), &mut rays, Vignetting::Off);
         }
         mono.to_film(&mut rays, film_mm);
         (0..rays.len()).map(|ray| -rays.point_mm(ray).truncate()).collect::<Vec<DVec2>>()

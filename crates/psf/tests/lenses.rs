@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use dioptric_optics::{Lens, ObjectPoint, PupilBoundary, Rims, glam::DVec2, rays_towards};
+use dioptric_optics::{Lens, ObjectPoint, PupilBoundary, Vignetting, glam::DVec2, rays_towards};
 use dioptric_psf::{BankSettings, Diffraction, Kernel, Picture, PsfBank};
 
 #[test]
@@ -100,7 +100,7 @@ fn counted(lens: &Lens, like: &Kernel, field_tan: f64, dioptres: f64, film_mm: f
     };
     let targets: Vec<DVec2> = (0..n).map(spiral).collect();
     let mut rays = rays_towards(&point, &targets, boundary.z_mm(), 0.0);
-    mono.trace(&mut rays, Rims::Clip);
+    mono.trace(&mut rays, Vignetting::On);
     mono.to_film(&mut rays, film_mm);
     let landed: Vec<DVec2> =
         (0..n).filter(|&i| rays.fate[i].is_in_flight()).map(|i| -rays.point_mm(i).truncate()).collect();

@@ -1,6 +1,6 @@
 //! A pupil cut into the cells of a square grid, by trying which rays get through.
 
-use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, Rims};
+use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, Vignetting};
 use glam::DVec2;
 
 /// A part of the pupil, in the plane that [`PupilBoundary`] lies in.
@@ -63,7 +63,7 @@ impl Grid<'_> {
 
     fn are_clear(&self, targets_mm: &[DVec2]) -> Vec<bool> {
         let mut rays = self.lens.rays_towards(self.point, targets_mm, self.z_mm, 0.0);
-        self.lens.trace(&mut rays, Rims::Clip);
+        self.lens.trace(&mut rays, Vignetting::On);
         rays.fate.iter().map(|fate| fate.is_in_flight()).collect()
     }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, Rims};
+use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, Vignetting};
 use glam::{DVec2, DVec3};
 
 use super::{grid::PupilGrid, propagation::Waves};
@@ -86,7 +86,7 @@ impl PupilCells {
         let targets_mm: Vec<DVec2> =
             steps.iter().flat_map(|step| self.targets_mm.iter().map(move |target| target + step)).collect();
         let mut rays = lens.rays_towards(point, &targets_mm, self.z_mm, 0.0);
-        lens.trace(&mut rays, Rims::Ignore);
+        lens.trace(&mut rays, Vignetting::Off);
         lens.to_film(&mut rays, film_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         match n_lost {

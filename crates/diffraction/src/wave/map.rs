@@ -2,12 +2,12 @@
 
 use std::{cell::RefCell, f64::consts::TAU};
 
-use dioptric_optics::{MonoLens, ObjectPoint, Rims};
+use dioptric_optics::{MonoLens, ObjectPoint, Vignetting};
 use glam::DVec2;
 use multiversion::multiversion;
 
 use super::{
-    PupilGrid, WaveNodes, WavePsf, WaveWindow, WindowCenter,
+    PupilGrid, PupilSamples, WavePsf, WaveWindow, WindowCenter,
     cells::solid_angle_per_area,
     propagation::{Waves, has_few_zones},
     smooth::{Azimuth, Parity, Places, Ray, horner, radial_slope},
@@ -16,7 +16,7 @@ use crate::{DiffractionError, quadrature::gauss_legendre_on};
 
 /// The edge of a pupil that is symmetric about its x axis, in the entrance-pupil plane.
 #[derive(Clone, Copy, Debug)]
-pub struct PupilEdge<'a> {
+pub struct PupilOutline<'a> {
     /// What the distances count from, mm from the axis along x.
     pub center_x_mm: f64,
     /// z of the plane from the first vertex, mm.
@@ -33,7 +33,7 @@ pub struct PupilEdge<'a> {
 /// the pupil is then symmetric about x. Coordinates over the pupil count from its middle in units of twice its rms
 /// width and height, so that pupils of different vignetting correspond.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WaveMap {
+pub struct PupilFunctionFit {
     // Invariant: SCALARS, then the coefficients of dx, dy, Φ (mm) and ln brightness, then the edge from azimuth 0 to π.
     numbers: Vec<f64>,
 }
@@ -57,7 +57,7 @@ fn span(function: usize) -> (Parity, std::ops::Range<usize>) {
     (parity, SCALARS + start..SCALARS + start + parity.n_terms())
 }
 
-impl WaveMap {
+impl PupilFunctionFit {
     /// Traces the light of a point in a field along x to the film, `film_mm` behind the last vertex, and fits it.
     ///
     /// # Errors
@@ -67,7 +67,7 @@ impl WaveMap {
         lens: &MonoLens,
         point: &ObjectPoint,
         film_mm: f64,
-        edge: PupilEdge<'_>,
+        edge: PupilOutline<'_>,
     ) -> Result<Self, DiffractionError> {
         let wavelength_nm = lens.wavelength_nm();
         let folded = DiffractionError::Folded { wavelength_nm };
@@ -77,7 +77,7 @@ impl WaveMap {
         let half_mm = edge.half_sizes_mm();
         let (targets_mm, areas, places) = edge.places(half_mm);
         let mut rays = lens.rays_towards(point, &targets_mm, edge.z_mm, 0.0);
-        lens.trace(&mut rays, Rims::Ignore);
+        lens.trace(&mut rays, Vignetting::Off);
         lens.to_film(&mut rays, film_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         if n_lost > 0 {
@@ -167,8 +167,8 @@ impl WaveMap {
     ///
     /// # Errors
     /// When the rays do not fill the directions one to one.
-    pub fn nodes(&self, grid: PupilGrid, wavelength_nm: f64, turn: DVec2) -> Result<WaveNodes, DiffractionError> {
-        let mut room = Room { half: Lists::default(), nodes: WaveNodes::none() };
+    pub fn nodes(&self, grid: PupilGrid, wavelength_nm: f64, turn: DVec2) -> Result<PupilSamples, DiffractionError> {
+        let mut room = Room { half: Lists::default(), nodes: PupilSamples::none() };
         self.fill(&mut room, grid, wavelength_nm, turn)?;
         Ok(room.nodes)
     }
@@ -217,8 +217,8 @@ impl WaveMap {
     }
 
     /// Mirrors the half pupil, turns it to its field and counts from the centroid.
-    fn assemble(&self, nodes: &mut WaveNodes, turn: DVec2, half: &Lists) {
-        let WaveNodes { wavelength_nm, grid, .. } = *nodes;
+    fn assemble(&self, nodes: &mut PupilSamples, turn: DVec2, half: &Lists) {
+        let PupilSamples { wavelength_nm, grid, .. } = *nodes;
         let (n_radii, n_azimuths) = (grid.n_radii, grid.n_azimuths);
         // Each azimuth as its own in the half, and whether it is mirrored.
         let azimuths = || {
@@ -303,16 +303,16 @@ impl WaveMap {
 
 thread_local! {
     /// One for each thread: asking for memory and giving it back took as long as the nodes.
-    static ROOM: RefCell<Room> = RefCell::new(Room { half: Lists::default(), nodes: WaveNodes::none() });
+    static ROOM: RefCell<Room> = RefCell::new(Room { half: Lists::default(), nodes: PupilSamples::none() });
 }
 
 /// The nodes of a sum and of half of its pupil.
 struct Room {
     half: Lists,
-    nodes: WaveNodes,
+    nodes: PupilSamples,
 }
 
-impl PupilEdge<'_> {
+impl PupilOutline<'_> {
     fn azimuth(&self, i: usize) -> DVec2 {
         let (c, s) = super::cis::cis(i as f64 / self.rho_mm.len() as f64);
         DVec2::new(c, s)

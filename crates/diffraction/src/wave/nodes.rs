@@ -21,7 +21,7 @@ use crate::DiffractionError;
 /// The lists have one length and go azimuth by azimuth, `grid.n_radii` nodes from the inside outwards each; they can be
 /// filled by hand, from interpolated ray maps for one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WaveNodes {
+pub struct PupilSamples {
     /// Vacuum wavelength, nm.
     pub wavelength_nm: f64,
     /// Index of the image space, n.
@@ -53,7 +53,7 @@ pub struct WaveNodes {
     pub amplitude_per_mm: Vec<f64>,
 }
 
-impl WaveNodes {
+impl PupilSamples {
     /// Traces the nodes of the true, vignetted pupil to the film, `film_mm` behind the last vertex; the reference is
     /// the centroid of the rays, or `reference_mm` on the film.
     ///

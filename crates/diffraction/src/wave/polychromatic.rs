@@ -3,14 +3,14 @@
 use dioptric_optics::{Lens, ObjectPoint};
 use glam::DVec2;
 
-use super::{PupilGrid, WaveNodes, WavePsf, WaveQuality, WaveWindow, WindowCenter, wave_psf};
+use super::{PupilGrid, PupilSamples, WavePsf, WaveQuality, WaveWindow, WindowCenter, wave_psf};
 use crate::DiffractionError;
 
 /// Returns the point spread function of light made up of wavelengths (nm) with these weights, which need no
 /// particular sum.
 ///
 /// The weights are those of the light on the film: they hold the source, the lens's transmission and the sensor's
-/// response, and how much light the pupil takes in at each wavelength ([`WaveNodes::collected`]) if that differs. A
+/// response, and how much light the pupil takes in at each wavelength ([`PupilSamples::collected`]) if that differs. A
 /// window on the centroid is on that of the whole light.
 ///
 /// # Errors
@@ -29,7 +29,7 @@ pub fn polychromatic_psf(
     }
     let mut centroid_mm = DVec2::ZERO;
     for &(wavelength_nm, weight) in spectrum {
-        let nodes = WaveNodes::trace(&lens.at(wavelength_nm)?, point, film_mm, PupilGrid::STANDARD, None)?;
+        let nodes = PupilSamples::trace(&lens.at(wavelength_nm)?, point, film_mm, PupilGrid::STANDARD, None)?;
         centroid_mm += nodes.centroid_mm() * (weight / total);
     }
     let center_mm = match window.center {

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{WaveNodes, axis::SampleAxis, transform};
+use super::{PupilSamples, axis::SampleAxis, transform};
 use crate::DiffractionError;
 
 /// The peak of a point spread function.
@@ -17,7 +17,7 @@ pub struct Peak {
 /// Places to each side at which the peak is first looked for, at most.
 const LARGEST_SEARCH: usize = 80;
 
-impl WaveNodes {
+impl PupilSamples {
     /// Returns the irradiance at a film point over that of the same amplitudes all in phase.
     pub fn strehl_at(&self, film_mm: DVec2) -> f64 {
         self.irradiance_per_mm2(film_mm) / self.perfect_peak_per_mm2()

@@ -4,7 +4,7 @@
 //! distance; it shares no node, area or phase with the sum of plane waves. Each case first shows that it has converged:
 //! with half again as many cells along each side it changes by less than .001.
 
-use dioptric_diffraction::{HuygensSources, PupilGrid, WaveNodes, WaveQuality, WaveWindow, WindowCenter, wave_psf};
+use dioptric_diffraction::{HuygensSources, PupilGrid, PupilSamples, WaveQuality, WaveWindow, WindowCenter, wave_psf};
 use dioptric_optics::{Glass, Interface, Lens, MonoLens, ObjectPoint, PupilBoundary, Surface, glam::DVec2};
 
 use crate::{
@@ -26,7 +26,7 @@ fn l1(found: &[f64], expected: &[f64]) -> f64 {
 /// Compares both sums about the centroid of the light; `false` where there are too many phases.
 #[track_caller]
 fn compare(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, what: &str) -> bool {
-    let Ok(nodes) = WaveNodes::trace(lens, point, film_mm, PupilGrid::STANDARD, None) else { return false };
+    let Ok(nodes) = PupilSamples::trace(lens, point, film_mm, PupilGrid::STANDARD, None) else { return false };
     let pitch_um = 6e3 * nodes.airy_unit_mm() / (N - 1) as f64;
     let window = WaveWindow { pitch_um, rows: N, columns: N, center: WindowCenter::Centroid };
     let quality = WaveQuality { points_per_pixel: Some(1), ..WaveQuality::default() };

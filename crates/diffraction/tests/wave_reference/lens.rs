@@ -1,7 +1,7 @@
 //! The objects and pupils of the reference lenses.
 
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, PupilBoundary, Rims,
+    Lens, MonoLens, ObjectPoint, PupilBoundary, Vignetting,
     glam::{DMat2, DVec2, DVec3},
     rays_towards,
 };
@@ -65,7 +65,7 @@ impl Reference {
         let wanted: Vec<DVec2> = pupil.into_iter().map(|place| place * radius_mm).collect();
         let misses = |targets: &[DVec2]| -> Vec<DVec2> {
             let mut rays = rays_towards(point, targets, self.pupil_z_mm, 0.0);
-            mono.trace_surfaces(0..mono.stop() + 1, &mut rays, Rims::Ignore);
+            mono.trace_surfaces(0..mono.stop() + 1, &mut rays, Vignetting::Off);
             assert_eq!(rays.n_in_flight(), rays.len(), "an aim is lost");
             (0..rays.len()).map(|i| rays.point_mm(i).truncate() - wanted[i]).collect()
         };

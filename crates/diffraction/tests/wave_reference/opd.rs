@@ -1,7 +1,7 @@
 //! Wavefronts, against a tracer of fifty digits.
 
 use dioptric_diffraction::ReferenceSphere;
-use dioptric_optics::{Rims, glam::DVec2, rays_towards};
+use dioptric_optics::{Vignetting, glam::DVec2, rays_towards};
 
 use crate::{
     lens::Reference,
@@ -22,7 +22,7 @@ fn wavefronts_agree_with_fifty_digits() {
             let (mono, point) = (reference.at(row), reference.point(row));
             let targets: Vec<DVec2> = pupil.iter().map(|p| reference.target_mm(&point, *p)).collect();
             let mut rays = rays_towards(&point, &targets, reference.pupil_z_mm, 0.0);
-            mono.trace(&mut rays, Rims::Ignore);
+            mono.trace(&mut rays, Vignetting::Off);
             let film_mm = image_z_mm - mono.last_vertex_z_mm();
             mono.to_film(&mut rays, film_mm);
             // The first pupil point is the chief ray's.

@@ -13,10 +13,10 @@
 use std::f64::consts::TAU;
 
 use dioptric_diffraction::{
-    Propagation, PupilGrid, ReferenceSphere, WaveNodes, WaveQuality, WaveWindow, WindowCenter,
+    Propagation, PupilGrid, PupilSamples, ReferenceSphere, WaveQuality, WaveWindow, WindowCenter,
     quadrature::gauss_legendre_on, wave_psf,
 };
-use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Rims, glam::DVec2, rays_towards};
+use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Vignetting, glam::DVec2, rays_towards};
 use serde_json::Value;
 
 use crate::{
@@ -109,13 +109,13 @@ impl<'a> Case<'a> {
     }
 
     /// Returns nodes as the reference has them: one amplitude for all of the pupil, given shares of it at some places.
-    fn even_nodes(&self, places: &[(DVec2, f64)], grid: PupilGrid) -> WaveNodes {
+    fn even_nodes(&self, places: &[(DVec2, f64)], grid: PupilGrid) -> PupilSamples {
         let targets: Vec<DVec2> = self.reference.targets_mm(&self.point, places.iter().map(|(place, _)| *place));
         let rays = on_film(self.reference, (&self.lens, &self.point), &targets, self.film_mm);
         assert_eq!(rays.n_in_flight(), rays.len());
         let q = |i: usize| rays.point_mm(i).truncate() - self.chief_mm();
         let share: Vec<f64> = places.iter().map(|(_, share)| *share).collect();
-        WaveNodes {
+        PupilSamples {
             wavelength_nm: self.lens.wavelength_nm(),
             image_index: self.lens.image_index(),
             grid,
@@ -132,7 +132,7 @@ impl<'a> Case<'a> {
         }
     }
 
-    fn polar(&self, grid: PupilGrid) -> WaveNodes {
+    fn polar(&self, grid: PupilGrid) -> PupilSamples {
         let radii = gauss_legendre_on(grid.n_radii, 0.0, 1.0);
         let azimuth = |i: usize| DVec2::from_angle(TAU * i as f64 / grid.n_azimuths as f64);
         let place = |i: usize| radii.iter().map(move |(t, w)| (azimuth(i) * *t, 2.0 * t * w / grid.n_azimuths as f64));
@@ -158,7 +158,7 @@ fn on_film(
     film_mm: f64,
 ) -> RayBatch {
     let mut rays = rays_towards(point, targets, reference.pupil_z_mm, 0.0);
-    lens.trace(&mut rays, Rims::Ignore);
+    lens.trace(&mut rays, Vignetting::Off);
     lens.to_film(&mut rays, film_mm);
     rays
 }
@@ -224,7 +224,7 @@ fn psfs_of_the_vignetted_pupil_agree_on_axis() {
         for row in rows.iter().filter(|row| numbers(&row["field"]) == [0.0, 0.0]) {
             let (mono, point, expected) = (reference.at(row), reference.point(row), Expected::of(row));
             let window = expected.window(DVec2::ZERO);
-            let nodes = WaveNodes::trace(&mono, &point, film_mm, PupilGrid::STANDARD, Some(DVec2::ZERO)).unwrap();
+            let nodes = PupilSamples::trace(&mono, &point, film_mm, PupilGrid::STANDARD, Some(DVec2::ZERO)).unwrap();
             let reach_mm = expected.reach_mm();
             if nodes.phase_range(reach_mm).total() > TRUSTED_BANDWIDTH {
                 continue;

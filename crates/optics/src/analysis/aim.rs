@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DVec2};
 
-use crate::{MonoLens, ObjectPoint, Rims, rays_towards};
+use crate::{MonoLens, ObjectPoint, Vignetting, rays_towards};
 
 /// Newton steps before an aim is given up from where it started.
 const NEWTON_STEPS: usize = 25;
@@ -91,7 +91,7 @@ impl<'a> Search<'a> {
     /// Returns where the rays to these targets pass the stop, in units of its radius, if all of them do.
     fn at_stop<const N: usize>(&self, point: &ObjectPoint, targets_mm: [DVec2; N]) -> Option<[DVec2; N]> {
         let mut rays = rays_towards(point, &targets_mm, self.z_mm, 0.0);
-        self.lens.trace_surfaces(0..self.lens.stop() + 1, &mut rays, Rims::Ignore);
+        self.lens.trace_surfaces(0..self.lens.stop() + 1, &mut rays, Vignetting::Off);
         let radius_mm = self.lens.stop_semi_aperture_mm();
         let all = rays.n_in_flight() == N;
         all.then(|| std::array::from_fn(|i| self.lens.in_stop_mm(rays.point_mm(i)) / radius_mm))
@@ -168,7 +168,7 @@ mod tests {
         let aim = StopAim::find(lens, point, places);
         let targets: Vec<DVec2> = aim.targets_mm().iter().map(|target| target.expect("the aim is found")).collect();
         let mut rays = rays_towards(point, &targets, aim.z_mm(), 0.0);
-        lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Rims::Ignore);
+        lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Vignetting::Off);
         for (i, place) in places.iter().enumerate() {
             let miss = (rays.point_mm(i).truncate() / lens.stop_semi_aperture_mm() - *place).length();
             assert!(rays.fate[i].is_in_flight() && miss < 2.0 * HIT, "{i}: {miss:e}");

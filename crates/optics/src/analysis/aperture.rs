@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::aim::StopAim;
-use crate::{MonoLens, ObjectPoint, Rims};
+use crate::{MonoLens, ObjectPoint, Vignetting};
 
 /// The share of the stop's radius that the edge is taken at, so that a stop as wide as its surface has one.
 const EDGE: f64 = 1.0 - 1e-9;
@@ -19,14 +19,14 @@ pub struct NumericalApertures {
 
 impl NumericalApertures {
     /// Finds the apertures by the real rays of a point on the axis through the upper and the lower edge of the stop;
-    /// `None` where they do not come through. Rims are ignored.
+    /// `None` where they do not come through. Vignetting are ignored.
     pub fn find(lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
         let aim = StopAim::find(lens, point, &[DVec2::Y * EDGE, DVec2::NEG_Y * EDGE]);
         let targets_mm: Vec<DVec2> = aim.targets_mm().iter().copied().collect::<Option<_>>()?;
         let mut rays = lens.rays_towards(point, &targets_mm, aim.z_mm(), 0.0);
         let half_sine = |rays: &crate::RayBatch| (0.5 * rays.direction(0).angle_between(rays.direction(1))).sin();
         let object = lens.object_index() * half_sine(&rays);
-        lens.trace(&mut rays, Rims::Ignore);
+        lens.trace(&mut rays, Vignetting::Off);
         let is_through = rays.n_in_flight() == rays.len();
         is_through.then(|| Self { object, image: lens.image_index() * half_sine(&rays) })
     }

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::aim::StopAim;
-use crate::{MonoLens, ObjectPoint, Rims, rays_towards};
+use crate::{MonoLens, ObjectPoint, Vignetting, rays_towards};
 
 /// Distance of the outer close rays from the chief ray in the pupil, in units of the pupil's radius.
 const CLOSE: f64 = 2e-3;
@@ -84,7 +84,7 @@ impl<'a> CloseRays<'a> {
         let h = 0.5 * CLOSE * radius_mm;
         let targets_mm = [-2.0, -1.0, 1.0, 2.0].map(|share| chief_mm + direction * (share * h));
         let mut rays = rays_towards(point, &targets_mm, aim.z_mm(), 0.0);
-        lens.trace(&mut rays, Rims::Ignore);
+        lens.trace(&mut rays, Vignetting::Off);
         lens.to_film(&mut rays, 0.0);
         if rays.n_in_flight() < targets_mm.len() {
             return None;
@@ -185,7 +185,7 @@ mod tests {
             let sampling = crate::analysis::PupilSampling {
                 coordinates: crate::analysis::PupilCoordinates::stop(&tiny),
                 places: vec![-direction, direction],
-                rims: Rims::Ignore,
+                rims: Vignetting::Off,
             };
             let rays = sampling.rays_on_film(&tiny, &point, focus_mm);
             let apart = (rays.point_mm(1) - rays.point_mm(0)).truncate().dot(direction);

@@ -51,7 +51,7 @@ impl StraightMap {
 mod tests {
     use super::*;
     use crate::{
-        Glass, Interface, Lens, Move, Shape, Surface,
+        CoordinateBreak, Glass, Interface, Lens, Shape, Surface,
         analysis::{AstigmaticFoci, AxisFoci, Distortion, Projection},
     };
 
@@ -108,7 +108,7 @@ mod tests {
     fn a_film_tilted_with_the_whole_lens_sees_nothing_of_it() {
         let straight = Lens::built_in("tessar-50mm").unwrap();
         let n = straight.interfaces().len();
-        let turn = Move {
+        let turn = CoordinateBreak {
             surfaces: (0, n),
             pivot_mm: 0.0,
             decenter_mm: [0.0; 3],

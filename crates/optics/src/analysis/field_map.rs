@@ -3,7 +3,7 @@
 use glam::{DMat2, DVec2};
 
 use super::pupil_places::{PupilCoordinates, PupilSampling};
-use crate::{MonoLens, ObjectPoint, RayBatch, Rims, paraxial::Matrix};
+use crate::{MonoLens, ObjectPoint, RayBatch, Vignetting, paraxial::Matrix};
 
 /// How an image without distortion grows with the field angle θ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,7 +99,7 @@ impl MonoLens {
     /// not end it. `None` if there is no such ray.
     pub fn chief_ray_on_film(&self, point: &ObjectPoint, film_mm: f64) -> Option<RayBatch> {
         let coordinates = PupilCoordinates::stop(self);
-        let sampling = PupilSampling { coordinates, places: vec![DVec2::ZERO], rims: Rims::Ignore };
+        let sampling = PupilSampling { coordinates, places: vec![DVec2::ZERO], rims: Vignetting::Off };
         let ray = sampling.rays_on_film(self, point, film_mm);
         ray.fate[0].is_in_flight().then_some(ray)
     }

@@ -132,12 +132,12 @@ mod tests {
 
     use super::*;
     use crate::{
-        Lens, Rims,
+        Lens, Vignetting,
         analysis::{PupilCoordinates, SpotDiagram, hexapolar},
     };
 
     fn sampling(lens: &MonoLens) -> PupilSampling {
-        PupilSampling { coordinates: PupilCoordinates::entrance(lens), places: hexapolar(8), rims: Rims::Clip }
+        PupilSampling { coordinates: PupilCoordinates::entrance(lens), places: hexapolar(8), rims: Vignetting::On }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec2, DVec3};
 
-use crate::{MonoLens, ObjectPoint, PupilBoundary, Rims};
+use crate::{MonoLens, ObjectPoint, PupilBoundary, Vignetting};
 
 /// Returns the projected solid angle of the cone of light that arrives at the image of a point, times the square of the
 /// image space's index over the object space's, sr: the irradiance there for a uniform scene of radiance 1; 0 where no
@@ -28,7 +28,7 @@ fn whole_cone(lens: &MonoLens, point: &ObjectPoint, n: usize, normal: DVec3) -> 
     let in_film = |direction: DVec3| if is_straight { direction } else { turn * direction };
     let of_part = |pupil: PupilBoundary| {
         let mut rays = pupil.plane().rays(lens, point, &pupil.edge_mm());
-        lens.trace(&mut rays, Rims::Ignore);
+        lens.trace(&mut rays, Vignetting::Off);
         let cosines: Vec<DVec2> = (0..n).map(|i| in_film(rays.direction(i)).truncate()).collect();
         let area = |step: usize| {
             let corners: Vec<DVec2> = cosines.iter().copied().step_by(step).collect();
@@ -114,7 +114,7 @@ mod tests {
             let lens = Lens::new("thick", "test", vec![front, back], 0).unwrap().at(550.0).unwrap();
             let far = ObjectPoint::Infinite(DVec3::Z);
             let mut edge = lens.rays_towards(&far, &[DVec2::new(0.0, 4.0)], 0.0, 0.0);
-            lens.trace(&mut edge, Rims::Ignore);
+            lens.trace(&mut edge, Vignetting::Off);
             let expected = PI * (index * edge.m[0]).powi(2);
             // The polygon is off by the fourth power of its sides: (2π / n)⁴ / 30.
             for (n, error) in [(64, 3.2e-6), (256, 1.3e-8)] {

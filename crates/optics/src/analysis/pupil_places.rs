@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::aim::StopAim;
-use crate::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, RayFate, Rims};
+use crate::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, RayFate, Vignetting};
 
 /// What places in the pupil are fractions of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +91,7 @@ pub struct PupilSampling {
     /// A place of the pupil for each ray.
     pub places: Vec<DVec2>,
     /// Whether rims end rays.
-    pub rims: Rims,
+    pub rims: Vignetting,
 }
 
 impl PupilSampling {
@@ -99,13 +99,13 @@ impl PupilSampling {
     pub fn rays_on_film(&self, lens: &MonoLens, point: &ObjectPoint, film_mm: f64) -> RayBatch {
         let mut rays = self.coordinates.rays(lens, point, &self.places);
         lens.trace(&mut rays, self.rims);
-        lens.to_image_surface(&mut rays, film_mm);
+        lens.to_film(&mut rays, film_mm);
         rays
     }
 
     /// Returns the chief ray alone, the one through the middle of the pupil, which no rim ends.
     pub fn chief(&self) -> Self {
-        Self { places: vec![DVec2::ZERO], rims: Rims::Ignore, ..*self }
+        Self { places: vec![DVec2::ZERO], rims: Vignetting::Off, ..*self }
     }
 }
 
@@ -155,7 +155,7 @@ mod tests {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::ZERO, 0.0);
         let mut rays = PupilCoordinates::stop(&lens).rays(&lens, &point, &[DVec2::X * 20.0, DVec2::X * 0.5]);
-        lens.trace(&mut rays, Rims::Ignore);
+        lens.trace(&mut rays, Vignetting::Off);
         assert_eq!(rays.fate, [RayFate::Missed { surface: lens.stop() as u16 }, RayFate::InFlight]);
     }
 }

@@ -34,7 +34,7 @@ impl RayFan {
 mod tests {
     use super::*;
     use crate::{
-        Lens, Rims,
+        Lens, Vignetting,
         analysis::{PupilCoordinates, pupil_line},
     };
 
@@ -42,7 +42,7 @@ mod tests {
         let sampling = PupilSampling {
             coordinates: PupilCoordinates::entrance(lens),
             places: pupil_line(direction, 21),
-            rims: Rims::Clip,
+            rims: Vignetting::On,
         };
         let point = ObjectPoint::from_field(lens, DVec2::new(0.0, field_tan), 0.0);
         RayFan::trace(lens, &point, film_mm, &sampling).unwrap()

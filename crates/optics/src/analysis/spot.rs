@@ -83,11 +83,11 @@ impl SpotDiagram {
 mod tests {
     use super::*;
     use crate::{
-        Lens, Rims,
+        Lens, Vignetting,
         analysis::{PupilCoordinates, hexapolar},
     };
 
-    fn sampling(lens: &MonoLens, n_rings: usize, rims: Rims) -> PupilSampling {
+    fn sampling(lens: &MonoLens, n_rings: usize, rims: Vignetting) -> PupilSampling {
         PupilSampling { coordinates: PupilCoordinates::entrance(lens), places: hexapolar(n_rings), rims }
     }
 
@@ -96,7 +96,7 @@ mod tests {
         let lens = Lens::thin(50.0, 10.0).unwrap().at(550.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.2, -0.1), 0.0);
         // Rays at the very rim: rounding would decide their fate.
-        let sampling = sampling(&lens, 6, Rims::Ignore);
+        let sampling = sampling(&lens, 6, Vignetting::Off);
         let focused = SpotDiagram::trace(&lens, &point, 50.0, &sampling);
         assert!(focused.rms_mm().unwrap() < 1e-12 && focused.transmission() == 1.0);
         assert!(focused.chief_mm.unwrap().distance(DVec2::new(-10.0, 5.0)) < 1e-12);
@@ -118,11 +118,11 @@ mod tests {
             let point = ObjectPoint::from_field(&lens, DVec2::new(0.0, field_tan), 0.0);
             SpotDiagram::trace(&lens, &point, 36.0, &sampling(&lens, 8, rims))
         };
-        let (clipped, whole) = (spot(0.3, Rims::Clip), spot(0.3, Rims::Ignore));
+        let (clipped, whole) = (spot(0.3, Vignetting::On), spot(0.3, Vignetting::Off));
         assert!(clipped.transmission() < 0.8 && clipped.transmission() > 0.2);
         assert!(whole.transmission() > clipped.transmission() && whole.chief_mm == clipped.chief_mm);
         assert_eq!(clipped.fates.iter().filter(|f| f.is_in_flight()).count(), clipped.points_mm.len());
-        let dark = spot(1.2, Rims::Clip);
+        let dark = spot(1.2, Vignetting::On);
         assert!(dark.centroid_mm().is_none() && dark.rms_mm().is_none() && dark.transmission() == 0.0);
     }
 }

@@ -8,7 +8,7 @@
 use glam::{DMat3, DVec3};
 use serde_json::Value;
 
-use crate::{Glass, Interface, Lens, Move, OpticsError, Pose, Shape, Surface, prescription::TextError};
+use crate::{CoordinateBreak, Glass, Interface, Lens, OpticsError, Pose, Shape, Surface, prescription::TextError};
 
 use super::{
     glasses::{Glasses, constant},
@@ -46,7 +46,7 @@ pub(super) fn lens_from_omni(value: &Value, name: &str, glasses: &Glasses) -> Re
 struct Rows {
     interfaces: Vec<Interface>,
     stops: Vec<usize>,
-    moves: Vec<Move>,
+    moves: Vec<CoordinateBreak>,
 }
 
 fn rows_of(file: &Object, glasses: &Glasses) -> Result<Rows, TextError> {
@@ -226,8 +226,8 @@ fn transform(row: &Object) -> Result<Option<Pose>, TextError> {
 }
 
 /// Returns the move of one surface about its own vertex.
-fn moved(surface: usize, pose: &Pose) -> Move {
-    Move {
+fn moved(surface: usize, pose: &Pose) -> CoordinateBreak {
+    CoordinateBreak {
         surfaces: (surface, surface),
         pivot_mm: 0.0,
         decenter_mm: pose.vertex_mm.into(),

@@ -17,7 +17,7 @@ use self::{
 use super::{
     glasses::{Glasses, constant, model},
     lens_file::{Field, LensFile, SeqNumbers},
-    system::{Beam, System, Vignetting},
+    system::{Beam, FieldVignetting, System},
 };
 
 /// Reads a CODE V file; `name` serves where the file states none.
@@ -345,7 +345,7 @@ impl<'a> Seq<'a> {
         })
     }
 
-    fn fields_in_mm(&self) -> Vec<(Field, Vignetting)> {
+    fn fields_in_mm(&self) -> Vec<(Field, FieldVignetting)> {
         let [x, y] = &self.fields;
         let at = |list: &[f64], i: usize| list.get(i).copied().unwrap_or(0.0);
         let mm = self.mm_per_unit;
@@ -361,7 +361,7 @@ impl<'a> Seq<'a> {
             let [upper_x, lower_x, upper_y, lower_y] = self.vignetting.each_ref().map(|list| at(list, i));
             let center = (0.5 * (lower_x - upper_x), 0.5 * (lower_y - upper_y)).into();
             let compression = (0.5 * (upper_x + lower_x), 0.5 * (upper_y + lower_y)).into();
-            (field, Vignetting { center, compression })
+            (field, FieldVignetting { center, compression })
         };
         (0..x.len().max(y.len())).map(field).collect()
     }

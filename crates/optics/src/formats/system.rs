@@ -7,8 +7,9 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    Aperture, Glass, ImageSurface, Interface, Lens, MonoLens, Move, ObjectPoint, OpticsError, Pose, RayBatch, Rims,
-    Shape, Surface, analysis::PupilCoordinates, glass::D_LINE_NM, prescription::TextError, rays_towards,
+    Aperture, CoordinateBreak, Glass, ImageSurface, Interface, Lens, MonoLens, ObjectPoint, OpticsError, Pose,
+    RayBatch, Shape, Surface, Vignetting, analysis::PupilCoordinates, glass::D_LINE_NM, prescription::TextError,
+    rays_towards,
 };
 
 use super::lens_file::{Field, LensFile};
@@ -50,7 +51,7 @@ impl SystemSurface {
 #[derive(Clone, Debug)]
 pub(super) struct SystemMove {
     pub(super) z_mm: f64,
-    pub(super) step: Move,
+    pub(super) step: CoordinateBreak,
 }
 
 /// How wide the beam is.
@@ -86,7 +87,7 @@ impl Beam {
 
 /// The part of the pupil that a field uses: `center + (1 − compression) · pupil`, in pupil radii.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Vignetting {
+pub(super) struct FieldVignetting {
     pub(super) center: DVec2,
     pub(super) compression: DVec2,
 }
@@ -109,7 +110,7 @@ pub(super) struct System {
     pub(super) wavelengths_nm: Vec<f64>,
     /// Index into the wavelengths.
     pub(super) reference: usize,
-    pub(super) fields: Vec<(Field, Vignetting)>,
+    pub(super) fields: Vec<(Field, FieldVignetting)>,
     pub(super) notes: Vec<String>,
 }
 
@@ -168,7 +169,7 @@ impl System {
             let pivot_mm = z_mm - self.first_vertex_z_mm - vertices_z_mm[first.min(n_surfaces - 1)];
             // What is left where two sums of the same distances meet.
             let pivot_mm = if pivot_mm.abs() < 1e-12 { 0.0 } else { pivot_mm };
-            Move { surfaces: (first, last.min(n_surfaces)), pivot_mm, ..*step }
+            CoordinateBreak { surfaces: (first, last.min(n_surfaces)), pivot_mm, ..*step }
         };
         let moves = self.moves.iter().map(in_lens).collect();
         let lens = lens.with_object_medium(self.object_medium.clone())?;
@@ -289,7 +290,7 @@ impl System {
         let poses = mono.poses().unwrap_or(&poses);
         let mut heights_mm = Vec::with_capacity(mono.n_surfaces());
         for (surface, pose) in poses.iter().enumerate() {
-            mono.trace_surfaces(surface..surface + 1, &mut rays, Rims::Ignore);
+            mono.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::Off);
             heights_mm.push(pose.to_own(rays.point_mm(0)).truncate().length());
         }
         let at_stop_mm = heights_mm[mono.stop()];
@@ -313,7 +314,7 @@ impl System {
         interfaces[lens.stop()].surface.semi_aperture_mm = stop_semi_aperture_mm;
         let lens = self.lens(interfaces, lens.stop())?;
         let poses = lens.poses();
-        let on_axis = [(Field::Angle { x_deg: 0.0, y_deg: 0.0 }, Vignetting::default())];
+        let on_axis = [(Field::Angle { x_deg: 0.0, y_deg: 0.0 }, FieldVignetting::default())];
         let fields = if self.fields.is_empty() { &on_axis[..] } else { &self.fields[..] };
         let reference_nm = self.wavelengths_nm.get(self.reference).copied().unwrap_or(D_LINE_NM);
         let reference_nm = [reference_nm];
@@ -376,7 +377,7 @@ impl System {
 ///
 /// They are aimed at the paraxial entrance pupil; where that leads them past the stop, as in a wide-angle lens, or where
 /// it is infinitely far, at the real stop.
-fn widen(widest_mm: &mut [f64], (mono, poses): (&MonoLens, &[Pose]), point: &ObjectPoint, vignetting: Vignetting) {
+fn widen(widest_mm: &mut [f64], (mono, poses): (&MonoLens, &[Pose]), point: &ObjectPoint, vignetting: FieldVignetting) {
     let on_ring = |i: usize| {
         let (sine, cosine) = (i as f64 * std::f64::consts::TAU / N_AZIMUTHS as f64).sin_cos();
         vignetting.center + (DVec2::ONE - vignetting.compression) * DVec2::new(cosine, sine)
@@ -392,7 +393,7 @@ fn widen(widest_mm: &mut [f64], (mono, poses): (&MonoLens, &[Pose]), point: &Obj
         }
     }
     for (surface, widest_mm) in widest_mm.iter_mut().enumerate() {
-        mono.trace_surfaces(surface..surface + 1, &mut rays, Rims::Ignore);
+        mono.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::Off);
         for ray in (0..rays.len()).filter(|&ray| rays.fate[ray].is_in_flight()) {
             let from_axis_mm = poses[surface].to_own(rays.point_mm(ray)).truncate().length();
             if from_axis_mm.is_finite() {
@@ -404,7 +405,7 @@ fn widen(widest_mm: &mut [f64], (mono, poses): (&MonoLens, &[Pose]), point: &Obj
 
 /// Whether rays aimed at these places of the paraxial pupil pass the stop near them: within half its radius.
 fn fills_stop(mono: &MonoLens, mut rays: RayBatch, places: &[DVec2]) -> bool {
-    mono.trace_surfaces(0..mono.stop() + 1, &mut rays, Rims::Ignore);
+    mono.trace_surfaces(0..mono.stop() + 1, &mut rays, Vignetting::Off);
     let stop_mm = mono.stop_semi_aperture_mm();
     let miss = |i: usize| (mono.in_stop_mm(rays.point_mm(i)).length() / stop_mm - places[i].length()).abs();
     rays.n_in_flight() == rays.len() && (0..rays.len()).all(|i| miss(i) < 0.5)

@@ -13,7 +13,7 @@ use self::surface::ZmxSurface;
 use super::{
     glasses::Glasses,
     lens_file::{Field, LensFile},
-    system::{Beam, System, SystemMove, SystemSurface, Vignetting},
+    system::{Beam, FieldVignetting, System, SystemMove, SystemSurface},
 };
 
 /// Reads a Zemax file; `name` serves where the file states none.
@@ -270,7 +270,7 @@ fn fields(
     mm: f64,
     [x, y]: &[Vec<f64>; 2],
     vignetting: &[Vec<f64>; 4],
-) -> Result<Vec<(Field, Vignetting)>, TextError> {
+) -> Result<Vec<(Field, FieldVignetting)>, TextError> {
     let at = |list: &[f64], i: usize| list.get(i).copied().unwrap_or(0.0);
     let n_stated = x.len().max(y.len());
     let n_fields = n_fields.filter(|&n| n > 0).unwrap_or(n_stated).min(n_stated);
@@ -288,7 +288,7 @@ fn fields(
             }
         };
         let [dx, dy, cx, cy] = vignetting.each_ref().map(|list| at(list, i));
-        Ok((field, Vignetting { center: (dx, dy).into(), compression: (cx, cy).into() }))
+        Ok((field, FieldVignetting { center: (dx, dy).into(), compression: (cx, cy).into() }))
     };
     (0..n_fields).map(field).collect()
 }

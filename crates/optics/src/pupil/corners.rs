@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::{Cell, EDGE_MM, PupilBoundary, Search};
-use crate::{MonoLens, ObjectPoint, Rims};
+use crate::{MonoLens, ObjectPoint, Vignetting};
 
 /// What bounds a pupil in some direction: a surface and the part of its openings, 0 for the round rim.
 type Limit = (usize, usize);
@@ -92,7 +92,7 @@ impl Search<'_> {
         let mut nearest = vec![(f64::INFINITY, (0, 0)); targets_mm.len()];
         let mut rays = self.plane.rays(self.lens, self.point, targets_mm);
         for (surface, step) in self.lens.steps().iter().enumerate() {
-            self.lens.trace_surfaces(surface..surface + 1, &mut rays, Rims::Ignore);
+            self.lens.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::Off);
             for (i, nearest) in nearest.iter_mut().enumerate().filter(|(i, _)| rays.fate[*i].is_in_flight()) {
                 let point = rays.point_mm(i);
                 let at = self.lens.poses().map_or(point, |poses| poses[surface].to_own(point)).truncate();

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use glam::DVec2;
 
 use super::{PupilBoundary, Search};
-use crate::{RayFate, Rims};
+use crate::{RayFate, Vignetting};
 
 /// Rays across the front of the lens in a first look, and in a second where that finds no light.
 const LOOKS: [usize; 2] = [25, 97];
@@ -99,7 +99,7 @@ impl Search<'_> {
     fn tried(&self, on_front: &[DVec2]) -> Vec<Trial> {
         let targets: Vec<DVec2> = on_front.iter().map(|place| self.target_through_front(*place)).collect();
         let mut rays = self.plane.rays(self.lens, self.point, &targets);
-        self.lens.trace(&mut rays, Rims::Clip);
+        self.lens.trace(&mut rays, Vignetting::On);
         let progress = |i: usize| match rays.fate[i] {
             RayFate::Vignetted { surface } => {
                 let surface = usize::from(surface);

@@ -216,7 +216,7 @@ fn path_difference<T: Real>(height: [T; 2], slopes: [T; 2], z: T) -> T {
 mod tests {
     use glam::{DVec2, DVec3};
 
-    use crate::{Glass, Interface, Lens, ObjectPoint, RayBatch, Rims, Shape, Surface, rays_towards};
+    use crate::{Glass, Interface, Lens, ObjectPoint, RayBatch, Shape, Surface, Vignetting, rays_towards};
 
     const TARGETS: [DVec2; 4] = [DVec2::ZERO, DVec2::new(4.0, 0.0), DVec2::new(-2.0, 3.0), DVec2::new(0.0, -4.9)];
 
@@ -228,7 +228,7 @@ mod tests {
             let point = ObjectPoint::from_field(&lens, field_tan, dioptres);
             let film_mm = lens.film_mm_for(1e3 / dioptres).unwrap();
             let mut rays = rays_towards(&point, &TARGETS, 0.0, 0.0);
-            lens.trace(&mut rays, Rims::Clip);
+            lens.trace(&mut rays, Vignetting::On);
             lens.to_film(&mut rays, film_mm);
             for i in 0..rays.len() {
                 let image = field_tan * -film_mm;
@@ -249,7 +249,7 @@ mod tests {
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.1, 0.05), 1.0);
         let film_mm = lens.film_mm_for(1_000.0).unwrap();
         let mut rays = rays_towards(&point, &TARGETS, 0.0, 0.0);
-        lens.trace(&mut rays, Rims::Clip);
+        lens.trace(&mut rays, Vignetting::On);
         lens.to_film(&mut rays, film_mm);
         for i in 1..rays.len() {
             assert!((rays.point_mm(i) - rays.point_mm(0)).length() < 1e-12);
@@ -270,7 +270,7 @@ mod tests {
         let lens = single(Shape::Conic { conic: -1.0 / (index * index) }, radius_mm, index).at(550.0).unwrap();
         let focus_mm = index * radius_mm / (index - 1.0);
         let mut rays = rays_towards(&ObjectPoint::Infinite(DVec3::Z), &TARGETS, 0.0, 0.0);
-        lens.trace(&mut rays, Rims::Clip);
+        lens.trace(&mut rays, Vignetting::On);
         lens.to_film(&mut rays, focus_mm);
         for i in 0..rays.len() {
             assert!(rays.point_mm(i).truncate().length() < 1e-13, "{}", rays.point_mm(i));
@@ -284,7 +284,7 @@ mod tests {
             let lens = single(shape, 20.0, 1.6).at(550.0).unwrap();
             let point = ObjectPoint::from_field(&lens, DVec2::new(0.2, 0.1), 1.0);
             let mut rays = rays_towards(&point, &TARGETS, 0.0, 0.0);
-            lens.trace(&mut rays, Rims::Clip);
+            lens.trace(&mut rays, Vignetting::On);
             rays
         };
         let sphere = trace(Shape::Sphere);
@@ -306,7 +306,7 @@ mod tests {
             let lens = single(shape, 20.0, 1.6).at(550.0).unwrap();
             let point = ObjectPoint::from_field(&lens, DVec2::new(0.2, 0.1), 1.0);
             let mut rays = rays_towards(&point, &TARGETS, 0.0, 0.0);
-            lens.trace(&mut rays, Rims::Clip);
+            lens.trace(&mut rays, Vignetting::On);
             rays
         };
         let even = trace(Shape::EvenAsphere { conic: -0.4, coefficients: vec![2e-5, -3e-7] });
@@ -331,7 +331,7 @@ mod tests {
         let trace = |lens: &crate::MonoLens| {
             let mut rays =
                 rays_towards(&ObjectPoint::Infinite(DVec3::new(0.1, 0.0, 1.0).normalize()), &TARGETS, 0.0, 0.0);
-            lens.trace(&mut rays, Rims::Clip);
+            lens.trace(&mut rays, Vignetting::On);
             rays
         };
         let (a, b) = (trace(&written), trace(&conic));
@@ -363,7 +363,7 @@ mod tests {
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.1, 0.2), 0.5);
         let start = rays_towards(&point, &TARGETS, lens.first_order().entrance_pupil_z_mm, 0.0);
         let mut rays = start.clone();
-        lens.trace(&mut rays, Rims::Clip);
+        lens.trace(&mut rays, Vignetting::On);
         lens.to_film(&mut rays, 30.0);
         let film_z_mm = lens.last_vertex_z_mm() + 30.0;
         let mut home = RayBatch::with_capacity(4);
@@ -373,7 +373,7 @@ mod tests {
             assert!((p.z - (lens.last_vertex_z_mm() - film_z_mm)).abs() < 1e-12);
             home.push(p, d, 0.0);
         }
-        back.trace(&mut home, Rims::Clip);
+        back.trace(&mut home, Vignetting::On);
         back.to_film(&mut home, 0.0);
         for i in 0..rays.len() {
             assert!((home.point_mm(i).truncate() - start.point_mm(i).truncate()).length() < 1e-12);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::{
-    Goal, Plan, Rims, Step,
+    Goal, Plan, Step, Vignetting,
     crossing::{ConicForm, Ray, cross_conic},
     move_to_plane, trace_batch, trace_clearances,
 };
@@ -13,7 +13,7 @@ use crate::{Pose, RayFate, rays::RaySlices};
 
 /// Traces rays given in the lens frame through these steps, each of which stands as its pose says; `first` is the
 /// number of the first of them.
-pub(crate) fn trace_placed(steps: &[Step], poses: &[Pose], first: usize, rims: Rims, rays: &mut RaySlices<'_>) {
+pub(crate) fn trace_placed(steps: &[Step], poses: &[Pose], first: usize, rims: Vignetting, rays: &mut RaySlices<'_>) {
     let mut number = first;
     for group in coaxial(poses) {
         let (pose, own) = in_own_frame(&steps[group.clone()], &poses[group]);
@@ -26,7 +26,7 @@ pub(crate) fn trace_placed(steps: &[Step], poses: &[Pose], first: usize, rims: R
 pub(crate) fn placed_clearances(steps: &[Step], poses: &[Pose], rays: &mut RaySlices<'_>, clearances: &mut [f64]) {
     for group in coaxial(poses) {
         let (pose, own) = in_own_frame(&steps[group.clone()], &poses[group]);
-        in_frame(&pose, rays, |rays| trace_clearances(&Plan::new(&own, 0, Rims::Ignore), rays, clearances));
+        in_frame(&pose, rays, |rays| trace_clearances(&Plan::new(&own, 0, Vignetting::Off), rays, clearances));
     }
 }
 

@@ -1,7 +1,7 @@
 //! A train of surfaces as the kernel wants it: constants worked out once, in the kernel's own kind of float.
 
 use super::{
-    Kind, Rims, Step,
+    Kind, Step, Vignetting,
     asphere::{AllPowers, Asphere, EvenPowers, ManyPowers},
     block::Block,
     crossing::{ConicForm, Ideal, Interface},
@@ -32,13 +32,13 @@ pub(super) struct Pass<T> {
     pub(super) interface: Interface<T>,
     pub(super) apertures: Vec<Aperture>,
     /// Whether rims end rays.
-    pub(super) rims: Rims,
+    pub(super) rims: Vignetting,
 }
 
 impl<T: Real> Pass<T> {
     /// Whether there is more to end rays than the round rim.
     pub(super) fn is_clipped_further(&self) -> bool {
-        self.rims == Rims::Clip && !self.apertures.is_empty()
+        self.rims == Vignetting::On && !self.apertures.is_empty()
     }
 
     /// Whether a ray that meets the surface here is inside its rim and its apertures.
@@ -164,7 +164,7 @@ fn padded<T: Real, const M: usize>(coefficients: &[f64]) -> [T; M] {
 
 impl<T: Real> Plan<T> {
     /// Plans a trace through these steps, of which there is at least one; `first` is the number of the first of them.
-    pub(crate) fn new(steps: &[Step], first: usize, rims: Rims) -> Self {
+    pub(crate) fn new(steps: &[Step], first: usize, rims: Vignetting) -> Self {
         let (begin, end) = (&steps[0], &steps[steps.len() - 1]);
         let mut previous_z = begin.vertex_z;
         let pass = |step: &Step| {
@@ -172,8 +172,8 @@ impl<T: Real> Plan<T> {
             previous_z = step.vertex_z;
             let ratio = step.index_before / step.index_after;
             let limit_mm2 = match rims {
-                Rims::Clip => T::of(step.semi_aperture * step.semi_aperture),
-                Rims::Ignore => T::MAX,
+                Vignetting::On => T::of(step.semi_aperture * step.semi_aperture),
+                Vignetting::Off => T::MAX,
             };
             let interface = Interface {
                 ratio: T::of(ratio),

@@ -3,7 +3,9 @@
 use glam::{DVec2, DVec3};
 
 use super::*;
-use crate::{Glass, Interface, Lens, MonoLens, Move, ObjectPoint, RayBatch, RayBatchF32, Shape, Surface, rays_towards};
+use crate::{
+    CoordinateBreak, Glass, Interface, Lens, MonoLens, ObjectPoint, RayBatch, RayBatchF32, Shape, Surface, rays_towards,
+};
 
 /// Rays that fill the front of a lens, and more: some pass, some are vignetted, some miss.
 fn bundle(lens: &MonoLens, field_tan: f64, n_rays: usize) -> RayBatch {
@@ -25,7 +27,7 @@ fn assert_same_bits(a: &RayBatch, b: &RayBatch) {
 }
 
 /// Traces each ray of a batch by itself.
-pub(crate) fn trace_one_by_one(lens: &MonoLens, rims: Rims, rays: &mut RayBatch) {
+pub(crate) fn trace_one_by_one(lens: &MonoLens, rims: Vignetting, rays: &mut RayBatch) {
     let plan = Plan::new(&lens.steps_for(rays.object_z_mm), 0, rims);
     for i in 0..rays.len() {
         let ((x, y, z), (l, m, n)) = (rays.point_mm(i).into(), rays.direction(i).into());
@@ -40,7 +42,7 @@ pub(crate) fn trace_one_by_one(lens: &MonoLens, rims: Rims, rays: &mut RayBatch)
 fn tile_and_scalar_twin_agree_to_the_bit() {
     for name in ["dgauss-50mm", "paper-2el", "fisheye-12.5mm", "asphere-15mm", "singlet-50mm"] {
         let lens = Lens::built_in(name).unwrap().at(550.0).unwrap();
-        for rims in [Rims::Clip, Rims::Ignore] {
+        for rims in [Vignetting::On, Vignetting::Off] {
             for (field_tan, n_rays) in [(0.0, 501), (0.3, 1003), (3.0, 777)] {
                 let rays = bundle(&lens, field_tan, n_rays);
                 let (mut tiled, mut single) = (rays.clone(), rays.clone());
@@ -60,8 +62,8 @@ fn tile_and_scalar_twin_agree_to_the_bit() {
         let lens = lens.at(550.0).unwrap();
         let rays = bundle(&lens, 0.2, 99);
         let (mut tiled, mut single) = (rays.clone(), rays.clone());
-        lens.trace(&mut tiled, Rims::Clip);
-        trace_one_by_one(&lens, Rims::Clip, &mut single);
+        lens.trace(&mut tiled, Vignetting::On);
+        trace_one_by_one(&lens, Vignetting::On, &mut single);
         assert_same_bits(&tiled, &single);
     }
 }
@@ -71,16 +73,16 @@ fn pieces_and_threads_change_no_bit() {
     let lens = Lens::built_in("dgauss-50mm").unwrap().at(500.0).unwrap();
     let rays = bundle(&lens, 0.2, 10_001);
     let (mut whole, mut shared) = (rays.clone(), rays.clone());
-    lens.trace(&mut whole, Rims::Clip);
-    lens.trace_parallel(&mut shared, Rims::Clip);
+    lens.trace(&mut whole, Vignetting::On);
+    lens.trace_parallel(&mut shared, Vignetting::On);
     assert_same_bits(&whole, &shared);
     let losses = whole.losses();
     assert!(losses.n_in_flight > 1000 && losses.by_surface.iter().filter(|s| s.n_vignetted > 0).count() > 3);
 
     // A trace in pieces passes the lens frame between them, which rounds z.
     let mut pieces = rays;
-    lens.trace_surfaces(0..lens.stop() + 1, &mut pieces, Rims::Clip);
-    lens.trace_surfaces(lens.stop() + 1..lens.n_surfaces(), &mut pieces, Rims::Clip);
+    lens.trace_surfaces(0..lens.stop() + 1, &mut pieces, Vignetting::On);
+    lens.trace_surfaces(lens.stop() + 1..lens.n_surfaces(), &mut pieces, Vignetting::On);
     assert_eq!(whole.fate, pieces.fate);
     let apart = whole.x_mm.iter().zip(&pieces.x_mm).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(apart < 1e-13, "{apart}");
@@ -91,7 +93,7 @@ fn rays_end_where_and_as_they_should() {
     let lens = Lens::built_in("paper-2el").unwrap().at(550.0).unwrap();
     let at = |y: f64, direction: DVec3| {
         let mut rays = RayBatch::from_points(&[DVec3::new(0.0, y, -5.0)], &[direction.normalize()]);
-        lens.trace(&mut rays, Rims::Clip);
+        lens.trace(&mut rays, Vignetting::On);
         (rays.fate[0], rays.point_mm(0))
     };
     assert_eq!(at(12.4, DVec3::Z).0, RayFate::InFlight);
@@ -111,7 +113,7 @@ fn rays_end_where_and_as_they_should() {
     let dome = Lens::new("dome", "test", vec![window, ball], 0).unwrap().at(550.0).unwrap();
     let end = |y: f64| {
         let mut rays = RayBatch::from_points(&[DVec3::new(0.0, y, -1.0)], &[DVec3::Z]);
-        dome.trace(&mut rays, Rims::Clip);
+        dome.trace(&mut rays, Vignetting::On);
         rays.fate[0]
     };
     assert_eq!(end(10.0 * (1.0 / 1.65) - 1e-9), RayFate::InFlight);
@@ -125,8 +127,8 @@ fn film_in_one_go_is_the_film_in_two_to_rounding() {
         let film_mm = lens.film_mm_for(2_000.0).unwrap();
         let rays = bundle(&lens, 0.1, 1003);
         let (mut one, mut two) = (rays.clone(), rays);
-        lens.trace_to_film(&mut one, Rims::Clip, film_mm);
-        lens.trace(&mut two, Rims::Clip);
+        lens.trace_to_film(&mut one, Vignetting::On, film_mm);
+        lens.trace(&mut two, Vignetting::On);
         lens.to_film(&mut two, film_mm);
         assert!(one.n_in_flight() > 100, "{name}");
         assert_eq!((&one.fate, &one.z_mm, &one.l), (&two.fate, &two.z_mm, &two.l));
@@ -148,8 +150,8 @@ fn single_precision_error_um(lens: &MonoLens, field_tan: f64, dioptres: f64) -> 
     let start_z_mm = if dioptres > 0.0 { point.z_mm() } else { -100.0 };
     let mut exact = rays_towards(&point, &targets, lens.first_order().entrance_pupil_z_mm, start_z_mm);
     let mut single = RayBatchF32::from(&exact);
-    lens.trace_to_film(&mut exact, Rims::Clip, film_mm);
-    lens.trace_to_film_f32(&mut single, Rims::Clip, film_mm);
+    lens.trace_to_film(&mut exact, Vignetting::On, film_mm);
+    lens.trace_to_film_f32(&mut single, Vignetting::On, film_mm);
     let both = (0..exact.len()).filter(|&i| exact.fate[i].is_in_flight() && single.fate[i].is_in_flight());
     let apart = |i: usize| {
         1e3 * (DVec2::new(single.x_mm[i].into(), single.y_mm[i].into()) - exact.point_mm(i).truncate()).length()
@@ -189,7 +191,7 @@ fn single_precision_and_its_scalar_twin_agree_to_the_bit() {
         let lens = Lens::built_in(name).unwrap().at(550.0).unwrap();
         let mut rays = RayBatchF32::from(&bundle(&lens, 0.3, 777));
         let start = rays.clone();
-        let plan = Plan::new(lens.steps(), 0, Rims::Clip);
+        let plan = Plan::new(lens.steps(), 0, Vignetting::On);
         trace_batch(&plan, Goal::LastSurface, rays.slices());
         for i in 0..rays.len() {
             let (x, y, z) = (start.x_mm[i], start.y_mm[i], start.z_mm[i]);
@@ -211,7 +213,7 @@ fn single_precision_goes_through_tilted_and_twice_curved_surfaces_too() {
     };
     let interfaces = vec![interface(toric, 20.0, 1.6), interface(Shape::Sphere, -60.0, 1.0)];
     let centered = Lens::new("twice curved", "test", interfaces, 0).unwrap();
-    let tilt = Move {
+    let tilt = CoordinateBreak {
         surfaces: (1, 1),
         pivot_mm: 0.0,
         decenter_mm: [0.1, 0.2, 0.0],
@@ -223,8 +225,8 @@ fn single_precision_goes_through_tilted_and_twice_curved_surfaces_too() {
         let lens = lens.at(550.0).unwrap();
         let mut exact = bundle(&lens, 0.1, 777);
         let mut single = RayBatchF32::from(&exact);
-        lens.trace_to_film(&mut exact, Rims::Clip, 20.0);
-        lens.trace_to_film_f32(&mut single, Rims::Clip, 20.0);
+        lens.trace_to_film(&mut exact, Vignetting::On, 20.0);
+        lens.trace_to_film_f32(&mut single, Vignetting::On, 20.0);
         assert!(exact.n_in_flight() > 100);
         for i in (0..exact.len()).filter(|&i| exact.fate[i].is_in_flight() && single.fate[i].is_in_flight()) {
             let apart_mm = DVec2::new(single.x_mm[i].into(), single.y_mm[i].into()) - exact.point_mm(i).truncate();

@@ -132,7 +132,7 @@ mod tests {
     use glam::{DVec2, DVec3};
 
     use crate::{
-        Glass, Interface, Lens, ObjectPoint, Rims, Shape, Surface, rays_towards, trace::tests::trace_one_by_one,
+        Glass, Interface, Lens, ObjectPoint, Shape, Surface, Vignetting, rays_towards, trace::tests::trace_one_by_one,
     };
 
     #[test]
@@ -149,12 +149,12 @@ mod tests {
             let targets: Vec<DVec2> =
                 (0..203).map(|i| 0.7 * f64::from(i).sqrt() * DVec2::from_angle(2.4 * f64::from(i))).collect();
             let point = ObjectPoint::Infinite(DVec3::new(0.3, 0.1, 1.0).normalize());
-            for rims in [Rims::Clip, Rims::Ignore] {
+            for rims in [Vignetting::On, Vignetting::Off] {
                 let mut tiled = rays_towards(&point, &targets, 0.0, -3.0);
                 let mut single = tiled.clone();
                 lens.trace(&mut tiled, rims);
                 trace_one_by_one(&lens, rims, &mut single);
-                assert!(tiled.n_in_flight() > 100 && (rims == Rims::Ignore || tiled.n_in_flight() < 203));
+                assert!(tiled.n_in_flight() > 100 && (rims == Vignetting::Off || tiled.n_in_flight() < 203));
                 assert_eq!(tiled, single);
             }
         }

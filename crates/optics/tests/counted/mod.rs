@@ -1,7 +1,7 @@
 //! Light counted ray by ray, for what is found in other ways to be held to.
 
 use dioptric_optics::{
-    MonoLens, ObjectPoint, RayBatch, Rims,
+    MonoLens, ObjectPoint, RayBatch, Vignetting,
     glam::{DQuat, DVec2, DVec3},
 };
 
@@ -23,7 +23,7 @@ pub(crate) fn cross_section_mm2(lens: &MonoLens, point: &ObjectPoint, n_across: 
             let at = |column: usize| low + cell * (DVec2::new(column as f64, row as f64) + 0.5);
             let points: Vec<DVec3> = (0..n_across).map(|column| turn * at(column).extend(0.0)).collect();
             let mut rays = RayBatch::from_points(&points, &vec![direction; n_across]);
-            lens.trace(&mut rays, Rims::Clip);
+            lens.trace(&mut rays, Vignetting::On);
             for column in (0..n_across).filter(|&column| rays.fate[column].is_in_flight()) {
                 next = (next.0.min(at(column)), next.1.max(at(column)));
                 n_lit += 1;
@@ -47,7 +47,7 @@ pub(crate) fn beam_radius_mm(lens: &MonoLens, n_rays: usize) -> f64 {
     let height = |i: usize| lens.semi_aperture_mm(0) * (i as f64 + 0.5) / n_rays as f64;
     let points: Vec<DVec3> = (0..n_rays).map(|i| DVec3::new(0.0, height(i), -1.0)).collect();
     let mut rays = RayBatch::from_points(&points, &vec![DVec3::Z; n_rays]);
-    lens.trace(&mut rays, Rims::Clip);
+    lens.trace(&mut rays, Vignetting::On);
     let dark = rays.fate.iter().position(|fate| !fate.is_in_flight()).unwrap_or(n_rays);
     lens.semi_aperture_mm(0) * dark as f64 / n_rays as f64
 }

@@ -1,6 +1,6 @@
 //! Rays, surface by surface.
 
-use dioptric_optics::{Lens, MonoLens, RayBatch, RayFate, Rims, glam::DVec3};
+use dioptric_optics::{Lens, MonoLens, RayBatch, RayFate, Vignetting, glam::DVec3};
 use serde_json::Value;
 
 use crate::reader::{NAMES, json, lens, number, numbers};
@@ -31,7 +31,7 @@ fn follow(mono: &MonoLens, row: &Value, image_z_mm: f64, worst: &mut Worst) -> O
         worst.opl_mm = worst.opl_mm.max((rays.opl_mm[0] - e[6]).abs());
     };
     for surface in 0..mono.n_surfaces() {
-        mono.trace_surfaces(surface..surface + 1, &mut rays, Rims::Ignore);
+        mono.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::Off);
         if !rays.fate[0].is_in_flight() {
             return rays.fate[0].surface();
         }
@@ -81,7 +81,7 @@ fn rays_agree_with_fifty_digits_on_every_surface() {
                 continue;
             }
             let mut clipped = start(row);
-            mono.trace(&mut clipped, Rims::Clip);
+            mono.trace(&mut clipped, Vignetting::On);
             assert_eq!(clipped.fate[0], expected_fate(row), "{name} ray {i}");
         }
         println!("{name}: {worst:?}");

@@ -1,7 +1,7 @@
 //! Spot diagrams, ray for ray as the reference has them.
 
 use dioptric_optics::{
-    MonoLens, ObjectPoint, Rims,
+    MonoLens, ObjectPoint, Vignetting,
     analysis::{PupilCoordinates, SpotDiagram, hexapolar},
     glam::{DVec2, DVec3},
 };
@@ -70,14 +70,15 @@ fn spots_agree_with_the_reference_to_nine_digits() {
                 mono.to_film(&mut rays, film_mm);
                 SpotDiagram::of(&rays, Some(DVec2::from_slice(&numbers(&row["chief_image"]))))
             };
-            let chief = spot(&[DVec2::ZERO], Rims::Ignore);
+            let chief = spot(&[DVec2::ZERO], Vignetting::Off);
             let error_mm = chief.points_mm[0].distance(chief.chief_mm.unwrap());
             assert!(error_mm <= 1e-11, "{name}: the chief ray is off by {error_mm:e}");
-            worst = worst.max(compare(name, &spot(&places, Rims::Ignore), &row["all"]));
+            worst = worst.max(compare(name, &spot(&places, Vignetting::Off), &row["all"]));
             // Where rays touch a rim to 1e-7 mm, as those aimed at the edge of the stop do, rounding decides.
             let rays = coordinates(spec).rays(&primary, &point, &places);
             let n_touching = mono.clearances_mm(rays).iter().filter(|c| c.abs() <= 1e-7).count();
-            let (clipped, n_expected) = (spot(&places, Rims::Clip), row["unvignetted"]["n"].as_u64().unwrap() as usize);
+            let (clipped, n_expected) =
+                (spot(&places, Vignetting::On), row["unvignetted"]["n"].as_u64().unwrap() as usize);
             assert!(clipped.points_mm.len().abs_diff(n_expected) <= n_touching, "{name}: {n_expected}");
             if clipped.points_mm.len() == n_expected {
                 worst = worst.max(compare(name, &clipped, &row["unvignetted"]));

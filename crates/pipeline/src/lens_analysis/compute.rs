@@ -2,7 +2,7 @@
 
 use dioptric_diffraction::{PupilGrid, Wavefront, WavefrontReference, best_wavefront_film_mm, opd_waves_at};
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, PupilBoundary, Rims,
+    Lens, MonoLens, ObjectPoint, PupilBoundary, Vignetting,
     analysis::{
         AstigmaticFoci, Autofocus, AxisFoci, Distortion, NumericalApertures, Projection, PupilCoordinates,
         PupilSampling, RayFan, SpotDiagram, StraightMap, field_limit_deg, hexapolar, projected_solid_angle_onto,
@@ -75,7 +75,7 @@ impl AnalysisRequest {
             reference,
             dioptres: 1e3 / way_mm,
             film_mm: 0.0,
-            sampling: PupilSampling { coordinates, places: hexapolar(self.n_rings), rims: Rims::Clip },
+            sampling: PupilSampling { coordinates, places: hexapolar(self.n_rings), rims: Vignetting::On },
         };
         bench.analyse(self, lens, (fields, notes))
     }

@@ -1,6 +1,6 @@
 //! Numbers of a capture: what the sensor saw and what the lens lost.
 
-use dioptric_optics::{MonoLens, ObjectPoint, Rims, glam::DVec2, rays_over_front};
+use dioptric_optics::{MonoLens, ObjectPoint, Vignetting, glam::DVec2, rays_over_front};
 use dioptric_sensor::{Raw, RawPlane, Tile};
 use ndarray::Array2;
 use serde::Serialize;
@@ -156,7 +156,7 @@ fn loss_row(shot: &Shot, mono: &MonoLens, field_tan: DVec2, dioptres: f64) -> Lo
     let axial = ObjectPoint::from_field(mono, DVec2::ZERO, dioptres);
     let point = ObjectPoint::from_field(mono, field_tan, dioptres);
     let mut rays = rays_over_front(mono, &point, LOSS_RAYS);
-    mono.trace(&mut rays, Rims::Clip);
+    mono.trace(&mut rays, Vignetting::On);
     let losses = rays.losses();
     let share = |n: usize| n as f64 / rays.len() as f64;
     let (mut by_stop, mut by_rims, mut otherwise) = (0, 0, 0);

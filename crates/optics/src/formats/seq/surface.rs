@@ -1,6 +1,6 @@
 //! A surface of a CODE V file.
 
-use crate::{Aperture, Glass, Move, Outline, Shape, prescription::TextError};
+use crate::{Aperture, CoordinateBreak, Glass, Outline, Shape, prescription::TextError};
 
 use super::{
     super::{
@@ -195,11 +195,16 @@ impl SeqSurface {
         let is_moved = self.decenter.iter().chain(&self.tilt_deg).any(|&v| v != 0.0);
         let decenter_mm = self.decenter.map(|shift| shift * mm);
         let last = if self.axis == SeqAxis::Returned { surface } else { usize::MAX };
-        let there =
-            Move { surfaces: (surface, last), pivot_mm: 0.0, decenter_mm, tilt_deg: [-a, -b, c], tilt_first: false };
+        let there = CoordinateBreak {
+            surfaces: (surface, last),
+            pivot_mm: 0.0,
+            decenter_mm,
+            tilt_deg: [-a, -b, c],
+            tilt_first: false,
+        };
         let own = match self.axis {
             SeqAxis::Bent | SeqAxis::Returned => there,
-            SeqAxis::Reversed => Move {
+            SeqAxis::Reversed => CoordinateBreak {
                 surfaces: (surface + 1, last),
                 decenter_mm: decenter_mm.map(|shift| -shift),
                 tilt_deg: [a, b, -c],
@@ -207,7 +212,12 @@ impl SeqSurface {
                 ..there
             },
         };
-        let turn = Move { surfaces: (surface, surface), decenter_mm: [0.0; 3], tilt_deg: [0.0, 0.0, 90.0], ..there };
+        let turn = CoordinateBreak {
+            surfaces: (surface, surface),
+            decenter_mm: [0.0; 3],
+            tilt_deg: [0.0, 0.0, 90.0],
+            ..there
+        };
         let turn = self.is_turned().then_some(SystemMove { z_mm, step: turn });
         let own = is_moved.then_some(SystemMove { z_mm, step: own });
         own.into_iter().chain(turn).collect()

@@ -1,6 +1,6 @@
 //! A surface of a Zemax file.
 
-use crate::{Aperture, Glass, Move, Outline, Shape, prescription::TextError};
+use crate::{Aperture, CoordinateBreak, Glass, Outline, Shape, prescription::TextError};
 
 use super::super::{
     glasses::{Glasses, model},
@@ -207,7 +207,7 @@ impl ZmxSurface {
             return Err(TextError { line: Some(self.line), reason });
         }
         let parameter = |place: usize| self.parameters.get(place - 1).copied().unwrap_or(0.0);
-        let step = Move {
+        let step = CoordinateBreak {
             surfaces: (first, usize::MAX),
             pivot_mm: 0.0,
             decenter_mm: [parameter(1) * mm, parameter(2) * mm, 0.0],

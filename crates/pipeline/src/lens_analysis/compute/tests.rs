@@ -1,4 +1,4 @@
-use dioptric_optics::{Glass, ImageSurface, Interface, Move, Shape, Surface};
+use dioptric_optics::{CoordinateBreak, Glass, ImageSurface, Interface, Shape, Surface};
 use dioptric_psf::{BankSettings, Diffraction, PsfBank};
 
 use super::*;
@@ -22,7 +22,7 @@ fn every_part_is_there_and_agrees_with_the_others() {
     assert_eq!((analysis.spots.len(), analysis.fans.len(), analysis.fields.len()), (6, 6, 2));
     assert_eq!((analysis.reference_nm, analysis.film_mm), (550.0, analysis.focus.axis_film_mm.unwrap()));
     let on_axis = &analysis.spots[1];
-    // Rims end no ray of the axis, and its spot is round.
+    // Vignetting end no ray of the axis, and its spot is round.
     assert_eq!(on_axis.transmission, 1.0);
     assert!((on_axis.sigma_x_um.unwrap() / on_axis.sigma_y_um.unwrap() - 1.0).abs() < 1e-9);
     let oblique = &analysis.spots[4];
@@ -228,7 +228,8 @@ fn an_anamorphic_lens_is_analysed_along_both_axes() {
 fn a_tilted_lens_is_analysed_and_keeps_what_symmetry_is_left() {
     let straight = Lens::built_in("tessar-50mm").unwrap().with_f_number(8.0, 550.0).unwrap();
     let tilt = |tilt_deg| {
-        let step = Move { surfaces: (2, 3), pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg, tilt_first: false };
+        let step =
+            CoordinateBreak { surfaces: (2, 3), pivot_mm: 0.0, decenter_mm: [0.0; 3], tilt_deg, tilt_first: false };
         straight.clone().with_moves(vec![step]).unwrap()
     };
     let fields = || AnalysisFields::AnglesDeg(vec![[0.0, 0.0], [0.0, 8.0], [0.0, -8.0], [8.0, 0.0], [-8.0, 0.0]]);
