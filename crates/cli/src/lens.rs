@@ -103,6 +103,11 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     let lens = &used.lens;
     let wavelengths_nm = match &arguments.wavelengths_nm {
         Some(list) => parse_numbers("--wavelengths-nm", list)?,
+        None if used.reference_nm.is_some() => {
+            let wavelength_nm = used.wavelength_or_usual();
+            tell_taken(&[format!("{wavelength_nm} nm")], common);
+            vec![wavelength_nm]
+        }
         None if used.is_known_at(REFERENCE_WAVELENGTH_NM) => vec![REFERENCE_WAVELENGTH_NM],
         None => {
             let wavelengths_nm = used.wavelengths_or(&[REFERENCE_WAVELENGTH_NM]);
@@ -121,6 +126,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
         .iter()
         .map(|&wavelength_nm| {
             let LensInfoArgs { distance_mm, field_deg, .. } = *arguments;
+            let distance_mm = distance_mm.or(Some(used.distance_mm).filter(|mm| mm.is_finite()));
             LensData::new(lens, &LensQuestion { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm })
         })
         .collect::<Result<_, _>>()?;
@@ -190,6 +196,9 @@ fn data_table(data: &[LensData]) -> anyhow::Result<String> {
 fn number(key: &str, value: &serde_json::Value) -> String {
     if let Some([first, last]) = value.as_array().map(Vec::as_slice) {
         return format!("{first}–{last}");
+    }
+    if let Some(is_so) = value.as_bool() {
+        return if is_so { "yes" } else { "no" }.to_owned();
     }
     match value.as_f64() {
         None if key.ends_with("_deg") || key.ends_with("colors_nm") || key.starts_with('C') => "–".to_owned(),

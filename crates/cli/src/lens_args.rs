@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
-use dioptric_pipeline::{LensReading, MissingGlass};
+use dioptric_pipeline::{LensReading, MissingGlass, SeqNumbers};
 
 /// Something to do with lenses.
 #[derive(Debug, Subcommand)]
@@ -39,6 +39,18 @@ pub(crate) struct LensReadingArgs {
     /// Change of index a nm, about 550 nm, of media with one stated index, as .dat files have (the paper: -0.000133)
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub(crate) slope_per_nm: Option<f64>,
+    /// What the numbers of S are in a .seq file that says neither RDM nor CUM [default: what is plausible]
+    #[arg(long, value_name = "KIND")]
+    pub(crate) seq_numbers: Option<SeqNumbersArg>,
+}
+
+/// What the numbers of surfaces are in a CODE V file that does not say.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum SeqNumbersArg {
+    /// Radii of curvature
+    Radii,
+    /// Curvatures
+    Curvatures,
 }
 
 /// What to do with a glass that no catalogue has.
@@ -70,6 +82,12 @@ impl LensReadingArgs {
                 MissingGlassArg::NdVd => MissingGlass::FromNdVd,
                 MissingGlassArg::Nearest => MissingGlass::Nearest,
             };
+        }
+        if let Some(numbers) = self.seq_numbers {
+            reading.seq_numbers = Some(match numbers {
+                SeqNumbersArg::Radii => SeqNumbers::Radii,
+                SeqNumbersArg::Curvatures => SeqNumbers::Curvatures,
+            });
         }
         reading.slope_per_nm = self.slope_per_nm.or(reading.slope_per_nm);
     }

@@ -163,8 +163,8 @@ fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
         for mtf in &row.mtf {
             writeln!(
                 text,
-                "{:>31} {:>8.2}/mm  radial {:.4}  tangential {:.4}",
-                "MTF", mtf.cycles_per_mm, mtf.radial, mtf.tangential
+                "{:>31} {:>8.2}/mm  tangential {:.4}  sagittal {:.4}",
+                "MTF", mtf.cycles_per_mm, mtf.tangential, mtf.sagittal
             )?;
         }
     }

@@ -203,7 +203,7 @@ fn psf_adds_the_whole_light_and_writes_its_table_and_mosaic() {
         [false, false, true, false, false, true]
     );
     assert_eq!(records[2]["wavelength_nm"], 550.0);
-    check_numbers(&records[2]["mtf"][0], "cycles_per_mm radial tangential");
+    check_numbers(&records[2]["mtf"][0], "cycles_per_mm tangential sagittal radial");
     let csv = fs::read_to_string(folder.path().join("t.csv")).unwrap();
     let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let names = lines.next().unwrap();

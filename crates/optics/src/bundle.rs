@@ -28,6 +28,13 @@ impl ObjectPoint {
         Self::Finite((field_tan * distance_mm).extend(center_z_mm - distance_mm))
     }
 
+    /// Returns the far point seen under this angle from the axis, up to π, on the side that this direction of x and y
+    /// points to.
+    pub fn far(angle_rad: f64, direction: DVec2) -> Self {
+        let across = direction.normalize_or_zero() * -angle_rad.sin();
+        Self::Infinite(across.extend(angle_rad.cos()))
+    }
+
     /// z of the plane that the point lies in, mm; −∞ for a far point.
     pub fn z_mm(&self) -> f64 {
         match self {

@@ -135,6 +135,20 @@ pub enum OpticsError {
         /// The f-number of that diameter at the d line; NaN where the lens has none.
         smallest_f_number: f64,
     },
+    /// An f-number that the rims of other surfaces than the stop do not let through.
+    #[error(
+        "{lens} opens to f/{smallest:.3}, where the rim of surface {surface} limits its light, asked for f/{asked}"
+    )]
+    RimsTooNarrow {
+        /// The lens.
+        lens: String,
+        /// The f-number asked for.
+        asked: f64,
+        /// The 0-based surface whose rim limits the light.
+        surface: usize,
+        /// The f-number of what gets through.
+        smallest: f64,
+    },
     /// A quantity that must be positive.
     #[error("{what} must be a positive number, found {found}")]
     NotPositive {

@@ -22,7 +22,7 @@ use std::path::Path;
 
 use crate::{Lens, OpticsError};
 
-pub use lens_file::{Field, LensFile, Microlens, MissingGlass, ReadOptions};
+pub use lens_file::{Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};
 
 /// Reads a lens file, and gives the lens alone.
 pub(crate) fn read(path: &Path) -> Result<Lens, OpticsError> {

@@ -13,7 +13,7 @@ use self::{
 };
 use crate::{
     Glass, ImageSurface, Lens, MonoLens, ObjectPoint, OpticsError, Pose, PupilBoundary, RayBatch, Shape, Surface,
-    Vignetting, rays_towards,
+    Vignetting,
 };
 
 /// What a drawing shows.
@@ -129,7 +129,7 @@ fn fans(lens: &Lens, lenses: &[MonoLens], layout: &Layout) -> Vec<Fan> {
         let height = |ray: usize| pupil.center_mm().y - low + (low + high) * share(ray);
         let targets: Vec<DVec2> = (0..n_rays).map(|ray| DVec2::new(pupil.center_mm().x, height(ray))).collect();
         for (lens, key) in lenses.iter().zip(layout.wavelength_keys()) {
-            let rays = rays_towards(&point, &targets, pupil.z_mm(), 0.0);
+            let rays = pupil.plane().rays(lens, &point, &targets);
             let color = key.color.unwrap_or_else(|| FIELD_COLORS[i % FIELD_COLORS.len()].to_owned());
             fans.push(Fan { field: i, color, dashes: key.dashes, lines: follow(lens, rays, lead_mm, layout.film_mm) });
         }

@@ -331,10 +331,21 @@ impl Lens {
     /// Returns the lens stopped down to this f-number (for a far object) at this wavelength.
     ///
     /// # Errors
-    /// When the f-number is not positive or below that of the full stop.
+    /// When the f-number is not positive or below that of the full stop, or of what the rims let through.
     pub fn with_f_number(&self, f_number: f64, wavelength_nm: f64) -> Result<Self, OpticsError> {
         positive("an f-number", f_number)?;
-        let now = self.at(wavelength_nm)?.first_order().f_number;
+        let now = self.at(wavelength_nm)?.first_order_of_stop().f_number;
+        let mut full = self.clone();
+        full.interfaces[self.stop].surface.semi_aperture_mm = self.full_stop_semi_aperture_mm;
+        let full = full.at(wavelength_nm)?;
+        if let Some(beam) = full.limiting_beam().filter(|_| f_number < full.first_order().f_number * (1.0 - 1e-3)) {
+            return Err(OpticsError::RimsTooNarrow {
+                lens: self.name.clone(),
+                asked: f_number,
+                surface: beam.limiting_surface,
+                smallest: full.first_order().f_number,
+            });
+        }
         self.with_stop_diameter_mm(2.0 * self.stop_semi_aperture_mm() * now / f_number)
     }
 

@@ -1,13 +1,13 @@
 //! A lens at one wavelength: the thing that is traced.
 
-use std::{borrow::Cow, ops::Range};
+use std::{borrow::Cow, ops::Range, sync::OnceLock};
 
 use glam::{DVec2, DVec3};
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::{
-    Aperture, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, RayBatchF32, Shape, Surface,
-    Vignetting,
+    Aperture, AxialBeam, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, RayBatchF32, Shape,
+    Surface, Vignetting,
     paraxial::{self, MarginalRay, Matrix},
     pose,
     trace::{self, Goal, Kind, Plan, Step},
@@ -33,7 +33,10 @@ pub struct MonoLens {
     image_surface: ImageSurface,
     /// Where surfaces stand, if not all are centred.
     placed: Option<Placed>,
+    /// That of the stop, whether it limits the light or not.
     first_order: FirstOrder,
+    /// The beam of a far point on the axis, once it is asked for.
+    far_beam: OnceLock<Option<AxialBeam>>,
 }
 
 /// Where the surfaces of a lens stand that is not centred.
@@ -73,6 +76,7 @@ impl MonoLens {
             image_surface: lens.image_surface(),
             placed,
             first_order,
+            far_beam: OnceLock::new(),
         })
     }
 
@@ -95,6 +99,8 @@ impl MonoLens {
     /// inverted, plus those of each two of them, and so on.
     #[must_use]
     pub fn with_obscurations_inverted(&self, inverted: &[usize]) -> Self {
+        // The parts have the f-number of the whole.
+        self.limiting_beam();
         let (mut lens, mut n) = (self.clone(), 0);
         for step in &mut lens.steps {
             step.apertures.retain_mut(|aperture| {
@@ -119,13 +125,60 @@ impl MonoLens {
     /// Of a lens that is not rotationally symmetric they are those of its axis with all surfaces put back on it (a bent
     /// axis made straight), in the y–z plane; [`first_order_x`](Self::first_order_x) gives those of the x–z plane. A
     /// tilted or decentred lens forms its image by them only as far as its tilts are small.
+    ///
+    /// Where a rim ends the light of a far point on the axis before the stop does ([`limiting_beam`](Self::limiting_beam)),
+    /// the diameters of the pupils and the f-number are those of the real beam that gets through; the pupils stay where the
+    /// images of the stop are.
     pub fn first_order(&self) -> FirstOrder {
+        let Some(beam) = self.limiting_beam() else { return self.first_order };
+        self.first_order.with_entrance_pupil_diameter_mm(2.0 * beam.height_mm)
+    }
+
+    /// The same for a beam that fills the stop, whether it gets through or not.
+    pub(crate) fn first_order_of_stop(&self) -> FirstOrder {
         self.first_order
+    }
+
+    /// The real beam of a far point on the axis, if a rim limits it and not the stop; `None` as a rule.
+    ///
+    /// Some lens files state a stop that is wider than what their rims let through.
+    pub fn limiting_beam(&self) -> Option<AxialBeam> {
+        if !(self.first_order.entrance_pupil_diameter_mm.is_finite() && self.first_order.power_per_mm != 0.0) {
+            return None;
+        }
+        let beam = self.far_beam.get_or_init(|| self.axial_beam(f64::INFINITY));
+        beam.filter(|beam| !beam.is_limited_by_stop)
+    }
+
+    /// Returns a sentence on what limits the light of a far point on the axis, if it is not the stop.
+    pub fn note_on_limit(&self) -> Option<String> {
+        let beam = self.limiting_beam()?;
+        let (real, of_stop) = (self.first_order().f_number, self.first_order.f_number);
+        let (surface, rim_mm) = (beam.limiting_surface, 2.0 * self.semi_aperture_mm(beam.limiting_surface));
+        let (filled_mm, stop_mm) = (2.0 * beam.stop_radius_mm, 2.0 * self.stop_semi_aperture_mm());
+        Some(format!(
+            "the stop does not limit the light: the rim of surface {surface} ({rim_mm:.4} mm across) lets a beam of f/{real:.3} \
+             through, which fills {filled_mm:.4} of the {stop_mm:.4} mm of the stop (f/{of_stop:.3} alone)"
+        ))
+    }
+
+    /// The f-number for a far object by the real rays that get through: effective focal length over the diameter of the
+    /// beam before the lens; `None` where no light does, or the lens has no power.
+    ///
+    /// It differs from the paraxial f-number by the aberration of the entrance pupil.
+    pub fn real_f_number(&self) -> Option<f64> {
+        let beam = (*self.far_beam.get_or_init(|| self.axial_beam(f64::INFINITY)))?;
+        let f_number = (self.first_order.efl_mm / (2.0 * beam.height_mm)).abs();
+        f_number.is_finite().then_some(f_number)
     }
 
     /// Focal lengths, principal planes and pupils in the x–z plane; those of [`first_order`](Self::first_order) unless
     /// a surface is curved differently along x and y.
     pub fn first_order_x(&self) -> FirstOrder {
+        // Of a lens of revolution nothing differs.
+        if self.steps.iter().all(|step| !matches!(step.kind, Kind::Toric(_))) {
+            return self.first_order();
+        }
         paraxial::first_order(&self.steps_along_x(), self.stop, self.wavelength_nm)
     }
 
@@ -183,6 +236,13 @@ impl MonoLens {
     /// z of the last vertex from the first, mm.
     pub fn last_vertex_z_mm(&self) -> f64 {
         self.steps[self.steps.len() - 1].vertex_z
+    }
+
+    /// How far from the middle of the stop the beam of a point on the axis passes it at most, mm: the stop's own radius unless
+    /// a rim limits the light of the point at this distance before the first vertex.
+    pub fn stop_radius_filled_mm(&self, object_distance_mm: f64) -> f64 {
+        let beam = self.axial_beam(object_distance_mm).filter(|beam| !beam.is_limited_by_stop);
+        beam.map_or(self.stop_semi_aperture_mm(), |beam| beam.stop_radius_mm)
     }
 
     pub(crate) fn steps(&self) -> &[Step] {
@@ -365,13 +425,29 @@ impl MonoLens {
     ///
     /// It is `N (1 + |m| / m_p)` with `m_p` the magnification of the pupils, and holds where those are infinite too.
     /// With it an unvignetted axial image of a Lambertian plane has `E = π L / (4 N_w²)` to 0.1 % at f/8, at any
-    /// magnification; the textbook's `N (1 + |m|)` has not, unless the pupils are equal.
+    /// magnification; the textbook's `N (1 + |m|)` has not, unless the pupils are equal. Where a rim limits the light and not
+    /// the stop, the cone is that of the real marginal ray.
     pub fn working_f_number(&self, object_distance_mm: f64) -> f64 {
         0.5 / self.marginal_ray(object_distance_mm).reduced_slope_after.abs()
     }
 
-    /// Returns the paraxial ray from the axial point at this distance before the first vertex to the edge of the stop.
+    /// Returns the paraxial ray from the axial point at this distance before the first vertex to the edge of the stop; where
+    /// a rim limits the light and not the stop, the one that starts as the real marginal ray does.
     pub(crate) fn marginal_ray(&self, object_distance_mm: f64) -> MarginalRay {
+        let to_stop = self.marginal_ray_of_stop(object_distance_mm);
+        let beam = match object_distance_mm.is_infinite() {
+            true => self.limiting_beam(),
+            false => self.axial_beam(object_distance_mm).filter(|beam| !beam.is_limited_by_stop),
+        };
+        match beam {
+            Some(beam) if object_distance_mm.is_infinite() => to_stop.scaled(beam.height_mm / to_stop.height_mm),
+            Some(beam) => to_stop.scaled((beam.slope_before * self.object_index() / to_stop.reduced_slope).abs()),
+            None => to_stop,
+        }
+    }
+
+    /// The same to the edge of the stop, whether the light gets through or not.
+    pub(crate) fn marginal_ray_of_stop(&self, object_distance_mm: f64) -> MarginalRay {
         MarginalRay::of(&self.steps, self.stop, object_distance_mm)
     }
 

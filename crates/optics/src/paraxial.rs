@@ -52,6 +52,13 @@ impl FirstOrder {
         self.image_index / self.power_per_mm
     }
 
+    /// Returns the same with pupils of another size.
+    pub(crate) fn with_entrance_pupil_diameter_mm(self, diameter_mm: f64) -> Self {
+        let exit_pupil_diameter_mm = diameter_mm * self.pupil_magnification();
+        let f_number = if self.power_per_mm == 0.0 { f64::INFINITY } else { self.efl_mm.abs() / diameter_mm };
+        Self { entrance_pupil_diameter_mm: diameter_mm, exit_pupil_diameter_mm, f_number, ..self }
+    }
+
     /// Exit-pupil diameter over entrance-pupil diameter.
     pub fn pupil_magnification(&self) -> f64 {
         self.exit_pupil_diameter_mm / self.entrance_pupil_diameter_mm
@@ -70,6 +77,15 @@ pub(crate) struct MarginalRay {
 }
 
 impl MarginalRay {
+    /// Returns the ray with all its heights and slopes times a factor.
+    pub(crate) fn scaled(self, factor: f64) -> Self {
+        Self {
+            reduced_slope: self.reduced_slope * factor,
+            height_mm: self.height_mm * factor,
+            reduced_slope_after: self.reduced_slope_after * factor,
+        }
+    }
+
     /// Returns the ray from the point at `object_distance_mm` before the first vertex (infinite for a far one).
     ///
     /// Heights and slopes are infinite where no such ray reaches the stop's edge, as from a far point to the stop of a
@@ -337,7 +353,7 @@ mod tests {
     #[test]
     fn telecentric_afocal_relay_has_no_power_and_pupils_without_end() {
         // 1/49 and 1/81 are no binary numbers: what rounding leaves must not pass for a focal length.
-        let relay = train([(1.0 / 49.0, 20.0, 49.0), (0.0, 5.0, 81.0), (1.0 / 81.0, 30.0, 0.0)], 1);
+        let relay = train([(1.0 / 49.0, 40.0, 49.0), (0.0, 5.0, 81.0), (1.0 / 81.0, 60.0, 0.0)], 1);
         let mono = relay.at(550.0).unwrap();
         let first = mono.first_order();
         assert_eq!((first.power_per_mm, first.efl_mm, first.f_number), (0.0, f64::INFINITY, f64::INFINITY));

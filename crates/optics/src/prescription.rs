@@ -3,7 +3,9 @@
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::{Aperture, CoordinateBreak, Glass, ImageSurface, Interface, Lens, OpticsError, Shape, Surface};
+use crate::{
+    Aperture, CoordinateBreak, Field, Glass, ImageSurface, Interface, Lens, LensFile, OpticsError, Shape, Surface,
+};
 
 /// A lens as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,6 +28,18 @@ struct Prescription {
     image_radius_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "is_zero")]
     image_conic: f64,
+    /// How the lens is meant to be used, as far as that is known: the place of the film behind the last vertex, that of the
+    /// object before the first (left out for a far one), wavelengths and the main one of them, and the points of the field.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    film_distance_mm: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    object_distance_mm: Option<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    wavelengths_nm: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reference_wavelength_nm: Option<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    fields: Vec<Field>,
 }
 
 /// A surface as it stands in a file, with what follows it.
@@ -78,6 +92,11 @@ impl From<OpticsError> for TextError {
 
 /// Reads a lens from the text of our own file.
 pub(crate) fn lens_from_ron(text: &str) -> Result<Lens, TextError> {
+    file_from_ron(text).map(|file| file.lens)
+}
+
+/// Reads a lens and its use from the text of our own file.
+pub(crate) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
     let prescription: Prescription = ron_options()
         .from_str(text)
         .map_err(|error| TextError { line: Some(error.span.start.line), reason: error.code.to_string() })?;
@@ -94,7 +113,34 @@ pub(crate) fn lens_from_ron(text: &str) -> Result<Lens, TextError> {
     let lens =
         Lens::new_with_apertures(prescription.name, prescription.source, interfaces, stop, prescription.apertures)?;
     let lens = lens.with_object_medium(prescription.object_medium)?;
-    Ok(lens.with_moves(prescription.moves)?.with_image_surface(image_surface)?)
+    let lens = lens.with_moves(prescription.moves)?.with_image_surface(image_surface)?;
+    let positive = |key: &str, found: Option<f64>| match found.filter(|mm| !(mm.is_finite() && *mm > 0.0)) {
+        Some(found) => Err(TextError { line: None, reason: format!("{key} is {found}, expected a number above 0") }),
+        None => Ok(found),
+    };
+    let finite = |key: &str, found: Option<f64>| match found.filter(|v| !v.is_finite()) {
+        Some(found) => Err(TextError { line: None, reason: format!("{key} is {found}, expected a finite number") }),
+        None => Ok(found),
+    };
+    for &nm in &prescription.wavelengths_nm {
+        positive("a wavelength of wavelengths_nm", Some(nm))?;
+    }
+    for field in &prescription.fields {
+        let (Field::Angle { x_deg: x, y_deg: y }
+        | Field::ObjectHeight { x_mm: x, y_mm: y }
+        | Field::ImageHeight { x_mm: x, y_mm: y }
+        | Field::RealImageHeight { x_mm: x, y_mm: y }) = *field;
+        finite("a number of fields", Some(x))?;
+        finite("a number of fields", Some(y))?;
+    }
+    Ok(LensFile {
+        film_mm: finite("film_distance_mm", prescription.film_distance_mm)?,
+        object_distance_mm: finite("object_distance_mm", prescription.object_distance_mm)?,
+        reference_wavelength_nm: positive("reference_wavelength_nm", prescription.reference_wavelength_nm)?,
+        wavelengths_nm: prescription.wavelengths_nm,
+        fields: prescription.fields,
+        ..LensFile::from(lens)
+    })
 }
 
 /// Returns the curvature of a radius, which is left out for a plane.
@@ -112,6 +158,11 @@ fn curvature_per_mm(surface: usize, key: &'static str, radius_mm: Option<f64>) -
 impl Lens {
     /// Returns the lens as the text of our own file, which reads back as the same lens.
     pub fn to_ron(&self) -> String {
+        LensFile::from(self.clone()).to_ron()
+    }
+
+    /// Returns the lens as it stands in our own file.
+    fn prescription(&self) -> Prescription {
         let radius_mm = |curvature_per_mm: f64| (curvature_per_mm != 0.0).then(|| 1.0 / curvature_per_mm);
         let row = |(i, interface): (usize, &Interface)| Row {
             radius_mm: radius_mm(interface.surface.curvature_per_mm),
@@ -121,7 +172,7 @@ impl Lens {
             medium: interface.medium_after.clone(),
             thickness_mm: interface.thickness_after_mm,
         };
-        let prescription = Prescription {
+        Prescription {
             name: self.name().to_owned(),
             source: self.source().to_owned(),
             object_medium: self.object_medium().clone(),
@@ -130,6 +181,26 @@ impl Lens {
             apertures: self.apertures().to_vec(),
             image_radius_mm: radius_mm(self.image_surface().curvature_per_mm),
             image_conic: self.image_surface().conic,
+            film_distance_mm: None,
+            object_distance_mm: None,
+            wavelengths_nm: Vec::new(),
+            reference_wavelength_nm: None,
+            fields: Vec::new(),
+        }
+    }
+}
+
+impl LensFile {
+    /// Returns the lens, and what is known of its use, as the text of our own file, which reads back as the same but for an
+    /// array of microlenses.
+    pub fn to_ron(&self) -> String {
+        let prescription = Prescription {
+            film_distance_mm: self.film_mm,
+            object_distance_mm: self.object_distance_mm.filter(|mm| mm.is_finite()),
+            wavelengths_nm: self.wavelengths_nm.clone(),
+            reference_wavelength_nm: self.reference_wavelength_nm,
+            fields: self.fields.clone(),
+            ..self.lens.prescription()
         };
         let pretty = ron::ser::PrettyConfig::new().depth_limit(2);
         ron_options().to_string_pretty(&prescription, pretty).expect("numbers and text always have a RON form")

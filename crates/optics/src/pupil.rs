@@ -2,57 +2,75 @@
 
 mod corners;
 mod holes;
+mod light;
+mod plane;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
+pub use self::plane::PupilPlane;
 use crate::{
-    MonoLens, ObjectPoint, RayBatch, Vignetting, rays_towards,
+    MonoLens, ObjectPoint, RayBatch, Vignetting,
     trace::{self, Plan},
 };
 
-/// The true, vignetted pupil that one object point sees at one wavelength: a region of the entrance-pupil plane,
+/// The true, vignetted pupil that one object point sees at one wavelength, or a part of it: a region of a plane,
 /// given by its edge at equally spaced azimuths about a centre.
 ///
-/// The edge follows the round rims and the openings of surfaces; an obscuration ([`Aperture`](crate::Aperture)) is a
-/// hole in the region that is not part of it. The hole is itself the pupil of the lens
-/// [with the obscuration inverted](MonoLens::with_obscurations_inverted).
+/// The plane is that of the paraxial entrance pupil; for light that comes in across the axis or from behind, as that of the
+/// widest lenses, it faces the point ([`PupilPlane`]). The edge follows the round rims and the openings of surfaces; an
+/// obscuration ([`Aperture`](crate::Aperture)) is a hole in the region that is not part of it. The hole is itself the
+/// pupil of the lens [with the obscuration inverted](MonoLens::with_obscurations_inverted).
 #[derive(Clone, Debug, PartialEq)]
 pub struct PupilBoundary {
     // Invariants: at least 3 radii, all finite and above 0.
     center_mm: DVec2,
-    z_mm: f64,
+    plane: PupilPlane,
     rho_mm: Vec<f64>,
 }
 
 impl PupilBoundary {
-    /// Finds the pupil, or `None` if no light of the point gets through.
+    /// Finds the pupil, or `None` if no light of the point gets through; of a pupil that no single place of it sees whole,
+    /// what is seen from a place well inside ([`find_parts`](Self::find_parts) finds the rest).
     ///
     /// Every ray through the region meets every surface inside its rim. The edge is found to rounding at each of
     /// `n_azimuths` (at least 8) directions; the centre is the centroid of the region.
     pub fn find(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> Option<Self> {
-        let n_azimuths = n_azimuths.max(8);
-        let search = Search::new(lens, point);
-        let inside_mm = search.inside_mm()?;
-        let rough = search.boundary(inside_mm, n_azimuths, 1e-3)?;
-        let centroid_mm = rough.centroid_mm();
-        // A region far from convex may not hold its centroid; then the point found first serves.
-        let is_clear = search.clearances(&[centroid_mm])[0] > 0.0;
-        search.boundary(if is_clear { centroid_mm } else { inside_mm }, n_azimuths, EDGE_MM)
+        Search::new(lens, point).largest(n_azimuths.max(8))
     }
 
-    /// The centre that radii count from, in the entrance-pupil plane, mm from the axis.
+    /// Finds the whole pupil as parts that do not overlap, the largest first; none if no light of the point gets through.
+    ///
+    /// A pupil has several parts where its light comes through in separate islands, or where no place of it sees all of
+    /// its edge, as in a crescent: then it is cut by straight lines. Light is looked for over the whole front of the lens.
+    /// All parts lie in the same plane, [`PupilPlane::of_parts`].
+    pub fn find_parts(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> Vec<Self> {
+        Search { lens, point, plane: PupilPlane::of_parts(lens, point) }.parts(n_azimuths.max(8))
+    }
+
+    /// The centre that radii count from, in the pupil's plane, mm from its origin.
     pub fn center_mm(&self) -> DVec2 {
         self.center_mm
     }
 
-    /// z of the entrance-pupil plane from the first vertex, mm.
+    /// The plane that the region lies in.
+    pub fn plane(&self) -> &PupilPlane {
+        &self.plane
+    }
+
+    /// z of the pupil's plane on the axis, from the first vertex, mm.
     pub fn z_mm(&self) -> f64 {
-        self.z_mm
+        self.plane.z_mm()
     }
 
     /// The edge's distance from the centre at the azimuths `2π i / n`, counted from +x towards +y, mm.
     pub fn rho_at_azimuths_mm(&self) -> &[f64] {
         &self.rho_mm
+    }
+
+    /// The places of the edge at these azimuths in the pupil's plane, mm.
+    pub fn edge_mm(&self) -> Vec<DVec2> {
+        let place = |(rho, u): (&f64, DVec2)| self.center_mm + *rho * u;
+        self.rho_mm.iter().zip(Self::azimuths(self.rho_mm.len())).map(place).collect()
     }
 
     /// Returns the edge's distance from the centre at any azimuth, mm: exact at the azimuths that were found, a cubic
@@ -78,11 +96,21 @@ impl PupilBoundary {
         (0..n).map(move |i| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64))
     }
 
+    fn rho_max(&self) -> f64 {
+        self.rho_mm.iter().copied().fold(0.0, f64::max)
+    }
+
     fn centroid_mm(&self) -> DVec2 {
         let n = self.rho_mm.len();
         let moment = |(r, u): (&f64, DVec2)| u * (r * r * r / 3.0);
         let sum: DVec2 = self.rho_mm.iter().zip(Self::azimuths(n)).map(moment).sum();
         self.center_mm + sum * (std::f64::consts::TAU / n as f64) / self.area_mm2()
+    }
+
+    /// How far beyond the edge a place lies, seen from the centre, mm; negative inside.
+    fn beyond_mm(&self, place_mm: DVec2) -> f64 {
+        let from_center = place_mm - self.center_mm;
+        from_center.length() - self.rho_max_mm(from_center.to_angle())
     }
 }
 
@@ -90,66 +118,127 @@ impl PupilBoundary {
 struct Search<'a> {
     lens: &'a MonoLens,
     point: &'a ObjectPoint,
-    z_mm: f64,
+    plane: PupilPlane,
 }
 
 impl<'a> Search<'a> {
     fn new(lens: &'a MonoLens, point: &'a ObjectPoint) -> Self {
-        Self { lens, point, z_mm: lens.projection_center_z_mm() }
+        Self { lens, point, plane: PupilPlane::of(lens, point) }
     }
 
     fn clearances(&self, targets_mm: &[DVec2]) -> Vec<f64> {
-        self.lens.clearances_mm(rays_towards(self.point, targets_mm, self.z_mm, 0.0))
+        self.lens.clearances_mm(self.plane.rays(self.lens, self.point, targets_mm))
     }
 
-    /// Returns a point of the pupil, if any ray gets through.
-    fn inside_mm(&self) -> Option<DVec2> {
-        if self.clearances(&[DVec2::ZERO])[0] > 0.0 {
-            return Some(DVec2::ZERO);
+    /// Returns the clearances of rays from the rims and from the sides of a cell.
+    fn clearances_in(&self, targets_mm: &[DVec2], cell: &Cell) -> Vec<f64> {
+        let mut clearances = self.clearances(targets_mm);
+        for (clearance, target) in clearances.iter_mut().zip(targets_mm) {
+            *clearance = clearance.min(cell.inside_mm(*target));
         }
-        let rim_mm = self.lens.semi_aperture_mm(0);
-        let (mut center, mut reach) = (DVec2::ZERO, 1.0);
-        let mut best = (f64::NEG_INFINITY, DVec2::ZERO);
-        // Rays through a grid on the first surface, finer and finer about the one that stays clear of rims by most.
-        for _ in 0..SEARCH_ROUNDS {
-            const N: i32 = 10;
-            let step = reach / f64::from(N);
-            let grid = (-N..=N).flat_map(|i| (-N..=N).map(move |j| DVec2::new(f64::from(i), f64::from(j)) * step));
-            let candidates: Vec<DVec2> =
-                grid.map(|offset| center + offset).filter(|p| p.length_squared() <= 1.0).collect();
-            let targets: Vec<DVec2> = candidates.iter().map(|p| self.target_through_front(*p * rim_mm)).collect();
-            for ((&candidate, &target), clearance) in candidates.iter().zip(&targets).zip(self.clearances(&targets)) {
-                if clearance > best.0 {
-                    best = (clearance, target);
-                    center = candidate;
-                }
-            }
-            if best.0 > 0.0 {
-                return Some(best.1);
-            }
-            reach *= 0.5;
+        clearances
+    }
+
+    /// Returns the middle of the pupil's plane, if light passes there, as it does for most fields of most lenses.
+    fn lit_middle(&self) -> Option<DVec2> {
+        (self.clearances(&[DVec2::ZERO])[0] > 0.0).then_some(DVec2::ZERO)
+    }
+
+    /// Finds what is seen of the pupil from a place well inside.
+    fn largest(&self, n_azimuths: usize) -> Option<PupilBoundary> {
+        let everywhere = Cell::default();
+        let in_middle = self.lit_middle().and_then(|seed| self.part_about(seed, &everywhere, n_azimuths));
+        in_middle.or_else(|| self.part_of(&self.lit_over_front(), &everywhere, n_azimuths))
+    }
+
+    /// Finds the parts of the pupil, the largest first.
+    fn parts(&self, n_azimuths: usize) -> Vec<PupilBoundary> {
+        let mut lit = self.lit_over_front();
+        let everywhere = Cell::default();
+        let in_middle = self.lit_middle().and_then(|seed| self.part_about(seed, &everywhere, n_azimuths));
+        let Some(part) = in_middle.or_else(|| self.part_of(&lit, &everywhere, n_azimuths)) else { return Vec::new() };
+        lit.extend(self.lit_around(&part));
+        let mut parts = self.split(part, &lit, &everywhere);
+        parts.sort_by(|a, b| b.area_mm2().total_cmp(&a.area_mm2()));
+        parts
+    }
+
+    /// Returns a part if it is all of the pupil that lies in its cell; else cuts the cell in two across the longer extent
+    /// of what is lit in it, and returns the parts in both, cut on as long as that is needed.
+    fn split(&self, part: PupilBoundary, lit: &[(DVec2, f64)], cell: &Cell) -> Vec<PupilBoundary> {
+        let is_beside = |(target, _): &(DVec2, f64)| part.beyond_mm(*target) > BESIDE * part.rho_max();
+        let is_whole = !lit.iter().any(is_beside) && self.uncertain_mm2(&part) <= UNCERTAIN * part.area_mm2();
+        if cell.0.len() >= MOST_CUTS || is_whole {
+            return vec![part];
         }
-        None
+        let cells = cell.cut_across(lit);
+        let of_cell = |cell: &Cell| {
+            let here: Vec<(DVec2, f64)> = lit.iter().filter(|(at, _)| cell.inside_mm(*at) > 0.0).copied().collect();
+            let here: Vec<(DVec2, f64)> = here.iter().map(|&(at, c)| (at, c.min(cell.inside_mm(at)))).collect();
+            let part = self.part_of(&here, cell, part.rho_mm.len())?;
+            Some(self.split(part, &here, cell))
+        };
+        cells.iter().filter_map(of_cell).flatten().collect()
     }
 
-    /// Returns where the ray through this point of the first surface crosses the pupil plane.
-    fn target_through_front(&self, on_front_mm: DVec2) -> DVec2 {
-        let point = self.lens.on_front_mm(on_front_mm);
-        let direction = self.point.direction_to(point);
-        (point + direction * ((self.z_mm - point.z) / direction.z)).truncate()
+    /// Returns the part around the first of these places, those of most clearance first, that has an area.
+    fn part_of(&self, lit: &[(DVec2, f64)], cell: &Cell, n_azimuths: usize) -> Option<PupilBoundary> {
+        let mut lit = lit.to_vec();
+        lit.sort_by(|a, b| b.1.total_cmp(&a.1));
+        lit.iter().take(MOST_SEEDS).find_map(|(seed, _)| self.part_about(*seed, cell, n_azimuths))
     }
 
-    /// Returns the edge as seen from a point inside, found to `edge_mm` of clearance.
-    fn boundary(&self, center_mm: DVec2, n_azimuths: usize, edge_mm: f64) -> Option<PupilBoundary> {
-        let rho_mm = self.edge_mm(center_mm, PupilBoundary::azimuths(n_azimuths), edge_mm)?;
-        Some(PupilBoundary { center_mm, z_mm: self.z_mm, rho_mm })
+    /// Returns how much of a part's area may be wrong where its edge jumps from one azimuth to the next, because a nearer
+    /// edge ends there: where the ray just within the chord between both is dark.
+    fn uncertain_mm2(&self, part: &PupilBoundary) -> f64 {
+        let edge = part.edge_mm();
+        let n = edge.len();
+        let within = |i: usize| part.center_mm + WITHIN_CHORD * (edge[i].midpoint(edge[(i + 1) % n]) - part.center_mm);
+        let clearances = self.clearances(&(0..n).map(within).collect::<Vec<_>>());
+        let ramp_mm2 = |i: usize| {
+            let squares = part.rho_mm[i].powi(2) - part.rho_mm[(i + 1) % n].powi(2);
+            0.25 * squares.abs() * std::f64::consts::TAU / n as f64
+        };
+        (0..n).filter(|&i| clearances[i] <= 0.0).map(ramp_mm2).sum()
     }
 
-    /// Returns how far the edge is from a point inside in each direction, mm, found to `edge_mm` of clearance.
-    fn edge_mm(&self, center_mm: DVec2, directions: impl Iterator<Item = DVec2>, edge_mm: f64) -> Option<Vec<f64>> {
-        let at_center = self.clearances(&[center_mm])[0];
+    /// Returns the part of the pupil around a place of it, as far as rays see the edge from the part's centroid or, where
+    /// that is dark or sees less, from the place itself.
+    fn part_about(&self, seed_mm: DVec2, cell: &Cell, n_azimuths: usize) -> Option<PupilBoundary> {
+        let rough = self.boundary(seed_mm, cell, n_azimuths, 1e-3)?;
+        let centroid_mm = rough.centroid_mm();
+        let is_clear = self.clearances_in(&[centroid_mm], cell)[0] > 0.0;
+        let from_centroid = is_clear.then(|| self.boundary(centroid_mm, cell, n_azimuths, EDGE_MM)).flatten();
+        match from_centroid {
+            Some(part) if part.area_mm2() >= SEES_ENOUGH * rough.area_mm2() => Some(part),
+            _ => self.boundary(seed_mm, cell, n_azimuths, EDGE_MM),
+        }
+    }
+
+    /// Returns the edge as seen from a place inside, found to `edge_mm` of clearance.
+    fn boundary(&self, center_mm: DVec2, cell: &Cell, n_azimuths: usize, edge_mm: f64) -> Option<PupilBoundary> {
+        let directions: Vec<DVec2> = PupilBoundary::azimuths(n_azimuths).collect();
+        let rho_mm = self.edge_mm(center_mm, cell, &directions, edge_mm)?;
+        Some(PupilBoundary { center_mm, plane: self.plane, rho_mm })
+    }
+
+    /// Returns how far the edge is from a place inside in each direction, mm, found to `edge_mm` of clearance.
+    fn edge_mm(&self, center_mm: DVec2, cell: &Cell, directions: &[DVec2], edge_mm: f64) -> Option<Vec<f64>> {
+        let at_center = self.clearances_in(&[center_mm], cell)[0];
         let edge_mm = edge_mm.min(0.01 * at_center);
-        let mut edges: Vec<Edge> = directions.map(|direction| Edge::new(direction, at_center)).collect();
+        let mut edges: Vec<Edge> = directions.iter().map(|&direction| Edge::new(direction, at_center)).collect();
+        for _ in 0..GAP_ROUNDS {
+            self.narrow(&mut edges, center_mm, cell, edge_mm);
+            if !self.open_gaps(&mut edges, center_mm, cell) {
+                break;
+            }
+        }
+        let is_whole = edges.iter().all(|edge| edge.outer.is_some() && edge.inner.0 > 0.0);
+        is_whole.then(|| edges.iter().map(|edge| edge.inner.0).collect())
+    }
+
+    /// Brings the two ends of each edge together.
+    fn narrow(&self, edges: &mut [Edge], center_mm: DVec2, cell: &Cell, edge_mm: f64) {
         for _ in 0..EDGE_ROUNDS {
             let mut open: Vec<&mut Edge> = edges.iter_mut().filter(|edge| !edge.is_found(edge_mm)).collect();
             if open.is_empty() {
@@ -158,25 +247,90 @@ impl<'a> Search<'a> {
             let radii: Vec<f64> = open.iter().map(|edge| edge.next_rho_mm()).collect();
             let target = |(edge, rho): (&&mut Edge, &f64)| center_mm + edge.direction * *rho;
             let targets: Vec<DVec2> = open.iter().zip(&radii).map(target).collect();
-            for ((edge, rho), clearance) in open.iter_mut().zip(radii).zip(self.clearances(&targets)) {
+            let clearances = self.clearances_in(&targets, cell);
+            for ((edge, rho), clearance) in open.iter_mut().zip(radii).zip(clearances) {
                 edge.note(rho, clearance);
             }
         }
-        let is_whole = edges.iter().all(|edge| edge.outer.is_some() && edge.inner.0 > 0.0);
-        is_whole.then(|| edges.iter().map(|edge| edge.inner.0).collect())
+    }
+
+    /// Looks for darkness between the centre and the edges, opens the edges beyond which there is some, and returns
+    /// whether there are any.
+    fn open_gaps(&self, edges: &mut [Edge], center_mm: DVec2, cell: &Cell) -> bool {
+        let share = |k: usize| (k + 1) as f64 / (GAP_PLACES + 1) as f64;
+        let places = |edge: &Edge| {
+            let along = edge.inner.0 * edge.direction;
+            (0..GAP_PLACES).map(move |k| center_mm + share(k) * along)
+        };
+        let targets: Vec<DVec2> = edges.iter().flat_map(places).collect();
+        let clearances = self.clearances_in(&targets, cell);
+        let mut is_any_open = false;
+        for (edge, clearances) in edges.iter_mut().zip(clearances.chunks(GAP_PLACES)) {
+            let Some(dark) = clearances.iter().position(|clearance| *clearance <= 0.0) else { continue };
+            let rho_mm = edge.inner.0;
+            let inner = match dark {
+                0 => (0.0, edge.at_center),
+                _ => (share(dark - 1) * rho_mm, clearances[dark - 1]),
+            };
+            *edge =
+                Edge { inner, outer: Some((share(dark) * rho_mm, clearances[dark])), in_a_row: 0, rounds: 0, ..*edge };
+            is_any_open = true;
+        }
+        is_any_open
     }
 }
 
-/// Rounds of the search for a first ray that gets through: the grid shrinks by half in each.
-const SEARCH_ROUNDS: usize = 16;
+/// A convex piece of the pupil's plane: what lies before all these lines, each a unit normal and a distance from the
+/// origin, mm.
+#[derive(Clone, Debug, Default)]
+struct Cell(Vec<(DVec2, f64)>);
+
+impl Cell {
+    /// How far inside the cell a place lies, mm; negative outside.
+    fn inside_mm(&self, place_mm: DVec2) -> f64 {
+        self.0.iter().map(|(normal, from_origin)| from_origin - normal.dot(place_mm)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Returns the two halves of the cell, cut through the mean of these places across the direction that they spread
+    /// most in.
+    fn cut_across(&self, places: &[(DVec2, f64)]) -> [Self; 2] {
+        let n = places.len().max(1) as f64;
+        let mean = places.iter().map(|(place, _)| *place).sum::<DVec2>() / n;
+        let spread = |f: fn(DVec2) -> f64| places.iter().map(|(place, _)| f(*place - mean)).sum::<f64>();
+        let (xx, xy, yy) = (spread(|p| p.x * p.x), spread(|p| p.x * p.y), spread(|p| p.y * p.y));
+        let along = DVec2::from_angle(0.5 * (2.0 * xy).atan2(xx - yy));
+        [along, -along].map(|normal| {
+            let line = (normal, normal.dot(mean));
+            Self(self.0.iter().copied().chain([line]).collect())
+        })
+    }
+}
+
+/// Places from which the edge of a part is looked for before the part is given up.
+const MOST_SEEDS: usize = 16;
+/// The most cuts that bound a part of a pupil.
+const MOST_CUTS: usize = 7;
+/// The share of a part's area that may be wrong at jumps of its edge, and how near to the chord between two azimuths the
+/// edge must come.
+const UNCERTAIN: f64 = 5e-4;
+const WITHIN_CHORD: f64 = 0.99;
+/// The share of what a first place sees of a part that the part's centroid must see to be its centre.
+const SEES_ENOUGH: f64 = 0.98;
+/// How far beyond a part's edge light counts as not seen, over the part's radius.
+const BESIDE: f64 = 0.02;
+/// Places between centre and edge that are looked at for darkness, and how often.
+const GAP_PLACES: usize = 11;
+const GAP_ROUNDS: usize = 4;
 /// Rounds after which an edge is as good as it gets; a well-behaved one takes ten.
 const EDGE_ROUNDS: usize = 100;
 /// Clearance at which a ray is held to graze its rim, mm.
 const EDGE_MM: f64 = 1e-11;
 
 /// The edge of the pupil in one direction from the centre, between a radius inside and one outside.
+#[derive(Clone, Copy)]
 struct Edge {
     direction: DVec2,
+    at_center: f64,
     /// Radius and clearance of the outermost ray known to get through.
     inner: (f64, f64),
     /// Radius and clearance of the innermost ray known not to, once there is one.
@@ -188,7 +342,7 @@ struct Edge {
 
 impl Edge {
     fn new(direction: DVec2, at_center: f64) -> Self {
-        Self { direction, inner: (0.0, at_center), outer: None, in_a_row: 0, rounds: 0 }
+        Self { direction, at_center, inner: (0.0, at_center), outer: None, in_a_row: 0, rounds: 0 }
     }
 
     fn is_found(&self, edge_mm: f64) -> bool {
@@ -223,6 +377,14 @@ impl Edge {
 }
 
 impl MonoLens {
+    /// How far inside the rim and the openings of a surface a point of it lies, mm; the point is of the lens frame.
+    fn clearance_on_mm(&self, surface: usize, point_mm: DVec3) -> f64 {
+        let step = &self.steps()[surface];
+        let at = self.poses().map_or(point_mm, |poses| poses[surface].to_own(point_mm)).truncate();
+        let openings = step.apertures.iter().map(|aperture| aperture.clearance_mm(at.x, at.y));
+        openings.fold(step.semi_aperture - at.length(), f64::min)
+    }
+
     /// Returns by how much each ray stays inside the rim that it comes nearest to, mm: the least over all surfaces of
     /// semi-aperture less distance from the axis.
     ///
@@ -246,7 +408,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::Lens;
+    use crate::{Lens, rays_towards};
 
     #[track_caller]
     fn pupil(lens: &MonoLens, field_deg: f64, dioptres: f64) -> PupilBoundary {

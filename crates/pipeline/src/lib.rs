@@ -20,7 +20,7 @@ mod sense;
 mod staged;
 mod stages;
 
-pub use dioptric_optics::MissingGlass;
+pub use dioptric_optics::{MissingGlass, SeqNumbers};
 pub use dioptric_psf::Diffraction;
 
 pub use camera::{

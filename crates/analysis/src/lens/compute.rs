@@ -64,17 +64,20 @@ impl AnalysisRequest {
                 expected: "an object that does not lie in the entrance pupil".to_owned(),
             });
         }
-        let (fields, notes) = self.fields_of(&lenses[reference], way_mm);
+        let (fields, mut notes) = self.fields_of(&lenses[reference], way_mm);
+        notes.extend(lenses[reference].note_on_limit());
+        // A stop that is wider than the light is no measure of where rays pass the pupil.
+        let beam = lenses[reference].axial_beam(self.distance_mm);
+        let coordinates = match beam.is_some_and(|beam| !beam.is_limited_by_stop) {
+            true => PupilCoordinates::Vignetted,
+            false => PupilCoordinates::Stop { radius_mm: WITHIN_RIM * lens.stop_semi_aperture_mm() },
+        };
         let bench = Bench {
             lenses,
             reference,
             dioptres: 1e3 / way_mm,
             film_mm: 0.0,
-            sampling: PupilSampling {
-                coordinates: PupilCoordinates::Stop { radius_mm: WITHIN_RIM * lens.stop_semi_aperture_mm() },
-                places: hexapolar(self.n_rings),
-                rims: Vignetting::On,
-            },
+            sampling: PupilSampling { coordinates, places: hexapolar(self.n_rings), rims: Vignetting::On },
         };
         bench.analyse(self, lens, (fields, notes))
     }

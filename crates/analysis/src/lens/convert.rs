@@ -27,7 +27,7 @@ pub fn convert_lens(input: &str, target: &Path, reading: &LensReading) -> Result
     let notes = std::mem::take(&mut file.notes);
     let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let (text, glasses) = match extension.as_str() {
-        "ron" => (file.lens.to_ron(), None),
+        "ron" => (file.to_ron(), None),
         "dat" => (file.to_dat()?, None),
         "json" => {
             file.wavelengths_nm.clear();

@@ -22,6 +22,8 @@ pub struct LensUse {
     pub distance_mm: f64,
     /// The points of the field, as the file names them.
     fields: Vec<Field>,
+    /// Distance of the film behind the last vertex that the file states, mm.
+    film_mm: Option<f64>,
 }
 
 impl LensUse {
@@ -33,6 +35,8 @@ impl LensUse {
     pub fn open(text: &str, reading: &LensReading, stop_mm: Option<f64>) -> Result<Self, PipelineError> {
         let mut used = Self::of(LensChoice::named(text).open(reading)?);
         used.lens = stop_mm.map_or(StopChoice::AsGiven, StopChoice::DiameterMm).apply(used.lens)?;
+        let mono = used.lens.at(used.wavelength_or_usual());
+        used.notes.extend(mono.ok().and_then(|mono| mono.note_on_limit()));
         Ok(used)
     }
 
@@ -45,6 +49,7 @@ impl LensUse {
             wavelengths_nm,
             distance_mm: file.object_distance_mm.unwrap_or(f64::INFINITY),
             fields: file.fields,
+            film_mm: file.film_mm,
             lens: file.lens,
             notes: file.notes,
         }
@@ -75,8 +80,8 @@ impl LensUse {
         self.reference_nm.unwrap_or_else(among)
     }
 
-    /// Returns the points of the field that the file names, by first-order optics at a wavelength where it states image
-    /// heights; `None` where it names none.
+    /// Returns the points of the field that the file names, by first-order optics at a wavelength where it states paraxial
+    /// image heights, by real chief rays where it states real ones; `None` where it names none, or a height that none has.
     ///
     /// Design programs state where light goes to: a positive angle is one of rising light, of an object below the axis. Of a
     /// lens with an axis of symmetry that is the same, and the numbers stay as they are.
@@ -91,6 +96,15 @@ impl LensUse {
                 // Not −0.
                 Field::Angle { x_deg, y_deg } => angles_deg.push([x_deg, y_deg].map(|deg| sign * deg + 0.0)),
                 Field::ObjectHeight { x_mm, y_mm } => heights_mm.push([x_mm, y_mm]),
+                Field::RealImageHeight { x_mm, y_mm } => {
+                    let way_mm = self.distance_mm + mono.projection_center_z_mm();
+                    let film_mm = self.film_mm.or_else(|| mono.film_mm_for(self.distance_mm).ok())?;
+                    let tan = -sign * mono.field_tan_of_image(DVec2::new(x_mm, y_mm), film_mm, 1e3 / way_mm)?;
+                    match self.distance_mm.is_finite() {
+                        true => heights_mm.push((tan * way_mm).to_array()),
+                        false => angles_deg.push(far(tan)),
+                    }
+                }
                 Field::ImageHeight { x_mm, y_mm } if self.distance_mm.is_finite() => {
                     let scale = -sign / mono.conjugate(self.distance_mm).magnification;
                     heights_mm.push([scale * x_mm, scale * y_mm]);
@@ -175,6 +189,13 @@ mod tests {
         let efl_mm = read("SO 0 1E10", "1.5").lens.at(550.0).unwrap().first_order().efl_mm;
         let Some(AnalysisFields::AnglesDeg(found)) = fields("YIM 0 5\nSO 0 1E10").0 else { panic!("angles") };
         assert!((found[1][1].to_radians().tan() - 5.0 / efl_mm).abs() < 1e-15);
+        // Real heights are those at which chief rays meet the image, 60 mm behind the lens.
+        let lens = read("YRI 0 5\nSO 0 1E10", "1.5");
+        let Some(AnalysisFields::AnglesDeg(found)) = lens.analysis_fields(550.0) else { panic!("angles") };
+        let mono = lens.lens.at(550.0).unwrap();
+        let tan = DVec2::new(0.0, found[1][1].to_radians().tan());
+        let point = dioptric_optics::ObjectPoint::from_field(&mono, tan, 0.0);
+        assert!((mono.chief_film_point_mm(&point, 60.0).unwrap().y + 5.0).abs() < 1e-9, "{found:?}");
         let Some(AnalysisFields::HeightsMm(found)) = fields("YIM 0 5\nSO 0 200").0 else { panic!("heights") };
         let magnification = read("SO 0 1E10", "1.5").lens.at(550.0).unwrap().conjugate(200.0).magnification;
         assert!((found[1][1] + 5.0 / magnification).abs() < 1e-12 && found[1][1] > 0.0);

@@ -18,6 +18,13 @@ pub struct LensData {
     /// Focal lengths, principal planes, pupils and f-number at a wavelength.
     #[serde(flatten)]
     pub first_order: FirstOrder,
+    /// The f-number by the real rays of the far point on the axis; `None` where none get through.
+    pub real_f_number: Option<f64>,
+    /// Whether the stop limits the light of that point. Where it does not, f-number and diameters of pupils are those of the
+    /// beam that the rims let through.
+    pub stop_limits: bool,
+    /// The surface whose rim limits it, counted from 0.
+    pub limiting_surface: usize,
     /// Exit-pupil diameter over entrance-pupil diameter.
     pub pupil_magnification: f64,
     /// Radius of the image surface if there were no astigmatism (Petzval's), mm; negative when it bends towards the lens.
@@ -123,10 +130,13 @@ impl LensData {
                 (sums.c1, sums.c2) = (f64::NAN, f64::NAN);
             }
         }
-        let first = mono.first_order();
+        let (first, limit) = (mono.first_order(), mono.limiting_beam());
         Ok(Self {
             lens: lens.name().to_owned(),
             first_order: first,
+            real_f_number: mono.real_f_number(),
+            stop_limits: limit.is_none(),
+            limiting_surface: limit.map_or(mono.stop(), |beam| beam.limiting_surface),
             pupil_magnification: first.pupil_magnification(),
             petzval_radius_mm: lens.is_rotational().then(|| petzval_radius_mm(lens, &mono)).transpose()?,
             half_light_field_deg: field_limit_deg(&mono, 0.5),

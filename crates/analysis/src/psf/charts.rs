@@ -26,7 +26,7 @@ impl PsfSet {
     /// most nine point-spread functions, where there are more of a middle wavelength and evenly chosen; with several
     /// wavelengths also `whole_light_mtf`, the modulation of all light of each point.
     ///
-    /// Radial lines are solid, those across dashed. Where the set has several wavelengths, `mtf` also shows that of the
+    /// Tangential lines (along the radius of the field) are solid, sagittal ones dashed. Where the set has several wavelengths, `mtf` also shows that of the
     /// whole light of the first field and distance.
     pub fn charts(&self, through_focus: &ThroughFocus) -> Vec<(String, LineChart)> {
         let plotted: Vec<Plotted<'_>> = self
@@ -98,16 +98,23 @@ impl PsfSet {
         let mut lines = self
             .lines(plotted, |picture, direction| steps(reach_per_mm).map(|f| (f, picture.mtf(direction, f))).collect());
         if let Some(first) = self.points().next().filter(|point| point.len() > 1) {
-            let words = self.point_words(&self.rows[first.start]);
+            let start = first.start;
+            let words = self.point_words(&self.rows[start]);
             let name = [words, vec!["whole light".to_owned()]].concat().join(", ");
             let whole = self.whole_modulation(first);
-            for (direction, is_dashed) in [(0.0, false), (FRAC_PI_2, true)] {
+            let meridian = self.rows[start].meridian_rad();
+            for (direction, is_dashed) in [(meridian, false), (meridian + FRAC_PI_2, true)] {
                 let points = steps(reach_per_mm).map(|f| (f, whole(direction, f))).collect();
                 let label = (!is_dashed).then(|| name.clone());
                 lines.push(Series { label, color: "#000000".to_owned(), points, is_dashed });
             }
         }
-        chart("Modulation", ("cycles per mm", (0.0, reach_per_mm)), ("modulation", Some((0.0, 1.0))), lines)
+        chart(
+            "Modulation (tangential solid, sagittal dashed)",
+            ("cycles per mm", (0.0, reach_per_mm)),
+            ("modulation", Some((0.0, 1.0))),
+            lines,
+        )
     }
 
     fn whole_modulations(&self, reach_per_mm: f64) -> LineChart {
@@ -115,14 +122,15 @@ impl PsfSet {
         let lines = points.into_iter().enumerate().flat_map(|(i, point)| {
             let row = &self.rows[point.start];
             let whole = self.whole_modulation(point);
-            [(0.0, false), (FRAC_PI_2, true)].map(|(direction, is_dashed)| Series {
+            let meridian = row.meridian_rad();
+            [(meridian, false), (meridian + FRAC_PI_2, true)].map(|(direction, is_dashed)| Series {
                 label: (!is_dashed).then(|| self.point_label(row)),
                 color: color(i),
                 points: steps(reach_per_mm).map(|f| (f, whole(direction, f))).collect(),
                 is_dashed,
             })
         });
-        let title = "Modulation of all wavelengths together";
+        let title = "Modulation of all wavelengths together (tangential solid, sagittal dashed)";
         chart(title, ("cycles per mm", (0.0, reach_per_mm)), ("modulation", Some((0.0, 1.0))), lines.collect())
     }
 
@@ -148,19 +156,20 @@ impl PsfSet {
         let lines = found.rows.iter().zip(&found.modulations).enumerate();
         let series = lines.flat_map(|(i, (row, modulations))| {
             let line = |is_dashed: bool| {
-                let values = modulations.iter().map(|(radial, across)| if is_dashed { *across } else { *radial });
+                let values = modulations.iter().map(|(along, across)| if is_dashed { *across } else { *along });
                 let points = found.shifts_mm.iter().copied().zip(values).collect();
                 Series { label: (!is_dashed).then(|| self.label(&self.rows[*row])), color: color(i), points, is_dashed }
             };
             [line(false), line(true)]
         });
-        let title = format!("Modulation through focus at {} cycles per mm", number(found.cycles_per_mm));
+        let per_mm = number(found.cycles_per_mm);
+        let title = format!("Modulation through focus at {per_mm} cycles per mm (tangential solid, sagittal dashed)");
         let reach_mm = found.shifts_mm.last().copied().unwrap_or(1.0);
         let x = ("film moved from the lens, mm", (-reach_mm, reach_mm));
         chart(&title, x, ("modulation", Some((0.0, 1.0))), series.collect())
     }
 
-    /// Returns two lines for each picture: along the radial direction, and dashed across it.
+    /// Returns two lines for each picture: along the radius of the field, and dashed across it.
     fn lines(&self, plotted: &[Plotted<'_>], of: impl Fn(&Picture, f64) -> Vec<(f64, f64)>) -> Vec<Series> {
         let both = plotted.iter().enumerate().flat_map(|(i, Plotted { row, picture })| {
             let line = |direction: f64, is_dashed: bool| Series {
@@ -169,7 +178,8 @@ impl PsfSet {
                 points: of(picture, direction),
                 is_dashed,
             };
-            [line(0.0, false), line(FRAC_PI_2, true)]
+            let meridian = row.meridian_rad();
+            [line(meridian, false), line(meridian + FRAC_PI_2, true)]
         });
         both.collect()
     }
@@ -278,7 +288,7 @@ mod tests {
             let (radial, across) = modulations[12];
             let own = set.rows[*row].mtf[0];
             // Pixels of another size, whose own modulation is taken out.
-            assert!((radial - own.radial).abs() < 2e-3 && (across - own.tangential).abs() < 2e-3, "{radial} {own:?}");
+            assert!((radial - own.radial).abs() < 2e-3 && (across - own.sagittal).abs() < 2e-3, "{radial} {own:?}");
         }
         // Red light comes to its focus behind blue: the lens is simple.
         let best = |row: usize| {

@@ -74,15 +74,25 @@ pub struct PsfRow {
     pub mtf: Vec<MtfRow>,
 }
 
-/// The modulation at a spatial frequency.
+/// The modulation at a spatial frequency, as ISO 9334 names it.
+///
+/// The meridional plane holds the axis and the point; of a point on the axis it is taken through x. Tangential is the
+/// modulation of lines across that plane (a wave along the radius of the field), sagittal that of lines along it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MtfRow {
     /// Spatial frequency, cycles per mm.
     pub cycles_per_mm: f64,
-    /// Modulation of a wave along x, the radial direction.
-    pub radial: f64,
-    /// Modulation of a wave along y.
+    /// Of lines across the meridional plane.
     pub tangential: f64,
+    /// Of lines along it.
+    pub sagittal: f64,
+    /// The same as tangential, by the name that it had before.
+    pub radial: f64,
+}
+
+/// Returns the direction of the meridional plane on the film, from +x, for tangents of field angles.
+pub(crate) fn meridian_rad(field_tan: DVec2) -> f64 {
+    if field_tan == DVec2::ZERO { 0.0 } else { field_tan.to_angle() }
 }
 
 /// Which point a row is of.
@@ -130,12 +140,18 @@ impl PsfRow {
         }
     }
 
+    /// Returns the direction of the point's meridional plane, from +x.
+    pub(crate) fn meridian_rad(&self) -> f64 {
+        meridian_rad(DVec2::new(self.field_deg.to_radians().tan(), self.field_y_deg.to_radians().tan()))
+    }
+
     /// Returns the row with the modulations at these frequencies, of a wave along a direction from +x.
     pub(crate) fn with_mtf(self, cycles_per_mm: &[f64], modulation: impl Fn(f64, f64) -> f64) -> Self {
-        let row = |&cycles_per_mm: &f64| MtfRow {
-            cycles_per_mm,
-            radial: modulation(0.0, cycles_per_mm),
-            tangential: modulation(FRAC_PI_2, cycles_per_mm),
+        let meridian = self.meridian_rad();
+        let row = |&cycles_per_mm: &f64| {
+            let tangential = modulation(meridian, cycles_per_mm);
+            let sagittal = modulation(meridian + FRAC_PI_2, cycles_per_mm);
+            MtfRow { cycles_per_mm, tangential, sagittal, radial: tangential }
         };
         Self { mtf: cycles_per_mm.iter().map(row).collect(), ..self }
     }
@@ -185,7 +201,7 @@ pub fn psf_csv(rows: &[PsfRow]) -> String {
             .to_owned();
     for mtf in rows.first().map_or(&[][..], |row| &row.mtf) {
         let f = mtf.cycles_per_mm;
-        let _ = write!(csv, ",mtf_radial_{f}_per_mm,mtf_tangential_{f}_per_mm");
+        let _ = write!(csv, ",mtf_tangential_{f}_per_mm,mtf_sagittal_{f}_per_mm");
     }
     csv.push('\n');
     let or_empty = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
@@ -213,7 +229,7 @@ pub fn psf_csv(rows: &[PsfRow]) -> String {
         }
         let _ = write!(csv, ",{},{}", or_empty(row.wave_share), or_empty(row.strehl));
         for mtf in &row.mtf {
-            let _ = write!(csv, ",{},{}", mtf.radial, mtf.tangential);
+            let _ = write!(csv, ",{},{}", mtf.tangential, mtf.sagittal);
         }
         csv.push('\n');
     }

@@ -3,8 +3,8 @@
 use dioptric_diffraction::{CircularStop, Covariance, Hurb, HurbForm, SampledHurb};
 use dioptric_optics::{
     FilmPoint, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Vignetting,
-    glam::{DVec2, Vec2Swizzles},
-    rays_over_front, rays_towards,
+    glam::{DVec2, DVec3, Vec2Swizzles},
+    rays_over_front,
 };
 
 /// Rings and azimuths of the rays of a spot.
@@ -33,25 +33,29 @@ impl Spot {
     ///
     /// `energy` is the area of that pupil over that which an axial point sees, both without what obscurations stop.
     pub(crate) fn through_pupil(mono: &MonoLens, point: &ObjectPoint, axial: &ObjectPoint, film_mm: f64) -> Self {
-        let Some(pupil) = PupilBoundary::find(mono, point, AZIMUTHS) else { return Self::default() };
+        let parts = PupilBoundary::find_parts(mono, point, AZIMUTHS);
+        let Some(plane) = parts.first().map(PupilBoundary::plane) else { return Self::default() };
         let (mut targets, mut areas) = (Vec::new(), Vec::new());
-        for azimuth in 0..AZIMUTHS {
-            let theta = std::f64::consts::TAU * azimuth as f64 / AZIMUTHS as f64;
-            let rho = pupil.rho_max_mm(theta);
-            for ring in 0..RINGS {
-                let r = rho * ((ring as f64 + 0.5) / RINGS as f64).sqrt();
-                targets.push(pupil.center_mm() + DVec2::from_angle(theta) * r);
-                areas.push(rho * rho);
+        for pupil in &parts {
+            for azimuth in 0..AZIMUTHS {
+                let theta = std::f64::consts::TAU * azimuth as f64 / AZIMUTHS as f64;
+                let rho = pupil.rho_max_mm(theta);
+                for ring in 0..RINGS {
+                    let r = rho * ((ring as f64 + 0.5) / RINGS as f64).sqrt();
+                    targets.push(pupil.center_mm() + DVec2::from_angle(theta) * r);
+                    areas.push(rho * rho);
+                }
             }
         }
-        let mut rays = rays_towards(point, &targets, pupil.z_mm(), 0.0);
+        let mut rays = plane.rays(mono, point, &targets);
         let cones = solid_angles(point, &rays);
         mono.trace(&mut rays, Vignetting::On);
         mono.to_film(&mut rays, film_mm);
         let area_mm2 = |point: &ObjectPoint| {
-            mono.over_clear_pupil(&|lens| PupilBoundary::find(lens, point, AZIMUTHS).map_or(0.0, |p| p.area_mm2()))
+            let whole = |lens: &MonoLens| area_of(point, &PupilBoundary::find_parts(lens, point, AZIMUTHS));
+            mono.over_clear_pupil(&whole)
         };
-        let seen_mm2 = if mono.n_obscurations() == 0 { pupil.area_mm2() } else { area_mm2(point) };
+        let seen_mm2 = if mono.n_obscurations() == 0 { area_of(point, &parts) } else { area_mm2(point) };
         let mut spot = Self::of_rays(mono, film_mm, &rays, |ray| areas[ray] * cones[ray]);
         spot.energy = Some(area_mm2(axial)).filter(|area| *area > 0.0).map_or(f64::NAN, |area| seen_mm2 / area);
         spot
@@ -109,6 +113,14 @@ impl Spot {
         let second_mm2 = Covariance { xx: squares.x, xy: products.x, yy: squares.y };
         Some(Moments { centroid_mm, second_mm2 })
     }
+}
+
+/// Returns the area that parts of a pupil, as light comes in, have in a plane across the axis, mm².
+fn area_of(point: &ObjectPoint, parts: &[PupilBoundary]) -> f64 {
+    let Some(plane) = parts.first().map(PupilBoundary::plane) else { return 0.0 };
+    let area_mm2: f64 = parts.iter().map(PupilBoundary::area_mm2).sum();
+    let direction = point.direction_to(DVec3::ZERO);
+    if plane.is_across_axis() { area_mm2 } else { area_mm2 * direction.dot(plane.normal()) / direction.z }
 }
 
 /// The paper's way of choosing rays.

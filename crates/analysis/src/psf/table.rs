@@ -245,6 +245,27 @@ mod tests {
     }
 
     #[test]
+    fn tangential_is_radial_on_every_side() {
+        let of = |x_deg: f64, y_deg: f64| {
+            let request = PsfRequest {
+                fields_deg: vec![x_deg],
+                field_y_deg: y_deg,
+                wavelengths_nm: vec![550.0],
+                mtf_per_mm: vec![20.0],
+                ..request()
+            };
+            let row = request.compute(&paper_lens()).unwrap().rows.remove(0);
+            (row.mtf[0].tangential, row.mtf[0].sagittal)
+        };
+        let (beside, above) = (of(8.0, 0.0), of(0.0, 8.0));
+        // The mesh of rays begins at another azimuth.
+        assert_relative_eq!(beside.0, above.0, epsilon = 2e-3);
+        assert_relative_eq!(beside.1, above.1, epsilon = 2e-3);
+        // Coma and astigmatism spread light along the radius.
+        assert!(beside.0 + 0.02 < beside.1, "{beside:?}");
+    }
+
+    #[test]
     fn a_row_has_the_keys_of_the_contract() {
         let set = request().compute(&paper_lens()).unwrap();
         let json = serde_json::to_value(&set.rows[0]).unwrap();

@@ -7,6 +7,7 @@ use dioptric_psf::{LensImageModel, Picture};
 use rayon::prelude::*;
 
 use super::request::Item;
+use super::row::meridian_rad;
 use super::spot::{PaperRays, Spot};
 use crate::{PsfRequest, PsfSampling, PsfSet};
 use dioptric_pipeline::PipelineError;
@@ -30,7 +31,7 @@ pub struct ThroughFocus {
     pub shifts_mm: Vec<f64>,
     /// The rows of the set that were followed: those that its plots show.
     pub rows: Vec<usize>,
-    /// For each of these, the modulations of waves along the radial direction and across it.
+    /// For each of these, the tangential and the sagittal modulations.
     pub modulations: Vec<Vec<(f64, f64)>>,
 }
 
@@ -82,7 +83,7 @@ struct Here<'a> {
 }
 
 impl Here<'_> {
-    /// Returns the modulations along and across of each point.
+    /// Returns the tangential and the sagittal modulation of each point.
     fn modulations(&self) -> Result<Vec<(f64, f64)>, PipelineError> {
         match self.request.sampling {
             PsfSampling::Pupil => {
@@ -100,9 +101,11 @@ impl Here<'_> {
         let Some(Window { picture, held }) = self.window(item, source) else { return (f64::NAN, f64::NAN) };
         let modulation = |direction| {
             let own = picture.mtf(direction, self.cycles_per_mm) * held;
-            (own * self.pixels(self.request.pixel_um) / self.pixels(picture.pitch_um())).min(1.0)
+            let [asked, drawn] = [self.request.pixel_um, picture.pitch_um()].map(|um| self.pixels(um, direction));
+            (own * asked / drawn).min(1.0)
         };
-        (modulation(0.0), modulation(FRAC_PI_2))
+        let meridian = meridian_rad(item.field_tan());
+        (modulation(meridian), modulation(meridian + FRAC_PI_2))
     }
 
     /// Draws a point on the coarsest pixels that do, in a window that is not too large; `None` of a dark point.
@@ -124,14 +127,20 @@ impl Here<'_> {
         let mono = self.lens.at(item.wavelength_nm)?;
         let point = ObjectPoint::from_field(&reference, item.field_tan(), item.dioptres);
         let spot = Spot::over_front(&mono, &point, self.film_mm, rays);
-        let pixels = self.pixels(self.request.pixel_um);
-        Ok((spot.modulation(0.0, self.cycles_per_mm) * pixels, spot.modulation(FRAC_PI_2, self.cycles_per_mm) * pixels))
+        let modulation = |direction: f64| {
+            spot.modulation(direction, self.cycles_per_mm) * self.pixels(self.request.pixel_um, direction)
+        };
+        let meridian = meridian_rad(item.field_tan());
+        Ok((modulation(meridian), modulation(meridian + FRAC_PI_2)))
     }
 
-    /// Returns the modulation that square pixels leave of the wave.
-    fn pixels(&self, pitch_um: f64) -> f64 {
-        let x = std::f64::consts::PI * 1e-3 * pitch_um * self.cycles_per_mm;
-        if x == 0.0 { 1.0 } else { (x.sin() / x).abs() }
+    /// Returns the modulation that square pixels leave of a wave along a direction from +x.
+    fn pixels(&self, pitch_um: f64, direction: f64) -> f64 {
+        let side = |share: f64| {
+            let x = std::f64::consts::PI * 1e-3 * pitch_um * self.cycles_per_mm * share;
+            if x == 0.0 { 1.0 } else { (x.sin() / x).abs() }
+        };
+        side(direction.cos()) * side(direction.sin())
     }
 }
 

@@ -1,6 +1,6 @@
 //! Where real chief rays land: distortion and lateral colour.
 
-use glam::DVec2;
+use glam::{DMat2, DVec2};
 
 use super::pupil_places::{PupilCoordinates, PupilSampling};
 use crate::{MonoLens, ObjectPoint, RayBatch, Vignetting, paraxial::Matrix};
@@ -60,6 +60,41 @@ impl MonoLens {
         self.chief_ray_on_film(point, film_mm).map(|ray| self.on_film_mm(ray.point_mm(0), film_mm))
     }
 
+    /// Returns the tangents of the field angles of the point, `dioptres` = 1/Z away, whose ray through the middle of the real
+    /// stop meets the film at this place of it, mm; `None` if none is found.
+    ///
+    /// Newton's method, led from the axis to the place in steps, to 1e-10 of the height.
+    pub fn field_tan_of_image(&self, image_mm: DVec2, film_mm: f64, dioptres: f64) -> Option<DVec2> {
+        const STEPS: u32 = 8;
+        const ROUNDS: usize = 30;
+        let lands_mm = |tan: DVec2| self.chief_film_point_mm(&ObjectPoint::from_field(self, tan, dioptres), film_mm);
+        let mut tan = DVec2::ZERO;
+        for step in 1..=STEPS {
+            let goal_mm = image_mm * (f64::from(step) / f64::from(STEPS));
+            let mut is_found = false;
+            for _ in 0..ROUNDS {
+                let here_mm = lands_mm(tan)?;
+                let miss_mm = goal_mm - here_mm;
+                is_found = miss_mm.length() <= 1e-10 * (1.0 + image_mm.length());
+                if is_found {
+                    break;
+                }
+                let by = 1e-6 * (1.0 + tan.length());
+                let along = |u: DVec2| Some((lands_mm(tan + u * by)? - here_mm) / by);
+                let slope = DMat2::from_cols(along(DVec2::X)?, along(DVec2::Y)?);
+                let change = slope.inverse() * miss_mm;
+                if !change.is_finite() {
+                    return None;
+                }
+                tan += change.clamp_length_max(0.2 * (1.0 + tan.length()));
+            }
+            if !is_found {
+                return None;
+            }
+        }
+        Some(tan)
+    }
+
     /// Returns the ray of a point through the middle of the real stop where it meets the film as it is curved; rims do
     /// not end it. `None` if there is no such ray.
     pub fn chief_ray_on_film(&self, point: &ObjectPoint, film_mm: f64) -> Option<RayBatch> {
@@ -89,6 +124,20 @@ mod tests {
     #[track_caller]
     fn relative(lens: &MonoLens, field_tan: f64, film_mm: f64, projection: Projection) -> f64 {
         Distortion::of(lens, (field_tan, 0.0), film_mm, projection).unwrap().relative()
+    }
+
+    #[test]
+    fn field_of_an_image_height_is_that_of_its_chief_ray() {
+        for (name, image_mm) in [("dgauss-50mm", DVec2::new(3.0, 15.0)), ("fisheye-12.5mm", DVec2::new(0.0, -14.0))] {
+            let lens = Lens::built_in(name).unwrap().at(550.0).unwrap();
+            let film_mm = lens.film_mm_for(1000.0).unwrap();
+            let dioptres = 1e3 / (1000.0 + lens.projection_center_z_mm());
+            let tan = lens.field_tan_of_image(image_mm, film_mm, dioptres).unwrap();
+            let point = ObjectPoint::from_field(&lens, tan, dioptres);
+            let landed_mm = lens.chief_film_point_mm(&point, film_mm).unwrap();
+            assert!(landed_mm.distance(image_mm) < 1e-8, "{name}: {landed_mm}");
+            assert_eq!(lens.field_tan_of_image(DVec2::new(0.0, 400.0), film_mm, dioptres), None);
+        }
     }
 
     #[test]

@@ -23,50 +23,55 @@ pub fn projected_solid_angle_onto(lens: &MonoLens, point: &ObjectPoint, n_azimut
 
 /// Returns the projected solid angle where there are no obscurations.
 fn whole_cone(lens: &MonoLens, point: &ObjectPoint, n: usize, normal: DVec3) -> f64 {
-    let Some(pupil) = PupilBoundary::find(lens, point, n) else { return 0.0 };
-    let azimuth = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64);
-    let edge = |(i, rho): (usize, &f64)| pupil.center_mm() + azimuth(i) * *rho;
-    let targets_mm: Vec<DVec2> = pupil.rho_at_azimuths_mm().iter().enumerate().map(edge).collect();
-    let mut rays = lens.rays_towards(point, &targets_mm, pupil.z_mm(), 0.0);
-    lens.trace(&mut rays, Vignetting::Off);
     let turn = DQuat::from_rotation_arc(normal, DVec3::Z);
     let is_straight = normal == DVec3::Z;
     let in_film = |direction: DVec3| if is_straight { direction } else { turn * direction };
-    let cosines: Vec<DVec2> = (0..n).map(|i| in_film(rays.direction(i)).truncate()).collect();
-    let area = |step: usize| {
-        let corners: Vec<DVec2> = cosines.iter().copied().step_by(step).collect();
-        let pairs = corners.iter().zip(corners.iter().cycle().skip(1));
-        0.5 * pairs.map(|(a, b)| a.perp_dot(*b)).sum::<f64>().abs()
+    let of_part = |pupil: PupilBoundary| {
+        let mut rays = pupil.plane().rays(lens, point, &pupil.edge_mm());
+        lens.trace(&mut rays, Vignetting::Off);
+        let cosines: Vec<DVec2> = (0..n).map(|i| in_film(rays.direction(i)).truncate()).collect();
+        let area = |step: usize| {
+            let corners: Vec<DVec2> = cosines.iter().copied().step_by(step).collect();
+            let pairs = corners.iter().zip(corners.iter().cycle().skip(1));
+            0.5 * pairs.map(|(a, b)| a.perp_dot(*b)).sum::<f64>().abs()
+        };
+        // A polygon falls short by the square of its sides; two of them tell by how much.
+        (4.0 * area(1) - area(2)) / 3.0
     };
-    // A polygon falls short by the square of its sides; two of them tell by how much.
-    (lens.image_index() / lens.object_index()).powi(2) * (4.0 * area(1) - area(2)) / 3.0
+    let area: f64 = PupilBoundary::find_parts(lens, point, n).into_iter().map(of_part).sum();
+    (lens.image_index() / lens.object_index()).powi(2) * area
 }
 
-/// The steepest field that is looked at, degrees.
+/// The steepest field of points in a plane before a lens that is looked at, degrees.
 pub const STEEPEST_FIELD_DEG: f64 = 88.0;
+/// The widest angle from the axis at which far points are looked at, degrees.
+pub const WIDEST_FIELD_DEG: f64 = 120.0;
 
 /// Returns the field angle, degrees, at which the illumination of a far point has fallen to a share of that on the axis
-/// (by rims and cosines); `None` if none comes together on the axis, the steepest of 88° if it has not fallen so far.
+/// (by rims and cosines); `None` if none comes together on the axis, the widest of 120° if it has not fallen so far.
 ///
 /// Twice this angle is a lens's field of view where its film sets no limit.
 pub fn field_limit_deg(lens: &MonoLens, share: f64) -> Option<f64> {
-    field_limit_along_deg(lens, share, DVec2::Y, 0.0)
+    let point = |field_deg: f64| ObjectPoint::far(field_deg.to_radians(), DVec2::Y);
+    limit_deg(lens, share, WIDEST_FIELD_DEG, &point)
 }
 
-/// Returns the same along a direction of the field, a unit vector, for points `dioptres` = 1/Z away.
+/// Returns the same along a direction of the field, a unit vector, for points `dioptres` = 1/Z away; at most 88°.
 pub fn field_limit_along_deg(lens: &MonoLens, share: f64, direction: DVec2, dioptres: f64) -> Option<f64> {
+    let point = |field_deg: f64| ObjectPoint::from_field(lens, direction * field_deg.to_radians().tan(), dioptres);
+    limit_deg(lens, share, STEEPEST_FIELD_DEG, &point)
+}
+
+fn limit_deg(lens: &MonoLens, share: f64, last_deg: f64, point: &dyn Fn(f64) -> ObjectPoint) -> Option<f64> {
     const N_AZIMUTHS: usize = 48;
-    let cone = |field_deg: f64| {
-        let point = ObjectPoint::from_field(lens, direction * field_deg.to_radians().tan(), dioptres);
-        projected_solid_angle(lens, &point, N_AZIMUTHS)
-    };
+    let cone = |field_deg: f64| projected_solid_angle(lens, &point(field_deg), N_AZIMUTHS);
     let least = share * cone(0.0);
     if least <= 0.0 {
         return None;
     }
     // The first degree that is too dark, then halves of it.
-    let dark = (1..=STEEPEST_FIELD_DEG as u32).map(f64::from).find(|&field_deg| cone(field_deg) < least);
-    let Some(mut dark) = dark else { return Some(STEEPEST_FIELD_DEG) };
+    let dark = (1..=last_deg as u32).map(f64::from).find(|&field_deg| cone(field_deg) < least);
+    let Some(mut dark) = dark else { return Some(last_deg) };
     let mut bright = dark - 1.0;
     while dark - bright > 1e-4 {
         let middle = 0.5 * (bright + dark);

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::aim::StopAim;
-use crate::{MonoLens, ObjectPoint, RayBatch, RayFate, Vignetting};
+use crate::{MonoLens, ObjectPoint, PupilBoundary, RayBatch, RayFate, Vignetting};
 
 /// What places in the pupil are fractions of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +24,9 @@ pub enum PupilCoordinates {
         /// The radius that a place at distance 1 has, mm.
         radius_mm: f64,
     },
+    /// The real, vignetted pupil of each point: a place at distance 1 lies on its edge, in the same direction from its
+    /// middle. It serves where the stop is wider than the light that the rims let through.
+    Vignetted,
 }
 
 impl PupilCoordinates {
@@ -49,6 +52,16 @@ impl PupilCoordinates {
                 let targets_mm: Vec<DVec2> = places.iter().map(|place| *place * radius_mm).collect();
                 lens.rays_towards(point, &targets_mm, z_mm, 0.0)
             }
+            Self::Vignetted => {
+                let Some(pupil) = PupilBoundary::find(lens, point, EDGE_AZIMUTHS) else {
+                    let mut rays = lens.rays_towards(point, &vec![DVec2::ZERO; places.len()], 0.0, 0.0);
+                    rays.fate.fill(RayFate::Missed { surface: lens.stop() as u16 });
+                    return rays;
+                };
+                let on_edge = |place: &DVec2| *place * (WITHIN_EDGE * pupil.rho_max_mm(place.to_angle()));
+                let targets_mm: Vec<DVec2> = places.iter().map(|place| pupil.center_mm() + on_edge(place)).collect();
+                pupil.plane().rays(lens, point, &targets_mm)
+            }
             Self::Stop { radius_mm } => {
                 let scale = radius_mm / lens.stop_semi_aperture_mm();
                 let scaled: Vec<DVec2> = places.iter().map(|place| *place * scale).collect();
@@ -65,6 +78,10 @@ impl PupilCoordinates {
         }
     }
 }
+
+/// Azimuths at which the edge of a vignetted pupil is found, and how near to it outermost rays pass.
+const EDGE_AZIMUTHS: usize = 192;
+const WITHIN_EDGE: f64 = 1.0 - 1e-9;
 
 /// Which rays of a point are traced.
 #[derive(Clone, Debug, PartialEq)]

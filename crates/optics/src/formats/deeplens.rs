@@ -11,10 +11,12 @@ use super::{
     shapes::even_asphere,
 };
 
-/// Whether a JSON value has the looks of a `DeepLens` file: its surfaces have the media on both sides.
+/// Whether a JSON value has the looks of a `DeepLens` file: its surfaces have the media on both sides, or types, as those of
+/// lenses that are diffractive alone.
 pub(super) fn is_deeplens(value: &Value) -> bool {
     let surfaces = value.get("surfaces").and_then(Value::as_array);
-    surfaces.is_some_and(|list| list.iter().any(|row| row.get("mat1").or(row.get("mat2")).is_some()))
+    surfaces
+        .is_some_and(|list| list.iter().any(|row| ["mat1", "mat2", "type"].iter().any(|key| row.get(key).is_some())))
 }
 
 /// Reads a lens from the JSON value of a `DeepLens` file, which has no name of its own.
@@ -22,6 +24,11 @@ pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -
     let file = Object::new(value, "")?;
     let mut interfaces: Vec<Interface> = Vec::new();
     let (mut stops, mut object_medium) = (Vec::new(), Glass::Air);
+    if let Some(element) = file.get("DOE").filter(|element| !element.is_null()) {
+        let kind = element.get("type").and_then(Value::as_str).unwrap_or("without a type");
+        let reason = format!("DOE: a diffractive element ({kind}) behind the lens is not supported");
+        return Err(TextError { line: None, reason });
+    }
     let rows = file.objects("surfaces")?;
     for (i, row) in rows.iter().enumerate() {
         let wrong =
@@ -30,10 +37,10 @@ pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -
         if matches!(kind, "Stop" | "Aperture" | "Diaphragm") {
             stops.push(i);
         }
+        let shape = shape(kind, row)?;
         if row.get("is_square") == Some(&Value::Bool(true)) {
             return Err(wrong("is_square", "a square rim is not supported".to_owned()));
         }
-        let shape = shape(kind, row)?;
         let curvature_per_mm = if matches!(kind, "Plane" | "ThinLens") { 0.0 } else { curvature_per_mm(row)? };
         if let (0, Some(name)) = (i, row.text("mat1")) {
             object_medium = medium(name, glasses).map_err(|reason| wrong("mat1", reason))?;
@@ -153,6 +160,14 @@ mod tests {
         let file = read(&SINGLET.replace("[0.0, 1e-5]", "[0.01, 1e-5]")).ok().unwrap();
         let with_square = Shape::OddAsphere { conic: -1.0, coefficients: vec![0.0, 0.01, 0.0, 1e-5] };
         assert_eq!(file.lens.interfaces()[1].surface.shape, with_square);
+    }
+
+    #[test]
+    fn diffractive_element_is_refused() {
+        let with = |element: &str| SINGLET.replace("\"d_sensor\"", &format!("\"DOE\": {element}, \"d_sensor\""));
+        let reason = message(&with("{\"type\": \"Grating\", \"d\": 8.3}"));
+        assert_eq!(reason, "DOE: a diffractive element (Grating) behind the lens is not supported");
+        assert!(read(&with("null")).is_ok());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::{CatalogueGlass, Glass, GlassCatalogue, OpticsError};
 
-use super::lens_file::{MissingGlass, ReadOptions};
+use super::lens_file::{MissingGlass, ReadOptions, SeqNumbers};
 
 /// Where a lens file's glasses are looked up.
 pub(super) struct Glasses<'a> {
@@ -24,6 +24,11 @@ impl<'a> Glasses<'a> {
         Self { options, makers: Vec::new(), private: Vec::new() }
     }
 
+    /// What the numbers of a CODE V file are taken for.
+    pub(super) fn seq_numbers(&self) -> Option<SeqNumbers> {
+        self.options.seq_numbers
+    }
+
     /// Returns the glass of this name; `nd_vd` is what the file states of it besides.
     pub(super) fn find(&self, name: &str, nd_vd: Option<(f64, f64)>) -> Result<Found, String> {
         let found = |glass| Ok(Found { glass, note: None });
@@ -43,6 +48,11 @@ impl<'a> Glasses<'a> {
         };
         self.instead(name, nd_vd).ok_or_else(|| {
             let stated = match nd_vd {
+                Some(PLACEHOLDER) => {
+                    "; n_d 1.5 and V_d 40, which the file states for it, are no data: Zemax writes them \
+                     for every glass that it does not know"
+                        .to_owned()
+                }
                 Some((nd, vd)) => format!("; the file states n_d {nd} and V_d {vd} for it"),
                 None => String::new(),
             };
@@ -65,7 +75,7 @@ impl<'a> Glasses<'a> {
 
     /// Returns what stands for a glass that no catalogue has, where that was asked for.
     fn instead(&self, name: &str, nd_vd: Option<(f64, f64)>) -> Option<Found> {
-        let (nd, vd) = nd_vd?;
+        let (nd, vd) = nd_vd.filter(|nd_vd| *nd_vd != PLACEHOLDER)?;
         match self.options.missing_glass {
             MissingGlass::Refuse => None,
             MissingGlass::FromNdVd => {
@@ -84,6 +94,9 @@ impl<'a> Glasses<'a> {
     }
 }
 
+/// What Zemax writes as index and Abbe number of a glass of a catalogue, unless they are stored with the file: no data.
+const PLACEHOLDER: (f64, f64) = (1.5, 40.0);
+
 /// Returns the glass of an index and an Abbe number as files state them: an Abbe number of 0 means no dispersion.
 pub(super) fn model(nd: f64, vd: f64) -> Glass {
     if vd == 0.0 { constant(nd) } else { Glass::NdVd { nd, vd } }
@@ -92,4 +105,21 @@ pub(super) fn model(nd: f64, vd: f64) -> Glass {
 /// Returns the medium of an index that does not depend on the wavelength.
 pub(super) fn constant(index: f64) -> Glass {
     if index == 1.0 { Glass::Air } else { Glass::Constant { index } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn placeholder_of_zemax_is_no_glass() {
+        for missing_glass in [MissingGlass::Refuse, MissingGlass::FromNdVd, MissingGlass::Nearest] {
+            let options = ReadOptions { missing_glass, ..Default::default() };
+            let glasses = Glasses::new(&options);
+            let reason = glasses.find("UNOBTAINIUM", Some((1.5, 40.0))).err().expect("it is refused");
+            assert!(reason.contains("UNOBTAINIUM") && reason.contains("are no data"), "{reason}");
+            let is_taken = glasses.find("UNOBTAINIUM", Some((1.523, 58.6))).is_ok();
+            assert_eq!(is_taken, missing_glass != MissingGlass::Refuse);
+        }
+    }
 }

@@ -136,7 +136,9 @@ fn radius_mm(row: &Object) -> Result<Option<[f64; 2]>, TextError> {
 }
 
 fn shape(row: &Object, [curvature_x_per_mm, curvature_y_per_mm]: [f64; 2]) -> Result<Shape, TextError> {
-    let conics = row.get("conic_constant").map(|conic| pair(conic, &row.place("conic_constant")));
+    // ISET writes an empty list for none.
+    let is_stated = |conic: &&Value| conic.as_array().is_none_or(|list| !list.is_empty());
+    let conics = row.get("conic_constant").filter(is_stated).map(|conic| pair(conic, &row.place("conic_constant")));
     let [conic_x, conic] = conics.transpose()?.unwrap_or_default();
     let place = row.place("aspheric_coefficients");
     let mut coefficients = vec![0.0];
@@ -308,6 +310,7 @@ mod tests {
         let with = |keys: &str| read(&SINGLET.replace("\"radius\": 50", &format!("\"radius\": 50, {keys}")));
         let shape = |keys: &str| with(keys).ok().unwrap().interfaces()[0].surface.shape.clone();
         assert_eq!(shape("\"conic_constant\": -1"), Shape::Conic { conic: -1.0 });
+        assert_eq!(shape("\"conic_constant\": []"), Shape::Sphere);
         let expected = Shape::EvenAsphere { conic: 0.0, coefficients: vec![1e-5] };
         assert_eq!(shape("\"aspheric_coefficients\": [1e-5, 0]"), expected);
         assert!(with("\"aspheric_coefficients\": [1e-5, \"x\"]").err().unwrap().reason.starts_with("surfaces[0].asph"));

@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     GlassCatalogue, Lens, OpticsError,
-    prescription::{TextError, lens_from_ron},
+    prescription::{TextError, file_from_ron},
 };
 
 use super::{dat, decode::text_of, deeplens, glasses::Glasses, iset_json, pbrt_list, seq, zmx};
 
 /// What a lens file says: the lens, and how it is meant to be used.
 ///
-/// Our own files and `.dat` files hold the lens alone.
+/// Files of the `.dat` kind hold the lens alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LensFile {
     /// The lens.
@@ -46,7 +46,8 @@ pub struct Microlens {
 }
 
 /// A point of the field, as lens files name them.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub enum Field {
     /// The angle in object space, degrees, at the entrance pupil: positive where the chief ray's slope is, as light from an
     /// object at negative coordinates has it. So Zemax's manual says, and so ray-optics reads CODE V's (`obj_coords`).
@@ -63,8 +64,15 @@ pub enum Field {
         /// Along y.
         y_mm: f64,
     },
-    /// The height of the image point, mm.
+    /// The height of the image point, mm, by first-order optics.
     ImageHeight {
+        /// Along x.
+        x_mm: f64,
+        /// Along y.
+        y_mm: f64,
+    },
+    /// The height at which the real chief ray meets the film, mm.
+    RealImageHeight {
         /// Along x.
         x_mm: f64,
         /// Along y.
@@ -84,6 +92,15 @@ pub enum MissingGlass {
     Nearest,
 }
 
+/// What the numbers of surfaces are in a CODE V file that says neither (`RDM`, `CUM`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SeqNumbers {
+    /// Radii of curvature.
+    Radii,
+    /// Curvatures.
+    Curvatures,
+}
+
 /// How to read a lens file.
 #[derive(Clone, Debug, Default)]
 pub struct ReadOptions {
@@ -91,6 +108,8 @@ pub struct ReadOptions {
     pub catalogues: Vec<GlassCatalogue>,
     /// What to do with a glass that no catalogue has.
     pub missing_glass: MissingGlass,
+    /// What the numbers of surfaces are in a CODE V file that does not say; `None` for what is plausible.
+    pub seq_numbers: Option<SeqNumbers>,
 }
 
 /// The largest lens file, bytes: far more than any lens needs.
@@ -125,7 +144,7 @@ impl LensFile {
         let text = text_of(bytes);
         let glasses = Glasses::new(options);
         let read = match extension.as_str() {
-            "ron" => lens_from_ron(&text).map(Self::of_lens),
+            "ron" => file_from_ron(&text),
             "dat" | "txt" => match pbrt_list::numbers_of(&text) {
                 Some(numbers) => pbrt_list::lens_from_numbers(&numbers, &name).map(Self::of_lens),
                 None => dat::lens_from_dat(&text, &name).map(Self::of_lens),

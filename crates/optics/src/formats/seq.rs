@@ -16,7 +16,7 @@ use self::{
 };
 use super::{
     glasses::{Glasses, constant, model},
-    lens_file::{Field, LensFile},
+    lens_file::{Field, LensFile, SeqNumbers},
     system::{Beam, FieldVignetting, System},
 };
 
@@ -26,17 +26,19 @@ pub(super) fn lens_from_seq(text: &str, name: &str, glasses: Glasses) -> Result<
     for command in commands_of(text) {
         file.take(&command)?;
     }
-    let is_mode_stated = file.is_mode_stated;
+    let unstated = file.decide_mode();
     let built = file.into_system().and_then(System::build);
-    built.map_err(|TextError { line, reason }| match is_mode_stated {
-        true => TextError { line, reason },
-        false => TextError { line, reason: format!("{reason}; {MODE_UNSTATED}") },
+    built.map_err(|TextError { line, reason }| match unstated {
+        None => TextError { line, reason },
+        Some(note) => TextError { line, reason: format!("{reason}; {note}") },
     })
 }
 
 /// What is done where the file leaves it to the program's settings.
-const MODE_UNSTATED: &str =
+const RADII_TAKEN: &str =
     "neither radii (RDM) nor curvatures (CUM) are announced: the numbers of S are taken for radii";
+const CURVATURES_TAKEN: &str = "neither radii (RDM) nor curvatures (CUM) are announced: the numbers of S, all below 1 and \
+     smaller than the beam or the glass, are taken for curvatures";
 
 /// What a file says, in its own units.
 struct Seq<'a> {
@@ -65,6 +67,7 @@ enum FieldKind {
     Angle,
     ObjectHeight,
     ImageHeight,
+    RealImageHeight,
 }
 
 impl<'a> Seq<'a> {
@@ -112,7 +115,8 @@ impl<'a> Seq<'a> {
             "REF" => self.reference = command.number(1)? as usize,
             "XAN" | "YAN" => self.take_fields(FieldKind::Angle, command)?,
             "XOB" | "YOB" => self.take_fields(FieldKind::ObjectHeight, command)?,
-            "XIM" | "YIM" | "XRI" | "YRI" => self.take_fields(FieldKind::ImageHeight, command)?,
+            "XIM" | "YIM" => self.take_fields(FieldKind::ImageHeight, command)?,
+            "XRI" | "YRI" => self.take_fields(FieldKind::RealImageHeight, command)?,
             "VUX" => self.vignetting[0] = command.numbers()?,
             "VLX" => self.vignetting[1] = command.numbers()?,
             "VUY" => self.vignetting[2] = command.numbers()?,
@@ -183,7 +187,8 @@ impl<'a> Seq<'a> {
             None => None,
         };
         let line = command.line;
-        self.surfaces.push(SeqSurface { line, curvature, thickness, medium, ..Default::default() });
+        let number_of_s = (self.is_radius_mode && value != 0.0).then_some(value);
+        self.surfaces.push(SeqSurface { line, curvature, thickness, medium, number_of_s, ..Default::default() });
         Ok(())
     }
 
@@ -247,13 +252,45 @@ impl<'a> Seq<'a> {
         Ok(Some(glass))
     }
 
+    /// Decides whether the numbers of `S` are radii or curvatures where the file says neither, and returns what was taken.
+    ///
+    /// Curvature is the program's default, but files that other programs write mean radii. Radii are longer than the beam is
+    /// wide by half, and than half the glass is thick; curvatures are below 1 in any unit that lenses are drawn in.
+    fn decide_mode(&mut self) -> Option<&'static str> {
+        use SeqNumbers::{Curvatures, Radii};
+        let mode = match (self.is_mode_stated, self.glasses.seq_numbers()) {
+            (true, _) => return None,
+            (false, Some(asked)) => asked,
+            (false, None) => {
+                let numbers = || self.surfaces.iter().filter_map(|surface| surface.number_of_s).map(f64::abs);
+                let (least, largest) = (numbers().fold(f64::INFINITY, f64::min), numbers().fold(0.0, f64::max));
+                let of_beam = match self.beam {
+                    Some(Beam::EntrancePupil(diameter)) => 0.5 * diameter,
+                    _ => 0.0,
+                };
+                let glass = self.surfaces.iter().filter(|surface| surface.medium.is_some());
+                let of_glass = glass.map(|surface| 0.5 * surface.thickness.abs()).fold(0.0, f64::max);
+                let are_short = largest > 0.0 && largest < 1.0 && least < of_beam.max(of_glass);
+                if are_short { Curvatures } else { Radii }
+            }
+        };
+        if mode == Curvatures {
+            for surface in &mut self.surfaces {
+                // Other commands may have curved the surface since.
+                if let Some(number) = surface.number_of_s.filter(|number| surface.curvature == 1.0 / number) {
+                    surface.curvature = number;
+                }
+            }
+        }
+        let note = if mode == Curvatures { CURVATURES_TAKEN } else { RADII_TAKEN };
+        self.notes.push(note.to_owned());
+        Some(note)
+    }
+
     fn into_system(mut self) -> Result<System, TextError> {
         if !self.has_image {
             let reason = "the file has no image surface (SI); expected SO, surfaces S and SI".to_owned();
             return Err(TextError { line: None, reason });
-        }
-        if !self.is_mode_stated {
-            self.notes.push(MODE_UNSTATED.to_owned());
         }
         let mm = self.mm_per_unit;
         let n_surfaces = self.surfaces.len();
@@ -317,6 +354,7 @@ impl<'a> Seq<'a> {
             let field = match self.field_kind {
                 Some(FieldKind::ObjectHeight) => Field::ObjectHeight { x_mm: mm * x, y_mm: mm * y },
                 Some(FieldKind::ImageHeight) => Field::ImageHeight { x_mm: mm * x, y_mm: mm * y },
+                Some(FieldKind::RealImageHeight) => Field::RealImageHeight { x_mm: mm * x, y_mm: mm * y },
                 _ => Field::Angle { x_deg: x, y_deg: y },
             };
             // The program cuts a share of the pupil radius off each side.

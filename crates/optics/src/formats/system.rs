@@ -247,7 +247,7 @@ impl System {
 
     /// Returns half the diameter of the stop that lets the stated beam through.
     fn stop_semi_aperture_mm(&mut self, mono: &MonoLens) -> Result<f64, TextError> {
-        let first = mono.first_order();
+        let first = mono.first_order_of_stop();
         let now_mm = mono.stop_semi_aperture_mm();
         let is_rim_stated = self.surfaces[mono.stop()].semi_aperture_mm.is_some();
         let beam = match self.beam {
@@ -255,13 +255,14 @@ impl System {
             Some(beam) => beam,
         };
         // The beam over the one that the stop as it is now lets through.
-        let slope_now = mono.marginal_ray(self.object_distance_mm).reduced_slope / first.object_index;
+        let to_stop = mono.marginal_ray_of_stop(self.object_distance_mm);
+        let slope_now = to_stop.reduced_slope / first.object_index;
         let ratio = match beam {
             Beam::Stop if is_rim_stated => return Ok(now_mm),
             Beam::Stop => return self.widest_stop_mm(mono),
             Beam::EntrancePupil(diameter_mm) => diameter_mm / first.entrance_pupil_diameter_mm,
             Beam::FNumber(f_number) => first.f_number / f_number.abs(),
-            Beam::WorkingFNumber(f_number) => mono.working_f_number(self.object_distance_mm) / f_number.abs(),
+            Beam::WorkingFNumber(f_number) => 0.5 / (to_stop.reduced_slope_after * f_number).abs(),
             Beam::ObjectCone(angle_rad) => angle_rad.tan() / slope_now,
             Beam::ObjectAperture(aperture) => (aperture / first.object_index).asin().tan() / slope_now,
         };
@@ -354,6 +355,13 @@ impl System {
                 return Ok(ObjectPoint::Finite(DVec3::new(x_mm, y_mm, -distance_mm)));
             }
             Field::ObjectHeight { .. } => return Err(plain("a field is an object height, but the object is far away")),
+            Field::RealImageHeight { x_mm, y_mm } => {
+                let film_mm = self.surfaces.last().map(|last| last.thickness_after_mm).filter(|mm| mm.is_finite());
+                let dioptres = 1e3 / (distance_mm + mono.projection_center_z_mm());
+                let tan = film_mm.and_then(|film| mono.field_tan_of_image(DVec2::new(x_mm, y_mm), film, dioptres));
+                let missed = || format!("no chief ray meets the image at the stated height of {x_mm}, {y_mm} mm");
+                tan.ok_or_else(|| plain(&missed()))?
+            }
             Field::ImageHeight { x_mm, y_mm } if distance_mm.is_finite() => {
                 let height_mm = DVec2::new(x_mm, y_mm) / mono.conjugate(distance_mm).magnification;
                 return Ok(ObjectPoint::Finite(height_mm.extend(-distance_mm)));

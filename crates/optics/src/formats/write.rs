@@ -33,7 +33,7 @@ impl LensFile {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         let failed = |reason: String| OpticsError::Io { path: path.to_owned(), reason };
         let text = match extension.as_str() {
-            "ron" => self.lens.to_ron(),
+            "ron" => self.to_ron(),
             "dat" => self.to_dat()?,
             "json" => self.to_omni_json()?,
             "zmx" => self.to_zmx()?,

@@ -208,7 +208,8 @@ impl LensFile {
             let (this_kind, x, y) = match *field {
                 Field::Angle { x_deg, y_deg } => (0, x_deg, y_deg),
                 Field::ObjectHeight { x_mm, y_mm } => (1, x_mm, y_mm),
-                Field::ImageHeight { x_mm, y_mm } => (3, x_mm, y_mm),
+                Field::ImageHeight { x_mm, y_mm } => (2, x_mm, y_mm),
+                Field::RealImageHeight { x_mm, y_mm } => (3, x_mm, y_mm),
             };
             kind = this_kind;
             let _ = write!(rows[0], " {x:e}");

@@ -280,7 +280,8 @@ fn fields(
         let field = match kind {
             0 => Field::Angle { x_deg: x, y_deg: y },
             1 => Field::ObjectHeight { x_mm, y_mm },
-            2 | 3 => Field::ImageHeight { x_mm, y_mm },
+            2 => Field::ImageHeight { x_mm, y_mm },
+            3 => Field::RealImageHeight { x_mm, y_mm },
             _ => {
                 let reason = format!("FTYP: field type {kind} is not supported; expected 0 to 3");
                 return Err(TextError { line: None, reason });

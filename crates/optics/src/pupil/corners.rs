@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::{EDGE_MM, PupilBoundary, Search};
+use super::{Cell, EDGE_MM, PupilBoundary, Search};
 use crate::{MonoLens, ObjectPoint, Vignetting};
 
 /// What bounds a pupil in some direction: a surface and the part of its openings, 0 for the round rim.
@@ -51,8 +51,8 @@ impl PupilBoundary {
 
     /// Returns the edge's distance from the centre at these azimuths, mm, found to rounding.
     pub fn edge_at_mm(&self, lens: &MonoLens, point: &ObjectPoint, azimuths_rad: &[f64]) -> Option<Vec<f64>> {
-        let directions = azimuths_rad.iter().map(|azimuth| DVec2::from_angle(*azimuth));
-        Search::new(lens, point).edge_mm(self.center_mm, directions, EDGE_MM)
+        let directions: Vec<DVec2> = azimuths_rad.iter().map(|azimuth| DVec2::from_angle(*azimuth)).collect();
+        Search::new(lens, point).edge_mm(self.center_mm, &Cell::default(), &directions, EDGE_MM)
     }
 
     /// Halves brackets until they are narrow, and returns the corner in each, with what remains to its right if the rim
@@ -61,9 +61,10 @@ impl PupilBoundary {
         let mut rights: Vec<(f64, Limit)> = brackets.iter().map(|bracket| bracket.right).collect();
         for _ in 0..HALVINGS {
             let middles: Vec<f64> = brackets.iter().zip(&rights).map(|(b, right)| 0.5 * (b.left.0 + right.0)).collect();
-            let directions = || middles.iter().map(|azimuth| DVec2::from_angle(*azimuth));
-            let rho_mm = search.edge_mm(self.center_mm, directions(), EDGE_MM)?;
-            let places: Vec<DVec2> = directions().zip(&rho_mm).map(|(u, rho)| self.center_mm + *rho * u).collect();
+            let directions: Vec<DVec2> = middles.iter().map(|azimuth| DVec2::from_angle(*azimuth)).collect();
+            let rho_mm = search.edge_mm(self.center_mm, &Cell::default(), &directions, EDGE_MM)?;
+            let places: Vec<DVec2> =
+                directions.iter().zip(&rho_mm).map(|(u, rho)| self.center_mm + *rho * *u).collect();
             let limits = search.limits(&places);
             for (i, bracket) in brackets.iter_mut().enumerate() {
                 let here = (middles[i], limits[i]);
@@ -89,7 +90,7 @@ impl Search<'_> {
     /// Returns what each ray comes nearest to.
     fn limits(&self, targets_mm: &[DVec2]) -> Vec<Limit> {
         let mut nearest = vec![(f64::INFINITY, (0, 0)); targets_mm.len()];
-        let mut rays = self.lens.rays_towards(self.point, targets_mm, self.z_mm, 0.0);
+        let mut rays = self.plane.rays(self.lens, self.point, targets_mm);
         for (surface, step) in self.lens.steps().iter().enumerate() {
             self.lens.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::Off);
             for (i, nearest) in nearest.iter_mut().enumerate().filter(|(i, _)| rays.fate[*i].is_in_flight()) {

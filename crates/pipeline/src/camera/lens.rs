@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions};
+use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions, SeqNumbers};
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
@@ -31,8 +31,10 @@ impl LensChoice {
     /// # Errors
     /// When there is none of that name, or its file or a catalogue cannot be read.
     pub fn open(&self, reading: &LensReading) -> Result<LensFile, PipelineError> {
+        // Catalogues are read, and refused, for a lens of any kind.
+        let options = reading.options()?;
         let mut file = match self {
-            Self::File(path) => LensFile::read(path, &reading.options()?)?,
+            Self::File(path) => LensFile::read(path, &options)?,
             Self::BuiltIn(name) => LensFile::from(Lens::built_in(name)?),
             Self::Thin { focal_length_mm, diameter_mm } => LensFile::from(Lens::thin(*focal_length_mm, *diameter_mm)?),
             Self::Pinhole { diameter_mm } => LensFile::from(Lens::pinhole(*diameter_mm)?),
@@ -99,13 +101,15 @@ pub struct LensReading {
     pub missing_glass: MissingGlass,
     /// The change of index a nanometre, about [`REFERENCE_WAVELENGTH_NM`], of the media of which only one index is stated.
     pub slope_per_nm: Option<f64>,
+    /// What the numbers of surfaces are in a CODE V file that says neither radii nor curvatures; `None` for what is plausible.
+    pub seq_numbers: Option<SeqNumbers>,
 }
 
 impl LensReading {
     /// Returns it as what reads the files is told.
     fn options(&self) -> Result<ReadOptions, PipelineError> {
         let catalogues = self.glasses.iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
-        Ok(ReadOptions { catalogues, missing_glass: self.missing_glass })
+        Ok(ReadOptions { catalogues, missing_glass: self.missing_glass, seq_numbers: self.seq_numbers })
     }
 }
 

@@ -20,5 +20,6 @@ pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError
     let file = inputs.choice.open(&inputs.reading)?;
     let lens = inputs.movements.apply(inputs.stop.apply(file.lens)?)?;
     let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
-    Ok(ResolvedLens { lens, reference, notes: file.notes })
+    let notes = file.notes.into_iter().chain(reference.note_on_limit()).collect();
+    Ok(ResolvedLens { lens, reference, notes })
 }

@@ -16,6 +16,8 @@ pub(super) struct SeqSurface {
     pub(super) line: usize,
     pub(super) is_stop: bool,
     pub(super) curvature: f64,
+    /// What stands for it in `S`, where that was taken for a radius.
+    pub(super) number_of_s: Option<f64>,
     pub(super) thickness: f64,
     pub(super) medium: Option<Glass>,
     pub(super) conic: f64,

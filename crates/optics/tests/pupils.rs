@@ -1,0 +1,152 @@
+//! Pupils and beams against rays counted one by one.
+
+mod counted;
+
+use std::path::PathBuf;
+
+use counted::{beam_radius_mm, cross_section_mm2};
+use dioptric_optics::{
+    Lens, MonoLens, ObjectPoint, PupilBoundary,
+    analysis::{field_limit_deg, projected_solid_angle},
+    glam::{DVec2, DVec3},
+};
+
+/// Azimuths of boundaries.
+const N_AZIMUTHS: usize = 192;
+
+fn shared(name: &str) -> MonoLens {
+    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "../../../shared/data/lenses", name].iter().collect();
+    Lens::read(&path).unwrap().at(550.0).unwrap()
+}
+
+fn built_in(name: &str) -> MonoLens {
+    Lens::built_in(name).unwrap().at(550.0).unwrap()
+}
+
+fn far(field_deg: f64) -> ObjectPoint {
+    ObjectPoint::far(field_deg.to_radians(), DVec2::new(0.28, 0.96))
+}
+
+/// The cross-section of the light of a far point that gets through, by the pupil's parts, mm².
+fn found_mm2(lens: &MonoLens, point: &ObjectPoint) -> f64 {
+    let direction = point.direction_to(DVec3::ZERO);
+    let parts = PupilBoundary::find_parts(lens, point, N_AZIMUTHS);
+    parts.iter().map(|part| part.area_mm2() * direction.dot(part.plane().normal())).sum()
+}
+
+/// Checks fields against so many rays across; grids of n across count a disc to n to the power −1.5.
+#[track_caller]
+fn check(name: &str, lens: &MonoLens, fields_deg: &[f64], n_across: usize, within: f64) {
+    for &field_deg in fields_deg {
+        let point = far(field_deg);
+        let (found, counted) = (found_mm2(lens, &point), cross_section_mm2(lens, &point, n_across));
+        assert!(counted > 0.0 && (found / counted - 1.0).abs() < within, "{name} {field_deg}: {found} {counted}");
+    }
+}
+
+#[test]
+fn pupils_of_fisheyes_move_and_turn() {
+    let fisheye = built_in("fisheye-12.5mm");
+    check("fisheye", &fisheye, &[0.0, 45.0, 80.0, 89.0, 90.0, 91.0], 600, 2e-3);
+    // A crescent so thin that coarser grids lose its ends.
+    check("fisheye", &fisheye, &[104.0], 1500, 2e-3);
+    check("wide", &built_in("wide-100deg"), &[0.0, 30.0, 50.0], 600, 2e-3);
+}
+
+#[test]
+#[dioptric_golden::needs_shared]
+fn widest_lens_has_light_at_every_field() {
+    let lens = shared("more/wideangle200deg-automatic-zemax.json");
+    check("200°", &lens, &[40.0, 78.0, 80.0, 82.0], 800, 4e-3);
+    // Its light ends for good, at one angle.
+    let last_deg = field_limit_deg(&lens, 1e-3).unwrap();
+    let mut before = projected_solid_angle(&lens, &far(76.0), 48);
+    for field_deg in (153..=(2.0 * last_deg) as u32).map(|i| 0.5 * f64::from(i)) {
+        let here = projected_solid_angle(&lens, &far(field_deg), 48);
+        assert!(here > 0.0 && here < before, "{field_deg}: {here} after {before}");
+        before = here;
+    }
+}
+
+#[test]
+fn crescent_pupils_are_found_whole() {
+    // Vignetting far apart in the light's direction: what passes a singlet or asphere from the side is no disc.
+    check("asphere", &built_in("asphere-15mm"), &[60.0, 68.0, 72.0], 1000, 2e-3);
+    let lens = built_in("asphere-15mm");
+    let parts = PupilBoundary::find_parts(&lens, &far(72.0), N_AZIMUTHS);
+    assert!(parts.len() > 1 && parts.windows(2).all(|pair| pair[0].area_mm2() >= pair[1].area_mm2()));
+}
+
+#[test]
+fn pupil_is_the_same_on_both_planes_it_is_looked_at_in() {
+    // 0.3 is the cosine at which the plane of the parts turns to the light, 0.01 that of the pupil's.
+    let lens = built_in("fisheye-12.5mm");
+    let about = |cosine: f64| [cosine + 1e-6, cosine - 1e-6].map(|cosine| far(cosine.acos().to_degrees()));
+    let is_across = |point| PupilBoundary::find(&lens, &point, N_AZIMUTHS).unwrap().plane().is_across_axis();
+    let [before, after] = about(0.01);
+    assert!(is_across(before) && !is_across(after));
+    let [before, after] = about(0.3);
+    let is_across =
+        |point| PupilBoundary::find_parts(&lens, &point, N_AZIMUTHS).iter().all(|part| part.plane().is_across_axis());
+    assert!(is_across(before) && !is_across(after));
+    assert!((found_mm2(&lens, &before) / found_mm2(&lens, &after) - 1.0).abs() < 1e-4);
+    let cones = [before, after].map(|point| projected_solid_angle(&lens, &point, 128));
+    assert!((cones[0] / cones[1] - 1.0).abs() < 1e-4, "{cones:?}");
+}
+
+/// The f-number by a million rays along a radius, good to 1e-6 of the front rim.
+fn counted_f_number(lens: &MonoLens) -> f64 {
+    lens.first_order().efl_mm.abs() / (2.0 * beam_radius_mm(lens, 1_000_000))
+}
+
+#[test]
+#[dioptric_golden::needs_shared]
+fn rims_narrower_than_the_stop_define_the_f_number() {
+    for (name, expected) in [
+        ("more/dgauss.90deg.4.38mm.json", 2.02),
+        ("more/wide.77deg.4.38mm.json", 6.96),
+        ("more/gullstrand.dat", 2.18),
+        ("fisheye.87deg.12.5mm.json", 2.74),
+    ] {
+        let lens = shared(name);
+        let first = lens.first_order();
+        assert!((first.f_number - expected).abs() < 0.006, "{name}: {}", first.f_number);
+        assert!((first.f_number / counted_f_number(&lens) - 1.0).abs() < 1e-4, "{name}");
+        assert!((first.entrance_pupil_diameter_mm * first.f_number / first.efl_mm.abs() - 1.0).abs() < 1e-12);
+        let beam = lens.limiting_beam().expect("a rim limits the light");
+        assert!(beam.limiting_surface != lens.stop() && beam.stop_radius_mm < lens.stop_semi_aperture_mm());
+        assert!(lens.note_on_limit().unwrap().starts_with("the stop does not limit the light: the rim of surface"));
+    }
+}
+
+#[test]
+fn real_f_number_is_that_of_counted_rays() {
+    for name in Lens::built_in_names() {
+        let lens = built_in(name);
+        let Some(real) = lens.real_f_number() else { continue };
+        assert!((real / counted_f_number(&lens) - 1.0).abs() < 1e-4, "{name}: {real} {}", counted_f_number(&lens));
+    }
+}
+
+#[test]
+fn narrower_stop_limits_again() {
+    let lens = Lens::built_in("fisheye-12.5mm").unwrap();
+    let open = lens.at(550.0).unwrap();
+    assert!(open.limiting_beam().is_some());
+    let stopped = lens.with_f_number(8.0, 550.0).unwrap().at(550.0).unwrap();
+    assert!(stopped.limiting_beam().is_none() && (stopped.first_order().f_number - 8.0).abs() < 1e-12);
+    let message = lens.with_f_number(2.4, 550.0).unwrap_err().to_string();
+    assert!(message.contains("opens to f/2.7") && message.contains("rim of surface"), "{message}");
+    let rims = open.limiting_beam().unwrap().stop_radius_mm;
+    assert!((open.stop_radius_filled_mm(f64::INFINITY) - rims).abs() < 1e-12 * rims);
+    assert_eq!(stopped.stop_radius_filled_mm(f64::INFINITY), stopped.stop_semi_aperture_mm());
+}
+
+#[test]
+fn working_f_number_of_far_objects_is_the_f_number() {
+    for lens in [built_in("fisheye-12.5mm"), built_in("dgauss-50mm")] {
+        let near = lens.working_f_number(1e7);
+        assert!((lens.working_f_number(f64::INFINITY) / lens.first_order().f_number - 1.0).abs() < 1e-9);
+        assert!((near / lens.first_order().f_number - 1.0).abs() < 1e-4, "{near}");
+    }
+}
