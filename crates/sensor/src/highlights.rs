@@ -220,7 +220,7 @@ impl Level {
             for (column, place) in line.chunks_exact_mut(n).enumerate() {
                 if place.iter().all(|v| *v == 0.0) {
                     let beside = |i: usize, last: usize| {
-                        let other = if i % 2 == 0 { (i / 2).saturating_sub(1) } else { i / 2 + 1 };
+                        let other = if i.is_multiple_of(2) { (i / 2).saturating_sub(1) } else { i / 2 + 1 };
                         [(i / 2, 0.75), (other.min(last), 0.25)]
                     };
                     for (r, down) in beside(row, coarser.rows - 1) {

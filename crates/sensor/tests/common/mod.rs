@@ -34,12 +34,8 @@ pub(crate) fn lit_by_d65(path: &std::path::Path) -> SpectralImage {
 
 /// Returns the irradiance of reflectances, one plane a band, in 1000 lx of D65 behind an ideal lens of f/4.
 pub(crate) fn lit(grid: WavelengthGrid, reflectances: Vec<Array2<f32>>) -> SpectralImage {
-    lit_by(&Illuminant::D65, grid, reflectances)
-}
-
-fn lit_by(light: &Illuminant, grid: WavelengthGrid, reflectances: Vec<Array2<f32>>) -> SpectralImage {
     // E = π L / (4 N²).
-    let white = light.white_radiance(&grid, 1000.0);
+    let white = Illuminant::D65.white_radiance(&grid, 1000.0);
     let planes = reflectances.into_iter().zip(&white).map(|(plane, &radiance)| {
         let factor = (radiance * std::f64::consts::PI / 64.0) as f32;
         plane.mapv(|reflectance| reflectance.max(0.0) * factor)
@@ -52,21 +48,11 @@ pub(crate) const PATCH: usize = 24;
 
 /// Returns the 24 patches in 4 rows of 6, lit.
 pub(crate) fn chart() -> SpectralImage {
-    chart_in_bands(&Illuminant::D65, 10.0)
-}
-
-/// Returns the 24 patches in 4 rows of 6 under 1000 lx of a light, in the 5 nm of its table.
-#[allow(dead_code, reason = "each test file uses a part of it")]
-pub(crate) fn chart_under(light: &Illuminant) -> SpectralImage {
-    chart_in_bands(light, 5.0)
-}
-
-fn chart_in_bands(light: &Illuminant, step_nm: f64) -> SpectralImage {
-    let grid = WavelengthGrid::uniform(380.0, 730.0, step_nm).unwrap();
+    let grid = WavelengthGrid::uniform(380.0, 730.0, 10.0).unwrap();
     let patches: Vec<Vec<f64>> = color_checker_reflectances().iter().map(|(_, s)| s.sample_held(&grid)).collect();
     let plane = |band: usize| {
         Array2::from_shape_fn((4 * PATCH, 6 * PATCH), |(r, c)| patches[6 * (r / PATCH) + c / PATCH][band] as f32)
     };
     let planes = (0..grid.len()).map(plane).collect();
-    lit_by(light, grid, planes)
+    lit(grid, planes)
 }
