@@ -120,7 +120,7 @@ impl Integrator<'_> {
             path.scattered = if next.is_delta { None } else { Some((hit.point, next.pdf)) };
             path.n_scatterings += 1;
             let greatest = path.throughput.iter().copied().fold(0.0, f32::max);
-            if !(greatest > 0.0) {
+            if greatest <= 0.0 {
                 return sum;
             }
             if path.n_scatterings >= ROULETTE_FROM {

@@ -1,7 +1,7 @@
 //! A camera with a real lens: rays from the film through the lens into the world.
 //!
 //! For a place x on the film and a point p of the last vertex plane, drawn from an area A, the spectral irradiance is the
-//! mean of `L (n_i/n_o)² cos θ cos θ_p A / |p − x|²`, with θ from the normal of the film and θ_p from that of the plane:
+//! mean of `L (n_i/n_o)² cos θ cos θ_p A / |p − x|²`, with θ from the normal of the film and `θ_p` from that of the plane:
 //! for parallel planes cos⁴θ A/z². L is the radiance along the ray that leaves the lens, 0 where the lens blocks it;
 //! along a ray L/n² stays the same.
 

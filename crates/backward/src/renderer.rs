@@ -72,7 +72,7 @@ impl<'a> Renderer<'a> {
             let found = settings.samples_per_pass;
             return Err(BackwardError::setting("the samples of a pass", found, "1 to 65536"));
         }
-        if let Some(clamp) = settings.clamp.filter(|clamp| !(*clamp > 0.0)) {
+        if let Some(clamp) = settings.clamp.filter(|clamp| clamp.is_nan() || *clamp <= 0.0) {
             return Err(BackwardError::setting("the clamp of scattered light", clamp, "a radiance above 0"));
         }
         if let Camera::Lens(lens) = camera
@@ -114,7 +114,7 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// When the noise is not above 0, or too few passes have been made to judge.
     pub fn aim_at_noise(&mut self, noise: f64, most: u32) -> Result<(), BackwardError> {
-        if !(noise > 0.0) {
+        if noise.is_nan() || noise <= 0.0 {
             return Err(BackwardError::setting("the noise to reach", noise, "a share of the picture above 0"));
         }
         if self.n_passes < 2 {

@@ -100,7 +100,7 @@ fn half_tangents(fov_deg: f64, pixels: PixelGrid, window: Option<[f64; 4]>) -> R
         window.unwrap_or([-aspect.max(1.0), aspect.max(1.0), -(1.0 / aspect).max(1.0), (1.0 / aspect).max(1.0)]);
     let size = DVec2::new(right - left, top - bottom);
     let off = DVec2::new(right + left, top + bottom).abs();
-    if off.max_element() > 1e-6 * size.max_element() || !(size.min_element() > 0.0) {
+    if off.max_element() > 1e-6 * size.max_element() || size.min_element() <= 0.0 {
         let found = format!("{left} to {right}, {bottom} to {top}");
         return Err(BackwardError::setting(
             "the window of the camera",
