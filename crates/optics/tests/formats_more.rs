@@ -1,5 +1,4 @@
 //! Lens files of other programs that used to be read wrongly, or refused for no good reason.
-#![cfg_attr(not(has_shared), expect(dead_code, reason = "most of this reads the shared data"))]
 
 use std::path::{Path, PathBuf};
 
