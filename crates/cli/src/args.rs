@@ -175,7 +175,7 @@ pub(crate) struct FrameArgs {
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub(crate) noise: Option<String>,
     /// Factor on the voltage after the pixel [default: 1]
-    #[arg(long, value_name = "G")]
+    #[arg(long, allow_negative_numbers = true, value_name = "G")]
     pub(crate) analog_gain: Option<f64>,
     /// What the picture makes white: scene (its light, or its mean where that is unknown), none, gray-world, white-patch,
     /// shades-of-gray, gray-edge, patch:X,Y,W,H, or a light as --illuminant has it [default: scene]

@@ -223,7 +223,7 @@ fn a_chart_is_found_and_two_pictures_are_compared() {
     let share = 36.0 * 36.0 * 24.0 / (280.0 * 200.0);
     let expected = 10.0 * (3.0 / (share * (6.0_f64 / 255.0).powi(2))).log10();
     assert!((number(&other["psnr_db"]) - expected).abs() < 0.05, "{} not {expected}", other["psnr_db"]);
-    assert!(number(&other["scielab"]["mean"]) > 0.5 && folder.path().join("cmp/scielab.png").exists());
+    assert!(number(&other["scielab"]["mean"]) > 0.5 && folder.path().join("cmp/scielab.svg").exists());
 }
 
 #[test]

@@ -59,7 +59,7 @@ impl OccludedSamples {
         Ok(Self::Estimated { fill: Box::new(fill), layer_coordinates })
     }
 
-    /// The layer_coordinates of the second samples among the layers.
+    /// The layer coordinates of the second samples among the layers.
     pub(crate) fn layer_coordinates(&self) -> Option<&Array2<f32>> {
         match self {
             Self::Nothing => None,
@@ -72,7 +72,7 @@ impl OccludedSamples {
         matches!(self, Self::Known(_))
     }
 
-    /// The bytes of memory beside the layer_coordinates.
+    /// The bytes of memory beside the layer coordinates.
     pub(crate) fn size_bytes(&self) -> usize {
         match self {
             Self::Estimated { fill, .. } => fill.size_bytes(),

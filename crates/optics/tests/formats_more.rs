@@ -10,7 +10,7 @@ fn read_with(name: &str, options: &ReadOptions) -> Result<LensFile, OpticsError>
 }
 
 fn efl_mm(file: &LensFile) -> f64 {
-    file.lens.at(file.reference_wavelength_nm.unwrap_or(587.6)).unwrap().first_order().efl_mm
+    file.lens.at(file.reference_wavelength_nm.unwrap_or(587.6)).expect("glasses that are known").first_order().efl_mm
 }
 
 #[test]

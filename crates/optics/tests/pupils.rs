@@ -16,11 +16,11 @@ const N_AZIMUTHS: usize = 192;
 
 fn shared(name: &str) -> MonoLens {
     let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "../../../shared/data/lenses", name].iter().collect();
-    Lens::read(&path).unwrap().at(550.0).unwrap()
+    Lens::read(&path).expect("a lens file").at(550.0).expect("glasses that are known")
 }
 
 fn built_in(name: &str) -> MonoLens {
-    Lens::built_in(name).unwrap().at(550.0).unwrap()
+    Lens::built_in(name).expect("a built-in lens").at(550.0).expect("glasses that are known")
 }
 
 fn far(field_deg: f64) -> ObjectPoint {

@@ -1,4 +1,5 @@
 //! A camera that is kept and changed computes what the change touches, and no more.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_pipeline::{
     BlurChoice, Camera, Capture, Diffraction, FilmChoice, FocusChoice, KeptCamera, Quality, SceneSource, SensorChoice,

@@ -31,7 +31,7 @@ const MOST_SAMPLES: usize = 32;
 /// The largest even width, in sixteenths of a pixel.
 const WIDEST: f64 = 80.0;
 
-/// PaddedRows of pixels in single precision, each longer at both ends so that eight pixels may run over the edge.
+/// Rows of pixels in single precision, each longer at both ends so that eight pixels may run over the edge.
 pub(crate) struct PaddedRows {
     pub(crate) n_lines: usize,
     pub(crate) n_pixels: usize,

@@ -54,7 +54,7 @@ fn globe(radius_m: f32, n: u32) -> TriangleMesh {
 fn world_of(mesh: TriangleMesh, place: DAffine3) -> World {
     let (mut builder, matte) = with_matte();
     builder.add_shape(Shape::Mesh(mesh), place, matte, None);
-    builder.build().unwrap()
+    builder.build().expect("a world of one mesh")
 }
 
 #[test]

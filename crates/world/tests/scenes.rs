@@ -15,9 +15,9 @@ fn read(path: &Path) -> Result<World, WorldError> {
 }
 
 fn read_text(text: &str) -> Result<World, WorldError> {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("world.pbrt");
-    std::fs::write(&path, text).unwrap();
+    std::fs::write(&path, text).expect("a folder that can be written to");
     read(&path)
 }
 

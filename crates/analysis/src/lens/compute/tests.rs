@@ -115,8 +115,9 @@ fn steep_fields_are_cut_and_told() {
     let angles = analysis.fields.iter().map(|row| row.place.field_deg).collect::<Vec<_>>();
     assert_eq!(angles[..3], [80.0, 88.0, 88.0]);
     assert!((angles[3] - 88.0).abs() < 1e-9 && analysis.fields[2].place.field_xy_deg == [0.0, -88.0]);
-    assert_eq!(analysis.notes.len(), 3);
-    assert!(analysis.notes[0].contains("89.5° is cut to 88°"), "{:?}", analysis.notes);
+    let cut: Vec<&String> = analysis.notes.iter().filter(|note| note.contains("is cut to")).collect();
+    assert_eq!(cut.len(), 3);
+    assert!(cut[0].contains("89.5° is cut to 88°"), "{cut:?}");
     // A hole in front of an ideal lens sees everything: cos⁴ falls to a quarter at 45°.
     let thin = Lens::thin(50.0, 0.5).unwrap();
     assert!(
