@@ -112,10 +112,12 @@ impl Uniform {
                 let mut field_tan = place_mm * tan_per_mm;
                 for _ in 0..60 {
                     let point = ObjectPoint::from_field(&mono, field_tan, 1.0 / self.plane_m);
-                    let pupil = PupilBoundary::find(&mono, &point, 64).unwrap();
+                    let pupil = PupilBoundary::find(&mono, &point, 64)
+                        .unwrap_or_else(|| panic!("no pupil at {field_tan} for {place_mm}"));
                     let target = pupil.center_mm() + DVec2::from_angle(azimuth) * pupil.rho_max_mm(azimuth);
                     let mut rays = rays_towards(&point, &[target], pupil.z_mm(), 0.0);
                     mono.trace(&mut rays, Vignetting::Off);
+                    mono.to_film(&mut rays, self.film_mm);
                     let cosine = rays.direction(0).truncate();
                     let off_mm = place_mm - mono.landed(&rays, self.film_mm).next().unwrap().in_picture_mm();
                     if off_mm.length() < 1e-6 {

@@ -135,7 +135,7 @@ impl MonoLens {
     }
 
     /// The same for a beam that fills the stop, whether it gets through or not.
-    pub(crate) fn first_order_of_stop(&self) -> FirstOrder {
+    pub fn first_order_of_stop(&self) -> FirstOrder {
         self.first_order
     }
 

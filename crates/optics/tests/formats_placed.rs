@@ -83,7 +83,7 @@ fn tilted_plate_of_a_zemax_file_shifts_light_and_its_return_puts_the_film_back()
     let mono = file.lens.at(550.0).unwrap();
     let mut rays = RayBatch::from_points(&[DVec3::ZERO], &[DVec3::Z]);
     mono.trace(&mut rays, Vignetting::On);
-    mono.to_film(&mut rays, 20.0);
+    mono.to_film_plane(&mut rays, 20.0);
     let (sine, cosine) = 30_f64.to_radians().sin_cos();
     let shift_mm = -7.0 * sine * (1.0 - cosine / (2.25 - sine * sine).sqrt());
     // The return is made at the plate's back, so that the film follows the axis from there.

@@ -238,7 +238,7 @@ fn sampled_lights_equal_cast_rays() {
             let world = builder.build().unwrap();
             let mut rng = ChaCha8Rng::seed_from_u64(5);
             let n = 60_000;
-            let mut n_missed = 0;
+            let (mut n_missed, mut n_seen, mut pdf_squared) = (0, 0, 0.0);
             let (mut by_rays, mut by_light, mut pdf_of_light, mut light_squared) = (0.0, 0.0, 0.0, 0.0);
             for _ in 0..n {
                 let out = direction(&mut rng);
@@ -246,13 +246,14 @@ fn sampled_lights_equal_cast_rays() {
                 if let Some(hit) = world.intersect(&ray, f32::INFINITY) {
                     let [radiance] = world.emission(&hit, -out, &[550.0]);
                     by_rays += f64::from(radiance * out.z.max(0.0)) * 4.0 * std::f64::consts::PI / f64::from(n);
-                    // ∫ pdf dω = 1 over what is seen, for shapes seen whole.
-                    pdf_of_light +=
-                        f64::from(world.light_pdf(Vec3::ZERO, &hit)) * 4.0 * std::f64::consts::PI / f64::from(n);
+                    let value = f64::from(world.light_pdf(Vec3::ZERO, &hit)) * 4.0 * std::f64::consts::PI;
+                    pdf_of_light += value / f64::from(n);
+                    pdf_squared += value * value / f64::from(n);
                 }
                 let drawn = world.sample_light(Vec3::ZERO, unit(&mut rng), [unit(&mut rng), unit(&mut rng)], &[550.0]);
                 let Some(light) = drawn else { continue };
                 if !world.is_occluded(&ray_to(light.direction), light.distance_m) {
+                    n_seen += 1;
                     let value = f64::from(light.radiance[0] * light.direction.z.max(0.0) / light.pdf);
                     by_light += value / f64::from(n);
                     light_squared += value * value / f64::from(n);
@@ -270,7 +271,24 @@ fn sampled_lights_equal_cast_rays() {
             // Casting 60 000 rays over the sphere has an error of about 1.5 % for lights of this size.
             assert!((by_light - by_rays).abs() < 0.05 * by_rays + 4.0 * sigma, "{shape:?}: {by_light} {by_rays}");
             assert!(n_missed < n / 1000, "{shape:?}: {n_missed}");
-            assert!(pdf_of_light > 0.3 && pdf_of_light < 1.06, "{shape:?}: {pdf_of_light}");
+            // ∫ pdf dω over what is seen is the share of samples that are seen; those of sides that don't glow are no
+            // samples, so this holds where both do.
+            if is_two_sided {
+                let share = f64::from(n_seen) / f64::from(n);
+                let variance = pdf_squared - pdf_of_light * pdf_of_light + share * (1.0 - share);
+                let sigma = (variance / f64::from(n)).sqrt();
+                assert!((pdf_of_light - share).abs() < 4.0 * sigma, "{shape:?}: {pdf_of_light} {share} ± {sigma}");
+                // A round sphere is sampled by its cone, all of which is seen; a stretched one evenly over the sphere
+                // it was, whose cap (1 − r/d)/2 is seen.
+                if let Shape::Sphere { radius_m } = shape {
+                    let distance_m = place.inverse().translation.length();
+                    let is_round = (place.matrix3.x_axis.length() - 1.0).abs() < 1e-9;
+                    let closed = if is_round { 1.0 } else { 0.5 * (1.0 - radius_m / distance_m) };
+                    // A ray to the very rim can miss by a rounding.
+                    let sigma = (closed * (1.0 - closed) / f64::from(n)).sqrt();
+                    assert!((share - closed).abs() < 4.0 * sigma + 1e-3, "{shape:?}: {share} {closed}");
+                }
+            }
         }
     }
 }

@@ -28,7 +28,7 @@ const LUMENS_PER_WATT: f32 = 683.002;
 pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<WorldBuilder, WorldError> {
     let unreadable = |reason: String| WorldError::Unreadable { file: path.to_owned(), reason };
     let bytes = read_bytes(path, MAX_BYTES)?;
-    let gltf = Gltf::from_slice(&bytes).map_err(|e| unreadable(e.to_string()))?;
+    let gltf = parse(&bytes).map_err(unreadable)?;
     let mut reader = Reader {
         builder: WorldBuilder::new(),
         file: path.to_owned(),
@@ -67,6 +67,20 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
         reader.builder.note("animations: not followed, everything stands as it is written");
     }
     Ok(reader.builder)
+}
+
+/// Parses and validates a file. The crate's validation looks up the accessor of POSITION before it has checked that
+/// there is one, so this is checked first.
+fn parse(bytes: &[u8]) -> Result<Gltf, String> {
+    let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).map_err(|e| e.to_string())?;
+    let root = document.into_json();
+    let mut used = root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.attributes.values());
+    if let Some(index) = used.find(|index| index.value() >= root.accessors.len()) {
+        let n = root.accessors.len();
+        return Err(format!("a mesh names accessor {}, of which there are {n}", index.value()));
+    }
+    let document = gltf::Document::from_json(root).map_err(|e| e.to_string())?;
+    Ok(Gltf { document, blob })
 }
 
 struct Reader<'c> {
@@ -366,7 +380,8 @@ mod tests {
         let forwards = camera.world_from_camera.transform_vector3(DVec3::Z).as_vec3();
         let origin = camera.world_from_camera.translation.as_vec3() + Vec3::new(0.2, 0.2, 0.0);
         let hit = world.intersect(&Ray { origin, direction: forwards }, f32::INFINITY).unwrap();
-        assert_eq!(hit.distance_m, 5.0);
+        // One rounding of an f32.
+        assert!((hit.distance_m - 5.0).abs() <= 5.0 * f32::EPSILON, "{}", hit.distance_m);
         let albedo = world.bsdf(&hit, -forwards, &[450.0, 650.0]).albedo();
         assert!(albedo[1] > 0.6 && albedo[0] < 0.2, "{albedo:?}");
         assert!(world.emission(&hit, -forwards, &[450.0])[0] > 0.1);
@@ -377,6 +392,8 @@ mod tests {
     fn ranges_beyond_a_buffer_are_refused() {
         assert!(read_text(&file("3", 4)).unwrap_err().to_string().contains("accessor 0"));
         assert!(read_text(&file("4000000000", 3)).unwrap_err().to_string().contains("accessor 1"));
+        let no_accessor = file("3", 3).replace("\"POSITION\":0", "\"POSITION\":9");
+        assert!(read_text(&no_accessor).unwrap_err().to_string().contains("accessor 9, of which there are 2"));
         assert!(read_text("{}").is_err());
         let floats = file("1", 3).replace("\"componentType\":5123", "\"componentType\":5126");
         assert!(read_text(&floats).unwrap_err().to_string().contains("accessor 1"));
