@@ -19,12 +19,12 @@ const ALLOWED: &[(&str, &[&str], &str)] = &[
         &["camera", "lens_camera", "renderer"],
         "a camera is one of several kinds, of which the lens's takes what the renderer asks of any",
     ),
-    ("cli", &["analyze", "lens"], "`lens` dispatches to `analyze`, which opens lenses as `lens` does"),
-    ("forward", &["knot_kernels", "tiles"], "kernels lie at the knots of tiles, which are laid by how kernels change"),
+    ("forward", &["plan", "render"], "a rendering is a plan used once, and both hand bands to the same kind of sink"),
     (
         "optics",
         &[
             "analysis",
+            "axial",
             "beam",
             "bundle",
             "extinction",
@@ -40,6 +40,21 @@ const ALLOWED: &[(&str, &[&str], &str)] = &[
         ],
         "`Lens` reads files and finds pupils through its own methods; files and built-in lenses are to leave the kernel",
     ),
+    (
+        "pipeline",
+        &["camera", "frame_files", "sense", "stages"],
+        "the camera holds the choice of outputs, which names its frames, and runs the stages",
+    ),
+    ("psf", &["adaptive", "model"], "a model is built by adding samples to a coarser one"),
+    ("psf", &["narrow_gaussian", "splat"], "splats are sorted into narrow Gaussians, which are made of a `Splat`"),
+    ("scene", &["light", "scene"], "a scene has a light and is put under another"),
+    (
+        "world",
+        &["light", "material", "ray", "texture", "world"],
+        "a world asks its materials and lights, which ask it for the geometry of a hit",
+    ),
+    ("cli", &["analyze", "lens"], "`lens` dispatches to `analyze`, which opens lenses as `lens` does"),
+    ("forward", &["knot_kernels", "tiles"], "kernels lie at the knots of tiles, which are laid by how kernels change"),
     ("optics", &["catalogue", "glass"], "`Glass` looks names up in the catalogue, which is a table of `Glass`"),
     (
         "optics",
@@ -55,13 +70,6 @@ const ALLOWED: &[(&str, &[&str], &str)] = &[
         ],
         "each format is read into `LensFile`, which dispatches to the formats",
     ),
-    (
-        "pipeline",
-        &["camera", "frame_files", "stages"],
-        "the camera holds the choice of outputs, which names its `Exposed`, and runs the stages",
-    ),
-    ("psf", &["adaptive", "bank", "drawing", "field_bank"], "three banks that become one"),
-    ("psf", &["splat", "stroke"], "splats are sorted into strokes, which are made of a `Splat`"),
     (
         "scene",
         &["still_life::lights", "still_life::material", "still_life::room", "still_life::world"],
