@@ -1,8 +1,8 @@
 //! The whole camera, chained as in Figure 1 of the paper: scene, lens, irradiance, sensor, picture.
 //!
-//! A [`Camera`] is a file: it states everything about a shot. A [`Shot`] is a camera with all that it names opened, a
-//! [`Capture`] what came of it, stage by stage. Beside it stand the [`figures`] of the paper, each a function that returns
-//! data.
+//! A [`Camera`] is a file: it states everything about a shot. A [`KeptCamera`] keeps the results of its stages, so that a
+//! changed camera computes what the change touches; a [`Capture`] is what came of it, stage by stage. Beside it stand the
+//! [`figures`] of the paper, each a function that returns data.
 //!
 //! This crate alone sees every stage. It knows nothing of terminals, tables or plots: it prints nothing, reads no clock and
 //! draws nothing, and reports how far it is through [`Progress`].

@@ -238,7 +238,7 @@ fn sampled_lights_equal_cast_rays() {
             let world = builder.build().unwrap();
             let mut rng = ChaCha8Rng::seed_from_u64(5);
             let n = 60_000;
-            let (mut n_missed, mut n_seen, mut pdf_squared) = (0, 0, 0.0);
+            let (mut n_missed, mut n_beside_edge, mut n_seen, mut pdf_squared) = (0, 0, 0, 0.0);
             let (mut by_rays, mut by_light, mut pdf_of_light, mut light_squared) = (0.0, 0.0, 0.0, 0.0);
             for _ in 0..n {
                 let out = direction(&mut rng);
@@ -263,14 +263,19 @@ fn sampled_lights_equal_cast_rays() {
                         continue;
                     };
                     let ratio = world.light_pdf(Vec3::ZERO, &hit) / light.pdf;
-                    // A grazing point's cosine is as exact as the point itself.
-                    assert!((ratio - 1.0).abs() < 0.02 || light.pdf > 50.0, "{shape:?}: {ratio} at {light:?}");
+                    // A grazing point's cosine is as exact as the point itself; a ray to a point within a rounding of an edge
+                    // between facets can meet the other one, whose cosine differs.
+                    if (ratio - 1.0).abs() >= 0.02 && light.pdf <= 50.0 {
+                        assert!(matches!(shape, Shape::Mesh(_)), "{shape:?}: {ratio} at {light:?}");
+                        n_beside_edge += 1;
+                    }
                 }
             }
             let sigma = ((light_squared - by_light * by_light) / f64::from(n)).sqrt();
             // Casting 60 000 rays over the sphere has an error of about 1.5 % for lights of this size.
             assert!((by_light - by_rays).abs() < 0.05 * by_rays + 4.0 * sigma, "{shape:?}: {by_light} {by_rays}");
-            assert!(n_missed < n / 1000, "{shape:?}: {n_missed}");
+            println!("{n_missed} missed, {n_beside_edge} beside an edge, of {n}");
+            assert!(n_missed < n / 1000 && n_beside_edge < n / 10_000, "{shape:?}: {n_missed} {n_beside_edge}");
             // ∫ pdf dω over what is seen is the share of samples that are seen; those of sides that don't glow are no
             // samples, so this holds where both do.
             if is_two_sided {
