@@ -499,10 +499,20 @@ mod tests {
         }
     }
 
+    /// Returns the share of a white furnace that a boundary gives back towards a direction.
+    fn furnace(lobe: Lobe<1>, outgoing: Vec3) -> f64 {
+        let bsdf = of(lobe, outgoing);
+        // Radiance in a medium of index n is n² in the furnace.
+        let medium = |z: f32| if matches!(lobe, Lobe::Dielectric { .. }) && z < 0.0 { 2.25 } else { 1.0 };
+        let n = 120;
+        let weights = squares(n).filter_map(|(u_lobe, u)| bsdf.sample(u_lobe, u));
+        let total: f64 = weights.map(|s| f64::from(s.weight[0] * medium(s.incident.z)) / (n * n) as f64).sum();
+        total / f64::from(medium(outgoing.z))
+    }
+
     /// In a furnace of radiance 1 (n² inside a medium) nothing gets brighter; what absorbs nothing and isn't rough stays
-    /// as it is, and what is rough loses only what its small mirrors send into each other: head on at least the share
-    /// α² / (1 + α²) of tilts over 45°, 4 % at α = 0.2 and 26 % at 0.6, and more at grazing angles, where tilts send light
-    /// into the surface: the lower bounds only say that no kind of light is left out.
+    /// as it is. A rough coat over white loses light between its small mirrors, by an amount that has no closed form: its lower
+    /// bounds only show that no kind of light is left out.
     #[test]
     fn white_furnace_stays_white() {
         let glass = |rough| Lobe::Dielectric { index: [1.5], rough };
@@ -511,11 +521,7 @@ mod tests {
         let cases = [
             (Lobe::Diffuse { reflectance: [0.5], transmittance: [0.5] }, 0.999, 1.001),
             (white_metal(None), 0.999, 1.001),
-            (white_metal(mild), 0.80, 1.001),
-            (white_metal(rough), 0.45, 1.001),
             (glass(None), 0.999, 1.001),
-            (glass(mild), 0.80, 1.001),
-            (glass(rough), 0.45, 1.001),
             (coated(1.0, None), 0.997, 1.003),
             (coated(1.0, mild), 0.80, 1.02),
             (coated(1.0, rough), 0.60, 1.02),
@@ -526,16 +532,31 @@ mod tests {
                 if cos < 0.0 && matches!(lobe, Lobe::Coated { .. }) {
                     continue;
                 }
-                let bsdf = of(lobe, direction(cos, azimuth));
-                // Radiance in a medium of index n is n² in the furnace.
-                let medium = |z: f32| if matches!(lobe, Lobe::Dielectric { .. }) && z < 0.0 { 2.25 } else { 1.0 };
-                let n = 120;
-                let total: f64 = squares(n)
-                    .filter_map(|(u_lobe, u)| bsdf.sample(u_lobe, u))
-                    .map(|s| f64::from(s.weight[0] * medium(s.incident.z)) / (n * n) as f64)
-                    .sum();
-                let total = total / f64::from(medium(cos));
+                let total = furnace(lobe, direction(cos, azimuth));
                 assert!(total > least - 0.01 && total < most + 0.01, "{lobe:?} at {cos}: {total}");
+            }
+        }
+    }
+
+    /// Rough boundaries lose what their small mirrors send into each other, and no more: the share of a white furnace that
+    /// they give back is that of a numerical integral over the tilts that are seen, of Smith's height-correlated masking and
+    /// Fresnel's equations, made apart from this code (1500 × 1500 tilts, to 0.003).
+    #[test]
+    fn rough_boundaries_lose_what_is_masked() {
+        let (mild, rough) = (Ggx::new(0.2, 0.2), Ggx::new(0.6, 0.6));
+        let metal = |rough| Lobe::Mirror { reflectance: [1.0], rough };
+        let glass = |rough| Lobe::Dielectric { index: [1.5], rough };
+        for (lobe, cosines, expected) in [
+            (metal(mild), [0.95, 0.6, 0.3], [0.9448, 0.9109, 0.8616]),
+            (metal(rough), [0.95, 0.6, 0.3], [0.5928, 0.6233, 0.7074]),
+            (glass(mild), [0.95, 0.6, 0.3], [0.9941, 0.9797, 0.9410]),
+            (glass(mild), [-0.95, -0.6, -0.3], [0.9510, 0.8875, 0.8325]),
+            (glass(rough), [0.95, 0.6, 0.3], [0.9495, 0.8820, 0.8154]),
+            (glass(rough), [-0.95, -0.6, -0.3], [0.6685, 0.6257, 0.6071]),
+        ] {
+            for (cos, expected) in cosines.into_iter().zip(expected) {
+                let total = furnace(lobe, direction(cos, 1.0));
+                assert!((total - expected).abs() < 0.01, "{lobe:?} at {cos}: {total}, expected {expected}");
             }
         }
     }
