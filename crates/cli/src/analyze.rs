@@ -90,7 +90,7 @@ fn request(arguments: &LensAnalyzeArgs, used: &LensUse, common: &Common) -> anyh
         // Places of an object elsewhere say nothing of this one.
         (None, None, Some(AnalysisFields::HeightsMm(_))) if arguments.distance_mm.is_some() => AnalysisFields::ByLight,
         (None, None, Some(fields)) => {
-            taken.push(in_words(&fields));
+            taken.push(summary(&fields));
             fields
         }
         (None, None, None) => AnalysisFields::ByLight,
@@ -100,7 +100,7 @@ fn request(arguments: &LensAnalyzeArgs, used: &LensUse, common: &Common) -> anyh
 }
 
 /// Returns fields as people name them.
-fn in_words(fields: &AnalysisFields) -> String {
+fn summary(fields: &AnalysisFields) -> String {
     let list = |pairs: &[[f64; 2]]| {
         let one = |[x, y]: &[f64; 2]| {
             if *x == 0.0 { list_of(&[*y]) } else { format!("{}/{}", list_of(&[*x]), list_of(&[*y])) }

@@ -112,10 +112,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
         None => {
             let wavelengths_nm = used.wavelengths_or(&[REFERENCE_WAVELENGTH_NM]);
             let list = list_of(&wavelengths_nm);
-            remark(
-                common.quiet,
-                &format!("the lens is not known at {REFERENCE_WAVELENGTH_NM} nm: it is told of at {list} nm"),
-            );
+            remark(common.quiet, &format!("the lens is not known at {REFERENCE_WAVELENGTH_NM} nm: shown at {list} nm"));
             wavelengths_nm
         }
     };

@@ -115,7 +115,7 @@ fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
         writeln!(text, "all fields {}° above the axis", row.field_y_deg)?;
     }
     if let Some(bank) = &set.bank {
-        writeln!(text, "{}", bank.in_words())?;
+        writeln!(text, "{}", bank.summary())?;
     }
     text.push('\n');
     writeln!(

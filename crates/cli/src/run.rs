@@ -255,7 +255,7 @@ fn summary(report: &RunReport, out: &Path) -> String {
         report.irradiance.wavelengths_nm.len(),
         1e3 * report.sensor.exposure_time_s,
         total_s,
-        report.psf_bank.as_ref().map_or_else(String::new, |bank| format!("point spreads: {}\n", bank.in_words())),
+        report.psf_bank.as_ref().map_or_else(String::new, |bank| format!("point spreads: {}\n", bank.summary())),
         out.join("report.html").display(),
     )
 }

@@ -106,7 +106,7 @@ pub enum ForwardError {
     /// A depth that lies inside the lens.
     #[error(
         "the scene is {depth_m:.5} m away{}, which lies inside {lens}: its first surface is {least_m:.4} m from its entrance pupil, where depth begins",
-        in_words(*.place)
+        summary(*.place)
     )]
     DepthInsideLens {
         /// The depth, m.
@@ -154,7 +154,7 @@ pub enum ForwardError {
     },
 }
 
-fn in_words(place: Option<(usize, usize)>) -> String {
+fn summary(place: Option<(usize, usize)>) -> String {
     place.map_or_else(String::new, |(row, column)| format!(" at row {row}, column {column}"))
 }
 

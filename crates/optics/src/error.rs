@@ -186,7 +186,7 @@ pub enum OpticsError {
         known: String,
     },
     /// A name that means several things.
-    #[error("{kind} '{name}' could be {}; name one of them", in_words(candidates))]
+    #[error("{kind} '{name}' could be {}; name one of them", summary(candidates))]
     Ambiguous {
         /// What was looked for.
         kind: &'static str,
@@ -224,7 +224,7 @@ pub enum OpticsError {
 }
 
 /// Joins names as `a, b or c`.
-fn in_words(names: &[String]) -> String {
+fn summary(names: &[String]) -> String {
     match names {
         [first @ .., last] if !first.is_empty() => format!("{} or {last}", first.join(", ")),
         _ => names.concat(),

@@ -1,4 +1,4 @@
-//! What glass swallows: extinction coefficients of the built-in catalogue, and the light that media let through.
+//! Internal absorption of glass: extinction coefficients of the built-in catalogue, and the light that media let through.
 
 use std::{collections::HashMap, sync::LazyLock};
 
@@ -90,12 +90,12 @@ fn within(grid_nm: &[f64], wavelength_nm: f64) -> bool {
     matches!((grid_nm.first(), grid_nm.last()), (Some(first), Some(last)) if (*first..=*last).contains(&wavelength_nm))
 }
 
-/// Returns what a medium of this extinction coefficient swallows on its way, 1/mm.
+/// Returns the absorption coefficient of a medium of this extinction coefficient, 1/mm.
 fn absorption_per_mm(k: f64, wavelength_nm: f64) -> f64 {
     4.0 * std::f64::consts::PI * k / (1e-6 * wavelength_nm)
 }
 
-/// What the media of a lens swallow at one wavelength.
+/// Internal absorption of the media of a lens at one wavelength.
 ///
 /// It stands beside the lens, so that a trace that does not ask for it pays nothing.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,7 +109,7 @@ pub struct Absorption {
 }
 
 impl Lens {
-    /// Returns what the media of the lens swallow at a wavelength.
+    /// Returns the internal absorption of the media of the lens at a wavelength.
     ///
     /// A medium whose extinction is not known counts as clear; [`unknown_behind`](Absorption::unknown_behind) names it.
     ///

@@ -50,7 +50,7 @@ pub fn glass_rows(part: &str) -> Vec<GlassRow> {
 pub fn glass_data(name: &str, wavelengths_nm: &[f64]) -> Result<GlassData, PipelineError> {
     let found = GlassCatalogue::built_in().find(name)?;
     let indices = wavelengths_nm.iter().map(|&nm| found.glass.index_at(nm)).collect::<Result<_, _>>()?;
-    // Of a glass of the catalogue its name is looked up, for what it swallows is listed by names.
+    // Of a glass of the catalogue its name is looked up, for its internal absorption is listed by names.
     let named = Glass::Named(found.full_name());
     let transmittances_10_mm = wavelengths_nm.iter().map(|&nm| named.internal_transmittance(nm, 10.0)).collect();
     Ok(GlassData { glass: row(found), wavelengths_nm: wavelengths_nm.to_vec(), indices, transmittances_10_mm })

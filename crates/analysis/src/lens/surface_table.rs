@@ -31,7 +31,7 @@ pub fn surface_rows(lens: &Lens) -> Vec<SurfaceRow> {
         thickness_mm: interface.thickness_after_mm,
         medium_after: interface.medium_after.describe(),
         diameter_mm: 2.0 * interface.surface.semi_aperture_mm,
-        remarks: shape_in_words(&interface.surface).into_iter().chain(openings_in_words(lens, surface)).collect(),
+        remarks: shape_summary(&interface.surface).into_iter().chain(openings_summary(lens, surface)).collect(),
     };
     lens.interfaces().iter().enumerate().map(row).collect()
 }
@@ -68,7 +68,7 @@ fn radius_mm(curvature_per_mm: f64) -> f64 {
 }
 
 /// Returns what a shape is beside its radius; nothing for a sphere or a plane.
-fn shape_in_words(surface: &Surface) -> Option<String> {
+fn shape_summary(surface: &Surface) -> Option<String> {
     let along_x = |curvature_per_mm: f64| format!("radius {} mm along x", number(radius_mm(curvature_per_mm)));
     Some(match &surface.shape {
         Shape::Sphere => return None,
@@ -112,9 +112,9 @@ fn terms(variable: &str, coefficients: &[f64], power: impl Fn(usize) -> usize) -
     terms.map(|(i, a)| format!(", {:e} {variable}{}", short(*a), raised(power(i)))).collect()
 }
 
-fn openings_in_words(lens: &Lens, surface: usize) -> Vec<String> {
+fn openings_summary(lens: &Lens, surface: usize) -> Vec<String> {
     let of_surface = lens.apertures().iter().filter(|aperture| aperture.surface == surface);
-    let in_words = |aperture: &dioptric_optics::Aperture| {
+    let summary = |aperture: &dioptric_optics::Aperture| {
         let what = if aperture.is_obscuration { "obscuration" } else { "opening" };
         let outline = match aperture.outline {
             Outline::Circle { radius_mm } => format!("circle of {} mm across", 2.0 * radius_mm),
@@ -131,7 +131,7 @@ fn openings_in_words(lens: &Lens, surface: usize) -> Vec<String> {
         };
         format!("{what}: {outline}{place}")
     };
-    of_surface.map(in_words).collect()
+    of_surface.map(summary).collect()
 }
 
 #[cfg(test)]

@@ -73,7 +73,7 @@ pub(super) enum Beam {
 
 impl Beam {
     /// Returns what is stated, for messages.
-    fn in_words(self) -> String {
+    fn summary(self) -> String {
         match self {
             Self::Stop => "the stop".to_owned(),
             Self::EntrancePupil(diameter_mm) => format!("the stated entrance pupil of {diameter_mm} mm"),
@@ -270,7 +270,7 @@ impl System {
         if semi_aperture_mm > 0.0 && semi_aperture_mm.is_finite() {
             return Ok(semi_aperture_mm);
         }
-        let (beam, pupil_mm) = (beam.in_words(), ratio * first.entrance_pupil_diameter_mm);
+        let (beam, pupil_mm) = (beam.summary(), ratio * first.entrance_pupil_diameter_mm);
         Err(plain(&format!(
             "{beam} makes an entrance pupil of {pupil_mm} mm and a stop of {} mm; expected positive ones",
             2.0 * semi_aperture_mm

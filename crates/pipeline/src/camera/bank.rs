@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{PipelineError, number};
 
-/// Places at which the error of a bank is measured: few, for it is told of every run.
+/// Places at which the error of a bank is measured: few, for it is measured in every run.
 const N_PLACES: usize = 24;
 /// The most samples of a bank that is to be as good as asked for: some 100 MB.
 const MOST_SAMPLES: usize = 4000;
@@ -107,8 +107,8 @@ impl BankData {
         })
     }
 
-    /// Says it in one line.
-    pub fn in_words(&self) -> String {
+    /// Returns it in one line.
+    pub fn summary(&self) -> String {
         let kind = match self.interpolation {
             "rays" => "rays interpolated between",
             _ => "pictures blended between",
@@ -144,13 +144,13 @@ mod tests {
         let [rays, within, paper] =
             [BankChoice::Standard, BankChoice::Within { error: 0.02 }, BankChoice::Paper].map(data);
         for data in [&rays, &within, &paper] {
-            println!("{}", data.in_words());
+            println!("{}", data.summary());
         }
         let n = |data: &BankData| data.n_fields * data.n_depths * data.n_wavelengths;
         assert_eq!((n(&rays), n(&paper)), (324, 324));
         assert!(n(&within) < 324 && within.median_error <= 0.02, "{within:?}");
         assert!(rays.median_error < 0.01 && paper.median_error > 20.0 * rays.median_error, "{rays:?} {paper:?}");
-        assert!(paper.in_words().starts_with("pictures blended") && !within.in_words().contains("asked for"));
+        assert!(paper.summary().starts_with("pictures blended") && !within.summary().contains("asked for"));
         assert!(build(BankChoice::Within { error: -1.0 }).is_err());
     }
 }

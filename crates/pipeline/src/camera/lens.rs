@@ -106,7 +106,7 @@ pub struct LensReading {
 }
 
 impl LensReading {
-    /// Returns it as what reads the files is told.
+    /// Returns it as options of the lens readers.
     fn options(&self) -> Result<ReadOptions, PipelineError> {
         let catalogues = self.glasses.iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
         Ok(ReadOptions { catalogues, missing_glass: self.missing_glass, seq_numbers: self.seq_numbers })

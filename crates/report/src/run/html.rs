@@ -158,7 +158,7 @@ fn spreads(page: &Page<'_>, (mosaic, src): &(PsfMosaic, String)) -> String {
         let _ = write!(html, "<div>{field_deg:.1}°</div>");
     }
     html.push_str("</div>\n</div>\n");
-    let sampling = page.report.psf_bank.as_ref().map(BankData::in_words);
+    let sampling = page.report.psf_bank.as_ref().map(BankData::summary);
     let sampling = sampling.map_or(String::new(), |words| format!(" Sampling: {}.", escaped(&words)));
     html += &note(&format!(
         "A white point of equal energy, as an observer sees its image. Depths are at the left, with the width of the \
