@@ -5,8 +5,9 @@ use dioptric_pipeline::{
     BlurChoice, Camera, Capture, Diffraction, FilmChoice, FocusChoice, KeptCamera, Quality, SceneSource, SensorChoice,
     Silent, StageCounts, StopChoice, WavelengthChoice, with_exposure_s,
 };
+use dioptric_scene::{ExrParts, write_spectral_exr};
 use dioptric_sensor::WhiteBalance;
-use dioptric_spectrum::{Bands, Cancel};
+use dioptric_spectrum::{Bands, Cancel, Quantity, SpectralImage, WavelengthGrid};
 
 /// The demo on a film of 48 × 32 pixels and three bands.
 fn small() -> Camera {
@@ -176,4 +177,40 @@ fn preview_shows_the_full_picture() {
     let rms = (squares / few.len() as f64).sqrt();
     println!("rms {rms:.4} of full scale");
     assert!(rms < 0.03, "{rms}");
+}
+
+/// What a header stands for is in another file: a change of that is a change of the scene.
+#[test]
+fn changed_scene_file_is_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.exr");
+    let paint = |level: f32| {
+        let grid = WavelengthGrid::uniform(450.0, 650.0, 100.0).unwrap();
+        let planes = vec![ndarray::Array2::from_elem((36, 54), level); 3];
+        let radiance = SpectralImage::new(Quantity::Radiance, grid, planes).unwrap();
+        write_spectral_exr(&path, &radiance, &ExrParts::default()).unwrap();
+    };
+    paint(0.01);
+    let mut camera = small();
+    camera.scene = dioptric_pipeline::SceneChoice::of_file(path.clone());
+    camera.scene.depth_m = Some(2.0);
+    camera.scene.field_of_view_deg = Some(34.0);
+    let kept = KeptCamera::new(camera);
+    let first = capture(&kept);
+    capture(&kept);
+    assert_eq!(kept.stage_counts().irradiance, 1);
+    first.irradiance.write_exr(&folder.path().join("irradiance.exr")).unwrap();
+    kept.write_resume_file(&first, folder.path()).unwrap();
+    assert!(KeptCamera::resume(folder.path()).unwrap().notes.is_empty());
+
+    // Another time of change is another file, were it as long.
+    paint(0.02);
+    let later = std::time::SystemTime::now() + std::time::Duration::from_secs(5);
+    std::fs::File::options().append(true).open(&path).unwrap().set_modified(later).unwrap();
+    let second = capture(&kept);
+    assert_eq!(kept.stage_counts().irradiance, 2);
+    let ratio = second.irradiance.summary.mean[1] / first.irradiance.summary.mean[1];
+    assert!((ratio - 2.0).abs() < 1e-5, "{ratio}");
+    let notes = KeptCamera::resume(folder.path()).unwrap().notes;
+    assert!(notes.len() == 1 && notes[0].contains("scene.exr"), "{notes:?}");
 }

@@ -322,7 +322,7 @@ impl Camera {
         self.scene.check(checker)
     }
 
-    fn resolve_paths(&mut self, folder: &Path) {
+    pub(crate) fn resolve_paths(&mut self, folder: &Path) {
         if let LensChoice::File(path) = &mut self.lens {
             *path = folder.join(&path);
         }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dioptric_forward::ImagingPlan;
+use dioptric_forward::{ImagingPlan, check_depth_map};
 use dioptric_psf::LensImageModel;
 use dioptric_scene::Scene;
 use dioptric_sensor::{Developed, ElectronRate, Processing, Sensor};
@@ -322,6 +322,11 @@ impl Chain<'_> {
             // Every medium must be known at every band before rays are traced.
             let grid = summary.grid()?;
             check_glasses(&lens, Some(&grid))?;
+            // The scene itself can tell where it is too near; a continued run has been through this.
+            let resolved = self.kept.scene.get(scene);
+            if let Some(depth) = resolved.as_ref().and_then(|resolved| resolved.scene.depth.as_ref()) {
+                check_depth_map(&lens.lens, &grid, depth)?;
+            }
             self.watch.progress.at(Stage::Lens, 0.0);
             bank::build(inputs, &lens, &place, (summary.near_m, summary.far_m), &grid, &self.watch)
         })

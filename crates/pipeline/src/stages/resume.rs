@@ -43,9 +43,14 @@ impl KeptCamera {
     /// # Errors
     /// When the file cannot be written.
     pub fn write_resume_file(&self, capture: &Capture, folder: &Path) -> Result<(), PipelineError> {
-        let inputs = self.irradiance_inputs()?;
+        let unknown =
+            |e: std::io::Error| PipelineError::Write { path: folder.join(RESUME_FILE), reason: e.to_string() };
+        // The run may be continued from another folder.
+        let here = std::env::current_dir().map_err(unknown)?;
+        let camera = self.with(|camera| camera.resolve_paths(&here));
+        let inputs = camera.irradiance_inputs()?;
         let kept = Kept {
-            camera: self.camera().clone(),
+            camera: camera.camera().clone(),
             files: inputs.files().cloned().collect(),
             scene: (*capture.scene).clone(),
             place: (*capture.place).clone(),

@@ -27,6 +27,21 @@ pub(crate) struct FileStamp {
 }
 
 impl FileStamp {
+    /// Returns the stamps of all that reading a path may read: the files of a folder, or a file and those beside it that
+    /// differ in their ending alone (the samples of a header, the glasses of a lens).
+    fn all_of(path: &Path) -> Vec<Self> {
+        let folder = if path.is_dir() { Some(path) } else { path.parent() };
+        let folder = folder.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let entries = fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+        let mut beside: Vec<PathBuf> = match path.is_dir() {
+            true => entries.collect(),
+            false => entries.filter(|entry| entry.file_stem() == path.file_stem() && entry.is_file()).collect(),
+        };
+        beside.retain(|entry| entry.file_name() != path.file_name());
+        beside.sort();
+        std::iter::once(path).chain(beside.iter().map(PathBuf::as_path)).map(Self::of).collect()
+    }
+
     fn of(path: &Path) -> Self {
         let state = fs::metadata(path).ok().map(|data| (data.len(), data.modified().ok()));
         Self { path: path.to_owned(), state }
@@ -140,8 +155,8 @@ pub(crate) struct PictureInputs {
 impl LensInputs {
     pub(crate) fn of(camera: &Camera) -> Self {
         let lens_file = match &camera.lens {
-            LensChoice::File(path) => Some(FileStamp::of(path)),
-            _ => None,
+            LensChoice::File(path) => FileStamp::all_of(path),
+            _ => Vec::new(),
         };
         let catalogues = camera.lens_reading.glasses.iter().map(|path| FileStamp::of(path));
         Self {
@@ -165,7 +180,7 @@ impl SceneInputs {
                 wavelengths: camera.wavelengths.clone(),
                 quality,
                 files: match &scene.source {
-                    SceneSource::File(path) => vec![FileStamp::of(path)],
+                    SceneSource::File(path) => FileStamp::all_of(path),
                     _ => Vec::new(),
                 },
             },
