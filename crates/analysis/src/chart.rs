@@ -7,7 +7,7 @@ use std::fmt::Write;
 pub struct Series {
     /// Name in the legend; none for a line that needs no entry.
     pub label: Option<String>,
-    /// Colour, `#rrggbb`.
+    /// Color, `#rrggbb`.
     pub color: String,
     /// Points x, y in the plot's units.
     pub points: Vec<(f64, f64)>,

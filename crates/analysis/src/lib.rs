@@ -16,11 +16,11 @@ mod run;
 pub use chart::{Corner, LineChart, Scale, Series};
 pub use lens::{
     AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ConvertedLens, FanRow, FieldPlace, FieldRow,
-    FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis, LensData, LensQuestion, LensRow,
-    LensUse, OpdMap, PlaneData, PupilRow, RayTable, SpotRow, SurfaceRow, TraceError, TraceSettings, WavefrontRow,
-    built_in_lenses, convert_lens, glass_data, glass_rows, placement_lines, surface_rows,
+    FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis, LensData, LensDefaults,
+    LensInfoRequest, LensRow, OpdMap, PlaneData, PupilRow, RayTable, SpotRow, SurfaceRow, TraceError, TraceSettings,
+    WavefrontRow, built_in_lenses, convert_lens, glass_data, glass_rows, placement_lines, surface_rows,
 };
-pub use psf::{MtfRow, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, WholeLight, psf_csv};
+pub use psf::{MtfRow, PolychromaticPsf, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, psf_csv};
 pub use run::{
     ChannelStatistics, FilmData, IrradianceData, LossRow, Run, RunCharts, RunPlaces, RunReport, SceneData,
     SensorStatistics,

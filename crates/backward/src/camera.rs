@@ -178,7 +178,7 @@ pub(crate) fn renormalized(direction: Vec3) -> Vec3 {
     direction * (1.5 - 0.5 * direction.length_squared())
 }
 
-/// Returns a point of the unit disc, evenly spread, neighbours staying neighbours (Shirley & Chiu 1997).
+/// Returns a point of the unit disc, evenly spread, neighbors staying neighbors (Shirley & Chiu 1997).
 pub(crate) fn on_disc(u: f64, v: f64) -> DVec2 {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
     let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);

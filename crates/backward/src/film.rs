@@ -68,7 +68,7 @@ impl Film {
     /// Returns how many passes each pixel needs until its relative standard error, over all bands, is `noise`; between
     /// those that it has had and `most`.
     ///
-    /// What a pixel needs is judged by its neighbours and never by itself: a pixel whose first passes happened to miss
+    /// What a pixel needs is judged by its neighbors and never by itself: a pixel whose first passes happened to miss
     /// something bright would else stop too soon, and the picture would be too dark.
     pub(crate) fn passes_needed(&self, noise: f64, most: u32) -> Vec<u32> {
         let of_pixel = |pixel: usize| {
@@ -102,7 +102,7 @@ impl Film {
     }
 }
 
-/// How far the neighbours of a pixel reach that say what it needs.
+/// How far the neighbors of a pixel reach that say what it needs.
 const REACH: usize = 3;
 
 #[cfg(test)]

@@ -118,7 +118,7 @@ impl LensCamera {
     }
 
     /// Returns the film place of a place in a pixel, mm, along the film's own axes: the lens turns the picture.
-    pub(crate) fn film_mm(&self, pixel: usize, in_pixel: [f64; 2]) -> DVec2 {
+    pub(crate) fn on_film_mm(&self, pixel: usize, in_pixel: [f64; 2]) -> DVec2 {
         let [s, t] = self.settings.pixels.share(pixel, in_pixel);
         DVec2::new(0.5 - s, t - 0.5) * self.settings.film_size_mm
     }
@@ -150,10 +150,10 @@ impl LensCamera {
         let film = self.lenses[self.lenses.len() / 2].forward();
         for &PixelSample { pixel, random } in samples {
             let [x, y, u, v] = random.camera();
-            let film_mm = self.film_mm(pixel, [x, y]);
+            let on_film_mm = self.on_film_mm(pixel, [x, y]);
             let aim = film
-                .film_site(film_mm, self.settings.film_distance_mm)
-                .zip(self.bounds.sample(film_mm, DVec2::new(u, v)));
+                .film_site(on_film_mm, self.settings.film_distance_mm)
+                .zip(self.bounds.sample(on_film_mm, DVec2::new(u, v)));
             let Some((site, pupil)) = aim else {
                 weights.push(0.0);
                 start.push(DVec3::ZERO, -DVec3::Z);
@@ -198,23 +198,25 @@ impl LensCamera {
         let (plane, film_distance_mm) = (self.bounds.plane(), self.settings.film_distance_mm);
         let sites: Vec<_> = pixels
             .iter()
-            .map(|&pixel| lens.forward().film_site(self.film_mm(pixel, [0.5; 2]), film_distance_mm))
+            .map(|&pixel| lens.forward().film_site(self.on_film_mm(pixel, [0.5; 2]), film_distance_mm))
             .collect();
         let mut aims_mm: Vec<DVec2> = vec![DVec2::ZERO; pixels.len()];
         let rays_to = |aims_mm: &[DVec2], moved_mm: DVec2| {
             let mut rays = RayBatch::with_capacity(aims_mm.len());
             for (aim_mm, site) in aims_mm.iter().zip(&sites) {
-                let point_mm = plane.to_lens((*aim_mm + moved_mm).extend(0.0));
+                let point_mm = plane.lens_from_surface((*aim_mm + moved_mm).extend(0.0));
                 let from_mm = site.map_or(point_mm + plane.rotation.z_axis, |site| site.point_mm);
                 rays.push(point_mm, (point_mm - from_mm).normalize(), 0.0);
             }
             rays
         };
-        let stop_pose = lens.stop_pose();
+        let stop_placement = lens.stop_placement();
         let at_stop = |aims_mm: &[DVec2], moved_mm: DVec2| {
             let mut rays = rays_to(aims_mm, moved_mm);
             lens.trace_to_stop(&mut rays, Vignetting::Off);
-            let place = |i: usize| rays.fate[i].is_in_flight().then(|| stop_pose.to_own(rays.point_mm(i)).truncate());
+            let place = |i: usize| {
+                rays.fate[i].is_in_flight().then(|| stop_placement.surface_from_lens(rays.point_mm(i)).truncate())
+            };
             (0..rays.len()).map(place).collect::<Vec<Option<DVec2>>>()
         };
         for _ in 0..NEWTON_STEPS {
@@ -263,11 +265,12 @@ fn is_achromatic(lens: &Lens, wavelengths_nm: &[f64]) -> Result<bool, BackwardEr
 fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, samples: &[PixelSample]) {
     let forward = lens.forward();
     let edge = CircularStop::new(forward.stop_semi_aperture_mm(), forward.wavelength_nm(), forward.stop_medium_index());
-    let pose = lens.stop_pose();
-    let to_own = pose.rotation.transpose();
+    let placement = lens.stop_placement();
+    let surface_from_lens = placement.rotation.transpose();
     for (i, sample) in samples.iter().enumerate().filter(|(i, _)| rays.fate[*i].is_in_flight()).collect::<Vec<_>>() {
-        let point_mm = pose.to_own(Vec3::new(rays.x_mm[i], rays.y_mm[i], rays.z_mm[i]).as_dvec3()).truncate();
-        let before = to_own * Vec3::new(rays.l[i], rays.m[i], rays.n[i]).as_dvec3();
+        let point_mm =
+            placement.surface_from_lens(Vec3::new(rays.x_mm[i], rays.y_mm[i], rays.z_mm[i]).as_dvec3()).truncate();
+        let before = surface_from_lens * Vec3::new(rays.l[i], rays.m[i], rays.n[i]).as_dvec3();
         let r_mm = point_mm.length();
         let AngularSpread { radial, across } = model.spread(r_mm, edge);
         let axis = if r_mm > 0.0 { point_mm / r_mm } else { DVec2::X };
@@ -278,7 +281,7 @@ fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, samples: &
             let rest = 1.0 - cosines.length_squared();
             (rest > 0.0).then(|| cosines.extend(-rest.sqrt()))
         });
-        let after = (pose.rotation * drawn.unwrap_or(before)).as_vec3();
+        let after = (placement.rotation * drawn.unwrap_or(before)).as_vec3();
         (rays.l[i], rays.m[i], rays.n[i]) = after.into();
     }
 }

@@ -109,7 +109,7 @@ impl<'a> Renderer<'a> {
     /// Decides once, from the passes made so far, how many each pixel is to have in all: as many as give it this relative
     /// standard error, at most `most`. At least two passes must have been made.
     ///
-    /// The number is decided by a pixel's neighbours alone, so that the picture stays without bias.
+    /// The number is decided by a pixel's neighbors alone, so that the picture stays without bias.
     ///
     /// # Errors
     /// When the noise is not above 0, or too few passes have been made to judge.

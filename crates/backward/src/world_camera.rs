@@ -67,7 +67,7 @@ impl Camera {
                 let film_distance_mm = match (film_distance_mm, focus_distance_m) {
                     (Some(film_distance_mm), _) => *film_distance_mm,
                     (None, Some(focus_m)) => film_distance_for(&lens, *focus_m)?,
-                    (None, None) => lens.at(FOCUS_NM)?.film_mm_for(f64::INFINITY)?,
+                    (None, None) => lens.at(FOCUS_NM)?.film_distance_mm_for(f64::INFINITY)?,
                 };
                 let size = DVec2::new(columns as f64, rows as f64);
                 let settings = LensCameraSettings {
@@ -115,11 +115,11 @@ fn half_tangents(fov_deg: f64, pixels: PixelGrid, window: Option<[f64; 4]>) -> R
 /// plane.
 fn film_distance_for(lens: &Lens, focus_m: f64) -> Result<f64, BackwardError> {
     let mono = lens.at(FOCUS_NM)?;
-    let mut film_mm = mono.film_mm_for(f64::INFINITY)?;
+    let mut film_distance_mm = mono.film_distance_mm_for(f64::INFINITY)?;
     for _ in 0..FOCUS_STEPS {
-        film_mm = mono.film_mm_for(1e3 * focus_m - mono.last_vertex_z_mm() - film_mm)?;
+        film_distance_mm = mono.film_distance_mm_for(1e3 * focus_m - mono.last_vertex_z_mm() - film_distance_mm)?;
     }
-    Ok(film_mm)
+    Ok(film_distance_mm)
 }
 
 /// Steps of focusing: each is off by the square of the magnification of the one before.
@@ -171,9 +171,9 @@ mod tests {
         let read = |_: &str| Lens::built_in("dgauss-50mm");
         let Ok(Camera::Lens(camera)) = Camera::from_world(&of(lens(Some(1.0))), &bands(), &read) else { panic!() };
         let mono = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
-        let film_mm = camera.settings().film_distance_mm;
-        let object_mm = mono.object_distance_mm_for(film_mm).unwrap();
-        assert!((object_mm + mono.last_vertex_z_mm() + film_mm - 1_000.0).abs() < 1e-6);
+        let film_distance_mm = camera.settings().film_distance_mm;
+        let object_mm = mono.object_distance_mm_for(film_distance_mm).unwrap();
+        assert!((object_mm + mono.last_vertex_z_mm() + film_distance_mm - 1_000.0).abs() < 1e-6);
         assert!((camera.settings().film_size_mm - DVec2::new(8.944_271_9, 4.472_136)).length() < 1e-6);
     }
 }

@@ -101,9 +101,13 @@ fn uniform_plane_follows_working_f_number() {
         let lens = gauss.with_f_number(f_number, 550.0).unwrap();
         let mono = lens.at(550.0).unwrap();
         for distance_mm in [8_000.0, 500.0] {
-            let film_mm = mono.film_mm_for(distance_mm).unwrap();
-            let picture =
-                render(&sky(), &camera(&lens, &bands, lens_settings(film_mm, 0.05, 1)), settings(&bands, 4096), 6);
+            let film_distance_mm = mono.film_distance_mm_for(distance_mm).unwrap();
+            let picture = render(
+                &sky(),
+                &camera(&lens, &bands, lens_settings(film_distance_mm, 0.05, 1)),
+                settings(&bands, 4096),
+                6,
+            );
             let expected = PI / (4.0 * mono.working_f_number(distance_mm).powi(2));
             let (found, error) = mean(&picture, 0);
             assert!(error < 7e-4 * expected, "f/{f_number}: {}", error / expected);
@@ -233,10 +237,10 @@ fn picture_is_upright() {
     let world = builder.build().unwrap();
     let bands = bands(&[550.0]);
     let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(8.0, 550.0).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2_000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2_000.0).unwrap();
     let view = pinhole(16, 0.16);
     let thin = ThinLens { view, radius_m: 0.003, focus_distance_m: 2.0 };
-    let through_lens = camera(&lens, &bands, lens_settings(film_mm, 16.0, 16));
+    let through_lens = camera(&lens, &bands, lens_settings(film_distance_mm, 16.0, 16));
     for camera in [through_lens, Camera::Pinhole(view), Camera::ThinLens(thin)] {
         let picture = render(&world, &camera, settings(&bands, 16), 2);
         let plane = &picture.picture.planes()[0];
@@ -258,14 +262,14 @@ fn knife_edge_has_the_forward_kernel() {
     let bands = bands(&[550.0]);
     let lens = Lens::thin(50.0, 50.0 / 16.0).unwrap();
     let mono = lens.at(550.0).unwrap();
-    let film_mm = mono.film_mm_for(2_000.0).unwrap();
+    let film_distance_mm = mono.film_distance_mm_for(2_000.0).unwrap();
     let (n_pixels, film_um) = (40, 80.0);
-    let mut of_lens = lens_settings(film_mm, 1e-3 * film_um, n_pixels);
+    let mut of_lens = lens_settings(film_distance_mm, 1e-3 * film_um, n_pixels);
     of_lens.pixels = of_lens.pixels.cropped((0, 18), (n_pixels, 4)).unwrap();
     of_lens.diffraction = Some(Hurb::PAPER);
     let picture = render(&world, &camera(&lens, &bands, of_lens), settings(&bands, 64), 16);
     let unit_um = 0.55 * mono.working_f_number(2_000.0);
-    let lit = disc_irradiance(50.0 / 32.0, film_mm, 0.0);
+    let lit = disc_irradiance(50.0 / 32.0, film_distance_mm, 0.0);
     // The integral of the line spread up to the edges and the middles of the pixels, by Simpson's rule.
     let half_step = 0.5 * film_um / n_pixels as f64 / unit_um;
     let lsf = |at: f64| Hurb::PAPER.lsf(at);
@@ -428,9 +432,9 @@ fn depth_is_from_the_entrance_pupil() {
     let world = builder.build().unwrap();
     let bands = bands(&[550.0, 650.0]);
     let lens = Lens::built_in("dgauss-50mm").unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2_000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2_000.0).unwrap();
     let view = pinhole(16, 0.16);
-    for camera in [camera(&lens, &bands, lens_settings(film_mm, 16.0, 16)), Camera::Pinhole(view)] {
+    for camera in [camera(&lens, &bands, lens_settings(film_distance_mm, 16.0, 16)), Camera::Pinhole(view)] {
         let seen = auxiliary(&world, &camera, &bands.grid, &Cancel::new()).unwrap();
         for ((row, column), &z_m) in seen.z_m.indexed_iter() {
             let (expected, albedo) = if column >= 8 { (2.0, 0.5) } else { (4.0, 0.25) };

@@ -3,8 +3,10 @@
 use std::{fmt::Write, fs};
 
 use anyhow::Context;
-use dioptric_analysis::{AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensUse};
-use dioptric_pipeline::{Staged, StopChoice, parse_numbers, parse_pairs};
+use dioptric_analysis::{
+    AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensDefaults,
+};
+use dioptric_pipeline::{Staged, StopSpec, parse_numbers, parse_pairs};
 use dioptric_report::{AnalysisPlots, DRAWS_PNG, write_drawing};
 
 use crate::{
@@ -22,7 +24,7 @@ const USUAL_NM: [f64; 3] = [450.0, 550.0, 650.0];
 pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Result<()> {
     let used = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?;
     let request = request(arguments, &used, common)?;
-    let stop = arguments.f_number.map_or(StopChoice::AsGiven, StopChoice::FNumber);
+    let stop = arguments.f_number.map_or(StopSpec::AsGiven, StopSpec::FNumber);
     let lens = stop.apply_at(used.lens, request.reference_nm())?;
     // The place is tried before the work.
     let staged = arguments.out.as_ref().map(|path| Staged::folder(path)).transpose()?.map(guarded);
@@ -59,7 +61,7 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
 }
 
 /// Returns what is asked for; where it is not said, what the lens's file says.
-fn request(arguments: &LensAnalyzeArgs, used: &LensUse, common: &Common) -> anyhow::Result<AnalysisRequest> {
+fn request(arguments: &LensAnalyzeArgs, used: &LensDefaults, common: &Common) -> anyhow::Result<AnalysisRequest> {
     let mut taken = Vec::new();
     let wavelengths_nm = match &arguments.wavelengths_nm {
         Some(list) => parse_numbers("--wavelengths-nm", list)?,
@@ -136,9 +138,9 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
 
 /// Returns what is said of the whole lens.
 fn head(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
-    let LensAnalysis { lens, efl_mm, f_number, film_mm, .. } = analysis;
+    let LensAnalysis { lens, efl_mm, f_number, film_distance_mm, .. } = analysis;
     let mut text =
-        format!("{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}, film {film_mm:.4} mm behind the last vertex\n");
+        format!("{lens}: f = {efl_mm:.4} mm, f/{f_number:.3}, film {film_distance_mm:.4} mm behind the last vertex\n");
     if let Some(x) = analysis.x_plane {
         writeln!(text, "along x: f = {:.4} mm, f/{:.3}", x.efl_mm, x.f_number)?;
     }

@@ -44,7 +44,7 @@ pub(crate) struct Common {
 pub(crate) enum Command {
     /// Runs the whole camera: scene, lens, sensor, picture; with no arguments, the built-in demo
     Run(Box<RunArgs>),
-    /// Lists, describes, analyses, draws and converts lenses
+    /// Lists, describes, analyzes, draws and converts lenses
     #[command(subcommand)]
     Lens(LensCommand),
     /// Lists and describes glasses
@@ -310,8 +310,8 @@ pub(crate) struct PsfArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) plots: Option<PathBuf>,
     /// Adds a row for the light of all wavelengths together to those of each point
-    #[arg(long)]
-    pub(crate) whole_light: bool,
+    #[arg(long, alias = "whole-light")]
+    pub(crate) polychromatic: bool,
     /// Weights of the wavelengths in the light of all together: rows, plots and mosaic [default: all alike]
     #[arg(long, value_name = "LIST")]
     pub(crate) spectral_weights: Option<String>,

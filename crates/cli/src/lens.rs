@@ -4,9 +4,9 @@ use std::{fmt::Write, fs, path::Path};
 
 use anyhow::Context;
 use dioptric_analysis::{
-    LensData, LensQuestion, LensUse, SurfaceRow, built_in_lenses, convert_lens, placement_lines, surface_rows,
+    LensData, LensDefaults, LensInfoRequest, SurfaceRow, built_in_lenses, convert_lens, placement_lines, surface_rows,
 };
-use dioptric_pipeline::{LensReading, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
+use dioptric_pipeline::{LensReadOptions, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
 use dioptric_report::{LensDrawing, check_drawing_name, drawing_file};
 
 use crate::{
@@ -28,11 +28,11 @@ pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> 
 /// Returns the lens with its stop set, and what its file says of its use; tells what is done otherwise than the file says.
 pub(crate) fn open(
     text: &str,
-    reading: &LensReading,
+    reading: &LensReadOptions,
     stop_mm: Option<f64>,
     common: &Common,
-) -> anyhow::Result<LensUse> {
-    let used = LensUse::open(text, reading, stop_mm)?;
+) -> anyhow::Result<LensDefaults> {
+    let used = LensDefaults::open(text, reading, stop_mm)?;
     tell(&used.notes, common);
     Ok(used)
 }
@@ -58,7 +58,7 @@ pub(crate) fn tell_taken(taken: &[String], common: &Common) {
     }
 }
 
-fn convert(input: &str, output: &Path, reading: &LensReading, common: &Common) -> anyhow::Result<()> {
+fn convert(input: &str, output: &Path, reading: &LensReadOptions, common: &Common) -> anyhow::Result<()> {
     let converted = convert_lens(input, output, reading)?;
     tell(&converted.notes, common);
     if let Some(glasses) = converted.glasses {
@@ -124,7 +124,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
         .map(|&wavelength_nm| {
             let LensInfoArgs { distance_mm, field_deg, .. } = *arguments;
             let distance_mm = distance_mm.or(Some(used.distance_mm).filter(|mm| mm.is_finite()));
-            LensData::new(lens, &LensQuestion { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm })
+            LensData::new(lens, &LensInfoRequest { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm })
         })
         .collect::<Result<_, _>>()?;
     if common.json {
@@ -233,7 +233,7 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
         (None, None) => vec![0.0, 10.0],
     };
     tell_taken(&taken, common);
-    let drawing = LensDrawing { fields_deg, distance_mm, wavelengths_nm, film_mm: arguments.film_mm };
+    let drawing = LensDrawing { fields_deg, distance_mm, wavelengths_nm, film_distance_mm: arguments.film_mm };
     let path = &arguments.output;
     let bytes = drawing_file(&drawing.to_svg(&used.lens)?, path)?;
     let staged = guarded(Staged::file(path)?);

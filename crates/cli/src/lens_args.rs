@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
-use dioptric_pipeline::{LensReading, MissingGlass, SeqNumbers};
+use dioptric_pipeline::{LensReadOptions, MissingGlass, SeqNumbers};
 
 /// Something to do with lenses.
 #[derive(Debug, Subcommand)]
@@ -12,7 +12,7 @@ pub(crate) enum LensCommand {
     List,
     /// Prints first-order data and, of a lens with an axis of symmetry, third-order sums
     Info(LensInfoArgs),
-    /// Analyses the lens by real rays: spots, fans, wavefronts, field curvature, distortion, colour, illumination, focus
+    /// Analyzes the lens by real rays: spots, fans, wavefronts, field curvature, distortion, color, illumination, focus
     Analyze(LensAnalyzeArgs),
     /// Draws the lens with rays, as SVG or, in a build with the feature png, PNG
     Draw(LensDrawArgs),
@@ -65,14 +65,14 @@ pub(crate) enum MissingGlassArg {
 }
 
 impl LensReadingArgs {
-    pub(crate) fn reading(&self) -> LensReading {
-        let mut reading = LensReading::default();
+    pub(crate) fn reading(&self) -> LensReadOptions {
+        let mut reading = LensReadOptions::default();
         self.change(&mut reading);
         reading
     }
 
     /// Changes what was asked for.
-    pub(crate) fn change(&self, reading: &mut LensReading) {
+    pub(crate) fn change(&self, reading: &mut LensReadOptions) {
         if !self.glasses.is_empty() {
             reading.glasses.clone_from(&self.glasses);
         }
@@ -115,7 +115,7 @@ pub(crate) struct LensInfoArgs {
     pub(crate) reading: LensReadingArgs,
 }
 
-/// What to analyse of a lens.
+/// What to analyze of a lens.
 #[derive(Debug, Args)]
 pub(crate) struct LensAnalyzeArgs {
     /// Lens, a file or the name of a built-in one

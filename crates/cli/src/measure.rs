@@ -6,13 +6,13 @@ use dioptric_analysis::measure::{
     BenchRequest, ChartMeasurement, ChartRequest, CodeCurve, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest,
     Measurement, NoiseData, PixelRegion, PointRequest, PointSet, measure_bench, measure_frames,
 };
-use dioptric_pipeline::{SensorChoice, Staged, parse_illuminant};
+use dioptric_pipeline::{SensorSpec, Staged, parse_illuminant};
 
 use dioptric_report::write_measurement;
 
 use crate::{
     args::Common,
-    measure_args::{ColourArgs, CurveKind, MeasureCommand, MtfArgs, NoiseArgs, SpotArgs},
+    measure_args::{ColorArgs, CurveKind, MeasureCommand, MtfArgs, NoiseArgs, SpotArgs},
     terminal::{guarded, print, print_json, remark_on_png},
 };
 
@@ -24,7 +24,7 @@ pub(crate) fn run(command: &MeasureCommand, common: &Common) -> anyhow::Result<(
         MeasureCommand::Mtf(arguments) => mtf(arguments, common),
         MeasureCommand::Spot(arguments) => spot(arguments, common),
         MeasureCommand::Noise(arguments) => noise(arguments, common),
-        MeasureCommand::Colour(arguments) => colour(arguments, common),
+        MeasureCommand::Color(arguments) => color(arguments, common),
     }
 }
 
@@ -57,7 +57,7 @@ fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {
         (Some(frames), _) => measure_frames(frames)?,
         (None, Some(sensor)) => {
             let request = BenchRequest {
-                sensor: SensorChoice::named(sensor),
+                sensor: SensorSpec::named(sensor),
                 filter: arguments.filter.clone(),
                 side: arguments.size,
                 n_levels: arguments.levels,
@@ -82,7 +82,7 @@ fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {
     finish.with(&data, noise_table)
 }
 
-fn colour(arguments: &ColourArgs, common: &Common) -> anyhow::Result<()> {
+fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
     let curve = curve(arguments.picture_args.curve);
     let out = arguments.picture_args.out.as_deref();
     if let Some(against) = &arguments.against {
@@ -99,7 +99,7 @@ fn colour(arguments: &ColourArgs, common: &Common) -> anyhow::Result<()> {
         light: arguments.illuminant.as_deref().map(parse_illuminant).transpose()?,
         curve,
     };
-    let finish = Finish::new("colour", out, common)?;
+    let finish = Finish::new("color", out, common)?;
     finish.with(&request.measure(&arguments.picture)?, chart_table)
 }
 

@@ -13,9 +13,9 @@ pub(crate) enum MeasureCommand {
     Spot(SpotArgs),
     /// Photon transfer after EMVA 1288, of flat and dark frames or of a sensor on a simulated bench
     Noise(NoiseArgs),
-    /// Colours of a 24-patch chart (ΔE00), or two pictures compared (S-CIELAB, VSNR, PSNR, SSIM)
-    #[command(alias = "color")]
-    Colour(ColourArgs),
+    /// Colors of a 24-patch chart (ΔE00), or two pictures compared (S-CIELAB, VSNR, PSNR, SSIM)
+    #[command(alias = "colour")]
+    Color(ColorArgs),
 }
 
 /// How a picture is read and where results go.
@@ -32,7 +32,7 @@ pub(crate) struct PictureArgs {
 /// How samples stand for light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum CurveKind {
-    /// Linear for 16-bit grey and EXR, sRGB for everything else
+    /// Linear for 16-bit gray and EXR, sRGB for everything else
     ByFile,
     /// Linear
     Linear,
@@ -67,7 +67,7 @@ pub(crate) struct MtfArgs {
 pub(crate) struct SpotArgs {
     /// Picture: PNG, TIFF, JPEG, EXR
     pub(crate) picture: PathBuf,
-    /// Side of the window about each point, an odd number of pixels [default: half way to its neighbours]
+    /// Side of the window about each point, an odd number of pixels [default: half way to its neighbors]
     #[arg(long, value_name = "N")]
     pub(crate) window: Option<usize>,
     /// Distance between pixels, µm; at 1, lengths are in pixels
@@ -125,7 +125,7 @@ pub(crate) struct NoiseArgs {
 
 /// A chart, or two pictures.
 #[derive(Debug, Args)]
-pub(crate) struct ColourArgs {
+pub(crate) struct ColorArgs {
     /// Picture: PNG, TIFF, JPEG, EXR
     pub(crate) picture: PathBuf,
     /// Corners of the chart, clockwise from the one beside dark skin, pixels [default: found in the picture]

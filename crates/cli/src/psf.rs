@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use dioptric_analysis::{PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
-use dioptric_pipeline::{BankChoice, FocusChoice, Staged, StopChoice, parse_numbers};
+use dioptric_pipeline::{BankSpec, FocusSpec, Staged, StopSpec, parse_numbers};
 use dioptric_report::{chart_svg, write_drawing, write_psfs};
 
 use crate::{
@@ -22,8 +22,8 @@ const SEED: u64 = 1;
 pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     let lens = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?.lens;
     let focus = match (arguments.film.focus_mm, arguments.film.film_mm) {
-        (Some(distance_mm), _) => FocusChoice::DistanceMm(distance_mm),
-        (None, Some(film_mm)) => FocusChoice::FilmMm(film_mm),
+        (Some(distance_mm), _) => FocusSpec::DistanceMm(distance_mm),
+        (None, Some(film_mm)) => FocusSpec::FilmMm(film_mm),
         (None, None) => anyhow::bail!("one of --focus-mm and --film-mm is needed"),
     };
     let request = PsfRequest {
@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
             None => Vec::new(),
         },
     };
-    let stop = arguments.f_number.map_or(StopChoice::AsGiven, StopChoice::FNumber);
+    let stop = arguments.f_number.map_or(StopSpec::AsGiven, StopSpec::FNumber);
     let reference_nm = request.reference_nm(&lens)?;
     let lens = stop.apply_at(lens, reference_nm)?;
     // The place is tried before the work.
@@ -61,8 +61,8 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     bar.show("tracing the lens", 0.0);
     let set = request.compute(&lens)?;
     drop(bar);
-    let rows = match arguments.whole_light {
-        true => with_whole_light(&set, &request.mtf_per_mm),
+    let rows = match arguments.polychromatic {
+        true => with_polychromatic(&set, &request.mtf_per_mm),
         false => set.rows.clone(),
     };
     if let (Some(staged), Some(path)) = (csv, &arguments.csv) {
@@ -89,9 +89,9 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 /// Returns the rows with one more after those of each point: the light of all its wavelengths together.
-fn with_whole_light(set: &PsfSet, mtf_per_mm: &[f64]) -> Vec<PsfRow> {
+fn with_polychromatic(set: &PsfSet, mtf_per_mm: &[f64]) -> Vec<PsfRow> {
     let mut rows = set.rows.clone();
-    for whole in set.whole_light(mtf_per_mm).into_iter().rev() {
+    for whole in set.polychromatic(mtf_per_mm).into_iter().rev() {
         let row = whole.row;
         let of_point = |other: &PsfRow| other.field_deg == row.field_deg && other.distance_mm == row.distance_mm;
         let after = rows.iter().rposition(of_point).map_or(rows.len(), |last| last + 1);
@@ -100,17 +100,18 @@ fn with_whole_light(set: &PsfSet, mtf_per_mm: &[f64]) -> Vec<PsfRow> {
     rows
 }
 
-fn bank(kind: Option<BankKind>, error: Option<f64>) -> Option<BankChoice> {
+fn bank(kind: Option<BankKind>, error: Option<f64>) -> Option<BankSpec> {
     match (kind, error) {
-        (_, Some(error)) => Some(BankChoice::Within { error }),
-        (Some(BankKind::Standard), None) => Some(BankChoice::Standard),
-        (Some(BankKind::Paper), None) => Some(BankChoice::Paper),
+        (_, Some(error)) => Some(BankSpec::Within { error }),
+        (Some(BankKind::Standard), None) => Some(BankSpec::Standard),
+        (Some(BankKind::Paper), None) => Some(BankSpec::Paper),
         (None, None) => None,
     }
 }
 
 fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
-    let mut text = format!("film {:.4} mm behind the last vertex, pixels of {} µm\n", set.film_mm, set.pixel_um);
+    let mut text =
+        format!("film {:.4} mm behind the last vertex, pixels of {} µm\n", set.film_distance_mm, set.pixel_um);
     if let Some(row) = rows.first().filter(|row| row.field_y_deg != 0.0) {
         writeln!(text, "all fields {}° above the axis", row.field_y_deg)?;
     }
@@ -139,7 +140,7 @@ fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
             "{:>9.3} {:>12.1} {:>8} {:>12} {:>12} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>10.3} {:>8.4}",
             row.field_deg,
             row.distance_mm,
-            if row.is_whole_light { "all".to_owned() } else { format!("{:.1}", row.wavelength_nm) },
+            if row.is_polychromatic { "all".to_owned() } else { format!("{:.1}", row.wavelength_nm) },
             fixed(row.centroid_x_mm, 5),
             fixed(row.centroid_y_mm, 5),
             row.rms_radius_um,

@@ -9,9 +9,9 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
-    BankChoice, BlurChoice, Camera, Diffraction, FilmChoice, FocusChoice, FrameFile, FramesChoice, KeptCamera,
-    LensChoice, LensReading, Progress, Quality, SceneChoice, SensorChoice, SensorOptions, Stage, Staged, StopChoice,
-    WavelengthChoice, parse_illuminant, parse_numbers, with_exposure_s,
+    BankSpec, BlurSpec, Camera, Diffraction, FilmSpec, FocusSpec, FrameFile, FramesSpec, KeptCamera, LensReadOptions,
+    LensSpec, Progress, Quality, SceneSpec, SensorOptions, SensorSpec, Stage, Staged, StopSpec, WavelengthSpec,
+    parse_illuminant, parse_numbers, with_exposure_s,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
@@ -67,7 +67,7 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera>
         change_demo(&mut camera, arguments);
     }
     if let Some(scene) = &arguments.scene {
-        camera.scene = SceneChoice::of_file(scene.clone());
+        camera.scene = SceneSpec::of_file(scene.clone());
     }
     change_scene(&mut camera, arguments)?;
     change_lens(&mut camera, arguments)?;
@@ -76,7 +76,7 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera>
         camera.seed = seed;
     }
     if let Some(list) = &arguments.wavelengths_nm {
-        camera.wavelengths = WavelengthChoice::ListNm(parse_numbers("--wavelengths-nm", list)?);
+        camera.wavelengths = WavelengthSpec::ListNm(parse_numbers("--wavelengths-nm", list)?);
     }
     let quality = match arguments.quality {
         QualityKind::Preview => Quality::Preview,
@@ -89,15 +89,15 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera>
 /// Changes what the demo has for its own lens and scene alone: the film and the name, and with the scene focus and bands.
 fn change_demo(camera: &mut Camera, arguments: &RunArgs) {
     if arguments.scene.is_some() {
-        camera.focus = FocusChoice::NearObject;
-        camera.wavelengths = WavelengthChoice::Scene;
+        camera.focus = FocusSpec::NearObject;
+        camera.wavelengths = WavelengthSpec::Scene;
     }
     if arguments.scene.is_some() || arguments.lens.is_some() {
-        camera.film = FilmChoice::Scene;
+        camera.film = FilmSpec::Scene;
     }
     let scene = arguments.scene.as_deref().map_or_else(|| "Still life".to_owned(), stem_of);
-    let lens = match arguments.lens.as_deref().map(LensChoice::named) {
-        Some(LensChoice::File(path)) => stem_of(&path),
+    let lens = match arguments.lens.as_deref().map(LensSpec::named) {
+        Some(LensSpec::File(path)) => stem_of(&path),
         Some(_) => arguments.lens.clone().unwrap_or_default(),
         None => "50 mm double Gauss".to_owned(),
     };
@@ -130,23 +130,23 @@ fn change_scene(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> 
 
 fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
     if let Some(lens) = &arguments.lens {
-        camera.lens = LensChoice::named(lens);
+        camera.lens = LensSpec::named(lens);
         // The f-number in the file was meant for another lens, and so was what it says of glasses.
-        camera.stop = StopChoice::AsGiven;
-        camera.lens_reading = LensReading::default();
+        camera.stop = StopSpec::AsGiven;
+        camera.lens_reading = LensReadOptions::default();
     }
     arguments.reading.change(&mut camera.lens_reading);
     if let Some(n) = arguments.f_number {
-        camera.stop = StopChoice::FNumber(n);
+        camera.stop = StopSpec::FNumber(n);
     }
     if let Some(d) = arguments.stop_mm {
-        camera.stop = StopChoice::DiameterMm(d);
+        camera.stop = StopSpec::DiameterMm(d);
     }
     if let Some(d) = arguments.focus_mm {
-        camera.focus = FocusChoice::DistanceMm(d);
+        camera.focus = FocusSpec::DistanceMm(d);
     }
     if let Some(d) = arguments.film_mm {
-        camera.focus = FocusChoice::FilmMm(d);
+        camera.focus = FocusSpec::FilmMm(d);
     }
     arguments.movements.change(&mut camera.movements);
     if let Some(kind) = arguments.diffraction {
@@ -155,17 +155,17 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
     camera.diffraction = with_gamma(camera.diffraction, arguments.gamma)?;
     if let Some(kind) = arguments.bank {
         camera.bank = match kind {
-            BankKind::Standard => BankChoice::Standard,
-            BankKind::Paper => BankChoice::Paper,
+            BankKind::Standard => BankSpec::Standard,
+            BankKind::Paper => BankSpec::Paper,
         };
     }
     if let Some(error) = arguments.bank_error {
-        camera.bank = BankChoice::Within { error };
+        camera.bank = BankSpec::Within { error };
     }
     if let Some(kind) = arguments.blur {
         camera.blur = match kind {
-            BlurKind::Layered => BlurChoice::Layered,
-            BlurKind::Pointwise => BlurChoice::Pointwise,
+            BlurKind::Layered => BlurSpec::Layered,
+            BlurKind::Pointwise => BlurSpec::Pointwise,
         };
     }
     Ok(())
@@ -192,16 +192,16 @@ pub(crate) fn diffraction(kind: DiffractionKind) -> Diffraction {
 
 fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
     if let Some(sensor) = &arguments.sensor {
-        camera.sensor = SensorChoice::named(sensor);
+        camera.sensor = SensorSpec::named(sensor);
         if arguments.scene.is_none() {
-            camera.film = FilmChoice::Sensor;
+            camera.film = FilmSpec::Sensor;
         }
     }
     match (&arguments.pixels, arguments.pixel_um) {
         (None, None) => {}
         (Some(size), Some(pitch_um)) => {
             let (columns, rows) = parse_size(size)?;
-            camera.film = FilmChoice::Pixels { columns, rows, pitch_um };
+            camera.film = FilmSpec::Pixels { columns, rows, pitch_um };
         }
         _ => bail!("--pixels and --pixel-um go together"),
     }
@@ -230,10 +230,10 @@ pub(crate) fn sensor_options(arguments: &FrameArgs) -> SensorOptions {
 }
 
 /// Returns how many frames the command line asks for.
-pub(crate) fn frames_of(arguments: &FrameArgs) -> anyhow::Result<Option<FramesChoice>> {
+pub(crate) fn frames_of(arguments: &FrameArgs) -> anyhow::Result<Option<FramesSpec>> {
     Ok(match (arguments.burst, arguments.bracket_stops.as_deref()) {
-        (Some(n), _) => Some(FramesChoice::Burst(n)),
-        (None, Some(list)) => Some(FramesChoice::BracketStops(parse_numbers("--bracket-stops", list)?)),
+        (Some(n), _) => Some(FramesSpec::Burst(n)),
+        (None, Some(list)) => Some(FramesSpec::BracketStops(parse_numbers("--bracket-stops", list)?)),
         (None, None) => None,
     })
 }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use dioptric_analysis::SensorStatistics;
 use dioptric_pipeline::{
-    Camera, FrameFile, Outputs, SenseRequest, SensorChoice, Staged, parse_illuminant, with_exposure_s,
+    Camera, FrameFile, Outputs, SenseRequest, SensorSpec, Staged, parse_illuminant, with_exposure_s,
 };
 use dioptric_report::write_sensed;
 
@@ -23,7 +23,7 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
     }
     sensor_options(&arguments.frames).apply(&mut noise, &mut exposure, &mut processing)?;
     let request = SenseRequest {
-        sensor: SensorChoice::named(&arguments.sensor),
+        sensor: SensorSpec::named(&arguments.sensor),
         pixel_um: arguments.pixel_um,
         exposure,
         frames: frames_of(&arguments.frames)?.unwrap_or(demo.frames),

@@ -15,7 +15,7 @@ use crate::{
 pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> {
     let lens = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?.lens;
     let rays = RayTable::open(&arguments.rays)?;
-    let settings = TraceSettings { rims_clip: !arguments.no_clip, film_mm: arguments.film_mm };
+    let settings = TraceSettings { rims_clip: !arguments.no_clip, film_distance_mm: arguments.film_mm };
     let Some(path) = &arguments.output else {
         let out = io::BufWriter::new(io::stdout().lock());
         return rays.trace(&lens, &settings, out).map_err(without_closed_pipe);

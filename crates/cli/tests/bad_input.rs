@@ -27,7 +27,7 @@ fn check_scene(folder: &Path, words: &[&str]) {
 }
 
 #[test]
-fn a_lens_that_is_not_centred_has_no_other_bank() {
+fn a_lens_that_is_not_centered_has_no_other_bank() {
     let folder = folder();
     let lens = r#"(name: "askew", source: "test", surfaces: [(radius_mm: 50.0, semi_aperture_mm: 5.0,
         medium: Constant(index: 1.5), thickness_mm: 3.0), (stop: true, radius_mm: -50.0, semi_aperture_mm: 5.0,
@@ -89,7 +89,7 @@ fn nan_and_negative_samples_are_named_with_their_place() {
 #[test]
 fn missing_depth_and_view_are_asked_for() {
     let folder = folder();
-    let picture = image_of_one_colour();
+    let picture = image_of_one_color();
     fs::write(folder.path().join("scene.png"), picture).unwrap();
     let run = ["run", "camera.ron", "--scene", "scene.png", "--out", "out"];
     check_error(folder.path(), &[&run[..], &["--fov-deg", "12"]].concat(), &["scene.png", "depth"]);
@@ -99,7 +99,7 @@ fn missing_depth_and_view_are_asked_for() {
 }
 
 /// A picture that the program itself made.
-fn image_of_one_colour() -> Vec<u8> {
+fn image_of_one_color() -> Vec<u8> {
     let other = folder();
     output(other.path(), &["run", "camera.ron", "--out", "good", "--quiet"]);
     fs::read(other.path().join("good/picture.png")).unwrap()

@@ -54,7 +54,7 @@ fn lens_without_an_axis_of_symmetry_has_both_its_planes_and_no_sums() {
     assert!(through[0].is_null() && through[1].as_f64().unwrap() > 0.99, "{glass}");
 }
 
-/// A surface that bends twice as much along x, decentred, before a curved film.
+/// A surface that bends twice as much along x, decentered, before a curved film.
 const TORIC: &str = r#"(
     name: "toric",
     source: "test",
@@ -75,7 +75,7 @@ fn rays_of_a_table_end_on_a_curved_film() {
     let image: Vec<f64> =
         table.lines().last().unwrap().split(',').skip(2).take(3).map(|cell| cell.parse().unwrap()).collect();
     let (x, y, z) = (image[0], image[1], image[2]);
-    // The film's centre of curvature lies 30 mm before its vertex, which the decentre of the surface leaves in place.
+    // The film's center of curvature lies 30 mm before its vertex, which the decenter of the surface leaves in place.
     assert!(((x * x + y * y + (z + 10.0).powi(2)).sqrt() - 30.0).abs() < 1e-12, "{table}");
 }
 
@@ -87,7 +87,7 @@ fn lens_analyze_has_its_keys_and_leaves_its_plots() {
     let analysis = json(folder.path(), &[&common[..], &stop, &["--out", "plots", "--json"]].concat());
     check_numbers(
         &analysis,
-        "distance_mm reference_nm efl_mm f_number working_f_number film_mm half_illumination_deg object_index image_index \
+        "distance_mm reference_nm efl_mm f_number working_f_number film_distance_mm half_illumination_deg object_index image_index \
          object_na image_na",
     );
     assert_eq!(analysis["grid"].as_array().unwrap().len(), 121);
@@ -137,7 +137,7 @@ fn lens_analyze_has_its_keys_and_leaves_its_plots() {
 }
 
 #[test]
-fn an_objective_in_water_is_told_and_analysed() {
+fn an_objective_in_water_is_told_and_analyzed() {
     let folder = tempfile::tempdir().unwrap();
     let water = "(name: \"dipping\", source: \"a test\", object_medium: Constant(index: 1.33), surfaces: [
         (semi_aperture_mm: 2.0, medium: Constant(index: 1.52), thickness_mm: 1.2),
@@ -195,9 +195,10 @@ fn psf_adds_the_whole_light_and_writes_its_table_and_mosaic() {
     let folder = tempfile::tempdir().unwrap();
     let common =
         ["psf", "paper-2el", "--fields-deg", "0,2", "--film-mm", "51.8145", "--stop-mm", "4", "--pixel-um", "4"];
-    let light = ["--wavelengths-nm", "500,600", "--whole-light", "--mtf-per-mm", "10", "--csv", "t.csv", "-o", "m.png"];
+    let light =
+        ["--wavelengths-nm", "500,600", "--polychromatic", "--mtf-per-mm", "10", "--csv", "t.csv", "-o", "m.png"];
     let records = json(folder.path(), &[&common[..], &light, &["--json"]].concat());
-    let is_whole = |record: &Value| record["is_whole_light"] == true;
+    let is_whole = |record: &Value| record["is_polychromatic"] == true;
     assert_eq!(
         records.as_array().unwrap().iter().map(is_whole).collect::<Vec<_>>(),
         [false, false, true, false, false, true]

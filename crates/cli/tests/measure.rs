@@ -31,7 +31,7 @@ fn blurred_edge(distance: f64, sigma: f64) -> f64 {
 
 const SIGMA_PX: f64 = 0.8;
 
-/// A linear 16-bit grey picture with an edge slanted by 5°, from 10 to 70 % of full scale.
+/// A linear 16-bit gray picture with an edge slanted by 5°, from 10 to 70 % of full scale.
 fn edge_picture(side: u32, gain: impl Fn(u32, u32) -> f64) -> ImageBuffer<Luma<u16>, Vec<u16>> {
     let (sin, cos) = 5.0_f64.to_radians().sin_cos();
     ImageBuffer::from_fn(side, side, |x, y| {
@@ -81,7 +81,7 @@ fn a_mosaic_is_measured_filter_by_filter() {
     }
 }
 
-/// Points of Gaussian light in linear 16-bit grey: column, row and standard deviation, pixels.
+/// Points of Gaussian light in linear 16-bit gray: column, row and standard deviation, pixels.
 fn points_picture(points: &[(f64, f64, f64)]) -> ImageBuffer<Luma<u16>, Vec<u16>> {
     ImageBuffer::from_fn(160, 120, |x, y| {
         let light = points.iter().enumerate().map(|(i, &(column, row, sigma))| {
@@ -155,7 +155,7 @@ fn a_sensor_on_the_bench_and_its_frames_from_files_agree() {
     assert!((number(&by_name["gain_dn_per_e"]) / number(&simulated["gain_dn_per_e"]) - 1.0).abs() < 0.02);
 }
 
-/// 24 patches of even grey-ish colours in sRGB; the real ones come from `dioptric` itself in other tests.
+/// 24 patches of even gray-ish colors in sRGB; the real ones come from `dioptric` itself in other tests.
 fn chart_picture(shift: u8) -> ImageBuffer<Rgb<u8>, Vec<u8>> {
     // sRGB of the 24 patches as they are commonly printed (BabelColor's averages), D65.
     const PATCHES: [[u8; 3]; 24] = [
@@ -201,20 +201,20 @@ fn a_chart_is_found_and_two_pictures_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     chart_picture(0).save(folder.path().join("chart.png")).unwrap();
     chart_picture(6).save(folder.path().join("reddish.png")).unwrap();
-    let found = json(folder.path(), &["measure", "colour", "chart.png", "--json", "-o", "out"]);
+    let found = json(folder.path(), &["measure", "color", "chart.png", "--json", "-o", "out"]);
     assert_eq!(found["patches"].as_array().unwrap().len(), 24);
     // Published sRGB values, 8 bits and the charts of different years: a few ΔE at most.
     assert!(number(&found["mean_delta_e"]) < 3.0, "{}", found["mean_delta_e"]);
     let given =
-        json(folder.path(), &["measure", "colour", "chart.png", "--json", "--corners", "22,22,258,22,258,178,22,178"]);
+        json(folder.path(), &["measure", "color", "chart.png", "--json", "--corners", "22,22,258,22,258,178,22,178"]);
     assert!((number(&given["mean_delta_e"]) - number(&found["mean_delta_e"])).abs() < 0.05);
-    let reddish = json(folder.path(), &["measure", "colour", "reddish.png", "--json"]);
+    let reddish = json(folder.path(), &["measure", "color", "reddish.png", "--json"]);
     assert!(number(&reddish["mean_delta_e"]) > number(&found["mean_delta_e"]) + 0.5);
-    for name in ["colour.json", "colour-ab.svg", "colour-delta-e.svg"] {
+    for name in ["color.json", "color-ab.svg", "color-delta-e.svg"] {
         assert!(folder.path().join("out").join(name).exists(), "{name}");
     }
 
-    let compare = ["measure", "colour", "chart.png", "--json", "--against"];
+    let compare = ["measure", "color", "chart.png", "--json", "--against"];
     let same = json(folder.path(), &[&compare[..], &["chart.png"]].concat());
     assert!(same["psnr_db"].is_null() && number(&same["scielab"]["max"]) < 1e-3);
     assert!((number(&same["ssim"]) - 1.0).abs() < 1e-4);
@@ -254,12 +254,12 @@ fn bad_input_ends_in_one_sentence() {
         (&["noise", "--sensor", "imx363", "--filter", "X"], &["'X'", "R, G, B"]),
         (&["noise", "--sensor", "imx363", "--wavelength-nm", "2000"], &["2000 nm"]),
         (&["noise", "--sensor", "imx363", "--size", "2"], &["side", "2"]),
-        (&["colour", "even.png"], &["even.png", "chart", "corners"]),
-        (&["colour", "chart.png", "--corners", "0,0,1"], &["--corners"]),
-        (&["colour", "chart.png", "--corners", "0,0,900,0,900,900,0,900"], &["within"]),
-        (&["colour", "chart.png", "--illuminant", "D66"], &["D66", "D65"]),
-        (&["colour", "chart.png", "--against", "even.png"], &["280", "64 × 64"]),
-        (&["colour", "chart.png", "--against", "chart.png", "--pixels-per-degree", "0"], &["pixels_per_degree"]),
+        (&["color", "even.png"], &["even.png", "chart", "corners"]),
+        (&["color", "chart.png", "--corners", "0,0,1"], &["--corners"]),
+        (&["color", "chart.png", "--corners", "0,0,900,0,900,900,0,900"], &["within"]),
+        (&["color", "chart.png", "--illuminant", "D66"], &["D66", "D65"]),
+        (&["color", "chart.png", "--against", "even.png"], &["280", "64 × 64"]),
+        (&["color", "chart.png", "--against", "chart.png", "--pixels-per-degree", "0"], &["pixels_per_degree"]),
     ] {
         check_error(path, &[&["measure"], arguments].concat(), words);
     }

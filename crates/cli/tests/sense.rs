@@ -10,7 +10,7 @@ use common::{CAMERA, check_error, output};
 use image::{ColorType, DynamicImage};
 use serde_json::Value;
 
-/// The data sheet of a colour camera with the pixels of that film.
+/// The data sheet of a color camera with the pixels of that film.
 fn sheet() -> String {
     let sheet = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../sensor/data/nikon-d5100.ron")).unwrap();
     let sized = |line: &str| match line.trim_start().split(':').next() {

@@ -30,12 +30,14 @@ fn from_the_lens(criterion: &mut Criterion) {
     let lens = Lens::built_in("dgauss-50mm").and_then(|lens| lens.with_f_number(8.0, 550.0)).expect("it is built in");
     let lens = lens.at(550.0).expect("the glass is known");
     let point = ObjectPoint::from_field(&lens, DVec2::new(0.1, 0.0), 0.5);
-    let film_mm = lens.film_mm_for(2000.0).expect("the lens focuses");
+    let film_distance_mm = lens.film_distance_mm_for(2000.0).expect("the lens focuses");
     criterion.bench_function("wave/dgauss_f8/nodes", |bencher| {
-        bencher.iter(|| black_box(PupilSamples::trace(&lens, &point, film_mm, PupilGrid::STANDARD, None).is_ok()));
+        bencher.iter(|| {
+            black_box(PupilSamples::trace(&lens, &point, film_distance_mm, PupilGrid::STANDARD, None).is_ok())
+        });
     });
     criterion.bench_function("wave/dgauss_f8/psf", |bencher| {
-        bencher.iter(|| black_box(wave_psf(&lens, &point, film_mm, &WINDOW, WaveQuality::default()).is_ok()));
+        bencher.iter(|| black_box(wave_psf(&lens, &point, film_distance_mm, &WINDOW, WaveQuality::default()).is_ok()));
     });
 }
 

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use crate::quadrature::gauss_legendre_on;
 
-/// Returns the irradiance `r` from the centre for a point of unit energy, per (λN)².
+/// Returns the irradiance `r` from the center for a point of unit energy, per (λN)².
 pub fn psf(r: f64) -> f64 {
     let v = PI * r.abs();
     if v < 1e-4 {
@@ -37,7 +37,7 @@ pub fn mtf(s: f64) -> f64 {
     2.0 / PI * (s.acos() - s * (1.0 - s * s).sqrt())
 }
 
-/// Returns the share of the energy within `r` of the centre.
+/// Returns the share of the energy within `r` of the center.
 pub fn encircled_energy(r: f64) -> f64 {
     let v = PI * r.abs();
     1.0 - bessel_j(0, v).powi(2) - bessel_j(1, v).powi(2)

@@ -70,7 +70,7 @@ impl Hurb {
         self.variance(1.0 / (distance_mm * distance_mm), edge).sqrt()
     }
 
-    /// Returns the spread of a ray that crosses a round stop `r_mm` from its centre.
+    /// Returns the spread of a ray that crosses a round stop `r_mm` from its center.
     ///
     /// The distances to the edge are R − r along the radius and the half-chord √(R² − r²) across it.
     pub fn spread(self, r_mm: f64, edge: CircularStop) -> AngularSpread {
@@ -125,7 +125,7 @@ impl Hurb {
         })
     }
 
-    /// Returns the share of the energy of an ideal lens in focus within `r` of the centre, in units of λN.
+    /// Returns the share of the energy of an ideal lens in focus within `r` of the center, in units of λN.
     pub fn encircled_energy(self, r: f64) -> f64 {
         self.average(|radial, across| {
             mean_over_azimuth(|cos2| {

@@ -34,7 +34,7 @@ const STEP: f64 = 1e-5;
 
 impl HuygensSources {
     /// Traces sources within the vignetted pupil of a point, `n_across` cells along its width and height, and carries
-    /// them back from the film to the sphere about `center_mm` (a place of the film, along its own x and y) through the centre of the exit
+    /// them back from the film to the sphere about `center_mm` (a place of the film, along its own x and y) through the center of the exit
     /// pupil or, where that is infinitely far, through the last vertex.
     ///
     /// The pupil is what rays get through with their rims, tried on a square grid, and rims are followed through its
@@ -46,7 +46,7 @@ impl HuygensSources {
     pub fn trace(
         lens: &MonoLens,
         point: &ObjectPoint,
-        film_mm: f64,
+        film_distance_mm: f64,
         center_mm: DVec2,
         n_across: usize,
     ) -> Result<Self, DiffractionError> {
@@ -55,12 +55,13 @@ impl HuygensSources {
             .filter(|(cells, _)| !cells.is_empty())
             .ok_or(DiffractionError::NoLight { wavelength_nm })?;
         let widest_mm = cells.iter().map(|cell| cell.at_mm.distance(cells[0].at_mm)).fold(0.0, f64::max);
-        let beside = Beside::trace(lens, point, film_mm, (&cells, z_mm, STEP * widest_mm))?;
+        let beside = Beside::trace(lens, point, film_distance_mm, (&cells, z_mm, STEP * widest_mm))?;
 
         // Carry every ray back to the sphere.
-        let pose = lens.film_pose(film_mm);
-        let on_film = beside.rays.each_ref().map(|rays| FilmRays::new(rays, lens, film_mm));
-        let exit_mm = on_film[0].exit_pupil_mm.unwrap_or_else(|| pose.to_own(lens.film_pose(0.0).vertex_mm));
+        let placement = lens.film_placement(film_distance_mm);
+        let on_film = beside.rays.each_ref().map(|rays| FilmRays::new(rays, lens, film_distance_mm));
+        let exit_mm =
+            on_film[0].exit_pupil_mm.unwrap_or_else(|| placement.surface_from_lens(lens.film_placement(0.0).vertex_mm));
         let center = on_film[0].film_point_mm(center_mm);
         let radius_mm = center.distance(exit_mm).copysign(-exit_mm.z);
         let on_sphere = on_film.each_ref().map(|rays| back_to_sphere(rays, center, radius_mm));
@@ -94,13 +95,13 @@ impl HuygensSources {
 
     /// Returns the irradiance at film points, per mm² for unit transmitted energy, on the threads of the current
     /// rayon pool.
-    pub fn irradiance_per_mm2(&self, film_mm: &[DVec2]) -> Vec<f64> {
-        film_mm.par_iter().map(|at| self.irradiance_at(self.point_mm(*at))).collect()
+    pub fn irradiance_per_mm2(&self, on_film_mm: &[DVec2]) -> Vec<f64> {
+        on_film_mm.par_iter().map(|at| self.irradiance_at(self.point_mm(*at))).collect()
     }
 
     /// Returns the irradiance at a film point over that of the same sources all in phase there.
-    pub fn strehl_at(&self, film_mm: DVec2) -> f64 {
-        let at = self.point_mm(film_mm);
+    pub fn strehl_at(&self, on_film_mm: DVec2) -> f64 {
+        let at = self.point_mm(on_film_mm);
         let amplitude: f64 = self.sources.iter().map(|source| source.strength_mm / at.distance(source.at_mm)).sum();
         self.irradiance_at(at) / (amplitude * self.wave_number_turns_per_mm).powi(2)
     }
@@ -136,7 +137,7 @@ impl Beside {
     fn trace(
         lens: &MonoLens,
         point: &ObjectPoint,
-        film_mm: f64,
+        film_distance_mm: f64,
         (cells, z_mm, step_mm): (&[Cell], f64, f64),
     ) -> Result<Self, DiffractionError> {
         let batches = [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|step| {
@@ -144,7 +145,7 @@ impl Beside {
             let mut rays = lens.rays_towards(point, &targets, z_mm, 0.0);
             let from: Vec<DVec3> = (0..rays.len()).map(|i| rays.direction(i)).collect();
             lens.trace(&mut rays, Vignetting::Off);
-            lens.to_film(&mut rays, film_mm);
+            lens.to_film(&mut rays, film_distance_mm);
             (rays, from)
         });
         let n_lost = batches.iter().map(|(rays, _)| rays.len() - rays.n_in_flight()).sum();

@@ -12,16 +12,16 @@ use crate::{DiffractionError, PupilGrid, ReferenceSphere, Wavefront, WavefrontRe
 pub fn opd_waves_at(
     lens: &MonoLens,
     point: &ObjectPoint,
-    film_mm: f64,
+    film_distance_mm: f64,
     sampling: &PupilSampling,
 ) -> Option<Vec<Option<f64>>> {
-    let chief = sampling.chief().rays_on_film(lens, point, film_mm);
+    let chief = sampling.chief().rays_on_film(lens, point, film_distance_mm);
     if !chief.fate[0].is_in_flight() {
         return None;
     }
     let sphere = ReferenceSphere::through_exit_pupil(lens, chief.point_mm(0));
     let chief_mm = sphere.paths_mm(lens, &chief)[0];
-    let paths_mm = sphere.paths_mm(lens, &sampling.rays_on_film(lens, point, film_mm));
+    let paths_mm = sphere.paths_mm(lens, &sampling.rays_on_film(lens, point, film_distance_mm));
     let waves = |path_mm: f64| (path_mm - chief_mm) / (lens.wavelength_nm() * 1e-6);
     Some(paths_mm.into_iter().map(|path_mm| path_mm.is_finite().then(|| waves(path_mm))).collect())
 }
@@ -29,23 +29,23 @@ pub fn opd_waves_at(
 /// Returns the film's distance behind the last vertex at which the wavefront of a point is nearest to a sphere, and its
 /// root mean square there, mm and waves.
 ///
-/// The square of that is a parabola in the film's place, which three places fix; `film_mm` is where to begin.
+/// The square of that is a parabola in the film's place, which three places fix; `film_distance_mm` is where to begin.
 ///
 /// # Errors
 /// As [`Wavefront::trace`].
 pub fn best_wavefront_film_mm(
     lens: &MonoLens,
     point: &ObjectPoint,
-    film_mm: f64,
+    film_distance_mm: f64,
     grid: PupilGrid,
 ) -> Result<(f64, f64), DiffractionError> {
-    let mean_square = |film_mm: f64| {
-        let wavefront = Wavefront::trace(lens, point, film_mm, grid, WavefrontReference::Best)?;
+    let mean_square = |film_distance_mm: f64| {
+        let wavefront = Wavefront::trace(lens, point, film_distance_mm, grid, WavefrontReference::Best)?;
         Ok::<f64, DiffractionError>(wavefront.rms_waves().powi(2))
     };
     let f_number = lens.first_order().f_number;
     let wave_mm = 8.0 * f_number * f_number * lens.wavelength_nm() * 1e-6;
-    let mut best_mm = film_mm;
+    let mut best_mm = film_distance_mm;
     // Places ever closer together, by waves of defocus: the parabola bends by the step over the focal length.
     for step_mm in [1.0, 0.1, 0.01, 0.01].map(|waves| waves * wave_mm) {
         let [before, here, after] =
@@ -91,12 +91,12 @@ mod tests {
     fn the_same_rays_give_the_wavefronts_own_aberration() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(5.6, 550.0).unwrap().at(550.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.05, 0.1), 0.5);
-        let film_mm = lens.film_mm_for(2000.0).unwrap();
+        let film_distance_mm = lens.film_distance_mm_for(2000.0).unwrap();
         let wavefront =
-            Wavefront::trace(&lens, &point, film_mm, PupilGrid::STANDARD, WavefrontReference::Chief).unwrap();
+            Wavefront::trace(&lens, &point, film_distance_mm, PupilGrid::STANDARD, WavefrontReference::Chief).unwrap();
         let coordinates = PupilCoordinates::stop(&lens);
         let sampling = PupilSampling { coordinates, places: wavefront.pupil.clone(), rims: Vignetting::Off };
-        let waves = opd_waves_at(&lens, &point, film_mm, &sampling).unwrap();
+        let waves = opd_waves_at(&lens, &point, film_distance_mm, &sampling).unwrap();
         for (found, expected) in waves.iter().zip(&wavefront.opd_waves) {
             assert!((found.unwrap() - expected).abs() < 1e-8);
         }
@@ -107,7 +107,7 @@ mod tests {
         let departure = |f_number: f64| {
             let lens = Lens::built_in("singlet-50mm").unwrap().with_f_number(f_number, 550.0).unwrap();
             let lens = lens.at(550.0).unwrap();
-            let paraxial_mm = lens.film_mm_for(f64::INFINITY).unwrap();
+            let paraxial_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
             let edge = PupilSampling {
                 coordinates: PupilCoordinates::entrance(&lens),
                 places: vec![DVec2::Y],
@@ -117,8 +117,8 @@ mod tests {
             let marginal_mm = paraxial_mm - marginal.y_mm[0] * marginal.n[0] / marginal.m[0];
             let grid = PupilGrid::STANDARD;
             let (best_mm, rms) = best_wavefront_film_mm(&lens, &FAR, paraxial_mm, grid).unwrap();
-            for film_mm in [best_mm - 0.02, best_mm + 0.02] {
-                let there = Wavefront::trace(&lens, &FAR, film_mm, grid, WavefrontReference::Best).unwrap();
+            for film_distance_mm in [best_mm - 0.02, best_mm + 0.02] {
+                let there = Wavefront::trace(&lens, &FAR, film_distance_mm, grid, WavefrontReference::Best).unwrap();
                 assert!(there.rms_waves() > rms);
             }
             (best_mm - paraxial_mm) / (marginal_mm - paraxial_mm) - 0.5

@@ -1,6 +1,6 @@
 //! HURB by random deviations of single rays, in the two forms that are in use.
 
-use dioptric_optics::{Pose, RayBatch};
+use dioptric_optics::{Placement, RayBatch};
 use glam::{DVec2, DVec3};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -35,11 +35,11 @@ pub struct SampledHurb {
 }
 
 impl SampledHurb {
-    /// Deviates the rays in flight at the edge, which stands at this pose: at
-    /// [`MonoLens::stop_pose`](dioptric_optics::MonoLens::stop_pose) if it is the stop.
+    /// Deviates the rays in flight at the edge, which stands at this placement: at
+    /// [`MonoLens::stop_placement`](dioptric_optics::MonoLens::stop_placement) if it is the stop.
     ///
     /// The rays must be at the edge: of the stop between `trace_surfaces(0..stop + 1)` and the rest.
-    pub fn apply(&self, rays: &mut RayBatch, edge_pose: &Pose) {
+    pub fn apply(&self, rays: &mut RayBatch, edge_placement: &Placement) {
         let n_chunks = rays.len().div_ceil(CHUNK);
         let deviated: Vec<Vec<DVec3>> = (0..n_chunks)
             .into_par_iter()
@@ -47,7 +47,7 @@ impl SampledHurb {
                 let mut random = ChaCha8Rng::seed_from_u64(self.seed);
                 random.set_stream(chunk as u64);
                 let range = chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK);
-                range.map(|ray| self.deviated(rays, ray, edge_pose, &mut random)).collect()
+                range.map(|ray| self.deviated(rays, ray, edge_placement, &mut random)).collect()
             })
             .collect();
         for (ray, direction) in deviated.into_iter().flatten().enumerate() {
@@ -58,10 +58,10 @@ impl SampledHurb {
     }
 
     /// Returns the direction of a ray after a random deviation. Every ray draws the same number of times, or redraws.
-    fn deviated(&self, rays: &RayBatch, ray: usize, edge_pose: &Pose, random: &mut ChaCha8Rng) -> DVec3 {
+    fn deviated(&self, rays: &RayBatch, ray: usize, edge_placement: &Placement, random: &mut ChaCha8Rng) -> DVec3 {
         // Place and direction in the frame of the edge.
-        let before = edge_pose.direction_to_own(rays.direction(ray));
-        let place_mm = edge_pose.to_own(rays.point_mm(ray)).truncate();
+        let before = edge_placement.direction_to_own(rays.direction(ray));
+        let place_mm = edge_placement.surface_from_lens(rays.point_mm(ray)).truncate();
 
         // Standard deviations along the radius and across it.
         let r_mm = place_mm.length();
@@ -88,7 +88,7 @@ impl SampledHurb {
                 }
             }
         };
-        edge_pose.direction_to_lens(after)
+        edge_placement.direction_to_lens(after)
     }
 }
 
@@ -115,7 +115,7 @@ mod tests {
         let n = 200_000;
         for form in [HurbForm::DirectionCosines, HurbForm::Angles] {
             let mut rays = bundle(n, DVec3::new(0.0, 0.8, 0.0));
-            SampledHurb { model: Hurb::PAPER, edge, form, seed: 7 }.apply(&mut rays, &Pose::centered(0.0));
+            SampledHurb { model: Hurb::PAPER, edge, form, seed: 7 }.apply(&mut rays, &Placement::centered(0.0));
             let wanted = Hurb::PAPER.spread(0.8, edge);
             // Two standard errors of a width from n draws: √(1/2n) = 0.16 %.
             assert!((rms(&rays.m) / wanted.radial - 1.0).abs() < 0.0032);
@@ -132,7 +132,7 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
             let mut rays = bundle(10_000, DVec3::new(0.1, 0.2, 0.0));
             pool.install(|| {
-                in_air(1).apply(&mut rays, &Pose::centered(0.0));
+                in_air(1).apply(&mut rays, &Placement::centered(0.0));
             });
             rays
         };
@@ -142,26 +142,26 @@ mod tests {
     #[test]
     fn a_ray_at_the_very_edge_stays_forward() {
         let mut rays = bundle(1000, DVec3::new(1.0, 0.0, 0.0));
-        in_air(1).apply(&mut rays, &Pose::centered(0.0));
+        in_air(1).apply(&mut rays, &Placement::centered(0.0));
         assert!(rays.n.iter().all(|&n| n > 0.0));
     }
 
-    /// A decentred, tilted edge deviates the same rays as a centred one, in its own frame.
+    /// A decentered, tilted edge deviates the same rays as a centered one, in its own frame.
     #[test]
     fn deviations_follow_the_edge() {
         use dioptric_optics::glam::DMat3;
         let rotation = DMat3::from_rotation_x(0.2) * DMat3::from_rotation_y(-0.1);
-        let pose = Pose { vertex_mm: DVec3::new(0.3, -0.4, 2.0), rotation };
+        let placement = Placement { vertex_mm: DVec3::new(0.3, -0.4, 2.0), rotation };
         let points: Vec<DVec3> = (0..500).map(|i| DVec3::new(0.001 * f64::from(i), 0.6, 0.0)).collect();
-        let placed: Vec<DVec3> = points.iter().map(|point| pose.to_lens(*point)).collect();
+        let placed: Vec<DVec3> = points.iter().map(|point| placement.lens_from_surface(*point)).collect();
         for form in [HurbForm::DirectionCosines, HurbForm::Angles] {
             let hurb = SampledHurb { form, ..in_air(3) };
             let mut centered = RayBatch::from_points(&points, &[DVec3::Z; 500]);
             let mut moved = RayBatch::from_points(&placed, &[rotation.z_axis; 500]);
-            hurb.apply(&mut centered, &Pose::centered(0.0));
-            hurb.apply(&mut moved, &pose);
+            hurb.apply(&mut centered, &Placement::centered(0.0));
+            hurb.apply(&mut moved, &placement);
             for ray in 0..500 {
-                let off = moved.direction(ray) - pose.direction_to_lens(centered.direction(ray));
+                let off = moved.direction(ray) - placement.direction_to_lens(centered.direction(ray));
                 assert!(off.length() < 1e-9, "{ray}: {off}");
             }
         }

@@ -1,6 +1,6 @@
 //! How a deviation at the stop moves a ray on the film.
 
-use dioptric_optics::{FilmPoint, MonoLens, Pose, RayBatch, StopPoint, Vignetting};
+use dioptric_optics::{FilmPoint, MonoLens, Placement, RayBatch, StopPoint, Vignetting};
 use glam::{DVec2, DVec3};
 
 use crate::{CircularStop, Covariance, Hurb};
@@ -30,23 +30,24 @@ impl StopRay {
     }
 }
 
-/// Traces rays to the film as it is curved, `film_mm` behind the last vertex, ignoring rims, and finds how deviations at the
+/// Traces rays to the film as it is curved, `film_distance_mm` behind the last vertex, ignoring rims, and finds how deviations at the
 /// stop move them there.
 ///
 /// The rays start in object space; those that end on the way are `None`. Each costs four more rays behind the stop.
-pub fn trace_stop_rays(lens: &MonoLens, mut rays: RayBatch, film_mm: f64) -> Vec<Option<StopRay>> {
+pub fn trace_stop_rays(lens: &MonoLens, mut rays: RayBatch, film_distance_mm: f64) -> Vec<Option<StopRay>> {
     let (behind, end) = (lens.stop() + 1, lens.n_surfaces());
     lens.trace_surfaces(0..behind, &mut rays, Vignetting::Off);
     let on_film = |mut rays: RayBatch| {
         if behind < end {
             lens.trace_surfaces(behind..end, &mut rays, Vignetting::Off);
         }
-        lens.to_film(&mut rays, film_mm);
-        let places = lens.film_points(&rays, film_mm);
+        lens.to_film(&mut rays, film_distance_mm);
+        let places = lens.film_points(&rays, film_distance_mm);
         (rays.fate, places)
     };
-    let stop_pose = lens.stop_pose();
-    let deviated = [DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|d| on_film(turned(&rays, &stop_pose, d * STEP)));
+    let stop_placement = lens.stop_placement();
+    let deviated =
+        [DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|d| on_film(turned(&rays, &stop_placement, d * STEP)));
     let stop = lens.stop_points(&rays);
     let straight = on_film(rays);
     (0..stop.len())
@@ -61,13 +62,13 @@ pub fn trace_stop_rays(lens: &MonoLens, mut rays: RayBatch, film_mm: f64) -> Vec
 }
 
 /// Returns the rays with their direction cosines along the stop's own x and y changed.
-fn turned(rays: &RayBatch, stop_pose: &Pose, by: DVec2) -> RayBatch {
+fn turned(rays: &RayBatch, stop_placement: &Placement, by: DVec2) -> RayBatch {
     let mut rays = rays.clone();
     for ray in 0..rays.len() {
-        let cosines = stop_pose.direction_to_own(rays.direction(ray)).truncate() + by;
+        let cosines = stop_placement.direction_to_own(rays.direction(ray)).truncate() + by;
         let rest = 1.0 - cosines.length_squared();
         let direction = DVec3::new(cosines.x, cosines.y, rest.max(0.0).sqrt());
-        rays.set_direction(ray, stop_pose.direction_to_lens(direction));
+        rays.set_direction(ray, stop_placement.direction_to_lens(direction));
     }
     rays
 }
@@ -140,7 +141,7 @@ mod tests {
             let (lens, mut rays, edge, unit) = figure_2(n_rays, 550.0);
             lens.trace_surfaces(0..lens.stop() + 1, &mut rays, Vignetting::On);
             let form = HurbForm::DirectionCosines;
-            SampledHurb { model, edge, form, seed: 3 }.apply(&mut rays, &lens.stop_pose());
+            SampledHurb { model, edge, form, seed: 3 }.apply(&mut rays, &lens.stop_placement());
             lens.to_film(&mut rays, FILM_MM);
             let share = |limit: f64| rays.x_mm.iter().filter(|x| x.abs() < limit * unit).count() as f64 / n_rays as f64;
             for limit in [0.25 * width, 0.5 * width, width, 3.0] {

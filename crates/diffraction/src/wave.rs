@@ -111,7 +111,7 @@ impl WavePsf {
 /// The largest range of phases that is accepted: a hundred and fifty thousand nodes.
 const LARGEST_BANDWIDTH: f64 = 1000.0;
 
-/// Returns the point spread function of an object point on a window of the film, `film_mm` behind the last vertex.
+/// Returns the point spread function of an object point on a window of the film, `film_distance_mm` behind the last vertex.
 ///
 /// # Errors
 /// When no light gets through, the window makes no sense, more nodes are needed than are asked for, or the blur and
@@ -119,11 +119,11 @@ const LARGEST_BANDWIDTH: f64 = 1000.0;
 pub fn wave_psf(
     lens: &MonoLens,
     point: &ObjectPoint,
-    film_mm: f64,
+    film_distance_mm: f64,
     window: &WaveWindow,
     quality: WaveQuality,
 ) -> Result<WavePsf, DiffractionError> {
-    pupil_samples(lens, point, film_mm, window, quality)?.psf(window, quality.points_per_pixel)
+    pupil_samples(lens, point, film_distance_mm, window, quality)?.psf(window, quality.points_per_pixel)
 }
 
 /// Returns the nodes that [`wave_psf`] sums: as many as `quality` says, or the window needs.
@@ -133,23 +133,23 @@ pub fn wave_psf(
 pub fn pupil_samples(
     lens: &MonoLens,
     point: &ObjectPoint,
-    film_mm: f64,
+    film_distance_mm: f64,
     window: &WaveWindow,
     quality: WaveQuality,
 ) -> Result<PupilSamples, DiffractionError> {
     let reference_mm = match window.center {
         WindowCenter::Centroid => None,
-        WindowCenter::At(film_mm) => Some(film_mm),
+        WindowCenter::At(film_distance_mm) => Some(film_distance_mm),
     };
-    let trace = |grid| PupilSamples::trace(lens, point, film_mm, grid, reference_mm);
-    let reach_mm = window.check()?;
+    let trace = |grid| PupilSamples::trace(lens, point, film_distance_mm, grid, reference_mm);
+    let extent_mm = window.check()?;
     if let Some(grid) = quality.nodes {
         let nodes = trace(grid)?;
-        nodes.check(reach_mm)?;
+        nodes.check(extent_mm)?;
         return Ok(nodes);
     }
     let mut nodes = trace(PupilGrid::STANDARD)?;
-    while let Some(grid) = nodes.finer_grid(reach_mm)? {
+    while let Some(grid) = nodes.finer_grid(extent_mm)? {
         nodes = trace(grid)?;
     }
     Ok(nodes)
@@ -172,10 +172,10 @@ impl WaveWindow {
 }
 
 impl PupilSamples {
-    /// Returns the grid that is to be tried instead of this one for places up to `reach_mm` from the reference, or `None`
+    /// Returns the grid that is to be tried instead of this one for places up to `extent_mm` from the reference, or `None`
     /// if this one does.
-    fn finer_grid(&self, reach_mm: f64) -> Result<Option<PupilGrid>, DiffractionError> {
-        let range = self.phase_range(reach_mm);
+    fn finer_grid(&self, extent_mm: f64) -> Result<Option<PupilGrid>, DiffractionError> {
+        let range = self.phase_range(extent_mm);
         if self.grid.covers(PupilGrid::needed(range)) {
             return Ok(None);
         }
@@ -194,10 +194,10 @@ impl PupilSamples {
     /// # Errors
     /// When the window makes no sense or needs more nodes than there are.
     pub fn psf(&self, window: &WaveWindow, points_per_pixel: Option<usize>) -> Result<WavePsf, DiffractionError> {
-        let reach_mm = window.check()?;
+        let extent_mm = window.check()?;
         let center_mm = match window.center {
             WindowCenter::Centroid => self.centroid_mm(),
-            WindowCenter::At(film_mm) => film_mm,
+            WindowCenter::At(film_distance_mm) => film_distance_mm,
         };
         if center_mm != self.reference_mm {
             return self
@@ -205,7 +205,7 @@ impl PupilSamples {
                 .about(center_mm)
                 .psf(&WaveWindow { center: WindowCenter::At(center_mm), ..*window }, points_per_pixel);
         }
-        let bandwidth = self.check(reach_mm)?;
+        let bandwidth = self.check(extent_mm)?;
         let (pitch_mm, unit_mm) = (window.pitch_um * 1e-3, self.airy_unit_mm());
         let is_rule = points_per_pixel.is_none();
         let points_per_pixel = match points_per_pixel {

@@ -12,7 +12,7 @@ use crate::{
 /// A sphere about a film point, up to which paths are counted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceSphere {
-    /// Its centre on the film, mm, lens frame.
+    /// Its center on the film, mm, lens frame.
     pub center_mm: DVec3,
     /// Its radius, mm: positive when the pupil lies before the film, infinite when it is infinitely far.
     pub radius_mm: f64,
@@ -21,12 +21,12 @@ pub struct ReferenceSphere {
 impl ReferenceSphere {
     /// Returns the sphere about a film point (lens frame) through the axial point of the paraxial exit pupil.
     ///
-    /// Where the film is tilted or decentred, that is the point of its own axis as far from it.
+    /// Where the film is tilted or decentered, that is the point of its own axis as far from it.
     pub fn through_exit_pupil(lens: &MonoLens, center_mm: DVec3) -> Self {
         let pupil_mm = lens.first_order().exit_pupil_z_mm;
         let radius_mm = match pupil_mm.is_finite() {
             true => {
-                let way_mm = lens.film_pose(pupil_mm).to_own(center_mm);
+                let way_mm = lens.film_placement(pupil_mm).surface_from_lens(center_mm);
                 way_mm.length().copysign(way_mm.z)
             }
             false => f64::INFINITY,
@@ -93,7 +93,7 @@ struct Traced {
 }
 
 impl Wavefront {
-    /// Traces the wavefront to the film as it is curved, `film_mm` behind the last vertex.
+    /// Traces the wavefront to the film as it is curved, `film_distance_mm` behind the last vertex.
     ///
     /// The grid is laid over the pupil as the point sees it. That of a wide field is long and narrow, and takes as many
     /// more azimuths as it needs.
@@ -103,20 +103,20 @@ impl Wavefront {
     pub fn trace(
         lens: &MonoLens,
         point: &ObjectPoint,
-        film_mm: f64,
+        film_distance_mm: f64,
         grid: PupilGrid,
         reference: WavefrontReference,
     ) -> Result<Self, DiffractionError> {
         let wavelength_nm = lens.wavelength_nm();
-        let Traced { energy, is_clear, in_stop, rays } = Traced::new(lens, point, film_mm, grid)?;
+        let Traced { energy, is_clear, in_stop, rays } = Traced::new(lens, point, film_distance_mm, grid)?;
         let chief = rays.len() - 1;
         let sphere = ReferenceSphere::through_exit_pupil(lens, rays.point_mm(chief));
         let paths_mm = sphere.paths_mm(lens, &rays);
         let opd_waves = paths_mm[..chief].iter().map(|p| (p - paths_mm[chief]) / (wavelength_nm * 1e-6)).collect();
-        let center_mm = lens.film_point(sphere.center_mm, film_mm).mm;
+        let center_mm = lens.film_point(sphere.center_mm, film_distance_mm).mm;
         let mut wavefront = Self { wavelength_nm, pupil: in_stop, energy, is_clear, opd_waves, center_mm };
         if reference == WavefrontReference::Best {
-            let on_film = FilmRays::new(&rays, lens, film_mm);
+            let on_film = FilmRays::new(&rays, lens, film_distance_mm);
             let directions: Vec<DVec2> =
                 (0..chief).map(|i| on_film.along_film(on_film.directions[i], center_mm)).collect();
             wavefront.take_out_tilt(&directions, lens.image_index());
@@ -124,7 +124,7 @@ impl Wavefront {
         Ok(wavefront)
     }
 
-    /// Takes out the piston and tilt that leave the least mean square, and moves the centre accordingly.
+    /// Takes out the piston and tilt that leave the least mean square, and moves the center accordingly.
     fn take_out_tilt(&mut self, directions: &[DVec2], index: f64) {
         let mean_d: DVec2 = self.energy.iter().zip(directions).map(|(e, d)| *e * *d).sum();
         let mean_w = self.mean(|w| w);
@@ -161,7 +161,7 @@ impl Wavefront {
         ends.1 - ends.0
     }
 
-    /// Returns the irradiance at the centre over that without aberration: |mean of cis(opd)|², weighted by energy.
+    /// Returns the irradiance at the center over that without aberration: |mean of cis(opd)|², weighted by energy.
     pub fn strehl(&self) -> f64 {
         let (mut re, mut im) = (0.0, 0.0);
         for (e, w) in self.energy.iter().zip(&self.opd_waves) {
@@ -181,7 +181,12 @@ impl Wavefront {
 
 impl Traced {
     /// Traces the nodes of a pupil and the chief ray.
-    fn new(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, grid: PupilGrid) -> Result<Self, DiffractionError> {
+    fn new(
+        lens: &MonoLens,
+        point: &ObjectPoint,
+        film_distance_mm: f64,
+        grid: PupilGrid,
+    ) -> Result<Self, DiffractionError> {
         let PupilCells { mut targets_mm, energy, z_mm, center_mm, .. } = PupilCells::find(lens, point, grid)
             .ok_or(DiffractionError::NoLight { wavelength_nm: lens.wavelength_nm() })?;
 
@@ -202,7 +207,7 @@ impl Traced {
         let stop_mm = lens.stop_semi_aperture_mm();
         let in_stop = (0..energy.len()).map(|i| lens.stop_point(rays.point_mm(i)).mm / stop_mm).collect();
         lens.trace_surfaces(behind..lens.n_surfaces(), &mut rays, Vignetting::Off);
-        lens.to_film(&mut rays, film_mm);
+        lens.to_film(&mut rays, film_distance_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         match n_lost {
             0 => Ok(Self { energy, is_clear, in_stop, rays }),
@@ -233,8 +238,9 @@ mod tests {
     fn defocus_of_a_thin_lens_is_its_zernike_term() {
         let lens = Lens::thin(50.0, 5.0).unwrap().at(550.0).unwrap();
         let far = ObjectPoint::Infinite(DVec3::Z);
-        let trace =
-            |film_mm: f64| Wavefront::trace(&lens, &far, film_mm, PupilGrid::STANDARD, WavefrontReference::Chief);
+        let trace = |film_distance_mm: f64| {
+            Wavefront::trace(&lens, &far, film_distance_mm, PupilGrid::STANDARD, WavefrontReference::Chief)
+        };
         assert!(trace(50.0).unwrap().peak_to_valley_waves() < 1e-9);
         // A film 0.1 mm too near: W20 = −dz sin²u / 2 at the edge, seen from a sphere about the film point.
         let wavefront = trace(49.9).unwrap();
@@ -252,10 +258,10 @@ mod tests {
     #[test]
     fn a_fisheye_has_a_wavefront_as_far_as_it_sees() {
         let lens = Lens::built_in("fisheye-12.5mm").unwrap().with_f_number(16.0, 550.0).unwrap().at(550.0).unwrap();
-        let film_mm = lens.film_mm_for(f64::INFINITY).unwrap();
+        let film_distance_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
         for field_deg in [0.0f64, 30.0, 60.0, 62.0, 70.0, 80.0, 85.0] {
             let point = ObjectPoint::from_field(&lens, DVec2::new(0.6, 0.8) * field_deg.to_radians().tan(), 0.0);
-            let trace = |grid, reference| Wavefront::trace(&lens, &point, film_mm, grid, reference).unwrap();
+            let trace = |grid, reference| Wavefront::trace(&lens, &point, film_distance_mm, grid, reference).unwrap();
             let best = trace(PupilGrid::STANDARD, WavefrontReference::Best);
             assert!((best.energy.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             // The edge of the pupil is that of the stop, or within it where rims vignette; nodes stay off it by 1 %.
@@ -269,7 +275,7 @@ mod tests {
             assert!((finer.rms_waves() / best.rms_waves() - 1.0).abs() < 1e-3, "{field_deg}°");
             // The chief ray is that through the middle of the stop, where the wavefront is 0.
             let chief = trace(PupilGrid::STANDARD, WavefrontReference::Chief);
-            assert_eq!(Some(chief.center_mm), lens.chief_film_point_mm(&point, film_mm));
+            assert_eq!(Some(chief.center_mm), lens.chief_film_point_mm(&point, film_distance_mm));
             let inner =
                 (0..chief.pupil.len()).min_by(|&a, &b| chief.pupil[a].length().total_cmp(&chief.pupil[b].length()));
             assert!(chief.opd_waves[inner.unwrap()].abs() < 0.05, "{field_deg}°");
@@ -279,10 +285,11 @@ mod tests {
     #[test]
     fn strehl_ratio_of_a_wide_field_is_that_of_huygens_sum() {
         let lens = Lens::built_in("fisheye-12.5mm").unwrap().with_f_number(8.0, 550.0).unwrap().at(550.0).unwrap();
-        let film_mm = lens.film_mm_for(f64::INFINITY).unwrap();
+        let film_distance_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.0, 80f64.to_radians().tan()), 0.0);
-        let best = Wavefront::trace(&lens, &point, film_mm, PupilGrid::STANDARD, WavefrontReference::Best).unwrap();
-        let sources = crate::HuygensSources::trace(&lens, &point, film_mm, best.center_mm, 60).unwrap();
+        let best =
+            Wavefront::trace(&lens, &point, film_distance_mm, PupilGrid::STANDARD, WavefrontReference::Best).unwrap();
+        let sources = crate::HuygensSources::trace(&lens, &point, film_distance_mm, best.center_mm, 60).unwrap();
         let summed = sources.strehl_at(best.center_mm);
         // The amplitudes of the sum follow the brightness of the exit cone, which at 80° is uneven: 2.5e-4 was found.
         assert!((summed - best.strehl()).abs() < 1e-3, "{summed} {}", best.strehl());

@@ -67,11 +67,11 @@ fn traced_thin_lens_has_the_pattern_of_its_hankel_transform() {
 }
 
 /// Returns the L1 difference of plane-wave and spherical-wave sums over a window of `n`² places.
-fn against_huygens(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, pitch_um: f64, n_rings: usize) -> f64 {
+fn against_huygens(lens: &MonoLens, point: &ObjectPoint, film_distance_mm: f64, pitch_um: f64, n_rings: usize) -> f64 {
     let points = WaveQuality { points_per_pixel: Some(1), ..WaveQuality::default() };
-    let psf = wave_psf(lens, point, film_mm, &window(pitch_um, 25), points).unwrap();
+    let psf = wave_psf(lens, point, film_distance_mm, &window(pitch_um, 25), points).unwrap();
     let places: Vec<DVec2> = psf.samples.indexed_iter().map(|((row, column), _)| psf.pixel_mm(row, column)).collect();
-    let huygens = HuygensSources::trace(lens, point, film_mm, psf.center_mm, 2 * n_rings).unwrap();
+    let huygens = HuygensSources::trace(lens, point, film_distance_mm, psf.center_mm, 2 * n_rings).unwrap();
     let area = (pitch_um * 1e-3).powi(2);
     let expected = huygens.irradiance_per_mm2(&places);
     let difference: f64 = psf.samples.iter().zip(&expected).map(|(a, b)| (a - b * area).abs()).sum();
@@ -82,8 +82,8 @@ fn against_huygens(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, pitch_um:
 fn plane_waves_agree_with_spherical_waves_written_out() {
     for (f_number, degrees) in [(8.0, 0.0), (8.0, 10.0), (4.0, 0.0), (4.0, 10.0)] {
         let lens = dgauss(f_number);
-        let film_mm = lens.film_mm_for(2000.0).unwrap();
-        let error = against_huygens(&lens, &field(&lens, degrees, 0.5), film_mm, 0.55 * f_number / 3.0, 50);
+        let film_distance_mm = lens.film_distance_mm_for(2000.0).unwrap();
+        let error = against_huygens(&lens, &field(&lens, degrees, 0.5), film_distance_mm, 0.55 * f_number / 3.0, 50);
         assert!(error < 0.005, "f/{f_number} at {degrees}°: {error}");
     }
 }
@@ -93,10 +93,11 @@ fn half_again_as_many_nodes_change_little() {
     // In focus, out of focus by up to 8 waves, off axis and vignetted.
     for (f_number, degrees, shift_mm) in [(8.0, 0.0, 0.0), (8.0, 12.0, 0.15), (4.0, 0.0, 0.3), (4.0, 12.0, 0.0)] {
         let lens = dgauss(f_number);
-        let (point, film_mm) = (field(&lens, degrees, 0.5), lens.film_mm_for(2000.0).unwrap() + shift_mm);
+        let (point, film_distance_mm) =
+            (field(&lens, degrees, 0.5), lens.film_distance_mm_for(2000.0).unwrap() + shift_mm);
         let window = window(2.0, 48);
-        let nodes = pupil_samples(&lens, &point, film_mm, &window, WaveQuality::default()).unwrap();
-        let more = PupilSamples::trace(&lens, &point, film_mm, nodes.grid.scaled(1.5), None).unwrap();
+        let nodes = pupil_samples(&lens, &point, film_distance_mm, &window, WaveQuality::default()).unwrap();
+        let more = PupilSamples::trace(&lens, &point, film_distance_mm, nodes.grid.scaled(1.5), None).unwrap();
         let error = l1(&nodes.psf(&window, None).unwrap(), &more.psf(&window, None).unwrap());
         assert!(error < 1e-3, "f/{f_number} at {degrees}°, {shift_mm} mm: {error}");
     }
@@ -105,10 +106,11 @@ fn half_again_as_many_nodes_change_little() {
 #[test]
 fn energy_in_a_wide_window_is_nearly_all() {
     let lens = dgauss(8.0);
-    let film_mm = lens.film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.film_distance_mm_for(2000.0).unwrap();
     for degrees in [0.0, 10.0] {
         // ±40 λN.
-        let psf = wave_psf(&lens, &field(&lens, degrees, 0.5), film_mm, &window(4.4, 80), WaveQuality::default());
+        let psf =
+            wave_psf(&lens, &field(&lens, degrees, 0.5), film_distance_mm, &window(4.4, 80), WaveQuality::default());
         let psf = psf.unwrap();
         assert!((0.994..1.0).contains(&psf.captured), "{degrees}°: {}", psf.captured);
         // A film's row of the picture is the same energy, mirrored.
@@ -120,10 +122,10 @@ fn energy_in_a_wide_window_is_nearly_all() {
 fn window_may_lie_anywhere_and_is_in_the_picture_frame() {
     // A scene point to the right and above lands in the film's left lower part, and its comatic tail is vignetted.
     let lens = dgauss(4.0);
-    let (point, film_mm) = (field(&lens, 12.0, 0.5), lens.film_mm_for(2000.0).unwrap());
+    let (point, film_distance_mm) = (field(&lens, 12.0, 0.5), lens.film_distance_mm_for(2000.0).unwrap());
     // The same places in a pixel for both windows, whichever way of summing suits each.
     let quality = WaveQuality { points_per_pixel: Some(3), ..WaveQuality::default() };
-    let all = wave_psf(&lens, &point, film_mm, &window(1.0, 61), quality).unwrap();
+    let all = wave_psf(&lens, &point, film_distance_mm, &window(1.0, 61), quality).unwrap();
     assert!(all.center_mm.x < 0.0 && all.center_mm.y < 0.0 && all.center_mm == all.centroid_mm);
     let mut moment = DVec2::ZERO;
     for ((row, column), share) in all.samples.indexed_iter() {
@@ -134,7 +136,7 @@ fn window_may_lie_anywhere_and_is_in_the_picture_frame() {
     // Part of the window, 7 columns to the right and 4 rows up in the picture.
     let center = all.pixel_mm(30 - 4, 30 + 7);
     let part = WaveWindow { rows: 11, columns: 9, center: WindowCenter::At(center), ..window(1.0, 0) };
-    let part = wave_psf(&lens, &point, film_mm, &part, quality).unwrap();
+    let part = wave_psf(&lens, &point, film_distance_mm, &part, quality).unwrap();
     for ((row, column), share) in part.samples.indexed_iter() {
         let expected = all.samples[(row + 26 - 5, column + 37 - 4)];
         assert!((share - expected).abs() < 1e-5 * all.samples[(30, 30)], "{row} {column}: {share} {expected}");
@@ -150,86 +152,86 @@ fn image_in_a_medium_is_smaller_by_its_index() {
         Lens::new("one surface", "made up", vec![interface], 0).unwrap().at(550.0).unwrap()
     };
     let lens = glass(1.5);
-    let film_mm = lens.film_mm_for(f64::INFINITY).unwrap();
+    let film_distance_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
     let far = ObjectPoint::Infinite(DVec3::Z);
-    let nodes = PupilSamples::trace(&lens, &far, film_mm, PupilGrid::STANDARD, None).unwrap();
+    let nodes = PupilSamples::trace(&lens, &far, film_distance_mm, PupilGrid::STANDARD, None).unwrap();
     // NA is that of a pupil of 2 mm at 40 mm, in air: it does not change on a plane window behind.
     assert!((nodes.numerical_aperture() / 0.05 - 1.0).abs() < 0.01, "{}", nodes.numerical_aperture());
-    let error = against_huygens(&lens, &far, film_mm, 1.5, 40);
+    let error = against_huygens(&lens, &far, film_distance_mm, 1.5, 40);
     assert!(error < 5e-3, "{error}");
 }
 
 #[test]
 fn pinhole_sends_spherical_waves() {
     let lens = Lens::pinhole(0.3).unwrap().at(550.0).unwrap();
-    for (point, film_mm) in [
+    for (point, film_distance_mm) in [
         (ObjectPoint::Infinite(DVec3::Z), 50.0),
         (ObjectPoint::Finite(DVec3::new(30.0, -10.0, -400.0)), 30.0),
         (ObjectPoint::Infinite(DVec3::Z), 10.0),
     ] {
-        let nodes = PupilSamples::trace(&lens, &point, film_mm, PupilGrid::STANDARD, None).unwrap();
+        let nodes = PupilSamples::trace(&lens, &point, film_distance_mm, PupilGrid::STANDARD, None).unwrap();
         assert_eq!(nodes.propagation, Propagation::Fresnel);
-        let error = against_huygens(&lens, &point, film_mm, 0.6 * film_mm, 40);
-        assert!(error < 5e-3, "{film_mm} mm: {error}");
+        let error = against_huygens(&lens, &point, film_distance_mm, 0.6 * film_distance_mm, 40);
+        assert!(error < 5e-3, "{film_distance_mm} mm: {error}");
     }
 }
 
 #[test]
 fn polychromatic_psf_is_the_weighted_mean() {
     let lens = Lens::built_in("paper-2el").unwrap().with_f_number(12.0, 550.0).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     let point = ObjectPoint::from_field(&lens.at(550.0).unwrap(), DVec2::new(0.1, 0.0), 0.5);
     let spectrum = [(500.0, 1.0), (550.0, 3.0)];
     let window = WaveWindow { rows: 30, ..window(4.0, 33) };
-    let sum = polychromatic_psf(&lens, &point, film_mm, &window, &spectrum, WaveQuality::default()).unwrap();
+    let sum = polychromatic_psf(&lens, &point, film_distance_mm, &window, &spectrum, WaveQuality::default()).unwrap();
     let at = WaveWindow { center: WindowCenter::At(sum.center_mm), ..window };
-    let [short, long] =
-        [500.0, 550.0].map(|nm| wave_psf(&lens.at(nm).unwrap(), &point, film_mm, &at, WaveQuality::default()).unwrap());
+    let [short, long] = [500.0, 550.0]
+        .map(|nm| wave_psf(&lens.at(nm).unwrap(), &point, film_distance_mm, &at, WaveQuality::default()).unwrap());
     let expected = &short.samples * 0.25 + &long.samples * 0.75;
     assert!((&sum.samples - &expected).mapv(f64::abs).sum() < 1e-12);
     assert!((sum.centroid_mm - 0.25 * short.centroid_mm - 0.75 * long.centroid_mm).length() < 1e-5);
-    let no_light = polychromatic_psf(&lens, &point, film_mm, &window, &[(500.0, 0.0)], WaveQuality::default());
+    let no_light = polychromatic_psf(&lens, &point, film_distance_mm, &window, &[(500.0, 0.0)], WaveQuality::default());
     assert_eq!(no_light.unwrap_err(), DiffractionError::Weights);
 }
 
 #[test]
 fn what_cannot_be_had_is_an_error() {
     let lens = dgauss(4.0);
-    let film_mm = lens.film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.film_distance_mm_for(2000.0).unwrap();
     let far_off = field(&lens, 60.0, 0.5);
     let default = WaveQuality::default();
-    let error = wave_psf(&lens, &far_off, film_mm, &window(2.0, 8), default).unwrap_err();
+    let error = wave_psf(&lens, &far_off, film_distance_mm, &window(2.0, 8), default).unwrap_err();
     assert_eq!(error, DiffractionError::NoLight { wavelength_nm: 550.0 });
     let point = field(&lens, 0.0, 0.5);
-    let error = wave_psf(&lens, &point, film_mm + 10.0, &window(2.0, 8), default).unwrap_err();
+    let error = wave_psf(&lens, &point, film_distance_mm + 10.0, &window(2.0, 8), default).unwrap_err();
     assert!(matches!(error, DiffractionError::TooBlurred { .. }), "{error}");
     for window in [window(0.0, 8), window(f64::NAN, 8), window(2.0, 0)] {
-        let error = wave_psf(&lens, &point, film_mm, &window, default).unwrap_err();
+        let error = wave_psf(&lens, &point, film_distance_mm, &window, default).unwrap_err();
         assert!(matches!(error, DiffractionError::Setting { .. }), "{error}");
     }
     let few = WaveQuality { nodes: Some(PupilGrid { n_radii: 8, n_azimuths: 20 }), ..default };
-    let error = wave_psf(&lens, &point, film_mm + 0.2, &window(2.0, 32), few).unwrap_err();
+    let error = wave_psf(&lens, &point, film_distance_mm + 0.2, &window(2.0, 32), few).unwrap_err();
     assert!(matches!(error, DiffractionError::TooFewNodes { n_radii: 8, n_azimuths: 20, .. }), "{error}");
 }
 
 #[test]
 fn strehl_ratio_of_small_aberrations_is_that_of_their_rms() {
     let lens = dgauss(8.0);
-    let film_mm = lens.film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.film_distance_mm_for(2000.0).unwrap();
     let point = field(&lens, 0.0, 0.5);
     for shift_mm in [-0.02, 0.02] {
-        let nodes = PupilSamples::trace(&lens, &point, film_mm + shift_mm, PupilGrid::STANDARD, None).unwrap();
+        let nodes = PupilSamples::trace(&lens, &point, film_distance_mm + shift_mm, PupilGrid::STANDARD, None).unwrap();
         let peak = nodes.peak().unwrap();
         let wavefront = dioptric_diffraction::Wavefront::trace(
             &lens,
             &point,
-            film_mm + shift_mm,
+            film_distance_mm + shift_mm,
             PupilGrid::STANDARD,
             dioptric_diffraction::WavefrontReference::Best,
         )
         .unwrap();
         let marechal = (-(TAU * wavefront.rms_waves()).powi(2)).exp();
         assert!((peak.strehl - wavefront.strehl()).abs() < 2e-3 && (peak.strehl - marechal).abs() < 0.02);
-        assert!((peak.film_mm - wavefront.center_mm).length() < 1e-5);
+        assert!((peak.on_film_mm - wavefront.center_mm).length() < 1e-5);
     }
 }

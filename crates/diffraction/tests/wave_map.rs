@@ -8,12 +8,12 @@ fn dgauss(f_number: f64, wavelength_nm: f64) -> MonoLens {
     Lens::built_in("dgauss-50mm").unwrap().with_f_number(f_number, 550.0).unwrap().at(wavelength_nm).unwrap()
 }
 
-fn map(lens: &MonoLens, field_tan: f64, dioptres: f64, film_mm: f64) -> PupilFunctionFit {
+fn map(lens: &MonoLens, field_tan: f64, dioptres: f64, film_distance_mm: f64) -> PupilFunctionFit {
     let point = ObjectPoint::from_field(lens, DVec2::new(field_tan, 0.0), dioptres);
     let pupil = PupilBoundary::find(lens, &point, 96).unwrap();
     let edge =
         PupilOutline { center_x_mm: pupil.center_mm().x, z_mm: pupil.z_mm(), rho_mm: pupil.rho_at_azimuths_mm() };
-    PupilFunctionFit::trace(lens, &point, film_mm, edge).unwrap()
+    PupilFunctionFit::trace(lens, &point, film_distance_mm, edge).unwrap()
 }
 
 fn l1(a: &WavePsf, b: &WavePsf) -> f64 {
@@ -27,14 +27,14 @@ fn fitted_waves_give_the_pattern_of_traced_ones() {
         [(8.0, 0.0, 0.0), (8.0, 12.0, 0.15), (4.0, 8.0, 0.05), (2.8, 14.0, 0.0), (2.1, 4.0, 0.0)]
     {
         let lens = dgauss(f_number, 550.0);
-        let film_mm = lens.film_mm_for(2000.0).unwrap() + shift_mm;
+        let film_distance_mm = lens.film_distance_mm_for(2000.0).unwrap() + shift_mm;
         let tan = f64::to_radians(degrees).tan();
-        let map = map(&lens, tan, 0.5, film_mm);
+        let map = map(&lens, tan, 0.5, film_distance_mm);
         let turn = DVec2::from_angle(0.4);
         let found = map.psf(550.0, turn, 2.0, (48, 48)).unwrap();
         let point = ObjectPoint::from_field(&lens, turn * tan, 0.5);
         let window = WaveWindow { pitch_um: 2.0, rows: 48, columns: 48, center: WindowCenter::Centroid };
-        let expected = wave_psf(&lens, &point, film_mm, &window, WaveQuality::default()).unwrap();
+        let expected = wave_psf(&lens, &point, film_distance_mm, &window, WaveQuality::default()).unwrap();
         let error = l1(&found, &expected);
         println!("f/{f_number} {degrees}°: L1 {error:.2e}, fit {:.1e} waves", map.error_waves());
         // The kinks of a vignetted edge are known at 96 azimuths only.
@@ -48,7 +48,7 @@ fn fitted_waves_give_the_pattern_of_traced_ones() {
 #[test]
 fn parts_of_a_fit_mix_to_it() {
     let lens = dgauss(8.0, 550.0);
-    let map = map(&lens, 0.1, 0.5, lens.film_mm_for(2000.0).unwrap());
+    let map = map(&lens, 0.1, 0.5, lens.film_distance_mm_for(2000.0).unwrap());
     // Quarters have no rounding.
     assert_eq!(
         PupilFunctionFit::mix([(&map, 0.25), (&map, 0.75)].into_iter()).unwrap().error_waves(),

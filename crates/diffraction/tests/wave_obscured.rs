@@ -116,7 +116,7 @@ fn rectangle_has_its_sinc() {
             let u = at * DVec2::new(half_x_mm, half_y_mm) * (2.0 * turns_per_mm);
             4.0 * half_x_mm * half_y_mm * (turns_per_mm * sinc(u.x) * sinc(u.y)).powi(2)
         };
-        // A decentred opening sees the lens's slopes up to 2 mm of 500 off the axis.
+        // A decentered opening sees the lens's slopes up to 2 mm of 500 off the axis.
         check_places(&nodes, 3.0, expected, 2e-4);
     }
 }
@@ -135,7 +135,7 @@ fn ellipse_has_airys_pattern_stretched() {
 }
 
 #[test]
-fn decentred_discs_and_a_spider_are_a_sum_of_their_transforms() {
+fn decentered_discs_and_a_spider_are_a_sum_of_their_transforms() {
     // Two vanes that cross under a disc, and a disc by itself off the middle.
     let vane = |half_x_mm, half_y_mm| aperture(Outline::Rectangle { half_x_mm, half_y_mm }, [0.0; 2], true);
     let (hub_mm, vane_mm, spot_mm, spot) = (0.6, 0.1, 0.3, DVec2::new(1.3, 0.9));
@@ -179,14 +179,16 @@ fn holes_of_a_real_lens_agree_with_huygens() {
     ];
     for (apertures, degrees) in cases {
         let lens = with(&lens, apertures.clone());
-        let film_mm = lens.film_mm_for(2000.0).unwrap();
+        let film_distance_mm = lens.film_distance_mm_for(2000.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.6, 0.8) * f64::to_radians(degrees).tan(), 0.5);
         let window = WaveWindow { pitch_um: 1.5, rows: 15, columns: 15, center: WindowCenter::Centroid };
         let points = WaveQuality { points_per_pixel: Some(1), ..WaveQuality::default() };
-        let psf = wave_psf(&lens, &point, film_mm, &window, points).unwrap();
+        let psf = wave_psf(&lens, &point, film_distance_mm, &window, points).unwrap();
         let places: Vec<DVec2> = psf.samples.indexed_iter().map(|((row, col), _)| psf.pixel_mm(row, col)).collect();
         let sum = |n: usize| {
-            HuygensSources::trace(&lens, &point, film_mm, psf.center_mm, n).unwrap().irradiance_per_mm2(&places)
+            HuygensSources::trace(&lens, &point, film_distance_mm, psf.center_mm, n)
+                .unwrap()
+                .irradiance_per_mm2(&places)
         };
         let (coarse, expected) = (sum(96), sum(144));
         let total: f64 = expected.iter().sum();
@@ -205,20 +207,21 @@ fn wavefront_of_an_annulus_has_its_defocus() {
     let hole: f64 = 0.5;
     let lens = thin(vec![disc(0.5 * DIAMETER_MM * hole, [0.0; 2])]);
     let shift_mm = 8.0 * (FOCAL_MM / DIAMETER_MM).powi(2) * WAVELENGTH_NM * 1e-6 * 0.2;
-    let film_mm = FOCAL_MM - shift_mm;
-    let wavefront = Wavefront::trace(&lens, &far(), film_mm, PupilGrid::STANDARD, WavefrontReference::Best).unwrap();
-    let edge_waves = 0.2 * FOCAL_MM / film_mm;
+    let film_distance_mm = FOCAL_MM - shift_mm;
+    let wavefront =
+        Wavefront::trace(&lens, &far(), film_distance_mm, PupilGrid::STANDARD, WavefrontReference::Best).unwrap();
+    let edge_waves = 0.2 * FOCAL_MM / film_distance_mm;
     let expected = edge_waves * (1.0 - hole * hole) / 12f64.sqrt();
     assert!((wavefront.rms_waves() / expected - 1.0).abs() < 3e-3, "{} {expected}", wavefront.rms_waves());
     assert!((wavefront.zernike_waves(11)[3] / (edge_waves / 12f64.sqrt()) - 1.0).abs() < 3e-3);
     // What is nowhere in the light does not count between the highest and the lowest; radii are a fortieth apart there.
     let fine = PupilGrid { n_radii: 60, n_azimuths: 16 };
-    let fine = Wavefront::trace(&lens, &far(), film_mm, fine, WavefrontReference::Best).unwrap();
+    let fine = Wavefront::trace(&lens, &far(), film_distance_mm, fine, WavefrontReference::Best).unwrap();
     let found = fine.peak_to_valley_waves() / edge_waves;
     assert!(found < 1.0 - hole * hole && found > 1.0 - (hole + 0.026).powi(2), "{found}");
     let expected = sinc(edge_waves * (1.0 - hole * hole)).powi(2);
     assert!((wavefront.strehl() - expected).abs() < 2e-3, "{} {expected}", wavefront.strehl());
-    let nodes = PupilSamples::trace(&lens, &far(), film_mm, PupilGrid::STANDARD, None).unwrap();
+    let nodes = PupilSamples::trace(&lens, &far(), film_distance_mm, PupilGrid::STANDARD, None).unwrap();
     assert!((nodes.peak().unwrap().strehl - expected).abs() < 2e-3, "{:?}", nodes.peak());
 }
 

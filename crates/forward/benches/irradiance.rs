@@ -17,7 +17,10 @@ fn scene_through_the_double_gauss(criterion: &mut Criterion) {
     let domain = PsfDomain {
         lens: &lens,
         film: &film,
-        film_mm: lens.at(550.0).and_then(|mono| mono.film_mm_for(1000.0)).expect("1 m can be in focus"),
+        film_distance_mm: lens
+            .at(550.0)
+            .and_then(|mono| mono.film_distance_mm_for(1000.0))
+            .expect("1 m can be in focus"),
         depth_range_m: scene.depth.as_ref().expect("it has depth").range_m(),
         grid: &grid,
         diffraction: Diffraction::Hurb { gamma: 1.0 },

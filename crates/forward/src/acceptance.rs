@@ -472,7 +472,7 @@ fn a_scene_finer_than_the_film_is_averaged_over_pixels() {
     scene.film = Film { rows: 100, columns: 100, pitch_um: 3.0 };
     let picture = rendered(&scene.source(), &lens(), &scene.film, &Settings::default()).remove(0);
     for &value in picture.slice(s![5..95, 5..95]) {
-        assert!((value - 0.5).abs() < 0.06, "a checkerboard of pixels is grey, not {value}");
+        assert!((value - 0.5).abs() < 0.06, "a checkerboard of pixels is gray, not {value}");
     }
 }
 

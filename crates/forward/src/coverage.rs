@@ -15,7 +15,7 @@ pub struct PsfDomain<'a> {
     /// The film.
     pub film: &'a Film,
     /// Distance of the film behind the last vertex, mm.
-    pub film_mm: f64,
+    pub film_distance_mm: f64,
     /// Nearest and farthest depth of the scene, m; the farthest may be infinite.
     pub depth_range_m: (f64, f64),
     /// The bands.
@@ -40,12 +40,12 @@ impl PsfDomain<'_> {
         let (far, near) = self.dioptres()?;
         let (first_nm, last_nm) = self.grid.range_nm();
         let BankSettings { reference_wavelength_nm, .. } =
-            BankSettings::covering(self.film_mm, 0.0, (far, near), (first_nm, last_nm), self.diffraction);
+            BankSettings::covering(self.film_distance_mm, 0.0, (far, near), (first_nm, last_nm), self.diffraction);
         let reference = self.lens.at(reference_wavelength_nm)?;
         for wavelength_nm in [first_nm, last_nm] {
             let lens = self.lens.at(wavelength_nm)?;
             for dioptres in [far, near] {
-                look(&Aim { lens: &lens, reference: &reference, dioptres, film_mm: self.film_mm })?;
+                look(&Aim { lens: &lens, reference: &reference, dioptres, film_distance_mm: self.film_distance_mm })?;
             }
         }
         Ok(())
@@ -77,7 +77,7 @@ impl PsfDomain<'_> {
             Ok(())
         })?;
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
-        Ok(BankSettings::covering(self.film_mm, last_field_tan, dioptres, wavelengths_nm, self.diffraction))
+        Ok(BankSettings::covering(self.film_distance_mm, last_field_tan, dioptres, wavelengths_nm, self.diffraction))
     }
 
     /// Returns such settings for any lens: a grid of fields to beyond the film's sides, the rest as
@@ -99,7 +99,13 @@ impl PsfDomain<'_> {
             Ok(())
         })?;
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
-        Ok(BankSettings::covering_grid(self.film_mm, (first, last), dioptres, wavelengths_nm, self.diffraction))
+        Ok(BankSettings::covering_grid(
+            self.film_distance_mm,
+            (first, last),
+            dioptres,
+            wavelengths_nm,
+            self.diffraction,
+        ))
     }
 }
 
@@ -133,7 +139,7 @@ struct Aim<'a> {
     lens: &'a MonoLens,
     reference: &'a MonoLens,
     dioptres: f64,
-    film_mm: f64,
+    film_distance_mm: f64,
 }
 
 /// The widest fields that are sought: 60 is 89°.
@@ -155,19 +161,19 @@ impl Aim<'_> {
         let targets: Vec<DVec2> = std::iter::once(pupil.center_mm()).chain(edge).collect();
         let mut rays = rays_towards(&point, &targets, pupil.z_mm(), 0.0);
         self.lens.trace(&mut rays, Vignetting::Off);
-        self.lens.to_film(&mut rays, self.film_mm);
+        self.lens.to_film(&mut rays, self.film_distance_mm);
         if !rays.fate[0].is_in_flight() {
             return None;
         }
-        Some(self.lens.landed(&rays, self.film_mm).map(FilmPoint::in_picture_mm).collect())
+        Some(self.lens.landed(&rays, self.film_distance_mm).map(FilmPoint::in_picture_mm).collect())
     }
 
     /// Returns the radius of the blur on the axis, mm, from first-order optics.
     fn axial_blur_mm(&self) -> f64 {
         let from_vertex_mm = 1e3 / self.dioptres - self.lens.projection_center_z_mm();
-        let Ok(image_mm) = self.lens.film_mm_for(from_vertex_mm) else { return 0.0 };
+        let Ok(image_mm) = self.lens.film_distance_mm_for(from_vertex_mm) else { return 0.0 };
         let cone = 0.5 / (self.lens.image_index() * self.lens.working_f_number(from_vertex_mm));
-        (cone * (self.film_mm - image_mm)).abs()
+        (cone * (self.film_distance_mm - image_mm)).abs()
     }
 
     /// Returns how far from the middle of a field's light its farthest ray lands, mm.

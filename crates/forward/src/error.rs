@@ -84,7 +84,7 @@ pub enum ForwardError {
     /// A band at a wavelength for which the bank was not traced.
     #[error("the scene has a band at {wavelength_nm} nm, but the lens was traced from {first_nm} to {last_nm} nm")]
     WavelengthOutside {
-        /// Centre of the band, nm.
+        /// Center of the band, nm.
         wavelength_nm: f64,
         /// Shortest wavelength of the bank, nm.
         first_nm: f64,

@@ -16,15 +16,22 @@ use ndarray::Array2;
 struct Camera {
     lens: Lens,
     film: Film,
-    film_mm: f64,
+    film_distance_mm: f64,
     depth_range_m: (f64, f64),
     grid: WavelengthGrid,
 }
 
 impl Camera {
     fn domain(&self) -> PsfDomain<'_> {
-        let Self { lens, film, film_mm, depth_range_m, grid } = self;
-        PsfDomain { lens, film, film_mm: *film_mm, depth_range_m: *depth_range_m, grid, diffraction: Diffraction::None }
+        let Self { lens, film, film_distance_mm, depth_range_m, grid } = self;
+        PsfDomain {
+            lens,
+            film,
+            film_distance_mm: *film_distance_mm,
+            depth_range_m: *depth_range_m,
+            grid,
+            diffraction: Diffraction::None,
+        }
     }
 
     fn any_lens(&self) -> LensImageModel {
@@ -65,10 +72,10 @@ fn turned(surfaces: (usize, usize), pivot_mm: f64, tilt_deg: [f64; 3]) -> Coordi
 #[test]
 fn of_a_symmetric_lens_the_picture_is_that_of_the_turned_bank() {
     let lens = double_gauss();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(1500.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(1500.0).unwrap();
     let grid = WavelengthGrid::new(vec![450.0, 550.0, 650.0]).unwrap();
     let film = Film { rows: 200, columns: 300, pitch_um: 100.0 };
-    let camera = Camera { lens, film, film_mm, depth_range_m: (1.0, 1.5), grid };
+    let camera = Camera { lens, film, film_distance_mm, depth_range_m: (1.0, 1.5), grid };
     let bars = Array2::from_shape_fn((240, 340), |(r, c)| if (r / 13 + c / 11) % 2 == 0 { 1.0 } else { 0.2 });
     let z_m = Array2::from_shape_fn((240, 340), |(_, c)| if c < 150 { 1.0 } else { 1.5 });
     let scene = scene(vec![bars; 3], &camera.grid, z_m, 545.0);
@@ -102,10 +109,10 @@ fn anamorphic() -> Lens {
 fn a_uniform_plane_gets_the_pupil_over_both_magnifications() {
     let lens = anamorphic();
     let mono = lens.at(550.0).unwrap();
-    let film_mm = 0.5 * (mono.first_order().bfl_mm + mono.first_order_x().bfl_mm);
+    let film_distance_mm = 0.5 * (mono.first_order().bfl_mm + mono.first_order_x().bfl_mm);
     let grid = WavelengthGrid::new(vec![550.0]).unwrap();
     let film = Film { rows: 64, columns: 64, pitch_um: 20.0 };
-    let camera = Camera { lens, film, film_mm, depth_range_m: (1e4, 1e4), grid };
+    let camera = Camera { lens, film, film_distance_mm, depth_range_m: (1e4, 1e4), grid };
     let flat = |value| Array2::from_elem((400, 400), value);
     let picture = camera.image(&camera.any_lens(), &scene(vec![flat(0.37)], &camera.grid, flat(1e4), 4000.0)).remove(0);
     // How far the light of a small field lands, and the pupil that it passes, traced here.
@@ -114,7 +121,7 @@ fn a_uniform_plane_gets_the_pupil_over_both_magnifications() {
         let point = ObjectPoint::from_field(&mono, field_tan, 0.0);
         let mut rays = rays_over_front(&mono, &point, 1000);
         mono.trace(&mut rays, Vignetting::On);
-        mono.to_film(&mut rays, film_mm);
+        mono.to_film(&mut rays, film_distance_mm);
         let through: Vec<usize> = (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()).collect();
         through.iter().map(|&i| rays.point_mm(i).truncate()).sum::<DVec2>() / through.len() as f64
     };
@@ -137,9 +144,9 @@ fn a_point_lands_where_the_rays_of_a_bent_lens_do() {
     let lens = lens.with_moves(vec![group]).unwrap();
     let grid = WavelengthGrid::new(vec![420.0, 550.0, 680.0]).unwrap();
     let film = Film { rows: 600, columns: 900, pitch_um: 24.0 };
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     let (rows, columns, focal_px, z_m) = (640, 940, 2100.0, 1.6);
-    let camera = Camera { lens, film, film_mm, depth_range_m: (z_m, z_m), grid };
+    let camera = Camera { lens, film, film_distance_mm, depth_range_m: (z_m, z_m), grid };
     let bank = camera.any_lens();
     let reference = camera.lens.at(550.0).unwrap();
     for (row, column) in [(319_usize, 500_usize), (120, 800), (560, 100)] {
@@ -152,7 +159,7 @@ fn a_point_lands_where_the_rays_of_a_bent_lens_do() {
             let point = ObjectPoint::from_field(&reference, DVec2::new(tan_x, tan_y), 1.0 / z_m);
             let mut rays = rays_over_front(&lens, &point, 400);
             lens.trace(&mut rays, Vignetting::On);
-            lens.to_film(&mut rays, film_mm);
+            lens.to_film(&mut rays, film_distance_mm);
             let through: Vec<usize> = (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()).collect();
             let mean = |of: &[f64]| through.iter().map(|&i| of[i]).sum::<f64>() / through.len() as f64;
             let expected = DVec2::new(449.5 - 1e3 * mean(&rays.x_mm) / 24.0, 299.5 + 1e3 * mean(&rays.y_mm) / 24.0);
@@ -174,11 +181,11 @@ fn the_depth_in_focus_of_a_turned_lens_follows_the_hinge_rule() {
     let mono = lens.at(550.0).unwrap();
     let first = mono.first_order();
     let (theta_deg, last) = (2.0_f64, lens.interfaces().len() - 1);
-    let film_mm = mono.film_mm_for(2000.0).unwrap();
+    let film_distance_mm = mono.film_distance_mm_for(2000.0).unwrap();
     let tilted = lens.with_moves(vec![turned((0, last), first.front_principal_mm, [theta_deg, 0.0, 0.0])]).unwrap();
     let grid = WavelengthGrid::new(vec![550.0]).unwrap();
     let film = Film { rows: 240, columns: 240, pitch_um: 40.0 };
-    let camera = Camera { lens: tilted, film, film_mm, depth_range_m: (0.5, 1e4), grid };
+    let camera = Camera { lens: tilted, film, film_distance_mm, depth_range_m: (0.5, 1e4), grid };
     let bank = camera.any_lens();
     let in_focus = |field_tan: DVec2| {
         let blur = |dioptres: f64| bank.blur_radius_mm(field_tan, dioptres, 550.0);
@@ -201,7 +208,7 @@ fn a_lens_that_sends_no_light_to_the_film_is_told() {
     let lens = lens.with_moves(vec![turned((0, last), 0.0, [60.0, 0.0, 0.0])]).unwrap();
     let film = Film { rows: 24, columns: 36, pitch_um: 100.0 };
     let grid = WavelengthGrid::new(vec![550.0]).unwrap();
-    let camera = Camera { lens, film, film_mm: 30.0, depth_range_m: (1.0, 2.0), grid };
+    let camera = Camera { lens, film, film_distance_mm: 30.0, depth_range_m: (1.0, 2.0), grid };
     let error = camera.domain().grid_settings().unwrap_err();
     assert!(matches!(error, ForwardError::DarkFilm { .. }), "{error}");
 }

@@ -14,22 +14,23 @@ use ndarray::Array2;
 struct Camera {
     lens: Lens,
     film: Film,
-    film_mm: f64,
+    film_distance_mm: f64,
 }
 
 impl Camera {
     fn new(f_number: f64, focus_m: f64, film: Film) -> Self {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(f_number, 550.0).unwrap();
         let mono = lens.at(550.0).unwrap();
-        let film_mm = mono.film_mm_for(1e3 * focus_m - mono.first_order().entrance_pupil_z_mm).unwrap();
-        Self { lens, film, film_mm }
+        let film_distance_mm =
+            mono.film_distance_mm_for(1e3 * focus_m - mono.first_order().entrance_pupil_z_mm).unwrap();
+        Self { lens, film, film_distance_mm }
     }
 
     fn image(&self, scene: &Scene, diffraction: Diffraction, settings: &Settings) -> Vec<Array2<f32>> {
         let domain = PsfDomain {
             lens: &self.lens,
             film: &self.film,
-            film_mm: self.film_mm,
+            film_distance_mm: self.film_distance_mm,
             depth_range_m: scene.depth.as_ref().unwrap().range_m(),
             grid: scene.radiance.grid(),
             diffraction,
@@ -65,7 +66,7 @@ fn check_radiometry(f_number: f64, z_m: f64, tolerance: f64) {
     let scene = scene(vec![Array2::from_elem((100, 100), radiance)], vec![550.0], z_m, 4000.0);
     let picture = camera.image(&scene, Diffraction::Hurb { gamma: 1.0 }, &Settings::default()).remove(0);
     let first = camera.lens.at(550.0).unwrap().first_order();
-    let image_mm = camera.film_mm - first.rear_principal_mm;
+    let image_mm = camera.film_distance_mm - first.rear_principal_mm;
     let magnification = image_mm / first.efl_mm - 1.0;
     let pupil_magnification = first.exit_pupil_diameter_mm / first.entrance_pupil_diameter_mm;
     let working = f_number * (1.0 + magnification / pupil_magnification);
@@ -102,7 +103,7 @@ fn a_point_lands_where_its_rays_do() {
             let point = ObjectPoint::from_field(&reference, DVec2::new(tan_x, tan_y), 1.0 / z_m);
             let mut rays = rays_over_front(&lens, &point, 400);
             lens.trace(&mut rays, Vignetting::On);
-            lens.to_film(&mut rays, camera.film_mm);
+            lens.to_film(&mut rays, camera.film_distance_mm);
             let through: Vec<usize> = (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()).collect();
             let mean = |of: &[f64]| through.iter().map(|&i| of[i]).sum::<f64>() / through.len() as f64;
             // The picture is the film turned by half a turn.
@@ -158,7 +159,7 @@ fn depth_inside_the_lens_is_refused() {
         let domain = PsfDomain {
             lens: &camera.lens,
             film: &camera.film,
-            film_mm: camera.film_mm,
+            film_distance_mm: camera.film_distance_mm,
             depth_range_m: depth.range_m(),
             grid: &grid,
             diffraction: Diffraction::None,

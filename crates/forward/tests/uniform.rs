@@ -26,7 +26,7 @@ struct Uniform {
     lens: Lens,
     bank: LensImageModel,
     film: Film,
-    film_mm: f64,
+    film_distance_mm: f64,
     plane_m: f64,
     picture: Array2<f32>,
 }
@@ -38,11 +38,11 @@ impl Uniform {
         let film = Film { rows: 48, columns: case.columns, pitch_um: case.pitch_um };
         let grid = WavelengthGrid::new(vec![WAVELENGTH_NM]).unwrap();
         let plane_m = 1e-3 * (case.plane_mm + mono.projection_center_z_mm());
-        let film_mm = mono.film_mm_for(case.focus_mm).unwrap();
+        let film_distance_mm = mono.film_distance_mm_for(case.focus_mm).unwrap();
         let domain = PsfDomain {
             lens: &lens,
             film: &film,
-            film_mm,
+            film_distance_mm,
             depth_range_m: (plane_m, plane_m),
             grid: &grid,
             diffraction: Diffraction::None,
@@ -64,7 +64,7 @@ impl Uniform {
             Ok(())
         })
         .unwrap();
-        Self { lens, bank, film, film_mm, plane_m, picture }
+        Self { lens, bank, film, film_distance_mm, plane_m, picture }
     }
 
     /// Returns the largest second difference along rows and columns, over the mean, and where: of neighbors, less that of pixels
@@ -117,9 +117,9 @@ impl Uniform {
                     let target = pupil.center_mm() + DVec2::from_angle(azimuth) * pupil.rho_max_mm(azimuth);
                     let mut rays = rays_towards(&point, &[target], pupil.z_mm(), 0.0);
                     mono.trace(&mut rays, Vignetting::Off);
-                    mono.to_film(&mut rays, self.film_mm);
+                    mono.to_film(&mut rays, self.film_distance_mm);
                     let cosine = rays.direction(0).truncate();
-                    let off_mm = place_mm - mono.landed(&rays, self.film_mm).next().unwrap().in_picture_mm();
+                    let off_mm = place_mm - mono.landed(&rays, self.film_distance_mm).next().unwrap().in_picture_mm();
                     if off_mm.length() < 1e-6 {
                         return cosine;
                     }

@@ -74,8 +74,8 @@ fn bundle(lens: &MonoLens, n_rays: usize) -> RayBatch {
 
 fn double_gauss() -> (MonoLens, f64) {
     let lens = Lens::built_in("dgauss-50mm").expect("the lens is built in").at(550.0).expect("the glass is known");
-    let film_mm = lens.film_mm_for(2_000.0).expect("the lens focuses");
-    (lens, film_mm)
+    let film_distance_mm = lens.film_distance_mm_for(2_000.0).expect("the lens focuses");
+    (lens, film_distance_mm)
 }
 
 /// Measures a trace of rays that each time start anew.
@@ -90,22 +90,22 @@ where
 }
 
 fn trace(criterion: &mut Criterion<CoreTime>) {
-    let (lens, film_mm) = double_gauss();
+    let (lens, film_distance_mm) = double_gauss();
     let mut group = criterion.benchmark_group("trace/double_gauss");
     for n_rays in [1_000, N_RAYS] {
         let rays = bundle(&lens, n_rays);
         group.throughput(Throughput::Elements((n_rays * (lens.n_surfaces() + 1)) as u64));
         let named = |name: &str| format!("{name}/{n_rays}");
-        measure(&mut group, &named("f64"), &rays, |rays| lens.trace_to_film(rays, Vignetting::On, film_mm));
+        measure(&mut group, &named("f64"), &rays, |rays| lens.trace_to_film(rays, Vignetting::On, film_distance_mm));
         measure(&mut group, &named("f32"), &RayBatchF32::from(&rays), |rays| {
-            lens.trace_to_film_f32(rays, Vignetting::On, film_mm);
+            lens.trace_to_film_f32(rays, Vignetting::On, film_distance_mm);
         });
     }
     group.finish();
 }
 
 fn threads(criterion: &mut Criterion) {
-    let (lens, film_mm) = double_gauss();
+    let (lens, film_distance_mm) = double_gauss();
     let rays = bundle(&lens, N_RAYS);
     let mut group = criterion.benchmark_group("trace/threads");
     group.throughput(Throughput::Elements((rays.len() * lens.n_surfaces()) as u64));
@@ -118,7 +118,7 @@ fn threads(criterion: &mut Criterion) {
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.01 * batch as f64, 0.0), 0.5);
         let beam = Beam { point, targets_mm: &targets_mm, z_mm: lens.first_order().entrance_pupil_z_mm };
         let mut sum = DVec2::ZERO;
-        lens.trace_onto(&beam, Vignetting::On, film_mm, |rays| {
+        lens.trace_onto(&beam, Vignetting::On, film_distance_mm, |rays| {
             for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
                 sum += DVec2::new(rays.x_mm[i], rays.y_mm[i]);
             }
@@ -258,13 +258,13 @@ fn trace_aspheres(criterion: &mut Criterion<CoreTime>) {
 /// Counted pictures: 10 fields by 31 wavelengths of 100,000 rays each on 64 × 64 pixels are 310 of these.
 fn count(criterion: &mut Criterion<CoreTime>) {
     const SIDE: usize = 64;
-    let (lens, film_mm) = double_gauss();
+    let (lens, film_distance_mm) = double_gauss();
     let point = ObjectPoint::from_field(&lens, DVec2::new(0.1, 0.0), 0.5);
     let targets_mm = targets(&lens, N_RAYS, 1.0);
     let beam = Beam { point, targets_mm: &targets_mm, z_mm: lens.first_order().entrance_pupil_z_mm };
     // The chief ray lands in the middle of pixels of 3 µm.
     let mut middle = DVec2::ZERO;
-    lens.trace_onto(&Beam { targets_mm: &[DVec2::ZERO], ..beam }, Vignetting::On, film_mm, |rays| {
+    lens.trace_onto(&Beam { targets_mm: &[DVec2::ZERO], ..beam }, Vignetting::On, film_distance_mm, |rays| {
         middle = rays.point_mm(0).truncate();
     });
     let pixel = |x_mm: f64, y_mm: f64| {
@@ -277,7 +277,7 @@ fn count(criterion: &mut Criterion<CoreTime>) {
     group.bench_function("f64", |bencher| {
         bencher.iter(|| {
             let mut counts = vec![0_u32; SIDE * SIDE];
-            lens.trace_onto(&beam, Vignetting::On, film_mm, |rays| {
+            lens.trace_onto(&beam, Vignetting::On, film_distance_mm, |rays| {
                 for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
                     if let Some(pixel) = pixel(rays.x_mm[i], rays.y_mm[i]) {
                         counts[pixel] += 1;
@@ -291,7 +291,7 @@ fn count(criterion: &mut Criterion<CoreTime>) {
     group.bench_function("f32", |bencher| {
         bencher.iter(|| {
             let mut counts = vec![0_u32; SIDE * SIDE];
-            lens.trace_onto_f32(&beam, Vignetting::On, film_mm, |rays| {
+            lens.trace_onto_f32(&beam, Vignetting::On, film_distance_mm, |rays| {
                 for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
                     if let Some(pixel) = pixel(rays.x_mm[i].into(), rays.y_mm[i].into()) {
                         counts[pixel] += 1;

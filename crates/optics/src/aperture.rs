@@ -111,7 +111,7 @@ impl Aperture {
     }
 
     /// The radius of the circle about the axis that holds the opening, mm.
-    pub(crate) fn reach_mm(&self) -> f64 {
+    pub(crate) fn extent_mm(&self) -> f64 {
         let (half, center) = (self.outline.half_widths_mm(), DVec2::from_array(self.center_mm));
         match self.outline {
             Outline::Rectangle { .. } => (center.abs() + half).length(),
@@ -170,7 +170,7 @@ mod tests {
                     let is_clear = aperture.is_clear_at(x, y);
                     assert_eq!(is_clear, aperture.clearance_mm(x, y) >= 0.0, "{outline:?} {x} {y}");
                     assert_ne!(is_clear, Aperture { is_obscuration: true, ..aperture }.is_clear_at(x, y));
-                    assert!(!is_clear || x.hypot(y) <= aperture.reach_mm());
+                    assert!(!is_clear || x.hypot(y) <= aperture.extent_mm());
                     n_clear += usize::from(is_clear);
                 }
             }

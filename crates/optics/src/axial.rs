@@ -39,12 +39,15 @@ pub struct AxialBeam {
 impl MonoLens {
     /// Finds the beam of the point on the axis at this distance before the first vertex, mm (infinite for a far one).
     ///
-    /// `None` where no light gets through close to the axis, and for lenses that are tilted, decentred or not of
+    /// `None` where no light gets through close to the axis, and for lenses that are tilted, decentered or not of
     /// revolution: of those the stop is taken to limit the light. Obscurations are left out.
     pub fn axial_beam(&self, object_distance_mm: f64) -> Option<AxialBeam> {
         let is_round = |aperture: &Aperture| aperture.is_obscuration || aperture.is_rotational();
         let are_all_round = self.steps().iter().flat_map(|step| &step.apertures).all(is_round);
-        if self.poses().is_some() || !are_all_round || self.steps().iter().any(|s| matches!(s.kind, Kind::Toric(_))) {
+        if self.placements().is_some()
+            || !are_all_round
+            || self.steps().iter().any(|s| matches!(s.kind, Kind::Toric(_)))
+        {
             return None;
         }
         let search = AxialSearch { lens: self, object_distance_mm };

@@ -81,31 +81,43 @@ fn aim_at(aim: &Aim<'_>, targets_mm: &[DVec2], rays: RaySlices<'_>) {
 }
 
 impl MonoLens {
-    /// Traces a beam to the film, `film_mm` behind the last vertex, and shows the rays there to `visit`, a few hundred
+    /// Traces a beam to the film, `film_distance_mm` behind the last vertex, and shows the rays there to `visit`, a few hundred
     /// at a time and in their order.
     ///
     /// The same rays as those of [`rays_towards`](Self::rays_towards) from the first vertex plane and
     /// [`trace_to_film`](Self::trace_to_film), to the bit, without storing them: for counting rays on pixels.
-    pub fn trace_onto(&self, beam: &Beam<'_>, rims: Vignetting, film_mm: f64, mut visit: impl FnMut(&RayBatch)) {
+    pub fn trace_onto(
+        &self,
+        beam: &Beam<'_>,
+        rims: Vignetting,
+        film_distance_mm: f64,
+        mut visit: impl FnMut(&RayBatch),
+    ) {
         let plan = Plan::new(&self.steps_for(beam.point.z_mm()), 0, rims);
         beam.for_each_lot(self.object_index(), |rays| {
             match self.has_plain_film() {
-                true => trace::trace_batch(&plan, Goal::Film { film_mm }, rays.slices()),
-                false => self.trace_to_film(rays, rims, film_mm),
+                true => trace::trace_batch(&plan, Goal::Film { film_distance_mm }, rays.slices()),
+                false => self.trace_to_film(rays, rims, film_distance_mm),
             }
             visit(rays);
         });
     }
 
     /// Traces a beam as [`trace_onto`](Self::trace_onto) does, in single precision: within 0.05 µm, and faster.
-    pub fn trace_onto_f32(&self, beam: &Beam<'_>, rims: Vignetting, film_mm: f64, mut visit: impl FnMut(&RayBatchF32)) {
+    pub fn trace_onto_f32(
+        &self,
+        beam: &Beam<'_>,
+        rims: Vignetting,
+        film_distance_mm: f64,
+        mut visit: impl FnMut(&RayBatchF32),
+    ) {
         let plan = Plan::new(self.steps(), 0, rims);
         let mut single = RayBatchF32::default();
         beam.for_each_lot(self.object_index(), |rays| {
             single.set(rays);
             match self.has_plain_film() {
-                true => trace::trace_batch(&plan, Goal::Film { film_mm }, single.slices()),
-                false => self.trace_to_film_f32(&mut single, rims, film_mm),
+                true => trace::trace_batch(&plan, Goal::Film { film_distance_mm }, single.slices()),
+                false => self.trace_to_film_f32(&mut single, rims, film_distance_mm),
             }
             visit(&single);
         });
@@ -135,9 +147,9 @@ mod tests {
     }
 
     /// Gathers the rays that a beam shows.
-    fn shown(lens: &MonoLens, beam: &Beam<'_>, film_mm: f64) -> RayBatch {
+    fn shown(lens: &MonoLens, beam: &Beam<'_>, film_distance_mm: f64) -> RayBatch {
         let mut all = RayBatch { object_z_mm: beam.point.z_mm(), ..RayBatch::default() };
-        lens.trace_onto(beam, Vignetting::On, film_mm, |rays| {
+        lens.trace_onto(beam, Vignetting::On, film_distance_mm, |rays| {
             for i in 0..rays.len() {
                 all.push(rays.point_mm(i), rays.direction(i), rays.opl_mm[i]);
             }

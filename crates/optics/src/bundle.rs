@@ -14,10 +14,10 @@ pub enum ObjectPoint {
 }
 
 impl ObjectPoint {
-    /// Returns the point seen from the paraxial entrance-pupil centre of `lens` under these tangents of field angles,
-    /// `dioptres` = 1/Z away (Z the axial distance from that centre in metres; 0 is infinitely far).
+    /// Returns the point seen from the paraxial entrance-pupil center of `lens` under these tangents of field angles,
+    /// `dioptres` = 1/Z away (Z the axial distance from that center in metres; 0 is infinitely far).
     ///
-    /// A telecentric lens has no such centre; there the first vertex stands for it
+    /// A telecentric lens has no such center; there the first vertex stands for it
     /// ([`MonoLens::projection_center_z_mm`]).
     pub fn from_field(lens: &MonoLens, field_tan: DVec2, dioptres: f64) -> Self {
         let center_z_mm = lens.projection_center_z_mm();
@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn path_lengths_do_not_depend_on_the_start_plane() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
-        let (film_mm, z_mm) = (36.5, lens.first_order().entrance_pupil_z_mm);
+        let (film_distance_mm, z_mm) = (36.5, lens.first_order().entrance_pupil_z_mm);
         let targets = [DVec2::ZERO, DVec2::new(5.0, 2.0), DVec2::new(-3.0, 7.0)];
         // 1 km away and 20 degrees off, where paths are 4e8 waves of light long.
         for dioptres in [0.0, 1e-3, 2.0] {
@@ -127,7 +127,7 @@ mod tests {
             let paths = |start_z_mm: f64| {
                 let mut rays = rays_towards(&point, &targets, z_mm, start_z_mm);
                 lens.trace(&mut rays, Vignetting::On);
-                lens.to_film(&mut rays, film_mm);
+                lens.to_film(&mut rays, film_distance_mm);
                 [rays.opl_mm[1] - rays.opl_mm[0], rays.opl_mm[2] - rays.opl_mm[0]]
             };
             let (near, far) = (paths(0.0), paths(-100.0));

@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn cornea_of_the_eye_has_its_keratometric_neighbourhood() {
+    fn cornea_of_the_eye_has_its_keratometric_neighborhood() {
         let cornea = GlassCatalogue::built_in().find("eye:cornea").unwrap();
         // The index of the schematic eyes, 1.376, at the wavelength that they are stated for.
         assert!((cornea.glass.index_at(589.3).unwrap() - 1.376).abs() < 2e-4);

@@ -116,7 +116,7 @@ pub enum OpticsError {
         found: f64,
     },
     /// A lens without an axis of symmetry where one is needed.
-    #[error("{task} needs a lens that is centred and rotationally symmetric, which {lens} is not")]
+    #[error("{task} needs a lens that is centered and rotationally symmetric, which {lens} is not")]
     NotRotational {
         /// The lens.
         lens: String,

@@ -3,13 +3,13 @@
 //!
 //! For film places in a table, rays are traced back through a grid of points without rims, and the least clearance from
 //! any rim says which points are lit. Bounds are a span of x for each of some rows of y. Each is one cell of the grid wider than
-//! the points that were lit, and holds those of all wavelengths and of the neighbouring film places about their middles,
+//! the points that were lit, and holds those of all wavelengths and of the neighboring film places about their middles,
 //! so that nothing lit lies outside.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use crate::{MonoLens, OpticsError, Pose, RayBatch, ReversedLens};
+use crate::{MonoLens, OpticsError, Placement, RayBatch, ReversedLens};
 
 /// How far a ray must get to count as lit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub enum PupilReach {
 /// They are conservative: light that reaches the film crosses the plane inside of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExitPupilBounds {
-    plane: Pose,
+    plane: Placement,
     layout: FilmLayout,
     regions: Vec<Option<Region>>,
 }
@@ -77,7 +77,7 @@ impl ExitPupilBounds {
         if !(film_distance_mm > 0.0 && film_distance_mm.is_finite()) {
             return Err(OpticsError::FilmInLens { lens: first.name().to_owned(), film_distance_mm });
         }
-        let plane = last_pose(first);
+        let plane = last_placement(first);
         let seek = |place_mm: DVec2| -> Vec<LitPoints> {
             let find = |lens| LitPoints::find(lens, &plane, place_mm, film_distance_mm, reach);
             lenses.iter().filter_map(find).collect()
@@ -100,24 +100,24 @@ impl ExitPupilBounds {
     }
 
     /// The plane that rays are aimed at: its origin and the directions of its axes in the lens frame.
-    pub fn plane(&self) -> Pose {
+    pub fn plane(&self) -> Placement {
         self.plane
     }
 
     /// Returns the point of the bounds of a film place, mm, for two numbers from 0 to 1; `None` where no light reaches the
-    /// film. Even numbers give even points, neighbouring numbers mostly neighbouring points.
-    pub fn sample(&self, film_mm: DVec2, u: DVec2) -> Option<PupilSample> {
-        let Seen { region, x_axis, middle_mm } = self.region_at(film_mm)?;
+    /// film. Even numbers give even points, neighboring numbers mostly neighboring points.
+    pub fn sample(&self, on_film_mm: DVec2, u: DVec2) -> Option<PupilSample> {
+        let Seen { region, x_axis, middle_mm } = self.region_at(on_film_mm)?;
         let place_mm = middle_mm + region.at(u);
         let on_plane_mm = x_axis * place_mm.x + x_axis.perp() * place_mm.y;
-        let point_mm = self.plane.to_lens(on_plane_mm.extend(0.0));
+        let point_mm = self.plane.lens_from_surface(on_plane_mm.extend(0.0));
         Some(PupilSample { point_mm, area_mm2: region.area_mm2() })
     }
 
     /// Whether a point of the plane, in the lens frame, lies inside the bounds of a film place.
-    pub fn contains(&self, film_mm: DVec2, point_mm: DVec3) -> bool {
-        let own_mm = self.plane.to_own(point_mm).truncate();
-        self.region_at(film_mm).is_some_and(|Seen { region, x_axis, middle_mm }| {
+    pub fn contains(&self, on_film_mm: DVec2, point_mm: DVec3) -> bool {
+        let own_mm = self.plane.surface_from_lens(point_mm).truncate();
+        self.region_at(on_film_mm).is_some_and(|Seen { region, x_axis, middle_mm }| {
             region.contains(DVec2::new(own_mm.dot(x_axis), own_mm.dot(x_axis.perp())) - middle_mm)
         })
     }
@@ -130,17 +130,17 @@ impl ExitPupilBounds {
     }
 
     /// Returns the region of a film place.
-    fn region_at(&self, film_mm: DVec2) -> Option<Seen<'_>> {
+    fn region_at(&self, on_film_mm: DVec2) -> Option<Seen<'_>> {
         match self.layout {
             FilmLayout::Rings { width_mm } => {
-                let r_mm = film_mm.length();
+                let r_mm = on_film_mm.length();
                 let (ring, share) = cell(r_mm / width_mm, N_RINGS);
-                let x_axis = if r_mm > 0.0 { film_mm / r_mm } else { DVec2::X };
+                let x_axis = if r_mm > 0.0 { on_film_mm / r_mm } else { DVec2::X };
                 let region = self.regions[ring].as_ref()?;
                 Some(Seen { region, x_axis, middle_mm: region.middles_mm[0].lerp(region.middles_mm[1], share) })
             }
             FilmLayout::Cells { half_mm } => {
-                let place = (film_mm / half_mm + DVec2::ONE) * (0.5 * N_CELLS as f64);
+                let place = (on_film_mm / half_mm + DVec2::ONE) * (0.5 * N_CELLS as f64);
                 let ((column, x), (row, y)) = (cell(place.x, N_CELLS), cell(place.y, N_CELLS));
                 let region = self.regions[row * N_CELLS + column].as_ref()?;
                 let middle = |row: usize| region.middles_mm[2 * row].lerp(region.middles_mm[2 * row + 1], x);
@@ -164,9 +164,9 @@ fn cell(place: f64, n: usize) -> (usize, f64) {
 }
 
 /// Where the last surface stands.
-fn last_pose(lens: &MonoLens) -> Pose {
+fn last_placement(lens: &MonoLens) -> Placement {
     let last = lens.n_surfaces() - 1;
-    lens.poses().map_or(Pose::centered(lens.last_vertex_z_mm()), |poses| poses[last])
+    lens.placements().map_or(Placement::centered(lens.last_vertex_z_mm()), |placements| placements[last])
 }
 
 /// A grid of points of the plane that holds all lit ones, and which points of each row are lit.
@@ -182,13 +182,13 @@ impl LitPoints {
     /// Finds the lit points for one place of the film, or that there are none.
     fn find(
         lens: &ReversedLens,
-        plane: &Pose,
-        film_mm: DVec2,
+        plane: &Placement,
+        on_film_mm: DVec2,
         film_distance_mm: f64,
         reach: PupilReach,
     ) -> Option<Self> {
-        let film_point_mm = lens.forward().film_site(film_mm, film_distance_mm)?.point_mm;
-        let (mut low_mm, mut high_mm) = rim_box_mm(lens.forward(), plane.to_own(film_point_mm))?;
+        let film_point_mm = lens.forward().film_site(on_film_mm, film_distance_mm)?.point_mm;
+        let (mut low_mm, mut high_mm) = rim_box_mm(lens.forward(), plane.surface_from_lens(film_point_mm))?;
         // Narrow the box to the points that are lit, or may have a lit one between them and the next.
         for _ in 0..N_NARROWINGS {
             let grid = Clearances::trace(lens, plane, film_point_mm, (low_mm, high_mm), SEEK, reach);
@@ -280,7 +280,7 @@ struct Clearances {
 impl Clearances {
     fn trace(
         lens: &ReversedLens,
-        plane: &Pose,
+        plane: &Placement,
         film_point_mm: DVec3,
         (low_mm, high_mm): (DVec2, DVec2),
         n: usize,
@@ -290,14 +290,14 @@ impl Clearances {
         let mut rays = RayBatch::with_capacity(n * n);
         for i in 0..n * n {
             let place_mm = low_mm + step_mm * DVec2::new((i % n) as f64, (i / n) as f64);
-            let point_mm = plane.to_lens(place_mm.extend(0.0));
+            let point_mm = plane.lens_from_surface(place_mm.extend(0.0));
             rays.push(point_mm, (point_mm - film_point_mm).normalize(), 0.0);
         }
         let mm = lens.clearances_mm(&mut rays, reach == PupilReach::Stop);
         Self { n, step_mm, mm }
     }
 
-    /// Whether a point is lit, or the clearance changes so much from it to its neighbours that a place between may be.
+    /// Whether a point is lit, or the clearance changes so much from it to its neighbors that a place between may be.
     fn may_be_lit(&self, i: usize) -> bool {
         let (here, n) = (self.mm[i], self.n);
         if here > 0.0 || here == f64::NEG_INFINITY {

@@ -17,13 +17,13 @@ impl MonoLens {
     /// Returns the site of the film over this place of its own x–y plane, mm, its vertex `film_distance_mm` behind the
     /// last vertex; `None` where a curved film does not reach.
     pub fn film_site(&self, place_mm: DVec2, film_distance_mm: f64) -> Option<FilmSite> {
-        let (surface, pose) = (self.image_surface(), self.film_pose(film_distance_mm));
+        let (surface, placement) = (self.image_surface(), self.film_placement(film_distance_mm));
         let sag_mm = surface.sag_at_mm(place_mm);
         let slope = surface.slope_at(place_mm);
         let is_there = sag_mm.is_finite() && slope.is_finite();
         is_there.then(|| FilmSite {
-            point_mm: pose.to_lens(place_mm.extend(sag_mm)),
-            normal: pose.rotation * (-slope).extend(1.0).normalize(),
+            point_mm: placement.lens_from_surface(place_mm.extend(sag_mm)),
+            normal: placement.rotation * (-slope).extend(1.0).normalize(),
         })
     }
 }

@@ -12,7 +12,7 @@ use self::{
     frame::Frame,
 };
 use crate::{
-    Glass, ImageSurface, Lens, MonoLens, ObjectPoint, OpticsError, Pose, PupilBoundary, RayBatch, Shape, Surface,
+    Glass, ImageSurface, Lens, MonoLens, ObjectPoint, OpticsError, Placement, PupilBoundary, RayBatch, Shape, Surface,
     Vignetting,
 };
 
@@ -20,12 +20,12 @@ use crate::{
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     /// Distance of the film behind the last vertex, mm.
-    pub film_mm: f64,
+    pub film_distance_mm: f64,
     /// Distance of the object before the first vertex, mm; infinite for a far one.
     pub object_distance_mm: f64,
     /// Tangents of the field angles from which rays come.
     pub field_tans: Vec<f64>,
-    /// Wavelengths of the rays, nm. With one field, rays are coloured by wavelength; else by field, and dashed by
+    /// Wavelengths of the rays, nm. With one field, rays are colored by wavelength; else by field, and dashed by
     /// wavelength.
     pub wavelengths_nm: Vec<f64>,
     /// Rays a field and wavelength.
@@ -34,16 +34,16 @@ pub struct Layout {
     pub width_px: f64,
 }
 
-/// Colours of fields, in their order: blue, green, red, orange, violet, grey.
+/// Colors of fields, in their order: blue, green, red, orange, violet, gray.
 const FIELD_COLORS: [&str; 6] = ["#2166ac", "#1b7837", "#b2182b", "#d9810c", "#762a83", "#555555"];
-/// Dashes of wavelengths, in their order, where colours tell fields; the first is a whole line.
+/// Dashes of wavelengths, in their order, where colors tell fields; the first is a whole line.
 const DASHES: [&str; 4] = ["none", "7 3", "2 2", "9 2 2 2"];
 
 impl Lens {
     /// Draws the lens with its stop, its film and rays, and returns the picture as SVG text.
     ///
     /// Each fan of rays fills the true, vignetted pupil of its field at the first wavelength; objects lie below the
-    /// axis, so that fans climb. Of a tilted or decentred lens the section in the y–z plane is drawn.
+    /// axis, so that fans climb. Of a tilted or decentered lens the section in the y–z plane is drawn.
     ///
     /// # Errors
     /// When there is no wavelength or a glass is not known at one of them.
@@ -78,7 +78,7 @@ impl Lens {
 /// How the rays of a wavelength are told from those of others.
 struct WavelengthKey {
     wavelength_nm: f64,
-    /// Its own colour, where colours do not tell fields.
+    /// Its own color, where colors do not tell fields.
     color: Option<String>,
     dashes: &'static str,
 }
@@ -110,7 +110,7 @@ struct Line {
 
 /// Returns how far before the lens rays are drawn, mm.
 fn lead_mm(lens: &Lens, layout: &Layout) -> f64 {
-    let track_mm = lens.last_vertex_z_mm() + layout.film_mm;
+    let track_mm = lens.last_vertex_z_mm() + layout.film_distance_mm;
     layout.object_distance_mm.min(0.25 * track_mm + 0.3 * lens.front_semi_aperture_mm())
 }
 
@@ -131,20 +131,25 @@ fn fans(lens: &Lens, lenses: &[MonoLens], layout: &Layout) -> Vec<Fan> {
         for (lens, key) in lenses.iter().zip(layout.wavelength_keys()) {
             let rays = pupil.plane().rays(lens, &point, &targets);
             let color = key.color.unwrap_or_else(|| FIELD_COLORS[i % FIELD_COLORS.len()].to_owned());
-            fans.push(Fan { field: i, color, dashes: key.dashes, lines: follow(lens, rays, lead_mm, layout.film_mm) });
+            fans.push(Fan {
+                field: i,
+                color,
+                dashes: key.dashes,
+                lines: follow(lens, rays, lead_mm, layout.film_distance_mm),
+            });
         }
     }
     fans
 }
 
-fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_mm: f64) -> Vec<Line> {
+fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_distance_mm: f64) -> Vec<Line> {
     // Steep rays start no further off than a little beyond the widest rim, and all of a fan on one front.
     let rims = (0..lens.n_surfaces()).map(|surface| lens.semi_aperture_mm(surface));
-    let reach_mm = 1.5 * rims.fold(0.0, f64::max);
+    let extent_mm = 1.5 * rims.fold(0.0, f64::max);
     let heading = (0..rays.len()).map(|i| rays.direction(i)).sum::<DVec3>().normalize_or(DVec3::Z);
     let nearest_start = |i: usize| {
         let (point, direction) = (rays.point_mm(i), rays.direction(i));
-        let by_height = (reach_mm - point.y.abs()).max(0.0) / direction.y.abs();
+        let by_height = (extent_mm - point.y.abs()).max(0.0) / direction.y.abs();
         heading.dot(point - direction * by_height.min(lead_mm / direction.z))
     };
     let front_mm = (0..rays.len()).map(nearest_start).fold(f64::NEG_INFINITY, f64::max);
@@ -165,7 +170,7 @@ fn follow(lens: &MonoLens, mut rays: RayBatch, lead_mm: f64, film_mm: f64) -> Ve
         lens.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::On);
         note(&mut lines, &rays, &before);
     }
-    lens.to_film(&mut rays, film_mm);
+    lens.to_film(&mut rays, film_distance_mm);
     let arrived = in_flight(&rays);
     note(&mut lines, &rays, &arrived);
     for (line, arrived) in lines.iter_mut().zip(arrived) {
@@ -180,7 +185,7 @@ fn object_space(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
     if *medium == Glass::Air {
         return;
     }
-    let front = outline(&lens.interfaces()[0].surface, &lens.poses()[0], extent_mm(lens, 0));
+    let front = outline(&lens.interfaces()[0].surface, &lens.placements()[0], extent_mm(lens, 0));
     let back_z_mm = front.iter().map(|point| point.x).fold(f64::INFINITY, f64::min) - lead_mm(lens, layout);
     let ends = [front[front.len() - 1], front[0]].map(|end| DVec2::new(back_z_mm, end.y));
     let (fill, _) = glass_colors(medium);
@@ -191,7 +196,7 @@ fn object_space(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
 /// Draws what lies between two surfaces and is not air.
 fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
     object_space(lens, layout, frame, svg);
-    let (interfaces, poses) = (lens.interfaces(), lens.poses());
+    let (interfaces, placements) = (lens.interfaces(), lens.placements());
     let mut i = 0;
     while i < interfaces.len() {
         let medium = &interfaces[i].medium_after;
@@ -205,12 +210,12 @@ fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
             surface.curvature_per_mm == 0.0 && interfaces[j].medium_after == *medium
         };
         let last = (i + 1..interfaces.len()).find(|&j| !is_within(j));
-        let front = outline(&interfaces[i].surface, &poses[i], extent_mm(lens, i));
+        let front = outline(&interfaces[i].surface, &placements[i], extent_mm(lens, i));
         let back = match last {
-            Some(j) => outline(&interfaces[j].surface, &poses[j], extent_mm(lens, j)),
+            Some(j) => outline(&interfaces[j].surface, &placements[j], extent_mm(lens, j)),
             None => {
-                let film_z_mm = lens.last_vertex_z_mm() + layout.film_mm;
-                outline(&Surface::plane(1.0), &Pose::centered(film_z_mm), extent_mm(lens, i))
+                let film_z_mm = lens.last_vertex_z_mm() + layout.film_distance_mm;
+                outline(&Surface::plane(1.0), &Placement::centered(film_z_mm), extent_mm(lens, i))
             }
         };
         let rim_mm = front[0].y.abs().max(back[0].y.abs());
@@ -247,37 +252,37 @@ fn stop(lens: &Lens, frame: &Frame, svg: &mut String) {
     let surface = &lens.interfaces()[lens.stop()].surface;
     let sag_mm = surface.sag_mm(surface.semi_aperture_mm * (1.0 - 1e-12));
     let sag_mm = if sag_mm.is_finite() { sag_mm } else { 0.0 };
-    let pose = lens.poses()[lens.stop()];
+    let placement = lens.placements()[lens.stop()];
     let length_mm = (0.22 * lens.stop_semi_aperture_mm()).max(10.0 / frame.px_per_mm);
     for sign in [-1.0, 1.0] {
         let inner = sign * surface.semi_aperture_mm;
         let line = frame.path([inner, inner + sign * length_mm].map(|y| {
-            let point = pose.to_lens(DVec3::new(0.0, y, sag_mm));
+            let point = placement.lens_from_surface(DVec3::new(0.0, y, sag_mm));
             DVec2::new(point.z, point.y)
         }));
         let _ = writeln!(svg, "<path d=\"{line}\" stroke=\"#111\" stroke-width=\"3\"/>");
     }
     let below_mm = surface.semi_aperture_mm + length_mm;
-    let foot = pose.to_lens(DVec3::new(0.0, -below_mm, sag_mm));
+    let foot = placement.lens_from_surface(DVec3::new(0.0, -below_mm, sag_mm));
     frame.label((frame.x(foot.z), frame.y(foot.y) + 13.0), "middle", "stop", svg);
 }
 
 fn film(lens: &Lens, layout: &Layout, fans: &[Fan], frame: &Frame, svg: &mut String) {
-    let z_mm = lens.last_vertex_z_mm() + layout.film_mm;
+    let z_mm = lens.last_vertex_z_mm() + layout.film_distance_mm;
     let arrived = fans.iter().flat_map(|fan| &fan.lines).filter(|line| line.reaches_film);
     let height = arrived.filter_map(|line| line.points.last()).map(|p| p.y.abs()).fold(0.0, f64::max);
     let half_mm = (1.06 * height).max(8.0 / frame.px_per_mm).min(frame.y_max_mm.max(-frame.y_min_mm));
     let ImageSurface { curvature_per_mm, conic } = lens.image_surface();
     let half_mm = half_mm.min(1.0 / curvature_per_mm.abs());
     let surface = Surface { curvature_per_mm, shape: Shape::Conic { conic }, semi_aperture_mm: half_mm };
-    let points = outline(&surface, &lens.film_motion().after(&Pose::centered(z_mm)), round_mm(&surface));
+    let points = outline(&surface, &lens.film_motion().after(&Placement::centered(z_mm)), round_mm(&surface));
     let top = points.last().copied().unwrap_or(DVec2::new(z_mm, half_mm));
     let line = frame.path(points);
     let _ = writeln!(svg, "<path d=\"{line}\" fill=\"none\" stroke=\"#111\" stroke-width=\"2\"/>");
     frame.label((frame.x(top.x) + 3.0, frame.y(top.y) - 6.0), "end", "film", svg);
 }
 
-/// Returns a colour that stands for a wavelength, as CSS writes it: the hue of its light, dark enough for lines on white.
+/// Returns a color that stands for a wavelength, as CSS writes it: the hue of its light, dark enough for lines on white.
 pub fn wavelength_color(wavelength_nm: f64) -> String {
     const HUES: [(f64, f64); 7] =
         [(400.0, 270.0), (450.0, 235.0), (490.0, 185.0), (530.0, 130.0), (580.0, 48.0), (620.0, 15.0), (700.0, 0.0)];
@@ -294,7 +299,7 @@ mod tests {
     fn draw(lens: &Lens, degrees: &[f64]) -> String {
         let mono = lens.at(550.0).unwrap();
         let layout = Layout {
-            film_mm: mono.film_mm_for(f64::INFINITY).unwrap_or(20.0),
+            film_distance_mm: mono.film_distance_mm_for(f64::INFINITY).unwrap_or(20.0),
             object_distance_mm: f64::INFINITY,
             field_tans: degrees.iter().map(|deg| deg.to_radians().tan()).collect(),
             wavelengths_nm: vec![550.0],
@@ -355,7 +360,7 @@ mod tests {
         let svg = draw(&lens, &[0.0, 30.0]);
         assert!(svg.contains(">0.0°<") && svg.contains(">30.0° dark<"));
         let layout = Layout {
-            film_mm: 36.0,
+            film_distance_mm: 36.0,
             object_distance_mm: f64::INFINITY,
             field_tans: vec![0.0, 0.1],
             wavelengths_nm: vec![450.0, 650.0],

@@ -5,7 +5,8 @@ use std::path::Path;
 use glam::DVec2;
 
 use crate::{
-    Aperture, CoordinateBreak, Glass, Interface, MonoLens, OpticsError, Pose, Shape, Surface, formats, library, pose,
+    Aperture, CoordinateBreak, Glass, Interface, MonoLens, OpticsError, Placement, Shape, Surface, formats, library,
+    placement,
 };
 
 /// A lens that has been checked and can be traced.
@@ -27,7 +28,7 @@ pub struct Lens {
 /// The shape of the film: a conic with its vertex on the axis. As it stands by default, it is a plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImageSurface {
-    /// One over the radius at the vertex, 1/mm; positive where the centre lies downstream, so that a retina's is
+    /// One over the radius at the vertex, 1/mm; positive where the center lies downstream, so that a retina's is
     /// negative.
     pub curvature_per_mm: f64,
     /// The conic constant.
@@ -120,7 +121,7 @@ impl Lens {
         Ok(self)
     }
 
-    /// Returns the lens with its surfaces tilted and decentred by these moves, and by no others.
+    /// Returns the lens with its surfaces tilted and decentered by these moves, and by no others.
     ///
     /// The lens frame stays where it was: at the place of the first vertex before the moves.
     ///
@@ -223,7 +224,7 @@ impl Lens {
         self.stop
     }
 
-    /// The tilts and decentres of surfaces, groups and the film; none for a centred lens.
+    /// The tilts and decenters of surfaces, groups and the film; none for a centered lens.
     pub fn moves(&self) -> &[CoordinateBreak] {
         &self.moves
     }
@@ -244,28 +245,28 @@ impl Lens {
     }
 
     /// Where each surface stands, all moves done.
-    pub fn poses(&self) -> Vec<Pose> {
+    pub fn placements(&self) -> Vec<Placement> {
         let vertices_z_mm = self.vertices_z_mm();
-        let centered = vertices_z_mm.iter().map(|&z_mm| Pose::centered(z_mm));
-        match pose::motions(&self.moves, &vertices_z_mm) {
-            Some(motions) => motions.iter().zip(centered).map(|(motion, pose)| motion.after(&pose)).collect(),
+        let centered = vertices_z_mm.iter().map(|&z_mm| Placement::centered(z_mm));
+        match placement::motions(&self.moves, &vertices_z_mm) {
+            Some(motions) => motions.iter().zip(centered).map(|(motion, placement)| motion.after(&placement)).collect(),
             None => centered.collect(),
         }
     }
 
     /// What the moves do to the film.
-    pub(crate) fn film_motion(&self) -> Pose {
-        let motions = pose::motions(&self.moves, &self.vertices_z_mm());
-        motions.and_then(|motions| motions.last().copied()).unwrap_or(Pose::centered(0.0))
+    pub(crate) fn film_motion(&self) -> Placement {
+        let motions = placement::motions(&self.moves, &self.vertices_z_mm());
+        motions.and_then(|motions| motions.last().copied()).unwrap_or(Placement::centered(0.0))
     }
 
-    /// Whether every surface is one of revolution about the lens's axis: whether nothing is tilted, decentred or
+    /// Whether every surface is one of revolution about the lens's axis: whether nothing is tilted, decentered or
     /// curved differently along x and y, and all apertures are circles about it.
     pub fn is_rotational(&self) -> bool {
         let is_round = |interface: &Interface| interface.surface.is_rotational();
         self.apertures.iter().all(Aperture::is_rotational)
             && self.interfaces.iter().all(is_round)
-            && pose::motions(&self.moves, &self.vertices_z_mm()).is_none()
+            && placement::motions(&self.moves, &self.vertices_z_mm()).is_none()
     }
 
     /// Checks that the lens is rotationally symmetric; `task` says what needs that, in words.
@@ -284,7 +285,7 @@ impl Lens {
         self.vertices_z_mm().last().copied().unwrap_or(0.0)
     }
 
-    /// z of each vertex from the first, mm, along the axis that moves may bend; [`poses`](Self::poses) says where it is.
+    /// z of each vertex from the first, mm, along the axis that moves may bend; [`placements`](Self::placements) says where it is.
     pub fn vertices_z_mm(&self) -> Vec<f64> {
         let mut z = 0.0;
         let vertex = |interface: &Interface| {

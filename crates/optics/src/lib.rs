@@ -1,8 +1,8 @@
 //! Glass, lenses and lens files, first-order theory, and exact rays traced through them.
 //!
 //! Lengths are millimetres, wavelengths nanometres, angles radians. In the lens frame +z is the way light travels
-//! and the origin is the vertex of the first surface; a radius is positive when the centre of curvature lies at +z,
-//! and the index after a surface is that of the medium behind it. A film lies `film_mm` behind the last vertex.
+//! and the origin is the vertex of the first surface; a radius is positive when the center of curvature lies at +z,
+//! and the index after a surface is that of the medium behind it. A film lies `film_distance_mm` behind the last vertex.
 //!
 //! This crate knows nothing of diffraction, images or files of pixels. It offers one hook, at the stop: trace to it,
 //! bend the rays, and trace on ([`MonoLens::trace_surfaces`]).
@@ -27,7 +27,7 @@ mod lens;
 mod library;
 mod mono;
 mod paraxial;
-mod pose;
+mod placement;
 mod prescription;
 mod pupil;
 mod rays;
@@ -55,7 +55,7 @@ pub use layout::{Layout, wavelength_color};
 pub use lens::{ImageSurface, Lens};
 pub use mono::MonoLens;
 pub use paraxial::{Conjugate, FirstOrder};
-pub use pose::{CoordinateBreak, Pose};
+pub use placement::{CoordinateBreak, Placement};
 pub use pupil::{PupilBoundary, PupilPlane};
 pub use rays::{Losses, RayBatch, RayFate, SurfaceLosses};
 pub use rays_f32::RayBatchF32;

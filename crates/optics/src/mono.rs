@@ -6,17 +6,17 @@ use glam::{DVec2, DVec3};
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::{
-    Aperture, AxialBeam, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Pose, RayBatch, RayBatchF32, Shape,
-    Surface, Vignetting,
+    Aperture, AxialBeam, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Placement, RayBatch, RayBatchF32,
+    Shape, Surface, Vignetting,
     paraxial::{self, MarginalRay, Matrix},
-    pose,
+    placement,
     trace::{self, Goal, Kind, Plan, Step},
 };
 
 /// Rays that one task of [`MonoLens::trace_parallel`] traces.
 const CHUNK: usize = 4096;
 
-/// How far an entrance pupil may be for counting from its centre, over the first rim's radius: then counts are good to
+/// How far an entrance pupil may be for counting from its center, over the first rim's radius: then counts are good to
 /// 1e-12 of the rim.
 const FARTHEST_PUPIL: f64 = 1e4;
 
@@ -31,7 +31,7 @@ pub struct MonoLens {
     front: Surface,
     rear: Surface,
     image_surface: ImageSurface,
-    /// Where surfaces stand, if not all are centred.
+    /// Where surfaces stand, if not all are centered.
     placed: Option<Placed>,
     /// That of the stop, whether it limits the light or not.
     first_order: FirstOrder,
@@ -39,13 +39,13 @@ pub struct MonoLens {
     far_beam: OnceLock<Option<AxialBeam>>,
 }
 
-/// Where the surfaces of a lens stand that is not centred.
+/// Where the surfaces of a lens stand that is not centered.
 #[derive(Clone, Debug)]
 struct Placed {
     /// That of each surface.
-    poses: Vec<Pose>,
+    placements: Vec<Placement>,
     /// What has become of the straight axis at the film.
-    film: Pose,
+    film: Placement,
 }
 
 impl MonoLens {
@@ -63,8 +63,8 @@ impl MonoLens {
             index_before = index_after;
         }
         let first_order = paraxial::first_order(&steps, lens.stop(), wavelength_nm);
-        let motions = pose::motions(lens.moves(), &lens.vertices_z_mm());
-        let placed = motions.map(|motions| Placed { poses: lens.poses(), film: motions[steps.len()] });
+        let motions = placement::motions(lens.moves(), &lens.vertices_z_mm());
+        let placed = motions.map(|motions| Placed { placements: lens.placements(), film: motions[steps.len()] });
         let steps_end = steps.len() - 1;
         Ok(Self {
             name: lens.name().to_owned(),
@@ -124,7 +124,7 @@ impl MonoLens {
     ///
     /// Of a lens that is not rotationally symmetric they are those of its axis with all surfaces put back on it (a bent
     /// axis made straight), in the y–z plane; [`first_order_x`](Self::first_order_x) gives those of the x–z plane. A
-    /// tilted or decentred lens forms its image by them only as far as its tilts are small.
+    /// tilted or decentered lens forms its image by them only as far as its tilts are small.
     ///
     /// Where a rim ends the light of a far point on the axis before the stop does ([`limiting_beam`](Self::limiting_beam)),
     /// the diameters of the pupils and the f-number are those of the real beam that gets through; the pupils stay where the
@@ -249,8 +249,8 @@ impl MonoLens {
         &self.steps
     }
 
-    pub(crate) fn poses(&self) -> Option<&[Pose]> {
-        self.placed.as_ref().map(|placed| placed.poses.as_slice())
+    pub(crate) fn placements(&self) -> Option<&[Placement]> {
+        self.placed.as_ref().map(|placed| placed.placements.as_slice())
     }
 
     /// The name of the lens.
@@ -260,14 +260,14 @@ impl MonoLens {
 
     /// Returns where a point of the lens frame lies in the stop's own frame, mm from the middle of the stop.
     pub(crate) fn in_stop_mm(&self, point_mm: DVec3) -> DVec2 {
-        self.poses().map_or(point_mm, |poses| poses[self.stop].to_own(point_mm)).truncate()
+        self.placements().map_or(point_mm, |placements| placements[self.stop].surface_from_lens(point_mm)).truncate()
     }
 
     /// Returns the point of the first surface over this place of its vertex plane, mm; beyond its equator, the place.
     pub(crate) fn on_front_mm(&self, place_mm: DVec2) -> DVec3 {
         let sag_mm = self.front.sag_at_mm(place_mm.x, place_mm.y);
         let point = place_mm.extend(if sag_mm.is_finite() { sag_mm } else { 0.0 });
-        self.poses().map_or(point, |poses| poses[0].to_lens(point))
+        self.placements().map_or(point, |placements| placements[0].lens_from_surface(point))
     }
 
     /// Returns the z of the last surface over this place of its vertex plane, mm, in its own frame; NaN beyond its equator.
@@ -275,18 +275,18 @@ impl MonoLens {
         self.rear.sag_at_mm(place_mm.x, place_mm.y)
     }
 
-    /// Where a film stands that lies `film_mm` behind the last vertex.
-    pub fn film_pose(&self, film_mm: f64) -> Pose {
-        let centered = Pose::centered(self.last_vertex_z_mm() + film_mm);
+    /// Where a film stands that lies `film_distance_mm` behind the last vertex.
+    pub fn film_placement(&self, film_distance_mm: f64) -> Placement {
+        let centered = Placement::centered(self.last_vertex_z_mm() + film_distance_mm);
         self.placed.as_ref().map_or(centered, |placed| placed.film.after(&centered))
     }
 
-    /// Returns where a point of the lens frame lies on a film `film_mm` behind the last vertex, mm, along the film's own
-    /// x and y: those of the lens, unless the film is tilted or decentred.
-    pub(crate) fn on_film_mm(&self, point_mm: DVec3, film_mm: f64) -> DVec2 {
+    /// Returns where a point of the lens frame lies on a film `film_distance_mm` behind the last vertex, mm, along the film's own
+    /// x and y: those of the lens, unless the film is tilted or decentered.
+    pub(crate) fn on_film_mm(&self, point_mm: DVec3, film_distance_mm: f64) -> DVec2 {
         match &self.placed {
             None => point_mm.truncate(),
-            Some(_) => self.film_pose(film_mm).to_own(point_mm).truncate(),
+            Some(_) => self.film_placement(film_distance_mm).surface_from_lens(point_mm).truncate(),
         }
     }
 
@@ -304,9 +304,9 @@ impl MonoLens {
     pub fn trace_surfaces(&self, surfaces: Range<usize>, rays: &mut RayBatch, rims: Vignetting) {
         let first = surfaces.start;
         let steps = self.steps_for(rays.object_z_mm);
-        match self.poses() {
-            Some(poses) => {
-                trace::trace_placed(&steps[surfaces.clone()], &poses[surfaces], first, rims, &mut rays.slices());
+        match self.placements() {
+            Some(placements) => {
+                trace::trace_placed(&steps[surfaces.clone()], &placements[surfaces], first, rims, &mut rays.slices());
             }
             None if surfaces.is_empty() => {}
             None => {
@@ -320,40 +320,40 @@ impl MonoLens {
     /// The result is that of [`trace`](Self::trace), to the bit.
     pub fn trace_parallel(&self, rays: &mut RayBatch, rims: Vignetting) {
         let steps = self.steps_for(rays.object_z_mm);
-        if let Some(poses) = self.poses() {
-            let trace = |mut chunk| trace::trace_placed(&steps, poses, 0, rims, &mut chunk);
+        if let Some(placements) = self.placements() {
+            let trace = |mut chunk| trace::trace_placed(&steps, placements, 0, rims, &mut chunk);
             return rays.par_slices(CHUNK).with_max_len(1).for_each(trace);
         }
         let plan = Plan::new(&steps, 0, rims);
         rays.par_slices(CHUNK).with_max_len(1).for_each(|chunk| trace::trace_batch(&plan, Goal::LastSurface, chunk));
     }
 
-    /// Traces rays through all surfaces and straight on to the film, `film_mm` behind the last vertex.
+    /// Traces rays through all surfaces and straight on to the film, `film_distance_mm` behind the last vertex.
     ///
     /// What [`trace`](Self::trace) and [`to_film`](Self::to_film) do, in one go.
-    pub fn trace_to_film(&self, rays: &mut RayBatch, rims: Vignetting, film_mm: f64) {
+    pub fn trace_to_film(&self, rays: &mut RayBatch, rims: Vignetting, film_distance_mm: f64) {
         if !self.has_plain_film() {
             self.trace(rays, rims);
-            return self.to_film(rays, film_mm);
+            return self.to_film(rays, film_distance_mm);
         }
         let plan = Plan::new(&self.steps_for(rays.object_z_mm), 0, rims);
-        trace::trace_batch(&plan, Goal::Film { film_mm }, rays.slices());
+        trace::trace_batch(&plan, Goal::Film { film_distance_mm }, rays.slices());
     }
 
-    /// Traces rays in single precision through all surfaces and straight on to the film, `film_mm` behind the last
+    /// Traces rays in single precision through all surfaces and straight on to the film, `film_distance_mm` behind the last
     /// vertex.
     ///
     /// They land within 0.05 µm of where [`trace_to_film`](Self::trace_to_film) lands them. Through tilted and
-    /// decentred surfaces and to curved films they go in double precision, no faster than there.
-    pub fn trace_to_film_f32(&self, rays: &mut RayBatchF32, rims: Vignetting, film_mm: f64) {
+    /// decentered surfaces and to curved films they go in double precision, no faster than there.
+    pub fn trace_to_film_f32(&self, rays: &mut RayBatchF32, rims: Vignetting, film_distance_mm: f64) {
         if !self.has_plain_film() {
             let mut wide = rays.widened();
-            self.trace_to_film(&mut wide, rims, film_mm);
+            self.trace_to_film(&mut wide, rims, film_distance_mm);
             return rays.set_rounded(&wide, |point, _| point);
         }
         // Where the object plane lies matters to path lengths only.
         let plan = Plan::new(&self.steps, 0, rims);
-        trace::trace_batch(&plan, Goal::Film { film_mm }, rays.slices());
+        trace::trace_batch(&plan, Goal::Film { film_distance_mm }, rays.slices());
     }
 
     /// Returns the steps, in which ideal lenses know where the object plane appears to them.
@@ -379,32 +379,36 @@ impl MonoLens {
         Cow::Owned(steps)
     }
 
-    /// Moves rays straight on to the film as it is curved, its vertex `film_mm` behind the last vertex.
+    /// Moves rays straight on to the film as it is curved, its vertex `film_distance_mm` behind the last vertex.
     ///
     /// A ray that does not meet a curved film ends as one that missed the surface after the last. Points stay in the lens
     /// frame; [`film_points`](Self::film_points) gives the places on the film itself.
-    pub fn to_film(&self, rays: &mut RayBatch, film_mm: f64) {
+    pub fn to_film(&self, rays: &mut RayBatch, film_distance_mm: f64) {
         let ImageSurface { curvature_per_mm, conic } = self.image_surface;
         if curvature_per_mm == 0.0 {
-            return self.to_film_plane(rays, film_mm);
+            return self.to_film_plane(rays, film_distance_mm);
         }
         let medium = (self.image_index(), self.n_surfaces() as u16);
-        let pose = self.film_pose(film_mm);
-        trace::move_to_placed_conic(&pose, [curvature_per_mm, conic], medium, &mut rays.slices());
+        let placement = self.film_placement(film_distance_mm);
+        trace::move_to_placed_conic(&placement, [curvature_per_mm, conic], medium, &mut rays.slices());
     }
 
-    /// Moves rays straight on to the plane through the film's vertex, `film_mm` behind the last vertex, however the film is
+    /// Moves rays straight on to the plane through the film's vertex, `film_distance_mm` behind the last vertex, however the film is
     /// curved.
-    pub fn to_film_plane(&self, rays: &mut RayBatch, film_mm: f64) {
+    pub fn to_film_plane(&self, rays: &mut RayBatch, film_distance_mm: f64) {
         match &self.placed {
-            None => trace::move_to_plane(rays.slices(), self.last_vertex_z_mm() + film_mm, self.image_index()),
+            None => trace::move_to_plane(rays.slices(), self.last_vertex_z_mm() + film_distance_mm, self.image_index()),
             Some(_) => {
-                trace::move_to_placed_plane(&self.film_pose(film_mm), self.image_index(), &mut rays.slices());
+                trace::move_to_placed_plane(
+                    &self.film_placement(film_distance_mm),
+                    self.image_index(),
+                    &mut rays.slices(),
+                );
             }
         }
     }
 
-    /// Whether every surface is centred and the film flat: then lens and film are traced in one go.
+    /// Whether every surface is centered and the film flat: then lens and film are traced in one go.
     pub(crate) fn has_plain_film(&self) -> bool {
         self.placed.is_none() && self.image_surface.curvature_per_mm == 0.0
     }
@@ -451,7 +455,7 @@ impl MonoLens {
         MarginalRay::of(&self.steps, self.stop, object_distance_mm)
     }
 
-    /// z from the first vertex of the point that fields and depths are counted from, mm: the centre of the paraxial
+    /// z from the first vertex of the point that fields and depths are counted from, mm: the center of the paraxial
     /// entrance pupil, or the first vertex where that is infinitely far or so far (10⁴ times the first rim) that a
     /// count from it would lose digits.
     pub fn projection_center_z_mm(&self) -> f64 {
@@ -470,10 +474,10 @@ impl MonoLens {
     ///
     /// # Errors
     /// When there is no real image behind the lens.
-    pub fn film_mm_for(&self, object_distance_mm: f64) -> Result<f64, OpticsError> {
-        let film_mm = self.conjugate(object_distance_mm).image_z_mm;
-        if film_mm > 0.0 && film_mm.is_finite() && object_distance_mm > 0.0 {
-            return Ok(film_mm);
+    pub fn film_distance_mm_for(&self, object_distance_mm: f64) -> Result<f64, OpticsError> {
+        let film_distance_mm = self.conjugate(object_distance_mm).image_z_mm;
+        if film_distance_mm > 0.0 && film_distance_mm.is_finite() && object_distance_mm > 0.0 {
+            return Ok(film_distance_mm);
         }
         Err(OpticsError::NoFocus { lens: self.name.clone(), side: "behind it", distance_mm: object_distance_mm })
     }
@@ -483,13 +487,13 @@ impl MonoLens {
     ///
     /// # Errors
     /// When there is no real object in front of the lens.
-    pub fn object_distance_mm_for(&self, film_mm: f64) -> Result<f64, OpticsError> {
+    pub fn object_distance_mm_for(&self, film_distance_mm: f64) -> Result<f64, OpticsError> {
         let (before, after) = (self.steps[0].index_before, self.image_index());
-        let distance_mm = -Matrix::of(&self.steps).object_of(film_mm, before, after);
+        let distance_mm = -Matrix::of(&self.steps).object_of(film_distance_mm, before, after);
         if distance_mm > 0.0 {
             return Ok(distance_mm);
         }
-        Err(OpticsError::NoFocus { lens: self.name.clone(), side: "before it", distance_mm: film_mm })
+        Err(OpticsError::NoFocus { lens: self.name.clone(), side: "before it", distance_mm: film_distance_mm })
     }
 }
 

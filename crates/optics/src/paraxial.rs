@@ -285,7 +285,7 @@ mod tests {
     fn check(lens: &Lens, wavelength_nm: f64, [efl, bfl, film_8m, film_2m]: [f64; 4]) {
         let mono = lens.at(wavelength_nm).unwrap();
         let first = mono.first_order();
-        let film = |mm: f64| mono.film_mm_for(mm).unwrap();
+        let film = |mm: f64| mono.film_distance_mm_for(mm).unwrap();
         for (found, expected) in [
             (first.efl_mm, efl),
             (first.bfl_mm, bfl),
@@ -333,11 +333,11 @@ mod tests {
     fn thin_lens_obeys_its_equation() {
         let lens = Lens::thin(50.0, 10.0).unwrap();
         let mono = lens.at(550.0).unwrap();
-        let film_mm = mono.film_mm_for(2_000.0).unwrap();
-        assert!((film_mm - 1.0 / (1.0 / 50.0 - 1.0 / 2_000.0)).abs() < 1e-12);
-        assert!((mono.conjugate(2_000.0).magnification + film_mm / 2_000.0).abs() < 1e-15);
+        let film_distance_mm = mono.film_distance_mm_for(2_000.0).unwrap();
+        assert!((film_distance_mm - 1.0 / (1.0 / 50.0 - 1.0 / 2_000.0)).abs() < 1e-12);
+        assert!((mono.conjugate(2_000.0).magnification + film_distance_mm / 2_000.0).abs() < 1e-15);
         let first = mono.first_order();
-        assert!((mono.working_f_number(2_000.0) - film_mm / 10.0).abs() < 1e-12);
+        assert!((mono.working_f_number(2_000.0) - film_distance_mm / 10.0).abs() < 1e-12);
         assert!((mono.working_f_number(f64::INFINITY) - first.f_number).abs() < 1e-12);
     }
 
@@ -360,7 +360,7 @@ mod tests {
         for infinite in [first.entrance_pupil_z_mm, first.exit_pupil_z_mm, first.entrance_pupil_diameter_mm] {
             assert!(infinite.is_infinite(), "{first:?}");
         }
-        assert!(mono.film_mm_for(f64::INFINITY).is_err());
+        assert!(mono.film_distance_mm_for(f64::INFINITY).is_err());
         // Every object is imaged at 81/49 of its size; the cone is that of the stop seen from the second focus.
         for object_mm in [20.0, 49.0, 300.0] {
             let expected = -81.0 / 49.0;
@@ -374,7 +374,7 @@ mod tests {
     fn object_in_the_front_focal_plane_is_imaged_infinitely_far() {
         let lens = Lens::thin(49.0, 10.0).unwrap().at(550.0).unwrap();
         assert_eq!(lens.conjugate(49.0).image_z_mm, f64::INFINITY);
-        assert!(lens.film_mm_for(49.0).is_err() && lens.film_mm_for(49.001).is_ok());
+        assert!(lens.film_distance_mm_for(49.0).is_err() && lens.film_distance_mm_for(49.001).is_ok());
     }
 
     #[test]
@@ -400,13 +400,13 @@ mod tests {
     fn what_cannot_focus_says_so() {
         let pinhole = Lens::pinhole(0.3).unwrap().at(550.0).unwrap();
         assert_eq!(pinhole.first_order().power_per_mm, 0.0);
-        assert!(pinhole.film_mm_for(1_000.0).is_err());
+        assert!(pinhole.film_distance_mm_for(1_000.0).is_err());
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         // Within the front focal length the image is virtual.
-        let message = lens.film_mm_for(5.0).unwrap_err().to_string();
+        let message = lens.film_distance_mm_for(5.0).unwrap_err().to_string();
         assert!(message.contains("dgauss-50mm forms no image behind it"), "{message}");
-        assert!(lens.film_mm_for(-5.0).is_err());
-        assert!(lens.film_mm_for(f64::NAN).is_err());
+        assert!(lens.film_distance_mm_for(-5.0).is_err());
+        assert!(lens.film_distance_mm_for(f64::NAN).is_err());
         assert!(lens.object_distance_mm_for(20.0).is_err());
     }
 

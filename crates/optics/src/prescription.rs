@@ -17,7 +17,7 @@ struct Prescription {
     #[serde(default, skip_serializing_if = "is_air")]
     object_medium: Glass,
     surfaces: Vec<Row>,
-    /// Tilts and decentres.
+    /// Tilts and decenters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     moves: Vec<CoordinateBreak>,
     /// Openings and obscurations beside the round rims.
@@ -134,7 +134,7 @@ pub(crate) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
         finite("a number of fields", Some(y))?;
     }
     Ok(LensFile {
-        film_mm: finite("film_distance_mm", prescription.film_distance_mm)?,
+        film_distance_mm: finite("film_distance_mm", prescription.film_distance_mm)?,
         object_distance_mm: finite("object_distance_mm", prescription.object_distance_mm)?,
         reference_wavelength_nm: positive("reference_wavelength_nm", prescription.reference_wavelength_nm)?,
         wavelengths_nm: prescription.wavelengths_nm,
@@ -195,7 +195,7 @@ impl LensFile {
     /// array of microlenses.
     pub fn to_ron(&self) -> String {
         let prescription = Prescription {
-            film_distance_mm: self.film_mm,
+            film_distance_mm: self.film_distance_mm,
             object_distance_mm: self.object_distance_mm.filter(|mm| mm.is_finite()),
             wavelengths_nm: self.wavelengths_nm.clone(),
             reference_wavelength_nm: self.reference_wavelength_nm,

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// The true, vignetted pupil that one object point sees at one wavelength, or a part of it: a region of a plane,
-/// given by its edge at equally spaced azimuths about a centre.
+/// given by its edge at equally spaced azimuths about a center.
 ///
 /// The plane is that of the paraxial entrance pupil; for light that comes in across the axis or from behind, as that of the
 /// widest lenses, it faces the point ([`PupilPlane`]). The edge follows the round rims and the openings of surfaces; an
@@ -33,7 +33,7 @@ impl PupilBoundary {
     /// what is seen from a place well inside ([`find_parts`](Self::find_parts) finds the rest).
     ///
     /// Every ray through the region meets every surface inside its rim. The edge is found to rounding at each of
-    /// `n_azimuths` (at least 8) directions; the centre is the centroid of the region.
+    /// `n_azimuths` (at least 8) directions; the center is the centroid of the region.
     pub fn find(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> Option<Self> {
         Search::new(lens, point).largest(n_azimuths.max(8))
     }
@@ -47,7 +47,7 @@ impl PupilBoundary {
         Search { lens, point, plane: PupilPlane::of_parts(lens, point) }.parts(n_azimuths.max(8))
     }
 
-    /// The centre that radii count from, in the pupil's plane, mm from its origin.
+    /// The center that radii count from, in the pupil's plane, mm from its origin.
     pub fn center_mm(&self) -> DVec2 {
         self.center_mm
     }
@@ -62,7 +62,7 @@ impl PupilBoundary {
         self.plane.z_mm()
     }
 
-    /// The edge's distance from the centre at the azimuths `2π i / n`, counted from +x towards +y, mm.
+    /// The edge's distance from the center at the azimuths `2π i / n`, counted from +x towards +y, mm.
     pub fn rho_at_azimuths_mm(&self) -> &[f64] {
         &self.rho_mm
     }
@@ -73,7 +73,7 @@ impl PupilBoundary {
         self.rho_mm.iter().zip(Self::azimuths(self.rho_mm.len())).map(place).collect()
     }
 
-    /// Returns the edge's distance from the centre at any azimuth, mm: exact at the azimuths that were found, a cubic
+    /// Returns the edge's distance from the center at any azimuth, mm: exact at the azimuths that were found, a cubic
     /// through the four nearest of them elsewhere.
     pub fn rho_max_mm(&self, theta: f64) -> f64 {
         let n = self.rho_mm.len();
@@ -83,7 +83,7 @@ impl PupilBoundary {
         let (p0, p1, p2, p3) = (at(0), at(1), at(2), at(3));
         let cubic =
             p1 + 0.5 * t * (p2 - p0 + t * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + t * (3.0 * (p1 - p2) + p3 - p0)));
-        // At a kink a cubic may overshoot; the neighbours bound it.
+        // At a kink a cubic may overshoot; the neighbors bound it.
         cubic.clamp(0.98 * p1.min(p2), 1.02 * p1.max(p2))
     }
 
@@ -107,7 +107,7 @@ impl PupilBoundary {
         self.center_mm + sum * (std::f64::consts::TAU / n as f64) / self.area_mm2()
     }
 
-    /// How far beyond the edge a place lies, seen from the centre, mm; negative inside.
+    /// How far beyond the edge a place lies, seen from the center, mm; negative inside.
     fn beyond_mm(&self, place_mm: DVec2) -> f64 {
         let from_center = place_mm - self.center_mm;
         from_center.length() - self.rho_max_mm(from_center.to_angle())
@@ -254,7 +254,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Looks for darkness between the centre and the edges, opens the edges beyond which there is some, and returns
+    /// Looks for darkness between the center and the edges, opens the edges beyond which there is some, and returns
     /// whether there are any.
     fn open_gaps(&self, edges: &mut [Edge], center_mm: DVec2, cell: &Cell) -> bool {
         let share = |k: usize| (k + 1) as f64 / (GAP_PLACES + 1) as f64;
@@ -314,11 +314,11 @@ const MOST_CUTS: usize = 7;
 /// edge must come.
 const UNCERTAIN: f64 = 5e-4;
 const WITHIN_CHORD: f64 = 0.99;
-/// The share of what a first place sees of a part that the part's centroid must see to be its centre.
+/// The share of what a first place sees of a part that the part's centroid must see to be its center.
 const SEES_ENOUGH: f64 = 0.98;
 /// How far beyond a part's edge light counts as not seen, over the part's radius.
 const BESIDE: f64 = 0.02;
-/// Places between centre and edge that are looked at for darkness, and how often.
+/// Places between center and edge that are looked at for darkness, and how often.
 const GAP_PLACES: usize = 11;
 const GAP_ROUNDS: usize = 4;
 /// Rounds after which an edge is as good as it gets; a well-behaved one takes ten.
@@ -326,7 +326,7 @@ const EDGE_ROUNDS: usize = 100;
 /// Clearance at which a ray is held to graze its rim, mm.
 const EDGE_MM: f64 = 1e-11;
 
-/// The edge of the pupil in one direction from the centre, between a radius inside and one outside.
+/// The edge of the pupil in one direction from the center, between a radius inside and one outside.
 #[derive(Clone, Copy)]
 struct Edge {
     direction: DVec2,
@@ -380,7 +380,8 @@ impl MonoLens {
     /// How far inside the rim and the openings of a surface a point of it lies, mm; the point is of the lens frame.
     fn clearance_on_mm(&self, surface: usize, point_mm: DVec3) -> f64 {
         let step = &self.steps()[surface];
-        let at = self.poses().map_or(point_mm, |poses| poses[surface].to_own(point_mm)).truncate();
+        let at =
+            self.placements().map_or(point_mm, |placements| placements[surface].surface_from_lens(point_mm)).truncate();
         let openings = step.apertures.iter().map(|aperture| aperture.clearance_mm(at.x, at.y));
         openings.fold(step.semi_aperture - at.length(), f64::min)
     }
@@ -392,12 +393,12 @@ impl MonoLens {
     pub fn clearances_mm(&self, mut rays: RayBatch) -> Vec<f64> {
         let mut clearances_mm = vec![f64::INFINITY; rays.len()];
         let steps = self.steps_for(rays.object_z_mm);
-        match self.poses() {
+        match self.placements() {
             None => {
                 let plan = Plan::new(&steps, 0, Vignetting::Off);
                 trace::trace_clearances(&plan, rays.slices(), &mut clearances_mm);
             }
-            Some(poses) => trace::placed_clearances(&steps, poses, &mut rays.slices(), &mut clearances_mm),
+            Some(placements) => trace::placed_clearances(&steps, placements, &mut rays.slices(), &mut clearances_mm),
         }
         clearances_mm
     }

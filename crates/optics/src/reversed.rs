@@ -6,7 +6,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::{
-    MonoLens, Pose, RayBatch, RayBatchF32, Vignetting,
+    MonoLens, Placement, RayBatch, RayBatchF32, Vignetting,
     rays::RaySlices,
     trace::{self, Goal, Kind, Plan, Real, Step, Toric},
 };
@@ -18,8 +18,8 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct ReversedLens {
     forward: MonoLens,
-    /// Where surfaces stand in the mirrored frame, the last first, if not all are centred.
-    poses: Option<Vec<Pose>>,
+    /// Where surfaces stand in the mirrored frame, the last first, if not all are centered.
+    placements: Option<Vec<Placement>>,
     /// Plans for each part, of a far object and with rims.
     plans: [Plan<f64>; 3],
     plans_f32: [Plan<f32>; 3],
@@ -39,11 +39,11 @@ enum Part {
 impl MonoLens {
     /// Returns the lens for rays from the film to the scene.
     pub fn reversed(&self) -> ReversedLens {
-        let poses = self.poses().map(|poses| poses.iter().rev().map(mirrored_pose).collect());
+        let placements = self.placements().map(|placements| placements.iter().rev().map(mirrored_placement).collect());
         let steps = |part: Part| part_of(&mirrored_steps(self, f64::NEG_INFINITY), self.stop(), part);
         let parts = [Part::Whole, Part::ToStop, Part::FromStop];
         ReversedLens {
-            poses,
+            placements,
             plans: parts.map(|part| plan_of(&steps(part), part, self.first_of(part), Vignetting::On)),
             plans_f32: parts.map(|part| plan_of(&steps(part), part, self.first_of(part), Vignetting::On)),
             forward: self.clone(),
@@ -64,9 +64,11 @@ impl ReversedLens {
 
     /// Where the stop stands: in its frame diffraction turns rays between [`trace_to_stop`](Self::trace_to_stop) and
     /// [`trace_from_stop`](Self::trace_from_stop).
-    pub fn stop_pose(&self) -> Pose {
+    pub fn stop_placement(&self) -> Placement {
         let stop = self.forward.stop();
-        self.forward.poses().map_or(Pose::centered(self.forward.vertex_z_mm(stop)), |poses| poses[stop])
+        self.forward
+            .placements()
+            .map_or(Placement::centered(self.forward.vertex_z_mm(stop)), |placements| placements[stop])
     }
 
     /// Traces rays from the image space through all surfaces, on this thread.
@@ -90,7 +92,7 @@ impl ReversedLens {
 
     /// Traces rays in single precision as [`trace`](Self::trace) does, with rims.
     ///
-    /// They must start near the last vertex. Through tilted and decentred surfaces they go in double precision.
+    /// They must start near the last vertex. Through tilted and decentered surfaces they go in double precision.
     pub fn trace_f32(&self, rays: &mut RayBatchF32) {
         self.trace_part_f32(Part::Whole, rays);
     }
@@ -116,7 +118,7 @@ impl ReversedLens {
         let mut slices = rays.slices();
         mirror(&mut slices);
         match self.poses_of(part) {
-            Some(poses) => trace::placed_clearances(&steps, poses, &mut slices, &mut clearances_mm),
+            Some(placements) => trace::placed_clearances(&steps, placements, &mut slices, &mut clearances_mm),
             None => {
                 let plan = plan_of(&steps, part, self.forward.first_of(part), Vignetting::Off);
                 trace::trace_clearances(&plan, slices, &mut clearances_mm);
@@ -134,9 +136,9 @@ impl ReversedLens {
         let steps = || part_of(&mirrored_steps(&self.forward, object_z_mm), self.forward.stop(), part);
         let first = self.forward.first_of(part);
         match self.poses_of(part) {
-            Some(poses) => {
+            Some(placements) => {
                 let plan = |own: &[Step], place: usize| Plan::reversed(own, first - place, rims, place == 0);
-                trace::trace_placed_by(&steps(), poses, plan, &mut slices);
+                trace::trace_placed_by(&steps(), placements, plan, &mut slices);
             }
             None if is_planned => trace::trace_batch(&self.plans[part as usize], Goal::LastSurface, slices),
             None => trace::trace_batch(&plan_of(&steps(), part, first, rims), Goal::LastSurface, slices),
@@ -145,7 +147,7 @@ impl ReversedLens {
     }
 
     fn trace_part_f32(&self, part: Part, rays: &mut RayBatchF32) {
-        if self.poses.is_some() {
+        if self.placements.is_some() {
             let mut wide = rays.widened();
             self.trace_part(part, &mut wide, Vignetting::On);
             return rays.set_rounded(&wide, |point, _| point);
@@ -156,13 +158,13 @@ impl ReversedLens {
         mirror(&mut rays.slices());
     }
 
-    /// The poses of the surfaces of a part.
-    fn poses_of(&self, part: Part) -> Option<&[Pose]> {
+    /// The placements of the surfaces of a part.
+    fn poses_of(&self, part: Part) -> Option<&[Placement]> {
         let stop_place = self.forward.n_surfaces() - 1 - self.forward.stop();
-        self.poses.as_ref().map(|poses| match part {
-            Part::Whole => &poses[..],
-            Part::ToStop => &poses[..=stop_place],
-            Part::FromStop => &poses[stop_place..],
+        self.placements.as_ref().map(|placements| match part {
+            Part::Whole => &placements[..],
+            Part::ToStop => &placements[..=stop_place],
+            Part::FromStop => &placements[stop_place..],
         })
     }
 }
@@ -178,9 +180,9 @@ fn mirror<T: Real>(rays: &mut RaySlices<'_, T>) {
     }
 }
 
-fn mirrored_pose(pose: &Pose) -> Pose {
+fn mirrored_placement(placement: &Placement) -> Placement {
     let flip = DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0));
-    Pose { vertex_mm: flip * pose.vertex_mm, rotation: flip * pose.rotation * flip }
+    Placement { vertex_mm: flip * placement.vertex_mm, rotation: flip * placement.rotation * flip }
 }
 
 /// Returns the steps of a lens mirrored at z = 0, the last first.

@@ -26,9 +26,9 @@ pub struct SeidelSums {
     pub s4: f64,
     /// Distortion.
     pub s5: f64,
-    /// Axial colour.
+    /// Axial color.
     pub c1: f64,
-    /// Lateral colour.
+    /// Lateral color.
     pub c2: f64,
 }
 
@@ -60,7 +60,7 @@ pub struct Seidel {
 pub struct SeidelSettings {
     /// The main wavelength, nm.
     pub wavelength_nm: f64,
-    /// The two wavelengths between which colour is counted, the shorter first, nm.
+    /// The two wavelengths between which color is counted, the shorter first, nm.
     pub colors_nm: [f64; 2],
     /// Distance of the object before the first vertex, mm; infinite for a far one.
     pub object_distance_mm: f64,
@@ -70,7 +70,7 @@ pub struct SeidelSettings {
 }
 
 impl SeidelSettings {
-    /// Returns the usual settings: a far object, the d line, and colour from F to C.
+    /// Returns the usual settings: a far object, the d line, and color from F to C.
     pub fn far(chief_slope: f64) -> Self {
         let (wavelength_nm, colors_nm) = (D_LINE_NM, [F_LINE_NM, C_LINE_NM]);
         Self { wavelength_nm, colors_nm, object_distance_mm: f64::INFINITY, chief_slope }
@@ -108,7 +108,7 @@ impl Paraxial {
 impl Lens {
     /// Returns the Seidel sums of the lens for a full aperture.
     ///
-    /// The marginal ray passes the edge of the paraxial entrance pupil, the chief ray its centre. (Of a far object and a
+    /// The marginal ray passes the edge of the paraxial entrance pupil, the chief ray its center. (Of a far object and a
     /// lens that is telecentric on its side, where such rays do not exist, the sums are infinite.) An ideal lens in
     /// the train adds nothing; a conic or asphere adds what its r⁴ term departs from the sphere.
     ///
@@ -234,7 +234,7 @@ mod tests {
             Lens::new("telecentric", "test", surfaces, 2).unwrap()
         };
         let probe = lens(1.0);
-        let bfl_mm = probe.at(D_LINE_NM).unwrap().film_mm_for(f64::INFINITY).unwrap() + 1.0;
+        let bfl_mm = probe.at(D_LINE_NM).unwrap().film_distance_mm_for(f64::INFINITY).unwrap() + 1.0;
         let settings = SeidelSettings { object_distance_mm: 90.0, ..SeidelSettings::far(0.05) };
         let exact = lens(bfl_mm);
         assert!(exact.at(D_LINE_NM).unwrap().first_order().entrance_pupil_z_mm.is_infinite());

@@ -76,7 +76,7 @@ impl Shape {
 
 /// A surface in the frame of its own vertex, with a circular rim about its axis.
 ///
-/// The curvature is signed: positive when the centre lies downstream, at +z. A plane is a surface of zero
+/// The curvature is signed: positive when the center lies downstream, at +z. A plane is a surface of zero
 /// curvature, not a special case. Where the surface is not one of revolution the curvature is that along y.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {

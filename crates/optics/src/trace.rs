@@ -93,7 +93,7 @@ pub(crate) enum Goal {
     /// On the last surface.
     LastSurface,
     /// On the plane so far behind the last vertex.
-    Film { film_mm: f64 },
+    Film { film_distance_mm: f64 },
 }
 
 /// Traces rays given in the lens frame.
@@ -176,8 +176,8 @@ fn trace_groups<T: Real, const B: usize>(
                 }
             }
         }
-        if let Goal::Film { film_mm } = goal {
-            kernel::to_plane(T::of(film_mm), plan.index_after, from);
+        if let Goal::Film { film_distance_mm } = goal {
+            kernel::to_plane(T::of(film_distance_mm), plan.index_after, from);
         }
         for (i, block) in from.iter().enumerate() {
             block.store(last_z, rays, start + i * LANES);

@@ -214,7 +214,7 @@ fn code_v_apertures_are_read() {
 #[test]
 fn drawing_shows_openings_and_obscurations() {
     let layout = Layout {
-        film_mm: 90.0,
+        film_distance_mm: 90.0,
         object_distance_mm: f64::INFINITY,
         field_tans: vec![0.0],
         wavelengths_nm: vec![550.0],

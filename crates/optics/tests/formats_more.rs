@@ -71,7 +71,7 @@ fn own_file_checks_what_it_says_of_use() {
     let good = read("fields: [Angle(x_deg: 0.0, y_deg: 7.0)], wavelengths_nm: [500.0, 600.0], film_distance_mm: 40.0")
         .unwrap();
     assert_eq!(good.fields, [Field::Angle { x_deg: 0.0, y_deg: 7.0 }]);
-    assert_eq!((good.wavelengths_nm.len(), good.film_mm, good.object_distance_mm), (2, Some(40.0), None));
+    assert_eq!((good.wavelengths_nm.len(), good.film_distance_mm, good.object_distance_mm), (2, Some(40.0), None));
     for (wrong, expected) in [
         ("wavelengths_nm: [0.0]", "a wavelength of wavelengths_nm is 0, expected a number above 0"),
         ("film_distance_mm: NaN", "film_distance_mm is NaN, expected a finite number"),

@@ -1,4 +1,4 @@
-//! Tilted, decentred and anamorphic surfaces and curved films in lens files.
+//! Tilted, decentered and anamorphic surfaces and curved films in lens files.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use std::path::Path;
@@ -43,24 +43,25 @@ fn read(name: &str, text: &str) -> LensFile {
 }
 
 /// Where rays through a lens meet the film, in the film's own frame.
-fn on_film(lens: &Lens, film_mm: f64) -> Vec<Option<DVec2>> {
+fn on_film(lens: &Lens, film_distance_mm: f64) -> Vec<Option<DVec2>> {
     let mono = lens.at(550.0).unwrap();
     let start = |i: i32| DVec3::new(0.5 * f64::from(i % 9 - 4), 0.5 * f64::from(i / 9 - 4), -5.0);
     let starts: Vec<DVec3> = (0..81).map(start).collect();
     let direction = DVec3::new(0.02, -0.03, 1.0).normalize();
     let mut rays = RayBatch::from_points(&starts, &[direction; 81]);
     mono.trace(&mut rays, Vignetting::On);
-    mono.to_film(&mut rays, film_mm);
-    let pose = mono.film_pose(film_mm);
-    let place = |i: usize| rays.fate[i].is_in_flight().then(|| pose.to_own(rays.point_mm(i)).truncate());
+    mono.to_film(&mut rays, film_distance_mm);
+    let placement = mono.film_placement(film_distance_mm);
+    let place =
+        |i: usize| rays.fate[i].is_in_flight().then(|| placement.surface_from_lens(rays.point_mm(i)).truncate());
     (0..rays.len()).map(place).collect()
 }
 
 #[track_caller]
 fn assert_same(a: &LensFile, b: &LensFile) {
     // An axis that goes round by breaks is as long as its pieces, and so are its distances.
-    let film_mm = b.film_mm.unwrap();
-    let (a, b) = (on_film(&a.lens, a.film_mm.unwrap_or(film_mm)), on_film(&b.lens, film_mm));
+    let film_distance_mm = b.film_distance_mm.unwrap();
+    let (a, b) = (on_film(&a.lens, a.film_distance_mm.unwrap_or(film_distance_mm)), on_film(&b.lens, film_distance_mm));
     assert!(a.iter().flatten().count() > 40);
     for (a, b) in a.into_iter().zip(b) {
         match (a, b) {
@@ -78,7 +79,7 @@ fn still(surfaces: (usize, usize)) -> CoordinateBreak {
 #[test]
 fn tilted_plate_of_a_zemax_file_shifts_light_and_its_return_puts_the_film_back() {
     let file = read("plate.zmx", PLATE);
-    assert_eq!((file.lens.interfaces().len(), file.film_mm), (3, Some(20.0)));
+    assert_eq!((file.lens.interfaces().len(), file.film_distance_mm), (3, Some(20.0)));
     assert_eq!(file.lens.image_surface(), ImageSurface { curvature_per_mm: -0.05, conic: 0.25 });
     let mono = file.lens.at(550.0).unwrap();
     let mut rays = RayBatch::from_points(&[DVec3::ZERO], &[DVec3::Z]);
@@ -88,7 +89,7 @@ fn tilted_plate_of_a_zemax_file_shifts_light_and_its_return_puts_the_film_back()
     let shift_mm = -7.0 * sine * (1.0 - cosine / (2.25 - sine * sine).sqrt());
     // The return is made at the plate's back, so that the film follows the axis from there.
     let film = DVec3::new(0.0, -7.0 * sine, 10.0 + 7.0 * cosine + 20.0);
-    assert!((mono.film_pose(20.0).vertex_mm - film).length() < 1e-14);
+    assert!((mono.film_placement(20.0).vertex_mm - film).length() < 1e-14);
     assert!((rays.point_mm(0) - DVec3::new(0.0, shift_mm, film.z)).length() < 1e-13, "{}", rays.point_mm(0));
     // Vignetting that the file leaves out are as wide as the tilted beam needs them.
     assert!((file.lens.interfaces()[1].surface.semi_aperture_mm - 2.0 / cosine).abs() < 1e-6);
@@ -98,9 +99,9 @@ fn tilted_plate_of_a_zemax_file_shifts_light_and_its_return_puts_the_film_back()
 fn breaks_are_in_the_units_of_the_file() {
     let inches = PLATE.replace("UNIT MM", "UNIT IN").replace("PARM 3 30", "PARM 1 0.5\n  PARM 2 -1\n  PARM 3 30");
     let lens = read("plate.zmx", &inches).lens;
-    let pose = lens.poses()[1];
-    assert!((pose.vertex_mm - DVec3::new(12.7, -25.4, 254.0)).length() < 1e-12);
-    assert!((pose.tilt_deg()[0] - 30.0).abs() < 1e-13);
+    let placement = lens.placements()[1];
+    assert!((placement.vertex_mm - DVec3::new(12.7, -25.4, 254.0)).length() < 1e-12);
+    assert!((placement.tilt_deg()[0] - 30.0).abs() < 1e-13);
 }
 
 /// A lens with every kind of shape and move.
@@ -126,7 +127,7 @@ fn design() -> LensFile {
         CoordinateBreak { tilt_deg: [-3.0, 0.5, 0.0], tilt_first: true, ..still((4, 4)) },
     ];
     let mut file = LensFile::from(lens.with_moves(moves).unwrap());
-    file.film_mm = Some(55.0);
+    file.film_distance_mm = Some(55.0);
     file.wavelengths_nm = vec![550.0];
     file.reference_wavelength_nm = Some(550.0);
     file
@@ -151,9 +152,9 @@ fn files_written_trace_the_same() {
     assert_same(&zmx, &bent);
     assert_eq!(zmx.lens.image_surface(), image_surface);
     let message = bent.to_omni_json().unwrap_err().to_string();
-    assert!(message.ends_with("surface 5 (the film) is tilted or decentred"), "{message}");
+    assert!(message.ends_with("surface 5 (the film) is tilted or decentered"), "{message}");
     let message = design().to_dat().unwrap_err().to_string();
-    assert_eq!(message, "a .dat file cannot hold this lens: surface 0 is tilted or decentred");
+    assert_eq!(message, "a .dat file cannot hold this lens: surface 0 is tilted or decentered");
 }
 
 #[test]
@@ -168,7 +169,7 @@ fn tilts_written_about_their_pivots_keep_every_length_of_the_axis() {
             let again = read("again.zmx", &file.to_zmx().unwrap());
             let lengths = |file: &LensFile| {
                 let gaps = file.lens.interfaces().iter().map(|interface| interface.thickness_after_mm);
-                gaps.chain(file.film_mm).collect::<Vec<_>>()
+                gaps.chain(file.film_distance_mm).collect::<Vec<_>>()
             };
             // The last gap of a lens is the film's.
             let n_gaps = file.lens.interfaces().len() - 1;
@@ -190,7 +191,7 @@ fn toroid_is_written_and_read_in_any_unit() {
     let surface = Surface { shape: toroid.clone(), ..Surface::sphere(40.0, 5.0) };
     let interface = Interface { surface, medium_after: Glass::Constant { index: 1.5 }, thickness_after_mm: 0.0 };
     let mut file = LensFile::from(Lens::new("toroid", "test", vec![interface], 0).unwrap());
-    file.film_mm = Some(100.0);
+    file.film_distance_mm = Some(100.0);
     let text = file.to_zmx().unwrap();
     let again = read("a.zmx", &text);
     assert_eq!(again.lens.interfaces()[0].surface.shape, toroid);

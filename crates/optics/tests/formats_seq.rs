@@ -55,7 +55,7 @@ fn surfaces_pupil_fields_and_wavelengths_are_read() {
     let private = Glass::Tabulated { wavelengths_nm: vec![480.0, 700.0], indices: vec![1.62, 1.6] };
     assert_eq!(lens.interfaces()[1].medium_after, private);
     // The defocus of the image surface is part of the distance.
-    assert_eq!((file.film_mm, file.object_distance_mm), (Some(95.5), None));
+    assert_eq!((file.film_distance_mm, file.object_distance_mm), (Some(95.5), None));
     assert_eq!(file.wavelengths_nm, [656.3, 587.6, 486.1]);
     assert_eq!(file.reference_wavelength_nm, Some(587.6));
     assert_eq!(file.fields, [0.0, 2.0].map(|y_deg| Field::Angle { x_deg: 0.0, y_deg }));

@@ -1,4 +1,4 @@
-//! Cylinders, toroids, tilts and decentres of CODE V files.
+//! Cylinders, toroids, tilts and decenters of CODE V files.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use std::path::Path;
@@ -34,17 +34,17 @@ fn still(surfaces: (usize, usize)) -> CoordinateBreak {
 /// Where rays through a lens meet the film, in the film's own frame; with `swap` x and y change places before and after.
 fn on_film(file: &LensFile, swap: bool) -> Vec<Option<DVec2>> {
     let mono = file.lens.at(550.0).unwrap();
-    let film_mm = file.film_mm.unwrap();
+    let film_distance_mm = file.film_distance_mm.unwrap();
     let turn = |v: DVec3| if swap { DVec3::new(v.y, v.x, v.z) } else { v };
     let start = |i: i32| turn(DVec3::new(0.9 * f64::from(i % 9 - 4), 0.8 * f64::from(i / 9 - 4), -5.0));
     let starts: Vec<DVec3> = (0..81).map(start).collect();
     let direction = turn(DVec3::new(0.02, -0.03, 1.0).normalize());
     let mut rays = RayBatch::from_points(&starts, &[direction; 81]);
     mono.trace(&mut rays, Vignetting::On);
-    mono.to_film(&mut rays, film_mm);
-    let pose = mono.film_pose(film_mm);
+    mono.to_film(&mut rays, film_distance_mm);
+    let placement = mono.film_placement(film_distance_mm);
     let place = |i: usize| {
-        let own = turn(pose.to_own(rays.point_mm(i)));
+        let own = turn(placement.surface_from_lens(rays.point_mm(i)));
         rays.fate[i].is_in_flight().then(|| own.truncate())
     };
     (0..rays.len()).map(place).collect()
@@ -74,7 +74,7 @@ fn turns_about_x_and_y_are_left_handed() {
     let merged = CoordinateBreak { surfaces: (2, 2), pivot_mm: 10.0, ..expected[1] };
     assert_eq!(file.lens.moves(), [expected[0], merged]);
     assert_eq!(file.lens.image_surface().curvature_per_mm, -1.0 / 30.0);
-    assert_eq!(file.film_mm, Some(30.0));
+    assert_eq!(file.film_distance_mm, Some(30.0));
 }
 
 /// A wedge whose front leans its top towards the film (ADE > 0: y turns to z by the left hand's rule) bends light as
@@ -84,7 +84,7 @@ fn leaning_front_bends_light_as_a_prism_does() {
     let wedge = "RDM\nEPD 4\nWL 550\nSO 0 1E10\nS 0 5 1.5\n STO; ADE 3; DAR\nS 0 100\nSI 0\n";
     let file = read(wedge);
     let mono = file.lens.at(550.0).unwrap();
-    let normal = file.lens.poses()[0].rotation.z_axis;
+    let normal = file.lens.placements()[0].rotation.z_axis;
     let lean = 3_f64.to_radians();
     assert!((normal - DVec3::new(0.0, lean.sin(), lean.cos())).length() < 1e-15, "{normal}");
     let mut rays = RayBatch::from_points(&[DVec3::new(0.0, 0.0, -5.0)], &[DVec3::Z]);
@@ -107,8 +107,9 @@ fn reversed_tilts_undo_what_came_before() {
     assert_eq!(last_tilt.decenter_mm, [-0.4, 0.3, -0.0]);
     assert_eq!((last_tilt.tilt_deg, last_tilt.tilt_first), ([-20.0, 10.0, -5.0], true));
     let axis_is_upright = |file: &LensFile| {
-        let pose = file.lens.at(550.0).unwrap().film_pose(file.film_mm.unwrap());
-        (pose.rotation.z_axis - DVec3::Z).length() < 1e-15 && (pose.rotation.x_axis - DVec3::X).length() < 1e-15
+        let placement = file.lens.at(550.0).unwrap().film_placement(file.film_distance_mm.unwrap());
+        (placement.rotation.z_axis - DVec3::Z).length() < 1e-15
+            && (placement.rotation.x_axis - DVec3::X).length() < 1e-15
     };
     assert!(axis_is_upright(&at_back) && !axis_is_upright(&plate("20")));
     let at_dummy = plate(&format!("0\nS 0 20\n {tilts}; REV"));

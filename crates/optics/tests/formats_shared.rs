@@ -56,7 +56,7 @@ fn lenses_of_deeplens_load_with_their_film() {
     let Some(file) = read("deeplens_ef50mm_f1.8.json") else { return };
     let file = file.unwrap();
     assert_eq!((file.lens.interfaces().len(), file.lens.stop()), (12, 6));
-    assert!((file.film_mm.unwrap() - 37.5632629).abs() < 1e-6);
+    assert!((file.film_distance_mm.unwrap() - 37.5632629).abs() < 1e-6);
     let first = file.lens.at(550.0).unwrap().first_order();
     // The fifty-digit reference has this lens with its numbers rounded back to decimals; the file's are 32-bit.
     assert!((first.efl_mm - 51.46687463377028).abs() < 2e-5, "{}", first.efl_mm);
@@ -65,7 +65,12 @@ fn lenses_of_deeplens_load_with_their_film() {
     let file = file.unwrap();
     let first = file.lens.at(550.0).unwrap().first_order();
     // The film lies where the program focused real rays, a hundredth of a millimetre from the paraxial focus.
-    assert!((file.film_mm.unwrap() - first.bfl_mm).abs() < 0.01, "{} {:?}", first.bfl_mm, file.film_mm);
+    assert!(
+        (file.film_distance_mm.unwrap() - first.bfl_mm).abs() < 0.01,
+        "{} {:?}",
+        first.bfl_mm,
+        file.film_distance_mm
+    );
     // The corner of the film sees the field that the file's name states, 68 degrees, but for distortion.
     let field_deg = 2.0 * (3.565 / first.efl_mm).atan().to_degrees();
     assert!((field_deg - 68.0).abs() < 4.0, "{field_deg}");
@@ -77,7 +82,7 @@ fn zemax_triplet_loads_as_wide_as_its_pupil_and_fields_need() {
     let Some(file) = read("optiland_lens1.zmx") else { return };
     let file = file.unwrap();
     assert_eq!((file.lens.interfaces().len(), file.lens.stop()), (7, 4));
-    assert_eq!((file.film_mm, file.object_distance_mm), (Some(18.660079956054688), None));
+    assert_eq!((file.film_distance_mm, file.object_distance_mm), (Some(18.660079956054688), None));
     assert_eq!(file.wavelengths_nm, [486.1327, 587.5618, 656.2725]);
     assert_eq!(file.reference_wavelength_nm, Some(587.5618));
     let first = file.lens.at(587.5618).unwrap().first_order();
@@ -91,7 +96,7 @@ fn code_v_lenses_load() {
     let Some(file) = read("optiland_cooke_triplet.seq") else { return };
     let file = file.unwrap();
     assert_eq!((file.lens.name(), file.lens.interfaces().len(), file.lens.stop()), ("Cooke Triplet", 6, 0));
-    assert_eq!(file.film_mm, Some(42.2017));
+    assert_eq!(file.film_distance_mm, Some(42.2017));
     let first = file.lens.at(587.6).unwrap().first_order();
     assert!((first.entrance_pupil_diameter_mm - 10.0).abs() < 1e-12);
     assert!((first.efl_mm - 50.3).abs() < 0.1, "{}", first.efl_mm);

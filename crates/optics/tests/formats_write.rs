@@ -58,7 +58,7 @@ fn design() -> LensFile {
         interface(surface(-90.1, 8.0), Glass::Air, 0.0),
     ];
     let mut file = LensFile::from(Lens::new("a design", "made up", interfaces, 3).unwrap());
-    file.film_mm = Some(37.25);
+    file.film_distance_mm = Some(37.25);
     file.wavelengths_nm = vec![486.1327, 550.0, 656.2725];
     file.reference_wavelength_nm = Some(550.0);
     file.fields = [0.0, 3.0].map(|y_deg| Field::Angle { x_deg: 0.0, y_deg }).to_vec();

@@ -73,7 +73,7 @@ fn surfaces_pupil_fields_and_wavelengths_are_read() {
     assert_eq!(lens.interfaces()[0].medium_after, Glass::Named("SCHOTT:N-BK7".to_owned()));
     let asphere = Shape::EvenAsphere { conic: -0.5, coefficients: vec![1e-6] };
     assert_eq!(lens.interfaces()[0].surface.shape, asphere);
-    assert_eq!((file.film_mm, file.object_distance_mm), (Some(60.0), None));
+    assert_eq!((file.film_distance_mm, file.object_distance_mm), (Some(60.0), None));
     // FTYP says that one wavelength is used.
     assert_eq!(file.wavelengths_nm, [587.5618]);
     assert_eq!(file.fields[1], Field::Angle { x_deg: 0.0, y_deg: 5.0 });

@@ -78,7 +78,7 @@ fn a_ball_images_its_aplanatic_point_without_aberration() {
 }
 
 #[test]
-fn a_hemisphere_magnifies_its_centre_by_its_index() {
+fn a_hemisphere_magnifies_its_center_by_its_index() {
     let ball = ball(1.6, 3.0);
     let rays = fan(&ball, -3.0, 80.0);
     for i in 0..rays.len() {
@@ -232,14 +232,14 @@ fn point_on_axis(distance_mm: f64) -> ObjectPoint {
 fn film_and_object_distances_belong_together() {
     let lens = objective(1.0).at(GREEN_NM).unwrap();
     for distance_mm in [0.9, 1.0, 2.0] {
-        let film_mm = lens.film_mm_for(distance_mm).unwrap();
-        assert!((lens.object_distance_mm_for(film_mm).unwrap() - distance_mm).abs() < 1e-12);
+        let film_distance_mm = lens.film_distance_mm_for(distance_mm).unwrap();
+        assert!((lens.object_distance_mm_for(film_distance_mm).unwrap() - distance_mm).abs() < 1e-12);
         // Newton's equation, distances from both focal points: x x′ = f f′.
         let first = lens.first_order();
-        let product = (-distance_mm - first.ffl_mm) * (film_mm - first.bfl_mm);
+        let product = (-distance_mm - first.ffl_mm) * (film_distance_mm - first.bfl_mm);
         assert!((product / (first.object_focal_mm() * first.image_focal_mm()) - 1.0).abs() < 1e-11);
     }
-    assert!(lens.film_mm_for(0.8).is_err(), "within the front focal length");
+    assert!(lens.film_distance_mm_for(0.8).is_err(), "within the front focal length");
 }
 
 #[test]
@@ -270,7 +270,7 @@ fn read(name: &str, text: &str) -> Result<LensFile, OpticsError> {
 fn files_keep_the_objects_medium_or_refuse_it() {
     let mut file = LensFile::from(objective(1.0));
     file.object_distance_mm = Some(1.0);
-    file.film_mm = Some(9.0);
+    file.film_distance_mm = Some(9.0);
     for (name, text) in [("o.ron", file.lens.to_ron()), ("o.zmx", file.to_zmx().unwrap())] {
         let again = read(name, &text).unwrap().lens;
         assert_eq!(again.object_medium().index_at(GREEN_NM).unwrap(), 1.33, "{name}");

@@ -1,4 +1,4 @@
-//! Surfaces and groups that are tilted and decentred, and curved films.
+//! Surfaces and groups that are tilted and decentered, and curved films.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_optics::{
@@ -87,24 +87,24 @@ fn whole_lens_moved_is_its_rays_moved_back() {
     let n = lens.interfaces().len();
     let step =
         CoordinateBreak { pivot_mm: 13.0, decenter_mm: [1.5, -0.7, 2.0], tilt_deg: [8.0, -5.0, 20.0], ..still((0, n)) };
-    let (film_mm, centered) = (36.5, lens.at(550.0).unwrap());
+    let (film_distance_mm, centered) = (36.5, lens.at(550.0).unwrap());
     let placed = lens.with_moves(vec![step]).unwrap();
     assert!(!placed.is_rotational());
     let placed = placed.at(550.0).unwrap();
-    let pose = placed.film_pose(-centered.last_vertex_z_mm());
+    let placement = placed.film_placement(-centered.last_vertex_z_mm());
     let start = bundle(&centered, 1000);
-    let (mut expected, mut found) = (start.clone(), moved(&start, pose.rotation, pose.vertex_mm));
+    let (mut expected, mut found) = (start.clone(), moved(&start, placement.rotation, placement.vertex_mm));
     centered.trace(&mut expected, Vignetting::On);
-    centered.to_film(&mut expected, film_mm);
+    centered.to_film(&mut expected, film_distance_mm);
     placed.trace_parallel(&mut found, Vignetting::On);
-    placed.to_film(&mut found, film_mm);
+    placed.to_film(&mut found, film_distance_mm);
     assert!(expected.n_in_flight() > 200 && expected.losses().by_surface.len() > 3);
     // Some hundred roundings of numbers of the order of 100 mm, of which steep rays make a few times more.
-    assert_near(&found, &moved(&expected, pose.rotation, pose.vertex_mm), 2e-12);
+    assert_near(&found, &moved(&expected, placement.rotation, placement.vertex_mm), 2e-12);
 }
 
 #[test]
-fn decentred_group_is_rays_shifted_between_the_groups() {
+fn decentered_group_is_rays_shifted_between_the_groups() {
     let lens = Lens::built_in("dgauss-50mm").unwrap();
     let (n, first) = (lens.interfaces().len(), 6);
     let shift_mm = DVec3::new(0.4, -0.3, 0.0);
@@ -121,14 +121,14 @@ fn decentred_group_is_rays_shifted_between_the_groups() {
         assert_eq!(found.fate[i], shifted.fate[i]);
         assert!((found.point_mm(i) - shifted.point_mm(i) - shift_mm).length() < 1e-12);
     }
-    // Its pupil is not where that of the centred lens is.
+    // Its pupil is not where that of the centered lens is.
     let point = ObjectPoint::from_field(&placed, DVec2::ZERO, 0.0);
     let pupil = PupilBoundary::find(&placed, &point, 32).unwrap();
     assert!(pupil.center_mm().length() > 1e-3);
 }
 
 #[test]
-fn pupil_of_a_decentred_lens_is_decentred() {
+fn pupil_of_a_decentered_lens_is_decentered() {
     let lens = Lens::built_in("dgauss-50mm").unwrap();
     let step = CoordinateBreak { decenter_mm: [30.0, 5.0, 0.0], ..still((0, lens.interfaces().len())) };
     let lens = lens.with_moves(vec![step]).unwrap().at(550.0).unwrap();
@@ -169,7 +169,7 @@ fn what_needs_symmetry_refuses_a_lens_without() {
     let step = CoordinateBreak { decenter_mm: [0.1, 0.0, 0.0], ..still((0, 0)) };
     let lens = plate(1.5, 3.0).with_moves(vec![step]).unwrap();
     let message = lens.seidel(&SeidelSettings::far(0.1)).unwrap_err().to_string();
-    let expected = "a sum of Seidel aberrations needs a lens that is centred and rotationally symmetric, \
+    let expected = "a sum of Seidel aberrations needs a lens that is centered and rotationally symmetric, \
                     which plate is not";
     assert_eq!(message, expected);
     assert!(!lens.at(550.0).unwrap().is_rotational());
@@ -205,13 +205,13 @@ fn rays_end_on_a_curved_film() {
     let image_surface = ImageSurface { curvature_per_mm: -1.0 / 40.0, conic: 0.0 };
     let curved = lens.clone().with_image_surface(image_surface).unwrap().at(550.0).unwrap();
     assert!(curved.is_rotational(), "a curved film is no tilt");
-    let film_mm = 36.5;
+    let film_distance_mm = 36.5;
     let mut rays = bundle(&curved, 200);
     curved.trace(&mut rays, Vignetting::On);
     let (mut flat, behind) = (rays.clone(), rays.clone());
-    curved.to_film(&mut rays, film_mm);
-    curved.to_film_plane(&mut flat, film_mm);
-    let center = DVec3::Z * (curved.last_vertex_z_mm() + film_mm - 40.0);
+    curved.to_film(&mut rays, film_distance_mm);
+    curved.to_film_plane(&mut flat, film_distance_mm);
+    let center = DVec3::Z * (curved.last_vertex_z_mm() + film_distance_mm - 40.0);
     assert!(rays.n_in_flight() > 50);
     for i in (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight()) {
         assert!(((rays.point_mm(i) - center).length() - 40.0).abs() < 2e-14);
@@ -222,13 +222,13 @@ fn rays_end_on_a_curved_film() {
     // On a film that is flat by default both are one.
     let flat_lens = lens.at(550.0).unwrap();
     let mut same = behind;
-    flat_lens.to_film(&mut same, film_mm);
+    flat_lens.to_film(&mut same, film_distance_mm);
     assert_eq!(same, flat);
     // A small ball does not fill the field.
     let ball = ImageSurface { curvature_per_mm: -1.0, conic: 0.0 };
     let ball = Lens::built_in("dgauss-50mm").unwrap().with_image_surface(ball).unwrap().at(550.0).unwrap();
     let mut rays = bundle(&ball, 200);
     ball.trace(&mut rays, Vignetting::On);
-    ball.to_film(&mut rays, film_mm);
+    ball.to_film(&mut rays, film_distance_mm);
     assert!(rays.fate.contains(&RayFate::Missed { surface: 11 }));
 }

@@ -53,33 +53,35 @@ fn lenses() -> Vec<(String, Lens, f64)> {
     all.push(Lens::thin(50.0, 12.0).unwrap());
     let placed = |lens: Lens| {
         let mono = lens.at(550.0).unwrap();
-        let film_mm = mono.film_mm_for(f64::INFINITY).or_else(|_| mono.film_mm_for(500.0)).unwrap_or(30.0);
-        (lens.name().to_owned(), lens, film_mm)
+        let film_distance_mm =
+            mono.film_distance_mm_for(f64::INFINITY).or_else(|_| mono.film_distance_mm_for(500.0)).unwrap_or(30.0);
+        (lens.name().to_owned(), lens, film_distance_mm)
     };
     all.into_iter().map(placed).collect()
 }
 
 /// Rays from all over a film of this half diagonal to all over the rim of the last surface, and their film places.
-fn from_film(lens: &MonoLens, film_mm: f64, half_mm: f64, n: usize, seed: u64) -> (Vec<DVec2>, RayBatch) {
+fn from_film(lens: &MonoLens, film_distance_mm: f64, half_mm: f64, n: usize, seed: u64) -> (Vec<DVec2>, RayBatch) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let last = lens.n_surfaces() - 1;
-    let pose = ExitPupilBounds::find(&[lens.reversed()], film_mm, DVec2::splat(half_mm), PupilReach::WholeLens)
-        .unwrap()
-        .plane();
+    let placement =
+        ExitPupilBounds::find(&[lens.reversed()], film_distance_mm, DVec2::splat(half_mm), PupilReach::WholeLens)
+            .unwrap()
+            .plane();
     let (mut places, mut rays) = (Vec::new(), RayBatch::with_capacity(n));
     while rays.len() < n {
         let mut pair = || DVec2::new(random.random::<f64>(), random.random::<f64>()) * 2.0 - DVec2::ONE;
         let (place, target) = (pair() * half_mm, pair() * 1.2 * lens.semi_aperture_mm(last));
-        let site = lens.film_site(place, film_mm).unwrap();
-        let target = pose.to_lens(target.extend(0.0));
+        let site = lens.film_site(place, film_distance_mm).unwrap();
+        let target = placement.lens_from_surface(target.extend(0.0));
         places.push(place);
         rays.push(target, (target - site.point_mm).normalize(), 0.0);
     }
     (places, rays)
 }
 
-fn half_film_mm(lens: &MonoLens, film_mm: f64) -> f64 {
-    (0.3 * film_mm).min(15.0).min(2.0 * lens.semi_aperture_mm(lens.n_surfaces() - 1))
+fn half_film_mm(lens: &MonoLens, film_distance_mm: f64) -> f64 {
+    (0.3 * film_distance_mm).min(15.0).min(2.0 * lens.semi_aperture_mm(lens.n_surfaces() - 1))
 }
 
 /// How far from a point the line of a ray passes.
@@ -89,9 +91,9 @@ fn off_line_mm(rays: &RayBatch, i: usize, point_mm: DVec3) -> f64 {
 
 #[test]
 fn light_returns_the_way_it_came() {
-    for (name, lens, film_mm) in lenses() {
+    for (name, lens, film_distance_mm) in lenses() {
         let lens = lens.at(550.0).unwrap();
-        let (_, start) = from_film(&lens, film_mm, half_film_mm(&lens, film_mm), 4000, 1);
+        let (_, start) = from_film(&lens, film_distance_mm, half_film_mm(&lens, film_distance_mm), 4000, 1);
         let mut rays = start.clone();
         lens.reversed().trace(&mut rays, Vignetting::On);
         assert!(rays.n_in_flight() > 10, "{name}: {}", rays.n_in_flight());
@@ -118,9 +120,9 @@ fn light_returns_the_way_it_came() {
 
 #[test]
 fn rims_end_the_same_rays_both_ways() {
-    for (name, lens, film_mm) in lenses() {
+    for (name, lens, film_distance_mm) in lenses() {
         let lens = lens.at(550.0).unwrap();
-        let (_, start) = from_film(&lens, film_mm, half_film_mm(&lens, film_mm), 4000, 2);
+        let (_, start) = from_film(&lens, film_distance_mm, half_film_mm(&lens, film_distance_mm), 4000, 2);
         let (mut clipped, mut free) = (start.clone(), start.clone());
         lens.reversed().trace(&mut clipped, Vignetting::On);
         lens.reversed().trace(&mut free, Vignetting::Off);
@@ -147,15 +149,21 @@ fn rims_end_the_same_rays_both_ways() {
 
 #[test]
 fn pause_at_the_stop_changes_nothing() {
-    for (name, lens, film_mm) in lenses() {
+    for (name, lens, film_distance_mm) in lenses() {
         let reversed = lens.at(550.0).unwrap().reversed();
-        let (_, start) = from_film(reversed.forward(), film_mm, half_film_mm(reversed.forward(), film_mm), 2000, 3);
+        let (_, start) = from_film(
+            reversed.forward(),
+            film_distance_mm,
+            half_film_mm(reversed.forward(), film_distance_mm),
+            2000,
+            3,
+        );
         let (mut whole, mut parts) = (start.clone(), start);
         reversed.trace(&mut whole, Vignetting::On);
         reversed.trace_to_stop(&mut parts, Vignetting::On);
         let edge_mm = reversed.forward().stop_semi_aperture_mm();
         for i in (0..parts.len()).filter(|&i| parts.fate[i].is_in_flight()) {
-            let own_mm = reversed.stop_pose().to_own(parts.point_mm(i));
+            let own_mm = reversed.stop_placement().surface_from_lens(parts.point_mm(i));
             assert!(own_mm.truncate().length() <= edge_mm + 1e-12, "{name}");
         }
         reversed.trace_from_stop(&mut parts, Vignetting::On);
@@ -171,9 +179,9 @@ fn pause_at_the_stop_changes_nothing() {
 
 #[test]
 fn single_precision_keeps_scene_rays() {
-    for (name, lens, film_mm) in lenses() {
+    for (name, lens, film_distance_mm) in lenses() {
         let lens = lens.at(550.0).unwrap();
-        let (_, start) = from_film(&lens, film_mm, half_film_mm(&lens, film_mm), 2000, 4);
+        let (_, start) = from_film(&lens, film_distance_mm, half_film_mm(&lens, film_distance_mm), 2000, 4);
         let mut narrow = RayBatchF32::from(&start);
         for i in 0..start.len() {
             let (point, direction) = (start.point_mm(i), start.direction(i));
@@ -199,16 +207,17 @@ fn single_precision_keeps_scene_rays() {
 
 #[test]
 fn no_light_passes_outside_the_bounds() {
-    for (name, lens, film_mm) in lenses() {
+    for (name, lens, film_distance_mm) in lenses() {
         let at = |nm: f64| lens.at(nm).unwrap().reversed();
-        let half_mm = half_film_mm(at(550.0).forward(), film_mm);
+        let half_mm = half_film_mm(at(550.0).forward(), film_distance_mm);
         let colors = [450.0, 550.0, 650.0].map(at);
         for reach in [PupilReach::WholeLens, PupilReach::Stop] {
-            let bounds = ExitPupilBounds::find(&colors, film_mm, DVec2::splat(half_mm), reach).unwrap();
+            let bounds = ExitPupilBounds::find(&colors, film_distance_mm, DVec2::splat(half_mm), reach).unwrap();
             let (mut n_lit, mut n_outside) = (0, 0);
             for (seed, nm) in [450.0, 480.0, 550.0, 600.0, 650.0].into_iter().enumerate() {
                 let reversed = at(nm);
-                let (places, start) = from_film(reversed.forward(), film_mm, half_mm, 30_000, 10 + seed as u64);
+                let (places, start) =
+                    from_film(reversed.forward(), film_distance_mm, half_mm, 30_000, 10 + seed as u64);
                 let mut rays = start.clone();
                 match reach {
                     PupilReach::WholeLens => reversed.trace(&mut rays, Vignetting::On),
@@ -229,11 +238,11 @@ fn no_light_passes_outside_the_bounds() {
 fn bounds_waste_few_rays() {
     for (f_number, least) in [(2.03, 0.88), (8.0, 0.88), (22.0, 0.88)] {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(f_number, 550.0).unwrap();
-        let film_mm = lens.at(550.0).unwrap().film_mm_for(2_000.0).unwrap();
+        let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2_000.0).unwrap();
         let reversed = lens.at(550.0).unwrap().reversed();
         let bounds = ExitPupilBounds::find(
             std::slice::from_ref(&reversed),
-            film_mm,
+            film_distance_mm,
             DVec2::new(18.0, 12.0),
             PupilReach::WholeLens,
         )
@@ -244,7 +253,7 @@ fn bounds_waste_few_rays() {
             for _ in 0..20_000 {
                 let target = bounds.sample(place, DVec2::new(random.random(), random.random())).unwrap().point_mm;
                 assert!(bounds.contains(place, target));
-                let site = reversed.forward().film_site(place, film_mm).unwrap();
+                let site = reversed.forward().film_site(place, film_distance_mm).unwrap();
                 rays.push(target, (target - site.point_mm).normalize(), 0.0);
             }
             reversed.trace(&mut rays, Vignetting::On);
@@ -276,7 +285,9 @@ fn samples_fill_the_bounds_evenly() {
 #[test]
 fn film_within_the_lens_is_refused() {
     let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
-    let find = |film_mm| ExitPupilBounds::find(&[lens.reversed()], film_mm, DVec2::ONE, PupilReach::WholeLens);
+    let find = |film_distance_mm| {
+        ExitPupilBounds::find(&[lens.reversed()], film_distance_mm, DVec2::ONE, PupilReach::WholeLens)
+    };
     assert_eq!(
         find(-3.0).unwrap_err().to_string(),
         "the film of dgauss-50mm lies -3 mm behind the last vertex, expected a distance above 0"

@@ -53,7 +53,7 @@ impl LinearRgb {
         Self { planes: [(); 3].map(|()| Array2::zeros((rows, columns))) }
     }
 
-    /// Adds a band seen in this colour.
+    /// Adds a band seen in this color.
     pub fn add(&mut self, band: &Array2<f32>, rgb: [f64; 3]) {
         for (plane, weight) in self.planes.iter_mut().zip(rgb) {
             plane.scaled_add(weight as f32, band);
@@ -70,7 +70,7 @@ impl LinearRgb {
         rgb
     }
 
-    /// Returns the picture with colours that a screen cannot show moved towards the grey of their luminance until it can.
+    /// Returns the picture with colors that a screen cannot show moved towards the gray of their luminance until it can.
     pub fn within_gamut(mut self) -> Self {
         let [red, green, blue] = &mut self.planes;
         ndarray::Zip::from(red).and(green).and(blue).for_each(|r, g, b| {
@@ -108,9 +108,9 @@ pub fn code(linear: f64) -> u8 {
     (255.0 * srgb_encode(linear)).round() as u8
 }
 
-/// Returns the colour of a single wavelength as `#rrggbb`, bright enough for a line on white.
+/// Returns the color of a single wavelength as `#rrggbb`, bright enough for a line on white.
 pub fn wavelength_color(wavelength_nm: f64) -> String {
-    // Beyond the visible the colour is that of its end.
+    // Beyond the visible the color is that of its end.
     let grid = WavelengthGrid::new(vec![wavelength_nm.clamp(405.0, 680.0)]).expect("a wavelength in the visible");
     let rgb = Observer::Cie1931.xyz(&grid, &[1.0]).to_linear_srgb().map(|v| v.max(0.0));
     let most = rgb.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn wavelengths_have_their_colours() {
+    fn wavelengths_have_their_colors() {
         let rgb = |nm| {
             let text = wavelength_color(nm);
             [1, 3, 5].map(|i| u8::from_str_radix(&text[i..i + 2], 16).unwrap())
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_colour_beyond_the_screen_keeps_its_luminance() {
+    fn a_color_beyond_the_screen_keeps_its_luminance() {
         let mut picture = LinearRgb::black(1, 1);
         picture.add(&ndarray::array![[1.0]], [-0.2, 0.1, 0.9]);
         let luminance = |p: &LinearRgb| Xyz::from_linear_srgb([0, 1, 2].map(|i| f64::from(p.planes[i][(0, 0)]))).0[1];

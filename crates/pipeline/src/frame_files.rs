@@ -41,7 +41,7 @@ pub enum FrameFile {
     Electrons,
     /// `raw.tiff`: the digital numbers, 16 bits.
     RawTiff,
-    /// `raw.dng`: the digital numbers with mosaic, levels and colour matrices.
+    /// `raw.dng`: the digital numbers with mosaic, levels and color matrices.
     RawDng,
     /// `picture-16.png`: the picture, 16 bits.
     PicturePng16,
@@ -184,7 +184,7 @@ fn write_planes(
     Ok(file.to_owned())
 }
 
-/// Writes each plane of digital numbers as a 16-bit grey picture.
+/// Writes each plane of digital numbers as a 16-bit gray picture.
 fn write_raw(raw: &Raw, extension: &str, folder: &Path) -> Result<Vec<String>, PipelineError> {
     let names = raw.planes.iter().zip(&raw.filter_names).map(|(plane, filter)| {
         let is_single = raw.planes.len() == 1;

@@ -24,9 +24,9 @@ pub use dioptric_optics::{MissingGlass, SeqNumbers};
 pub use dioptric_psf::Diffraction;
 
 pub use camera::{
-    BankChoice, BankData, BlurChoice, Camera, Exposed, FilmChoice, FocusChoice, FramesChoice, LensChoice, LensReading,
-    Movements, REFERENCE_WAVELENGTH_NM, SceneChoice, SceneSource, SensorChoice, SensorOptions, StopChoice,
-    WavelengthChoice, nearest_to_reference_nm,
+    BankData, BankSpec, BlurSpec, Camera, Exposed, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec,
+    Movements, REFERENCE_WAVELENGTH_NM, SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec,
+    nearest_to_reference_nm,
 };
 pub use error::PipelineError;
 pub use frame_files::{FrameFile, Frames, Outputs, write_frames};

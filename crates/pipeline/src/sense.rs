@@ -9,7 +9,7 @@ use dioptric_sensor::{
 use dioptric_spectrum::{Bands, Cancel, Illuminant, Spectrum, WavelengthGrid};
 
 use crate::{
-    FrameSet, Frames, FramesChoice, Irradiance, Outputs, PipelineError, SensorChoice, Silent, number,
+    FrameSet, Frames, FramesSpec, Irradiance, Outputs, PipelineError, SensorSpec, Silent, number,
     stages::{ShutterInputs, Watch, expose},
 };
 
@@ -17,14 +17,14 @@ use crate::{
 #[derive(Clone, Debug, PartialEq)]
 pub struct SenseRequest {
     /// The sensor; where the image has another pitch or size, its pixels are laid over the image's middle.
-    pub sensor: SensorChoice,
+    pub sensor: SensorSpec,
     /// The distance between the sensor's pixels, µm, where it is not the sensor's own: that of the samples of an image gives
     /// one pixel a sample, as in the run that made it.
     pub pixel_um: Option<f64>,
     /// The exposure.
     pub exposure: ExposureControl,
     /// How many frames the picture is made of.
-    pub frames: FramesChoice,
+    pub frames: FramesSpec,
     /// From the raw frame to the picture.
     pub processing: Processing,
     /// Which sources of noise are on.

@@ -2,8 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_pipeline::{
-    BlurChoice, Camera, Capture, Diffraction, FilmChoice, FocusChoice, KeptCamera, Quality, SceneSource, SensorChoice,
-    Silent, StageCounts, StopChoice, WavelengthChoice, with_exposure_s,
+    BlurSpec, Camera, Capture, Diffraction, FilmSpec, FocusSpec, KeptCamera, Quality, SceneSource, SensorSpec, Silent,
+    StageCounts, StopSpec, WavelengthSpec, with_exposure_s,
 };
 use dioptric_scene::{ExrParts, write_spectral_exr};
 use dioptric_sensor::WhiteBalance;
@@ -12,9 +12,9 @@ use dioptric_spectrum::{Bands, Cancel, Quantity, SpectralImage, WavelengthGrid};
 /// The demo on a film of 48 × 32 pixels and three bands.
 fn small() -> Camera {
     let mut camera = Camera::demo().unwrap();
-    camera.film = FilmChoice::Pixels { columns: 48, rows: 32, pitch_um: 660.0 };
+    camera.film = FilmSpec::Pixels { columns: 48, rows: 32, pitch_um: 660.0 };
     camera.scene.source = SceneSource::StillLife { columns: 54, rows: 36 };
-    camera.wavelengths = WavelengthChoice::ListNm(vec![450.0, 550.0, 650.0]);
+    camera.wavelengths = WavelengthSpec::ListNm(vec![450.0, 550.0, 650.0]);
     camera
 }
 
@@ -78,19 +78,19 @@ fn processing_changes_the_picture_alone() {
 
 #[test]
 fn sensor_starts_at_the_electrons() {
-    check(|camera| camera.sensor = SensorChoice::BuiltIn("imx363".to_owned()), [0, 0, 0, 0, 0, 0, 1, 1, 1]);
+    check(|camera| camera.sensor = SensorSpec::BuiltIn("imx363".to_owned()), [0, 0, 0, 0, 0, 0, 1, 1, 1]);
 }
 
 #[test]
 fn focus_diffraction_and_blur_start_at_film_bank_and_plan() {
-    check(|camera| camera.focus = FocusChoice::DistanceMm(2000.0), [0, 0, 1, 1, 1, 1, 1, 1, 1]);
+    check(|camera| camera.focus = FocusSpec::DistanceMm(2000.0), [0, 0, 1, 1, 1, 1, 1, 1, 1]);
     check(|camera| camera.diffraction = Diffraction::None, [0, 0, 0, 1, 1, 1, 1, 1, 1]);
-    check(|camera| camera.blur = BlurChoice::Pointwise, [0, 0, 0, 0, 1, 1, 1, 1, 1]);
+    check(|camera| camera.blur = BlurSpec::Pointwise, [0, 0, 0, 0, 1, 1, 1, 1, 1]);
 }
 
 #[test]
 fn stop_resolves_the_lens_and_keeps_the_scene() {
-    check(|camera| camera.stop = StopChoice::FNumber(8.0), [1, 0, 1, 1, 1, 1, 1, 1, 1]);
+    check(|camera| camera.stop = StopSpec::FNumber(8.0), [1, 0, 1, 1, 1, 1, 1, 1, 1]);
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn brighter_scene_keeps_the_plan() {
 fn going_back_costs_nothing() {
     let kept = KeptCamera::new(small());
     capture(&kept);
-    capture(&kept.with(|camera| camera.focus = FocusChoice::DistanceMm(2000.0)));
+    capture(&kept.with(|camera| camera.focus = FocusSpec::DistanceMm(2000.0)));
     let before = kept.stage_counts();
     capture(&kept);
     assert_eq!(kept.stage_counts(), before);
@@ -144,7 +144,7 @@ fn continued_run_images_nothing() {
     assert_eq!((counts.scene, counts.bank, counts.irradiance, counts.electrons), (0, 0, 0, 1));
     assert_eq!(bits(&exposed), bits(&capture(&kept.with(|camera| camera.seed = 5))));
     // A change before the irradiance images the scene anew, and rightly.
-    let focus = |camera: &mut Camera| camera.focus = FocusChoice::DistanceMm(2000.0);
+    let focus = |camera: &mut Camera| camera.focus = FocusSpec::DistanceMm(2000.0);
     assert_eq!(bits(&capture(&resumed.camera.with(focus))), bits(&capture(&kept.with(focus))));
 }
 
@@ -160,9 +160,9 @@ fn folder_without_a_run_is_refused() {
 #[test]
 fn preview_shows_the_full_picture() {
     let mut camera = small();
-    camera.film = FilmChoice::Pixels { columns: 600, rows: 400, pitch_um: 52.8 };
+    camera.film = FilmSpec::Pixels { columns: 600, rows: 400, pitch_um: 52.8 };
     camera.scene.source = SceneSource::StillLife { columns: 680, rows: 454 };
-    camera.wavelengths = WavelengthChoice::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 20.0 };
+    camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 20.0 };
     let kept = KeptCamera::new(camera);
     let (full, preview) = (capture(&kept), capture(&kept.with_quality(Quality::Preview)));
     assert_eq!((preview.place.binning, preview.place.rows, preview.place.columns), (2, 200, 300));
@@ -192,7 +192,7 @@ fn changed_scene_file_is_seen() {
     };
     paint(0.01);
     let mut camera = small();
-    camera.scene = dioptric_pipeline::SceneChoice::of_file(path.clone());
+    camera.scene = dioptric_pipeline::SceneSpec::of_file(path.clone());
     camera.scene.depth_m = Some(2.0);
     camera.scene.field_of_view_deg = Some(34.0);
     let kept = KeptCamera::new(camera);

@@ -15,8 +15,8 @@ const HURB: Diffraction = Diffraction::Hurb { gamma: 1.0 };
 
 /// 10 fields × 9 depths × 4 wavelengths from 400 to 700 nm, focused at 2 m.
 fn settings(lens: &Lens, diffraction: Diffraction) -> BankSettings {
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
-    let settings = BankSettings::covering(film_mm, 0.2, (0.1, 1.2), (400.0, 700.0), diffraction);
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+    let settings = BankSettings::covering(film_distance_mm, 0.2, (0.1, 1.2), (400.0, 700.0), diffraction);
     BankSettings { fields: FieldSampling::Radial((0..10).map(|i| 0.2 * f64::from(i) / 9.0).collect()), ..settings }
 }
 

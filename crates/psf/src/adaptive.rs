@@ -312,12 +312,12 @@ mod tests {
     #[test]
     fn samples_are_added_until_the_target_is_met_or_the_limit_is() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
-        let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+        let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
         let few = BankSettings {
             fields: FieldSampling::Radial(vec![0.0, 0.1, 0.2]),
             dioptres: vec![0.1, 1.0],
             wavelengths_nm: vec![450.0, 650.0],
-            ..BankSettings::covering(film_mm, 0.2, (0.1, 1.0), (450.0, 650.0), Diffraction::None)
+            ..BankSettings::covering(film_distance_mm, 0.2, (0.1, 1.0), (450.0, 650.0), Diffraction::None)
         };
         let places = ErrorPlaces { n_places: 16, ..ErrorPlaces::STANDARD };
         let wanted = AdaptiveSettings { target_median: 0.01, places, ..AdaptiveSettings::STANDARD };

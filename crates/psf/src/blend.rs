@@ -92,8 +92,8 @@ mod tests {
     #[test]
     fn on_a_sample_a_blend_is_its_picture() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
-        let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
-        let rays = BankSettings::covering(film_mm, 0.2, (0.0, 1.0), (450.0, 650.0), Diffraction::None);
+        let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+        let rays = BankSettings::covering(film_distance_mm, 0.2, (0.0, 1.0), (450.0, 650.0), Diffraction::None);
         let images = BankSettings { interpolation: Interpolation::Images, ..rays.clone() };
         let [rays, images] = [rays, images].map(|settings| LensImageModel::build(&lens, &settings).unwrap());
         let at = |bank: &LensImageModel, tan: f64, d: f64, nm: f64| {

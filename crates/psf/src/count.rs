@@ -69,17 +69,17 @@ impl FrontGrid {
 /// surface, in angles, with the vacuum wavelength.
 ///
 /// For a single ideal lens that is right; for others it spreads light too much, and is kept for comparison only.
-pub fn trace_as_authors(lens: &MonoLens, rays: &mut RayBatch, film_mm: f64, bending: Option<AuthorsBending>) {
+pub fn trace_as_authors(lens: &MonoLens, rays: &mut RayBatch, film_distance_mm: f64, bending: Option<AuthorsBending>) {
     for surface in 0..lens.n_surfaces() {
         lens.trace_surfaces(surface..surface + 1, rays, Vignetting::On);
         if let Some(AuthorsBending { model, seed }) = bending {
             let edge = CircularStop::new(lens.semi_aperture_mm(surface), lens.wavelength_nm(), 1.0);
             let seed = seed.wrapping_add(surface as u64);
             let hurb = SampledHurb { model, edge, form: HurbForm::Angles, seed };
-            hurb.apply(rays, &lens.surface_pose(surface));
+            hurb.apply(rays, &lens.surface_placement(surface));
         }
     }
-    lens.to_film(rays, film_mm);
+    lens.to_film(rays, film_distance_mm);
 }
 
 impl CountingFilm {
@@ -92,11 +92,13 @@ impl CountingFilm {
         counts
     }
 
-    /// Returns what [`count`](Self::count) does for the rays of a beam on the film, `film_mm` behind the lens, without
+    /// Returns what [`count`](Self::count) does for the rays of a beam on the film, `film_distance_mm` behind the lens, without
     /// storing them.
-    pub fn count_beam(self, lens: &MonoLens, beam: &Beam<'_>, film_mm: f64) -> Array2<f64> {
+    pub fn count_beam(self, lens: &MonoLens, beam: &Beam<'_>, film_distance_mm: f64) -> Array2<f64> {
         let mut counts = Array2::zeros((self.n_pixels, self.n_pixels));
-        lens.trace_onto(beam, Vignetting::On, film_mm, |rays| self.add(lens.landed(rays, film_mm), &mut counts));
+        lens.trace_onto(beam, Vignetting::On, film_distance_mm, |rays| {
+            self.add(lens.landed(rays, film_distance_mm), &mut counts)
+        });
         counts
     }
 
@@ -160,14 +162,14 @@ mod tests {
         let lens = Lens::built_in("paper-2el").unwrap().at(550.0).unwrap();
         let grid = FrontGrid { n_across: 201, jitter_seed: Some(1) };
         let source_mm = DVec3::new(100.0, 0.0, -2_000.0);
-        let (film_mm, targets_mm) = (52.0, grid.targets_mm(&lens));
+        let (film_distance_mm, targets_mm) = (52.0, grid.targets_mm(&lens));
         let mut rays = grid.rays(&lens, source_mm);
-        lens.trace_to_film(&mut rays, Vignetting::On, film_mm);
-        let center_mm = mean_place_mm(lens.landed(&rays, film_mm)).unwrap();
+        lens.trace_to_film(&mut rays, Vignetting::On, film_distance_mm);
+        let center_mm = mean_place_mm(lens.landed(&rays, film_distance_mm)).unwrap();
         let film = CountingFilm { n_pixels: 64, side_mm: 1.0, center_mm };
         let beam = Beam { point: ObjectPoint::Finite(source_mm), targets_mm: &targets_mm, z_mm: 0.0 };
-        let counts = film.count_beam(&lens, &beam, film_mm);
+        let counts = film.count_beam(&lens, &beam, film_distance_mm);
         assert!(counts.sum() > 1e3);
-        assert_eq!(counts, film.count(lens.landed(&rays, film_mm)));
+        assert_eq!(counts, film.count(lens.landed(&rays, film_distance_mm)));
     }
 }

@@ -106,7 +106,7 @@ impl RotationalBank {
         let field_tan = field_tan.clamp_length_max(self.last_field_tan());
         let point = ObjectPoint::from_field(self.reference(), field_tan, dioptres.clamp(least, most));
         let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::Centroid };
-        Ok(wave_psf(&lens, &point, self.settings().film_mm, &window, WaveQuality::default())?.samples)
+        Ok(wave_psf(&lens, &point, self.settings().film_distance_mm, &window, WaveQuality::default())?.samples)
     }
 }
 

@@ -14,7 +14,7 @@ const STEPS: usize = 24;
 ///
 /// Fields are tangents of angles at the entrance pupil, places are mm from the lens's axis, both in the picture frame: x to
 /// the right, y up, where a distant point at tan θ lands at about +f tan θ. It is the inverse of where the centroids of
-/// point spread functions lie, so distortion, lateral colour, tilts and different powers across and up are in it.
+/// point spread functions lie, so distortion, lateral color, tilts and different powers across and up are in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldGeometry {
     area: Area,

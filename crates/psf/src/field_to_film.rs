@@ -131,7 +131,7 @@ fn nearest(lit: &[Option<DVec2>], at: usize, n_columns: usize) -> usize {
     (0..lit.len()).filter(|&i| lit[i].is_some()).min_by_key(|&i| square(i)).unwrap_or(at)
 }
 
-/// Fills the gaps of a grid of places by going on straight from two neighbours in a line, or returns `None` where there are
+/// Fills the gaps of a grid of places by going on straight from two neighbors in a line, or returns `None` where there are
 /// no two.
 fn straight_on(mut places: Vec<Option<DVec2>>, n_columns: usize) -> Option<Vec<DVec2>> {
     let n_rows = places.len() / n_columns;

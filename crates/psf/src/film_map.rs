@@ -6,7 +6,7 @@ use crate::FieldGeometry;
 
 /// From a distance on the film to the field seen there, and the irradiance that it gets; for one depth and wavelength.
 ///
-/// The map is that of the centroids of the PSFs, so distortion and lateral colour are in it.
+/// The map is that of the centroids of the PSFs, so distortion and lateral color are in it.
 #[derive(Clone, Debug)]
 pub struct RadialMap {
     // Invariants: at least two entries, evenly spaced in the square of the distance, as many gains as ratios.

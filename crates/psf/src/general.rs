@@ -38,7 +38,7 @@ pub(crate) struct GeneralBank {
     pub(crate) samples: Vec<Option<Sample>>,
     lens: Lens,
     reference: MonoLens,
-    /// Index around the stop at each of the colours.
+    /// Index around the stop at each of the colors.
     stop_indices: Vec<f64>,
 }
 
@@ -72,7 +72,7 @@ impl GeneralBank {
                         reference: &reference,
                         field_tan: DVec2::new(tan_x, tan_y),
                         dioptres,
-                        film_mm: settings.film_mm,
+                        film_distance_mm: settings.film_distance_mm,
                         mesh,
                     }));
                 }
@@ -182,7 +182,7 @@ impl GeneralBank {
             let dioptres = within(self.dioptres.knots(), dioptres);
             let point = ObjectPoint::from_field(&self.reference, field_tan, dioptres);
             let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::Centroid };
-            Ok(wave_psf(&lens, &point, self.settings.film_mm, &window, WaveQuality::default())?.samples)
+            Ok(wave_psf(&lens, &point, self.settings.film_distance_mm, &window, WaveQuality::default())?.samples)
         };
         composed(layout, self.settings.diffraction, waves)
     }

@@ -30,7 +30,7 @@ const PART_OF_A_WIDE_CELL: f64 = 0.25;
 const FAR: f64 = 5.0;
 /// Variance, pixels², that a pixel's own size adds when the need for subdivision is judged.
 const PIXEL_VARIANCE: f64 = 0.12;
-/// How much of the distance by which neighbours' Gaussians come apart at one standard deviation each is made softer.
+/// How much of the distance by which neighbors' Gaussians come apart at one standard deviation each is made softer.
 const FAN: f64 = 1.5;
 
 /// Uncertainty bending at the stop.
@@ -295,7 +295,7 @@ impl Looks {
     /// Whether bending is so small beside the cell that it is drawn as it is.
     #[inline(always)]
     fn is_still(&self, i: usize) -> bool {
-        // Cells of a blur lie side by side: what one loses to its neighbour it gets back.
+        // Cells of a blur lie side by side: what one loses to its neighbor it gets back.
         let narrow = match self.out2[i].min(self.around2[i]) {
             side2 if side2 > WIDE_CELL * WIDE_CELL => PART_OF_A_WIDE_CELL,
             side2 if side2 > NARROW_CELL * NARROW_CELL => PART_OF_A_PIXEL,
@@ -313,7 +313,7 @@ impl Looks {
 
     /// Returns the splat of a part.
     ///
-    /// Gaussians along the radii of the stop fan out. Far from a blur's edge the splats of neighbours would leave gaps, 48
+    /// Gaussians along the radii of the stop fan out. Far from a blur's edge the splats of neighbors would leave gaps, 48
     /// spokes, so each is softened across by how far it comes apart from the next; but by less than a part's own side,
     /// for in focus they all meet in the middle.
     #[inline(always)]

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// A polar mesh over the pupil: a centre, then rings out to its edge, each of equally many nodes.
+/// A polar mesh over the pupil: a center, then rings out to its edge, each of equally many nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Mesh {
     pub(crate) n_rings: usize,
@@ -21,7 +21,7 @@ impl Mesh {
         self.n_rings * self.n_azimuths
     }
 
-    /// Returns the radius of a ring as a share of the pupil's: 0 is the centre, `n_rings` the edge.
+    /// Returns the radius of a ring as a share of the pupil's: 0 is the center, `n_rings` the edge.
     ///
     /// Rings crowd a little towards the edge, where outlines are drawn and diffraction is strongest.
     pub(crate) fn share(self, ring: f64) -> f64 {
@@ -33,7 +33,7 @@ impl Mesh {
         TAU * j / self.n_azimuths as f64
     }
 
-    /// Returns the place of a node in a list: all of ring 0 are the centre.
+    /// Returns the place of a node in a list: all of ring 0 are the center.
     pub(crate) fn node(self, ring: usize, j: usize) -> usize {
         if ring == 0 {
             0
@@ -68,7 +68,7 @@ impl Mesh {
     }
 }
 
-/// Returns a polar place about a centre.
+/// Returns a polar place about a center.
 pub(crate) fn polar(center: DVec2, radius: f64, azimuth: f64) -> DVec2 {
     center + DVec2::from_angle(azimuth) * radius
 }

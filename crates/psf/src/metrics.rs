@@ -68,7 +68,7 @@ impl Picture {
         DVec2::new(self.mean(|p| p.x), self.mean(|p| p.y))
     }
 
-    /// Returns the second moments about the centroid, µm². Pixels count as points at their centres.
+    /// Returns the second moments about the centroid, µm². Pixels count as points at their centers.
     pub fn second_moments_um2(&self) -> Covariance {
         let c = self.centroid_um();
         Covariance {
@@ -98,7 +98,7 @@ impl Picture {
         for ((row, column), e) in self.energy.indexed_iter() {
             let at = self.at_um(row, column).dot(along) / self.pitch_um + middle + offset;
             let (below, fraction) = (at.floor(), at - at.floor());
-            // Rounding must not push a whole number to the neighbour below.
+            // Rounding must not push a whole number to the neighbor below.
             let (below, fraction) = if fraction > 1.0 - 1e-9 { (below + 1.0, 0.0) } else { (below, fraction) };
             values[below as usize] += e * (1.0 - fraction) / self.pitch_um;
             if fraction > 0.0 {

@@ -44,32 +44,32 @@ pub fn two_element_lens(stop_diameter_mm: f64, outer_diameter_mm: f64) -> Result
 pub fn counted_psfs(
     lenses: &[MonoLens],
     source_mm: DVec3,
-    film_mm: f64,
+    film_distance_mm: f64,
     grid: FrontGrid,
     film: CountingFilm,
 ) -> Vec<Array2<f64>> {
     let count = |lens: &MonoLens| {
         let point = ObjectPoint::Finite(source_mm + DVec3::Z * lens.last_vertex_z_mm());
-        film.count_beam(lens, &Beam { point, targets_mm: &grid.targets_mm(lens), z_mm: 0.0 }, film_mm)
+        film.count_beam(lens, &Beam { point, targets_mm: &grid.targets_mm(lens), z_mm: 0.0 }, film_distance_mm)
     };
     lenses.iter().map(count).collect()
 }
 
 /// Returns where the middle of a fine film belongs: the mean place, over all wavelengths, of a first pass with 26² rays,
 /// or `None` if none of them arrives.
-pub fn film_center_mm(lenses: &[MonoLens], source_mm: DVec3, film_mm: f64) -> Option<DVec2> {
+pub fn film_center_mm(lenses: &[MonoLens], source_mm: DVec3, film_distance_mm: f64) -> Option<DVec2> {
     let coarse = FrontGrid { n_across: 26, jitter_seed: None };
     let mean_mm = |lens: &MonoLens| {
-        let rays = land(lens, source_mm, film_mm, coarse);
-        mean_place_mm(lens.landed(&rays, film_mm))
+        let rays = land(lens, source_mm, film_distance_mm, coarse);
+        mean_place_mm(lens.landed(&rays, film_distance_mm))
     };
     let means: Vec<DVec2> = lenses.iter().filter_map(mean_mm).collect();
     (!means.is_empty()).then(|| means.iter().sum::<DVec2>() / means.len() as f64)
 }
 
-fn land(lens: &MonoLens, source_mm: DVec3, film_mm: f64, grid: FrontGrid) -> RayBatch {
+fn land(lens: &MonoLens, source_mm: DVec3, film_distance_mm: f64, grid: FrontGrid) -> RayBatch {
     let mut rays = grid.rays(lens, source_mm + DVec3::Z * lens.last_vertex_z_mm());
-    trace_as_authors(lens, &mut rays, film_mm, None);
+    trace_as_authors(lens, &mut rays, film_distance_mm, None);
     rays
 }
 

@@ -1,4 +1,4 @@
-//! The vignetted pupil, found from that of a neighbouring point.
+//! The vignetted pupil, found from that of a neighboring point.
 
 use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, rays_towards};
 use glam::DVec2;
@@ -8,7 +8,7 @@ use crate::mesh::polar;
 /// How near to a rim the pupil's edge must pass, mm: the pupil's area is then good to 1e-8.
 const TOLERANCE_MM: f64 = 1e-8;
 
-/// The edge of a pupil in the entrance-pupil plane, at equally spaced azimuths about a centre.
+/// The edge of a pupil in the entrance-pupil plane, at equally spaced azimuths about a center.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Pupil {
     pub(crate) center_mm: DVec2,
@@ -31,7 +31,7 @@ impl Pupil {
     pub(crate) fn near(&self, lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
         let n_azimuths = self.rho_mm.len();
         let guess = Self { z_mm: lens.projection_center_z_mm(), ..self.clone() };
-        // Once to know where its centre is, once about that: any three digits of the first will do.
+        // Once to know where its center is, once about that: any three digits of the first will do.
         let solved = guess
             .refined(lens, point, 1e-3 * TOLERANCE_MM.sqrt())
             .map(Self::recentered)
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_neighbours_pupil_leads_to_the_pupil_found_from_nothing() {
+    fn the_neighbors_pupil_leads_to_the_pupil_found_from_nothing() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         let point = |field| ObjectPoint::from_field(&lens, DVec2::new(field, 0.0), 0.5);
         let mut pupil = Pupil::find(&lens, &point(0.0), 32).unwrap();
@@ -154,7 +154,7 @@ mod tests {
             pupil = pupil.near(&lens, &point(field)).unwrap();
             let found = Pupil::find(&lens, &point(field), 32).unwrap();
             let area = |p: &Pupil| p.rho_mm.iter().map(|r| r * r).sum::<f64>();
-            // The centres differ a little, and with them the sum over 32 azimuths where the edge has kinks.
+            // The centers differ a little, and with them the sum over 32 azimuths where the edge has kinks.
             assert!((area(&pupil) / area(&found) - 1.0).abs() < 1e-3, "at {field}");
             let edge = |share: f64| {
                 let on = |i| polar(pupil.center_mm, share * pupil.rho_mm[i], pupil.azimuth(i));

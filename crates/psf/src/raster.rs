@@ -210,7 +210,7 @@ fn deposit_mesh(raster: &mut Raster, mesh: Mesh, at: &[DVec2], energies: &[f64])
         }
         for (j, [outer, inner]) in row.iter().enumerate() {
             let [a, b, c, _] = mesh.corners(ring, j).map(|node| at[node]);
-            // The neighbours run along the same edges the other way.
+            // The neighbors run along the same edges the other way.
             let [_, before] = row[if j == 0 { n - 1 } else { j - 1 }];
             let beyond = densities.get((ring + 1) * n + j).map_or(0.0, |[_, inner]| *inner);
             raster.edge(a, b, outer - before);
@@ -255,7 +255,7 @@ mod tests {
         }
         let image = raster.finish();
         assert!((image.sum() - 500.0).abs() < 500.0 * 1e-12);
-        // The centroid of what covers a pixel is within half a pixel of its centre, and the errors average.
+        // The centroid of what covers a pixel is within half a pixel of its center, and the errors average.
         let x: f64 = image.indexed_iter().map(|((_, c), e)| e * (c as f64 + 0.5)).sum();
         assert!((x - moment.x).abs() < 500.0 * 0.01);
     }

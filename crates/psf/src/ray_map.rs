@@ -132,7 +132,7 @@ pub(crate) struct RayMapJob<'a> {
     pub(crate) reference: &'a MonoLens,
     pub(crate) field_tan: DVec2,
     pub(crate) dioptres: f64,
-    pub(crate) film_mm: f64,
+    pub(crate) film_distance_mm: f64,
     pub(crate) mesh: Mesh,
 }
 
@@ -191,7 +191,7 @@ impl RayMapJob<'_> {
     }
 
     /// Returns where rays aimed at the pupil land, in the picture frame. A ray that fails at the pupil's very edge
-    /// lands with its neighbour inside.
+    /// lands with its neighbor inside.
     fn land(self, point: &ObjectPoint, targets: &[DVec2], z_mm: f64, has_stop: bool) -> Option<Vec<Node>> {
         let mut rays = rays_towards(point, targets, z_mm, 0.0);
         let landed: Vec<Option<Node>> = if has_stop {
@@ -202,12 +202,12 @@ impl RayMapJob<'_> {
                 along_l_mm: -ray.along_l_mm,
                 along_m_mm: -ray.along_m_mm,
             };
-            trace_stop_rays(self.lens, rays, self.film_mm).into_iter().map(|ray| ray.map(node)).collect()
+            trace_stop_rays(self.lens, rays, self.film_distance_mm).into_iter().map(|ray| ray.map(node)).collect()
         } else {
             self.lens.trace(&mut rays, Vignetting::Off);
-            self.lens.to_film(&mut rays, self.film_mm);
+            self.lens.to_film(&mut rays, self.film_distance_mm);
             let node = |at: FilmPoint| Node { at_mm: at.in_picture_mm(), ..Node::default() };
-            let places = self.lens.film_points(&rays, self.film_mm);
+            let places = self.lens.film_points(&rays, self.film_distance_mm);
             places.into_iter().zip(&rays.fate).map(|(at, fate)| fate.is_in_flight().then(|| node(at))).collect()
         };
         let mut nodes = vec![landed[0]?];

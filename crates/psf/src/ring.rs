@@ -6,7 +6,7 @@ use dioptric_diffraction::quadrature::gauss_legendre_on;
 
 use crate::mesh::Mesh;
 
-/// A piece of this many standard deviations across leaves a ripple of 2 %, which pixels and neighbours hide.
+/// A piece of this many standard deviations across leaves a ripple of 2 %, which pixels and neighbors hide.
 pub(crate) const PIECE: f64 = 2.7;
 
 /// A ring of cells of the mesh.

@@ -41,7 +41,7 @@ pub(crate) struct RotationalBank {
     waves: Vec<PupilFunctionFit>,
     lens: Lens,
     reference: MonoLens,
-    /// Index around the stop at each of the colours.
+    /// Index around the stop at each of the colors.
     stop_indices: Vec<f64>,
 }
 
@@ -68,7 +68,7 @@ impl RotationalBank {
             reference: &reference,
             field_tan: DVec2::ZERO,
             dioptres: settings.dioptres[0],
-            film_mm: settings.film_mm,
+            film_distance_mm: settings.film_distance_mm,
             mesh,
         };
         let seed = Pupil::find(&reference, &axial.point(), mesh.n_azimuths).ok_or_else(|| PsfError::Dark {
@@ -308,7 +308,7 @@ impl ColumnTracer<'_> {
             reference: self.reference,
             field_tan: DVec2::new(field_tan, 0.0),
             dioptres,
-            film_mm: self.settings.film_mm,
+            film_distance_mm: self.settings.film_distance_mm,
             mesh: self.mesh,
         }
     }
@@ -362,7 +362,7 @@ fn wave_map(task: &RayMapJob<'_>, pupil: &Pupil) -> Option<PupilFunctionFit> {
     let point = task.point();
     let pupil = pupil.resampled(WAVE_AZIMUTHS).near(task.lens, &point)?;
     let edge = PupilOutline { center_x_mm: pupil.center_mm.x, z_mm: pupil.z_mm, rho_mm: &pupil.rho_mm };
-    PupilFunctionFit::trace(task.lens, &point, task.film_mm, edge).ok()
+    PupilFunctionFit::trace(task.lens, &point, task.film_distance_mm, edge).ok()
 }
 
 /// Returns the fields of settings for a lens with an axis of symmetry.

@@ -150,7 +150,7 @@ impl SampleCounts {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BankSettings {
     /// Distance of the film behind the last vertex, mm.
-    pub film_mm: f64,
+    pub film_distance_mm: f64,
     /// The wavelength whose paraxial entrance pupil fields and depths count from, nm.
     pub reference_wavelength_nm: f64,
     /// Fields.
@@ -175,7 +175,7 @@ impl BankSettings {
     ///
     /// A range of no length becomes a single sample.
     pub fn covering(
-        film_mm: f64,
+        film_distance_mm: f64,
         last_field_tan: f64,
         dioptres: (f64, f64),
         wavelengths_nm: (f64, f64),
@@ -183,7 +183,7 @@ impl BankSettings {
     ) -> Self {
         let n = SampleCounts::STANDARD;
         Self {
-            film_mm,
+            film_distance_mm,
             reference_wavelength_nm: 550.0,
             fields: FieldSampling::Radial(spaced((0.0, last_field_tan), n.n_radial)),
             dioptres: spaced(dioptres, n.n_depths),
@@ -200,7 +200,7 @@ impl BankSettings {
     ///
     /// Cubics through the centroids of 11 × 11 fields leave errors of some tenths of a micrometre.
     pub fn covering_grid(
-        film_mm: f64,
+        film_distance_mm: f64,
         (first_tan, last_tan): (DVec2, DVec2),
         dioptres: (f64, f64),
         wavelengths_nm: (f64, f64),
@@ -212,7 +212,7 @@ impl BankSettings {
                 tans_x: even_angles((first_tan.x, last_tan.x), n),
                 tans_y: even_angles((first_tan.y, last_tan.y), n),
             },
-            ..Self::covering(film_mm, 0.0, dioptres, wavelengths_nm, diffraction)
+            ..Self::covering(film_distance_mm, 0.0, dioptres, wavelengths_nm, diffraction)
         }
     }
 
@@ -294,7 +294,7 @@ impl BankSettings {
             true => Ok(()),
             false => Err(PsfError::Setting { key, found, expected }),
         };
-        setting("film_mm", self.film_mm, "a finite number", self.film_mm.is_finite())?;
+        setting("film_distance_mm", self.film_distance_mm, "a finite number", self.film_distance_mm.is_finite())?;
         setting("n_rings", self.n_rings as f64, "2 or more", self.n_rings >= 2)?;
         setting("n_azimuths", self.n_azimuths as f64, "8 or more", self.n_azimuths >= 8)?;
         self.diffraction.check()

@@ -294,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_hold_the_integral_not_the_value_at_their_centre() {
+    fn pixels_hold_the_integral_not_the_value_at_their_center() {
         let sigma: f64 = 0.5;
         let image = deposited(DVec2::splat(30.5), Covariance { xx: sigma * sigma, xy: 0.0, yy: sigma * sigma });
         // erf(0.5/(0.5·√2)) = erf(0.70711) = 0.682689.

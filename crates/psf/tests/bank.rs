@@ -10,8 +10,8 @@ fn dgauss(f_number: f64) -> Lens {
 }
 
 fn focused_at_2_m(lens: &Lens, diffraction: Diffraction) -> LensImageModel {
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
-    let settings = BankSettings::covering(film_mm, 0.2, (0.1, 1.2), (420.0, 680.0), diffraction);
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+    let settings = BankSettings::covering(film_distance_mm, 0.2, (0.1, 1.2), (420.0, 680.0), diffraction);
     LensImageModel::build(lens, &settings).unwrap()
 }
 
@@ -24,9 +24,10 @@ fn axial_brightness_is_that_of_the_working_f_number() {
     for (f_number, expected) in [(8.0, 0.012138), (4.0, 0.048705), (2.0277, 0.190958)] {
         let lens = dgauss(f_number);
         let mono = lens.at(550.0).unwrap();
-        let film_mm = mono.film_mm_for(8000.0).unwrap();
+        let film_distance_mm = mono.film_distance_mm_for(8000.0).unwrap();
         let dioptres = 1e3 / (8000.0 + mono.first_order().entrance_pupil_z_mm);
-        let settings = BankSettings::covering(film_mm, 0.1, (dioptres, dioptres), (550.0, 550.0), Diffraction::None);
+        let settings =
+            BankSettings::covering(film_distance_mm, 0.1, (dioptres, dioptres), (550.0, 550.0), Diffraction::None);
         let value = LensImageModel::build(&lens, &settings)
             .unwrap()
             .radial_geometry(dioptres, 550.0)
@@ -49,7 +50,7 @@ fn lens_without_an_axis_of_symmetry_is_refused() {
     let lens = dgauss(4.0).with_moves(vec![step]).unwrap();
     let settings = BankSettings::covering(36.5, 0.1, (0.5, 0.5), (550.0, 550.0), Diffraction::None);
     let message = LensImageModel::build(&lens, &settings).unwrap_err().to_string();
-    let expected = "a bank of point spread functions needs a lens that is centred and rotationally symmetric, which";
+    let expected = "a bank of point spread functions needs a lens that is centered and rotationally symmetric, which";
     assert!(message.starts_with(expected), "{message}");
 }
 
@@ -90,13 +91,13 @@ fn blur_is_signed_and_grows_with_the_distance_from_focus() {
 #[test]
 fn an_ideal_lens_in_focus_draws_the_airy_pattern() {
     let lens = Lens::thin(50.0, 50.0 / 8.0).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     let settings = BankSettings {
         fields: FieldSampling::Radial(vec![0.0]),
-        ..BankSettings::covering(film_mm, 0.0, (0.5, 0.5), (550.0, 550.0), Diffraction::Wave)
+        ..BankSettings::covering(film_distance_mm, 0.0, (0.5, 0.5), (550.0, 550.0), Diffraction::Wave)
     };
     let bank = LensImageModel::build(&lens, &settings).unwrap();
-    let unit_um = 0.55 * film_mm / 6.25;
+    let unit_um = 0.55 * film_distance_mm / 6.25;
     let kernel = bank.kernel(PsfQuery::new(DVec2::ZERO, 0.5, 550.0, 0.125 * unit_um));
     assert_eq!(bank.wave_fraction(PsfQuery::new(DVec2::X * 0.0, 0.5, 550.0, 0.125 * unit_um)), 1.0);
     // A square of ±12 λN holds 98.3 %, of which trimming keeps 99.9 %.

@@ -15,10 +15,10 @@ const PITCH_UM: f64 = 4.0;
 fn rays_at_stop(lens: &MonoLens, point: &ObjectPoint, n_rays: usize) -> RayBatch {
     let boundary = PupilBoundary::find(lens, point, 64).unwrap();
     // Vogel's spiral over the disc about the pupil; what is outside is vignetted.
-    let reach_mm = boundary.rho_at_azimuths_mm().iter().copied().fold(0.0, f64::max);
+    let extent_mm = boundary.rho_at_azimuths_mm().iter().copied().fold(0.0, f64::max);
     let targets: Vec<DVec2> = (0..n_rays)
         .map(|i| {
-            let radius_mm = reach_mm * ((i as f64 + 0.5) / n_rays as f64).sqrt();
+            let radius_mm = extent_mm * ((i as f64 + 0.5) / n_rays as f64).sqrt();
             boundary.center_mm() + DVec2::from_angle(2.399_963_229_728_653 * i as f64) * radius_mm
         })
         .collect();
@@ -36,7 +36,14 @@ fn rays_at_stop(lens: &MonoLens, point: &ObjectPoint, n_rays: usize) -> RayBatch
 }
 
 /// Returns the L1 difference of a kernel from bent rays counted on its pixels, and what random counts alone would give.
-fn difference(lens: &Lens, kernel: &Kernel, field_tan: f64, dioptres: f64, film_mm: f64, gamma: f64) -> (f64, f64) {
+fn difference(
+    lens: &Lens,
+    kernel: &Kernel,
+    field_tan: f64,
+    dioptres: f64,
+    film_distance_mm: f64,
+    gamma: f64,
+) -> (f64, f64) {
     let mono = lens.at(550.0).unwrap();
     let point = ObjectPoint::from_field(&mono, DVec2::new(field_tan, 0.0), dioptres);
     let behind = rays_at_stop(&mono, &point, 100_000);
@@ -44,8 +51,8 @@ fn difference(lens: &Lens, kernel: &Kernel, field_tan: f64, dioptres: f64, film_
         if mono.stop() + 1 < mono.n_surfaces() {
             mono.trace_surfaces(mono.stop() + 1..mono.n_surfaces(), &mut rays, Vignetting::Off);
         }
-        mono.to_film(&mut rays, film_mm);
-        mono.landed(&rays, film_mm).map(FilmPoint::in_picture_mm).collect::<Vec<DVec2>>()
+        mono.to_film(&mut rays, film_distance_mm);
+        mono.landed(&rays, film_distance_mm).map(FilmPoint::in_picture_mm).collect::<Vec<DVec2>>()
     };
     let straight = land(behind.clone());
     let centroid = straight.iter().sum::<DVec2>() / straight.len() as f64;
@@ -57,7 +64,7 @@ fn difference(lens: &Lens, kernel: &Kernel, field_tan: f64, dioptres: f64, film_
         let mut rays = behind.clone();
         let form = HurbForm::DirectionCosines;
         let hurb = SampledHurb { model: Hurb::with_gamma(gamma), edge, form, seed: round };
-        hurb.apply(&mut rays, &mono.stop_pose());
+        hurb.apply(&mut rays, &mono.stop_placement());
         for at in land(rays) {
             let at = (at - centroid) * (1e3 / PITCH_UM);
             let (column, row) = (at.x + 0.5 * side as f64, 0.5 * side as f64 - at.y);
@@ -83,11 +90,17 @@ fn kernels_are_those_of_rays_bent_at_random() {
         (4.0, 0.1, 0.1, 0.02),
     ] {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(f_number, 550.0).unwrap();
-        let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+        let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
         let gamma = 1.0;
         let settings = BankSettings {
             fields: FieldSampling::Radial(vec![0.0, 0.1]),
-            ..BankSettings::covering(film_mm, 0.1, (dioptres, dioptres), (550.0, 550.0), Diffraction::Hurb { gamma })
+            ..BankSettings::covering(
+                film_distance_mm,
+                0.1,
+                (dioptres, dioptres),
+                (550.0, 550.0),
+                Diffraction::Hurb { gamma },
+            )
         };
         let kernel = LensImageModel::build(&lens, &settings).unwrap().kernel(PsfQuery::new(
             DVec2::new(field_tan, 0.0),
@@ -95,7 +108,7 @@ fn kernels_are_those_of_rays_bent_at_random() {
             550.0,
             PITCH_UM,
         ));
-        let (l1, noise) = difference(&lens, &kernel, field_tan, dioptres, film_mm, gamma);
+        let (l1, noise) = difference(&lens, &kernel, field_tan, dioptres, film_distance_mm, gamma);
         println!(
             "f/{f_number}, {field_tan}, {dioptres} D: {l1:.4}, noise {noise:.4}, drawing {:.4}",
             (l1 * l1 - noise * noise).max(0.0).sqrt()
@@ -110,7 +123,7 @@ fn light_beyond_the_edge_of_a_blur_is_even_around_it() {
     // 1 mm behind the focus of f/8: a disc of 62.5 µm radius; λN is 4.4 µm.
     let lens = Lens::thin(50.0, 6.25).unwrap();
     let settings = BankSettings {
-        film_mm: 51.0,
+        film_distance_mm: 51.0,
         reference_wavelength_nm: 550.0,
         fields: FieldSampling::Radial(vec![0.0, 0.1]),
         dioptres: vec![0.0],

@@ -4,9 +4,9 @@
 use dioptric_optics::{Aperture, Glass, Interface, Lens, Outline, Shape, Surface, glam::DVec2};
 use dioptric_psf::{BankSettings, Diffraction, FieldSampling, Interpolation, LensImageModel, Picture, PsfQuery};
 
-fn settings(film_mm: f64, tans_x: Vec<f64>, tans_y: Vec<f64>, diffraction: Diffraction) -> BankSettings {
+fn settings(film_distance_mm: f64, tans_x: Vec<f64>, tans_y: Vec<f64>, diffraction: Diffraction) -> BankSettings {
     BankSettings {
-        film_mm,
+        film_distance_mm,
         reference_wavelength_nm: 550.0,
         fields: FieldSampling::Points { tans_x, tans_y },
         dioptres: vec![0.2, 0.6, 1.0],
@@ -25,12 +25,12 @@ fn points(tans_x: Vec<f64>) -> FieldSampling {
 #[test]
 fn of_a_symmetric_lens_it_is_the_turned_bank() {
     let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     let tans: Vec<f64> = (-3..=3).map(|i| 0.05 * f64::from(i)).collect();
     for (diffraction, most) in [(Diffraction::None, 0.05), (Diffraction::Hurb { gamma: 1.0 }, 0.05)] {
-        let plane = settings(film_mm, tans.clone(), tans.clone(), diffraction);
+        let plane = settings(film_distance_mm, tans.clone(), tans.clone(), diffraction);
         let turned = BankSettings {
-            film_mm,
+            film_distance_mm,
             reference_wavelength_nm: 550.0,
             fields: FieldSampling::Radial((0..8).map(|i| 0.031 * f64::from(i)).collect()),
             dioptres: plane.dioptres.clone(),
@@ -81,8 +81,9 @@ fn a_lens_of_two_powers_has_its_lines_across_and_up() {
     let mono = lens.at(550.0).unwrap();
     let [up_mm, across_mm] = [mono.first_order(), mono.first_order_x()].map(|first| first.bfl_mm);
     assert!(across_mm - up_mm > 5.0, "{across_mm} {up_mm}");
-    let moments = |film_mm: f64, at: DVec2| {
-        let mut settings = settings(film_mm, vec![-0.02, 0.0, 0.02], vec![-0.02, 0.0, 0.02], Diffraction::None);
+    let moments = |film_distance_mm: f64, at: DVec2| {
+        let mut settings =
+            settings(film_distance_mm, vec![-0.02, 0.0, 0.02], vec![-0.02, 0.0, 0.02], Diffraction::None);
         settings.dioptres = vec![0.0];
         let bank = LensImageModel::build(&lens, &settings).unwrap();
         let query = PsfQuery { field_tan: at, dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 4.0 };
@@ -109,16 +110,16 @@ fn a_lens_of_two_powers_has_its_lines_across_and_up() {
 fn waves_of_a_lens_of_two_powers_are_summed_and_dark_fields_are_none() {
     let lens = astigmatic();
     let mono = lens.at(550.0).unwrap();
-    let film_mm = 0.5 * (mono.first_order().bfl_mm + mono.first_order_x().bfl_mm);
+    let film_distance_mm = 0.5 * (mono.first_order().bfl_mm + mono.first_order_x().bfl_mm);
     let wide = BankSettings {
         dioptres: vec![0.0],
-        ..settings(film_mm, vec![0.0, 0.01], vec![0.0], Diffraction::Hurb { gamma: 1.0 })
+        ..settings(film_distance_mm, vec![0.0, 0.01], vec![0.0], Diffraction::Hurb { gamma: 1.0 })
     };
     let query = PsfQuery { field_tan: DVec2::ZERO, dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 4.0 };
     assert!(LensImageModel::build(&lens, &wide).unwrap().kernel_and_model(query).is_some());
     // A microscope sees nothing at 10°.
     let microscope = Lens::built_in("microscope-20x").unwrap();
-    let beside = BankSettings { film_mm: 0.2194, fields: points(vec![0.0, 0.18]), ..wide.clone() };
+    let beside = BankSettings { film_distance_mm: 0.2194, fields: points(vec![0.0, 0.18]), ..wide.clone() };
     let bank = LensImageModel::build(&microscope, &beside).unwrap();
     let at = |tan_x: f64| bank.picture(PsfQuery { field_tan: DVec2::new(tan_x, 0.0), ..query }, 9);
     assert!(at(0.0).is_some() && at(0.18).is_none() && at(0.1).is_none());
@@ -148,10 +149,10 @@ fn an_obscured_lens_blurs_to_rings() {
     let bank = LensImageModel::build(&lens, &ring).unwrap();
     let query = PsfQuery { field_tan: DVec2::ZERO, dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 10.0 };
     let (picture, _) = bank.picture(query, 61).unwrap();
-    let within = |reach_mm: f64| -> f64 {
+    let within = |extent_mm: f64| -> f64 {
         let pixels = picture.indexed_iter();
         let inside = pixels.filter(|((row, column), _)| {
-            DVec2::new(*column as f64 - 30.0, *row as f64 - 30.0).length() * 0.01 <= reach_mm
+            DVec2::new(*column as f64 - 30.0, *row as f64 - 30.0).length() * 0.01 <= extent_mm
         });
         inside.map(|(_, e)| *e).sum()
     };
@@ -168,15 +169,15 @@ fn a_lens_with_a_round_hole_is_drawn_alike_by_both_banks() {
     let hole =
         Aperture { surface: 0, outline: Outline::Circle { radius_mm: 1.0 }, center_mm: [0.0; 2], is_obscuration: true };
     let lens = Lens::new_with_apertures("annulus", "test", thin.interfaces().to_vec(), 0, vec![hole]).unwrap();
-    let film_mm = 50.05;
+    let film_distance_mm = 50.05;
     for diffraction in [Diffraction::None, Diffraction::Wave] {
         let plane = BankSettings {
             dioptres: vec![0.0],
             wavelengths_nm: vec![550.0],
-            ..settings(film_mm, vec![0.06], vec![0.08], diffraction)
+            ..settings(film_distance_mm, vec![0.06], vec![0.08], diffraction)
         };
         let turned = BankSettings {
-            film_mm,
+            film_distance_mm,
             reference_wavelength_nm: plane.reference_wavelength_nm,
             fields: FieldSampling::Radial(vec![0.0, 0.1]),
             dioptres: vec![0.0],

@@ -1,4 +1,4 @@
-//! Decentred stops, tilted and decentred films and curved films, each in its own frame.
+//! Decentered stops, tilted and decentered films and curved films, each in its own frame.
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
@@ -19,9 +19,9 @@ fn placed(lens: &Lens, surfaces: (usize, usize), decenter_mm: [f64; 3], tilt_deg
     lens.clone().with_moves(vec![step]).unwrap()
 }
 
-fn bank(lens: &Lens, film_mm: f64, tans: (Vec<f64>, Vec<f64>), diffraction: Diffraction) -> LensImageModel {
+fn bank(lens: &Lens, film_distance_mm: f64, tans: (Vec<f64>, Vec<f64>), diffraction: Diffraction) -> LensImageModel {
     let settings = BankSettings {
-        film_mm,
+        film_distance_mm,
         reference_wavelength_nm: NM,
         fields: FieldSampling::Points { tans_x: tans.0, tans_y: tans.1 },
         dioptres: vec![0.0],
@@ -41,13 +41,13 @@ fn query(field_tan: DVec2) -> PsfQuery {
 /// A lens moved aside as a whole deviates each ray of a far point as the lens in its old place does: the covariance on the
 /// film is the same, the place shifted.
 #[test]
-fn decentred_stop_keeps_hurb_rays() {
+fn decentered_stop_keeps_hurb_rays() {
     let lens = double_gauss();
     let shift = DVec2::new(0.9, -1.7);
     let all = (0, lens.interfaces().len() - 1);
     let mono = lens.at(NM).unwrap();
     let moved = placed(&lens, all, [shift.x, shift.y, 0.0], [0.0; 3]).at(NM).unwrap();
-    let (film_mm, z_mm) = (mono.first_order().bfl_mm + 0.2, mono.projection_center_z_mm());
+    let (film_distance_mm, z_mm) = (mono.first_order().bfl_mm + 0.2, mono.projection_center_z_mm());
     let edge = CircularStop::new(mono.stop_semi_aperture_mm(), NM, 1.0);
     // More than half the stop's radius: before, part of the pupil counted as outside the edge.
     assert!(shift.length() > 0.5 * edge.radius_mm, "{}", edge.radius_mm);
@@ -57,8 +57,8 @@ fn decentred_stop_keeps_hurb_rays() {
         let targets: Vec<DVec2> =
             (0..40).map(|i| DVec2::from_angle(2.4 * f64::from(i)) * (radius_mm * f64::from(i) / 40.0)).collect();
         let aside: Vec<DVec2> = targets.iter().map(|target| target + shift).collect();
-        let expected = trace_stop_rays(&mono, rays_towards(&point, &targets, z_mm, 0.0), film_mm);
-        let found = trace_stop_rays(&moved, rays_towards(&point, &aside, z_mm, 0.0), film_mm);
+        let expected = trace_stop_rays(&mono, rays_towards(&point, &targets, z_mm, 0.0), film_distance_mm);
+        let found = trace_stop_rays(&moved, rays_towards(&point, &aside, z_mm, 0.0), film_distance_mm);
         for (found, expected) in found.into_iter().zip(expected) {
             let (found, expected) = (found.unwrap(), expected.unwrap());
             assert!((found.stop.mm - expected.stop.mm).length() < 1e-9, "{found:?} {expected:?}");
@@ -77,14 +77,14 @@ fn decentred_stop_keeps_hurb_rays() {
 
 /// The HURB picture of a lens moved aside is that of the lens in place, shifted.
 #[test]
-fn decentred_stop_keeps_psf() {
+fn decentered_stop_keeps_psf() {
     let lens = double_gauss();
     let all = (0, lens.interfaces().len() - 1);
-    let film_mm = lens.at(NM).unwrap().first_order().bfl_mm;
+    let film_distance_mm = lens.at(NM).unwrap().first_order().bfl_mm;
     let moved = placed(&lens, all, [0.9, -1.7, 0.0], [0.0; 3]);
     let field = DVec2::new(0.08, 0.03);
     let tans = || (vec![field.x], vec![field.y]);
-    let [a, b] = [&lens, &moved].map(|lens| bank(lens, film_mm, tans(), Diffraction::Hurb { gamma: 1.0 }));
+    let [a, b] = [&lens, &moved].map(|lens| bank(lens, film_distance_mm, tans(), Diffraction::Hurb { gamma: 1.0 }));
     let shift = b.centroid_mm(field, 0.0, NM) - a.centroid_mm(field, 0.0, NM);
     // The picture frame is the film turned by 180°; the outlines of the two pupils are sampled at other places.
     assert!((shift - DVec2::new(-0.9, 1.7)).length() < 1e-6, "{shift}");
@@ -98,11 +98,11 @@ fn decentred_stop_keeps_psf() {
 fn moved_film_counts_its_own_coordinates() {
     let lens = double_gauss();
     let film = lens.interfaces().len();
-    let film_mm = lens.at(NM).unwrap().first_order().bfl_mm + 0.3;
+    let film_distance_mm = lens.at(NM).unwrap().first_order().bfl_mm + 0.3;
     let field = DVec2::new(0.08, 0.03);
     for diffraction in [Diffraction::None, Diffraction::Hurb { gamma: 1.0 }] {
         let at = |lens: &Lens| {
-            let bank = bank(lens, film_mm, (vec![field.x], vec![field.y]), diffraction);
+            let bank = bank(lens, film_distance_mm, (vec![field.x], vec![field.y]), diffraction);
             bank.centroid_mm(field, 0.0, NM)
         };
         let straight = at(&lens);
@@ -123,10 +123,10 @@ fn moved_film_counts_its_own_coordinates() {
 fn moved_film_turns_waves() {
     let lens = double_gauss();
     let film = lens.interfaces().len();
-    let film_mm = lens.at(NM).unwrap().first_order().bfl_mm;
+    let film_distance_mm = lens.at(NM).unwrap().first_order().bfl_mm;
     let field = DVec2::new(0.1, 0.0);
     let picture = |lens: &Lens| {
-        let bank = bank(lens, film_mm, (vec![field.x], vec![field.y]), Diffraction::Wave);
+        let bank = bank(lens, film_distance_mm, (vec![field.x], vec![field.y]), Diffraction::Wave);
         let (picture, model) = bank.picture(query(field), 61).unwrap();
         assert!(model.wave_share > 0.9, "{model:?}");
         picture
@@ -156,8 +156,8 @@ fn ball() -> Lens {
 #[test]
 fn curved_film_keeps_every_field_in_focus() {
     let lens = ball();
-    let film_mm = lens.at(NM).unwrap().first_order().bfl_mm;
-    let radius_mm = film_mm + 10.0;
+    let film_distance_mm = lens.at(NM).unwrap().first_order().bfl_mm;
+    let radius_mm = film_distance_mm + 10.0;
     let curved = ImageSurface { curvature_per_mm: -1.0 / radius_mm, conic: 0.0 };
     let curved = lens.clone().with_image_surface(curved).unwrap();
     let tan = 25f64.to_radians().tan();
@@ -165,7 +165,7 @@ fn curved_film_keeps_every_field_in_focus() {
         let settings = BankSettings {
             fields: FieldSampling::Radial(vec![0.0, tan]),
             interpolation: Interpolation::Rays,
-            ..BankSettings::covering(film_mm, tan, (0.0, 0.0), (NM, NM), diffraction)
+            ..BankSettings::covering(film_distance_mm, tan, (0.0, 0.0), (NM, NM), diffraction)
         };
         let [flat, curved] = [&lens, &curved].map(|lens| LensImageModel::build(lens, &settings).unwrap());
         let reach = |bank: &LensImageModel, tan: f64| bank.extent_mm(DVec2::X * tan, 0.0, NM).unwrap();

@@ -75,11 +75,11 @@ fn errors_of(lens: &Lens, settings: &BankSettings) -> (Errors, Errors) {
 #[test]
 fn the_double_gauss_is_met_from_288_samples() {
     let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     let last = 18f64.to_radians().tan();
     let settings = BankSettings {
         fields: FieldSampling::Radial((0..8).map(|i| last * f64::from(i) / 7.0).collect()),
-        ..BankSettings::covering(film_mm, last, (0.05, 1.2), (420.0, 680.0), Diffraction::None)
+        ..BankSettings::covering(film_distance_mm, last, (0.05, 1.2), (420.0, 680.0), Diffraction::None)
     };
     let (l1, esf) = errors_of(&lens, &settings);
     println!("dgauss L1 {} {} ESF {} {}", l1.quantile(0.5), l1.quantile(0.9), esf.quantile(0.5), esf.quantile(0.9));
@@ -90,9 +90,9 @@ fn the_double_gauss_is_met_from_288_samples() {
 #[test]
 fn the_papers_lens_is_met_from_48_samples() {
     let lens = dioptric_psf::paper::two_element_lens(10.0, 10.0).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     let last = 12f64.to_radians().tan();
-    let covering = BankSettings::covering(film_mm, last, (0.05, 1.2), (420.0, 680.0), Diffraction::None);
+    let covering = BankSettings::covering(film_distance_mm, last, (0.05, 1.2), (420.0, 680.0), Diffraction::None);
     let settings = BankSettings {
         fields: FieldSampling::Radial((0..4).map(|i| last * f64::from(i) / 3.0).collect()),
         dioptres: (0..4).map(|i| 0.05 + 1.15 * f64::from(i) / 3.0).collect(),
@@ -108,11 +108,11 @@ fn the_papers_lens_is_met_from_48_samples() {
 fn blended_pictures_are_far_from_what_lies_between_them() {
     // The paper's way, at as many samples as the test above, where prototypes had a median of .39 (and .007 of rays).
     let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     let last = 18f64.to_radians().tan();
     let rays = BankSettings {
         fields: FieldSampling::Radial((0..8).map(|i| last * f64::from(i) / 7.0).collect()),
-        ..BankSettings::covering(film_mm, last, (0.05, 1.2), (420.0, 680.0), Diffraction::None)
+        ..BankSettings::covering(film_distance_mm, last, (0.05, 1.2), (420.0, 680.0), Diffraction::None)
     };
     let images = BankSettings { interpolation: Interpolation::Images, ..rays.clone() };
     let places = ErrorPlaces { n_places: 60, ..ErrorPlaces::STANDARD };

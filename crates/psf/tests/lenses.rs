@@ -12,19 +12,19 @@ fn every_built_in_lens_has_a_bank() {
         let lens = Lens::built_in(name).unwrap();
         let mono = lens.at(550.0).unwrap();
         // Some are made for a near object: focus where they do.
-        let far = mono.film_mm_for(f64::INFINITY).ok();
-        let (film_mm, dioptres) = match far {
-            Some(film_mm) => (film_mm, (0.0, 1.0)),
+        let far = mono.film_distance_mm_for(f64::INFINITY).ok();
+        let (film_distance_mm, dioptres) = match far {
+            Some(film_distance_mm) => (film_distance_mm, (0.0, 1.0)),
             None => {
-                let film_mm = mono.film_mm_for(1000.0).unwrap();
+                let film_distance_mm = mono.film_distance_mm_for(1000.0).unwrap();
                 let distance_mm = 1000.0 + mono.first_order().entrance_pupil_z_mm;
-                (film_mm, (1e3 / distance_mm, 1e3 / distance_mm))
+                (film_distance_mm, (1e3 / distance_mm, 1e3 / distance_mm))
             }
         };
         let settings = BankSettings {
             n_rings: 6,
             n_azimuths: 24,
-            ..BankSettings::covering(film_mm, 0.1, dioptres, (486.0, 656.0), Diffraction::Hurb { gamma: 1.0 })
+            ..BankSettings::covering(film_distance_mm, 0.1, dioptres, (486.0, 656.0), Diffraction::Hurb { gamma: 1.0 })
         };
         let bank = LensImageModel::build(&lens, &settings).unwrap_or_else(|error| panic!("{name}: {error}"));
         let last = bank.settings().fields.axes().0[bank.n_fields() - 1];
@@ -42,20 +42,20 @@ fn every_built_in_lens_has_a_bank() {
 
 #[test]
 fn a_pinhole_casts_its_shadow() {
-    let (diameter_mm, film_mm) = (0.5, 50.0);
+    let (diameter_mm, film_distance_mm) = (0.5, 50.0);
     let lens = Lens::pinhole(diameter_mm).unwrap();
-    let settings = BankSettings::covering(film_mm, 0.3, (0.0, 2.0), (550.0, 550.0), Diffraction::None);
+    let settings = BankSettings::covering(film_distance_mm, 0.3, (0.0, 2.0), (550.0, 550.0), Diffraction::None);
     let bank = LensImageModel::build(&lens, &settings).unwrap();
     for (field_tan, dioptres) in [(0.0, 0.0), (0.2, 1.0), (0.3, 2.0)] {
         let geometry = bank.radial_geometry(dioptres, 550.0).unwrap();
         // A near point lights the near side of the hole more: the centroid moves by parts of R²/Z.
-        assert!((geometry.image_radius_mm(field_tan) - film_mm * field_tan).abs() < 1e-4);
+        assert!((geometry.image_radius_mm(field_tan) - film_distance_mm * field_tan).abs() < 1e-4);
         // E/L = A cos⁴ / f², with the whole pupil in one direction.
         let area_mm2 = PI / 4.0 * diameter_mm * diameter_mm;
-        let expected = area_mm2 / (film_mm * film_mm) / (1.0 + field_tan * field_tan).powi(2);
+        let expected = area_mm2 / (film_distance_mm * film_distance_mm) / (1.0 + field_tan * field_tan).powi(2);
         assert!((geometry.irradiance_per_radiance(field_tan) / expected - 1.0).abs() < 1e-3);
         // A disc of the pinhole's size, seen from the point.
-        let radius_um = 0.5e3 * diameter_mm * (1.0 + film_mm * dioptres * 1e-3);
+        let radius_um = 0.5e3 * diameter_mm * (1.0 + film_distance_mm * dioptres * 1e-3);
         let kernel = bank.kernel(PsfQuery::new(DVec2::new(field_tan, 0.0), dioptres, 550.0, 5.0));
         let rms_um = Picture::from(&kernel).rms_radius_um();
         assert!((rms_um / (radius_um / 2f64.sqrt()) - 1.0).abs() < 0.005, "{rms_um} {radius_um}");
@@ -67,42 +67,42 @@ fn a_pinhole_casts_its_shadow() {
 fn an_ideal_lens_follows_the_thin_lens_equation() {
     let (focal_mm, diameter_mm) = (50.0, 10.0);
     let lens = Lens::thin(focal_mm, diameter_mm).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(1000.0).unwrap();
-    assert!((film_mm - 1000.0 * 50.0 / 950.0).abs() < 1e-9);
-    let settings = BankSettings::covering(film_mm, 0.2, (0.0, 3.0), (550.0, 550.0), Diffraction::None);
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(1000.0).unwrap();
+    assert!((film_distance_mm - 1000.0 * 50.0 / 950.0).abs() < 1e-9);
+    let settings = BankSettings::covering(film_distance_mm, 0.2, (0.0, 3.0), (550.0, 550.0), Diffraction::None);
     let bank = LensImageModel::build(&lens, &settings).unwrap();
     for dioptres in [0.0, 0.4, 0.9, 1.3, 2.7] {
         // Circle of confusion: radius × film × (difference of vergences); 95 % of an even disc is within 0.975 of it.
-        let expected_mm = 0.5 * diameter_mm * film_mm * (dioptres - 1.0) * 1e-3 * 0.95f64.sqrt();
+        let expected_mm = 0.5 * diameter_mm * film_distance_mm * (dioptres - 1.0) * 1e-3 * 0.95f64.sqrt();
         let blur_mm = bank.blur_radius_mm(DVec2::X * 0.1, dioptres, 550.0);
         // The rms radius of the mesh's cells is 0.5 % short of the disc's.
         assert!((blur_mm / expected_mm - 1.0).abs() < 0.01, "{dioptres}: {blur_mm} {expected_mm}");
         // cos⁴ is exact for a thin lens and a far film but for the size of the pupil.
         let geometry = bank.radial_geometry(dioptres, 550.0).unwrap();
-        let on_axis = PI * (0.5 * diameter_mm / film_mm).powi(2);
+        let on_axis = PI * (0.5 * diameter_mm / film_distance_mm).powi(2);
         let expected = on_axis * (1.0 + 0.15f64 * 0.15).powi(-2);
         assert!((geometry.irradiance_per_radiance(0.15) / expected - 1.0).abs() < 3e-3);
         // A near point lights the near side of the lens more, which shows out of focus.
-        assert!((geometry.image_radius_mm(0.15) - 0.15 * film_mm).abs() < 2e-3);
+        assert!((geometry.image_radius_mm(0.15) - 0.15 * film_distance_mm).abs() < 2e-3);
     }
 }
 
 /// Returns a kernel of counted rays: a million spread evenly over the pupil.
-fn counted(lens: &Lens, like: &Kernel, field_tan: f64, dioptres: f64, film_mm: f64) -> Vec<f64> {
+fn counted(lens: &Lens, like: &Kernel, field_tan: f64, dioptres: f64, film_distance_mm: f64) -> Vec<f64> {
     let mono = lens.at(550.0).unwrap();
     let point = ObjectPoint::from_field(&mono, DVec2::new(field_tan, 0.0), dioptres);
     let boundary = PupilBoundary::find(&mono, &point, 64).unwrap();
-    let reach_mm = boundary.rho_at_azimuths_mm().iter().copied().fold(0.0, f64::max);
+    let extent_mm = boundary.rho_at_azimuths_mm().iter().copied().fold(0.0, f64::max);
     let n = 1_000_000;
     let spiral = |i: usize| {
-        let radius_mm = reach_mm * ((i as f64 + 0.5) / n as f64).sqrt();
+        let radius_mm = extent_mm * ((i as f64 + 0.5) / n as f64).sqrt();
         boundary.center_mm() + DVec2::from_angle(2.399_963_229_728_653 * i as f64) * radius_mm
     };
     let targets: Vec<DVec2> = (0..n).map(spiral).collect();
     let mut rays = rays_towards(&point, &targets, boundary.z_mm(), 0.0);
     mono.trace(&mut rays, Vignetting::On);
-    mono.to_film(&mut rays, film_mm);
-    let landed: Vec<DVec2> = mono.landed(&rays, film_mm).map(FilmPoint::in_picture_mm).collect();
+    mono.to_film(&mut rays, film_distance_mm);
+    let landed: Vec<DVec2> = mono.landed(&rays, film_distance_mm).map(FilmPoint::in_picture_mm).collect();
     let centroid = landed.iter().sum::<DVec2>() / landed.len() as f64;
     let side = like.samples.nrows();
     let mut counts = vec![0.0; side * side];
@@ -119,16 +119,16 @@ fn counted(lens: &Lens, like: &Kernel, field_tan: f64, dioptres: f64, film_mm: f
 #[test]
 fn a_mesh_of_576_rays_is_as_good_as_a_million_counted_ones() {
     let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     for (field_tan, dioptres, pitch_um) in [(0.1, 0.05, 5.0), (0.1, 0.3, 3.0), (0.05, 1.0, 5.0)] {
         let settings = BankSettings {
             fields: FieldSampling::Radial(vec![0.0, field_tan]),
-            ..BankSettings::covering(film_mm, 0.1, (dioptres, dioptres), (550.0, 550.0), Diffraction::None)
+            ..BankSettings::covering(film_distance_mm, 0.1, (dioptres, dioptres), (550.0, 550.0), Diffraction::None)
         };
         let bank = LensImageModel::build(&lens, &settings).unwrap();
         let kernel = bank.kernel(PsfQuery::new(DVec2::new(field_tan, 0.0), dioptres, 550.0, pitch_um));
         assert!(kernel.samples.nrows() >= 20);
-        let counts = counted(&lens, &kernel, field_tan, dioptres, film_mm);
+        let counts = counted(&lens, &kernel, field_tan, dioptres, film_distance_mm);
         let l1: f64 = kernel.samples.iter().zip(&counts).map(|(a, b)| (f64::from(*a) - b).abs()).sum();
         // The counts themselves are uneven: along a spiral by somewhat less than 1/√n.
         let n_lit = counts.iter().filter(|c| **c > 0.0).count();

@@ -14,25 +14,26 @@ const HURB: Diffraction = Diffraction::Hurb { gamma: 1.0 };
 
 fn double_gauss() -> (Lens, f64) {
     let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
-    (lens, film_mm)
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+    (lens, film_distance_mm)
 }
 
-fn along_radius(film_mm: f64) -> BankSettings {
-    BankSettings::covering(film_mm, 0.2, (0.1, 1.2), (420.0, 680.0), HURB)
+fn along_radius(film_distance_mm: f64) -> BankSettings {
+    BankSettings::covering(film_distance_mm, 0.2, (0.1, 1.2), (420.0, 680.0), HURB)
 }
 
-fn over_grid(film_mm: f64) -> BankSettings {
+fn over_grid(film_distance_mm: f64) -> BankSettings {
     let corners = (DVec2::new(-0.2, -0.15), DVec2::new(0.2, 0.15));
-    BankSettings::covering_grid(film_mm, corners, (0.1, 1.2), (420.0, 680.0), HURB).with_counts(SampleCounts::PREVIEW)
+    BankSettings::covering_grid(film_distance_mm, corners, (0.1, 1.2), (420.0, 680.0), HURB)
+        .with_counts(SampleCounts::PREVIEW)
 }
 
 /// Reports ascend to 1 on one thread, step by step.
 #[test]
 fn progress_ascends_to_one() {
-    let (lens, film_mm) = double_gauss();
+    let (lens, film_distance_mm) = double_gauss();
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    for settings in [along_radius(film_mm).with_counts(SampleCounts::PREVIEW), over_grid(film_mm)] {
+    for settings in [along_radius(film_distance_mm).with_counts(SampleCounts::PREVIEW), over_grid(film_distance_mm)] {
         let heard = Mutex::new(vec![]);
         let progress = |part: f64| heard.lock().unwrap().push(part);
         one.install(|| LensImageModel::build_with(&lens, &settings, &progress, &Cancel::new())).unwrap();
@@ -46,10 +47,10 @@ fn progress_ascends_to_one() {
 /// After the request each thread ends the one sample that it is at, some milliseconds, and begins no other.
 #[test]
 fn cancelled_build_begins_no_more_samples() {
-    let (lens, film_mm) = double_gauss();
+    let (lens, film_distance_mm) = double_gauss();
     for n_threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
-        for settings in [along_radius(film_mm), over_grid(film_mm)] {
+        for settings in [along_radius(film_distance_mm), over_grid(film_distance_mm)] {
             let cancel = Cancel::new();
             let after = Mutex::new(0);
             let progress = |_: f64| {
@@ -66,8 +67,8 @@ fn cancelled_build_begins_no_more_samples() {
 /// Measuring the error, and sampling until it is met, end with a request too.
 #[test]
 fn cancelled_measurement_has_no_result() {
-    let (lens, film_mm) = double_gauss();
-    let settings = along_radius(film_mm).with_counts(SampleCounts::PREVIEW);
+    let (lens, film_distance_mm) = double_gauss();
+    let settings = along_radius(film_distance_mm).with_counts(SampleCounts::PREVIEW);
     let model = LensImageModel::build(&lens, &settings).unwrap();
     let cancel = Cancel::new();
     cancel.cancel();
@@ -81,10 +82,10 @@ fn cancelled_measurement_has_no_result() {
 /// The figure that the documentation of [`SampleCounts::PREVIEW`] states.
 #[test]
 fn preview_blurs_keep_to_a_tenth() {
-    let (lens, film_mm) = double_gauss();
-    let preview = along_radius(film_mm).with_counts(SampleCounts::PREVIEW);
+    let (lens, film_distance_mm) = double_gauss();
+    let preview = along_radius(film_distance_mm).with_counts(SampleCounts::PREVIEW);
     let places = ErrorPlaces { n_places: 24, ..ErrorPlaces::STANDARD };
-    for settings in [preview, over_grid(film_mm)] {
+    for settings in [preview, over_grid(film_distance_mm)] {
         let model = LensImageModel::build(&lens, &settings).unwrap();
         let error = model.measured_error(&places, &Cancel::new()).unwrap();
         println!("{} samples: {error:?}", settings.n_samples());
@@ -95,7 +96,7 @@ fn preview_blurs_keep_to_a_tenth() {
 /// Single points of a placed lens have pictures, but no scene can be imaged through them.
 #[test]
 fn single_points_see_no_film() {
-    let (lens, film_mm) = double_gauss();
+    let (lens, film_distance_mm) = double_gauss();
     let tilt = CoordinateBreak {
         surfaces: (2, 3),
         pivot_mm: 0.0,
@@ -105,7 +106,7 @@ fn single_points_see_no_film() {
     };
     let lens = lens.with_moves(vec![tilt]).unwrap();
     let fields = FieldSampling::Points { tans_x: vec![0.0, 0.1], tans_y: vec![0.0] };
-    let settings = BankSettings { fields, dioptres: vec![0.5], ..along_radius(film_mm) };
+    let settings = BankSettings { fields, dioptres: vec![0.5], ..along_radius(film_distance_mm) };
     let points = LensImageModel::build(&lens, &settings).unwrap();
     assert!(points.centroid_mm(DVec2::X * 0.1, 0.5, 550.0).is_finite());
     assert!(points.film_map(0.5, 550.0, 10.0).at(DVec2::X).is_none());

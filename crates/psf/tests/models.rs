@@ -33,13 +33,19 @@ const MODELS: [(&str, Diffraction); 4] = [
 
 fn picture(case: &Case, diffraction: Diffraction) -> Array2<f64> {
     let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(case.f_number, 550.0).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     let field_tan = DVec2::X * case.field_deg.to_radians().tan();
     let settings = BankSettings {
         fields: FieldSampling::Radial(if field_tan.x > 0.0 { vec![0.0, field_tan.x] } else { vec![0.0] }),
         n_rings: 24,
         n_azimuths: 96,
-        ..BankSettings::covering(film_mm, field_tan.x, (case.dioptres, case.dioptres), (550.0, 550.0), diffraction)
+        ..BankSettings::covering(
+            film_distance_mm,
+            field_tan.x,
+            (case.dioptres, case.dioptres),
+            (550.0, 550.0),
+            diffraction,
+        )
     };
     let query = PsfQuery { field_tan, dioptres: case.dioptres, wavelength_nm: 550.0, pitch_um: PITCH_UM };
     let (picture, model) = LensImageModel::build(&lens, &settings).unwrap().picture(query, SIZE).unwrap();
@@ -78,10 +84,10 @@ fn bent_rays_have_the_edge_of_waves_and_geometry_has_not() {
 #[test]
 fn bent_blurs_have_no_dot_in_their_middle() {
     let lens = Lens::thin(50.0, 12.5).unwrap();
-    let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     for (pitch_um, dioptres) in [(1.0, 0.9), (2.0, 0.9), (2.0, 0.7), (1.0, 0.6), (4.0, 1.5)] {
         let diffraction = Diffraction::Hurb { gamma: 1.0 };
-        let settings = BankSettings::covering(film_mm, 0.0, (dioptres, dioptres), (550.0, 550.0), diffraction);
+        let settings = BankSettings::covering(film_distance_mm, 0.0, (dioptres, dioptres), (550.0, 550.0), diffraction);
         let bank = LensImageModel::build(&lens, &settings).unwrap();
         let query = PsfQuery { field_tan: DVec2::ZERO, dioptres, wavelength_nm: 550.0, pitch_um };
         let picture = bank.picture(query, 301).unwrap().0;

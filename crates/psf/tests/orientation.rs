@@ -1,4 +1,4 @@
-//! Which way point spread functions point: coma, astigmatism and colour against third-order theory and chief rays.
+//! Which way point spread functions point: coma, astigmatism and color against third-order theory and chief rays.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_diffraction::Covariance;
@@ -6,9 +6,9 @@ use dioptric_optics::{Lens, MonoLens, ObjectPoint, SeidelSettings, analysis::Ast
 use dioptric_psf::{BankSettings, Diffraction, FieldSampling, Interpolation, LensImageModel, Picture, PsfQuery};
 
 /// Returns a bank with a sample at the axis and at this field, of a far point.
-fn bank_at(lens: &Lens, film_mm: f64, field_tan: f64, wavelengths_nm: &[f64]) -> LensImageModel {
+fn bank_at(lens: &Lens, film_distance_mm: f64, field_tan: f64, wavelengths_nm: &[f64]) -> LensImageModel {
     let settings = BankSettings {
-        film_mm,
+        film_distance_mm,
         reference_wavelength_nm: 550.0,
         fields: FieldSampling::Radial(vec![0.0, field_tan]),
         dioptres: vec![0.0],
@@ -22,15 +22,15 @@ fn bank_at(lens: &Lens, film_mm: f64, field_tan: f64, wavelengths_nm: &[f64]) ->
 }
 
 /// Returns where the chief ray of a far point in a field to the right lands, mm to the right of the picture.
-fn chief_mm(lens: &Lens, film_mm: f64, field_tan: f64, wavelength_nm: f64) -> f64 {
+fn chief_mm(lens: &Lens, film_distance_mm: f64, field_tan: f64, wavelength_nm: f64) -> f64 {
     let reference = lens.at(550.0).unwrap();
     let point = ObjectPoint::from_field(&reference, DVec2::new(field_tan, 0.0), 0.0);
     // The picture is the film turned by 180°.
-    -lens.at(wavelength_nm).unwrap().chief_film_point_mm(&point, film_mm).unwrap().x
+    -lens.at(wavelength_nm).unwrap().chief_film_point_mm(&point, film_distance_mm).unwrap().x
 }
 
 fn paraxial_film_mm(lens: &MonoLens) -> f64 {
-    lens.film_mm_for(f64::INFINITY).unwrap()
+    lens.film_distance_mm_for(f64::INFINITY).unwrap()
 }
 
 /// Returns the place of the brightest pixel, µm from the middle of the picture.
@@ -64,10 +64,10 @@ fn coma_points_as_its_seidel_sum_says() {
         // outwards.
         let s2 = lens.seidel(&settings).unwrap().total.s2;
         let expected_mm = -s2 / (2.0 * slope);
-        let film_mm = paraxial_film_mm(&mono);
-        let bank = bank_at(&lens, film_mm, field_tan, &[550.0]);
+        let film_distance_mm = paraxial_film_mm(&mono);
+        let bank = bank_at(&lens, film_distance_mm, field_tan, &[550.0]);
         let centroid_mm = bank.radial_geometry(0.0, 550.0).unwrap().image_radius_mm(field_tan);
-        let found_mm = centroid_mm - chief_mm(&lens, film_mm, field_tan, 550.0);
+        let found_mm = centroid_mm - chief_mm(&lens, film_distance_mm, field_tan, 550.0);
         println!("{name}: {:.5} µm of coma, {:.5} expected", 1e3 * found_mm, 1e3 * expected_mm);
         // What is of fifth order falls with the square of the f-number, to some hundredths at f/24.
         assert!((found_mm / expected_mm - 1.0).abs() < 0.07, "{name}: {found_mm} {expected_mm}");
@@ -85,10 +85,10 @@ fn the_head_of_a_comet_is_at_the_chief_ray() {
         // Between the foci of the close rays astigmatism and curvature are least.
         let point = ObjectPoint::from_field(&mono, DVec2::new(field_tan, 0.0), 0.0);
         let foci = AstigmaticFoci::find(&mono, &point).unwrap();
-        let film_mm = 0.5 * (foci.tangential_mm + foci.sagittal_mm);
-        let bank = bank_at(&lens, film_mm, field_tan, &[550.0]);
+        let film_distance_mm = 0.5 * (foci.tangential_mm + foci.sagittal_mm);
+        let bank = bank_at(&lens, film_distance_mm, field_tan, &[550.0]);
         let chief_from_centroid_um = 1e3
-            * (chief_mm(&lens, film_mm, field_tan, 550.0)
+            * (chief_mm(&lens, film_distance_mm, field_tan, 550.0)
                 - bank.radial_geometry(0.0, 550.0).unwrap().image_radius_mm(field_tan));
         let pitch_um = 0.2 * chief_from_centroid_um.abs();
         let kernel = bank.kernel(PsfQuery::new(DVec2::new(field_tan, 0.0), 0.0, 550.0, pitch_um));
@@ -104,8 +104,8 @@ fn the_head_of_a_comet_is_at_the_chief_ray() {
 }
 
 /// Returns the second moments of a far point in a field of this length and direction, on pixels of this size.
-fn moments(lens: &Lens, film_mm: f64, field_tan: DVec2, pitch_um: f64) -> Covariance {
-    let bank = bank_at(lens, film_mm, field_tan.length(), &[550.0]);
+fn moments(lens: &Lens, film_distance_mm: f64, field_tan: DVec2, pitch_um: f64) -> Covariance {
+    let bank = bank_at(lens, film_distance_mm, field_tan.length(), &[550.0]);
     Picture::from(&bank.kernel(PsfQuery::new(field_tan, 0.0, 550.0, pitch_um))).second_moments_um2()
 }
 
@@ -120,7 +120,9 @@ fn astigmatism_flips_through_focus() {
         let foci = AstigmaticFoci::find(&mono, &point).unwrap();
         // An even disc's standard deviation is a quarter of its width.
         let line_um = 1e3 * (foci.sagittal_mm - foci.tangential_mm).abs() / 30.0 / 4.0;
-        let at = |film_mm, turn: DVec2| moments(&lens, film_mm, turn.normalize() * field_tan, 0.1 * line_um);
+        let at = |film_distance_mm, turn: DVec2| {
+            moments(&lens, film_distance_mm, turn.normalize() * field_tan, 0.1 * line_um)
+        };
         let (at_tangential, at_sagittal) = (at(foci.tangential_mm, DVec2::X), at(foci.sagittal_mm, DVec2::X));
         println!("{name}: line of {line_um:.3} µm, {at_tangential:?}, {at_sagittal:?}");
         // Rays in the plane of the axis come together in a line across it, and the others in one along it: a third as
@@ -138,20 +140,20 @@ fn astigmatism_flips_through_focus() {
 }
 
 #[test]
-fn colours_are_ordered_as_their_chief_rays() {
+fn colors_are_ordered_as_their_chief_rays() {
     let nm = [450.0, 550.0, 650.0];
     let mut orders = vec![];
     for name in Lens::built_in_names() {
         let built_in = Lens::built_in(name).unwrap();
         let lens = built_in.with_f_number(32.0, 550.0).unwrap_or(built_in);
         let field_tan = 0.08;
-        let film_mm = paraxial_film_mm(&lens.at(550.0).unwrap());
-        let bank = bank_at(&lens, film_mm, field_tan, &nm);
+        let film_distance_mm = paraxial_film_mm(&lens.at(550.0).unwrap());
+        let bank = bank_at(&lens, film_distance_mm, field_tan, &nm);
         if bank.settings().fields.axes().0[bank.n_fields() - 1] < field_tan {
             continue;
         }
         let centroids = nm.map(|nm| 1e3 * bank.radial_geometry(0.0, nm).unwrap().image_radius_mm(field_tan));
-        let chiefs = nm.map(|nm| 1e3 * chief_mm(&lens, film_mm, field_tan, nm));
+        let chiefs = nm.map(|nm| 1e3 * chief_mm(&lens, film_distance_mm, field_tan, nm));
         println!(
             "{name}: centroids {:.2} {:.2}, chief rays {:.2} {:.2} µm off green",
             centroids[0] - centroids[1],
@@ -161,7 +163,7 @@ fn colours_are_ordered_as_their_chief_rays() {
         );
         for i in [0, 2] {
             let (centroid, chief) = (centroids[i] - centroids[1], chiefs[i] - chiefs[1]);
-            // Coma and the middle of the pupil differ from colour to colour; at f/32 by less than 0.2 µm.
+            // Coma and the middle of the pupil differ from color to color; at f/32 by less than 0.2 µm.
             assert!((centroid - chief).abs() < 0.1 * chief.abs() + 0.2, "{name}: {centroid} {chief}");
         }
         if (chiefs[0] - chiefs[2]).abs() > 1.0 {

@@ -177,7 +177,7 @@ impl Mark {
             let [top, bottom] = [0.5, -0.5].map(|side| down(y + side * height));
             let _ = write!(path, "M{left:.1} {top:.1}H{right:.1}V{bottom:.1}H{left:.1}Z");
         }
-        // Without smoothed edges, which would leave seams between neighbours.
+        // Without smoothed edges, which would leave seams between neighbors.
         let color = &self.color;
         let _ = writeln!(svg, "<path d=\"{path}\" fill=\"{color}\" shape-rendering=\"crispEdges\"/>");
     }

@@ -2,7 +2,7 @@
 
 use dioptric_analysis::{AnalysisFields, AnalysisFilm, AnalysisRequest, PsfRequest, PsfSampling};
 use dioptric_optics::{Glass, Interface, Lens, Shape, Surface};
-use dioptric_pipeline::{Diffraction, FocusChoice};
+use dioptric_pipeline::{Diffraction, FocusSpec};
 use dioptric_report::{AnalysisPlots, psf_mosaic};
 
 fn analysis_request() -> AnalysisRequest {
@@ -63,7 +63,7 @@ fn mosaic_has_a_tile_for_each_picture() {
         field_y_deg: 0.0,
         distances_mm: vec![4000.0, 8000.0],
         wavelengths_nm: vec![450.0, 550.0, 650.0],
-        focus: FocusChoice::FilmMm(51.8145),
+        focus: FocusSpec::FilmMm(51.8145),
         diffraction: Diffraction::None,
         pixel_um: 2.0,
         size: None,
@@ -78,7 +78,7 @@ fn mosaic_has_a_tile_for_each_picture() {
     // Three wavelengths and the light of all of them across, six points down.
     assert!(mosaic.width() > 4 * 160 && mosaic.height() > 6 * 160);
     // A microscope sees nothing at 10°: its tile is dark, and labeled so.
-    let focus = FocusChoice::DistanceMm(2000.0);
+    let focus = FocusSpec::DistanceMm(2000.0);
     let dark = PsfRequest { fields_deg: vec![0.0, 10.0], distances_mm: vec![2000.0], focus, ..request };
     assert!(psf_mosaic(&dark.compute(&Lens::built_in("microscope-20x").unwrap()).unwrap()).is_ok());
 }

@@ -68,8 +68,12 @@ fn crowded_chart_has_its_legend_above() {
 
 #[test]
 fn drawn_lens_is_the_golden_one() {
-    let drawing =
-        LensDrawing { fields_deg: vec![0.0, 3.0], distance_mm: 2000.0, wavelengths_nm: vec![550.0], film_mm: None };
+    let drawing = LensDrawing {
+        fields_deg: vec![0.0, 3.0],
+        distance_mm: 2000.0,
+        wavelengths_nm: vec![550.0],
+        film_distance_mm: None,
+    };
     let svg = drawing.to_svg(&Lens::built_in("paper-2el").unwrap()).unwrap();
     check_svg("report/lens.svg", &svg, ROUNDING_PX);
 }

@@ -12,7 +12,7 @@ use crate::{
     formats::{PartialFile, unwritable},
 };
 
-/// Returns an image as sRGB codes, the colour `white` becoming white and what is brighter being clipped.
+/// Returns an image as sRGB codes, the color `white` becoming white and what is brighter being clipped.
 ///
 /// The eye's observer stands in for a camera here: this is a look at the data, not a simulated picture.
 pub fn srgb_preview(image: &SpectralImage, white: Xyz) -> Array2<[u8; 3]> {

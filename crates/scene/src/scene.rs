@@ -7,7 +7,7 @@ use ndarray::{Array2, s};
 
 use crate::{SceneError, SceneLight, View, resample::resampled};
 
-/// What stands before the camera, as seen from the projection centre.
+/// What stands before the camera, as seen from the projection center.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Where it comes from, for messages and reports.
@@ -24,7 +24,7 @@ pub struct Scene {
     pub light: Option<SceneLight>,
 }
 
-/// What would be seen if the object at the centre of each sample were taken away.
+/// What would be seen if the object at the center of each sample were taken away.
 ///
 /// Where nothing lies behind, the layer repeats the sample of the first.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,7 +62,7 @@ impl Scene {
         Ok(self)
     }
 
-    /// Returns the scene with a centred view of this angle where it has none.
+    /// Returns the scene with a centered view of this angle where it has none.
     ///
     /// # Errors
     /// When the angle is not between 0° and 180°.
@@ -205,7 +205,7 @@ impl Scene {
 
     /// Returns the scene on other bands.
     ///
-    /// Between band centres radiance runs in straight lines; a band wider than those of the scene takes the mean
+    /// Between band centers radiance runs in straight lines; a band wider than those of the scene takes the mean
     /// over its width.
     ///
     /// # Errors

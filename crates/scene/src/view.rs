@@ -4,14 +4,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::SceneError;
 
-/// Where the samples of a scene lie, as seen from the projection centre.
+/// Where the samples of a scene lie, as seen from the projection center.
 ///
-/// Centres of samples are at whole numbers of rows and columns: a sample at (row, column) shows what lies at the
+/// Centers of samples are at whole numbers of rows and columns: a sample at (row, column) shows what lies at the
 /// tangents (column − `center_x_px`) / `focal_px` to the right and (`center_y_px` − row) / `focal_px` upwards.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct View {
-    /// Distance from the projection centre to the picture, in samples.
+    /// Distance from the projection center to the picture, in samples.
     pub focal_px: f64,
     /// Column of the optical axis.
     pub center_x_px: f64,
@@ -20,7 +20,7 @@ pub struct View {
 }
 
 impl View {
-    /// Returns the view of a picture whose axis is at its centre and that spans this angle from edge to edge.
+    /// Returns the view of a picture whose axis is at its center and that spans this angle from edge to edge.
     ///
     /// # Errors
     /// When the angle is not between 0° and 180°.
@@ -91,7 +91,7 @@ impl View {
         }
         Err(SceneError::Setting {
             what: "the camera data of the scene",
-            value: format!("focal {} px, centre ({}, {}) px", self.focal_px, self.center_x_px, self.center_y_px),
+            value: format!("focal {} px, center ({}, {}) px", self.focal_px, self.center_x_px, self.center_y_px),
             expected: "finite numbers and a focal length above 0".to_owned(),
         })
     }

@@ -29,7 +29,7 @@ pub enum WhiteBalance {
         percentile: f64,
     },
     /// The power mean of the picture is taken to be gray, 1 being the gray world and infinity the white patch
-    /// (Finlayson & Trezzi, "Shades of gray and colour constancy", Color Imaging Conference 2004, who find 6 best).
+    /// (Finlayson & Trezzi, "Shades of gray and color constancy", Color Imaging Conference 2004, who find 6 best).
     ShadesOfGray {
         /// The exponent, 1 or more.
         exponent: f64,

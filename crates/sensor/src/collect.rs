@@ -19,7 +19,7 @@ const BANDS_AT_ONCE: usize = 4;
 pub struct Illumination<'a> {
     /// Spectral irradiance, W m⁻² nm⁻¹; a few bands are asked for at a time.
     pub irradiance: &'a dyn Bands,
-    /// The distance between the irradiance's samples on the film, µm, both centerd on the axis: pixels then average
+    /// The distance between the irradiance's samples on the film, µm, both centered on the axis: pixels then average
     /// over their apertures, and the frame has the sensor's rows and columns. `None` when there is one sample
     /// (already averaged) a pixel: the frame then has the size of the irradiance, from the tile's first pixel on.
     pub pitch_um: Option<f64>,

@@ -3,7 +3,7 @@
 use ndarray::Array2;
 use rayon::prelude::*;
 
-/// The shares of samples that a row (or column) of pixel apertures sees, both grids being centerd on the axis.
+/// The shares of samples that a row (or column) of pixel apertures sees, both grids being centered on the axis.
 pub(crate) struct Overlaps {
     /// For each pixel the first sample it sees, and the share of its aperture that each sample covers.
     pixels: Vec<(usize, Vec<f32>)>,

@@ -31,7 +31,7 @@ pub struct Sensor {
     pub columns: usize,
     /// The distance between pixels, µm; pixels are square.
     pub pixel_pitch_um: f64,
-    /// The share of the pixel's area that collects light, 0–1. Below 1 the aperture is a centerd square.
+    /// The share of the pixel's area that collects light, 0–1. Below 1 the aperture is a centered square.
     pub fill_factor: f64,
     /// Which filter lies on which pixel.
     pub cfa: Cfa,

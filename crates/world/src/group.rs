@@ -165,7 +165,7 @@ impl Group {
 
 /// Returns a box enlarged by one to two times a length.
 ///
-/// How much differs from box to box: the builder joins neighbours that are each other's best, of which there is one pair at
+/// How much differs from box to box: the builder joins neighbors that are each other's best, of which there is one pair at
 /// a time among boxes that are all alike, and its time grows as the square of their number.
 fn padded(aabb: Aabb, pad: f32, index: u32) -> Aabb {
     let hash = |salt: u32| {

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
-/// Returns a point of the unit disc, evenly spread, neighbours staying neighbours (Shirley & Chiu 1997).
+/// Returns a point of the unit disc, evenly spread, neighbors staying neighbors (Shirley & Chiu 1997).
 pub(crate) fn on_disc(u: [f32; 2]) -> Vec2 {
     let [x, y] = u.map(|u| 2.0 * u - 1.0);
     if x == 0.0 && y == 0.0 {

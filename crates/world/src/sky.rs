@@ -49,7 +49,7 @@ impl SampledSky {
         };
         let weights: Vec<f64> = (0..rows * columns).map(|i| luminance(i % columns, i / columns)).collect();
         let around = |x: usize, y: usize| {
-            // Interpolation spreads a sample's light over its neighbours: each gets a share of what is around it.
+            // Interpolation spreads a sample's light over its neighbors: each gets a share of what is around it.
             let mut sum = 0.0;
             for dy in [rows - 1, 0, 1] {
                 for dx in [columns - 1, 0, 1] {

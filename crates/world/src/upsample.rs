@@ -78,7 +78,7 @@ impl Table {
                 let (largest, y, x) = (column / (N * N), column / N % N, column % N);
                 let [x, y] = [x, y].map(|i| i as f64 / (N - 1) as f64);
                 let mut coefficients = vec![[0.0; 3]; N];
-                // Walk up and down from a middling brightness, each point starting from its neighbour.
+                // Walk up and down from a middling brightness, each point starting from its neighbor.
                 for indices in [(N / 3..N).collect::<Vec<_>>(), (0..N / 3).rev().collect()] {
                     let mut c = match indices.first() {
                         Some(&first) if first < N / 3 => coefficients[N / 3].map(f64::from),

@@ -46,7 +46,7 @@ impl AnalysisRequest {
         stated.unwrap_or_else(|| nearest_to_reference_nm(&self.wavelengths_nm))
     }
 
-    /// Analyses a lens.
+    /// Analyzes a lens.
     ///
     /// # Errors
     /// When a number makes no sense, a glass is not known at a wavelength, or the lens has no focus and no film is given.
@@ -76,10 +76,10 @@ impl AnalysisRequest {
             lenses,
             reference,
             dioptres: 1e3 / way_mm,
-            film_mm: 0.0,
+            film_distance_mm: 0.0,
             sampling: PupilSampling { coordinates, places: hexapolar(self.n_rings), rims: Vignetting::On },
         };
-        bench.analyse(self, lens, (fields, notes))
+        bench.analyze(self, lens, (fields, notes))
     }
 }
 
@@ -88,7 +88,7 @@ struct Bench {
     lenses: Vec<MonoLens>,
     reference: usize,
     dioptres: f64,
-    film_mm: f64,
+    film_distance_mm: f64,
     sampling: PupilSampling,
 }
 
@@ -121,32 +121,33 @@ impl Bench {
         self.lenses.iter().map(row).collect()
     }
 
-    fn analyse(
+    fn analyze(
         mut self,
         request: &AnalysisRequest,
         lens: &Lens,
         (fields, notes): (Vec<Field>, Vec<String>),
     ) -> Result<LensAnalysis, PipelineError> {
-        let paraxial = self.reference().film_mm_for(request.distance_mm);
+        let paraxial = self.reference().film_distance_mm_for(request.distance_mm);
         let axis = self.point(DVec2::ZERO);
-        let on_axis = paraxial.as_ref().ok().and_then(|&film_mm| self.best(&[axis], &self.lenses, film_mm));
-        self.film_mm = match (request.film, on_axis) {
-            (AnalysisFilm::FilmMm(film_mm), _) => film_mm,
-            (AnalysisFilm::FocusMm(distance_mm), _) => self.reference().film_mm_for(distance_mm)?,
-            (AnalysisFilm::BestFocus, Some((film_mm, _))) => film_mm,
+        let on_axis =
+            paraxial.as_ref().ok().and_then(|&film_distance_mm| self.best(&[axis], &self.lenses, film_distance_mm));
+        self.film_distance_mm = match (request.film, on_axis) {
+            (AnalysisFilm::FilmMm(film_distance_mm), _) => film_distance_mm,
+            (AnalysisFilm::FocusMm(distance_mm), _) => self.reference().film_distance_mm_for(distance_mm)?,
+            (AnalysisFilm::BestFocus, Some((film_distance_mm, _))) => film_distance_mm,
             (AnalysisFilm::BestFocus, None) => paraxial.clone()?,
         };
-        let from_mm = paraxial.as_ref().map_or(self.film_mm, |film_mm| *film_mm);
+        let from_mm = paraxial.as_ref().map_or(self.film_distance_mm, |film_distance_mm| *film_distance_mm);
         let points: Vec<ObjectPoint> = fields.iter().map(|field| self.point(field.tan)).collect();
         let over_fields = self.best(&points, &self.lenses, from_mm);
-        let wavefront = on_axis.and_then(|(film_mm, _)| {
-            best_wavefront_film_mm(self.reference(), &axis, film_mm, PupilGrid::STANDARD).ok()
+        let wavefront = on_axis.and_then(|(film_distance_mm, _)| {
+            best_wavefront_film_mm(self.reference(), &axis, film_distance_mm, PupilGrid::STANDARD).ok()
         });
         let first = self.reference().first_order();
         let pairs: Vec<(&Field, &MonoLens)> =
             fields.iter().flat_map(|field| self.lenses.iter().map(move |lens| (field, lens))).collect();
         let curve_fields = curve_fields(&fields);
-        let straight = StraightMap::of(self.reference(), self.dioptres, self.film_mm);
+        let straight = StraightMap::of(self.reference(), self.dioptres, self.film_distance_mm);
         let axial_cone = self.cone(&axis);
         let field_rows = |fields: &[Field]| {
             fields.par_iter().map(|field| self.field_row(field, (straight.as_ref(), axial_cone))).collect()
@@ -170,7 +171,7 @@ impl Bench {
             efl_mm: first.efl_mm,
             f_number: first.f_number,
             working_f_number: self.reference().working_f_number(request.distance_mm),
-            film_mm: self.film_mm,
+            film_distance_mm: self.film_distance_mm,
             half_illumination_deg: field_limit_deg(self.reference(), 0.5),
             focus: FocusData {
                 paraxial_film_mm: paraxial.ok(),
@@ -194,10 +195,10 @@ impl Bench {
 
     fn spot_row(&self, field: &Field, lens: &MonoLens) -> SpotRow {
         let point = self.point(field.tan);
-        let spot = SpotDiagram::trace(lens, &point, self.film_mm, &self.sampling);
+        let spot = SpotDiagram::trace(lens, &point, self.film_distance_mm, &self.sampling);
         let um = |mm: Option<f64>| mm.map(|mm| 1e3 * mm);
         let sigma_mm = spot.sigma_mm();
-        let center_mm = self.reference().chief_film_point_mm(&point, self.film_mm).or(spot.centroid_mm());
+        let center_mm = self.reference().chief_film_point_mm(&point, self.film_distance_mm).or(spot.centroid_mm());
         let pupil = PupilBoundary::find(lens, &point, TOLD_AZIMUTHS).map(|pupil| PupilRow {
             z_mm: pupil.z_mm(),
             center_mm: pupil.center_mm().to_array(),
@@ -205,7 +206,7 @@ impl Bench {
             area_mm2: pupil.area_mm2(),
         });
         let wavefront =
-            Wavefront::trace(lens, &point, self.film_mm, PupilGrid::STANDARD, WavefrontReference::Best).ok();
+            Wavefront::trace(lens, &point, self.film_distance_mm, PupilGrid::STANDARD, WavefrontReference::Best).ok();
         SpotRow {
             place: field.place,
             wavelength_nm: lens.wavelength_nm(),
@@ -236,11 +237,11 @@ impl Bench {
         let along = |direction: DVec2| {
             let sampling = PupilSampling { places: pupil_line(direction, FAN_PLACES), ..self.sampling.clone() };
             let none = || vec![None; FAN_PLACES];
-            let errors_um = RayFan::trace(lens, &point, self.film_mm, &sampling).map_or_else(none, |fan| {
+            let errors_um = RayFan::trace(lens, &point, self.film_distance_mm, &sampling).map_or_else(none, |fan| {
                 // The picture frame is the lens frame turned by half a turn.
                 fan.errors_mm.iter().map(|error| error.map(|mm| -1e3 * mm.dot(direction))).collect()
             });
-            (errors_um, opd_waves_at(lens, &point, self.film_mm, &sampling).unwrap_or_else(none))
+            (errors_um, opd_waves_at(lens, &point, self.film_distance_mm, &sampling).unwrap_or_else(none))
         };
         let ((tangential_um, tangential_waves), (sagittal_um, sagittal_waves)) = (along(DVec2::Y), along(DVec2::X));
         FanRow {
@@ -256,14 +257,14 @@ impl Bench {
 
     fn field_row(&self, field: &Field, (straight, axial_cone): (Option<&StraightMap>, f64)) -> FieldRow {
         let (point, lens) = (self.point(field.tan), self.reference());
-        let place_mm = |lens: &MonoLens| lens.chief_film_point_mm(&point, self.film_mm);
+        let place_mm = |lens: &MonoLens| lens.chief_film_point_mm(&point, self.film_distance_mm);
         let height_mm = |lens: &MonoLens| place_mm(lens).map(|place_mm| 0.0 - place_mm.dot(field.direction));
         let reference_mm = height_mm(lens);
         let shift_um =
             |lens: &MonoLens| height_mm(lens).zip(reference_mm).map(|(own, reference)| 1e3 * (own - reference));
         let [against_tangent, against_angle] = self.distortions(field, straight, place_mm(lens));
         // Along the axis from where the chief ray meets the film, which may be curved.
-        let film_mm = self.film_mm + self.chief_on_film(&point).map_or(0.0, |own| own.z);
+        let film_distance_mm = self.film_distance_mm + self.chief_on_film(&point).map_or(0.0, |own| own.z);
         let foci = AstigmaticFoci::find(lens, &point);
         let axes = (!lens.is_rotational()).then(|| AxisFoci::find(lens, &point)).flatten();
         FieldRow {
@@ -272,10 +273,10 @@ impl Bench {
             image_mm: place_mm(lens).map(in_picture),
             distortion_tangent_percent: against_tangent.map(|relative| 100.0 * relative),
             distortion_angle_percent: against_angle.map(|relative| 100.0 * relative),
-            tangential_focus_mm: foci.map(|foci| foci.tangential_mm - film_mm),
-            sagittal_focus_mm: foci.map(|foci| foci.sagittal_mm - film_mm),
-            x_focus_mm: axes.map(|foci| foci.x_mm - film_mm),
-            y_focus_mm: axes.map(|foci| foci.y_mm - film_mm),
+            tangential_focus_mm: foci.map(|foci| foci.tangential_mm - film_distance_mm),
+            sagittal_focus_mm: foci.map(|foci| foci.sagittal_mm - film_distance_mm),
+            x_focus_mm: axes.map(|foci| foci.x_mm - film_distance_mm),
+            y_focus_mm: axes.map(|foci| foci.y_mm - film_distance_mm),
             relative_illumination: (axial_cone > 0.0).then(|| self.cone(&point) / axial_cone),
             lateral_color_um: self.lenses.iter().map(shift_um).collect(),
         }
@@ -287,8 +288,9 @@ impl Bench {
         let field_tan = field.tan.length();
         if self.reference().is_rotational() {
             let field = (field_tan, self.dioptres);
-            return [Projection::Tangent, Projection::Angle]
-                .map(|projection| Some(Distortion::of(self.reference(), field, self.film_mm, projection)?.relative()));
+            return [Projection::Tangent, Projection::Angle].map(|projection| {
+                Some(Distortion::of(self.reference(), field, self.film_distance_mm, projection)?.relative())
+            });
         }
         let against = |tan: DVec2| Some(straight?.relative(tan, chief_mm?));
         let angle_over_tan = if field_tan == 0.0 { 1.0 } else { field_tan.atan() / field_tan };
@@ -297,8 +299,8 @@ impl Bench {
 
     /// Returns where the chief ray meets the film, in the film's own frame, mm.
     fn chief_on_film(&self, point: &ObjectPoint) -> Option<DVec3> {
-        let ray = self.reference().chief_ray_on_film(point, self.film_mm)?;
-        Some(self.reference().film_pose(self.film_mm).to_own(ray.point_mm(0)))
+        let ray = self.reference().chief_ray_on_film(point, self.film_distance_mm)?;
+        Some(self.reference().film_placement(self.film_distance_mm).surface_from_lens(ray.point_mm(0)))
     }
 
     /// Returns the projected solid angle of a point's light on the film as it slopes there.
@@ -306,7 +308,7 @@ impl Bench {
         let lens = self.reference();
         let slope = self.chief_on_film(point).map(|own| lens.image_surface().slope_at(own.truncate()));
         let normal = slope.map_or(DVec3::Z, |slope| (-slope).extend(1.0).normalize());
-        let normal = lens.film_pose(self.film_mm).rotation * normal;
+        let normal = lens.film_placement(self.film_distance_mm).rotation * normal;
         projected_solid_angle_onto(lens, point, EDGE_AZIMUTHS, normal)
     }
 
@@ -317,7 +319,7 @@ impl Bench {
         let is_inside = |cell: &DVec2| cell.length_squared() < 1.0;
         let places = cells.iter().copied().filter(is_inside).collect();
         let sampling = PupilSampling { places, ..self.sampling.clone() };
-        let found = opd_waves_at(lens, &self.point(field.tan), self.film_mm, &sampling).unwrap_or_default();
+        let found = opd_waves_at(lens, &self.point(field.tan), self.film_distance_mm, &sampling).unwrap_or_default();
         let mut found = found.into_iter();
         let waves = cells.iter().map(|cell| if is_inside(cell) { found.next().flatten() } else { None }).collect();
         OpdMap { place: field.place, wavelength_nm: lens.wavelength_nm(), n_across: MAP_CELLS, waves }
@@ -338,7 +340,7 @@ impl Bench {
         let places: Vec<DVec2> = places.map(|place| place * half).collect();
         let row = |&tan: &DVec2| GridRow {
             field_xy_deg: tan.to_array().map(|tan| tan.atan().to_degrees()),
-            image_mm: self.reference().chief_film_point_mm(&self.point(tan), self.film_mm).map(in_picture),
+            image_mm: self.reference().chief_film_point_mm(&self.point(tan), self.film_distance_mm).map(in_picture),
             straight_mm: in_picture(straight.at_mm(tan)),
         };
         places.par_iter().map(row).collect()
@@ -346,8 +348,8 @@ impl Bench {
 }
 
 /// Returns a place on the film in the picture frame, which is turned by half a turn.
-fn in_picture(film_mm: DVec2) -> [f64; 2] {
-    [0.0 - film_mm.x, 0.0 - film_mm.y]
+fn in_picture(on_film_mm: DVec2) -> [f64; 2] {
+    [0.0 - on_film_mm.x, 0.0 - on_film_mm.y]
 }
 
 /// Returns the fields that curves are drawn over: from the axis to the widest of these.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_pipeline::{LensChoice, LensReading, PipelineError};
+use dioptric_pipeline::{LensReadOptions, LensSpec, PipelineError};
 
 /// A lens in the format of another file.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,8 +22,8 @@ pub struct ConvertedLens {
 ///
 /// # Errors
 /// When there is no such lens, or the format cannot hold it.
-pub fn convert_lens(input: &str, target: &Path, reading: &LensReading) -> Result<ConvertedLens, PipelineError> {
-    let mut file = LensChoice::named(input).open(reading)?;
+pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Result<ConvertedLens, PipelineError> {
+    let mut file = LensSpec::named(input).open(reading)?;
     let notes = std::mem::take(&mut file.notes);
     let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let (text, glasses) = match extension.as_str() {

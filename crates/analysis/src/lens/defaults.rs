@@ -4,12 +4,12 @@ use dioptric_optics::{Field, Lens, LensFile, glam::DVec2};
 
 use crate::AnalysisFields;
 use dioptric_pipeline::{
-    LensChoice, LensReading, PipelineError, REFERENCE_WAVELENGTH_NM, StopChoice, nearest_to_reference_nm,
+    LensReadOptions, LensSpec, PipelineError, REFERENCE_WAVELENGTH_NM, StopSpec, nearest_to_reference_nm,
 };
 
 /// A lens, and what its file says of its use.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LensUse {
+pub struct LensDefaults {
     /// The lens.
     pub lens: Lens,
     /// What the file says and this program does otherwise or not at all, a sentence each.
@@ -23,18 +23,18 @@ pub struct LensUse {
     /// The points of the field, as the file names them.
     fields: Vec<Field>,
     /// Distance of the film behind the last vertex that the file states, mm.
-    film_mm: Option<f64>,
+    film_distance_mm: Option<f64>,
 }
 
-impl LensUse {
+impl LensDefaults {
     /// Returns the lens that `LENS` on the command line means, with its stop set to `stop_mm` where given, and what its file
     /// says of its use.
     ///
     /// # Errors
     /// When there is no such lens, its file or a catalogue cannot be read, or the stop does not open so far.
-    pub fn open(text: &str, reading: &LensReading, stop_mm: Option<f64>) -> Result<Self, PipelineError> {
-        let mut used = Self::of(LensChoice::named(text).open(reading)?);
-        used.lens = stop_mm.map_or(StopChoice::AsGiven, StopChoice::DiameterMm).apply(used.lens)?;
+    pub fn open(text: &str, reading: &LensReadOptions, stop_mm: Option<f64>) -> Result<Self, PipelineError> {
+        let mut used = Self::of(LensSpec::named(text).open(reading)?);
+        used.lens = stop_mm.map_or(StopSpec::AsGiven, StopSpec::DiameterMm).apply(used.lens)?;
         let mono = used.lens.at(used.wavelength_or_usual());
         used.notes.extend(mono.ok().and_then(|mono| mono.note_on_limit()));
         Ok(used)
@@ -49,7 +49,7 @@ impl LensUse {
             wavelengths_nm,
             distance_mm: file.object_distance_mm.unwrap_or(f64::INFINITY),
             fields: file.fields,
-            film_mm: file.film_mm,
+            film_distance_mm: file.film_distance_mm,
             lens: file.lens,
             notes: file.notes,
         }
@@ -98,8 +98,10 @@ impl LensUse {
                 Field::ObjectHeight { x_mm, y_mm } => heights_mm.push([x_mm, y_mm]),
                 Field::RealImageHeight { x_mm, y_mm } => {
                     let way_mm = self.distance_mm + mono.projection_center_z_mm();
-                    let film_mm = self.film_mm.or_else(|| mono.film_mm_for(self.distance_mm).ok())?;
-                    let tan = -sign * mono.field_tan_of_image(DVec2::new(x_mm, y_mm), film_mm, 1e3 / way_mm)?;
+                    let film_distance_mm =
+                        self.film_distance_mm.or_else(|| mono.film_distance_mm_for(self.distance_mm).ok())?;
+                    let tan =
+                        -sign * mono.field_tan_of_image(DVec2::new(x_mm, y_mm), film_distance_mm, 1e3 / way_mm)?;
                     match self.distance_mm.is_finite() {
                         true => heights_mm.push((tan * way_mm).to_array()),
                         false => angles_deg.push(far(tan)),
@@ -160,11 +162,11 @@ mod tests {
 
     use super::*;
 
-    fn of_file(path: &str, text: &str) -> LensUse {
-        LensUse::of(LensFile::from_bytes(Path::new(path), text.as_bytes(), &ReadOptions::default()).unwrap())
+    fn of_file(path: &str, text: &str) -> LensDefaults {
+        LensDefaults::of(LensFile::from_bytes(Path::new(path), text.as_bytes(), &ReadOptions::default()).unwrap())
     }
 
-    fn read(keys: &str, glass: &str) -> LensUse {
+    fn read(keys: &str, glass: &str) -> LensDefaults {
         let text = format!("RDM\nEPD 5\n{keys}\nS 50 5 {glass}\n STO\nS -50 60\nSI 0\n");
         of_file("a.seq", &text)
     }
@@ -227,7 +229,7 @@ mod tests {
 
     #[test]
     fn stop_is_set() {
-        let open = |text: &str, stop_mm| LensUse::open(text, &LensReading::default(), stop_mm);
+        let open = |text: &str, stop_mm| LensDefaults::open(text, &LensReadOptions::default(), stop_mm);
         let lens = open("dgauss-50mm", Some(8.0)).unwrap().lens;
         assert_eq!(lens.stop_semi_aperture_mm(), 4.0);
         assert!(open("dgauss-50mm", Some(80.0)).is_err());

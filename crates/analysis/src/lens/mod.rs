@@ -12,7 +12,7 @@ mod trace_table;
 
 pub use compute::GRID_LINES;
 pub use convert::{ConvertedLens, convert_lens};
-pub use defaults::LensUse;
+pub use defaults::LensDefaults;
 pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
 pub use request::{AnalysisFields, AnalysisFilm, AnalysisRequest};
 pub use rows::{
@@ -20,5 +20,5 @@ pub use rows::{
     WavefrontRow,
 };
 pub use surface_table::{SurfaceRow, placement_lines, surface_rows};
-pub use table::{ImageData, LensData, LensQuestion, LensRow, PlaneData, built_in_lenses};
+pub use table::{ImageData, LensData, LensInfoRequest, LensRow, PlaneData, built_in_lenses};
 pub use trace_table::{RayTable, TraceError, TraceSettings};

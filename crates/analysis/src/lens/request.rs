@@ -1,4 +1,4 @@
-//! What to analyse a lens for.
+//! What to analyze a lens for.
 
 use dioptric_optics::{
     MonoLens,
@@ -42,7 +42,7 @@ impl AnalysisFields {
     }
 }
 
-/// What to analyse a lens for.
+/// What to analyze a lens for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AnalysisRequest {
     /// The points of the field.

@@ -39,14 +39,15 @@ pub struct LensAnalysis {
     /// The first order of the x–z plane, where it is not that of the y–z plane, which the numbers above are of.
     pub x_plane: Option<PlaneData>,
     /// Where the film is, behind the last vertex, mm.
-    pub film_mm: f64,
-    /// Radius of the film, mm, positive where its centre lies behind; none for a flat one.
+    #[serde(rename = "film_mm")]
+    pub film_distance_mm: f64,
+    /// Radius of the film, mm, positive where its center lies behind; none for a flat one.
     pub film_radius_mm: Option<f64>,
     /// The field at which the illumination of a far object falls to half, degrees.
     pub half_illumination_deg: Option<f64>,
     /// Where the film would be best.
     pub focus: FocusData,
-    /// Axial colour.
+    /// Axial color.
     pub axial_color: Vec<AxialColorRow>,
     /// Spots, wavefronts and pupils: fields outermost, then wavelengths.
     pub spots: Vec<SpotRow>,
@@ -194,7 +195,7 @@ pub struct WavefrontRow {
 pub struct PupilRow {
     /// z of that plane from the first vertex, mm.
     pub z_mm: f64,
-    /// The centre that radii count from, mm from the axis (lens frame).
+    /// The center that radii count from, mm from the axis (lens frame).
     pub center_mm: [f64; 2],
     /// Largest radius at equal steps of azimuth from +x towards +y, mm.
     pub rho_max_mm: Vec<f64>,

@@ -36,7 +36,7 @@ pub fn surface_rows(lens: &Lens) -> Vec<SurfaceRow> {
     lens.interfaces().iter().enumerate().map(row).collect()
 }
 
-/// Returns what there is to say of a lens beside its surfaces: a curved film, tilts and decentres, a line each.
+/// Returns what there is to say of a lens beside its surfaces: a curved film, tilts and decenters, a line each.
 pub fn placement_lines(lens: &Lens) -> Vec<String> {
     let mut lines = Vec::new();
     let film = lens.image_surface();

@@ -39,7 +39,7 @@ pub struct LensData {
     /// The image of an object at the distance asked for.
     #[serde(flatten)]
     pub image: Option<ImageData>,
-    /// The two wavelengths between which the third-order sums count colour, nm; `None` where their colour is unknown.
+    /// The two wavelengths between which the third-order sums count color, nm; `None` where their color is unknown.
     pub seidel_colors_nm: Option<[f64; 2]>,
     /// The third-order sums of the whole lens, mm. Only a rotationally symmetric lens has them.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -47,7 +47,7 @@ pub struct LensData {
     /// The third-order sums of each surface, mm.
     pub seidel_surfaces: Vec<SeidelSums>,
     /// What differs in the x–z plane, of a lens that is not rotationally symmetric; the rest is then of the y–z plane,
-    /// with tilts and decentres left out.
+    /// with tilts and decenters left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub x_plane: Option<PlaneData>,
 }
@@ -65,20 +65,20 @@ pub struct PlaneData {
 
 /// What the data of a lens is about.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LensQuestion {
+pub struct LensInfoRequest {
     /// Wavelength, nm.
     pub wavelength_nm: f64,
     /// Distance of an object before the first vertex, mm, of which the image is wanted.
     pub distance_mm: Option<f64>,
     /// Half field of the third-order sums, degrees.
     pub field_deg: f64,
-    /// The two wavelengths, the shorter first, between which those sums count colour where the lens is not known at the
-    /// F and C lines, as one for the infrared; without them the sums have no colour.
+    /// The two wavelengths, the shorter first, between which those sums count color where the lens is not known at the
+    /// F and C lines, as one for the infrared; without them the sums have no color.
     pub instead_of_f_and_c_nm: Option<[f64; 2]>,
 }
 
-impl LensQuestion {
-    /// Returns the wavelengths between which colour is counted, nm.
+impl LensInfoRequest {
+    /// Returns the wavelengths between which color is counted, nm.
     fn colors_nm(&self, lens: &Lens) -> Option<[f64; 2]> {
         let is_known = |lines_nm: &[f64; 2]| lines_nm.iter().all(|&nm| lens.at(nm).is_ok());
         [Some([F_LINE_NM, C_LINE_NM]), self.instead_of_f_and_c_nm].into_iter().flatten().find(is_known)
@@ -113,8 +113,8 @@ impl LensData {
     ///
     /// # Errors
     /// When a glass is not known at the wavelength, or the distance is not above 0.
-    pub fn new(lens: &Lens, question: &LensQuestion) -> Result<Self, PipelineError> {
-        let LensQuestion { wavelength_nm, distance_mm, field_deg, .. } = *question;
+    pub fn new(lens: &Lens, question: &LensInfoRequest) -> Result<Self, PipelineError> {
+        let LensInfoRequest { wavelength_nm, distance_mm, field_deg, .. } = *question;
         let mono = lens.at(wavelength_nm)?;
         let x_plane = (!lens.is_rotational()).then(|| PlaneData::of_x(&mono));
         let colors_nm = question.colors_nm(lens);
@@ -218,8 +218,8 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    fn question(distance_mm: Option<f64>) -> LensQuestion {
-        LensQuestion { wavelength_nm: 550.0, distance_mm, field_deg: 10.0, instead_of_f_and_c_nm: None }
+    fn question(distance_mm: Option<f64>) -> LensInfoRequest {
+        LensInfoRequest { wavelength_nm: 550.0, distance_mm, field_deg: 10.0, instead_of_f_and_c_nm: None }
     }
 
     #[test]
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn infrared_lens_counts_colour_between_the_wavelengths_asked_for() {
+    fn infrared_lens_counts_color_between_the_wavelengths_asked_for() {
         // Germanium's kind: known from 2 to 14 µm only.
         let glass = dioptric_optics::Glass::Sellmeier {
             b: vec![14.76, 0.24],
@@ -265,17 +265,17 @@ mod tests {
             thickness_after_mm: 0.0,
         };
         let lens = Lens::new("infrared", "test", vec![front], 0).unwrap();
-        let question = LensQuestion { wavelength_nm: 10e3, ..question(None) };
+        let question = LensInfoRequest { wavelength_nm: 10e3, ..question(None) };
         let data = LensData::new(&lens, &question).unwrap();
         assert!(data.seidel_colors_nm.is_none() && data.seidel.unwrap().c1.is_nan() && data.seidel.unwrap().s1 > 0.0);
-        let ends = LensQuestion { instead_of_f_and_c_nm: Some([8e3, 12e3]), ..question };
+        let ends = LensInfoRequest { instead_of_f_and_c_nm: Some([8e3, 12e3]), ..question };
         let data = LensData::new(&lens, &ends).unwrap();
         assert_eq!(data.seidel_colors_nm, Some([8e3, 12e3]));
         // C1 of one surface with the marginal ray coming in straight: A y Δ(δn/n) = c y² δn/n.
         let index = |nm: f64| lens.at(nm).unwrap().image_index();
         let expected = 12.0 * 12.0 / 50.0 * (index(8e3) - index(12e3)) / index(10e3);
         assert_relative_eq!(data.seidel.unwrap().c1, expected, max_relative = 1e-12);
-        let narrower = LensQuestion { instead_of_f_and_c_nm: Some([1e3, 12e3]), ..question };
+        let narrower = LensInfoRequest { instead_of_f_and_c_nm: Some([1e3, 12e3]), ..question };
         assert!(LensData::new(&lens, &narrower).unwrap().seidel_colors_nm.is_none());
     }
 

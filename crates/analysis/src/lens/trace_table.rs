@@ -25,7 +25,7 @@ pub struct TraceSettings {
     /// Whether rims end rays.
     pub rims_clip: bool,
     /// Takes the rays on to a film this far behind the last vertex, mm, of the shape that the lens states.
-    pub film_mm: Option<f64>,
+    pub film_distance_mm: Option<f64>,
 }
 
 impl RayTable {
@@ -164,8 +164,8 @@ fn trace_all(lens: &MonoLens, mut rays: RayBatch, settings: &TraceSettings) -> T
         lens.trace_surfaces(surface..surface + 1, &mut rays, rims);
         after_surface.push(rays.clone());
     }
-    let at_image = settings.film_mm.map(|film_mm| {
-        lens.to_film(&mut rays, film_mm);
+    let at_image = settings.film_distance_mm.map(|film_distance_mm| {
+        lens.to_film(&mut rays, film_distance_mm);
         rays
     });
     Traced { after_surface, at_image }
@@ -226,7 +226,7 @@ mod tests {
 
     #[test]
     fn a_ray_has_a_row_a_surface_and_one_at_the_film() {
-        let settings = TraceSettings { rims_clip: true, film_mm: Some(36.1) };
+        let settings = TraceSettings { rims_clip: true, film_distance_mm: Some(36.1) };
         let rows = traced(&format!("{HEADER}0,1,-10,0,0,1,550\n0,0,-10,0,0,1,650\n"), &settings);
         let n_surfaces = Lens::built_in("dgauss-50mm").unwrap().interfaces().len();
         assert_eq!(rows.len(), 1 + 2 * (n_surfaces + 1));
@@ -244,9 +244,9 @@ mod tests {
     #[test]
     fn a_lost_ray_ends_at_its_surface_unless_rims_are_ignored() {
         let text = format!("{HEADER}0,12.7,-10,0,0,1,550\n");
-        let clipped = traced(&text, &TraceSettings { rims_clip: true, film_mm: Some(36.1) });
+        let clipped = traced(&text, &TraceSettings { rims_clip: true, film_distance_mm: Some(36.1) });
         assert_eq!((clipped.len(), clipped[1][9].as_str()), (2, "vignetted"));
-        let free = traced(&text, &TraceSettings { rims_clip: false, film_mm: None });
+        let free = traced(&text, &TraceSettings { rims_clip: false, film_distance_mm: None });
         assert!(free.len() > 2 && free[1][9] == "passed");
     }
 

@@ -1,4 +1,4 @@
-//! Colours of a 24-patch chart in a picture.
+//! Colors of a 24-patch chart in a picture.
 
 use std::path::Path;
 
@@ -16,13 +16,13 @@ pub struct ChartRequest {
     /// The chart's corners as row and column: beside dark skin, bluish green, black and white; looked for where they are
     /// not given.
     pub corners: Option<ChartCorners>,
-    /// The light on the chart, under which its patches have the colours that are wanted; D65 where it is not given.
+    /// The light on the chart, under which its patches have the colors that are wanted; D65 where it is not given.
     pub light: Option<Illuminant>,
     /// How samples stand for light.
     pub curve: CodeCurve,
 }
 
-/// The colours of a chart.
+/// The colors of a chart.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChartMeasurement {
     /// The file.
@@ -117,12 +117,12 @@ impl ChartRequest {
 
 impl Measurement for ChartMeasurement {
     fn charts(&self) -> Vec<(String, LineChart)> {
-        vec![("colour-ab".to_owned(), self.ab_plot()), ("colour-delta-e".to_owned(), self.delta_e_plot())]
+        vec![("color-ab".to_owned(), self.ab_plot()), ("color-delta-e".to_owned(), self.delta_e_plot())]
     }
 }
 
 impl ChartMeasurement {
-    /// From each colour wanted a line to the one measured.
+    /// From each color wanted a line to the one measured.
     fn ab_plot(&self) -> LineChart {
         let ab = |lab: [f64; 3]| (lab[1], lab[2]);
         let widest = self
@@ -136,7 +136,7 @@ impl ChartMeasurement {
             let [r, g, b] = patch.wanted_srgb;
             let color = format!("#{r:02x}{g:02x}{b:02x}");
             let (from, to) = (ab(patch.wanted_lab), ab(patch.lab));
-            // A small cross stands on the colour wanted.
+            // A small cross stands on the color wanted.
             let arm = 0.012 * limit;
             let line = |points| Series { label: None, color: color.clone(), points, is_dashed: false };
             [

@@ -45,7 +45,7 @@ pub struct Comparison {
     pub against_vsnr: Option<f64>,
 }
 
-/// Colour differences over all pixels.
+/// Color differences over all pixels.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeltaESummary {
     /// The mean.

@@ -159,7 +159,7 @@ impl EdgeRequest {
             return region.check_within((rows, columns));
         }
         let in_file = |reason: String| PipelineError::Read { path: picture.name.clone().into(), reason };
-        // The colours of a mosaic would look like edges: each tile becomes one sample.
+        // The colors of a mosaic would look like edges: each tile becomes one sample.
         let luminance = picture.luminance();
         let binned = Array2::from_shape_fn((rows / period, columns / period), |(r, c)| {
             let tile = luminance.slice(s![r * period..(r + 1) * period, c * period..(c + 1) * period]);

@@ -108,9 +108,9 @@ pub(crate) fn read_frame(path: &Path) -> Result<Array2<f32>, PipelineError> {
     let samples = read_picture_samples(path)?;
     let wrong = |reason: String| PipelineError::Read { path: path.to_owned(), reason };
     match (samples.top, samples.planes.len()) {
-        (None, _) => Err(wrong("its samples are not whole numbers, expected a grey PNG or TIFF".to_owned())),
+        (None, _) => Err(wrong("its samples are not whole numbers, expected a gray PNG or TIFF".to_owned())),
         (Some(_), 1) => Ok(samples.planes.into_iter().next().expect("there is one plane").1),
-        (Some(_), n) => Err(wrong(format!("it has {n} channels, expected a grey PNG or TIFF"))),
+        (Some(_), n) => Err(wrong(format!("it has {n} channels, expected a gray PNG or TIFF"))),
     }
 }
 

@@ -28,7 +28,7 @@ pub trait Measurement: Serialize {
     fn charts(&self) -> Vec<(String, LineChart)>;
 }
 
-/// The colour of a channel's line: its own where the name is a colour's.
+/// The color of a channel's line: its own where the name is a color's.
 fn channel_color(name: &str) -> String {
     match name {
         "R" => "#c03030".to_owned(),

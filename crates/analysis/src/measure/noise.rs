@@ -14,7 +14,7 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use super::frames::{DESCRIPTOR_FILE, FileSeries, descriptor, find_series, read_frame};
-use dioptric_pipeline::{PipelineError, SensorChoice};
+use dioptric_pipeline::{PipelineError, SensorSpec};
 
 /// The light for which ISO speeds are told.
 const ISO_LIGHT: Illuminant = Illuminant::D55;
@@ -27,7 +27,7 @@ const SAME_TIME: f64 = 1e-6;
 #[derive(Clone, Debug, PartialEq)]
 pub struct BenchRequest {
     /// The sensor.
-    pub sensor: SensorChoice,
+    pub sensor: SensorSpec,
     /// The filter; the one that sees the light best where it is not given.
     pub filter: Option<String>,
     /// The side of the square of pixels; 512 where it is not given.
@@ -191,7 +191,7 @@ pub fn measure_bench(request: &BenchRequest, frames_folder: Option<&Path>) -> Re
         let text = descriptor(bits, bench.settings().side, &kept);
         fs::write(&path, text).map_err(|e| PipelineError::Write { path, reason: e.to_string() })?;
     }
-    let data = collected.analyse(sensor.name.clone())?;
+    let data = collected.analyze(sensor.name.clone())?;
     Ok(NoiseData { filter: Some(bench.filter().to_owned()), data_sheet: Some(data_sheet(&bench)), ..data })
 }
 
@@ -201,7 +201,7 @@ pub fn measure_bench(request: &BenchRequest, frames_folder: Option<&Path>) -> Re
 /// name after the last `-` or `_` only, and their photons are then not known.
 ///
 /// # Errors
-/// When a file cannot be read or is no grey picture of whole numbers, frames differ in size, or there are too few.
+/// When a file cannot be read or is no gray picture of whole numbers, frames differ in size, or there are too few.
 pub fn measure_frames(path: &Path) -> Result<NoiseData, PipelineError> {
     let in_file = |error: PipelineError| match error {
         PipelineError::Sensor(error) => PipelineError::Read { path: path.to_owned(), reason: error.to_string() },
@@ -219,7 +219,7 @@ pub fn measure_frames(path: &Path) -> Result<NoiseData, PipelineError> {
         }
         collected.add(taken).map_err(in_file)?;
     }
-    collected.analyse(path.display().to_string()).map_err(in_file)
+    collected.analyze(path.display().to_string()).map_err(in_file)
 }
 
 fn numbers_of(raw: &Raw) -> Array2<f32> {
@@ -311,7 +311,7 @@ impl Collected {
         Ok(())
     }
 
-    fn analyse(&self, source: String) -> Result<NoiseData, PipelineError> {
+    fn analyze(&self, source: String) -> Result<NoiseData, PipelineError> {
         let flats: Vec<&Measured> = self.series.iter().filter(|s| !s.is_dark()).collect();
         let times: Vec<f64> = flats.iter().filter_map(|s| s.time_s).collect();
         let time_s = times.first().copied();

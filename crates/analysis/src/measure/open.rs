@@ -12,7 +12,7 @@ use dioptric_pipeline::PipelineError;
 /// How a picture's samples stand for light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CodeCurve {
-    /// Linear for 16-bit grey (raw frames) and floating-point samples, the curve of sRGB for everything else.
+    /// Linear for 16-bit gray (raw frames) and floating-point samples, the curve of sRGB for everything else.
     #[default]
     ByFile,
     /// Linear.
@@ -65,14 +65,14 @@ impl MeasuredPicture {
         self.planes.iter().find(|(own, _)| own == name).map(|(_, plane)| plane)
     }
 
-    /// Returns the three channels R, G and B, or one grey channel three times; rows × columns × 3.
+    /// Returns the three channels R, G and B, or one gray channel three times; rows × columns × 3.
     ///
     /// # Errors
     /// When the picture has other channels.
     pub fn rgb(&self) -> Result<Array3<f32>, PipelineError> {
         let planes = match (self.plane("R"), self.plane("G"), self.plane("B"), self.planes.as_slice()) {
             (Some(r), Some(g), Some(b), _) => [r, g, b],
-            (_, _, _, [(_, grey)]) => [grey; 3],
+            (_, _, _, [(_, gray)]) => [gray; 3],
             _ => {
                 let names: Vec<&str> = self.planes.iter().map(|(name, _)| name.as_str()).collect();
                 let reason = format!("its channels are {}, expected R, G and B or a single one", names.join(", "));

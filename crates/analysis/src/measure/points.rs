@@ -19,7 +19,7 @@ const N_RADII: usize = 48;
 /// How pictures of points are measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointRequest {
-    /// The side of the window about each point, pixels; half way to its neighbours where it is not given.
+    /// The side of the window about each point, pixels; half way to its neighbors where it is not given.
     pub window: Option<usize>,
     /// The distance between pixels, µm.
     pub pixel_um: f64,

@@ -9,7 +9,7 @@ use crate::{Corner, LineChart, PsfRow, PsfSet, Scale, Series, ThroughFocus};
 
 /// Point-spread functions that a plot tells apart.
 const MOST_LINES: usize = 9;
-/// Colours of lines, the first six told apart also by those who see few.
+/// Colors of lines, the first six told apart also by those who see few.
 const COLORS: [&str; MOST_LINES] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f3c8d", "#8c6d31", "#808080"];
 /// Steps along the axis of a plot.
@@ -164,8 +164,8 @@ impl PsfSet {
         });
         let per_mm = number(found.cycles_per_mm);
         let title = format!("Modulation through focus at {per_mm} cycles per mm (tangential solid, sagittal dashed)");
-        let reach_mm = found.shifts_mm.last().copied().unwrap_or(1.0);
-        let x = ("film moved from the lens, mm", (-reach_mm, reach_mm));
+        let extent_mm = found.shifts_mm.last().copied().unwrap_or(1.0);
+        let x = ("film moved from the lens, mm", (-extent_mm, extent_mm));
         chart(&title, x, ("modulation", Some((0.0, 1.0))), series.collect())
     }
 
@@ -256,7 +256,7 @@ mod tests {
 
     use super::*;
     use crate::{PsfRequest, PsfSampling};
-    use dioptric_pipeline::FocusChoice;
+    use dioptric_pipeline::FocusSpec;
     use dioptric_psf::Diffraction;
 
     fn request() -> PsfRequest {
@@ -265,7 +265,7 @@ mod tests {
             field_y_deg: 0.0,
             distances_mm: vec![8000.0],
             wavelengths_nm: vec![450.0, 600.0],
-            focus: FocusChoice::FilmMm(51.8145),
+            focus: FocusSpec::FilmMm(51.8145),
             diffraction: Diffraction::Hurb { gamma: 1.0 },
             pixel_um: 4.0,
             size: None,
@@ -313,7 +313,7 @@ mod tests {
     fn the_whole_light_is_blurrier_than_its_sharpest_part() {
         let lens = Lens::built_in("paper-2el").unwrap().with_stop_diameter_mm(4.0).unwrap();
         let set = request().compute(&lens).unwrap();
-        let whole = set.whole_light(&[10.0]);
+        let whole = set.polychromatic(&[10.0]);
         assert_eq!(whole.len(), 2);
         for (i, light) in whole.iter().enumerate() {
             let parts = [&set.rows[2 * i], &set.rows[2 * i + 1]];

@@ -9,7 +9,7 @@ pub(crate) mod spot;
 mod table;
 mod through_focus;
 
-pub use polychromatic::WholeLight;
+pub use polychromatic::PolychromaticPsf;
 pub use request::{PsfRequest, PsfSampling};
 pub use row::{MtfRow, PsfRow, psf_csv};
 pub use table::PsfSet;

@@ -15,7 +15,7 @@ use dioptric_pipeline::{display::LinearRgb, display::SpectrumToRgb};
 
 /// The light of all wavelengths of one point, each laid where it lands.
 #[derive(Clone, Debug)]
-pub struct WholeLight {
+pub struct PolychromaticPsf {
     /// What is measured of it; the centroid is that of the whole.
     pub row: PsfRow,
     /// The energy on each pixel about that centroid; the sum is at most 1.
@@ -42,17 +42,17 @@ impl PsfSet {
     /// Returns the light of all wavelengths of each point that is lit, in the order of the rows.
     ///
     /// Wavelengths count by the set's weights and by how much of each gets through. Pictures are moved by parts of a
-    /// pixel by sharing between neighbours; moments and modulations are exact.
-    pub fn whole_light(&self, mtf_per_mm: &[f64]) -> Vec<WholeLight> {
+    /// pixel by sharing between neighbors; moments and modulations are exact.
+    pub fn polychromatic(&self, mtf_per_mm: &[f64]) -> Vec<PolychromaticPsf> {
         self.points().filter_map(|point| self.whole(point, mtf_per_mm)).collect()
     }
 
     /// Returns the light of all wavelengths of one point, if there are several and it is lit.
-    pub fn whole_light_of(&self, point: Range<usize>) -> Option<WholeLight> {
+    pub fn polychromatic_of(&self, point: Range<usize>) -> Option<PolychromaticPsf> {
         (point.len() > 1).then(|| self.whole(point, &[])).flatten()
     }
 
-    fn whole(&self, point: Range<usize>, mtf_per_mm: &[f64]) -> Option<WholeLight> {
+    fn whole(&self, point: Range<usize>, mtf_per_mm: &[f64]) -> Option<PolychromaticPsf> {
         let (centroid_mm, parts) = self.parts(point.clone())?;
         let mut second = Covariance::default();
         let first = &self.rows[point.start];
@@ -80,7 +80,10 @@ impl PsfSet {
         };
         let row = PsfRow::measure(name, centroid_mm, second, &Picture::new(picture.view(), self.pixel_um))
             .with_mtf(mtf_per_mm, |direction, f| self.modulation_of(&pictures, direction, f));
-        Some(WholeLight { row: PsfRow { is_whole_light: true, energy, picture_share, wave_share, ..row }, picture })
+        Some(PolychromaticPsf {
+            row: PsfRow { is_polychromatic: true, energy, picture_share, wave_share, ..row },
+            picture,
+        })
     }
 
     /// Returns the modulation of the whole light of a point for a wave along a direction from +x; no number where it

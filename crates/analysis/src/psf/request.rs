@@ -3,7 +3,7 @@
 use dioptric_optics::{Lens, MonoLens, glam::DVec2};
 use dioptric_psf::{Diffraction, PsfError, PsfQuery};
 
-use dioptric_pipeline::{BankChoice, FocusChoice, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+use dioptric_pipeline::{BankSpec, FocusSpec, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 
 /// Wavelengths that are seen.
 const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
@@ -22,7 +22,7 @@ pub struct PsfRequest {
     /// Wavelengths, nm.
     pub wavelengths_nm: Vec<f64>,
     /// Where the film is; a near object has no meaning here.
-    pub focus: FocusChoice,
+    pub focus: FocusSpec,
     /// Diffraction at the stop.
     pub diffraction: Diffraction,
     /// Side of a pixel, µm.
@@ -32,7 +32,7 @@ pub struct PsfRequest {
     /// How the light is sampled.
     pub sampling: PsfSampling,
     /// A bank over the range of the points from which they are drawn; `None` to trace each of them.
-    pub bank: Option<BankChoice>,
+    pub bank: Option<BankSpec>,
     /// Spatial frequencies of the MTF tables, cycles per mm.
     pub mtf_per_mm: Vec<f64>,
     /// The seed of the paper mode's diffraction.
@@ -152,7 +152,7 @@ impl PsfRequest {
         if matches!(self.sampling, PsfSampling::Paper { .. }) && self.diffraction == Diffraction::Wave {
             return Err(self.wrong("diffraction", "wave", "bent rays or none in the paper mode"));
         }
-        if let Some(BankChoice::Within { error }) = self.bank
+        if let Some(BankSpec::Within { error }) = self.bank
             && !(error.is_finite() && error > 0.0)
         {
             return Err(self.wrong("bank_error", &error.to_string(), "a number above 0"));

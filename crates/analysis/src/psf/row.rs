@@ -26,7 +26,7 @@ pub struct PsfRow {
     pub wavelength_nm: f64,
     /// Whether this is the light of all wavelengths of the point together.
     #[serde(skip_serializing_if = "is_false")]
-    pub is_whole_light: bool,
+    pub is_polychromatic: bool,
     /// Centroid, to the right, mm from the axis.
     pub centroid_x_mm: f64,
     /// Centroid, upwards, mm from the axis.
@@ -116,7 +116,7 @@ impl PsfRow {
             field_y_deg: name.field_y_deg,
             distance_mm: name.distance_mm,
             wavelength_nm: name.wavelength_nm,
-            is_whole_light: false,
+            is_polychromatic: false,
             // Adding 0 takes the sign from a zero.
             centroid_x_mm: place_mm.x + 0.0,
             centroid_y_mm: place_mm.y + 0.0,
@@ -195,7 +195,7 @@ pub(crate) fn place_and_size(moments: Option<Moments>) -> (DVec2, Covariance) {
 /// Returns rows as a table with a line of names; modulations are named by their frequency.
 pub fn psf_csv(rows: &[PsfRow]) -> String {
     let mut csv =
-        "field_deg,field_y_deg,distance_mm,wavelength_nm,is_whole_light,centroid_x_mm,centroid_y_mm,rms_radius_um,sigma_x_um,\
+        "field_deg,field_y_deg,distance_mm,wavelength_nm,is_polychromatic,centroid_x_mm,centroid_y_mm,rms_radius_um,sigma_x_um,\
                    sigma_y_um,second_moment_xy_um2,lsf_fwhm_um,lsf_fwhm_y_um,ee50_radius_um,ee80_radius_um,\
                    es50_half_width_um,es80_half_width_um,energy,picture_share,wave_share,strehl"
             .to_owned();
@@ -222,8 +222,8 @@ pub fn psf_csv(rows: &[PsfRow]) -> String {
             row.energy,
             row.picture_share,
         ];
-        let PsfRow { field_deg, field_y_deg, distance_mm, wavelength_nm, is_whole_light, .. } = row;
-        let _ = write!(csv, "{field_deg},{field_y_deg},{distance_mm},{wavelength_nm},{is_whole_light}");
+        let PsfRow { field_deg, field_y_deg, distance_mm, wavelength_nm, is_polychromatic, .. } = row;
+        let _ = write!(csv, "{field_deg},{field_y_deg},{distance_mm},{wavelength_nm},{is_polychromatic}");
         for value in numbers {
             let _ = write!(csv, ",{value}");
         }

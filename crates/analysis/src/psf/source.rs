@@ -14,18 +14,24 @@ const AZIMUTHS: usize = 96;
 
 impl PsfRequest {
     /// Returns a bank over the range of points where that was asked for, else one of the points.
-    pub(crate) fn source(&self, lens: &Lens, items: &[Item], film_mm: f64) -> Result<LensImageModel, PipelineError> {
-        let Some(choice) = self.bank else { return self.exact_source(lens, items, film_mm) };
+    pub(crate) fn source(
+        &self,
+        lens: &Lens,
+        items: &[Item],
+        film_distance_mm: f64,
+    ) -> Result<LensImageModel, PipelineError> {
+        let Some(choice) = self.bank else { return self.exact_source(lens, items, film_distance_mm) };
         if !lens.is_rotational() {
             let found = format!("a bank of {}", lens.name());
             return Err(self.wrong("bank", &found, "none: of a lens without an axis of symmetry each point is traced"));
         }
         let reference_wavelength_nm = self.reference(lens)?.wavelength_nm();
-        let exact = self.exact_settings(radius_of(items), items, film_mm, reference_wavelength_nm);
+        let exact = self.exact_settings(radius_of(items), items, film_distance_mm, reference_wavelength_nm);
         let ends = |list: &[f64]| (list[0], list[list.len() - 1]);
         let (_, last_field_tan) = ends(exact.fields.axes().0);
         let (dioptres, wavelengths_nm) = (ends(&exact.dioptres), ends(&exact.wavelengths_nm));
-        let standard = BankSettings::covering(film_mm, last_field_tan, dioptres, wavelengths_nm, exact.diffraction);
+        let standard =
+            BankSettings::covering(film_distance_mm, last_field_tan, dioptres, wavelengths_nm, exact.diffraction);
         let standard = BankSettings { reference_wavelength_nm, ..standard };
         choice.build(lens, standard, self.pixel_um, &|_| {}, &Cancel::new())
     }
@@ -35,7 +41,7 @@ impl PsfRequest {
         &self,
         lens: &Lens,
         items: &[Item],
-        film_mm: f64,
+        film_distance_mm: f64,
     ) -> Result<LensImageModel, PipelineError> {
         let reference_wavelength_nm = self.reference(lens)?.wavelength_nm();
         let fields = match lens.is_rotational() {
@@ -45,18 +51,18 @@ impl PsfRequest {
                 tans_y: sorted(items.iter().map(|item| item.field_tan().y)),
             },
         };
-        Ok(LensImageModel::build(lens, &self.exact_settings(fields, items, film_mm, reference_wavelength_nm))?)
+        Ok(LensImageModel::build(lens, &self.exact_settings(fields, items, film_distance_mm, reference_wavelength_nm))?)
     }
 
     fn exact_settings(
         &self,
         fields: FieldSampling,
         items: &[Item],
-        film_mm: f64,
+        film_distance_mm: f64,
         reference_wavelength_nm: f64,
     ) -> BankSettings {
         BankSettings {
-            film_mm,
+            film_distance_mm,
             reference_wavelength_nm,
             fields,
             dioptres: sorted(items.iter().map(|item| item.dioptres)),

@@ -32,7 +32,12 @@ impl Spot {
     /// Sends rays evenly through the true pupil of a point.
     ///
     /// `energy` is the area of that pupil over that which an axial point sees, both without what obscurations stop.
-    pub(crate) fn through_pupil(mono: &MonoLens, point: &ObjectPoint, axial: &ObjectPoint, film_mm: f64) -> Self {
+    pub(crate) fn through_pupil(
+        mono: &MonoLens,
+        point: &ObjectPoint,
+        axial: &ObjectPoint,
+        film_distance_mm: f64,
+    ) -> Self {
         let parts = PupilBoundary::find_parts(mono, point, AZIMUTHS);
         let Some(plane) = parts.first().map(PupilBoundary::plane) else { return Self::default() };
         let (mut targets, mut areas) = (Vec::new(), Vec::new());
@@ -50,13 +55,13 @@ impl Spot {
         let mut rays = plane.rays(mono, point, &targets);
         let cones = solid_angles(point, &rays);
         mono.trace(&mut rays, Vignetting::On);
-        mono.to_film(&mut rays, film_mm);
+        mono.to_film(&mut rays, film_distance_mm);
         let area_mm2 = |point: &ObjectPoint| {
             let whole = |lens: &MonoLens| area_of(point, &PupilBoundary::find_parts(lens, point, AZIMUTHS));
             mono.over_clear_pupil(&whole)
         };
         let seen_mm2 = if mono.n_obscurations() == 0 { area_of(point, &parts) } else { area_mm2(point) };
-        let mut spot = Self::of_rays(mono, film_mm, &rays, |ray| areas[ray] * cones[ray]);
+        let mut spot = Self::of_rays(mono, film_distance_mm, &rays, |ray| areas[ray] * cones[ray]);
         spot.energy = Some(area_mm2(axial)).filter(|area| *area > 0.0).map_or(f64::NAN, |area| seen_mm2 / area);
         spot
     }
@@ -64,26 +69,26 @@ impl Spot {
     /// Sends rays to a square grid over the front disc, as the paper does; `bending` also draws diffraction.
     ///
     /// `energy` is the share of the rays that reached the film.
-    pub(crate) fn over_front(mono: &MonoLens, point: &ObjectPoint, film_mm: f64, paper: &PaperRays) -> Self {
+    pub(crate) fn over_front(mono: &MonoLens, point: &ObjectPoint, film_distance_mm: f64, paper: &PaperRays) -> Self {
         let mut rays = rays_over_front(mono, point, paper.n_across);
         let stop = mono.stop();
         mono.trace_surfaces(0..stop + 1, &mut rays, Vignetting::On);
         if let Some(model) = paper.bending {
             let edge = CircularStop::new(mono.stop_semi_aperture_mm(), mono.wavelength_nm(), mono.stop_medium_index());
             let hurb = SampledHurb { model, edge, form: HurbForm::Angles, seed: paper.seed };
-            hurb.apply(&mut rays, &mono.stop_pose());
+            hurb.apply(&mut rays, &mono.stop_placement());
         }
         mono.trace_surfaces(stop + 1..mono.n_surfaces(), &mut rays, Vignetting::On);
-        mono.to_film(&mut rays, film_mm);
-        let mut spot = Self::of_rays(mono, film_mm, &rays, |_| 1.0);
+        mono.to_film(&mut rays, film_distance_mm);
+        let mut spot = Self::of_rays(mono, film_distance_mm, &rays, |_| 1.0);
         spot.energy = spot.at_mm.len() as f64 / rays.len().max(1) as f64;
         spot
     }
 
     /// Gathers the rays that reached the film.
-    fn of_rays(mono: &MonoLens, film_mm: f64, rays: &RayBatch, weight: impl Fn(usize) -> f64) -> Self {
+    fn of_rays(mono: &MonoLens, film_distance_mm: f64, rays: &RayBatch, weight: impl Fn(usize) -> f64) -> Self {
         let passed: Vec<usize> = (0..rays.len()).filter(|&ray| rays.fate[ray].is_in_flight()).collect();
-        let at_mm = mono.landed(rays, film_mm).map(FilmPoint::in_picture_mm).collect();
+        let at_mm = mono.landed(rays, film_distance_mm).map(FilmPoint::in_picture_mm).collect();
         let weights: Vec<f64> = passed.iter().map(|&ray| weight(ray)).collect();
         let sum: f64 = weights.iter().sum();
         Self { at_mm, weights: weights.into_iter().map(|w| w / sum).collect(), energy: 0.0 }
@@ -151,10 +156,10 @@ mod tests {
     fn spot_at(field_deg: f64, distance_mm: f64) -> Spot {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
         let mono = lens.at(550.0).unwrap();
-        let film_mm = mono.film_mm_for(distance_mm).unwrap();
+        let film_distance_mm = mono.film_distance_mm_for(distance_mm).unwrap();
         let point = ObjectPoint::from_field(&mono, DVec2::new(field_deg.to_radians().tan(), 0.0), 1e3 / distance_mm);
         let axial = ObjectPoint::from_field(&mono, DVec2::ZERO, 1e3 / distance_mm);
-        Spot::through_pupil(&mono, &point, &axial, film_mm)
+        Spot::through_pupil(&mono, &point, &axial, film_distance_mm)
     }
 
     #[test]

@@ -13,14 +13,14 @@ use super::request::{Item, LARGEST};
 use super::row::{PointName, place_and_size};
 use super::spot::{PaperRays, Spot};
 use crate::{PsfRequest, PsfRow, PsfSampling};
-use dioptric_pipeline::{BankData, FocusChoice, PipelineError};
+use dioptric_pipeline::{BankData, FocusSpec, PipelineError};
 use dioptric_psf::Diffraction;
 
 /// Point-spread functions with their pictures.
 #[derive(Clone, Debug)]
 pub struct PsfSet {
     /// Distance of the film behind the last vertex, mm.
-    pub film_mm: f64,
+    pub film_distance_mm: f64,
     /// Side of a pixel, µm.
     pub pixel_um: f64,
     /// What is measured: fields outermost, then distances, then wavelengths.
@@ -41,18 +41,18 @@ impl PsfRequest {
     pub fn compute(&self, lens: &Lens) -> Result<PsfSet, PipelineError> {
         self.check()?;
         let reference = self.reference(lens)?;
-        let film_mm = match self.focus {
-            FocusChoice::DistanceMm(distance_mm) => reference.film_mm_for(distance_mm)?,
-            FocusChoice::FilmMm(film_mm) => film_mm,
-            FocusChoice::NearObject => return Err(self.wrong("focus", "NearObject", "a distance or a film place")),
+        let film_distance_mm = match self.focus {
+            FocusSpec::DistanceMm(distance_mm) => reference.film_distance_mm_for(distance_mm)?,
+            FocusSpec::FilmMm(film_distance_mm) => film_distance_mm,
+            FocusSpec::NearObject => return Err(self.wrong("focus", "NearObject", "a distance or a film place")),
         };
         let items = self.items(lens)?;
         let source = match self.sampling {
-            PsfSampling::Pupil => Some(self.source(lens, &items, film_mm)?),
+            PsfSampling::Pupil => Some(self.source(lens, &items, film_distance_mm)?),
             PsfSampling::Paper { .. } => None,
         };
         let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> =
-            items.par_iter().map(|item| self.compute_one(item, lens, source.as_ref(), film_mm)).collect();
+            items.par_iter().map(|item| self.compute_one(item, lens, source.as_ref(), film_distance_mm)).collect();
         let (mut rows, pictures): (Vec<PsfRow>, _) = computed?.into_iter().unzip();
         let spectral_weights = match self.spectral_weights.is_empty() {
             true => vec![1.0; self.wavelengths_nm.len()],
@@ -60,7 +60,7 @@ impl PsfRequest {
         };
         let bank = source.as_ref().and_then(BankData::of);
         rows.iter_mut().for_each(|row| row.bank.clone_from(&bank));
-        Ok(PsfSet { film_mm, pixel_um: self.pixel_um, rows, pictures, bank, spectral_weights })
+        Ok(PsfSet { film_distance_mm, pixel_um: self.pixel_um, rows, pictures, bank, spectral_weights })
     }
 
     fn compute_one(
@@ -68,7 +68,7 @@ impl PsfRequest {
         item: &Item,
         lens: &Lens,
         source: Option<&LensImageModel>,
-        film_mm: f64,
+        film_distance_mm: f64,
     ) -> Result<(PsfRow, Array2<f32>), PipelineError> {
         let reference = self.reference(lens)?;
         let mono = lens.at(item.wavelength_nm)?;
@@ -76,7 +76,7 @@ impl PsfRequest {
         let (spot, picture, model) = match (self.sampling, source) {
             (PsfSampling::Pupil, Some(source)) => {
                 let axial = ObjectPoint::from_field(&reference, DVec2::ZERO, item.dioptres);
-                let spot = Spot::through_pupil(&mono, &point, &axial, film_mm);
+                let spot = Spot::through_pupil(&mono, &point, &axial, film_distance_mm);
                 let drawn = if spot.at_mm.is_empty() { None } else { self.draw(item, source) };
                 let (picture, model) = drawn.map_or_else(|| (Array2::zeros((1, 1)), None), |(p, m)| (p, Some(m)));
                 (spot, self.size.map_or_else(|| picture.clone(), |size| resized(&picture, size)), model)
@@ -84,7 +84,7 @@ impl PsfRequest {
             (PsfSampling::Pupil, None) => unreachable!("a bank is built for this sampling"),
             (PsfSampling::Paper { n_across }, _) => {
                 let paper = PaperRays { n_across, bending: self.diffraction.hurb(), seed: self.seed };
-                let spot = Spot::over_front(&mono, &point, film_mm, &paper);
+                let spot = Spot::over_front(&mono, &point, film_distance_mm, &paper);
                 let picture = self.counted(&spot);
                 (spot, picture, None)
             }
@@ -94,7 +94,8 @@ impl PsfRequest {
             (row.wave_share, row.fallback) = (Some(wave_share), fallback);
         }
         if row.is_of_waves() {
-            let nodes = PupilSamples::trace(&mono, &point, film_mm, PupilGrid { n_radii: 24, n_azimuths: 96 }, None);
+            let nodes =
+                PupilSamples::trace(&mono, &point, film_distance_mm, PupilGrid { n_radii: 24, n_azimuths: 96 }, None);
             // Waves of a blur too large for these nodes have no peak to speak of.
             row.strehl = nodes.and_then(|nodes| nodes.peak()).ok().map(|peak| peak.strehl);
         }
@@ -105,7 +106,7 @@ impl PsfRequest {
     fn draw(&self, item: &Item, source: &LensImageModel) -> Option<(Array2<f32>, ModelUse)> {
         let query = item.query(self.pixel_um);
         match self.size {
-            // A picture is centred on the middle of a pixel, which an odd number has.
+            // A picture is centered on the middle of a pixel, which an odd number has.
             Some(size) if size % 2 == 1 => {
                 source.picture(query, size).map(|(picture, model)| (picture.mapv(|e| e as f32), model))
             }
@@ -202,7 +203,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
     use dioptric_optics::{Glass, Interface, Surface};
-    use dioptric_pipeline::BankChoice;
+    use dioptric_pipeline::BankSpec;
 
     fn request() -> PsfRequest {
         PsfRequest {
@@ -210,7 +211,7 @@ mod tests {
             field_y_deg: 0.0,
             distances_mm: vec![8000.0],
             wavelengths_nm: vec![450.0, 650.0],
-            focus: FocusChoice::FilmMm(51.8145),
+            focus: FocusSpec::FilmMm(51.8145),
             diffraction: Diffraction::None,
             pixel_um: 2.0,
             size: None,
@@ -286,7 +287,7 @@ mod tests {
             fields_deg: vec![0.0],
             distances_mm: vec![2000.0, 300.0],
             wavelengths_nm: vec![550.0],
-            focus: FocusChoice::DistanceMm(2000.0),
+            focus: FocusSpec::DistanceMm(2000.0),
             diffraction: Diffraction::Wave,
             ..request()
         };
@@ -305,7 +306,7 @@ mod tests {
         let traced = request.compute(&paper_lens()).unwrap();
         assert_eq!((traced.bank.is_none(), traced.rows[0].bank.is_none()), (true, true));
         let drawn =
-            PsfRequest { bank: Some(BankChoice::Within { error: 0.02 }), ..request }.compute(&paper_lens()).unwrap();
+            PsfRequest { bank: Some(BankSpec::Within { error: 0.02 }), ..request }.compute(&paper_lens()).unwrap();
         let data = drawn.rows[3].bank.as_ref().unwrap();
         assert!(data.median_error <= 0.02 && data.n_places == 24, "{data:?}");
         for (a, b) in traced.rows.iter().zip(&drawn.rows) {
@@ -329,12 +330,12 @@ mod tests {
     #[test]
     fn a_dark_point_has_no_size() {
         // A microscope sees nothing at 10°.
-        let focus = FocusChoice::DistanceMm(2000.0);
+        let focus = FocusSpec::DistanceMm(2000.0);
         let request = PsfRequest { fields_deg: vec![0.0, 10.0], distances_mm: vec![2000.0], focus, ..request() };
         let set = request.compute(&Lens::built_in("microscope-20x").unwrap()).unwrap();
         assert!(!set.rows[0].is_dark() && set.rows[2].is_dark() && !set.rows[2].is_cut());
         assert!(set.rows[2].ee50_radius_um.is_nan() && set.rows[2].lsf_fwhm_um.is_nan());
-        assert_eq!(set.whole_light(&[]).len(), 1);
+        assert_eq!(set.polychromatic(&[]).len(), 1);
     }
 
     #[test]
@@ -350,13 +351,13 @@ mod tests {
             fields_deg: vec![0.0],
             distances_mm: vec![f64::INFINITY],
             wavelengths_nm: vec![10e3],
-            focus: FocusChoice::DistanceMm(f64::INFINITY),
+            focus: FocusSpec::DistanceMm(f64::INFINITY),
             diffraction: Diffraction::Wave,
             pixel_um: 10.0,
             ..request()
         };
         let set = infrared.compute(&lens).unwrap();
-        assert_eq!(set.film_mm, lens.at(10e3).unwrap().film_mm_for(f64::INFINITY).unwrap());
+        assert_eq!(set.film_distance_mm, lens.at(10e3).unwrap().film_distance_mm_for(f64::INFINITY).unwrap());
         assert!(set.rows[0].strehl.unwrap() > 0.8, "{:?}", set.rows[0]);
         assert!(infrared.through_focus(&lens, &set).is_ok());
         // Ultraviolet light is focused by itself too, in any lens; visible light for 550 nm.
@@ -383,9 +384,9 @@ mod tests {
             PsfRequest { wavelengths_nm: vec![f64::INFINITY], ..request() },
             PsfRequest { pixel_um: 0.0, ..request() },
             PsfRequest { size: Some(0), ..request() },
-            PsfRequest { focus: FocusChoice::NearObject, ..request() },
-            PsfRequest { bank: Some(BankChoice::Within { error: f64::NAN }), ..request() },
-            PsfRequest { bank: Some(BankChoice::Paper), sampling: PsfSampling::Paper { n_across: 21 }, ..request() },
+            PsfRequest { focus: FocusSpec::NearObject, ..request() },
+            PsfRequest { bank: Some(BankSpec::Within { error: f64::NAN }), ..request() },
+            PsfRequest { bank: Some(BankSpec::Paper), sampling: PsfSampling::Paper { n_across: 21 }, ..request() },
         ] {
             assert!(wrong.compute(&paper_lens()).is_err(), "{wrong:?}");
         }

@@ -49,22 +49,28 @@ impl PsfRequest {
         let reference = self.reference(lens)?;
         let first = reference.first_order();
         // A telecentric lens has the cone of its object's image on any film.
-        let f_number = match (set.film_mm - first.exit_pupil_z_mm) / first.exit_pupil_diameter_mm {
+        let f_number = match (set.film_distance_mm - first.exit_pupil_z_mm) / first.exit_pupil_diameter_mm {
             f_number if f_number.is_finite() => f_number,
             _ => reference.working_f_number(self.distances_mm.first().copied().unwrap_or(f64::INFINITY)),
         };
         // Where the blur is 1.2 periods wide, the modulation of an even disc is at its first zero.
-        let reach_mm = match 1.5 * 1.22 * f_number.abs() / cycles_per_mm {
+        let extent_mm = match 1.5 * 1.22 * f_number.abs() / cycles_per_mm {
             reach if reach.is_finite() => reach.min(5.0),
             _ => 1.0,
         };
-        let shifts_mm: Vec<f64> = (-STEPS..=STEPS).map(|i| reach_mm * f64::from(i) / f64::from(STEPS)).collect();
+        let shifts_mm: Vec<f64> = (-STEPS..=STEPS).map(|i| extent_mm * f64::from(i) / f64::from(STEPS)).collect();
         let rows = set.plotted();
         let all = self.items(lens)?;
         let items: Vec<Item> = rows.iter().map(|row| all[*row]).collect();
         let mut modulations = vec![Vec::with_capacity(shifts_mm.len()); rows.len()];
         for shift_mm in &shifts_mm {
-            let here = Here { request: self, lens, items: &items, film_mm: set.film_mm + shift_mm, cycles_per_mm };
+            let here = Here {
+                request: self,
+                lens,
+                items: &items,
+                film_distance_mm: set.film_distance_mm + shift_mm,
+                cycles_per_mm,
+            };
             for (found, modulation) in modulations.iter_mut().zip(here.modulations()?) {
                 found.push(modulation);
             }
@@ -78,7 +84,7 @@ struct Here<'a> {
     request: &'a PsfRequest,
     lens: &'a Lens,
     items: &'a [Item],
-    film_mm: f64,
+    film_distance_mm: f64,
     cycles_per_mm: f64,
 }
 
@@ -87,7 +93,7 @@ impl Here<'_> {
     fn modulations(&self) -> Result<Vec<(f64, f64)>, PipelineError> {
         match self.request.sampling {
             PsfSampling::Pupil => {
-                let source = self.request.exact_source(self.lens, self.items, self.film_mm)?;
+                let source = self.request.exact_source(self.lens, self.items, self.film_distance_mm)?;
                 Ok(self.items.par_iter().map(|item| self.of_picture(item, &source)).collect())
             }
             PsfSampling::Paper { n_across } => {
@@ -126,7 +132,7 @@ impl Here<'_> {
         let reference = self.request.reference(self.lens)?;
         let mono = self.lens.at(item.wavelength_nm)?;
         let point = ObjectPoint::from_field(&reference, item.field_tan(), item.dioptres);
-        let spot = Spot::over_front(&mono, &point, self.film_mm, rays);
+        let spot = Spot::over_front(&mono, &point, self.film_distance_mm, rays);
         let modulation = |direction: f64| {
             spot.modulation(direction, self.cycles_per_mm) * self.pixels(self.request.pixel_um, direction)
         };

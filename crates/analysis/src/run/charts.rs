@@ -10,7 +10,7 @@ use dioptric_pipeline::{Capture, REFERENCE_WAVELENGTH_NM, display::wavelength_co
 
 /// Points of a curve.
 const POINTS: usize = 64;
-/// Colours of the channels of a frame that are not red, green or blue.
+/// Colors of the channels of a frame that are not red, green or blue.
 const OTHER_CHANNEL: &str = "#555566";
 
 /// The plots of the report.
@@ -238,7 +238,7 @@ fn distortion(bank: &LensImageModel, places: &RunPlaces) -> LineChart {
     let (low, high) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
     let margin = 0.08 * (high - low).max(0.01);
     LineChart {
-        title: "Distortion and lateral colour".to_owned(),
+        title: "Distortion and lateral color".to_owned(),
         x_label: "field angle, degrees".to_owned(),
         y_label: "image height against f · tan, %".to_owned(),
         x_range: (0.0, places.corner_tan().atan().to_degrees()),

@@ -35,7 +35,8 @@ pub struct RunReport {
     /// The lens, at the reference wavelength and the distance in focus.
     pub lens: LensData,
     /// Distance of the film behind the last vertex, mm.
-    pub film_mm: f64,
+    #[serde(rename = "film_mm")]
+    pub film_distance_mm: f64,
     /// The film.
     pub film: FilmData,
     /// The scene.
@@ -121,7 +122,7 @@ impl RunReport {
             dioptric: env!("CARGO_PKG_VERSION"),
             camera: capture.camera.clone(),
             lens: statistics::lens_data(capture, places.corner_tan())?,
-            film_mm: place.film_distance_mm,
+            film_distance_mm: place.film_distance_mm,
             film: FilmData { columns: place.columns, rows: place.rows, pitch_um: place.pitch_um },
             scene: SceneData {
                 name: scene.name.clone(),

@@ -6,7 +6,7 @@ use ndarray::Array2;
 use serde::Serialize;
 
 use crate::psf::spot::Spot;
-use crate::{LensData, LensQuestion};
+use crate::{LensData, LensInfoRequest};
 use dioptric_pipeline::{Capture, Frames, PipelineError, REFERENCE_WAVELENGTH_NM};
 
 /// Bins of a histogram of digital numbers.
@@ -193,7 +193,7 @@ fn loss_row(mono: &MonoLens, film_distance_mm: f64, field_tan: DVec2, dioptres: 
 
 /// The lens as it was used.
 pub(super) fn lens_data(capture: &Capture, corner_tan: f64) -> Result<LensData, PipelineError> {
-    let question = LensQuestion {
+    let question = LensInfoRequest {
         wavelength_nm: REFERENCE_WAVELENGTH_NM,
         distance_mm: capture.place.focus_distance_mm,
         field_deg: corner_tan.atan().to_degrees(),

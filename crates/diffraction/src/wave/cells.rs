@@ -25,7 +25,7 @@ pub(crate) struct PupilCells {
     pub(crate) z_mm: f64,
     /// A place within the pupil's outer edge.
     pub(crate) center_mm: DVec2,
-    /// Half the distance of the neighbours that derivatives are taken from, mm.
+    /// Half the distance of the neighbors that derivatives are taken from, mm.
     step_mm: f64,
 }
 
@@ -78,22 +78,22 @@ impl PupilCells {
         self.targets_mm.len()
     }
 
-    /// Traces the nodes to the film, and after them their neighbours towards +x, −x, +y and −y.
+    /// Traces the nodes to the film, and after them their neighbors towards +x, −x, +y and −y.
     pub(super) fn trace(
         &self,
         lens: &MonoLens,
         point: &ObjectPoint,
-        film_mm: f64,
+        film_distance_mm: f64,
     ) -> Result<FilmRays, DiffractionError> {
         let steps = [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|u| u * self.step_mm);
         let targets_mm: Vec<DVec2> =
             steps.iter().flat_map(|step| self.targets_mm.iter().map(move |target| target + step)).collect();
         let mut rays = lens.rays_towards(point, &targets_mm, self.z_mm, 0.0);
         lens.trace(&mut rays, Vignetting::Off);
-        lens.to_film(&mut rays, film_mm);
+        lens.to_film(&mut rays, film_distance_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         match n_lost {
-            0 => Ok(FilmRays::new(&rays, lens, film_mm)),
+            0 => Ok(FilmRays::new(&rays, lens, film_distance_mm)),
             _ => Err(DiffractionError::LostRays { wavelength_nm: lens.wavelength_nm(), n_lost, n_rays }),
         }
     }
@@ -133,7 +133,7 @@ const MOST_AZIMUTHS: usize = 1024;
 /// Finds the pupil and the azimuths of its nodes: equally spaced where the edge is smooth, Gauss and Legendre's between
 /// corners where it has any. A pupil that is long and narrow takes as many more as it needs.
 ///
-/// About the centre of an ellipse of axes a and b, ρ² has harmonics of 2θ that fall like ((a − b) / (a + b))ᵏ, so that
+/// About the center of an ellipse of axes a and b, ρ² has harmonics of 2θ that fall like ((a − b) / (a + b))ᵏ, so that
 /// sums over n azimuths err by the (n / 2)-th of them.
 fn azimuths(lens: &MonoLens, point: &ObjectPoint, grid: PupilGrid) -> Option<(PupilBoundary, Vec<Spoke>)> {
     let mut boundary = PupilBoundary::find(lens, point, grid.n_azimuths)?;

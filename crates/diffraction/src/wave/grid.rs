@@ -3,7 +3,7 @@
 /// How many nodes a pupil has: Gauss–Legendre along the radius, equally spaced in azimuth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PupilGrid {
-    /// Nodes from the centre to the edge.
+    /// Nodes from the center to the edge.
     pub n_radii: usize,
     /// Azimuths.
     pub n_azimuths: usize,
@@ -55,7 +55,7 @@ impl PupilGrid {
     }
 }
 
-/// How far phases range from the pupil's centre to its edge, in radians.
+/// How far phases range from the pupil's center to its edge, in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseRange {
     /// By the rays' places on the film about their centroid, `(2π/λ) NA q_max`: defocus and aberrations.

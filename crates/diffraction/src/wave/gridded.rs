@@ -272,7 +272,7 @@ fn shape(t: f64) -> f64 {
     if u.abs() <= 1.0 { (BETA * ((1.0 - u * u).sqrt() - 1.0)).exp() } else { 0.0 }
 }
 
-/// The window between neighbouring grid points: polynomials in `2 t − 1`, the highest power first.
+/// The window between neighboring grid points: polynomials in `2 t − 1`, the highest power first.
 static PIECES: LazyLock<[[f32; WIDTH]; TERMS]> = LazyLock::new(|| {
     let mut terms = [[0.0_f32; WIDTH]; TERMS];
     for piece in 0..WIDTH {

@@ -30,7 +30,7 @@ pub struct PupilOutline<'a> {
 /// The light of one object point at one wavelength on the film, as smooth functions over its pupil: polynomials of
 /// degree 12 for the directions behind the lens, the angular eikonal Φ and the brightness, and the pupil's edge.
 ///
-/// Maps of neighbouring fields, depths and wavelengths can be added with weights ([`mix`](Self::mix)), and nodes for
+/// Maps of neighboring fields, depths and wavelengths can be added with weights ([`mix`](Self::mix)), and nodes for
 /// the wave sum be taken from them in any number ([`nodes`](Self::nodes)). The field lies along +x of the film's frame;
 /// the pupil is then symmetric about x. Coordinates over the pupil count from its middle in units of twice its rms
 /// width and height, so that pupils of different vignetting correspond.
@@ -87,7 +87,7 @@ fn span(function: usize) -> (Parity, std::ops::Range<usize>) {
 }
 
 impl PupilFunctionFit {
-    /// Traces the light of a point in a field along x to the film, `film_mm` behind the last vertex, and fits it.
+    /// Traces the light of a point in a field along x to the film, `film_distance_mm` behind the last vertex, and fits it.
     ///
     /// # Errors
     /// When rays within the pupil are lost, all run in one direction, or the pupil is one of few Fresnel zones, whose
@@ -95,12 +95,12 @@ impl PupilFunctionFit {
     pub fn trace(
         lens: &MonoLens,
         point: &ObjectPoint,
-        film_mm: f64,
+        film_distance_mm: f64,
         edge: PupilOutline<'_>,
     ) -> Result<Self, DiffractionError> {
         let wavelength_nm = lens.wavelength_nm();
         let folded = DiffractionError::Folded { wavelength_nm };
-        if has_few_zones(lens, film_mm) {
+        if has_few_zones(lens, film_distance_mm) {
             return Err(folded);
         }
         // Trace rays through half the pupil, which the other half mirrors.
@@ -108,7 +108,7 @@ impl PupilFunctionFit {
         let (targets_mm, areas, places) = edge.places(half_mm);
         let mut rays = lens.rays_towards(point, &targets_mm, edge.z_mm, 0.0);
         lens.trace(&mut rays, Vignetting::Off);
-        lens.to_film(&mut rays, film_mm);
+        lens.to_film(&mut rays, film_distance_mm);
         let (n_rays, n_lost) = (rays.len(), rays.len() - rays.n_in_flight());
         if n_lost > 0 {
             return Err(DiffractionError::LostRays { wavelength_nm, n_lost, n_rays });
@@ -120,7 +120,7 @@ impl PupilFunctionFit {
         let half_collected: f64 = taken.iter().sum();
         // The other half of the pupil mirrors this one.
         // The waves that the rays stand for, about the centroid (eqs. 1 to 4).
-        let rays = FilmRays::new(&rays, lens, film_mm);
+        let rays = FilmRays::new(&rays, lens, film_distance_mm);
         let moment_mm = taken.iter().enumerate().map(|(i, e)| e * rays.place_mm(i).x).sum::<f64>();
         let centroid_x_mm = moment_mm / half_collected;
         let waves = Waves::of(&rays, DVec2::new(centroid_x_mm, 0.0));
@@ -188,7 +188,7 @@ impl PupilFunctionFit {
         let (p0, p1, p2, p3) = (at(below - 1), at(below), at(below + 1), at(below + 2));
         let cubic =
             p1 + 0.5 * t * (p2 - p0 + t * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + t * (3.0 * (p1 - p2) + p3 - p0)));
-        // At a kink a cubic may overshoot; the neighbours bound it.
+        // At a kink a cubic may overshoot; the neighbors bound it.
         cubic.clamp(0.98 * p1.min(p2), 1.02 * p1.max(p2))
     }
 
@@ -320,11 +320,11 @@ impl PupilFunctionFit {
         (rows, columns): (usize, usize),
     ) -> Result<WavePsf, DiffractionError> {
         let window = WaveWindow { pitch_um, rows, columns, center: WindowCenter::Centroid };
-        let reach_mm = window.check()?;
+        let extent_mm = window.check()?;
         ROOM.with_borrow_mut(|room| {
             // A few nodes tell how many are needed.
             self.fill(room, PupilGrid { n_radii: 8, n_azimuths: 32 }, wavelength_nm, turn)?;
-            while let Some(grid) = room.nodes.finer_grid(reach_mm)? {
+            while let Some(grid) = room.nodes.finer_grid(extent_mm)? {
                 self.fill(room, grid, wavelength_nm, turn)?;
             }
             room.nodes.psf(&WaveWindow { center: WindowCenter::At(room.nodes.reference_mm), ..window }, None)

@@ -54,7 +54,7 @@ pub struct PupilSamples {
 }
 
 impl PupilSamples {
-    /// Traces the nodes of the true, vignetted pupil to the film, `film_mm` behind the last vertex; the reference is
+    /// Traces the nodes of the true, vignetted pupil to the film, `film_distance_mm` behind the last vertex; the reference is
     /// the centroid of the rays, or `reference_mm` on the film.
     ///
     /// # Errors
@@ -62,13 +62,13 @@ impl PupilSamples {
     pub fn trace(
         lens: &MonoLens,
         point: &ObjectPoint,
-        film_mm: f64,
+        film_distance_mm: f64,
         grid: PupilGrid,
         reference_mm: Option<DVec2>,
     ) -> Result<Self, DiffractionError> {
         let wavelength_nm = lens.wavelength_nm();
         let cells = PupilCells::find(lens, point, grid).ok_or(DiffractionError::NoLight { wavelength_nm })?;
-        let rays = cells.trace(lens, point, film_mm)?;
+        let rays = cells.trace(lens, point, film_distance_mm)?;
         let centroid_mm = cells.centroid_mm(&rays);
         let mut waves = Waves::of(&rays, centroid_mm);
         let mut areas = cells.direction_areas(&waves);
@@ -199,15 +199,15 @@ impl PupilSamples {
         self.wavelength_nm * 1e-6 / (2.0 * self.numerical_aperture())
     }
 
-    /// Returns the ranges of the phase over the pupil's radius, for places up to `reach_mm` from the reference.
-    pub fn phase_range(&self, reach_mm: f64) -> PhaseRange {
+    /// Returns the ranges of the phase over the pupil's radius, for places up to `extent_mm` from the reference.
+    pub fn phase_range(&self, extent_mm: f64) -> PhaseRange {
         let per_mm = TAU / (self.wavelength_nm * 1e-6) * self.numerical_aperture();
         let centroid_mm = self.mean(&self.q_x_mm, &self.q_y_mm);
         let spot_mm = largest(&self.q_x_mm, &self.q_y_mm, centroid_mm);
         PhaseRange {
             rays: per_mm * spot_mm,
             along_radius: per_mm * self.widest_along_radius(centroid_mm) / PhaseRange::DEFOCUS_ALONG_RADIUS,
-            window: per_mm * (reach_mm + centroid_mm.length()),
+            window: per_mm * (extent_mm + centroid_mm.length()),
         }
     }
 
@@ -221,12 +221,12 @@ impl PupilSamples {
         azimuths.map(|(x, y)| widest(x, y, &weights, from_mm)).fold(0.0, f64::max).sqrt()
     }
 
-    /// Checks the node rule for places up to `reach_mm` from the reference, and returns B.
+    /// Checks the node rule for places up to `extent_mm` from the reference, and returns B.
     ///
     /// # Errors
     /// When there are fewer nodes than B needs.
-    pub fn check(&self, reach_mm: f64) -> Result<f64, DiffractionError> {
-        let range = self.phase_range(reach_mm);
+    pub fn check(&self, extent_mm: f64) -> Result<f64, DiffractionError> {
+        let range = self.phase_range(extent_mm);
         let needed = PupilGrid::needed(range);
         if self.grid.covers(needed) {
             return Ok(range.total());
@@ -255,9 +255,9 @@ impl PupilSamples {
 
     /// Returns the irradiance at one film point, per mm² for unit transmitted energy: the sum written out, in double
     /// precision.
-    pub fn irradiance_per_mm2(&self, film_mm: DVec2) -> f64 {
+    pub fn irradiance_per_mm2(&self, on_film_mm: DVec2) -> f64 {
         let waves = self.plane_waves(DVec2::ZERO);
-        let at = film_mm - self.reference_mm;
+        let at = on_film_mm - self.reference_mm;
         let (mut re, mut im) = (0.0, 0.0);
         for j in 0..self.len() {
             let (c, s) = super::cis::cis(waves.turns_x_per_mm[j] * at.x + waves.turns_y_per_mm[j] * at.y);

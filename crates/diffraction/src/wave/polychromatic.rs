@@ -18,7 +18,7 @@ use crate::DiffractionError;
 pub fn polychromatic_psf(
     lens: &Lens,
     point: &ObjectPoint,
-    film_mm: f64,
+    film_distance_mm: f64,
     window: &WaveWindow,
     spectrum: &[(f64, f64)],
     quality: WaveQuality,
@@ -29,17 +29,17 @@ pub fn polychromatic_psf(
     }
     let mut centroid_mm = DVec2::ZERO;
     for &(wavelength_nm, weight) in spectrum {
-        let nodes = PupilSamples::trace(&lens.at(wavelength_nm)?, point, film_mm, PupilGrid::STANDARD, None)?;
+        let nodes = PupilSamples::trace(&lens.at(wavelength_nm)?, point, film_distance_mm, PupilGrid::STANDARD, None)?;
         centroid_mm += nodes.centroid_mm() * (weight / total);
     }
     let center_mm = match window.center {
         WindowCenter::Centroid => centroid_mm,
-        WindowCenter::At(film_mm) => film_mm,
+        WindowCenter::At(film_distance_mm) => film_distance_mm,
     };
     let window = WaveWindow { center: WindowCenter::At(center_mm), ..*window };
     let mut sum: Option<WavePsf> = None;
     for &(wavelength_nm, weight) in spectrum {
-        let mut psf = wave_psf(&lens.at(wavelength_nm)?, point, film_mm, &window, quality)?;
+        let mut psf = wave_psf(&lens.at(wavelength_nm)?, point, film_distance_mm, &window, quality)?;
         psf.samples *= weight / total;
         match &mut sum {
             None => sum = Some(psf),

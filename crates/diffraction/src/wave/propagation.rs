@@ -18,9 +18,9 @@ pub enum Propagation {
 const FEW_FRESNEL_ZONES: f64 = 30.0;
 
 /// Whether the exit pupil is so small and far, or the lens so weak, that its waves are not gathered where its rays are.
-pub(super) fn has_few_zones(lens: &MonoLens, film_mm: f64) -> bool {
+pub(super) fn has_few_zones(lens: &MonoLens, film_distance_mm: f64) -> bool {
     let first = lens.first_order();
-    let (radius_mm, way_mm) = (0.5 * first.exit_pupil_diameter_mm, film_mm - first.exit_pupil_z_mm);
+    let (radius_mm, way_mm) = (0.5 * first.exit_pupil_diameter_mm, film_distance_mm - first.exit_pupil_z_mm);
     let zones = first.image_index * radius_mm * radius_mm / (lens.wavelength_nm() * 1e-6 * way_mm.abs());
     // A telecentric lens has a pupil infinitely large and far: no reason for doubt.
     way_mm.is_finite() && (first.power_per_mm == 0.0 || zones < FEW_FRESNEL_ZONES)
@@ -41,15 +41,17 @@ pub(crate) struct FilmRays {
 }
 
 impl FilmRays {
-    /// Takes rays that are on the film, `film_mm` behind the last vertex, into its frame.
-    pub(crate) fn new(rays: &RayBatch, lens: &MonoLens, film_mm: f64) -> Self {
-        let pose = lens.film_pose(film_mm);
+    /// Takes rays that are on the film, `film_distance_mm` behind the last vertex, into its frame.
+    pub(crate) fn new(rays: &RayBatch, lens: &MonoLens, film_distance_mm: f64) -> Self {
+        let placement = lens.film_placement(film_distance_mm);
         let exit_z_mm = lens.first_order().exit_pupil_z_mm;
         Self {
-            points_mm: (0..rays.len()).map(|i| pose.to_own(rays.point_mm(i))).collect(),
-            directions: (0..rays.len()).map(|i| pose.direction_to_own(rays.direction(i))).collect(),
+            points_mm: (0..rays.len()).map(|i| placement.surface_from_lens(rays.point_mm(i))).collect(),
+            directions: (0..rays.len()).map(|i| placement.direction_to_own(rays.direction(i))).collect(),
             opl_mm: rays.opl_mm.clone(),
-            exit_pupil_mm: exit_z_mm.is_finite().then(|| pose.to_own(lens.film_pose(exit_z_mm).vertex_mm)),
+            exit_pupil_mm: exit_z_mm
+                .is_finite()
+                .then(|| placement.surface_from_lens(lens.film_placement(exit_z_mm).vertex_mm)),
             shape: lens.image_surface(),
             image_index: lens.image_index(),
         }

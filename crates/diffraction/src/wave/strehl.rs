@@ -9,7 +9,7 @@ use crate::DiffractionError;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Peak {
     /// Where it is on the film, mm, lens frame.
-    pub film_mm: DVec2,
+    pub on_film_mm: DVec2,
     /// Its height over that of the same amplitudes all in phase: the Strehl ratio.
     pub strehl: f64,
 }
@@ -19,8 +19,8 @@ const LARGEST_SEARCH: usize = 80;
 
 impl PupilSamples {
     /// Returns the irradiance at a film point over that of the same amplitudes all in phase.
-    pub fn strehl_at(&self, film_mm: DVec2) -> f64 {
-        self.irradiance_per_mm2(film_mm) / self.perfect_peak_per_mm2()
+    pub fn strehl_at(&self, on_film_mm: DVec2) -> f64 {
+        self.irradiance_per_mm2(on_film_mm) / self.perfect_peak_per_mm2()
     }
 
     /// Finds the highest point of the point spread function on the film, and the Strehl ratio there.
@@ -35,16 +35,16 @@ impl PupilSamples {
         let nodes = self.clone().about(self.centroid_mm());
         let spot_mm = nodes.q_x_mm.iter().zip(&nodes.q_y_mm).map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max);
         let wanted = ((spot_mm / unit_mm + 1.5) * 4.0).ceil().min(LARGEST_SEARCH as f64) as usize;
-        let reach_mm = |half: usize| (half as f64 + 0.5) * 0.25 * unit_mm * std::f64::consts::SQRT_2;
-        let half = (6..=wanted).rev().find(|&half| nodes.check(reach_mm(half)).is_ok()).unwrap_or(6);
-        nodes.check(reach_mm(half))?;
+        let extent_mm = |half: usize| (half as f64 + 0.5) * 0.25 * unit_mm * std::f64::consts::SQRT_2;
+        let half = (6..=wanted).rev().find(|&half| nodes.check(extent_mm(half)).is_ok()).unwrap_or(6);
+        nodes.check(extent_mm(half))?;
         let axis = SampleAxis::new(2 * half + 1, 0.25 * unit_mm, 1);
         let lattice = transform::mean_square(&nodes.plane_waves(DVec2::ZERO), &axis, &axis);
         let highest = lattice.indexed_iter().max_by(|a, b| a.1.total_cmp(b.1));
         let (row, column) = highest.map_or((half, half), |(place, _)| place);
         let place = |i: usize| (i as f64 - half as f64) * 0.25 * unit_mm;
-        let film_mm = nodes.climb(nodes.reference_mm + DVec2::new(place(column), place(row)), unit_mm);
-        Ok(Peak { film_mm, strehl: nodes.strehl_at(film_mm) })
+        let on_film_mm = nodes.climb(nodes.reference_mm + DVec2::new(place(column), place(row)), unit_mm);
+        Ok(Peak { on_film_mm, strehl: nodes.strehl_at(on_film_mm) })
     }
 
     /// Goes from a point near a summit to the summit.

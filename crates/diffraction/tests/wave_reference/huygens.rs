@@ -25,19 +25,19 @@ fn l1(found: &[f64], expected: &[f64]) -> f64 {
 
 /// Compares both sums about the centroid of the light; `false` where there are too many phases.
 #[track_caller]
-fn compare(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, what: &str) -> bool {
-    let Ok(nodes) = PupilSamples::trace(lens, point, film_mm, PupilGrid::STANDARD, None) else { return false };
+fn compare(lens: &MonoLens, point: &ObjectPoint, film_distance_mm: f64, what: &str) -> bool {
+    let Ok(nodes) = PupilSamples::trace(lens, point, film_distance_mm, PupilGrid::STANDARD, None) else { return false };
     let pitch_um = 6e3 * nodes.airy_unit_mm() / (N - 1) as f64;
     let window = WaveWindow { pitch_um, rows: N, columns: N, center: WindowCenter::Centroid };
     let quality = WaveQuality { points_per_pixel: Some(1), ..WaveQuality::default() };
-    let psf = match wave_psf(lens, point, film_mm, &window, quality) {
+    let psf = match wave_psf(lens, point, film_distance_mm, &window, quality) {
         Ok(psf) if psf.bandwidth <= BANDWIDTH => psf,
         _ => return false,
     };
     let places: Vec<DVec2> = psf.samples.indexed_iter().map(|((row, column), _)| psf.pixel_mm(row, column)).collect();
     let found: Vec<f64> = psf.samples.iter().map(|share| share / (pitch_um * 1e-3).powi(2)).collect();
     let sum = |n_across: usize| {
-        let sources = HuygensSources::trace(lens, point, film_mm, psf.center_mm, n_across).unwrap();
+        let sources = HuygensSources::trace(lens, point, film_distance_mm, psf.center_mm, n_across).unwrap();
         sources.irradiance_per_mm2(&places)
     };
     let n = (1.1 * psf.bandwidth).max(48.0) as usize;
@@ -55,8 +55,13 @@ fn compare_stopped(lens: &Lens, wavelength_nm: f64, what: &str, at: impl Fn(&Mon
     for steps in 0..9 {
         let stopped = lens.clone().with_stop_diameter_mm(full_mm * 0.75f64.powi(steps)).unwrap();
         let lens = stopped.at(wavelength_nm).unwrap();
-        let Some((point, film_mm)) = at(&lens) else { break };
-        if compare(&lens, &point, film_mm, &format!("{what}, {wavelength_nm} nm, stop {:.2}", 0.75f64.powi(steps))) {
+        let Some((point, film_distance_mm)) = at(&lens) else { break };
+        if compare(
+            &lens,
+            &point,
+            film_distance_mm,
+            &format!("{what}, {wavelength_nm} nm, stop {:.2}", 0.75f64.powi(steps)),
+        ) {
             return;
         }
     }
@@ -86,7 +91,7 @@ const FIELDS: [(&str, f64, f64); 16] = [
 /// The point at a field of a lens, and the film on which the axis is sharp.
 fn point_and_film(lens: &MonoLens, field_tan: DVec2, distance_mm: f64) -> Option<(ObjectPoint, f64)> {
     let dioptres = 1e3 / (distance_mm + lens.projection_center_z_mm());
-    Some((ObjectPoint::from_field(lens, field_tan, dioptres), lens.film_mm_for(distance_mm).ok()?))
+    Some((ObjectPoint::from_field(lens, field_tan, dioptres), lens.film_distance_mm_for(distance_mm).ok()?))
 }
 
 #[test]
@@ -120,7 +125,7 @@ fn far_points_and_sharp_corners() {
             let point = ObjectPoint::from_field(lens, field_tan, 0.0);
             let corners = PupilBoundary::find(lens, &point, 64)?.corners_rad(lens, &point);
             assert!(corners.len() >= n_corners, "{name}: {corners:?}");
-            Some((point, lens.film_mm_for(f64::INFINITY).ok()?))
+            Some((point, lens.film_distance_mm_for(f64::INFINITY).ok()?))
         });
     }
 }
@@ -150,12 +155,12 @@ fn images_in_a_medium() {
 fn every_reference_lens() {
     for name in NAMES {
         let (Some(reference), Some(psf)) = (Reference::open(name), json(&format!("{name}.psf"))) else { return };
-        let film_mm = number(&psf["image_z"]) - reference.lens.last_vertex_z_mm();
+        let film_distance_mm = number(&psf["image_z"]) - reference.lens.last_vertex_z_mm();
         for (field, wavelength_nm) in [(0.0, 650.0), (1.0, 450.0)] {
             let row = serde_json::json!({ "field": [0.0, field] });
             let point = reference.point(&row);
             compare_stopped(&reference.lens, wavelength_nm, &format!("{name} at {field} of its field"), |_| {
-                Some((point, film_mm))
+                Some((point, film_distance_mm))
             });
         }
     }

@@ -69,7 +69,7 @@ impl Reference {
             assert_eq!(rays.n_in_flight(), rays.len(), "an aim is lost");
             (0..rays.len()).map(|i| rays.point_mm(i).truncate() - wanted[i]).collect()
         };
-        // The pupil of a wide lens moves with the field; the centre of the true one is a good start.
+        // The pupil of a wide lens moves with the field; the center of the true one is a good start.
         let start = PupilBoundary::find(&mono, point, 64).unwrap().center_mm();
         let mut targets = vec![start; wanted.len()];
         for _ in 0..40 {

@@ -23,8 +23,8 @@ fn wavefronts_agree_with_fifty_digits() {
             let targets: Vec<DVec2> = pupil.iter().map(|p| reference.target_mm(&point, *p)).collect();
             let mut rays = rays_towards(&point, &targets, reference.pupil_z_mm, 0.0);
             mono.trace(&mut rays, Vignetting::Off);
-            let film_mm = image_z_mm - mono.last_vertex_z_mm();
-            mono.to_film(&mut rays, film_mm);
+            let film_distance_mm = image_z_mm - mono.last_vertex_z_mm();
+            mono.to_film(&mut rays, film_distance_mm);
             // The first pupil point is the chief ray's.
             let own = ReferenceSphere::through_exit_pupil(&mono, rays.point_mm(0));
             let radius_mm = number(&row["reference_radius_mm"]).copysign(own.radius_mm);

@@ -4,7 +4,7 @@
 //! cuts the rim in squares; its own README trusts it to 1 % at best, and only where the wavefront on the axis is below half a
 //! wave, which leaves out three lenses and the asphere off its axis.
 //!
-//! Its 32 squares along the radius follow phases of 32 π = 100 radians; where there are more, neighbouring squares are out of
+//! Its 32 squares along the radius follow phases of 32 π = 100 radians; where there are more, neighboring squares are out of
 //! step and the row is not the point spread function. Of 38 rows 20 have fewer, and agree. Eight have up to 160 and
 //! still agree within 5 %; ten have more, up to 1,800, and are off by .08 to .99 of their light.
 //! All 18 are held to two things: the same squares with our rays give the row, so it is the squares that are wrong; and
@@ -56,7 +56,7 @@ impl Expected {
         WaveWindow { pitch_um: self.pitch_mm * 1e3, rows: self.n, columns: self.n, center: WindowCenter::At(center_mm) }
     }
 
-    fn reach_mm(&self) -> f64 {
+    fn extent_mm(&self) -> f64 {
         self.pitch_mm * self.n as f64 / 2f64.sqrt()
     }
 
@@ -92,16 +92,16 @@ struct Case<'a> {
     reference: &'a Reference,
     lens: MonoLens,
     point: ObjectPoint,
-    film_mm: f64,
+    film_distance_mm: f64,
     sphere: ReferenceSphere,
 }
 
 impl<'a> Case<'a> {
-    fn new(reference: &'a Reference, row: &Value, film_mm: f64) -> Self {
+    fn new(reference: &'a Reference, row: &Value, film_distance_mm: f64) -> Self {
         let (lens, point) = (reference.at(row), reference.point(row));
-        let chief = on_film(reference, (&lens, &point), &[reference.target_mm(&point, DVec2::ZERO)], film_mm);
+        let chief = on_film(reference, (&lens, &point), &[reference.target_mm(&point, DVec2::ZERO)], film_distance_mm);
         let sphere = ReferenceSphere::through_exit_pupil(&lens, chief.point_mm(0));
-        Self { reference, lens, point, film_mm, sphere }
+        Self { reference, lens, point, film_distance_mm, sphere }
     }
 
     fn chief_mm(&self) -> DVec2 {
@@ -111,7 +111,7 @@ impl<'a> Case<'a> {
     /// Returns nodes as the reference has them: one amplitude for all of the pupil, given shares of it at some places.
     fn even_nodes(&self, places: &[(DVec2, f64)], grid: PupilGrid) -> PupilSamples {
         let targets: Vec<DVec2> = self.reference.targets_mm(&self.point, places.iter().map(|(place, _)| *place));
-        let rays = on_film(self.reference, (&self.lens, &self.point), &targets, self.film_mm);
+        let rays = on_film(self.reference, (&self.lens, &self.point), &targets, self.film_distance_mm);
         assert_eq!(rays.n_in_flight(), rays.len());
         let q = |i: usize| rays.point_mm(i).truncate() - self.chief_mm();
         let share: Vec<f64> = places.iter().map(|(_, share)| *share).collect();
@@ -155,11 +155,11 @@ fn on_film(
     reference: &Reference,
     (lens, point): (&MonoLens, &ObjectPoint),
     targets: &[DVec2],
-    film_mm: f64,
+    film_distance_mm: f64,
 ) -> RayBatch {
     let mut rays = rays_towards(point, targets, reference.pupil_z_mm, 0.0);
     lens.trace(&mut rays, Vignetting::Off);
-    lens.to_film(&mut rays, film_mm);
+    lens.to_film(&mut rays, film_distance_mm);
     rays
 }
 
@@ -167,11 +167,11 @@ fn on_film(
 fn trusted_rows() -> Vec<(Reference, f64, Vec<Value>)> {
     let open = |name: &&str| {
         let (reference, file) = (Reference::open(name)?, json(&format!("{name}.psf"))?);
-        let film_mm = number(&file["image_z"]) - reference.lens.last_vertex_z_mm();
+        let film_distance_mm = number(&file["image_z"]) - reference.lens.last_vertex_z_mm();
         let is_trusted = number(&file["on_axis_rms_wavefront_waves"]) < 0.5;
         let is_on_axis = |row: &&Value| numbers(&row["field"]) == [0.0, 0.0];
         let rows = file["rows"].as_array().unwrap().iter().filter(|row| *name != "asphere_al1815c" || is_on_axis(row));
-        is_trusted.then(|| (reference, film_mm, rows.cloned().collect()))
+        is_trusted.then(|| (reference, film_distance_mm, rows.cloned().collect()))
     };
     NAMES.iter().filter_map(open).collect()
 }
@@ -180,10 +180,10 @@ fn trusted_rows() -> Vec<(Reference, f64, Vec<Value>)> {
 #[dioptric_golden::needs_shared]
 fn sums_over_the_same_pupil_agree_on_and_off_axis() {
     let (mut n_compared, mut n_too_coarse) = (0, 0);
-    for (reference, film_mm, rows) in trusted_rows() {
+    for (reference, film_distance_mm, rows) in trusted_rows() {
         for row in &rows {
-            let (case, expected) = (Case::new(&reference, row, film_mm), Expected::of(row));
-            let range = case.polar(PupilGrid::STANDARD).phase_range(expected.reach_mm());
+            let (case, expected) = (Case::new(&reference, row, film_distance_mm), Expected::of(row));
+            let range = case.polar(PupilGrid::STANDARD).phase_range(expected.extent_mm());
             let what =
                 format!("{} {} {} B {:.0}", reference.lens.name(), row["field"], row["wavelength_nm"], range.total());
             let nodes = case.polar(PupilGrid::needed(range.scaled(1.1)).scaled(1.1));
@@ -220,17 +220,18 @@ fn sums_over_the_same_pupil_agree_on_and_off_axis() {
 #[dioptric_golden::needs_shared]
 fn psfs_of_the_vignetted_pupil_agree_on_axis() {
     let mut n_compared = 0;
-    for (reference, film_mm, rows) in trusted_rows() {
+    for (reference, film_distance_mm, rows) in trusted_rows() {
         for row in rows.iter().filter(|row| numbers(&row["field"]) == [0.0, 0.0]) {
             let (mono, point, expected) = (reference.at(row), reference.point(row), Expected::of(row));
             let window = expected.window(DVec2::ZERO);
-            let nodes = PupilSamples::trace(&mono, &point, film_mm, PupilGrid::STANDARD, Some(DVec2::ZERO)).unwrap();
-            let reach_mm = expected.reach_mm();
-            if nodes.phase_range(reach_mm).total() > TRUSTED_BANDWIDTH {
+            let nodes =
+                PupilSamples::trace(&mono, &point, film_distance_mm, PupilGrid::STANDARD, Some(DVec2::ZERO)).unwrap();
+            let extent_mm = expected.extent_mm();
+            if nodes.phase_range(extent_mm).total() > TRUSTED_BANDWIDTH {
                 continue;
             }
             let points = WaveQuality { points_per_pixel: Some(1), ..WaveQuality::default() };
-            let psf = wave_psf(&mono, &point, film_mm, &window, points).unwrap();
+            let psf = wave_psf(&mono, &point, film_distance_mm, &window, points).unwrap();
             let found = psf.in_film_frame() / (expected.pitch_mm.powi(2) * nodes.perfect_peak_per_mm2());
             expected.check(&found, &format!("{} {}", reference.lens.name(), row["wavelength_nm"]));
             n_compared += 1;

@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let domain = PsfDomain {
         lens: &lens,
         film: &film,
-        film_mm: mono.film_mm_for(focus_mm)?,
+        film_distance_mm: mono.film_distance_mm_for(focus_mm)?,
         depth_range_m: scene.require_depth()?.range_m(),
         grid: scene.radiance.grid(),
         diffraction: Diffraction::Hurb { gamma: 1.0 },

@@ -89,7 +89,7 @@ impl<'a> CloseRays<'a> {
         if rays.n_in_flight() < targets_mm.len() {
             return None;
         }
-        let turn = lens.film_pose(0.0).rotation.transpose();
+        let turn = lens.film_placement(0.0).rotation.transpose();
         let slope = |of: &dyn Fn(usize) -> DVec2| 8.0 * (of(2) - of(1)) - (of(3) - of(0));
         let place = slope(&|i| lens.on_film_mm(rays.point_mm(i), 0.0));
         let tangent = slope(&|i| {

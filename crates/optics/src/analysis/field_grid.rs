@@ -14,18 +14,19 @@ const SMALL_TAN: f64 = 1e-4;
 /// from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StraightMap {
-    /// Where the middle of the field lies on the film, mm, lens frame (the film's own where it is tilted or decentred).
+    /// Where the middle of the field lies on the film, mm, lens frame (the film's own where it is tilted or decentered).
     pub center_mm: DVec2,
     /// Movement on the film, mm, for a unit change of the tangents of the field along x and y.
     pub scale_mm: DMat2,
 }
 
 impl StraightMap {
-    /// Takes the map from real chief rays of small fields, for points `dioptres` = 1/Z away, on a film `film_mm` behind
+    /// Takes the map from real chief rays of small fields, for points `dioptres` = 1/Z away, on a film `film_distance_mm` behind
     /// the last vertex; `None` if there are no such rays.
-    pub fn of(lens: &MonoLens, dioptres: f64, film_mm: f64) -> Option<Self> {
-        let chief_mm =
-            |field_tan: DVec2| lens.chief_film_point_mm(&ObjectPoint::from_field(lens, field_tan, dioptres), film_mm);
+    pub fn of(lens: &MonoLens, dioptres: f64, film_distance_mm: f64) -> Option<Self> {
+        let chief_mm = |field_tan: DVec2| {
+            lens.chief_film_point_mm(&ObjectPoint::from_field(lens, field_tan, dioptres), film_distance_mm)
+        };
         let slope_mm = |direction: DVec2| {
             let [ahead_mm, behind_mm] = [SMALL_TAN, -SMALL_TAN].map(|tan| chief_mm(direction * tan));
             Some((ahead_mm? - behind_mm?) / (2.0 * SMALL_TAN))
@@ -58,16 +59,16 @@ mod tests {
     #[test]
     fn a_round_lens_has_its_paraxial_scale_and_distortion() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
-        let film_mm = lens.film_mm_for(f64::INFINITY).unwrap();
-        let map = StraightMap::of(&lens, 0.0, film_mm).unwrap();
+        let film_distance_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
+        let map = StraightMap::of(&lens, 0.0, film_distance_mm).unwrap();
         let expected = DMat2::from_diagonal(DVec2::splat(-lens.first_order().efl_mm));
         // Distortion over small fields: 1e-8 of the field squared, times some.
         assert!((map.scale_mm - expected).abs().to_cols_array().iter().all(|v| *v < 1e-5), "{map:?}");
         assert!(map.center_mm.length() < 1e-12);
         let tan = DVec2::new(0.12, 0.16);
         let point = ObjectPoint::from_field(&lens, tan, 0.0);
-        let found = map.relative(tan, lens.chief_film_point_mm(&point, film_mm).unwrap());
-        let round = Distortion::of(&lens, (0.2, 0.0), film_mm, Projection::Tangent).unwrap().relative();
+        let found = map.relative(tan, lens.chief_film_point_mm(&point, film_distance_mm).unwrap());
+        let round = Distortion::of(&lens, (0.2, 0.0), film_distance_mm, Projection::Tangent).unwrap().relative();
         assert!((found - round).abs() < 1e-7, "{found} {round}");
     }
 
@@ -93,8 +94,10 @@ mod tests {
         assert!((foci.x_mm / first_x.bfl_mm - 1.0).abs() < 1e-9 && (foci.y_mm / first_y.bfl_mm - 1.0).abs() < 1e-9);
         assert!((lens.conjugate_x(f64::INFINITY).image_z_mm / first_x.bfl_mm - 1.0).abs() < 1e-14);
         // In the rear focal plane of one direction the scale along it is its focal length.
-        for (film_mm, axis, efl_mm) in [(first_x.bfl_mm, 0, first_x.efl_mm), (first_y.bfl_mm, 1, first_y.efl_mm)] {
-            let map = StraightMap::of(&lens, 0.0, film_mm).unwrap();
+        for (film_distance_mm, axis, efl_mm) in
+            [(first_x.bfl_mm, 0, first_x.efl_mm), (first_y.bfl_mm, 1, first_y.efl_mm)]
+        {
+            let map = StraightMap::of(&lens, 0.0, film_distance_mm).unwrap();
             assert!((map.scale_mm.col(axis)[axis] / -efl_mm - 1.0).abs() < 1e-6, "{map:?} {efl_mm}");
             assert!(map.scale_mm.col(0).y.abs() < 1e-9 && map.scale_mm.col(1).x.abs() < 1e-9);
         }
@@ -117,11 +120,11 @@ mod tests {
         };
         let turned = straight.clone().with_moves(vec![turn]).unwrap();
         let (straight, turned) = (straight.at(550.0).unwrap(), turned.at(550.0).unwrap());
-        let pose = turned.film_pose(0.0);
+        let placement = turned.film_placement(0.0);
         for tan in [DVec2::ZERO, DVec2::new(0.1, -0.05)] {
             let direction = glam::DVec3::new(-tan.x, -tan.y, 1.0).normalize();
             let here = ObjectPoint::Infinite(direction);
-            let there = ObjectPoint::Infinite(pose.rotation * direction);
+            let there = ObjectPoint::Infinite(placement.rotation * direction);
             let chief = |lens: &MonoLens, point| lens.chief_film_point_mm(point, 46.0).unwrap();
             let apart_mm = chief(&straight, &here) - chief(&turned, &there);
             assert!(apart_mm.length() < 1e-9, "{apart_mm}");

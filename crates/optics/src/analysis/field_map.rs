@@ -1,4 +1,4 @@
-//! Where real chief rays land: distortion and lateral colour.
+//! Where real chief rays land: distortion and lateral color.
 
 use glam::{DMat2, DVec2};
 
@@ -24,7 +24,7 @@ pub struct Distortion {
 }
 
 impl Distortion {
-    /// Returns the distortion of a field on a film `film_mm` behind the last vertex; `None` if no ray passes the middle
+    /// Returns the distortion of a field on a film `film_distance_mm` behind the last vertex; `None` if no ray passes the middle
     /// of the stop.
     ///
     /// The field is the tangent of the angle at the paraxial entrance pupil. The paraxial scale is that of this film and
@@ -32,16 +32,16 @@ impl Distortion {
     pub fn of(
         lens: &MonoLens,
         (field_tan, dioptres): (f64, f64),
-        film_mm: f64,
+        film_distance_mm: f64,
         projection: Projection,
     ) -> Option<Self> {
         let point = ObjectPoint::from_field(lens, DVec2::new(0.0, field_tan), dioptres);
-        let height_mm = -lens.chief_film_point_mm(&point, film_mm)?.y;
+        let height_mm = -lens.chief_film_point_mm(&point, film_distance_mm)?.y;
         let field = match projection {
             Projection::Tangent => field_tan,
             Projection::Angle => field_tan.atan(),
         };
-        Some(Self { height_mm, ideal_mm: field * lens.film_scale_mm(film_mm) })
+        Some(Self { height_mm, ideal_mm: field * lens.film_scale_mm(film_distance_mm) })
     }
 
     /// Returns the relative distortion: 0.01 for an image 1 % too large, −1 for one shrunk to a point; 0 on the axis.
@@ -52,22 +52,23 @@ impl Distortion {
 
 impl MonoLens {
     /// Returns where the ray of a point through the middle of the real stop meets the film as it is curved, mm, in x and y
-    /// of the lens frame (of the film's own, where it is tilted or decentred); rims do not end it. `None` if there is no
+    /// of the lens frame (of the film's own, where it is tilted or decentered); rims do not end it. `None` if there is no
     /// such ray.
     ///
-    /// Its difference between wavelengths is lateral colour.
-    pub fn chief_film_point_mm(&self, point: &ObjectPoint, film_mm: f64) -> Option<DVec2> {
-        self.chief_ray_on_film(point, film_mm).map(|ray| self.on_film_mm(ray.point_mm(0), film_mm))
+    /// Its difference between wavelengths is lateral color.
+    pub fn chief_film_point_mm(&self, point: &ObjectPoint, film_distance_mm: f64) -> Option<DVec2> {
+        self.chief_ray_on_film(point, film_distance_mm).map(|ray| self.on_film_mm(ray.point_mm(0), film_distance_mm))
     }
 
     /// Returns the tangents of the field angles of the point, `dioptres` = 1/Z away, whose ray through the middle of the real
     /// stop meets the film at this place of it, mm; `None` if none is found.
     ///
     /// Newton's method, led from the axis to the place in steps, to 1e-10 of the height.
-    pub fn field_tan_of_image(&self, image_mm: DVec2, film_mm: f64, dioptres: f64) -> Option<DVec2> {
+    pub fn field_tan_of_image(&self, image_mm: DVec2, film_distance_mm: f64, dioptres: f64) -> Option<DVec2> {
         const STEPS: u32 = 8;
         const ROUNDS: usize = 30;
-        let lands_mm = |tan: DVec2| self.chief_film_point_mm(&ObjectPoint::from_field(self, tan, dioptres), film_mm);
+        let lands_mm =
+            |tan: DVec2| self.chief_film_point_mm(&ObjectPoint::from_field(self, tan, dioptres), film_distance_mm);
         let mut tan = DVec2::ZERO;
         for step in 1..=STEPS {
             let goal_mm = image_mm * (f64::from(step) / f64::from(STEPS));
@@ -97,22 +98,22 @@ impl MonoLens {
 
     /// Returns the ray of a point through the middle of the real stop where it meets the film as it is curved; rims do
     /// not end it. `None` if there is no such ray.
-    pub fn chief_ray_on_film(&self, point: &ObjectPoint, film_mm: f64) -> Option<RayBatch> {
+    pub fn chief_ray_on_film(&self, point: &ObjectPoint, film_distance_mm: f64) -> Option<RayBatch> {
         let coordinates = PupilCoordinates::stop(self);
         let sampling = PupilSampling { coordinates, places: vec![DVec2::ZERO], rims: Vignetting::Off };
-        let ray = sampling.rays_on_film(self, point, film_mm);
+        let ray = sampling.rays_on_film(self, point, film_distance_mm);
         ray.fate[0].is_in_flight().then_some(ray)
     }
 
     /// Returns the paraxial image height on a film over the tangent of the field angle at the entrance pupil, mm,
     /// positive for an image upside down: the focal length, for a film in the rear focal plane.
-    pub fn film_scale_mm(&self, film_mm: f64) -> f64 {
+    pub fn film_scale_mm(&self, film_distance_mm: f64) -> f64 {
         let steps = self.steps();
         let matrix = Matrix::of(steps);
         // A ray of slope 1 through the middle of the entrance pupil; where that is infinitely far, of the first vertex.
         let y = -self.projection_center_z_mm();
         let w = steps[0].index_before;
-        matrix.a * y + matrix.b * w + film_mm * (matrix.c * y + matrix.d * w) / self.image_index()
+        matrix.a * y + matrix.b * w + film_distance_mm * (matrix.c * y + matrix.d * w) / self.image_index()
     }
 }
 
@@ -122,21 +123,21 @@ mod tests {
     use crate::Lens;
 
     #[track_caller]
-    fn relative(lens: &MonoLens, field_tan: f64, film_mm: f64, projection: Projection) -> f64 {
-        Distortion::of(lens, (field_tan, 0.0), film_mm, projection).unwrap().relative()
+    fn relative(lens: &MonoLens, field_tan: f64, film_distance_mm: f64, projection: Projection) -> f64 {
+        Distortion::of(lens, (field_tan, 0.0), film_distance_mm, projection).unwrap().relative()
     }
 
     #[test]
     fn field_of_an_image_height_is_that_of_its_chief_ray() {
         for (name, image_mm) in [("dgauss-50mm", DVec2::new(3.0, 15.0)), ("fisheye-12.5mm", DVec2::new(0.0, -14.0))] {
             let lens = Lens::built_in(name).unwrap().at(550.0).unwrap();
-            let film_mm = lens.film_mm_for(1000.0).unwrap();
+            let film_distance_mm = lens.film_distance_mm_for(1000.0).unwrap();
             let dioptres = 1e3 / (1000.0 + lens.projection_center_z_mm());
-            let tan = lens.field_tan_of_image(image_mm, film_mm, dioptres).unwrap();
+            let tan = lens.field_tan_of_image(image_mm, film_distance_mm, dioptres).unwrap();
             let point = ObjectPoint::from_field(&lens, tan, dioptres);
-            let landed_mm = lens.chief_film_point_mm(&point, film_mm).unwrap();
+            let landed_mm = lens.chief_film_point_mm(&point, film_distance_mm).unwrap();
             assert!(landed_mm.distance(image_mm) < 1e-8, "{name}: {landed_mm}");
-            assert_eq!(lens.field_tan_of_image(DVec2::new(0.0, 400.0), film_mm, dioptres), None);
+            assert_eq!(lens.field_tan_of_image(DVec2::new(0.0, 400.0), film_distance_mm, dioptres), None);
         }
     }
 
@@ -156,8 +157,8 @@ mod tests {
     fn scale_is_the_focal_length_in_focus_and_the_magnification_near() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         let first = lens.first_order();
-        let film_mm = lens.film_mm_for(f64::INFINITY).unwrap();
-        assert!((lens.film_scale_mm(film_mm) / first.efl_mm - 1.0).abs() < 1e-13);
+        let film_distance_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
+        assert!((lens.film_scale_mm(film_distance_mm) / first.efl_mm - 1.0).abs() < 1e-13);
         let conjugate = lens.conjugate(500.0);
         let expected = -conjugate.magnification * (500.0 + first.entrance_pupil_z_mm);
         assert!((lens.film_scale_mm(conjugate.image_z_mm) / expected - 1.0).abs() < 1e-13);
@@ -176,10 +177,10 @@ mod tests {
                 chief_slope: field_tan,
             };
             let sums = lens.seidel(&settings).unwrap();
-            let film_mm = mono.film_mm_for(f64::INFINITY).unwrap();
+            let film_distance_mm = mono.film_distance_mm_for(f64::INFINITY).unwrap();
             // δh = S5 / (2 n' u'), h = H / (n' u'): relative S5 / 2H.
             let expected = sums.total.s5 / (2.0 * sums.lagrange_mm);
-            let found = relative(&mono, field_tan, film_mm, Projection::Tangent);
+            let found = relative(&mono, field_tan, film_distance_mm, Projection::Tangent);
             // Fifth order is smaller by the square of the field, times some tens.
             assert!((found / expected - 1.0).abs() < 0.02, "{name}: {found:e} {expected:e}");
         }
@@ -188,8 +189,8 @@ mod tests {
     #[test]
     fn fisheye_keeps_angles_rather_than_straight_lines() {
         let lens = Lens::built_in("fisheye-12.5mm").unwrap().at(550.0).unwrap();
-        let film_mm = lens.film_mm_for(f64::INFINITY).unwrap();
-        let at = |degrees: f64, projection| relative(&lens, degrees.to_radians().tan(), film_mm, projection);
+        let film_distance_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
+        let at = |degrees: f64, projection| relative(&lens, degrees.to_radians().tan(), film_distance_mm, projection);
         assert!(at(85.0, Projection::Tangent) < -0.85);
         assert!(at(80.0, Projection::Angle).abs() < 0.15, "{}", at(80.0, Projection::Angle));
     }

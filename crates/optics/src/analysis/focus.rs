@@ -30,7 +30,7 @@ fn arrived(rays: &RayBatch) -> impl Iterator<Item = usize> {
 }
 
 impl FocusRays {
-    /// Adds a spot: the rays of one point on a flat film, of several wavelengths if its colours are to coincide; all count
+    /// Adds a spot: the rays of one point on a flat film, of several wavelengths if its colors are to coincide; all count
     /// alike.
     pub fn add(&mut self, wavelengths: &[RayBatch]) {
         let ray = |rays: &RayBatch, i: usize| (rays.point_mm(i).truncate(), rays.direction(i).truncate() / rays.n[i]);
@@ -39,12 +39,12 @@ impl FocusRays {
         );
     }
 
-    /// Adds the spot of rays on the film of a lens, `film_mm` behind its last vertex, however it is curved and stands.
-    fn add_on_film(&mut self, lens: &MonoLens, film_mm: f64, wavelengths: &[RayBatch]) {
-        let pose = lens.film_pose(film_mm);
+    /// Adds the spot of rays on the film of a lens, `film_distance_mm` behind its last vertex, however it is curved and stands.
+    fn add_on_film(&mut self, lens: &MonoLens, film_distance_mm: f64, wavelengths: &[RayBatch]) {
+        let placement = lens.film_placement(film_distance_mm);
         let ray = |rays: &RayBatch, i: usize| {
-            let place = lens.on_film_mm(rays.point_mm(i), film_mm);
-            let direction = pose.rotation.transpose() * rays.direction(i);
+            let place = lens.on_film_mm(rays.point_mm(i), film_distance_mm);
+            let direction = placement.rotation.transpose() * rays.direction(i);
             let slope = direction.truncate() / direction.z;
             // As a sloping film moves on, a ray meets it sooner or later.
             (place, slope / (1.0 - slope.dot(lens.image_surface().slope_at(place))))
@@ -97,11 +97,11 @@ impl Autofocus<'_> {
     /// Returns the film's distance behind the last vertex at which the spots are smallest, and their size there, both
     /// mm; `None` if no light gets through, or none that comes to a focus.
     ///
-    /// `film_mm` says from which film the rays are taken; it changes the result by rounding only. A curved film comes to
+    /// `film_distance_mm` says from which film the rays are taken; it changes the result by rounding only. A curved film comes to
     /// rest in a few rounds.
-    pub fn best_film_mm(&self, film_mm: f64) -> Option<(f64, f64)> {
+    pub fn best_film_mm(&self, film_distance_mm: f64) -> Option<(f64, f64)> {
         let is_flat = self.lenses.iter().all(|lens| lens.image_surface().curvature_per_mm == 0.0);
-        let mut best = self.better_film_mm(film_mm)?;
+        let mut best = self.better_film_mm(film_distance_mm)?;
         for _ in 0..if is_flat { 0 } else { ROUNDS } {
             let before_mm = best.0;
             best = self.better_film_mm(before_mm)?;
@@ -113,16 +113,16 @@ impl Autofocus<'_> {
     }
 
     /// Returns the best film as the rays on this one foretell it.
-    fn better_film_mm(&self, film_mm: f64) -> Option<(f64, f64)> {
+    fn better_film_mm(&self, film_distance_mm: f64) -> Option<(f64, f64)> {
         let mut rays = FocusRays::default();
         for point in self.points {
-            let spot = |lens: &MonoLens| self.sampling.rays_on_film(lens, point, film_mm);
+            let spot = |lens: &MonoLens| self.sampling.rays_on_film(lens, point, film_distance_mm);
             if let Some(lens) = self.lenses.first() {
-                rays.add_on_film(lens, film_mm, &self.lenses.iter().map(spot).collect::<Vec<_>>());
+                rays.add_on_film(lens, film_distance_mm, &self.lenses.iter().map(spot).collect::<Vec<_>>());
             }
         }
         let shift_mm = rays.shift_mm()?;
-        Some((film_mm + shift_mm, rays.rms_mm(shift_mm)))
+        Some((film_distance_mm + shift_mm, rays.rms_mm(shift_mm)))
     }
 }
 
@@ -145,8 +145,8 @@ mod tests {
         let lens = Lens::thin(50.0, 10.0).unwrap().at(550.0).unwrap();
         let points = [0.0, 0.2].map(|tan| ObjectPoint::from_field(&lens, DVec2::X * tan, 0.5));
         let focus = Autofocus { lenses: from_ref(&lens), points: &points, sampling: &sampling(&lens) };
-        let (film_mm, rms_mm) = focus.best_film_mm(40.0).unwrap();
-        assert!((film_mm - 1.0 / (1.0 / 50.0 - 1.0 / 2000.0)).abs() < 1e-11);
+        let (film_distance_mm, rms_mm) = focus.best_film_mm(40.0).unwrap();
+        assert!((film_distance_mm - 1.0 / (1.0 / 50.0 - 1.0 / 2000.0)).abs() < 1e-11);
         // What is left is the square root of rounding in squares of 1 mm.
         assert!(rms_mm < 1e-7);
     }
@@ -160,15 +160,15 @@ mod tests {
         let points = [0.0, 0.15, 0.3].map(|tan| ObjectPoint::from_field(&lens, DVec2::Y * tan, 0.0));
         let sampling = sampling(&lens);
         let focus = Autofocus { lenses: from_ref(&lens), points: &points, sampling: &sampling };
-        let (film_mm, rms_mm) = focus.best_film_mm(36.0).unwrap();
-        let found_mm = |film_mm: f64| {
-            let spot = |point| SpotDiagram::trace(&lens, point, film_mm, &sampling).rms_mm().unwrap();
+        let (film_distance_mm, rms_mm) = focus.best_film_mm(36.0).unwrap();
+        let found_mm = |film_distance_mm: f64| {
+            let spot = |point| SpotDiagram::trace(&lens, point, film_distance_mm, &sampling).rms_mm().unwrap();
             (points.iter().map(|point| spot(point).powi(2)).sum::<f64>() / 3.0).sqrt()
         };
-        assert!((found_mm(film_mm) - rms_mm).abs() < 1e-9, "{} {rms_mm}", found_mm(film_mm));
-        assert!(found_mm(film_mm - 0.02) > rms_mm && found_mm(film_mm + 0.02) > rms_mm);
+        assert!((found_mm(film_distance_mm) - rms_mm).abs() < 1e-9, "{} {rms_mm}", found_mm(film_distance_mm));
+        assert!(found_mm(film_distance_mm - 0.02) > rms_mm && found_mm(film_distance_mm + 0.02) > rms_mm);
         // The start matters no more than to the last move.
-        assert!((focus.best_film_mm(34.0).unwrap().0 - film_mm).abs() < 1e-8);
+        assert!((focus.best_film_mm(34.0).unwrap().0 - film_distance_mm).abs() < 1e-8);
     }
 
     #[test]
@@ -177,11 +177,12 @@ mod tests {
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.0, 0.2), 0.0);
         let sampling = sampling(&lens);
         let focus = Autofocus { lenses: from_ref(&lens), points: &[point], sampling: &sampling };
-        let (film_mm, rms_mm) = focus.best_film_mm(36.0).unwrap();
-        assert!((focus.best_film_mm(30.0).unwrap().0 - film_mm).abs() < 1e-11);
-        let spot = |film_mm: f64| SpotDiagram::trace(&lens, &point, film_mm, &sampling).rms_mm().unwrap();
-        assert!((spot(film_mm) - rms_mm).abs() < 1e-12);
-        assert!(spot(film_mm - 0.01) > rms_mm && spot(film_mm + 0.01) > rms_mm);
+        let (film_distance_mm, rms_mm) = focus.best_film_mm(36.0).unwrap();
+        assert!((focus.best_film_mm(30.0).unwrap().0 - film_distance_mm).abs() < 1e-11);
+        let spot =
+            |film_distance_mm: f64| SpotDiagram::trace(&lens, &point, film_distance_mm, &sampling).rms_mm().unwrap();
+        assert!((spot(film_distance_mm) - rms_mm).abs() < 1e-12);
+        assert!(spot(film_distance_mm - 0.01) > rms_mm && spot(film_distance_mm + 0.01) > rms_mm);
     }
 
     #[test]
@@ -193,7 +194,7 @@ mod tests {
         let mut sampling = sampling(&lens);
         sampling.places = hexapolar(60);
         let focus = Autofocus { lenses: from_ref(&lens), points: &[axis], sampling: &sampling };
-        let paraxial_mm = lens.film_mm_for(f64::INFINITY).unwrap();
+        let paraxial_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
         let edge = PupilSampling { places: vec![DVec2::Y], ..sampling.clone() };
         let marginal = edge.rays_on_film(&lens, &axis, paraxial_mm);
         let marginal_mm = paraxial_mm - marginal.y_mm[0] * marginal.n[0] / marginal.m[0];

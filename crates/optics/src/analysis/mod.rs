@@ -1,4 +1,4 @@
-//! Real-ray analysis: spots, fans, field curvature, distortion, colour, illumination and focus.
+//! Real-ray analysis: spots, fans, field curvature, distortion, color, illumination and focus.
 //!
 //! Everything here is computed from exact rays of one [`ObjectPoint`](crate::ObjectPoint) at one wavelength, and holds
 //! for any aperture and field. A ray that cannot be found or does not arrive is `None`, never an error.

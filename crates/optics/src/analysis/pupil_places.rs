@@ -95,11 +95,11 @@ pub struct PupilSampling {
 }
 
 impl PupilSampling {
-    /// Returns the rays of a point on the film as it is curved, `film_mm` behind the last vertex, or where they ended.
-    pub fn rays_on_film(&self, lens: &MonoLens, point: &ObjectPoint, film_mm: f64) -> RayBatch {
+    /// Returns the rays of a point on the film as it is curved, `film_distance_mm` behind the last vertex, or where they ended.
+    pub fn rays_on_film(&self, lens: &MonoLens, point: &ObjectPoint, film_distance_mm: f64) -> RayBatch {
         let mut rays = self.coordinates.rays(lens, point, &self.places);
         lens.trace(&mut rays, self.rims);
-        lens.to_film(&mut rays, film_mm);
+        lens.to_film(&mut rays, film_distance_mm);
         rays
     }
 
@@ -109,7 +109,7 @@ impl PupilSampling {
     }
 }
 
-/// Returns the centre of the pupil and rings about it, the k-th of 6k places beginning on +x: 1 + 3 n (n + 1) places of
+/// Returns the center of the pupil and rings about it, the k-th of 6k places beginning on +x: 1 + 3 n (n + 1) places of
 /// about equal areas.
 pub fn hexapolar(n_rings: usize) -> Vec<DVec2> {
     let ring = |k: usize| {

@@ -14,17 +14,22 @@ pub struct RayFan {
 }
 
 impl RayFan {
-    /// Traces a fan to the film as it is curved, `film_mm` behind the last vertex; `None` if not even the chief ray arrives.
-    pub fn trace(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, sampling: &PupilSampling) -> Option<Self> {
-        let chief = sampling.chief().rays_on_film(lens, point, film_mm);
+    /// Traces a fan to the film as it is curved, `film_distance_mm` behind the last vertex; `None` if not even the chief ray arrives.
+    pub fn trace(
+        lens: &MonoLens,
+        point: &ObjectPoint,
+        film_distance_mm: f64,
+        sampling: &PupilSampling,
+    ) -> Option<Self> {
+        let chief = sampling.chief().rays_on_film(lens, point, film_distance_mm);
         if !chief.fate[0].is_in_flight() {
             return None;
         }
-        let chief_mm = lens.on_film_mm(chief.point_mm(0), film_mm);
-        let rays = sampling.rays_on_film(lens, point, film_mm);
+        let chief_mm = lens.on_film_mm(chief.point_mm(0), film_distance_mm);
+        let rays = sampling.rays_on_film(lens, point, film_distance_mm);
         let error = |i: usize| {
             let is_there = rays.fate[i].is_in_flight();
-            is_there.then(|| lens.on_film_mm(rays.point_mm(i), film_mm) - chief_mm)
+            is_there.then(|| lens.on_film_mm(rays.point_mm(i), film_distance_mm) - chief_mm)
         };
         Some(Self { errors_mm: (0..rays.len()).map(error).collect() })
     }
@@ -38,14 +43,14 @@ mod tests {
         analysis::{PupilCoordinates, pupil_line},
     };
 
-    fn fan(lens: &MonoLens, field_tan: f64, film_mm: f64, direction: DVec2) -> RayFan {
+    fn fan(lens: &MonoLens, field_tan: f64, film_distance_mm: f64, direction: DVec2) -> RayFan {
         let sampling = PupilSampling {
             coordinates: PupilCoordinates::entrance(lens),
             places: pupil_line(direction, 21),
             rims: Vignetting::On,
         };
         let point = ObjectPoint::from_field(lens, DVec2::new(0.0, field_tan), 0.0);
-        RayFan::trace(lens, &point, film_mm, &sampling).unwrap()
+        RayFan::trace(lens, &point, film_distance_mm, &sampling).unwrap()
     }
 
     #[test]
@@ -62,9 +67,9 @@ mod tests {
     #[test]
     fn sagittal_fans_are_mirror_images_and_axial_ones_are_odd() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap().at(550.0).unwrap();
-        let film_mm = lens.film_mm_for(f64::INFINITY).unwrap();
-        let sagittal = fan(&lens, 0.2, film_mm, DVec2::X);
-        let axial = fan(&lens, 0.0, film_mm, DVec2::Y);
+        let film_distance_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
+        let sagittal = fan(&lens, 0.2, film_distance_mm, DVec2::X);
+        let axial = fan(&lens, 0.0, film_distance_mm, DVec2::Y);
         for i in 0..21 {
             let (a, b) = (sagittal.errors_mm[i].unwrap(), sagittal.errors_mm[20 - i].unwrap());
             assert!((a.x + b.x).abs() < 1e-12 && (a.y - b.y).abs() < 1e-12);

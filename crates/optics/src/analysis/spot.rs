@@ -9,7 +9,7 @@ use crate::{MonoLens, ObjectPoint, RayBatch, RayFate};
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpotDiagram {
     /// The film points of the rays that arrive, mm, in the order of their pupil places: x and y of the lens frame, or of
-    /// the film's own where it is tilted or decentred.
+    /// the film's own where it is tilted or decentered.
     pub points_mm: Vec<DVec2>,
     /// The film point of the chief ray (through the middle of the pupil, whether rims end it or not), mm.
     pub chief_mm: Option<DVec2>,
@@ -18,12 +18,12 @@ pub struct SpotDiagram {
 }
 
 impl SpotDiagram {
-    /// Traces rays through these places of the pupil to the film as it is curved, `film_mm` behind the last vertex.
-    pub fn trace(lens: &MonoLens, point: &ObjectPoint, film_mm: f64, sampling: &PupilSampling) -> Self {
-        let rays = sampling.rays_on_film(lens, point, film_mm);
-        let chief = sampling.chief().rays_on_film(lens, point, film_mm);
-        let chief_mm = chief.fate[0].is_in_flight().then(|| lens.on_film_mm(chief.point_mm(0), film_mm));
-        Self::on(|point_mm| lens.on_film_mm(point_mm, film_mm), &rays, chief_mm)
+    /// Traces rays through these places of the pupil to the film as it is curved, `film_distance_mm` behind the last vertex.
+    pub fn trace(lens: &MonoLens, point: &ObjectPoint, film_distance_mm: f64, sampling: &PupilSampling) -> Self {
+        let rays = sampling.rays_on_film(lens, point, film_distance_mm);
+        let chief = sampling.chief().rays_on_film(lens, point, film_distance_mm);
+        let chief_mm = chief.fate[0].is_in_flight().then(|| lens.on_film_mm(chief.point_mm(0), film_distance_mm));
+        Self::on(|point_mm| lens.on_film_mm(point_mm, film_distance_mm), &rays, chief_mm)
     }
 
     /// Returns the spot of rays that have been traced to the film.

@@ -70,7 +70,7 @@ pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -
     let lens = Lens::new(name, source, interfaces, stop)?.with_object_medium(object_medium)?;
     let mut read = LensFile::of_lens(lens);
     if let (Some(sensor), Some(last)) = (file.get("d_sensor"), rows.last()) {
-        read.film_mm = Some(number(sensor, "d_sensor")? - last.number_or("d", 0.0)?);
+        read.film_distance_mm = Some(number(sensor, "d_sensor")? - last.number_or("d", 0.0)?);
     }
     Ok(read)
 }
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn surfaces_film_and_media_are_read() {
         let file = read(SINGLET).ok().unwrap();
-        assert_eq!((file.lens.stop(), file.lens.last_vertex_z_mm(), file.film_mm), (0, 2.5, Some(50.0)));
+        assert_eq!((file.lens.stop(), file.lens.last_vertex_z_mm(), file.film_distance_mm), (0, 2.5, Some(50.0)));
         let asphere = &file.lens.interfaces()[1];
         assert_eq!(asphere.medium_after, Glass::NdVd { nd: 1.5, vd: 60.0 });
         assert_eq!(asphere.surface.shape, Shape::EvenAsphere { conic: -1.0, coefficients: vec![1e-5] });

@@ -8,7 +8,7 @@
 use glam::{DMat3, DVec3};
 use serde_json::Value;
 
-use crate::{CoordinateBreak, Glass, Interface, Lens, OpticsError, Pose, Shape, Surface, prescription::TextError};
+use crate::{CoordinateBreak, Glass, Interface, Lens, OpticsError, Placement, Shape, Surface, prescription::TextError};
 
 use super::{
     glasses::{Glasses, constant},
@@ -58,7 +58,7 @@ fn rows_of(file: &Object, glasses: &Glasses) -> Result<Rows, TextError> {
             let reason = format!("{} is not known; expected {SURFACE_KEYS}", row.place(key));
             return Err(TextError { line: None, reason });
         }
-        moves.extend(transform(row)?.map(|pose| moved(i, &pose)));
+        moves.extend(transform(row)?.map(|placement| moved(i, &placement)));
         let radius_mm = radius_mm(row)?;
         let is_stop = radius_mm == Some([0.0; 2]) || row.get("stop") == Some(&Value::Bool(true));
         if is_stop {
@@ -196,7 +196,7 @@ fn table(value: &Value, place: &str) -> Result<Glass, TextError> {
 /// Returns how a surface is shifted and turned from its place, if it is.
 ///
 /// The four columns say where its x, y and z axes point and how far its vertex is shifted, in mm.
-fn transform(row: &Object) -> Result<Option<Pose>, TextError> {
+fn transform(row: &Object) -> Result<Option<Placement>, TextError> {
     let Some(transform) = row.get("transform") else { return Ok(None) };
     let place = row.place("transform");
     let mut flat = Vec::new();
@@ -217,8 +217,8 @@ fn transform(row: &Object) -> Result<Option<Pose>, TextError> {
             if apart.iter().any(|v| v.abs() > 1e-6) || rotation.determinant() < 0.0 {
                 return Err(plain(format!("{place}: its axes are not those of a rotation")));
             }
-            let pose = Pose { vertex_mm: shift, rotation };
-            Ok(Some(pose).filter(|pose| *pose != Pose::centered(0.0)))
+            let placement = Placement { vertex_mm: shift, rotation };
+            Ok(Some(placement).filter(|placement| *placement != Placement::centered(0.0)))
         }
         (9 | 12 | 16, None) if flat.iter().enumerate().all(is_identity) => Ok(None),
         _ => Err(wrong(&place, transform, expected)),
@@ -226,12 +226,12 @@ fn transform(row: &Object) -> Result<Option<Pose>, TextError> {
 }
 
 /// Returns the move of one surface about its own vertex.
-fn moved(surface: usize, pose: &Pose) -> CoordinateBreak {
+fn moved(surface: usize, placement: &Placement) -> CoordinateBreak {
     CoordinateBreak {
         surfaces: (surface, surface),
         pivot_mm: 0.0,
-        decenter_mm: pose.vertex_mm.into(),
-        tilt_deg: pose.tilt_deg(),
+        decenter_mm: placement.vertex_mm.into(),
+        tilt_deg: placement.tilt_deg(),
         tilt_first: false,
     }
 }
@@ -342,10 +342,10 @@ mod tests {
             (&lens.interfaces()[0].surface.shape, lens.interfaces()[0].surface.curvature_per_mm),
             (&shape, 0.02)
         );
-        let pose = lens.poses()[0];
-        assert_eq!(pose.vertex_mm, DVec3::new(0.1, 0.2, 0.3));
-        assert!((pose.to_lens(DVec3::Z) - DVec3::new(0.1, -0.4, 1.1)).length() < 1e-15);
-        assert_eq!(lens.poses()[1], Pose::centered(3.0));
+        let placement = lens.placements()[0];
+        assert_eq!(placement.vertex_mm, DVec3::new(0.1, 0.2, 0.3));
+        assert!((placement.lens_from_surface(DVec3::Z) - DVec3::new(0.1, -0.4, 1.1)).length() < 1e-15);
+        assert_eq!(lens.placements()[1], Placement::centered(3.0));
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub struct LensFile {
     /// The lens.
     pub lens: Lens,
     /// Distance from the last vertex to the film, mm, where the file states it.
-    pub film_mm: Option<f64>,
+    pub film_distance_mm: Option<f64>,
     /// Distance from the object to the first vertex, mm; `None` where it is far away or not stated.
     pub object_distance_mm: Option<f64>,
     /// The wavelengths that the file names, nm.
@@ -164,7 +164,7 @@ impl LensFile {
     pub(super) fn of_lens(lens: Lens) -> Self {
         Self {
             lens,
-            film_mm: None,
+            film_distance_mm: None,
             object_distance_mm: None,
             wavelengths_nm: Vec::new(),
             reference_wavelength_nm: None,

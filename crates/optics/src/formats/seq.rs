@@ -1,7 +1,7 @@
 //! CODE V sequence files (`.seq`): commands, of which `S` adds a surface and `;` or a line's end ends each.
 //!
 //! Read are radii or curvatures, thicknesses, glasses of the catalogue or of a private one (`PRV` … `END`), conics, even
-//! aspheres, cylinders (`CYL`), toroids (`YTO`, `XTO`) and anamorphic conics (`AAS`), decentres and tilts (basic, `DAR` or
+//! aspheres, cylinders (`CYL`), toroids (`YTO`, `XTO`) and anamorphic conics (`AAS`), decenters and tilts (basic, `DAR` or
 //! `REV`), apertures, the pupil, fields and wavelengths. Commands that change no ray (solves, variables, labels) are passed
 //! over; what changes rays and cannot be traced is refused.
 

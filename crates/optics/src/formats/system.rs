@@ -7,7 +7,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    Aperture, CoordinateBreak, Glass, ImageSurface, Interface, Lens, MonoLens, ObjectPoint, OpticsError, Pose,
+    Aperture, CoordinateBreak, Glass, ImageSurface, Interface, Lens, MonoLens, ObjectPoint, OpticsError, Placement,
     RayBatch, Shape, Surface, Vignetting, analysis::PupilCoordinates, glass::D_LINE_NM, prescription::TextError,
     rays_towards,
 };
@@ -35,9 +35,9 @@ impl SystemSurface {
     /// Returns the surface with an opening, and with a rim that is as wide as the opening and the surface need.
     pub(super) fn with_aperture(mut self, aperture: Aperture) -> Self {
         if !aperture.is_obscuration {
-            let reach_mm = aperture.reach_mm();
+            let extent_mm = aperture.extent_mm();
             let is_rotational = self.shape.is_rotational();
-            self.semi_aperture_mm = Some(if is_rotational { reach_mm.min(widest_mm(&self)) } else { reach_mm });
+            self.semi_aperture_mm = Some(if is_rotational { extent_mm.min(widest_mm(&self)) } else { extent_mm });
         }
         self.is_rim_fixed = true;
         self.apertures.push(aperture);
@@ -45,7 +45,7 @@ impl SystemSurface {
     }
 }
 
-/// A tilt and decentre, with the z along the axis at which it happens: from the file's first surface.
+/// A tilt and decenter, with the z along the axis at which it happens: from the file's first surface.
 ///
 /// Its surfaces are those that the file has; the last may be beyond them, which means the film.
 #[derive(Clone, Debug)]
@@ -131,7 +131,7 @@ impl System {
             return Err(OpticsError::Stops { n_stops: 0 }.into());
         };
         self.drop_dummies(&mut stop);
-        let film_mm = self.surfaces.last().map(|last| last.thickness_after_mm);
+        let film_distance_mm = self.surfaces.last().map(|last| last.thickness_after_mm);
         let reference_nm = self.wavelengths_nm.get(self.reference).copied();
         let lens = self.provisional(stop)?;
         let mono = lens.at(reference_nm.unwrap_or(D_LINE_NM))?;
@@ -148,7 +148,7 @@ impl System {
         }
         Ok(LensFile {
             lens: self.lens(interfaces, stop)?,
-            film_mm: film_mm.filter(|film| film.is_finite()),
+            film_distance_mm: film_distance_mm.filter(|film| film.is_finite()),
             object_distance_mm: Some(self.object_distance_mm).filter(|distance| distance.is_finite()),
             wavelengths_nm: self.wavelengths_nm,
             reference_wavelength_nm: reference_nm,
@@ -158,7 +158,7 @@ impl System {
         })
     }
 
-    /// Returns the lens of these surfaces, tilted and decentred as the file says.
+    /// Returns the lens of these surfaces, tilted and decentered as the file says.
     fn lens(&self, interfaces: Vec<Interface>, stop: usize) -> Result<Lens, OpticsError> {
         let n_surfaces = interfaces.len();
         let (name, source) = (self.name.clone(), self.source.clone());
@@ -286,12 +286,13 @@ impl System {
             false => ObjectPoint::from_field(mono, DVec2::ZERO, 0.0),
         };
         let mut rays = rays_towards(&point, &target, mono.projection_center_z_mm(), 0.0);
-        let poses: Vec<Pose> = (0..mono.n_surfaces()).map(|i| Pose::centered(mono.vertex_z_mm(i))).collect();
-        let poses = mono.poses().unwrap_or(&poses);
+        let placements: Vec<Placement> =
+            (0..mono.n_surfaces()).map(|i| Placement::centered(mono.vertex_z_mm(i))).collect();
+        let placements = mono.placements().unwrap_or(&placements);
         let mut heights_mm = Vec::with_capacity(mono.n_surfaces());
-        for (surface, pose) in poses.iter().enumerate() {
+        for (surface, placement) in placements.iter().enumerate() {
             mono.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::Off);
-            heights_mm.push(pose.to_own(rays.point_mm(0)).truncate().length());
+            heights_mm.push(placement.surface_from_lens(rays.point_mm(0)).truncate().length());
         }
         let at_stop_mm = heights_mm[mono.stop()];
         let rims = self.surfaces.iter().map(|surface| surface.semi_aperture_mm);
@@ -313,7 +314,7 @@ impl System {
         let mut interfaces = lens.interfaces().to_vec();
         interfaces[lens.stop()].surface.semi_aperture_mm = stop_semi_aperture_mm;
         let lens = self.lens(interfaces, lens.stop())?;
-        let poses = lens.poses();
+        let placements = lens.placements();
         let on_axis = [(Field::Angle { x_deg: 0.0, y_deg: 0.0 }, FieldVignetting::default())];
         let fields = if self.fields.is_empty() { &on_axis[..] } else { &self.fields[..] };
         let reference_nm = self.wavelengths_nm.get(self.reference).copied().unwrap_or(D_LINE_NM);
@@ -331,7 +332,7 @@ impl System {
             };
             for (field, vignetting) in fields {
                 let point = self.object_point(&mono, *field)?;
-                widen(&mut widest_mm, (&mono, &poses), &point, *vignetting);
+                widen(&mut widest_mm, (&mono, &placements), &point, *vignetting);
             }
         }
         let unreached = widest_mm.iter().position(|&semi_aperture_mm| semi_aperture_mm == 0.0);
@@ -356,9 +357,11 @@ impl System {
             }
             Field::ObjectHeight { .. } => return Err(plain("a field is an object height, but the object is far away")),
             Field::RealImageHeight { x_mm, y_mm } => {
-                let film_mm = self.surfaces.last().map(|last| last.thickness_after_mm).filter(|mm| mm.is_finite());
+                let film_distance_mm =
+                    self.surfaces.last().map(|last| last.thickness_after_mm).filter(|mm| mm.is_finite());
                 let dioptres = 1e3 / (distance_mm + mono.projection_center_z_mm());
-                let tan = film_mm.and_then(|film| mono.field_tan_of_image(DVec2::new(x_mm, y_mm), film, dioptres));
+                let tan =
+                    film_distance_mm.and_then(|film| mono.field_tan_of_image(DVec2::new(x_mm, y_mm), film, dioptres));
                 let missed = || format!("no chief ray meets the image at the stated height of {x_mm}, {y_mm} mm");
                 tan.ok_or_else(|| plain(&missed()))?
             }
@@ -373,11 +376,16 @@ impl System {
     }
 }
 
-/// Widens the rims so that a ring of rays through the edge of the pupil, and the ray through its centre, pass.
+/// Widens the rims so that a ring of rays through the edge of the pupil, and the ray through its center, pass.
 ///
 /// They are aimed at the paraxial entrance pupil; where that leads them past the stop, as in a wide-angle lens, or where
 /// it is infinitely far, at the real stop.
-fn widen(widest_mm: &mut [f64], (mono, poses): (&MonoLens, &[Pose]), point: &ObjectPoint, vignetting: FieldVignetting) {
+fn widen(
+    widest_mm: &mut [f64],
+    (mono, placements): (&MonoLens, &[Placement]),
+    point: &ObjectPoint,
+    vignetting: FieldVignetting,
+) {
     let on_ring = |i: usize| {
         let (sine, cosine) = (i as f64 * std::f64::consts::TAU / N_AZIMUTHS as f64).sin_cos();
         vignetting.center + (DVec2::ONE - vignetting.compression) * DVec2::new(cosine, sine)
@@ -395,7 +403,7 @@ fn widen(widest_mm: &mut [f64], (mono, poses): (&MonoLens, &[Pose]), point: &Obj
     for (surface, widest_mm) in widest_mm.iter_mut().enumerate() {
         mono.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::Off);
         for ray in (0..rays.len()).filter(|&ray| rays.fate[ray].is_in_flight()) {
-            let from_axis_mm = poses[surface].to_own(rays.point_mm(ray)).truncate().length();
+            let from_axis_mm = placements[surface].surface_from_lens(rays.point_mm(ray)).truncate().length();
             if from_axis_mm.is_finite() {
                 *widest_mm = widest_mm.max(from_axis_mm);
             }

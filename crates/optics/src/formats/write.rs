@@ -4,7 +4,7 @@ use std::{fmt::Write as _, fs, path::Path};
 
 use serde_json::{Value, json};
 
-use crate::{Glass, Interface, Lens, OpticsError, Pose, Shape, Surface, glass::D_LINE_NM};
+use crate::{Glass, Interface, Lens, OpticsError, Placement, Shape, Surface, glass::D_LINE_NM};
 
 use super::lens_file::{LensFile, Microlens};
 
@@ -49,14 +49,14 @@ impl LensFile {
     /// that at the reference wavelength, or at the d line where the file states none.
     ///
     /// # Errors
-    /// When the object is not in air, a surface is a plane that is not the stop, an asphere or an ideal lens, or tilted or decentred, or the stop
+    /// When the object is not in air, a surface is a plane that is not the stop, an asphere or an ideal lens, or tilted or decentered, or the stop
     /// is curved.
     pub fn to_dat(&self) -> Result<String, OpticsError> {
         const FORMAT: &str = "a .dat file";
         let wavelength_nm = self.reference_wavelength_nm.unwrap_or(D_LINE_NM);
         let lens = &self.lens;
         if let Some(surface) = first_moved(lens) {
-            return Err(cannot(FORMAT, surface, "is tilted or decentred"));
+            return Err(cannot(FORMAT, surface, "is tilted or decentered"));
         }
         check_air(FORMAT, lens)?;
         check_round(FORMAT, lens)?;
@@ -89,7 +89,7 @@ impl LensFile {
     /// this crate reads (`"radius": null`, `"stop": true`), so that ISET refuses the file instead of misreading it.
     ///
     /// # Errors
-    /// When the object is not in air, a surface is an odd asphere, a toroid or an ideal lens, the film is tilted or decentred, or a glass is not
+    /// When the object is not in air, a surface is an odd asphere, a toroid or an ideal lens, the film is tilted or decentered, or a glass is not
     /// known at one of the wavelengths.
     pub fn to_omni_json(&self) -> Result<String, OpticsError> {
         let mut wavelengths_nm = self.wavelengths_nm.clone();
@@ -99,8 +99,8 @@ impl LensFile {
         wavelengths_nm.sort_by(f64::total_cmp);
         wavelengths_nm.dedup();
         let lens = &self.lens;
-        if lens.film_motion() != Pose::centered(0.0) {
-            return Err(cannot(OMNI, lens.interfaces().len(), "(the film) is tilted or decentred"));
+        if lens.film_motion() != Placement::centered(0.0) {
+            return Err(cannot(OMNI, lens.interfaces().len(), "(the film) is tilted or decentered"));
         }
         check_air(OMNI, lens)?;
         check_round(OMNI, lens)?;
@@ -141,16 +141,19 @@ fn check_round(format: &'static str, lens: &Lens) -> Result<(), OpticsError> {
 }
 
 fn first_moved(lens: &Lens) -> Option<usize> {
-    lens.poses().iter().zip(lens.vertices_z_mm()).position(|(pose, z_mm)| *pose != Pose::centered(z_mm))
+    lens.placements()
+        .iter()
+        .zip(lens.vertices_z_mm())
+        .position(|(placement, z_mm)| *placement != Placement::centered(z_mm))
 }
 
 fn omni_rows(lens: &Lens, wavelengths_nm: &[f64]) -> Result<Vec<Value>, OpticsError> {
-    let (poses, vertices_z_mm) = (lens.poses(), lens.vertices_z_mm());
+    let (placements, vertices_z_mm) = (lens.placements(), lens.vertices_z_mm());
     let row = |(i, interface): (usize, &Interface)| {
         let mut row = omni_row(i, i == lens.stop(), interface, wavelengths_nm)?;
-        let Pose { vertex_mm, rotation } = poses[i];
-        if poses[i] != Pose::centered(vertices_z_mm[i]) {
-            let shift_mm = vertex_mm - Pose::centered(vertices_z_mm[i]).vertex_mm;
+        let Placement { vertex_mm, rotation } = placements[i];
+        if placements[i] != Placement::centered(vertices_z_mm[i]) {
+            let shift_mm = vertex_mm - Placement::centered(vertices_z_mm[i]).vertex_mm;
             row["transform"] =
                 json!([rotation.x_axis, rotation.y_axis, rotation.z_axis, shift_mm].map(|v| v.to_array()));
         }

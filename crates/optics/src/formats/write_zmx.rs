@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use glam::DVec2;
 
-use crate::{Aperture, CatalogueGlass, Glass, GlassCatalogue, Lens, OpticsError, Outline, Pose, Shape, Surface};
+use crate::{Aperture, CatalogueGlass, Glass, GlassCatalogue, Lens, OpticsError, Outline, Placement, Shape, Surface};
 
 use super::{
     agf::agf_lines,
@@ -18,7 +18,7 @@ struct Gap {
     turn: Option<Turn>,
 }
 
-/// A coordinate break: a shift along x and y, the turn of a pose, and a way along the turned axis.
+/// A coordinate break: a shift along x and y, the turn of a placement, and a way along the turned axis.
 struct Turn {
     shift_mm: DVec2,
     tilt_deg: [f64; 3],
@@ -33,8 +33,8 @@ impl Gap {
     ///
     /// Before and behind a tilt the pieces of the axis together are as long as it is straight: that is so where they
     /// meet at the tilt's pivot, and lengths along the axis come back as they were.
-    fn new(way: &Pose, straight_mm: f64) -> Self {
-        let straight = Pose::centered(straight_mm);
+    fn new(way: &Placement, straight_mm: f64) -> Self {
+        let straight = Placement::centered(straight_mm);
         // What rounding leaves of a motion and its return.
         if way.inverse().after(&straight).is_rest() {
             return Self { thickness_mm: straight_mm, turn: None };
@@ -46,7 +46,7 @@ impl Gap {
     }
 
     /// Returns the gap of this way with this much of it behind the break.
-    fn turned(way: &Pose, behind_mm: f64) -> Self {
+    fn turned(way: &Placement, behind_mm: f64) -> Self {
         let pivot_mm = way.vertex_mm - way.rotation.z_axis * behind_mm;
         let turn = Turn { shift_mm: pivot_mm.truncate(), tilt_deg: way.tilt_deg(), thickness_mm: behind_mm };
         Self { thickness_mm: pivot_mm.z, turn: Some(turn) }
@@ -64,7 +64,7 @@ impl Gap {
 }
 
 impl LensFile {
-    /// Returns the lens as a Zemax file, with its film, fields and wavelengths. What is tilted or decentred stands behind
+    /// Returns the lens as a Zemax file, with its film, fields and wavelengths. What is tilted or decentered stands behind
     /// coordinate breaks, one from each surface to the next. A first surface that is shifted along z comes back at z = 0,
     /// which moves the lens frame.
     ///
@@ -158,21 +158,21 @@ impl LensFile {
     /// Returns the ways from the lens frame to the first surface, between surfaces, and to the film.
     fn zmx_gaps(&self) -> Vec<Gap> {
         let lens = &self.lens;
-        let film_z_mm = lens.last_vertex_z_mm() + self.film_mm.unwrap_or(0.0);
-        let film = lens.film_motion().after(&Pose::centered(film_z_mm));
-        let mut before = Pose::centered(0.0);
-        let gap = |(i, pose): (usize, Pose)| {
-            let way = std::mem::replace(&mut before, pose).inverse().after(&pose);
+        let film_z_mm = lens.last_vertex_z_mm() + self.film_distance_mm.unwrap_or(0.0);
+        let film = lens.film_motion().after(&Placement::centered(film_z_mm));
+        let mut before = Placement::centered(0.0);
+        let gap = |(i, placement): (usize, Placement)| {
+            let way = std::mem::replace(&mut before, placement).inverse().after(&placement);
             let straight_mm = match i.checked_sub(1) {
                 // Behind a far object the axis has no length to keep.
                 None if way.is_rest() => 0.0,
                 None => return Gap::turned(&way, 0.0),
-                Some(i) if i + 1 == lens.interfaces().len() => self.film_mm.unwrap_or(0.0),
+                Some(i) if i + 1 == lens.interfaces().len() => self.film_distance_mm.unwrap_or(0.0),
                 Some(i) => lens.interfaces()[i].thickness_after_mm,
             };
             Gap::new(&way, straight_mm)
         };
-        lens.poses().into_iter().chain([film]).enumerate().map(gap).collect()
+        lens.placements().into_iter().chain([film]).enumerate().map(gap).collect()
     }
 
     /// Returns the makers of the glasses, in an order in which each glass's name means it.
@@ -247,7 +247,7 @@ fn zmx_aperture(lens: &Lens, surface: usize) -> Result<String, OpticsError> {
         }
         (_, true) => return Err(cannot("a .zmx file", surface, "has an obscuration that is no circle about the axis")),
         // The format has no rim beside the opening.
-        _ if aperture.reach_mm() > rim_mm * (1.0 + 1e-12) => {
+        _ if aperture.extent_mm() > rim_mm * (1.0 + 1e-12) => {
             return Err(cannot("a .zmx file", surface, "has an opening that reaches beyond its rim"));
         }
         (Outline::Circle { radius_mm }, false) => format!("  CLAP 0 {radius_mm:e} 0\r\n"),

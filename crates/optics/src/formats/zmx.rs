@@ -2,7 +2,7 @@
 //!
 //! Read are sequential systems of the surfaces STANDARD, EVENASPH, ODDASPHE, BICONICX, TOROIDAL, PARAXIAL and COORDBRK,
 //! with the entrance pupil, fields and wavelengths of the first configuration. Solves and pickups keep the values that
-//! the file stores. Keywords that change no ray (colours, tolerances, merit functions) are
+//! the file stores. Keywords that change no ray (colors, tolerances, merit functions) are
 //! passed over; whatever changes rays and cannot be traced is refused by name.
 
 mod surface;

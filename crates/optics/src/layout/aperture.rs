@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use glam::{DVec2, DVec3};
 
 use super::frame::Frame;
-use crate::{Lens, Pose, Surface};
+use crate::{Lens, Placement, Surface};
 
 /// Returns how far a surface reaches down and up in the y–z plane, mm: its rim, or within it its openings.
 pub(super) fn extent_mm(lens: &Lens, surface: usize) -> [f64; 2] {
@@ -24,14 +24,14 @@ pub(super) fn round_mm(surface: &Surface) -> [f64; 2] {
 }
 
 /// Returns the points of a surface from its lower end to its upper one.
-pub(super) fn outline(surface: &Surface, pose: &Pose, [low_mm, high_mm]: [f64; 2]) -> Vec<DVec2> {
+pub(super) fn outline(surface: &Surface, placement: &Placement, [low_mm, high_mm]: [f64; 2]) -> Vec<DVec2> {
     const N: i32 = 32;
     let at = |i: i32| {
         // Denser towards the ends, which may lie on the equator to rounding.
         let share = (std::f64::consts::FRAC_PI_2 * f64::from(i) / f64::from(N)).sin();
         let y = 0.5 * (low_mm + high_mm) + 0.5 * (high_mm - low_mm) * share;
         let sag_mm = surface.sag_mm(y.abs() * (1.0 - 1e-12));
-        let point = pose.to_lens(DVec3::new(0.0, y, if sag_mm.is_finite() { sag_mm } else { 0.0 }));
+        let point = placement.lens_from_surface(DVec3::new(0.0, y, if sag_mm.is_finite() { sag_mm } else { 0.0 }));
         DVec2::new(point.z, point.y)
     };
     if surface.curvature_per_mm == 0.0 && surface.sag_mm(high_mm.abs()) == 0.0 {
@@ -42,14 +42,14 @@ pub(super) fn outline(surface: &Surface, pose: &Pose, [low_mm, high_mm]: [f64; 2
 
 /// Draws what stands before surfaces.
 pub(super) fn obscurations(lens: &Lens, frame: &Frame, svg: &mut String) {
-    let poses = lens.poses();
+    let placements = lens.placements();
     for aperture in lens.apertures().iter().filter(|aperture| aperture.is_obscuration) {
         let (middle, half) = (aperture.center_mm[1], aperture.outline.half_widths_mm().y);
         let surface = &lens.interfaces()[aperture.surface].surface;
         let [low, high] = round_mm(surface);
         let ends = [low.max(middle - half), high.min(middle + half)];
         if ends[0] < ends[1] {
-            let path = frame.path(outline(surface, &poses[aperture.surface], ends));
+            let path = frame.path(outline(surface, &placements[aperture.surface], ends));
             let _ = writeln!(svg, "<path d=\"{path}\" fill=\"none\" stroke=\"#111\" stroke-width=\"3.5\"/>");
         }
     }

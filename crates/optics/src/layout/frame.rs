@@ -27,7 +27,7 @@ pub(super) struct Frame {
 impl Frame {
     pub(super) fn around(lens: &Lens, layout: &Layout, fans: &[Fan]) -> Self {
         let points = || fans.iter().flat_map(|fan| &fan.lines).flat_map(|line| &line.points);
-        let z_film_mm = lens.last_vertex_z_mm() + layout.film_mm;
+        let z_film_mm = lens.last_vertex_z_mm() + layout.film_distance_mm;
         let z_min_mm = points().map(|p| p.x).fold(0.0, f64::min);
         let z_max_mm = points().map(|p| p.x).fold(z_film_mm, f64::max);
         let rims = lens.interfaces().iter().map(|interface| interface.surface.semi_aperture_mm);
@@ -111,7 +111,7 @@ impl Frame {
         );
     }
 
-    /// Writes what colours and dashes mean, behind these words.
+    /// Writes what colors and dashes mean, behind these words.
     pub(super) fn keys(&self, words: &str, layout: &Layout, fans: &[Fan], svg: &mut String) {
         let (mut x, y) =
             (MARGIN_PX + LETTER_PX * (words.chars().count() + 4) as f64, self.height_px - 0.6 * FOOT_PX + 5.0);

@@ -49,7 +49,7 @@ impl PupilBoundary {
         if corners.len() > MOST_CORNERS { vec![] } else { corners }
     }
 
-    /// Returns the edge's distance from the centre at these azimuths, mm, found to rounding.
+    /// Returns the edge's distance from the center at these azimuths, mm, found to rounding.
     pub fn edge_at_mm(&self, lens: &MonoLens, point: &ObjectPoint, azimuths_rad: &[f64]) -> Option<Vec<f64>> {
         let directions: Vec<DVec2> = azimuths_rad.iter().map(|azimuth| DVec2::from_angle(*azimuth)).collect();
         Search::new(lens, point).edge_mm(self.center_mm, &Cell::default(), &directions, EDGE_MM)
@@ -95,7 +95,11 @@ impl Search<'_> {
             self.lens.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::Off);
             for (i, nearest) in nearest.iter_mut().enumerate().filter(|(i, _)| rays.fate[*i].is_in_flight()) {
                 let point = rays.point_mm(i);
-                let at = self.lens.poses().map_or(point, |poses| poses[surface].to_own(point)).truncate();
+                let at = self
+                    .lens
+                    .placements()
+                    .map_or(point, |placements| placements[surface].surface_from_lens(point))
+                    .truncate();
                 let mut note = |clearance_mm: f64, part: usize| {
                     if clearance_mm < nearest.0 - SAME_MM {
                         *nearest = (clearance_mm, (surface, part));

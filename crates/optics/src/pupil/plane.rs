@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
-use crate::{MonoLens, ObjectPoint, Pose, RayBatch};
+use crate::{MonoLens, ObjectPoint, Placement, RayBatch};
 
 /// The least cosine between light and axis for which the pupil is looked at in a plane across the axis.
 const LEAST_COSINE: f64 = 0.01;
@@ -17,7 +17,7 @@ const LEAST_COSINE_OF_PARTS: f64 = 0.3;
 /// light by the shortest turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PupilPlane {
-    pose: Pose,
+    placement: Placement,
     is_across_axis: bool,
 }
 
@@ -44,12 +44,12 @@ impl PupilPlane {
             return Self::across_axis(z_mm);
         }
         let rotation = DMat3::from_quat(DQuat::from_rotation_arc(DVec3::Z, point.direction_to(DVec3::ZERO)));
-        Self { pose: Pose { vertex_mm: DVec3::ZERO, rotation }, is_across_axis: false }
+        Self { placement: Placement { vertex_mm: DVec3::ZERO, rotation }, is_across_axis: false }
     }
 
     /// Returns the plane across the axis at this z from the first vertex, mm.
     pub fn across_axis(z_mm: f64) -> Self {
-        Self { pose: Pose::centered(z_mm), is_across_axis: true }
+        Self { placement: Placement::centered(z_mm), is_across_axis: true }
     }
 
     /// Whether it lies across the axis, as it does for all light from the front.
@@ -59,12 +59,12 @@ impl PupilPlane {
 
     /// z of its origin from the first vertex, mm.
     pub fn z_mm(&self) -> f64 {
-        self.pose.vertex_mm.z
+        self.placement.vertex_mm.z
     }
 
     /// Its normal, along which light runs.
     pub fn normal(&self) -> DVec3 {
-        self.pose.rotation.z_axis
+        self.placement.rotation.z_axis
     }
 
     /// Returns rays from a point towards these places of the plane, mm, before the lens; path lengths are those of
@@ -76,8 +76,8 @@ impl PupilPlane {
         let mut rays = RayBatch::with_capacity(targets_mm.len());
         rays.object_z_mm = point.z_mm();
         for target_mm in targets_mm {
-            let start_mm = self.pose.to_lens(target_mm.extend(0.0));
-            let opl_mm = lens.object_index() * point.path_difference_mm(start_mm, self.pose.vertex_mm);
+            let start_mm = self.placement.lens_from_surface(target_mm.extend(0.0));
+            let opl_mm = lens.object_index() * point.path_difference_mm(start_mm, self.placement.vertex_mm);
             rays.push(start_mm, point.direction_to(start_mm), opl_mm);
         }
         rays
@@ -85,7 +85,8 @@ impl PupilPlane {
 
     /// Returns where the line through a point of the lens frame, mm, with this direction meets the plane, mm.
     pub(super) fn meets_mm(&self, on_line_mm: DVec3, direction: DVec3) -> DVec2 {
-        let (own_mm, along) = (self.pose.to_own(on_line_mm), self.pose.rotation.transpose() * direction);
+        let (own_mm, along) =
+            (self.placement.surface_from_lens(on_line_mm), self.placement.rotation.transpose() * direction);
         (own_mm - along * (own_mm.z / along.z)).truncate()
     }
 }

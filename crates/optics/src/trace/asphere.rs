@@ -1,6 +1,6 @@
 //! Aspheres: Newton's method from the conic, for a block of lanes at once.
 //!
-//! Every lane stops for itself, so that a ray's result does not depend on its neighbours. The scalar twin uses the
+//! Every lane stops for itself, so that a ray's result does not depend on its neighbors. The scalar twin uses the
 //! same code with one lane.
 
 use super::{

@@ -193,7 +193,7 @@ pub(super) fn thin_lens<T: Real>(lens: &Ideal<T>, interface: &Interface<T>, ray:
     let n_after = T::ONE / (T::ONE + sx * sx + sy * sy).sqrt();
     let mut turned = Ray { l: sx * n_after, m: sy * n_after, n: n_after, ..passed.ray };
     if T::HAS_PATH {
-        // The path from the object point, and on to its image, is made that of the ray through the centre.
+        // The path from the object point, and on to its image, is made that of the ray through the center.
         let before = path_difference([x, y], [tx, ty], object_z);
         let after = path_difference([x, y], [sx, sy], image_z);
         turned.opl = opl + (n2 * after - n1 * before);
@@ -202,7 +202,7 @@ pub(super) fn thin_lens<T: Real>(lens: &Ideal<T>, interface: &Interface<T>, ray:
 }
 
 /// Returns by how much the ray of these slopes through `height` has further to go from its point in the plane `z`
-/// than the ray through the lens centre has; the plane may be infinitely far.
+/// than the ray through the lens center has; the plane may be infinitely far.
 #[inline(always)]
 fn path_difference<T: Real>(height: [T; 2], slopes: [T; 2], z: T) -> T {
     let (ux, uy) = (slopes[0] + height[0] / z, slopes[1] + height[1] / z);
@@ -226,12 +226,12 @@ mod tests {
         for dioptres in [0.0, 0.5, 4.0] {
             let field_tan = DVec2::new(0.3, -0.2);
             let point = ObjectPoint::from_field(&lens, field_tan, dioptres);
-            let film_mm = lens.film_mm_for(1e3 / dioptres).unwrap();
+            let film_distance_mm = lens.film_distance_mm_for(1e3 / dioptres).unwrap();
             let mut rays = rays_towards(&point, &TARGETS, 0.0, 0.0);
             lens.trace(&mut rays, Vignetting::On);
-            lens.to_film(&mut rays, film_mm);
+            lens.to_film(&mut rays, film_distance_mm);
             for i in 0..rays.len() {
-                let image = field_tan * -film_mm;
+                let image = field_tan * -film_distance_mm;
                 assert!((rays.point_mm(i).truncate() - image).length() < 1e-12, "{dioptres}: {}", rays.point_mm(i));
                 assert!((rays.opl_mm[i] - rays.opl_mm[0]).abs() < 1e-12, "{dioptres}: {:?}", rays.opl_mm);
             }
@@ -247,10 +247,10 @@ mod tests {
         });
         let lens = Lens::new("pair", "test", vec![first, second], 0).unwrap().at(550.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(0.1, 0.05), 1.0);
-        let film_mm = lens.film_mm_for(1_000.0).unwrap();
+        let film_distance_mm = lens.film_distance_mm_for(1_000.0).unwrap();
         let mut rays = rays_towards(&point, &TARGETS, 0.0, 0.0);
         lens.trace(&mut rays, Vignetting::On);
-        lens.to_film(&mut rays, film_mm);
+        lens.to_film(&mut rays, film_distance_mm);
         for i in 1..rays.len() {
             assert!((rays.point_mm(i) - rays.point_mm(0)).length() < 1e-12);
             assert!((rays.opl_mm[i] - rays.opl_mm[0]).abs() < 1e-12);

@@ -124,12 +124,12 @@ fn rays_end_where_and_as_they_should() {
 fn film_in_one_go_is_the_film_in_two_to_rounding() {
     for name in ["dgauss-50mm", "singlet-50mm", "asphere-15mm"] {
         let lens = Lens::built_in(name).unwrap().at(550.0).unwrap();
-        let film_mm = lens.film_mm_for(2_000.0).unwrap();
+        let film_distance_mm = lens.film_distance_mm_for(2_000.0).unwrap();
         let rays = bundle(&lens, 0.1, 1003);
         let (mut one, mut two) = (rays.clone(), rays);
-        lens.trace_to_film(&mut one, Vignetting::On, film_mm);
+        lens.trace_to_film(&mut one, Vignetting::On, film_distance_mm);
         lens.trace(&mut two, Vignetting::On);
-        lens.to_film(&mut two, film_mm);
+        lens.to_film(&mut two, film_distance_mm);
         assert!(one.n_in_flight() > 100, "{name}");
         assert_eq!((&one.fate, &one.z_mm, &one.l), (&two.fate, &two.z_mm, &two.l));
         for i in 0..one.len() {
@@ -141,7 +141,8 @@ fn film_in_one_go_is_the_film_in_two_to_rounding() {
 
 /// Returns the rms and the largest distance on the film, µm, between rays in single and in double precision.
 fn single_precision_error_um(lens: &MonoLens, field_tan: f64, dioptres: f64) -> (f64, f64) {
-    let film_mm = lens.film_mm_for(if dioptres > 0.0 { 1e3 / dioptres } else { f64::INFINITY }).unwrap();
+    let film_distance_mm =
+        lens.film_distance_mm_for(if dioptres > 0.0 { 1e3 / dioptres } else { f64::INFINITY }).unwrap();
     let point = ObjectPoint::from_field(lens, DVec2::new(field_tan, 0.4 * field_tan), dioptres);
     let radius_mm = 0.5 * lens.first_order().entrance_pupil_diameter_mm;
     let place = |i: usize| radius_mm * (i as f64 / 4000.0).sqrt() * DVec2::from_angle(2.4 * i as f64);
@@ -150,8 +151,8 @@ fn single_precision_error_um(lens: &MonoLens, field_tan: f64, dioptres: f64) -> 
     let start_z_mm = if dioptres > 0.0 { point.z_mm() } else { -100.0 };
     let mut exact = rays_towards(&point, &targets, lens.first_order().entrance_pupil_z_mm, start_z_mm);
     let mut single = RayBatchF32::from(&exact);
-    lens.trace_to_film(&mut exact, Vignetting::On, film_mm);
-    lens.trace_to_film_f32(&mut single, Vignetting::On, film_mm);
+    lens.trace_to_film(&mut exact, Vignetting::On, film_distance_mm);
+    lens.trace_to_film_f32(&mut single, Vignetting::On, film_distance_mm);
     let both = (0..exact.len()).filter(|&i| exact.fate[i].is_in_flight() && single.fate[i].is_in_flight());
     let apart = |i: usize| {
         1e3 * (DVec2::new(single.x_mm[i].into(), single.y_mm[i].into()) - exact.point_mm(i).truncate()).length()

@@ -18,7 +18,7 @@ pub(crate) enum Toric {
         k: [f64; 2],
     },
     /// The curve `z = f(y)`, a conic with added even powers of y, turned about the axis parallel to y through the
-    /// centre of curvature along x.
+    /// center of curvature along x.
     Toroid {
         /// Curvatures along x and y.
         c: [f64; 2],

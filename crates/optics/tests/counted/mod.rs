@@ -13,8 +13,8 @@ const N_GRIDS: usize = 4;
 pub(crate) fn cross_section_mm2(lens: &MonoLens, point: &ObjectPoint, n_across: usize) -> f64 {
     let direction = point.direction_to(DVec3::ZERO);
     let turn = DQuat::from_rotation_arc(DVec3::Z, direction);
-    let reach_mm = 3.0 * lens.semi_aperture_mm(0);
-    let (mut low, mut high) = (DVec2::splat(-reach_mm), DVec2::splat(reach_mm));
+    let extent_mm = 3.0 * lens.semi_aperture_mm(0);
+    let (mut low, mut high) = (DVec2::splat(-extent_mm), DVec2::splat(extent_mm));
     let mut area_mm2 = 0.0;
     for _ in 0..N_GRIDS {
         let cell = (high - low) / n_across as f64;

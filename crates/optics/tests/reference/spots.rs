@@ -57,7 +57,7 @@ fn spots_agree_with_the_reference_to_nine_digits() {
     for name in NAMES {
         let Some(file) = json(name) else { return };
         let (spec, lens) = (&file["lens"], lens(&file));
-        let film_mm = number(&spec["image_z"]) - lens.last_vertex_z_mm();
+        let film_distance_mm = number(&spec["image_z"]) - lens.last_vertex_z_mm();
         let (primary, places) = (lens.at(number(&spec["primary_nm"])).unwrap(), hexapolar(12));
         let (mut worst, mut n_compared) = (0.0_f64, 0);
         for row in file["spots"]["rows"].as_array().unwrap() {
@@ -67,7 +67,7 @@ fn spots_agree_with_the_reference_to_nine_digits() {
             let spot = |places: &[DVec2], rims| {
                 let mut rays = coordinates(spec).rays(&primary, &point, places);
                 mono.trace(&mut rays, rims);
-                mono.to_film(&mut rays, film_mm);
+                mono.to_film(&mut rays, film_distance_mm);
                 SpotDiagram::of(&rays, Some(DVec2::from_slice(&numbers(&row["chief_image"]))))
             };
             let chief = spot(&[DVec2::ZERO], Vignetting::Off);

@@ -15,7 +15,7 @@ const MOST_SAMPLES: usize = 4000;
 /// How the point-spread functions of a lens are sampled over field, depth and wavelength.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum BankChoice {
+pub enum BankSpec {
     /// Rays of 9 fields, 9 depths and 4 wavelengths, interpolated.
     #[default]
     Standard,
@@ -28,7 +28,7 @@ pub enum BankChoice {
     Paper,
 }
 
-impl BankChoice {
+impl BankSpec {
     /// Traces a model of a lens's image, and measures the error of its interpolation on pixels of this size.
     ///
     /// `standard` has the standard numbers of samples.
@@ -137,12 +137,11 @@ mod tests {
     #[test]
     fn a_bank_has_the_error_asked_for_with_fewer_samples_and_the_papers_has_much_more() {
         let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
-        let film_mm = lens.at(550.0).unwrap().film_mm_for(2000.0).unwrap();
-        let standard = BankSettings::covering(film_mm, 0.2, (0.2, 1.0), (420.0, 680.0), Diffraction::None);
-        let build = |choice: BankChoice| choice.build(&lens, standard.clone(), 5.0, &|_| {}, &Cancel::new());
-        let data = |choice: BankChoice| BankData::of(&build(choice).unwrap()).unwrap();
-        let [rays, within, paper] =
-            [BankChoice::Standard, BankChoice::Within { error: 0.02 }, BankChoice::Paper].map(data);
+        let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+        let standard = BankSettings::covering(film_distance_mm, 0.2, (0.2, 1.0), (420.0, 680.0), Diffraction::None);
+        let build = |choice: BankSpec| choice.build(&lens, standard.clone(), 5.0, &|_| {}, &Cancel::new());
+        let data = |choice: BankSpec| BankData::of(&build(choice).unwrap()).unwrap();
+        let [rays, within, paper] = [BankSpec::Standard, BankSpec::Within { error: 0.02 }, BankSpec::Paper].map(data);
         for data in [&rays, &within, &paper] {
             println!("{}", data.summary());
         }
@@ -151,6 +150,6 @@ mod tests {
         assert!(n(&within) < 324 && within.median_error <= 0.02, "{within:?}");
         assert!(rays.median_error < 0.01 && paper.median_error > 20.0 * rays.median_error, "{rays:?} {paper:?}");
         assert!(paper.summary().starts_with("pictures blended") && !within.summary().contains("asked for"));
-        assert!(build(BankChoice::Within { error: -1.0 }).is_err());
+        assert!(build(BankSpec::Within { error: -1.0 }).is_err());
     }
 }

@@ -11,7 +11,7 @@ const MOST: usize = 64;
 /// How many frames a picture is made of.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum FramesChoice {
+pub enum FramesSpec {
     /// One.
     #[default]
     Single,
@@ -42,7 +42,7 @@ impl Exposed {
     }
 }
 
-impl FramesChoice {
+impl FramesSpec {
     /// Checks that the number of frames makes sense.
     ///
     /// # Errors
@@ -102,8 +102,8 @@ mod tests {
         let sensor = Sensor { prnu_fraction: 0.0, dsnu_v: 0.0, ..Sensor::built_in("machine-vision-mono").unwrap() };
         let rate = ElectronRate { planes_e_per_s: vec![Array2::from_elem((64, 64), 2e5)] };
         let shoot =
-            |choice: FramesChoice| choice.expose(&sensor, &rate, &Exposure::seconds(0.01), &Noise::all(1)).unwrap();
-        let (single, burst) = (shoot(FramesChoice::Single), shoot(FramesChoice::Burst(16)));
+            |choice: FramesSpec| choice.expose(&sensor, &rate, &Exposure::seconds(0.01), &Noise::all(1)).unwrap();
+        let (single, burst) = (shoot(FramesSpec::Single), shoot(FramesSpec::Burst(16)));
         assert!(single.merged.is_none() && single.raw == burst.raw && single.volts == burst.volts);
         let deviation = |raw: &Raw| f64::from(raw.linear()[0].std(0.0));
         // 4096 pixels: a standard error of 1.1 % of each deviation.
@@ -113,10 +113,10 @@ mod tests {
 
     #[test]
     fn impossible_numbers_of_frames_are_named() {
-        let error = |choice: FramesChoice| choice.check().unwrap_err().to_string();
-        assert!(error(FramesChoice::Burst(0)).contains("Burst"));
-        assert!(error(FramesChoice::BracketStops(vec![])).contains("0 stops"));
-        assert!(error(FramesChoice::BracketStops(vec![f64::NAN])).contains("NaN"));
-        FramesChoice::BracketStops(vec![-4.0, 0.0]).check().unwrap();
+        let error = |choice: FramesSpec| choice.check().unwrap_err().to_string();
+        assert!(error(FramesSpec::Burst(0)).contains("Burst"));
+        assert!(error(FramesSpec::BracketStops(vec![])).contains("0 stops"));
+        assert!(error(FramesSpec::BracketStops(vec![f64::NAN])).contains("NaN"));
+        FramesSpec::BracketStops(vec![-4.0, 0.0]).check().unwrap();
     }
 }

@@ -6,7 +6,7 @@ use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions,
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
-use crate::{LensChoice, PipelineError, SensorChoice, StopChoice};
+use crate::{LensSpec, PipelineError, SensorSpec, StopSpec};
 
 /// The wavelength of f-numbers, fields and focus where nothing else is said, nm.
 pub const REFERENCE_WAVELENGTH_NM: f64 = 550.0;
@@ -17,7 +17,7 @@ pub fn nearest_to_reference_nm(wavelengths_nm: &[f64]) -> f64 {
     wavelengths_nm.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(REFERENCE_WAVELENGTH_NM)
 }
 
-impl LensChoice {
+impl LensSpec {
     /// Returns what `LENS` on the command line means: a built-in name where it is one, a path where it looks like one or
     /// is one, else a name that is not known.
     pub fn named(text: &str) -> Self {
@@ -30,7 +30,7 @@ impl LensChoice {
     ///
     /// # Errors
     /// When there is none of that name, or its file or a catalogue cannot be read.
-    pub fn open(&self, reading: &LensReading) -> Result<LensFile, PipelineError> {
+    pub fn open(&self, reading: &LensReadOptions) -> Result<LensFile, PipelineError> {
         // Catalogues are read, and refused, for a lens of any kind.
         let options = reading.options()?;
         let mut file = match self {
@@ -46,7 +46,7 @@ impl LensChoice {
     }
 }
 
-impl StopChoice {
+impl StopSpec {
     /// Returns the lens with its stop set.
     ///
     /// # Errors
@@ -68,7 +68,7 @@ impl StopChoice {
     }
 }
 
-impl SensorChoice {
+impl SensorSpec {
     /// Returns what `SENSOR` on the command line means: a path where it looks like one or is one, else a built-in name.
     pub fn named(text: &str) -> Self {
         if is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
@@ -94,7 +94,7 @@ fn is_path(text: &str) -> bool {
 /// What a lens file leaves open, and how to close it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct LensReading {
+pub struct LensReadOptions {
     /// Glass catalogues (`.agf`, `.yml`) to look in before the built-in one.
     pub glasses: Vec<PathBuf>,
     /// What to do with a glass that no catalogue has.
@@ -105,7 +105,7 @@ pub struct LensReading {
     pub seq_numbers: Option<SeqNumbers>,
 }
 
-impl LensReading {
+impl LensReadOptions {
     /// Returns it as options of the lens readers.
     fn options(&self) -> Result<ReadOptions, PipelineError> {
         let catalogues = self.glasses.iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
@@ -119,10 +119,10 @@ mod tests {
 
     #[test]
     fn names_and_paths_are_told_apart() {
-        assert_eq!(LensChoice::named("dgauss-50mm"), LensChoice::BuiltIn("dgauss-50mm".to_owned()));
-        assert_eq!(LensChoice::named("fisheye-12.5mm"), LensChoice::BuiltIn("fisheye-12.5mm".to_owned()));
+        assert_eq!(LensSpec::named("dgauss-50mm"), LensSpec::BuiltIn("dgauss-50mm".to_owned()));
+        assert_eq!(LensSpec::named("fisheye-12.5mm"), LensSpec::BuiltIn("fisheye-12.5mm".to_owned()));
         for path in ["lens.dat", "./lens", "folder/lens"] {
-            assert_eq!(LensChoice::named(path), LensChoice::File(PathBuf::from(path)));
+            assert_eq!(LensSpec::named(path), LensSpec::File(PathBuf::from(path)));
         }
     }
 }

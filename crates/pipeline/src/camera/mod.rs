@@ -19,11 +19,11 @@ use dioptric_spectrum::WavelengthGrid;
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-pub use bank::{BankChoice, BankData};
-pub use frames::{Exposed, FramesChoice};
-pub use lens::{LensReading, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+pub use bank::{BankData, BankSpec};
+pub use frames::{Exposed, FramesSpec};
+pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 pub use movements::Movements;
-pub use scene::{SceneChoice, SceneSource};
+pub use scene::{SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
 
 use self::check::Checker;
@@ -41,32 +41,32 @@ pub struct Camera {
     /// What to call the shot.
     pub name: String,
     /// The lens.
-    pub lens: LensChoice,
+    pub lens: LensSpec,
     /// What the lens's file leaves open.
     #[serde(default)]
-    pub lens_reading: LensReading,
+    pub lens_reading: LensReadOptions,
     /// How far its stop is open.
     #[serde(default)]
-    pub stop: StopChoice,
+    pub stop: StopSpec,
     /// How it is turned and moved before the film.
     #[serde(default)]
     pub movements: Movements,
     /// Where the film is.
-    pub focus: FocusChoice,
+    pub focus: FocusSpec,
     /// How large the film is.
     #[serde(default)]
-    pub film: FilmChoice,
+    pub film: FilmSpec,
     /// Diffraction at the stop.
     #[serde(default)]
     pub diffraction: Diffraction,
     /// How the point-spread functions are sampled.
     #[serde(default)]
-    pub bank: BankChoice,
+    pub bank: BankSpec,
     /// How the point-spread functions are laid over the scene.
     #[serde(default)]
-    pub blur: BlurChoice,
+    pub blur: BlurSpec,
     /// The sensor.
-    pub sensor: SensorChoice,
+    pub sensor: SensorSpec,
     /// The exposure.
     #[serde(default = "automatic")]
     pub exposure: ExposureControl,
@@ -75,15 +75,15 @@ pub struct Camera {
     pub noise: NoiseSources,
     /// How many frames the picture is made of.
     #[serde(default)]
-    pub frames: FramesChoice,
+    pub frames: FramesSpec,
     /// From the raw frame to the picture.
     #[serde(default)]
     pub processing: Processing,
     /// What stands before the camera.
-    pub scene: SceneChoice,
+    pub scene: SceneSpec,
     /// The bands that are simulated.
     #[serde(default)]
-    pub wavelengths: WavelengthChoice,
+    pub wavelengths: WavelengthSpec,
     /// The seed of all noise.
     #[serde(default = "one")]
     pub seed: u64,
@@ -95,7 +95,7 @@ pub struct Camera {
 /// Which lens.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum LensChoice {
+pub enum LensSpec {
     /// A built-in lens by name.
     BuiltIn(String),
     /// A lens file.
@@ -117,7 +117,7 @@ pub enum LensChoice {
 /// How far the stop is open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum StopChoice {
+pub enum StopSpec {
     /// As the lens file says.
     #[default]
     AsGiven,
@@ -130,7 +130,7 @@ pub enum StopChoice {
 /// Where the film is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum FocusChoice {
+pub enum FocusSpec {
     /// In focus for an object at this distance from the first vertex, mm.
     DistanceMm(f64),
     /// At this distance from the last vertex, mm.
@@ -142,7 +142,7 @@ pub enum FocusChoice {
 /// How large the film is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum FilmChoice {
+pub enum FilmSpec {
     /// The pixels of the sensor.
     #[default]
     Sensor,
@@ -163,7 +163,7 @@ pub enum FilmChoice {
 /// How the point-spread functions are laid over the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum BlurChoice {
+pub enum BlurSpec {
     /// In layers of depth, near ones hiding far ones.
     #[default]
     Layered,
@@ -174,7 +174,7 @@ pub enum BlurChoice {
 /// Which sensor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum SensorChoice {
+pub enum SensorSpec {
     /// A built-in sensor by name.
     BuiltIn(String),
     /// A sensor file.
@@ -184,7 +184,7 @@ pub enum SensorChoice {
 /// The bands that are simulated.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum WavelengthChoice {
+pub enum WavelengthSpec {
     /// Those of the scene; 400–700 nm in steps of 10 nm where it has none of its own.
     #[default]
     Scene,
@@ -201,7 +201,7 @@ pub enum WavelengthChoice {
     ListNm(Vec<f64>),
 }
 
-impl WavelengthChoice {
+impl WavelengthSpec {
     /// Returns the bands asked for, or `None` for those of the scene.
     ///
     /// # Errors
@@ -270,26 +270,26 @@ impl Camera {
 
     fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
         match &self.lens {
-            LensChoice::Thin { focal_length_mm, diameter_mm } => {
+            LensSpec::Thin { focal_length_mm, diameter_mm } => {
                 checker.positive("focal_length_mm", *focal_length_mm)?;
                 checker.positive("diameter_mm", *diameter_mm)?;
             }
-            LensChoice::Pinhole { diameter_mm } => checker.positive("diameter_mm", *diameter_mm)?,
-            LensChoice::BuiltIn(_) | LensChoice::File(_) => {}
+            LensSpec::Pinhole { diameter_mm } => checker.positive("diameter_mm", *diameter_mm)?,
+            LensSpec::BuiltIn(_) | LensSpec::File(_) => {}
         }
         if let Some(slope_per_nm) = self.lens_reading.slope_per_nm {
             checker.finite("slope_per_nm", slope_per_nm)?;
         }
         match self.stop {
-            StopChoice::FNumber(n) => checker.positive("FNumber", n)?,
-            StopChoice::DiameterMm(d) => checker.positive("DiameterMm", d)?,
-            StopChoice::AsGiven => {}
+            StopSpec::FNumber(n) => checker.positive("FNumber", n)?,
+            StopSpec::DiameterMm(d) => checker.positive("DiameterMm", d)?,
+            StopSpec::AsGiven => {}
         }
         match self.focus {
-            FocusChoice::DistanceMm(d) if d == f64::INFINITY => {}
-            FocusChoice::DistanceMm(d) => checker.positive("DistanceMm", d)?,
-            FocusChoice::FilmMm(d) => checker.finite("FilmMm", d)?,
-            FocusChoice::NearObject => {}
+            FocusSpec::DistanceMm(d) if d == f64::INFINITY => {}
+            FocusSpec::DistanceMm(d) => checker.positive("DistanceMm", d)?,
+            FocusSpec::FilmMm(d) => checker.finite("FilmMm", d)?,
+            FocusSpec::NearObject => {}
         }
         let Movements { tilt_deg, swing_deg, rise_mm, shift_mm } = self.movements;
         for (key, value) in
@@ -297,7 +297,7 @@ impl Camera {
         {
             checker.finite(key, value)?;
         }
-        if let FilmChoice::Pixels { columns, rows, pitch_um } = self.film {
+        if let FilmSpec::Pixels { columns, rows, pitch_um } = self.film {
             checker.count("columns", columns, 1..=65_536)?;
             checker.count("rows", rows, 1..=65_536)?;
             checker.positive("pitch_um", pitch_um)?;
@@ -305,31 +305,31 @@ impl Camera {
         if let Err(PsfError::Setting { key, found, expected }) = self.diffraction.check() {
             checker.wrong(key, &found.to_string(), expected)?;
         }
-        if let BankChoice::Within { error } = self.bank {
+        if let BankSpec::Within { error } = self.bank {
             checker.positive("error", error)?;
         }
         self.exposure.check().map_err(|error| checker.of_sensor(error))?;
         match &self.wavelengths {
-            WavelengthChoice::Scene => {}
-            WavelengthChoice::Range { first_nm, last_nm, step_nm } => {
+            WavelengthSpec::Scene => {}
+            WavelengthSpec::Range { first_nm, last_nm, step_nm } => {
                 checker.positive("first_nm", *first_nm)?;
                 checker.positive("last_nm", *last_nm)?;
                 checker.positive("step_nm", *step_nm)?;
             }
-            WavelengthChoice::ListNm(list) => list.iter().try_for_each(|&nm| checker.positive("ListNm", nm))?,
+            WavelengthSpec::ListNm(list) => list.iter().try_for_each(|&nm| checker.positive("ListNm", nm))?,
         }
         self.frames.check()?;
         self.scene.check(checker)
     }
 
     pub(crate) fn resolve_paths(&mut self, folder: &Path) {
-        if let LensChoice::File(path) = &mut self.lens {
+        if let LensSpec::File(path) = &mut self.lens {
             *path = folder.join(&path);
         }
         for path in &mut self.lens_reading.glasses {
             *path = folder.join(&path);
         }
-        if let SensorChoice::File(path) = &mut self.sensor {
+        if let SensorSpec::File(path) = &mut self.sensor {
             *path = folder.join(&path);
         }
         self.scene.resolve_paths(folder);
@@ -376,7 +376,7 @@ mod tests {
             parse(&SHORT.replace("sensor:", &with)).unwrap().processing
         };
         assert_eq!(of(""), Processing::default());
-        assert_eq!(of("white: GreyWorld"), Processing { white: WhiteBalance::GrayWorld, ..Processing::default() });
+        assert_eq!(of("white: GrayWorld"), Processing { white: WhiteBalance::GrayWorld, ..Processing::default() });
         assert_eq!(of("white: Light(D50), curve: Srgb"), Processing::for_light(Illuminant::D50));
         assert_eq!(of("demosaic: Directional, highlights: Clip"), Processing::plain());
         let light = "white: Light(Chromaticity(x: 0.46, y: 0.414))";
@@ -398,9 +398,9 @@ mod tests {
     #[test]
     fn what_is_left_out_has_a_default_and_paths_follow_the_file() {
         let camera = parse(SHORT).unwrap();
-        assert_eq!((camera.seed, camera.film, camera.blur), (1, FilmChoice::Sensor, BlurChoice::Layered));
+        assert_eq!((camera.seed, camera.film, camera.blur), (1, FilmSpec::Sensor, BlurSpec::Layered));
         assert_eq!(camera.diffraction, Diffraction::Hurb { gamma: 1.0 });
-        assert_eq!(camera.sensor, SensorChoice::File(PathBuf::from("folder/my/sensor.ron")));
+        assert_eq!(camera.sensor, SensorSpec::File(PathBuf::from("folder/my/sensor.ron")));
     }
 
     #[track_caller]

@@ -58,9 +58,9 @@ mod tests {
         let point = ObjectPoint::from_field(&mono, field_tan, 0.0);
         let mut rays = rays_towards(&point, &[DVec2::ZERO], mono.projection_center_z_mm(), 0.0);
         mono.trace(&mut rays, Vignetting::Off);
-        let film_mm = mono.first_order().bfl_mm;
-        mono.to_film(&mut rays, film_mm);
-        mono.film_point(rays.point_mm(0), film_mm).in_picture_mm()
+        let film_distance_mm = mono.first_order().bfl_mm;
+        mono.to_film(&mut rays, film_distance_mm);
+        mono.film_point(rays.point_mm(0), film_distance_mm).in_picture_mm()
     }
 
     #[test]

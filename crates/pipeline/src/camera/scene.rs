@@ -15,7 +15,7 @@ use crate::PipelineError;
 /// What stands before the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SceneChoice {
+pub struct SceneSpec {
     /// Where its radiance comes from.
     pub source: SceneSource,
     /// Horizontal field of view from edge to edge, degrees; for files that hold no camera data, and for targets.
@@ -68,7 +68,7 @@ pub enum SceneSource {
 /// The illuminance on what has none of its own, lux.
 const USUAL_LUX: f64 = 1000.0;
 
-impl SceneChoice {
+impl SceneSpec {
     /// A file, with the defaults for all else.
     pub fn of_file(path: PathBuf) -> Self {
         Self {
@@ -201,19 +201,19 @@ mod tests {
     #[test]
     fn only_scenes_of_known_light_are_relit() {
         let folder = tempfile::tempdir().unwrap();
-        let of_file = SceneChoice::of_file(radiance_file(folder.path()));
-        let bare = SceneChoice { depth_m: Some(2.0), field_of_view_deg: Some(20.0), ..of_file };
+        let of_file = SceneSpec::of_file(radiance_file(folder.path()));
+        let bare = SceneSpec { depth_m: Some(2.0), field_of_view_deg: Some(20.0), ..of_file };
         // As it is, it is opened, and what light it is under is not known.
         assert!(bare.open(None).unwrap().light.is_none());
         for asked in [
-            SceneChoice { illuminant: Some(Illuminant::A), ..bare.clone() },
-            SceneChoice { illuminance_lux: Some(5.0), ..bare.clone() },
+            SceneSpec { illuminant: Some(Illuminant::A), ..bare.clone() },
+            SceneSpec { illuminance_lux: Some(5.0), ..bare.clone() },
         ] {
             let message = asked.open(None).unwrap_err().to_string();
             assert!(message.contains("room.exr") && message.contains("not known"), "{message}");
         }
         // Once its light is stated, it is put under another: the same gray, of the same luminance.
-        let stated = SceneChoice { light: Some(Illuminant::D65), illuminant: Some(Illuminant::A), ..bare.clone() };
+        let stated = SceneSpec { light: Some(Illuminant::D65), illuminant: Some(Illuminant::A), ..bare.clone() };
         let relit = stated.open(None).unwrap();
         let white = Illuminant::A.white_radiance(relit.radiance.grid(), 100.0);
         for (found, white) in relit.radiance.spectrum_at(1, 2).iter().zip(white) {
@@ -222,6 +222,6 @@ mod tests {
         }
         assert_eq!(relit.light.unwrap().illuminant, Illuminant::A);
         // Its illuminance is still not known.
-        assert!(SceneChoice { illuminance_lux: Some(5.0), ..stated }.open(None).is_err());
+        assert!(SceneSpec { illuminance_lux: Some(5.0), ..stated }.open(None).is_err());
     }
 }

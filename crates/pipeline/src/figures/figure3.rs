@@ -48,7 +48,7 @@ impl CountedPsfs {
             .zip(&wavelengths_nm)
             .map(|(rms_um, &nm)| {
                 let mono = lens.at(nm)?;
-                let image_mm = mono.film_mm_for(object_mm - mono.last_vertex_z_mm())?;
+                let image_mm = mono.film_distance_mm_for(object_mm - mono.last_vertex_z_mm())?;
                 // The image of what is nearer than the distance in focus lies behind the film.
                 Ok((1e-3 * rms_um * 2f64.sqrt()).copysign(image_mm - FIGURE_3_FILM_MM))
             })

@@ -19,7 +19,7 @@ pub(super) fn build(
     let domain = PsfDomain {
         lens: &lens.lens,
         film: &place.film(),
-        film_mm: place.film_distance_mm,
+        film_distance_mm: place.film_distance_mm,
         depth_range_m,
         grid,
         diffraction: inputs.diffraction,

@@ -10,7 +10,7 @@ use super::{
     scene::ResolvedScene,
     spec::{FilmInputs, Raster},
 };
-use crate::{FocusChoice, Movements, PipelineError};
+use crate::{FocusSpec, Movements, PipelineError};
 
 /// The share of the scene's samples that may be nearer than the near object.
 const NEAR_SHARE: f64 = 0.02;
@@ -85,13 +85,13 @@ pub(super) fn place(
     })
 }
 
-fn place_film(focus: FocusChoice, lens: &MonoLens, scene: &Scene) -> Result<f64, PipelineError> {
+fn place_film(focus: FocusSpec, lens: &MonoLens, scene: &Scene) -> Result<f64, PipelineError> {
     match focus {
-        FocusChoice::FilmMm(film_mm) => Ok(film_mm),
-        FocusChoice::DistanceMm(distance_mm) => Ok(lens.film_mm_for(distance_mm)?),
-        FocusChoice::NearObject => {
+        FocusSpec::FilmMm(film_distance_mm) => Ok(film_distance_mm),
+        FocusSpec::DistanceMm(distance_mm) => Ok(lens.film_distance_mm_for(distance_mm)?),
+        FocusSpec::NearObject => {
             let z_mm = 1e3 * near_depth_m(scene)?;
-            Ok(lens.film_mm_for(z_mm - lens.projection_center_z_mm())?)
+            Ok(lens.film_distance_mm_for(z_mm - lens.projection_center_z_mm())?)
         }
     }
 }
@@ -104,20 +104,20 @@ fn near_depth_m(scene: &Scene) -> Result<f64, PipelineError> {
 }
 
 /// Returns as many pixels as the scene has samples about the axis, of such a pitch that they see the scene's field.
-fn size_film(lens: &MonoLens, film_mm: f64, scene: &Scene) -> Result<Film, PipelineError> {
+fn size_film(lens: &MonoLens, film_distance_mm: f64, scene: &Scene) -> Result<Film, PipelineError> {
     let view = scene.require_view()?;
     let (rows, columns) = seen_evenly(&view, scene.rows(), scene.columns())?;
     let (half_rows, half_columns) = (0.5 * rows as f64, 0.5 * columns as f64);
     let half = DVec2::new(half_columns, half_rows);
     let seen_um = match lens.is_rotational() {
-        true => seen_pitch_um(lens, film_mm, &view, half),
-        false => seen_pitch_of_any_um(lens, film_mm, &view, half),
+        true => seen_pitch_um(lens, film_distance_mm, &view, half),
+        false => seen_pitch_of_any_um(lens, film_distance_mm, &view, half),
     };
     // Blur mixes the rim of the scene with the dark beyond.
-    let half_um = seen_um * half_rows.min(half_columns) - 1e3 * widest_blur_mm(lens, film_mm, scene)?;
+    let half_um = seen_um * half_rows.min(half_columns) - 1e3 * widest_blur_mm(lens, film_distance_mm, scene)?;
     let pitch_um = half_um / half_rows.min(half_columns);
     if !(pitch_um.is_finite() && pitch_um > 0.0) {
-        let reason = format!("the film at {film_mm} mm sees no upright picture of the scene");
+        let reason = format!("the film at {film_distance_mm} mm sees no upright picture of the scene");
         return Err(PipelineError::Unsuitable { what: "film: Scene", reason });
     }
     Ok(Film { rows, columns, pitch_um })
@@ -125,17 +125,17 @@ fn size_film(lens: &MonoLens, film_mm: f64, scene: &Scene) -> Result<Film, Pipel
 
 /// Returns the pitch at which the scene, `half` a size across and up in samples, just fills the film, µm: by first order, but
 /// no more than barrel distortion leaves of it, which draws the rim of the scene inwards.
-fn seen_pitch_um(lens: &MonoLens, film_mm: f64, view: &View, half: DVec2) -> f64 {
-    let paraxial_um = 1e3 * height_per_tan_mm(lens, film_mm) / view.focal_px;
+fn seen_pitch_um(lens: &MonoLens, film_distance_mm: f64, view: &View, half: DVec2) -> f64 {
+    let paraxial_um = 1e3 * height_per_tan_mm(lens, film_distance_mm) / view.focal_px;
     let seen = [DVec2::new(half.x, 0.0), DVec2::new(0.0, half.y), half]
-        .map(|place| height_over_paraxial(lens, place.length() / view.focal_px, film_mm))
+        .map(|place| height_over_paraxial(lens, place.length() / view.focal_px, film_distance_mm))
         .into_iter()
         .fold(1.0, f64::min);
     seen * paraxial_um
 }
 
 /// Returns the same of a lens without an axis of symmetry, by the chief rays of the scene's border.
-fn seen_pitch_of_any_um(lens: &MonoLens, film_mm: f64, view: &View, half: DVec2) -> f64 {
+fn seen_pitch_of_any_um(lens: &MonoLens, film_distance_mm: f64, view: &View, half: DVec2) -> f64 {
     const ALONG: i32 = 4;
     let parts = (-ALONG..=ALONG).map(|i| f64::from(i) / f64::from(ALONG));
     let border = parts.flat_map(|part| {
@@ -143,7 +143,7 @@ fn seen_pitch_of_any_um(lens: &MonoLens, film_mm: f64, view: &View, half: DVec2)
     });
     // The film ends where the first point of the border lies on it.
     let pitch_um = |part: DVec2| {
-        let at_mm = chief_ray_mm(lens, part * half / view.focal_px, film_mm)?;
+        let at_mm = chief_ray_mm(lens, part * half / view.focal_px, film_distance_mm)?;
         Some(1e3 * (at_mm / half).abs().max_element())
     };
     border.filter_map(pitch_um).fold(f64::INFINITY, f64::min)
@@ -164,35 +164,35 @@ fn seen_evenly(view: &View, rows: usize, columns: usize) -> Result<(usize, usize
 }
 
 /// Returns how far off axis the chief ray of a unit tangent lands, mm, by first order.
-fn height_per_tan_mm(lens: &MonoLens, film_mm: f64) -> f64 {
-    lens.film_scale_mm(film_mm).abs()
+fn height_per_tan_mm(lens: &MonoLens, film_distance_mm: f64) -> f64 {
+    lens.film_scale_mm(film_distance_mm).abs()
 }
 
 /// Returns by how much the chief ray of a field lands farther out than first order says; 1 where it does not get through.
-fn height_over_paraxial(lens: &MonoLens, tan: f64, film_mm: f64) -> f64 {
-    let landed = chief_ray_mm(lens, DVec2::new(tan, 0.0), film_mm);
-    landed.map_or(1.0, |at_mm| at_mm.x.abs() / (tan * height_per_tan_mm(lens, film_mm)))
+fn height_over_paraxial(lens: &MonoLens, tan: f64, film_distance_mm: f64) -> f64 {
+    let landed = chief_ray_mm(lens, DVec2::new(tan, 0.0), film_distance_mm);
+    landed.map_or(1.0, |at_mm| at_mm.x.abs() / (tan * height_per_tan_mm(lens, film_distance_mm)))
 }
 
 /// Returns where the ray of a far field through the middle of the paraxial entrance pupil lands, mm.
-fn chief_ray_mm(lens: &MonoLens, field_tan: DVec2, film_mm: f64) -> Option<DVec2> {
+fn chief_ray_mm(lens: &MonoLens, field_tan: DVec2, film_distance_mm: f64) -> Option<DVec2> {
     let point = ObjectPoint::from_field(lens, field_tan, 0.0);
     let mut rays = rays_towards(&point, &[DVec2::ZERO], lens.projection_center_z_mm(), 0.0);
     lens.trace(&mut rays, Vignetting::Off);
-    lens.to_film(&mut rays, film_mm);
-    rays.fate[0].is_in_flight().then(|| lens.film_point(rays.point_mm(0), film_mm).mm)
+    lens.to_film(&mut rays, film_distance_mm);
+    rays.fate[0].is_in_flight().then(|| lens.film_point(rays.point_mm(0), film_distance_mm).mm)
 }
 
 /// Returns the radius of the largest blur of the scene on the axis, mm, by first order.
-fn widest_blur_mm(lens: &MonoLens, film_mm: f64, scene: &Scene) -> Result<f64, PipelineError> {
+fn widest_blur_mm(lens: &MonoLens, film_distance_mm: f64, scene: &Scene) -> Result<f64, PipelineError> {
     let first = lens.first_order();
     let (near_m, far_m) = scene.require_depth()?.range_m();
-    let focus_dioptres = match lens.object_distance_mm_for(film_mm) {
+    let focus_dioptres = match lens.object_distance_mm_for(film_distance_mm) {
         Ok(distance_mm) => 1e3 / (distance_mm + lens.projection_center_z_mm()),
         Err(_) => return Ok(0.0),
     };
     let farthest = [1.0 / near_m, 1.0 / far_m].map(|d| (d - focus_dioptres).abs()).into_iter().fold(0.0, f64::max);
-    let radius_mm = 0.5e-3 * first.entrance_pupil_diameter_mm * farthest * height_per_tan_mm(lens, film_mm);
+    let radius_mm = 0.5e-3 * first.entrance_pupil_diameter_mm * farthest * height_per_tan_mm(lens, film_distance_mm);
     Ok(if radius_mm.is_finite() { radius_mm } else { 0.0 })
 }
 
@@ -217,10 +217,14 @@ mod tests {
         let (view, half) =
             (View { focal_px: 1000.0, center_x_px: 300.0, center_y_px: 200.0 }, DVec2::new(300.0, 200.0));
         let mono = lens.at(550.0).unwrap();
-        let film_mm = mono.first_order().bfl_mm;
-        let straight_um = seen_pitch_um(&mono, film_mm, &view, half);
+        let film_distance_mm = mono.first_order().bfl_mm;
+        let straight_um = seen_pitch_um(&mono, film_distance_mm, &view, half);
         // A symmetric lens: both ways lead to the same, but for how distortion is sampled.
-        assert_relative_eq!(seen_pitch_of_any_um(&mono, film_mm, &view, half), straight_um, max_relative = 2e-3);
+        assert_relative_eq!(
+            seen_pitch_of_any_um(&mono, film_distance_mm, &view, half),
+            straight_um,
+            max_relative = 2e-3
+        );
         let whole = (0, lens.interfaces().len() - 1);
         let aside = CoordinateBreak {
             surfaces: whole,
@@ -232,12 +236,12 @@ mod tests {
         let aside = lens.with_moves(vec![aside]).unwrap().at(550.0).unwrap();
         // A lens 1 mm to the side moves the picture of a far scene by 1 mm, which half the film's width of 15 mm loses: but
         // for the distortion between the corner, which ends the film without the shift, and the side, which ends it with.
-        let shift_um = straight_um - seen_pitch_of_any_um(&aside, film_mm, &view, half);
+        let shift_um = straight_um - seen_pitch_of_any_um(&aside, film_distance_mm, &view, half);
         assert_abs_diff_eq!(shift_um, 1e3 / half.x, epsilon = 2e-3 * straight_um);
     }
 
     #[test]
-    fn a_film_of_the_scene_is_centred_on_its_axis() {
+    fn a_film_of_the_scene_is_centered_on_its_axis() {
         let view = View { focal_px: 500.0, center_x_px: 155.0, center_y_px: 124.5 };
         assert_eq!(seen_evenly(&view, 250, 370).unwrap(), (250, 311));
         assert!(seen_evenly(&View { center_x_px: -3.0, ..view }, 250, 370).is_err());

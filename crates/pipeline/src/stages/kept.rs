@@ -33,13 +33,13 @@ const MEMORY_BYTES: u64 = 2 << 30;
 /// nothing. Results are the same to the bit whether they were kept or made anew, and for any number of threads.
 ///
 /// ```
-/// use dioptric_pipeline::{Camera, FilmChoice, KeptCamera, SceneSource, Silent, WavelengthChoice};
+/// use dioptric_pipeline::{Camera, FilmSpec, KeptCamera, SceneSource, Silent, WavelengthSpec};
 /// use dioptric_spectrum::Cancel;
 ///
 /// let mut camera = Camera::demo()?;
-/// camera.film = FilmChoice::Pixels { columns: 48, rows: 32, pitch_um: 660.0 };
+/// camera.film = FilmSpec::Pixels { columns: 48, rows: 32, pitch_um: 660.0 };
 /// camera.scene.source = SceneSource::StillLife { columns: 54, rows: 36 };
-/// camera.wavelengths = WavelengthChoice::ListNm(vec![450.0, 550.0, 650.0]);
+/// camera.wavelengths = WavelengthSpec::ListNm(vec![450.0, 550.0, 650.0]);
 /// let kept = KeptCamera::new(camera);
 /// let first = kept.capture(&Silent, &Cancel::new())?;
 /// // Another seed: the scene is imaged no second time.

@@ -7,7 +7,7 @@ use dioptric_psf::LensImageModel;
 use dioptric_scene::Scene;
 
 use super::{Watch, film::FilmPlace, spec::PlanInputs};
-use crate::{BlurChoice, PipelineError, Stage};
+use crate::{BlurSpec, PipelineError, Stage};
 
 pub(super) fn plan(
     inputs: &PlanInputs,
@@ -17,8 +17,8 @@ pub(super) fn plan(
     watch: &Watch<'_>,
 ) -> Result<ImagingPlan, PipelineError> {
     let mode = match inputs.blur {
-        BlurChoice::Layered => BlurMode::Layered,
-        BlurChoice::Pointwise => BlurMode::Pointwise,
+        BlurSpec::Layered => BlurMode::Layered,
+        BlurSpec::Pointwise => BlurMode::Pointwise,
     };
     let settings = Settings { mode, ..Settings::default() };
     let spec = ImagingSpec { film: place.film(), grid: scene.radiance.grid().clone(), settings };

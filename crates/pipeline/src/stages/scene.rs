@@ -5,7 +5,7 @@ use dioptric_spectrum::WavelengthGrid;
 use serde::{Deserialize, Serialize};
 
 use super::spec::{GeometryInputs, SceneInputs};
-use crate::{PipelineError, Quality, SceneChoice, SceneSource};
+use crate::{PipelineError, Quality, SceneSource, SceneSpec};
 
 /// A scene in brief: what the stages after the imaging need of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -69,7 +69,7 @@ pub struct ResolvedScene {
 pub(super) fn open(inputs: &SceneInputs) -> Result<ResolvedScene, PipelineError> {
     let GeometryInputs { source, wavelengths, quality, field_of_view_deg, depth_m, .. } = &inputs.geometry;
     let wanted = wavelengths.grid()?;
-    let choice = |source| SceneChoice {
+    let choice = |source| SceneSpec {
         source,
         field_of_view_deg: *field_of_view_deg,
         depth_m: *depth_m,

@@ -14,8 +14,8 @@ use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    BankChoice, BlurChoice, Camera, Diffraction, FilmChoice, FocusChoice, FramesChoice, LensChoice, LensReading,
-    Movements, PipelineError, Quality, SceneSource, StopChoice, WavelengthChoice,
+    BankSpec, BlurSpec, Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec, Movements,
+    PipelineError, Quality, SceneSource, StopSpec, WavelengthSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -55,9 +55,9 @@ impl FileStamp {
 /// The lens, its stop set, moved before the film.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LensInputs {
-    pub(crate) choice: LensChoice,
-    pub(crate) reading: LensReading,
-    pub(crate) stop: StopChoice,
+    pub(crate) choice: LensSpec,
+    pub(crate) reading: LensReadOptions,
+    pub(crate) stop: StopSpec,
     pub(crate) movements: Movements,
     files: Vec<FileStamp>,
 }
@@ -68,7 +68,7 @@ pub(crate) struct GeometryInputs {
     pub(crate) source: SceneSource,
     pub(crate) field_of_view_deg: Option<f64>,
     pub(crate) depth_m: Option<f64>,
-    pub(crate) wavelengths: WavelengthChoice,
+    pub(crate) wavelengths: WavelengthSpec,
     pub(crate) quality: Quality,
     files: Vec<FileStamp>,
 }
@@ -88,7 +88,7 @@ pub(crate) struct SceneInputs {
 pub(crate) struct FilmInputs {
     pub(crate) lens: LensInputs,
     pub(crate) geometry: GeometryInputs,
-    pub(crate) focus: FocusChoice,
+    pub(crate) focus: FocusSpec,
     pub(crate) raster: Raster,
 }
 
@@ -106,14 +106,14 @@ pub(crate) enum Raster {
 pub(crate) struct BankInputs {
     pub(crate) film: FilmInputs,
     pub(crate) diffraction: Diffraction,
-    pub(crate) bank: BankChoice,
+    pub(crate) bank: BankSpec,
 }
 
 /// The plan of the imaging.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PlanInputs {
     pub(crate) bank: BankInputs,
-    pub(crate) blur: BlurChoice,
+    pub(crate) blur: BlurSpec,
 }
 
 /// The spectral irradiance on the film.
@@ -141,7 +141,7 @@ pub(crate) struct FrameInputs {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ShutterInputs {
     pub(crate) exposure: ExposureControl,
-    pub(crate) frames: FramesChoice,
+    pub(crate) frames: FramesSpec,
     pub(crate) noise: Noise,
 }
 
@@ -155,7 +155,7 @@ pub(crate) struct PictureInputs {
 impl LensInputs {
     pub(crate) fn of(camera: &Camera) -> Self {
         let lens_file = match &camera.lens {
-            LensChoice::File(path) => FileStamp::all_of(path),
+            LensSpec::File(path) => FileStamp::all_of(path),
             _ => Vec::new(),
         };
         let catalogues = camera.lens_reading.glasses.iter().map(|path| FileStamp::of(path));
@@ -196,11 +196,11 @@ impl IrradianceInputs {
     pub(crate) fn of(camera: &Camera, sensor: &Sensor, quality: Quality) -> Self {
         let scene = SceneInputs::of(camera, quality);
         let raster = match camera.film {
-            FilmChoice::Sensor => {
+            FilmSpec::Sensor => {
                 Raster::Pixels(Film { rows: sensor.rows, columns: sensor.columns, pitch_um: sensor.pixel_pitch_um })
             }
-            FilmChoice::Pixels { columns, rows, pitch_um } => Raster::Pixels(Film { rows, columns, pitch_um }),
-            FilmChoice::Scene => Raster::Scene,
+            FilmSpec::Pixels { columns, rows, pitch_um } => Raster::Pixels(Film { rows, columns, pitch_um }),
+            FilmSpec::Scene => Raster::Scene,
         };
         let film =
             FilmInputs { lens: LensInputs::of(camera), geometry: scene.geometry.clone(), focus: camera.focus, raster };

@@ -19,7 +19,7 @@ pub struct LensDrawing {
     /// Wavelengths of the rays, nm; focus and f-number are those of the first.
     pub wavelengths_nm: Vec<f64>,
     /// Distance of the film behind the last vertex, mm; `None` for where the object is in focus.
-    pub film_mm: Option<f64>,
+    pub film_distance_mm: Option<f64>,
 }
 
 impl LensDrawing {
@@ -36,15 +36,15 @@ impl LensDrawing {
                 expected: "angles below 89.9 degrees".to_owned(),
             });
         }
-        let film_mm = match self.film_mm {
-            Some(film_mm) => film_mm,
+        let film_distance_mm = match self.film_distance_mm {
+            Some(film_distance_mm) => film_distance_mm,
             None => {
                 let reference_nm = self.wavelengths_nm.first().copied().unwrap_or(REFERENCE_WAVELENGTH_NM);
-                lens.at(reference_nm)?.film_mm_for(self.distance_mm)?
+                lens.at(reference_nm)?.film_distance_mm_for(self.distance_mm)?
             }
         };
         Ok(lens.draw(&Layout {
-            film_mm,
+            film_distance_mm,
             object_distance_mm: self.distance_mm,
             field_tans: self.fields_deg.iter().map(|field| field.to_radians().tan()).collect(),
             wavelengths_nm: self.wavelengths_nm.clone(),
@@ -59,7 +59,12 @@ mod tests {
     use super::*;
 
     fn drawing() -> LensDrawing {
-        LensDrawing { fields_deg: vec![0.0, 14.0], distance_mm: 2000.0, wavelengths_nm: vec![550.0], film_mm: None }
+        LensDrawing {
+            fields_deg: vec![0.0, 14.0],
+            distance_mm: 2000.0,
+            wavelengths_nm: vec![550.0],
+            film_distance_mm: None,
+        }
     }
 
     #[test]

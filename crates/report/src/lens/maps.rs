@@ -8,14 +8,14 @@ use super::{
 };
 use crate::{panel::Mark, panel::MarkKind, panel::Panel, panel::Sheet};
 
-/// Size of a map and of its colour bar, px.
+/// Size of a map and of its color bar, px.
 const MAP_PX: [f64; 2] = [250.0, 248.0];
 const BAR_PX: f64 = 82.0;
 /// Size of the grid of fields, px.
 const GRID_PX: f64 = 620.0;
-/// Steps of colour to each side of white.
+/// Steps of color to each side of white.
 const LEVELS: i32 = 20;
-/// Colours from early to late light: equal steps between these.
+/// Colors from early to late light: equal steps between these.
 const EARLY_TO_LATE: [[f64; 3]; 7] = [
     [5.0, 48.0, 97.0],
     [33.0, 102.0, 172.0],
@@ -27,7 +27,7 @@ const EARLY_TO_LATE: [[f64; 3]; 7] = [
 ];
 
 impl AnalysisPlots<'_> {
-    /// Returns maps of the optical path difference over the stop as SVG, a row a field with its colour bar, and a column a
+    /// Returns maps of the optical path difference over the stop as SVG, a row a field with its color bar, and a column a
     /// wavelength.
     pub fn opd_svg(&self) -> String {
         let n_wavelengths = self.0.wavelengths_nm.len().max(1);

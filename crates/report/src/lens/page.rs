@@ -11,7 +11,7 @@ pub(super) const HEAD_PX: f64 = 84.0;
 /// Size of the plots of a field, and of those over field, px.
 const SMALL_PX: [f64; 2] = [268.0, 196.0];
 const LARGE_PX: [f64; 2] = [268.0, 300.0];
-/// Colours of two lines that are no wavelengths.
+/// Colors of two lines that are no wavelengths.
 const PAIR: [&str; 2] = ["#2166ac", "#b2182b"];
 
 /// The plots of an analysis.
@@ -20,7 +20,7 @@ pub struct AnalysisPlots<'a>(pub &'a LensAnalysis);
 
 impl AnalysisPlots<'_> {
     /// Returns a page of plots as SVG: for each field its spot, ray fans and path differences; over field, curvature,
-    /// distortion, lateral colour and illumination; and axial colour.
+    /// distortion, lateral color and illumination; and axial color.
     pub fn page_svg(&self) -> String {
         let n_wavelengths = self.0.wavelengths_nm.len().max(1);
         let (spots, fans): (Vec<&[SpotRow]>, Vec<&[FanRow]>) =
@@ -63,7 +63,7 @@ impl AnalysisPlots<'_> {
         sheet.to_svg(width, HEAD_PX + SIDE_PX[1] * rows + MARGIN_PX)
     }
 
-    /// Writes what is analysed, and what colours mean.
+    /// Writes what is analyzed, and what colors mean.
     pub(super) fn head(&self, sheet: &mut Sheet, what: &str) {
         sheet.text((MARGIN_PX, 32.0), 19.0, ("#111", "bold"), &format!("{} — {what}", self.0.lens));
         let object = match self.0.distance_mm.is_infinite() {
@@ -81,7 +81,7 @@ impl AnalysisPlots<'_> {
             self.0.x_plane.map_or(String::new(), |x| format!(" (along x {:.3} mm · f/{:.2})", x.efl_mm, x.f_number));
         let words = format!(
             "f = {:.3} mm · f/{:.2}{along_x}{aperture} · {object}{medium} · film {:.4} mm behind the last vertex{film}",
-            self.0.efl_mm, self.0.f_number, self.0.film_mm
+            self.0.efl_mm, self.0.f_number, self.0.film_distance_mm
         );
         sheet.text((MARGIN_PX, 52.0), 12.5, ("#333", "normal"), &words);
         let mut x = MARGIN_PX;
@@ -119,7 +119,7 @@ impl AnalysisPlots<'_> {
         }
     }
 
-    /// The plots over field, and that of axial colour.
+    /// The plots over field, and that of axial color.
     fn field_panels(&self) -> [Panel; 5] {
         let last = self.0.curves.last().map_or(1.0, |row| row.place.field_deg).max(1e-3);
         let upright = |title: &str, x_label: &str, half: f64, marks: Vec<Mark>| Panel {
@@ -174,7 +174,7 @@ impl AnalysisPlots<'_> {
         [
             upright("field curvature", bend_label, half_range_x(&bends), bends),
             upright("distortion", "%: — against tan θ, - - against θ", half_range_x(&distortions), distortions),
-            upright("lateral colour", "µm from the reference", half_range_x(&colors), colors),
+            upright("lateral color", "µm from the reference", half_range_x(&colors), colors),
             Panel {
                 title: "relative illumination".to_owned(),
                 x_label: "field, °".to_owned(),
@@ -209,7 +209,7 @@ impl AnalysisPlots<'_> {
         let ends = self.0.wavelengths_nm.iter().fold((f64::MAX, f64::MIN), |e, nm| (e.0.min(*nm), e.1.max(*nm)));
         let half = half_range_x(&marks);
         Panel {
-            title: "axial colour".to_owned(),
+            title: "axial color".to_owned(),
             x_label: "focus, mm: — paraxial, - - least spot".to_owned(),
             y_label: "wavelength, nm".to_owned(),
             x_range: (-half, half),

@@ -1,4 +1,4 @@
-//! Point-spread functions in colour, laid out over field and depth as in Figure 1.
+//! Point-spread functions in color, laid out over field and depth as in Figure 1.
 
 use dioptric_optics::glam::DVec2;
 use dioptric_psf::{Kernel, LensImage, LensImageModel, PsfQuery};
@@ -9,7 +9,7 @@ use ndarray::Array2;
 use crate::png::enlarged;
 use dioptric_pipeline::{REFERENCE_WAVELENGTH_NM, display::LinearRgb, display::SpectrumToRgb};
 
-/// Space between tiles, pixels, and its grey.
+/// Space between tiles, pixels, and its gray.
 const GAP: u32 = 3;
 const PAPER: Rgb<u8> = Rgb([36, 36, 40]);
 
@@ -102,14 +102,14 @@ impl Point {
         bank.kernel(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um })
     }
 
-    /// How far from the reference wavelength's image this one lies, µm, right and up: lateral colour.
+    /// How far from the reference wavelength's image this one lies, µm, right and up: lateral color.
     fn lateral_color_um(&self, bank: &LensImageModel) -> DVec2 {
         let at = |nm: f64| bank.centroid_mm(self.field_tan, self.dioptres, nm);
         1e3 * (at(self.wavelength_nm) - at(REFERENCE_WAVELENGTH_NM))
     }
 }
 
-/// Returns a point-spread function in a window that is centred on the image of the reference wavelength.
+/// Returns a point-spread function in a window that is centered on the image of the reference wavelength.
 fn window(bank: &LensImageModel, point: &Point, pitch_um: f64, size: usize) -> Array2<f32> {
     let kernel = point.kernel(bank, pitch_um).samples;
     let shift = (point.lateral_color_um(bank) / pitch_um).round();

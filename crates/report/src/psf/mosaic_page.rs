@@ -27,7 +27,7 @@ const SCALE: u32 = 22;
 /// rest of it small.
 const HELD: f64 = 0.98;
 
-/// Draws all pictures: wavelengths across, with the whole light of all of them in colour at the end of each row;
+/// Draws all pictures: wavelengths across, with the whole light of all of them in color at the end of each row;
 /// fields and distances down.
 ///
 /// Each tile is exposed for its brightest pixel. The tiles of a row are of one scale, told by the bar below them,
@@ -72,7 +72,7 @@ pub fn psf_mosaic(set: &PsfSet) -> Result<RgbImage, PipelineError> {
 /// Returns the side of the square that holds nearly all light of each picture of a point and of them all, µm.
 fn row_side_um(set: &PsfSet, point: Range<usize>) -> f64 {
     let own = point.clone().filter(|i| !set.rows[*i].is_dark()).map(|i| set.pictures[i].view());
-    let whole = set.whole_light_of(point).map(|light| light.picture);
+    let whole = set.polychromatic_of(point).map(|light| light.picture);
     let side = |picture: ndarray::ArrayView2<'_, f32>| {
         2.0 * dioptric_psf::Picture::new(picture, set.pixel_um).energy_half_side_um(HELD)
     };

@@ -122,7 +122,7 @@ fn glance(report: &RunReport) -> String {
         (format!("{} × {}", film.columns, film.rows), format!("pixels of {:.2} µm", film.pitch_um)),
         (
             format!("{:.2} × {:.2} mm", side_mm(film.columns), side_mm(film.rows)),
-            format!("film, {:.3} mm behind the lens", report.film_mm),
+            format!("film, {:.3} mm behind the lens", report.film_distance_mm),
         ),
         (format!("{:.3} ms", report.sensor.exposure_time_s * 1000.0), "exposure".to_owned()),
         (format!("{:.2} lx", report.irradiance.mean_lux), "mean illuminance on the film".to_owned()),

@@ -22,7 +22,7 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
             .collect(),
         distance_mm: page.run.capture.place.focus_distance_mm.unwrap_or(f64::INFINITY),
         wavelengths_nm: vec![REFERENCE_WAVELENGTH_NM],
-        film_mm: Some(page.run.capture.place.film_distance_mm),
+        film_distance_mm: Some(page.run.capture.place.film_distance_mm),
     };
     let pictures = Pictures {
         picture: data_uri(page.picture_png),
@@ -61,7 +61,7 @@ fn seen(light: &LinearRgb) -> String {
     embedded(&thumbnail(&light.to_srgb(light.level_at(0.99).max(f64::MIN_POSITIVE))))
 }
 
-/// A few bands, each in its colour and exposed alike.
+/// A few bands, each in its color and exposed alike.
 fn bands(page: &Page<'_>) -> Vec<Figure> {
     let bands = &page.run.capture.irradiance.summary.bands;
     let top = bands.iter().map(|(_, plane)| level_at(plane, 0.995)).fold(f64::MIN_POSITIVE, f64::max);
@@ -81,7 +81,7 @@ fn bands(page: &Page<'_>) -> Vec<Figure> {
         .collect()
 }
 
-/// The colour of a band, its largest part 1.
+/// The color of a band, its largest part 1.
 fn tint(wavelength_nm: f64) -> [f64; 3] {
     let text = wavelength_color(wavelength_nm);
     let parts = [1, 3, 5].map(|i| u8::from_str_radix(&text[i..i + 2], 16).map_or(0.0, f64::from));

@@ -1,4 +1,4 @@
-//! A folder with one grey picture a band, as in the CAVE database.
+//! A folder with one gray picture a band, as in the CAVE database.
 
 use std::{
     fs,
@@ -16,7 +16,7 @@ use crate::SceneError;
 /// Names of a text file with the wavelengths of numbered pictures, nm.
 const LISTS: [&str; 2] = ["wavelengths.txt", "wavelengths.csv"];
 
-/// Reads a folder of grey PNG or TIFF pictures, one a band, as reflectances: the largest code is 1, linear.
+/// Reads a folder of gray PNG or TIFF pictures, one a band, as reflectances: the largest code is 1, linear.
 ///
 /// Names end in the wavelength in nm (`toys_400.png`, `toys-400.5nm.png`) or in a number (`toys_ms_01.png`). Numbered
 /// pictures take their wavelengths, in the order of their numbers, from `wavelengths`, from a file `wavelengths.txt` in
@@ -41,7 +41,7 @@ pub fn read_band_folder(folder: &Path, wavelengths: Option<&WavelengthGrid>) -> 
         let reason = format!("{} pictures of bands, but {} wavelengths", pictures.len(), grid.len());
         return Err(unreadable(folder, reason));
     }
-    let planes: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| grey(path)).collect();
+    let planes: Result<Vec<_>, _> = pictures.par_iter().map(|(_, path)| gray(path)).collect();
     SpectralImage::new(Quantity::Reflectance, grid, planes?).map_err(values)
 }
 
@@ -91,8 +91,8 @@ fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>
     })
 }
 
-/// Reads a grey picture, white being 1; of a coloured one the green channel, which a grey one saved as RGB repeats.
-fn grey(path: &Path) -> Result<Array2<f32>, SceneError> {
+/// Reads a gray picture, white being 1; of a colored one the green channel, which a gray one saved as RGB repeats.
+fn gray(path: &Path) -> Result<Array2<f32>, SceneError> {
     let picture = decode(path)?;
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
     let samples: Vec<f32> = match picture {

@@ -26,7 +26,7 @@ pub(crate) struct Attributes {
 }
 
 impl Attributes {
-    /// Returns the camera data; a centre that is not given lies in the middle.
+    /// Returns the camera data; a center that is not given lies in the middle.
     pub(crate) fn view(&self, columns: usize, rows: usize) -> Result<Option<View>, SceneError> {
         let centered = |focal_px| View {
             focal_px,

@@ -12,7 +12,7 @@ use crate::SceneError;
 
 /// Reads a PNG, JPEG or TIFF picture of 8 or 16 bits as the radiance of a display that shows it.
 ///
-/// The picture's white has the luminance `white_cd_m2`. A colour beyond the display's gamut is clipped at 0 in the
+/// The picture's white has the luminance `white_cd_m2`. A color beyond the display's gamut is clipped at 0 in the
 /// bands where it would need negative light.
 ///
 /// # Errors
@@ -50,7 +50,7 @@ pub fn read_picture(
 /// The samples of a picture as they stand in its file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureSamples {
-    /// Each channel with its name: `Y` for grey, `R`, `G` and `B`, or what an EXR file calls it.
+    /// Each channel with its name: `Y` for gray, `R`, `G` and `B`, or what an EXR file calls it.
     pub planes: Vec<(String, Array2<f32>)>,
     /// The highest code of a file of whole numbers, 255 or 65 535; `None` for floating-point samples.
     pub top: Option<u16>,
@@ -115,7 +115,7 @@ mod tests {
     use image::{ImageBuffer, Rgb};
 
     #[test]
-    fn colours_survive_the_lift() {
+    fn colors_survive_the_lift() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         let codes = [[255_u8, 255, 255], [200, 120, 80], [0, 0, 0]];
@@ -165,10 +165,10 @@ mod tests {
         };
         let rgb8 = image::RgbImage::from_fn(4, 3, |x, y| image::Rgb([x as u8, y as u8, 7]));
         check("a.png", rgb8.into(), &["R", "G", "B"], &[2.0, 1.0, 7.0], Some(255));
-        let grey16 =
+        let gray16 =
             image::ImageBuffer::<image::Luma<u16>, _>::from_fn(4, 3, |x, y| image::Luma([(1000 * x + y) as u16]));
-        check("b.png", grey16.clone().into(), &["Y"], &[2001.0], Some(65535));
-        check("c.tif", grey16.into(), &["Y"], &[2001.0], Some(65535));
+        check("b.png", gray16.clone().into(), &["Y"], &[2001.0], Some(65535));
+        check("c.tif", gray16.into(), &["Y"], &[2001.0], Some(65535));
         assert!(read_picture_samples(&folder.path().join("none.png")).unwrap_err().to_string().contains("none.png"));
     }
 }

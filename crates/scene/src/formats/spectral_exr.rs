@@ -31,7 +31,7 @@ pub struct SpectralFile {
     pub image: SpectralImage,
     /// Axial depth, from channel `Z`.
     pub depth: Option<DepthMap>,
-    /// Distance from the projection centre, m, from channel `distance`.
+    /// Distance from the projection center, m, from channel `distance`.
     pub distance_m: Option<Array2<f32>>,
     /// Pinhole geometry, where the file tells it.
     pub view: Option<View>,

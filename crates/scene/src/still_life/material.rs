@@ -53,7 +53,7 @@ pub(super) struct Coat {
     pub(super) f0: f64,
     /// Spread of what it mirrors, as the tangent of an angle.
     pub(super) roughness: f64,
-    /// The pigment that colours what a metal mirrors.
+    /// The pigment that colors what a metal mirrors.
     pub(super) metal: Option<PigmentIndex>,
 }
 
@@ -223,7 +223,7 @@ fn cloth(point: DVec3, normal: DVec3, footprint: f64) -> Surface {
     let fade = (1.6 - 1.6 * footprint / PITCH).clamp(0.0, 1.0);
     let (u, v) = (std::f64::consts::PI * point.x / PITCH, std::f64::consts::PI * point.z / PITCH);
     let over = u.sin() * v.sin();
-    // Where the warp lies on top its colour shows, else that of the weft; afar both mix.
+    // Where the warp lies on top its color shows, else that of the weft; afar both mix.
     let warp_on_top = 0.5 + 0.5 * fade * (6.0 * over).tanh();
     let dyed = warp * warp_on_top + weft * (1.0 - warp_on_top);
     let slub = cloudy(DVec3::new(300.0 * point.x, 2.0, 12.0 * point.z), 300.0 * footprint)
@@ -269,7 +269,7 @@ fn pear(point: DVec3, normal: DVec3, footprint: f64) -> Surface {
     Surface { mix, normal, coat: Coat::clear(0.035, 0.12), glow: None }
 }
 
-/// Peel: the colour, and pores that break the light.
+/// Peel: the color, and pores that break the light.
 fn dimpled(point: DVec3, normal: DVec3, pigment: Pigment, pores_per_m: f64, footprint: f64) -> Surface {
     let at = pores_per_m * point;
     let height = |p: DVec3| smooth(p);

@@ -40,7 +40,7 @@ impl StillLife {
         Self { rows, columns, horizontal_fov_deg: 34.0, with_hidden: false }
     }
 
-    /// Returns the still life on these bands: absolute radiance, the depth at the centre of each sample, the view.
+    /// Returns the still life on these bands: absolute radiance, the depth at the center of each sample, the view.
     ///
     /// A table by a window stands in a room, with things from 0.65 m to 4 m before the eye: fruit, a 24-patch chart
     /// and a printed card at 1 m; a vase, books, a bottle behind; a chair at 2.5 m; a sideboard, books, a lamp, a

@@ -43,7 +43,7 @@ pub(super) fn spread(index: usize, offset: DVec2) -> DVec2 {
     (offset + (index as f64) * STEP).fract()
 }
 
-/// Returns the offset of a pixel: neighbours differ as much as they can.
+/// Returns the offset of a pixel: neighbors differ as much as they can.
 pub(super) fn pixel_offset(row: usize, column: usize, which: usize) -> DVec2 {
     let (x, y) = (column as f64 + 5.588 * which as f64, row as f64 + 3.171 * which as f64);
     let gradient = (52.982_918_9 * (0.067_110_56 * x + 0.005_837_15 * y).fract()).fract();

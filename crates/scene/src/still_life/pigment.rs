@@ -101,7 +101,7 @@ fn hump(nm: f64, center_nm: f64, width_nm: f64) -> f64 {
     (-0.5 * ((nm - center_nm) / width_nm).powi(2)).exp()
 }
 
-/// Three hills that sum to 1 everywhere: the colours that light bounced once is kept in.
+/// Three hills that sum to 1 everywhere: the colors that light bounced once is kept in.
 pub(super) const N_TONES: usize = 3;
 
 /// Every reflectance on the bands of a scene.

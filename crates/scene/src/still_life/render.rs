@@ -1,4 +1,4 @@
-//! The picture of the still life: rays from the eye, light gathered, smoothed and coloured.
+//! The picture of the still life: rays from the eye, light gathered, smoothed and colored.
 
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use glam::{DMat3, DVec2, DVec3};
@@ -127,7 +127,7 @@ pub(super) struct Layer {
 pub(super) enum Which {
     /// The first on each ray.
     First,
-    /// The first behind the thing at the centre of the pixel.
+    /// The first behind the thing at the center of the pixel.
     Behind,
 }
 
@@ -288,7 +288,7 @@ fn alike(a: &Seen, b: &Seen) -> bool {
 struct Aim {
     row: f64,
     column: f64,
-    /// The thing at its centre and where it begins, when what is behind it is wanted.
+    /// The thing at its center and where it begins, when what is behind it is wanted.
     without: Option<(usize, f64)>,
     z_m: f64,
     offset: DVec2,

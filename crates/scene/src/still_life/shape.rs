@@ -116,7 +116,7 @@ struct Piece {
 impl Lathe {
     /// Returns the smooth surface through (height, radius) points, heights ascending.
     ///
-    /// Radius² follows a curve of continuous slope that keeps between neighbouring points: a parabola on each half of
+    /// Radius² follows a curve of continuous slope that keeps between neighboring points: a parabola on each half of
     /// each interval, with slopes limited as Fritsch and Butland (1984) do.
     pub(super) fn smooth(profile: &[[f64; 2]]) -> Self {
         let squared: Vec<[f64; 2]> = profile.iter().map(|[y, r]| [*y, r * r]).collect();

@@ -23,17 +23,17 @@ pub enum Pattern {
         /// Side of a square, in samples.
         check_px: usize,
     },
-    /// One straight edge through the centre, light at the lower left.
+    /// One straight edge through the center, light at the lower left.
     SlantedBar {
         /// Rows a column along the edge.
         slope: f64,
     },
-    /// Lines a sample wide through the centre, evenly turned.
+    /// Lines a sample wide through the center, evenly turned.
     RadialLines {
         /// The number of whole lines; 8 give 16 rays.
         n_lines: usize,
     },
-    /// Single light samples on a square lattice that has one at the centre.
+    /// Single light samples on a square lattice that has one at the center.
     PointArray {
         /// From point to point, in samples.
         spacing_px: usize,
@@ -165,7 +165,7 @@ impl Target {
             Pattern::RadialLines { .. } => "radial lines",
             Pattern::PointArray { .. } => "point array",
             Pattern::SiemensStar { .. } => "Siemens star",
-            Pattern::ColorChart => "colour chart",
+            Pattern::ColorChart => "color chart",
         }
     }
 
@@ -262,7 +262,7 @@ mod tests {
         assert_eq!(plane.dim(), (385, 385));
         assert!(plane[(384, 0)] > plane[(0, 384)]);
         let light_in_top_row = plane.row(0).iter().filter(|&&v| v > 0.5 * plane[(384, 0)]).count();
-        // The edge y = 2.6 x meets the top row, 192 above the centre, 73.8 left of it.
+        // The edge y = 2.6 x meets the top row, 192 above the center, 73.8 left of it.
         assert_eq!(light_in_top_row, 192 - 73);
 
         let lines = Target::paper_radial_lines().scene(&grid()).unwrap();
@@ -284,7 +284,7 @@ mod tests {
             let scene = target.scene(&WavelengthGrid::uniform(380.0, 780.0, 5.0).unwrap()).unwrap();
             scene.validate().unwrap();
             let expected = if pattern == Pattern::Uniform { 250.0 } else { 125.0 };
-            // A star is half light, to the share of its odd centre sample; 5 nm bands are within 0.1 %.
+            // A star is half light, to the share of its odd center sample; 5 nm bands are within 0.1 %.
             assert_relative_eq!(scene.mean_luminance_cd_m2(), expected, max_relative = 0.01);
         }
     }

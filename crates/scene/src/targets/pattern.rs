@@ -34,7 +34,7 @@ fn sample_points(n: usize, row: usize, column: usize) -> impl Iterator<Item = (f
     (0..n * n).map(move |i| (row as f64 + at(i / n), column as f64 + at(i % n)))
 }
 
-/// Tells whether a point of the picture is light; the centres of samples are at whole numbers.
+/// Tells whether a point of the picture is light; the centers of samples are at whole numbers.
 fn is_light(target: &Target, row: f64, column: f64) -> bool {
     let (y, x) = (row - 0.5 * (target.rows as f64 - 1.0), column - 0.5 * (target.columns as f64 - 1.0));
     match target.pattern {
@@ -51,7 +51,7 @@ fn is_light(target: &Target, row: f64, column: f64) -> bool {
     }
 }
 
-/// Draws lines a sample wide from the centre, each to the edge of the largest circle.
+/// Draws lines a sample wide from the center, each to the edge of the largest circle.
 fn radial_lines(rows: usize, columns: usize, n_lines: usize) -> Array2<f64> {
     let mut light = Array2::zeros((rows, columns));
     let (center_y, center_x) = ((rows / 2) as f64, (columns / 2) as f64);

@@ -20,7 +20,7 @@ fn every_part_is_there_and_agrees_with_the_others() {
     let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
     let analysis = request(vec![0.0, 10.0]).compute(&lens).unwrap();
     assert_eq!((analysis.spots.len(), analysis.fans.len(), analysis.fields.len()), (6, 6, 2));
-    assert_eq!((analysis.reference_nm, analysis.film_mm), (550.0, analysis.focus.axis_film_mm.unwrap()));
+    assert_eq!((analysis.reference_nm, analysis.film_distance_mm), (550.0, analysis.focus.axis_film_mm.unwrap()));
     let on_axis = &analysis.spots[1];
     // Vignetting end no ray of the axis, and its spot is round.
     assert_eq!(on_axis.transmission, 1.0);
@@ -53,7 +53,8 @@ fn illumination_is_that_of_the_ray_map() {
     let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(8.0, 550.0).unwrap();
     let analysis = request(vec![0.0, 5.0, 10.0]).compute(&lens).unwrap();
     let tan = 12f64.to_radians().tan();
-    let settings = BankSettings::covering(analysis.film_mm, tan, (0.0, 0.0), (550.0, 550.0), Diffraction::None);
+    let settings =
+        BankSettings::covering(analysis.film_distance_mm, tan, (0.0, 0.0), (550.0, 550.0), Diffraction::None);
     let geometry = LensImageModel::build(&lens, &settings).unwrap().radial_geometry(0.0, 550.0).unwrap();
     let on_axis = geometry.irradiance_per_radiance(0.0);
     for row in &analysis.fields {
@@ -102,9 +103,9 @@ fn what_makes_no_sense_is_refused() {
     assert!(analysis.fields[1].distortion_tangent_percent.unwrap().abs() < 1e-9);
 }
 
-/// Returns the field rows of a lens analysed far away on a film at this place.
-fn on_film(lens: &Lens, film_mm: f64, fields: AnalysisFields) -> LensAnalysis {
-    AnalysisRequest { fields, film: AnalysisFilm::FilmMm(film_mm), ..request(vec![]) }.compute(lens).unwrap()
+/// Returns the field rows of a lens analyzed far away on a film at this place.
+fn on_film(lens: &Lens, film_distance_mm: f64, fields: AnalysisFields) -> LensAnalysis {
+    AnalysisRequest { fields, film: AnalysisFilm::FilmMm(film_distance_mm), ..request(vec![]) }.compute(lens).unwrap()
 }
 
 #[test]
@@ -153,7 +154,7 @@ fn maps_hold_the_aberration_of_the_wavefront() {
 
 #[test]
 fn a_film_curved_like_the_image_is_sharp_all_over() {
-    // A ball with its stop in the middle: every field is as the axis, its image on a sphere about the centre.
+    // A ball with its stop in the middle: every field is as the axis, its image on a sphere about the center.
     let half = |radius_mm: f64, index: f64, thickness_after_mm: f64| Interface {
         surface: Surface::sphere(radius_mm, 9.0),
         medium_after: if index == 1.0 { Glass::Air } else { Glass::Constant { index } },
@@ -164,16 +165,16 @@ fn a_film_curved_like_the_image_is_sharp_all_over() {
         Interface { surface: Surface::plane(1.0), medium_after: Glass::Constant { index }, thickness_after_mm: 10.0 };
     let ball = vec![half(10.0, index, 10.0), stop, half(-10.0, 1.0, 0.0)];
     let ball = Lens::new("ball", "test", ball, 1).unwrap();
-    // The focal length of a ball is n R / (2 (n − 1)), from its centre.
+    // The focal length of a ball is n R / (2 (n − 1)), from its center.
     let film_radius_mm = 0.5 * index * 10.0 / (index - 1.0);
     let curved = ImageSurface { curvature_per_mm: -1.0 / film_radius_mm, conic: 0.0 };
     let (flat, round) = (ball.clone(), ball.with_image_surface(curved).unwrap());
     let [flat, round] = [flat, round].map(|lens| request(vec![0.0, 20.0, 40.0]).compute(&lens).unwrap());
     assert_eq!((flat.film_radius_mm, round.film_radius_mm.map(f64::round)), (None, Some(-15.0)));
-    assert!((flat.film_mm - round.film_mm).abs() < 1e-3, "a spot on the axis hardly sees the bend");
+    assert!((flat.film_distance_mm - round.film_distance_mm).abs() < 1e-3, "a spot on the axis hardly sees the bend");
     for (row, field_deg) in round.fields.iter().zip([0.0f64, 20.0, 40.0]) {
-        // Chief rays go straight on through the centre.
-        let radius_mm = 10.0 + round.film_mm;
+        // Chief rays go straight on through the center.
+        let radius_mm = 10.0 + round.film_distance_mm;
         let near = film_radius_mm * field_deg.to_radians().sin();
         assert!((row.height_mm.unwrap() - near).abs() < (radius_mm - film_radius_mm).abs() + 1e-9, "{row:?}");
         // No ray near a diameter knows which one it is: no astigmatism, and the axis's distance to the film in every
@@ -190,7 +191,7 @@ fn a_film_curved_like_the_image_is_sharp_all_over() {
 }
 
 #[test]
-fn an_anamorphic_lens_is_analysed_along_both_axes() {
+fn an_anamorphic_lens_is_analyzed_along_both_axes() {
     let shape = Shape::Biconic { conic: 0.0, curvature_x_per_mm: 0.03, conic_x: 0.0 };
     let row = |surface, medium_after, thickness_after_mm| Interface { surface, medium_after, thickness_after_mm };
     let front = Surface { curvature_per_mm: 0.01, shape, semi_aperture_mm: 12.0 };
@@ -218,7 +219,7 @@ fn an_anamorphic_lens_is_analysed_along_both_axes() {
 }
 
 #[test]
-fn a_tilted_lens_is_analysed_and_keeps_what_symmetry_is_left() {
+fn a_tilted_lens_is_analyzed_and_keeps_what_symmetry_is_left() {
     let straight = Lens::built_in("tessar-50mm").unwrap().with_f_number(8.0, 550.0).unwrap();
     let tilt = |tilt_deg| {
         let step =
@@ -226,21 +227,22 @@ fn a_tilted_lens_is_analysed_and_keeps_what_symmetry_is_left() {
         straight.clone().with_moves(vec![step]).unwrap()
     };
     let fields = || AnalysisFields::AnglesDeg(vec![[0.0, 0.0], [0.0, 8.0], [0.0, -8.0], [8.0, 0.0], [-8.0, 0.0]]);
-    let film_mm = straight.at(550.0).unwrap().film_mm_for(f64::INFINITY).unwrap();
+    let film_distance_mm = straight.at(550.0).unwrap().film_distance_mm_for(f64::INFINITY).unwrap();
     // Tilted about x, left and right stay alike, and up and down do not.
-    let analysis = on_film(&tilt([0.4, 0.0, 0.0]), film_mm, fields());
+    let analysis = on_film(&tilt([0.4, 0.0, 0.0]), film_distance_mm, fields());
     let rms = |i: usize| analysis.spots[3 * i + 1].rms_um.unwrap();
     assert!((rms(3) / rms(4) - 1.0).abs() < 1e-6, "{} {}", rms(3), rms(4));
     assert!((rms(1) / rms(2) - 1.0).abs() > 1e-3, "{} {}", rms(1), rms(2));
     assert!(analysis.spots.iter().all(|spot| spot.wavefront.is_some()) && analysis.grid.len() == 121);
     // A tilt of nothing is the straight lens.
-    let (none, plain) = (on_film(&tilt([0.0; 3]), film_mm, fields()), on_film(&straight, film_mm, fields()));
+    let (none, plain) =
+        (on_film(&tilt([0.0; 3]), film_distance_mm, fields()), on_film(&straight, film_distance_mm, fields()));
     assert_eq!(none.spots, plain.spots);
     assert!(plain.x_plane.is_none() && analysis.x_plane.is_some());
 }
 
 #[test]
-fn an_objective_in_water_is_analysed_by_heights() {
+fn an_objective_in_water_is_analyzed_by_heights() {
     // Water, a thin lens as the objective and one as the tube lens: ideal, so that all is known.
     let stop = |power_per_mm: f64, thickness_after_mm| Interface {
         surface: Surface {
@@ -262,7 +264,7 @@ fn an_objective_in_water_is_analysed_by_heights() {
     let analysis = request.compute(&lens).unwrap();
     // The front focal length is n f; the magnification is that of the two focal lengths; n sin u = M n′ sin u′ only for an
     // aplanat, which an ideal lens of straight lines is not.
-    assert!((analysis.film_mm - 200.0).abs() < 1e-6 && analysis.object_index == 1.33);
+    assert!((analysis.film_distance_mm - 200.0).abs() < 1e-6 && analysis.object_index == 1.33);
     let expected = 1.33 * 4.0 / 4.0f64.hypot(6.65);
     assert!((analysis.object_na.unwrap() - expected).abs() < 1e-8, "{:?}", analysis.object_na);
     for (row, place_mm) in analysis.fields.iter().zip([[0.0, 0.0], [0.0, 0.05], [0.03, 0.04]]) {

@@ -37,7 +37,7 @@ pub(super) struct SeqSurface {
     pub(super) axis: SeqAxis,
 }
 
-/// What decentres and tilts of a surface do to the axis behind it.
+/// What decenters and tilts of a surface do to the axis behind it.
 #[derive(Clone, Copy, Default, PartialEq)]
 pub(super) enum SeqAxis {
     /// It goes on as the surface has bent it.
@@ -184,7 +184,7 @@ impl SeqSurface {
         Ok(())
     }
 
-    /// Returns the tilts and decentres at this surface, whose number and z along the axis are these.
+    /// Returns the tilts and decenters at this surface, whose number and z along the axis are these.
     ///
     /// Of the program's angles those about x and y turn by the left-hand rule, that about z by the right-hand rule; each
     /// is about the axis that those before it have made. `REV` undoes the same numbers behind the surface. So read them

@@ -1,13 +1,13 @@
-//! Where surfaces stand that are not centred: rigid motions of surfaces, of groups and of the film.
+//! Where surfaces stand that are not centered: rigid motions of surfaces, of groups and of the film.
 
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::OpticsError;
 
-/// A tilt and decentre of neighbouring surfaces, which move as one rigid body.
+/// A tilt and decenter of neighboring surfaces, which move as one rigid body.
 ///
-/// The frame of the moved surfaces is shifted by the decentre and then turned about x, the new y and the new z, each
+/// The frame of the moved surfaces is shifted by the decenter and then turned about x, the new y and the new z, each
 /// by the right-hand rule; with `tilt_first` it is turned about z, the new y and the new x, and then shifted along its
 /// own axes, which undoes the former where all signs are changed. Both are the coordinate breaks of Zemax.
 ///
@@ -49,7 +49,7 @@ impl CoordinateBreak {
     }
 
     /// Returns the motion of points about a pivot on the axis.
-    fn motion(&self, pivot_z_mm: f64) -> Pose {
+    fn motion(&self, pivot_z_mm: f64) -> Placement {
         let [x, y, z] = self.tilt_deg.map(f64::to_radians);
         let (pivot, shift) = (DVec3::Z * pivot_z_mm, DVec3::from_array(self.decenter_mm));
         let about = (DMat3::from_rotation_x(x), DMat3::from_rotation_y(y), DMat3::from_rotation_z(z));
@@ -60,13 +60,13 @@ impl CoordinateBreak {
                 (rotation, rotation * shift)
             }
         };
-        Pose { vertex_mm: pivot + shift - rotation * pivot, rotation }
+        Placement { vertex_mm: pivot + shift - rotation * pivot, rotation }
     }
 }
 
 /// Where a surface stands: the place of its vertex and the directions of its axes, in the lens frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
+pub struct Placement {
     /// The vertex, mm.
     pub vertex_mm: DVec3,
     /// Turns directions of the surface's own frame to those of the lens frame.
@@ -76,21 +76,21 @@ pub struct Pose {
 /// How far a motion and its return may miss each other by rounding: in mm, and in the elements of a rotation.
 const ROUNDING: (f64, f64) = (1e-12, 1e-14);
 
-impl Pose {
+impl Placement {
     const IDENTITY: Self = Self { vertex_mm: DVec3::ZERO, rotation: DMat3::IDENTITY };
 
-    /// Returns the pose of a centred surface.
+    /// Returns the placement of a centered surface.
     pub fn centered(vertex_z_mm: f64) -> Self {
         Self { vertex_mm: DVec3::Z * vertex_z_mm, ..Self::IDENTITY }
     }
 
     /// Returns the point of the lens frame for one of the surface's own frame, mm.
-    pub fn to_lens(&self, point_mm: DVec3) -> DVec3 {
+    pub fn lens_from_surface(&self, point_mm: DVec3) -> DVec3 {
         self.rotation * point_mm + self.vertex_mm
     }
 
     /// Returns the point of the surface's own frame for one of the lens frame, mm.
-    pub fn to_own(&self, point_mm: DVec3) -> DVec3 {
+    pub fn surface_from_lens(&self, point_mm: DVec3) -> DVec3 {
         self.rotation.transpose() * (point_mm - self.vertex_mm)
     }
 
@@ -106,12 +106,12 @@ impl Pose {
 
     /// Returns the motion that first does the other and then this one.
     pub fn after(&self, other: &Self) -> Self {
-        Self { vertex_mm: self.to_lens(other.vertex_mm), rotation: self.rotation * other.rotation }
+        Self { vertex_mm: self.lens_from_surface(other.vertex_mm), rotation: self.rotation * other.rotation }
     }
 
     /// Returns the motion that undoes this one.
     pub fn inverse(&self) -> Self {
-        Self { vertex_mm: self.to_own(DVec3::ZERO), rotation: self.rotation.transpose() }
+        Self { vertex_mm: self.surface_from_lens(DVec3::ZERO), rotation: self.rotation.transpose() }
     }
 
     /// Whether another surface stands on the same axis and is not turned about it, to rounding.
@@ -140,17 +140,19 @@ impl Pose {
 }
 
 /// The motions that moves make: of each surface, and of the film; `None` where nothing moves.
-pub(crate) fn motions(moves: &[CoordinateBreak], vertices_z_mm: &[f64]) -> Option<Vec<Pose>> {
+pub(crate) fn motions(moves: &[CoordinateBreak], vertices_z_mm: &[f64]) -> Option<Vec<Placement>> {
     let n_surfaces = vertices_z_mm.len();
     let motion = |place: usize| {
         let of = |step: &&CoordinateBreak| (step.surfaces.0..=step.surfaces.1).contains(&place);
         let pivot_z_mm = |step: &CoordinateBreak| vertices_z_mm[step.surfaces.0.min(n_surfaces - 1)] + step.pivot_mm;
-        let whole =
-            moves.iter().filter(of).fold(Pose::IDENTITY, |whole, step| whole.after(&step.motion(pivot_z_mm(step))));
-        if whole.is_rest() { Pose::IDENTITY } else { whole }
+        let whole = moves
+            .iter()
+            .filter(of)
+            .fold(Placement::IDENTITY, |whole, step| whole.after(&step.motion(pivot_z_mm(step))));
+        if whole.is_rest() { Placement::IDENTITY } else { whole }
     };
-    let all: Vec<Pose> = (0..=n_surfaces).map(motion).collect();
-    all.iter().any(|motion| *motion != Pose::IDENTITY).then_some(all)
+    let all: Vec<Placement> = (0..=n_surfaces).map(motion).collect();
+    all.iter().any(|motion| *motion != Placement::IDENTITY).then_some(all)
 }
 
 #[cfg(test)]
@@ -165,13 +167,13 @@ mod tests {
     #[test]
     fn rotation_is_that_of_three_turns_by_the_right_hand_rule() {
         // Zemax's rotation matrix: R13 = sin y, R12 = −cos y sin z, R23 = −sin x cos y.
-        let pose = tilted((0, 0)).motion(0.0);
+        let placement = tilted((0, 0)).motion(0.0);
         let [x, y, z] = [10.0, -20.0, 30.0_f64].map(f64::to_radians);
-        let r = pose.rotation;
+        let r = placement.rotation;
         assert!((r.z_axis.x - y.sin()).abs() < 1e-16);
         assert!((r.y_axis.x + y.cos() * z.sin()).abs() < 1e-16);
         assert!((r.z_axis.y + x.sin() * y.cos()).abs() < 1e-16);
-        for (found, expected) in pose.tilt_deg().into_iter().zip([10.0, -20.0, 30.0]) {
+        for (found, expected) in placement.tilt_deg().into_iter().zip([10.0, -20.0, 30.0]) {
             assert!((found - expected).abs() < 1e-13);
         }
         let gimbal = CoordinateBreak { tilt_deg: [25.0, 90.0, 15.0], ..tilted((0, 0)) }.motion(0.0);
@@ -193,9 +195,9 @@ mod tests {
         };
         let motions = motions(&[tilted((0, 3)), back], &[0.0, 4.0, 9.0]).unwrap();
         assert_eq!(motions[0], motions[1]);
-        assert_eq!(motions[2..], [Pose::IDENTITY; 2]);
-        let there = motions[0].to_lens(DVec3::new(1.0, 2.0, 3.0));
-        assert!((motions[0].to_own(there) - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-14);
+        assert_eq!(motions[2..], [Placement::IDENTITY; 2]);
+        let there = motions[0].lens_from_surface(DVec3::new(1.0, 2.0, 3.0));
+        assert!((motions[0].surface_from_lens(there) - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-14);
         assert!(motions[0].inverse().after(&motions[0]).is_rest());
     }
 
