@@ -95,7 +95,7 @@ pub enum PipelineError {
     Psf(PsfError),
     /// The scene.
     #[error(transparent)]
-    Scene(#[from] SceneError),
+    Scene(SceneError),
     /// The blur.
     #[error(transparent)]
     Forward(ForwardError),
@@ -126,6 +126,15 @@ impl From<PsfError> for PipelineError {
         match error {
             PsfError::Cancelled(cancelled) => Self::Cancelled(cancelled),
             other => Self::Psf(other),
+        }
+    }
+}
+
+impl From<SceneError> for PipelineError {
+    fn from(error: SceneError) -> Self {
+        match error {
+            SceneError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Scene(other),
         }
     }
 }

@@ -6,11 +6,11 @@ use dioptric_sensor::{
     AutoExposure, Developed, ElectronRate, ExitPupil, Exposure, ExposureControl, Illumination, Noise, NoiseSources,
     Processing, Sensor, WhiteBalance,
 };
-use dioptric_spectrum::{Bands, Cancel, Illuminant, Spectrum, WavelengthGrid};
+use dioptric_spectrum::{Bands, Illuminant, Spectrum, WavelengthGrid};
 
 use crate::{
-    FrameSet, Frames, FramesSpec, Irradiance, Outputs, PipelineError, SensorSpec, Silent, number,
-    stages::{ShutterInputs, Watch, expose},
+    FrameSet, Frames, FramesSpec, Irradiance, Outputs, PipelineError, SensorSpec, number,
+    stages::{ShutterInputs, expose},
 };
 
 /// How a sensor is exposed to an irradiance image.
@@ -118,8 +118,7 @@ impl SenseRequest {
             frames: self.frames.clone(),
             noise: Noise { sources: self.noise, ..Noise::all(self.seed) },
         };
-        let watch = Watch { progress: &Silent, cancel: &Cancel::new() };
-        let frames = expose(&shutter, &sensor, &rate, &watch)?;
+        let frames = expose(&shutter, &sensor, &rate)?;
         let processing = self.processing.under(self.illuminant.as_ref());
         let developed = sensor.develop(frames.exposed.developed_from(), &processing)?;
         Ok(Sensed {

@@ -1,5 +1,7 @@
 //! The mean rate of photo-electrons in each pixel.
 
+use std::sync::Arc;
+
 use dioptric_sensor::{ElectronRate, ExitPupil, Illumination, Sensor};
 
 use super::{Watch, film::FilmPlace, irradiance::Irradiance};
@@ -12,18 +14,19 @@ pub(super) fn on_film(sensor: &Sensor, place: &FilmPlace) -> Sensor {
 
 /// Collects the electrons of all bands; the pixels are one sample each.
 pub(super) fn collect(
-    irradiance: &Irradiance,
-    sensor: &Sensor,
+    irradiance: Arc<Irradiance>,
+    sensor: Sensor,
     place: &FilmPlace,
     watch: &Watch<'_>,
 ) -> Result<ElectronRate, PipelineError> {
     watch.progress.at(Stage::Sensor, 0.0);
-    watch.cancel.check()?;
     // Pixels of a binned film are the full film's, farther apart: angles are those of the places they stand for.
     let closer = |mm: f64| mm / place.binning as f64;
     let pupil = place.exit_pupil_distance_mm.filter(|_| !sensor.chief_ray_response.is_empty());
     let exit_pupil =
         pupil.map(|mm| ExitPupil { distance_mm: closer(mm), axis_mm: place.exit_pupil_axis_mm.map(closer) });
-    let light = Illumination { exit_pupil, ..Illumination::on_pixels(irradiance) };
-    Ok(sensor.electron_rate(&light)?)
+    watch.run(move || {
+        let light = Illumination { exit_pupil, ..Illumination::on_pixels(&*irradiance) };
+        Ok(sensor.electron_rate(&light)?)
+    })
 }

@@ -2,8 +2,8 @@
 
 use dioptric_sensor::{ElectronRate, Exposure, Sensor};
 
-use super::{Watch, spec::ShutterInputs};
-use crate::{Exposed, PipelineError, Stage};
+use super::spec::ShutterInputs;
+use crate::{Exposed, PipelineError};
 
 /// What a sensor gives for one picture, and how it was exposed.
 #[derive(Clone, Debug)]
@@ -14,14 +14,7 @@ pub struct FrameSet {
     pub exposed: Exposed,
 }
 
-pub(crate) fn expose(
-    inputs: &ShutterInputs,
-    sensor: &Sensor,
-    rate: &ElectronRate,
-    watch: &Watch<'_>,
-) -> Result<FrameSet, PipelineError> {
-    watch.progress.at(Stage::Sensor, 0.5);
-    watch.cancel.check()?;
+pub(crate) fn expose(inputs: &ShutterInputs, sensor: &Sensor, rate: &ElectronRate) -> Result<FrameSet, PipelineError> {
     let exposure = sensor.expose(rate, &inputs.exposure)?;
     let exposed = inputs.frames.expose(sensor, rate, &exposure, &inputs.noise)?;
     Ok(FrameSet { exposure, exposed })

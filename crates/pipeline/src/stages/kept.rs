@@ -1,6 +1,6 @@
 //! A camera that is kept and changed.
 
-use std::sync::Arc;
+use std::{fs, sync::Arc};
 
 use dioptric_forward::{ImagingPlan, check_depth_map};
 use dioptric_psf::LensImageModel;
@@ -22,7 +22,7 @@ use super::{
         PictureInputs, PlanInputs, SceneInputs,
     },
 };
-use crate::{Camera, Frames, PipelineError, Progress, Quality, Stage};
+use crate::{Camera, Frames, PipelineError, Progress, Quality, SceneSource, Stage};
 
 /// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
 const MEMORY_BYTES: u64 = 2 << 30;
@@ -241,6 +241,22 @@ impl KeptCamera {
         Ok(Capture { camera, quality, lens, scene, place, sensor, irradiance, rate, frames, processing, developed })
     }
 
+    /// Checks all that can be without taking the picture: every number, the lens with its stop and glasses, the sensor, and
+    /// that the scene's file is there. Returns the lens.
+    ///
+    /// # Errors
+    /// As [`capture`](Self::capture) has them before it computes anything.
+    pub fn check(&self) -> Result<Arc<ResolvedLens>, PipelineError> {
+        self.camera.validate()?;
+        let inputs = self.irradiance_inputs()?;
+        let lens = self.kept.lens.get_or_make(inputs.plan.bank.film.lens, lens::resolve)?;
+        check_glasses(&lens, self.camera.wavelengths.grid()?.as_ref())?;
+        if let SceneSource::File(path) = &self.camera.scene.source {
+            fs::metadata(path).map_err(|e| PipelineError::Read { path: path.clone(), reason: e.to_string() })?;
+        }
+        Ok(lens)
+    }
+
     /// Returns the model of the lens's image that the picture was made with, traced now where it is not kept.
     ///
     /// # Errors
@@ -298,7 +314,7 @@ impl Chain<'_> {
         self.kept.scene.get_or_make(inputs.clone(), |inputs| {
             self.watch.progress.at(Stage::Scene, 0.0);
             self.watch.cancel.check()?;
-            let scene = scene::open(inputs)?;
+            let scene = scene::open(inputs, &self.watch)?;
             self.watch.progress.at(Stage::Scene, 1.0);
             Ok(scene)
         })
@@ -354,7 +370,7 @@ impl Chain<'_> {
         self.kept.electrons.get_or_make(inputs.clone(), |inputs| {
             let irradiance = self.irradiance(&inputs.irradiance)?;
             let place = self.film(&inputs.irradiance.plan.bank.film, &inputs.irradiance.scene)?;
-            electrons::collect(&irradiance, &electrons::on_film(&inputs.sensor, &place), &place, &self.watch)
+            electrons::collect(irradiance, electrons::on_film(&inputs.sensor, &place), &place, &self.watch)
         })
     }
 
@@ -363,19 +379,21 @@ impl Chain<'_> {
             let irradiance = &inputs.electrons.irradiance;
             let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
             let rate = self.electrons(&inputs.electrons)?;
-            frames::expose(&inputs.shutter, &electrons::on_film(&inputs.electrons.sensor, &place), &rate, &self.watch)
+            self.watch.progress.at(Stage::Sensor, 0.5);
+            let (shutter, sensor) = (inputs.shutter.clone(), electrons::on_film(&inputs.electrons.sensor, &place));
+            self.watch.run(move || frames::expose(&shutter, &sensor, &rate))
         })
     }
 
     fn picture(&self, inputs: PictureInputs, processing: &Processing) -> Result<Arc<Developed>, PipelineError> {
         self.kept.picture.get_or_make(inputs, |inputs| {
             self.watch.progress.at(Stage::Picture, 0.0);
-            self.watch.cancel.check()?;
             let irradiance = &inputs.frames.electrons.irradiance;
             let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
             let frames = self.frames(&inputs.frames)?;
             let sensor = electrons::on_film(&inputs.frames.electrons.sensor, &place);
-            Ok(sensor.develop(frames.exposed.developed_from(), processing)?)
+            let processing = processing.clone();
+            self.watch.run(move || Ok(sensor.develop(frames.exposed.developed_from(), &processing)?))
         })
     }
 }

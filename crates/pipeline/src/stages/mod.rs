@@ -27,11 +27,11 @@ mod resume;
 mod scene;
 mod slot;
 mod spec;
-
-use dioptric_spectrum::Cancel;
+mod watch;
 
 pub(crate) use frames::expose;
 pub(crate) use spec::ShutterInputs;
+pub(crate) use watch::Watch;
 
 pub use film::FilmPlace;
 pub use frames::FrameSet;
@@ -40,12 +40,3 @@ pub use kept::{Capture, KeptCamera, StageCounts};
 pub use lens::ResolvedLens;
 pub use resume::{RESUME_FILE, Resumed};
 pub use scene::{ResolvedScene, SceneSummary};
-
-use crate::Progress;
-
-/// Who follows a computation and may end it.
-#[derive(Clone, Copy)]
-pub(crate) struct Watch<'a> {
-    pub(crate) progress: &'a dyn Progress,
-    pub(crate) cancel: &'a Cancel,
-}

@@ -4,8 +4,11 @@ use dioptric_scene::{Scene, SceneLight};
 use dioptric_spectrum::WavelengthGrid;
 use serde::{Deserialize, Serialize};
 
-use super::spec::{GeometryInputs, SceneInputs};
-use crate::{PipelineError, Quality, SceneSource, SceneSpec};
+use super::{
+    Watch,
+    spec::{GeometryInputs, SceneInputs},
+};
+use crate::{PipelineError, Quality, SceneSource, SceneSpec, Stage};
 
 /// A scene in brief: what the stages after the imaging need of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -66,7 +69,7 @@ pub struct ResolvedScene {
 ///
 /// A full scene has the samples and bands of its source. Of a lower quality a computed scene is made with fewer of both,
 /// and one from a file is averaged over blocks of samples and over wider bands; a depth is that of the middle of its block.
-pub(super) fn open(inputs: &SceneInputs) -> Result<ResolvedScene, PipelineError> {
+pub(super) fn open(inputs: &SceneInputs, watch: &Watch<'_>) -> Result<ResolvedScene, PipelineError> {
     let GeometryInputs { source, wavelengths, quality, field_of_view_deg, depth_m, .. } = &inputs.geometry;
     let wanted = wavelengths.grid()?;
     let choice = |source| SceneSpec {
@@ -94,17 +97,27 @@ pub(super) fn open(inputs: &SceneInputs) -> Result<ResolvedScene, PipelineError>
     };
     match computed {
         _ if *quality == Quality::Full => {
-            Ok(ResolvedScene { scene: choice(source.clone()).open(wanted.as_ref())?, binning: 1 })
+            Ok(ResolvedScene { scene: read(choice(source.clone()), wanted, watch)?, binning: 1 })
         }
         Some((thinned, binning)) => {
             let bands = wanted.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
-            Ok(ResolvedScene { scene: choice(thinned).open(Some(&quality.bands_of(&bands)?))?, binning })
+            Ok(ResolvedScene { scene: read(choice(thinned), Some(quality.bands_of(&bands)?), watch)?, binning })
         }
         None => {
-            let whole = choice(source.clone()).open(wanted.as_ref())?;
+            let whole = read(choice(source.clone()), wanted, watch)?;
             let bands = quality.bands_of(whole.radiance.grid())?;
             let binning = quality.scene_binning(whole.columns());
-            Ok(ResolvedScene { scene: whole.resampled(&bands)?.binned(binning)?, binning })
+            watch.run(move || Ok(ResolvedScene { scene: whole.resampled(&bands)?.binned(binning)?, binning }))
         }
+    }
+}
+
+fn read(scene: SceneSpec, wanted: Option<WavelengthGrid>, watch: &Watch<'_>) -> Result<Scene, PipelineError> {
+    match scene.source {
+        SceneSource::StillLife { .. } => {
+            let progress = |fraction| watch.progress.at(Stage::Scene, fraction);
+            scene.open_with(wanted.as_ref(), &progress, watch.cancel)
+        }
+        SceneSource::File(_) | SceneSource::Target { .. } => watch.run(move || scene.open(wanted.as_ref())),
     }
 }

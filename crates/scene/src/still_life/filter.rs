@@ -1,5 +1,6 @@
 //! Smoothing of sampled light over the pixels of one surface.
 
+use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -25,16 +26,24 @@ pub(super) type Lights = [f32; N_LIGHTS];
 ///
 /// Three passes of a 5 × 5 binomial window, 1, 2 and 4 pixels apart, in which a pixel of another object, another
 /// slope or off the plane does not count (Dammertz et al. 2010). Only bounced light takes part in the third.
-pub(super) fn smoothed(guides: &[Guide], lights: Vec<Lights>, columns: usize) -> Vec<Lights> {
+pub(super) fn smoothed(
+    guides: &[Guide],
+    lights: Vec<Lights>,
+    columns: usize,
+    cancel: &Cancel,
+) -> Result<Vec<Lights>, Cancelled> {
     let mut lights = lights;
     for (step, first) in [(1, 0), (2, 0), (4, BOUNCE)] {
         lights = (0..guides.len())
             .into_par_iter()
             .with_min_len(columns)
-            .map(|index| smoothed_pixel(guides, &lights, columns, index, step, first))
-            .collect();
+            .map(|index| {
+                cancel.check()?;
+                Ok(smoothed_pixel(guides, &lights, columns, index, step, first))
+            })
+            .collect::<Result<_, _>>()?;
     }
-    lights
+    Ok(lights)
 }
 
 fn smoothed_pixel(
@@ -100,7 +109,7 @@ mod tests {
             let (row, column) = (index / columns, index % columns);
             [if column >= 16 { 100.0 } else { 10.0 } + ((row + column) % 2) as f32; N_LIGHTS]
         };
-        let lights = smoothed(&guides, (0..columns * 8).map(noisy).collect(), columns);
+        let lights = smoothed(&guides, (0..columns * 8).map(noisy).collect(), columns, &Cancel::new()).unwrap();
         for (index, light) in lights.iter().enumerate() {
             let expected = if index % columns >= 16 { 100.5 } else { 10.5 };
             assert!(light.iter().all(|v| (v - expected).abs() < 0.2), "{index}: {light:?}");

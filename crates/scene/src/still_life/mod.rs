@@ -14,12 +14,12 @@ mod shape;
 mod tree;
 mod world;
 
-use dioptric_spectrum::WavelengthGrid;
+use dioptric_spectrum::{Cancel, WavelengthGrid};
 use glam::{DMat3, DVec3};
 
 use crate::{HiddenLayer, Scene, SceneError, View};
 use light_probe::light_on_grays;
-use render::{Eye, Which, picture};
+use render::{Eye, Painting, Which, picture};
 
 /// How the still life is pictured.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +54,20 @@ impl StillLife {
     /// # Errors
     /// When the size is 0 or the angle is not between 0° and 180°.
     pub fn scene(&self, grid: &WavelengthGrid) -> Result<Scene, SceneError> {
+        self.scene_with(grid, &|_| {}, &Cancel::new())
+    }
+
+    /// As [`scene`](Self::scene); `progress` gets the part that is done, 0–1, from any thread, and a cancel is looked at every
+    /// millisecond or so.
+    ///
+    /// # Errors
+    /// As [`scene`](Self::scene), and when the work is cancelled.
+    pub fn scene_with(
+        &self,
+        grid: &WavelengthGrid,
+        progress: &(dyn Fn(f64) + Sync),
+        cancel: &Cancel,
+    ) -> Result<Scene, SceneError> {
         if self.rows == 0 || self.columns == 0 || self.rows.saturating_mul(self.columns) > 1 << 28 {
             return Err(SceneError::Setting {
                 what: "the size of the still life",
@@ -64,7 +78,9 @@ impl StillLife {
         let view = View::from_horizontal_fov_deg(self.horizontal_fov_deg, self.columns, self.rows)?;
         let world = room::world();
         let eye = eye(view);
-        let layer = |which| picture(&world, &eye, (self.rows, self.columns), grid, which);
+        let n_layers = if self.with_hidden { 2 } else { 1 };
+        let painting = Painting::new(n_layers * 2 * self.rows, progress, cancel);
+        let layer = |which| picture(&world, &eye, (self.rows, self.columns), grid, which, &painting);
         let first = layer(Which::First)?;
         let hidden = match self.with_hidden {
             true => Some(layer(Which::Behind)?).map(|l| HiddenLayer { radiance: l.radiance, depth: l.depth }),
@@ -92,6 +108,8 @@ fn eye(view: View) -> Eye {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Mutex;
+
     use super::*;
 
     #[test]
@@ -130,6 +148,27 @@ mod tests {
             pool.install(|| StillLife::new(48, 32).scene(&grid).unwrap())
         };
         assert_eq!(on(1), on(3));
+    }
+
+    #[test]
+    fn painting_reports_progress_and_is_cancelled() {
+        let grid = WavelengthGrid::new(vec![550.0]).unwrap();
+        let life = StillLife { with_hidden: true, ..StillLife::new(24, 16) };
+        let (done, cancel) = (Mutex::new(Vec::new()), Cancel::new());
+        life.scene_with(&grid, &|part| done.lock().unwrap().push(part), &cancel).unwrap();
+        let mut done = done.into_inner().unwrap();
+        done.sort_by(f64::total_cmp);
+        // Two layers, each row of which is drawn and then lit.
+        assert_eq!(done, (1..=64).map(|n| f64::from(n) / 64.0).collect::<Vec<_>>());
+        for after in [0.0, 0.2, 0.4, 0.7] {
+            let cancel = Cancel::new();
+            let stop = |part: f64| {
+                if part > after {
+                    cancel.cancel()
+                }
+            };
+            assert!(matches!(life.scene_with(&grid, &stop, &cancel), Err(SceneError::Cancelled(_))), "{after}");
+        }
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! The picture of the still life: rays from the eye, light gathered, smoothed and colored.
 
-use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use dioptric_spectrum::{Cancel, Cancelled, DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use glam::{DMat3, DVec2, DVec3};
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -131,6 +133,25 @@ pub(super) enum Which {
     Behind,
 }
 
+/// How far the painting is, and whether it is still wanted.
+pub(super) struct Painting<'a> {
+    n_rows: usize,
+    n_done: AtomicUsize,
+    progress: &'a (dyn Fn(f64) + Sync),
+    cancel: &'a Cancel,
+}
+
+impl<'a> Painting<'a> {
+    pub(super) fn new(n_rows: usize, progress: &'a (dyn Fn(f64) + Sync), cancel: &'a Cancel) -> Self {
+        Self { n_rows, n_done: AtomicUsize::new(0), progress, cancel }
+    }
+
+    fn row_is_done(&self) {
+        let n_done = 1 + self.n_done.fetch_add(1, Ordering::Relaxed);
+        (self.progress)(n_done as f64 / self.n_rows as f64);
+    }
+}
+
 /// Returns the picture of a world.
 pub(super) fn picture(
     world: &World,
@@ -138,15 +159,16 @@ pub(super) fn picture(
     (rows, columns): (usize, usize),
     grid: &WavelengthGrid,
     which: Which,
+    painting: &Painting<'_>,
 ) -> Result<Layer, SceneError> {
-    let painter = Painter { shader: Shader::new(world, eye.origin, grid), eye, n_bands: grid.len(), which };
-    let drawn: Vec<Row> = (0..rows).into_par_iter().map(|row| painter.row(row, columns)).collect();
+    let painter = Painter { shader: Shader::new(world, eye.origin, grid), eye, n_bands: grid.len(), which, painting };
+    let drawn = (0..rows).into_par_iter().map(|row| painter.row(row, columns)).collect::<Result<Vec<Row>, _>>()?;
     let guides: Vec<Guide> = drawn.iter().flat_map(|row| &row.guides).copied().collect();
     let lights = drawn.iter().flat_map(|row| &row.lights).copied().collect();
-    let lights = smoothed(&guides, lights, columns);
+    let lights = smoothed(&guides, lights, columns, painting.cancel)?;
     let z_m = Array2::from_shape_fn((rows, columns), |(r, c)| drawn[r].z_m[c]);
-    let finished: Vec<Vec<f32>> =
-        drawn.into_par_iter().enumerate().map(|(row, drawn)| painter.finished(row, drawn, &guides, &lights)).collect();
+    let finish = |(row, drawn): (usize, Row)| painter.finished(row, drawn, &guides, &lights);
+    let finished = drawn.into_par_iter().enumerate().map(finish).collect::<Result<Vec<Vec<f32>>, _>>()?;
     let planes = planes(&finished, columns, grid.len());
     Ok(Layer { radiance: SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?, depth: DepthMap::new(z_m)? })
 }
@@ -175,12 +197,14 @@ struct Painter<'a> {
     eye: &'a Eye,
     n_bands: usize,
     which: Which,
+    painting: &'a Painting<'a>,
 }
 
 impl Painter<'_> {
-    fn row(&self, row: usize, columns: usize) -> Row {
+    fn row(&self, row: usize, columns: usize) -> Result<Row, Cancelled> {
         let mut drawn = Row::empty(columns, self.n_bands);
         for column in 0..columns {
+            self.painting.cancel.check()?;
             let aim = Aim::new(self, row, column);
             drawn.z_m.push(aim.z_m as f32);
             let parts = self.parts(&aim, &mut drawn.own[column * self.n_bands..][..self.n_bands]);
@@ -190,7 +214,8 @@ impl Painter<'_> {
             drawn.lights.push(self.shader.gather(largest, row, column));
             drawn.push(parts);
         }
-        drawn
+        self.painting.row_is_done();
+        Ok(drawn)
     }
 
     /// Looks through the points of a pixel.
@@ -231,10 +256,11 @@ impl Painter<'_> {
     }
 
     /// Returns the spectra of a row, columns × bands, under the smoothed light.
-    fn finished(&self, row: usize, mut drawn: Row, guides: &[Guide], lights: &[Lights]) -> Vec<f32> {
+    fn finished(&self, row: usize, mut drawn: Row, guides: &[Guide], lights: &[Lights]) -> Result<Vec<f32>, Cancelled> {
         let columns = drawn.guides.len();
         let (mut fragments, mut pigments) = (drawn.fragments.iter(), drawn.pigments.as_slice());
         for (column, spectrum) in drawn.own.chunks_exact_mut(self.n_bands).enumerate() {
+            self.painting.cancel.check()?;
             for fragment in fragments.by_ref().take(drawn.n_fragments[column]) {
                 let lights = match &fragment.seen {
                     None => lights[row * columns + column],
@@ -246,7 +272,8 @@ impl Painter<'_> {
                 self.shader.add_lit(&lights, own, fragment.sheen, spectrum);
             }
         }
-        drawn.own
+        self.painting.row_is_done();
+        Ok(drawn.own)
     }
 }
 
