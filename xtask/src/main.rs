@@ -1,4 +1,4 @@
-//! Project chores: `cargo xtask layers`, `modules`, `packages`, `figures [--out DIR]`.
+//! Project chores: `cargo xtask layers`, `modules`, `packages`, `schema`, `figures [--out DIR]`.
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool talks to its user")]
 
@@ -6,10 +6,11 @@ mod figures;
 mod layers;
 mod modules;
 mod packages;
+mod schema;
 
 use std::{path::Path, process::ExitCode};
 
-const USAGE: &str = "usage: cargo xtask layers | modules | packages | figures [--out DIR]";
+const USAGE: &str = "usage: cargo xtask layers | modules | packages | schema | figures [--out DIR]";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -17,6 +18,7 @@ fn main() -> ExitCode {
         ["layers"] => layers::run(),
         ["modules"] => modules::run(),
         ["packages"] => packages::run(),
+        ["schema"] => schema::run(),
         ["figures"] => figures::run(Path::new("docs/figures")),
         ["figures", "--out", folder] => figures::run(Path::new(folder)),
         _ => Err(anyhow::anyhow!(USAGE)),

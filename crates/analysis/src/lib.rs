@@ -12,6 +12,7 @@ mod lens;
 pub mod measure;
 mod psf;
 mod run;
+mod sensor_table;
 
 pub use chart::{Corner, LineChart, Scale, Series};
 pub use lens::{
@@ -25,3 +26,4 @@ pub use run::{
     ChannelStatistics, FilmData, IrradianceData, LossRow, Run, RunCharts, RunPlaces, RunReport, SceneData,
     SensorStatistics,
 };
+pub use sensor_table::{SensorRow, built_in_sensors};

@@ -6,12 +6,12 @@ use anyhow::Context;
 use dioptric_analysis::{
     AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensDefaults,
 };
-use dioptric_pipeline::{Staged, StopSpec, parse_numbers, parse_pairs};
+use dioptric_pipeline::{Staged, parse_pairs};
 use dioptric_report::{AnalysisPlots, DRAWS_PNG, write_drawing};
 
 use crate::{
     args::Common,
-    lens::{list_of, open, tell_taken},
+    lens::{list_of, tell_taken},
     lens_args::LensAnalyzeArgs,
     terminal::{Bar, fixed, guarded, print, print_json, remark, remark_on_png},
 };
@@ -22,10 +22,9 @@ const PNG_SCALE: f64 = 1.5;
 const USUAL_NM: [f64; 3] = [450.0, 550.0, 650.0];
 
 pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Result<()> {
-    let used = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?;
+    let used = arguments.lens.open(common)?;
     let request = request(arguments, &used, common)?;
-    let stop = arguments.f_number.map_or(StopSpec::AsGiven, StopSpec::FNumber);
-    let lens = stop.apply_at(used.lens, request.reference_nm())?;
+    let lens = arguments.lens.state.apply(used, request.reference_nm())?.lens;
     // The place is tried before the work.
     let staged = arguments.out.as_ref().map(|path| Staged::folder(path)).transpose()?.map(guarded);
     let bar = Bar::new(common.quiet);
@@ -63,19 +62,17 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
 /// Returns what is asked for; where it is not said, what the lens's file says.
 fn request(arguments: &LensAnalyzeArgs, used: &LensDefaults, common: &Common) -> anyhow::Result<AnalysisRequest> {
     let mut taken = Vec::new();
-    let wavelengths_nm = match &arguments.wavelengths_nm {
-        Some(list) => parse_numbers("--wavelengths-nm", list)?,
-        None => used.wavelengths_or(&USUAL_NM),
-    };
-    if arguments.wavelengths_nm.is_none() && wavelengths_nm != USUAL_NM {
+    let asked_nm = arguments.bands.nm()?;
+    let wavelengths_nm = asked_nm.clone().unwrap_or_else(|| used.wavelengths_or(&USUAL_NM));
+    if asked_nm.is_none() && wavelengths_nm != USUAL_NM {
         taken.push(format!("wavelengths of {} nm", list_of(&wavelengths_nm)));
     }
     let mut request = AnalysisRequest {
         fields: AnalysisFields::ByLight,
-        main_wavelength_nm: used.reference_nm.filter(|_| arguments.wavelengths_nm.is_none()),
+        main_wavelength_nm: used.reference_nm.filter(|_| asked_nm.is_none()),
         wavelengths_nm,
         distance_mm: arguments.distance_mm.unwrap_or(used.distance_mm),
-        film: match (arguments.film_mm, arguments.focus_mm) {
+        film: match (arguments.film.film_mm, arguments.film.focus_mm) {
             (Some(film_mm), _) => AnalysisFilm::FilmMm(film_mm),
             (None, Some(distance_mm)) => AnalysisFilm::FocusMm(distance_mm),
             (None, None) => AnalysisFilm::BestFocus,

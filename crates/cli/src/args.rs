@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::{
-    lens_args::{GlassCommand, LensCommand, LensReadingArgs},
+    camera::{CameraCommand, SensorCommand},
+    lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
-    movement_args::MovementArgs,
 };
 
 /// Simulates a camera from the scene's spectral radiance to the final picture.
@@ -47,6 +47,12 @@ pub(crate) enum Command {
     /// Lists, describes, analyzes, draws and converts lenses
     #[command(subcommand)]
     Lens(LensCommand),
+    /// Writes, describes and checks camera files
+    #[command(subcommand)]
+    Camera(CameraCommand),
+    /// Lists sensors, and writes and describes sensor files
+    #[command(subcommand)]
+    Sensor(SensorCommand),
     /// Lists and describes glasses
     #[command(subcommand)]
     Glass(GlassCommand),
@@ -93,21 +99,9 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "LENS")]
     pub(crate) lens: Option<String>,
     #[command(flatten)]
-    pub(crate) reading: LensReadingArgs,
-    /// Stops the lens down to this f-number
-    #[arg(long, value_name = "N", conflicts_with = "stop_mm")]
-    pub(crate) f_number: Option<f64>,
-    /// Diameter of the stop, mm
-    #[arg(long, value_name = "D")]
-    pub(crate) stop_mm: Option<f64>,
-    /// Focuses on this distance from the first vertex, mm
-    #[arg(long, value_name = "D", conflicts_with = "film_mm")]
-    pub(crate) focus_mm: Option<f64>,
-    /// Places the film this far behind the last vertex, mm
-    #[arg(long, value_name = "D")]
-    pub(crate) film_mm: Option<f64>,
+    pub(crate) state: LensStateArgs,
     #[command(flatten)]
-    pub(crate) movements: MovementArgs,
+    pub(crate) place: FilmArgs,
     /// Horizontal field of view of the scene, degrees
     #[arg(long, value_name = "A")]
     pub(crate) fov_deg: Option<f64>,
@@ -153,9 +147,8 @@ pub(crate) struct RunArgs {
     /// How the scene is blurred
     #[arg(long, value_name = "MODE", value_enum)]
     pub(crate) blur: Option<BlurKind>,
-    /// Bands, nm: a list or first:last:step [default: those of the scene]
-    #[arg(long, value_name = "LIST")]
-    pub(crate) wavelengths_nm: Option<String>,
+    #[command(flatten)]
+    pub(crate) bands: BandArgs,
 }
 
 /// Which exposures are taken, and which files are written of them.
@@ -225,8 +218,8 @@ pub(crate) enum BlurKind {
 /// Rays to trace.
 #[derive(Debug, Args)]
 pub(crate) struct TraceArgs {
-    /// Lens, a file or the name of a built-in one
-    pub(crate) lens: String,
+    #[command(flatten)]
+    pub(crate) lens: LensArgs,
     /// Table of rays with the columns `x_mm,y_mm,z_mm,l,m,n,wavelength_nm`
     #[arg(long, value_name = "IN.csv")]
     pub(crate) rays: PathBuf,
@@ -236,21 +229,16 @@ pub(crate) struct TraceArgs {
     /// Also takes the rays to a film this far behind the last vertex, mm, curved as the lens file says
     #[arg(long, value_name = "D", allow_negative_numbers = true)]
     pub(crate) film_mm: Option<f64>,
-    /// Diameter of the stop, mm [default: the lens's own]
-    #[arg(long, value_name = "D")]
-    pub(crate) stop_mm: Option<f64>,
     /// Ignores the rims of the surfaces
     #[arg(long)]
     pub(crate) no_clip: bool,
-    #[command(flatten)]
-    pub(crate) reading: LensReadingArgs,
 }
 
 /// Point-spread functions to compute.
 #[derive(Debug, Args)]
 pub(crate) struct PsfArgs {
-    /// Lens, a file or the name of a built-in one
-    pub(crate) lens: String,
+    #[command(flatten)]
+    pub(crate) lens: LensArgs,
     /// Field angles, degrees
     #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true)]
     pub(crate) fields_deg: String,
@@ -260,18 +248,10 @@ pub(crate) struct PsfArgs {
     /// Distances of the points from the first vertex, mm; inf for a star
     #[arg(long, value_name = "LIST", default_value = "2000")]
     pub(crate) distances_mm: String,
-    /// Wavelengths, nm: a list or first:last:step
-    #[arg(long, value_name = "LIST", default_value = "550")]
-    pub(crate) wavelengths_nm: String,
-    /// Where the film is
     #[command(flatten)]
-    pub(crate) film: FilmPlace,
-    /// Stops the lens down to this f-number
-    #[arg(long, value_name = "N", conflicts_with = "stop_mm")]
-    pub(crate) f_number: Option<f64>,
-    /// Diameter of the stop, mm [default: the lens's own]
-    #[arg(long, value_name = "D")]
-    pub(crate) stop_mm: Option<f64>,
+    pub(crate) bands: BandArgs,
+    #[command(flatten)]
+    pub(crate) film: FilmArgs,
     /// Diffraction at the stop
     #[arg(long, value_name = "KIND", value_enum, default_value_t = DiffractionKind::None)]
     pub(crate) diffraction: DiffractionKind,
@@ -315,20 +295,6 @@ pub(crate) struct PsfArgs {
     /// Weights of the wavelengths in the light of all together: rows, plots and mosaic [default: all alike]
     #[arg(long, value_name = "LIST")]
     pub(crate) spectral_weights: Option<String>,
-    #[command(flatten)]
-    pub(crate) reading: LensReadingArgs,
-}
-
-/// Where the film is: at a focus or at a place.
-#[derive(Debug, Args)]
-#[group(required = true, multiple = false)]
-pub(crate) struct FilmPlace {
-    /// Focuses on this distance from the first vertex, mm
-    #[arg(long, value_name = "D")]
-    pub(crate) focus_mm: Option<f64>,
-    /// Places the film this far behind the last vertex, mm
-    #[arg(long, value_name = "D", allow_negative_numbers = true)]
-    pub(crate) film_mm: Option<f64>,
 }
 
 /// How a point-spread function is sampled.

@@ -3,18 +3,20 @@
 use std::fmt::Write;
 
 use dioptric_analysis::{GlassRow, glass_data, glass_rows};
-use dioptric_pipeline::parse_numbers;
 
 use crate::{
     args::Common,
-    lens_args::GlassCommand,
+    lens_args::{BandArgs, GlassCommand},
     terminal::{print, print_json},
 };
+
+/// Wavelengths where none are asked for, nm.
+const USUAL_NM: [f64; 7] = [400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0];
 
 pub(crate) fn run(command: &GlassCommand, common: &Common) -> anyhow::Result<()> {
     match command {
         GlassCommand::List { filter } => list(filter.as_deref(), common),
-        GlassCommand::Show { name, wavelengths_nm } => show(name, wavelengths_nm, common),
+        GlassCommand::Show { name, bands } => show(name, bands, common),
     }
 }
 
@@ -35,8 +37,8 @@ fn list(filter: Option<&str>, common: &Common) -> anyhow::Result<()> {
     print(&text)
 }
 
-fn show(name: &str, wavelengths_nm: &str, common: &Common) -> anyhow::Result<()> {
-    let data = glass_data(name, &parse_numbers("--wavelengths-nm", wavelengths_nm)?)?;
+fn show(name: &str, bands: &BandArgs, common: &Common) -> anyhow::Result<()> {
+    let data = glass_data(name, &bands.nm()?.unwrap_or(USUAL_NM.to_vec()))?;
     if common.json {
         return print_json(&data);
     }

@@ -4,9 +4,9 @@ use std::{fmt::Write, fs, path::Path};
 
 use anyhow::Context;
 use dioptric_analysis::{
-    LensData, LensDefaults, LensInfoRequest, SurfaceRow, built_in_lenses, convert_lens, placement_lines, surface_rows,
+    LensData, LensInfoRequest, SurfaceRow, built_in_lenses, convert_lens, placement_lines, surface_rows,
 };
-use dioptric_pipeline::{LensReadOptions, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
+use dioptric_pipeline::{LensReadOptions, REFERENCE_WAVELENGTH_NM, Staged, nearest_to_reference_nm, parse_numbers};
 use dioptric_report::{LensDrawing, check_drawing_name, drawing_file};
 
 use crate::{
@@ -23,18 +23,6 @@ pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> 
         LensCommand::Draw(arguments) => draw(arguments, common),
         LensCommand::Convert { input, output, reading } => convert(input, output, &reading.reading(), common),
     }
-}
-
-/// Returns the lens with its stop set, and what its file says of its use; tells what is done otherwise than the file says.
-pub(crate) fn open(
-    text: &str,
-    reading: &LensReadOptions,
-    stop_mm: Option<f64>,
-    common: &Common,
-) -> anyhow::Result<LensDefaults> {
-    let used = LensDefaults::open(text, reading, stop_mm)?;
-    tell(&used.notes, common);
-    Ok(used)
 }
 
 /// Returns numbers as a list for people: of many the first three and the last.
@@ -99,10 +87,9 @@ fn list(common: &Common) -> anyhow::Result<()> {
 }
 
 fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
-    let used = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?;
-    let lens = &used.lens;
-    let wavelengths_nm = match &arguments.wavelengths_nm {
-        Some(list) => parse_numbers("--wavelengths-nm", list)?,
+    let used = arguments.lens.open(common)?;
+    let wavelengths_nm = match arguments.bands.nm()? {
+        Some(list) => list,
         None if used.reference_nm.is_some() => {
             let wavelength_nm = used.wavelength_or_usual();
             tell_taken(&[format!("{wavelength_nm} nm")], common);
@@ -116,6 +103,9 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
             wavelengths_nm
         }
     };
+    let wavelength_nm = nearest_to_reference_nm(&wavelengths_nm);
+    let used = arguments.lens.state.apply(used, wavelength_nm)?;
+    let lens = &used.lens;
     let ends = |ends: (f64, f64), nm: &f64| (ends.0.min(*nm), ends.1.max(*nm));
     let (first_nm, last_nm) = wavelengths_nm.iter().fold((f64::INFINITY, 0.0), ends);
     let instead_of_f_and_c_nm = (first_nm < last_nm).then_some([first_nm, last_nm]);
@@ -207,10 +197,10 @@ fn number(key: &str, value: &serde_json::Value) -> String {
 
 fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     check_drawing_name(&arguments.output)?;
-    let used = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?;
+    let used = arguments.lens.open(common)?;
     let mut taken = Vec::new();
-    let wavelengths_nm = match &arguments.wavelengths_nm {
-        Some(list) => parse_numbers("--wavelengths-nm", list)?,
+    let wavelengths_nm = match arguments.bands.nm()? {
+        Some(list) => list,
         None => {
             let wavelength_nm = used.wavelength_or_usual();
             if wavelength_nm != REFERENCE_WAVELENGTH_NM {
@@ -233,7 +223,13 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
         (None, None) => vec![0.0, 10.0],
     };
     tell_taken(&taken, common);
-    let drawing = LensDrawing { fields_deg, distance_mm, wavelengths_nm, film_distance_mm: arguments.film_mm };
+    let wavelength_nm = wavelengths_nm.first().copied().unwrap_or(REFERENCE_WAVELENGTH_NM);
+    let used = arguments.lens.state.apply(used, wavelength_nm)?;
+    let film_distance_mm = match (arguments.film.focus_mm, arguments.film.film_mm) {
+        (Some(focus_mm), _) => Some(used.lens.at(wavelength_nm)?.film_distance_mm_for(focus_mm)?),
+        (None, film_mm) => film_mm,
+    };
+    let drawing = LensDrawing { fields_deg, distance_mm, wavelengths_nm, film_distance_mm };
     let path = &arguments.output;
     let bytes = drawing_file(&drawing.to_svg(&used.lens)?, path)?;
     let staged = guarded(Staged::file(path)?);

@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
-use dioptric_pipeline::{LensReadOptions, MissingGlass, SeqNumbers};
+use dioptric_analysis::LensDefaults;
+use dioptric_pipeline::{FocusSpec, LensReadOptions, MissingGlass, SeqNumbers, StopSpec, parse_numbers};
+
+use crate::{args::Common, movement_args::MovementArgs, terminal::remark};
 
 /// Something to do with lenses.
 #[derive(Debug, Subcommand)]
@@ -25,6 +28,87 @@ pub(crate) enum LensCommand {
         #[command(flatten)]
         reading: LensReadingArgs,
     },
+}
+
+/// A lens, how far it is open and how it stands: what every command about one lens takes.
+#[derive(Debug, Args)]
+pub(crate) struct LensArgs {
+    /// Lens, a file or the name of a built-in one
+    pub(crate) lens: String,
+    #[command(flatten)]
+    pub(crate) state: LensStateArgs,
+}
+
+/// What the file of a lens leaves open, how far the lens is open, and how it is turned and moved.
+#[derive(Debug, Args)]
+pub(crate) struct LensStateArgs {
+    #[command(flatten)]
+    pub(crate) reading: LensReadingArgs,
+    /// Stops the lens down to this f-number
+    #[arg(long, value_name = "N", conflicts_with = "stop_mm")]
+    pub(crate) f_number: Option<f64>,
+    /// Diameter of the stop, mm [default: the lens's own]
+    #[arg(long, value_name = "D")]
+    pub(crate) stop_mm: Option<f64>,
+    #[command(flatten)]
+    pub(crate) movements: MovementArgs,
+}
+
+/// Where the film is: at a focus or at a place.
+#[derive(Clone, Copy, Debug, Args)]
+#[group(multiple = false)]
+pub(crate) struct FilmArgs {
+    /// Focuses on this distance from the first vertex, mm, or inf
+    #[arg(long, value_name = "D")]
+    pub(crate) focus_mm: Option<f64>,
+    /// Places the film this far behind the last vertex, mm
+    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    pub(crate) film_mm: Option<f64>,
+}
+
+/// Which wavelengths.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct BandArgs {
+    /// Wavelengths, nm: a list or first:last:step [default: those of the scene or of the lens's file, else usual ones at which
+    /// the glasses are known]
+    #[arg(long, alias = "wavelength-nm", value_name = "LIST")]
+    wavelengths_nm: Option<String>,
+}
+
+impl LensArgs {
+    /// Returns the lens as its file has it, and what the file says of its use, which is printed where this program does
+    /// otherwise.
+    pub(crate) fn open(&self, common: &Common) -> anyhow::Result<LensDefaults> {
+        let used = LensDefaults::open(&self.lens, &self.state.reading.reading(), self.state.stop_mm)?;
+        used.notes.iter().for_each(|note| remark(common.quiet, note));
+        Ok(used)
+    }
+}
+
+impl LensStateArgs {
+    /// The stop that was asked for.
+    pub(crate) fn stop(&self) -> Option<StopSpec> {
+        self.f_number.map(StopSpec::FNumber).or(self.stop_mm.map(StopSpec::DiameterMm))
+    }
+
+    /// Returns the lens with its stop and its movements; an f-number is that at this wavelength, nm.
+    pub(crate) fn apply(&self, used: LensDefaults, wavelength_nm: f64) -> anyhow::Result<LensDefaults> {
+        Ok(used.placed(self.stop().unwrap_or_default(), self.movements.movements(), wavelength_nm)?)
+    }
+}
+
+impl FilmArgs {
+    /// The place that was asked for.
+    pub(crate) fn focus(self) -> Option<FocusSpec> {
+        self.focus_mm.map(FocusSpec::DistanceMm).or(self.film_mm.map(FocusSpec::FilmMm))
+    }
+}
+
+impl BandArgs {
+    /// The wavelengths that were asked for, nm.
+    pub(crate) fn nm(&self) -> anyhow::Result<Option<Vec<f64>>> {
+        Ok(self.wavelengths_nm.as_deref().map(|list| parse_numbers("--wavelengths-nm", list)).transpose()?)
+    }
 }
 
 /// What a lens file leaves open.
@@ -96,30 +180,23 @@ impl LensReadingArgs {
 /// What to print about a lens.
 #[derive(Debug, Args)]
 pub(crate) struct LensInfoArgs {
-    /// Lens, a file or the name of a built-in one
-    pub(crate) lens: String,
-    /// Wavelengths, nm: a list or first:last:step [default: 550; of a lens not known there, its file's, else one that its
-    /// glasses know]
-    #[arg(long, value_name = "LIST")]
-    pub(crate) wavelengths_nm: Option<String>,
+    #[command(flatten)]
+    pub(crate) lens: LensArgs,
+    #[command(flatten)]
+    pub(crate) bands: BandArgs,
     /// Also images an object at this distance from the first vertex, mm
     #[arg(long, value_name = "D")]
     pub(crate) distance_mm: Option<f64>,
-    /// Diameter of the stop, mm [default: the lens's own]
-    #[arg(long, value_name = "D")]
-    pub(crate) stop_mm: Option<f64>,
     /// Half field for the third-order sums, degrees
     #[arg(long, value_name = "A", default_value_t = 10.0)]
     pub(crate) field_deg: f64,
-    #[command(flatten)]
-    pub(crate) reading: LensReadingArgs,
 }
 
 /// What to analyze of a lens.
 #[derive(Debug, Args)]
 pub(crate) struct LensAnalyzeArgs {
-    /// Lens, a file or the name of a built-in one
-    pub(crate) lens: String,
+    #[command(flatten)]
+    pub(crate) lens: LensArgs,
     /// Field angles, degrees: above the axis as 0,10,20, or along x and y as 5/10 [default: those of the lens's file, else 0,
     /// 0.5, 0.7 and 1 of where the light falls to a quarter]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
@@ -127,27 +204,14 @@ pub(crate) struct LensAnalyzeArgs {
     /// Fields as object points, mm from the axis, for an object at a finite distance: y, or x/y
     #[arg(long, value_name = "LIST", conflicts_with = "fields_deg", allow_hyphen_values = true)]
     pub(crate) fields_mm: Option<String>,
-    /// Wavelengths, nm: a list or first:last:step; that nearest to 550 is the reference [default: those of the lens's file,
-    /// with its reference, else 450,550,650, or three that its glasses know]
-    #[arg(long, value_name = "LIST")]
-    pub(crate) wavelengths_nm: Option<String>,
+    #[command(flatten)]
+    pub(crate) bands: BandArgs,
     /// Distance of the object from the first vertex, mm, or inf [default: that of the lens's file, else inf]
     #[arg(long, value_name = "D")]
     pub(crate) distance_mm: Option<f64>,
-    /// Stops the lens down to this f-number
-    #[arg(long, value_name = "N", conflicts_with = "stop_mm")]
-    pub(crate) f_number: Option<f64>,
-    /// Diameter of the stop, mm [default: the lens's own]
-    #[arg(long, value_name = "D")]
-    pub(crate) stop_mm: Option<f64>,
-    /// Places the film this far behind the last vertex, mm [default: where the spot on the axis is smallest]
-    #[arg(long, value_name = "D", conflicts_with = "focus_mm", allow_negative_numbers = true)]
-    pub(crate) film_mm: Option<f64>,
-    /// Places the film at the paraxial image of this distance from the first vertex, mm, or inf
-    #[arg(long, value_name = "D")]
-    pub(crate) focus_mm: Option<f64>,
+    /// Without either, the film is where the spot on the axis is smallest
     #[command(flatten)]
-    pub(crate) reading: LensReadingArgs,
+    pub(crate) film: FilmArgs,
     /// Rings of rays in a spot: N of them have 1 + 3N(N + 1) rays
     #[arg(long, value_name = "N", default_value_t = 12)]
     pub(crate) rings: usize,
@@ -160,10 +224,8 @@ pub(crate) struct LensAnalyzeArgs {
 /// How to draw a lens.
 #[derive(Debug, Args)]
 pub(crate) struct LensDrawArgs {
-    /// Lens, a file or the name of a built-in one
-    pub(crate) lens: String,
     #[command(flatten)]
-    pub(crate) reading: LensReadingArgs,
+    pub(crate) lens: LensArgs,
     /// File to write: .svg, or .png in a build with the feature png
     #[arg(long, short, visible_alias = "out", value_name = "F")]
     pub(crate) output: PathBuf,
@@ -173,16 +235,10 @@ pub(crate) struct LensDrawArgs {
     /// Distance of the object, mm, or inf [default: that of the lens's file, else inf]
     #[arg(long, value_name = "D")]
     pub(crate) distance_mm: Option<f64>,
-    /// Diameter of the stop, mm [default: the lens's own]
-    #[arg(long, value_name = "D")]
-    pub(crate) stop_mm: Option<f64>,
-    /// Film distance behind the last vertex, mm [default: in focus]
-    #[arg(long, value_name = "D")]
-    pub(crate) film_mm: Option<f64>,
-    /// Wavelengths of the rays, nm: a list or first:last:step; focus and f-number are those of the first [default: the
-    /// reference of the lens's file, else 550, or one that its glasses know]
-    #[arg(long, alias = "wavelength-nm", value_name = "LIST")]
-    pub(crate) wavelengths_nm: Option<String>,
+    #[command(flatten)]
+    pub(crate) film: FilmArgs,
+    #[command(flatten)]
+    pub(crate) bands: BandArgs,
 }
 
 /// Something to do with glasses.
@@ -198,8 +254,7 @@ pub(crate) enum GlassCommand {
     Show {
         /// Name of the glass, e.g. N-BK7
         name: String,
-        /// Wavelengths, nm: a list or first:last:step
-        #[arg(long, value_name = "LIST", default_value = "400:700:50")]
-        wavelengths_nm: String,
+        #[command(flatten)]
+        bands: BandArgs,
     },
 }

@@ -5,6 +5,7 @@
 
 mod analyze;
 mod args;
+mod camera;
 mod glass;
 mod lens;
 mod lens_args;
@@ -46,6 +47,8 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
     match command {
         Command::Run(arguments) => run::run(&arguments, &common),
         Command::Lens(command) => lens::run(&command, &common),
+        Command::Camera(command) => camera::run(&command, &common),
+        Command::Sensor(command) => camera::run_sensor(&command, &common),
         Command::Glass(command) => glass::run(&command, &common),
         Command::Trace(arguments) => trace::run(&arguments, &common),
         Command::Psf(arguments) => psf::run(&arguments, &common),

@@ -21,6 +21,13 @@ pub(crate) struct MovementArgs {
 }
 
 impl MovementArgs {
+    /// The movements that were asked for.
+    pub(crate) fn movements(self) -> Movements {
+        let mut movements = Movements::default();
+        self.change(&mut movements);
+        movements
+    }
+
     /// Changes what was asked for.
     pub(crate) fn change(self, movements: &mut Movements) {
         *movements = Movements {

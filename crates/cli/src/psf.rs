@@ -2,13 +2,13 @@
 
 use std::fmt::Write;
 
+use anyhow::Context;
 use dioptric_analysis::{PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
-use dioptric_pipeline::{BankSpec, FocusSpec, Staged, StopSpec, parse_numbers};
+use dioptric_pipeline::{BankSpec, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
 use dioptric_report::{chart_svg, write_drawing, write_psfs};
 
 use crate::{
     args::{BankKind, Common, PsfArgs, PsfMode},
-    lens::open,
     run::{diffraction, with_gamma},
     terminal::{Bar, fixed, guarded, print, print_json, remark, remark_on_png},
 };
@@ -20,17 +20,13 @@ const PNG_SCALE: f64 = 2.0;
 const SEED: u64 = 1;
 
 pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
-    let lens = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?.lens;
-    let focus = match (arguments.film.focus_mm, arguments.film.film_mm) {
-        (Some(distance_mm), _) => FocusSpec::DistanceMm(distance_mm),
-        (None, Some(film_mm)) => FocusSpec::FilmMm(film_mm),
-        (None, None) => anyhow::bail!("one of --focus-mm and --film-mm is needed"),
-    };
+    let used = arguments.lens.open(common)?;
+    let focus = arguments.film.focus().context("where is the film? expected --focus-mm or --film-mm")?;
     let request = PsfRequest {
         fields_deg: parse_numbers("--fields-deg", &arguments.fields_deg)?,
         field_y_deg: arguments.field_y_deg,
         distances_mm: parse_numbers("--distances-mm", &arguments.distances_mm)?,
-        wavelengths_nm: parse_numbers("--wavelengths-nm", &arguments.wavelengths_nm)?,
+        wavelengths_nm: arguments.bands.nm()?.unwrap_or(vec![REFERENCE_WAVELENGTH_NM]),
         focus,
         diffraction: with_gamma(diffraction(arguments.diffraction), arguments.gamma)?,
         pixel_um: arguments.pixel_um,
@@ -50,9 +46,8 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
             None => Vec::new(),
         },
     };
-    let stop = arguments.f_number.map_or(StopSpec::AsGiven, StopSpec::FNumber);
-    let reference_nm = request.reference_nm(&lens)?;
-    let lens = stop.apply_at(lens, reference_nm)?;
+    let reference_nm = request.reference_nm(&used.lens)?;
+    let lens = arguments.lens.state.apply(used, reference_nm)?.lens;
     // The place is tried before the work.
     let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
     let csv = arguments.csv.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);

@@ -75,8 +75,8 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera>
     if let Some(seed) = common.seed {
         camera.seed = seed;
     }
-    if let Some(list) = &arguments.wavelengths_nm {
-        camera.wavelengths = WavelengthSpec::ListNm(parse_numbers("--wavelengths-nm", list)?);
+    if let Some(list) = arguments.bands.nm()? {
+        camera.wavelengths = WavelengthSpec::ListNm(list);
     }
     let quality = match arguments.quality {
         QualityKind::Preview => Quality::Preview,
@@ -101,7 +101,7 @@ fn change_demo(camera: &mut Camera, arguments: &RunArgs) {
         Some(_) => arguments.lens.clone().unwrap_or_default(),
         None => "50 mm double Gauss".to_owned(),
     };
-    let stop = match (arguments.f_number, arguments.stop_mm) {
+    let stop = match (arguments.state.f_number, arguments.state.stop_mm) {
         (Some(n), _) => format!(" at f/{n}"),
         (None, Some(mm)) => format!(", stop {mm} mm"),
         (None, None) if arguments.lens.is_none() => " at f/4".to_owned(),
@@ -135,20 +135,10 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
         camera.stop = StopSpec::AsGiven;
         camera.lens_reading = LensReadOptions::default();
     }
-    arguments.reading.change(&mut camera.lens_reading);
-    if let Some(n) = arguments.f_number {
-        camera.stop = StopSpec::FNumber(n);
-    }
-    if let Some(d) = arguments.stop_mm {
-        camera.stop = StopSpec::DiameterMm(d);
-    }
-    if let Some(d) = arguments.focus_mm {
-        camera.focus = FocusSpec::DistanceMm(d);
-    }
-    if let Some(d) = arguments.film_mm {
-        camera.focus = FocusSpec::FilmMm(d);
-    }
-    arguments.movements.change(&mut camera.movements);
+    arguments.state.reading.change(&mut camera.lens_reading);
+    camera.stop = arguments.state.stop().unwrap_or(camera.stop);
+    camera.focus = arguments.place.focus().unwrap_or(camera.focus);
+    arguments.state.movements.change(&mut camera.movements);
     if let Some(kind) = arguments.diffraction {
         camera.diffraction = diffraction(kind);
     }

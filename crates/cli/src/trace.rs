@@ -8,12 +8,13 @@ use dioptric_pipeline::Staged;
 
 use crate::{
     args::{Common, TraceArgs},
-    lens::open,
     terminal::{guarded, output_error},
 };
 
 pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> {
-    let lens = open(&arguments.lens, &arguments.reading.reading(), arguments.stop_mm, common)?.lens;
+    let used = arguments.lens.open(common)?;
+    let wavelength_nm = used.wavelength_or_usual();
+    let lens = arguments.lens.state.apply(used, wavelength_nm)?.lens;
     let rays = RayTable::open(&arguments.rays)?;
     let settings = TraceSettings { rims_clip: !arguments.no_clip, film_distance_mm: arguments.film_mm };
     let Some(path) = &arguments.output else {

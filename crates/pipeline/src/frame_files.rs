@@ -13,6 +13,7 @@ use crate::{Exposed, PipelineError};
 
 /// What is written besides the picture and the report.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Outputs {
     /// `irradiance.exr`, the spectral irradiance on the sensor.
@@ -36,6 +37,7 @@ impl Default for Outputs {
 
 /// A file of a sensor's frame or of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum FrameFile {
     /// `electrons.exr`: the electrons of each pixel.
     Electrons,

@@ -16,6 +16,7 @@ mod frame_files;
 mod numbers;
 mod progress;
 mod quality;
+mod schema;
 mod sense;
 mod staged;
 mod stages;
@@ -33,6 +34,9 @@ pub use frame_files::{FrameFile, Frames, Outputs, write_frames};
 pub use numbers::{number, parse_numbers, parse_pairs};
 pub use progress::{Progress, Silent, Stage};
 pub use quality::Quality;
+#[cfg(feature = "schema")]
+pub use schema::generated_schemas;
+pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed, parse_illuminant, parse_white, with_analog_gain, with_exposure_s};
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{

@@ -8,6 +8,7 @@ use crate::{PsfError, axis::Axis};
 
 /// How diffraction is taken into account.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum Diffraction {
     /// Not at all: geometric optics.
@@ -59,6 +60,7 @@ impl Diffraction {
 
 /// How a bank finds what lies between its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Interpolation {
     /// Rays are interpolated, and pictures drawn from them: quadratic in field, dioptres and dispersion.
     #[default]

@@ -11,6 +11,7 @@ use crate::{Demosaic, Sensor, SensorError, Tile, blur::gaussian_blur, demosaic, 
 ///
 /// The statistics leave out samples from 99 % of saturation on, of which the color is not known.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum WhiteBalance {
     /// The light on the scene; the mean of the picture where that is not known.
     #[default]

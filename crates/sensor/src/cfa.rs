@@ -8,6 +8,7 @@ use crate::SensorError;
 ///
 /// In a data sheet `Mosaic([["R", "G"], ["G", "B"]])`; a monochrome sensor is `Mosaic([["Y"]])`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Cfa {
     /// A tile of filter names, repeated from the top left pixel on.
     Mosaic(Vec<Vec<String>>),

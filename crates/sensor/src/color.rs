@@ -11,6 +11,7 @@ use crate::{
 
 /// How the sensor's channels become colors.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum ColorCorrection {
     /// A matrix fitted under the light that white is balanced for; where white is found in the picture, under the light on
     /// the scene if that is known, and else under the black body or daylight that comes nearest. None where white is not

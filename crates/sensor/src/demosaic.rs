@@ -13,6 +13,7 @@ use crate::{SensorError, Tile};
 
 /// How the missing colors of a mosaic are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Demosaic {
     /// The nearest pixel of each color. Any mosaic.
     Nearest,

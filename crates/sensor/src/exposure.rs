@@ -6,6 +6,7 @@ use crate::{Sensor, SensorError};
 
 /// What belongs to a shot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Exposure {
     /// How long the shutter is open, s; 0 is a bias frame, of read noise and offsets alone.
@@ -23,6 +24,7 @@ pub struct Exposure {
 
 /// A readout of a dual-gain pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum GainMode {
     /// The one every sensor has.
     #[default]
@@ -33,6 +35,7 @@ pub enum GainMode {
 
 /// How the exposure is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum ExposureControl {
     /// By hand; a time of 0 is a bias frame.
     Manual(Exposure),
@@ -42,6 +45,7 @@ pub enum ExposureControl {
 
 /// An exposure time chosen by metering.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct AutoExposure {
     /// What is metered.
@@ -55,6 +59,7 @@ pub struct AutoExposure {
 
 /// What an automatic exposure looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Metering {
     /// The mean of all pixels.
     Mean,

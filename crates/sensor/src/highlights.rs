@@ -15,6 +15,7 @@ use crate::{SensorError, Tile};
 
 /// What becomes of light beyond saturation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Highlights {
     /// Each channel is cut at the saturation of the least sensitive: hues turn, and all that is blown is white at most.
     Clip,

@@ -8,6 +8,7 @@ use crate::SensorError;
 
 /// A source of noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum NoiseSource {
     /// Photon (shot) noise.
     #[serde(alias = "Shot")]
@@ -53,11 +54,13 @@ impl NoiseSource {
 ///
 /// In a camera file `All`, `None`, `Only([Photon, Read])` or `Except([Defects])`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(from = "Words", into = "Words")]
 pub struct NoiseSources(u32);
 
 /// The words of [`NoiseSources`] in a file.
 #[derive(Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename = "NoiseSources")]
 enum Words {
     All,
@@ -163,6 +166,7 @@ impl From<NoiseSources> for Words {
 /// A pixel's numbers depend on the seed, the source and the row alone, so that a frame is the same for any number of
 /// threads, and switching one noise off leaves the others as they were.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Noise {
     /// The seed of what changes from frame to frame.

@@ -20,6 +20,7 @@ use crate::{
 ///
 /// Everything that is left out of a file is as in [`Processing::default`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Processing {
     /// Pixels further than this above or below all their neighbors of the same filter are replaced, as a share of

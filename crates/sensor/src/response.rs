@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The curve from the amplified voltage to the converter's input; it maps 0 … swing onto 0 … swing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Response {
     /// A straight line.
     #[default]
@@ -56,6 +57,7 @@ fn on_lines(knees: impl Iterator<Item = (f64, f64)>, end: f64, x: f64) -> f64 {
 
 /// The analog-to-digital converter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum Adc {
     /// None: frames stay in volts.

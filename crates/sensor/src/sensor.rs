@@ -19,6 +19,7 @@ use crate::{Adc, Cfa, Exposure, GainMode, Response, SensorError, Tile};
 /// A gain of 2 doubles the signal (ISETCam divides by it). Fields that most sensors do without may be left out
 /// of a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Sensor {
     /// What to call it.
@@ -113,6 +114,7 @@ pub struct Sensor {
 
 /// A color filter with the pixel behind it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Filter {
     /// The name that the mosaic uses, often one letter.
@@ -124,6 +126,7 @@ pub struct Filter {
 
 /// A layer over the whole array.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Layer {
     /// What it is.
@@ -134,6 +137,7 @@ pub struct Layer {
 
 /// The second, more sensitive readout of a dual-gain pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct HighGain {
     /// Volts an electron.
@@ -146,6 +150,7 @@ pub struct HighGain {
 
 /// Dark current and how it grows with temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DarkCurrent {
     /// Electrons a second and pixel at the reference temperature.
@@ -172,6 +177,7 @@ impl Default for DarkCurrent {
 
 /// Pixels that do not work, placed by the fixed pattern's seed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Defects {
     /// The share of pixels with an excess dark current.

@@ -8,6 +8,7 @@ use crate::{Raw, SensorError, Tile};
 
 /// The factor that undoes the fall of light at each place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum LensShading {
     /// 1 + a2 r² + a4 r⁴ + a6 r⁶, the same for all filters; r is 0 in the middle and 1 in the corners.
     Radial {
@@ -24,6 +25,7 @@ pub enum LensShading {
 
 /// Factors in the middles of the cells of a coarse grid over the frame; beyond the outermost the lines go on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ShadingMap {
     /// Cells from top to bottom, 2 or more.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The primaries in which a picture is coded; white is D65 in all of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum ColorSpace {
     /// sRGB, those of ITU-R BT.709.
     #[default]

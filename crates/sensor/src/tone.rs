@@ -7,6 +7,7 @@ use crate::SensorError;
 
 /// How bright the picture is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Brightness {
     /// As exposed: saturation of the least sensitive channel is white.
     #[default]
@@ -24,6 +25,7 @@ pub enum Brightness {
 
 /// The curve from linear light to codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum ToneCurve {
     /// None: codes are linear light.
     Linear,

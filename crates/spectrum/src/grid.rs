@@ -6,6 +6,7 @@ use crate::SpectrumError;
 
 /// A list of ascending band centers, each with the width that it stands for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct WavelengthGrid {
     // Invariants: centers ascend and are finite and positive; as many widths, all positive.

@@ -12,6 +12,7 @@ const COLOR_CHECKER: &str = include_str!("../data/colorchecker_babelcolor_averag
 
 /// A light, by name, by temperature, by chromaticity or by its measured spectrum.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum Illuminant {
     /// Incandescent light, CIE A.
     A,

@@ -6,6 +6,7 @@ use crate::{SpectrumError, WavelengthGrid, grid::check_ascending};
 
 /// A function of wavelength: points of a table with straight lines between them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(try_from = "Table", into = "Table")]
 pub struct Spectrum {
     // Invariants: wavelengths ascend; as many values, all finite.
@@ -14,6 +15,7 @@ pub struct Spectrum {
 }
 
 #[derive(Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 struct Table {
     wavelengths_nm: Vec<f64>,

@@ -4,7 +4,7 @@ use dioptric_optics::{Field, Lens, LensFile, glam::DVec2};
 
 use crate::AnalysisFields;
 use dioptric_pipeline::{
-    LensReadOptions, LensSpec, PipelineError, REFERENCE_WAVELENGTH_NM, StopSpec, nearest_to_reference_nm,
+    LensReadOptions, LensSpec, Movements, PipelineError, REFERENCE_WAVELENGTH_NM, StopSpec, nearest_to_reference_nm,
 };
 
 /// A lens, and what its file says of its use.
@@ -38,6 +38,15 @@ impl LensDefaults {
         let mono = used.lens.at(used.wavelength_or_usual());
         used.notes.extend(mono.ok().and_then(|mono| mono.note_on_limit()));
         Ok(used)
+    }
+
+    /// Returns it with the stop of the lens set and the lens turned and moved; an f-number is that at this wavelength, nm.
+    ///
+    /// # Errors
+    /// When the stop does not open so far, a movement is not finite, or a glass is not known at the wavelength.
+    pub fn placed(self, stop: StopSpec, movements: Movements, wavelength_nm: f64) -> Result<Self, PipelineError> {
+        let lens = movements.apply_at(stop.apply_at(self.lens, wavelength_nm)?, wavelength_nm)?;
+        Ok(Self { lens, ..self })
     }
 
     /// Returns what a file says.

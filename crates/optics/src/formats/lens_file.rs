@@ -82,6 +82,7 @@ pub enum Field {
 
 /// What to do with a glass that no catalogue has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum MissingGlass {
     /// Refuse the file and say which glass is missing.
     #[default]
@@ -94,6 +95,7 @@ pub enum MissingGlass {
 
 /// What the numbers of surfaces are in a CODE V file that says neither (`RDM`, `CUM`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum SeqNumbers {
     /// Radii of curvature.
     Radii,

@@ -14,6 +14,7 @@ const MOST_SAMPLES: usize = 4000;
 
 /// How the point-spread functions of a lens are sampled over field, depth and wavelength.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum BankSpec {
     /// Rays of 9 fields, 9 depths and 4 wavelengths, interpolated.

@@ -10,6 +10,7 @@ const MOST: usize = 64;
 
 /// How many frames a picture is made of.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum FramesSpec {
     /// One.

@@ -93,6 +93,7 @@ fn is_path(text: &str) -> bool {
 
 /// What a lens file leaves open, and how to close it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct LensReadOptions {
     /// Glass catalogues (`.agf`, `.yml`) to look in before the built-in one.

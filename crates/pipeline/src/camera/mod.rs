@@ -36,6 +36,7 @@ const DEMO: &str = include_str!("../../data/demo.ron");
 ///
 /// Everything that may be left out of a file has a default; paths are relative to the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
     /// What to call the shot.
@@ -94,6 +95,7 @@ pub struct Camera {
 
 /// Which lens.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum LensSpec {
     /// A built-in lens by name.
@@ -116,6 +118,7 @@ pub enum LensSpec {
 
 /// How far the stop is open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum StopSpec {
     /// As the lens file says.
@@ -129,6 +132,7 @@ pub enum StopSpec {
 
 /// Where the film is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum FocusSpec {
     /// In focus for an object at this distance from the first vertex, mm.
@@ -141,6 +145,7 @@ pub enum FocusSpec {
 
 /// How large the film is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum FilmSpec {
     /// The pixels of the sensor.
@@ -162,6 +167,7 @@ pub enum FilmSpec {
 
 /// How the point-spread functions are laid over the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum BlurSpec {
     /// In layers of depth, near ones hiding far ones.
@@ -173,6 +179,7 @@ pub enum BlurSpec {
 
 /// Which sensor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum SensorSpec {
     /// A built-in sensor by name.
@@ -183,6 +190,7 @@ pub enum SensorSpec {
 
 /// The bands that are simulated.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum WavelengthSpec {
     /// Those of the scene; 400–700 nm in steps of 10 nm where it has none of its own.

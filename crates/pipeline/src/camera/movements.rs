@@ -9,6 +9,7 @@ use crate::{PipelineError, REFERENCE_WAVELENGTH_NM};
 ///
 /// Where tilts and swings change the plane of focus, rise and shift choose the part of the lens's picture that the film sees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Movements {
     /// Turn about the horizontal, degrees; above 0 forwards: the lens looks down.
@@ -27,10 +28,18 @@ impl Movements {
     /// # Errors
     /// When a number is not finite, or the lens has as many moves of its surfaces as it may have.
     pub fn apply(self, lens: Lens) -> Result<Lens, PipelineError> {
+        self.apply_at(lens, REFERENCE_WAVELENGTH_NM)
+    }
+
+    /// Returns the lens so turned and moved; the entrance pupil is that at this wavelength, nm.
+    ///
+    /// # Errors
+    /// As [`apply`](Self::apply), and when a glass is not known at the wavelength.
+    pub fn apply_at(self, lens: Lens, wavelength_nm: f64) -> Result<Lens, PipelineError> {
         if self == Self::default() {
             return Ok(lens);
         }
-        let pupil_z_mm = lens.at(REFERENCE_WAVELENGTH_NM)?.projection_center_z_mm();
+        let pupil_z_mm = lens.at(wavelength_nm)?.projection_center_z_mm();
         let whole = CoordinateBreak {
             surfaces: (0, lens.interfaces().len() - 1),
             // The pupil of a lens that is telecentric before the object is infinitely far.

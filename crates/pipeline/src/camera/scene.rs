@@ -6,7 +6,7 @@ use std::{
 };
 
 use dioptric_scene::{Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, read_scene};
-use dioptric_spectrum::{Illuminant, WavelengthGrid};
+use dioptric_spectrum::{Cancel, Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
 use super::check::Checker;
@@ -14,6 +14,7 @@ use crate::PipelineError;
 
 /// What stands before the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
     /// Where its radiance comes from.
@@ -43,6 +44,7 @@ pub struct SceneSpec {
 
 /// Where a scene's radiance comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum SceneSource {
     /// A spectral EXR, an ENVI header, a folder of band pictures, or an ordinary picture.
@@ -122,6 +124,20 @@ impl SceneSpec {
     /// # Errors
     /// When a file cannot be read, lacks what is needed or holds what cannot be.
     pub fn open(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
+        self.open_with(wanted, &|_| {}, &Cancel::new())
+    }
+
+    /// As [`open`](Self::open); `progress` gets the part that is done, 0–1, where a scene is painted, which a cancel ends
+    /// within milliseconds. Reading a file is one step.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), and when the work is cancelled.
+    pub fn open_with(
+        &self,
+        wanted: Option<&WavelengthGrid>,
+        progress: &(dyn Fn(f64) + Sync),
+        cancel: &Cancel,
+    ) -> Result<Scene, PipelineError> {
         let own_or = || wanted.cloned().map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok);
         let light = self.illuminant.clone().unwrap_or(Illuminant::D65);
         let illuminance_lux = self.illuminance_lux.unwrap_or(USUAL_LUX);
@@ -138,7 +154,9 @@ impl SceneSpec {
                 };
                 read_scene(path, &options)?
             }
-            SceneSource::StillLife { columns, rows } => StillLife::new(*columns, *rows).scene(&own_or()?)?,
+            SceneSource::StillLife { columns, rows } => {
+                StillLife::new(*columns, *rows).scene_with(&own_or()?, progress, cancel)?
+            }
             SceneSource::Target { pattern, columns, rows } => Target {
                 pattern: *pattern,
                 rows: *rows,

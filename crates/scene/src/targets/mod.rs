@@ -14,6 +14,7 @@ use crate::{Scene, SceneError, SceneLight};
 
 /// What is drawn on a target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum Pattern {
     /// White all over.
@@ -49,6 +50,7 @@ pub enum Pattern {
 
 /// The shape of a target's spectrum.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum TargetLight {
     /// The same power in every nanometre.
     EqualEnergy,
@@ -76,6 +78,7 @@ impl TargetLight {
 
 /// A flat target that faces the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Target {
     /// What is drawn on it.

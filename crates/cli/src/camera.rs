@@ -1,0 +1,132 @@
+//! `dioptric camera` and `dioptric sensor`: files to begin with, what they may hold, and whether they are right.
+
+use std::{
+    fmt::Write,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, bail};
+use clap::Subcommand;
+use dioptric_analysis::built_in_sensors;
+use dioptric_pipeline::{CAMERA_SCHEMA, CAMERA_TEMPLATE, Camera, KeptCamera, SENSOR_SCHEMA, SensorSpec, Staged};
+use serde_json::json;
+
+use crate::{
+    args::Common,
+    terminal::{guarded, print, print_json, remark},
+};
+
+/// Something to do with camera files.
+#[derive(Debug, Subcommand)]
+pub(crate) enum CameraCommand {
+    /// Writes a camera file with every key, its default and its choices in comments
+    Init {
+        /// File to write [default: standard output]
+        #[arg(long, short, value_name = "F.ron")]
+        output: Option<PathBuf>,
+    },
+    /// Prints the JSON schema of camera files
+    Schema,
+    /// Reads a camera file and checks its numbers, lens, glasses and sensor, without taking the picture
+    Check {
+        /// The camera file
+        camera: PathBuf,
+    },
+}
+
+/// Something to do with sensors.
+#[derive(Debug, Subcommand)]
+pub(crate) enum SensorCommand {
+    /// Lists the built-in sensors
+    List,
+    /// Prints the data sheet of a sensor as a sensor file
+    Show {
+        /// Sensor, a file or the name of a built-in one
+        sensor: String,
+    },
+    /// Writes the data sheet of a built-in sensor to a file, to begin with
+    Init {
+        /// Sensor to begin with, a file or the name of a built-in one
+        #[arg(default_value = "nikon-d5100")]
+        sensor: String,
+        /// File to write [default: standard output]
+        #[arg(long, short, value_name = "F.ron")]
+        output: Option<PathBuf>,
+    },
+    /// Prints the JSON schema of sensor files
+    Schema,
+}
+
+pub(crate) fn run(command: &CameraCommand, common: &Common) -> anyhow::Result<()> {
+    match command {
+        CameraCommand::Init { output } => write_new(output.as_deref(), CAMERA_TEMPLATE, common),
+        CameraCommand::Schema => print(CAMERA_SCHEMA),
+        CameraCommand::Check { camera } => check(camera, common),
+    }
+}
+
+pub(crate) fn run_sensor(command: &SensorCommand, common: &Common) -> anyhow::Result<()> {
+    match command {
+        SensorCommand::List => list(common),
+        SensorCommand::Show { sensor } => print(&(SensorSpec::named(sensor).open()?.to_ron() + "\n")),
+        SensorCommand::Init { sensor, output } => {
+            write_new(output.as_deref(), &(SensorSpec::named(sensor).open()?.to_ron() + "\n"), common)
+        }
+        SensorCommand::Schema => print(SENSOR_SCHEMA),
+    }
+}
+
+/// Writes a file that is not there yet, or to standard output.
+fn write_new(path: Option<&Path>, text: &str, common: &Common) -> anyhow::Result<()> {
+    let Some(path) = path else { return print(text) };
+    if path.exists() {
+        bail!("{} is there already; expected the name of a new file", path.display());
+    }
+    let staged = guarded(Staged::file(path)?);
+    fs::write(staged.path(), text).with_context(|| format!("cannot write {}", path.display()))?;
+    staged.commit()?;
+    remark(common.quiet, &format!("wrote {}", path.display()));
+    Ok(())
+}
+
+fn check(path: &Path, common: &Common) -> anyhow::Result<()> {
+    let camera = Camera::read(path)?;
+    let lens = KeptCamera::new(camera.clone()).check()?;
+    let first = lens.reference.first_order();
+    if common.json {
+        return print_json(&json!({
+            "camera": camera.name, "lens": lens.lens.name(), "efl_mm": first.efl_mm, "f_number": first.f_number,
+            "notes": lens.notes,
+        }));
+    }
+    lens.notes.iter().for_each(|note| remark(common.quiet, note));
+    print(&format!(
+        "{}: {}: {}, f = {:.3} mm, f/{:.2}\n",
+        path.display(),
+        camera.name,
+        lens.lens.name(),
+        first.efl_mm,
+        first.f_number
+    ))
+}
+
+fn list(common: &Common) -> anyhow::Result<()> {
+    let rows = built_in_sensors()?;
+    if common.json {
+        return print_json(&rows);
+    }
+    let mut text = format!(
+        "{:<20} {:>12} {:>8} {:>8} {:>9} {:>10}  {}\n",
+        "name", "pixels", "pitch µm", "mosaic", "well e⁻", "read noise", "what it is"
+    );
+    for row in rows {
+        let pixels = format!("{} × {}", row.columns, row.rows);
+        writeln!(
+            text,
+            "{:<20} {pixels:>12} {:>8} {:>8} {:>9.0} {:>10.2}  {}",
+            row.name, row.pixel_pitch_um, row.mosaic, row.full_well_e, row.read_noise_e, row.title
+        )?;
+    }
+    print(&text)
+}
