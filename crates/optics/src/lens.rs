@@ -1,13 +1,8 @@
 //! A lens: surfaces in a row, one of them the stop.
 
-use std::path::Path;
-
 use glam::DVec2;
 
-use crate::{
-    Aperture, CoordinateBreak, Glass, Interface, MonoLens, OpticsError, Placement, Shape, Surface, formats, library,
-    placement,
-};
+use crate::{Aperture, CoordinateBreak, Glass, Interface, OpticsError, Placement, Shape, Surface, placement};
 
 /// A lens that has been checked and can be traced.
 #[derive(Clone, Debug, PartialEq)]
@@ -175,30 +170,6 @@ impl Lens {
         Self::new("thin lens", "the thin-lens equation", vec![interface], 0)
     }
 
-    /// Returns the built-in lens of this name; [`built_in_names`](Self::built_in_names) lists them.
-    ///
-    /// # Errors
-    /// When there is none of that name.
-    pub fn built_in(name: &str) -> Result<Self, OpticsError> {
-        library::built_in(name)
-    }
-
-    /// The names of the built-in lenses.
-    pub fn built_in_names() -> impl Iterator<Item = &'static str> {
-        library::names()
-    }
-
-    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx` or `.seq`.
-    ///
-    /// [`LensFile::read`](crate::LensFile::read) tells what else the file says, as where the film lies.
-    ///
-    /// # Errors
-    /// When the file cannot be read or is not what it should be; the message names the file and, where it can, the
-    /// line and key.
-    pub fn read(path: &Path) -> Result<Self, OpticsError> {
-        formats::read(path)
-    }
-
     /// The lens's name.
     pub fn name(&self) -> &str {
         &self.name
@@ -306,48 +277,16 @@ impl Lens {
         self.interfaces[self.stop].surface.semi_aperture_mm
     }
 
-    /// Returns the lens with its stop set to this diameter.
-    ///
-    /// # Errors
-    /// When the diameter is not positive or wider than the prescription's stop.
-    pub fn with_stop_diameter_mm(&self, diameter_mm: f64) -> Result<Self, OpticsError> {
-        let semi_aperture_mm = 0.5 * positive("the diameter of a stop in mm", diameter_mm)?;
-        let full_mm = self.full_stop_semi_aperture_mm;
-        // A diameter that came from the full stop by way of its f-number may be off by rounding.
-        if semi_aperture_mm > full_mm * (1.0 + 1e-9) {
-            let mut full = self.clone();
-            full.interfaces[self.stop].surface.semi_aperture_mm = full_mm;
-            return Err(OpticsError::StopTooWide {
-                lens: self.name.clone(),
-                asked_mm: diameter_mm,
-                largest_mm: 2.0 * full_mm,
-                smallest_f_number: full.at(MESSAGE_WAVELENGTH_NM).map_or(f64::NAN, |lens| lens.first_order().f_number),
-            });
-        }
-        let mut lens = self.clone();
-        lens.interfaces[self.stop].surface.semi_aperture_mm = semi_aperture_mm.min(full_mm);
-        Ok(lens)
+    /// Half the diameter of the prescription's stop, mm, however far it is stopped down.
+    pub(crate) fn full_stop_semi_aperture_mm(&self) -> f64 {
+        self.full_stop_semi_aperture_mm
     }
 
-    /// Returns the lens stopped down to this f-number (for a far object) at this wavelength.
-    ///
-    /// # Errors
-    /// When the f-number is not positive or below that of the full stop, or of what the rims let through.
-    pub fn with_f_number(&self, f_number: f64, wavelength_nm: f64) -> Result<Self, OpticsError> {
-        positive("an f-number", f_number)?;
-        let now = self.at(wavelength_nm)?.first_order_of_stop().f_number;
-        let mut full = self.clone();
-        full.interfaces[self.stop].surface.semi_aperture_mm = self.full_stop_semi_aperture_mm;
-        let full = full.at(wavelength_nm)?;
-        if let Some(beam) = full.limiting_beam().filter(|_| f_number < full.first_order().f_number * (1.0 - 1e-3)) {
-            return Err(OpticsError::RimsTooNarrow {
-                lens: self.name.clone(),
-                asked: f_number,
-                surface: beam.limiting_surface,
-                smallest: full.first_order().f_number,
-            });
-        }
-        self.with_stop_diameter_mm(2.0 * self.stop_semi_aperture_mm() * now / f_number)
+    /// Returns the lens with a stop of this semi-aperture, which is at most the full one.
+    pub(crate) fn with_stop_semi_aperture_mm(&self, semi_aperture_mm: f64) -> Self {
+        let mut lens = self.clone();
+        lens.interfaces[self.stop].surface.semi_aperture_mm = semi_aperture_mm.min(self.full_stop_semi_aperture_mm);
+        lens
     }
 
     /// Returns the lens with the same dispersion given to every medium of constant index but air: a straight line of this
@@ -369,14 +308,6 @@ impl Lens {
         }
         Ok(lens)
     }
-
-    /// Returns the lens at one wavelength.
-    ///
-    /// # Errors
-    /// When a glass is not known at that wavelength.
-    pub fn at(&self, wavelength_nm: f64) -> Result<MonoLens, OpticsError> {
-        MonoLens::new(self, wavelength_nm)
-    }
 }
 
 /// The largest number of surfaces.
@@ -386,9 +317,7 @@ const MOST_APERTURES: usize = 2 * MOST_SURFACES;
 /// The largest number of moves: two breaks before each surface.
 const MOST_MOVES: usize = 2 * MOST_SURFACES;
 
-/// The wavelength at which a message states an f-number, nm.
-const MESSAGE_WAVELENGTH_NM: f64 = crate::glass::D_LINE_NM;
-
-fn positive(what: &'static str, found: f64) -> Result<f64, OpticsError> {
+/// Returns the number if it is positive and finite.
+pub(crate) fn positive(what: &'static str, found: f64) -> Result<f64, OpticsError> {
     if found > 0.0 && found.is_finite() { Ok(found) } else { Err(OpticsError::NotPositive { what, found }) }
 }

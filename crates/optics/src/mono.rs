@@ -1,17 +1,21 @@
 //! A lens at one wavelength: the thing that is traced.
 
+mod axial;
+
 use std::{borrow::Cow, ops::Range, sync::OnceLock};
 
 use glam::{DVec2, DVec3};
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::{
-    Aperture, AxialBeam, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Placement, RayBatch, RayBatchF32,
-    Shape, Surface, Vignetting,
+    Aperture, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Placement, RayBatch, RayBatchF32, Shape, Surface,
+    Vignetting,
     paraxial::{self, MarginalRay, Matrix},
     placement,
     trace::{self, Goal, Kind, Plan, Step},
 };
+
+pub use self::axial::AxialBeam;
 
 /// Rays that one task of [`MonoLens::trace_parallel`] traces.
 const CHUNK: usize = 4096;
@@ -37,6 +41,16 @@ pub struct MonoLens {
     first_order: FirstOrder,
     /// The beam of a far point on the axis, once it is asked for.
     far_beam: OnceLock<Option<AxialBeam>>,
+}
+
+impl Lens {
+    /// Returns the lens at one wavelength.
+    ///
+    /// # Errors
+    /// When a glass is not known at that wavelength.
+    pub fn at(&self, wavelength_nm: f64) -> Result<MonoLens, OpticsError> {
+        MonoLens::new(self, wavelength_nm)
+    }
 }
 
 /// Where the surfaces of a lens stand that is not centered.

@@ -8,7 +8,8 @@ use glam::{DMat3, DVec3};
 use crate::{
     MonoLens, Placement, RayBatch, RayBatchF32, Vignetting,
     rays::RaySlices,
-    trace::{self, Goal, Kind, Plan, Real, Step, Toric},
+    toric::Toric,
+    trace::{self, Goal, Kind, Plan, Real, Step},
 };
 
 /// A lens at one wavelength, traced from the film to the scene.

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::{Aperture, Glass, OpticsError, trace::Toric};
+use crate::{Aperture, Glass, OpticsError, toric::Toric};
 
 /// The shape of a surface, beyond its curvature at the vertex.
 ///

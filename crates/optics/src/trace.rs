@@ -29,9 +29,8 @@ pub(crate) use self::{
     placed::{move_to_placed_conic, move_to_placed_plane, placed_clearances, trace_placed, trace_placed_by},
     plan::Plan,
     real::Real,
-    toric::Toric,
 };
-use crate::{Aperture, RayFate, rays::RaySlices};
+use crate::{Aperture, RayFate, rays::RaySlices, toric::Toric};
 
 /// Whether rims end rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

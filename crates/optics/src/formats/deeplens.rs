@@ -2,13 +2,14 @@
 
 use serde_json::Value;
 
-use crate::{Glass, Interface, Lens, OpticsError, Shape, Surface, prescription::TextError};
+use crate::{Glass, Interface, Lens, OpticsError, Shape, Surface};
 
 use super::{
     glasses::{Glasses, constant, model},
     json::{Object, number, numbers},
     lens_file::LensFile,
     shapes::even_asphere,
+    text_error::TextError,
 };
 
 /// Whether a JSON value has the looks of a `DeepLens` file: its surfaces have the media on both sides, or types, as those of

@@ -8,7 +8,7 @@
 mod command;
 mod surface;
 
-use crate::{CatalogueGlass, Glass, ImageSurface, prescription::TextError};
+use crate::{CatalogueGlass, Glass, ImageSurface};
 
 use self::{
     command::{Command, commands_of},
@@ -18,6 +18,7 @@ use super::{
     glasses::{Glasses, constant, model},
     lens_file::{Field, LensFile, SeqNumbers},
     system::{Beam, FieldVignetting, System},
+    text_error::TextError,
 };
 
 /// Reads a CODE V file; `name` serves where the file states none.

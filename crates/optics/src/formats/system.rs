@@ -8,11 +8,13 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     Aperture, CoordinateBreak, Glass, ImageSurface, Interface, Lens, MonoLens, ObjectPoint, OpticsError, Placement,
-    RayBatch, Shape, Surface, Vignetting, analysis::PupilCoordinates, glass::D_LINE_NM, prescription::TextError,
-    rays_towards,
+    RayBatch, Shape, Surface, Vignetting, analysis::PupilCoordinates, glass::D_LINE_NM, rays_towards,
 };
 
-use super::lens_file::{Field, LensFile};
+use super::{
+    lens_file::{Field, LensFile},
+    text_error::TextError,
+};
 
 /// A surface of a design program's file, in mm.
 #[derive(Clone, Debug)]

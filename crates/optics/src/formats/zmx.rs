@@ -7,13 +7,14 @@
 
 mod surface;
 
-use crate::{ImageSurface, prescription::TextError};
+use crate::ImageSurface;
 
 use self::surface::ZmxSurface;
 use super::{
     glasses::Glasses,
     lens_file::{Field, LensFile},
     system::{Beam, FieldVignetting, System, SystemMove, SystemSurface},
+    text_error::TextError,
 };
 
 /// Reads a Zemax file; `name` serves where the file states none.

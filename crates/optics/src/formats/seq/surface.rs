@@ -1,11 +1,12 @@
 //! A surface of a CODE V file.
 
-use crate::{Aperture, CoordinateBreak, Glass, Outline, Shape, prescription::TextError};
+use crate::{Aperture, CoordinateBreak, Glass, Outline, Shape};
 
 use super::{
     super::{
         shapes::{even_asphere, up_to_last},
         system::{SystemMove, SystemSurface},
+        text_error::TextError,
     },
     command::Command,
 };

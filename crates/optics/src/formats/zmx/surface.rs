@@ -1,11 +1,12 @@
 //! A surface of a Zemax file.
 
-use crate::{Aperture, CoordinateBreak, Glass, Outline, Shape, prescription::TextError};
+use crate::{Aperture, CoordinateBreak, Glass, Outline, Shape};
 
 use super::super::{
     glasses::{Glasses, model},
     shapes::{conic_of, even_asphere, up_to_last},
     system::{SystemMove, SystemSurface},
+    text_error::TextError,
 };
 use super::Line;
 

@@ -3,8 +3,11 @@
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    Aperture, CoordinateBreak, Field, Glass, ImageSurface, Interface, Lens, LensFile, OpticsError, Shape, Surface,
+use crate::{Aperture, CoordinateBreak, Glass, ImageSurface, Interface, Lens, OpticsError, Shape, Surface};
+
+use super::{
+    lens_file::{Field, LensFile},
+    text_error::TextError,
 };
 
 /// A lens as it stands in a file.
@@ -78,25 +81,13 @@ fn is_air(glass: &Glass) -> bool {
     *glass == Glass::Air
 }
 
-/// What is wrong with the text of a lens file, and on which line where that is known.
-pub(crate) struct TextError {
-    pub(crate) line: Option<usize>,
-    pub(crate) reason: String,
-}
-
-impl From<OpticsError> for TextError {
-    fn from(error: OpticsError) -> Self {
-        Self { line: None, reason: error.to_string() }
-    }
-}
-
 /// Reads a lens from the text of our own file.
 pub(crate) fn lens_from_ron(text: &str) -> Result<Lens, TextError> {
     file_from_ron(text).map(|file| file.lens)
 }
 
 /// Reads a lens and its use from the text of our own file.
-pub(crate) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
+pub(super) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
     let prescription: Prescription = ron_options()
         .from_str(text)
         .map_err(|error| TextError { line: Some(error.span.start.line), reason: error.code.to_string() })?;
