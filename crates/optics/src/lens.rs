@@ -142,7 +142,7 @@ impl Lens {
     /// Returns the lens with these surfaces, counted from 0, as mirrors, and no others.
     ///
     /// Axes do not turn at a mirror: behind an odd number of them light runs towards −z, so that distances between vertices
-    /// are negative there, and radii keep their sign. `docs/mirrors.md` has the conventions. The medium behind a mirror is
+    /// are negative there, and radii keep their sign. docs/mirrors.md in the repository has the conventions. The medium behind a mirror is
     /// that before it.
     ///
     /// # Errors

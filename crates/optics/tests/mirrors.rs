@@ -4,8 +4,9 @@
 use std::f64::consts::PI;
 
 use dioptric_optics::{
-    Aperture, CoordinateBreak, Glass, Interface, Layout, Lens, LensFile, MirrorShadow, MonoLens, ObjectPoint, Outline,
-    PupilBoundary, RayBatch, ReadOptions, SeidelSettings, Shape, Surface, Vignetting,
+    Aperture, CoordinateBreak, ExitPupilBounds, Glass, ImageSurface, Interface, Layout, Lens, LensFile, MirrorShadow,
+    MonoLens, ObjectPoint, Outline, PupilBoundary, PupilReach, RayBatch, ReadOptions, SeidelSettings, Shape, Surface,
+    Vignetting,
     analysis::{Autofocus, PupilCoordinates, PupilSampling, hexapolar, projected_solid_angle},
     glam::{DVec2, DVec3},
     rays_towards,
@@ -467,6 +468,62 @@ fn best_focus_of_a_mirror_is_downstream() {
 }
 
 #[test]
+fn schmidt_camera_is_sharp_on_its_curved_film() {
+    // Its focal surface is concentric with the mirror: the center lies 400 mm downstream, at the plate.
+    let camera = |curvature_per_mm: f64| {
+        let film = ImageSurface { curvature_per_mm, conic: 0.0 };
+        schmidt(60.0).with_image_surface(film).unwrap().at(550.0).unwrap()
+    };
+    let rms_mm = |lens: &MonoLens, tan: f64| {
+        let point = ObjectPoint::from_field(lens, DVec2::new(0.6, 0.8) * tan, 0.0);
+        let mut rays = lens.rays_towards(&point, &disc(55.0, 300), 0.0, 0.0);
+        lens.trace_to_film(&mut rays, Vignetting::On, 400.0);
+        let places: Vec<DVec2> = lens.landed(&rays, 400.0).map(|place| place.mm).collect();
+        assert_eq!(places.len(), 300);
+        let mean = places.iter().sum::<DVec2>() / 300.0;
+        (places.iter().map(|place| (*place - mean).length_squared()).sum::<f64>() / 300.0).sqrt()
+    };
+    let (curved, flat, wrong) = (camera(1.0 / 400.0), camera(0.0), camera(-1.0 / 400.0));
+    let axis_mm = rms_mm(&curved, 0.0);
+    // At 3° a flat film is defocused by h²/2R = .55 mm, one that is curved the other way by twice as much.
+    let [curved_mm, flat_mm, wrong_mm] = [&curved, &flat, &wrong].map(|lens| rms_mm(lens, 0.0524));
+    assert!(curved_mm < 2.0 * axis_mm && flat_mm > 10.0 * curved_mm, "{axis_mm} {curved_mm} {flat_mm}");
+    assert!((wrong_mm / flat_mm - 2.0).abs() < 0.1, "{flat_mm} {wrong_mm}");
+}
+
+#[test]
+fn exit_pupil_bounds_hold_all_light_of_mirrors() {
+    for (lens, film_mm, tan, half_mm) in [
+        (TELESCOPE.ritchey_chretien(), 1000.0, 0.004, 14.0),
+        (single(-400.0, -1.0, 40.0), 200.0, 0.02, 5.0),
+        (folded(20.0).0, 17.0, 0.1, 8.0),
+    ] {
+        let lens = lens.at(550.0).unwrap();
+        let reversed = [lens.reversed()];
+        let bounds = ExitPupilBounds::find(&reversed, film_mm, DVec2::splat(half_mm), PupilReach::WholeLens).unwrap();
+        let mut n_found = 0;
+        for share in [0.0, 0.4, 1.0] {
+            let point = ObjectPoint::from_field(&lens, DVec2::new(0.3, 0.8) * (share * tan), 0.0);
+            let radius_mm = 0.5 * lens.first_order().entrance_pupil_diameter_mm;
+            let z_mm = lens.first_order().entrance_pupil_z_mm;
+            let mut rays = lens.rays_towards(&point, &disc(radius_mm, 200), z_mm, 0.0);
+            lens.trace_to_film(&mut rays, Vignetting::On, film_mm);
+            let plane = bounds.plane();
+            for i in (0..200).filter(|&i| rays.fate[i].is_in_flight()) {
+                let (own, along) =
+                    (plane.surface_from_lens(rays.point_mm(i)), plane.direction_to_own(rays.direction(i)));
+                let crossing = plane.lens_from_surface(own - along * (own.z / along.z));
+                assert!(own.z > 0.0 && along.z > 0.0, "the plane looks along the light");
+                let place = lens.film_point(rays.point_mm(i), film_mm).mm;
+                assert!(bounds.contains(place, crossing), "{share} {place} {crossing}");
+                n_found += 1;
+            }
+        }
+        assert!(n_found > 200, "{n_found}");
+    }
+}
+
+#[test]
 fn mirrors_that_cannot_be_are_refused() {
     let lens = Lens::built_in("dgauss-50mm").unwrap();
     let message = |mirror: usize| lens.clone().with_mirrors([mirror]).unwrap_err().to_string();
@@ -479,7 +536,7 @@ fn mirrors_that_cannot_be_are_refused() {
 #[test]
 fn mirrors_survive_our_own_and_zemax_files() {
     let (fold, _) = folded(20.0);
-    let image = dioptric_optics::ImageSurface { curvature_per_mm: 1.0 / 300.0, conic: 0.0 };
+    let image = ImageSurface { curvature_per_mm: 1.0 / 300.0, conic: 0.0 };
     let curved = schmidt(60.0).with_image_surface(image).unwrap();
     for (lens, film_mm) in [(TELESCOPE.ritchey_chretien(), 1000.0), (curved, 401.0), (fold, 17.0)] {
         let file = LensFile { film_distance_mm: Some(film_mm), ..LensFile::from(lens.clone()) };
