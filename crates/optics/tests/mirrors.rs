@@ -524,6 +524,34 @@ fn exit_pupil_bounds_hold_all_light_of_mirrors() {
 }
 
 #[test]
+fn bend_of_code_v_follows_the_axis() {
+    let read = |tilts: &str| {
+        let start = "RDM\nEPD 10\nDIM M\nWL 550\nYAN 0\nSO 0 1E11\nS 0 30\n STO\nS 0 -50 REFL\n";
+        let text = format!("{start} {tilts}; BEN\nSI 0 0\nGO\n");
+        LensFile::from_bytes("fold.seq".as_ref(), text.as_bytes(), &ReadOptions::default())
+    };
+    for tilt in ["ADE 30", "BDE -45"] {
+        let file = read(tilt).unwrap();
+        let (lens, film_mm) = (file.lens.at(550.0).unwrap(), file.film_distance_mm.unwrap());
+        assert_eq!(film_mm, 50.0);
+        for place in [DVec2::ZERO, DVec2::new(2.0, -3.0)] {
+            let mut ray = RayBatch::from_points(&[place.extend(-5.0)], &[DVec3::Z]);
+            lens.trace_to_film(&mut ray, Vignetting::On, film_mm);
+            // The film stands across the folded axis, and light along the axis lands where it came in.
+            let film = lens.film_placement(film_mm);
+            assert!((film.direction_to_own(ray.direction(0)) - DVec3::Z).length() < 1e-14);
+            let landed = lens.film_point(ray.point_mm(0), film_mm).mm;
+            assert!((landed - place).length() < 1e-13, "{tilt}: {landed}");
+        }
+    }
+    let message = read("ADE 30; BDE 10").unwrap_err().to_string();
+    assert!(
+        message.contains("BEN: a mirror that bends the axis is supported where it has one tilt alone"),
+        "{message}"
+    );
+}
+
+#[test]
 fn mirrors_that_cannot_be_are_refused() {
     let lens = Lens::built_in("dgauss-50mm").unwrap();
     let message = |mirror: usize| lens.clone().with_mirrors([mirror]).unwrap_err().to_string();

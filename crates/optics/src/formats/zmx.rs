@@ -1,6 +1,6 @@
 //! Zemax lens files (`.zmx`): a keyword a line, surfaces in blocks that begin with `SURF`.
 //!
-//! Read are sequential systems of the surfaces STANDARD, EVENASPH, ODDASPHE, BICONICX, TOROIDAL, PARAXIAL, DGRATING, BINARY_2
+//! Read are sequential systems of the surfaces STANDARD, EVENASPH, ODDASPHE, BICONICX, TOROIDAL, PARAXIAL, DGRATING, `BINARY_2`
 //! and COORDBRK, mirrors among them,
 //! with the entrance pupil, fields and wavelengths of the first configuration. Solves and pickups keep the values that
 //! the file stores. Keywords that change no ray (colors, tolerances, merit functions) are

@@ -271,8 +271,10 @@ impl SeqSurface {
         if self.axis == SeqAxis::Folded && !self.is_mirror {
             return wrong("BEN: a surface that bends the axis, but is no mirror, is not supported");
         }
-        if self.axis == SeqAxis::Folded && (self.decenter != [0.0; 3] || self.tilt_deg[2] != 0.0) {
-            return wrong("BEN: a mirror that bends the axis and is decentered or turned about z is not supported");
+        // Of two turns the second is about a turned axis, and the same turns again do not lead along the reflected light.
+        let n_turns = self.tilt_deg.iter().filter(|angle| **angle != 0.0).count();
+        if self.axis == SeqAxis::Folded && (self.decenter != [0.0; 3] || self.tilt_deg[2] != 0.0 || n_turns > 1) {
+            return wrong("BEN: a mirror that bends the axis is supported where it has one tilt alone, ADE or BDE");
         }
         if self.hole_radius.is_some() && !self.is_mirror {
             return wrong("CIR HOL: a hole in a surface that is no mirror is not supported");
