@@ -29,13 +29,15 @@ pub use camera::{
     nearest_to_reference_nm,
 };
 pub use error::PipelineError;
-pub use frame_files::{FrameFile, Frames, Outputs, write_frames};
+pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
 pub use numbers::{number, parse_numbers, parse_pairs};
 pub use progress::{Progress, Silent, Stage};
 pub use quality::Quality;
-pub use sense::{SenseRequest, Sensed, parse_illuminant, parse_white, with_analog_gain, with_exposure_s};
+pub use sense::{
+    SenseRequest, Sensed, parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s,
+};
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{
-    Capture, FilmPlace, FrameSet, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera, RESUME_FILE,
-    ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,
+    Capture, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera,
+    RESUME_FILE, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,
 };

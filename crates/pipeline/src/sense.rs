@@ -9,7 +9,9 @@ use dioptric_sensor::{
 use dioptric_spectrum::{Bands, Cancel, Illuminant, Spectrum, WavelengthGrid};
 
 use crate::{
-    FrameSet, Frames, FramesSpec, Irradiance, Outputs, PipelineError, SensorSpec, Silent, number,
+    FrameSet, Frames, FramesSpec, Irradiance, Outputs, PipelineError, SensorSpec, Silent,
+    camera::automatic,
+    number,
     stages::{ShutterInputs, Watch, expose},
 };
 
@@ -141,6 +143,18 @@ pub fn with_exposure_s(control: ExposureControl, time_s: f64) -> ExposureControl
         ExposureControl::Manual(exposure) => Exposure { time_s, ..exposure },
         ExposureControl::Auto(auto) => Exposure { time_s, ..auto.limit },
     })
+}
+
+/// Returns the exposure metered: as it was where it was so before, else the usual one, just not saturating; gain and
+/// temperature stay.
+pub fn with_auto_exposure(control: ExposureControl) -> ExposureControl {
+    match (control, automatic()) {
+        (ExposureControl::Manual(exposure), ExposureControl::Auto(usual)) => {
+            let limit = Exposure { time_s: usual.limit.time_s, ..exposure };
+            ExposureControl::Auto(AutoExposure { limit, ..usual })
+        }
+        (control, _) => control,
+    }
 }
 
 /// Returns the exposure with another analog gain; time and temperature stay.

@@ -152,6 +152,31 @@ impl SceneSpec {
             }
             .scene(&own_or()?)?,
         };
+        self.light_up(&mut scene)?;
+        Ok(scene)
+    }
+
+    /// Returns a scene that is in no file, with what it leaves open taken from here, on the bands wanted.
+    ///
+    /// # Errors
+    /// When it lacks what is needed, or holds what cannot be.
+    pub(crate) fn finish(&self, mut scene: Scene, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
+        if let Some(depth_m) = self.depth_m {
+            scene = scene.or_flat_depth_m(depth_m)?;
+        }
+        if let Some(fov_deg) = self.field_of_view_deg {
+            scene = scene.or_horizontal_fov_deg(fov_deg)?;
+        }
+        if let Some(grid) = wanted.filter(|grid| *grid != scene.radiance.grid()) {
+            scene = scene.resampled(grid)?;
+        }
+        scene.validate()?;
+        self.light_up(&mut scene)?;
+        Ok(scene)
+    }
+
+    /// Puts a scene under the light that is asked for, and checks that it is whole.
+    fn light_up(&self, scene: &mut Scene) -> Result<(), PipelineError> {
         if let (None, Some(illuminant)) = (&scene.light, &self.light) {
             scene.light = Some(SceneLight { illuminant: illuminant.clone(), illuminance_lux: None });
         }
@@ -163,7 +188,7 @@ impl SceneSpec {
         if let Some(wanted_cd_m2) = self.mean_luminance_cd_m2 {
             scene.scale(wanted_cd_m2 / scene.mean_luminance_cd_m2())?;
         }
-        Ok(scene)
+        Ok(())
     }
 
     pub(crate) fn resolve_paths(&mut self, folder: &Path) {

@@ -12,6 +12,7 @@ use super::{
     Watch, bank, electrons,
     film::{self, FilmPlace},
     frames::{self, FrameSet},
+    given::GivenParts,
     irradiance::{self, Irradiance},
     lens::{self, ResolvedLens},
     plan,
@@ -51,6 +52,7 @@ const MEMORY_BYTES: u64 = 2 << 30;
 #[derive(Clone, Debug)]
 pub struct KeptCamera {
     camera: Camera,
+    pub(super) given: GivenParts,
     quality: Quality,
     memory_bytes: u64,
     kept: Arc<KeptResults>,
@@ -139,6 +141,8 @@ pub struct Capture {
     pub processing: Processing,
     /// The picture.
     pub developed: Arc<Developed>,
+    /// What the rate of electrons was made from.
+    pub(super) inputs: ElectronInputs,
 }
 
 impl Capture {
@@ -164,7 +168,8 @@ impl Capture {
 impl KeptCamera {
     /// A camera of which nothing is computed yet, at full quality.
     pub fn new(camera: Camera) -> Self {
-        Self { camera, quality: Quality::Full, memory_bytes: MEMORY_BYTES, kept: Arc::default() }
+        let (given, quality) = (GivenParts::default(), Quality::Full);
+        Self { camera, given, quality, memory_bytes: MEMORY_BYTES, kept: Arc::default() }
     }
 
     /// Returns the camera changed; what is kept is shared.
@@ -220,7 +225,7 @@ impl KeptCamera {
     /// cancelled.
     pub fn capture(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Capture, PipelineError> {
         self.camera.validate()?;
-        let inputs = PictureInputs::of(&self.camera, self.quality)?;
+        let inputs = self.picture_inputs()?;
         let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
         let frame_inputs = &inputs.frames;
         let electron_inputs = &frame_inputs.electrons;
@@ -237,8 +242,20 @@ impl KeptCamera {
         let processing = self.camera.processing.under(scene.light.as_ref().map(|light| &light.illuminant));
         let developed = chain.picture(inputs.clone(), &processing)?;
         progress.at(Stage::Picture, 1.0);
-        let (camera, quality) = (self.camera.clone(), self.quality);
-        Ok(Capture { camera, quality, lens, scene, place, sensor, irradiance, rate, frames, processing, developed })
+        Ok(Capture {
+            camera: self.camera.clone(),
+            quality: self.quality,
+            lens,
+            scene,
+            place,
+            sensor,
+            irradiance,
+            rate,
+            frames,
+            processing,
+            developed,
+            inputs: electron_inputs.clone(),
+        })
     }
 
     /// Returns the model of the lens's image that the picture was made with, traced now where it is not kept.
@@ -266,7 +283,11 @@ impl KeptCamera {
     }
 
     pub(super) fn irradiance_inputs(&self) -> Result<IrradianceInputs, PipelineError> {
-        Ok(PictureInputs::of(&self.camera, self.quality)?.frames.electrons.irradiance)
+        Ok(self.picture_inputs()?.frames.electrons.irradiance)
+    }
+
+    fn picture_inputs(&self) -> Result<PictureInputs, PipelineError> {
+        PictureInputs::of(&self.camera, &self.given, self.quality)
     }
 
     pub(super) fn results(&self) -> &KeptResults {

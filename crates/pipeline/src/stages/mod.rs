@@ -19,6 +19,7 @@ mod bank;
 mod electrons;
 mod film;
 mod frames;
+mod given;
 mod irradiance;
 mod kept;
 mod lens;
@@ -35,6 +36,7 @@ pub(crate) use spec::ShutterInputs;
 
 pub use film::FilmPlace;
 pub use frames::FrameSet;
+pub use given::{Given, GivenParts};
 pub use irradiance::{IRRADIANCE_FILE, Irradiance, IrradianceSummary};
 pub use kept::{Capture, KeptCamera, StageCounts};
 pub use lens::ResolvedLens;

@@ -78,6 +78,13 @@ pub(super) fn open(inputs: &SceneInputs) -> Result<ResolvedScene, PipelineError>
         illuminance_lux: inputs.illuminance_lux,
         mean_luminance_cd_m2: inputs.mean_luminance_cd_m2,
     };
+    if let Some(given) = inputs.geometry.given.as_deref() {
+        let whole = choice(source.clone()).finish(given.clone(), wanted.as_ref())?;
+        let bands = quality.bands_of(whole.radiance.grid())?;
+        let binning = quality.scene_binning(whole.columns());
+        let scene = if bands == *whole.radiance.grid() { whole } else { whole.resampled(&bands)? };
+        return Ok(ResolvedScene { scene: scene.binned(binning)?, binning });
+    }
     let fewer = |n: usize, binning: usize| (n / binning).max(1);
     let computed = match source {
         SceneSource::File(_) => None,
