@@ -22,6 +22,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("analysis", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline"]),
     ("report", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline", "analysis"]),
     ("cli", &["spectrum", "pipeline", "analysis", "report"]),
+    ("python", &["spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis"]),
     ("xtask", &["report"]),
 ];
 
