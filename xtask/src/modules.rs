@@ -75,6 +75,7 @@ const ALLOWED: &[(&str, &[&str], &str)] = &[
         &["still_life::lights", "still_life::material", "still_life::room", "still_life::world"],
         "one scene in four files: the window's luminance is the material's and the lights'",
     ),
+    ("python", &["camera", "shot"], "a camera takes shots, and a shot has the camera that took it"),
     ("sensor", &["exposure", "sensor"], "an exposure is resolved for a sensor, whose methods take an exposure"),
 ];
 

@@ -23,9 +23,9 @@ use pyo3::{
 use rayon::prelude::*;
 
 use crate::{
-    changes::{count, diffraction, each_option, with_gamma},
     errors::{exception, guarded, wrong},
     input::{array_f64, is_single, number, numbers},
+    options::{count, diffraction, each_option, with_gamma},
     rays::Rays,
     serial::to_python,
     view::view,

@@ -12,6 +12,7 @@ mod changes;
 mod errors;
 mod input;
 mod lens;
+mod options;
 mod rays;
 mod scene;
 mod sensor;

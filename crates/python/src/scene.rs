@@ -12,9 +12,9 @@ use ndarray::{Array2, Array3, ArrayView1, Axis, Ix2, Ix3};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    changes::{each_option, word},
     errors::{exception, guarded, wrong},
     input::{is_single, number, numbers, owned_f32},
+    options::{each_option, light},
     view::view,
     worker::{Follower, run},
 };
@@ -303,13 +303,12 @@ impl Scene {
 fn with_options(function: &str, mut spec: SceneSpec, options: Option<&Bound<'_, PyDict>>) -> PyResult<SceneSpec> {
     let known = ["fov_deg", "depth_m", "illuminant", "illuminance_lux", "light", "mean_luminance_cd_m2"];
     each_option(function, options, &known, |key, value| {
-        let light = |value| parse_illuminant(&word(key, value)?).map_err(exception);
         match key {
             "fov_deg" => spec.field_of_view_deg = Some(number(key, value)?),
             "depth_m" => spec.depth_m = Some(number(key, value)?),
-            "illuminant" => spec.illuminant = Some(light(value)?),
+            "illuminant" => spec.illuminant = Some(light(key, value)?),
             "illuminance_lux" => spec.illuminance_lux = Some(number(key, value)?),
-            "light" => spec.light = Some(light(value)?),
+            "light" => spec.light = Some(light(key, value)?),
             _ => spec.mean_luminance_cd_m2 = Some(number(key, value)?),
         }
         Ok(())

@@ -21,11 +21,11 @@ def fresh(tiny: dp.Camera, **change: object) -> dp.Camera:
     return dp.Camera.from_ron(tiny.with_(**change).to_ron())
 
 
-def longer(tiny: dp.Camera, rows: int = 160) -> dp.Camera:
-    """A camera whose picture takes some seconds."""
+def longer(tiny: dp.Camera, pixels: tuple[int, int] = (240, 160), pixel_um: float = 132) -> dp.Camera:
+    """A camera whose picture takes a second or more."""
     scene = dp.Scene.target("checkerboard", 300, 200, fov_deg=36, depth_m=1.2)
     return fresh(
-        tiny, scene=scene, pixels=(240, rows), pixel_um=132, wavelengths_nm=list(range(400, 701, 10)), f_number=2.8
+        tiny, scene=scene, pixels=pixels, pixel_um=pixel_um, wavelengths_nm=list(range(400, 701, 10)), f_number=2.8
     )
 
 
@@ -66,7 +66,7 @@ def test_other_threads_run_meanwhile(tiny: dp.Camera) -> None:
     thread = threading.Thread(target=count)
     thread.start()
     start = time.perf_counter()
-    longer(tiny, 40).render()
+    longer(tiny, (240, 40)).render()
     elapsed = time.perf_counter() - start
     done.set()
     thread.join()
@@ -82,7 +82,7 @@ def test_follower_is_told_every_stage(tiny: dp.Camera) -> None:
         told.append((stage, fraction))
         callers.add(threading.get_ident())
 
-    longer(tiny, 40).render(progress=follow)
+    longer(tiny, (240, 40)).render(progress=follow)
     assert callers == {threading.get_ident()}
     assert all(0 <= fraction <= 1 for _, fraction in told) and len(told) > 2
     assert told[-1] == ("developing the picture", 1.0)
@@ -109,7 +109,7 @@ def test_exception_of_a_follower_ends_the_work(tiny: dp.Camera) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
 def test_ctrl_c_ends_the_work(tiny: dp.Camera) -> None:
-    camera = longer(tiny, 640)
+    camera = longer(tiny, (960, 640), 33)
     threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
     start = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):

@@ -28,6 +28,7 @@ mod resume;
 mod scene;
 mod slot;
 mod spec;
+mod with_given;
 
 use dioptric_spectrum::Cancel;
 
