@@ -7,6 +7,8 @@
 //! The Python side of the package (`python/dioptric`) has the type stubs, and what is easier said in Python: progress bars,
 //! xarray, HTML for notebooks.
 
+#![expect(clippy::doc_markdown, reason = "the words of classes and methods are Python docstrings, in NumPy's format")]
+
 mod camera;
 mod changes;
 mod errors;
