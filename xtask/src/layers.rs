@@ -18,7 +18,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("backward", &["spectrum", "optics", "diffraction", "world"]),
     ("forward", &["spectrum", "optics", "psf", "scene"]),
     ("sensor", &["spectrum"]),
-    ("pipeline", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor"]),
+    ("pipeline", &["spectrum", "optics", "diffraction", "psf", "scene", "world", "backward", "forward", "sensor"]),
     ("analysis", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline"]),
     ("report", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline", "analysis"]),
     ("cli", &["spectrum", "pipeline", "analysis", "report"]),

@@ -20,13 +20,14 @@ mod sense;
 mod staged;
 mod stages;
 
+pub use dioptric_backward::{BandSampling, LightPaths, Renderer, Rendering};
 pub use dioptric_optics::{MissingGlass, SeqNumbers};
 pub use dioptric_psf::Diffraction;
 
 pub use camera::{
     BankData, BankSpec, BlurSpec, Camera, Exposed, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec,
-    Movements, REFERENCE_WAVELENGTH_NM, SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec,
-    nearest_to_reference_nm,
+    Movements, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec, SensorOptions, SensorSpec,
+    StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
 pub use error::PipelineError;
 pub use frame_files::{FrameFile, Frames, Outputs, write_frames};
@@ -37,5 +38,5 @@ pub use sense::{SenseRequest, Sensed, parse_illuminant, parse_white, with_analog
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     Capture, FilmPlace, FrameSet, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera, RESUME_FILE,
-    ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,
+    RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, WorldRender, write_seen_png,
 };

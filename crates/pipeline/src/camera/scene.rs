@@ -9,7 +9,7 @@ use dioptric_scene::{Pattern, ReadOptions, Scene, SceneLight, StillLife, Target,
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
-use super::check::Checker;
+use super::{check::Checker, world::WorldSpec};
 use crate::PipelineError;
 
 /// What stands before the camera.
@@ -63,6 +63,8 @@ pub enum SceneSource {
         /// Rows.
         rows: usize,
     },
+    /// A three-dimensional world, with lights of its own.
+    World(WorldSpec),
 }
 
 /// The illuminance on what has none of its own, lux.
@@ -104,6 +106,14 @@ impl SceneSpec {
         }
         match self.source {
             SceneSource::File(_) => Ok(()),
+            SceneSource::World(ref world) => {
+                let others = [self.illuminance_lux, self.mean_luminance_cd_m2, self.depth_m];
+                if self.illuminant.is_some() || others.iter().any(Option::is_some) {
+                    let expected = "field_of_view_deg and light at most: a world has lights and depths of its own";
+                    return checker.wrong("scene", "a world under another light or at another depth", expected);
+                }
+                world.check(checker)
+            }
             SceneSource::StillLife { columns, rows } => check_size(checker, columns, rows),
             SceneSource::Target { columns, rows, .. } => {
                 check_size(checker, columns, rows)?;
@@ -138,6 +148,10 @@ impl SceneSpec {
                 };
                 read_scene(path, &options)?
             }
+            SceneSource::World(world) => {
+                let reason = format!("{} is no picture but a world, expected to be rendered", world.file.display());
+                return Err(PipelineError::Unsuitable { what: "scene", reason });
+            }
             SceneSource::StillLife { columns, rows } => StillLife::new(*columns, *rows).scene(&own_or()?)?,
             SceneSource::Target { pattern, columns, rows } => Target {
                 pattern: *pattern,
@@ -167,8 +181,10 @@ impl SceneSpec {
     }
 
     pub(crate) fn resolve_paths(&mut self, folder: &Path) {
-        if let SceneSource::File(path) = &mut self.source {
-            *path = folder.join(&path);
+        match &mut self.source {
+            SceneSource::File(path) => *path = folder.join(&path),
+            SceneSource::World(world) => world.file = folder.join(&world.file),
+            SceneSource::StillLife { .. } | SceneSource::Target { .. } => {}
         }
     }
 }

@@ -10,7 +10,7 @@ use std::{
 
 use dioptric_forward::{ImagingPlan, Source};
 use dioptric_scene::{BandWriter, ExrParts, Scene, read_spectral_exr};
-use dioptric_spectrum::{Bands, Observer, Quantity, SpectrumError, WavelengthGrid};
+use dioptric_spectrum::{Bands, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::Array2;
 
 use super::{Watch, film::FilmPlace};
@@ -101,13 +101,18 @@ impl Irradiance {
         image.check_samples().map_err(|e| in_file(e.to_string()))?;
         let pitch_um = image.pitch_um().or(pitch_um);
         let pitch_um = pitch_um.ok_or_else(|| in_file("it states no distance between its samples".to_owned()))?;
+        Ok(Self::of_image(image, pitch_um))
+    }
+
+    /// Returns it with bands in memory; `image` is an irradiance.
+    pub(super) fn of_image(image: SpectralImage, pitch_um: f64) -> Self {
         let (grid, size) = (image.grid().clone(), (image.rows(), image.columns()));
         let mut summing = Summing::new(&grid, size);
         let planes = image.into_planes();
         for (band, plane) in planes.iter().enumerate() {
             summing.add(band, plane);
         }
-        Ok(Self { grid, size, pitch_um, planes: Planes::Memory(planes), summary: summing.summary })
+        Self { grid, size, pitch_um, planes: Planes::Memory(planes), summary: summing.summary }
     }
 }
 
@@ -222,7 +227,7 @@ impl Summing {
 mod tests {
     use dioptric_forward::{DiscLens, ImagingSpec, Settings};
     use dioptric_scene::View;
-    use dioptric_spectrum::{Cancel, DepthMap, SpectralImage};
+    use dioptric_spectrum::{Cancel, DepthMap};
 
     use super::*;
     use crate::Silent;

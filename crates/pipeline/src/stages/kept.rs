@@ -6,7 +6,8 @@ use dioptric_forward::{ImagingPlan, check_depth_map};
 use dioptric_psf::LensImageModel;
 use dioptric_scene::Scene;
 use dioptric_sensor::{Developed, ElectronRate, Processing, Sensor};
-use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, WavelengthGrid};
+use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_world::World;
 
 use super::{
     Watch, bank, electrons,
@@ -19,8 +20,9 @@ use super::{
     slot::Slot,
     spec::{
         BankInputs, ElectronInputs, FilmInputs, FrameInputs, GeometryInputs, IrradianceInputs, LensInputs,
-        PictureInputs, PlanInputs, SceneInputs,
+        PictureInputs, PlanInputs, SceneInputs, WorldInputs,
     },
+    world::{self, WorldRender},
 };
 use crate::{Camera, Frames, PipelineError, Progress, Quality, Stage};
 
@@ -60,6 +62,7 @@ pub struct KeptCamera {
 #[derive(Debug)]
 pub(super) struct KeptResults {
     pub(super) lens: Slot<LensInputs, ResolvedLens>,
+    pub(super) world: Slot<WorldInputs, World>,
     pub(super) scene: Slot<SceneInputs, ResolvedScene>,
     pub(super) summary: Slot<SceneInputs, SceneSummary>,
     pub(super) depth: Slot<GeometryInputs, DepthMap>,
@@ -77,6 +80,7 @@ impl Default for KeptResults {
     fn default() -> Self {
         Self {
             lens: Slot::new(8),
+            world: Slot::new(2),
             scene: Slot::new(2),
             summary: Slot::new(8),
             depth: Slot::new(2),
@@ -265,6 +269,59 @@ impl KeptCamera {
         Ok(self.kept.depth.put(inputs.scene.geometry, scene.scene.require_depth()?.clone()))
     }
 
+    /// Returns the irradiance on the film.
+    ///
+    /// # Errors
+    /// As [`capture`](Self::capture).
+    pub fn irradiance(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<Irradiance>, PipelineError> {
+        self.camera.validate()?;
+        let inputs = self.irradiance_inputs()?;
+        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        chain.irradiance(&inputs)
+    }
+
+    /// Returns the world before the camera, read now where it is not kept.
+    ///
+    /// # Errors
+    /// When the scene is no world, or its files cannot be read.
+    pub fn world(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<World>, PipelineError> {
+        let scene = SceneInputs::of(&self.camera, self.quality);
+        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        chain.world(&scene.geometry)
+    }
+
+    /// Returns the world before the camera as its lens sees it, to be rendered pass by pass.
+    ///
+    /// # Errors
+    /// When the scene is no world, or as [`capture`](Self::capture).
+    pub fn world_render(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<WorldRender, PipelineError> {
+        self.camera.validate()?;
+        let inputs = self.irradiance_inputs()?;
+        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let resolved = chain.scene(&inputs.scene)?;
+        let lens = chain.lens(&inputs.plan.bank.film.lens)?;
+        // What is too near for the lens is found before the work.
+        let grid = resolved.scene.radiance.grid();
+        check_glasses(&lens, Some(grid))?;
+        check_depth_map(&lens.lens, grid, resolved.scene.require_depth()?)?;
+        chain.world_render(&inputs)
+    }
+
+    /// Keeps a rendered picture as the irradiance of this camera, so that a capture starts behind it.
+    ///
+    /// # Errors
+    /// When the picture is no irradiance on the film of this camera.
+    pub fn keep_irradiance(&self, picture: SpectralImage) -> Result<(), PipelineError> {
+        let inputs = self.irradiance_inputs()?;
+        let (quantity, pitch_um) = (picture.quantity(), picture.pitch_um());
+        let Some(pitch_um) = pitch_um.filter(|_| quantity == Quantity::Irradiance) else {
+            let reason = format!("its unit is {}, expected an irradiance on pixels of a known pitch", quantity.unit());
+            return Err(PipelineError::Unsuitable { what: "the picture", reason });
+        };
+        self.kept.irradiance.put(inputs, Irradiance::of_image(picture, pitch_um));
+        Ok(())
+    }
+
     pub(super) fn irradiance_inputs(&self) -> Result<IrradianceInputs, PipelineError> {
         Ok(PictureInputs::of(&self.camera, self.quality)?.frames.electrons.irradiance)
     }
@@ -298,10 +355,29 @@ impl Chain<'_> {
         self.kept.scene.get_or_make(inputs.clone(), |inputs| {
             self.watch.progress.at(Stage::Scene, 0.0);
             self.watch.cancel.check()?;
-            let scene = scene::open(inputs)?;
+            let scene = match inputs.geometry.world() {
+                Some((_, spec)) => world::view(inputs, spec, &self.world(&inputs.geometry)?, &self.watch)?,
+                None => scene::open(inputs)?,
+            };
             self.watch.progress.at(Stage::Scene, 1.0);
             Ok(scene)
         })
+    }
+
+    fn world(&self, geometry: &GeometryInputs) -> Result<Arc<World>, PipelineError> {
+        let Some((inputs, _)) = geometry.world() else {
+            let reason = "it is no world, expected 'source: World((file: ...))'".to_owned();
+            return Err(PipelineError::Unsuitable { what: "scene", reason });
+        };
+        self.kept.world.get_or_make(inputs, |inputs| world::read(inputs, &self.watch))
+    }
+
+    fn world_render(&self, inputs: &IrradianceInputs) -> Result<WorldRender, PipelineError> {
+        let world = self.world(&inputs.scene.geometry)?;
+        let film = &inputs.plan.bank.film;
+        let grid = self.summary(&inputs.scene)?.grid()?;
+        let (lens, place) = (self.lens(&film.lens)?, self.film(film, &inputs.scene)?);
+        WorldRender::through_lens(world, inputs, (&lens, &place), grid)
     }
 
     fn summary(&self, inputs: &SceneInputs) -> Result<Arc<SceneSummary>, PipelineError> {
@@ -342,6 +418,11 @@ impl Chain<'_> {
 
     fn irradiance(&self, inputs: &IrradianceInputs) -> Result<Arc<Irradiance>, PipelineError> {
         self.kept.irradiance.get_or_make(inputs.clone(), |inputs| {
+            if let Some(effort) = inputs.scene.geometry.world().and_then(|(_, spec)| spec.backward()) {
+                let picture = self.world_render(inputs)?.render(effort, &self.watch)?.picture;
+                let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
+                return Ok(Irradiance::of_image(picture, place.pitch_um));
+            }
             let plan = self.plan(&inputs.plan, &inputs.scene)?;
             let resolved = self.scene(&inputs.scene)?;
             let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;

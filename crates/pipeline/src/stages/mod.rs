@@ -23,10 +23,14 @@ mod irradiance;
 mod kept;
 mod lens;
 mod plan;
+mod rendering;
 mod resume;
 mod scene;
 mod slot;
 mod spec;
+mod world;
+mod world_camera;
+mod world_light;
 
 use dioptric_spectrum::Cancel;
 
@@ -38,8 +42,10 @@ pub use frames::FrameSet;
 pub use irradiance::{IRRADIANCE_FILE, Irradiance, IrradianceSummary};
 pub use kept::{Capture, KeptCamera, StageCounts};
 pub use lens::ResolvedLens;
+pub use rendering::{RenderingSummary, write_seen_png};
 pub use resume::{RESUME_FILE, Resumed};
 pub use scene::{ResolvedScene, SceneSummary};
+pub use world::WorldRender;
 
 use crate::Progress;
 

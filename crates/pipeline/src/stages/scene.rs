@@ -80,7 +80,7 @@ pub(super) fn open(inputs: &SceneInputs) -> Result<ResolvedScene, PipelineError>
     };
     let fewer = |n: usize, binning: usize| (n / binning).max(1);
     let computed = match source {
-        SceneSource::File(_) => None,
+        SceneSource::File(_) | SceneSource::World(_) => None,
         SceneSource::StillLife { columns, rows } => {
             let binning = quality.scene_binning(*columns);
             let (columns, rows) = (fewer(*columns, binning), fewer(*rows, binning));

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     BankSpec, BlurSpec, Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec, Movements,
-    PipelineError, Quality, SceneSource, StopSpec, WavelengthSpec,
+    PipelineError, Quality, SceneSource, StopSpec, WavelengthSpec, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -81,6 +81,14 @@ pub(crate) struct SceneInputs {
     pub(crate) illuminance_lux: Option<f64>,
     pub(crate) light: Option<Illuminant>,
     pub(crate) mean_luminance_cd_m2: Option<f64>,
+}
+
+/// A world, read from its files.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct WorldInputs {
+    pub(crate) file: PathBuf,
+    pub(crate) unit_m: f64,
+    files: Vec<FileStamp>,
 }
 
 /// The place and the raster of the film.
@@ -169,6 +177,15 @@ impl LensInputs {
     }
 }
 
+impl GeometryInputs {
+    /// Returns what the world of this geometry is read from, or `None` for a scene that is none.
+    pub(crate) fn world(&self) -> Option<(WorldInputs, &WorldSpec)> {
+        let SceneSource::World(spec) = &self.source else { return None };
+        let inputs = WorldInputs { file: spec.file.clone(), unit_m: spec.unit_m, files: self.files.clone() };
+        Some((inputs, spec))
+    }
+}
+
 impl SceneInputs {
     pub(crate) fn of(camera: &Camera, quality: Quality) -> Self {
         let scene = &camera.scene;
@@ -181,6 +198,7 @@ impl SceneInputs {
                 quality,
                 files: match &scene.source {
                     SceneSource::File(path) => FileStamp::all_of(path),
+                    SceneSource::World(world) => FileStamp::all_of(&world.file),
                     _ => Vec::new(),
                 },
             },
