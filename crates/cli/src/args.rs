@@ -8,6 +8,7 @@ use crate::{
     lens_args::{GlassCommand, LensCommand, LensReadingArgs},
     measure_args::MeasureCommand,
     movement_args::MovementArgs,
+    render_args::{CompareArgs, RenderArgs},
 };
 
 /// Simulates a camera from the scene's spectral radiance to the final picture.
@@ -54,6 +55,10 @@ pub(crate) enum Command {
     Trace(TraceArgs),
     /// Computes point-spread functions over field, distance and wavelength
     Psf(PsfArgs),
+    /// Renders a three-dimensional world: rays from the film through the lens, then sensor and picture
+    Render(Box<RenderArgs>),
+    /// Renders the world of a camera file both ways and compares: rays from the film, and the view blurred
+    Compare(CompareArgs),
     /// Exposes a sensor to an irradiance image and processes the picture
     Sense(SenseArgs),
     /// Measures pictures, frames and sensors as a laboratory does

@@ -5,6 +5,7 @@
 
 mod analyze;
 mod args;
+mod compare;
 mod glass;
 mod lens;
 mod lens_args;
@@ -12,6 +13,8 @@ mod measure;
 mod measure_args;
 mod movement_args;
 mod psf;
+mod render;
+mod render_args;
 mod run;
 mod sense;
 mod terminal;
@@ -49,6 +52,8 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Glass(command) => glass::run(&command, &common),
         Command::Trace(arguments) => trace::run(&arguments, &common),
         Command::Psf(arguments) => psf::run(&arguments, &common),
+        Command::Render(arguments) => render::run(&arguments, &common),
+        Command::Compare(arguments) => compare::run(&arguments, &common),
         Command::Sense(arguments) => sense::run(&arguments, &common),
         Command::Measure(command) => measure::run(&command, &common),
     }
