@@ -1,10 +1,12 @@
-"""Traces 100,000 rays through the 50 mm double Gauss with batoid and, where it is installed, Optiland.
+"""Traces 100,000 rays through the 50 mm double Gauss with dioptric, batoid and Optiland, where they are installed.
 
 The rays are those of `cargo bench -p dioptric-optics -- double_gauss`: from a point 2 m away, tan 0.1 off the axis, over
 a disc 1.1 times the entrance pupil. Prints ray-surfaces per core-second, the film counted as a surface.
 
-    pip install batoid optiland
+    pip install . batoid optiland
     OMP_NUM_THREADS=1 python scripts/peers.py
+
+dioptric's time is that of the whole call from Python: it takes rows of points and directions and makes new arrays.
 """
 
 import time
@@ -100,7 +102,28 @@ def optiland_run():
     return run
 
 
-for peer, prepare in [("batoid", batoid_run), ("Optiland", optiland_run)]:
+def dioptric_run():
+    import dioptric
+
+    def row(number, radius_mm, thickness_mm, index, diameter_mm):
+        thickness_mm = 0 if number == len(RADIUS_MM) - 1 else thickness_mm
+        radius = "" if np.isinf(radius_mm) else f"radius_mm: {radius_mm}, "
+        medium = f"Constant(index: {index})"
+        stop = "stop: true, " if number == 5 else ""
+        return f"({stop}{radius}semi_aperture_mm: {diameter_mm / 2}, medium: {medium}, thickness_mm: {thickness_mm})"
+
+    rows = map(row, range(len(RADIUS_MM)), RADIUS_MM, THICKNESS_MM, INDEX, DIAMETER_MM)
+    lens = dioptric.Lens.parse(f'(name: "double Gauss", source: "peers.py", surfaces: [{", ".join(rows)}])')
+    starts, directions = (np.ascontiguousarray(rows.T) for rows in rays_mm())
+
+    def run():
+        rays = lens.trace(starts, directions, 550, film_mm=THICKNESS_MM[-1])
+        return lambda: (rays.passed.sum(), rays.x_mm[rays.passed].mean())
+
+    return run
+
+
+for peer, prepare in [("dioptric", dioptric_run), ("batoid", batoid_run), ("Optiland", optiland_run)]:
     try:
         job = prepare()
     except ImportError:

@@ -18,11 +18,12 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("backward", &["spectrum", "optics", "diffraction", "world"]),
     ("forward", &["spectrum", "optics", "psf", "scene"]),
     ("sensor", &["spectrum"]),
-    ("pipeline", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor"]),
+    ("pipeline", &["spectrum", "optics", "diffraction", "psf", "scene", "world", "backward", "forward", "sensor"]),
     ("analysis", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline"]),
     ("report", &["spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline", "analysis"]),
     ("cli", &["spectrum", "pipeline", "analysis", "report"]),
-    ("xtask", &["report"]),
+    ("python", &["spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis"]),
+    ("xtask", &["pipeline", "report"]),
 ];
 
 /// Compares the table with `cargo metadata` and names the first thing that differs.

@@ -1,4 +1,4 @@
-//! Project chores: `cargo xtask layers`, `modules`, `packages`, `schema`, `figures [--out DIR]`.
+//! Project chores: `cargo xtask layers`, `modules`, `packages`, `schema`, `figures [4 | --out DIR]`.
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool talks to its user")]
 
@@ -10,7 +10,7 @@ mod schema;
 
 use std::{path::Path, process::ExitCode};
 
-const USAGE: &str = "usage: cargo xtask layers | modules | packages | schema | figures [--out DIR]";
+const USAGE: &str = "usage: cargo xtask layers | modules | packages | schema | figures [4 | --out DIR]";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -20,6 +20,7 @@ fn main() -> ExitCode {
         ["packages"] => packages::run(),
         ["schema"] => schema::run(),
         ["figures"] => figures::run(Path::new("docs/figures")),
+        ["figures", "4"] => figures::run_figure4(Path::new("docs/figures")),
         ["figures", "--out", folder] => figures::run(Path::new(folder)),
         _ => Err(anyhow::anyhow!(USAGE)),
     };

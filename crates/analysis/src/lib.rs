@@ -10,6 +10,7 @@
 mod chart;
 mod lens;
 pub mod measure;
+mod methods;
 mod psf;
 mod run;
 mod sensor_table;
@@ -21,6 +22,7 @@ pub use lens::{
     LensInfoRequest, LensRow, OpdMap, PlaneData, PupilRow, RayTable, SpotRow, SurfaceRow, TraceError, TraceSettings,
     WavefrontRow, built_in_lenses, convert_lens, glass_data, glass_rows, placement_lines, surface_rows,
 };
+pub use methods::{Fit, MethodComparison, MethodRow};
 pub use psf::{MtfRow, PolychromaticPsf, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, psf_csv};
 pub use run::{
     ChannelStatistics, FilmData, IrradianceData, LossRow, Run, RunCharts, RunPlaces, RunReport, SceneData,

@@ -152,6 +152,18 @@ impl Pinhole {
         DVec3::new((2.0 * s - 1.0) * self.half_tangents.x, (1.0 - 2.0 * t) * self.half_tangents.y, 1.0)
     }
 
+    /// Where the pinhole is, in the world.
+    pub fn origin(&self) -> Vec3 {
+        self.placement.world_from_camera.translation.as_vec3()
+    }
+
+    /// Returns the ray towards a place of the whole picture: 0 to 1 to the right, and down.
+    pub fn ray_at(&self, [s, t]: [f64; 2]) -> Ray {
+        let half = self.half_tangents;
+        let direction = DVec3::new((2.0 * s - 1.0) * half.x, (1.0 - 2.0 * t) * half.y, 1.0);
+        world_ray(&self.placement, DVec3::ZERO, direction)
+    }
+
     /// Returns the ray of a place in a pixel.
     pub(crate) fn ray(&self, pixel: usize, in_pixel: [f64; 2]) -> Ray {
         world_ray(&self.placement, DVec3::ZERO, self.towards(pixel, in_pixel))

@@ -11,6 +11,7 @@ use crate::Sampler;
 
 /// How much of the light is followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum LightPaths {
     /// All of it, however often it is scattered.
     #[default]

@@ -86,7 +86,7 @@ impl LensCamera {
         let middle = lenses[lenses.len() / 2].forward();
         let projection_center_z_mm = middle.projection_center_z_mm();
         let origin_z_mm = match settings.origin {
-            LensOrigin::Film => middle.last_vertex_z_mm() + settings.film_distance_mm,
+            LensOrigin::Film => middle.film_placement(settings.film_distance_mm).vertex_mm.z,
             LensOrigin::EntrancePupil => projection_center_z_mm,
             LensOrigin::FirstVertex => 0.0,
         };
@@ -97,6 +97,15 @@ impl LensCamera {
     #[must_use]
     pub fn with_inflated_bounds(&self, factor: f64) -> Self {
         Self { bounds: self.bounds.inflated(factor), ..self.clone() }
+    }
+
+    /// Returns the camera with another part of its picture: from this column and row on, so many of each.
+    ///
+    /// # Errors
+    /// When the part does not lie in the picture.
+    pub fn cropped(mut self, first: (usize, usize), size: (usize, usize)) -> Result<Self, BackwardError> {
+        self.settings.pixels = self.settings.pixels.cropped(first, size)?;
+        Ok(self)
     }
 
     /// The bands that the camera was made for.
@@ -244,8 +253,11 @@ const NEWTON_STEPS: usize = 6;
 /// The step of its difference quotients, mm.
 const DIFFERENCE_MM: f64 = 1e-4;
 
-/// Whether the lens has the same indices at all these wavelengths.
+/// Whether the lens has the same indices at all these wavelengths, and no diffractive surface.
 fn is_achromatic(lens: &Lens, wavelengths_nm: &[f64]) -> Result<bool, BackwardError> {
+    if !lens.diffractive().is_empty() {
+        return Ok(false);
+    }
     let media = lens.interfaces().iter().map(|interface| &interface.medium_after);
     for medium in media.chain([lens.object_medium()]) {
         let first = medium.index_at(wavelengths_nm[0])?;

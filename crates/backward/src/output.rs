@@ -4,8 +4,8 @@ use std::{fs, path::Path};
 
 use dioptric_spectrum::{Quantity, SpectralImage};
 use exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text,
-    WritableImage,
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder, SmallVec,
+    Text, WritableImage,
 };
 use ndarray::Array2;
 
@@ -75,7 +75,9 @@ fn write(
     let failed = |reason: String| BackwardError::Write { file: path.to_owned(), reason };
     let partial = path.with_extension(format!("{}.partial", std::process::id()));
     let list: SmallVec<[Channel; 4]> = channels.into_iter().collect();
-    let layer = Layer::new((columns, rows), attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(list));
+    // In a fixed order, so that equal pictures are equal files whatever the threads do.
+    let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS };
+    let layer = Layer::new((columns, rows), attributes, encoding, AnyChannels::sort(list));
     let written = Image::from_layer(layer).write().to_file(&partial).map_err(|error| failed(error.to_string()));
     written.and_then(|()| fs::rename(&partial, path).map_err(|error| failed(error.to_string()))).inspect_err(|_| {
         // What is left of it is of no use; that it cannot be removed changes nothing.

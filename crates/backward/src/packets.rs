@@ -11,6 +11,7 @@ pub(crate) const PACKET: usize = 8;
 
 /// What the value of a band is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum BandSampling {
     /// The mean over the width of the band.
     #[default]
@@ -26,6 +27,8 @@ pub(crate) struct Packets {
     nodes_nm: Vec<f64>,
     n_bands: usize,
     stride: usize,
+    /// Half the width that each of a band's wavelengths stands for, nm.
+    half_widths_nm: Vec<f64>,
 }
 
 impl Packets {
@@ -42,7 +45,12 @@ impl Packets {
         // Steps of eight nodes reach every band soonest; they must not close before all have been taken.
         let from = if n_bands > PACKET { PACKET } else { (5 * n_bands).div_ceil(8) };
         let stride = (from.max(1)..).find(|&stride| greatest_common_divisor(stride, n_bands) == 1).unwrap_or(1);
-        Self { nodes_nm, n_bands, stride }
+        let half_width_nm = |&width: &f64| match sampling {
+            BandSampling::Mean => 0.5 * width / PACKET as f64,
+            BandSampling::Center => 0.0,
+        };
+        let half_widths_nm = grid.widths_nm().iter().map(half_width_nm).collect();
+        Self { nodes_nm, n_bands, stride, half_widths_nm }
     }
 
     /// All wavelengths, nm.
@@ -66,6 +74,13 @@ impl Packets {
     pub(crate) fn nodes_of(&self, sample: usize) -> [usize; PACKET] {
         let first = (sample % self.n_bands) * self.stride % self.n_bands;
         std::array::from_fn(|k| first + k * self.n_bands)
+    }
+
+    /// Returns a wavelength of those that a node stands for, nm; `share` of 0 to 1 chooses among them evenly.
+    ///
+    /// Lenses are traced at the node itself: over an eighth of a band they do not change.
+    pub(crate) fn wavelength_nm(&self, node: usize, share: f64) -> f64 {
+        self.nodes_nm[node] + (2.0 * share - 1.0) * self.half_widths_nm[Self::band_of(node)]
     }
 
     /// The band of a node.
@@ -96,6 +111,17 @@ mod tests {
             let soonest = (n_bands as usize).div_ceil(PACKET);
             assert!(packets.n_for_all_bands() <= 2 * soonest, "{n_bands}: {}", packets.n_for_all_bands());
         }
+    }
+
+    #[test]
+    fn wavelengths_of_a_band_leave_no_gap() {
+        let grid = WavelengthGrid::uniform(420.0, 700.0, 40.0).unwrap();
+        let packets = Packets::new(&grid, BandSampling::Mean);
+        assert_eq!((packets.wavelength_nm(0, 0.0), packets.wavelength_nm(63, 1.0)), (400.0, 720.0));
+        for node in 1..64 {
+            assert!((packets.wavelength_nm(node, 0.0) - packets.wavelength_nm(node - 1, 1.0)).abs() < 1e-9);
+        }
+        assert_eq!(Packets::new(&grid, BandSampling::Center).wavelength_nm(9, 0.7), 460.0);
     }
 
     #[test]

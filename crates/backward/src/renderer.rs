@@ -205,11 +205,12 @@ impl<'a> Renderer<'a> {
             let samples: Vec<PixelSample> = tile.pixels.iter().map(of_pixel).collect();
             let in_order = self.n_passes as usize % n_bands * samples_per_pass as usize + sample as usize;
             let nodes = self.packets.nodes_of(rotation + in_order);
-            let wavelengths_nm = nodes.map(|node| self.packets.nodes_nm()[node] as f32);
             self.camera.rays(&samples, &nodes, &mut rays);
             // Find the light along each, and add it to its band.
             for (i, PixelSample { random, .. }) in samples.iter().enumerate() {
                 cancel.check()?;
+                let share = f64::from(random.pair(WAVELENGTH_PAIR)[0]);
+                let wavelengths_nm = nodes.map(|node| self.packets.wavelength_nm(node, share) as f32);
                 let radiance = self.packet_radiance(&integrator, &rays, (i, n_pixels), &wavelengths_nm, random);
                 for (node, value) in nodes.iter().zip(radiance) {
                     sums[i * n_bands + Packets::band_of(*node)] += f64::from(value);
@@ -255,6 +256,8 @@ impl<'a> Renderer<'a> {
     }
 }
 
+/// The pair of numbers that chooses wavelengths; those below are the stop's and the integrator's.
+const WAVELENGTH_PAIR: u32 = u32::MAX;
 /// The most samples of a pass.
 const MOST_SAMPLES: u32 = 65_536;
 

@@ -54,6 +54,7 @@ impl Camera {
                 has_diffraction,
                 has_dispersion,
             } => {
+                let is_ideal = focal_length_mm.is_some() && file.is_empty();
                 let lens = match focal_length_mm {
                     Some(focal_length_mm) if file.is_empty() => Lens::thin(*focal_length_mm, *aperture_diameter_mm)?,
                     _ => {
@@ -75,7 +76,8 @@ impl Camera {
                     film_size_mm: size * (film_diagonal_mm / size.length()),
                     pixels,
                     placement,
-                    origin: LensOrigin::Film,
+                    // The paper's `idealDiffraction` camera has its lens at the origin, pbrt's `realistic` its film.
+                    origin: if is_ideal { LensOrigin::EntrancePupil } else { LensOrigin::Film },
                     diffraction: has_diffraction.then_some(Hurb::PAPER),
                 };
                 Ok(Self::Lens(Box::new(LensCamera::new(&lens, bands, settings)?)))
@@ -154,6 +156,24 @@ mod tests {
         assert!((view.half_tangents - DVec2::new(0.5, 0.25)).length() < 1e-12);
         let aside = Camera::from_world(&of(perspective(Some([0.0, 1.0, -1.0, 1.0]))), &bands(), &read);
         assert!(aside.unwrap_err().to_string().contains("the axis goes through the middle"));
+    }
+
+    #[test]
+    fn ideal_lens_stands_at_the_origin() {
+        let ideal = |film_distance_mm| CameraKind::Lens {
+            file: String::new(),
+            focal_length_mm: Some(50.0),
+            film_distance_mm: Some(film_distance_mm),
+            focus_distance_m: None,
+            aperture_diameter_mm: 10.0,
+            film_diagonal_mm: 70.0,
+            has_diffraction: false,
+            has_dispersion: false,
+        };
+        let read = |_: &str| Lens::built_in("dgauss-50mm");
+        let Ok(Camera::Lens(camera)) = Camera::from_world(&of(ideal(137.0)), &bands(), &read) else { panic!() };
+        // The center of its entrance pupil, which is the lens, and not the film 137 mm behind it.
+        assert_eq!(camera.projection_center().0, DVec3::ZERO);
     }
 
     #[test]

@@ -4,10 +4,12 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+pub(crate) use crate::common::Common;
 use crate::{
     camera::{CameraCommand, SensorCommand},
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
+    render_args::{CompareArgs, RenderArgs},
 };
 
 /// Simulates a camera from the scene's spectral radiance to the final picture.
@@ -20,23 +22,6 @@ pub(crate) struct Cli {
     /// Options of every command.
     #[command(flatten)]
     pub(crate) common: Common,
-}
-
-/// Options of every command.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct Common {
-    /// Prints numbers as JSON
-    #[arg(long, global = true)]
-    pub(crate) json: bool,
-    /// Uses N threads [default: one a core]; results do not depend on it
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    pub(crate) threads: Option<u16>,
-    /// Draws all noise from this seed [default: the camera file's, or 1]
-    #[arg(long, global = true, value_name = "N")]
-    pub(crate) seed: Option<u64>,
-    /// Prints nothing but errors and what was asked for
-    #[arg(long, short, global = true)]
-    pub(crate) quiet: bool,
 }
 
 /// A command.
@@ -60,6 +45,10 @@ pub(crate) enum Command {
     Trace(TraceArgs),
     /// Computes point-spread functions over field, distance and wavelength
     Psf(PsfArgs),
+    /// Renders a three-dimensional world: rays from the film through the lens, then sensor and picture
+    Render(Box<RenderArgs>),
+    /// Renders the world of a camera file both ways and compares: rays from the film, and the view blurred
+    Compare(CompareArgs),
     /// Exposes a sensor to an irradiance image and processes the picture
     Sense(SenseArgs),
     /// Measures pictures, frames and sensors as a laboratory does

@@ -13,7 +13,7 @@ use dioptric_pipeline::{CAMERA_SCHEMA, CAMERA_TEMPLATE, Camera, KeptCamera, SENS
 use serde_json::json;
 
 use crate::{
-    args::Common,
+    common::Common,
     terminal::{guarded, print, print_json, remark},
 };
 

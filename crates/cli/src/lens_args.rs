@@ -6,7 +6,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use dioptric_analysis::LensDefaults;
 use dioptric_pipeline::{FocusSpec, LensReadOptions, MissingGlass, SeqNumbers, StopSpec, parse_numbers};
 
-use crate::{args::Common, movement_args::MovementArgs, terminal::remark};
+use crate::{common::Common, movement_args::MovementArgs, terminal::remark};
 
 /// Something to do with lenses.
 #[derive(Debug, Subcommand)]
@@ -58,7 +58,7 @@ pub(crate) struct LensStateArgs {
 #[derive(Clone, Copy, Debug, Args)]
 #[group(multiple = false)]
 pub(crate) struct FilmArgs {
-    /// Focuses on this distance from the first vertex, mm, or inf
+    /// Focuses on this distance from the first vertex, mm, or inf [default of a render with --lens: what stands ahead]
     #[arg(long, value_name = "D")]
     pub(crate) focus_mm: Option<f64>,
     /// Places the film this far behind the last vertex, mm

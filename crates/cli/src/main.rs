@@ -6,6 +6,8 @@
 mod analyze;
 mod args;
 mod camera;
+mod common;
+mod compare;
 mod glass;
 mod lens;
 mod lens_args;
@@ -13,6 +15,8 @@ mod measure;
 mod measure_args;
 mod movement_args;
 mod psf;
+mod render;
+mod render_args;
 mod run;
 mod sense;
 mod terminal;
@@ -52,6 +56,8 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Glass(command) => glass::run(&command, &common),
         Command::Trace(arguments) => trace::run(&arguments, &common),
         Command::Psf(arguments) => psf::run(&arguments, &common),
+        Command::Render(arguments) => render::run(&arguments, &common),
+        Command::Compare(arguments) => compare::run(&arguments, &common),
         Command::Sense(arguments) => sense::run(&arguments, &common),
         Command::Measure(command) => measure::run(&command, &common),
     }

@@ -110,7 +110,7 @@ fn change_demo(camera: &mut Camera, arguments: &RunArgs) {
     camera.name = format!("{scene}, {lens}{stop}");
 }
 
-fn stem_of(path: &Path) -> String {
+pub(crate) fn stem_of(path: &Path) -> String {
     path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
@@ -228,14 +228,14 @@ pub(crate) fn frames_of(arguments: &FrameArgs) -> anyhow::Result<Option<FramesSp
     })
 }
 
-fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
+pub(crate) fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
     let parts = text.split_once(['x', 'X', '×']);
     parts
         .and_then(|(columns, rows)| Some((columns.trim().parse().ok()?, rows.trim().parse().ok()?)))
         .with_context(|| format!("--pixels is '{text}', expected WxH, as 640x480"))
 }
 
-fn summary(report: &RunReport, out: &Path) -> String {
+pub(crate) fn summary(report: &RunReport, out: &Path) -> String {
     let total_s: f64 = report.timings_s.iter().map(|(_, seconds)| seconds).sum();
     format!(
         "{}: {} × {} pixels, {} bands, {:.2} ms, {:.1} s\n{}{}\n",
@@ -251,18 +251,18 @@ fn summary(report: &RunReport, out: &Path) -> String {
 }
 
 /// Shows progress and measures how long each stage takes.
-struct Clock {
+pub(crate) struct Clock {
     bar: Bar,
     stages: Mutex<Vec<(Stage, Instant)>>,
 }
 
 impl Clock {
-    fn new(quiet: bool) -> Self {
+    pub(crate) fn new(quiet: bool) -> Self {
         Self { bar: Bar::new(quiet), stages: Mutex::new(Vec::new()) }
     }
 
     /// Returns how long each stage has taken so far, s.
-    fn timings(&self) -> Vec<(String, f64)> {
+    pub(crate) fn timings(&self) -> Vec<(String, f64)> {
         let stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
         let ends = stages.iter().skip(1).map(|(_, start)| *start).chain([Instant::now()]);
         stages

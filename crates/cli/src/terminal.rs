@@ -95,6 +95,11 @@ pub(crate) fn guarded(staged: Staged) -> Staged {
     staged
 }
 
+/// Makes a file known that an interrupt may leave half-written.
+pub(crate) fn guard(path: PathBuf) {
+    PARTIAL.lock().unwrap_or_else(PoisonError::into_inner).push(path);
+}
+
 /// A progress bar, shown on a terminal only.
 pub(crate) struct Bar(Option<ProgressBar>);
 

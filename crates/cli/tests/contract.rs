@@ -87,7 +87,7 @@ fn lens_analyze_has_its_keys_and_leaves_its_plots() {
     let analysis = json(folder.path(), &[&common[..], &stop, &["--out", "plots", "--json"]].concat());
     check_numbers(
         &analysis,
-        "distance_mm reference_nm efl_mm f_number working_f_number film_distance_mm half_illumination_deg object_index image_index \
+        "distance_mm reference_nm efl_mm f_number working_f_number film_mm half_illumination_deg object_index image_index \
          object_na image_na",
     );
     assert_eq!(analysis["grid"].as_array().unwrap().len(), 121);

@@ -5,6 +5,7 @@ use multiversion::multiversion;
 
 use crate::{
     MonoLens, ObjectPoint, RayBatch, RayBatchF32, RayFate, Vignetting,
+    bundle::{Aim, rays_within},
     rays::RaySlices,
     trace::{self, Goal, Plan},
 };
@@ -23,47 +24,6 @@ pub struct Beam<'a> {
     pub z_mm: f64,
 }
 
-/// How rays from an object point start, of path length 0 for the one aimed at the axis.
-pub(crate) struct Aim<'a> {
-    point: &'a ObjectPoint,
-    z_mm: f64,
-    start_z_mm: f64,
-    reference_mm: DVec3,
-    /// Of the medium that the rays start in.
-    index: f64,
-}
-
-impl<'a> Aim<'a> {
-    /// Aims at targets in the plane `z_mm`; rays start on the plane `start_z_mm`.
-    pub(crate) fn new(point: &'a ObjectPoint, z_mm: f64, start_z_mm: f64) -> Self {
-        let aim = Self { point, z_mm, start_z_mm, reference_mm: DVec3::ZERO, index: 1.0 };
-        let (reference_mm, _) = aim.start(DVec2::ZERO);
-        Self { reference_mm, ..aim }
-    }
-
-    /// The same in a medium of this index.
-    pub(crate) fn within(self, index: f64) -> Self {
-        Self { index, ..self }
-    }
-
-    /// Returns the start and the direction of the ray towards a target.
-    #[inline(always)]
-    fn start(&self, target_mm: DVec2) -> (DVec3, DVec3) {
-        let target_mm = target_mm.extend(self.z_mm);
-        let direction = self.point.direction_to(target_mm);
-        // Where the pupil appears behind the object, light runs as though it came from the target.
-        let direction = direction * 1.0_f64.copysign(direction.z);
-        (target_mm + direction * ((self.start_z_mm - self.z_mm) / direction.z), direction)
-    }
-
-    /// Returns the start, the direction and the path length of the ray towards a target.
-    #[inline(always)]
-    pub(crate) fn ray(&self, target_mm: DVec2) -> (DVec3, DVec3, f64) {
-        let (start_mm, direction) = self.start(target_mm);
-        (start_mm, direction, self.index * self.point.path_difference_mm(start_mm, self.reference_mm))
-    }
-}
-
 /// Fills a batch with the rays towards as many targets.
 #[multiversion(targets("x86_64+avx2"))]
 fn aim_at(aim: &Aim<'_>, targets_mm: &[DVec2], rays: RaySlices<'_>) {
@@ -80,7 +40,29 @@ fn aim_at(aim: &Aim<'_>, targets_mm: &[DVec2], rays: RaySlices<'_>) {
     fate.fill(RayFate::InFlight);
 }
 
+impl ObjectPoint {
+    /// Returns the point seen from the paraxial entrance-pupil center of `lens` under these tangents of field angles,
+    /// `dioptres` = 1/Z away (Z the axial distance from that center in metres; 0 is infinitely far).
+    ///
+    /// A telecentric lens has no such center; there the first vertex stands for it
+    /// ([`MonoLens::projection_center_z_mm`]).
+    pub fn from_field(lens: &MonoLens, field_tan: DVec2, dioptres: f64) -> Self {
+        let center_z_mm = lens.projection_center_z_mm();
+        if dioptres == 0.0 {
+            return Self::Infinite(DVec3::new(-field_tan.x, -field_tan.y, 1.0).normalize());
+        }
+        let distance_mm = 1e3 / dioptres;
+        Self::Finite((field_tan * distance_mm).extend(center_z_mm - distance_mm))
+    }
+}
+
 impl MonoLens {
+    /// Returns rays as [`rays_towards`](crate::rays_towards) does, with path lengths in the medium that the object of
+    /// this lens is in.
+    pub fn rays_towards(&self, point: &ObjectPoint, targets_mm: &[DVec2], z_mm: f64, start_z_mm: f64) -> RayBatch {
+        rays_within(self.object_index(), point, targets_mm, [z_mm, start_z_mm])
+    }
+
     /// Traces a beam to the film, `film_distance_mm` behind the last vertex, and shows the rays there to `visit`, a few hundred
     /// at a time and in their order.
     ///
@@ -137,8 +119,22 @@ impl Beam<'_> {
     }
 }
 
+/// Returns rays from an object point to a square grid of `n_across`² points, of which those in a disc are kept, on
+/// the flat front disc of the lens: the paper's way of choosing rays.
+///
+/// The disc has the radius of the first surface's rim and lies in its vertex plane.
+pub fn rays_over_front(lens: &MonoLens, point: &ObjectPoint, n_across: usize) -> RayBatch {
+    let radius_mm = lens.semi_aperture_mm(0);
+    let at = |i: usize| if n_across < 2 { 0.0 } else { 2.0 * i as f64 / (n_across - 1) as f64 - 1.0 };
+    let grid = (0..n_across).flat_map(|row| (0..n_across).map(move |column| DVec2::new(at(column), at(row))));
+    let targets: Vec<DVec2> = grid.filter(|p| p.length_squared() <= 1.0).map(|p| p * radius_mm).collect();
+    lens.rays_towards(point, &targets, 0.0, 0.0)
+}
+
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
     use crate::{CoordinateBreak, Lens, rays_towards};
 
@@ -199,5 +195,37 @@ mod tests {
         let mut n_shown = 0;
         lens.trace_onto(&beam, Vignetting::On, 36.0, |_| n_shown += 1);
         assert_eq!(n_shown, 0);
+    }
+
+    #[test]
+    fn path_lengths_do_not_depend_on_the_start_plane() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
+        let (film_distance_mm, z_mm) = (36.5, lens.first_order().entrance_pupil_z_mm);
+        let targets = [DVec2::ZERO, DVec2::new(5.0, 2.0), DVec2::new(-3.0, 7.0)];
+        // 1 km away and 20 degrees off, where paths are 4e8 waves of light long.
+        for dioptres in [0.0, 1e-3, 2.0] {
+            let point = ObjectPoint::from_field(&lens, DVec2::new(0.2, 0.1), dioptres);
+            let paths = |start_z_mm: f64| {
+                let mut rays = rays_towards(&point, &targets, z_mm, start_z_mm);
+                lens.trace(&mut rays, Vignetting::On);
+                lens.to_film(&mut rays, film_distance_mm);
+                [rays.opl_mm[1] - rays.opl_mm[0], rays.opl_mm[2] - rays.opl_mm[0]]
+            };
+            let (near, far) = (paths(0.0), paths(-100.0));
+            for (a, b) in near.into_iter().zip(far) {
+                assert!((a - b).abs() < 1e-6 * 550e-6, "{dioptres}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn paper_mode_fills_the_front_disc_evenly() {
+        let lens = Lens::built_in("paper-2el").unwrap().at(550.0).unwrap();
+        let point = ObjectPoint::from_field(&lens, DVec2::ZERO, 0.5);
+        let rays = rays_over_front(&lens, &point, 201);
+        assert!((rays.len() as f64 / 201_f64.powi(2) - PI / 4.0).abs() < 0.01);
+        assert!(rays.z_mm.iter().all(|z| *z == 0.0));
+        let widest = (0..rays.len()).map(|i| rays.x_mm[i].hypot(rays.y_mm[i])).fold(0.0, f64::max);
+        assert!((widest - 12.5).abs() < 1e-9, "{widest}");
     }
 }

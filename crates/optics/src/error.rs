@@ -55,6 +55,22 @@ pub enum OpticsError {
         /// What should stand there.
         expected: &'static str,
     },
+    /// A surface that cannot be diffractive, or a task that does not know of such.
+    #[error("{lens}: {reason}")]
+    Diffractive {
+        /// The lens.
+        lens: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A surface that cannot be a mirror.
+    #[error("surface {surface} cannot be a mirror: {reason}")]
+    Mirror {
+        /// 0-based surface.
+        surface: usize,
+        /// Why not.
+        reason: String,
+    },
     /// A rim that lies beyond the sphere or conic it should be cut from.
     #[error("surface {surface}: a rim of {semi_aperture_mm} mm does not fit on a surface of radius {radius_mm} mm")]
     RimBeyondSurface {

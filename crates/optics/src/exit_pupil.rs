@@ -77,7 +77,7 @@ impl ExitPupilBounds {
         if !(film_distance_mm > 0.0 && film_distance_mm.is_finite()) {
             return Err(OpticsError::FilmInLens { lens: first.name().to_owned(), film_distance_mm });
         }
-        let plane = last_placement(first);
+        let plane = first.surface_placement(first.n_surfaces() - 1);
         let seek = |place_mm: DVec2| -> Vec<LitPoints> {
             let find = |lens| LitPoints::find(lens, &plane, place_mm, film_distance_mm, reach);
             lenses.iter().filter_map(find).collect()
@@ -161,12 +161,6 @@ struct Seen<'a> {
 fn cell(place: f64, n: usize) -> (usize, f64) {
     let cell = (place.max(0.0) as usize).min(n - 1);
     (cell, (place - cell as f64).clamp(0.0, 1.0))
-}
-
-/// Where the last surface stands.
-fn last_placement(lens: &MonoLens) -> Placement {
-    let last = lens.n_surfaces() - 1;
-    lens.placements().map_or(Placement::centered(lens.last_vertex_z_mm()), |placements| placements[last])
 }
 
 /// A grid of points of the plane that holds all lit ones, and which points of each row are lit.

@@ -10,21 +10,16 @@ mod iset_json;
 mod json;
 mod lens_file;
 mod pbrt_list;
+mod prescription;
+mod read;
 mod rii_yaml;
 mod seq;
 mod shapes;
 mod system;
+mod text_error;
 mod write;
 mod write_zmx;
 mod zmx;
 
-use std::path::Path;
-
-use crate::{Lens, OpticsError};
-
 pub use lens_file::{Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};
-
-/// Reads a lens file, and gives the lens alone.
-pub(crate) fn read(path: &Path) -> Result<Lens, OpticsError> {
-    LensFile::read(path, &ReadOptions::default()).map(|file| file.lens)
-}
+pub(crate) use prescription::lens_from_ron;

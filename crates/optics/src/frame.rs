@@ -33,13 +33,15 @@ impl FilmPoint {
 }
 
 impl MonoLens {
-    /// Where a surface stands: on the axis at its vertex, unless it is tilted or decentered.
+    /// Where a surface stands: on the axis at its vertex, unless it is tilted or decentered. Its z is along the light that
+    /// leaves it, so that behind an odd number of mirrors the frame is left-handed.
     pub fn surface_placement(&self, surface: usize) -> Placement {
-        self.placements()
-            .map_or_else(|| Placement::centered(self.vertex_z_mm(surface)), |placements| placements[surface])
+        let Some(placements) = self.placements() else { return Placement::centered(self.vertex_z_mm(surface)) };
+        let placement = placements[surface];
+        if self.steps()[surface].is_mirror { placement.flipped() } else { placement }
     }
 
-    /// Where the stop stands.
+    /// Where the stop stands, its z along the light that leaves it.
     pub fn stop_placement(&self) -> Placement {
         self.surface_placement(self.stop())
     }

@@ -1,11 +1,13 @@
 //! Media and their refractive index as a function of wavelength.
 
+mod catalogue;
 mod formula;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Air, GlassCatalogue, OpticsError};
+use crate::{Air, OpticsError};
 
+pub use self::catalogue::{CatalogueGlass, GlassCatalogue};
 use self::formula::formula_index;
 
 /// The helium d line, at which catalogues state the main index, nm.

@@ -57,6 +57,7 @@ impl Lens {
         let mut svg = frame.open(self.name());
         frame.axis(&mut svg);
         elements(self, layout, &frame, &mut svg);
+        mirrors(self, &frame, &mut svg);
         for fan in &fans {
             frame.rays(fan, &mut svg);
         }
@@ -108,10 +109,17 @@ struct Line {
     reaches_film: bool,
 }
 
+/// Returns the least and the greatest z of all vertices and of the film, mm, along the axis that moves may bend.
+fn extent_z_mm(lens: &Lens, layout: &Layout) -> [f64; 2] {
+    let ends = lens.vertices_z_mm().into_iter().chain([lens.film_z_mm(layout.film_distance_mm)]);
+    ends.fold([0.0; 2], |[low, high], z_mm| [z_mm.min(low), z_mm.max(high)])
+}
+
 /// Returns how far before the lens rays are drawn, mm.
 fn lead_mm(lens: &Lens, layout: &Layout) -> f64 {
-    let track_mm = lens.last_vertex_z_mm() + layout.film_distance_mm;
-    layout.object_distance_mm.min(0.25 * track_mm + 0.3 * lens.front_semi_aperture_mm())
+    let [front_mm, back_mm] = extent_z_mm(lens, layout);
+    let lead_mm = 0.25 * (back_mm - front_mm) + 0.3 * lens.front_semi_aperture_mm() - front_mm;
+    layout.object_distance_mm.min(lead_mm)
 }
 
 fn fans(lens: &Lens, lenses: &[MonoLens], layout: &Layout) -> Vec<Fan> {
@@ -214,7 +222,7 @@ fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
         let back = match last {
             Some(j) => outline(&interfaces[j].surface, &placements[j], extent_mm(lens, j)),
             None => {
-                let film_z_mm = lens.last_vertex_z_mm() + layout.film_distance_mm;
+                let film_z_mm = lens.film_z_mm(layout.film_distance_mm);
                 outline(&Surface::plane(1.0), &Placement::centered(film_z_mm), extent_mm(lens, i))
             }
         };
@@ -237,6 +245,23 @@ fn elements(lens: &Lens, layout: &Layout, frame: &Frame, svg: &mut String) {
             frame.path(points)
         );
         i = last.unwrap_or(interfaces.len());
+    }
+}
+
+/// Draws the mirrors: a thick line each, left open where an obscuration about the middle stands for a hole.
+fn mirrors(lens: &Lens, frame: &Frame, svg: &mut String) {
+    let placements = lens.placements();
+    for &mirror in lens.mirrors() {
+        let surface = &lens.interfaces()[mirror].surface;
+        let [low, high] = extent_mm(lens, mirror);
+        let pieces = match aperture::hole_mm(lens, mirror) {
+            Some(hole_mm) if low < -hole_mm && hole_mm < high => vec![[low, -hole_mm], [hole_mm, high]],
+            _ => vec![[low, high]],
+        };
+        for piece in pieces {
+            let path = frame.path(outline(surface, &placements[mirror], piece));
+            let _ = writeln!(svg, "<path d=\"{path}\" fill=\"none\" stroke=\"#4d5a66\" stroke-width=\"2.6\"/>");
+        }
     }
 }
 
@@ -268,12 +293,14 @@ fn stop(lens: &Lens, frame: &Frame, svg: &mut String) {
 }
 
 fn film(lens: &Lens, layout: &Layout, fans: &[Fan], frame: &Frame, svg: &mut String) {
-    let z_mm = lens.last_vertex_z_mm() + layout.film_distance_mm;
+    let z_mm = lens.film_z_mm(layout.film_distance_mm);
     let arrived = fans.iter().flat_map(|fan| &fan.lines).filter(|line| line.reaches_film);
     let height = arrived.filter_map(|line| line.points.last()).map(|p| p.y.abs()).fold(0.0, f64::max);
     let half_mm = (1.06 * height).max(8.0 / frame.px_per_mm).min(frame.y_max_mm.max(-frame.y_min_mm));
     let ImageSurface { curvature_per_mm, conic } = lens.image_surface();
     let half_mm = half_mm.min(1.0 / curvature_per_mm.abs());
+    let is_backward = lens.is_backward_before(lens.interfaces().len());
+    let curvature_per_mm = if is_backward { -curvature_per_mm } else { curvature_per_mm };
     let surface = Surface { curvature_per_mm, shape: Shape::Conic { conic }, semi_aperture_mm: half_mm };
     let points = outline(&surface, &lens.film_motion().after(&Placement::centered(z_mm)), round_mm(&surface));
     let top = points.last().copied().unwrap_or(DVec2::new(z_mm, half_mm));

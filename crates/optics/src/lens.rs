@@ -1,19 +1,17 @@
 //! A lens: surfaces in a row, one of them the stop.
 
-use std::path::Path;
-
 use glam::DVec2;
 
 use crate::{
-    Aperture, CoordinateBreak, Glass, Interface, MonoLens, OpticsError, Placement, Shape, Surface, formats, library,
-    placement,
+    Aperture, CoordinateBreak, DiffractiveSurface, Glass, Interface, OpticsError, Placement, Shape, Surface, placement,
 };
 
 /// A lens that has been checked and can be traced.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lens {
     // Invariants: 1 to 1000 interfaces whose numbers are finite and whose rims fit; `stop` is an index of them;
-    // the stop's semi-aperture is at most `full_stop_semi_aperture_mm`; the moves have been checked.
+    // the stop's semi-aperture is at most `full_stop_semi_aperture_mm`; the moves have been checked; `mirrors` are indices of
+    // interfaces in ascending order, and have the same medium on both sides.
     name: String,
     source: String,
     object_medium: Glass,
@@ -22,14 +20,16 @@ pub struct Lens {
     full_stop_semi_aperture_mm: f64,
     moves: Vec<CoordinateBreak>,
     apertures: Vec<Aperture>,
+    mirrors: Vec<usize>,
+    diffractive: Vec<DiffractiveSurface>,
     image_surface: ImageSurface,
 }
 
 /// The shape of the film: a conic with its vertex on the axis. As it stands by default, it is a plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImageSurface {
-    /// One over the radius at the vertex, 1/mm; positive where the center lies downstream, so that a retina's is
-    /// negative.
+    /// One over the radius at the vertex, 1/mm; positive where the center lies downstream along the light, so that a
+    /// retina's is negative.
     pub curvature_per_mm: f64,
     /// The conic constant.
     pub conic: f64,
@@ -106,6 +106,8 @@ impl Lens {
             full_stop_semi_aperture_mm,
             moves: Vec::new(),
             apertures,
+            mirrors: Vec::new(),
+            diffractive: Vec::new(),
             image_surface: ImageSurface::default(),
         })
     }
@@ -118,7 +120,8 @@ impl Lens {
     pub fn with_object_medium(mut self, medium: Glass) -> Result<Self, OpticsError> {
         medium.check()?;
         self.object_medium = medium;
-        Ok(self)
+        let mirrors = std::mem::take(&mut self.mirrors);
+        self.with_mirrors(mirrors)
     }
 
     /// Returns the lens with its surfaces tilted and decentered by these moves, and by no others.
@@ -133,6 +136,58 @@ impl Lens {
             return Err(OpticsError::MoveCount { n_moves: moves.len(), most: MOST_MOVES });
         }
         self.moves = moves;
+        Ok(self)
+    }
+
+    /// Returns the lens with these surfaces, counted from 0, as mirrors, and no others.
+    ///
+    /// Axes do not turn at a mirror: behind an odd number of them light runs towards −z, so that distances between vertices
+    /// are negative there, and radii keep their sign. docs/mirrors.md in the repository has the conventions. The medium behind a mirror is
+    /// that before it.
+    ///
+    /// # Errors
+    /// When a surface is not there, is an ideal lens, or has another medium behind it than before.
+    pub fn with_mirrors(mut self, mirrors: impl IntoIterator<Item = usize>) -> Result<Self, OpticsError> {
+        let mut mirrors: Vec<usize> = mirrors.into_iter().collect();
+        mirrors.sort_unstable();
+        mirrors.dedup();
+        for &surface in &mirrors {
+            let cannot = |reason: String| Err(OpticsError::Mirror { surface, reason });
+            let Some(interface) = self.interfaces.get(surface) else {
+                return cannot(format!("the lens has the surfaces 0 to {}", self.interfaces.len() - 1));
+            };
+            if matches!(interface.surface.shape, Shape::ThinLens { .. }) {
+                return cannot("it is an ideal thin lens".to_owned());
+            }
+            let before = surface.checked_sub(1).map_or(&self.object_medium, |i| &self.interfaces[i].medium_after);
+            if interface.medium_after != *before {
+                let (before, after) = (before.describe(), interface.medium_after.describe());
+                return cannot(format!("the medium behind it is {after}, expected that before it, {before}"));
+            }
+        }
+        self.mirrors = mirrors;
+        Ok(self)
+    }
+
+    /// Returns the lens with these gratings and diffractive surfaces, and no others.
+    ///
+    /// # Errors
+    /// When a surface is not there, is named twice or is an ideal lens, or a number makes no sense.
+    pub fn with_diffractive(mut self, diffractive: Vec<DiffractiveSurface>) -> Result<Self, OpticsError> {
+        for (i, phase) in diffractive.iter().enumerate() {
+            phase.check(self.interfaces.len())?;
+            let cannot = |what: &str| {
+                let reason = format!("surface {} cannot be diffractive: {what}", phase.surface);
+                Err(OpticsError::Diffractive { lens: self.name.clone(), reason })
+            };
+            if matches!(self.interfaces[phase.surface].surface.shape, Shape::ThinLens { .. }) {
+                return cannot("it is an ideal thin lens");
+            }
+            if diffractive[..i].iter().any(|other| other.surface == phase.surface) {
+                return cannot("it is named twice");
+            }
+        }
+        self.diffractive = diffractive;
         Ok(self)
     }
 
@@ -175,30 +230,6 @@ impl Lens {
         Self::new("thin lens", "the thin-lens equation", vec![interface], 0)
     }
 
-    /// Returns the built-in lens of this name; [`built_in_names`](Self::built_in_names) lists them.
-    ///
-    /// # Errors
-    /// When there is none of that name.
-    pub fn built_in(name: &str) -> Result<Self, OpticsError> {
-        library::built_in(name)
-    }
-
-    /// The names of the built-in lenses.
-    pub fn built_in_names() -> impl Iterator<Item = &'static str> {
-        library::names()
-    }
-
-    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx` or `.seq`.
-    ///
-    /// [`LensFile::read`](crate::LensFile::read) tells what else the file says, as where the film lies.
-    ///
-    /// # Errors
-    /// When the file cannot be read or is not what it should be; the message names the file and, where it can, the
-    /// line and key.
-    pub fn read(path: &Path) -> Result<Self, OpticsError> {
-        formats::read(path)
-    }
-
     /// The lens's name.
     pub fn name(&self) -> &str {
         &self.name
@@ -239,6 +270,34 @@ impl Lens {
         self.apertures.iter().filter(move |aperture| aperture.surface == surface)
     }
 
+    /// The gratings and diffractive surfaces; none for most lenses.
+    pub fn diffractive(&self) -> &[DiffractiveSurface] {
+        &self.diffractive
+    }
+
+    /// The surfaces that reflect, counted from 0, in ascending order; none for most lenses.
+    pub fn mirrors(&self) -> &[usize] {
+        &self.mirrors
+    }
+
+    /// Whether a surface reflects.
+    pub fn is_mirror(&self, surface: usize) -> bool {
+        self.mirrors.binary_search(&surface).is_ok()
+    }
+
+    /// Whether light runs towards −z before a surface, along the axis that moves may bend: behind an odd number of mirrors.
+    /// The surface after the last is the film.
+    pub fn is_backward_before(&self, surface: usize) -> bool {
+        self.mirrors.iter().filter(|&&mirror| mirror < surface).count() % 2 == 1
+    }
+
+    /// z of the film's vertex from the first, mm, along the axis that moves may bend, for a film this far behind the last
+    /// vertex along the light.
+    pub fn film_z_mm(&self, film_distance_mm: f64) -> f64 {
+        let is_backward = self.is_backward_before(self.interfaces.len());
+        self.last_vertex_z_mm() + if is_backward { -film_distance_mm } else { film_distance_mm }
+    }
+
     /// The shape of the film.
     pub fn image_surface(&self) -> ImageSurface {
         self.image_surface
@@ -266,6 +325,7 @@ impl Lens {
         let is_round = |interface: &Interface| interface.surface.is_rotational();
         self.apertures.iter().all(Aperture::is_rotational)
             && self.interfaces.iter().all(is_round)
+            && self.diffractive.iter().all(|phase| phase.profile.is_rotational())
             && placement::motions(&self.moves, &self.vertices_z_mm()).is_none()
     }
 
@@ -306,48 +366,16 @@ impl Lens {
         self.interfaces[self.stop].surface.semi_aperture_mm
     }
 
-    /// Returns the lens with its stop set to this diameter.
-    ///
-    /// # Errors
-    /// When the diameter is not positive or wider than the prescription's stop.
-    pub fn with_stop_diameter_mm(&self, diameter_mm: f64) -> Result<Self, OpticsError> {
-        let semi_aperture_mm = 0.5 * positive("the diameter of a stop in mm", diameter_mm)?;
-        let full_mm = self.full_stop_semi_aperture_mm;
-        // A diameter that came from the full stop by way of its f-number may be off by rounding.
-        if semi_aperture_mm > full_mm * (1.0 + 1e-9) {
-            let mut full = self.clone();
-            full.interfaces[self.stop].surface.semi_aperture_mm = full_mm;
-            return Err(OpticsError::StopTooWide {
-                lens: self.name.clone(),
-                asked_mm: diameter_mm,
-                largest_mm: 2.0 * full_mm,
-                smallest_f_number: full.at(MESSAGE_WAVELENGTH_NM).map_or(f64::NAN, |lens| lens.first_order().f_number),
-            });
-        }
-        let mut lens = self.clone();
-        lens.interfaces[self.stop].surface.semi_aperture_mm = semi_aperture_mm.min(full_mm);
-        Ok(lens)
+    /// Half the diameter of the prescription's stop, mm, however far it is stopped down.
+    pub(crate) fn full_stop_semi_aperture_mm(&self) -> f64 {
+        self.full_stop_semi_aperture_mm
     }
 
-    /// Returns the lens stopped down to this f-number (for a far object) at this wavelength.
-    ///
-    /// # Errors
-    /// When the f-number is not positive or below that of the full stop, or of what the rims let through.
-    pub fn with_f_number(&self, f_number: f64, wavelength_nm: f64) -> Result<Self, OpticsError> {
-        positive("an f-number", f_number)?;
-        let now = self.at(wavelength_nm)?.first_order_of_stop().f_number;
-        let mut full = self.clone();
-        full.interfaces[self.stop].surface.semi_aperture_mm = self.full_stop_semi_aperture_mm;
-        let full = full.at(wavelength_nm)?;
-        if let Some(beam) = full.limiting_beam().filter(|_| f_number < full.first_order().f_number * (1.0 - 1e-3)) {
-            return Err(OpticsError::RimsTooNarrow {
-                lens: self.name.clone(),
-                asked: f_number,
-                surface: beam.limiting_surface,
-                smallest: full.first_order().f_number,
-            });
-        }
-        self.with_stop_diameter_mm(2.0 * self.stop_semi_aperture_mm() * now / f_number)
+    /// Returns the lens with a stop of this semi-aperture, which is at most the full one.
+    pub(crate) fn with_stop_semi_aperture_mm(&self, semi_aperture_mm: f64) -> Self {
+        let mut lens = self.clone();
+        lens.interfaces[self.stop].surface.semi_aperture_mm = semi_aperture_mm.min(self.full_stop_semi_aperture_mm);
+        lens
     }
 
     /// Returns the lens with the same dispersion given to every medium of constant index but air: a straight line of this
@@ -369,14 +397,6 @@ impl Lens {
         }
         Ok(lens)
     }
-
-    /// Returns the lens at one wavelength.
-    ///
-    /// # Errors
-    /// When a glass is not known at that wavelength.
-    pub fn at(&self, wavelength_nm: f64) -> Result<MonoLens, OpticsError> {
-        MonoLens::new(self, wavelength_nm)
-    }
 }
 
 /// The largest number of surfaces.
@@ -386,9 +406,7 @@ const MOST_APERTURES: usize = 2 * MOST_SURFACES;
 /// The largest number of moves: two breaks before each surface.
 const MOST_MOVES: usize = 2 * MOST_SURFACES;
 
-/// The wavelength at which a message states an f-number, nm.
-const MESSAGE_WAVELENGTH_NM: f64 = crate::glass::D_LINE_NM;
-
-fn positive(what: &'static str, found: f64) -> Result<f64, OpticsError> {
+/// Returns the number if it is positive and finite.
+pub(crate) fn positive(what: &'static str, found: f64) -> Result<f64, OpticsError> {
     if found > 0.0 && found.is_finite() { Ok(found) } else { Err(OpticsError::NotPositive { what, found }) }
 }

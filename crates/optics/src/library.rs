@@ -1,6 +1,6 @@
 //! The built-in lenses.
 
-use crate::{Lens, OpticsError, prescription::lens_from_ron};
+use crate::{Lens, OpticsError, formats::lens_from_ron};
 
 /// Names the lenses whose files lie in `data/lenses`.
 macro_rules! lenses {
@@ -28,11 +28,26 @@ const LENSES: &[(&str, &str)] = lenses![
     "relay-1to1",
 ];
 
-pub(crate) fn names() -> impl Iterator<Item = &'static str> {
+impl Lens {
+    /// Returns the built-in lens of this name; [`built_in_names`](Self::built_in_names) lists them.
+    ///
+    /// # Errors
+    /// When there is none of that name.
+    pub fn built_in(name: &str) -> Result<Self, OpticsError> {
+        built_in(name)
+    }
+
+    /// The names of the built-in lenses.
+    pub fn built_in_names() -> impl Iterator<Item = &'static str> {
+        names()
+    }
+}
+
+fn names() -> impl Iterator<Item = &'static str> {
     LENSES.iter().map(|(name, _)| *name)
 }
 
-pub(crate) fn built_in(name: &str) -> Result<Lens, OpticsError> {
+fn built_in(name: &str) -> Result<Lens, OpticsError> {
     let Some((_, text)) = LENSES.iter().find(|(known, _)| *known == name) else {
         let known = format!("built in are {}", names().collect::<Vec<_>>().join(", "));
         return Err(OpticsError::Unknown { kind: "lens", name: name.to_owned(), known });

@@ -1,17 +1,21 @@
 //! A lens at one wavelength: the thing that is traced.
 
+mod axial;
+
 use std::{borrow::Cow, ops::Range, sync::OnceLock};
 
 use glam::{DVec2, DVec3};
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::{
-    Aperture, AxialBeam, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Placement, RayBatch, RayBatchF32,
-    Shape, Surface, Vignetting,
+    Aperture, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Placement, RayBatch, RayBatchF32, Shape, Surface,
+    Vignetting,
     paraxial::{self, MarginalRay, Matrix},
     placement,
-    trace::{self, Goal, Kind, Plan, Step},
+    trace::{self, Goal, Kind, Phase, Plan, Step},
 };
+
+pub use self::axial::AxialBeam;
 
 /// Rays that one task of [`MonoLens::trace_parallel`] traces.
 const CHUNK: usize = 4096;
@@ -31,7 +35,9 @@ pub struct MonoLens {
     front: Surface,
     rear: Surface,
     image_surface: ImageSurface,
-    /// Where surfaces stand, if not all are centered.
+    /// z of each vertex from the first, mm, along the axis that moves may bend.
+    vertices_z_mm: Vec<f64>,
+    /// Where surfaces stand, if not all are centered or some reflect.
     placed: Option<Placed>,
     /// That of the stop, whether it limits the light or not.
     first_order: FirstOrder,
@@ -39,42 +45,93 @@ pub struct MonoLens {
     far_beam: OnceLock<Option<AxialBeam>>,
 }
 
-/// Where the surfaces of a lens stand that is not centered.
+impl Lens {
+    /// Returns the lens at one wavelength.
+    ///
+    /// # Errors
+    /// When a glass is not known at that wavelength.
+    pub fn at(&self, wavelength_nm: f64) -> Result<MonoLens, OpticsError> {
+        MonoLens::new(self, wavelength_nm)
+    }
+}
+
+/// Where the surfaces of a lens stand that is not centered, or that has mirrors or diffractive surfaces.
 #[derive(Clone, Debug)]
 struct Placed {
-    /// That of each surface.
+    /// That of each surface, its z along the light that comes: behind an odd number of mirrors the frame is left-handed.
     placements: Vec<Placement>,
     /// What has become of the straight axis at the film.
     film: Placement,
+    /// Whether all stand on the axis.
+    is_centered: bool,
+    /// Whether light runs towards −z at the film.
+    is_film_backward: bool,
+}
+
+impl Placed {
+    /// Returns where the surfaces of a lens stand; `None` where all are centered and none reflects.
+    fn of(lens: &Lens, vertices_z_mm: &[f64]) -> Option<Self> {
+        let motions = placement::motions(lens.moves(), vertices_z_mm);
+        if motions.is_none() && lens.mirrors().is_empty() && lens.diffractive().is_empty() {
+            return None;
+        }
+        let along_light = |(i, placement): (usize, Placement)| {
+            if lens.is_backward_before(i) { placement.flipped() } else { placement }
+        };
+        Some(Self {
+            placements: lens.placements().into_iter().enumerate().map(along_light).collect(),
+            film: lens.film_motion(),
+            is_centered: motions.is_none(),
+            is_film_backward: lens.is_backward_before(vertices_z_mm.len()),
+        })
+    }
 }
 
 impl MonoLens {
     pub(crate) fn new(lens: &Lens, wavelength_nm: f64) -> Result<Self, OpticsError> {
-        let mut steps = Vec::with_capacity(lens.interfaces().len());
-        let mut index_before = lens.object_medium().index_at(wavelength_nm)?;
-        for (interface, vertex_z) in lens.interfaces().iter().zip(lens.vertices_z_mm()) {
+        let (mut steps, mut index_before) = (Vec::new(), lens.object_medium().index_at(wavelength_nm)?);
+        let (vertices_z_mm, n_surfaces) = (lens.vertices_z_mm(), lens.interfaces().len());
+        let (mut vertex_z, mut before_z_mm) = (0.0, 0.0);
+        for (i, interface) in lens.interfaces().iter().enumerate() {
             let index_after = interface.medium_after.index_at(wavelength_nm)?;
-            let surface = &interface.surface;
-            let is_window = surface.curvature_per_mm == 0.0 && index_before == index_after;
+            let (is_backward, is_mirror) = (lens.is_backward_before(i), lens.is_mirror(i));
+            let as_met = is_backward.then(|| interface.surface.flipped());
+            let surface = as_met.as_ref().unwrap_or(&interface.surface);
+            let is_window = surface.curvature_per_mm == 0.0 && index_before == index_after && !is_mirror;
             let kind = kind_of(surface, is_window);
             let (curvature, semi_aperture) = (surface.curvature_per_mm, surface.semi_aperture_mm);
-            let apertures = lens.apertures_of(steps.len()).copied().collect();
-            steps.push(Step { kind, curvature, index_before, index_after, vertex_z, semi_aperture, apertures });
+            let apertures = lens.apertures_of(i).copied().collect();
+            let way_mm = vertices_z_mm[i] - before_z_mm;
+            vertex_z += if is_backward { -way_mm } else { way_mm };
+            before_z_mm = vertices_z_mm[i];
+            // Without mirrors, the same bits as the sums of the lens.
+            let vertex_z = if lens.mirrors().is_empty() { vertices_z_mm[i] } else { vertex_z };
+            steps.push(Step {
+                kind,
+                curvature,
+                index_before,
+                index_after,
+                vertex_z,
+                semi_aperture,
+                apertures,
+                is_mirror,
+                phase: phase_of(lens, i, wavelength_nm),
+            });
             index_before = index_after;
         }
         let first_order = paraxial::first_order(&steps, lens.stop(), wavelength_nm);
-        let motions = placement::motions(lens.moves(), &lens.vertices_z_mm());
-        let placed = motions.map(|motions| Placed { placements: lens.placements(), film: motions[steps.len()] });
-        let steps_end = steps.len() - 1;
+        let rear = &lens.interfaces()[n_surfaces - 1].surface;
+        let rear = if lens.is_backward_before(n_surfaces) { rear.flipped() } else { rear.clone() };
         Ok(Self {
             name: lens.name().to_owned(),
             wavelength_nm,
             steps,
             stop: lens.stop(),
             front: lens.interfaces()[0].surface.clone(),
-            rear: lens.interfaces()[steps_end].surface.clone(),
+            rear,
             image_surface: lens.image_surface(),
-            placed,
+            placed: Placed::of(lens, &vertices_z_mm),
+            vertices_z_mm,
             first_order,
             far_beam: OnceLock::new(),
         })
@@ -82,9 +139,19 @@ impl MonoLens {
 
     /// Whether the lens is rotationally symmetric, as [`Lens::is_rotational`].
     pub fn is_rotational(&self) -> bool {
-        let is_round =
-            |step: &Step| step.apertures.iter().all(Aperture::is_rotational) && !matches!(step.kind, Kind::Toric(_));
-        self.placed.is_none() && self.steps.iter().all(is_round)
+        let is_round = |step: &Step| step.apertures.iter().all(Aperture::is_rotational) && step.is_rotational();
+        self.is_centered() && self.steps.iter().all(is_round)
+    }
+
+    /// Whether all surfaces and the film stand on the axis.
+    pub(crate) fn is_centered(&self) -> bool {
+        self.placed.as_ref().is_none_or(|placed| placed.is_centered)
+    }
+
+    /// Whether light runs towards −z of the lens frame (or of what moves make of it) before the film: behind an odd number of
+    /// mirrors.
+    pub fn is_film_backward(&self) -> bool {
+        self.placed.as_ref().is_some_and(|placed| placed.is_film_backward)
     }
 
     /// The number of obscurations, of all surfaces.
@@ -228,14 +295,14 @@ impl MonoLens {
         self.steps[surface].semi_aperture
     }
 
-    /// z of a surface's vertex from the first, mm.
+    /// z of a surface's vertex from the first, mm, along the axis that moves may bend.
     pub fn vertex_z_mm(&self, surface: usize) -> f64 {
-        self.steps[surface].vertex_z
+        self.vertices_z_mm[surface]
     }
 
-    /// z of the last vertex from the first, mm.
+    /// z of the last vertex from the first, mm, along the axis that moves may bend.
     pub fn last_vertex_z_mm(&self) -> f64 {
-        self.steps[self.steps.len() - 1].vertex_z
+        self.vertices_z_mm[self.vertices_z_mm.len() - 1]
     }
 
     /// How far from the middle of the stop the beam of a point on the axis passes it at most, mm: the stop's own radius unless
@@ -270,15 +337,23 @@ impl MonoLens {
         self.placements().map_or(point, |placements| placements[0].lens_from_surface(point))
     }
 
-    /// Returns the z of the last surface over this place of its vertex plane, mm, in its own frame; NaN beyond its equator.
+    /// Returns the z of the last surface over this place of its vertex plane, mm, along the light that leaves it; NaN beyond
+    /// its equator.
     pub(crate) fn last_sag_mm(&self, place_mm: DVec2) -> f64 {
         self.rear.sag_at_mm(place_mm.x, place_mm.y)
     }
 
-    /// Where a film stands that lies `film_distance_mm` behind the last vertex.
+    /// Where a film stands that lies `film_distance_mm` behind the last vertex, its z along the light: behind an odd number of mirrors
+    /// the frame is left-handed, so that x and y stay those of the lens.
     pub fn film_placement(&self, film_distance_mm: f64) -> Placement {
-        let centered = Placement::centered(self.last_vertex_z_mm() + film_distance_mm);
-        self.placed.as_ref().map_or(centered, |placed| placed.film.after(&centered))
+        let last_z_mm = self.last_vertex_z_mm();
+        match &self.placed {
+            None => Placement::centered(last_z_mm + film_distance_mm),
+            Some(placed) if placed.is_film_backward => {
+                placed.film.after(&Placement::centered(last_z_mm - film_distance_mm)).flipped()
+            }
+            Some(placed) => placed.film.after(&Placement::centered(last_z_mm + film_distance_mm)),
+        }
     }
 
     /// Returns where a point of the lens frame lies on a film `film_distance_mm` behind the last vertex, mm, along the film's own
@@ -495,6 +570,13 @@ impl MonoLens {
         }
         Err(OpticsError::NoFocus { lens: self.name.clone(), side: "before it", distance_mm: film_distance_mm })
     }
+}
+
+/// Returns the phase that a surface adds at a wavelength.
+fn phase_of(lens: &Lens, surface: usize, wavelength_nm: f64) -> Option<Phase> {
+    let stated = lens.diffractive().iter().find(|phase| phase.surface == surface)?;
+    let path_per_cycle_mm = f64::from(stated.order) * 1e-6 * wavelength_nm;
+    Some(Phase { profile: stated.profile.clone(), path_per_cycle_mm })
 }
 
 /// Returns the kernel's form of a surface's shape.

@@ -6,7 +6,8 @@ use crate::trace::{Kind, Step};
 
 /// The first-order data of a lens at one wavelength.
 ///
-/// z of things in front is from the first vertex, of things behind from the last, both positive downstream.
+/// z of things in front is from the first vertex, of things behind from the last, both positive downstream: behind an odd
+/// number of mirrors, towards −z of the lens frame.
 /// A lens without power (a pinhole) has infinite focal lengths; a telecentric one an infinitely far pupil.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FirstOrder {
@@ -221,9 +222,16 @@ fn reduced_gap_mm(steps: &[Step], surface: usize) -> f64 {
 impl Step {
     /// The paraxial power of the surface, 1/mm.
     pub(crate) fn power(&self) -> f64 {
+        let of_phase = self.phase.as_ref().map_or(0.0, |phase| phase.profile.power_of_path() * phase.path_per_cycle_mm);
+        of_phase + self.power_of_shape()
+    }
+
+    fn power_of_shape(&self) -> f64 {
         match self.kind {
             Kind::Window => 0.0,
             Kind::ThinLens { power, .. } => power,
+            // Light that runs on towards +z behind a mirror does so in an index of the opposite sign.
+            _ if self.is_mirror => -2.0 * self.index_before * self.vertex_curvature(),
             _ => (self.index_after - self.index_before) * self.vertex_curvature(),
         }
     }

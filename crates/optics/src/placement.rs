@@ -69,7 +69,8 @@ impl CoordinateBreak {
 pub struct Placement {
     /// The vertex, mm.
     pub vertex_mm: DVec3,
-    /// Turns directions of the surface's own frame to those of the lens frame.
+    /// Turns directions of the surface's own frame to those of the lens frame. Of a surface that light meets behind an odd
+    /// number of mirrors it also reverses z, so that the surface's own z is along the light.
     pub rotation: DMat3,
 }
 
@@ -112,6 +113,12 @@ impl Placement {
     /// Returns the motion that undoes this one.
     pub fn inverse(&self) -> Self {
         Self { vertex_mm: self.surface_from_lens(DVec3::ZERO), rotation: self.rotation.transpose() }
+    }
+
+    /// Returns the frame with its z the other way, x and y as they are: of the other handedness.
+    pub(crate) fn flipped(&self) -> Self {
+        let DMat3 { x_axis, y_axis, z_axis } = self.rotation;
+        Self { rotation: DMat3::from_cols(x_axis, y_axis, -z_axis), ..*self }
     }
 
     /// Whether another surface stands on the same axis and is not turned about it, to rounding.

@@ -8,7 +8,8 @@ use glam::{DMat3, DVec3};
 use crate::{
     MonoLens, Placement, RayBatch, RayBatchF32, Vignetting,
     rays::RaySlices,
-    trace::{self, Goal, Kind, Plan, Real, Step, Toric},
+    toric::Toric,
+    trace::{self, Goal, Kind, Plan, Real, Step},
 };
 
 /// A lens at one wavelength, traced from the film to the scene.
@@ -39,7 +40,10 @@ enum Part {
 impl MonoLens {
     /// Returns the lens for rays from the film to the scene.
     pub fn reversed(&self) -> ReversedLens {
-        let placements = self.placements().map(|placements| placements.iter().rev().map(mirrored_placement).collect());
+        let placements = self.placements().map(|placements| {
+            let both = placements.iter().zip(self.steps()).rev();
+            both.map(|(placement, step)| mirrored_placement(placement, step.is_mirror)).collect()
+        });
         let steps = |part: Part| part_of(&mirrored_steps(self, f64::NEG_INFINITY), self.stop(), part);
         let parts = [Part::Whole, Part::ToStop, Part::FromStop];
         ReversedLens {
@@ -65,10 +69,7 @@ impl ReversedLens {
     /// Where the stop stands: in its frame diffraction turns rays between [`trace_to_stop`](Self::trace_to_stop) and
     /// [`trace_from_stop`](Self::trace_from_stop).
     pub fn stop_placement(&self) -> Placement {
-        let stop = self.forward.stop();
-        self.forward
-            .placements()
-            .map_or(Placement::centered(self.forward.vertex_z_mm(stop)), |placements| placements[stop])
+        self.forward.stop_placement()
     }
 
     /// Traces rays from the image space through all surfaces, on this thread.
@@ -180,9 +181,12 @@ fn mirror<T: Real>(rays: &mut RaySlices<'_, T>) {
     }
 }
 
-fn mirrored_placement(placement: &Placement) -> Placement {
+/// Returns where a surface stands in the mirrored frame: its own frame is mirrored too, but for a mirror, which light comes to
+/// from the same side both ways.
+fn mirrored_placement(placement: &Placement, is_mirror: bool) -> Placement {
     let flip = DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0));
-    Placement { vertex_mm: flip * placement.vertex_mm, rotation: flip * placement.rotation * flip }
+    let mirrored = Placement { vertex_mm: flip * placement.vertex_mm, rotation: flip * placement.rotation };
+    if is_mirror { mirrored } else { mirrored.flipped() }
 }
 
 /// Returns the steps of a lens mirrored at z = 0, the last first.
@@ -191,6 +195,10 @@ fn mirrored_steps(lens: &MonoLens, object_z_mm: f64) -> Vec<Step> {
 }
 
 fn mirrored(step: &Step) -> Step {
+    if step.is_mirror {
+        return step.clone();
+    }
+    // The phase of a place adds to light of either direction.
     let negated = |list: &[f64]| list.iter().map(|a| -a).collect();
     let kind = match &step.kind {
         Kind::Window => Kind::Window,
@@ -236,6 +244,8 @@ fn part_of(steps: &[Step], stop: usize, part: Part) -> Vec<Step> {
             if matches!(stop.kind, Kind::ThinLens { .. }) {
                 stop.kind = Kind::Window;
             }
+            stop.is_mirror = false;
+            stop.phase = None;
             steps
         }
     }

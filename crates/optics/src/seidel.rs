@@ -116,6 +116,10 @@ impl Lens {
     /// When a glass is not known at one of the wavelengths, or the lens is not rotationally symmetric.
     pub fn seidel(&self, settings: &SeidelSettings) -> Result<Seidel, OpticsError> {
         self.check_rotational("a sum of Seidel aberrations")?;
+        if !self.diffractive().is_empty() {
+            let reason = "Seidel sums of diffractive surfaces are not supported".to_owned();
+            return Err(OpticsError::Diffractive { lens: self.name().to_owned(), reason });
+        }
         let mono = self.at(settings.wavelength_nm)?;
         let [short, long] = [self.at(settings.colors_nm[0])?, self.at(settings.colors_nm[1])?];
         let index_before = mono.steps()[0].index_before;
@@ -162,15 +166,17 @@ impl AtSurface<'_> {
         if matches!(step.kind, Kind::Window | Kind::ThinLens { .. }) {
             return SeidelSums::default();
         }
-        let (n0, n1, c) = (step.index_before, step.index_after, step.vertex_curvature());
+        // A mirror is a boundary to the opposite index.
+        let (n0, c) = (step.index_before, step.vertex_curvature());
+        let n1 = if step.is_mirror { -n0 } else { step.index_after };
         let (y, y_bar) = (self.marginal.y, self.chief.y);
         let a = n0 * (self.marginal.u + c * y);
         let a_bar = n0 * (self.chief.u + c * y_bar);
-        let u_over_n = self.marginal.refracted(step).u / n1 - self.marginal.u / n0;
+        let u_over_n = self.marginal.refracted(step).u / step.index_after - self.marginal.u / n0;
         let petzval = c * (1.0 / n1 - 1.0 / n0);
         // Free of the quotient of Ā and A, which fails where the marginal ray meets the surface head-on.
         let s5 = a_bar * (petzval * y_bar * (a_bar * y - h) - a_bar * a_bar * y * (1.0 / (n1 * n1) - 1.0 / (n0 * n0)));
-        let color = self.index_difference[1] / n1 - self.index_difference[0] / n0;
+        let color = self.index_difference[1] / step.index_after - self.index_difference[0] / n0;
         // How much the r⁴ term departs from that of the sphere of the vertex's curvature, eightfold.
         let fourth = |conic: f64, a4: f64| (1.0 + conic) * step.curvature.powi(3) + 8.0 * a4 - c.powi(3);
         let bent = match &step.kind {

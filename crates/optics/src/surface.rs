@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::{Aperture, Glass, OpticsError, trace::Toric};
+use crate::{Aperture, Glass, OpticsError, toric::Toric};
 
 /// The shape of a surface, beyond its curvature at the vertex.
 ///
@@ -140,6 +140,31 @@ impl Surface {
             }
             _ => None,
         }
+    }
+
+    /// Returns the surface mirrored at its vertex plane: as light meets it that runs towards −z.
+    pub(crate) fn flipped(&self) -> Self {
+        let negated = |list: &[f64]| list.iter().map(|a| -a).collect();
+        let shape = match &self.shape {
+            Shape::Sphere => Shape::Sphere,
+            Shape::Conic { conic } => Shape::Conic { conic: *conic },
+            Shape::EvenAsphere { conic, coefficients } => {
+                Shape::EvenAsphere { conic: *conic, coefficients: negated(coefficients) }
+            }
+            Shape::OddAsphere { conic, coefficients } => {
+                Shape::OddAsphere { conic: *conic, coefficients: negated(coefficients) }
+            }
+            Shape::ThinLens { power_per_mm } => Shape::ThinLens { power_per_mm: *power_per_mm },
+            Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
+                Shape::Biconic { conic: *conic, curvature_x_per_mm: -curvature_x_per_mm, conic_x: *conic_x }
+            }
+            Shape::Toroid { curvature_x_per_mm, conic, coefficients } => Shape::Toroid {
+                curvature_x_per_mm: -curvature_x_per_mm,
+                conic: *conic,
+                coefficients: negated(coefficients),
+            },
+        };
+        Self { curvature_per_mm: -self.curvature_per_mm, shape, semi_aperture_mm: self.semi_aperture_mm }
     }
 
     /// Whether the surface is one of revolution about its own axis.

@@ -9,6 +9,7 @@ mod asphere;
 mod block;
 mod crossing;
 mod kernel;
+mod phase;
 mod placed;
 mod plan;
 mod real;
@@ -26,12 +27,12 @@ use self::{
     plan::Pass,
 };
 pub(crate) use self::{
+    phase::Phase,
     placed::{move_to_placed_conic, move_to_placed_plane, placed_clearances, trace_placed, trace_placed_by},
     plan::Plan,
     real::Real,
-    toric::Toric,
 };
-use crate::{Aperture, RayFate, rays::RaySlices};
+use crate::{Aperture, RayFate, rays::RaySlices, toric::Toric};
 
 /// Whether rims end rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +43,8 @@ pub enum Vignetting {
     Off,
 }
 
-/// A surface with its indices resolved.
+/// A surface with its indices resolved, as the light meets it: where that runs towards −z, the surface is mirrored at its
+/// vertex plane and z counts the other way, so that light always runs towards +z.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
     pub(crate) kind: Kind,
@@ -53,6 +55,10 @@ pub(crate) struct Step {
     pub(crate) semi_aperture: f64,
     /// Openings beside the round rim.
     pub(crate) apertures: Vec<Aperture>,
+    /// Whether it reflects.
+    pub(crate) is_mirror: bool,
+    /// The phase that it adds.
+    pub(crate) phase: Option<Phase>,
 }
 
 /// The shapes, and what they need beyond a curvature.

@@ -205,7 +205,6 @@ fn what_cannot_be_traced_is_refused_by_name() {
     assert!(message("TYPE EVENASPH", "TYPE GRINSUR1").starts_with("lens.zmx:18: surface 1: surfaces of type GRINSUR1"));
     assert!(message("TYPE EVENASPH", "TYPE TOROIDAL\n  XDAT 1 2").contains("Zernike terms (XDAT) of a toroid"));
     assert!(message("TYPE EVENASPH", "TYPE COORDBRK").contains("surface 1: a coordinate break cannot be the stop"));
-    assert!(message("GLAS N-BK7", "GLAS MIRROR").contains("mirrors are not supported"));
     assert!(message("  CONI", "  OBSC 1 2\n  CONI").contains("OBSC: an obscuration with a hole"));
     assert!(message("  CONI", "  SPID 1 4\n  CONI").contains("SPID: a spider is not supported"));
     assert!(message("MODE SEQ", "MODE NSC").contains("MODE: NSC is not supported; expected SEQ"));

@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
+use dioptric_backward::BackwardError;
 use dioptric_forward::ForwardError;
 use dioptric_optics::OpticsError;
 use dioptric_psf::PsfError;
 use dioptric_scene::SceneError;
 use dioptric_sensor::SensorError;
 use dioptric_spectrum::{Cancelled, SpectrumError};
+use dioptric_world::WorldError;
 
 /// A camera that cannot be built, run or written down.
 #[derive(Debug, thiserror::Error)]
@@ -99,6 +101,12 @@ pub enum PipelineError {
     /// The blur.
     #[error(transparent)]
     Forward(ForwardError),
+    /// The world.
+    #[error(transparent)]
+    World(WorldError),
+    /// The rendering of a world.
+    #[error(transparent)]
+    Backward(BackwardError),
     /// Spectral data.
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
@@ -135,6 +143,24 @@ impl From<SceneError> for PipelineError {
         match error {
             SceneError::Cancelled(cancelled) => Self::Cancelled(cancelled),
             other => Self::Scene(other),
+        }
+    }
+}
+
+impl From<WorldError> for PipelineError {
+    fn from(error: WorldError) -> Self {
+        match error {
+            WorldError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::World(other),
+        }
+    }
+}
+
+impl From<BackwardError> for PipelineError {
+    fn from(error: BackwardError) -> Self {
+        match error {
+            BackwardError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Backward(other),
         }
     }
 }

@@ -126,13 +126,22 @@ pub fn write_frames(
     for file in &outputs.also {
         names.extend(write_also(frames, picture, *file, folder)?);
     }
+    let png = picture_png(picture)?;
+    let path = folder.join("picture.png");
+    fs::write(&path, &png).map_err(|e| PipelineError::Write { path, reason: e.to_string() })?;
+    Ok((names, png))
+}
+
+/// Returns a picture as an 8-bit PNG file, the `picture.png` of a run.
+///
+/// # Errors
+/// When it cannot be encoded.
+pub fn picture_png(picture: &Picture) -> Result<Vec<u8>, PipelineError> {
     let mut png = Vec::new();
     PngEncoder::new(&mut png)
         .write_image(&picture.to_rgb8(), picture.columns() as u32, picture.rows() as u32, ExtendedColorType::Rgb8)
         .map_err(|e| PipelineError::Png { reason: e.to_string() })?;
-    let path = folder.join("picture.png");
-    fs::write(&path, &png).map_err(|e| PipelineError::Write { path, reason: e.to_string() })?;
-    Ok((names, png))
+    Ok(png)
 }
 
 fn write_also(

@@ -20,26 +20,30 @@ mod schema;
 mod sense;
 mod staged;
 mod stages;
+mod words;
 
+pub use dioptric_backward::{BandSampling, LightPaths, Renderer, Rendering};
 pub use dioptric_optics::{MissingGlass, SeqNumbers};
 pub use dioptric_psf::Diffraction;
 
 pub use camera::{
     BankData, BankSpec, BlurSpec, Camera, Exposed, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec,
-    Movements, REFERENCE_WAVELENGTH_NM, SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec,
-    nearest_to_reference_nm,
+    Movements, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec, SensorOptions, SensorSpec,
+    StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
 pub use error::PipelineError;
-pub use frame_files::{FrameFile, Frames, Outputs, write_frames};
+pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
 pub use numbers::{number, parse_numbers, parse_pairs};
 pub use progress::{Progress, Silent, Stage};
 pub use quality::Quality;
 #[cfg(feature = "schema")]
 pub use schema::generated_schemas;
 pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
-pub use sense::{SenseRequest, Sensed, parse_illuminant, parse_white, with_analog_gain, with_exposure_s};
+pub use sense::{SenseRequest, Sensed};
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{
-    Capture, FilmPlace, FrameSet, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera, RESUME_FILE,
-    ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,
+    Capture, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera,
+    RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, WorldRender,
+    write_seen_png,
 };
+pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

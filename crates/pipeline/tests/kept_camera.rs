@@ -2,8 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_pipeline::{
-    BlurSpec, Camera, Capture, Diffraction, FilmSpec, FocusSpec, KeptCamera, Quality, SceneSource, SensorSpec, Silent,
-    StageCounts, StopSpec, WavelengthSpec, with_exposure_s,
+    BlurSpec, Camera, Capture, Diffraction, FilmSpec, FocusSpec, Given, KeptCamera, Quality, SceneSource, SensorSpec,
+    Silent, StageCounts, StopSpec, WavelengthSpec, with_exposure_s,
 };
 use dioptric_scene::{ExrParts, write_spectral_exr};
 use dioptric_sensor::WhiteBalance;
@@ -153,6 +153,42 @@ fn folder_without_a_run_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let error = KeptCamera::resume(folder.path()).unwrap_err().to_string();
     assert!(error.contains("kept.ron"), "{error}");
+}
+
+/// Parts that a program hands over make the picture of the same parts by name.
+#[test]
+fn given_parts_are_those_they_equal() {
+    let named = KeptCamera::new(small());
+    let camera = named.camera();
+    let lens = camera.stop.apply(camera.lens.open(&camera.lens_reading).unwrap().lens).unwrap();
+    let scene = camera.scene.open(camera.wavelengths.grid().unwrap().as_ref()).unwrap();
+    let given = KeptCamera::new(small())
+        .with_given_lens(Given::new(lens))
+        .with_given_scene(Given::new(scene))
+        .with_given_sensor(Given::new(camera.sensor.open().unwrap()));
+    let first = capture(&given);
+    assert_eq!(bits(&first), bits(&capture(&named)));
+    // They are kept as files are: another exposure images nothing.
+    capture(&given.with(|camera| camera.seed = 3));
+    assert_eq!((given.stage_counts().scene, given.stage_counts().irradiance), (1, 1));
+    // No file can name them.
+    let message = given.write_resume_file(&first, std::path::Path::new(".")).unwrap_err().to_string();
+    assert!(message.contains("lens") && message.contains("in no file"), "{message}");
+}
+
+#[test]
+fn kept_capture_is_never_imaged_again() {
+    let kept = KeptCamera::new(small());
+    let first = capture(&kept);
+    for focus_mm in [1500.0, 2000.0, 2500.0] {
+        capture(&kept.with(|camera| camera.focus = FocusSpec::DistanceMm(focus_mm)));
+    }
+    let before = kept.stage_counts();
+    kept.keep(&first);
+    let exposed = capture(&kept.with(|camera| camera.seed = 9));
+    let after = kept.stage_counts();
+    assert_eq!((after.irradiance, after.electrons), (before.irradiance, before.electrons));
+    assert!(std::sync::Arc::ptr_eq(&exposed.irradiance, &first.irradiance));
 }
 
 /// A preview shows the full picture averaged over its pixels, to a few hundredths of full scale: fewer bands shift colors, a coarser

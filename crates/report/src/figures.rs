@@ -1,18 +1,27 @@
 //! The figures as pictures and drawings.
 
+use std::path::Path;
+
 use dioptric_diffraction::Hurb;
 use dioptric_psf::Profile;
-use dioptric_spectrum::WavelengthGrid;
+use dioptric_spectrum::{Cancel, WavelengthGrid};
 use image::{Rgb, RgbImage, imageops};
 
-use crate::{mesh::Mesh, png::enlarged, png::png_bytes};
+use crate::{
+    comparison_picture,
+    mesh::Mesh,
+    methods::side_by_side,
+    png::{enlarged, png_bytes},
+};
+use dioptric_analysis::MethodComparison;
 use dioptric_pipeline::{
-    PipelineError,
+    PipelineError, Silent,
     display::{LinearRgb, SpectrumToRgb},
     figures::{
         figure1::{self, Thumbnail},
         figure2::{self, Surface},
         figure3,
+        figure4::{self, Panel},
     },
 };
 
@@ -31,13 +40,13 @@ impl Drawing {
     }
 }
 
-/// Returns Figures 1 to 3 at full quality: pictures, drawings, and the tables behind them.
+/// Returns Figures 1 to 4 at full quality: pictures, drawings, and the tables behind them.
 ///
-/// `told` is given the name of each figure before it is made.
+/// `worlds` is the folder of the world of Figure 4, `metronome.pbrt`; `told` is given the name of each figure before it is made.
 ///
 /// # Errors
 /// When something cannot be computed or encoded; the built-in set-ups can.
-pub fn draw_all(told: &dyn Fn(&str)) -> Result<Vec<Drawing>, PipelineError> {
+pub fn draw_all(worlds: &Path, told: &dyn Fn(&str)) -> Result<Vec<Drawing>, PipelineError> {
     told("figure 1: point spread functions over field and depth");
     let thumbnails = figure1::thumbnails(401)?;
     let mut drawings = vec![
@@ -60,7 +69,43 @@ pub fn draw_all(told: &dyn Fn(&str)) -> Result<Vec<Drawing>, PipelineError> {
         drawings.push(Drawing::new(&format!("{name}.png"), png_bytes(&panels(scale)?)?));
     }
     drawings.push(Drawing::new("figure3.csv", figure3::table()?));
+    drawings.extend(draw_figure4(worlds, told)?);
     Ok(drawings)
+}
+
+/// Returns Figure 4 alone, as [`draw_all`] does.
+///
+/// # Errors
+/// When the world cannot be read or rendered.
+pub fn draw_figure4(worlds: &Path, told: &dyn Fn(&str)) -> Result<Vec<Drawing>, PipelineError> {
+    told("figure 4: a world by rays from the film");
+    let camera = figure4::camera(&worlds.join("metronome.pbrt"), FIGURE_4_PX, FIGURE_4_SAMPLES)?;
+    let world = figure4::panels(&camera, &Silent, &Cancel::new())?;
+    told("figure 4: the same by point spread functions, and the difference");
+    let comparison = MethodComparison::of(&camera, &Silent, &Cancel::new())?;
+    Ok(vec![
+        Drawing::new("figure4.png", png_bytes(&row_of_panels(&world))?),
+        Drawing::new("figure4.csv", figure4::table(&world)),
+        Drawing::new("figure4_methods.png", png_bytes(&comparison_picture(&comparison))?),
+        Drawing::new("figure4_methods.csv", comparison.table()),
+    ])
+}
+
+/// Pixels of a panel of Figure 4 each way, and samples of each.
+const FIGURE_4_PX: usize = 300;
+const FIGURE_4_SAMPLES: u32 = 96;
+
+/// Returns the panels of Figure 4 side by side, with their names.
+fn row_of_panels(panels: &[Panel]) -> RgbImage {
+    let pictures: Vec<(String, RgbImage)> = panels
+        .iter()
+        .map(|panel| {
+            let (width, height) = (panel.picture.columns() as u32, panel.picture.rows() as u32);
+            let picture = RgbImage::from_raw(width, height, panel.picture.to_rgb8());
+            (panel.name.to_owned(), picture.expect("three codes a pixel"))
+        })
+        .collect();
+    side_by_side(&pictures)
 }
 
 /// Returns the pictures of Figure 1 side by side: fields to the right, depths downwards, nearest on top.

@@ -8,10 +8,10 @@ use dioptric_spectrum::{Observer, Spectrum, WavelengthGrid};
 use crate::{
     Beyond, Hit, LightId, SkyImage, SpectralCurve, WorldError,
     mesh::triangle_area,
+    placed::{PlacedKind, PlacedShape},
     sampling::{Distribution, Frame, cone, on_disc, on_triangle},
     shape::{Quadric, Shape},
     sky::SampledSky,
-    world::{PlacedKind, PlacedShape},
 };
 
 /// A light that is no shape.

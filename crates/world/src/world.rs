@@ -3,43 +3,16 @@
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
-    Bsdf, Emission, Hit, Light, LightSample, Material, Ray, Relief, Shape, Texture, TriangleMesh, WorldCamera,
-    WorldError,
+    Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Relief, Shape, ShapeId,
+    Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
     light::Lights,
     material::{Surface, Surfaces},
     mesh::normal_matrix,
+    placed::{PlacedKind, PlacedShape},
     shape::Quadric,
     texture::{MAX_DEPTH, Textures},
 };
-
-macro_rules! ids {
-    ($($(#[$doc:meta])* $name:ident),*) => {$(
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-        pub struct $name(pub u32);
-    )*};
-}
-
-ids! {
-    /// A shape of a world, by number.
-    ShapeId,
-    /// A material of a world, by number.
-    MaterialId,
-    /// A texture of a world, by number.
-    TextureId,
-    /// A light of a world, by number; glowing shapes come after the others.
-    LightId,
-    /// A group of shapes that can be placed more than once, by number.
-    GroupId,
-    /// One placing of a group, by number.
-    InstanceId
-}
-
-impl GroupId {
-    /// The group that stands in the world itself.
-    pub const ROOT: Self = Self(0);
-}
 
 /// Geometry, materials, lights and cameras, checked and ready to be asked.
 ///
@@ -63,23 +36,6 @@ struct Geometry {
     instances: Vec<Instance>,
     /// The root first.
     groups: Vec<Group>,
-}
-
-/// A shape in the frame of its group.
-#[derive(Debug)]
-pub(crate) struct PlacedShape {
-    pub(crate) kind: PlacedKind,
-    pub(crate) group: u32,
-    pub(crate) material: MaterialId,
-    pub(crate) emission: Option<Emission>,
-    pub(crate) is_reversed: bool,
-    pub(crate) light: Option<LightId>,
-}
-
-#[derive(Debug)]
-pub(crate) enum PlacedKind {
-    Mesh(TriangleMesh),
-    Quadric(Box<Quadric>),
 }
 
 impl Parts for Geometry {
@@ -558,19 +514,6 @@ impl NewShape {
             emission: self.emission,
             is_reversed: self.is_reversed,
             light: None,
-        }
-    }
-}
-
-impl PlacedShape {
-    fn add_to(&self, parts: &mut GroupParts, index: u32) {
-        match &self.kind {
-            PlacedKind::Mesh(mesh) => {
-                for triangle in 0..mesh.triangles.len() {
-                    parts.add_triangle(mesh.corners(triangle), index, triangle as u32);
-                }
-            }
-            PlacedKind::Quadric(quadric) => parts.add_quadric(quadric, index),
         }
     }
 }

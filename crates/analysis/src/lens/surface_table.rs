@@ -1,6 +1,6 @@
 //! The surfaces of a lens in words and numbers.
 
-use dioptric_optics::{Lens, Outline, Shape, Surface};
+use dioptric_optics::{DiffractiveSurface, Glass, Lens, Outline, PhaseProfile, Shape, Surface};
 use serde::Serialize;
 
 /// A surface of a lens as a row of a table.
@@ -14,7 +14,7 @@ pub struct SurfaceRow {
     pub radius_mm: f64,
     /// Distance to the next vertex, mm.
     pub thickness_mm: f64,
-    /// What lies behind.
+    /// What lies behind, or that it is a mirror.
     pub medium_after: String,
     /// Clear diameter, mm.
     pub diameter_mm: f64,
@@ -29,11 +29,33 @@ pub fn surface_rows(lens: &Lens) -> Vec<SurfaceRow> {
         is_stop: surface == lens.stop(),
         radius_mm: radius_mm(interface.surface.curvature_per_mm),
         thickness_mm: interface.thickness_after_mm,
-        medium_after: interface.medium_after.describe(),
+        medium_after: match (lens.is_mirror(surface), &interface.medium_after) {
+            (true, Glass::Air) => "mirror".to_owned(),
+            (true, medium) => format!("mirror in {}", medium.describe()),
+            (false, medium) => medium.describe(),
+        },
         diameter_mm: 2.0 * interface.surface.semi_aperture_mm,
-        remarks: shape_summary(&interface.surface).into_iter().chain(openings_summary(lens, surface)).collect(),
+        remarks: {
+            let of_shape = shape_summary(&interface.surface).into_iter();
+            of_shape.chain(phase_summary(lens, surface)).chain(openings_summary(lens, surface)).collect()
+        },
     };
     lens.interfaces().iter().enumerate().map(row).collect()
+}
+
+/// Returns what there is to say of the phase that a surface adds.
+fn phase_summary(lens: &Lens, surface: usize) -> Option<String> {
+    let DiffractiveSurface { order, profile, .. } = lens.diffractive().iter().find(|phase| phase.surface == surface)?;
+    Some(match profile {
+        PhaseProfile::Grating { lines_per_mm: [x, y] } => {
+            format!("grating of {} lines/mm along x and {} along y in the order {order}", short(*x), short(*y))
+        }
+        PhaseProfile::Rings { radius_mm, coefficients_rad } => {
+            let terms = (1..).zip(coefficients_rad).map(|(i, a)| format!("{} ρ^{}", short(*a), 2 * i));
+            let sum = terms.collect::<Vec<_>>().join(" + ");
+            format!("phase of {sum} rad with ρ = r/{} mm in the order {order}", short(*radius_mm))
+        }
+    })
 }
 
 /// Returns what there is to say of a lens beside its surfaces: a curved film, tilts and decenters, a line each.

@@ -33,7 +33,8 @@ impl FocusRays {
     /// Adds a spot: the rays of one point on a flat film, of several wavelengths if its colors are to coincide; all count
     /// alike.
     pub fn add(&mut self, wavelengths: &[RayBatch]) {
-        let ray = |rays: &RayBatch, i: usize| (rays.point_mm(i).truncate(), rays.direction(i).truncate() / rays.n[i]);
+        let ray =
+            |rays: &RayBatch, i: usize| (rays.point_mm(i).truncate(), rays.direction(i).truncate() / rays.n[i].abs());
         self.add_rays(
             &wavelengths.iter().flat_map(|rays| arrived(rays).map(move |i| ray(rays, i))).collect::<Vec<_>>(),
         );

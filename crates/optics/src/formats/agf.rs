@@ -1,9 +1,9 @@
 //! Zemax glass catalogues (`.agf`): of each glass the name and formula (`NM`), coefficients (`CD`), range (`LD`) and
 //! internal transmission (`IT`).
 
-use crate::{CatalogueGlass, Glass, extinction::extinction_of_share, prescription::TextError};
+use crate::{CatalogueGlass, Glass, extinction::extinction_of_share};
 
-use super::zmx::nm_of_um;
+use super::{text_error::TextError, zmx::nm_of_um};
 
 /// A glass whose lines are being read.
 #[derive(Default)]

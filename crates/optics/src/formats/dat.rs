@@ -4,7 +4,9 @@
 //! behind the surface, and the clear diameter, all in mm. Lines that begin with `#` are comments; a line of one
 //! number before the rows is the focal length, which is not needed. On the stop's row N = 0 means the medium before.
 
-use crate::{Glass, Interface, Lens, OpticsError, Surface, prescription::TextError};
+use crate::{Glass, Interface, Lens, OpticsError, Surface};
+
+use super::text_error::TextError;
 
 /// Reads a lens from the text of a `.dat` file; `name` serves where the file states none.
 pub(crate) fn lens_from_dat(text: &str, name: &str) -> Result<Lens, TextError> {

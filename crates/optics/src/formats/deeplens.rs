@@ -1,14 +1,16 @@
 //! The JSON lens files of `DeepLens`: `surfaces` with type, r, c (or roc), d, k, ai and the media on both sides.
 
+use glam::DVec2;
 use serde_json::Value;
 
-use crate::{Glass, Interface, Lens, OpticsError, Shape, Surface, prescription::TextError};
+use crate::{Aperture, DiffractiveSurface, Glass, Interface, Lens, OpticsError, Outline, PhaseProfile, Shape, Surface};
 
 use super::{
     glasses::{Glasses, constant, model},
     json::{Object, number, numbers},
     lens_file::LensFile,
     shapes::even_asphere,
+    text_error::TextError,
 };
 
 /// Whether a JSON value has the looks of a `DeepLens` file: its surfaces have the media on both sides, or types, as those of
@@ -24,11 +26,6 @@ pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -
     let file = Object::new(value, "")?;
     let mut interfaces: Vec<Interface> = Vec::new();
     let (mut stops, mut object_medium) = (Vec::new(), Glass::Air);
-    if let Some(element) = file.get("DOE").filter(|element| !element.is_null()) {
-        let kind = element.get("type").and_then(Value::as_str).unwrap_or("without a type");
-        let reason = format!("DOE: a diffractive element ({kind}) behind the lens is not supported");
-        return Err(TextError { line: None, reason });
-    }
     let rows = file.objects("surfaces")?;
     for (i, row) in rows.iter().enumerate() {
         let wrong =
@@ -65,14 +62,79 @@ pub(super) fn lens_from_deeplens(value: &Value, name: &str, glasses: &Glasses) -
         };
         interfaces.push(Interface { surface, medium_after, thickness_after_mm });
     }
+    let element = match file.get("DOE").filter(|element| !element.is_null()) {
+        Some(element) => Some(Grating::read(&Object::new(element, "DOE")?)?),
+        None => None,
+    };
+    let mut last_d_mm = rows.last().map_or(Ok(0.0), |last| last.number_or("d", 0.0))?;
+    if let (Some(grating), Some(last)) = (&element, interfaces.last_mut()) {
+        last.thickness_after_mm = grating.d_mm - last_d_mm;
+        last_d_mm = grating.d_mm;
+        let (surface, medium_after) = (Surface::plane(grating.half_mm.length()), last.medium_after.clone());
+        interfaces.push(Interface { surface, medium_after, thickness_after_mm: 0.0 });
+    }
     let &[stop] = stops.as_slice() else { return Err(OpticsError::Stops { n_stops: stops.len() }.into()) };
     let source = file.text("info").unwrap_or("a DeepLens file");
-    let lens = Lens::new(name, source, interfaces, stop)?.with_object_medium(object_medium)?;
-    let mut read = LensFile::of_lens(lens);
-    if let (Some(sensor), Some(last)) = (file.get("d_sensor"), rows.last()) {
-        read.film_distance_mm = Some(number(sensor, "d_sensor")? - last.number_or("d", 0.0)?);
+    let surface = interfaces.len() - 1;
+    let openings = element.iter().map(|grating| grating.opening(surface)).collect();
+    let lens = Lens::new_with_apertures(name, source, interfaces, stop, openings)?;
+    let diffractive = element.iter().map(|grating| grating.diffractive(surface)).collect();
+    let mut read = LensFile::of_lens(lens.with_object_medium(object_medium)?.with_diffractive(diffractive)?);
+    if element.is_some() {
+        read.notes.push("DOE: of the grating the first order is traced, with all of the light".to_owned());
+    }
+    if let Some(sensor) = file.get("d_sensor") {
+        read.film_distance_mm = Some(number(sensor, "d_sensor")? - last_d_mm);
     }
     Ok(read)
+}
+
+/// A linear grating behind the lens: its phase is `alpha (x sin θ + y cos θ)` over half the width.
+struct Grating {
+    d_mm: f64,
+    /// Half its widths along x and y, mm.
+    half_mm: DVec2,
+    lines_per_mm: DVec2,
+}
+
+impl Grating {
+    fn read(element: &Object) -> Result<Self, TextError> {
+        let wrong = |reason: String| TextError { line: None, reason };
+        match element.text("type") {
+            Some("Grating") => {}
+            other => {
+                let kind = other.unwrap_or("without a type");
+                let expected = "expected a Grating, as the phases of others are those of waves, not of an order";
+                return Err(wrong(format!("DOE: a diffractive element ({kind}) is not supported; {expected}")));
+            }
+        }
+        let res = element.get("res").map_or(Ok(vec![2000.0]), |res| match res.as_f64() {
+            Some(one) => Ok(vec![one]),
+            None => numbers(res, &element.place("res")),
+        })?;
+        let pitch_mm = element.number_or("fab_ps", 1e-3)?;
+        let half_mm = match *res.as_slice() {
+            [n] => DVec2::splat(0.5 * n * pitch_mm),
+            [x, y] => DVec2::new(x, y) * (0.5 * pitch_mm),
+            _ => return Err(wrong(format!("{} has {} numbers, expected one or two", element.place("res"), res.len()))),
+        };
+        if !(half_mm.min_element() > 0.0 && half_mm.is_finite()) {
+            return Err(wrong(format!("{} and fab_ps make no width above 0", element.place("res"))));
+        }
+        let (sine, cosine) = element.number_or("theta", 0.0)?.sin_cos();
+        let per_mm = element.number_or("alpha", 0.0)? / (std::f64::consts::TAU * half_mm.x);
+        Ok(Self { d_mm: element.number("d")?, half_mm, lines_per_mm: DVec2::new(sine, cosine) * per_mm })
+    }
+
+    fn opening(&self, surface: usize) -> Aperture {
+        let outline = Outline::Rectangle { half_x_mm: self.half_mm.x, half_y_mm: self.half_mm.y };
+        Aperture { surface, outline, center_mm: [0.0; 2], is_obscuration: false }
+    }
+
+    fn diffractive(&self, surface: usize) -> DiffractiveSurface {
+        let profile = PhaseProfile::Grating { lines_per_mm: self.lines_per_mm.to_array() };
+        DiffractiveSurface { surface, order: 1, profile }
+    }
 }
 
 /// Returns the shape beyond the curvature at the vertex.
@@ -163,11 +225,23 @@ mod tests {
     }
 
     #[test]
-    fn diffractive_element_is_refused() {
+    fn grating_behind_the_lens_is_a_surface() {
         let with = |element: &str| SINGLET.replace("\"d_sensor\"", &format!("\"DOE\": {element}, \"d_sensor\""));
-        let reason = message(&with("{\"type\": \"Grating\", \"d\": 8.3}"));
-        assert_eq!(reason, "DOE: a diffractive element (Grating) behind the lens is not supported");
+        let grating = "{\"type\": \"Grating\", \"d\": 8.5, \"res\": [4000, 2000], \"alpha\": 100.0, \"theta\": 0.5}";
+        let file = read(&with(grating)).ok().unwrap();
+        assert_eq!((file.lens.interfaces().len(), file.lens.last_vertex_z_mm()), (4, 8.5));
+        assert_eq!((file.film_distance_mm, file.lens.apertures().len(), file.notes.len()), (Some(44.0), 1, 1));
+        let [DiffractiveSurface { surface: 3, order: 1, profile: PhaseProfile::Grating { lines_per_mm } }] =
+            file.lens.diffractive()
+        else {
+            panic!("{:?}", file.lens.diffractive())
+        };
+        // 100 rad over half the width along x, 2 mm.
+        let expected = DVec2::new(0.5_f64.sin(), 0.5_f64.cos()) * (50.0 / std::f64::consts::TAU);
+        assert!((DVec2::from_array(*lines_per_mm) - expected).length() < 1e-14);
         assert!(read(&with("null")).is_ok());
+        let reason = message(&with("{\"type\": \"Fresnel\", \"d\": 8.3}"));
+        assert!(reason.starts_with("DOE: a diffractive element (Fresnel) is not supported"), "{reason}");
     }
 
     #[test]

@@ -2,9 +2,14 @@
 
 use std::path::Path;
 
-use crate::{GlassCatalogue, OpticsError, prescription::TextError};
+use crate::{GlassCatalogue, OpticsError};
 
-use super::{agf, decode::text_of, lens_file::bytes_of, rii_yaml};
+use super::{
+    agf,
+    decode::{bytes_of, text_of},
+    rii_yaml,
+    text_error::TextError,
+};
 
 impl GlassCatalogue {
     /// Reads a file of glasses, by its extension: `.agf` (Zemax), or `.yml` or `.yaml` (one material, as

@@ -8,13 +8,14 @@
 use glam::{DMat3, DVec3};
 use serde_json::Value;
 
-use crate::{CoordinateBreak, Glass, Interface, Lens, OpticsError, Placement, Shape, Surface, prescription::TextError};
+use crate::{CoordinateBreak, Glass, Interface, Lens, OpticsError, Placement, Shape, Surface};
 
 use super::{
     glasses::{Glasses, constant},
     json::{Object, number, numbers, wrong},
     lens_file::{LensFile, Microlens},
     shapes::even_asphere,
+    text_error::TextError,
 };
 
 const SURFACE_KEYS: &str =

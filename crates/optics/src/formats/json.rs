@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value};
 
-use crate::prescription::TextError;
+use super::text_error::TextError;
 
 /// A JSON object and where it stands, as `surfaces[3]`.
 pub(super) struct Object<'a> {

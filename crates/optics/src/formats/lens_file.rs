@@ -1,15 +1,8 @@
 //! Lens files of every format: the lens, and what else the file says about its use.
 
-use std::{fs, path::Path};
-
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    GlassCatalogue, Lens, OpticsError,
-    prescription::{TextError, file_from_ron},
-};
-
-use super::{dat, decode::text_of, deeplens, glasses::Glasses, iset_json, pbrt_list, seq, zmx};
+use crate::{GlassCatalogue, Lens};
 
 /// What a lens file says: the lens, and how it is meant to be used.
 ///
@@ -114,55 +107,7 @@ pub struct ReadOptions {
     pub seq_numbers: Option<SeqNumbers>,
 }
 
-/// The largest lens file, bytes: far more than any lens needs.
-const LARGEST_FILE: u64 = 16 << 20;
-
 impl LensFile {
-    /// Reads a lens file, by its extension: `.ron` (our own), `.dat` or `.txt`, `.json` (ISET's omni format or
-    /// `DeepLens`), `.zmx` (Zemax) or `.seq` (CODE V).
-    ///
-    /// A glass catalogue beside a `.zmx` file that has its name and the extension `.agf` is read with it.
-    ///
-    /// # Errors
-    /// When the file cannot be read, is not what it should be, or holds what this crate cannot trace; the message
-    /// names the file and, where it can, the line and key.
-    pub fn read(path: &Path, options: &ReadOptions) -> Result<Self, OpticsError> {
-        let companion = path.with_extension("agf");
-        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zmx")) && companion.is_file() {
-            let mut options = options.clone();
-            options.catalogues.push(GlassCatalogue::read(&companion)?);
-            return Self::from_bytes(path, &bytes_of(path)?, &options);
-        }
-        Self::from_bytes(path, &bytes_of(path)?, options)
-    }
-
-    /// Reads a lens file from its bytes; the path tells the format and the name, and is not opened.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read).
-    pub fn from_bytes(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Self, OpticsError> {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        let text = text_of(bytes);
-        let glasses = Glasses::new(options);
-        let read = match extension.as_str() {
-            "ron" => file_from_ron(&text),
-            "dat" | "txt" => match pbrt_list::numbers_of(&text) {
-                Some(numbers) => pbrt_list::lens_from_numbers(&numbers, &name).map(Self::of_lens),
-                None => dat::lens_from_dat(&text, &name).map(Self::of_lens),
-            },
-            "json" => json(&text, &name, &glasses),
-            "zmx" => zmx::lens_from_zmx(&text, &name, glasses),
-            "seq" => seq::lens_from_seq(&text, &name, glasses),
-            _ => {
-                let expected = "expected .ron, .dat, .txt, .json, .zmx or .seq";
-                let reason = format!("the extension '.{extension}' is no lens format; {expected}");
-                return Err(OpticsError::Io { path: path.to_owned(), reason });
-            }
-        };
-        read.map_err(|TextError { line, reason }| OpticsError::File { path: path.to_owned(), line, reason })
-    }
-
     pub(super) fn of_lens(lens: Lens) -> Self {
         Self {
             lens,
@@ -174,25 +119,5 @@ impl LensFile {
             microlens: None,
             notes: Vec::new(),
         }
-    }
-}
-
-/// Returns what a file holds, unless it is larger than any that this crate reads.
-pub(super) fn bytes_of(path: &Path) -> Result<Vec<u8>, OpticsError> {
-    let failed = |reason: String| OpticsError::Io { path: path.to_owned(), reason };
-    let n_bytes = fs::metadata(path).map_err(|error| failed(error.to_string()))?.len();
-    if n_bytes > LARGEST_FILE {
-        return Err(failed(format!("the file has {n_bytes} bytes; expected at most {LARGEST_FILE}")));
-    }
-    fs::read(path).map_err(|error| failed(error.to_string()))
-}
-
-fn json(text: &str, name: &str, glasses: &Glasses) -> Result<LensFile, TextError> {
-    let value = serde_json::from_str(text)
-        .map_err(|error| TextError { line: Some(error.line()), reason: format!("not JSON: {error}") })?;
-    if deeplens::is_deeplens(&value) {
-        deeplens::lens_from_deeplens(&value, name, glasses)
-    } else {
-        iset_json::lens_from_omni(&value, name, glasses)
     }
 }

@@ -4,10 +4,9 @@
 //! radius of 0 marks the stop. Where each surface has a line of its own the file is a `.dat` file as well, and that
 //! reader, which can name the line of a mistake, reads it.
 
-use crate::prescription::TextError;
 use crate::{Interface, Lens, OpticsError, Surface};
 
-use super::glasses::constant;
+use super::{glasses::constant, text_error::TextError};
 
 /// Returns the numbers of a list whose lines are not rows of four, or `None` if the text is anything else.
 pub(super) fn numbers_of(text: &str) -> Option<Vec<f64>> {

@@ -4,9 +4,9 @@
 //! `wavelength_range` or, after `data: |`, rows of numbers. Of the blocks the first that gives an index is read, and the
 //! first that gives an extinction coefficient.
 
-use crate::{CatalogueGlass, Glass, prescription::TextError};
+use crate::{CatalogueGlass, Glass};
 
-use super::zmx::nm_of_um;
+use super::{text_error::TextError, zmx::nm_of_um};
 
 /// A block under `DATA:`.
 #[derive(Default)]

@@ -8,7 +8,7 @@
 mod command;
 mod surface;
 
-use crate::{CatalogueGlass, Glass, ImageSurface, prescription::TextError};
+use crate::{CatalogueGlass, Glass, ImageSurface};
 
 use self::{
     command::{Command, commands_of},
@@ -17,7 +17,8 @@ use self::{
 use super::{
     glasses::{Glasses, constant, model},
     lens_file::{Field, LensFile, SeqNumbers},
-    system::{Beam, FieldVignetting, System},
+    system::{Beam, FieldVignetting, System, SystemSurface},
+    text_error::TextError,
 };
 
 /// Reads a CODE V file; `name` serves where the file states none.
@@ -182,13 +183,22 @@ impl<'a> Seq<'a> {
             _ => value,
         };
         let thickness = if command.words.len() > 2 { command.distance(2)? } else { 0.0 };
+        let is_mirror = command.words.get(3).is_some_and(|word| is_mirror(word));
         let medium = match command.words.get(3) {
-            Some(word) => self.medium(word, command)?,
-            None => None,
+            Some(word) if !is_mirror => self.medium(word, command)?,
+            _ => None,
         };
         let line = command.line;
         let number_of_s = (self.is_radius_mode && value != 0.0).then_some(value);
-        self.surfaces.push(SeqSurface { line, curvature, thickness, medium, number_of_s, ..Default::default() });
+        self.surfaces.push(SeqSurface {
+            line,
+            curvature,
+            thickness,
+            medium,
+            is_mirror,
+            number_of_s,
+            ..Default::default()
+        });
         Ok(())
     }
 
@@ -206,11 +216,21 @@ impl<'a> Seq<'a> {
             }
             "GLA" | "GL1" => {
                 if let Some(word) = command.words.get(place) {
-                    self.surfaces[surface].medium = self.medium(word, command)?;
+                    let is_mirror = is_mirror(word);
+                    self.surfaces[surface].medium = if is_mirror { None } else { self.medium(word, command)? };
+                    self.surfaces[surface].is_mirror = is_mirror;
                 }
                 Ok(())
             }
-            "RMD" => Err(command.wrong("mirrors are not supported")),
+            "RMD" => {
+                let mode = command.words.get(place).map(|word| word.to_uppercase()).unwrap_or_default();
+                match mode.as_str() {
+                    "REFL" => self.surfaces[surface].is_mirror = true,
+                    "REFR" => self.surfaces[surface].is_mirror = false,
+                    _ => return Err(command.wrong(format!("'{mode}' is not supported; expected REFL or REFR"))),
+                }
+                Ok(())
+            }
             _ => self.surfaces[surface].take(keyword, command, place),
         }
     }
@@ -231,8 +251,8 @@ impl<'a> Seq<'a> {
         if matches!(word.to_uppercase().as_str(), "AIR" | "VACUUM" | "") {
             return Ok(None);
         }
-        if matches!(word.to_uppercase().as_str(), "REFL" | "REFR" | "REFO") {
-            return Err(command.wrong("mirrors are not supported"));
+        if matches!(word.to_uppercase().as_str(), "REFR" | "REFO") {
+            return Err(command.wrong(format!("'{word}' is no glass; expected a glass, AIR or REFL for a mirror")));
         }
         let glass = match code_of(word) {
             Some(glass) => glass,
@@ -302,13 +322,14 @@ impl<'a> Seq<'a> {
         let defocus_mm = image.thickness * mm;
         let is_far = object.thickness.abs() >= 1e10;
         let object_distance_mm = if is_far { f64::INFINITY } else { object.thickness * mm };
-        let mut surfaces = Vec::with_capacity(n_surfaces);
+        let mut surfaces: Vec<SystemSurface> = Vec::with_capacity(n_surfaces);
         let (mut moves, mut z_mm) = (Vec::new(), 0.0);
         for (i, surface) in self.surfaces[1..].iter().enumerate() {
             moves.extend(surface.moves(i, mm, z_mm));
             z_mm += surface.thickness * mm;
             if i + 2 < n_surfaces {
-                surfaces.push(surface.in_mm(mm)?);
+                let before = surfaces.last().map_or(&object_medium, |before| &before.medium_after);
+                surfaces.push(surface.in_mm(mm, before)?);
             }
         }
         if let Some(last) = surfaces.last_mut() {
@@ -365,6 +386,11 @@ impl<'a> Seq<'a> {
         };
         (0..x.len().max(y.len())).map(field).collect()
     }
+}
+
+/// Whether the word in a glass's place makes the surface a mirror.
+fn is_mirror(word: &str) -> bool {
+    word.eq_ignore_ascii_case("REFL")
 }
 
 fn is_no(command: &Command) -> bool {

@@ -7,12 +7,15 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    Aperture, CoordinateBreak, Glass, ImageSurface, Interface, Lens, MonoLens, ObjectPoint, OpticsError, Placement,
-    RayBatch, Shape, Surface, Vignetting, analysis::PupilCoordinates, glass::D_LINE_NM, prescription::TextError,
-    rays_towards,
+    Aperture, CoordinateBreak, DiffractiveSurface, Glass, ImageSurface, Interface, Lens, MonoLens, ObjectPoint,
+    OpticsError, PhaseProfile, Placement, RayBatch, Shape, Surface, Vignetting, analysis::PupilCoordinates,
+    glass::D_LINE_NM, rays_towards,
 };
 
-use super::lens_file::{Field, LensFile};
+use super::{
+    lens_file::{Field, LensFile},
+    text_error::TextError,
+};
 
 /// A surface of a design program's file, in mm.
 #[derive(Clone, Debug)]
@@ -25,6 +28,10 @@ pub(super) struct SystemSurface {
     pub(super) thickness_after_mm: f64,
     /// The rim, where the file states one.
     pub(super) semi_aperture_mm: Option<f64>,
+    /// Whether it reflects; the medium behind it is then that before it.
+    pub(super) is_mirror: bool,
+    /// The order and the phase of a grating or diffractive surface.
+    pub(super) phase: Option<(i32, PhaseProfile)>,
     /// Whether the rim is one that stops light, not merely where the program's rays went.
     pub(super) is_rim_fixed: bool,
     /// What bounds light beside the rim, of whichever surface.
@@ -131,7 +138,10 @@ impl System {
             return Err(OpticsError::Stops { n_stops: 0 }.into());
         };
         self.drop_dummies(&mut stop);
-        let film_distance_mm = self.surfaces.last().map(|last| last.thickness_after_mm);
+        if self.is_film_backward() {
+            self.image_surface.curvature_per_mm *= -1.0;
+        }
+        let film_distance_mm = self.film_distance_mm();
         let reference_nm = self.wavelengths_nm.get(self.reference).copied();
         let lens = self.provisional(stop)?;
         let mono = lens.at(reference_nm.unwrap_or(D_LINE_NM))?;
@@ -146,9 +156,11 @@ impl System {
                 }
             }
         }
+        let lens = self.lens(interfaces, stop)?;
+        self.notes.extend(note_on_shadows(&lens));
         Ok(LensFile {
-            lens: self.lens(interfaces, stop)?,
-            film_distance_mm: film_distance_mm.filter(|film| film.is_finite()),
+            lens,
+            film_distance_mm,
             object_distance_mm: Some(self.object_distance_mm).filter(|distance| distance.is_finite()),
             wavelengths_nm: self.wavelengths_nm,
             reference_wavelength_nm: reference_nm,
@@ -156,6 +168,18 @@ impl System {
             microlens: None,
             notes: self.notes,
         })
+    }
+
+    /// Whether light runs towards −z before the film: behind an odd number of mirrors.
+    fn is_film_backward(&self) -> bool {
+        self.surfaces.iter().filter(|surface| surface.is_mirror).count() % 2 == 1
+    }
+
+    /// Returns how far behind the last surface the film lies, along the light, mm.
+    fn film_distance_mm(&self) -> Option<f64> {
+        let along_z_mm = self.surfaces.last()?.thickness_after_mm;
+        let film_distance_mm = if self.is_film_backward() { -along_z_mm } else { along_z_mm };
+        film_distance_mm.is_finite().then_some(film_distance_mm)
     }
 
     /// Returns the lens of these surfaces, tilted and decentered as the file says.
@@ -173,7 +197,13 @@ impl System {
         };
         let moves = self.moves.iter().map(in_lens).collect();
         let lens = lens.with_object_medium(self.object_medium.clone())?;
-        lens.with_moves(moves)?.with_image_surface(self.image_surface)
+        let mirrors = self.surfaces.iter().enumerate().filter_map(|(i, surface)| surface.is_mirror.then_some(i));
+        let diffractive = self.surfaces.iter().enumerate().filter_map(|(surface, stated)| {
+            let (order, profile) = stated.phase.clone()?;
+            Some(DiffractiveSurface { surface, order, profile })
+        });
+        let lens = lens.with_diffractive(diffractive.collect())?;
+        lens.with_mirrors(mirrors)?.with_moves(moves)?.with_image_surface(self.image_surface)
     }
 
     /// Returns the apertures of all surfaces, each with the surface's number.
@@ -194,7 +224,12 @@ impl System {
             };
             let surface = &self.surfaces[i];
             let is_plane = surface.shape == Shape::Sphere && surface.curvature_per_mm == 0.0;
-            if i == *stop || !is_plane || surface.is_rim_fixed || surface.medium_after != *medium_before {
+            if i == *stop
+                || !is_plane
+                || surface.is_mirror
+                || surface.is_rim_fixed
+                || surface.medium_after != *medium_before
+            {
                 i += 1;
                 continue;
             }
@@ -357,8 +392,7 @@ impl System {
             }
             Field::ObjectHeight { .. } => return Err(plain("a field is an object height, but the object is far away")),
             Field::RealImageHeight { x_mm, y_mm } => {
-                let film_distance_mm =
-                    self.surfaces.last().map(|last| last.thickness_after_mm).filter(|mm| mm.is_finite());
+                let film_distance_mm = self.film_distance_mm();
                 let dioptres = 1e3 / (distance_mm + mono.projection_center_z_mm());
                 let tan =
                     film_distance_mm.and_then(|film| mono.field_tan_of_image(DVec2::new(x_mm, y_mm), film, dioptres));
@@ -374,6 +408,18 @@ impl System {
         let dioptres = 1e3 / (distance_mm + mono.projection_center_z_mm());
         Ok(ObjectPoint::from_field(mono, tan, dioptres))
     }
+}
+
+/// Returns a sentence on mirrors that stand in the light to others where the file states no obscuration.
+fn note_on_shadows(lens: &Lens) -> Option<String> {
+    let shadow = lens.mirror_shadows().into_iter().next()?;
+    let is_any_stated = lens.apertures().iter().any(|aperture| aperture.is_obscuration);
+    (!is_any_stated).then(|| {
+        format!(
+            "the mirror {} stands in the light to surface {}, and no obscuration is stated: its shadow is left out",
+            shadow.mirror, shadow.before
+        )
+    })
 }
 
 /// Widens the rims so that a ring of rays through the edge of the pupil, and the ray through its center, pass.

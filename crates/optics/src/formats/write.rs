@@ -59,6 +59,7 @@ impl LensFile {
             return Err(cannot(FORMAT, surface, "is tilted or decentered"));
         }
         check_air(FORMAT, lens)?;
+        check_refracting(FORMAT, lens)?;
         check_round(FORMAT, lens)?;
         let efl_mm = lens.at(wavelength_nm)?.first_order().efl_mm;
         let mut text = format!(
@@ -103,6 +104,7 @@ impl LensFile {
             return Err(cannot(OMNI, lens.interfaces().len(), "(the film) is tilted or decentered"));
         }
         check_air(OMNI, lens)?;
+        check_refracting(OMNI, lens)?;
         check_round(OMNI, lens)?;
         let mut file = json!({
             "name": lens.name(),
@@ -119,6 +121,17 @@ impl LensFile {
 }
 
 const OMNI: &str = "a .json file of ISET";
+
+/// Checks that no surface reflects or diffracts, for which a format has no word.
+fn check_refracting(format: &'static str, lens: &Lens) -> Result<(), OpticsError> {
+    if let Some(&mirror) = lens.mirrors().first() {
+        return Err(cannot(format, mirror, "is a mirror"));
+    }
+    match lens.diffractive().first() {
+        Some(phase) => Err(cannot(format, phase.surface, "is a grating or diffractive surface")),
+        None => Ok(()),
+    }
+}
 
 /// Checks that the object of a lens is in air, as a format takes for granted.
 fn check_air(format: &'static str, lens: &Lens) -> Result<(), OpticsError> {

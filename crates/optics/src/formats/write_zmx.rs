@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 
 use glam::DVec2;
 
-use crate::{Aperture, CatalogueGlass, Glass, GlassCatalogue, Lens, OpticsError, Outline, Placement, Shape, Surface};
+use crate::{
+    Aperture, CatalogueGlass, Glass, GlassCatalogue, Lens, OpticsError, Outline, PhaseProfile, Placement, Shape,
+};
 
 use super::{
     agf::agf_lines,
@@ -24,6 +26,9 @@ struct Turn {
     tilt_deg: [f64; 3],
     thickness_mm: f64,
 }
+
+/// The line of a mirror's glass; the numbers mean nothing.
+const MIRROR: &str = "  GLAS MIRROR 0 0 1.5 40 0 0 0 0 0 0\r\n";
 
 /// The least 1 − cos of a tilt that is taken to turn about a point of the axis; below, the point is lost in rounding.
 const LEAST_TILT: f64 = 1e-10;
@@ -72,8 +77,11 @@ impl LensFile {
     /// When a glass is neither of the catalogue nor given by index and Abbe number: the format has no place for others.
     /// [`to_zmx_and_agf`](Self::to_zmx_and_agf) gives them a catalogue of their own.
     pub fn to_zmx(&self) -> Result<String, OpticsError> {
-        let glasses =
-            media(&self.lens).map(|(place, medium)| zmx_glass(place, medium)).collect::<Result<Vec<_>, _>>()?;
+        let glass = |(place, medium): (Option<usize>, &Glass)| match place {
+            Some(surface) if self.lens.is_mirror(surface) => Ok(MIRROR.to_owned()),
+            _ => zmx_glass(place, medium),
+        };
+        let glasses = media(&self.lens).map(glass).collect::<Result<Vec<_>, _>>()?;
         self.zmx_text(&glasses, None)
     }
 
@@ -86,6 +94,10 @@ impl LensFile {
         let mut private: Vec<&Glass> = Vec::new();
         let mut lines = Vec::new();
         for (place, medium) in media(&self.lens) {
+            if place.is_some_and(|surface| self.lens.is_mirror(surface)) {
+                lines.push(MIRROR.to_owned());
+                continue;
+            }
             let refusal = match zmx_glass(place, medium) {
                 Ok(line) => {
                     lines.push(line);
@@ -135,7 +147,7 @@ impl LensFile {
             if i == lens.stop() {
                 text.push_str("  STOP\r\n");
             }
-            write_zmx_shape(&mut text, i, &interface.surface)?;
+            write_zmx_shape(&mut text, lens, i)?;
             let thickness_mm = gaps[i + 1].thickness_mm;
             let radius_mm = interface.surface.semi_aperture_mm;
             let _ = write!(
@@ -147,7 +159,9 @@ impl LensFile {
             gaps[i + 1].write_break(&mut text, &mut n_written);
         }
         let image = lens.image_surface();
-        let _ = write!(text, "SURF {}\r\n  TYPE STANDARD\r\n  CURV {:e}\r\n", n_written + 1, image.curvature_per_mm);
+        let is_backward = lens.is_backward_before(lens.interfaces().len());
+        let curvature = if is_backward { -image.curvature_per_mm } else { image.curvature_per_mm };
+        let _ = write!(text, "SURF {}\r\n  TYPE STANDARD\r\n  CURV {curvature:e}\r\n", n_written + 1);
         if image.conic != 0.0 {
             let _ = write!(text, "  CONI {:e}\r\n", image.conic);
         }
@@ -158,7 +172,7 @@ impl LensFile {
     /// Returns the ways from the lens frame to the first surface, between surfaces, and to the film.
     fn zmx_gaps(&self) -> Vec<Gap> {
         let lens = &self.lens;
-        let film_z_mm = lens.last_vertex_z_mm() + self.film_distance_mm.unwrap_or(0.0);
+        let film_z_mm = lens.film_z_mm(self.film_distance_mm.unwrap_or(0.0));
         let film = lens.film_motion().after(&Placement::centered(film_z_mm));
         let mut before = Placement::centered(0.0);
         let gap = |(i, placement): (usize, Placement)| {
@@ -167,7 +181,7 @@ impl LensFile {
                 // Behind a far object the axis has no length to keep.
                 None if way.is_rest() => 0.0,
                 None => return Gap::turned(&way, 0.0),
-                Some(i) if i + 1 == lens.interfaces().len() => self.film_distance_mm.unwrap_or(0.0),
+                Some(i) if i + 1 == lens.interfaces().len() => film_z_mm - lens.last_vertex_z_mm(),
                 Some(i) => lens.interfaces()[i].thickness_after_mm,
             };
             Gap::new(&way, straight_mm)
@@ -290,8 +304,9 @@ fn zmx_glass(surface: Option<usize>, medium: &Glass) -> Result<String, OpticsErr
     }
 }
 
-fn write_zmx_shape(text: &mut String, i: usize, surface: &Surface) -> Result<(), OpticsError> {
-    let (kind, conic, parameters): (&str, f64, Vec<f64>) = match &surface.shape {
+fn write_zmx_shape(text: &mut String, lens: &Lens, i: usize) -> Result<(), OpticsError> {
+    let surface = &lens.interfaces()[i].surface;
+    let (mut kind, conic, mut parameters): (&str, f64, Vec<f64>) = match &surface.shape {
         Shape::Sphere => ("STANDARD", 0.0, Vec::new()),
         Shape::Conic { conic } => ("STANDARD", *conic, Vec::new()),
         Shape::EvenAsphere { conic, coefficients } => {
@@ -310,6 +325,30 @@ fn write_zmx_shape(text: &mut String, i: usize, surface: &Surface) -> Result<(),
             ("TOROIDAL", *conic, radius.into_iter().chain(coefficients.iter().copied()).collect())
         }
     };
+    let phase = lens.diffractive().iter().find(|phase| phase.surface == i);
+    let mut behind = String::new();
+    match phase.map(|phase| (&phase.profile, phase.order, kind)) {
+        None => {}
+        Some((PhaseProfile::Grating { lines_per_mm: [0.0, along_y] }, order, "STANDARD")) => {
+            (kind, parameters) = ("DGRATING", vec![1e-3 * along_y, f64::from(order)]);
+        }
+        Some((PhaseProfile::Rings { radius_mm, coefficients_rad }, order, "STANDARD" | "EVENASPH")) => {
+            kind = "BINARY_2";
+            let _ = write!(behind, "  PARM 0 {order}\r\n");
+            let numbers =
+                [coefficients_rad.len() as f64, *radius_mm].into_iter().chain(coefficients_rad.iter().copied());
+            for (place, number) in (1..).zip(numbers) {
+                let _ = write!(behind, "  XDAT {place} {number:e} 0 0\r\n");
+            }
+        }
+        Some(_) => {
+            return Err(cannot(
+                "a .zmx file",
+                i,
+                "is a grating along x, or diffractive on a shape that the format has not",
+            ));
+        }
+    }
     if parameters.len() > 8 {
         return Err(cannot("a .zmx file", i, "has more than eight aspheric coefficients"));
     }
@@ -320,6 +359,7 @@ fn write_zmx_shape(text: &mut String, i: usize, surface: &Surface) -> Result<(),
     for (place, parameter) in (1..).zip(parameters) {
         let _ = write!(text, "  PARM {place} {parameter:e}\r\n");
     }
+    text.push_str(&behind);
     Ok(())
 }
 

@@ -1,19 +1,21 @@
 //! Zemax lens files (`.zmx`): a keyword a line, surfaces in blocks that begin with `SURF`.
 //!
-//! Read are sequential systems of the surfaces STANDARD, EVENASPH, ODDASPHE, BICONICX, TOROIDAL, PARAXIAL and COORDBRK,
+//! Read are sequential systems of the surfaces STANDARD, EVENASPH, ODDASPHE, BICONICX, TOROIDAL, PARAXIAL, DGRATING, `BINARY_2`
+//! and COORDBRK, mirrors among them,
 //! with the entrance pupil, fields and wavelengths of the first configuration. Solves and pickups keep the values that
 //! the file stores. Keywords that change no ray (colors, tolerances, merit functions) are
 //! passed over; whatever changes rays and cannot be traced is refused by name.
 
 mod surface;
 
-use crate::{ImageSurface, prescription::TextError};
+use crate::ImageSurface;
 
 use self::surface::ZmxSurface;
 use super::{
     glasses::Glasses,
     lens_file::{Field, LensFile},
     system::{Beam, FieldVignetting, System, SystemMove, SystemSurface},
+    text_error::TextError,
 };
 
 /// Reads a Zemax file; `name` serves where the file states none.
@@ -211,7 +213,12 @@ impl Zmx {
                 if surface.is_stop {
                     stop = Some(surfaces.len());
                 }
-                surfaces.push(surface.in_mm(number, mm, &glasses, &mut notes)?);
+                let before = surfaces.last().map_or(&object_medium, |before| &before.medium_after);
+                let medium_after = match surface.is_mirror() {
+                    true => before.clone(),
+                    false => surface.medium(number, &glasses, &mut notes)?,
+                };
+                surfaces.push(surface.in_mm(number, mm, medium_after)?);
             }
             z_mm += thickness_mm;
         }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use glam::{DVec2, DVec3};
 
 use super::frame::Frame;
-use crate::{Lens, Placement, Surface};
+use crate::{Aperture, Lens, Placement, Surface};
 
 /// Returns how far a surface reaches down and up in the y–z plane, mm: its rim, or within it its openings.
 pub(super) fn extent_mm(lens: &Lens, surface: usize) -> [f64; 2] {
@@ -40,10 +40,21 @@ pub(super) fn outline(surface: &Surface, placement: &Placement, [low_mm, high_mm
     (-N..=N).map(at).collect()
 }
 
+/// Returns the radius of the hole in a mirror, mm: of the widest round obscuration about its middle.
+pub(super) fn hole_mm(lens: &Lens, mirror: usize) -> Option<f64> {
+    let holes = lens.apertures_of(mirror).filter(|aperture| is_hole(lens, aperture));
+    holes.map(|hole| hole.outline.half_widths_mm().y).reduce(f64::max)
+}
+
+/// Whether an obscuration is a hole in a mirror, through which light is lost to the image.
+fn is_hole(lens: &Lens, aperture: &Aperture) -> bool {
+    aperture.is_obscuration && aperture.is_rotational() && lens.is_mirror(aperture.surface)
+}
+
 /// Draws what stands before surfaces.
 pub(super) fn obscurations(lens: &Lens, frame: &Frame, svg: &mut String) {
     let placements = lens.placements();
-    for aperture in lens.apertures().iter().filter(|aperture| aperture.is_obscuration) {
+    for aperture in lens.apertures().iter().filter(|aperture| aperture.is_obscuration && !is_hole(lens, aperture)) {
         let (middle, half) = (aperture.center_mm[1], aperture.outline.half_widths_mm().y);
         let surface = &lens.interfaces()[aperture.surface].surface;
         let [low, high] = round_mm(surface);

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use glam::DVec2;
 
-use super::{FIELD_COLORS, Fan, Layout, WavelengthKey};
+use super::{FIELD_COLORS, Fan, Layout, WavelengthKey, extent_z_mm};
 use crate::Lens;
 
 /// Margin around the drawing, px.
@@ -27,9 +27,9 @@ pub(super) struct Frame {
 impl Frame {
     pub(super) fn around(lens: &Lens, layout: &Layout, fans: &[Fan]) -> Self {
         let points = || fans.iter().flat_map(|fan| &fan.lines).flat_map(|line| &line.points);
-        let z_film_mm = lens.last_vertex_z_mm() + layout.film_distance_mm;
-        let z_min_mm = points().map(|p| p.x).fold(0.0, f64::min);
-        let z_max_mm = points().map(|p| p.x).fold(z_film_mm, f64::max);
+        let [front_mm, back_mm] = extent_z_mm(lens, layout);
+        let z_min_mm = points().map(|p| p.x).fold(front_mm, f64::min);
+        let z_max_mm = points().map(|p| p.x).fold(back_mm, f64::max);
         let rims = lens.interfaces().iter().map(|interface| interface.surface.semi_aperture_mm);
         let rim_mm = 1.15 * rims.fold(0.0, f64::max);
         let y_min_mm = points().map(|p| p.y).fold(-rim_mm, f64::min);

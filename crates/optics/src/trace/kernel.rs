@@ -12,8 +12,8 @@ use super::{
         ConicForm, Crossing, Ideal, Interface, Passed, Ray, cross_conic, cross_plane, cross_sphere, refract, thin_lens,
     },
     real::Real,
-    toric::Toric,
 };
+use crate::toric::Toric;
 
 /// A surface that takes blocks of rays through it.
 pub(super) trait Optic<T: Real> {

@@ -1,8 +1,8 @@
-//! Tracing through surfaces that are tilted or decentered: those on one axis in its frame, by the kernels for centered ones.
-
-use std::ops::Range;
-
-use glam::DVec3;
+//! Tracing through surfaces that are tilted or decentered, or that reflect: those on one axis in its frame, by the kernels for
+//! centered ones.
+//!
+//! A mirror is the last of its group: behind it the frames of surfaces have their z along the reflected light. So is a
+//! diffractive surface, at which rays are turned one by one.
 
 use super::{
     Goal, Plan, Step, Vignetting,
@@ -31,10 +31,12 @@ pub(crate) fn trace_placed_by(
     plan: impl Fn(&[Step], usize) -> Plan<f64>,
     rays: &mut RaySlices<'_>,
 ) {
-    for group in coaxial(placements) {
-        let place = group.start;
-        let (placement, own) = in_own_frame(&steps[group.clone()], &placements[group]);
-        in_frame(&placement, rays, |rays| trace_batch(&plan(&own, place), Goal::LastSurface, rays));
+    for group in Group::all(steps, placements) {
+        let plan = plan(&group.own, group.place);
+        in_frame(&group.frame, group.is_reversed(), rays, |mut rays| {
+            trace_batch(&plan, Goal::LastSurface, rays.reborrow());
+            group.diffract(plan.surface(group.own.len() - 1), &mut rays);
+        });
     }
 }
 
@@ -45,37 +47,71 @@ pub(crate) fn placed_clearances(
     rays: &mut RaySlices<'_>,
     clearances: &mut [f64],
 ) {
-    for group in coaxial(placements) {
-        let (placement, own) = in_own_frame(&steps[group.clone()], &placements[group]);
-        in_frame(&placement, rays, |rays| trace_clearances(&Plan::new(&own, 0, Vignetting::Off), rays, clearances));
+    for group in Group::all(steps, placements) {
+        let plan = Plan::new(&group.own, 0, Vignetting::Off);
+        in_frame(&group.frame, group.is_reversed(), rays, |mut rays| {
+            trace_clearances(&plan, rays.reborrow(), clearances);
+            group.diffract(plan.surface(group.own.len() - 1), &mut rays);
+            let ended = rays.fate.iter().zip(clearances.iter_mut()).filter(|(fate, _)| !fate.is_in_flight());
+            ended.for_each(|(_, clearance)| *clearance = f64::NEG_INFINITY);
+        });
     }
 }
 
-/// Returns the surfaces in groups that stand on one axis each, as those of a lens do that is tilted as a whole: for a group
-/// rays change their frame once.
-fn coaxial(placements: &[Placement]) -> impl Iterator<Item = Range<usize>> {
-    let mut start = 0;
-    std::iter::from_fn(move || {
-        let first = placements.get(start)?;
-        let n = placements[start..].iter().take_while(|placement| first.is_coaxial(placement)).count();
-        start += n;
-        Some(start - n..start)
-    })
+/// Surfaces that stand on one axis, as those of a lens do that is tilted as a whole: for them rays change their frame once.
+/// A mirror or a diffractive surface is the last.
+struct Group<'a> {
+    /// The frame of the first of them.
+    frame: Placement,
+    /// Its place among all.
+    place: usize,
+    /// All of them as centered ones in that frame; a diffractive one only ends the way.
+    own: Vec<Step>,
+    /// The last of them.
+    last: &'a Step,
 }
 
-/// Returns the frame of the first of the surfaces of a group, and all of them as centered ones in it.
-fn in_own_frame(steps: &[Step], placements: &[Placement]) -> (Placement, Vec<Step>) {
-    let frame = placements[0];
-    let own = |(step, placement): (&Step, &Placement)| Step {
-        vertex_z: frame.surface_from_lens(placement.vertex_mm).z,
-        ..step.clone()
-    };
-    (frame, steps.iter().zip(placements).map(own).collect())
+impl<'a> Group<'a> {
+    fn all(steps: &'a [Step], placements: &'a [Placement]) -> impl Iterator<Item = Self> {
+        let mut place = 0;
+        std::iter::from_fn(move || {
+            let (start, frame) = (place, *placements.get(place)?);
+            place += 1;
+            while place < steps.len() && !steps[place - 1].ends_group() && frame.is_coaxial(&placements[place]) {
+                place += 1;
+            }
+            let own = |(step, stands): (&Step, &Placement)| {
+                let step = if step.phase.is_some() { step.reached() } else { step.clone() };
+                Step { vertex_z: frame.surface_from_lens(stands.vertex_mm).z, ..step }
+            };
+            let own = steps[start..place].iter().zip(&placements[start..place]).map(own).collect();
+            Some(Self { frame, place: start, own, last: &steps[place - 1] })
+        })
+    }
+
+    /// Whether the kernel leaves the directions of rays reversed: behind a mirror ([`Plan::new`]).
+    fn is_reversed(&self) -> bool {
+        self.own.last().is_some_and(|step| step.is_mirror)
+    }
+
+    /// Turns the rays on the last surface, of this number, if it is diffractive.
+    fn diffract(&self, surface: u16, rays: &mut RaySlices<'_>) {
+        if let Some(phase) = &self.last.phase {
+            self.last.diffract_all(phase, surface, rays);
+        }
+    }
+}
+
+impl Step {
+    /// Whether light has another frame, or another direction than refraction gives, behind the surface.
+    fn ends_group(&self) -> bool {
+        self.is_mirror || self.phase.is_some()
+    }
 }
 
 /// Moves every ray in flight along its line to the x–y plane of a frame, in a medium of this index.
 pub(crate) fn move_to_placed_plane(placement: &Placement, index: f64, rays: &mut RaySlices<'_>) {
-    in_frame(placement, rays, |rays| move_to_plane(rays, 0.0, index));
+    in_frame(placement, false, rays, |rays| move_to_plane(rays, 0.0, index));
 }
 
 /// Moves every ray in flight along its line to a conic with its vertex at a frame's origin; those that do not meet it
@@ -87,7 +123,7 @@ pub(crate) fn move_to_placed_conic(
     rays: &mut RaySlices<'_>,
 ) {
     let form = ConicForm::new(curvature, conic);
-    in_frame(placement, rays, |mut rays| {
+    in_frame(placement, false, rays, |mut rays| {
         for i in (0..rays.fate.len()).filter(|&i| rays.fate[i].is_in_flight()).collect::<Vec<_>>() {
             let (p, d) = (rays.point(i), rays.direction(i));
             // From where the ray passes nearest to the vertex, so that a far start costs no digits.
@@ -105,16 +141,19 @@ pub(crate) fn move_to_placed_conic(
 }
 
 /// Brings the rays in flight into a surface's own frame, works on them there, and brings the same ones back.
-fn in_frame(placement: &Placement, rays: &mut RaySlices<'_>, work: impl FnOnce(RaySlices<'_>)) {
-    let there: Vec<bool> = rays.fate.iter().map(|fate| fate.is_in_flight()).collect();
-    let turn = |rays: &mut RaySlices<'_>, point: &dyn Fn(DVec3) -> DVec3, direction: &dyn Fn(DVec3) -> DVec3| {
-        for i in there.iter().enumerate().filter_map(|(i, &is_there)| is_there.then_some(i)) {
-            rays.set_point(i, point(rays.point(i)));
-            rays.set_direction(i, direction(rays.direction(i)));
-        }
-    };
+///
+/// Behind a mirror the kernel leaves the directions of rays reversed that go on (`Plan::new`); they are set right.
+fn in_frame(placement: &Placement, is_reversed: bool, rays: &mut RaySlices<'_>, work: impl FnOnce(RaySlices<'_>)) {
+    let there: Vec<usize> = (0..rays.fate.len()).filter(|&i| rays.fate[i].is_in_flight()).collect();
     let back = placement.rotation.transpose();
-    turn(rays, &|p| placement.surface_from_lens(p), &|d| back * d);
+    for &i in &there {
+        rays.set_point(i, placement.surface_from_lens(rays.point(i)));
+        rays.set_direction(i, back * rays.direction(i));
+    }
     work(rays.reborrow());
-    turn(rays, &|p| placement.lens_from_surface(p), &|d| placement.rotation * d);
+    for &i in &there {
+        let direction = placement.rotation * rays.direction(i);
+        rays.set_point(i, placement.lens_from_surface(rays.point(i)));
+        rays.set_direction(i, if is_reversed && rays.fate[i].is_in_flight() { -direction } else { direction });
+    }
 }

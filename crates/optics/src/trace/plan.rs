@@ -174,7 +174,9 @@ impl<T: Real> Plan<T> {
         let pass = |step: &Step| {
             let shift = T::of(step.vertex_z - previous_z);
             previous_z = step.vertex_z;
-            let ratio = step.index_before / step.index_after;
+            // Refraction into an index of the opposite sign is reflection with the direction reversed, which
+            // `trace_placed_by` undoes.
+            let ratio = if step.is_mirror { -1.0 } else { step.index_before / step.index_after };
             let limit_mm2 = match rims {
                 Vignetting::On => T::of(step.semi_aperture * step.semi_aperture),
                 Vignetting::Off => T::MAX,

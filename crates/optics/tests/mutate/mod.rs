@@ -7,7 +7,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// The seeds: name and bytes. The name's extension tells the format.
-pub(crate) const SEEDS: [(&str, &[u8]); 9] = [
+pub(crate) const SEEDS: [(&str, &[u8]); 13] = [
     ("singlet.ron", include_bytes!("../corpus/singlet.ron")),
     ("doublet.dat", include_bytes!("../corpus/doublet.dat")),
     ("list.txt", include_bytes!("../corpus/list.txt")),
@@ -15,6 +15,10 @@ pub(crate) const SEEDS: [(&str, &[u8]); 9] = [
     ("deeplens.json", include_bytes!("../corpus/deeplens.json")),
     ("singlet.zmx", include_bytes!("../corpus/singlet.zmx")),
     ("doublet.seq", include_bytes!("../corpus/doublet.seq")),
+    ("telescope.ron", include_bytes!("../corpus/telescope.ron")),
+    ("grating.json", include_bytes!("../corpus/grating.json")),
+    ("phases.zmx", include_bytes!("../corpus/phases.zmx")),
+    ("cassegrain.seq", include_bytes!("../corpus/cassegrain.seq")),
     ("two.agf", include_bytes!("../corpus/two.agf")),
     ("formula.yml", include_bytes!("../corpus/formula.yml")),
 ];

@@ -7,6 +7,7 @@ mod lens;
 mod movements;
 mod scene;
 mod sensor_options;
+mod world;
 
 use std::{
     fs,
@@ -25,6 +26,7 @@ pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm
 pub use movements::Movements;
 pub use scene::{SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
+pub use world::{RenderEffort, RenderMethod, WorldSpec};
 
 use self::check::Checker;
 use crate::{Outputs, PipelineError};

@@ -9,7 +9,7 @@ use dioptric_scene::{Pattern, ReadOptions, Scene, SceneLight, StillLife, Target,
 use dioptric_spectrum::{Cancel, Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
-use super::check::Checker;
+use super::{check::Checker, world::WorldSpec};
 use crate::PipelineError;
 
 /// What stands before the camera.
@@ -65,6 +65,8 @@ pub enum SceneSource {
         /// Rows.
         rows: usize,
     },
+    /// A three-dimensional world, with lights of its own.
+    World(WorldSpec),
 }
 
 /// The illuminance on what has none of its own, lux.
@@ -106,6 +108,14 @@ impl SceneSpec {
         }
         match self.source {
             SceneSource::File(_) => Ok(()),
+            SceneSource::World(ref world) => {
+                let others = [self.illuminance_lux, self.mean_luminance_cd_m2, self.depth_m];
+                if self.illuminant.is_some() || others.iter().any(Option::is_some) {
+                    let expected = "field_of_view_deg and light at most: a world has lights and depths of its own";
+                    return checker.wrong("scene", "a world under another light or at another depth", expected);
+                }
+                world.check(checker)
+            }
             SceneSource::StillLife { columns, rows } => check_size(checker, columns, rows),
             SceneSource::Target { columns, rows, .. } => {
                 check_size(checker, columns, rows)?;
@@ -154,6 +164,10 @@ impl SceneSpec {
                 };
                 read_scene(path, &options)?
             }
+            SceneSource::World(world) => {
+                let reason = format!("{} is no picture but a world, expected to be rendered", world.file.display());
+                return Err(PipelineError::Unsuitable { what: "scene", reason });
+            }
             SceneSource::StillLife { columns, rows } => {
                 StillLife::new(*columns, *rows).scene_with(&own_or()?, progress, cancel)?
             }
@@ -170,6 +184,31 @@ impl SceneSpec {
             }
             .scene(&own_or()?)?,
         };
+        self.light_up(&mut scene)?;
+        Ok(scene)
+    }
+
+    /// Returns a scene that is in no file, with what it leaves open taken from here, on the bands wanted.
+    ///
+    /// # Errors
+    /// When it lacks what is needed, or holds what cannot be.
+    pub(crate) fn finish(&self, mut scene: Scene, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
+        if let Some(depth_m) = self.depth_m {
+            scene = scene.or_flat_depth_m(depth_m)?;
+        }
+        if let Some(fov_deg) = self.field_of_view_deg {
+            scene = scene.or_horizontal_fov_deg(fov_deg)?;
+        }
+        if let Some(grid) = wanted.filter(|grid| *grid != scene.radiance.grid()) {
+            scene = scene.resampled(grid)?;
+        }
+        scene.validate()?;
+        self.light_up(&mut scene)?;
+        Ok(scene)
+    }
+
+    /// Puts a scene under the light that is asked for, and checks that it is whole.
+    fn light_up(&self, scene: &mut Scene) -> Result<(), PipelineError> {
         if let (None, Some(illuminant)) = (&scene.light, &self.light) {
             scene.light = Some(SceneLight { illuminant: illuminant.clone(), illuminance_lux: None });
         }
@@ -181,12 +220,14 @@ impl SceneSpec {
         if let Some(wanted_cd_m2) = self.mean_luminance_cd_m2 {
             scene.scale(wanted_cd_m2 / scene.mean_luminance_cd_m2())?;
         }
-        Ok(scene)
+        Ok(())
     }
 
     pub(crate) fn resolve_paths(&mut self, folder: &Path) {
-        if let SceneSource::File(path) = &mut self.source {
-            *path = folder.join(&path);
+        match &mut self.source {
+            SceneSource::File(path) => *path = folder.join(&path),
+            SceneSource::World(world) => world.file = folder.join(&world.file),
+            SceneSource::StillLife { .. } | SceneSource::Target { .. } => {}
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use dioptric_sensor::{Demosaic, ExposureControl, Highlights, NoiseSources, Processing};
 
-use crate::{PipelineError, sense::parse_white, with_analog_gain};
+use crate::{PipelineError, parse_white, with_analog_gain};
 
 /// Changes to noise, gain and processing as words; what is `None` stays.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -10,8 +10,8 @@ use std::{
 
 use dioptric_forward::{ImagingPlan, Source};
 use dioptric_scene::{BandWriter, ExrParts, Scene, read_spectral_exr};
-use dioptric_spectrum::{Bands, Observer, Quantity, SpectrumError, WavelengthGrid};
-use ndarray::Array2;
+use dioptric_spectrum::{Bands, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
+use ndarray::{Array2, Array3, ArrayView3, Axis};
 
 use super::{Watch, film::FilmPlace};
 use crate::{
@@ -38,7 +38,8 @@ pub struct Irradiance {
 /// Where the bands are.
 #[derive(Debug)]
 enum Planes {
-    Memory(Vec<Array2<f32>>),
+    /// Bands × rows × columns, one block of memory.
+    Memory(Array3<f32>),
     /// All bands one after the other, little-endian.
     File(Mutex<File>),
 }
@@ -74,6 +75,14 @@ impl Irradiance {
         self.pitch_um
     }
 
+    /// All bands as they lie in memory, bands × rows × columns in standard layout; `None` where they are in a file.
+    pub fn cube(&self) -> Option<ArrayView3<'_, f32>> {
+        match &self.planes {
+            Planes::Memory(cube) => Some(cube.view()),
+            Planes::File(_) => None,
+        }
+    }
+
     /// Writes it as spectral EXR.
     ///
     /// # Errors
@@ -101,13 +110,19 @@ impl Irradiance {
         image.check_samples().map_err(|e| in_file(e.to_string()))?;
         let pitch_um = image.pitch_um().or(pitch_um);
         let pitch_um = pitch_um.ok_or_else(|| in_file("it states no distance between its samples".to_owned()))?;
+        Ok(Self::of_image(image, pitch_um))
+    }
+
+    /// Returns it with bands in memory; `image` is an irradiance.
+    pub(super) fn of_image(image: SpectralImage, pitch_um: f64) -> Self {
         let (grid, size) = (image.grid().clone(), (image.rows(), image.columns()));
         let mut summing = Summing::new(&grid, size);
-        let planes = image.into_planes();
-        for (band, plane) in planes.iter().enumerate() {
-            summing.add(band, plane);
+        let mut cube = Array3::zeros((grid.len(), size.0, size.1));
+        for (band, plane) in image.into_planes().into_iter().enumerate() {
+            summing.add(band, &plane);
+            cube.index_axis_mut(Axis(0), band).assign(&plane);
         }
-        Ok(Self { grid, size, pitch_um, planes: Planes::Memory(planes), summary: summing.summary })
+        Self { grid, size, pitch_um, planes: Planes::Memory(cube), summary: summing.summary }
     }
 }
 
@@ -126,10 +141,14 @@ impl Bands for Irradiance {
 
     fn band(&self, band: usize) -> Result<Cow<'_, Array2<f32>>, SpectrumError> {
         match &self.planes {
-            Planes::Memory(planes) => match planes.get(band) {
-                Some(plane) => Ok(Cow::Borrowed(plane)),
-                None => Err(SpectrumError::Band { band, reason: format!("there are {} bands", planes.len()) }),
-            },
+            Planes::Memory(cube) => {
+                let n_bands = cube.len_of(Axis(0));
+                if band >= n_bands {
+                    return Err(SpectrumError::Band { band, reason: format!("there are {n_bands} bands") });
+                }
+                // A copy of a band is a hundredth of the work of whoever asks for it.
+                Ok(Cow::Owned(cube.index_axis(Axis(0), band).to_owned()))
+            }
             Planes::File(file) => {
                 let unreadable = |e: std::io::Error| SpectrumError::Band { band, reason: e.to_string() };
                 let n_samples = self.size.0 * self.size.1;
@@ -161,7 +180,8 @@ pub(super) fn image(
     let is_spilled = size_bytes(size, grid.len()) > memory_bytes;
     let cannot = |e: std::io::Error| PipelineError::Spill { reason: e.to_string() };
     let mut file = if is_spilled { Some(tempfile::tempfile().map_err(cannot)?) } else { None };
-    let mut planes = Vec::new();
+    let shape = (if is_spilled { 0 } else { grid.len() }, size.0, size.1);
+    let mut cube = Array3::zeros(shape);
     let mut summing = Summing::new(&grid, size);
     let source = Source::of_scene(scene)?;
     let progress = |fraction| watch.progress.at(Stage::Irradiance, fraction);
@@ -172,11 +192,11 @@ pub(super) fn image(
                 let bytes: Vec<u8> = plane.iter().flat_map(|sample| sample.to_le_bytes()).collect();
                 file.write_all(&bytes)?;
             }
-            None => planes.push(plane),
+            None => cube.index_axis_mut(Axis(0), band).assign(&plane),
         }
         Ok(())
     })?;
-    let planes = file.map_or(Planes::Memory(planes), |file| Planes::File(Mutex::new(file)));
+    let planes = file.map_or(Planes::Memory(cube), |file| Planes::File(Mutex::new(file)));
     Ok(Irradiance { grid, size, pitch_um: place.pitch_um, planes, summary: summing.summary })
 }
 
@@ -222,7 +242,7 @@ impl Summing {
 mod tests {
     use dioptric_forward::{DiscLens, ImagingSpec, Settings};
     use dioptric_scene::View;
-    use dioptric_spectrum::{Cancel, DepthMap, SpectralImage};
+    use dioptric_spectrum::{Cancel, DepthMap};
 
     use super::*;
     use crate::Silent;
@@ -261,6 +281,9 @@ mod tests {
             assert_eq!(kept.band(band).unwrap(), spilled.band(band).unwrap());
         }
         assert_eq!(kept.summary.mean, spilled.summary.mean);
+        let cube = kept.cube().unwrap();
+        assert!(cube.is_standard_layout() && spilled.cube().is_none());
+        assert_eq!(cube.index_axis(Axis(0), 1), kept.band(1).unwrap().view());
         assert!(kept.band(3).is_err() && spilled.band(3).is_err());
     }
 

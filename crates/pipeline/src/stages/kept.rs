@@ -6,12 +6,14 @@ use dioptric_forward::{ImagingPlan, check_depth_map};
 use dioptric_psf::LensImageModel;
 use dioptric_scene::Scene;
 use dioptric_sensor::{Developed, ElectronRate, Processing, Sensor};
-use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, WavelengthGrid};
+use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_world::World;
 
 use super::{
     Watch, bank, electrons,
     film::{self, FilmPlace},
     frames::{self, FrameSet},
+    given::GivenParts,
     irradiance::{self, Irradiance},
     lens::{self, ResolvedLens},
     plan,
@@ -19,8 +21,9 @@ use super::{
     slot::Slot,
     spec::{
         BankInputs, ElectronInputs, FilmInputs, FrameInputs, GeometryInputs, IrradianceInputs, LensInputs,
-        PictureInputs, PlanInputs, SceneInputs,
+        PictureInputs, PlanInputs, SceneInputs, WorldInputs,
     },
+    world::{self, WorldRender},
 };
 use crate::{Camera, Frames, PipelineError, Progress, Quality, SceneSource, Stage};
 
@@ -51,6 +54,7 @@ const MEMORY_BYTES: u64 = 2 << 30;
 #[derive(Clone, Debug)]
 pub struct KeptCamera {
     camera: Camera,
+    pub(super) given: GivenParts,
     quality: Quality,
     memory_bytes: u64,
     kept: Arc<KeptResults>,
@@ -60,6 +64,7 @@ pub struct KeptCamera {
 #[derive(Debug)]
 pub(super) struct KeptResults {
     pub(super) lens: Slot<LensInputs, ResolvedLens>,
+    pub(super) world: Slot<WorldInputs, World>,
     pub(super) scene: Slot<SceneInputs, ResolvedScene>,
     pub(super) summary: Slot<SceneInputs, SceneSummary>,
     pub(super) depth: Slot<GeometryInputs, DepthMap>,
@@ -77,6 +82,7 @@ impl Default for KeptResults {
     fn default() -> Self {
         Self {
             lens: Slot::new(8),
+            world: Slot::new(2),
             scene: Slot::new(2),
             summary: Slot::new(8),
             depth: Slot::new(2),
@@ -139,6 +145,8 @@ pub struct Capture {
     pub processing: Processing,
     /// The picture.
     pub developed: Arc<Developed>,
+    /// What the rate of electrons was made from.
+    pub(super) inputs: ElectronInputs,
 }
 
 impl Capture {
@@ -164,7 +172,8 @@ impl Capture {
 impl KeptCamera {
     /// A camera of which nothing is computed yet, at full quality.
     pub fn new(camera: Camera) -> Self {
-        Self { camera, quality: Quality::Full, memory_bytes: MEMORY_BYTES, kept: Arc::default() }
+        let (given, quality) = (GivenParts::default(), Quality::Full);
+        Self { camera, given, quality, memory_bytes: MEMORY_BYTES, kept: Arc::default() }
     }
 
     /// Returns the camera changed; what is kept is shared.
@@ -220,7 +229,7 @@ impl KeptCamera {
     /// cancelled.
     pub fn capture(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Capture, PipelineError> {
         self.camera.validate()?;
-        let inputs = PictureInputs::of(&self.camera, self.quality)?;
+        let inputs = self.picture_inputs()?;
         let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
         let frame_inputs = &inputs.frames;
         let electron_inputs = &frame_inputs.electrons;
@@ -237,8 +246,20 @@ impl KeptCamera {
         let processing = self.camera.processing.under(scene.light.as_ref().map(|light| &light.illuminant));
         let developed = chain.picture(inputs.clone(), &processing)?;
         progress.at(Stage::Picture, 1.0);
-        let (camera, quality) = (self.camera.clone(), self.quality);
-        Ok(Capture { camera, quality, lens, scene, place, sensor, irradiance, rate, frames, processing, developed })
+        Ok(Capture {
+            camera: self.camera.clone(),
+            quality: self.quality,
+            lens,
+            scene,
+            place,
+            sensor,
+            irradiance,
+            rate,
+            frames,
+            processing,
+            developed,
+            inputs: electron_inputs.clone(),
+        })
     }
 
     /// Checks all that can be without taking the picture: every number, the lens with its stop and glasses, the sensor, and
@@ -251,7 +272,12 @@ impl KeptCamera {
         let inputs = self.irradiance_inputs()?;
         let lens = self.kept.lens.get_or_make(inputs.plan.bank.film.lens, lens::resolve)?;
         check_glasses(&lens, self.camera.wavelengths.grid()?.as_ref())?;
-        if let SceneSource::File(path) = &self.camera.scene.source {
+        let file = match &self.camera.scene.source {
+            SceneSource::File(path) => Some(path),
+            SceneSource::World(world) => Some(&world.file),
+            SceneSource::StillLife { .. } | SceneSource::Target { .. } => None,
+        };
+        if let Some(path) = file.filter(|_| self.given.scene.is_none()) {
             fs::metadata(path).map_err(|e| PipelineError::Read { path: path.clone(), reason: e.to_string() })?;
         }
         Ok(lens)
@@ -281,8 +307,65 @@ impl KeptCamera {
         Ok(self.kept.depth.put(inputs.scene.geometry, scene.scene.require_depth()?.clone()))
     }
 
+    /// Returns the irradiance on the film.
+    ///
+    /// # Errors
+    /// As [`capture`](Self::capture).
+    pub fn irradiance(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<Irradiance>, PipelineError> {
+        self.camera.validate()?;
+        let inputs = self.irradiance_inputs()?;
+        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        chain.irradiance(&inputs)
+    }
+
+    /// Returns the world before the camera, read now where it is not kept.
+    ///
+    /// # Errors
+    /// When the scene is no world, or its files cannot be read.
+    pub fn world(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<World>, PipelineError> {
+        let scene = SceneInputs::of(&self.camera, &self.given, self.quality);
+        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        chain.world(&scene.geometry)
+    }
+
+    /// Returns the world before the camera as its lens sees it, to be rendered pass by pass.
+    ///
+    /// # Errors
+    /// When the scene is no world, or as [`capture`](Self::capture).
+    pub fn world_render(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<WorldRender, PipelineError> {
+        self.camera.validate()?;
+        let inputs = self.irradiance_inputs()?;
+        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let resolved = chain.scene(&inputs.scene)?;
+        let lens = chain.lens(&inputs.plan.bank.film.lens)?;
+        // What is too near for the lens is found before the work.
+        let grid = resolved.scene.radiance.grid();
+        check_glasses(&lens, Some(grid))?;
+        check_depth_map(&lens.lens, grid, resolved.scene.require_depth()?)?;
+        chain.world_render(&inputs)
+    }
+
+    /// Keeps a rendered picture as the irradiance of this camera, so that a capture starts behind it.
+    ///
+    /// # Errors
+    /// When the picture is no irradiance on the film of this camera.
+    pub fn keep_irradiance(&self, picture: SpectralImage) -> Result<(), PipelineError> {
+        let inputs = self.irradiance_inputs()?;
+        let (quantity, pitch_um) = (picture.quantity(), picture.pitch_um());
+        let Some(pitch_um) = pitch_um.filter(|_| quantity == Quantity::Irradiance) else {
+            let reason = format!("its unit is {}, expected an irradiance on pixels of a known pitch", quantity.unit());
+            return Err(PipelineError::Unsuitable { what: "the picture", reason });
+        };
+        self.kept.irradiance.put(inputs, Irradiance::of_image(picture, pitch_um));
+        Ok(())
+    }
+
     pub(super) fn irradiance_inputs(&self) -> Result<IrradianceInputs, PipelineError> {
-        Ok(PictureInputs::of(&self.camera, self.quality)?.frames.electrons.irradiance)
+        Ok(self.picture_inputs()?.frames.electrons.irradiance)
+    }
+
+    fn picture_inputs(&self) -> Result<PictureInputs, PipelineError> {
+        PictureInputs::of(&self.camera, &self.given, self.quality)
     }
 
     pub(super) fn results(&self) -> &KeptResults {
@@ -314,10 +397,29 @@ impl Chain<'_> {
         self.kept.scene.get_or_make(inputs.clone(), |inputs| {
             self.watch.progress.at(Stage::Scene, 0.0);
             self.watch.cancel.check()?;
-            let scene = scene::open(inputs, &self.watch)?;
+            let scene = match inputs.geometry.world() {
+                Some((_, spec)) => world::view(inputs, spec, &self.world(&inputs.geometry)?, &self.watch)?,
+                None => scene::open(inputs, &self.watch)?,
+            };
             self.watch.progress.at(Stage::Scene, 1.0);
             Ok(scene)
         })
+    }
+
+    fn world(&self, geometry: &GeometryInputs) -> Result<Arc<World>, PipelineError> {
+        let Some((inputs, _)) = geometry.world() else {
+            let reason = "it is no world, expected 'source: World((file: ...))'".to_owned();
+            return Err(PipelineError::Unsuitable { what: "scene", reason });
+        };
+        self.kept.world.get_or_make(inputs, |inputs| world::read(inputs, &self.watch))
+    }
+
+    fn world_render(&self, inputs: &IrradianceInputs) -> Result<WorldRender, PipelineError> {
+        let world = self.world(&inputs.scene.geometry)?;
+        let film = &inputs.plan.bank.film;
+        let grid = self.summary(&inputs.scene)?.grid()?;
+        let (lens, place) = (self.lens(&film.lens)?, self.film(film, &inputs.scene)?);
+        WorldRender::through_lens(world, inputs, (&lens, &place), grid)
     }
 
     fn summary(&self, inputs: &SceneInputs) -> Result<Arc<SceneSummary>, PipelineError> {
@@ -358,6 +460,11 @@ impl Chain<'_> {
 
     fn irradiance(&self, inputs: &IrradianceInputs) -> Result<Arc<Irradiance>, PipelineError> {
         self.kept.irradiance.get_or_make(inputs.clone(), |inputs| {
+            if let Some(effort) = inputs.scene.geometry.world().and_then(|(_, spec)| spec.backward()) {
+                let picture = self.world_render(inputs)?.render(effort, &self.watch)?.picture;
+                let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
+                return Ok(Irradiance::of_image(picture, place.pitch_um));
+            }
             let plan = self.plan(&inputs.plan, &inputs.scene)?;
             let resolved = self.scene(&inputs.scene)?;
             let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;

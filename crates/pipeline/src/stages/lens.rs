@@ -1,6 +1,6 @@
 //! The lens: read, its stop set, moved before the film.
 
-use dioptric_optics::{Lens, MonoLens};
+use dioptric_optics::{Lens, LensFile, MonoLens};
 
 use super::spec::LensInputs;
 use crate::{PipelineError, REFERENCE_WAVELENGTH_NM};
@@ -17,7 +17,10 @@ pub struct ResolvedLens {
 }
 
 pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError> {
-    let file = inputs.choice.open(&inputs.reading)?;
+    let file = match inputs.given.as_deref() {
+        Some(lens) => LensFile::from(lens.clone()),
+        None => inputs.choice.open(&inputs.reading)?,
+    };
     let lens = inputs.movements.apply(inputs.stop.apply(file.lens)?)?;
     let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
     let notes = file.notes.into_iter().chain(reference.note_on_limit()).collect();

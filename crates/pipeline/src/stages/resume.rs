@@ -41,10 +41,11 @@ impl KeptCamera {
     /// Writes what is needed to continue from a folder that holds the irradiance of this capture.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// When the file cannot be written, or a part of the camera was made in a program, which no file could name.
     pub fn write_resume_file(&self, capture: &Capture, folder: &Path) -> Result<(), PipelineError> {
         let unknown =
             |e: std::io::Error| PipelineError::Write { path: folder.join(RESUME_FILE), reason: e.to_string() };
+        self.given().check_none()?;
         // The run may be continued from another folder.
         let here = std::env::current_dir().map_err(unknown)?;
         let camera = self.with(|camera| camera.resolve_paths(&here));

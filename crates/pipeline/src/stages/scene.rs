@@ -81,9 +81,16 @@ pub(super) fn open(inputs: &SceneInputs, watch: &Watch<'_>) -> Result<ResolvedSc
         illuminance_lux: inputs.illuminance_lux,
         mean_luminance_cd_m2: inputs.mean_luminance_cd_m2,
     };
+    if let Some(given) = inputs.geometry.given.as_deref() {
+        let whole = choice(source.clone()).finish(given.clone(), wanted.as_ref())?;
+        let bands = quality.bands_of(whole.radiance.grid())?;
+        let binning = quality.scene_binning(whole.columns());
+        let scene = if bands == *whole.radiance.grid() { whole } else { whole.resampled(&bands)? };
+        return Ok(ResolvedScene { scene: scene.binned(binning)?, binning });
+    }
     let fewer = |n: usize, binning: usize| (n / binning).max(1);
     let computed = match source {
-        SceneSource::File(_) => None,
+        SceneSource::File(_) | SceneSource::World(_) => None,
         SceneSource::StillLife { columns, rows } => {
             let binning = quality.scene_binning(*columns);
             let (columns, rows) = (fewer(*columns, binning), fewer(*rows, binning));
@@ -118,6 +125,8 @@ fn read(scene: SceneSpec, wanted: Option<WavelengthGrid>, watch: &Watch<'_>) -> 
             let progress = |fraction| watch.progress.at(Stage::Scene, fraction);
             scene.open_with(wanted.as_ref(), &progress, watch.cancel)
         }
-        SceneSource::File(_) | SceneSource::Target { .. } => watch.run(move || scene.open(wanted.as_ref())),
+        SceneSource::File(_) | SceneSource::Target { .. } | SceneSource::World(_) => {
+            watch.run(move || scene.open(wanted.as_ref()))
+        }
     }
 }

@@ -48,7 +48,11 @@ impl<K: PartialEq, T> Slot<K, T> {
 
     /// Keeps a result that was made elsewhere.
     pub(crate) fn put(&self, key: K, result: T) -> Arc<T> {
-        let result = Arc::new(result);
+        self.put_shared(key, Arc::new(result))
+    }
+
+    /// Keeps a result that others hold too.
+    pub(crate) fn put_shared(&self, key: K, result: Arc<T>) -> Arc<T> {
         let mut entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
         entries.retain(|(kept, _)| *kept != key);
         entries.push((key, result.clone()));

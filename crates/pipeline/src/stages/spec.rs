@@ -9,13 +9,16 @@ use std::{
 };
 
 use dioptric_forward::Film;
+use dioptric_optics::Lens;
+use dioptric_scene::Scene;
 use dioptric_sensor::{ExposureControl, Noise, Processing, Sensor};
 use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
 
+use super::given::{Given, GivenParts};
 use crate::{
     BankSpec, BlurSpec, Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec, Movements,
-    PipelineError, Quality, SceneSource, StopSpec, WavelengthSpec,
+    PipelineError, Quality, SceneSource, StopSpec, WavelengthSpec, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -55,6 +58,7 @@ impl FileStamp {
 /// The lens, its stop set, moved before the film.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LensInputs {
+    pub(crate) given: Option<Given<Lens>>,
     pub(crate) choice: LensSpec,
     pub(crate) reading: LensReadOptions,
     pub(crate) stop: StopSpec,
@@ -65,6 +69,7 @@ pub(crate) struct LensInputs {
 /// Where the samples of the scene are: all that imaging is planned from.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GeometryInputs {
+    pub(crate) given: Option<Given<Scene>>,
     pub(crate) source: SceneSource,
     pub(crate) field_of_view_deg: Option<f64>,
     pub(crate) depth_m: Option<f64>,
@@ -81,6 +86,14 @@ pub(crate) struct SceneInputs {
     pub(crate) illuminance_lux: Option<f64>,
     pub(crate) light: Option<Illuminant>,
     pub(crate) mean_luminance_cd_m2: Option<f64>,
+}
+
+/// A world, read from its files.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct WorldInputs {
+    pub(crate) file: PathBuf,
+    pub(crate) unit_m: f64,
+    files: Vec<FileStamp>,
 }
 
 /// The place and the raster of the film.
@@ -153,13 +166,14 @@ pub(crate) struct PictureInputs {
 }
 
 impl LensInputs {
-    pub(crate) fn of(camera: &Camera) -> Self {
+    pub(crate) fn of(camera: &Camera, given: &GivenParts) -> Self {
         let lens_file = match &camera.lens {
-            LensSpec::File(path) => FileStamp::all_of(path),
+            LensSpec::File(path) if given.lens.is_none() => FileStamp::all_of(path),
             _ => Vec::new(),
         };
         let catalogues = camera.lens_reading.glasses.iter().map(|path| FileStamp::of(path));
         Self {
+            given: given.lens.clone(),
             choice: camera.lens.clone(),
             reading: camera.lens_reading.clone(),
             stop: camera.stop,
@@ -169,18 +183,29 @@ impl LensInputs {
     }
 }
 
+impl GeometryInputs {
+    /// Returns what the world of this geometry is read from, or `None` for a scene that is none.
+    pub(crate) fn world(&self) -> Option<(WorldInputs, &WorldSpec)> {
+        let SceneSource::World(spec) = &self.source else { return None };
+        let inputs = WorldInputs { file: spec.file.clone(), unit_m: spec.unit_m, files: self.files.clone() };
+        Some((inputs, spec))
+    }
+}
+
 impl SceneInputs {
-    pub(crate) fn of(camera: &Camera, quality: Quality) -> Self {
+    pub(crate) fn of(camera: &Camera, given: &GivenParts, quality: Quality) -> Self {
         let scene = &camera.scene;
         Self {
             geometry: GeometryInputs {
+                given: given.scene.clone(),
                 source: scene.source.clone(),
                 field_of_view_deg: scene.field_of_view_deg,
                 depth_m: scene.depth_m,
                 wavelengths: camera.wavelengths.clone(),
                 quality,
                 files: match &scene.source {
-                    SceneSource::File(path) => FileStamp::all_of(path),
+                    SceneSource::File(path) if given.scene.is_none() => FileStamp::all_of(path),
+                    SceneSource::World(world) => FileStamp::all_of(&world.file),
                     _ => Vec::new(),
                 },
             },
@@ -193,8 +218,8 @@ impl SceneInputs {
 }
 
 impl IrradianceInputs {
-    pub(crate) fn of(camera: &Camera, sensor: &Sensor, quality: Quality) -> Self {
-        let scene = SceneInputs::of(camera, quality);
+    pub(crate) fn of(camera: &Camera, given: &GivenParts, sensor: &Sensor, quality: Quality) -> Self {
+        let scene = SceneInputs::of(camera, given, quality);
         let raster = match camera.film {
             FilmSpec::Sensor => {
                 Raster::Pixels(Film { rows: sensor.rows, columns: sensor.columns, pitch_um: sensor.pixel_pitch_um })
@@ -202,8 +227,12 @@ impl IrradianceInputs {
             FilmSpec::Pixels { columns, rows, pitch_um } => Raster::Pixels(Film { rows, columns, pitch_um }),
             FilmSpec::Scene => Raster::Scene,
         };
-        let film =
-            FilmInputs { lens: LensInputs::of(camera), geometry: scene.geometry.clone(), focus: camera.focus, raster };
+        let film = FilmInputs {
+            lens: LensInputs::of(camera, given),
+            geometry: scene.geometry.clone(),
+            focus: camera.focus,
+            raster,
+        };
         let bank = BankInputs { film, diffraction: camera.diffraction, bank: camera.bank };
         Self { plan: PlanInputs { bank, blur: camera.blur }, scene }
     }
@@ -221,9 +250,9 @@ impl PictureInputs {
     ///
     /// # Errors
     /// When the sensor cannot be read.
-    pub(crate) fn of(camera: &Camera, quality: Quality) -> Result<Self, PipelineError> {
-        let sensor = camera.sensor.open()?;
-        let irradiance = IrradianceInputs::of(camera, &sensor, quality);
+    pub(crate) fn of(camera: &Camera, given: &GivenParts, quality: Quality) -> Result<Self, PipelineError> {
+        let sensor = given.sensor.as_deref().map_or_else(|| camera.sensor.open(), |sensor| Ok(sensor.clone()))?;
+        let irradiance = IrradianceInputs::of(camera, given, &sensor, quality);
         let frames = FrameInputs {
             electrons: ElectronInputs { irradiance, sensor },
             shutter: ShutterInputs {

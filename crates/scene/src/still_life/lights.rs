@@ -3,31 +3,16 @@
 use glam::{DVec2, DVec3};
 
 use super::{
+    floor_plan::{BULBS, Bulb, ROOM_CENTER, WINDOW_CD_M2, WINDOW_HIGH, WINDOW_LOW},
     noise::{on_disc, spread},
-    room::{ROOM_CENTER, WINDOW_HIGH, WINDOW_LOW},
     world::{Seen, World},
 };
 
-/// Luminance of the sky in the window at its middle, cd/m².
-pub(super) const WINDOW_CD_M2: f64 = 3300.0;
 /// Share of the window that is glass.
 const GLASS: f64 = 0.80;
 
 /// The shadows of a lamp that gives less than this, head on, are left out: they are too weak to be seen.
 const FAINT_LUX: f64 = 14.0;
-
-/// A lamp that shines like a ball.
-pub(super) struct Bulb {
-    pub(super) center: DVec3,
-    pub(super) radius: f64,
-    pub(super) luminance: f64,
-}
-
-/// The bare bulb above the table, out of the picture, and the shaded lamp at the back.
-pub(super) const BULBS: [Bulb; 2] = [
-    Bulb { center: DVec3::new(0.85, 0.95, 0.60), radius: 0.045, luminance: 42_000.0 },
-    Bulb { center: DVec3::new(0.93, 0.30, 3.62), radius: 0.10, luminance: 2_600.0 },
-];
 
 /// Illuminance, lx, by day and by lamp.
 #[derive(Clone, Copy, Debug, Default)]

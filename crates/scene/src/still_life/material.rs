@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use super::{
+    floor_plan::{CLOTH_HALF, WINDOW_CD_M2, WINDOW_HIGH, WINDOW_LOW},
     noise::{cloudy, smooth, unit},
     pattern::{cover, line, print, star, stripes},
     pigment::{Pigment, PigmentIndex},
-    room::{CLOTH_HALF, WINDOW_HIGH, WINDOW_LOW},
 };
 use crate::targets::patch_at;
 
@@ -179,7 +179,7 @@ fn room(point: DVec3, normal: DVec3, footprint: f64) -> Surface {
                 || is_bar(pane(y, WINDOW_LOW.y, WINDOW_HIGH.y, 3.0), 0.05);
             if !bar {
                 let height = (y - WINDOW_LOW.y) / (WINDOW_HIGH.y - WINDOW_LOW.y);
-                surface.glow = Some((Light::Day, super::lights::WINDOW_CD_M2 * (0.85 + 0.5 * height)));
+                surface.glow = Some((Light::Day, WINDOW_CD_M2 * (0.85 + 0.5 * height)));
             }
         }
     }

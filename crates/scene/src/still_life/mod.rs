@@ -1,6 +1,7 @@
 //! A still life made by formula: the built-in demonstration scene.
 
 mod filter;
+mod floor_plan;
 mod light_probe;
 mod lights;
 mod material;

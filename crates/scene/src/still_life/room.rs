@@ -3,23 +3,13 @@
 use glam::DVec3;
 
 use super::{
-    lights::BULBS,
+    floor_plan::{BULBS, CLOTH_HALF, ROOM_CENTER, ROOM_HALF},
     material::{Light, Material},
     noise::unit,
     pigment::{Pigment, PigmentIndex},
     shape::{Frame, Lathe, Shape},
     world::{Object, World},
 };
-
-/// The middle of the room; y = 0 is the top of the table, z = 0 the eye.
-pub(super) const ROOM_CENTER: DVec3 = DVec3::new(0.0, 0.55, 1.25);
-const ROOM_HALF: DVec3 = DVec3::new(2.2, 1.3, 2.75);
-/// The corners of the window in the left wall, from the middle of the room.
-pub(super) const WINDOW_LOW: DVec3 = DVec3::new(-2.2, -0.50, -0.55);
-pub(super) const WINDOW_HIGH: DVec3 = DVec3::new(-2.2, 0.95, 1.45);
-
-/// Half the sides of the cloth on the table.
-pub(super) const CLOTH_HALF: DVec3 = DVec3::new(0.25, 0.0012, 0.46);
 
 /// Objects that belong together, and more of them.
 type Things = Vec<Vec<Object>>;

@@ -1,6 +1,6 @@
 //! The commands of a CODE V file.
 
-use crate::prescription::TextError;
+use super::super::text_error::TextError;
 
 /// A command and what follows it.
 pub(super) struct Command {

@@ -1,11 +1,12 @@
 //! A surface of a CODE V file.
 
-use crate::{Aperture, CoordinateBreak, Glass, Outline, Shape, prescription::TextError};
+use crate::{Aperture, CoordinateBreak, Glass, Outline, Shape};
 
 use super::{
     super::{
         shapes::{even_asphere, up_to_last},
         system::{SystemMove, SystemSurface},
+        text_error::TextError,
     },
     command::Command,
 };
@@ -20,12 +21,16 @@ pub(super) struct SeqSurface {
     pub(super) number_of_s: Option<f64>,
     pub(super) thickness: f64,
     pub(super) medium: Option<Glass>,
+    /// Whether it reflects; the medium behind it is then that before it.
+    pub(super) is_mirror: bool,
     pub(super) conic: f64,
     /// From r⁴ on.
     pub(super) coefficients: [f64; 9],
     pub(super) clear_radius: Option<f64>,
     pub(super) opening: SeqOpening,
     pub(super) obscuration: SeqOpening,
+    /// The radius of a hole through the surface.
+    pub(super) hole_radius: Option<f64>,
     /// What differs along x, where something does.
     pub(super) kind: SeqKind,
     pub(super) curvature_x: f64,
@@ -47,6 +52,8 @@ pub(super) enum SeqAxis {
     Returned,
     /// The surface stands on the axis, which is bent behind it by what undoes the numbers (REV).
     Reversed,
+    /// It is turned by the surface's angles once more, as the light that a mirror reflects (BEN).
+    Folded,
 }
 
 /// An opening or obscuration that is no round rim, in the file's units.
@@ -103,7 +110,7 @@ impl SeqSurface {
             "THI" => self.thickness = command.distance(place)?,
             "CIR" => match command.words.get(place).map(|word| word.to_uppercase()).as_deref() {
                 Some("EDG") => {}
-                Some("HOL") => return Err(command.wrong("holes are not supported")),
+                Some("HOL") => self.hole_radius = Some(command.number(place + 1)?),
                 Some("OBS") => self.obscuration.radius = Some(command.number(place + 1)?),
                 _ => self.clear_radius = Some(command.number(place)?),
             },
@@ -119,11 +126,10 @@ impl SeqSurface {
             }
             "DAR" => self.axis = SeqAxis::Returned,
             "REV" => self.axis = SeqAxis::Reversed,
-            "BEN" => return Err(command.wrong("tilts that bend the axis at a mirror are not supported")),
+            "BEN" => self.axis = SeqAxis::Folded,
             "RET" | "GLB" => {
-                return Err(
-                    command.wrong("this kind of tilt is not supported; expected XDE to CDE, alone, with DAR or REV")
-                );
+                return Err(command
+                    .wrong("this kind of tilt is not supported; expected XDE to CDE, alone, with DAR, REV or BEN"));
             }
             "XOD" | "YOD" | "ZOD" if command.number(place)? != 0.0 => {
                 return Err(command.wrong("tilts about another point than the vertex are not supported"));
@@ -171,7 +177,7 @@ impl SeqSurface {
         let axis = usize::from(keyword.ends_with('Y'));
         let (aperture, place) = match command.words.get(place).map(|word| word.to_uppercase()).as_deref() {
             Some("EDG") => return Ok(()),
-            Some("HOL") => return Err(command.wrong("holes are not supported")),
+            Some("HOL") => return Err(command.wrong("only round holes (CIR HOL) are supported")),
             Some("OBS") => (&mut self.obscuration, place + 1),
             _ => (&mut self.opening, place),
         };
@@ -203,7 +209,7 @@ impl SeqSurface {
             tilt_first: false,
         };
         let own = match self.axis {
-            SeqAxis::Bent | SeqAxis::Returned => there,
+            SeqAxis::Bent | SeqAxis::Returned | SeqAxis::Folded => there,
             SeqAxis::Reversed => CoordinateBreak {
                 surfaces: (surface + 1, last),
                 decenter_mm: decenter_mm.map(|shift| -shift),
@@ -220,7 +226,10 @@ impl SeqSurface {
         };
         let turn = self.is_turned().then_some(SystemMove { z_mm, step: turn });
         let own = is_moved.then_some(SystemMove { z_mm, step: own });
-        own.into_iter().chain(turn).collect()
+        // Behind a mirror the axis turns by the same angles again, so that it follows the ray along it.
+        let fold = CoordinateBreak { surfaces: (surface + 1, last), decenter_mm: [0.0; 3], ..there };
+        let fold = (is_moved && self.axis == SeqAxis::Folded).then_some(SystemMove { z_mm, step: fold });
+        own.into_iter().chain(turn).chain(fold).collect()
     }
 
     /// Whether the surface is one whose curve is along x: a toroid about an axis parallel to y that is turned by a right
@@ -256,15 +265,30 @@ impl SeqSurface {
         }
     }
 
-    pub(super) fn in_mm(&self, mm: f64) -> Result<SystemSurface, TextError> {
+    /// Returns the surface in mm; `before` is the medium before it.
+    pub(super) fn in_mm(&self, mm: f64, before: &Glass) -> Result<SystemSurface, TextError> {
+        let wrong = |reason: &str| Err(TextError { line: Some(self.line), reason: reason.to_owned() });
+        if self.axis == SeqAxis::Folded && !self.is_mirror {
+            return wrong("BEN: a surface that bends the axis, but is no mirror, is not supported");
+        }
+        // Of two turns the second is about a turned axis, and the same turns again do not lead along the reflected light.
+        let n_turns = self.tilt_deg.iter().filter(|angle| **angle != 0.0).count();
+        if self.axis == SeqAxis::Folded && (self.decenter != [0.0; 3] || self.tilt_deg[2] != 0.0 || n_turns > 1) {
+            return wrong("BEN: a mirror that bends the axis is supported where it has one tilt alone, ADE or BDE");
+        }
+        if self.hole_radius.is_some() && !self.is_mirror {
+            return wrong("CIR HOL: a hole in a surface that is no mirror is not supported");
+        }
         let curvature = if self.is_turned() { self.curvature_x } else { self.curvature };
         let surface = SystemSurface {
             line: self.line,
             curvature_per_mm: curvature / mm,
             shape: self.shape(mm)?,
-            medium_after: self.medium.clone().unwrap_or_default(),
+            medium_after: if self.is_mirror { before.clone() } else { self.medium.clone().unwrap_or_default() },
             thickness_after_mm: self.thickness * mm,
             semi_aperture_mm: self.clear_radius.map(|radius| radius * mm),
+            is_mirror: self.is_mirror,
+            phase: None,
             is_rim_fixed: self.clear_radius.is_some(),
             apertures: Vec::new(),
         };
@@ -284,6 +308,11 @@ impl SeqSurface {
             for outline in stated.outlines(mm) {
                 surface = surface.with_aperture(Aperture { surface: 0, outline, center_mm, is_obscuration });
             }
+        }
+        if let Some(radius) = self.hole_radius {
+            let outline = Outline::Circle { radius_mm: radius * mm };
+            let hole = Aperture { surface: 0, outline, center_mm: [0.0; 2], is_obscuration: true };
+            surface = surface.with_aperture(hole);
         }
         surface
     }

@@ -1,11 +1,12 @@
 //! A surface of a Zemax file.
 
-use crate::{Aperture, CoordinateBreak, Glass, Outline, Shape, prescription::TextError};
+use crate::{Aperture, CoordinateBreak, Glass, Outline, PhaseProfile, Shape};
 
 use super::super::{
     glasses::{Glasses, model},
     shapes::{conic_of, even_asphere, up_to_last},
     system::{SystemMove, SystemSurface},
+    text_error::TextError,
 };
 use super::Line;
 
@@ -22,7 +23,10 @@ pub(super) struct ZmxSurface {
     parameters: Vec<f64>,
     semi_diameter: Option<f64>,
     is_semi_diameter_fixed: bool,
-    has_extra_data: bool,
+    /// The parameter 0: the order of a diffractive surface.
+    parameter_zero: f64,
+    /// Numbered from 1: how many terms there are, the radius that they count from, and the terms.
+    extra_data: Vec<f64>,
     /// Keyword and the two numbers behind it.
     aperture: Option<(String, [f64; 2])>,
     aperture_center: [f64; 2],
@@ -45,6 +49,9 @@ const OTHER_APERTURES: [(&str, &str); 4] = [
     ("UDAP", "a user-defined aperture"),
 ];
 
+/// The most numbers of extra data of a surface.
+const MOST_EXTRA_DATA: usize = 500;
+
 /// Solves and pickups: a curvature, thickness or parameter picked up from another surface, and a thickness that brings
 /// the marginal or the chief ray to a height, or an edge to a width.
 const SOLVES: [&str; 6] = ["PKUP", "PZUP", "PPAR", "MAZH", "CHZH", "EDGE"];
@@ -65,8 +72,9 @@ impl ZmxSurface {
             "DISZ" => self.thickness = line.number(0)?,
             "PARM" => {
                 let place = line.count(0)?;
-                // Newer files state a parameter 0 too, which means nothing to the surfaces that are read.
+                // Newer files state a parameter 0 of every surface; it means something to diffractive ones alone.
                 if place == 0 {
+                    self.parameter_zero = line.number(1)?;
                     return Ok(true);
                 }
                 if place > 200 {
@@ -87,9 +95,16 @@ impl ZmxSurface {
                 }
                 self.aperture = Some((line.keyword.to_owned(), numbers));
             }
-            // The first of the extra data is how many terms there are.
-            "XDAT" if line.count(0)? == 1 => self.has_extra_data = line.number_or(1, 0.0)? != 0.0,
-            "XDAT" => {}
+            "XDAT" => {
+                let place = line.count(0)?;
+                if !(1..=MOST_EXTRA_DATA).contains(&place) {
+                    return Err(
+                        line.wrong(format!("number {place} of the extra data; expected 1 to {MOST_EXTRA_DATA}"))
+                    );
+                }
+                self.extra_data.resize(self.extra_data.len().max(place), 0.0);
+                self.extra_data[place - 1] = line.number_or(1, 0.0)?;
+            }
             "FLAP" => self.is_semi_diameter_fixed = true,
             "OBDC" => self.aperture_center = [line.number_or(0, 0.0)?, line.number_or(1, 0.0)?],
             "GLAS" => {
@@ -108,19 +123,19 @@ impl ZmxSurface {
         Ok(true)
     }
 
-    pub(super) fn in_mm(
-        &self,
-        number: usize,
-        mm: f64,
-        glasses: &Glasses,
-        notes: &mut Vec<String>,
-    ) -> Result<SystemSurface, TextError> {
+    /// Whether it reflects.
+    pub(super) fn is_mirror(&self) -> bool {
+        self.glass.as_ref().is_some_and(|glass| glass.name.eq_ignore_ascii_case("MIRROR"))
+    }
+
+    /// Returns the surface in mm, with this medium behind it.
+    pub(super) fn in_mm(&self, number: usize, mm: f64, medium_after: Glass) -> Result<SystemSurface, TextError> {
         let wrong = |reason: String| TextError { line: Some(self.line), reason: format!("surface {number}: {reason}") };
         let parameter = |place: usize| self.parameters.get(place - 1).copied().unwrap_or(0.0);
         let mut curvature_per_mm = self.curvature / mm;
         let shape = match self.kind.as_str() {
-            "STANDARD" => conic_of(self.conic),
-            "EVENASPH" => {
+            "STANDARD" | "DGRATING" => conic_of(self.conic),
+            "EVENASPH" | "BINARY_2" => {
                 let powers = (1..).map(|half| 1 - 2 * half);
                 let from_r2: Vec<f64> =
                     self.parameters.iter().take(8).zip(powers).map(|(a, p)| a * mm.powi(p)).collect();
@@ -140,7 +155,7 @@ impl ZmxSurface {
                 curvature_x_per_mm: curvature_of(parameter(1) * mm),
                 conic_x: parameter(2),
             },
-            "TOROIDAL" if self.has_extra_data => {
+            "TOROIDAL" if self.extra_data.first().is_some_and(|&n_terms| n_terms != 0.0) => {
                 return Err(wrong("Zernike terms (XDAT) of a toroid are not supported".to_owned()));
             }
             "TOROIDAL" => {
@@ -153,11 +168,11 @@ impl ZmxSurface {
                 }
             }
             other => {
-                let known = "expected STANDARD, EVENASPH, ODDASPHE, BICONICX, TOROIDAL, PARAXIAL or COORDBRK";
+                let known = "expected STANDARD, EVENASPH, ODDASPHE, BICONICX, TOROIDAL, PARAXIAL, DGRATING, BINARY_2 or \
+                             COORDBRK";
                 return Err(wrong(format!("surfaces of type {other} are not supported; {known}")));
             }
         };
-        let medium_after = self.medium(number, glasses, notes)?;
         let surface = SystemSurface {
             line: self.line,
             curvature_per_mm,
@@ -165,10 +180,37 @@ impl ZmxSurface {
             medium_after,
             thickness_after_mm: self.thickness * mm,
             semi_aperture_mm: self.semi_diameter.map(|semi_diameter| semi_diameter * mm),
+            is_mirror: self.is_mirror(),
+            phase: self.phase(mm).map_err(wrong)?,
             is_rim_fixed: self.semi_diameter.is_some() && self.is_semi_diameter_fixed,
             apertures: Vec::new(),
         };
         Ok(self.with_apertures(mm, surface))
+    }
+
+    /// Returns the order and the phase of a grating or diffractive surface.
+    ///
+    /// A grating's parameters are its lines per µm along y and the order, whatever the file's unit of length; the extra data of
+    /// the other are the number of terms, the radius and the coefficients of even powers from the second on, in radians. So
+    /// has Zemax's manual; the sign is that of the semi-diameters that the program stores with a grating in order −1.
+    fn phase(&self, mm: f64) -> Result<Option<(i32, PhaseProfile)>, String> {
+        let parameter = |place: usize| self.parameters.get(place - 1).copied().unwrap_or(0.0);
+        let order = |found: f64| match found.fract() == 0.0 && found.abs() <= 1e6 {
+            true => Ok(found as i32),
+            false => Err(format!("a diffraction order of {found}; expected a whole number")),
+        };
+        match (self.kind.as_str(), self.extra_data.as_slice()) {
+            ("DGRATING", _) => {
+                let profile = PhaseProfile::Grating { lines_per_mm: [0.0, 1e3 * parameter(1)] };
+                Ok(Some((order(parameter(2))?, profile)))
+            }
+            ("BINARY_2", [n_terms, radius, coefficients @ ..]) if *n_terms > 0.0 => {
+                let coefficients_rad = coefficients.iter().copied().take(*n_terms as usize).collect();
+                let profile = PhaseProfile::Rings { radius_mm: radius * mm, coefficients_rad };
+                Ok(Some((order(self.parameter_zero)?, profile)))
+            }
+            _ => Ok(None),
+        }
     }
 
     /// Returns the surface with the aperture that the file states for it.
@@ -222,7 +264,7 @@ impl ZmxSurface {
         let wrong =
             |reason: String| TextError { line: Some(stated.line), reason: format!("surface {number}: {reason}") };
         match (stated.name.to_uppercase().as_str(), stated.nd_vd) {
-            ("MIRROR", _) => Err(wrong("mirrors are not supported".to_owned())),
+            ("MIRROR", _) => Err(wrong("the object cannot be a mirror".to_owned())),
             ("AIR" | "VACUUM" | "", _) => Ok(Glass::Air),
             ("___BLANK", Some((nd, vd))) => Ok(model(nd, vd)),
             ("___BLANK", None) => Err(wrong("a model glass without its index".to_owned())),

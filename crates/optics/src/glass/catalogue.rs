@@ -34,8 +34,8 @@ pub struct GlassCatalogue {
     by_key: HashMap<String, Vec<usize>>,
 }
 
-const BUILT_IN: &str = include_str!("../data/glass/catalogue.csv");
-const CRYSTALS: &str = include_str!("../data/glass/crystals.csv");
+const BUILT_IN: &str = include_str!("../../data/glass/catalogue.csv");
+const CRYSTALS: &str = include_str!("../../data/glass/crystals.csv");
 
 /// Plastics of phone lenses by the index at the d line and the Abbe number: OKP4 and OKP4HT of the maker's table of their
 /// properties (Osaka Gas Chemicals), and a cyclo-olefin copolymer, whose maker's Zemax catalogue states 1.5332 and 56.15
@@ -47,7 +47,7 @@ const PLASTICS: [(&str, f64, f64); 3] = [("OKP4", 1.607, 27.0), ("OKP4HT", 1.632
 const CORNING_7980: ([f64; 3], [f64; 3]) =
     ([0.683740494, 0.420323613, 0.58502748], [0.00460352869, 0.0133968856, 64.4932732]);
 
-const EYE_MEDIA: &str = include_str!("../data/glass/eye_media.csv");
+const EYE_MEDIA: &str = include_str!("../../data/glass/eye_media.csv");
 
 /// Names that other programs use for glasses of the built-in catalogue.
 const ALIASES: &[(&str, &str)] = &[

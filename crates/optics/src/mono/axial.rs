@@ -2,10 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::{
-    Aperture, MonoLens, ObjectPoint, RayBatch, Vignetting, rays_towards,
-    trace::{self, Goal, Kind, Plan},
-};
+use crate::{Aperture, MonoLens, ObjectPoint, RayBatch, Vignetting, rays_towards, trace::Step};
 
 /// Heights on the front at which rays are tried before the marginal ray is sought.
 const N_HEIGHTS: usize = 256;
@@ -44,10 +41,7 @@ impl MonoLens {
     pub fn axial_beam(&self, object_distance_mm: f64) -> Option<AxialBeam> {
         let is_round = |aperture: &Aperture| aperture.is_obscuration || aperture.is_rotational();
         let are_all_round = self.steps().iter().flat_map(|step| &step.apertures).all(is_round);
-        if self.placements().is_some()
-            || !are_all_round
-            || self.steps().iter().any(|s| matches!(s.kind, Kind::Toric(_)))
-        {
+        if !self.is_centered() || !are_all_round || !self.steps().iter().all(Step::is_rotational) {
             return None;
         }
         let search = AxialSearch { lens: self, object_distance_mm };
@@ -98,11 +92,9 @@ impl AxialSearch<'_> {
     fn beam(&self, inside_mm: f64, outside_mm: f64) -> Option<AxialBeam> {
         let mut rays = self.rays(&[inside_mm, outside_mm]);
         let (height_mm, before) = (rays.y_mm[0], rays.direction(0));
-        let steps = self.lens.steps_for(rays.object_z_mm);
         let (mut least_mm, mut limiting_surface, mut stop_radius_mm) = (f64::INFINITY, 0, f64::NAN);
-        for (surface, step) in steps.iter().enumerate() {
-            let plan = Plan::new(&steps[surface..=surface], surface, Vignetting::Off);
-            trace::trace_batch(&plan, Goal::LastSurface, rays.slices());
+        for (surface, step) in self.lens.steps().iter().enumerate() {
+            self.lens.trace_surfaces(surface..surface + 1, &mut rays, Vignetting::Off);
             let openings = step.apertures.iter().map(|aperture| aperture.clearance_mm(0.0, rays.y_mm[0]));
             let clearance_mm = openings.fold(step.semi_aperture - rays.y_mm[0].abs(), f64::min);
             if surface == self.lens.stop() {

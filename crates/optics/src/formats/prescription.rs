@@ -4,7 +4,12 @@ use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Aperture, CoordinateBreak, Field, Glass, ImageSurface, Interface, Lens, LensFile, OpticsError, Shape, Surface,
+    Aperture, CoordinateBreak, DiffractiveSurface, Glass, ImageSurface, Interface, Lens, OpticsError, Shape, Surface,
+};
+
+use super::{
+    lens_file::{Field, LensFile},
+    text_error::TextError,
 };
 
 /// A lens as it stands in a file.
@@ -23,6 +28,9 @@ struct Prescription {
     /// Openings and obscurations beside the round rims.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     apertures: Vec<Aperture>,
+    /// Gratings and diffractive surfaces.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    diffractive: Vec<DiffractiveSurface>,
     /// Left out for a flat film.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     image_radius_mm: Option<f64>,
@@ -53,8 +61,10 @@ struct Row {
     shape: Shape,
     #[serde(default, skip_serializing_if = "is_false")]
     stop: bool,
+    #[serde(default, skip_serializing_if = "is_false")]
+    mirror: bool,
     semi_aperture_mm: f64,
-    /// Left out for air.
+    /// Left out for air. Behind a mirror it is that before it.
     #[serde(default, skip_serializing_if = "is_air")]
     medium: Glass,
     thickness_mm: f64,
@@ -78,30 +88,19 @@ fn is_air(glass: &Glass) -> bool {
     *glass == Glass::Air
 }
 
-/// What is wrong with the text of a lens file, and on which line where that is known.
-pub(crate) struct TextError {
-    pub(crate) line: Option<usize>,
-    pub(crate) reason: String,
-}
-
-impl From<OpticsError> for TextError {
-    fn from(error: OpticsError) -> Self {
-        Self { line: None, reason: error.to_string() }
-    }
-}
-
 /// Reads a lens from the text of our own file.
 pub(crate) fn lens_from_ron(text: &str) -> Result<Lens, TextError> {
     file_from_ron(text).map(|file| file.lens)
 }
 
 /// Reads a lens and its use from the text of our own file.
-pub(crate) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
+pub(super) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
     let prescription: Prescription = ron_options()
         .from_str(text)
         .map_err(|error| TextError { line: Some(error.span.start.line), reason: error.code.to_string() })?;
     let stops: Vec<usize> = (0..prescription.surfaces.len()).filter(|&i| prescription.surfaces[i].stop).collect();
     let &[stop] = stops.as_slice() else { return Err(OpticsError::Stops { n_stops: stops.len() }.into()) };
+    let mirrors: Vec<usize> = (0..prescription.surfaces.len()).filter(|&i| prescription.surfaces[i].mirror).collect();
     let mut interfaces = Vec::with_capacity(prescription.surfaces.len());
     for (surface, row) in prescription.surfaces.into_iter().enumerate() {
         let curvature_per_mm = curvature_per_mm(surface, "radius_mm", row.radius_mm)?;
@@ -112,7 +111,8 @@ pub(crate) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
     let image_surface = ImageSurface { curvature_per_mm, conic: prescription.image_conic };
     let lens =
         Lens::new_with_apertures(prescription.name, prescription.source, interfaces, stop, prescription.apertures)?;
-    let lens = lens.with_object_medium(prescription.object_medium)?;
+    let lens = lens.with_object_medium(prescription.object_medium)?.with_mirrors(mirrors)?;
+    let lens = lens.with_diffractive(prescription.diffractive)?;
     let lens = lens.with_moves(prescription.moves)?.with_image_surface(image_surface)?;
     let positive = |key: &str, found: Option<f64>| match found.filter(|mm| !(mm.is_finite() && *mm > 0.0)) {
         Some(found) => Err(TextError { line: None, reason: format!("{key} is {found}, expected a number above 0") }),
@@ -168,6 +168,7 @@ impl Lens {
             radius_mm: radius_mm(interface.surface.curvature_per_mm),
             shape: interface.surface.shape.clone(),
             stop: i == self.stop(),
+            mirror: self.is_mirror(i),
             semi_aperture_mm: interface.surface.semi_aperture_mm,
             medium: interface.medium_after.clone(),
             thickness_mm: interface.thickness_after_mm,
@@ -179,6 +180,7 @@ impl Lens {
             surfaces: self.interfaces().iter().enumerate().map(row).collect(),
             moves: self.moves().to_vec(),
             apertures: self.apertures().to_vec(),
+            diffractive: self.diffractive().to_vec(),
             image_radius_mm: radius_mm(self.image_surface().curvature_per_mm),
             image_conic: self.image_surface().conic,
             film_distance_mm: None,

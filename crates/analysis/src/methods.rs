@@ -1,0 +1,224 @@
+//! A world rendered both ways: rays from the film against the view blurred by point spread functions.
+
+mod fit;
+
+use std::sync::Arc;
+
+use dioptric_optics::glam::DVec2;
+use dioptric_pipeline::{
+    BandSampling, Camera, Irradiance, KeptCamera, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, RenderEffort,
+    RenderMethod, Rendering, SceneSource, display::LinearRgb,
+};
+use dioptric_psf::{LensImage, LensImageModel};
+use dioptric_spectrum::{Bands, Cancel};
+use ndarray::{Array2, Zip};
+use serde::Serialize;
+
+pub use self::fit::Fit;
+use self::fit::fit;
+
+/// A picture of a world both ways, and how they differ.
+#[derive(Clone, Debug, Serialize)]
+pub struct MethodComparison {
+    /// What is pictured.
+    pub name: String,
+    /// Samples a pixel of the rays from the film, and of the view that is blurred.
+    pub effort: RenderEffort,
+    /// The share of pixels in the band of depth edges: those that the blur of an edge reaches.
+    pub edge_fraction: f64,
+    /// A row a band.
+    pub rows: Vec<MethodRow>,
+    /// The picture by rays from the film as an observer sees it, lux.
+    #[serde(skip)]
+    pub backward: LinearRgb,
+    /// The view blurred.
+    #[serde(skip)]
+    pub forward: LinearRgb,
+    /// Where the band of depth edges is.
+    #[serde(skip)]
+    pub is_edge: Array2<bool>,
+}
+
+/// How two pictures of a band differ: forward less backward.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct MethodRow {
+    /// The center of the band, nm.
+    pub wavelength_nm: f64,
+    /// The difference of the totals, as a share.
+    pub total: f64,
+    /// One standard error of it, from the noise of the rays from the film.
+    pub total_error: f64,
+    /// The mean absolute difference of pixels off depth edges, as a share of the mean of the picture.
+    pub off_edges: f64,
+    /// The same in the band of depth edges; none where there are no edges.
+    pub edge_band: Option<f64>,
+    /// The mean absolute difference that the noise of the rays from the film makes alone.
+    pub noise: f64,
+    /// What moves and blurs the one picture into the other, off depth edges.
+    #[serde(flatten)]
+    pub fit: Fit,
+}
+
+/// A step of depth between neighbors, as a share of the nearer, that is an edge and no slope.
+const EDGE_STEP: f32 = 0.03;
+
+impl MethodComparison {
+    /// Renders the world of a camera both ways, on bands of one wavelength each.
+    ///
+    /// # Errors
+    /// When the scene is no world, or as [`KeptCamera::capture`].
+    pub fn of(camera: &Camera, progress: &dyn Progress, cancel: &Cancel) -> Result<Self, PipelineError> {
+        let SceneSource::World(spec) = &camera.scene.source else {
+            let reason = "it is no world, expected 'source: World((file: ...))'".to_owned();
+            return Err(PipelineError::Unsuitable { what: "scene", reason });
+        };
+        let effort = spec.effort;
+        let by = |method| {
+            KeptCamera::new(camera.clone()).with(|camera| {
+                if let SceneSource::World(spec) = &mut camera.scene.source {
+                    (spec.method, spec.bands) = (method, BandSampling::Center);
+                }
+            })
+        };
+        let (forward, backward) = (by(RenderMethod::Forward), by(RenderMethod::Backward));
+        let blurred = forward.irradiance(progress, cancel)?;
+        let render = backward.world_render(progress, cancel)?;
+        let mut renderer = render.renderer()?;
+        render.refine(&mut renderer, effort, progress, cancel, &mut |_| Ok(true))?;
+        let z_m = render.auxiliary(cancel)?.z_m;
+        let is_edge = edge_band(&z_m, &*forward.model(progress, cancel)?, blurred.pitch_um());
+        Self::new(&camera.name, effort, (&blurred, &renderer.rendering()), is_edge)
+    }
+
+    fn new(
+        name: &str,
+        effort: RenderEffort,
+        (forward, backward): (&Arc<Irradiance>, &Rendering),
+        is_edge: Array2<bool>,
+    ) -> Result<Self, PipelineError> {
+        let mut rows = Vec::new();
+        let grid = backward.picture.grid();
+        for (band, &wavelength_nm) in grid.centers_nm().iter().enumerate() {
+            let (truth, error) = (&backward.picture.planes()[band], &backward.standard_error.planes()[band]);
+            rows.push(MethodRow::of(wavelength_nm, &*forward.band(band)?, (truth, error), &is_edge));
+        }
+        let n_edge = is_edge.iter().filter(|&&is| is).count();
+        Ok(Self {
+            name: name.to_owned(),
+            effort,
+            edge_fraction: n_edge as f64 / is_edge.len() as f64,
+            rows,
+            backward: LinearRgb::of_image(&backward.picture),
+            forward: forward.summary.seen.clone(),
+            is_edge,
+        })
+    }
+}
+
+impl MethodComparison {
+    /// Returns the rows as a table: a line a band.
+    pub fn table(&self) -> String {
+        let mut text = "wavelength_nm,total,total_error,off_edges,edge_band,noise,gain,right_px,down_px,magnification,\
+                        blur_px2,blur_error_px2\n"
+            .to_owned();
+        for row in &self.rows {
+            let MethodRow { wavelength_nm, total, total_error, off_edges, edge_band, noise, fit } = row;
+            let band = edge_band.map_or_else(String::new, |share| format!("{share:.5}"));
+            text += &format!(
+                "{wavelength_nm},{total:.5},{total_error:.5},{off_edges:.5},{band},{noise:.5},{:.5},{:.4},{:.4},{:.6},{:.4},{:.4}\n",
+                fit.gain, fit.right_px, fit.down_px, fit.magnification, fit.blur_px2, fit.errors[4]
+            );
+        }
+        text
+    }
+}
+
+impl MethodRow {
+    fn of(
+        wavelength_nm: f64,
+        forward: &Array2<f32>,
+        (backward, error): (&Array2<f32>, &Array2<f32>),
+        is_edge: &Array2<bool>,
+    ) -> Self {
+        let sum = |plane: &Array2<f32>| plane.iter().map(|&v| f64::from(v)).sum::<f64>();
+        let (of_backward, n) = (sum(backward), backward.len() as f64);
+        let mean = of_backward / n;
+        // Sums of absolute differences and numbers of pixels, off edges and in their band.
+        let mut zones = [[0.0; 2]; 2];
+        Zip::from(forward).and(backward).and(is_edge).for_each(|&f, &b, &is_edge| {
+            let zone = &mut zones[usize::from(is_edge)];
+            zone[0] += (f64::from(f) - f64::from(b)).abs();
+            zone[1] += 1.0;
+        });
+        let share = |[sum, n]: [f64; 2]| if n > 0.0 { sum / n / mean } else { 0.0 };
+        let variance: f64 = error.iter().map(|&v| f64::from(v).powi(2)).sum();
+        Self {
+            wavelength_nm,
+            total: sum(forward) / of_backward - 1.0,
+            total_error: variance.sqrt() / of_backward,
+            off_edges: share(zones[0]),
+            edge_band: (zones[1][1] > 0.0).then(|| share(zones[1])),
+            // The mean of a normal number's absolute value is √(2/π) of its deviation.
+            noise: std::f64::consts::FRAC_2_PI.sqrt() * sum(error) / n / mean,
+            fit: fit(forward, (backward, error), is_edge),
+        }
+    }
+}
+
+/// Returns the pixels that the blur at a depth edge reaches: that of the more blurred side, and one more.
+fn edge_band(z_m: &Array2<f32>, model: &LensImageModel, pitch_um: f64) -> Array2<bool> {
+    let (far, near) = model.dioptres();
+    let radius_px = |z_m: f32| {
+        let dioptres = (1.0 / f64::from(z_m)).clamp(far, near);
+        1e3 * model.blur_radius_mm(DVec2::ZERO, dioptres, REFERENCE_WAVELENGTH_NM).abs() / pitch_um
+    };
+    let (rows, columns) = z_m.dim();
+    let mut is_edge = Array2::from_elem((rows, columns), false);
+    let mut mark = |(row, column): (usize, usize), reach_px: f64| {
+        let reach = reach_px.ceil() as isize;
+        for down in -reach..=reach {
+            for right in -reach..=reach {
+                let at = (row.checked_add_signed(down), column.checked_add_signed(right));
+                let (Some(r), Some(c)) = at else { continue };
+                if ((down * down + right * right) as f64) <= reach_px * reach_px && r < rows && c < columns {
+                    is_edge[(r, c)] = true;
+                }
+            }
+        }
+    };
+    for row in 0..rows {
+        for column in 0..columns {
+            let here = z_m[(row, column)];
+            for next in [(row + 1, column), (row, column + 1)].into_iter().filter(|&(r, c)| r < rows && c < columns) {
+                let there = z_m[next];
+                let is_step =
+                    (here - there).abs() > EDGE_STEP * here.min(there) || here.is_finite() != there.is_finite();
+                if is_step {
+                    let reach_px = 1.5 + radius_px(here).max(radius_px(there));
+                    mark((row, column), reach_px);
+                }
+            }
+        }
+    }
+    is_edge
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_told_apart_by_place() {
+        let truth = Array2::from_shape_fn((20, 30), |(r, c)| 2.0 + ((r * 3 + c * 5) % 7) as f32 / 7.0);
+        let error = Array2::from_elem((20, 30), 0.01_f32);
+        let is_edge = Array2::from_shape_fn((20, 30), |(_, c)| (10..15).contains(&c));
+        let mean = truth.iter().map(|&v| f64::from(v)).sum::<f64>() / 600.0;
+        // Off by 1 % of the mean off the edges, and by 5 % in their band.
+        let off = |is: bool| (if is { 0.05 * mean } else { 0.01 * mean }) as f32;
+        let forward = Zip::from(&truth).and(&is_edge).map_collect(|&v, &is| v + off(is));
+        let row = MethodRow::of(550.0, &forward, (&truth, &error), &is_edge);
+        // Single precision.
+        assert!((row.off_edges - 0.01).abs() < 1e-5 && (row.edge_band.unwrap() - 0.05).abs() < 1e-5, "{row:?}");
+        assert!((row.total - (0.01 * 5.0 + 0.05) / 6.0).abs() < 1e-5, "{row:?}");
+    }
+}

@@ -1,0 +1,68 @@
+//! A world rendered both ways through a real lens.
+#![expect(clippy::unwrap_used, reason = "a test that cannot set up its files fails")]
+
+use std::fs;
+
+use dioptric_analysis::MethodComparison;
+use dioptric_pipeline::{Camera, Silent};
+use dioptric_spectrum::Cancel;
+
+/// A wall that glows 1.5 m before the camera.
+const WORLD: &str = r#"
+Film "rgb" "integer xresolution" 120 "integer yresolution" 90
+LookAt 0 0 0  0 0 1  0 1 0
+Camera "perspective" "float fov" 9
+WorldBegin
+AttributeBegin
+AreaLightSource "diffuse" "spectrum L" [ 400 1 700 2 ] "bool twosided" true
+Shape "trianglemesh" "integer indices" [ 0 1 2 0 2 3 ] "point3 P" [ -1 -1 1.5  -1 1 1.5  1 1 1.5  1 -1 1.5 ]
+AttributeEnd
+"#;
+
+/// A brighter bar before the left half of it.
+const BAR: &str = r#"
+AttributeBegin
+AreaLightSource "diffuse" "spectrum L" [ 400 3 700 3 ] "bool twosided" true
+Shape "trianglemesh" "integer indices" [ 0 1 2 0 2 3 ] "point3 P" [ -.03 -1 1.2  -.03 1 1.2  -.015 1 1.2  -.015 -1 1.2 ]
+AttributeEnd
+"#;
+
+const CAMERA: &str = r#"(
+    name: "both ways",
+    lens: BuiltIn("dgauss-50mm"),
+    stop: FNumber(5.0),
+    focus: DistanceMm(1450.0),
+    film: Pixels(columns: 40, rows: 30, pitch_um: 150.0),
+    sensor: BuiltIn("nikon-d5100"),
+    scene: (source: World((file: "wall.pbrt", effort: Samples(256)))),
+    wavelengths: ListNm([450.0, 550.0, 650.0]),
+)"#;
+
+fn compare(world: &str) -> MethodComparison {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("wall.pbrt"), world).unwrap();
+    let camera = Camera::parse(CAMERA, &folder.path().join("camera.ron")).unwrap();
+    MethodComparison::of(&camera, &Silent, &Cancel::new()).unwrap()
+}
+
+#[test]
+fn even_wall_is_the_same_both_ways() {
+    let found = compare(WORLD);
+    assert_eq!(found.edge_fraction, 0.0);
+    for row in &found.rows {
+        // 0.3 % is what is asked of light that no rim takes; the rendering's noise stands beside it.
+        assert!(row.total.abs() < 0.003 + 4.0 * row.total_error, "{row:?}");
+        assert!(row.off_edges < 0.003 + 2.0 * row.noise, "{row:?}");
+    }
+}
+
+#[test]
+fn bar_before_a_wall_differs_at_its_edges_alone() {
+    let found = compare(&[WORLD, BAR].concat());
+    assert!((0.05..0.9).contains(&found.edge_fraction), "{}", found.edge_fraction);
+    for row in &found.rows {
+        // What is asked off edges, and in their band.
+        assert!(row.off_edges < 0.01 + 2.0 * row.noise, "{row:?}");
+        assert!(row.edge_band.unwrap() < 0.06 + 2.0 * row.noise, "{row:?}");
+    }
+}

@@ -1,0 +1,20 @@
+//! Options of every command.
+
+use clap::Args;
+
+/// Options of every command.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct Common {
+    /// Prints numbers as JSON
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// Uses N threads [default: one a core]; results do not depend on it
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+    /// Draws all noise from this seed [default: the camera file's, or 1]
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Prints nothing but errors and what was asked for
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+}

@@ -1,0 +1,281 @@
+//! `dioptric render`: a world seen by a camera, ray by ray from its film.
+
+use std::{
+    fs, process,
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context, bail};
+use dioptric_analysis::{Run, RunReport};
+use dioptric_pipeline::{
+    Camera, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PipelineError, Progress, RenderEffort,
+    Rendering, RenderingSummary, SceneSource, SceneSpec, SensorOptions, SensorSpec, Silent, Stage, Staged, StopSpec,
+    WavelengthSpec, WorldRender, WorldSpec, with_exposure_s, write_json, write_seen_png,
+};
+use dioptric_report::write_run;
+use dioptric_spectrum::{Cancel, WavelengthGrid};
+use serde::Serialize;
+
+use crate::{
+    args::Common,
+    lens::tell,
+    render_args::RenderArgs,
+    run::{Clock, parse_size, stem_of, summary},
+    terminal::{guard, guarded, print, print_json, remark},
+};
+
+/// The name of a checkpoint.
+const STATE: &str = "render.state";
+/// Checkpoints are written at least so far apart.
+const BETWEEN_CHECKPOINTS: Duration = Duration::from_secs(10);
+
+/// The report of a run, with what is known of the rendering.
+#[derive(Serialize)]
+struct Report {
+    #[serde(flatten)]
+    run: Option<RunReport>,
+    rendering: RenderingSummary,
+}
+
+pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()> {
+    let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
+    let kept = KeptCamera::new(camera_of(arguments, common)?);
+    kept.camera().validate()?;
+    let world = kept.world(&clock, &cancel)?;
+    tell(world.notes(), common);
+    let mut camera = kept.camera().clone();
+    let has_lens = arguments.lens.is_some() || arguments.camera.is_some();
+    let own = world.cameras().first();
+    let own_has_lens = match own {
+        Some(own) if arguments.camera.is_none() => camera.take_from_world(own)?,
+        None if !has_lens => bail!("{}: has no camera, expected one, or --lens", arguments.world.display()),
+        _ => false,
+    };
+    if !has_lens && !own_has_lens {
+        let (Some(own), SceneSource::World(spec)) = (own, &camera.scene.source) else {
+            bail!("{}: has no camera, expected one, or --lens", arguments.world.display());
+        };
+        let grid = camera.wavelengths.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
+        let render = WorldRender::of_own_camera(world.clone(), own, spec, grid)?;
+        let render = cropped(render, arguments)?;
+        return render_without_sensor(arguments, common, (&render, &clock, &cancel), &|rendering| {
+            RenderingSummary::of(rendering, &world, spec)
+        });
+    }
+    change_lens(&mut camera, arguments);
+    change_film(&mut camera, arguments)?;
+    camera.focus = match arguments.place.focus() {
+        Some(focus) => focus,
+        // What stands ahead in the middle.
+        None if arguments.lens.is_some() => camera.focus_ahead(&world)?,
+        None => camera.focus,
+    };
+    let kept = kept.with(|own| *own = camera);
+    let render = kept.world_render(&clock, &cancel)?;
+    if let (Some(_), SceneSource::World(spec)) = (&arguments.crop, &kept.camera().scene.source) {
+        let render = cropped(render, arguments)?;
+        return render_without_sensor(arguments, common, (&render, &clock, &cancel), &|rendering| {
+            RenderingSummary::of(rendering, &world, spec)
+        });
+    }
+    let rendering = refine(arguments, (&render, &clock, &cancel))?;
+    finish(arguments, common, (&kept, &clock, &cancel), (&render, &rendering))
+}
+
+/// Returns the part that is asked for.
+fn cropped(render: WorldRender, arguments: &RenderArgs) -> anyhow::Result<WorldRender> {
+    let Some(text) = &arguments.crop else { return Ok(render) };
+    let numbers: Option<Vec<usize>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    let Some([x, y, width, height]) = numbers.and_then(|numbers| <[usize; 4]>::try_from(numbers).ok()) else {
+        bail!("--crop is '{text}', expected X,Y,W,H, as 100,80,64,48");
+    };
+    Ok(render.cropped((x, y), (width, height))?)
+}
+
+/// Returns the camera of the file or the demo before the world, with what the command line changes but for lens and film.
+fn camera_of(arguments: &RenderArgs, common: &Common) -> anyhow::Result<Camera> {
+    let mut camera = arguments.camera.as_deref().map_or_else(Camera::demo, Camera::read)?;
+    let size = arguments.pixels.as_deref().map(parse_size).transpose()?;
+    let spec = WorldSpec {
+        unit_m: arguments.unit_m,
+        effort: effort(arguments),
+        size,
+        paths: arguments.bounces.map_or_else(LightPaths::default, LightPaths::UpTo),
+        seed: common.seed.unwrap_or(1),
+        ..WorldSpec::of_file(arguments.world.clone())
+    };
+    camera.scene = SceneSpec {
+        source: SceneSource::World(spec),
+        field_of_view_deg: arguments.fov_deg,
+        ..SceneSpec::of_file(arguments.world.clone())
+    };
+    if arguments.camera.is_none() {
+        camera.name = stem_of(&arguments.world);
+    }
+    camera.seed = common.seed.unwrap_or(camera.seed);
+    if let Some(list) = arguments.bands.nm()? {
+        camera.wavelengths = WavelengthSpec::ListNm(list);
+    }
+    if let Some(sensor) = &arguments.sensor {
+        camera.sensor = SensorSpec::named(sensor);
+    }
+    if let Some(time_s) = arguments.exposure_s {
+        camera.exposure = with_exposure_s(camera.exposure, time_s);
+    }
+    let options = SensorOptions { white: arguments.white.clone(), ..SensorOptions::default() };
+    options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing)?;
+    Ok(camera)
+}
+
+fn effort(arguments: &RenderArgs) -> RenderEffort {
+    match (arguments.samples, arguments.noise, arguments.seconds) {
+        (Some(n), ..) => RenderEffort::Samples(n),
+        (None, Some(noise), _) => RenderEffort::Noise(noise),
+        // Time ends it.
+        (None, None, Some(_)) => RenderEffort::Samples(1 << 24),
+        (None, None, None) => RenderEffort::default(),
+    }
+}
+
+fn change_lens(camera: &mut Camera, arguments: &RenderArgs) {
+    if let Some(lens) = &arguments.lens {
+        camera.lens = LensSpec::named(lens);
+        camera.stop = StopSpec::AsGiven;
+        camera.lens_reading = LensReadOptions::default();
+    }
+    arguments.state.reading.change(&mut camera.lens_reading);
+    camera.stop = arguments.state.stop().unwrap_or(camera.stop);
+    arguments.state.movements.change(&mut camera.movements);
+    if let Some(kind) = arguments.diffraction {
+        camera.diffraction = kind.into();
+    }
+}
+
+/// Changes the pixels of the film; its width stays unless another is given.
+fn change_film(camera: &mut Camera, arguments: &RenderArgs) -> anyhow::Result<()> {
+    let size = arguments.pixels.as_deref().map(parse_size).transpose()?;
+    camera.film = match (camera.film, size, arguments.film_width_mm) {
+        (film, None, None) => film,
+        (FilmSpec::Pixels { columns, pitch_um, .. }, Some(size), width_mm) => {
+            pixels(size, width_mm.unwrap_or(1e-3 * pitch_um * columns as f64))
+        }
+        (FilmSpec::Pixels { columns, rows, .. }, None, Some(width_mm)) => pixels((columns, rows), width_mm),
+        (_, Some(size), Some(width_mm)) => pixels(size, width_mm),
+        // The view of the world has the pixels asked for.
+        (film @ FilmSpec::Scene, Some(_), None) => film,
+        _ => bail!("--pixels and --film-width-mm go together, unless the camera has a film of its own"),
+    };
+    Ok(())
+}
+
+fn pixels((columns, rows): (usize, usize), width_mm: f64) -> FilmSpec {
+    FilmSpec::Pixels { columns, rows, pitch_um: 1e3 * width_mm / columns as f64 }
+}
+
+/// What a rendering is, and who follows it.
+type Job<'a> = (&'a WorldRender, &'a Clock, &'a Cancel);
+
+/// Renders pass by pass, and keeps what there is every now and then.
+fn refine(arguments: &RenderArgs, (render, clock, cancel): Job<'_>) -> anyhow::Result<Rendering> {
+    let (began, effort) = (Instant::now(), effort(arguments));
+    let out = &arguments.out;
+    fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
+    let (state, identity) = (out.join(STATE), render.identity(effort));
+    guard(state.with_extension(format!("{}.partial", process::id())));
+    let mut renderer = render.renderer()?;
+    if arguments.resume && state.exists() {
+        renderer.resume(&state, &identity)?;
+    }
+    let mut saved: Option<Instant> = None;
+    render.refine(&mut renderer, effort, clock, cancel, &mut |renderer| {
+        let elapsed = began.elapsed();
+        let is_over = arguments.seconds.is_some_and(|seconds| elapsed.as_secs_f64() >= seconds);
+        if is_over || saved.is_none_or(|at| at.elapsed() >= BETWEEN_CHECKPOINTS) {
+            renderer.save(&state, &identity)?;
+            write_seen_png(&renderer.rendering().picture, &out.join("picture.png"))?;
+            saved = Some(Instant::now());
+        }
+        Ok::<bool, PipelineError>(!is_over)
+    })?;
+    renderer.save(&state, &identity)?;
+    Ok(renderer.rendering())
+}
+
+/// Takes a rendering of irradiance through the sensor to the picture, and writes everything.
+fn finish(
+    arguments: &RenderArgs,
+    common: &Common,
+    (kept, clock, cancel): (&KeptCamera, &Clock, &Cancel),
+    (render, rendering): (&WorldRender, &Rendering),
+) -> anyhow::Result<()> {
+    let out = &arguments.out;
+    kept.keep_irradiance(rendering.picture.clone())?;
+    let staged = guarded(Staged::folder(out)?);
+    let capture = kept.capture(clock, cancel)?;
+    let (model, depth) = (kept.model(clock, cancel)?, kept.depth(clock, cancel)?);
+    clock.at(Stage::Report, 0.0);
+    let run = Run { capture: &capture, model: &model, depth: Some(&depth) };
+    let mut report = write_run(&run, staged.path(), &|| clock.timings())?;
+    // The same samples, with their standard errors.
+    let files = render.write_files(rendering, &render.auxiliary(cancel)?, staged.path())?;
+    report.files.extend(
+        files
+            .into_iter()
+            .filter(|file| !report.files.iter().any(|known| known == file))
+            .map(str::to_owned)
+            .collect::<Vec<_>>(),
+    );
+    report.timings_s = clock.timings();
+    let world = kept.world(&Silent, cancel)?;
+    let SceneSource::World(spec) = &kept.camera().scene.source else { unreachable!("the scene is a world") };
+    let rendering = RenderingSummary::of(rendering, &world, spec);
+    let report = Report { run: Some(report), rendering };
+    write_json(&staged.path().join("report.json"), &report)?;
+    kept.write_resume_file(&capture, staged.path())?;
+    staged.commit()?;
+    tell(&capture.lens.notes, common);
+    if common.json {
+        return print_json(&report);
+    }
+    remark(common.quiet, "");
+    match &report.run {
+        Some(run) if !common.quiet => print(&(samples(&report.rendering) + &summary(run, out))),
+        _ => Ok(()),
+    }
+}
+
+/// Renders what a camera by formula sees, which has no film, or a part of a picture, which is no sensor's: the picture is as
+/// an observer sees it.
+fn render_without_sensor(
+    arguments: &RenderArgs,
+    common: &Common,
+    job: Job<'_>,
+    sum_up: &dyn Fn(&Rendering) -> RenderingSummary,
+) -> anyhow::Result<()> {
+    let (render, clock, cancel) = job;
+    let rendering = refine(arguments, job)?;
+    let out = &arguments.out;
+    let staged = guarded(Staged::folder(out)?);
+    clock.at(Stage::Report, 0.0);
+    render.write_files(&rendering, &render.auxiliary(cancel)?, staged.path())?;
+    write_seen_png(&rendering.picture, &staged.path().join("picture.png"))?;
+    let report = Report { run: None, rendering: sum_up(&rendering) };
+    write_json(&staged.path().join("report.json"), &report)?;
+    staged.commit()?;
+    if common.json {
+        return print_json(&report);
+    }
+    let text = samples(&report.rendering) + &format!("{}, as an observer sees it\n", out.join("picture.png").display());
+    if common.quiet { Ok(()) } else { print(&text) }
+}
+
+fn samples(rendering: &RenderingSummary) -> String {
+    let n = rendering.samples_per_pixel;
+    match &rendering.relative_standard_error {
+        Some(errors) => {
+            let error = 100.0 * errors.iter().sum::<f64>() / errors.len() as f64;
+            format!("{n:.0} samples a pixel, standard error {error:.2} % of the mean in a band\n")
+        }
+        None => format!("{n:.0} samples a pixel\n"),
+    }
+}

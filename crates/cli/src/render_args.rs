@@ -1,0 +1,109 @@
+//! The words of `dioptric render`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use dioptric_pipeline::Diffraction;
+
+use crate::lens_args::{BandArgs, FilmArgs, LensStateArgs};
+
+/// What diffraction rays from the film can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RayDiffraction {
+    /// Rays only
+    None,
+    /// Heisenberg-uncertainty ray bending, γ = 1 (the paper, Freniere)
+    Hurb,
+    /// Heisenberg-uncertainty ray bending, γ = √2 (`Scene3D` since 2015)
+    HurbScene3d,
+    /// Ray bending with constants fitted to Airy's pattern
+    HurbCalibrated,
+}
+
+impl From<RayDiffraction> for Diffraction {
+    fn from(kind: RayDiffraction) -> Self {
+        match kind {
+            RayDiffraction::None => Self::None,
+            RayDiffraction::Hurb => Self::Hurb { gamma: 1.0 },
+            RayDiffraction::HurbScene3d => Self::Hurb { gamma: std::f64::consts::SQRT_2 },
+            RayDiffraction::HurbCalibrated => Self::HurbCalibrated,
+        }
+    }
+}
+
+/// A world, and the camera that renders it.
+#[derive(Debug, Args)]
+pub(crate) struct RenderArgs {
+    /// World to render: .pbrt, .gltf, .glb, .obj or .ply
+    pub(crate) world: PathBuf,
+    /// Camera file, whose scene the world takes the place of [default: the camera of the world's file]
+    #[arg(long, value_name = "CAMERA.ron")]
+    pub(crate) camera: Option<PathBuf>,
+    /// Lens in place of the camera's, a file or the name of a built-in one
+    #[arg(long, value_name = "LENS")]
+    pub(crate) lens: Option<String>,
+    #[command(flatten)]
+    pub(crate) state: LensStateArgs,
+    #[command(flatten)]
+    pub(crate) place: FilmArgs,
+    /// Horizontal field of view of a world whose file states none, degrees
+    #[arg(long, value_name = "A")]
+    pub(crate) fov_deg: Option<f64>,
+    /// Size of the picture in pixels, e.g. 640x480 [default: that of the camera]
+    #[arg(long, value_name = "WxH")]
+    pub(crate) pixels: Option<String>,
+    /// Renders a part of the picture: first column and row, columns and rows; without sensor and report
+    #[arg(long, value_name = "X,Y,W,H")]
+    pub(crate) crop: Option<String>,
+    /// Width of the film, mm [default: that of the camera, or what its field of view needs]
+    #[arg(long, value_name = "W")]
+    pub(crate) film_width_mm: Option<f64>,
+    /// Diffraction at the stop [default: the camera's]
+    #[arg(long, value_name = "KIND", value_enum)]
+    pub(crate) diffraction: Option<RayDiffraction>,
+    #[command(flatten)]
+    pub(crate) bands: BandArgs,
+    /// Sensor, a file or the name of a built-in one
+    #[arg(long, value_name = "SENSOR")]
+    pub(crate) sensor: Option<String>,
+    /// Exposure time, s [default: automatic]
+    #[arg(long, value_name = "T")]
+    pub(crate) exposure_s: Option<f64>,
+    /// What the picture makes white, as for `run` [default: scene, the light on what is seen]
+    #[arg(long, value_name = "WHITE")]
+    pub(crate) white: Option<String>,
+    /// Length of the file's unit, m
+    #[arg(long, value_name = "M", default_value_t = 1.0)]
+    pub(crate) unit_m: f64,
+    /// Follows light over at most so many scatterings: 0 shows what glows, 1 direct light [default: all]
+    #[arg(long, value_name = "N")]
+    pub(crate) bounces: Option<u32>,
+    /// Samples a pixel, rounded up to a multiple of 8 [default: 64, unless noise or time is given]
+    #[arg(long, value_name = "N", conflicts_with_all = ["noise", "seconds"])]
+    pub(crate) samples: Option<u32>,
+    /// Renders until the relative standard error of a pixel over all bands is this, e.g. 0.02
+    #[arg(long, value_name = "R")]
+    pub(crate) noise: Option<f64>,
+    /// Renders for so long, s, or until the noise is reached where that is given too
+    #[arg(long, value_name = "S")]
+    pub(crate) seconds: Option<f64>,
+    /// Goes on from where an earlier rendering into the same folder was stopped; the bits are those of one without a stop
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Folder for the results
+    #[arg(long, short, value_name = "DIR", default_value = "dioptric-render")]
+    pub(crate) out: PathBuf,
+}
+
+/// A world that is rendered both ways.
+#[derive(Debug, Args)]
+pub(crate) struct CompareArgs {
+    /// Camera file whose scene is a world: `scene: (source: World((file: "room.pbrt")))`
+    pub(crate) camera: PathBuf,
+    /// Samples a pixel, of both [default: those of the camera file]
+    #[arg(long, value_name = "N")]
+    pub(crate) samples: Option<u32>,
+    /// Folder for the results
+    #[arg(long, short, value_name = "DIR", default_value = "dioptric-compare")]
+    pub(crate) out: PathBuf,
+}

@@ -1,0 +1,183 @@
+//! `dioptric render` on the built program.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot set up its files fails")]
+
+mod common;
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use common::{CAMERA, check_error, output};
+
+/// A gray wall 2 m before the camera, and a lamp beside the view.
+const WORLD: &str = r#"
+Film "rgb" "integer xresolution" 24 "integer yresolution" 16
+LookAt 0 0 0  0 0 1  0 1 0
+Camera "perspective" "float fov" 20
+WorldBegin
+LightSource "point" "point3 from" [ 0.5 0.5 1 ] "spectrum I" [ 300 1 900 1 ]
+Material "diffuse" "rgb reflectance" [ 0.5 0.5 0.5 ]
+Shape "trianglemesh" "integer indices" [ 0 1 2 0 2 3 ] "point3 P" [ -1 -1 2  -1 1 2  1 1 2  1 -1 2 ]
+"#;
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("wall.pbrt"), WORLD).unwrap();
+    folder
+}
+
+const BANDS: &[&str] = &["--wavelengths-nm", "450,550,650", "--quiet"];
+const LENS: &[&str] = &["--lens", "dgauss-50mm", "--f-number", "5"];
+
+fn render(folder: &Path, options: &[&str]) {
+    output(folder, &[&["render", "wall.pbrt"], LENS, BANDS, options].concat());
+}
+
+fn report(folder: &Path) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
+}
+
+/// All that a rendering has gathered, and the picture that came of it.
+fn bits(folder: &Path) -> [Vec<u8>; 2] {
+    ["render.state", "picture.png"].map(|name| fs::read(folder.join(name)).unwrap())
+}
+
+#[test]
+fn world_ends_in_a_picture_and_a_report() {
+    let folder = folder();
+    render(folder.path(), &["--samples", "16", "-o", "out"]);
+    let out = folder.path().join("out");
+    for name in ["irradiance.exr", "auxiliary.exr", "picture.png", "report.html", "render.state", "kept.ron"] {
+        assert!(out.join(name).exists(), "{name}");
+    }
+    let report = report(&out);
+    assert_eq!(report["rendering"]["samples_per_pixel"], 16.0);
+    // The wall 2 m before the entrance pupil is in focus, and the lens is the one asked for.
+    let focus_mm = report["lens"]["distance_mm"].as_f64().unwrap();
+    assert!((1900.0..2000.0).contains(&focus_mm), "{focus_mm}");
+    // Single precision.
+    assert!((report["scene"]["near_m"].as_f64().unwrap() - 2.0).abs() < 1e-6);
+    // What follows the film starts from its irradiance.
+    output(folder.path(), &["run", "--from", "out", "--seed", "2", "--quiet", "-o", "again"]);
+    assert!(folder.path().join("again/picture.png").exists());
+    output(folder.path(), &["sense", "out/irradiance.exr", "--sensor", "nikon-d100", "--quiet", "-o", "sensed"]);
+}
+
+#[test]
+fn camera_of_the_file_sees_radiance() {
+    let folder = folder();
+    output(folder.path(), &[&["render", "wall.pbrt", "--samples", "16", "-o", "out"], BANDS].concat());
+    let out = folder.path().join("out");
+    assert!(out.join("radiance.exr").exists() && out.join("picture.png").exists());
+    assert!(!out.join("irradiance.exr").exists());
+    // ρ/π I cos θ / d² at the middle of each pixel, with I = 1 W/(sr nm), the lamp 1 m before the wall and 0.5 m aside and up.
+    let half_tan = 10_f64.to_radians().tan();
+    let at = |n: usize, i: usize| (2.0 * (i as f64 + 0.5) / n as f64 - 1.0) * half_tan * 2.0 * n as f64 / 16.0;
+    let radiance = |x: f64, y: f64| {
+        let square = (x - 0.5).powi(2) + (y - 0.5).powi(2) + 1.0;
+        0.5 / std::f64::consts::PI * square.powf(-1.5)
+    };
+    let sum: f64 = (0..24).flat_map(|x| (0..16).map(move |y| radiance(at(24, x), at(16, y)))).sum();
+    // The middle of a pixel stands for its mean to 1e-4, and the lamp leaves no noise but that of places in it.
+    let mean = report(&out)["rendering"]["mean"][1].as_f64().unwrap();
+    assert!((mean / (sum / 384.0) - 1.0).abs() < 1e-3, "{mean} {sum}");
+}
+
+#[test]
+fn part_of_a_picture_has_no_sensor() {
+    let folder = folder();
+    render(folder.path(), &["--samples", "16", "--crop", "5,3,7,4", "-o", "part"]);
+    let out = folder.path().join("part");
+    assert_eq!(report(&out)["rendering"]["size"], serde_json::json!([7, 4]));
+    assert!(out.join("irradiance.exr").exists() && !out.join("raw.png").exists());
+    let beyond = [&["render", "wall.pbrt"], LENS, BANDS, &["--crop", "20,0,9,9"]].concat();
+    check_error(folder.path(), &beyond, &["20,0", "within a picture"]);
+}
+
+#[test]
+fn camera_file_lends_lens_and_sensor() {
+    let folder = folder();
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    let words = ["render", "wall.pbrt", "--camera", "camera.ron", "--samples", "16", "--quiet", "-o", "out"];
+    output(folder.path(), &words);
+    let report = report(&folder.path().join("out"));
+    assert_eq!(report["film"]["columns"], 48);
+    // The same camera with the world as its scene is the same picture.
+    let of_world = r#"scene: (source: World((file: "wall.pbrt", effort: Samples(16)))),"#;
+    let start = CAMERA.find("scene:").unwrap();
+    let end = start + CAMERA[start..].find('\n').unwrap();
+    fs::write(folder.path().join("world.ron"), CAMERA.replace(&CAMERA[start..end], of_world)).unwrap();
+    output(folder.path(), &["run", "world.ron", "--quiet", "-o", "run"]);
+    let picture = |name: &str| fs::read(folder.path().join(name).join("picture.png")).unwrap();
+    assert!(picture("out") == picture("run"));
+}
+
+#[test]
+fn resumed_rendering_has_the_same_bits() {
+    let folder = folder();
+    let read = |name: &str| bits(&folder.path().join(name));
+    render(folder.path(), &["--samples", "64", "-o", "whole"]);
+    render(folder.path(), &["--samples", "32", "-o", "parts", "--threads", "1"]);
+    assert!(read("whole") != read("parts"));
+    render(folder.path(), &["--samples", "64", "--resume", "-o", "parts"]);
+    assert!(read("whole") == read("parts"));
+    // Another world is not continued.
+    fs::write(folder.path().join("wall.pbrt"), WORLD.replace("0.5 0.5 0.5", "0.25 0.5 0.5")).unwrap();
+    let words = [&["render", "wall.pbrt"], LENS, BANDS, &["--samples", "96", "--resume", "-o", "parts"]].concat();
+    check_error(folder.path(), &words, &["render.state", "another rendering"]);
+}
+
+#[test]
+fn killed_rendering_is_continued_to_the_same_bits() {
+    let folder = folder();
+    let words = |out| [&["render", "wall.pbrt"], LENS, BANDS, &["--samples", "1024", "-o", out]].concat();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_dioptric"))
+        .args(words("killed"))
+        .current_dir(folder.path())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    // The first checkpoint is written after the first pass.
+    let (state, began) = (folder.path().join("killed/render.state"), Instant::now());
+    while !state.exists() && began.elapsed() < Duration::from_secs(120) {
+        thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(state.exists());
+    output(folder.path(), &[&words("killed")[..], &["--resume"]].concat());
+    output(folder.path(), &words("whole"));
+    let read = |name: &str| bits(&folder.path().join(name));
+    assert!(read("killed") == read("whole"));
+}
+
+#[test]
+fn noise_and_time_end_a_rendering() {
+    let folder = folder();
+    render(folder.path(), &["--noise", "0.05", "-o", "noise"]);
+    let error = &report(&folder.path().join("noise"))["rendering"];
+    // What is aimed at is the noise of a pixel over all bands: that of one band is at most √3 times as large here.
+    assert!(error["relative_standard_error"][1].as_f64().unwrap() < 0.1, "{error}");
+    render(folder.path(), &["--seconds", "0.1", "-o", "seconds"]);
+    assert!(folder.path().join("seconds/picture.png").exists());
+}
+
+#[test]
+fn bad_worlds_end_in_a_sentence() {
+    let folder = folder();
+    check_error(folder.path(), &["render", "none.pbrt", "--quiet"], &["none.pbrt"]);
+    let pixels = [&["render", "wall.pbrt"], LENS, BANDS, &["--pixels", "24by16"]].concat();
+    check_error(folder.path(), &pixels, &["--pixels is '24by16', expected WxH"]);
+    check_error(folder.path(), &["render", "wall.pbrt", "--lens", "none", "--quiet"], &["none"]);
+    fs::write(folder.path().join("bare.pbrt"), WORLD.replace("Camera \"perspective\" \"float fov\" 20\n", "")).unwrap();
+    check_error(folder.path(), &["render", "bare.pbrt", "--quiet"], &["bare.pbrt", "no camera", "--lens"]);
+    let lens = [&["render", "bare.pbrt"], LENS, BANDS].concat();
+    check_error(folder.path(), &lens, &["field_of_view_deg"]);
+    fs::write(folder.path().join("broken.pbrt"), "WorldBegin\nShape \"sphere\" [\n").unwrap();
+    check_error(folder.path(), &["render", "broken.pbrt", "--quiet"], &["broken.pbrt", "2"]);
+}

@@ -1,0 +1,110 @@
+//! Ruled gratings and diffractive surfaces: phases that surfaces add to light, used in one order.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::OpticsError;
+
+/// What a surface adds to the light that it refracts or reflects: the phase of one diffraction order.
+///
+/// In the order m, with cycles ψ(x, y) of the profile, a ray of wavelength λ leaves with `n₂ d₂ = n₁ d₁ + m λ ∇ψ + Γ N`: the
+/// components along the surface obey the grating equation, and Γ along the normal N is what makes d₂ a unit vector. Its path is
+/// m λ ψ longer. Where no d₂ exists the order does not propagate, and the ray ends as a totally reflected one does. How much
+/// light the order has is not worked out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DiffractiveSurface {
+    /// The surface, counted from 0.
+    pub surface: usize,
+    /// The order: 1 deflects light towards where the phase grows.
+    pub order: i32,
+    /// The phase of the first order.
+    pub profile: PhaseProfile,
+}
+
+/// A phase as a function of x and y on the vertex plane of a surface, in its own frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum PhaseProfile {
+    /// Straight grooves that are equidistant on the vertex plane.
+    Grating {
+        /// Grooves per mm along x and along y.
+        lines_per_mm: [f64; 2],
+    },
+    /// Rings: the phase is the sum of `coefficients_rad[i] ρ^(2i + 2)`, ρ the distance from the axis over a radius.
+    Rings {
+        /// The radius at which ρ is 1, mm.
+        radius_mm: f64,
+        /// Coefficients of ρ², ρ⁴ and on, radians.
+        coefficients_rad: Vec<f64>,
+    },
+}
+
+impl PhaseProfile {
+    /// Returns the phase at a place, in cycles.
+    pub(crate) fn cycles_at(&self, place_mm: DVec2) -> f64 {
+        match self {
+            Self::Grating { lines_per_mm } => DVec2::from_array(*lines_per_mm).dot(place_mm),
+            Self::Rings { radius_mm, coefficients_rad } => {
+                let square = place_mm.length_squared() / (radius_mm * radius_mm);
+                coefficients_rad.iter().rev().fold(0.0, |sum, a| (sum + a) * square) / TAU
+            }
+        }
+    }
+
+    /// Returns the gradient of the phase at a place, cycles/mm.
+    pub(crate) fn gradient_per_mm(&self, place_mm: DVec2) -> DVec2 {
+        match self {
+            Self::Grating { lines_per_mm } => DVec2::from_array(*lines_per_mm),
+            Self::Rings { radius_mm, coefficients_rad } => {
+                let square = place_mm.length_squared() / (radius_mm * radius_mm);
+                let terms = coefficients_rad.iter().enumerate().rev();
+                let derivative = terms.fold(0.0, |sum, (i, a)| sum * square + (i + 1) as f64 * a);
+                place_mm * (2.0 * derivative / (radius_mm * radius_mm) / TAU)
+            }
+        }
+    }
+
+    /// Returns the paraxial power for each mm of path that a cycle adds, 1/mm²: what it takes from n u over the height.
+    pub(crate) fn power_of_path(&self) -> f64 {
+        match self {
+            Self::Grating { .. } => 0.0,
+            Self::Rings { radius_mm, coefficients_rad } => {
+                let square = coefficients_rad.first().copied().unwrap_or(0.0);
+                -square / (PI * radius_mm * radius_mm)
+            }
+        }
+    }
+
+    /// Whether the phase depends on the distance from the axis alone.
+    pub(crate) fn is_rotational(&self) -> bool {
+        match self {
+            Self::Grating { lines_per_mm } => *lines_per_mm == [0.0; 2],
+            Self::Rings { .. } => true,
+        }
+    }
+}
+
+impl DiffractiveSurface {
+    /// Checks the numbers, for a lens of this many surfaces.
+    pub(crate) fn check(&self, n_surfaces: usize) -> Result<(), OpticsError> {
+        let surface = self.surface;
+        let wrong = |key, found, expected| Err(OpticsError::Surface { surface, key, found, expected });
+        if surface >= n_surfaces {
+            return wrong("diffractive surface", surface as f64, "a surface that the lens has, counted from 0");
+        }
+        let numbers: &[f64] = match &self.profile {
+            PhaseProfile::Grating { lines_per_mm } => lines_per_mm,
+            PhaseProfile::Rings { radius_mm, .. } if !(*radius_mm > 0.0 && radius_mm.is_finite()) => {
+                return wrong("radius_mm of a phase", *radius_mm, "a finite number above 0");
+            }
+            PhaseProfile::Rings { coefficients_rad, .. } => coefficients_rad,
+        };
+        match numbers.iter().find(|number| !number.is_finite()) {
+            Some(found) => wrong("number of a phase", *found, "a finite number"),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! Reading a lens file of any format, by its extension.
+
+use std::path::Path;
+
+use crate::{GlassCatalogue, Lens, OpticsError};
+
+use super::{
+    dat,
+    decode::{bytes_of, text_of},
+    deeplens,
+    glasses::Glasses,
+    iset_json,
+    lens_file::{LensFile, ReadOptions},
+    pbrt_list,
+    prescription::file_from_ron,
+    seq,
+    text_error::TextError,
+    zmx,
+};
+
+impl Lens {
+    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx` or `.seq`.
+    ///
+    /// [`LensFile::read`](crate::LensFile::read) tells what else the file says, as where the film lies.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is not what it should be; the message names the file and, where it can, the
+    /// line and key.
+    pub fn read(path: &Path) -> Result<Self, OpticsError> {
+        LensFile::read(path, &ReadOptions::default()).map(|file| file.lens)
+    }
+}
+
+impl LensFile {
+    /// Reads a lens file, by its extension: `.ron` (our own), `.dat` or `.txt`, `.json` (ISET's omni format or
+    /// `DeepLens`), `.zmx` (Zemax) or `.seq` (CODE V).
+    ///
+    /// A glass catalogue beside a `.zmx` file that has its name and the extension `.agf` is read with it.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is not what it should be, or holds what this crate cannot trace; the message
+    /// names the file and, where it can, the line and key.
+    pub fn read(path: &Path, options: &ReadOptions) -> Result<Self, OpticsError> {
+        let companion = path.with_extension("agf");
+        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zmx")) && companion.is_file() {
+            let mut options = options.clone();
+            options.catalogues.push(GlassCatalogue::read(&companion)?);
+            return Self::from_bytes(path, &bytes_of(path)?, &options);
+        }
+        Self::from_bytes(path, &bytes_of(path)?, options)
+    }
+
+    /// Reads a lens file from its bytes; the path tells the format and the name, and is not opened.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn from_bytes(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Self, OpticsError> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let text = text_of(bytes);
+        let glasses = Glasses::new(options);
+        let read = match extension.as_str() {
+            "ron" => file_from_ron(&text),
+            "dat" | "txt" => match pbrt_list::numbers_of(&text) {
+                Some(numbers) => pbrt_list::lens_from_numbers(&numbers, &name).map(Self::of_lens),
+                None => dat::lens_from_dat(&text, &name).map(Self::of_lens),
+            },
+            "json" => json(&text, &name, &glasses),
+            "zmx" => zmx::lens_from_zmx(&text, &name, glasses),
+            "seq" => seq::lens_from_seq(&text, &name, glasses),
+            _ => {
+                let expected = "expected .ron, .dat, .txt, .json, .zmx or .seq";
+                let reason = format!("the extension '.{extension}' is no lens format; {expected}");
+                return Err(OpticsError::Io { path: path.to_owned(), reason });
+            }
+        };
+        read.map_err(|TextError { line, reason }| OpticsError::File { path: path.to_owned(), line, reason })
+    }
+}
+
+fn json(text: &str, name: &str, glasses: &Glasses) -> Result<LensFile, TextError> {
+    let value = serde_json::from_str(text)
+        .map_err(|error| TextError { line: Some(error.line()), reason: format!("not JSON: {error}") })?;
+    if deeplens::is_deeplens(&value) {
+        deeplens::lens_from_deeplens(&value, name, glasses)
+    } else {
+        iset_json::lens_from_omni(&value, name, glasses)
+    }
+}

@@ -1,0 +1,276 @@
+//! Gratings and diffractive surfaces: the grating equation, ideal diffractive lenses, and files.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::f64::consts::{PI, TAU};
+
+use dioptric_optics::{
+    DiffractiveSurface, Glass, Interface, Lens, LensFile, MonoLens, ObjectPoint, PhaseProfile, RayBatch, RayFate,
+    ReadOptions, SeidelSettings, Shape, Surface, Vignetting,
+    analysis::PupilCoordinates,
+    glam::{DVec2, DVec3},
+};
+
+const WAVELENGTH_NM: f64 = 550.0;
+
+/// A single surface between these media with a phase.
+fn single(surface: Surface, indices: [f64; 2], order: i32, profile: PhaseProfile) -> Lens {
+    let [before, after] = indices.map(|index| Glass::Constant { index });
+    let interface = Interface { surface, medium_after: after, thickness_after_mm: 0.0 };
+    let lens = Lens::new("diffractive", "test", vec![interface], 0).unwrap().with_object_medium(before).unwrap();
+    lens.with_diffractive(vec![DiffractiveSurface { surface: 0, order, profile }]).unwrap()
+}
+
+fn ray(lens: &MonoLens, place_mm: DVec2, direction: DVec3) -> RayBatch {
+    let direction = direction.normalize();
+    let mut ray = RayBatch::from_points(&[place_mm.extend(0.0) - direction * 20.0], &[direction]);
+    lens.trace(&mut ray, Vignetting::On);
+    ray
+}
+
+const GRATING: PhaseProfile = PhaseProfile::Grating { lines_per_mm: [70.0, 240.0] };
+const DIRECTIONS: [DVec3; 4] =
+    [DVec3::Z, DVec3::new(0.0, 0.3, 1.0), DVec3::new(0.2, -0.1, 1.0), DVec3::new(-0.5, 0.4, 1.0)];
+
+#[test]
+fn plane_grating_obeys_its_equation() {
+    let lambda_mm = 1e-6 * WAVELENGTH_NM;
+    for order in [-2, -1, 0, 1, 3] {
+        for (indices, is_mirror) in [([1.0, 1.0], false), ([1.5, 1.0], false), ([1.0, 1.7], false), ([1.3, 1.3], true)]
+        {
+            let mut lens = single(Surface::plane(10.0), indices, order, GRATING);
+            if is_mirror {
+                lens = lens.with_mirrors([0]).unwrap();
+            }
+            let lens = lens.at(WAVELENGTH_NM).unwrap();
+            for direction in DIRECTIONS {
+                let place_mm = DVec2::new(1.0, -2.0);
+                let ray = ray(&lens, place_mm, direction);
+                let before = direction.normalize();
+                let expected =
+                    before.truncate() * indices[0] + DVec2::new(70.0, 240.0) * (f64::from(order) * lambda_mm);
+                if expected.length() > indices[1] {
+                    assert_eq!(ray.fate[0], RayFate::TotalReflection { surface: 0 });
+                    continue;
+                }
+                assert!(ray.fate[0].is_in_flight());
+                let after = ray.direction(0);
+                assert!((after.truncate() * indices[1] - expected).length() < 1e-14, "{order} {after}");
+                assert!((after.length() - 1.0).abs() < 1e-15 && (after.z < 0.0) == is_mirror);
+                // 20 mm in the medium before, and the phase at the place.
+                let phase_mm = f64::from(order) * lambda_mm * place_mm.dot(DVec2::new(70.0, 240.0));
+                assert!((ray.opl_mm[0] - 20.0 * indices[0] - phase_mm).abs() < 1e-13);
+            }
+        }
+    }
+}
+
+#[test]
+fn order_that_does_not_propagate_ends() {
+    let fine = PhaseProfile::Grating { lines_per_mm: [0.0, 1500.0] };
+    let lens = single(Surface::plane(10.0), [1.0, 1.0], 1, fine.clone()).at(WAVELENGTH_NM).unwrap();
+    // sin θ = .825 at normal incidence; .825 + .25 is none.
+    assert!(ray(&lens, DVec2::ZERO, DVec3::Z).fate[0].is_in_flight());
+    let steep = DVec3::new(0.0, 0.25, (1.0_f64 - 0.0625).sqrt());
+    assert_eq!(ray(&lens, DVec2::ZERO, steep).fate[0], RayFate::TotalReflection { surface: 0 });
+    // Light that plain refraction would reflect totally leaves in the order that turns it back.
+    let lens = single(Surface::plane(10.0), [1.6, 1.0], -1, fine).at(WAVELENGTH_NM).unwrap();
+    let inside = DVec3::new(0.0, 0.8, 0.6);
+    assert!(ray(&lens, DVec2::ZERO, inside).fate[0].is_in_flight());
+}
+
+#[test]
+fn curved_surfaces_bend_by_their_tangential_phase() {
+    let shapes = [
+        (0.04, Shape::Sphere),
+        (0.04, Shape::Conic { conic: -1.4 }),
+        (0.02, Shape::EvenAsphere { conic: 0.5, coefficients: vec![1e-4, -2e-6] }),
+        (0.02, Shape::OddAsphere { conic: 0.5, coefficients: vec![1e-3, 2e-3, 1e-5] }),
+        (0.02, Shape::Biconic { conic: 0.5, curvature_x_per_mm: -0.03, conic_x: -1.0 }),
+    ];
+    let rings = PhaseProfile::Rings { radius_mm: 5.0, coefficients_rad: vec![-300.0, 80.0, 9.0] };
+    for (curvature_per_mm, shape) in shapes {
+        let surface = Surface { curvature_per_mm, shape, semi_aperture_mm: 8.0 };
+        for profile in [GRATING, rings.clone()] {
+            let lens = single(surface.clone(), [1.0, 1.5], 1, profile.clone()).at(WAVELENGTH_NM).unwrap();
+            for direction in DIRECTIONS {
+                let ray = ray(&lens, DVec2::new(1.5, 2.5), direction);
+                let (p, after) = (ray.point_mm(0), ray.direction(0));
+                assert!((p.z - surface.sag_at_mm(p.x, p.y)).abs() < 1e-12 && (after.length() - 1.0).abs() < 1e-15);
+                let h = 1e-4;
+                let slope = |u: DVec2| {
+                    let at = |s: f64| surface.sag_at_mm(p.x + s * u.x, p.y + s * u.y);
+                    (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h)
+                };
+                let gradient_per_mm = match &profile {
+                    PhaseProfile::Grating { lines_per_mm } => DVec2::from_array(*lines_per_mm),
+                    PhaseProfile::Rings { .. } => {
+                        let s = p.truncate().length_squared() / 25.0;
+                        p.truncate() * (2.0 / 25.0 * (-300.0 + 160.0 * s + 27.0 * s * s) / TAU)
+                    }
+                };
+                let left = after * 1.5 - direction.normalize() - (gradient_per_mm * 1e-6 * WAVELENGTH_NM).extend(0.0);
+                // Along both tangents of the surface nothing is left; slopes by differences are good to 1e-12.
+                for u in [DVec2::X, DVec2::Y] {
+                    let tangent = DVec3::new(u.x, u.y, slope(u));
+                    assert!(left.dot(tangent).abs() < 1e-11, "{surface:?}: {:e}", left.dot(tangent));
+                }
+            }
+        }
+    }
+}
+
+/// The phase of a diffractive lens that is ideal in air at a wavelength: f − √(f² + r²) in waves, by its series.
+fn ideal(focal_mm: f64, radius_mm: f64, wavelength_nm: f64) -> PhaseProfile {
+    let mut binomial = 0.5;
+    let term = |i: i32| {
+        let term = -focal_mm * binomial * (radius_mm / focal_mm).powi(2 * i);
+        binomial *= (0.5 - f64::from(i)) / f64::from(i + 1);
+        term * TAU / (1e-6 * wavelength_nm)
+    };
+    PhaseProfile::Rings { radius_mm, coefficients_rad: (1..=12).map(term).collect() }
+}
+
+#[test]
+fn ideal_diffractive_lens_images_a_far_point_perfectly() {
+    let (focal_mm, radius_mm) = (80.0, 8.0);
+    let lens = single(Surface::plane(radius_mm), [1.0; 2], 1, ideal(focal_mm, radius_mm, WAVELENGTH_NM));
+    assert!(lens.is_rotational());
+    let mono = lens.at(WAVELENGTH_NM).unwrap();
+    let first = mono.first_order();
+    assert!((first.efl_mm / focal_mm - 1.0).abs() < 1e-13 && (first.bfl_mm / focal_mm - 1.0).abs() < 1e-13);
+    let targets: Vec<DVec2> =
+        (0..100).map(|i| 0.8 * f64::from(i).sqrt() * DVec2::from_angle(2.4 * f64::from(i))).collect();
+    let mut rays = mono.rays_towards(&ObjectPoint::Infinite(DVec3::Z), &targets, 0.0, 0.0);
+    mono.trace_to_film(&mut rays, Vignetting::On, focal_mm);
+    for i in 0..rays.len() {
+        assert!(rays.point_mm(i).truncate().length() < 1e-12, "{}", rays.point_mm(i));
+        assert!((rays.opl_mm[i] - rays.opl_mm[0]).abs() < 1e-12);
+    }
+    // Power goes with the wavelength, and with the order.
+    let red = lens.at(700.0).unwrap().first_order().efl_mm;
+    assert!((red * 700.0 / (focal_mm * WAVELENGTH_NM) - 1.0).abs() < 1e-13, "{red}");
+    let third = single(Surface::plane(radius_mm), [1.0; 2], 3, ideal(focal_mm, radius_mm, WAVELENGTH_NM));
+    let third = third.at(WAVELENGTH_NM).unwrap().first_order().efl_mm;
+    assert!((3.0 * third / focal_mm - 1.0).abs() < 1e-13, "{third}");
+    // A ray near the axis meets it where first-order optics says, on a glass surface too.
+    let curved = Surface::sphere(60.0, 4.0);
+    let rings = PhaseProfile::Rings { radius_mm: 4.0, coefficients_rad: vec![-200.0, 30.0] };
+    let mono = single(curved, [1.0, 1.6], 1, rings).at(WAVELENGTH_NM).unwrap();
+    let near = ray(&mono, DVec2::new(0.0, 1e-5), DVec3::Z);
+    let focus_mm = -near.y_mm[0] * near.n[0] / near.m[0];
+    assert!((focus_mm / mono.first_order().bfl_mm - 1.0).abs() < 1e-9, "{focus_mm}");
+    let expected = 0.6 / 60.0 + 200.0 * 1e-6 * WAVELENGTH_NM / (PI * 16.0);
+    assert!((mono.first_order().power_per_mm / expected - 1.0).abs() < 1e-13);
+}
+
+/// A lens of glass with a diffractive front and a grating that reflects behind it.
+fn hybrid() -> Lens {
+    let glass = Glass::Constant { index: 1.5 };
+    let front = Interface { surface: Surface::sphere(60.0, 6.0), medium_after: glass, thickness_after_mm: 4.0 };
+    let back = Interface { surface: Surface::plane(6.0), medium_after: Glass::Air, thickness_after_mm: 20.0 };
+    let mirror =
+        Interface { surface: Surface::sphere(-500.0, 20.0), medium_after: Glass::Air, thickness_after_mm: 0.0 };
+    let lens = Lens::new("hybrid", "test", vec![front, back, mirror], 0).unwrap().with_mirrors([2]).unwrap();
+    let rings = PhaseProfile::Rings { radius_mm: 6.0, coefficients_rad: vec![-150.0, 12.0, 1.0] };
+    let grating = PhaseProfile::Grating { lines_per_mm: [0.0, 200.0] };
+    lens.with_diffractive(vec![
+        DiffractiveSurface { surface: 0, order: 1, profile: rings },
+        DiffractiveSurface { surface: 2, order: -1, profile: grating },
+    ])
+    .unwrap()
+}
+
+#[test]
+fn light_finds_its_way_back_through_gratings() {
+    let lens = hybrid().at(WAVELENGTH_NM).unwrap();
+    let targets: Vec<DVec2> =
+        (0..50).map(|i| 0.7 * f64::from(i).sqrt() * DVec2::from_angle(2.4 * f64::from(i))).collect();
+    let start = lens.rays_towards(&ObjectPoint::Infinite(DVec3::new(0.05, 0.1, 1.0).normalize()), &targets, 0.0, 0.0);
+    let mut rays = start.clone();
+    lens.trace(&mut rays, Vignetting::On);
+    assert_eq!(rays.n_in_flight(), 50);
+    let mut back = RayBatch::with_capacity(50);
+    (0..50).for_each(|i| back.push(rays.point_mm(i) + rays.direction(i) * 5.0, -rays.direction(i), 0.0));
+    let mut in_two = back.clone();
+    let reversed = lens.reversed();
+    reversed.trace(&mut back, Vignetting::On);
+    reversed.trace_to_stop(&mut in_two, Vignetting::On);
+    reversed.trace_from_stop(&mut in_two, Vignetting::On);
+    for i in 0..50 {
+        let beside_mm = (back.point_mm(i) - start.point_mm(i)).cross(start.direction(i)).length();
+        assert!(beside_mm < 1e-11 && (back.direction(i) + start.direction(i)).length() < 1e-13, "{beside_mm:e}");
+        assert!((in_two.direction(i) - back.direction(i)).length() < 1e-13);
+    }
+}
+
+#[test]
+fn gratings_survive_our_own_and_zemax_files() {
+    let file = LensFile { film_distance_mm: Some(30.0), ..LensFile::from(hybrid()) };
+    let again =
+        |name: &str, text: &str| LensFile::from_bytes(name.as_ref(), text.as_bytes(), &ReadOptions::default()).unwrap();
+    assert_eq!(again("lens.ron", &file.to_ron()), file);
+    let zmx = again("lens.zmx", &file.to_zmx().unwrap());
+    assert_eq!(zmx.lens.diffractive(), file.lens.diffractive());
+    assert_eq!(zmx.lens.mirrors(), file.lens.mirrors());
+    let message = file.to_omni_json().unwrap_err().to_string();
+    assert!(message.contains("surface 2 is a mirror"), "{message}");
+    let message = hybrid().seidel(&SeidelSettings::far(0.0)).unwrap_err().to_string();
+    assert!(message.contains("centered and rotationally symmetric"), "{message}");
+}
+
+#[test]
+fn impossible_diffractive_surfaces_are_refused() {
+    let lens = Lens::built_in("dgauss-50mm").unwrap();
+    let at = |surface: usize, profile: PhaseProfile| DiffractiveSurface { surface, order: 1, profile };
+    let message = |list: Vec<DiffractiveSurface>| lens.clone().with_diffractive(list).unwrap_err().to_string();
+    assert!(message(vec![at(99, GRATING)]).contains("expected a surface that the lens has"));
+    assert!(
+        message(vec![at(1, GRATING), at(1, GRATING)]).contains("surface 1 cannot be diffractive: it is named twice")
+    );
+    let rings = |radius_mm: f64, a: f64| PhaseProfile::Rings { radius_mm, coefficients_rad: vec![a] };
+    assert!(message(vec![at(1, rings(0.0, 1.0))]).contains("radius_mm of a phase is 0"));
+    assert!(message(vec![at(1, rings(1.0, f64::NAN))]).contains("number of a phase is NaN"));
+    let round = lens.clone().with_diffractive(vec![at(1, rings(5.0, -3.0))]).unwrap();
+    let message = round.seidel(&SeidelSettings::far(0.0)).unwrap_err().to_string();
+    assert!(message.contains("Seidel sums of diffractive surfaces are not supported"), "{message}");
+}
+
+#[test]
+#[dioptric_golden::needs_shared]
+fn zemax_grating_has_the_diameter_that_opticstudio_stored() {
+    let path = dioptric_golden::shared("data/lenses/more/flat_transmission_grating.zmx").unwrap();
+    let file = LensFile::read(&path, &ReadOptions::default()).unwrap();
+    let lens = file.lens.at(587.0).unwrap();
+    let coordinates = PupilCoordinates::entrance(&lens);
+    let places = [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y];
+    let tan = 10_f64.to_radians().tan();
+    let mut widest_mm = 0.0_f64;
+    for field in [DVec2::ZERO, DVec2::new(0.0, -tan), DVec2::new(-tan, 0.0)] {
+        let point = ObjectPoint::from_field(&lens, field, 0.0);
+        let mut rays = coordinates.rays(&lens, &point, &places);
+        lens.trace_to_film(&mut rays, Vignetting::Off, file.film_distance_mm.unwrap());
+        widest_mm = (0..4).map(|i| rays.point_mm(i).truncate().length()).fold(widest_mm, f64::max);
+    }
+    // The semi-diameter of the image in the file, by rays at the ends of the axes of the pupil of all fields.
+    assert!((widest_mm - 13.319_073_572_664_644).abs() < 1e-6, "{widest_mm}");
+}
+
+#[test]
+#[dioptric_golden::needs_shared]
+fn deeplens_grating_is_read() {
+    let path = dioptric_golden::shared("data/lenses/more/a489_grating.json").unwrap();
+    let file = LensFile::read(&path, &ReadOptions::default());
+    match file {
+        Ok(file) => {
+            let [DiffractiveSurface { order: 1, profile: PhaseProfile::Grating { lines_per_mm: [x, y] }, .. }] =
+                file.lens.diffractive()
+            else {
+                panic!("{:?}", file.lens.diffractive())
+            };
+            // 1000 rad over 3 mm.
+            assert!(*x == 0.0 && (y - 1000.0 / (3.0 * TAU)).abs() < 1e-12, "{x} {y}");
+            assert!(file.notes.iter().any(|note| note.starts_with("DOE: of the grating the first order")));
+        }
+        Err(error) => panic!("{error}"),
+    }
+}

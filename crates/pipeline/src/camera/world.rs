@@ -1,0 +1,118 @@
+//! A three-dimensional world before the camera, as a camera file says it.
+
+use std::path::PathBuf;
+
+use dioptric_backward::{BandSampling, LightPaths};
+use serde::{Deserialize, Serialize};
+
+use super::check::Checker;
+use crate::PipelineError;
+
+/// A three-dimensional world before the camera, and how it is rendered.
+///
+/// The center of the lens's entrance pupil stands where the world's file has its camera, and looks where that does; without
+/// one it stands at the origin and looks along +z.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct WorldSpec {
+    /// The file: `.pbrt`, `.gltf`, `.glb`, `.obj` or `.ply`.
+    pub file: PathBuf,
+    /// How long the file's unit of length is, m.
+    #[serde(default = "one_meter")]
+    pub unit_m: f64,
+    /// How its light comes to the film.
+    #[serde(default)]
+    pub method: RenderMethod,
+    /// When it is rendered well enough.
+    #[serde(default)]
+    pub effort: RenderEffort,
+    /// Columns and rows of the view from the middle of the entrance pupil, which `film: Scene` has too; those of the file's
+    /// camera if left out.
+    #[serde(default)]
+    pub size: Option<(usize, usize)>,
+    /// How far the camera stands before the place of the file's, along its axis, mm.
+    #[serde(default)]
+    pub advance_mm: f64,
+    /// Whether a band is the mean over its width, or the value at its center.
+    #[serde(default)]
+    pub bands: BandSampling,
+    /// How often light may be scattered on its way.
+    #[serde(default)]
+    pub paths: LightPaths,
+    /// The seed of the rendering's samples; that of the sensor's noise is the camera's.
+    #[serde(default = "one")]
+    pub seed: u64,
+}
+
+/// How the light of a world comes to the film.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub enum RenderMethod {
+    /// Rays from the film through the lens into the world: the final picture.
+    #[default]
+    Backward,
+    /// The view from the middle of the entrance pupil, blurred by the lens's point spread functions: the rapid one.
+    Forward,
+}
+
+/// When a rendering is good enough.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub enum RenderEffort {
+    /// After so many samples a pixel, rounded up to whole passes.
+    Samples(u32),
+    /// When the relative standard error of a pixel over all bands is this.
+    Noise(f64),
+}
+
+impl Default for RenderEffort {
+    fn default() -> Self {
+        Self::Samples(64)
+    }
+}
+
+fn one_meter() -> f64 {
+    1.0
+}
+
+fn one() -> u64 {
+    1
+}
+
+impl WorldSpec {
+    /// A world's file, with the defaults for all else.
+    pub fn of_file(file: PathBuf) -> Self {
+        Self {
+            file,
+            unit_m: one_meter(),
+            method: RenderMethod::default(),
+            effort: RenderEffort::default(),
+            size: None,
+            advance_mm: 0.0,
+            bands: BandSampling::default(),
+            paths: LightPaths::default(),
+            seed: one(),
+        }
+    }
+
+    /// Returns the effort of rays from the film, or `None` where the view is blurred instead.
+    pub(crate) fn backward(&self) -> Option<RenderEffort> {
+        (self.method == RenderMethod::Backward).then_some(self.effort)
+    }
+
+    pub(super) fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
+        checker.positive("unit_m", self.unit_m)?;
+        checker.finite("advance_mm", self.advance_mm)?;
+        if let Some((columns, rows)) = self.size {
+            checker.count("size", columns, 1..=65_536)?;
+            checker.count("size", rows, 1..=65_536)?;
+        }
+        match self.effort {
+            RenderEffort::Samples(n) => checker.count("Samples", n as usize, 1..=1 << 24),
+            RenderEffort::Noise(noise) => checker.positive("Noise", noise),
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! A rendering in numbers and as a picture.
+
+use std::path::{Path, PathBuf};
+
+use dioptric_backward::Rendering;
+use dioptric_spectrum::SpectralImage;
+use dioptric_world::World;
+use ndarray::Array2;
+use serde::Serialize;
+
+use crate::{PipelineError, Staged, WorldSpec, display::LinearRgb};
+
+/// A rendering in brief.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RenderingSummary {
+    /// Where the world came from.
+    pub world: PathBuf,
+    /// The unit of its samples.
+    pub unit: &'static str,
+    /// Columns and rows of pixels.
+    pub size: (usize, usize),
+    /// Centers of its bands, nm.
+    pub wavelengths_nm: Vec<f64>,
+    /// The mean of each band.
+    pub mean: Vec<f64>,
+    /// The rms standard error of a pixel in each band, as a share of the band's mean; none after a single pass.
+    pub relative_standard_error: Option<Vec<f64>>,
+    /// Samples a pixel, in the mean.
+    pub samples_per_pixel: f64,
+    /// What of the world's file is not supported, and what stands in its place.
+    pub notes: Vec<String>,
+}
+
+impl RenderingSummary {
+    /// Sums up a rendering of a world.
+    pub fn of(rendering: &Rendering, world: &World, spec: &WorldSpec) -> Self {
+        let picture = &rendering.picture;
+        let n = (picture.rows() * picture.columns()) as f64;
+        let mean_of =
+            |plane: &Array2<f32>, power: i32| plane.iter().map(|&v| f64::from(v).powi(power)).sum::<f64>() / n;
+        let mean: Vec<f64> = picture.planes().iter().map(|plane| mean_of(plane, 1)).collect();
+        let error =
+            |(plane, &mean): (&Array2<f32>, &f64)| if mean > 0.0 { mean_of(plane, 2).sqrt() / mean } else { 0.0 };
+        let errors: Vec<f64> = rendering.standard_error.planes().iter().zip(&mean).map(error).collect();
+        Self {
+            world: spec.file.clone(),
+            unit: picture.quantity().unit(),
+            size: (picture.columns(), picture.rows()),
+            wavelengths_nm: picture.grid().centers_nm().to_vec(),
+            relative_standard_error: errors.iter().any(|&error| error > 0.0).then_some(errors),
+            mean,
+            samples_per_pixel: rendering.n_samples.iter().map(|&n| f64::from(n)).sum::<f64>() / n,
+            notes: world.notes().to_vec(),
+        }
+    }
+}
+
+/// Writes a picture as the standard observer sees it, its brightest per cent white.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_seen_png(picture: &SpectralImage, path: &Path) -> Result<(), PipelineError> {
+    let seen = LinearRgb::of_image(picture).within_gamut();
+    let staged = Staged::file(path)?;
+    let white = seen.level_at(0.99).max(f64::MIN_POSITIVE);
+    let saved = seen.to_srgb(white).save_with_format(staged.path(), image::ImageFormat::Png);
+    saved.map_err(|e| PipelineError::Png { reason: e.to_string() })?;
+    staged.commit()
+}

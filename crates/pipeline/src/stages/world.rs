@@ -1,0 +1,321 @@
+//! Worlds: read, seen from the middle of the entrance pupil, and rendered through the lens.
+
+use std::{fs, path::Path, sync::Arc};
+
+use dioptric_backward::{
+    Auxiliary, BandSampling, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
+    Placement, RenderSettings, Renderer, Rendering, ThinLens, auxiliary, write_auxiliary_exr, write_rendering_exr,
+};
+use dioptric_optics::{Lens, glam::DVec2};
+use dioptric_scene::{Scene, SceneLight, View};
+use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectrumError, WavelengthGrid};
+use dioptric_world::{
+    CameraKind, ReadOptions, World, WorldCamera,
+    glam::{DAffine3, DVec3},
+    read_world,
+};
+
+use super::{
+    IRRADIANCE_FILE, Watch,
+    film::FilmPlace,
+    lens::ResolvedLens,
+    scene::ResolvedScene,
+    spec::{IrradianceInputs, SceneInputs, WorldInputs},
+    world_light::light_on,
+};
+use crate::{
+    Diffraction, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, Stage, WorldSpec,
+};
+
+/// Samples of a pass: as many as spread well, and few enough for a first picture soon.
+const SAMPLES_PER_PASS: u32 = 8;
+/// Passes that noise is judged by.
+const PILOT_PASSES: u32 = 4;
+/// The most passes where noise decides.
+const MOST_PASSES: u32 = 4096;
+
+/// A world as a camera sees it, to be rendered pass by pass.
+#[derive(Clone, Debug)]
+pub struct WorldRender {
+    world: Arc<World>,
+    camera: Camera,
+    bands: Bands,
+    paths: LightPaths,
+    seed: u64,
+    samples_per_pass: u32,
+    identity: String,
+}
+
+/// Reads a world.
+pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, PipelineError> {
+    watch.progress.at(Stage::Scene, 0.0);
+    Ok(read_world(&inputs.file, &ReadOptions { metres_per_unit: inputs.unit_m }, watch.cancel)?)
+}
+
+/// Returns where the middle of the entrance pupil stands, and how it looks.
+pub(super) fn placement(world: &World, spec: &WorldSpec) -> Placement {
+    let of_file = world.cameras().first().map_or(DAffine3::IDENTITY, |camera| camera.world_from_camera);
+    let advance = DAffine3::from_translation(DVec3::Z * 1e-3 * spec.advance_mm);
+    Placement { world_from_camera: of_file * advance }
+}
+
+/// The view of worlds whose file has no camera: columns and rows.
+const SIZE: (usize, usize) = (720, 480);
+
+/// Renders the view from the middle of the entrance pupil: radiance and depth.
+///
+/// Where rays from the film make the picture, the view is but its summary, and one pass does.
+pub(super) fn view(
+    inputs: &SceneInputs,
+    spec: &WorldSpec,
+    world: &Arc<World>,
+    watch: &Watch<'_>,
+) -> Result<ResolvedScene, PipelineError> {
+    let geometry = &inputs.geometry;
+    let of_file = world.cameras().first();
+    let (columns, rows) = spec.size.or(of_file.map(|camera| camera.resolution)).unwrap_or(SIZE);
+    let binning = geometry.quality.scene_binning(columns);
+    let (columns, rows) = ((columns / binning).max(1), (rows / binning).max(1));
+    let fov_deg = geometry.field_of_view_deg.or(of_file.and_then(horizontal_fov_deg));
+    let fov_deg = fov_deg.ok_or_else(|| PipelineError::Unsuitable {
+        what: "field_of_view_deg",
+        reason: format!("missing, and {} has no camera that states an angle; expected degrees", spec.file.display()),
+    })?;
+    let view = View::from_horizontal_fov_deg(fov_deg, columns, rows)?;
+    let wanted = geometry.wavelengths.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
+    let bands = Bands { grid: geometry.quality.bands_of(&wanted)?, sampling: spec.bands };
+    let half_tangents = 0.5 * DVec2::new(columns as f64, rows as f64) / view.focal_px;
+    let pixels = PixelGrid::new(columns, rows);
+    let pinhole = Pinhole { placement: placement(world, spec), pixels, half_tangents, layer: 0 };
+    let (effort, samples_per_pass) = match spec.method {
+        // As few as reach every band.
+        RenderMethod::Backward => (RenderEffort::Samples(1), 1),
+        RenderMethod::Forward => (spec.effort, SAMPLES_PER_PASS),
+    };
+    let world = world.clone();
+    let camera = Camera::Pinhole(pinhole);
+    let (paths, seed) = (spec.paths, spec.seed);
+    let render = WorldRender { world, camera, bands, paths, seed, samples_per_pass, identity: String::new() };
+    let mut renderer = render.renderer()?;
+    let progress = AtStage { progress: watch.progress, stage: Stage::Scene };
+    render.refine(&mut renderer, effort, &progress, watch.cancel, &mut |_| Ok(true))?;
+    let depth = DepthMap::new(auxiliary(&render.world, &render.camera, &reference_band()?.grid, watch.cancel)?.z_m)?;
+    let name = spec.file.file_stem().unwrap_or(spec.file.as_os_str()).to_string_lossy().into_owned();
+    let light = match &inputs.light {
+        Some(stated) => Some(SceneLight { illuminant: stated.clone(), illuminance_lux: None }),
+        None => light_on(&render.world, &pinhole)?,
+    };
+    let radiance = renderer.rendering().picture;
+    let scene = Scene { depth: Some(depth), view: Some(view), light, ..Scene::new(name, radiance) };
+    Ok(ResolvedScene { scene, binning })
+}
+
+/// Returns the angle across the picture of a camera that states one, degrees.
+fn horizontal_fov_deg(camera: &WorldCamera) -> Option<f64> {
+    if !matches!(camera.kind, CameraKind::Perspective { .. }) {
+        return None;
+    }
+    let view = match Camera::from_world(camera, &reference_band().ok()?, &|_| Lens::pinhole(1.0)).ok()? {
+        Camera::Pinhole(view) => view,
+        Camera::ThinLens(lens) => lens.view,
+        Camera::Lens(_) => return None,
+    };
+    Some(2.0 * view.half_tangents.x.atan().to_degrees())
+}
+
+pub(super) fn reference_band() -> Result<Bands, SpectrumError> {
+    Ok(Bands { grid: WavelengthGrid::new(vec![REFERENCE_WAVELENGTH_NM])?, sampling: BandSampling::Center })
+}
+
+/// Progress of one stage reported as another's.
+struct AtStage<'a> {
+    progress: &'a dyn Progress,
+    stage: Stage,
+}
+
+impl Progress for AtStage<'_> {
+    fn at(&self, _: Stage, fraction: f64) {
+        self.progress.at(self.stage, fraction);
+    }
+}
+
+impl WorldRender {
+    /// Returns the world as the lens of a camera file sees it.
+    pub(super) fn through_lens(
+        world: Arc<World>,
+        inputs: &IrradianceInputs,
+        (lens, place): (&ResolvedLens, &FilmPlace),
+        grid: WavelengthGrid,
+    ) -> Result<Self, PipelineError> {
+        let Some((_, spec)) = inputs.scene.geometry.world() else {
+            unreachable!("the world that is given is that of these inputs");
+        };
+        if inputs.plan.bank.diffraction == Diffraction::Wave {
+            let reason = "rays from the film carry no waves, expected None, Hurb or HurbCalibrated".to_owned();
+            return Err(PipelineError::Unsuitable { what: "diffraction: Wave", reason });
+        }
+        let bands = Bands { grid, sampling: spec.bands };
+        let settings = LensCameraSettings {
+            film_distance_mm: place.film_distance_mm,
+            film_size_mm: DVec2::new(place.columns as f64, place.rows as f64) * (1e-3 * place.pitch_um),
+            pixels: PixelGrid::new(place.columns, place.rows),
+            placement: placement(&world, spec),
+            origin: LensOrigin::EntrancePupil,
+            diffraction: inputs.plan.bank.diffraction.hurb(),
+        };
+        let identity = format!("{} {:?} {settings:?}", fingerprint(&world, spec), lens.lens);
+        let camera = Camera::Lens(Box::new(LensCamera::new(&lens.lens, &bands, settings)?));
+        let (paths, seed) = (spec.paths, spec.seed);
+        Ok(Self { world, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity })
+    }
+
+    /// Returns the world as a camera of its own file sees it: one by formula gives radiance, one with a lens irradiance.
+    ///
+    /// Lens files are looked for beside the world's.
+    ///
+    /// # Errors
+    /// When the camera is of a kind that cannot be rendered, or its lens cannot be read.
+    pub fn of_own_camera(
+        world: Arc<World>,
+        camera: &WorldCamera,
+        spec: &WorldSpec,
+        grid: WavelengthGrid,
+    ) -> Result<Self, PipelineError> {
+        let resolution = spec.size.unwrap_or(camera.resolution);
+        let camera = WorldCamera { resolution, ..camera.clone() };
+        let bands = Bands { grid, sampling: spec.bands };
+        let folder = spec.file.parent().unwrap_or(Path::new(""));
+        let read_lens = |name: &str| Lens::read(&folder.join(name));
+        let identity = format!("{} {camera:?}", fingerprint(&world, spec));
+        let camera = Camera::from_world(&camera, &bands, &read_lens)?;
+        let (paths, seed) = (spec.paths, spec.seed);
+        Ok(Self { world, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity })
+    }
+
+    /// Returns the rendering of a part of the picture: from this column and row on, so many of each; its samples are those of
+    /// the whole.
+    ///
+    /// # Errors
+    /// When the part does not lie in the picture.
+    pub fn cropped(mut self, first: (usize, usize), size: (usize, usize)) -> Result<Self, PipelineError> {
+        self.camera = match self.camera {
+            Camera::Pinhole(view) => Camera::Pinhole(Pinhole { pixels: view.pixels.cropped(first, size)?, ..view }),
+            Camera::ThinLens(lens) => {
+                let pixels = lens.view.pixels.cropped(first, size)?;
+                Camera::ThinLens(ThinLens { view: Pinhole { pixels, ..lens.view }, ..lens })
+            }
+            Camera::Lens(lens) => Camera::Lens(Box::new(lens.cropped(first, size)?)),
+        };
+        Ok(self)
+    }
+
+    /// What the pixels are of: irradiance on a film, or the radiance that a camera by formula sees.
+    pub fn quantity(&self) -> Quantity {
+        self.camera.quantity()
+    }
+
+    /// Returns what is rendered in words, so that no checkpoint is continued as another rendering.
+    pub fn identity(&self, effort: RenderEffort) -> String {
+        match effort {
+            RenderEffort::Samples(_) => self.identity.clone(),
+            RenderEffort::Noise(noise) => format!("{} noise {noise}", self.identity),
+        }
+    }
+
+    /// Returns a renderer that has not begun.
+    ///
+    /// # Errors
+    /// When a setting makes no sense.
+    pub fn renderer(&self) -> Result<Renderer<'_>, PipelineError> {
+        let settings = RenderSettings {
+            bands: self.bands.clone(),
+            paths: self.paths,
+            samples_per_pass: self.samples_per_pass,
+            seed: self.seed,
+            clamp: None,
+        };
+        Ok(Renderer::new(&self.world, &self.camera, settings)?)
+    }
+
+    /// Makes passes until the picture is good enough, or `goes_on`, which is asked after each, returns false.
+    ///
+    /// # Errors
+    /// When the work is cancelled, or `goes_on` fails.
+    pub fn refine(
+        &self,
+        renderer: &mut Renderer<'_>,
+        effort: RenderEffort,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+        goes_on: &mut dyn FnMut(&Renderer<'_>) -> Result<bool, PipelineError>,
+    ) -> Result<(), PipelineError> {
+        loop {
+            let n_done = renderer.n_passes();
+            let n_passes = match effort {
+                RenderEffort::Samples(n) => Some(n.div_ceil(renderer.settings().samples_per_pass)),
+                RenderEffort::Noise(noise) => {
+                    if n_done >= PILOT_PASSES && renderer.n_passes_left().is_none() {
+                        renderer.aim_at_noise(noise, MOST_PASSES)?;
+                    }
+                    renderer.n_passes_left().map(|left| n_done + left)
+                }
+            };
+            if n_passes.is_some_and(|n| n_done >= n) {
+                return Ok(());
+            }
+            let of = f64::from(n_passes.unwrap_or(2 * PILOT_PASSES));
+            let show = |share: f64| progress.at(Stage::Irradiance, (f64::from(n_done) + share) / of);
+            show(0.0);
+            if !renderer.pass(cancel, &show)? || !goes_on(renderer)? {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Renders the picture.
+    ///
+    /// # Errors
+    /// When the work is cancelled.
+    pub(crate) fn render(&self, effort: RenderEffort, watch: &Watch<'_>) -> Result<Rendering, PipelineError> {
+        let mut renderer = self.renderer()?;
+        self.refine(&mut renderer, effort, watch.progress, watch.cancel, &mut |_| Ok(true))?;
+        Ok(renderer.rendering())
+    }
+
+    /// Returns what the camera sees besides light: depth, normals, materials.
+    ///
+    /// # Errors
+    /// When the work is cancelled.
+    pub fn auxiliary(&self, cancel: &Cancel) -> Result<Auxiliary, PipelineError> {
+        Ok(auxiliary(&self.world, &self.camera, &self.bands.grid, cancel)?)
+    }
+
+    /// Writes a picture with its standard errors and its depth, and beside it `auxiliary.exr`; returns the names of the files.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn write_files(
+        &self,
+        rendering: &Rendering,
+        seen: &Auxiliary,
+        folder: &Path,
+    ) -> Result<[&str; 2], PipelineError> {
+        let name = if self.quantity() == Quantity::Irradiance { IRRADIANCE_FILE } else { RADIANCE_FILE };
+        write_rendering_exr(&folder.join(name), rendering, Some(&seen.z_m))?;
+        write_auxiliary_exr(&folder.join(AUXILIARY_FILE), seen)?;
+        Ok([name, AUXILIARY_FILE])
+    }
+}
+
+/// The name of the file of what a camera by formula sees.
+const RADIANCE_FILE: &str = "radiance.exr";
+/// The name of the file of depth, normals and materials.
+const AUXILIARY_FILE: &str = "auxiliary.exr";
+
+/// Returns words that differ between worlds: what is counted and measured of one.
+fn fingerprint(world: &World, spec: &WorldSpec) -> String {
+    let names: Vec<&str> = world.material_names().collect();
+    let counts = (world.n_primitives(), world.n_lights(), world.bounds());
+    let file = fs::metadata(&spec.file).ok().map(|data| (data.len(), data.modified().ok()));
+    format!("{counts:?} {names:?} {file:?} {}", spec.unit_m)
+}

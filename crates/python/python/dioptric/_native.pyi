@@ -1,0 +1,398 @@
+"""The native part of the package; docstrings are those of the classes."""
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar, Literal, TypeAlias, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_Path: TypeAlias = str | os.PathLike[str]
+_Numbers: TypeAlias = float | Sequence[float] | NDArray[Any]
+_Diffraction: TypeAlias = Literal["none", "hurb", "hurb-scene3d", "hurb-calibrated", "wave"]
+_Planes: TypeAlias = tuple[NDArray[Any], ...]
+_Progress: TypeAlias = bool | Callable[[str, float], object] | None
+
+__all__ = [
+    "Camera",
+    "Lens",
+    "Rays",
+    "Scene",
+    "Sensor",
+    "Shot",
+    "Memory",
+    "_panic",
+    "set_threads",
+    "threads",
+    "__version__",
+]
+
+__version__: str
+
+def set_threads(n: int) -> None: ...
+def threads() -> int: ...
+def _panic() -> None: ...
+@final
+class Memory:
+    @property
+    def __array_interface__(self) -> dict[str, Any]: ...
+    @property
+    def address(self) -> int: ...
+
+@final
+class Camera:
+    @staticmethod
+    def demo() -> Camera: ...
+    @staticmethod
+    def read(path: _Path) -> Camera: ...
+    @staticmethod
+    def from_ron(text: str, folder: _Path | None = None) -> Camera: ...
+    @staticmethod
+    def from_dict(data: dict[str, Any]) -> Camera: ...
+    @staticmethod
+    def resume(folder: _Path) -> Camera: ...
+    def with_(
+        self,
+        *,
+        name: str | None = ...,
+        lens: Lens | _Path | None = ...,
+        f_number: float | None = ...,
+        stop_mm: float | None = ...,
+        focus_mm: float | Literal["near"] | None = ...,
+        film_mm: float | None = ...,
+        tilt_deg: float | None = ...,
+        swing_deg: float | None = ...,
+        rise_mm: float | None = ...,
+        shift_mm: float | None = ...,
+        sensor: Sensor | _Path | None = ...,
+        film: Literal["sensor", "scene"] | None = ...,
+        pixels: tuple[int, int] | None = ...,
+        pixel_um: float | None = ...,
+        diffraction: _Diffraction | None = ...,
+        gamma: float | None = ...,
+        blur: Literal["layered", "pointwise"] | None = ...,
+        bank: Literal["standard", "paper"] | None = ...,
+        bank_error: float | None = ...,
+        scene: Scene | _Path | None = ...,
+        fov_deg: float | None = ...,
+        depth_m: float | None = ...,
+        illuminant: str | None = ...,
+        illuminance_lux: float | None = ...,
+        scene_light: str | None = ...,
+        mean_luminance_cd_m2: float | None = ...,
+        wavelengths_nm: _Numbers | Literal["scene"] | None = ...,
+        exposure_s: float | Literal["auto"] | None = ...,
+        analog_gain: float | None = ...,
+        noise: str | None = ...,
+        burst: int | None = ...,
+        bracket_stops: Sequence[float] | None = ...,
+        white: str | None = ...,
+        demosaic: str | None = ...,
+        highlights: str | None = ...,
+        seed: int | None = ...,
+    ) -> Camera: ...
+    def render(
+        self,
+        *,
+        quality: Literal["full", "draft", "preview"] = "full",
+        progress: _Progress = None,
+        memory_bytes: int | None = None,
+    ) -> Shot: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def lens(self) -> Lens: ...
+    @property
+    def scene(self) -> Scene: ...
+    @property
+    def sensor(self) -> Sensor: ...
+    def stage_counts(self) -> dict[str, int]: ...
+    def to_dict(self) -> dict[str, Any]: ...
+    def to_ron(self) -> str: ...
+    def write(self, path: _Path) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __reduce__(self) -> tuple[Any, tuple[str]]: ...
+
+@final
+class Shot:
+    @property
+    def camera(self) -> Camera: ...
+    @property
+    def quality(self) -> str: ...
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def pitch_um(self) -> float: ...
+    @property
+    def film_mm(self) -> float: ...
+    @property
+    def exposure_s(self) -> float: ...
+    @property
+    def wavelengths_nm(self) -> NDArray[np.float64]: ...
+    @property
+    def irradiance(self) -> NDArray[np.float32]: ...
+    @property
+    def electron_rate(self) -> NDArray[np.float32] | _Planes: ...
+    @property
+    def electrons(self) -> NDArray[np.float32] | _Planes: ...
+    @property
+    def volts(self) -> NDArray[np.float32] | _Planes: ...
+    @property
+    def raw(self) -> NDArray[np.uint16] | NDArray[np.float32] | _Planes: ...
+    @property
+    def levels(self) -> dict[str, float]: ...
+    @property
+    def picture(self) -> NDArray[np.float32]: ...
+    @property
+    def rgb(self) -> NDArray[np.uint8]: ...
+    @property
+    def depth_m(self) -> NDArray[np.float32]: ...
+    def report(self) -> dict[str, Any]: ...
+    def expose(
+        self,
+        *,
+        seed: int | None = ...,
+        exposure_s: float | Literal["auto"] | None = ...,
+        analog_gain: float | None = ...,
+        noise: str | None = ...,
+        burst: int | None = ...,
+        bracket_stops: Sequence[float] | None = ...,
+        white: str | None = ...,
+        demosaic: str | None = ...,
+        highlights: str | None = ...,
+    ) -> Shot: ...
+    def develop(
+        self, *, white: str | None = ..., demosaic: str | None = ..., highlights: str | None = ...
+    ) -> Shot: ...
+    def png(self) -> bytes: ...
+    def save(self, path: _Path) -> list[str]: ...
+    def to_xarray(self) -> Any: ...
+    def _repr_png_(self) -> bytes: ...
+    def _repr_html_(self) -> str: ...
+
+@final
+class Lens:
+    @staticmethod
+    def names() -> list[str]: ...
+    @staticmethod
+    def library() -> list[dict[str, Any]]: ...
+    @staticmethod
+    def built_in(name: str) -> Lens: ...
+    @staticmethod
+    def read(
+        path: _Path,
+        *,
+        glasses: Sequence[_Path] | None = None,
+        missing_glass: Literal["refuse", "nd-vd", "nearest"] = "refuse",
+        slope_per_nm: float | None = None,
+    ) -> Lens: ...
+    @staticmethod
+    def parse(text: str, name: str = "lens.ron") -> Lens: ...
+    @staticmethod
+    def thin(focal_length_mm: float, diameter_mm: float) -> Lens: ...
+    @staticmethod
+    def pinhole(diameter_mm: float) -> Lens: ...
+    def with_stop(self, *, f_number: float | None = None, diameter_mm: float | None = None) -> Lens: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def source(self) -> str: ...
+    @property
+    def notes(self) -> list[str]: ...
+    @property
+    def n_surfaces(self) -> int: ...
+    @property
+    def is_rotational(self) -> bool: ...
+    @property
+    def efl_mm(self) -> float: ...
+    @property
+    def f_number(self) -> float: ...
+    def info(
+        self, wavelengths_nm: _Numbers | None = None, *, distance_mm: float | None = None, field_deg: float = 10.0
+    ) -> Any: ...
+    def surfaces(self) -> list[dict[str, Any]]: ...
+    def trace(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        wavelength_nm: float = ...,
+        *,
+        film_mm: float | None = None,
+        clip: bool = True,
+    ) -> Rays: ...
+    def psf(
+        self,
+        *,
+        field_deg: _Numbers | None = ...,
+        field_y_deg: float | None = ...,
+        distance_mm: _Numbers | None = ...,
+        wavelengths_nm: _Numbers | None = ...,
+        focus_mm: float | None = ...,
+        film_mm: float | None = ...,
+        pixel_um: float | None = ...,
+        shape: int | None = ...,
+        diffraction: _Diffraction | None = ...,
+        gamma: float | None = ...,
+        rays: int | None = ...,
+        seed: int | None = ...,
+    ) -> NDArray[np.float32]: ...
+    def psf_table(
+        self,
+        *,
+        field_deg: _Numbers | None = ...,
+        field_y_deg: float | None = ...,
+        distance_mm: _Numbers | None = ...,
+        wavelengths_nm: _Numbers | None = ...,
+        focus_mm: float | None = ...,
+        film_mm: float | None = ...,
+        pixel_um: float | None = ...,
+        shape: int | None = ...,
+        diffraction: _Diffraction | None = ...,
+        gamma: float | None = ...,
+        rays: int | None = ...,
+        seed: int | None = ...,
+        mtf_per_mm: _Numbers | None = ...,
+    ) -> list[dict[str, Any]]: ...
+    def analyze(
+        self,
+        *,
+        fields_deg: _Numbers | None = ...,
+        wavelengths_nm: _Numbers | None = ...,
+        distance_mm: float | None = ...,
+        film_mm: float | None = ...,
+        focus_mm: float | None = ...,
+        rings: int | None = ...,
+    ) -> dict[str, Any]: ...
+    def draw(
+        self,
+        *,
+        fields_deg: _Numbers | None = None,
+        distance_mm: float = ...,
+        wavelengths_nm: _Numbers | None = None,
+        film_mm: float | None = None,
+    ) -> str: ...
+    def film_mm_for(self, distance_mm: float, wavelength_nm: float | None = None) -> float: ...
+    def to_ron(self) -> str: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def _repr_html_(self) -> str: ...
+    def __reduce__(self) -> tuple[Any, tuple[str]]: ...
+
+@final
+class Rays:
+    FATES: ClassVar[list[str]]
+    def __len__(self) -> int: ...
+    @property
+    def x_mm(self) -> NDArray[np.float64]: ...
+    @property
+    def y_mm(self) -> NDArray[np.float64]: ...
+    @property
+    def z_mm(self) -> NDArray[np.float64]: ...
+    @property
+    def l(self) -> NDArray[np.float64]: ...
+    @property
+    def m(self) -> NDArray[np.float64]: ...
+    @property
+    def n(self) -> NDArray[np.float64]: ...
+    @property
+    def opl_mm(self) -> NDArray[np.float64]: ...
+    @property
+    def positions_mm(self) -> NDArray[np.float64]: ...
+    @property
+    def directions(self) -> NDArray[np.float64]: ...
+    @property
+    def passed(self) -> NDArray[np.bool_]: ...
+    @property
+    def fate(self) -> NDArray[np.uint8]: ...
+    @property
+    def surface(self) -> NDArray[np.int16]: ...
+
+@final
+class Scene:
+    @staticmethod
+    def from_array(
+        radiance: ArrayLike,
+        wavelengths_nm: _Numbers,
+        *,
+        depth_m: ArrayLike,
+        fov_deg: float,
+        light: str | None = None,
+        name: str = "scene",
+    ) -> Scene: ...
+    @staticmethod
+    def read(
+        path: _Path,
+        *,
+        fov_deg: float | None = ...,
+        depth_m: float | None = ...,
+        illuminant: str | None = ...,
+        illuminance_lux: float | None = ...,
+        light: str | None = ...,
+        mean_luminance_cd_m2: float | None = ...,
+    ) -> Scene: ...
+    @staticmethod
+    def still_life(
+        columns: int = 1080,
+        rows: int = 720,
+        *,
+        illuminant: str | None = ...,
+        illuminance_lux: float | None = ...,
+        mean_luminance_cd_m2: float | None = ...,
+    ) -> Scene: ...
+    @staticmethod
+    def target(
+        pattern: Literal[
+            "uniform", "checkerboard", "slanted-bar", "radial-lines", "point-array", "siemens-star", "color-chart"
+        ],
+        columns: int,
+        rows: int,
+        *,
+        size: float | None = None,
+        fov_deg: float,
+        depth_m: float,
+        illuminant: str | None = ...,
+        illuminance_lux: float | None = ...,
+        mean_luminance_cd_m2: float | None = ...,
+    ) -> Scene: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def shape(self) -> tuple[int, int, int]: ...
+    @property
+    def wavelengths_nm(self) -> NDArray[np.float64]: ...
+    @property
+    def depth_m(self) -> NDArray[np.float32]: ...
+    @property
+    def mean_luminance_cd_m2(self) -> float: ...
+    def band(self, band: int) -> NDArray[np.float32]: ...
+    def to_array(self) -> NDArray[np.float32]: ...
+    def write(self, path: _Path) -> None: ...
+
+@final
+class Sensor:
+    @staticmethod
+    def names() -> list[str]: ...
+    @staticmethod
+    def built_in(name: str) -> Sensor: ...
+    @staticmethod
+    def read(path: _Path) -> Sensor: ...
+    @staticmethod
+    def from_ron(text: str) -> Sensor: ...
+    @staticmethod
+    def from_dict(data: dict[str, Any]) -> Sensor: ...
+    def with_(self, **changes: Any) -> Sensor: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def pixel_pitch_um(self) -> float: ...
+    @property
+    def filters(self) -> list[str]: ...
+    def quantum_efficiency(self, wavelengths_nm: _Numbers) -> NDArray[np.float64]: ...
+    def to_dict(self) -> dict[str, Any]: ...
+    def to_ron(self) -> str: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __reduce__(self) -> tuple[Any, tuple[str]]: ...

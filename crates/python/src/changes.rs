@@ -1,0 +1,254 @@
+//! Changes of a camera by name, each as the command line has it.
+
+use dioptric_optics::Lens as OpticsLens;
+use dioptric_pipeline::{
+    BankSpec, BlurSpec, Camera, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions, LensSpec,
+    SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure, with_exposure_s,
+};
+use pyo3::{
+    prelude::*,
+    types::{PyDict, PyString},
+};
+
+use crate::{
+    errors::{exception, wrong, wrong_type},
+    input::{number, numbers, type_name},
+    lens::Lens,
+    options::{count, diffraction, each_option, light, with_gamma, word},
+    scene::Scene,
+    sensor::Sensor,
+};
+
+/// What changes the frames and what comes after, but not the light on the sensor.
+pub(crate) const OF_EXPOSURE: &[&str] =
+    &["seed", "exposure_s", "analog_gain", "noise", "burst", "bracket_stops", "white", "demosaic", "highlights"];
+/// What changes the picture alone.
+pub(crate) const OF_PICTURE: &[&str] = &["white", "demosaic", "highlights"];
+/// All changes, in the order in which they are made.
+pub(crate) const ALL: &[&str] = &[
+    "name",
+    "lens",
+    "f_number",
+    "stop_mm",
+    "focus_mm",
+    "film_mm",
+    "tilt_deg",
+    "swing_deg",
+    "rise_mm",
+    "shift_mm",
+    "sensor",
+    "film",
+    "pixels",
+    "pixel_um",
+    "diffraction",
+    "gamma",
+    "blur",
+    "bank",
+    "bank_error",
+    "scene",
+    "fov_deg",
+    "depth_m",
+    "illuminant",
+    "illuminance_lux",
+    "scene_light",
+    "mean_luminance_cd_m2",
+    "wavelengths_nm",
+    "exposure_s",
+    "analog_gain",
+    "noise",
+    "burst",
+    "bracket_stops",
+    "white",
+    "demosaic",
+    "highlights",
+    "seed",
+];
+
+/// Returns the camera with changes made, checked.
+pub(crate) fn changed(
+    function: &str,
+    kept: &KeptCamera,
+    options: Option<&Bound<'_, PyDict>>,
+    known: &[&str],
+) -> PyResult<KeptCamera> {
+    let mut changed = kept.clone();
+    let mut checks_lens = false;
+    each_option(function, options, known, |key, value| {
+        checks_lens |= matches!(key, "lens" | "f_number" | "stop_mm");
+        match key {
+            "lens" => set_lens(&mut changed, value),
+            "scene" => set_scene(&mut changed, value),
+            "sensor" => set_sensor(&mut changed, value),
+            _ => {
+                let (mut camera, given) = (changed.camera().clone(), changed.given().clone());
+                set(&mut camera, &given, key, value)?;
+                changed = changed.with_camera(camera, given);
+                Ok(())
+            }
+        }
+    })?;
+    let camera = changed.camera();
+    camera.validate().map_err(exception)?;
+    if checks_lens {
+        open_lens(&changed)?;
+    }
+    if changed.given().sensor.is_none() {
+        camera.sensor.open().map_err(exception)?;
+    }
+    Ok(changed)
+}
+
+/// Returns the lens of a camera, its stop set.
+pub(crate) fn open_lens(kept: &KeptCamera) -> PyResult<OpticsLens> {
+    let camera = kept.camera();
+    let lens = match &kept.given().lens {
+        Some(lens) => (**lens).clone(),
+        None => camera.lens.open(&camera.lens_reading).map_err(exception)?.lens,
+    };
+    camera.stop.apply(lens).map_err(exception)
+}
+
+/// Puts another lens in: what the camera said of the stop and the glasses of the old one goes with it.
+fn set_lens(kept: &mut KeptCamera, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    if let Ok(lens) = value.cast::<Lens>() {
+        *kept = lens.get().put_into(kept);
+        return Ok(());
+    }
+    let text: String = path_or_name("lens", value)?;
+    let mut given = kept.given().clone();
+    given.lens = None;
+    let camera = Camera {
+        lens: LensSpec::named(&text),
+        stop: StopSpec::AsGiven,
+        lens_reading: LensReadOptions::default(),
+        ..kept.camera().clone()
+    };
+    *kept = kept.with_camera(camera, given);
+    Ok(())
+}
+
+fn set_scene(kept: &mut KeptCamera, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    if let Ok(scene) = value.cast::<Scene>() {
+        *kept = scene.get().put_into(kept);
+        return Ok(());
+    }
+    let path = path_or_name("scene", value)?;
+    *kept = Scene::of_choice(SceneSpec::of_file(path.into())).put_into(kept);
+    Ok(())
+}
+
+/// Puts another sensor in; the film becomes its pixels, as on the command line.
+fn set_sensor(kept: &mut KeptCamera, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    if let Ok(sensor) = value.cast::<Sensor>() {
+        *kept = sensor.get().put_into(kept);
+    } else {
+        let mut given = kept.given().clone();
+        given.sensor = None;
+        let sensor = SensorSpec::named(&path_or_name("sensor", value)?);
+        *kept = kept.with_camera(Camera { sensor, ..kept.camera().clone() }, given);
+    }
+    *kept = kept.with(|camera| camera.film = FilmSpec::Sensor);
+    Ok(())
+}
+
+fn set(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    let scene = &mut camera.scene;
+    match key {
+        "name" => camera.name = word(key, value)?,
+        "f_number" => camera.stop = StopSpec::FNumber(number(key, value)?),
+        "stop_mm" => camera.stop = StopSpec::DiameterMm(number(key, value)?),
+        "focus_mm" if value.is_instance_of::<PyString>() => match word(key, value)?.as_str() {
+            "near" => camera.focus = FocusSpec::NearObject,
+            other => return Err(wrong(key, format!("'{other}'"), "a distance in mm, or 'near' for the near object")),
+        },
+        "focus_mm" => camera.focus = FocusSpec::DistanceMm(number(key, value)?),
+        "film_mm" => camera.focus = FocusSpec::FilmMm(number(key, value)?),
+        "tilt_deg" => camera.movements.tilt_deg = number(key, value)?,
+        "swing_deg" => camera.movements.swing_deg = number(key, value)?,
+        "rise_mm" => camera.movements.rise_mm = number(key, value)?,
+        "shift_mm" => camera.movements.shift_mm = number(key, value)?,
+        "film" => {
+            camera.film = match word(key, value)?.as_str() {
+                "sensor" => FilmSpec::Sensor,
+                "scene" => FilmSpec::Scene,
+                other => return Err(wrong(key, format!("'{other}'"), "'sensor' or 'scene'")),
+            }
+        }
+        "pixels" => {
+            let (columns, rows) =
+                value.extract().map_err(|_| wrong_type(key, type_name(value), "a pair of columns and rows"))?;
+            let pitch_um = match camera.film {
+                FilmSpec::Pixels { pitch_um, .. } => pitch_um,
+                // Until `pixel_um` is set, that of the sensor.
+                _ => match given.sensor.as_deref() {
+                    Some(sensor) => sensor.pixel_pitch_um,
+                    None => camera.sensor.open().map_err(exception)?.pixel_pitch_um,
+                },
+            };
+            camera.film = FilmSpec::Pixels { columns, rows, pitch_um };
+        }
+        "pixel_um" => match &mut camera.film {
+            FilmSpec::Pixels { pitch_um, .. } => *pitch_um = number(key, value)?,
+            _ => return Err(wrong(key, number(key, value)?, "'pixels' with it: the film's pixels are the sensor's")),
+        },
+        "diffraction" => camera.diffraction = diffraction(key, value)?,
+        "gamma" => camera.diffraction = with_gamma(camera.diffraction, number(key, value)?)?,
+        "blur" => {
+            camera.blur = match word(key, value)?.as_str() {
+                "layered" => BlurSpec::Layered,
+                "pointwise" => BlurSpec::Pointwise,
+                other => return Err(wrong(key, format!("'{other}'"), "'layered' or 'pointwise'")),
+            }
+        }
+        "bank" => {
+            camera.bank = match word(key, value)?.as_str() {
+                "standard" => BankSpec::Standard,
+                "paper" => BankSpec::Paper,
+                other => return Err(wrong(key, format!("'{other}'"), "'standard' or 'paper'")),
+            }
+        }
+        "bank_error" => camera.bank = BankSpec::Within { error: number(key, value)? },
+        "fov_deg" => scene.field_of_view_deg = Some(number(key, value)?),
+        "depth_m" => scene.depth_m = Some(number(key, value)?),
+        "illuminant" => scene.illuminant = Some(light(key, value)?),
+        "illuminance_lux" => scene.illuminance_lux = Some(number(key, value)?),
+        "scene_light" => scene.light = Some(light(key, value)?),
+        "mean_luminance_cd_m2" => scene.mean_luminance_cd_m2 = Some(number(key, value)?),
+        "wavelengths_nm" if value.is_instance_of::<PyString>() => match word(key, value)?.as_str() {
+            "scene" => camera.wavelengths = WavelengthSpec::Scene,
+            other => return Err(wrong(key, format!("'{other}'"), "numbers, or 'scene' for the scene's own")),
+        },
+        "wavelengths_nm" => camera.wavelengths = WavelengthSpec::ListNm(numbers(key, value)?),
+        "exposure_s" if value.is_instance_of::<PyString>() => match word(key, value)?.as_str() {
+            "auto" => camera.exposure = with_auto_exposure(camera.exposure),
+            other => return Err(wrong(key, format!("'{other}'"), "a time in s, or 'auto'")),
+        },
+        "exposure_s" => camera.exposure = with_exposure_s(camera.exposure, number(key, value)?),
+        "burst" => camera.frames = FramesSpec::Burst(count(key, value)?),
+        "bracket_stops" => camera.frames = FramesSpec::BracketStops(numbers(key, value)?),
+        "seed" => {
+            camera.seed =
+                value.extract().map_err(|_| wrong_type(key, type_name(value), "a whole number of 0 or more"))?;
+        }
+        _ => return set_sensor_option(camera, key, value),
+    }
+    Ok(())
+}
+
+fn set_sensor_option(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    let mut options = SensorOptions::default();
+    match key {
+        "analog_gain" => options.analog_gain = Some(number(key, value)?),
+        "noise" => options.noise = Some(word(key, value)?),
+        "white" => options.white = Some(word(key, value)?),
+        "demosaic" => options.demosaic = Some(word(key, value)?),
+        _ => options.highlights = Some(word(key, value)?),
+    }
+    options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing).map_err(exception)
+}
+
+fn path_or_name(key: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
+    let path: std::path::PathBuf =
+        value.extract().map_err(|_| wrong_type(key, type_name(value), "a name, a path or an object of dioptric"))?;
+    Ok(path.to_string_lossy().into_owned())
+}

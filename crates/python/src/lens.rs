@@ -1,0 +1,694 @@
+//! Lenses.
+
+use std::{
+    path::PathBuf,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use dioptric_analysis::{
+    AnalysisFields, AnalysisFilm, AnalysisRequest, LensData, LensDefaults, LensInfoRequest, PsfRequest, PsfSampling,
+    PsfSet, built_in_lenses, surface_rows,
+};
+use dioptric_optics::{Layout, LensFile, MonoLens, RayBatch, ReadOptions, Vignetting};
+use dioptric_pipeline::{
+    Camera, Diffraction, FocusSpec, Given, KeptCamera, LensReadOptions, LensSpec, MissingGlass, PipelineError,
+    REFERENCE_WAVELENGTH_NM, StopSpec,
+};
+use ndarray::{ArrayD, ArrayView2, ArrayViewD, Axis, IxDyn};
+use numpy::PyReadonlyArrayDyn;
+use pyo3::{
+    prelude::*,
+    types::{PyDict, PyType},
+};
+use rayon::prelude::*;
+
+use crate::{
+    errors::{exception, guarded, wrong},
+    input::{array_f64, is_single, number, numbers},
+    options::{count, diffraction, each_option, with_gamma},
+    rays::Rays,
+    serial::to_python,
+    view::view,
+    worker::{Follower, install, run},
+};
+
+/// Rays below which a trace is done at once, without giving up the interpreter's lock: some 50 µs of work.
+const FEW_RAYS: usize = 500;
+/// Wavelengths of an analysis where neither the caller nor the lens's file names some, nm.
+const USUAL_NM: [f64; 3] = [450.0, 550.0, 650.0];
+/// Rays of each fan of a drawing.
+const DRAWN_RAYS: usize = 9;
+
+/// A lens: a train of surfaces with a stop, read from a file, built in, or ideal. It never changes.
+///
+/// Lens frame: millimetres, +z the way light travels, origin at the first vertex; x to the right, y up. Wavelengths are
+/// nanometres, angles degrees, distances of objects positive before the first vertex.
+#[pyclass(frozen, module = "dioptric")]
+pub(crate) struct Lens {
+    /// The lens with its stop set, and what its file says beside.
+    file: LensFile,
+    /// What a camera file says of it, where it can.
+    choice: Option<(LensSpec, LensReadOptions)>,
+    stop: StopSpec,
+    /// The lens at the wavelength of the last trace.
+    mono: Mutex<Option<Arc<MonoLens>>>,
+}
+
+impl Lens {
+    fn new(file: LensFile, choice: Option<(LensSpec, LensReadOptions)>) -> Self {
+        Self { file, choice, stop: StopSpec::AsGiven, mono: Mutex::default() }
+    }
+
+    fn of_choice(choice: LensSpec, reading: LensReadOptions) -> PyResult<Self> {
+        let file = choice.open(&reading).map_err(exception)?;
+        Ok(Self::new(file, Some((choice, reading))))
+    }
+
+    /// Returns the lens of a camera.
+    pub(crate) fn of_camera(kept: &KeptCamera) -> PyResult<Self> {
+        let camera = kept.camera();
+        let lens = match &kept.given().lens {
+            Some(lens) => Self::new(LensFile::from((**lens).clone()), None),
+            None => Self::of_choice(camera.lens.clone(), camera.lens_reading.clone())?,
+        };
+        lens.stopped(camera.stop)
+    }
+
+    fn stopped(&self, stop: StopSpec) -> PyResult<Self> {
+        let lens = stop.apply(self.file.lens.clone()).map_err(exception)?;
+        let stop = if stop == StopSpec::AsGiven { self.stop } else { stop };
+        Ok(Self {
+            file: LensFile { lens, ..self.file.clone() },
+            choice: self.choice.clone(),
+            stop,
+            mono: Mutex::default(),
+        })
+    }
+
+    /// Returns a camera with this lens.
+    pub(crate) fn put_into(&self, kept: &KeptCamera) -> KeptCamera {
+        let Some((lens, reading)) = &self.choice else {
+            return kept.with_given_lens(Given::new(self.file.lens.clone()));
+        };
+        let mut given = kept.given().clone();
+        given.lens = None;
+        let camera =
+            Camera { lens: lens.clone(), lens_reading: reading.clone(), stop: self.stop, ..kept.camera().clone() };
+        kept.with_camera(camera, given)
+    }
+
+    fn mono(&self, wavelength_nm: f64) -> PyResult<Arc<MonoLens>> {
+        let mut kept = self.mono.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*kept {
+            Some(mono) if mono.wavelength_nm() == wavelength_nm => Ok(mono.clone()),
+            _ => {
+                let mono = Arc::new(self.file.lens.at(wavelength_nm).map_err(exception)?);
+                *kept = Some(mono.clone());
+                Ok(mono)
+            }
+        }
+    }
+
+    fn used(&self) -> LensDefaults {
+        LensDefaults::of(self.file.clone())
+    }
+
+    fn wavelength_or_usual(&self, wavelength_nm: Option<f64>) -> f64 {
+        wavelength_nm.unwrap_or_else(|| self.used().wavelength_or_usual())
+    }
+}
+
+#[pymethods]
+impl Lens {
+    /// Returns the names of the built-in lenses.
+    #[staticmethod]
+    fn names() -> Vec<&'static str> {
+        dioptric_optics::Lens::built_in_names().collect()
+    }
+
+    /// Returns the built-in lenses as a list of dictionaries: ``name``, ``efl_mm`` and ``f_number`` at 550 nm wide open,
+    /// ``surfaces``, ``source``.
+    #[staticmethod]
+    fn library(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+        guarded(|| to_python(py, &built_in_lenses().map_err(exception)?))
+    }
+
+    /// Returns a built-in lens.
+    #[staticmethod]
+    fn built_in(name: &str) -> PyResult<Self> {
+        guarded(|| Self::of_choice(LensSpec::BuiltIn(name.to_owned()), LensReadOptions::default()))
+    }
+
+    /// Reads a lens file: ``.ron`` (our own), ``.dat``, ``.json`` (ISET's or DeepLens's), ``.zmx`` (Zemax) or ``.seq`` (CODE V).
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    /// glasses : list of paths, optional
+    ///     Glass catalogues (``.agf``, ``.yml``) to look in before the built-in one.
+    /// missing_glass : {"refuse", "nd-vd", "nearest"}
+    ///     What to do with a glass that no catalogue has.
+    /// slope_per_nm : float, optional
+    ///     Change of index a nanometre of media of which the file states one index alone.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", slope_per_nm=None))]
+    fn read(
+        path: PathBuf,
+        glasses: Option<Vec<PathBuf>>,
+        missing_glass: &str,
+        slope_per_nm: Option<f64>,
+    ) -> PyResult<Self> {
+        let missing_glass = match missing_glass {
+            "refuse" => MissingGlass::Refuse,
+            "nd-vd" => MissingGlass::FromNdVd,
+            "nearest" => MissingGlass::Nearest,
+            other => return Err(wrong("missing_glass", format!("'{other}'"), "'refuse', 'nd-vd' or 'nearest'")),
+        };
+        let glasses = glasses.unwrap_or_default();
+        let reading = LensReadOptions { glasses, missing_glass, slope_per_nm, ..LensReadOptions::default() };
+        guarded(|| Self::of_choice(LensSpec::File(path), reading))
+    }
+
+    /// Returns the lens of a file's text.
+    ///
+    /// Parameters
+    /// ----------
+    /// text : str
+    /// name : str
+    ///     What to call it; its ending tells the format, as of `Lens.read`.
+    #[staticmethod]
+    #[pyo3(signature = (text, name="lens.ron"))]
+    fn parse(text: &str, name: &str) -> PyResult<Self> {
+        guarded(|| {
+            let file = LensFile::from_bytes(name.as_ref(), text.as_bytes(), &ReadOptions::default());
+            Ok(Self::new(file.map_err(exception)?, None))
+        })
+    }
+
+    /// Returns an ideal thin lens, free of aberrations.
+    ///
+    /// Parameters
+    /// ----------
+    /// focal_length_mm : float
+    /// diameter_mm : float
+    ///     Of its rim, which is the stop.
+    #[staticmethod]
+    fn thin(focal_length_mm: f64, diameter_mm: f64) -> PyResult<Self> {
+        guarded(|| Self::of_choice(LensSpec::Thin { focal_length_mm, diameter_mm }, LensReadOptions::default()))
+    }
+
+    /// Returns a hole without a lens; a camera with it needs its film's place, ``film_mm``.
+    #[staticmethod]
+    fn pinhole(diameter_mm: f64) -> PyResult<Self> {
+        guarded(|| Self::of_choice(LensSpec::Pinhole { diameter_mm }, LensReadOptions::default()))
+    }
+
+    /// Returns the lens with its stop set: to an f-number (for a far object at 550 nm) or to a diameter in mm.
+    #[pyo3(signature = (*, f_number=None, diameter_mm=None))]
+    fn with_stop(&self, f_number: Option<f64>, diameter_mm: Option<f64>) -> PyResult<Self> {
+        let stop = match (f_number, diameter_mm) {
+            (Some(n), None) => StopSpec::FNumber(n),
+            (None, Some(mm)) => StopSpec::DiameterMm(mm),
+            (None, None) => return Err(wrong("the stop", "not given", "f_number or diameter_mm")),
+            _ => return Err(wrong("the stop", "given twice", "f_number or diameter_mm")),
+        };
+        guarded(|| self.stopped(stop))
+    }
+
+    /// What the lens is called.
+    #[getter]
+    fn name(&self) -> &str {
+        self.file.lens.name()
+    }
+
+    /// Where its prescription comes from.
+    #[getter]
+    fn source(&self) -> &str {
+        self.file.lens.source()
+    }
+
+    /// What its file says and dioptric does otherwise or not at all, a sentence each.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.file.notes.clone()
+    }
+
+    /// The number of surfaces, the stop included.
+    #[getter]
+    fn n_surfaces(&self) -> usize {
+        self.file.lens.interfaces().len()
+    }
+
+    /// Whether it is centered and rotationally symmetric.
+    #[getter]
+    fn is_rotational(&self) -> bool {
+        self.file.lens.is_rotational()
+    }
+
+    /// Effective focal length, mm, at 550 nm, or at the main wavelength of a lens not known there.
+    #[getter]
+    fn efl_mm(&self) -> PyResult<f64> {
+        guarded(|| Ok(self.mono(self.wavelength_or_usual(None))?.first_order().efl_mm))
+    }
+
+    /// f-number for a far object, at the wavelength of `efl_mm`.
+    #[getter]
+    fn f_number(&self) -> PyResult<f64> {
+        guarded(|| Ok(self.mono(self.wavelength_or_usual(None))?.first_order().f_number))
+    }
+
+    /// Returns first-order data and third-order sums: focal lengths, principal planes, pupils, f-number, Seidel sums.
+    ///
+    /// Parameters
+    /// ----------
+    /// wavelengths_nm : float or list of float, optional
+    ///     The lens's main wavelength, else 550.
+    /// distance_mm : float, optional
+    ///     Of an object before the first vertex, of which ``image_distance_mm``, ``magnification`` and ``working_f_number``
+    ///     are told too.
+    /// field_deg : float
+    ///     Half field of the third-order sums.
+    ///
+    /// Returns
+    /// -------
+    /// dict, or a list of them for a list of wavelengths, with the keys of ``dioptric lens info --json``.
+    #[pyo3(signature = (wavelengths_nm=None, *, distance_mm=None, field_deg=10.0))]
+    fn info<'py>(
+        &self,
+        py: Python<'py>,
+        wavelengths_nm: Option<&Bound<'py, PyAny>>,
+        distance_mm: Option<f64>,
+        field_deg: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let list = wavelengths_nm.map(|list| numbers("wavelengths_nm", list)).transpose()?;
+        let list = list.unwrap_or_else(|| vec![self.wavelength_or_usual(None)]);
+        guarded(|| {
+            let (first, last) = list.iter().fold((f64::INFINITY, 0.0), |(a, b), nm| (nm.min(a), nm.max(b)));
+            let instead_of_f_and_c_nm = (first < last).then_some([first, last]);
+            let data = |&wavelength_nm: &f64| {
+                LensData::new(
+                    &self.file.lens,
+                    &LensInfoRequest { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm },
+                )
+            };
+            let rows: Vec<LensData> = list.iter().map(data).collect::<Result<_, _>>().map_err(exception)?;
+            match wavelengths_nm.is_none_or(is_single) {
+                true => to_python(py, &rows[0]),
+                false => to_python(py, &rows),
+            }
+        })
+    }
+
+    /// Returns the surfaces as a list of dictionaries: radius, thickness, diameter, medium behind, whether it is the stop.
+    fn surfaces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        guarded(|| to_python(py, &surface_rows(&self.file.lens)))
+    }
+
+    /// Traces rays of one wavelength through all surfaces.
+    ///
+    /// Parameters
+    /// ----------
+    /// origins : array_like, (n, 3) or (3,)
+    ///     Points before the lens, mm in the lens frame.
+    /// directions : array_like, (n, 3) or (3,)
+    ///     Directions; those not of unit length are made so.
+    /// wavelength_nm : float
+    /// film_mm : float, optional
+    ///     Follows the rays on to a film this far behind the last vertex; else they end on the last surface.
+    /// clip : bool
+    ///     Whether rims and the stop end rays.
+    ///
+    /// Returns
+    /// -------
+    /// Rays
+    #[pyo3(signature = (origins, directions, wavelength_nm=REFERENCE_WAVELENGTH_NM, *, film_mm=None, clip=true))]
+    fn trace(
+        &self,
+        py: Python<'_>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        wavelength_nm: f64,
+        film_mm: Option<f64>,
+        clip: bool,
+    ) -> PyResult<Rays> {
+        let points = array_f64("origins", origins, "(n, 3) or (3,)", &[1, 2])?;
+        let heads = array_f64("directions", directions, "(n, 3) or (3,)", &[1, 2])?;
+        let (points, heads) = (rows_of("origins", &points)?, rows_of("directions", &heads)?);
+        if points.dim() != heads.dim() {
+            return Err(wrong(
+                "directions",
+                format!("{} rows", heads.nrows()),
+                &format!("{}, as origins", points.nrows()),
+            ));
+        }
+        if let Some(film_mm) = film_mm.filter(|mm| !mm.is_finite()) {
+            return Err(wrong("film_mm", film_mm, "a finite number"));
+        }
+        let mono = guarded(|| self.mono(wavelength_nm))?;
+        let rims = if clip { Vignetting::On } else { Vignetting::Off };
+        let to_film = |rays: &mut RayBatch| {
+            if let Some(film_mm) = film_mm {
+                mono.to_film(rays, film_mm);
+            }
+        };
+        // The arrays are read with the interpreter's lock held, so that no other thread writes to them meanwhile.
+        if points.nrows() <= FEW_RAYS {
+            return guarded(|| {
+                let mut rays = batch_of(&points, &heads)?;
+                mono.trace(&mut rays, rims);
+                to_film(&mut rays);
+                Ok(Rays::new(rays))
+            });
+        }
+        let mut rays = install(py, || batch_of(&points, &heads))??;
+        run(py, &Follower::nobody(), |_, _| {
+            mono.trace_parallel(&mut rays, rims);
+            to_film(&mut rays);
+            Ok(Rays::new(rays))
+        })
+    }
+
+    /// Returns point spread functions, upright as the picture shows them: the energy on each pixel about the centroid.
+    ///
+    /// Parameters
+    /// ----------
+    /// field_deg : float or list of float
+    ///     Angles at the entrance pupil, to the right of the picture. Default 0.
+    /// field_y_deg : float
+    ///     How far above the axis all of them lie. Default 0.
+    /// distance_mm : float or list of float
+    ///     Of the points before the first vertex; ``inf`` for a star. Default ``inf``.
+    /// wavelengths_nm : float or list of float
+    ///     Default 550.
+    /// focus_mm, film_mm : float
+    ///     The film: in focus for an object at this distance, or this far behind the last vertex. Default: in focus for the first
+    ///     of ``distance_mm``.
+    /// pixel_um : float
+    ///     Side of a pixel. Default 1.
+    /// shape : int
+    ///     Pixels along a side. Default 65; the centroid is the middle of the middle pixel of an odd number.
+    /// diffraction : {"hurb", "none", "hurb-scene3d", "hurb-calibrated", "wave"}
+    /// gamma : float
+    ///     Strength of HURB.
+    /// rays : int
+    ///     Counts this many rays along the side of a grid over the front rim, as the paper does, in place of exact energies.
+    /// seed : int
+    ///     Of the diffraction of counted rays.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float32, (fields, distances, wavelengths, shape, shape); an axis whose argument is a single number is left out.
+    /// Sums are at most 1: the share of the light entering the pupil that reaches the pixels.
+    #[pyo3(signature = (**options))]
+    fn psf<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
+        let asked = PsfOptions::read("psf", options)?;
+        let set = asked.compute(py, self)?;
+        let (n, n_points) = (asked.request.size.unwrap_or(1), set.pictures.len());
+        let mut samples: Vec<f32> = Vec::with_capacity(n_points * n * n);
+        for picture in &set.pictures {
+            samples.extend(picture.iter());
+        }
+        let request = &asked.request;
+        let lists = [&request.fields_deg, &request.distances_mm, &request.wavelengths_nm].map(Vec::len);
+        let kept = lists.iter().zip(asked.is_single).filter(|(_, is_single)| !is_single).map(|(n, _)| *n);
+        let shape: Vec<usize> = kept.chain([n, n]).collect();
+        let array =
+            ArrayD::from_shape_vec(IxDyn(&shape), samples).map_err(|_| wrong("shape", n, "pictures of equal size"))?;
+        view(py, &Arc::new(array), |array| array.view())
+    }
+
+    /// Returns what is measured of point spread functions, a dictionary each: centroid, widths, encircled energy, energy and, where
+    /// ``mtf_per_mm`` lists spatial frequencies, the MTF. Arguments as of `psf`; fields outermost, then distances, then wavelengths.
+    #[pyo3(signature = (**options))]
+    fn psf_table<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
+        let set = PsfOptions::read("psf_table", options)?.compute(py, self)?;
+        to_python(py, &set.rows)
+    }
+
+    /// Analyzes the lens by real rays: foci, spots, fans, distortion, astigmatism, color, wavefront over the field.
+    ///
+    /// Parameters
+    /// ----------
+    /// fields_deg : list of float, optional
+    ///     Angles above the axis; else those of the lens's file, else 0, 0.5, 0.7 and 1 of where the light falls to a quarter.
+    /// wavelengths_nm : list of float, optional
+    ///     Those of the lens's file, else 450, 550, 650.
+    /// distance_mm : float, optional
+    ///     Of the object; that of the lens's file, else ``inf``.
+    /// film_mm, focus_mm : float, optional
+    ///     The film's place behind the last vertex, or the distance in paraxial focus; else where the axial spot is smallest.
+    /// rings : int
+    ///     Of rays in a spot. Default 6.
+    ///
+    /// Returns
+    /// -------
+    /// dict, with the keys of ``dioptric lens analyze --json``.
+    #[pyo3(signature = (**options))]
+    fn analyze<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
+        let request = self.analysis_request(options)?;
+        let analysis = run(py, &Follower::nobody(), |_, _| request.compute(&self.file.lens))?;
+        to_python(py, &analysis)
+    }
+
+    /// Draws the lens with rays, to scale.
+    ///
+    /// Parameters
+    /// ----------
+    /// fields_deg : float or list of float
+    ///     A fan of rays each. Default: 0 and 0.7 of where the light falls to half.
+    /// distance_mm : float
+    ///     Of the object, ``inf`` for a far one.
+    /// wavelengths_nm : float or list of float, optional
+    ///     Of the rays; focus is that of the first.
+    /// film_mm : float, optional
+    ///     The film's place behind the last vertex; else where the object is in focus.
+    ///
+    /// Returns
+    /// -------
+    /// str, an SVG document.
+    #[pyo3(signature = (*, fields_deg=None, distance_mm=f64::INFINITY, wavelengths_nm=None, film_mm=None))]
+    fn draw(
+        &self,
+        fields_deg: Option<&Bound<'_, PyAny>>,
+        distance_mm: f64,
+        wavelengths_nm: Option<&Bound<'_, PyAny>>,
+        film_mm: Option<f64>,
+    ) -> PyResult<String> {
+        let fields_deg = fields_deg.map(|list| numbers("fields_deg", list)).transpose()?;
+        let wavelengths_nm = wavelengths_nm.map(|list| numbers("wavelengths_nm", list)).transpose()?;
+        let wavelengths_nm = wavelengths_nm.unwrap_or_else(|| vec![self.wavelength_or_usual(None)]);
+        guarded(|| {
+            let lens = &self.file.lens;
+            let reference = lens.at(wavelengths_nm[0]).map_err(exception)?;
+            let film_mm = film_mm.map_or_else(|| reference.film_distance_mm_for(distance_mm), Ok).map_err(exception)?;
+            let fields_deg = fields_deg.unwrap_or_else(|| {
+                let widest = dioptric_optics::analysis::field_limit_deg(&reference, 0.5);
+                widest.map_or_else(|| vec![0.0], |angle| vec![0.0, 0.7 * angle])
+            });
+            if let Some(field) = fields_deg.iter().find(|field| field.is_nan() || field.abs() >= 89.9) {
+                return Err(wrong("fields_deg", field, "angles below 89.9 degrees"));
+            }
+            let layout = Layout {
+                film_distance_mm: film_mm,
+                object_distance_mm: distance_mm,
+                field_tans: fields_deg.iter().map(|field| field.to_radians().tan()).collect(),
+                wavelengths_nm,
+                n_rays: DRAWN_RAYS,
+                width_px: 800.0,
+            };
+            lens.draw(&layout).map_err(exception)
+        })
+    }
+
+    /// Returns the distance of the film behind the last vertex, mm, at which an object is in paraxial focus.
+    #[pyo3(signature = (distance_mm, wavelength_nm=None))]
+    fn film_mm_for(&self, distance_mm: f64, wavelength_nm: Option<f64>) -> PyResult<f64> {
+        guarded(|| {
+            self.mono(self.wavelength_or_usual(wavelength_nm))?.film_distance_mm_for(distance_mm).map_err(exception)
+        })
+    }
+
+    /// Returns the lens as the text of our own lens file.
+    fn to_ron(&self) -> String {
+        self.file.to_ron()
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.file.lens == other.file.lens
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        Ok(format!("<Lens {}: f = {:.2} mm, f/{:.2}>", self.name(), self.efl_mm()?, self.f_number()?))
+    }
+
+    fn _repr_html_(&self) -> PyResult<String> {
+        self.draw(None, f64::INFINITY, None, None)
+    }
+
+    /// Copies by the text of the lens file, so that lenses can be sent to other processes.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let parse = PyType::new::<Self>(py).getattr("parse")?;
+        Ok((parse, (self.to_ron(),)))
+    }
+}
+
+impl Lens {
+    fn analysis_request(&self, options: Option<&Bound<'_, PyDict>>) -> PyResult<AnalysisRequest> {
+        let used = self.used();
+        let mut request = AnalysisRequest {
+            fields: AnalysisFields::ByLight,
+            main_wavelength_nm: used.reference_nm,
+            wavelengths_nm: used.wavelengths_or(&USUAL_NM),
+            distance_mm: used.distance_mm,
+            film: AnalysisFilm::BestFocus,
+            n_rings: 6,
+        };
+        let (mut has_fields, mut has_distance) = (false, false);
+        let known = ["fields_deg", "wavelengths_nm", "distance_mm", "film_mm", "focus_mm", "rings"];
+        each_option("analyze", options, &known, |key, value| {
+            match key {
+                "fields_deg" => {
+                    request.fields = AnalysisFields::above_axis_deg(&numbers(key, value)?);
+                    has_fields = true;
+                }
+                "wavelengths_nm" => {
+                    request.wavelengths_nm = numbers(key, value)?;
+                    request.main_wavelength_nm = None;
+                }
+                "distance_mm" => {
+                    request.distance_mm = number(key, value)?;
+                    has_distance = true;
+                }
+                "film_mm" => request.film = AnalysisFilm::FilmMm(number(key, value)?),
+                "focus_mm" => request.film = AnalysisFilm::FocusMm(number(key, value)?),
+                _ => request.n_rings = count(key, value)?,
+            }
+            Ok(())
+        })?;
+        let of_file = used.analysis_fields(request.reference_nm());
+        // Places of an object elsewhere say nothing of this one.
+        let fits = |fields: &AnalysisFields| !(has_distance && matches!(fields, AnalysisFields::HeightsMm(_)));
+        if let Some(fields) = of_file.filter(fits).filter(|_| !has_fields) {
+            request.fields = fields;
+        }
+        Ok(request)
+    }
+}
+
+/// What is asked of point spread functions.
+struct PsfOptions {
+    request: PsfRequest,
+    /// Whether field, distance and wavelength are single numbers.
+    is_single: [bool; 3],
+}
+
+impl PsfOptions {
+    fn read(function: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut request = PsfRequest {
+            fields_deg: vec![0.0],
+            field_y_deg: 0.0,
+            distances_mm: vec![f64::INFINITY],
+            wavelengths_nm: vec![REFERENCE_WAVELENGTH_NM],
+            focus: FocusSpec::NearObject,
+            diffraction: Diffraction::Hurb { gamma: 1.0 },
+            pixel_um: 1.0,
+            size: Some(65),
+            sampling: PsfSampling::Pupil,
+            bank: None,
+            mtf_per_mm: Vec::new(),
+            seed: 1,
+            spectral_weights: Vec::new(),
+        };
+        let mut single = [true; 3];
+        let known = [
+            "field_deg",
+            "field_y_deg",
+            "distance_mm",
+            "wavelengths_nm",
+            "focus_mm",
+            "film_mm",
+            "pixel_um",
+            "shape",
+            "diffraction",
+            "gamma",
+            "rays",
+            "seed",
+            "mtf_per_mm",
+        ];
+        each_option(function, options, &known, |key, value| {
+            match key {
+                "field_deg" => (request.fields_deg, single[0]) = (numbers(key, value)?, is_single(value)),
+                "field_y_deg" => request.field_y_deg = number(key, value)?,
+                "distance_mm" => (request.distances_mm, single[1]) = (numbers(key, value)?, is_single(value)),
+                "wavelengths_nm" => (request.wavelengths_nm, single[2]) = (numbers(key, value)?, is_single(value)),
+                "focus_mm" => request.focus = FocusSpec::DistanceMm(number(key, value)?),
+                "film_mm" => request.focus = FocusSpec::FilmMm(number(key, value)?),
+                "pixel_um" => request.pixel_um = number(key, value)?,
+                "shape" => request.size = Some(count(key, value)?),
+                "diffraction" => request.diffraction = diffraction(key, value)?,
+                "gamma" => request.diffraction = with_gamma(request.diffraction, number(key, value)?)?,
+                "rays" => request.sampling = PsfSampling::Paper { n_across: count(key, value)? },
+                "seed" => request.seed = count(key, value)? as u64,
+                _ => request.mtf_per_mm = numbers(key, value)?,
+            }
+            Ok(())
+        })?;
+        if request.focus == FocusSpec::NearObject {
+            request.focus = FocusSpec::DistanceMm(request.distances_mm[0]);
+        }
+        Ok(Self { request, is_single: single })
+    }
+
+    fn compute(&self, py: Python<'_>, lens: &Lens) -> PyResult<PsfSet> {
+        run(py, &Follower::nobody(), |_, _| -> Result<PsfSet, PipelineError> { self.request.compute(&lens.file.lens) })
+    }
+}
+
+/// Returns an array of rows of three numbers; a single row may lack its axis.
+fn rows_of<'a>(key: &str, array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<ArrayView2<'a, f64>> {
+    let view: ArrayViewD<'a, f64> = array.as_array();
+    let shape = view.shape().to_vec();
+    let view = if view.ndim() == 1 { view.insert_axis(Axis(0)) } else { view };
+    let rows = view.into_dimensionality().ok().filter(|rows: &ArrayView2<'a, f64>| rows.ncols() == 3);
+    rows.ok_or_else(|| wrong(key, format!("of shape {shape:?}"), "an array of shape (n, 3) or (3,)"))
+}
+
+/// Returns rays from rows of points and directions.
+fn batch_of(points: &ArrayView2<'_, f64>, heads: &ArrayView2<'_, f64>) -> PyResult<RayBatch> {
+    const AT_ONCE: usize = 16_384;
+    let n = points.nrows();
+    let mut rays = RayBatch::with_capacity(0);
+    let fill = |rows: &ArrayView2<'_, f64>, column: usize| -> Vec<f64> {
+        let column = rows.column(column);
+        let mut list = vec![0.0; n];
+        let part = |(number, part): (usize, &mut [f64])| {
+            let first = number * AT_ONCE;
+            part.iter_mut().zip(column.iter().skip(first)).for_each(|(to, from)| *to = *from);
+        };
+        match n <= AT_ONCE {
+            true => list.chunks_mut(AT_ONCE).enumerate().for_each(part),
+            false => list.par_chunks_mut(AT_ONCE).enumerate().for_each(part),
+        }
+        list
+    };
+    (rays.x_mm, rays.y_mm, rays.z_mm) = (fill(points, 0), fill(points, 1), fill(points, 2));
+    (rays.l, rays.m, rays.n) = (fill(heads, 0), fill(heads, 1), fill(heads, 2));
+    rays.opl_mm = vec![0.0; n];
+    rays.fate = vec![dioptric_optics::RayFate::InFlight; n];
+    for ray in 0..n {
+        let (l, m, cosine) = (rays.l[ray], rays.m[ray], rays.n[ray]);
+        let squared = l * l + m * m + cosine * cosine;
+        if (squared - 1.0).abs() > 1e-15 {
+            let length = squared.sqrt();
+            if !(length.is_finite() && length > 0.0) {
+                return Err(wrong("directions", format!("[{l}, {m}, {cosine}] in row {ray}"), "a direction"));
+            }
+            (rays.l[ray], rays.m[ray], rays.n[ray]) = (l / length, m / length, cosine / length);
+        }
+    }
+    let is_finite = |list: &Vec<f64>| list.iter().all(|value| value.is_finite());
+    match is_finite(&rays.x_mm) && is_finite(&rays.y_mm) && is_finite(&rays.z_mm) {
+        true => Ok(rays),
+        false => Err(wrong("origins", "not finite somewhere", "finite numbers")),
+    }
+}

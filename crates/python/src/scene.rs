@@ -1,0 +1,318 @@
+//! Scenes: what stands before the camera.
+
+use std::{
+    path::PathBuf,
+    sync::{Arc, OnceLock},
+};
+
+use dioptric_pipeline::{Camera, Given, KeptCamera, PipelineError, SceneSource, SceneSpec, parse_illuminant};
+use dioptric_scene::{Pattern, Scene as RadianceScene, SceneLight, View, write_scene_exr};
+use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use ndarray::{Array2, Array3, ArrayView1, Axis, Ix2, Ix3};
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    errors::{exception, guarded, wrong},
+    input::{is_single, number, numbers, owned_f32},
+    options::{each_option, light},
+    view::view,
+    worker::{Follower, run},
+};
+
+/// What stands before the camera: spectral radiance and depth, from arrays, a file, or drawn. It never changes.
+///
+/// Radiance is W m⁻² sr⁻¹ nm⁻¹ and absolute; depth is metres along the axis from the entrance pupil. Row 0 is the top.
+#[pyclass(frozen, module = "dioptric")]
+pub(crate) struct Scene {
+    source: Source,
+    /// The radiance, once it was asked for.
+    radiance: OnceLock<Given<RadianceScene>>,
+}
+
+enum Source {
+    /// A camera file can say it; nothing is read before it is needed.
+    Spec(Box<SceneSpec>),
+    /// Made of arrays.
+    Given(Given<RadianceScene>),
+}
+
+impl Scene {
+    /// Returns the scene that a camera file says.
+    pub(crate) fn of_choice(spec: SceneSpec) -> Self {
+        Self { source: Source::Spec(Box::new(spec)), radiance: OnceLock::new() }
+    }
+
+    /// Returns the scene of a camera.
+    pub(crate) fn of_camera(kept: &KeptCamera) -> Self {
+        match &kept.given().scene {
+            Some(scene) => Self::of_given(scene.clone()),
+            None => Self::of_choice(kept.camera().scene.clone()),
+        }
+    }
+
+    fn of_given(scene: Given<RadianceScene>) -> Self {
+        Self { source: Source::Given(scene), radiance: OnceLock::new() }
+    }
+
+    /// Returns a camera before which this scene stands.
+    pub(crate) fn put_into(&self, kept: &KeptCamera) -> KeptCamera {
+        match &self.source {
+            Source::Spec(spec) => {
+                let mut given = kept.given().clone();
+                given.scene = None;
+                kept.with_camera(Camera { scene: SceneSpec::clone(spec), ..kept.camera().clone() }, given)
+            }
+            Source::Given(scene) => {
+                let bare = SceneSpec::of_file(PathBuf::new());
+                kept.with(|camera| camera.scene = bare).with_given_scene(scene.clone())
+            }
+        }
+    }
+
+    fn opened(&self, py: Python<'_>) -> PyResult<&Given<RadianceScene>> {
+        if let Some(scene) = self.radiance.get() {
+            return Ok(scene);
+        }
+        let scene = match &self.source {
+            Source::Given(scene) => scene.clone(),
+            Source::Spec(spec) => run(py, &Follower::nobody(), |_, _| spec.open(None).map(Given::new))?,
+        };
+        Ok(self.radiance.get_or_init(|| scene))
+    }
+}
+
+#[pymethods]
+impl Scene {
+    /// Makes a scene of arrays.
+    ///
+    /// Parameters
+    /// ----------
+    /// radiance : array_like, (bands, rows, columns)
+    ///     Spectral radiance, W m⁻² sr⁻¹ nm⁻¹, finite and not negative; copied, as 32-bit floats.
+    /// wavelengths_nm : list of float
+    ///     Centers of the bands, ascending.
+    /// depth_m : float or array_like (rows, columns)
+    ///     Depth along the axis, above 0; ``inf`` is allowed.
+    /// fov_deg : float
+    ///     Horizontal field of view from edge to edge.
+    /// light : str, optional
+    ///     The light on it, where that is known, as ``"D65"``: what white balance goes by.
+    /// name : str
+    #[staticmethod]
+    #[pyo3(signature = (radiance, wavelengths_nm, *, depth_m, fov_deg, light=None, name="scene"))]
+    fn from_array(
+        radiance: &Bound<'_, PyAny>,
+        wavelengths_nm: &Bound<'_, PyAny>,
+        depth_m: &Bound<'_, PyAny>,
+        fov_deg: f64,
+        light: Option<&str>,
+        name: &str,
+    ) -> PyResult<Self> {
+        let cube = owned_f32("radiance", radiance, "(bands, rows, columns)", &[3])?;
+        let cube: Array3<f32> = cube.into_dimensionality::<Ix3>().expect("three axes were checked");
+        let depth = match is_single(depth_m) {
+            true => Array2::from_elem((cube.dim().1, cube.dim().2), number("depth_m", depth_m)? as f32),
+            false => {
+                let map = owned_f32("depth_m", depth_m, "(rows, columns)", &[2])?;
+                map.into_dimensionality::<Ix2>().expect("two axes were checked")
+            }
+        };
+        let wavelengths_nm = numbers("wavelengths_nm", wavelengths_nm)?;
+        guarded(|| {
+            let make = || -> Result<RadianceScene, PipelineError> {
+                let grid = WavelengthGrid::new(wavelengths_nm)?;
+                let (_, rows, columns) = cube.dim();
+                let planes = cube.axis_iter(Axis(0)).map(|plane| plane.to_owned()).collect();
+                let mut scene = RadianceScene::new(name, SpectralImage::new(Quantity::Radiance, grid, planes)?);
+                scene.depth = Some(DepthMap::new(depth)?);
+                scene.view = Some(View::from_horizontal_fov_deg(fov_deg, columns, rows)?);
+                if let Some(light) = light {
+                    scene.light = Some(SceneLight { illuminant: parse_illuminant(light)?, illuminance_lux: None });
+                }
+                scene.validate()?;
+                Ok(scene)
+            };
+            Ok(Self::of_given(Given::new(make().map_err(exception)?)))
+        })
+    }
+
+    /// Reads a scene: a spectral EXR, an ENVI header, a folder of band pictures, or an ordinary picture, which is lifted to
+    /// spectra. The file is read when it is needed.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    /// fov_deg : float, optional
+    ///     Horizontal field of view, for files that hold none.
+    /// depth_m : float, optional
+    ///     One depth for all of it, for files that hold none.
+    /// illuminant : str, optional
+    ///     The light that it is put under, as ``"D65"``, ``"3200K"``, or a CSV file.
+    /// illuminance_lux : float, optional
+    /// light : str, optional
+    ///     The light that is on a file of radiance, which does not state it.
+    /// mean_luminance_cd_m2 : float, optional
+    ///     Scales the radiance.
+    #[staticmethod]
+    #[pyo3(signature = (path, **options))]
+    fn read(path: PathBuf, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        if !path.exists() {
+            let reason = "there is no such file or folder".to_owned();
+            return Err(exception(PipelineError::Read { path, reason }));
+        }
+        Ok(Self::of_choice(with_options("read", SceneSpec::of_file(path), options)?))
+    }
+
+    /// Returns the built-in still life, with objects at several depths, under a light like a room's.
+    ///
+    /// Parameters
+    /// ----------
+    /// columns, rows : int
+    /// illuminant, illuminance_lux, mean_luminance_cd_m2
+    ///     As of `Scene.read`.
+    #[staticmethod]
+    #[pyo3(signature = (columns=1080, rows=720, **options))]
+    fn still_life(columns: usize, rows: usize, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let source = SceneSource::StillLife { columns, rows };
+        let spec = SceneSpec { source, ..SceneSpec::of_file(PathBuf::new()) };
+        Ok(Self::of_choice(with_options("still_life", spec, options)?))
+    }
+
+    /// Returns a flat target that faces the camera.
+    ///
+    /// Parameters
+    /// ----------
+    /// pattern : {"uniform", "checkerboard", "slanted-bar", "radial-lines", "point-array", "siemens-star", "color-chart"}
+    /// columns, rows : int
+    /// fov_deg : float
+    ///     Horizontal field of view from its left edge to its right.
+    /// depth_m : float
+    ///     Its distance along the axis.
+    /// size : float, optional
+    ///     Of the pattern: side of a square or distance of points in samples (default 16), slope of the bar (2.6), number of lines
+    ///     (8) or of pairs of sectors (36).
+    /// illuminant, illuminance_lux, mean_luminance_cd_m2
+    ///     As of `Scene.read`.
+    #[staticmethod]
+    #[pyo3(signature = (pattern, columns, rows, *, size=None, **options))]
+    fn target(
+        pattern: &str,
+        columns: usize,
+        rows: usize,
+        size: Option<f64>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let whole = |usual: usize| match size {
+            None => Ok(usual),
+            Some(n) if n >= 1.0 && n.fract() == 0.0 && n < 1e6 => Ok(n as usize),
+            Some(n) => Err(wrong("size", n, "a whole number of 1 or more")),
+        };
+        let pattern = match pattern {
+            "uniform" => Pattern::Uniform,
+            "checkerboard" => Pattern::Checkerboard { check_px: whole(16)? },
+            "slanted-bar" => Pattern::SlantedBar { slope: size.unwrap_or(2.6) },
+            "radial-lines" => Pattern::RadialLines { n_lines: whole(8)? },
+            "point-array" => Pattern::PointArray { spacing_px: whole(16)? },
+            "siemens-star" => Pattern::SiemensStar { n_cycles: whole(36)? },
+            "color-chart" => Pattern::ColorChart,
+            other => {
+                let expected =
+                    "uniform, checkerboard, slanted-bar, radial-lines, point-array, siemens-star or color-chart";
+                return Err(wrong("pattern", format!("'{other}'"), expected));
+            }
+        };
+        let source = SceneSource::Target { pattern, columns, rows };
+        let spec = with_options("target", SceneSpec { source, ..SceneSpec::of_file(PathBuf::new()) }, options)?;
+        for (key, value) in [("fov_deg", spec.field_of_view_deg), ("depth_m", spec.depth_m)] {
+            if value.is_none() {
+                return Err(wrong(key, "missing", "a number: a target has none of its own"));
+            }
+        }
+        Ok(Self::of_choice(spec))
+    }
+
+    /// What the scene is called.
+    #[getter]
+    fn name(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(self.opened(py)?.name.clone())
+    }
+
+    /// Bands, rows and columns.
+    #[getter]
+    fn shape(&self, py: Python<'_>) -> PyResult<(usize, usize, usize)> {
+        let scene = self.opened(py)?;
+        Ok((scene.radiance.grid().len(), scene.rows(), scene.columns()))
+    }
+
+    /// Centers of the bands, nm; (bands,) float64.
+    #[getter]
+    fn wavelengths_nm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let owner = Arc::new(self.opened(py)?.clone());
+        view(py, &owner, |scene| ArrayView1::from(scene.radiance.grid().centers_nm()))
+    }
+
+    /// Depth of each sample along the axis, m; (rows, columns) float32, a view.
+    #[getter]
+    fn depth_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let owner = Arc::new(self.opened(py)?.clone());
+        owner.require_depth().map_err(exception)?;
+        view(py, &owner, |scene| scene.depth.as_ref().expect("it was checked").z_m().view())
+    }
+
+    /// Mean luminance, cd/m² (CIE 1931).
+    #[getter]
+    fn mean_luminance_cd_m2(&self, py: Python<'_>) -> PyResult<f64> {
+        Ok(self.opened(py)?.mean_luminance_cd_m2())
+    }
+
+    /// Returns the spectral radiance of a band, W m⁻² sr⁻¹ nm⁻¹; (rows, columns) float32, a view.
+    fn band<'py>(&self, py: Python<'py>, band: usize) -> PyResult<Bound<'py, PyAny>> {
+        let owner = Arc::new(self.opened(py)?.clone());
+        let n_bands = owner.radiance.planes().len();
+        if band >= n_bands {
+            return Err(wrong("band", band, &format!("0 to {}", n_bands - 1)));
+        }
+        view(py, &owner, |scene| scene.radiance.planes()[band].view())
+    }
+
+    /// Returns the spectral radiance, W m⁻² sr⁻¹ nm⁻¹; (bands, rows, columns) float32, copied from the bands.
+    fn to_array<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let scene = self.opened(py)?;
+        view(py, &Arc::new(scene.radiance.to_cube()), |cube| cube.view())
+    }
+
+    /// Writes the scene as spectral EXR with depth and view, which `Scene.read` and ``dioptric run --scene`` read.
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let scene = self.opened(py)?;
+        run(py, &Follower::nobody(), |_, _| Ok(write_scene_exr(&path, scene, true)?))
+    }
+
+    fn __repr__(&self) -> String {
+        let of_size = |what: &str, columns: usize, rows: usize| format!("<Scene {what}: {columns} × {rows}>");
+        match &self.source {
+            Source::Given(scene) => of_size(&scene.name, scene.columns(), scene.rows()),
+            Source::Spec(spec) => match &spec.source {
+                SceneSource::File(path) => format!("<Scene {}>", path.display()),
+                SceneSource::World(world) => format!("<Scene {}>", world.file.display()),
+                SceneSource::StillLife { columns, rows } => of_size("still life", *columns, *rows),
+                SceneSource::Target { pattern, columns, rows } => of_size(&format!("{pattern:?}"), *columns, *rows),
+            },
+        }
+    }
+}
+
+fn with_options(function: &str, mut spec: SceneSpec, options: Option<&Bound<'_, PyDict>>) -> PyResult<SceneSpec> {
+    let known = ["fov_deg", "depth_m", "illuminant", "illuminance_lux", "light", "mean_luminance_cd_m2"];
+    each_option(function, options, &known, |key, value| {
+        match key {
+            "fov_deg" => spec.field_of_view_deg = Some(number(key, value)?),
+            "depth_m" => spec.depth_m = Some(number(key, value)?),
+            "illuminant" => spec.illuminant = Some(light(key, value)?),
+            "illuminance_lux" => spec.illuminance_lux = Some(number(key, value)?),
+            "light" => spec.light = Some(light(key, value)?),
+            _ => spec.mean_luminance_cd_m2 = Some(number(key, value)?),
+        }
+        Ok(())
+    })?;
+    Ok(spec)
+}

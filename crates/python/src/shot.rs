@@ -1,0 +1,370 @@
+//! What came of a camera.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{Arc, OnceLock},
+};
+
+use dioptric_analysis::{Run, RunReport};
+use dioptric_pipeline::{
+    Capture, IRRADIANCE_FILE, KeptCamera, PipelineError, Quality, Staged, picture_png, write_file, write_frames,
+    write_json,
+};
+use dioptric_psf::LensImageModel;
+use dioptric_scene::write_planes_exr;
+use dioptric_sensor::RawPlane;
+use dioptric_spectrum::{Bands, DepthMap};
+use ndarray::{Array2, Array3, ArrayView1, Axis};
+use pyo3::{
+    prelude::*,
+    types::{PyBytes, PyDict, PyTuple},
+};
+
+use crate::{
+    camera::Camera,
+    changes::{OF_EXPOSURE, OF_PICTURE, changed},
+    errors::wrong,
+    serial::to_python,
+    view::view,
+    worker::{Follower, run},
+};
+
+/// A picture that was taken, with every stage that led to it.
+///
+/// Arrays are read-only views of the results; they hold what they need, and outlive the shot. Row 0 is the top, upright as the
+/// photographer sees it.
+#[pyclass(frozen, module = "dioptric")]
+pub(crate) struct Shot {
+    kept: KeptCamera,
+    capture: Arc<Capture>,
+    /// Irradiance that was kept in a file, once it was asked for.
+    read: OnceLock<Arc<Array3<f32>>>,
+    rgb: OnceLock<Arc<Array3<u8>>>,
+}
+
+impl Shot {
+    /// Takes the picture of a camera.
+    pub(crate) fn take(py: Python<'_>, kept: KeptCamera, follower: &Follower) -> PyResult<Self> {
+        let capture = run(py, follower, |progress, cancel| kept.capture(progress, cancel))?;
+        Ok(Self { kept, capture: Arc::new(capture), read: OnceLock::new(), rgb: OnceLock::new() })
+    }
+
+    /// Takes the picture again with a change that images nothing.
+    fn again(
+        &self,
+        py: Python<'_>,
+        function: &str,
+        changes: Option<&Bound<'_, PyDict>>,
+        known: &[&str],
+    ) -> PyResult<Self> {
+        let kept = changed(function, &self.kept, changes, known)?;
+        kept.keep(&self.capture);
+        Self::take(py, kept, &Follower::nobody())
+    }
+
+    /// Returns views of the planes of a frame.
+    fn planes<'py>(
+        &self,
+        py: Python<'py>,
+        pick: impl Fn(&Capture) -> &Vec<Array2<f32>>,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        (0..pick(&self.capture).len()).map(|n| view(py, &self.capture, |capture| pick(capture)[n].view())).collect()
+    }
+
+    /// Returns the plane of a frame that has one, else all of them.
+    fn plane_or_planes<'py>(&self, py: Python<'py>, mut planes: Vec<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        match planes.len() {
+            1 => Ok(planes.swap_remove(0)),
+            _ => Ok(PyTuple::new(py, planes)?.into_any()),
+        }
+    }
+
+    fn model_and_depth(&self, py: Python<'_>) -> PyResult<(Arc<LensImageModel>, Arc<DepthMap>)> {
+        self.kept.keep(&self.capture);
+        run(py, &Follower::nobody(), |progress, cancel| {
+            Ok((self.kept.model(progress, cancel)?, self.kept.depth(progress, cancel)?))
+        })
+    }
+}
+
+#[pymethods]
+impl Shot {
+    /// The camera that took it.
+    #[getter]
+    fn camera(&self) -> Camera {
+        Camera::new(self.kept.with_quality(Quality::Full))
+    }
+
+    /// How finely it was simulated: "full", "draft" or "preview".
+    #[getter]
+    fn quality(&self) -> &'static str {
+        match self.capture.quality {
+            Quality::Full => "full",
+            Quality::Draft => "draft",
+            Quality::Preview => "preview",
+        }
+    }
+
+    /// Rows and columns of the picture.
+    #[getter]
+    fn shape(&self) -> (usize, usize) {
+        (self.capture.place.rows, self.capture.place.columns)
+    }
+
+    /// Distance between the samples of the irradiance on the film, µm.
+    #[getter]
+    fn pitch_um(&self) -> f64 {
+        self.capture.place.pitch_um
+    }
+
+    /// Distance of the film behind the last vertex, mm.
+    #[getter]
+    fn film_mm(&self) -> f64 {
+        self.capture.place.film_distance_mm
+    }
+
+    /// How long the shutter was open, s, as given or metered.
+    #[getter]
+    fn exposure_s(&self) -> f64 {
+        self.capture.frames.exposure.time_s
+    }
+
+    /// Centers of the bands, nm; (bands,) float64.
+    #[getter]
+    fn wavelengths_nm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        view(py, &self.capture, |capture| ArrayView1::from(capture.grid().centers_nm()))
+    }
+
+    /// Spectral irradiance on the film, W m⁻² nm⁻¹; (bands, rows, columns) float32.
+    ///
+    /// A view; where it was kept in a file (``memory_bytes`` of `Camera.render`), read at the first access.
+    #[getter]
+    fn irradiance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let irradiance = &self.capture.irradiance;
+        if !irradiance.is_spilled() {
+            return view(py, irradiance, |irradiance| irradiance.cube().expect("it is in memory"));
+        }
+        if self.read.get().is_none() {
+            let cube = run(py, &Follower::nobody(), |_, cancel| -> Result<_, PipelineError> {
+                let (rows, columns) = irradiance.size();
+                let mut cube = Array3::zeros((irradiance.grid().len(), rows, columns));
+                for (band, mut plane) in cube.axis_iter_mut(Axis(0)).enumerate() {
+                    cancel.check()?;
+                    plane.assign(&*irradiance.band(band)?);
+                }
+                Ok(cube)
+            })?;
+            self.read.get_or_init(|| Arc::new(cube));
+        }
+        view(py, self.read.get().expect("it was read"), |cube| cube.view())
+    }
+
+    /// Mean rate of photo-electrons, electrons a second; (rows, columns) float32, or a tuple, one a filter, of a sensor of stacked
+    /// filters.
+    #[getter]
+    fn electron_rate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.plane_or_planes(py, self.planes(py, |capture| &capture.rate.planes_e_per_s)?)
+    }
+
+    /// Electrons at the end of the exposure, with shot noise; (rows, columns) float32, or a tuple, one a filter.
+    #[getter]
+    fn electrons<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.plane_or_planes(py, self.planes(py, |capture| &capture.frames.exposed.electrons.planes_e)?)
+    }
+
+    /// Voltages at the pixels' outputs before the analog gain, V; (rows, columns) float32, or a tuple, one a filter.
+    #[getter]
+    fn volts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.plane_or_planes(py, self.planes(py, |capture| &capture.frames.exposed.volts.planes_v)?)
+    }
+
+    /// The frame as the converter gives it: digital numbers, (rows, columns) uint16; float32 volts without a converter; a tuple,
+    /// one a filter, of a sensor of stacked filters.
+    #[getter]
+    fn raw<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let planes = 0..self.capture.frames.exposed.raw.planes.len();
+        let plane = |n: usize| match &self.capture.frames.exposed.raw.planes[n] {
+            RawPlane::Dn(_) => view(py, &self.capture, |capture| {
+                capture.frames.exposed.raw.planes[n].dn().expect("it holds digital numbers").view()
+            }),
+            RawPlane::Volts(plane) => view(py, &Arc::new(plane.clone()), |plane| plane.view()),
+        };
+        self.plane_or_planes(py, planes.map(plane).collect::<PyResult<_>>()?)
+    }
+
+    /// The levels of `raw`: ``black``, ``white`` (saturation) and ``top`` samples, and ``volts_per_electron`` after the gain.
+    #[getter]
+    fn levels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let levels = &self.capture.frames.exposed.raw.levels;
+        let dict = PyDict::new(py);
+        for (key, value) in [
+            ("black", levels.black),
+            ("white", levels.white),
+            ("top", levels.top),
+            ("step_v", levels.step_v),
+            ("volts_per_electron", levels.volts_per_electron),
+        ] {
+            dict.set_item(key, value)?;
+        }
+        Ok(dict)
+    }
+
+    /// The picture's codes, 0-1; (rows, columns, 3) float32.
+    #[getter]
+    fn picture<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        view(py, &self.capture.developed, |developed| developed.picture.codes.view())
+    }
+
+    /// The picture's 8-bit codes, those of ``picture.png``; (rows, columns, 3) uint8, rounded at the first access.
+    #[getter]
+    fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let rgb = self.rgb.get_or_init(|| {
+            let picture = &self.capture.developed.picture;
+            let shape = (picture.rows(), picture.columns(), 3);
+            Arc::new(Array3::from_shape_vec(shape, picture.to_rgb8()).expect("three codes a pixel"))
+        });
+        view(py, rgb, |rgb| rgb.view())
+    }
+
+    /// Depth of the scene's samples along the axis, m; (scene rows, scene columns) float32.
+    #[getter]
+    fn depth_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let kept = &self.kept;
+        let depth = run(py, &Follower::nobody(), |progress, cancel| kept.depth(progress, cancel))?;
+        view(py, &depth, |depth| depth.z_m().view())
+    }
+
+    /// Returns what was measured: lens, film, scene, bank, irradiance, sensor statistics, losses; the keys of ``report.json``.
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (model, depth) = self.model_and_depth(py)?;
+        let capture = &*self.capture;
+        let report = run(py, &Follower::nobody(), |_, _| {
+            RunReport::new(&Run { capture, model: &model, depth: Some(&depth) }, &[], Vec::new())
+        })?;
+        to_python(py, &report)
+    }
+
+    /// Takes the picture again under another exposure; the scene is not imaged again, whatever was rendered since.
+    ///
+    /// Parameters
+    /// ----------
+    /// seed, exposure_s, analog_gain, noise, burst, bracket_stops, white, demosaic, highlights
+    ///     As of `Camera.with_`.
+    ///
+    /// Returns
+    /// -------
+    /// Shot
+    #[pyo3(signature = (**changes))]
+    fn expose(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        self.again(py, "expose", changes, OF_EXPOSURE)
+    }
+
+    /// Develops the same frames otherwise.
+    ///
+    /// Parameters
+    /// ----------
+    /// white, demosaic, highlights
+    ///     As of `Camera.with_`.
+    ///
+    /// Returns
+    /// -------
+    /// Shot
+    #[pyo3(signature = (**changes))]
+    fn develop(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        self.again(py, "develop", changes, OF_PICTURE)
+    }
+
+    /// Returns the picture as the bytes of a PNG file, equal to the ``picture.png`` of ``dioptric run``.
+    fn png<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let developed = &self.capture.developed;
+        let png = run(py, &Follower::nobody(), |_, _| picture_png(&developed.picture))?;
+        Ok(PyBytes::new(py, &png))
+    }
+
+    /// Writes the picture to a path that ends in ``.png``, else everything into a folder.
+    ///
+    /// A folder gets what ``dioptric run`` writes and the camera's ``outputs`` ask for, but for the page ``report.html``:
+    /// ``picture.png``, ``irradiance.exr``, ``depth.exr``, ``volts.exr``, ``raw.png``, ``report.json``, and ``camera.ron`` and
+    /// ``kept.ron``, from which a run continues, where files can name all parts. Files appear whole or not at all.
+    ///
+    /// Returns
+    /// -------
+    /// list of str, the names of the files.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<Vec<String>> {
+        let is_picture = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+        if is_picture && !path.is_dir() {
+            let developed = &self.capture.developed;
+            return run(py, &Follower::nobody(), |_, _| {
+                let staged = Staged::file(&path)?;
+                write_file(staged.path(), &picture_png(&developed.picture)?)?;
+                staged.commit()?;
+                Ok(vec![path.file_name().unwrap_or_default().to_string_lossy().into_owned()])
+            });
+        }
+        if path.extension().is_some() && !path.is_dir() {
+            return Err(wrong("path", format!("'{}'", path.display()), "a folder, or a file that ends in .png"));
+        }
+        let (model, depth) = self.model_and_depth(py)?;
+        run(py, &Follower::nobody(), |_, _| {
+            let staged = Staged::folder(&path)?;
+            let files = self.write_into(staged.path(), &model, &depth)?;
+            staged.commit()?;
+            Ok(files)
+        })
+    }
+
+    /// Returns all stages as an ``xarray.Dataset``, with coordinates in nm and mm and units; needs xarray, which
+    /// ``pip install dioptric[xarray]`` brings.
+    fn to_xarray<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("dioptric._xarray")?.call_method1("dataset", (slf,))
+    }
+
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        self.png(py)
+    }
+
+    fn _repr_html_<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("dioptric._html")?.call_method1("shot", (slf,))
+    }
+
+    fn __repr__(&self) -> String {
+        let place = &self.capture.place;
+        let bands = self.capture.grid().len();
+        let name = &self.capture.camera.name;
+        format!("<Shot {name}: {} × {} pixels, {bands} bands, {:.4} s>", place.columns, place.rows, self.exposure_s())
+    }
+}
+
+impl Shot {
+    fn write_into(
+        &self,
+        folder: &Path,
+        model: &LensImageModel,
+        depth: &DepthMap,
+    ) -> Result<Vec<String>, PipelineError> {
+        let capture = &*self.capture;
+        let outputs = &capture.camera.outputs;
+        let mut files = Vec::new();
+        if outputs.irradiance {
+            capture.irradiance.write_exr(&folder.join(IRRADIANCE_FILE))?;
+            files.push(IRRADIANCE_FILE.to_owned());
+        }
+        if outputs.depth {
+            write_planes_exr(&folder.join("depth.exr"), &[("Z", depth.z_m())], true)?;
+            files.push("depth.exr".to_owned());
+        }
+        files.extend(write_frames(&capture.frame_parts(), &capture.developed.picture, outputs, folder)?.0);
+        if self.kept.given().check_none().is_ok() {
+            write_file(&folder.join("camera.ron"), capture.camera.to_ron().as_bytes())?;
+            files.push("camera.ron".to_owned());
+            if outputs.irradiance && capture.quality == Quality::Full {
+                self.kept.write_resume_file(capture, folder)?;
+                files.push(dioptric_pipeline::RESUME_FILE.to_owned());
+            }
+        }
+        let report = RunReport::new(&Run { capture, model, depth: Some(depth) }, &[], files.clone())?;
+        write_json(&folder.join("report.json"), &report)?;
+        files.push("report.json".to_owned());
+        Ok(files)
+    }
+}

@@ -1,0 +1,104 @@
+"""Everything wrong is a ValueError, an OSError or a TypeError of one sentence; no panic passes `except Exception`."""
+
+import dioptric as dp
+import numpy as np
+import pytest
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"f_number": -4}, ValueError, "FNumber is -4, expected a finite number above 0"),
+        ({"f_number": 0.3}, ValueError, "opens to at most"),
+        ({"f_number": "wide"}, TypeError, "f_number is str, expected a number"),
+        ({"focus_mm": "far"}, ValueError, "focus_mm is 'far', expected a distance in mm"),
+        ({"lens": "no-such-lens"}, ValueError, "no lens is named 'no-such-lens'"),
+        ({"lens": 5}, TypeError, "lens is int, expected a name, a path or an object of dioptric"),
+        ({"sensor": "no-such-sensor"}, ValueError, "no sensor is named 'no-such-sensor'"),
+        ({"diffraction": "some"}, ValueError, "diffraction is 'some', expected 'none', 'hurb'"),
+        ({"diffraction": "none", "gamma": 2}, ValueError, "gamma is 2, expected diffraction='hurb'"),
+        ({"pixels": 5}, TypeError, "pixels is int, expected a pair"),
+        ({"pixels": (0, 5)}, ValueError, "columns is 0, expected 1 to 65536"),
+        ({"white": "pinkish"}, ValueError, "'pinkish' is not known, expected one of scene, none"),
+        ({"noise": "hiss"}, ValueError, "'hiss' is not known"),
+        ({"wavelengths_nm": []}, ValueError, "wavelengths_nm is empty"),
+        ({"wavelengths_nm": [500, None]}, TypeError, "wavelengths_nm is list, expected a number or a list of numbers"),
+        ({"seed": -1}, TypeError, "seed is int, expected a whole number of 0 or more"),
+        ({"burst": 0}, ValueError, "Burst is 0"),
+        ({"illuminant": "moon"}, ValueError, "moon"),
+        ({"f_numbre": 4}, TypeError, r"with_\(\) has no argument 'f_numbre'; it has name, lens, f_number"),
+    ],
+)
+def test_wrong_change_is_named(tiny: dp.Camera, change: dict, error: type, words: str) -> None:
+    with pytest.raises(error, match=words) as raised:
+        tiny.with_(**change)
+    assert "\n" not in str(raised.value)
+
+
+def test_files_that_are_not_there_are_os_errors() -> None:
+    for act in (
+        lambda: dp.Camera.read("/nowhere/camera.ron"),
+        lambda: dp.Lens.read("/nowhere/lens.zmx"),
+        lambda: dp.Sensor.read("/nowhere/sensor.ron"),
+        lambda: dp.Scene.read("/nowhere/scene.exr"),
+    ):
+        with pytest.raises(OSError, match="/nowhere/"):
+            act()
+
+
+def test_camera_text_names_line_and_key(tiny: dp.Camera) -> None:
+    with pytest.raises(ValueError, match=r"camera.ron:\d+:\d+: .*fokus"):
+        dp.Camera.from_ron(tiny.to_ron().replace("focus:", "fokus:"))
+
+
+def test_dictionary_of_other_keys_is_named(tiny: dp.Camera) -> None:
+    data = tiny.to_dict()
+    for wrong, words in [
+        (data | {"fokus": 1}, "the camera: unknown field `fokus`"),
+        (data | {"lens": "dgauss"}, "the camera: unknown variant `dgauss`"),
+        (data | {"lens": 5}, "the camera: found int, expected one of BuiltIn, File"),
+        (data | {"seed": "a"}, "the camera: invalid type: string"),
+        (data | {"focus": {"DistanceMm": -5.0}}, "DistanceMm is -5"),
+        ({"name": "a"}, "the camera: missing field"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            dp.Camera.from_dict(wrong)
+
+
+def test_scene_of_wrong_arrays_is_named() -> None:
+    good = np.ones((2, 3, 4))
+    bad = good.copy()
+    bad[1, 2, 0] = -1
+    for radiance, wavelengths, depth, words in [
+        (good[0], [500, 600], 1.0, r"radiance is of shape \[3, 4\], expected an array of shape \(bands, rows, columns\)"),
+        (good, [500], 1.0, "bands of an image"),
+        (good, [600, 500], 1.0, "600|ascend"),
+        (good, [500, 600], -1.0, "-1"),
+        (good, [500, 600], np.ones((4, 3)), "the depth is 4 × 3 samples"),
+        (bad, [500, 600], 1.0, "row 2, column 0"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            dp.Scene.from_array(radiance, wavelengths, depth_m=depth, fov_deg=30)
+    with pytest.raises(ValueError, match="0|180"):
+        dp.Scene.from_array(good, [500, 600], depth_m=1, fov_deg=190)
+
+
+def test_part_made_in_python_is_in_no_file(tiny: dp.Camera, tmp_path) -> None:
+    camera = tiny.with_(scene=dp.Scene.from_array(np.ones((2, 3, 4)), [500, 600], depth_m=1, fov_deg=30))
+    for act in (camera.to_ron, lambda: camera.write(tmp_path / "a.ron")):
+        with pytest.raises(ValueError, match="scene: it was made in a program and is in no file"):
+            act()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_panic_is_an_exception_like_others() -> None:
+    with pytest.raises(RuntimeError, match="a fault of dioptric, please report it: on purpose"):
+        dp._native._panic()
+
+
+def test_no_class_can_be_made_or_changed_by_hand(shot: dp.Shot) -> None:
+    for kind in (dp.Shot, dp.Rays, dp.Lens, dp.Camera, dp._native.Memory):
+        with pytest.raises(TypeError):
+            kind()
+    with pytest.raises(AttributeError):
+        shot.quality = "draft"  # type: ignore[misc]

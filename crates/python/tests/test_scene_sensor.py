@@ -1,0 +1,90 @@
+"""Scenes and sensors made of arrays and dictionaries are those they equal."""
+
+import pickle
+from pathlib import Path
+
+import dioptric as dp
+import numpy as np
+import pytest
+
+
+def test_scene_of_arrays_images_as_its_source(tiny: dp.Camera) -> None:
+    target = dp.Scene.target("checkerboard", 54, 36, size=6, fov_deg=36, depth_m=1.2)
+    arrays = dp.Scene.from_array(
+        target.to_array(), target.wavelengths_nm, depth_m=target.depth_m, fov_deg=36, light="D65", name="copy"
+    )
+    a, b = (tiny.with_(scene=scene, wavelengths_nm="scene").render() for scene in (target, arrays))
+    assert a.irradiance.any() and np.array_equal(a.irradiance, b.irradiance)
+    assert np.array_equal(a.raw, b.raw)
+
+
+def test_uniform_scene_has_the_camera_equation() -> None:
+    radiance = 0.02
+    scene = dp.Scene.from_array(np.full((3, 40, 60), radiance), [450, 550, 650], depth_m=1000, fov_deg=20)
+    lens = dp.Lens.thin(50, 12.5)
+    camera = dp.Camera.demo().with_(
+        lens=lens, scene=scene, focus_mm=1e6, pixels=(24, 16), pixel_um=300, wavelengths_nm="scene", diffraction="none"
+    )
+    middle = camera.render().irradiance[:, 7:9, 11:13]
+    # What the pupil takes in of a far plane, spread over its image f² times the solid angle: E = π L / (4 N²), at f/4. A few
+    # 1e-4 are left to the pupil's edge, a polygon of rays.
+    np.testing.assert_allclose(middle, np.pi * radiance / (4 * 4.0**2), rtol=1e-3)
+
+
+def test_radiance_comes_back_as_it_was() -> None:
+    rng = np.random.default_rng(3)
+    radiance = rng.random((4, 5, 6), dtype=np.float32)
+    depth = 1 + rng.random((5, 6), dtype=np.float32)
+    scene = dp.Scene.from_array(radiance, [400, 500, 600, 700], depth_m=depth, fov_deg=30, name="noise")
+    assert np.array_equal(scene.to_array(), radiance) and np.array_equal(scene.depth_m, depth)
+    assert np.array_equal(scene.band(2), radiance[2]) and not scene.band(2).flags.writeable
+    assert scene.shape == (4, 5, 6) and scene.name == "noise"
+    with pytest.raises(ValueError, match="band is 4, expected 0 to 3"):
+        scene.band(4)
+
+
+def test_written_scene_is_read_back(tmp_path: Path) -> None:
+    scene = dp.Scene.target("checkerboard", 40, 30, size=5, fov_deg=10, depth_m=3)
+    scene.write(tmp_path / "a.exr")
+    back = dp.Scene.read(tmp_path / "a.exr")
+    assert np.array_equal(back.to_array(), scene.to_array()) and np.array_equal(back.depth_m, scene.depth_m)
+
+
+def test_target_under_its_light() -> None:
+    scene = dp.Scene.target("uniform", 8, 6, fov_deg=10, depth_m=3, illuminance_lux=314.159265)
+    # A white under E lux has E / π cd/m²; beyond the bands, 400-700 nm, the eye sees less than a thousandth.
+    assert scene.mean_luminance_cd_m2 == pytest.approx(100, rel=1e-3)
+    with pytest.raises(ValueError, match="depth_m is missing"):
+        dp.Scene.target("uniform", 8, 6, fov_deg=10)
+    with pytest.raises(ValueError, match="pattern is 'stripes'"):
+        dp.Scene.target("stripes", 8, 6, fov_deg=10, depth_m=3)
+
+
+def test_sensor_is_a_dictionary_and_back() -> None:
+    for name in dp.Sensor.names():
+        sensor = dp.Sensor.built_in(name)
+        assert dp.Sensor.from_dict(sensor.to_dict()) == sensor == pickle.loads(pickle.dumps(sensor)), name
+
+
+def test_sensor_with_another_pitch_is_another() -> None:
+    sensor = dp.Sensor.built_in("imx363")
+    coarse = sensor.with_(pixel_pitch_um=2.8, rows=100, columns=200)
+    assert coarse.pixel_pitch_um == 2.8 and coarse.shape == (100, 200) and sensor.pixel_pitch_um != 2.8
+    with pytest.raises(ValueError, match="pixel_pitch_um"):
+        sensor.with_(pixel_pitch_um=-1.0)
+    with pytest.raises(ValueError, match="unknown field `pitch`"):
+        sensor.with_(pitch=1.0)
+
+
+def test_quantum_efficiency_is_a_table() -> None:
+    sensor = dp.Sensor.built_in("nikon-d5100")
+    table = sensor.quantum_efficiency(np.arange(400, 701, 50))
+    assert table.shape == (len(sensor.filters), 7) and (table >= 0).all() and (table < 1).all()
+
+
+def test_given_sensor_takes_the_picture(tiny: dp.Camera, shot: dp.Shot) -> None:
+    by_hand = dp.Sensor.from_ron(dp.Sensor.built_in("nikon-d5100").to_ron())
+    camera = tiny.with_(sensor=by_hand, pixels=(48, 32), pixel_um=660)
+    assert np.array_equal(camera.render().raw, shot.raw)
+    silent = camera.with_(sensor=by_hand.with_(read_noise_v=0.0), pixels=(48, 32), pixel_um=660)
+    assert not np.array_equal(silent.render().raw, shot.raw)
