@@ -20,17 +20,19 @@ impl RadialMap {
     /// Entries of the table: an error below 1e-6 for the smooth maps of lenses.
     const N_ENTRIES: usize = 1025;
 
-    /// Tabulates a lens up to `extent_mm` off axis.
+    /// Tabulates a lens up to `extent_mm` off axis, or to where the last field is seen if that is less.
     ///
     /// `tan_at` gives the field seen at a distance on the film, mm, `None` where nothing is; `gain_at` the irradiance
     /// per radiance of a field, sr.
     pub fn tabulate(extent_mm: f64, tan_at: impl Fn(f64) -> Option<f64>, gain_at: impl Fn(f64) -> f64) -> Self {
         let n = Self::N_ENTRIES;
+        // Entries beyond the last field would be lost to the table, however many there are within.
+        let extent_mm = last_seen_mm(extent_mm, &tan_at);
         let entries_per_mm2 = (n - 1) as f64 / (extent_mm * extent_mm);
         let (mut tan_per_mm, mut irradiance_per_radiance) = (Vec::with_capacity(n), Vec::with_capacity(n));
         for entry in 0..n {
             // At the axis the ratio is 0/0; a thousandth of the first step stands for it.
-            let radius_mm = (f64::max(entry as f64, 1e-6) / entries_per_mm2).sqrt();
+            let radius_mm = (f64::max(entry as f64, 1e-6) / entries_per_mm2).sqrt().min(extent_mm);
             let Some(tan) = tan_at(radius_mm) else { break };
             tan_per_mm.push(tan / radius_mm);
             irradiance_per_radiance.push(gain_at(tan));
@@ -51,10 +53,11 @@ impl RadialMap {
     /// from the axis is `radius2_mm2`; `None` beyond the extent.
     pub fn at(&self, radius2_mm2: f64) -> Option<(f64, f64)> {
         let place = radius2_mm2 * self.entries_per_mm2;
-        let below = place as usize;
-        if below + 1 >= self.tan_per_mm.len() {
+        let last = self.tan_per_mm.len() - 1;
+        if place > last as f64 || self.extent_mm == 0.0 {
             return None;
         }
+        let below = (place as usize).min(last - 1);
         let fraction = place - below as f64;
         let mix = |table: &[f64]| table[below] + fraction * (table[below + 1] - table[below]);
         Some((mix(&self.tan_per_mm), mix(&self.irradiance_per_radiance)))
@@ -68,6 +71,23 @@ impl RadialMap {
         let tan = self.tan_per_mm[self.tan_per_mm.len() - 1] * self.extent_mm;
         place_mm / place_mm.length() * tan
     }
+}
+
+/// Returns the distance up to which something is seen, at most `extent_mm`, from within: to the last digits of a number.
+fn last_seen_mm(extent_mm: f64, tan_at: impl Fn(f64) -> Option<f64>) -> f64 {
+    let (mut seen, mut dark) = (0.0, extent_mm);
+    if tan_at(extent_mm).is_some() {
+        return extent_mm;
+    }
+    while dark - seen > 1e-14 * extent_mm {
+        let middle = 0.5 * (seen + dark);
+        if middle <= seen || middle >= dark {
+            break;
+        }
+        if tan_at(middle).is_some() { seen = middle } else { dark = middle }
+    }
+    // Where nothing is seen at all there is a table of one entry, of nothing.
+    if seen > 0.0 { seen } else { extent_mm }
 }
 
 /// From places of the film to the fields seen there, and the irradiance that they get; for one depth and wavelength.
@@ -130,6 +150,23 @@ impl FilmMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A table that was asked for far beyond the last field had few entries left within it, or none.
+    #[test]
+    fn map_ends_where_the_last_field_is_seen() {
+        for extent_mm in [3.6, 4.0, 40.0, 4e3, 4e6] {
+            let tan_at = |r: f64| (r <= 3.5).then_some(r / 50.0);
+            let map = RadialMap::tabulate(extent_mm, tan_at, |_| 2.0);
+            assert!((map.extent_mm() / 3.5 - 1.0).abs() < 1e-6, "{extent_mm}: {}", map.extent_mm());
+            for r in [0.0, 1.0, 3.4999] {
+                let (tan_per_mm, gain) = map.at(r * r).unwrap();
+                assert!((tan_per_mm * 50.0 - 1.0).abs() < 1e-12 && (gain - 2.0).abs() < 1e-12);
+            }
+            assert!(map.at(3.5001_f64.powi(2)).is_none());
+        }
+        let dark = RadialMap::tabulate(10.0, |_| None, |_| 2.0);
+        assert!(dark.extent_mm() == 0.0 && dark.at(0.0).is_none());
+    }
 
     #[test]
     fn map_follows_a_lens_with_distortion() {
