@@ -1,0 +1,48 @@
+//! The demo's picture looks as it did: `fixtures/golden/demo-96x64.png`, to be looked at.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::path::Path;
+
+use dioptric_golden::workspace_root;
+use dioptric_pipeline::{Camera, FilmSpec, KeptCamera, SceneSource, Silent, WavelengthSpec};
+use dioptric_spectrum::Cancel;
+use image::RgbImage;
+
+/// The demo on ten times larger pixels, with seven bands; all noise is seeded.
+fn small_demo() -> RgbImage {
+    let mut camera = Camera::demo().unwrap();
+    camera.film = FilmSpec::Pixels { columns: 96, rows: 64, pitch_um: 330.0 };
+    camera.scene.source = SceneSource::StillLife { columns: 108, rows: 72 };
+    camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 50.0 };
+    let picture = KeptCamera::new(camera).capture(&Silent, &Cancel::new()).unwrap().developed.picture.to_rgb8();
+    RgbImage::from_raw(96, 64, picture).unwrap()
+}
+
+fn save(picture: &RgbImage, path: &Path) {
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    picture.save(path).unwrap();
+}
+
+#[test]
+fn demo_is_the_golden_picture() {
+    let picture = small_demo();
+    let path = workspace_root().join("fixtures/golden/demo-96x64.png");
+    let largest = image::open(&path).ok().map(|golden| {
+        let golden = golden.into_rgb8();
+        assert_eq!(golden.dimensions(), picture.dimensions());
+        golden.as_raw().iter().zip(picture.as_raw()).map(|(a, b)| a.abs_diff(*b)).max().unwrap()
+    });
+    // One code of 255 for another library of elementary functions, and one for rounding.
+    if largest.is_some_and(|codes| codes <= 2) {
+        return;
+    }
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        save(&picture, &path);
+        return;
+    }
+    let kept = workspace_root().join("target/golden/demo-96x64.png");
+    save(&picture, &kept);
+    panic!(
+        "the picture differs by {largest:?} codes; the actual one is target/golden/demo-96x64.png (UPDATE_GOLDEN=1 accepts it)"
+    );
+}
