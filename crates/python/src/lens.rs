@@ -265,7 +265,7 @@ impl Lens {
     ///     The lens's main wavelength, else 550.
     /// distance_mm : float, optional
     ///     Of an object before the first vertex, of which ``image_distance_mm``, ``magnification`` and ``working_f_number``
-    ///     are told too.
+    ///     are in the result too.
     /// field_deg : float
     ///     Half field of the third-order sums.
     ///

@@ -111,7 +111,7 @@ pub(crate) fn _panic(py: Python<'_>) -> PyResult<()> {
     run(py, &Follower::nobody(), |_, _| panic!("on purpose"))
 }
 
-/// Who is told how far the work is.
+/// Who follows how far the work is.
 pub(crate) struct Follower {
     callable: Option<Py<PyAny>>,
     is_bar: bool,
@@ -152,7 +152,7 @@ impl Follower {
     }
 }
 
-/// The latest that is known of the work, until it is told.
+/// The latest that is known of the work, until it is passed on.
 #[derive(Default)]
 struct Latest(Mutex<Option<(Stage, f64)>>);
 

@@ -51,11 +51,11 @@ pub(super) struct Interface<T> {
 
 /// What becomes of a ray at a surface.
 #[derive(Clone, Copy)]
-pub(super) struct Passed<T> {
+pub(super) struct Interaction<T> {
     /// The ray on the surface, turned.
     pub(super) ray: Ray<T>,
     /// Whether it goes on; if not, the rest says why.
-    pub(super) goes_on: bool,
+    pub(super) survives: bool,
     /// Whether its crossing, if it has a finite one, is of the right sheet.
     pub(super) is_front: bool,
 }
@@ -136,7 +136,7 @@ pub(super) fn cross_conic<T: Real>(form: &ConicForm<T>, ray: &Ray<T>) -> Crossin
 
 /// Moves a ray to its crossing and refracts it there.
 #[inline(always)]
-pub(super) fn refract<T: Real>(interface: &Interface<T>, ray: &Ray<T>, crossing: &Crossing<T>) -> Passed<T> {
+pub(super) fn refract<T: Real>(interface: &Interface<T>, ray: &Ray<T>, crossing: &Crossing<T>) -> Interaction<T> {
     let &Crossing { t, normal, cos, cos2, is_front } = crossing;
     let &Interface { ratio, ratio2, index_before, .. } = interface;
     let (x, y, z) = (ray.x + ray.l * t, ray.y + ray.m * t, ray.z + ray.n * t);
@@ -151,19 +151,19 @@ pub(super) fn refract<T: Real>(interface: &Interface<T>, ray: &Ray<T>, crossing:
         n: ratio * ray.n + bend * normal[2],
         opl: longer(ray.opl, index_before, t),
     };
-    let goes_on = interface.is_within(x, y) & is_front & (after2 >= T::ZERO);
-    Passed { ray: refracted, goes_on, is_front }
+    let survives = interface.is_within(x, y) & is_front & (after2 >= T::ZERO);
+    Interaction { ray: refracted, survives, is_front }
 }
 
 /// Moves a ray to the vertex plane, where nothing bends it.
 #[inline(always)]
-pub(super) fn cross_plane<T: Real>(interface: &Interface<T>, ray: &Ray<T>) -> Passed<T> {
+pub(super) fn cross_plane<T: Real>(interface: &Interface<T>, ray: &Ray<T>) -> Interaction<T> {
     let t = -ray.z / ray.n;
     let (x, y) = (ray.x + ray.l * t, ray.y + ray.m * t);
     let is_ahead = ray.n > T::ZERO;
     let moved = Ray { x, y, z: T::ZERO, opl: longer(ray.opl, interface.index_before, t), ..*ray };
-    let goes_on = interface.is_within(x, y) & is_ahead;
-    Passed { ray: moved, goes_on, is_front: is_ahead }
+    let survives = interface.is_within(x, y) & is_ahead;
+    Interaction { ray: moved, survives, is_front: is_ahead }
 }
 
 /// A path that goes on by `t` in a medium.
@@ -184,7 +184,7 @@ pub(super) struct Ideal<T> {
 
 /// Moves a ray to an ideal lens in the vertex plane, and turns it there.
 #[inline(always)]
-pub(super) fn thin_lens<T: Real>(lens: &Ideal<T>, interface: &Interface<T>, ray: &Ray<T>) -> Passed<T> {
+pub(super) fn thin_lens<T: Real>(lens: &Ideal<T>, interface: &Interface<T>, ray: &Ray<T>) -> Interaction<T> {
     let &Ideal { index_before: n1, index_after: n2, power, object_z, image_z } = lens;
     let passed = cross_plane(interface, ray);
     let Ray { x, y, l, m, n, opl, .. } = passed.ray;
@@ -198,7 +198,7 @@ pub(super) fn thin_lens<T: Real>(lens: &Ideal<T>, interface: &Interface<T>, ray:
         let after = path_difference([x, y], [sx, sy], image_z);
         turned.opl = opl + (n2 * after - n1 * before);
     }
-    Passed { ray: turned, ..passed }
+    Interaction { ray: turned, ..passed }
 }
 
 /// Returns by how much the ray of these slopes through `height` has further to go from its point in the plane `z`

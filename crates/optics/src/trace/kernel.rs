@@ -9,7 +9,8 @@ use multiversion::multiversion;
 use super::{
     block::{Block, LANES},
     crossing::{
-        ConicForm, Crossing, Ideal, Interface, Passed, Ray, cross_conic, cross_plane, cross_sphere, refract, thin_lens,
+        ConicForm, Crossing, Ideal, Interaction, Interface, Ray, cross_conic, cross_plane, cross_sphere, refract,
+        thin_lens,
     },
     real::Real,
 };
@@ -21,7 +22,7 @@ pub(super) trait Optic<T: Real> {
     /// and turns them there.
     ///
     /// The new block says which rays are still in flight, and which crossed the right sheet of it; where one ended it holds what
-    /// [`Passed`] does.
+    /// [`Interaction`] does.
     fn pass<const N: usize>(&self, shift: T, from: &Block<T, N>, to: &mut Block<T, N>);
 }
 
@@ -44,12 +45,12 @@ pub(super) fn pass_lanes<T: Real, const N: usize>(
     shift: T,
     from: &Block<T, N>,
     to: &mut Block<T, N>,
-    pass_one: impl Fn(usize, &Ray<T>) -> Passed<T>,
+    pass_one: impl Fn(usize, &Ray<T>) -> Interaction<T>,
 ) {
     for i in 0..N {
-        let Passed { ray, goes_on, is_front } = pass_one(i, &from.ray(i, shift));
+        let Interaction { ray, survives, is_front } = pass_one(i, &from.ray(i, shift));
         to.set(i, &ray);
-        to.alive[i] = if goes_on { from.alive[i] } else { T::NO };
+        to.alive[i] = if survives { from.alive[i] } else { T::NO };
         to.front[i] = T::mask(is_front);
     }
 }

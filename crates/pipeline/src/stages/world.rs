@@ -237,17 +237,17 @@ impl WorldRender {
         Ok(Renderer::new(&self.world, &self.camera, settings)?)
     }
 
-    /// Makes passes until the picture is good enough, or `goes_on`, which is asked after each, returns false.
+    /// Makes passes until the picture is good enough, or `is_wanted`, which is called after each, returns false.
     ///
     /// # Errors
-    /// When the work is cancelled, or `goes_on` fails.
+    /// When the work is cancelled, or `is_wanted` fails.
     pub fn refine(
         &self,
         renderer: &mut Renderer<'_>,
         effort: RenderEffort,
         progress: &dyn Progress,
         cancel: &Cancel,
-        goes_on: &mut dyn FnMut(&Renderer<'_>) -> Result<bool, PipelineError>,
+        is_wanted: &mut dyn FnMut(&Renderer<'_>) -> Result<bool, PipelineError>,
     ) -> Result<(), PipelineError> {
         loop {
             let n_done = renderer.n_passes();
@@ -266,7 +266,7 @@ impl WorldRender {
             let of = f64::from(n_passes.unwrap_or(2 * PILOT_PASSES));
             let show = |share: f64| progress.at(Stage::Irradiance, (f64::from(n_done) + share) / of);
             show(0.0);
-            if !renderer.pass(cancel, &show)? || !goes_on(renderer)? {
+            if !renderer.pass(cancel, &show)? || !is_wanted(renderer)? {
                 return Ok(());
             }
         }
