@@ -36,6 +36,14 @@ pub enum SceneError {
         /// Bytes allowed.
         limit: u64,
     },
+    /// A file of a kind that this build leaves out.
+    #[error("{}: this build cannot read it, expected one with the feature '{feature}'", file.display())]
+    LacksFeature {
+        /// The file.
+        file: PathBuf,
+        /// The cargo feature with which it can.
+        feature: &'static str,
+    },
     /// A file whose kind the name does not tell.
     #[error(
         "{}: expected a .exr, .hdr (ENVI), .png, .jpg or .tif file, or a folder with one picture a band",

@@ -31,6 +31,14 @@ pub enum WorldError {
         /// The file.
         file: PathBuf,
     },
+    /// A file of a kind that this build leaves out.
+    #[error("{}: this build cannot read it, expected one with the feature '{feature}'", file.display())]
+    LacksFeature {
+        /// The file.
+        file: PathBuf,
+        /// The cargo feature with which it can.
+        feature: &'static str,
+    },
     /// A mesh with vertices or triangles that cannot be.
     #[error("mesh: {reason}")]
     Mesh {

@@ -64,6 +64,9 @@ impl ImageTexture {
         if reader.format().is_none() {
             return Err(unreadable("expected a .png, .jpg, .tga, .tif or .exr picture".to_owned()));
         }
+        if cfg!(not(feature = "jpeg")) && reader.format() == Some(image::ImageFormat::Jpeg) {
+            return Err(WorldError::LacksFeature { file: path.to_owned(), feature: "jpeg" });
+        }
         let mut limits = image::Limits::default();
         limits.max_alloc = Some(16 * MAX_SAMPLES);
         limits.max_image_width = Some(1 << 20);

@@ -75,6 +75,9 @@ pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Scene, SceneErro
             finish(path, name, contents, options)
         }
         "hdr" => finish(path, name, Contents::of(read_envi(path)?.into_image(options.white_level)?), options),
+        "jpg" | "jpeg" if cfg!(not(feature = "jpeg")) => {
+            Err(SceneError::LacksFeature { file: path.to_owned(), feature: "jpeg" })
+        }
         "png" | "jpg" | "jpeg" | "tif" | "tiff" => {
             let grid = match &options.grid {
                 Some(grid) => grid.clone(),

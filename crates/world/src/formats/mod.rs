@@ -1,5 +1,6 @@
 //! Files of worlds and meshes.
 
+#[cfg(feature = "gltf")]
 mod gltf;
 mod obj;
 mod pbrt;
@@ -46,7 +47,10 @@ pub fn read_world(path: &Path, options: &ReadOptions, cancel: &Cancel) -> Result
     let kind = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let builder = match kind.as_deref() {
         Some("pbrt") => pbrt::read(path, unit, cancel)?,
+        #[cfg(feature = "gltf")]
         Some("gltf" | "glb") => gltf::read(path, scale, cancel)?,
+        #[cfg(not(feature = "gltf"))]
+        Some("gltf" | "glb") => return Err(WorldError::LacksFeature { file: path.to_owned(), feature: "gltf" }),
         Some("obj") => bare(read_obj(path)?.into_iter().map(|(_, mesh)| mesh), scale),
         Some("ply") => bare([read_ply(path)?], scale),
         _ => return Err(WorldError::UnknownKind { file: path.to_owned() }),
