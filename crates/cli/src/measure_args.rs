@@ -140,7 +140,7 @@ pub(crate) struct ColorArgs {
     /// Pixels a degree of the viewer's field, for S-CIELAB and VSNR
     #[arg(long, value_name = "N", default_value_t = 60.0)]
     pub(crate) pixels_per_degree: f64,
-    /// An even patch, whose visual SNR is told
+    /// An even patch, whose visual SNR is measured
     #[arg(long, value_name = "x,y,w,h", requires = "against")]
     pub(crate) patch: Option<String>,
     /// The picture and the results

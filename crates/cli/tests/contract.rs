@@ -191,7 +191,7 @@ fn psf_has_its_keys_in_both_modes() {
 }
 
 #[test]
-fn psf_adds_the_whole_light_and_writes_its_table_and_mosaic() {
+fn psf_adds_polychromatic_rows_and_writes_its_table_and_mosaic() {
     let folder = tempfile::tempdir().unwrap();
     let common =
         ["psf", "paper-2el", "--fields-deg", "0,2", "--film-mm", "51.8145", "--stop-mm", "4", "--pixel-um", "4"];

@@ -59,7 +59,7 @@ fn radial(n: u32, m: u32, rho: f64) -> f64 {
 
 /// Returns the coefficients of the first `n_terms` polynomials that fit the values best, by weighted least squares.
 ///
-/// The points need not fill the disc, but must tell the polynomials apart; a polynomial that they do not tell from
+/// The points need not fill the disc, but must determine the polynomials; a polynomial that they do not distinguish from
 /// those before it gets the coefficient 0. Weights are those of a quadrature: some may be negative, where a hole is
 /// taken away from a whole.
 pub fn fit_noll(points: &[DVec2], values: &[f64], weights: &[f64], n_terms: usize) -> Vec<f64> {

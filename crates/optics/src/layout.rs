@@ -76,7 +76,7 @@ impl Lens {
     }
 }
 
-/// How the rays of a wavelength are told from those of others.
+/// How the rays of a wavelength are distinguished from those of others.
 struct WavelengthKey {
     wavelength_nm: f64,
     /// Its own color, where colors do not tell fields.

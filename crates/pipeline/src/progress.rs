@@ -38,7 +38,7 @@ impl Stage {
     }
 }
 
-/// Is told how far a run is.
+/// Receives how far a run is.
 pub trait Progress: Sync {
     /// A stage is done to this part, 0–1. Called from any thread; 0 is the start of the stage.
     fn at(&self, stage: Stage, fraction: f64);

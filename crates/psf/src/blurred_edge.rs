@@ -26,10 +26,10 @@ static PROFILES: LazyLock<Vec<BlurredEdgeTable>> =
 const PART_OF_A_PIXEL: f32 = 0.0625;
 /// Sixteen profiles to each doubling of the sum: a hundred kilobytes. What a stroke has above its profile widens its even part.
 const PER_DOUBLING_BITS: u32 = 4;
-const UNTOLD_BITS: u32 = f32::MANTISSA_DIGITS - 1 - PER_DOUBLING_BITS;
+const DROPPED_BITS: u32 = f32::MANTISSA_DIGITS - 1 - PER_DOUBLING_BITS;
 /// The number that the bits of the part alone would have.
-const FIRST: usize = (PART_OF_A_PIXEL.to_bits() >> UNTOLD_BITS) as usize;
-const N_PROFILES: usize = ((1.0 + PART_OF_A_PIXEL).to_bits() >> UNTOLD_BITS) as usize - FIRST + 1;
+const FIRST: usize = (PART_OF_A_PIXEL.to_bits() >> DROPPED_BITS) as usize;
+const N_PROFILES: usize = ((1.0 + PART_OF_A_PIXEL).to_bits() >> DROPPED_BITS) as usize - FIRST + 1;
 
 pub(crate) fn profiles() -> &'static [BlurredEdgeTable] {
     &PROFILES
@@ -40,18 +40,18 @@ pub(crate) fn profiles() -> &'static [BlurredEdgeTable] {
 pub(crate) fn variance_below(variance: f32) -> f32 {
     // The leading bits are those of the logarithm.
     let sum = variance.clamp(0.0, 1.0) + PART_OF_A_PIXEL;
-    f32::from_bits(sum.to_bits() >> UNTOLD_BITS << UNTOLD_BITS) - PART_OF_A_PIXEL
+    f32::from_bits(sum.to_bits() >> DROPPED_BITS << DROPPED_BITS) - PART_OF_A_PIXEL
 }
 
 /// Returns the number of the profile of a variance that there is.
 #[inline(always)]
 pub(crate) fn profile_number(variance: f32) -> usize {
-    ((variance + PART_OF_A_PIXEL).to_bits() >> UNTOLD_BITS) as usize - FIRST
+    ((variance + PART_OF_A_PIXEL).to_bits() >> DROPPED_BITS) as usize - FIRST
 }
 
 /// Returns the variance of the profile of a number.
 fn variance_of(number: usize) -> f32 {
-    f32::from_bits(((FIRST + number) << UNTOLD_BITS) as u32) - PART_OF_A_PIXEL
+    f32::from_bits(((FIRST + number) << DROPPED_BITS) as u32) - PART_OF_A_PIXEL
 }
 
 impl BlurredEdgeTable {

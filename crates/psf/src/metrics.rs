@@ -130,7 +130,7 @@ impl Picture {
     /// Returns the real and imaginary part of the picture's Fourier transform for a wave along `direction_rad`: the
     /// modulation and, as its angle, how far the wave is moved towards the direction.
     ///
-    /// Those of several wavelengths can be added with weights; the modulation of the sum is that of the whole light.
+    /// Those of several wavelengths can be added with weights; the modulation of the sum is that of the polychromatic light.
     pub fn optical_transfer(&self, direction_rad: f64, cycles_per_mm: f64) -> (f64, f64) {
         let along = DVec2::from_angle(direction_rad);
         let wave = along * (2.0 * PI * cycles_per_mm * 1e-3);

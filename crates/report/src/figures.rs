@@ -42,18 +42,18 @@ impl Drawing {
 
 /// Returns Figures 1 to 4 at full quality: pictures, drawings, and the tables behind them.
 ///
-/// `worlds` is the folder of the world of Figure 4, `metronome.pbrt`; `told` is given the name of each figure before it is made.
+/// `worlds` is the folder of the world of Figure 4, `metronome.pbrt`; `announce` is called with the name of each figure before it is made.
 ///
 /// # Errors
 /// When something cannot be computed or encoded; the built-in set-ups can.
-pub fn draw_all(worlds: &Path, told: &dyn Fn(&str)) -> Result<Vec<Drawing>, PipelineError> {
-    told("figure 1: point spread functions over field and depth");
+pub fn draw_all(worlds: &Path, announce: &dyn Fn(&str)) -> Result<Vec<Drawing>, PipelineError> {
+    announce("figure 1: point spread functions over field and depth");
     let thumbnails = figure1::thumbnails(401)?;
     let mut drawings = vec![
         Drawing::new("figure1.png", png_bytes(&mosaic(&thumbnails))?),
         Drawing::new("figure1.csv", figure1::table(&thumbnails)),
     ];
-    told("figure 2: line spread functions by ray bending and by theory");
+    announce("figure 2: line spread functions by ray bending and by theory");
     let nm: Vec<f64> = figure3::grid().centers_nm().to_vec();
     let counted = figure2::counted(&nm, 401)?;
     let theory = figure2::theory(&nm);
@@ -65,11 +65,11 @@ pub fn draw_all(worlds: &Path, told: &dyn Fn(&str)) -> Result<Vec<Drawing>, Pipe
     let closed = figure2::hurb("HURB, closed form", &nm, Hurb::with_gamma(1.0));
     drawings.push(Drawing::new("figure2.csv", figure2::table(&[counted, closed, calibrated, wave, theory])));
     for (name, scale) in [("figure3", figure3::PRINTED_BLUR_SCALE), ("figure3_true_scale", 1.0)] {
-        told("figure 3: chromatic aberration at 8 m and 2 m");
+        announce("figure 3: chromatic aberration at 8 m and 2 m");
         drawings.push(Drawing::new(&format!("{name}.png"), png_bytes(&panels(scale)?)?));
     }
     drawings.push(Drawing::new("figure3.csv", figure3::table()?));
-    drawings.extend(draw_figure4(worlds, told)?);
+    drawings.extend(draw_figure4(worlds, announce)?);
     Ok(drawings)
 }
 
@@ -77,11 +77,11 @@ pub fn draw_all(worlds: &Path, told: &dyn Fn(&str)) -> Result<Vec<Drawing>, Pipe
 ///
 /// # Errors
 /// When the world cannot be read or rendered.
-pub fn draw_figure4(worlds: &Path, told: &dyn Fn(&str)) -> Result<Vec<Drawing>, PipelineError> {
-    told("figure 4: a world by rays from the film");
+pub fn draw_figure4(worlds: &Path, announce: &dyn Fn(&str)) -> Result<Vec<Drawing>, PipelineError> {
+    announce("figure 4: a world by rays from the film");
     let camera = figure4::camera(&worlds.join("metronome.pbrt"), FIGURE_4_PX, FIGURE_4_SAMPLES)?;
     let world = figure4::panels(&camera, &Silent, &Cancel::new())?;
-    told("figure 4: the same by point spread functions, and the difference");
+    announce("figure 4: the same by point spread functions, and the difference");
     let comparison = MethodComparison::of(&camera, &Silent, &Cancel::new())?;
     Ok(vec![
         Drawing::new("figure4.png", png_bytes(&row_of_panels(&world))?),

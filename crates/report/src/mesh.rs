@@ -10,7 +10,7 @@ const TILT_DEG: f64 = 28.0;
 /// Pixels of the box's base and height for each pixel of the drawing's width.
 const BASE: f64 = 0.46;
 const TALL: f64 = 0.38;
-/// Viridis of matplotlib (CC0): dark violet to yellow, of even steps in lightness, told apart by the color-blind.
+/// Viridis of matplotlib (CC0): dark violet to yellow, of even steps in lightness, readable with color vision deficiency.
 const COLORS: [[u8; 3]; 11] = [
     [0x44, 0x01, 0x54],
     [0x48, 0x24, 0x75],

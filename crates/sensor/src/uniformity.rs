@@ -56,7 +56,7 @@ impl FrameStack {
     /// Returns the variance over the pixels, without what temporal noise leaves in the mean of so many frames.
     ///
     /// # Errors
-    /// When there are fewer than two frames, which do not tell the temporal noise.
+    /// When there are fewer than two frames, from which the temporal noise cannot be estimated.
     pub fn spatial_variance(&self) -> Result<f64, SensorError> {
         if self.n_frames < 2 || self.mean.len() < 2 {
             let (expected, found) = ("2 or more".to_owned(), self.n_frames.to_string());

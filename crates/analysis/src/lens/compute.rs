@@ -25,9 +25,9 @@ use dioptric_pipeline::{PipelineError, nearest_to_reference_nm};
 const CURVE_STEPS: usize = 40;
 /// Places along a fan.
 const FAN_PLACES: usize = 41;
-/// Azimuths of a pupil's edge for the illumination, and those that are told.
+/// Azimuths of the edge of a pupil for the illumination, and of those the ones in the table.
 const EDGE_AZIMUTHS: usize = 128;
-const TOLD_AZIMUTHS: usize = 36;
+const LISTED_AZIMUTHS: usize = 36;
 /// The share of the stop's radius that the outermost rays keep to, so that rounding does not end them at its rim.
 const WITHIN_RIM: f64 = 1.0 - 1e-9;
 /// Cells of a map across the stop: an odd number, so that there is one in the middle.
@@ -36,7 +36,7 @@ const MAP_CELLS: usize = 31;
 /// Lines of the grid of a distortion plot, each way.
 pub const GRID_LINES: usize = 11;
 const WIDEST_GRID_DEG: f64 = 60.0;
-/// Zernike coefficients that are told: up to the sixth degree, less its last.
+/// Zernike coefficients in the table: up to the sixth degree, less its last.
 const ZERNIKE_TERMS: usize = 22;
 
 impl AnalysisRequest {
@@ -199,7 +199,7 @@ impl Bench {
         let um = |mm: Option<f64>| mm.map(|mm| 1e3 * mm);
         let sigma_mm = spot.sigma_mm();
         let center_mm = self.reference().chief_film_point_mm(&point, self.film_distance_mm).or(spot.centroid_mm());
-        let pupil = PupilBoundary::find(lens, &point, TOLD_AZIMUTHS).map(|pupil| PupilRow {
+        let pupil = PupilBoundary::find(lens, &point, LISTED_AZIMUTHS).map(|pupil| PupilRow {
             z_mm: pupil.z_mm(),
             center_mm: pupil.center_mm().to_array(),
             rho_max_mm: pupil.rho_at_azimuths_mm().to_vec(),

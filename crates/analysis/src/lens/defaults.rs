@@ -1,4 +1,4 @@
-//! A lens and how it is meant to be used, as far as its file says: what stands where a command is not told otherwise.
+//! A lens and how it is meant to be used, as far as its file says: the defaults of commands.
 
 use dioptric_optics::{Field, Lens, LensFile, glam::DVec2};
 

@@ -17,7 +17,7 @@ const POINTS: usize = 100;
 pub struct CompareRequest {
     /// Pixels a degree of the viewer's field.
     pub pixels_per_degree: f64,
-    /// An even patch, whose visual signal-to-noise ratio is told.
+    /// An even patch, whose visual signal-to-noise ratio is measured.
     pub patch: Option<PixelRegion>,
     /// How samples stand for light.
     pub curve: CodeCurve,

@@ -16,7 +16,7 @@ use serde::Serialize;
 use super::frames::{DESCRIPTOR_FILE, FileSeries, descriptor, find_series, read_frame};
 use dioptric_pipeline::{PipelineError, SensorSpec};
 
-/// The light for which ISO speeds are told.
+/// The light for which ISO speeds are given.
 const ISO_LIGHT: Illuminant = Illuminant::D55;
 /// Signal-to-noise ratios of ISO 12232's noise-based speeds: excellent and acceptable.
 const ISO_SNR: [f64; 2] = [40.0, 10.0];
@@ -324,7 +324,7 @@ impl Collected {
         let dark = self.series.iter().filter(|s| s.is_dark()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
         let dark = dark.ok_or_else(|| too_few("have no dark series among them".to_owned()))?;
         let are_counted = flats.iter().all(|s| s.photons.is_some());
-        // Where photons were not counted the signal stands for them: only ratios to it are then told.
+        // Where photons were not counted the signal stands for them: only ratios to it then have a meaning.
         let points: Vec<FlatPoint> = flats
             .iter()
             .map(|s| FlatPoint { photons: s.photons.unwrap_or(s.point.mean_dn - dark.point.mean_dn), ..s.point })

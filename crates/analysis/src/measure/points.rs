@@ -11,7 +11,7 @@ use super::{CodeCurve, MeasuredPicture, Measurement, channel_color};
 use crate::{Corner, LineChart, Scale, Series};
 use dioptric_pipeline::PipelineError;
 
-/// Shares of the energy whose radii are told.
+/// Shares of the energy whose radii are listed.
 const SHARES: [f64; 3] = [0.5, 0.8, 0.9];
 /// Radii of the plotted encircled energy.
 const N_RADII: usize = 48;
@@ -162,7 +162,7 @@ fn median(plane: &Array2<f32>) -> f64 {
 impl Measurement for PointSet {
     fn charts(&self) -> Vec<(String, LineChart)> {
         let widest = self.spots.iter().filter_map(|spot| spot.encircled_energy.last()).map(|e| e.0).fold(0.0, f64::max);
-        // More than a few lines cannot be told apart.
+        // More than a few lines cannot be distinguished.
         let series = self.spots.iter().take(12).map(|spot| Series {
             label: Some(format!("{} {}", spot.spot, spot.channel)),
             color: channel_color(&spot.channel),

@@ -9,7 +9,7 @@ use crate::{Corner, LineChart, PsfRow, PsfSet, Scale, Series, ThroughFocus};
 
 /// Point-spread functions that a plot tells apart.
 const MOST_LINES: usize = 9;
-/// Colors of lines, the first six told apart also by those who see few.
+/// Colors of lines, the first six distinguishable with color vision deficiency.
 const COLORS: [&str; MOST_LINES] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f3c8d", "#8c6d31", "#808080"];
 /// Steps along the axis of a plot.
@@ -24,10 +24,10 @@ struct Plotted<'a> {
 impl PsfSet {
     /// Returns plots by name: `lsf`, `esf`, `mtf`, `encircled_energy`, `ensquared_energy` and `through_focus` of at
     /// most nine point-spread functions, where there are more of a middle wavelength and evenly chosen; with several
-    /// wavelengths also `whole_light_mtf`, the modulation of all light of each point.
+    /// wavelengths also `polychromatic_mtf`, the modulation of the light of all wavelengths of each point.
     ///
     /// Tangential lines (along the radius of the field) are solid, sagittal ones dashed. Where the set has several wavelengths, `mtf` also shows that of the
-    /// whole light of the first field and distance.
+    /// polychromatic light of the first field and distance.
     pub fn charts(&self, through_focus: &ThroughFocus) -> Vec<(String, LineChart)> {
         let plotted: Vec<Plotted<'_>> = self
             .plotted()
@@ -47,7 +47,7 @@ impl PsfSet {
             ("through_focus", self.through_focus(through_focus)),
         ];
         if self.spectral_weights.len() > 1 {
-            charts.push(("whole_light_mtf", self.whole_modulations(reach_per_mm)));
+            charts.push(("polychromatic_mtf", self.polychromatic_modulations(reach_per_mm)));
         }
         charts.into_iter().map(|(name, chart)| (name.to_owned(), chart)).collect()
     }
@@ -100,8 +100,8 @@ impl PsfSet {
         if let Some(first) = self.points().next().filter(|point| point.len() > 1) {
             let start = first.start;
             let words = self.point_words(&self.rows[start]);
-            let name = [words, vec!["whole light".to_owned()]].concat().join(", ");
-            let whole = self.whole_modulation(first);
+            let name = [words, vec!["polychromatic".to_owned()]].concat().join(", ");
+            let whole = self.polychromatic_modulation(first);
             let meridian = self.rows[start].meridian_rad();
             for (direction, is_dashed) in [(meridian, false), (meridian + FRAC_PI_2, true)] {
                 let points = steps(reach_per_mm).map(|f| (f, whole(direction, f))).collect();
@@ -117,11 +117,11 @@ impl PsfSet {
         )
     }
 
-    fn whole_modulations(&self, reach_per_mm: f64) -> LineChart {
+    fn polychromatic_modulations(&self, reach_per_mm: f64) -> LineChart {
         let points = evenly(self.points().collect());
         let lines = points.into_iter().enumerate().flat_map(|(i, point)| {
             let row = &self.rows[point.start];
-            let whole = self.whole_modulation(point);
+            let whole = self.polychromatic_modulation(point);
             let meridian = row.meridian_rad();
             [(meridian, false), (meridian + FRAC_PI_2, true)].map(|(direction, is_dashed)| Series {
                 label: (!is_dashed).then(|| self.point_label(row)),
@@ -197,7 +197,7 @@ impl PsfSet {
     /// Returns what tells a point from the others.
     fn point_label(&self, row: &PsfRow) -> String {
         match self.point_words(row) {
-            words if words.is_empty() => "whole light".to_owned(),
+            words if words.is_empty() => "polychromatic".to_owned(),
             words => words.join(", "),
         }
     }
@@ -299,18 +299,18 @@ mod tests {
         let plots = set.charts(&through);
         assert_eq!(plots.len(), 7);
         for (name, chart) in &plots {
-            let expected = if name == "whole_light_mtf" { "5°" } else { "5°, 600 nm" };
+            let expected = if name == "polychromatic_mtf" { "5°" } else { "5°, 600 nm" };
             assert!(chart.to_csv().contains(expected), "{name}");
             assert!(chart.to_csv().lines().count() > 25, "{name}");
         }
-        assert!(plots[2].1.series.iter().any(|s| s.label.as_deref() == Some("0°, whole light")));
+        assert!(plots[2].1.series.iter().any(|s| s.label.as_deref() == Some("0°, polychromatic")));
         let wrong = PsfRequest { spectral_weights: vec![1.0], ..request() };
         assert!(wrong.compute(&lens).is_err());
         assert!(PsfRequest { spectral_weights: vec![-1.0, 2.0], ..request() }.compute(&lens).is_err());
     }
 
     #[test]
-    fn the_whole_light_is_blurrier_than_its_sharpest_part() {
+    fn the_polychromatic_spread_is_blurrier_than_its_sharpest_part() {
         let lens = Lens::built_in("paper-2el").unwrap().with_stop_diameter_mm(4.0).unwrap();
         let set = request().compute(&lens).unwrap();
         let whole = set.polychromatic(&[10.0]);

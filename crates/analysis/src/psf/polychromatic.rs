@@ -86,9 +86,9 @@ impl PsfSet {
         })
     }
 
-    /// Returns the modulation of the whole light of a point for a wave along a direction from +x; no number where it
+    /// Returns the modulation of the polychromatic light of a point for a wave along a direction from +x; no number where it
     /// is dark.
-    pub(crate) fn whole_modulation(&self, point: Range<usize>) -> impl Fn(f64, f64) -> f64 {
+    pub(crate) fn polychromatic_modulation(&self, point: Range<usize>) -> impl Fn(f64, f64) -> f64 {
         let parts = self.parts(point).map_or_else(Vec::new, |(_, parts)| parts);
         let pictures: Vec<(f64, DVec2, Picture)> =
             parts.iter().map(|p| (p.share, p.offset_px, self.picture(p.index))).collect();
@@ -109,7 +109,7 @@ impl PsfSet {
         if total > 0.0 { real.hypot(imaginary) / total } else { f64::NAN }
     }
 
-    /// Returns the picture of the whole light as an observer sees it where light of the set's weights is white.
+    /// Returns the picture of the polychromatic light as an observer sees it where light of the set's weights is white.
     pub fn color_of(&self, point: Range<usize>) -> Option<LinearRgb> {
         let mut bands: Vec<(usize, f64)> = point.clone().map(|i| self.rows[i].wavelength_nm).enumerate().collect();
         bands.sort_by(|a, b| a.1.total_cmp(&b.1));

@@ -22,7 +22,7 @@ pub struct PsfRow {
     pub field_y_deg: f64,
     /// Distance of the point before the first vertex, mm.
     pub distance_mm: f64,
-    /// Wavelength, nm; of a whole light, the mean.
+    /// Wavelength, nm; of polychromatic light, the mean.
     pub wavelength_nm: f64,
     /// Whether this is the light of all wavelengths of the point together.
     #[serde(skip_serializing_if = "is_false")]

@@ -11,7 +11,7 @@ use crate::DiffractionError;
 ///
 /// The weights are those of the light on the film: they hold the source, the lens's transmission and the sensor's
 /// response, and how much light the pupil takes in at each wavelength ([`PupilSamples::collected`]) if that differs. A
-/// window on the centroid is on that of the whole light.
+/// window on the centroid is on that of all of it.
 ///
 /// # Errors
 /// When there is no weight above 0, or one below, and for what ails a single wavelength.

@@ -105,7 +105,7 @@ type Basis = [[f64; MOST_TERMS]; LANES];
 
 impl Places {
     /// Returns the coefficients of the functions of one parity that meet these values best, each list a function;
-    /// `None` where the places do not tell the terms apart.
+    /// `None` where the places do not determine the terms.
     pub(super) fn fit<const N: usize>(&self, parity: Parity, values: [&[f64]; N]) -> Option<[Vec<f64>; N]> {
         // Zernike's polynomials are nearly orthogonal over a pupil that nearly fills the disc; powers are not.
         let n = parity.n_terms();

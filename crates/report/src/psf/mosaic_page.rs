@@ -27,10 +27,10 @@ const SCALE: u32 = 22;
 /// rest of it small.
 const HELD: f64 = 0.98;
 
-/// Draws all pictures: wavelengths across, with the whole light of all of them in color at the end of each row;
+/// Draws all pictures: wavelengths across, with the light of all of them together in color at the end of each row;
 /// fields and distances down.
 ///
-/// Each tile is exposed for its brightest pixel. The tiles of a row are of one scale, told by the bar below them,
+/// Each tile is exposed for its brightest pixel. The tiles of a row are of one scale, given by the bar below them,
 /// about the centroid; x runs to the right, y up.
 ///
 /// # Errors

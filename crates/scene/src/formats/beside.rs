@@ -52,7 +52,7 @@ impl PartialFile {
 impl Drop for PartialFile {
     fn drop(&mut self) {
         drop(self.file.take());
-        // After `finish` it is no longer there; an error here has nobody to be told to.
+        // After `finish` it is no longer there; an error here cannot be reported.
         let _ = fs::remove_file(&self.partial);
     }
 }

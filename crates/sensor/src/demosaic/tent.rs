@@ -8,8 +8,8 @@ use crate::Tile;
 /// For each phase of the tile and each channel, the neighbors that count: row and column steps, and weight.
 type Neighborhoods = Vec<Vec<Vec<(isize, isize, f32)>>>;
 
-/// Returns the neighborhoods that a rule makes of the pixels of one channel within a tile of each phase; the rule is
-/// told whether the pixel in the middle is one of them.
+/// Returns the neighborhoods that a rule makes of the pixels of one channel within a tile of each phase; the rule
+/// receives whether the pixel in the middle is one of them.
 fn neighborhoods(
     tile: &Tile,
     n_channels: usize,
