@@ -1,14 +1,18 @@
 //! How long a change of a kept camera takes to the picture, and how soon a cancelled one returns, on the built-in demo:
-//! `cargo bench -p dioptric-pipeline --bench kept`. Prints seconds: median and worst of a few runs each.
+//! `cargo bench -p dioptric-pipeline --bench kept [-- full draft preview cancel]`. Prints seconds: median and worst of a few runs
+//! each.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a bench fails by panicking and prints what it measured")]
 
 use std::{
-    fs, thread,
+    env, fs,
+    sync::Mutex,
+    thread,
     time::{Duration, Instant},
 };
 
 use dioptric_pipeline::{
-    Camera, FocusSpec, KeptCamera, Quality, SensorSpec, Silent, StopSpec, with_analog_gain, with_exposure_s,
+    Camera, FocusSpec, KeptCamera, Progress, Quality, SensorSpec, Silent, Stage, StopSpec, with_analog_gain,
+    with_exposure_s,
 };
 use dioptric_sensor::{Demosaic, Sensor};
 use dioptric_spectrum::Cancel;
@@ -65,33 +69,51 @@ fn main() {
         })
         .collect();
 
+    let sections: Vec<String> = env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
+    let is_wanted = |section: &str| sections.is_empty() || sections.iter().any(|wanted| wanted == section);
     println!("{:<44} {:>8} {:>8}", "seconds to the picture of the demo", "median", "worst");
-    let kept = KeptCamera::new(demo.clone());
-    let whole_s = seconds(&kept);
-    row("full quality: nothing kept", vec![whole_s]);
-    changes(&kept, &sensors);
-    for quality in [Quality::Draft, Quality::Preview] {
-        let kept = KeptCamera::new(demo.clone()).with_quality(quality);
-        row(&format!("{quality:?}: nothing kept"), vec![seconds(&kept)]);
-        changes(&kept, &sensors);
-    }
-
-    // Cancelled at moments spread over a whole run, all stages made anew.
-    let late_s = (0..40).map(|i| {
-        let (kept, cancel) = (KeptCamera::new(demo.clone()), Cancel::new());
-        let canceller = cancel.clone();
-        let after = Duration::from_secs_f64(whole_s * (f64::from(i) + 0.5) / 40.0);
-        let at = thread::spawn(move || {
-            thread::sleep(after);
-            canceller.cancel();
-            Instant::now()
-        });
-        let ended = kept.capture(&Silent, &cancel).map(drop);
-        let returned = Instant::now();
-        match ended {
-            Ok(()) => 0.0,
-            Err(_) => returned.duration_since(at.join().unwrap()).as_secs_f64(),
+    for (section, quality) in [("full", Quality::Full), ("draft", Quality::Draft), ("preview", Quality::Preview)] {
+        if is_wanted(section) {
+            let kept = KeptCamera::new(demo.clone()).with_quality(quality);
+            row(&format!("{quality:?}: nothing kept"), vec![seconds(&kept)]);
+            changes(&kept, &sensors);
         }
-    });
-    row("from cancel to return", late_s.collect());
+    }
+    if is_wanted("cancel") {
+        let whole_s = seconds(&KeptCamera::new(demo.clone()));
+        let mut late: Vec<(f64, String)> =
+            (0..40).map(|i| cancelled(&demo, whole_s * (i as f64 + 0.5) / 40.0)).collect();
+        row("from cancel to return", late.iter().map(|(seconds, _)| *seconds).collect());
+        late.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (seconds, stage) in &late[..5] {
+            println!("    {seconds:.3} in {stage}");
+        }
+    }
+}
+
+/// Where a run is.
+#[derive(Default)]
+struct Place(Mutex<String>);
+
+impl Progress for Place {
+    fn at(&self, stage: Stage, fraction: f64) {
+        *self.0.lock().unwrap() = format!("{}, {:.0} %", stage.title(), 100.0 * fraction);
+    }
+}
+
+/// Returns the time from a cancel after so many seconds of a run, all stages made anew, to its return, and where it was.
+fn cancelled(demo: &Camera, after_s: f64) -> (f64, String) {
+    let (kept, cancel, place) = (KeptCamera::new(demo.clone()), Cancel::new(), Place::default());
+    thread::scope(|scope| {
+        let at = scope.spawn(|| {
+            thread::sleep(Duration::from_secs_f64(after_s));
+            let stage = place.0.lock().unwrap().clone();
+            cancel.cancel();
+            (Instant::now(), stage)
+        });
+        let ended = kept.capture(&place, &cancel).map(drop);
+        let returned = Instant::now();
+        let (at, stage) = at.join().unwrap();
+        (if ended.is_ok() { 0.0 } else { returned.duration_since(at).as_secs_f64() }, stage)
+    })
 }

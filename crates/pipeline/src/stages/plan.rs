@@ -7,7 +7,7 @@ use dioptric_psf::LensImageModel;
 use dioptric_scene::Scene;
 
 use super::{Watch, film::FilmPlace, spec::PlanInputs};
-use crate::{BlurSpec, PipelineError, Stage};
+use crate::{BlurSpec, PipelineError, Quality, Stage};
 
 pub(super) fn plan(
     inputs: &PlanInputs,
@@ -20,7 +20,13 @@ pub(super) fn plan(
         BlurSpec::Layered => BlurMode::Layered,
         BlurSpec::Pointwise => BlurMode::Pointwise,
     };
-    let settings = Settings { mode, ..Settings::default() };
+    let settings = match inputs.bank.film.geometry.quality {
+        Quality::Full | Quality::Draft => Settings { mode, ..Settings::default() },
+        // The pixels are several of the full film's: what a step costs is a part of what the pixels cost.
+        Quality::Preview => {
+            Settings { mode, layer_step_px: 3.0, chromatic_step_px: 1.0, max_edge_error: 0.03, ..Settings::default() }
+        }
+    };
     let spec = ImagingSpec { film: place.film(), grid: scene.radiance.grid().clone(), settings };
     let progress = |fraction| watch.progress.at(Stage::Plan, fraction);
     Ok(ImagingPlan::new(model, &Source::of_scene(scene)?.geometry(), spec, &progress, watch.cancel)?)

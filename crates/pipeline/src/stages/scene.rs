@@ -122,8 +122,9 @@ pub(super) fn open(inputs: &SceneInputs, watch: &Watch<'_>) -> Result<ResolvedSc
 fn read(scene: SceneSpec, wanted: Option<WavelengthGrid>, watch: &Watch<'_>) -> Result<Scene, PipelineError> {
     match scene.source {
         SceneSource::StillLife { .. } => {
-            let progress = |fraction| watch.progress.at(Stage::Scene, fraction);
-            scene.open_with(wanted.as_ref(), &progress, watch.cancel)
+            let report = |part| watch.progress.at(Stage::Scene, part);
+            let cancel = watch.cancel.clone();
+            watch.run_reporting(&report, move |progress| scene.open_with(wanted.as_ref(), progress, &cancel))
         }
         SceneSource::File(_) | SceneSource::Target { .. } | SceneSource::World(_) => {
             watch.run(move || scene.open(wanted.as_ref()))

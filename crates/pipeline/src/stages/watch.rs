@@ -30,21 +30,35 @@ impl Watch<'_> {
         &self,
         step: impl FnOnce() -> Result<T, PipelineError> + Send + 'static,
     ) -> Result<T, PipelineError> {
+        self.run_reporting(&|_| {}, move |_| step())
+    }
+
+    /// Runs a step as [`run`](Self::run) does; the part of it that is done, 0–1, goes to `report` on this thread.
+    ///
+    /// A step that looks at the cancel itself may take its time to give back what memory it had: nobody waits for that.
+    pub(super) fn run_reporting<T: Send + 'static>(
+        &self,
+        report: &dyn Fn(f64),
+        step: impl FnOnce(&(dyn Fn(f64) + Sync)) -> Result<T, PipelineError> + Send + 'static,
+    ) -> Result<T, PipelineError> {
         self.cancel.check()?;
         if rayon::current_thread_index().is_some() {
-            return step();
+            return step(&|_| {});
         }
-        let (done, result) = mpsc::sync_channel(1);
+        let (sender, messages) = mpsc::channel();
         let worker = thread::Builder::new()
             .name("dioptric-step".to_owned())
             .spawn(move || {
                 // Nobody may be waiting any more.
-                let _ = done.send(step());
+                let result = step(&|part| drop(sender.send(Message::Part(part))));
+                drop(sender.send(Message::Done(result)));
             })
             .map_err(|error| PipelineError::Unsuitable { what: "a thread", reason: error.to_string() })?;
         loop {
-            match result.recv_timeout(LOOK) {
-                Ok(result) => return result,
+            match messages.recv_timeout(LOOK) {
+                Ok(Message::Done(result)) => return result,
+                Ok(Message::Part(_)) if self.cancel.is_cancelled() => return Err(Cancelled.into()),
+                Ok(Message::Part(part)) => report(part),
                 Err(RecvTimeoutError::Timeout) if self.cancel.is_cancelled() => return Err(Cancelled.into()),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => match worker.join() {
@@ -54,6 +68,13 @@ impl Watch<'_> {
             }
         }
     }
+}
+
+/// What a step on a thread of its own sends.
+enum Message<T> {
+    /// The part of it that is done.
+    Part(f64),
+    Done(Result<T, PipelineError>),
 }
 
 #[cfg(test)]
@@ -81,6 +102,17 @@ mod tests {
         go.send(()).unwrap();
         // A cancelled watch starts nothing.
         assert!(watch.run(|| Ok(1)).is_err());
+    }
+
+    #[test]
+    fn a_step_reports_on_the_thread_that_waits() {
+        let seen = std::cell::RefCell::new(vec![]);
+        let watch = Watch { progress: &Silent, cancel: &Cancel::new() };
+        let result = watch.run_reporting(&|part| seen.borrow_mut().push(part), |report| {
+            [0.25, 0.5].into_iter().for_each(report);
+            Ok(3)
+        });
+        assert_eq!((result.unwrap(), seen.into_inner()), (3, vec![0.25, 0.5]));
     }
 
     #[test]
