@@ -1,4 +1,4 @@
-//! One layer in one band: its ideal picture, spread by PSFs that vary over the film.
+//! One layer in one band: its ideal picture, light or alpha, spread by PSFs that vary over the film.
 
 use std::collections::BTreeMap;
 
@@ -10,8 +10,8 @@ use rustfft::num_complex::Complex;
 use crate::{
     convolve::{STRIP_COLUMNS, STRIP_ROWS, Strip, fast_size, multiply_add, with_fft},
     knot_kernels::{KnotKernel, LayerKernels, edge_spread_peak},
-    occlusion::BlurredLayer,
-    sampler::{IdealLayer, Rectangle, Sampler, Surface},
+    occlusion::BlurredPlane,
+    sampler::{Rectangle, Sampler, Surface},
     stopwatch::{Part, Stopwatch},
     tiles::{Knot, LARGEST, Patch, polynomials},
     work::Work,
@@ -25,27 +25,25 @@ pub(crate) struct LayerTask<'a> {
     pub(crate) sampler: &'a Sampler,
     pub(crate) map: &'a FilmMap,
     pub(crate) layer: usize,
+    /// Their light is blurred where they have radiance, their alpha where not.
     pub(crate) surfaces: &'a [Surface<'a>],
     pub(crate) patches: &'a [Patch],
     pub(crate) kernels: &'a LayerKernels,
     pub(crate) film_rows: usize,
     pub(crate) film_columns: usize,
-    /// Whether the blurred alpha is wanted beside the light.
-    pub(crate) with_alpha: bool,
     pub(crate) stopwatch: &'a Stopwatch,
 }
 
-/// The blurred light and alpha of a cell.
+/// The blurred light or alpha of a cell.
 struct BlurredCell {
     at: Rectangle,
-    light: Vec<f32>,
-    alpha: Option<Vec<f32>>,
+    values: Vec<f32>,
 }
 
 /// Blurs a layer into `out`, which must be clear; each patch counts as `patch_units` of work.
 pub(crate) fn blur_layer(
     task: &LayerTask<'_>,
-    out: &mut BlurredLayer,
+    out: &mut BlurredPlane,
     work: &Work<'_>,
     patch_units: u64,
 ) -> Result<(), Cancelled> {
@@ -80,34 +78,27 @@ fn blur_patch(
     let (first_row, first_column) = cell.first_pixel(&task.sampler.frame);
     let whole = Rectangle { first_row, first_column, rows: cell.size, columns: cell.size };
     let Some(source) = whole.clipped(task.film_rows, task.film_columns, half) else { return Ok(None) };
-    let mut ideal = IdealLayer::default();
-    let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, &mut ideal, cancel);
-    if !task.stopwatch.time(Part::Sampling, sample)? {
-        return Ok(None);
-    }
+    let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, cancel);
+    let Some(mut ideal) = task.stopwatch.time(Part::Sampling, sample)? else { return Ok(None) };
     let expansion = Expansion::of(patch, kernels, width, cancel)?;
-    let mut planes = vec![ideal.light.as_slice()];
-    if task.with_alpha {
+    if task.surfaces.iter().all(|surface| surface.radiance.is_none()) {
         // What a surface covers is 1 all over it, however its kernels change.
         let share = (1.0 / expansion.uniform_response(cell.size)) as f32;
-        ideal.alpha.iter_mut().for_each(|alpha| *alpha *= share);
-        planes.push(&ideal.alpha);
+        ideal.iter_mut().for_each(|alpha| *alpha *= share);
     }
     let places = Places::new(patch, &source, task.sampler);
-    let spread = if expansion.is_better_direct(&source, planes.len()) {
-        task.stopwatch.time(Part::Direct, || spread_directly(&planes, &places, &expansion, cancel))
+    let values = if expansion.is_better_direct(&source) {
+        task.stopwatch.time(Part::Direct, || spread_directly(&ideal, &places, &expansion, cancel))
     } else {
-        task.stopwatch.time(Part::Transforms, || spread_by_transform(&planes, &places, &expansion, cancel))
+        task.stopwatch.time(Part::Transforms, || spread_by_transform(&ideal, &places, &expansion, cancel))
     };
-    let mut spread = spread?.into_iter();
     let at = Rectangle {
         first_row: source.first_row - half as i64,
         first_column: source.first_column - half as i64,
         rows: source.rows + 2 * half,
         columns: source.columns + 2 * half,
     };
-    let light = spread.next().unwrap_or_default();
-    Ok(Some(BlurredCell { at, light, alpha: spread.next() }))
+    Ok(Some(BlurredCell { at, values: values? }))
 }
 
 /// The kernel over a cell: a sum of squares of samples, each times a polynomial down and one across the cell.
@@ -179,10 +170,10 @@ impl Expansion {
     }
 
     /// Whether a sum takes less time than transforms.
-    fn is_better_direct(&self, source: &Rectangle, n_planes: usize) -> bool {
+    fn is_better_direct(&self, source: &Rectangle) -> bool {
         let lanes = source.rows * (source.columns + self.width - 1);
-        let direct = n_planes * self.n_across() * self.width * self.width * lanes;
-        let n_transforms = self.terms.len() + n_planes * (self.terms.len() + 1);
+        let direct = self.n_across() * self.width * self.width * lanes;
+        let n_transforms = 2 * self.terms.len() + 1;
         direct <= n_transforms * self.transform_size(source).pow(2) * COST_OF_TRANSFORM
     }
 
@@ -217,17 +208,17 @@ impl Places {
     }
 }
 
-/// Spreads planes by sums: exactly the kernel of each row, and along a row that of each sample.
+/// Spreads a plane by sums: exactly the kernel of each row, and along a row that of each sample.
 fn spread_directly(
-    planes: &[&[f32]],
+    values: &[f32],
     places: &Places,
     expansion: &Expansion,
     cancel: &Cancel,
-) -> Result<Vec<Vec<f32>>, Cancelled> {
+) -> Result<Vec<f32>, Cancelled> {
     let (rows, columns) = (places.down.len(), places.across.len());
     let (width, n_across) = (expansion.width, expansion.n_across());
     let (out_rows, out_columns) = (rows + width - 1, columns + width - 1);
-    let mut out = vec![vec![0.0; out_rows * out_columns]; planes.len()];
+    let mut out = vec![0.0; out_rows * out_columns];
     let mut strip = Strip::new(width, n_across);
     for top in (0..rows).step_by(STRIP_ROWS) {
         let n_rows = STRIP_ROWS.min(rows - top);
@@ -237,66 +228,58 @@ fn spread_directly(
         }
         for left in (0..columns).step_by(STRIP_COLUMNS) {
             let across = &places.across[left..(left + STRIP_COLUMNS).min(columns)];
-            for (values, out) in planes.iter().zip(&mut out) {
-                cancel.check()?;
-                let lines = (top..top + n_rows).map(|row| &values[row * columns + left..][..across.len()]);
-                if strip.load(lines, across) {
-                    strip.add_to(&mut out[top * out_columns + left..], out_columns);
-                }
+            cancel.check()?;
+            let lines = (top..top + n_rows).map(|row| &values[row * columns + left..][..across.len()]);
+            if strip.load(lines, across) {
+                strip.add_to(&mut out[top * out_columns + left..], out_columns);
             }
         }
     }
     Ok(out)
 }
 
-/// Spreads planes by transforms: the sum over the terms of what each does to a plane times its polynomials.
+/// Spreads a plane by transforms: the sum over the terms of what each does to the plane times its polynomials.
 fn spread_by_transform(
-    planes: &[&[f32]],
+    values: &[f32],
     places: &Places,
     expansion: &Expansion,
     cancel: &Cancel,
-) -> Result<Vec<Vec<f32>>, Cancelled> {
+) -> Result<Vec<f32>, Cancelled> {
     let (rows, columns, width) = (places.down.len(), places.across.len(), expansion.width);
     let size = fast_size(rows.max(columns) + width - 1);
     with_fft(size, |fft| {
         let (mut kernel, mut spectrum) = (vec![], vec![]);
-        let mut sums = vec![vec![Complex::new(0.0, 0.0); fft.spectrum_len()]; planes.len()];
+        let mut sum = vec![Complex::new(0.0, 0.0); fft.spectrum_len()];
         let mut weighted = vec![0.0; rows * columns];
         for term in &expansion.terms {
             cancel.check()?;
             fft.forward(&term.samples, width, &mut kernel);
-            for (values, sum) in planes.iter().zip(&mut sums) {
-                cancel.check()?;
-                let lines = weighted.chunks_exact_mut(columns).zip(values.chunks_exact(columns));
-                for ((weighted, values), down) in lines.zip(&places.down) {
-                    let down = down[term.down];
-                    for ((weighted, value), across) in weighted.iter_mut().zip(values).zip(&places.across) {
-                        *weighted = value * (down * across[term.across]);
-                    }
-                }
-                fft.forward(&weighted, columns, &mut spectrum);
-                multiply_add(sum, &spectrum, &kernel);
-            }
-        }
-        let inverse = |mut sum: Vec<Complex<f32>>| {
             cancel.check()?;
-            let mut out = vec![];
-            fft.inverse(&mut sum, rows + width - 1, columns + width - 1, &mut out);
-            Ok(out)
-        };
-        sums.into_iter().map(inverse).collect()
+            let lines = weighted.chunks_exact_mut(columns).zip(values.chunks_exact(columns));
+            for ((weighted, values), down) in lines.zip(&places.down) {
+                let down = down[term.down];
+                for ((weighted, value), across) in weighted.iter_mut().zip(values).zip(&places.across) {
+                    *weighted = value * (down * across[term.across]);
+                }
+            }
+            fft.forward(&weighted, columns, &mut spectrum);
+            multiply_add(&mut sum, &spectrum, &kernel);
+        }
+        cancel.check()?;
+        let mut out = vec![];
+        fft.inverse(&mut sum, rows + width - 1, columns + width - 1, &mut out);
+        Ok(out)
     })
 }
 
 /// Adds what of a blurred cell lies on the film.
-fn add_cell(task: &LayerTask<'_>, cell: &BlurredCell, out: &mut BlurredLayer) {
+fn add_cell(task: &LayerTask<'_>, cell: &BlurredCell, out: &mut BlurredPlane) {
     let Some(on_film) = cell.at.clipped(task.film_rows, task.film_columns, 0) else { return };
     let (skip_rows, skip_columns) =
         ((on_film.first_row - cell.at.first_row) as usize, (on_film.first_column - cell.at.first_column) as usize);
     for row in 0..on_film.rows {
         let first = (row + skip_rows) * cell.at.columns + skip_columns;
-        let part = first..first + on_film.columns;
-        let alpha = cell.alpha.as_ref().map(|alpha| &alpha[part.clone()]);
-        out.add_row(on_film.first_row as usize + row, on_film.first_column as usize, &cell.light[part], alpha);
+        let part = &cell.values[first..first + on_film.columns];
+        out.add_row(on_film.first_row as usize + row, on_film.first_column as usize, part);
     }
 }

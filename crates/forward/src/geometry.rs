@@ -25,7 +25,17 @@ impl FilmFrame {
 
     /// Returns the place (x right, y up, mm from the axis) of a row and column, which may lie outside the film.
     pub(crate) fn place_mm(&self, row: f64, column: f64) -> DVec2 {
-        DVec2::new((column - self.center_column) * self.pitch_mm, (self.center_row - row) * self.pitch_mm)
+        DVec2::new(self.x_mm(column), self.y_mm(row))
+    }
+
+    /// Returns how far to the right of the axis a column lies, mm.
+    pub(crate) fn x_mm(&self, column: f64) -> f64 {
+        (column - self.center_column) * self.pitch_mm
+    }
+
+    /// Returns how far above the axis a row lies, mm.
+    pub(crate) fn y_mm(&self, row: f64) -> f64 {
+        (self.center_row - row) * self.pitch_mm
     }
 
     pub(crate) fn center(&self) -> (f64, f64) {

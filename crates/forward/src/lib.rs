@@ -12,6 +12,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod basis;
 mod blur;
 mod convolve;
 mod coverage;
@@ -22,7 +23,9 @@ mod geometry;
 mod hidden;
 mod irradiance;
 mod knot_kernels;
+mod lateral_color;
 mod layers;
+mod layout;
 mod occluded;
 mod occlusion;
 mod plan;
@@ -39,12 +42,13 @@ mod acceptance;
 #[cfg(test)]
 mod plan_tests;
 
+pub use basis::BandKernels;
 pub use coverage::{PsfDomain, check_depth_map};
 pub use disc_lens::DiscLens;
 pub use error::{ForwardError, SinkError};
 pub use film::{BlurMode, Film, Settings};
 pub use irradiance::irradiance;
-pub use plan::{BandKernels, ImagingPlan, ImagingSpec};
+pub use plan::{ImagingPlan, ImagingSpec};
 pub use render::{Sink, render};
 pub use source::{BandRadiance, OccludedLayer, SceneGeometry, SceneRadiance, Source};
 pub use stopwatch::{Clock, ImagingTimes};

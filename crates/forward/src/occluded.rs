@@ -1,20 +1,20 @@
 //! The second samples of a scene: what lies behind near surfaces, close to their edges.
 
 use dioptric_spectrum::{Cancel, Cancelled, DepthMap};
-use ndarray::Array2;
 
 use crate::{
     BlurMode, SceneGeometry, Settings,
     hidden::{EdgeRule, Fill, reach_of_edges},
     layers::Layers,
+    sampler::LayerCoordinates,
     work::plane_of,
 };
 
 /// Where the second samples come from, and their layer coordinates (NaN where there is none).
 pub(crate) enum OccludedSamples {
     Nothing,
-    Estimated { fill: Box<Fill>, layer_coordinates: Array2<f32> },
-    Known(Array2<f32>),
+    Estimated { fill: Box<Fill>, layer_coordinates: LayerCoordinates },
+    Known(LayerCoordinates),
 }
 
 impl OccludedSamples {
@@ -45,7 +45,7 @@ impl OccludedSamples {
                 let shows = reach[row * size.1 + column] > 0.0 && distance > front[(row, column)] + 0.5 * rule.jump;
                 if shows { layers.coordinate_of_distance(distance) } else { f32::NAN }
             };
-            return Ok(Self::Known(plane_of(size, cancel, place)?));
+            return Ok(Self::Known(LayerCoordinates::new(plane_of(size, cancel, place)?, cancel)?));
         }
         let fill = Fill::find(&front, &rule, cancel)?;
         if fill.is_empty() {
@@ -55,12 +55,12 @@ impl OccludedSamples {
             let distance = fill.distances[(row, column)];
             if distance.is_nan() { f32::NAN } else { layers.coordinate_of_distance(distance) }
         };
-        let layer_coordinates = plane_of(size, cancel, place)?;
+        let layer_coordinates = LayerCoordinates::new(plane_of(size, cancel, place)?, cancel)?;
         Ok(Self::Estimated { fill: Box::new(fill), layer_coordinates })
     }
 
     /// The layer coordinates of the second samples among the layers.
-    pub(crate) fn layer_coordinates(&self) -> Option<&Array2<f32>> {
+    pub(crate) fn layer_coordinates(&self) -> Option<&LayerCoordinates> {
         match self {
             Self::Nothing => None,
             Self::Estimated { layer_coordinates, .. } | Self::Known(layer_coordinates) => Some(layer_coordinates),

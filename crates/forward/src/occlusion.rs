@@ -1,43 +1,38 @@
 //! Layers laid one behind the other until every pixel is covered.
 
+use std::ops::Range;
+
 use dioptric_spectrum::{Cancel, Cancelled};
 use ndarray::{Array2, Zip};
 
-/// A blurred layer: its light and its alpha, and the part of each row that it touches.
-pub(crate) struct BlurredLayer {
-    light: Array2<f32>,
-    alpha: Array2<f32>,
+/// The light or the alpha of a blurred layer, and the part of each row that it touches.
+pub(crate) struct BlurredPlane {
+    values: Array2<f32>,
+    /// First column and the one after the last.
     touched: Vec<(usize, usize)>,
 }
 
-impl BlurredLayer {
+impl BlurredPlane {
     pub(crate) fn new(rows: usize, columns: usize) -> Self {
-        let zeros = || Array2::zeros((rows, columns));
-        Self { light: zeros(), alpha: zeros(), touched: vec![(columns, 0); rows] }
+        Self { values: Array2::zeros((rows, columns)), touched: vec![(columns, 0); rows] }
     }
 
-    /// Adds a part of a row of light and of alpha, the latter where it is wanted.
-    pub(crate) fn add_row(&mut self, row: usize, first_column: usize, light: &[f32], alpha: Option<&[f32]>) {
-        let add = |plane: &mut Array2<f32>, values: &[f32]| {
-            let mut line = plane.row_mut(row);
-            let line = line.as_slice_mut().expect("planes are in standard order");
-            for (sum, value) in line[first_column..][..values.len()].iter_mut().zip(values) {
-                *sum += value;
-            }
-        };
-        add(&mut self.light, light);
-        if let Some(alpha) = alpha {
-            add(&mut self.alpha, alpha);
+    /// Adds to a part of a row.
+    pub(crate) fn add_row(&mut self, row: usize, first_column: usize, values: &[f32]) {
+        let mut line = self.values.row_mut(row);
+        let line = line.as_slice_mut().expect("planes are in standard order");
+        for (sum, value) in line[first_column..][..values.len()].iter_mut().zip(values) {
+            *sum += value;
         }
         let (start, end) = &mut self.touched[row];
         *start = (*start).min(first_column);
-        *end = (*end).max(first_column + light.len());
+        *end = (*end).max(first_column + values.len());
     }
 
     /// Adds a layer on pixels `factor` times as wide, about the same middle, interpolated between their centers.
     pub(crate) fn add_magnified(&mut self, coarse: &Self, factor: usize, cancel: &Cancel) -> Result<(), Cancelled> {
-        let (rows, columns) = self.light.dim();
-        let (coarse_rows, coarse_columns) = coarse.light.dim();
+        let (rows, columns) = self.values.dim();
+        let (coarse_rows, coarse_columns) = coarse.values.dim();
         // A pixel's place among those of the coarse layer: the first of two, and the share of the second.
         let place = |index: usize, n: usize, n_coarse: usize| {
             let at = (index as f64 - 0.5 * (n as f64 - 1.0)) / factor as f64 + 0.5 * (n_coarse as f64 - 1.0);
@@ -45,33 +40,92 @@ impl BlurredLayer {
             (first, (at - first as f64) as f32)
         };
         let across: Vec<(usize, f32)> = (0..columns).map(|column| place(column, columns, coarse_columns)).collect();
-        let line = |plane: &Array2<f32>, (top, down): (usize, f32)| -> Vec<f32> {
+        let plane = &coarse.values;
+        for row in 0..rows {
+            cancel.check()?;
+            let (top, down) = place(row, rows, coarse_rows);
             let between = |&(left, right): &(usize, f32)| {
                 let at = |row: usize| plane[(row, left)] + right * (plane[(row, left + 1)] - plane[(row, left)]);
                 at(top) + down * (at(top + 1) - at(top))
             };
-            across.iter().map(between).collect()
-        };
-        for row in 0..rows {
-            cancel.check()?;
-            let at = place(row, rows, coarse_rows);
-            let (light, alpha) = (line(&coarse.light, at), line(&coarse.alpha, at));
-            self.add_row(row, 0, &light, Some(&alpha));
+            let line: Vec<f32> = across.iter().map(between).collect();
+            self.add_row(row, 0, &line);
         }
         Ok(())
     }
 
-    /// Wipes the layer for the next.
+    /// Wipes the plane for the next layer.
     fn clear(&mut self) {
-        let columns = self.light.ncols();
+        let columns = self.values.ncols();
         for (row, (start, end)) in self.touched.iter_mut().enumerate() {
-            for plane in [&mut self.light, &mut self.alpha] {
-                if let Some(line) = plane.row_mut(row).as_slice_mut() {
-                    line[*start..(*end).max(*start)].fill(0.0);
-                }
+            if let Some(line) = self.values.row_mut(row).as_slice_mut() {
+                line[*start..(*end).max(*start)].fill(0.0);
             }
             (*start, *end) = (columns, 0);
         }
+    }
+
+    /// Returns the plane as alpha, and wipes it.
+    pub(crate) fn take_alpha(&mut self) -> LayerAlpha {
+        let columns = |&(start, end): &(usize, usize)| start..end.max(start);
+        let lines: Vec<Range<usize>> = self.touched.iter().map(columns).collect();
+        let mut alpha = Vec::with_capacity(lines.iter().map(Range::len).sum());
+        let mut starts = Vec::with_capacity(lines.len());
+        for (line, row) in lines.iter().zip(self.values.rows()) {
+            starts.push(alpha.len());
+            alpha.extend(row.iter().skip(line.start).take(line.len()));
+        }
+        self.clear();
+        LayerAlpha { lines, starts, alpha }
+    }
+}
+
+/// The alpha of a blurred layer: the share of each pixel that it covers, of each row the part where it covers any.
+#[derive(Debug)]
+pub(crate) struct LayerAlpha {
+    /// The columns of each row.
+    lines: Vec<Range<usize>>,
+    /// Where the alpha of each row begins.
+    starts: Vec<usize>,
+    alpha: Vec<f32>,
+}
+
+impl LayerAlpha {
+    /// The bytes of memory that it takes.
+    pub(crate) fn size_bytes(&self) -> usize {
+        size_of_val(self.lines.as_slice()) + size_of_val(self.starts.as_slice()) + size_of_val(self.alpha.as_slice())
+    }
+
+    /// Adds its alpha in a row, times a factor, to that from column `first` on.
+    fn add_to(&self, row: usize, factor: f32, alpha: &mut [f32], first: usize) {
+        let line = &self.lines[row];
+        let own = &self.alpha[self.starts[row]..][..line.len()];
+        if let Some(alpha) = alpha.get_mut(line.start.wrapping_sub(first)..) {
+            alpha.iter_mut().zip(own).for_each(|(sum, own)| *sum += factor * own);
+        }
+    }
+}
+
+/// The alpha of a layer between two bands.
+#[derive(Clone, Copy)]
+pub(crate) struct AlphaBetween<'a> {
+    pub(crate) lower: &'a LayerAlpha,
+    pub(crate) upper: &'a LayerAlpha,
+    /// 0 at the lower band, 1 at the upper one.
+    pub(crate) fraction: f32,
+}
+
+impl AlphaBetween<'_> {
+    /// Puts the alpha of a row into `alpha`, and returns the column of its first value.
+    fn line(&self, row: usize, alpha: &mut Vec<f32>) -> usize {
+        alpha.clear();
+        let parts = [(self.lower, 1.0 - self.fraction), (self.upper, self.fraction)];
+        let parts = parts.into_iter().filter(|(part, factor)| *factor != 0.0 && !part.lines[row].is_empty());
+        let ends = |(start, end): (usize, usize), line: &Range<usize>| (start.min(line.start), end.max(line.end));
+        let (start, end) = parts.clone().map(|(part, _)| &part.lines[row]).fold((usize::MAX, 0), ends);
+        alpha.resize(end.saturating_sub(start), 0.0);
+        parts.for_each(|(part, factor)| part.add_to(row, factor, alpha, start));
+        start.min(end)
     }
 }
 
@@ -93,28 +147,34 @@ impl Composite {
     }
 
     /// Lays a layer behind those before it, and wipes it.
-    pub(crate) fn composite_under(&mut self, layer: &mut BlurredLayer, cancel: &Cancel) -> Result<(), Cancelled> {
-        for (row, &(start, end)) in layer.touched.iter().enumerate() {
+    pub(crate) fn composite_under(
+        &mut self,
+        light: &mut BlurredPlane,
+        alpha: AlphaBetween<'_>,
+        cancel: &Cancel,
+    ) -> Result<(), Cancelled> {
+        let mut alphas = vec![];
+        for row in 0..light.values.nrows() {
             cancel.check()?;
-            for column in start..end {
-                let alpha = layer.alpha[(row, column)];
+            let first = alpha.line(row, &mut alphas);
+            for (column, &alpha) in (first..).zip(&alphas) {
                 let uncovered = &mut self.uncovered[(row, column)];
                 if alpha <= 0.0 || *uncovered <= 0.0 {
                     continue;
                 }
                 let taken = alpha.min(*uncovered);
-                self.light[(row, column)] += layer.light[(row, column)] * (taken / alpha);
+                self.light[(row, column)] += light.values[(row, column)] * (taken / alpha);
                 *uncovered -= taken;
             }
         }
-        layer.clear();
+        light.clear();
         Ok(())
     }
 
     /// Adds a layer's light as if it hid nothing, and wipes it.
-    pub(crate) fn add(&mut self, layer: &mut BlurredLayer) {
-        self.light += &layer.light;
-        layer.clear();
+    pub(crate) fn add(&mut self, light: &mut BlurredPlane) {
+        self.light += &light.values;
+        light.clear();
     }
 
     /// Returns the picture, each pixel scaled to full alpha.
@@ -137,16 +197,18 @@ impl Composite {
 mod tests {
     use super::*;
 
-    fn layer(light: f32, alpha: f32) -> BlurredLayer {
-        let mut layer = BlurredLayer::new(1, 1);
-        layer.add_row(0, 0, &[light], Some(&[alpha]));
-        layer
+    fn plane(value: f32) -> BlurredPlane {
+        let mut plane = BlurredPlane::new(1, 1);
+        plane.add_row(0, 0, &[value]);
+        plane
     }
 
     fn composite(layers: &[(f32, f32)]) -> f32 {
         let mut picture = Composite::new(1, 1);
         for &(light, alpha) in layers {
-            picture.composite_under(&mut layer(light, alpha), &Cancel::new()).unwrap();
+            let alpha = plane(alpha).take_alpha();
+            let alpha = AlphaBetween { lower: &alpha, upper: &alpha, fraction: 0.25 };
+            picture.composite_under(&mut plane(light), alpha, &Cancel::new()).unwrap();
         }
         picture.finish()[(0, 0)]
     }
@@ -164,6 +226,27 @@ mod tests {
     #[test]
     fn a_surface_in_two_layers_covers_once() {
         assert_eq!(composite(&[(0.4 * 3.0, 0.4), (0.6 * 3.0, 0.6), (9.0, 0.5)]), 3.0);
+    }
+
+    #[test]
+    fn alpha_between_bands_is_their_mean() {
+        let alpha = |first: usize, values: &[f32]| {
+            let mut plane = BlurredPlane::new(2, 9);
+            plane.add_row(1, first, values);
+            let alpha = plane.take_alpha();
+            assert!(plane.values.iter().all(|&v| v == 0.0));
+            alpha
+        };
+        let (lower, upper) = (alpha(2, &[0.5, 1.0, 1.0]), alpha(4, &[1.0, 0.5]));
+        let line = |row: usize, fraction: f32| {
+            let mut alpha = vec![7.0];
+            let first = AlphaBetween { lower: &lower, upper: &upper, fraction }.line(row, &mut alpha);
+            (first, alpha)
+        };
+        assert_eq!(line(1, 0.25), (2, vec![0.375, 0.75, 1.0, 0.125]));
+        assert_eq!(line(1, 0.0), (2, vec![0.5, 1.0, 1.0]));
+        assert_eq!(line(1, 1.0), (4, vec![1.0, 0.5]));
+        assert_eq!(line(0, 0.25), (0, vec![]));
     }
 
     #[test]

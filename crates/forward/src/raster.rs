@@ -32,8 +32,10 @@ impl LayerRaster {
         factor
     }
 
+    /// `view` is that of the scene, with its rows and columns.
+    ///
     /// Returns the raster of pixels `factor` times as wide as the film's, which reaches beyond its edges.
-    pub(crate) fn new(film: &Film, factor: usize, view: View, map: &FilmMap) -> Self {
+    pub(crate) fn new(film: &Film, factor: usize, view: (View, (usize, usize)), map: &FilmMap) -> Self {
         let n = |n: usize| if factor == 1 { n } else { n.div_ceil(factor) + 2 };
         let coarse = Film { rows: n(film.rows), columns: n(film.columns), pitch_um: factor as f64 * film.pitch_um };
         let most = if factor == 1 { MOST_SAMPLES } else { MOST_SAMPLES_OF_WIDE };

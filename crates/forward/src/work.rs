@@ -12,6 +12,14 @@ use rayon::prelude::*;
 /// Receives the fraction of a piece of work that is done, from 0 to 1, from any thread.
 pub(crate) type Progress<'a> = dyn Fn(f64) + Sync + 'a;
 
+/// Who follows a piece of work.
+pub(crate) struct Watch<'a> {
+    pub(crate) progress: &'a Progress<'a>,
+    /// The fractions reported at the start and at the end.
+    pub(crate) range: (f64, f64),
+    pub(crate) cancel: &'a Cancel,
+}
+
 /// A piece of work of a known number of units: its progress, and whether it has been cancelled.
 pub(crate) struct Work<'a> {
     cancel: &'a Cancel,

@@ -44,6 +44,11 @@ impl Area {
 }
 
 impl FieldGeometry {
+    /// The bytes of memory that it takes.
+    pub(crate) fn size_bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice())
+    }
+
     /// Returns the field (tangents) seen at a place of the film and the irradiance there over the radiance of a locally
     /// uniform scene, sr; `None` where the bank has no field for it.
     ///

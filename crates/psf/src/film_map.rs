@@ -51,6 +51,8 @@ impl RadialMap {
 
     /// Returns the field per mm of film (1/mm) and the irradiance per radiance (sr) where the squared distance
     /// from the axis is `radius2_mm2`; `None` beyond the extent.
+    // Within the loops over the samples of a film, whose time it is half of when called.
+    #[inline]
     pub fn at(&self, radius2_mm2: f64) -> Option<(f64, f64)> {
         let place = radius2_mm2 * self.entries_per_mm2;
         let last = self.tan_per_mm.len() - 1;
@@ -129,6 +131,16 @@ impl FilmMap {
         match self {
             Self::Radial(map) => map.field_tan(place_mm),
             Self::Plane(map) => map.nearest_field_tan(place_mm),
+        }
+    }
+
+    /// The bytes of memory that it takes.
+    pub fn size_bytes(&self) -> usize {
+        match self {
+            Self::Radial(map) => {
+                size_of_val(map.tan_per_mm.as_slice()) + size_of_val(map.irradiance_per_radiance.as_slice())
+            }
+            Self::Plane(map) => map.size_bytes(),
         }
     }
 
