@@ -19,7 +19,6 @@ const ALLOWED: &[(&str, &[&str], &str)] = &[
         &["camera", "lens_camera", "renderer"],
         "a camera is one of several kinds, of which the lens's takes what the renderer asks of any",
     ),
-    ("forward", &["plan", "render"], "a rendering is a plan used once, and both hand bands to the same kind of sink"),
     (
         "pipeline",
         &["camera", "frame_files", "words"],

@@ -3,27 +3,16 @@
 use std::sync::{Arc, Mutex};
 
 use dioptric_psf::LensImage;
-use dioptric_spectrum::{Cancel, WavelengthGrid};
+use dioptric_spectrum::Cancel;
 use ndarray::Array2;
 
 use crate::{
-    BandKernels, BandRadiance, Film, ForwardError, SceneGeometry, SceneRadiance, Settings, Sink,
+    BandKernels, BandRadiance, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
     basis::Kept,
     layout::Layout,
     stopwatch::{Clock, ImagingTimes, Stopwatch},
     work::{Watch, Work},
 };
-
-/// What a plan is made for, beside the scene's geometry and the lens.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImagingSpec {
-    /// The film.
-    pub film: Film,
-    /// The bands.
-    pub grid: WavelengthGrid,
-    /// How finely the picture is made.
-    pub settings: Settings,
-}
 
 /// The imaging of one scene geometry through one lens on one film: made once, then used for any light and any band.
 ///

@@ -2,12 +2,8 @@
 
 use dioptric_psf::LensImage;
 use dioptric_spectrum::Cancel;
-use ndarray::Array2;
 
-use crate::{Film, ForwardError, ImagingSpec, Settings, SinkError, Source, layout::Layout, work::Watch};
-
-/// Takes the bands of a picture, one after the other, shortest wavelength first.
-pub type Sink<'a> = dyn FnMut(usize, Array2<f32>) -> Result<(), SinkError> + 'a;
+use crate::{Film, ForwardError, ImagingSpec, Settings, Sink, Source, layout::Layout, work::Watch};
 
 /// Images a source through a lens: hands the irradiance on the film, W m⁻² nm⁻¹, to `sink` band by band.
 ///
