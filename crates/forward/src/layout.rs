@@ -7,13 +7,13 @@ use std::{
 };
 
 use dioptric_psf::{FilmMap, LensImage};
-use dioptric_spectrum::{Cancel, Cancelled};
+use dioptric_spectrum::{Cancel, Cancelled, WavelengthGrid};
 use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    BandKernels, BandRadiance, BlurMode, Film, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
+    BandKernels, BandRadiance, BlurMode, Film, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Settings, Sink,
     basis::{BandBasis, BasisBetween, Kept},
     blur::{LayerTask, blur_layer},
     geometry::check_extent,
@@ -52,6 +52,48 @@ pub(crate) struct Layout {
     pub(crate) stopwatch: Stopwatch,
 }
 
+/// Layers of depth over a film, each on its raster.
+struct Stack {
+    layers: Layers,
+    kernel_bands: Vec<usize>,
+    /// Blur radius of each layer, pixels of the film.
+    radius_px: Vec<f64>,
+    rasters: Vec<LayerRaster>,
+    /// Of each layer, in the middle band.
+    maps: Vec<FilmMap>,
+    extent_mm: f64,
+}
+
+impl Stack {
+    fn over(lens: &dyn LensImage, scene: &SceneGeometry<'_>, spec: &ImagingSpec, dioptres: (f64, f64)) -> Self {
+        let ImagingSpec { film, grid, settings } = spec;
+        let (pitch_mm, corner_mm, middle_nm) = (1e-3 * film.pitch_um, film.half_diagonal_mm(), middle_nm(grid));
+        let fields = blur_fields(lens, &lens.film_map(dioptres.0, middle_nm, corner_mm), film);
+        let blurs = Blurs { kernels: lens, pitch_mm, fields: &fields, wavelengths_nm: grid.centers_nm() };
+        let layers = Layers::over(dioptres, settings.layer_step_px, &blurs);
+        let kernel_bands = layers.chromatic_knots(settings.chromatic_step_px, &blurs);
+        let radius_px: Vec<f64> = (0..layers.len()).map(|layer| layers.radius_px_at(layer as f32)).collect();
+        let pad_px = radius_px.iter().map(|&radius_px| pad_for(radius_px)).fold(0.0, f64::max);
+        let border_px = pad_px + 2.0 * settings.knot_spacing_px as f64;
+        let extent_mm = corner_mm + pitch_mm * std::f64::consts::SQRT_2 * border_px;
+        let maps: Vec<FilmMap> = layers.dioptres().iter().map(|&d| lens.film_map(d, middle_nm, extent_mm)).collect();
+        let view = (scene.view, scene.size());
+        let raster = |(&radius_px, map)| LayerRaster::new(film, LayerRaster::factor_for(radius_px), view, map);
+        let rasters = radius_px.iter().zip(&maps).map(raster).collect();
+        Self { layers, kernel_bands, radius_px, rasters, maps, extent_mm }
+    }
+}
+
+/// The wavelength of the middle band.
+fn middle_nm(grid: &WavelengthGrid) -> f64 {
+    grid.centers_nm()[grid.len() / 2]
+}
+
+/// Whether layers hide those behind them.
+fn hides(settings: &Settings, layers: &Layers) -> bool {
+    settings.mode == BlurMode::Layered && layers.len() > 1
+}
+
 /// Units of work of a kernel and of a patch of the film in one band, about in proportion to their time.
 const KERNEL_UNITS: u64 = 1;
 const PATCH_UNITS: u64 = 8;
@@ -73,30 +115,16 @@ impl Layout {
         let dioptres = (1.0 / far_m, 1.0 / near_m);
         check_extent(lens, grid, dioptres, film, cancel)?;
 
-        // Lay layers over the depths.
-        let wavelengths_nm = grid.centers_nm();
-        let middle_nm = wavelengths_nm[wavelengths_nm.len() / 2];
-        let corner_mm = film.half_diagonal_mm();
-        let fields = blur_fields(lens, &lens.film_map(dioptres.0, middle_nm, corner_mm), film);
-        let blurs = Blurs { kernels: lens, pitch_mm: 1e-3 * film.pitch_um, fields: &fields, wavelengths_nm };
-        let layers = Layers::over(dioptres, settings.layer_step_px, &blurs);
-        let kernel_bands = layers.chromatic_knots(settings.chromatic_step_px, &blurs);
+        let stack = Stack::over(lens, scene, &spec, dioptres);
+        let Stack { layers, kernel_bands, radius_px, rasters, maps, extent_mm } = stack;
         let z_m = scene.depth.z_m();
         let coordinate = |row: usize, column: usize| layers.coordinate_of(z_m[(row, column)]);
         let layer_coordinates = LayerCoordinates::new(plane_of(z_m.dim(), cancel, coordinate)?, cancel)?;
-
-        let pad_px = (0..layers.len()).map(|l| pad_for(layers.radius_px_at(l as f32))).fold(0.0, f64::max);
-        let cell_size = settings.knot_spacing_px;
-        let extent_mm = corner_mm + 1e-3 * film.pitch_um * std::f64::consts::SQRT_2 * (pad_px + 2.0 * cell_size as f64);
-        let maps: Vec<FilmMap> = layers.dioptres().iter().map(|&d| lens.film_map(d, middle_nm, extent_mm)).collect();
-        let radius_px: Vec<f64> = (0..layers.len()).map(|layer| layers.radius_px_at(layer as f32)).collect();
-        let view = (scene.view, scene.size());
-        let raster = |(&radius_px, map)| LayerRaster::new(film, LayerRaster::factor_for(radius_px), view, map);
-        let rasters: Vec<LayerRaster> = radius_px.iter().zip(&maps).map(raster).collect();
-        let scene_per_film = LayerRaster::new(film, 1, view, &maps[0]).sampler.scene_per_film;
+        let scene_per_film = LayerRaster::new(film, 1, (scene.view, scene.size()), &maps[0]).sampler.scene_per_film;
         let occluded = OccludedSamples::find(scene, &layers, settings, scene_per_film, cancel)?;
 
         // Find the cells in which a layer has anything, and halve them until the spline follows the PSFs.
+        let (wavelengths_nm, middle_nm) = (grid.centers_nm(), middle_nm(grid));
         let ends: Vec<FilmMap> = [wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1], middle_nm]
             .into_iter()
             .flat_map(|w| [0, layers.len() - 1].map(|l| lens.film_map(layers.dioptres()[l], w, extent_mm)))
@@ -106,7 +134,7 @@ impl Layout {
             .map(LayerCoordinates::samples)
             .collect();
         let extents = Extents { radius_px: &radius_px, maps: &ends, surfaces: &surfaces };
-        let active = active_cells_of(&rasters, &extents, cell_size, cancel)?;
+        let active = active_cells_of(&rasters, &extents, settings.knot_spacing_px, cancel)?;
         let work = Work::new(cancel, progress, range, active.iter().map(Vec::len).sum::<usize>() as u64);
         let stopwatch = Stopwatch::default();
         let film_lens = FilmLens {
@@ -119,10 +147,10 @@ impl Layout {
         };
         let tiling = Tiling::new(active, &film_lens, settings, &work)?;
         let kept = Mutex::new(Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() });
-        let hides = settings.mode == BlurMode::Layered && layers.len() > 1;
-        let shifts = LateralColor { lens, film, grid, extent_mm };
-        let basis_bands = match hides {
-            true => shifts.knots(&kernel_bands, dioptres, settings.chromatic_step_px),
+        let basis_bands = match hides(settings, &layers) {
+            true => {
+                LateralColor { lens, film, grid, extent_mm }.knots(&kernel_bands, dioptres, settings.chromatic_step_px)
+            }
             false => kernel_bands.clone(),
         };
         Ok(Self {
@@ -153,9 +181,8 @@ impl Layout {
         self.layer_coordinates.samples().dim()
     }
 
-    /// Whether layers hide those behind them.
     fn hides(&self) -> bool {
-        self.spec.settings.mode == BlurMode::Layered && self.layers.len() > 1
+        hides(&self.spec.settings, &self.layers)
     }
 
     fn maps(&self) -> MutexGuard<'_, BTreeMap<usize, Arc<Vec<FilmMap>>>> {

@@ -52,8 +52,8 @@ pub(crate) struct LayerCoordinates {
 }
 
 impl LayerCoordinates {
+    /// Takes samples in standard layout.
     pub(crate) fn new(samples: Array2<f32>, cancel: &Cancel) -> Result<Self, Cancelled> {
-        let samples = samples.as_standard_layout().into_owned();
         let (rows, columns) = samples.dim();
         let mut ranges = Array2::from_elem((rows, columns), (u16::MAX, 0));
         ranges.axis_iter_mut(Axis(0)).into_par_iter().enumerate().try_for_each(|(top, mut line)| {

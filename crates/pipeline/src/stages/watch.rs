@@ -33,17 +33,18 @@ impl Watch<'_> {
         self.run_reporting(&|_| {}, move |_| step())
     }
 
-    /// Runs a step as [`run`](Self::run) does; the part of it that is done, 0–1, goes to `report` on this thread.
+    /// Runs a step as [`run`](Self::run) does; the part of it that is done, 0–1, goes to `report`, on this thread unless it is
+    /// one of a pool.
     ///
     /// A step that looks at the cancel itself may take its time to give back what memory it had: nobody waits for that.
     pub(super) fn run_reporting<T: Send + 'static>(
         &self,
-        report: &dyn Fn(f64),
+        report: &(dyn Fn(f64) + Sync),
         step: impl FnOnce(&(dyn Fn(f64) + Sync)) -> Result<T, PipelineError> + Send + 'static,
     ) -> Result<T, PipelineError> {
         self.cancel.check()?;
         if rayon::current_thread_index().is_some() {
-            return step(&|_| {});
+            return step(report);
         }
         let (sender, messages) = mpsc::channel();
         let worker = thread::Builder::new()
@@ -79,7 +80,10 @@ enum Message<T> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::sync::{
+        Mutex,
+        atomic::{AtomicBool, Ordering},
+    };
 
     use super::*;
     use crate::Silent;
@@ -106,13 +110,21 @@ mod tests {
 
     #[test]
     fn a_step_reports_on_the_thread_that_waits() {
-        let seen = std::cell::RefCell::new(vec![]);
-        let watch = Watch { progress: &Silent, cancel: &Cancel::new() };
-        let result = watch.run_reporting(&|part| seen.borrow_mut().push(part), |report| {
-            [0.25, 0.5].into_iter().for_each(report);
-            Ok(3)
-        });
-        assert_eq!((result.unwrap(), seen.into_inner()), (3, vec![0.25, 0.5]));
+        let here = thread::current().id();
+        let parts = || {
+            let seen = Mutex::new(vec![]);
+            let watch = Watch { progress: &Silent, cancel: &Cancel::new() };
+            let report = |part: f64| seen.lock().unwrap().push((part, thread::current().id() == here));
+            let result = watch.run_reporting(&report, |report| {
+                [0.25, 0.5].into_iter().for_each(report);
+                Ok(3)
+            });
+            (result.unwrap(), seen.into_inner().unwrap())
+        };
+        assert_eq!(parts(), (3, vec![(0.25, true), (0.5, true)]));
+        // In a pool there is no other thread, and the parts are reported as well.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        assert_eq!(pool.install(parts), (3, vec![(0.25, false), (0.5, false)]));
     }
 
     #[test]
