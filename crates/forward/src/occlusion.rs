@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use dioptric_spectrum::{Cancel, Cancelled};
-use ndarray::{Array2, Zip};
+use ndarray::{Array2, ArrayView1, Zip};
 
 /// The light or the alpha of a blurred layer, and the part of each row that it touches.
 pub(crate) struct BlurredPlane {
@@ -65,10 +65,14 @@ impl BlurredPlane {
         }
     }
 
-    /// Returns the plane as alpha, and wipes it.
+    /// Returns the plane as alpha, without the zeros at the ends of its rows, and wipes it.
     pub(crate) fn take_alpha(&mut self) -> LayerAlpha {
-        let columns = |&(start, end): &(usize, usize)| start..end.max(start);
-        let lines: Vec<Range<usize>> = self.touched.iter().map(columns).collect();
+        let lit = |((start, end), row): (&(usize, usize), ArrayView1<'_, f32>)| {
+            let covers = |column: &usize| row[*column] != 0.0;
+            let first = (*start..*end).find(covers).unwrap_or(*start);
+            first..(first..*end).rfind(covers).map_or(first, |last| last + 1)
+        };
+        let lines: Vec<Range<usize>> = self.touched.iter().zip(self.values.rows()).map(lit).collect();
         let mut alpha = Vec::with_capacity(lines.iter().map(Range::len).sum());
         let mut starts = Vec::with_capacity(lines.len());
         for (line, row) in lines.iter().zip(self.values.rows()) {
@@ -237,7 +241,9 @@ mod tests {
             assert!(plane.values.iter().all(|&v| v == 0.0));
             alpha
         };
-        let (lower, upper) = (alpha(2, &[0.5, 1.0, 1.0]), alpha(4, &[1.0, 0.5]));
+        let (lower, upper) = (alpha(1, &[0.0, 0.5, 1.0, 1.0, 0.0]), alpha(4, &[1.0, 0.5]));
+        assert_eq!((lower.alpha.len(), upper.alpha.len()), (3, 2));
+        assert!(alpha(3, &[0.0, 0.0]).alpha.is_empty());
         let line = |row: usize, fraction: f32| {
             let mut alpha = vec![7.0];
             let first = AlphaBetween { lower: &lower, upper: &upper, fraction }.line(row, &mut alpha);
