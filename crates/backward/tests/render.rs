@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 
 use dioptric_backward::{
     BackwardError, BandSampling, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole,
-    PixelGrid, Placement, RenderSettings, Renderer, Rendering, ThinLens, auxiliary, layered_depth,
+    PixelGrid, Placement, RenderSettings, Renderer, Rendering, ThinLens, auxiliary, layered_depth, write_auxiliary_exr,
+    write_rendering_exr,
 };
 use dioptric_diffraction::Hurb;
 use dioptric_optics::{CoordinateBreak, Glass, Lens, glam::DVec2};
@@ -444,6 +445,24 @@ fn resumed_rendering_has_same_bits() {
     assert!(message(begin().resume(&path, "busy")).contains("is not what a picture of this size takes"));
     std::fs::write(&path, "no").unwrap();
     assert!(message(begin().resume(&path, "busy")).contains("is no checkpoint"));
+}
+
+/// The library that writes the files keeps their attributes in no order.
+#[test]
+fn equal_renderings_are_equal_files() {
+    let bands = bands(&[450.0, 550.0]);
+    let (world, camera) = (busy_world(), busy_camera(&bands));
+    let rendering = render(&world, &camera, settings(&bands, 2), 1);
+    let seen = auxiliary(&world, &camera, &bands.grid, &Cancel::new()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = |name: usize| {
+        let [picture, aside] = ["picture", "aside"].map(|what| folder.path().join(format!("{what}{name}.exr")));
+        write_rendering_exr(&picture, &rendering, Some(&seen.z_m)).unwrap();
+        write_auxiliary_exr(&aside, &seen).unwrap();
+        [picture, aside].map(|path| std::fs::read(path).unwrap())
+    };
+    let first = bytes(0);
+    assert!((1..8).all(|name| bytes(name) == first));
 }
 
 #[test]

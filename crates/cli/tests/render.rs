@@ -42,9 +42,9 @@ fn report(folder: &Path) -> serde_json::Value {
     serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
 }
 
-/// All that a rendering has gathered, and the picture that came of it.
-fn bits(folder: &Path) -> [Vec<u8>; 2] {
-    ["render.state", "picture.png"].map(|name| fs::read(folder.join(name)).unwrap())
+/// All that a rendering has gathered, and what came of it.
+fn bits(folder: &Path) -> [Vec<u8>; 4] {
+    ["render.state", "picture.png", "irradiance.exr", "auxiliary.exr"].map(|name| fs::read(folder.join(name)).unwrap())
 }
 
 #[test]
