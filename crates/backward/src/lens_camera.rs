@@ -99,13 +99,9 @@ impl LensCamera {
         Self { bounds: self.bounds.inflated(factor), ..self.clone() }
     }
 
-    /// Returns the camera with another part of its picture: from this column and row on, so many of each.
-    ///
-    /// # Errors
-    /// When the part does not lie in the picture.
-    pub fn cropped(mut self, first: (usize, usize), size: (usize, usize)) -> Result<Self, BackwardError> {
-        self.settings.pixels = self.settings.pixels.cropped(first, size)?;
-        Ok(self)
+    pub(crate) fn with_pixels(mut self, pixels: PixelGrid) -> Self {
+        self.settings.pixels = pixels;
+        self
     }
 
     /// The bands that the camera was made for.

@@ -150,7 +150,12 @@ fn killed_rendering_is_continued_to_the_same_bits() {
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(state.exists());
+    // What there is can be looked at before the end, and gives way to the picture.
+    let preview = folder.path().join("killed/preview.png");
+    let shown = image::open(&preview).unwrap();
+    assert!(shown.width() >= 24 && shown.height() >= 16);
     output(folder.path(), &[&words("killed")[..], &["--resume"]].concat());
+    assert!(!preview.exists());
     output(folder.path(), &words("whole"));
     let read = |name: &str| bits(&folder.path().join(name));
     assert!(read("killed") == read("whole"));

@@ -4,11 +4,11 @@ use std::{fs, path::Path, sync::Arc};
 
 use dioptric_backward::{
     Auxiliary, BandSampling, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
-    Placement, RenderSettings, Renderer, Rendering, ThinLens, auxiliary, write_auxiliary_exr, write_rendering_exr,
+    Placement, RenderSettings, Renderer, Rendering, auxiliary, write_auxiliary_exr, write_rendering_exr,
 };
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_scene::{Scene, SceneLight, View};
-use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectrumError, WavelengthGrid};
+use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use dioptric_world::{
     CameraKind, ReadOptions, World, WorldCamera,
     glam::{DAffine3, DVec3},
@@ -198,15 +198,22 @@ impl WorldRender {
     /// # Errors
     /// When the part does not lie in the picture.
     pub fn cropped(mut self, first: (usize, usize), size: (usize, usize)) -> Result<Self, PipelineError> {
-        self.camera = match self.camera {
-            Camera::Pinhole(view) => Camera::Pinhole(Pinhole { pixels: view.pixels.cropped(first, size)?, ..view }),
-            Camera::ThinLens(lens) => {
-                let pixels = lens.view.pixels.cropped(first, size)?;
-                Camera::ThinLens(ThinLens { view: Pinhole { pixels, ..lens.view }, ..lens })
-            }
-            Camera::Lens(lens) => Camera::Lens(Box::new(lens.cropped(first, size)?)),
-        };
+        let pixels = self.camera.pixels().cropped(first, size)?;
+        self.camera = self.camera.with_pixels(pixels);
         Ok(self)
+    }
+
+    /// Returns a first look at the picture: one pass with as few samples as reach every band, on pixels so many times as wide
+    /// and as high.
+    ///
+    /// # Errors
+    /// When the work is cancelled.
+    pub fn preview(&self, factor: usize, cancel: &Cancel) -> Result<SpectralImage, PipelineError> {
+        let pixels = self.camera.pixels().coarser(factor);
+        let coarse = Self { camera: self.camera.clone().with_pixels(pixels), samples_per_pass: 1, ..self.clone() };
+        let mut renderer = coarse.renderer()?;
+        renderer.pass(cancel, &|_| {})?;
+        Ok(renderer.rendering().picture)
     }
 
     /// What the pixels are of: irradiance on a film, or the radiance that a camera by formula sees.
