@@ -61,6 +61,7 @@ fn lens_settings(film_distance_mm: f64, film_size_mm: f64, n_pixels: usize) -> L
         placement: Placement::IDENTITY,
         origin: LensOrigin::EntrancePupil,
         diffraction: None,
+        micro_array: None,
     }
 }
 

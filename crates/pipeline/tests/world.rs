@@ -106,6 +106,33 @@ fn both_methods_have_the_light_of_the_wall() {
     }
 }
 
+/// An ideal lens keeps tangents, not sines: light counted on the object's side and on the film's differs by cos⁴ of their slopes.
+#[test]
+fn methods_differ_by_the_sine_condition_of_an_ideal_lens() {
+    let text = CAMERA
+        .replace("BuiltIn(\"dgauss-50mm\")", "Thin(focal_length_mm: 50.0, diameter_mm: 30.0)")
+        .replace("    stop: FNumber(5.0),\n", "")
+        .replace("NearObject", "FilmMm(137.0)")
+        .replace("columns: 40, rows: 24, pitch_um: 150.0", "columns: 12, rows: 12, pitch_um: 500.0")
+        .replace("Samples(32), size: (96, 64)", "Samples(512), size: (96, 64), advance_mm: 1921.0")
+        .replace("wavelengths:", "diffraction: None,\n    wavelengths:");
+    let (_folder, kept) = camera(&text);
+    let backward = kept.irradiance(&Silent, &Cancel::new()).unwrap();
+    let forward = kept.with(|camera| {
+        if let SceneSource::World(spec) = &mut camera.scene.source {
+            spec.method = RenderMethod::Forward;
+        }
+    });
+    let forward = forward.irradiance(&Silent, &Cancel::new()).unwrap();
+    // A stop of 15 mm, the wall 79 mm before it. Exactly, π a²/(a² + s²) by magnification squared against π a²/(a² + v²).
+    let expected =
+        (15.0_f64.powi(2) + 137.0_f64.powi(2)) / (15.0_f64.powi(2) + 79.0_f64.powi(2)) * (79.0 / 137.0_f64).powi(2);
+    for band in 0..3 {
+        let found = forward.summary.mean[band] / backward.summary.mean[band];
+        assert!((found / expected - 1.0).abs() < 0.004, "{found} {expected}");
+    }
+}
+
 #[test]
 fn part_has_the_samples_of_the_whole() {
     let (_folder, kept) = camera(CAMERA);

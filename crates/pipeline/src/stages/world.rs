@@ -55,7 +55,7 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
 /// Returns where the middle of the entrance pupil stands, and how it looks.
 pub(super) fn placement(world: &World, spec: &WorldSpec) -> Placement {
     let of_file = world.cameras().first().map_or(DAffine3::IDENTITY, |camera| camera.world_from_camera);
-    let advance = DAffine3::from_translation(DVec3::Z * 1e-3 * spec.advance_mm);
+    let advance = DAffine3::from_translation(1e-3 * DVec3::new(spec.aside_mm.0, spec.aside_mm.1, spec.advance_mm));
     Placement { world_from_camera: of_file * advance }
 }
 
@@ -156,12 +156,14 @@ impl WorldRender {
         }
         let bands = Bands { grid, sampling: spec.bands };
         let settings = LensCameraSettings {
-            film_distance_mm: place.film_distance_mm,
+            // The focus puts the array there, and the film lies behind it.
+            film_distance_mm: place.film_distance_mm + inputs.micro_array.map_or(0.0, |array| array.gap_mm),
             film_size_mm: DVec2::new(place.columns as f64, place.rows as f64) * (1e-3 * place.pitch_um),
             pixels: PixelGrid::new(place.columns, place.rows),
             placement: placement(&world, spec),
             origin: LensOrigin::EntrancePupil,
             diffraction: inputs.plan.bank.diffraction.hurb(),
+            micro_array: inputs.micro_array,
         };
         let identity = format!("{} {:?} {settings:?}", fingerprint(&world, spec), lens.lens);
         let camera = Camera::Lens(Box::new(LensCamera::new(&lens.lens, &bands, settings)?));
