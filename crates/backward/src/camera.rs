@@ -71,6 +71,16 @@ impl Camera {
         }
     }
 
+    /// Returns the camera with other pixels over the same film or angle of view.
+    #[must_use]
+    pub fn with_pixels(self, pixels: PixelGrid) -> Self {
+        match self {
+            Self::Pinhole(view) => Self::Pinhole(Pinhole { pixels, ..view }),
+            Self::ThinLens(lens) => Self::ThinLens(ThinLens { view: Pinhole { pixels, ..lens.view }, ..lens }),
+            Self::Lens(lens) => Self::Lens(Box::new(lens.with_pixels(pixels))),
+        }
+    }
+
     /// What the samples of the picture are.
     pub fn quantity(&self) -> Quantity {
         match self {

@@ -9,7 +9,7 @@ use crate::{
     camera::{CameraCommand, SensorCommand},
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
-    render_args::{CompareArgs, RenderArgs},
+    render_args::{CompareArgs, LightFieldArgs, RenderArgs},
 };
 
 /// Simulates a camera from the scene's spectral radiance to the final picture.
@@ -49,6 +49,9 @@ pub(crate) enum Command {
     Render(Box<RenderArgs>),
     /// Renders the world of a camera file both ways and compares: rays from the film, and the view blurred
     Compare(CompareArgs),
+    /// Takes a light field apart: views of the parts of the pupil, refocused pictures, depth
+    #[command(name = "lightfield")]
+    LightField(LightFieldArgs),
     /// Exposes a sensor to an irradiance image and processes the picture
     Sense(SenseArgs),
     /// Measures pictures, frames and sensors as a laboratory does

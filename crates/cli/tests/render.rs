@@ -42,9 +42,9 @@ fn report(folder: &Path) -> serde_json::Value {
     serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
 }
 
-/// All that a rendering has gathered, and the picture that came of it.
-fn bits(folder: &Path) -> [Vec<u8>; 2] {
-    ["render.state", "picture.png"].map(|name| fs::read(folder.join(name)).unwrap())
+/// All that a rendering has gathered, and what came of it.
+fn bits(folder: &Path) -> [Vec<u8>; 4] {
+    ["render.state", "picture.png", "irradiance.exr", "auxiliary.exr"].map(|name| fs::read(folder.join(name)).unwrap())
 }
 
 #[test]
@@ -150,7 +150,12 @@ fn killed_rendering_is_continued_to_the_same_bits() {
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(state.exists());
+    // What there is can be looked at before the end, and gives way to the picture.
+    let preview = folder.path().join("killed/preview.png");
+    let shown = image::open(&preview).unwrap();
+    assert!(shown.width() >= 24 && shown.height() >= 16);
     output(folder.path(), &[&words("killed")[..], &["--resume"]].concat());
+    assert!(!preview.exists());
     output(folder.path(), &words("whole"));
     let read = |name: &str| bits(&folder.path().join(name));
     assert!(read("killed") == read("whole"));
