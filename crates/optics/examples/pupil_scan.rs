@@ -18,7 +18,7 @@ use rayon::prelude::*;
 #[path = "../tests/counted/mod.rs"]
 mod counted;
 
-use counted::{beam_radius_mm, cross_section_mm2, spot_rms_mm};
+use counted::{beam_radius_mm, cross_section_mm2, is_any_lit, spot_rms_mm};
 
 const LAST_FIELD_DEG: f64 = 120.0;
 /// Azimuths of boundaries.
@@ -76,11 +76,14 @@ impl Field {
         let cosine = |part: &PupilBoundary| point.direction_to(DVec3::ZERO).dot(part.plane().normal());
         let parts = |lens: &MonoLens| PupilBoundary::find_parts(lens, &point, N_AZIMUTHS);
         let area_mm2 = |lens: &MonoLens| parts(lens).iter().map(|part| part.area_mm2() * cosine(part)).sum::<f64>();
+        let found_mm2 = lens.over_clear_pupil(&area_mm2);
+        // Where nothing is found, a coarse grid looks for light first.
+        let is_counted = found_mm2 > 0.0 || is_any_lit(lens, &point);
         Self {
             degrees,
-            found_mm2: lens.over_clear_pupil(&area_mm2),
-            counted_mm2: cross_section_mm2(lens, &point, n_across),
-            n_parts: parts(lens).len(),
+            found_mm2,
+            counted_mm2: if is_counted { cross_section_mm2(lens, &point, n_across) } else { 0.0 },
+            n_parts: if found_mm2 > 0.0 { parts(lens).len() } else { 0 },
             has_outline: PupilBoundary::find(lens, &point, N_AZIMUTHS).is_some(),
         }
     }

@@ -166,11 +166,10 @@ impl<'a> Search<'a> {
     /// Finds the parts of the pupil, the largest first.
     fn parts(&self, n_azimuths: usize) -> Vec<PupilBoundary> {
         let everywhere = Cell::default();
-        let (mut lit, of_front) = self.first_part(n_azimuths);
+        let (lit, of_front) = self.first_part(n_azimuths);
         let in_middle = self.lit_middle().and_then(|seed| self.part_about(seed, &everywhere, n_azimuths));
         let Some(part) = in_middle.or(of_front) else { return Vec::new() };
         let part = self.refined(part, &everywhere);
-        lit.extend(self.lit_around(&part));
         let mut parts = self.split(part, &lit, &everywhere, n_azimuths);
         parts.sort_by(|a, b| b.area_mm2().total_cmp(&a.area_mm2()));
         parts
@@ -180,13 +179,16 @@ impl<'a> Search<'a> {
     /// of what is lit in it, and returns the parts in both, cut on as long as that is needed.
     fn split(&self, part: PupilBoundary, lit: &[(DVec2, f64)], cell: &Cell, n_azimuths: usize) -> Vec<PupilBoundary> {
         let is_beside = |(target, _): &(DVec2, f64)| part.beyond_mm(*target) > BESIDE * part.rho_max();
+        let mut lit = lit.to_vec();
+        lit.extend(self.lit_around(&part).into_iter().filter(|(target, _)| cell.inside_mm(*target) > 0.0));
         let (beyond, missing_mm2) = self.lit_beyond(&part, cell);
         let uncertain_mm2 = missing_mm2 + self.uncertain_mm2(&part);
         let is_whole = !lit.iter().any(is_beside) && uncertain_mm2 <= UNCERTAIN * part.area_mm2();
         if cell.0.len() >= MOST_CUTS || is_whole {
             return vec![part];
         }
-        let lit = &[lit, &beyond].concat()[..];
+        lit.extend(beyond);
+        let lit = &lit[..];
         let cells = cell.cut_across(lit);
         let of_cell = |cell: &Cell| {
             let here: Vec<(DVec2, f64)> = lit.iter().filter(|(at, _)| cell.inside_mm(*at) > 0.0).copied().collect();
@@ -394,7 +396,7 @@ const MOST_SEEDS: usize = 16;
 const MOST_CUTS: usize = 7;
 /// The share of a part's area that may be wrong at jumps of its edge, and how near to the chord between two azimuths the
 /// edge must come.
-const UNCERTAIN: f64 = 5e-4;
+const UNCERTAIN: f64 = 1.5e-4;
 const WITHIN_CHORD: f64 = 0.99;
 /// The share of what a first place sees of a part that the part's centroid must see to be its center.
 const SEES_ENOUGH: f64 = 0.98;

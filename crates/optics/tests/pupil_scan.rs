@@ -18,15 +18,15 @@ fn lenses() -> Vec<(&'static str, MonoLens)> {
 
 #[test]
 fn fields_have_the_light_of_counted_rays() {
-    // 250 rays across count a disc to 250 to the power −1.5, 2.5e-4, and a crescent to some times that.
+    // 300 rays across count a disc to 300 to the power −1.5, 2e-4, and a crescent to some times that.
     let worst = |(name, lens): &(&str, MonoLens)| {
-        let axial_mm2 = cross_section_mm2(lens, &ObjectPoint::Infinite(DVec3::Z), 250);
-        for field_deg in (0..12).map(|i| 8.5 * f64::from(i)) {
+        let axial_mm2 = cross_section_mm2(lens, &ObjectPoint::Infinite(DVec3::Z), 300);
+        for field_deg in (0..9).map(|i| 9.5 * f64::from(i)) {
             let point = ObjectPoint::far(field_deg.to_radians(), DVec2::new(0.28, 0.96));
             let direction = point.direction_to(DVec3::ZERO);
             let parts = PupilBoundary::find_parts(lens, &point, 128);
             let found: f64 = parts.iter().map(|part| part.area_mm2() * direction.dot(part.plane().normal())).sum();
-            let counted = cross_section_mm2(lens, &point, 250);
+            let counted = cross_section_mm2(lens, &point, 300);
             let is_lit = found.max(counted) > 1e-3 * axial_mm2;
             assert!(!is_lit || (found / counted - 1.0).abs() < 4e-3, "{name} {field_deg}: {found} {counted}");
         }
@@ -52,8 +52,8 @@ fn axial_spots_are_those_of_counted_rays() {
         // Out of focus, where the rim, of which rays are hard to count, has no more than its share of the squares.
         let film_mm = best_mm + 8.0 * least_mm * lens.first_order().f_number;
         let (found, counted) = (rms_mm(film_mm), spot_rms_mm(lens, &axis, film_mm, 600).expect("light on the axis"));
-        // 600 rays across count a disc to 600 to the power −1.5, 7e-5, its rim's share of the squares twice that.
-        assert!((found / counted - 1.0).abs() < 3e-4, "{name}: {found} {counted}");
+        // 600 rays across count a disc to 600 to the power −1.5, 7e-5, and its rim has some times its share of the squares.
+        assert!((found / counted - 1.0).abs() < 7e-4, "{name}: {found} {counted}");
     };
     lenses().par_iter().for_each(compare);
 }

@@ -87,6 +87,14 @@ fn about_light(lens: &MonoLens, light: &FarLight, n_across: usize) -> Option<Gri
     Some(grid)
 }
 
+/// Whether any of a coarse grid of rays of a far point gets through.
+#[allow(dead_code, reason = "the example looks at fields that should be dark")]
+pub(crate) fn is_any_lit(lens: &MonoLens, point: &ObjectPoint) -> bool {
+    let extent = DVec2::splat(3.0 * lens.semi_aperture_mm(0));
+    let grid = Grid::new(-extent, extent, FIRST_ACROSS[0]);
+    grid.about_lit(lens, &FarLight::of(point), FIRST_ACROSS[0]).is_some()
+}
+
 /// Returns the cross-section of the light of a far point that gets through, mm², by a grid of so many rays across.
 pub(crate) fn cross_section_mm2(lens: &MonoLens, point: &ObjectPoint, n_across: usize) -> f64 {
     let light = FarLight::of(point);
