@@ -81,7 +81,7 @@ impl Sets {
     /// Returns the tangential and the sagittal modulation of all light of a field, over frequency in cycles per mm.
     fn modulation(&self, field: &FieldLight) -> impl Fn(f64) -> [f64; 2] {
         let set = &self.sets[field.set];
-        let whole = set.whole_modulation(field.first_row..field.first_row + set.spectral_weights.len());
+        let whole = set.polychromatic_modulation(field.first_row..field.first_row + set.spectral_weights.len());
         let (meridian_rad, pixel_mm) = (field.meridian_rad, 1e-3 * set.pixel_um);
         move |cycles_per_mm| {
             [meridian_rad, meridian_rad + FRAC_PI_2].map(|direction| {

@@ -103,7 +103,8 @@ impl LensPage<'_> {
 
     /// One line a quantity, one column a wavelength.
     fn first_order(&self) -> String {
-        let quantities: [(&str, fn(&LensData) -> Option<f64>); 17] = [
+        type Quantity = (&'static str, fn(&LensData) -> Option<f64>);
+        let quantities: [Quantity; 17] = [
             ("focal length, mm", |d| Some(d.first_order.efl_mm)),
             ("back focal length, mm", |d| Some(d.first_order.bfl_mm)),
             ("front focal length, mm", |d| Some(d.first_order.ffl_mm)),
