@@ -146,8 +146,11 @@ fn moved_left_px(from: &Array2<f32>, to: &Array2<f32>, part: &(Range<usize>, Ran
     at(best) + 0.5 * step * (before - after) / (before - 2.0 * here + after)
 }
 
+/// Rows and columns.
+type Part = (Range<usize>, Range<usize>);
+
 /// Parts of the views that show one plane alone, also where it moves.
-fn parts(field: &LightField) -> [(f64, (Range<usize>, Range<usize>)); 2] {
+fn parts(field: &LightField) -> [(f64, Part); 2] {
     let (rows, columns) = field.size();
     let rows = 6..rows - 6;
     [(NEAR_M, (rows.clone(), 6..columns / 2 - 6)), (FAR_M, (rows, columns / 2 + 6..columns - 6))]
