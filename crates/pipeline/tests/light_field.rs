@@ -108,7 +108,7 @@ fn field() -> &'static LightField {
 
 /// Returns how far `to` shows what `from` shows to the left of it, pixels: where the sum of squared differences over a part of
 /// the picture is least. Both are smoothed, so that values between samples are those of a line between them.
-fn moved_left_px(from: &Array2<f32>, to: &Array2<f32>, part: &(Range<usize>, Range<usize>), range: Range<f64>) -> f64 {
+fn moved_left_px(from: &Array2<f32>, to: &Array2<f32>, part: &Part, range: Range<f64>) -> f64 {
     let smooth = |plane: &Array2<f32>| {
         let (rows, columns) = plane.dim();
         Array2::from_shape_fn((rows, columns), |(row, column)| {

@@ -56,7 +56,7 @@ fn wall_radiance(x_m: f64, y_m: f64) -> f64 {
     0.5 / PI * ((x_m - 0.5).powi(2) + (y_m - 0.5).powi(2) + 1.0).powf(-1.5)
 }
 
-/// Both ways, and by E = π L cos⁴θ / (4 N_w²).
+/// Both ways, and by `E = π L cos⁴θ / (4 N_w²)`.
 #[test]
 fn both_methods_have_the_light_of_the_wall() {
     let (columns, rows, pitch_um) = (20, 12, 300.0);
