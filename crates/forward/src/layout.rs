@@ -105,19 +105,8 @@ impl Layout {
             .chain(occluded.layer_coordinates())
             .map(LayerCoordinates::samples)
             .collect();
-        let mut active: Vec<Vec<Cell>> = vec![vec![]; layers.len()];
-        let factors: BTreeSet<usize> = rasters.iter().map(|raster| raster.factor).collect();
-        for factor in factors {
-            let members: Vec<usize> = (0..layers.len()).filter(|&layer| rasters[layer].factor == factor).collect();
-            let LayerRaster { film, sampler, .. } = &rasters[members[0]];
-            let pad_px = members.iter().map(|&layer| pad_for(radius_px[layer])).fold(0.0, f64::max) / factor as f64;
-            let cells = cells_over(film, pad_px.ceil() as usize, cell_size);
-            let mut found = active_cells(&cells, sampler, &ends, &surfaces, layers.len(), cancel)?;
-            for layer in members {
-                let blur_px = 2.0 * radius_px[layer] / factor as f64;
-                active[layer] = joined_for(blur_px, std::mem::take(&mut found[layer]));
-            }
-        }
+        let extents = Extents { radius_px: &radius_px, maps: &ends, surfaces: &surfaces };
+        let active = active_cells_of(&rasters, &extents, cell_size, cancel)?;
         let work = Work::new(cancel, progress, range, active.iter().map(Vec::len).sum::<usize>() as u64);
         let stopwatch = Stopwatch::default();
         let film_lens = FilmLens {
@@ -423,6 +412,41 @@ impl Layout {
         }
         Ok(())
     }
+}
+
+/// How far layers reach.
+struct Extents<'a> {
+    /// Blur radius of each layer, pixels of the film.
+    radius_px: &'a [f64],
+    /// At the ends of the bands and of the depths.
+    maps: &'a [FilmMap],
+    /// Layer coordinates of the scene's surfaces.
+    surfaces: &'a [&'a Array2<f32>],
+}
+
+/// Returns the cells of each layer in which it has anything.
+fn active_cells_of(
+    rasters: &[LayerRaster],
+    extents: &Extents<'_>,
+    cell_size: usize,
+    cancel: &Cancel,
+) -> Result<Vec<Vec<Cell>>, Cancelled> {
+    let Extents { radius_px, maps, surfaces } = *extents;
+    let n_layers = rasters.len();
+    let mut active: Vec<Vec<Cell>> = vec![vec![]; n_layers];
+    let factors: BTreeSet<usize> = rasters.iter().map(|raster| raster.factor).collect();
+    for factor in factors {
+        let members: Vec<usize> = (0..n_layers).filter(|&layer| rasters[layer].factor == factor).collect();
+        let LayerRaster { film, sampler, .. } = &rasters[members[0]];
+        let pad_px = members.iter().map(|&layer| pad_for(radius_px[layer])).fold(0.0, f64::max) / factor as f64;
+        let cells = cells_over(film, pad_px.ceil() as usize, cell_size);
+        let mut found = active_cells(&cells, sampler, maps, surfaces, n_layers, cancel)?;
+        for layer in members {
+            let blur_px = 2.0 * radius_px[layer] / factor as f64;
+            active[layer] = joined_for(blur_px, std::mem::take(&mut found[layer]));
+        }
+    }
+    Ok(active)
 }
 
 /// Returns how far beyond the film light is taken from, pixels: the 95 % radius of a blur, doubled, holds all but the
