@@ -18,7 +18,7 @@ use dioptric_optics::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{BackwardError, camera::on_disc};
+use crate::{BackwardError, sampler::on_disc};
 
 /// An array of small lenses or holes, parallel to the film and before it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -3,7 +3,7 @@
 
 use std::{fmt::Write, fs, ops::Range, sync::OnceLock};
 
-use dioptric_pipeline::{Camera, DepthSearch, KeptCamera, LightField, Silent};
+use dioptric_pipeline::{Camera, DepthSearch, KeptCamera, LightField, LightFieldSpec, Silent};
 use dioptric_spectrum::Cancel;
 use ndarray::Array2;
 
@@ -146,7 +146,7 @@ fn moved_left_px(from: &Array2<f32>, to: &Array2<f32>, part: &Part, range: Range
     at(best) + 0.5 * step * (before - after) / (before - 2.0 * here + after)
 }
 
-/// Rows and columns.
+/// Rows and columns of a part of a view.
 type Part = (Range<usize>, Range<usize>);
 
 /// Parts of the views that show one plane alone, also where it moves.
@@ -244,6 +244,17 @@ fn parallel_cameras_see_nearer_things_move_more() {
     // The picture of the camera itself is that of the view in the middle.
     let own = kept.irradiance(&Silent, &Cancel::new()).unwrap();
     assert_eq!(own.summary.seen.planes[1], field.view(0, 1).unwrap()[1]);
+}
+
+#[test]
+fn camera_of_the_metronome_is_matched() {
+    let path = dioptric_golden::workspace_root().join("fixtures/worlds/metronome-lightfield.ron");
+    let kept = KeptCamera::new(Camera::read(&path).unwrap());
+    kept.check().unwrap();
+    let Some(LightFieldSpec::Array(array)) = kept.camera().light_field else { panic!("an array") };
+    // The image of the pupil, 10 mm by 4 of 137 mm, fits into an element.
+    let image_mm = 10.0 * array.gap_mm / 137.0;
+    assert!(image_mm < array.pitch_mm && image_mm > 0.9 * array.pitch_mm);
 }
 
 #[test]

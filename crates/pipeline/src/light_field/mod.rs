@@ -11,7 +11,7 @@ mod shift;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-pub(crate) use decode::Decoding;
+pub(crate) use decode::{ArrayFilm, Decoding};
 pub use depth::{DepthEstimate, DepthSearch};
 pub use geometry::ViewGeometry;
 

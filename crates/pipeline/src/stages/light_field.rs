@@ -5,8 +5,8 @@ use ndarray::Array2;
 
 use super::{Irradiance, KeptCamera};
 use crate::{
-    LightField, LightFieldSpec, PipelineError, Progress, SceneSource,
-    light_field::{Decoding, View, ViewGeometry},
+    FilmSpec, FocusSpec, LightField, LightFieldSpec, PipelineError, Progress, SceneSource, Stage, ViewGeometry,
+    light_field::{ArrayFilm, Decoding, View},
 };
 
 /// Progress of one of so many equal parts.
@@ -17,7 +17,7 @@ struct Part<'a> {
 }
 
 impl Progress for Part<'_> {
-    fn at(&self, stage: crate::Stage, fraction: f64) {
+    fn at(&self, stage: Stage, fraction: f64) {
         self.progress.at(stage, (self.number as f64 + fraction) / self.of as f64);
     }
 }
@@ -63,7 +63,15 @@ impl KeptCamera {
             return Err(no_light_field());
         };
         let (lens, place) = self.lens_and_film(progress, cancel)?;
-        let decoding = Decoding { array: &array, lens: &lens.reference, place: &place, n_views };
+        let film = ArrayFilm {
+            rows: place.rows,
+            columns: place.columns,
+            pitch_mm: 1e-3 * place.pitch_um,
+            // The array stands where the focus puts the film, and the film behind it.
+            array_distance_mm: place.film_distance_mm,
+            exit_pupil_axis_mm: place.exit_pupil_axis_mm,
+        };
+        let decoding = Decoding { array: &array, lens: &lens.reference, film: &film, n_views };
         decoding.light_field(&irradiance.summary.seen.planes)
     }
 
@@ -86,9 +94,8 @@ impl KeptCamera {
             let right = (number % columns) as f64 - 0.5 * (columns as f64 - 1.0);
             let up = 0.5 * (rows as f64 - 1.0) - (number / columns) as f64;
             let aside = self.with(|camera| {
-                camera.focus = crate::FocusSpec::FilmMm(place.film_distance_mm);
-                camera.film =
-                    crate::FilmSpec::Pixels { columns: place.columns, rows: place.rows, pitch_um: place.pitch_um };
+                camera.focus = FocusSpec::FilmMm(place.film_distance_mm);
+                camera.film = FilmSpec::Pixels { columns: place.columns, rows: place.rows, pitch_um: place.pitch_um };
                 if let SceneSource::World(spec) = &mut camera.scene.source {
                     spec.aside_mm.0 += spacing_mm * right;
                     spec.aside_mm.1 += spacing_mm * up;
