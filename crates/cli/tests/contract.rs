@@ -4,7 +4,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{CAMERA, check_error, output};
+use common::{CAMERA, check_error, dioptric, output};
 use serde_json::Value;
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
