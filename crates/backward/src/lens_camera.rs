@@ -173,6 +173,11 @@ impl LensCamera {
             weights.push(weight);
             start.push(point_mm, direction);
         }
+        // What turns rays at the stop is the same for all wavelengths of a sample.
+        let turns: Vec<DVec2> = match self.settings.diffraction {
+            Some(_) => samples.iter().map(|sample| standard_normals(sample.random.pair(0))).collect(),
+            None => Vec::new(),
+        };
         // Trace each wavelength through the lens; once for all where they go the same way.
         out.is_shared = self.lenses.len() == 1;
         let lenses = nodes.iter().map(|&node| &self.lenses[node % self.lenses.len()]);
@@ -182,7 +187,7 @@ impl LensCamera {
                 None => lens.trace_f32(&mut rays),
                 Some(model) => {
                     lens.trace_to_stop_f32(&mut rays);
-                    diffract(lens, &mut rays, model, samples);
+                    diffract(lens, &mut rays, model, (samples, &turns));
                     lens.trace_from_stop_f32(&mut rays);
                 }
             }
@@ -316,13 +321,16 @@ fn is_achromatic(lens: &Lens, wavelengths_nm: &[f64]) -> Result<bool, BackwardEr
 /// Turns rays at the stop by HURB, as `dioptric_diffraction::bend` does those that come from the scene: its Gaussian of
 /// direction cosines is even, so that both ways have the same kernel.
 ///
-/// The pair of normal numbers of a sample is the same for all its wavelengths.
-fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, samples: &[PixelSample]) {
+/// The first pair of normal numbers of a sample, which nearly all take, is given: it is the same for all its wavelengths.
+fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, (samples, turns): (&[PixelSample], &[DVec2])) {
     let forward = lens.forward();
     let edge = CircularStop::new(forward.stop_semi_aperture_mm(), forward.wavelength_nm(), forward.stop_medium_index());
     let placement = lens.stop_placement();
     let surface_from_lens = placement.rotation.transpose();
-    for (i, sample) in samples.iter().enumerate().filter(|(i, _)| rays.fate[*i].is_in_flight()).collect::<Vec<_>>() {
+    for (i, sample) in samples.iter().enumerate() {
+        if !rays.fate[i].is_in_flight() {
+            continue;
+        }
         let point_mm =
             placement.surface_from_lens(Vec3::new(rays.x_mm[i], rays.y_mm[i], rays.z_mm[i]).as_dvec3()).truncate();
         let before = surface_from_lens * Vec3::new(rays.l[i], rays.m[i], rays.n[i]).as_dvec3();
@@ -331,7 +339,7 @@ fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, samples: &
         let axis = if r_mm > 0.0 { point_mm / r_mm } else { DVec2::X };
         // Draw again where the ray would be turned back, which only those within a wavelength of the edge can be.
         let drawn = (0..REDRAWS).find_map(|pair| {
-            let normal = standard_normals(sample.random.pair(pair));
+            let normal = if pair == 0 { turns[i] } else { standard_normals(sample.random.pair(pair)) };
             let cosines = before.truncate() + axis * (radial * normal.x) + axis.perp() * (across * normal.y);
             let rest = 1.0 - cosines.length_squared();
             (rest > 0.0).then(|| cosines.extend(-rest.sqrt()))
