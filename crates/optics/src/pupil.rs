@@ -42,7 +42,7 @@ impl PupilBoundary {
     ///
     /// A pupil has several parts where its light comes through in separate islands, or where no place of it sees all of
     /// its edge, as in a crescent: then it is cut by straight lines. Light is looked for over the whole front of the lens.
-    /// Long and narrow parts have more azimuths than asked for. All parts lie in the same plane, [`PupilPlane::of_parts`].
+    /// All parts lie in the same plane, [`PupilPlane::of_parts`].
     pub fn find_parts(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> Vec<Self> {
         Search { lens, point, plane: PupilPlane::of_parts(lens, point) }.parts(n_azimuths.max(8))
     }
@@ -148,124 +148,44 @@ impl<'a> Search<'a> {
     fn largest(&self, n_azimuths: usize) -> Option<PupilBoundary> {
         let everywhere = Cell::default();
         let in_middle = self.lit_middle().and_then(|seed| self.part_about(seed, &everywhere, n_azimuths));
-        in_middle.or_else(|| self.first_part(n_azimuths).1)
-    }
-
-    /// Returns places of the pupil over the front, and the part about one of them.
-    fn first_part(&self, n_azimuths: usize) -> (Vec<(DVec2, f64)>, Option<PupilBoundary>) {
-        let everywhere = Cell::default();
-        for n_across in light::LOOKS {
-            let lit = self.look(n_across);
-            if let Some(part) = self.part_of(&lit, &everywhere, n_azimuths) {
-                return (lit, Some(part));
-            }
-        }
-        (Vec::new(), None)
+        in_middle.or_else(|| self.part_of(&self.lit_over_front(), &everywhere, n_azimuths))
     }
 
     /// Finds the parts of the pupil, the largest first.
     fn parts(&self, n_azimuths: usize) -> Vec<PupilBoundary> {
+        let mut lit = self.lit_over_front();
         let everywhere = Cell::default();
-        let (lit, of_front) = self.first_part(n_azimuths);
         let in_middle = self.lit_middle().and_then(|seed| self.part_about(seed, &everywhere, n_azimuths));
-        let Some(part) = in_middle.or(of_front) else { return Vec::new() };
-        let part = self.refined(part, &everywhere);
-        let mut parts = self.split(part, &lit, &everywhere, n_azimuths);
+        let Some(part) = in_middle.or_else(|| self.part_of(&lit, &everywhere, n_azimuths)) else { return Vec::new() };
+        lit.extend(self.lit_around(&part));
+        let mut parts = self.split(part, &lit, &everywhere);
         parts.sort_by(|a, b| b.area_mm2().total_cmp(&a.area_mm2()));
         parts
     }
 
     /// Returns a part if it is all of the pupil that lies in its cell; else cuts the cell in two across the longer extent
     /// of what is lit in it, and returns the parts in both, cut on as long as that is needed.
-    fn split(&self, part: PupilBoundary, lit: &[(DVec2, f64)], cell: &Cell, n_azimuths: usize) -> Vec<PupilBoundary> {
+    fn split(&self, part: PupilBoundary, lit: &[(DVec2, f64)], cell: &Cell) -> Vec<PupilBoundary> {
         let is_beside = |(target, _): &(DVec2, f64)| part.beyond_mm(*target) > BESIDE * part.rho_max();
-        let mut lit = lit.to_vec();
-        lit.extend(self.lit_around(&part).into_iter().filter(|(target, _)| cell.inside_mm(*target) > 0.0));
-        let (beyond, missing_mm2) = self.lit_beyond(&part, cell);
-        let uncertain_mm2 = missing_mm2 + self.uncertain_mm2(&part);
-        let is_whole = !lit.iter().any(is_beside) && uncertain_mm2 <= UNCERTAIN * part.area_mm2();
+        let is_whole = !lit.iter().any(is_beside) && self.uncertain_mm2(&part) <= UNCERTAIN * part.area_mm2();
         if cell.0.len() >= MOST_CUTS || is_whole {
             return vec![part];
         }
-        lit.extend(beyond);
-        let lit = &lit[..];
         let cells = cell.cut_across(lit);
         let of_cell = |cell: &Cell| {
             let here: Vec<(DVec2, f64)> = lit.iter().filter(|(at, _)| cell.inside_mm(*at) > 0.0).copied().collect();
             let here: Vec<(DVec2, f64)> = here.iter().map(|&(at, c)| (at, c.min(cell.inside_mm(at)))).collect();
-            let part = self.part_of(&here, cell, n_azimuths)?;
-            Some(self.split(self.refined(part, cell), &here, cell, n_azimuths))
+            let part = self.part_of(&here, cell, part.rho_mm.len())?;
+            Some(self.split(part, &here, cell))
         };
         cells.iter().filter_map(of_cell).flatten().collect()
-    }
-
-    /// Returns places of the pupil beyond the edge of a part, as the horns of a crescent beyond its hollow side, and the area that
-    /// they stand for, mm².
-    fn lit_beyond(&self, part: &PupilBoundary, cell: &Cell) -> (Vec<(DVec2, f64)>, f64) {
-        let every = part.rho_mm.len().div_ceil(MOST_LOOKS);
-        let reach_mm = BEYOND * part.rho_max();
-        let directions = PupilBoundary::azimuths(part.rho_mm.len()).zip(&part.rho_mm).step_by(every);
-        let places: Vec<(DVec2, f64)> = directions
-            .flat_map(|(direction, rho)| {
-                let step_mm = (reach_mm - rho) / BEYOND_PLACES as f64;
-                (0..BEYOND_PLACES).map(move |k| {
-                    let r_mm = rho + (k as f64 + 0.5) * step_mm;
-                    (part.center_mm + r_mm * direction, r_mm * step_mm)
-                })
-            })
-            .collect();
-        let clearances = self.clearances_in(&places.iter().map(|(place, _)| *place).collect::<Vec<_>>(), cell);
-        let angle = every as f64 * std::f64::consts::TAU / part.rho_mm.len() as f64;
-        let lit = || places.iter().zip(&clearances).filter(|(_, clearance)| **clearance > 0.0);
-        let area_mm2 = lit().map(|((_, per_angle_mm2), _)| angle * per_angle_mm2).sum();
-        (lit().map(|((place, _), clearance)| (*place, *clearance)).collect(), area_mm2)
-    }
-
-    /// Returns a part with as many azimuths as its area needs: of a long and narrow one the edge comes and goes between few.
-    fn refined(&self, mut part: PupilBoundary, cell: &Cell) -> PupilBoundary {
-        let most = MOST_FINER * part.rho_mm.len();
-        let area = |every: usize| {
-            let n = part.rho_mm.len() / every;
-            part.rho_mm.iter().step_by(every).map(|rho| rho * rho).sum::<f64>() / n as f64
-        };
-        let mut change = (area(2) / area(1) - 1.0).abs();
-        while change > AREA_CHANGE && part.rho_mm.len() < most {
-            let n = part.rho_mm.len();
-            let between: Vec<DVec2> = PupilBoundary::azimuths(2 * n).skip(1).step_by(2).collect();
-            let Some(rho_mm) = self.edge_mm(part.center_mm, cell, &between, EDGE_MM) else { break };
-            let mean_square = |list: &[f64]| list.iter().map(|rho| rho * rho).sum::<f64>() / n as f64;
-            let (known, new) = (mean_square(&part.rho_mm), mean_square(&rho_mm));
-            change = (known / (0.5 * (known + new)) - 1.0).abs();
-            part.rho_mm = part.rho_mm.iter().zip(&rho_mm).flat_map(|(known, new)| [*known, *new]).collect();
-        }
-        part
     }
 
     /// Returns the part around the first of these places, those of most clearance first, that has an area.
     fn part_of(&self, lit: &[(DVec2, f64)], cell: &Cell, n_azimuths: usize) -> Option<PupilBoundary> {
         let mut lit = lit.to_vec();
         lit.sort_by(|a, b| b.1.total_cmp(&a.1));
-        lit.iter().take(MOST_SEEDS).find_map(|seed| self.part_about(self.climbed(*seed, cell), cell, n_azimuths))
-    }
-
-    /// Returns a place further inside than a first place of the pupil, which may be at the tip of a crescent: uphill in
-    /// clearance.
-    fn climbed(&self, (mut here, mut clearance): (DVec2, f64), cell: &Cell) -> DVec2 {
-        let mut step_mm = clearance;
-        for _ in 0..CLIMB_ROUNDS {
-            let around: Vec<DVec2> = PupilBoundary::azimuths(8).map(|direction| here + step_mm * direction).collect();
-            let found = self.clearances_in(&around, cell);
-            let best = (0..around.len()).max_by(|&a, &b| found[a].total_cmp(&found[b])).unwrap_or(0);
-            if found[best] > clearance {
-                (here, clearance) = (around[best], found[best]);
-                step_mm *= 1.5;
-            } else if step_mm < 0.1 * clearance {
-                break;
-            } else {
-                step_mm *= 0.5;
-            }
-        }
-        here
+        lit.iter().take(MOST_SEEDS).find_map(|(seed, _)| self.part_about(*seed, cell, n_azimuths))
     }
 
     /// Returns how much of a part's area may be wrong where its edge jumps from one azimuth to the next, because a nearer
@@ -386,27 +306,16 @@ impl Cell {
     }
 }
 
-/// By how much of a part's area half the azimuths may differ from all of them, which are then good to a third or less of that, and
-/// how many times more azimuths than asked for a part may have.
-const AREA_CHANGE: f64 = 4e-4;
-const MOST_FINER: usize = 32;
 /// Places from which the edge of a part is looked for before the part is given up.
 const MOST_SEEDS: usize = 16;
 /// The most cuts that bound a part of a pupil.
 const MOST_CUTS: usize = 7;
 /// The share of a part's area that may be wrong at jumps of its edge, and how near to the chord between two azimuths the
 /// edge must come.
-const UNCERTAIN: f64 = 1.5e-4;
+const UNCERTAIN: f64 = 5e-4;
 const WITHIN_CHORD: f64 = 0.99;
 /// The share of what a first place sees of a part that the part's centroid must see to be its center.
 const SEES_ENOUGH: f64 = 0.98;
-/// Steps uphill from a first place of the pupil, at most.
-const CLIMB_ROUNDS: usize = 60;
-/// How far beyond a part's edge more of the pupil is looked for, over the part's radius; at how many places of how many azimuths at
-/// most.
-const BEYOND: f64 = 1.3;
-const BEYOND_PLACES: usize = 16;
-const MOST_LOOKS: usize = 192;
 /// How far beyond a part's edge light counts as not seen, over the part's radius.
 const BESIDE: f64 = 0.02;
 /// Places between center and edge that are looked at for darkness, and how often.

@@ -8,7 +8,7 @@ use super::{PupilBoundary, Search};
 use crate::{RayFate, Vignetting};
 
 /// Rays across the front of the lens in a first look, and in a second where that finds no light.
-pub(super) const LOOKS: [usize; 2] = [25, 97];
+const LOOKS: [usize; 2] = [25, 97];
 /// How many of the rays that get furthest lead to finer ones, how many those are across, and how often.
 const N_LEADERS: usize = 16;
 const N_FINER: i32 = 2;
@@ -29,12 +29,22 @@ struct Trial {
 }
 
 impl Search<'_> {
-    /// Returns places of the pupil, each with its clearance: those of so many rays across the whole front of the lens or,
+    /// Returns places of the pupil, each with its clearance: those of rays spread over the whole front of the lens or,
     /// where none of them gets through, of rays near to those that get furthest.
     ///
     /// Surfaces let through less and less: what passes the first k of them holds all that passes k + 1. So rays that get
     /// further than others are near to those that get further still.
-    pub(super) fn look(&self, n_across: usize) -> Vec<(DVec2, f64)> {
+    pub(super) fn lit_over_front(&self) -> Vec<(DVec2, f64)> {
+        for n_across in LOOKS {
+            let lit = self.look(n_across);
+            if !lit.is_empty() {
+                return lit;
+            }
+        }
+        Vec::new()
+    }
+
+    fn look(&self, n_across: usize) -> Vec<(DVec2, f64)> {
         let mut step = 2.0 / n_across as f64;
         let disc: Vec<DVec2> = cells(n_across).filter(|place| place.length() <= 1.0 + step).collect();
         let lit = self.lit(&disc);
