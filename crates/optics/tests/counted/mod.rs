@@ -96,6 +96,7 @@ pub(crate) fn is_any_lit(lens: &MonoLens, point: &ObjectPoint) -> bool {
 }
 
 /// Returns the cross-section of the light of a far point that gets through, mm², by a grid of so many rays across.
+#[allow(dead_code, reason = "not every test looks at fields")]
 pub(crate) fn cross_section_mm2(lens: &MonoLens, point: &ObjectPoint, n_across: usize) -> f64 {
     let light = FarLight::of(point);
     let Some(grid) = about_light(lens, &light, n_across) else { return 0.0 };
