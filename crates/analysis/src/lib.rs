@@ -19,8 +19,9 @@ pub use chart::{Corner, LineChart, Scale, Series};
 pub use lens::{
     AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ConvertedLens, FanRow, FieldPlace, FieldRow,
     FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis, LensData, LensDefaults,
-    LensInfoRequest, LensRow, OpdMap, PlaneData, PupilRow, RayTable, SpotRow, SurfaceRow, TraceError, TraceSettings,
-    WavefrontRow, built_in_lenses, convert_lens, glass_data, glass_rows, placement_lines, surface_rows,
+    LensInfoRequest, LensModulation, LensPageData, LensRow, OpdMap, PlaneData, PupilRow, RayTable, SpotRow, SurfaceRow,
+    TraceError, TraceSettings, WavefrontRow, built_in_lenses, convert_lens, glass_data, glass_rows, placement_lines,
+    surface_rows,
 };
 pub use methods::{Fit, MethodComparison, MethodRow};
 pub use psf::{MtfRow, PolychromaticPsf, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, psf_csv};

@@ -140,6 +140,7 @@ fn camera_of(scene: &Value, name: &str) -> Camera {
                 placement: Placement::IDENTITY,
                 origin: LensOrigin::Film,
                 diffraction: None,
+                micro_array: None,
             };
             let lens = lens_of(&scene["lenses"][camera["lens"].as_str().unwrap()], camera);
             Camera::Lens(Box::new(LensCamera::new(&lens, &bands(), settings).unwrap()))

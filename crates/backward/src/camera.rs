@@ -6,7 +6,7 @@ use dioptric_world::{
     glam::{DVec2, DVec3, Vec3},
 };
 
-use crate::{BackwardError, LensCamera, PixelGrid, Placement, Sampler, packets::PACKET};
+use crate::{BackwardError, LensCamera, PixelGrid, Placement, Sampler, packets::PACKET, sampler::on_disc};
 
 /// A camera in a world.
 #[derive(Clone, Debug)]
@@ -68,6 +68,16 @@ impl Camera {
             Self::Pinhole(pinhole) => pinhole.pixels,
             Self::ThinLens(lens) => lens.view.pixels,
             Self::Lens(lens) => lens.pixels(),
+        }
+    }
+
+    /// Returns the camera with other pixels over the same film or angle of view.
+    #[must_use]
+    pub fn with_pixels(self, pixels: PixelGrid) -> Self {
+        match self {
+            Self::Pinhole(view) => Self::Pinhole(Pinhole { pixels, ..view }),
+            Self::ThinLens(lens) => Self::ThinLens(ThinLens { view: Pinhole { pixels, ..lens.view }, ..lens }),
+            Self::Lens(lens) => Self::Lens(Box::new(lens.with_pixels(pixels))),
         }
     }
 
@@ -188,15 +198,4 @@ pub(crate) fn world_ray(placement: &Placement, start_m: DVec3, direction: DVec3)
 /// Makes up for the rounding of a direction to single precision.
 pub(crate) fn renormalized(direction: Vec3) -> Vec3 {
     direction * (1.5 - 0.5 * direction.length_squared())
-}
-
-/// Returns a point of the unit disc, evenly spread, neighbors staying neighbors (Shirley & Chiu 1997).
-pub(crate) fn on_disc(u: f64, v: f64) -> DVec2 {
-    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
-    let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
-    if x == 0.0 && y == 0.0 {
-        return DVec2::ZERO;
-    }
-    let (r, angle) = if x.abs() > y.abs() { (x, FRAC_PI_4 * y / x) } else { (y, FRAC_PI_2 - FRAC_PI_4 * x / y) };
-    r * DVec2::from_angle(angle)
 }

@@ -14,8 +14,9 @@ use dioptric_world::Ray;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    BackwardError, Bands, PixelGrid, Placement,
+    BackwardError, Bands, MicroArray, PixelGrid, Placement, Sampler,
     camera::{CameraRays, PixelSample, world_ray},
+    micro_array::PlacedMicroArray,
     packets::{PACKET, Packets},
 };
 
@@ -46,6 +47,8 @@ pub struct LensCameraSettings {
     pub origin: LensOrigin,
     /// Diffraction at the stop.
     pub diffraction: Option<Hurb>,
+    /// Small lenses or holes before the film.
+    pub micro_array: Option<MicroArray>,
 }
 
 /// A camera with a real lens.
@@ -55,7 +58,9 @@ pub struct LensCamera {
     bands: Bands,
     /// The lens at each wavelength node; a single one where they are all alike.
     lenses: Vec<ReversedLens>,
+    /// Of the film, or of the array before it.
     bounds: ExitPupilBounds,
+    micro_array: Option<PlacedMicroArray>,
     origin_z_mm: f64,
     projection_center_z_mm: f64,
 }
@@ -82,15 +87,26 @@ impl LensCamera {
         apart.dedup();
         let colors: Vec<ReversedLens> = apart.into_iter().map(|i| lenses[i].clone()).collect();
         let reach = if settings.diffraction.is_some() { PupilReach::Stop } else { PupilReach::WholeLens };
-        let bounds = ExitPupilBounds::find(&colors, settings.film_distance_mm, 0.5 * size_mm, reach)?;
         let middle = lenses[lenses.len() / 2].forward();
+        // Rays aim at the pupil from the film, or from the array before it; that is seen up to a few elements beyond the film.
+        let (aimed_from_mm, half_mm) = match &settings.micro_array {
+            Some(array) => {
+                array.check()?;
+                (settings.film_distance_mm - array.gap_mm, 0.5 * size_mm + 2.0 * array.pitch_mm)
+            }
+            None => (settings.film_distance_mm, 0.5 * size_mm),
+        };
+        let bounds = ExitPupilBounds::find(&colors, aimed_from_mm, half_mm, reach)?;
+        let film = middle.film_placement(settings.film_distance_mm);
+        let place = |array| PlacedMicroArray::new(array, film, half_mm, &bounds);
+        let micro_array = settings.micro_array.map(place).transpose()?;
         let projection_center_z_mm = middle.projection_center_z_mm();
         let origin_z_mm = match settings.origin {
             LensOrigin::Film => middle.film_placement(settings.film_distance_mm).vertex_mm.z,
             LensOrigin::EntrancePupil => projection_center_z_mm,
             LensOrigin::FirstVertex => 0.0,
         };
-        Ok(Self { settings, bands: bands.clone(), lenses, bounds, origin_z_mm, projection_center_z_mm })
+        Ok(Self { settings, bands: bands.clone(), lenses, bounds, micro_array, origin_z_mm, projection_center_z_mm })
     }
 
     /// Returns the camera with larger bounds of its exit pupil: the same picture, with more rays lost.
@@ -99,13 +115,9 @@ impl LensCamera {
         Self { bounds: self.bounds.inflated(factor), ..self.clone() }
     }
 
-    /// Returns the camera with another part of its picture: from this column and row on, so many of each.
-    ///
-    /// # Errors
-    /// When the part does not lie in the picture.
-    pub fn cropped(mut self, first: (usize, usize), size: (usize, usize)) -> Result<Self, BackwardError> {
-        self.settings.pixels = self.settings.pixels.cropped(first, size)?;
-        Ok(self)
+    pub(crate) fn with_pixels(mut self, pixels: PixelGrid) -> Self {
+        self.settings.pixels = pixels;
+        self
     }
 
     /// The bands that the camera was made for.
@@ -155,26 +167,17 @@ impl LensCamera {
         // Aim at the pupil: points on the last vertex plane, in single precision from here on.
         let mut weights = Vec::with_capacity(samples.len());
         let mut start = RayBatchF32::default();
-        let plane_normal = self.bounds.plane().rotation.z_axis;
-        let film = self.lenses[self.lenses.len() / 2].forward();
         for &PixelSample { pixel, random } in samples {
-            let [x, y, u, v] = random.camera();
-            let on_film_mm = self.on_film_mm(pixel, [x, y]);
-            let aim = film
-                .film_site(on_film_mm, self.settings.film_distance_mm)
-                .zip(self.bounds.sample(on_film_mm, DVec2::new(u, v)));
-            let Some((site, pupil)) = aim else {
-                weights.push(0.0);
-                start.push(DVec3::ZERO, -DVec3::Z);
-                continue;
-            };
-            let between_mm = pupil.point_mm - site.point_mm;
-            let square_mm2 = between_mm.length_squared();
-            let direction = between_mm / square_mm2.sqrt();
-            let cosines = direction.dot(site.normal) * direction.dot(plane_normal);
-            weights.push(cosines.abs() * pupil.area_mm2 / square_mm2);
-            start.push(pupil.point_mm, direction);
+            let aimed = self.aim(pixel, &random);
+            let Aimed { point_mm, direction, weight } = aimed.unwrap_or(Aimed::NOWHERE);
+            weights.push(weight);
+            start.push(point_mm, direction);
         }
+        // What turns rays at the stop is the same for all wavelengths of a sample.
+        let turns: Vec<DVec2> = match self.settings.diffraction {
+            Some(_) => samples.iter().map(|sample| standard_normals(sample.random.pair(0))).collect(),
+            None => Vec::new(),
+        };
         // Trace each wavelength through the lens; once for all where they go the same way.
         out.is_shared = self.lenses.len() == 1;
         let lenses = nodes.iter().map(|&node| &self.lenses[node % self.lenses.len()]);
@@ -184,7 +187,7 @@ impl LensCamera {
                 None => lens.trace_f32(&mut rays),
                 Some(model) => {
                     lens.trace_to_stop_f32(&mut rays);
-                    diffract(lens, &mut rays, model, samples);
+                    diffract(lens, &mut rays, model, (samples, &turns));
                     lens.trace_from_stop_f32(&mut rays);
                 }
             }
@@ -199,22 +202,53 @@ impl LensCamera {
         }
     }
 
-    /// Returns for each of some pixels the ray from its middle through the middle of the stop, or none.
+    /// Draws a ray from a pixel to the last vertex plane; none where no light comes from.
+    fn aim(&self, pixel: usize, random: &Sampler) -> Option<Aimed> {
+        let film = self.lenses[self.lenses.len() / 2].forward();
+        let [x, y, u, v] = random.camera();
+        let on_film_mm = self.on_film_mm(pixel, [x, y]);
+        let site = film.film_site(on_film_mm, self.settings.film_distance_mm)?;
+        let plane = self.bounds.plane();
+        if let Some(array) = &self.micro_array {
+            let ray = array.ray(site.point_mm, [f64::from(random.pair(ELEMENT_PAIR)[0]), u, v])?;
+            let square_mm2 = site.point_mm.distance_squared(ray.point_mm);
+            let cosines = ray.before.dot(site.normal) * ray.before.dot(array.normal());
+            let to_plane_mm = (plane.vertex_mm - ray.point_mm).dot(plane.rotation.z_axis);
+            let along_mm = to_plane_mm / ray.after.dot(plane.rotation.z_axis);
+            let weight = cosines.abs() * ray.area_mm2 / square_mm2;
+            let point_mm = ray.point_mm + along_mm * ray.after;
+            return (along_mm > 0.0).then_some(Aimed { point_mm, direction: ray.after, weight });
+        }
+        let pupil = self.bounds.sample(on_film_mm, DVec2::new(u, v))?;
+        let between_mm = pupil.point_mm - site.point_mm;
+        let square_mm2 = between_mm.length_squared();
+        let direction = between_mm / square_mm2.sqrt();
+        let cosines = direction.dot(site.normal) * direction.dot(plane.rotation.z_axis);
+        let weight = cosines.abs() * pupil.area_mm2 / square_mm2;
+        Some(Aimed { point_mm: pupil.point_mm, direction, weight })
+    }
+
+    /// Returns for each of some pixels the ray from its middle through the middle of the stop, or none. With an array before
+    /// the film it starts from the middle of the element that is before the pixel.
     ///
     /// Newton's method on the last vertex plane, without rims; at the middle one of the wavelengths.
     pub(crate) fn chief_rays(&self, pixels: &[usize]) -> Vec<Option<Ray>> {
         let lens = &self.lenses[self.lenses.len() / 2];
         let (plane, film_distance_mm) = (self.bounds.plane(), self.settings.film_distance_mm);
-        let sites: Vec<_> = pixels
-            .iter()
-            .map(|&pixel| lens.forward().film_site(self.on_film_mm(pixel, [0.5; 2]), film_distance_mm))
-            .collect();
+        let site_mm = |&pixel: &usize| {
+            let site = lens.forward().film_site(self.on_film_mm(pixel, [0.5; 2]), film_distance_mm)?;
+            match &self.micro_array {
+                Some(array) => array.element_before(site.point_mm),
+                None => Some(site.point_mm),
+            }
+        };
+        let sites_mm: Vec<Option<DVec3>> = pixels.iter().map(site_mm).collect();
         let mut aims_mm: Vec<DVec2> = vec![DVec2::ZERO; pixels.len()];
         let rays_to = |aims_mm: &[DVec2], moved_mm: DVec2| {
             let mut rays = RayBatch::with_capacity(aims_mm.len());
-            for (aim_mm, site) in aims_mm.iter().zip(&sites) {
+            for (aim_mm, site_mm) in aims_mm.iter().zip(&sites_mm) {
                 let point_mm = plane.lens_from_surface((*aim_mm + moved_mm).extend(0.0));
-                let from_mm = site.map_or(point_mm + plane.rotation.z_axis, |site| site.point_mm);
+                let from_mm = site_mm.unwrap_or(point_mm + plane.rotation.z_axis);
                 rays.push(point_mm, (point_mm - from_mm).normalize(), 0.0);
             }
             rays
@@ -241,13 +275,27 @@ impl LensCamera {
         let mut rays = rays_to(&aims_mm, DVec2::ZERO);
         lens.trace(&mut rays, Vignetting::Off);
         let seen = |i: usize| {
-            let is_seen = sites[i].is_some() && rays.fate[i].is_in_flight();
+            let is_seen = sites_mm[i].is_some() && rays.fate[i].is_in_flight();
             is_seen.then(|| self.in_world(rays.point_mm(i), rays.direction(i)))
         };
         (0..pixels.len()).map(seen).collect()
     }
 }
 
+/// A ray that has left the film, on the last vertex plane, and what its radiance counts.
+struct Aimed {
+    point_mm: DVec3,
+    direction: DVec3,
+    weight: f64,
+}
+
+impl Aimed {
+    /// A ray that counts nothing.
+    const NOWHERE: Self = Self { point_mm: DVec3::ZERO, direction: DVec3::NEG_Z, weight: 0.0 };
+}
+
+/// The pair of numbers that chooses elements of an array.
+const ELEMENT_PAIR: u32 = u32::MAX - 1;
 /// Steps of Newton's method: each squares an error that begins at a millimeter or so.
 const NEWTON_STEPS: usize = 6;
 /// The step of its difference quotients, mm.
@@ -273,13 +321,16 @@ fn is_achromatic(lens: &Lens, wavelengths_nm: &[f64]) -> Result<bool, BackwardEr
 /// Turns rays at the stop by HURB, as `dioptric_diffraction::bend` does those that come from the scene: its Gaussian of
 /// direction cosines is even, so that both ways have the same kernel.
 ///
-/// The pair of normal numbers of a sample is the same for all its wavelengths.
-fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, samples: &[PixelSample]) {
+/// The first pair of normal numbers of a sample, which nearly all take, is given: it is the same for all its wavelengths.
+fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, (samples, turns): (&[PixelSample], &[DVec2])) {
     let forward = lens.forward();
     let edge = CircularStop::new(forward.stop_semi_aperture_mm(), forward.wavelength_nm(), forward.stop_medium_index());
     let placement = lens.stop_placement();
     let surface_from_lens = placement.rotation.transpose();
-    for (i, sample) in samples.iter().enumerate().filter(|(i, _)| rays.fate[*i].is_in_flight()).collect::<Vec<_>>() {
+    for (i, sample) in samples.iter().enumerate() {
+        if !rays.fate[i].is_in_flight() {
+            continue;
+        }
         let point_mm =
             placement.surface_from_lens(Vec3::new(rays.x_mm[i], rays.y_mm[i], rays.z_mm[i]).as_dvec3()).truncate();
         let before = surface_from_lens * Vec3::new(rays.l[i], rays.m[i], rays.n[i]).as_dvec3();
@@ -288,7 +339,7 @@ fn diffract(lens: &ReversedLens, rays: &mut RayBatchF32, model: Hurb, samples: &
         let axis = if r_mm > 0.0 { point_mm / r_mm } else { DVec2::X };
         // Draw again where the ray would be turned back, which only those within a wavelength of the edge can be.
         let drawn = (0..REDRAWS).find_map(|pair| {
-            let normal = standard_normals(sample.random.pair(pair));
+            let normal = if pair == 0 { turns[i] } else { standard_normals(sample.random.pair(pair)) };
             let cosines = before.truncate() + axis * (radial * normal.x) + axis.perp() * (across * normal.y);
             let rest = 1.0 - cosines.length_squared();
             (rest > 0.0).then(|| cosines.extend(-rest.sqrt()))

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use dioptric_spectrum::{Quantity, SpectralImage};
+use dioptric_spectrum::{Quantity, SpectralImage, sort_exr_attributes};
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder, SmallVec,
     Text, WritableImage,
@@ -79,7 +79,11 @@ fn write(
     let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS };
     let layer = Layer::new((columns, rows), attributes, encoding, AnyChannels::sort(list));
     let written = Image::from_layer(layer).write().to_file(&partial).map_err(|error| failed(error.to_string()));
-    written.and_then(|()| fs::rename(&partial, path).map_err(|error| failed(error.to_string()))).inspect_err(|_| {
+    let in_place = || {
+        sort_exr_attributes(&mut fs::File::options().read(true).write(true).open(&partial)?)?;
+        fs::rename(&partial, path)
+    };
+    written.and_then(|()| in_place().map_err(|error| failed(error.to_string()))).inspect_err(|_| {
         // What is left of it is of no use; that it cannot be removed changes nothing.
         let _ = fs::remove_file(&partial);
     })

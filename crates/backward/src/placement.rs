@@ -65,6 +65,17 @@ impl PixelGrid {
         Ok(cropped)
     }
 
+    /// Returns the same picture on pixels so many times as wide and as high; a part grows to whole ones of them.
+    #[must_use]
+    pub fn coarser(self, factor: usize) -> Self {
+        let factor = factor.max(1);
+        let fewer = |n: usize| n.div_ceil(factor);
+        let [x, y, width, height] = self.crop;
+        let (first, end) = ([x / factor, y / factor], [fewer(x + width), fewer(y + height)]);
+        let crop = [first[0], first[1], end[0] - first[0], end[1] - first[1]];
+        Self { columns: fewer(self.columns), rows: fewer(self.rows), crop }
+    }
+
     pub(crate) fn check(&self) -> Result<(), BackwardError> {
         let [x, y, width, height] = self.crop;
         let is_within = width > 0

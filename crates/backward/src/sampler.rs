@@ -6,6 +6,8 @@
 //! first two, shuffled and scrambled anew. Scrambling hashes as Burley, "Practical hash-based Owen scrambling"
 //! (JCGT 9, 2020), with the constants of Vegdahl's improved Laine–Karras hash (2021).
 
+use dioptric_optics::glam::DVec2;
+
 /// Draws the numbers of one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sampler {
@@ -42,6 +44,17 @@ impl Sampler {
             (bits >> 8) as f32 * UNIT_F32
         })
     }
+}
+
+/// Returns a point of the unit disc, evenly spread, neighbors staying neighbors (Shirley & Chiu 1997).
+pub(crate) fn on_disc(u: f64, v: f64) -> DVec2 {
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+    let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    if x == 0.0 && y == 0.0 {
+        return DVec2::ZERO;
+    }
+    let (r, angle) = if x.abs() > y.abs() { (x, FRAC_PI_4 * y / x) } else { (y, FRAC_PI_2 - FRAC_PI_4 * x / y) };
+    r * DVec2::from_angle(angle)
 }
 
 /// Returns a number as good as random for each number (the finalizer of `MurmurHash3`).

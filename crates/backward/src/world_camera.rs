@@ -79,6 +79,7 @@ impl Camera {
                     // The paper's `idealDiffraction` camera has its lens at the origin, pbrt's `realistic` its film.
                     origin: if is_ideal { LensOrigin::EntrancePupil } else { LensOrigin::Film },
                     diffraction: has_diffraction.then_some(Hurb::PAPER),
+                    micro_array: None,
                 };
                 Ok(Self::Lens(Box::new(LensCamera::new(&lens, bands, settings)?)))
             }

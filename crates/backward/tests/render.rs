@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 
 use dioptric_backward::{
     BackwardError, BandSampling, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole,
-    PixelGrid, Placement, RenderSettings, Renderer, Rendering, ThinLens, auxiliary, layered_depth,
+    PixelGrid, Placement, RenderSettings, Renderer, Rendering, ThinLens, auxiliary, layered_depth, write_auxiliary_exr,
+    write_rendering_exr,
 };
 use dioptric_diffraction::Hurb;
 use dioptric_optics::{CoordinateBreak, Glass, Lens, glam::DVec2};
@@ -60,6 +61,7 @@ fn lens_settings(film_distance_mm: f64, film_size_mm: f64, n_pixels: usize) -> L
         placement: Placement::IDENTITY,
         origin: LensOrigin::EntrancePupil,
         diffraction: None,
+        micro_array: None,
     }
 }
 
@@ -229,6 +231,76 @@ fn lamp_lights_wall_by_its_form_factor() {
     assert!(error < 0.01 * expected && (found - expected).abs() < 4.0 * error, "{found} {expected} {error}");
 }
 
+/// A wall 2 m away, its albedo one half, and a lamp of intensity 1 between it and the camera, aside and above.
+fn lamp_and_wall() -> World {
+    let mut builder = WorldBuilder::new();
+    add_gray(&mut builder, quad([-1.0, -1.0, 2.0], 2.0, 2.0), 0.5, 0.0);
+    builder.add_light(Light::Point { position: LAMP_M, intensity: SpectralCurve::constant(1.0) });
+    builder.build().unwrap()
+}
+
+const LAMP_M: DVec3 = DVec3::new(0.5, 0.5, 1.0);
+
+/// Radiance of that wall, ρ/π I cos θ / d².
+fn wall_radiance(x_m: f64, y_m: f64) -> f64 {
+    let to_lamp = LAMP_M - DVec3::new(x_m, y_m, 2.0);
+    0.5 / PI * -to_lamp.z / to_lamp.length().powi(3)
+}
+
+#[test]
+fn pinhole_sees_lit_wall_in_closed_form() {
+    let (bands, n, half_tangent) = (bands(&[450.0, 650.0]), 9, 0.12);
+    let picture = render(&lamp_and_wall(), &Camera::Pinhole(pinhole(n, half_tangent)), settings(&bands, 64), 4);
+    let at_m = |pixel: usize| 2.0 * half_tangent * (2.0 * (pixel as f64 + 0.5) / n as f64 - 1.0);
+    for ((row, column), &found) in picture.picture.planes()[1].indexed_iter() {
+        let expected = wall_radiance(at_m(column), -at_m(row));
+        let error = f64::from(picture.standard_error.planes()[1][(row, column)]);
+        // The pixel's width of 53 mm changes the value at its middle by w²/24 times the second derivatives, 15 r²/d⁴ − 6/d² or
+        // up to 3.4 per m²: 4e-4.
+        let limit = 5e-4 * expected + 4.0 * error;
+        assert!((f64::from(found) - expected).abs() < limit, "{row} {column}: {found} {expected} {error}");
+        assert!(limit < 1.5e-3 * expected, "{limit}");
+    }
+}
+
+#[test]
+fn lens_sees_lit_wall_in_closed_form() {
+    let (bands, world) = (bands(&[550.0]), lamp_and_wall());
+    let (film_mm, n) = (10.0, 41);
+    let gauss = Lens::built_in("dgauss-50mm").unwrap().with_f_number(8.0, 550.0).unwrap();
+    for (lens, pixels) in [
+        (Lens::thin(50.0, 6.25).unwrap(), vec![(20, 20), (36, 8), (3, 39)]),
+        (Lens::pinhole(0.4).unwrap(), vec![(20, 20), (36, 8)]),
+        // On the axis, where its working f-number is all that counts.
+        (gauss, vec![(20, 20)]),
+    ] {
+        let mono = lens.at(550.0).unwrap();
+        let is_ideal = lens.interfaces().len() == 1;
+        let from_lens_mm = 2_000.0 - if is_ideal { 0.0 } else { mono.projection_center_z_mm() };
+        let film_distance_mm = mono.film_distance_mm_for(from_lens_mm).unwrap_or(50.0);
+        for (column, row) in pixels {
+            let mut of_pixel = lens_settings(film_distance_mm, film_mm, n);
+            of_pixel.pixels = of_pixel.pixels.cropped((column, row), (1, 1)).unwrap();
+            let picture = render(&world, &camera(&lens, &bands, of_pixel), settings(&bands, 4096), 6);
+            let (found, error) = mean(&picture, 0);
+            let at_mm = |pixel: usize| film_mm * ((pixel as f64 + 0.5) / n as f64 - 0.5);
+            let at_m = |pixel: usize| 2.0 * at_mm(pixel) / film_distance_mm;
+            let per_radiance = match is_ideal {
+                true => {
+                    let radius_mm = mono.stop_semi_aperture_mm();
+                    disc_irradiance(radius_mm, film_distance_mm, at_mm(column).hypot(at_mm(row)))
+                }
+                false => PI / (4.0 * mono.working_f_number(from_lens_mm).powi(2)),
+            };
+            let expected = per_radiance * wall_radiance(at_m(column), -at_m(row));
+            // The 0.3 % for a real lens at f/8; 2e-4 for the pixel's own width.
+            let limit = if is_ideal { 2e-4 } else { 3e-3 } + 4.0 * error / expected;
+            assert!((found / expected - 1.0).abs() < limit, "{} {column}: {}", lens.name(), found / expected);
+            assert!(limit < 6e-3, "{limit}");
+        }
+    }
+}
+
 #[test]
 fn picture_is_upright() {
     let mut builder = WorldBuilder::new();
@@ -375,6 +447,24 @@ fn resumed_rendering_has_same_bits() {
     assert!(message(begin().resume(&path, "busy")).contains("is not what a picture of this size takes"));
     std::fs::write(&path, "no").unwrap();
     assert!(message(begin().resume(&path, "busy")).contains("is no checkpoint"));
+}
+
+/// The library that writes the files keeps their attributes in no order.
+#[test]
+fn equal_renderings_are_equal_files() {
+    let bands = bands(&[450.0, 550.0]);
+    let (world, camera) = (busy_world(), busy_camera(&bands));
+    let rendering = render(&world, &camera, settings(&bands, 2), 1);
+    let seen = auxiliary(&world, &camera, &bands.grid, &Cancel::new()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = |name: usize| {
+        let [picture, aside] = ["picture", "aside"].map(|what| folder.path().join(format!("{what}{name}.exr")));
+        write_rendering_exr(&picture, &rendering, Some(&seen.z_m)).unwrap();
+        write_auxiliary_exr(&aside, &seen).unwrap();
+        [picture, aside].map(|path| std::fs::read(path).unwrap())
+    };
+    let first = bytes(0);
+    assert!((1..8).all(|name| bytes(name) == first));
 }
 
 #[test]

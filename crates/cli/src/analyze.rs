@@ -4,10 +4,11 @@ use std::{fmt::Write, fs};
 
 use anyhow::Context;
 use dioptric_analysis::{
-    AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensDefaults,
+    AnalysisFields, AnalysisFilm, AnalysisRequest, FieldPlace, FieldRow, LensAnalysis, LensDefaults, LensModulation,
+    LensPageData,
 };
 use dioptric_pipeline::{Staged, parse_pairs};
-use dioptric_report::{AnalysisPlots, DRAWS_PNG, write_drawing};
+use dioptric_report::{AnalysisPlots, DRAWS_PNG, LensPage, chart_svg, write_drawing};
 
 use crate::{
     args::Common,
@@ -24,14 +25,15 @@ const USUAL_NM: [f64; 3] = [450.0, 550.0, 650.0];
 pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.open(common)?;
     let request = request(arguments, &used, common)?;
-    let lens = arguments.lens.state.apply(used, request.reference_nm())?.lens;
+    let used = arguments.lens.state.apply(used, request.reference_nm())?;
     // The place is tried before the work.
     let staged = arguments.out.as_ref().map(|path| Staged::folder(path)).transpose()?.map(guarded);
     let bar = Bar::new(common.quiet);
     bar.show("tracing the lens", 0.0);
-    let analysis = request.compute(&lens)?;
+    let analysis = request.compute(&used.lens)?;
+    let shown = arguments.out.is_some().then(|| LensPageData::of(&request, &used, &analysis)).transpose()?;
     drop(bar);
-    if let (Some(staged), Some(path)) = (staged, &arguments.out) {
+    if let (Some(staged), Some(shown), Some(path)) = (staged, shown, &arguments.out) {
         let cannot = || format!("cannot write {}", path.display());
         let json = serde_json::to_string_pretty(&analysis)? + "\n";
         let plots = AnalysisPlots(&analysis);
@@ -44,12 +46,24 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
         ] {
             write_drawing(&svg, staged.path(), name, PNG_SCALE)?;
         }
-        fs::write(staged.path().join("analysis.html"), plots.html(&tables(&analysis)?)).with_context(cannot)?;
+        match &shown.modulation {
+            Ok(LensModulation { over_frequency, over_field, through_focus }) => {
+                for (name, chart) in
+                    [("mtf", over_frequency), ("mtf_over_field", over_field), ("mtf_through_focus", through_focus)]
+                {
+                    write_drawing(&chart_svg(chart, 640.0, 420.0), staged.path(), name, PNG_SCALE)?;
+                    fs::write(staged.path().join(format!("{name}.csv")), chart.to_csv()).with_context(cannot)?;
+                }
+            }
+            Err(reason) => remark(common.quiet, &format!("note: no modulation is shown: {reason}")),
+        }
+        let page = LensPage { plots, shown: &shown, tables: &tables(&analysis)? };
+        fs::write(staged.path().join("analysis.html"), page.html()?).with_context(cannot)?;
         staged.commit()?;
         remark(
             common.quiet,
             &format!(
-                "wrote analysis.json, analysis.html, and analysis, spots, opd and distortion as {}, in {}",
+                "wrote analysis.json, analysis.html, and analysis, spots, opd, distortion and mtf as {}, in {}",
                 if DRAWS_PNG { ".svg and .png" } else { ".svg" },
                 path.display()
             ),

@@ -9,7 +9,7 @@ use crate::{
     camera::{CameraCommand, SensorCommand},
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
-    render_args::{CompareArgs, RenderArgs},
+    render_args::{CompareArgs, LightFieldArgs, RenderArgs},
 };
 
 /// Simulates a camera from the scene's spectral radiance to the final picture.
@@ -49,6 +49,9 @@ pub(crate) enum Command {
     Render(Box<RenderArgs>),
     /// Renders the world of a camera file both ways and compares: rays from the film, and the view blurred
     Compare(CompareArgs),
+    /// Takes a light field apart: views of the parts of the pupil, refocused pictures, depth
+    #[command(name = "lightfield")]
+    LightField(LightFieldArgs),
     /// Exposes a sensor to an irradiance image and processes the picture
     Sense(SenseArgs),
     /// Measures pictures, frames and sensors as a laboratory does
@@ -228,15 +231,15 @@ pub(crate) struct TraceArgs {
 pub(crate) struct PsfArgs {
     #[command(flatten)]
     pub(crate) lens: LensArgs,
-    /// Field angles, degrees
-    #[arg(long, value_name = "LIST", default_value = "0", allow_hyphen_values = true)]
-    pub(crate) fields_deg: String,
+    /// Field angles, degrees [default: those of the lens's file, else 0]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub(crate) fields_deg: Option<String>,
     /// How far above the axis all of these fields lie, degrees
     #[arg(long, value_name = "A", default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) field_y_deg: f64,
-    /// Distances of the points from the first vertex, mm; inf for a star
-    #[arg(long, value_name = "LIST", default_value = "2000")]
-    pub(crate) distances_mm: String,
+    /// Distances of the points from the first vertex, mm; inf for a star [default: that of the lens's file, else 2000]
+    #[arg(long, value_name = "LIST")]
+    pub(crate) distances_mm: Option<String>,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
     #[command(flatten)]

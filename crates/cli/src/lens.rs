@@ -6,7 +6,9 @@ use anyhow::Context;
 use dioptric_analysis::{
     LensData, LensInfoRequest, SurfaceRow, built_in_lenses, convert_lens, placement_lines, surface_rows,
 };
-use dioptric_pipeline::{LensReadOptions, REFERENCE_WAVELENGTH_NM, Staged, nearest_to_reference_nm, parse_numbers};
+use dioptric_pipeline::{
+    LensReadOptions, PipelineError, REFERENCE_WAVELENGTH_NM, Staged, nearest_to_reference_nm, parse_numbers,
+};
 use dioptric_report::{LensDrawing, check_drawing_name, drawing_file};
 
 use crate::{
@@ -226,7 +228,10 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     let wavelength_nm = wavelengths_nm.first().copied().unwrap_or(REFERENCE_WAVELENGTH_NM);
     let used = arguments.lens.state.apply(used, wavelength_nm)?;
     let film_distance_mm = match (arguments.film.focus_mm, arguments.film.film_mm) {
-        (Some(focus_mm), _) => Some(used.lens.at(wavelength_nm)?.film_distance_mm_for(focus_mm)?),
+        (Some(focus_mm), _) => {
+            let mono = used.lens.at(wavelength_nm)?;
+            Some(mono.film_distance_mm_for(focus_mm).map_err(PipelineError::from)?)
+        }
         (None, film_mm) => film_mm,
     };
     let drawing = LensDrawing { fields_deg, distance_mm, wavelengths_nm, film_distance_mm };

@@ -11,6 +11,7 @@ mod compare;
 mod glass;
 mod lens;
 mod lens_args;
+mod light_field;
 mod measure;
 mod measure_args;
 mod movement_args;
@@ -58,6 +59,7 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Psf(arguments) => psf::run(&arguments, &common),
         Command::Render(arguments) => render::run(&arguments, &common),
         Command::Compare(arguments) => compare::run(&arguments, &common),
+        Command::LightField(arguments) => light_field::run(&arguments, &common),
         Command::Sense(arguments) => sense::run(&arguments, &common),
         Command::Measure(command) => measure::run(&command, &common),
     }

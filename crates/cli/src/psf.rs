@@ -3,12 +3,13 @@
 use std::fmt::Write;
 
 use anyhow::Context;
-use dioptric_analysis::{PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
-use dioptric_pipeline::{BankSpec, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
+use dioptric_analysis::{LensDefaults, PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
+use dioptric_pipeline::{BankSpec, FocusSpec, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
 use dioptric_report::{chart_svg, write_drawing, write_psfs};
 
 use crate::{
     args::{BankKind, Common, PsfArgs, PsfMode},
+    lens::{list_of, tell_taken},
     run::{diffraction, with_gamma},
     terminal::{Bar, fixed, guarded, print, print_json, remark, remark_on_png},
 };
@@ -21,12 +22,13 @@ const SEED: u64 = 1;
 
 pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.open(common)?;
-    let focus = arguments.film.focus().context("where is the film? expected --focus-mm or --film-mm")?;
+    let Points { fields_deg, distances_mm, wavelengths_nm, focus, spectral_weights } =
+        points(arguments, &used, common)?;
     let request = PsfRequest {
-        fields_deg: parse_numbers("--fields-deg", &arguments.fields_deg)?,
+        fields_deg,
         field_y_deg: arguments.field_y_deg,
-        distances_mm: parse_numbers("--distances-mm", &arguments.distances_mm)?,
-        wavelengths_nm: arguments.bands.nm()?.unwrap_or(vec![REFERENCE_WAVELENGTH_NM]),
+        distances_mm,
+        wavelengths_nm,
         focus,
         diffraction: with_gamma(diffraction(arguments.diffraction), arguments.gamma)?,
         pixel_um: arguments.pixel_um,
@@ -41,10 +43,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
             None => Vec::new(),
         },
         seed: common.seed.unwrap_or(SEED),
-        spectral_weights: match &arguments.spectral_weights {
-            Some(list) => parse_numbers("--spectral-weights", list)?,
-            None => Vec::new(),
-        },
+        spectral_weights,
     };
     let reference_nm = request.reference_nm(&used.lens)?;
     let lens = arguments.lens.state.apply(used, reference_nm)?.lens;
@@ -81,6 +80,57 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         remark_on_png(common.quiet);
     }
     if common.json { print_json(&rows) } else { print(&table(&set, &rows)?) }
+}
+
+/// Which points are looked at, and where the film is.
+struct Points {
+    fields_deg: Vec<f64>,
+    distances_mm: Vec<f64>,
+    wavelengths_nm: Vec<f64>,
+    focus: FocusSpec,
+    spectral_weights: Vec<f64>,
+}
+
+/// Distance of points where neither the command nor the lens's file names one, mm.
+const USUAL_DISTANCE_MM: f64 = 2000.0;
+
+/// Returns what is asked for; where it is not said, what the lens's file says.
+fn points(arguments: &PsfArgs, used: &LensDefaults, common: &Common) -> anyhow::Result<Points> {
+    let mut taken = Vec::new();
+    let of_file = arguments.film.focus().is_none().then_some(used.film_distance_mm).flatten();
+    let focus = arguments.film.focus().or(of_file.map(FocusSpec::FilmMm));
+    let focus = focus.context("where is the film? expected --focus-mm or --film-mm")?;
+    taken.extend(of_file.map(|film_mm| format!("the film at {} mm", list_of(&[film_mm]))));
+    let asked_nm = arguments.bands.nm()?;
+    let wavelengths_nm = asked_nm.clone().unwrap_or_else(|| used.wavelengths_or(&[REFERENCE_WAVELENGTH_NM]));
+    if asked_nm.is_none() && wavelengths_nm != [REFERENCE_WAVELENGTH_NM] {
+        taken.push(format!("wavelengths of {} nm", list_of(&wavelengths_nm)));
+    }
+    let fields_of_file = || used.psf_fields_deg(used.wavelength_or_usual());
+    let fields_deg = match (&arguments.fields_deg, arguments.fields_deg.is_none().then(fields_of_file).flatten()) {
+        (Some(list), _) => parse_numbers("--fields-deg", list)?,
+        (None, Some(fields_deg)) => {
+            taken.push(format!("fields of {} degrees", list_of(&fields_deg)));
+            fields_deg
+        }
+        (None, None) => vec![0.0],
+    };
+    let distances_mm = match &arguments.distances_mm {
+        Some(list) => parse_numbers("--distances-mm", list)?,
+        // The film that a file states is that of its own object.
+        None if used.distance_mm.is_finite() || of_file.is_some() => {
+            taken.push(format!("an object at {} mm", list_of(&[used.distance_mm])));
+            vec![used.distance_mm]
+        }
+        None => vec![USUAL_DISTANCE_MM],
+    };
+    let spectral_weights = match (&arguments.spectral_weights, asked_nm) {
+        (Some(list), _) => parse_numbers("--spectral-weights", list)?,
+        (None, None) => used.weights_of(&wavelengths_nm),
+        (None, Some(_)) => Vec::new(),
+    };
+    tell_taken(&taken, common);
+    Ok(Points { fields_deg, distances_mm, wavelengths_nm, focus, spectral_weights })
 }
 
 /// Returns the rows with one more after those of each point: the light of all its wavelengths together.

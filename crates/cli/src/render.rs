@@ -1,7 +1,9 @@
 //! `dioptric render`: a world seen by a camera, ray by ray from its film.
 
 use std::{
-    fs, process,
+    fs,
+    path::Path,
+    process,
     time::{Duration, Instant},
 };
 
@@ -28,6 +30,12 @@ use crate::{
 const STATE: &str = "render.state";
 /// Checkpoints are written at least so far apart.
 const BETWEEN_CHECKPOINTS: Duration = Duration::from_secs(10);
+/// The name of the picture so far, until the whole one takes its place.
+const PREVIEW: &str = "preview.png";
+/// Pictures so far are written at least so far apart.
+const BETWEEN_PREVIEWS: Duration = Duration::from_secs(1);
+/// How many times as wide the pixels of the first looks are; they take 1/64 and 1/16 of a pass.
+const FIRST_LOOKS: [usize; 2] = [8, 4];
 
 /// The report of a run, with what is known of the rendering.
 #[derive(Serialize)]
@@ -186,14 +194,25 @@ fn refine(arguments: &RenderArgs, (render, clock, cancel): Job<'_>) -> anyhow::R
     if arguments.resume && state.exists() {
         renderer.resume(&state, &identity)?;
     }
-    let mut saved: Option<Instant> = None;
+    let preview = out.join(PREVIEW);
+    if renderer.n_passes() == 0 {
+        clock.at(Stage::Irradiance, 0.0);
+        for factor in FIRST_LOOKS {
+            write_seen_png(&render.preview(factor, cancel)?, factor, &preview)?;
+        }
+    }
+    let (mut saved, mut shown): (Option<Instant>, Option<Instant>) = (None, None);
+    let is_due = |last: Option<Instant>, after: Duration| last.is_none_or(|at| at.elapsed() >= after);
     render.refine(&mut renderer, effort, clock, cancel, &mut |renderer| {
         let elapsed = began.elapsed();
         let is_over = arguments.seconds.is_some_and(|seconds| elapsed.as_secs_f64() >= seconds);
-        if is_over || saved.is_none_or(|at| at.elapsed() >= BETWEEN_CHECKPOINTS) {
+        if is_over || is_due(saved, BETWEEN_CHECKPOINTS) {
             renderer.save(&state, &identity)?;
-            write_seen_png(&renderer.rendering().picture, &out.join("picture.png"))?;
             saved = Some(Instant::now());
+        }
+        if is_over || is_due(shown, BETWEEN_PREVIEWS) {
+            write_seen_png(&renderer.rendering().picture, 1, &preview)?;
+            shown = Some(Instant::now());
         }
         Ok::<bool, PipelineError>(!is_over)
     })?;
@@ -233,6 +252,7 @@ fn finish(
     write_json(&staged.path().join("report.json"), &report)?;
     kept.write_resume_file(&capture, staged.path())?;
     staged.commit()?;
+    remove_preview(out);
     tell(&capture.lens.notes, common);
     if common.json {
         return print_json(&report);
@@ -258,15 +278,22 @@ fn render_without_sensor(
     let staged = guarded(Staged::folder(out)?);
     clock.at(Stage::Report, 0.0);
     render.write_files(&rendering, &render.auxiliary(cancel)?, staged.path())?;
-    write_seen_png(&rendering.picture, &staged.path().join("picture.png"))?;
+    write_seen_png(&rendering.picture, 1, &staged.path().join("picture.png"))?;
     let report = Report { run: None, rendering: sum_up(&rendering) };
     write_json(&staged.path().join("report.json"), &report)?;
     staged.commit()?;
+    remove_preview(out);
     if common.json {
         return print_json(&report);
     }
     let text = samples(&report.rendering) + &format!("{}, as an observer sees it\n", out.join("picture.png").display());
     if common.quiet { Ok(()) } else { print(&text) }
+}
+
+/// Removes the picture so far when the whole one is there.
+fn remove_preview(out: &Path) {
+    // One that cannot be removed does no harm.
+    let _ = fs::remove_file(out.join(PREVIEW));
 }
 
 fn samples(rendering: &RenderingSummary) -> String {

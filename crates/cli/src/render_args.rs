@@ -107,3 +107,34 @@ pub(crate) struct CompareArgs {
     #[arg(long, short, value_name = "DIR", default_value = "dioptric-compare")]
     pub(crate) out: PathBuf,
 }
+
+/// A light-field camera, and what is made of what it takes.
+#[derive(Debug, Args)]
+pub(crate) struct LightFieldArgs {
+    /// Camera file with `light_field: Array((...))` or `light_field: Cameras(...)`, its scene a world
+    pub(crate) camera: PathBuf,
+    /// Irradiance that was rendered with this camera, as `irradiance.exr` of `run` or `render` [default: rendered now]
+    #[arg(long, value_name = "FILE.exr")]
+    pub(crate) irradiance: Option<PathBuf>,
+    /// Samples a pixel, where it is rendered now [default: those of the camera file]
+    #[arg(long, value_name = "N")]
+    pub(crate) samples: Option<u32>,
+    /// Views along each side of the pupil, behind an array [default: one a pixel]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub(crate) views: Option<u16>,
+    /// Depths to refocus on, m from the entrance pupil, e.g. 0.4,0.5 [default: eight over the range]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub(crate) refocus_m: Vec<f64>,
+    /// Nearest depth that is sought, m [default: that of the scene]
+    #[arg(long, value_name = "Z")]
+    pub(crate) near_m: Option<f64>,
+    /// Farthest depth that is sought, m [default: that of the scene]
+    #[arg(long, value_name = "Z")]
+    pub(crate) far_m: Option<f64>,
+    /// Samples each way that depth is sought over: more for noise, fewer for small objects
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    pub(crate) radius_px: usize,
+    /// Folder for the results
+    #[arg(long, short, value_name = "DIR", default_value = "dioptric-lightfield")]
+    pub(crate) out: PathBuf,
+}

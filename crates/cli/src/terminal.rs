@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use dioptric_pipeline::Staged;
+use dioptric_pipeline::{PipelineError, Staged};
 use dioptric_report::{DRAWS_PNG, PNG_REMEDY};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -57,7 +57,12 @@ pub(crate) fn output_error(error: io::Error) -> anyhow::Error {
 
 /// Prints an error and its causes as one sentence on one line.
 pub(crate) fn print_error(error: &anyhow::Error) {
-    let sentence = format!("{error:#}");
+    let is_without_image = |cause: &PipelineError| cause.is_without_image();
+    let remedy = match error.chain().filter_map(|cause| cause.downcast_ref()).any(is_without_image) {
+        true => "; place the film with --film-mm, its distance behind the last vertex",
+        false => "",
+    };
+    let sentence = format!("{error:#}{remedy}");
     let words: Vec<&str> = sentence.split_whitespace().collect();
     // Standard error may be closed too; then there is nobody to tell.
     let _ = writeln!(io::stderr(), "error: {}", words.join(" "));

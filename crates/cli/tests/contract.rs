@@ -4,7 +4,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{CAMERA, check_error, output};
+use common::{CAMERA, check_error, dioptric, output};
 use serde_json::Value;
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
@@ -119,7 +119,8 @@ fn lens_analyze_has_its_keys_and_leaves_its_plots() {
     assert_eq!(written, analysis);
     let page = fs::read_to_string(folder.path().join("plots/analysis.html")).unwrap();
     assert!(page.contains("Optical path differences") && page.contains("least spot on the axis"));
-    for name in ["analysis", "spots", "opd", "distortion"] {
+    assert!(page.contains("Prescription") && page.contains("Modulation over field") && page.contains("Glasses"));
+    for name in ["analysis", "spots", "opd", "distortion", "mtf", "mtf_over_field", "mtf_through_focus"] {
         let file = |extension: &str| fs::read(folder.path().join(format!("plots/{name}.{extension}"))).unwrap();
         assert!(file("svg").starts_with(b"<svg"), "{name}");
         if cfg!(feature = "png") {
@@ -363,7 +364,7 @@ fn use_that_a_file_states_is_taken() {
     assert_eq!((analysis["reference_nm"].as_f64(), analysis["distance_mm"].as_f64()), (Some(10_000.0), Some(400.0)));
     assert_eq!(analysis["fields"][2]["object_mm"][1].as_f64(), Some(5.0));
     let maps = analysis["opd_maps"].as_array().unwrap();
-    assert_eq!((maps.len(), maps[0]["waves"].as_array().unwrap().len()), (9, 31 * 31));
+    assert_eq!((maps.len(), maps[0]["waves"].as_array().unwrap().len()), (9, 51 * 51));
     // What is asked for goes before.
     let far =
         ["lens", "analyze", "ir.seq", "--rings", "3", "--distance-mm", "inf", "--wavelengths-nm", "9000", "--json"];
@@ -523,4 +524,26 @@ fn bent_rays_have_the_strength_asked_for() {
     ] {
         check_error(folder.path(), &[&psf[..], options].concat(), &words);
     }
+}
+
+#[test]
+fn plane_mirror_asks_for_the_film() {
+    let folder = tempfile::tempdir().unwrap();
+    let mirror = "(name: \"fold\", source: \"test\", surfaces: [(stop: true, mirror: true, semi_aperture_mm: 10.0, \
+                  thickness_mm: 0.0)])";
+    fs::write(folder.path().join("fold.ron"), mirror).unwrap();
+    for arguments in [
+        &["lens", "draw", "fold.ron", "-o", "fold.svg"][..],
+        &["psf", "fold.ron", "--focus-mm", "2000"],
+        &["run", "--lens", "fold.ron", "--quality", "preview", "--out", "run"],
+    ] {
+        let found = dioptric(folder.path(), arguments);
+        let message = String::from_utf8_lossy(&found.stderr).into_owned();
+        assert!(!found.status.success() && message.contains("--film-mm"), "{arguments:?}: {message}");
+    }
+    output(folder.path(), &["lens", "draw", "fold.ron", "-o", "fold.svg", "--film-mm", "50"]);
+    let psf = json(folder.path(), &["psf", "fold.ron", "--film-mm", "50", "--pixel-um", "200", "--json"]);
+    // A disc of 10 mm about the axis, a little wider for the light of 2 m: √½ of its radius.
+    let expected_um = 10_000.0 * (1.0 + 50.0 / 2000.0) * 0.5_f64.sqrt();
+    assert!((psf[0]["rms_radius_um"].as_f64().unwrap() / expected_um - 1.0).abs() < 1e-3, "{psf}");
 }

@@ -42,9 +42,9 @@ fn report(folder: &Path) -> serde_json::Value {
     serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
 }
 
-/// All that a rendering has gathered, and the picture that came of it.
-fn bits(folder: &Path) -> [Vec<u8>; 2] {
-    ["render.state", "picture.png"].map(|name| fs::read(folder.join(name)).unwrap())
+/// All that a rendering has gathered, and what came of it.
+fn bits(folder: &Path) -> [Vec<u8>; 4] {
+    ["render.state", "picture.png", "irradiance.exr", "auxiliary.exr"].map(|name| fs::read(folder.join(name)).unwrap())
 }
 
 #[test]
@@ -150,10 +150,52 @@ fn killed_rendering_is_continued_to_the_same_bits() {
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(state.exists());
+    // What there is can be looked at before the end, and gives way to the picture.
+    let preview = folder.path().join("killed/preview.png");
+    let shown = image::open(&preview).unwrap();
+    assert!(shown.width() >= 24 && shown.height() >= 16);
     output(folder.path(), &[&words("killed")[..], &["--resume"]].concat());
+    assert!(!preview.exists());
     output(folder.path(), &words("whole"));
     let read = |name: &str| bits(&folder.path().join(name));
     assert!(read("killed") == read("whole"));
+}
+
+/// Lenses of f/4 before 120 × 80 pixels: 11 × 7 of them have their image of the pupil on the film.
+const LIGHT_FIELD: &str = r#"(
+    name: "light field",
+    lens: Thin(focal_length_mm: 50.0, diameter_mm: 12.5),
+    focus: DistanceMm(1000.0),
+    film: Pixels(columns: 120, rows: 80, pitch_um: 20.0),
+    light_field: Array((elements: Lenses(focal_length_mm: 0.8), pitch_mm: 0.2, gap_mm: 0.8)),
+    sensor: BuiltIn("nikon-d5100"),
+    scene: (source: World((file: "wall.pbrt", effort: Samples(8)))),
+    wavelengths: ListNm([450.0, 550.0, 650.0]),
+)"#;
+
+#[test]
+fn light_field_ends_in_views_and_depth() {
+    let folder = folder();
+    fs::write(folder.path().join("camera.ron"), LIGHT_FIELD).unwrap();
+    let words = ["lightfield", "camera.ron", "--refocus-m", "1,2", "--near-m", "0.8", "--far-m", "4", "--json"];
+    let report: serde_json::Value =
+        serde_json::from_str(&output(folder.path(), &[&words[..], &["-o", "out"]].concat())).unwrap();
+    assert_eq!((&report["n_views"], &report["size"]), (&serde_json::json!([9, 9]), &serde_json::json!([7, 11])));
+    // In focus neighboring views are alike; behind it they move the other way.
+    let disparity_px = |i: usize| report["refocused"][i][1].as_f64().unwrap();
+    assert!(disparity_px(0).abs() < 0.01 && disparity_px(1) < -0.1, "{report}");
+    for name in report["files"].as_array().unwrap() {
+        assert!(folder.path().join("out").join(name.as_str().unwrap()).exists(), "{name}");
+    }
+    // What was rendered is taken apart again without rendering.
+    output(folder.path(), &[&words[..], &["--irradiance", "out/irradiance.exr", "-o", "again"]].concat());
+    let picture = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    assert!(picture("out/views.png") == picture("again/views.png"));
+    assert!(picture("out/depth.exr") == picture("again/depth.exr"));
+    let plain = LIGHT_FIELD.replace("light_field: Array", "// Array");
+    fs::write(folder.path().join("plain.ron"), plain).unwrap();
+    check_error(folder.path(), &["lightfield", "plain.ron", "--quiet"], &["light_field", "the camera has none"]);
+    check_error(folder.path(), &["lightfield", "camera.ron", "--refocus-m", "0"], &["--refocus-m has 0"]);
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use crate::quadrature::gauss_legendre_on;
+use dioptric_optics::quadrature::gauss_legendre_on;
 
 /// Returns the irradiance `r` from the center for a point of unit energy, per (λN)².
 pub fn psf(r: f64) -> f64 {

@@ -7,10 +7,10 @@
 
 use std::f64::consts::PI;
 
-use dioptric_optics::StopPoint;
+use dioptric_optics::{StopPoint, quadrature::gauss_legendre_on};
 use serde::{Deserialize, Serialize};
 
-use crate::{Covariance, quadrature::gauss_legendre_on};
+use crate::Covariance;
 
 /// A round edge at which rays are deviated.
 #[derive(Clone, Copy, Debug, PartialEq)]

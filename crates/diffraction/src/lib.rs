@@ -14,7 +14,6 @@ mod error;
 mod hurb;
 mod huygens;
 mod opd;
-pub mod quadrature;
 mod sampled_hurb;
 mod stop_ray;
 mod wave;

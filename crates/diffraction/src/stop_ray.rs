@@ -145,7 +145,7 @@ mod tests {
             lens.to_film(&mut rays, FILM_MM);
             let share = |limit: f64| rays.x_mm.iter().filter(|x| x.abs() < limit * unit).count() as f64 / n_rays as f64;
             for limit in [0.25 * width, 0.5 * width, width, 3.0] {
-                let nodes = crate::quadrature::gauss_legendre_on(64, 0.0, limit);
+                let nodes = dioptric_optics::quadrature::gauss_legendre_on(64, 0.0, limit);
                 let expected: f64 = nodes.iter().map(|(u, w)| 2.0 * w * model.lsf(*u)).sum();
                 // Four standard errors of a share are below 0.0032.
                 assert_abs_diff_eq!(share(limit), expected, epsilon = 0.0032);

@@ -106,7 +106,7 @@ mod tests {
     use std::f64::consts::{PI, TAU};
 
     use super::*;
-    use crate::quadrature::gauss_legendre_on;
+    use dioptric_optics::quadrature::gauss_legendre_on;
 
     fn disc() -> (Vec<DVec2>, Vec<f64>) {
         let radii = gauss_legendre_on(16, 0.0, 1.0);

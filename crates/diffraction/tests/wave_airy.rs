@@ -5,9 +5,8 @@ use std::f64::consts::TAU;
 
 use dioptric_diffraction::{
     DiffractionError, PhaseRange, PupilGrid, PupilSamples, WavePsf, WaveWindow, WindowCenter, airy,
-    quadrature::gauss_legendre_on,
 };
-use dioptric_optics::glam::DVec2;
+use dioptric_optics::{glam::DVec2, quadrature::gauss_legendre_on};
 
 const CENTER: WindowCenter = WindowCenter::At(DVec2::ZERO);
 

@@ -5,11 +5,12 @@ use std::f64::consts::{PI, TAU};
 
 use dioptric_diffraction::{
     DiffractionError, HuygensSources, Propagation, PupilGrid, PupilSamples, WavePsf, WaveQuality, WaveWindow,
-    WindowCenter, airy::bessel_j, polychromatic_psf, pupil_samples, quadrature::gauss_legendre_on, wave_psf,
+    WindowCenter, airy::bessel_j, polychromatic_psf, pupil_samples, wave_psf,
 };
 use dioptric_optics::{
     Glass, Interface, Lens, MonoLens, ObjectPoint, Surface,
     glam::{DVec2, DVec3},
+    quadrature::gauss_legendre_on,
 };
 
 fn dgauss(f_number: f64) -> MonoLens {

@@ -5,11 +5,12 @@ use std::f64::consts::{PI, TAU};
 
 use dioptric_diffraction::{
     DiffractionError, HuygensSources, PupilGrid, PupilSamples, WaveQuality, WaveWindow, Wavefront, WavefrontReference,
-    WindowCenter, airy::bessel_j, quadrature::gauss_legendre_on, wave_psf,
+    WindowCenter, airy::bessel_j, wave_psf,
 };
 use dioptric_optics::{
     Aperture, Glass, Interface, Lens, MonoLens, ObjectPoint, Outline, Shape, Surface,
     glam::{DVec2, DVec3},
+    quadrature::gauss_legendre_on,
 };
 
 const FOCAL_MM: f64 = 500.0;

@@ -1,23 +1,32 @@
-//! Compares pupils with rays counted one by one, over all fields of lenses.
+//! Compares pupils, f-numbers and axial spots with rays counted one by one, over all fields of lenses.
 //!
-//! `cargo run --release -p dioptric-optics --example pupil_scan -- [STEP_DEG] [RAYS_ACROSS] [LENS …]`: of each lens (built-in
-//! names or files; without any, all that are built in) and each far field the cross-section of the light that gets through,
-//! by the pupil's boundary and by a square grid of rays; at the end the largest differences.
-#![expect(clippy::print_stdout, reason = "this is a command")]
+//! `cargo run --release --workspace --example pupil_scan -- [STEP_DEG] [RAYS_ACROSS] [LENS …]`: of each lens (built-in names or
+//! files; without any, all that are built in) and each far field the cross-section of the light that gets through, by the
+//! parts of the pupil and by a square grid of rays. Prints the rows of the tables of docs/pupils.md; fields that differ by more
+//! than 0.1 % go to standard error.
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "this is a command")]
 
 use std::path::Path;
 
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, PupilBoundary,
+    Lens, LensFile, MissingGlass, MonoLens, ObjectPoint, PupilBoundary, ReadOptions,
+    analysis::{Autofocus, PupilLight, PupilRule},
     glam::{DVec2, DVec3},
 };
+use rayon::prelude::*;
 
 #[path = "../tests/counted/mod.rs"]
 mod counted;
 
-use counted::cross_section_mm2;
+use counted::{beam_radius_mm, cross_section_mm2, is_any_lit, spot_rms_mm};
 
-const LAST_FIELD_DEG: f64 = 110.0;
+const LAST_FIELD_DEG: f64 = 120.0;
+/// Azimuths of boundaries.
+const N_AZIMUTHS: usize = 192;
+/// Fields are not compared where less than this share of the light on the brightest gets through.
+const DARK: f64 = 1e-6;
+/// The rays of an axial spot, as `lens analyze` has them.
+const N_RINGS: usize = 12;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -28,63 +37,122 @@ fn main() {
         names = Lens::built_in_names().map(str::to_owned).collect();
     }
     for name in names {
-        let lens = if Path::new(&name).exists() { Lens::read(Path::new(&name)) } else { Lens::built_in(&name) };
-        match lens.and_then(|lens| lens.at(550.0)) {
-            Ok(lens) => scan(&name, &lens, step_deg, n_across),
-            Err(error) => println!("{name}: {error}"),
+        match open(&name) {
+            Ok(lens) => {
+                let name = Path::new(&name).file_name().map_or(name.as_str(), |n| n.to_str().unwrap_or(&name));
+                scan(name, &lens, step_deg, n_across);
+                compare_axis(name, &lens, 2 * n_across);
+            }
+            Err(error) => println!("| {name} | refused: {error} |"),
         }
     }
 }
 
-fn scan(name: &str, lens: &MonoLens, step_deg: f64, n_across: usize) {
-    let name = Path::new(name).file_name().map_or(name, |n| n.to_str().unwrap_or(name));
-    let (mut worst, mut most_parts, mut before): (_, usize, Option<[f64; 2]>) = ((0.0_f64, 0.0), 0, None);
-    let mut worst_step = (0.0_f64, 0.0);
-    let (mut axial, mut last_lit) = (0.0_f64, 0.0);
-    for i in 0..=(LAST_FIELD_DEG / step_deg) as usize {
-        let field_deg = i as f64 * step_deg;
-        let point = ObjectPoint::far(field_deg.to_radians(), DVec2::new(0.28, 0.96));
-        let parts = PupilBoundary::find_parts(lens, &point, 192);
-        let cosine = |part: &PupilBoundary| point.direction_to(DVec3::ZERO).dot(part.plane().normal());
-        let found: f64 = parts.iter().map(|part| part.area_mm2() * cosine(part)).sum();
-        let counted = cross_section_mm2(lens, &point, n_across);
-        axial = axial.max(counted);
-        let difference = if counted == found { 0.0 } else { (found - counted) / counted.max(found) };
-        most_parts = most_parts.max(parts.len());
-        if counted > 0.0 {
-            last_lit = field_deg;
-        }
-        if difference.abs() > worst.0 {
-            worst = (difference.abs(), field_deg);
-        }
-        if let Some([found_before, counted_before]) = before {
-            // By how much a step of what is found differs from that of the rays, over the light on the brighter side.
-            let step =
-                ((found - found_before) - (counted - counted_before)).abs() / counted.max(counted_before).max(1e-300);
-            if step.is_finite() && step > worst_step.0 && counted > 1e-5 * axial {
-                worst_step = (step, field_deg);
-            }
-        }
-        if difference.abs() > 2e-3 || (parts.len() > 1 && counted > 0.0) {
-            let areas: Vec<f64> = parts.iter().map(|part| part.area_mm2() * cosine(part) / found).collect();
-            println!(
-                "  {name} {field_deg}: found {found:.6e} counted {counted:.6e} mm2, {:+.2e}; parts {areas:.4?}",
-                difference
-            );
-        }
-        before = Some([found, counted]);
+/// Returns a lens at its file's own wavelength, or at 550 nm.
+fn open(name: &str) -> Result<MonoLens, dioptric_optics::OpticsError> {
+    if !Path::new(name).exists() {
+        return Lens::built_in(name)?.at(550.0);
     }
-    let (first, axial_mm2) = (lens.first_order(), cross_section_mm2(lens, &ObjectPoint::far(0.0, DVec2::Y), n_across));
-    let counted_f_number = first.efl_mm.abs() / (2.0 * (axial_mm2 / std::f64::consts::PI).sqrt());
+    let options = ReadOptions { missing_glass: MissingGlass::FromNdVd, ..ReadOptions::default() };
+    let file = LensFile::read(Path::new(name), &options)?;
+    file.lens.at(file.reference_wavelength_nm.unwrap_or(550.0))
+}
+
+/// What is found and what is counted of one field, mm².
+#[derive(Clone, Copy)]
+struct Field {
+    degrees: f64,
+    found_mm2: f64,
+    counted_mm2: f64,
+    n_parts: usize,
+    has_outline: bool,
+}
+
+impl Field {
+    fn of(lens: &MonoLens, degrees: f64, n_across: usize) -> Self {
+        // Aslant, so that no ray of a grid lies on an axis of symmetry.
+        let direction = DVec2::new(0.28, 0.96) * degrees.signum();
+        let point = ObjectPoint::far(degrees.abs().to_radians(), direction);
+        let cosine = |part: &PupilBoundary| point.direction_to(DVec3::ZERO).dot(part.plane().normal());
+        let parts = |lens: &MonoLens| PupilBoundary::find_parts(lens, &point, N_AZIMUTHS);
+        let area_mm2 = |lens: &MonoLens| parts(lens).iter().map(|part| part.area_mm2() * cosine(part)).sum::<f64>();
+        let found_mm2 = lens.over_clear_pupil(&area_mm2);
+        // Where nothing is found, a coarse grid looks for light first.
+        let is_counted = found_mm2 > 0.0 || is_any_lit(lens, &point);
+        Self {
+            degrees,
+            found_mm2,
+            counted_mm2: if is_counted { cross_section_mm2(lens, &point, n_across) } else { 0.0 },
+            n_parts: if found_mm2 > 0.0 { parts(lens).len() } else { 0 },
+            has_outline: PupilBoundary::find(lens, &point, N_AZIMUTHS).is_some(),
+        }
+    }
+
+    fn difference(&self) -> f64 {
+        let brighter = self.found_mm2.max(self.counted_mm2);
+        if brighter == 0.0 { 0.0 } else { (self.found_mm2 - self.counted_mm2) / brighter }
+    }
+
+    /// Returns by how much a step of what is found differs from that of the rays, over the light on the brighter side.
+    fn step_from(&self, before: &Self) -> f64 {
+        let brighter = self.counted_mm2.max(before.counted_mm2);
+        let steps = (self.found_mm2 - before.found_mm2) - (self.counted_mm2 - before.counted_mm2);
+        if brighter == 0.0 { 0.0 } else { steps.abs() / brighter }
+    }
+}
+
+/// Prints the row of a lens: its last light, the largest difference, the largest step that rays do not have, the most parts.
+fn scan(name: &str, lens: &MonoLens, step_deg: f64, n_across: usize) {
+    let n = (LAST_FIELD_DEG / step_deg) as i32;
+    let first = if lens.is_rotational() { 0 } else { -n };
+    let fields: Vec<Field> =
+        (first..=n).into_par_iter().map(|i| Field::of(lens, f64::from(i) * step_deg, n_across)).collect();
+    let brightest = fields.iter().map(|field| field.counted_mm2).fold(0.0, f64::max);
+    let is_lit = |field: &&Field| field.counted_mm2.max(field.found_mm2) > DARK * brightest;
+    let lit: Vec<&Field> = fields.iter().filter(is_lit).collect();
+    let last_deg = fields.iter().filter(|f| f.counted_mm2 > 0.0).map(|f| f.degrees.abs()).fold(0.0, f64::max);
+    for field in fields.iter().filter(|f| f.difference().abs() > 1e-3 || (f.counted_mm2 > 0.0) != f.has_outline) {
+        let Field { degrees, found_mm2, counted_mm2, n_parts, has_outline } = field;
+        eprintln!(
+            "{name} {degrees}: found {found_mm2:.6e} counted {counted_mm2:.6e} mm2, {:+.2e}; {n_parts} parts, outline \
+             {has_outline}",
+            field.difference()
+        );
+    }
+    let worst = lit.iter().max_by(|a, b| a.difference().abs().total_cmp(&b.difference().abs()));
+    let (worst, at_deg) = worst.map_or((0.0, 0.0), |field| (field.difference().abs(), field.degrees));
+    let steps = fields.windows(2).filter(|pair| is_lit(&&pair[0]) || is_lit(&&pair[1]));
+    let step = steps.map(|pair| pair[1].step_from(&pair[0])).fold(0.0, f64::max);
+    let most = lit.iter().map(|field| field.n_parts).max().unwrap_or(0);
+    println!("| {name} | {} | {last_deg} | {worst:.1e} at {at_deg} | {step:.1e} | {most} |", lit.len());
+}
+
+/// Prints the row of a lens: f-numbers, the beam on the axis and its spot, against counted rays.
+fn compare_axis(name: &str, lens: &MonoLens, n_across: usize) {
+    let first = lens.first_order();
+    let limit = lens.limiting_beam().map_or("stop".to_owned(), |beam| format!("rim {}", beam.limiting_surface));
+    let (Some(real), true) = (lens.real_f_number(), lens.is_rotational()) else {
+        return println!("|| {name} | no axial beam | f/{:.4} | – | – | – | – |", first.f_number);
+    };
+    let counted = first.efl_mm.abs() / (2.0 * beam_radius_mm(lens, 2_000_000));
+    let axis = ObjectPoint::Infinite(DVec3::Z);
+    let paraxial_mm = lens.film_distance_mm_for(f64::INFINITY);
+    let focus = Autofocus { lenses: std::slice::from_ref(lens), points: &[axis], rule: PupilRule::of_rings(N_RINGS) };
+    let spot = paraxial_mm.ok().and_then(|from_mm| focus.best_film_mm(from_mm));
+    let spot = spot.map_or("– | –".to_owned(), |(best_mm, least_mm)| {
+        // Out of focus, where the rim, of which rays are hard to count, has no more than its share of the squares.
+        let film_mm = best_mm + 8.0 * least_mm * first.f_number;
+        let light = PupilLight::to_film(lens, &axis, film_mm, PupilRule::of_rings(N_RINGS));
+        let found_mm = light.map_or(f64::NAN, |light| {
+            let (_, [xx, yy, _]) = light.moments(lens, film_mm);
+            (xx + yy).sqrt()
+        });
+        let counted_mm = spot_rms_mm(lens, &axis, film_mm, n_across).unwrap_or(f64::NAN);
+        format!("{:.4} | {:.1e}", 1e3 * found_mm, (found_mm / counted_mm - 1.0).abs())
+    });
     println!(
-        "{name}: f-number {:.6}, real {:?}, counted {counted_f_number:.6}; limited by {:?}, stop {}",
+        "|| {name} | {limit} | {:.5} | {real:.5} | {:.1e} | {spot} |",
         first.f_number,
-        lens.real_f_number(),
-        lens.limiting_beam().map(|beam| beam.limiting_surface),
-        lens.stop()
-    );
-    println!(
-        "{name}: last light {last_lit} deg; largest difference {:.2e} at {} deg, of steps {:.2e} at {}; at most {most_parts} parts",
-        worst.0, worst.1, worst_step.0, worst_step.1
+        (real / counted - 1.0).abs()
     );
 }

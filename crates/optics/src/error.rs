@@ -239,6 +239,19 @@ pub enum OpticsError {
     },
 }
 
+impl OpticsError {
+    /// Returns the error of a glass with the surface that it lies behind, where its description alone does not tell it from
+    /// others.
+    pub(crate) fn behind_surface(mut self, surface: usize) -> Self {
+        if let Self::WavelengthOutsideGlass { glass, .. } | Self::Index { glass, .. } = &mut self
+            && glass.starts_with("a ")
+        {
+            *glass = format!("{glass} behind surface {surface}");
+        }
+        self
+    }
+}
+
 /// Joins names as `a, b or c`.
 fn summary(names: &[String]) -> String {
     match names {

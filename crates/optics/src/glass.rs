@@ -17,6 +17,10 @@ pub const F_LINE_NM: f64 = 486.1327;
 /// The hydrogen C line, nm.
 pub const C_LINE_NM: f64 = 656.2725;
 
+/// Where an index and an Abbe number are held to say something of a glass, nm: within the windows of optical glasses. Beyond them
+/// Cauchy's law through two numbers is no index of anything.
+const ND_VD_RANGE_NM: (f64, f64) = (300.0, 2500.0);
+
 /// A medium: its refractive index, relative to air, as a function of wavelength.
 ///
 /// Air is that of the catalogues, [`Air::CATALOGUE`], which has index 1 here; so a lens stands in such air. What else
@@ -155,6 +159,7 @@ impl Glass {
             Self::Absorbing { law, .. } => law.range_nm(),
             Self::Sellmeier { range_nm, .. } | Self::Formula { range_nm, .. } => *range_nm,
             Self::Tabulated { wavelengths_nm, .. } => Some((*wavelengths_nm.first()?, *wavelengths_nm.last()?)),
+            Self::NdVd { .. } => Some(ND_VD_RANGE_NM),
             _ => None,
         }
     }
@@ -181,7 +186,7 @@ impl Glass {
             Self::Cauchy { a, b_um2 } => format!("the Cauchy glass {a} + {b_um2}/λ²"),
             Self::NdVd { nd, vd } => format!("the glass of n_d {nd}, V_d {vd}"),
             Self::Sellmeier { b, .. } => format!("a Sellmeier glass of {} terms", b.len()),
-            Self::Formula { formula, .. } => format!("a glass of formula {formula}"),
+            Self::Formula { formula, .. } => format!("a glass by dispersion formula {formula}"),
             Self::Tabulated { wavelengths_nm, .. } => format!("a glass tabulated at {} points", wavelengths_nm.len()),
             Self::Absorbing { law, .. } => law.describe(),
         }

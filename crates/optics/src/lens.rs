@@ -230,6 +230,35 @@ impl Lens {
         Self::new("thin lens", "the thin-lens equation", vec![interface], 0)
     }
 
+    /// Returns the lens with an ideal lens of this focal length right behind its last surface: what turns the angles that an
+    /// afocal lens sends light under into places on a film.
+    ///
+    /// # Errors
+    /// When the focal length is 0 or not finite.
+    pub fn with_ideal_lens_behind(&self, focal_length_mm: f64) -> Result<Self, OpticsError> {
+        let n = self.interfaces.len();
+        let last = &self.interfaces[n - 1];
+        let shape = Shape::ThinLens { power_per_mm: 1.0 / focal_length_mm };
+        let rims = self.interfaces.iter().map(|interface| interface.surface.semi_aperture_mm);
+        // Wide enough for light that leaves aslant.
+        let semi_aperture_mm = 100.0 * rims.fold(0.0, f64::max);
+        let surface = Surface { curvature_per_mm: 0.0, shape, semi_aperture_mm };
+        let ideal = Interface { surface, medium_after: last.medium_after.clone(), thickness_after_mm: 0.0 };
+        let mut interfaces = self.interfaces.clone();
+        interfaces[n - 1].thickness_after_mm = 0.0;
+        interfaces.push(ideal);
+        let to_film = |step: &CoordinateBreak| {
+            let (first, last) = step.surfaces;
+            CoordinateBreak { surfaces: (first, if last == n { n + 1 } else { last }), ..*step }
+        };
+        Self::new_with_apertures(&self.name, &self.source, interfaces, self.stop, self.apertures.clone())?
+            .with_object_medium(self.object_medium.clone())?
+            .with_mirrors(self.mirrors.clone())?
+            .with_diffractive(self.diffractive.clone())?
+            .with_moves(self.moves.iter().map(to_film).collect())?
+            .with_image_surface(self.image_surface)
+    }
+
     /// The lens's name.
     pub fn name(&self) -> &str {
         &self.name

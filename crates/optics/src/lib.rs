@@ -30,6 +30,7 @@ mod mono;
 mod paraxial;
 mod placement;
 mod pupil;
+pub mod quadrature;
 mod rays;
 mod rays_f32;
 mod reversed;

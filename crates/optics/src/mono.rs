@@ -93,7 +93,8 @@ impl MonoLens {
         let (vertices_z_mm, n_surfaces) = (lens.vertices_z_mm(), lens.interfaces().len());
         let (mut vertex_z, mut before_z_mm) = (0.0, 0.0);
         for (i, interface) in lens.interfaces().iter().enumerate() {
-            let index_after = interface.medium_after.index_at(wavelength_nm)?;
+            let index_after =
+                interface.medium_after.index_at(wavelength_nm).map_err(|error| error.behind_surface(i))?;
             let (is_backward, is_mirror) = (lens.is_backward_before(i), lens.is_mirror(i));
             let as_met = is_backward.then(|| interface.surface.flipped());
             let surface = as_met.as_ref().unwrap_or(&interface.surface);

@@ -29,15 +29,10 @@ fn numbers_of_seq_are_what_is_plausible() {
 
 #[test]
 #[dioptric_golden::needs_shared]
-fn diffractive_elements_and_placeholders_are_refused() {
+fn diffractive_elements_are_refused() {
     let message = |name: &str, options: &ReadOptions| read_with(name, options).unwrap_err().to_string();
     let fresnel = message("doelens.json", &ReadOptions::default());
     assert!(fresnel.contains("surfaces[0].type: surfaces of type 'Fresnel' are not supported"), "{fresnel}");
-    for missing_glass in [MissingGlass::Refuse, MissingGlass::FromNdVd, MissingGlass::Nearest] {
-        let options = ReadOptions { missing_glass, ..Default::default() };
-        let placeholder = message("ACL3026U-Zemax(ZMX).zmx", &options);
-        assert!(placeholder.contains("B270") && placeholder.contains("are no data"), "{placeholder}");
-    }
 }
 
 #[test]
@@ -75,8 +70,70 @@ fn own_file_checks_what_it_says_of_use() {
         ("film_distance_mm: NaN", "film_distance_mm is NaN, expected a finite number"),
         ("object_distance_mm: inf", "object_distance_mm is inf, expected a finite number"),
         ("fields: [Angle(x_deg: inf, y_deg: 0.0)]", "a number of fields is inf, expected a finite number"),
+        ("wavelength_weights: [1.0]", "wavelength_weights is [1.0], expected 0 numbers of 0 or more"),
     ] {
         let message = read(wrong).unwrap_err().to_string();
         assert!(message.ends_with(expected), "{message}");
+    }
+}
+
+#[test]
+#[dioptric_golden::needs_shared]
+fn b270_has_the_focal_length_of_its_maker() {
+    // The aspheric condenser of 26 mm that Thorlabs sells as ACL3026U.
+    let options = ReadOptions { missing_glass: MissingGlass::FromNdVd, ..Default::default() };
+    let file = read_with("ACL3026U-Zemax(ZMX).zmx", &options).unwrap();
+    assert!((efl_mm(&file) - 25.91).abs() < 0.02, "{}", efl_mm(&file));
+}
+
+#[test]
+fn weights_comments_and_labels_survive_every_way() {
+    let seq = "RDM; LEN; TIT 'a'; EPD 5; DIM M; WL 656 588 486; WTW 1 2 1; REF 2; YAN 0 5; WTF 1 0.5\nSO 0 1E11\n\
+               S 50 5 1.5; STO; SLB \"front lens\"\nS -50 60\nSI 0 0\n";
+    let read = |name: &str, text: &str| {
+        LensFile::from_bytes(Path::new(name), text.as_bytes(), &ReadOptions::default()).unwrap()
+    };
+    let file = read("a.seq", seq);
+    assert_eq!(
+        (file.wavelength_weights.as_slice(), file.field_weights.as_slice()),
+        (&[1.0, 2.0, 1.0][..], &[1.0, 0.5][..])
+    );
+    assert_eq!(file.surface_comments, ["front lens", ""]);
+    let kept = |file: &LensFile| {
+        let LensFile { wavelengths_nm, wavelength_weights, reference_wavelength_nm, fields, field_weights, .. } =
+            file.clone();
+        let uses = (wavelengths_nm, wavelength_weights, reference_wavelength_nm, fields, field_weights);
+        (uses, file.surface_comments.clone(), file.film_distance_mm)
+    };
+    let ron = read("a.ron", &file.to_ron());
+    let zmx = read("a.zmx", &ron.to_zmx().unwrap());
+    assert_eq!(kept(&file), kept(&ron));
+    assert_eq!(kept(&file), kept(&zmx));
+}
+
+#[test]
+fn dropped_planes_are_noted() {
+    let seq = "RDM; EPD 5; WL 588\nSO 0 1E11\nS 0 20\nS 50 5 1.5; STO\nS -50 60\nSI 0 0\n";
+    let file = LensFile::from_bytes(Path::new("a.seq"), seq.as_bytes(), &ReadOptions::default()).unwrap();
+    assert_eq!((file.lens.interfaces().len(), file.notes.len()), (2, 1), "{:?}", file.notes);
+    assert!(
+        file.notes[0].contains("the plane of line 3") && file.notes[0].contains("the lens begins 20 mm behind it"),
+        "{}",
+        file.notes[0]
+    );
+}
+
+#[test]
+#[dioptric_golden::needs_shared]
+fn stop_within_an_opening_is_written() {
+    let file = read_with("thorlabs_lj1598l1.zmx", &ReadOptions::default()).unwrap();
+    let again = LensFile::from_bytes(Path::new("a.zmx"), file.to_zmx().unwrap().as_bytes(), &ReadOptions::default());
+    let (lens, again) = (&file.lens, &again.unwrap().lens);
+    assert_eq!(lens.apertures(), again.apertures());
+    let rims = |lens: &dioptric_optics::Lens| -> Vec<f64> {
+        lens.interfaces().iter().map(|interface| interface.surface.semi_aperture_mm).collect()
+    };
+    for (rim, again) in rims(lens).iter().zip(rims(again)) {
+        assert!((rim / again - 1.0).abs() < 1e-12, "{rim} {again}");
     }
 }

@@ -62,6 +62,10 @@ fn design() -> LensFile {
     file.wavelengths_nm = vec![486.1327, 550.0, 656.2725];
     file.reference_wavelength_nm = Some(550.0);
     file.fields = [0.0, 3.0].map(|y_deg| Field::Angle { x_deg: 0.0, y_deg }).to_vec();
+    file.wavelength_weights = vec![0.5, 1.0, 0.25];
+    file.field_weights = vec![1.0, 2.0];
+    file.surface_comments = ["front", "", "", "iris", "back", ""].map(str::to_owned).to_vec();
+    file.comments = vec!["a second line".to_owned()];
     file
 }
 

@@ -7,7 +7,7 @@ use dioptric_optics::{
     Aperture, CoordinateBreak, ExitPupilBounds, Glass, ImageSurface, Interface, Layout, Lens, LensFile, MirrorShadow,
     MonoLens, ObjectPoint, Outline, PupilBoundary, PupilReach, RayBatch, ReadOptions, SeidelSettings, Shape, Surface,
     Vignetting,
-    analysis::{Autofocus, PupilCoordinates, PupilSampling, hexapolar, projected_solid_angle},
+    analysis::{Autofocus, PupilRule, projected_solid_angle},
     glam::{DVec2, DVec3},
     rays_towards,
 };
@@ -455,13 +455,8 @@ fn best_focus_of_a_mirror_is_downstream() {
         let lens = lens.at(550.0).unwrap();
         let expected_mm = lens.film_distance_mm_for(f64::INFINITY).unwrap();
         let axis = [ObjectPoint::Infinite(DVec3::Z)];
-        let sampling = PupilSampling {
-            coordinates: PupilCoordinates::entrance(&lens),
-            places: hexapolar(8),
-            rims: Vignetting::On,
-        };
         let lenses = std::slice::from_ref(&lens);
-        let focus = Autofocus { lenses, points: &axis, sampling: &sampling };
+        let focus = Autofocus { lenses, points: &axis, rule: PupilRule::of_rings(8) };
         let (film_mm, rms_mm) = focus.best_film_mm(expected_mm + 0.5).unwrap();
         assert!((film_mm - expected_mm).abs() < 1e-2 && rms_mm < 1e-4, "{film_mm} {rms_mm}");
     }

@@ -129,6 +129,13 @@ pub enum PipelineError {
     },
 }
 
+impl PipelineError {
+    /// Whether a lens forms no image behind it to put the film at: then the film must be placed by its distance from the lens.
+    pub fn is_without_image(&self) -> bool {
+        matches!(self, Self::Optics(OpticsError::NoFocus { side: "behind it", .. }))
+    }
+}
+
 impl From<PsfError> for PipelineError {
     fn from(error: PsfError) -> Self {
         match error {

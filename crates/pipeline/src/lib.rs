@@ -13,6 +13,7 @@ pub mod display;
 mod error;
 pub mod figures;
 mod frame_files;
+mod light_field;
 mod numbers;
 mod progress;
 mod quality;
@@ -22,17 +23,18 @@ mod staged;
 mod stages;
 mod words;
 
-pub use dioptric_backward::{BandSampling, LightPaths, Renderer, Rendering};
+pub use dioptric_backward::{BandSampling, LightPaths, MicroArray, MicroElements, MicroLayout, Renderer, Rendering};
 pub use dioptric_optics::{MissingGlass, SeqNumbers};
 pub use dioptric_psf::Diffraction;
 
 pub use camera::{
     BankData, BankSpec, BlurSpec, Camera, Exposed, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec,
-    Movements, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec, SensorOptions, SensorSpec,
-    StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
+    LightFieldSpec, Movements, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec,
+    SensorOptions, SensorSpec, StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
 pub use error::PipelineError;
 pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
+pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_numbers, parse_pairs};
 pub use progress::{Progress, Silent, Stage};
 pub use quality::Quality;

@@ -1,10 +1,12 @@
 //! A world as the scene of a camera file.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
-use std::fs;
+use std::{f64::consts::PI, fs};
 
-use dioptric_pipeline::{Camera, KeptCamera, RenderEffort, SceneSource, Silent, WorldSpec};
+use dioptric_optics::Lens;
+use dioptric_pipeline::{Camera, KeptCamera, RenderEffort, RenderMethod, SceneSource, Silent, WorldSpec};
 use dioptric_spectrum::{Bands, Cancel, Illuminant, WavelengthGrid};
+use ndarray::Array2;
 
 /// A gray wall 2 m before the camera under a lamp.
 const WORLD: &str = r#"
@@ -46,6 +48,88 @@ fn both_methods_end_in_a_picture() {
         kept.with(|camera| camera.seed = 9).capture(&Silent, &Cancel::new()).unwrap();
         assert_eq!(kept.stage_counts().irradiance, before.irradiance);
         assert!(capture.irradiance.summary.mean.iter().all(|mean| *mean > 0.0));
+    }
+}
+
+/// Radiance of the wall, ρ/π I cos θ / d².
+fn wall_radiance(x_m: f64, y_m: f64) -> f64 {
+    0.5 / PI * ((x_m - 0.5).powi(2) + (y_m - 0.5).powi(2) + 1.0).powf(-1.5)
+}
+
+/// Both ways, and by `E = π L cos⁴θ / (4 N_w²)`.
+#[test]
+fn both_methods_have_the_light_of_the_wall() {
+    let (columns, rows, pitch_um) = (20, 12, 300.0);
+    let text = CAMERA
+        .replace("FNumber(5.0)", "FNumber(8.0)")
+        .replace("columns: 40, rows: 24, pitch_um: 150.0", "columns: 20, rows: 12, pitch_um: 300.0")
+        .replace("Samples(32)", "Samples(512)");
+    let (_folder, kept) = camera(&text);
+    let render = kept.world_render(&Silent, &Cancel::new()).unwrap();
+    let mut renderer = render.renderer().unwrap();
+    render.refine(&mut renderer, RenderEffort::Samples(512), &Silent, &Cancel::new(), &mut |_| Ok(true)).unwrap();
+    let backward = renderer.rendering();
+    let forward = kept.with(|camera| {
+        if let SceneSource::World(spec) = &mut camera.scene.source {
+            spec.method = RenderMethod::Forward;
+        }
+    });
+    let forward = forward.irradiance(&Silent, &Cancel::new()).unwrap();
+    let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(8.0, 550.0).unwrap();
+    for (band, nm) in [450.0, 550.0, 650.0].into_iter().enumerate() {
+        let mono = lens.at(nm).unwrap();
+        let distance_mm = 2_000.0 - mono.projection_center_z_mm();
+        let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(distance_mm).unwrap();
+        let n_w = mono.working_f_number(distance_mm);
+        let expected = |row: usize, column: usize| {
+            let at_mm = |i: usize, n: usize| 1e-3 * pitch_um * (i as f64 + 0.5 - 0.5 * n as f64);
+            let (x, y) = (at_mm(column, columns), -at_mm(row, rows));
+            let to_pupil_mm = film_distance_mm - mono.first_order().exit_pupil_z_mm;
+            let cos2 = 1.0 / (1.0 + (x * x + y * y) / (to_pupil_mm * to_pupil_mm));
+            let m_per_mm = 2.0 / mono.film_scale_mm(film_distance_mm).abs();
+            PI / (4.0 * n_w * n_w) * cos2 * cos2 * wall_radiance(x * m_per_mm, y * m_per_mm)
+        };
+        let mean = |value: &dyn Fn(usize, usize) -> f64| {
+            let sum: f64 = (0..rows).flat_map(|row| (0..columns).map(move |column| value(row, column))).sum();
+            sum / (rows * columns) as f64
+        };
+        let of = |plane: &Array2<f32>| mean(&|row, column| f64::from(plane[(row, column)]));
+        let (closed, blurred) = (mean(&expected), of(&forward.band(band).unwrap()));
+        let traced = of(&backward.picture.planes()[band]);
+        let variance = mean(&|row, column| f64::from(backward.standard_error.planes()[band][(row, column)]).powi(2));
+        let noise = (variance / (rows * columns) as f64).sqrt() / traced;
+        // What is asked of light that no rim takes is 0.3 %; the rendering's noise stands beside it.
+        assert!(noise < 1e-3, "{nm}: {noise}");
+        assert!((blurred / traced - 1.0).abs() < 0.003 + 3.0 * noise, "{nm}: {blurred} {traced} {noise}");
+        assert!((traced / closed - 1.0).abs() < 0.003 + 3.0 * noise, "{nm}: {traced} {closed} {noise}");
+        assert!((blurred / closed - 1.0).abs() < 0.003, "{nm}: {blurred} {closed}");
+    }
+}
+
+/// An ideal lens keeps tangents, not sines: light counted on the object's side and on the film's differs by cos⁴ of their slopes.
+#[test]
+fn methods_differ_by_the_sine_condition_of_an_ideal_lens() {
+    let text = CAMERA
+        .replace("BuiltIn(\"dgauss-50mm\")", "Thin(focal_length_mm: 50.0, diameter_mm: 30.0)")
+        .replace("    stop: FNumber(5.0),\n", "")
+        .replace("NearObject", "FilmMm(137.0)")
+        .replace("columns: 40, rows: 24, pitch_um: 150.0", "columns: 12, rows: 12, pitch_um: 500.0")
+        .replace("Samples(32), size: (96, 64)", "Samples(512), size: (96, 64), advance_mm: 1921.0")
+        .replace("wavelengths:", "diffraction: None,\n    wavelengths:");
+    let (_folder, kept) = camera(&text);
+    let backward = kept.irradiance(&Silent, &Cancel::new()).unwrap();
+    let forward = kept.with(|camera| {
+        if let SceneSource::World(spec) = &mut camera.scene.source {
+            spec.method = RenderMethod::Forward;
+        }
+    });
+    let forward = forward.irradiance(&Silent, &Cancel::new()).unwrap();
+    // A stop of 15 mm, the wall 79 mm before it. Exactly, π a²/(a² + s²) by magnification squared against π a²/(a² + v²).
+    let expected =
+        (15.0_f64.powi(2) + 137.0_f64.powi(2)) / (15.0_f64.powi(2) + 79.0_f64.powi(2)) * (79.0 / 137.0_f64).powi(2);
+    for band in 0..3 {
+        let found = forward.summary.mean[band] / backward.summary.mean[band];
+        assert!((found / expected - 1.0).abs() < 0.004, "{found} {expected}");
     }
 }
 

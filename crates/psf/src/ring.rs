@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use dioptric_diffraction::quadrature::gauss_legendre_on;
+use dioptric_optics::quadrature::gauss_legendre_on;
 
 use crate::mesh::Mesh;
 

@@ -138,7 +138,17 @@ fn an_obscured_lens_blurs_to_rings() {
     let thin = Lens::thin(50.0, 10.0).unwrap();
     let hole =
         Aperture { surface: 0, outline: Outline::Circle { radius_mm: 2.5 }, center_mm: [0.0; 2], is_obscuration: true };
-    let lens = Lens::new_with_apertures("annulus", "test", thin.interfaces().to_vec(), 0, vec![hole]).unwrap();
+    let annulus = |interfaces| Lens::new_with_apertures("annulus", "test", interfaces, 0, vec![hole]).unwrap();
+    let surface = Surface { shape: Shape::Conic { conic: -1.0 }, ..Surface::sphere(-100.0, 5.0) };
+    let paraboloid = vec![Interface { surface, medium_after: Glass::Air, thickness_after_mm: 0.0 }];
+    // A mirror with a hole, whose light runs back, does the same.
+    for lens in [annulus(thin.interfaces().to_vec()), annulus(paraboloid).with_mirrors([0]).unwrap()] {
+        blurs_to_a_ring(&lens);
+    }
+}
+
+#[track_caller]
+fn blurs_to_a_ring(lens: &Lens) {
     // 2 mm before the focus the rays fill the ring from 0.1 to 0.2 mm.
     let ring = BankSettings {
         dioptres: vec![0.0],
@@ -146,7 +156,7 @@ fn an_obscured_lens_blurs_to_rings() {
         n_rings: 24,
         ..settings(48.0, vec![0.0], vec![0.0], Diffraction::None)
     };
-    let bank = LensImageModel::build(&lens, &ring).unwrap();
+    let bank = LensImageModel::build(lens, &ring).unwrap();
     let query = PsfQuery { field_tan: DVec2::ZERO, dioptres: 0.0, wavelength_nm: 550.0, pitch_um: 10.0 };
     let (picture, _) = bank.picture(query, 61).unwrap();
     let within = |extent_mm: f64| -> f64 {

@@ -9,6 +9,7 @@ mod drawing_file;
 mod figures;
 mod lens;
 mod lettering;
+mod light_field;
 mod measurement;
 mod mesh;
 mod methods;
@@ -22,7 +23,8 @@ mod svg_png;
 
 pub use drawing_file::{DRAWS_PNG, PNG_REMEDY, check_drawing_name, drawing_file, write_drawing};
 pub use figures::{Drawing, draw_all, draw_figure4};
-pub use lens::{AnalysisPlots, LensDrawing};
+pub use lens::{AnalysisPlots, LensDrawing, LensPage};
+pub use light_field::{LightFieldReport, write_light_field};
 pub use measurement::write_measurement;
 pub use methods::{comparison_picture, write_comparison};
 pub use plots::chart_svg;

@@ -37,6 +37,8 @@ pub(crate) enum MarkKind {
     Dots,
     /// Filled rectangles of this width and height about the places.
     Cells([f64; 2]),
+    /// Filled rectangles between each two places, its lower left and its upper right corner.
+    Boxes,
 }
 
 /// A sheet that plots are put on.
@@ -135,8 +137,13 @@ impl Panel {
 
 impl Mark {
     pub(crate) fn draw(&self, across: &dyn Fn(f64) -> f64, down: &dyn Fn(f64) -> f64, svg: &mut String) {
-        if let MarkKind::Cells(sides) = self.kind {
-            return self.fill(sides, across, down, svg);
+        match self.kind {
+            MarkKind::Cells([width, height]) => {
+                let corners = |&(x, y): &(f64, f64)| [-0.5, 0.5].map(|side| (x + side * width, y + side * height));
+                return self.fill(&self.points.iter().flat_map(corners).collect::<Vec<_>>(), across, down, svg);
+            }
+            MarkKind::Boxes => return self.fill(&self.points, across, down, svg),
+            _ => {}
         }
         let mut path = String::new();
         let mut is_open = false;
@@ -156,25 +163,19 @@ impl Mark {
         let style = match self.kind {
             MarkKind::Line => "stroke-width=\"1.5\" stroke-linejoin=\"round\"",
             MarkKind::Dashed => "stroke-width=\"1.5\" stroke-dasharray=\"5 3\"",
-            MarkKind::Cells(_) | MarkKind::Dots => {
+            MarkKind::Cells(_) | MarkKind::Boxes | MarkKind::Dots => {
                 "stroke-width=\"1.7\" stroke-linecap=\"round\" stroke-opacity=\"0.75\""
             }
         };
         let _ = writeln!(svg, "<path d=\"{path}\" fill=\"none\" stroke=\"{}\" {style}/>", self.color);
     }
 
-    /// Fills a rectangle about each place.
-    fn fill(
-        &self,
-        [width, height]: [f64; 2],
-        across: &dyn Fn(f64) -> f64,
-        down: &dyn Fn(f64) -> f64,
-        svg: &mut String,
-    ) {
+    /// Fills the rectangles between these corners, two each.
+    fn fill(&self, corners: &[(f64, f64)], across: &dyn Fn(f64) -> f64, down: &dyn Fn(f64) -> f64, svg: &mut String) {
         let mut path = String::new();
-        for &(x, y) in self.points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
-            let [left, right] = [-0.5, 0.5].map(|side| across(x + side * width));
-            let [top, bottom] = [0.5, -0.5].map(|side| down(y + side * height));
+        for pair in corners.chunks_exact(2).filter(|pair| pair.iter().all(|(x, y)| x.is_finite() && y.is_finite())) {
+            let [left, right] = [pair[0].0, pair[1].0].map(across);
+            let [top, bottom] = [pair[1].1, pair[0].1].map(down);
             let _ = write!(path, "M{left:.1} {top:.1}H{right:.1}V{bottom:.1}H{left:.1}Z");
         }
         // Without smoothed edges, which would leave seams between neighbors.

@@ -1,9 +1,11 @@
 //! Pages and mosaics show what was computed, with words that name it.
 
-use dioptric_analysis::{AnalysisFields, AnalysisFilm, AnalysisRequest, PsfRequest, PsfSampling};
-use dioptric_optics::{Glass, Interface, Lens, Shape, Surface};
+use dioptric_analysis::{
+    AnalysisFields, AnalysisFilm, AnalysisRequest, LensDefaults, LensPageData, PsfRequest, PsfSampling,
+};
+use dioptric_optics::{Glass, Interface, Lens, LensFile, Shape, Surface};
 use dioptric_pipeline::{Diffraction, FocusSpec};
-use dioptric_report::{AnalysisPlots, psf_mosaic};
+use dioptric_report::{AnalysisPlots, LensPage, psf_mosaic};
 
 fn analysis_request() -> AnalysisRequest {
     AnalysisRequest {
@@ -27,7 +29,16 @@ fn analysis_page_names_its_curves() {
     let maps = plots.opd_svg();
     assert!(maps.contains("waves late") && maps.contains("λ P–V") && !maps.contains("NaN"));
     assert!(plots.grid_svg().contains("chief rays") && !plots.grid_svg().contains("NaN"));
-    assert!(plots.html("a < b").contains("<pre>a &lt; b</pre>"));
+    let mut used = LensDefaults::of(LensFile::from(lens));
+    used.surface_comments = vec!["front & first".to_owned()];
+    let shown = LensPageData::of(&analysis_request(), &used, &analysis).unwrap();
+    let page = LensPage { plots, shown: &shown, tables: "a < b" };
+    let html = page.html().unwrap();
+    assert!(html.contains("<pre>a &lt; b</pre>") && html.contains("front &amp; first") && !html.contains("NaN"));
+    for part in ["Prescription", "First order", "Modulation over field", "Through focus", "Glasses", "Airy", "550.0 nm"]
+    {
+        assert!(html.contains(part), "{part}");
+    }
 }
 
 #[test]

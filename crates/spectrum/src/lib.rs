@@ -3,7 +3,8 @@
 //! Wavelengths are nanometers. Spectral radiance is W m⁻² sr⁻¹ nm⁻¹, spectral irradiance
 //! W m⁻² nm⁻¹. Row 0 of an image is its top, upright as the photographer sees it.
 //!
-//! This crate is the bottom layer: it knows nothing of lenses, scenes, sensors or files.
+//! This crate is the bottom layer: it knows nothing of lenses, scenes, sensors or files, but for [`sort_exr_attributes`], which
+//! all who write EXR need.
 //!
 //! ```
 //! use dioptric_spectrum::{Illuminant, Observer, WavelengthGrid, Xyz};
@@ -22,6 +23,7 @@ mod cancel;
 mod color;
 mod display;
 mod error;
+mod exr_header;
 mod grid;
 mod illuminant;
 mod image;
@@ -31,6 +33,7 @@ pub use cancel::{Cancel, Cancelled};
 pub use color::{Lab, Observer, Xyz, adapt_bradford, delta_e_2000, srgb_decode, srgb_encode};
 pub use display::Display;
 pub use error::SpectrumError;
+pub use exr_header::sort_exr_attributes;
 pub use grid::WavelengthGrid;
 pub use illuminant::{ColorTemperature, Illuminant, blackbody, color_checker_reflectances, daylight};
 pub use image::{Bands, DepthMap, Quantity, SpectralImage};

@@ -1,12 +1,14 @@
 //! The numbers of an analysis.
 
+use std::borrow::Cow;
+
 use dioptric_diffraction::{PupilGrid, Wavefront, WavefrontReference, best_wavefront_film_mm, opd_waves_at};
 use dioptric_optics::{
     Lens, MonoLens, ObjectPoint, PupilBoundary, Vignetting,
     analysis::{
-        AstigmaticFoci, Autofocus, AxisFoci, Distortion, NumericalApertures, Projection, PupilCoordinates,
-        PupilSampling, RayFan, SpotDiagram, StraightMap, field_limit_deg, hexapolar, projected_solid_angle_onto,
-        pupil_line,
+        AstigmaticFoci, Autofocus, AxisFoci, Distortion, NumericalApertures, Projection, PupilCoordinates, PupilLight,
+        PupilRule, PupilSampling, RayFan, SpotDiagram, StraightMap, field_limit_deg, hexapolar,
+        projected_solid_angle_onto, pupil_line,
     },
     glam::{DVec2, DVec3},
 };
@@ -21,6 +23,10 @@ use super::{
 use crate::PlaneData;
 use dioptric_pipeline::{PipelineError, nearest_to_reference_nm};
 
+/// How far away an image counts as infinitely far, over the front rim's radius, and the focal length of the ideal lens that brings
+/// it near, mm.
+const PARALLEL: f64 = 1e5;
+const IDEAL_MM: f64 = 100.0;
 /// Steps of the curves over field.
 const CURVE_STEPS: usize = 40;
 /// Places along a fan.
@@ -31,7 +37,7 @@ const LISTED_AZIMUTHS: usize = 36;
 /// The share of the stop's radius that the outermost rays keep to, so that rounding does not end them at its rim.
 const WITHIN_RIM: f64 = 1.0 - 1e-9;
 /// Cells of a map across the stop: an odd number, so that there is one in the middle.
-const MAP_CELLS: usize = 31;
+const MAP_CELLS: usize = 51;
 /// Lines of a grid of fields in each direction, and the widest angle that it goes to.
 /// Lines of the grid of a distortion plot, each way.
 pub const GRID_LINES: usize = 11;
@@ -52,6 +58,34 @@ impl AnalysisRequest {
     /// When a number makes no sense, a glass is not known at a wavelength, or the lens has no focus and no film is given.
     pub fn compute(&self, lens: &Lens) -> Result<LensAnalysis, PipelineError> {
         self.check()?;
+        let (lens, note) = self.lens_with_image(lens)?;
+        let mut analysis = self.compute_imaging(&lens)?;
+        analysis.notes.extend(note);
+        Ok(analysis)
+    }
+
+    /// Returns the lens that is analyzed: the lens itself or, where it sends the light of the object off in parallel and no film
+    /// is given, the lens with an ideal one behind it, and a sentence on that.
+    ///
+    /// # Errors
+    /// When a glass is not known at the reference wavelength.
+    pub fn lens_with_image<'a>(&self, lens: &'a Lens) -> Result<(Cow<'a, Lens>, Option<String>), PipelineError> {
+        let mono = lens.at(self.reference_nm())?;
+        let image_z_mm = mono.conjugate(self.distance_mm).image_z_mm;
+        let is_parallel = image_z_mm.is_nan() || image_z_mm.abs() > PARALLEL * mono.semi_aperture_mm(0);
+        if self.film != AnalysisFilm::BestFocus || !is_parallel {
+            return Ok((Cow::Borrowed(lens), None));
+        }
+        let with_ideal = lens.with_ideal_lens_behind(IDEAL_MM)?;
+        let note = format!(
+            "the light leaves the lens in parallel: it is analyzed through an ideal lens of {IDEAL_MM} mm right behind it, on whose \
+             film 1 µm is {} mrad",
+            1.0 / IDEAL_MM
+        );
+        Ok((Cow::Owned(with_ideal), Some(note)))
+    }
+
+    fn compute_imaging(&self, lens: &Lens) -> Result<LensAnalysis, PipelineError> {
         let lenses: Vec<MonoLens> = self.wavelengths_nm.iter().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
         let reference_nm = self.reference_nm();
         let reference = self.wavelengths_nm.iter().position(|&nm| nm == reference_nm).unwrap_or(0);
@@ -78,6 +112,7 @@ impl AnalysisRequest {
             dioptres: 1e3 / way_mm,
             film_distance_mm: 0.0,
             sampling: PupilSampling { coordinates, places: hexapolar(self.n_rings), rims: Vignetting::On },
+            rule: PupilRule::of_rings(self.n_rings),
         };
         bench.analyze(self, lens, (fields, notes))
     }
@@ -89,7 +124,10 @@ struct Bench {
     reference: usize,
     dioptres: f64,
     film_distance_mm: f64,
+    /// The rays of spot diagrams and fans.
     sampling: PupilSampling,
+    /// The rays that stand for the light, of which sizes and foci are.
+    rule: PupilRule,
 }
 
 impl Bench {
@@ -104,7 +142,7 @@ impl Bench {
 
     /// Returns the film with the least spots of these points, mm, and their size, mm rms.
     fn best(&self, points: &[ObjectPoint], lenses: &[MonoLens], from_mm: f64) -> Option<(f64, f64)> {
-        Autofocus { lenses, points, sampling: &self.sampling }.best_film_mm(from_mm)
+        Autofocus { lenses, points, rule: self.rule }.best_film_mm(from_mm)
     }
 
     /// Returns where each wavelength of a point on the axis focuses; films are sought about `from_mm`.
@@ -196,9 +234,17 @@ impl Bench {
     fn spot_row(&self, field: &Field, lens: &MonoLens) -> SpotRow {
         let point = self.point(field.tan);
         let spot = SpotDiagram::trace(lens, &point, self.film_distance_mm, &self.sampling);
+        let light = PupilLight::to_film(lens, &point, self.film_distance_mm, self.rule);
+        let moments = light.map(|light| light.moments(lens, self.film_distance_mm));
         let um = |mm: Option<f64>| mm.map(|mm| 1e3 * mm);
-        let sigma_mm = spot.sigma_mm();
-        let center_mm = self.reference().chief_film_point_mm(&point, self.film_distance_mm).or(spot.centroid_mm());
+        let centroid_mm = moments.map(|(centroid_mm, _)| centroid_mm);
+        let [sigma_x_mm, sigma_y_mm, rms_mm] = match moments {
+            Some((_, [xx, yy, _])) => [xx, yy, xx + yy].map(|square: f64| Some(square.max(0.0).sqrt())),
+            None => [None; 3],
+        };
+        let from_chief_mm =
+            spot.chief_mm.zip(centroid_mm).map(|(chief_mm, centroid_mm)| chief_mm.distance(centroid_mm));
+        let center_mm = self.reference().chief_film_point_mm(&point, self.film_distance_mm).or(centroid_mm);
         let pupil = PupilBoundary::find(lens, &point, LISTED_AZIMUTHS).map(|pupil| PupilRow {
             z_mm: pupil.z_mm(),
             center_mm: pupil.center_mm().to_array(),
@@ -210,13 +256,13 @@ impl Bench {
         SpotRow {
             place: field.place,
             wavelength_nm: lens.wavelength_nm(),
-            height_mm: spot.centroid_mm().map(|centroid_mm| 0.0 - centroid_mm.dot(field.direction)),
-            image_mm: spot.centroid_mm().map(in_picture),
-            rms_um: um(spot.rms_mm()),
-            rms_about_chief_um: um(spot.rms_about_chief_mm()),
+            height_mm: centroid_mm.map(|centroid_mm| 0.0 - centroid_mm.dot(field.direction)),
+            image_mm: centroid_mm.map(in_picture),
+            rms_um: um(rms_mm),
+            rms_about_chief_um: um(rms_mm.zip(from_chief_mm).map(|(rms, off)| rms.hypot(off))),
             radius_um: um(spot.radius_about_chief_mm()),
-            sigma_x_um: um(sigma_mm.map(|sigma| sigma.x)),
-            sigma_y_um: um(sigma_mm.map(|sigma| sigma.y)),
+            sigma_x_um: um(sigma_x_mm),
+            sigma_y_um: um(sigma_y_mm),
             transmission: spot.transmission(),
             wavefront: wavefront.map(|wavefront| WavefrontRow {
                 rms_waves: wavefront.rms_waves(),

@@ -16,14 +16,18 @@ pub struct LensDefaults {
     pub notes: Vec<String>,
     /// The wavelengths that the file names, of those at which all media are known, nm.
     pub wavelengths_nm: Vec<f64>,
+    /// The weight of each of them; empty where they count alike.
+    wavelength_weights: Vec<f64>,
     /// The one of them that is the main one, nm.
     pub reference_nm: Option<f64>,
     /// Distance of the object before the first vertex, mm; infinite where it is far or not stated.
     pub distance_mm: f64,
+    /// What the file calls each surface; empty where it names none.
+    pub surface_comments: Vec<String>,
     /// The points of the field, as the file names them.
     fields: Vec<Field>,
     /// Distance of the film behind the last vertex that the file states, mm.
-    film_distance_mm: Option<f64>,
+    pub film_distance_mm: Option<f64>,
 }
 
 impl LensDefaults {
@@ -53,10 +57,14 @@ impl LensDefaults {
     pub fn of(file: LensFile) -> Self {
         let is_known = |nm: &f64| file.lens.at(*nm).is_ok();
         let wavelengths_nm: Vec<f64> = file.wavelengths_nm.iter().copied().filter(is_known).collect();
+        let weighed = file.wavelengths_nm.iter().zip(&file.wavelength_weights);
+        let wavelength_weights = weighed.filter(|(nm, _)| is_known(nm)).map(|(_, weight)| *weight).collect();
         Self {
+            wavelength_weights,
             reference_nm: file.reference_wavelength_nm.filter(|nm| wavelengths_nm.contains(nm)),
             wavelengths_nm,
             distance_mm: file.object_distance_mm.unwrap_or(f64::INFINITY),
+            surface_comments: file.surface_comments,
             fields: file.fields,
             film_distance_mm: file.film_distance_mm,
             lens: file.lens,
@@ -80,6 +88,26 @@ impl LensDefaults {
             }
             _ => usual_nm.to_vec(),
         }
+    }
+
+    /// Returns the weights of these wavelengths, if they are those of the file and it weighs them; none where they count alike.
+    pub fn weights_of(&self, wavelengths_nm: &[f64]) -> Vec<f64> {
+        let weights = &self.wavelength_weights;
+        let are_weights = weights.iter().all(|weight| *weight >= 0.0) && weights.iter().any(|weight| *weight > 0.0);
+        match wavelengths_nm == self.wavelengths_nm && are_weights {
+            true => weights.clone(),
+            false => Vec::new(),
+        }
+    }
+
+    /// Returns the field angles to the right of the axis that stand for those of the file of a lens with an axis of symmetry,
+    /// degrees; `None` of other lenses, or where the file names none.
+    pub fn psf_fields_deg(&self, wavelength_nm: f64) -> Option<Vec<f64>> {
+        let mut fields_deg = self.drawing_fields_deg(wavelength_nm).filter(|_| self.lens.is_rotational())?;
+        fields_deg.iter_mut().for_each(|field_deg| *field_deg = field_deg.abs());
+        fields_deg.sort_by(f64::total_cmp);
+        fields_deg.dedup();
+        Some(fields_deg)
     }
 
     /// Returns the one wavelength that stands where none is asked for, nm: the file's main one, else as

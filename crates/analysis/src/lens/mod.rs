@@ -4,6 +4,8 @@ mod compute;
 mod convert;
 mod defaults;
 mod glass_table;
+mod modulation;
+mod page_data;
 mod request;
 mod rows;
 mod surface_table;
@@ -14,6 +16,8 @@ pub use compute::GRID_LINES;
 pub use convert::{ConvertedLens, convert_lens};
 pub use defaults::LensDefaults;
 pub use glass_table::{GlassData, GlassRow, glass_data, glass_rows};
+pub use modulation::LensModulation;
+pub use page_data::LensPageData;
 pub use request::{AnalysisFields, AnalysisFilm, AnalysisRequest};
 pub use rows::{
     AxialColorRow, FanRow, FieldPlace, FieldRow, FocusData, GridRow, LensAnalysis, OpdMap, PupilRow, SpotRow,

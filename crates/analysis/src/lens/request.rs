@@ -1,8 +1,8 @@
 //! What to analyze a lens for.
 
 use dioptric_optics::{
-    MonoLens,
-    analysis::{STEEPEST_FIELD_DEG, field_limit_along_deg},
+    MonoLens, ObjectPoint,
+    analysis::{PupilLight, PupilRule, STEEPEST_FIELD_DEG, field_limit_along_deg},
     glam::DVec2,
 };
 
@@ -11,6 +11,8 @@ use dioptric_pipeline::PipelineError;
 
 /// The share of the axial illumination down to which fields are chosen where none are given.
 const DIMMEST: f64 = 0.25;
+/// How wide a spot may be, twice its root mean square, over the focal length, for fields to be chosen up to there.
+const WIDEST_SPOT: f64 = 0.05;
 
 /// Where the film is for an analysis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -140,8 +142,15 @@ impl AnalysisRequest {
         let mut notes = Vec::new();
         let fields: Vec<Field> = match &self.fields {
             AnalysisFields::ByLight => {
-                let (fields, is_cut) = by_light(lens, 1e3 / way_mm);
-                if is_cut {
+                let (fields, end) = by_light(lens, 1e3 / way_mm);
+                if end == FieldEnd::Blur {
+                    notes.push(
+                        "the fields end where light no longer comes together: beyond, spots are wider than a twentieth of the \
+                         focal length"
+                            .to_owned(),
+                    );
+                }
+                if end == FieldEnd::Steepest {
                     notes.push(format!(
                         "the light has not fallen to a quarter at {STEEPEST_FIELD_DEG}°, the steepest field that is \
                          looked at: the fields are shares of that"
@@ -178,10 +187,30 @@ impl AnalysisRequest {
     }
 }
 
-/// Returns fields up to where the light falls to a quarter, and whether that is beyond the steepest.
-fn by_light(lens: &MonoLens, dioptres: f64) -> (Vec<Field>, bool) {
-    let limit_deg = |direction| field_limit_along_deg(lens, DIMMEST, direction, dioptres).unwrap_or(0.0);
-    let y_deg = limit_deg(DVec2::Y);
+/// What ends the fields that are chosen.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum FieldEnd {
+    /// Light has fallen to a quarter.
+    Light,
+    /// Spots are no longer spots.
+    Blur,
+    /// No steeper field is looked at.
+    Steepest,
+}
+
+/// Returns fields up to where the light falls to a quarter or no longer comes together, and which of them ends the fields.
+fn by_light(lens: &MonoLens, dioptres: f64) -> (Vec<Field>, FieldEnd) {
+    let limit_deg = |direction| {
+        let by_light_deg = field_limit_along_deg(lens, DIMMEST, direction, dioptres).unwrap_or(0.0);
+        let by_blur_deg = blur_limit_deg(lens, direction, dioptres, by_light_deg);
+        let end = match by_blur_deg {
+            Some(_) => FieldEnd::Blur,
+            None if by_light_deg >= STEEPEST_FIELD_DEG => FieldEnd::Steepest,
+            None => FieldEnd::Light,
+        };
+        (by_blur_deg.unwrap_or(by_light_deg), end)
+    };
+    let (y_deg, end) = limit_deg(DVec2::Y);
     // A tenth of a degree is a round number; a field narrower than that has none.
     let round = |angle_deg: f64| match angle_deg >= 1.0 {
         true => (angle_deg * 10.0).floor() / 10.0,
@@ -189,12 +218,30 @@ fn by_light(lens: &MonoLens, dioptres: f64) -> (Vec<Field>, bool) {
     };
     if lens.is_rotational() {
         let fields = [0.0, 0.5, 0.7, 1.0].map(|share| Field::of_angles([0.0, round(share * y_deg)]));
-        return (fields.to_vec(), y_deg >= STEEPEST_FIELD_DEG);
+        return (fields.to_vec(), end);
     }
-    let x_deg = limit_deg(DVec2::X);
+    let (x_deg, end_x) = limit_deg(DVec2::X);
     let fields = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.7, 0.7]];
     let fields = fields.map(|[x, y]| Field::of_angles([round(x * x_deg), round(y * y_deg)]));
-    (fields.to_vec(), x_deg.max(y_deg) >= STEEPEST_FIELD_DEG)
+    (fields.to_vec(), if end == FieldEnd::Light { end_x } else { end })
+}
+
+/// Returns the last whole degree, up to a field, at which spots on the paraxial film are no wider than a share of the focal
+/// length; `None` if they are not at any, or on the axis already are.
+fn blur_limit_deg(lens: &MonoLens, direction: DVec2, dioptres: f64, last_deg: f64) -> Option<f64> {
+    let distance_mm = 1e3 / dioptres - lens.projection_center_z_mm();
+    let film_mm = lens.film_distance_mm_for(if dioptres == 0.0 { f64::INFINITY } else { distance_mm }).ok()?;
+    let widest_mm = WIDEST_SPOT * lens.first_order().efl_mm.abs();
+    let is_spot = |field_deg: f64| {
+        let point = ObjectPoint::from_field(lens, direction * field_deg.to_radians().tan(), dioptres);
+        let light = PupilLight::to_film(lens, &point, film_mm, PupilRule::of_rings(3));
+        light.is_some_and(|light| {
+            let (_, [xx, yy, _]) = light.moments(lens, film_mm);
+            2.0 * (xx + yy).sqrt() <= widest_mm
+        })
+    };
+    let wide = (0..=last_deg as u32).map(f64::from).find(|&field_deg| !is_spot(field_deg))?;
+    (wide > 0.0).then_some(wide - 1.0)
 }
 
 fn wrong(key: &'static str, found: f64, expected: &str) -> PipelineError {

@@ -144,7 +144,8 @@ pub struct AxialColorRow {
     pub rms_shift_mm: Option<f64>,
 }
 
-/// The image of one point at one wavelength.
+/// The image of one point at one wavelength. Centroid, root mean squares and standard deviations are those of the light
+/// that gets through, whose pupil is filled evenly as the point sees it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SpotRow {
     /// The point of the field.

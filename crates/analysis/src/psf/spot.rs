@@ -2,14 +2,16 @@
 
 use dioptric_diffraction::{CircularStop, Covariance, Hurb, HurbForm, SampledHurb};
 use dioptric_optics::{
-    FilmPoint, MonoLens, ObjectPoint, PupilBoundary, RayBatch, Vignetting,
+    FilmPoint, MonoLens, ObjectPoint, PupilBoundary, Vignetting,
+    analysis::{PupilLight, PupilRule},
     glam::{DVec2, DVec3, Vec2Swizzles},
     rays_over_front,
 };
 
-/// Rings and azimuths of the rays of a spot.
-const RINGS: usize = 24;
+/// Azimuths of a pupil.
 const AZIMUTHS: usize = 96;
+/// The rays of a spot.
+const RULE: PupilRule = PupilRule { n_rings: 24, n_azimuths: AZIMUTHS };
 
 /// Where rays land on the film, in the picture frame (mm, x to the right, y up), each with its share of the energy.
 #[derive(Clone, Debug, Default)]
@@ -29,7 +31,7 @@ pub(crate) struct Moments {
 }
 
 impl Spot {
-    /// Sends rays evenly through the true pupil of a point.
+    /// Sends the light of a point through its true pupil.
     ///
     /// `energy` is the area of that pupil over that which an axial point sees, both without what obscurations stop.
     pub(crate) fn through_pupil(
@@ -38,32 +40,15 @@ impl Spot {
         axial: &ObjectPoint,
         film_distance_mm: f64,
     ) -> Self {
-        let parts = PupilBoundary::find_parts(mono, point, AZIMUTHS);
-        let Some(plane) = parts.first().map(PupilBoundary::plane) else { return Self::default() };
-        let (mut targets, mut areas) = (Vec::new(), Vec::new());
-        for pupil in &parts {
-            for azimuth in 0..AZIMUTHS {
-                let theta = std::f64::consts::TAU * azimuth as f64 / AZIMUTHS as f64;
-                let rho = pupil.rho_max_mm(theta);
-                for ring in 0..RINGS {
-                    let r = rho * ((ring as f64 + 0.5) / RINGS as f64).sqrt();
-                    targets.push(pupil.center_mm() + DVec2::from_angle(theta) * r);
-                    areas.push(rho * rho);
-                }
-            }
-        }
-        let mut rays = plane.rays(mono, point, &targets);
-        let cones = solid_angles(point, &rays);
-        mono.trace(&mut rays, Vignetting::On);
-        mono.to_film(&mut rays, film_distance_mm);
+        let Some(light) = PupilLight::to_film(mono, point, film_distance_mm, RULE) else { return Self::default() };
         let area_mm2 = |point: &ObjectPoint| {
-            let whole = |lens: &MonoLens| area_of(point, &PupilBoundary::find_parts(lens, point, AZIMUTHS));
-            mono.over_clear_pupil(&whole)
+            mono.over_clear_pupil(&|lens| area_of(point, &PupilBoundary::find_parts(lens, point, AZIMUTHS)))
         };
-        let seen_mm2 = if mono.n_obscurations() == 0 { area_of(point, &parts) } else { area_mm2(point) };
-        let mut spot = Self::of_rays(mono, film_distance_mm, &rays, |ray| areas[ray] * cones[ray]);
-        spot.energy = Some(area_mm2(axial)).filter(|area| *area > 0.0).map_or(f64::NAN, |area| seen_mm2 / area);
-        spot
+        Self {
+            at_mm: mono.landed(light.rays(), film_distance_mm).map(FilmPoint::in_picture_mm).collect(),
+            weights: light.weights().to_vec(),
+            energy: Some(area_mm2(axial)).filter(|area| *area > 0.0).map_or(f64::NAN, |area| area_mm2(point) / area),
+        }
     }
 
     /// Sends rays to a square grid over the front disc, as the paper does; `bending` also draws diffraction.
@@ -80,18 +65,9 @@ impl Spot {
         }
         mono.trace_surfaces(stop + 1..mono.n_surfaces(), &mut rays, Vignetting::On);
         mono.to_film(&mut rays, film_distance_mm);
-        let mut spot = Self::of_rays(mono, film_distance_mm, &rays, |_| 1.0);
-        spot.energy = spot.at_mm.len() as f64 / rays.len().max(1) as f64;
-        spot
-    }
-
-    /// Gathers the rays that reached the film.
-    fn of_rays(mono: &MonoLens, film_distance_mm: f64, rays: &RayBatch, weight: impl Fn(usize) -> f64) -> Self {
-        let passed: Vec<usize> = (0..rays.len()).filter(|&ray| rays.fate[ray].is_in_flight()).collect();
-        let at_mm = mono.landed(rays, film_distance_mm).map(FilmPoint::in_picture_mm).collect();
-        let weights: Vec<f64> = passed.iter().map(|&ray| weight(ray)).collect();
-        let sum: f64 = weights.iter().sum();
-        Self { at_mm, weights: weights.into_iter().map(|w| w / sum).collect(), energy: 0.0 }
+        let at_mm: Vec<DVec2> = mono.landed(&rays, film_distance_mm).map(FilmPoint::in_picture_mm).collect();
+        let n_passed = at_mm.len() as f64;
+        Self { weights: vec![1.0 / n_passed; at_mm.len()], at_mm, energy: n_passed / rays.len().max(1) as f64 }
     }
 
     /// Returns the modulation of a wave along a direction from +x; no number if no light arrived.
@@ -136,15 +112,6 @@ pub(crate) struct PaperRays {
     /// Diffraction drawn at the stop.
     pub(crate) bending: Option<Hurb>,
     pub(crate) seed: u64,
-}
-
-/// Returns the solid angle a unit of pupil area takes up as seen from the point, up to a common factor.
-fn solid_angles(point: &ObjectPoint, rays: &RayBatch) -> Vec<f64> {
-    match point {
-        // From a point, cos θ / d² and d = |z| / cos θ.
-        ObjectPoint::Finite(_) => rays.n.iter().map(|n| n.powi(3)).collect(),
-        ObjectPoint::Infinite(_) => vec![1.0; rays.len()],
-    }
 }
 
 #[cfg(test)]

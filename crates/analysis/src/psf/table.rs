@@ -54,6 +54,11 @@ impl PsfRequest {
         let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> =
             items.par_iter().map(|item| self.compute_one(item, lens, source.as_ref(), film_distance_mm)).collect();
         let (mut rows, pictures): (Vec<PsfRow>, _) = computed?.into_iter().unzip();
+        if !rows.iter().any(|row| row.energy > 0.0) {
+            let found = format!("{:?}", self.fields_deg);
+            let expected = format!("at least one field of which light gets through {} to the film", lens.name());
+            return Err(self.wrong("fields_deg", &found, &expected));
+        }
         let spectral_weights = match self.spectral_weights.is_empty() {
             true => vec![1.0; self.wavelengths_nm.len()],
             false => self.spectral_weights.clone(),

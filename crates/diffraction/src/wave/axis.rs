@@ -1,6 +1,6 @@
 //! The places along one axis of a window at which the wave is sampled.
 
-use crate::quadrature::gauss_legendre;
+use dioptric_optics::quadrature::gauss_legendre;
 
 /// Places along one axis, symmetric about 0: `n_points` Gauss–Legendre points in each of `n_pixels` pixels.
 #[derive(Clone, Debug)]

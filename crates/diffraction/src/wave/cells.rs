@@ -2,14 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, Vignetting};
+use dioptric_optics::{MonoLens, ObjectPoint, PupilBoundary, Vignetting, quadrature::gauss_legendre_on};
 use glam::{DVec2, DVec3};
 
 use super::{
     grid::PupilGrid,
     propagation::{FilmRays, Waves},
 };
-use crate::{DiffractionError, quadrature::gauss_legendre_on};
+use crate::DiffractionError;
 
 /// The cells of a pupil in the entrance-pupil plane, azimuth by azimuth.
 ///

@@ -7,6 +7,7 @@
 
 use std::{cell::RefCell, collections::HashMap, f64::consts::PI, sync::LazyLock};
 
+use dioptric_optics::quadrature::gauss_legendre_on;
 use glam::DVec2;
 use multiversion::multiversion;
 use ndarray::Array2;
@@ -17,7 +18,6 @@ use super::{
     pixel_mean::{PixelMean, Room},
     transform::PlaneWaves,
 };
-use crate::quadrature::gauss_legendre_on;
 
 /// Points of the grid that a wave is spread over, each way.
 const WIDTH: usize = 8;

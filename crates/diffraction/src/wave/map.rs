@@ -4,7 +4,7 @@
 
 use std::{cell::RefCell, f64::consts::TAU};
 
-use dioptric_optics::{MonoLens, ObjectPoint, Vignetting};
+use dioptric_optics::{MonoLens, ObjectPoint, Vignetting, quadrature::gauss_legendre_on};
 use glam::DVec2;
 use multiversion::multiversion;
 
@@ -14,7 +14,7 @@ use super::{
     propagation::{FilmRays, Waves, has_few_zones},
     smooth::{Azimuth, Parity, Places, Ray, horner, radial_slope},
 };
-use crate::{DiffractionError, quadrature::gauss_legendre_on};
+use crate::DiffractionError;
 
 /// The edge of a pupil that is symmetric about its x axis, in the entrance-pupil plane.
 #[derive(Clone, Copy, Debug)]

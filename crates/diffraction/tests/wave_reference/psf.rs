@@ -13,10 +13,11 @@
 use std::f64::consts::TAU;
 
 use dioptric_diffraction::{
-    Propagation, PupilGrid, PupilSamples, ReferenceSphere, WaveQuality, WaveWindow, WindowCenter,
-    quadrature::gauss_legendre_on, wave_psf,
+    Propagation, PupilGrid, PupilSamples, ReferenceSphere, WaveQuality, WaveWindow, WindowCenter, wave_psf,
 };
-use dioptric_optics::{MonoLens, ObjectPoint, RayBatch, Vignetting, glam::DVec2, rays_towards};
+use dioptric_optics::{
+    MonoLens, ObjectPoint, RayBatch, Vignetting, glam::DVec2, quadrature::gauss_legendre_on, rays_towards,
+};
 use serde_json::Value;
 
 use crate::{

@@ -29,7 +29,7 @@ fn whole_cone(lens: &MonoLens, point: &ObjectPoint, n: usize, normal: DVec3) -> 
     let of_part = |pupil: PupilBoundary| {
         let mut rays = pupil.plane().rays(lens, point, &pupil.edge_mm());
         lens.trace(&mut rays, Vignetting::Off);
-        let cosines: Vec<DVec2> = (0..n).map(|i| in_film(rays.direction(i)).truncate()).collect();
+        let cosines: Vec<DVec2> = (0..rays.len()).map(|i| in_film(rays.direction(i)).truncate()).collect();
         let area = |step: usize| {
             let corners: Vec<DVec2> = cosines.iter().copied().step_by(step).collect();
             let pairs = corners.iter().zip(corners.iter().cycle().skip(1));

@@ -10,6 +10,7 @@ mod field_grid;
 mod field_map;
 mod focus;
 mod illumination;
+mod pupil_light;
 mod pupil_places;
 mod ray_fan;
 mod spot;
@@ -24,6 +25,7 @@ pub use illumination::{
     STEEPEST_FIELD_DEG, WIDEST_FIELD_DEG, field_limit_along_deg, field_limit_deg, projected_solid_angle,
     projected_solid_angle_onto,
 };
+pub use pupil_light::{PupilLight, PupilRule};
 pub use pupil_places::{PupilCoordinates, PupilSampling, hexapolar, pupil_line};
 pub use ray_fan::RayFan;
 pub use spot::SpotDiagram;

@@ -17,10 +17,18 @@ pub struct LensFile {
     pub object_distance_mm: Option<f64>,
     /// The wavelengths that the file names, nm.
     pub wavelengths_nm: Vec<f64>,
+    /// The weight of each of them; empty where they count alike.
+    pub wavelength_weights: Vec<f64>,
     /// The one of them that first-order data refer to, nm.
     pub reference_wavelength_nm: Option<f64>,
     /// The fields that the file names.
     pub fields: Vec<Field>,
+    /// The weight of each of them; empty where they count alike.
+    pub field_weights: Vec<f64>,
+    /// What the file calls each surface; empty where it names none.
+    pub surface_comments: Vec<String>,
+    /// What the file says of itself beside the source of the lens, a line each.
+    pub comments: Vec<String>,
     /// The array of microlenses before the film that the file states. It is kept, not traced.
     pub microlens: Option<Microlens>,
     /// What the file says and this crate does otherwise or not at all, a sentence each.
@@ -114,10 +122,20 @@ impl LensFile {
             film_distance_mm: None,
             object_distance_mm: None,
             wavelengths_nm: Vec::new(),
+            wavelength_weights: Vec::new(),
             reference_wavelength_nm: None,
             fields: Vec::new(),
+            field_weights: Vec::new(),
+            surface_comments: Vec::new(),
+            comments: Vec::new(),
             microlens: None,
             notes: Vec::new(),
         }
     }
+}
+
+/// Returns weights, one each of `n` things, if they are not all alike; what is not stated counts as 1.
+pub(super) fn weights_of(stated: &[f64], n: usize) -> Vec<f64> {
+    let weights: Vec<f64> = (0..n).map(|i| stated.get(i).copied().unwrap_or(1.0)).collect();
+    if weights.iter().all(|weight| *weight == weights[0]) { Vec::new() } else { weights }
 }

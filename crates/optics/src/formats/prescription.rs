@@ -44,16 +44,28 @@ struct Prescription {
     object_distance_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     wavelengths_nm: Vec<f64>,
+    /// One each of the wavelengths; left out where they count alike.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    wavelength_weights: Vec<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     reference_wavelength_nm: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     fields: Vec<Field>,
+    /// One each of the fields; left out where they count alike.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    field_weights: Vec<f64>,
+    /// What there is to say beside the source, a line each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    comments: Vec<String>,
 }
 
 /// A surface as it stands in a file, with what follows it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Row {
+    /// What it is called, if anything.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    comment: String,
     /// Left out for a plane.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     radius_mm: Option<f64>,
@@ -102,10 +114,12 @@ pub(super) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
     let &[stop] = stops.as_slice() else { return Err(OpticsError::Stops { n_stops: stops.len() }.into()) };
     let mirrors: Vec<usize> = (0..prescription.surfaces.len()).filter(|&i| prescription.surfaces[i].mirror).collect();
     let mut interfaces = Vec::with_capacity(prescription.surfaces.len());
+    let mut surface_comments = Vec::with_capacity(prescription.surfaces.len());
     for (surface, row) in prescription.surfaces.into_iter().enumerate() {
         let curvature_per_mm = curvature_per_mm(surface, "radius_mm", row.radius_mm)?;
         let surface = Surface { curvature_per_mm, shape: row.shape, semi_aperture_mm: row.semi_aperture_mm };
         interfaces.push(Interface { surface, medium_after: row.medium, thickness_after_mm: row.thickness_mm });
+        surface_comments.push(row.comment);
     }
     let curvature_per_mm = curvature_per_mm(interfaces.len(), "image_radius_mm", prescription.image_radius_mm)?;
     let image_surface = ImageSurface { curvature_per_mm, conic: prescription.image_conic };
@@ -133,7 +147,16 @@ pub(super) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
         finite("a number of fields", Some(x))?;
         finite("a number of fields", Some(y))?;
     }
+    if surface_comments.iter().all(String::is_empty) {
+        surface_comments.clear();
+    }
+    check_weights("wavelength_weights", &prescription.wavelength_weights, prescription.wavelengths_nm.len())?;
+    check_weights("field_weights", &prescription.field_weights, prescription.fields.len())?;
     Ok(LensFile {
+        wavelength_weights: prescription.wavelength_weights,
+        field_weights: prescription.field_weights,
+        surface_comments,
+        comments: prescription.comments,
         film_distance_mm: finite("film_distance_mm", prescription.film_distance_mm)?,
         object_distance_mm: finite("object_distance_mm", prescription.object_distance_mm)?,
         reference_wavelength_nm: positive("reference_wavelength_nm", prescription.reference_wavelength_nm)?,
@@ -141,6 +164,15 @@ pub(super) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
         fields: prescription.fields,
         ..LensFile::from(lens)
     })
+}
+
+/// Checks that weights, where there are any, are one each of so many things.
+fn check_weights(key: &str, weights: &[f64], n: usize) -> Result<(), TextError> {
+    let are_good = weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0);
+    if weights.is_empty() || (weights.len() == n && are_good) {
+        return Ok(());
+    }
+    Err(TextError { line: None, reason: format!("{key} is {weights:?}, expected {n} numbers of 0 or more") })
 }
 
 /// Returns the curvature of a radius, which is left out for a plane.
@@ -165,6 +197,7 @@ impl Lens {
     fn prescription(&self) -> Prescription {
         let radius_mm = |curvature_per_mm: f64| (curvature_per_mm != 0.0).then(|| 1.0 / curvature_per_mm);
         let row = |(i, interface): (usize, &Interface)| Row {
+            comment: String::new(),
             radius_mm: radius_mm(interface.surface.curvature_per_mm),
             shape: interface.surface.shape.clone(),
             stop: i == self.stop(),
@@ -186,8 +219,11 @@ impl Lens {
             film_distance_mm: None,
             object_distance_mm: None,
             wavelengths_nm: Vec::new(),
+            wavelength_weights: Vec::new(),
             reference_wavelength_nm: None,
             fields: Vec::new(),
+            field_weights: Vec::new(),
+            comments: Vec::new(),
         }
     }
 }
@@ -196,7 +232,10 @@ impl LensFile {
     /// Returns the lens, and what is known of its use, as the text of our own file, which reads back as the same but for an
     /// array of microlenses.
     pub fn to_ron(&self) -> String {
-        let prescription = Prescription {
+        let mut prescription = Prescription {
+            wavelength_weights: self.wavelength_weights.clone(),
+            field_weights: self.field_weights.clone(),
+            comments: self.comments.clone(),
             film_distance_mm: self.film_distance_mm,
             object_distance_mm: self.object_distance_mm.filter(|mm| mm.is_finite()),
             wavelengths_nm: self.wavelengths_nm.clone(),
@@ -204,6 +243,9 @@ impl LensFile {
             fields: self.fields.clone(),
             ..self.lens.prescription()
         };
+        for (row, comment) in prescription.surfaces.iter_mut().zip(&self.surface_comments) {
+            row.comment.clone_from(comment);
+        }
         let pretty = ron::ser::PrettyConfig::new().depth_limit(2);
         ron_options().to_string_pretty(&prescription, pretty).expect("numbers and text always have a RON form")
     }

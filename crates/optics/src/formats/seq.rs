@@ -50,6 +50,8 @@ struct Seq<'a> {
     is_mode_stated: bool,
     beam: Option<Beam>,
     wavelengths_nm: Vec<f64>,
+    wavelength_weights: Vec<f64>,
+    field_weights: Vec<f64>,
     /// Counted from 1.
     reference: usize,
     field_kind: Option<FieldKind>,
@@ -81,6 +83,8 @@ impl<'a> Seq<'a> {
             is_mode_stated: false,
             beam: None,
             wavelengths_nm: Vec::new(),
+            wavelength_weights: Vec::new(),
+            field_weights: Vec::new(),
             reference: 1,
             field_kind: None,
             fields: Default::default(),
@@ -113,6 +117,8 @@ impl<'a> Seq<'a> {
             "NAO" => self.beam = Some(Beam::ObjectAperture(command.number(1)?)),
             "NA" => return Err(command.wrong("the image-side aperture is not supported; state EPD, FNO or NAO")),
             "WL" => self.wavelengths_nm = command.numbers()?,
+            "WTW" => self.wavelength_weights = command.numbers()?,
+            "WTF" => self.field_weights = command.numbers()?,
             "REF" => self.reference = command.number(1)? as usize,
             "XAN" | "YAN" => self.take_fields(FieldKind::Angle, command)?,
             "XOB" | "YOB" => self.take_fields(FieldKind::ObjectHeight, command)?,
@@ -209,6 +215,10 @@ impl<'a> Seq<'a> {
         let place = if named.is_some() { 2 } else { 1 };
         let Some(surface) = named.or(self.surfaces.len().checked_sub(1)) else { return Ok(()) };
         match keyword {
+            "SLB" => {
+                self.surfaces[surface].label = command.words.get(place).cloned().unwrap_or_default();
+                Ok(())
+            }
             "STO" => {
                 self.surfaces.iter_mut().for_each(|surface| surface.is_stop = false);
                 self.surfaces[surface].is_stop = true;
@@ -360,7 +370,10 @@ impl<'a> Seq<'a> {
                 other => other,
             }),
             fields: self.fields_in_mm(),
+            field_weights: self.field_weights,
             wavelengths_nm: self.wavelengths_nm,
+            wavelength_weights: self.wavelength_weights,
+            comments: Vec::new(),
             reference: self.reference.saturating_sub(1),
             notes: self.notes,
         })

@@ -13,7 +13,7 @@ use crate::{
 };
 
 use super::{
-    lens_file::{Field, LensFile},
+    lens_file::{Field, LensFile, weights_of},
     text_error::TextError,
 };
 
@@ -22,6 +22,8 @@ use super::{
 pub(super) struct SystemSurface {
     /// Where the file begins to speak of it.
     pub(super) line: usize,
+    /// What the file calls it.
+    pub(super) comment: String,
     pub(super) curvature_per_mm: f64,
     pub(super) shape: Shape,
     pub(super) medium_after: Glass,
@@ -115,9 +117,14 @@ pub(super) struct System {
     pub(super) stop: Option<usize>,
     pub(super) beam: Option<Beam>,
     pub(super) wavelengths_nm: Vec<f64>,
+    /// One each of the wavelengths; what is not stated counts as 1.
+    pub(super) wavelength_weights: Vec<f64>,
     /// Index into the wavelengths.
     pub(super) reference: usize,
     pub(super) fields: Vec<(Field, FieldVignetting)>,
+    /// One each of the fields; what is not stated counts as 1.
+    pub(super) field_weights: Vec<f64>,
+    pub(super) comments: Vec<String>,
     pub(super) notes: Vec<String>,
 }
 
@@ -162,9 +169,13 @@ impl System {
             lens,
             film_distance_mm,
             object_distance_mm: Some(self.object_distance_mm).filter(|distance| distance.is_finite()),
+            wavelength_weights: weights_of(&self.wavelength_weights, self.wavelengths_nm.len()),
             wavelengths_nm: self.wavelengths_nm,
             reference_wavelength_nm: reference_nm,
+            field_weights: weights_of(&self.field_weights, self.fields.len()),
             fields: self.fields.iter().map(|(field, _)| *field).collect(),
+            surface_comments: comments_of(&self.surfaces),
+            comments: self.comments,
             microlens: None,
             notes: self.notes,
         })
@@ -216,7 +227,7 @@ impl System {
 
     /// Drops planes at which nothing happens to any ray.
     fn drop_dummies(&mut self, stop: &mut usize) {
-        let mut i = 0;
+        let (mut i, mut dropped, first_z_mm) = (0, Vec::new(), self.first_vertex_z_mm);
         while i < self.surfaces.len() && self.surfaces.len() > 1 {
             let medium_before = match i {
                 0 => &self.object_medium,
@@ -241,7 +252,7 @@ impl System {
                 }
                 _ => self.surfaces[i - 1].thickness_after_mm += thickness_mm,
             }
-            self.surfaces.remove(i);
+            dropped.push(self.surfaces.remove(i).line);
             self.moves.retain(|step| step.step.surfaces != (i, i));
             for SystemMove { step, .. } in &mut self.moves {
                 let (first, last) = step.surfaces;
@@ -251,6 +262,7 @@ impl System {
                 *stop -= 1;
             }
         }
+        self.notes.extend(note_on_dummies(&dropped, self.first_vertex_z_mm - first_z_mm));
     }
 
     /// Returns the lens with rims as wide as its surfaces allow where the file states none.
@@ -407,6 +419,29 @@ impl System {
         };
         let dioptres = 1e3 / (distance_mm + mono.projection_center_z_mm());
         Ok(ObjectPoint::from_field(mono, tan, dioptres))
+    }
+}
+
+/// Returns a sentence on planes that were left out, which the file has at these lines, and by how much the lens begins later
+/// for it.
+fn note_on_dummies(lines: &[usize], later_mm: f64) -> Option<String> {
+    let list: Vec<String> = lines.iter().map(usize::to_string).collect();
+    let which = match lines {
+        [] => return None,
+        [_] => format!("the plane of line {}, at which nothing happens to light, is left out", list[0]),
+        _ => format!("the planes of lines {}, at which nothing happens to light, are left out", list.join(", ")),
+    };
+    Some(match later_mm == 0.0 {
+        true => which,
+        false => format!("{which}: the lens begins {later_mm} mm behind it"),
+    })
+}
+
+/// Returns what the file calls each surface; nothing where it names none.
+fn comments_of(surfaces: &[SystemSurface]) -> Vec<String> {
+    match surfaces.iter().all(|surface| surface.comment.is_empty()) {
+        true => Vec::new(),
+        false => surfaces.iter().map(|surface| surface.comment.clone()).collect(),
     }
 }
 

@@ -6,6 +6,7 @@ use glam::DVec2;
 
 use crate::{
     Aperture, CatalogueGlass, Glass, GlassCatalogue, Lens, OpticsError, Outline, PhaseProfile, Placement, Shape,
+    glass::D_LINE_NM,
 };
 
 use super::{
@@ -126,7 +127,18 @@ impl LensFile {
     fn zmx_text(&self, glasses: &[String], catalogue: Option<&str>) -> Result<String, OpticsError> {
         let lens = &self.lens;
         let mut text = format!("MODE SEQ\r\nNAME {}\r\nNOTE 0 {}\r\n", one_line(lens.name()), one_line(lens.source()));
-        text.push_str("UNIT MM X W X CM MR CPMM\r\nFLOA\r\n");
+        for comment in &self.comments {
+            let _ = write!(text, "NOTE 0 {}\r\n", one_line(comment));
+        }
+        text.push_str("UNIT MM X W X CM MR CPMM\r\n");
+        // The format has no rim beside an opening: one that the stop reaches out of is told by the pupil.
+        match opening_beyond_rim(lens, lens.stop()) {
+            false => text.push_str("FLOA\r\n"),
+            true => {
+                let first = lens.at(self.reference_wavelength_nm.unwrap_or(D_LINE_NM))?.first_order_of_stop();
+                let _ = write!(text, "ENPD {:e}\r\n", first.entrance_pupil_diameter_mm);
+            }
+        }
         let mut makers = self.zmx_makers()?;
         makers.extend(catalogue.map(str::to_owned));
         if !makers.is_empty() {
@@ -146,6 +158,9 @@ impl LensFile {
             let _ = write!(text, "SURF {n_written}\r\n");
             if i == lens.stop() {
                 text.push_str("  STOP\r\n");
+            }
+            if let Some(comment) = self.surface_comments.get(i).filter(|comment| !comment.is_empty()) {
+                let _ = write!(text, "  COMM {}\r\n", one_line(comment));
             }
             write_zmx_shape(&mut text, lens, i)?;
             let thickness_mm = gaps[i + 1].thickness_mm;
@@ -234,14 +249,26 @@ impl LensFile {
         if n_fields > 0 {
             let _ = write!(text, "XFLN{}\r\nYFLN{}\r\n", rows[0], rows[1]);
         }
+        if !self.field_weights.is_empty() {
+            let weights: String = self.field_weights.iter().map(|weight| format!(" {weight:e}")).collect();
+            let _ = write!(text, "FWGN{weights}\r\n");
+        }
         for (i, nm) in self.wavelengths_nm.iter().enumerate() {
-            let _ = write!(text, "WAVM {} {:e} 1\r\n", i + 1, nm / 1e3);
+            let weight = self.wavelength_weights.get(i).copied().unwrap_or(1.0);
+            let _ = write!(text, "WAVM {} {:e} {weight}\r\n", i + 1, nm / 1e3);
         }
         let is_reference = |nm: &f64| Some(*nm) == self.reference_wavelength_nm;
         if let Some(reference) = self.wavelengths_nm.iter().position(is_reference) {
             let _ = write!(text, "PWAV {}\r\n", reference + 1);
         }
     }
+}
+
+/// Whether the one opening of a surface reaches beyond its rim.
+fn opening_beyond_rim(lens: &Lens, surface: usize) -> bool {
+    let rim_mm = lens.interfaces()[surface].surface.semi_aperture_mm;
+    let mut openings = lens.apertures_of(surface).filter(|aperture| !aperture.is_obscuration);
+    openings.any(|aperture| aperture.extent_mm() > rim_mm * (1.0 + 1e-12))
 }
 
 /// Returns the lines of what bounds light at a surface, of which the format has one aperture a surface.
@@ -260,8 +287,7 @@ fn zmx_aperture(lens: &Lens, surface: usize) -> Result<String, OpticsError> {
             return Ok(format!("  CLAP {radius_mm:e} {rim_mm:e} 0\r\n"));
         }
         (_, true) => return Err(cannot("a .zmx file", surface, "has an obscuration that is no circle about the axis")),
-        // The format has no rim beside the opening.
-        _ if aperture.extent_mm() > rim_mm * (1.0 + 1e-12) => {
+        _ if surface != lens.stop() && opening_beyond_rim(lens, surface) => {
             return Err(cannot("a .zmx file", surface, "has an opening that reaches beyond its rim"));
         }
         (Outline::Circle { radius_mm }, false) => format!("  CLAP 0 {radius_mm:e} 0\r\n"),

@@ -83,7 +83,7 @@ impl Line<'_> {
 #[derive(Default)]
 struct Zmx {
     name: String,
-    note: String,
+    remarks: Vec<String>,
     mm_per_unit: Option<f64>,
     beam: Option<Beam>,
     makers: Vec<String>,
@@ -92,7 +92,9 @@ struct Zmx {
     n_wavelengths: Option<usize>,
     fields: [Vec<f64>; 2],
     vignetting: [Vec<f64>; 4],
-    wavelengths_um: Vec<(usize, f64)>,
+    /// Each with its number and its weight.
+    wavelengths_um: Vec<(usize, f64, f64)>,
+    field_weights: Vec<f64>,
     primary: usize,
     n_configurations: usize,
     surfaces: Vec<ZmxSurface>,
@@ -124,7 +126,7 @@ impl Zmx {
                 return Err(line.wrong(format!("{} is not supported; expected SEQ", line.text())));
             }
             "NAME" => self.name = line.text(),
-            "NOTE" if self.note.is_empty() => self.note = line.words.get(1..).unwrap_or_default().join(" "),
+            "NOTE" => self.remarks.push(line.words.get(1..).unwrap_or_default().join(" ")),
             "UNIT" => self.mm_per_unit = Some(mm_per_unit(line)?),
             "ENPD" => self.beam = Some(Beam::EntrancePupil(line.number(0)?)),
             "FNUM" if line.number_or(1, 0.0)? == 0.0 => self.beam = Some(Beam::FNumber(line.number(0)?)),
@@ -145,8 +147,14 @@ impl Zmx {
             "VDYN" | "ZVDY" => self.vignetting[1] = line.numbers()?,
             "VCXN" | "ZVCX" => self.vignetting[2] = line.numbers()?,
             "VCYN" | "ZVCY" => self.vignetting[3] = line.numbers()?,
-            "WAVM" => self.wavelengths_um.push((line.count(0)?, line.number(1)?)),
-            "WAVL" => self.wavelengths_um = (1..).zip(line.numbers()?).collect(),
+            "WAVM" => self.wavelengths_um.push((line.count(0)?, line.number(1)?, line.number_or(2, 1.0)?)),
+            "WAVL" => self.wavelengths_um = (1..).zip(line.numbers()?).map(|(number, um)| (number, um, 1.0)).collect(),
+            "WWGT" => {
+                for (stated, weight) in self.wavelengths_um.iter_mut().zip(line.numbers()?) {
+                    stated.2 = weight;
+                }
+            }
+            "FWGN" | "FWGT" => self.field_weights = line.numbers()?,
             "PWAV" => self.primary = line.count(0)?,
             "MNUM" => self.n_configurations = line.count(0)?,
             _ => {}
@@ -223,12 +231,14 @@ impl Zmx {
             z_mm += thickness_mm;
         }
         let mut wavelengths_um = self.wavelengths_um;
-        wavelengths_um.sort_by_key(|(number, _)| *number);
+        wavelengths_um.sort_by_key(|(number, ..)| *number);
         wavelengths_um.truncate(self.n_wavelengths.filter(|&n| n > 0).unwrap_or(usize::MAX));
-        let wavelengths_nm = wavelengths_um.iter().map(|(_, um)| nm_of_um(*um)).collect();
+        let wavelengths_nm = wavelengths_um.iter().map(|(_, um, _)| nm_of_um(*um)).collect();
+        let mut remarks = self.remarks.into_iter().filter(|remark| !remark.is_empty());
         Ok(System {
             name: if self.name.is_empty() { name.to_owned() } else { self.name },
-            source: if self.note.is_empty() { "a Zemax file".to_owned() } else { self.note },
+            source: remarks.next().unwrap_or("a Zemax file".to_owned()),
+            comments: remarks.collect(),
             object_distance_mm,
             object_medium,
             first_vertex_z_mm,
@@ -241,6 +251,8 @@ impl Zmx {
                 other => other,
             }),
             wavelengths_nm,
+            wavelength_weights: wavelengths_um.iter().map(|(.., weight)| *weight).collect(),
+            field_weights: self.field_weights,
             reference: self.primary.saturating_sub(1),
             fields: fields(self.field_type, self.n_fields, mm, &self.fields, &self.vignetting)?,
             notes,

@@ -73,7 +73,7 @@ const ALIASES: &[(&str, &str)] = &[
 ];
 
 impl GlassCatalogue {
-    /// The built-in glasses: those of six makers and LZOS, a few plastics, crystals and fluids, infrared glasses, and the
+    /// The built-in glasses: those of six makers and LZOS, B270, a few plastics, crystals and fluids, infrared glasses, and the
     /// media of the eye (`EYE:CORNEA`, `EYE:AQUEOUS`, `EYE:LENS`, `EYE:VITREOUS`).
     ///
     /// The numbers are the refractiveindex.info database's (public domain, CC0 1.0), but for three plastics and
@@ -254,7 +254,7 @@ mod tests {
     #[test]
     fn every_row_is_read_and_makes_sense() {
         let catalogue = GlassCatalogue::built_in();
-        assert_eq!(catalogue.glasses().len(), 1694 + 30 + PLASTICS.len() + 1 + 4);
+        assert_eq!(catalogue.glasses().len(), 1694 + 31 + PLASTICS.len() + 1 + 4);
         let mut n_infrared = 0;
         for glass in catalogue.glasses() {
             glass.glass.check().unwrap();

@@ -1,48 +1,132 @@
-//! Light counted ray by ray, for what is found in other ways to be held to.
+//! Light counted ray by ray, for what is found in other ways to be held to. Nothing here knows of pupils: rays fall on the
+//! front of a lens from a plane that faces the point, and either get through or not.
 
 use dioptric_optics::{
     MonoLens, ObjectPoint, RayBatch, Vignetting,
-    glam::{DQuat, DVec2, DVec3},
+    glam::{DVec2, DVec3},
 };
 
-/// Grids, each over what the one before found lit, of which the last is counted.
-const N_GRIDS: usize = 4;
+/// Rays across the grids that light is first looked for on, each but the first about what the one before found lit; the second
+/// of the first place is for fields that the first leaves dark.
+const FIRST_ACROSS: [usize; 2] = [300, 700];
+const N_ZOOMS: usize = 2;
 
-/// Returns the cross-section of the light of a far point that gets through, mm², by rays on square grids of so many across,
-/// of which each but the first covers what the one before found lit.
-pub(crate) fn cross_section_mm2(lens: &MonoLens, point: &ObjectPoint, n_across: usize) -> f64 {
-    let direction = point.direction_to(DVec3::ZERO);
-    let turn = DQuat::from_rotation_arc(DVec3::Z, direction);
-    let extent_mm = 3.0 * lens.semi_aperture_mm(0);
-    let (mut low, mut high) = (DVec2::splat(-extent_mm), DVec2::splat(extent_mm));
-    let mut area_mm2 = 0.0;
-    for _ in 0..N_GRIDS {
-        let cell = (high - low) / n_across as f64;
-        let (mut next, mut n_lit) = ((DVec2::INFINITY, DVec2::NEG_INFINITY), 0_usize);
-        for row in 0..n_across {
-            let at = |column: usize| low + cell * (DVec2::new(column as f64, row as f64) + 0.5);
-            let points: Vec<DVec3> = (0..n_across).map(|column| turn * at(column).extend(0.0)).collect();
-            let mut rays = RayBatch::from_points(&points, &vec![direction; n_across]);
-            lens.trace(&mut rays, Vignetting::On);
-            for column in (0..n_across).filter(|&column| rays.fate[column].is_in_flight()) {
-                next = (next.0.min(at(column)), next.1.max(at(column)));
-                n_lit += 1;
-            }
-        }
-        area_mm2 = n_lit as f64 * cell.x * cell.y;
-        if n_lit == 0 {
-            break;
-        }
-        // The ends of a crescent are narrower than a cell.
-        let margin = 1.5 * cell + 0.2 * (next.1 - next.0);
-        (low, high) = (next.0 - margin, next.1 + margin);
+/// A far point, and the plane that its rays start in.
+struct FarLight {
+    direction: DVec3,
+    x: DVec3,
+    y: DVec3,
+}
+
+impl FarLight {
+    /// Returns the light of a far point; the y of its plane lies in the plane of the light and the axis.
+    fn of(point: &ObjectPoint) -> Self {
+        let direction = point.direction_to(DVec3::ZERO);
+        let across = direction.cross(DVec3::Z);
+        let x = if across.length() > 1e-9 { across.normalize() } else { DVec3::X };
+        Self { direction, x, y: direction.cross(x) }
     }
-    area_mm2
+
+    fn rays(&self, places_mm: &[DVec2]) -> RayBatch {
+        let start = |place: &DVec2| self.x * place.x + self.y * place.y;
+        let starts: Vec<DVec3> = places_mm.iter().map(start).collect();
+        RayBatch::from_points(&starts, &vec![self.direction; places_mm.len()])
+    }
+}
+
+/// A square grid of rays.
+#[derive(Clone, Copy)]
+struct Grid {
+    low: DVec2,
+    cell: DVec2,
+    n_across: usize,
+}
+
+impl Grid {
+    fn new(low: DVec2, high: DVec2, n_across: usize) -> Self {
+        Self { low, cell: (high - low) / n_across as f64, n_across }
+    }
+
+    fn row(&self, row: usize) -> Vec<DVec2> {
+        let at = |column: usize| self.low + self.cell * (DVec2::new(column as f64, row as f64) + 0.5);
+        (0..self.n_across).map(at).collect()
+    }
+
+    /// Hands each row of rays, traced behind the lens, and where they started, to `visit`.
+    fn trace(&self, lens: &MonoLens, light: &FarLight, mut visit: impl FnMut(&[DVec2], RayBatch)) {
+        for row in 0..self.n_across {
+            let places = self.row(row);
+            let mut rays = light.rays(&places);
+            lens.trace(&mut rays, Vignetting::On);
+            visit(&places, rays);
+        }
+    }
+
+    /// Returns a grid of so many rays across about what this one finds lit, with room; `None` if that is nothing.
+    fn about_lit(&self, lens: &MonoLens, light: &FarLight, n_across: usize) -> Option<Self> {
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        self.trace(lens, light, |places, rays| {
+            for (place, _) in places.iter().zip(&rays.fate).filter(|(_, fate)| fate.is_in_flight()) {
+                (low, high) = (low.min(*place), high.max(*place));
+            }
+        });
+        // The ends of a crescent are narrower than a cell.
+        let margin = 1.5 * self.cell + 0.2 * (high - low);
+        low.is_finite().then(|| Self::new(low - margin, high + margin, n_across))
+    }
+}
+
+/// Returns a grid of so many rays across about all of the light of a far point that gets through; `None` of a dark one.
+fn about_light(lens: &MonoLens, light: &FarLight, n_across: usize) -> Option<Grid> {
+    let extent = DVec2::splat(3.0 * lens.semi_aperture_mm(0));
+    let first = |n: usize| Grid::new(-extent, extent, n).about_lit(lens, light, FIRST_ACROSS[0]);
+    let mut grid = FIRST_ACROSS.into_iter().find_map(first)?;
+    for zoom in 0..N_ZOOMS {
+        grid = grid.about_lit(lens, light, if zoom + 1 == N_ZOOMS { n_across } else { FIRST_ACROSS[0] })?;
+    }
+    Some(grid)
+}
+
+/// Whether any of a coarse grid of rays of a far point gets through.
+#[allow(dead_code, reason = "the example looks at fields that should be dark")]
+pub(crate) fn is_any_lit(lens: &MonoLens, point: &ObjectPoint) -> bool {
+    let extent = DVec2::splat(3.0 * lens.semi_aperture_mm(0));
+    let grid = Grid::new(-extent, extent, FIRST_ACROSS[0]);
+    grid.about_lit(lens, &FarLight::of(point), FIRST_ACROSS[0]).is_some()
+}
+
+/// Returns the cross-section of the light of a far point that gets through, mm², by a grid of so many rays across.
+#[allow(dead_code, reason = "not every test looks at fields")]
+pub(crate) fn cross_section_mm2(lens: &MonoLens, point: &ObjectPoint, n_across: usize) -> f64 {
+    let light = FarLight::of(point);
+    let Some(grid) = about_light(lens, &light, n_across) else { return 0.0 };
+    let mut n_lit = 0_usize;
+    grid.trace(lens, &light, |_, rays| n_lit += rays.n_in_flight());
+    n_lit as f64 * grid.cell.x * grid.cell.y
+}
+
+/// Returns the root-mean-square distance from their centroid of the places where the light of a far point meets a film, mm, by a
+/// grid of so many rays across.
+#[allow(dead_code, reason = "not every test looks at spots")]
+pub(crate) fn spot_rms_mm(lens: &MonoLens, point: &ObjectPoint, film_distance_mm: f64, n_across: usize) -> Option<f64> {
+    let light = FarLight::of(point);
+    let grid = about_light(lens, &light, n_across)?;
+    let (mut sum, mut squares, mut n_lit, mut origin) = (DVec2::ZERO, 0.0, 0_usize, None);
+    grid.trace(lens, &light, |_, mut rays| {
+        lens.to_film(&mut rays, film_distance_mm);
+        for landed in lens.landed(&rays, film_distance_mm) {
+            // About a place of the spot, so that its distance from the axis costs no digits.
+            let from_first = landed.mm - *origin.get_or_insert(landed.mm);
+            (sum, squares, n_lit) = (sum + from_first, squares + from_first.length_squared(), n_lit + 1);
+        }
+    });
+    let n = n_lit as f64;
+    Some((squares / n - (sum / n).length_squared()).max(0.0).sqrt())
 }
 
 /// Returns the height of the outermost ray of the beam about the axis that gets through, of so many rays from the axis to the
 /// rim of the first surface, mm.
-#[allow(dead_code, reason = "the example counts areas alone")]
+#[allow(dead_code, reason = "not every test looks at beams")]
 pub(crate) fn beam_radius_mm(lens: &MonoLens, n_rays: usize) -> f64 {
     let height = |i: usize| lens.semi_aperture_mm(0) * (i as f64 + 0.5) / n_rays as f64;
     let points: Vec<DVec3> = (0..n_rays).map(|i| DVec3::new(0.0, height(i), -1.0)).collect();

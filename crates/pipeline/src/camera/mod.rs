@@ -4,6 +4,7 @@ mod bank;
 mod check;
 mod frames;
 mod lens;
+mod light_field;
 mod movements;
 mod scene;
 mod sensor_options;
@@ -23,6 +24,7 @@ use serde::{Deserialize, Serialize};
 pub use bank::{BankData, BankSpec};
 pub use frames::{Exposed, FramesSpec};
 pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+pub use light_field::LightFieldSpec;
 pub use movements::Movements;
 pub use scene::{SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
@@ -68,6 +70,9 @@ pub struct Camera {
     /// How the point-spread functions are laid over the scene.
     #[serde(default)]
     pub blur: BlurSpec,
+    /// What makes a light-field camera of it: an array of small lenses or holes before the film, or more cameras beside it.
+    #[serde(default)]
+    pub light_field: Option<LightFieldSpec>,
     /// The sensor.
     pub sensor: SensorSpec,
     /// The exposure.
@@ -329,6 +334,9 @@ impl Camera {
             WavelengthSpec::ListNm(list) => list.iter().try_for_each(|&nm| checker.positive("ListNm", nm))?,
         }
         self.frames.check()?;
+        if let Some(spec) = &self.light_field {
+            spec.check(checker)?;
+        }
         self.scene.check(checker)
     }
 

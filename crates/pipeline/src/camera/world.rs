@@ -34,6 +34,9 @@ pub struct WorldSpec {
     /// How far the camera stands before the place of the file's, along its axis, mm.
     #[serde(default)]
     pub advance_mm: f64,
+    /// How far the camera stands to the right of the place of the file's and above it, as the picture shows it, mm.
+    #[serde(default)]
+    pub aside_mm: (f64, f64),
     /// Whether a band is the mean over its width, or the value at its center.
     #[serde(default)]
     pub bands: BandSampling,
@@ -92,6 +95,7 @@ impl WorldSpec {
             effort: RenderEffort::default(),
             size: None,
             advance_mm: 0.0,
+            aside_mm: (0.0, 0.0),
             bands: BandSampling::default(),
             paths: LightPaths::default(),
             seed: one(),
@@ -106,6 +110,8 @@ impl WorldSpec {
     pub(super) fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
         checker.positive("unit_m", self.unit_m)?;
         checker.finite("advance_mm", self.advance_mm)?;
+        checker.finite("aside_mm", self.aside_mm.0)?;
+        checker.finite("aside_mm", self.aside_mm.1)?;
         if let Some((columns, rows)) = self.size {
             checker.count("size", columns, 1..=65_536)?;
             checker.count("size", rows, 1..=65_536)?;

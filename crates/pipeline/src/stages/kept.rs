@@ -360,6 +360,18 @@ impl KeptCamera {
         Ok(())
     }
 
+    /// Returns the lens and the film behind it.
+    pub(super) fn lens_and_film(
+        &self,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<(Arc<ResolvedLens>, Arc<FilmPlace>), PipelineError> {
+        let inputs = self.irradiance_inputs()?;
+        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let film = &inputs.plan.bank.film;
+        Ok((chain.lens(&film.lens)?, chain.film(film, &inputs.scene)?))
+    }
+
     pub(super) fn irradiance_inputs(&self) -> Result<IrradianceInputs, PipelineError> {
         Ok(self.picture_inputs()?.frames.electrons.irradiance)
     }
@@ -464,6 +476,10 @@ impl Chain<'_> {
                 let picture = self.world_render(inputs)?.render(effort, &self.watch)?.picture;
                 let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
                 return Ok(Irradiance::of_image(picture, place.pitch_um));
+            }
+            if inputs.micro_array.is_some() {
+                let reason = "only rays from the film go through its array, expected a world with method: Backward";
+                return Err(PipelineError::Unsuitable { what: "light_field", reason: reason.to_owned() });
             }
             let plan = self.plan(&inputs.plan, &inputs.scene)?;
             let resolved = self.scene(&inputs.scene)?;

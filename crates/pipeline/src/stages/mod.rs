@@ -23,6 +23,7 @@ mod given;
 mod irradiance;
 mod kept;
 mod lens;
+mod light_field;
 mod plan;
 mod rendering;
 mod resume;

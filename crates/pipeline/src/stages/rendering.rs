@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use dioptric_backward::Rendering;
 use dioptric_spectrum::SpectralImage;
 use dioptric_world::World;
+use image::RgbImage;
 use ndarray::Array2;
 use serde::Serialize;
 
@@ -55,15 +56,20 @@ impl RenderingSummary {
     }
 }
 
-/// Writes a picture as the standard observer sees it, its brightest per cent white.
+/// Writes a picture as the standard observer sees it, its brightest per cent white and each sample so many pixels wide and
+/// high.
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn write_seen_png(picture: &SpectralImage, path: &Path) -> Result<(), PipelineError> {
+pub fn write_seen_png(picture: &SpectralImage, magnification: usize, path: &Path) -> Result<(), PipelineError> {
     let seen = LinearRgb::of_image(picture).within_gamut();
     let staged = Staged::file(path)?;
     let white = seen.level_at(0.99).max(f64::MIN_POSITIVE);
-    let saved = seen.to_srgb(white).save_with_format(staged.path(), image::ImageFormat::Png);
+    let small = seen.to_srgb(white);
+    let times = magnification.max(1) as u32;
+    let (width, height) = (small.width() * times, small.height() * times);
+    let shown = RgbImage::from_fn(width, height, |x, y| *small.get_pixel(x / times, y / times));
+    let saved = shown.save_with_format(staged.path(), image::ImageFormat::Png);
     saved.map_err(|e| PipelineError::Png { reason: e.to_string() })?;
     staged.commit()
 }

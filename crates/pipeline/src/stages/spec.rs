@@ -8,6 +8,7 @@ use std::{
     time::SystemTime,
 };
 
+use dioptric_backward::MicroArray;
 use dioptric_forward::Film;
 use dioptric_optics::Lens;
 use dioptric_scene::Scene;
@@ -17,8 +18,8 @@ use serde::{Deserialize, Serialize};
 
 use super::given::{Given, GivenParts};
 use crate::{
-    BankSpec, BlurSpec, Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec, Movements,
-    PipelineError, Quality, SceneSource, StopSpec, WavelengthSpec, WorldSpec,
+    BankSpec, BlurSpec, Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec,
+    LightFieldSpec, Movements, PipelineError, Quality, SceneSource, StopSpec, WavelengthSpec, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -134,6 +135,7 @@ pub(crate) struct PlanInputs {
 pub(crate) struct IrradianceInputs {
     pub(crate) plan: PlanInputs,
     pub(crate) scene: SceneInputs,
+    pub(crate) micro_array: Option<MicroArray>,
 }
 
 /// The mean rate of photo-electrons.
@@ -234,7 +236,8 @@ impl IrradianceInputs {
             raster,
         };
         let bank = BankInputs { film, diffraction: camera.diffraction, bank: camera.bank };
-        Self { plan: PlanInputs { bank, blur: camera.blur }, scene }
+        let micro_array = camera.light_field.as_ref().and_then(LightFieldSpec::micro_array);
+        Self { plan: PlanInputs { bank, blur: camera.blur }, scene, micro_array }
     }
 }
 

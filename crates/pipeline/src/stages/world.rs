@@ -4,11 +4,11 @@ use std::{fs, path::Path, sync::Arc};
 
 use dioptric_backward::{
     Auxiliary, BandSampling, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
-    Placement, RenderSettings, Renderer, Rendering, ThinLens, auxiliary, write_auxiliary_exr, write_rendering_exr,
+    Placement, RenderSettings, Renderer, Rendering, auxiliary, write_auxiliary_exr, write_rendering_exr,
 };
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_scene::{Scene, SceneLight, View};
-use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectrumError, WavelengthGrid};
+use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use dioptric_world::{
     CameraKind, ReadOptions, World, WorldCamera,
     glam::{DAffine3, DVec3},
@@ -55,7 +55,7 @@ pub(super) fn read(inputs: &WorldInputs, watch: &Watch<'_>) -> Result<World, Pip
 /// Returns where the middle of the entrance pupil stands, and how it looks.
 pub(super) fn placement(world: &World, spec: &WorldSpec) -> Placement {
     let of_file = world.cameras().first().map_or(DAffine3::IDENTITY, |camera| camera.world_from_camera);
-    let advance = DAffine3::from_translation(DVec3::Z * 1e-3 * spec.advance_mm);
+    let advance = DAffine3::from_translation(1e-3 * DVec3::new(spec.aside_mm.0, spec.aside_mm.1, spec.advance_mm));
     Placement { world_from_camera: of_file * advance }
 }
 
@@ -156,12 +156,14 @@ impl WorldRender {
         }
         let bands = Bands { grid, sampling: spec.bands };
         let settings = LensCameraSettings {
-            film_distance_mm: place.film_distance_mm,
+            // The focus puts the array there, and the film lies behind it.
+            film_distance_mm: place.film_distance_mm + inputs.micro_array.map_or(0.0, |array| array.gap_mm),
             film_size_mm: DVec2::new(place.columns as f64, place.rows as f64) * (1e-3 * place.pitch_um),
             pixels: PixelGrid::new(place.columns, place.rows),
             placement: placement(&world, spec),
             origin: LensOrigin::EntrancePupil,
             diffraction: inputs.plan.bank.diffraction.hurb(),
+            micro_array: inputs.micro_array,
         };
         let identity = format!("{} {:?} {settings:?}", fingerprint(&world, spec), lens.lens);
         let camera = Camera::Lens(Box::new(LensCamera::new(&lens.lens, &bands, settings)?));
@@ -198,15 +200,22 @@ impl WorldRender {
     /// # Errors
     /// When the part does not lie in the picture.
     pub fn cropped(mut self, first: (usize, usize), size: (usize, usize)) -> Result<Self, PipelineError> {
-        self.camera = match self.camera {
-            Camera::Pinhole(view) => Camera::Pinhole(Pinhole { pixels: view.pixels.cropped(first, size)?, ..view }),
-            Camera::ThinLens(lens) => {
-                let pixels = lens.view.pixels.cropped(first, size)?;
-                Camera::ThinLens(ThinLens { view: Pinhole { pixels, ..lens.view }, ..lens })
-            }
-            Camera::Lens(lens) => Camera::Lens(Box::new(lens.cropped(first, size)?)),
-        };
+        let pixels = self.camera.pixels().cropped(first, size)?;
+        self.camera = self.camera.with_pixels(pixels);
         Ok(self)
+    }
+
+    /// Returns a first look at the picture: one pass with as few samples as reach every band, on pixels so many times as wide
+    /// and as high.
+    ///
+    /// # Errors
+    /// When the work is cancelled.
+    pub fn preview(&self, factor: usize, cancel: &Cancel) -> Result<SpectralImage, PipelineError> {
+        let pixels = self.camera.pixels().coarser(factor);
+        let coarse = Self { camera: self.camera.clone().with_pixels(pixels), samples_per_pass: 1, ..self.clone() };
+        let mut renderer = coarse.renderer()?;
+        renderer.pass(cancel, &|_| {})?;
+        Ok(renderer.rendering().picture)
     }
 
     /// What the pixels are of: irradiance on a film, or the radiance that a camera by formula sees.

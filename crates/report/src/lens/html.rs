@@ -1,31 +1,154 @@
 //! The page of an analysis for a browser.
 
-use super::AnalysisPlots;
+use dioptric_analysis::{LensData, LensPageData, placement_lines, surface_rows};
+use dioptric_pipeline::PipelineError;
 
-impl AnalysisPlots<'_> {
-    /// Returns a self-contained page with all plots, and with these tables as text.
-    pub fn html(&self, tables: &str) -> String {
-        let plots = [
-            ("Spots, fans and curves over field", self.page_svg()),
-            ("Spot diagrams", self.spots_svg()),
-            ("Optical path differences", self.opd_svg()),
-            ("Distortion", self.grid_svg()),
-        ];
-        let section = |(title, svg): &(&str, String)| format!("<section><h2>{title}</h2>\n{svg}</section>\n");
-        let plots: String = plots.iter().map(section).collect();
-        let (name, tables) = (escaped(&self.0.lens), escaped(tables));
+use super::{AnalysisPlots, LensDrawing, glass_map::glass_map_svg};
+use crate::{chart_svg, panel::escaped};
+
+const STYLE: &str = include_str!("../run/report.css");
+/// Size of a chart, px.
+const CHART_PX: (f64, f64) = (620.0, 380.0);
+
+/// All that the page of a lens shows.
+#[derive(Clone, Copy, Debug)]
+pub struct LensPage<'a> {
+    /// The analysis, and its plots.
+    pub plots: AnalysisPlots<'a>,
+    /// What else is shown of the lens.
+    pub shown: &'a LensPageData,
+    /// The numbers of the analysis as text.
+    pub tables: &'a str,
+}
+
+impl LensPage<'_> {
+    /// Returns the self-contained page: prescription, drawing, first-order data, modulation, spots, fans, path differences,
+    /// distortion, glasses, and the numbers as text.
+    ///
+    /// # Errors
+    /// When a glass is not known at a wavelength.
+    pub fn html(&self) -> Result<String, PipelineError> {
+        let analysis = self.plots.0;
+        let mut body = section("Lens", &(self.drawing()? + &note(&analysis.notes.join(" · "))));
+        body += &section("Prescription", &self.prescription());
+        body += &section("First order", &self.first_order());
+        if let Ok(modulation) = &self.shown.modulation {
+            let charts = [&modulation.over_frequency, &modulation.over_field, &modulation.through_focus];
+            let charts: String = charts.map(|chart| chart_svg(chart, CHART_PX.0, CHART_PX.1)).concat();
+            let words = "Tangential (solid): lines across the plane of axis and field, a wave along the radius. Sagittal \
+                         (dashed): lines along it. By the waves of all wavelengths together; where the blur is too large for \
+                         that, by bent rays.";
+            body += &section("Modulation", &format!("<div class=\"pair\">\n{charts}</div>\n{}", note(words)));
+        }
+        let fans = "Tangential rays and curves are those in the plane of axis and field (along y), sagittal ones across it \
+                    (along x): solid and dashed where they share a plot. Each spot has its own scale; the gray circle is Airy's \
+                    first zero.";
+        body += &section("Spots, fans and curves over field", &(self.plots.page_svg() + &note(fans)));
+        body += &section("Spot diagrams", &self.plots.spots_svg());
+        body += &section("Optical path differences", &self.plots.opd_svg());
+        body += &section("Distortion", &self.plots.grid_svg());
+        if let Some(map) = glass_map_svg(&self.shown.lens) {
+            body += &section("Glasses", &(map + &note("Numbers in brackets: the surfaces that a glass lies behind.")));
+        }
+        body += &section("Numbers", &format!("<pre>{}</pre>\n", escaped(self.tables)));
+        let (name, source) = (escaped(&analysis.lens), escaped(self.shown.lens.source()));
+        Ok(format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{name} – dioptric</title>\n\
+             <style>\n{STYLE}main {{ max-width: 1480px; }} section {{ overflow-x: auto; }}\n</style>\n</head>\n<body>\n\
+             <header>\n<h1>{name}</h1>\n<p>{source}</p>\n</header>\n<main>\n{body}</main>\n</body>\n</html>\n"
+        ))
+    }
+
+    /// Draws the lens with the rays of the fields, as far as a drawing shows them.
+    fn drawing(&self) -> Result<String, PipelineError> {
+        let analysis = self.plots.0;
+        let steepest_deg = 89.0;
+        let mut fields_deg: Vec<f64> = analysis.fields.iter().map(|row| row.place.field_xy_deg[1]).collect();
+        fields_deg.retain(|field_deg| field_deg.abs() < steepest_deg);
+        fields_deg.sort_by(f64::total_cmp);
+        fields_deg.dedup();
+        let drawing = LensDrawing {
+            fields_deg,
+            distance_mm: analysis.distance_mm,
+            wavelengths_nm: vec![analysis.reference_nm],
+            film_distance_mm: Some(analysis.film_distance_mm),
+        };
+        drawing.to_svg(&self.shown.lens)
+    }
+
+    fn prescription(&self) -> String {
+        let mm = |value: f64| if value.is_finite() { format!("{value:.4}") } else { "∞".to_owned() };
+        let row = |row: dioptric_analysis::SurfaceRow| {
+            let stop = if row.is_stop { "stop".to_owned() } else { String::new() };
+            let comment = self.shown.surface_comments.get(row.surface).filter(|comment| !comment.is_empty()).cloned();
+            let remarks: Vec<String> =
+                comment.into_iter().chain([stop].into_iter().filter(|s| !s.is_empty())).chain(row.remarks).collect();
+            let cells = [mm(row.radius_mm), mm(row.thickness_mm), mm(row.diameter_mm)];
+            let cells: String = cells.iter().map(|cell| format!("<td class=\"n\">{cell}</td>")).collect();
+            format!(
+                "<tr><td>{}</td>{cells}<td class=\"w\">{}</td><td class=\"w\">{}</td></tr>\n",
+                row.surface,
+                escaped(&row.medium_after),
+                escaped(&remarks.join("; "))
+            )
+        };
+        let rows: String = surface_rows(&self.shown.lens).into_iter().map(row).collect();
+        let moves: String = placement_lines(&self.shown.lens).iter().map(|line| note(line)).collect();
         format!(
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name} – dioptric</title>\n\
-             <style>body {{ margin: 0 auto; max-width: 1440px; padding: 20px; background: #f3f5f8; color: #1d2330; \
-             font: 15px/1.5 system-ui, \"DejaVu Sans\", sans-serif; }} section {{ background: #fff; \
-             border: 1px solid #dfe3ea; border-radius: 10px; padding: 18px 22px; margin-bottom: 20px; overflow-x: auto; }} \
-             h2 {{ margin: 0 0 12px; font-size: 17px; }} svg {{ max-width: 100%; height: auto; }} \
-             pre {{ font: 13px/1.45 \"DejaVu Sans Mono\", monospace; margin: 0; }}</style>\n</head>\n<body>\n\
-             <h1>{name}</h1>\n<section><h2>Numbers</h2>\n<pre>{tables}</pre></section>\n{plots}</body>\n</html>\n"
+            "<table>\n<tr><th>surface</th><th class=\"n\">radius mm</th><th class=\"n\">distance mm</th>\
+             <th class=\"n\">diameter mm</th><th class=\"w\">medium behind</th><th class=\"w\"></th></tr>\n{rows}</table>\n{moves}"
         )
+    }
+
+    /// One line a quantity, one column a wavelength.
+    fn first_order(&self) -> String {
+        type Quantity = (&'static str, fn(&LensData) -> Option<f64>);
+        let quantities: [Quantity; 17] = [
+            ("focal length, mm", |d| Some(d.first_order.efl_mm)),
+            ("back focal length, mm", |d| Some(d.first_order.bfl_mm)),
+            ("front focal length, mm", |d| Some(d.first_order.ffl_mm)),
+            ("front principal plane, mm behind the first vertex", |d| Some(d.first_order.front_principal_mm)),
+            ("rear principal plane, mm behind the last vertex", |d| Some(d.first_order.rear_principal_mm)),
+            ("entrance pupil, mm behind the first vertex", |d| Some(d.first_order.entrance_pupil_z_mm)),
+            ("its diameter, mm", |d| Some(d.first_order.entrance_pupil_diameter_mm)),
+            ("exit pupil, mm behind the last vertex", |d| Some(d.first_order.exit_pupil_z_mm)),
+            ("its diameter, mm", |d| Some(d.first_order.exit_pupil_diameter_mm)),
+            ("f-number", |d| Some(d.first_order.f_number)),
+            ("f-number of the real beam", |d| d.real_f_number),
+            ("magnification", |d| d.image.map(|image| image.magnification)),
+            ("working f-number", |d| d.image.map(|image| image.working_f_number)),
+            ("Petzval radius, mm", |d| d.petzval_radius_mm),
+            ("field where the light falls to half, °", |d| d.half_light_field_deg),
+            ("field where it ends, °", |d| d.last_light_field_deg),
+            ("pupil magnification", |d| Some(d.pupil_magnification)),
+        ];
+        let head: String = self
+            .shown
+            .data
+            .iter()
+            .map(|d| format!("<th class=\"n\">{:.1} nm</th>", d.first_order.wavelength_nm))
+            .collect();
+        let row = |(name, of): &(&str, fn(&LensData) -> Option<f64>)| {
+            let values: Vec<Option<f64>> = self.shown.data.iter().map(of).collect();
+            if values.iter().all(Option::is_none) {
+                return String::new();
+            }
+            let cell = |value: &Option<f64>| match value {
+                Some(value) if value.is_finite() => format!("<td class=\"n\">{value:.4}</td>"),
+                Some(_) => "<td class=\"n\">∞</td>".to_owned(),
+                None => "<td class=\"n\">–</td>".to_owned(),
+            };
+            format!("<tr><td>{name}</td>{}</tr>\n", values.iter().map(cell).collect::<String>())
+        };
+        format!("<table>\n<tr><th></th>{head}</tr>\n{}</table>\n", quantities.iter().map(row).collect::<String>())
     }
 }
 
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+fn section(title: &str, inside: &str) -> String {
+    format!("<section>\n<h2>{title}</h2>\n{inside}</section>\n")
+}
+
+fn note(words: &str) -> String {
+    if words.is_empty() { String::new() } else { format!("<p class=\"note\">{}</p>\n", escaped(words)) }
 }

@@ -13,6 +13,8 @@ const MAP_PX: [f64; 2] = [250.0, 248.0];
 const BAR_PX: f64 = 82.0;
 /// Size of the grid of fields, px.
 const GRID_PX: f64 = 620.0;
+/// Cells of a drawn map over those of the computed one, each way.
+const FINER: usize = 3;
 /// Steps of color to each side of white.
 const LEVELS: i32 = 20;
 /// Colors from early to late light: equal steps between these.
@@ -96,16 +98,7 @@ fn lines(color: &str, kind: MarkKind, places: &[Option<[f64; 2]>]) -> Vec<Mark> 
 }
 
 fn map_panel(map: &OpdMap, half: f64) -> Panel {
-    let n = map.n_across;
-    let at = |i: usize| (2 * i + 1) as f64 / n as f64 - 1.0;
-    let mut cells = vec![Vec::new(); (2 * LEVELS + 1) as usize];
     let waves = || map.waves.iter().flatten().copied();
-    for (i, waves) in map.waves.iter().enumerate() {
-        if let Some(waves) = waves {
-            cells[level(*waves / half)].push((at(i % n), at(i / n)));
-        }
-    }
-    let side = 2.0 / n as f64;
     let circle = (0..=96).map(|i| std::f64::consts::TAU * f64::from(i) / 96.0);
     let edge = Mark {
         color: "#777777".to_owned(),
@@ -124,8 +117,48 @@ fn map_panel(map: &OpdMap, half: f64) -> Panel {
         x_range: (-1.05, 1.05),
         y_range: (-1.05, 1.05),
         is_to_scale: true,
-        marks: filled(cells, [side, side]).chain([edge]).collect(),
+        marks: levels(map, half).chain([edge]).collect(),
     }
+}
+
+/// Returns a mark for each level of a map, drawn three times as finely as it was computed: by straight lines between the
+/// cells that are known.
+fn levels(map: &OpdMap, half: f64) -> impl Iterator<Item = Mark> {
+    let n = FINER * map.n_across;
+    let edge_at = |i: usize| 2.0 * i as f64 / n as f64 - 1.0;
+    let mut boxes = vec![Vec::new(); (2 * LEVELS + 1) as usize];
+    for row in 0..n {
+        let level_at = |column: usize| between(map, row, column).map(|waves| level(waves / half));
+        let mut column = 0;
+        while column < n {
+            let here = level_at(column);
+            let end = (column + 1..n).find(|&next| level_at(next) != here).unwrap_or(n);
+            if let Some(here) = here {
+                boxes[here].extend([(edge_at(column), edge_at(row)), (edge_at(end), edge_at(row + 1))]);
+            }
+            column = end;
+        }
+    }
+    let levels = boxes.into_iter().enumerate().filter(|(_, points)| !points.is_empty());
+    levels.map(|(level, points)| Mark { color: color(level), kind: MarkKind::Boxes, points })
+}
+
+/// Returns the waves at a cell of the finer grid; `None` where the cell of the map that it lies in has none.
+fn between(map: &OpdMap, row: usize, column: usize) -> Option<f64> {
+    let n = map.n_across;
+    map.waves[row / FINER * n + column / FINER]?;
+    // The cells on both sides, and how far from the first, of both axes.
+    let sides = |i: usize| {
+        let place = (i as f64 + 0.5) / FINER as f64 - 0.5;
+        let below = place.floor().max(0.0);
+        (below as usize, (below as usize + 1).min(n - 1), (place - below).clamp(0.0, 1.0))
+    };
+    let ((r0, r1, fr), (c0, c1, fc)) = (sides(row), sides(column));
+    let corners =
+        [(r0, c0, (1.0 - fr) * (1.0 - fc)), (r0, c1, (1.0 - fr) * fc), (r1, c0, fr * (1.0 - fc)), (r1, c1, fr * fc)];
+    let known = corners.into_iter().filter_map(|(r, c, share)| Some((map.waves[r * n + c]?, share)));
+    let (sum, shares) = known.fold((0.0, 0.0), |(sum, shares), (waves, share)| (sum + share * waves, shares + share));
+    (shares > 0.0).then(|| sum / shares)
 }
 
 fn color_bar(half: f64) -> Panel {

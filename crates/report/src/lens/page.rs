@@ -30,7 +30,7 @@ impl AnalysisPlots<'_> {
         let ranges = Ranges::of(self.0);
         for (row, (spots, fans)) in spots.iter().zip(&fans).enumerate() {
             let y = HEAD_PX + SMALL_PX[1] * row as f64;
-            let panels = [self.spot_panel(spots, ranges.spot_um)].into_iter().chain(fan_panels(fans, &ranges));
+            let panels = [self.spot_panel(spots)].into_iter().chain(fan_panels(fans, &ranges));
             for (column, panel) in panels.enumerate() {
                 let x = MARGIN_PX + SMALL_PX[0] * column as f64;
                 sheet.panel(&panel, [x, y, SMALL_PX[0], SMALL_PX[1]]);
@@ -44,16 +44,15 @@ impl AnalysisPlots<'_> {
         sheet.to_svg(2.0 * MARGIN_PX + 5.0 * SMALL_PX[0], y + LARGE_PX[1] + MARGIN_PX)
     }
 
-    /// Returns the spot diagrams as SVG, a row a field and a column a wavelength, all to one scale.
+    /// Returns the spot diagrams as SVG, a row a field and a column a wavelength, each to its own scale and with Airy's ring.
     pub fn spots_svg(&self) -> String {
         const SIDE_PX: [f64; 2] = [250.0, 248.0];
         let n_wavelengths = self.0.wavelengths_nm.len().max(1);
         let mut sheet = Sheet::default();
         self.head(&mut sheet, "spot diagrams");
-        let range_um = Ranges::of(self.0).spot_um;
         for (i, spot) in self.0.spots.iter().enumerate() {
             let place = [(i % n_wavelengths) as f64, (i / n_wavelengths) as f64];
-            let mut panel = self.spot_panel(std::slice::from_ref(spot), range_um);
+            let mut panel = self.spot_panel(std::slice::from_ref(spot));
             panel.title = format!("{}, {:.0} nm{}", spot.place.label(), spot.wavelength_nm, rms_words(spot));
             let (x, y) = (MARGIN_PX + SIDE_PX[0] * place[0], HEAD_PX + SIDE_PX[1] * place[1]);
             sheet.panel(&panel, [x, y, SIDE_PX[0], SIDE_PX[1]]);
@@ -94,8 +93,11 @@ impl AnalysisPlots<'_> {
         }
     }
 
-    fn spot_panel(&self, spots: &[SpotRow], range_um: f64) -> Panel {
-        let airy_um = 1.22e-3 * self.0.reference_nm * self.0.working_f_number;
+    /// Returns the plot of spots to their own scale, in which Airy's ring has room.
+    fn spot_panel(&self, spots: &[SpotRow]) -> Panel {
+        let airy_um = 1.22e-3 * self.0.reference_nm * self.0.working_f_number.abs();
+        let reach = spots.iter().flat_map(|spot| &spot.points_um).flat_map(|p| [p.0, p.1]);
+        let range_um = half_range(reach.chain([1.15 * airy_um]));
         let circle = (0..=48).map(|i| std::f64::consts::TAU * f64::from(i) / 48.0);
         let mut marks = vec![Mark {
             color: "#888888".to_owned(),
@@ -139,10 +141,10 @@ impl AnalysisPlots<'_> {
         let (bends, bend_label) = match self.0.x_plane {
             None => (
                 vec![
-                    curve(PAIR[0], MarkKind::Line, &|row| row.sagittal_focus_mm),
-                    curve(PAIR[1], MarkKind::Dashed, &|row| row.tangential_focus_mm),
+                    curve(PAIR[0], MarkKind::Line, &|row| row.tangential_focus_mm),
+                    curve(PAIR[1], MarkKind::Dashed, &|row| row.sagittal_focus_mm),
                 ],
-                "focus, mm: — sagittal, - - tangential",
+                "focus, mm: — tangential, - - sagittal",
             ),
             Some(_) => (
                 vec![
@@ -231,18 +233,16 @@ fn rms_words(spot: &SpotRow) -> String {
 
 /// The ranges that all fields share, so that they can be compared.
 struct Ranges {
-    spot_um: f64,
     fan_um: f64,
     waves: f64,
 }
 
 impl Ranges {
     fn of(analysis: &LensAnalysis) -> Self {
-        let spots = analysis.spots.iter().flat_map(|spot| &spot.points_um).flat_map(|p| [p.0, p.1]);
         let fans = || analysis.fans.iter();
         let errors = fans().flat_map(|fan| fan.tangential_um.iter().chain(&fan.sagittal_um)).flatten().copied();
         let waves = fans().flat_map(|fan| fan.tangential_waves.iter().chain(&fan.sagittal_waves)).flatten().copied();
-        Self { spot_um: half_range(spots), fan_um: half_range(errors), waves: half_range(waves) }
+        Self { fan_um: half_range(errors), waves: half_range(waves) }
     }
 }
 
@@ -265,10 +265,10 @@ fn fan_panels(fans: &[FanRow], ranges: &Ranges) -> [Panel; 4] {
             .collect(),
     };
     [
-        panel("rays along y", "εy, µm", ranges.fan_um, &|fan| &fan.tangential_um),
-        panel("rays along x", "εx, µm", ranges.fan_um, &|fan| &fan.sagittal_um),
-        panel("path along y", "waves", ranges.waves, &|fan| &fan.tangential_waves),
-        panel("path along x", "waves", ranges.waves, &|fan| &fan.sagittal_waves),
+        panel("tangential rays (along y)", "εy, µm", ranges.fan_um, &|fan| &fan.tangential_um),
+        panel("sagittal rays (along x)", "εx, µm", ranges.fan_um, &|fan| &fan.sagittal_um),
+        panel("tangential path (along y)", "waves", ranges.waves, &|fan| &fan.tangential_waves),
+        panel("sagittal path (along x)", "waves", ranges.waves, &|fan| &fan.sagittal_waves),
     ]
 }
 

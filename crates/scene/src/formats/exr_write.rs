@@ -5,7 +5,7 @@ use std::{
     path::Path,
 };
 
-use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid, sort_exr_attributes};
 use exr::{
     meta::{BlockDescription, MetaData, header::Header, magic_number},
     prelude::{
@@ -18,7 +18,7 @@ use ndarray::Array2;
 use super::{
     band_name::{self, BandKind},
     beside::{PartialFile, unwritable},
-    exr_attributes, exr_order,
+    exr_attributes,
     spectral_exr::HIDDEN_LAYER,
 };
 use crate::{HiddenLayer, Scene, SceneError, View};
@@ -156,7 +156,7 @@ fn write_layers(path: &Path, mut layers: Vec<Layer<AnyChannels<FlatSamples>>>) -
         Image::from_layers(attributes, SmallVec::<[_; 2]>::from_vec(layers)).write().to_buffered(writer)
     };
     written.map_err(|error| unwritable(path, error))?;
-    exr_order::sort_attributes(partial.file()).map_err(|error| unwritable(path, error))?;
+    sort_exr_attributes(partial.file()).map_err(|error| unwritable(path, error))?;
     partial.finish()
 }
 
@@ -242,7 +242,7 @@ impl BandWriter {
         if let Some(band) = self.is_written.iter().position(|written| !written) {
             return Err(unwritable(self.partial.path(), format!("band '{}' was never given", self.bands[band].0)));
         }
-        let sorted = exr_order::sort_attributes(self.partial.file());
+        let sorted = sort_exr_attributes(self.partial.file());
         sorted.map_err(|error| unwritable(self.partial.path(), error))?;
         self.partial.finish()
     }

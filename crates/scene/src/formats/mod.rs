@@ -7,7 +7,6 @@ mod camera;
 mod envi;
 mod envi_header;
 mod exr_attributes;
-mod exr_order;
 #[cfg(test)]
 mod exr_tests;
 mod exr_write;

@@ -277,3 +277,30 @@ fn an_objective_in_water_is_analyzed_by_heights() {
     let by_light = AnalysisRequest { fields: AnalysisFields::ByLight, ..request }.compute(&lens).unwrap();
     assert!(by_light.fields[3].place.field_deg > 5.0 && by_light.spots.iter().all(|spot| spot.rms_um.is_some()));
 }
+
+#[test]
+fn chosen_fields_end_where_spots_do() {
+    let of = |fields| AnalysisRequest { fields, wavelengths_nm: vec![550.0], ..request(vec![0.0]) };
+    let asphere = Lens::built_in("asphere-15mm").unwrap();
+    let analysis = of(AnalysisFields::ByLight).compute(&asphere).unwrap();
+    // A condenser is lit to beyond 75°, where nothing is an image any more.
+    assert!(analysis.fields[3].place.field_deg < 40.0, "{:?}", analysis.fields[3].place);
+    assert!(analysis.notes.iter().any(|note| note.contains("no longer comes together")), "{:?}", analysis.notes);
+    let fisheye = of(AnalysisFields::ByLight).compute(&Lens::built_in("fisheye-12.5mm").unwrap()).unwrap();
+    assert!(fisheye.fields[3].place.field_deg > 60.0, "{:?}", fisheye.fields[3].place);
+}
+
+#[test]
+fn afocal_lens_is_analyzed_by_angles() {
+    // Kepler's telescope of two ideal lenses: five times the angle, a sharp point in the focus of the third.
+    let front = Lens::thin(100.0, 10.0).unwrap().interfaces()[0].clone();
+    let back = Lens::thin(20.0, 40.0).unwrap().interfaces()[0].clone();
+    let front = Interface { thickness_after_mm: 120.0, ..front };
+    let telescope = Lens::new("telescope", "test", vec![front, back], 0).unwrap();
+    let request = AnalysisRequest { wavelengths_nm: vec![550.0], ..request(vec![0.0, 1.0]) };
+    let analysis = request.compute(&telescope).unwrap();
+    assert!(analysis.notes.iter().any(|note| note.contains("1 µm is 0.01 mrad")), "{:?}", analysis.notes);
+    let height_mm = analysis.spots[1].height_mm.unwrap();
+    assert!((height_mm.abs() - 500.0 * 1_f64.to_radians().tan()).abs() < 1e-6, "{height_mm}");
+    assert!(analysis.spots.iter().all(|spot| spot.rms_um.unwrap() < 1e-3));
+}

@@ -15,6 +15,8 @@ use super::{
 #[derive(Default)]
 pub(super) struct SeqSurface {
     pub(super) line: usize,
+    /// What SLB calls it.
+    pub(super) label: String,
     pub(super) is_stop: bool,
     pub(super) curvature: f64,
     /// What stands for it in `S`, where that was taken for a radius.
@@ -282,6 +284,7 @@ impl SeqSurface {
         let curvature = if self.is_turned() { self.curvature_x } else { self.curvature };
         let surface = SystemSurface {
             line: self.line,
+            comment: self.label.clone(),
             curvature_per_mm: curvature / mm,
             shape: self.shape(mm)?,
             medium_after: if self.is_mirror { before.clone() } else { self.medium.clone().unwrap_or_default() },

@@ -15,6 +15,7 @@ use super::Line;
 pub(super) struct ZmxSurface {
     pub(super) line: usize,
     pub(super) is_stop: bool,
+    pub(super) comment: String,
     pub(super) kind: String,
     pub(super) curvature: f64,
     pub(super) conic: f64,
@@ -66,6 +67,7 @@ impl ZmxSurface {
     pub(super) fn take(&mut self, line: &Line) -> Result<bool, TextError> {
         match line.keyword {
             "STOP" => self.is_stop = true,
+            "COMM" => self.comment = line.text(),
             "TYPE" => self.kind = line.words.first().copied().unwrap_or_default().to_uppercase(),
             "CURV" => self.curvature = line.number(0)?,
             "CONI" => self.conic = line.number(0)?,
@@ -175,6 +177,7 @@ impl ZmxSurface {
         };
         let surface = SystemSurface {
             line: self.line,
+            comment: self.comment.clone(),
             curvature_per_mm,
             shape,
             medium_after,

@@ -1,4 +1,4 @@
-//! The same bytes for the same picture: the attributes of an OpenEXR header in a fixed order.
+//! The same bytes for the same picture: the attributes of an `OpenEXR` header in a fixed order.
 //!
 //! The format leaves their order open, and the library that writes them keeps its own in a table without one.
 
@@ -14,8 +14,13 @@ const MULTIPART: u8 = 0x10;
 /// Headers longer than this are left as they are.
 const LONGEST: u64 = 1 << 22;
 
-/// Sorts the attributes of each header of a file that has been written.
-pub(super) fn sort_attributes(file: &mut File) -> io::Result<()> {
+/// Sorts the attributes of each header of an `OpenEXR` file that has been written, so that equal pictures are equal files.
+///
+/// The file must be open for reading and writing. Headers that are not whole, or longer than 4 MiB, are left as they are.
+///
+/// # Errors
+/// When the file cannot be read or written.
+pub fn sort_exr_attributes(file: &mut File) -> io::Result<()> {
     file.seek(SeekFrom::Start(0))?;
     let mut start = Vec::new();
     Read::by_ref(file).take(LONGEST).read_to_end(&mut start)?;
@@ -26,7 +31,7 @@ pub(super) fn sort_attributes(file: &mut File) -> io::Result<()> {
 
 /// Returns the headers at the start of these bytes with their attributes in the order of their names, as long as
 /// they were; `None` if they are not whole.
-pub(super) fn sorted_headers(start: &[u8]) -> Option<Vec<u8>> {
+fn sorted_headers(start: &[u8]) -> Option<Vec<u8>> {
     let is_multipart = start.get(5)? & MULTIPART != 0;
     let mut rest = start.get(PREAMBLE..)?;
     let mut sorted = Vec::new();

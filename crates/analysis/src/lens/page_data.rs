@@ -1,0 +1,42 @@
+//! What the page of a lens shows beside its analysis.
+
+use dioptric_optics::Lens;
+
+use crate::{AnalysisRequest, LensAnalysis, LensData, LensDefaults, LensInfoRequest, LensModulation};
+use dioptric_pipeline::PipelineError;
+
+/// The lens that was analyzed, its first-order data and its modulation.
+#[derive(Clone, Debug)]
+pub struct LensPageData {
+    /// The lens that was analyzed: an afocal one with an ideal lens behind it.
+    pub lens: Lens,
+    /// What the lens's file calls its surfaces; empty where it names none.
+    pub surface_comments: Vec<String>,
+    /// First-order data of the lens itself, one each of the wavelengths.
+    pub data: Vec<LensData>,
+    /// The modulation, or why there is none.
+    pub modulation: Result<LensModulation, String>,
+}
+
+impl LensPageData {
+    /// Computes it for an analysis of a lens.
+    ///
+    /// # Errors
+    /// When a glass is not known at a wavelength.
+    pub fn of(request: &AnalysisRequest, used: &LensDefaults, analysis: &LensAnalysis) -> Result<Self, PipelineError> {
+        let lens = request.lens_with_image(&used.lens)?.0.into_owned();
+        let field_deg = analysis.fields.iter().map(|row| row.place.field_deg).fold(0.0, f64::max);
+        let distance_mm = Some(request.distance_mm).filter(|mm| mm.is_finite());
+        let data = |&wavelength_nm: &f64| {
+            let question = LensInfoRequest { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm: None };
+            LensData::new(&used.lens, &question)
+        };
+        let weights = used.weights_of(&request.wavelengths_nm);
+        Ok(Self {
+            data: request.wavelengths_nm.iter().map(data).collect::<Result<_, _>>()?,
+            modulation: analysis.modulation(&lens, &weights).map_err(|error| error.to_string()),
+            surface_comments: used.surface_comments.clone(),
+            lens,
+        })
+    }
+}

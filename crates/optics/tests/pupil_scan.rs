@@ -1,0 +1,54 @@
+//! Spots of all built-in lenses against rays counted one by one: a small part of what the example `pupil_scan` compares.
+
+mod counted;
+
+use counted::spot_rms_mm;
+use dioptric_optics::{
+    Lens, MonoLens, ObjectPoint,
+    analysis::{Autofocus, PupilLight, PupilRule},
+    glam::DVec3,
+};
+use rayon::prelude::*;
+
+fn lenses() -> Vec<(&'static str, MonoLens)> {
+    let open = |name| (name, Lens::built_in(name).expect("a built-in lens").at(550.0).expect("glasses that are known"));
+    Lens::built_in_names().map(open).collect()
+}
+
+#[test]
+fn axial_spots_are_those_of_counted_rays() {
+    let compare = |(name, lens): &(&str, MonoLens)| {
+        let axis = ObjectPoint::Infinite(DVec3::Z);
+        let rule = PupilRule::of_rings(12);
+        let Ok(from_mm) = lens.film_distance_mm_for(f64::INFINITY) else { return };
+        let focus = Autofocus { lenses: std::slice::from_ref(lens), points: &[axis], rule };
+        let (best_mm, least_mm) = focus.best_film_mm(from_mm).expect("light on the axis");
+        let rms_mm = |film_mm: f64| {
+            let light = PupilLight::to_film(lens, &axis, film_mm, rule).expect("light on the axis");
+            assert!((light.weights().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            let (_, [xx, yy, _]) = light.moments(lens, film_mm);
+            (xx + yy).sqrt()
+        };
+        assert!((rms_mm(best_mm) / least_mm - 1.0).abs() < 1e-6, "{name}: {} {least_mm}", rms_mm(best_mm));
+        // Out of focus, where the rim, of which rays are hard to count, has no more than its share of the squares.
+        let film_mm = best_mm + 8.0 * least_mm * lens.first_order().f_number;
+        let (found, counted) = (rms_mm(film_mm), spot_rms_mm(lens, &axis, film_mm, 600).expect("light on the axis"));
+        // 600 rays across count a disc to 600 to the power −1.5, 7e-5, and its rim has some times its share of the squares.
+        assert!((found / counted - 1.0).abs() < 7e-4, "{name}: {found} {counted}");
+    };
+    lenses().par_iter().for_each(compare);
+}
+
+#[test]
+fn light_beside_an_obscuration_has_the_moments_of_a_ring() {
+    use dioptric_optics::{Aperture, Outline};
+    let thin = Lens::thin(50.0, 10.0).unwrap();
+    let hole =
+        Aperture { surface: 0, outline: Outline::Circle { radius_mm: 2.5 }, center_mm: [0.0; 2], is_obscuration: true };
+    let lens = Lens::new_with_apertures("annulus", "test", thin.interfaces().to_vec(), 0, vec![hole]).unwrap();
+    let lens = lens.at(550.0).unwrap();
+    let light = PupilLight::to_film(&lens, &ObjectPoint::Infinite(DVec3::Z), 48.0, PupilRule::of_rings(4)).unwrap();
+    // 2 mm before the focus the ring from 2.5 to 5 mm is from 0.1 to 0.2 mm: ⟨r²⟩ is the mean of both squares.
+    let (centroid_mm, [xx, yy, xy]) = light.moments(&lens, 48.0);
+    assert!(((xx + yy) / 0.025 - 1.0).abs() < 1e-9 && centroid_mm.length() < 1e-12 && xy.abs() < 1e-12, "{xx} {yy}");
+}

@@ -1,0 +1,118 @@
+//! The light field of a camera: the irradiance behind its array taken apart, or the pictures of a raster of cameras.
+
+use dioptric_spectrum::Cancel;
+use ndarray::Array2;
+
+use super::{Irradiance, KeptCamera};
+use crate::{
+    FilmSpec, FocusSpec, LightField, LightFieldSpec, PipelineError, Progress, SceneSource, Stage, ViewGeometry,
+    light_field::{ArrayFilm, Decoding, View},
+};
+
+/// Progress of one of so many equal parts.
+struct Part<'a> {
+    progress: &'a dyn Progress,
+    number: usize,
+    of: usize,
+}
+
+impl Progress for Part<'_> {
+    fn at(&self, stage: Stage, fraction: f64) {
+        self.progress.at(stage, (self.number as f64 + fraction) / self.of as f64);
+    }
+}
+
+impl KeptCamera {
+    /// Returns the light field that the camera takes, its channels red, green and blue as an observer sees the irradiance,
+    /// linear sRGB in lux.
+    ///
+    /// `n_views` are the views along each side of the pupil behind an array of small lenses or holes: as many as there are
+    /// pixels across the image of the pupil if left out. A raster of cameras has its own number.
+    ///
+    /// # Errors
+    /// When the camera has no `light_field`, its numbers do not go together, or as [`capture`](Self::capture).
+    pub fn light_field(
+        &self,
+        n_views: Option<usize>,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<LightField, PipelineError> {
+        match &self.camera().light_field {
+            Some(LightFieldSpec::Array(_)) => {
+                self.decoded(&*self.irradiance(progress, cancel)?, n_views, progress, cancel)
+            }
+            Some(LightFieldSpec::Cameras { columns, rows, spacing_mm }) => {
+                self.of_cameras((*rows, *columns), *spacing_mm, progress, cancel)
+            }
+            None => Err(no_light_field()),
+        }
+    }
+
+    /// Returns the light field of an irradiance that was rendered with this camera's array.
+    ///
+    /// # Errors
+    /// When the camera has no array, or its numbers and the irradiance do not go together.
+    pub fn decoded(
+        &self,
+        irradiance: &Irradiance,
+        n_views: Option<usize>,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<LightField, PipelineError> {
+        let Some(array) = self.camera().light_field.as_ref().and_then(LightFieldSpec::micro_array) else {
+            return Err(no_light_field());
+        };
+        let (lens, place) = self.lens_and_film(progress, cancel)?;
+        let film = ArrayFilm {
+            rows: place.rows,
+            columns: place.columns,
+            pitch_mm: 1e-3 * place.pitch_um,
+            // The array stands where the focus puts the film, and the film behind it.
+            array_distance_mm: place.film_distance_mm,
+            exit_pupil_axis_mm: place.exit_pupil_axis_mm,
+        };
+        let decoding = Decoding { array: &array, lens: &lens.reference, film: &film, n_views };
+        decoding.light_field(&irradiance.summary.seen.planes)
+    }
+
+    /// Takes the pictures of a raster of cameras.
+    fn of_cameras(
+        &self,
+        (rows, columns): (usize, usize),
+        spacing_mm: f64,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<LightField, PipelineError> {
+        let SceneSource::World(_) = &self.camera().scene.source else {
+            let reason = "it is no world, of which a raster of cameras could see more than one side".to_owned();
+            return Err(PipelineError::Unsuitable { what: "scene", reason });
+        };
+        // Where focus and film are those of the camera in the middle.
+        let (lens, place) = self.lens_and_film(progress, cancel)?;
+        let of = rows * columns;
+        let views = (0..of).map(|number| {
+            let right = (number % columns) as f64 - 0.5 * (columns as f64 - 1.0);
+            let up = 0.5 * (rows as f64 - 1.0) - (number / columns) as f64;
+            let aside = self.with(|camera| {
+                camera.focus = FocusSpec::FilmMm(place.film_distance_mm);
+                camera.film = FilmSpec::Pixels { columns: place.columns, rows: place.rows, pitch_um: place.pitch_um };
+                if let SceneSource::World(spec) = &mut camera.scene.source {
+                    spec.aside_mm.0 += spacing_mm * right;
+                    spec.aside_mm.1 += spacing_mm * up;
+                }
+            });
+            let irradiance = aside.irradiance(&Part { progress, number, of }, cancel)?;
+            let planes: Vec<Array2<f32>> = irradiance.summary.seen.planes.to_vec();
+            Ok(View { planes, weight: 1.0 })
+        });
+        let views = views.collect::<Result<Vec<View>, PipelineError>>()?;
+        let pitch_mm = 1e-3 * place.pitch_um;
+        let geometry = ViewGeometry::cameras(&lens.reference, place.film_distance_mm, spacing_mm, pitch_mm);
+        LightField::new((rows, columns), views, geometry)
+    }
+}
+
+fn no_light_field() -> PipelineError {
+    let reason = "the camera has none, expected 'light_field: Array((...))' or 'light_field: Cameras(...)'".to_owned();
+    PipelineError::Unsuitable { what: "light_field", reason }
+}
