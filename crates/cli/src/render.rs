@@ -234,7 +234,7 @@ fn finish(
     let (model, depth) = (kept.model(clock, cancel)?, kept.depth(clock, cancel)?);
     clock.at(Stage::Report, 0.0);
     let run = Run { capture: &capture, model: &model, depth: Some(&depth) };
-    let mut report = write_run(&run, staged.path(), &|| clock.timings())?;
+    let mut report = write_run(&run, staged.path(), &|| clock.times())?;
     // The same samples, with their standard errors.
     let files = render.write_files(rendering, &render.auxiliary(cancel)?, staged.path())?;
     report.files.extend(
@@ -244,12 +244,12 @@ fn finish(
             .map(str::to_owned)
             .collect::<Vec<_>>(),
     );
-    report.timings_s = clock.timings();
     let world = kept.world(&Silent, cancel)?;
     let SceneSource::World(spec) = &kept.camera().scene.source else { unreachable!("the scene is a world") };
     let rendering = RenderingSummary::of(rendering, &world, spec);
     let report = Report { run: Some(report), rendering };
     write_json(&staged.path().join("report.json"), &report)?;
+    write_json(&staged.path().join("timings.json"), &clock.times())?;
     kept.write_resume_file(&capture, staged.path())?;
     staged.commit()?;
     remove_preview(out);
@@ -259,7 +259,7 @@ fn finish(
     }
     remark(common.quiet, "");
     match &report.run {
-        Some(run) if !common.quiet => print(&(samples(&report.rendering) + &summary(run, out))),
+        Some(run) if !common.quiet => print(&(samples(&report.rendering) + &summary(run, clock.total_s(), out))),
         _ => Ok(()),
     }
 }

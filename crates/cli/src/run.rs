@@ -2,16 +2,16 @@
 
 use std::{
     path::Path,
-    sync::{Mutex, PoisonError},
-    time::Instant,
+    sync::{Arc, Mutex, PoisonError},
+    time::{Duration, Instant},
 };
 
 use anyhow::{Context, bail};
-use dioptric_analysis::{Run, RunReport};
+use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_pipeline::{
-    BankSpec, BlurSpec, Camera, Diffraction, FilmSpec, FocusSpec, FrameFile, FramesSpec, KeptCamera, LensReadOptions,
-    LensSpec, Progress, Quality, SceneSpec, SensorOptions, SensorSpec, Stage, Staged, StopSpec, WavelengthSpec,
-    parse_illuminant, parse_numbers, with_exposure_s,
+    BankSpec, BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FocusSpec, FrameFile, FramesSpec,
+    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, SceneSpec, SensorOptions, SensorSpec,
+    Stage, Staged, StopSpec, WavelengthSpec, parse_illuminant, parse_numbers, with_exposure_s,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
@@ -36,11 +36,12 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     let depth = kept.depth(&clock, &cancel)?;
     clock.at(Stage::Report, 0.0);
     let run = Run { capture: &capture, model: &model, depth: Some(&depth) };
-    let report = write_run(&run, staged.path(), &|| clock.timings())?;
+    let report = write_run(&run, staged.path(), &|| clock.times())?;
     if capture.camera.outputs.irradiance && capture.quality == Quality::Full {
         kept.write_resume_file(&capture, staged.path())?;
     }
     staged.commit()?;
+    let total_s = clock.total_s();
     drop(clock);
     tell(&capture.lens.notes, common);
     tell(&report.sensor.notes, common);
@@ -48,7 +49,7 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
         return print_json(&report);
     }
     remark(common.quiet, "");
-    if common.quiet { Ok(()) } else { print(&summary(&report, out)) }
+    if common.quiet { Ok(()) } else { print(&summary(&report, total_s, out)) }
 }
 
 /// Returns the camera of the file, of the run to continue or of the demo, with what the command line changes.
@@ -235,8 +236,7 @@ pub(crate) fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
         .with_context(|| format!("--pixels is '{text}', expected WxH, as 640x480"))
 }
 
-pub(crate) fn summary(report: &RunReport, out: &Path) -> String {
-    let total_s: f64 = report.timings_s.iter().map(|(_, seconds)| seconds).sum();
+pub(crate) fn summary(report: &RunReport, total_s: f64, out: &Path) -> String {
     format!(
         "{}: {} × {} pixels, {} bands, {:.2} ms, {:.1} s\n{}{}\n",
         report.camera.name,
@@ -253,23 +253,34 @@ pub(crate) fn summary(report: &RunReport, out: &Path) -> String {
 /// Shows progress and measures how long each stage takes.
 pub(crate) struct Clock {
     bar: Bar,
+    started: Instant,
     stages: Mutex<Vec<(Stage, Instant)>>,
+    imaging: Mutex<Option<ImagingTimes>>,
 }
 
 impl Clock {
     pub(crate) fn new(quiet: bool) -> Self {
-        Self { bar: Bar::new(quiet), stages: Mutex::new(Vec::new()) }
+        Self { bar: Bar::new(quiet), started: Instant::now(), stages: Mutex::default(), imaging: Mutex::default() }
     }
 
-    /// Returns how long each stage has taken so far, s.
-    pub(crate) fn timings(&self) -> Vec<(String, f64)> {
+    /// Returns how long the work has taken so far, s.
+    pub(crate) fn total_s(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
+    /// Returns how long each stage has taken so far, and the parts of the imaging.
+    pub(crate) fn times(&self) -> RunTimes {
         let stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
         let ends = stages.iter().skip(1).map(|(_, start)| *start).chain([Instant::now()]);
-        stages
-            .iter()
-            .zip(ends)
-            .map(|((stage, start), end)| (stage.title().to_owned(), (end - *start).as_secs_f64()))
-            .collect()
+        let stage = |((stage, start), end): (&(Stage, Instant), Instant)| {
+            (stage.title().to_owned(), (end - *start).as_secs_f64())
+        };
+        let part = |(part, time): (&str, Duration)| (part.to_owned(), time.as_secs_f64());
+        let imaging = *self.imaging.lock().unwrap_or_else(PoisonError::into_inner);
+        RunTimes {
+            stages_s: stages.iter().zip(ends).map(stage).collect(),
+            imaging_s: imaging.iter().flat_map(ImagingTimes::parts).map(part).collect(),
+        }
     }
 }
 
@@ -280,6 +291,15 @@ impl Progress for Clock {
             stages.push((stage, Instant::now()));
         }
         self.bar.show(stage.title(), fraction);
+    }
+
+    fn clock(&self) -> Option<Arc<PartClock>> {
+        let started = self.started;
+        Some(Arc::new(move || started.elapsed()))
+    }
+
+    fn imaged(&self, times: &ImagingTimes) {
+        *self.imaging.lock().unwrap_or_else(PoisonError::into_inner) = Some(*times);
     }
 }
 

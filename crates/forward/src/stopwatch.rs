@@ -26,6 +26,31 @@ pub struct ImagingTimes {
     pub compositing: Duration,
 }
 
+impl ImagingTimes {
+    /// The parts with their names, in the order of the work.
+    pub fn parts(&self) -> [(&'static str, Duration); 5] {
+        [
+            ("kernels", self.kernels),
+            ("sampling", self.sampling),
+            ("transforms", self.transforms),
+            ("direct", self.direct),
+            ("compositing", self.compositing),
+        ]
+    }
+
+    /// Returns what has been added since an earlier time of the same plan.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        Self {
+            kernels: self.kernels.saturating_sub(earlier.kernels),
+            sampling: self.sampling.saturating_sub(earlier.sampling),
+            transforms: self.transforms.saturating_sub(earlier.transforms),
+            direct: self.direct.saturating_sub(earlier.direct),
+            compositing: self.compositing.saturating_sub(earlier.compositing),
+        }
+    }
+}
+
 /// A part of imaging.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Part {

@@ -36,7 +36,7 @@ pub use error::PipelineError;
 pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_numbers, parse_pairs};
-pub use progress::{Progress, Silent, Stage};
+pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
 pub use quality::Quality;
 #[cfg(feature = "schema")]
 pub use schema::generated_schemas;

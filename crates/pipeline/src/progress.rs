@@ -1,5 +1,9 @@
 //! How far a run is, for whoever wants to know.
 
+use std::sync::Arc;
+
+pub use dioptric_forward::{Clock, ImagingTimes};
+
 /// A stage of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Stage {
@@ -42,6 +46,17 @@ impl Stage {
 pub trait Progress: Sync {
     /// A stage is done to this part, 0–1. Called from any thread; 0 is the start of the stage.
     fn at(&self, stage: Stage, fraction: f64);
+
+    /// The clock by which the parts of imaging are timed; where there is none they are not.
+    fn clock(&self) -> Option<Arc<Clock>> {
+        None
+    }
+
+    /// The imaging of a scene is done, and its parts took so long, summed over threads. Called where the plan of the imaging has
+    /// a clock.
+    fn imaged(&self, times: &ImagingTimes) {
+        let _ = times;
+    }
 }
 
 /// Tells nobody.

@@ -1,12 +1,19 @@
 //! The whole chain held to physics: from the radiance of a target to the picture.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
-use std::{f64::consts::PI, sync::Mutex};
+use std::{
+    f64::consts::PI,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
 
 use dioptric_pipeline::{
-    Camera, Capture, Diffraction, FilmSpec, FocusSpec, FramesSpec, KeptCamera, LensSpec, Movements, PipelineError,
-    Progress, Quality, SceneSource, SceneSpec, SenseRequest, SensorSpec, Silent, Stage, StopSpec, WavelengthSpec,
-    with_exposure_s,
+    Camera, Capture, Clock, Diffraction, FilmSpec, FocusSpec, FramesSpec, ImagingTimes, KeptCamera, LensSpec,
+    Movements, PipelineError, Progress, Quality, SceneSource, SceneSpec, SenseRequest, SensorSpec, Silent, Stage,
+    StopSpec, WavelengthSpec, with_exposure_s,
 };
 use dioptric_scene::Pattern;
 use dioptric_sensor::{NoiseSource, NoiseSources, Processing};
@@ -281,13 +288,28 @@ fn every_stage_is_cancelled_and_begins_again() {
     }
 }
 
-/// Keeps all news.
+/// Keeps all news, and times the parts of imaging where it is timed.
 #[derive(Default)]
-struct News(Mutex<Vec<(Stage, f64)>>);
+struct News {
+    stages: Mutex<Vec<(Stage, f64)>>,
+    imaged: Mutex<Vec<ImagingTimes>>,
+    is_timed: bool,
+}
 
 impl Progress for News {
     fn at(&self, stage: Stage, fraction: f64) {
-        self.0.lock().unwrap().push((stage, fraction));
+        self.stages.lock().unwrap().push((stage, fraction));
+    }
+
+    /// Counts its calls: each piece of work takes 1 ns.
+    fn clock(&self) -> Option<Arc<Clock>> {
+        let calls = AtomicU64::new(0);
+        self.is_timed
+            .then(|| -> Arc<Clock> { Arc::new(move || Duration::from_nanos(calls.fetch_add(1, Ordering::Relaxed))) })
+    }
+
+    fn imaged(&self, times: &ImagingTimes) {
+        self.imaged.lock().unwrap().push(*times);
     }
 }
 
@@ -296,12 +318,26 @@ fn progress_begins_every_stage_in_order() {
     let news = News::default();
     let camera = before(Pattern::Uniform);
     KeptCamera::new(camera).capture(&news, &Cancel::new()).unwrap();
-    let news = news.0.into_inner().unwrap();
+    assert!(news.imaged.into_inner().unwrap().is_empty());
+    let news = news.stages.into_inner().unwrap();
     assert!(news.iter().all(|(_, fraction)| (0.0..=1.0).contains(fraction)));
     let mut stages: Vec<Stage> = news.iter().map(|(stage, _)| *stage).collect();
     stages.dedup();
     let wanted = [Stage::Scene, Stage::Lens, Stage::Plan, Stage::Irradiance, Stage::Sensor, Stage::Picture];
     assert_eq!(stages, wanted);
+}
+
+#[test]
+fn imaging_is_timed_where_there_is_a_clock() {
+    let news = News { is_timed: true, ..News::default() };
+    let kept = KeptCamera::new(before(Pattern::Uniform));
+    kept.capture(&news, &Cancel::new()).unwrap();
+    // Kept irradiance is not imaged again.
+    kept.with(|camera| camera.seed += 1).capture(&news, &Cancel::new()).unwrap();
+    let imaged = news.imaged.into_inner().unwrap();
+    assert_eq!(imaged.len(), 1);
+    assert!(imaged[0].kernels > Duration::ZERO && imaged[0].sampling > Duration::ZERO, "{imaged:?}");
+    assert!(imaged[0].compositing > Duration::ZERO, "{imaged:?}");
 }
 
 #[test]

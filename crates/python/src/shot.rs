@@ -239,7 +239,7 @@ impl Shot {
         let (model, depth) = self.model_and_depth(py)?;
         let capture = &*self.capture;
         let report = run(py, &Follower::nobody(), |_, _| {
-            RunReport::new(&Run { capture, model: &model, depth: Some(&depth) }, &[], Vec::new())
+            RunReport::new(&Run { capture, model: &model, depth: Some(&depth) }, Vec::new())
         })?;
         to_python(py, &report)
     }
@@ -362,7 +362,7 @@ impl Shot {
                 files.push(dioptric_pipeline::RESUME_FILE.to_owned());
             }
         }
-        let report = RunReport::new(&Run { capture, model, depth: Some(depth) }, &[], files.clone())?;
+        let report = RunReport::new(&Run { capture, model, depth: Some(depth) }, files.clone())?;
         write_json(&folder.join("report.json"), &report)?;
         files.push("report.json".to_owned());
         Ok(files)

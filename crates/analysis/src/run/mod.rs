@@ -55,10 +55,18 @@ pub struct RunReport {
     pub color_matrix: [Vec<f64>; 3],
     /// The mean ΔE₀₀ that is left of the 24-patch chart after the matrix; none where it was not fitted.
     pub color_matrix_mean_delta_e: Option<f64>,
-    /// How long each stage took, s.
-    pub timings_s: Vec<(String, f64)>,
     /// The files beside the report.
     pub files: Vec<String>,
+}
+
+/// Where the time of a run went, as `timings.json` has it: what the caller measured, for the library reads no clock. Equal runs
+/// have equal reports, and other times.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RunTimes {
+    /// How long each stage took, s.
+    pub stages_s: Vec<(String, f64)>,
+    /// Of the imaging, how long each part took, s, summed over threads; nothing where no scene was imaged.
+    pub imaging_s: Vec<(String, f64)>,
 }
 
 /// The film of a run.
@@ -109,11 +117,11 @@ pub struct IrradianceData {
 impl RunReport {
     /// Returns the numbers of a run.
     ///
-    /// `timings_s` is what the caller measured of each stage, and `files` what was written; the library reads no clock.
+    /// `files` are those written beside the report.
     ///
     /// # Errors
     /// When the scene has no depth, or a glass is not known at the reference wavelength.
-    pub fn new(run: &Run<'_>, timings_s: &[(String, f64)], files: Vec<String>) -> Result<Self, PipelineError> {
+    pub fn new(run: &Run<'_>, files: Vec<String>) -> Result<Self, PipelineError> {
         let places = RunPlaces::of(run);
         let fields = [0.0, 0.35, 0.7, 1.0].map(|share| places.field(share));
         let capture = run.capture;
@@ -146,7 +154,6 @@ impl RunReport {
             white_balance: capture.developed.balance.clone(),
             color_matrix: capture.developed.color.rows.clone(),
             color_matrix_mean_delta_e: capture.developed.color.mean_delta_e(),
-            timings_s: timings_s.to_vec(),
             files,
         })
     }

@@ -8,7 +8,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use dioptric_forward::{ImagingPlan, Source};
+use dioptric_forward::{ImagingPlan, ImagingTimes, Source};
 use dioptric_scene::{BandWriter, ExrParts, Scene, read_spectral_exr};
 use dioptric_spectrum::{Bands, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::{Array2, Array3, ArrayView3, Axis};
@@ -184,7 +184,7 @@ pub(super) fn image(
     let mut cube = Array3::zeros(shape);
     let mut summing = Summing::new(&grid, size);
     let source = Source::of_scene(scene)?;
-    let progress = |fraction| watch.progress.at(Stage::Irradiance, fraction);
+    let (progress, earlier) = (|fraction| watch.progress.at(Stage::Irradiance, fraction), plan.times());
     plan.stream(&source.light(), &progress, watch.cancel, &mut |band, plane| {
         summing.add(band, &plane);
         match &mut file {
@@ -196,6 +196,10 @@ pub(super) fn image(
         }
         Ok(())
     })?;
+    let times = plan.times().since(&earlier);
+    if times != ImagingTimes::default() {
+        watch.progress.imaged(&times);
+    }
     let planes = file.map_or(Planes::Memory(cube), |file| Planes::File(Mutex::new(file)));
     Ok(Irradiance { grid, size, pitch_um: place.pitch_um, planes, summary: summing.summary })
 }

@@ -29,5 +29,9 @@ pub(super) fn plan(
     };
     let spec = ImagingSpec { film: place.film(), grid: scene.radiance.grid().clone(), settings };
     let progress = |fraction| watch.progress.at(Stage::Plan, fraction);
-    Ok(ImagingPlan::new(model, &Source::of_scene(scene)?.geometry(), spec, &progress, watch.cancel)?)
+    let plan = ImagingPlan::new(model, &Source::of_scene(scene)?.geometry(), spec, &progress, watch.cancel)?;
+    Ok(match watch.progress.clock() {
+        Some(clock) => plan.with_clock(clock),
+        None => plan,
+    })
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dioptric_analysis::{LineChart, Run, RunCharts, RunPlaces, RunReport};
+use dioptric_analysis::{LineChart, Run, RunCharts, RunPlaces, RunReport, RunTimes};
 use dioptric_pipeline::BankData;
 use dioptric_sensor::WhiteBalance;
 
@@ -18,6 +18,7 @@ const MOSAIC_PX: usize = 150;
 pub(super) struct Page<'a> {
     pub(super) run: &'a Run<'a>,
     pub(super) report: &'a RunReport,
+    pub(super) times: &'a RunTimes,
     pub(super) places: &'a RunPlaces,
     pub(super) charts: &'a RunCharts,
     pub(super) picture_png: &'a [u8],
@@ -55,7 +56,7 @@ pub(super) fn write_page(page: &Page<'_>, pictures: &Pictures) -> String {
         section("Geometry and light over the field", &field(page)),
         section("Spectral irradiance on the film", &irradiance(page, pictures)),
         section(&format!("Sensor: {}", escaped(&report.sensor.sensor)), &sensor(report)),
-        if report.timings_s.is_empty() { String::new() } else { section("Time", &timings(report)) },
+        if page.times.stages_s.is_empty() { String::new() } else { section("Time", &timings(page.times)) },
         format!(
             "<section>\n<details><summary>All settings, as a camera file</summary><pre>{}</pre></details>\n</section>\n",
             escaped(&page.run.capture.camera.to_ron())
@@ -224,8 +225,17 @@ fn sensor(report: &RunReport) -> String {
     table(&heads, rows) + &note(&words)
 }
 
-fn timings(report: &RunReport) -> String {
-    table(&[], report.timings_s.iter().map(|(stage, seconds)| vec![escaped(stage), format!("{seconds:.2} s")]))
+fn timings(times: &RunTimes) -> String {
+    let rows = |times_s: &[(String, f64)]| {
+        table(&[], times_s.iter().map(|(what, seconds)| vec![escaped(what), format!("{seconds:.2} s")]))
+    };
+    let stages = rows(&times.stages_s);
+    if times.imaging_s.is_empty() {
+        return stages;
+    }
+    let parts = rows(&times.imaging_s);
+    format!("<div class=\"pair\">\n<div>{stages}</div><div>{parts}</div></div>\n")
+        + &note("Right: the parts of scene to irradiance, summed over threads.")
 }
 
 #[cfg(test)]

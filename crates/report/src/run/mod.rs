@@ -1,26 +1,22 @@
-//! The files of a run: irradiance, frames, picture, `report.html` and `report.json`.
+//! The files of a run: irradiance, frames, picture, `report.html`, `report.json` and `timings.json`.
 
 mod html;
 mod page;
 
 use std::path::Path;
 
-use dioptric_analysis::{Run, RunCharts, RunPlaces, RunReport, SensorStatistics};
+use dioptric_analysis::{Run, RunCharts, RunPlaces, RunReport, RunTimes, SensorStatistics};
 use dioptric_pipeline::{IRRADIANCE_FILE, Outputs, PipelineError, Sensed, write_file, write_frames, write_json};
 use dioptric_scene::write_planes_exr;
 
 /// Writes everything of a run into a folder, and returns the report.
 ///
-/// `timings_s` returns how long each stage has taken so far, and is asked last of all, so that `report.json` counts the
-/// writing of the other files too; the library reads no clock.
+/// `times` returns where the time has gone so far, and is asked last of all, so that `timings.json` counts the writing of the
+/// other files too; the library reads no clock.
 ///
 /// # Errors
 /// When a file cannot be written.
-pub fn write_run(
-    run: &Run<'_>,
-    folder: &Path,
-    timings_s: &dyn Fn() -> Vec<(String, f64)>,
-) -> Result<RunReport, PipelineError> {
+pub fn write_run(run: &Run<'_>, folder: &Path, times: &dyn Fn() -> RunTimes) -> Result<RunReport, PipelineError> {
     let capture = run.capture;
     let outputs = &capture.camera.outputs;
     let mut files = Vec::new();
@@ -34,13 +30,14 @@ pub fn write_run(
     }
     let (frame_files, png) = write_frames(&capture.frame_parts(), &capture.developed.picture, outputs, folder)?;
     files.extend(frame_files);
-    let report = RunReport::new(run, &timings_s(), files)?;
+    let report = RunReport::new(run, files)?;
     let places = RunPlaces::of(run);
     let charts = RunCharts::of(run, &places, &report.sensor);
-    let page = html::Page { run, report: &report, places: &places, charts: &charts, picture_png: &png };
+    let page =
+        html::Page { run, report: &report, times: &times(), places: &places, charts: &charts, picture_png: &png };
     write_file(&folder.join("report.html"), page::render(&page)?.as_bytes())?;
-    let report = RunReport { timings_s: timings_s(), ..report };
     write_json(&folder.join("report.json"), &report)?;
+    write_json(&folder.join("timings.json"), &times())?;
     Ok(report)
 }
 
