@@ -4,7 +4,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{CAMERA, check_error, dioptric, output};
+use common::{CAMERA, check_error, dioptric, output, read_picture};
 use serde_json::Value;
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
@@ -294,7 +294,7 @@ fn run_takes_a_picture_through_a_tilted_lens() {
     let movements = serde_json::json!({"tilt_deg": 5.0, "swing_deg": -1.0, "rise_mm": 0.5, "shift_mm": 0.0});
     assert_eq!(report["camera"]["movements"], movements);
     // The scene fills the film to its rim: no corner is dark.
-    let picture = image::open(folder.path().join("out/picture.png")).unwrap().to_rgb8();
+    let picture = read_picture(&folder.path().join("out/picture.png")).to_rgb8();
     let (columns, rows) = picture.dimensions();
     for (x, y) in [(0, 0), (columns - 1, 0), (0, rows - 1), (columns - 1, rows - 1), (columns / 2, rows / 2)] {
         assert!(picture.get_pixel(x, y).0[1] > 60, "{x} {y}: {:?}", picture.get_pixel(x, y));

@@ -7,6 +7,7 @@ mod common;
 use std::{fs, path::Path};
 
 use common::{check_error, output};
+use dioptric_pictures::save;
 use image::{GrayImage, ImageBuffer, Luma, Rgb};
 use serde_json::Value;
 
@@ -50,7 +51,7 @@ fn half_frequency() -> f64 {
 #[test]
 fn an_edge_is_found_and_has_its_mtf50() {
     let folder = tempfile::tempdir().unwrap();
-    edge_picture(120, |_, _| 1.0).save(folder.path().join("edge.png")).unwrap();
+    save(&edge_picture(120, |_, _| 1.0).into(), &folder.path().join("edge.png")).unwrap();
     let arguments = ["measure", "mtf", "edge.png", "--pixel-um", "4", "--json", "-o", "out"];
     let measured = json(folder.path(), &arguments);
     let channel = &measured["channels"][0];
@@ -70,7 +71,7 @@ fn a_mosaic_is_measured_filter_by_filter() {
     let folder = tempfile::tempdir().unwrap();
     // Filters of different sensitivity would look like edges themselves.
     let gain = |x: u32, y: u32| [1.0, 0.6, 0.4][((x % 2) + (y % 2)) as usize];
-    edge_picture(200, gain).save(folder.path().join("raw.png")).unwrap();
+    save(&edge_picture(200, gain).into(), &folder.path().join("raw.png")).unwrap();
     let measured = json(folder.path(), &["measure", "mtf", "raw.png", "--mosaic", "RGGB", "--json"]);
     let channels = measured["channels"].as_array().unwrap();
     let names: Vec<&str> = channels.iter().map(|c| c["channel"].as_str().unwrap()).collect();
@@ -95,7 +96,7 @@ fn points_picture(points: &[(f64, f64, f64)]) -> ImageBuffer<Luma<u16>, Vec<u16>
 #[test]
 fn points_have_their_places_and_moments() {
     let folder = tempfile::tempdir().unwrap();
-    points_picture(&[(100.3, 40.6, 3.0), (40.0, 80.25, 2.0)]).save(folder.path().join("points.png")).unwrap();
+    save(&points_picture(&[(100.3, 40.6, 3.0), (40.0, 80.25, 2.0)]).into(), &folder.path().join("points.png")).unwrap();
     let measured = json(folder.path(), &["measure", "spot", "points.png", "--pixel-um", "2", "--json", "-o", "out"]);
     let spots = measured["spots"].as_array().unwrap();
     assert_eq!(spots.len(), 2);
@@ -199,8 +200,8 @@ fn chart_picture(shift: u8) -> ImageBuffer<Rgb<u8>, Vec<u8>> {
 #[test]
 fn a_chart_is_found_and_two_pictures_are_compared() {
     let folder = tempfile::tempdir().unwrap();
-    chart_picture(0).save(folder.path().join("chart.png")).unwrap();
-    chart_picture(6).save(folder.path().join("reddish.png")).unwrap();
+    save(&chart_picture(0).into(), &folder.path().join("chart.png")).unwrap();
+    save(&chart_picture(6).into(), &folder.path().join("reddish.png")).unwrap();
     let found = json(folder.path(), &["measure", "color", "chart.png", "--json", "-o", "out"]);
     assert_eq!(found["patches"].as_array().unwrap().len(), 24);
     // Published sRGB values, 8 bits and the charts of different years: a few ΔE at most.
@@ -230,8 +231,8 @@ fn a_chart_is_found_and_two_pictures_are_compared() {
 fn bad_input_ends_in_one_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    GrayImage::from_pixel(64, 64, Luma([90])).save(path.join("even.png")).unwrap();
-    chart_picture(0).save(path.join("chart.png")).unwrap();
+    save(&GrayImage::from_pixel(64, 64, Luma([90])).into(), &path.join("even.png")).unwrap();
+    save(&chart_picture(0).into(), &path.join("chart.png")).unwrap();
     fs::write(path.join("text.png"), "no picture").unwrap();
     fs::write(path.join("list.txt"), "b 10 many\n").unwrap();
     fs::create_dir(path.join("empty")).unwrap();

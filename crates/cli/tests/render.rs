@@ -12,7 +12,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{CAMERA, check_error, output};
+use common::{CAMERA, check_error, output, read_picture};
 
 /// A gray wall 2 m before the camera, and a lamp beside the view.
 const WORLD: &str = r#"
@@ -152,7 +152,7 @@ fn killed_rendering_is_continued_to_the_same_bits() {
     assert!(state.exists());
     // What there is can be looked at before the end, and gives way to the picture.
     let preview = folder.path().join("killed/preview.png");
-    let shown = image::open(&preview).unwrap();
+    let shown = read_picture(&preview);
     assert!(shown.width() >= 24 && shown.height() >= 16);
     output(folder.path(), &[&words("killed")[..], &["--resume"]].concat());
     assert!(!preview.exists());

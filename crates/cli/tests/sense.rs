@@ -6,7 +6,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{CAMERA, check_error, output};
+use common::{CAMERA, check_error, output, read_picture};
 use image::{ColorType, DynamicImage};
 use serde_json::Value;
 
@@ -46,7 +46,7 @@ fn every_file_of_a_frame_is_written_and_reads_back() {
     let folder = folder();
     let all = "electrons,raw-tiff,raw-dng,picture-png16,picture-tiff8,picture-tiff16,picture-exr";
     sense(folder.path(), "small.ron", &["--also", all]);
-    let open = |name: &str| -> DynamicImage { image::open(folder.path().join("out").join(name)).unwrap() };
+    let open = |name: &str| -> DynamicImage { read_picture(&folder.path().join("out").join(name)) };
     assert_eq!(open("raw.png").color(), ColorType::L16);
     assert_eq!(open("raw.tiff").into_luma16(), open("raw.png").into_luma16());
     assert_eq!(open("picture.png").color(), ColorType::Rgb8);
@@ -69,7 +69,7 @@ fn every_file_of_a_frame_is_written_and_reads_back() {
 
 /// Returns the standard deviation of the picture's green codes in the middle of the frame.
 fn noise(folder: &Path) -> f64 {
-    let picture = image::open(folder.join("out/picture-16.png")).unwrap().into_rgb16();
+    let picture = read_picture(&folder.join("out/picture-16.png")).into_rgb16();
     let middle = (8..24).flat_map(|y| (12..36).map(move |x| (x, y)));
     let codes: Vec<f64> = middle.map(|(x, y)| f64::from(picture.get_pixel(x, y).0[1])).collect();
     let mean = codes.iter().sum::<f64>() / codes.len() as f64;
@@ -117,7 +117,7 @@ fn noise_and_white_are_chosen_on_the_command_line() {
     let folder = folder();
     let raw = |options: &[&str]| {
         sense(folder.path(), "small.ron", &[&["--exposure-s", "1e-6"], options].concat());
-        image::open(folder.path().join("out/raw.png")).unwrap().into_luma16()
+        read_picture(&folder.path().join("out/raw.png")).into_luma16()
     };
     assert_eq!(raw(&["--noise", "none", "--seed", "1"]), raw(&["--noise", "none", "--seed", "2"]));
     assert_ne!(raw(&["--noise", "photon", "--seed", "1"]), raw(&["--noise", "photon", "--seed", "2"]));
@@ -131,7 +131,7 @@ fn noise_and_white_are_chosen_on_the_command_line() {
     for white in ["patch:4,4,24,16", "gray-world", "shades-of-gray"] {
         let options = ["--white", white, "--demosaic", "bilinear", "--highlights", "clip", "--noise", "none"];
         sense(folder.path(), "small.ron", &options);
-        let picture = image::open(folder.path().join("out/picture.png")).unwrap().into_rgb8();
+        let picture = read_picture(&folder.path().join("out/picture.png")).into_rgb8();
         let [r, g, b] = picture.get_pixel(24, 16).0.map(i32::from);
         assert!((r - g).abs() <= 1 && (b - g).abs() <= 1, "{white}: {r} {g} {b}");
     }
@@ -168,7 +168,10 @@ fn only_the_pixels_under_the_image_are_read() {
     let folder = folder();
     // 9.6 × 6.4 mm of light on 4.51 × 2.88 mm of pixels, and on the middle of 23.6 × 15.6 mm.
     sense(folder.path(), "mt9v024", &[]);
-    let size = |name: &str| image::image_dimensions(folder.path().join(name)).unwrap();
+    let size = |name: &str| {
+        let found = read_picture(&folder.path().join(name));
+        (found.width(), found.height())
+    };
     assert_eq!(size("out/picture.png"), (752, 480));
     sense(folder.path(), "nikon-d5100", &[]);
     assert_eq!(size("out/picture.png"), (2008, 1339));

@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 Ok(())
             })?;
         }
-        picture.save(out.join(format!("edges_{name}.png")))?;
+        dioptric_pictures::save(&picture.into(), &out.join(format!("edges_{name}.png")))?;
     }
     Ok(())
 }

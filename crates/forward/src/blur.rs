@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use dioptric_fft::Complex;
 use dioptric_psf::FilmMap;
 use dioptric_spectrum::{Cancel, Cancelled};
 use rayon::prelude::*;
-use rustfft::num_complex::Complex;
 
 use crate::{
     convolve::{STRIP_COLUMNS, STRIP_ROWS, Strip, fast_size, multiply_add, with_fft},

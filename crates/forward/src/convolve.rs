@@ -2,8 +2,7 @@
 
 use std::{cell::RefCell, collections::HashMap, rc::Rc, sync::Arc};
 
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use rustfft::{Fft, FftPlanner, num_complex::Complex};
+use dioptric_fft::{Complex, ComplexToReal, Fft, Planner, RealToComplex};
 
 /// Rows transformed together, so that the transpose writes whole cache lines.
 const BATCH: usize = 8;
@@ -54,9 +53,9 @@ pub(crate) fn with_fft<R>(size: usize, body: impl FnOnce(&mut Fft2) -> R) -> R {
 
 impl Fft2 {
     fn new(size: usize) -> Self {
-        let (mut real, mut complex) = (RealFftPlanner::<f32>::new(), FftPlanner::<f32>::new());
-        let (row_forward, row_inverse) = (real.plan_fft_forward(size), real.plan_fft_inverse(size));
-        let (column_forward, column_inverse) = (complex.plan_fft_forward(size), complex.plan_fft_inverse(size));
+        let mut planner = Planner::new();
+        let (row_forward, row_inverse) = (planner.real_forward(size), planner.real_inverse(size));
+        let (column_forward, column_inverse) = (planner.forward(size), planner.inverse(size));
         let n_scratch = [
             row_forward.get_scratch_len(),
             row_inverse.get_scratch_len(),

@@ -70,6 +70,9 @@ pub struct Settings {
     pub depth_edge_px: f64,
     /// Largest change of blur radius between wavelengths among which PSFs are interpolated, pixels.
     pub chromatic_step_px: f64,
+    /// Largest blur radius of a layer that is imaged on the pixels of the film; wider blurs have pixels 2, 4, 8 … times as
+    /// wide, so that the radius is between half of this and this. At least 4.
+    pub widest_blur_px: f64,
 }
 
 impl Default for Settings {
@@ -81,6 +84,7 @@ impl Default for Settings {
             layer_step_px: 2.0,
             depth_edge_px: 3.0,
             chromatic_step_px: 0.25,
+            widest_blur_px: 64.0,
         }
     }
 }
@@ -104,6 +108,10 @@ impl Settings {
         if !(self.chromatic_step_px.is_finite() && self.chromatic_step_px >= 0.0) {
             let (what, value) = ("the chromatic step", self.chromatic_step_px);
             return Err(ForwardError::Setting { what, value, expected: "a number, 0 or more" });
+        }
+        if !(self.widest_blur_px.is_finite() && self.widest_blur_px >= 4.0) {
+            let (what, value) = ("the widest blur", self.widest_blur_px);
+            return Err(ForwardError::Setting { what, value, expected: "a number, 4 pixels or more" });
         }
         if !(16..=1024).contains(&self.knot_spacing_px) || self.knot_spacing_px % 2 == 1 {
             let (what, value) = ("the knot spacing", self.knot_spacing_px as f64);

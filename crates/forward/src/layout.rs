@@ -78,7 +78,8 @@ impl Stack {
         let extent_mm = corner_mm + pitch_mm * std::f64::consts::SQRT_2 * border_px;
         let maps: Vec<FilmMap> = layers.dioptres().iter().map(|&d| lens.film_map(d, middle_nm, extent_mm)).collect();
         let view = (scene.view, scene.size());
-        let raster = |(&radius_px, map)| LayerRaster::new(film, LayerRaster::factor_for(radius_px), view, map);
+        let factor = |radius_px: f64| LayerRaster::factor_for(radius_px, settings.widest_blur_px);
+        let raster = |(&radius_px, map)| LayerRaster::new(film, factor(radius_px), view, map);
         let rasters = radius_px.iter().zip(&maps).map(raster).collect();
         Self { layers, kernel_bands, radius_px, rasters, maps, extent_mm }
     }

@@ -5,9 +5,6 @@ use dioptric_scene::View;
 
 use crate::{Film, geometry::FilmFrame, sampler::Sampler};
 
-/// Blur radius, in pixels of the film, from which a layer is imaged on a coarser raster.
-const WIDE_PX: f64 = 64.0;
-
 /// The most samples of the scene a pixel of the film, each way.
 const MOST_SAMPLES: usize = 16;
 
@@ -23,10 +20,10 @@ pub(crate) struct LayerRaster {
 }
 
 impl LayerRaster {
-    /// Returns the factor for a blur: 1, or that with which its radius is 32 to 64 pixels.
-    pub(crate) fn factor_for(blur_px: f64) -> usize {
+    /// Returns the factor for a blur: 1, or that with which its radius is at most `widest_px`, and more than half of that.
+    pub(crate) fn factor_for(blur_px: f64, widest_px: f64) -> usize {
         let mut factor = 1;
-        while blur_px > WIDE_PX * factor as f64 {
+        while blur_px > widest_px * factor as f64 {
             factor *= 2;
         }
         factor

@@ -5,7 +5,6 @@ use std::{fs, path::Path};
 use dioptric_scene::write_planes_exr;
 use dioptric_sensor::{Depth, ElectronRate, Exposure, Picture, Processing, Raw, Sensor};
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 
@@ -137,11 +136,8 @@ pub fn write_frames(
 /// # Errors
 /// When it cannot be encoded.
 pub fn picture_png(picture: &Picture) -> Result<Vec<u8>, PipelineError> {
-    let mut png = Vec::new();
-    PngEncoder::new(&mut png)
-        .write_image(&picture.to_rgb8(), picture.columns() as u32, picture.rows() as u32, ExtendedColorType::Rgb8)
-        .map_err(|e| PipelineError::Png { reason: e.to_string() })?;
-    Ok(png)
+    dioptric_pictures::encode_rgb8_png(&picture.to_rgb8(), (picture.columns(), picture.rows()))
+        .map_err(|e| PipelineError::Png { reason: e.to_string() })
 }
 
 fn write_also(

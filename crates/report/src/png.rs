@@ -1,15 +1,12 @@
 //! Pictures as PNG.
 
 use dioptric_pipeline::PipelineError;
-use image::{ImageEncoder, RgbImage, codecs::png::PngEncoder};
+use image::RgbImage;
 
 /// Returns a picture as the bytes of a PNG file.
 pub(crate) fn png_bytes(picture: &RgbImage) -> Result<Vec<u8>, PipelineError> {
-    let mut bytes = Vec::new();
-    PngEncoder::new(&mut bytes)
-        .write_image(picture, picture.width(), picture.height(), image::ExtendedColorType::Rgb8)
-        .map_err(|e| PipelineError::Png { reason: e.to_string() })?;
-    Ok(bytes)
+    dioptric_pictures::encode_rgb8_png(picture, (picture.width() as usize, picture.height() as usize))
+        .map_err(|e| PipelineError::Png { reason: e.to_string() })
 }
 
 /// Returns the picture enlarged by a whole number, samples staying sharp.

@@ -1,9 +1,9 @@
 //! A quick look at a spectral image as an sRGB picture.
 
-use std::{io::BufWriter, path::Path};
+use std::{io::Write, path::Path};
 
+use dioptric_pictures::encode_rgb8_png;
 use dioptric_spectrum::{Observer, SpectralImage, Xyz, adapt_bradford, srgb_encode};
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -44,10 +44,9 @@ pub fn srgb_preview(image: &SpectralImage, white: Xyz) -> Array2<[u8; 3]> {
 /// When the file cannot be written; it is then not there.
 pub fn write_preview_png(path: &Path, image: &SpectralImage, white: Xyz) -> Result<(), SceneError> {
     let codes: Vec<u8> = srgb_preview(image, white).into_iter().flatten().collect();
+    let png = encode_rgb8_png(&codes, (image.columns(), image.rows())).map_err(|error| unwritable(path, error))?;
     let mut partial = PartialFile::create(path)?;
-    PngEncoder::new(BufWriter::new(partial.file()))
-        .write_image(&codes, image.columns() as u32, image.rows() as u32, ExtendedColorType::Rgb8)
-        .map_err(|error| unwritable(path, error))?;
+    partial.file().write_all(&png).map_err(|error| unwritable(path, error))?;
     partial.finish()
 }
 
@@ -71,7 +70,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         write_preview_png(&path, &scene.radiance, white).unwrap();
-        let back = image::open(&path).unwrap().into_rgb8();
+        let back = dioptric_pictures::read(&path, dioptric_pictures::Limits::no_limits()).unwrap().into_rgb8();
         // sRGB 1.055 × 0.5^(1/2.4) − 0.055 = 0.7354.
         assert_eq!((back.get_pixel(4, 0).0, back.get_pixel(0, 0).0), ([255; 3], [188; 3]));
         assert!(write_preview_png(&folder.path().join("no/a.png"), &scene.radiance, white).is_err());

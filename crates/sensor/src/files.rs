@@ -2,11 +2,12 @@
 
 use std::{
     fs,
-    io::{BufWriter, Cursor, Write},
+    io::{BufWriter, Write},
     path::Path,
 };
 
-use image::{DynamicImage, ImageBuffer, ImageFormat};
+use dioptric_pictures::{DynamicImage, ImageFormat, encode};
+use image::ImageBuffer;
 
 use crate::{Picture, Raw, RawPlane, SensorError};
 
@@ -68,9 +69,7 @@ fn write_image(path: &Path, image: &DynamicImage) -> Result<(), SensorError> {
         Some("tif" | "tiff") => ImageFormat::Tiff,
         _ => return Err(write_error(path, "the extension must be png, tif or tiff")),
     };
-    let mut bytes = Cursor::new(Vec::new());
-    image.write_to(&mut bytes, format).map_err(|e| write_error(path, e))?;
-    write_beside_and_rename(path, bytes.get_ref())
+    write_beside_and_rename(path, &encode(image, format).map_err(|e| write_error(path, e))?)
 }
 
 /// Writes a file under another name beside its own, then renames it, so that there is never half a file.

@@ -15,7 +15,7 @@ const LAGS: [(usize, usize); 6] = [(0, 1), (1, 0), (1, 1), (0, 2), (2, 0), (2, 2
 
 fn codes(name: &str) -> Array3<f32> {
     let path = dioptric_golden::shared(&format!("reference/paper/images/{name}")).unwrap();
-    let picture = image::open(path).unwrap().into_rgb8();
+    let picture = dioptric_pictures::read(&path, dioptric_pictures::Limits::no_limits()).unwrap().into_rgb8();
     let size = (picture.height() as usize, picture.width() as usize, 3);
     Array3::from_shape_fn(size, |(r, c, k)| f32::from(picture.get_pixel(c as u32, r as u32).0[k]) / 255.0)
 }

@@ -60,19 +60,18 @@ impl ImageTexture {
     /// When the file can't be read as a picture, or has more than 2²⁸ samples.
     pub fn read(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<Self, WorldError> {
         let unreadable = |reason: String| WorldError::Unreadable { file: path.to_owned(), reason };
-        let mut reader = image::ImageReader::open(path).map_err(|e| unreadable(e.to_string()))?;
-        if reader.format().is_none() {
+        let format = dioptric_pictures::format_of(path).map_err(|e| unreadable(e.to_string()))?;
+        if format.is_none() {
             return Err(unreadable("expected a .png, .jpg, .tga, .tif or .exr picture".to_owned()));
         }
-        if cfg!(not(feature = "jpeg")) && reader.format() == Some(image::ImageFormat::Jpeg) {
+        if cfg!(not(feature = "jpeg")) && format == Some(image::ImageFormat::Jpeg) {
             return Err(WorldError::LacksFeature { file: path.to_owned(), feature: "jpeg" });
         }
         let mut limits = image::Limits::default();
         limits.max_alloc = Some(16 * MAX_SAMPLES);
         limits.max_image_width = Some(1 << 20);
         limits.max_image_height = Some(1 << 20);
-        reader.limits(limits);
-        let picture = reader.decode().map_err(|e| unreadable(e.to_string()))?;
+        let picture = dioptric_pictures::read(path, limits).map_err(|e| unreadable(e.to_string()))?;
         let (columns, rows) = (picture.width() as usize, picture.height() as usize);
         if columns == 0 || rows == 0 || columns as u64 * rows as u64 > MAX_SAMPLES {
             return Err(unreadable(format!("{columns} x {rows} samples: expected 1 to 2²⁸")));
@@ -164,6 +163,8 @@ impl Encoding {
 
 #[cfg(test)]
 mod tests {
+    use dioptric_pictures::save;
+
     use super::*;
 
     #[test]
@@ -190,7 +191,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for name in ["a.png", "a.tga"] {
             let path = folder.path().join(name);
-            image::RgbImage::from_pixel(1, 1, image::Rgb([0, 128, 255])).save(&path).unwrap();
+            save(&image::RgbImage::from_pixel(1, 1, image::Rgb([0, 128, 255])).into(), &path).unwrap();
             for (encoding, middle) in
                 [(Encoding::Srgb, 0.215_86), (Encoding::Linear, 0.501_96), (Encoding::Gamma(2.2), 0.219_52)]
             {
@@ -199,7 +200,7 @@ mod tests {
             }
         }
         let path = folder.path().join("b.exr");
-        image::Rgb32FImage::from_pixel(1, 1, image::Rgb([0.25, 0.5, 7.0])).save(&path).unwrap();
+        save(&image::Rgb32FImage::from_pixel(1, 1, image::Rgb([0.25, 0.5, 7.0])).into(), &path).unwrap();
         assert_eq!(
             ImageTexture::read(&path, Encoding::Srgb, Wrap::Repeat).unwrap().rgb_at(Vec2::ZERO),
             [0.25, 0.5, 7.0]

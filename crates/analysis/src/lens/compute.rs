@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use dioptric_diffraction::{PupilGrid, Wavefront, WavefrontReference, best_wavefront_film_mm, opd_waves_at};
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, PupilBoundary, Vignetting,
+    Lens, MonoLens, ObjectPoint, PupilBoundary, Shape, Surface, Vignetting,
     analysis::{
         AstigmaticFoci, Autofocus, AxisFoci, Distortion, NumericalApertures, Projection, PupilCoordinates, PupilLight,
         PupilRule, PupilSampling, RayFan, SpotDiagram, StraightMap, field_limit_deg, hexapolar,
@@ -73,7 +73,10 @@ impl AnalysisRequest {
         let mono = lens.at(self.reference_nm())?;
         let image_z_mm = mono.conjugate(self.distance_mm).image_z_mm;
         let is_parallel = image_z_mm.is_nan() || image_z_mm.abs() > PARALLEL * mono.semi_aperture_mm(0);
-        if self.film != AnalysisFilm::BestFocus || !is_parallel {
+        // What has no power anywhere, like a pinhole, is no telescope.
+        let is_plane = |surface: &Surface| surface.curvature_per_mm == 0.0 && surface.shape == Shape::Sphere;
+        let has_power = lens.interfaces().iter().any(|interface| !is_plane(&interface.surface));
+        if self.film != AnalysisFilm::BestFocus || !is_parallel || !has_power {
             return Ok((Cow::Borrowed(lens), None));
         }
         let with_ideal = lens.with_ideal_lens_behind(IDEAL_MM)?;

@@ -272,8 +272,8 @@ mod tests {
             for &(per_mm, modulation) in line.points.iter().filter(|(per_mm, _)| *per_mm <= 200.0) {
                 let s: f64 = per_mm / 200.0;
                 let expected = 2.0 / PI * (s.acos() - s * (1.0 - s * s).sqrt());
-                // The window of a picture cuts off the outermost rings.
-                assert!((modulation - expected).abs() < 0.015, "{per_mm}: {modulation} {expected}");
+                // The window of a picture cuts off the outermost rings, whose part is estimated.
+                assert!((modulation - expected).abs() < 0.006, "{per_mm}: {modulation} {expected}");
             }
         }
         // In focus it is sharpest.

@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use dioptric_pipeline::number;
 use dioptric_psf::{EnclosedEnergy, Picture, Profile};
 
+use super::windowed::Windowed;
 use crate::{Corner, LineChart, PsfRow, PsfSet, Scale, Series, ThroughFocus};
 
 /// Point-spread functions that a plot tells apart.
@@ -19,6 +20,7 @@ const STEPS: i32 = 60;
 struct Plotted<'a> {
     row: &'a PsfRow,
     picture: Picture,
+    whole: Windowed,
 }
 
 impl PsfSet {
@@ -32,7 +34,11 @@ impl PsfSet {
         let plotted: Vec<Plotted<'_>> = self
             .plotted()
             .into_iter()
-            .map(|i| Plotted { row: &self.rows[i], picture: Picture::new(self.pictures[i].view(), self.pixel_um) })
+            .map(|i| Plotted {
+                row: &self.rows[i],
+                picture: Picture::new(self.pictures[i].view(), self.pixel_um),
+                whole: Windowed::new(self.pictures[i].view(), self.pixel_um),
+            })
             .collect();
         let reach_per_mm = self.reach_per_mm(&plotted);
         let mut charts = vec![
@@ -70,7 +76,7 @@ impl PsfSet {
         of: impl Fn(&Picture, f64) -> Profile,
     ) -> LineChart {
         let reach_um = plotted.iter().map(|p| p.picture.energy_radius_um(0.95)).fold(0.0, f64::max) * 1.3;
-        let lines = self.lines(plotted, |picture, direction| {
+        let lines = self.lines(plotted, |Plotted { picture, .. }, direction| {
             let profile = of(picture, direction);
             profile.at_um.into_iter().zip(profile.values).filter(|(x, _)| x.abs() <= reach_um).collect()
         });
@@ -95,8 +101,9 @@ impl PsfSet {
     }
 
     fn modulation(&self, plotted: &[Plotted<'_>], reach_per_mm: f64) -> LineChart {
-        let mut lines = self
-            .lines(plotted, |picture, direction| steps(reach_per_mm).map(|f| (f, picture.mtf(direction, f))).collect());
+        let mut lines = self.lines(plotted, |p, direction| {
+            steps(reach_per_mm).map(|f| (f, p.whole.modulation(direction, f))).collect()
+        });
         if let Some(first) = self.points().next().filter(|point| point.len() > 1) {
             let start = first.start;
             let words = self.point_words(&self.rows[start]);
@@ -170,12 +177,13 @@ impl PsfSet {
     }
 
     /// Returns two lines for each picture: along the radius of the field, and dashed across it.
-    fn lines(&self, plotted: &[Plotted<'_>], of: impl Fn(&Picture, f64) -> Vec<(f64, f64)>) -> Vec<Series> {
-        let both = plotted.iter().enumerate().flat_map(|(i, Plotted { row, picture })| {
+    fn lines(&self, plotted: &[Plotted<'_>], of: impl Fn(&Plotted<'_>, f64) -> Vec<(f64, f64)>) -> Vec<Series> {
+        let both = plotted.iter().enumerate().flat_map(|(i, plotted)| {
+            let row = plotted.row;
             let line = |direction: f64, is_dashed: bool| Series {
                 label: (!is_dashed).then(|| self.label(row)),
                 color: color(i),
-                points: of(picture, direction),
+                points: of(plotted, direction),
                 is_dashed,
             };
             let meridian = row.meridian_rad();

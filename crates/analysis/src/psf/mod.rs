@@ -8,6 +8,7 @@ mod source;
 pub(crate) mod spot;
 mod table;
 mod through_focus;
+mod windowed;
 
 pub use polychromatic::PolychromaticPsf;
 pub use request::{PsfRequest, PsfSampling};

@@ -10,6 +10,7 @@ use ndarray::Array2;
 
 use super::request::LARGEST;
 use super::row::PointName;
+use super::windowed::Windowed;
 use crate::{PsfRow, PsfSet};
 use dioptric_pipeline::{display::LinearRgb, display::SpectrumToRgb};
 
@@ -30,6 +31,13 @@ struct Part {
     share: f64,
     /// How far its centroid lies from that of the whole, pixels: columns to the right, rows down.
     offset_px: DVec2,
+}
+
+/// A part as waves see it.
+struct PartWaves {
+    share: f64,
+    offset_px: DVec2,
+    picture: Windowed,
 }
 
 impl PsfSet {
@@ -74,10 +82,7 @@ impl PsfSet {
             wave_share = wave_share.zip(row.wave_share).map(|(sum, share)| sum + w * share);
         }
         let picture = self.summed(&parts, self.side_of(&parts));
-        let pictures: Vec<(f64, DVec2, Picture)> = match mtf_per_mm.is_empty() {
-            true => vec![],
-            false => parts.iter().map(|p| (p.share, p.offset_px, self.picture(p.index))).collect(),
-        };
+        let pictures = if mtf_per_mm.is_empty() { vec![] } else { self.waves_of(&parts) };
         let row = PsfRow::measure(name, centroid_mm, second, &Picture::new(picture.view(), self.pixel_um))
             .with_mtf(mtf_per_mm, |direction, f| self.modulation_of(&pictures, direction, f));
         Some(PolychromaticPsf {
@@ -90,17 +95,25 @@ impl PsfSet {
     /// is dark.
     pub(crate) fn polychromatic_modulation(&self, point: Range<usize>) -> impl Fn(f64, f64) -> f64 {
         let parts = self.parts(point).map_or_else(Vec::new, |(_, parts)| parts);
-        let pictures: Vec<(f64, DVec2, Picture)> =
-            parts.iter().map(|p| (p.share, p.offset_px, self.picture(p.index))).collect();
+        let pictures = self.waves_of(&parts);
         move |direction, cycles_per_mm| self.modulation_of(&pictures, direction, cycles_per_mm)
     }
 
-    fn modulation_of(&self, parts: &[(f64, DVec2, Picture)], direction: f64, cycles_per_mm: f64) -> f64 {
+    fn waves_of(&self, parts: &[Part]) -> Vec<PartWaves> {
+        let of = |part: &Part| PartWaves {
+            share: part.share,
+            offset_px: part.offset_px,
+            picture: Windowed::new(self.pictures[part.index].view(), self.pixel_um),
+        };
+        parts.iter().map(of).collect()
+    }
+
+    fn modulation_of(&self, parts: &[PartWaves], direction: f64, cycles_per_mm: f64) -> f64 {
         let (mut real, mut imaginary, mut total) = (0.0, 0.0, 0.0);
-        for (share, offset_px, picture) in parts {
+        for PartWaves { share, offset_px, picture } in parts {
             let place_mm =
                 1e-3 * self.pixel_um * (*offset_px * DVec2::new(1.0, -1.0)).dot(DVec2::from_angle(direction));
-            let (re, im) = picture.optical_transfer(direction, cycles_per_mm);
+            let (re, im) = picture.transfer(direction, cycles_per_mm);
             let (s, c) = (std::f64::consts::TAU * cycles_per_mm * place_mm).sin_cos();
             real += share * (re * c - im * s);
             imaginary += share * (re * s + im * c);
@@ -162,10 +175,6 @@ impl PsfSet {
             add_moved(&mut sum, &self.pictures[part.index], part.offset_px, part.share as f32);
         }
         sum
-    }
-
-    fn picture(&self, index: usize) -> Picture {
-        Picture::new(self.pictures[index].view(), self.pixel_um)
     }
 }
 

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::request::{Item, LARGEST};
 use super::row::{PointName, place_and_size};
 use super::spot::{PaperRays, Spot};
+use super::windowed::Windowed;
 use crate::{PsfRequest, PsfRow, PsfSampling};
 use dioptric_pipeline::{BankData, FocusSpec, PipelineError};
 use dioptric_psf::Diffraction;
@@ -134,8 +135,9 @@ impl PsfRequest {
         };
         let row = PsfRow::measure(name, place_mm, second, &measured);
         let picture_share = picture.iter().map(|e| f64::from(*e)).sum();
+        let whole = Windowed::new(picture.view(), self.pixel_um);
         PsfRow { energy: spot.energy, picture_share, ..row }
-            .with_mtf(&self.mtf_per_mm, |direction, f| measured.mtf(direction, f))
+            .with_mtf(&self.mtf_per_mm, |direction, f| whole.modulation(direction, f))
     }
 
     /// Counts the rays of a spot on pixels about its centroid.

@@ -63,3 +63,9 @@ fn names_in(folder: &Path) -> Vec<String> {
     names.sort();
     names
 }
+
+/// Reads a picture that the program wrote.
+#[allow(dead_code, reason = "not every test file needs it")]
+pub(crate) fn read_picture(path: &Path) -> dioptric_pictures::DynamicImage {
+    dioptric_pictures::read(path, dioptric_pictures::Limits::no_limits()).expect("a picture")
+}

@@ -7,11 +7,11 @@
 
 use std::{cell::RefCell, collections::HashMap, f64::consts::PI, sync::LazyLock};
 
+use dioptric_fft::{Complex, Planner};
 use dioptric_optics::quadrature::gauss_legendre_on;
 use glam::DVec2;
 use multiversion::multiversion;
 use ndarray::Array2;
-use rustfft::{FftPlanner, num_complex::Complex};
 
 use super::{
     cis::cis,
@@ -127,7 +127,7 @@ struct Space {
     squares: Vec<f64>,
     waves: PlaneWaves,
     room: Room,
-    planner: FftPlanner<f32>,
+    planner: Planner,
     /// By the numbers of places and of points.
     fades: HashMap<(usize, usize), Vec<f64>>,
 }
@@ -146,7 +146,7 @@ impl Space {
             squares: vec![],
             waves: PlaneWaves::default(),
             room: Room::default(),
-            planner: FftPlanner::new(),
+            planner: Planner::new(),
             fades: HashMap::new(),
         }
     }
@@ -183,8 +183,7 @@ impl Space {
 
     /// Computes the squares of the waves at `n_x` × `n_y` places about the middle.
     fn transform(&mut self, n_x: usize, n_y: usize, unscale: f64) {
-        let (along_x, along_y) =
-            (self.planner.plan_fft_inverse(self.size_x), self.planner.plan_fft_inverse(self.size_y));
+        let (along_x, along_y) = (self.planner.inverse(self.size_x), self.planner.inverse(self.size_y));
         let n_scratch = along_x.get_inplace_scratch_len().max(along_y.get_inplace_scratch_len());
         self.scratch.resize(n_scratch.max(self.scratch.len()), Complex::ZERO);
         self.gather();

@@ -69,7 +69,9 @@ pub fn write_seen_png(picture: &SpectralImage, magnification: usize, path: &Path
     let times = magnification.max(1) as u32;
     let (width, height) = (small.width() * times, small.height() * times);
     let shown = RgbImage::from_fn(width, height, |x, y| *small.get_pixel(x / times, y / times));
-    let saved = shown.save_with_format(staged.path(), image::ImageFormat::Png);
-    saved.map_err(|e| PipelineError::Png { reason: e.to_string() })?;
+    let png = dioptric_pictures::encode_rgb8_png(&shown, (width as usize, height as usize))
+        .map_err(|e| PipelineError::Png { reason: e.to_string() })?;
+    let written = std::fs::write(staged.path(), png);
+    written.map_err(|e| PipelineError::Write { path: path.to_owned(), reason: e.to_string() })?;
     staged.commit()
 }

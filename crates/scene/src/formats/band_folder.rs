@@ -5,8 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use dioptric_pictures::DynamicImage;
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
-use image::DynamicImage;
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -106,13 +106,14 @@ fn gray(path: &Path) -> Result<Array2<f32>, SceneError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use dioptric_pictures::save;
     use image::{ImageBuffer, Luma};
 
     fn folder_of(names: &[&str]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         for (i, name) in names.iter().enumerate() {
             let picture = ImageBuffer::from_pixel(3, 2, Luma([100 * (i as u16 + 1)]));
-            picture.save(folder.path().join(name)).unwrap();
+            save(&picture.into(), &folder.path().join(name)).unwrap();
         }
         fs::write(folder.path().join("readme.md"), "not a picture").unwrap();
         folder
@@ -154,7 +155,7 @@ mod tests {
         let folder = folder_of(&[]);
         assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("no spectral band"));
         let folder = folder_of(&["a_400.png"]);
-        ImageBuffer::from_pixel(9, 9, Luma([1_u8])).save(folder.path().join("a_500.png")).unwrap();
+        save(&ImageBuffer::from_pixel(9, 9, Luma([1_u8])).into(), &folder.path().join("a_500.png")).unwrap();
         assert!(read_band_folder(folder.path(), None).unwrap_err().to_string().contains("rows of a band"));
     }
 }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use dioptric_pictures::{DynamicImage, Limits};
 use dioptric_spectrum::{Display, Quantity, SpectralImage, WavelengthGrid, srgb_decode};
-use image::{DynamicImage, ImageReader, Limits};
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -97,20 +97,18 @@ pub fn read_picture_samples(path: &Path) -> Result<PictureSamples, SceneError> {
 
 /// Decodes a picture of any kind that the file's content tells.
 pub(crate) fn decode(path: &Path) -> Result<DynamicImage, SceneError> {
-    let mut reader =
-        ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|error| unreadable(path, error))?;
     let mut limits = Limits::default();
     limits.max_alloc = Some(4 << 30);
     limits.max_image_width = Some(1 << 17);
     limits.max_image_height = Some(1 << 17);
-    reader.limits(limits);
-    reader.decode().map_err(|error| unreadable(path, error.to_string().replace('\n', " ")))
+    dioptric_pictures::read(path, limits).map_err(|error| unreadable(path, error.to_string().replace('\n', " ")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use approx::assert_abs_diff_eq;
+    use dioptric_pictures::save;
     use dioptric_spectrum::{Observer, Xyz};
     use image::{ImageBuffer, Rgb};
 
@@ -119,7 +117,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         let codes = [[255_u8, 255, 255], [200, 120, 80], [0, 0, 0]];
-        ImageBuffer::from_fn(3, 1, |x, _| Rgb(codes[x as usize])).save(&path).unwrap();
+        save(&ImageBuffer::from_fn(3, 1, |x, _| Rgb(codes[x as usize])).into(), &path).unwrap();
         let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
         let lifted = read_picture(&path, &Display::apple_studio(), &grid, 80.0).unwrap();
         for (column, code) in codes.iter().enumerate() {
@@ -137,7 +135,7 @@ mod tests {
     fn sixteen_bits_are_kept() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.tif");
-        ImageBuffer::from_fn(2, 1, |x, _| Rgb([30_000_u16 + x as u16; 3])).save(&path).unwrap();
+        save(&ImageBuffer::from_fn(2, 1, |x, _| Rgb([30_000_u16 + x as u16; 3])).into(), &path).unwrap();
         let grid = WavelengthGrid::uniform(400.0, 700.0, 50.0).unwrap();
         let lifted = read_picture(&path, &Display::apple_studio(), &grid, 100.0).unwrap();
         assert!(lifted.spectrum_at(0, 1)[3] > lifted.spectrum_at(0, 0)[3]);
@@ -157,7 +155,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let check = |name: &str, picture: DynamicImage, names: &[&str], first: &[f32], top: Option<u16>| {
             let path = folder.path().join(name);
-            picture.save(&path).unwrap();
+            save(&picture, &path).unwrap();
             let read = read_picture_samples(&path).unwrap();
             let found: Vec<_> = read.planes.iter().map(|(name, plane)| (name.as_str(), plane[(1, 2)])).collect();
             let expected: Vec<_> = names.iter().copied().zip(first.iter().copied()).collect();
