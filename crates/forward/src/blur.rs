@@ -8,6 +8,7 @@ use dioptric_spectrum::{Cancel, Cancelled};
 use rayon::prelude::*;
 
 use crate::{
+    block_layers::BlockLayers,
     convolve::{STRIP_COLUMNS, STRIP_ROWS, Strip, fast_size, multiply_add, with_fft},
     knot_kernels::{KnotKernel, LayerKernels, edge_spread_peak},
     occlusion::BlurredPlane,
@@ -27,6 +28,8 @@ pub(crate) struct LayerTask<'a> {
     pub(crate) layer: usize,
     /// Their light is blurred where they have radiance, their alpha where not.
     pub(crate) surfaces: &'a [Surface<'a>],
+    /// Those of the surfaces.
+    pub(crate) blocks: &'a BlockLayers,
     pub(crate) patches: &'a [Patch],
     pub(crate) kernels: &'a LayerKernels,
     pub(crate) film_rows: usize,
@@ -78,7 +81,7 @@ fn blur_patch(
     let (first_row, first_column) = cell.first_pixel(&task.sampler.frame);
     let whole = Rectangle { first_row, first_column, rows: cell.size, columns: cell.size };
     let Some(source) = whole.clipped(task.film_rows, task.film_columns, half) else { return Ok(None) };
-    let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, cancel);
+    let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, task.blocks, cancel);
     let Some(mut ideal) = task.stopwatch.time(Part::Sampling, sample)? else { return Ok(None) };
     let expansion = Expansion::of(patch, kernels, width, cancel)?;
     if task.surfaces.iter().all(|surface| surface.radiance.is_none()) {

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use crate::{
     BandKernels, BandRadiance, BlurMode, Film, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Settings, Sink,
     basis::{BandBasis, BasisBetween, Kept},
+    block_layers::BlockLayers,
     blur::{LayerTask, blur_layer},
     geometry::check_extent,
     lateral_color::LateralColor,
@@ -42,6 +43,8 @@ pub(crate) struct Layout {
     /// Of each layer.
     rasters: Vec<LayerRaster>,
     tiling: Tiling,
+    /// By the factor of their raster.
+    blocks: BTreeMap<usize, BlockLayers>,
     layer_coordinates: LayerCoordinates,
     pub(crate) occluded: OccludedSamples,
     /// How far off axis light is taken from, mm.
@@ -130,12 +133,10 @@ impl Layout {
             .into_iter()
             .flat_map(|w| [0, layers.len() - 1].map(|l| lens.film_map(layers.dioptres()[l], w, extent_mm)))
             .collect();
-        let surfaces: Vec<&Array2<f32>> = std::iter::once(&layer_coordinates)
-            .chain(occluded.layer_coordinates())
-            .map(LayerCoordinates::samples)
-            .collect();
+        let surfaces: Vec<&LayerCoordinates> =
+            std::iter::once(&layer_coordinates).chain(occluded.layer_coordinates()).collect();
         let extents = Extents { radius_px: &radius_px, maps: &ends, surfaces: &surfaces };
-        let active = active_cells_of(&rasters, &extents, settings.knot_spacing_px, cancel)?;
+        let (active, blocks) = active_cells_of(&rasters, &extents, settings.knot_spacing_px, cancel)?;
         let work = Work::new(cancel, progress, range, active.iter().map(Vec::len).sum::<usize>() as u64);
         let stopwatch = Stopwatch::default();
         let film_lens = FilmLens {
@@ -160,6 +161,7 @@ impl Layout {
             layers,
             rasters,
             tiling,
+            blocks,
             layer_coordinates,
             occluded,
             extent_mm,
@@ -174,7 +176,8 @@ impl Layout {
         let planes = self.layer_coordinates.size_bytes()
             + self.occluded.layer_coordinates().map_or(0, LayerCoordinates::size_bytes);
         let maps = self.maps().values().flat_map(|maps| maps.iter()).map(FilmMap::size_bytes).sum::<usize>();
-        planes + maps + self.occluded.size_bytes() + self.tiling.size_bytes() + self.kept().size_bytes
+        let blocks = self.blocks.values().map(BlockLayers::size_bytes).sum::<usize>();
+        planes + maps + blocks + self.occluded.size_bytes() + self.tiling.size_bytes() + self.kept().size_bytes
     }
 
     /// Rows and columns of the scene.
@@ -425,6 +428,7 @@ impl Layout {
             map,
             layer,
             surfaces,
+            blocks: &self.blocks[factor],
             patches,
             kernels: &kernels.by_layer[layer],
             film_rows: film.rows,
@@ -449,32 +453,37 @@ struct Extents<'a> {
     /// At the ends of the bands and of the depths.
     maps: &'a [FilmMap],
     /// Layer coordinates of the scene's surfaces.
-    surfaces: &'a [&'a Array2<f32>],
+    surfaces: &'a [&'a LayerCoordinates],
 }
 
-/// Returns the cells of each layer in which it has anything.
+/// The cells of each layer in which it has anything, and the layers of blocks of pixels by the factor of their raster.
+type Active = (Vec<Vec<Cell>>, BTreeMap<usize, BlockLayers>);
+
+/// Finds where layers have anything.
 fn active_cells_of(
     rasters: &[LayerRaster],
     extents: &Extents<'_>,
     cell_size: usize,
     cancel: &Cancel,
-) -> Result<Vec<Vec<Cell>>, Cancelled> {
+) -> Result<Active, Cancelled> {
     let Extents { radius_px, maps, surfaces } = *extents;
     let n_layers = rasters.len();
-    let mut active: Vec<Vec<Cell>> = vec![vec![]; n_layers];
+    let samples: Vec<&Array2<f32>> = surfaces.iter().map(|surface| surface.samples()).collect();
+    let (mut active, mut blocks): Active = (vec![vec![]; n_layers], BTreeMap::new());
     let factors: BTreeSet<usize> = rasters.iter().map(|raster| raster.factor).collect();
     for factor in factors {
         let members: Vec<usize> = (0..n_layers).filter(|&layer| rasters[layer].factor == factor).collect();
         let LayerRaster { film, sampler, .. } = &rasters[members[0]];
         let pad_px = members.iter().map(|&layer| pad_for(radius_px[layer])).fold(0.0, f64::max) / factor as f64;
         let cells = cells_over(film, pad_px.ceil() as usize, cell_size);
-        let mut found = active_cells(&cells, sampler, maps, surfaces, n_layers, cancel)?;
+        let mut found = active_cells(&cells, sampler, maps, &samples, n_layers, cancel)?;
+        blocks.insert(factor, BlockLayers::find(sampler, &cells, maps, surfaces, cancel)?);
         for layer in members {
             let blur_px = 2.0 * radius_px[layer] / factor as f64;
             active[layer] = joined_for(blur_px, std::mem::take(&mut found[layer]));
         }
     }
-    Ok(active)
+    Ok((active, blocks))
 }
 
 /// Returns how far beyond the film light is taken from, pixels: the 95 % radius of a blur, doubled, holds all but the

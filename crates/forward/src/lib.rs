@@ -13,6 +13,7 @@
 struct Readme;
 
 mod basis;
+mod block_layers;
 mod blur;
 mod convolve;
 mod coverage;

@@ -6,7 +6,7 @@ use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
 use ndarray::{Array2, Axis, parallel::prelude::*};
 
-use crate::{geometry::FilmFrame, layers::tent};
+use crate::{block_layers::BlockLayers, geometry::FilmFrame, layers::tent};
 
 /// A rectangle of film pixels, which may reach beyond the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,6 +83,12 @@ impl LayerCoordinates {
         &self.samples
     }
 
+    /// Returns the first and last layer with weight in each square that begins at a sample of a row.
+    pub(crate) fn ranges_of_row(&self, row: usize) -> &[(u16, u16)] {
+        let columns = self.ranges.ncols();
+        &self.ranges.as_slice().expect("made in standard layout")[row * columns..][..columns]
+    }
+
     /// The bytes of memory that they take.
     pub(crate) fn size_bytes(&self) -> usize {
         self.samples.len() * (size_of::<f32>() + size_of::<(u16, u16)>())
@@ -114,13 +120,14 @@ impl Sampler {
     /// Returns the ideal picture of a layer within a rectangle, row by row, or `None` where there is nothing of it: irradiance,
     /// W m⁻² nm⁻¹, where the surfaces have radiance, and alpha, the share of each pixel that the layer covers, where not.
     ///
-    /// Beyond the edge of the scene lies darkness at the depth of the edge.
+    /// Beyond the edge of the scene lies darkness at the depth of the edge. `blocks` are those of the surfaces.
     pub(crate) fn sample(
         &self,
         rectangle: Rectangle,
         map: &FilmMap,
         layer: usize,
         surfaces: &[Surface<'_>],
+        blocks: &BlockLayers,
         cancel: &Cancel,
     ) -> Result<Option<Vec<f32>>, Cancelled> {
         let mut ideal = Vec::with_capacity(rectangle.rows * rectangle.columns);
@@ -135,9 +142,14 @@ impl Sampler {
         let x_mm: Vec<f64> =
             along(rectangle.first_column, rectangle.columns).iter().map(|&c| self.frame.x_mm(c)).collect();
         let y_mm: Vec<f64> = along(rectangle.first_row, rectangle.rows).iter().map(|&r| self.frame.y_mm(r)).collect();
-        for y_mm in y_mm.chunks_exact(n) {
+        for (row, y_mm) in (rectangle.first_row..).zip(y_mm.chunks_exact(n)) {
             cancel.check()?;
-            for x_mm in x_mm.chunks_exact(n) {
+            let blocks = blocks.of_row(row);
+            for (column, x_mm) in (rectangle.first_column..).zip(x_mm.chunks_exact(n)) {
+                if blocks.is_some_and(|blocks| !blocks.may_have(column, layer)) {
+                    ideal.push(0.0);
+                    continue;
+                }
                 let mut sum = 0.0;
                 for (&y, &x) in y_mm.iter().flat_map(|y| x_mm.iter().map(move |x| (y, x))) {
                     let Some((tan, gain)) = map.at(DVec2::new(x, y)) else { continue };

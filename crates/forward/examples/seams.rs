@@ -1,0 +1,53 @@
+//! Seams: a uniform plane through seven lenses, wide open and at f/8, in focus and 2 dioptres off, by rays, bent rays and waves.
+//! `cargo run --release --example seams -p dioptric-forward [LENS …]` prints a table: the largest second difference beyond the
+//! curvature at eight pixels, and without diffraction the largest difference from real rays, of a strip from corner to corner.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "an example shows its numbers, and stops where one is missing"
+)]
+
+use dioptric_psf::Diffraction;
+
+#[path = "../tests/uniform/plane.rs"]
+mod plane;
+
+use plane::{Case, Uniform};
+
+/// Lenses, their widest f-number, and half the diagonal that they light, mm.
+const LENSES: [(&str, f64, f64); 7] = [
+    ("paper-2el", 4.0, 10.0),
+    ("dgauss-50mm", 2.03, 11.3),
+    ("cooke-50mm", 4.5, 11.3),
+    ("canon-50mm", 1.9, 11.3),
+    ("achromat-100mm", 4.0, 5.0),
+    ("tessar-50mm", 4.5, 7.5),
+    ("fisheye-12.5mm", 2.9, 7.0),
+];
+
+fn main() {
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
+    println!("lens, f-number, plane, diffraction, second difference, illumination");
+    for (lens, widest, radius_mm) in LENSES {
+        if !wanted.is_empty() && !wanted.iter().any(|name| name == lens) {
+            continue;
+        }
+        for f_number in [widest, 8.0] {
+            for (plane, plane_mm) in [("in focus", 2000.0), ("2 dioptres off", 400.0)] {
+                for diffraction in [Diffraction::None, Diffraction::Hurb { gamma: 1.0 }, Diffraction::Wave] {
+                    let (columns, focus_mm) = (724, 2000.0);
+                    let pitch_um = 2e3 * radius_mm / columns as f64;
+                    let case = Case { lens, f_number, focus_mm, plane_mm, columns, pitch_um, diffraction };
+                    let uniform = Uniform::new(&case);
+                    let (step, _) = uniform.worst_step();
+                    let illumination = match diffraction {
+                        Diffraction::None => format!("{:+.2e}", uniform.worst_illumination().0),
+                        _ => String::new(),
+                    };
+                    println!("{lens}, {f_number}, {plane}, {diffraction:?}, {step:.1e}, {illumination}");
+                }
+            }
+        }
+    }
+}
