@@ -2,14 +2,14 @@
 //!
 //! `cargo run --release --workspace --example pupil_scan -- [STEP_DEG] [RAYS_ACROSS] [LENS …]`: of each lens (built-in names or
 //! files; without any, all that are built in) and each far field the cross-section of the light that gets through, by the
-//! parts of the pupil and by a square grid of rays. Prints the rows of the tables of docs/pupils.md; fields that differ by more
+//! region of the pupil and by a square grid of rays. Prints the rows of the tables of docs/pupils.md; fields that differ by more
 //! than 0.1 % go to standard error.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "this is a command")]
 
 use std::path::Path;
 
 use dioptric_optics::{
-    Lens, LensFile, MissingGlass, MonoLens, ObjectPoint, PupilBoundary, ReadOptions,
+    Lens, LensFile, MissingGlass, MonoLens, ObjectPoint, PupilBoundary, PupilRegion, ReadOptions,
     analysis::{Autofocus, PupilLight, PupilRule},
     glam::{DVec2, DVec3},
 };
@@ -64,7 +64,7 @@ struct Field {
     degrees: f64,
     found_mm2: f64,
     counted_mm2: f64,
-    n_parts: usize,
+    has_lines: bool,
     has_outline: bool,
 }
 
@@ -73,9 +73,9 @@ impl Field {
         // Aslant, so that no ray of a grid lies on an axis of symmetry.
         let direction = DVec2::new(0.28, 0.96) * degrees.signum();
         let point = ObjectPoint::far(degrees.abs().to_radians(), direction);
-        let cosine = |part: &PupilBoundary| point.direction_to(DVec3::ZERO).dot(part.plane().normal());
-        let parts = |lens: &MonoLens| PupilBoundary::find_parts(lens, &point, N_AZIMUTHS);
-        let area_mm2 = |lens: &MonoLens| parts(lens).iter().map(|part| part.area_mm2() * cosine(part)).sum::<f64>();
+        let cosine = |region: &PupilRegion| point.direction_to(DVec3::ZERO).dot(region.plane().normal());
+        let region = |lens: &MonoLens| PupilRegion::find(lens, &point, N_AZIMUTHS);
+        let area_mm2 = |lens: &MonoLens| region(lens).map_or(0.0, |region| region.area_mm2() * cosine(&region));
         let found_mm2 = lens.over_clear_pupil(&area_mm2);
         // Where nothing is found, a coarse grid looks for light first.
         let is_counted = found_mm2 > 0.0 || is_any_lit(lens, &point);
@@ -83,7 +83,7 @@ impl Field {
             degrees,
             found_mm2,
             counted_mm2: if is_counted { cross_section_mm2(lens, &point, n_across) } else { 0.0 },
-            n_parts: if found_mm2 > 0.0 { parts(lens).len() } else { 0 },
+            has_lines: region(lens).is_some_and(|region| region.outline().is_none()),
             has_outline: PupilBoundary::find(lens, &point, N_AZIMUTHS).is_some(),
         }
     }
@@ -101,7 +101,8 @@ impl Field {
     }
 }
 
-/// Prints the row of a lens: its last light, the largest difference, the largest step that rays do not have, the most parts.
+/// Prints the row of a lens: its last light, the largest difference, the largest step that rays do not have, the fields that
+/// lines across the pupil serve.
 fn scan(name: &str, lens: &MonoLens, step_deg: f64, n_across: usize) {
     let n = (LAST_FIELD_DEG / step_deg) as i32;
     let first = if lens.is_rotational() { 0 } else { -n };
@@ -112,9 +113,9 @@ fn scan(name: &str, lens: &MonoLens, step_deg: f64, n_across: usize) {
     let lit: Vec<&Field> = fields.iter().filter(is_lit).collect();
     let last_deg = fields.iter().filter(|f| f.counted_mm2 > 0.0).map(|f| f.degrees.abs()).fold(0.0, f64::max);
     for field in fields.iter().filter(|f| f.difference().abs() > 1e-3 || (f.counted_mm2 > 0.0) != f.has_outline) {
-        let Field { degrees, found_mm2, counted_mm2, n_parts, has_outline } = field;
+        let Field { degrees, found_mm2, counted_mm2, has_lines, has_outline } = field;
         eprintln!(
-            "{name} {degrees}: found {found_mm2:.6e} counted {counted_mm2:.6e} mm2, {:+.2e}; {n_parts} parts, outline \
+            "{name} {degrees}: found {found_mm2:.6e} counted {counted_mm2:.6e} mm2, {:+.2e}; lines {has_lines}, outline \
              {has_outline}",
             field.difference()
         );
@@ -123,8 +124,8 @@ fn scan(name: &str, lens: &MonoLens, step_deg: f64, n_across: usize) {
     let (worst, at_deg) = worst.map_or((0.0, 0.0), |field| (field.difference().abs(), field.degrees));
     let steps = fields.windows(2).filter(|pair| is_lit(&&pair[0]) || is_lit(&&pair[1]));
     let step = steps.map(|pair| pair[1].step_from(&pair[0])).fold(0.0, f64::max);
-    let most = lit.iter().map(|field| field.n_parts).max().unwrap_or(0);
-    println!("| {name} | {} | {last_deg} | {worst:.1e} at {at_deg} | {step:.1e} | {most} |", lit.len());
+    let n_by_lines = lit.iter().filter(|field| field.has_lines).count();
+    println!("| {name} | {} | {last_deg} | {worst:.1e} at {at_deg} | {step:.1e} | {n_by_lines} |", lit.len());
 }
 
 /// Prints the row of a lens: f-numbers, the beam on the axis and its spot, against counted rays.

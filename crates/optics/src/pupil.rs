@@ -4,10 +4,12 @@ mod corners;
 mod holes;
 mod light;
 mod plane;
+mod region;
+mod strips;
 
 use glam::{DVec2, DVec3};
 
-pub use self::plane::PupilPlane;
+pub use self::{plane::PupilPlane, region::PupilRegion};
 use crate::{
     MonoLens, ObjectPoint, RayBatch, Vignetting,
     trace::{self, Plan},
@@ -30,21 +32,12 @@ pub struct PupilBoundary {
 
 impl PupilBoundary {
     /// Finds the pupil, or `None` if no light of the point gets through; of a pupil that no single place of it sees whole,
-    /// what is seen from a place well inside ([`find_parts`](Self::find_parts) finds the rest).
+    /// what is seen from a place well inside ([`PupilRegion::find`] finds the rest).
     ///
     /// Every ray through the region meets every surface inside its rim. The edge is found to rounding at each of
     /// `n_azimuths` (at least 8) directions; the center is the centroid of the region.
     pub fn find(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> Option<Self> {
         Search::new(lens, point).largest(n_azimuths.max(8))
-    }
-
-    /// Finds the whole pupil as parts that do not overlap, the largest first; none if no light of the point gets through.
-    ///
-    /// A pupil has several parts where its light comes through in separate islands, or where no place of it sees all of
-    /// its edge, as in a crescent: then it is cut by straight lines. Light is looked for over the whole front of the lens.
-    /// All parts lie in the same plane, [`PupilPlane::of_parts`].
-    pub fn find_parts(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> Vec<Self> {
-        Search { lens, point, plane: PupilPlane::of_parts(lens, point) }.parts(n_azimuths.max(8))
     }
 
     /// The center that radii count from, in the pupil's plane, mm from its origin.
@@ -130,15 +123,6 @@ impl<'a> Search<'a> {
         self.lens.clearances_mm(self.plane.rays(self.lens, self.point, targets_mm))
     }
 
-    /// Returns the clearances of rays from the rims and from the sides of a cell.
-    fn clearances_in(&self, targets_mm: &[DVec2], cell: &Cell) -> Vec<f64> {
-        let mut clearances = self.clearances(targets_mm);
-        for (clearance, target) in clearances.iter_mut().zip(targets_mm) {
-            *clearance = clearance.min(cell.inside_mm(*target));
-        }
-        clearances
-    }
-
     /// Returns the middle of the pupil's plane, if light passes there, as it does for most fields of most lenses.
     fn lit_middle(&self) -> Option<DVec2> {
         (self.clearances(&[DVec2::ZERO])[0] > 0.0).then_some(DVec2::ZERO)
@@ -146,46 +130,57 @@ impl<'a> Search<'a> {
 
     /// Finds what is seen of the pupil from a place well inside.
     fn largest(&self, n_azimuths: usize) -> Option<PupilBoundary> {
-        let everywhere = Cell::default();
-        let in_middle = self.lit_middle().and_then(|seed| self.part_about(seed, &everywhere, n_azimuths));
-        in_middle.or_else(|| self.part_of(&self.lit_over_front(), &everywhere, n_azimuths))
+        let in_middle = self.lit_middle().and_then(|seed| self.part_about(seed, n_azimuths));
+        in_middle.or_else(|| {
+            let lit = self.lit_over_front();
+            let part = self.part_of(&lit, n_azimuths);
+            part.or_else(|| if lit.is_empty() { None } else { self.part_beside(n_azimuths) })
+        })
     }
 
-    /// Finds the parts of the pupil, the largest first.
-    fn parts(&self, n_azimuths: usize) -> Vec<PupilBoundary> {
-        let mut lit = self.lit_over_front();
-        let everywhere = Cell::default();
-        let in_middle = self.lit_middle().and_then(|seed| self.part_about(seed, &everywhere, n_azimuths));
-        let Some(part) = in_middle.or_else(|| self.part_of(&lit, &everywhere, n_azimuths)) else { return Vec::new() };
-        lit.extend(self.lit_around(&part));
-        let mut parts = self.split(part, &lit, &everywhere);
-        parts.sort_by(|a, b| b.area_mm2().total_cmp(&a.area_mm2()));
-        parts
-    }
-
-    /// Returns a part if it is all of the pupil that lies in its cell; else cuts the cell in two across the longer extent
-    /// of what is lit in it, and returns the parts in both, cut on as long as that is needed.
-    fn split(&self, part: PupilBoundary, lit: &[(DVec2, f64)], cell: &Cell) -> Vec<PupilBoundary> {
-        let is_beside = |(target, _): &(DVec2, f64)| part.beyond_mm(*target) > BESIDE * part.rho_max();
-        let is_whole = !lit.iter().any(is_beside) && self.uncertain_mm2(&part) <= UNCERTAIN * part.area_mm2();
-        if cell.0.len() >= MOST_CUTS || is_whole {
-            return vec![part];
-        }
-        let cells = cell.cut_across(lit);
-        let of_cell = |cell: &Cell| {
-            let here: Vec<(DVec2, f64)> = lit.iter().filter(|(at, _)| cell.inside_mm(*at) > 0.0).copied().collect();
-            let here: Vec<(DVec2, f64)> = here.iter().map(|&(at, c)| (at, c.min(cell.inside_mm(at)))).collect();
-            let part = self.part_of(&here, cell, part.rho_mm.len())?;
-            Some(self.split(part, &here, cell))
-        };
-        cells.iter().filter_map(of_cell).flatten().collect()
+    /// Returns the part about the middle of the one that is found in the plane of the whole region, which is less oblique to steep
+    /// light.
+    fn part_beside(&self, n_azimuths: usize) -> Option<PupilBoundary> {
+        let facing = Self { plane: PupilPlane::of_region(self.lens, self.point), ..*self };
+        let part = facing.part_of(&facing.lit_over_front(), n_azimuths)?;
+        let middle = facing.plane.rays(self.lens, self.point, &[part.center_mm]);
+        self.part_about(self.plane.meets_mm(middle.point_mm(0), middle.direction(0)), n_azimuths)
     }
 
     /// Returns the part around the first of these places, those of most clearance first, that has an area.
-    fn part_of(&self, lit: &[(DVec2, f64)], cell: &Cell, n_azimuths: usize) -> Option<PupilBoundary> {
+    fn part_of(&self, lit: &[(DVec2, f64)], n_azimuths: usize) -> Option<PupilBoundary> {
         let mut lit = lit.to_vec();
         lit.sort_by(|a, b| b.1.total_cmp(&a.1));
-        lit.iter().take(MOST_SEEDS).find_map(|(seed, _)| self.part_about(*seed, cell, n_azimuths))
+        // A few places may all be at the tip of a crescent, from which little is seen.
+        let is_tip = lit.len() < FEW;
+        let seed = |place: &(DVec2, f64)| if is_tip { self.climbed(*place) } else { place.0 };
+        lit.iter().take(MOST_SEEDS).find_map(|place| self.part_about(seed(place), n_azimuths))
+    }
+
+    /// Returns a place further inside the pupil than this one: uphill in clearance, to a summit or a ridge.
+    ///
+    /// From the tip of a crescent the way up is narrow: directions turn from one look to the next, and the last one that led up is
+    /// tried again.
+    fn climbed(&self, (mut here, mut clearance): (DVec2, f64)) -> DVec2 {
+        let (mut step_mm, mut heading) = (clearance, DVec2::X);
+        for round in 0..CLIMB_ROUNDS {
+            let turned = DVec2::from_angle(GOLDEN_ANGLE * f64::from(round));
+            let about = [-0.2, -0.05, 0.0, 0.05, 0.2].map(|angle| DVec2::from_angle(angle).rotate(heading));
+            let all = PupilBoundary::azimuths(CLIMB_DIRECTIONS).map(|direction| direction.rotate(turned)).chain(about);
+            let directions: Vec<DVec2> = all.collect();
+            let places: Vec<DVec2> = directions.iter().map(|direction| here + step_mm * *direction).collect();
+            let found = self.clearances(&places);
+            let best = (0..found.len()).max_by(|&a, &b| found[a].total_cmp(&found[b])).unwrap_or(0);
+            if found[best] > clearance {
+                (here, clearance, heading) = (places[best], found[best], directions[best]);
+                step_mm *= 2.0;
+            } else if step_mm < LEAST_STEP * clearance {
+                break;
+            } else {
+                step_mm *= 0.5;
+            }
+        }
+        here
     }
 
     /// Returns how much of a part's area may be wrong where its edge jumps from one azimuth to the next, because a nearer
@@ -204,50 +199,52 @@ impl<'a> Search<'a> {
 
     /// Returns the part of the pupil around a place of it, as far as rays see the edge from the part's centroid or, where
     /// that is dark or sees less, from the place itself.
-    fn part_about(&self, seed_mm: DVec2, cell: &Cell, n_azimuths: usize) -> Option<PupilBoundary> {
-        let rough = self.boundary(seed_mm, cell, n_azimuths, 1e-3)?;
+    fn part_about(&self, seed_mm: DVec2, n_azimuths: usize) -> Option<PupilBoundary> {
+        let rough = self.boundary(seed_mm, n_azimuths, 1e-3)?;
         let centroid_mm = rough.centroid_mm();
-        let is_clear = self.clearances_in(&[centroid_mm], cell)[0] > 0.0;
-        let from_centroid = is_clear.then(|| self.boundary(centroid_mm, cell, n_azimuths, EDGE_MM)).flatten();
+        let is_clear = self.clearances(&[centroid_mm])[0] > 0.0;
+        let from_centroid = is_clear.then(|| self.boundary(centroid_mm, n_azimuths, EDGE_MM)).flatten();
         match from_centroid {
             Some(part) if part.area_mm2() >= SEES_ENOUGH * rough.area_mm2() => Some(part),
-            _ => self.boundary(seed_mm, cell, n_azimuths, EDGE_MM),
+            _ => self.boundary(seed_mm, n_azimuths, EDGE_MM),
         }
     }
 
     /// Returns the edge as seen from a place inside, found to `edge_mm` of clearance.
-    fn boundary(&self, center_mm: DVec2, cell: &Cell, n_azimuths: usize, edge_mm: f64) -> Option<PupilBoundary> {
+    fn boundary(&self, center_mm: DVec2, n_azimuths: usize, edge_mm: f64) -> Option<PupilBoundary> {
         let directions: Vec<DVec2> = PupilBoundary::azimuths(n_azimuths).collect();
-        let rho_mm = self.edge_mm(center_mm, cell, &directions, edge_mm)?;
+        let rho_mm = self.edge_mm(center_mm, &directions, edge_mm)?;
         Some(PupilBoundary { center_mm, plane: self.plane, rho_mm })
     }
 
     /// Returns how far the edge is from a place inside in each direction, mm, found to `edge_mm` of clearance.
-    fn edge_mm(&self, center_mm: DVec2, cell: &Cell, directions: &[DVec2], edge_mm: f64) -> Option<Vec<f64>> {
-        let at_center = self.clearances_in(&[center_mm], cell)[0];
+    fn edge_mm(&self, center_mm: DVec2, directions: &[DVec2], edge_mm: f64) -> Option<Vec<f64>> {
+        let at_center = self.clearances(&[center_mm])[0];
         let edge_mm = edge_mm.min(0.01 * at_center);
-        let mut edges: Vec<Edge> = directions.iter().map(|&direction| Edge::new(direction, at_center)).collect();
+        let edge = |direction: &DVec2| Edge::new(center_mm, *direction, at_center);
+        let mut edges: Vec<Edge> = directions.iter().map(edge).collect();
+        self.narrow(&mut edges, edge_mm);
         for _ in 0..GAP_ROUNDS {
-            self.narrow(&mut edges, center_mm, cell, edge_mm);
-            if !self.open_gaps(&mut edges, center_mm, cell) {
+            if !self.open_gaps(&mut edges) {
                 break;
             }
+            self.narrow(&mut edges, edge_mm);
         }
         let is_whole = edges.iter().all(|edge| edge.outer.is_some() && edge.inner.0 > 0.0);
         is_whole.then(|| edges.iter().map(|edge| edge.inner.0).collect())
     }
 
     /// Brings the two ends of each edge together.
-    fn narrow(&self, edges: &mut [Edge], center_mm: DVec2, cell: &Cell, edge_mm: f64) {
+    fn narrow(&self, edges: &mut [Edge], edge_mm: f64) {
         for _ in 0..EDGE_ROUNDS {
             let mut open: Vec<&mut Edge> = edges.iter_mut().filter(|edge| !edge.is_found(edge_mm)).collect();
             if open.is_empty() {
                 break;
             }
             let radii: Vec<f64> = open.iter().map(|edge| edge.next_rho_mm()).collect();
-            let target = |(edge, rho): (&&mut Edge, &f64)| center_mm + edge.direction * *rho;
+            let target = |(edge, rho): (&&mut Edge, &f64)| edge.place_mm(*rho);
             let targets: Vec<DVec2> = open.iter().zip(&radii).map(target).collect();
-            let clearances = self.clearances_in(&targets, cell);
+            let clearances = self.clearances(&targets);
             for ((edge, rho), clearance) in open.iter_mut().zip(radii).zip(clearances) {
                 edge.note(rho, clearance);
             }
@@ -256,14 +253,14 @@ impl<'a> Search<'a> {
 
     /// Looks for darkness between the center and the edges, opens the edges beyond which there is some, and returns
     /// whether there are any.
-    fn open_gaps(&self, edges: &mut [Edge], center_mm: DVec2, cell: &Cell) -> bool {
+    fn open_gaps(&self, edges: &mut [Edge]) -> bool {
         let share = |k: usize| (k + 1) as f64 / (GAP_PLACES + 1) as f64;
         let places = |edge: &Edge| {
-            let along = edge.inner.0 * edge.direction;
-            (0..GAP_PLACES).map(move |k| center_mm + share(k) * along)
+            let edge = *edge;
+            (0..GAP_PLACES).map(move |k| edge.place_mm(share(k) * edge.inner.0))
         };
         let targets: Vec<DVec2> = edges.iter().flat_map(places).collect();
-        let clearances = self.clearances_in(&targets, cell);
+        let clearances = self.clearances(&targets);
         let mut is_any_open = false;
         for (edge, clearances) in edges.iter_mut().zip(clearances.chunks(GAP_PLACES)) {
             let Some(dark) = clearances.iter().position(|clearance| *clearance <= 0.0) else { continue };
@@ -280,44 +277,20 @@ impl<'a> Search<'a> {
     }
 }
 
-/// A convex piece of the pupil's plane: what lies before all these lines, each a unit normal and a distance from the
-/// origin, mm.
-#[derive(Clone, Debug, Default)]
-struct Cell(Vec<(DVec2, f64)>);
-
-impl Cell {
-    /// How far inside the cell a place lies, mm; negative outside.
-    fn inside_mm(&self, place_mm: DVec2) -> f64 {
-        self.0.iter().map(|(normal, from_origin)| from_origin - normal.dot(place_mm)).fold(f64::INFINITY, f64::min)
-    }
-
-    /// Returns the two halves of the cell, cut through the mean of these places across the direction that they spread
-    /// most in.
-    fn cut_across(&self, places: &[(DVec2, f64)]) -> [Self; 2] {
-        let n = places.len().max(1) as f64;
-        let mean = places.iter().map(|(place, _)| *place).sum::<DVec2>() / n;
-        let spread = |f: fn(DVec2) -> f64| places.iter().map(|(place, _)| f(*place - mean)).sum::<f64>();
-        let (xx, xy, yy) = (spread(|p| p.x * p.x), spread(|p| p.x * p.y), spread(|p| p.y * p.y));
-        let along = DVec2::from_angle(0.5 * (2.0 * xy).atan2(xx - yy));
-        [along, -along].map(|normal| {
-            let line = (normal, normal.dot(mean));
-            Self(self.0.iter().copied().chain([line]).collect())
-        })
-    }
-}
-
 /// Places from which the edge of a part is looked for before the part is given up.
 const MOST_SEEDS: usize = 16;
-/// The most cuts that bound a part of a pupil.
-const MOST_CUTS: usize = 7;
-/// The share of a part's area that may be wrong at jumps of its edge, and how near to the chord between two azimuths the
-/// edge must come.
-const UNCERTAIN: f64 = 5e-4;
+/// Fewer first places than this are climbed from, in at most so many steps.
+const FEW: usize = 32;
+const CLIMB_ROUNDS: u32 = 100;
+/// Directions of a step uphill, and by how much they turn from one to the next, rad.
+const CLIMB_DIRECTIONS: usize = 12;
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+/// The least step uphill, over the clearance.
+const LEAST_STEP: f64 = 0.02;
+/// How near to the chord between two azimuths the edge must come.
 const WITHIN_CHORD: f64 = 0.99;
 /// The share of what a first place sees of a part that the part's centroid must see to be its center.
 const SEES_ENOUGH: f64 = 0.98;
-/// How far beyond a part's edge light counts as not seen, over the part's radius.
-const BESIDE: f64 = 0.02;
 /// Places between center and edge that are looked at for darkness, and how often.
 const GAP_PLACES: usize = 11;
 const GAP_ROUNDS: usize = 4;
@@ -326,9 +299,10 @@ const EDGE_ROUNDS: usize = 100;
 /// Clearance at which a ray is held to graze its rim, mm.
 const EDGE_MM: f64 = 1e-11;
 
-/// The edge of the pupil in one direction from the center, between a radius inside and one outside.
+/// The edge of the pupil in one direction from a place inside, between a radius inside and one outside.
 #[derive(Clone, Copy)]
 struct Edge {
+    center_mm: DVec2,
     direction: DVec2,
     at_center: f64,
     /// Radius and clearance of the outermost ray known to get through.
@@ -341,8 +315,12 @@ struct Edge {
 }
 
 impl Edge {
-    fn new(direction: DVec2, at_center: f64) -> Self {
-        Self { direction, at_center, inner: (0.0, at_center), outer: None, in_a_row: 0, rounds: 0 }
+    fn new(center_mm: DVec2, direction: DVec2, at_center: f64) -> Self {
+        Self { center_mm, direction, at_center, inner: (0.0, at_center), outer: None, in_a_row: 0, rounds: 0 }
+    }
+
+    fn place_mm(&self, rho_mm: f64) -> DVec2 {
+        self.center_mm + rho_mm * self.direction
     }
 
     fn is_found(&self, edge_mm: f64) -> bool {

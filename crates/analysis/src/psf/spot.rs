@@ -2,7 +2,7 @@
 
 use dioptric_diffraction::{CircularStop, Covariance, Hurb, HurbForm, SampledHurb};
 use dioptric_optics::{
-    FilmPoint, MonoLens, ObjectPoint, PupilBoundary, Vignetting,
+    FilmPoint, MonoLens, ObjectPoint, PupilRegion, Vignetting,
     analysis::{PupilLight, PupilRule},
     glam::{DVec2, DVec3, Vec2Swizzles},
     rays_over_front,
@@ -42,7 +42,9 @@ impl Spot {
     ) -> Self {
         let Some(light) = PupilLight::to_film(mono, point, film_distance_mm, RULE) else { return Self::default() };
         let area_mm2 = |point: &ObjectPoint| {
-            mono.over_clear_pupil(&|lens| area_of(point, &PupilBoundary::find_parts(lens, point, AZIMUTHS)))
+            mono.over_clear_pupil(&|lens| {
+                PupilRegion::find(lens, point, AZIMUTHS).map_or(0.0, |region| area_of(point, &region))
+            })
         };
         Self {
             at_mm: mono.landed(light.rays(), film_distance_mm).map(FilmPoint::in_picture_mm).collect(),
@@ -96,11 +98,9 @@ impl Spot {
     }
 }
 
-/// Returns the area that parts of a pupil, as light comes in, have in a plane across the axis, mm².
-fn area_of(point: &ObjectPoint, parts: &[PupilBoundary]) -> f64 {
-    let Some(plane) = parts.first().map(PupilBoundary::plane) else { return 0.0 };
-    let area_mm2: f64 = parts.iter().map(PupilBoundary::area_mm2).sum();
-    let direction = point.direction_to(DVec3::ZERO);
+/// Returns the area that a pupil, as light comes in, has in a plane across the axis, mm².
+fn area_of(point: &ObjectPoint, pupil: &PupilRegion) -> f64 {
+    let (plane, area_mm2, direction) = (pupil.plane(), pupil.area_mm2(), point.direction_to(DVec3::ZERO));
     if plane.is_across_axis() { area_mm2 } else { area_mm2 * direction.dot(plane.normal()) / direction.z }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec2, DVec3};
 
-use crate::{MonoLens, ObjectPoint, PupilBoundary, Vignetting};
+use crate::{MonoLens, ObjectPoint, PupilBoundary, PupilRegion, Vignetting};
 
 /// Returns the projected solid angle of the cone of light that arrives at the image of a point, times the square of the
 /// image space's index over the object space's, sr: the irradiance there for a uniform scene of radiance 1; 0 where no
@@ -21,12 +21,16 @@ pub fn projected_solid_angle_onto(lens: &MonoLens, point: &ObjectPoint, n_azimut
     lens.over_clear_pupil(&|lens| whole_cone(lens, point, n_azimuths.max(16).next_multiple_of(2), normal))
 }
 
+/// Places on each line across a region, and the distance, over the size of the region, across which directions are compared.
+const N_ON_LINE: usize = 6;
+const DIFFERENCE: f64 = 1e-6;
+
 /// Returns the projected solid angle where there are no obscurations.
 fn whole_cone(lens: &MonoLens, point: &ObjectPoint, n: usize, normal: DVec3) -> f64 {
     let turn = DQuat::from_rotation_arc(normal, DVec3::Z);
     let is_straight = normal == DVec3::Z;
     let in_film = |direction: DVec3| if is_straight { direction } else { turn * direction };
-    let of_part = |pupil: PupilBoundary| {
+    let of_outline = |pupil: &PupilBoundary| {
         let mut rays = pupil.plane().rays(lens, point, &pupil.edge_mm());
         lens.trace(&mut rays, Vignetting::Off);
         let cosines: Vec<DVec2> = (0..rays.len()).map(|i| in_film(rays.direction(i)).truncate()).collect();
@@ -38,7 +42,24 @@ fn whole_cone(lens: &MonoLens, point: &ObjectPoint, n: usize, normal: DVec3) -> 
         // A polygon falls short by the square of its sides; two of them tell by how much.
         (4.0 * area(1) - area(2)) / 3.0
     };
-    let area: f64 = PupilBoundary::find_parts(lens, point, n).into_iter().map(of_part).sum();
+    let of_nodes = |region: &PupilRegion| {
+        let nodes = region.nodes(N_ON_LINE);
+        let step_mm = DIFFERENCE * region.area_mm2().sqrt();
+        let offsets = [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y];
+        let beside = nodes.iter().flat_map(|(place, _)| offsets.map(|offset| *place + step_mm * offset));
+        let mut rays = region.plane().rays(lens, point, &beside.collect::<Vec<_>>());
+        lens.trace(&mut rays, Vignetting::Off);
+        let cosines = |i: usize| rays.fate[i].is_in_flight().then(|| in_film(rays.direction(i)).truncate());
+        let area = |(i, (_, area_mm2)): (usize, &(DVec2, f64))| {
+            let (over_x, over_y) = (cosines(4 * i)? - cosines(4 * i + 1)?, cosines(4 * i + 2)? - cosines(4 * i + 3)?);
+            Some(area_mm2 * over_x.perp_dot(over_y) / (4.0 * step_mm * step_mm))
+        };
+        nodes.iter().enumerate().filter_map(area).sum::<f64>().abs()
+    };
+    let area = PupilRegion::find(lens, point, n).map_or(0.0, |region| match region.outline() {
+        Some(outline) => of_outline(outline),
+        None => of_nodes(&region),
+    });
     (lens.image_index() / lens.object_index()).powi(2) * area
 }
 

@@ -1,10 +1,8 @@
 //! The light of a point that gets through a lens, by few rays of known weight.
 
-use std::f64::consts::PI;
-
 use glam::{DVec2, DVec3};
 
-use crate::{MonoLens, ObjectPoint, PupilBoundary, PupilPlane, RayBatch, Vignetting, quadrature::gauss_legendre_on};
+use crate::{MonoLens, ObjectPoint, PupilPlane, PupilRegion, RayBatch, Vignetting};
 
 /// The fewest azimuths of a pupil.
 const LEAST_AZIMUTHS: usize = 48;
@@ -49,7 +47,7 @@ impl PupilLight {
         let mut light = Self { rays: RayBatch::default(), weights: Vec::new() };
         lens.for_each_clear_part(&mut |part, sign| {
             let n_before = light.weights.len();
-            for region in PupilBoundary::find_parts(part, point, rule.n_azimuths) {
+            if let Some(region) = PupilRegion::find(part, point, rule.n_azimuths) {
                 light.add(part, (point, film_distance_mm), &region, (rule, sign));
             }
             light.weights.len() > n_before
@@ -88,25 +86,15 @@ impl PupilLight {
         (centroid_mm, second_mm2)
     }
 
-    /// Adds the light through one region of a pupil.
+    /// Adds the light through a region.
     fn add(
         &mut self,
         lens: &MonoLens,
         (point, film_distance_mm): (&ObjectPoint, f64),
-        region: &PupilBoundary,
+        region: &PupilRegion,
         (rule, sign): (PupilRule, f64),
     ) {
-        let radii = gauss_legendre_on(rule.n_rings, 0.0, 1.0);
-        let n_azimuths = region.rho_at_azimuths_mm().len();
-        let (mut targets_mm, mut areas_mm2) = (Vec::new(), Vec::new());
-        for edge_mm in region.edge_mm() {
-            let to_edge = edge_mm - region.center_mm();
-            let wedge_mm2 = PI / n_azimuths as f64 * to_edge.length_squared();
-            for (square, weight) in &radii {
-                targets_mm.push(region.center_mm() + to_edge * square.sqrt());
-                areas_mm2.push(weight * wedge_mm2);
-            }
-        }
+        let (targets_mm, areas_mm2): (Vec<DVec2>, Vec<f64>) = region.nodes(rule.n_rings).into_iter().unzip();
         let mut rays = region.plane().rays(lens, point, &targets_mm);
         let per_area = |i: usize| solid_angle_per_area(region.plane(), point, rays.direction(i));
         let weights: Vec<f64> =

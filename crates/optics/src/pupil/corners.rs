@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::{Cell, EDGE_MM, PupilBoundary, Search};
+use super::{EDGE_MM, PupilBoundary, Search};
 use crate::{MonoLens, ObjectPoint, Vignetting};
 
 /// What bounds a pupil in some direction: a surface and the part of its openings, 0 for the round rim.
@@ -52,7 +52,7 @@ impl PupilBoundary {
     /// Returns the edge's distance from the center at these azimuths, mm, found to rounding.
     pub fn edge_at_mm(&self, lens: &MonoLens, point: &ObjectPoint, azimuths_rad: &[f64]) -> Option<Vec<f64>> {
         let directions: Vec<DVec2> = azimuths_rad.iter().map(|azimuth| DVec2::from_angle(*azimuth)).collect();
-        Search::new(lens, point).edge_mm(self.center_mm, &Cell::default(), &directions, EDGE_MM)
+        Search::new(lens, point).edge_mm(self.center_mm, &directions, EDGE_MM)
     }
 
     /// Halves brackets until they are narrow, and returns the corner in each, with what remains to its right if the rim
@@ -62,7 +62,7 @@ impl PupilBoundary {
         for _ in 0..HALVINGS {
             let middles: Vec<f64> = brackets.iter().zip(&rights).map(|(b, right)| 0.5 * (b.left.0 + right.0)).collect();
             let directions: Vec<DVec2> = middles.iter().map(|azimuth| DVec2::from_angle(*azimuth)).collect();
-            let rho_mm = search.edge_mm(self.center_mm, &Cell::default(), &directions, EDGE_MM)?;
+            let rho_mm = search.edge_mm(self.center_mm, &directions, EDGE_MM)?;
             let places: Vec<DVec2> =
                 directions.iter().zip(&rho_mm).map(|(u, rho)| self.center_mm + *rho * *u).collect();
             let limits = search.limits(&places);

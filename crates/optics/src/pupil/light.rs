@@ -14,7 +14,7 @@ const N_LEADERS: usize = 16;
 const N_FINER: i32 = 2;
 const FINER_ROUNDS: usize = 28;
 /// Rays across a part of the pupil and its surroundings, and how far these go, over the part's width.
-const AROUND: usize = 33;
+const AROUND: usize = 25;
 const SURROUNDINGS: f64 = 1.6;
 
 /// How far a ray gets: the surfaces that it passes, then how far outside the rim it meets the next, mm, as a negative number.
@@ -84,7 +84,7 @@ impl Search<'_> {
         self.lit_targets(on_front.iter().map(|place| self.target_through_front(*place)).collect())
     }
 
-    fn lit_targets(&self, targets_mm: Vec<DVec2>) -> Vec<(DVec2, f64)> {
+    pub(super) fn lit_targets(&self, targets_mm: Vec<DVec2>) -> Vec<(DVec2, f64)> {
         let clearances = self.clearances(&targets_mm);
         targets_mm.into_iter().zip(clearances).filter(|(_, clearance)| *clearance > 0.0).collect()
     }

@@ -6,8 +6,8 @@ use crate::{MonoLens, ObjectPoint, Placement, RayBatch};
 
 /// The least cosine between light and axis for which the pupil is looked at in a plane across the axis.
 const LEAST_COSINE: f64 = 0.01;
-/// The same for a pupil's parts: in a plane across steeper light a pupil is long and narrow, and its edge hard to sample.
-const LEAST_COSINE_OF_PARTS: f64 = 0.3;
+/// The same for a pupil's whole region: in a plane across steeper light a pupil is long and narrow, and its edge hard to sample.
+const LEAST_COSINE_OF_REGION: f64 = 0.3;
 
 /// The plane in which the pupil of a point is a region.
 ///
@@ -27,9 +27,9 @@ impl PupilPlane {
         Self::with_least_cosine(lens, point, LEAST_COSINE)
     }
 
-    /// Returns the plane for the parts of a pupil: the same, but facing the point from 72.5° on.
-    pub fn of_parts(lens: &MonoLens, point: &ObjectPoint) -> Self {
-        Self::with_least_cosine(lens, point, LEAST_COSINE_OF_PARTS)
+    /// Returns the plane for the whole region of a pupil: the same, but facing the point from 72.5° on.
+    pub fn of_region(lens: &MonoLens, point: &ObjectPoint) -> Self {
+        Self::with_least_cosine(lens, point, LEAST_COSINE_OF_REGION)
     }
 
     fn with_least_cosine(lens: &MonoLens, point: &ObjectPoint, least_cosine: f64) -> Self {
