@@ -169,6 +169,10 @@ pub(crate) struct FrameArgs {
     /// How missing colors are found: nearest, bilinear, malvar, directional, directional-ratio
     #[arg(long, value_name = "METHOD")]
     pub(crate) demosaic: Option<String>,
+    /// How much noise is taken out: 0 none, 0.5 what noise may be, more what texture may be too [default: what the frame's own
+    /// noise asks for]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) denoise: Option<f64>,
     /// What becomes of light beyond saturation: clip (channel by channel), reconstruct [default: reconstruct]
     #[arg(long, value_name = "KIND")]
     pub(crate) highlights: Option<String>,

@@ -216,6 +216,7 @@ pub(crate) fn sensor_options(arguments: &FrameArgs) -> SensorOptions {
         analog_gain: arguments.analog_gain,
         white: arguments.white.clone(),
         demosaic: arguments.demosaic.clone(),
+        denoise: arguments.denoise,
         highlights: arguments.highlights.clone(),
     }
 }

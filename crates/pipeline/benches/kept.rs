@@ -42,7 +42,7 @@ fn changes(kept: &KeptCamera, sensors: &[std::path::PathBuf]) {
     of("processing: demosaic", &|camera, i| {
         let methods = [Demosaic::Bilinear, Demosaic::Malvar, Demosaic::Directional];
         camera.processing.demosaic = methods[i % methods.len()];
-        camera.processing.denoise = 1e-6 * (i / methods.len()) as f64;
+        camera.processing.denoise = Some(1e-6 * (i / methods.len()) as f64);
     });
     of("sensor: quantum efficiency", &|camera, i| camera.sensor = SensorSpec::File(sensors[i].clone()));
     of("focus", &|camera, i| camera.focus = FocusSpec::DistanceMm(900.0 + 50.0 * i as f64));

@@ -73,7 +73,7 @@ fn exposure_and_noise_start_at_the_frames() {
 #[test]
 fn processing_changes_the_picture_alone() {
     check(|camera| camera.processing.white = WhiteBalance::GrayWorld, [0, 0, 0, 0, 0, 0, 0, 0, 1]);
-    check(|camera| camera.processing.denoise = 0.5, [0, 0, 0, 0, 0, 0, 0, 0, 1]);
+    check(|camera| camera.processing.denoise = Some(0.5), [0, 0, 0, 0, 0, 0, 0, 0, 1]);
 }
 
 #[test]

@@ -9,7 +9,7 @@
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::Tile;
+use crate::{Tile, phases};
 
 /// The standard deviation that white noise of 1 has at each scale of the B₃ spline transform (Starck & Murtagh, table 1).
 const NOISE_AT_SCALE: [f32; 4] = [0.889, 0.200, 0.0859, 0.0413];
@@ -32,7 +32,7 @@ pub(crate) enum SampleNoise {
 
 impl SampleNoise {
     /// Returns the sample on a scale on which noise is 1.
-    fn stabilized(&self, sample: f32) -> f32 {
+    pub(crate) fn stabilized(&self, sample: f32) -> f32 {
         match self {
             Self::Frame { electrons_per_unit, floor_e } => {
                 let electrons = f64::from(sample) * electrons_per_unit;
@@ -52,6 +52,23 @@ impl SampleNoise {
             Self::Table(table) => table.sample_of(f64::from(value)) as f32,
         }
     }
+}
+
+/// The sample of a middle gray, and the shares of it that noise must reach for any, and for all, of the automatic strength.
+const MIDDLE_GRAY: f64 = 0.18;
+const NOISE_SHARES: [f64; 2] = [0.05, 0.1];
+/// The strength at which a noisy photograph comes nearest to a clean one (docs/sensor.md).
+const AUTOMATIC_STRENGTH: f64 = 0.5;
+
+/// Returns the strength that a frame's noise asks for: none where a middle gray stands 20 times above it, all where it stands ten
+/// times above it, which ISO 12232 takes to be just acceptable.
+pub(crate) fn automatic_strength(noise: &SampleNoise) -> f64 {
+    // The slope of the scale on which noise is 1 is one over the noise.
+    let (below, above) = (0.98 * MIDDLE_GRAY, 1.02 * MIDDLE_GRAY);
+    let slope = f64::from(noise.stabilized(above as f32) - noise.stabilized(below as f32)) / (above - below);
+    let [least, most] = NOISE_SHARES;
+    let share = 1.0 / (slope * MIDDLE_GRAY);
+    AUTOMATIC_STRENGTH * ((share - least) / (most - least)).clamp(0.0, 1.0)
 }
 
 /// A scale on which noise is 1, for a noise that changes with the sample in any way: the integral of 1 / deviation.
@@ -116,37 +133,21 @@ pub(crate) fn denoise(planes: &mut [Array2<f32>], tile: Option<&Tile>, noise: &[
 }
 
 fn denoise_mosaic(plane: &mut Array2<f32>, tile: &Tile, noise: &[SampleNoise], strength: f32) {
-    let n_phases = tile.rows() * tile.columns();
-    let (n_rows, n_columns) = plane.dim();
-    let size = (n_rows.div_ceil(tile.rows()), n_columns.div_ceil(tile.columns()));
-    let noise_of = |phase: usize| &noise[tile.filter_at(phase / tile.columns(), phase % tile.columns())];
-    // A tile that hangs over the edge takes its missing samples from the tile before it.
-    let inside =
-        |place: usize, period: usize, n: usize| if place < n { place } else { place.saturating_sub(period).min(n - 1) };
-    let phases: Vec<Array2<f32>> = (0..n_phases)
-        .into_par_iter()
-        .map(|phase| {
-            Array2::from_shape_fn(size, |(r, c)| {
-                let row = inside(r * tile.rows() + phase / tile.columns(), tile.rows(), n_rows);
-                let column = inside(c * tile.columns() + phase % tile.columns(), tile.columns(), n_columns);
-                noise_of(phase).stabilized(plane[(row, column)])
-            })
-        })
-        .collect();
+    let filters: Vec<usize> = (0..tile.rows()).flat_map(|row| tile.row(row).to_vec()).collect();
+    let mut phases = phases::split(std::slice::from_ref(plane), Some(tile));
+    let of_filters = || filters.iter().map(|&filter| &noise[filter]);
+    phases.iter_mut().zip(of_filters()).for_each(|(phase, noise)| phase.par_mapv_inplace(|v| noise.stabilized(v)));
     let cosines = cosines(tile.rows(), tile.columns());
     let denoised: Vec<Array2<f32>> =
         cosines.par_iter().map(|row| shrink(&weighted_sum(&phases, row), strength)).collect();
     drop(phases);
-    let back: Vec<Array2<f32>> = (0..n_phases)
-        .into_par_iter()
-        .map(|phase| weighted_sum(&denoised, &cosines.iter().map(|row| row[phase]).collect::<Vec<_>>()))
-        .collect();
-    plane.outer_iter_mut().into_par_iter().enumerate().for_each(|(row, mut values)| {
-        for (column, value) in values.iter_mut().enumerate() {
-            let phase = (row % tile.rows()) * tile.columns() + column % tile.columns();
-            *value = noise_of(phase).unstabilized(back[phase][(row / tile.rows(), column / tile.columns())]);
-        }
+    let back = (0..filters.len()).into_par_iter().zip(of_filters().collect::<Vec<_>>()).map(|(phase, noise)| {
+        let mut sum = weighted_sum(&denoised, &cosines.iter().map(|row| row[phase]).collect::<Vec<_>>());
+        sum.mapv_inplace(|v| noise.unstabilized(v));
+        sum
     });
+    let size = plane.dim();
+    *plane = phases::join(back.collect(), Some(tile), size).swap_remove(0);
 }
 
 /// Returns the orthonormal cosine transform of a tile: a row a frequency, a column a phase.
@@ -253,6 +254,20 @@ mod tests {
             let back = noise.unstabilized(noise.stabilized(sample));
             assert!((back - sample - 0.25 / 6000.0).abs() < 1e-6, "{sample} {back}");
         }
+    }
+
+    #[test]
+    fn noise_asks_for_denoising() {
+        let strength = |electrons_per_unit: f64, floor_e: f64| {
+            automatic_strength(&SampleNoise::Frame { electrons_per_unit, floor_e })
+        };
+        // A middle gray of n electrons has √(n + floor²) of noise: a twentieth of 400, a tenth of 100.
+        assert_eq!(strength(33_000.0, 10.0), 0.0);
+        assert_eq!(strength(404.0 / 0.18, 0.0), 0.0);
+        assert_eq!(strength(98.0 / 0.18, 0.0), 0.5);
+        let n = 200.0_f64;
+        let expected = 0.5 * ((n + 25.0).sqrt() / n - 0.05) / 0.05;
+        assert!((strength(n / 0.18, 5.0) - expected).abs() < 1e-3, "{} {expected}", strength(n / 0.18, 5.0));
     }
 
     #[test]

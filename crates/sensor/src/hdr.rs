@@ -29,6 +29,30 @@ impl Sensor {
     /// # Errors
     /// When there are no frames, or they differ in size or mosaic, or one was not exposed.
     pub fn merge(&self, frames: &[Raw]) -> Result<Raw, SensorError> {
+        self.check_merge(frames)?;
+        let first = &frames[0];
+        let linear: Vec<Vec<Array2<f32>>> = frames.iter().map(Raw::linear).collect();
+        let sources: Vec<MergedFrame> = frames.iter().map(|frame| self.source_of(frame)).collect();
+        // What saturates last sets the scale.
+        let (shortest, scale) = (0..frames.len())
+            .map(|i| (i, sources[i].saturation_e_per_s()))
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .expect("there is a first frame");
+        let merge_plane = |plane: usize| {
+            let mut merged = linear[shortest][plane].clone();
+            ndarray::Zip::indexed(&mut merged).par_for_each(|at, value| {
+                let samples = || sources.iter().zip(&linear).map(|(source, planes)| (source, planes[plane][at]));
+                *value = (merged_rate(samples).unwrap_or(f64::from(*value) * scale) / scale) as f32;
+            });
+            RawPlane::Volts(merged)
+        };
+        let exposure = frames[shortest].exposure;
+        let planes = (0..first.planes.len()).map(merge_plane).collect();
+        Ok(Raw { planes, levels: self.unit_levels(&exposure), exposure, merged: sources, ..first.clone() })
+    }
+
+    /// Checks that frames can be merged.
+    pub(crate) fn check_merge(&self, frames: &[Raw]) -> Result<(), SensorError> {
         let shape = |what, expected: String, found: String| Err(SensorError::Shape { what, expected, found });
         let Some(first) = frames.first() else {
             return shape("frames to merge", "1 or more".to_owned(), "0".to_owned());
@@ -53,28 +77,11 @@ impl Sensor {
                 ));
             }
         }
-        let linear: Vec<Vec<Array2<f32>>> = frames.iter().map(Raw::linear).collect();
-        let sources: Vec<MergedFrame> = frames.iter().map(|frame| self.source_of(frame)).collect();
-        // What saturates last sets the scale.
-        let (shortest, scale) = (0..frames.len())
-            .map(|i| (i, sources[i].saturation_e_per_s()))
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .expect("there is a first frame");
-        let merge_plane = |plane: usize| {
-            let mut merged = linear[shortest][plane].clone();
-            ndarray::Zip::indexed(&mut merged).par_for_each(|at, value| {
-                let samples = || sources.iter().zip(&linear).map(|(source, planes)| (source, planes[plane][at]));
-                *value = (merged_rate(samples).unwrap_or(f64::from(*value) * scale) / scale) as f32;
-            });
-            RawPlane::Volts(merged)
-        };
-        let exposure = frames[shortest].exposure;
-        let planes = (0..first.planes.len()).map(merge_plane).collect();
-        Ok(Raw { planes, levels: self.unit_levels(&exposure), exposure, merged: sources, ..first.clone() })
+        Ok(())
     }
 
     /// Returns what a frame is in a merge.
-    fn source_of(&self, frame: &Raw) -> MergedFrame {
+    pub(crate) fn source_of(&self, frame: &Raw) -> MergedFrame {
         MergedFrame {
             time_s: frame.exposure.time_s,
             saturation_e: frame.levels.saturation_e(),
@@ -83,7 +90,7 @@ impl Sensor {
     }
 
     /// Returns the levels of samples that are shares of saturation.
-    fn unit_levels(&self, exposure: &Exposure) -> Levels {
+    pub(crate) fn unit_levels(&self, exposure: &Exposure) -> Levels {
         let saturation_e = self.saturation_e(exposure);
         let units = Self {
             adc: Adc::Analog,

@@ -10,7 +10,7 @@ use crate::{
     SensorError, ToneCurve, WhiteBalance,
     balance::{gains, light_of_gains},
     defects, demosaic,
-    denoise::{SampleNoise, denoise},
+    denoise::{SampleNoise, automatic_strength, denoise},
     hdr::merged_noise,
     highlights::{Saturated, dimmed, reconstruct},
     metering::percentile,
@@ -28,8 +28,10 @@ pub struct Processing {
     pub defect_threshold: Option<f64>,
     /// The fall of light towards the corners that is undone; left out, it stays.
     pub shading: Option<LensShading>,
-    /// How much noise is taken out of the raw frame: 0 none, 1 what is below three standard deviations.
-    pub denoise: f64,
+    /// How much noise is taken out of the raw frame: 0 none, 1 what is below three standard deviations; left out, as much as
+    /// its own noise asks for. That is none up to a twentieth of the signal of a middle gray (18 % of saturation), and 0.5 from a
+    /// tenth on.
+    pub denoise: Option<f64>,
     /// What is made white.
     #[serde(alias = "white_balance")]
     pub white: WhiteBalance,
@@ -48,12 +50,13 @@ pub struct Processing {
 }
 
 impl Default for Processing {
-    /// White by the light on the scene, highlights rebuilt, the best demosaic, as bright as exposed, and sRGB.
+    /// White by the light on the scene, noisy frames denoised, highlights rebuilt, the best demosaic, as bright as exposed, and
+    /// sRGB.
     fn default() -> Self {
         Self {
             defect_threshold: None,
             shading: None,
-            denoise: 0.0,
+            denoise: None,
             white: WhiteBalance::Scene,
             highlights: Highlights::Reconstruct,
             demosaic: Demosaic::DirectionalRatio,
@@ -71,9 +74,9 @@ impl Processing {
         Self { white: WhiteBalance::Light(light), ..Self::default() }
     }
 
-    /// Returns the plain chain: directional interpolation of differences, and channels clipped one by one.
+    /// Returns the plain chain: noise left as it is, directional interpolation of differences, and channels clipped one by one.
     pub fn plain() -> Self {
-        Self { highlights: Highlights::Clip, demosaic: Demosaic::Directional, ..Self::default() }
+        Self { denoise: Some(0.0), highlights: Highlights::Clip, demosaic: Demosaic::Directional, ..Self::default() }
     }
 
     /// Returns the processing of the paper's Figure 4: bilinear, no balance, no color correction, a power of 0.6.
@@ -163,9 +166,10 @@ impl Sensor {
         if let Some(shading) = &processing.shading {
             shading.correct(&mut planes, tile);
         }
-        if processing.denoise > 0.0 {
-            let noise = vec![self.sample_noise(raw); n_channels];
-            denoise(&mut planes, tile, &noise, processing.denoise);
+        let noise = self.sample_noise(raw);
+        let strength = processing.denoise.unwrap_or_else(|| automatic_strength(&noise));
+        if strength > 0.0 {
+            denoise(&mut planes, tile, &vec![noise; n_channels], strength);
         }
         let balance = gains(self, &planes, tile, &processing.white)?;
         weigh(&mut planes, tile, &balance, processing.highlights);
@@ -217,8 +221,10 @@ impl Sensor {
             Err(SensorError::Shape { what, expected: expected.to_string(), found: found.to_string() })
         };
         let n_channels = self.filters.len();
-        let not_negative =
-            [("defect_threshold", processing.defect_threshold.unwrap_or(0.0)), ("denoise", processing.denoise)];
+        let not_negative = [
+            ("defect_threshold", processing.defect_threshold.unwrap_or(0.0)),
+            ("denoise", processing.denoise.unwrap_or(0.0)),
+        ];
         if let Some((key, value)) = not_negative.into_iter().find(|(_, v)| !(*v >= 0.0 && v.is_finite())) {
             return Err(SensorError::value("the processing", key, value, "a number of 0 or more"));
         }

@@ -215,7 +215,7 @@ fn noisy_psnr_db(path: &std::path::Path, strength: f64) -> f64 {
     // A short exposure at a high gain: 8 % of the well at white.
     let limit = Exposure { analog_gain: 11.0, ..Exposure::seconds(f64::INFINITY) };
     let control = ExposureControl::Auto(AutoExposure { limit, ..AutoExposure::new(Metering::Percentile(99.5), 0.9) });
-    let processing = |denoise| Processing { denoise, ..Processing::for_light(Illuminant::D65) };
+    let processing = |denoise| Processing { denoise: Some(denoise), ..Processing::for_light(Illuminant::D65) };
     let picture = |noise: Noise, strength| {
         let capture = sensor.capture(&Illumination::on_pixels(&image), &control, &noise).unwrap();
         sensor.develop(&capture.raw, &processing(strength)).unwrap().picture

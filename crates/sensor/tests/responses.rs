@@ -212,7 +212,9 @@ fn merged_frames_are_denoised_by_their_own_noise() {
         let picture = |noise: Noise, denoise: f64| {
             let mut frames = frames(exposures, noise);
             let raw = if frames.len() > 1 { sensor.merge(&frames).unwrap() } else { frames.remove(0) };
-            sensor.develop_linear(&raw, &Processing { denoise, ..Processing::for_light(Illuminant::D65) }).unwrap()
+            sensor
+                .develop_linear(&raw, &Processing { denoise: Some(denoise), ..Processing::for_light(Illuminant::D65) })
+                .unwrap()
         };
         let clean = picture(Noise::none(), 0.0);
         let noisy = rms(&picture(Noise::all(3), 0.0), &clean);

@@ -15,6 +15,8 @@ pub struct SensorOptions {
     pub white: Option<String>,
     /// A demosaic, as [`Demosaic::parse`] has it.
     pub demosaic: Option<String>,
+    /// How much noise is taken out, 0 or more.
+    pub denoise: Option<f64>,
     /// What becomes of highlights, as [`Highlights::parse`] has it.
     pub highlights: Option<String>,
 }
@@ -42,6 +44,9 @@ impl SensorOptions {
         }
         if let Some(method) = &self.demosaic {
             processing.demosaic = Demosaic::parse(method)?;
+        }
+        if self.denoise.is_some() {
+            processing.denoise = self.denoise;
         }
         if let Some(kind) = &self.highlights {
             processing.highlights = Highlights::parse(kind)?;

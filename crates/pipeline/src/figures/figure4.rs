@@ -39,7 +39,8 @@ pub fn camera(world: &Path, columns: usize, samples: u32) -> Result<Camera, Pipe
     let spec = WorldSpec { effort: RenderEffort::Samples(samples), ..WorldSpec::of_file(world.to_owned()) };
     camera.scene = SceneSpec { source: SceneSource::World(spec), ..SceneSpec::of_file(world.to_owned()) };
     camera.sensor = SensorSpec::BuiltIn("nikon-d100".to_owned());
-    camera.processing = Processing::default();
+    // The figure shows the noise.
+    camera.processing = Processing { denoise: Some(0.0), ..Processing::default() };
     camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 10.0 };
     let read = KeptCamera::new(camera.clone()).world(&Silent, &Cancel::new())?;
     let has_lens = read.cameras().first().map_or(Ok(false), |of_file| camera.take_from_world(of_file))?;
