@@ -149,6 +149,10 @@ pub(crate) struct FrameArgs {
     /// Takes so many frames and merges them
     #[arg(long, value_name = "N", conflicts_with = "bracket_stops")]
     pub(crate) burst: Option<usize>,
+    /// Moves the camera between the frames of a burst, at the last one by so many pixels; they are aligned and merged where they
+    /// agree
+    #[arg(long, value_name = "P", requires = "burst", allow_negative_numbers = true)]
+    pub(crate) burst_motion_px: Option<f64>,
     /// Takes exposures that differ by powers of two and merges them, e.g. -4,-2,0
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub(crate) bracket_stops: Option<String>,

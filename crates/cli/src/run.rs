@@ -224,7 +224,10 @@ pub(crate) fn sensor_options(arguments: &FrameArgs) -> SensorOptions {
 /// Returns how many frames the command line asks for.
 pub(crate) fn frames_of(arguments: &FrameArgs) -> anyhow::Result<Option<FramesSpec>> {
     Ok(match (arguments.burst, arguments.bracket_stops.as_deref()) {
-        (Some(n), _) => Some(FramesSpec::Burst(n)),
+        (Some(frames), _) => Some(match arguments.burst_motion_px {
+            Some(motion_px) => FramesSpec::MovingBurst { frames, motion_px },
+            None => FramesSpec::Burst(frames),
+        }),
         (None, Some(list)) => Some(FramesSpec::BracketStops(parse_numbers("--bracket-stops", list)?)),
         (None, None) => None,
     })

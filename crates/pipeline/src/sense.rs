@@ -117,7 +117,7 @@ impl SenseRequest {
             frames: self.frames.clone(),
             noise: Noise { sources: self.noise, ..Noise::all(self.seed) },
         };
-        let frames = expose(&shutter, &sensor, &rate)?;
+        let frames = expose(&shutter, &sensor, &rate, Some(&light))?;
         let processing = self.processing.under(self.illuminant.as_ref());
         let developed = sensor.develop(frames.exposed.developed_from(), &processing)?;
         Ok(Sensed {

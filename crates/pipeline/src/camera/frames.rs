@@ -1,5 +1,7 @@
 //! One frame, a burst or a bracket of exposures.
 
+use std::borrow::Cow;
+
 use dioptric_sensor::{ElectronRate, Electrons, Exposure, Noise, Raw, Sensor, Volts};
 use serde::{Deserialize, Serialize};
 
@@ -7,6 +9,8 @@ use crate::PipelineError;
 
 /// The most frames of one picture.
 const MOST: usize = 64;
+/// The farthest that frames are aligned over, pixels of a Bayer mosaic.
+const MOST_PX: f64 = 48.0;
 
 /// How many frames a picture is made of.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -18,6 +22,14 @@ pub enum FramesSpec {
     Single,
     /// So many of equal exposure, merged into one of less noise.
     Burst(usize),
+    /// So many of equal exposure by a camera that moves between them, aligned tile by tile and merged where they agree.
+    MovingBurst {
+        /// How many.
+        frames: usize,
+        /// How far from the first frame the image has moved at the last one, pixels, 0 to 48; between them it goes round on a
+        /// spiral.
+        motion_px: f64,
+    },
     /// Exposures that differ from the chosen one by powers of two, merged into one of more range; −2 is a quarter of the
     /// time.
     BracketStops(Vec<f64>),
@@ -43,6 +55,18 @@ impl Exposed {
     }
 }
 
+/// The rate of photo-electrons where the image has moved by so many pixels, down and to the right.
+pub(crate) type MovedRate<'a> = dyn Fn([f64; 2]) -> Result<Cow<'a, ElectronRate>, PipelineError> + 'a;
+
+/// Returns where the image lies at each frame of a moving burst, pixels.
+fn path_px(frame: usize, n_frames: usize, motion_px: f64) -> [f64; 2] {
+    // Steps of the golden angle, so that no direction and no fraction of a pixel comes twice.
+    const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+    let radius = motion_px * frame as f64 / (n_frames.max(2) - 1) as f64;
+    let (sine, cosine) = (GOLDEN_ANGLE * frame as f64).sin_cos();
+    [radius * sine, radius * cosine]
+}
+
 impl FramesSpec {
     /// Checks that the number of frames makes sense.
     ///
@@ -54,6 +78,12 @@ impl FramesSpec {
         };
         match self {
             Self::Burst(n) if *n == 0 || *n > MOST => wrong("Burst", n.to_string(), format!("1 to {MOST} frames")),
+            Self::MovingBurst { frames, .. } if *frames == 0 || *frames > MOST => {
+                wrong("MovingBurst.frames", frames.to_string(), format!("1 to {MOST} frames"))
+            }
+            Self::MovingBurst { motion_px, .. } if !(0.0..=MOST_PX).contains(motion_px) => {
+                wrong("MovingBurst.motion_px", motion_px.to_string(), format!("0 to {MOST_PX} pixels"))
+            }
             Self::BracketStops(stops) if stops.is_empty() || stops.len() > MOST => {
                 wrong("BracketStops", format!("{} stops", stops.len()), format!("1 to {MOST}"))
             }
@@ -69,27 +99,46 @@ impl FramesSpec {
     pub(crate) fn expose(
         &self,
         sensor: &Sensor,
-        rate: &ElectronRate,
+        rate: &MovedRate<'_>,
         exposure: &Exposure,
         noise: &Noise,
     ) -> Result<Exposed, PipelineError> {
         self.check()?;
         let exposures = match self {
             Self::Single => vec![*exposure],
-            Self::Burst(n) => vec![*exposure; *n],
+            Self::Burst(n) | Self::MovingBurst { frames: n, .. } => vec![*exposure; *n],
             Self::BracketStops(stops) => exposure.bracket(stops),
         };
         let (mut first, mut frames) = (None, Vec::new());
-        for (exposure, number) in exposures.iter().zip(0..) {
-            let noise = noise.frame(number);
-            let electrons = sensor.electrons(rate, exposure, &noise)?;
+        for (number, exposure) in exposures.iter().enumerate() {
+            let moved_px = match self {
+                Self::MovingBurst { motion_px, .. } => path_px(number, exposures.len(), *motion_px),
+                _ => [0.0; 2],
+            };
+            let noise = noise.frame(number as u64);
+            let electrons = sensor.electrons(&*rate(moved_px)?, exposure, &noise)?;
             let volts = sensor.volts(&electrons, exposure, &noise)?;
             frames.push(sensor.digitize(&volts, exposure)?);
             first.get_or_insert((electrons, volts));
         }
         let (electrons, volts) = first.expect("a checked choice has a frame");
-        let merged = if *self == Self::Single { None } else { Some(sensor.merge(&frames)?) };
+        let merged = match self {
+            Self::Single => None,
+            Self::MovingBurst { .. } => Some(sensor.merge_moving(&frames)?),
+            Self::Burst(_) | Self::BracketStops(_) => Some(sensor.merge(&frames)?),
+        };
         Ok(Exposed { electrons, volts, raw: frames.swap_remove(0), merged })
+    }
+}
+
+/// Returns the rate of an image that does not move; a moving burst is refused.
+pub(crate) fn at_rest<'a>(rate: &'a ElectronRate) -> impl Fn([f64; 2]) -> Result<Cow<'a, ElectronRate>, PipelineError> {
+    move |moved_px| {
+        if moved_px == [0.0; 2] {
+            return Ok(Cow::Borrowed(rate));
+        }
+        let reason = "needs the irradiance, of which the electrons alone are left here".to_owned();
+        Err(PipelineError::Unsuitable { what: "a moving burst", reason })
     }
 }
 
@@ -102,8 +151,9 @@ mod tests {
     fn a_burst_has_less_noise_and_its_first_frame_is_the_single_one() {
         let sensor = Sensor { prnu_fraction: 0.0, dsnu_v: 0.0, ..Sensor::built_in("machine-vision-mono").unwrap() };
         let rate = ElectronRate { planes_e_per_s: vec![Array2::from_elem((64, 64), 2e5)] };
-        let shoot =
-            |choice: FramesSpec| choice.expose(&sensor, &rate, &Exposure::seconds(0.01), &Noise::all(1)).unwrap();
+        let shoot = |choice: FramesSpec| {
+            choice.expose(&sensor, &at_rest(&rate), &Exposure::seconds(0.01), &Noise::all(1)).unwrap()
+        };
         let (single, burst) = (shoot(FramesSpec::Single), shoot(FramesSpec::Burst(16)));
         assert!(single.merged.is_none() && single.raw == burst.raw && single.volts == burst.volts);
         let deviation = |raw: &Raw| f64::from(raw.linear()[0].std(0.0));
@@ -118,6 +168,18 @@ mod tests {
         assert!(error(FramesSpec::Burst(0)).contains("Burst"));
         assert!(error(FramesSpec::BracketStops(vec![])).contains("0 stops"));
         assert!(error(FramesSpec::BracketStops(vec![f64::NAN])).contains("NaN"));
+        assert!(error(FramesSpec::MovingBurst { frames: 4, motion_px: f64::NAN }).contains("motion_px"));
         FramesSpec::BracketStops(vec![-4.0, 0.0]).check().unwrap();
+    }
+
+    #[test]
+    fn a_moving_camera_ends_where_it_should() {
+        let end = path_px(15, 16, 8.0);
+        assert!(path_px(0, 16, 8.0) == [0.0; 2] && (end[0].hypot(end[1]) - 8.0).abs() < 1e-12);
+        let rate = ElectronRate { planes_e_per_s: vec![Array2::from_elem((64, 64), 2e5)] };
+        let sensor = Sensor::built_in("machine-vision-mono").unwrap();
+        let choice = FramesSpec::MovingBurst { frames: 2, motion_px: 1.0 };
+        let error = choice.expose(&sensor, &at_rest(&rate), &Exposure::seconds(0.01), &Noise::all(1)).unwrap_err();
+        assert!(error.to_string().contains("irradiance"), "{error}");
     }
 }

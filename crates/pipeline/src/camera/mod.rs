@@ -22,6 +22,7 @@ use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
 pub use bank::{BankData, BankSpec};
+pub(crate) use frames::at_rest;
 pub use frames::{Exposed, FramesSpec};
 pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 pub use light_field::LightFieldSpec;
@@ -396,7 +397,7 @@ mod tests {
         assert_eq!(of(""), Processing::default());
         assert_eq!(of("white: GrayWorld"), Processing { white: WhiteBalance::GrayWorld, ..Processing::default() });
         assert_eq!(of("white: Light(D50), curve: Srgb"), Processing::for_light(Illuminant::D50));
-        assert_eq!(of("demosaic: Directional, highlights: Clip"), Processing::plain());
+        assert_eq!(of("demosaic: Directional, highlights: Clip, denoise: 0.0"), Processing::plain());
         let light = "white: Light(Chromaticity(x: 0.46, y: 0.414))";
         assert_eq!(of(light), Processing::for_light(Illuminant::Chromaticity { x: 0.46, y: 0.414 }));
     }

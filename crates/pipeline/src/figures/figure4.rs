@@ -7,7 +7,7 @@ use dioptric_spectrum::Cancel;
 
 use crate::{
     Camera, FilmSpec, KeptCamera, LensSpec, PipelineError, Progress, RenderEffort, SceneSource, SceneSpec, SensorSpec,
-    Silent, WavelengthSpec, WorldSpec,
+    Silent, WavelengthSpec, WorldSpec, camera::at_rest,
 };
 
 /// The read noise of the third panel, V; the sensor swings over 1.15 V.
@@ -77,7 +77,7 @@ pub fn panels(camera: &Camera, progress: &dyn Progress, cancel: &Cancel) -> Resu
         let sensor = Sensor { read_noise_v, ..capture.sensor.clone() };
         let exposure = capture.frames.exposure;
         let noise = Noise { sources: camera.noise, ..Noise::all(camera.seed) };
-        let exposed = camera.frames.expose(&sensor, &capture.rate, &exposure, &noise)?;
+        let exposed = camera.frames.expose(&sensor, &at_rest(&capture.rate), &exposure, &noise)?;
         let picture = sensor.develop(exposed.developed_from(), &capture.processing)?.picture;
         Ok(Panel { name, exposure_s: exposure.time_s, picture })
     };

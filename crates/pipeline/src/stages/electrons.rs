@@ -12,6 +12,14 @@ pub(super) fn on_film(sensor: &Sensor, place: &FilmPlace) -> Sensor {
     Sensor { pixel_pitch_um: place.pixel_pitch_um(), ..sensor.clone().with_size(place.rows, place.columns) }
 }
 
+/// Returns where the light of the sensor's pixels comes from, if its responses depend on that.
+pub(super) fn exit_pupil(sensor: &Sensor, place: &FilmPlace) -> Option<ExitPupil> {
+    // Pixels of a binned film are the full film's, farther apart: angles are those of the places they stand for.
+    let closer = |mm: f64| mm / place.binning as f64;
+    let pupil = place.exit_pupil_distance_mm.filter(|_| !sensor.chief_ray_response.is_empty());
+    pupil.map(|mm| ExitPupil { distance_mm: closer(mm), axis_mm: place.exit_pupil_axis_mm.map(closer) })
+}
+
 /// Collects the electrons of all bands; the pixels are one sample each.
 pub(super) fn collect(
     irradiance: Arc<Irradiance>,
@@ -20,11 +28,7 @@ pub(super) fn collect(
     watch: &Watch<'_>,
 ) -> Result<ElectronRate, PipelineError> {
     watch.progress.at(Stage::Sensor, 0.0);
-    // Pixels of a binned film are the full film's, farther apart: angles are those of the places they stand for.
-    let closer = |mm: f64| mm / place.binning as f64;
-    let pupil = place.exit_pupil_distance_mm.filter(|_| !sensor.chief_ray_response.is_empty());
-    let exit_pupil =
-        pupil.map(|mm| ExitPupil { distance_mm: closer(mm), axis_mm: place.exit_pupil_axis_mm.map(closer) });
+    let exit_pupil = exit_pupil(&sensor, place);
     watch.run(move || {
         let light = Illumination { exit_pupil, ..Illumination::on_pixels(&*irradiance) };
         Ok(sensor.electron_rate(&light)?)

@@ -1,9 +1,11 @@
 //! The frames of the sensor: exposure, noise, conversion.
 
-use dioptric_sensor::{ElectronRate, Exposure, Sensor};
+use std::borrow::Cow;
+
+use dioptric_sensor::{ElectronRate, Exposure, Illumination, Moved, Sensor};
 
 use super::spec::ShutterInputs;
-use crate::{Exposed, PipelineError};
+use crate::{Exposed, FramesSpec, PipelineError, camera::at_rest};
 
 /// What a sensor gives for one picture, and how it was exposed.
 #[derive(Clone, Debug)]
@@ -14,8 +16,36 @@ pub struct FrameSet {
     pub exposed: Exposed,
 }
 
-pub(crate) fn expose(inputs: &ShutterInputs, sensor: &Sensor, rate: &ElectronRate) -> Result<FrameSet, PipelineError> {
+/// Exposes a sensor; `light` is the irradiance that the rate was collected from, needed where the camera moves between frames.
+pub(crate) fn expose(
+    inputs: &ShutterInputs,
+    sensor: &Sensor,
+    rate: &ElectronRate,
+    light: Option<&Illumination<'_>>,
+) -> Result<FrameSet, PipelineError> {
     let exposure = sensor.expose(rate, &inputs.exposure)?;
-    let exposed = inputs.frames.expose(sensor, rate, &exposure, &inputs.noise)?;
+    let still = at_rest(rate);
+    let exposed = match light.filter(|_| inputs.moves()) {
+        None => inputs.frames.expose(sensor, &still, &exposure, &inputs.noise)?,
+        Some(light) => {
+            let sample_um = light.pitch_um.unwrap_or(sensor.pixel_pitch_um);
+            let moved = |moved_px: [f64; 2]| -> Result<Cow<'_, ElectronRate>, PipelineError> {
+                if moved_px == [0.0; 2] {
+                    return Ok(Cow::Borrowed(rate));
+                }
+                let shift_px = moved_px.map(|px| px * sensor.pixel_pitch_um / sample_um);
+                let irradiance = Moved { irradiance: light.irradiance, shift_px };
+                Ok(Cow::Owned(sensor.electron_rate(&Illumination { irradiance: &irradiance, ..*light })?))
+            };
+            inputs.frames.expose(sensor, &moved, &exposure, &inputs.noise)?
+        }
+    };
     Ok(FrameSet { exposure, exposed })
+}
+
+impl ShutterInputs {
+    /// Whether the camera moves between frames.
+    pub(crate) fn moves(&self) -> bool {
+        matches!(self.frames, FramesSpec::MovingBurst { .. })
+    }
 }

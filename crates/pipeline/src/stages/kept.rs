@@ -5,7 +5,7 @@ use std::{fs, sync::Arc};
 use dioptric_forward::{ImagingPlan, check_depth_map};
 use dioptric_psf::LensImageModel;
 use dioptric_scene::Scene;
-use dioptric_sensor::{Developed, ElectronRate, Processing, Sensor};
+use dioptric_sensor::{Developed, ElectronRate, Illumination, Processing, Sensor};
 use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, Quantity, SpectralImage, WavelengthGrid};
 use dioptric_world::World;
 
@@ -504,7 +504,15 @@ impl Chain<'_> {
             let rate = self.electrons(&inputs.electrons)?;
             self.watch.progress.at(Stage::Sensor, 0.5);
             let (shutter, sensor) = (inputs.shutter.clone(), electrons::on_film(&inputs.electrons.sensor, &place));
-            self.watch.run(move || frames::expose(&shutter, &sensor, &rate))
+            // What moves between frames is the irradiance.
+            let irradiance = if shutter.moves() { Some(self.irradiance(irradiance)?) } else { None };
+            let exit_pupil = electrons::exit_pupil(&sensor, &place);
+            self.watch.run(move || {
+                let light = irradiance
+                    .as_deref()
+                    .map(|irradiance| Illumination { exit_pupil, ..Illumination::on_pixels(irradiance) });
+                frames::expose(&shutter, &sensor, &rate, light.as_ref())
+            })
         })
     }
 
