@@ -14,6 +14,7 @@ struct Readme;
 
 mod basis;
 mod block_layers;
+mod block_search;
 mod blur;
 mod convolve;
 mod coverage;

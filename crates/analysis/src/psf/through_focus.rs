@@ -3,12 +3,13 @@
 use std::f64::consts::FRAC_PI_2;
 
 use dioptric_optics::{Lens, ObjectPoint};
-use dioptric_psf::{LensImageModel, Picture};
+use dioptric_psf::LensImageModel;
 use rayon::prelude::*;
 
 use super::request::Item;
 use super::row::meridian_rad;
 use super::spot::{PaperRays, Spot};
+use super::windowed::Windowed;
 use crate::{PsfRequest, PsfSampling, PsfSet};
 use dioptric_pipeline::PipelineError;
 
@@ -104,28 +105,28 @@ impl Here<'_> {
     }
 
     fn of_picture(&self, item: &Item, source: &LensImageModel) -> (f64, f64) {
-        let Some(Window { picture, held }) = self.window(item, source) else { return (f64::NAN, f64::NAN) };
+        let Some((picture, pitch_um)) = self.window(item, source) else { return (f64::NAN, f64::NAN) };
         let modulation = |direction| {
-            let own = picture.mtf(direction, self.cycles_per_mm) * held;
-            let [asked, drawn] = [self.request.pixel_um, picture.pitch_um()].map(|um| self.pixels(um, direction));
+            let own = picture.modulation(direction, self.cycles_per_mm);
+            let [asked, drawn] = [self.request.pixel_um, pitch_um].map(|um| self.pixels(um, direction));
             (own * asked / drawn).min(1.0)
         };
         let meridian = meridian_rad(item.field_tan());
         (modulation(meridian), modulation(meridian + FRAC_PI_2))
     }
 
-    /// Draws a point on the coarsest pixels that do, in a window that is not too large; `None` of a dark point.
-    fn window(&self, item: &Item, source: &LensImageModel) -> Option<Window> {
+    /// Draws a point on the coarsest pixels that do, of a side in µm, in a window that is not too large; `None` of a dark point.
+    fn window(&self, item: &Item, source: &LensImageModel) -> Option<(Windowed, f64)> {
         let asked_um = self.request.pixel_um;
         let reach_um = 1e3 * source.extent_mm(item.field_tan(), item.dioptres, item.wavelength_nm)?;
         let pitch_um = pitch_um(asked_um, self.cycles_per_mm, reach_um);
         let query = item.query(pitch_um);
         if 2.0 * reach_um > pitch_um * LARGEST_WINDOW as f64 {
             let (energy, _) = source.picture(query, LARGEST_WINDOW)?;
-            return Some(Window { held: energy.sum(), picture: Picture::new(energy.view(), pitch_um) });
+            return Some((Windowed::new(energy.mapv(|e| e as f32).view(), pitch_um), pitch_um));
         }
         let (kernel, _) = source.kernel_and_model(query)?;
-        Some(Window { held: 1.0, picture: Picture::from(&kernel) })
+        Some((Windowed::new(kernel.samples.view(), pitch_um), pitch_um))
     }
 
     fn of_rays(&self, item: &Item, rays: &PaperRays) -> Result<(f64, f64), PipelineError> {
@@ -148,12 +149,6 @@ impl Here<'_> {
         };
         side(direction.cos()) * side(direction.sin())
     }
-}
-
-/// A picture and the share of the light that it holds.
-struct Window {
-    picture: Picture,
-    held: f64,
 }
 
 /// Returns the side of the pixels on which a modulation is computed, µm: those asked for where the blur is small, up to

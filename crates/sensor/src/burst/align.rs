@@ -145,7 +145,7 @@ impl Bowl {
         let (hrr, hcc) = (down + bend, right + bend);
         let (gr, gc) = (bend * expected[0] - self.slope[0], bend * expected[1] - self.slope[1]);
         let determinant = hrr * hcc - both * both;
-        if !(determinant > 1e-6 * hrr * hcc && hrr > 0.0 && hcc > 0.0) || !determinant.is_finite() {
+        if !(determinant > 1e-6 * hrr * hcc && hrr > 0.0 && hcc > 0.0 && determinant.is_finite()) {
             return expected.map(|d| d.clamp(-1.0, 1.0));
         }
         [(hcc * gr - both * gc) / determinant, (hrr * gc - both * gr) / determinant].map(|d| d.clamp(-1.0, 1.0))
