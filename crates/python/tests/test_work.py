@@ -110,6 +110,8 @@ def test_exception_of_a_follower_ends_the_work(tiny: dp.Camera) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX's")
 def test_ctrl_c_ends_the_work(tiny: dp.Camera) -> None:
     camera = longer(tiny, (960, 640), 33)
+    # A shell starts what runs in the background with the signal ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
     start = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
