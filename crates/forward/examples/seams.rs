@@ -1,4 +1,4 @@
-//! Seams: a uniform plane through seven lenses, wide open and at f/8, in focus and 2 dioptres off, by rays, bent rays and waves.
+//! Seams: a uniform plane through seven lenses, wide open and at f/8, in focus and 2 dioptres off, by rays without diffraction, HURB and waves.
 //! `cargo run --release --example seams -p dioptric-forward [LENS …]` prints a table: the largest second difference beyond the
 //! curvature at eight pixels, and without diffraction the largest difference from real rays, of a strip from corner to corner.
 

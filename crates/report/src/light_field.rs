@@ -34,7 +34,7 @@ pub struct LightFieldReport {
     pub whole: Vec<bool>,
     /// Depths that a picture was refocused on, m, with the disparity of neighboring views there, pixels.
     pub refocused: Vec<(f64, f64)>,
-    /// The least, the median and the greatest depth, m, of samples that are told with confidence.
+    /// The least, the median and the greatest depth, m, of the samples whose depth is certain enough to be used.
     pub depth_m: Option<[f32; 3]>,
     /// The share of such samples.
     pub confident_share: f64,

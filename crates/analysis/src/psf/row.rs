@@ -55,7 +55,8 @@ pub struct PsfRow {
     /// The area of the pupil that reaches the film over that of an axial point at the same distance and wavelength
     /// (paper mode: the share of the rays over the front rim's disc).
     pub energy: f64,
-    /// The share of the point's light that lies on the picture: what the picture's metrics are of.
+    /// The share of the point's light that lies on the picture: what the picture's metrics are of, but for the modulation, in which
+    /// the rest counts as well.
     pub picture_share: f64,
     /// The share of the picture that is the sum of waves; the rest is geometric or bent rays. Not in the paper mode.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -69,7 +70,8 @@ pub struct PsfRow {
     /// The bank from which it was drawn, where it was not traced.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bank: Option<BankData>,
-    /// Modulation at the frequencies asked for.
+    /// Modulation at the frequencies asked for, of all light of the point: what lies outside of the picture counts as if it fell off
+    /// with the third power of the distance.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mtf: Vec<MtfRow>,
 }

@@ -131,7 +131,7 @@ impl LensFile {
             let _ = write!(text, "NOTE 0 {}\r\n", one_line(comment));
         }
         text.push_str("UNIT MM X W X CM MR CPMM\r\n");
-        // The format has no rim beside an opening: one that the stop reaches out of is told by the pupil.
+        // The format has no rim beside an opening: where the opening is larger than the rim, the file states the entrance pupil.
         match opening_beyond_rim(lens, lens.stop()) {
             false => text.push_str("FLOA\r\n"),
             true => {

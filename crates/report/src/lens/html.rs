@@ -37,7 +37,7 @@ impl LensPage<'_> {
             let charts: String = charts.map(|chart| chart_svg(chart, CHART_PX.0, CHART_PX.1)).concat();
             let words = "Tangential (solid): lines across the plane of axis and field, a wave along the radius. Sagittal \
                          (dashed): lines along it. By the waves of all wavelengths together; where the blur is too large for \
-                         that, by bent rays.";
+                         that, by HURB.";
             body += &section("Modulation", &format!("<div class=\"pair\">\n{charts}</div>\n{}", note(words)));
         }
         let fans = "Tangential rays and curves are those in the plane of axis and field (along y), sagittal ones across it \
