@@ -441,8 +441,8 @@ fn depth_edges_move_with_lateral_color() {
     let dioptres = Array2::from_shape_fn((120, 160), |(r, c)| if (r / 30 + c / 40) % 2 == 0 { 23.5 } else { 28.0 });
     let mut scene = pixels(plane.clone(), &dioptres);
     scene.radiance = image(vec![plane; 13], (0..13).map(|i| 490.0 + 10.0 * f64::from(i)).collect());
-    let at = |chromatic_step_px| {
-        rendered(&scene.source(), &lens, &scene.film, &Settings { chromatic_step_px, ..Settings::default() })
+    let at = |coverage_step_px| {
+        rendered(&scene.source(), &lens, &scene.film, &Settings { coverage_step_px, ..Settings::default() })
     };
     let (shared, own) = (at(0.25), at(0.0));
     let error = |(shared, own): (&Array2<f32>, &Array2<f32>)| {

@@ -1,5 +1,7 @@
 //! The layers that blocks of pixels may have a part of: most pixels lie in few layers, and a layer is sampled in those alone.
 
+use std::ops::Range;
+
 use ndarray::Array2;
 
 /// Pixels along a side of a block.
@@ -40,5 +42,21 @@ impl RowBlocks<'_> {
     pub(crate) fn may_have(&self, column: i64, layer: usize) -> bool {
         let block = usize::try_from(column - self.first_column).ok().and_then(|at| self.ranges.get(at / BLOCK));
         block.is_none_or(|&(first, last)| (usize::from(first)..=usize::from(last)).contains(&layer))
+    }
+
+    /// Returns the first run of pixels that may have a part of a layer, of a range of them counted from a column; an empty one at
+    /// the end of the range if there is none.
+    pub(crate) fn next_run(&self, first_column: i64, range: Range<usize>, layer: usize) -> Range<usize> {
+        let next_where = |start: usize, wanted: bool| {
+            let mut at = start;
+            while at < range.end && self.may_have(first_column + at as i64, layer) != wanted {
+                // All pixels of a block are alike.
+                let within = (first_column + at as i64 - self.first_column).rem_euclid(BLOCK as i64) as usize;
+                at += BLOCK - within;
+            }
+            at.min(range.end)
+        };
+        let start = next_where(range.start, true);
+        start..next_where(start, false)
     }
 }

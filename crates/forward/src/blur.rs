@@ -34,6 +34,8 @@ pub(crate) struct LayerTask<'a> {
     pub(crate) kernels: &'a LayerKernels,
     pub(crate) film_rows: usize,
     pub(crate) film_columns: usize,
+    /// A term that changes no edge by more than this is left out.
+    pub(crate) negligible_edge: f64,
     pub(crate) stopwatch: &'a Stopwatch,
 }
 
@@ -83,7 +85,7 @@ fn blur_patch(
     let Some(source) = whole.clipped(task.film_rows, task.film_columns, half) else { return Ok(None) };
     let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, task.blocks, cancel);
     let Some(mut ideal) = task.stopwatch.time(Part::Sampling, sample)? else { return Ok(None) };
-    let expansion = Expansion::of(patch, kernels, width, cancel)?;
+    let expansion = Expansion::of(patch, kernels, (width, task.negligible_edge), cancel)?;
     if task.surfaces.iter().all(|surface| surface.radiance.is_none()) {
         // What a surface covers is 1 all over it, however its kernels change.
         let share = (1.0 / expansion.uniform_response(cell.size)) as f32;
@@ -117,9 +119,6 @@ struct Term {
     samples: Vec<f32>,
 }
 
-/// A term that changes no edge by more than this is left out.
-const NEGLIGIBLE: f64 = 4e-6;
-
 /// Multiplications that take about as long as the transform of a sample.
 const COST_OF_TRANSFORM: usize = 64;
 
@@ -127,7 +126,7 @@ impl Expansion {
     fn of(
         patch: &Patch,
         kernels: &BTreeMap<Knot, KnotKernel>,
-        width: usize,
+        (width, negligible_edge): (usize, f64),
         cancel: &Cancel,
     ) -> Result<Self, Cancelled> {
         let mut terms = vec![];
@@ -139,7 +138,7 @@ impl Expansion {
                 kernels[knot].add_to(&mut samples, width, shares[product]);
             }
             let largest = LARGEST[down] * LARGEST[across];
-            if product == 0 || largest * edge_spread_peak(&samples, width) > NEGLIGIBLE {
+            if product == 0 || largest * edge_spread_peak(&samples, width) > negligible_edge {
                 terms.push(Term { down, across, samples });
             }
         }

@@ -1,6 +1,6 @@
 //! Linear convolution of small blocks: directly, and by Fourier transform.
 
-use std::{cell::RefCell, collections::HashMap, rc::Rc, sync::Arc};
+use std::{cell::RefCell, collections::HashMap, ops::Range, rc::Rc, sync::Arc};
 
 use dioptric_fft::{Complex, ComplexToReal, Fft, Planner, RealToComplex};
 
@@ -144,24 +144,28 @@ pub(crate) const STRIP_COLUMNS: usize = 128;
 /// has `stride` samples a row.
 ///
 /// A strip has planes of samples, each with a kernel of `width` × `width` samples of its own for every row. `padded`
-/// holds the rows of the planes with `width − 1` zeros before each and at least as many behind.
+/// holds the rows of the planes with `width − 1` zeros before each and at least as many behind; of each row only the columns `lit`
+/// of it hold more than zeros.
 #[multiversion::multiversion(targets("x86_64+avx2", "aarch64+neon"))]
 fn convolve_padded(
     padded: &[f32],
     padded_stride: usize,
     kernels: &[f32],
     (width, n_planes): (usize, usize),
-    n_columns: usize,
+    (n_columns, lit): (usize, &[Range<usize>]),
     (out, stride): (&mut [f32], usize),
 ) {
     let kernel_len = width * width;
-    let n_rows = padded.len() / (n_planes * padded_stride);
+    let n_rows = lit.len();
     for row in 0..n_rows + width - 1 {
         let kernel_rows = (row + 1).saturating_sub(n_rows)..width.min(row + 1);
         for first in (0..n_columns + width - 1).step_by(LANES) {
             let mut sum = [0.0_f32; LANES];
             for kernel_row in kernel_rows.clone() {
                 let source = row - kernel_row;
+                if lit[source].end <= first || lit[source].start >= first + LANES + width - 1 {
+                    continue;
+                }
                 for plane in 0..n_planes {
                     let line = (source * n_planes + plane) * padded_stride;
                     let samples = &padded[line + first..][..LANES + width - 1];
@@ -188,6 +192,8 @@ pub(crate) struct Strip {
     n_columns: usize,
     padded_stride: usize,
     padded: Vec<f32>,
+    /// Of each row, the columns of `padded` that may not be zero.
+    lit: Vec<Range<usize>>,
     kernels: Vec<f32>,
 }
 
@@ -195,7 +201,7 @@ impl Strip {
     /// Returns an empty strip for kernels of `width` samples a side.
     pub(crate) fn new(width: usize, n_polynomials: usize) -> Self {
         let kernels = vec![0.0; STRIP_ROWS * n_polynomials * width * width];
-        Self { width, n_polynomials, n_columns: 0, padded_stride: 0, padded: vec![], kernels }
+        Self { width, n_polynomials, n_columns: 0, padded_stride: 0, padded: vec![], lit: vec![], kernels }
     }
 
     /// The kernels of a row, one for each polynomial.
@@ -211,25 +217,28 @@ impl Strip {
         self.n_columns = polynomials.len();
         self.padded_stride = (self.n_columns + width - 1).next_multiple_of(LANES) + width - 1;
         self.padded.clear();
-        let mut has_light = false;
+        self.lit.clear();
         for line in lines {
+            let first = line.iter().position(|sample| *sample != 0.0).unwrap_or(line.len());
+            let end = line.iter().rposition(|sample| *sample != 0.0).map_or(first, |last| last + 1);
+            self.lit.push(width - 1 + first..width - 1 + end);
             for plane in 0..self.n_polynomials {
                 let start = self.padded.len();
                 self.padded.resize(start + self.padded_stride, 0.0);
                 let padded = &mut self.padded[start + width - 1..];
                 for ((padded, sample), polynomials) in padded.iter_mut().zip(line).zip(polynomials) {
                     *padded = sample * polynomials[plane];
-                    has_light |= *sample != 0.0;
                 }
             }
         }
-        has_light
+        self.lit.iter().any(|lit| !lit.is_empty())
     }
 
     /// Adds the full convolution of the strip to `out`, whose first sample belongs to the strip's first less half a kernel.
     pub(crate) fn add_to(&self, out: &mut [f32], stride: usize) {
         let shape = (self.width, self.n_polynomials);
-        convolve_padded(&self.padded, self.padded_stride, &self.kernels, shape, self.n_columns, (out, stride));
+        let columns = (self.n_columns, self.lit.as_slice());
+        convolve_padded(&self.padded, self.padded_stride, &self.kernels, shape, columns, (out, stride));
     }
 }
 

@@ -4,6 +4,7 @@ use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, Vig
 use dioptric_psf::{BankSettings, Diffraction};
 use dioptric_spectrum::{DepthMap, WavelengthGrid};
 use glam::{DMat2, DVec2};
+use rayon::prelude::*;
 
 use crate::{Film, ForwardError};
 
@@ -35,20 +36,26 @@ impl PsfDomain<'_> {
         Err(ForwardError::Setting { what, value, expected: "above 0 and no larger than the farthest, m" })
     }
 
-    /// Hands the lens at the ends of the wavelengths, looking at the ends of the depths, one after the other.
-    fn for_each_end(&self, mut look: impl FnMut(&Aim<'_>) -> Result<(), ForwardError>) -> Result<(), ForwardError> {
+    /// Returns what is found of the lens at the ends of the wavelengths, looking at the ends of the depths.
+    fn at_ends<T: Send>(
+        &self,
+        look: impl Fn(&Aim<'_>) -> Result<T, ForwardError> + Sync,
+    ) -> Result<Vec<T>, ForwardError> {
         let (far, near) = self.dioptres()?;
         let (first_nm, last_nm) = self.grid.range_nm();
         let BankSettings { reference_wavelength_nm, .. } =
             BankSettings::covering(self.film_distance_mm, 0.0, (far, near), (first_nm, last_nm), self.diffraction);
         let reference = self.lens.at(reference_wavelength_nm)?;
-        for wavelength_nm in [first_nm, last_nm] {
-            let lens = self.lens.at(wavelength_nm)?;
-            for dioptres in [far, near] {
-                look(&Aim { lens: &lens, reference: &reference, dioptres, film_distance_mm: self.film_distance_mm })?;
-            }
-        }
-        Ok(())
+        let lenses = [self.lens.at(first_nm)?, self.lens.at(last_nm)?];
+        let ends: Vec<(&MonoLens, f64)> = lenses.iter().flat_map(|lens| [(lens, far), (lens, near)]).collect();
+        let looked: Vec<Result<T, ForwardError>> = ends
+            .par_iter()
+            .map(|&(lens, dioptres)| {
+                look(&Aim { lens, reference: &reference, dioptres, film_distance_mm: self.film_distance_mm })
+            })
+            .collect();
+        // The first of several errors, whoever found it first.
+        looked.into_iter().collect()
     }
 
     /// Returns the settings of a model that serves a scene on a film, whatever the symmetry of the lens: standard numbers of
@@ -69,13 +76,12 @@ impl PsfDomain<'_> {
     pub fn radial_settings(&self) -> Result<BankSettings, ForwardError> {
         self.film.check()?;
         self.lens.check_rotational("a bank of point spread functions over field angle alone")?;
-        let mut last_field_tan = 0.0_f64;
-        self.for_each_end(|aim| {
+        let fields_tan = self.at_ends(|aim| {
             // The border of the film is blurred by light from beyond it.
             let extent_mm = 1.02 * self.film.half_diagonal_mm() + aim.axial_blur_mm();
-            last_field_tan = last_field_tan.max(aim.field_tan_at(extent_mm));
-            Ok(())
+            Ok(aim.field_tan_at(extent_mm))
         })?;
+        let last_field_tan = fields_tan.into_iter().fold(0.0, f64::max);
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
         Ok(BankSettings::covering(self.film_distance_mm, last_field_tan, dioptres, wavelengths_nm, self.diffraction))
     }
@@ -88,16 +94,15 @@ impl PsfDomain<'_> {
     pub fn grid_settings(&self) -> Result<BankSettings, ForwardError> {
         self.film.check()?;
         let half_mm = self.film.half_size_mm();
-        let (mut first, mut last) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        self.for_each_end(|aim| {
+        let corners = self.at_ends(|aim| {
             let wavelength_nm = aim.lens.wavelength_nm();
             let dark = || ForwardError::DarkFilm { lens: self.lens.name().to_owned(), wavelength_nm };
             let center = aim.field_at_middle().ok_or_else(dark)?;
             let beyond_mm = 1.02 * half_mm + aim.blur_mm(center);
-            let (low, high) = aim.fields_over(center, beyond_mm);
-            (first, last) = (first.min(low), last.max(high));
-            Ok(())
+            Ok(aim.fields_over(center, beyond_mm))
         })?;
+        let around = |(first, last): (DVec2, DVec2), (low, high)| (first.min(low), last.max(high));
+        let (first, last) = corners.into_iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), around);
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
         Ok(BankSettings::covering_grid(
             self.film_distance_mm,

@@ -70,6 +70,12 @@ pub struct Settings {
     pub depth_edge_px: f64,
     /// Largest change of blur radius between wavelengths among which PSFs are interpolated, pixels.
     pub chromatic_step_px: f64,
+    /// Largest motion of a point of the film between wavelengths among which what layers cover is interpolated, pixels; off an even
+    /// motion it may be by a 25th of it.
+    pub coverage_step_px: f64,
+    /// A change of kernels over a cell that moves no edge spread function by more than this is left out. What is left out shows as
+    /// steps between cells.
+    pub negligible_edge: f64,
     /// Largest blur radius of a layer that is imaged on the pixels of the film; wider blurs have pixels 2, 4, 8 … times as
     /// wide, so that the radius is between half of this and this. At least 4.
     pub widest_blur_px: f64,
@@ -84,6 +90,8 @@ impl Default for Settings {
             layer_step_px: 2.0,
             depth_edge_px: 3.0,
             chromatic_step_px: 0.25,
+            coverage_step_px: 0.25,
+            negligible_edge: 4e-6,
             widest_blur_px: 64.0,
         }
     }
@@ -105,9 +113,15 @@ impl Settings {
                 return Err(ForwardError::Setting { what, value, expected: "a number above 0" });
             }
         }
-        if !(self.chromatic_step_px.is_finite() && self.chromatic_step_px >= 0.0) {
-            let (what, value) = ("the chromatic step", self.chromatic_step_px);
-            return Err(ForwardError::Setting { what, value, expected: "a number, 0 or more" });
+        let not_negative = [
+            ("the chromatic step", self.chromatic_step_px),
+            ("the coverage step", self.coverage_step_px),
+            ("the negligible edge", self.negligible_edge),
+        ];
+        for (what, value) in not_negative {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(ForwardError::Setting { what, value, expected: "a number, 0 or more" });
+            }
         }
         if !(self.widest_blur_px.is_finite() && self.widest_blur_px >= 4.0) {
             let (what, value) = ("the widest blur", self.widest_blur_px);

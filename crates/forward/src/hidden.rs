@@ -113,39 +113,70 @@ pub(crate) fn reach_of_edges(
         [(0, 1), (0, -1), (1, 0), (-1, 0), (0, 2), (0, -2), (2, 0), (-2, 0), (0, 3), (0, -3), (3, 0), (-3, 0)];
     let inside =
         |row: isize, column: isize| (0..rows as isize).contains(&row) && (0..columns as isize).contains(&column);
-    for ((row, column), &distance) in distances.indexed_iter() {
-        check_every(columns, column, cancel)?;
-        for (down, right) in OFFSETS {
-            let (r, c) = (row as isize + down, column as isize + right);
-            if inside(r, c) {
-                let other = distances[(r as usize, c as usize)];
-                if other - distance > rule.jump {
-                    let radius = f32::max((rule.reach)(distance), (rule.reach)(other)) + 2.0;
-                    let at = &mut reach[row * columns + column];
-                    *at = at.max(radius);
-                }
-            }
-        }
-    }
-    // Two sweeps spread the reach over the near surface, down to 0, a sample a step; farther surfaces stop it.
-    let mut spread = |from: [(isize, isize, f32); 4], order: &mut dyn Iterator<Item = usize>| {
-        for sample in order {
-            check_every(columns, sample, cancel)?;
-            let (row, column) = (sample / columns, sample % columns);
-            for (down, right, cost) in from {
+    reach.par_chunks_mut(columns.max(1)).enumerate().try_for_each(|(row, line)| {
+        cancel.check()?;
+        for (column, reach) in line.iter_mut().enumerate() {
+            let distance = distances[(row, column)];
+            for (down, right) in OFFSETS {
                 let (r, c) = (row as isize + down, column as isize + right);
-                if inside(r, c) && distances[(row, column)] - distances[(r as usize, c as usize)] <= rule.jump {
-                    let left = reach[r as usize * columns + c as usize] - cost;
-                    reach[sample] = reach[sample].max(left);
+                if inside(r, c) {
+                    let other = distances[(r as usize, c as usize)];
+                    if other - distance > rule.jump {
+                        let radius = f32::max((rule.reach)(distance), (rule.reach)(other)) + 2.0;
+                        *reach = reach.max(radius);
+                    }
                 }
             }
         }
         Ok(())
-    };
-    let diagonal = std::f32::consts::SQRT_2;
-    spread([(0, -1, 1.0), (-1, 0, 1.0), (-1, -1, diagonal), (-1, 1, diagonal)], &mut (0..rows * columns))?;
-    spread([(0, 1, 1.0), (1, 0, 1.0), (1, 1, diagonal), (1, -1, diagonal)], &mut (0..rows * columns).rev())?;
+    })?;
+    let samples = distances.as_standard_layout();
+    let Some(samples) = samples.as_slice() else { return Ok(reach) };
+    spread_over(samples, &mut reach, columns, rule.jump, cancel)?;
+    // Turned by half a turn the second sweep is the first.
+    reach.reverse();
+    let turned: Vec<f32> = samples.iter().rev().copied().collect();
+    spread_over(&turned, &mut reach, columns, rule.jump, cancel)?;
+    reach.reverse();
     Ok(reach)
+}
+
+/// Spreads a reach over the near surface, down to 0, a sample a step, from above and the left; farther surfaces stop it.
+fn spread_over(
+    distances: &[f32],
+    reach: &mut [f32],
+    columns: usize,
+    jump: f32,
+    cancel: &Cancel,
+) -> Result<(), Cancelled> {
+    let diagonal = std::f32::consts::SQRT_2;
+    let mut above: Option<(&[f32], &mut [f32])> = None;
+    for (line, reach) in distances.chunks_exact(columns).zip(reach.chunks_exact_mut(columns)) {
+        cancel.check()?;
+        if let Some((line_above, reach_above)) = &above {
+            for column in 0..columns {
+                let mut take = |from: usize, cost: f32| {
+                    if line[column] - line_above[from] <= jump {
+                        reach[column] = reach[column].max(reach_above[from] - cost);
+                    }
+                };
+                take(column, 1.0);
+                if column > 0 {
+                    take(column - 1, diagonal);
+                }
+                if column + 1 < columns {
+                    take(column + 1, diagonal);
+                }
+            }
+        }
+        for column in 1..columns {
+            if line[column] - line[column - 1] <= jump {
+                reach[column] = reach[column].max(reach[column - 1] - 1.0);
+            }
+        }
+        above = Some((line, reach));
+    }
+    Ok(())
 }
 
 /// Means over cells of 1, 2, 4 … samples, each over the farthest surface in the cell only.
@@ -253,25 +284,29 @@ impl Level {
     /// Returns the level of half as many cells each way, and which children each of its cells is the mean of.
     fn halved(&self, jump: f32, cancel: &Cancel) -> Result<(Self, Vec<[bool; 4]>), Cancelled> {
         let (rows, columns) = (self.rows.div_ceil(2), self.columns.div_ceil(2));
-        let (mut distances, mut shares, mut members) = (vec![], vec![], vec![]);
-        for cell in 0..rows * columns {
-            check_every(1 << 12, cell, cancel)?;
-            let all = || self.children_of(cell, columns, [true; 4]);
-            let farthest = all().map(|(child, _)| self.distances[child]).fold(f32::NEG_INFINITY, f32::max);
-            let mut member = [false; 4];
-            let (mut distance, mut share, mut n) = (0.0, 0.0, 0.0);
-            for (child, which) in all() {
-                n += 1.0;
-                if self.distances[child] > farthest - jump {
-                    member[which] = true;
-                    distance += self.shares[child] * self.distances[child];
-                    share += self.shares[child];
+        let halved: Vec<(f32, f32, [bool; 4])> = (0..rows * columns)
+            .into_par_iter()
+            .with_min_len(1 << 12)
+            .map(|cell| {
+                check_every(1 << 12, cell, cancel)?;
+                let all = || self.children_of(cell, columns, [true; 4]);
+                let farthest = all().map(|(child, _)| self.distances[child]).fold(f32::NEG_INFINITY, f32::max);
+                let mut member = [false; 4];
+                let (mut distance, mut share, mut n) = (0.0, 0.0, 0.0);
+                for (child, which) in all() {
+                    n += 1.0;
+                    if self.distances[child] > farthest - jump {
+                        member[which] = true;
+                        distance += self.shares[child] * self.distances[child];
+                        share += self.shares[child];
+                    }
                 }
-            }
-            distances.push(distance / share);
-            shares.push(share / n);
-            members.push(member);
-        }
+                Ok((distance / share, share / n, member))
+            })
+            .collect::<Result<_, Cancelled>>()?;
+        let distances = halved.iter().map(|(distance, ..)| *distance).collect();
+        let shares = halved.iter().map(|(_, share, _)| *share).collect();
+        let members = halved.into_iter().map(|(.., member)| member).collect();
         let first_cell = self.first_cell + self.rows * self.columns;
         Ok((Self { first_cell, rows, columns, distances, shares }, members))
     }

@@ -3,6 +3,7 @@
 use dioptric_psf::LensImage;
 use dioptric_spectrum::WavelengthGrid;
 use glam::DVec2;
+use rayon::prelude::*;
 
 use crate::Film;
 
@@ -19,7 +20,7 @@ impl LateralColor<'_> {
     /// fixed share of that at most off an even motion.
     pub(crate) fn knots(&self, kernel_bands: &[usize], dioptres: (f64, f64), step_px: f64) -> Vec<usize> {
         let fields = |&nm: &f64| self.fields_tan(nm, dioptres);
-        let fields: Vec<Vec<DVec2>> = self.grid.centers_nm().iter().map(fields).collect();
+        let fields: Vec<Vec<DVec2>> = self.grid.centers_nm().par_iter().map(fields).collect();
         let step_tan = step_px * self.tan_per_px(dioptres.0);
         let mut knots = vec![0];
         for band in 1..fields.len() {

@@ -79,7 +79,8 @@ impl Stack {
         let pad_px = radius_px.iter().map(|&radius_px| pad_for(radius_px)).fold(0.0, f64::max);
         let border_px = pad_px + 2.0 * settings.knot_spacing_px as f64;
         let extent_mm = corner_mm + pitch_mm * std::f64::consts::SQRT_2 * border_px;
-        let maps: Vec<FilmMap> = layers.dioptres().iter().map(|&d| lens.film_map(d, middle_nm, extent_mm)).collect();
+        let maps: Vec<FilmMap> =
+            layers.dioptres().par_iter().map(|&d| lens.film_map(d, middle_nm, extent_mm)).collect();
         let view = (scene.view, scene.size());
         let factor = |radius_px: f64| LayerRaster::factor_for(radius_px, settings.widest_blur_px);
         let raster = |(&radius_px, map)| LayerRaster::new(film, factor(radius_px), view, map);
@@ -130,7 +131,7 @@ impl Layout {
         // Find the cells in which a layer has anything, and halve them until the spline follows the PSFs.
         let (wavelengths_nm, middle_nm) = (grid.centers_nm(), middle_nm(grid));
         let ends: Vec<FilmMap> = [wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1], middle_nm]
-            .into_iter()
+            .into_par_iter()
             .flat_map(|w| [0, layers.len() - 1].map(|l| lens.film_map(layers.dioptres()[l], w, extent_mm)))
             .collect();
         let surfaces: Vec<&LayerCoordinates> =
@@ -151,7 +152,7 @@ impl Layout {
         let kept = Mutex::new(Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() });
         let basis_bands = match hides(settings, &layers) {
             true => {
-                LateralColor { lens, film, grid, extent_mm }.knots(&kernel_bands, dioptres, settings.chromatic_step_px)
+                LateralColor { lens, film, grid, extent_mm }.knots(&kernel_bands, dioptres, settings.coverage_step_px)
             }
             false => kernel_bands.clone(),
         };
@@ -304,12 +305,12 @@ impl Layout {
             .map(|depths| depths.surface(None))
             .collect();
         let maps = self.maps_at(lens, band);
-        let mut blurred = self.blank();
         let covered = |layer: usize| {
+            let mut blurred = self.blank();
             self.blur_onto_film(layer, &maps[layer], &surfaces, kernels, &mut blurred, work)?;
-            Ok(blurred.take_alpha())
+            Ok(blurred.into_alpha())
         };
-        (0..self.layers.len()).map(covered).collect()
+        (0..self.layers.len()).into_par_iter().map(covered).collect()
     }
 
     pub(crate) fn stream(
@@ -327,10 +328,11 @@ impl Layout {
         let work = Work::new(watch.cancel, watch.progress, watch.range, n_units);
         let mut hand_on = |band, picture| sink(band, picture).map_err(|reason| ForwardError::Sink { band, reason });
         let mut lower = self.basis(lens, 0, &work)?;
+        let last = n_bands - 1;
         for pair in self.basis_bands.windows(2) {
             let upper = self.basis(lens, pair[1], &work)?;
-            let bands: Vec<usize> = (pair[0]..pair[1]).collect();
-            for group in bands.chunks(rayon::current_num_threads().clamp(1, 4)) {
+            let bands: Vec<usize> = (pair[0]..pair[1] + usize::from(pair[1] == last)).collect();
+            for group in bands.chunks(self.bands_at_once()) {
                 let pictures: Vec<Result<Array2<f32>, ForwardError>> = group
                     .par_iter()
                     .map(|&band| {
@@ -345,10 +347,21 @@ impl Layout {
             }
             lower = upper;
         }
-        let last = n_bands - 1;
-        let picture = self.image_of(lens, last, &BasisBetween::new(&lower, &lower, 0.0), radiance, &work)?;
+        if n_bands == 1 {
+            hand_on(0, self.image_of(lens, 0, &BasisBetween::new(&lower, &lower, 0.0), radiance, &work)?)?;
+        }
         (watch.progress)(watch.range.1);
-        hand_on(last, picture)
+        Ok(())
+    }
+
+    /// How many bands are worked on at once: more than there are threads, so that none waits, where pictures are small.
+    fn bands_at_once(&self) -> usize {
+        /// Planes of the film that a band takes while it is imaged.
+        const PLANES: usize = 4;
+        const IN_FLIGHT_BYTES: usize = 256 << 20;
+        let Film { rows, columns, .. } = self.spec.film;
+        let threads = rayon::current_num_threads();
+        (IN_FLIGHT_BYTES / (PLANES * size_of::<f32>() * rows * columns).max(1)).clamp(threads.min(4), 4 * threads)
     }
 
     /// Reads a band and images it.
@@ -433,6 +446,7 @@ impl Layout {
             kernels: &kernels.by_layer[layer],
             film_rows: film.rows,
             film_columns: film.columns,
+            negligible_edge: self.spec.settings.negligible_edge,
             stopwatch: &self.stopwatch,
         };
         if *factor == 1 {

@@ -65,8 +65,8 @@ impl BlurredPlane {
         }
     }
 
-    /// Returns the plane as alpha, without the zeros at the ends of its rows, and wipes it.
-    pub(crate) fn take_alpha(&mut self) -> LayerAlpha {
+    /// Returns the plane as alpha, without the zeros at the ends of its rows.
+    pub(crate) fn into_alpha(self) -> LayerAlpha {
         let lit = |((start, end), row): (&(usize, usize), ArrayView1<'_, f32>)| {
             let covers = |column: &usize| row[*column] != 0.0;
             let first = (*start..*end).find(covers).unwrap_or(*start);
@@ -79,7 +79,6 @@ impl BlurredPlane {
             starts.push(alpha.len());
             alpha.extend(row.iter().skip(line.start).take(line.len()));
         }
-        self.clear();
         LayerAlpha { lines, starts, alpha }
     }
 }
@@ -210,7 +209,7 @@ mod tests {
     fn composite(layers: &[(f32, f32)]) -> f32 {
         let mut picture = Composite::new(1, 1);
         for &(light, alpha) in layers {
-            let alpha = plane(alpha).take_alpha();
+            let alpha = plane(alpha).into_alpha();
             let alpha = AlphaBetween { lower: &alpha, upper: &alpha, fraction: 0.25 };
             picture.composite_under(&mut plane(light), alpha, &Cancel::new()).unwrap();
         }
@@ -237,9 +236,7 @@ mod tests {
         let alpha = |first: usize, values: &[f32]| {
             let mut plane = BlurredPlane::new(2, 9);
             plane.add_row(1, first, values);
-            let alpha = plane.take_alpha();
-            assert!(plane.values.iter().all(|&v| v == 0.0));
-            alpha
+            plane.into_alpha()
         };
         let (lower, upper) = (alpha(1, &[0.0, 0.5, 1.0, 1.0, 0.0]), alpha(4, &[1.0, 0.5]));
         assert_eq!((lower.alpha.len(), upper.alpha.len()), (3, 2));

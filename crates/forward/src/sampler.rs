@@ -1,9 +1,8 @@
 //! The ideal picture of a layer: what an aberration-free lens of the same geometry would put on the film.
 
-use dioptric_psf::FilmMap;
+use dioptric_psf::{FieldsAlong, FilmMap};
 use dioptric_scene::View;
 use dioptric_spectrum::{Cancel, Cancelled};
-use glam::DVec2;
 use ndarray::{Array2, Axis, parallel::prelude::*};
 
 use crate::{block_layers::BlockLayers, geometry::FilmFrame, layers::tent};
@@ -130,7 +129,7 @@ impl Sampler {
         blocks: &BlockLayers,
         cancel: &Cancel,
     ) -> Result<Option<Vec<f32>>, Cancelled> {
-        let mut ideal = Vec::with_capacity(rectangle.rows * rectangle.columns);
+        let mut ideal = vec![0.0; rectangle.rows * rectangle.columns];
         let n = self.per_pixel;
         let share = 1.0 / (n * n) as f32;
         let mut has_any = false;
@@ -142,75 +141,110 @@ impl Sampler {
         let x_mm: Vec<f64> =
             along(rectangle.first_column, rectangle.columns).iter().map(|&c| self.frame.x_mm(c)).collect();
         let y_mm: Vec<f64> = along(rectangle.first_row, rectangle.rows).iter().map(|&r| self.frame.y_mm(r)).collect();
-        for (row, y_mm) in (rectangle.first_row..).zip(y_mm.chunks_exact(n)) {
+        let (mut seen, mut squares) = (FieldsAlong::default(), Squares::default());
+        let lines = y_mm.chunks_exact(n).zip(ideal.chunks_exact_mut(rectangle.columns));
+        for (row, (y_mm, line)) in (rectangle.first_row..).zip(lines) {
             cancel.check()?;
             let blocks = blocks.of_row(row);
-            for (column, x_mm) in (rectangle.first_column..).zip(x_mm.chunks_exact(n)) {
-                if blocks.is_some_and(|blocks| !blocks.may_have(column, layer)) {
-                    ideal.push(0.0);
-                    continue;
-                }
-                let mut sum = 0.0;
-                for (&y, &x) in y_mm.iter().flat_map(|y| x_mm.iter().map(move |x| (y, x))) {
-                    let Some((tan, gain)) = map.at(DVec2::new(x, y)) else { continue };
-                    let (v, u) = self.view.position_of(tan.x, tan.y);
-                    let square = Square::at(self.size, v, u);
-                    for surface in surfaces {
-                        let Some((value, weight)) = square.value_of(surface, layer) else { continue };
-                        sum += if surface.radiance.is_some() { value * gain as f32 } else { weight };
-                        has_any |= weight > 0.0;
+            let mut start = 0;
+            while start < rectangle.columns {
+                let run = match &blocks {
+                    Some(blocks) => blocks.next_run(rectangle.first_column, start..rectangle.columns, layer),
+                    None => start..rectangle.columns,
+                };
+                let pixels = &mut line[run.clone()];
+                for &y_mm in y_mm {
+                    map.along(&x_mm[n * run.start..n * run.end], y_mm, &mut seen);
+                    self.locate(&seen, &mut squares);
+                    for (pixel, first) in pixels.iter_mut().zip((0..).step_by(n)) {
+                        for at in first..first + n {
+                            has_any |= self.add(&squares, at, surfaces, layer, pixel);
+                        }
                     }
                 }
-                ideal.push(sum * share);
+                pixels.iter_mut().for_each(|pixel| *pixel *= share);
+                start = run.end;
             }
         }
         Ok(has_any.then_some(ideal))
     }
-}
 
-/// A place between four samples of the scene; beyond the edge of the scene, at the edge.
-struct Square {
-    /// The numbers of the samples, row by row, the first of which is that of the square.
-    corners: [usize; 4],
-    down: f32,
-    across: f32,
-    /// Whether the place lies on the scene.
-    is_inside: bool,
-}
-
-impl Square {
-    #[inline]
-    fn at((rows, columns): (usize, usize), row: f64, column: f64) -> Self {
-        let (last_row, last_column) = ((rows - 1) as f64, (columns - 1) as f64);
-        let is_inside = row >= -0.5 && column >= -0.5 && row <= last_row + 0.5 && column <= last_column + 0.5;
-        let (row, column) = (row.clamp(0.0, last_row), column.clamp(0.0, last_column));
-        let (top, left) = (row as u32 as usize, column as u32 as usize);
-        let (below, beside) = (if top + 1 < rows { columns } else { 0 }, usize::from(left + 1 < columns));
-        let first = top * columns + left;
-        Self {
-            corners: [first, first + beside, first + below, first + below + beside],
-            down: (row - f64::from(top as u32)) as f32,
-            across: (column - f64::from(left as u32)) as f32,
-            is_inside,
-        }
+    /// Puts the squares of the scene that are seen along a row into `squares`.
+    fn locate(&self, seen: &FieldsAlong, squares: &mut Squares) {
+        locate((&self.view, self.size), seen, squares);
     }
 
-    /// Returns radiance × weight (0 where there is no radiance) and weight of a layer, or `None` where it has no weight.
+    /// Adds what of a layer is seen at a place to a pixel: light where the surfaces have radiance, weight where not. Returns
+    /// whether there is any.
     #[inline]
-    fn value_of(&self, surface: &Surface<'_>, layer: usize) -> Option<(f32, f32)> {
-        let (first, last) = surface.ranges[self.corners[0]];
-        if layer < usize::from(first) || layer > usize::from(last) {
-            return None;
+    fn add(&self, squares: &Squares, at: usize, surfaces: &[Surface<'_>], layer: usize, pixel: &mut f32) -> bool {
+        let first = squares.first[at] as usize;
+        if first == UNSEEN as usize {
+            return false;
         }
-        let Self { down, across, .. } = *self;
+        let (rows, columns) = self.size;
+        let (beside, below) = (usize::from(columns > 1), if rows > 1 { columns } else { 0 });
+        let corners = [first, first + beside, first + below, first + below + beside];
+        let (down, across) = (squares.down[at], squares.across[at]);
         let shares = [(1.0 - down) * (1.0 - across), (1.0 - down) * across, down * (1.0 - across), down * across];
-        let coordinate = layer as f32;
-        let (mut light, mut alpha) = (0.0, 0.0);
-        for (corner, share) in self.corners.into_iter().zip(shares) {
-            let weight = share * tent(surface.layer_coordinates[corner], coordinate);
-            light += surface.radiance.map_or(0.0, |radiance| weight * radiance[corner]);
-            alpha += weight;
+        let mut has_any = false;
+        for surface in surfaces {
+            let (first, last) = surface.ranges[corners[0]];
+            if layer < usize::from(first) || layer > usize::from(last) {
+                continue;
+            }
+            let weights: [f32; 4] =
+                std::array::from_fn(|i| shares[i] * tent(surface.layer_coordinates[corners[i]], layer as f32));
+            let weight = weights[0] + weights[1] + weights[2] + weights[3];
+            has_any |= weight > 0.0;
+            *pixel += match surface.radiance {
+                Some(radiance) => {
+                    let light: f32 = (0..4).map(|i| weights[i] * radiance[corners[i]]).sum();
+                    light * squares.gain[at]
+                }
+                None => weight,
+            };
         }
-        Some((if self.is_inside { light } else { 0.0 }, alpha))
+        has_any
+    }
+}
+
+/// Squares between four samples of the scene in which places lie; beyond the edge of the scene, at the edge.
+#[derive(Default)]
+struct Squares {
+    /// The number of the sample at the upper left of each, or [`UNSEEN`].
+    first: Vec<u32>,
+    /// How far below and to the right of it the place lies, 0 to 1.
+    down: Vec<f32>,
+    across: Vec<f32>,
+    /// Irradiance per radiance, sr; 0 beyond the edge.
+    gain: Vec<f32>,
+}
+
+/// Stands for the square of a place that nothing is seen from.
+const UNSEEN: u32 = u32::MAX;
+
+/// Finds the squares of the scene in the fields along a row.
+#[multiversion::multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn locate((view, (rows, columns)): (&View, (usize, usize)), seen: &FieldsAlong, squares: &mut Squares) {
+    let n = seen.tan_x.len();
+    squares.first.resize(n, 0);
+    for values in [&mut squares.down, &mut squares.across, &mut squares.gain] {
+        values.resize(n, 0.0);
+    }
+    let (last_row, last_column) = ((rows - 1) as f64, (columns - 1) as f64);
+    let (last_top, last_left) = (rows.saturating_sub(2) as f64, columns.saturating_sub(2) as f64);
+    let fields = seen.tan_x.iter().zip(&seen.tan_y).zip(&seen.irradiance_per_radiance);
+    let places = squares.down.iter_mut().zip(&mut squares.across).zip(&mut squares.gain);
+    for (((&tan_x, &tan_y), &gain), (first, ((down, across), bright))) in
+        fields.zip(squares.first.iter_mut().zip(places))
+    {
+        let (row, column) = (view.center_y_px - view.focal_px * tan_y, view.center_x_px + view.focal_px * tan_x);
+        let is_inside = row >= -0.5 && column >= -0.5 && row <= last_row + 0.5 && column <= last_column + 0.5;
+        let (row, column) = (row.clamp(0.0, last_row), column.clamp(0.0, last_column));
+        let (top, left) = (row.min(last_top) as i32, column.min(last_left) as i32);
+        (*down, *across) = ((row - f64::from(top)) as f32, (column - f64::from(left)) as f32);
+        *first = if gain.is_nan() { UNSEEN } else { top as u32 * columns as u32 + left as u32 };
+        *bright = if is_inside { gain as f32 } else { 0.0 };
     }
 }

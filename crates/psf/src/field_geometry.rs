@@ -3,11 +3,17 @@
 use dioptric_spectrum::{Cancel, Cancelled};
 use glam::{DMat2, DVec2};
 
-use crate::axis::{Axis, Stencil};
+use crate::{
+    FieldsAlong,
+    axis::{Axis, Stencil},
+};
 
-/// Nodes of a table along each side.
+/// Nodes of a table along each side, for fields sampled as they are by default.
 const NODES: usize = 129;
-/// Steps of Newton's method; it has converged after four or five.
+/// The same for at most this many fields each way.
+const FEW_NODES: usize = 65;
+const FEW_FIELDS: usize = 6;
+/// Steps of Newton's method; it has converged after three or four.
 const STEPS: usize = 24;
 
 /// Field and irradiance over the film, for one depth and wavelength.
@@ -26,20 +32,28 @@ pub struct FieldGeometry {
 /// A rectangle of the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Area {
-    pub(crate) first_mm: DVec2,
-    pub(crate) last_mm: DVec2,
+    first_mm: DVec2,
+    last_mm: DVec2,
+    /// Nodes along each side.
+    side: usize,
+    nodes_per_mm: DVec2,
 }
 
 impl Area {
-    /// Returns the smallest rectangle about these places.
-    pub(crate) fn around(mut places_mm: impl Iterator<Item = DVec2>) -> Option<Self> {
+    /// Returns the smallest rectangle about the places where so many fields each way land.
+    pub(crate) fn around(mut places_mm: impl Iterator<Item = DVec2>, n_fields: usize) -> Option<Self> {
         let first = places_mm.next()?;
         let (first_mm, last_mm) = places_mm.fold((first, first), |(low, high), at| (low.min(at), high.max(at)));
-        Some(Self { first_mm, last_mm })
+        Some(Self::between(first_mm, last_mm, if n_fields <= FEW_FIELDS { FEW_NODES } else { NODES }))
+    }
+
+    /// Returns the rectangle between two of its corners: left below and right above.
+    fn between(first_mm: DVec2, last_mm: DVec2, side: usize) -> Self {
+        Self { first_mm, last_mm, side, nodes_per_mm: (side - 1) as f64 / (last_mm - first_mm) }
     }
 
     fn step_mm(&self) -> DVec2 {
-        (self.last_mm - self.first_mm) / (NODES - 1) as f64
+        (self.last_mm - self.first_mm) / (self.side - 1) as f64
     }
 }
 
@@ -56,15 +70,16 @@ impl FieldGeometry {
     /// cosine, but no losses in glass.
     #[inline]
     pub fn at(&self, place_mm: DVec2) -> Option<(DVec2, f64)> {
-        let place = (place_mm - self.area.first_mm) / self.area.step_mm();
-        let last = (NODES - 1) as f64;
+        let place = (place_mm - self.area.first_mm) * self.area.nodes_per_mm;
+        let side = self.area.side;
+        let last = (side - 1) as f64;
         if !(place.x >= 0.0 && place.y >= 0.0 && place.x <= last && place.y <= last) {
             return None;
         }
-        let (column, row) = ((place.x as usize).min(NODES - 2), (place.y as usize).min(NODES - 2));
+        let (column, row) = ((place.x as usize).min(side - 2), (place.y as usize).min(side - 2));
         let (across, up) = (place.x - column as f64, place.y - row as f64);
-        let first = row * NODES + column;
-        let [a, b, c, d] = [first, first + 1, first + NODES, first + NODES + 1].map(|node| self.nodes[node]);
+        let first = row * side + column;
+        let [a, b, c, d] = [first, first + 1, first + side, first + side + 1].map(|node| self.nodes[node]);
         let mix = |i: usize| {
             (1.0 - up) * ((1.0 - across) * a[i] + across * b[i]) + up * ((1.0 - across) * c[i] + across * d[i])
         };
@@ -72,20 +87,60 @@ impl FieldGeometry {
         (!irradiance_per_radiance.is_nan()).then(|| (DVec2::new(mix(0), mix(1)), irradiance_per_radiance))
     }
 
+    /// As [`at`](Self::at) at places of one height.
+    pub(crate) fn along(&self, x_mm: &[f64], y_mm: f64, seen: &mut FieldsAlong) {
+        for (i, &x_mm) in x_mm.iter().enumerate() {
+            let found = self.at(DVec2::new(x_mm, y_mm));
+            let (tan, gain) = found.unwrap_or((DVec2::ZERO, f64::NAN));
+            (seen.tan_x[i], seen.tan_y[i], seen.irradiance_per_radiance[i]) = (tan.x, tan.y, gain);
+        }
+    }
+
     /// Returns the field seen at the place nearest to this one for which the bank has one.
     pub fn nearest_field_tan(&self, place_mm: DVec2) -> DVec2 {
         if let Some((field_tan, _)) = self.at(place_mm) {
             return field_tan;
         }
+        // Most often the place lies beyond an area that is seen to its borders.
+        let within_mm = place_mm.clamp(self.area.first_mm, self.area.last_mm);
+        if let Some((field_tan, _)) = self.at(within_mm) {
+            return field_tan;
+        }
+        self.nearest_known(within_mm).map_or(DVec2::ZERO, |node| DVec2::new(self.nodes[node][0], self.nodes[node][1]))
+    }
+
+    /// Returns the node nearest to a place in the area that has a field, sought in wider and wider squares about it.
+    fn nearest_known(&self, place_mm: DVec2) -> Option<usize> {
         let step_mm = self.area.step_mm();
-        let distance = |node: usize| {
-            let at = self.area.first_mm + step_mm * DVec2::new((node % NODES) as f64, (node / NODES) as f64);
-            at.distance_squared(place_mm)
-        };
-        let known = (0..self.nodes.len()).filter(|&node| !self.nodes[node][2].is_nan());
-        known
-            .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
-            .map_or(DVec2::ZERO, |node| DVec2::new(self.nodes[node][0], self.nodes[node][1]))
+        let center = ((place_mm - self.area.first_mm) * self.area.nodes_per_mm).round().as_i64vec2();
+        let last = self.area.side as i64 - 1;
+        let mut nearest: Option<(f64, usize)> = None;
+        for reach in 0..=last {
+            // All nodes from here on lie at least so far away.
+            let least_mm = (reach as f64 - 0.5) * step_mm.min_element();
+            if nearest.is_some_and(|(distance_mm, _)| distance_mm <= least_mm) {
+                break;
+            }
+            for down in -reach..=reach {
+                let is_side = down.abs() == reach;
+                for across in (-reach..=reach).step_by(if is_side { 1 } else { 2 * reach.max(1) as usize }) {
+                    let (row, column) = (center.y + down, center.x + across);
+                    if !(0..=last).contains(&row) || !(0..=last).contains(&column) {
+                        continue;
+                    }
+                    let node = row as usize * self.area.side + column as usize;
+                    if self.nodes[node][2].is_nan() {
+                        continue;
+                    }
+                    let at_mm = self.area.first_mm + step_mm * DVec2::new(column as f64, row as f64);
+                    let distance_mm = at_mm.distance(place_mm);
+                    if nearest.is_none_or(|(least, _)| distance_mm < least) {
+                        nearest = Some((distance_mm, node));
+                    }
+                }
+            }
+        }
+        nearest.map(|(_, node)| node)
     }
 
     /// Returns the geometry that is the sum of these, of one area, with these weights.
@@ -173,7 +228,8 @@ impl Landing<'_> {
             // A little beyond the samples the cubics still mean something.
             field_tan = (field_tan + step).clamp(low - 0.2 * span, high + 0.2 * span);
             landed = self.of(field_tan);
-            if (step / span).abs().max_element() < 1e-12 {
+            // The digits that are right double in each step, but across a knot of the cubics.
+            if (step / span).abs().max_element() < 1e-9 {
                 break;
             }
         }
@@ -192,14 +248,17 @@ impl Landing<'_> {
             let node = squares.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(node, _)| node);
             DVec2::new(self.x.knots()[node % n_x], self.y.knots()[node / n_x])
         };
-        let mut nodes = Vec::with_capacity(NODES * NODES);
-        for row in 0..NODES {
+        let mut nodes = Vec::with_capacity(area.side * area.side);
+        for row in 0..area.side {
             cancel.check()?;
-            let mut beside: Option<DVec2> = None;
-            for column in 0..NODES {
+            let mut beside: Option<(DVec2, Landed)> = None;
+            for column in 0..area.side {
                 let place_mm = area.first_mm + step_mm * DVec2::new(column as f64, row as f64);
-                let found = self.field_at(place_mm, beside.unwrap_or_else(|| nearest(place_mm)));
-                beside = found.as_ref().map(|(field_tan, _)| *field_tan);
+                let ahead =
+                    beside.map(|(field_tan, landed)| field_tan + landed.slope_mm.inverse() * (place_mm - landed.at_mm));
+                let from = ahead.filter(|from| from.is_finite()).unwrap_or_else(|| nearest(place_mm));
+                beside = self.field_at(place_mm, from);
+                let found = beside.as_ref();
                 nodes.push(
                     found.map_or([f64::NAN; 3], |(tan, landed)| [tan.x, tan.y, landed.irradiance_per_radiance()]),
                 );
@@ -233,7 +292,7 @@ mod tests {
         let (x, y) = (axis(0.4, 11), axis(0.3, 11));
         let landing = landing(&x, &y, |_| 100.0);
         let geometry =
-            landing.inverse(Area::around(landing.centroids_mm.iter().copied()).unwrap(), &Cancel::new()).unwrap();
+            landing.inverse(Area::around(landing.centroids_mm.iter().copied(), 11).unwrap(), &Cancel::new()).unwrap();
         for (across, up) in [(0.0, 0.0), (0.31, -0.22), (-0.37, 0.27), (0.12, 0.05)] {
             let field_tan = DVec2::new(across, up);
             let (found, gain) = geometry.at(land(field_tan)).unwrap();
@@ -257,7 +316,7 @@ mod tests {
         let (x, y) = (axis(0.4, 11), axis(0.3, 11));
         let landing = landing(&x, &y, |tan| if tan.x > 0.25 { 0.0 } else { 100.0 });
         let geometry =
-            landing.inverse(Area::around(landing.centroids_mm.iter().copied()).unwrap(), &Cancel::new()).unwrap();
+            landing.inverse(Area::around(landing.centroids_mm.iter().copied(), 11).unwrap(), &Cancel::new()).unwrap();
         let full = geometry.at(land(DVec2::new(0.1, 0.0))).unwrap().1;
         for i in 0..40 {
             let at = DVec2::new(0.01 * f64::from(i), 0.0);
@@ -272,7 +331,7 @@ mod tests {
     fn weights_mix_tables() {
         let (x, y) = (axis(0.4, 5), axis(0.3, 5));
         let landing = landing(&x, &y, |_| 100.0);
-        let area = Area { first_mm: DVec2::splat(-5.0), last_mm: DVec2::splat(5.0) };
+        let area = Area::between(DVec2::splat(-5.0), DVec2::splat(5.0), NODES);
         let geometry = landing.inverse(area, &Cancel::new()).unwrap();
         let mixed = FieldGeometry::mix([(&geometry, 0.75), (&geometry, 0.25)].into_iter()).unwrap();
         let at = DVec2::new(1.3, -2.2);

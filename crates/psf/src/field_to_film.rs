@@ -50,7 +50,7 @@ impl FieldToFilm {
             pupils_mm2.extend(samples.iter().map(|s| s.as_ref().map_or(0.0, |s| s.summary.pupil_mm2)));
         }
         let mut this = Self { nearest_lit, centroids_mm, pupils_mm2, geometries: vec![] };
-        let area = Area::around(this.centroids_mm.iter().copied()).expect("there are samples");
+        let area = Area::around(this.centroids_mm.iter().copied(), n_x.max(n_y)).expect("there are samples");
         let n_planes = this.centroids_mm.len() / n_plane;
         let inverse = |plane| this.landing(bank, [(plane, 1.0)].into_iter()).inverse(area, cancel);
         this.geometries = (0..n_planes).into_par_iter().map(inverse).collect::<Result<_, Cancelled>>()?;

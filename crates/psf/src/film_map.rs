@@ -1,6 +1,7 @@
 //! From places on the film to the fields that are seen there.
 
 use glam::DVec2;
+use multiversion::multiversion;
 
 use crate::FieldGeometry;
 
@@ -65,6 +66,16 @@ impl RadialMap {
         Some((mix(&self.tan_per_mm), mix(&self.irradiance_per_radiance)))
     }
 
+    /// As [`at`](Self::at) at each place.
+    fn along(&self, x_mm: &[f64], y_mm: f64, seen: &mut FieldsAlong) {
+        if self.extent_mm == 0.0 {
+            seen.irradiance_per_radiance.fill(f64::NAN);
+            return;
+        }
+        let tables = (self.tan_per_mm.as_slice(), self.irradiance_per_radiance.as_slice());
+        look_up(tables, self.entries_per_mm2, x_mm, y_mm, seen);
+    }
+
     /// Returns the field at a place of the film, mm from the axis; beyond the extent, that of the last place in it.
     pub fn field_tan(&self, place_mm: DVec2) -> DVec2 {
         if let Some((tan_per_mm, _)) = self.at(place_mm.length_squared()) {
@@ -72,6 +83,51 @@ impl RadialMap {
         }
         let tan = self.tan_per_mm[self.tan_per_mm.len() - 1] * self.extent_mm;
         place_mm / place_mm.length() * tan
+    }
+}
+
+/// The fields seen along a row of places on the film, and the irradiance that they get.
+#[derive(Clone, Debug, Default)]
+pub struct FieldsAlong {
+    /// Tangents to the right.
+    pub tan_x: Vec<f64>,
+    /// Tangents upwards.
+    pub tan_y: Vec<f64>,
+    /// Irradiance per radiance, sr; NaN where nothing is seen.
+    pub irradiance_per_radiance: Vec<f64>,
+}
+
+impl FieldsAlong {
+    fn resize(&mut self, len: usize) {
+        for values in [&mut self.tan_x, &mut self.tan_y, &mut self.irradiance_per_radiance] {
+            values.clear();
+            values.resize(len, 0.0);
+        }
+    }
+}
+
+/// Looks up a radial map at each place.
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn look_up(
+    (tan_per_mm, irradiance_per_radiance): (&[f64], &[f64]),
+    entries_per_mm2: f64,
+    x_mm: &[f64],
+    y_mm: f64,
+    seen: &mut FieldsAlong,
+) {
+    let last = tan_per_mm.len() - 1;
+    let end = last as f64;
+    let FieldsAlong { tan_x, tan_y, irradiance_per_radiance: gain } = seen;
+    let outputs = tan_x.iter_mut().zip(tan_y.iter_mut()).zip(gain.iter_mut());
+    for (&x_mm, ((tan_x, tan_y), gain)) in x_mm.iter().zip(outputs) {
+        let place = (x_mm * x_mm + y_mm * y_mm) * entries_per_mm2;
+        // Beyond the table its last entry is read, and not used.
+        let below = (place.min(end) as i32 as usize).min(last - 1);
+        let fraction = place - below as f64;
+        let mix = |table: &[f64]| table[below] + fraction * (table[below + 1] - table[below]);
+        let tan = mix(tan_per_mm);
+        (*tan_x, *tan_y) = (x_mm * tan, y_mm * tan);
+        *gain = if place > end { f64::NAN } else { mix(irradiance_per_radiance) };
     }
 }
 
@@ -123,6 +179,15 @@ impl FilmMap {
                 map.at(place_mm.length_squared()).map(|(tan_per_mm, gain)| (place_mm * tan_per_mm, gain))
             }
             Self::Plane(map) => map.at(place_mm),
+        }
+    }
+
+    /// As [`at`](Self::at) at places of one height: `x_mm` to the right of the axis and `y_mm` above it.
+    pub fn along(&self, x_mm: &[f64], y_mm: f64, seen: &mut FieldsAlong) {
+        seen.resize(x_mm.len());
+        match self {
+            Self::Radial(map) => map.along(x_mm, y_mm, seen),
+            Self::Plane(map) => map.along(x_mm, y_mm, seen),
         }
     }
 
@@ -191,6 +256,23 @@ mod tests {
             assert!((tan - expected).abs() < 1e-7, "{r} mm: {tan} {expected}");
             let gain = map.at(r * r).unwrap().1;
             assert!((gain - (1.0 + expected * expected).powi(-2)).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn row_is_seen_as_its_places() {
+        let tan_at = |r: f64| (r < 15.0).then_some(r / 50.0 * (1.0 + 1e-4 * r * r));
+        let map = FilmMap::Radial(RadialMap::tabulate(20.0, tan_at, |tan| 1.0 / (1.0 + tan * tan).powi(2)));
+        let dark = FilmMap::Radial(RadialMap::tabulate(20.0, |_| None, |_| 1.0));
+        let x_mm: Vec<f64> = (0..83).map(|i| 0.47 * f64::from(i) - 20.0).collect();
+        let mut seen = FieldsAlong::default();
+        for (map, y_mm) in [(&map, 0.0), (&map, -9.3), (&dark, 1.0)] {
+            map.along(&x_mm, y_mm, &mut seen);
+            for (i, &x_mm) in x_mm.iter().enumerate() {
+                let gain = seen.irradiance_per_radiance[i];
+                let along = (!gain.is_nan()).then(|| (DVec2::new(seen.tan_x[i], seen.tan_y[i]), gain));
+                assert_eq!(along, map.at(DVec2::new(x_mm, y_mm)), "{x_mm}, {y_mm}");
+            }
         }
     }
 

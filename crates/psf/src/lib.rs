@@ -50,7 +50,7 @@ pub use drawing::{ModelUse, PsfQuery};
 pub use energy::EnclosedEnergy;
 pub use error::PsfError;
 pub use field_geometry::FieldGeometry;
-pub use film_map::{FilmMap, RadialMap};
+pub use film_map::{FieldsAlong, FilmMap, RadialMap};
 pub use geometry::RadialGeometry;
 pub use kernel::Kernel;
 pub use lens_image::LensImage;
