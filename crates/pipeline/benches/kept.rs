@@ -1,6 +1,6 @@
 //! How long a change of a kept camera takes to the picture, and how soon a cancelled one returns, on the built-in demo:
-//! `cargo bench -p dioptric-pipeline --bench kept [-- full draft preview cancel]`. Prints seconds: median and worst of a few runs
-//! each.
+//! `cargo bench -p dioptric-pipeline --bench kept [-- full draft preview cancel] [--only CHANGE]`. Prints seconds of the clock,
+//! median and worst of a few runs each.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a bench fails by panicking and prints what it measured")]
 
 use std::{
@@ -26,15 +26,54 @@ fn seconds(kept: &KeptCamera) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
+/// When each stage was first heard of.
+#[derive(Default)]
+struct Starts(Mutex<Vec<(Stage, Instant)>>);
+
+impl Progress for Starts {
+    fn at(&self, stage: Stage, _: f64) {
+        let mut starts = self.0.lock().unwrap();
+        if starts.last().is_none_or(|(last, _)| *last != stage) {
+            starts.push((stage, Instant::now()));
+        }
+    }
+}
+
+/// Prints the milliseconds from the start of each stage to that of the next.
+fn print_stages(kept: &KeptCamera) {
+    let (starts, begin) = (Starts::default(), Instant::now());
+    kept.capture(&starts, &Cancel::new()).unwrap();
+    let end = Instant::now();
+    let starts = starts.0.into_inner().unwrap();
+    let mut before = begin;
+    for (i, (stage, at)) in starts.iter().enumerate() {
+        let next = starts.get(i + 1).map_or(end, |(_, next)| *next);
+        let (waited, took) = (at.duration_since(before), next.duration_since(*at));
+        println!(
+            "    {:>7.1} ms before, {:>7.1} ms {}",
+            1e3 * waited.as_secs_f64(),
+            1e3 * took.as_secs_f64(),
+            stage.title()
+        );
+        before = next;
+    }
+}
+
 fn row(name: &str, mut times_s: Vec<f64>) {
     times_s.sort_by(f64::total_cmp);
     println!("{name:<44} {:>8.3} {:>8.3}", times_s[times_s.len() / 2], times_s[times_s.len() - 1]);
 }
 
-fn changes(kept: &KeptCamera, sensors: &[std::path::PathBuf]) {
+fn changes(kept: &KeptCamera, sensors: &[std::path::PathBuf], only: Option<&str>) {
     let of = |name: &str, change: &dyn Fn(&mut Camera, usize)| {
+        if only.is_some_and(|only| !name.starts_with(only)) {
+            return;
+        }
         let times_s = (0..REPEATS).map(|i| seconds(&kept.with(|camera| change(camera, i)))).collect();
         row(name, times_s);
+        if only.is_some() {
+            print_stages(&kept.with(|camera| change(camera, REPEATS)));
+        }
     };
     of("seed", &|camera, i| camera.seed = 100 + i as u64);
     of("exposure", &|camera, i| camera.exposure = with_exposure_s(camera.exposure, 1e-3 * (1.0 + i as f64)));
@@ -58,7 +97,7 @@ fn main() {
         SensorSpec::File(path) => Sensor::read(path).unwrap(),
     };
     // The same sensor with smaller photodiodes.
-    let sensors: Vec<_> = (0..REPEATS)
+    let sensors: Vec<_> = (0..=REPEATS)
         .map(|i| {
             let mut changed = sensor.clone();
             changed.fill_factor *= 1.0 - 0.01 * (1 + i) as f64;
@@ -69,14 +108,16 @@ fn main() {
         })
         .collect();
 
-    let sections: Vec<String> = env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
+    let mut arguments: Vec<String> = env::args().skip(1).collect();
+    let only = arguments.iter().position(|argument| argument == "--only").and_then(|at| arguments.drain(at..).nth(1));
+    let sections: Vec<String> = arguments.into_iter().filter(|argument| !argument.starts_with('-')).collect();
     let is_wanted = |section: &str| sections.is_empty() || sections.iter().any(|wanted| wanted == section);
     println!("{:<44} {:>8} {:>8}", "seconds to the picture of the demo", "median", "worst");
     for (section, quality) in [("full", Quality::Full), ("draft", Quality::Draft), ("preview", Quality::Preview)] {
         if is_wanted(section) {
             let kept = KeptCamera::new(demo.clone()).with_quality(quality);
             row(&format!("{quality:?}: nothing kept"), vec![seconds(&kept)]);
-            changes(&kept, &sensors);
+            changes(&kept, &sensors, only.as_deref());
         }
     }
     if is_wanted("cancel") {

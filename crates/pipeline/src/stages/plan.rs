@@ -23,9 +23,15 @@ pub(super) fn plan(
     let settings = match inputs.bank.film.geometry.quality {
         Quality::Full | Quality::Draft => Settings { mode, ..Settings::default() },
         // The pixels are several of the full film's: what a step costs is a part of what the pixels cost.
-        Quality::Preview => {
-            Settings { mode, layer_step_px: 3.0, chromatic_step_px: 1.0, max_edge_error: 0.03, ..Settings::default() }
-        }
+        Quality::Preview => Settings {
+            mode,
+            layer_step_px: 3.0,
+            chromatic_step_px: 1.0,
+            coverage_step_px: 8.0,
+            max_edge_error: 0.03,
+            negligible_edge: 1e-3,
+            ..Settings::default()
+        },
     };
     let spec = ImagingSpec { film: place.film(), grid: scene.radiance.grid().clone(), settings };
     let progress = |fraction| watch.progress.at(Stage::Plan, fraction);
