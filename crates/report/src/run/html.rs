@@ -47,7 +47,8 @@ pub(super) fn write_page(page: &Page<'_>, pictures: &Pictures) -> String {
     let head = [&report.lens.lens, &report.sensor.sensor, &report.scene.name].map(|words| escaped(words)).join(" · ");
     let body = [
         format!(
-            "<section class=\"picture\"><img src=\"{}\" alt=\"The picture\" width=\"{}\" height=\"{}\"></section>\n",
+            "<section class=\"picture\"><a href=\"picture.png\" title=\"every pixel\"><img src=\"{}\" alt=\"The picture\" \
+             width=\"{}\" height=\"{}\"></a></section>\n",
             pictures.picture, report.film.columns, report.film.rows
         ),
         section("At a glance", &glance(report)),

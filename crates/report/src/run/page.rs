@@ -13,6 +13,9 @@ use dioptric_pipeline::{
 /// Widest small picture, pixels.
 const THUMBNAIL: usize = 480;
 
+/// Pixels of the largest picture that is in the page whole; noise does not compress, and a page is to stay below 3 MB.
+const WHOLE_PIXELS: usize = 700_000;
+
 /// Returns the page as HTML.
 pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
     let drawing = LensDrawing {
@@ -25,7 +28,7 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
         film_distance_mm: Some(page.run.capture.place.film_distance_mm),
     };
     let pictures = Pictures {
-        picture: data_uri(page.picture_png),
+        picture: picture(page)?,
         lens_svg: drawing.to_svg(&page.run.capture.lens.lens).unwrap_or_default(),
         mosaic: mosaic(page)?,
         seen: seen(&page.run.capture.irradiance.summary.seen),
@@ -33,6 +36,18 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
         depth: depth(page),
     };
     Ok(write_page(page, &pictures))
+}
+
+/// The picture, made smaller where it is large.
+fn picture(page: &Page<'_>) -> Result<String, PipelineError> {
+    let picture = &page.run.capture.developed.picture;
+    let (columns, rows) = (picture.columns(), picture.rows());
+    let factor = (1..).find(|factor| columns.div_ceil(*factor) * rows.div_ceil(*factor) <= WHOLE_PIXELS).unwrap_or(1);
+    if factor == 1 {
+        return Ok(data_uri(page.picture_png));
+    }
+    let whole = RgbImage::from_raw(columns as u32, rows as u32, picture.to_rgb8()).unwrap_or_default();
+    Ok(data_uri(&png_bytes(&shrunk(&whole, factor as u32))?))
 }
 
 fn data_uri(png: &[u8]) -> String {
@@ -114,9 +129,10 @@ fn level_at(plane: &Array2<f32>, share: f64) -> f64 {
 /// Returns the picture made smaller by a whole number where it is wide.
 fn thumbnail(picture: &RgbImage) -> RgbImage {
     let factor = (picture.width() as usize).div_ceil(THUMBNAIL).max(1) as u32;
-    if factor == 1 {
-        return picture.clone();
-    }
+    if factor == 1 { picture.clone() } else { shrunk(picture, factor) }
+}
+
+fn shrunk(picture: &RgbImage, factor: u32) -> RgbImage {
     image::imageops::resize(
         picture,
         (picture.width() / factor).max(1),
