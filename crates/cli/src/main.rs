@@ -15,6 +15,7 @@ mod light_field;
 mod measure;
 mod measure_args;
 mod movement_args;
+mod paintings;
 mod psf;
 mod render;
 mod render_args;

@@ -19,6 +19,7 @@ use dioptric_spectrum::Cancel;
 use crate::{
     args::{BankKind, BlurKind, Common, DiffractionKind, FrameArgs, QualityKind, RunArgs},
     lens::tell,
+    paintings::painting_folder,
     terminal::{Bar, guarded, print, print_json, remark},
 };
 
@@ -84,7 +85,7 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera>
         QualityKind::Draft => Quality::Draft,
         QualityKind::Full => Quality::Full,
     };
-    Ok(kept.with(|own| *own = camera).with_quality(quality))
+    Ok(kept.with(|own| *own = camera).with_quality(quality).with_paintings(painting_folder()))
 }
 
 /// Changes what the demo has for its own lens and scene alone: the film and the name, and with the scene focus and bands.

@@ -45,7 +45,7 @@ pub use sense::{SenseRequest, Sensed};
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     Capture, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera,
-    RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, WorldRender,
-    write_seen_png,
+    PaintingFolder, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,
+    WorldRender, write_seen_png,
 };
 pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

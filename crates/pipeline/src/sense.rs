@@ -9,7 +9,7 @@ use dioptric_spectrum::{Bands, Illuminant, WavelengthGrid};
 
 use crate::{
     FrameSet, Frames, FramesSpec, Irradiance, Outputs, PipelineError, SensorSpec, number,
-    stages::{ShutterInputs, expose},
+    stages::{MovedLight, ShutterInputs, expose},
 };
 
 /// How a sensor is exposed to an irradiance image.
@@ -117,7 +117,8 @@ impl SenseRequest {
             frames: self.frames.clone(),
             noise: Noise { sources: self.noise, ..Noise::all(self.seed) },
         };
-        let frames = expose(&shutter, &sensor, &rate, Some(&light))?;
+        let samples_per_px = light.pitch_um.map_or(1.0, |sample_um| sensor.pixel_pitch_um / sample_um);
+        let frames = expose(&shutter, &sensor, &rate, Some(&MovedLight { light, samples_per_px }))?;
         let processing = self.processing.under(self.illuminant.as_ref());
         let developed = sensor.develop(frames.exposed.developed_from(), &processing)?;
         Ok(Sensed {

@@ -10,7 +10,7 @@ use dioptric_spectrum::{Cancel, Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
 use super::{check::Checker, world::WorldSpec};
-use crate::PipelineError;
+use crate::{PaintingFolder, PipelineError};
 
 /// What stands before the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -134,10 +134,10 @@ impl SceneSpec {
     /// # Errors
     /// When a file cannot be read, lacks what is needed or holds what cannot be.
     pub fn open(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
-        self.open_with(wanted, &|_| {}, &Cancel::new())
+        self.open_with(wanted, None, &|_| {}, &Cancel::new())
     }
 
-    /// As [`open`](Self::open); `progress` gets the part that is done, 0–1, where a scene is painted, which a cancel ends
+    /// As [`open`](Self::open); the still life is taken from `paintings` where it is there, and kept there. `progress` gets the part that is done, 0–1, where a scene is painted, which a cancel ends
     /// within milliseconds. Reading a file is one step.
     ///
     /// # Errors
@@ -145,6 +145,7 @@ impl SceneSpec {
     pub fn open_with(
         &self,
         wanted: Option<&WavelengthGrid>,
+        paintings: Option<&PaintingFolder>,
         progress: &(dyn Fn(f64) + Sync),
         cancel: &Cancel,
     ) -> Result<Scene, PipelineError> {
@@ -169,7 +170,11 @@ impl SceneSpec {
                 return Err(PipelineError::Unsuitable { what: "scene", reason });
             }
             SceneSource::StillLife { columns, rows } => {
-                StillLife::new(*columns, *rows).scene_with(&own_or()?, progress, cancel)?
+                let (life, grid) = (StillLife::new(*columns, *rows), own_or()?);
+                match paintings {
+                    Some(folder) => folder.scene(&life, &grid, progress, cancel)?,
+                    None => life.scene_with(&grid, progress, cancel)?,
+                }
             }
             SceneSource::Target { pattern, columns, rows } => Target {
                 pattern: *pattern,

@@ -16,24 +16,30 @@ pub struct FrameSet {
     pub exposed: Exposed,
 }
 
-/// Exposes a sensor; `light` is the irradiance that the rate was collected from, needed where the camera moves between frames.
+/// The irradiance that a rate was collected from, needed where the camera moves between frames.
+pub(crate) struct MovedLight<'a> {
+    pub(crate) light: Illumination<'a>,
+    /// Samples of the irradiance in a pixel of the full film, each way.
+    pub(crate) samples_per_px: f64,
+}
+
+/// Exposes a sensor.
 pub(crate) fn expose(
     inputs: &ShutterInputs,
     sensor: &Sensor,
     rate: &ElectronRate,
-    light: Option<&Illumination<'_>>,
+    moved: Option<&MovedLight<'_>>,
 ) -> Result<FrameSet, PipelineError> {
     let exposure = sensor.expose(rate, &inputs.exposure)?;
     let still = at_rest(rate);
-    let exposed = match light.filter(|_| inputs.moves()) {
+    let exposed = match moved.filter(|_| inputs.moves()) {
         None => inputs.frames.expose(sensor, &still, &exposure, &inputs.noise)?,
-        Some(light) => {
-            let sample_um = light.pitch_um.unwrap_or(sensor.pixel_pitch_um);
+        Some(MovedLight { light, samples_per_px }) => {
             let moved = |moved_px: [f64; 2]| -> Result<Cow<'_, ElectronRate>, PipelineError> {
                 if moved_px == [0.0; 2] {
                     return Ok(Cow::Borrowed(rate));
                 }
-                let shift_px = moved_px.map(|px| px * sensor.pixel_pitch_um / sample_um);
+                let shift_px = moved_px.map(|px| px * samples_per_px);
                 let irradiance = Moved { irradiance: light.irradiance, shift_px };
                 Ok(Cow::Owned(sensor.electron_rate(&Illumination { irradiance: &irradiance, ..*light })?))
             };

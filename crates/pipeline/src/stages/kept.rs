@@ -10,9 +10,9 @@ use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, Quantity, SpectralI
 use dioptric_world::World;
 
 use super::{
-    Watch, bank, electrons,
+    PaintingFolder, Watch, bank, electrons,
     film::{self, FilmPlace},
-    frames::{self, FrameSet},
+    frames::{self, FrameSet, MovedLight},
     given::GivenParts,
     irradiance::{self, Irradiance},
     lens::{self, ResolvedLens},
@@ -57,6 +57,7 @@ pub struct KeptCamera {
     pub(super) given: GivenParts,
     quality: Quality,
     memory_bytes: u64,
+    paintings: Option<PaintingFolder>,
     kept: Arc<KeptResults>,
 }
 
@@ -173,7 +174,7 @@ impl KeptCamera {
     /// A camera of which nothing is computed yet, at full quality.
     pub fn new(camera: Camera) -> Self {
         let (given, quality) = (GivenParts::default(), Quality::Full);
-        Self { camera, given, quality, memory_bytes: MEMORY_BYTES, kept: Arc::default() }
+        Self { camera, given, quality, memory_bytes: MEMORY_BYTES, paintings: None, kept: Arc::default() }
     }
 
     /// Returns the camera changed; what is kept is shared.
@@ -194,6 +195,12 @@ impl KeptCamera {
     #[must_use]
     pub fn with_memory_bytes(&self, memory_bytes: u64) -> Self {
         Self { memory_bytes, ..self.clone() }
+    }
+
+    /// Returns the camera that keeps paintings of the still life in a folder, for it and others to take from there.
+    #[must_use]
+    pub fn with_paintings(&self, folder: Option<PaintingFolder>) -> Self {
+        Self { paintings: folder, ..self.clone() }
     }
 
     /// The camera.
@@ -230,7 +237,7 @@ impl KeptCamera {
     pub fn capture(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Capture, PipelineError> {
         self.camera.validate()?;
         let inputs = self.picture_inputs()?;
-        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let chain = self.chain(progress, cancel);
         let frame_inputs = &inputs.frames;
         let electron_inputs = &frame_inputs.electrons;
         let irradiance_inputs = &electron_inputs.irradiance;
@@ -289,7 +296,7 @@ impl KeptCamera {
     /// As [`capture`](Self::capture).
     pub fn model(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<LensImageModel>, PipelineError> {
         let inputs = self.irradiance_inputs()?;
-        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let chain = self.chain(progress, cancel);
         chain.bank(&inputs.plan.bank, &inputs.scene)
     }
 
@@ -299,7 +306,7 @@ impl KeptCamera {
     /// As [`capture`](Self::capture).
     pub fn depth(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<DepthMap>, PipelineError> {
         let inputs = self.irradiance_inputs()?;
-        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let chain = self.chain(progress, cancel);
         if let Some(kept) = self.kept.depth.get(&inputs.scene.geometry) {
             return Ok(kept);
         }
@@ -314,7 +321,7 @@ impl KeptCamera {
     pub fn irradiance(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<Irradiance>, PipelineError> {
         self.camera.validate()?;
         let inputs = self.irradiance_inputs()?;
-        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let chain = self.chain(progress, cancel);
         chain.irradiance(&inputs)
     }
 
@@ -324,7 +331,7 @@ impl KeptCamera {
     /// When the scene is no world, or its files cannot be read.
     pub fn world(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<World>, PipelineError> {
         let scene = SceneInputs::of(&self.camera, &self.given, self.quality);
-        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let chain = self.chain(progress, cancel);
         chain.world(&scene.geometry)
     }
 
@@ -335,7 +342,7 @@ impl KeptCamera {
     pub fn world_render(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<WorldRender, PipelineError> {
         self.camera.validate()?;
         let inputs = self.irradiance_inputs()?;
-        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let chain = self.chain(progress, cancel);
         let resolved = chain.scene(&inputs.scene)?;
         let lens = chain.lens(&inputs.plan.bank.film.lens)?;
         // What is too near for the lens is found before the work.
@@ -367,9 +374,14 @@ impl KeptCamera {
         cancel: &Cancel,
     ) -> Result<(Arc<ResolvedLens>, Arc<FilmPlace>), PipelineError> {
         let inputs = self.irradiance_inputs()?;
-        let chain = Chain { kept: &self.kept, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } };
+        let chain = self.chain(progress, cancel);
         let film = &inputs.plan.bank.film;
         Ok((chain.lens(&film.lens)?, chain.film(film, &inputs.scene)?))
+    }
+
+    fn chain<'a>(&'a self, progress: &'a dyn Progress, cancel: &'a Cancel) -> Chain<'a> {
+        let (kept, paintings) = (&*self.kept, self.paintings.as_ref());
+        Chain { kept, paintings, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } }
     }
 
     pub(super) fn irradiance_inputs(&self) -> Result<IrradianceInputs, PipelineError> {
@@ -396,6 +408,7 @@ fn check_glasses(lens: &ResolvedLens, grid: Option<&WavelengthGrid>) -> Result<(
 /// The stages in their order, each asking for the ones it needs.
 struct Chain<'a> {
     kept: &'a KeptResults,
+    paintings: Option<&'a PaintingFolder>,
     memory_bytes: u64,
     watch: Watch<'a>,
 }
@@ -411,7 +424,7 @@ impl Chain<'_> {
             self.watch.cancel.check()?;
             let scene = match inputs.geometry.world() {
                 Some((_, spec)) => world::view(inputs, spec, &self.world(&inputs.geometry)?, &self.watch)?,
-                None => scene::open(inputs, &self.watch)?,
+                None => scene::open(inputs, self.paintings, &self.watch)?,
             };
             self.watch.progress.at(Stage::Scene, 1.0);
             Ok(scene)
@@ -508,10 +521,11 @@ impl Chain<'_> {
             let irradiance = if shutter.moves() { Some(self.irradiance(irradiance)?) } else { None };
             let exit_pupil = electrons::exit_pupil(&sensor, &place);
             self.watch.run(move || {
-                let light = irradiance
-                    .as_deref()
-                    .map(|irradiance| Illumination { exit_pupil, ..Illumination::on_pixels(irradiance) });
-                frames::expose(&shutter, &sensor, &rate, light.as_ref())
+                let moved = irradiance.as_deref().map(|irradiance| MovedLight {
+                    light: Illumination { exit_pupil, ..Illumination::on_pixels(irradiance) },
+                    samples_per_px: 1.0 / place.binning as f64,
+                });
+                frames::expose(&shutter, &sensor, &rate, moved.as_ref())
             })
         })
     }

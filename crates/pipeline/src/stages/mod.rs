@@ -24,6 +24,7 @@ mod irradiance;
 mod kept;
 mod lens;
 mod light_field;
+mod paintings;
 mod plan;
 mod rendering;
 mod resume;
@@ -36,7 +37,7 @@ mod world;
 mod world_camera;
 mod world_light;
 
-pub(crate) use frames::expose;
+pub(crate) use frames::{MovedLight, expose};
 pub(crate) use spec::ShutterInputs;
 pub(crate) use watch::Watch;
 
@@ -46,6 +47,7 @@ pub use given::{Given, GivenParts};
 pub use irradiance::{IRRADIANCE_FILE, Irradiance, IrradianceSummary};
 pub use kept::{Capture, KeptCamera, StageCounts};
 pub use lens::ResolvedLens;
+pub use paintings::PaintingFolder;
 pub use rendering::{RenderingSummary, write_seen_png};
 pub use resume::{RESUME_FILE, Resumed};
 pub use scene::{ResolvedScene, SceneSummary};

@@ -5,7 +5,7 @@ use dioptric_spectrum::WavelengthGrid;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Watch,
+    PaintingFolder, Watch,
     spec::{GeometryInputs, SceneInputs},
 };
 use crate::{PipelineError, Quality, SceneSource, SceneSpec, Stage};
@@ -69,7 +69,12 @@ pub struct ResolvedScene {
 ///
 /// A full scene has the samples and bands of its source. Of a lower quality a computed scene is made with fewer of both,
 /// and one from a file is averaged over blocks of samples and over wider bands; a depth is that of the middle of its block.
-pub(super) fn open(inputs: &SceneInputs, watch: &Watch<'_>) -> Result<ResolvedScene, PipelineError> {
+pub(super) fn open(
+    inputs: &SceneInputs,
+    paintings: Option<&PaintingFolder>,
+    watch: &Watch<'_>,
+) -> Result<ResolvedScene, PipelineError> {
+    let read = |scene, wanted| read(scene, wanted, paintings, watch);
     let GeometryInputs { source, wavelengths, quality, field_of_view_deg, depth_m, .. } = &inputs.geometry;
     let wanted = wavelengths.grid()?;
     let choice = |source| SceneSpec {
@@ -104,14 +109,14 @@ pub(super) fn open(inputs: &SceneInputs, watch: &Watch<'_>) -> Result<ResolvedSc
     };
     match computed {
         _ if *quality == Quality::Full => {
-            Ok(ResolvedScene { scene: read(choice(source.clone()), wanted, watch)?, binning: 1 })
+            Ok(ResolvedScene { scene: read(choice(source.clone()), wanted)?, binning: 1 })
         }
         Some((thinned, binning)) => {
             let bands = wanted.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
-            Ok(ResolvedScene { scene: read(choice(thinned), Some(quality.bands_of(&bands)?), watch)?, binning })
+            Ok(ResolvedScene { scene: read(choice(thinned), Some(quality.bands_of(&bands)?))?, binning })
         }
         None => {
-            let whole = read(choice(source.clone()), wanted, watch)?;
+            let whole = read(choice(source.clone()), wanted)?;
             let bands = quality.bands_of(whole.radiance.grid())?;
             let binning = quality.scene_binning(whole.columns());
             watch.run(move || Ok(ResolvedScene { scene: whole.resampled(&bands)?.binned(binning)?, binning }))
@@ -119,12 +124,19 @@ pub(super) fn open(inputs: &SceneInputs, watch: &Watch<'_>) -> Result<ResolvedSc
     }
 }
 
-fn read(scene: SceneSpec, wanted: Option<WavelengthGrid>, watch: &Watch<'_>) -> Result<Scene, PipelineError> {
+fn read(
+    scene: SceneSpec,
+    wanted: Option<WavelengthGrid>,
+    paintings: Option<&PaintingFolder>,
+    watch: &Watch<'_>,
+) -> Result<Scene, PipelineError> {
     match scene.source {
         SceneSource::StillLife { .. } => {
             let report = |part| watch.progress.at(Stage::Scene, part);
-            let cancel = watch.cancel.clone();
-            watch.run_reporting(&report, move |progress| scene.open_with(wanted.as_ref(), progress, &cancel))
+            let (cancel, paintings) = (watch.cancel.clone(), paintings.cloned());
+            watch.run_reporting(&report, move |progress| {
+                scene.open_with(wanted.as_ref(), paintings.as_ref(), progress, &cancel)
+            })
         }
         SceneSource::File(_) | SceneSource::Target { .. } | SceneSource::World(_) => {
             watch.run(move || scene.open(wanted.as_ref()))

@@ -15,7 +15,7 @@ mod shape;
 mod tree;
 mod world;
 
-use dioptric_spectrum::{Cancel, WavelengthGrid};
+use dioptric_spectrum::{Cancel, DepthMap, SpectralImage, WavelengthGrid};
 use glam::{DMat3, DVec3};
 
 use crate::{HiddenLayer, Scene, SceneError, View};
@@ -87,13 +87,29 @@ impl StillLife {
             true => Some(layer(Which::Behind)?).map(|l| HiddenLayer { radiance: l.radiance, depth: l.depth }),
             false => None,
         };
+        Ok(Scene { hidden, ..self.of_painting(first.radiance, first.depth)? })
+    }
+
+    /// Returns the scene of what [`scene`](Self::scene) painted before, without a hidden layer.
+    ///
+    /// # Errors
+    /// When the painting is not of this size.
+    pub fn of_painting(&self, radiance: SpectralImage, depth: DepthMap) -> Result<Scene, SceneError> {
+        let size = (radiance.rows(), radiance.columns());
+        if size != (self.rows, self.columns) || depth.z_m().dim() != size {
+            return Err(SceneError::Setting {
+                what: "the size of the painting",
+                value: format!("{} × {} samples", size.1, size.0),
+                expected: format!("{} × {} samples, in radiance and depth", self.columns, self.rows),
+            });
+        }
         Ok(Scene {
             name: "still life".to_owned(),
-            radiance: first.radiance,
-            depth: Some(first.depth),
-            view: Some(view),
-            hidden,
-            light: Some(light_on_grays(&world)?),
+            radiance,
+            depth: Some(depth),
+            view: Some(View::from_horizontal_fov_deg(self.horizontal_fov_deg, self.columns, self.rows)?),
+            hidden: None,
+            light: Some(light_on_grays(&room::world())?),
         })
     }
 }
