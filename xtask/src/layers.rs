@@ -29,7 +29,7 @@ const LAYERS: &[(&str, &[&str])] = &[
         "report",
         &["pictures", "spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline", "analysis"],
     ),
-    ("sweep", &["pictures", "spectrum", "backward", "pipeline", "analysis"]),
+    ("sweep", &["pictures", "spectrum", "psf", "backward", "pipeline", "analysis"]),
     ("cli", &["pictures", "spectrum", "pipeline", "analysis", "report", "sweep"]),
     ("python", &["spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis"]),
     ("xtask", &["pipeline", "report", "sweep"]),

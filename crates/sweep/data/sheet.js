@@ -25,11 +25,12 @@ const columns = [
   ...sheet.metrics.map((name, i) => ({ name, of: (item) => item.metrics[i] ?? undefined })),
 ];
 const varies = (column) => {
-  const seen = new Set();
+  let first;
   for (const item of items) {
     const value = column.of(item);
-    if (value !== undefined) seen.add(JSON.stringify(value));
-    if (seen.size > 1) return true;
+    if (value === undefined || value === first) continue;
+    if (first !== undefined && words(value) !== words(first)) return true;
+    first = value;
   }
   return false;
 };
@@ -47,7 +48,7 @@ const moving = metricColumns.filter(varies);
 const still = metricColumns.filter((column) => !moving.includes(column));
 const movingKeys = keyColumns.filter(varies);
 const firstKey = (movingKeys[0] ?? keyColumns[0]).name;
-fill("y", named([...moving, ...still]), (moving.find((column) => column.name.startsWith("mean_raw")) ?? moving[0])?.name);
+fill("y", named([...moving, ...still]), (moving.find((column) => column.name.startsWith("mean_raw")) ?? moving.find((column) => column.name !== "exposure_time_s") ?? moving[0])?.name);
 fill("x", named([...movingKeys, ...keyColumns.filter((column) => !movingKeys.includes(column)), ...moving]), firstKey);
 fill("color", [["", "–"], ...named(keyColumns)], movingKeys[1]?.name ?? "");
 fill("order", [["", "plan"], ...named(columns)], "");
@@ -58,10 +59,10 @@ const column = (id) => columns.find((own) => own.name === element(id).value);
 const axis = (values, first, last, wantsLog) => {
   const isNumeric = values.every((value) => typeof value === "number");
   if (!isNumeric) {
-    const places = [...new Set(values.map(words))];
-    const at = (value) => first + (last - first) * (places.indexOf(words(value)) + 0.5) / places.length;
-    const every = Math.ceil(places.length / 12);
-    return { at, ticks: places.map((place, i) => [first + (last - first) * (i + 0.5) / places.length, place]).filter((_, i) => i % every === 0) };
+    const names = [...new Set(values.map(words))];
+    const places = new Map(names.map((name, i) => [name, first + (last - first) * (i + 0.5) / names.length]));
+    const every = Math.ceil(names.length / 12);
+    return { at: (value) => places.get(words(value)), ticks: names.filter((_, i) => i % every === 0).map((name) => [places.get(name), name]) };
   }
   let least = Infinity, most = -Infinity;
   for (const value of values) { least = Math.min(least, value); most = Math.max(most, value); }
@@ -103,6 +104,7 @@ const plot = () => {
   if (shown.length === 0) return;
   const [width, height, left, top, bottom] = [1100, 420, 90, 14, 52];
   const groups = color ? [...new Set(shown.map((item) => words(color.of(item))))] : [];
+  const places = new Map(groups.map((group, i) => [group, i]));
   const right = groups.length ? 200 : 20;
   const isLog = element("log").checked;
   const across = axis(shown.map(x.of), left, width - right, isLog);
@@ -122,17 +124,22 @@ const plot = () => {
   drawing.append(svg("text", { x: 16, y: middle, "text-anchor": "middle", fill: "#1d2330", transform: `rotate(-90 16 ${middle})` }, y.name));
   const shade = (item) => {
     if (!color) return COLORS[0];
-    const group = groups.indexOf(words(color.of(item)));
+    const group = places.get(words(color.of(item)));
     if (groups.length <= COLORS.length) return COLORS[group];
     return `hsl(${250 - 250 * group / (groups.length - 1)} 65% 45%)`;
   };
+  // As text, and with one listener for all: a plan may have many thousand items.
   const radius = shown.length > 1000 ? 2.5 : 4;
-  for (const item of shown) {
-    const dot = svg("circle", { cx: across.at(x.of(item)), cy: up.at(y.of(item)), r: radius, fill: shade(item), "fill-opacity": 0.75 });
-    dot.append(svg("title", {}, caption(item).join("\n") + `\n${y.name}: ${short(y.of(item))}`));
-    dot.addEventListener("click", () => choose(item));
-    drawing.append(dot);
-  }
+  const dot = (item) =>
+    `<circle data-n="${item.n}" cx="${across.at(x.of(item)).toFixed(1)}" cy="${up.at(y.of(item)).toFixed(1)}" r="${radius}" fill="${shade(item)}" fill-opacity="0.75"/>`;
+  const dots = svg("g", {});
+  dots.innerHTML = shown.map(dot).join("");
+  dots.addEventListener("click", (event) => choose(items[event.target.dataset.n]));
+  dots.addEventListener("mouseover", (event) => {
+    const item = items[event.target.dataset.n];
+    if (item && !event.target.firstChild) event.target.append(svg("title", {}, [...caption(item), `${y.name}: ${short(y.of(item))}`].join("\n")));
+  });
+  drawing.append(dots);
   const every = Math.ceil(groups.length / 20);
   groups.filter((_, i) => i % every === 0).forEach((group, row) => {
     const place = top + 12 + 18 * row;

@@ -1,12 +1,14 @@
 //! One item: the picture of one camera and its files.
 
-use std::{fs, io, path::Path};
+use std::{fs, io, path::Path, sync::Arc};
 
-use dioptric_analysis::{Run, RunReport};
+use dioptric_analysis::{Run, RunOptics, RunReport};
 use dioptric_pictures::encode_rgb8_png;
 use dioptric_pipeline::{
-    Camera, Capture, GivenParts, KeptCamera, PipelineError, Progress, Stage, write_capture, write_file, write_json,
+    Camera, Capture, FilmPlace, GivenParts, KeptCamera, PipelineError, Progress, ResolvedLens, SceneSummary, Stage,
+    write_capture, write_file, write_json,
 };
+use dioptric_psf::LensImageModel;
 use dioptric_spectrum::Cancel;
 use serde::{Deserialize, Serialize};
 
@@ -27,31 +29,88 @@ pub(crate) struct Refusal {
     pub(crate) reason: String,
 }
 
-/// Takes the picture of a camera and writes all files of the item into a folder; returns whether there is a picture.
-///
-/// `kept` has the results of the camera before, and gets those of this one. A camera that cannot be is written with the
-/// reason.
-pub(crate) fn make(
-    kept: &mut Option<KeptCamera>,
-    camera: &Camera,
-    folder: &Path,
-    progress: &dyn Progress,
-    cancel: &Cancel,
-) -> Result<bool, SweepError> {
-    write_file(&folder.join(CAMERA), (camera.to_ron() + "\n").as_bytes())?;
-    let own = match kept.take() {
-        Some(kept) => kept.with_camera(camera.clone(), GivenParts::default()),
-        None => KeptCamera::new(camera.clone()),
-    };
-    let taken = take(kept.insert(own), folder, progress, cancel);
-    match taken {
-        Ok(()) => Ok(true),
-        Err(error) if !error.is_passing() => {
-            leave_camera_alone(folder).map_err(SweepError::writing(folder))?;
-            write_json(&folder.join(REFUSED), &Refusal { reason: error.to_string() })?;
-            Ok(false)
+/// What items have in common, kept from one to the next.
+#[derive(Default)]
+pub(crate) struct Bench {
+    camera: Option<KeptCamera>,
+    optics: Option<(Shared, RunOptics)>,
+}
+
+/// What the optics of a report are made from.
+#[derive(Clone)]
+struct Shared {
+    lens: Arc<ResolvedLens>,
+    place: Arc<FilmPlace>,
+    scene: Arc<SceneSummary>,
+    model: Arc<LensImageModel>,
+}
+
+impl Shared {
+    /// Whether they are the same results, not equal ones: stages with equal inputs hand out one result.
+    fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.lens, &other.lens)
+            && Arc::ptr_eq(&self.place, &other.place)
+            && Arc::ptr_eq(&self.scene, &other.scene)
+            && Arc::ptr_eq(&self.model, &other.model)
+    }
+}
+
+impl Bench {
+    /// Takes the picture of a camera and writes all files of the item into a folder; returns whether there is a picture.
+    ///
+    /// A camera that cannot be is written with the reason.
+    pub(crate) fn make(
+        &mut self,
+        camera: &Camera,
+        folder: &Path,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<bool, SweepError> {
+        write_file(&folder.join(CAMERA), (camera.to_ron() + "\n").as_bytes())?;
+        match self.take(camera, folder, progress, cancel) {
+            Ok(()) => Ok(true),
+            Err(error) if !error.is_passing() => {
+                leave_camera_alone(folder).map_err(SweepError::writing(folder))?;
+                write_json(&folder.join(REFUSED), &Refusal { reason: error.to_string() })?;
+                Ok(false)
+            }
+            Err(error) => Err(error.into()),
         }
-        Err(error) => Err(error.into()),
+    }
+
+    fn take(
+        &mut self,
+        camera: &Camera,
+        folder: &Path,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<(), PipelineError> {
+        let kept = match self.camera.take() {
+            Some(kept) => kept.with_camera(camera.clone(), GivenParts::default()),
+            None => KeptCamera::new(camera.clone()),
+        };
+        let kept = self.camera.insert(kept);
+        let capture = kept.capture(progress, cancel)?;
+        let model = kept.model(progress, cancel)?;
+        let depth = if camera.outputs.depth { Some(kept.depth(progress, cancel)?) } else { None };
+        progress.at(Stage::Report, 0.0);
+        let run = Run { capture: &capture, model: &model, depth: depth.as_deref() };
+        let optics = self.optics_of(&run, model.clone())?;
+        let (files, _) = write_capture(&capture, depth.as_deref(), folder)?;
+        write_json(&folder.join("report.json"), &RunReport::with_optics(&run, optics, files)?)?;
+        write_file(&folder.join(THUMBNAIL), &thumbnail(&capture)?)
+    }
+
+    /// Returns what the report says of the lens, from the item before where that shares it.
+    fn optics_of(&mut self, run: &Run<'_>, model: Arc<LensImageModel>) -> Result<RunOptics, PipelineError> {
+        let Capture { lens, place, scene, .. } = run.capture;
+        let own = Shared { lens: lens.clone(), place: place.clone(), scene: scene.clone(), model };
+        if let Some((_, optics)) = self.optics.as_ref().filter(|(shared, _)| shared.is(&own)) {
+            return Ok(optics.clone());
+        }
+        let optics = RunOptics::of(run)?;
+        self.optics = Some((own, optics.clone()));
+        Ok(optics)
     }
 }
 
@@ -64,18 +123,6 @@ fn leave_camera_alone(folder: &Path) -> io::Result<()> {
         }
     }
     Ok(())
-}
-
-fn take(kept: &KeptCamera, folder: &Path, progress: &dyn Progress, cancel: &Cancel) -> Result<(), PipelineError> {
-    let capture = kept.capture(progress, cancel)?;
-    let model = kept.model(progress, cancel)?;
-    let depth = if capture.camera.outputs.depth { Some(kept.depth(progress, cancel)?) } else { None };
-    progress.at(Stage::Report, 0.0);
-    let run = Run { capture: &capture, model: &model, depth: depth.as_deref() };
-    let mut report = RunReport::new(&run, Vec::new())?;
-    (report.files, _) = write_capture(&capture, depth.as_deref(), folder)?;
-    write_json(&folder.join("report.json"), &report)?;
-    write_file(&folder.join(THUMBNAIL), &thumbnail(&capture)?)
 }
 
 /// Returns the picture made smaller by a whole number, as PNG.

@@ -14,8 +14,8 @@ pub const RESULTS_EPOCH: u32 = 1;
 /// The name of an item: the BLAKE3 hash of its camera, of the content of the files that it is made from, and of
 /// [`RESULTS_EPOCH`].
 ///
-/// The camera is hashed as RON on one line with every default filled in (JSON has no infinity, which automatic exposures hold),
-/// each path replaced by the hash of its content and the file's name; so folders do not count, and neither does the order or
+/// The camera is hashed as the text of its camera file with every default filled in (JSON has no infinity, which automatic
+/// exposures hold), each path replaced by the hash of its content and the file's name; so folders do not count, and neither does the order or
 /// the spelling of a plan.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ItemId([u8; 32]);
@@ -55,14 +55,16 @@ impl ItemKey {
         let camera = inputs.by_content(camera)?;
         let scene = &camera.scene;
         let sensor = (camera.film == FilmSpec::Sensor).then_some(&camera.sensor);
+        // They decide nothing but the order, so that the words of a debugger will do.
+        let of = |part: &dyn fmt::Debug| short(&hash(&format!("{part:?}")));
         let stages = [
-            short(&(&scene.source, scene.field_of_view_deg, scene.depth_m, &camera.wavelengths)),
-            short(&(&camera.lens, &camera.lens_reading, camera.stop, camera.movements)),
-            short(&(camera.focus, camera.film, sensor, camera.diffraction, camera.bank)),
-            short(&(camera.blur, &camera.light_field)),
-            short(&(&scene.illuminant, scene.illuminance_lux, &scene.light, scene.mean_luminance_cd_m2)),
-            short(&camera.sensor),
-            short(&(camera.exposure, camera.noise, &camera.frames, camera.seed)),
+            of(&(&scene.source, scene.field_of_view_deg, scene.depth_m, &camera.wavelengths)),
+            of(&(&camera.lens, &camera.lens_reading, camera.stop, camera.movements)),
+            of(&(camera.focus, camera.film, sensor, camera.diffraction, camera.bank)),
+            of(&(camera.blur, &camera.light_field)),
+            of(&(&scene.illuminant, scene.illuminance_lux, &scene.light, scene.mean_luminance_cd_m2)),
+            of(&camera.sensor),
+            of(&(camera.exposure, camera.noise, &camera.frames, camera.seed)),
         ];
         let imaging = Camera {
             name: String::new(),
@@ -75,19 +77,19 @@ impl ItemKey {
             outputs: still.outputs.clone(),
             ..camera.clone()
         };
-        Ok(Self { id: ItemId(hash(&camera)), imaging: short(&imaging), stages })
+        Ok(Self { id: ItemId(hash(&camera.to_ron())), imaging: short(&hash(&imaging.to_ron())), stages })
     }
 }
 
-fn hash(value: &impl Serialize) -> [u8; 32] {
-    let text = ron::to_string(value).expect("every part of a camera can be written as RON");
+fn hash(text: &str) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
-    hasher.update(b"dioptric item ").update(&RESULTS_EPOCH.to_le_bytes()).update(text.as_bytes());
+    // Lines end alike on every system.
+    hasher.update(b"dioptric item ").update(&RESULTS_EPOCH.to_le_bytes()).update(text.replace("\r\n", "\n").as_bytes());
     *hasher.finalize().as_bytes()
 }
 
-fn short(value: &impl Serialize) -> u64 {
-    let [a, b, c, d, e, f, g, h, ..] = hash(value);
+fn short(hash: &[u8; 32]) -> u64 {
+    let [a, b, c, d, e, f, g, h, ..] = *hash;
     u64::from_le_bytes([a, b, c, d, e, f, g, h])
 }
 

@@ -6,7 +6,7 @@ use std::{
 };
 
 use dioptric_pipeline::{Camera, FrameFile, Outputs};
-use ron::extensions::Extensions;
+use ron::{extensions::Extensions, value::RawValue};
 use serde::Deserialize;
 
 use crate::{
@@ -37,8 +37,8 @@ pub enum Base {
     Demo,
     /// A camera file; its path is relative to the plan.
     File(PathBuf),
-    /// This camera; paths in it are relative to the plan.
-    Camera(Box<Camera>),
+    /// This camera, the content of a camera file; paths in it are relative to the plan.
+    Camera(#[cfg_attr(feature = "schema", schemars(with = "dioptric_pipeline::Camera"))] Box<RawValue>),
 }
 
 /// What is written of each item beside its picture and its report; the words are those of the camera file's `outputs`, which
@@ -57,6 +57,27 @@ pub struct PlanOutputs {
     pub raw: bool,
     /// More files of the sensor's frames.
     pub also: Vec<FrameFile>,
+}
+
+impl Base {
+    /// Returns the camera, its paths absolute.
+    ///
+    /// `folder` is that of the plan, whose name errors begin with.
+    pub(crate) fn open(&self, folder: &Path, plan: &Path) -> Result<Camera, SweepError> {
+        Ok(match self {
+            Self::Demo => Camera::demo()?,
+            Self::File(file) => Camera::read(&folder.join(file))?,
+            Self::Camera(text) => {
+                // Lines count from the top of the plan, where that is a file that can be read once more.
+                let name = Path::new(plan.file_name().unwrap_or(plan.as_os_str()));
+                let whole = fs::read_to_string(plan).unwrap_or_default();
+                let above = whole.find(text.get_ron()).map_or(0, |at| whole[..at].matches('\n').count());
+                let mut camera = Camera::parse(&("\n".repeat(above) + text.get_ron()), name)?;
+                camera.resolve_paths(folder);
+                camera
+            }
+        })
+    }
 }
 
 impl PlanOutputs {

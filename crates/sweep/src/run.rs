@@ -1,10 +1,10 @@
 //! The items of a sweep made, one after the other.
 
-use dioptric_pipeline::{KeptCamera, Progress, Silent};
+use dioptric_pipeline::{Progress, Silent};
 use dioptric_spectrum::Cancel;
 use serde::Serialize;
 
-use crate::{Shard, Status, Store, Sweep, SweepError, Workplace, item};
+use crate::{Shard, Status, Store, Sweep, SweepError, Workplace, item::Bench};
 
 /// Receives how far a sweep is, beside how far the item is that is being made.
 pub trait SweepProgress: Progress {
@@ -50,7 +50,7 @@ impl Sweep {
         let n_all = missing.len();
         missing.retain(|item| !store.has(self.id(*item)));
         let mut made = Made { n_there: n_all - missing.len(), ..Made::default() };
-        let mut kept: Option<KeptCamera> = None;
+        let mut bench = Bench::default();
         for (n, &item) in missing.iter().enumerate() {
             cancel.check()?;
             if limit.is_some_and(|limit| made.n_done + made.n_refused >= limit) {
@@ -65,7 +65,7 @@ impl Sweep {
                 continue;
             }
             let camera = self.camera(item)?;
-            let has_picture = item::make(&mut kept, &camera, &place.item(id)?, progress, cancel)?;
+            let has_picture = bench.make(&camera, &place.item(id)?, progress, cancel)?;
             self.inputs().check_unchanged(&camera)?;
             place.keep(id)?;
             if has_picture { made.n_done += 1 } else { made.n_refused += 1 }

@@ -80,16 +80,7 @@ impl Sweep {
     pub fn of(plan: Plan, path: &Path) -> Result<Self, SweepError> {
         let parent = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let folder = parent.canonicalize().map_err(SweepError::reading(parent))?;
-        let camera = match &plan.base {
-            Base::Demo => Camera::demo()?,
-            Base::File(file) => Camera::read(&folder.join(file))?,
-            Base::Camera(camera) => {
-                let mut camera = (**camera).clone();
-                camera.resolve_paths(&folder);
-                camera.validate()?;
-                camera
-            }
-        };
+        let camera = plan.base.open(&folder, path)?;
         let base = Value::parse(&camera.to_ron()).expect("what a camera writes is RON");
         let points = plan.vary.iter().map(Points::of).collect();
         let (keys, order) = (Vec::new(), Vec::new());

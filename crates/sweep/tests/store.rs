@@ -7,6 +7,7 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
+use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{Camera, KeptCamera, Progress, Silent, Stage, picture_png};
 use dioptric_spectrum::Cancel;
 use dioptric_sweep::{Index, Plan, Shard, Status, Store, Sweep, SweepError, SweepProgress};
@@ -110,14 +111,17 @@ fn stores_depend_on_the_plan_alone() {
     Index::of(&sweep, &cut).unwrap().write(&cut).unwrap();
     assert!(files(cut.folder()) == expected);
 
-    // What is in an item, and that it is what the camera gives by itself.
-    let item = whole.item(sweep.id(1));
+    // What is in an item, and that it is what the camera gives by itself: this one shares its irradiance with another.
+    let item = whole.item(sweep.id(3));
     let names: Vec<PathBuf> = files(&item).into_keys().collect();
     let all = ["camera.ron", "picture.png", "raw.png", "report.json", "thumbnail.png"];
     assert_eq!(names, all.map(PathBuf::from));
-    let capture = KeptCamera::new(Camera::read(&item.join("camera.ron")).unwrap()).capture(&Silent, &Cancel::new());
-    let picture = picture_png(&capture.unwrap().developed.picture).unwrap();
-    assert!(fs::read(item.join("picture.png")).unwrap() == picture);
+    let kept = KeptCamera::new(Camera::read(&item.join("camera.ron")).unwrap());
+    let capture = kept.capture(&Silent, &Cancel::new()).unwrap();
+    assert!(fs::read(item.join("picture.png")).unwrap() == picture_png(&capture.developed.picture).unwrap());
+    let run = Run { capture: &capture, model: &kept.model(&Silent, &Cancel::new()).unwrap(), depth: None };
+    let report = RunReport::new(&run, vec!["picture.png".to_owned(), "raw.png".to_owned()]).unwrap();
+    assert_eq!(fs::read(item.join("report.json")).unwrap(), serde_json::to_vec_pretty(&report).unwrap());
 
     // A camera that cannot be is there with the reason.
     let index = Index::of(&sweep, &whole).unwrap();
@@ -158,6 +162,20 @@ fn stores_depend_on_the_plan_alone() {
     }
     assert_eq!(names.len(), 6 * 5);
     assert!(names.is_sorted() && names[0].ends_with(".camera.ron") && names[4].ends_with(".values.json"), "{names:?}");
+}
+
+#[test]
+fn wrong_lines_of_a_camera_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plan.ron");
+    for (text, words) in [
+        (PLAN.replace("focus: DistanceMm(2000.0)", "focus: DistanceMm(-2.0)"), "plan.ron:3: DistanceMm is -2"),
+        (PLAN.replace("film:", "filmed:"), "plan.ron:4:"),
+    ] {
+        fs::write(&path, text).unwrap();
+        let message = Sweep::read(&path).unwrap_err().to_string();
+        assert!(message.contains(words) && !message.contains('\n'), "{message}");
+    }
 }
 
 #[test]
