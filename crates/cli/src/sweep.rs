@@ -67,7 +67,7 @@ enum SweepCommand {
         /// Folder that keeps the results [default: that of the plan's name, ending in .store]
         #[arg(long, value_name = "DIR")]
         store: Option<PathBuf>,
-        /// Archive to write, as WebDataset reads it
+        /// Archive to write, as `WebDataset` reads it
         #[arg(long, value_name = "OUT.tar")]
         webdataset: PathBuf,
         /// Writes archives OUT-000000.tar and so on of so many items each

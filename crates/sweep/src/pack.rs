@@ -1,4 +1,4 @@
-//! Items packed into archives as WebDataset reads them.
+//! Items packed into archives as `WebDataset` reads them.
 
 use std::{
     fs,

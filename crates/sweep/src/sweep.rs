@@ -9,7 +9,7 @@ use std::{
 use dioptric_pipeline::Camera;
 use rayon::prelude::*;
 
-use crate::{Base, ItemId, Plan, SweepError, Value, axes::Points, inputs::Inputs, key::ItemKey, plan::read_plan};
+use crate::{ItemId, Plan, SweepError, Value, axes::Points, inputs::Inputs, key::ItemKey, plan::read_plan};
 
 /// A plan with all its items.
 #[derive(Debug)]

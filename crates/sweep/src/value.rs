@@ -27,9 +27,9 @@ pub enum Value {
     /// Nothing: `None`.
     Nothing,
     /// A list or a tuple.
-    List(Vec<Value>),
+    List(Vec<Self>),
     /// A struct by its keys, or a choice by its name.
-    Map(BTreeMap<String, Value>),
+    Map(BTreeMap<String, Self>),
 }
 
 impl Value {
@@ -45,7 +45,8 @@ impl Value {
     pub fn number(value: f64) -> Self {
         // Below 2⁵³ whole numbers are exact.
         const EXACT: f64 = 9_007_199_254_740_992.0;
-        if value.fract() != 0.0 || !(value.abs() < EXACT) {
+        let is_whole = value.fract() == 0.0 && value.abs() < EXACT;
+        if !is_whole {
             return Self::Number(value);
         }
         if value < 0.0 { Self::Below(value as i64) } else { Self::Whole(value as u64) }

@@ -26,12 +26,13 @@ const PLAN: &str = r#"(
 
 fn sweep(text: &str, folder: &Path) -> Sweep {
     let path = folder.join("plan.ron");
-    Sweep::of(Plan::parse(text, &path).unwrap(), &path).unwrap()
+    Plan::parse(text, &path).and_then(|plan| Sweep::of(plan, &path)).expect("the plan is right")
 }
 
 fn make(sweep: &Sweep, store: &Store, shard: &str) {
-    let made = sweep.make(&store.begin().unwrap(), shard.parse().unwrap(), None, &Silent, &Cancel::new());
-    assert_eq!(made.unwrap().n_left, 0);
+    let shard = shard.parse().expect("a shard");
+    let made = sweep.make(&store.begin().expect("a workplace"), shard, None, &Silent, &Cancel::new());
+    assert_eq!(made.expect("the items can be made").n_left, 0);
 }
 
 /// Returns every file below a folder with its bytes.
@@ -39,12 +40,13 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut all = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(next) = folders.pop() {
-        for entry in fs::read_dir(next).unwrap() {
-            let path = entry.unwrap().path();
+        for entry in fs::read_dir(next).expect("a folder") {
+            let path = entry.expect("an entry").path();
             if path.is_dir() {
                 folders.push(path);
             } else {
-                all.insert(path.strip_prefix(folder).unwrap().to_owned(), fs::read(&path).unwrap());
+                let bytes = fs::read(&path).expect("a file");
+                all.insert(path.strip_prefix(folder).expect("it lies there").to_owned(), bytes);
             }
         }
     }
