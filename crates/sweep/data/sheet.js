@@ -103,8 +103,13 @@ const plot = () => {
   const shown = items.filter((item) => x.of(item) !== undefined && typeof y.of(item) === "number");
   if (shown.length === 0) return;
   const [width, height, left, top, bottom] = [1100, 420, 90, 14, 52];
-  const groups = color ? [...new Set(shown.map((item) => words(color.of(item))))] : [];
-  const places = new Map(groups.map((group, i) => [group, i]));
+  const places = new Map(), colors = new Map();
+  const groups = [];
+  for (const item of color ? shown : []) {
+    const group = words(color.of(item));
+    if (!places.has(group)) places.set(group, groups.push(group) - 1);
+    colors.set(item, group);
+  }
   const right = groups.length ? 200 : 20;
   const isLog = element("log").checked;
   const across = axis(shown.map(x.of), left, width - right, isLog);
@@ -124,26 +129,45 @@ const plot = () => {
   drawing.append(svg("text", { x: 16, y: middle, "text-anchor": "middle", fill: "#1d2330", transform: `rotate(-90 16 ${middle})` }, y.name));
   const shade = (item) => {
     if (!color) return COLORS[0];
-    const group = places.get(words(color.of(item)));
+    const group = places.get(colors.get(item));
     if (groups.length <= COLORS.length) return COLORS[group];
     return `hsl(${250 - 250 * group / (groups.length - 1)} 65% 45%)`;
   };
-  // As text, and with one listener for all: a plan may have many thousand items.
+  // One path a color, for a plan may have many thousand items; what is nearest to the pointer is searched for.
   const radius = shown.length > 1000 ? 2.5 : 4;
-  const dot = (item) =>
-    `<circle data-n="${item.n}" cx="${across.at(x.of(item)).toFixed(1)}" cy="${up.at(y.of(item)).toFixed(1)}" r="${radius}" fill="${shade(item)}" fill-opacity="0.75"/>`;
-  const dots = svg("g", {});
-  dots.innerHTML = shown.map(dot).join("");
-  dots.addEventListener("click", (event) => choose(items[event.target.dataset.n]));
-  dots.addEventListener("mouseover", (event) => {
-    const item = items[event.target.dataset.n];
-    if (item && !event.target.firstChild) event.target.append(svg("title", {}, [...caption(item), `${y.name}: ${short(y.of(item))}`].join("\n")));
-  });
+  const spots = shown.map((item) => [across.at(x.of(item)), up.at(y.of(item)), item]);
+  const paths = new Map();
+  for (const [cx, cy, item] of spots) {
+    const color = shade(item);
+    paths.set(color, (paths.get(color) ?? "") + `M${cx.toFixed(1)} ${cy.toFixed(1)}h0`);
+  }
+  const dots = svg("g", { fill: "none", "stroke-width": 2 * radius, "stroke-linecap": "round", "stroke-opacity": 0.75 });
+  for (const [stroke, d] of paths) dots.append(svg("path", { d, stroke }));
   drawing.append(dots);
+  const nearest = (event) => {
+    const box = drawing.getBoundingClientRect(), scale = width / box.width;
+    const [px, py] = [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale];
+    let found, least = 100;
+    for (const [cx, cy, item] of spots) {
+      const distance = (cx - px) ** 2 + (cy - py) ** 2;
+      if (distance < least) [found, least] = [item, distance];
+    }
+    return found;
+  };
+  const tip = drawing.appendChild(svg("title", {}));
+  drawing.addEventListener("mousemove", (event) => {
+    const item = nearest(event);
+    drawing.style.cursor = item ? "pointer" : "";
+    tip.textContent = item ? [...caption(item), `${y.name}: ${short(y.of(item))}`].join("\n") : "";
+  });
+  drawing.addEventListener("click", (event) => {
+    const item = nearest(event);
+    if (item) choose(item);
+  });
   const every = Math.ceil(groups.length / 20);
   groups.filter((_, i) => i % every === 0).forEach((group, row) => {
     const place = top + 12 + 18 * row;
-    const one = shown.find((item) => words(color.of(item)) === group);
+    const one = shown.find((item) => colors.get(item) === group);
     drawing.append(svg("circle", { cx: width - right + 18, cy: place - 4, r: 5, fill: shade(one) }));
     drawing.append(svg("text", { x: width - right + 30, y: place, fill: "#1d2330" }, group.length > 24 ? group.slice(0, 23) + "…" : group));
   });
