@@ -29,9 +29,10 @@ const LAYERS: &[(&str, &[&str])] = &[
         "report",
         &["pictures", "spectrum", "optics", "diffraction", "psf", "scene", "forward", "sensor", "pipeline", "analysis"],
     ),
-    ("cli", &["pictures", "spectrum", "pipeline", "analysis", "report"]),
+    ("sweep", &["pictures", "spectrum", "psf", "backward", "pipeline", "analysis"]),
+    ("cli", &["pictures", "spectrum", "pipeline", "analysis", "report", "sweep"]),
     ("python", &["spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis"]),
-    ("xtask", &["pipeline", "report"]),
+    ("xtask", &["pipeline", "report", "sweep"]),
 ];
 
 /// Compares the table with `cargo metadata` and names the first thing that differs.

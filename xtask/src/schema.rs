@@ -1,4 +1,4 @@
-//! JSON schemas of camera and sensor files, made from the types that the files are read into.
+//! JSON schemas of camera, sensor and plan files, made from the types that the files are read into.
 
 use std::{
     fs,
@@ -6,19 +6,20 @@ use std::{
 };
 
 use anyhow::Context;
-use dioptric_pipeline::generated_schemas;
-
-/// Writes the schemas into the sources of `dioptric-pipeline`.
+/// Writes the schemas into the sources of the crates that have the types.
 pub(crate) fn run() -> anyhow::Result<()> {
-    for (name, text) in generated_schemas() {
-        let path = path_of(name);
+    for (path, text) in schemas() {
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(())
 }
 
-fn path_of(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/pipeline/data").join(name)
+/// Returns all schemas with the places of their files.
+fn schemas() -> Vec<(PathBuf, String)> {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates");
+    let place = |of: &str, (name, text): (&str, String)| (crates.join(of).join("data").join(name), text);
+    let cameras = dioptric_pipeline::generated_schemas().map(|schema| place("pipeline", schema));
+    cameras.into_iter().chain([place("sweep", dioptric_sweep::generated_schema())]).collect()
 }
 
 #[cfg(test)]
@@ -27,9 +28,9 @@ mod tests {
 
     #[test]
     fn schemas_are_those_of_the_types() {
-        for (name, text) in generated_schemas() {
-            let kept = fs::read_to_string(path_of(name)).unwrap();
-            assert!(kept == text, "{name} is not that of the types: run `cargo xtask schema`");
+        for (path, text) in schemas() {
+            let kept = fs::read_to_string(&path).unwrap();
+            assert!(kept == text, "{} is not that of the types: run `cargo xtask schema`", path.display());
         }
     }
 }

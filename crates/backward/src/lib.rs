@@ -37,5 +37,5 @@ pub use output::{write_auxiliary_exr, write_rendering_exr};
 pub use packets::BandSampling;
 pub use placement::{PixelGrid, Placement, Rendering};
 pub use renderer::{Bands, RenderSettings, Renderer};
-pub use sampler::Sampler;
+pub use sampler::{SOBOL_DIMENSIONS, Sampler, scrambled_sobol};
 pub use world_camera::distance_ahead_m;

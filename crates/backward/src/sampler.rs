@@ -77,7 +77,20 @@ fn scrambled(v: u32, key: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// Returns the point of this index of Sobol's sequence in a dimension from 0 to 3.
+/// The number of dimensions of [`scrambled_sobol`].
+pub const SOBOL_DIMENSIONS: usize = 21;
+
+/// Returns the coordinate, in [0, 1), of the point of this index of Sobol's sequence in a dimension, scrambled as Owen does: the
+/// first 2ⁿ points have one in each of 2ⁿ equal parts of every axis, for every seed.
+///
+/// # Panics
+/// When there is no such dimension.
+pub fn scrambled_sobol(index: u32, dimension: usize, seed: u64) -> f64 {
+    let key = mix(seed as u32 ^ mix((seed >> 32) as u32 ^ 0x9e37_79b9));
+    f64::from(scrambled(sobol(index, dimension), mix(key ^ (dimension as u32 + 1)))) * UNIT
+}
+
+/// Returns the point of this index of Sobol's sequence in a dimension from 0 to 20.
 fn sobol(index: u32, dimension: usize) -> u32 {
     if dimension == 0 {
         return index.reverse_bits();
@@ -90,14 +103,35 @@ fn sobol(index: u32, dimension: usize) -> u32 {
     point
 }
 
-/// Direction numbers of the first four dimensions.
-const DIRECTIONS: [[u32; 32]; 4] = {
+/// Direction numbers of the first 21 dimensions (Joe & Kuo 2008, the table new-joe-kuo-6.21201).
+const DIRECTIONS: [[u32; 32]; SOBOL_DIMENSIONS] = {
     // Degree, coefficients and first numbers of each polynomial; the first dimension needs none.
-    let polynomials: [(usize, u32, [u32; 3]); 4] =
-        [(0, 0, [1; 3]), (1, 0, [1; 3]), (2, 1, [1, 3, 0]), (3, 1, [1, 3, 1])];
-    let mut all = [[0; 32]; 4];
+    let polynomials: [(usize, u32, [u32; 7]); SOBOL_DIMENSIONS] = [
+        (0, 0, [1; 7]),
+        (1, 0, [1; 7]),
+        (2, 1, [1, 3, 0, 0, 0, 0, 0]),
+        (3, 1, [1, 3, 1, 0, 0, 0, 0]),
+        (3, 2, [1, 1, 1, 0, 0, 0, 0]),
+        (4, 1, [1, 1, 3, 3, 0, 0, 0]),
+        (4, 4, [1, 3, 5, 13, 0, 0, 0]),
+        (5, 2, [1, 1, 5, 5, 17, 0, 0]),
+        (5, 4, [1, 1, 5, 5, 5, 0, 0]),
+        (5, 7, [1, 1, 7, 11, 19, 0, 0]),
+        (5, 11, [1, 1, 5, 1, 1, 0, 0]),
+        (5, 13, [1, 1, 1, 3, 11, 0, 0]),
+        (5, 14, [1, 3, 5, 5, 31, 0, 0]),
+        (6, 1, [1, 3, 3, 9, 7, 49, 0]),
+        (6, 13, [1, 1, 1, 15, 21, 21, 0]),
+        (6, 16, [1, 3, 1, 13, 27, 49, 0]),
+        (6, 19, [1, 1, 1, 15, 7, 5, 0]),
+        (6, 22, [1, 3, 1, 15, 13, 25, 0]),
+        (6, 25, [1, 1, 5, 5, 19, 61, 0]),
+        (7, 1, [1, 3, 7, 11, 23, 15, 103]),
+        (7, 4, [1, 3, 7, 13, 13, 15, 69]),
+    ];
+    let mut all = [[0; 32]; SOBOL_DIMENSIONS];
     let mut dimension = 0;
-    while dimension < 4 {
+    while dimension < SOBOL_DIMENSIONS {
         let (degree, coefficients, first) = polynomials[dimension];
         let mut i = 0;
         while i < 32 {
@@ -150,6 +184,30 @@ mod tests {
             let camera: Vec<[f64; 4]> = (0..64).map(|i| Sampler::new(1, pixel, 2, i).camera()).collect();
             assert_net(&camera.iter().map(|p| [p[0], p[1]]).collect::<Vec<_>>());
         }
+    }
+
+    /// The first points of dimensions 1 to 7, as published with the direction numbers.
+    #[test]
+    fn first_sobol_points_are_published_ones() {
+        let point = |index: u32| (0..7).map(|d| f64::from(sobol(index ^ (index >> 1), d)) * UNIT).collect::<Vec<_>>();
+        assert_eq!(point(1), [0.5; 7]);
+        assert_eq!(point(2), [0.75, 0.25, 0.25, 0.25, 0.75, 0.75, 0.25]);
+        assert_eq!(point(3), [0.25, 0.75, 0.75, 0.75, 0.25, 0.25, 0.75]);
+        assert_eq!(point(4), [0.375, 0.375, 0.625, 0.875, 0.375, 0.125, 0.375]);
+    }
+
+    #[test]
+    fn every_dimension_is_stratified() {
+        for dimension in 0..SOBOL_DIMENSIONS {
+            let mut places: Vec<usize> =
+                (0..1024).map(|i| (scrambled_sobol(i, dimension, 7) * 1024.0) as usize).collect();
+            places.sort_unstable();
+            assert_eq!(places, (0..1024).collect::<Vec<_>>(), "dimension {dimension}");
+        }
+        // No two dimensions are alike.
+        let point = |dimension| (0..64).map(|i| sobol(i, dimension)).collect::<Vec<_>>();
+        let distinct: std::collections::BTreeSet<_> = (0..SOBOL_DIMENSIONS).map(point).collect();
+        assert_eq!(distinct.len(), SOBOL_DIMENSIONS);
     }
 
     #[test]

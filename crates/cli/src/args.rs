@@ -10,6 +10,7 @@ use crate::{
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
     render_args::{CompareArgs, LightFieldArgs, RenderArgs},
+    sweep::SweepArgs,
 };
 
 /// Simulates a camera from the scene's spectral radiance to the final picture.
@@ -54,6 +55,8 @@ pub(crate) enum Command {
     LightField(LightFieldArgs),
     /// Exposes a sensor to an irradiance image and processes the picture
     Sense(SenseArgs),
+    /// Takes many pictures of a varied camera from a plan, into a store that can be gone on with
+    Sweep(SweepArgs),
     /// Measures pictures, frames and sensors as a laboratory does
     #[command(subcommand)]
     Measure(MeasureCommand),

@@ -78,7 +78,7 @@ pub(crate) fn run_sensor(command: &SensorCommand, common: &Common) -> anyhow::Re
 }
 
 /// Writes a file that is not there yet, or to standard output.
-fn write_new(path: Option<&Path>, text: &str, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn write_new(path: Option<&Path>, text: &str, common: &Common) -> anyhow::Result<()> {
     let Some(path) = path else { return print(text) };
     if path.exists() {
         bail!("{} is there already; expected the name of a new file", path.display());

@@ -21,6 +21,7 @@ mod render;
 mod render_args;
 mod run;
 mod sense;
+mod sweep;
 mod terminal;
 mod trace;
 
@@ -62,6 +63,7 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Compare(arguments) => compare::run(&arguments, &common),
         Command::LightField(arguments) => light_field::run(&arguments, &common),
         Command::Sense(arguments) => sense::run(&arguments, &common),
+        Command::Sweep(arguments) => sweep::run(&arguments, &common),
         Command::Measure(command) => measure::run(&command, &common),
     }
 }

@@ -3,6 +3,7 @@
 #![expect(clippy::print_stderr, reason = "errors go to standard error")]
 
 use std::{
+    borrow::Cow,
     fmt,
     io::{self, IsTerminal, Write},
     path::PathBuf,
@@ -121,10 +122,10 @@ impl Bar {
         Self(Some(bar))
     }
 
-    /// Shows a stage and how far it is, 0–1.
-    pub(crate) fn show(&self, stage: &'static str, fraction: f64) {
+    /// Shows what is done and how far it is, 0–1.
+    pub(crate) fn show(&self, what: impl Into<Cow<'static, str>>, fraction: f64) {
         if let Some(bar) = &self.0 {
-            bar.set_message(stage);
+            bar.set_message(what);
             bar.set_position((1000.0 * fraction) as u64);
         }
     }

@@ -134,6 +134,24 @@ impl PipelineError {
     pub fn is_without_image(&self) -> bool {
         matches!(self, Self::Optics(OpticsError::NoFocus { side: "behind it", .. }))
     }
+
+    /// Whether it is about this machine or this moment: work that was cancelled, a file that is not there or cannot be written.
+    /// All other errors are about the camera, and come back whenever it is tried.
+    pub fn is_passing(&self) -> bool {
+        matches!(
+            self,
+            Self::Cancelled(_)
+                | Self::Write { .. }
+                | Self::Read { .. }
+                | Self::Png { .. }
+                | Self::Spill { .. }
+                | Self::Optics(OpticsError::Io { .. })
+                | Self::Sensor(SensorError::Read { .. } | SensorError::Write { .. })
+                | Self::Scene(SceneError::Unwritable { .. })
+                | Self::Backward(BackwardError::Write { .. })
+                | Self::Forward(ForwardError::Sink { .. })
+        )
+    }
 }
 
 impl From<PsfError> for PipelineError {

@@ -9,6 +9,7 @@
 #![doc = include_str!("../README.md")]
 
 mod camera;
+mod capture_files;
 pub mod display;
 mod error;
 pub mod figures;
@@ -32,6 +33,7 @@ pub use camera::{
     LightFieldSpec, Movements, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec,
     SensorOptions, SensorSpec, StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
+pub use capture_files::write_capture;
 pub use error::PipelineError;
 pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};

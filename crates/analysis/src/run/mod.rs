@@ -114,6 +114,29 @@ pub struct IrradianceData {
     pub mean_lux: f64,
 }
 
+/// What a report says of the lens before its film: the same for all runs that share lens, film, scene and model, whatever is
+/// behind the irradiance.
+#[derive(Clone, Debug)]
+pub struct RunOptics {
+    lens: LensData,
+    losses: Vec<LossRow>,
+}
+
+impl RunOptics {
+    /// Returns what the report of a run says of its lens; rays are traced for it.
+    ///
+    /// # Errors
+    /// When a glass is not known at the reference wavelength.
+    pub fn of(run: &Run<'_>) -> Result<Self, PipelineError> {
+        let places = RunPlaces::of(run);
+        let fields = [0.0, 0.35, 0.7, 1.0].map(|share| places.field(share));
+        Ok(Self {
+            lens: statistics::lens_data(run.capture, places.corner_tan())?,
+            losses: statistics::losses(run.capture, &fields)?,
+        })
+    }
+}
+
 impl RunReport {
     /// Returns the numbers of a run.
     ///
@@ -122,14 +145,21 @@ impl RunReport {
     /// # Errors
     /// When the scene has no depth, or a glass is not known at the reference wavelength.
     pub fn new(run: &Run<'_>, files: Vec<String>) -> Result<Self, PipelineError> {
-        let places = RunPlaces::of(run);
-        let fields = [0.0, 0.35, 0.7, 1.0].map(|share| places.field(share));
+        Self::with_optics(run, RunOptics::of(run)?, files)
+    }
+
+    /// Returns the numbers of a run of which what concerns the lens is known already, from a run that shares lens, film, scene and
+    /// model with it.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_optics(run: &Run<'_>, optics: RunOptics, files: Vec<String>) -> Result<Self, PipelineError> {
         let capture = run.capture;
         let (place, scene) = (&capture.place, &capture.scene);
         Ok(Self {
             dioptric: env!("CARGO_PKG_VERSION"),
             camera: capture.camera.clone(),
-            lens: statistics::lens_data(capture, places.corner_tan())?,
+            lens: optics.lens,
             film_distance_mm: place.film_distance_mm,
             film: FilmData { columns: place.columns, rows: place.rows, pitch_um: place.pitch_um },
             scene: SceneData {
@@ -150,7 +180,7 @@ impl RunReport {
                 mean_lux: capture.irradiance.summary.mean_lux,
             },
             sensor: SensorStatistics::new(&capture.frame_parts())?,
-            losses: statistics::losses(capture, &fields)?,
+            losses: optics.losses,
             white_balance: capture.developed.balance.clone(),
             color_matrix: capture.developed.color.rows.clone(),
             color_matrix_mean_delta_e: capture.developed.color.mean_delta_e(),

@@ -341,7 +341,8 @@ impl Camera {
         self.scene.check(checker)
     }
 
-    pub(crate) fn resolve_paths(&mut self, folder: &Path) {
+    /// Takes paths as relative to a folder; absolute ones stay.
+    pub fn resolve_paths(&mut self, folder: &Path) {
         if let LensSpec::File(path) = &mut self.lens {
             *path = folder.join(&path);
         }

@@ -6,8 +6,7 @@ mod page;
 use std::path::Path;
 
 use dioptric_analysis::{Run, RunCharts, RunPlaces, RunReport, RunTimes, SensorStatistics};
-use dioptric_pipeline::{IRRADIANCE_FILE, Outputs, PipelineError, Sensed, write_file, write_frames, write_json};
-use dioptric_scene::write_planes_exr;
+use dioptric_pipeline::{Outputs, PipelineError, Sensed, write_capture, write_file, write_frames, write_json};
 
 /// Writes everything of a run into a folder, and returns the report.
 ///
@@ -18,18 +17,7 @@ use dioptric_scene::write_planes_exr;
 /// When a file cannot be written.
 pub fn write_run(run: &Run<'_>, folder: &Path, times: &dyn Fn() -> RunTimes) -> Result<RunReport, PipelineError> {
     let capture = run.capture;
-    let outputs = &capture.camera.outputs;
-    let mut files = Vec::new();
-    if outputs.irradiance {
-        capture.irradiance.write_exr(&folder.join(IRRADIANCE_FILE))?;
-        files.push(IRRADIANCE_FILE.to_owned());
-    }
-    if let Some(depth) = run.depth.filter(|_| outputs.depth) {
-        write_planes_exr(&folder.join("depth.exr"), &[("Z", depth.z_m())], true)?;
-        files.push("depth.exr".to_owned());
-    }
-    let (frame_files, png) = write_frames(&capture.frame_parts(), &capture.developed.picture, outputs, folder)?;
-    files.extend(frame_files);
+    let (files, png) = write_capture(capture, run.depth, folder)?;
     let report = RunReport::new(run, files)?;
     let places = RunPlaces::of(run);
     let charts = RunCharts::of(run, &places, &report.sensor);

@@ -1,0 +1,80 @@
+//! `dioptric sweep`: the words that users rely on.
+
+mod common;
+
+use std::{fs, path::Path};
+
+use common::{CAMERA, check_error, dioptric, output};
+use serde_json::{Value, json};
+
+const PLAN: &str = r#"(base: File("camera.ron"), vary: [Grid({"exposure.Manual.time_s": List([0.01, 0.02])})])"#;
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    serde_json::from_str(&output(folder, arguments)).expect("the output is JSON")
+}
+
+#[test]
+fn a_sweep_fills_its_store() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    fs::write(folder.path().join("plan.ron"), PLAN).unwrap();
+    let counts = json(folder.path(), &["sweep", "plan.ron", "--dry-run", "--json"]);
+    assert_eq!(counts, json!({"items": 2, "irradiances": 1, "done": 0, "refused": 0, "missing": 2}));
+    assert!(!folder.path().join("plan.store").exists());
+
+    let made = json(folder.path(), &["sweep", "plan.ron", "--limit", "1", "--json"]);
+    assert_eq!((&made["done"], &made["left"]), (&json!(1), &json!(1)));
+    assert!(output(folder.path(), &["sweep", "plan.ron"]).contains("1 items were there, 1 were made"));
+    for name in ["index.jsonl", "index.csv", "index.html"] {
+        assert!(folder.path().join("plan.store").join(name).is_file(), "{name}");
+    }
+    // The picture of an item is that of its camera file by itself.
+    let lines = fs::read_to_string(folder.path().join("plan.store/index.jsonl")).unwrap();
+    let first: Value = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
+    let id = first["id"].as_str().unwrap();
+    let item = folder.path().join("plan.store/items").join(&id[..2]).join(id);
+    output(folder.path(), &["run", item.join("camera.ron").to_str().unwrap(), "--out", "alone"]);
+    for name in ["picture.png", "report.json"] {
+        let alone = fs::read(folder.path().join("alone").join(name)).unwrap();
+        assert!(fs::read(item.join(name)).unwrap() == alone, "{name}");
+    }
+
+    output(folder.path(), &["sweep", "index", "plan.ron", "--quiet"]);
+    assert_eq!(fs::read_to_string(folder.path().join("plan.store/index.jsonl")).unwrap(), lines);
+    assert_eq!(output(folder.path(), &["sweep", "pack", "plan.ron", "--webdataset", "out.tar"]), "out.tar\n");
+    assert!(folder.path().join("out.tar").is_file());
+}
+
+#[test]
+fn plans_to_begin_with_are_plans() {
+    let folder = tempfile::tempdir().unwrap();
+    output(folder.path(), &["sweep", "--init", "-o", "plan.ron"]);
+    let counts = json(folder.path(), &["sweep", "plan.ron", "--dry-run", "--json", "--shard", "1/1"]);
+    assert_eq!((&counts["items"], &counts["irradiances"]), (&json!(12), &json!(3)));
+    assert!(json(folder.path(), &["sweep", "--schema"])["properties"]["vary"].is_object());
+    check_error(folder.path(), &["sweep", "--init", "-o", "plan.ron"], &["plan.ron", "already"]);
+}
+
+#[test]
+fn wrong_plans_end_in_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |text: &str| fs::write(folder.path().join("plan.ron"), text).unwrap();
+    let check = |words: &[&str]| check_error(folder.path(), &["sweep", "plan.ron"], words);
+    check(&["cannot read plan.ron"]);
+    put("not a plan");
+    check(&["plan.ron:1:"]);
+    put(PLAN);
+    check(&["camera.ron"]);
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    put(&PLAN.replace("exposure.Manual", "exposures.Manual"));
+    check(&["'exposures.Manual.time_s'", "unknown field `exposures`"]);
+    put(&PLAN.replace("[0.01, 0.02]", "[]"));
+    check(&["'exposure.Manual.time_s'", "no values"]);
+    put(PLAN);
+    check_error(folder.path(), &["sweep", "plan.ron", "--shard", "3/2"], &["'3/2'", "I/N"]);
+    check_error(folder.path(), &["sweep", "plan.ron", "--seed", "3"], &["--seed"]);
+    check_error(folder.path(), &["sweep"], &["expected a plan"]);
+    check_error(folder.path(), &["sweep", "pack", "plan.ron", "--webdataset", "o.tar"], &["none of its items"]);
+    check_error(folder.path(), &["sweep", "index", "plan.ron"], &["plan.store"]);
+    assert!(!dioptric(folder.path(), &["sweep", "plan.ron", "index", "plan.ron"]).status.success());
+}

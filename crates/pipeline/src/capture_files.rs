@@ -1,0 +1,39 @@
+//! The stages of a capture as files.
+
+use std::path::Path;
+
+use dioptric_scene::write_planes_exr;
+use dioptric_spectrum::DepthMap;
+
+use crate::{
+    PipelineError,
+    frame_files::write_frames,
+    stages::{Capture, IRRADIANCE_FILE},
+};
+
+/// Writes what the camera's outputs ask for of a capture into a folder: irradiance, depth, frames and picture. Returns the names
+/// of the files and the bytes of `picture.png`.
+///
+/// `depth` is that of the scene's samples, where it is at hand.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write_capture(
+    capture: &Capture,
+    depth: Option<&DepthMap>,
+    folder: &Path,
+) -> Result<(Vec<String>, Vec<u8>), PipelineError> {
+    let outputs = &capture.camera.outputs;
+    let mut files = Vec::new();
+    if outputs.irradiance {
+        capture.irradiance.write_exr(&folder.join(IRRADIANCE_FILE))?;
+        files.push(IRRADIANCE_FILE.to_owned());
+    }
+    if let Some(depth) = depth.filter(|_| outputs.depth) {
+        write_planes_exr(&folder.join("depth.exr"), &[("Z", depth.z_m())], true)?;
+        files.push("depth.exr".to_owned());
+    }
+    let (frame_files, png) = write_frames(&capture.frame_parts(), &capture.developed.picture, outputs, folder)?;
+    files.extend(frame_files);
+    Ok((files, png))
+}

@@ -1,0 +1,145 @@
+//! One item: the picture of one camera and its files.
+
+use std::{fs, io, path::Path, sync::Arc};
+
+use dioptric_analysis::{Run, RunOptics, RunReport};
+use dioptric_pictures::encode_rgb8_png;
+use dioptric_pipeline::{
+    Camera, Capture, FilmPlace, GivenParts, KeptCamera, PipelineError, Progress, ResolvedLens, SceneSummary, Stage,
+    write_capture, write_file, write_json,
+};
+use dioptric_psf::LensImageModel;
+use dioptric_spectrum::Cancel;
+use serde::{Deserialize, Serialize};
+
+use crate::SweepError;
+
+/// The name of the camera file.
+const CAMERA: &str = "camera.ron";
+/// The name of the file that says why a camera was refused.
+pub(crate) const REFUSED: &str = "refused.json";
+/// The name of the small picture.
+pub(crate) const THUMBNAIL: &str = "thumbnail.png";
+/// Widest small picture, pixels.
+const THUMBNAIL_PX: usize = 192;
+
+/// Why a camera has no picture.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Refusal {
+    pub(crate) reason: String,
+}
+
+/// What items have in common, kept from one to the next.
+#[derive(Default)]
+pub(crate) struct Bench {
+    camera: Option<KeptCamera>,
+    optics: Option<(Shared, RunOptics)>,
+}
+
+/// What the optics of a report are made from.
+#[derive(Clone)]
+struct Shared {
+    lens: Arc<ResolvedLens>,
+    place: Arc<FilmPlace>,
+    scene: Arc<SceneSummary>,
+    model: Arc<LensImageModel>,
+}
+
+impl Shared {
+    /// Whether they are the same results, not equal ones: stages with equal inputs hand out one result.
+    fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.lens, &other.lens)
+            && Arc::ptr_eq(&self.place, &other.place)
+            && Arc::ptr_eq(&self.scene, &other.scene)
+            && Arc::ptr_eq(&self.model, &other.model)
+    }
+}
+
+impl Bench {
+    /// Takes the picture of a camera and writes all files of the item into a folder; returns whether there is a picture.
+    ///
+    /// A camera that cannot be is written with the reason.
+    pub(crate) fn make(
+        &mut self,
+        camera: &Camera,
+        folder: &Path,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<bool, SweepError> {
+        write_file(&folder.join(CAMERA), (camera.to_ron() + "\n").as_bytes())?;
+        match self.take(camera, folder, progress, cancel) {
+            Ok(()) => Ok(true),
+            Err(error) if !error.is_passing() => {
+                leave_camera_alone(folder).map_err(SweepError::writing(folder))?;
+                write_json(&folder.join(REFUSED), &Refusal { reason: error.to_string() })?;
+                Ok(false)
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn take(
+        &mut self,
+        camera: &Camera,
+        folder: &Path,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<(), PipelineError> {
+        let kept = match self.camera.take() {
+            Some(kept) => kept.with_camera(camera.clone(), GivenParts::default()),
+            None => KeptCamera::new(camera.clone()),
+        };
+        let kept = self.camera.insert(kept);
+        let capture = kept.capture(progress, cancel)?;
+        let model = kept.model(progress, cancel)?;
+        let depth = if camera.outputs.depth { Some(kept.depth(progress, cancel)?) } else { None };
+        progress.at(Stage::Report, 0.0);
+        let run = Run { capture: &capture, model: &model, depth: depth.as_deref() };
+        let optics = self.optics_of(&run, model.clone())?;
+        let (files, _) = write_capture(&capture, depth.as_deref(), folder)?;
+        write_json(&folder.join("report.json"), &RunReport::with_optics(&run, optics, files)?)?;
+        write_file(&folder.join(THUMBNAIL), &thumbnail(&capture)?)
+    }
+
+    /// Returns what the report says of the lens, from the item before where that shares it.
+    fn optics_of(&mut self, run: &Run<'_>, model: Arc<LensImageModel>) -> Result<RunOptics, PipelineError> {
+        let Capture { lens, place, scene, .. } = run.capture;
+        let own = Shared { lens: lens.clone(), place: place.clone(), scene: scene.clone(), model };
+        if let Some((_, optics)) = self.optics.as_ref().filter(|(shared, _)| shared.is(&own)) {
+            return Ok(optics.clone());
+        }
+        let optics = RunOptics::of(run)?;
+        self.optics = Some((own, optics.clone()));
+        Ok(optics)
+    }
+}
+
+/// Removes what was written of a picture before its camera was refused: by a sensor whose frames no DNG can hold.
+fn leave_camera_alone(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_name() != CAMERA {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns the picture made smaller by a whole number, as PNG.
+fn thumbnail(capture: &Capture) -> Result<Vec<u8>, PipelineError> {
+    let picture = &capture.developed.picture;
+    let (columns, rows) = (picture.columns(), picture.rows());
+    let (codes, factor) = (picture.to_rgb8(), columns.div_ceil(THUMBNAIL_PX).max(1));
+    let (width, height) = (columns.div_ceil(factor), rows.div_ceil(factor));
+    let mut small = Vec::with_capacity(3 * width * height);
+    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+        let (below, right) = ((factor * (y + 1)).min(rows), (factor * (x + 1)).min(columns));
+        for channel in 0..3 {
+            let samples = (factor * y..below).flat_map(|row| (factor * x..right).map(move |column| (row, column)));
+            let codes = samples.map(|(row, column)| u32::from(codes[3 * (row * columns + column) + channel]));
+            let (sum, n) = codes.fold((0, 0), |(sum, n), code| (sum + code, n + 1));
+            small.push(((sum + n / 2) / n) as u8);
+        }
+    }
+    encode_rgb8_png(&small, (width, height)).map_err(|error| PipelineError::Png { reason: error.to_string() })
+}

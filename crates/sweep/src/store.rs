@@ -1,0 +1,232 @@
+//! Where results are kept: a folder in which an item is there whole or not at all.
+
+use std::{
+    fs::{self, File, OpenOptions, TryLockError},
+    io,
+    path::{Path, PathBuf},
+};
+
+use tempfile::TempDir;
+
+use crate::{ItemId, SweepError};
+
+/// What folders of items that are being made are called, beside those of finished ones.
+const UNFINISHED: &str = ".tmp-";
+/// The file in such a folder that its maker holds locked as long as it lives.
+const LOCK: &str = "lock";
+
+/// A folder of finished items: `items/` then the first two digits of the item's name, then its name.
+#[derive(Clone, Debug)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+/// What came of an item.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// It has a picture.
+    Done,
+    /// Its camera was refused; `refused.json` says why.
+    Refused,
+    /// It is not there.
+    Missing,
+}
+
+impl Store {
+    /// A store in a folder, which is made when the first item is.
+    pub fn new(folder: &Path) -> Self {
+        Self { folder: folder.to_owned() }
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Returns where an item is, from the folder of the store.
+    pub fn place(id: ItemId) -> PathBuf {
+        let name = id.to_string();
+        Path::new("items").join(&name[..2]).join(name)
+    }
+
+    /// Returns the folder of an item, whether it is there or not.
+    pub fn item(&self, id: ItemId) -> PathBuf {
+        self.folder.join(Self::place(id))
+    }
+
+    /// Whether an item is there, done or refused.
+    pub fn has(&self, id: ItemId) -> bool {
+        self.item(id).is_dir()
+    }
+
+    /// Returns what came of an item.
+    pub fn status(&self, id: ItemId) -> Status {
+        let folder = self.item(id);
+        match (folder.join("refused.json").is_file(), folder.is_dir()) {
+            (true, _) => Status::Refused,
+            (false, true) => Status::Done,
+            (false, false) => Status::Missing,
+        }
+    }
+
+    /// Makes a place for items that are being made, and removes what makers left that are no more.
+    ///
+    /// # Errors
+    /// When the store cannot be written to.
+    pub fn begin(&self) -> Result<Workplace<'_>, SweepError> {
+        let cannot = SweepError::writing(&self.folder);
+        fs::create_dir_all(&self.folder).map_err(&cannot)?;
+        self.remove_leftovers().map_err(&cannot)?;
+        // Another maker may take the folder for a leftover until it is locked.
+        for _ in 0..100 {
+            let unfinished = tempfile::Builder::new().prefix(UNFINISHED).tempdir_in(&self.folder).map_err(&cannot)?;
+            if let Lock::Held(file) | Lock::Unknown(file) = lock(unfinished.path()) {
+                return Ok(Workplace { store: self, _lock: file, unfinished });
+            }
+        }
+        Err(cannot(io::Error::other("no folder in it can be locked")))
+    }
+
+    /// Removes the folders of makers that are no more; nobody holds their locks.
+    fn remove_leftovers(&self) -> io::Result<()> {
+        for entry in fs::read_dir(&self.folder)? {
+            let entry = entry?;
+            if entry.file_name().to_string_lossy().starts_with(UNFINISHED)
+                && let Lock::Held(file) = lock(&entry.path())
+            {
+                // What cannot be removed is left for the next one.
+                drop((fs::remove_dir_all(entry.path()), file));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What came of locking the folder of a maker.
+enum Lock {
+    /// It is ours.
+    Held(File),
+    /// Another holds it, or has removed the folder.
+    Taken,
+    /// The file system knows no locks: leftovers stay there.
+    Unknown(File),
+}
+
+fn lock(folder: &Path) -> Lock {
+    let path = folder.join(LOCK);
+    let Ok(file) = OpenOptions::new().create(true).truncate(false).write(true).open(&path) else {
+        return Lock::Taken;
+    };
+    match file.try_lock() {
+        // It may have been removed between being opened and being locked.
+        Ok(()) if path.exists() => Lock::Held(file),
+        Ok(()) | Err(TryLockError::WouldBlock) => Lock::Taken,
+        Err(TryLockError::Error(_)) => Lock::Unknown(file),
+    }
+}
+
+/// A place for items that are being made, removed with all that is unfinished when it is dropped.
+#[derive(Debug)]
+pub struct Workplace<'a> {
+    store: &'a Store,
+    // Before the folder: a file that is open cannot be removed everywhere.
+    _lock: File,
+    unfinished: TempDir,
+}
+
+impl Workplace<'_> {
+    /// The folder of all that is unfinished.
+    pub fn path(&self) -> &Path {
+        self.unfinished.path()
+    }
+
+    /// The store that the items are for.
+    pub fn store(&self) -> &Store {
+        self.store
+    }
+
+    /// Makes a folder for the files of an item.
+    pub(crate) fn item(&self, id: ItemId) -> Result<PathBuf, SweepError> {
+        let folder = self.path().join(id.to_string());
+        let cannot = SweepError::writing(&folder);
+        match fs::remove_dir_all(&folder) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(cannot(error)),
+            _ => {}
+        }
+        fs::create_dir(&folder).map_err(cannot)?;
+        Ok(folder)
+    }
+
+    /// Puts an item into the store, its files on the disk first. Where another maker was first, its item stays.
+    pub(crate) fn keep(&self, id: ItemId) -> Result<(), SweepError> {
+        let (made, place) = (self.path().join(id.to_string()), self.store.item(id));
+        let cannot = SweepError::writing(&place);
+        for entry in fs::read_dir(&made).map_err(&cannot)? {
+            let path = entry.map_err(&cannot)?.path();
+            OpenOptions::new().write(true).open(&path).and_then(|file| file.sync_all()).map_err(&cannot)?;
+        }
+        let above = place.parent().unwrap_or(&self.store.folder);
+        fs::create_dir_all(above).map_err(&cannot)?;
+        sync_folder(&made).map_err(&cannot)?;
+        match fs::rename(&made, &place) {
+            // A folder that is not empty is never replaced.
+            Err(_) if place.is_dir() => fs::remove_dir_all(&made).map_err(&cannot)?,
+            other => other.map_err(&cannot)?,
+        }
+        sync_folder(above).map_err(&cannot)
+    }
+}
+
+/// Brings the entries of a folder to the disk, where the system can.
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use dioptric_pipeline::Camera;
+
+    use super::*;
+    use crate::{inputs::Inputs, key::ItemKey};
+
+    fn id() -> ItemId {
+        let demo = Camera::demo().unwrap();
+        ItemKey::of(&demo, &demo, &Inputs::default()).unwrap().id
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn first_maker_of_an_item_wins() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path());
+        let (one, other) = (store.begin().unwrap(), store.begin().unwrap());
+        for (maker, text) in [(&one, "one"), (&other, "other")] {
+            fs::write(maker.item(id()).unwrap().join("report.json"), text).unwrap();
+        }
+        assert_eq!(store.status(id()), Status::Missing);
+        one.keep(id()).unwrap();
+        other.keep(id()).unwrap();
+        assert_eq!(fs::read_to_string(store.item(id()).join("report.json")).unwrap(), "one");
+        assert!(store.has(id()) && store.status(id()) == Status::Done);
+        drop((one, other));
+        assert_eq!(names(folder.path()), ["items"]);
+    }
+
+    #[test]
+    fn leftovers_of_the_dead_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::new(folder.path());
+        for (name, file) in [(".tmp-killed", "lock"), (".tmp-newborn", "half.png")] {
+            fs::create_dir(folder.path().join(name)).unwrap();
+            fs::write(folder.path().join(name).join(file), "").unwrap();
+        }
+        let alive = store.begin().unwrap();
+        let second = store.begin().unwrap();
+        assert!(alive.path().is_dir() && second.path().is_dir());
+        assert_eq!(names(folder.path()).len(), 2);
+    }
+}

@@ -1,0 +1,256 @@
+//! A plan with all its items: their cameras, their names, and the order in which they are made.
+
+use std::{
+    collections::{HashMap, HashSet},
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use dioptric_pipeline::Camera;
+use rayon::prelude::*;
+
+use crate::{ItemId, Plan, SweepError, Value, axes::Points, inputs::Inputs, key::ItemKey, plan::read_plan};
+
+/// A plan with all its items.
+#[derive(Debug)]
+pub struct Sweep {
+    path: PathBuf,
+    /// That of the plan, absolute: what paths are relative to.
+    folder: PathBuf,
+    plan: Plan,
+    points: Vec<Points>,
+    base: Value,
+    keys: Vec<ItemKey>,
+    /// The items as they are made: those that share results follow one another.
+    order: Vec<usize>,
+    inputs: Inputs,
+}
+
+/// A share of the items: those of every n-th irradiance, by its hash.
+///
+/// It depends on nothing but the item, so shards of a plan never overlap and do not move when the plan grows; items that share
+/// an irradiance are in the same shard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    index: u64,
+    of: u64,
+}
+
+impl Shard {
+    /// All items.
+    pub const ALL: Self = Self { index: 0, of: 1 };
+
+    /// Whether it is less than all items.
+    pub fn is_part(self) -> bool {
+        self.of > 1
+    }
+
+    fn has(self, key: &ItemKey) -> bool {
+        key.imaging % self.of == self.index
+    }
+}
+
+impl FromStr for Shard {
+    type Err = SweepError;
+
+    /// Reads `I/N`, I from 1 to N.
+    fn from_str(text: &str) -> Result<Self, SweepError> {
+        let parts = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+        match parts {
+            Some((index, of)) if (1..=of).contains(&index) => Ok(Self { index: index - 1, of }),
+            _ => Err(SweepError::Shard { found: text.to_owned() }),
+        }
+    }
+}
+
+impl Sweep {
+    /// Reads a plan and draws up its items; files that cameras are made from are read once, and hashed.
+    ///
+    /// # Errors
+    /// Names the line or the key of the plan that is wrong and what was expected, or the file that cannot be read. A camera
+    /// whose numbers make no sense is none: that is the result of its item.
+    pub fn read(path: &Path) -> Result<Self, SweepError> {
+        Self::of(read_plan(path)?, path)
+    }
+
+    /// Draws up the items of a plan; `path` names it in errors, and its paths are relative to that one's folder.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn of(plan: Plan, path: &Path) -> Result<Self, SweepError> {
+        let parent = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = parent.canonicalize().map_err(SweepError::reading(parent))?;
+        let camera = plan.base.open(&folder, path)?;
+        let base = Value::parse(&camera.to_ron()).expect("what a camera writes is RON");
+        let points = plan.vary.iter().map(Points::of).collect();
+        let (keys, order) = (Vec::new(), Vec::new());
+        let mut sweep =
+            Self { path: path.to_owned(), folder, plan, points, base, keys, order, inputs: Inputs::default() };
+        // What is wrong with the first item is found before all others are drawn up.
+        sweep.camera(0)?;
+        let still = Camera::demo()?;
+        let key = |item| ItemKey::of(&sweep.camera(item)?, &still, &sweep.inputs);
+        sweep.keys = (0..sweep.plan.count()).into_par_iter().map(key).collect::<Result<_, _>>()?;
+        sweep.order = in_order(&sweep.keys);
+        Ok(sweep)
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The plan's file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The number of items.
+    pub fn len(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Whether there are no items, which no plan allows.
+    pub fn is_empty(&self) -> bool {
+        self.keys.is_empty()
+    }
+
+    /// The number of different irradiances: how often a scene is imaged.
+    pub fn n_irradiances(&self, shard: Shard) -> usize {
+        self.keys.iter().filter(|key| shard.has(key)).map(|key| key.imaging).collect::<HashSet<_>>().len()
+    }
+
+    /// The name of an item, counted from 0 in the order of the plan.
+    ///
+    /// # Panics
+    /// When there is no such item.
+    pub fn id(&self, item: usize) -> ItemId {
+        self.keys[item].id
+    }
+
+    /// The items of a shard as they are made: those that share results follow one another.
+    pub fn items(&self, shard: Shard) -> impl Iterator<Item = usize> {
+        self.order.iter().copied().filter(move |item| shard.has(&self.keys[*item]))
+    }
+
+    /// Returns what an item sets, in the order of [`Plan::keys`].
+    pub fn values(&self, mut item: usize) -> Vec<Value> {
+        let mut blocks: Vec<Vec<Value>> = Vec::with_capacity(self.points.len());
+        for (sampling, points) in self.plan.vary.iter().zip(&self.points).rev() {
+            // Checked when the plan was read.
+            let n = sampling.count().unwrap_or(1);
+            blocks.push(points.at(item % n));
+            item /= n;
+        }
+        blocks.into_iter().rev().flatten().collect()
+    }
+
+    /// Returns the camera of an item, its paths absolute and its outputs those of the plan.
+    ///
+    /// # Errors
+    /// When a key is unknown, or its value is of the wrong kind.
+    pub fn camera(&self, item: usize) -> Result<Camera, SweepError> {
+        let values = self.values(item);
+        let mut camera = self.with(values.iter().enumerate()).map_err(|reason| self.blame(&values, reason))?;
+        camera.resolve_paths(&self.folder);
+        camera.outputs = self.plan.outputs.of_camera();
+        Ok(camera)
+    }
+
+    /// Returns the base with some of the keys set.
+    fn with<'a>(&self, values: impl Iterator<Item = (usize, &'a Value)>) -> Result<Camera, String> {
+        let (keys, mut camera) = (self.plan.keys(), self.base.clone());
+        for (axis, value) in values {
+            camera.set(keys[axis], value.clone())?;
+        }
+        camera.typed()
+    }
+
+    /// Returns the error of values that make no camera, with the key that it is about.
+    fn blame(&self, values: &[Value], reason: String) -> SweepError {
+        let keys = self.plan.keys();
+        let alone = |axis: &usize| self.with(std::iter::once((*axis, &values[*axis]))).is_err_and(|own| own == reason);
+        let first = |n: &usize| self.with(values.iter().enumerate().take(*n + 1)).is_err();
+        let axis = (0..values.len()).find(alone).or_else(|| (0..values.len()).find(first)).unwrap_or(0);
+        SweepError::Axis { path: self.path.clone(), key: keys[axis].to_owned(), reason }
+    }
+
+    pub(crate) fn inputs(&self) -> &Inputs {
+        &self.inputs
+    }
+}
+
+/// Returns the items so that those that share the results of stages follow one another, and else in the order of the plan.
+fn in_order(keys: &[ItemKey]) -> Vec<usize> {
+    // Each setting of a stage counts by the item that has it first.
+    let mut first = HashMap::new();
+    let mut ranks: Vec<([u32; 7], usize)> = Vec::with_capacity(keys.len());
+    for (item, key) in keys.iter().enumerate() {
+        let rank = std::array::from_fn(|stage| *first.entry((stage, key.stages[stage])).or_insert(item as u32));
+        ranks.push((rank, item));
+    }
+    ranks.sort_unstable();
+    ranks.into_iter().map(|(_, item)| item).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sweep(vary: &str) -> Result<Sweep, SweepError> {
+        let path = Path::new("p.ron");
+        Sweep::of(Plan::parse(&format!("(base: Demo, vary: [{vary}])"), path)?, path)
+    }
+
+    #[test]
+    fn items_are_the_cameras_of_the_plan() {
+        let sweep = sweep(
+            r#"Grid({"exposure.Manual.time_s": List([0.1, 0.2])}), List(keys: ["stop.FNumber", "seed"], points: [[4, 1], [8, 2], [4, 1]])"#,
+        )
+        .unwrap();
+        assert_eq!((sweep.len(), sweep.n_irradiances(Shard::ALL)), (6, 2));
+        assert_eq!(sweep.values(4), [Value::Number(0.2), Value::Whole(8), Value::Whole(2)]);
+        let camera = sweep.camera(4).unwrap();
+        assert!(camera.to_ron().contains("FNumber(8.0)") && camera.to_ron().contains("time_s: 0.2"));
+        assert!(camera.seed == 2 && !camera.outputs.raw);
+        // Point 1 and 3 of the list are the same.
+        assert_eq!(sweep.id(0), sweep.id(2));
+        // The four items of one stop come before the two of the other.
+        assert_eq!(sweep.items(Shard::ALL).collect::<Vec<_>>(), [0, 2, 3, 5, 1, 4]);
+    }
+
+    #[test]
+    fn shards_part_the_items_by_irradiance() {
+        let sweep =
+            sweep(r#"Grid({"stop.FNumber": Linear(first: 4, last: 8, count: 9), "seed": List([1, 2])})"#).unwrap();
+        let shards = ["1/3", "2/3", "3/3"].map(|text| text.parse::<Shard>().unwrap());
+        let mut all: Vec<usize> = shards.iter().flat_map(|shard| sweep.items(*shard)).collect();
+        all.sort_unstable();
+        assert_eq!(all, (0..18).collect::<Vec<_>>());
+        assert_eq!(shards.iter().map(|shard| sweep.n_irradiances(*shard)).sum::<usize>(), 9);
+        for text in ["0/3", "4/3", "1", "a/b", "1/0"] {
+            assert!(text.parse::<Shard>().unwrap_err().to_string().contains("expected I/N"), "{text}");
+        }
+    }
+
+    #[test]
+    fn keys_that_no_camera_has_are_named() {
+        for (vary, words) in [
+            (
+                r#"Grid({"seed": List([1]), "fokus.DistanceMm": List([1])})"#,
+                "p.ron: 'fokus.DistanceMm': unknown field `fokus`",
+            ),
+            (r#"Grid({"seed": List([1.5])})"#, "p.ron: 'seed': invalid type: floating point `1.5`"),
+            (r#"Grid({"seed": List([1, "x"])})"#, "p.ron: 'seed': invalid type: string"),
+            (r#"Grid({"exposure.time_s": List([1])})"#, "p.ron: 'exposure.time_s': exposure is Auto(…)"),
+            (
+                r#"Grid({"seed": List([1]), "exposure.Manual.analog_gain": List([2])})"#,
+                "'exposure.Manual.analog_gain': missing field `time_s`",
+            ),
+            (r#"Grid({"lens.File": List(["none.zmx"])})"#, "none.zmx"),
+        ] {
+            let message = sweep(vary).unwrap_err().to_string();
+            assert!(message.contains(words) && !message.contains('\n'), "{message}");
+        }
+    }
+}
