@@ -136,6 +136,29 @@ impl PipelineError {
     }
 }
 
+/// What a scene lacks that may be given beside it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SceneLack {
+    /// Its depth.
+    Depth,
+    /// Its camera data.
+    View,
+    /// Both.
+    DepthAndView,
+}
+
+impl PipelineError {
+    /// Returns what the scene lacks that may be given beside it, where that is what is wrong.
+    pub fn scene_lack(&self) -> Option<SceneLack> {
+        match self {
+            Self::Scene(SceneError::MissingDepth { .. }) => Some(SceneLack::Depth),
+            Self::Scene(SceneError::MissingView { .. }) => Some(SceneLack::View),
+            Self::Scene(SceneError::MissingDepthAndView { .. }) => Some(SceneLack::DepthAndView),
+            _ => None,
+        }
+    }
+}
+
 impl From<PsfError> for PipelineError {
     fn from(error: PsfError) -> Self {
         match error {
