@@ -79,16 +79,16 @@ def edge():
 
 
 def room():
-    """Balls on a checkered floor before a wall, lit from the left above, by a pinhole 1 m above the floor that looks 12 degrees down."""
-    columns, rows, focal_px = 360, 240, 340.0
-    down = math.radians(12)
+    """Balls on a checkered floor before a wall, lit from the left above, by a pinhole 1 m above the floor that looks 9 degrees down."""
+    columns, rows, focal_px = 360, 240, 560.0
+    down = math.radians(9)
     # center x, y, z (m; y up, z ahead), radius, reflectance in red, green and blue
     balls = [
-        (-0.42, -0.72, 1.60, 0.28, (0.62, 0.10, 0.08)),
-        (0.34, -0.78, 1.95, 0.22, (0.10, 0.28, 0.60)),
-        (0.05, -0.87, 1.55, 0.13, (0.70, 0.55, 0.08)),
-        (0.95, -0.60, 2.90, 0.40, (0.12, 0.42, 0.16)),
-        (-1.05, -0.65, 3.10, 0.35, (0.60, 0.60, 0.58)),
+        (-0.42, -0.72, 2.50, 0.28, (0.62, 0.10, 0.08)),
+        (0.36, -0.78, 2.85, 0.22, (0.10, 0.28, 0.60)),
+        (0.05, -0.87, 2.60, 0.13, (0.70, 0.55, 0.08)),
+        (0.98, -0.60, 4.10, 0.40, (0.12, 0.42, 0.16)),
+        (-0.85, -0.65, 4.30, 0.35, (0.60, 0.60, 0.58)),
     ]
     light = (-0.48, 0.75, -0.46)
     dot = lambda a, b: sum(p * q for p, q in zip(a, b))
@@ -111,7 +111,7 @@ def room():
                 dark = (math.floor(x / 0.25) + math.floor(z / 0.25)) % 2
                 best = (t, (0.0, 1.0, 0.0), (0.12, 0.09, 0.07) if dark else (0.60, 0.52, 0.42))
         if ray[2] > 0:
-            t = (4.0 - origin[2]) / ray[2]
+            t = (5.5 - origin[2]) / ray[2]
             if 1e-6 < t < best[0]:
                 x, y = origin[0] + t * ray[0], origin[1] + t * ray[1]
                 stripe = 0.5 + 0.5 * math.tanh(8 * math.sin(2 * math.pi * x / 0.8))

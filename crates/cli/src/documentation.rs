@@ -154,10 +154,13 @@ fn every_link_leads_to_a_file_and_a_heading() {
 #[test]
 fn every_command_line_of_the_pages_parses() {
     let (mut wrong, mut n_commands) = (Vec::new(), 0);
-    for page in pages() {
+    // What changed has the words of its time.
+    for page in pages().into_iter().filter(|page| !page.path.ends_with("CHANGELOG.md")) {
         let mut check = |(number, arguments): &(usize, Vec<String>), is_pattern: bool| {
             n_commands += 1;
             let Err(error) = Cli::words().try_get_matches_from(arguments) else { return };
+            // What a shell puts in is not known here.
+            let is_pattern = is_pattern || arguments.iter().any(|word| word.contains('$'));
             let is_help = matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
             // What stands for a value is none, and what a sentence is not about may be left out.
             let is_open = matches!(

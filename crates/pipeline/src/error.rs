@@ -15,7 +15,7 @@ use dioptric_world::WorldError;
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
     /// A list of numbers that cannot be read.
-    #[error("{what}: '{item}' is neither a number nor a range first:last:step")]
+    #[error("{what}: '{item}' is neither a number nor a range first:last:step whose step leads from first to last")]
     List {
         /// What the list was for.
         what: &'static str,
