@@ -171,7 +171,7 @@ fn every_command_line_of_the_pages_parses() {
                     | ErrorKind::MissingSubcommand
                     | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
             );
-            if !is_help && !(is_pattern && is_open) {
+            if !(is_help || is_pattern && is_open) {
                 let first = error.to_string().lines().next().unwrap_or_default().to_owned();
                 wrong.push(format!("{}:{number}: {}: {first}", page.path.display(), arguments.join(" ")));
             }

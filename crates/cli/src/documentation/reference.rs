@@ -1,8 +1,8 @@
 //! The pages of the book that list every key of camera and sensor files, made from their schemas.
 
-use std::{collections::BTreeSet, env, fmt::Write, fs};
+use std::{collections::BTreeSet, env, fmt::Write, fs, path::Path};
 
-use dioptric_pipeline::{CAMERA_SCHEMA, SENSOR_SCHEMA};
+use dioptric_pipeline::{CAMERA_SCHEMA, Camera, SENSOR_SCHEMA};
 use serde_json::{Map, Value};
 
 use super::root;
@@ -39,13 +39,14 @@ fn reference_pages_are_those_of_the_schemas() {
 fn page(start: &str, schema: &Value) -> String {
     let mut text = format!("{start}\n\n## The file\n\n");
     let (mut waiting, mut seen) = (Vec::new(), BTreeSet::new());
-    text += &fields(schema, &mut waiting);
+    let defs = &schema["$defs"];
+    text += &fields(schema, defs, &mut waiting);
     while !waiting.is_empty() {
         for name in std::mem::take(&mut waiting) {
             if seen.insert(name.clone()) {
-                let definition = &schema["$defs"][&name];
+                let definition = &defs[&name];
                 let _ = writeln!(text, "\n## {name}\n\n{}\n", whole(definition));
-                text += &body(definition, &mut waiting);
+                text += &body(definition, defs, &mut waiting);
             }
         }
     }
@@ -53,16 +54,16 @@ fn page(start: &str, schema: &Value) -> String {
 }
 
 /// What stands below the heading of a type: its keys, or its variants.
-fn body(schema: &Value, names: &mut Vec<String>) -> String {
+fn body(schema: &Value, defs: &Value, names: &mut Vec<String>) -> String {
     let variants = variants(schema);
     if variants.is_empty() {
         return match schema.get("properties") {
-            Some(_) => fields(schema, names),
+            Some(_) => fields(schema, defs, names),
             None => format!("As {}.\n", word(schema, names)),
         };
     }
     let mut text = "| one of | |\n|---|---|\n".to_owned();
-    for (form, what) in variants.iter().flat_map(|variant| forms(variant, names)) {
+    for (form, what) in variants.iter().flat_map(|variant| forms(variant, defs, names)) {
         let _ = writeln!(text, "| {form} | {what} |");
     }
     text
@@ -77,7 +78,7 @@ fn variants(schema: &Value) -> Vec<&Value> {
 }
 
 /// Returns how a variant is written, and what it is.
-fn forms(variant: &Value, names: &mut Vec<String>) -> Vec<(String, String)> {
+fn forms(variant: &Value, defs: &Value, names: &mut Vec<String>) -> Vec<(String, String)> {
     if let Some(name) = variant["const"].as_str() {
         return vec![(format!("`{name}`"), short(variant))];
     }
@@ -94,11 +95,13 @@ fn forms(variant: &Value, names: &mut Vec<String>) -> Vec<(String, String)> {
             Some(keys) => {
                 let required = required(payload);
                 for (key, field) in ordered(keys, &required) {
-                    let default = default_of(field).map(|value| format!(", {value} if left out")).unwrap_or_default();
+                    let default =
+                        default_of(field, defs).map(|value| format!(", {value} if left out")).unwrap_or_default();
                     let _ = write!(what, "<br>`{key}` ({}{default}): {}", word(field, names), short(field));
                 }
                 format!("`{name}({})`", required.iter().map(|key| format!("{key}: …")).collect::<Vec<_>>().join(", "))
             }
+            None if is_record(payload, defs) => format!("`{name}((…))` of {}", word(payload, names)),
             None => format!("`{name}(…)` of {}", word(payload, names)),
         };
         forms.push((form, what));
@@ -107,11 +110,11 @@ fn forms(variant: &Value, names: &mut Vec<String>) -> Vec<(String, String)> {
 }
 
 /// Returns the table of a record's keys.
-fn fields(schema: &Value, names: &mut Vec<String>) -> String {
+fn fields(schema: &Value, defs: &Value, names: &mut Vec<String>) -> String {
     let mut text = "| key | is | default | |\n|---|---|---|---|\n".to_owned();
     let Some(keys) = schema["properties"].as_object() else { return text };
     for (key, field) in ordered(keys, &required(schema)) {
-        let default = default_of(field).unwrap_or_default();
+        let default = default_of(field, defs).unwrap_or_default();
         let _ = writeln!(text, "| `{key}` | {} | {default} | {} |", word(field, names), short(field));
     }
     text
@@ -158,23 +161,53 @@ fn word(schema: &Value, names: &mut Vec<String>) -> String {
 }
 
 /// Returns a default as a camera file has it, or `None` where there is none.
-fn default_of(field: &Value) -> Option<String> {
-    field.get("default").map(|value| format!("`{}`", ron_of(value)))
+fn default_of(field: &Value, defs: &Value) -> Option<String> {
+    field.get("default").map(|value| format!("`{}`", ron_of(value, field, defs)))
 }
 
-fn ron_of(value: &Value) -> String {
-    let list = |values: &[Value]| values.iter().map(ron_of).collect::<Vec<_>>().join(", ");
+/// Returns the definition that a schema stands for, itself if none.
+fn resolved<'a>(schema: &'a Value, defs: &'a Value) -> &'a Value {
+    let some = |choice: &&Value| choice.get("$ref").is_some();
+    let schema = schema["anyOf"].as_array().and_then(|choices| choices.iter().find(some)).unwrap_or(schema);
+    schema["$ref"].as_str().map_or(schema, |target| &defs[target.trim_start_matches("#/$defs/")])
+}
+
+/// Whether a schema names a type that is a record, which a file writes in parentheses of its own.
+fn is_record(schema: &Value, defs: &Value) -> bool {
+    schema.get("$ref").is_some() && resolved(schema, defs).get("properties").is_some()
+}
+
+/// Returns a value of a type as a file has it.
+fn ron_of(value: &Value, schema: &Value, defs: &Value) -> String {
+    let schema = resolved(schema, defs);
     match value {
+        // JSON has no other word for it.
+        Value::Null if schema["type"] == "number" => "inf".to_owned(),
         Value::Null => "None".to_owned(),
         // The names of variants are text in JSON.
         Value::String(name) => name.clone(),
-        Value::Array(values) => format!("[{}]", list(values)),
+        Value::Array(values) => {
+            let all: Vec<_> = values.iter().map(|value| ron_of(value, &schema["items"], defs)).collect();
+            match schema.get("prefixItems") {
+                Some(_) => format!("({})", all.join(", ")),
+                None => format!("[{}]", all.join(", ")),
+            }
+        }
         Value::Object(keys) => match keys.iter().next() {
             Some((name, payload)) if keys.len() == 1 && name.starts_with(char::is_uppercase) => {
-                format!("{name}({})", ron_of(payload).trim_start_matches('(').trim_end_matches(')'))
+                let variant = variants(schema).into_iter().map(|v| &v["properties"][name]).find(|v| !v.is_null());
+                let of = variant.unwrap_or(&Value::Null);
+                let text = ron_of(payload, of, defs);
+                match text.strip_prefix('(') {
+                    // The keys of the variant itself.
+                    Some(inner) if !is_record(of, defs) => format!("{name}({inner}"),
+                    _ => format!("{name}({text})"),
+                }
             }
             _ => {
-                let all = keys.iter().map(|(key, value)| format!("{key}: {}", ron_of(value))).collect::<Vec<_>>();
+                let of = |key: &str| &schema["properties"][key];
+                let all: Vec<_> =
+                    keys.iter().map(|(key, value)| format!("{key}: {}", ron_of(value, of(key), defs))).collect();
                 format!("({})", all.join(", "))
             }
         },
@@ -203,11 +236,21 @@ fn whole(schema: &Value) -> String {
     (kept + rest).replace("[`", "`").replace("`]", "`")
 }
 
+/// Each default of the page, written into a camera file, is the default.
 #[test]
 fn defaults_are_written_as_files_have_them() {
-    let of = |json: &str| ron_of(&serde_json::from_str(json).unwrap());
-    assert_eq!(of(r#"{"Hurb": {"gamma": 1.0}}"#), "Hurb(gamma: 1.0)");
-    assert_eq!(of(r#"{"Samples": 64}"#), "Samples(64)");
-    assert_eq!(of(r#"{"tilt_deg": 0.0, "rise_mm": 0.0}"#), "(rise_mm: 0.0, tilt_deg: 0.0)");
-    assert_eq!(of("[null, true]"), "[None, true]");
+    let schema: Value = serde_json::from_str(CAMERA_SCHEMA).unwrap();
+    let start = "name: \"short\", lens: BuiltIn(\"dgauss-50mm\"), focus: NearObject, sensor: BuiltIn(\"imx363\"), \
+                 scene: (source: StillLife(columns: 3, rows: 2))";
+    let parse = |text: String| Camera::parse(&text, Path::new("short.ron"));
+    let short = parse(format!("({start})")).unwrap();
+    let keys = schema["properties"].as_object().unwrap();
+    let mut n_defaults = 0;
+    for (key, field) in keys {
+        let Some(default) = default_of(field, &schema["$defs"]) else { continue };
+        let camera = parse(format!("({start}, {key}: {})", default.trim_matches('`')));
+        assert_eq!(camera.unwrap_or_else(|error| panic!("{key}: {error}")), short, "{key}");
+        n_defaults += 1;
+    }
+    assert_eq!(n_defaults, keys.len() - 5);
 }
