@@ -1,7 +1,8 @@
-//! Project chores: `cargo xtask features`, `layers`, `modules`, `packages`, `schema`, `figures [4 | --out DIR]`.
+//! Project chores: `cargo xtask book`, `features`, `layers`, `modules`, `packages`, `schema`, `figures [4 | --out DIR]`.
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool talks to its user")]
 
+mod book;
 mod features;
 mod figures;
 mod layers;
@@ -11,11 +12,13 @@ mod schema;
 
 use std::{path::Path, process::ExitCode};
 
-const USAGE: &str = "usage: cargo xtask features | layers | modules | packages | schema | figures [4 | --out DIR]";
+const USAGE: &str =
+    "usage: cargo xtask book | features | layers | modules | packages | schema | figures [4 | --out DIR]";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["book"] => book::run(),
         ["features"] => features::run(),
         ["layers"] => layers::run(),
         ["modules"] => modules::run(),

@@ -1,8 +1,9 @@
 //! The words of the command line, and nothing else.
 
-use std::path::PathBuf;
+use std::{any::TypeId, ffi::OsString, path::PathBuf};
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 
 pub(crate) use crate::common::Common;
 use crate::{
@@ -23,6 +24,40 @@ pub(crate) struct Cli {
     /// Options of every command.
     #[command(flatten)]
     pub(crate) common: Common,
+}
+
+impl Cli {
+    /// Returns the words of the program.
+    pub(crate) fn words() -> clap::Command {
+        takes_negative_numbers(Self::command())
+    }
+
+    /// Reads a command line, the name of the program first.
+    pub(crate) fn read<T: Into<OsString> + Clone>(line: impl IntoIterator<Item = T>) -> Result<Self, clap::Error> {
+        let mut matches = Self::words().try_get_matches_from(line)?;
+        Self::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut Self::words()))
+    }
+}
+
+/// Lets every option that takes a number, or a list of them, take a negative one: whether it makes sense is for those to say who
+/// know what it is.
+fn takes_negative_numbers(command: clap::Command) -> clap::Command {
+    let is_number = |arg: &Arg| arg.get_value_parser().type_id() == TypeId::of::<f64>();
+    let is_list = |arg: &Arg| arg.get_value_names().is_some_and(|names| names.iter().any(|name| name == "LIST"));
+    command
+        .mut_args(|arg| if is_number(&arg) || is_list(&arg) { arg.allow_hyphen_values(true) } else { arg })
+        .mut_subcommands(takes_negative_numbers)
+}
+
+/// What the options of a long help are grouped under.
+mod heading {
+    pub(super) const SCENE: &str = "Scene";
+    pub(super) const LENS: &str = "Lens";
+    pub(super) const FILM: &str = "Film and sensor";
+    pub(super) const EXPOSURE: &str = "Exposure and picture";
+    pub(super) const SIMULATION: &str = "Simulation";
+    pub(super) const POINTS: &str = "Points";
+    pub(super) const RESULTS: &str = "Results";
 }
 
 /// A command.
@@ -60,6 +95,17 @@ pub(crate) enum Command {
     /// Measures pictures, frames and sensors as a laboratory does
     #[command(subcommand)]
     Measure(MeasureCommand),
+    /// Prints what completes these words in a shell: bash, elvish, fish, powershell or zsh
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+    /// Writes manual pages, one a command
+    Man {
+        /// Folder for the pages
+        #[arg(long, short, value_name = "DIR", default_value = "man")]
+        out: PathBuf,
+    },
 }
 
 /// How finely a picture is simulated.
@@ -79,68 +125,68 @@ pub(crate) struct RunArgs {
     /// The camera file; without it, the built-in demo camera
     pub(crate) camera: Option<PathBuf>,
     /// Scene to photograph: spectral EXR, ENVI header, folder of band PNGs, or a picture
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
     pub(crate) scene: Option<PathBuf>,
     /// Folder for the results [default: dioptric-out, or that of --from]
-    #[arg(long, short, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR", help_heading = heading::RESULTS)]
     pub(crate) out: Option<PathBuf>,
     /// Continues from the folder of a finished run: its camera, and its irradiance where no change touches it
-    #[arg(long, value_name = "DIR", conflicts_with = "camera")]
+    #[arg(long, value_name = "DIR", conflicts_with = "camera", help_heading = heading::RESULTS)]
     pub(crate) from: Option<PathBuf>,
     /// How finely the picture is simulated
-    #[arg(long, value_name = "QUALITY", value_enum, default_value = "full")]
+    #[arg(long, value_name = "QUALITY", value_enum, default_value = "full", help_heading = heading::SIMULATION)]
     pub(crate) quality: QualityKind,
     /// Lens, a file or the name of a built-in one
-    #[arg(long, value_name = "LENS")]
+    #[arg(long, value_name = "LENS", help_heading = heading::LENS)]
     pub(crate) lens: Option<String>,
     #[command(flatten)]
     pub(crate) state: LensStateArgs,
     #[command(flatten)]
     pub(crate) place: FilmArgs,
     /// Horizontal field of view of the scene, degrees
-    #[arg(long, value_name = "A")]
+    #[arg(long, value_name = "A", help_heading = heading::SCENE)]
     pub(crate) fov_deg: Option<f64>,
     /// Depth of a scene that has none, m
-    #[arg(long, value_name = "Z")]
+    #[arg(long, value_name = "Z", help_heading = heading::SCENE)]
     pub(crate) depth_m: Option<f64>,
     /// Light to put the scene under: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3, a temperature (3200K), a chromaticity
     /// (0.46,0.414) or a CSV file of its spectrum; scenes of unknown light cannot be relit
-    #[arg(long, value_name = "LIGHT")]
+    #[arg(long, value_name = "LIGHT", help_heading = heading::SCENE)]
     pub(crate) illuminant: Option<String>,
     /// Illuminance on the scene, or of a picture's white, lux
-    #[arg(long, value_name = "LUX")]
+    #[arg(long, value_name = "LUX", help_heading = heading::SCENE)]
     pub(crate) illuminance_lux: Option<f64>,
     /// Light that is on a scene of radiance whose file does not state it, as --illuminant has it
-    #[arg(long, value_name = "LIGHT")]
+    #[arg(long, value_name = "LIGHT", help_heading = heading::SCENE)]
     pub(crate) scene_light: Option<String>,
     /// Sensor, a file or the name of a built-in one
-    #[arg(long, value_name = "SENSOR")]
+    #[arg(long, value_name = "SENSOR", help_heading = heading::FILM)]
     pub(crate) sensor: Option<String>,
-    /// Size of the film in pixels, e.g. 640x480 [default: the picture of the scene, at most the sensor]
-    #[arg(long, value_name = "WxH")]
+    /// Pixels of the film, e.g. 640x480; without --pixel-um the film stays as large as it is [default: those of the camera]
+    #[arg(long, value_name = "WxH", help_heading = heading::FILM)]
     pub(crate) pixels: Option<String>,
-    /// Distance between pixels, µm [default: the sensor's]
-    #[arg(long, value_name = "P")]
+    /// Distance between pixels, µm; without --pixels the film stays as large as it is [default: that of the camera]
+    #[arg(long, value_name = "P", help_heading = heading::FILM)]
     pub(crate) pixel_um: Option<f64>,
     /// Exposure time, s [default: automatic]
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", help_heading = heading::EXPOSURE)]
     pub(crate) exposure_s: Option<f64>,
     #[command(flatten)]
     pub(crate) frames: FrameArgs,
     /// Diffraction at the stop
-    #[arg(long, value_name = "KIND", value_enum)]
+    #[arg(long, value_name = "KIND", value_enum, help_heading = heading::SIMULATION)]
     pub(crate) diffraction: Option<DiffractionKind>,
     /// Strength γ of ray bending, in place of that of its kind
-    #[arg(long, value_name = "G", allow_negative_numbers = true)]
+    #[arg(long, value_name = "G", help_heading = heading::SIMULATION)]
     pub(crate) gamma: Option<f64>,
     /// How point-spread functions are sampled
-    #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error")]
+    #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error", help_heading = heading::SIMULATION)]
     pub(crate) bank: Option<BankKind>,
     /// Samples point-spread functions as finely as this median error needs, a share of the energy, e.g. 0.01
-    #[arg(long, value_name = "E")]
+    #[arg(long, value_name = "E", help_heading = heading::SIMULATION)]
     pub(crate) bank_error: Option<f64>,
     /// How the scene is blurred
-    #[arg(long, value_name = "MODE", value_enum)]
+    #[arg(long, value_name = "MODE", value_enum, help_heading = heading::SIMULATION)]
     pub(crate) blur: Option<BlurKind>,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
@@ -150,38 +196,38 @@ pub(crate) struct RunArgs {
 #[derive(Debug, Args)]
 pub(crate) struct FrameArgs {
     /// Takes so many frames and merges them
-    #[arg(long, value_name = "N", conflicts_with = "bracket_stops")]
+    #[arg(long, value_name = "N", conflicts_with = "bracket_stops", help_heading = heading::EXPOSURE)]
     pub(crate) burst: Option<usize>,
     /// Moves the camera between the frames of a burst, at the last one by so many pixels; they are aligned and merged where they
     /// agree
-    #[arg(long, value_name = "P", requires = "burst", allow_negative_numbers = true)]
+    #[arg(long, value_name = "P", requires = "burst", help_heading = heading::EXPOSURE)]
     pub(crate) burst_motion_px: Option<f64>,
     /// Takes exposures that differ by powers of two and merges them, e.g. -4,-2,0
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
     pub(crate) bracket_stops: Option<String>,
     /// Writes these files too: electrons, raw-tiff, raw-dng, picture-png16, picture-tiff8, picture-tiff16, picture-exr
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", help_heading = heading::RESULTS)]
     pub(crate) also: Option<String>,
     /// Switches noise on: all, none, or a list of photon, dark-current, read, reset, row, prnu, dsnu, column, defects;
     /// all,-NAME leaves one out [default: all]
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
     pub(crate) noise: Option<String>,
     /// Factor on the voltage after the pixel [default: 1]
-    #[arg(long, allow_negative_numbers = true, value_name = "G")]
+    #[arg(long, value_name = "G", help_heading = heading::EXPOSURE)]
     pub(crate) analog_gain: Option<f64>,
     /// What the picture makes white: scene (its light, or its mean where that is unknown), none, gray-world, white-patch,
     /// shades-of-gray, gray-edge, patch:X,Y,W,H, or a light as --illuminant has it [default: scene]
-    #[arg(long, value_name = "WHITE")]
+    #[arg(long, value_name = "WHITE", help_heading = heading::EXPOSURE)]
     pub(crate) white: Option<String>,
     /// How missing colors are found: nearest, bilinear, malvar, directional, directional-ratio
-    #[arg(long, value_name = "METHOD")]
+    #[arg(long, value_name = "METHOD", help_heading = heading::EXPOSURE)]
     pub(crate) demosaic: Option<String>,
     /// How much noise is taken out: 0 none, 0.5 what noise may be, more what texture may be too [default: what the frame's own
     /// noise asks for]
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", help_heading = heading::EXPOSURE)]
     pub(crate) denoise: Option<f64>,
     /// What becomes of light beyond saturation: clip (channel by channel), reconstruct [default: reconstruct]
-    #[arg(long, value_name = "KIND")]
+    #[arg(long, value_name = "KIND", help_heading = heading::EXPOSURE)]
     pub(crate) highlights: Option<String>,
 }
 
@@ -230,7 +276,7 @@ pub(crate) struct TraceArgs {
     #[arg(long, short, value_name = "OUT.csv")]
     pub(crate) output: Option<PathBuf>,
     /// Also takes the rays to a film this far behind the last vertex, mm, curved as the lens file says
-    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    #[arg(long, value_name = "D")]
     pub(crate) film_mm: Option<f64>,
     /// Ignores the rims of the surfaces
     #[arg(long)]
@@ -243,60 +289,60 @@ pub(crate) struct PsfArgs {
     #[command(flatten)]
     pub(crate) lens: LensArgs,
     /// Field angles, degrees [default: those of the lens's file, else 0]
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LIST", help_heading = heading::POINTS)]
     pub(crate) fields_deg: Option<String>,
     /// How far above the axis all of these fields lie, degrees
-    #[arg(long, value_name = "A", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "A", default_value_t = 0.0, help_heading = heading::POINTS)]
     pub(crate) field_y_deg: f64,
     /// Distances of the points from the first vertex, mm; inf for a star [default: that of the lens's file, else 2000]
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", help_heading = heading::POINTS)]
     pub(crate) distances_mm: Option<String>,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
     #[command(flatten)]
     pub(crate) film: FilmArgs,
     /// Diffraction at the stop
-    #[arg(long, value_name = "KIND", value_enum, default_value_t = DiffractionKind::None)]
+    #[arg(long, value_name = "KIND", value_enum, default_value_t = DiffractionKind::None, help_heading = heading::SIMULATION)]
     pub(crate) diffraction: DiffractionKind,
     /// Strength γ of ray bending, in place of that of its kind
-    #[arg(long, value_name = "G", allow_negative_numbers = true)]
+    #[arg(long, value_name = "G", help_heading = heading::SIMULATION)]
     pub(crate) gamma: Option<f64>,
     /// Pixel of the pictures and of the metrics, µm
-    #[arg(long, value_name = "P", default_value_t = 1.0)]
+    #[arg(long, value_name = "P", default_value_t = 1.0, help_heading = heading::RESULTS)]
     pub(crate) pixel_um: f64,
     /// Width and height of the pictures, pixels [default: to hold the spot]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = heading::RESULTS)]
     pub(crate) size: Option<usize>,
     /// How the light is sampled
-    #[arg(long, value_name = "MODE", value_enum, default_value_t = PsfMode::Pupil)]
+    #[arg(long, value_name = "MODE", value_enum, default_value_t = PsfMode::Pupil, help_heading = heading::SIMULATION)]
     pub(crate) mode: PsfMode,
     /// Rays along the side of the paper mode's square grid
-    #[arg(long, value_name = "N", default_value_t = 201)]
+    #[arg(long, value_name = "N", default_value_t = 201, help_heading = heading::SIMULATION)]
     pub(crate) rays: usize,
     /// Draws from a bank over the range of the points, not traced at each, and tells the error of that
-    #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error")]
+    #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error", help_heading = heading::SIMULATION)]
     pub(crate) bank: Option<BankKind>,
     /// Draws from a bank sampled as finely as this median error needs, a share of the energy, e.g. 0.01
-    #[arg(long, value_name = "E")]
+    #[arg(long, value_name = "E", help_heading = heading::SIMULATION)]
     pub(crate) bank_error: Option<f64>,
     /// Adds MTF tables at these frequencies, cycles/mm
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", help_heading = heading::RESULTS)]
     pub(crate) mtf_per_mm: Option<String>,
     /// Writes the pictures: an EXR with a layer a PSF, or a PNG mosaic
-    #[arg(long, short, value_name = "F")]
+    #[arg(long, short, value_name = "F", help_heading = heading::RESULTS)]
     pub(crate) output: Option<PathBuf>,
     /// Writes the table as CSV
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "F", help_heading = heading::RESULTS)]
     pub(crate) csv: Option<PathBuf>,
     /// Writes plots into this folder: line and edge spread, MTF, encircled and ensquared energy, MTF through focus;
     /// SVG and the lines as CSV; PNG too in a build with the feature png
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = heading::RESULTS)]
     pub(crate) plots: Option<PathBuf>,
     /// Adds a row for the light of all wavelengths together to those of each point
-    #[arg(long, alias = "whole-light")]
+    #[arg(long, alias = "whole-light", help_heading = heading::POINTS)]
     pub(crate) polychromatic: bool,
     /// Weights of the wavelengths in the light of all together: rows, plots and mosaic [default: all alike]
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", help_heading = heading::POINTS)]
     pub(crate) spectral_weights: Option<String>,
 }
 
@@ -315,23 +361,23 @@ pub(crate) struct SenseArgs {
     /// Spectral irradiance, EXR
     pub(crate) irradiance: PathBuf,
     /// Sensor, a file or the name of a built-in one
-    #[arg(long, value_name = "SENSOR")]
+    #[arg(long, value_name = "SENSOR", help_heading = heading::FILM)]
     pub(crate) sensor: String,
     /// Distance between the sensor's pixels, µm [default: the sensor's own]; that of the image's samples makes each a pixel
-    #[arg(long, value_name = "P")]
+    #[arg(long, value_name = "P", help_heading = heading::FILM)]
     pub(crate) pixel_um: Option<f64>,
     /// Folder for the results
-    #[arg(long, short, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR", help_heading = heading::RESULTS)]
     pub(crate) out: PathBuf,
     /// Exposure time, s [default: automatic]
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", help_heading = heading::EXPOSURE)]
     pub(crate) exposure_s: Option<f64>,
     /// Distance of the exit pupil from the sensor, mm, for the chief-ray angle [default: light along the axis]
-    #[arg(long, value_name = "D")]
+    #[arg(long, value_name = "D", help_heading = heading::FILM)]
     pub(crate) exit_pupil_mm: Option<f64>,
     /// The light on the scene, which is made white: a name, a temperature, a chromaticity or a CSV file, as for `run`
     /// [default: unknown]
-    #[arg(long, value_name = "LIGHT")]
+    #[arg(long, value_name = "LIGHT", help_heading = heading::EXPOSURE)]
     pub(crate) illuminant: Option<String>,
     #[command(flatten)]
     pub(crate) frames: FrameArgs,

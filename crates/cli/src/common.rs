@@ -4,6 +4,7 @@ use clap::Args;
 
 /// Options of every command.
 #[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Every command")]
 pub(crate) struct Common {
     /// Prints numbers as JSON
     #[arg(long, global = true)]

@@ -63,7 +63,9 @@ fn convert(input: &str, output: &Path, reading: &LensReadOptions, common: &Commo
         write(&beside, &glasses)?;
         remark(common.quiet, &format!("wrote the lens's own glasses to {}", beside.display()));
     }
-    write(output, &converted.text)
+    write(output, &converted.text)?;
+    remark(common.quiet, &format!("wrote {}", output.display()));
+    Ok(())
 }
 
 fn write(path: &Path, text: &str) -> anyhow::Result<()> {

@@ -41,6 +41,7 @@ pub(crate) struct LensArgs {
 
 /// What the file of a lens leaves open, how far the lens is open, and how it is turned and moved.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Lens")]
 pub(crate) struct LensStateArgs {
     #[command(flatten)]
     pub(crate) reading: LensReadingArgs,
@@ -56,18 +57,20 @@ pub(crate) struct LensStateArgs {
 
 /// Where the film is: at a focus or at a place.
 #[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "Focus")]
 #[group(multiple = false)]
 pub(crate) struct FilmArgs {
     /// Focuses on this distance from the first vertex, mm, or inf [default of a render with --lens: what stands ahead]
     #[arg(long, value_name = "D")]
     pub(crate) focus_mm: Option<f64>,
     /// Places the film this far behind the last vertex, mm
-    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    #[arg(long, value_name = "D")]
     pub(crate) film_mm: Option<f64>,
 }
 
 /// Which wavelengths.
 #[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Wavelengths")]
 pub(crate) struct BandArgs {
     /// Wavelengths, nm: a list or first:last:step [default: those of the scene or of the lens's file, else usual ones at which
     /// the glasses are known]
@@ -113,6 +116,7 @@ impl BandArgs {
 
 /// What a lens file leaves open.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Lens file")]
 pub(crate) struct LensReadingArgs {
     /// Glass catalogue to look in before the built-in one, .agf or .yml; may be given several times
     #[arg(long, value_name = "F")]
@@ -121,7 +125,7 @@ pub(crate) struct LensReadingArgs {
     #[arg(long, value_enum)]
     pub(crate) missing_glass: Option<MissingGlassArg>,
     /// Change of index a nm, about 550 nm, of media with one stated index, as .dat files have (the paper: -0.000133)
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    #[arg(long, value_name = "S")]
     pub(crate) slope_per_nm: Option<f64>,
     /// What the numbers of S are in a .seq file that says neither RDM nor CUM [default: what is plausible]
     #[arg(long, value_name = "KIND")]
@@ -199,10 +203,10 @@ pub(crate) struct LensAnalyzeArgs {
     pub(crate) lens: LensArgs,
     /// Field angles, degrees: above the axis as 0,10,20, or along x and y as 5/10 [default: those of the lens's file, else 0,
     /// 0.5, 0.7 and 1 of where the light falls to a quarter]
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LIST")]
     pub(crate) fields_deg: Option<String>,
     /// Fields as object points, mm from the axis, for an object at a finite distance: y, or x/y
-    #[arg(long, value_name = "LIST", conflicts_with = "fields_deg", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LIST", conflicts_with = "fields_deg")]
     pub(crate) fields_mm: Option<String>,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
@@ -230,7 +234,7 @@ pub(crate) struct LensDrawArgs {
     #[arg(long, short, visible_alias = "out", value_name = "F")]
     pub(crate) output: PathBuf,
     /// Field angles of the ray fans, degrees [default: those of the lens's file, else 0,10]
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LIST")]
     pub(crate) fields_deg: Option<String>,
     /// Distance of the object, mm, or inf [default: that of the lens's file, else inf]
     #[arg(long, value_name = "D")]

@@ -24,11 +24,14 @@ mod sense;
 mod sweep;
 mod terminal;
 mod trace;
+mod words;
+
+#[cfg(test)]
+mod documentation;
 
 use std::process::ExitCode;
 
 use anyhow::Context;
-use clap::Parser;
 
 use crate::{
     args::{Cli, Command, Common},
@@ -36,7 +39,7 @@ use crate::{
 };
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
     terminal::remove_partial_files_on_interrupt();
     match dispatch(cli) {
         Ok(()) => ExitCode::SUCCESS,
@@ -65,6 +68,8 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Sense(arguments) => sense::run(&arguments, &common),
         Command::Sweep(arguments) => sweep::run(&arguments, &common),
         Command::Measure(command) => measure::run(&command, &common),
+        Command::Completions { shell } => words::completions(shell),
+        Command::Man { out } => words::manual(&out, &common),
     }
 }
 

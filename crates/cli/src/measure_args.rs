@@ -74,7 +74,7 @@ pub(crate) struct SpotArgs {
     #[arg(long, value_name = "P", default_value_t = 1.0)]
     pub(crate) pixel_um: f64,
     /// Light between the points, highest code 1 [default: the median of the picture]
-    #[arg(long, value_name = "L", allow_negative_numbers = true)]
+    #[arg(long, value_name = "L")]
     pub(crate) background: Option<f64>,
     /// The picture and the results
     #[command(flatten)]
@@ -113,7 +113,7 @@ pub(crate) struct NoiseArgs {
     #[arg(long, value_name = "G", requires = "sensor")]
     pub(crate) analog_gain: Option<f64>,
     /// Temperature of the chip, °C [default: 25]
-    #[arg(long, value_name = "C", requires = "sensor", allow_negative_numbers = true)]
+    #[arg(long, value_name = "C", requires = "sensor")]
     pub(crate) temperature_c: Option<f64>,
     /// Keeps the frames as 16-bit PNG with a descriptor in this folder
     #[arg(long, value_name = "DIR", requires = "sensor")]

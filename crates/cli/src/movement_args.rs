@@ -5,18 +5,19 @@ use dioptric_pipeline::Movements;
 
 /// How the lens is turned about its entrance pupil and moved before the film.
 #[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "Movements of the lens")]
 pub(crate) struct MovementArgs {
     /// Tilts the lens forwards, degrees: it looks down
-    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    #[arg(long, value_name = "A")]
     tilt_deg: Option<f64>,
     /// Swings the lens to the right, degrees
-    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    #[arg(long, value_name = "A")]
     swing_deg: Option<f64>,
     /// Moves the lens up, mm
-    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    #[arg(long, value_name = "D")]
     rise_mm: Option<f64>,
     /// Moves the lens to the right, mm
-    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    #[arg(long, value_name = "D")]
     shift_mm: Option<f64>,
 }
 

@@ -37,61 +37,61 @@ pub(crate) struct RenderArgs {
     /// World to render: .pbrt, .gltf, .glb, .obj or .ply
     pub(crate) world: PathBuf,
     /// Camera file, whose scene the world takes the place of [default: the camera of the world's file]
-    #[arg(long, value_name = "CAMERA.ron")]
+    #[arg(long, value_name = "CAMERA.ron", help_heading = "Lens")]
     pub(crate) camera: Option<PathBuf>,
     /// Lens in place of the camera's, a file or the name of a built-in one
-    #[arg(long, value_name = "LENS")]
+    #[arg(long, value_name = "LENS", help_heading = "Lens")]
     pub(crate) lens: Option<String>,
     #[command(flatten)]
     pub(crate) state: LensStateArgs,
     #[command(flatten)]
     pub(crate) place: FilmArgs,
     /// Horizontal field of view of a world whose file states none, degrees
-    #[arg(long, value_name = "A")]
+    #[arg(long, value_name = "A", help_heading = "World")]
     pub(crate) fov_deg: Option<f64>,
     /// Size of the picture in pixels, e.g. 640x480 [default: that of the camera]
-    #[arg(long, value_name = "WxH")]
+    #[arg(long, value_name = "WxH", help_heading = "Film and sensor")]
     pub(crate) pixels: Option<String>,
     /// Renders a part of the picture: first column and row, columns and rows; without sensor and report
-    #[arg(long, value_name = "X,Y,W,H")]
+    #[arg(long, value_name = "X,Y,W,H", help_heading = "Film and sensor")]
     pub(crate) crop: Option<String>,
     /// Width of the film, mm [default: that of the camera, or what its field of view needs]
-    #[arg(long, value_name = "W")]
+    #[arg(long, value_name = "W", help_heading = "Film and sensor")]
     pub(crate) film_width_mm: Option<f64>,
     /// Diffraction at the stop [default: the camera's]
-    #[arg(long, value_name = "KIND", value_enum)]
+    #[arg(long, value_name = "KIND", value_enum, help_heading = "Simulation")]
     pub(crate) diffraction: Option<RayDiffraction>,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
     /// Sensor, a file or the name of a built-in one
-    #[arg(long, value_name = "SENSOR")]
+    #[arg(long, value_name = "SENSOR", help_heading = "Film and sensor")]
     pub(crate) sensor: Option<String>,
     /// Exposure time, s [default: automatic]
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", help_heading = "Exposure and picture")]
     pub(crate) exposure_s: Option<f64>,
     /// What the picture makes white, as for `run` [default: scene, the light on what is seen]
-    #[arg(long, value_name = "WHITE")]
+    #[arg(long, value_name = "WHITE", help_heading = "Exposure and picture")]
     pub(crate) white: Option<String>,
     /// Length of the file's unit, m
-    #[arg(long, value_name = "M", default_value_t = 1.0)]
+    #[arg(long, value_name = "M", default_value_t = 1.0, help_heading = "World")]
     pub(crate) unit_m: f64,
     /// Follows light over at most so many scatterings: 0 shows what glows, 1 direct light [default: all]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Simulation")]
     pub(crate) bounces: Option<u32>,
     /// Samples a pixel, rounded up to a multiple of 8 [default: 64, unless noise or time is given]
-    #[arg(long, value_name = "N", conflicts_with_all = ["noise", "seconds"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["noise", "seconds"], help_heading = "Simulation")]
     pub(crate) samples: Option<u32>,
     /// Renders until the relative standard error of a pixel over all bands is this, e.g. 0.02
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", help_heading = "Simulation")]
     pub(crate) noise: Option<f64>,
     /// Renders for so long, s, or until the noise is reached where that is given too
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", help_heading = "Simulation")]
     pub(crate) seconds: Option<f64>,
     /// Goes on from where an earlier rendering into the same folder was stopped; the bits are those of one without a stop
-    #[arg(long)]
+    #[arg(long, help_heading = "Results")]
     pub(crate) resume: bool,
     /// Folder for the results
-    #[arg(long, short, value_name = "DIR", default_value = "dioptric-render")]
+    #[arg(long, short, value_name = "DIR", default_value = "dioptric-render", help_heading = "Results")]
     pub(crate) out: PathBuf,
 }
 

@@ -11,7 +11,7 @@ use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_pipeline::{
     BankSpec, BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FocusSpec, FrameFile, FramesSpec,
     ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, SceneSpec, SensorOptions, SensorSpec,
-    Stage, Staged, StopSpec, WavelengthSpec, parse_illuminant, parse_numbers, with_exposure_s,
+    Silent, Stage, Staged, StopSpec, WavelengthSpec, parse_illuminant, parse_numbers, with_exposure_s,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
@@ -85,7 +85,28 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera>
         QualityKind::Draft => Quality::Draft,
         QualityKind::Full => Quality::Full,
     };
-    Ok(kept.with(|own| *own = camera).with_quality(quality).with_paintings(painting_folder()))
+    let kept = kept.with(|own| *own = camera).with_quality(quality).with_paintings(painting_folder());
+    let film = film_of(&kept, arguments)?;
+    Ok(kept.with(|own| own.film = film))
+}
+
+/// Returns the film with the pixels asked for; where only their number or their pitch is, the film stays as large as it is.
+fn film_of(kept: &KeptCamera, arguments: &RunArgs) -> anyhow::Result<FilmSpec> {
+    let size = arguments.pixels.as_deref().map(parse_size).transpose()?;
+    let size_um = || kept.film_size_mm(&Silent, &Cancel::new()).map(|size_mm| size_mm.map(|mm| 1e3 * mm));
+    Ok(match (size, arguments.pixel_um) {
+        (None, None) => kept.camera().film,
+        (Some((columns, rows)), Some(pitch_um)) => FilmSpec::Pixels { columns, rows, pitch_um },
+        (Some((columns, rows)), None) => {
+            let [width_um, height_um] = size_um()?;
+            // The whole of the new film lies within the old one.
+            FilmSpec::Pixels { columns, rows, pitch_um: (width_um / columns as f64).min(height_um / rows as f64) }
+        }
+        (None, Some(pitch_um)) => {
+            let [columns, rows] = size_um()?.map(|um| (um / pitch_um).round().max(1.0) as usize);
+            FilmSpec::Pixels { columns, rows, pitch_um }
+        }
+    })
 }
 
 /// Changes what the demo has for its own lens and scene alone: the film and the name, and with the scene focus and bands.
@@ -188,14 +209,6 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
         if arguments.scene.is_none() {
             camera.film = FilmSpec::Sensor;
         }
-    }
-    match (&arguments.pixels, arguments.pixel_um) {
-        (None, None) => {}
-        (Some(size), Some(pitch_um)) => {
-            let (columns, rows) = parse_size(size)?;
-            camera.film = FilmSpec::Pixels { columns, rows, pitch_um };
-        }
-        _ => bail!("--pixels and --pixel-um go together"),
     }
     if let Some(frames) = frames_of(&arguments.frames)? {
         camera.frames = frames;
@@ -310,20 +323,58 @@ impl Progress for Clock {
 
 #[cfg(test)]
 mod tests {
-    use clap::Parser;
+    use approx::assert_relative_eq;
 
     use super::*;
     use crate::args::{Cli, Command};
 
-    fn camera(options: &[&str]) -> Camera {
-        let cli = Cli::parse_from([&["dioptric", "run"], options].concat());
+    fn try_camera(options: &[&str]) -> anyhow::Result<Camera> {
+        let cli = Cli::read([&["dioptric", "run"], options].concat())?;
         let Command::Run(arguments) = &cli.command else { panic!("another command") };
-        camera_of(arguments, &cli.common).unwrap().camera().clone()
+        let kept = camera_of(arguments, &cli.common)?;
+        kept.camera().validate()?;
+        Ok(kept.camera().clone())
+    }
+
+    fn camera(options: &[&str]) -> Camera {
+        try_camera(options).unwrap()
     }
 
     #[test]
     fn the_demo_is_itself_until_something_is_changed() {
         assert_eq!(camera(&[]), Camera::demo().unwrap());
+    }
+
+    #[track_caller]
+    fn check_film(options: &[&str], expected: (usize, usize), expected_um: f64) {
+        let FilmSpec::Pixels { columns, rows, pitch_um } = camera(options).film else { panic!("a film of no size") };
+        assert_eq!((columns, rows), expected, "{options:?}");
+        assert_relative_eq!(pitch_um, expected_um, max_relative = 1e-12);
+    }
+
+    /// The demo's film is 960 × 640 pixels of 33 µm, 31.68 × 21.12 mm; the sensor imx363 has 4032 × 3024 of 1.4 µm.
+    #[test]
+    fn film_keeps_its_size_under_other_pixels() {
+        check_film(&["--pixels", "480x320"], (480, 320), 66.0);
+        // What is taller or wider than the film lies within it.
+        check_film(&["--pixels", "320x320"], (320, 320), 66.0);
+        check_film(&["--pixels", "960x320"], (960, 320), 33.0);
+        check_film(&["--pixel-um", "66"], (480, 320), 66.0);
+        check_film(&["--pixels", "100x50", "--pixel-um", "2"], (100, 50), 2.0);
+        check_film(&["--sensor", "imx363", "--pixels", "403x302"], (403, 302), 1.4 * 4032.0 / 403.0);
+    }
+
+    #[test]
+    fn pixels_that_cannot_be_are_named() {
+        for (options, word) in [
+            (["--pixels", "0x4"], "columns"),
+            (["--pixel-um", "-2"], "pitch_um"),
+            (["--pixel-um", "1e-9"], "columns"),
+            (["--pixels", "4"], "WxH"),
+        ] {
+            let message = try_camera(&options).unwrap_err().to_string();
+            assert!(message.contains(word), "{options:?}: {message}");
+        }
     }
 
     #[test]

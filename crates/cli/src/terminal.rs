@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use dioptric_pipeline::{PipelineError, Staged};
+use dioptric_pipeline::{PipelineError, SceneLack, Staged};
 use dioptric_report::{DRAWS_PNG, PNG_REMEDY};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -58,15 +58,23 @@ pub(crate) fn output_error(error: io::Error) -> anyhow::Error {
 
 /// Prints an error and its causes as one sentence on one line.
 pub(crate) fn print_error(error: &anyhow::Error) {
-    let is_without_image = |cause: &PipelineError| cause.is_without_image();
-    let remedy = match error.chain().filter_map(|cause| cause.downcast_ref()).any(is_without_image) {
-        true => "; place the film with --film-mm, its distance behind the last vertex",
-        false => "",
-    };
+    let remedy = error.chain().filter_map(|cause| cause.downcast_ref()).find_map(remedy).unwrap_or_default();
     let sentence = format!("{error:#}{remedy}");
     let words: Vec<&str> = sentence.split_whitespace().collect();
     // Standard error may be closed too; then there is nobody to tell.
     let _ = writeln!(io::stderr(), "error: {}", words.join(" "));
+}
+
+/// Returns the words of the command line that mend an error, where it has any.
+fn remedy(error: &PipelineError) -> Option<&'static str> {
+    if error.is_without_image() {
+        return Some("; place the film with --film-mm, its distance behind the last vertex");
+    }
+    Some(match error.scene_lack()? {
+        SceneLack::Depth => " (--depth-m, or depth_m of the camera file)",
+        SceneLack::View => " (--fov-deg, or field_of_view_deg of the camera file)",
+        SceneLack::DepthAndView => " (--depth-m and --fov-deg, or depth_m and field_of_view_deg of the camera file)",
+    })
 }
 
 /// Prints a remark, unless the user wants none.

@@ -8,7 +8,7 @@ use dioptric_pipeline::Staged;
 
 use crate::{
     args::{Common, TraceArgs},
-    terminal::{guarded, output_error},
+    terminal::{guarded, output_error, remark},
 };
 
 pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> {
@@ -24,7 +24,9 @@ pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> 
     let staged = guarded(Staged::file(path)?);
     let file = create(staged.path())?;
     rays.trace(&lens, &settings, io::BufWriter::new(file))?;
-    Ok(staged.commit()?)
+    staged.commit()?;
+    remark(common.quiet, &format!("wrote {}", path.display()));
+    Ok(())
 }
 
 fn create(path: &Path) -> anyhow::Result<File> {

@@ -92,8 +92,13 @@ fn missing_depth_and_view_are_asked_for() {
     let picture = image_of_one_color();
     fs::write(folder.path().join("scene.png"), picture).unwrap();
     let run = ["run", "camera.ron", "--scene", "scene.png", "--out", "out"];
-    check_error(folder.path(), &[&run[..], &["--fov-deg", "12"]].concat(), &["scene.png", "depth"]);
-    check_error(folder.path(), &[&run[..], &["--depth-m", "2"]].concat(), &["scene.png", "field of view"]);
+    check_error(folder.path(), &[&run[..], &["--fov-deg", "12"]].concat(), &["scene.png", "depth", "(--depth-m,"]);
+    check_error(
+        folder.path(),
+        &[&run[..], &["--depth-m", "2"]].concat(),
+        &["scene.png", "field of view", "(--fov-deg,"],
+    );
+    check_error(folder.path(), &run, &["scene.png", "neither", "--depth-m and --fov-deg"]);
     output(folder.path(), &[&run[..], &["--fov-deg", "12", "--depth-m", "2", "--quiet"]].concat());
     assert!(folder.path().join("out/picture.png").exists());
 }

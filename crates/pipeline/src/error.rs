@@ -15,7 +15,7 @@ use dioptric_world::WorldError;
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
     /// A list of numbers that cannot be read.
-    #[error("{what}: '{item}' is neither a number nor a range first:last:step")]
+    #[error("{what}: '{item}' is neither a number nor a range first:last:step whose step leads from first to last")]
     List {
         /// What the list was for.
         what: &'static str,
@@ -151,6 +151,29 @@ impl PipelineError {
                 | Self::Backward(BackwardError::Write { .. })
                 | Self::Forward(ForwardError::Sink { .. })
         )
+    }
+}
+
+/// What a scene lacks that may be given beside it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SceneLack {
+    /// Its depth.
+    Depth,
+    /// Its camera data.
+    View,
+    /// Both.
+    DepthAndView,
+}
+
+impl PipelineError {
+    /// Returns what the scene lacks that may be given beside it, where that is what is wrong.
+    pub fn scene_lack(&self) -> Option<SceneLack> {
+        match self {
+            Self::Scene(SceneError::MissingDepth { .. }) => Some(SceneLack::Depth),
+            Self::Scene(SceneError::MissingView { .. }) => Some(SceneLack::View),
+            Self::Scene(SceneError::MissingDepthAndView { .. }) => Some(SceneLack::DepthAndView),
+            _ => None,
+        }
     }
 }
 

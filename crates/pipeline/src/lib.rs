@@ -34,7 +34,7 @@ pub use camera::{
     SensorOptions, SensorSpec, StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
 pub use capture_files::write_capture;
-pub use error::PipelineError;
+pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_numbers, parse_pairs};

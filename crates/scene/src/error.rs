@@ -93,7 +93,9 @@ pub enum SceneError {
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
     /// A scene without the depth that the next stage needs.
-    #[error("{name}: the scene has no depth: give one, in metres, or add a channel 'Z' to its file")]
+    #[error(
+        "{name}: the scene has no depth: give one, in metres, or add a channel 'Z' to its file, or a NAME.depth.png"
+    )]
     MissingDepth {
         /// The scene.
         name: String,
@@ -111,6 +113,14 @@ pub enum SceneError {
     /// A scene without camera data that the next stage needs.
     #[error("{name}: the scene has no camera data: give its horizontal field of view in degrees")]
     MissingView {
+        /// The scene.
+        name: String,
+    },
+    /// A scene that has neither depth nor camera data.
+    #[error(
+        "{name}: the scene has neither depth nor camera data: give a depth, in metres, and its horizontal field of view in degrees"
+    )]
+    MissingDepthAndView {
         /// The scene.
         name: String,
     },

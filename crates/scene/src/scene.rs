@@ -89,6 +89,19 @@ impl Scene {
         self.view.ok_or_else(|| SceneError::MissingView { name: self.name.clone() })
     }
 
+    /// Checks that the scene has both a depth and a view.
+    ///
+    /// # Errors
+    /// Names what is missing, both where both are.
+    pub fn require_depth_and_view(&self) -> Result<(), SceneError> {
+        if self.depth.is_none() && self.view.is_none() {
+            return Err(SceneError::MissingDepthAndView { name: self.name.clone() });
+        }
+        self.require_depth()?;
+        self.require_view()?;
+        Ok(())
+    }
+
     /// Checks that every part fits the others and every sample is finite and not negative.
     ///
     /// # Errors

@@ -19,7 +19,8 @@ use crate::{PaintingFolder, PipelineError};
 pub struct SceneSpec {
     /// Where its radiance comes from.
     pub source: SceneSource,
-    /// Horizontal field of view from edge to edge, degrees; for files that hold no camera data, and for targets.
+    /// Horizontal field of view from edge to edge, degrees; for files that hold no camera data, for targets, and for the still
+    /// life, whose own is 34.
     #[serde(default)]
     pub field_of_view_deg: Option<f64>,
     /// One depth for the whole scene, m; for files that hold no depth, and for targets.
@@ -170,7 +171,9 @@ impl SceneSpec {
                 return Err(PipelineError::Unsuitable { what: "scene", reason });
             }
             SceneSource::StillLife { columns, rows } => {
-                let (life, grid) = (StillLife::new(*columns, *rows), own_or()?);
+                let usual = StillLife::new(*columns, *rows);
+                let horizontal_fov_deg = self.field_of_view_deg.unwrap_or(usual.horizontal_fov_deg);
+                let (life, grid) = (StillLife { horizontal_fov_deg, ..usual }, own_or()?);
                 match paintings {
                     Some(folder) => folder.scene(&life, &grid, progress, cancel)?,
                     None => life.scene_with(&grid, progress, cancel)?,
@@ -220,8 +223,7 @@ impl SceneSpec {
         if self.illuminant.is_some() || self.illuminance_lux.is_some() {
             scene.relight(self.illuminant.as_ref(), self.illuminance_lux)?;
         }
-        scene.require_depth()?;
-        scene.require_view()?;
+        scene.require_depth_and_view()?;
         if let Some(wanted_cd_m2) = self.mean_luminance_cd_m2 {
             scene.scale(wanted_cd_m2 / scene.mean_luminance_cd_m2())?;
         }

@@ -21,7 +21,7 @@ use super::{
     slot::Slot,
     spec::{
         BankInputs, ElectronInputs, FilmInputs, FrameInputs, GeometryInputs, IrradianceInputs, LensInputs,
-        PictureInputs, PlanInputs, SceneInputs, WorldInputs,
+        PictureInputs, PlanInputs, Raster, SceneInputs, WorldInputs,
     },
     world::{self, WorldRender},
 };
@@ -365,6 +365,18 @@ impl KeptCamera {
         };
         self.kept.irradiance.put(inputs, Irradiance::of_image(picture, pitch_um));
         Ok(())
+    }
+
+    /// Returns the width and the height of the film, mm; of a film that has the scene's size, the scene is opened for it.
+    ///
+    /// # Errors
+    /// As [`capture`](Self::capture) has them before it traces the lens.
+    pub fn film_size_mm(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<[f64; 2], PipelineError> {
+        let film = match self.irradiance_inputs()?.plan.bank.film.raster {
+            Raster::Pixels(film) => film,
+            Raster::Scene => self.lens_and_film(progress, cancel)?.1.film(),
+        };
+        Ok([film.columns, film.rows].map(|n| 1e-3 * film.pitch_um * n as f64))
     }
 
     /// Returns the lens and the film behind it.

@@ -1,6 +1,6 @@
 //! A run continued from its folder: what it imaged is taken from there as long as nothing before it changed.
 
-use std::{fs, path::Path};
+use std::{fs, io, path::Path};
 
 use dioptric_scene::read_planes_exr;
 use dioptric_spectrum::DepthMap;
@@ -71,7 +71,12 @@ impl KeptCamera {
     pub fn resume(folder: &Path) -> Result<Resumed, PipelineError> {
         let path = folder.join(RESUME_FILE);
         let unreadable = |reason: String| PipelineError::Read { path: path.clone(), reason };
-        let text = fs::read_to_string(&path).map_err(|e| unreadable(e.to_string()))?;
+        let text = fs::read_to_string(&path).map_err(|e| match e.kind() {
+            io::ErrorKind::NotFound => {
+                unreadable("expected the folder of a run of full quality that wrote its irradiance".to_owned())
+            }
+            _ => unreadable(e.to_string()),
+        })?;
         let kept: Kept = ron::from_str(&text).map_err(|e| PipelineError::Syntax {
             path: path.clone(),
             line: e.span.start.line,

@@ -19,6 +19,9 @@ struct CameraFile {
     fy_px: f64,
     cx_px: f64,
     cy_px: f64,
+    /// How far one code of the depth beside the picture stands for, m.
+    #[serde(default)]
+    depth_unit_m: Option<f64>,
 }
 
 /// Endings of a picture's stem that its camera file does not repeat.
@@ -29,9 +32,7 @@ const PARTS: [&str; 4] = [".radiance_depth", ".radiance", ".reflectance", ".dept
 /// For `a_1.radiance_depth.exr` the names looked for are `a_1.camera.json`, `a_1_camera.json` and `a_camera.json`.
 /// Where the file speaks of a picture a whole number of times larger, samples are taken to have been merged.
 pub(crate) fn view_beside(picture: &Path, rows: usize, columns: usize) -> Result<Option<View>, SceneError> {
-    let Some(path) = candidates(picture).into_iter().find(|path| path.is_file()) else { return Ok(None) };
-    let text = fs::read_to_string(&path).map_err(|error| unreadable(&path, error))?;
-    let camera: CameraFile = serde_json::from_str(&text).map_err(|error| unreadable(&path, error))?;
+    let Some((path, camera)) = read_beside(picture)? else { return Ok(None) };
     let wrong = |reason: String| Err(unreadable(&path, reason));
     if (camera.fx_px - camera.fy_px).abs() > 1e-3 * camera.fx_px.abs() {
         return wrong(format!("fx_px {} and fy_px {} differ: expected square samples", camera.fx_px, camera.fy_px));
@@ -52,12 +53,35 @@ pub(crate) fn view_beside(picture: &Path, rows: usize, columns: usize) -> Result
     Ok(Some(view.binned(factor)))
 }
 
+/// Returns how far one code of the depth beside a picture stands for, m, where the camera file beside it says so.
+pub(super) fn depth_unit_beside(picture: &Path) -> Result<Option<f64>, SceneError> {
+    let Some((path, camera)) = read_beside(picture)? else { return Ok(None) };
+    match camera.depth_unit_m {
+        Some(unit_m) if !(unit_m.is_finite() && unit_m > 0.0) => {
+            Err(unreadable(&path, format!("depth_unit_m is {unit_m}, expected a length above 0")))
+        }
+        unit_m => Ok(unit_m),
+    }
+}
+
+fn read_beside(picture: &Path) -> Result<Option<(PathBuf, CameraFile)>, SceneError> {
+    let Some(path) = candidates(picture).into_iter().find(|path| path.is_file()) else { return Ok(None) };
+    let text = fs::read_to_string(&path).map_err(|error| unreadable(&path, error))?;
+    let camera = serde_json::from_str(&text).map_err(|error| unreadable(&path, error))?;
+    Ok(Some((path, camera)))
+}
+
 fn candidates(picture: &Path) -> Vec<PathBuf> {
+    beside(picture, &[".camera.json", "_camera.json"])
+}
+
+/// Returns the names beside a picture that its stem, and the part of it before the last underscore, have with these endings.
+pub(super) fn beside(picture: &Path, endings: &[&str]) -> Vec<PathBuf> {
     let stem = picture.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let stem = PARTS.iter().find_map(|part| stem.strip_suffix(part)).unwrap_or(&stem);
-    let mut names = vec![format!("{stem}.camera.json"), format!("{stem}_camera.json")];
+    let mut names: Vec<String> = endings.iter().map(|ending| format!("{stem}{ending}")).collect();
     if let Some((first, _)) = stem.rsplit_once('_') {
-        names.push(format!("{first}_camera.json"));
+        names.extend(endings.iter().filter(|ending| ending.starts_with('_')).map(|ending| format!("{first}{ending}")));
     }
     names.into_iter().map(|name| picture.with_file_name(name)).collect()
 }

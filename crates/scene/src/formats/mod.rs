@@ -4,6 +4,7 @@ mod band_folder;
 mod band_name;
 mod beside;
 mod camera;
+mod depth_picture;
 mod envi;
 mod envi_header;
 mod exr_attributes;

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use dioptric_spectrum::{Display, Illuminant, Quantity, SpectralImage, Spectrum, WavelengthGrid};
 
-use super::{camera::view_beside, read_band_folder, read_envi, read_picture, read_spectral_exr};
+use super::{
+    camera::view_beside, depth_picture::depth_beside, read_band_folder, read_envi, read_picture, read_spectral_exr,
+};
 use crate::{HiddenLayer, Scene, SceneError, SceneLight, View, reflectance_under, resampled};
 
 /// What a file may leave open.
@@ -47,8 +49,10 @@ impl Default for ReadOptions {
 /// Reads a scene from a spectral EXR (`.exr`), an ENVI header (`.hdr`), a folder with a picture a band, or an
 /// ordinary picture (`.png`, `.jpg`, `.tif`).
 ///
-/// Camera data comes from the options, else from the file, else from a `NAME.camera.json` beside it. Depth and view
-/// may still be absent afterwards: [`Scene::require_depth`] and [`Scene::require_view`] say so.
+/// Camera data comes from the options, else from the file, else from a `NAME.camera.json` beside it; depth from the file, else
+/// from a gray 16-bit `NAME.depth.png` beside it (millimetres, or what `depth_unit_m` of the camera file says; 0 where it was
+/// not measured), else from the options. Depth and view may still be absent afterwards: [`Scene::require_depth_and_view`] says
+/// so.
 ///
 /// # Errors
 /// One sentence with the file's name when anything in it is wrong, or its bands do not cover those wanted.
@@ -122,8 +126,12 @@ fn finish(path: &Path, name: String, contents: Contents, options: &ReadOptions) 
         Quantity::Reflectance => Some(SceneLight::new(options.light.clone(), options.illuminance_lux)),
         _ => contents.light,
     };
+    let depth = match contents.depth {
+        Some(depth) => Some(depth),
+        None => depth_beside(path, contents.image.rows(), contents.image.columns())?,
+    };
     let radiance = lit(contents.image, options)?;
-    let scene = Scene { name, radiance, depth: contents.depth, view, hidden, light };
+    let scene = Scene { name, radiance, depth, view, hidden, light };
     let scene = match options.depth_m {
         Some(depth_m) => scene.or_flat_depth_m(depth_m)?,
         None => scene,
