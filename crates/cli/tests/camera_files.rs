@@ -7,7 +7,12 @@ use std::{
 };
 
 fn dioptric(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_dioptric")).current_dir(folder).args(arguments).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_dioptric"))
+        .env("DIOPTRIC_CACHE", "")
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .unwrap()
 }
 
 fn text(folder: &Path, arguments: &[&str]) -> String {

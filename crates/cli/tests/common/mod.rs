@@ -22,6 +22,7 @@ pub(crate) const CAMERA: &str = r#"(
 /// Runs `dioptric` with these arguments in a folder.
 pub(crate) fn dioptric(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_dioptric"))
+        .env("DIOPTRIC_CACHE", "")
         .args(arguments)
         .current_dir(folder)
         .output()
