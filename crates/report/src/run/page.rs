@@ -42,12 +42,17 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
 fn picture(page: &Page<'_>) -> Result<String, PipelineError> {
     let picture = &page.run.capture.developed.picture;
     let (columns, rows) = (picture.columns(), picture.rows());
-    let factor = (1..).find(|factor| columns.div_ceil(*factor) * rows.div_ceil(*factor) <= WHOLE_PIXELS).unwrap_or(1);
+    let factor = factor_of(columns, rows);
     if factor == 1 {
         return Ok(data_uri(page.picture_png));
     }
     let whole = RgbImage::from_raw(columns as u32, rows as u32, picture.to_rgb8()).unwrap_or_default();
     Ok(data_uri(&png_bytes(&shrunk(&whole, factor as u32))?))
+}
+
+/// Returns how many pixels of a picture are one in the page, each way.
+fn factor_of(columns: usize, rows: usize) -> usize {
+    (1..).find(|factor| (columns / factor) * (rows / factor) <= WHOLE_PIXELS).unwrap_or(1)
 }
 
 fn data_uri(png: &[u8]) -> String {
@@ -139,4 +144,18 @@ fn shrunk(picture: &RgbImage, factor: u32) -> RgbImage {
         (picture.height() / factor).max(1),
         image::imageops::FilterType::Triangle,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn page_holds_small_pictures_whole_and_large_ones_smaller() {
+        assert_eq!((factor_of(960, 640), factor_of(1, 700_000), factor_of(1, 700_001)), (1, 1, 2));
+        assert_eq!((factor_of(4000, 3000), factor_of(1216, 832)), (5, 2));
+        let picture = RgbImage::from_fn(40, 30, |x, _| image::Rgb([if x < 20 { 0 } else { 200 }; 3]));
+        let small = shrunk(&picture, 5);
+        assert_eq!((small.dimensions(), small[(0, 3)].0, small[(7, 3)].0), ((8, 6), [0; 3], [200; 3]));
+    }
 }
