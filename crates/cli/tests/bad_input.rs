@@ -103,6 +103,13 @@ fn missing_depth_and_view_are_asked_for() {
     assert!(folder.path().join("out/picture.png").exists());
 }
 
+#[test]
+fn only_runs_of_full_quality_are_continued() {
+    let folder = folder();
+    output(folder.path(), &["run", "camera.ron", "--quality", "preview", "--out", "look", "--quiet"]);
+    check_error(folder.path(), &["run", "--from", "look", "--out", "on"], &["look/kept.ron", "full quality"]);
+}
+
 /// A picture that the program itself made.
 fn image_of_one_color() -> Vec<u8> {
     let other = folder();

@@ -12,8 +12,8 @@ use std::{
 use approx::assert_relative_eq;
 use common::output;
 use dioptric_pipeline::{
-    BankData, BankSpec, Camera, Capture, FilmSpec, FramesSpec, KeptCamera, RenderEffort, SceneSource, Silent,
-    WavelengthSpec, with_exposure_s,
+    BankData, BankSpec, Camera, Capture, FilmSpec, FramesSpec, KeptCamera, RenderEffort, SceneSource, SceneSpec,
+    Silent, WavelengthSpec, with_exposure_s,
 };
 use dioptric_spectrum::Cancel;
 use serde_json::Value;
@@ -130,6 +130,19 @@ fn edge_of_known_blur_has_its_mtf() {
     let expected = (0.5 * 2_f64.ln()).sqrt() / (0.8 * std::f64::consts::PI);
     // A slanted edge of 64 samples shows it to half a percent.
     assert_relative_eq!(found, expected, max_relative = 5e-3);
+}
+
+#[test]
+fn still_life_is_as_wide_as_asked() {
+    let grid = dioptric_spectrum::WavelengthGrid::new(vec![550.0]).unwrap();
+    let width_deg = |field_of_view_deg: Option<f64>| {
+        let source = SceneSource::StillLife { columns: 12, rows: 8 };
+        let spec = SceneSpec { source, field_of_view_deg, ..SceneSpec::of_file(PathBuf::new()) };
+        spec.open(Some(&grid)).unwrap().require_view().unwrap().horizontal_fov_deg(12)
+    };
+    // The arrangement is made for 34 degrees.
+    assert_relative_eq!(width_deg(None), 34.0, max_relative = 1e-12);
+    assert_relative_eq!(width_deg(Some(58.0)), 58.0, max_relative = 1e-12);
 }
 
 #[test]
