@@ -110,6 +110,8 @@ pub struct NoiseData {
     pub dark_current_by_mean_e_per_s: Option<f64>,
     /// The dark current from the rise of the variance.
     pub dark_current_by_variance_e_per_s: Option<f64>,
+    /// By how much the bench raised the black level, DN, so that it does not cut off the noise of darkness; 0 for frames from files.
+    pub raised_black_dn: u16,
     /// What the sensor's data sheet says of the same; none for frames from files.
     pub data_sheet: Option<NoiseDataSheet>,
     /// The points of the photon transfer, darkness first.
@@ -192,7 +194,8 @@ pub fn measure_bench(request: &BenchRequest, frames_folder: Option<&Path>) -> Re
         fs::write(&path, text).map_err(|e| PipelineError::Write { path, reason: e.to_string() })?;
     }
     let data = collected.analyze(sensor.name.clone())?;
-    Ok(NoiseData { filter: Some(bench.filter().to_owned()), data_sheet: Some(data_sheet(&bench)), ..data })
+    let (filter, raised_black_dn) = (Some(bench.filter().to_owned()), bench.raised_black_dn());
+    Ok(NoiseData { filter, raised_black_dn, data_sheet: Some(data_sheet(&bench)), ..data })
 }
 
 /// Measures the frames that a descriptor file lists, or of a folder.
@@ -356,6 +359,7 @@ impl Collected {
             prnu_percent: uniformity.map(|u| 100.0 * u.prnu_fraction),
             dark_current_by_mean_e_per_s: current.map(|c| c.by_mean_e_per_s),
             dark_current_by_variance_e_per_s: current.map(|c| c.by_variance_e_per_s),
+            raised_black_dn: 0,
             data_sheet: None,
             points: noise_points(&transfer, are_counted),
         })
