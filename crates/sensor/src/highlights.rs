@@ -47,6 +47,9 @@ impl Highlights {
 const SPILL_PX: usize = 2;
 /// A rebuilt channel is at most so many times its saturation.
 const MOST: f32 = 16.0;
+/// Surroundings tell the color of what is blown altogether where they are part of its glow: not at all up to the first of these
+/// shares of saturation, by their largest channel, and fully from the second on. What is blown before a dim wall is white.
+const GLOW: [f32; 2] = [0.3, 0.5];
 
 /// Which channels are saturated in or next to each pixel, a bit a channel.
 pub(crate) struct Saturated {
@@ -90,9 +93,9 @@ fn spread(bits: &Array2<u32>) -> Array2<u32> {
 
 /// Rebuilds the saturated channels of balanced light; `levels` is the balanced saturation of each channel.
 pub(crate) fn reconstruct(channels: &mut [Array2<f32>], saturated: &Saturated, levels: &[f64]) {
-    let colors = surrounding_colors(channels, saturated);
-    let (rows, columns) = saturated.bits.dim();
     let levels: Vec<f32> = levels.iter().map(|&level| level as f32).collect();
+    let colors = surrounding_colors(channels, saturated, &levels);
+    let (rows, columns) = saturated.bits.dim();
     let mut lines: Vec<Vec<&mut [f32]>> = (0..rows).map(|_| Vec::with_capacity(channels.len())).collect();
     for channel in channels.iter_mut() {
         let all = channel.as_slice_mut().expect("demosaiced planes are contiguous");
@@ -102,8 +105,8 @@ pub(crate) fn reconstruct(channels: &mut [Array2<f32>], saturated: &Saturated, l
         for column in 0..columns {
             let bits = saturated.bits[(row, column)];
             if bits != 0 {
-                let color = colors.at(row, column);
                 let is_saturated = |k: usize| bits >> k & 1 == 1;
+                let color = colors.at(row, column, (0..line.len()).all(is_saturated));
                 let scale = scale(&line, column, &color, &levels, &is_saturated);
                 for (k, line) in line.iter_mut().enumerate().filter(|(k, _)| is_saturated(*k)) {
                     line[column] = (scale * color[k]).min(MOST * levels[k]).max(line[column]);
@@ -138,33 +141,38 @@ fn scale(
 struct Colors {
     columns: usize,
     n_channels: usize,
-    /// For each place the channels, which sum to 1.
+    /// For each place the channels, which sum to 1, and how far they tell the color of what is blown altogether, 0 to 1.
     values: Vec<f32>,
 }
 
 impl Colors {
-    fn at(&self, row: usize, column: usize) -> Vec<f32> {
-        let first = ((row / 2) * self.columns + column / 2) * self.n_channels;
-        self.values[first..first + self.n_channels].to_vec()
+    /// Returns the color about a place; where all of it is blown, white as far as the surroundings do not tell.
+    fn at(&self, row: usize, column: usize, is_all_blown: bool) -> Vec<f32> {
+        let n = self.n_channels;
+        let first = ((row / 2) * self.columns + column / 2) * (n + 1);
+        let (color, told) = (&self.values[first..first + n], self.values[first + n]);
+        let told = if is_all_blown { told } else { 1.0 };
+        color.iter().map(|v| told * v + (1.0 - told) / n as f32).collect()
     }
 }
 
-/// One level of the pyramid: for each place the sums of the channels and of the weights.
+/// One level of the pyramid: for each place the sums of the channels and of their weights.
 struct Level {
     rows: usize,
     columns: usize,
     sums: Vec<f32>,
 }
 
-fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated) -> Colors {
+fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated, levels: &[f32]) -> Colors {
     let n = channels.len();
+    let n_sums = n + 1;
     // The color at a place is the mean of light weighted by the square of its brightness: bright surroundings are those
     // of what is blown.
     let (rows, columns) = saturated.bits.dim();
     let (half_rows, half_columns) = (rows.div_ceil(2), columns.div_ceil(2));
-    let mut sums = vec![0.0_f32; half_rows * half_columns * n];
-    sums.par_chunks_mut(half_columns * n).enumerate().for_each(|(half_row, line)| {
-        for (half_column, place) in line.chunks_exact_mut(n).enumerate() {
+    let mut sums = vec![0.0_f32; half_rows * half_columns * n_sums];
+    sums.par_chunks_mut(half_columns * n_sums).enumerate().for_each(|(half_row, line)| {
+        for (half_column, place) in line.chunks_exact_mut(n_sums).enumerate() {
             for row in 2 * half_row..(2 * half_row + 2).min(rows) {
                 for column in 2 * half_column..(2 * half_column + 2).min(columns) {
                     if saturated.bits[(row, column)] == 0 {
@@ -172,6 +180,7 @@ fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated) -> Colors
                         for (sum, plane) in place.iter_mut().zip(channels) {
                             *sum += brightness * brightness * plane[(row, column)].max(0.0);
                         }
+                        place[n] += brightness * brightness;
                     }
                 }
             }
@@ -180,17 +189,21 @@ fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated) -> Colors
     let mut pyramid = vec![Level { rows: half_rows, columns: half_columns, sums }];
     while pyramid.last().is_some_and(|level| level.rows > 1 || level.columns > 1) {
         let finer = &pyramid[pyramid.len() - 1];
-        pyramid.push(finer.halved(n));
+        pyramid.push(finer.halved(n_sums));
     }
     // From the coarsest down, places without light take the color of the place above them.
     for index in (0..pyramid.len() - 1).rev() {
         let (finer, coarser) = pyramid.split_at_mut(index + 1);
-        finer[index].fill_from(&coarser[0], n);
+        finer[index].fill_from(&coarser[0], n_sums);
     }
     let Level { columns, sums: mut values, .. } = pyramid.swap_remove(0);
-    values.par_chunks_exact_mut(n).for_each(|place| {
-        let sum: f32 = place.iter().sum();
-        place.iter_mut().for_each(|v| *v = if sum > 0.0 { *v / sum } else { 1.0 / n as f32 });
+    values.par_chunks_exact_mut(n_sums).for_each(|place| {
+        let (color, told) = place.split_at_mut(n);
+        let (sum, weight): (f32, f32) = (color.iter().sum(), told[0]);
+        let share = color.iter().zip(levels).map(|(sum, level)| sum / (weight * level)).fold(0.0, f32::max);
+        let part = ((share - GLOW[0]) / (GLOW[1] - GLOW[0])).clamp(0.0, 1.0);
+        told[0] = if weight > 0.0 { part * part * (3.0 - 2.0 * part) } else { 0.0 };
+        color.iter_mut().for_each(|v| *v = if sum > 0.0 { *v / sum } else { 1.0 / n as f32 });
     });
     Colors { columns, n_channels: n, values }
 }
@@ -286,6 +299,22 @@ mod tests {
         reconstruct(&mut channels, &saturated, &levels);
         let [r, g, b] = dimmed([0, 1, 2].map(|k| channels[k][(30, 40)]));
         assert!(r == 1.0 && (g - 0.5).abs() < 0.05 && (b - 0.19).abs() < 0.04, "{r} {g} {b}");
+    }
+
+    /// The teal of a wall says nothing of the bulb before it.
+    #[test]
+    fn all_blown_before_a_dim_wall_is_white() {
+        let wall = [0.12, 0.2, 0.21];
+        let mut channels =
+            [0, 1, 2].map(|k| {
+                Array2::from_shape_fn((60, 80), |(r, c)| {
+                    if (r as f32 - 29.5).hypot(c as f32 - 39.5) < 9.0 { 1.0 } else { wall[k] }
+                })
+            });
+        let saturated = Saturated::find(&channels, None, 3, 0.999).unwrap();
+        reconstruct(&mut channels, &saturated, &[1.0; 3]);
+        assert_eq!(dimmed([0, 1, 2].map(|k| channels[k][(30, 40)])), [1.0; 3]);
+        assert_eq!([0, 1, 2].map(|k| channels[k][(5, 5)]), wall);
     }
 
     #[test]
