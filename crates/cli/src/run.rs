@@ -23,6 +23,9 @@ use crate::{
     terminal::{Bar, guarded, print, print_json, remark},
 };
 
+/// The share of a film without light that is worth a word.
+const LEAST_DARK: f64 = 1e-3;
+
 /// Where results go when nothing else is asked for.
 const OUT: &str = "dioptric-out";
 
@@ -46,6 +49,12 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     drop(clock);
     tell(&capture.lens.notes, common);
     tell(&report.sensor.notes, common);
+    if report.film.dark_fraction > LEAST_DARK {
+        let percent = 100.0 * report.film.dark_fraction;
+        let words = "where that is not black in the scene, the lens shows less of it than the film is large: take a smaller \
+                     film or a wider scene";
+        remark(common.quiet, &format!("{percent:.1} % of the film gets no light; {words}"));
+    }
     if common.json {
         return print_json(&report);
     }

@@ -3,7 +3,7 @@
 mod charts;
 mod statistics;
 
-use dioptric_pipeline::{BankData, Camera, Capture, PipelineError};
+use dioptric_pipeline::{BankData, Camera, Capture, PipelineError, display::LinearRgb};
 use dioptric_psf::LensImageModel;
 use dioptric_scene::SceneLight;
 use dioptric_spectrum::{ColorTemperature, DepthMap};
@@ -78,6 +78,19 @@ pub struct FilmData {
     pub rows: usize,
     /// Distance between pixels, µm.
     pub pitch_um: f64,
+    /// The share of pixels that get no light: beyond the scene, or beyond what the lens sees.
+    pub dark_fraction: f64,
+}
+
+/// Returns the share of pixels that get next to nothing of the mean light.
+fn dark_fraction(seen: &LinearRgb) -> f64 {
+    /// A blur leaves nothing beyond its window; the mean of a night scene is a thousand times its darkest places.
+    const DARK: f32 = 1e-6;
+    let [red, green, blue] = &seen.planes;
+    let light = || red.iter().zip(green).zip(blue).map(|((r, g), b)| r.abs() + g.abs() + b.abs());
+    let n = red.len().max(1) as f64;
+    let mean = (light().map(f64::from).sum::<f64>() / n) as f32;
+    light().filter(|&light| light <= DARK * mean).count() as f64 / n
 }
 
 /// The scene of a run.
@@ -161,7 +174,12 @@ impl RunReport {
             camera: capture.camera.clone(),
             lens: optics.lens,
             film_distance_mm: place.film_distance_mm,
-            film: FilmData { columns: place.columns, rows: place.rows, pitch_um: place.pitch_um },
+            film: FilmData {
+                columns: place.columns,
+                rows: place.rows,
+                pitch_um: place.pitch_um,
+                dark_fraction: dark_fraction(&run.capture.irradiance.summary.seen),
+            },
             scene: SceneData {
                 name: scene.name.clone(),
                 columns: scene.columns,
@@ -186,5 +204,22 @@ impl RunReport {
             color_matrix_mean_delta_e: capture.developed.color.mean_delta_e(),
             files,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+
+    #[test]
+    fn film_beyond_the_light_is_counted() {
+        let mut seen = LinearRgb::black(10, 10);
+        assert_eq!(dark_fraction(&seen), 1.0);
+        // A dim corner is no darkness.
+        let lit = |(row, column): (usize, usize)| if column < 7 { if row == 0 { 1e-3 } else { 5.0 } } else { 0.0 };
+        seen.add(&Array2::from_shape_fn((10, 10), lit), [0.3, -0.1, 0.8]);
+        assert_eq!(dark_fraction(&seen), 0.3);
     }
 }
