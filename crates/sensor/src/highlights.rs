@@ -47,8 +47,10 @@ impl Highlights {
 const SPILL_PX: usize = 2;
 /// A rebuilt channel is at most so many times its saturation.
 const MOST: f32 = 16.0;
-/// Surroundings tell the color of what is blown altogether where they are part of its glow: not at all up to the first of these
-/// shares of saturation, by their largest channel, and fully from the second on. What is blown before a dim wall is white.
+/// A channel next to a saturated sample is saturated itself from this share on; below, it is interpolated from others as well.
+const SURE: f32 = 0.9;
+/// Surroundings tell the color of what is blown where they are part of its glow: not at all up to the first of these shares of
+/// saturation, by their largest channel, and fully from the second on. What is blown before a dim wall is white.
 const GLOW: [f32; 2] = [0.3, 0.5];
 
 /// Which channels are saturated in or next to each pixel, a bit a channel.
@@ -105,9 +107,14 @@ pub(crate) fn reconstruct(channels: &mut [Array2<f32>], saturated: &Saturated, l
         for column in 0..columns {
             let bits = saturated.bits[(row, column)];
             if bits != 0 {
-                let is_saturated = |k: usize| bits >> k & 1 == 1;
-                let color = colors.at(row, column, (0..line.len()).all(is_saturated));
-                let scale = scale(&line, column, &color, &levels, &is_saturated);
+                let blown = line
+                    .iter()
+                    .zip(&levels)
+                    .enumerate()
+                    .fold(0_u32, |blown, (k, (line, level))| blown | u32::from(line[column] >= SURE * level) << k);
+                let is_saturated = |k: usize| (bits & blown) >> k & 1 == 1;
+                let color = colors.at(row, column);
+                let scale = scale(&line, column, color, &levels, &is_saturated);
                 for (k, line) in line.iter_mut().enumerate().filter(|(k, _)| is_saturated(*k)) {
                     line[column] = (scale * color[k]).min(MOST * levels[k]).max(line[column]);
                 }
@@ -141,18 +148,14 @@ fn scale(
 struct Colors {
     columns: usize,
     n_channels: usize,
-    /// For each place the channels, which sum to 1, and how far they tell the color of what is blown altogether, 0 to 1.
+    /// For each place the channels, which sum to 1, and one number more.
     values: Vec<f32>,
 }
 
 impl Colors {
-    /// Returns the color about a place; where all of it is blown, white as far as the surroundings do not tell.
-    fn at(&self, row: usize, column: usize, is_all_blown: bool) -> Vec<f32> {
-        let n = self.n_channels;
-        let first = ((row / 2) * self.columns + column / 2) * (n + 1);
-        let (color, told) = (&self.values[first..first + n], self.values[first + n]);
-        let told = if is_all_blown { told } else { 1.0 };
-        color.iter().map(|v| told * v + (1.0 - told) / n as f32).collect()
+    fn at(&self, row: usize, column: usize) -> &[f32] {
+        let first = ((row / 2) * self.columns + column / 2) * (self.n_channels + 1);
+        &self.values[first..first + self.n_channels]
     }
 }
 
@@ -166,8 +169,8 @@ struct Level {
 fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated, levels: &[f32]) -> Colors {
     let n = channels.len();
     let n_sums = n + 1;
-    // The color at a place is the mean of light weighted by the square of its brightness: bright surroundings are those
-    // of what is blown.
+    // The color at a place is the mean of light weighted by the square of its brightness: bright surroundings, up to the rim of what
+    // is blown, are part of it.
     let (rows, columns) = saturated.bits.dim();
     let (half_rows, half_columns) = (rows.div_ceil(2), columns.div_ceil(2));
     let mut sums = vec![0.0_f32; half_rows * half_columns * n_sums];
@@ -175,7 +178,9 @@ fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated, levels: &
         for (half_column, place) in line.chunks_exact_mut(n_sums).enumerate() {
             for row in 2 * half_row..(2 * half_row + 2).min(rows) {
                 for column in 2 * half_column..(2 * half_column + 2).min(columns) {
-                    if saturated.bits[(row, column)] == 0 {
+                    let is_blown =
+                        channels.iter().zip(levels).any(|(plane, level)| plane[(row, column)] >= SURE * level);
+                    if !is_blown {
                         let brightness: f32 = channels.iter().map(|plane| plane[(row, column)].max(0.0)).sum();
                         for (sum, plane) in place.iter_mut().zip(channels) {
                             *sum += brightness * brightness * plane[(row, column)].max(0.0);
@@ -198,12 +203,13 @@ fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated, levels: &
     }
     let Level { columns, sums: mut values, .. } = pyramid.swap_remove(0);
     values.par_chunks_exact_mut(n_sums).for_each(|place| {
-        let (color, told) = place.split_at_mut(n);
-        let (sum, weight): (f32, f32) = (color.iter().sum(), told[0]);
+        let (color, weight) = place.split_at_mut(n);
+        let (sum, weight): (f32, f32) = (color.iter().sum(), weight[0]);
         let share = color.iter().zip(levels).map(|(sum, level)| sum / (weight * level)).fold(0.0, f32::max);
         let part = ((share - GLOW[0]) / (GLOW[1] - GLOW[0])).clamp(0.0, 1.0);
-        told[0] = if weight > 0.0 { part * part * (3.0 - 2.0 * part) } else { 0.0 };
-        color.iter_mut().for_each(|v| *v = if sum > 0.0 { *v / sum } else { 1.0 / n as f32 });
+        let told = if weight > 0.0 && sum > 0.0 { part * part * (3.0 - 2.0 * part) } else { 0.0 };
+        let white = (1.0 - told) / n as f32;
+        color.iter_mut().for_each(|v| *v = if told > 0.0 { told * *v / sum + white } else { white });
     });
     Colors { columns, n_channels: n, values }
 }
