@@ -16,6 +16,7 @@ pub mod figures;
 mod frame_files;
 mod light_field;
 mod numbers;
+mod paintings;
 mod progress;
 mod quality;
 mod schema;
@@ -38,6 +39,7 @@ pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_numbers, parse_pairs};
+pub use paintings::PaintingFolder;
 pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
 pub use quality::Quality;
 #[cfg(feature = "schema")]
@@ -47,7 +49,7 @@ pub use sense::{SenseRequest, Sensed};
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     Capture, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera,
-    PaintingFolder, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,
-    WorldRender, write_seen_png,
+    RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, WorldRender,
+    write_seen_png,
 };
 pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

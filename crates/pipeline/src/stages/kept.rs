@@ -10,7 +10,7 @@ use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, Quantity, SpectralI
 use dioptric_world::World;
 
 use super::{
-    PaintingFolder, Watch, bank, electrons,
+    Watch, bank, electrons,
     film::{self, FilmPlace},
     frames::{self, FrameSet, MovedLight},
     given::GivenParts,
@@ -25,7 +25,7 @@ use super::{
     },
     world::{self, WorldRender},
 };
-use crate::{Camera, Frames, PipelineError, Progress, Quality, SceneSource, Stage};
+use crate::{Camera, Frames, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
 
 /// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
 const MEMORY_BYTES: u64 = 2 << 30;

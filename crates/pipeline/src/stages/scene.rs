@@ -5,10 +5,10 @@ use dioptric_spectrum::WavelengthGrid;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    PaintingFolder, Watch,
+    Watch,
     spec::{GeometryInputs, SceneInputs},
 };
-use crate::{PipelineError, Quality, SceneSource, SceneSpec, Stage};
+use crate::{PaintingFolder, PipelineError, Quality, SceneSource, SceneSpec, Stage};
 
 /// A scene in brief: what the stages after the imaging need of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

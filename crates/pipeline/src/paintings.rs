@@ -1,6 +1,7 @@
 //! Paintings of the still life kept in files, so that a later run does not paint them again.
 
 use std::{
+    cmp::Reverse,
     fs,
     hash::{DefaultHasher, Hash, Hasher},
     path::{Path, PathBuf},
@@ -96,7 +97,7 @@ fn remove_oldest(folder: &Path, most_bytes: u64) {
             Some((metadata.modified().ok()?, metadata.len(), entry.path()))
         })
         .collect();
-    paintings.sort_by(|a, b| b.0.cmp(&a.0));
+    paintings.sort_by_key(|(at, ..)| Reverse(*at));
     let mut bytes = 0;
     for (_, len, path) in paintings {
         bytes += len;
