@@ -3,7 +3,7 @@
 use glam::DVec2;
 use multiversion::multiversion;
 
-use crate::FieldGeometry;
+use crate::{FieldGeometry, FieldsAlong};
 
 /// From a distance on the film to the field seen there, and the irradiance that it gets; for one depth and wavelength.
 ///
@@ -83,26 +83,6 @@ impl RadialMap {
         }
         let tan = self.tan_per_mm[self.tan_per_mm.len() - 1] * self.extent_mm;
         place_mm / place_mm.length() * tan
-    }
-}
-
-/// The fields seen along a row of places on the film, and the irradiance that they get.
-#[derive(Clone, Debug, Default)]
-pub struct FieldsAlong {
-    /// Tangents to the right.
-    pub tan_x: Vec<f64>,
-    /// Tangents upwards.
-    pub tan_y: Vec<f64>,
-    /// Irradiance per radiance, sr; NaN where nothing is seen.
-    pub irradiance_per_radiance: Vec<f64>,
-}
-
-impl FieldsAlong {
-    fn resize(&mut self, len: usize) {
-        for values in [&mut self.tan_x, &mut self.tan_y, &mut self.irradiance_per_radiance] {
-            values.clear();
-            values.resize(len, 0.0);
-        }
     }
 }
 
