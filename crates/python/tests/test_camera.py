@@ -118,7 +118,7 @@ def test_preview_has_fewer_samples(tiny: dp.Camera) -> None:
 
 def test_report_has_the_numbers_of_the_run(shot: dp.Shot) -> None:
     report = shot.report()
-    assert report["film"] == {"columns": 48, "rows": 32, "pitch_um": 660.0}
+    assert report["film"] == {"columns": 48, "rows": 32, "pitch_um": 660.0, "dark_fraction": 0.0}
     np.testing.assert_allclose(report["irradiance"]["mean_w_m2_nm"], shot.irradiance.mean(axis=(1, 2)), rtol=1e-5)
 
 
