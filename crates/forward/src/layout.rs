@@ -356,12 +356,13 @@ impl Layout {
 
     /// How many bands are worked on at once: more than there are threads, so that none waits, where pictures are small.
     fn bands_at_once(&self) -> usize {
-        /// Planes of the film that a band takes while it is imaged.
+        /// Planes of the film, or of the scene where that is larger, that a band takes while it is imaged.
         const PLANES: usize = 4;
         const IN_FLIGHT_BYTES: usize = 256 << 20;
         let Film { rows, columns, .. } = self.spec.film;
-        let threads = rayon::current_num_threads();
-        (IN_FLIGHT_BYTES / (PLANES * size_of::<f32>() * rows * columns).max(1)).clamp(threads.min(4), 4 * threads)
+        let (threads, (scene_rows, scene_columns)) = (rayon::current_num_threads(), self.size());
+        let n_samples = (rows * columns).max(scene_rows * scene_columns);
+        (IN_FLIGHT_BYTES / (PLANES * size_of::<f32>() * n_samples).max(1)).clamp(threads.min(4), 4 * threads)
     }
 
     /// Reads a band and images it.
