@@ -201,7 +201,8 @@ fn options_take_negative_numbers() {
         "dioptric render room.pbrt --noise -0.5 --seconds -1",
         "dioptric measure noise --sensor imx363 --temperature-c -10 --analog-gain -1",
     ] {
-        Cli::words().try_get_matches_from(arguments_of(line).unwrap()).unwrap();
+        let parsed = Cli::words().try_get_matches_from(arguments_of(line).unwrap());
+        assert!(parsed.is_ok(), "{line}: {parsed:?}");
     }
 }
 

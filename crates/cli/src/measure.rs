@@ -208,10 +208,7 @@ fn noise_table(data: &NoiseData) -> Result<String, std::fmt::Error> {
         format!("{}{filter}: {} frames of {} × {} pixels\n\n", data.source, data.n_frames, data.columns, data.rows);
     if data.raised_black_dn > 0 {
         let dn = data.raised_black_dn;
-        writeln!(
-            text,
-            "The black level was raised by {dn} DN, since the sensor's own cuts off the noise of darkness.\n"
-        )?;
+        writeln!(text, "The black level was raised by {dn} DN, since the sensor's own level clips the dark noise.\n")?;
     }
     let sheet = data.data_sheet.as_ref();
     writeln!(text, "{:<34} {:>12} {:>12}", "", "measured", "data sheet")?;

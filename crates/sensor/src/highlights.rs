@@ -148,13 +148,13 @@ fn scale(
 struct Colors {
     columns: usize,
     n_channels: usize,
-    /// For each place the channels, which sum to 1, and one number more.
+    /// For each place the channels, which sum to 1.
     values: Vec<f32>,
 }
 
 impl Colors {
     fn at(&self, row: usize, column: usize) -> &[f32] {
-        let first = ((row / 2) * self.columns + column / 2) * (self.n_channels + 1);
+        let first = ((row / 2) * self.columns + column / 2) * self.n_channels;
         &self.values[first..first + self.n_channels]
     }
 }
@@ -201,15 +201,19 @@ fn surrounding_colors(channels: &[Array2<f32>], saturated: &Saturated, levels: &
         let (finer, coarser) = pyramid.split_at_mut(index + 1);
         finer[index].fill_from(&coarser[0], n_sums);
     }
-    let Level { columns, sums: mut values, .. } = pyramid.swap_remove(0);
-    values.par_chunks_exact_mut(n_sums).for_each(|place| {
-        let (color, weight) = place.split_at_mut(n);
-        let (sum, weight): (f32, f32) = (color.iter().sum(), weight[0]);
-        let share = color.iter().zip(levels).map(|(sum, level)| sum / (weight * level)).fold(0.0, f32::max);
+    let Level { columns, sums, .. } = pyramid.swap_remove(0);
+    let mut values = vec![0.0; sums.len() / n_sums * n];
+    values.par_chunks_exact_mut(n).zip(sums.par_chunks_exact(n_sums)).for_each(|(color, place)| {
+        let (sums, weight) = (&place[..n], place[n]);
+        let sum: f32 = sums.iter().sum();
+        let share = sums.iter().zip(levels).map(|(sum, level)| sum / (weight * level)).fold(0.0, f32::max);
         let part = ((share - GLOW[0]) / (GLOW[1] - GLOW[0])).clamp(0.0, 1.0);
-        let told = if weight > 0.0 && sum > 0.0 { part * part * (3.0 - 2.0 * part) } else { 0.0 };
-        let white = (1.0 - told) / n as f32;
-        color.iter_mut().for_each(|v| *v = if told > 0.0 { told * *v / sum + white } else { white });
+        let known = if weight > 0.0 && sum > 0.0 { part * part * (3.0 - 2.0 * part) } else { 0.0 };
+        let white = (1.0 - known) / n as f32;
+        color
+            .iter_mut()
+            .zip(sums)
+            .for_each(|(v, own)| *v = if known > 0.0 { known * own / sum + white } else { white });
     });
     Colors { columns, n_channels: n, values }
 }

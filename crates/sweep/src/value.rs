@@ -91,7 +91,7 @@ impl Value {
         if matches!(self, Self::Nothing) {
             *self = Self::Map(BTreeMap::new());
         }
-        let found = self.in_words();
+        let found = self.description();
         match self {
             Self::List(list) => {
                 let (n, index) = (list.len(), part.parse::<usize>().ok());
@@ -107,7 +107,7 @@ impl Value {
     }
 
     /// Returns what it is, for an error.
-    fn in_words(&self) -> String {
+    fn description(&self) -> String {
         match self {
             Self::Map(map) => match map.keys().next().filter(|key| starts_a_choice(key)) {
                 Some(choice) => format!("{choice}(…)"),

@@ -53,7 +53,7 @@ pub(crate) fn view_beside(picture: &Path, rows: usize, columns: usize) -> Result
     Ok(Some(view.binned(factor)))
 }
 
-/// Returns how far one code of the depth beside a picture stands for, m, where the camera file beside it says so.
+/// Returns the depth that one code of the depth picture stands for, m, where the camera file states it.
 pub(super) fn depth_unit_beside(picture: &Path) -> Result<Option<f64>, SceneError> {
     let Some((path, camera)) = read_beside(picture)? else { return Ok(None) };
     match camera.depth_unit_m {

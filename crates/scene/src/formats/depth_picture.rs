@@ -13,7 +13,7 @@ use super::{
 };
 use crate::SceneError;
 
-/// What one code stands for where no camera file says so, m: depth cameras write millimetres.
+/// The depth that one code stands for where no camera file states it, m: depth cameras write millimetres.
 const UNIT_M: f64 = 1e-3;
 
 /// Reads the depth of a picture from the gray 16-bit picture beside it, or returns `None` where there is none.
