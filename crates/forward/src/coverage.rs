@@ -1,7 +1,7 @@
 //! The sampling of point spread functions that a scene and a film need.
 
-use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, Vignetting, rays_towards};
-use dioptric_psf::{BankSettings, Diffraction};
+use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, OpticsError, PupilBoundary, Vignetting, rays_towards};
+use dioptric_psf::{BankSettings, Diffraction, lens_on_axis};
 use dioptric_spectrum::{DepthMap, WavelengthGrid};
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -65,20 +65,31 @@ impl PsfDomain<'_> {
     /// When the film has no area, the lens has no index at a wavelength of the grid, or no light reaches the middle of the film.
     pub fn settings(&self) -> Result<BankSettings, ForwardError> {
         check_depth(self.lens, self.grid, self.depth_range_m.0, None)?;
-        if self.lens.is_rotational() { self.radial_settings() } else { self.grid_settings() }
+        let has_axis = lens_on_axis(self.lens, self.middle_nm()).is_some();
+        if has_axis { self.radial_settings() } else { self.grid_settings() }
     }
 
-    /// Returns such settings for a lens with an axis of symmetry: fields along a radius to beyond the film's corner, depths
-    /// from end to end in dioptres, wavelengths evenly in 1/λ².
+    fn middle_nm(&self) -> f64 {
+        let (first_nm, last_nm) = self.grid.range_nm();
+        0.5 * (first_nm + last_nm)
+    }
+
+    /// Returns such settings for a lens with an axis of symmetry, on the axis or moved sideways: fields along a radius to beyond
+    /// the film's farthest corner, depths from end to end in dioptres, wavelengths evenly in 1/λ².
     ///
     /// # Errors
     /// When the film has no area, or the lens has no index at a wavelength of the grid or is not rotationally symmetric.
     pub fn radial_settings(&self) -> Result<BankSettings, ForwardError> {
         self.film.check()?;
-        self.lens.check_rotational("a bank of point spread functions over field angle alone")?;
-        let fields_tan = self.at_ends(|aim| {
+        let has_none = || OpticsError::NotRotational {
+            lens: self.lens.name().to_owned(),
+            task: "a bank of point spread functions over field angle alone",
+        };
+        let (centered, aside_mm) = lens_on_axis(self.lens, self.middle_nm()).ok_or_else(has_none)?;
+        let corner_mm = self.film.half_diagonal_mm() + aside_mm.length();
+        let fields_tan = PsfDomain { lens: &centered, ..*self }.at_ends(|aim| {
             // The border of the film is blurred by light from beyond it.
-            let extent_mm = 1.02 * self.film.half_diagonal_mm() + aim.axial_blur_mm();
+            let extent_mm = 1.02 * corner_mm + aim.axial_blur_mm();
             Ok(aim.field_tan_at(extent_mm))
         })?;
         let last_field_tan = fields_tan.into_iter().fold(0.0, f64::max);

@@ -87,7 +87,10 @@ pub(crate) fn check_extent(
 fn ends_before(map: &FilmMap, film: &Film) -> Option<f64> {
     let corner_mm = film.half_diagonal_mm();
     match map {
-        FilmMap::Radial(map) => (map.extent_mm() < corner_mm).then_some(map.extent_mm()),
+        FilmMap::Radial(map) => {
+            let corner_mm = corner_mm + map.axis_mm().length();
+            (map.extent_mm() < corner_mm).then_some(map.extent_mm())
+        }
         FilmMap::Plane(map) => {
             let half_mm = film.half_size_mm();
             // Out along lines to the corners and the middles of the sides.

@@ -140,6 +140,8 @@ fn moved_lens_shows_the_unmoved_one_re_framed() {
     let movements =
         Movements { rise_mm: f64::from(up_px) * px_mm, shift_mm: f64::from(right_px) * px_mm, ..Movements::default() };
     let moved = of(movements, rows, columns);
+    // The lens moved up and to the right carries its axis with it over the film, of which the picture is turned by 180°.
+    assert_eq!(moved.place.exit_pupil_axis_mm, [-movements.shift_mm, movements.rise_mm]);
     let whole = of(Movements::default(), rows + 2 * up_px as usize, columns + 2 * right_px as usize);
     for band in 0..3 {
         let (moved, whole) = (moved.irradiance.band(band).unwrap(), whole.irradiance.band(band).unwrap());
@@ -149,8 +151,8 @@ fn moved_lens_shows_the_unmoved_one_re_framed() {
         let square = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
         let rms = (moved.iter().zip(framed).map(square).sum::<f64>() / framed.len() as f64).sqrt() / mean;
         println!("band {band}: rms {rms:.5} of the mean");
-        // Fields of a moved lens are sampled over a grid, of a centered one along a radius.
-        assert!(rms < 0.01, "band {band}: {rms}");
+        // Both are sampled along a radius: what is left is that of fields to a farther corner, and of kernels at other places.
+        assert!(rms < 5e-4, "band {band}: {rms}");
     }
 }
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     BankSettings, Diffraction, FieldSampling, Interpolation, Kernel, LensImageModel, PsfError, PsfQuery,
-    general::GeneralBank, rotational::RotationalBank,
+    decenter::Decenter, general::GeneralBank, rotational::RotationalBank,
 };
 
 /// How right a bank is to be, and how large it may become.
@@ -112,10 +112,11 @@ impl LensImageModel {
         if !matches!(start.fields, FieldSampling::Radial(_)) {
             return setting("fields", start.fields.len() as f64, "fields along a radius");
         }
-        // HURB and waves only smooth what geometry gets wrong.
+        // HURB and waves only smooth what geometry gets wrong, and a lens moved sideways has its errors about its axis.
+        let (centered, _) = Decenter::of(lens, start.reference_wavelength_nm);
         let geometric = |settings: &BankSettings| {
             let settings = BankSettings { diffraction: Diffraction::None, ..settings.clone() };
-            RotationalBank::build(lens, &settings, &|_| {}, cancel)
+            RotationalBank::build(&centered, &settings, &|_| {}, cancel)
         };
         let mut settings = start.clone();
         let first = geometric(&settings)?;

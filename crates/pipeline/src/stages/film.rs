@@ -34,7 +34,7 @@ pub struct FilmPlace {
     /// Distance of the film behind the exit pupil, mm, below 0 where the pupil lies behind the film; `None` of a telecentric
     /// lens.
     pub exit_pupil_distance_mm: Option<f64>,
-    /// Where the axis of the exit pupil meets the film, mm to the right and upwards in the picture.
+    /// Where the axis of the exit pupil meets the film, mm to the right and down in the picture.
     pub exit_pupil_axis_mm: [f64; 2],
 }
 
