@@ -201,6 +201,18 @@ impl FilmMap {
         }
     }
 
+    /// Returns the map with places counted from another: `from_mm` is where that is now.
+    #[must_use]
+    pub fn counted_from(self, from_mm: DVec2) -> Self {
+        match self {
+            Self::Radial(map) => {
+                let (axis_mm, axis_tan) = (map.axis_mm - from_mm, map.axis_tan);
+                Self::Radial(map.about(axis_mm, axis_tan))
+            }
+            Self::Plane(map) => Self::Plane(map.counted_from(from_mm)),
+        }
+    }
+
     /// The bytes of memory that it takes.
     pub fn size_bytes(&self) -> usize {
         match self {
