@@ -5,7 +5,7 @@ use dioptric_optics::MonoLens;
 use ndarray::Array2;
 
 use super::{LightField, View, ViewGeometry};
-use crate::{FilmPlace, PipelineError};
+use crate::PipelineError;
 
 /// A film behind an array. Places are mm to the right of the axis and above it, as in the picture.
 #[derive(Clone, Copy, Debug)]
@@ -20,20 +20,6 @@ pub(crate) struct ArrayFilm {
     pub(crate) array_distance_mm: f64,
     /// Where the axis of the exit pupil meets the film, mm.
     pub(crate) exit_pupil_axis_mm: [f64; 2],
-}
-
-impl ArrayFilm {
-    /// Returns the film of a camera whose focus puts the array where the film would be.
-    pub(crate) fn behind_array(place: &FilmPlace) -> Self {
-        let [right_mm, down_mm] = place.exit_pupil_axis_mm;
-        Self {
-            rows: place.rows,
-            columns: place.columns,
-            pitch_mm: 1e-3 * place.pitch_um,
-            array_distance_mm: place.film_distance_mm,
-            exit_pupil_axis_mm: [right_mm, -down_mm],
-        }
-    }
 }
 
 /// How a picture behind an array is taken apart.
