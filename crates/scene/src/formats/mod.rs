@@ -26,6 +26,6 @@ pub use envi::{EnviCube, read_envi};
 pub use exr_write::{BandWriter, ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
 pub use mat::{IsetScene, read_iset_mat};
 pub use picture::{PictureSamples, read_picture, read_picture_samples};
-pub use read_scene::{ReadOptions, read_scene};
+pub use read_scene::{ReadOptions, read_hidden_layer, read_scene};
 pub use spectral_exr::{SpectralFile, read_planes_exr, read_spectral_exr};
 pub use unmeasured::FillDepth;

@@ -70,18 +70,58 @@ impl Default for ReadOptions {
 /// One sentence with the file's name when anything in it is wrong, or its bands do not cover those wanted.
 pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Scene, SceneError> {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     if let Some(fill) = options.fill_depth {
         fill.check()?;
     }
-    if path.is_dir() {
-        let image = read_band_folder(path, options.band_wavelengths.as_ref())?;
-        return finish(path, name, Contents::of(image), options);
+    finish(path, name, contents_of(path, options)?, options)
+}
+
+/// Reads what lies behind the first surface of a scene from a file of its own, of any kind that [`read_scene`] reads: radiance and
+/// depth of the same samples, seen from the same place.
+///
+/// Depth 0 or NaN says that nothing is known there: it becomes that of the first surface.
+///
+/// # Errors
+/// As [`read_scene`], and when the file has no depth, another size, or a depth before the first surface.
+pub fn read_hidden_layer(path: &Path, options: &ReadOptions, first: &Scene) -> Result<HiddenLayer, SceneError> {
+    let mut contents = contents_of(path, options)?;
+    let (rows, columns) = (contents.image.rows(), contents.image.columns());
+    if contents.depth.is_none() {
+        contents.depth = depth_beside(path, rows, columns)?.map(|(_, values_m)| RawDepth { values_m, is_axial: true });
     }
+    let z_m = match (contents.depth, first.view) {
+        (Some(RawDepth { values_m, is_axial: true }), _) => values_m,
+        (Some(RawDepth { values_m, is_axial: false }), Some(view)) => axial(&values_m, view),
+        _ => return Err(unreadable(path, "a hidden layer needs a depth, expected a channel 'Z' or a NAME.depth.png")),
+    };
+    let grid = Some(first.radiance.grid().clone());
+    let radiance = lit(contents.image, &ReadOptions { grid, ..options.clone() })?;
+    let hidden = HiddenLayer { radiance, depth: behind(path, z_m, first.depth.as_ref())? };
+    Scene { hidden: Some(hidden.clone()), ..first.clone() }.validate()?;
+    Ok(hidden)
+}
+
+/// Returns the depths of a hidden layer, where nothing is known those of the first surface.
+fn behind(file: &Path, mut z_m: Array2<f32>, first: Option<&DepthMap>) -> Result<DepthMap, SceneError> {
+    if let Some(first) = first.filter(|first| first.z_m().dim() == z_m.dim()) {
+        z_m.zip_mut_with(first.z_m(), |z, first| {
+            if *z == 0.0 || z.is_nan() {
+                *z = *first;
+            }
+        });
+    }
+    DepthMap::new(z_m).map_err(|reason| SceneError::Values { file: file.to_owned(), reason })
+}
+
+fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {
+    if path.is_dir() {
+        return Ok(Contents::of(read_band_folder(path, options.band_wavelengths.as_ref())?));
+    }
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     match extension.as_str() {
-        "exr" => finish(path, name, of_exr(path, options)?, options),
-        "hdr" => finish(path, name, Contents::of(read_envi(path)?.into_image(options.white_level)?), options),
-        "mat" => finish(path, name, of_mat(path)?, options),
+        "exr" => of_exr(path, options),
+        "hdr" => Ok(Contents::of(read_envi(path)?.into_image(options.white_level)?)),
+        "mat" => of_mat(path),
         "jpg" | "jpeg" if cfg!(not(feature = "jpeg")) => {
             Err(SceneError::LacksFeature { file: path.to_owned(), feature: "jpeg" })
         }
@@ -89,7 +129,7 @@ pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Scene, SceneErro
             let display = Display::apple_studio();
             let image = read_picture(path, &display, &picture_bands(options)?, options.picture_white_cd_m2)?;
             let light = Some(white_of(&display, options.picture_white_cd_m2)?);
-            finish(path, name, Contents { light, ..Contents::of(image) }, options)
+            Ok(Contents { light, ..Contents::of(image) })
         }
         _ if !path.exists() => Err(unreadable(path, "there is no such file")),
         _ => Err(SceneError::UnknownKind { file: path.to_owned() }),
@@ -150,7 +190,7 @@ struct Contents {
     image: SpectralImage,
     depth: Option<RawDepth>,
     view: Option<View>,
-    hidden: Option<HiddenLayer>,
+    hidden: Option<(SpectralImage, Array2<f32>)>,
     light: Option<SceneLight>,
     notes: Vec<String>,
 }
@@ -188,7 +228,9 @@ fn finish(path: &Path, name: String, contents: Contents, options: &ReadOptions) 
     };
     notes.extend(resampling_note(contents.image.grid(), options.grid.as_ref()));
     let hidden = match contents.hidden {
-        Some(layer) => Some(HiddenLayer { radiance: lit(layer.radiance, options)?, ..layer }),
+        Some((image, z_m)) => {
+            Some(HiddenLayer { radiance: lit(image, options)?, depth: behind(path, z_m, depth.as_ref())? })
+        }
         None => None,
     };
     let light = match contents.image.quantity() {

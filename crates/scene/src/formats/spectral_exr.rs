@@ -79,6 +79,10 @@ pub fn read_spectral_exr(path: &Path) -> Result<SpectralFile, SceneError> {
         RawImage::Spectral(image) => image,
         RawImage::Rgb(_) => return Err(no_bands(path)),
     };
+    let hidden = match hidden {
+        Some((radiance, z_m)) => Some(HiddenLayer { radiance, depth: DepthMap::new(z_m).map_err(values)? }),
+        None => None,
+    };
     Ok(SpectralFile { image, depth: map(z_m)?, distance_m: map(distance_m)?.map(|m| m.z_m().clone()), view, hidden })
 }
 
@@ -97,7 +101,8 @@ pub(super) struct RawFile {
     /// Distance from the projection center, likewise.
     pub(super) distance_m: Option<Array2<f32>>,
     pub(super) view: Option<View>,
-    pub(super) hidden: Option<HiddenLayer>,
+    /// Radiance and axial depth of the layer behind.
+    pub(super) hidden: Option<(SpectralImage, Array2<f32>)>,
 }
 
 /// The picture of an EXR file.
@@ -110,7 +115,6 @@ pub(super) enum RawImage {
 /// Reads an EXR file of bands or, where it has none, of red, green and blue.
 pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     let mut layers = read_layers(path)?;
-    let values = |reason| SceneError::Values { file: path.to_owned(), reason };
     let Some(index) = layers.iter().position(|layer| layer.has_bands()) else {
         return rgb_of(layers, path);
     };
@@ -120,7 +124,7 @@ pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     let (image, z_m, distance_m) = first.into_image(path)?;
     let hidden = match hidden {
         Some(layer) => match layer.into_image(path)? {
-            (radiance, Some(z_m), _) => Some(HiddenLayer { radiance, depth: DepthMap::new(z_m).map_err(values)? }),
+            (radiance, Some(z_m), _) => Some((radiance, z_m)),
             _ => return Err(unreadable(path, "the layer 'hidden' has no channel 'Z'")),
         },
         None => None,
