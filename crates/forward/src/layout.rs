@@ -1,7 +1,6 @@
 //! The work of a plan: layers of depth over the film, their kernels, and the imaging of a band.
 
 use std::{
-    borrow::Cow,
     collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
@@ -411,11 +410,7 @@ impl Layout {
         work: &Work<'_>,
     ) -> Result<Array2<f32>, Cancelled> {
         let maps = self.maps_at(lens, band);
-        let occluded: Option<Cow<'_, Array2<f32>>> = match &self.occluded {
-            OccludedSamples::Nothing => None,
-            OccludedSamples::Estimated { fill, .. } => Some(Cow::Owned(fill.samples(light.front, work.cancel())?)),
-            OccludedSamples::Known(_) => light.occluded.map(Cow::Borrowed),
-        };
+        let occluded = self.occluded.samples(light.front, light.occluded, work.cancel())?;
         let front = light.front.as_standard_layout();
         let occluded = occluded.as_ref().map(|samples| samples.as_standard_layout());
         let mut surfaces = vec![self.layer_coordinates.surface(front.as_slice())];
