@@ -125,7 +125,7 @@ pub(crate) enum QualityKind {
 pub(crate) struct RunArgs {
     /// The camera file; without it, the built-in demo camera
     pub(crate) camera: Option<PathBuf>,
-    /// Scene to photograph: spectral EXR, ENVI header, folder of band PNGs, or a picture
+    /// Scene to photograph: spectral EXR, ENVI header, `ISETCam` .mat, folder of band PNGs, or a picture
     #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
     pub(crate) scene: Option<PathBuf>,
     /// Folder for the results [default: dioptric-out, or that of --from]
@@ -134,6 +134,13 @@ pub(crate) struct RunArgs {
     /// Continues from the folder of a finished run: its camera, and its irradiance where no change touches it
     #[arg(long, value_name = "DIR", conflicts_with = "camera", help_heading = heading::RESULTS)]
     pub(crate) from: Option<PathBuf>,
+    /// Continues a killed run to the same folder from the bands that it finished
+    #[arg(long, conflicts_with = "from", help_heading = heading::RESULTS)]
+    pub(crate) resume: bool,
+    /// Memory that scene, imaging and film may take, as 1GiB or 500MB; what does not fit goes through files [default: half of the
+    /// machine's]
+    #[arg(long, value_name = "BYTES", help_heading = heading::SIMULATION)]
+    pub(crate) memory: Option<String>,
     /// How finely the picture is simulated
     #[arg(long, value_name = "QUALITY", value_enum, default_value = "full", help_heading = heading::SIMULATION)]
     pub(crate) quality: QualityKind,
@@ -150,6 +157,21 @@ pub(crate) struct RunArgs {
     /// Depth of a scene that has none, m
     #[arg(long, value_name = "Z", help_heading = heading::SCENE)]
     pub(crate) depth_m: Option<f64>,
+    /// Width of a flat scene from edge to edge, mm: a slide, a document, a wafer
+    #[arg(long, value_name = "W", requires = "distance_mm", conflicts_with_all = ["fov_deg", "depth_m"], help_heading = heading::SCENE)]
+    pub(crate) width_mm: Option<f64>,
+    /// Distance of a flat scene from the first vertex of the lens, mm
+    #[arg(long, value_name = "D", requires = "width_mm", help_heading = heading::SCENE)]
+    pub(crate) distance_mm: Option<f64>,
+    /// Depth where none was measured: beside (the farther of those beside it), far (the farthest of the scene), or metres
+    #[arg(long, value_name = "FILL", help_heading = heading::SCENE)]
+    pub(crate) fill_depth: Option<String>,
+    /// What lies behind the first surface of the scene's file: a file of radiance and depth of the same samples
+    #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
+    pub(crate) hidden: Option<PathBuf>,
+    /// Number that a perfect white has in an ENVI file that does not state it
+    #[arg(long, value_name = "N", help_heading = heading::SCENE)]
+    pub(crate) white_level: Option<f64>,
     /// Light to put the scene under: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3, a temperature (3200K), a chromaticity
     /// (0.46,0.414) or a CSV file of its spectrum; scenes of unknown light cannot be relit
     #[arg(long, value_name = "LIGHT", help_heading = heading::SCENE)]
@@ -163,6 +185,9 @@ pub(crate) struct RunArgs {
     /// Sensor, a file or the name of a built-in one
     #[arg(long, value_name = "SENSOR", help_heading = heading::FILM)]
     pub(crate) sensor: Option<String>,
+    /// Size of the film: that of the sensor, or what the scene covers, a pixel a sample
+    #[arg(long, value_name = "SIZE", value_enum, conflicts_with_all = ["pixels", "pixel_um"], help_heading = heading::FILM)]
+    pub(crate) film: Option<FilmKind>,
     /// Pixels of the film, e.g. 640x480; without --pixel-um the film stays as large as it is [default: those of the camera]
     #[arg(long, value_name = "WxH", help_heading = heading::FILM)]
     pub(crate) pixels: Option<String>,
@@ -194,6 +219,15 @@ pub(crate) struct RunArgs {
     pub(crate) blur: Option<BlurKind>,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
+}
+
+/// How large the film is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FilmKind {
+    /// The pixels of the sensor
+    Sensor,
+    /// As many pixels as the scene has samples, which see the scene's field
+    Scene,
 }
 
 /// Which exposures are taken, and which files are written of them.

@@ -14,6 +14,7 @@ mod lens_args;
 mod light_field;
 mod measure;
 mod measure_args;
+mod memory;
 mod movement_args;
 mod paintings;
 mod psf;

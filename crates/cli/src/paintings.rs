@@ -18,7 +18,7 @@ pub(crate) fn painting_folder() -> Option<PaintingFolder> {
 }
 
 /// Returns what tells this program from another build of it: its version, and the size and age of its file.
-fn build() -> Option<String> {
+pub(crate) fn build() -> Option<String> {
     let file = env::current_exe().ok()?.metadata().ok()?;
     let built = file.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
     Some(format!("{} {} {}", env!("CARGO_PKG_VERSION"), file.len(), built.as_nanos()))

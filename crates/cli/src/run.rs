@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_pipeline::{
-    BankSpec, BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FocusSpec, FrameFile, FramesSpec,
+    BankSpec, BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
     ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, SceneSpec, SensorOptions, SensorSpec,
     Silent, Stage, Staged, StopSpec, WavelengthSpec, parse_illuminant, parse_numbers, with_exposure_s,
 };
@@ -17,9 +17,10 @@ use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
 
 use crate::{
-    args::{BankKind, BlurKind, Common, DiffractionKind, FrameArgs, QualityKind, RunArgs},
+    args::{BankKind, BlurKind, Common, DiffractionKind, FilmKind, FrameArgs, QualityKind, RunArgs},
     lens::tell,
-    paintings::painting_folder,
+    memory::memory_budget,
+    paintings::{build, painting_folder},
     terminal::{Bar, guarded, print, print_json, remark},
 };
 
@@ -34,6 +35,13 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     kept.camera().validate()?;
     let out = arguments.out.as_deref().or(arguments.from.as_deref()).unwrap_or(Path::new(OUT));
     let staged = guarded(Staged::folder(out)?);
+    let kept = match build() {
+        Some(build) => kept.with_bands_kept_in(staged.root(), build),
+        None => kept,
+    };
+    if arguments.resume && !kept.take_bands(&staged.leftovers())? {
+        remark(common.quiet, "no killed run of this camera left bands here: it starts from the beginning");
+    }
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
     let capture = kept.capture(&clock, &cancel)?;
     let model = kept.model(&clock, &cancel)?;
@@ -49,10 +57,11 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     drop(clock);
     tell(&capture.lens.notes, common);
     tell(&report.sensor.notes, common);
+    tell(&report.scene.notes, common);
     if report.film.dark_fraction > LEAST_DARK {
         let percent = 100.0 * report.film.dark_fraction;
         let words = "where that is not black in the scene, the lens shows less of it than the film is large: take a smaller \
-                     film or a wider scene";
+                     film (--film scene) or a wider scene";
         remark(common.quiet, &format!("{percent:.1} % of the film gets no light; {words}"));
     }
     if common.json {
@@ -95,6 +104,10 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera>
         QualityKind::Full => Quality::Full,
     };
     let kept = kept.with(|own| *own = camera).with_quality(quality).with_paintings(painting_folder());
+    let kept = match memory_budget(arguments.memory.as_deref())? {
+        Some(bytes) => kept.with_memory_budget(bytes),
+        None => kept,
+    };
     let film = film_of(&kept, arguments)?;
     Ok(kept.with(|own| own.film = film))
 }
@@ -104,6 +117,10 @@ fn film_of(kept: &KeptCamera, arguments: &RunArgs) -> anyhow::Result<FilmSpec> {
     let size = arguments.pixels.as_deref().map(parse_size).transpose()?;
     let size_um = || kept.film_size_mm(&Silent, &Cancel::new()).map(|size_mm| size_mm.map(|mm| 1e3 * mm));
     Ok(match (size, arguments.pixel_um) {
+        (None, None) if arguments.film.is_some() => match arguments.film {
+            Some(FilmKind::Scene) => FilmSpec::Scene,
+            _ => FilmSpec::Sensor,
+        },
         (None, None) => kept.camera().film,
         (Some((columns, rows)), Some(pitch_um)) => FilmSpec::Pixels { columns, rows, pitch_um },
         (Some((columns, rows)), None) => {
@@ -150,6 +167,18 @@ fn change_scene(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> 
     let scene = &mut camera.scene;
     scene.field_of_view_deg = arguments.fov_deg.or(scene.field_of_view_deg);
     scene.depth_m = arguments.depth_m.or(scene.depth_m);
+    if arguments.fov_deg.is_some() || arguments.depth_m.is_some() {
+        scene.flat = None;
+    }
+    if let (Some(width_mm), Some(distance_mm)) = (arguments.width_mm, arguments.distance_mm) {
+        (scene.field_of_view_deg, scene.depth_m) = (None, None);
+        scene.flat = Some(FlatSize { width_mm, distance_mm });
+    }
+    if let Some(fill) = &arguments.fill_depth {
+        scene.fill_depth = Some(fill.parse().map_err(dioptric_pipeline::PipelineError::from)?);
+    }
+    scene.hidden = arguments.hidden.clone().or_else(|| scene.hidden.take());
+    scene.white_level = arguments.white_level.or(scene.white_level);
     scene.illuminance_lux = arguments.illuminance_lux.or(scene.illuminance_lux);
     if let Some(name) = &arguments.illuminant {
         scene.illuminant = Some(parse_illuminant(name)?);

@@ -105,7 +105,7 @@ pub(crate) fn remove_partial_files_on_interrupt() {
 
 /// Makes results known, so that an interrupt removes them while they are half-written.
 pub(crate) fn guarded(staged: Staged) -> Staged {
-    PARTIAL.lock().unwrap_or_else(PoisonError::into_inner).push(staged.path().to_owned());
+    PARTIAL.lock().unwrap_or_else(PoisonError::into_inner).push(staged.root().to_owned());
     staged
 }
 

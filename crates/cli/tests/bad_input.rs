@@ -218,3 +218,63 @@ fn an_analysis_that_cannot_be_leaves_nothing() {
     check(&["--distance-mm", "5"], &["forms no image"]);
     check(&["--f-number", "1.2"], &["opens to at most"]);
 }
+
+/// Writes a picture and the codes of its depth, millimetres.
+fn write_rgbd(folder: &Path, codes: impl Fn(u32, u32) -> u16) {
+    let color = image::RgbImage::from_fn(24, 16, |x, y| image::Rgb([(10 * x) as u8, (15 * y) as u8, 128]));
+    dioptric_pictures::save(&color.into(), &folder.join("room.png")).unwrap();
+    let depth = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(24, 16, |x, y| image::Luma([codes(x, y)]));
+    dioptric_pictures::save(&depth.into(), &folder.join("room.depth.png")).unwrap();
+}
+
+const ROOM: [&str; 7] = ["run", "camera.ron", "--scene", "room.png", "--fov-deg", "14", "--out"];
+
+#[test]
+fn depth_inside_the_lens_is_refused_by_its_place() {
+    let folder = folder();
+    // 3 mm before the entrance pupil is amid the glass.
+    write_rgbd(folder.path(), |x, y| if (x, y) == (5, 7) { 3 } else { 2000 });
+    check_error(folder.path(), &[&ROOM[..], &["out"]].concat(), &["row 7, column 5", "0.003 m"]);
+}
+
+#[test]
+fn unmeasured_depth_is_counted() {
+    let folder = folder();
+    write_rgbd(folder.path(), |x, _| if x < 6 { 0 } else { 1500 });
+    let run = common::dioptric(folder.path(), &[&ROOM[..], &["out", "--fill-depth", "far"]].concat());
+    let said = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(run.status.success() && said.contains("96 of 384 samples (25.00 %) have no depth"), "{said}");
+    check_error(folder.path(), &[&ROOM[..], &["bad", "--fill-depth", "near"]].concat(), &["'near'", "far"]);
+    write_rgbd(folder.path(), |_, _| 0);
+    check_error(folder.path(), &[&ROOM[..], &["bad"]].concat(), &["room.depth.png", "no sample"]);
+}
+
+#[test]
+fn hidden_layer_in_front_is_refused_by_its_place() {
+    let folder = folder();
+    write_rgbd(folder.path(), |x, y| if (x, y) == (3, 2) { 900 } else { 2500 });
+    for name in ["room.png", "room.depth.png"] {
+        fs::rename(folder.path().join(name), folder.path().join(name.replace("room", "behind"))).unwrap();
+    }
+    write_rgbd(folder.path(), |_, _| 2000);
+    let hidden = [&ROOM[..], &["out", "--hidden", "behind.png"]].concat();
+    check_error(folder.path(), &hidden, &["room.png", "0.9 m", "row 2, column 3", "2 m"]);
+    fs::remove_file(folder.path().join("behind.depth.png")).unwrap();
+    check_error(folder.path(), &hidden, &["behind.png", "needs a depth"]);
+    check_error(folder.path(), &["run", "camera.ron", "--hidden", "behind.png", "--out", "out"], &["hidden", "a file"]);
+}
+
+#[test]
+fn flat_scenes_are_stated_once() {
+    let folder = folder();
+    write_rgbd(folder.path(), |_, _| 2000);
+    let scene = ["run", "camera.ron", "--scene", "room.png", "--out", "out"];
+    let flat = |more: &[&'static str]| [&scene[..], more].concat();
+    let alone = common::dioptric(folder.path(), &flat(&["--width-mm", "30"]));
+    assert!(!alone.status.success() && String::from_utf8_lossy(&alone.stderr).contains("--distance-mm"));
+    let both = flat(&["--width-mm", "30", "--distance-mm", "500", "--fov-deg", "3"]);
+    assert!(!common::dioptric(folder.path(), &both).status.success());
+    check_error(folder.path(), &flat(&["--width-mm", "-3", "--distance-mm", "500"]), &["width_mm is -3"]);
+    let world = ["run", "--width-mm", "30", "--distance-mm", "500", "--out", "out"];
+    check_error(folder.path(), &world, &["flat is the size of what has depths of its own"]);
+}

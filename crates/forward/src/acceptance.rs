@@ -223,6 +223,33 @@ fn depth_edges_are_four_times_better_than_scattered_points() {
     assert!(known_edge <= 0.03 && known_off <= 0.006, "{known_edge} / {known_off}");
 }
 
+#[test]
+fn unknown_places_of_a_layer_are_guessed() {
+    let scene = SlantedPlane::new();
+    let pixels = scene.pixels();
+    let picture = |source: &Source<'_>| rendered(source, &lens(), &pixels.film, &Settings::default()).remove(0);
+    let source = pixels.source();
+    // A layer of which nothing is known is as good as none, to the bit.
+    let unknown = OccludedLayer { radiance: source.radiance, depth: source.depth };
+    let guessed = picture(&source);
+    assert_eq!(picture(&Source { occluded: Some(unknown), ..source }), guessed);
+    // Known in the upper half alone, it is what is known there and guessed below.
+    let (radiance, behind) = scene.behind();
+    let mut half = behind.z_m().clone();
+    let middle = half.nrows() / 2;
+    half.slice_mut(s![middle.., ..]).assign(&source.depth.z_m().slice(s![middle.., ..]));
+    let half = DepthMap::new(half).unwrap();
+    let half = picture(&Source { occluded: Some(OccludedLayer { radiance: &radiance, depth: &half }), ..source });
+    let known = picture(&Source { occluded: Some(OccludedLayer { radiance: &radiance, depth: &behind }), ..source });
+    let far = half.nrows() / 4;
+    let rms_between = |rows: std::ops::Range<usize>, other: &Array2<f32>| {
+        let part = |plane: &Array2<f32>| plane.slice(s![rows.clone(), ..]).to_owned();
+        rms((part(&half) - part(other)).iter().map(|v| f64::from(*v)))
+    };
+    assert!(rms_between(0..far, &known) < 1e-3 * rms_between(0..far, &guessed));
+    assert!(rms_between(3 * far..4 * far, &guessed) < 1e-3 * rms_between(3 * far..4 * far, &known));
+}
+
 /// Convolution with the lens's own disc, by the sum, the plane going on as 0.
 fn convolved(plane: &Array2<f32>, kernel: &Array2<f32>) -> Array2<f64> {
     let (rows, columns) = plane.dim();

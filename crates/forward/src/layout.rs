@@ -1,7 +1,6 @@
 //! The work of a plan: layers of depth over the film, their kernels, and the imaging of a band.
 
 use std::{
-    borrow::Cow,
     collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
@@ -32,6 +31,9 @@ use crate::{
 /// Kernels and alpha that a plan keeps when nothing else is asked for, bytes.
 const KEPT_BUDGET_BYTES: usize = 256 << 20;
 
+/// What bands in flight take when nothing else is asked for, bytes.
+const IN_FLIGHT_BYTES: usize = 256 << 20;
+
 /// A plan but for the lens, which each method takes.
 pub(crate) struct Layout {
     pub(crate) spec: ImagingSpec,
@@ -53,6 +55,8 @@ pub(crate) struct Layout {
     /// Of each band that was asked for, those of all layers.
     maps: Mutex<BTreeMap<usize, Arc<Vec<FilmMap>>>>,
     pub(crate) stopwatch: Stopwatch,
+    /// Bytes that bands in flight may take; `None` for the usual ones, and as many bands as there are threads (up to four) at least.
+    pub(crate) in_flight_bytes: Option<usize>,
 }
 
 /// Layers of depth over a film, each on its raster.
@@ -169,6 +173,7 @@ impl Layout {
             kept,
             maps: Mutex::default(),
             stopwatch,
+            in_flight_bytes: None,
             spec,
         })
     }
@@ -313,8 +318,10 @@ impl Layout {
         (0..self.layers.len()).into_par_iter().map(covered).collect()
     }
 
-    pub(crate) fn stream(
+    /// Images the bands from `first` on.
+    pub(crate) fn stream_from(
         &self,
+        first: usize,
         lens: &dyn LensImage,
         radiance: &SceneRadiance<'_>,
         watch: &Watch<'_>,
@@ -323,21 +330,28 @@ impl Layout {
         let n_bands = self.spec.grid.len();
         let n_patches = self.tiling.n_patches() as u64;
         let n_kernels = self.tiling.n_knots() as u64 * self.kernel_bands.len() as u64;
-        let n_planes = n_bands + if self.hides() { self.basis_bands.len() } else { 0 };
+        let n_planes = n_bands.saturating_sub(first) + if self.hides() { self.basis_bands.len() } else { 0 };
         let n_units = n_patches * n_planes as u64 * PATCH_UNITS + n_kernels * KERNEL_UNITS;
         let work = Work::new(watch.cancel, watch.progress, watch.range, n_units);
         let mut hand_on = |band, picture| sink(band, picture).map_err(|reason| ForwardError::Sink { band, reason });
-        let mut lower = self.basis(lens, 0, &work)?;
+        let mut lower = None;
         let last = n_bands - 1;
         for pair in self.basis_bands.windows(2) {
+            let bands: Vec<usize> = (pair[0].max(first)..pair[1] + usize::from(pair[1] == last)).collect();
+            if bands.is_empty() {
+                continue;
+            }
+            let below = match lower.take() {
+                Some(basis) => basis,
+                None => self.basis(lens, pair[0], &work)?,
+            };
             let upper = self.basis(lens, pair[1], &work)?;
-            let bands: Vec<usize> = (pair[0]..pair[1] + usize::from(pair[1] == last)).collect();
             for group in bands.chunks(self.bands_at_once()) {
                 let pictures: Vec<Result<Array2<f32>, ForwardError>> = group
                     .par_iter()
                     .map(|&band| {
                         let fraction = (band - pair[0]) as f32 / (pair[1] - pair[0]) as f32;
-                        let basis = BasisBetween::new(&lower, &upper, fraction);
+                        let basis = BasisBetween::new(&below, &upper, fraction);
                         self.image_of(lens, band, &basis, radiance, &work)
                     })
                     .collect();
@@ -345,10 +359,11 @@ impl Layout {
                     hand_on(band, picture?)?;
                 }
             }
-            lower = upper;
+            lower = Some(upper);
         }
-        if n_bands == 1 {
-            hand_on(0, self.image_of(lens, 0, &BasisBetween::new(&lower, &lower, 0.0), radiance, &work)?)?;
+        if n_bands == 1 && first == 0 {
+            let only = self.basis(lens, 0, &work)?;
+            hand_on(0, self.image_of(lens, 0, &BasisBetween::new(&only, &only, 0.0), radiance, &work)?)?;
         }
         (watch.progress)(watch.range.1);
         Ok(())
@@ -356,13 +371,16 @@ impl Layout {
 
     /// How many bands are worked on at once: more than there are threads, so that none waits, where pictures are small.
     fn bands_at_once(&self) -> usize {
-        /// Planes of the film, or of the scene where that is larger, that a band takes while it is imaged.
+        let threads = rayon::current_num_threads();
+        let least = if self.in_flight_bytes.is_some() { 1 } else { threads.min(4) };
+        (self.in_flight_bytes.unwrap_or(IN_FLIGHT_BYTES) / self.band_bytes().max(1)).clamp(least, 4 * threads)
+    }
+
+    /// What a band takes while it is imaged, bytes: planes of the film, or of the scene where that is larger.
+    pub(crate) fn band_bytes(&self) -> usize {
         const PLANES: usize = 4;
-        const IN_FLIGHT_BYTES: usize = 256 << 20;
-        let Film { rows, columns, .. } = self.spec.film;
-        let (threads, (scene_rows, scene_columns)) = (rayon::current_num_threads(), self.size());
-        let n_samples = (rows * columns).max(scene_rows * scene_columns);
-        (IN_FLIGHT_BYTES / (PLANES * size_of::<f32>() * n_samples).max(1)).clamp(threads.min(4), 4 * threads)
+        let (Film { rows, columns, .. }, (scene_rows, scene_columns)) = (self.spec.film, self.size());
+        PLANES * size_of::<f32>() * (rows * columns).max(scene_rows * scene_columns)
     }
 
     /// Reads a band and images it.
@@ -392,11 +410,7 @@ impl Layout {
         work: &Work<'_>,
     ) -> Result<Array2<f32>, Cancelled> {
         let maps = self.maps_at(lens, band);
-        let occluded: Option<Cow<'_, Array2<f32>>> = match &self.occluded {
-            OccludedSamples::Nothing => None,
-            OccludedSamples::Estimated { fill, .. } => Some(Cow::Owned(fill.samples(light.front, work.cancel())?)),
-            OccludedSamples::Known(_) => light.occluded.map(Cow::Borrowed),
-        };
+        let occluded = self.occluded.samples(light.front, light.occluded, work.cancel())?;
         let front = light.front.as_standard_layout();
         let occluded = occluded.as_ref().map(|samples| samples.as_standard_layout());
         let mut surfaces = vec![self.layer_coordinates.surface(front.as_slice())];

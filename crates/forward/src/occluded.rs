@@ -1,6 +1,9 @@
 //! The second samples of a scene: what lies behind near surfaces, close to their edges.
 
+use std::borrow::Cow;
+
 use dioptric_spectrum::{Cancel, Cancelled, DepthMap};
+use ndarray::Array2;
 
 use crate::{
     BlurMode, SceneGeometry, Settings,
@@ -13,9 +16,26 @@ use crate::{
 /// Where the second samples come from, and their layer coordinates (NaN where there is none).
 pub(crate) enum OccludedSamples {
     Nothing,
-    Estimated { fill: Box<Fill>, layer_coordinates: LayerCoordinates },
-    Known(LayerCoordinates),
+    Estimated {
+        fill: Box<Fill>,
+        layer_coordinates: LayerCoordinates,
+    },
+    /// Given, and estimated where nothing is known.
+    Known {
+        guesses: Option<Box<Guesses>>,
+        layer_coordinates: LayerCoordinates,
+    },
 }
+
+/// Second samples that are estimated beside those that are given.
+pub(crate) struct Guesses {
+    fill: Fill,
+    /// Row and column of each.
+    places: Vec<(u32, u32)>,
+}
+
+/// How much farther than the first surface something must lie to be known as behind it, of a jump of depth: roundings.
+const LEAST_BEHIND: f32 = 0.05;
 
 impl OccludedSamples {
     /// Finds where blurred edges show what lies behind them.
@@ -40,12 +60,25 @@ impl OccludedSamples {
         let front = distances(scene.depth)?;
         if let Some(depth) = scene.occluded_depth {
             let (known, reach) = (distances(depth)?, reach_of_edges(&front, &rule, cancel)?);
+            let fill = Fill::find(&front, &rule, cancel)?;
+            let is_guessed = |row: usize, column: usize| {
+                let is_known = known[(row, column)] > front[(row, column)] + LEAST_BEHIND * rule.jump;
+                !is_known && !fill.distances[(row, column)].is_nan()
+            };
             let place = |row: usize, column: usize| {
+                if is_guessed(row, column) {
+                    return layers.coordinate_of_distance(fill.distances[(row, column)]);
+                }
                 let distance = known[(row, column)];
                 let shows = reach[row * size.1 + column] > 0.0 && distance > front[(row, column)] + 0.5 * rule.jump;
                 if shows { layers.coordinate_of_distance(distance) } else { f32::NAN }
             };
-            return Ok(Self::Known(LayerCoordinates::new(plane_of(size, cancel, place)?, cancel)?));
+            let layer_coordinates = LayerCoordinates::new(plane_of(size, cancel, place)?, cancel)?;
+            let all = (0..size.0).flat_map(|row| (0..size.1).map(move |column| (row, column)));
+            let places: Vec<(u32, u32)> =
+                all.filter(|&(r, c)| is_guessed(r, c)).map(|(r, c)| (r as u32, c as u32)).collect();
+            let guesses = if places.is_empty() { None } else { Some(Box::new(Guesses { fill, places })) };
+            return Ok(Self::Known { guesses, layer_coordinates });
         }
         let fill = Fill::find(&front, &rule, cancel)?;
         if fill.is_empty() {
@@ -63,20 +96,48 @@ impl OccludedSamples {
     pub(crate) fn layer_coordinates(&self) -> Option<&LayerCoordinates> {
         match self {
             Self::Nothing => None,
-            Self::Estimated { layer_coordinates, .. } | Self::Known(layer_coordinates) => Some(layer_coordinates),
+            Self::Estimated { layer_coordinates, .. } | Self::Known { layer_coordinates, .. } => {
+                Some(layer_coordinates)
+            }
         }
     }
 
     /// Whether the light of the second samples is given, not estimated.
     pub(crate) fn needs_radiance(&self) -> bool {
-        matches!(self, Self::Known(_))
+        matches!(self, Self::Known { .. })
     }
 
     /// The bytes of memory beside the layer coordinates.
     pub(crate) fn size_bytes(&self) -> usize {
         match self {
             Self::Estimated { fill, .. } => fill.size_bytes(),
-            Self::Nothing | Self::Known(_) => 0,
+            Self::Known { guesses: Some(guesses), .. } => {
+                guesses.fill.size_bytes() + size_of_val(guesses.places.as_slice())
+            }
+            Self::Nothing | Self::Known { guesses: None, .. } => 0,
         }
+    }
+
+    /// Returns the light of the second samples of a band, `front` being that of the first and `given` what is known of them.
+    pub(crate) fn samples<'a>(
+        &self,
+        front: &Array2<f32>,
+        given: Option<&'a Array2<f32>>,
+        cancel: &Cancel,
+    ) -> Result<Option<Cow<'a, Array2<f32>>>, Cancelled> {
+        Ok(match self {
+            Self::Nothing => None,
+            Self::Estimated { fill, .. } => Some(Cow::Owned(fill.samples(front, cancel)?)),
+            Self::Known { guesses: None, .. } => given.map(Cow::Borrowed),
+            Self::Known { guesses: Some(guesses), .. } => {
+                let Some(mut samples) = given.cloned() else { return Ok(None) };
+                let filled = guesses.fill.samples(front, cancel)?;
+                for &(row, column) in &guesses.places {
+                    let place = (row as usize, column as usize);
+                    samples[place] = filled[place];
+                }
+                Some(Cow::Owned(samples))
+            }
+        })
     }
 }

@@ -91,6 +91,18 @@ impl ImagingPlan {
         self
     }
 
+    /// Returns the plan whose bands in flight take at most this many bytes together; one band is always worked on.
+    #[must_use]
+    pub fn with_band_budget(mut self, bytes: usize) -> Self {
+        self.layout.in_flight_bytes = Some(bytes);
+        self
+    }
+
+    /// Returns the bytes of memory that a band takes while it is imaged.
+    pub fn band_bytes(&self) -> usize {
+        self.layout.band_bytes()
+    }
+
     /// Returns the plan that adds up, by a clock, the time that its parts take; see [`times`](Self::times).
     #[must_use]
     pub fn with_clock(mut self, clock: Arc<Clock>) -> Self {
@@ -148,8 +160,30 @@ impl ImagingPlan {
         cancel: &Cancel,
         sink: &mut Sink<'_>,
     ) -> Result<(), ForwardError> {
+        self.stream_from(0, radiance, progress, cancel, sink)
+    }
+
+    /// Images the bands from `first` on as [`stream`](Self::stream) does, to the same bits: what is left of work that was
+    /// interrupted.
+    ///
+    /// # Errors
+    /// As [`stream`](Self::stream).
+    pub fn stream_from(
+        &self,
+        first: usize,
+        radiance: &SceneRadiance<'_>,
+        progress: &(dyn Fn(f64) + Sync),
+        cancel: &Cancel,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), ForwardError> {
         radiance.check(self.layout.size(), &self.layout.spec.grid)?;
         progress(0.0);
-        self.layout.stream(self.lens.as_ref(), radiance, &Watch { progress, range: (0.0, 1.0), cancel }, sink)
+        self.layout.stream_from(
+            first,
+            self.lens.as_ref(),
+            radiance,
+            &Watch { progress, range: (0.0, 1.0), cancel },
+            sink,
+        )
     }
 }

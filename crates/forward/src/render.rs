@@ -30,5 +30,5 @@ pub fn render(
     let lens: &dyn LensImage = if film.is_centered() { lens } else { &framed };
     progress(0.0);
     let layout = Layout::new(lens, &source.geometry(), spec, progress, (0.0, PLANNED), &cancel)?;
-    layout.stream(lens, &source.light(), &Watch { progress, range: (PLANNED, 1.0), cancel: &cancel }, sink)
+    layout.stream_from(0, lens, &source.light(), &Watch { progress, range: (PLANNED, 1.0), cancel: &cancel }, sink)
 }

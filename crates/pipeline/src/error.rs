@@ -113,6 +113,24 @@ pub enum PipelineError {
     /// Work that was stopped on request.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+    /// Less memory than the imaging of a scene takes.
+    #[error(
+        "the imaging may take {}, but scene, plan and film take at least {}: give it more memory, or take fewer pixels or bands",
+        shown_bytes(*budget_bytes),
+        shown_bytes(*least_bytes)
+    )]
+    Memory {
+        /// What it may take, bytes.
+        budget_bytes: u64,
+        /// The least that would do, bytes.
+        least_bytes: u64,
+    },
+    /// An amount of memory that is none.
+    #[error("an amount of memory is '{found}', expected a number with a unit, as 1GiB or 500MB")]
+    Bytes {
+        /// What was given.
+        found: String,
+    },
     /// A temporary file that cannot be written.
     #[error("cannot keep the irradiance in a temporary file: {reason}")]
     Spill {
@@ -145,6 +163,7 @@ impl PipelineError {
                 | Self::Read { .. }
                 | Self::Png { .. }
                 | Self::Spill { .. }
+                | Self::Memory { .. }
                 | Self::Optics(OpticsError::Io { .. })
                 | Self::Sensor(SensorError::Read { .. } | SensorError::Write { .. })
                 | Self::Scene(SceneError::Unwritable { .. })
@@ -220,4 +239,9 @@ impl From<ForwardError> for PipelineError {
             other => Self::Forward(other),
         }
     }
+}
+
+/// Returns an amount of memory in MiB, rounded up.
+fn shown_bytes(bytes: u64) -> String {
+    format!("{} MiB", bytes.div_ceil(1 << 20))
 }

@@ -15,6 +15,7 @@ mod error;
 pub mod figures;
 mod frame_files;
 mod light_field;
+mod memory;
 mod numbers;
 mod paintings;
 mod progress;
@@ -28,16 +29,18 @@ mod words;
 pub use dioptric_backward::{BandSampling, LightPaths, MicroArray, MicroElements, MicroLayout, Renderer, Rendering};
 pub use dioptric_optics::{MissingGlass, SeqNumbers};
 pub use dioptric_psf::Diffraction;
+pub use dioptric_scene::FillDepth;
 
 pub use camera::{
-    BankData, BankSpec, BlurSpec, Camera, Crop, Exposed, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec,
-    LightFieldSpec, Movements, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec,
+    BankData, BankSpec, BlurSpec, Camera, Crop, Exposed, FilmSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions,
+    LensSpec, LightFieldSpec, Movements, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec,
     SensorOptions, SensorSpec, StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
 pub use capture_files::write_capture;
 pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
+pub use memory::parse_bytes;
 pub use numbers::{number, parse_numbers, parse_pairs};
 pub use paintings::PaintingFolder;
 pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
@@ -46,7 +49,7 @@ pub use quality::Quality;
 pub use schema::generated_schemas;
 pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
-pub use staged::{Staged, write_file, write_json};
+pub use staged::{Leftover, Staged, write_file, write_json};
 pub use stages::{
     Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance, IrradianceSummary,
     KeptCamera, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,

@@ -1,7 +1,8 @@
 //! Results that appear whole or not at all.
 
 use std::{
-    fs, io,
+    fs::{self, File, OpenOptions, TryLockError},
+    io,
     path::{Path, PathBuf},
 };
 
@@ -9,17 +10,43 @@ use serde::Serialize;
 
 use crate::PipelineError;
 
+/// The file in a hidden folder that its owner holds locked as long as it lives, so that nobody needs to know of processes.
+const LOCK: &str = "lock";
+
+/// What stands in the names of hidden folders before the number of their process.
+const PARTIAL: &str = ".partial-";
+
 /// A file or folder of results that is written beside its place and moved there at the end.
 ///
-/// Dropped without [`commit`](Self::commit), it leaves nothing behind; files that were at the place before stay.
+/// It is written inside a hidden folder of its own, `.NAME.partial-PID` beside the target or `.run.partial-PID` in a folder that is
+/// there. Dropped without [`commit`](Self::commit), it leaves nothing behind; files that were at the place before stay. What a
+/// killed process left is removed when the next one writes to the same place; that of a process that lives is left alone.
 #[derive(Debug)]
 pub struct Staged {
     target: PathBuf,
-    partial: PathBuf,
+    /// The hidden folder.
+    root: PathBuf,
+    /// What is moved to the target.
+    content: PathBuf,
     is_folder: bool,
     /// Folders above the target that were made for it, outermost first.
     made_parents: Vec<PathBuf>,
     is_committed: bool,
+    lock: Option<File>,
+}
+
+/// The hidden folder that a killed process left; nobody else takes it while this is held.
+#[derive(Debug)]
+pub struct Leftover {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Leftover {
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
 }
 
 impl Staged {
@@ -32,11 +59,8 @@ impl Staged {
         if target.exists() && !target.is_dir() {
             return Err(PipelineError::Write { path: target.to_owned(), reason: "it is not a folder".to_owned() });
         }
-        let made_parents = make_parents(target).map_err(cannot)?;
-        // Inside an existing folder, so that a folder that cannot be written to is found out before the work.
-        let partial = if target.is_dir() { target.join(partial_name("run")) } else { beside(target) };
-        let staged = Self { target: target.to_owned(), partial, is_folder: true, made_parents, is_committed: false };
-        fs::create_dir(&staged.partial).map_err(cannot)?;
+        let staged = Self::begin(target, true).map_err(cannot)?;
+        fs::create_dir(&staged.content).map_err(cannot)?;
         Ok(staged)
     }
 
@@ -49,61 +73,152 @@ impl Staged {
         if target.is_dir() {
             return Err(PipelineError::Write { path: target.to_owned(), reason: "it is a folder".to_owned() });
         }
-        let made_parents = make_parents(target).map_err(cannot)?;
-        let staged = Self {
-            target: target.to_owned(),
-            partial: beside(target),
-            is_folder: false,
-            made_parents,
-            is_committed: false,
-        };
-        fs::File::create(&staged.partial).map_err(cannot)?;
+        let staged = Self::begin(target, false).map_err(cannot)?;
+        File::create(&staged.content).map_err(cannot)?;
+        remove(leftovers(target, false));
         Ok(staged)
+    }
+
+    /// Makes the hidden folder and those above it, and locks it.
+    fn begin(target: &Path, is_folder: bool) -> io::Result<Self> {
+        let made_parents = make_parents(target)?;
+        let made = Self::begin_in(target, is_folder, &made_parents);
+        if made.is_err() {
+            remove_empty(&made_parents);
+        }
+        made
+    }
+
+    fn begin_in(target: &Path, is_folder: bool, made_parents: &[PathBuf]) -> io::Result<Self> {
+        let name = target.file_name().map_or_else(|| "out".into(), ToOwned::to_owned);
+        let (folder, start) = places(target, is_folder);
+        // Another may take the folder for a leftover until it is locked; and an earlier process may have had this number.
+        for attempt in 0..100 {
+            let suffix = if attempt == 0 { String::new() } else { format!("-{attempt}") };
+            let root = folder.join(format!("{start}{}{suffix}", std::process::id()));
+            match fs::create_dir(&root) {
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
+                made => made?,
+            }
+            if let Lock::Held(lock) | Lock::Unknown(lock) = lock(&root) {
+                let content = root.join(if is_folder { "results".into() } else { name });
+                let (target, made_parents, lock) = (target.to_owned(), made_parents.to_vec(), Some(lock));
+                return Ok(Self { target, root, content, is_folder, made_parents, is_committed: false, lock });
+            }
+        }
+        Err(io::Error::other("no hidden folder beside it can be locked"))
     }
 
     /// Where to write.
     pub fn path(&self) -> &Path {
-        &self.partial
+        &self.content
     }
 
-    /// Moves what was written to its place.
+    /// The hidden folder, for what is not moved to the target; it is removed in the end.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// Returns the hidden folders that killed processes left for the same target.
+    pub fn leftovers(&self) -> Vec<Leftover> {
+        leftovers(&self.target, self.is_folder)
+    }
+
+    /// Moves what was written to its place, and removes what killed processes left for it.
     ///
     /// # Errors
     /// When a file cannot be moved.
     pub fn commit(mut self) -> Result<(), PipelineError> {
         let moved = if self.is_folder && self.target.is_dir() {
-            move_entries(&self.partial, &self.target)
+            move_entries(&self.content, &self.target)
         } else {
-            fs::rename(&self.partial, &self.target)
+            fs::rename(&self.content, &self.target)
         };
         moved.map_err(|reason| PipelineError::Write { path: self.target.clone(), reason: reason.to_string() })?;
         self.is_committed = true;
+        remove(self.leftovers());
         Ok(())
     }
 }
 
 impl Drop for Staged {
     fn drop(&mut self) {
+        // A file that is open cannot be removed everywhere; nothing can be done about what cannot be removed.
+        self.lock = None;
+        let _ = fs::remove_dir_all(&self.root);
         if self.is_committed {
             return;
         }
-        // Nothing can be done about what cannot be removed; empty folders only are taken away above it.
-        let _ = if self.is_folder { fs::remove_dir_all(&self.partial) } else { fs::remove_file(&self.partial) };
-        for parent in self.made_parents.iter().rev() {
-            let _ = fs::remove_dir(parent);
-        }
+        remove_empty(&self.made_parents);
     }
 }
 
-fn partial_name(name: &str) -> String {
-    format!(".{name}.partial-{}", std::process::id())
+/// Removes folders, the last first, as far as they are empty.
+fn remove_empty(folders: &[PathBuf]) {
+    for folder in folders.iter().rev() {
+        let _ = fs::remove_dir(folder);
+    }
 }
 
-/// Returns a hidden name in the folder of `target`.
-fn beside(target: &Path) -> PathBuf {
+/// Returns the folder in which the hidden folders for a target lie, and how their names start.
+fn places(target: &Path, is_folder: bool) -> (PathBuf, String) {
+    // Inside an existing folder, so that a folder that cannot be written to is found out before the work.
+    if is_folder && target.is_dir() {
+        return (target.to_owned(), format!(".run{PARTIAL}"));
+    }
     let name = target.file_name().map_or_else(|| "out".to_owned(), |name| name.to_string_lossy().into_owned());
-    let extension = target.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
-    target.with_file_name(partial_name(&name) + &extension)
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    (folder.to_owned(), format!(".{name}{PARTIAL}"))
+}
+
+/// Returns what killed processes left for a target, in the target and beside it.
+fn leftovers(target: &Path, is_folder: bool) -> Vec<Leftover> {
+    let beside = places(target, false);
+    let inside = is_folder.then(|| places(target, true)).filter(|inside| *inside != beside);
+    let mut found = Vec::new();
+    for (folder, start) in std::iter::once(beside).chain(inside) {
+        let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+        for path in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(&start)).map(|e| e.path()) {
+            if path.is_dir()
+                && let Lock::Held(lock) = lock(&path)
+            {
+                found.push(Leftover { path, _lock: lock });
+            }
+        }
+    }
+    found.sort_by(|a, b| a.path.cmp(&b.path));
+    found
+}
+
+fn remove(leftovers: Vec<Leftover>) {
+    for Leftover { path, _lock: lock } in leftovers {
+        // What cannot be removed is left for the next one.
+        drop(lock);
+        let _ = fs::remove_dir_all(path);
+    }
+}
+
+/// What came of locking a hidden folder.
+enum Lock {
+    /// It is ours.
+    Held(File),
+    /// Another holds it, or has removed the folder.
+    Taken,
+    /// The file system knows no locks: leftovers stay there.
+    Unknown(File),
+}
+
+fn lock(folder: &Path) -> Lock {
+    let path = folder.join(LOCK);
+    let Ok(file) = OpenOptions::new().create(true).truncate(false).write(true).open(&path) else {
+        return Lock::Taken;
+    };
+    match file.try_lock() {
+        // It may have been removed between being opened and being locked.
+        Ok(()) if path.exists() => Lock::Held(file),
+        Ok(()) | Err(TryLockError::WouldBlock) => Lock::Taken,
+        Err(TryLockError::Error(_)) => Lock::Unknown(file),
+    }
 }
 
 /// Makes the folders above `target` and returns those that were missing.
@@ -191,6 +306,47 @@ mod tests {
         staged.commit().unwrap();
         assert_eq!(fs::read_to_string(&target).unwrap(), "whole");
         assert_eq!(names_in(target.parent().unwrap()), ["lens.svg"]);
+    }
+
+    /// Leaves what a killed process would: a hidden folder that nobody holds.
+    fn leave(folder: &Path, name: &str, file: &str) {
+        let left = folder.join(name);
+        fs::create_dir_all(left.join("results")).unwrap();
+        fs::write(left.join(file), "half").unwrap();
+    }
+
+    #[test]
+    fn leftovers_of_the_dead_are_removed() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("out");
+        fs::create_dir(&target).unwrap();
+        leave(&target, ".run.partial-1", "results/half.txt");
+        leave(root.path(), ".out.partial-2", "lock");
+        leave(root.path(), ".other.partial-3", "lock");
+        let alive = Staged::folder(&target).unwrap();
+        assert_eq!(names_in(root.path()), [".other.partial-3", ".out.partial-2", "out"]);
+        // Found, and held until they are let go.
+        let found: Vec<PathBuf> = alive.leftovers().iter().map(|left| left.path().to_owned()).collect();
+        assert_eq!(found, [root.path().join(".out.partial-2"), target.join(".run.partial-1")]);
+        let second = Staged::folder(&target).unwrap();
+        fs::write(second.path().join("a.txt"), "whole").unwrap();
+        second.commit().unwrap();
+        // The first is alive, though its process has the same number.
+        assert_eq!(names_in(root.path()), [".other.partial-3", "out"]);
+        assert_eq!(names_in(&target).len(), 2);
+        fs::write(alive.path().join("b.txt"), "whole").unwrap();
+        alive.commit().unwrap();
+        assert_eq!(names_in(&target), ["a.txt", "b.txt"]);
+    }
+
+    #[test]
+    fn leftovers_of_a_file_are_removed_at_once() {
+        let root = tempfile::tempdir().unwrap();
+        leave(root.path(), ".lens.svg.partial-77", "lens.svg");
+        let staged = Staged::file(&root.path().join("lens.svg")).unwrap();
+        assert_eq!(names_in(root.path()).len(), 1);
+        drop(staged);
+        assert!(names_in(root.path()).is_empty());
     }
 
     #[test]

@@ -46,7 +46,7 @@ pub enum SceneError {
     },
     /// A file whose kind the name does not tell.
     #[error(
-        "{}: expected a .exr, .hdr (ENVI), .png, .jpg or .tif file, or a folder with one picture a band",
+        "{}: expected a .exr, .hdr (ENVI), .mat (ISETCam), .png, .jpg or .tif file, or a folder with one picture a band",
         file.display()
     )]
     UnknownKind {
@@ -99,6 +99,41 @@ pub enum SceneError {
     MissingDepth {
         /// The scene.
         name: String,
+    },
+    /// Depth that was not measured at some places, of which nobody says what it is.
+    #[error(
+        "{}: the depth at row {row}, column {column} is 0 or no number, as at {n_unmeasured} of {n_samples} samples: expected \
+         numbers above 0, or a choice of what is there (--fill-depth far, beside or METRES)",
+        file.display()
+    )]
+    Unmeasured {
+        /// The file.
+        file: PathBuf,
+        /// Row of the first such sample.
+        row: usize,
+        /// Column of the first such sample.
+        column: usize,
+        /// How many there are.
+        n_unmeasured: usize,
+        /// Samples in all.
+        n_samples: usize,
+    },
+    /// A layer that should lie behind the first surface and lies before it.
+    #[error(
+        "{name}: the hidden layer lies at {hidden_m} m at row {row}, column {column}, before the first surface at {first_m} m: \
+         expected it behind, or as far where nothing is known"
+    )]
+    HiddenInFront {
+        /// The scene.
+        name: String,
+        /// Row of the first such sample.
+        row: usize,
+        /// Column of the first such sample.
+        column: usize,
+        /// Depth of the hidden layer there, m.
+        hidden_m: f32,
+        /// Depth of the first surface there, m.
+        first_m: f32,
     },
     /// A scene under a light that is not known, which another cannot take the place of.
     #[error("{name}: the {what} on the scene is not known, so that it cannot be put under another: {instead}")]

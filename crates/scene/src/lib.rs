@@ -28,9 +28,9 @@ mod view;
 
 pub use error::SceneError;
 pub use formats::{
-    BandWriter, EnviCube, ExrParts, PictureSamples, ReadOptions, SpectralFile, read_band_folder, read_envi,
-    read_picture, read_picture_samples, read_planes_exr, read_scene, read_spectral_exr, write_planes_exr,
-    write_scene_exr, write_spectral_exr,
+    BandWriter, EnviCube, ExrParts, FillDepth, IsetScene, PictureSamples, ReadOptions, SpectralFile, read_band_folder,
+    read_envi, read_hidden_layer, read_iset_mat, read_picture, read_picture_samples, read_planes_exr, read_scene,
+    read_spectral_exr, write_planes_exr, write_scene_exr, write_spectral_exr,
 };
 pub use light::SceneLight;
 pub use preview::{srgb_preview, write_preview_png};

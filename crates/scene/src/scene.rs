@@ -7,6 +7,9 @@ use ndarray::{Array2, s};
 
 use crate::{SceneError, SceneLight, View, resample::resampled};
 
+/// How much nearer than the first surface, relatively, a hidden layer may be: half floats carry three digits.
+const HIDDEN_TOLERANCE: f32 = 2e-3;
+
 /// What stands before the camera, as seen from the projection center.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
@@ -22,6 +25,8 @@ pub struct Scene {
     pub hidden: Option<HiddenLayer>,
     /// The light on it, where that is known: what a white balance may go by.
     pub light: Option<SceneLight>,
+    /// What was done to its samples to make it, a sentence each: depths filled, bands resampled.
+    pub notes: Vec<String>,
 }
 
 /// What would be seen if the object at the center of each sample were taken away.
@@ -38,7 +43,7 @@ pub struct HiddenLayer {
 impl Scene {
     /// Returns a scene of radiance alone.
     pub fn new(name: impl Into<String>, radiance: SpectralImage) -> Self {
-        Self { name: name.into(), radiance, depth: None, view: None, hidden: None, light: None }
+        Self { name: name.into(), radiance, depth: None, view: None, hidden: None, light: None, notes: vec![] }
     }
 
     /// The number of rows.
@@ -118,6 +123,19 @@ impl Scene {
             self.check_size("the hidden layer", (hidden.radiance.rows(), hidden.radiance.columns()))?;
             self.check_size("the depth of the hidden layer", hidden.depth.z_m().dim())?;
             self.check_radiance(&hidden.radiance)?;
+            self.check_behind(hidden)?;
+        }
+        Ok(())
+    }
+
+    /// Checks that a hidden layer lies behind the first surface, but for roundings of the files that the two come from.
+    fn check_behind(&self, hidden: &HiddenLayer) -> Result<(), SceneError> {
+        let Some(first) = &self.depth else { return Ok(()) };
+        for (((row, column), &first_m), &hidden_m) in first.z_m().indexed_iter().zip(hidden.depth.z_m()) {
+            if hidden_m < (1.0 - HIDDEN_TOLERANCE) * first_m {
+                let name = self.name.clone();
+                return Err(SceneError::HiddenInFront { name, row, column, hidden_m, first_m });
+            }
         }
         Ok(())
     }
@@ -168,6 +186,7 @@ impl Scene {
             view: self.view.map(|v| v.cropped(rows.start, columns.start)),
             hidden,
             light: self.light.clone(),
+            notes: self.notes.clone(),
         })
     }
 
@@ -213,6 +232,7 @@ impl Scene {
             view: self.view.map(|view| view.binned(factor)),
             hidden,
             light: self.light.clone(),
+            notes: self.notes.clone(),
         })
     }
 
@@ -235,6 +255,7 @@ impl Scene {
             view: self.view,
             hidden,
             light: self.light.clone(),
+            notes: self.notes.clone(),
         })
     }
 

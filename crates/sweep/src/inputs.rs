@@ -86,7 +86,12 @@ fn paths(camera: &mut Camera) -> Vec<&mut PathBuf> {
         SceneSource::World(world) => Some(&mut world.file),
         SceneSource::StillLife { .. } | SceneSource::Target { .. } => None,
     };
-    lens.into_iter().chain(&mut camera.lens_reading.glasses).chain(sensor).chain(scene).collect()
+    lens.into_iter()
+        .chain(&mut camera.lens_reading.glasses)
+        .chain(sensor)
+        .chain(scene)
+        .chain(&mut camera.scene.hidden)
+        .collect()
 }
 
 impl Input {

@@ -58,7 +58,7 @@ impl ItemKey {
         // They decide nothing but the order, so that the words of a debugger will do.
         let of = |part: &dyn fmt::Debug| short(&hash(&format!("{part:?}")));
         let stages = [
-            of(&(&scene.source, scene.field_of_view_deg, scene.depth_m, &camera.wavelengths)),
+            of(&(&scene.source, scene.field_of_view_deg, scene.depth_m, scene.flat, &camera.wavelengths)),
             of(&(&camera.lens, &camera.lens_reading, camera.stop, camera.movements)),
             of(&((camera.focus, camera.film, camera.crop), sensor, camera.diffraction, camera.bank)),
             of(&(camera.blur, &camera.light_field)),

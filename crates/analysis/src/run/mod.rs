@@ -115,6 +115,8 @@ pub struct SceneData {
     pub light: Option<SceneLight>,
     /// Its correlated color temperature.
     pub light_temperature: Option<ColorTemperature>,
+    /// What was done to its samples to make it, a sentence each: depths filled, bands resampled.
+    pub notes: Vec<String>,
 }
 
 /// The irradiance of a run.
@@ -193,6 +195,7 @@ impl RunReport {
                 mean_luminance_cd_m2: scene.mean_luminance_cd_m2,
                 light: scene.light.clone(),
                 light_temperature: scene.light.as_ref().map(|light| light.illuminant.color_temperature()),
+                notes: scene.notes.clone(),
             },
             psf_bank: BankData::of(run.model),
             irradiance: IrradianceData {

@@ -29,7 +29,7 @@ pub use frames::{Exposed, FramesSpec};
 pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 pub use light_field::LightFieldSpec;
 pub use movements::Movements;
-pub use scene::{SceneSource, SceneSpec};
+pub use scene::{FlatSize, SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
 pub use world::{RenderEffort, RenderMethod, WorldSpec};
 

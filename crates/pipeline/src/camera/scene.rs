@@ -5,8 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_scene::{Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, read_scene};
-use dioptric_spectrum::{Cancel, Illuminant, WavelengthGrid};
+use dioptric_scene::{
+    FillDepth, Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, View, read_hidden_layer,
+    read_scene,
+};
+use dioptric_spectrum::{Cancel, DepthMap, Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
 use super::{check::Checker, world::WorldSpec};
@@ -26,6 +29,21 @@ pub struct SceneSpec {
     /// One depth for the whole scene, m; for files that hold no depth, and for targets.
     #[serde(default)]
     pub depth_m: Option<f64>,
+    /// A flat scene by its size, in place of field of view and depth: slides, documents, wafers. For files, whose own camera data
+    /// and depth it takes the place of, and for targets.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flat: Option<FlatSize>,
+    /// The depth of samples of a file where none was measured: code 0 of a depth picture (`Beside` if left out), 0 or NaN of
+    /// channel `Z` (refused if left out).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fill_depth: Option<FillDepth>,
+    /// A file of what lies behind the first surface of a file: radiance and depth of the same samples, depth 0 where that is not
+    /// known. A layer `hidden` of the file itself does as well.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hidden: Option<PathBuf>,
+    /// The number that a perfect white has in an ENVI file that does not state it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub white_level: Option<f64>,
     /// The light that the scene is put under: it lights reflectances and targets (D65 if left out), and takes the place of
     /// the light on all others (their own if left out), where that is known.
     #[serde(default)]
@@ -43,12 +61,43 @@ pub struct SceneSpec {
     pub mean_luminance_cd_m2: Option<f64>,
 }
 
+/// The size and the place of a flat scene that faces the camera.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct FlatSize {
+    /// Its width from edge to edge, mm.
+    pub width_mm: f64,
+    /// Its distance from the first vertex of the lens, mm.
+    pub distance_mm: f64,
+}
+
+impl FlatSize {
+    /// Returns the field of view (degrees) and the depth (m) of it, seen from the middle of an entrance pupil so far behind the first
+    /// vertex.
+    ///
+    /// # Errors
+    /// When the pupil is infinitely far away, or not behind the scene.
+    pub(crate) fn seen_from(self, pupil_z_mm: f64) -> Result<(f64, f64), PipelineError> {
+        let depth_mm = self.distance_mm + pupil_z_mm;
+        if !(depth_mm.is_finite() && depth_mm > 0.0) {
+            let reason = format!(
+                "the lens has its entrance pupil {pupil_z_mm} mm behind its first vertex, expected one behind the scene, {} mm \
+                 before it, and not at infinity",
+                self.distance_mm
+            );
+            return Err(PipelineError::Unsuitable { what: "flat", reason });
+        }
+        Ok((2.0 * (0.5 * self.width_mm / depth_mm).atan().to_degrees(), 1e-3 * depth_mm))
+    }
+}
+
 /// Where a scene's radiance comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum SceneSource {
-    /// A spectral EXR, an ENVI header, a folder of band pictures, or an ordinary picture.
+    /// A spectral EXR, an ENVI header, an `ISETCam` scene (`.mat`), a folder of band pictures, or an ordinary picture.
     File(PathBuf),
     /// The built-in still life, with objects at several depths.
     StillLife {
@@ -80,6 +129,10 @@ impl SceneSpec {
             source: SceneSource::File(path),
             field_of_view_deg: None,
             depth_m: None,
+            flat: None,
+            fill_depth: None,
+            hidden: None,
+            white_level: None,
             illuminant: None,
             illuminance_lux: None,
             light: None,
@@ -98,6 +151,16 @@ impl SceneSpec {
         }
         if let Some(luminance) = self.mean_luminance_cd_m2 {
             checker.positive("mean_luminance_cd_m2", luminance)?;
+        }
+        if let Some(level) = self.white_level {
+            checker.positive("white_level", level)?;
+        }
+        if let Some(FillDepth::Metres(z_m)) = self.fill_depth.filter(|fill| fill.check().is_err()) {
+            checker.wrong("fill_depth", &z_m.to_string(), "Beside, Far, or Metres above 0")?;
+        }
+        self.check_flat(checker)?;
+        if self.hidden.is_some() && !matches!(self.source, SceneSource::File(_)) {
+            checker.wrong("hidden", "a file", "a source that is a file as well")?;
         }
         if let Some(lux) = self.illuminance_lux {
             checker.positive("illuminance_lux", lux)?;
@@ -122,6 +185,7 @@ impl SceneSpec {
                 check_size(checker, columns, rows)?;
                 let missing = |key| checker.wrong(key, "missing", "a number: a target has none of its own");
                 match (self.field_of_view_deg, self.depth_m) {
+                    _ if self.flat.is_some() => Ok(()),
                     (None, _) => missing("field_of_view_deg"),
                     (_, None) => missing("depth_m"),
                     _ => Ok(()),
@@ -130,7 +194,36 @@ impl SceneSpec {
         }
     }
 
-    /// Returns the scene on the bands wanted, or on its own.
+    fn check_flat(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
+        let Some(FlatSize { width_mm, distance_mm }) = self.flat else { return Ok(()) };
+        checker.positive("width_mm", width_mm)?;
+        checker.positive("distance_mm", distance_mm)?;
+        if self.field_of_view_deg.is_some() || self.depth_m.is_some() {
+            let found = "a size beside a field of view or a depth";
+            checker.wrong("flat", found, "one or the other: they say the same")?;
+        }
+        match self.source {
+            SceneSource::File(_) | SceneSource::Target { .. } => Ok(()),
+            SceneSource::StillLife { .. } | SceneSource::World(_) => {
+                checker.wrong("flat", "the size of what has depths of its own", "a file or a target for it")
+            }
+        }
+    }
+
+    /// Returns the scene as it is seen through a lens whose entrance pupil is so far behind its first vertex: a flat scene by its
+    /// field of view and depth.
+    ///
+    /// # Errors
+    /// When no picture of a flat scene can be seen from there.
+    pub(crate) fn seen_from(mut self, pupil_z_mm: f64) -> Result<Self, PipelineError> {
+        if let Some(flat) = self.flat {
+            let (fov_deg, depth_m) = flat.seen_from(pupil_z_mm)?;
+            (self.field_of_view_deg, self.depth_m) = (Some(fov_deg), Some(depth_m));
+        }
+        Ok(self)
+    }
+
+    /// Returns the scene on the bands wanted, or on its own. A flat scene by its size needs a lens, and is none here.
     ///
     /// # Errors
     /// When a file cannot be read, lacks what is needed or holds what cannot be.
@@ -162,9 +255,15 @@ impl SceneSpec {
                     picture_white_cd_m2: illuminance_lux / PI,
                     depth_m: self.depth_m,
                     horizontal_fov_deg: self.field_of_view_deg,
+                    fill_depth: self.fill_depth,
+                    white_level: self.white_level,
                     ..ReadOptions::default()
                 };
-                read_scene(path, &options)?
+                let mut scene = read_scene(path, &options)?;
+                if let Some(hidden) = &self.hidden {
+                    scene.hidden = Some(read_hidden_layer(hidden, &options, &scene)?);
+                }
+                self.lay_flat(scene)?
             }
             SceneSource::World(world) => {
                 let reason = format!("{} is no picture but a world, expected to be rendered", world.file.display());
@@ -207,11 +306,22 @@ impl SceneSpec {
         if let Some(fov_deg) = self.field_of_view_deg {
             scene = scene.or_horizontal_fov_deg(fov_deg)?;
         }
+        scene = self.lay_flat(scene)?;
         if let Some(grid) = wanted.filter(|grid| *grid != scene.radiance.grid()) {
             scene = scene.resampled(grid)?;
         }
         scene.validate()?;
         self.light_up(&mut scene)?;
+        Ok(scene)
+    }
+
+    /// Returns the scene with the depth and the view of a flat one in place of its own, where its size is given.
+    fn lay_flat(&self, mut scene: Scene) -> Result<Scene, PipelineError> {
+        if let (Some(_), Some(fov_deg), Some(depth_m)) = (self.flat, self.field_of_view_deg, self.depth_m) {
+            let (rows, columns) = (scene.rows(), scene.columns());
+            scene.view = Some(View::from_horizontal_fov_deg(fov_deg, columns, rows)?);
+            scene.depth = Some(DepthMap::flat(rows, columns, depth_m).map_err(dioptric_scene::SceneError::from)?);
+        }
         Ok(scene)
     }
 
@@ -235,6 +345,9 @@ impl SceneSpec {
             SceneSource::File(path) => *path = folder.join(&path),
             SceneSource::World(world) => world.file = folder.join(&world.file),
             SceneSource::StillLife { .. } | SceneSource::Target { .. } => {}
+        }
+        if let Some(hidden) = &mut self.hidden {
+            *hidden = folder.join(&hidden);
         }
     }
 }

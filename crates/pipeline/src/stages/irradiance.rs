@@ -3,7 +3,7 @@
 use std::{
     borrow::Cow,
     fs::File,
-    io::{Read, Seek, SeekFrom, Write},
+    io::Write,
     path::Path,
     sync::{Mutex, PoisonError},
 };
@@ -13,7 +13,11 @@ use dioptric_scene::{BandWriter, ExrParts, Scene, read_spectral_exr};
 use dioptric_spectrum::{Bands, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::{Array2, Array3, ArrayView3, Axis};
 
-use super::{Watch, film::FilmPlace};
+use super::{
+    Watch,
+    band_store::{BandFolder, BandStore, read_plane},
+    film::FilmPlace,
+};
 use crate::{
     PipelineError, Stage,
     display::{LinearRgb, SpectrumToRgb},
@@ -150,15 +154,9 @@ impl Bands for Irradiance {
                 Ok(Cow::Owned(cube.index_axis(Axis(0), band).to_owned()))
             }
             Planes::File(file) => {
-                let unreadable = |e: std::io::Error| SpectrumError::Band { band, reason: e.to_string() };
-                let n_samples = self.size.0 * self.size.1;
-                let mut bytes = vec![0; 4 * n_samples];
                 let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
-                file.seek(SeekFrom::Start(band as u64 * bytes.len() as u64)).map_err(unreadable)?;
-                file.read_exact(&mut bytes).map_err(unreadable)?;
-                let samples = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-                let plane = Array2::from_shape_vec(self.size, samples).expect("as many samples as were asked for");
-                Ok(Cow::Owned(plane))
+                let plane = read_plane(&mut file, band, self.size);
+                plane.map(Cow::Owned).map_err(|error| SpectrumError::Band { band, reason: error.to_string() })
             }
         }
     }
@@ -168,31 +166,53 @@ fn size_bytes((rows, columns): (usize, usize), n_bands: usize) -> u64 {
     4 * rows as u64 * columns as u64 * n_bands as u64
 }
 
-/// Images the scene; bands that together take more than `memory_bytes` go to a temporary file.
+/// Where bands go as they are imaged.
+#[derive(Clone, Copy)]
+pub(super) struct Keeping<'a> {
+    /// What they may take together in memory; more goes to a file.
+    pub(super) memory_bytes: u64,
+    /// Where they are kept besides, for a run that goes on after this one was killed.
+    pub(super) folder: Option<&'a BandFolder>,
+}
+
+/// Images the scene, but for bands that an earlier run left.
 pub(super) fn image(
     plan: &ImagingPlan,
     scene: &Scene,
     place: &FilmPlace,
-    memory_bytes: u64,
+    keeping: Keeping<'_>,
     watch: &Watch<'_>,
 ) -> Result<Irradiance, PipelineError> {
     let (grid, size) = (scene.radiance.grid().clone(), (place.rows, place.columns));
-    let is_spilled = size_bytes(size, grid.len()) > memory_bytes;
+    let is_spilled = size_bytes(size, grid.len()) > keeping.memory_bytes;
     let cannot = |e: std::io::Error| PipelineError::Spill { reason: e.to_string() };
-    let mut file = if is_spilled { Some(tempfile::tempfile().map_err(cannot)?) } else { None };
+    let mut store = keeping.folder.map(|folder| folder.open(size, grid.len())).transpose()?;
+    let is_file_missing = is_spilled && store.is_none();
+    let mut file = if is_file_missing { Some(tempfile::tempfile().map_err(cannot)?) } else { None };
     let shape = (if is_spilled { 0 } else { grid.len() }, size.0, size.1);
     let mut cube = Array3::zeros(shape);
     let mut summing = Summing::new(&grid, size);
+    let first = store.as_ref().map_or(0, BandStore::n_done);
+    for band in 0..first {
+        let Some(plane) = store.as_mut().map(|store| store.read(band)).transpose()? else { break };
+        summing.add(band, &plane);
+        if !is_spilled {
+            cube.index_axis_mut(Axis(0), band).assign(&plane);
+        }
+    }
     let source = Source::of_scene(scene)?;
     let (progress, earlier) = (|fraction| watch.progress.at(Stage::Irradiance, fraction), plan.times());
-    plan.stream(&source.light(), &progress, watch.cancel, &mut |band, plane| {
+    plan.stream_from(first, &source.light(), &progress, watch.cancel, &mut |band, plane| {
         summing.add(band, &plane);
-        match &mut file {
-            Some(file) => {
-                let bytes: Vec<u8> = plane.iter().flat_map(|sample| sample.to_le_bytes()).collect();
-                file.write_all(&bytes)?;
-            }
-            None => cube.index_axis_mut(Axis(0), band).assign(&plane),
+        if let Some(store) = &mut store {
+            store.append(&plane)?;
+        }
+        if let Some(file) = &mut file {
+            let bytes: Vec<u8> = plane.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+            file.write_all(&bytes)?;
+        }
+        if !is_spilled {
+            cube.index_axis_mut(Axis(0), band).assign(&plane);
         }
         Ok(())
     })?;
@@ -200,6 +220,7 @@ pub(super) fn image(
     if times != ImagingTimes::default() {
         watch.progress.imaged(&times);
     }
+    let file = file.or(store.filter(|_| is_spilled).map(BandStore::into_file));
     let planes = file.map_or(Planes::Memory(cube), |file| Planes::File(Mutex::new(file)));
     Ok(Irradiance { grid, size, pitch_um: place.pitch_um, planes, summary: summing.summary })
 }
@@ -251,7 +272,7 @@ mod tests {
     use super::*;
     use crate::Silent;
 
-    fn image_with(memory_bytes: u64) -> Irradiance {
+    fn image_with(memory_bytes: u64, folder: Option<&BandFolder>) -> Irradiance {
         let grid = WavelengthGrid::uniform(450.0, 650.0, 100.0).unwrap();
         let planes = (0..3)
             .map(|band| Array2::from_shape_fn((24, 30), |(row, column)| ((row * 7 + column * 3 + band) % 11) as f32));
@@ -275,12 +296,34 @@ mod tests {
         let cancel = Cancel::new();
         let geometry = Source::of_scene(&scene).unwrap().geometry();
         let plan = ImagingPlan::new(std::sync::Arc::new(lens), &geometry, spec, &|_| {}, &cancel).unwrap();
-        image(&plan, &scene, &place, memory_bytes, &Watch { progress: &Silent, cancel: &cancel }).unwrap()
+        let keeping = Keeping { memory_bytes, folder };
+        image(&plan, &scene, &place, keeping, &Watch { progress: &Silent, cancel: &cancel }).unwrap()
+    }
+
+    #[test]
+    fn bands_of_a_killed_run_are_gone_on_with() {
+        let folder = tempfile::tempdir().unwrap();
+        let bands = BandFolder { path: folder.path().to_owned(), key: "camera".to_owned() };
+        let whole = image_with(u64::MAX, None);
+        for memory_bytes in [u64::MAX, 100] {
+            for n_left in [0, 1, 2, 3] {
+                let mut store = bands.open((16, 20), 3).unwrap();
+                (store.n_done()..n_left).for_each(|band| store.append(&whole.band(band).unwrap()).unwrap());
+                drop(store);
+                let resumed = image_with(memory_bytes, Some(&bands));
+                assert_eq!(resumed.is_spilled(), memory_bytes == 100);
+                for band in 0..3 {
+                    assert_eq!(resumed.band(band).unwrap(), whole.band(band).unwrap(), "{n_left} left, band {band}");
+                }
+                assert_eq!(resumed.summary.mean_lux, whole.summary.mean_lux);
+                std::fs::remove_file(folder.path().join("bands.ron")).unwrap();
+            }
+        }
     }
 
     #[test]
     fn spilled_bands_are_those_in_memory() {
-        let (kept, spilled) = (image_with(u64::MAX), image_with(100));
+        let (kept, spilled) = (image_with(u64::MAX, None), image_with(100, None));
         assert!(!kept.is_spilled() && spilled.is_spilled());
         for band in [2, 0, 1] {
             assert_eq!(kept.band(band).unwrap(), spilled.band(band).unwrap());
@@ -296,7 +339,7 @@ mod tests {
     fn file_gives_back_the_same_bits() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("irradiance.exr");
-        let made = image_with(u64::MAX);
+        let made = image_with(u64::MAX, None);
         made.write_exr(&path).unwrap();
         let read = Irradiance::read_exr(&path, None).unwrap();
         assert_eq!((read.pitch_um(), read.grid()), (made.pitch_um(), made.grid()));

@@ -1,6 +1,6 @@
 //! A camera that is kept and changed.
 
-use std::{fs, sync::Arc};
+use std::{fs, path::PathBuf, sync::Arc};
 
 use dioptric_forward::{ImagingPlan, check_depth_map};
 use dioptric_psf::LensImageModel;
@@ -10,11 +10,13 @@ use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, Quantity, SpectralI
 use dioptric_world::World;
 
 use super::{
-    Watch, bank, electrons,
+    Watch,
+    band_store::BandFolder,
+    bank, electrons,
     film::{self, FilmPlace},
     frames::{self, FrameSet, MovedLight},
     given::GivenParts,
-    irradiance::{self, Irradiance},
+    irradiance::{self, Irradiance, Keeping},
     lens::{self, ResolvedLens},
     plan,
     scene::{self, ResolvedScene, SceneSummary},
@@ -25,7 +27,10 @@ use super::{
     },
     world::{self, WorldRender},
 };
-use crate::{Camera, Frames, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
+use crate::{
+    Camera, Frames, Leftover, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage,
+    memory::MemoryBudget,
+};
 
 /// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
 const MEMORY_BYTES: u64 = 2 << 30;
@@ -57,6 +62,8 @@ pub struct KeptCamera {
     pub(super) given: GivenParts,
     quality: Quality,
     memory_bytes: u64,
+    budget: Option<MemoryBudget>,
+    bands: Option<(PathBuf, String)>,
     paintings: Option<PaintingFolder>,
     kept: Arc<KeptResults>,
 }
@@ -174,7 +181,8 @@ impl KeptCamera {
     /// A camera of which nothing is computed yet, at full quality.
     pub fn new(camera: Camera) -> Self {
         let (given, quality) = (GivenParts::default(), Quality::Full);
-        Self { camera, given, quality, memory_bytes: MEMORY_BYTES, paintings: None, kept: Arc::default() }
+        let (memory_bytes, kept) = (MEMORY_BYTES, Arc::default());
+        Self { camera, given, quality, memory_bytes, budget: None, bands: None, paintings: None, kept }
     }
 
     /// Returns the camera changed; what is kept is shared.
@@ -195,6 +203,46 @@ impl KeptCamera {
     #[must_use]
     pub fn with_memory_bytes(&self, memory_bytes: u64) -> Self {
         Self { memory_bytes, ..self.clone() }
+    }
+
+    /// Returns the camera whose imaging takes at most so many bytes: scene, plan, bands that are worked on and film. Irradiance that
+    /// does not fit goes to a temporary file. A plan that is kept already stays as it is.
+    #[must_use]
+    pub fn with_memory_budget(&self, bytes: u64) -> Self {
+        Self { budget: Some(MemoryBudget { bytes }), ..self.clone() }
+    }
+
+    /// Returns the camera that keeps bands of the irradiance in a folder as they are finished, for a run that goes on after this one
+    /// was killed; `build` tells builds of the program apart, since another may image otherwise.
+    #[must_use]
+    pub fn with_bands_kept_in(&self, folder: impl Into<PathBuf>, build: impl Into<String>) -> Self {
+        Self { bands: Some((folder.into(), build.into())), ..self.clone() }
+    }
+
+    /// Takes the finished bands that a killed run of this camera left, to go on from there; returns whether there were any.
+    ///
+    /// # Errors
+    /// When they cannot be moved to the folder of this camera's bands, or there is none.
+    pub fn take_bands(&self, leftovers: &[Leftover]) -> Result<bool, PipelineError> {
+        let inputs = self.irradiance_inputs()?;
+        let Some(folder) = self.band_folder(&inputs)? else { return Ok(false) };
+        for leftover in leftovers {
+            if folder.adopt(leftover.path())? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Returns where bands are kept: a part of the camera that was made in a program has no name by which to know it again.
+    fn band_folder(&self, inputs: &IrradianceInputs) -> Result<Option<BandFolder>, PipelineError> {
+        let Some((path, build)) = self.bands.as_ref().filter(|_| self.given.check_none().is_ok()) else {
+            return Ok(None);
+        };
+        let key = (build, self.quality, &self.camera, inputs.files().collect::<Vec<_>>());
+        let key = ron::to_string(&key)
+            .map_err(|error| PipelineError::Write { path: path.clone(), reason: error.to_string() })?;
+        Ok(Some(BandFolder { path: path.clone(), key }))
     }
 
     /// Returns the camera that keeps paintings of the still life in a folder, for it and others to take from there.
@@ -392,8 +440,7 @@ impl KeptCamera {
     }
 
     fn chain<'a>(&'a self, progress: &'a dyn Progress, cancel: &'a Cancel) -> Chain<'a> {
-        let (kept, paintings) = (&*self.kept, self.paintings.as_ref());
-        Chain { kept, paintings, memory_bytes: self.memory_bytes, watch: Watch { progress, cancel } }
+        Chain { camera: self, kept: &self.kept, paintings: self.paintings.as_ref(), watch: Watch { progress, cancel } }
     }
 
     pub(super) fn irradiance_inputs(&self) -> Result<IrradianceInputs, PipelineError> {
@@ -419,9 +466,9 @@ fn check_glasses(lens: &ResolvedLens, grid: Option<&WavelengthGrid>) -> Result<(
 
 /// The stages in their order, each asking for the ones it needs.
 struct Chain<'a> {
+    camera: &'a KeptCamera,
     kept: &'a KeptResults,
     paintings: Option<&'a PaintingFolder>,
-    memory_bytes: u64,
     watch: Watch<'a>,
 }
 
@@ -436,7 +483,11 @@ impl Chain<'_> {
             self.watch.cancel.check()?;
             let scene = match inputs.geometry.world() {
                 Some((_, spec)) => world::view(inputs, spec, &self.world(&inputs.geometry)?, &self.watch)?,
-                None => scene::open(inputs, self.paintings, &self.watch)?,
+                None => {
+                    let lens = inputs.geometry.flat.as_ref().map(|(_, lens)| self.lens(lens)).transpose()?;
+                    let pupil_z_mm = lens.map(|lens| lens.reference.projection_center_z_mm());
+                    scene::open(inputs, pupil_z_mm, self.paintings, &self.watch)?
+                }
             };
             self.watch.progress.at(Stage::Scene, 1.0);
             Ok(scene)
@@ -489,9 +540,12 @@ impl Chain<'_> {
 
     fn plan(&self, inputs: &PlanInputs, scene: &SceneInputs) -> Result<Arc<ImagingPlan>, PipelineError> {
         self.kept.plan.get_or_make(inputs.clone(), |inputs| {
-            let model = self.bank(&inputs.bank, scene)?;
             let (place, resolved) = (self.film(&inputs.bank.film, scene)?, self.scene(scene)?);
-            plan::plan(inputs, model, &place, &resolved.scene, &self.watch)
+            let budget = self.camera.budget;
+            // What is too large for it is found before the lens is traced.
+            budget.map_or(Ok(()), |budget| budget.check(&resolved.scene, &place))?;
+            let model = self.bank(&inputs.bank, scene)?;
+            plan::plan(inputs, model, &place, &resolved.scene, budget, &self.watch)
         })
     }
 
@@ -510,7 +564,12 @@ impl Chain<'_> {
             let resolved = self.scene(&inputs.scene)?;
             let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
             let scene: &Scene = &resolved.scene;
-            irradiance::image(&plan, scene, &place, self.memory_bytes, &self.watch)
+            let memory_bytes = match self.camera.budget {
+                Some(budget) => budget.irradiance_bytes(&plan, scene, &place)?,
+                None => self.camera.memory_bytes,
+            };
+            let folder = self.camera.band_folder(inputs)?;
+            irradiance::image(&plan, scene, &place, Keeping { memory_bytes, folder: folder.as_ref() }, &self.watch)
         })
     }
 

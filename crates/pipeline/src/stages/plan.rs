@@ -7,13 +7,14 @@ use dioptric_psf::LensImageModel;
 use dioptric_scene::Scene;
 
 use super::{Watch, film::FilmPlace, spec::PlanInputs};
-use crate::{BlurSpec, PipelineError, Quality, Stage};
+use crate::{BlurSpec, PipelineError, Quality, Stage, memory::MemoryBudget};
 
 pub(super) fn plan(
     inputs: &PlanInputs,
     model: Arc<LensImageModel>,
     place: &FilmPlace,
     scene: &Scene,
+    budget: Option<MemoryBudget>,
     watch: &Watch<'_>,
 ) -> Result<ImagingPlan, PipelineError> {
     let mode = match inputs.blur {
@@ -36,6 +37,10 @@ pub(super) fn plan(
     let spec = ImagingSpec { film: place.film(), grid: scene.radiance.grid().clone(), settings };
     let progress = |fraction| watch.progress.at(Stage::Plan, fraction);
     let plan = ImagingPlan::new(model, &Source::of_scene(scene)?.geometry(), spec, &progress, watch.cancel)?;
+    let plan = match budget {
+        Some(budget) => budget.fit(plan, scene, place)?,
+        None => plan,
+    };
     Ok(match watch.progress.clock() {
         Some(clock) => plan.with_clock(clock),
         None => plan,

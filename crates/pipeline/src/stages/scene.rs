@@ -30,6 +30,9 @@ pub struct SceneSummary {
     pub light: Option<SceneLight>,
     /// Centers of its bands, nm.
     pub wavelengths_nm: Vec<f64>,
+    /// What was done to its samples to make it, a sentence each: depths filled, bands resampled.
+    #[serde(default)]
+    pub notes: Vec<String>,
 }
 
 impl SceneSummary {
@@ -44,6 +47,7 @@ impl SceneSummary {
             mean_luminance_cd_m2: scene.mean_luminance_cd_m2(),
             light: scene.light.clone(),
             wavelengths_nm: scene.radiance.grid().centers_nm().to_vec(),
+            notes: scene.notes.clone(),
         })
     }
 
@@ -69,25 +73,24 @@ pub struct ResolvedScene {
 ///
 /// A full scene has the samples and bands of its source. Of a lower quality a computed scene is made with fewer of both,
 /// and one from a file is averaged over blocks of samples and over wider bands; a depth is that of the middle of its block.
+/// A flat scene by its size is seen from an entrance pupil `pupil_z_mm` behind the first vertex.
 pub(super) fn open(
     inputs: &SceneInputs,
+    pupil_z_mm: Option<f64>,
     paintings: Option<&PaintingFolder>,
     watch: &Watch<'_>,
 ) -> Result<ResolvedScene, PipelineError> {
     let read = |scene, wanted| read(scene, wanted, paintings, watch);
-    let GeometryInputs { source, wavelengths, quality, field_of_view_deg, depth_m, .. } = &inputs.geometry;
+    let GeometryInputs { source, wavelengths, quality, .. } = &inputs.geometry;
     let wanted = wavelengths.grid()?;
-    let choice = |source| SceneSpec {
-        source,
-        field_of_view_deg: *field_of_view_deg,
-        depth_m: *depth_m,
-        illuminant: inputs.illuminant.clone(),
-        light: inputs.light.clone(),
-        illuminance_lux: inputs.illuminance_lux,
-        mean_luminance_cd_m2: inputs.mean_luminance_cd_m2,
+    let whole = inputs.choice();
+    let whole = match pupil_z_mm {
+        Some(pupil_z_mm) => whole.seen_from(pupil_z_mm)?,
+        None => whole,
     };
+    let choice = |source| SceneSpec { source, ..whole.clone() };
     if let Some(given) = inputs.geometry.given.as_deref() {
-        let whole = choice(source.clone()).finish(given.clone(), wanted.as_ref())?;
+        let whole = whole.finish(given.clone(), wanted.as_ref())?;
         let bands = quality.bands_of(whole.radiance.grid())?;
         let binning = quality.scene_binning(whole.columns());
         let scene = if bands == *whole.radiance.grid() { whole } else { whole.resampled(&bands)? };

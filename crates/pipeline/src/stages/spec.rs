@@ -11,15 +11,16 @@ use std::{
 use dioptric_backward::MicroArray;
 use dioptric_forward::Film;
 use dioptric_optics::Lens;
-use dioptric_scene::Scene;
+use dioptric_scene::{FillDepth, Scene};
 use dioptric_sensor::{ExposureControl, Noise, Processing, Sensor};
 use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
 
 use super::given::{Given, GivenParts};
 use crate::{
-    BankSpec, BlurSpec, Camera, Crop, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec,
-    LightFieldSpec, Movements, PipelineError, Quality, SceneSource, StopSpec, WavelengthSpec, WorldSpec,
+    BankSpec, BlurSpec, Camera, Crop, Diffraction, FilmSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions,
+    LensSpec, LightFieldSpec, Movements, PipelineError, Quality, SceneSource, SceneSpec, StopSpec, WavelengthSpec,
+    WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -74,6 +75,10 @@ pub(crate) struct GeometryInputs {
     pub(crate) source: SceneSource,
     pub(crate) field_of_view_deg: Option<f64>,
     pub(crate) depth_m: Option<f64>,
+    /// The size of a flat scene, and the lens from whose entrance pupil it is seen.
+    pub(crate) flat: Option<(FlatSize, Box<LensInputs>)>,
+    pub(crate) fill_depth: Option<FillDepth>,
+    pub(crate) hidden: Option<PathBuf>,
     pub(crate) wavelengths: WavelengthSpec,
     pub(crate) quality: Quality,
     files: Vec<FileStamp>,
@@ -87,6 +92,7 @@ pub(crate) struct SceneInputs {
     pub(crate) illuminance_lux: Option<f64>,
     pub(crate) light: Option<Illuminant>,
     pub(crate) mean_luminance_cd_m2: Option<f64>,
+    pub(crate) white_level: Option<f64>,
 }
 
 /// A world, read from its files.
@@ -196,6 +202,24 @@ impl GeometryInputs {
 }
 
 impl SceneInputs {
+    /// Returns the part of a camera file that says this.
+    pub(crate) fn choice(&self) -> SceneSpec {
+        let GeometryInputs { source, field_of_view_deg, depth_m, flat, fill_depth, hidden, .. } = &self.geometry;
+        SceneSpec {
+            source: source.clone(),
+            field_of_view_deg: *field_of_view_deg,
+            depth_m: *depth_m,
+            flat: flat.as_ref().map(|(flat, _)| *flat),
+            fill_depth: *fill_depth,
+            hidden: hidden.clone(),
+            white_level: self.white_level,
+            illuminant: self.illuminant.clone(),
+            light: self.light.clone(),
+            illuminance_lux: self.illuminance_lux,
+            mean_luminance_cd_m2: self.mean_luminance_cd_m2,
+        }
+    }
+
     pub(crate) fn of(camera: &Camera, given: &GivenParts, quality: Quality) -> Self {
         let scene = &camera.scene;
         Self {
@@ -204,10 +228,16 @@ impl SceneInputs {
                 source: scene.source.clone(),
                 field_of_view_deg: scene.field_of_view_deg,
                 depth_m: scene.depth_m,
+                flat: scene.flat.map(|flat| (flat, Box::new(LensInputs::of(camera, given)))),
+                fill_depth: scene.fill_depth,
+                hidden: scene.hidden.clone(),
                 wavelengths: camera.wavelengths.clone(),
                 quality,
                 files: match &scene.source {
-                    SceneSource::File(path) if given.scene.is_none() => FileStamp::all_of(path),
+                    SceneSource::File(path) if given.scene.is_none() => {
+                        let hidden = scene.hidden.iter().flat_map(|path| FileStamp::all_of(path));
+                        FileStamp::all_of(path).into_iter().chain(hidden).collect()
+                    }
                     SceneSource::World(world) => FileStamp::all_of(&world.file),
                     _ => Vec::new(),
                 },
@@ -216,6 +246,7 @@ impl SceneInputs {
             light: scene.light.clone(),
             illuminance_lux: scene.illuminance_lux,
             mean_luminance_cd_m2: scene.mean_luminance_cd_m2,
+            white_level: scene.white_level,
         }
     }
 }

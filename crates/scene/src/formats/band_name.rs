@@ -1,4 +1,5 @@
-//! The names of spectral channels: `S0.550,000000nm`, `T.5,5e-7m`, `S0.545THz` (Fichet et al. 2021).
+//! The names of spectral channels: `S0.550,000000nm`, `T.5,5e-7m`, `S0.545THz` (Fichet et al. 2021, and pbrt's spectral film),
+//! `360.00-375.67nm` (a bin of Mitsuba 0.6) and the bare `550nm`.
 
 /// Metres a second.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
@@ -14,14 +15,30 @@ pub(crate) enum BandKind {
 
 /// Returns the kind and wavelength (nm) of a channel name, or `None` if it is no spectral channel.
 ///
-/// The decimal sign may be a comma or a point; polarised (`S1`–`S3`) and fluorescent channels are left alone.
+/// The decimal sign may be a comma or a point; polarised (`S1`–`S3`) and fluorescent channels are left alone. A wavelength alone
+/// holds light; of a bin the wavelength is its middle.
 pub(crate) fn parse(name: &str) -> Option<(BandKind, f64)> {
-    let (kind, rest) = if let Some(rest) = name.strip_prefix("S0.") {
-        (BandKind::Emissive, rest)
-    } else {
-        (BandKind::Reflective, name.strip_prefix("T.")?)
-    };
-    let (number, unit) = split_number(rest)?;
+    if let Some(rest) = name.strip_prefix("S0.") {
+        return Some((BandKind::Emissive, wavelength_nm(rest)?));
+    }
+    if let Some(rest) = name.strip_prefix("T.") {
+        return Some((BandKind::Reflective, wavelength_nm(rest)?));
+    }
+    if !name.starts_with(|c: char| c.is_ascii_digit()) {
+        return None;
+    }
+    if let Some((first, last)) = name.strip_suffix("nm").and_then(|bin| bin.split_once('-'))
+        && let (Ok(first_nm), Ok(last_nm)) = (first.parse::<f64>(), last.parse::<f64>())
+    {
+        let is_bin = first_nm > 0.0 && last_nm > first_nm && last_nm.is_finite();
+        return is_bin.then_some((BandKind::Emissive, 0.5 * (first_nm + last_nm)));
+    }
+    Some((BandKind::Emissive, wavelength_nm(name)?))
+}
+
+/// Returns the wavelength (nm) of a number with a unit.
+fn wavelength_nm(text: &str) -> Option<f64> {
+    let (number, unit) = split_number(text)?;
     let value: f64 = number.replace(',', ".").parse().ok()?;
     let wavelength_nm = if let Some(prefix) = unit.strip_suffix("Hz") {
         1e9 * SPEED_OF_LIGHT / (value * prefix_factor(prefix)?)
@@ -32,7 +49,7 @@ pub(crate) fn parse(name: &str) -> Option<(BandKind, f64)> {
             prefix => 1e9 * prefix_factor(prefix)? * value,
         }
     };
-    (wavelength_nm.is_finite() && wavelength_nm > 0.0).then_some((kind, wavelength_nm))
+    (wavelength_nm.is_finite() && wavelength_nm > 0.0).then_some(wavelength_nm)
 }
 
 /// Returns the name of a band; parsed again it gives the same wavelength to the bit.
@@ -116,12 +133,34 @@ mod tests {
         check("S0.500THz", BandKind::Emissive, 599.584916);
         check("S0.0,0005EHz", BandKind::Emissive, 599.584916);
         check("S0.5e14Hz", BandKind::Emissive, 599.584916);
+        check("550nm", BandKind::Emissive, 550.0);
+        check("550.25nm", BandKind::Emissive, 550.25);
+        check("0,55um", BandKind::Emissive, 550.0);
+        check("360.00-375.50nm", BandKind::Emissive, 367.75);
     }
 
     #[test]
     fn other_channels_are_left_alone() {
-        for name in ["R", "Z", "S1.550nm", "T.400nm.550nm", "S0.", "S0.nm", "S0.0nm", "S0.550", "S0.550xm", "T.é", ""]
-        {
+        for name in [
+            "R",
+            "Z",
+            "S1.550nm",
+            "T.400nm.550nm",
+            "S0.",
+            "S0.nm",
+            "S0.0nm",
+            "S0.550",
+            "S0.550xm",
+            "T.é",
+            "",
+            "550",
+            "7",
+            "2.A",
+            "400-300nm",
+            "0-1nm",
+            "-1-2nm",
+            "1e-7",
+        ] {
             assert_eq!(parse(name), None, "{name}");
         }
     }

@@ -12,6 +12,7 @@ use ndarray::Array2;
 use super::{
     beside::unreadable,
     envi_header::{self, DataType, EnviHeader, Interleave},
+    light_unit::LightUnit,
 };
 use crate::SceneError;
 
@@ -37,7 +38,8 @@ pub struct EnviCube {
 }
 
 impl EnviCube {
-    /// Returns the cube as an image: radiance where the header's `data units` say so, or else the reflectance.
+    /// Returns the cube as an image: radiance where the header's `data units` say so (`W/m^2/sr/nm`, `uW/(cm^2 sr nm)`,
+    /// `photons/s/m^2/sr/nm` and their like), or else the reflectance.
     ///
     /// Reflectance is relative to, in this order: `white_level`, the header's `reflectance scale factor`, or the cubes
     /// `white_reference*.hdr` and `dark_reference*.hdr` beside the file. Numbers below 0, which the noise of a dark
@@ -46,8 +48,9 @@ impl EnviCube {
     /// # Errors
     /// When nothing tells what a perfect white is.
     pub fn into_image(self, white_level: Option<f64>) -> Result<SpectralImage, SceneError> {
-        if white_level.is_none() && self.data_units.as_deref().is_some_and(is_radiance) {
-            return self.image(Quantity::Radiance);
+        let unit = self.data_units.as_deref().and_then(LightUnit::parse);
+        if let (None, Some(unit)) = (white_level, unit.filter(|unit| unit.quantity == Quantity::Radiance)) {
+            return self.radiance(unit);
         }
         if let Some(scale) = white_level.or(self.reflectance_scale) {
             let mut scaled = self;
@@ -100,6 +103,14 @@ impl EnviCube {
         self.clipped().image(Quantity::Reflectance)
     }
 
+    /// Returns the radiance of numbers in a unit.
+    fn radiance(mut self, unit: LightUnit) -> Result<SpectralImage, SceneError> {
+        for (plane, &wavelength_nm) in self.planes.iter_mut().zip(self.grid.centers_nm()) {
+            unit.convert(plane, wavelength_nm);
+        }
+        self.image(Quantity::Radiance)
+    }
+
     fn clipped(mut self) -> Self {
         self.planes.iter_mut().for_each(|plane| plane.mapv_inplace(|v| if v < 0.0 { 0.0 } else { v }));
         self
@@ -124,10 +135,6 @@ impl EnviCube {
         found.sort();
         found.first().map(|path| read_envi(path)).transpose()
     }
-}
-
-fn is_radiance(unit: &str) -> bool {
-    matches!(unit.trim(), "W.m^-2.sr^-1.nm^-1" | "W/m^2/sr/nm" | "W/(m^2 sr nm)" | "W m-2 sr-1 nm-1")
 }
 
 /// Reads an ENVI header and the file of numbers beside it: BSQ, BIL or BIP, any real data type and byte order.

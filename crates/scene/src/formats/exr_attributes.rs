@@ -3,6 +3,7 @@
 use dioptric_spectrum::Quantity;
 use exr::prelude::{AttributeValue, LayerAttributes, Text};
 
+use super::light_unit::LightUnit;
 use crate::{SceneError, View};
 
 const LAYOUT_VERSION: &str = "spectralLayoutVersion";
@@ -16,8 +17,8 @@ const FOV: &str = "viewHorizontalFovDeg";
 /// What the header of a layer tells.
 #[derive(Clone, Debug)]
 pub(crate) struct Attributes {
-    /// Radiance or irradiance, `None` where nothing is said; or the text of units that are not known.
-    pub(crate) quantity: Result<Option<Quantity>, String>,
+    /// Of radiance or irradiance, `None` where nothing is said; or the text of a unit that is not known.
+    pub(super) unit: Result<Option<LightUnit>, String>,
     pub(crate) pitch_um: Option<f64>,
     focal_px: Option<f64>,
     center_x_px: Option<f64>,
@@ -52,27 +53,21 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
         Some(AttributeValue::Text(text)) => text.to_string().trim().parse().ok(),
         _ => None,
     };
-    let quantity = match get(UNITS) {
-        Some(AttributeValue::Text(text)) => quantity_of(&text.to_string()).map(Some),
+    let unit = match get(UNITS) {
+        // `W.m^-2.sr^-1` is what the layout's reference library writes for values a nanometre.
+        Some(AttributeValue::Text(text)) => {
+            let text = text.to_string();
+            LightUnit::parse(&text).map(Some).ok_or(text)
+        }
         _ => Ok(None),
     };
     Attributes {
-        quantity,
+        unit,
         pitch_um: number(PITCH).filter(|pitch| pitch.is_finite() && *pitch > 0.0),
         focal_px: number(FOCAL),
         center_x_px: number(CENTER_X),
         center_y_px: number(CENTER_Y),
         fov_deg: number(FOV),
-    }
-}
-
-/// Returns what a unit measures. `W.m^-2.sr^-1` is what the layout's reference library writes for values a nanometre.
-fn quantity_of(unit: &str) -> Result<Quantity, String> {
-    let plain: String = unit.chars().filter(|c| !c.is_whitespace()).collect();
-    match plain.strip_suffix(".nm^-1").unwrap_or(&plain) {
-        "W.m^-2.sr^-1" => Ok(Quantity::Radiance),
-        "W.m^-2" => Ok(Quantity::Irradiance),
-        _ => Err(unit.to_owned()),
     }
 }
 
@@ -110,20 +105,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn units_tell_radiance_from_irradiance() {
-        assert_eq!(quantity_of("W.m^-2.sr^-1"), Ok(Quantity::Radiance));
-        assert_eq!(quantity_of("W.m^-2.sr^-1.nm^-1"), Ok(Quantity::Radiance));
-        assert_eq!(quantity_of("W . m^-2"), Ok(Quantity::Irradiance));
-        assert_eq!(quantity_of("photons"), Err("photons".to_owned()));
-    }
-
-    #[test]
     fn attributes_there_and_back() {
         let view = View { focal_px: 100.0 / 3.0, center_x_px: 1.5, center_y_px: 2.0 };
         let mut layer = LayerAttributes::default();
         add_to(&mut layer, Some(Quantity::Irradiance), Some(1.4), Some(view));
         let back = from_layer(&layer);
-        assert_eq!((back.quantity.clone(), back.pitch_um), (Ok(Some(Quantity::Irradiance)), Some(1.4)));
+        let quantity = back.unit.clone().unwrap().map(|unit| unit.quantity);
+        assert_eq!((quantity, back.pitch_um), (Some(Quantity::Irradiance), Some(1.4)));
         assert_eq!(back.view(10, 10).unwrap(), Some(view));
     }
 

@@ -171,6 +171,85 @@ fn half_floats_other_units_and_rgb_are_read() {
 }
 
 #[test]
+fn bands_of_other_renderers_are_read() {
+    let file = file();
+    // pbrt's spectral film; Mitsuba 0.6, whose bins are of 75 nm; a wavelength alone.
+    for names in [["S0.450,000000nm", "S0.525,000000nm"], ["412.50-487.50nm", "487.50-562.50nm"], ["450nm", "525.0nm"]]
+    {
+        write_raw(&file.path, vec![("R", flat(9.0)), (names[0], flat(2.0)), (names[1], flat(3.0))], &[]);
+        let back = read_spectral_exr(&file.path).unwrap();
+        assert_eq!(
+            (back.image.grid().centers_nm(), back.image.spectrum_at(1, 1)),
+            (&[450.0, 525.0][..], vec![2.0, 3.0])
+        );
+        assert_eq!(back.image.quantity(), Quantity::Radiance);
+    }
+}
+
+#[test]
+fn radiance_in_photons_becomes_watts() {
+    let file = file();
+    let unit = [("emissiveUnits", "photon.s^-1.m^-2.sr^-1")];
+    write_raw(&file.path, vec![("S0.500nm", flat(1e15)), ("S0.600nm", flat(1e15))], &unit);
+    let back = read_spectral_exr(&file.path).unwrap().image;
+    // h c / λ with h c = 1.98644586e-25 J m.
+    for (watts, nm) in back.spectrum_at(0, 1).iter().zip([500.0, 600.0]) {
+        approx::assert_relative_eq!(*watts, 1.986_445_86e-1 / nm, max_relative = 1e-6);
+    }
+}
+
+fn at_depth(channels: Vec<(&str, FlatSamples)>, fill_depth: Option<FillDepth>) -> Result<Scene, SceneError> {
+    let file = file();
+    write_raw(&file.path, channels, &[("viewHorizontalFovDeg", "30")]);
+    read_scene(&file.path, &ReadOptions { fill_depth, ..ReadOptions::default() })
+}
+
+#[test]
+fn colors_with_depth_are_a_scene() {
+    let color = |letter: &str| flat(if letter == "R" { 2.0 } else { 0.5 });
+    for (prefix, depth) in [("", "Z"), ("ViewLayer.Combined.", "ViewLayer.Depth.Z")] {
+        let names = ["R", "G", "B"].map(|letter| format!("{prefix}{letter}"));
+        let mut channels: Vec<_> = names.iter().map(|name| (name.as_str(), color(&name[name.len() - 1..]))).collect();
+        channels.push((depth, flat(3.0)));
+        let scene = at_depth(channels, None).unwrap();
+        assert_eq!(scene.require_depth().unwrap().range_m(), (3.0, 3.0));
+        let grid = scene.radiance.grid();
+        let xyz = dioptric_spectrum::Observer::Cie1931.xyz(grid, &scene.radiance.spectrum_at(0, 0));
+        let rgb = dioptric_spectrum::Xyz(xyz.0.map(|v| v / 100.0)).to_linear_srgb();
+        // Brighter than white stays so; the sRGB matrices are each other's inverse to 1e-6.
+        rgb.iter().zip([2.0, 0.5, 0.5]).for_each(|(v, e)| approx::assert_abs_diff_eq!(*v, e, epsilon = 2e-5));
+        assert!(scene.light.is_some());
+    }
+    assert!(at_depth(vec![("R", flat(1.0)), ("Z", flat(1.0))], None).unwrap_err().to_string().contains("no spectral"));
+}
+
+#[test]
+fn unmeasured_depth_is_filled_when_asked() {
+    let channels = || vec![("S0.500nm", flat(1.0)), ("Z", FlatSamples::F32(vec![0.0, 2.0, f32::NAN, 4.0]))];
+    let message = at_depth(channels(), None).unwrap_err().to_string();
+    assert!(message.contains("row 0, column 0") && message.contains("2 of 4 samples"), "{message}");
+    for (fill, first_m) in [(FillDepth::Beside, 2.0), (FillDepth::Far, 4.0), (FillDepth::Metres(7.5), 7.5)] {
+        let scene = at_depth(channels(), Some(fill)).unwrap();
+        assert_eq!(scene.require_depth().unwrap().z_m()[(0, 0)], first_m);
+        assert!(scene.notes[0].starts_with("2 of 4 samples (50.00 %) have no depth"), "{:?}", scene.notes);
+    }
+    assert!(at_depth(channels(), Some(FillDepth::Metres(-1.0))).is_err());
+    let negative = vec![("S0.500nm", flat(1.0)), ("Z", FlatSamples::F32(vec![-2.0, 2.0, 2.0, 4.0]))];
+    assert!(at_depth(negative, Some(FillDepth::Far)).unwrap_err().to_string().contains("-2 m"));
+}
+
+#[test]
+fn a_hidden_layer_in_front_is_refused_by_its_place() {
+    let (file, mut scene) = (file(), scene());
+    let mut z_m = scene.depth.as_ref().unwrap().z_m().clone();
+    z_m[(3, 2)] *= 0.5;
+    scene.hidden = Some(HiddenLayer { radiance: scene.radiance.clone(), depth: DepthMap::new(z_m).unwrap() });
+    write_scene_exr(&file.path, &scene, false).unwrap();
+    let message = read_scene(&file.path, &ReadOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("test.exr") && message.contains("row 3, column 2"), "{message}");
+}
+
+#[test]
 fn distance_becomes_depth_with_a_view() {
     let file = file();
     write_raw(&file.path, vec![("S0.500nm", flat(1.0)), ("distance", flat(2.0))], &[]);

@@ -11,15 +11,21 @@ mod exr_attributes;
 #[cfg(test)]
 mod exr_tests;
 mod exr_write;
+mod light_unit;
+mod mat;
+mod photons;
 mod picture;
 mod read_scene;
 mod spectral_exr;
+mod unmeasured;
 
 pub(crate) use beside::{PartialFile, unwritable};
 
 pub use band_folder::read_band_folder;
 pub use envi::{EnviCube, read_envi};
 pub use exr_write::{BandWriter, ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
+pub use mat::{IsetScene, read_iset_mat};
 pub use picture::{PictureSamples, read_picture, read_picture_samples};
-pub use read_scene::{ReadOptions, read_scene};
+pub use read_scene::{ReadOptions, read_hidden_layer, read_scene};
 pub use spectral_exr::{SpectralFile, read_planes_exr, read_spectral_exr};
+pub use unmeasured::FillDepth;

@@ -23,13 +23,7 @@ pub fn read_picture(
     grid: &WavelengthGrid,
     white_cd_m2: f64,
 ) -> Result<SpectralImage, SceneError> {
-    if !(white_cd_m2.is_finite() && white_cd_m2 > 0.0) {
-        return Err(SceneError::Setting {
-            what: "the luminance of the picture's white",
-            value: format!("{white_cd_m2} cd/m²"),
-            expected: "a finite number above 0".to_owned(),
-        });
-    }
+    check_white(white_cd_m2)?;
     let picture = decode(path)?.into_rgb16();
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
     let linear: Vec<f64> = (0..=u16::MAX).map(|code| srgb_decode(f64::from(code) / 65535.0)).collect();
@@ -45,6 +39,41 @@ pub fn read_picture(
         .collect();
     SpectralImage::new(Quantity::Radiance, grid.clone(), planes)
         .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })
+}
+
+fn check_white(white_cd_m2: f64) -> Result<(), SceneError> {
+    if white_cd_m2.is_finite() && white_cd_m2 > 0.0 {
+        return Ok(());
+    }
+    Err(SceneError::Setting {
+        what: "the luminance of the picture's white",
+        value: format!("{white_cd_m2} cd/m²"),
+        expected: "a finite number above 0".to_owned(),
+    })
+}
+
+/// Returns the radiance of a display that shows these linear sRGB colors, in which 1 is as bright as its white; brighter ones
+/// are brighter in proportion. What would need negative light is 0.
+pub(super) fn lifted(
+    rgb: &[Array2<f32>; 3],
+    display: &Display,
+    grid: &WavelengthGrid,
+    white_cd_m2: f64,
+) -> Result<SpectralImage, SceneError> {
+    check_white(white_cd_m2)?;
+    let basis = display.srgb_basis(grid, white_cd_m2);
+    let planes = (0..grid.len())
+        .into_par_iter()
+        .map(|band| {
+            let mut sum = Array2::<f64>::zeros(rgb[0].dim());
+            for (color, basis) in rgb.iter().zip(&basis) {
+                ndarray::Zip::from(&mut sum).and(color).for_each(|sum, &v| *sum += basis[band] * f64::from(v));
+            }
+            // NaN stays, to be refused by its place.
+            sum.mapv(|v| if v < 0.0 { 0.0 } else { v as f32 })
+        })
+        .collect();
+    Ok(SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?)
 }
 
 /// The samples of a picture as they stand in its file.

@@ -1,4 +1,4 @@
-//! Reading spectral OpenEXR in the layout of Fichet, Pacanowski and Wilkie (2021), with depth.
+//! Reading spectral OpenEXR in the layout of Fichet, Pacanowski and Wilkie (2021) and its relatives, with depth.
 
 use std::{collections::HashMap, fs::File, io::BufReader, path::Path};
 
@@ -13,6 +13,7 @@ use super::{
     band_name::{self, BandKind},
     beside::unreadable,
     exr_attributes::{self, Attributes},
+    light_unit::LightUnit,
 };
 use crate::{HiddenLayer, SceneError, View};
 
@@ -45,41 +46,85 @@ impl SpectralFile {
     /// # Errors
     /// When a converted distance is not above 0.
     pub fn depth_with(&self, view: Option<View>) -> Result<Option<DepthMap>, SceneError> {
-        if let (None, Some(distance), Some(view)) = (&self.depth, &self.distance_m, view) {
-            let z = Array2::from_shape_fn(distance.dim(), |(row, column)| {
-                let along = view.distance_per_depth(row as f64, column as f64);
-                (f64::from(distance[(row, column)]) / along) as f32
-            });
-            return Ok(Some(DepthMap::new(z)?));
+        if let (None, Some(distance_m), Some(view)) = (&self.depth, &self.distance_m, view) {
+            return Ok(Some(DepthMap::new(axial(distance_m, view))?));
         }
         Ok(self.depth.clone())
     }
 }
 
+/// Returns the axial depths of distances from the projection center.
+pub(super) fn axial(distance_m: &Array2<f32>, view: View) -> Array2<f32> {
+    Array2::from_shape_fn(distance_m.dim(), |(row, column)| {
+        let along = view.distance_per_depth(row as f64, column as f64);
+        (f64::from(distance_m[(row, column)]) / along) as f32
+    })
+}
+
 /// Reads a spectral EXR file.
 ///
 /// Channels are `S0.…` (radiance, or irradiance where `emissiveUnits` says so) or `T.…` (reflectance), in any number
-/// of decimals, with exponents and any unit of length or frequency, as half or single floats. Values are a
-/// nanometre. Other channels, such as RGB, are left alone, but for `Z` and `distance`.
+/// of decimals, with exponents and any unit of length or frequency, as half or single floats; so pbrt writes them too. `550nm`
+/// and a bin `360.00-375.67nm` (Mitsuba 0.6) are light likewise. Values are a nanometre, in W or photons. Other channels, such
+/// as RGB, are left alone, but for `Z` and `distance`.
 ///
 /// # Errors
 /// One sentence with the file's name when it is truncated, too large, without spectral bands, of mixed units, or holds
 /// a sample that is not finite or is negative.
 pub fn read_spectral_exr(path: &Path) -> Result<SpectralFile, SceneError> {
+    let RawFile { image, z_m, distance_m, view, hidden } = read_raw_exr(path)?;
+    let values = |reason| SceneError::Values { file: path.to_owned(), reason };
+    let map = |plane: Option<Array2<f32>>| plane.map(DepthMap::new).transpose().map_err(values);
+    let image = match image {
+        RawImage::Spectral(image) => image,
+        RawImage::Rgb(_) => return Err(no_bands(path)),
+    };
+    let hidden = match hidden {
+        Some((radiance, z_m)) => Some(HiddenLayer { radiance, depth: DepthMap::new(z_m).map_err(values)? }),
+        None => None,
+    };
+    Ok(SpectralFile { image, depth: map(z_m)?, distance_m: map(distance_m)?.map(|m| m.z_m().clone()), view, hidden })
+}
+
+fn no_bands(path: &Path) -> SceneError {
+    SceneError::NoBands {
+        file: path.to_owned(),
+        expected: "channels named like S0.550,000000nm (light) or T.550,000000nm (reflectance)",
+    }
+}
+
+/// What an EXR file holds, its depths as they stand.
+pub(super) struct RawFile {
+    pub(super) image: RawImage,
+    /// Axial depth; 0 or NaN may stand for none.
+    pub(super) z_m: Option<Array2<f32>>,
+    /// Distance from the projection center, likewise.
+    pub(super) distance_m: Option<Array2<f32>>,
+    pub(super) view: Option<View>,
+    /// Radiance and axial depth of the layer behind.
+    pub(super) hidden: Option<(SpectralImage, Array2<f32>)>,
+}
+
+/// The picture of an EXR file.
+pub(super) enum RawImage {
+    Spectral(SpectralImage),
+    /// Linear red, green and blue of a file without bands.
+    Rgb([Array2<f32>; 3]),
+}
+
+/// Reads an EXR file of bands or, where it has none, of red, green and blue.
+pub(super) fn read_raw_exr(path: &Path) -> Result<RawFile, SceneError> {
     let mut layers = read_layers(path)?;
     let Some(index) = layers.iter().position(|layer| layer.has_bands()) else {
-        return Err(SceneError::NoBands {
-            file: path.to_owned(),
-            expected: "channels named like S0.550,000000nm (light) or T.550,000000nm (reflectance)",
-        });
+        return rgb_of(layers, path);
     };
     let first = layers.swap_remove(index);
     let hidden = layers.into_iter().find(|layer| layer.name == HIDDEN_LAYER && layer.has_bands());
     let attributes = first.attributes.clone();
-    let (image, depth, distance_m) = first.into_image(path)?;
+    let (image, z_m, distance_m) = first.into_image(path)?;
     let hidden = match hidden {
         Some(layer) => match layer.into_image(path)? {
-            (radiance, Some(depth), _) => Some(HiddenLayer { radiance, depth }),
+            (radiance, Some(z_m), _) => Some((radiance, z_m)),
             _ => return Err(unreadable(path, "the layer 'hidden' has no channel 'Z'")),
         },
         None => None,
@@ -89,7 +134,35 @@ pub fn read_spectral_exr(path: &Path) -> Result<SpectralFile, SceneError> {
         None => image,
     };
     let view = attributes.view(image.columns(), image.rows()).map_err(|error| unreadable(path, error))?;
-    Ok(SpectralFile { image, depth, distance_m, view, hidden })
+    Ok(RawFile { image: RawImage::Spectral(image), z_m, distance_m, view, hidden })
+}
+
+/// Returns the picture of a file without bands: `R`, `G` and `B`, or Blender's `….Combined.R`; its depth is `Z` or `….Depth.Z`.
+fn rgb_of(layers: Vec<RawLayer>, path: &Path) -> Result<RawFile, SceneError> {
+    let attributes = layers[0].attributes.clone();
+    let mut planes: Vec<(String, Array2<f32>)> = layers.into_iter().flat_map(RawLayer::into_named).collect();
+    let mut take = |is_it: &dyn Fn(&str) -> bool| {
+        let index = planes.iter().position(|(name, _)| is_it(name))?;
+        Some(planes.swap_remove(index).1)
+    };
+    let mut color = |letter: &str| take(&|name| name == letter || name.ends_with(&format!("Combined.{letter}")));
+    let (Some(red), Some(green), Some(blue)) = (color("R"), color("G"), color("B")) else {
+        return Err(no_bands(path));
+    };
+    let is_depth =
+        |name: &str| ["Z", "depth.Z"].contains(&name) || name.ends_with("Depth.Z") || name.ends_with("Depth.V");
+    let z_m = take(&is_depth);
+    let distance_m = take(&|name| name == "distance");
+    let (rows, columns) = red.dim();
+    for (name, plane) in
+        [("G", Some(&green)), ("B", Some(&blue)), ("Z", z_m.as_ref()), ("distance", distance_m.as_ref())]
+    {
+        if plane.is_some_and(|plane| plane.dim() != (rows, columns)) {
+            return Err(unreadable(path, format!("its channels 'R' and '{name}' differ in size")));
+        }
+    }
+    let view = attributes.view(columns, rows).map_err(|error| unreadable(path, error))?;
+    Ok(RawFile { image: RawImage::Rgb([red, green, blue]), z_m, distance_m, view, hidden: None })
 }
 
 /// Reads every channel of an EXR file's first layer as single floats, by name.
@@ -108,11 +181,21 @@ struct RawLayer {
 }
 
 impl RawLayer {
+    /// Returns the channels, each with the name of the layer before its own where it has one.
+    fn into_named(self) -> Vec<(String, Array2<f32>)> {
+        let layer = self.name;
+        let full = |name: String| match (layer.as_str(), name.contains('.')) {
+            ("", _) | (_, true) => name,
+            (layer, false) => format!("{layer}.{name}"),
+        };
+        self.planes.into_iter().map(|(name, plane)| (full(name), plane)).collect()
+    }
+
     fn has_bands(&self) -> bool {
         self.planes.iter().any(|(name, _)| band_name::parse(name).is_some())
     }
 
-    /// Sorts the channels into an image, `Z` and `distance`.
+    /// Sorts the channels into an image, `Z` and `distance`, which are as they stand.
     fn into_image(self, path: &Path) -> Result<Parts, SceneError> {
         let mut kinds = HashMap::new();
         let mut bands = Vec::new();
@@ -135,27 +218,31 @@ impl RawLayer {
         if let Some(pair) = bands.windows(2).find(|pair| pair[0].0 == pair[1].0) {
             return units(format!("channels '{}' and '{}' are the same wavelength", pair[0].1, pair[1].1));
         }
-        let quantity = match (kinds.contains_key(&true), &self.attributes.quantity) {
-            (false, _) => Quantity::Reflectance,
-            (true, Ok(quantity)) => quantity.unwrap_or(Quantity::Radiance),
-            (true, Err(unknown)) => {
+        let unit = match &self.attributes.unit {
+            _ if !kinds.contains_key(&true) => None,
+            Ok(unit) => Some(unit.unwrap_or(LightUnit::RADIANCE)),
+            Err(unknown) => {
                 return units(format!(
-                    "emissiveUnits is '{unknown}': expected W.m^-2.sr^-1 or W.m^-2, a nanometre understood"
+                    "emissiveUnits is '{unknown}': expected W.m^-2.sr^-1 or W.m^-2, a nanometre understood, or photons \
+                     likewise"
                 ));
             }
         };
+        let quantity = unit.map_or(Quantity::Reflectance, |unit| unit.quantity);
         let values = |reason| SceneError::Values { file: path.to_owned(), reason };
         let grid = WavelengthGrid::new(bands.iter().map(|band| band.0).collect()).map_err(values)?;
-        let planes = bands.into_iter().map(|band| band.2).collect();
+        let in_watts = |(wavelength_nm, _, mut plane): (f64, String, Array2<f32>)| {
+            unit.iter().for_each(|unit| unit.convert(&mut plane, wavelength_nm));
+            plane
+        };
+        let planes = bands.into_iter().map(in_watts).collect();
         let image = SpectralImage::new(quantity, grid, planes).map_err(values)?;
         image.check_samples().map_err(values)?;
-        let depth = depth.map(DepthMap::new).transpose().map_err(values)?;
-        let distance_m = distance_m.map(DepthMap::new).transpose().map_err(values)?.map(|map| map.z_m().clone());
         Ok((image, depth, distance_m))
     }
 }
 
-type Parts = (SpectralImage, Option<DepthMap>, Option<Array2<f32>>);
+type Parts = (SpectralImage, Option<Array2<f32>>, Option<Array2<f32>>);
 
 /// Reads all layers; at least one.
 fn read_layers(path: &Path) -> Result<Vec<RawLayer>, SceneError> {

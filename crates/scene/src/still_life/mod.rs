@@ -110,6 +110,7 @@ impl StillLife {
             view: Some(View::from_horizontal_fov_deg(self.horizontal_fov_deg, self.columns, self.rows)?),
             hidden: None,
             light: Some(light_on_grays(&room::world())?),
+            notes: vec![],
         })
     }
 }

@@ -1,0 +1,109 @@
+//! Scenes that people have, from their files to the picture.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot set up its files fails")]
+
+mod common;
+
+use std::{fs, path::Path};
+
+use common::{CAMERA, dioptric, output};
+use dioptric_spectrum::Bands;
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    folder
+}
+
+fn report(folder: &Path, arguments: &[&str]) -> serde_json::Value {
+    serde_json::from_str(&output(folder, &[arguments, &["--json"]].concat())).unwrap()
+}
+
+#[test]
+fn isetcam_scene_is_photographed() {
+    let folder = folder();
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes");
+    let scene = scenes.join("iset_scene.mat");
+    let run = ["run", "camera.ron", "--scene", scene.to_str().unwrap(), "--out", "out", "--film", "scene"];
+    let report = report(folder.path(), &run);
+    assert_eq!((report["scene"]["columns"].as_u64(), report["scene"]["rows"].as_u64()), (Some(6), Some(4)));
+    assert!(report["scene"]["light"]["illuminance_lux"].as_f64().unwrap() > 100.0);
+    let note = report["scene"]["notes"][0].as_str().unwrap();
+    assert!(note.starts_with("5 bands of 420–700 nm, 60 to 80 nm apart become 3 bands"), "{note}");
+    let old = scenes.join("iset_scene_v73.mat");
+    let refused = dioptric(folder.path(), &["run", "camera.ron", "--scene", old.to_str().unwrap(), "--out", "bad"]);
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("version 7.3"));
+}
+
+/// A flat scene by its size is the one of the angle and the depth that it has from the entrance pupil.
+#[test]
+fn flat_scene_is_as_wide_as_stated() {
+    let folder = folder();
+    let info = output(folder.path(), &["lens", "info", "dgauss-50mm", "--wavelengths-nm", "550", "--json"]);
+    let info: serde_json::Value = serde_json::from_str(&info).unwrap();
+    let pupil_mm = info[0]["entrance_pupil_z_mm"].as_f64().unwrap();
+    let (width_mm, distance_mm) = (120.0, 400.0);
+    let depth_mm = distance_mm + pupil_mm;
+    let fov_deg = 2.0 * (0.5 * width_mm / depth_mm).atan().to_degrees();
+    let scene =
+        |words: &str| CAMERA.replace("field_of_view_deg: 14.0, depth_m: 2.0", words).replace("Uniform", "ColorChart");
+    let by_size = scene(&format!("flat: (width_mm: {width_mm:?}, distance_mm: {distance_mm:?})"));
+    let by_angle = scene(&format!("field_of_view_deg: {fov_deg}, depth_m: {}", 1e-3 * depth_mm));
+    let irradiance = |name: &str, text: &str| {
+        assert_ne!(text, CAMERA);
+        fs::write(folder.path().join(format!("{name}.ron")), text.replace("DistanceMm(2000.0)", "DistanceMm(400.0)"))
+            .unwrap();
+        output(folder.path(), &["run", &format!("{name}.ron"), "--out", name, "--quiet"]);
+        dioptric_pipeline::Irradiance::read_exr(&folder.path().join(name).join("irradiance.exr"), None).unwrap()
+    };
+    let (size, angle) = (irradiance("size", &by_size), irradiance("angle", &by_angle));
+    for band in 0..3 {
+        let (size, angle) = (size.band(band).unwrap(), angle.band(band).unwrap());
+        let most = size.iter().copied().fold(0.0, f32::max);
+        // The printed pupil has 17 digits; single precision, of depth too, is left.
+        let largest = size.iter().zip(angle.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(most > 0.0 && largest < 1e-4 * most, "{largest} of {most}");
+    }
+}
+
+/// What is given as lying behind is what is seen past an edge that is out of focus.
+#[test]
+fn hidden_layer_is_seen_past_an_edge() {
+    let folder = folder();
+    let save = |name: &str, color: &dyn Fn(u32) -> u8, depth: &dyn Fn(u32) -> u16| {
+        let picture = image::RgbImage::from_fn(64, 48, |x, _| image::Rgb([color(x); 3]));
+        dioptric_pictures::save(&picture.into(), &folder.path().join(format!("{name}.png"))).unwrap();
+        let map = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(64, 48, |x, _| image::Luma([depth(x)]));
+        dioptric_pictures::save(&map.into(), &folder.path().join(format!("{name}.depth.png"))).unwrap();
+    };
+    // A dark near half, in focus behind it a gray wall; what it hides is bright.
+    save("room", &|x| if x < 32 { 40 } else { 100 }, &|x| if x < 32 { 500 } else { 2000 });
+    save("behind", &|_| 255, &|x| if x < 32 { 2000 } else { 0 });
+    let light = |more: &[&str]| {
+        let run = [
+            "run",
+            "camera.ron",
+            "--scene",
+            "room.png",
+            "--fov-deg",
+            "14",
+            "--f-number",
+            "2",
+            "--out",
+            "out",
+            "--quiet",
+        ];
+        output(folder.path(), &[&run[..], more].concat());
+        let path = folder.path().join("out/irradiance.exr");
+        let irradiance = dioptric_pipeline::Irradiance::read_exr(&path, None).unwrap();
+        let green = irradiance.band(1).unwrap();
+        // The edge lies in the middle of the film; far from it nothing of the hidden is seen.
+        let at = |column: usize| f64::from(green[(16, column)]);
+        (at(23), at(2), at(45))
+    };
+    let (guessed, known) = (light(&[]), light(&["--hidden", "behind.png"]));
+    assert!(known.0 > 1.15 * guessed.0, "{known:?} {guessed:?}");
+    for (known, guessed) in [(known.1, guessed.1), (known.2, guessed.2)] {
+        assert!((known / guessed - 1.0).abs() < 0.02, "{known} {guessed}");
+    }
+}

@@ -1,0 +1,138 @@
+//! Finished bands of the irradiance in a file, from which a killed run goes on.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{Read, Seek, SeekFrom, Write},
+    path::{Path, PathBuf},
+};
+
+use ndarray::Array2;
+
+use crate::PipelineError;
+
+/// What the bands are made from.
+const KEY: &str = "bands.ron";
+/// The bands one after the other, little-endian.
+const BANDS: &str = "bands.raw";
+
+/// A folder in which bands are kept as they are finished, and what they are made from: another camera's are not taken.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct BandFolder {
+    pub(super) path: PathBuf,
+    pub(super) key: String,
+}
+
+/// The file of the bands, open.
+pub(super) struct BandStore {
+    file: File,
+    path: PathBuf,
+    size: (usize, usize),
+    n_done: usize,
+}
+
+impl BandFolder {
+    /// Takes the bands of another folder if they are of this camera; returns whether they were.
+    pub(super) fn adopt(&self, other: &Path) -> Result<bool, PipelineError> {
+        if fs::read_to_string(other.join(KEY)).ok().as_ref() != Some(&self.key) {
+            return Ok(false);
+        }
+        for name in [BANDS, KEY] {
+            fs::rename(other.join(name), self.path.join(name)).map_err(|error| self.unwritable(&error))?;
+        }
+        Ok(true)
+    }
+
+    /// Opens the file of the bands: what of it is whole stays, if it is of this camera.
+    pub(super) fn open(&self, size: (usize, usize), n_bands: usize) -> Result<BandStore, PipelineError> {
+        let opened = || -> std::io::Result<BandStore> {
+            let path = self.path.join(BANDS);
+            let is_ours = fs::read_to_string(self.path.join(KEY)).ok().as_ref() == Some(&self.key);
+            let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(!is_ours).open(&path)?;
+            let n_done = ((file.metadata()?.len() / band_bytes(size)) as usize).min(n_bands);
+            // Half a band, which the end of the process cut off, is made anew.
+            file.set_len(n_done as u64 * band_bytes(size))?;
+            file.seek(SeekFrom::End(0))?;
+            if !is_ours {
+                fs::write(self.path.join(KEY), &self.key)?;
+            }
+            Ok(BandStore { file, path, size, n_done })
+        };
+        opened().map_err(|error| self.unwritable(&error))
+    }
+
+    fn unwritable(&self, error: &std::io::Error) -> PipelineError {
+        PipelineError::Write { path: self.path.clone(), reason: error.to_string() }
+    }
+}
+
+impl BandStore {
+    /// How many bands are there, from the first on.
+    pub(super) fn n_done(&self) -> usize {
+        self.n_done
+    }
+
+    /// Returns a band that is there.
+    pub(super) fn read(&mut self, band: usize) -> Result<Array2<f32>, PipelineError> {
+        let plane = read_plane(&mut self.file, band, self.size);
+        plane.map_err(|error| PipelineError::Read { path: self.path.clone(), reason: error.to_string() })
+    }
+
+    /// Adds the next band.
+    pub(super) fn append(&mut self, plane: &Array2<f32>) -> std::io::Result<()> {
+        self.file.seek(SeekFrom::Start(self.n_done as u64 * band_bytes(self.size)))?;
+        let bytes: Vec<u8> = plane.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+        self.file.write_all(&bytes)?;
+        self.n_done += 1;
+        Ok(())
+    }
+
+    /// Returns the file, which holds all bands.
+    pub(super) fn into_file(self) -> File {
+        self.file
+    }
+}
+
+fn band_bytes((rows, columns): (usize, usize)) -> u64 {
+    4 * rows as u64 * columns as u64
+}
+
+/// Reads a band of a file of bands.
+pub(super) fn read_plane(file: &mut File, band: usize, size: (usize, usize)) -> std::io::Result<Array2<f32>> {
+    let mut bytes = vec![0; band_bytes(size) as usize];
+    file.seek(SeekFrom::Start(band as u64 * bytes.len() as u64))?;
+    file.read_exact(&mut bytes)?;
+    let samples = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    Ok(Array2::from_shape_vec(size, samples).expect("as many samples as were asked for"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_whole_bands_of_the_same_camera_stay() {
+        let (one, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let folder = |path: &Path, key: &str| BandFolder { path: path.to_owned(), key: key.to_owned() };
+        let size = (2, 3);
+        let plane = |band: usize| Array2::from_shape_fn(size, |(r, c)| (100 * band + 10 * r + c) as f32 + 0.1);
+        let first = folder(one.path(), "camera");
+        let mut store = first.open(size, 5).unwrap();
+        (0..3).for_each(|band| store.append(&plane(band)).unwrap());
+        drop(store);
+        // Killed amid the fourth.
+        let mut cut = OpenOptions::new().append(true).open(one.path().join(BANDS)).unwrap();
+        cut.write_all(&[1, 2, 3, 4, 5]).unwrap();
+        let mut again = first.open(size, 5).unwrap();
+        assert_eq!(again.n_done(), 3);
+        assert_eq!(again.read(1).unwrap(), plane(1));
+        again.append(&plane(3)).unwrap();
+        assert_eq!((again.read(3).unwrap(), again.n_done()), (plane(3), 4));
+        drop(again);
+        // Another folder takes them, if it is the same camera's.
+        assert!(!folder(other.path(), "another").adopt(one.path()).unwrap());
+        let second = folder(other.path(), "camera");
+        assert!(second.adopt(one.path()).unwrap());
+        assert_eq!(second.open(size, 5).unwrap().n_done(), 4);
+        assert_eq!(folder(other.path(), "another").open(size, 5).unwrap().n_done(), 0);
+    }
+}

@@ -1,0 +1,193 @@
+//! Units of spectral light as files write them: `W.m^-2.sr^-1`, `uW/(cm^2 sr nm)`, `photons/s/m^2/sr/nm`.
+
+use dioptric_spectrum::Quantity;
+use ndarray::Array2;
+
+use super::photons::joules_per_photon;
+
+/// What the numbers of a file are, and what makes them W m⁻² sr⁻¹ nm⁻¹ or W m⁻² nm⁻¹.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LightUnit {
+    /// Radiance or irradiance.
+    pub(super) quantity: Quantity,
+    factor: f64,
+    is_photons: bool,
+}
+
+impl LightUnit {
+    /// Radiance in W m⁻² sr⁻¹ nm⁻¹.
+    pub(super) const RADIANCE: Self = Self { quantity: Quantity::Radiance, factor: 1.0, is_photons: false };
+
+    /// Returns the unit of a text, or `None` where it is no unit of spectral light. A nanometre is understood where no length
+    /// of wavelength is stated.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let mut sum = Sum::default();
+        let mut rest = text.trim();
+        let mut below = Below::No;
+        while let Some(first) = rest.chars().next() {
+            match first {
+                '/' => (below, rest) = (Below::Next, &rest[1..]),
+                '(' if below == Below::Next => (below, rest) = (Below::Group, &rest[1..]),
+                ')' if below == Below::Group => (below, rest) = (Below::No, &rest[1..]),
+                _ if first.is_whitespace() || matches!(first, '.' | '*' | '·') => rest = &rest[first.len_utf8()..],
+                _ => {
+                    let (name, exponent, after) = power(rest)?;
+                    let sign = if below == Below::No { 1 } else { -1 };
+                    sum.add(name, sign * exponent)?;
+                    if below == Below::Next {
+                        below = Below::No;
+                    }
+                    rest = after;
+                }
+            }
+        }
+        if below == Below::No { sum.unit() } else { None }
+    }
+
+    /// Puts the samples of a band into watts.
+    pub(super) fn convert(self, plane: &mut Array2<f32>, wavelength_nm: f64) {
+        let joules = if self.is_photons { joules_per_photon(wavelength_nm) } else { 1.0 };
+        let factor = self.factor * joules;
+        // A factor of 1 keeps samples to the bit.
+        if factor != 1.0 {
+            plane.mapv_inplace(|v| (f64::from(v) * factor) as f32);
+        }
+    }
+}
+
+/// Whether what is read stands below a line of a fraction.
+#[derive(Clone, Copy, PartialEq)]
+enum Below {
+    No,
+    Next,
+    Group,
+}
+
+/// Splits `cm^-2 …` into its name, its exponent and the rest.
+fn power(text: &str) -> Option<(&str, i32, &str)> {
+    let end = text.find(|c: char| !c.is_alphabetic()).unwrap_or(text.len());
+    let (name, rest) = text.split_at(end);
+    let rest = rest.strip_prefix("**").or_else(|| rest.strip_prefix('^')).unwrap_or(rest);
+    let digits = rest.strip_prefix(['-', '+', '−']).unwrap_or(rest);
+    let n_digits = digits.bytes().take_while(u8::is_ascii_digit).count();
+    if name.is_empty() || n_digits > 2 {
+        return None;
+    }
+    if n_digits == 0 {
+        return Some((name, 1, rest));
+    }
+    let number: i32 = digits[..n_digits].parse().ok()?;
+    let sign = if rest.starts_with(['-', '−']) { -1 } else { 1 };
+    Some((name, sign * number, &digits[n_digits..]))
+}
+
+/// Exponents of what a unit is made of, and its factor.
+#[derive(Default)]
+struct Sum {
+    watts: i32,
+    photons: i32,
+    seconds: i32,
+    metres: i32,
+    steradians: i32,
+    wavelengths: i32,
+    log10_factor: i32,
+}
+
+impl Sum {
+    fn add(&mut self, name: &str, exponent: i32) -> Option<()> {
+        let (what, log10) = match name {
+            "W" | "watt" | "watts" => (&mut self.watts, 0),
+            "kW" => (&mut self.watts, 3),
+            "mW" => (&mut self.watts, -3),
+            "uW" | "µW" | "μW" => (&mut self.watts, -6),
+            "nW" => (&mut self.watts, -9),
+            "photon" | "photons" | "quanta" | "ph" | "q" => (&mut self.photons, 0),
+            "s" | "sec" => (&mut self.seconds, 0),
+            "m" => (&mut self.metres, 0),
+            "cm" => (&mut self.metres, -2),
+            "mm" => (&mut self.metres, -3),
+            "sr" => (&mut self.steradians, 0),
+            "nm" => (&mut self.wavelengths, 0),
+            "um" | "µm" | "μm" | "micron" => (&mut self.wavelengths, 3),
+            _ => return None,
+        };
+        *what += exponent;
+        self.log10_factor += log10 * exponent;
+        Some(())
+    }
+
+    fn unit(mut self) -> Option<LightUnit> {
+        // A spectral unit in metres alone: W.m^-3.sr^-1.
+        if self.metres == -3 && self.wavelengths == 0 {
+            self.metres = -2;
+            self.log10_factor -= 9;
+        }
+        let is_photons = match (self.watts, self.photons, self.seconds) {
+            (1, 0, 0) => false,
+            (0, 1, -1) => true,
+            _ => return None,
+        };
+        let quantity = match self.steradians {
+            -1 => Quantity::Radiance,
+            0 => Quantity::Irradiance,
+            _ => return None,
+        };
+        let is_light = self.metres == -2 && matches!(self.wavelengths, 0 | -1);
+        is_light.then(|| LightUnit { quantity, factor: 10.0_f64.powi(self.log10_factor), is_photons })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[track_caller]
+    fn check(text: &str, quantity: Quantity, per_watt: f64) {
+        let unit = LightUnit::parse(text).unwrap();
+        assert_eq!((unit.quantity, unit.is_photons), (quantity, false), "{text}");
+        assert_relative_eq!(unit.factor, per_watt, max_relative = 1e-15);
+    }
+
+    #[test]
+    fn units_are_read_in_every_spelling() {
+        for text in [
+            "W.m^-2.sr^-1",
+            "W.m^-2.sr^-1.nm^-1",
+            "W/m^2/sr/nm",
+            "W/(m^2 sr nm)",
+            "W m-2 sr-1 nm-1",
+            "W / (m^2 * sr * nm)",
+            "W·m−2·sr−1·nm−1",
+            "W m**-2 sr**-1 nm**-1",
+        ] {
+            check(text, Quantity::Radiance, 1.0);
+        }
+        check("W . m^-2", Quantity::Irradiance, 1.0);
+        // 1 µW/cm² is 0.01 W/m²; a micrometre holds a thousand nanometres.
+        check("uW/cm^2/nm/sr", Quantity::Radiance, 1e-2);
+        check("µW/(cm^2 nm sr)", Quantity::Radiance, 1e-2);
+        check("W/m^2/sr/um", Quantity::Radiance, 1e-3);
+        check("mW/(m^2 sr nm)", Quantity::Radiance, 1e-3);
+        check("W.m^-3.sr^-1", Quantity::Radiance, 1e-9);
+    }
+
+    #[test]
+    fn photons_carry_their_energy() {
+        for text in ["photons/s/m^2/sr/nm", "photon.s^-1.m^-2.sr^-1.nm^-1", "q/(s m^2 sr nm)"] {
+            let mut plane = Array2::from_elem((1, 1), 1e15);
+            LightUnit::parse(text).unwrap().convert(&mut plane, 550.0);
+            // A photon of 550 nm has 3.6117e-19 J (CODATA: h c = 1.98644586e-25 J m).
+            assert_relative_eq!(plane[(0, 0)], 3.611_72e-4, max_relative = 1e-5);
+        }
+    }
+
+    #[test]
+    fn other_units_are_none() {
+        for text in
+            ["", "photons", "lm", "W", "W/m^4", "DN", "W/m^2 sr", "W m-2 sr-2", "W/(m^2", "reflectance", "W^999", "é"]
+        {
+            assert_eq!(LightUnit::parse(text), None, "{text}");
+        }
+    }
+}

@@ -1,0 +1,370 @@
+//! The arrays of a MATLAB file of version 5 to 7: "MAT-File Format", The `MathWorks`, chapter 1.
+//!
+//! Little- and big-endian, compressed or not. Memory: the file, what its wanted variables are inflated to, which deflate bounds
+//! by 1032 times their part of the file, and at most a million arrays of structures.
+
+use std::{fs::File, io::Read, path::Path};
+
+use flate2::read::ZlibDecoder;
+
+use super::super::beside::unreadable;
+use crate::SceneError;
+
+/// No variable read here may need more memory than this.
+const LIMIT_BYTES: u64 = 16 << 30;
+/// Deflate cannot shrink more than 1032 times; a header that says otherwise lies.
+const LIMIT_RATIO: u64 = 1040;
+/// Structures within each other.
+const LIMIT_DEPTH: usize = 32;
+/// Arrays of all structures of a variable.
+const LIMIT_ARRAYS: usize = 1_000_000;
+/// What is inflated of a variable to learn its name.
+const PEEK_BYTES: usize = 512;
+
+/// Types of stored elements.
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+
+/// The variables of a file that were wanted, inflated.
+#[derive(Debug)]
+pub(super) struct MatFile {
+    is_big_endian: bool,
+    /// Each variable with the content of its element.
+    variables: Vec<(String, Vec<u8>)>,
+}
+
+/// An array: its sides, and what it holds.
+#[derive(Clone, Debug)]
+pub(super) struct MatArray<'a> {
+    pub(super) sides: Vec<usize>,
+    pub(super) content: Content<'a>,
+}
+
+/// What an array holds.
+#[derive(Clone, Debug)]
+pub(super) enum Content<'a> {
+    /// Real numbers, the first index fastest.
+    Numbers(Numbers<'a>),
+    /// The fields of a structure, of its first element where there are more.
+    Fields(Vec<(String, MatArray<'a>)>),
+    /// Text, cells, sparse and complex arrays, objects and functions.
+    Other(&'static str),
+}
+
+/// Numbers as they are stored.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Numbers<'a> {
+    bytes: &'a [u8],
+    kind: u32,
+    is_big_endian: bool,
+    /// Whether the array is one of whole numbers, whatever they are stored as.
+    pub(super) is_integer: bool,
+    /// The largest number that an array of this class holds.
+    top: f64,
+}
+
+impl MatFile {
+    /// Reads those variables of a file whose names are wanted.
+    pub(super) fn read(path: &Path, wanted: &[&str]) -> Result<Self, SceneError> {
+        let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
+        let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
+        if length > LIMIT_BYTES {
+            return Err(SceneError::TooLarge { file: path.to_owned(), bytes: length, limit: LIMIT_BYTES });
+        }
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(|error| unreadable(path, error))?;
+        Self::parse(&bytes, wanted).map_err(|reason| unreadable(path, reason))
+    }
+
+    fn parse(bytes: &[u8], wanted: &[&str]) -> Result<Self, String> {
+        if bytes.starts_with(b"MATLAB 7.3") || bytes.starts_with(b"\x89HDF") {
+            return Err(
+                "it is a MATLAB file of version 7.3 (HDF5), expected version 5 to 7: save it with '-v7' in MATLAB, or \
+                        convert it by scripts/mat73_to_mat7.py"
+                    .to_owned(),
+            );
+        }
+        let is_big_endian = match bytes.get(126..128) {
+            Some(b"IM") => false,
+            Some(b"MI") => true,
+            _ => return Err("it is no MATLAB file of version 5 to 7".to_owned()),
+        };
+        let mut rest = Elements { bytes: &bytes[128..], is_big_endian };
+        let mut variables: Vec<(String, Vec<u8>)> = Vec::new();
+        while let Some((kind, content)) = rest.next()? {
+            let variable = match kind {
+                MATRIX => {
+                    let name = header_of(content, is_big_endian)?.name;
+                    wanted.contains(&name.as_str()).then(|| (name, content.to_vec()))
+                }
+                COMPRESSED => inflate(content, is_big_endian, wanted)?,
+                _ => None,
+            };
+            variables.extend(variable.filter(|(name, _)| !name.is_empty()));
+        }
+        Ok(Self { is_big_endian, variables })
+    }
+
+    /// Returns a variable, or `None` where the file has none of this name.
+    pub(super) fn array(&self, name: &str) -> Result<Option<MatArray<'_>>, String> {
+        let Some((_, content)) = self.variables.iter().find(|(own, _)| own == name) else { return Ok(None) };
+        let mut n_left = LIMIT_ARRAYS;
+        array_of(content, self.is_big_endian, LIMIT_DEPTH, &mut n_left).map(Some)
+    }
+}
+
+impl<'a> MatArray<'a> {
+    /// Returns a field of a structure that is there and not empty.
+    pub(super) fn field(&self, name: &str) -> Option<&Self> {
+        match &self.content {
+            Content::Fields(fields) => fields.iter().find(|(own, _)| own == name).map(|(_, array)| array),
+            _ => None,
+        }
+        .filter(|array| array.len() > 0)
+    }
+
+    /// The number of elements.
+    pub(super) fn len(&self) -> usize {
+        // Sides were checked to have a product.
+        self.sides.iter().product()
+    }
+
+    /// Returns the numbers, or what the array holds in their place.
+    pub(super) fn numbers(&self) -> Result<Numbers<'a>, &'static str> {
+        match &self.content {
+            Content::Numbers(numbers) => Ok(*numbers),
+            Content::Fields(_) => Err("a structure"),
+            Content::Other(what) => Err(what),
+        }
+    }
+
+    /// Returns the one number of an array of one.
+    pub(super) fn number(&self) -> Option<f64> {
+        (self.len() == 1).then(|| self.numbers().ok().map(|numbers| numbers.at(0))).flatten()
+    }
+
+    /// Returns all numbers of a list.
+    pub(super) fn list(&self) -> Option<Vec<f64>> {
+        let numbers = self.numbers().ok()?;
+        Some((0..self.len()).map(|index| numbers.at(index)).collect())
+    }
+}
+
+impl Numbers<'_> {
+    /// Returns the largest whole number that the array's class holds; 0 for other numbers.
+    pub(super) fn top(&self) -> f64 {
+        self.top
+    }
+
+    /// Returns a number by its index; there is one for each element of the array.
+    pub(super) fn at(&self, index: usize) -> f64 {
+        let size = width_of(self.kind).expect("the kind was checked");
+        let mut little = [0; 8];
+        little[..size].copy_from_slice(&self.bytes[index * size..(index + 1) * size]);
+        if self.is_big_endian {
+            little[..size].reverse();
+        }
+        let [a, b, c, d, ..] = little;
+        match self.kind {
+            1 => f64::from(i8::from_le_bytes([a])),
+            2 => f64::from(a),
+            3 => f64::from(i16::from_le_bytes([a, b])),
+            4 => f64::from(u16::from_le_bytes([a, b])),
+            5 => f64::from(i32::from_le_bytes([a, b, c, d])),
+            6 => f64::from(u32::from_le_bytes([a, b, c, d])),
+            7 => f64::from(f32::from_le_bytes([a, b, c, d])),
+            9 => f64::from_le_bytes(little),
+            12 => i64::from_le_bytes(little) as f64,
+            _ => u64::from_le_bytes(little) as f64,
+        }
+    }
+}
+
+/// Returns the bytes of a stored number of a type, or `None` for types that are none.
+fn width_of(kind: u32) -> Option<usize> {
+    Some(match kind {
+        1 | 2 => 1,
+        3 | 4 => 2,
+        5..=7 => 4,
+        9 | 12 | 13 => 8,
+        _ => return None,
+    })
+}
+
+/// Elements one after the other.
+struct Elements<'a> {
+    bytes: &'a [u8],
+    is_big_endian: bool,
+}
+
+const TRUNCATED: &str = "the file ends too early (truncated)";
+
+impl<'a> Elements<'a> {
+    fn word(&self, at: usize) -> Option<u32> {
+        let bytes: [u8; 4] = self.bytes.get(at..at + 4)?.try_into().ok()?;
+        Some(if self.is_big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+    }
+
+    /// Returns the type and the content of the next element; `None` at the end.
+    fn next(&mut self) -> Result<Option<(u32, &'a [u8])>, String> {
+        if self.bytes.is_empty() {
+            return Ok(None);
+        }
+        let first = self.word(0).ok_or(TRUNCATED)?;
+        // Up to four bytes stand in the tag itself, their number in its upper half.
+        let (kind, from, n_bytes, padded) = if first >> 16 != 0 {
+            (first & 0xffff, 4, (first >> 16) as usize, 8)
+        } else {
+            let n_bytes = self.word(4).ok_or(TRUNCATED)? as usize;
+            // Compressed elements follow each other without a gap.
+            let padded = if first == COMPRESSED { n_bytes } else { n_bytes.next_multiple_of(8) };
+            (first, 8, n_bytes, 8 + padded)
+        };
+        if from == 4 && n_bytes > 4 {
+            return Err("an element of more than four bytes stands in its own tag".to_owned());
+        }
+        let content = self.bytes.get(from..from + n_bytes).ok_or(TRUNCATED)?;
+        self.bytes = self.bytes.get(padded..).unwrap_or_default();
+        Ok(Some((kind, content)))
+    }
+
+    fn required(&mut self) -> Result<(u32, &'a [u8]), String> {
+        self.next()?.ok_or_else(|| TRUNCATED.to_owned())
+    }
+}
+
+/// Inflates an element if it is a variable whose name is wanted.
+fn inflate(bytes: &[u8], is_big_endian: bool, wanted: &[&str]) -> Result<Option<(String, Vec<u8>)>, String> {
+    let broken = |_| "a compressed variable is broken".to_owned();
+    let mut stream = ZlibDecoder::new(bytes);
+    let mut start = Vec::with_capacity(PEEK_BYTES);
+    stream.by_ref().take(PEEK_BYTES as u64).read_to_end(&mut start).map_err(broken)?;
+    let tag = Elements { bytes: &start, is_big_endian };
+    let (Some(kind), Some(n_bytes)) = (tag.word(0), tag.word(4)) else { return Err(TRUNCATED.to_owned()) };
+    if kind != MATRIX {
+        return Ok(None);
+    }
+    let name = header_of(&start[8..], is_big_endian)?.name;
+    if !wanted.contains(&name.as_str()) {
+        return Ok(None);
+    }
+    let (n_bytes, limit) = (u64::from(n_bytes), (bytes.len() as u64).saturating_mul(LIMIT_RATIO));
+    if n_bytes > limit {
+        return Err(format!("its variable '{name}' claims {n_bytes} bytes in {} compressed ones", bytes.len()));
+    }
+    let mut content = start.split_off(8);
+    content.truncate(n_bytes as usize);
+    let missing = n_bytes - content.len() as u64;
+    stream.take(missing).read_to_end(&mut content).map_err(broken)?;
+    if (content.len() as u64) < n_bytes {
+        return Err(TRUNCATED.to_owned());
+    }
+    Ok(Some((name, content)))
+}
+
+/// The head of an array.
+struct Header<'a> {
+    class: u32,
+    is_complex: bool,
+    sides: Vec<usize>,
+    name: String,
+    /// What follows.
+    rest: Elements<'a>,
+}
+
+/// Reads the head of an array; of opaque ones, which have no sides, class and name alone.
+fn header_of(bytes: &[u8], is_big_endian: bool) -> Result<Header<'_>, String> {
+    let mut rest = Elements { bytes, is_big_endian };
+    let (_, flags) = rest.required()?;
+    let flags = Elements { bytes: flags, is_big_endian }.word(0).ok_or(TRUNCATED)?;
+    let (class, is_complex) = (flags & 0xff, flags & 0x0800 != 0);
+    let sides = if class == 17 { vec![] } else { sides_of(rest.required()?.1, is_big_endian)? };
+    let name = String::from_utf8_lossy(rest.required()?.1).into_owned();
+    Ok(Header { class, is_complex, sides, name, rest })
+}
+
+fn sides_of(bytes: &[u8], is_big_endian: bool) -> Result<Vec<usize>, String> {
+    let words = Elements { bytes, is_big_endian };
+    let sides: Vec<usize> = (0..bytes.len() / 4).filter_map(|i| words.word(4 * i)).map(|side| side as usize).collect();
+    let product = sides.iter().try_fold(1_usize, |product, &side| product.checked_mul(side));
+    match product {
+        Some(_) if !sides.is_empty() && sides.len() <= LIMIT_DEPTH => Ok(sides),
+        _ => Err(format!("an array has the sides {:?}", &sides[..sides.len().min(4)])),
+    }
+}
+
+fn array_of<'a>(
+    bytes: &'a [u8],
+    is_big_endian: bool,
+    depth: usize,
+    n_left: &mut usize,
+) -> Result<MatArray<'a>, String> {
+    if bytes.is_empty() {
+        return Ok(MatArray { sides: vec![0], content: Content::Other("nothing") });
+    }
+    if depth == 0 || *n_left == 0 {
+        return Err(format!("its structures hold more than {LIMIT_ARRAYS} arrays or {LIMIT_DEPTH} levels"));
+    }
+    *n_left -= 1;
+    let Header { class, is_complex, sides, rest, .. } = header_of(bytes, is_big_endian)?;
+    let content = match class {
+        2 => fields_of(&sides, rest, depth, n_left)?,
+        4 => Content::Other("text"),
+        6..=15 if is_complex => Content::Other("complex numbers"),
+        6..=15 => Content::Numbers(numbers_of(&sides, rest, class)?),
+        1 => Content::Other("cells"),
+        5 => Content::Other("a sparse array"),
+        _ => Content::Other("an object"),
+    };
+    Ok(MatArray { sides, content })
+}
+
+fn numbers_of<'a>(sides: &[usize], mut rest: Elements<'a>, class: u32) -> Result<Numbers<'a>, String> {
+    let (kind, bytes) = rest.required()?;
+    let width = width_of(kind).ok_or_else(|| format!("numbers are stored as type {kind}, which is none"))?;
+    let n_numbers: usize = sides.iter().product();
+    if bytes.len() / width < n_numbers {
+        return Err(format!("an array of {n_numbers} numbers has {} bytes", bytes.len()));
+    }
+    // Classes 8 to 15 are signed and unsigned whole numbers of 8, 16, 32 and 64 bits, in turn.
+    let is_integer = class > 7;
+    let top = match class {
+        8..=15 => {
+            let bits = 8 << ((class - 8) / 2);
+            let positive = if class.is_multiple_of(2) { bits - 1 } else { bits };
+            2.0_f64.powi(positive) - 1.0
+        }
+        _ => 0.0,
+    };
+    Ok(Numbers { bytes, kind, is_big_endian: rest.is_big_endian, is_integer, top })
+}
+
+fn fields_of<'a>(
+    sides: &[usize],
+    mut rest: Elements<'a>,
+    depth: usize,
+    n_left: &mut usize,
+) -> Result<Content<'a>, String> {
+    let is_big_endian = rest.is_big_endian;
+    let (_, width) = rest.required()?;
+    let width = Elements { bytes: width, is_big_endian }.word(0).ok_or(TRUNCATED)? as usize;
+    let (_, names) = rest.required()?;
+    if width == 0 {
+        return Err("the names of a structure's fields are of no length".to_owned());
+    }
+    let name_of = |name: &[u8]| {
+        let end = name.iter().position(|&byte| byte == 0).unwrap_or(name.len());
+        String::from_utf8_lossy(&name[..end]).into_owned()
+    };
+    let mut fields = Vec::new();
+    if sides.iter().product::<usize>() > 0 {
+        for name in names.chunks_exact(width) {
+            let (kind, content) = rest.required()?;
+            if kind != MATRIX {
+                return Err(format!("the field '{}' is of type {kind}, expected an array", name_of(name)));
+            }
+            fields.push((name_of(name), array_of(content, is_big_endian, depth - 1, n_left)?));
+        }
+    }
+    Ok(Content::Fields(fields))
+}

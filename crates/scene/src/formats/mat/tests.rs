@@ -1,0 +1,206 @@
+//! MATLAB files that scipy wrote, by `scripts/mat_fixtures.py`, and files that must be refused.
+
+use std::{fs, path::PathBuf};
+
+use approx::assert_relative_eq;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{super::photons::joules_per_photon, *};
+use crate::{ReadOptions, SceneError, read_scene};
+
+const WAVE_NM: [f64; 5] = [420.0, 480.0, 550.0, 630.0, 700.0];
+
+fn fixture(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes").join(name)
+}
+
+fn read(name: &str) -> IsetScene {
+    read_iset_mat(&fixture(name)).unwrap()
+}
+
+/// Checks photons of 1e15 (1 + row + column / 10 + band / 100), to so many of them.
+#[track_caller]
+fn check_photons(scene: &IsetScene, within: f64) {
+    assert_eq!(scene.image.grid().centers_nm(), WAVE_NM);
+    assert_eq!((scene.image.rows(), scene.image.columns()), (4, 6));
+    for row in 0..4 {
+        for column in 0..6 {
+            for (band, watts) in scene.image.spectrum_at(row, column).into_iter().enumerate() {
+                let photons = 1e15 * (1.0 + row as f64 + column as f64 / 10.0 + band as f64 / 100.0);
+                assert_relative_eq!(watts / joules_per_photon(WAVE_NM[band]), photons, epsilon = within);
+            }
+        }
+    }
+}
+
+/// Single precision of the largest, 4.54e15, twice rounded.
+const SINGLE: f64 = 1e9;
+
+#[test]
+fn a_scene_structure_is_read() {
+    for name in ["iset_scene.mat", "iset_plain.mat"] {
+        let scene = read(name);
+        check_photons(&scene, SINGLE);
+        assert_eq!((scene.horizontal_fov_deg, scene.distance_m, scene.n_clipped), (Some(30.0), Some(1.2), 0));
+        let depth_m = scene.depth_m.unwrap();
+        assert_eq!((depth_m.dim(), depth_m[(0, 0)], depth_m[(3, 1)]), ((4, 6), 2.0, 5.5));
+        // The radiance of a white under it: equal photons.
+        let light = scene.light.unwrap();
+        let white = light.illuminant.white_radiance(scene.image.grid(), light.illuminance_lux.unwrap());
+        for (watts, nm) in white.iter().zip(WAVE_NM) {
+            assert_relative_eq!(watts / joules_per_photon(nm), 8e15, max_relative = 1e-6);
+        }
+    }
+}
+
+#[test]
+fn coefficients_and_basis_make_a_scene() {
+    let scene = read("iset_multispectral.mat");
+    check_photons(&scene, SINGLE);
+    let light = scene.light.unwrap();
+    let white = light.illuminant.white_radiance(scene.image.grid(), light.illuminance_lux.unwrap());
+    white.iter().for_each(|watts| assert_relative_eq!(*watts, 0.01, max_relative = 1e-9));
+    assert_eq!((scene.depth_m, scene.distance_m), (None, None));
+}
+
+#[test]
+fn bare_photons_make_a_scene() {
+    let scene = read("iset_raw.mat");
+    check_photons(&scene, SINGLE);
+    assert_eq!((scene.horizontal_fov_deg, scene.distance_m, scene.light), (Some(20.0), Some(3.0), None));
+}
+
+#[test]
+fn coded_photons_are_decoded() {
+    // Half a step of 16 bits over 3.54e15 photons, and single precision.
+    check_photons(&read("iset_coded.mat"), 0.5 * 3.54e15 / 65535.0 + SINGLE);
+}
+
+#[test]
+fn distances_become_depths_of_the_view() {
+    let scene = read_scene(&fixture("iset_scene.mat"), &ReadOptions::default()).unwrap();
+    let view = scene.require_view().unwrap();
+    assert_relative_eq!(view.horizontal_fov_deg(6), 30.0, max_relative = 1e-12);
+    let z_m = f64::from(scene.require_depth().unwrap().z_m()[(3, 1)]);
+    assert_relative_eq!(z_m * view.distance_per_depth(3.0, 1.0), 5.5, max_relative = 1e-6);
+    // One distance for all is that of a plane.
+    let raw = read_scene(&fixture("iset_raw.mat"), &ReadOptions::default()).unwrap();
+    assert_eq!(raw.require_depth().unwrap().range_m(), (3.0, 3.0));
+    assert_eq!(raw.name, "iset_raw.mat");
+}
+
+/// Writes an element: its tag, its content and what fills it up to a multiple of 8 bytes, big-endian.
+fn element(kind: u32, content: &[u8]) -> Vec<u8> {
+    let mut bytes = [kind.to_be_bytes(), (content.len() as u32).to_be_bytes()].concat();
+    bytes.extend(content);
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+    bytes
+}
+
+fn words(values: &[u32]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_be_bytes()).collect()
+}
+
+/// A variable of numbers, big-endian.
+fn variable(name: &str, sides: &[u32], numbers: &[f64]) -> Vec<u8> {
+    let doubles: Vec<u8> = numbers.iter().flat_map(|number| number.to_be_bytes()).collect();
+    let parts =
+        [element(6, &words(&[6, 0])), element(5, &words(sides)), element(1, name.as_bytes()), element(9, &doubles)];
+    element(14, &parts.concat())
+}
+
+#[test]
+fn big_endian_files_are_read() {
+    let mut bytes = vec![b' '; 124];
+    bytes.extend([1, 0, b'M', b'I']);
+    bytes.extend(variable("wave", &[1, 2], &[600.0, 500.0]));
+    bytes.extend(variable("photons", &[1, 3, 2], &[1e15, 2e15, 3e15, 4e15, 5e15, 6e15]));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("old.mat");
+    fs::write(&path, bytes).unwrap();
+    let scene = read_iset_mat(&path).unwrap();
+    // Bands that descend are put in order.
+    assert_eq!(scene.image.grid().centers_nm(), [500.0, 600.0]);
+    let photons =
+        scene.image.spectrum_at(0, 1).into_iter().zip([500.0, 600.0]).map(|(w, nm)| w / joules_per_photon(nm));
+    photons.zip([5e15, 2e15]).for_each(|(found, expected)| assert_relative_eq!(found, expected, max_relative = 1e-6));
+}
+
+#[track_caller]
+fn check_refused(bytes: &[u8], word: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bad.mat");
+    fs::write(&path, bytes).unwrap();
+    let message = read_iset_mat(&path).unwrap_err().to_string();
+    assert!(message.contains("bad.mat") && message.contains(word) && !message.contains('\n'), "{message}");
+}
+
+#[test]
+fn other_files_are_refused_in_a_sentence() {
+    let good = fs::read(fixture("iset_plain.mat")).unwrap();
+    check_refused(b"", "no MATLAB file");
+    check_refused(&[b' '; 500], "no MATLAB file");
+    check_refused(&fs::read(fixture("iset_scene_v73.mat")).unwrap(), "version 7.3");
+    check_refused(&good[..good.len() / 2], "truncated");
+    check_refused(&good[..128], "no scene");
+    // Twice the bands that the photons have.
+    let mut bytes = good[..124].to_vec();
+    bytes.extend([1, 0, b'M', b'I']);
+    let with = |wave: &[f64], sides: &[u32], n: usize| {
+        [bytes.clone(), variable("wave", &[1, wave.len() as u32], wave), variable("photons", sides, &vec![1.0; n])]
+            .concat()
+    };
+    check_refused(&with(&[500.0, 600.0], &[1, 3, 4], 12), "1 × 3 × 4, expected rows × columns × 2");
+    check_refused(&with(&[500.0, 500.0], &[1, 3, 2], 6), "ascending");
+    check_refused(&with(&[-500.0, 500.0], &[1, 3, 2], 6), "-500 nm");
+    check_refused(&with(&[500.0, 600.0], &[1, 300, 2], 6), "600 numbers has 48 bytes");
+    check_refused(&with(&[500.0, 600.0], &[u32::MAX, u32::MAX, u32::MAX], 6), "sides");
+    check_refused(&with(&[500.0, 600.0], &[0, 3, 2], 0), "samples");
+    assert!(matches!(read_iset_mat(&fixture("absent.mat")), Err(SceneError::Unreadable { .. })));
+}
+
+#[test]
+fn a_variable_that_claims_terabytes_is_refused() {
+    // A tag of 4 GiB, compressed into a few bytes.
+    let mut inner = Vec::new();
+    inner.extend(14_u32.to_le_bytes());
+    inner.extend(u32::MAX.to_le_bytes());
+    let rest = fs::read(fixture("iset_plain.mat")).unwrap();
+    inner.extend(&rest[136..]);
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+    std::io::Write::write_all(&mut encoder, &inner).unwrap();
+    let packed = encoder.finish().unwrap();
+    let mut bytes = rest[..128].to_vec();
+    bytes.extend(15_u32.to_le_bytes());
+    bytes.extend((packed.len() as u32).to_le_bytes());
+    bytes.extend(packed);
+    check_refused(&bytes, "claims 4294967295 bytes");
+}
+
+#[test]
+fn no_mutation_of_a_matlab_file_makes_the_reader_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mat");
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut n_refused = 0;
+    for name in ["iset_plain.mat", "iset_scene.mat", "iset_multispectral.mat", "iset_coded.mat"] {
+        let whole = fs::read(fixture(name)).unwrap();
+        for _ in 0..1000 {
+            let mut bytes = whole.clone();
+            if rng.random::<f32>() < 0.2 {
+                bytes.truncate(rng.random_range(0..whole.len()));
+            } else {
+                for _ in 0..rng.random_range(1..4) {
+                    // Past the text at the start.
+                    let at = rng.random_range(124..bytes.len());
+                    bytes[at] ^= rng.random_range(1..=255_u8);
+                }
+            }
+            fs::write(&path, &bytes).unwrap();
+            n_refused += usize::from(read_scene(&path, &ReadOptions::default()).is_err());
+        }
+    }
+    // Any change of a compressed file is seen; of a plain one many change a sample.
+    assert!(n_refused > 2500, "{n_refused} of 4000 refused");
+}
