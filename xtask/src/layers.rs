@@ -32,6 +32,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("sweep", &["pictures", "spectrum", "psf", "backward", "pipeline", "analysis"]),
     ("cli", &["pictures", "spectrum", "pipeline", "analysis", "report", "sweep"]),
     ("python", &["spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis"]),
+    ("studio", &["pictures", "spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis"]),
     ("xtask", &["pipeline", "report", "sweep"]),
 ];
 

@@ -96,6 +96,8 @@ pub(crate) enum Command {
     /// Measures pictures, frames and sensors as a laboratory does
     #[command(subcommand)]
     Measure(MeasureCommand),
+    /// Opens the window in which anything of a camera is changed and its picture seen at once: the program dioptric-studio
+    Studio(StudioArgs),
     /// Prints what completes these words in a shell: bash, elvish, fish, powershell or zsh
     Completions {
         /// The shell
@@ -109,9 +111,18 @@ pub(crate) enum Command {
     },
 }
 
+/// A camera to be changed in the window.
+#[derive(Debug, Args)]
+pub(crate) struct StudioArgs {
+    /// The camera file; without it, the camera as it was left, or the demo
+    pub(crate) camera: Option<PathBuf>,
+}
+
 /// How finely a picture is simulated.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum QualityKind {
+    /// At most 160 columns and 4 bands: a thumbnail
+    Sketch,
     /// At most 480 columns and 5 bands: at once
     Preview,
     /// At most 960 columns and 11 bands

@@ -22,6 +22,7 @@ mod render;
 mod render_args;
 mod run;
 mod sense;
+mod studio;
 mod sweep;
 mod terminal;
 mod trace;
@@ -69,6 +70,7 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Sense(arguments) => sense::run(&arguments, &common),
         Command::Sweep(arguments) => sweep::run(&arguments, &common),
         Command::Measure(command) => measure::run(&command, &common),
+        Command::Studio(arguments) => studio::run(&arguments),
         Command::Completions { shell } => words::completions(shell),
         Command::Man { out } => words::manual(&out, &common),
     }

@@ -99,6 +99,7 @@ fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera>
         camera.wavelengths = WavelengthSpec::ListNm(list);
     }
     let quality = match arguments.quality {
+        QualityKind::Sketch => Quality::Sketch,
         QualityKind::Preview => Quality::Preview,
         QualityKind::Draft => Quality::Draft,
         QualityKind::Full => Quality::Full,

@@ -1,5 +1,5 @@
 //! How long a change of a kept camera takes to the picture, and how soon a cancelled one returns, on the built-in demo:
-//! `cargo bench -p dioptric-pipeline --bench kept [-- full draft preview cancel] [--only CHANGE]`. Prints seconds of the clock,
+//! `cargo bench -p dioptric-pipeline --bench kept [-- full draft preview sketch cancel] [--only CHANGE]`. Prints seconds of the clock,
 //! median and worst of a few runs each.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a bench fails by panicking and prints what it measured")]
 
@@ -113,7 +113,9 @@ fn main() {
     let sections: Vec<String> = arguments.into_iter().filter(|argument| !argument.starts_with('-')).collect();
     let is_wanted = |section: &str| sections.is_empty() || sections.iter().any(|wanted| wanted == section);
     println!("{:<44} {:>8} {:>8}", "seconds to the picture of the demo", "median", "worst");
-    for (section, quality) in [("full", Quality::Full), ("draft", Quality::Draft), ("preview", Quality::Preview)] {
+    for (section, quality) in
+        [("full", Quality::Full), ("draft", Quality::Draft), ("preview", Quality::Preview), ("sketch", Quality::Sketch)]
+    {
         if is_wanted(section) {
             let kept = KeptCamera::new(demo.clone()).with_quality(quality);
             row(&format!("{quality:?}: nothing kept"), vec![seconds(&kept)]);

@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 /// docs/ARCHITECTURE.md.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Quality {
+    /// At most 160 columns and 4 bands, and the coarsest bank: for each step of a hand that drags.
+    Sketch,
     /// At most 480 columns and 5 bands, and a coarse bank: for changes while one looks.
     Preview,
     /// At most 960 columns and 11 bands.
@@ -24,6 +26,7 @@ impl Quality {
     /// The most columns of a film and the most bands.
     fn most(self) -> Option<(usize, usize)> {
         match self {
+            Self::Sketch => Some((160, 4)),
             Self::Preview => Some((480, 5)),
             Self::Draft => Some((960, 11)),
             Self::Full => None,

@@ -191,35 +191,39 @@ fn kept_capture_is_never_imaged_again() {
     assert!(std::sync::Arc::ptr_eq(&exposed.irradiance, &first.irradiance));
 }
 
-/// Returns how far the picture of a lower quality, of half as many pixels each way, is from the full one averaged over them: rms, as
-/// a share of full scale.
-fn rms_from_full(camera: Camera, quality: Quality) -> f64 {
-    let kept = KeptCamera::new(camera);
-    let (full, preview) = (capture(&kept), capture(&kept.with_quality(quality)));
-    let halves = (2, full.place.rows / 2, full.place.columns / 2);
-    assert_eq!((preview.place.binning, preview.place.rows, preview.place.columns), halves);
-    let (whole, few) = (&full.developed.picture.codes, &preview.developed.picture.codes);
-    let squares: f64 = few
+/// Returns the root mean square, as a share of full scale, of the difference of a picture of lower quality from the full one averaged
+/// over its pixels, and how many of those it takes, each way.
+fn rms_from_full(full: &Capture, few: &Capture) -> (f64, usize) {
+    let n = few.place.binning;
+    let (whole, codes) = (&full.developed.picture.codes, &few.developed.picture.codes);
+    let squares: f64 = codes
         .indexed_iter()
         .map(|((row, column, channel), &code)| {
-            let block = whole.slice(ndarray::s![2 * row..2 * row + 2, 2 * column..2 * column + 2, channel]);
-            f64::from(code - block.sum() / 4.0).powi(2)
+            let block = whole.slice(ndarray::s![n * row..n * (row + 1), n * column..n * (column + 1), channel]);
+            f64::from(code - block.sum() / (n * n) as f32).powi(2)
         })
         .sum();
-    (squares / few.len() as f64).sqrt()
+    ((squares / codes.len() as f64).sqrt(), n)
 }
 
 /// A preview shows the full picture averaged over its pixels, to a few hundredths of full scale: fewer bands shift colors, a coarser
-/// scene softens edges, and every pixel has the noise of a single one.
+/// scene softens edges, and every pixel has the noise of a single one. A sketch shows it to twice as many.
 #[test]
-fn preview_shows_the_full_picture() {
+fn preview_and_sketch_show_the_full_picture() {
     let mut camera = small();
     camera.film = FilmSpec::Pixels { columns: 600, rows: 400, pitch_um: 52.8 };
     camera.scene.source = SceneSource::StillLife { columns: 680, rows: 454 };
     camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 20.0 };
-    let rms = rms_from_full(camera, Quality::Preview);
-    println!("rms {rms:.4} of full scale");
-    assert!(rms < 0.025, "{rms}");
+    let kept = KeptCamera::new(camera);
+    let full = capture(&kept);
+    let preview = capture(&kept.with_quality(Quality::Preview));
+    let sketch = capture(&kept.with_quality(Quality::Sketch));
+    assert_eq!((sketch.place.rows, sketch.place.columns, sketch.grid().len()), (100, 150, 4));
+    for (few, binning, most) in [(&preview, 2, 0.025), (&sketch, 4, 0.05)] {
+        let (rms, found) = rms_from_full(&full, few);
+        println!("{:?}: rms {rms:.4} of full scale", few.quality);
+        assert!(found == binning && rms < most, "{rms}");
+    }
 }
 
 /// So does a draft: of a strip of the picture that has its edges and its blurs.
@@ -229,9 +233,10 @@ fn draft_shows_the_full_picture() {
     camera.film = FilmSpec::Pixels { columns: 1200, rows: 200, pitch_um: 26.4 };
     camera.scene.source = SceneSource::StillLife { columns: 1360, rows: 228 };
     camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 10.0 };
-    let rms = rms_from_full(camera, Quality::Draft);
+    let kept = KeptCamera::new(camera);
+    let (rms, binning) = rms_from_full(&capture(&kept), &capture(&kept.with_quality(Quality::Draft)));
     println!("rms {rms:.4} of full scale");
-    assert!(rms < 0.017, "{rms}");
+    assert!(binning == 2 && rms < 0.017, "{rms}");
 }
 
 /// What a header stands for is in another file: a change of that is a change of the scene.

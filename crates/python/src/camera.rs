@@ -166,7 +166,8 @@ impl Camera {
             "full" => Quality::Full,
             "draft" => Quality::Draft,
             "preview" => Quality::Preview,
-            other => return Err(wrong("quality", format!("'{other}'"), "'full', 'draft' or 'preview'")),
+            "sketch" => Quality::Sketch,
+            other => return Err(wrong("quality", format!("'{other}'"), "'full', 'draft', 'preview' or 'sketch'")),
         };
         let mut kept = self.kept.with_quality(quality);
         if let Some(bytes) = memory_bytes {

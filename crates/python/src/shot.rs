@@ -95,13 +95,14 @@ impl Shot {
         Camera::new(self.kept.with_quality(Quality::Full))
     }
 
-    /// How finely it was simulated: "full", "draft" or "preview".
+    /// How finely it was simulated: "full", "draft", "preview" or "sketch".
     #[getter]
     fn quality(&self) -> &'static str {
         match self.capture.quality {
             Quality::Full => "full",
             Quality::Draft => "draft",
             Quality::Preview => "preview",
+            Quality::Sketch => "sketch",
         }
     }
 

@@ -7,6 +7,10 @@ use dioptric_spectrum::WavelengthGrid;
 use super::{Watch, film::FilmPlace, lens::ResolvedLens, spec::BankInputs};
 use crate::{PipelineError, Quality, Stage};
 
+/// For sketches: what one sees on pixels of several times the full ones.
+const SKETCH: SampleCounts =
+    SampleCounts { n_radial: 4, n_grid: 4, n_depths: 3, n_wavelengths: 2, n_rings: 5, n_azimuths: 20 };
+
 /// Traces the model; its error is measured for a full picture alone.
 pub(super) fn build(
     inputs: &BankInputs,
@@ -31,6 +35,7 @@ pub(super) fn build(
             return inputs.bank.build(&lens.lens, standard, place.pitch_um, &progress, watch.cancel);
         }
         Quality::Draft => standard,
+        Quality::Sketch => standard.with_counts(SKETCH),
         Quality::Preview => standard.with_counts(SampleCounts::PREVIEW),
     };
     Ok(LensImageModel::build_with(&lens.lens, &settings, &progress, watch.cancel)?)

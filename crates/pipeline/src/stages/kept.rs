@@ -348,6 +348,16 @@ impl KeptCamera {
         chain.bank(&inputs.plan.bank, &inputs.scene)
     }
 
+    /// Returns the scene as it is imaged at this quality, read or made now where it is not kept.
+    ///
+    /// # Errors
+    /// As [`capture`](Self::capture).
+    pub fn scene(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<ResolvedScene>, PipelineError> {
+        let inputs = self.irradiance_inputs()?;
+        let chain = self.chain(progress, cancel);
+        chain.scene(&inputs.scene)
+    }
+
     /// Returns the depth of each sample of the scene, m; of a camera that continues a run, what that wrote of it.
     ///
     /// # Errors

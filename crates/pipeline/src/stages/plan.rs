@@ -24,7 +24,7 @@ pub(super) fn plan(
     let settings = match inputs.bank.film.geometry.quality {
         Quality::Full | Quality::Draft => Settings { mode, ..Settings::default() },
         // The pixels are several of the full film's: what a step costs is a part of what the pixels cost.
-        Quality::Preview => Settings {
+        Quality::Preview | Quality::Sketch => Settings {
             mode,
             layer_step_px: 3.0,
             chromatic_step_px: 1.0,

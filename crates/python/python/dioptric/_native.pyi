@@ -95,7 +95,7 @@ class Camera:
     def render(
         self,
         *,
-        quality: Literal["full", "draft", "preview"] = "full",
+        quality: Literal["full", "draft", "preview", "sketch"] = "full",
         progress: _Progress = None,
         memory_bytes: int | None = None,
     ) -> Shot: ...

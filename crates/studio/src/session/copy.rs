@@ -1,0 +1,382 @@
+//! A camera in words for elsewhere: a camera file, a command line, Python.
+
+use dioptric_pipeline::{
+    BlurSpec, Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec, SensorSpec, StopSpec,
+    parse_illuminant, parse_white, with_analog_gain, with_exposure_s,
+};
+use dioptric_sensor::{Demosaic, ExposureControl, Highlights, NoiseSource, NoiseSources, WhiteBalance};
+use dioptric_spectrum::Illuminant;
+
+use super::Session;
+
+/// Returns the text of the camera file, its paths absolute.
+pub fn as_ron(camera: &Camera) -> String {
+    let mut absolute = camera.clone();
+    if let Ok(folder) = std::env::current_dir() {
+        absolute.resolve_paths(&folder);
+    }
+    let mut text = absolute.to_ron();
+    text.push('\n');
+    text
+}
+
+/// Returns a command for a shell that takes this picture: options of `dioptric run` where they can say what differs from the file
+/// or from the demo, else a command that writes the camera file first.
+pub fn as_command(session: &Session) -> String {
+    let base = Base::of(session);
+    match base.words(session.camera(), Tongue::Shell) {
+        Some(words) => {
+            let file = base.path.iter().map(|path| quoted(path));
+            let parts = ["dioptric run".to_owned()].into_iter().chain(file);
+            let options = words.into_iter().map(|Word { key, value }| format!("--{key} {}", quoted(&value)));
+            parts.chain(options).collect::<Vec<_>>().join(" ")
+        }
+        None => format!("cat > camera.ron <<'END'\n{}END\ndioptric run camera.ron", as_ron(session.camera())),
+    }
+}
+
+/// Returns lines of Python that take this picture.
+pub fn as_python(session: &Session) -> String {
+    let base = Base::of(session);
+    let start = base.path.as_ref().map_or("dp.Camera.demo()".to_owned(), |path| format!("dp.Camera.read({path:?})"));
+    let camera = match base.words(session.camera(), Tongue::Python) {
+        Some(words) if words.is_empty() => start,
+        Some(words) => {
+            let changes: Vec<String> = words.into_iter().map(|Word { key, value }| format!("{key}={value}")).collect();
+            format!("{start}.with_({})", changes.join(", "))
+        }
+        None => format!("dp.Camera.from_ron(r'''\n{}''')", as_ron(session.camera())),
+    };
+    format!("import dioptric as dp\n\ncamera = {camera}\nshot = camera.render()\nshot.save(\"dioptric-out\")\n")
+}
+
+/// Who reads the words.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Tongue {
+    Shell,
+    Python,
+}
+
+/// A word that changes a camera, and its value as it is written.
+struct Word {
+    key: String,
+    value: String,
+}
+
+/// What a command starts from.
+struct Base {
+    camera: Camera,
+    path: Option<String>,
+}
+
+/// The words so far, and the camera that they make.
+struct Telling {
+    tongue: Tongue,
+    made: Camera,
+    words: Vec<Word>,
+}
+
+impl Base {
+    fn of(session: &Session) -> Self {
+        match session.path() {
+            Some(path) => {
+                let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+                Self { camera: session.kept.clone(), path: Some(path.display().to_string()) }
+            }
+            None => Self { camera: Camera::demo().unwrap_or_else(|_| session.camera().clone()), path: None },
+        }
+    }
+
+    /// Returns the words that make a camera of this one; `None` where words cannot.
+    fn words(&self, camera: &Camera, tongue: Tongue) -> Option<Vec<Word>> {
+        let mut telling = Telling { tongue, made: self.camera.clone(), words: Vec::new() };
+        // The demo has a film for its own lens and scene, which the command line changes with them.
+        if camera.lens != telling.made.lens && self.path.is_some() && tongue == Tongue::Shell {
+            telling.lens(camera);
+        }
+        telling.optics(camera);
+        telling.sensor(camera);
+        telling.scene(camera);
+        telling.processing(camera);
+        let Telling { mut made, words, .. } = telling;
+        // Neither changes the picture.
+        made.name.clone_from(&camera.name);
+        made.outputs.clone_from(&camera.outputs);
+        (made == *camera).then_some(words)
+    }
+}
+
+impl Telling {
+    fn number(&mut self, key: &str, value: f64) {
+        self.word(key, format!("{value}"));
+    }
+
+    fn text(&mut self, key: &str, value: &str) {
+        let value = if self.tongue == Tongue::Python { format!("{value:?}") } else { value.to_owned() };
+        self.word(key, value);
+    }
+
+    fn word(&mut self, key: &str, value: String) {
+        let key = if self.tongue == Tongue::Python { key.replace('-', "_") } else { key.to_owned() };
+        self.words.push(Word { key, value });
+    }
+
+    fn lens(&mut self, camera: &Camera) {
+        let named = match &camera.lens {
+            LensSpec::BuiltIn(name) => name.clone(),
+            LensSpec::File(path) => path.display().to_string(),
+            LensSpec::Thin { .. } | LensSpec::Pinhole { .. } => return,
+        };
+        if LensSpec::named(&named) == camera.lens {
+            self.text("lens", &named);
+            self.made.lens = camera.lens.clone();
+            (self.made.stop, self.made.lens_reading) = (StopSpec::AsGiven, LensReadOptions::default());
+        }
+    }
+
+    fn optics(&mut self, camera: &Camera) {
+        if camera.stop != self.made.stop {
+            match camera.stop {
+                StopSpec::FNumber(n) => self.number("f-number", n),
+                StopSpec::DiameterMm(d) => self.number("stop-mm", d),
+                StopSpec::AsGiven => return,
+            }
+            self.made.stop = camera.stop;
+        }
+        if camera.focus != self.made.focus {
+            match camera.focus {
+                FocusSpec::DistanceMm(d) => self.number("focus-mm", d),
+                FocusSpec::FilmMm(d) => self.number("film-mm", d),
+                FocusSpec::NearObject => return,
+            }
+            self.made.focus = camera.focus;
+        }
+        let (new, old) = (camera.movements, self.made.movements);
+        for (key, new, old) in [
+            ("tilt-deg", new.tilt_deg, old.tilt_deg),
+            ("swing-deg", new.swing_deg, old.swing_deg),
+            ("rise-mm", new.rise_mm, old.rise_mm),
+            ("shift-mm", new.shift_mm, old.shift_mm),
+        ] {
+            if new != old {
+                self.number(key, new);
+            }
+        }
+        self.made.movements = camera.movements;
+        if camera.diffraction != self.made.diffraction {
+            let word = match camera.diffraction {
+                Diffraction::None => "none",
+                Diffraction::Hurb { gamma: 1.0 } => "hurb",
+                Diffraction::HurbCalibrated => "hurb-calibrated",
+                Diffraction::Wave => "wave",
+                Diffraction::Hurb { .. } => return,
+            };
+            self.text("diffraction", word);
+            self.made.diffraction = camera.diffraction;
+        }
+        if camera.blur != self.made.blur {
+            self.text("blur", if camera.blur == BlurSpec::Layered { "layered" } else { "pointwise" });
+            self.made.blur = camera.blur;
+        }
+    }
+
+    fn sensor(&mut self, camera: &Camera) {
+        if camera.sensor != self.made.sensor {
+            let named = match &camera.sensor {
+                SensorSpec::BuiltIn(name) => name.clone(),
+                SensorSpec::File(path) => path.display().to_string(),
+            };
+            if SensorSpec::named(&named) != camera.sensor {
+                return;
+            }
+            self.text("sensor", &named);
+            (self.made.sensor, self.made.film) = (camera.sensor.clone(), FilmSpec::Sensor);
+        }
+        if let FilmSpec::Pixels { columns, rows, pitch_um } = camera.film
+            && camera.film != self.made.film
+        {
+            match self.tongue {
+                Tongue::Shell => self.word("pixels", format!("{columns}x{rows}")),
+                Tongue::Python => self.word("pixels", format!("({columns}, {rows})")),
+            }
+            self.number("pixel-um", pitch_um);
+            self.made.film = camera.film;
+        }
+        let time_s = |control: &ExposureControl| match control {
+            ExposureControl::Manual(exposure) => Some(exposure.time_s),
+            ExposureControl::Auto(_) => None,
+        };
+        if let Some(new_s) = time_s(&camera.exposure).filter(|new_s| Some(*new_s) != time_s(&self.made.exposure)) {
+            self.number("exposure-s", new_s);
+            self.made.exposure = with_exposure_s(self.made.exposure, new_s);
+        }
+        let gain = |control: &ExposureControl| match control {
+            ExposureControl::Manual(exposure) => exposure.analog_gain,
+            ExposureControl::Auto(auto) => auto.limit.analog_gain,
+        };
+        if gain(&camera.exposure) != gain(&self.made.exposure) {
+            self.number("analog-gain", gain(&camera.exposure));
+            self.made.exposure = with_analog_gain(self.made.exposure, gain(&camera.exposure));
+        }
+        if camera.noise != self.made.noise {
+            self.text("noise", &noise_words(camera.noise));
+            self.made.noise = camera.noise;
+        }
+        if let (FramesSpec::Burst(n), true) = (&camera.frames, camera.frames != self.made.frames) {
+            self.word("burst", n.to_string());
+            self.made.frames = camera.frames.clone();
+        }
+        if camera.seed != self.made.seed {
+            self.word("seed", camera.seed.to_string());
+            self.made.seed = camera.seed;
+        }
+    }
+
+    fn scene(&mut self, camera: &Camera) {
+        let (new, old) = (&camera.scene, self.made.scene.clone());
+        for (key, new, old) in [
+            ("fov-deg", new.field_of_view_deg, old.field_of_view_deg),
+            ("depth-m", new.depth_m, old.depth_m),
+            ("illuminance-lux", new.illuminance_lux, old.illuminance_lux),
+        ] {
+            if let Some(new) = new.filter(|new| Some(*new) != old) {
+                self.number(key, new);
+            }
+        }
+        let made = &mut self.made.scene;
+        made.field_of_view_deg = new.field_of_view_deg.or(old.field_of_view_deg);
+        made.depth_m = new.depth_m.or(old.depth_m);
+        made.illuminance_lux = new.illuminance_lux.or(old.illuminance_lux);
+        if let Some(light) = new.illuminant.as_ref().filter(|light| Some(*light) != old.illuminant.as_ref())
+            && let Some(word) = light_word(light)
+        {
+            self.text("illuminant", &word);
+            self.made.scene.illuminant = Some(light.clone());
+        }
+    }
+
+    fn processing(&mut self, camera: &Camera) {
+        let (new, old) = (&camera.processing, self.made.processing.clone());
+        if new.demosaic != old.demosaic
+            && let Some((name, _)) = Demosaic::NAMES.iter().find(|(_, method)| *method == new.demosaic)
+        {
+            self.text("demosaic", name);
+            self.made.processing.demosaic = new.demosaic;
+        }
+        if new.highlights != old.highlights {
+            self.text("highlights", if new.highlights == Highlights::Clip { "clip" } else { "reconstruct" });
+            self.made.processing.highlights = new.highlights;
+        }
+        // Python has no word for it.
+        if let Some(strength) = new.denoise.filter(|_| new.denoise != old.denoise && self.tongue == Tongue::Shell) {
+            self.number("denoise", strength);
+            self.made.processing.denoise = new.denoise;
+        }
+        if new.white != old.white
+            && let Some(word) = white_word(&new.white)
+        {
+            self.text("white", &word);
+            self.made.processing.white = new.white.clone();
+        }
+    }
+}
+
+/// Returns the sources of noise as a command line has them.
+fn noise_words(noise: NoiseSources) -> String {
+    let on: Vec<&str> =
+        NoiseSource::NAMES.iter().filter(|(_, source)| noise.has(*source)).map(|(name, _)| *name).collect();
+    match on.len() {
+        0 => "none".to_owned(),
+        n if n == NoiseSource::NAMES.len() => "all".to_owned(),
+        _ => on.join(","),
+    }
+}
+
+/// Returns the word of a light on the command line, where it has one.
+pub(crate) fn light_word(light: &Illuminant) -> Option<String> {
+    let names = Illuminant::NAMES.iter().map(|name| (*name).to_owned());
+    let numbers = match light {
+        Illuminant::Blackbody(kelvin) | Illuminant::Daylight(kelvin) => Some(format!("{kelvin}K")),
+        Illuminant::Chromaticity { x, y } => Some(format!("{x},{y}")),
+        _ => None,
+    };
+    names.chain(numbers).find(|word| parse_illuminant(word).is_ok_and(|parsed| parsed == *light))
+}
+
+/// Returns the word of a white on the command line, where it has one.
+pub(crate) fn white_word(white: &WhiteBalance) -> Option<String> {
+    let words = ["scene", "none", "gray-world", "white-patch", "shades-of-gray", "gray-edge"].map(str::to_owned);
+    let light = match white {
+        WhiteBalance::Light(light) => light_word(light),
+        _ => None,
+    };
+    words.into_iter().chain(light).find(|word| parse_white(word).is_ok_and(|parsed| parsed == *white))
+}
+
+/// Returns a word for a shell.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:+=%@".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn changed(change: impl FnOnce(&mut Camera)) -> Session {
+        let mut session = Session::new(Camera::demo().unwrap());
+        let mut camera = session.camera().clone();
+        change(&mut camera);
+        session.change(camera, None);
+        session
+    }
+
+    #[test]
+    fn options_say_what_differs_from_the_demo() {
+        assert_eq!(as_command(&changed(|_| {})), "dioptric run");
+        let session = changed(|camera| {
+            camera.stop = StopSpec::FNumber(2.8);
+            camera.movements.swing_deg = -3.5;
+            camera.noise = NoiseSources::only(&[NoiseSource::Photon, NoiseSource::Read]);
+            camera.scene.illuminant = Some(Illuminant::Blackbody(3200.0));
+            camera.sensor = SensorSpec::BuiltIn("imx363".to_owned());
+        });
+        let options = "--f-number 2.8 --swing-deg -3.5 --sensor imx363 --pixels 960x640 --pixel-um 33 --noise photon,read \
+                       --illuminant 3200K";
+        assert_eq!(as_command(&session), format!("dioptric run {options}"));
+        let python = as_python(&session);
+        let words =
+            "dp.Camera.demo().with_(f_number=2.8, swing_deg=-3.5, sensor=\"imx363\", pixels=(960, 640), pixel_um=33, ";
+        assert!(python.contains(words), "{python}");
+    }
+
+    #[test]
+    fn a_camera_that_has_no_words_is_written_out() {
+        let session = changed(|camera| camera.processing.brightness = dioptric_sensor::Brightness::Factor(2.0));
+        let text = as_command(&session);
+        let ron = text.strip_prefix("cat > camera.ron <<'END'\n").unwrap().split("END\n").next().unwrap();
+        assert_eq!(Camera::parse(ron, Path::new("/camera.ron")).unwrap(), *session.camera());
+        let python = as_python(&session);
+        let ron = python.split("'''").nth(1).unwrap();
+        assert_eq!(Camera::parse(ron, Path::new("/camera.ron")).unwrap(), *session.camera());
+    }
+
+    #[test]
+    fn a_file_is_named_and_quoted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("my camera.ron");
+        let mut session = changed(|camera| camera.seed = 9);
+        session.save(&path).unwrap();
+        assert_eq!(as_command(&session), format!("dioptric run '{}'", path.display()));
+        let lens = Camera { lens: LensSpec::BuiltIn("tessar-50mm".to_owned()), ..session.camera().clone() };
+        session.change(lens, None);
+        // Another lens starts at its own stop.
+        assert!(as_command(&session).ends_with("my camera.ron' --lens tessar-50mm --f-number 4"));
+    }
+}

@@ -1,0 +1,238 @@
+//! The lens: which, how far open, focused where, turned and moved how.
+
+use dioptric_optics::Lens;
+use dioptric_pipeline::{
+    BankSpec, BlurSpec, Camera, Diffraction, FocusSpec, LensReadOptions, LensSpec, StopSpec, WavelengthSpec,
+};
+use egui::Ui;
+
+use super::{
+    super::fields::{NumberField, choice, text},
+    Desk, lens_drawing,
+};
+use crate::engine::Field;
+
+pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
+    which(ui, camera);
+    desk.tell(ui, Field::Lens, camera);
+    if let Some(product) = desk.product {
+        lens_drawing::show(ui, camera, product, desk.stamp);
+    }
+    stop(ui, camera, desk);
+    desk.tell(ui, Field::Stop, camera);
+    focus(ui, camera, desk);
+    desk.tell(ui, Field::Focus, camera);
+}
+
+fn which(ui: &mut Ui, camera: &mut Camera) {
+    let mut named = match &camera.lens {
+        LensSpec::BuiltIn(name) => name.clone(),
+        LensSpec::File(path) => path.display().to_string(),
+        LensSpec::Thin { .. } => "thin".to_owned(),
+        LensSpec::Pinhole { .. } => "pinhole".to_owned(),
+    };
+    let before = named.clone();
+    let mut names: Vec<(String, &str)> = Lens::built_in_names().map(|name| (name.to_owned(), name)).collect();
+    names.extend([("thin".to_owned(), "ideal thin lens"), ("pinhole".to_owned(), "pinhole")]);
+    choice(ui, "lens", "A built-in lens, an ideal one, or a pinhole", &mut named, &names);
+    if matches!(camera.lens, LensSpec::BuiltIn(_) | LensSpec::File(_))
+        && let Some(typed) = text(
+            ui,
+            "lens file",
+            "A lens file, or the name of a built-in lens; files can be dropped on the window",
+            &before,
+        )
+    {
+        named = typed;
+    }
+    if named != before {
+        take_lens(camera, &named);
+    }
+    match &mut camera.lens {
+        LensSpec::Thin { focal_length_mm, diameter_mm } => {
+            millimetres("focal length", "Focal length of the thin lens", 1.0..=500.0).show(ui, focal_length_mm);
+            millimetres("diameter", "Diameter of its rim, which is the stop", 0.01..=200.0).show(ui, diameter_mm);
+        }
+        LensSpec::Pinhole { diameter_mm } => {
+            millimetres("diameter", "Diameter of the hole", 0.01..=5.0).show(ui, diameter_mm);
+        }
+        LensSpec::BuiltIn(_) | LensSpec::File(_) => {}
+    }
+}
+
+/// Puts another lens on the camera; stop and glasses of the one before meant that one.
+pub(in crate::ui) fn take_lens(camera: &mut Camera, named: &str) {
+    camera.lens = match named {
+        "thin" => LensSpec::Thin { focal_length_mm: 50.0, diameter_mm: 12.5 },
+        "pinhole" => {
+            camera.focus = FocusSpec::FilmMm(50.0);
+            LensSpec::Pinhole { diameter_mm: 0.3 }
+        }
+        other => LensSpec::named(other),
+    };
+    (camera.stop, camera.lens_reading) = (StopSpec::AsGiven, LensReadOptions::default());
+}
+
+fn millimetres<'a>(label: &'a str, words: &'a str, slider: std::ops::RangeInclusive<f64>) -> NumberField<'a> {
+    NumberField { label, unit: "mm", range: 1e-4..=1e6, slider, is_logarithmic: true, words }
+}
+
+/// How the stop is stated.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum StopKind {
+    AsGiven,
+    FNumber,
+    Diameter,
+}
+
+fn stop(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
+    let lens = desk.product.map(|product| &product.capture.lens);
+    let f_number = lens.map_or(4.0, |lens| lens.reference.first_order().f_number.abs());
+    let diameter_mm = lens.map_or(10.0, |lens| 2.0 * lens.lens.stop_semi_aperture_mm());
+    let mut kind = match camera.stop {
+        StopSpec::AsGiven => StopKind::AsGiven,
+        StopSpec::FNumber(_) => StopKind::FNumber,
+        StopSpec::DiameterMm(_) => StopKind::Diameter,
+    };
+    let kinds =
+        [(StopKind::AsGiven, "the lens's own"), (StopKind::FNumber, "f-number"), (StopKind::Diameter, "diameter")];
+    if choice(ui, "stop", "How far the stop is open", &mut kind, &kinds) {
+        camera.stop = match kind {
+            StopKind::AsGiven => StopSpec::AsGiven,
+            StopKind::FNumber => StopSpec::FNumber((100.0 * f_number).ceil() / 100.0),
+            StopKind::Diameter => StopSpec::DiameterMm((1000.0 * diameter_mm).floor() / 1000.0),
+        };
+    }
+    // The f-number is there however the stop is stated; typing one states it so.
+    let mut number = match camera.stop {
+        StopSpec::FNumber(n) => n,
+        _ => (100.0 * f_number).round() / 100.0,
+    };
+    let field = NumberField {
+        label: "f-number",
+        unit: "",
+        range: 0.1..=1000.0,
+        slider: 1.0..=64.0,
+        is_logarithmic: true,
+        words: "Focal length over the diameter of the entrance pupil, for a far object at 550 nm",
+    };
+    if field.show(ui, &mut number) {
+        camera.stop = StopSpec::FNumber(number);
+    }
+    if let StopSpec::DiameterMm(mm) = &mut camera.stop {
+        millimetres("diameter of stop", "Diameter of the stop", 0.01..=100.0).show(ui, mm);
+    }
+}
+
+/// How the film is placed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum FocusKind {
+    Distance,
+    Film,
+    Near,
+}
+
+fn focus(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
+    let place = desk.product.map(|product| &product.capture.place);
+    let distance_mm = place.and_then(|place| place.focus_distance_mm).unwrap_or(1000.0);
+    let film_mm = place.map_or(50.0, |place| place.film_distance_mm);
+    let mut kind = match camera.focus {
+        FocusSpec::DistanceMm(_) => FocusKind::Distance,
+        FocusSpec::FilmMm(_) => FocusKind::Film,
+        FocusSpec::NearObject => FocusKind::Near,
+    };
+    let kinds = [
+        (FocusKind::Distance, "on a distance"),
+        (FocusKind::Film, "by the film's place"),
+        (FocusKind::Near, "on what is near"),
+    ];
+    if choice(ui, "focus", "How the film is placed; a click into the picture focuses there", &mut kind, &kinds) {
+        camera.focus = match kind {
+            FocusKind::Distance => FocusSpec::DistanceMm(distance_mm.round()),
+            FocusKind::Film => FocusSpec::FilmMm((1e4 * film_mm).round() / 1e4),
+            FocusKind::Near => FocusSpec::NearObject,
+        };
+    }
+    match &mut camera.focus {
+        FocusSpec::FilmMm(mm) => {
+            let field = NumberField {
+                label: "film distance",
+                unit: "mm",
+                range: -1e5..=1e5,
+                slider: 0.9 * film_mm..=1.15 * film_mm,
+                is_logarithmic: false,
+                words: "Distance of the film behind the last vertex",
+            };
+            field.show(ui, mm);
+        }
+        focus => {
+            // As above: typing a distance focuses there.
+            let mut mm = match focus {
+                FocusSpec::DistanceMm(mm) => *mm,
+                _ => distance_mm.round(),
+            };
+            let field = NumberField {
+                label: "distance",
+                unit: "mm",
+                range: 1e-3..=f64::INFINITY,
+                slider: 100.0..=20_000.0,
+                is_logarithmic: true,
+                words: "Distance before the first vertex that is in focus; inf for a far one",
+            };
+            if field.show(ui, &mut mm) {
+                *focus = FocusSpec::DistanceMm(mm);
+            }
+        }
+    }
+}
+
+pub(super) fn movements(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
+    let movements = &mut camera.movements;
+    let turn = |label, words| NumberField {
+        label,
+        unit: "°",
+        range: -60.0..=60.0,
+        slider: -12.0..=12.0,
+        is_logarithmic: false,
+        words,
+    };
+    turn("tilt", "Turn about the horizontal; above 0 the lens looks down").show(ui, &mut movements.tilt_deg);
+    turn("swing", "Turn about the vertical; above 0 the lens looks to the right").show(ui, &mut movements.swing_deg);
+    let shift = |label, words| NumberField {
+        label,
+        unit: "mm",
+        range: -1000.0..=1000.0,
+        slider: -10.0..=10.0,
+        is_logarithmic: false,
+        words,
+    };
+    shift("rise", "How far the lens is moved up").show(ui, &mut movements.rise_mm);
+    shift("shift", "How far the lens is moved to the right").show(ui, &mut movements.shift_mm);
+    desk.tell(ui, Field::Movements, camera);
+}
+
+pub(super) fn simulation(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
+    let kinds = [
+        (Diffraction::None, "none"),
+        (Diffraction::Hurb { gamma: 1.0 }, "bent rays (HURB)"),
+        (Diffraction::HurbCalibrated, "bent rays, calibrated"),
+        (Diffraction::Wave, "waves"),
+    ];
+    choice(ui, "diffraction", "Diffraction at the stop", &mut camera.diffraction, &kinds);
+    let blurs = [(BlurSpec::Layered, "layers of depth"), (BlurSpec::Pointwise, "point by point")];
+    choice(ui, "blur", "How the point spread functions are laid over the scene", &mut camera.blur, &blurs);
+    let banks = [
+        (BankSpec::Standard, "standard"),
+        (BankSpec::Within { error: 0.02 }, "within 2 %"),
+        (BankSpec::Paper, "the paper's"),
+    ];
+    choice(ui, "sampling", "How the point spread functions are sampled", &mut camera.bank, &banks);
+    let bands = [
+        (WavelengthSpec::Scene, "those of the scene"),
+        (WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 10.0 }, "400–700 nm by 10"),
+        (WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 20.0 }, "400–700 nm by 20"),
+        (WavelengthSpec::ListNm(vec![450.0, 550.0, 650.0]), "450, 550, 650 nm"),
+    ];
+    choice(ui, "bands", "The wavelengths that are simulated", &mut camera.wavelengths, &bands);
+    desk.tell(ui, Field::Simulation, camera);
+}

@@ -1,0 +1,62 @@
+//! The left side: the camera as parameters.
+
+pub(super) mod lens;
+mod lens_drawing;
+mod scene;
+mod sensor;
+
+use egui::{Button, CollapsingHeader, ScrollArea, Ui};
+
+use crate::engine::{Fault, Field, Product};
+
+use super::fields::wrong;
+use dioptric_pipeline::Camera;
+
+/// What the panels show beside the camera.
+pub(super) struct Desk<'a> {
+    /// What is wrong with the camera.
+    pub(super) fault: Option<&'a Fault>,
+    /// The latest results.
+    pub(super) product: Option<&'a Product>,
+    /// A number that tells these results from others.
+    pub(super) stamp: u64,
+}
+
+impl Desk<'_> {
+    /// Tells what is wrong with a part, where something is, and offers what would do.
+    fn tell(&self, ui: &mut Ui, field: Field, camera: &mut Camera) {
+        let Some(fault) = self.fault.filter(|fault| fault.field == field) else { return };
+        wrong(ui, &fault.message);
+        if let Some((words, mended)) = &fault.remedy
+            && ui.add(Button::new(format!("✔ {words}"))).clicked()
+        {
+            camera.clone_from(mended);
+        }
+    }
+
+    /// Whether something of a section is wrong.
+    fn has_fault(&self, fields: &[Field]) -> bool {
+        self.fault.is_some_and(|fault| fields.contains(&fault.field))
+    }
+}
+
+/// Shows all parameters and changes the camera.
+pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
+    ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+        section(ui, "Scene", &[Field::Scene], desk, true, |ui| scene::show(ui, camera, desk));
+        let of_lens = [Field::Lens, Field::Stop, Field::Focus, Field::Movements];
+        section(ui, "Lens", &of_lens, desk, true, |ui| lens::show(ui, camera, desk));
+        section(ui, "Movements", &[Field::Movements], desk, true, |ui| lens::movements(ui, camera, desk));
+        section(ui, "Film and sensor", &[Field::Film, Field::Sensor], desk, true, |ui| sensor::show(ui, camera, desk));
+        section(ui, "Exposure", &[Field::Exposure], desk, true, |ui| sensor::exposure(ui, camera, desk));
+        section(ui, "Noise", &[], desk, false, |ui| sensor::noise(ui, camera));
+        section(ui, "Processing", &[Field::Processing], desk, false, |ui| sensor::processing(ui, camera, desk));
+        section(ui, "Simulation", &[Field::Simulation], desk, false, |ui| lens::simulation(ui, camera, desk));
+    });
+}
+
+fn section(ui: &mut Ui, title: &str, fields: &[Field], desk: &Desk<'_>, is_open: bool, contents: impl FnOnce(&mut Ui)) {
+    // What is wrong is never hidden.
+    let open = desk.has_fault(fields).then_some(true);
+    CollapsingHeader::new(title).default_open(is_open).open(open).show(ui, contents);
+}

@@ -1,0 +1,156 @@
+//! The engine delivers the latest camera, rung by rung, and the last rung is the run.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use std::{
+    sync::mpsc::{self, Receiver},
+    time::{Duration, Instant},
+};
+
+use dioptric_pipeline::{
+    Camera, FilmSpec, KeptCamera, SceneSource, SensorSpec, Silent, StopSpec, WavelengthSpec, write_capture,
+};
+use dioptric_spectrum::Cancel;
+use dioptric_studio::engine::{Delivery, Engine, EngineSettings, Field, Rung};
+
+/// Longer than any work here takes on a busy machine.
+const LONG: Duration = Duration::from_secs(120);
+
+/// The demo on 960 / `n` columns.
+fn demo(n: usize) -> Camera {
+    let mut camera = Camera::demo().unwrap();
+    camera.film = FilmSpec::Pixels { columns: 960 / n, rows: 640 / n, pitch_um: 33.0 * n as f64 };
+    camera.scene.source = SceneSource::StillLife { columns: 1080 / n, rows: 720 / n };
+    camera.wavelengths = WavelengthSpec::Range { first_nm: 420.0, last_nm: 680.0, step_nm: 20.0 };
+    camera
+}
+
+fn start() -> (Engine, Receiver<()>) {
+    let (sender, woken) = mpsc::channel();
+    let engine = Engine::start(EngineSettings::default(), move || _ = sender.send(())).unwrap();
+    (engine, woken)
+}
+
+/// Waits for the last rung of a camera; returns all that was delivered until then.
+fn wait(engine: &Engine, woken: &Receiver<()>, generation: u64, top: Rung) -> Vec<Delivery> {
+    let (mut all, start) = (Vec::new(), Instant::now());
+    while start.elapsed() < LONG {
+        all.extend(engine.take());
+        let is_last = |d: &Delivery| d.generation == generation && (d.rung == top || d.outcome.is_err());
+        if all.iter().any(is_last) {
+            return all;
+        }
+        _ = woken.recv_timeout(Duration::from_millis(100));
+    }
+    panic!("nothing came in {LONG:?}");
+}
+
+#[test]
+fn the_last_rung_is_the_run() {
+    let camera = demo(3);
+    let (engine, woken) = start();
+    // On the way there, other cameras.
+    engine.submit(Camera { stop: StopSpec::FNumber(8.0), ..camera.clone() }, Rung::Preview);
+    std::thread::sleep(Duration::from_millis(30));
+    engine.submit(Camera { seed: 4, ..camera.clone() }, Rung::Full);
+    std::thread::sleep(Duration::from_millis(300));
+    let generation = engine.submit(camera.clone(), Rung::Full);
+    let all = wait(&engine, &woken, generation, Rung::Full);
+    let rungs: Vec<Rung> = all.iter().filter(|d| d.generation == generation).map(|d| d.rung).collect();
+    assert_eq!(rungs, Rung::ALL);
+
+    let folder = tempfile::tempdir().unwrap();
+    let capture = KeptCamera::new(camera).capture(&Silent, &Cancel::new()).unwrap();
+    let (_, png) = write_capture(&capture, None, folder.path()).unwrap();
+    let product = all.last().unwrap().outcome.as_ref().unwrap();
+    assert!(product.png().unwrap() == png && std::fs::read(folder.path().join("picture.png")).unwrap() == png);
+}
+
+#[test]
+fn the_latest_camera_wins() {
+    let (engine, woken) = start();
+    let cameras: Vec<Camera> =
+        (0..40).map(|i| Camera { stop: StopSpec::FNumber(4.0 + 0.1 * f64::from(i)), ..demo(6) }).collect();
+    let mut last = 0;
+    for camera in &cameras {
+        last = engine.submit(camera.clone(), Rung::Preview);
+        std::thread::sleep(Duration::from_millis(7));
+    }
+    let all = wait(&engine, &woken, last, Rung::Preview);
+    // Each picture is that of its own camera, in the order of submission.
+    assert!(all.windows(2).all(|pair| pair[0].generation <= pair[1].generation));
+    for delivery in &all {
+        let product = delivery.outcome.as_ref().unwrap();
+        assert_eq!(*product.camera(), cameras[delivery.generation as usize - 1]);
+    }
+    assert_eq!((all.last().unwrap().generation, all.last().unwrap().rung), (40, Rung::Preview));
+}
+
+#[test]
+fn going_back_gives_the_same_bits() {
+    let (engine, woken) = start();
+    let (first, other) = (demo(6), Camera { stop: StopSpec::FNumber(11.0), ..demo(6) });
+    let picture = |camera: &Camera| {
+        let generation = engine.submit(camera.clone(), Rung::Full);
+        wait(&engine, &woken, generation, Rung::Full).last().unwrap().outcome.as_ref().unwrap().rgb8.clone()
+    };
+    let before = picture(&first);
+    assert_ne!(picture(&other), before);
+    assert_eq!(picture(&first), before);
+}
+
+#[test]
+fn cancelled_work_ends_within_20_ms() {
+    let (engine, woken) = start();
+    let mut late = Vec::new();
+    // A film of the demo's size, so that the full rung takes seconds, stopped ever later in it.
+    let mut camera = demo(1);
+    for i in 0..8 {
+        camera.stop = StopSpec::FNumber(4.0 + f64::from(i));
+        let generation = engine.submit(camera.clone(), Rung::Full);
+        wait(&engine, &woken, generation, Rung::Preview);
+        std::thread::sleep(Duration::from_millis(90 * i as u64));
+        let asked = Instant::now();
+        engine.stop();
+        while engine.is_busy() {
+            assert!(asked.elapsed() < LONG);
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        late.push(asked.elapsed());
+    }
+    late.sort();
+    println!("from stop to rest: {late:?}");
+    // The median, because other tests run beside this one.
+    assert!(late[late.len() / 2] <= Duration::from_millis(20), "{late:?}");
+    assert!(engine.take().is_empty());
+}
+
+#[test]
+fn a_wrong_camera_is_a_fault_at_its_field() {
+    let (engine, woken) = start();
+    let wrong = Camera { sensor: SensorSpec::BuiltIn("no such".to_owned()), ..demo(6) };
+    let generation = engine.submit(wrong, Rung::Full);
+    let all = wait(&engine, &woken, generation, Rung::Full);
+    let fault = all[0].outcome.as_ref().unwrap_err();
+    assert_eq!((all.len(), fault.field), (1, Field::Sensor));
+    assert!(fault.message.contains("no such"), "{}", fault.message);
+    // The engine goes on.
+    let generation = engine.submit(demo(6), Rung::Sketch);
+    assert!(wait(&engine, &woken, generation, Rung::Sketch).last().unwrap().outcome.is_ok());
+}
+
+#[test]
+fn progress_tells_the_rung_and_its_stage() {
+    let (engine, woken) = start();
+    let generation = engine.submit(demo(2), Rung::Full);
+    let mut seen = Vec::new();
+    let start = Instant::now();
+    while start.elapsed() < LONG && !engine.take().iter().any(|d| d.rung == Rung::Full) {
+        if let Some(busy) = engine.busy() {
+            assert!(busy.generation == generation && (0.0..=1.0).contains(&busy.fraction));
+            seen.push((busy.rung, busy.stage));
+        }
+        _ = woken.recv_timeout(Duration::from_millis(2));
+    }
+    let full: Vec<_> = seen.iter().filter(|(rung, _)| *rung == Rung::Full).collect();
+    assert!(!full.is_empty() && full.windows(2).all(|pair| pair[0] <= pair[1]), "{seen:?}");
+}
