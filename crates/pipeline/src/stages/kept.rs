@@ -565,7 +565,7 @@ impl Chain<'_> {
             let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
             let scene: &Scene = &resolved.scene;
             let memory_bytes = match self.camera.budget {
-                Some(budget) => budget.irradiance_bytes(&plan, scene, &place)?,
+                Some(budget) => budget.irradiance_bytes(&plan, scene, &place)?.min(self.camera.memory_bytes),
                 None => self.camera.memory_bytes,
             };
             let folder = self.camera.band_folder(inputs)?;
