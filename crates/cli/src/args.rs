@@ -4,6 +4,7 @@ use std::{any::TypeId, ffi::OsString, path::PathBuf};
 
 use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use dioptric_pipeline::Crop;
 
 pub(crate) use crate::common::Common;
 use crate::{
@@ -193,6 +194,9 @@ pub(crate) struct RunArgs {
     /// Distance between pixels, µm; without --pixels the film stays as large as it is [default: that of the camera]
     #[arg(long, value_name = "P", help_heading = heading::FILM)]
     pub(crate) pixel_um: Option<f64>,
+    /// Part of the film to simulate in place of all of it: first column and row, columns and rows, e.g. 100,80,64,48
+    #[arg(long, value_name = "X,Y,W,H", help_heading = heading::FILM)]
+    pub(crate) crop: Option<Crop>,
     /// Exposure time, s [default: automatic]
     #[arg(long, value_name = "T", help_heading = heading::EXPOSURE)]
     pub(crate) exposure_s: Option<f64>,
@@ -207,7 +211,7 @@ pub(crate) struct RunArgs {
     /// How point-spread functions are sampled
     #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error", help_heading = heading::SIMULATION)]
     pub(crate) bank: Option<BankKind>,
-    /// Samples point-spread functions as finely as this median error needs, a share of the energy, e.g. 0.01
+    /// Samples point-spread functions as finely as this error at nine tenths of the places needs, a share of the energy, e.g. 0.01 [default: 0.02]
     #[arg(long, value_name = "E", help_heading = heading::SIMULATION)]
     pub(crate) bank_error: Option<f64>,
     /// How the scene is blurred
@@ -283,7 +287,7 @@ pub(crate) enum DiffractionKind {
 /// How point-spread functions are sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum BankKind {
-    /// Rays of 9 fields, 9 depths and 4 wavelengths, interpolated
+    /// Rays of 9 fields, 9 depths and 4 wavelengths, interpolated, and of more where the error asks for them
     Standard,
     /// Pictures of the same samples, blended as in the paper, for comparison only
     Paper,
@@ -356,7 +360,7 @@ pub(crate) struct PsfArgs {
     /// Draws from a bank over the range of the points, not traced at each, and tells the error of that
     #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error", help_heading = heading::SIMULATION)]
     pub(crate) bank: Option<BankKind>,
-    /// Draws from a bank sampled as finely as this median error needs, a share of the energy, e.g. 0.01
+    /// Draws from a bank sampled as finely as this error at nine tenths of the places needs, a share of the energy, e.g. 0.01
     #[arg(long, value_name = "E", help_heading = heading::SIMULATION)]
     pub(crate) bank_error: Option<f64>,
     /// Adds MTF tables at these frequencies, cycles/mm

@@ -10,7 +10,7 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
-    Camera, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PipelineError, Progress, RenderEffort,
+    Camera, Crop, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PipelineError, Progress, RenderEffort,
     Rendering, RenderingSummary, SceneSource, SceneSpec, SensorOptions, SensorSpec, Silent, Stage, Staged, StopSpec,
     WavelengthSpec, WorldRender, WorldSpec, with_exposure_s, write_json, write_seen_png,
 };
@@ -92,12 +92,8 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
 
 /// Returns the part that is asked for.
 fn cropped(render: WorldRender, arguments: &RenderArgs) -> anyhow::Result<WorldRender> {
-    let Some(text) = &arguments.crop else { return Ok(render) };
-    let numbers: Option<Vec<usize>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
-    let Some([x, y, width, height]) = numbers.and_then(|numbers| <[usize; 4]>::try_from(numbers).ok()) else {
-        bail!("--crop is '{text}', expected X,Y,W,H, as 100,80,64,48");
-    };
-    Ok(render.cropped((x, y), (width, height))?)
+    let Some(Crop { x, y, columns, rows }) = arguments.crop else { return Ok(render) };
+    Ok(render.cropped((x, y), (columns, rows))?)
 }
 
 /// Returns the camera of the file or the demo before the world, with what the command line changes but for lens and film.

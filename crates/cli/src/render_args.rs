@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use dioptric_pipeline::Diffraction;
+use dioptric_pipeline::{Crop, Diffraction};
 
 use crate::lens_args::{BandArgs, FilmArgs, LensStateArgs};
 
@@ -54,7 +54,7 @@ pub(crate) struct RenderArgs {
     pub(crate) pixels: Option<String>,
     /// Renders a part of the picture: first column and row, columns and rows; without sensor and report
     #[arg(long, value_name = "X,Y,W,H", help_heading = "Film and sensor")]
-    pub(crate) crop: Option<String>,
+    pub(crate) crop: Option<Crop>,
     /// Width of the film, mm [default: that of the camera, or what its field of view needs]
     #[arg(long, value_name = "W", help_heading = "Film and sensor")]
     pub(crate) film_width_mm: Option<f64>,

@@ -200,6 +200,7 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
     camera.stop = arguments.state.stop().unwrap_or(camera.stop);
     camera.focus = arguments.place.focus().unwrap_or(camera.focus);
     arguments.state.movements.change(&mut camera.movements);
+    camera.crop = arguments.crop.or(camera.crop);
     if let Some(kind) = arguments.diffraction {
         camera.diffraction = diffraction(kind);
     }

@@ -36,7 +36,7 @@ fn a_lens_that_is_not_centered_has_no_other_bank() {
     let camera =
         CAMERA.replace("BuiltIn(\"dgauss-50mm\")", "File(\"askew.ron\")").replace("FNumber(4.0)", "FNumber(8.0)");
     fs::write(folder.path().join("camera.ron"), camera).unwrap();
-    let words = ["only the standard one is for a lens without an axis of symmetry, as askew is"];
+    let words = ["the paper's is for a lens with an axis of symmetry, unlike askew"];
     check_error(folder.path(), &["run", "camera.ron", "--bank", "paper", "--out", "out"], &words);
     let broken = lens.replace("(1, 1)", "(1, 3)");
     fs::write(folder.path().join("askew.ron"), broken).unwrap();

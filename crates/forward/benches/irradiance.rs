@@ -10,7 +10,7 @@ use dioptric_psf::{Diffraction, LensImageModel};
 use dioptric_spectrum::WavelengthGrid;
 
 fn scene_through_the_double_gauss(criterion: &mut Criterion) {
-    let film = Film { rows: 480, columns: 576, pitch_um: 12.0 };
+    let film = Film::centered(480, 576, 12.0);
     let grid = WavelengthGrid::uniform(460.0, 640.0, 60.0).expect("four bands");
     let scene = by_formula::scene(film.rows, film.columns, &grid).expect("its depths are positive");
     let lens = Lens::built_in("dgauss-50mm").and_then(|lens| lens.with_f_number(4.0, 550.0)).expect("it is built in");

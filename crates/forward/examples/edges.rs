@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let radiance = SpectralImage::new(Quantity::Radiance, grid, (0..3).map(plane).collect())?;
     let depth = DepthMap::new(Array2::from_shape_fn((ROWS, COLUMNS), |(r, c)| 1.0 / at(r, c).1))?;
     let view = View { focal_px: 1000.0, center_x_px: 239.5, center_y_px: 199.5 };
-    let film = Film { rows: ROWS, columns: COLUMNS, pitch_um: 1.0 };
+    let film = Film::centered(ROWS, COLUMNS, 1.0);
     for (name, focus_dioptres) in [("near", 34.0), ("middle", 22.0), ("far", 10.0)] {
         let mut picture = RgbImage::new(2 * COLUMNS as u32, ROWS as u32);
         for (half, mode) in [BlurMode::Pointwise, BlurMode::Layered].into_iter().enumerate() {

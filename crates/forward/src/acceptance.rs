@@ -58,7 +58,7 @@ fn pixels(radiance: Array2<f32>, dioptres: &Array2<f32>) -> Pixels {
             center_x_px: 0.5 * (columns as f64 - 1.0),
             center_y_px: 0.5 * (rows as f64 - 1.0),
         },
-        film: Film { rows, columns, pitch_um: 1.0 },
+        film: Film::centered(rows, columns, 1.0),
     }
 }
 
@@ -518,7 +518,7 @@ fn a_point_lands_where_the_lens_says_at_every_wavelength() {
 fn a_scene_finer_than_the_film_is_averaged_over_pixels() {
     let fine = Array2::from_shape_fn((300, 300), |(r, c)| f32::from(u8::from((r + c) % 2 == 0)));
     let mut scene = pixels(fine, &Array2::from_elem((300, 300), 20.0));
-    scene.film = Film { rows: 100, columns: 100, pitch_um: 3.0 };
+    scene.film = Film::centered(100, 100, 3.0);
     let picture = rendered(&scene.source(), &lens(), &scene.film, &Settings::default()).remove(0);
     for &value in picture.slice(s![5..95, 5..95]) {
         assert!((value - 0.5).abs() < 0.06, "a checkerboard of pixels is gray, not {value}");

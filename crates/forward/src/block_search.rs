@@ -116,7 +116,7 @@ mod tests {
     /// What is passed over has nothing: sampled with and without the blocks, a layer is the same to the bit.
     #[test]
     fn samples_passed_over_are_empty() {
-        let (film, size) = (Film { rows: 40, columns: 56, pitch_um: 10.0 }, (90, 110));
+        let (film, size) = (Film::centered(40, 56, 10.0), (90, 110));
         let lens = DiscLens { focal_mm: 50.0, ..DiscLens::default() };
         let map = lens.film_map(0.5, 550.0, 2.0);
         let view = View { focal_px: 9000.0, center_x_px: 54.5, center_y_px: 44.5 };

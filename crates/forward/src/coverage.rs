@@ -1,7 +1,7 @@
 //! The sampling of point spread functions that a scene and a film need.
 
-use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, PupilBoundary, Vignetting, rays_towards};
-use dioptric_psf::{BankSettings, Diffraction};
+use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, OpticsError, PupilBoundary, Vignetting, rays_towards};
+use dioptric_psf::{BankSettings, Diffraction, lens_on_axis};
 use dioptric_spectrum::{DepthMap, WavelengthGrid};
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -51,7 +51,8 @@ impl PsfDomain<'_> {
         let looked: Vec<Result<T, ForwardError>> = ends
             .par_iter()
             .map(|&(lens, dioptres)| {
-                look(&Aim { lens, reference: &reference, dioptres, film_distance_mm: self.film_distance_mm })
+                let (film_distance_mm, film_center_mm) = (self.film_distance_mm, DVec2::ZERO);
+                look(&Aim { lens, reference: &reference, dioptres, film_distance_mm, film_center_mm })
             })
             .collect();
         // The first of several errors, whoever found it first.
@@ -65,20 +66,32 @@ impl PsfDomain<'_> {
     /// When the film has no area, the lens has no index at a wavelength of the grid, or no light reaches the middle of the film.
     pub fn settings(&self) -> Result<BankSettings, ForwardError> {
         check_depth(self.lens, self.grid, self.depth_range_m.0, None)?;
-        if self.lens.is_rotational() { self.radial_settings() } else { self.grid_settings() }
+        let has_axis = lens_on_axis(self.lens, self.middle_nm()).is_some();
+        if has_axis { self.radial_settings() } else { self.grid_settings() }
     }
 
-    /// Returns such settings for a lens with an axis of symmetry: fields along a radius to beyond the film's corner, depths
-    /// from end to end in dioptres, wavelengths evenly in 1/λ².
+    fn middle_nm(&self) -> f64 {
+        let (first_nm, last_nm) = self.grid.range_nm();
+        0.5 * (first_nm + last_nm)
+    }
+
+    /// Returns such settings for a lens with an axis of symmetry, on the axis or moved sideways: fields along a radius to beyond
+    /// the film's farthest corner, depths from end to end in dioptres, wavelengths evenly in 1/λ².
     ///
     /// # Errors
     /// When the film has no area, or the lens has no index at a wavelength of the grid or is not rotationally symmetric.
     pub fn radial_settings(&self) -> Result<BankSettings, ForwardError> {
         self.film.check()?;
-        self.lens.check_rotational("a bank of point spread functions over field angle alone")?;
-        let fields_tan = self.at_ends(|aim| {
+        let has_none = || OpticsError::NotRotational {
+            lens: self.lens.name().to_owned(),
+            task: "a bank of point spread functions over field angle alone",
+        };
+        let (centered, aside_mm) = lens_on_axis(self.lens, self.middle_nm()).ok_or_else(has_none)?;
+        // A lens moved aside has its axis on the other side of the picture.
+        let corner_mm = self.film.half_diagonal_mm() + (self.film.center_mm + aside_mm).length();
+        let fields_tan = PsfDomain { lens: &centered, ..*self }.at_ends(|aim| {
             // The border of the film is blurred by light from beyond it.
-            let extent_mm = 1.02 * self.film.half_diagonal_mm() + aim.axial_blur_mm();
+            let extent_mm = 1.02 * corner_mm + aim.axial_blur_mm();
             Ok(aim.field_tan_at(extent_mm))
         })?;
         let last_field_tan = fields_tan.into_iter().fold(0.0, f64::max);
@@ -95,6 +108,7 @@ impl PsfDomain<'_> {
         self.film.check()?;
         let half_mm = self.film.half_size_mm();
         let corners = self.at_ends(|aim| {
+            let aim = Aim { film_center_mm: self.film.center_mm, ..*aim };
             let wavelength_nm = aim.lens.wavelength_nm();
             let dark = || ForwardError::DarkFilm { lens: self.lens.name().to_owned(), wavelength_nm };
             let center = aim.field_at_middle().ok_or_else(dark)?;
@@ -145,6 +159,8 @@ struct Aim<'a> {
     reference: &'a MonoLens,
     dioptres: f64,
     film_distance_mm: f64,
+    /// From where places on the film are counted, mm from the axis.
+    film_center_mm: DVec2,
 }
 
 /// The widest fields that are sought: 60 is 89°.
@@ -170,7 +186,8 @@ impl Aim<'_> {
         if !rays.fate[0].is_in_flight() {
             return None;
         }
-        Some(self.lens.landed(&rays, self.film_distance_mm).map(FilmPoint::in_picture_mm).collect())
+        let landed = self.lens.landed(&rays, self.film_distance_mm).map(FilmPoint::in_picture_mm);
+        Some(landed.map(|at_mm| at_mm - self.film_center_mm).collect())
     }
 
     /// Returns the radius of the blur on the axis, mm, from first-order optics.
@@ -208,7 +225,7 @@ impl Aim<'_> {
         high * (1.0 + 1e-3)
     }
 
-    /// Returns the field whose light lands on the axis: by Newton's method from that along the axis.
+    /// Returns the field whose light lands in the film's middle: by Newton's method from that along the axis.
     fn field_at_middle(&self) -> Option<DVec2> {
         let mut field_tan = DVec2::ZERO;
         for _ in 0..12 {
@@ -231,7 +248,7 @@ impl Aim<'_> {
         None
     }
 
-    /// Returns the corners of the rectangle of fields that holds all that land within `half_mm` of the axis, across and up.
+    /// Returns the corners of the rectangle of fields that holds all that land within `half_mm` of the film's middle, across and up.
     fn fields_over(&self, center: DVec2, half_mm: DVec2) -> (DVec2, DVec2) {
         const ALONG: i32 = 8;
         let is_within = |field_tan: DVec2| self.lands_mm(field_tan).is_some_and(|at| at.abs().cmplt(half_mm).all());

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::ForwardError;
 
-/// The raster of the sensor's pixels; the optical axis passes through its center.
+/// The raster of the sensor's pixels, anywhere in the lens's image.
 ///
 /// Row 0 is the top of the picture, upright as the photographer sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,12 +15,29 @@ pub struct Film {
     pub columns: usize,
     /// Distance between pixels, µm.
     pub pitch_um: f64,
+    /// Where its middle is, mm from the optical axis, x to the right and y up in the picture.
+    pub center_mm: DVec2,
 }
 
 impl Film {
+    /// Returns a film with the optical axis in its middle.
+    pub fn centered(rows: usize, columns: usize, pitch_um: f64) -> Self {
+        Self { rows, columns, pitch_um, center_mm: DVec2::ZERO }
+    }
+
+    /// Whether the optical axis passes through its middle.
+    pub fn is_centered(&self) -> bool {
+        self.center_mm == DVec2::ZERO
+    }
+
     /// Returns half the diagonal, corner to center, mm.
     pub fn half_diagonal_mm(&self) -> f64 {
         0.5e-3 * self.pitch_um * f64::hypot(self.rows as f64, self.columns as f64)
+    }
+
+    /// Returns how far from the optical axis its farthest corner lies, mm.
+    pub fn reach_mm(&self) -> f64 {
+        if self.is_centered() { self.half_diagonal_mm() } else { (self.half_size_mm() + self.center_mm.abs()).length() }
     }
 
     /// Returns half the width and half the height, mm: the corner at the top right as it is seen from the center.
@@ -28,12 +45,16 @@ impl Film {
         0.5e-3 * self.pitch_um * DVec2::new(self.columns as f64, self.rows as f64)
     }
 
-    /// Checks that the film has an area.
+    /// Checks that the film has an area, and a place.
     ///
     /// # Errors
-    /// When it has no pixels, or pixels of no size.
+    /// When it has no pixels, pixels of no size, or a middle that is not finite.
     pub fn check(&self) -> Result<(), ForwardError> {
-        let Self { rows, columns, pitch_um } = *self;
+        let Self { rows, columns, pitch_um, center_mm } = *self;
+        if !center_mm.is_finite() {
+            let (what, value) = ("the middle of the film", center_mm.x + center_mm.y);
+            return Err(ForwardError::Setting { what, value, expected: "finite numbers of millimeters" });
+        }
         if rows * columns > 0 && pitch_um.is_finite() && pitch_um > 0.0 {
             return Ok(());
         }

@@ -71,11 +71,12 @@ pub(crate) fn check_extent(
     if lens.is_dark_beyond_extent() {
         return Ok(());
     }
-    let corner_mm = film.half_diagonal_mm();
+    let half_mm = film.half_diagonal_mm();
     for &wavelength_nm in grid.centers_nm() {
         for dioptres in [dioptres.0, dioptres.1] {
             cancel.check()?;
-            if let Some(extent_mm) = ends_before(&lens.film_map(dioptres, wavelength_nm, 1.1 * corner_mm), film) {
+            if let Some(extent_mm) = ends_before(&lens.film_map(dioptres, wavelength_nm, 1.1 * half_mm), film) {
+                let corner_mm = film.reach_mm();
                 return Err(ForwardError::FilmBeyondField { corner_mm, extent_mm, wavelength_nm });
             }
         }
@@ -83,11 +84,14 @@ pub(crate) fn check_extent(
     Ok(())
 }
 
-/// Returns how far from the axis the corners of the film lie up to which something is seen, mm; `None` where all of it is.
+/// Returns how far from the axis, or from the middle of the film where the lens has none, something is seen towards the film's corners,
+/// mm; `None` where all of it is.
 fn ends_before(map: &FilmMap, film: &Film) -> Option<f64> {
-    let corner_mm = film.half_diagonal_mm();
     match map {
-        FilmMap::Radial(map) => (map.extent_mm() < corner_mm).then_some(map.extent_mm()),
+        FilmMap::Radial(map) => {
+            let corner_mm = film.half_diagonal_mm() + map.axis_mm().length();
+            (map.extent_mm() < corner_mm).then_some(map.extent_mm())
+        }
         FilmMap::Plane(map) => {
             let half_mm = film.half_size_mm();
             // Out along lines to the corners and the middles of the sides.

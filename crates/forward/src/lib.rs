@@ -21,6 +21,7 @@ mod coverage;
 mod disc_lens;
 mod error;
 mod film;
+mod framed;
 mod geometry;
 mod hidden;
 mod irradiance;

@@ -16,9 +16,15 @@ use crate::{
 /// Where the second samples come from, and their layer coordinates (NaN where there is none).
 pub(crate) enum OccludedSamples {
     Nothing,
-    Estimated { fill: Box<Fill>, layer_coordinates: LayerCoordinates },
+    Estimated {
+        fill: Box<Fill>,
+        layer_coordinates: LayerCoordinates,
+    },
     /// Given, and estimated where nothing is known.
-    Known { guesses: Option<Box<Guesses>>, layer_coordinates: LayerCoordinates },
+    Known {
+        guesses: Option<Box<Guesses>>,
+        layer_coordinates: LayerCoordinates,
+    },
 }
 
 /// Second samples that are estimated beside those that are given.

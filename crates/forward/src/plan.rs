@@ -9,6 +9,7 @@ use ndarray::Array2;
 use crate::{
     BandKernels, BandRadiance, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
     basis::Kept,
+    framed::Framed,
     layout::Layout,
     stopwatch::{Clock, ImagingTimes, Stopwatch},
     work::{Watch, Work},
@@ -30,7 +31,7 @@ use crate::{
 /// let depth = DepthMap::flat(60, 80, 2.0)?;
 /// let view = View { focal_px: 5000.0, center_x_px: 39.5, center_y_px: 29.5 };
 /// let spec = ImagingSpec {
-///     film: Film { rows: 40, columns: 40, pitch_um: 10.0 },
+///     film: Film::centered(40, 40, 10.0),
 ///     grid: WavelengthGrid::uniform(500.0, 600.0, 50.0)?,
 ///     settings: Settings::default(),
 /// };
@@ -73,6 +74,10 @@ impl ImagingPlan {
         cancel: &Cancel,
     ) -> Result<Self, ForwardError> {
         progress(0.0);
+        let lens: Arc<dyn LensImage + Send> = match spec.film.is_centered() {
+            true => lens,
+            false => Arc::new(Framed { lens, center_mm: spec.film.center_mm }),
+        };
         let layout = Layout::new(lens.as_ref(), scene, spec, progress, (0.0, 1.0), cancel)?;
         progress(1.0);
         Ok(Self { lens, layout })

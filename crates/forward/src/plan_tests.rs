@@ -55,7 +55,7 @@ impl Scene {
 
     fn spec(&self) -> ImagingSpec {
         ImagingSpec {
-            film: Film { rows: ROWS, columns: COLUMNS, pitch_um: 1.0 },
+            film: Film::centered(ROWS, COLUMNS, 1.0),
             grid: WavelengthGrid::new((0..7).map(|i| 500.0 + 20.0 * f64::from(i)).collect()).unwrap(),
             settings: Settings::default(),
         }

@@ -34,7 +34,7 @@ impl LayerRaster {
     /// Returns the raster of pixels `factor` times as wide as the film's, which reaches beyond its edges.
     pub(crate) fn new(film: &Film, factor: usize, view: (View, (usize, usize)), map: &FilmMap) -> Self {
         let n = |n: usize| if factor == 1 { n } else { n.div_ceil(factor) + 2 };
-        let coarse = Film { rows: n(film.rows), columns: n(film.columns), pitch_um: factor as f64 * film.pitch_um };
+        let coarse = Film::centered(n(film.rows), n(film.columns), factor as f64 * film.pitch_um);
         let most = if factor == 1 { MOST_SAMPLES } else { MOST_SAMPLES_OF_WIDE };
         let sampler = Sampler::new(view, FilmFrame::new(&coarse), map, most);
         Self { factor, film: coarse, sampler }

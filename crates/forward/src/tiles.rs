@@ -464,7 +464,7 @@ mod tests {
     #[test]
     fn cells_cover_the_film_and_its_border_once() {
         for (rows, columns) in [(100, 151), (128, 64)] {
-            let film = Film { rows, columns, pitch_um: 1.0 };
+            let film = Film::centered(rows, columns, 1.0);
             let frame = FilmFrame::new(&film);
             let mut hits = Array2::<u8>::zeros((rows + 20, columns + 20));
             for cell in cells_over(&film, 10, 32) {

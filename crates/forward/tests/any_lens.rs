@@ -74,7 +74,7 @@ fn of_a_symmetric_lens_the_picture_is_that_of_the_turned_bank() {
     let lens = double_gauss();
     let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(1500.0).unwrap();
     let grid = WavelengthGrid::new(vec![450.0, 550.0, 650.0]).unwrap();
-    let film = Film { rows: 200, columns: 300, pitch_um: 100.0 };
+    let film = Film::centered(200, 300, 100.0);
     let camera = Camera { lens, film, film_distance_mm, depth_range_m: (1.0, 1.5), grid };
     let bars = Array2::from_shape_fn((240, 340), |(r, c)| if (r / 13 + c / 11) % 2 == 0 { 1.0 } else { 0.2 });
     let z_m = Array2::from_shape_fn((240, 340), |(_, c)| if c < 150 { 1.0 } else { 1.5 });
@@ -111,7 +111,7 @@ fn a_uniform_plane_gets_the_pupil_over_both_magnifications() {
     let mono = lens.at(550.0).unwrap();
     let film_distance_mm = 0.5 * (mono.first_order().bfl_mm + mono.first_order_x().bfl_mm);
     let grid = WavelengthGrid::new(vec![550.0]).unwrap();
-    let film = Film { rows: 64, columns: 64, pitch_um: 20.0 };
+    let film = Film::centered(64, 64, 20.0);
     let camera = Camera { lens, film, film_distance_mm, depth_range_m: (1e4, 1e4), grid };
     let flat = |value| Array2::from_elem((400, 400), value);
     let picture = camera.image(&camera.any_lens(), &scene(vec![flat(0.37)], &camera.grid, flat(1e4), 4000.0)).remove(0);
@@ -143,7 +143,7 @@ fn a_point_lands_where_the_rays_of_a_bent_lens_do() {
     let group = CoordinateBreak { decenter_mm: [0.2, -0.3, 0.0], ..turned((last - 3, last), 3.0, [1.0, -0.7, 0.0]) };
     let lens = lens.with_moves(vec![group]).unwrap();
     let grid = WavelengthGrid::new(vec![420.0, 550.0, 680.0]).unwrap();
-    let film = Film { rows: 600, columns: 900, pitch_um: 24.0 };
+    let film = Film::centered(600, 900, 24.0);
     let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
     let (rows, columns, focal_px, z_m) = (640, 940, 2100.0, 1.6);
     let camera = Camera { lens, film, film_distance_mm, depth_range_m: (z_m, z_m), grid };
@@ -184,7 +184,7 @@ fn the_depth_in_focus_of_a_turned_lens_follows_the_hinge_rule() {
     let film_distance_mm = mono.film_distance_mm_for(2000.0).unwrap();
     let tilted = lens.with_moves(vec![turned((0, last), first.front_principal_mm, [theta_deg, 0.0, 0.0])]).unwrap();
     let grid = WavelengthGrid::new(vec![550.0]).unwrap();
-    let film = Film { rows: 240, columns: 240, pitch_um: 40.0 };
+    let film = Film::centered(240, 240, 40.0);
     let camera = Camera { lens: tilted, film, film_distance_mm, depth_range_m: (0.5, 1e4), grid };
     let bank = camera.any_lens();
     let in_focus = |field_tan: DVec2| {
@@ -206,7 +206,7 @@ fn a_lens_that_sends_no_light_to_the_film_is_told() {
     let lens = double_gauss();
     let last = lens.interfaces().len() - 1;
     let lens = lens.with_moves(vec![turned((0, last), 0.0, [60.0, 0.0, 0.0])]).unwrap();
-    let film = Film { rows: 24, columns: 36, pitch_um: 100.0 };
+    let film = Film::centered(24, 36, 100.0);
     let grid = WavelengthGrid::new(vec![550.0]).unwrap();
     let camera = Camera { lens, film, film_distance_mm: 30.0, depth_range_m: (1.0, 2.0), grid };
     let error = camera.domain().grid_settings().unwrap_err();

@@ -61,7 +61,7 @@ fn scene(planes: Vec<Array2<f32>>, wavelengths_nm: Vec<f64>, z_m: f64, focal_px:
 /// A uniform Lambertian plane in focus, against the formula of the working f-number, on the axis.
 #[track_caller]
 fn check_radiometry(f_number: f64, z_m: f64, tolerance: f64) {
-    let camera = Camera::new(f_number, z_m, Film { rows: 64, columns: 64, pitch_um: 10.0 });
+    let camera = Camera::new(f_number, z_m, Film::centered(64, 64, 10.0));
     let radiance = 0.37;
     let scene = scene(vec![Array2::from_elem((100, 100), radiance)], vec![550.0], z_m, 4000.0);
     let picture = camera.image(&scene, Diffraction::Hurb { gamma: 1.0 }, &Settings::default()).remove(0);
@@ -87,7 +87,7 @@ fn a_lambertian_plane_gets_the_irradiance_of_the_working_f_number() {
 
 #[test]
 fn a_point_lands_where_its_rays_do() {
-    let film = Film { rows: 600, columns: 900, pitch_um: 24.0 };
+    let film = Film::centered(600, 900, 24.0);
     let camera = Camera::new(4.0, 2.0, film);
     let (rows, columns, focal_px, z_m) = (640, 940, 2100.0, 1.6);
     let wavelengths_nm = vec![420.0, 550.0, 680.0];
@@ -126,7 +126,7 @@ fn a_point_lands_where_its_rays_do() {
 
 #[test]
 fn psfs_shared_between_bands_are_as_good_as_one_for_each() {
-    let camera = Camera::new(4.0, 1.0, Film { rows: 160, columns: 240, pitch_um: 5.0 });
+    let camera = Camera::new(4.0, 1.0, Film::centered(160, 240, 5.0));
     let bars = Array2::from_shape_fn((200, 280), |(r, c)| if (r / 9 + c / 7) % 2 == 0 { 1.0 } else { 0.2 });
     let wavelengths_nm: Vec<f64> = (0..16).map(|i| 400.0 + 20.0 * f64::from(i)).collect();
     let mut scene = scene(vec![bars; 16], wavelengths_nm, 1.0, 10_500.0);
@@ -149,7 +149,7 @@ fn psfs_shared_between_bands_are_as_good_as_one_for_each() {
 /// Depth begins at the entrance pupil, some centimeters behind the first surface.
 #[test]
 fn depth_inside_the_lens_is_refused() {
-    let camera = Camera::new(4.0, 2.0, Film { rows: 24, columns: 36, pitch_um: 100.0 });
+    let camera = Camera::new(4.0, 2.0, Film::centered(24, 36, 100.0));
     let grid = WavelengthGrid::new(vec![550.0]).unwrap();
     let refused = |z_m: f32| {
         let mut depth = Array2::from_elem((10, 12), 2.0_f32);

@@ -358,6 +358,23 @@ impl Lens {
             && placement::motions(&self.moves, &self.vertices_z_mm()).is_none()
     }
 
+    /// Returns the lens on the axis, and how far this one is moved sideways from there, mm along x and y: of a lens that would be
+    /// rotationally symmetric but for being decentered as a whole, before a flat film that stays. `None` of any other, the lens
+    /// on the axis among them.
+    pub fn recentered(&self) -> Option<(Self, DVec2)> {
+        let (moved, film) = (self.placements(), self.film_motion());
+        let aside = moved.first()?.vertex_mm.truncate();
+        let is_film_flat = self.image_surface == ImageSurface::default();
+        if aside == DVec2::ZERO || !film.is_rest() || !is_film_flat {
+            return None;
+        }
+        let centered = Self { moves: vec![], ..self.clone() };
+        let back = Placement { vertex_mm: -aside.extend(0.0), ..Placement::centered(0.0) };
+        let stands = |(moved, home): (&Placement, &Placement)| back.after(moved).after(&home.inverse()).is_rest();
+        let is_whole = moved.iter().zip(&centered.placements()).all(stands);
+        (is_whole && centered.is_rotational()).then_some((centered, aside))
+    }
+
     /// Checks that the lens is rotationally symmetric; `task` says what needs that, in words.
     ///
     /// # Errors

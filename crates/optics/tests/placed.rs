@@ -176,6 +176,24 @@ fn what_needs_symmetry_refuses_a_lens_without() {
 }
 
 #[test]
+fn lens_moved_sideways_as_a_whole_is_recentered() {
+    let lens = Lens::built_in("asphere-15mm").unwrap();
+    let n = lens.interfaces().len();
+    let aside = |surfaces| CoordinateBreak { decenter_mm: [0.5, -0.25, 0.0], ..still(surfaces) };
+    let of = |moves: Vec<CoordinateBreak>| lens.clone().with_moves(moves).unwrap().recentered();
+    assert_eq!(of(vec![aside((0, n - 1))]), Some((lens.clone(), DVec2::new(0.5, -0.25))));
+    let farther = of(vec![aside((0, n - 1)), aside((0, n - 1))]).map(|(_, aside)| aside);
+    assert_eq!(farther, Some(DVec2::new(1.0, -0.5)));
+    let turned = CoordinateBreak { tilt_deg: [0.1, 0.0, 0.0], ..aside((0, n - 1)) };
+    let towards_film = CoordinateBreak { decenter_mm: [0.5, 0.0, 0.1], ..still((0, n - 1)) };
+    for moves in [vec![], vec![aside((0, 0))], vec![aside((0, n))], vec![turned], vec![towards_film]] {
+        assert_eq!(of(moves.clone()), None, "{moves:?}");
+    }
+    let curved = lens.clone().with_image_surface(ImageSurface { curvature_per_mm: -0.05, conic: 0.0 }).unwrap();
+    assert_eq!(curved.with_moves(vec![aside((0, n - 1))]).unwrap().recentered(), None);
+}
+
+#[test]
 fn file_and_back_keeps_moves_shapes_and_the_film() {
     let biconic = Shape::Biconic { conic: -0.3, curvature_x_per_mm: 0.02, conic_x: 0.7 };
     let toroid = Shape::Toroid { curvature_x_per_mm: 0.03, conic: 0.5, coefficients: vec![1e-3, -2e-5] };

@@ -32,7 +32,7 @@ pub use dioptric_psf::Diffraction;
 pub use dioptric_scene::FillDepth;
 
 pub use camera::{
-    BankData, BankSpec, BlurSpec, Camera, Exposed, FilmSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions,
+    BankData, BankSpec, BlurSpec, Camera, Crop, Exposed, FilmSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions,
     LensSpec, LightFieldSpec, Movements, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec,
     SensorOptions, SensorSpec, StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
@@ -51,8 +51,8 @@ pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
 pub use staged::{Leftover, Staged, write_file, write_json};
 pub use stages::{
-    Capture, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance, IrradianceSummary, KeptCamera,
-    RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, WorldRender,
-    write_seen_png,
+    Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance, IrradianceSummary,
+    KeptCamera, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,
+    WorldRender, write_seen_png,
 };
 pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

@@ -191,17 +191,13 @@ fn kept_capture_is_never_imaged_again() {
     assert!(std::sync::Arc::ptr_eq(&exposed.irradiance, &first.irradiance));
 }
 
-/// A preview shows the full picture averaged over its pixels, to a few hundredths of full scale: fewer bands shift colors, a coarser
-/// scene softens edges, and every pixel has the noise of a single one.
-#[test]
-fn preview_shows_the_full_picture() {
-    let mut camera = small();
-    camera.film = FilmSpec::Pixels { columns: 600, rows: 400, pitch_um: 52.8 };
-    camera.scene.source = SceneSource::StillLife { columns: 680, rows: 454 };
-    camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 20.0 };
+/// Returns how far the picture of a lower quality, of half as many pixels each way, is from the full one averaged over them: rms, as
+/// a share of full scale.
+fn rms_from_full(camera: Camera, quality: Quality) -> f64 {
     let kept = KeptCamera::new(camera);
-    let (full, preview) = (capture(&kept), capture(&kept.with_quality(Quality::Preview)));
-    assert_eq!((preview.place.binning, preview.place.rows, preview.place.columns), (2, 200, 300));
+    let (full, preview) = (capture(&kept), capture(&kept.with_quality(quality)));
+    let halves = (2, full.place.rows / 2, full.place.columns / 2);
+    assert_eq!((preview.place.binning, preview.place.rows, preview.place.columns), halves);
     let (whole, few) = (&full.developed.picture.codes, &preview.developed.picture.codes);
     let squares: f64 = few
         .indexed_iter()
@@ -210,9 +206,32 @@ fn preview_shows_the_full_picture() {
             f64::from(code - block.sum() / 4.0).powi(2)
         })
         .sum();
-    let rms = (squares / few.len() as f64).sqrt();
+    (squares / few.len() as f64).sqrt()
+}
+
+/// A preview shows the full picture averaged over its pixels, to a few hundredths of full scale: fewer bands shift colors, a coarser
+/// scene softens edges, and every pixel has the noise of a single one.
+#[test]
+fn preview_shows_the_full_picture() {
+    let mut camera = small();
+    camera.film = FilmSpec::Pixels { columns: 600, rows: 400, pitch_um: 52.8 };
+    camera.scene.source = SceneSource::StillLife { columns: 680, rows: 454 };
+    camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 20.0 };
+    let rms = rms_from_full(camera, Quality::Preview);
     println!("rms {rms:.4} of full scale");
     assert!(rms < 0.025, "{rms}");
+}
+
+/// So does a draft: of a strip of the picture that has its edges and its blurs.
+#[test]
+fn draft_shows_the_full_picture() {
+    let mut camera = small();
+    camera.film = FilmSpec::Pixels { columns: 1200, rows: 200, pitch_um: 26.4 };
+    camera.scene.source = SceneSource::StillLife { columns: 1360, rows: 228 };
+    camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 10.0 };
+    let rms = rms_from_full(camera, Quality::Draft);
+    println!("rms {rms:.4} of full scale");
+    assert!(rms < 0.017, "{rms}");
 }
 
 /// What a header stands for is in another file: a change of that is a change of the scene.

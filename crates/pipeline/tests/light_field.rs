@@ -3,7 +3,7 @@
 
 use std::{fmt::Write, fs, ops::Range, sync::OnceLock};
 
-use dioptric_pipeline::{Camera, DepthSearch, KeptCamera, LightField, LightFieldSpec, Silent};
+use dioptric_pipeline::{Camera, DepthSearch, FilmSpec, KeptCamera, LightField, LightFieldSpec, Movements, Silent};
 use dioptric_spectrum::Cancel;
 use ndarray::Array2;
 
@@ -225,6 +225,26 @@ fn depth_is_that_of_the_planes() {
     let wrong = DepthSearch { near_m: 2.0, ..search };
     let message = field.depth(&wrong, &Cancel::new()).unwrap_err().to_string();
     assert!(message.contains("the range of depths") && message.contains("2 to 1.1 m"), "{message}");
+}
+
+/// The axis of a moved lens crosses the film beside its middle, and the image of the pupil lies behind an element accordingly. About
+/// a point mirrored in the middle views at opposite rims of the pupil would look past it.
+#[test]
+fn moved_lens_is_seen_through_the_whole_pupil() {
+    let (_folder, kept) = plenoptic();
+    let kept = kept.with(|camera| {
+        camera.film = FilmSpec::Pixels { columns: 360, rows: 240, pitch_um: 10.0 };
+        camera.movements = Movements { rise_mm: 5.0, shift_mm: 3.0, ..Movements::default() };
+    });
+    let field = kept.light_field(None, &Silent, &Cancel::new()).unwrap();
+    let (rows, columns) = field.n_views();
+    let light = |row: usize, column: usize| field.view(row, column).unwrap()[0].sum();
+    let (middle_row, middle_column) = (rows / 2, columns / 2);
+    let middle = light(middle_row, middle_column);
+    for (row, column) in [(1, middle_column), (rows - 2, middle_column), (middle_row, 1), (middle_row, columns - 2)] {
+        let share = light(row, column) / middle;
+        assert!(share > 0.8, "view {row}, {column}: {share}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use std::{f64::consts::PI, fs};
 
 use dioptric_optics::Lens;
-use dioptric_pipeline::{Camera, KeptCamera, RenderEffort, RenderMethod, SceneSource, Silent, WorldSpec};
+use dioptric_pipeline::{Camera, Crop, KeptCamera, RenderEffort, RenderMethod, SceneSource, Silent, WorldSpec};
 use dioptric_spectrum::{Bands, Cancel, Illuminant, WavelengthGrid};
 use ndarray::Array2;
 
@@ -138,13 +138,16 @@ fn part_has_the_samples_of_the_whole() {
     let (_folder, kept) = camera(CAMERA);
     let render = kept.world_render(&Silent, &Cancel::new()).unwrap();
     let part = render.clone().cropped((5, 3), (7, 4)).unwrap();
-    let [whole, part] = [render, part].map(|render| {
+    let crop = Crop { x: 5, y: 3, columns: 7, rows: 4 };
+    let of_camera = kept.with(|camera| camera.crop = Some(crop)).world_render(&Silent, &Cancel::new()).unwrap();
+    let [whole, part, of_camera] = [render, part, of_camera].map(|render| {
         let mut renderer = render.renderer().unwrap();
         let effort = RenderEffort::Samples(16);
         render.refine(&mut renderer, effort, &Silent, &Cancel::new(), &mut |_| Ok(true)).unwrap();
         renderer.rendering().picture
     });
     assert_eq!((part.rows(), part.columns()), (4, 7));
+    assert_eq!(part, of_camera);
     for (row, column) in [(0, 0), (3, 6), (2, 1)] {
         assert_eq!(part.spectrum_at(row, column), whole.spectrum_at(row + 3, column + 5));
     }

@@ -99,7 +99,8 @@ mod tests {
         let at = |bank: &LensImageModel, tan: f64, d: f64, nm: f64| {
             bank.kernel(PsfQuery::new(DVec2::new(0.0, tan), d, nm, 5.0)).normalized()
         };
-        for (tan, dioptres, nm) in [(0.0, 0.0, 450.0), (0.1, 0.5, 650.0), (0.2, 1.0, 450.0)] {
+        let middle = rays.settings().fields.axes().0[4];
+        for (tan, dioptres, nm) in [(0.0, 0.0, 450.0), (middle, 0.5, 650.0), (0.2, 1.0, 450.0)] {
             let (a, b) = (at(&rays, tan, dioptres, nm), at(&images, tan, dioptres, nm));
             assert_eq!(a.samples.dim(), b.samples.dim());
             // The kernels hold all but 1e-7, in single precision.

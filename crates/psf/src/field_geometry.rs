@@ -63,6 +63,13 @@ impl FieldGeometry {
         size_of_val(self.nodes.as_slice())
     }
 
+    /// Returns the same with places counted from another: `from_mm` is where that is now.
+    pub(crate) fn counted_from(mut self, from_mm: DVec2) -> Self {
+        self.area.first_mm -= from_mm;
+        self.area.last_mm -= from_mm;
+        self
+    }
+
     /// Returns the field (tangents) seen at a place of the film and the irradiance there over the radiance of a locally
     /// uniform scene, sr; `None` where the bank has no field for it.
     ///

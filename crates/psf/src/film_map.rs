@@ -7,7 +7,8 @@ use crate::{FieldGeometry, FieldsAlong};
 
 /// From a distance on the film to the field seen there, and the irradiance that it gets; for one depth and wavelength.
 ///
-/// The map is that of the centroids of the PSFs, so distortion and lateral color are in it.
+/// The map is that of the centroids of the PSFs, so distortion and lateral color are in it. Its axis is the middle of the film
+/// and looks at the middle of the scene, unless it is [`about`](Self::about) another.
 #[derive(Clone, Debug)]
 pub struct RadialMap {
     // Invariants: at least two entries, evenly spaced in the square of the distance, as many gains as ratios.
@@ -15,6 +16,9 @@ pub struct RadialMap {
     tan_per_mm: Vec<f64>,
     irradiance_per_radiance: Vec<f64>,
     extent_mm: f64,
+    /// Where the axis meets the film and the field seen there, in the picture frame.
+    axis_mm: DVec2,
+    axis_tan: DVec2,
 }
 
 impl RadialMap {
@@ -42,7 +46,20 @@ impl RadialMap {
         if tan_per_mm.len() < 2 {
             (tan_per_mm, irradiance_per_radiance) = (vec![0.0; 2], vec![0.0; 2]);
         }
-        Self { entries_per_mm2, tan_per_mm, irradiance_per_radiance, extent_mm }
+        let (axis_mm, axis_tan) = (DVec2::ZERO, DVec2::ZERO);
+        Self { entries_per_mm2, tan_per_mm, irradiance_per_radiance, extent_mm, axis_mm, axis_tan }
+    }
+
+    /// Returns the map of a lens moved sideways: about an axis that meets the film at `axis_mm` (x right, y up, from its middle)
+    /// and looks at the field `axis_tan` of the scene.
+    #[must_use]
+    pub fn about(self, axis_mm: DVec2, axis_tan: DVec2) -> Self {
+        Self { axis_mm, axis_tan, ..self }
+    }
+
+    /// Where the axis meets the film, mm from its middle.
+    pub fn axis_mm(&self) -> DVec2 {
+        self.axis_mm
     }
 
     /// How far from the axis anything is seen, mm.
@@ -73,40 +90,43 @@ impl RadialMap {
             return;
         }
         let tables = (self.tan_per_mm.as_slice(), self.irradiance_per_radiance.as_slice());
-        look_up(tables, self.entries_per_mm2, x_mm, y_mm, seen);
+        look_up(tables, self.entries_per_mm2, (x_mm, y_mm), (self.axis_mm, self.axis_tan), seen);
     }
 
-    /// Returns the field at a place of the film, mm from the axis; beyond the extent, that of the last place in it.
+    /// Returns the field at a place of the film, mm from its middle; beyond the extent, that of the last place in it.
     pub fn field_tan(&self, place_mm: DVec2) -> DVec2 {
+        let place_mm = place_mm - self.axis_mm;
         if let Some((tan_per_mm, _)) = self.at(place_mm.length_squared()) {
-            return place_mm * tan_per_mm;
+            return place_mm * tan_per_mm + self.axis_tan;
         }
         let tan = self.tan_per_mm[self.tan_per_mm.len() - 1] * self.extent_mm;
-        place_mm / place_mm.length() * tan
+        place_mm / place_mm.length() * tan + self.axis_tan
     }
 }
 
-/// Looks up a radial map at each place.
+/// Looks up a radial map at each place of a row.
 #[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
 fn look_up(
     (tan_per_mm, irradiance_per_radiance): (&[f64], &[f64]),
     entries_per_mm2: f64,
-    x_mm: &[f64],
-    y_mm: f64,
+    (x_mm, y_mm): (&[f64], f64),
+    (axis_mm, axis_tan): (DVec2, DVec2),
     seen: &mut FieldsAlong,
 ) {
+    let y_mm = y_mm - axis_mm.y;
     let last = tan_per_mm.len() - 1;
     let end = last as f64;
     let FieldsAlong { tan_x, tan_y, irradiance_per_radiance: gain } = seen;
     let outputs = tan_x.iter_mut().zip(tan_y.iter_mut()).zip(gain.iter_mut());
     for (&x_mm, ((tan_x, tan_y), gain)) in x_mm.iter().zip(outputs) {
+        let x_mm = x_mm - axis_mm.x;
         let place = (x_mm * x_mm + y_mm * y_mm) * entries_per_mm2;
         // Beyond the table its last entry is read, and not used.
         let below = (place.min(end) as i32 as usize).min(last - 1);
         let fraction = place - below as f64;
         let mix = |table: &[f64]| table[below] + fraction * (table[below + 1] - table[below]);
         let tan = mix(tan_per_mm);
-        (*tan_x, *tan_y) = (x_mm * tan, y_mm * tan);
+        (*tan_x, *tan_y) = (x_mm * tan + axis_tan.x, y_mm * tan + axis_tan.y);
         *gain = if place > end { f64::NAN } else { mix(irradiance_per_radiance) };
     }
 }
@@ -150,19 +170,21 @@ impl From<FieldGeometry> for FilmMap {
 }
 
 impl FilmMap {
-    /// Returns the field seen at a place of the film (mm from the axis, x right, y up) and the irradiance per radiance (sr);
+    /// Returns the field seen at a place of the film (mm from its middle, x right, y up) and the irradiance per radiance (sr);
     /// `None` where nothing is seen.
     #[inline]
     pub fn at(&self, place_mm: DVec2) -> Option<(DVec2, f64)> {
         match self {
             Self::Radial(map) => {
-                map.at(place_mm.length_squared()).map(|(tan_per_mm, gain)| (place_mm * tan_per_mm, gain))
+                let place_mm = place_mm - map.axis_mm;
+                let seen = map.at(place_mm.length_squared());
+                seen.map(|(tan_per_mm, gain)| (place_mm * tan_per_mm + map.axis_tan, gain))
             }
             Self::Plane(map) => map.at(place_mm),
         }
     }
 
-    /// As [`at`](Self::at) at places of one height: `x_mm` to the right of the axis and `y_mm` above it.
+    /// As [`at`](Self::at) at places of one height: `x_mm` to the right of the middle and `y_mm` above it.
     pub fn along(&self, x_mm: &[f64], y_mm: f64, seen: &mut FieldsAlong) {
         seen.resize(x_mm.len());
         match self {
@@ -176,6 +198,18 @@ impl FilmMap {
         match self {
             Self::Radial(map) => map.field_tan(place_mm),
             Self::Plane(map) => map.nearest_field_tan(place_mm),
+        }
+    }
+
+    /// Returns the map with places counted from another: `from_mm` is where that is now.
+    #[must_use]
+    pub fn counted_from(self, from_mm: DVec2) -> Self {
+        match self {
+            Self::Radial(map) => {
+                let (axis_mm, axis_tan) = (map.axis_mm - from_mm, map.axis_tan);
+                Self::Radial(map.about(axis_mm, axis_tan))
+            }
+            Self::Plane(map) => Self::Plane(map.counted_from(from_mm)),
         }
     }
 
@@ -246,7 +280,9 @@ mod tests {
         let dark = FilmMap::Radial(RadialMap::tabulate(20.0, |_| None, |_| 1.0));
         let x_mm: Vec<f64> = (0..83).map(|i| 0.47 * f64::from(i) - 20.0).collect();
         let mut seen = FieldsAlong::default();
-        for (map, y_mm) in [(&map, 0.0), (&map, -9.3), (&dark, 1.0)] {
+        let aside = RadialMap::tabulate(20.0, tan_at, |tan| 1.0 / (1.0 + tan * tan).powi(2));
+        let aside = FilmMap::Radial(aside.about(DVec2::new(3.0, -2.0), DVec2::new(0.01, 0.02)));
+        for (map, y_mm) in [(&map, 0.0), (&map, -9.3), (&dark, 1.0), (&aside, 4.0)] {
             map.along(&x_mm, y_mm, &mut seen);
             for (i, &x_mm) in x_mm.iter().enumerate() {
                 let gain = seen.irradiance_per_radiance[i];

@@ -8,9 +8,11 @@
 pub struct RadialGeometry {
     // Invariants: fields ascend from 0, and the heights with them; all lists are of one length.
     field_tans: Vec<f64>,
-    /// Image height over field, mm: even in the field.
+    /// Angles of the fields.
+    angles: Vec<f64>,
+    /// Image height over field, mm: even in the angle.
     magnification_mm: Vec<f64>,
-    /// Second derivatives of the cubic spline through these.
+    /// Second derivatives of the cubic spline through these over the angle, in which it is smooth up to 90°.
     bends: Vec<f64>,
     radii_mm: Vec<f64>,
     irradiance_per_radiance: Vec<f64>,
@@ -24,9 +26,11 @@ impl RadialGeometry {
         let n = 1 + radii.windows(2).take_while(|pair| pair[1].abs() > pair[0].abs()).count();
         field_tans.truncate(n);
         magnification_mm.truncate(n);
-        let bends = even_spline(&field_tans, &magnification_mm);
+        let angles: Vec<f64> = field_tans.iter().map(|tan| tan.atan()).collect();
+        let bends = even_spline(&angles, &magnification_mm);
         let mut this = Self {
             field_tans,
+            angles,
             magnification_mm,
             bends,
             radii_mm: radii[..n].to_vec(),
@@ -62,25 +66,26 @@ impl RadialGeometry {
             return None;
         }
         let above = self.radii_mm.partition_point(|&r| r * sign < target * sign).clamp(1, n - 1);
-        let (mut low, mut high) = (self.field_tans[above - 1], self.field_tans[above]);
+        let (mut low, mut high) = (self.angles[above - 1], self.angles[above]);
         let (r_low, r_high) = (self.radii_mm[above - 1], self.radii_mm[above]);
-        let mut field = low + (high - low) * (target - r_low) / (r_high - r_low);
-        // Newton's method, kept inside the bracket.
+        let mut angle = low + (high - low) * (target - r_low) / (r_high - r_low);
+        // Newton's method in the angle, kept inside the bracket.
         for _ in 0..20 {
+            let field = angle.tan();
             let (g, slope) = self.magnification_at(field);
             let error = field * g - target;
             if error.abs() <= 1e-13 * r_high.abs() {
                 break;
             }
             if error * sign > 0.0 {
-                high = field;
+                high = angle;
             } else {
-                low = field;
+                low = angle;
             }
-            let next = field - error / (g + field * slope);
-            field = if next > low && next < high { next } else { 0.5 * (low + high) };
+            let next = angle - error / ((g + field * slope) * (1.0 + field * field));
+            angle = if next > low && next < high { next } else { 0.5 * (low + high) };
         }
-        Some(field)
+        Some(angle.tan())
     }
 
     /// Returns irradiance on the film over radiance of a locally uniform scene, sr: the projected solid angle of the
@@ -92,8 +97,8 @@ impl RadialGeometry {
         }
         let at = field_tan.clamp(0.0, self.last_field_tan());
         let above = self.field_tans.partition_point(|&f| f < at).clamp(1, n - 1);
-        let width = self.field_tans[above] - self.field_tans[above - 1];
-        let fraction = (at - self.field_tans[above - 1]) / width;
+        let (start, end) = (self.angles[above - 1], self.angles[above]);
+        let fraction = (at.atan() - start) / (end - start);
         let (a, b) = (self.irradiance_per_radiance[above - 1], self.irradiance_per_radiance[above]);
         if above == 1 {
             // Even in the field: flat on the axis.
@@ -112,21 +117,21 @@ impl RadialGeometry {
         self.radii_mm[self.radii_mm.len() - 1]
     }
 
-    /// Returns height over field, mm, and its derivative.
+    /// Returns height over field, mm, and its derivative by the field.
     fn magnification_at(&self, field_tan: f64) -> (f64, f64) {
         let n = self.field_tans.len();
         if n == 1 {
             return (self.magnification_mm[0], 0.0);
         }
         let above = self.field_tans.partition_point(|&f| f < field_tan).clamp(1, n - 1);
-        let (x0, x1) = (self.field_tans[above - 1], self.field_tans[above]);
+        let (x0, x1, angle) = (self.angles[above - 1], self.angles[above], field_tan.atan());
         let (y0, y1) = (self.magnification_mm[above - 1], self.magnification_mm[above]);
         let (m0, m1) = (self.bends[above - 1], self.bends[above]);
         let h = x1 - x0;
-        let (a, b) = ((x1 - field_tan) / h, (field_tan - x0) / h);
+        let (a, b) = ((x1 - angle) / h, (angle - x0) / h);
         let value = a * y0 + b * y1 + ((a * a * a - a) * m0 + (b * b * b - b) * m1) * h * h / 6.0;
         let slope = (y1 - y0) / h + ((1.0 - 3.0 * a * a) * m0 + (3.0 * b * b - 1.0) * m1) * h / 6.0;
-        (value, slope)
+        (value, slope / (1.0 + field_tan * field_tan))
     }
 }
 
@@ -163,9 +168,14 @@ fn even_spline(x: &[f64], y: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
+    /// Height over field of a lens whose distortion is a parabola over the angle.
+    fn magnification_mm(field_tan: f64) -> f64 {
+        50.0 * (1.0 - 0.1 * field_tan.atan().powi(2))
+    }
+
     fn barrel() -> RadialGeometry {
         let fields: Vec<f64> = (0..13).map(|i| f64::from(i) / 20.0).collect();
-        let magnification = fields.iter().map(|f| 50.0 * (1.0 - 0.1 * f * f)).collect();
+        let magnification = fields.iter().map(|f| magnification_mm(*f)).collect();
         RadialGeometry::new(fields, magnification, &[100.0; 13])
     }
 
@@ -173,7 +183,7 @@ mod tests {
     fn heights_follow_the_distortion_and_back() {
         let geometry = barrel();
         for field in [0.0, 0.01, 0.123, 0.3, 0.55, 0.6] {
-            let expected = 50.0 * field * (1.0 - 0.1 * field * field);
+            let expected = field * magnification_mm(field);
             // A cubic spline meets a parabola exactly but for its ends.
             assert!((geometry.image_radius_mm(field) - expected).abs() < 1e-9, "at {field}");
             assert!((geometry.field_tan(expected).unwrap() - field).abs() < 1e-9, "at {field}");
@@ -187,7 +197,8 @@ mod tests {
         let geometry = barrel();
         assert!((geometry.irradiance_per_radiance(0.0) - 100.0 / 2500.0).abs() < 1e-9);
         let field = 0.4f64;
-        let expected = 100.0 / (50.0 * (1.0 - 0.1 * field * field) * 50.0 * (1.0 - 0.3 * field * field));
+        let slope_mm = magnification_mm(field) - 50.0 * 0.2 * field * field.atan() / (1.0 + field * field);
+        let expected = 100.0 / (magnification_mm(field) * slope_mm);
         assert!((geometry.irradiance_per_radiance(field) / expected - 1.0).abs() < 1e-6);
     }
 

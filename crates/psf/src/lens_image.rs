@@ -22,7 +22,7 @@ pub trait LensImage: Sync {
     /// Whether the lens passes no light beyond the extent of its maps; if not, what comes there is not known.
     fn is_dark_beyond_extent(&self) -> bool;
 
-    /// Returns the map from the film, at least up to `extent_mm` from the axis where the lens is known so far, to fields.
+    /// Returns the map from the film, at least up to `extent_mm` from its middle where the lens is known so far, to fields.
     fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap;
 
     /// Returns the point spread function of a point about its centroid; of a dark point that of one near by.

@@ -16,6 +16,7 @@ mod axis;
 mod blend;
 mod blurred_edge;
 mod count;
+mod decenter;
 mod dispersion;
 mod drawing;
 mod energy;
@@ -47,6 +48,7 @@ mod watch;
 
 pub use adaptive::{AdaptiveSettings, ErrorPlaces, MeasuredError};
 pub use count::{AuthorsBending, CountingFilm, FrontGrid, mean_place_mm, trace_as_authors};
+pub use decenter::lens_on_axis;
 pub use drawing::{ModelUse, PsfQuery};
 pub use energy::EnclosedEnergy;
 pub use error::PsfError;

@@ -7,20 +7,24 @@ use ndarray::Array2;
 
 use crate::{
     BankSettings, FieldSampling, FilmMap, Kernel, LensImage, MeasuredError, ModelUse, PsfError, PsfQuery,
-    RadialGeometry, RadialMap, field_to_film::FieldToFilm, general::GeneralBank, rotational::RotationalBank,
+    RadialGeometry, RadialMap, decenter::Decenter, field_to_film::FieldToFilm, general::GeneralBank,
+    rotational::RotationalBank,
 };
 
 /// The image that a lens forms, from ray maps sampled over field, depth and wavelength.
 ///
 /// It interpolates rays, not pictures: 50 to 300 samples are better than thousands of blended ones. Where points land and
-/// how bright they are is kept apart from blur. Of a rotationally symmetric lens fields are sampled along one radius and
-/// turned; of any other over a grid ([`FieldSampling`]).
+/// how bright they are is kept apart from blur. Of a rotationally symmetric lens, on the axis or moved sideways as a whole, fields
+/// are sampled along one radius and turned; of any other over a grid ([`FieldSampling`]).
 ///
 /// Fields are tangents at the entrance pupil and places mm from the film's middle, both in the picture frame (x right, y
 /// up); depths are dioptres from the entrance pupil. What lies outside the ranges of the samples is moved to their ends.
 #[derive(Clone, Debug)]
 pub struct LensImageModel {
+    lens: Lens,
     form: Form,
+    /// Of fields along a radius: how far the lens stands from the axis of scene and film.
+    decenter: Decenter,
     error: Option<MeasuredError>,
 }
 
@@ -60,9 +64,12 @@ impl LensImageModel {
         progress: &(dyn Fn(f64) + Sync),
         cancel: &Cancel,
     ) -> Result<Self, PsfError> {
+        let mut decenter = Decenter::default();
         let form = match &settings.fields {
             FieldSampling::Radial(_) => {
-                Form::Rotational(Box::new(RotationalBank::build(lens, settings, progress, cancel)?))
+                let (centered, aside) = Decenter::of(lens, settings.reference_wavelength_nm);
+                decenter = aside;
+                Form::Rotational(Box::new(RotationalBank::build(&centered, settings, progress, cancel)?))
             }
             FieldSampling::Grid { .. } => {
                 let bank = GeneralBank::build(lens, settings, progress, cancel)?;
@@ -75,7 +82,7 @@ impl LensImageModel {
             }
         };
         progress(1.0);
-        Ok(Self { form, error: None })
+        Ok(Self { lens: lens.clone(), form, decenter, error: None })
     }
 
     pub(crate) fn form(&self) -> Result<&RotationalBank, &GeneralBank> {
@@ -106,10 +113,7 @@ impl LensImageModel {
 
     /// The lens.
     pub fn lens(&self) -> &Lens {
-        match self.form() {
-            Ok(bank) => bank.lens(),
-            Err(bank) => bank.lens(),
-        }
+        &self.lens
     }
 
     /// The number of fields: of those along a radius, as many as see light.
@@ -123,7 +127,7 @@ impl LensImageModel {
     /// Whether samples about a point see light: of dark points there are no pictures.
     pub fn is_lit(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> bool {
         match self.form() {
-            Ok(bank) => field_tan.length() <= bank.last_field_tan(),
+            Ok(bank) => self.decenter.seen_from_lens(field_tan, dioptres).length() <= bank.last_field_tan(),
             Err(bank) => bank.centroid_mm(field_tan, dioptres, wavelength_nm).is_some(),
         }
     }
@@ -134,7 +138,7 @@ impl LensImageModel {
     /// how much. Of a dark point it is that of the nearest field that sees light.
     pub fn kernel(&self, query: PsfQuery) -> Kernel {
         match &self.form {
-            Form::Rotational(bank) => bank.kernel_and_model(query).0,
+            Form::Rotational(bank) => bank.kernel_and_model(self.decenter.query(query)).0,
             Form::General { bank, field_to_film: Some(inverse) } => inverse.kernel(bank, query),
             Form::General { bank, field_to_film: None } => {
                 bank.kernel_and_model(query).map_or_else(|| Kernel::identity(query.pitch_um), |(kernel, _)| kernel)
@@ -145,7 +149,7 @@ impl LensImageModel {
     /// Returns the point spread function of a point about its centroid and the model that drew it, or `None` of a dark point.
     pub fn kernel_and_model(&self, query: PsfQuery) -> Option<(Kernel, ModelUse)> {
         match self.form() {
-            Ok(bank) => self.is_lit_at(query).then(|| bank.kernel_and_model(query)),
+            Ok(bank) => self.is_lit_at(query).then(|| bank.kernel_and_model(self.decenter.query(query))),
             Err(bank) => bank.kernel_and_model(query),
         }
     }
@@ -154,7 +158,7 @@ impl LensImageModel {
     /// model that drew it, or `None` of a dark point. The energy of the point is 1; what falls outside is lost.
     pub fn picture(&self, query: PsfQuery, size: usize) -> Option<(Array2<f64>, ModelUse)> {
         match self.form() {
-            Ok(bank) => self.is_lit_at(query).then(|| bank.picture(query, size)),
+            Ok(bank) => self.is_lit_at(query).then(|| bank.picture(self.decenter.query(query), size)),
             Err(bank) => bank.picture(query, size),
         }
     }
@@ -166,9 +170,10 @@ impl LensImageModel {
     /// Returns how far from the centroid the farthest ray of a point lands, mm, or `None` of a dark point.
     pub fn extent_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<f64> {
         match self.form() {
-            Ok(bank) => self
-                .is_lit(field_tan, dioptres, wavelength_nm)
-                .then(|| bank.extent_mm(field_tan.length(), dioptres, wavelength_nm)),
+            Ok(bank) => self.is_lit(field_tan, dioptres, wavelength_nm).then(|| {
+                let field_tan = self.decenter.seen_from_lens(field_tan, dioptres);
+                bank.extent_mm(field_tan.length(), dioptres, wavelength_nm)
+            }),
             Err(bank) => bank.extent_mm(field_tan, dioptres, wavelength_nm),
         }
     }
@@ -180,7 +185,7 @@ impl LensImageModel {
     /// logarithm: from 1 at B = 200 to 0 at B = 400, a blur of about ten waves of defocus.
     pub fn wave_fraction(&self, query: PsfQuery) -> f64 {
         match self.form() {
-            Ok(bank) => bank.wave_fraction(query),
+            Ok(bank) => bank.wave_fraction(self.decenter.query(query)),
             Err(bank) => bank.wave_fraction(query),
         }
     }
@@ -191,8 +196,10 @@ impl LensImageModel {
     pub fn centroid_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> DVec2 {
         match &self.form {
             Form::Rotational(bank) => {
+                let field_tan = self.decenter.seen_from_lens(field_tan, dioptres);
                 let direction = field_tan.try_normalize().unwrap_or(DVec2::X);
-                direction * bank.geometry(dioptres, wavelength_nm).image_radius_mm(field_tan.length())
+                let radius_mm = bank.geometry(dioptres, wavelength_nm).image_radius_mm(field_tan.length());
+                direction * radius_mm + self.decenter.axis_mm()
             }
             Form::General { bank, field_to_film: Some(inverse) } => {
                 inverse.centroid_mm(bank, field_tan, dioptres, wavelength_nm)
@@ -210,6 +217,7 @@ impl LensImageModel {
     pub fn irradiance_per_radiance(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         match &self.form {
             Form::Rotational(bank) => {
+                let field_tan = self.decenter.seen_from_lens(field_tan, dioptres);
                 bank.geometry(dioptres, wavelength_nm).irradiance_per_radiance(field_tan.length())
             }
             Form::General { bank, field_to_film: Some(inverse) } => {
@@ -220,21 +228,21 @@ impl LensImageModel {
     }
 
     /// Returns image height and brightness over the field, at one depth and wavelength; `None` unless fields are sampled
-    /// along a radius.
+    /// along a radius, about the middle of the scene.
     pub fn radial_geometry(&self, dioptres: f64, wavelength_nm: f64) -> Option<RadialGeometry> {
-        Some(self.form().ok()?.geometry(dioptres, wavelength_nm))
+        Some(self.form().ok().filter(|_| self.decenter.is_none())?.geometry(dioptres, wavelength_nm))
     }
 
-    /// Returns the field that a corner of the film sees, `corner_mm` from its middle: of a radius, along +x.
+    /// Returns the field that a corner of the film sees, `corner_mm` from its middle: of a radius about the middle, along +x.
     ///
     /// Where the corner sees nothing it is the last field that is seen.
     pub fn corner_field_tan(&self, corner_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> DVec2 {
         match &self.form {
-            Form::Rotational(bank) => {
+            Form::Rotational(bank) if self.decenter.is_none() => {
                 let geometry = bank.geometry(dioptres, wavelength_nm);
                 DVec2::X * geometry.field_tan(corner_mm.length()).unwrap_or(bank.last_field_tan())
             }
-            Form::General { .. } => self.film_map(dioptres, wavelength_nm, corner_mm.length()).field_tan(corner_mm),
+            _ => self.film_map(dioptres, wavelength_nm, corner_mm.length()).field_tan(corner_mm),
         }
     }
 
@@ -244,7 +252,10 @@ impl LensImageModel {
     /// of its energy within it. So it goes smoothly through 0, where aberrations keep a spot from vanishing.
     pub fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         match &self.form {
-            Form::Rotational(bank) => bank.blur_radius_mm(field_tan.length(), dioptres, wavelength_nm),
+            Form::Rotational(bank) => {
+                let field_tan = self.decenter.seen_from_lens(field_tan, dioptres);
+                bank.blur_radius_mm(field_tan.length(), dioptres, wavelength_nm)
+            }
             Form::General { bank, field_to_film } => {
                 let nearest_lit = field_to_film.as_ref().map(|inverse| inverse.nearest_lit());
                 bank.blur_radius_mm(nearest_lit, field_tan, dioptres, wavelength_nm)
@@ -255,7 +266,7 @@ impl LensImageModel {
 
 impl LensImage for LensImageModel {
     fn is_symmetric(&self) -> bool {
-        self.form().is_ok()
+        self.form().is_ok() && self.decenter.is_none()
     }
 
     fn wavelengths_nm(&self) -> (f64, f64) {
@@ -282,7 +293,9 @@ impl LensImage for LensImageModel {
             Form::Rotational(bank) => {
                 let geometry = bank.geometry(dioptres, wavelength_nm);
                 let gain = |tan: f64| geometry.irradiance_per_radiance(tan);
-                RadialMap::tabulate(extent_mm, |r| geometry.field_tan(r), gain).into()
+                let extent_mm = extent_mm + self.decenter.length_mm();
+                let map = RadialMap::tabulate(extent_mm, |r| geometry.field_tan(r), gain);
+                map.about(self.decenter.axis_mm(), self.decenter.axis_tan(dioptres)).into()
             }
             Form::General { bank, field_to_film: Some(inverse) } => {
                 inverse.geometry(bank, dioptres, wavelength_nm).into()

@@ -7,6 +7,9 @@ use crate::mesh::polar;
 
 /// How near to a rim the pupil's edge must pass, mm: the pupil's area is then good to 1e-8.
 const TOLERANCE_MM: f64 = 1e-8;
+/// How far the center may be from the centroid of the edge about it, as a share of the radius. Rays are interpolated between points
+/// by their places about the center, so it must be that of the pupil alone, wherever the search began.
+const OFF_CENTER: f64 = 2e-3;
 
 /// The edge of a pupil in the entrance-pupil plane, at equally spaced azimuths about a center.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,14 +32,32 @@ impl Pupil {
 
     /// Finds the pupil of a point whose pupil should be like this one, or from nothing if it is not.
     pub(crate) fn near(&self, lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
-        let n_azimuths = self.rho_mm.len();
         let guess = Self { z_mm: lens.projection_center_z_mm(), ..self.clone() };
-        // Once to know where its center is, once about that: any three digits of the first will do.
-        let solved = guess
-            .refined(lens, point, 1e-3 * TOLERANCE_MM.sqrt())
-            .map(Self::recentered)
-            .and_then(|centered| centered.refined(lens, point, TOLERANCE_MM));
-        solved.or_else(|| Self::find(lens, point, n_azimuths))
+        guess.settled(lens, point).or_else(|| {
+            let found = Self::find(lens, point, self.rho_mm.len())?;
+            Some(found.clone().settled(lens, point).unwrap_or(found))
+        })
+    }
+
+    /// Returns the region about its own centroid, its edge moved to where clearances are 0; `None` if that does not converge.
+    fn settled(self, lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
+        const MOST_STEPS: usize = 8;
+        // Any three digits of the edge tell where the center is.
+        let coarse_mm = 1e-3 * TOLERANCE_MM.sqrt();
+        let mut here = self.refined(lens, point, coarse_mm)?;
+        for _ in 0..MOST_STEPS {
+            let (center_mm, radius_mm) = (here.center_mm, here.mean_radius_mm());
+            let next = here.recentered();
+            if next.center_mm.distance(center_mm) <= OFF_CENTER * radius_mm {
+                return next.refined(lens, point, TOLERANCE_MM);
+            }
+            here = next.refined(lens, point, coarse_mm)?;
+        }
+        here.refined(lens, point, TOLERANCE_MM)
+    }
+
+    fn mean_radius_mm(&self) -> f64 {
+        self.rho_mm.iter().sum::<f64>() / self.rho_mm.len() as f64
     }
 
     /// Returns the same region with its edge at so many azimuths, by straight lines between those known.

@@ -20,7 +20,7 @@ use crate::{
 const WAVE_AZIMUTHS: usize = 96;
 /// How many times finer than the bank's the table of image heights is, in the field.
 const GEOMETRY_STEPS: usize = 3;
-/// The field that stands for the axis where a ratio of height to field is needed, as a share of the largest.
+/// The angle that stands for the axis where a ratio of height to field is needed, as a share of the largest.
 const NEAR_AXIS: f64 = 1e-3;
 
 /// Ray maps of a rotationally symmetric lens over field, depth and wavelength. Image height and brightness are in a table
@@ -29,6 +29,9 @@ const NEAR_AXIS: f64 = 1e-3;
 pub(crate) struct RotationalBank {
     // Invariant: `records`, `waves` and `summaries` are indexed by (wavelength, depth, field), the field innermost.
     settings: BankSettings,
+    /// Tangents of the fields that see light.
+    field_tans: Vec<f64>,
+    /// Their angles, in which rays change evenly up to 90°.
     fields: Axis,
     dioptres: Axis,
     /// Wavelengths in reverse, by the measure of the lens's dispersion.
@@ -115,8 +118,10 @@ impl RotationalBank {
         let axis = |knots: Vec<f64>| Axis::new(knots).expect("the settings were checked");
         let mut geometry_fields = geometry_fields(radius(settings));
         geometry_fields.truncate(Self::n_geometry(n_fields));
+        let field_tans = radius(settings)[..n_fields].to_vec();
         Ok(Self {
-            fields: axis(radius(settings)[..n_fields].to_vec()),
+            fields: axis(field_tans.iter().map(|tan| tan.atan()).collect()),
+            field_tans,
             dioptres: axis(settings.dioptres.clone()),
             colors: axis(colors.iter().map(|&nm| dispersion.coordinate(nm)).collect()),
             dispersion,
@@ -143,11 +148,11 @@ impl RotationalBank {
 
     /// The fields that see light.
     pub(crate) fn field_tans(&self) -> &[f64] {
-        self.fields.knots()
+        &self.field_tans
     }
 
     pub(crate) fn n_fields(&self) -> usize {
-        self.fields.knots().len()
+        self.field_tans.len()
     }
 
     /// Returns how many fields the table of image heights has, for so many of the bank.
@@ -172,8 +177,7 @@ impl RotationalBank {
 
     /// The largest field that sees light, as its tangent.
     pub(crate) fn last_field_tan(&self) -> f64 {
-        let knots = self.fields.knots();
-        knots[knots.len() - 1]
+        self.field_tans[self.field_tans.len() - 1]
     }
 
     /// Returns where centroids land and how bright they are, at one depth and wavelength.
@@ -199,8 +203,8 @@ impl RotationalBank {
         let at = field_tan.clamp(0.0, self.geometry_fields[n - 1]);
         let above = self.geometry_fields.partition_point(|&f| f < at).clamp(1.min(n - 1), n - 1);
         let below = above.saturating_sub(1);
-        let width = self.geometry_fields[above] - self.geometry_fields[below];
-        let fraction = if width > 0.0 { (at - self.geometry_fields[below]) / width } else { 0.0 };
+        let [start, end, here] = [self.geometry_fields[below], self.geometry_fields[above], at].map(f64::atan);
+        let fraction = if end > start { (here - start) / (end - start) } else { 0.0 };
         let rms: f64 = self
             .columns(dioptres, wavelength_nm)
             .map(|(column, weight)| {
@@ -236,7 +240,7 @@ impl RotationalBank {
             return None;
         }
         let (n_fields, n_depths) = (self.fields.knots().len(), self.dioptres.knots().len());
-        let fields = self.fields.cubic(field_tan);
+        let fields = self.fields.cubic(field_tan.atan());
         let depths = self.dioptres.cubic(dioptres);
         let colors = self.colors.cubic(self.dispersion.coordinate(self.within_colors(wavelength_nm)));
         let mut weighted = Vec::with_capacity(64);
@@ -251,7 +255,7 @@ impl RotationalBank {
 
     pub(crate) fn record(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> RayMap {
         let n = self.fields.knots().len();
-        let fields = self.fields.stencil(field_tan);
+        let fields = self.fields.stencil(field_tan.atan());
         let weighted = self.columns(dioptres, wavelength_nm).flat_map(|(column, weight)| {
             fields.iter().map(|(f, w)| (&self.records[column * n + f], w * weight)).collect::<Vec<_>>()
         });
@@ -331,7 +335,7 @@ impl ColumnTracer<'_> {
             summary.centroid_mm /= field;
             if i == 0 {
                 let last = radius(self.settings).last().copied();
-                let near_axis = NEAR_AXIS * last.filter(|f| *f > 0.0).unwrap_or(0.1);
+                let near_axis = (NEAR_AXIS * last.filter(|f| *f > 0.0).unwrap_or(0.1).atan()).tan();
                 let beside = self.task(lens, near_axis, dioptres);
                 let Some(nearby) = pupil.near(lens, &beside.point()) else { break };
                 let Some(beside) = beside.trace(&nearby, false) else { break };
@@ -373,12 +377,13 @@ fn radius(settings: &BankSettings) -> &[f64] {
     }
 }
 
-/// Returns the fields with others evenly between them.
+/// Returns the fields with others between them, evenly in angle.
 fn geometry_fields(field_tans: &[f64]) -> Vec<f64> {
     let mut fields = vec![field_tans[0]];
     for pair in field_tans.windows(2) {
-        let step = (pair[1] - pair[0]) / GEOMETRY_STEPS as f64;
-        fields.extend((1..GEOMETRY_STEPS).map(|i| pair[0] + step * i as f64));
+        let (start, end) = (pair[0].atan(), pair[1].atan());
+        let step = (end - start) / GEOMETRY_STEPS as f64;
+        fields.extend((1..GEOMETRY_STEPS).map(|i| (start + step * i as f64).tan()));
         fields.push(pair[1]);
     }
     fields

@@ -113,7 +113,7 @@ impl FieldSampling {
     }
 
     /// Returns such a sampling with the axes changed each by a function.
-    fn mapped(&self, of: impl Fn(&[f64]) -> Vec<f64>) -> Self {
+    pub(crate) fn mapped(&self, of: impl Fn(&[f64]) -> Vec<f64>) -> Self {
         match self {
             Self::Radial(tans) => Self::Radial(of(tans)),
             Self::Grid { tans_x, tans_y } => Self::Grid { tans_x: of(tans_x), tans_y: of(tans_y) },
@@ -172,7 +172,7 @@ pub struct BankSettings {
 }
 
 impl BankSettings {
-    /// Returns settings that cover these ranges at 9 fields, 9 depths and 4 wavelengths, evenly spaced in the tangent,
+    /// Returns settings that cover these ranges at 9 fields, 9 depths and 4 wavelengths, evenly spaced in angle,
     /// in dioptres and in 1/λ², with 12 × 48 rays each: the error of an interpolated blur is about 1 %.
     ///
     /// A range of no length becomes a single sample.
@@ -187,7 +187,7 @@ impl BankSettings {
         Self {
             film_distance_mm,
             reference_wavelength_nm: 550.0,
-            fields: FieldSampling::Radial(spaced((0.0, last_field_tan), n.n_radial)),
+            fields: FieldSampling::Radial(even_angles((0.0, last_field_tan), n.n_radial)),
             dioptres: spaced(dioptres, n.n_depths),
             wavelengths_nm: evenly_dispersed(wavelengths_nm, n.n_wavelengths),
             n_rings: n.n_rings,
@@ -223,7 +223,7 @@ impl BankSettings {
     #[must_use]
     pub fn with_counts(&self, n: SampleCounts) -> Self {
         let fields = match &self.fields {
-            FieldSampling::Radial(tans) => FieldSampling::Radial(spaced(ends(tans), n.n_radial)),
+            FieldSampling::Radial(tans) => FieldSampling::Radial(even_angles(ends(tans), n.n_radial)),
             FieldSampling::Grid { tans_x, tans_y } => FieldSampling::Grid {
                 tans_x: even_angles(ends(tans_x), n.n_grid),
                 tans_y: even_angles(ends(tans_y), n.n_grid),
@@ -311,8 +311,11 @@ fn spaced((first, last): (f64, f64), n: usize) -> Vec<f64> {
     (0..n).map(|i| first + (last - first) * i as f64 / (n - 1) as f64).collect()
 }
 
-/// Returns `n` tangents of evenly spaced angles from one end of a range to the other.
+/// Returns `n` tangents of evenly spaced angles from one end of a range to the other, or its one number.
 fn even_angles((first, last): (f64, f64), n: usize) -> Vec<f64> {
+    if last <= first || n < 2 {
+        return vec![first];
+    }
     let (low, high) = (first.atan(), last.atan());
     let mut tans: Vec<f64> = (0..n).map(|i| (low + (high - low) * i as f64 / (n - 1) as f64).tan()).collect();
     // The ends to the bit.

@@ -106,6 +106,8 @@ impl Camera {
     ///     The film becomes its pixels, unless ``film`` or ``pixels`` says otherwise.
     /// film : {"sensor", "scene"}
     ///     Whether it has the sensor's pixels or as many as the scene has samples.
+    /// crop : (x, y, columns, rows)
+    ///     The part of the film that is simulated, pixels from the top left of the picture.
     /// pixels : (columns, rows)
     /// pixel_um : float
     ///     A film of pixels of one's own.
@@ -115,7 +117,7 @@ impl Camera {
     /// blur : {"layered", "pointwise"}
     /// bank : {"standard", "paper"}
     /// bank_error : float
-    ///     Samples the lens as finely as this median error needs.
+    ///     Samples the lens as finely as this error at nine tenths of the places needs.
     /// scene : Scene or path
     /// fov_deg, depth_m, illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2
     ///     Of the scene, as of `Scene.read`.

@@ -2,8 +2,8 @@
 
 use dioptric_optics::Lens as OpticsLens;
 use dioptric_pipeline::{
-    BankSpec, BlurSpec, Camera, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions, LensSpec,
-    SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure, with_exposure_s,
+    BankSpec, BlurSpec, Camera, Crop, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions,
+    LensSpec, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure, with_exposure_s,
 };
 use pyo3::{
     prelude::*,
@@ -38,6 +38,7 @@ pub(crate) const ALL: &[&str] = &[
     "shift_mm",
     "sensor",
     "film",
+    "crop",
     "pixels",
     "pixel_um",
     "diffraction",
@@ -167,6 +168,11 @@ fn set(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_, PyA
         "swing_deg" => camera.movements.swing_deg = number(key, value)?,
         "rise_mm" => camera.movements.rise_mm = number(key, value)?,
         "shift_mm" => camera.movements.shift_mm = number(key, value)?,
+        "crop" => {
+            let expected = "four whole numbers: the first column and row, columns and rows";
+            let (x, y, columns, rows) = value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?;
+            camera.crop = Some(Crop { x, y, columns, rows });
+        }
         "film" => {
             camera.film = match word(key, value)?.as_str() {
                 "sensor" => FilmSpec::Sensor,

@@ -45,6 +45,22 @@ impl Cfa {
         }
     }
 
+    /// Returns the mosaic as it is from a row and column on: that of a part of the pixels.
+    #[must_use]
+    pub fn from_pixel(&self, row: usize, column: usize) -> Self {
+        let Self::Mosaic(tile) = self else { return Self::Stacked };
+        let mut rows = tile.clone();
+        if !rows.is_empty() {
+            let n_rows = rows.len();
+            rows.rotate_left(row % n_rows);
+        }
+        for names in rows.iter_mut().filter(|names| !names.is_empty()) {
+            let n_columns = names.len();
+            names.rotate_left(column % n_columns);
+        }
+        Self::Mosaic(rows)
+    }
+
     /// Returns the tile as places in a list of filters, or `None` where every pixel has them all.
     ///
     /// # Errors
@@ -196,6 +212,24 @@ mod tests {
         let quad = quad.resolve("test", &["R", "G", "B"]).unwrap().unwrap();
         assert_eq!((quad.rows(), quad.columns(), quad.bayer()), (4, 4, None));
         assert_eq!((quad.filter_at(1, 1), quad.filter_at(1, 2), quad.filter_at(2, 2)), (0, 1, 2));
+    }
+
+    #[test]
+    fn a_part_of_the_pixels_has_its_part_of_the_mosaic() {
+        let bayer = Cfa::two_by_two("RGGB").unwrap();
+        for (row, column, letters) in [(0, 1, "GRBG"), (1, 0, "GBRG"), (1, 1, "BGGR"), (2, 4, "RGGB")] {
+            assert_eq!(bayer.from_pixel(row, column), Cfa::two_by_two(letters).unwrap());
+        }
+        let quad = bayer.repeated(2);
+        let tile = |cfa: &Cfa| cfa.resolve("test", &["R", "G", "B"]).unwrap().unwrap();
+        let (whole, part) = (tile(&quad), tile(&quad.from_pixel(3, 5)));
+        for (row, column) in (0..4).flat_map(|row| (0..4).map(move |column| (row, column))) {
+            assert_eq!(part.filter_at(row, column), whole.filter_at(row + 3, column + 5));
+        }
+        assert_eq!(
+            (Cfa::Stacked.from_pixel(1, 1), Cfa::Mosaic(vec![]).from_pixel(1, 1)),
+            (Cfa::Stacked, Cfa::Mosaic(vec![]))
+        );
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::{SweepError, inputs::Inputs};
 
 /// Counts the changes of results that no camera file shows: raised whenever an equal camera and equal files make another
 /// picture, report or file, so that items made before are not taken for those made now.
-pub const RESULTS_EPOCH: u32 = 1;
+pub const RESULTS_EPOCH: u32 = 2;
 
 /// The name of an item: the BLAKE3 hash of its camera, of the content of the files that it is made from, and of
 /// [`RESULTS_EPOCH`].
@@ -60,7 +60,7 @@ impl ItemKey {
         let stages = [
             of(&(&scene.source, scene.field_of_view_deg, scene.depth_m, scene.flat, &camera.wavelengths)),
             of(&(&camera.lens, &camera.lens_reading, camera.stop, camera.movements)),
-            of(&(camera.focus, camera.film, sensor, camera.diffraction, camera.bank)),
+            of(&((camera.focus, camera.film, camera.crop), sensor, camera.diffraction, camera.bank)),
             of(&(camera.blur, &camera.light_field)),
             of(&(&scene.illuminant, scene.illuminance_lux, &scene.light, scene.mean_luminance_cd_m2)),
             of(&camera.sensor),

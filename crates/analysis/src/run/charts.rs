@@ -57,8 +57,10 @@ impl RunPlaces {
             let pupil_z_mm = run.capture.lens.reference.projection_center_z_mm();
             1e3 / (mm + pupil_z_mm)
         });
+        let film = place.film();
+        let corner_mm = film.half_size_mm() + film.center_mm.abs();
         Self {
-            corner: bank.corner_field_tan(place.film().half_size_mm(), focus.clamp(far, near), REFERENCE_WAVELENGTH_NM),
+            corner: bank.corner_field_tan(corner_mm, focus.clamp(far, near), REFERENCE_WAVELENGTH_NM),
             focus_dioptres: focus.clamp(far, near),
             dioptres: (0..steps).map(|i| far + (near - far) * i as f64 / (steps as f64 - 1.0).max(1.0)).collect(),
             wavelengths_nm: if last > first { wavelengths_nm } else { vec![first] },

@@ -3,7 +3,7 @@
 mod charts;
 mod statistics;
 
-use dioptric_pipeline::{BankData, Camera, Capture, PipelineError, display::LinearRgb};
+use dioptric_pipeline::{BankData, Camera, Capture, FilmPart, PipelineError, display::LinearRgb};
 use dioptric_psf::LensImageModel;
 use dioptric_scene::SceneLight;
 use dioptric_spectrum::{ColorTemperature, DepthMap};
@@ -78,6 +78,9 @@ pub struct FilmData {
     pub rows: usize,
     /// Distance between pixels, µm.
     pub pitch_um: f64,
+    /// The part of the film that this is, where it is not all of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub part: Option<FilmPart>,
     /// The share of pixels that get no light: beyond the scene, or beyond what the lens sees.
     pub dark_fraction: f64,
 }
@@ -180,6 +183,7 @@ impl RunReport {
                 columns: place.columns,
                 rows: place.rows,
                 pitch_um: place.pitch_um,
+                part: place.part,
                 dark_fraction: dark_fraction(&run.capture.irradiance.summary.seen),
             },
             scene: SceneData {

@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     )?;
     let lens =
         Lens::built_in(args.get(7).map_or("dgauss-50mm", |name| name))?.with_f_number(f_number.parse()?, 550.0)?;
-    let film = Film { rows: rows.parse()?, columns: columns.parse()?, pitch_um: pitch_um.parse()? };
+    let film = Film::centered(rows.parse()?, columns.parse()?, pitch_um.parse()?);
     let scene = match scene.as_str() {
         "by-formula" => by_formula::scene(film.rows, film.columns, &WavelengthGrid::uniform(400.0, 700.0, 10.0)?)?,
         file => read_scene(Path::new(file), &ReadOptions::default())?,

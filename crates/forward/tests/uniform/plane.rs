@@ -35,7 +35,7 @@ impl Uniform {
     pub(crate) fn new(case: &Case) -> Self {
         let lens = Lens::built_in(case.lens).unwrap().with_f_number(case.f_number, WAVELENGTH_NM).unwrap();
         let mono = lens.at(WAVELENGTH_NM).unwrap();
-        let film = Film { rows: 48, columns: case.columns, pitch_um: case.pitch_um };
+        let film = Film::centered(48, case.columns, case.pitch_um);
         let grid = WavelengthGrid::new(vec![WAVELENGTH_NM]).unwrap();
         let plane_m = 1e-3 * (case.plane_mm + mono.projection_center_z_mm());
         let film_distance_mm = mono.film_distance_mm_for(case.focus_mm).unwrap();

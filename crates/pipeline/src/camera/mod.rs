@@ -2,6 +2,7 @@
 
 mod bank;
 mod check;
+mod crop;
 mod frames;
 mod lens;
 mod light_field;
@@ -22,6 +23,7 @@ use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
 pub use bank::{BankData, BankSpec};
+pub use crop::Crop;
 pub(crate) use frames::at_rest;
 pub use frames::{Exposed, FramesSpec};
 pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
@@ -62,6 +64,9 @@ pub struct Camera {
     /// How large the film is.
     #[serde(default)]
     pub film: FilmSpec,
+    /// The part of the film that is simulated; all of it if left out.
+    #[serde(default)]
+    pub crop: Option<Crop>,
     /// Diffraction at the stop.
     #[serde(default)]
     pub diffraction: Diffraction,
@@ -317,6 +322,13 @@ impl Camera {
             checker.count("columns", columns, 1..=65_536)?;
             checker.count("rows", rows, 1..=65_536)?;
             checker.positive("pitch_um", pitch_um)?;
+        }
+        if let (Some(crop), FilmSpec::Pixels { columns, rows, .. }) = (self.crop, self.film) {
+            crop.check((rows, columns))?;
+        }
+        if self.crop.is_some() && self.light_field.is_some() {
+            let reason = "a part of the film is no light field, expected the whole film".to_owned();
+            return Err(PipelineError::Unsuitable { what: "crop", reason });
         }
         if let Err(PsfError::Setting { key, found, expected }) = self.diffraction.check() {
             checker.wrong(key, &found.to_string(), expected)?;

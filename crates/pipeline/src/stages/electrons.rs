@@ -7,9 +7,13 @@ use dioptric_sensor::{ElectronRate, ExitPupil, Illumination, Sensor};
 use super::{Watch, film::FilmPlace, irradiance::Irradiance};
 use crate::{PipelineError, Stage};
 
-/// Returns the sensor as it lies on the film: its pixels are the film's samples.
+/// Returns the sensor as it lies on the film: its pixels are the film's samples, its mosaic that of the whole film.
 pub(super) fn on_film(sensor: &Sensor, place: &FilmPlace) -> Sensor {
-    Sensor { pixel_pitch_um: place.pixel_pitch_um(), ..sensor.clone().with_size(place.rows, place.columns) }
+    let cfa = match place.part {
+        Some(part) => sensor.cfa.from_pixel(part.first_row, part.first_column),
+        None => sensor.cfa.clone(),
+    };
+    Sensor { pixel_pitch_um: place.pixel_pitch_um(), cfa, ..sensor.clone().with_size(place.rows, place.columns) }
 }
 
 /// Returns where the light of the sensor's pixels comes from, if its responses depend on that.

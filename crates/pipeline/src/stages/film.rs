@@ -10,7 +10,7 @@ use super::{
     scene::ResolvedScene,
     spec::{FilmInputs, Raster},
 };
-use crate::{FocusSpec, Movements, PipelineError};
+use crate::{Crop, FocusSpec, Movements, PipelineError};
 
 /// The share of the scene's samples that may be nearer than the near object.
 const NEAR_SHARE: f64 = 0.02;
@@ -34,14 +34,56 @@ pub struct FilmPlace {
     /// Distance of the film behind the exit pupil, mm, below 0 where the pupil lies behind the film; `None` of a telecentric
     /// lens.
     pub exit_pupil_distance_mm: Option<f64>,
-    /// Where the axis of the exit pupil meets the film, mm to the right and upwards in the picture.
+    /// Where the axis of the exit pupil meets the film, mm to the right and down in the picture from the middle of what is simulated.
     pub exit_pupil_axis_mm: [f64; 2],
+    /// The part of the film that is simulated, where it is not all of it.
+    #[serde(default)]
+    pub part: Option<FilmPart>,
+}
+
+/// Which part of a film is simulated, in samples of the irradiance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FilmPart {
+    /// Its first column, from the left of the picture.
+    pub first_column: usize,
+    /// Its first row, from the top.
+    pub first_row: usize,
+    /// Columns of the whole film.
+    pub of_columns: usize,
+    /// Rows of the whole film.
+    pub of_rows: usize,
+}
+
+impl FilmPart {
+    /// Returns the part and the film that it is: of a film whose samples are so many pixels each way.
+    fn of(crop: Crop, whole: Film, binning: usize) -> Result<(Self, Film), PipelineError> {
+        crop.check((whole.rows * binning, whole.columns * binning))?;
+        let part = Self {
+            first_column: (crop.x / binning).min(whole.columns - 1),
+            first_row: (crop.y / binning).min(whole.rows - 1),
+            of_columns: whole.columns,
+            of_rows: whole.rows,
+        };
+        let columns = (crop.columns / binning).clamp(1, whole.columns - part.first_column);
+        let rows = (crop.rows / binning).clamp(1, whole.rows - part.first_row);
+        let film = Film { rows, columns, center_mm: part.center_mm((rows, columns), whole.pitch_um), ..whole };
+        Ok((part, film))
+    }
+
+    /// Returns the middle of the part, mm to the right of the middle of the film and above it.
+    fn center_mm(self, (rows, columns): (usize, usize), pitch_um: f64) -> DVec2 {
+        let right = self.first_column as f64 + 0.5 * (columns as f64 - self.of_columns as f64);
+        let down = self.first_row as f64 + 0.5 * (rows as f64 - self.of_rows as f64);
+        1e-3 * pitch_um * DVec2::new(right, -down)
+    }
 }
 
 impl FilmPlace {
     /// The raster of samples.
     pub fn film(&self) -> Film {
-        Film { rows: self.rows, columns: self.columns, pitch_um: self.pitch_um }
+        let center_mm = self.part.map(|part| part.center_mm((self.rows, self.columns), self.pitch_um));
+        Film { center_mm: center_mm.unwrap_or_default(), ..Film::centered(self.rows, self.columns, self.pitch_um) }
     }
 
     /// The distance between the pixels of the sensor on this film, µm.
@@ -63,15 +105,22 @@ pub(super) fn place(
             let binning = inputs.geometry.quality.film_binning(full.columns);
             let fewer = |n: usize| (n / binning).max(1);
             let pitch_um = full.pitch_um * binning as f64;
-            (Film { rows: fewer(full.rows), columns: fewer(full.columns), pitch_um }, binning)
+            (Film::centered(fewer(full.rows), fewer(full.columns), pitch_um), binning)
         }
         // As coarse as the scene is by now.
         Raster::Scene => (size_film(reference, film_distance_mm, scene)?, resolved.binning),
     };
+    let (part, film) = match inputs.crop {
+        Some(crop) => {
+            let (part, film) = FilmPart::of(crop, film, binning)?;
+            (Some(part), film)
+        }
+        None => (None, film),
+    };
     // A lens moved up and to the right moves its axis so on the film, which the picture shows turned by 180°. That a tilted
     // axis meets the film elsewhere is left out.
     let Movements { rise_mm, shift_mm, .. } = inputs.lens.movements;
-    let exit_pupil_axis_mm = [-shift_mm, rise_mm];
+    let exit_pupil_axis_mm = [-shift_mm - film.center_mm.x, rise_mm + film.center_mm.y];
     let exit_pupil_z_mm = reference.first_order().exit_pupil_z_mm;
     Ok(FilmPlace {
         rows: film.rows,
@@ -82,6 +131,7 @@ pub(super) fn place(
         focus_distance_mm: reference.object_distance_mm_for(film_distance_mm).ok(),
         exit_pupil_distance_mm: exit_pupil_z_mm.is_finite().then_some(film_distance_mm - exit_pupil_z_mm),
         exit_pupil_axis_mm,
+        part,
     })
 }
 
@@ -120,7 +170,7 @@ fn size_film(lens: &MonoLens, film_distance_mm: f64, scene: &Scene) -> Result<Fi
         let reason = format!("the film at {film_distance_mm} mm sees no upright picture of the scene");
         return Err(PipelineError::Unsuitable { what: "film: Scene", reason });
     }
-    Ok(Film { rows, columns, pitch_um })
+    Ok(Film::centered(rows, columns, pitch_um))
 }
 
 /// Returns the pitch at which the scene, `half` a size across and up in samples, just fills the film, µm: by first order, but

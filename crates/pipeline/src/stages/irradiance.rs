@@ -289,6 +289,7 @@ mod tests {
             focus_distance_mm: None,
             exit_pupil_distance_mm: None,
             exit_pupil_axis_mm: [0.0; 2],
+            part: None,
         };
         let lens = DiscLens { focus_dioptres: 1.0, radius_um_per_dioptre: 20.0, focal_mm: 50.0, ..DiscLens::default() };
         let spec = ImagingSpec { film: place.film(), grid, settings: Settings::default() };

@@ -63,13 +63,14 @@ impl KeptCamera {
             return Err(no_light_field());
         };
         let (lens, place) = self.lens_and_film(progress, cancel)?;
+        let [right_mm, down_mm] = place.exit_pupil_axis_mm;
         let film = ArrayFilm {
             rows: place.rows,
             columns: place.columns,
             pitch_mm: 1e-3 * place.pitch_um,
             // The array stands where the focus puts the film, and the film behind it.
             array_distance_mm: place.film_distance_mm,
-            exit_pupil_axis_mm: place.exit_pupil_axis_mm,
+            exit_pupil_axis_mm: [right_mm, -down_mm],
         };
         let decoding = Decoding { array: &array, lens: &lens.reference, film: &film, n_views };
         decoding.light_field(&irradiance.summary.seen.planes)

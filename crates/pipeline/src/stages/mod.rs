@@ -41,7 +41,7 @@ pub(crate) use frames::{MovedLight, expose};
 pub(crate) use spec::ShutterInputs;
 pub(crate) use watch::Watch;
 
-pub use film::FilmPlace;
+pub use film::{FilmPart, FilmPlace};
 pub use frames::FrameSet;
 pub use given::{Given, GivenParts};
 pub use irradiance::{IRRADIANCE_FILE, Irradiance, IrradianceSummary};

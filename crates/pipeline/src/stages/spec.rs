@@ -18,8 +18,9 @@ use serde::{Deserialize, Serialize};
 
 use super::given::{Given, GivenParts};
 use crate::{
-    BankSpec, BlurSpec, Camera, Diffraction, FilmSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions, LensSpec,
-    LightFieldSpec, Movements, PipelineError, Quality, SceneSource, SceneSpec, StopSpec, WavelengthSpec, WorldSpec,
+    BankSpec, BlurSpec, Camera, Crop, Diffraction, FilmSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions,
+    LensSpec, LightFieldSpec, Movements, PipelineError, Quality, SceneSource, SceneSpec, StopSpec, WavelengthSpec,
+    WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -109,6 +110,7 @@ pub(crate) struct FilmInputs {
     pub(crate) geometry: GeometryInputs,
     pub(crate) focus: FocusSpec,
     pub(crate) raster: Raster,
+    pub(crate) crop: Option<Crop>,
 }
 
 /// The pixels of the film.
@@ -253,10 +255,8 @@ impl IrradianceInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts, sensor: &Sensor, quality: Quality) -> Self {
         let scene = SceneInputs::of(camera, given, quality);
         let raster = match camera.film {
-            FilmSpec::Sensor => {
-                Raster::Pixels(Film { rows: sensor.rows, columns: sensor.columns, pitch_um: sensor.pixel_pitch_um })
-            }
-            FilmSpec::Pixels { columns, rows, pitch_um } => Raster::Pixels(Film { rows, columns, pitch_um }),
+            FilmSpec::Sensor => Raster::Pixels(Film::centered(sensor.rows, sensor.columns, sensor.pixel_pitch_um)),
+            FilmSpec::Pixels { columns, rows, pitch_um } => Raster::Pixels(Film::centered(rows, columns, pitch_um)),
             FilmSpec::Scene => Raster::Scene,
         };
         let film = FilmInputs {
@@ -264,6 +264,7 @@ impl IrradianceInputs {
             geometry: scene.geometry.clone(),
             focus: camera.focus,
             raster,
+            crop: camera.crop,
         };
         let bank = BankInputs { film, diffraction: camera.diffraction, bank: camera.bank };
         let micro_array = camera.light_field.as_ref().and_then(LightFieldSpec::micro_array);

@@ -155,11 +155,12 @@ impl WorldRender {
             return Err(PipelineError::Unsuitable { what: "diffraction: Wave", reason });
         }
         let bands = Bands { grid, sampling: spec.bands };
+        let (columns, rows) = place.part.map_or((place.columns, place.rows), |part| (part.of_columns, part.of_rows));
         let settings = LensCameraSettings {
             // The focus puts the array there, and the film lies behind it.
             film_distance_mm: place.film_distance_mm + inputs.micro_array.map_or(0.0, |array| array.gap_mm),
-            film_size_mm: DVec2::new(place.columns as f64, place.rows as f64) * (1e-3 * place.pitch_um),
-            pixels: PixelGrid::new(place.columns, place.rows),
+            film_size_mm: DVec2::new(columns as f64, rows as f64) * (1e-3 * place.pitch_um),
+            pixels: PixelGrid::new(columns, rows),
             placement: placement(&world, spec),
             origin: LensOrigin::EntrancePupil,
             diffraction: inputs.plan.bank.diffraction.hurb(),
@@ -168,7 +169,11 @@ impl WorldRender {
         let identity = format!("{} {:?} {settings:?}", fingerprint(&world, spec), lens.lens);
         let camera = Camera::Lens(Box::new(LensCamera::new(&lens.lens, &bands, settings)?));
         let (paths, seed) = (spec.paths, spec.seed);
-        Ok(Self { world, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity })
+        let whole = Self { world, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity };
+        match place.part {
+            Some(part) => whole.cropped((part.first_column, part.first_row), (place.columns, place.rows)),
+            None => Ok(whole),
+        }
     }
 
     /// Returns the world as a camera of its own file sees it: one by formula gives radiance, one with a lens irradiance.

@@ -66,6 +66,7 @@ class Camera:
         shift_mm: float | None = ...,
         sensor: Sensor | _Path | None = ...,
         film: Literal["sensor", "scene"] | None = ...,
+        crop: tuple[int, int, int, int] | None = ...,
         pixels: tuple[int, int] | None = ...,
         pixel_um: float | None = ...,
         diffraction: _Diffraction | None = ...,
