@@ -244,7 +244,8 @@ impl SceneSpec {
         cancel: &Cancel,
     ) -> Result<Scene, PipelineError> {
         if self.flat.is_some() && self.depth_m.is_none() {
-            let reason = "a scene by its size is seen through a lens, expected a camera's, or a field of view and a depth";
+            let reason =
+                "a scene by its size is seen through a lens, expected a camera's, or a field of view and a depth";
             return Err(PipelineError::Unsuitable { what: "flat", reason: reason.to_owned() });
         }
         let own_or = || wanted.cloned().map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok);
