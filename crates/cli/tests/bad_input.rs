@@ -234,7 +234,11 @@ fn depth_inside_the_lens_is_refused_by_its_place() {
     let folder = folder();
     // 3 mm before the entrance pupil is amid the glass.
     write_rgbd(folder.path(), |x, y| if (x, y) == (5, 7) { 3 } else { 2000 });
-    check_error(folder.path(), &[&ROOM[..], &["out"]].concat(), &["row 7, column 5", "0.003 m"]);
+    check_error(
+        folder.path(),
+        &[&ROOM[..], &["out"]].concat(),
+        &["0.00300 m", "row 7, column 5", "inside dgauss-50mm"],
+    );
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Lists of numbers as people type them: `400,550` or `400:700:10`.
+//! Numbers as people type them: lists, `400,550` or `400:700:10`, and amounts of memory, `1GiB`.
 
 use crate::PipelineError;
 
@@ -63,6 +63,32 @@ pub fn number(value: f64) -> String {
     format!("{}", (value * 1e3).round() / 1e3 + 0.0)
 }
 
+/// Reads an amount of memory: bytes, or a number with kB, MB, GB (powers of 1000) or KiB, MiB, GiB (of 1024).
+///
+/// # Errors
+/// When it is none.
+pub fn parse_bytes(text: &str) -> Result<u64, PipelineError> {
+    let wrong = || PipelineError::Bytes { found: text.to_owned() };
+    let trimmed = text.trim();
+    let end = trimmed.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(trimmed.len());
+    let (number, unit) = trimmed.split_at(end);
+    let factor: f64 = match unit.to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "k" | "kb" => 1e3,
+        "m" | "mb" => 1e6,
+        "g" | "gb" => 1e9,
+        "tb" => 1e12,
+        "kib" => 1024.0,
+        "mib" => 1024.0 * 1024.0,
+        "gib" => 1024.0 * 1024.0 * 1024.0,
+        "tib" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
+        _ => return Err(wrong()),
+    };
+    let bytes = factor * number.trim().parse::<f64>().map_err(|_| wrong())?;
+    // Beyond 2⁵³ bytes no machine tells them apart.
+    if (1.0..9e15).contains(&bytes) { Ok(bytes as u64) } else { Err(wrong()) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,5 +124,23 @@ mod tests {
         }
         assert!(parse_numbers("fields", "").is_err());
         assert!(parse_numbers("fields", "0:1:1e-9").is_err());
+    }
+
+    #[test]
+    fn amounts_of_memory_are_read() {
+        for (text, bytes) in [
+            ("1GiB", 1 << 30),
+            ("500MB", 500_000_000),
+            ("1.5 kib", 1536),
+            ("4096", 4096),
+            ("2g", 2_000_000_000),
+            (" 64 MiB ", 64 << 20),
+        ] {
+            assert_eq!(parse_bytes(text).unwrap(), bytes, "{text}");
+        }
+        for wrong in ["", "GiB", "-1GB", "0", "1 parsec", "1e400", "NaN", "1GiB2"] {
+            let message = parse_bytes(wrong).unwrap_err().to_string();
+            assert!(message.contains("1GiB") && message.contains(wrong), "{message}");
+        }
     }
 }

@@ -243,6 +243,11 @@ impl SceneSpec {
         progress: &(dyn Fn(f64) + Sync),
         cancel: &Cancel,
     ) -> Result<Scene, PipelineError> {
+        if self.flat.is_some() && self.depth_m.is_none() {
+            let reason =
+                "a scene by its size is seen through a lens, expected a camera's, or a field of view and a depth";
+            return Err(PipelineError::Unsuitable { what: "flat", reason: reason.to_owned() });
+        }
         let own_or = || wanted.cloned().map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok);
         let light = self.illuminant.clone().unwrap_or(Illuminant::D65);
         let illuminance_lux = self.illuminance_lux.unwrap_or(USUAL_LUX);
@@ -375,6 +380,22 @@ mod tests {
         let path = folder.join("room.exr");
         write_spectral_exr(&path, &image, &ExrParts::default()).unwrap();
         path
+    }
+
+    #[test]
+    fn flat_scenes_are_seen_from_the_pupil() {
+        let flat = FlatSize { width_mm: 20.0, distance_mm: 90.0 };
+        // From 10 mm behind the first vertex 20 mm are 2 atan(.1) wide; a pupil before the lens sees less.
+        let (fov_deg, depth_m) = flat.seen_from(10.0).unwrap();
+        assert_relative_eq!(fov_deg, 2.0 * 0.1_f64.atan().to_degrees(), max_relative = 1e-12);
+        assert_relative_eq!(depth_m, 0.1, max_relative = 1e-12);
+        assert_relative_eq!(flat.seen_from(-40.0).unwrap().1, 0.05, max_relative = 1e-12);
+        for pupil_z_mm in [-90.0, -200.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN] {
+            let message = flat.seen_from(pupil_z_mm).unwrap_err().to_string();
+            assert!(message.starts_with("flat: the lens has its entrance pupil"), "{message}");
+        }
+        let of_file = SceneSpec { flat: Some(flat), ..SceneSpec::of_file(PathBuf::from("wafer.exr")) };
+        assert!(of_file.open(None).unwrap_err().to_string().contains("through a lens"));
     }
 
     #[test]

@@ -18,6 +18,7 @@ use super::{
     given::GivenParts,
     irradiance::{self, Irradiance, Keeping},
     lens::{self, ResolvedLens},
+    memory::MemoryBudget,
     plan,
     scene::{self, ResolvedScene, SceneSummary},
     slot::Slot,
@@ -27,10 +28,7 @@ use super::{
     },
     world::{self, WorldRender},
 };
-use crate::{
-    Camera, Frames, Leftover, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage,
-    memory::MemoryBudget,
-};
+use crate::{Camera, Frames, Leftover, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
 
 /// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
 const MEMORY_BYTES: u64 = 2 << 30;
@@ -575,7 +573,7 @@ impl Chain<'_> {
             let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
             let scene: &Scene = &resolved.scene;
             let memory_bytes = match self.camera.budget {
-                Some(budget) => budget.irradiance_bytes(&plan, scene, &place)?,
+                Some(budget) => budget.irradiance_bytes(&plan, scene, &place)?.min(self.camera.memory_bytes),
                 None => self.camera.memory_bytes,
             };
             let folder = self.camera.band_folder(inputs)?;

@@ -25,6 +25,7 @@ mod irradiance;
 mod kept;
 mod lens;
 mod light_field;
+mod memory;
 mod plan;
 mod rendering;
 mod resume;

@@ -6,8 +6,8 @@ use dioptric_forward::{BlurMode, ImagingPlan, ImagingSpec, Settings, Source};
 use dioptric_psf::LensImageModel;
 use dioptric_scene::Scene;
 
-use super::{Watch, film::FilmPlace, spec::PlanInputs};
-use crate::{BlurSpec, PipelineError, Quality, Stage, memory::MemoryBudget};
+use super::{Watch, film::FilmPlace, memory::MemoryBudget, spec::PlanInputs};
+use crate::{BlurSpec, PipelineError, Quality, Stage};
 
 pub(super) fn plan(
     inputs: &PlanInputs,

@@ -3,7 +3,8 @@
 use dioptric_forward::ImagingPlan;
 use dioptric_scene::Scene;
 
-use crate::{FilmPlace, PipelineError};
+use super::film::FilmPlace;
+use crate::PipelineError;
 
 /// What the stages after the irradiance take for a pixel of the film, bytes: electrons, volts, codes and colors.
 const FILM_BYTES: u64 = 96;
@@ -87,53 +88,4 @@ fn fixed_bytes(scene: &Scene, place: &FilmPlace) -> u64 {
     let layers = 1 + u64::from(scene.hidden.is_some());
     let planes = layers * (scene.radiance.grid().len() as u64 + 1);
     4 * planes * (scene.rows() * scene.columns()) as u64 + FILM_BYTES * (place.rows * place.columns) as u64
-}
-
-/// Reads an amount of memory: bytes, or a number with kB, MB, GB (powers of 1000) or KiB, MiB, GiB (of 1024).
-///
-/// # Errors
-/// When it is none.
-pub fn parse_bytes(text: &str) -> Result<u64, PipelineError> {
-    let wrong = || PipelineError::Bytes { found: text.to_owned() };
-    let trimmed = text.trim();
-    let end = trimmed.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(trimmed.len());
-    let (number, unit) = trimmed.split_at(end);
-    let factor: f64 = match unit.to_ascii_lowercase().as_str() {
-        "" | "b" => 1.0,
-        "k" | "kb" => 1e3,
-        "m" | "mb" => 1e6,
-        "g" | "gb" => 1e9,
-        "tb" => 1e12,
-        "kib" => 1024.0,
-        "mib" => 1024.0 * 1024.0,
-        "gib" => 1024.0 * 1024.0 * 1024.0,
-        "tib" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
-        _ => return Err(wrong()),
-    };
-    let bytes = factor * number.trim().parse::<f64>().map_err(|_| wrong())?;
-    // Beyond 2⁵³ bytes no machine tells them apart.
-    if bytes >= 1.0 && bytes < 9e15 { Ok(bytes as u64) } else { Err(wrong()) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn amounts_of_memory_are_read() {
-        for (text, bytes) in [
-            ("1GiB", 1 << 30),
-            ("500MB", 500_000_000),
-            ("1.5 kib", 1536),
-            ("4096", 4096),
-            ("2g", 2_000_000_000),
-            (" 64 MiB ", 64 << 20),
-        ] {
-            assert_eq!(parse_bytes(text).unwrap(), bytes, "{text}");
-        }
-        for wrong in ["", "GiB", "-1GB", "0", "1 parsec", "1e400", "NaN", "1GiB2"] {
-            let message = parse_bytes(wrong).unwrap_err().to_string();
-            assert!(message.contains("1GiB") && message.contains(wrong), "{message}");
-        }
-    }
 }
