@@ -39,3 +39,18 @@ fn beside(own: &Path) -> Option<PathBuf> {
     let path = own.with_file_name(format!("{PROGRAM}{}", env::consts::EXE_SUFFIX));
     path.is_file().then_some(path)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_program_beside_this_one_is_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let own = folder.path().join("dioptric");
+        assert_eq!(beside(&own), None);
+        let program = folder.path().join(format!("{PROGRAM}{}", env::consts::EXE_SUFFIX));
+        std::fs::write(&program, "").unwrap();
+        assert_eq!(beside(&own), Some(program));
+    }
+}

@@ -44,6 +44,11 @@ fn a_lens_that_is_not_centered_has_no_other_bank() {
 }
 
 #[test]
+fn a_window_needs_its_camera() {
+    check_error(folder().path(), &["studio", "absent.ron"], &["cannot read absent.ron"]);
+}
+
+#[test]
 fn a_truncated_exr_is_named() {
     let folder = folder();
     let bytes = spectral_exr(folder.path());

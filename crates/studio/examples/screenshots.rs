@@ -23,8 +23,6 @@ use eframe::{
 
 /// How long charts may take after the full picture.
 const REST: Duration = Duration::from_millis(1500);
-/// The most bytes of a file.
-const MOST_BYTES: usize = 150_000;
 
 /// A state of the window: its name, what is done for it in turn, the picture awaited after each.
 type State = (&'static str, bool, &'static [fn(&mut Studio)]);
@@ -102,25 +100,11 @@ impl eframe::App for Shots {
     }
 }
 
-/// Writes an image on fewer and fewer colors until it is small enough.
+/// Writes an image.
 fn write(path: &Path, image: &ColorImage) {
-    for bits in (3..=8).rev() {
-        let mask = 0xff << (8 - bits);
-        let round = |code: u8| (u16::from(code) + (1 << (7 - bits.min(7)))).min(255) as u8 & mask;
-        let full = bits == 8;
-        let codes: Vec<u8> = image
-            .pixels
-            .iter()
-            .flat_map(|pixel| [pixel.r(), pixel.g(), pixel.b()])
-            .map(|code| if full { code } else { round(code) })
-            .collect();
-        let png = encode_rgb8_png(&codes, (image.size[0], image.size[1])).unwrap();
-        if png.len() <= MOST_BYTES || bits == 3 {
-            fs::write(path, &png).unwrap();
-            println!("{}: {} x {}, {} bytes, {bits} bits", path.display(), image.size[0], image.size[1], png.len());
-            return;
-        }
-    }
+    let codes: Vec<u8> = image.pixels.iter().flat_map(|pixel| [pixel.r(), pixel.g(), pixel.b()]).collect();
+    fs::write(path, encode_rgb8_png(&codes, (image.size[0], image.size[1])).unwrap()).unwrap();
+    println!("{}: {} x {}", path.display(), image.size[0], image.size[1]);
 }
 
 fn main() {

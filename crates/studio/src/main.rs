@@ -1,13 +1,15 @@
 //! The program `dioptric-studio [CAMERA.ron]`: a window of the system around [`dioptric_studio::ui`].
 
-use std::{env, error::Error, path::PathBuf, process::ExitCode};
+use std::{env, error::Error, path::PathBuf, process::ExitCode, time::UNIX_EPOCH};
 
+use dioptric_pipeline::PaintingFolder;
 use dioptric_studio::{
     engine::EngineSettings,
     session::Autosave,
     ui::{Studio, StudioSettings},
 };
 use eframe::{Frame, NativeOptions, egui};
+use etcetera::{BaseStrategy, choose_base_strategy};
 
 /// The window's contents as eframe wants them.
 struct Shell(Studio);
@@ -31,7 +33,11 @@ fn main() -> ExitCode {
 
 fn run() -> Result<(), Box<dyn Error>> {
     let camera = env::args_os().nth(1).map(PathBuf::from);
-    let settings = StudioSettings { engine: EngineSettings::default(), autosave: Autosave::of_user(), camera };
+    let settings = StudioSettings {
+        engine: EngineSettings { paintings: painting_folder() },
+        autosave: Autosave::of_user(),
+        camera,
+    };
     let viewport = egui::ViewportBuilder::default().with_inner_size([1400.0, 900.0]).with_title("dioptric studio");
     let options = NativeOptions { viewport, ..NativeOptions::default() };
     eframe::run_native(
@@ -40,4 +46,17 @@ fn run() -> Result<(), Box<dyn Error>> {
         Box::new(|context| Ok(Box::new(Shell(Studio::new(&context.egui_ctx, settings)?)))),
     )?;
     Ok(())
+}
+
+/// Returns the folder where paintings of the still life are kept, as the command line has it; `None` where none is wanted.
+fn painting_folder() -> Option<PaintingFolder> {
+    let folder = match env::var_os("DIOPTRIC_CACHE") {
+        Some(folder) => PathBuf::from(folder),
+        None => choose_base_strategy().ok()?.cache_dir().join("dioptric"),
+    };
+    let file = env::current_exe().ok()?.metadata().ok()?;
+    let built = file.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
+    // Another build may paint otherwise.
+    let build = format!("{} {} {}", env!("CARGO_PKG_VERSION"), file.len(), built.as_nanos());
+    (!folder.as_os_str().is_empty()).then(|| PaintingFolder::new(folder, build))
 }

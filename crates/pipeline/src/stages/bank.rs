@@ -9,7 +9,7 @@ use crate::{PipelineError, Quality, Stage};
 
 /// For sketches: what one sees on pixels of several times the full ones.
 const SKETCH: SampleCounts =
-    SampleCounts { n_radial: 4, n_grid: 4, n_depths: 3, n_wavelengths: 2, n_rings: 5, n_azimuths: 20 };
+    SampleCounts { n_radial: 4, n_grid: 3, n_depths: 2, n_wavelengths: 2, n_rings: 5, n_azimuths: 20 };
 
 /// Traces the model; its error is measured for a full picture alone.
 pub(super) fn build(

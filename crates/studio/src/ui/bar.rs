@@ -134,8 +134,9 @@ impl Studio {
     fn progress(&self, ui: &mut Ui) {
         let done = self.results.as_ref().map(|results| {
             let delivery = &results.delivery;
-            let milliseconds = 1e3 * delivery.work.as_secs_f64();
-            format!("{} {}/3, {milliseconds:.0} ms", delivery.rung.name(), delivery.rung.number())
+            let seconds = delivery.work.as_secs_f64();
+            let time = if seconds < 1.0 { format!("{:.0} ms", 1e3 * seconds) } else { format!("{seconds:.1} s") };
+            format!("{} {}/3, {time}", delivery.rung.name(), delivery.rung.number())
         });
         ui.separator();
         ui.label(RichText::new(done.unwrap_or_default()).monospace());

@@ -69,8 +69,8 @@ pub(in crate::ui) fn histogram(ui: &mut Ui, product: &Product) {
 pub(in crate::ui) fn light(ui: &mut Ui, product: &Product) {
     egui::Grid::new("light").num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
         for step in product.light() {
-            ui.label(RichText::new(step.place).small().weak());
-            ui.label(RichText::new(step.amount).small());
+            ui.label(RichText::new(step.place).small());
+            ui.label(RichText::new(step.amount).small().strong());
             ui.end_row();
         }
     });
@@ -86,6 +86,7 @@ pub(in crate::ui) fn plot<'a>(id: &'a str, ui: &Ui, x_words: &str, x_most: f64, 
         .include_y(1.04 * y_most)
         .x_axis_label(x_words.to_owned())
         .set_margin_fraction(vec2(0.0, 0.0))
+        .grid_spacing(egui::Rangef::new(6.0, 60.0))
         .allow_drag(false)
         .allow_scroll(false)
         .allow_zoom(false)
