@@ -88,7 +88,7 @@ fn hidden_layer_is_seen_past_an_edge() {
             "--fov-deg",
             "14",
             "--f-number",
-            "2",
+            "2.1",
             "--out",
             "out",
             "--quiet",
