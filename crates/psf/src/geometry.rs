@@ -249,8 +249,8 @@ mod tests {
             let angle = 0.001 * f64::from(i);
             let expected = 0.04 * angle.cos().powi(4);
             let found = smooth.irradiance_per_radiance(angle.tan());
-            // Slopes of parabolas are of third order in the distance of knots.
-            assert!((found / expected - 1.0).abs() < 2e-6, "{angle}: {}", found / expected - 1.0);
+            // Straight lines are off by 2e-4, these cubics by 2e-6, but for the last interval, whose end has one side.
+            assert!((found / expected - 1.0).abs() < 1e-5, "{angle}: {}", found / expected - 1.0);
         }
         let vignetted = RadialGeometry::new(fields, magnification, &cut);
         let values: Vec<f64> =
