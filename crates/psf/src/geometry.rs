@@ -256,9 +256,9 @@ mod tests {
         let values: Vec<f64> =
             (0..4800).map(|i| vignetted.irradiance_per_radiance((1e-4 * f64::from(i)).tan())).collect();
         assert!(values.windows(2).all(|pair| pair[1] <= pair[0] + 1e-15));
-        // Straight lines would have kinks of 1e-4 of a slope of 1 over such a step.
+        // Straight lines have a kink of .05 over .02 rad where the rim begins, 2.5e-4 over such a step; a cubic spreads it over 200 steps.
         let second = values.windows(3).map(|v| (v[2] - 2.0 * v[1] + v[0]).abs()).fold(0.0, f64::max) / 0.04;
-        assert!(second < 2e-6, "{second}");
+        assert!(second < 5e-6, "{second}");
     }
 
     #[test]
