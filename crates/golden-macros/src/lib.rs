@@ -6,11 +6,12 @@ use std::path::Path;
 
 use proc_macro::TokenStream;
 
-/// Counts a test as ignored where the shared reference data is not beside the workspace.
+/// Counts a test as ignored where the shared reference data is not beside the workspace. It stands before `#[test]`, which takes no
+/// notice of what comes after it.
 ///
 /// ```text
-/// #[test]
 /// #[dioptric_golden::needs_shared]
+/// #[test]
 /// fn rays_agree_with_the_reference() {}
 /// ```
 ///

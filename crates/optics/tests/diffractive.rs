@@ -235,8 +235,8 @@ fn impossible_diffractive_surfaces_are_refused() {
     assert!(message.contains("Seidel sums of diffractive surfaces are not supported"), "{message}");
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn zemax_grating_has_the_diameter_that_opticstudio_stored() {
     let path = dioptric_golden::shared("data/lenses/more/flat_transmission_grating.zmx").unwrap();
     let file = LensFile::read(&path, &ReadOptions::default()).unwrap();
@@ -255,8 +255,8 @@ fn zemax_grating_has_the_diameter_that_opticstudio_stored() {
     assert!((widest_mm - 13.319_073_572_664_644).abs() < 1e-6, "{widest_mm}");
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn deeplens_grating_is_read() {
     let path = dioptric_golden::shared("data/lenses/more/a489_grating.json").unwrap();
     let file = LensFile::read(&path, &ReadOptions::default());

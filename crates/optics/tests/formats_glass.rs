@@ -12,8 +12,8 @@ fn json(path: &str) -> Option<Value> {
     Some(serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap())
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn named_glasses_of_the_reference_lenses_have_their_index_to_1e_15() {
     let mut n_checked = 0;
     for lens in REFERENCE_LENSES {
@@ -40,8 +40,8 @@ fn named_glasses_of_the_reference_lenses_have_their_index_to_1e_15() {
     assert!(n_checked >= 100, "only {n_checked} indices were there to check");
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn every_glass_has_the_index_and_abbe_number_of_its_source() {
     let Some(file) = json("data/glass/glass_subset.json") else { return };
     let glasses = file["glasses"].as_array().unwrap();

@@ -13,8 +13,8 @@ fn efl_mm(file: &LensFile) -> f64 {
     file.lens.at(file.reference_wavelength_nm.unwrap_or(587.6)).expect("glasses that are known").first_order().efl_mm
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn numbers_of_seq_are_what_is_plausible() {
     for (name, expected_mm) in [("landscape_lens.seq", 10.0), ("singlet.seq", 13.11)] {
         let file = read_with(name, &ReadOptions::default()).unwrap();
@@ -27,22 +27,22 @@ fn numbers_of_seq_are_what_is_plausible() {
     assert!(message.contains("are taken for radii"), "{message}");
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn diffractive_elements_are_refused() {
     let message = |name: &str, options: &ReadOptions| read_with(name, options).unwrap_err().to_string();
     let fresnel = message("doelens.json", &ReadOptions::default());
     assert!(fresnel.contains("surfaces[0].type: surfaces of type 'Fresnel' are not supported"), "{fresnel}");
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn empty_conic_constant_is_none() {
     assert!(read_with("dogmar.77deg.4.38mm.json", &ReadOptions::default()).is_ok());
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn own_file_keeps_what_zemax_files_say() {
     let zemax = read_with("zemax_double_gaussian.zmx", &ReadOptions::default()).unwrap();
     let again = LensFile::from_bytes(Path::new("a.ron"), zemax.to_ron().as_bytes(), &ReadOptions::default()).unwrap();
@@ -77,8 +77,8 @@ fn own_file_checks_what_it_says_of_use() {
     }
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn b270_has_the_focal_length_of_its_maker() {
     // The aspheric condenser of 26 mm that Thorlabs sells as ACL3026U.
     let options = ReadOptions { missing_glass: MissingGlass::FromNdVd, ..Default::default() };
@@ -123,8 +123,8 @@ fn dropped_planes_are_noted() {
     );
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn stop_within_an_opening_is_written() {
     let file = read_with("thorlabs_lj1598l1.zmx", &ReadOptions::default()).unwrap();
     let again = LensFile::from_bytes(Path::new("a.zmx"), file.to_zmx().unwrap().as_bytes(), &ReadOptions::default());

@@ -20,8 +20,8 @@ fn check(name: &str, n_surfaces: usize, stop: usize, efl_mm: f64, bfl_mm: f64) {
     assert!(efl_error <= 6e-4 && bfl_error <= 6e-4, "{name}: {} {}", first.efl_mm, first.bfl_mm);
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn lenses_of_iset_have_their_published_focal_lengths() {
     check("2el.XXdeg.50mm.dat", 3, 1, 51.997, 51.080);
     check("2el.XXdeg.50mm.json", 3, 1, 51.997, 51.080);
@@ -33,8 +33,8 @@ fn lenses_of_iset_have_their_published_focal_lengths() {
     check("telephoto.250mm.json", 7, 3, 249.566, 105.070);
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn cooke_triplet_of_iset_and_the_spectral_double_gauss_load() {
     let Some(file) = read("cooke40deg-zemax.json") else { return };
     let lens = file.unwrap().lens;
@@ -50,8 +50,8 @@ fn cooke_triplet_of_iset_and_the_spectral_double_gauss_load() {
     assert!(message.contains("from 395 to 705 nm, not at 390 nm"), "{message}");
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn lenses_of_deeplens_load_with_their_film() {
     let Some(file) = read("deeplens_ef50mm_f1.8.json") else { return };
     let file = file.unwrap();
@@ -76,8 +76,8 @@ fn lenses_of_deeplens_load_with_their_film() {
     assert!((field_deg - 68.0).abs() < 4.0, "{field_deg}");
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn zemax_triplet_loads_as_wide_as_its_pupil_and_fields_need() {
     let Some(file) = read("optiland_lens1.zmx") else { return };
     let file = file.unwrap();
@@ -90,8 +90,8 @@ fn zemax_triplet_loads_as_wide_as_its_pupil_and_fields_need() {
     assert!((first.efl_mm - 25.0).abs() < 0.02 && (first.bfl_mm - 18.66).abs() < 0.15, "{first:?}");
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn code_v_lenses_load() {
     let Some(file) = read("optiland_cooke_triplet.seq") else { return };
     let file = file.unwrap();
@@ -113,8 +113,8 @@ fn code_v_lenses_load() {
     assert!(file.notes[1].contains("no surface is marked as the stop"));
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn agf_catalogue_has_the_index_of_the_built_in_glass() {
     let Some(path) = dioptric_golden::shared("data/lenses/tiny_schott.agf") else { return };
     let catalogue = GlassCatalogue::read(&path).unwrap();

@@ -619,8 +619,8 @@ fn with_indices(lens: &Lens, indices: &[f64]) -> Lens {
 }
 
 /// Files of other programs against ray-optics (`scripts/mirror_reference.py`).
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn files_with_mirrors_agree_with_ray_optics() {
     let mut now: Option<(MonoLens, f64, f64)> = None;
     let (mut n_files, mut n_rays) = (0, 0);

@@ -53,8 +53,8 @@ fn pupils_of_fisheyes_move_and_turn() {
     check("wide", &built_in("wide-100deg"), &[0.0, 30.0, 50.0], 600, 2e-3);
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn widest_lens_has_light_at_every_field() {
     let lens = shared("more/wideangle200deg-automatic-zemax.json");
     check("200°", &lens, &[40.0, 78.0, 80.0, 82.0], 800, 4e-3);
@@ -101,8 +101,8 @@ fn counted_f_number(lens: &MonoLens) -> f64 {
     lens.first_order().efl_mm.abs() / (2.0 * beam_radius_mm(lens, 1_000_000))
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn rims_narrower_than_the_stop_define_the_f_number() {
     for (name, expected) in [
         ("more/dgauss.90deg.4.38mm.json", 2.02),

@@ -174,8 +174,8 @@ mod tests {
         row[key].parse().unwrap()
     }
 
-    #[test]
     #[dioptric_golden::needs_shared]
+    #[test]
     fn figure_3_has_the_authors_rms_radii() {
         let Some(rows) = table("reference/paper/fig3_2El_D4_onaxis_rms.csv") else { return };
         assert_eq!(rows.len(), 62);
@@ -191,8 +191,8 @@ mod tests {
         }
     }
 
-    #[test]
     #[dioptric_golden::needs_shared]
+    #[test]
     fn the_stored_array_has_the_authors_moments() {
         let Some(rows) = table("reference/paper/psfstructure_2El_10mmAp_moments.csv") else { return };
         assert_eq!(rows.len(), 80);
@@ -232,8 +232,8 @@ mod tests {
         }
     }
 
-    #[test]
     #[dioptric_golden::needs_shared]
+    #[test]
     fn figure_2_has_the_authors_widths() {
         let Some(rows) = table("reference/paper/fig2_hurb_lsf.csv") else { return };
         assert_eq!(rows.len(), 93);

@@ -76,8 +76,8 @@ fn exposed(clean: &Array3<f32>, read_noise_v: f64) -> Picture {
     sensor.develop(&capture.raw, &Processing::paper()).unwrap().picture
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn the_grain_of_figure_4_is_that_of_the_authors_picture() {
     let clean = codes("indestructibleObject10mmApProcessed.png");
     let theirs = grain(&codes("indestructibleObject10mmApProcessed_.05ReadNoise.png"), &clean);

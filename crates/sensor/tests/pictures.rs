@@ -183,8 +183,8 @@ fn demosaic_psnr_db(path: &std::path::Path, cfa: &Cfa) -> [f64; 5] {
     })
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn the_good_demosaic_beats_bilinear_by_three_decibels() {
     for name in ["cave_chart_and_stuffed_toy", "cave_stuffed_toys_256"] {
         let path = dioptric_golden::shared(&format!("data/scenes/{name}.reflectance.exr")).unwrap();
@@ -198,8 +198,8 @@ fn the_good_demosaic_beats_bilinear_by_three_decibels() {
     }
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn other_mosaics_gain_from_detail() {
     let path = dioptric_golden::shared("data/scenes/cave_stuffed_toys_256.reflectance.exr").unwrap();
     let quad = Cfa::two_by_two("RGGB").unwrap().repeated(2);
@@ -223,8 +223,8 @@ fn noisy_psnr_db(path: &std::path::Path, strength: f64) -> f64 {
     psnr_db(&picture(Noise::all(7), strength), &picture(Noise::none(), 0.0)).unwrap()
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn denoising_brings_a_noisy_picture_nearer_to_the_clean_one() {
     for name in ["cave_chart_and_stuffed_toy", "cave_stuffed_toys_256"] {
         let path = dioptric_golden::shared(&format!("data/scenes/{name}.reflectance.exr")).unwrap();

@@ -241,8 +241,8 @@ fn shared(place: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(place)
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn all_reference_scenes_load() {
     let folders = ["data/scenes3d", "data/paper/indestructibleObject", "reference/render"];
     let mut paths: Vec<PathBuf> = folders.iter().map(|folder| shared(folder)).collect();
@@ -275,8 +275,8 @@ fn all_reference_scenes_load() {
 }
 
 /// The paper's Figure 4: its object is met where its camera looks, and its materials have their textures.
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn figure_4_is_seen_by_its_camera() {
     let path = shared("data/paper/indestructibleObject/mainDefocused.pbrt");
     let world = read_world(&path, &ReadOptions { metres_per_unit: 0.001 }, &Cancel::new()).unwrap();

@@ -150,8 +150,8 @@ fn images_in_a_medium() {
     }
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn every_reference_lens() {
     for name in NAMES {
         let (Some(reference), Some(psf)) = (Reference::open(name), json(&format!("{name}.psf"))) else { return };

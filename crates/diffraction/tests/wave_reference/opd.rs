@@ -8,8 +8,8 @@ use crate::{
     reader::{NAMES, number, numbers},
 };
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn wavefronts_agree_with_fifty_digits() {
     for name in NAMES {
         let Some(reference) = Reference::open(name) else { return };

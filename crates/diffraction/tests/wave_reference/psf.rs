@@ -177,8 +177,8 @@ fn trusted_rows() -> Vec<(Reference, f64, Vec<Value>)> {
     NAMES.iter().filter_map(open).collect()
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn sums_over_the_same_pupil_agree_on_and_off_axis() {
     let (mut n_compared, mut n_too_coarse) = (0, 0);
     for (reference, film_distance_mm, rows) in trusted_rows() {
@@ -217,8 +217,8 @@ fn sums_over_the_same_pupil_agree_on_and_off_axis() {
     assert_eq!((n_compared, n_too_coarse), (28, 18));
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn psfs_of_the_vignetted_pupil_agree_on_axis() {
     let mut n_compared = 0;
     for (reference, film_distance_mm, rows) in trusted_rows() {

@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use crate::reader::{NAMES, json, lens, number};
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn first_order_data_agree_to_twelve_digits() {
     for name in NAMES {
         let Some(file) = json(name) else { return };
@@ -52,8 +52,8 @@ fn first_order_data_agree_to_twelve_digits() {
     }
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn focus_shifts_with_wavelength_as_published() {
     for name in NAMES {
         let Some(file) = json(name) else { return };

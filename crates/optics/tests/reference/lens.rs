@@ -4,8 +4,8 @@ use dioptric_optics::{C_LINE_NM, D_LINE_NM, F_LINE_NM};
 
 use crate::reader::{NAMES, glass, json, number};
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn indices_agree_to_rounding() {
     for name in NAMES {
         let Some(file) = json(name) else { return };

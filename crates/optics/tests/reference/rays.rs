@@ -65,8 +65,8 @@ fn is_at_a_rim(lens: &Lens, row: &Value) -> bool {
     })
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn rays_agree_with_fifty_digits_on_every_surface() {
     for name in NAMES {
         let (Some(file), Some(rays)) = (json(name), json(&format!("{name}.rays"))) else { return };

@@ -8,8 +8,8 @@ fn list(sums: &SeidelSums) -> [f64; 7] {
     [sums.s1, sums.s2, sums.s3, sums.s4, sums.s5, sums.c1, sums.c2]
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn seidel_sums_agree_surface_by_surface() {
     for name in NAMES {
         let Some(file) = json(name) else { return };

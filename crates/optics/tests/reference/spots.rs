@@ -51,8 +51,8 @@ fn compare(name: &str, spot: &SpotDiagram, expected: &Value) -> f64 {
     sizes.into_iter().map(error).fold(0.0, f64::max)
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn spots_agree_with_the_reference_to_nine_digits() {
     for name in NAMES {
         let Some(file) = json(name) else { return };

@@ -362,8 +362,8 @@ mod tests {
         assert!(n_refused > 1000, "{n_refused} of 3000 refused");
     }
 
-    #[test]
     #[dioptric_golden::needs_shared]
+    #[test]
     fn the_corn_kernel_is_a_reflectance() {
         let Some(path) = dioptric_golden::shared("data/scenes/envi_corn_kernel/4-22-22_right_same_B73_top_00.hdr")
         else {

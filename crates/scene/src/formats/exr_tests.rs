@@ -331,8 +331,8 @@ fn no_mutation_of_a_file_makes_the_reader_panic() {
     assert!(n_refused > 800, "{n_refused} of 3000 refused");
 }
 
-#[test]
 #[dioptric_golden::needs_shared]
+#[test]
 fn the_real_files_are_read() {
     let Some(folder) = dioptric_golden::shared("data/scenes") else { return };
     for (name, quantity, size, bands, has_depth) in [

@@ -419,8 +419,8 @@ mod tests {
         assert!(message(&folder.path().join("absent.exr")).contains("absent.exr"));
     }
 
-    #[test]
     #[dioptric_golden::needs_shared]
+    #[test]
     fn the_real_scenes_have_depth_and_camera_data() {
         let Some(folder) = dioptric_golden::shared("data/scenes") else { return };
         let piano = read_scene(&folder.join("piano3d.radiance_depth.exr"), &ReadOptions::default()).unwrap();
