@@ -4,7 +4,7 @@ use std::{any::TypeId, ffi::OsString, path::PathBuf};
 
 use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use dioptric_pipeline::Crop;
+use dioptric_pipeline::{BlurSpec, Crop};
 
 pub(crate) use crate::common::Common;
 use crate::{
@@ -225,9 +225,10 @@ pub(crate) struct RunArgs {
     /// Samples point-spread functions as finely as this error at nine tenths of the places needs, a share of the energy, e.g. 0.01 [default: 0.02]
     #[arg(long, value_name = "E", help_heading = heading::SIMULATION)]
     pub(crate) bank_error: Option<f64>,
-    /// How the scene is blurred
-    #[arg(long, value_name = "MODE", value_enum, help_heading = heading::SIMULATION)]
-    pub(crate) blur: Option<BlurKind>,
+    /// How the scene is blurred: 'layered', in layers of depth of which near ones hide far ones; 'views:N', such layers through N parts of the
+    /// pupil, for occluders narrower than it; 'pointwise', every sample on its own, as in the paper [default: layered]
+    #[arg(long, value_name = "MODE", help_heading = heading::SIMULATION)]
+    pub(crate) blur: Option<BlurSpec>,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
 }
@@ -302,15 +303,6 @@ pub(crate) enum BankKind {
     Standard,
     /// Pictures of the same samples, blended as in the paper, for comparison only
     Paper,
-}
-
-/// How the scene is blurred.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum BlurKind {
-    /// Depth layers with occlusion
-    Layered,
-    /// Every sample spread on its own, as in the paper
-    Pointwise,
 }
 
 /// Rays to trace.

@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_pipeline::{
-    BankSpec, BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
+    BankSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
     ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, SceneSpec, SensorOptions, SensorSpec,
     Silent, Stage, Staged, StopSpec, WavelengthSpec, parse_illuminant, parse_numbers, with_exposure_s,
 };
@@ -17,7 +17,7 @@ use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
 
 use crate::{
-    args::{BankKind, BlurKind, Common, DiffractionKind, FilmKind, FrameArgs, QualityKind, RunArgs},
+    args::{BankKind, Common, DiffractionKind, FilmKind, FrameArgs, QualityKind, RunArgs},
     lens::tell,
     memory::memory_budget,
     paintings::{build, painting_folder},
@@ -215,21 +215,16 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
     if let Some(error) = arguments.bank_error {
         camera.bank = BankSpec::Within { error };
     }
-    if let Some(kind) = arguments.blur {
-        camera.blur = match kind {
-            BlurKind::Layered => BlurSpec::Layered,
-            BlurKind::Pointwise => BlurSpec::Pointwise,
-        };
-    }
+    camera.blur = arguments.blur.unwrap_or(camera.blur);
     Ok(())
 }
 
-/// Returns bent rays with another strength, where one is asked for.
+/// Returns HURB with another strength, where one is asked for.
 pub(crate) fn with_gamma(choice: Diffraction, gamma: Option<f64>) -> anyhow::Result<Diffraction> {
     match (choice, gamma) {
         (_, None) => Ok(choice),
         (Diffraction::Hurb { .. }, Some(gamma)) => Ok(Diffraction::Hurb { gamma }),
-        (_, Some(_)) => bail!("--gamma is the strength of bent rays, expected with --diffraction hurb"),
+        (_, Some(_)) => bail!("--gamma is the strength of HURB, expected with --diffraction hurb"),
     }
 }
 

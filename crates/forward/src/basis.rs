@@ -55,6 +55,12 @@ impl BasisBetween {
         Self { kernels, lower: lower.alpha.clone(), upper: upper.alpha.clone(), fraction }
     }
 
+    /// Returns that of a band between two, or of one of them.
+    pub(crate) fn at(band: usize, [lower_band, upper_band]: [usize; 2], lower: &BandBasis, upper: &BandBasis) -> Self {
+        let fraction = (band - lower_band) as f32 / (upper_band - lower_band).max(1) as f32;
+        Self::new(lower, upper, fraction)
+    }
+
     /// The alpha of a layer, where layers hide each other.
     pub(crate) fn alpha(&self, layer: usize) -> Option<AlphaBetween<'_>> {
         let (lower, upper) = (self.lower.as_ref()?, self.upper.as_ref()?);

@@ -1,6 +1,8 @@
 //! A lens by formula, whose blur is a uniform disc.
 
-use dioptric_psf::{FilmMap, Kernel, LensImage, PsfQuery, RadialMap};
+use std::sync::Arc;
+
+use dioptric_psf::{FilmMap, Kernel, LensImage, PartOfPoint, PsfError, PsfQuery, PupilDivision, RadialMap, ShiftedMap};
 use glam::DVec2;
 use ndarray::Array2;
 
@@ -65,18 +67,85 @@ impl LensImage for DiscLens {
         let radius_mm = self.blur_radius_mm(field_tan, dioptres, wavelength_nm).abs();
         Kernel { samples: disc(1e3 * radius_mm / pitch_um), pitch_um }
     }
+    fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
+        let division = Arc::new(PupilDivision::new(n_parts));
+        let part = |part: usize| {
+            let moments = disc_moments(|at| division.share(part, at));
+            Arc::new(PartOfDisc { lens: self.clone(), division: division.clone(), part, moments })
+        };
+        Ok((0..division.n_parts()).map(|i| part(i) as Arc<dyn LensImage + Send>).collect())
+    }
     fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         let focus_dioptres = self.focus_dioptres + self.axial_per_nm * (wavelength_nm - 550.0);
         1e-3 * self.radius_um_per_dioptre * (dioptres - focus_dioptres) * (1.0 + self.growth * field_tan.length())
     }
 }
 
+/// A part of the pupil of a [`DiscLens`].
+struct PartOfDisc {
+    lens: DiscLens,
+    division: Arc<PupilDivision>,
+    part: usize,
+    /// Share of the light, and the middle of the part in the unit disc of the pupil.
+    moments: (f64, DVec2),
+}
+
+impl LensImage for PartOfDisc {
+    fn is_symmetric(&self) -> bool {
+        false
+    }
+    fn wavelengths_nm(&self) -> (f64, f64) {
+        self.lens.wavelengths_nm()
+    }
+    fn dioptres(&self) -> (f64, f64) {
+        self.lens.dioptres()
+    }
+    fn is_dark_beyond_extent(&self) -> bool {
+        self.lens.is_dark_beyond_extent()
+    }
+    fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
+        let radius_mm = |field_tan: DVec2| self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm);
+        let (share, middle) = self.moments;
+        let aside_mm = 2.0 * radius_mm(DVec2::ZERO).abs();
+        let whole = self.lens.film_map(dioptres, wavelength_nm, extent_mm + aside_mm);
+        // In the picture, which is the film turned by 180°, light of near points lies on the other side of the pupil.
+        let part_at = |field_tan: DVec2| PartOfPoint { share, shift_mm: -middle * radius_mm(field_tan) };
+        FilmMap::Shifted(ShiftedMap::tabulate(whole, extent_mm, part_at))
+    }
+    fn kernel(&self, query: PsfQuery) -> Kernel {
+        let PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um } = query;
+        let radius_px = 1e3 * self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm) / pitch_um;
+        let samples = part_of_disc(-radius_px, self.moments.1, |at| self.division.share(self.part, at));
+        Kernel { samples, pitch_um }
+    }
+    fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm)
+    }
+}
+
+/// Returns the share of a part in the unit disc, and its middle.
+fn disc_moments(share_at: impl Fn(DVec2) -> f64) -> (f64, DVec2) {
+    let (mut share, mut places, mut total) = (0.0, DVec2::ZERO, 0.0);
+    for (at, weight) in disc_points(400) {
+        let part = weight * share_at(at);
+        (share, places, total) = (share + part, places + part * at, total + weight);
+    }
+    (share / total, if share > 0.0 { places / share } else { DVec2::ZERO })
+}
+
 /// Returns a uniform disc whose points are shared bilinearly among the pixels around them.
 fn disc(radius_px: f64) -> Array2<f32> {
+    part_of_disc(radius_px, DVec2::ZERO, |_| 1.0)
+}
+
+/// Returns the part of a uniform disc that goes through a part of the pupil, about its own middle; points of the unit disc, y up, land at `radius_px` times their
+/// place.
+fn part_of_disc(radius_px: f64, middle: DVec2, share_at: impl Fn(DVec2) -> f64) -> Array2<f32> {
     // Points across a pixel, and rings across the smallest discs.
     const FINE: f64 = 8.0;
-    let half = radius_px.ceil() as usize;
-    let n_rings = (FINE * radius_px).round().max(1.0) as usize;
+    let reach_px = radius_px.abs() * (1.0 + middle.length());
+    let half = reach_px.ceil() as usize;
+    let n_rings = (FINE * radius_px.abs()).round().max(1.0) as usize;
     let mut kernel = Array2::<f64>::zeros((2 * half + 1, 2 * half + 1));
     let mut share = |row: f64, column: f64, weight: f64| {
         let (top, left) = (row.floor(), column.floor());
@@ -92,16 +161,25 @@ fn disc(radius_px: f64) -> Array2<f32> {
             }
         }
     };
-    for ring in 0..n_rings {
-        // Points in proportion to the ring's area, symmetric in all eight octants.
-        let radius = radius_px * (ring as f64 + 0.5) / n_rings as f64;
-        let n_octant = ring + 1;
-        for k in 0..8 * n_octant {
-            let angle = (k as f64 + 0.5) / (8 * n_octant) as f64 * std::f64::consts::TAU;
-            let weight = (2 * ring + 1) as f64 / (8 * n_octant) as f64;
-            share(half as f64 - radius * angle.sin(), half as f64 + radius * angle.cos(), weight);
+    for (at, weight) in disc_points(n_rings) {
+        let weight = weight * share_at(at);
+        if weight > 0.0 {
+            let place = (at - middle) * radius_px;
+            share(half as f64 - place.y, half as f64 + place.x, weight);
         }
     }
     let sum = kernel.sum();
     kernel.mapv(|v| (v / sum) as f32)
+}
+
+/// Returns points of the unit disc and their weights: on rings, in proportion to their area, symmetric in all eight octants.
+fn disc_points(n_rings: usize) -> impl Iterator<Item = (DVec2, f64)> {
+    (0..n_rings).flat_map(move |ring| {
+        let (radius, n_octant) = ((ring as f64 + 0.5) / n_rings as f64, ring + 1);
+        (0..8 * n_octant).map(move |k| {
+            let angle = (k as f64 + 0.5) / (8 * n_octant) as f64 * std::f64::consts::TAU;
+            let weight = (2 * ring + 1) as f64 / (8 * n_octant) as f64;
+            (radius * DVec2::new(angle.cos(), angle.sin()), weight)
+        })
+    })
 }

@@ -141,6 +141,9 @@ pub enum ForwardError {
     /// The lens could not be traced.
     #[error(transparent)]
     Lens(#[from] dioptric_optics::OpticsError),
+    /// Its pupil could not be divided.
+    #[error(transparent)]
+    Psf(#[from] dioptric_psf::PsfError),
     /// A band could not be had.
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),

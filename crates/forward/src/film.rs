@@ -70,6 +70,9 @@ pub enum BlurMode {
     Layered,
     /// The paper's way: every sample is spread by its own PSF and nothing hides anything.
     Pointwise,
+    /// As in layers, through so many parts of the pupil, 2 to 256, one after the other: each is a view of its own of what hides what, blurred by the width of
+    /// its part. It takes as many times as long, and is right where a surface in front is narrower than the pupil.
+    Views(usize),
 }
 
 /// How finely a forward rendering is made.
@@ -143,6 +146,12 @@ impl Settings {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(ForwardError::Setting { what, value, expected: "a number, 0 or more" });
             }
+        }
+        if let BlurMode::Views(n) = self.mode
+            && !(2..=256).contains(&n)
+        {
+            let (what, value) = ("the number of views", n as f64);
+            return Err(ForwardError::Setting { what, value, expected: "a whole number from 2 to 256" });
         }
         if !(self.widest_blur_px.is_finite() && self.widest_blur_px >= 4.0) {
             let (what, value) = ("the widest blur", self.widest_blur_px);

@@ -1,8 +1,8 @@
 //! A lens's image with places counted from the middle of a film that lies off the axis.
 
-use std::ops::Deref;
+use std::{ops::Deref, sync::Arc};
 
-use dioptric_psf::{FilmMap, Kernel, LensImage, PsfQuery};
+use dioptric_psf::{FilmMap, Kernel, LensImage, PsfError, PsfQuery};
 use glam::DVec2;
 
 /// The image of a lens, places on the film counted from another place than the axis.
@@ -40,6 +40,11 @@ where
 
     fn kernel(&self, query: PsfQuery) -> Kernel {
         self.lens.kernel(query)
+    }
+
+    fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
+        let framed = |lens| Arc::new(Framed { lens, center_mm: self.center_mm }) as Arc<dyn LensImage + Send>;
+        Ok(self.lens.through_parts(n_parts)?.into_iter().map(framed).collect())
     }
 
     fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {

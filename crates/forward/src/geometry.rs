@@ -92,7 +92,7 @@ fn ends_before(map: &FilmMap, film: &Film) -> Option<f64> {
             let corner_mm = film.half_diagonal_mm() + map.axis_mm().length();
             (map.extent_mm() < corner_mm).then_some(map.extent_mm())
         }
-        FilmMap::Plane(map) => {
+        FilmMap::Plane(_) | FilmMap::Shifted(_) => {
             let half_mm = film.half_size_mm();
             // Out along lines to the corners and the middles of the sides.
             let ways =

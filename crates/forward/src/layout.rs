@@ -6,13 +6,14 @@ use std::{
 };
 
 use dioptric_psf::{FilmMap, LensImage};
+use dioptric_scene::View;
 use dioptric_spectrum::{Cancel, Cancelled, WavelengthGrid};
 use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    BandKernels, BandRadiance, BlurMode, Film, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Settings, Sink,
+    BandKernels, BandRadiance, BlurMode, Film, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Settings,
     basis::{BandBasis, BasisBetween, Kept},
     block_layers::BlockLayers,
     blur::{LayerTask, blur_layer},
@@ -25,7 +26,7 @@ use crate::{
     sampler::{LayerCoordinates, Surface},
     stopwatch::{Part, Stopwatch},
     tiles::{Cell, FilmLens, Tiling, active_cells, cells_over, joined_for},
-    work::{Progress, Watch, Work, plane_of},
+    work::{Progress, Work, plane_of},
 };
 
 /// Kernels and alpha that a plan keeps when nothing else is asked for, bytes.
@@ -34,21 +35,76 @@ const KEPT_BUDGET_BYTES: usize = 256 << 20;
 /// What bands in flight take when nothing else is asked for, bytes.
 const IN_FLIGHT_BYTES: usize = 256 << 20;
 
-/// A plan but for the lens, which each method takes.
-pub(crate) struct Layout {
-    pub(crate) spec: ImagingSpec,
+/// The depths of a scene in layers and what their edges hide: the same for all parts of a pupil.
+pub(crate) struct SceneLayers {
+    pub(crate) layers: Layers,
     /// The bands at which PSFs are computed; between them they are interpolated.
     kernel_bands: Vec<usize>,
     /// Those and more, at which the alpha of layers is computed: interpolated between them as well.
-    basis_bands: Vec<usize>,
-    pub(crate) layers: Layers,
+    pub(crate) basis_bands: Vec<usize>,
+    layer_coordinates: LayerCoordinates,
+    pub(crate) occluded: OccludedSamples,
+}
+
+impl SceneLayers {
+    /// Lays a scene in layers of the blur of a lens.
+    pub(crate) fn over(
+        lens: &dyn LensImage,
+        scene: &SceneGeometry<'_>,
+        spec: &ImagingSpec,
+        cancel: &Cancel,
+    ) -> Result<Self, ForwardError> {
+        let ImagingSpec { film, grid, settings } = spec;
+        film.check()?;
+        settings.check()?;
+        scene.check()?;
+        let (near_m, far_m) = scene.depth.range_m();
+        let dioptres = (1.0 / far_m, 1.0 / near_m);
+        check_extent(lens, grid, dioptres, film, cancel)?;
+
+        let (pitch_mm, corner_mm, middle_nm) = (1e-3 * film.pitch_um, film.half_diagonal_mm(), middle_nm(grid));
+        let map = lens.film_map(dioptres.0, middle_nm, corner_mm);
+        let fields = blur_fields(lens, &map, film);
+        let blurs = Blurs { kernels: lens, pitch_mm, fields: &fields, wavelengths_nm: grid.centers_nm() };
+        let layers = Layers::over(dioptres, settings.layer_step_px, &blurs);
+        let kernel_bands = layers.chromatic_knots(settings.chromatic_step_px, &blurs);
+        let extent_mm = extent_of(&radii_px(&layers), film, settings);
+        let basis_bands = match hides(settings, &layers) {
+            true => {
+                LateralColor { lens, film, grid, extent_mm }.knots(&kernel_bands, dioptres, settings.coverage_step_px)
+            }
+            false => kernel_bands.clone(),
+        };
+        let z_m = scene.depth.z_m();
+        let coordinate = |row: usize, column: usize| layers.coordinate_of(z_m[(row, column)]);
+        let layer_coordinates = LayerCoordinates::new(plane_of(z_m.dim(), cancel, coordinate)?, cancel)?;
+        let nearest = lens.film_map(layers.dioptres()[0], middle_nm, extent_mm);
+        let scene_per_film = LayerRaster::new(film, 1, (scene.view, scene.size()), &nearest).sampler.scene_per_film;
+        let occluded = OccludedSamples::find(scene, &layers, settings, scene_per_film, cancel)?;
+        Ok(Self { layers, kernel_bands, basis_bands, layer_coordinates, occluded })
+    }
+
+    /// Rows and columns of the scene.
+    pub(crate) fn size(&self) -> (usize, usize) {
+        self.layer_coordinates.samples().dim()
+    }
+
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.layer_coordinates.size_bytes()
+            + self.occluded.layer_coordinates().map_or(0, LayerCoordinates::size_bytes)
+            + self.occluded.size_bytes()
+    }
+}
+
+/// A plan but for the lens, which each method takes.
+pub(crate) struct Layout {
+    pub(crate) spec: ImagingSpec,
+    pub(crate) scene: Arc<SceneLayers>,
     /// Of each layer.
     rasters: Vec<LayerRaster>,
     tiling: Tiling,
     /// By the factor of their raster.
     blocks: BTreeMap<usize, BlockLayers>,
-    layer_coordinates: LayerCoordinates,
-    pub(crate) occluded: OccludedSamples,
     /// How far off axis light is taken from, mm.
     extent_mm: f64,
     pub(crate) kept: Mutex<Kept>,
@@ -59,38 +115,16 @@ pub(crate) struct Layout {
     pub(crate) in_flight_bytes: Option<usize>,
 }
 
-/// Layers of depth over a film, each on its raster.
-struct Stack {
-    layers: Layers,
-    kernel_bands: Vec<usize>,
-    /// Blur radius of each layer, pixels of the film.
-    radius_px: Vec<f64>,
-    rasters: Vec<LayerRaster>,
-    /// Of each layer, in the middle band.
-    maps: Vec<FilmMap>,
-    extent_mm: f64,
+/// Returns the blur radius of each layer, pixels of the film.
+fn radii_px(layers: &Layers) -> Vec<f64> {
+    (0..layers.len()).map(|layer| layers.radius_px_at(layer as f32)).collect()
 }
 
-impl Stack {
-    fn over(lens: &dyn LensImage, scene: &SceneGeometry<'_>, spec: &ImagingSpec, dioptres: (f64, f64)) -> Self {
-        let ImagingSpec { film, grid, settings } = spec;
-        let (pitch_mm, corner_mm, middle_nm) = (1e-3 * film.pitch_um, film.half_diagonal_mm(), middle_nm(grid));
-        let fields = blur_fields(lens, &lens.film_map(dioptres.0, middle_nm, corner_mm), film);
-        let blurs = Blurs { kernels: lens, pitch_mm, fields: &fields, wavelengths_nm: grid.centers_nm() };
-        let layers = Layers::over(dioptres, settings.layer_step_px, &blurs);
-        let kernel_bands = layers.chromatic_knots(settings.chromatic_step_px, &blurs);
-        let radius_px: Vec<f64> = (0..layers.len()).map(|layer| layers.radius_px_at(layer as f32)).collect();
-        let pad_px = radius_px.iter().map(|&radius_px| pad_for(radius_px)).fold(0.0, f64::max);
-        let border_px = pad_px + 2.0 * settings.knot_spacing_px as f64;
-        let extent_mm = corner_mm + pitch_mm * std::f64::consts::SQRT_2 * border_px;
-        let maps: Vec<FilmMap> =
-            layers.dioptres().par_iter().map(|&d| lens.film_map(d, middle_nm, extent_mm)).collect();
-        let view = (scene.view, scene.size());
-        let factor = |radius_px: f64| LayerRaster::factor_for(radius_px, settings.widest_blur_px);
-        let raster = |(&radius_px, map)| LayerRaster::new(film, factor(radius_px), view, map);
-        let rasters = radius_px.iter().zip(&maps).map(raster).collect();
-        Self { layers, kernel_bands, radius_px, rasters, maps, extent_mm }
-    }
+/// Returns how far off axis light is taken from, mm.
+fn extent_of(radius_px: &[f64], film: &Film, settings: &Settings) -> f64 {
+    let pad_px = radius_px.iter().map(|&radius_px| pad_for(radius_px)).fold(0.0, f64::max);
+    let border_px = pad_px + 2.0 * settings.knot_spacing_px as f64;
+    film.half_diagonal_mm() + 1e-3 * film.pitch_um * std::f64::consts::SQRT_2 * border_px
 }
 
 /// The wavelength of the middle band.
@@ -100,7 +134,7 @@ fn middle_nm(grid: &WavelengthGrid) -> f64 {
 
 /// Whether layers hide those behind them.
 fn hides(settings: &Settings, layers: &Layers) -> bool {
-    settings.mode == BlurMode::Layered && layers.len() > 1
+    settings.mode != BlurMode::Pointwise && layers.len() > 1
 }
 
 /// Units of work of a kernel and of a patch of the film in one band, about in proportion to their time.
@@ -110,36 +144,31 @@ const PATCH_UNITS: u64 = 8;
 impl Layout {
     pub(crate) fn new(
         lens: &dyn LensImage,
-        scene: &SceneGeometry<'_>,
+        view: View,
+        scene: Arc<SceneLayers>,
         spec: ImagingSpec,
-        progress: &Progress<'_>,
-        range: (f64, f64),
+        (progress, range): (&Progress<'_>, (f64, f64)),
         cancel: &Cancel,
     ) -> Result<Self, ForwardError> {
         let ImagingSpec { film, grid, settings } = &spec;
-        film.check()?;
-        settings.check()?;
-        scene.check()?;
-        let (near_m, far_m) = scene.depth.range_m();
-        let dioptres = (1.0 / far_m, 1.0 / near_m);
-        check_extent(lens, grid, dioptres, film, cancel)?;
-
-        let stack = Stack::over(lens, scene, &spec, dioptres);
-        let Stack { layers, kernel_bands, radius_px, rasters, maps, extent_mm } = stack;
-        let z_m = scene.depth.z_m();
-        let coordinate = |row: usize, column: usize| layers.coordinate_of(z_m[(row, column)]);
-        let layer_coordinates = LayerCoordinates::new(plane_of(z_m.dim(), cancel, coordinate)?, cancel)?;
-        let scene_per_film = LayerRaster::new(film, 1, (scene.view, scene.size()), &maps[0]).sampler.scene_per_film;
-        let occluded = OccludedSamples::find(scene, &layers, settings, scene_per_film, cancel)?;
+        let layers = &scene.layers;
+        let radius_px = radii_px(layers);
+        let extent_mm = extent_of(&radius_px, film, settings);
+        let middle_nm = middle_nm(grid);
+        let maps: Vec<FilmMap> =
+            layers.dioptres().par_iter().map(|&d| lens.film_map(d, middle_nm, extent_mm)).collect();
+        let factor = |radius_px: f64| LayerRaster::factor_for(radius_px, settings.widest_blur_px);
+        let raster = |(&radius_px, map)| LayerRaster::new(film, factor(radius_px), (view, scene.size()), map);
+        let rasters: Vec<LayerRaster> = radius_px.iter().zip(&maps).map(raster).collect();
 
         // Find the cells in which a layer has anything, and halve them until the spline follows the PSFs.
-        let (wavelengths_nm, middle_nm) = (grid.centers_nm(), middle_nm(grid));
+        let wavelengths_nm = grid.centers_nm();
         let ends: Vec<FilmMap> = [wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1], middle_nm]
             .into_par_iter()
             .flat_map(|w| [0, layers.len() - 1].map(|l| lens.film_map(layers.dioptres()[l], w, extent_mm)))
             .collect();
         let surfaces: Vec<&LayerCoordinates> =
-            std::iter::once(&layer_coordinates).chain(occluded.layer_coordinates()).collect();
+            std::iter::once(&scene.layer_coordinates).chain(scene.occluded.layer_coordinates()).collect();
         let extents = Extents { radius_px: &radius_px, maps: &ends, surfaces: &surfaces };
         let (active, blocks) = active_cells_of(&rasters, &extents, settings.knot_spacing_px, cancel)?;
         let work = Work::new(cancel, progress, range, active.iter().map(Vec::len).sum::<usize>() as u64);
@@ -147,28 +176,18 @@ impl Layout {
         let film_lens = FilmLens {
             image: lens,
             rasters: &rasters,
-            layers: &layers,
+            layers,
             maps: &maps,
             wavelength_nm: middle_nm,
             stopwatch: &stopwatch,
         };
         let tiling = Tiling::new(active, &film_lens, settings, &work)?;
         let kept = Mutex::new(Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() });
-        let basis_bands = match hides(settings, &layers) {
-            true => {
-                LateralColor { lens, film, grid, extent_mm }.knots(&kernel_bands, dioptres, settings.coverage_step_px)
-            }
-            false => kernel_bands.clone(),
-        };
         Ok(Self {
-            basis_bands,
-            kernel_bands,
-            layers,
+            scene,
             rasters,
             tiling,
             blocks,
-            layer_coordinates,
-            occluded,
             extent_mm,
             kept,
             maps: Mutex::default(),
@@ -178,21 +197,20 @@ impl Layout {
         })
     }
 
+    /// The bytes of memory that it takes, what it shares with other parts of a pupil left out.
     pub(crate) fn size_bytes(&self) -> usize {
-        let planes = self.layer_coordinates.size_bytes()
-            + self.occluded.layer_coordinates().map_or(0, LayerCoordinates::size_bytes);
         let maps = self.maps().values().flat_map(|maps| maps.iter()).map(FilmMap::size_bytes).sum::<usize>();
         let blocks = self.blocks.values().map(BlockLayers::size_bytes).sum::<usize>();
-        planes + maps + blocks + self.occluded.size_bytes() + self.tiling.size_bytes() + self.kept().size_bytes
+        maps + blocks + self.tiling.size_bytes() + self.kept().size_bytes
     }
 
     /// Rows and columns of the scene.
     pub(crate) fn size(&self) -> (usize, usize) {
-        self.layer_coordinates.samples().dim()
+        self.scene.size()
     }
 
     fn hides(&self) -> bool {
-        hides(&self.spec.settings, &self.layers)
+        hides(&self.spec.settings, &self.scene.layers)
     }
 
     fn maps(&self) -> MutexGuard<'_, BTreeMap<usize, Arc<Vec<FilmMap>>>> {
@@ -216,19 +234,19 @@ impl Layout {
         }
         let wavelength_nm = self.spec.grid.centers_nm()[band];
         let map = |&dioptres: &f64| lens.film_map(dioptres, wavelength_nm, self.extent_mm);
-        let maps: Arc<Vec<FilmMap>> = Arc::new(self.layers.dioptres().par_iter().map(map).collect());
+        let maps: Arc<Vec<FilmMap>> = Arc::new(self.scene.layers.dioptres().par_iter().map(map).collect());
         self.maps().insert(band, maps.clone());
         maps
     }
 
     /// Returns the kernels of a band, between the two bands around it at which they are computed.
     pub(crate) fn kernels(&self, lens: &dyn LensImage, band: usize, work: &Work<'_>) -> Result<BandKernels, Cancelled> {
-        let above = self.kernel_bands.partition_point(|&knot| knot < band);
-        let upper = self.kernel_bands[above];
+        let above = self.scene.kernel_bands.partition_point(|&knot| knot < band);
+        let upper = self.scene.kernel_bands[above];
         if upper == band {
             return self.computed_kernels(lens, band, work);
         }
-        let lower = self.kernel_bands[above - 1];
+        let lower = self.scene.kernel_bands[above - 1];
         let fraction = (band - lower) as f32 / (upper - lower) as f32;
         let lower = self.computed_kernels(lens, lower, work)?;
         Ok(lower.mixed(&self.computed_kernels(lens, upper, work)?, fraction))
@@ -245,7 +263,7 @@ impl Layout {
         let film_lens = FilmLens {
             image: lens,
             rasters: &self.rasters,
-            layers: &self.layers,
+            layers: &self.scene.layers,
             maps: &maps,
             wavelength_nm,
             stopwatch: &self.stopwatch,
@@ -266,8 +284,8 @@ impl Layout {
         band: usize,
         work: &Work<'_>,
     ) -> Result<BasisBetween, Cancelled> {
-        let above = self.basis_bands.partition_point(|&knot| knot < band);
-        let (upper, lower) = (self.basis_bands[above], self.basis_bands[above.saturating_sub(1)]);
+        let above = self.scene.basis_bands.partition_point(|&knot| knot < band);
+        let (upper, lower) = (self.scene.basis_bands[above], self.scene.basis_bands[above.saturating_sub(1)]);
         if upper == band {
             let basis = self.basis(lens, band, work)?;
             return Ok(BasisBetween::new(&basis, &basis, 0.0));
@@ -277,7 +295,7 @@ impl Layout {
     }
 
     /// Returns the basis of a band at which it is computed.
-    fn basis(&self, lens: &dyn LensImage, band: usize, work: &Work<'_>) -> Result<BandBasis, Cancelled> {
+    pub(crate) fn basis(&self, lens: &dyn LensImage, band: usize, work: &Work<'_>) -> Result<BandBasis, Cancelled> {
         let kernels = self.kernels(lens, band, work)?;
         if !self.hides() {
             return Ok(BandBasis { kernels, alpha: None });
@@ -305,8 +323,8 @@ impl Layout {
         kernels: &BandKernels,
         work: &Work<'_>,
     ) -> Result<Vec<LayerAlpha>, Cancelled> {
-        let surfaces: Vec<Surface<'_>> = std::iter::once(&self.layer_coordinates)
-            .chain(self.occluded.layer_coordinates())
+        let surfaces: Vec<Surface<'_>> = std::iter::once(&self.scene.layer_coordinates)
+            .chain(self.scene.occluded.layer_coordinates())
             .map(|depths| depths.surface(None))
             .collect();
         let maps = self.maps_at(lens, band);
@@ -315,62 +333,65 @@ impl Layout {
             self.blur_onto_film(layer, &maps[layer], &surfaces, kernels, &mut blurred, work)?;
             Ok(blurred.into_alpha())
         };
-        (0..self.layers.len()).into_par_iter().map(covered).collect()
+        (0..self.scene.layers.len()).into_par_iter().map(covered).collect()
     }
 
-    /// Images the bands from `first` on.
+    /// Returns the units of work of all bands from `first` on; with `alone`, a basis is computed again for each pair of bands that it is an end of.
+    pub(crate) fn stream_units(&self, first: usize, alone: bool) -> u64 {
+        let n_patches = self.tiling.n_patches() as u64;
+        let n_kernels = self.tiling.n_knots() as u64 * self.scene.kernel_bands.len() as u64;
+        let n_bases = self.scene.basis_bands.len() * if alone { 2 } else { 1 };
+        let n_planes = self.spec.grid.len().saturating_sub(first) + if self.hides() { n_bases } else { 0 };
+        n_patches * n_planes as u64 * PATCH_UNITS + n_kernels * KERNEL_UNITS
+    }
+
+    /// Returns the pairs of neighboring bands whose bases are computed, each with the bands from `first` on that lie between them; a single band is
+    /// a pair of its own.
+    pub(crate) fn bands_between_bases(&self, first: usize) -> Vec<([usize; 2], Vec<usize>)> {
+        let bases = &self.scene.basis_bands;
+        let last = bases[bases.len() - 1];
+        let single = (bases.len() == 1).then_some([last; 2]);
+        let pairs = bases.windows(2).map(|pair| [pair[0], pair[1]]).chain(single);
+        let with_bands =
+            |pair: [usize; 2]| (pair, (pair[0].max(first)..pair[1] + usize::from(pair[1] == last)).collect());
+        pairs.map(with_bands).filter(|(_, bands): &(_, Vec<usize>)| !bands.is_empty()).collect()
+    }
+
+    /// Images the bands from `first` on, and hands on each as soon as those before it are done.
     pub(crate) fn stream_from(
         &self,
         first: usize,
         lens: &dyn LensImage,
         radiance: &SceneRadiance<'_>,
-        watch: &Watch<'_>,
-        sink: &mut Sink<'_>,
+        work: &Work<'_>,
+        hand_on: &mut dyn FnMut(usize, Array2<f32>) -> Result<(), ForwardError>,
     ) -> Result<(), ForwardError> {
-        let n_bands = self.spec.grid.len();
-        let n_patches = self.tiling.n_patches() as u64;
-        let n_kernels = self.tiling.n_knots() as u64 * self.kernel_bands.len() as u64;
-        let n_planes = n_bands.saturating_sub(first) + if self.hides() { self.basis_bands.len() } else { 0 };
-        let n_units = n_patches * n_planes as u64 * PATCH_UNITS + n_kernels * KERNEL_UNITS;
-        let work = Work::new(watch.cancel, watch.progress, watch.range, n_units);
-        let mut hand_on = |band, picture| sink(band, picture).map_err(|reason| ForwardError::Sink { band, reason });
-        let mut lower = None;
-        let last = n_bands - 1;
-        for pair in self.basis_bands.windows(2) {
-            let bands: Vec<usize> = (pair[0].max(first)..pair[1] + usize::from(pair[1] == last)).collect();
-            if bands.is_empty() {
-                continue;
-            }
-            let below = match lower.take() {
-                Some(basis) => basis,
-                None => self.basis(lens, pair[0], &work)?,
+        let mut known: Option<(usize, BandBasis)> = None;
+        for (pair, bands) in self.bands_between_bases(first) {
+            let lower = match known.take() {
+                Some((band, basis)) if band == pair[0] => basis,
+                _ => self.basis(lens, pair[0], work)?,
             };
-            let upper = self.basis(lens, pair[1], &work)?;
+            let upper = if pair[1] == pair[0] { lower.clone() } else { self.basis(lens, pair[1], work)? };
             for group in bands.chunks(self.bands_at_once()) {
                 let pictures: Vec<Result<Array2<f32>, ForwardError>> = group
                     .par_iter()
                     .map(|&band| {
-                        let fraction = (band - pair[0]) as f32 / (pair[1] - pair[0]) as f32;
-                        let basis = BasisBetween::new(&below, &upper, fraction);
-                        self.image_of(lens, band, &basis, radiance, &work)
+                        let basis = BasisBetween::at(band, pair, &lower, &upper);
+                        self.image_of(lens, band, &basis, radiance, work)
                     })
                     .collect();
                 for (&band, picture) in group.iter().zip(pictures) {
                     hand_on(band, picture?)?;
                 }
             }
-            lower = Some(upper);
+            known = Some((pair[1], upper));
         }
-        if n_bands == 1 && first == 0 {
-            let only = self.basis(lens, 0, &work)?;
-            hand_on(0, self.image_of(lens, 0, &BasisBetween::new(&only, &only, 0.0), radiance, &work)?)?;
-        }
-        (watch.progress)(watch.range.1);
         Ok(())
     }
 
     /// How many bands are worked on at once: more than there are threads, so that none waits, where pictures are small.
-    fn bands_at_once(&self) -> usize {
+    pub(crate) fn bands_at_once(&self) -> usize {
         let threads = rayon::current_num_threads();
         let least = if self.in_flight_bytes.is_some() { 1 } else { threads.min(4) };
         (self.in_flight_bytes.unwrap_or(IN_FLIGHT_BYTES) / self.band_bytes().max(1)).clamp(least, 4 * threads)
@@ -384,7 +405,7 @@ impl Layout {
     }
 
     /// Reads a band and images it.
-    fn image_of(
+    pub(crate) fn image_of(
         &self,
         lens: &dyn LensImage,
         band: usize,
@@ -394,10 +415,10 @@ impl Layout {
     ) -> Result<Array2<f32>, ForwardError> {
         work.check()?;
         let front = radiance.front.band(band)?;
-        let needed = radiance.occluded.filter(|_| self.occluded.needs_radiance());
+        let needed = radiance.occluded.filter(|_| self.scene.occluded.needs_radiance());
         let occluded = needed.map(|occluded| occluded.band(band)).transpose()?;
         let light = BandRadiance { front: &front, occluded: occluded.as_deref() };
-        light.check(self.size(), self.occluded.needs_radiance())?;
+        light.check(self.size(), self.scene.occluded.needs_radiance())?;
         Ok(self.image(lens, band, basis, light, work)?)
     }
 
@@ -410,11 +431,11 @@ impl Layout {
         work: &Work<'_>,
     ) -> Result<Array2<f32>, Cancelled> {
         let maps = self.maps_at(lens, band);
-        let occluded = self.occluded.samples(light.front, light.occluded, work.cancel())?;
+        let occluded = self.scene.occluded.samples(light.front, light.occluded, work.cancel())?;
         let front = light.front.as_standard_layout();
         let occluded = occluded.as_ref().map(|samples| samples.as_standard_layout());
-        let mut surfaces = vec![self.layer_coordinates.surface(front.as_slice())];
-        if let (Some(radiance), Some(depths)) = (&occluded, self.occluded.layer_coordinates()) {
+        let mut surfaces = vec![self.scene.layer_coordinates.surface(front.as_slice())];
+        if let (Some(radiance), Some(depths)) = (&occluded, self.scene.occluded.layer_coordinates()) {
             surfaces.push(depths.surface(radiance.as_slice()));
         }
         let Film { rows, columns, .. } = self.spec.film;

@@ -39,6 +39,7 @@ mod source;
 mod spec;
 mod stopwatch;
 mod tiles;
+mod views;
 mod work;
 
 #[cfg(test)]

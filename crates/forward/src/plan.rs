@@ -12,6 +12,7 @@ use crate::{
     framed::Framed,
     layout::Layout,
     stopwatch::{Clock, ImagingTimes, Stopwatch},
+    views::Views,
     work::{Watch, Work},
 };
 
@@ -48,13 +49,16 @@ use crate::{
 /// ```
 pub struct ImagingPlan {
     lens: Arc<dyn LensImage + Send>,
-    layout: Layout,
+    views: Views,
 }
 
 impl std::fmt::Debug for ImagingPlan {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Layout { spec, layers, .. } = &self.layout;
-        f.debug_struct("ImagingPlan").field("spec", spec).field("dioptres", &layers.dioptres()).finish_non_exhaustive()
+        let Layout { spec, scene, .. } = self.views.first();
+        f.debug_struct("ImagingPlan")
+            .field("spec", spec)
+            .field("dioptres", &scene.layers.dioptres())
+            .finish_non_exhaustive()
     }
 }
 
@@ -78,60 +82,64 @@ impl ImagingPlan {
             true => lens,
             false => Arc::new(Framed { lens, center_mm: spec.film.center_mm }),
         };
-        let layout = Layout::new(lens.as_ref(), scene, spec, progress, (0.0, 1.0), cancel)?;
+        let views = Views::of(lens.as_ref(), scene, &spec, (progress, (0.0, 1.0)), cancel)?;
         progress(1.0);
-        Ok(Self { lens, layout })
+        Ok(Self { lens, views })
     }
 
     /// Returns the plan that keeps at most this many bytes of kernels and of what layers cover; others are computed anew for each
     /// band.
     #[must_use]
     pub fn with_kernel_budget(mut self, bytes: usize) -> Self {
-        self.layout.kept = Mutex::new(Kept { budget_bytes: bytes, ..Kept::default() });
+        let layouts = self.views.layouts_mut();
+        let budget_bytes = bytes / layouts.len();
+        layouts.iter_mut().for_each(|layout| layout.kept = Mutex::new(Kept { budget_bytes, ..Kept::default() }));
         self
     }
 
     /// Returns the plan whose bands in flight take at most this many bytes together; one band is always worked on.
     #[must_use]
     pub fn with_band_budget(mut self, bytes: usize) -> Self {
-        self.layout.in_flight_bytes = Some(bytes);
+        self.views.layouts_mut().iter_mut().for_each(|layout| layout.in_flight_bytes = Some(bytes));
         self
     }
 
     /// Returns the bytes of memory that a band takes while it is imaged.
     pub fn band_bytes(&self) -> usize {
-        self.layout.band_bytes()
+        self.views.first().band_bytes()
     }
 
     /// Returns the plan that adds up, by a clock, the time that its parts take; see [`times`](Self::times).
     #[must_use]
     pub fn with_clock(mut self, clock: Arc<Clock>) -> Self {
-        self.layout.stopwatch = Stopwatch::of(clock);
+        let stopwatch = Stopwatch::of(clock);
+        self.views.layouts_mut().iter_mut().for_each(|layout| layout.stopwatch = stopwatch.clone());
         self
     }
 
     /// Returns where the time of imaging went since the plan got a clock, summed over threads; nothing without one.
     pub fn times(&self) -> ImagingTimes {
-        self.layout.stopwatch.times()
+        self.views.first().stopwatch.times()
     }
 
     /// What the plan was made for.
     pub fn spec(&self) -> &ImagingSpec {
-        &self.layout.spec
+        &self.views.first().spec
     }
 
     /// Returns the bytes of memory that the plan takes now, kept kernels included, the lens left out.
     pub fn size_bytes(&self) -> usize {
-        self.layout.size_bytes()
+        self.views.size_bytes()
     }
 
-    /// Returns the kernels of a band, computed where they are not kept.
+    /// Returns the kernels of a band, computed where they are not kept: of each part of the pupil, or of the whole alone.
     ///
     /// # Errors
     /// When there is no such band, or the work is cancelled.
-    pub fn kernels(&self, band: usize, cancel: &Cancel) -> Result<BandKernels, ForwardError> {
-        self.layout.check_band(band)?;
-        Ok(self.layout.kernels(self.lens.as_ref(), band, &Work::unobserved(cancel))?)
+    pub fn kernels(&self, band: usize, cancel: &Cancel) -> Result<Vec<BandKernels>, ForwardError> {
+        self.views.first().check_band(band)?;
+        let of = |(lens, layout): (&dyn LensImage, &Layout)| layout.kernels(lens, band, &Work::unobserved(cancel));
+        Ok(self.views.iter(self.lens.as_ref()).map(of).collect::<Result<_, _>>()?)
     }
 
     /// Returns the irradiance on the film in one band, W m⁻² nm⁻¹, rows × columns.
@@ -139,11 +147,10 @@ impl ImagingPlan {
     /// # Errors
     /// When there is no such band, when the radiance is not that of the planned samples, or when the work is cancelled.
     pub fn image(&self, band: usize, radiance: BandRadiance<'_>, cancel: &Cancel) -> Result<Array2<f32>, ForwardError> {
-        self.layout.check_band(band)?;
-        radiance.check(self.layout.size(), self.layout.occluded.needs_radiance())?;
-        let work = Work::unobserved(cancel);
-        let basis = self.layout.basis_between(self.lens.as_ref(), band, &work)?;
-        Ok(self.layout.image(self.lens.as_ref(), band, &basis, radiance, &work)?)
+        let layout = self.views.first();
+        layout.check_band(band)?;
+        radiance.check(layout.size(), layout.scene.occluded.needs_radiance())?;
+        Ok(self.views.image(self.lens.as_ref(), band, radiance, &Work::unobserved(cancel))?)
     }
 
     /// Images all bands: hands the irradiance on the film, W m⁻² nm⁻¹, to `sink` band by band.
@@ -176,14 +183,10 @@ impl ImagingPlan {
         cancel: &Cancel,
         sink: &mut Sink<'_>,
     ) -> Result<(), ForwardError> {
-        radiance.check(self.layout.size(), &self.layout.spec.grid)?;
+        let layout = self.views.first();
+        radiance.check(layout.size(), &layout.spec.grid)?;
         progress(0.0);
-        self.layout.stream_from(
-            first,
-            self.lens.as_ref(),
-            radiance,
-            &Watch { progress, range: (0.0, 1.0), cancel },
-            sink,
-        )
+        let watch = Watch { progress, range: (0.0, 1.0), cancel };
+        self.views.stream_from(first, self.lens.as_ref(), radiance, &watch, sink)
     }
 }

@@ -3,7 +3,7 @@
 use dioptric_psf::LensImage;
 use dioptric_spectrum::Cancel;
 
-use crate::{Film, ForwardError, ImagingSpec, Settings, Sink, Source, framed::Framed, layout::Layout, work::Watch};
+use crate::{Film, ForwardError, ImagingSpec, Settings, Sink, Source, framed::Framed, views::Views, work::Watch};
 
 /// Images a source through a lens: hands the irradiance on the film, W m⁻² nm⁻¹, to `sink` band by band.
 ///
@@ -29,6 +29,6 @@ pub fn render(
     let framed = Framed { lens, center_mm: film.center_mm };
     let lens: &dyn LensImage = if film.is_centered() { lens } else { &framed };
     progress(0.0);
-    let layout = Layout::new(lens, &source.geometry(), spec, progress, (0.0, PLANNED), &cancel)?;
-    layout.stream_from(0, lens, &source.light(), &Watch { progress, range: (PLANNED, 1.0), cancel: &cancel }, sink)
+    let views = Views::of(lens, &source.geometry(), &spec, (progress, (0.0, PLANNED)), &cancel)?;
+    views.stream_from(0, lens, &source.light(), &Watch { progress, range: (PLANNED, 1.0), cancel: &cancel }, sink)
 }

@@ -61,12 +61,12 @@ pub(crate) enum Part {
     Compositing,
 }
 
-/// Adds up the time of each part, where there is a clock.
-#[derive(Default)]
+/// Adds up the time of each part, where there is a clock; clones add to the same sums.
+#[derive(Clone, Default)]
 pub(crate) struct Stopwatch {
     clock: Option<Arc<Clock>>,
     /// In the order of [`Part`].
-    nanoseconds: [AtomicU64; 5],
+    nanoseconds: Arc<[AtomicU64; 5]>,
 }
 
 impl Stopwatch {

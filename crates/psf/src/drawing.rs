@@ -81,7 +81,7 @@ impl RotationalBank {
         wave_share_of(&self.layout(&record, query, None), self.settings().diffraction)
     }
 
-    fn layout<'a>(&self, record: &'a RayMap, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
+    pub(crate) fn layout<'a>(&self, record: &'a RayMap, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
         let turn = query.field_tan.try_normalize().unwrap_or(DVec2::X);
         let bending = self.settings().diffraction.hurb().map(|model| {
             let index = self.stop_index(query.wavelength_nm);

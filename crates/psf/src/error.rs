@@ -43,6 +43,12 @@ pub enum PsfError {
         /// Wavelength, nm.
         wavelength_nm: f64,
     },
+    /// A lens whose pupil cannot be divided.
+    #[error("the pupil of this lens cannot be divided: {reason}")]
+    Undividable {
+        /// Why, and what can be done.
+        reason: &'static str,
+    },
     /// The work was stopped on request.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

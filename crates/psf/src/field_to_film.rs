@@ -117,9 +117,14 @@ impl FieldToFilm {
     /// Returns the point spread function of a point about its centroid; of a dark one that of the nearest lit field.
     pub(crate) fn kernel(&self, bank: &GeneralBank, query: PsfQuery) -> Kernel {
         let PsfQuery { field_tan, dioptres, wavelength_nm, .. } = query;
+        bank.kernel_of(&self.record(bank, field_tan, dioptres, wavelength_nm), query).0
+    }
+
+    /// Returns the ray map of a point; of a dark one that of the nearest lit field.
+    pub(crate) fn record(&self, bank: &GeneralBank, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> RayMap {
         let samples = bank.lit_samples(Some(&self.nearest_lit), field_tan, dioptres, wavelength_nm);
         let record = RayMap::mix(samples.map(|(sample, weight)| (&sample.record, weight)));
-        bank.kernel_of(&record.expect("every stencil has a knot"), query).0
+        record.expect("every stencil has a knot")
     }
 }
 

@@ -5,6 +5,10 @@ use multiversion::multiversion;
 
 use crate::{FieldGeometry, FieldsAlong};
 
+mod shifted;
+
+pub use shifted::{PartOfPoint, ShiftedMap};
+
 /// From a distance on the film to the field seen there, and the irradiance that it gets; for one depth and wavelength.
 ///
 /// The map is that of the centroids of the PSFs, so distortion and lateral color are in it. Its axis is the middle of the film
@@ -155,6 +159,8 @@ pub enum FilmMap {
     Radial(RadialMap),
     /// Of any other.
     Plane(FieldGeometry),
+    /// Of a part of a pupil.
+    Shifted(ShiftedMap),
 }
 
 impl From<RadialMap> for FilmMap {
@@ -181,6 +187,7 @@ impl FilmMap {
                 seen.map(|(tan_per_mm, gain)| (place_mm * tan_per_mm + map.axis_tan, gain))
             }
             Self::Plane(map) => map.at(place_mm),
+            Self::Shifted(map) => map.at(place_mm),
         }
     }
 
@@ -190,6 +197,12 @@ impl FilmMap {
         match self {
             Self::Radial(map) => map.along(x_mm, y_mm, seen),
             Self::Plane(map) => map.along(x_mm, y_mm, seen),
+            Self::Shifted(map) => {
+                for (i, &x_mm) in x_mm.iter().enumerate() {
+                    let (tan, gain) = map.at(DVec2::new(x_mm, y_mm)).unwrap_or((DVec2::ZERO, f64::NAN));
+                    (seen.tan_x[i], seen.tan_y[i], seen.irradiance_per_radiance[i]) = (tan.x, tan.y, gain);
+                }
+            }
         }
     }
 
@@ -198,6 +211,7 @@ impl FilmMap {
         match self {
             Self::Radial(map) => map.field_tan(place_mm),
             Self::Plane(map) => map.nearest_field_tan(place_mm),
+            Self::Shifted(map) => map.field_tan(place_mm),
         }
     }
 
@@ -210,6 +224,7 @@ impl FilmMap {
                 Self::Radial(map.about(axis_mm, axis_tan))
             }
             Self::Plane(map) => Self::Plane(map.counted_from(from_mm)),
+            Self::Shifted(map) => Self::Shifted(map.counted_from(from_mm)),
         }
     }
 
@@ -220,6 +235,7 @@ impl FilmMap {
                 size_of_val(map.tan_per_mm.as_slice()) + size_of_val(map.irradiance_per_radiance.as_slice())
             }
             Self::Plane(map) => map.size_bytes(),
+            Self::Shifted(map) => map.size_bytes(),
         }
     }
 
@@ -234,6 +250,7 @@ impl FilmMap {
                 let up = tan(DVec2::Y * over_mm) - tan(DVec2::NEG_Y * over_mm);
                 across.perp_dot(up).abs().sqrt() / (2.0 * over_mm)
             }
+            Self::Shifted(map) => map.whole().tan_per_mm(over_mm),
         }
     }
 }

@@ -160,7 +160,7 @@ impl GeneralBank {
         record.map_or(0.0, |record| wave_share_of(&self.layout(&record, query, None), self.settings.diffraction))
     }
 
-    fn layout<'a>(&self, record: &'a RayMap, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
+    pub(crate) fn layout<'a>(&self, record: &'a RayMap, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
         let wavelength_nm = self.within_colors(query.wavelength_nm);
         let bending = self.settings.diffraction.hurb().map(|model| {
             let colors = self.colors.stencil(self.dispersion.coordinate(wavelength_nm));

@@ -1,8 +1,10 @@
 //! What imaging a scene asks of a lens.
 
+use std::sync::Arc;
+
 use glam::DVec2;
 
-use crate::{FilmMap, Kernel, PsfQuery};
+use crate::{FilmMap, Kernel, PsfError, PsfQuery};
 
 /// The image that a focused lens forms: where it puts light, how much, and how it spreads it.
 ///
@@ -27,6 +29,16 @@ pub trait LensImage: Sync {
 
     /// Returns the point spread function of a point about its centroid; of a dark point that of one near by.
     fn kernel(&self, query: PsfQuery) -> Kernel;
+
+    /// Returns the images through so many parts of the pupil, which add up to that of the whole: views of the scene from as many
+    /// places, each blurred by the width of its part. Their blur radii are those of the whole pupil.
+    ///
+    /// # Errors
+    /// When the pupil of the lens cannot be divided, as it is here unless another way is given.
+    fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
+        let _ = n_parts;
+        Err(PsfError::Undividable { reason: "nothing is known of its parts" })
+    }
 
     /// Returns the radius of the blur, mm: above 0 for objects nearer than the focus, below 0 beyond it.
     fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64;

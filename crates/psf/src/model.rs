@@ -6,8 +6,8 @@ use glam::DVec2;
 use ndarray::Array2;
 
 use crate::{
-    BankSettings, FieldSampling, FilmMap, Kernel, LensImage, MeasuredError, ModelUse, PsfError, PsfQuery,
-    RadialGeometry, RadialMap, decenter::Decenter, field_to_film::FieldToFilm, general::GeneralBank,
+    BankSettings, FieldSampling, Kernel, LensImage, MeasuredError, ModelUse, PsfError, PsfQuery, RadialGeometry,
+    decenter::Decenter, field_to_film::FieldToFilm, general::GeneralBank, ray_map::RayMap, render::Layout,
     rotational::RotationalBank,
 };
 
@@ -22,14 +22,15 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct LensImageModel {
     lens: Lens,
-    form: Form,
+    pub(crate) form: Form,
     /// Of fields along a radius: how far the lens stands from the axis of scene and film.
     decenter: Decenter,
     error: Option<MeasuredError>,
 }
 
+/// What was sampled.
 #[derive(Clone, Debug)]
-enum Form {
+pub(crate) enum Form {
     /// Of a lens with an axis of symmetry.
     Rotational(Box<RotationalBank>),
     /// Of any lens.
@@ -89,6 +90,45 @@ impl LensImageModel {
         match &self.form {
             Form::Rotational(bank) => Ok(bank),
             Form::General { bank, .. } => Err(bank),
+        }
+    }
+
+    /// How far the lens stands from the axis of scene and film.
+    pub(crate) fn decenter(&self) -> Decenter {
+        self.decenter
+    }
+
+    /// Of a grid of fields: the sample that stands for each, itself where it is lit.
+    pub(crate) fn nearest_lit(&self) -> Option<&[usize]> {
+        match &self.form {
+            Form::General { field_to_film: Some(inverse), .. } => Some(inverse.nearest_lit()),
+            _ => None,
+        }
+    }
+
+    /// Returns the ray map of a point, of a dark one that of the nearest lit field, and how it is turned in the picture.
+    ///
+    /// # Panics
+    /// Of [`FieldSampling::Points`].
+    pub(crate) fn record(&self, query: PsfQuery) -> (RayMap, DVec2) {
+        let PsfQuery { field_tan, dioptres, wavelength_nm, .. } = self.decenter.query(query);
+        match &self.form {
+            Form::Rotational(bank) => {
+                let turn = field_tan.try_normalize().unwrap_or(DVec2::X);
+                (bank.record(field_tan.length(), dioptres, wavelength_nm), turn)
+            }
+            Form::General { bank, field_to_film } => {
+                let inverse = field_to_film.as_ref().expect("single points are not divided");
+                (inverse.record(bank, field_tan, dioptres, wavelength_nm), DVec2::X)
+            }
+        }
+    }
+
+    /// Returns a point's ray map laid out on pixels.
+    pub(crate) fn ray_layout<'a>(&self, record: &'a RayMap, query: PsfQuery) -> Layout<'a> {
+        match self.form() {
+            Ok(bank) => bank.layout(record, self.decenter.query(query), None),
+            Err(bank) => bank.layout(record, query, None),
         }
     }
 
@@ -262,67 +302,4 @@ impl LensImageModel {
             }
         }
     }
-}
-
-impl LensImage for LensImageModel {
-    fn is_symmetric(&self) -> bool {
-        self.form().is_ok() && self.decenter.is_none()
-    }
-
-    fn wavelengths_nm(&self) -> (f64, f64) {
-        ends(&self.settings().wavelengths_nm)
-    }
-
-    fn dioptres(&self) -> (f64, f64) {
-        ends(&self.settings().dioptres)
-    }
-
-    fn is_dark_beyond_extent(&self) -> bool {
-        match &self.form {
-            // Along a radius the fields that see no light are left out.
-            Form::Rotational(bank) => bank.n_fields() < bank.settings().fields.len(),
-            Form::General { bank, field_to_film } => {
-                field_to_film.as_ref().is_some_and(|inverse| inverse.is_dark_at_rim(bank))
-            }
-        }
-    }
-
-    /// Of [`FieldSampling::Points`] the map sees nothing.
-    fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
-        match &self.form {
-            Form::Rotational(bank) => {
-                let geometry = bank.geometry(dioptres, wavelength_nm);
-                let gain = |tan: f64| geometry.irradiance_per_radiance(tan);
-                let extent_mm = extent_mm + self.decenter.length_mm();
-                let map = RadialMap::tabulate(extent_mm, |r| geometry.field_tan(r), gain);
-                map.about(self.decenter.axis_mm(), self.decenter.axis_tan(dioptres)).into()
-            }
-            Form::General { bank, field_to_film: Some(inverse) } => {
-                inverse.geometry(bank, dioptres, wavelength_nm).into()
-            }
-            Form::General { .. } => RadialMap::tabulate(extent_mm, |_| None, |_| 0.0).into(),
-        }
-    }
-
-    fn kernel(&self, query: PsfQuery) -> Kernel {
-        self.kernel(query)
-    }
-
-    fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        self.blur_radius_mm(field_tan, dioptres, wavelength_nm)
-    }
-
-    fn spread_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        match &self.form {
-            Form::Rotational(_) => self.blur_radius_mm(field_tan, dioptres, wavelength_nm).abs(),
-            Form::General { bank, field_to_film } => {
-                let nearest_lit = field_to_film.as_ref().map(|inverse| inverse.nearest_lit());
-                bank.spread_mm(nearest_lit, field_tan, dioptres, wavelength_nm)
-            }
-        }
-    }
-}
-
-fn ends(values: &[f64]) -> (f64, f64) {
-    (values[0], values[values.len() - 1])
 }

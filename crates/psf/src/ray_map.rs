@@ -96,6 +96,54 @@ impl RayMap {
         self.mesh.cells().zip(self.energies()).map(square).sum::<f64>().sqrt()
     }
 
+    /// Returns the centroid of cells of these energies, as they are drawn: the sum of their places, each times its energy, mm.
+    fn weighted_sum_mm(&self, energies: impl Iterator<Item = f64>) -> DVec2 {
+        let at = |node: usize| self.pair(0, node);
+        let place = |((ring, j), energy): ((usize, usize), f64)| {
+            let outer = self.mesh.outer_share(ring);
+            let [a, b, c, d] = self.mesh.corners(ring, j);
+            (at(a) + at(c) + outer * at(b) + (1.0 - outer) * at(d)) * (energy / 3.0)
+        };
+        let lit = self.mesh.cells().zip(energies).filter(|(_, energy)| *energy != 0.0);
+        lit.map(place).sum()
+    }
+
+    /// Returns the part of the energy that goes through a part of the pupil, and the sum of its places, each times its energy, mm.
+    ///
+    /// `share_at` is the share of the light at a place of the unit disc onto which the pupil is mapped.
+    pub(crate) fn part_moments(&self, share_at: impl Fn(DVec2) -> f64) -> (f64, DVec2) {
+        let energies = self.part_energies(share_at);
+        (energies.iter().sum(), self.weighted_sum_mm(energies.into_iter()))
+    }
+
+    /// Returns the map of what goes through a part of the pupil, about its own centroid, of energy 1; `None` where nothing does.
+    pub(crate) fn part(&self, share_at: impl Fn(DVec2) -> f64) -> Option<Self> {
+        let energies = self.part_energies(share_at);
+        let share: f64 = energies.iter().sum();
+        if share <= 0.0 {
+            return None;
+        }
+        let centroid_mm = self.weighted_sum_mm(energies.iter().copied()) / share;
+        let mut part = self.clone();
+        let n = self.mesh.n_nodes();
+        part.numbers[..n].iter_mut().for_each(|x| *x -= centroid_mm.x as f32);
+        part.numbers[n..2 * n].iter_mut().for_each(|y| *y -= centroid_mm.y as f32);
+        let first = part.numbers.len() - self.mesh.n_cells();
+        part.numbers[first..].iter_mut().zip(energies).for_each(|(of_part, e)| *of_part = (e / share) as f32);
+        Some(part)
+    }
+
+    /// Returns the energies of the cells through a part of the pupil, each cell taken at its middle.
+    fn part_energies(&self, share_at: impl Fn(DVec2) -> f64) -> Vec<f64> {
+        let place = |(ring, j): (usize, usize)| {
+            let [inner, outer] = [ring, ring + 1].map(|ring| self.mesh.share(ring as f64));
+            let radius = (inner * inner + inner * outer + outer * outer) / (1.5 * (inner + outer));
+            polar(DVec2::ZERO, radius, self.mesh.azimuth(j as f64 + 0.5))
+        };
+        let cells = self.mesh.cells().zip(self.energies());
+        cells.map(|(cell, &energy)| f64::from(energy) * share_at(place(cell))).collect()
+    }
+
     /// The energies of the cells; their sum is 1.
     pub(crate) fn energies(&self) -> &[f32] {
         &self.numbers[self.numbers.len() - self.mesh.n_cells()..]

@@ -44,7 +44,7 @@ impl<'a> Layout<'a> {
                 *v = turn.rotate(*v) * DVec2::new(scale, -scale);
             }
         }
-        let reach = nodes.iter().map(|node| node.at_mm.abs().max_element()).fold(0.0, f64::max);
+        let reach = lit_nodes(record).map(|i| nodes[i].at_mm.abs().max_element()).fold(0.0, f64::max);
         let unit = bending.map_or(0.0, |bending| unit(record, &nodes, bending));
         let half = (reach + TAILS * unit - 0.5).ceil().clamp(0.0, MOST_PIXELS) as usize;
         Self { record, nodes, bending, reach, unit, side: 2 * half + 1, natural_side: 2 * half + 1 }
@@ -82,6 +82,12 @@ impl<'a> Layout<'a> {
         raster.mesh(record.mesh, &at, &energies);
         raster.finish()
     }
+}
+
+/// Returns the corners of the cells that have energy, some of them several times.
+fn lit_nodes(record: &RayMap) -> impl Iterator<Item = usize> {
+    let lit = record.mesh.cells().zip(record.energies()).filter(|(_, energy)| **energy != 0.0);
+    lit.flat_map(|((ring, j), _)| record.mesh.corners(ring, j))
 }
 
 /// Returns drawn energies as a kernel, trimmed to what matters.

@@ -155,6 +155,16 @@ impl RotationalBank {
         self.field_tans.len()
     }
 
+    /// The angles of the fields that see light.
+    pub(crate) fn field_axis(&self) -> &Axis {
+        &self.fields
+    }
+
+    /// The ray maps, by wavelength, depth and field, the field innermost.
+    pub(crate) fn records(&self) -> &[RayMap] {
+        &self.records
+    }
+
     /// Returns how many fields the table of image heights has, for so many of the bank.
     fn n_geometry(n_fields: usize) -> usize {
         n_fields.saturating_sub(1) * GEOMETRY_STEPS + 1
@@ -223,7 +233,7 @@ impl RotationalBank {
     }
 
     /// Returns the columns of samples (one field innermost) that a depth and wavelength draw on, with weights.
-    fn columns(&self, dioptres: f64, wavelength_nm: f64) -> impl Iterator<Item = (usize, f64)> {
+    pub(crate) fn columns(&self, dioptres: f64, wavelength_nm: f64) -> impl Iterator<Item = (usize, f64)> {
         let n_depths = self.dioptres.knots().len();
         let depths = self.dioptres.stencil(dioptres);
         let colors = self.color_stencil(wavelength_nm);

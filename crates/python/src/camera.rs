@@ -114,7 +114,8 @@ impl Camera {
     /// diffraction : {"none", "hurb", "hurb-scene3d", "hurb-calibrated", "wave"}
     /// gamma : float
     ///     Strength of HURB.
-    /// blur : {"layered", "pointwise"}
+    /// blur : {"layered", "pointwise", "views:N"}
+    ///     Layers of depth; each sample on its own, as in the paper; layers through N parts of the pupil.
     /// bank : {"standard", "paper"}
     /// bank_error : float
     ///     Samples the lens as finely as this error at nine tenths of the places needs.

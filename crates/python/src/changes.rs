@@ -2,8 +2,8 @@
 
 use dioptric_optics::Lens as OpticsLens;
 use dioptric_pipeline::{
-    BankSpec, BlurSpec, Camera, Crop, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions,
-    LensSpec, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure, with_exposure_s,
+    BankSpec, Camera, Crop, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions, LensSpec,
+    SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure, with_exposure_s,
 };
 use pyo3::{
     prelude::*,
@@ -200,11 +200,9 @@ fn set(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_, PyA
         "diffraction" => camera.diffraction = diffraction(key, value)?,
         "gamma" => camera.diffraction = with_gamma(camera.diffraction, number(key, value)?)?,
         "blur" => {
-            camera.blur = match word(key, value)?.as_str() {
-                "layered" => BlurSpec::Layered,
-                "pointwise" => BlurSpec::Pointwise,
-                other => return Err(wrong(key, format!("'{other}'"), "'layered' or 'pointwise'")),
-            }
+            let found = word(key, value)?;
+            let expected = "'layered', 'pointwise' or 'views:16'";
+            camera.blur = found.parse().map_err(|_| wrong(key, format!("'{found}'"), expected))?;
         }
         "bank" => {
             camera.bank = match word(key, value)?.as_str() {

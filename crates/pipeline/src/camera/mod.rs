@@ -1,6 +1,7 @@
 //! The camera file: everything about a shot, in one RON file.
 
 mod bank;
+mod blur;
 mod check;
 mod crop;
 mod frames;
@@ -23,6 +24,7 @@ use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
 pub use bank::{BankData, BankSpec};
+pub use blur::BlurSpec;
 pub use crop::Crop;
 pub(crate) use frames::at_rest;
 pub use frames::{Exposed, FramesSpec};
@@ -178,18 +180,6 @@ pub enum FilmSpec {
     },
 }
 
-/// How the point-spread functions are laid over the scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub enum BlurSpec {
-    /// In layers of depth, near ones hiding far ones.
-    #[default]
-    Layered,
-    /// Each sample spread on its own, as in the paper.
-    Pointwise,
-}
-
 /// Which sensor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -336,6 +326,7 @@ impl Camera {
         if let BankSpec::Within { error } = self.bank {
             checker.positive("error", error)?;
         }
+        self.blur.check(self.diffraction, self.bank, checker)?;
         self.exposure.check().map_err(|error| checker.of_sensor(error))?;
         match &self.wavelengths {
             WavelengthSpec::Scene => {}

@@ -17,11 +17,13 @@ pub(super) fn plan(
     budget: Option<MemoryBudget>,
     watch: &Watch<'_>,
 ) -> Result<ImagingPlan, PipelineError> {
-    let mode = match inputs.blur {
-        BlurSpec::Layered => BlurMode::Layered,
-        BlurSpec::Pointwise => BlurMode::Pointwise,
+    let quality = inputs.bank.film.geometry.quality;
+    let mode = match (inputs.blur, quality) {
+        (BlurSpec::Views(n), Quality::Full | Quality::Draft) => BlurMode::Views(n),
+        (BlurSpec::Layered | BlurSpec::Views(_), _) => BlurMode::Layered,
+        (BlurSpec::Pointwise, _) => BlurMode::Pointwise,
     };
-    let settings = match inputs.bank.film.geometry.quality {
+    let settings = match quality {
         Quality::Full | Quality::Draft => Settings { mode, ..Settings::default() },
         // The pixels are several of the full film's: what a step costs is a part of what the pixels cost.
         Quality::Preview | Quality::Sketch => Settings {

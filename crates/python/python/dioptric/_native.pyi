@@ -71,7 +71,7 @@ class Camera:
         pixel_um: float | None = ...,
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
-        blur: Literal["layered", "pointwise"] | None = ...,
+        blur: str | None = ...,
         bank: Literal["standard", "paper"] | None = ...,
         bank_error: float | None = ...,
         scene: Scene | _Path | None = ...,

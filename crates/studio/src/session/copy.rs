@@ -1,7 +1,7 @@
 //! A camera in words for elsewhere: a camera file, a command line, Python.
 
 use dioptric_pipeline::{
-    BlurSpec, Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec, SensorSpec, StopSpec,
+    Camera, Diffraction, FilmSpec, FocusSpec, FramesSpec, LensReadOptions, LensSpec, SensorSpec, StopSpec,
     parse_illuminant, parse_white, with_analog_gain, with_exposure_s,
 };
 use dioptric_sensor::{Demosaic, ExposureControl, Highlights, NoiseSource, NoiseSources, WhiteBalance};
@@ -175,7 +175,7 @@ impl Telling {
             self.made.diffraction = camera.diffraction;
         }
         if camera.blur != self.made.blur {
-            self.text("blur", if camera.blur == BlurSpec::Layered { "layered" } else { "pointwise" });
+            self.text("blur", &camera.blur.to_string());
             self.made.blur = camera.blur;
         }
     }

@@ -214,12 +214,16 @@ pub(super) fn movements(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
 pub(super) fn simulation(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
     let kinds = [
         (Diffraction::None, "none"),
-        (Diffraction::Hurb { gamma: 1.0 }, "bent rays (HURB)"),
-        (Diffraction::HurbCalibrated, "bent rays, calibrated"),
+        (Diffraction::Hurb { gamma: 1.0 }, "HURB"),
+        (Diffraction::HurbCalibrated, "HURB, calibrated"),
         (Diffraction::Wave, "waves"),
     ];
     choice(ui, "diffraction", "Diffraction at the stop", &mut camera.diffraction, &kinds);
-    let blurs = [(BlurSpec::Layered, "layers of depth"), (BlurSpec::Pointwise, "point by point")];
+    let blurs = [
+        (BlurSpec::Layered, "layers of depth"),
+        (BlurSpec::Views(16), "layers, from 16 parts of the pupil"),
+        (BlurSpec::Pointwise, "point by point"),
+    ];
     choice(ui, "blur", "How the point spread functions are laid over the scene", &mut camera.blur, &blurs);
     let banks = [
         (BankSpec::Standard, "standard"),

@@ -1,0 +1,77 @@
+//! What imaging a scene asks of a traced lens.
+
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use crate::{
+    FilmMap, Kernel, LensImage, LensImageModel, PsfError, PsfQuery, RadialMap, model::Form, part_image::PartImage,
+};
+
+impl LensImage for LensImageModel {
+    fn is_symmetric(&self) -> bool {
+        self.form().is_ok() && self.decenter().is_none()
+    }
+
+    fn wavelengths_nm(&self) -> (f64, f64) {
+        ends(&self.settings().wavelengths_nm)
+    }
+
+    fn dioptres(&self) -> (f64, f64) {
+        ends(&self.settings().dioptres)
+    }
+
+    fn is_dark_beyond_extent(&self) -> bool {
+        match &self.form {
+            // Along a radius the fields that see no light are left out.
+            Form::Rotational(bank) => bank.n_fields() < bank.settings().fields.len(),
+            Form::General { bank, field_to_film } => {
+                field_to_film.as_ref().is_some_and(|inverse| inverse.is_dark_at_rim(bank))
+            }
+        }
+    }
+
+    /// Of [`FieldSampling::Points`] the map sees nothing.
+    fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
+        match &self.form {
+            Form::Rotational(bank) => {
+                let geometry = bank.geometry(dioptres, wavelength_nm);
+                let gain = |tan: f64| geometry.irradiance_per_radiance(tan);
+                let extent_mm = extent_mm + self.decenter().length_mm();
+                let map = RadialMap::tabulate(extent_mm, |r| geometry.field_tan(r), gain);
+                map.about(self.decenter().axis_mm(), self.decenter().axis_tan(dioptres)).into()
+            }
+            Form::General { bank, field_to_film: Some(inverse) } => {
+                inverse.geometry(bank, dioptres, wavelength_nm).into()
+            }
+            Form::General { .. } => RadialMap::tabulate(extent_mm, |_| None, |_| 0.0).into(),
+        }
+    }
+
+    fn kernel(&self, query: PsfQuery) -> Kernel {
+        self.kernel(query)
+    }
+
+    fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
+        let images = PartImage::all(self, n_parts)?;
+        Ok(images.into_iter().map(|image| Arc::new(image) as Arc<dyn LensImage + Send>).collect())
+    }
+
+    fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        self.blur_radius_mm(field_tan, dioptres, wavelength_nm)
+    }
+
+    fn spread_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        match &self.form {
+            Form::Rotational(_) => self.blur_radius_mm(field_tan, dioptres, wavelength_nm).abs(),
+            Form::General { bank, field_to_film } => {
+                let nearest_lit = field_to_film.as_ref().map(|inverse| inverse.nearest_lit());
+                bank.spread_mm(nearest_lit, field_tan, dioptres, wavelength_nm)
+            }
+        }
+    }
+}
+
+fn ends(values: &[f64]) -> (f64, f64) {
+    (values[0], values[values.len() - 1])
+}
