@@ -19,7 +19,7 @@ use plane::{Case, Uniform};
 const LENSES: [(&str, f64, f64); 7] = [
     ("paper-2el", 4.0, 10.0),
     ("dgauss-50mm", 2.03, 11.3),
-    ("cooke-50mm", 4.5, 11.3),
+    ("cooke-50mm", 5.0, 11.3),
     ("canon-50mm", 1.9, 11.3),
     ("achromat-100mm", 4.0, 5.0),
     ("tessar-50mm", 4.5, 7.5),
@@ -38,14 +38,20 @@ fn main() {
                 for diffraction in [Diffraction::None, Diffraction::Hurb { gamma: 1.0 }, Diffraction::Wave] {
                     let (columns, focus_mm) = (724, 2000.0);
                     let pitch_um = 2e3 * radius_mm / columns as f64;
-                    let case = Case { lens, f_number, focus_mm, plane_mm, columns, pitch_um, diffraction };
+                    let case =
+                        Case { lens, f_number, focus_mm, plane_mm, columns, pitch_um, diffraction, is_adaptive: true };
                     let uniform = Uniform::new(&case);
-                    let (step, _) = uniform.worst_step();
+                    let (step, (row, column)) = uniform.worst_step();
                     let illumination = match diffraction {
-                        Diffraction::None => format!("{:+.2e}", uniform.worst_illumination().0),
+                        Diffraction::None => {
+                            let (error, radius_mm) = uniform.worst_illumination();
+                            format!("{error:+.2e} at {radius_mm:.2} mm")
+                        }
                         _ => String::new(),
                     };
-                    println!("{lens}, {f_number}, {plane}, {diffraction:?}, {step:.1e}, {illumination}");
+                    println!(
+                        "{lens}, {f_number}, {plane}, {diffraction:?}, {step:.1e} at {row} {column}, {illumination}"
+                    );
                 }
             }
         }

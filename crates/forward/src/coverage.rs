@@ -25,6 +25,10 @@ pub struct PsfDomain<'a> {
     pub diffraction: Diffraction,
 }
 
+/// How far beyond the film fields are sampled, over the radius of the blur: the border of the film is blurred by light from beyond it, and
+/// kernels there are between those at knots farther out.
+const BORDER_OF_BLUR: f64 = 1.5;
+
 impl PsfDomain<'_> {
     /// Returns the farthest and nearest depth, dioptres.
     fn dioptres(&self) -> Result<(f64, f64), ForwardError> {
@@ -90,8 +94,7 @@ impl PsfDomain<'_> {
         // A lens moved aside has its axis on the other side of the picture.
         let corner_mm = self.film.half_diagonal_mm() + (self.film.center_mm + aside_mm).length();
         let fields_tan = PsfDomain { lens: &centered, ..*self }.at_ends(|aim| {
-            // The border of the film is blurred by light from beyond it.
-            let extent_mm = 1.02 * corner_mm + aim.axial_blur_mm();
+            let extent_mm = 1.02 * corner_mm + BORDER_OF_BLUR * aim.axial_blur_mm();
             Ok(aim.field_tan_at(extent_mm))
         })?;
         let last_field_tan = fields_tan.into_iter().fold(0.0, f64::max);
@@ -112,7 +115,7 @@ impl PsfDomain<'_> {
             let wavelength_nm = aim.lens.wavelength_nm();
             let dark = || ForwardError::DarkFilm { lens: self.lens.name().to_owned(), wavelength_nm };
             let center = aim.field_at_middle().ok_or_else(dark)?;
-            let beyond_mm = 1.02 * half_mm + aim.blur_mm(center);
+            let beyond_mm = 1.02 * half_mm + BORDER_OF_BLUR * aim.blur_mm(center);
             Ok(aim.fields_over(center, beyond_mm))
         })?;
         let around = |(first, last): (DVec2, DVec2), (low, high)| (first.min(low), last.max(high));

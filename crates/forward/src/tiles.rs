@@ -366,8 +366,8 @@ impl Probe<'_> {
 }
 
 /// The largest relative error of the irradiance of a uniform plane that a spline may cause where knots can be added, as a part
-/// of the largest error of edges: .1 % by default.
-const SHADING_PER_EDGE_ERROR: f64 = 0.1;
+/// of the largest error of edges: .05 % by default.
+const SHADING_PER_EDGE_ERROR: f64 = 0.05;
 
 /// Returns the kernel at a knot less that of a spline.
 fn spline_error(kernels: &LayerKernels, knot: Knot, spline: &Weights) -> KnotKernel {

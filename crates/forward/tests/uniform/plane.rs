@@ -2,9 +2,9 @@
 
 use dioptric_forward::{Film, PsfDomain, Settings, Source, render};
 use dioptric_optics::{Lens, ObjectPoint, PupilBoundary, Vignetting, rays_towards};
-use dioptric_psf::{Diffraction, FieldSampling, LensImageModel};
+use dioptric_psf::{AdaptiveSettings, Diffraction, ErrorPlaces, FieldSampling, LensImageModel};
 use dioptric_scene::View;
-use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
 use ndarray::Array2;
 
@@ -20,6 +20,8 @@ pub(crate) struct Case {
     pub(crate) columns: usize,
     pub(crate) pitch_um: f64,
     pub(crate) diffraction: Diffraction,
+    /// Whether samples are added until pictures between them are right, as `dioptric run` does, or are as many as usual.
+    pub(crate) is_adaptive: bool,
 }
 
 pub(crate) struct Uniform {
@@ -48,7 +50,12 @@ impl Uniform {
             diffraction: case.diffraction,
         };
         let settings = domain.settings().unwrap();
-        let bank = LensImageModel::build(&lens, &settings).unwrap();
+        let places = ErrorPlaces { pitch_um: case.pitch_um, ..ErrorPlaces::STANDARD };
+        let wanted = AdaptiveSettings { places, ..AdaptiveSettings::STANDARD };
+        let bank = match case.is_adaptive {
+            true => LensImageModel::build_adaptive(&lens, &settings, &wanted, &|_| {}, &Cancel::new()).unwrap(),
+            false => LensImageModel::build(&lens, &settings).unwrap(),
+        };
         let last_tan = match &settings.fields {
             FieldSampling::Radial(tans) => tans[tans.len() - 1],
             _ => panic!("a lens with an axis of symmetry has fields along a radius"),
