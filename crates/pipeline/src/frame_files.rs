@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use dioptric_scene::write_planes_exr;
-use dioptric_sensor::{Depth, ElectronRate, Exposure, Picture, Processing, Raw, Sensor};
+use dioptric_sensor::{Depth, ElectronRate, Exposure, LensTables, Picture, Processing, Raw, Sensor};
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
@@ -99,6 +99,8 @@ pub struct Frames<'a> {
     pub exposed: &'a Exposed,
     /// From the raw frame to the picture.
     pub processing: &'a Processing,
+    /// What the lens does to the frame, where the processing undoes some of it.
+    pub lens: Option<&'a LensTables>,
     /// The bands of the irradiance.
     pub grid: &'a WavelengthGrid,
     /// The light on the scene; D65 where it is not known.
@@ -164,7 +166,8 @@ fn write_also(
         FrameFile::PictureTiff16 => write_picture("picture-16.tiff", Depth::Sixteen),
         FrameFile::PictureExr => {
             // Developed once more, because the picture holds codes.
-            let light = frames.sensor.develop_linear(frames.exposed.developed_from(), frames.processing)?;
+            let (raw, processing) = (frames.exposed.developed_from(), frames.processing);
+            let light = frames.sensor.develop_linear_with(raw, processing, frames.lens)?;
             let light = light.bright(frames.processing.brightness);
             let planes: Vec<Array2<f32>> = (0..3).map(|k| light.index_axis(Axis(2), k).to_owned()).collect();
             let named: Vec<(&str, &Array2<f32>)> = ["R", "G", "B"].into_iter().zip(&planes).collect();

@@ -49,8 +49,8 @@ pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
 pub use staged::{Leftover, Staged, write_file, write_json};
 pub use stages::{
-    Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance, IrradianceSummary,
-    KeptCamera, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,
-    WorldRender, write_seen_png,
+    AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,
+    IrradianceSummary, KeptCamera, LensAberrations, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene,
+    Resumed, SceneSummary, StageCounts, WorldRender, write_seen_png,
 };
 pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

@@ -6,14 +6,16 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Highlights, LensShading, Picture, Raw, Sensor,
-    SensorError, ToneCurve, WhiteBalance,
+    Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Highlights, LensCorrections, LensShading,
+    LensTables, LocalTone, Picture, Raw, Sensor, SensorError, ToneCurve, WhiteBalance,
     balance::{gains, light_of_gains},
     defects, demosaic,
     denoise::{SampleNoise, automatic_strength, denoise},
     hdr::merged_noise,
     highlights::{Saturated, dimmed, reconstruct},
+    lens_tables::warp,
     metering::percentile,
+    sharpen::{SharpenedChannels, sharpen},
 };
 
 /// What is done to a raw frame, in this order.
@@ -32,6 +34,8 @@ pub struct Processing {
     /// its own noise asks for. That is none up to a twentieth of the signal of a middle gray (18 % of saturation), and 0.5 from a
     /// tenth on.
     pub denoise: Option<f64>,
+    /// Aberrations of the lens that are undone; left out, they stay.
+    pub lens_corrections: LensCorrections,
     /// What is made white.
     #[serde(alias = "white_balance")]
     pub white: WhiteBalance,
@@ -39,10 +43,14 @@ pub struct Processing {
     pub highlights: Highlights,
     /// How the missing colors are found.
     pub demosaic: Demosaic,
+    /// The standard deviation of the blur by lens and pixels that is undone, pixels, as far as noise allows: 0 none, 2 at most.
+    pub sharpen_px: f64,
     /// How channels become colors.
     pub color: ColorCorrection,
     /// How bright the picture is made.
     pub brightness: Brightness,
+    /// How the contrast between and within parts of the picture is changed; left out, it stays.
+    pub local_tone: LocalTone,
     /// The curve from light to codes.
     pub curve: ToneCurve,
     /// The primaries of the picture.
@@ -57,11 +65,14 @@ impl Default for Processing {
             defect_threshold: None,
             shading: None,
             denoise: None,
+            lens_corrections: LensCorrections::default(),
             white: WhiteBalance::Scene,
             highlights: Highlights::Reconstruct,
             demosaic: Demosaic::DirectionalRatio,
+            sharpen_px: 0.0,
             color: ColorCorrection::Auto,
             brightness: Brightness::AsExposed,
+            local_tone: LocalTone::default(),
             curve: ToneCurve::Srgb,
             space: ColorSpace::Srgb,
         }
@@ -117,11 +128,16 @@ pub struct LinearPicture {
     pub light: Array3<f32>,
     /// What becomes of light above 1 in a picture.
     pub highlights: Highlights,
+    /// How the contrast between and within parts is changed in a picture.
+    pub local_tone: LocalTone,
     /// The factor on each channel that made white neutral.
     pub balance: Vec<f64>,
     /// The matrix from balanced channels to linear sRGB.
     pub color: ColorMatrix,
 }
+
+/// The luminance of linear sRGB (IEC 61966-2-1).
+const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
 /// A picture and what was found out while making it.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,7 +158,22 @@ impl Sensor {
     /// # Errors
     /// When the frame is not of this sensor or too small, or a setting makes no sense.
     pub fn develop(&self, raw: &Raw, processing: &Processing) -> Result<Developed, SensorError> {
-        Ok(self.develop_linear(raw, processing)?.encode(processing.brightness, processing.curve, processing.space))
+        self.develop_with(raw, processing, None)
+    }
+
+    /// Returns the picture of a raw frame whose lens is known: what [`Processing::lens_corrections`] asks for is undone by its
+    /// tables.
+    ///
+    /// # Errors
+    /// As [`develop`](Self::develop), and when corrections are asked for without tables or with those of another frame.
+    pub fn develop_with(
+        &self,
+        raw: &Raw,
+        processing: &Processing,
+        lens: Option<&LensTables>,
+    ) -> Result<Developed, SensorError> {
+        let linear = self.develop_linear_with(raw, processing, lens)?;
+        Ok(linear.encode(processing.brightness, processing.curve, processing.space))
     }
 
     /// Returns the linear light of a raw frame, as [`develop`](Self::develop) has it before brightness and tone curve.
@@ -150,8 +181,24 @@ impl Sensor {
     /// # Errors
     /// As [`develop`](Self::develop).
     pub fn develop_linear(&self, raw: &Raw, processing: &Processing) -> Result<LinearPicture, SensorError> {
+        self.develop_linear_with(raw, processing, None)
+    }
+
+    /// Returns the linear light of a raw frame whose lens is known.
+    ///
+    /// # Errors
+    /// As [`develop_with`](Self::develop_with).
+    pub fn develop_linear_with(
+        &self,
+        raw: &Raw,
+        processing: &Processing,
+        lens: Option<&LensTables>,
+    ) -> Result<LinearPicture, SensorError> {
         raw.check()?;
         self.check_settings(raw, processing)?;
+        let corrections = processing.lens_corrections;
+        let lens = needed_tables(corrections, lens)?;
+        lens.map_or(Ok(()), |lens| lens.check(raw.size(), self.filters.len()))?;
         let processing = processing.under(None);
         let tile = raw.tile.as_ref();
         let n_channels = self.filters.len();
@@ -169,7 +216,10 @@ impl Sensor {
         let noise = self.sample_noise(raw);
         let strength = processing.denoise.unwrap_or_else(|| automatic_strength(&noise));
         if strength > 0.0 {
-            denoise(&mut planes, tile, &vec![noise; n_channels], strength);
+            denoise(&mut planes, tile, &vec![noise.clone(); n_channels], strength);
+        }
+        if let Some(lens) = lens.filter(|_| corrections.vignetting) {
+            lens.even_out(&mut planes, tile);
         }
         let balance = gains(self, &planes, tile, &processing.white)?;
         weigh(&mut planes, tile, &balance, processing.highlights);
@@ -179,6 +229,10 @@ impl Sensor {
         };
         if let Some(saturated) = saturated {
             reconstruct(&mut channels, &saturated, &balance);
+        }
+        if let Some(lens) = lens.filter(|_| corrections.moves()) {
+            let sources: Vec<_> = (0..n_channels).map(|channel| lens.source_px(channel, corrections)).collect();
+            channels = warp(&channels, &sources);
         }
         let fitted = |light: &Illuminant| {
             let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
@@ -190,7 +244,14 @@ impl Sensor {
             ColorCorrection::Fitted(light) => fitted(light),
             ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), delta_e: Vec::new() },
         };
-        Ok(LinearPicture { light: mix(&channels, &color), highlights: processing.highlights, balance, color })
+        if processing.sharpen_px > 0.0 {
+            let share = |channel: usize| color.rows.iter().zip(LUMINANCE).map(|(row, y)| y * row[channel]).sum();
+            let luminance: Vec<f64> = (0..n_channels).map(share).collect();
+            let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: &noise };
+            sharpen(&mut channels, processing.sharpen_px, &of);
+        }
+        let Processing { highlights, local_tone, .. } = processing;
+        Ok(LinearPicture { light: mix(&channels, &color), highlights, local_tone, balance, color })
     }
 
     /// Returns the share of saturation from which on a sample is taken to be saturated: three deviations of noise below it.
@@ -252,6 +313,10 @@ impl Sensor {
         if !right {
             return Err(SensorError::value("the processing", key, value, "a number above 0, and at most 100 %"));
         }
+        if !(0.0..=2.0).contains(&processing.sharpen_px) {
+            return Err(SensorError::value("the processing", "sharpen_px", processing.sharpen_px, "0 to 2 pixels"));
+        }
+        processing.local_tone.check()?;
         processing.curve.check()
     }
 }
@@ -271,14 +336,27 @@ impl LinearPicture {
         let table = curve.table();
         let keeps_hue = self.highlights == Highlights::Reconstruct;
         let mut codes = self.light;
+        let tone = self.local_tone;
+        let local = (!tone.is_none()).then(|| tone.factors(codes.view(), brightness as f32));
+        let local = local.as_ref().map(|factors| factors.as_slice().expect("a new array is contiguous"));
         let all = codes.as_slice_mut().expect("linear pictures are made contiguous");
-        all.par_chunks_exact_mut(3).for_each(|pixel| {
-            let light = space.from_linear_srgb([0, 1, 2].map(|i| pixel[i] * brightness as f32));
+        all.par_chunks_exact_mut(3).enumerate().for_each(|(place, pixel)| {
+            let factor = brightness as f32 * local.map_or(1.0, |factors| factors[place]);
+            let light = space.from_linear_srgb([0, 1, 2].map(|i| pixel[i] * factor));
             let light = if keeps_hue { dimmed(light) } else { light };
             pixel.iter_mut().zip(light).for_each(|(code, light)| *code = table.encode(light));
         });
         Developed { picture: Picture { codes }, balance: self.balance, color: self.color, brightness }
     }
+}
+
+/// Returns the tables that the corrections need; none where there is nothing to correct.
+fn needed_tables(corrections: LensCorrections, lens: Option<&LensTables>) -> Result<Option<&LensTables>, SensorError> {
+    if corrections.is_none() || lens.is_some() {
+        return Ok(lens.filter(|_| !corrections.is_none()));
+    }
+    let reason = "need the tables of the lens that made the frame, expected them with it or no corrections".to_owned();
+    Err(SensorError::Unsuitable { what: "lens_corrections", reason })
 }
 
 /// Multiplies each channel by its factor, and clips it at the saturation of the least sensitive where highlights are clipped.
