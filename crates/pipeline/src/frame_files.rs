@@ -3,12 +3,12 @@
 use std::{fs, path::Path};
 
 use dioptric_scene::write_planes_exr;
-use dioptric_sensor::{Depth, ElectronRate, Exposure, LensTables, Picture, Processing, Raw, Sensor};
+use dioptric_sensor::{Depth, DngDetails, ElectronRate, Exposure, LensTables, Picture, Processing, Raw, Sensor};
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 
-use crate::{Exposed, PipelineError};
+use crate::{Exposed, PipelineError, ResolvedLens};
 
 /// What is written besides the picture and the report.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -101,6 +101,8 @@ pub struct Frames<'a> {
     pub processing: &'a Processing,
     /// What the lens does to the frame, where the processing undoes some of it.
     pub lens: Option<&'a LensTables>,
+    /// The lens, where it is known.
+    pub optics: Option<&'a ResolvedLens>,
     /// The bands of the irradiance.
     pub grid: &'a WavelengthGrid,
     /// The light on the scene; D65 where it is not known.
@@ -158,7 +160,7 @@ fn write_also(
         }
         FrameFile::RawTiff => write_raw(&frames.exposed.raw, "tiff", folder),
         FrameFile::RawDng => {
-            frames.sensor.write_dng(&frames.exposed.raw, &frames.light, &folder.join("raw.dng"))?;
+            frames.sensor.write_dng(&frames.exposed.raw, &dng_details(frames, picture), &folder.join("raw.dng"))?;
             Ok(vec!["raw.dng".to_owned()])
         }
         FrameFile::PicturePng16 => write_picture("picture-16.png", Depth::Sixteen),
@@ -174,6 +176,19 @@ fn write_also(
             write_planes_exr(&folder.join("picture.exr"), &named, true)?;
             Ok(vec!["picture.exr".to_owned()])
         }
+    }
+}
+
+/// Returns what a DNG file says besides its frame.
+fn dng_details<'a>(frames: &Frames<'a>, picture: &'a Picture) -> DngDetails<'a> {
+    let first = frames.optics.map(|lens| lens.reference.first_order());
+    DngDetails {
+        light: frames.light.clone(),
+        f_number: first.map(|first| first.f_number),
+        focal_length_mm: first.map(|first| first.efl_mm),
+        lens: frames.optics.map(|lens| lens.lens.name().to_owned()),
+        picture: Some(picture),
+        corrections: frames.lens.map(|tables| (frames.processing.lens_corrections, tables)),
     }
 }
 

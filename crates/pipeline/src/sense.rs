@@ -70,6 +70,7 @@ impl Sensed {
             exposed: &self.frames.exposed,
             processing: &self.processing,
             lens: None,
+            optics: None,
             light: self.light.clone(),
             grid: &self.grid,
         }

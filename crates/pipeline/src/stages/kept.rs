@@ -175,6 +175,7 @@ impl Capture {
             exposed: &self.frames.exposed,
             processing: &self.processing,
             lens: self.aberrations.as_ref().map(|aberrations| &aberrations.tables),
+            optics: Some(&self.lens),
             grid: self.grid(),
             light: self.scene.light.as_ref().map_or(Illuminant::D65, |light| light.illuminant.clone()),
         }
