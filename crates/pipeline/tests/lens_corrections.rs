@@ -19,7 +19,10 @@ const SPACING_PX: usize = 40;
 const ROWS: usize = 400;
 const COLUMNS: usize = 600;
 
-/// A target 9 m wide and 3 m away through a wide-angle lens whose barrel distortion is 46 pixels in the corners, and whose lateral
+/// A point of the lattice by number, across and down from the middle, and where it is in each channel, columns and rows.
+type FoundPoint = (DVec2, [DVec2; 3]);
+
+/// A target 10.5 m wide and 3 m away through a wide-angle lens whose barrel distortion is 46 pixels in the corners, and whose lateral
 /// color is .4; on a sensor of three stacked channels.
 fn before(pattern: Pattern) -> Camera {
     let mut camera = Camera::demo().unwrap();
@@ -73,7 +76,7 @@ fn centroid(shot: &Capture, about: DVec2, channel: usize) -> DVec2 {
 
 /// Returns where the points of the lattice lie, by number across and down from the middle, in each channel: sought at the affine
 /// places first, then where they are.
-fn found(shot: &Capture, place: impl Fn(DVec2) -> DVec2) -> Vec<(DVec2, [DVec2; 3])> {
+fn found(shot: &Capture, place: impl Fn(DVec2) -> DVec2) -> Vec<FoundPoint> {
     let (rows, columns, _) = shot.developed.picture.codes.dim();
     let lattice =
         (-12..=12).flat_map(|down| (-16..=16).map(move |right| DVec2::new(f64::from(right), f64::from(down))));
@@ -97,7 +100,7 @@ fn brightest_about(shot: &Capture, about: DVec2) -> DVec2 {
 }
 
 /// Returns the largest distance of the points from the best affine lattice, pixels, and the largest between channels.
-fn errors_px(points: &[(DVec2, [DVec2; 3])]) -> (f64, f64) {
+fn errors_px(points: &[FoundPoint]) -> (f64, f64) {
     let (mut normal, mut across, mut down) = (DMat3::ZERO, DVec3::ZERO, DVec3::ZERO);
     for (node, places) in points {
         let row = DVec3::new(node.x, node.y, 1.0);
@@ -105,12 +108,12 @@ fn errors_px(points: &[(DVec2, [DVec2; 3])]) -> (f64, f64) {
         (across, down) = (across + row * places[1].x, down + row * places[1].y);
     }
     let (across, down) = (normal.inverse() * across, normal.inverse() * down);
-    let off = |(node, places): &(DVec2, [DVec2; 3])| {
+    let off = |(node, places): &FoundPoint| {
         let row = DVec3::new(node.x, node.y, 1.0);
         places[1].distance(DVec2::new(row.dot(across), row.dot(down)))
     };
-    let apart = |(_, places): &(DVec2, [DVec2; 3])| places[0].distance(places[2]).max(places[0].distance(places[1]));
-    let most = |of: &dyn Fn(&(DVec2, [DVec2; 3])) -> f64| points.iter().map(of).fold(0.0, f64::max);
+    let apart = |(_, places): &FoundPoint| places[0].distance(places[2]).max(places[0].distance(places[1]));
+    let most = |of: &dyn Fn(&FoundPoint) -> f64| points.iter().map(of).fold(0.0, f64::max);
     (most(&off), most(&apart))
 }
 

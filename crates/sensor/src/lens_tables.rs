@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 pub use frame_table::FrameTable;
 pub(crate) use warp::warp;
 
+use self::frame_table::stencils;
 use crate::{SensorError, Tile};
 
 /// Which aberrations of its lens a picture is freed of; [`LensTables`] know them.
@@ -133,13 +134,13 @@ impl LensTables {
     pub(crate) fn even_out(&self, planes: &mut [Array2<f32>], tile: Option<&Tile>) {
         for (number, plane) in planes.iter_mut().enumerate() {
             let (n_rows, n_columns) = plane.dim();
+            let along = stencils(n_columns, self.vignetting[0].nodes().1);
             plane.outer_iter_mut().into_par_iter().enumerate().for_each(|(row, mut values)| {
                 let filters = tile.map_or(std::slice::from_ref(&number), |tile| tile.row(row));
                 let down = (row as f64 + 0.5) / n_rows as f64;
                 let lines: Vec<_> = filters.iter().map(|&filter| self.vignetting[filter].line(down)).collect();
-                for (column, value) in values.iter_mut().enumerate() {
-                    let right = (column as f64 + 0.5) / n_columns as f64;
-                    *value *= lines[column % lines.len()].at(right) as f32;
+                for ((value, stencil), line) in values.iter_mut().zip(&along).zip(lines.iter().cycle()) {
+                    *value *= line.with_stencil(stencil) as f32;
                 }
             });
         }

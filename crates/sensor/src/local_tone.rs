@@ -152,10 +152,15 @@ fn block_means(plane: &Array2<f32>, step: usize) -> Array2<f32> {
     let mut means = Array2::zeros((rows.div_ceil(step), columns.div_ceil(step)));
     means.outer_iter_mut().into_par_iter().enumerate().for_each(|(block_row, mut line)| {
         let from = block_row * step..((block_row + 1) * step).min(rows);
+        let height = from.len();
+        for row in from {
+            let values = plane.row(row);
+            let values = values.as_slice().expect("planes of stops are contiguous");
+            line.iter_mut().zip(values.chunks(step)).for_each(|(sum, block)| *sum += block.iter().sum::<f32>());
+        }
         for (block_column, mean) in line.iter_mut().enumerate() {
-            let across = block_column * step..((block_column + 1) * step).min(columns);
-            let block = plane.slice(ndarray::s![from.clone(), across]);
-            *mean = block.sum() / block.len() as f32;
+            let width = step.min(columns - block_column * step);
+            *mean /= (width * height) as f32;
         }
     });
     means

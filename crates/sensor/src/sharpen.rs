@@ -5,7 +5,7 @@
 //! beyond the range of the neighboring pixels and no farther. All channels are multiplied by the same factor, which keeps their
 //! color.
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1};
 use rayon::prelude::*;
 
 use crate::denoise::SampleNoise;
@@ -42,17 +42,26 @@ pub(crate) fn sharpen(channels: &mut [Array2<f32>], blur_px: f64, of: &Sharpened
     let ranges = ranges_across(&luminance);
     let mut lines = rows_of(channels);
     lines.par_iter_mut().enumerate().for_each(|(row, line)| {
-        for column in 0..columns {
-            let (old, new) = (luminance[(row, column)], sharp[(row, column)]);
-            let detail = new - old;
-            let threshold = DEVIATIONS * noise.deviation(old);
-            let kept = if detail.abs() > threshold { detail - threshold * threshold / detail } else { 0.0 };
-            let about = row.saturating_sub(ABOUT)..(row + ABOUT + 1).min(rows);
-            let [low, high] = about.map(|row| ranges[(row, column)]).fold(NOTHING, wider);
-            let beyond = OVERSHOOT * (high - low);
-            let wanted = (old + kept).clamp(low - beyond, high + beyond);
-            let factor = if old > 0.0 { (wanted / old).clamp(1.0 / MOST_FACTOR, MOST_FACTOR) } else { 1.0 };
-            line.iter_mut().for_each(|plane| plane[column] *= factor);
+        let about = row.saturating_sub(ABOUT)..(row + ABOUT + 1).min(rows);
+        let mut ranges_of_row = vec![NOTHING; columns];
+        for row in about {
+            ranges_of_row.iter_mut().zip(ranges.row(row)).for_each(|(range, beside)| *range = wider(*range, *beside));
+        }
+        let factors: Vec<f32> = luminance
+            .row(row)
+            .iter()
+            .zip(sharp.row(row))
+            .zip(ranges_of_row)
+            .map(|((&old, &new), [low, high])| {
+                let (detail, threshold) = (new - old, DEVIATIONS * noise.deviation(old));
+                let kept = if detail.abs() > threshold { detail - threshold * threshold / detail } else { 0.0 };
+                let beyond = OVERSHOOT * (high - low);
+                let wanted = (old + kept).clamp(low - beyond, high + beyond);
+                if old > 0.0 { (wanted / old).clamp(1.0 / MOST_FACTOR, MOST_FACTOR) } else { 1.0 }
+            })
+            .collect();
+        for plane in line {
+            plane.iter_mut().zip(&factors).for_each(|(value, factor)| *value *= factor);
         }
     });
 }
@@ -88,15 +97,22 @@ fn wider([low, high]: [f32; 2], [other_low, other_high]: [f32; 2]) -> [f32; 2] {
 
 /// Returns the lowest and the highest value about each place of a row.
 fn ranges_across(plane: &Array2<f32>) -> Array2<[f32; 2]> {
-    let columns = plane.ncols();
     let mut ranges = Array2::from_elem(plane.dim(), NOTHING);
     ranges.outer_iter_mut().into_par_iter().zip(plane.outer_iter()).for_each(|(mut to, from)| {
-        for (column, range) in to.iter_mut().enumerate() {
-            let about = column.saturating_sub(ABOUT)..(column + ABOUT + 1).min(columns);
-            *range = about.map(|column| [from[column]; 2]).fold(NOTHING, wider);
-        }
+        let padded = padded(from, ABOUT);
+        let windows = padded.windows(2 * ABOUT + 1);
+        to.iter_mut().zip(windows).for_each(|(range, about)| {
+            *range = about.iter().fold(NOTHING, |range, &v| wider(range, [v, v]));
+        });
     });
     ranges
+}
+
+/// Returns a row that goes on as at its ends, so many places at each.
+fn padded(row: ArrayView1<'_, f32>, reach: usize) -> Vec<f32> {
+    let first = std::iter::repeat_n(row[0], reach);
+    let last = std::iter::repeat_n(row[row.len() - 1], reach);
+    first.chain(row.iter().copied()).chain(last).collect()
 }
 
 /// Returns the taps, −[`REACH`] to [`REACH`], of the regularized inverse of a Gaussian blur: H / (H² + k) over its value at 0, k
@@ -130,14 +146,12 @@ fn detail_noise(taps: &[f32]) -> f32 {
 
 /// Filters each row; beyond the borders it goes on as at them.
 fn filtered_across(plane: &Array2<f32>, taps: &[f32]) -> Array2<f32> {
-    let columns = plane.ncols();
     let mut filtered = Array2::zeros(plane.dim());
     filtered.outer_iter_mut().into_par_iter().zip(plane.outer_iter()).for_each(|(mut to, from)| {
-        let first = std::iter::repeat_n(from[0], REACH);
-        let last = std::iter::repeat_n(from[columns - 1], REACH);
-        let padded: Vec<f32> = first.chain(from.iter().copied()).chain(last).collect();
-        for (to, window) in to.iter_mut().zip(padded.windows(taps.len())) {
-            *to = window.iter().zip(taps).map(|(v, tap)| v * tap).sum();
+        let padded = padded(from, REACH);
+        // Tap by tap, which is vector code.
+        for (i, tap) in taps.iter().enumerate() {
+            to.iter_mut().zip(&padded[i..]).for_each(|(to, v)| *to += tap * v);
         }
     });
     filtered

@@ -49,7 +49,7 @@ impl Value {
 pub(crate) struct Directory {
     fields: BTreeMap<u16, Value>,
     /// Directories to which a field of this number points.
-    children: BTreeMap<u16, Directory>,
+    children: BTreeMap<u16, Self>,
     /// The samples of its image, one strip.
     strip: Option<Vec<u8>>,
 }

@@ -100,23 +100,29 @@ pub(crate) struct FrameLine {
     padded: Vec<f64>,
 }
 
+/// Four padded nodes, by the first of them, and their weights.
+pub(crate) type Stencil = (usize, [f64; 4]);
+
 impl FrameLine {
-    #[inline]
     pub(crate) fn at(&self, right: f64) -> f64 {
-        let (first, weights) = stencil(right, self.columns);
-        (0..4).map(|k| weights[k] * self.padded[first + k]).sum()
+        self.with_stencil(&stencil(right, self.columns))
     }
 
     /// As [`at`](Self::at), with the stencil of the place at hand.
     #[inline]
-    pub(crate) fn with_stencil(&self, (first, weights): (usize, [f64; 4])) -> f64 {
-        (0..4).map(|k| weights[k] * self.padded[first + k]).sum()
+    pub(crate) fn with_stencil(&self, (first, weights): &Stencil) -> f64 {
+        let nodes = &self.padded[*first..*first + 4];
+        weights[0] * nodes[0] + weights[1] * nodes[1] + weights[2] * nodes[2] + weights[3] * nodes[3]
     }
 }
 
-/// Returns the first of four padded nodes about a share of the frame, and their weights.
-#[inline]
-pub(crate) fn stencil(share: f64, n: usize) -> (usize, [f64; 4]) {
+/// Returns the stencils of the middles of so many pixels along a frame of so many nodes.
+pub(crate) fn stencils(n_pixels: usize, n_nodes: usize) -> Vec<Stencil> {
+    (0..n_pixels).map(|i| stencil((i as f64 + 0.5) / n_pixels as f64, n_nodes)).collect()
+}
+
+/// Returns the nodes about a share of the frame.
+fn stencil(share: f64, n: usize) -> Stencil {
     let place = share.clamp(0.0, 1.0) * (n - 1) as f64;
     let below = (place as usize).min(n - 2);
     (below, keys(place - below as f64))

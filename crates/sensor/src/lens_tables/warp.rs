@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     Displacement,
-    frame_table::{keys, stencil},
+    frame_table::{Stencil, keys, stencils},
 };
 
 /// Places so far beyond the frame, pixels, still take the samples at its border; what is farther out is black.
@@ -21,18 +21,23 @@ pub(crate) fn warp(channels: &[Array2<f32>], sources: &[Displacement]) -> Vec<Ar
         let all = plane.as_slice_mut().expect("new planes are contiguous");
         all.chunks_mut(columns).zip(&mut lines).for_each(|(line, row)| row.push(line));
     }
-    lines.into_par_iter().enumerate().for_each(|(row, mut out)| warp_row(row, channels, sources, &mut out));
+    let along = stencils(columns, sources[0][0].nodes().1);
+    lines.into_par_iter().enumerate().for_each(|(row, mut out)| warp_row(row, channels, sources, &along, &mut out));
     warped
 }
 
-fn warp_row(row: usize, channels: &[Array2<f32>], sources: &[Displacement], out: &mut [&mut [f32]]) {
+fn warp_row(
+    row: usize,
+    channels: &[Array2<f32>],
+    sources: &[Displacement],
+    stencils: &[Stencil],
+    out: &mut [&mut [f32]],
+) {
     let (rows, columns) = channels[0].dim();
     let down = (row as f64 + 0.5) / rows as f64;
     let lines: Vec<_> = sources.iter().map(|source| source.each_ref().map(|table| table.line(down))).collect();
-    let (_, n_nodes) = sources[0][0].nodes();
     let mut places = vec![[0.0_f64; 2]; channels.len()];
-    for column in 0..columns {
-        let at = stencil((column as f64 + 0.5) / columns as f64, n_nodes);
+    for (column, at) in stencils.iter().enumerate() {
         let mut is_within = true;
         for (place, [across, along]) in places.iter_mut().zip(&lines) {
             *place = [column as f64 + across.with_stencil(at), row as f64 + along.with_stencil(at)];
@@ -59,11 +64,10 @@ fn sample(plane: &Array2<f32>, x: f64, y: f64) -> f32 {
     let (across, along) = (keys(x - left).map(|w| w as f32), keys(y - top).map(|w| w as f32));
     let (first_column, first_row) = (left as isize - 1, top as isize - 1);
     let (mut sum, mut low, mut high) = (0.0_f32, f32::INFINITY, f32::NEG_INFINITY);
-    let mut add = |four: [f32; 4], weight: f32| {
-        let line: f32 = four.iter().zip(&across).map(|(v, w)| v * w).sum();
-        sum += weight * line;
-        low = four.iter().fold(low, |low, &v| low.min(v));
-        high = four.iter().fold(high, |high, &v| high.max(v));
+    let mut add = |[a, b, c, d]: [f32; 4], weight: f32| {
+        sum += weight * (a * across[0] + b * across[1] + c * across[2] + d * across[3]);
+        low = low.min(a.min(b).min(c.min(d)));
+        high = high.max(a.max(b).max(c.max(d)));
     };
     let is_inside =
         first_column >= 0 && first_row >= 0 && first_column + 4 <= columns as isize && first_row + 4 <= rows as isize;
