@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Highlights, LensCorrections, LensShading,
-    LensTables, LocalTone, Picture, Raw, Sensor, SensorError, ToneCurve, WhiteBalance,
+    LensTables, LocalTone, Picture, Raw, Sensor, SensorError, Tile, ToneCurve, WhiteBalance,
     balance::{gains, light_of_gains},
     defects, demosaic,
     denoise::{SampleNoise, automatic_strength, denoise},
@@ -202,22 +202,13 @@ impl Sensor {
         let processing = processing.under(None);
         let tile = raw.tile.as_ref();
         let n_channels = self.filters.len();
+        let noise = self.sample_noise(raw);
         let mut planes = raw.linear();
         let saturated = match processing.highlights {
             Highlights::Clip => None,
             Highlights::Reconstruct => Saturated::find(&planes, tile, n_channels, self.saturated_from(raw)),
         };
-        if let Some(threshold) = processing.defect_threshold {
-            defects::correct(&mut planes, tile, threshold as f32);
-        }
-        if let Some(shading) = &processing.shading {
-            shading.correct(&mut planes, tile);
-        }
-        let noise = self.sample_noise(raw);
-        let strength = processing.denoise.unwrap_or_else(|| automatic_strength(&noise));
-        if strength > 0.0 {
-            denoise(&mut planes, tile, &vec![noise.clone(); n_channels], strength);
-        }
+        self.clean(&mut planes, tile, &processing, &noise);
         if let Some(lens) = lens.filter(|_| corrections.vignetting) {
             lens.even_out(&mut planes, tile);
         }
@@ -234,16 +225,7 @@ impl Sensor {
             let sources: Vec<_> = (0..n_channels).map(|channel| lens.source_px(channel, corrections)).collect();
             channels = warp(&channels, &sources);
         }
-        let fitted = |light: &Illuminant| {
-            let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
-            ColorMatrix::fit(self, light, &chart)
-        };
-        let color = match &processing.color {
-            ColorCorrection::None => ColorMatrix::identity(n_channels),
-            ColorCorrection::Auto => fitted(&light_of_gains(self, &balance)),
-            ColorCorrection::Fitted(light) => fitted(light),
-            ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), delta_e: Vec::new() },
-        };
+        let color = self.color_matrix(&processing.color, &balance);
         if processing.sharpen_px > 0.0 {
             let share = |channel: usize| color.rows.iter().zip(LUMINANCE).map(|(row, y)| y * row[channel]).sum();
             let luminance: Vec<f64> = (0..n_channels).map(share).collect();
@@ -252,6 +234,34 @@ impl Sensor {
         }
         let Processing { highlights, local_tone, .. } = processing;
         Ok(LinearPicture { light: mix(&channels, &color), highlights, local_tone, balance, color })
+    }
+
+    /// Mends defects, undoes a given fall of light and takes out noise.
+    fn clean(&self, planes: &mut [Array2<f32>], tile: Option<&Tile>, processing: &Processing, noise: &SampleNoise) {
+        if let Some(threshold) = processing.defect_threshold {
+            defects::correct(planes, tile, threshold as f32);
+        }
+        if let Some(shading) = &processing.shading {
+            shading.correct(planes, tile);
+        }
+        let strength = processing.denoise.unwrap_or_else(|| automatic_strength(noise));
+        if strength > 0.0 {
+            denoise(planes, tile, &vec![noise.clone(); self.filters.len()], strength);
+        }
+    }
+
+    /// Returns the matrix from channels that were balanced so to linear sRGB.
+    fn color_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> ColorMatrix {
+        let fitted = |light: &Illuminant| {
+            let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
+            ColorMatrix::fit(self, light, &chart)
+        };
+        match color {
+            ColorCorrection::None => ColorMatrix::identity(self.filters.len()),
+            ColorCorrection::Auto => fitted(&light_of_gains(self, balance)),
+            ColorCorrection::Fitted(light) => fitted(light),
+            ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), delta_e: Vec::new() },
+        }
     }
 
     /// Returns the share of saturation from which on a sample is taken to be saturated: three deviations of noise below it.
@@ -360,7 +370,7 @@ fn needed_tables(corrections: LensCorrections, lens: Option<&LensTables>) -> Res
 }
 
 /// Multiplies each channel by its factor, and clips it at the saturation of the least sensitive where highlights are clipped.
-fn weigh(planes: &mut [Array2<f32>], tile: Option<&crate::Tile>, balance: &[f64], highlights: Highlights) {
+fn weigh(planes: &mut [Array2<f32>], tile: Option<&Tile>, balance: &[f64], highlights: Highlights) {
     let top = if highlights == Highlights::Clip { 1.0 } else { f32::INFINITY };
     for (number, plane) in planes.iter_mut().enumerate() {
         plane.outer_iter_mut().into_par_iter().enumerate().for_each(|(row, mut values)| {

@@ -211,7 +211,7 @@ impl<'a> Geometry<'a> {
     ) -> Result<Self, PipelineError> {
         let center_mm = match &channels.bands[channels.bands.len() / 2] {
             FilmMap::Radial(map) => map.axis_mm(),
-            FilmMap::Plane(_) => DVec2::ZERO,
+            FilmMap::Plane(_) | FilmMap::Shifted(_) => DVec2::ZERO,
         };
         let dark = || PipelineError::Unsuitable {
             what: "lens_corrections",
