@@ -282,6 +282,10 @@ pub(crate) struct FrameArgs {
     /// Aberrations of the simulated lens that are undone: all, none, or of distortion, lateral-color, vignetting [default: none]
     #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
     pub(crate) lens_corrections: Option<String>,
+    /// How channels become colors: auto (a matrix fitted for sensor and light), roots (of their products too: nearer), none
+    /// [default: auto]
+    #[arg(long, value_name = "KIND", help_heading = heading::EXPOSURE)]
+    pub(crate) color: Option<String>,
     /// Undoes a blur of this standard deviation, pixels, as far as noise allows; .5 to .8 for sharp lenses [default: 0]
     #[arg(long, value_name = "S", help_heading = heading::EXPOSURE)]
     pub(crate) sharpen_px: Option<f64>,

@@ -8,7 +8,7 @@ use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 
-use crate::{Exposed, PipelineError, ResolvedLens};
+use crate::{Exposed, PipelineError};
 
 /// What is written besides the picture and the report.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -86,6 +86,17 @@ impl FrameFile {
     }
 }
 
+/// What a raw file says of a lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensFacts<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its f-number at infinity.
+    pub f_number: f64,
+    /// Its focal length, mm.
+    pub focal_length_mm: f64,
+}
+
 /// The frames of one exposure.
 #[derive(Clone)]
 pub struct Frames<'a> {
@@ -102,7 +113,7 @@ pub struct Frames<'a> {
     /// What the lens does to the frame, where the processing undoes some of it.
     pub lens: Option<&'a LensTables>,
     /// The lens, where it is known.
-    pub optics: Option<&'a ResolvedLens>,
+    pub optics: Option<LensFacts<'a>>,
     /// The bands of the irradiance.
     pub grid: &'a WavelengthGrid,
     /// The light on the scene; D65 where it is not known.
@@ -181,12 +192,11 @@ fn write_also(
 
 /// Returns what a DNG file says besides its frame.
 fn dng_details<'a>(frames: &Frames<'a>, picture: &'a Picture) -> DngDetails<'a> {
-    let first = frames.optics.map(|lens| lens.reference.first_order());
     DngDetails {
         light: frames.light.clone(),
-        f_number: first.map(|first| first.f_number),
-        focal_length_mm: first.map(|first| first.efl_mm),
-        lens: frames.optics.map(|lens| lens.lens.name().to_owned()),
+        f_number: frames.optics.map(|lens| lens.f_number),
+        focal_length_mm: frames.optics.map(|lens| lens.focal_length_mm),
+        lens: frames.optics.map(|lens| lens.name.to_owned()),
         picture: Some(picture),
         corrections: frames.lens.map(|tables| (frames.processing.lens_corrections, tables)),
     }

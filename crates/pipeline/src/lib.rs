@@ -37,7 +37,7 @@ pub use camera::{
 };
 pub use capture_files::write_capture;
 pub use error::{PipelineError, SceneLack};
-pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
+pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_bytes, parse_numbers, parse_pairs};
 pub use paintings::PaintingFolder;

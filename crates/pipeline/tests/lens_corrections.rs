@@ -4,8 +4,8 @@
 use dioptric_optics::glam::{DMat3, DVec2, DVec3};
 use dioptric_pipeline::{
     Camera, Capture, Crop, Diffraction, FilmSpec, FlatSize, FocusSpec, KeptCamera, LensSpec, LightFieldSpec,
-    MicroArray, MicroElements, MicroLayout, Movements, Quality, SceneSource, SceneSpec, SensorSpec, Silent, StopSpec,
-    WavelengthSpec,
+    MicroArray, MicroElements, MicroLayout, Movements, Quality, SceneSource, SceneSpec, SenseRequest, SensorSpec,
+    Silent, StopSpec, WavelengthSpec,
 };
 use dioptric_scene::Pattern;
 use dioptric_sensor::{
@@ -137,7 +137,6 @@ fn points_of_a_lattice_lie_on_a_lattice_in_every_channel() {
     let straight = found(&shot, |node| middle + step_px * node);
     assert!(straight.len() > 60, "{}", straight.len());
     let (off_px, apart_px) = errors_px(&straight);
-    println!("corrected: {off_px} {apart_px} of {}", straight.len());
     // A point is one sample of the target, 1.3 pixels wide: where it lies is known to a tenth of a pixel.
     assert!(off_px < 0.15 && apart_px < 0.1, "{off_px} {apart_px}");
     // The middle keeps its scale: that of first order.
@@ -148,7 +147,6 @@ fn points_of_a_lattice_lie_on_a_lattice_in_every_channel() {
     // Without distortion lateral color is left, and the other way about.
     let shot = shoot(LensCorrections { lateral_color: false, ..LensCorrections::ALL });
     let (off_px, apart_px) = errors_px(&found(&shot, |node| middle + step_px * node));
-    println!("distortion alone: {off_px} {apart_px}");
     assert!(off_px < 0.15 && apart_px > 0.2, "{off_px} {apart_px}");
     let shot = shoot(LensCorrections { lateral_color: true, ..LensCorrections::default() });
     let barrel = |node: DVec2| {
@@ -160,7 +158,6 @@ fn points_of_a_lattice_lie_on_a_lattice_in_every_channel() {
     };
     let curved = found(&shot, barrel);
     let (off_px, apart_px) = errors_px(&curved);
-    println!("lateral color alone: {off_px} {apart_px} of {}", curved.len());
     assert!(off_px > 2.0 && apart_px < 0.1, "{off_px} {apart_px}");
 }
 
@@ -179,7 +176,6 @@ fn a_moved_lens_is_straightened_too() {
         let step_px = step_px(&shot);
         let points = found(&shot, |node| middle + step_px * node);
         let (off_px, apart_px) = errors_px(&points);
-        println!("{movements:?}: {off_px} {apart_px} of {}", points.len());
         assert!(points.len() > 20 && off_px < 0.2 && apart_px < 0.1, "{movements:?}: {off_px} {apart_px}");
     }
 }
@@ -204,7 +200,6 @@ fn parts_and_previews_are_those_of_the_whole() {
             worst = worst.max((code - of_whole[(row + 50, column + 10, channel)]).abs());
         }
     }
-    println!("part: worst {worst}, black {n_black}");
     // Tables of the part and of the whole are interpolated between other nodes.
     assert!(worst < 0.03, "{worst}");
     let summary = part.aberrations.as_ref().unwrap().summary;
@@ -242,7 +237,6 @@ fn an_even_plane_is_even() {
     };
     let (plain, even) =
         (shoot(LensCorrections::default()), shoot(LensCorrections { vignetting: true, ..LensCorrections::default() }));
-    println!("{} {}", evenness(&plain), evenness(&even));
     assert!(evenness(&plain) < 0.6);
     assert!(evenness(&even) > 0.99, "{}", evenness(&even));
     let gain = even.aberrations.unwrap().summary.largest_gain;
@@ -261,4 +255,23 @@ fn a_light_field_is_refused() {
     }));
     let message = KeptCamera::new(camera).capture(&Silent, &Cancel::new()).unwrap_err().to_string();
     assert!(message.contains("lens_corrections"), "{message}");
+}
+
+#[test]
+fn irradiance_without_its_lens_is_refused() {
+    let camera = with(&before(Pattern::Uniform), LensCorrections::ALL);
+    let request = SenseRequest {
+        sensor: camera.sensor,
+        pixel_um: None,
+        exposure: camera.exposure,
+        frames: camera.frames,
+        processing: camera.processing,
+        noise: camera.noise,
+        illuminant: None,
+        exit_pupil_mm: None,
+        seed: 1,
+        outputs: camera.outputs,
+    };
+    let message = request.sense(std::path::Path::new("irradiance.exr")).unwrap_err().to_string();
+    assert!(message.starts_with("lens_corrections") && message.contains("--from"), "{message}");
 }

@@ -131,7 +131,7 @@ impl Camera {
     /// burst : int
     /// bracket_stops : list of float
     ///     Several frames, merged.
-    /// white, demosaic, highlights : str
+    /// white, demosaic, highlights, color : str
     /// denoise, sharpen_px : float
     ///     Of the processing.
     /// lens_corrections : str

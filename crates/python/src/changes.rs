@@ -32,12 +32,13 @@ pub(crate) const OF_EXPOSURE: &[&str] = &[
     "denoise",
     "highlights",
     "lens_corrections",
+    "color",
     "sharpen_px",
     "local_tone",
 ];
 /// What changes the picture alone.
 pub(crate) const OF_PICTURE: &[&str] =
-    &["white", "demosaic", "denoise", "highlights", "lens_corrections", "sharpen_px", "local_tone"];
+    &["white", "demosaic", "denoise", "highlights", "lens_corrections", "color", "sharpen_px", "local_tone"];
 /// All changes, in the order in which they are made.
 pub(crate) const ALL: &[&str] = &[
     "name",
@@ -78,6 +79,7 @@ pub(crate) const ALL: &[&str] = &[
     "denoise",
     "highlights",
     "lens_corrections",
+    "color",
     "sharpen_px",
     "local_tone",
     "seed",
@@ -266,6 +268,7 @@ fn set_sensor_option(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -
         "demosaic" => options.demosaic = Some(word(key, value)?),
         "denoise" => options.denoise = Some(number(key, value)?),
         "lens_corrections" => options.lens_corrections = Some(word(key, value)?),
+        "color" => options.color = Some(word(key, value)?),
         "sharpen_px" => options.sharpen_px = Some(number(key, value)?),
         "local_tone" => options.local_tone = Some(word(key, value)?),
         _ => options.highlights = Some(word(key, value)?),

@@ -250,7 +250,7 @@ impl Shot {
     /// Parameters
     /// ----------
     /// seed, exposure_s, analog_gain, noise, burst, bracket_stops, white, demosaic, denoise, highlights, lens_corrections,
-    /// sharpen_px, local_tone
+    /// color, sharpen_px, local_tone
     ///     As of `Camera.with_`.
     ///
     /// Returns
@@ -265,7 +265,7 @@ impl Shot {
     ///
     /// Parameters
     /// ----------
-    /// white, demosaic, denoise, highlights, lens_corrections, sharpen_px, local_tone
+    /// white, demosaic, denoise, highlights, lens_corrections, color, sharpen_px, local_tone
     ///     As of `Camera.with_`.
     ///
     /// Returns

@@ -39,6 +39,7 @@ mod noise;
 mod phases;
 mod photon_transfer;
 mod picture;
+mod plane_rows;
 mod points;
 mod poisson;
 mod process;

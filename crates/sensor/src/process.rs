@@ -9,6 +9,7 @@ use crate::{
     Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Highlights, LensCorrections, LensShading,
     LensTables, LocalTone, Picture, Raw, Sensor, SensorError, Tile, ToneCurve, WhiteBalance,
     balance::{gains, light_of_gains},
+    color::pairs,
     defects, demosaic,
     denoise::{SampleNoise, automatic_strength, denoise},
     hdr::merged_noise,
@@ -110,9 +111,12 @@ impl Processing {
             (other, _) => other.clone(),
         };
         let color = match (&self.color, &white, light) {
-            (ColorCorrection::Auto, WhiteBalance::None, _) => ColorCorrection::None,
+            (ColorCorrection::Auto | ColorCorrection::Roots, WhiteBalance::None, _) => ColorCorrection::None,
             (ColorCorrection::Auto, WhiteBalance::Light(light), _) | (ColorCorrection::Auto, _, Some(light)) => {
                 ColorCorrection::Fitted(light.clone())
+            }
+            (ColorCorrection::Roots, WhiteBalance::Light(light), _) | (ColorCorrection::Roots, _, Some(light)) => {
+                ColorCorrection::FittedRoots(light.clone())
             }
             (other, ..) => other.clone(),
         };
@@ -135,9 +139,6 @@ pub struct LinearPicture {
     /// The matrix from balanced channels to linear sRGB.
     pub color: ColorMatrix,
 }
-
-/// The luminance of linear sRGB (IEC 61966-2-1).
-const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
 /// A picture and what was found out while making it.
 #[derive(Clone, Debug, PartialEq)]
@@ -227,8 +228,7 @@ impl Sensor {
         }
         let color = self.color_matrix(&processing.color, &balance);
         if processing.sharpen_px > 0.0 {
-            let share = |channel: usize| color.rows.iter().zip(LUMINANCE).map(|(row, y)| y * row[channel]).sum();
-            let luminance: Vec<f64> = (0..n_channels).map(share).collect();
+            let luminance = color.luminance_shares(n_channels);
             let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: &noise };
             sharpen(&mut channels, processing.sharpen_px, &of);
         }
@@ -252,15 +252,14 @@ impl Sensor {
 
     /// Returns the matrix from channels that were balanced so to linear sRGB.
     fn color_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> ColorMatrix {
-        let fitted = |light: &Illuminant| {
-            let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
-            ColorMatrix::fit(self, light, &chart)
-        };
+        let chart = || -> Vec<Spectrum> { color_checker_reflectances().into_iter().map(|(_, s)| s).collect() };
         match color {
             ColorCorrection::None => ColorMatrix::identity(self.filters.len()),
-            ColorCorrection::Auto => fitted(&light_of_gains(self, balance)),
-            ColorCorrection::Fitted(light) => fitted(light),
-            ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), delta_e: Vec::new() },
+            ColorCorrection::Auto => ColorMatrix::fit(self, &light_of_gains(self, balance), &chart()),
+            ColorCorrection::Roots => ColorMatrix::fit_roots(self, &light_of_gains(self, balance), &chart()),
+            ColorCorrection::Fitted(light) => ColorMatrix::fit(self, light, &chart()),
+            ColorCorrection::FittedRoots(light) => ColorMatrix::fit_roots(self, light, &chart()),
+            ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), has_roots: false, delta_e: Vec::new() },
         }
     }
 
@@ -304,14 +303,7 @@ impl Sensor {
             return shape("filters of the raw frame", n_channels, raw.filter_names.len());
         }
         processing.white.check(n_channels)?;
-        if let ColorCorrection::Fitted(light) = &processing.color {
-            light.check()?;
-        }
-        if let ColorCorrection::Matrix(rows) = &processing.color
-            && let Some(row) = rows.iter().find(|row| row.len() != n_channels)
-        {
-            return shape("factors in a row of the color matrix", n_channels, row.len());
-        }
+        processing.color.check(n_channels)?;
         let (key, value, right) = match processing.brightness {
             Brightness::AsExposed => ("", 1.0, true),
             Brightness::Factor(factor) => ("brightness.factor", factor, factor > 0.0 && factor.is_finite()),
@@ -388,17 +380,28 @@ fn mix(channels: &[Array2<f32>], color: &ColorMatrix) -> Array3<f32> {
     let rows: [Vec<f32>; 3] = color.rows.each_ref().map(|row| row.iter().map(|&m| m as f32).collect());
     let mut linear = Array3::<f32>::zeros((n_rows, n_columns, 3));
     let lines = linear.as_slice_mut().expect("a new array is contiguous").par_chunks_mut(3 * n_columns);
+    let n_channels = channels.len();
     lines.enumerate().for_each(|(row, line)| {
+        let factors = |term: usize| rows.each_ref().map(|row| row[term]);
         for (channel, plane) in channels.iter().enumerate() {
-            let factors = rows.each_ref().map(|row| row[channel]);
-            for (pixel, &value) in line.chunks_exact_mut(3).zip(plane.row(row)) {
-                pixel[0] += factors[0] * value;
-                pixel[1] += factors[1] * value;
-                pixel[2] += factors[2] * value;
-            }
+            add_term(line, factors(channel), plane.row(row).iter().copied());
+        }
+        for ((i, j), term) in pairs(n_channels).zip(n_channels..).filter(|_| color.has_roots) {
+            let products = channels[i].row(row).into_iter().zip(channels[j].row(row));
+            add_term(line, factors(term), products.map(|(a, b)| (a.max(0.0) * b.max(0.0)).sqrt()));
         }
     });
     linear
+}
+
+/// Adds values times the factors of red, green and blue to a row of pixels.
+#[inline]
+fn add_term(line: &mut [f32], factors: [f32; 3], values: impl Iterator<Item = f32>) {
+    for (pixel, value) in line.chunks_exact_mut(3).zip(values) {
+        pixel[0] += factors[0] * value;
+        pixel[1] += factors[1] * value;
+        pixel[2] += factors[2] * value;
+    }
 }
 
 /// Returns the factor on linear light that a brightness asks for.

@@ -8,7 +8,7 @@
 use ndarray::{Array2, ArrayView1};
 use rayon::prelude::*;
 
-use crate::denoise::SampleNoise;
+use crate::{denoise::SampleNoise, plane_rows::plane_rows};
 
 /// The largest gain along one axis; in the corners of the spectrum the gains of both multiply.
 const MOST_GAIN: f64 = 2.5;
@@ -40,7 +40,7 @@ pub(crate) fn sharpen(channels: &mut [Array2<f32>], blur_px: f64, of: &Sharpened
     let noise = NoiseTable::new(of, detail_noise(&taps));
     let (rows, columns) = luminance.dim();
     let ranges = ranges_across(&luminance);
-    let mut lines = rows_of(channels);
+    let mut lines = plane_rows(channels);
     lines.par_iter_mut().enumerate().for_each(|(row, line)| {
         let about = row.saturating_sub(ABOUT)..(row + ABOUT + 1).min(rows);
         let mut ranges_of_row = vec![NOTHING; columns];
@@ -64,17 +64,6 @@ pub(crate) fn sharpen(channels: &mut [Array2<f32>], blur_px: f64, of: &Sharpened
             plane.iter_mut().zip(&factors).for_each(|(value, factor)| *value *= factor);
         }
     });
-}
-
-/// Returns the rows of all planes: for each row its line in every plane.
-fn rows_of(planes: &mut [Array2<f32>]) -> Vec<Vec<&mut [f32]>> {
-    let (rows, columns) = planes[0].dim();
-    let mut lines: Vec<Vec<&mut [f32]>> = (0..rows).map(|_| Vec::with_capacity(planes.len())).collect();
-    for plane in planes {
-        let all = plane.as_slice_mut().expect("demosaiced planes are contiguous");
-        all.chunks_mut(columns).zip(&mut lines).for_each(|(line, row)| row.push(line));
-    }
-    lines
 }
 
 fn weighted_sum(planes: &[Array2<f32>], weights: &[f64]) -> Array2<f32> {

@@ -1,6 +1,8 @@
 //! What a command line changes of the sensor's frames and of the picture.
 
-use dioptric_sensor::{Demosaic, ExposureControl, Highlights, LensCorrections, LocalTone, NoiseSources, Processing};
+use dioptric_sensor::{
+    ColorCorrection, Demosaic, ExposureControl, Highlights, LensCorrections, LocalTone, NoiseSources, Processing,
+};
 
 use crate::{PipelineError, parse_white, with_analog_gain};
 
@@ -21,6 +23,8 @@ pub struct SensorOptions {
     pub highlights: Option<String>,
     /// Aberrations of the lens that are undone, as [`LensCorrections::parse`] has them.
     pub lens_corrections: Option<String>,
+    /// How channels become colors, as [`ColorCorrection::parse`] has it.
+    pub color: Option<String>,
     /// The blur that is undone, pixels.
     pub sharpen_px: Option<f64>,
     /// Contrast between and within parts, as [`LocalTone::parse`] has it.
@@ -59,6 +63,9 @@ impl SensorOptions {
         }
         if let Some(list) = &self.lens_corrections {
             processing.lens_corrections = LensCorrections::parse(list)?;
+        }
+        if let Some(kind) = &self.color {
+            processing.color = ColorCorrection::parse(kind)?;
         }
         processing.sharpen_px = self.sharpen_px.unwrap_or(processing.sharpen_px);
         if let Some(tone) = &self.local_tone {

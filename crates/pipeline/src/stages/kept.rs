@@ -29,7 +29,9 @@ use super::{
     },
     world::{self, WorldRender},
 };
-use crate::{Camera, Frames, Leftover, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
+use crate::{
+    Camera, Frames, Leftover, LensFacts, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage,
+};
 
 /// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
 const MEMORY_BYTES: u64 = 2 << 30;
@@ -168,6 +170,7 @@ impl Capture {
 
     /// What is written of the frames.
     pub fn frame_parts(&self) -> Frames<'_> {
+        let first = self.lens.reference.first_order();
         Frames {
             sensor: &self.sensor,
             exposure: &self.frames.exposure,
@@ -175,7 +178,11 @@ impl Capture {
             exposed: &self.frames.exposed,
             processing: &self.processing,
             lens: self.aberrations.as_ref().map(|aberrations| &aberrations.tables),
-            optics: Some(&self.lens),
+            optics: Some(LensFacts {
+                name: self.lens.lens.name(),
+                f_number: first.f_number,
+                focal_length_mm: first.efl_mm,
+            }),
             grid: self.grid(),
             light: self.scene.light.as_ref().map_or(Illuminant::D65, |light| light.illuminant.clone()),
         }

@@ -92,6 +92,7 @@ class Camera:
         denoise: float | None = ...,
         highlights: str | None = ...,
         lens_corrections: str | None = ...,
+        color: str | None = ...,
         sharpen_px: float | None = ...,
         local_tone: str | None = ...,
         seed: int | None = ...,
@@ -168,6 +169,7 @@ class Shot:
         denoise: float | None = ...,
         highlights: str | None = ...,
         lens_corrections: str | None = ...,
+        color: str | None = ...,
         sharpen_px: float | None = ...,
         local_tone: str | None = ...,
     ) -> Shot: ...
@@ -179,6 +181,7 @@ class Shot:
         denoise: float | None = ...,
         highlights: str | None = ...,
         lens_corrections: str | None = ...,
+        color: str | None = ...,
         sharpen_px: float | None = ...,
         local_tone: str | None = ...,
     ) -> Shot: ...

@@ -7,6 +7,7 @@ use super::{
     Displacement,
     frame_table::{Stencil, keys, stencils},
 };
+use crate::plane_rows::plane_rows;
 
 /// Places so far beyond the frame, pixels, still take the samples at its border; what is farther out is black.
 const BORDER_PX: f64 = 4.0;
@@ -16,11 +17,7 @@ const BORDER_PX: f64 = 4.0;
 pub(crate) fn warp(channels: &[Array2<f32>], sources: &[Displacement]) -> Vec<Array2<f32>> {
     let (rows, columns) = channels[0].dim();
     let mut warped: Vec<Array2<f32>> = channels.iter().map(|_| Array2::zeros((rows, columns))).collect();
-    let mut lines: Vec<Vec<&mut [f32]>> = (0..rows).map(|_| Vec::with_capacity(channels.len())).collect();
-    for plane in &mut warped {
-        let all = plane.as_slice_mut().expect("new planes are contiguous");
-        all.chunks_mut(columns).zip(&mut lines).for_each(|(line, row)| row.push(line));
-    }
+    let lines = plane_rows(&mut warped);
     let along = stencils(columns, sources[0][0].nodes().1);
     lines.into_par_iter().enumerate().for_each(|(row, mut out)| warp_row(row, channels, sources, &along, &mut out));
     warped
