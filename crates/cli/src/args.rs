@@ -279,6 +279,19 @@ pub(crate) struct FrameArgs {
     /// What becomes of light beyond saturation: clip (channel by channel), reconstruct [default: reconstruct]
     #[arg(long, value_name = "KIND", help_heading = heading::EXPOSURE)]
     pub(crate) highlights: Option<String>,
+    /// Aberrations of the simulated lens that are undone: all, none, or of distortion, lateral-color, vignetting [default: none]
+    #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
+    pub(crate) lens_corrections: Option<String>,
+    /// How channels become colors: auto (a matrix fitted for sensor and light), roots (of their products too: nearer), none
+    /// [default: auto]
+    #[arg(long, value_name = "KIND", help_heading = heading::EXPOSURE)]
+    pub(crate) color: Option<String>,
+    /// Undoes a blur of this standard deviation, pixels, as far as noise allows; .5 to .8 for sharp lenses [default: 0]
+    #[arg(long, value_name = "S", help_heading = heading::EXPOSURE)]
+    pub(crate) sharpen_px: Option<f64>,
+    /// Factors on the contrast between parts of the picture and within them, RANGE or RANGE,DETAIL, as 0.6,1.2 [default: 1,1]
+    #[arg(long, value_name = "TONE", help_heading = heading::EXPOSURE)]
+    pub(crate) local_tone: Option<String>,
 }
 
 /// What diffraction to compute.

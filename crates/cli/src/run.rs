@@ -267,6 +267,10 @@ pub(crate) fn sensor_options(arguments: &FrameArgs) -> SensorOptions {
         demosaic: arguments.demosaic.clone(),
         denoise: arguments.denoise,
         highlights: arguments.highlights.clone(),
+        lens_corrections: arguments.lens_corrections.clone(),
+        color: arguments.color.clone(),
+        sharpen_px: arguments.sharpen_px,
+        local_tone: arguments.local_tone.clone(),
     }
 }
 

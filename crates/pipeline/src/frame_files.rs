@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use dioptric_scene::write_planes_exr;
-use dioptric_sensor::{Depth, ElectronRate, Exposure, Picture, Processing, Raw, Sensor};
+use dioptric_sensor::{Depth, DngDetails, ElectronRate, Exposure, LensTables, Picture, Processing, Raw, Sensor};
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
@@ -86,6 +86,17 @@ impl FrameFile {
     }
 }
 
+/// What a raw file says of a lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensFacts<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its f-number at infinity.
+    pub f_number: f64,
+    /// Its focal length, mm.
+    pub focal_length_mm: f64,
+}
+
 /// The frames of one exposure.
 #[derive(Clone)]
 pub struct Frames<'a> {
@@ -99,6 +110,10 @@ pub struct Frames<'a> {
     pub exposed: &'a Exposed,
     /// From the raw frame to the picture.
     pub processing: &'a Processing,
+    /// What the lens does to the frame, where the processing undoes some of it.
+    pub lens: Option<&'a LensTables>,
+    /// The lens, where it is known.
+    pub optics: Option<LensFacts<'a>>,
     /// The bands of the irradiance.
     pub grid: &'a WavelengthGrid,
     /// The light on the scene; D65 where it is not known.
@@ -156,7 +171,7 @@ fn write_also(
         }
         FrameFile::RawTiff => write_raw(&frames.exposed.raw, "tiff", folder),
         FrameFile::RawDng => {
-            frames.sensor.write_dng(&frames.exposed.raw, &frames.light, &folder.join("raw.dng"))?;
+            frames.sensor.write_dng(&frames.exposed.raw, &dng_details(frames, picture), &folder.join("raw.dng"))?;
             Ok(vec!["raw.dng".to_owned()])
         }
         FrameFile::PicturePng16 => write_picture("picture-16.png", Depth::Sixteen),
@@ -164,13 +179,26 @@ fn write_also(
         FrameFile::PictureTiff16 => write_picture("picture-16.tiff", Depth::Sixteen),
         FrameFile::PictureExr => {
             // Developed once more, because the picture holds codes.
-            let light = frames.sensor.develop_linear(frames.exposed.developed_from(), frames.processing)?;
+            let (raw, processing) = (frames.exposed.developed_from(), frames.processing);
+            let light = frames.sensor.develop_linear_with(raw, processing, frames.lens)?;
             let light = light.bright(frames.processing.brightness);
             let planes: Vec<Array2<f32>> = (0..3).map(|k| light.index_axis(Axis(2), k).to_owned()).collect();
             let named: Vec<(&str, &Array2<f32>)> = ["R", "G", "B"].into_iter().zip(&planes).collect();
             write_planes_exr(&folder.join("picture.exr"), &named, true)?;
             Ok(vec!["picture.exr".to_owned()])
         }
+    }
+}
+
+/// Returns what a DNG file says besides its frame.
+fn dng_details<'a>(frames: &Frames<'a>, picture: &'a Picture) -> DngDetails<'a> {
+    DngDetails {
+        light: frames.light.clone(),
+        f_number: frames.optics.map(|lens| lens.f_number),
+        focal_length_mm: frames.optics.map(|lens| lens.focal_length_mm),
+        lens: frames.optics.map(|lens| lens.name.to_owned()),
+        picture: Some(picture),
+        corrections: frames.lens.map(|tables| (frames.processing.lens_corrections, tables)),
     }
 }
 

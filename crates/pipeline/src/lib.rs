@@ -37,7 +37,7 @@ pub use camera::{
 };
 pub use capture_files::write_capture;
 pub use error::{PipelineError, SceneLack};
-pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
+pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_bytes, parse_numbers, parse_pairs};
 pub use paintings::PaintingFolder;
@@ -49,8 +49,8 @@ pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
 pub use staged::{Leftover, Staged, write_file, write_json};
 pub use stages::{
-    Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance, IrradianceSummary,
-    KeptCamera, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts,
-    WorldRender, write_seen_png,
+    AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,
+    IrradianceSummary, KeptCamera, LensAberrations, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene,
+    Resumed, SceneSummary, StageCounts, WorldRender, write_seen_png,
 };
 pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

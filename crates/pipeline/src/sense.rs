@@ -69,6 +69,8 @@ impl Sensed {
             rate: &self.rate,
             exposed: &self.frames.exposed,
             processing: &self.processing,
+            lens: None,
+            optics: None,
             light: self.light.clone(),
             grid: &self.grid,
         }
@@ -82,8 +84,14 @@ impl SenseRequest {
     /// that does not has one sample a pixel.
     ///
     /// # Errors
-    /// When the image cannot be read or is no irradiance, the sensor is unknown, or an exposure cannot be metered.
+    /// When the image cannot be read or is no irradiance, the sensor is unknown, an exposure cannot be metered, or the picture of a
+    /// lens is to be corrected, which is not known here.
     pub fn sense(&self, image: &Path) -> Result<Sensed, PipelineError> {
+        if !self.processing.lens_corrections.is_none() {
+            let reason = "need the lens, which a file of irradiance does not hold, expected `dioptric run`, with --from and its \
+                          folder for a picture that is there";
+            return Err(PipelineError::Unsuitable { what: "lens_corrections", reason: reason.to_owned() });
+        }
         let sensor = self.sensor.open()?;
         let sensor = match self.pixel_um {
             Some(pixel_pitch_um) => Sensor { pixel_pitch_um, ..sensor },

@@ -131,8 +131,13 @@ impl Camera {
     /// burst : int
     /// bracket_stops : list of float
     ///     Several frames, merged.
-    /// white, demosaic, highlights : str
+    /// white, demosaic, highlights, color : str
+    /// denoise, sharpen_px : float
     ///     Of the processing.
+    /// lens_corrections : str
+    ///     Aberrations of the lens that are undone: "all", "none", or of "distortion,lateral-color,vignetting".
+    /// local_tone : str
+    ///     Factors on the contrast between parts of the picture and within them: "0.6" or "0.6,1.2".
     /// seed : int
     /// name : str
     #[pyo3(signature = (**changes))]

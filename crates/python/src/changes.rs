@@ -20,10 +20,25 @@ use crate::{
 };
 
 /// What changes the frames and what comes after, but not the light on the sensor.
-pub(crate) const OF_EXPOSURE: &[&str] =
-    &["seed", "exposure_s", "analog_gain", "noise", "burst", "bracket_stops", "white", "demosaic", "highlights"];
+pub(crate) const OF_EXPOSURE: &[&str] = &[
+    "seed",
+    "exposure_s",
+    "analog_gain",
+    "noise",
+    "burst",
+    "bracket_stops",
+    "white",
+    "demosaic",
+    "denoise",
+    "highlights",
+    "lens_corrections",
+    "color",
+    "sharpen_px",
+    "local_tone",
+];
 /// What changes the picture alone.
-pub(crate) const OF_PICTURE: &[&str] = &["white", "demosaic", "highlights"];
+pub(crate) const OF_PICTURE: &[&str] =
+    &["white", "demosaic", "denoise", "highlights", "lens_corrections", "color", "sharpen_px", "local_tone"];
 /// All changes, in the order in which they are made.
 pub(crate) const ALL: &[&str] = &[
     "name",
@@ -61,7 +76,12 @@ pub(crate) const ALL: &[&str] = &[
     "bracket_stops",
     "white",
     "demosaic",
+    "denoise",
     "highlights",
+    "lens_corrections",
+    "color",
+    "sharpen_px",
+    "local_tone",
     "seed",
 ];
 
@@ -246,6 +266,11 @@ fn set_sensor_option(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -
         "noise" => options.noise = Some(word(key, value)?),
         "white" => options.white = Some(word(key, value)?),
         "demosaic" => options.demosaic = Some(word(key, value)?),
+        "denoise" => options.denoise = Some(number(key, value)?),
+        "lens_corrections" => options.lens_corrections = Some(word(key, value)?),
+        "color" => options.color = Some(word(key, value)?),
+        "sharpen_px" => options.sharpen_px = Some(number(key, value)?),
+        "local_tone" => options.local_tone = Some(word(key, value)?),
         _ => options.highlights = Some(word(key, value)?),
     }
     options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing).map_err(exception)

@@ -249,7 +249,8 @@ impl Shot {
     ///
     /// Parameters
     /// ----------
-    /// seed, exposure_s, analog_gain, noise, burst, bracket_stops, white, demosaic, highlights
+    /// seed, exposure_s, analog_gain, noise, burst, bracket_stops, white, demosaic, denoise, highlights, lens_corrections,
+    /// color, sharpen_px, local_tone
     ///     As of `Camera.with_`.
     ///
     /// Returns
@@ -264,7 +265,7 @@ impl Shot {
     ///
     /// Parameters
     /// ----------
-    /// white, demosaic, highlights
+    /// white, demosaic, denoise, highlights, lens_corrections, color, sharpen_px, local_tone
     ///     As of `Camera.with_`.
     ///
     /// Returns

@@ -1,4 +1,5 @@
-"""Opens the DNG files that a test writes with two independent readers, LibRaw (rawpy) and tifffile.
+"""Opens the DNG files that a test writes with two independent readers, LibRaw (rawpy) and tifffile, and has ExifTool validate
+them where it is installed.
 
     DIOPTRIC_DNG_FOLDER=/some/folder cargo test -p dioptric-sensor --test shots frames_for_other_readers
     pip install rawpy tifffile pillow numpy
@@ -11,6 +12,8 @@ the levels and the matrices right, and the mosaic not at all, so that mosaic is 
 result of the last run is in check_dng.txt.
 """
 
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -62,6 +65,19 @@ def check_tags(name, folder, numbers, tile):
     return tags
 
 
+def validate(folder):
+    """ExifTool's word on each file, which must be that it is right."""
+    if shutil.which("exiftool") is None:
+        print("no exiftool: not validated")
+        return
+    files = sorted(folder.glob("*.dng"))
+    words = subprocess.run(["exiftool", "-s3", "-validate", *map(str, files)], capture_output=True, text=True, check=True)
+    found = [line for line in words.stdout.splitlines() if line and not line.startswith("=")]
+    assert len([word for word in found if word == "OK"]) == len(files), words.stdout
+    version = subprocess.run(["exiftool", "-ver"], capture_output=True, text=True, check=True).stdout.strip()
+    print(f"exiftool {version} -validate: {len(files)} files without warnings")
+
+
 def main(folder):
     for name, (bits, black, tile, has_hues) in SENSORS.items():
         numbers = numbers_of(folder, name)
@@ -103,4 +119,5 @@ def main(folder):
 
 
 print(f"rawpy {rawpy.__version__} (LibRaw {'.'.join(map(str, rawpy.libraw_version))}), tifffile {tifffile.__version__}")
+validate(Path(sys.argv[1]))
 main(Path(sys.argv[1]))

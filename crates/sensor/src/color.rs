@@ -4,7 +4,7 @@ use dioptric_spectrum::{Illuminant, Lab, Observer, Spectrum, Xyz, adapt_bradford
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Sensor,
+    Sensor, SensorError,
     balance::{fine_grid, white_response},
     least_squares::Normal,
 };
@@ -20,18 +20,80 @@ pub enum ColorCorrection {
     Auto,
     /// The first three channels are taken as red, green and blue; one channel alone is gray.
     None,
+    /// As `Auto`, of the channels and the square roots of their products: nearer to the observer's colors than a matrix can come, at
+    /// every exposure alike. For three or four channels; noise grows a little more.
+    Roots,
     /// A matrix fitted to the sensor, the 1931 observer and the 24-patch chart under this light.
     Fitted(Illuminant),
+    /// The same of the channels and the square roots of their products.
+    FittedRoots(Illuminant),
     /// Three rows, one for each of linear red, green and blue, of one factor a (balanced) channel.
     Matrix([Vec<f64>; 3]),
+}
+
+impl ColorCorrection {
+    /// Returns the correction of a name: `auto`, `roots` or `none`.
+    ///
+    /// # Errors
+    /// When the name is another.
+    pub fn parse(name: &str) -> Result<Self, SensorError> {
+        match name.to_ascii_lowercase().as_str() {
+            "auto" => Ok(Self::Auto),
+            "roots" => Ok(Self::Roots),
+            "none" => Ok(Self::None),
+            _ => Err(SensorError::Word {
+                what: "a color correction",
+                found: name.to_owned(),
+                expected: "auto, roots, none".to_owned(),
+            }),
+        }
+    }
+
+    /// Checks that the correction can be had for so many channels.
+    pub(crate) fn check(&self, n_channels: usize) -> Result<(), SensorError> {
+        let (rows, light) = match self {
+            Self::Auto | Self::None => return Ok(()),
+            Self::Fitted(light) => return Ok(light.check()?),
+            Self::Roots => (None, None),
+            Self::FittedRoots(light) => (None, Some(light)),
+            Self::Matrix(rows) => (Some(rows), None),
+        };
+        light.map_or(Ok(()), Illuminant::check)?;
+        let found = match rows {
+            Some(rows) => rows.iter().map(Vec::len).find(|n| *n != n_channels),
+            None if (3..=4).contains(&n_channels) => None,
+            None => {
+                let reason = format!("needs three or four channels, but the sensor has {n_channels}");
+                return Err(SensorError::Unsuitable { what: "color: Roots", reason });
+            }
+        };
+        match found {
+            Some(found) => Err(SensorError::Shape {
+                what: "factors in a row of the color matrix",
+                expected: n_channels.to_string(),
+                found: found.to_string(),
+            }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Returns the pairs of different channels, in the order in which rows have factors for their roots.
+pub(crate) fn pairs(n_channels: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n_channels).flat_map(move |i| (i + 1..n_channels).map(move |j| (i, j)))
 }
 
 /// A matrix from balanced channels to linear sRGB, and how well it does.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ColorMatrix {
-    /// For linear red, green and blue the factor of each channel. Rows of a fitted matrix sum to 1, so that what is
-    /// balanced stays neutral.
+    /// For linear red, green and blue the factor of each channel, and where [`has_roots`](Self::has_roots) those of the square roots of
+    /// the products of each two (the first with each later one, then the second, …). Rows of a fitted matrix sum to 1, so that
+    /// what is balanced stays neutral.
     pub rows: [Vec<f64>; 3],
+    /// Whether roots have factors (Finlayson, Mackiewicz & Hurlbert, "Color correction using root-polynomial regression", IEEE
+    /// Trans. Image Process. 24, 2015): unlike products they grow as light does, so that exposure changes no color.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub has_roots: bool,
     /// ΔE₀₀ of each training color; empty where the matrix was not fitted.
     pub delta_e: Vec<f64>,
 }
@@ -40,7 +102,7 @@ impl ColorMatrix {
     /// Returns the matrix that takes the first three channels, or a single one, as they are.
     pub fn identity(n_channels: usize) -> Self {
         let row = |i: usize| (0..n_channels).map(|j| f64::from(u8::from(j == i.min(n_channels - 1)))).collect();
-        Self { rows: [row(0), row(1), row(2)], delta_e: Vec::new() }
+        Self { rows: [row(0), row(1), row(2)], has_roots: false, delta_e: Vec::new() }
     }
 
     /// Returns the matrix fitted to a sensor and reflectances under a light.
@@ -49,15 +111,39 @@ impl ColorMatrix {
     /// moved from the light's white to that of sRGB (Bradford). The sum of squared differences is minimized, in
     /// lightness, chroma and hue with the weights of chroma that ΔE₀₀ has, starting from the best linear fit.
     pub fn fit(sensor: &Sensor, light: &Illuminant, reflectances: &[Spectrum]) -> Self {
-        let training = Training::new(sensor, light, reflectances);
-        let n_channels = sensor.filters.len();
+        Self::fitted(&Training::new(sensor, light, reflectances), false)
+    }
+
+    /// Returns such a matrix of the channels and the roots of their products.
+    pub fn fit_roots(sensor: &Sensor, light: &Illuminant, reflectances: &[Spectrum]) -> Self {
+        let mut training = Training::new(sensor, light, reflectances);
+        training.channels = training.channels.iter().map(|channels| with_roots(channels)).collect();
+        Self::fitted(&training, true)
+    }
+
+    fn fitted(training: &Training, has_roots: bool) -> Self {
+        let n_terms = training.channels[0].len();
         let mut parameters = training.linear_fit();
-        if n_channels > 1 {
+        if n_terms > 1 {
             training.refine(&mut parameters);
         }
-        let rows = rows_of(&parameters, n_channels);
-        let delta_e = (0..reflectances.len()).map(|i| training.delta_e(&rows, i)).collect();
-        Self { rows, delta_e }
+        let rows = rows_of(&parameters, n_terms);
+        let delta_e = (0..training.rgb.len()).map(|i| training.delta_e(&rows, i)).collect();
+        Self { rows, has_roots, delta_e }
+    }
+
+    /// Returns the share of each channel in luminance, near gray: there a root changes by half as much as each of its channels.
+    pub(crate) fn luminance_shares(&self, n_channels: usize) -> Vec<f64> {
+        let terms = self.rows[0].len();
+        // The luminance of linear sRGB (IEC 61966-2-1).
+        let share = |term: usize| self.rows.iter().zip([0.2126, 0.7152, 0.0722]).map(|(row, y)| y * row[term]).sum();
+        let mut shares: Vec<f64> = (0..n_channels).map(share).collect();
+        for ((i, j), term) in pairs(n_channels).zip(n_channels..terms) {
+            let half: f64 = 0.5 * share(term);
+            shares[i] += half;
+            shares[j] += half;
+        }
+        shares
     }
 
     /// The mean ΔE₀₀ of the training colors, or `None` where the matrix was not fitted.
@@ -68,8 +154,14 @@ impl ColorMatrix {
 
     /// Returns linear sRGB of balanced channels.
     pub fn apply(&self, channels: &[f64]) -> [f64; 3] {
-        apply(&self.rows, channels)
+        if self.has_roots { apply(&self.rows, &with_roots(channels)) } else { apply(&self.rows, channels) }
     }
+}
+
+/// Returns channels with the square roots of their products; what is below 0 counts as 0 there.
+fn with_roots(channels: &[f64]) -> Vec<f64> {
+    let roots = pairs(channels.len()).map(|(i, j)| (channels[i].max(0.0) * channels[j].max(0.0)).sqrt());
+    channels.iter().copied().chain(roots).collect()
 }
 
 fn apply(rows: &[Vec<f64>; 3], channels: &[f64]) -> [f64; 3] {
@@ -231,6 +323,52 @@ mod tests {
             for row in &matrix.rows {
                 assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             }
+        }
+    }
+
+    #[test]
+    fn roots_come_nearer_and_keep_grays_and_exposure() {
+        for (name, light, most) in [("imx363", Illuminant::A, 2.0), ("nikon-d5100", Illuminant::D65, 1.1)] {
+            let sensor = Sensor::built_in(name).unwrap();
+            let (matrix, roots) =
+                (ColorMatrix::fit(&sensor, &light, &chart()), ColorMatrix::fit_roots(&sensor, &light, &chart()));
+            let (of_matrix, of_roots) = (matrix.mean_delta_e().unwrap(), roots.mean_delta_e().unwrap());
+            assert!(of_roots < most && of_roots < of_matrix, "{name}: {of_matrix} {of_roots}");
+            assert_eq!(roots.rows[0].len(), 6);
+            for gray in [0.02, 0.4] {
+                assert!(roots.apply(&[gray; 3]).iter().all(|v| (v - gray).abs() < 1e-12));
+            }
+            let color = [0.3, 0.2, 0.05];
+            for (once, twice) in roots.apply(&color).iter().zip(roots.apply(&color.map(|v| 2.0 * v))) {
+                assert!((2.0 * once - twice).abs() < 1e-12);
+            }
+            assert!((roots.luminance_shares(3).iter().sum::<f64>() - 1.0).abs() < 1e-9);
+        }
+    }
+
+    /// The mean ΔE₀₀ of patches that the fit did not see, each left out of one.
+    fn unseen_delta_e(
+        sensor: &Sensor,
+        light: &Illuminant,
+        fit: fn(&Sensor, &Illuminant, &[Spectrum]) -> ColorMatrix,
+    ) -> f64 {
+        let all = Training::new(sensor, light, &chart());
+        let unseen = |left_out: usize| {
+            let mut others = chart();
+            others.remove(left_out);
+            let seen = fit(sensor, light, &others).apply(&all.channels[left_out]);
+            delta_e_2000(lab_of(seen), all.lab[left_out])
+        };
+        (0..24).map(unseen).sum::<f64>() / 24.0
+    }
+
+    #[test]
+    fn roots_come_nearer_to_colors_they_were_not_fitted_to() {
+        for (name, light, most) in [("imx363", Illuminant::A, 1.9), ("nikon-d5100", Illuminant::D65, 1.1)] {
+            let sensor = Sensor::built_in(name).unwrap();
+            let of_matrix = unseen_delta_e(&sensor, &light, ColorMatrix::fit);
+            let of_roots = unseen_delta_e(&sensor, &light, ColorMatrix::fit_roots);
+            assert!(of_roots < most && of_roots < of_matrix, "{name}: {of_matrix} {of_roots}");
         }
     }
 

@@ -42,6 +42,12 @@ impl SampleNoise {
         }
     }
 
+    /// Returns the standard deviation of a sample.
+    pub(crate) fn deviation(&self, sample: f32) -> f32 {
+        const BY: f32 = 1e-3;
+        2.0 * BY / (self.stabilized(sample + BY) - self.stabilized(sample - BY)).max(f32::MIN_POSITIVE)
+    }
+
     /// Returns the sample of a value on that scale; the mean comes out unbiased above a few electrons.
     fn unstabilized(&self, value: f32) -> f32 {
         match self {

@@ -1,32 +1,44 @@
 //! Raw frames as DNG files (Adobe Digital Negative 1.4), which raw converters open.
 
-use std::{io::Cursor, path::Path};
+mod color;
+mod opcodes;
+mod tiff_file;
+
+use std::path::Path;
 
 use dioptric_spectrum::Illuminant;
-use tiff::{
-    encoder::{
-        Rational, SRational, TiffEncoder,
-        colortype::{ColorType, Gray16, RGB16},
-    },
-    tags::Tag,
-};
 
+use self::{
+    color::{camera_from_xyz, color_codes, plane_order, xyz_d50_from_balanced},
+    opcodes::opcode_list_3,
+    tiff_file::{Directory, Value},
+};
 use crate::{
-    Raw, RawPlane, Sensor, SensorError,
+    LensCorrections, LensTables, Picture, Raw, RawPlane, Sensor, SensorError,
     balance::white_response,
-    dng_color::{camera_from_xyz, color_codes, plane_order},
     files::{write_beside_and_rename, write_error},
 };
 
 const NEW_SUBFILE_TYPE: u16 = 254;
+const IMAGE_WIDTH: u16 = 256;
+const IMAGE_LENGTH: u16 = 257;
+const BITS_PER_SAMPLE: u16 = 258;
+const COMPRESSION: u16 = 259;
 const PHOTOMETRIC_INTERPRETATION: u16 = 262;
 const MAKE: u16 = 271;
 const MODEL: u16 = 272;
 const ORIENTATION: u16 = 274;
+const SAMPLES_PER_PIXEL: u16 = 277;
+const ROWS_PER_STRIP: u16 = 278;
+const X_RESOLUTION: u16 = 282;
+const Y_RESOLUTION: u16 = 283;
+const PLANAR_CONFIGURATION: u16 = 284;
+const RESOLUTION_UNIT: u16 = 296;
 const SOFTWARE: u16 = 305;
+const SUB_DIRECTORIES: u16 = 330;
 const CFA_REPEAT_PATTERN_DIM: u16 = 33421;
 const CFA_PATTERN: u16 = 33422;
-const EXPOSURE_TIME: u16 = 33434;
+const EXIF_DIRECTORY: u16 = 34665;
 const DNG_VERSION: u16 = 50706;
 const DNG_BACKWARD_VERSION: u16 = 50707;
 const UNIQUE_CAMERA_MODEL: u16 = 50708;
@@ -40,8 +52,21 @@ const COLOR_MATRIX_2: u16 = 50722;
 const AS_SHOT_NEUTRAL: u16 = 50728;
 const CALIBRATION_ILLUMINANT_1: u16 = 50778;
 const CALIBRATION_ILLUMINANT_2: u16 = 50779;
+const FORWARD_MATRIX_1: u16 = 50964;
+const FORWARD_MATRIX_2: u16 = 50965;
+const OPCODE_LIST_3: u16 = 51022;
+const NOISE_PROFILE: u16 = 51041;
+
+/// Fields of the Exif directory (Exif 2.32).
+const EXPOSURE_TIME: u16 = 33434;
+const F_NUMBER: u16 = 33437;
+const PHOTOGRAPHIC_SENSITIVITY: u16 = 34855;
+const EXIF_VERSION: u16 = 36864;
+const FOCAL_LENGTH: u16 = 37386;
+const LENS_MODEL: u16 = 42036;
 
 /// Values of the tag `PhotometricInterpretation`.
+const RGB: u16 = 2;
 const COLOR_FILTER_ARRAY: u16 = 32803;
 const LINEAR_RAW: u16 = 34892;
 /// Values of the calibration illuminants (EXIF light sources).
@@ -49,36 +74,68 @@ const STANDARD_LIGHT_A: u16 = 17;
 const D65: u16 = 21;
 /// The code of no light after a linearization table; room below it for noise.
 const LINEARIZED_BLACK: f64 = 4096.0;
+/// The longest side of a preview, pixels.
+const PREVIEW_PX: usize = 512;
+
+/// What a DNG file says besides the frame; what is not known is left out of it.
+#[derive(Clone, Debug)]
+pub struct DngDetails<'a> {
+    /// The light whose white the file states as neutral.
+    pub light: Illuminant,
+    /// The f-number of the lens.
+    pub f_number: Option<f64>,
+    /// Its focal length, mm.
+    pub focal_length_mm: Option<f64>,
+    /// Its name.
+    pub lens: Option<String>,
+    /// The developed picture, shown small by programs that list files.
+    pub picture: Option<&'a Picture>,
+    /// What readers may undo of the lens, and the tables by which.
+    pub corrections: Option<(LensCorrections, &'a LensTables)>,
+}
+
+impl DngDetails<'_> {
+    /// Nothing but the light.
+    pub fn of_light(light: Illuminant) -> Self {
+        Self { light, f_number: None, focal_length_mm: None, lens: None, picture: None, corrections: None }
+    }
+}
 
 impl Sensor {
-    /// Writes a frame as DNG: its digital numbers with mosaic, levels, color matrices for A and D65, and the neutral of
-    /// `light`.
+    /// Writes a frame as DNG: its digital numbers with mosaic, levels, noise, color matrices for A and D65, and the neutral of
+    /// a light.
     ///
     /// A single filter and stacked filters are written without a mosaic (`LinearRaw`); a response that is not a straight
-    /// line goes with a table that undoes it.
+    /// line goes with a table that undoes it. With a picture the first directory is a preview, and the frame in a directory
+    /// below it. The ISO speed is that of the sensor's data sheet, or else 78 lx s over the exposure that saturates.
     ///
     /// # Errors
     /// When the frame is in volts, or its filters are not one, three, or (in a mosaic) four of R, G, B, C, M, Y and W, or
-    /// the tile is too large; or the file cannot be written; then there is no file.
-    pub fn write_dng(&self, raw: &Raw, light: &Illuminant, path: &Path) -> Result<(), SensorError> {
+    /// the tile is too large; the corrections are those of another frame or no function of the distance from a center; or the
+    /// file cannot be written; then there is no file.
+    pub fn write_dng(&self, raw: &Raw, details: &DngDetails<'_>, path: &Path) -> Result<(), SensorError> {
         raw.check()?;
         let planes: Option<Vec<_>> = raw.planes.iter().map(RawPlane::dn).collect();
         let planes = planes.ok_or_else(|| raw.without_numbers("a DNG file"))?;
-        let tags = Tags { sensor: self, raw, light, colors: color_codes(raw)? };
         let (rows, columns) = raw.size();
-        let codes: Vec<u16> = match planes.as_slice() {
-            [plane] => plane.iter().copied().collect(),
+        let codes: Vec<u8> = match planes.as_slice() {
+            [plane] => plane.iter().flat_map(|dn| dn.to_le_bytes()).collect(),
             planes => (0..rows * columns)
-                .flat_map(|i| planes.iter().map(move |plane| plane[(i / columns, i % columns)]))
+                .flat_map(|i| planes.iter().flat_map(move |plane| plane[(i / columns, i % columns)].to_le_bytes()))
                 .collect(),
         };
-        let mut bytes = Cursor::new(Vec::new());
-        let written = match planes.len() {
-            1 => tags.encode::<Gray16>(&mut bytes, &codes),
-            _ => tags.encode::<RGB16>(&mut bytes, &codes),
-        };
-        written.map_err(|e| write_error(path, e))?;
-        write_beside_and_rename(path, bytes.get_ref())
+        let tags = Tags { sensor: self, raw, details, colors: color_codes(raw)? };
+        let too_large = || write_error(path, "the frame is larger than a file of this kind can be, 4 GiB");
+        let file = tags.directory(codes)?.into_file().ok_or_else(too_large)?;
+        write_beside_and_rename(path, &file)
+    }
+
+    /// Returns the ISO speed of an exposure: that of the data sheet, or else the saturation-based one.
+    fn iso_speed(&self, raw: &Raw, light: &Illuminant) -> f64 {
+        match self.iso_at_unity_gain {
+            Some(iso) => iso * raw.exposure.analog_gain,
+            None => self.iso_by_saturation(light, &raw.exposure),
+        }
     }
 }
 
@@ -86,54 +143,94 @@ impl Sensor {
 struct Tags<'a> {
     sensor: &'a Sensor,
     raw: &'a Raw,
-    light: &'a Illuminant,
+    details: &'a DngDetails<'a>,
     /// The number that DNG has for each filter; empty for a monochrome sensor.
     colors: Vec<u8>,
 }
 
 impl Tags<'_> {
-    fn encode<C: ColorType<Inner = u16>>(
-        &self,
-        bytes: &mut Cursor<Vec<u8>>,
-        codes: &[u16],
-    ) -> Result<(), tiff::TiffError> {
-        let (rows, columns) = self.raw.size();
-        let mut encoder = TiffEncoder::new(bytes)?;
-        let mut image = encoder.new_image::<C>(columns as u32, rows as u32)?;
-        self.write(image.encoder())?;
-        image.write_data(codes)
+    /// Returns the first directory: of the preview with that of the frame below it, or of the frame.
+    fn directory(&self, codes: Vec<u8>) -> Result<Directory, SensorError> {
+        let mut frame = Directory::default();
+        self.write_frame(&mut frame, codes)?;
+        let mut first = match self.details.picture {
+            Some(picture) => {
+                let mut preview = preview(picture);
+                preview.set_child(SUB_DIRECTORIES, frame);
+                preview
+            }
+            None => frame,
+        };
+        self.write_camera(&mut first);
+        first.set_child(EXIF_DIRECTORY, self.exif());
+        Ok(first)
     }
 
-    fn write<W: std::io::Write + std::io::Seek>(
-        &self,
-        directory: &mut tiff::encoder::DirectoryEncoder<'_, W, tiff::encoder::TiffKindStandard>,
-    ) -> Result<(), tiff::TiffError> {
+    /// Writes what is of the camera: in the first directory.
+    fn write_camera(&self, first: &mut Directory) {
+        let model = &self.sensor.name;
+        first.set(MAKE, Value::Ascii("dioptric".to_owned()));
+        first.set(MODEL, Value::Ascii(model.clone()));
+        first.set(ORIENTATION, Value::Short(vec![1]));
+        first.set(X_RESOLUTION, Value::Rational(vec![(72, 1)]));
+        first.set(Y_RESOLUTION, Value::Rational(vec![(72, 1)]));
+        first.set(RESOLUTION_UNIT, Value::Short(vec![2]));
+        first.set(SOFTWARE, Value::Ascii(format!("dioptric {}", env!("CARGO_PKG_VERSION"))));
+        first.set(DNG_VERSION, Value::Byte(vec![1, 4, 0, 0]));
+        first.set(DNG_BACKWARD_VERSION, Value::Byte(vec![1, 1, 0, 0]));
+        first.set(UNIQUE_CAMERA_MODEL, Value::Ascii(format!("dioptric {model}")));
+        if !self.colors.is_empty() {
+            self.write_color(first);
+        }
+    }
+
+    fn exif(&self) -> Directory {
+        let mut exif = Directory::default();
+        let DngDetails { light, f_number, focal_length_mm, lens, .. } = self.details;
+        exif.set(EXIF_VERSION, Value::Undefined(b"0232".to_vec()));
+        exif.set(EXPOSURE_TIME, Value::Rational(vec![exposure_time(self.raw.exposure.time_s)]));
+        let iso = self.sensor.iso_speed(self.raw, light).round().clamp(1.0, f64::from(u16::MAX)) as u16;
+        exif.set(PHOTOGRAPHIC_SENSITIVITY, Value::Short(vec![iso]));
+        let known = |value: &Option<f64>| value.filter(|v| *v > 0.0 && *v < 1e6).map(|v| Value::fraction(v, 1000));
+        if let Some(n) = known(f_number) {
+            exif.set(F_NUMBER, Value::Rational(vec![n]));
+        }
+        if let Some(mm) = known(focal_length_mm) {
+            exif.set(FOCAL_LENGTH, Value::Rational(vec![mm]));
+        }
+        if let Some(lens) = lens {
+            exif.set(LENS_MODEL, Value::Ascii(lens.clone()));
+        }
+        exif
+    }
+
+    fn write_frame(&self, frame: &mut Directory, codes: Vec<u8>) -> Result<(), SensorError> {
         let is_mosaic = !self.colors.is_empty() && self.raw.tile.is_some();
         let interpretation = if is_mosaic { COLOR_FILTER_ARRAY } else { LINEAR_RAW };
-        directory.write_tag(Tag::Unknown(NEW_SUBFILE_TYPE), 0_u32)?;
-        directory.write_tag(Tag::from_u16_exhaustive(PHOTOMETRIC_INTERPRETATION), interpretation)?;
-        directory.write_tag(Tag::from_u16_exhaustive(MAKE), "dioptric")?;
-        // TIFF text is ASCII.
-        let model: String = self.sensor.name.chars().map(|c| if c.is_ascii() { c } else { '?' }).collect();
-        directory.write_tag(Tag::from_u16_exhaustive(MODEL), model.as_str())?;
-        directory.write_tag(Tag::from_u16_exhaustive(ORIENTATION), 1_u16)?;
-        directory.write_tag(Tag::from_u16_exhaustive(SOFTWARE), "dioptric")?;
-        let microseconds = (self.raw.exposure.time_s * 1e6).round().clamp(1.0, f64::from(u32::MAX)) as u32;
-        directory.write_tag(Tag::Unknown(EXPOSURE_TIME), Rational { n: microseconds, d: 1_000_000 })?;
-        directory.write_tag(Tag::Unknown(DNG_VERSION), &[1_u8, 4, 0, 0][..])?;
-        directory.write_tag(Tag::Unknown(DNG_BACKWARD_VERSION), &[1_u8, 1, 0, 0][..])?;
-        directory.write_tag(Tag::Unknown(UNIQUE_CAMERA_MODEL), format!("dioptric {model}").as_str())?;
-        self.write_levels(directory)?;
+        let n_planes = self.raw.planes.len();
+        write_image(frame, self.raw.size(), (16, n_planes), interpretation, codes);
+        frame.set(NEW_SUBFILE_TYPE, Value::Long(vec![0]));
+        self.write_levels(frame);
         if is_mosaic {
-            self.write_mosaic(directory)?;
+            self.write_mosaic(frame);
         }
-        if self.colors.is_empty() { Ok(()) } else { self.write_color(directory) }
+        // σ² = S x + O of the light x, 1 at the white level; frames that were merged follow no such line.
+        let noise_e = self.sensor.noise_floor_e(self.raw);
+        let saturation_e = self.raw.levels.saturation_e();
+        if self.raw.merged.is_empty() && self.raw.levels.is_linear() {
+            frame.set(NOISE_PROFILE, Value::Double(vec![1.0 / saturation_e, (noise_e / saturation_e).powi(2)]));
+        }
+        if let Some((corrections, tables)) = self.details.corrections.filter(|(corrections, _)| !corrections.is_none())
+        {
+            tables.check(self.raw.size(), self.sensor.filters.len())?;
+            let order = plane_order(&self.colors, self.raw.tile.as_ref());
+            let order = if order.is_empty() { vec![0] } else { order };
+            frame.set(OPCODE_LIST_3, Value::Undefined(opcode_list_3(tables, corrections, &order)?));
+        }
+        Ok(())
     }
 
-    fn write_levels<W: std::io::Write + std::io::Seek>(
-        &self,
-        directory: &mut tiff::encoder::DirectoryEncoder<'_, W, tiff::encoder::TiffKindStandard>,
-    ) -> Result<(), tiff::TiffError> {
+    fn write_levels(&self, frame: &mut Directory) {
         let levels = &self.raw.levels;
         let (mut black, mut white) = (levels.black, levels.white.round().min(levels.top));
         if !levels.is_linear() {
@@ -141,55 +238,93 @@ impl Tags<'_> {
             let straight = |dn: u32| LINEARIZED_BLACK + (top - LINEARIZED_BLACK) * levels.linear(f64::from(dn));
             let table: Vec<u16> =
                 (0..=levels.top as u32).map(|dn| straight(dn).round().clamp(0.0, top) as u16).collect();
-            directory.write_tag(Tag::Unknown(LINEARIZATION_TABLE), &table[..])?;
+            frame.set(LINEARIZATION_TABLE, Value::Short(table));
             (black, white) = (LINEARIZED_BLACK, top);
         }
         // One level for each plane.
         let n_planes = self.raw.planes.len();
-        let blacks: Vec<Rational> = vec![Rational { n: (black * 1000.0).round().max(0.0) as u32, d: 1000 }; n_planes];
-        directory.write_tag(Tag::Unknown(BLACK_LEVEL), &blacks[..])?;
-        directory.write_tag(Tag::Unknown(WHITE_LEVEL), &vec![white as u32; n_planes][..])
+        frame.set(BLACK_LEVEL, Value::Rational(vec![Value::fraction(black.max(0.0), 1000); n_planes]));
+        frame.set(WHITE_LEVEL, Value::Long(vec![white as u32; n_planes]));
     }
 
-    fn write_mosaic<W: std::io::Write + std::io::Seek>(
-        &self,
-        directory: &mut tiff::encoder::DirectoryEncoder<'_, W, tiff::encoder::TiffKindStandard>,
-    ) -> Result<(), tiff::TiffError> {
+    fn write_mosaic(&self, frame: &mut Directory) {
         let tile = self.raw.tile.as_ref().expect("only mosaics come here");
-        directory.write_tag(Tag::Unknown(CFA_REPEAT_PATTERN_DIM), &[tile.rows() as u16, tile.columns() as u16][..])?;
-        let pattern: Vec<u8> = (0..tile.rows()).flat_map(|row| tile.row(row)).map(|&f| self.colors[f]).collect();
-        directory.write_tag(Tag::Unknown(CFA_PATTERN), &pattern[..])?;
-        let planes: Vec<u8> =
-            plane_order(&self.colors, self.raw.tile.as_ref()).iter().map(|&filter| self.colors[filter]).collect();
-        directory.write_tag(Tag::Unknown(CFA_PLANE_COLOR), &planes[..])?;
-        directory.write_tag(Tag::Unknown(CFA_LAYOUT), 1_u16)
+        frame.set(CFA_REPEAT_PATTERN_DIM, Value::Short(vec![tile.rows() as u16, tile.columns() as u16]));
+        let pattern = (0..tile.rows()).flat_map(|row| tile.row(row)).map(|&f| self.colors[f]).collect();
+        frame.set(CFA_PATTERN, Value::Byte(pattern));
+        let order = plane_order(&self.colors, self.raw.tile.as_ref());
+        frame.set(CFA_PLANE_COLOR, Value::Byte(order.iter().map(|&filter| self.colors[filter]).collect()));
+        frame.set(CFA_LAYOUT, Value::Short(vec![1]));
     }
 
-    fn write_color<W: std::io::Write + std::io::Seek>(
-        &self,
-        directory: &mut tiff::encoder::DirectoryEncoder<'_, W, tiff::encoder::TiffKindStandard>,
-    ) -> Result<(), tiff::TiffError> {
+    fn write_color(&self, first: &mut Directory) {
         let order = plane_order(&self.colors, self.raw.tile.as_ref());
-        for (matrix_tag, light_tag, light, number) in [
-            (COLOR_MATRIX_1, CALIBRATION_ILLUMINANT_1, Illuminant::A, STANDARD_LIGHT_A),
-            (COLOR_MATRIX_2, CALIBRATION_ILLUMINANT_2, Illuminant::D65, D65),
+        let signed = |v: f64| ((v * 10_000.0).round() as i32, 10_000);
+        for (matrix_tag, forward_tag, light_tag, light, number) in [
+            (COLOR_MATRIX_1, FORWARD_MATRIX_1, CALIBRATION_ILLUMINANT_1, Illuminant::A, STANDARD_LIGHT_A),
+            (COLOR_MATRIX_2, FORWARD_MATRIX_2, CALIBRATION_ILLUMINANT_2, Illuminant::D65, D65),
         ] {
             let rows = camera_from_xyz(self.sensor, &light);
-            let matrix: Vec<SRational> = order
-                .iter()
-                .flat_map(|&filter| rows[filter])
-                .map(|v| SRational { n: (v * 10_000.0).round() as i32, d: 10_000 })
-                .collect();
-            directory.write_tag(Tag::Unknown(matrix_tag), &matrix[..])?;
-            directory.write_tag(Tag::Unknown(light_tag), number)?;
+            let matrix = order.iter().flat_map(|&filter| rows[filter]).map(signed).collect();
+            first.set(matrix_tag, Value::SignedRational(matrix));
+            if let Some(rows) = xyz_d50_from_balanced(self.sensor, &light) {
+                let matrix = rows.iter().flat_map(|row| order.iter().map(|&filter| signed(row[filter]))).collect();
+                first.set(forward_tag, Value::SignedRational(matrix));
+            }
+            first.set(light_tag, Value::Short(vec![number]));
         }
-        let white = white_response(self.sensor, self.light);
+        let white = white_response(self.sensor, &self.details.light);
         let brightest = white.iter().copied().fold(0.0, f64::max);
-        let neutral: Vec<Rational> = order
-            .iter()
-            .map(|&filter| white[filter])
-            .map(|w| Rational { n: (w / brightest * 1e6).round().max(1.0) as u32, d: 1_000_000 })
-            .collect();
-        directory.write_tag(Tag::Unknown(AS_SHOT_NEUTRAL), &neutral[..])
+        let part = |filter: usize| Value::fraction((white[filter] / brightest).max(1e-6), 1_000_000);
+        first.set(AS_SHOT_NEUTRAL, Value::Rational(order.into_iter().map(part).collect()));
     }
+}
+
+/// Returns an exposure time as a fraction: of whole microseconds, or of a second where it is shorter than a hundred.
+fn exposure_time(time_s: f64) -> (u32, u32) {
+    match time_s {
+        short if short > 0.0 && short < 1e-4 => (1, (1.0 / short).round().min(f64::from(u32::MAX)) as u32),
+        _ => Value::fraction(time_s, 1_000_000),
+    }
+}
+
+fn write_image(
+    directory: &mut Directory,
+    (rows, columns): (usize, usize),
+    (bits, n_planes): (u16, usize),
+    interpretation: u16,
+    samples: Vec<u8>,
+) {
+    directory.set(IMAGE_WIDTH, Value::Long(vec![columns as u32]));
+    directory.set(IMAGE_LENGTH, Value::Long(vec![rows as u32]));
+    directory.set(BITS_PER_SAMPLE, Value::Short(vec![bits; n_planes]));
+    directory.set(COMPRESSION, Value::Short(vec![1]));
+    directory.set(PHOTOMETRIC_INTERPRETATION, Value::Short(vec![interpretation]));
+    directory.set(SAMPLES_PER_PIXEL, Value::Short(vec![n_planes as u16]));
+    directory.set(ROWS_PER_STRIP, Value::Long(vec![rows as u32]));
+    directory.set(PLANAR_CONFIGURATION, Value::Short(vec![1]));
+    directory.set_strip(samples);
+}
+
+/// Returns the directory of a small picture: means of blocks of codes.
+fn preview(picture: &Picture) -> Directory {
+    let (rows, columns) = (picture.rows(), picture.columns());
+    let step = rows.max(columns).div_ceil(PREVIEW_PX).max(1);
+    let (few_rows, few_columns) = ((rows / step).max(1), (columns / step).max(1));
+    let mut samples = Vec::with_capacity(3 * few_rows * few_columns);
+    for row in 0..few_rows {
+        for column in 0..few_columns {
+            let down = row * step..((row + 1) * step).min(rows);
+            let across = column * step..((column + 1) * step).min(columns);
+            for channel in 0..3 {
+                let block = picture.codes.slice(ndarray::s![down.clone(), across.clone(), channel]);
+                let mean = block.sum() / block.len() as f32;
+                samples.push((mean.clamp(0.0, 1.0) * 255.0).round() as u8);
+            }
+        }
+    }
+    let mut directory = Directory::default();
+    write_image(&mut directory, (few_rows, few_columns), (8, 3), RGB, samples);
+    directory.set(NEW_SUBFILE_TYPE, Value::Long(vec![1]));
+    directory
 }

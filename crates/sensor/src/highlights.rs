@@ -11,7 +11,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{SensorError, Tile};
+use crate::{SensorError, Tile, plane_rows::plane_rows};
 
 /// What becomes of light beyond saturation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -97,12 +97,8 @@ fn spread(bits: &Array2<u32>) -> Array2<u32> {
 pub(crate) fn reconstruct(channels: &mut [Array2<f32>], saturated: &Saturated, levels: &[f64]) {
     let levels: Vec<f32> = levels.iter().map(|&level| level as f32).collect();
     let colors = surrounding_colors(channels, saturated, &levels);
-    let (rows, columns) = saturated.bits.dim();
-    let mut lines: Vec<Vec<&mut [f32]>> = (0..rows).map(|_| Vec::with_capacity(channels.len())).collect();
-    for channel in channels.iter_mut() {
-        let all = channel.as_slice_mut().expect("demosaiced planes are contiguous");
-        all.chunks_mut(columns).zip(&mut lines).for_each(|(line, row)| row.push(line));
-    }
+    let columns = saturated.bits.ncols();
+    let lines = plane_rows(channels);
     lines.into_par_iter().enumerate().for_each(|(row, mut line)| {
         for column in 0..columns {
             let bits = saturated.bits[(row, column)];

@@ -6,14 +6,17 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Highlights, LensShading, Picture, Raw, Sensor,
-    SensorError, ToneCurve, WhiteBalance,
+    Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Highlights, LensCorrections, LensShading,
+    LensTables, LocalTone, Picture, Raw, Sensor, SensorError, Tile, ToneCurve, WhiteBalance,
     balance::{gains, light_of_gains},
+    color::pairs,
     defects, demosaic,
     denoise::{SampleNoise, automatic_strength, denoise},
     hdr::merged_noise,
     highlights::{Saturated, dimmed, reconstruct},
+    lens_tables::warp,
     metering::percentile,
+    sharpen::{SharpenedChannels, sharpen},
 };
 
 /// What is done to a raw frame, in this order.
@@ -32,6 +35,8 @@ pub struct Processing {
     /// its own noise asks for. That is none up to a twentieth of the signal of a middle gray (18 % of saturation), and 0.5 from a
     /// tenth on.
     pub denoise: Option<f64>,
+    /// Aberrations of the lens that are undone; left out, they stay.
+    pub lens_corrections: LensCorrections,
     /// What is made white.
     #[serde(alias = "white_balance")]
     pub white: WhiteBalance,
@@ -39,10 +44,14 @@ pub struct Processing {
     pub highlights: Highlights,
     /// How the missing colors are found.
     pub demosaic: Demosaic,
+    /// The standard deviation of the blur by lens and pixels that is undone, pixels, as far as noise allows: 0 none, 2 at most.
+    pub sharpen_px: f64,
     /// How channels become colors.
     pub color: ColorCorrection,
     /// How bright the picture is made.
     pub brightness: Brightness,
+    /// How the contrast between and within parts of the picture is changed; left out, it stays.
+    pub local_tone: LocalTone,
     /// The curve from light to codes.
     pub curve: ToneCurve,
     /// The primaries of the picture.
@@ -57,11 +66,14 @@ impl Default for Processing {
             defect_threshold: None,
             shading: None,
             denoise: None,
+            lens_corrections: LensCorrections::default(),
             white: WhiteBalance::Scene,
             highlights: Highlights::Reconstruct,
             demosaic: Demosaic::DirectionalRatio,
+            sharpen_px: 0.0,
             color: ColorCorrection::Auto,
             brightness: Brightness::AsExposed,
+            local_tone: LocalTone::default(),
             curve: ToneCurve::Srgb,
             space: ColorSpace::Srgb,
         }
@@ -99,9 +111,12 @@ impl Processing {
             (other, _) => other.clone(),
         };
         let color = match (&self.color, &white, light) {
-            (ColorCorrection::Auto, WhiteBalance::None, _) => ColorCorrection::None,
+            (ColorCorrection::Auto | ColorCorrection::Roots, WhiteBalance::None, _) => ColorCorrection::None,
             (ColorCorrection::Auto, WhiteBalance::Light(light), _) | (ColorCorrection::Auto, _, Some(light)) => {
                 ColorCorrection::Fitted(light.clone())
+            }
+            (ColorCorrection::Roots, WhiteBalance::Light(light), _) | (ColorCorrection::Roots, _, Some(light)) => {
+                ColorCorrection::FittedRoots(light.clone())
             }
             (other, ..) => other.clone(),
         };
@@ -117,6 +132,8 @@ pub struct LinearPicture {
     pub light: Array3<f32>,
     /// What becomes of light above 1 in a picture.
     pub highlights: Highlights,
+    /// How the contrast between and within parts is changed in a picture.
+    pub local_tone: LocalTone,
     /// The factor on each channel that made white neutral.
     pub balance: Vec<f64>,
     /// The matrix from balanced channels to linear sRGB.
@@ -142,7 +159,22 @@ impl Sensor {
     /// # Errors
     /// When the frame is not of this sensor or too small, or a setting makes no sense.
     pub fn develop(&self, raw: &Raw, processing: &Processing) -> Result<Developed, SensorError> {
-        Ok(self.develop_linear(raw, processing)?.encode(processing.brightness, processing.curve, processing.space))
+        self.develop_with(raw, processing, None)
+    }
+
+    /// Returns the picture of a raw frame whose lens is known: what [`Processing::lens_corrections`] asks for is undone by its
+    /// tables.
+    ///
+    /// # Errors
+    /// As [`develop`](Self::develop), and when corrections are asked for without tables or with those of another frame.
+    pub fn develop_with(
+        &self,
+        raw: &Raw,
+        processing: &Processing,
+        lens: Option<&LensTables>,
+    ) -> Result<Developed, SensorError> {
+        let linear = self.develop_linear_with(raw, processing, lens)?;
+        Ok(linear.encode(processing.brightness, processing.curve, processing.space))
     }
 
     /// Returns the linear light of a raw frame, as [`develop`](Self::develop) has it before brightness and tone curve.
@@ -150,26 +182,36 @@ impl Sensor {
     /// # Errors
     /// As [`develop`](Self::develop).
     pub fn develop_linear(&self, raw: &Raw, processing: &Processing) -> Result<LinearPicture, SensorError> {
+        self.develop_linear_with(raw, processing, None)
+    }
+
+    /// Returns the linear light of a raw frame whose lens is known.
+    ///
+    /// # Errors
+    /// As [`develop_with`](Self::develop_with).
+    pub fn develop_linear_with(
+        &self,
+        raw: &Raw,
+        processing: &Processing,
+        lens: Option<&LensTables>,
+    ) -> Result<LinearPicture, SensorError> {
         raw.check()?;
         self.check_settings(raw, processing)?;
+        let corrections = processing.lens_corrections;
+        let lens = needed_tables(corrections, lens)?;
+        lens.map_or(Ok(()), |lens| lens.check(raw.size(), self.filters.len()))?;
         let processing = processing.under(None);
         let tile = raw.tile.as_ref();
         let n_channels = self.filters.len();
+        let noise = self.sample_noise(raw);
         let mut planes = raw.linear();
         let saturated = match processing.highlights {
             Highlights::Clip => None,
             Highlights::Reconstruct => Saturated::find(&planes, tile, n_channels, self.saturated_from(raw)),
         };
-        if let Some(threshold) = processing.defect_threshold {
-            defects::correct(&mut planes, tile, threshold as f32);
-        }
-        if let Some(shading) = &processing.shading {
-            shading.correct(&mut planes, tile);
-        }
-        let noise = self.sample_noise(raw);
-        let strength = processing.denoise.unwrap_or_else(|| automatic_strength(&noise));
-        if strength > 0.0 {
-            denoise(&mut planes, tile, &vec![noise; n_channels], strength);
+        self.clean(&mut planes, tile, &processing, &noise);
+        if let Some(lens) = lens.filter(|_| corrections.vignetting) {
+            lens.even_out(&mut planes, tile);
         }
         let balance = gains(self, &planes, tile, &processing.white)?;
         weigh(&mut planes, tile, &balance, processing.highlights);
@@ -180,17 +222,45 @@ impl Sensor {
         if let Some(saturated) = saturated {
             reconstruct(&mut channels, &saturated, &balance);
         }
-        let fitted = |light: &Illuminant| {
-            let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
-            ColorMatrix::fit(self, light, &chart)
-        };
-        let color = match &processing.color {
-            ColorCorrection::None => ColorMatrix::identity(n_channels),
-            ColorCorrection::Auto => fitted(&light_of_gains(self, &balance)),
-            ColorCorrection::Fitted(light) => fitted(light),
-            ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), delta_e: Vec::new() },
-        };
-        Ok(LinearPicture { light: mix(&channels, &color), highlights: processing.highlights, balance, color })
+        if let Some(lens) = lens.filter(|_| corrections.moves()) {
+            let sources: Vec<_> = (0..n_channels).map(|channel| lens.source_px(channel, corrections)).collect();
+            channels = warp(&channels, &sources);
+        }
+        let color = self.color_matrix(&processing.color, &balance);
+        if processing.sharpen_px > 0.0 {
+            let luminance = color.luminance_shares(n_channels);
+            let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: &noise };
+            sharpen(&mut channels, processing.sharpen_px, &of);
+        }
+        let Processing { highlights, local_tone, .. } = processing;
+        Ok(LinearPicture { light: mix(&channels, &color), highlights, local_tone, balance, color })
+    }
+
+    /// Mends defects, undoes a given fall of light and takes out noise.
+    fn clean(&self, planes: &mut [Array2<f32>], tile: Option<&Tile>, processing: &Processing, noise: &SampleNoise) {
+        if let Some(threshold) = processing.defect_threshold {
+            defects::correct(planes, tile, threshold as f32);
+        }
+        if let Some(shading) = &processing.shading {
+            shading.correct(planes, tile);
+        }
+        let strength = processing.denoise.unwrap_or_else(|| automatic_strength(noise));
+        if strength > 0.0 {
+            denoise(planes, tile, &vec![noise.clone(); self.filters.len()], strength);
+        }
+    }
+
+    /// Returns the matrix from channels that were balanced so to linear sRGB.
+    fn color_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> ColorMatrix {
+        let chart = || -> Vec<Spectrum> { color_checker_reflectances().into_iter().map(|(_, s)| s).collect() };
+        match color {
+            ColorCorrection::None => ColorMatrix::identity(self.filters.len()),
+            ColorCorrection::Auto => ColorMatrix::fit(self, &light_of_gains(self, balance), &chart()),
+            ColorCorrection::Roots => ColorMatrix::fit_roots(self, &light_of_gains(self, balance), &chart()),
+            ColorCorrection::Fitted(light) => ColorMatrix::fit(self, light, &chart()),
+            ColorCorrection::FittedRoots(light) => ColorMatrix::fit_roots(self, light, &chart()),
+            ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), has_roots: false, delta_e: Vec::new() },
+        }
     }
 
     /// Returns the share of saturation from which on a sample is taken to be saturated: three deviations of noise below it.
@@ -233,14 +303,7 @@ impl Sensor {
             return shape("filters of the raw frame", n_channels, raw.filter_names.len());
         }
         processing.white.check(n_channels)?;
-        if let ColorCorrection::Fitted(light) = &processing.color {
-            light.check()?;
-        }
-        if let ColorCorrection::Matrix(rows) = &processing.color
-            && let Some(row) = rows.iter().find(|row| row.len() != n_channels)
-        {
-            return shape("factors in a row of the color matrix", n_channels, row.len());
-        }
+        processing.color.check(n_channels)?;
         let (key, value, right) = match processing.brightness {
             Brightness::AsExposed => ("", 1.0, true),
             Brightness::Factor(factor) => ("brightness.factor", factor, factor > 0.0 && factor.is_finite()),
@@ -252,6 +315,10 @@ impl Sensor {
         if !right {
             return Err(SensorError::value("the processing", key, value, "a number above 0, and at most 100 %"));
         }
+        if !(0.0..=2.0).contains(&processing.sharpen_px) {
+            return Err(SensorError::value("the processing", "sharpen_px", processing.sharpen_px, "0 to 2 pixels"));
+        }
+        processing.local_tone.check()?;
         processing.curve.check()
     }
 }
@@ -271,9 +338,13 @@ impl LinearPicture {
         let table = curve.table();
         let keeps_hue = self.highlights == Highlights::Reconstruct;
         let mut codes = self.light;
+        let tone = self.local_tone;
+        let local = (!tone.is_none()).then(|| tone.factors(codes.view(), brightness as f32));
+        let local = local.as_ref().map(|factors| factors.as_slice().expect("a new array is contiguous"));
         let all = codes.as_slice_mut().expect("linear pictures are made contiguous");
-        all.par_chunks_exact_mut(3).for_each(|pixel| {
-            let light = space.from_linear_srgb([0, 1, 2].map(|i| pixel[i] * brightness as f32));
+        all.par_chunks_exact_mut(3).enumerate().for_each(|(place, pixel)| {
+            let factor = brightness as f32 * local.map_or(1.0, |factors| factors[place]);
+            let light = space.from_linear_srgb([0, 1, 2].map(|i| pixel[i] * factor));
             let light = if keeps_hue { dimmed(light) } else { light };
             pixel.iter_mut().zip(light).for_each(|(code, light)| *code = table.encode(light));
         });
@@ -281,8 +352,17 @@ impl LinearPicture {
     }
 }
 
+/// Returns the tables that the corrections need; none where there is nothing to correct.
+fn needed_tables(corrections: LensCorrections, lens: Option<&LensTables>) -> Result<Option<&LensTables>, SensorError> {
+    if corrections.is_none() || lens.is_some() {
+        return Ok(lens.filter(|_| !corrections.is_none()));
+    }
+    let reason = "need the tables of the lens that made the frame, expected them with it or no corrections".to_owned();
+    Err(SensorError::Unsuitable { what: "lens_corrections", reason })
+}
+
 /// Multiplies each channel by its factor, and clips it at the saturation of the least sensitive where highlights are clipped.
-fn weigh(planes: &mut [Array2<f32>], tile: Option<&crate::Tile>, balance: &[f64], highlights: Highlights) {
+fn weigh(planes: &mut [Array2<f32>], tile: Option<&Tile>, balance: &[f64], highlights: Highlights) {
     let top = if highlights == Highlights::Clip { 1.0 } else { f32::INFINITY };
     for (number, plane) in planes.iter_mut().enumerate() {
         plane.outer_iter_mut().into_par_iter().enumerate().for_each(|(row, mut values)| {
@@ -300,17 +380,28 @@ fn mix(channels: &[Array2<f32>], color: &ColorMatrix) -> Array3<f32> {
     let rows: [Vec<f32>; 3] = color.rows.each_ref().map(|row| row.iter().map(|&m| m as f32).collect());
     let mut linear = Array3::<f32>::zeros((n_rows, n_columns, 3));
     let lines = linear.as_slice_mut().expect("a new array is contiguous").par_chunks_mut(3 * n_columns);
+    let n_channels = channels.len();
     lines.enumerate().for_each(|(row, line)| {
+        let factors = |term: usize| rows.each_ref().map(|row| row[term]);
         for (channel, plane) in channels.iter().enumerate() {
-            let factors = rows.each_ref().map(|row| row[channel]);
-            for (pixel, &value) in line.chunks_exact_mut(3).zip(plane.row(row)) {
-                pixel[0] += factors[0] * value;
-                pixel[1] += factors[1] * value;
-                pixel[2] += factors[2] * value;
-            }
+            add_term(line, factors(channel), plane.row(row).iter().copied());
+        }
+        for ((i, j), term) in pairs(n_channels).zip(n_channels..).filter(|_| color.has_roots) {
+            let products = channels[i].row(row).into_iter().zip(channels[j].row(row));
+            add_term(line, factors(term), products.map(|(a, b)| (a.max(0.0) * b.max(0.0)).sqrt()));
         }
     });
     linear
+}
+
+/// Adds values times the factors of red, green and blue to a row of pixels.
+#[inline]
+fn add_term(line: &mut [f32], factors: [f32; 3], values: impl Iterator<Item = f32>) {
+    for (pixel, value) in line.chunks_exact_mut(3).zip(values) {
+        pixel[0] += factors[0] * value;
+        pixel[1] += factors[1] * value;
+        pixel[2] += factors[2] * value;
+    }
 }
 
 /// Returns the factor on linear light that a brightness asks for.

@@ -313,7 +313,7 @@ impl Sensor {
     }
 
     /// Returns the relative sensitivity at a chief-ray angle, degrees.
-    pub(crate) fn chief_ray_factor(&self, angle_deg: f64) -> f64 {
+    pub fn chief_ray_factor(&self, angle_deg: f64) -> f64 {
         let table = &self.chief_ray_response;
         let above = table.partition_point(|&(deg, _)| deg < angle_deg);
         match (above.checked_sub(1).map(|i| table[i]), table.get(above)) {

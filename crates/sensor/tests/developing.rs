@@ -3,8 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by a panic")]
 
 use dioptric_sensor::{
-    Adc, AutoExposure, Cfa, Demosaic, Exposure, ExposureControl, Highlights, Illumination, Metering, Moved, Noise,
-    Picture, Processing, Raw, Sensor, WhiteBalance, psnr_db,
+    Adc, AutoExposure, Cfa, ColorCorrection, Demosaic, Exposure, ExposureControl, Highlights, Illumination, Metering,
+    Moved, Noise, Picture, Processing, Raw, Sensor, WhiteBalance, psnr_db,
 };
 use dioptric_spectrum::{
     Illuminant, Lab, Observer, Quantity, SpectralImage, WavelengthGrid, Xyz, adapt_bradford,
@@ -209,7 +209,7 @@ fn what_disagrees_is_left_out_of_a_merge() {
 }
 
 /// Returns the mean ΔE₀₀ of the 24 patches after white from the white one, for camera and 1931 observer alike, under a known light.
-fn chart_delta_e(sensor: &Sensor, light: &Illuminant) -> f64 {
+fn chart_delta_e(sensor: &Sensor, light: &Illuminant, color: ColorCorrection) -> f64 {
     let grid = WavelengthGrid::uniform(380.0, 730.0, 5.0).unwrap();
     let fine = WavelengthGrid::uniform(380.0, 780.0, 1.0).unwrap();
     let source = light.spectrum().sample_held(&fine);
@@ -225,7 +225,7 @@ fn chart_delta_e(sensor: &Sensor, light: &Illuminant) -> f64 {
     let image = SpectralImage::new(Quantity::Irradiance, grid.clone(), (0..grid.len()).map(plane).collect()).unwrap();
     let raw = sensor.capture(&Illumination::on_pixels(&image), &METERED, &Noise::none()).unwrap().raw;
     let white_patch = WhiteBalance::Patch { left: 4, top: 52, width: 8, height: 8 };
-    let processing = Processing { white: white_patch, ..Processing::default() }.under(Some(light));
+    let processing = Processing { white: white_patch, color, ..Processing::default() }.under(Some(light));
     let linear = sensor.develop_linear(&raw, &processing).unwrap().light;
     let seen = |i: usize| [0, 1, 2].map(|k| f64::from(linear[(16 * (i / 6) + 8, 16 * (i % 6) + 8, k)]));
     let xyz = |i: usize| {
@@ -246,11 +246,16 @@ fn chart_delta_e(sensor: &Sensor, light: &Illuminant) -> f64 {
 fn charts_keep_colors_under_every_light() {
     let mut found = Vec::new();
     let lights = [Illuminant::D65, Illuminant::Fl2, Illuminant::Fl11, Illuminant::A];
-    // Under A three channels of the phone's sensor come to 2.14 at best.
+    let lights_of_all = lights.clone();
+    // Under A a matrix of the phone's three channels comes to 2.14, and to 2.08 where the mean itself is made least; with roots it does
+    // better.
     for (name, bar, lights) in [("imx363", 2.0, &lights[..3]), ("nikon-d5100", 1.5, &lights[..])] {
         let sensor = Sensor { adc: Adc::Analog, ..Sensor::built_in(name).unwrap() };
         for light in lights {
-            found.push((name, light.clone(), chart_delta_e(&sensor, light), bar));
+            found.push((name, light.clone(), chart_delta_e(&sensor, light, ColorCorrection::Auto), bar));
+        }
+        for light in &lights_of_all {
+            found.push((name, light.clone(), chart_delta_e(&sensor, light, ColorCorrection::Roots), bar));
         }
     }
     assert!(found.iter().all(|(_, _, delta_e, bar)| delta_e <= bar), "{found:.2?}");

@@ -9,8 +9,9 @@ use approx::assert_relative_eq;
 use common::chart;
 use dioptric_pictures::{Limits, read};
 use dioptric_sensor::{
-    Adc, AutoExposure, Cfa, ChartReport, ColorCorrection, Demosaic, Depth, ElectronRate, Exposure, ExposureControl,
-    Filter, Illumination, Metering, Noise, NoiseSource, Picture, Processing, Raw, RawPlane, Response, Sensor,
+    Adc, AutoExposure, Cfa, ChartReport, ColorCorrection, Demosaic, Depth, DngDetails, ElectronRate, Exposure,
+    ExposureControl, Filter, FrameTable, Illumination, LensCorrections, LensTables, Metering, Noise, NoiseSource,
+    Picture, Processing, Raw, RawPlane, Response, Sensor,
 };
 use dioptric_spectrum::{Illuminant, Spectrum};
 use ndarray::{Array2, Array3};
@@ -191,16 +192,21 @@ fn chart_raw(sensor: &Sensor) -> Raw {
 
 /// Returns the whole numbers of the tags of a little-endian TIFF file's first directory; fractions give two each.
 fn tags_of(file: &[u8]) -> std::collections::BTreeMap<u16, Vec<u32>> {
+    tags_at(file, u32::from_le_bytes(file[4..8].try_into().unwrap()))
+}
+
+/// Returns the same of the directory at a place.
+fn tags_at(file: &[u8], place: u32) -> std::collections::BTreeMap<u16, Vec<u32>> {
     let number = |at: usize, bytes: usize| (0..bytes).rev().fold(0_u32, |n, i| n << 8 | u32::from(file[at + i]));
-    let directory = number(4, 4) as usize;
+    let directory = place as usize;
     let entry = |i: usize| {
         let at = directory + 2 + 12 * i;
         let (kind, count) = (number(at + 2, 2), number(at + 4, 4) as usize);
-        // BYTE and ASCII, SHORT, LONG, and the two LONGs of a RATIONAL.
+        // BYTE, ASCII and UNDEFINED, SHORT, LONG, and the two LONGs of a RATIONAL or DOUBLE.
         let (bytes, count) = match kind {
-            1 | 2 => (1, count),
+            1 | 2 | 7 => (1, count),
             3 => (2, count),
-            5 | 10 => (4, 2 * count),
+            5 | 10 | 12 => (4, 2 * count),
             _ => (4, count),
         };
         let from = if bytes * count <= 4 { at + 8 } else { number(at + 8, 4) as usize };
@@ -221,7 +227,7 @@ fn raw_numbers_come_back_from_png_tiff_and_dng() {
         assert!(back.pixels().zip(dn).all(|(pixel, &dn)| pixel.0[0] == dn), "{name}");
     }
     let path = folder.path().join("raw.dng");
-    sensor.write_dng(&raw, &Illuminant::D65, &path).unwrap();
+    sensor.write_dng(&raw, &DngDetails::of_light(Illuminant::D65), &path).unwrap();
     let tags = tags_of(&std::fs::read(&path).unwrap());
     assert_eq!(tags[&262], [32803]);
     assert_eq!(tags[&33421], [2, 2]);
@@ -230,6 +236,65 @@ fn raw_numbers_come_back_from_png_tiff_and_dng() {
     assert_eq!((tags[&50721].len(), tags[&50722].len(), tags[&50728].len()), (18, 18, 6));
     // Nothing but the three finished files is left.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+}
+
+#[test]
+fn a_dng_says_how_it_was_taken_and_through_what() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("raw.dng");
+    let (sensor, raw) = raw_of("imx363");
+    let picture = sensor.develop(&raw, &Processing::for_light(Illuminant::D65)).unwrap().picture;
+    let table = |value: f64| FrameTable::tabulate(5, 5, |_, _| value).unwrap();
+    let tables = LensTables {
+        size: raw.size(),
+        distortion_px: [0, 1].map(|i| {
+            let size = [raw.size().1 as f64, raw.size().0 as f64];
+            FrameTable::tabulate(5, 5, |down, right| 0.01 * size[i] * ([right, down][i] - 0.5)).unwrap()
+        }),
+        lateral_color_px: vec![[table(0.0), table(0.0)]; 3],
+        vignetting: vec![table(1.0); 3],
+    };
+    let details = DngDetails {
+        f_number: Some(1.8),
+        focal_length_mm: Some(4.38),
+        lens: Some("thin".to_owned()),
+        picture: Some(&picture),
+        corrections: Some((LensCorrections { distortion: true, ..LensCorrections::default() }, &tables)),
+        ..DngDetails::of_light(Illuminant::A)
+    };
+    sensor.write_dng(&raw, &details, &path).unwrap();
+    let file = std::fs::read(&path).unwrap();
+    let first = tags_of(&file);
+    // A preview of eight bits, then the frame in a directory of its own.
+    assert_eq!((&first[&254], &first[&258], &first[&262]), (&vec![1], &vec![8, 8, 8], &vec![2]));
+    let frame = tags_at(&file, first[&330][0]);
+    assert_eq!((&frame[&254], &frame[&258], &frame[&262]), (&vec![0], &vec![16], &vec![32803]));
+    let number = |at: u32| u16::from_le_bytes(file[at as usize..at as usize + 2].try_into().unwrap());
+    assert_eq!(number(frame[&273][0] + 2), raw.dn().unwrap()[(0, 1)]);
+    assert_eq!((frame[&273][0] % 2, first[&273][0] % 2, frame[&279][0] as usize), (0, 0, 2 * raw.dn().unwrap().len()));
+    // The numbers of an exposure, and the two matrices from the balanced camera to D50.
+    let exif = tags_at(&file, first[&34665][0]);
+    let iso = sensor.iso_at_unity_gain.unwrap() * raw.exposure.analog_gain;
+    assert_eq!((&exif[&33437], &exif[&37386]), (&vec![1800, 1000], &vec![4380, 1000]));
+    assert_eq!((exif[&34855][0], exif[&33434][0]), (iso.round() as u32, (raw.exposure.time_s * 1e6).round() as u32));
+    for tag in [50964, 50965] {
+        let white: Vec<f64> =
+            first[&tag].chunks(6).map(|row| row.chunks(2).map(|v| f64::from(v[0] as i32) / 1e4).sum()).collect();
+        assert!(white.iter().zip([0.9642, 1.0, 0.8249]).all(|(v, wanted)| (v - wanted).abs() < 1e-3), "{white:?}");
+    }
+    // The noise that is stated is that of an even surface.
+    let double = |words: &[u32]| f64::from_bits(u64::from(words[0]) | u64::from(words[1]) << 32);
+    let [slope, floor] = [0, 2].map(|i| double(&frame[&51041][i..i + 2]));
+    let even = ElectronRate { planes_e_per_s: vec![Array2::from_elem((200, 200), 2e5)] };
+    let quiet = Sensor { prnu_fraction: 0.0, ..sensor };
+    let flat = expose(&quiet, &even, &Exposure { time_s: 0.01, ..raw.exposure }, &Noise::all(5));
+    let light: Vec<f64> = flat.linear()[0].iter().map(|&v| f64::from(v)).collect();
+    let (mean, deviation) = mean_and_deviation(&light);
+    assert!((deviation.powi(2) / (slope * mean + floor) - 1.0).abs() < 0.05, "{deviation} {slope} {floor}");
+    // One opcode, of one scale: WarpRectilinear.
+    let opcodes: Vec<u8> = frame[&51022].iter().map(|&byte| byte as u8).collect();
+    assert_eq!((&opcodes[..8], &opcodes[16..24]), (&[0, 0, 0, 1, 0, 0, 0, 1][..], &[0, 0, 0, 164, 0, 0, 0, 3][..]));
+    assert!((f64::from_be_bytes(opcodes[24..32].try_into().unwrap()) - 1.01).abs() < 1e-6);
 }
 
 #[test]
@@ -258,10 +323,16 @@ fn what_cannot_be_written_says_why_and_leaves_nothing() {
     assert!(message(raw.write(&folder.path().join("raw.jpg"))).contains("png, tif or tiff"));
     assert!(message(raw.write(&folder.path().join("no/such/raw.png"))).contains("no/such"));
     let (ideal, planes) = raw_of("ideal");
-    assert!(message(ideal.write_dng(&planes, &Illuminant::D65, &folder.path().join("a.dng"))).contains("volts"));
+    assert!(
+        message(ideal.write_dng(&planes, &DngDetails::of_light(Illuminant::D65), &folder.path().join("a.dng")))
+            .contains("volts")
+    );
     let (d100, volts) = raw_of("nikon-d100");
     assert!(matches!(volts.planes[0], RawPlane::Volts(_)));
-    assert!(message(d100.write_dng(&volts, &Illuminant::D65, &folder.path().join("a.dng"))).contains("volts"));
+    assert!(
+        message(d100.write_dng(&volts, &DngDetails::of_light(Illuminant::D65), &folder.path().join("a.dng")))
+            .contains("volts")
+    );
     let odd = Sensor { filters: vec![], ..sensor };
     assert!(odd.check().is_err());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
@@ -299,7 +370,7 @@ fn frames_for_other_readers_are_written_where_asked() {
     for (name, sensor) in dng_sensors() {
         let raw = chart_raw(&sensor);
         let path = folder.join(format!("{name}.dng"));
-        sensor.write_dng(&raw, &Illuminant::D65, &path).unwrap();
+        sensor.write_dng(&raw, &DngDetails::of_light(Illuminant::D65), &path).unwrap();
         for (plane, filter) in raw.planes.iter().zip(&raw.filter_names) {
             let one = Raw { planes: vec![plane.clone()], ..raw.clone() };
             let png = if raw.planes.len() == 1 { format!("{name}.png") } else { format!("{name}.{filter}.png") };
@@ -333,7 +404,7 @@ fn a_bent_response_goes_with_the_table_that_straightens_it() {
     let (_, sensor) = dng_sensors().into_iter().find(|(name, _)| *name == "logarithmic").unwrap();
     let raw = chart_raw(&sensor);
     let path = folder.path().join("log.dng");
-    sensor.write_dng(&raw, &Illuminant::D65, &path).unwrap();
+    sensor.write_dng(&raw, &DngDetails::of_light(Illuminant::D65), &path).unwrap();
     let tags = tags_of(&std::fs::read(&path).unwrap());
     let (table, black, white) = (&tags[&50712], tags[&50714][0] / tags[&50714][1], tags[&50717][0]);
     let linear = &raw.linear()[0];
@@ -361,7 +432,10 @@ fn what_dng_cannot_hold_is_refused_in_one_sentence() {
         ("a large tile", Cfa::two_by_two("RGGB").unwrap().repeated(8), &[R, G, B]),
     ] {
         let sensor = Sensor { adc: imx363.adc, ..with_filters(cfa, filters) };
-        let message = sensor.write_dng(&chart_raw(&sensor), &Illuminant::D65, &path).unwrap_err().to_string();
+        let message = sensor
+            .write_dng(&chart_raw(&sensor), &DngDetails::of_light(Illuminant::D65), &path)
+            .unwrap_err()
+            .to_string();
         assert!(message.starts_with("a DNG file has") && !message.contains('\n'), "{what}: {message}");
         assert!(!path.exists());
     }

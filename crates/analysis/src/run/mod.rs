@@ -3,7 +3,7 @@
 mod charts;
 mod statistics;
 
-use dioptric_pipeline::{BankData, Camera, Capture, FilmPart, PipelineError, display::LinearRgb};
+use dioptric_pipeline::{AberrationSummary, BankData, Camera, Capture, FilmPart, PipelineError, display::LinearRgb};
 use dioptric_psf::LensImageModel;
 use dioptric_scene::SceneLight;
 use dioptric_spectrum::{ColorTemperature, DepthMap};
@@ -51,10 +51,14 @@ pub struct RunReport {
     pub losses: Vec<LossRow>,
     /// Factor on each channel that made white neutral.
     pub white_balance: Vec<f64>,
-    /// The matrix from balanced channels to linear sRGB, a row for each of red, green and blue.
+    /// The matrix from balanced channels to linear sRGB, a row for each of red, green and blue; with `color: Roots` the factors of the
+    /// roots of their products follow.
     pub color_matrix: [Vec<f64>; 3],
     /// The mean ΔE₀₀ that is left of the 24-patch chart after the matrix; none where it was not fitted.
     pub color_matrix_mean_delta_e: Option<f64>,
+    /// How much the corrections of the lens do, where some are asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lens_corrections: Option<AberrationSummary>,
     /// The files beside the report.
     pub files: Vec<String>,
 }
@@ -209,6 +213,7 @@ impl RunReport {
             white_balance: capture.developed.balance.clone(),
             color_matrix: capture.developed.color.rows.clone(),
             color_matrix_mean_delta_e: capture.developed.color.mean_delta_e(),
+            lens_corrections: capture.aberrations.as_ref().map(|aberrations| aberrations.summary),
             files,
         })
     }

@@ -320,6 +320,12 @@ impl Camera {
             let reason = "a part of the film is no light field, expected the whole film".to_owned();
             return Err(PipelineError::Unsuitable { what: "crop", reason });
         }
+        if let (Some(LightFieldSpec::Array(_)), false) = (&self.light_field, self.processing.lens_corrections.is_none())
+        {
+            let reason =
+                "are for the picture of a lens, expected none where an array stands before the film".to_owned();
+            return Err(PipelineError::Unsuitable { what: "lens_corrections", reason });
+        }
         if let Err(PsfError::Setting { key, found, expected }) = self.diffraction.check() {
             checker.wrong(key, &found.to_string(), expected)?;
         }

@@ -1,6 +1,8 @@
 //! What a command line changes of the sensor's frames and of the picture.
 
-use dioptric_sensor::{Demosaic, ExposureControl, Highlights, NoiseSources, Processing};
+use dioptric_sensor::{
+    ColorCorrection, Demosaic, ExposureControl, Highlights, LensCorrections, LocalTone, NoiseSources, Processing,
+};
 
 use crate::{PipelineError, parse_white, with_analog_gain};
 
@@ -19,6 +21,14 @@ pub struct SensorOptions {
     pub denoise: Option<f64>,
     /// What becomes of highlights, as [`Highlights::parse`] has it.
     pub highlights: Option<String>,
+    /// Aberrations of the lens that are undone, as [`LensCorrections::parse`] has them.
+    pub lens_corrections: Option<String>,
+    /// How channels become colors, as [`ColorCorrection::parse`] has it.
+    pub color: Option<String>,
+    /// The blur that is undone, pixels.
+    pub sharpen_px: Option<f64>,
+    /// Contrast between and within parts, as [`LocalTone::parse`] has it.
+    pub local_tone: Option<String>,
 }
 
 impl SensorOptions {
@@ -50,6 +60,16 @@ impl SensorOptions {
         }
         if let Some(kind) = &self.highlights {
             processing.highlights = Highlights::parse(kind)?;
+        }
+        if let Some(list) = &self.lens_corrections {
+            processing.lens_corrections = LensCorrections::parse(list)?;
+        }
+        if let Some(kind) = &self.color {
+            processing.color = ColorCorrection::parse(kind)?;
+        }
+        processing.sharpen_px = self.sharpen_px.unwrap_or(processing.sharpen_px);
+        if let Some(tone) = &self.local_tone {
+            processing.local_tone = LocalTone::parse(tone)?;
         }
         Ok(())
     }

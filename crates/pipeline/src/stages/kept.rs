@@ -18,17 +18,20 @@ use super::{
     given::GivenParts,
     irradiance::{self, Irradiance, Keeping},
     lens::{self, ResolvedLens},
+    lens_tables::{LensAberrations, TableParts},
     memory::MemoryBudget,
     plan,
     scene::{self, ResolvedScene, SceneSummary},
     slot::Slot,
     spec::{
-        BankInputs, ElectronInputs, FilmInputs, FrameInputs, GeometryInputs, IrradianceInputs, LensInputs,
-        PictureInputs, PlanInputs, Raster, SceneInputs, WorldInputs,
+        AberrationInputs, BankInputs, ElectronInputs, FilmInputs, FrameInputs, GeometryInputs, IrradianceInputs,
+        LensInputs, PictureInputs, PlanInputs, Raster, SceneInputs, WorldInputs,
     },
     world::{self, WorldRender},
 };
-use crate::{Camera, Frames, Leftover, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
+use crate::{
+    Camera, Frames, Leftover, LensFacts, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage,
+};
 
 /// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
 const MEMORY_BYTES: u64 = 2 << 30;
@@ -80,6 +83,7 @@ pub(super) struct KeptResults {
     pub(super) irradiance: Slot<IrradianceInputs, Irradiance>,
     pub(super) electrons: Slot<ElectronInputs, ElectronRate>,
     pub(super) frames: Slot<FrameInputs, FrameSet>,
+    aberrations: Slot<AberrationInputs, LensAberrations>,
     pub(super) picture: Slot<PictureInputs, Developed>,
 }
 
@@ -98,6 +102,7 @@ impl Default for KeptResults {
             irradiance: Slot::new(2),
             electrons: Slot::new(2),
             frames: Slot::new(2),
+            aberrations: Slot::new(4),
             picture: Slot::new(4),
         }
     }
@@ -149,6 +154,8 @@ pub struct Capture {
     pub frames: Arc<FrameSet>,
     /// From the raw frame to the picture.
     pub processing: Processing,
+    /// What the lens does to the frame, where the processing undoes some of it.
+    pub aberrations: Option<Arc<LensAberrations>>,
     /// The picture.
     pub developed: Arc<Developed>,
     /// What the rate of electrons was made from.
@@ -163,12 +170,19 @@ impl Capture {
 
     /// What is written of the frames.
     pub fn frame_parts(&self) -> Frames<'_> {
+        let first = self.lens.reference.first_order();
         Frames {
             sensor: &self.sensor,
             exposure: &self.frames.exposure,
             rate: &self.rate,
             exposed: &self.frames.exposed,
             processing: &self.processing,
+            lens: self.aberrations.as_ref().map(|aberrations| &aberrations.tables),
+            optics: Some(LensFacts {
+                name: self.lens.lens.name(),
+                f_number: first.f_number,
+                focal_length_mm: first.efl_mm,
+            }),
             grid: self.grid(),
             light: self.scene.light.as_ref().map_or(Illuminant::D65, |light| light.illuminant.clone()),
         }
@@ -297,7 +311,8 @@ impl KeptCamera {
         let sensor = electrons::on_film(&electron_inputs.sensor, &place);
         let frames = chain.frames(frame_inputs)?;
         let processing = self.camera.processing.under(scene.light.as_ref().map(|light| &light.illuminant));
-        let developed = chain.picture(inputs.clone(), &processing)?;
+        let aberrations = chain.aberrations(&inputs)?;
+        let developed = chain.picture(inputs.clone(), &processing, aberrations.clone())?;
         progress.at(Stage::Picture, 1.0);
         Ok(Capture {
             camera: self.camera.clone(),
@@ -310,6 +325,7 @@ impl KeptCamera {
             rate,
             frames,
             processing,
+            aberrations,
             developed,
             inputs: electron_inputs.clone(),
         })
@@ -609,7 +625,36 @@ impl Chain<'_> {
         })
     }
 
-    fn picture(&self, inputs: PictureInputs, processing: &Processing) -> Result<Arc<Developed>, PipelineError> {
+    /// Returns what the lens does to the frame, where the processing undoes some of it.
+    fn aberrations(&self, inputs: &PictureInputs) -> Result<Option<Arc<LensAberrations>>, PipelineError> {
+        if inputs.processing.lens_corrections.is_none() {
+            return Ok(None);
+        }
+        let ElectronInputs { irradiance, sensor } = &inputs.frames.electrons;
+        let film = irradiance.plan.bank.film.clone();
+        let inputs = AberrationInputs { film, scene: irradiance.scene.clone(), sensor: sensor.clone() };
+        let aberrations = self.kept.aberrations.get_or_make(inputs, |inputs| {
+            let (lens, summary) = (self.lens(&inputs.film.lens)?, self.summary(&inputs.scene)?);
+            let place = self.film(&inputs.film, &inputs.scene)?;
+            let parts = TableParts {
+                lens: &lens,
+                place: &place,
+                sensor: &electrons::on_film(&inputs.sensor, &place),
+                light: summary.light.as_ref().map(|light| &light.illuminant),
+                grid: &summary.grid()?,
+                depth_range_m: (summary.near_m, summary.far_m),
+            };
+            parts.aberrations(&self.watch)
+        })?;
+        Ok(Some(aberrations))
+    }
+
+    fn picture(
+        &self,
+        inputs: PictureInputs,
+        processing: &Processing,
+        aberrations: Option<Arc<LensAberrations>>,
+    ) -> Result<Arc<Developed>, PipelineError> {
         self.kept.picture.get_or_make(inputs, |inputs| {
             self.watch.progress.at(Stage::Picture, 0.0);
             let irradiance = &inputs.frames.electrons.irradiance;
@@ -617,7 +662,10 @@ impl Chain<'_> {
             let frames = self.frames(&inputs.frames)?;
             let sensor = electrons::on_film(&inputs.frames.electrons.sensor, &place);
             let processing = processing.clone();
-            self.watch.run(move || Ok(sensor.develop(frames.exposed.developed_from(), &processing)?))
+            self.watch.run(move || {
+                let tables = aberrations.as_ref().map(|aberrations| &aberrations.tables);
+                Ok(sensor.develop_with(frames.exposed.developed_from(), &processing, tables)?)
+            })
         })
     }
 }

@@ -167,6 +167,14 @@ pub(crate) struct ShutterInputs {
     pub(crate) noise: Noise,
 }
 
+/// What the lens does to the frame of a sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct AberrationInputs {
+    pub(crate) film: FilmInputs,
+    pub(crate) scene: SceneInputs,
+    pub(crate) sensor: Sensor,
+}
+
 /// The picture.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PictureInputs {

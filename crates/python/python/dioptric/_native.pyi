@@ -89,7 +89,12 @@ class Camera:
         bracket_stops: Sequence[float] | None = ...,
         white: str | None = ...,
         demosaic: str | None = ...,
+        denoise: float | None = ...,
         highlights: str | None = ...,
+        lens_corrections: str | None = ...,
+        color: str | None = ...,
+        sharpen_px: float | None = ...,
+        local_tone: str | None = ...,
         seed: int | None = ...,
     ) -> Camera: ...
     def render(
@@ -161,10 +166,24 @@ class Shot:
         bracket_stops: Sequence[float] | None = ...,
         white: str | None = ...,
         demosaic: str | None = ...,
+        denoise: float | None = ...,
         highlights: str | None = ...,
+        lens_corrections: str | None = ...,
+        color: str | None = ...,
+        sharpen_px: float | None = ...,
+        local_tone: str | None = ...,
     ) -> Shot: ...
     def develop(
-        self, *, white: str | None = ..., demosaic: str | None = ..., highlights: str | None = ...
+        self,
+        *,
+        white: str | None = ...,
+        demosaic: str | None = ...,
+        denoise: float | None = ...,
+        highlights: str | None = ...,
+        lens_corrections: str | None = ...,
+        color: str | None = ...,
+        sharpen_px: float | None = ...,
+        local_tone: str | None = ...,
     ) -> Shot: ...
     def png(self) -> bytes: ...
     def save(self, path: _Path) -> list[str]: ...

@@ -98,6 +98,26 @@ pub(crate) fn camera_from_xyz(sensor: &Sensor, light: &Illuminant) -> Vec<[f64; 
         .collect()
 }
 
+/// Returns the matrix from balanced channels to XYZ under D50, of white (1, 1, 1) to that of D50, by which we develop: of three
+/// channels, for a light.
+pub(crate) fn xyz_d50_from_balanced(sensor: &Sensor, light: &Illuminant) -> Option<[[f64; 3]; 3]> {
+    if sensor.filters.len() != 3 {
+        return None;
+    }
+    let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
+    let fitted = ColorMatrix::fit(sensor, light, &chart);
+    let grid = fine_grid();
+    let d50 = Observer::Cie1931.xyz(&grid, &Illuminant::D50.spectrum().sample_held(&grid));
+    let d50 = Xyz(d50.0.map(|v| v / d50.0[1]));
+    // The white of sRGB is that of its own matrix.
+    let white = Xyz::from_linear_srgb([1.0; 3]);
+    let columns = [0, 1, 2].map(|channel| {
+        let rgb = fitted.rows.each_ref().map(|row| row[channel]);
+        adapt_bradford(Xyz::from_linear_srgb(rgb), white, d50).0
+    });
+    Some([0, 1, 2].map(|i| columns.map(|column| column[i])))
+}
+
 /// Returns the matrix from XYZ under a light to balanced channels.
 fn balanced_from_xyz(srgb_from_balanced: [[f64; 3]; 3], light: &Illuminant) -> [[f64; 3]; 3] {
     let balanced_from_srgb = inverse(srgb_from_balanced);
@@ -146,6 +166,17 @@ mod tests {
                     // Bradford's D65 has five digits; the fit weighs the white a hundredfold, not without end.
                     assert!((neutral - white / brightest).abs() < 1e-3, "{light:?}: {neutral}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn forward_matrices_take_white_to_d50() {
+        for light in [Illuminant::A, Illuminant::D65] {
+            let rows = xyz_d50_from_balanced(&Sensor::built_in("imx363").unwrap(), &light).unwrap();
+            // The white that DNG states for D50.
+            for (row, wanted) in rows.iter().zip([0.9642, 1.0, 0.8249]) {
+                assert!((row.iter().sum::<f64>() - wanted).abs() < 5e-4, "{rows:?}");
             }
         }
     }
