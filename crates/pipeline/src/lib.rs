@@ -40,7 +40,7 @@ pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, Outputs, picture_png, write_frames};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_bytes, parse_numbers, parse_pairs};
-pub use paintings::PaintingFolder;
+pub use paintings::{PaintingFolder, program_build};
 pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
 pub use quality::Quality;
 #[cfg(feature = "schema")]

@@ -12,6 +12,7 @@ use crate::{
     changes::{ALL, changed},
     errors::{exception, guarded, wrong},
     lens::Lens,
+    paintings::painting_folder,
     scene::Scene,
     sensor::Sensor,
     serial::{from_python, to_python},
@@ -33,8 +34,9 @@ impl Camera {
         Self { kept }
     }
 
-    fn of_file(file: CameraFile) -> Self {
-        Self::new(KeptCamera::new(file))
+    /// Returns the camera of a camera file; paintings of the still life are kept in the user's cache, as the program does.
+    pub(crate) fn of_file(py: Python<'_>, file: CameraFile) -> Self {
+        Self::new(KeptCamera::new(file).with_paintings(painting_folder(py)))
     }
 }
 
@@ -42,14 +44,14 @@ impl Camera {
 impl Camera {
     /// Returns the camera of the built-in demo: a still life through a 50 mm double Gauss at f/4, as of ``dioptric run``.
     #[staticmethod]
-    fn demo() -> PyResult<Self> {
-        guarded(|| Ok(Self::of_file(CameraFile::demo().map_err(exception)?)))
+    fn demo(py: Python<'_>) -> PyResult<Self> {
+        guarded(|| Ok(Self::of_file(py, CameraFile::demo().map_err(exception)?)))
     }
 
     /// Reads a camera file; paths in it are relative to its folder.
     #[staticmethod]
-    fn read(path: PathBuf) -> PyResult<Self> {
-        guarded(|| Ok(Self::of_file(CameraFile::read(&path).map_err(exception)?)))
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        guarded(|| Ok(Self::of_file(py, CameraFile::read(&path).map_err(exception)?)))
     }
 
     /// Returns the camera of a camera file's text, in RON.
@@ -61,9 +63,9 @@ impl Camera {
     ///     What paths in it are relative to.
     #[staticmethod]
     #[pyo3(signature = (text, folder=None))]
-    fn from_ron(text: &str, folder: Option<PathBuf>) -> PyResult<Self> {
+    fn from_ron(py: Python<'_>, text: &str, folder: Option<PathBuf>) -> PyResult<Self> {
         let name = folder.unwrap_or_default().join("camera.ron");
-        guarded(|| Ok(Self::of_file(CameraFile::parse(text, &name).map_err(exception)?)))
+        guarded(|| Ok(Self::of_file(py, CameraFile::parse(text, &name).map_err(exception)?)))
     }
 
     /// Returns the camera of a dictionary as `to_dict` makes it: the keys of the camera file; what is left out has its default.
@@ -72,7 +74,7 @@ impl Camera {
         let file: CameraFile = from_python("the camera", data.as_any())?;
         guarded(|| {
             file.validate().map_err(exception)?;
-            Ok(Self::of_file(file))
+            Ok(Self::of_file(data.py(), file))
         })
     }
 
@@ -85,7 +87,7 @@ impl Camera {
             let warn = py.import("warnings")?.getattr("warn")?;
             warn.call1((format!("{note}: the scene is imaged anew"),))?;
         }
-        Ok(Self::new(resumed.camera))
+        Ok(Self::new(resumed.camera.with_paintings(painting_folder(py))))
     }
 
     /// Returns the camera with changes, checked now. Names, words and units are those of ``dioptric run``.

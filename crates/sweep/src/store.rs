@@ -158,6 +158,12 @@ impl Workplace<'_> {
         Ok(folder)
     }
 
+    /// Removes what was made of an item that cannot be finished.
+    pub(crate) fn discard(&self, id: ItemId) -> Result<(), SweepError> {
+        let folder = self.path().join(id.to_string());
+        fs::remove_dir_all(&folder).map_err(SweepError::writing(&folder))
+    }
+
     /// Puts an item into the store, its files on the disk first. Where another maker was first, its item stays.
     pub(crate) fn keep(&self, id: ItemId) -> Result<(), SweepError> {
         let (made, place) = (self.path().join(id.to_string()), self.store.item(id));
