@@ -66,9 +66,9 @@ pub enum SweepError {
         /// Its number.
         item: usize,
         /// Its name here.
-        found: crate::ItemId,
+        found: String,
         /// Its name there.
-        expected: crate::ItemId,
+        expected: String,
     },
     /// A place of the store that cannot be written to.
     #[error("cannot write {}: {reason}", path.display())]

@@ -169,7 +169,7 @@ impl Maker {
         let camera = self.cameras.camera(item)?;
         let found = self.cameras.key(&camera)?.id;
         if found != id {
-            return Err(SweepError::Other { item, found, expected: id });
+            return Err(SweepError::Other { item, found: found.to_string(), expected: id.to_string() });
         }
         make_item(&self.cameras, (&camera, id), place, &mut self.bench, (progress, cancel))
     }
