@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dioptric_pipeline::{Camera as CameraFile, KeptCamera, PipelineError, Quality, Staged, write_file};
+use dioptric_pipeline::{Camera as CameraFile, KeptCamera, PipelineError, Quality, Staged, parse_bytes, write_file};
 use pyo3::{
     prelude::*,
     types::{PyDict, PyType},
@@ -12,6 +12,7 @@ use crate::{
     changes::{ALL, changed},
     errors::{exception, guarded, wrong},
     lens::Lens,
+    options::word,
     paintings::painting_folder,
     scene::Scene,
     sensor::Sensor,
@@ -122,7 +123,8 @@ impl Camera {
     /// bank_error : float
     ///     Samples the lens as finely as this error at nine tenths of the places needs.
     /// scene : Scene or path
-    /// fov_deg, depth_m, illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2
+    /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, white_level
+    /// illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2
     ///     Of the scene, as of `Scene.read`.
     /// wavelengths_nm : list of float, or "scene"
     ///     The bands that are simulated.
@@ -134,6 +136,7 @@ impl Camera {
     /// bracket_stops : list of float
     ///     Several frames, merged.
     /// white, demosaic, highlights : str
+    /// denoise : float
     ///     Of the processing.
     /// seed : int
     /// name : str
@@ -146,24 +149,28 @@ impl Camera {
     ///
     /// Parameters
     /// ----------
-    /// quality : {"full", "draft", "preview"}
-    ///     Preview: at most 480 columns and 5 bands; draft: 960 and 11.
+    /// quality : {"full", "draft", "preview", "sketch"}
+    ///     Draft: at most 960 columns and 11 bands; preview: 480 and 5; sketch: 160 and 4.
     /// progress : bool or callable
     ///     ``True`` for a bar (tqdm's where that is installed), or a callable of the stage's title and the part of it that is done,
     ///     0-1, called from this thread some 40 times a second.
     /// memory_bytes : int
     ///     Irradiance of more than this is kept in a temporary file. Default 2 GiB.
+    /// memory : str or int
+    ///     The most that imaging takes, as ``"4GiB"`` or in bytes: scene, plan, bands that are worked on and film; ``--memory`` of the
+    ///     program. Results are the same.
     ///
     /// Returns
     /// -------
     /// Shot
-    #[pyo3(signature = (*, quality="full", progress=None, memory_bytes=None))]
+    #[pyo3(signature = (*, quality="full", progress=None, memory_bytes=None, memory=None))]
     fn render(
         &self,
         py: Python<'_>,
         quality: &str,
         progress: Option<&Bound<'_, PyAny>>,
         memory_bytes: Option<u64>,
+        memory: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Shot> {
         let quality = match quality {
             "full" => Quality::Full,
@@ -175,6 +182,13 @@ impl Camera {
         let mut kept = self.kept.with_quality(quality);
         if let Some(bytes) = memory_bytes {
             kept = kept.with_memory_bytes(bytes);
+        }
+        if let Some(memory) = memory {
+            let budget = match memory.extract::<u64>() {
+                Ok(bytes) => bytes,
+                Err(_) => parse_bytes(&word("memory", memory)?).map_err(exception)?,
+            };
+            kept = kept.with_memory_budget(budget);
         }
         Shot::take(py, kept, &Follower::of(progress)?)
     }

@@ -249,7 +249,7 @@ impl Shot {
     ///
     /// Parameters
     /// ----------
-    /// seed, exposure_s, analog_gain, noise, burst, bracket_stops, white, demosaic, highlights
+    /// seed, exposure_s, analog_gain, noise, burst, bracket_stops, white, demosaic, denoise, highlights
     ///     As of `Camera.with_`.
     ///
     /// Returns
@@ -264,7 +264,7 @@ impl Shot {
     ///
     /// Parameters
     /// ----------
-    /// white, demosaic, highlights
+    /// white, demosaic, denoise, highlights
     ///     As of `Camera.with_`.
     ///
     /// Returns

@@ -83,6 +83,11 @@ class Camera:
         scene: Scene | _Path | None = ...,
         fov_deg: float | None = ...,
         depth_m: float | None = ...,
+        width_mm: float | None = ...,
+        distance_mm: float | None = ...,
+        fill_depth: Literal["beside", "far"] | float | None = ...,
+        hidden: _Path | None = ...,
+        white_level: float | None = ...,
         illuminant: str | None = ...,
         illuminance_lux: float | None = ...,
         scene_light: str | None = ...,
@@ -95,6 +100,7 @@ class Camera:
         bracket_stops: Sequence[float] | None = ...,
         white: str | None = ...,
         demosaic: str | None = ...,
+        denoise: float | None = ...,
         highlights: str | None = ...,
         seed: int | None = ...,
     ) -> Camera: ...
@@ -104,6 +110,7 @@ class Camera:
         quality: Literal["full", "draft", "preview", "sketch"] = "full",
         progress: _Progress = None,
         memory_bytes: int | None = None,
+        memory: str | int | None = None,
     ) -> Shot: ...
     @property
     def name(self) -> str: ...
@@ -167,10 +174,16 @@ class Shot:
         bracket_stops: Sequence[float] | None = ...,
         white: str | None = ...,
         demosaic: str | None = ...,
+        denoise: float | None = ...,
         highlights: str | None = ...,
     ) -> Shot: ...
     def develop(
-        self, *, white: str | None = ..., demosaic: str | None = ..., highlights: str | None = ...
+        self,
+        *,
+        white: str | None = ...,
+        demosaic: str | None = ...,
+        denoise: float | None = ...,
+        highlights: str | None = ...,
     ) -> Shot: ...
     def png(self) -> bytes: ...
     def save(self, path: _Path) -> list[str]: ...
@@ -333,6 +346,11 @@ class Scene:
         *,
         fov_deg: float | None = ...,
         depth_m: float | None = ...,
+        width_mm: float | None = ...,
+        distance_mm: float | None = ...,
+        fill_depth: Literal["beside", "far"] | float | None = ...,
+        hidden: _Path | None = ...,
+        white_level: float | None = ...,
         illuminant: str | None = ...,
         illuminance_lux: float | None = ...,
         light: str | None = ...,
@@ -356,8 +374,10 @@ class Scene:
         rows: int,
         *,
         size: float | None = None,
-        fov_deg: float,
-        depth_m: float,
+        fov_deg: float | None = ...,
+        depth_m: float | None = ...,
+        width_mm: float | None = ...,
+        distance_mm: float | None = ...,
         illuminant: str | None = ...,
         illuminance_lux: float | None = ...,
         mean_luminance_cd_m2: float | None = ...,
