@@ -2,7 +2,7 @@
 # # A data set of pictures with random cameras
 #
 # A plan draws cameras at random; a sweep takes their pictures into a store, each with what it was taken by: labels for depth from defocus, denoising, or
-# blind estimation of a lens. A thousand pictures take some minutes; on many machines `python -m dioptric.ray` or `--shard` make the same store
+# blind estimation of a lens. A thousand pictures take ten minutes of a processor; on many machines `python -m dioptric.ray` or `--shard` make the same store
 # ([docs/sweep.md](../sweep.md)).
 
 # %%
