@@ -20,11 +20,12 @@ shot
 # The light on the film, band by band, and the raw frame behind it.
 
 # %%
-figure, axes = plt.subplots(1, 3, figsize=(12, 3))
+figure, axes = plt.subplots(1, 3, figsize=(13, 3), layout="constrained")
 for axis, nm in zip(axes, (450, 620)):
     band = np.argmin(np.abs(shot.wavelengths_nm - nm))
-    image = axis.imshow(shot.irradiance[band], cmap="gray")
-    axis.set_title(f"irradiance at {shot.wavelengths_nm[band]:.0f} nm, W m⁻² nm⁻¹")
+    # The small lamps are a hundred times brighter than all else.
+    image = axis.imshow(shot.irradiance[band], cmap="gray", vmax=np.percentile(shot.irradiance[band], 99))
+    axis.set_title(f"{shot.wavelengths_nm[band]:.0f} nm, W m⁻² nm⁻¹")
     figure.colorbar(image, ax=axis)
 image = axes[2].imshow(shot.raw, cmap="gray")
 axes[2].set_title(f"digital numbers after {1e3 * shot.exposure_s:.1f} ms")

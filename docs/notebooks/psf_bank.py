@@ -14,12 +14,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 SMALL = "DIOPTRIC_SMALL" in os.environ
+PIXEL_UM = 12.0
 lens = dp.Lens.built_in("dgauss-50mm").with_stop(f_number=2.8)
 fields_deg = np.linspace(0, 18, 4 if SMALL else 13)
-distances_mm = 1 / np.linspace(1 / 700, 1 / 5000, 3 if SMALL else 9)       # even in dioptres, as blur is
+distances_mm = 1 / np.linspace(1 / 800, 1 / 4000, 3 if SMALL else 9)       # even in dioptres, as blur is
 wavelengths_nm = np.array([450, 550, 650]) if SMALL else np.arange(420, 681, 20)
 bank = lens.psf(
-    field_deg=fields_deg, distance_mm=distances_mm, wavelengths_nm=wavelengths_nm, focus_mm=1200, pixel_um=6, shape=65,
+    field_deg=fields_deg, distance_mm=distances_mm, wavelengths_nm=wavelengths_nm, focus_mm=1200, pixel_um=PIXEL_UM, shape=65,
 )
 print(bank.shape, bank.dtype, f"{bank.nbytes / 1e6:.1f} MB")
 
@@ -35,12 +36,12 @@ for row, field in zip(axes, steps):
 plt.show()
 
 # %% [markdown]
-# The sum of a point spread is the share of the light entering the pupil that reaches its pixels: what the rims leave, and what does not fall
-# outside of the picture. Divided out, each sums to one.
+# Point spreads are normalized to the light that gets through the lens, so that a sum below one is what falls outside of the picture; the light
+# itself, cut by the rims, is in `lens.analyze`. Divided out, each sums to one.
 
 # %%
 energy = bank.sum(axis=(-2, -1))
-print(f"light at {fields_deg[-1]:.0f}°, in focus: {energy[-1, 1, green] / energy[0, 1, green]:.3f} of that on the axis")
+print(f"in the pictures: {100 * energy.min():.1f} % of the light at least")
 normalized = bank / energy[..., None, None]
 pictures = normalized.reshape(-1, 65 * 65)
 mean = pictures.mean(axis=0)
@@ -54,6 +55,6 @@ assert n < len(strengths)
 folder = Path(tempfile.mkdtemp())
 np.savez_compressed(
     folder / "bank.npz", psf=normalized.astype(np.float32), energy=energy,
-    fields_deg=fields_deg, distances_mm=distances_mm, wavelengths_nm=wavelengths_nm, pixel_um=6.0,
+    fields_deg=fields_deg, distances_mm=distances_mm, wavelengths_nm=wavelengths_nm, pixel_um=PIXEL_UM,
 )
 print(f"{(folder / 'bank.npz').stat().st_size / 1e6:.1f} MB; torch.from_numpy(np.load('bank.npz')['psf']) has it in PyTorch")
