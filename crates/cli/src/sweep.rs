@@ -171,6 +171,8 @@ fn index(plan: &Path, store: Option<&Path>, common: &Common) -> anyhow::Result<(
     if !store.folder().is_dir() {
         bail!("{} is no folder, expected the store of {}", store.folder().display(), plan.display());
     }
+    // Of shards that were killed.
+    store.remove_leftovers();
     Index::of(&sweep, &store)?.write(&store)?;
     if common.json {
         return count(&sweep, &store, Shard::ALL, common);

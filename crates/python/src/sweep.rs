@@ -2,7 +2,10 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::{Mutex, PoisonError},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use dioptric_sweep::{
@@ -248,7 +251,8 @@ impl Sweep {
         counts_of(py, &made)
     }
 
-    /// Writes ``index.jsonl``, ``index.csv`` and the contact sheet ``index.html`` anew from what the store holds.
+    /// Writes ``index.jsonl``, ``index.csv`` and the contact sheet ``index.html`` anew from what the store holds, and removes what killed
+    /// processes left in it.
     #[pyo3(signature = (store=None))]
     fn write_index(&self, py: Python<'_>, store: Option<PathBuf>) -> PyResult<()> {
         let (store, items) = (self.store(py, store), &self.items);
@@ -256,7 +260,10 @@ impl Sweep {
             let reason = "it is no folder, expected the store of the plan".to_owned();
             return Err(sweep_exception(SweepError::Read { path: store.folder().to_owned(), reason }));
         }
-        run_sweep(py, &Follower::nobody(), |_, _| Index::of(items, &store)?.write(&store))
+        run_sweep(py, &Follower::nobody(), |_, _| {
+            store.remove_leftovers();
+            Index::of(items, &store)?.write(&store)
+        })
     }
 
     /// Counts the items by what came of them: ``done``, ``refused``, ``missing``.
@@ -331,6 +338,7 @@ fn counts_of<'py>(py: Python<'py>, made: &Made) -> PyResult<Bound<'py, PyDict>> 
 pub(crate) struct Maker {
     maker: Mutex<dioptric_sweep::Maker>,
     store: Store,
+    has_begun: AtomicBool,
 }
 
 #[pymethods]
@@ -341,7 +349,7 @@ impl Maker {
         let maker = run_sweep(py, &Follower::nobody(), |_, _| {
             dioptric_sweep::Maker::of(own.plan.clone(), &own.path, paintings)
         })?;
-        Ok(Self { maker: Mutex::new(maker), store: Store::new(&store) })
+        Ok(Self { maker: Mutex::new(maker), store: Store::new(&store), has_begun: AtomicBool::new(false) })
     }
 
     /// Makes those of some items that are not there, one after the other.
@@ -360,7 +368,8 @@ impl Maker {
         let items: Vec<_> = items.into_iter().map(named).collect::<Result<_, _>>().map_err(sweep_exception)?;
         run_sweep(py, &Follower::nobody(), |latest, cancel| {
             let mut maker = self.maker.lock().unwrap_or_else(PoisonError::into_inner);
-            let place = self.store.begin()?;
+            let has_begun = self.has_begun.swap(true, Ordering::Relaxed);
+            let place = if has_begun { self.store.workplace() } else { self.store.begin() }?;
             items.into_iter().map(|item| Ok(words(maker.make(&place, item, latest, cancel)?))).collect()
         })
     }

@@ -73,11 +73,25 @@ impl Store {
     /// # Errors
     /// When the store cannot be written to.
     pub fn begin(&self) -> Result<Workplace<'_>, SweepError> {
+        self.remove_leftovers();
+        self.workplace()
+    }
+
+    /// Makes a place for items that are being made. Of many makers that begin again and again each would look at all others to find
+    /// what is left: that is for the first time, and for the end.
+    ///
+    /// # Errors
+    /// When the store cannot be written to.
+    pub fn workplace(&self) -> Result<Workplace<'_>, SweepError> {
         let cannot = SweepError::writing(&self.folder);
         fs::create_dir_all(&self.folder).map_err(&cannot)?;
-        Leftover::all_in(&self.folder, UNFINISHED).into_iter().for_each(Leftover::remove);
         let name = |attempt| format!("{UNFINISHED}{}-{attempt}", std::process::id());
         Ok(Workplace { store: self, unfinished: HiddenFolder::make(&self.folder, name).map_err(&cannot)? })
+    }
+
+    /// Removes what makers left that are no more.
+    pub fn remove_leftovers(&self) {
+        Leftover::all_in(&self.folder, UNFINISHED).into_iter().for_each(Leftover::remove);
     }
 }
 
@@ -186,6 +200,12 @@ mod tests {
         let alive = store.begin().unwrap();
         let second = store.begin().unwrap();
         assert!(alive.path().is_dir() && second.path().is_dir());
+        assert_eq!(names(folder.path()).len(), 2);
+        fs::create_dir(folder.path().join(".tmp-dead")).unwrap();
+        let third = store.workplace().unwrap();
+        assert_eq!(names(folder.path()).len(), 4);
+        drop(third);
+        store.remove_leftovers();
         assert_eq!(names(folder.path()).len(), 2);
     }
 }

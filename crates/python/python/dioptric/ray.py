@@ -226,6 +226,9 @@ def main(arguments: list[str] | None = None) -> int:
             threads=given.threads,
             progress=not given.quiet,
         )
+    except KeyboardInterrupt:
+        print("error: interrupted; what is finished stays, and the next sweep goes on from there", file=sys.stderr)
+        return 130
     except (ImportError, OSError, RuntimeError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
