@@ -31,7 +31,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ),
     ("sweep", &["pictures", "spectrum", "psf", "backward", "pipeline", "analysis"]),
     ("cli", &["pictures", "spectrum", "pipeline", "analysis", "report", "sweep"]),
-    ("python", &["spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis"]),
+    ("python", &["spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis", "sweep"]),
     ("studio", &["pictures", "spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis"]),
     ("xtask", &["pipeline", "report", "sweep"]),
 ];

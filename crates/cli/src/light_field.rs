@@ -9,6 +9,7 @@ use dioptric_spectrum::Cancel;
 
 use crate::{
     args::Common,
+    paintings::painting_folder,
     render_args::LightFieldArgs,
     run::Clock,
     terminal::{guarded, print, print_json},
@@ -28,7 +29,7 @@ pub(crate) fn run(arguments: &LightFieldArgs, common: &Common) -> anyhow::Result
     if let Some(wrong) = arguments.refocus_m.iter().find(|depth_m| depth_m.is_nan() || **depth_m <= 0.0) {
         bail!("--refocus-m has {wrong}, expected depths above 0 m");
     }
-    let kept = KeptCamera::new(camera);
+    let kept = KeptCamera::new(camera).with_paintings(painting_folder());
     kept.check()?;
     let staged = guarded(Staged::folder(&arguments.out)?);
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());

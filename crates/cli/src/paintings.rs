@@ -1,25 +1,19 @@
-//! Where paintings of the still life are kept from run to run.
+//! What the program keeps from run to run.
 
-use std::{env, path::PathBuf, time::UNIX_EPOCH};
+use std::{env, path::PathBuf};
 
-use dioptric_pipeline::PaintingFolder;
-use etcetera::{BaseStrategy, choose_base_strategy};
-
-/// Names the folder; nothing is kept where it is empty.
-const VARIABLE: &str = "DIOPTRIC_CACHE";
+use dioptric_pipeline::{PaintingFolder, program_build};
 
 /// Returns the user's folder of paintings, `None` where there is none or none is wanted.
 pub(crate) fn painting_folder() -> Option<PaintingFolder> {
-    let folder = match env::var_os(VARIABLE) {
-        Some(folder) => PathBuf::from(folder),
-        None => choose_base_strategy().ok()?.cache_dir().join("dioptric"),
-    };
-    if folder.as_os_str().is_empty() { None } else { Some(PaintingFolder::new(folder, build()?)) }
+    PaintingFolder::of_user(&program()?)
 }
 
-/// Returns what tells this program from another build of it: its version, and the size and age of its file.
+/// Returns what tells this program from another build of it.
 pub(crate) fn build() -> Option<String> {
-    let file = env::current_exe().ok()?.metadata().ok()?;
-    let built = file.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
-    Some(format!("{} {} {}", env!("CARGO_PKG_VERSION"), file.len(), built.as_nanos()))
+    program_build(&program()?)
+}
+
+fn program() -> Option<PathBuf> {
+    env::current_exe().ok()
 }

@@ -9,12 +9,13 @@ use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use dioptric_pipeline::{Progress, Stage};
 use dioptric_spectrum::Cancel;
-use dioptric_sweep::{Index, PLAN_SCHEMA, PLAN_TEMPLATE, Shard, Store, Sweep, SweepProgress};
+use dioptric_sweep::{Index, Made, PLAN_SCHEMA, PLAN_TEMPLATE, Shard, Store, Sweep, SweepProgress};
 use serde_json::json;
 
 use crate::{
     camera::write_new,
     common::Common,
+    paintings::painting_folder,
     terminal::{Bar, guard, print, print_json, remark},
 };
 
@@ -105,7 +106,7 @@ pub(crate) fn run(arguments: &SweepArgs, common: &Common) -> anyhow::Result<()> 
 
 fn open(plan: &Path, store: Option<&Path>) -> anyhow::Result<(Sweep, Store)> {
     let folder = store.map_or_else(|| plan.with_extension("store"), Path::to_owned);
-    Ok((Sweep::read(plan)?, Store::new(&folder)))
+    Ok((Sweep::read(plan)?.with_paintings(painting_folder()), Store::new(&folder)))
 }
 
 fn make(plan: &Path, arguments: &SweepArgs, common: &Common) -> anyhow::Result<()> {
@@ -125,14 +126,23 @@ fn make(plan: &Path, arguments: &SweepArgs, common: &Common) -> anyhow::Result<(
         Index::of(&sweep, &store)?.write(&store)?;
     }
     if common.json {
-        return print_json(&json!({
-            "there": made.n_there, "done": made.n_done, "refused": made.n_refused, "left": made.n_left,
-            "store": store.folder(),
-        }));
+        print_json(&json!({
+            "there": made.n_there, "done": made.n_done, "refused": made.n_refused, "failed": made.n_failed,
+            "left": made.n_left, "store": store.folder(),
+        }))?;
+    } else if !common.quiet {
+        tell_made(&made, plan, &store, has_index)?;
     }
-    if common.quiet {
-        return Ok(());
+    match made.first_failure {
+        Some(reason) => bail!(
+            "{} items were not made, the first since {reason}; they are tried again when the sweep is started again",
+            made.n_failed
+        ),
+        None => Ok(()),
     }
+}
+
+fn tell_made(made: &Made, plan: &Path, store: &Store, has_index: bool) -> anyhow::Result<()> {
     let last = match has_index {
         true => store.folder().join("index.html").display().to_string(),
         false => format!("when all shards are done: dioptric sweep index {}", plan.display()),
@@ -161,6 +171,8 @@ fn index(plan: &Path, store: Option<&Path>, common: &Common) -> anyhow::Result<(
     if !store.folder().is_dir() {
         bail!("{} is no folder, expected the store of {}", store.folder().display(), plan.display());
     }
+    // Of shards that were killed.
+    store.remove_leftovers();
     Index::of(&sweep, &store)?.write(&store)?;
     if common.json {
         return count(&sweep, &store, Shard::ALL, common);

@@ -78,3 +78,21 @@ fn wrong_plans_end_in_one_sentence() {
     check_error(folder.path(), &["sweep", "index", "plan.ron"], &["plan.store"]);
     assert!(!dioptric(folder.path(), &["sweep", "plan.ron", "index", "plan.ron"]).status.success());
 }
+
+#[test]
+fn unreadable_files_end_in_an_error_and_are_no_results() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    fs::write(folder.path().join("cut.exr"), [0x76, 0x2f, 0x31, 0x01]).unwrap();
+    let scene = r#"(source: File("cut.exr"), field_of_view_deg: 14.0, depth_m: 2.0)"#;
+    let vary = format!(r#"Grid({{"scene": List([{scene}]), "seed": List([1, 2])}})"#);
+    fs::write(folder.path().join("plan.ron"), format!(r#"(base: File("camera.ron"), vary: [{vary}])"#)).unwrap();
+    for _ in 0..2 {
+        let words = ["2 items were not made", "cut.exr", "tried again"];
+        let done = dioptric(folder.path(), &["sweep", "plan.ron", "--json"]);
+        let error = String::from_utf8(done.stderr).unwrap();
+        assert!(!done.status.success() && words.iter().all(|word| error.contains(word)), "{error}");
+        let counts: Value = serde_json::from_slice(&done.stdout).unwrap();
+        assert_eq!((&counts["failed"], &counts["refused"]), (&json!(2), &json!(0)));
+    }
+}

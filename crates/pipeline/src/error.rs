@@ -153,22 +153,34 @@ impl PipelineError {
         matches!(self, Self::Optics(OpticsError::NoFocus { side: "behind it", .. }))
     }
 
-    /// Whether it is about this machine or this moment: work that was cancelled, a file that is not there or cannot be written.
+    /// Whether it is about this machine or this moment: work that was cancelled, a file that cannot be read or written.
     /// All other errors are about the camera, and come back whenever it is tried.
     pub fn is_passing(&self) -> bool {
+        self.is_unreadable()
+            || matches!(
+                self,
+                Self::Cancelled(_)
+                    | Self::Write { .. }
+                    | Self::Png { .. }
+                    | Self::Spill { .. }
+                    | Self::Memory { .. }
+                    | Self::Sensor(SensorError::Write { .. })
+                    | Self::Scene(SceneError::Unwritable { .. })
+                    | Self::Backward(BackwardError::Write { .. })
+                    | Self::Forward(ForwardError::Sink { .. })
+            )
+    }
+
+    /// Whether a file that the camera is made from cannot be read: absent, cut off, or of another format. Another try may find it
+    /// mended; what is wrong in a file that can be read is not among these.
+    pub fn is_unreadable(&self) -> bool {
         matches!(
             self,
-            Self::Cancelled(_)
-                | Self::Write { .. }
-                | Self::Read { .. }
-                | Self::Png { .. }
-                | Self::Spill { .. }
-                | Self::Memory { .. }
+            Self::Read { .. }
                 | Self::Optics(OpticsError::Io { .. })
-                | Self::Sensor(SensorError::Read { .. } | SensorError::Write { .. })
-                | Self::Scene(SceneError::Unwritable { .. })
-                | Self::Backward(BackwardError::Write { .. })
-                | Self::Forward(ForwardError::Sink { .. })
+                | Self::Sensor(SensorError::Read { .. })
+                | Self::Scene(SceneError::Unreadable { .. })
+                | Self::World(WorldError::Unreadable { .. })
         )
     }
 }

@@ -14,6 +14,7 @@ pub mod display;
 mod error;
 pub mod figures;
 mod frame_files;
+mod hidden;
 mod light_field;
 mod numbers;
 mod paintings;
@@ -38,16 +39,17 @@ pub use camera::{
 pub use capture_files::write_capture;
 pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};
+pub use hidden::{HiddenFolder, Leftover};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_bytes, parse_numbers, parse_pairs};
-pub use paintings::PaintingFolder;
+pub use paintings::{PaintingFolder, program_build};
 pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
 pub use quality::Quality;
 #[cfg(feature = "schema")]
 pub use schema::generated_schemas;
 pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
-pub use staged::{Leftover, Staged, write_file, write_json};
+pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,
     IrradianceSummary, KeptCamera, LensAberrations, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene,

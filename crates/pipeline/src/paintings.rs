@@ -2,14 +2,15 @@
 
 use std::{
     cmp::Reverse,
-    fs,
+    env, fs,
     hash::{DefaultHasher, Hash, Hasher},
     path::{Path, PathBuf},
-    time::SystemTime,
+    time::{SystemTime, UNIX_EPOCH},
 };
 
 use dioptric_scene::{ExrParts, Scene, StillLife, read_spectral_exr, write_spectral_exr};
 use dioptric_spectrum::{Cancel, Quantity, SpectralImage, WavelengthGrid};
+use etcetera::{BaseStrategy, choose_base_strategy};
 
 use crate::PipelineError;
 
@@ -18,6 +19,16 @@ const LEAST_PIXELS: usize = 100_000;
 
 /// Bytes of all paintings together; the oldest give way.
 const MOST_BYTES: u64 = 1 << 30;
+
+/// Names the user's folder; nothing is kept where it is empty.
+const VARIABLE: &str = "DIOPTRIC_CACHE";
+
+/// Returns what tells one build of a program from another: its version, and the size and age of its file.
+pub fn program_build(file: &Path) -> Option<String> {
+    let file = file.metadata().ok()?;
+    let built = file.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
+    Some(format!("{} {} {}", env!("CARGO_PKG_VERSION"), file.len(), built.as_nanos()))
+}
 
 /// A folder in which paintings of the still life are kept from run to run.
 ///
@@ -30,6 +41,18 @@ pub struct PaintingFolder {
 }
 
 impl PaintingFolder {
+    /// Returns the user's folder of paintings, which all programs share: the one that the environment variable `DIOPTRIC_CACHE` names,
+    /// else `dioptric` in the user's cache; `None` where there is none or, by an empty variable, none is wanted.
+    ///
+    /// `program` is the file of the program that paints, by which its builds are told apart.
+    pub fn of_user(program: &Path) -> Option<Self> {
+        let folder = match env::var_os(VARIABLE) {
+            Some(folder) => PathBuf::from(folder),
+            None => choose_base_strategy().ok()?.cache_dir().join("dioptric"),
+        };
+        if folder.as_os_str().is_empty() { None } else { Some(Self::new(folder, program_build(program)?)) }
+    }
+
     /// Returns the folder at a path, which need not exist yet; `build` tells builds of the program apart, since another may
     /// paint otherwise.
     pub fn new(path: impl Into<PathBuf>, build: impl Into<String>) -> Self {

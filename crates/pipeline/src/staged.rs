@@ -1,17 +1,17 @@
 //! Results that appear whole or not at all.
 
 use std::{
-    fs::{self, File, OpenOptions, TryLockError},
+    fs::{self, File},
     io,
     path::{Path, PathBuf},
 };
 
 use serde::Serialize;
 
-use crate::PipelineError;
-
-/// The file in a hidden folder that its owner holds locked as long as it lives, so that nobody needs to know of processes.
-const LOCK: &str = "lock";
+use crate::{
+    PipelineError,
+    hidden::{HiddenFolder, Leftover},
+};
 
 /// What stands in the names of hidden folders before the number of their process.
 const PARTIAL: &str = ".partial-";
@@ -24,29 +24,13 @@ const PARTIAL: &str = ".partial-";
 #[derive(Debug)]
 pub struct Staged {
     target: PathBuf,
-    /// The hidden folder.
-    root: PathBuf,
+    hidden: HiddenFolder,
     /// What is moved to the target.
     content: PathBuf,
     is_folder: bool,
     /// Folders above the target that were made for it, outermost first.
     made_parents: Vec<PathBuf>,
     is_committed: bool,
-    lock: Option<File>,
-}
-
-/// The hidden folder that a killed process left; nobody else takes it while this is held.
-#[derive(Debug)]
-pub struct Leftover {
-    path: PathBuf,
-    _lock: File,
-}
-
-impl Leftover {
-    /// The folder.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
 }
 
 impl Staged {
@@ -92,21 +76,14 @@ impl Staged {
     fn begin_in(target: &Path, is_folder: bool, made_parents: &[PathBuf]) -> io::Result<Self> {
         let name = target.file_name().map_or_else(|| "out".into(), ToOwned::to_owned);
         let (folder, start) = places(target, is_folder);
-        // Another may take the folder for a leftover until it is locked; and an earlier process may have had this number.
-        for attempt in 0..100 {
-            let suffix = if attempt == 0 { String::new() } else { format!("-{attempt}") };
-            let root = folder.join(format!("{start}{}{suffix}", std::process::id()));
-            match fs::create_dir(&root) {
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
-                made => made?,
-            }
-            if let Lock::Held(lock) | Lock::Unknown(lock) = lock(&root) {
-                let content = root.join(if is_folder { "results".into() } else { name });
-                let (target, made_parents, lock) = (target.to_owned(), made_parents.to_vec(), Some(lock));
-                return Ok(Self { target, root, content, is_folder, made_parents, is_committed: false, lock });
-            }
-        }
-        Err(io::Error::other("no hidden folder beside it can be locked"))
+        let numbered = |attempt: usize| match attempt {
+            0 => format!("{start}{}", std::process::id()),
+            _ => format!("{start}{}-{attempt}", std::process::id()),
+        };
+        let hidden = HiddenFolder::make(&folder, numbered)?;
+        let content = hidden.path().join(if is_folder { "results".into() } else { name });
+        let (target, made_parents) = (target.to_owned(), made_parents.to_vec());
+        Ok(Self { target, hidden, content, is_folder, made_parents, is_committed: false })
     }
 
     /// Where to write.
@@ -116,7 +93,7 @@ impl Staged {
 
     /// The hidden folder, for what is not moved to the target; it is removed in the end.
     pub fn root(&self) -> &Path {
-        &self.root
+        self.hidden.path()
     }
 
     /// Returns the hidden folders that killed processes left for the same target.
@@ -143,13 +120,10 @@ impl Staged {
 
 impl Drop for Staged {
     fn drop(&mut self) {
-        // A file that is open cannot be removed everywhere; nothing can be done about what cannot be removed.
-        self.lock = None;
-        let _ = fs::remove_dir_all(&self.root);
-        if self.is_committed {
-            return;
+        self.hidden.remove();
+        if !self.is_committed {
+            remove_empty(&self.made_parents);
         }
-        remove_empty(&self.made_parents);
     }
 }
 
@@ -175,50 +149,14 @@ fn places(target: &Path, is_folder: bool) -> (PathBuf, String) {
 fn leftovers(target: &Path, is_folder: bool) -> Vec<Leftover> {
     let beside = places(target, false);
     let inside = is_folder.then(|| places(target, true)).filter(|inside| *inside != beside);
-    let mut found = Vec::new();
-    for (folder, start) in std::iter::once(beside).chain(inside) {
-        let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
-        for path in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(&start)).map(|e| e.path()) {
-            if path.is_dir()
-                && let Lock::Held(lock) = lock(&path)
-            {
-                found.push(Leftover { path, _lock: lock });
-            }
-        }
-    }
-    found.sort_by(|a, b| a.path.cmp(&b.path));
+    let mut found: Vec<Leftover> =
+        std::iter::once(beside).chain(inside).flat_map(|(folder, start)| Leftover::all_in(&folder, &start)).collect();
+    found.sort_by(|a, b| a.path().cmp(b.path()));
     found
 }
 
 fn remove(leftovers: Vec<Leftover>) {
-    for Leftover { path, _lock: lock } in leftovers {
-        // What cannot be removed is left for the next one.
-        drop(lock);
-        let _ = fs::remove_dir_all(path);
-    }
-}
-
-/// What came of locking a hidden folder.
-enum Lock {
-    /// It is ours.
-    Held(File),
-    /// Another holds it, or has removed the folder.
-    Taken,
-    /// The file system knows no locks: leftovers stay there.
-    Unknown(File),
-}
-
-fn lock(folder: &Path) -> Lock {
-    let path = folder.join(LOCK);
-    let Ok(file) = OpenOptions::new().create(true).truncate(false).write(true).open(&path) else {
-        return Lock::Taken;
-    };
-    match file.try_lock() {
-        // It may have been removed between being opened and being locked.
-        Ok(()) if path.exists() => Lock::Held(file),
-        Ok(()) | Err(TryLockError::WouldBlock) => Lock::Taken,
-        Err(TryLockError::Error(_)) => Lock::Unknown(file),
-    }
+    leftovers.into_iter().for_each(Leftover::remove);
 }
 
 /// Makes the folders above `target` and returns those that were missing.

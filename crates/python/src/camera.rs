@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dioptric_pipeline::{Camera as CameraFile, KeptCamera, PipelineError, Quality, Staged, write_file};
+use dioptric_pipeline::{Camera as CameraFile, KeptCamera, PipelineError, Quality, Staged, parse_bytes, write_file};
 use pyo3::{
     prelude::*,
     types::{PyDict, PyType},
@@ -12,6 +12,8 @@ use crate::{
     changes::{ALL, changed},
     errors::{exception, guarded, wrong},
     lens::Lens,
+    options::word,
+    paintings::painting_folder,
     scene::Scene,
     sensor::Sensor,
     serial::{from_python, to_python},
@@ -33,8 +35,9 @@ impl Camera {
         Self { kept }
     }
 
-    fn of_file(file: CameraFile) -> Self {
-        Self::new(KeptCamera::new(file))
+    /// Returns the camera of a camera file; paintings of the still life are kept in the user's cache, as the program does.
+    pub(crate) fn of_file(py: Python<'_>, file: CameraFile) -> Self {
+        Self::new(KeptCamera::new(file).with_paintings(painting_folder(py)))
     }
 }
 
@@ -42,14 +45,14 @@ impl Camera {
 impl Camera {
     /// Returns the camera of the built-in demo: a still life through a 50 mm double Gauss at f/4, as of ``dioptric run``.
     #[staticmethod]
-    fn demo() -> PyResult<Self> {
-        guarded(|| Ok(Self::of_file(CameraFile::demo().map_err(exception)?)))
+    fn demo(py: Python<'_>) -> PyResult<Self> {
+        guarded(|| Ok(Self::of_file(py, CameraFile::demo().map_err(exception)?)))
     }
 
     /// Reads a camera file; paths in it are relative to its folder.
     #[staticmethod]
-    fn read(path: PathBuf) -> PyResult<Self> {
-        guarded(|| Ok(Self::of_file(CameraFile::read(&path).map_err(exception)?)))
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        guarded(|| Ok(Self::of_file(py, CameraFile::read(&path).map_err(exception)?)))
     }
 
     /// Returns the camera of a camera file's text, in RON.
@@ -61,9 +64,9 @@ impl Camera {
     ///     What paths in it are relative to.
     #[staticmethod]
     #[pyo3(signature = (text, folder=None))]
-    fn from_ron(text: &str, folder: Option<PathBuf>) -> PyResult<Self> {
+    fn from_ron(py: Python<'_>, text: &str, folder: Option<PathBuf>) -> PyResult<Self> {
         let name = folder.unwrap_or_default().join("camera.ron");
-        guarded(|| Ok(Self::of_file(CameraFile::parse(text, &name).map_err(exception)?)))
+        guarded(|| Ok(Self::of_file(py, CameraFile::parse(text, &name).map_err(exception)?)))
     }
 
     /// Returns the camera of a dictionary as `to_dict` makes it: the keys of the camera file; what is left out has its default.
@@ -72,7 +75,7 @@ impl Camera {
         let file: CameraFile = from_python("the camera", data.as_any())?;
         guarded(|| {
             file.validate().map_err(exception)?;
-            Ok(Self::of_file(file))
+            Ok(Self::of_file(data.py(), file))
         })
     }
 
@@ -85,7 +88,7 @@ impl Camera {
             let warn = py.import("warnings")?.getattr("warn")?;
             warn.call1((format!("{note}: the scene is imaged anew"),))?;
         }
-        Ok(Self::new(resumed.camera))
+        Ok(Self::new(resumed.camera.with_paintings(painting_folder(py))))
     }
 
     /// Returns the camera with changes, checked now. Names, words and units are those of ``dioptric run``.
@@ -120,7 +123,8 @@ impl Camera {
     /// bank_error : float
     ///     Samples the lens as finely as this error at nine tenths of the places needs.
     /// scene : Scene or path
-    /// fov_deg, depth_m, illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2
+    /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, white_level
+    /// illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2
     ///     Of the scene, as of `Scene.read`.
     /// wavelengths_nm : list of float, or "scene"
     ///     The bands that are simulated.
@@ -149,24 +153,28 @@ impl Camera {
     ///
     /// Parameters
     /// ----------
-    /// quality : {"full", "draft", "preview"}
-    ///     Preview: at most 480 columns and 5 bands; draft: 960 and 11.
+    /// quality : {"full", "draft", "preview", "sketch"}
+    ///     Draft: at most 960 columns and 11 bands; preview: 480 and 5; sketch: 160 and 4.
     /// progress : bool or callable
     ///     ``True`` for a bar (tqdm's where that is installed), or a callable of the stage's title and the part of it that is done,
     ///     0-1, called from this thread some 40 times a second.
     /// memory_bytes : int
     ///     Irradiance of more than this is kept in a temporary file. Default 2 GiB.
+    /// memory : str or int
+    ///     The most that imaging takes, as ``"4GiB"`` or in bytes: scene, plan, bands that are worked on and film; ``--memory`` of the
+    ///     program. Results are the same.
     ///
     /// Returns
     /// -------
     /// Shot
-    #[pyo3(signature = (*, quality="full", progress=None, memory_bytes=None))]
+    #[pyo3(signature = (*, quality="full", progress=None, memory_bytes=None, memory=None))]
     fn render(
         &self,
         py: Python<'_>,
         quality: &str,
         progress: Option<&Bound<'_, PyAny>>,
         memory_bytes: Option<u64>,
+        memory: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Shot> {
         let quality = match quality {
             "full" => Quality::Full,
@@ -178,6 +186,13 @@ impl Camera {
         let mut kept = self.kept.with_quality(quality);
         if let Some(bytes) = memory_bytes {
             kept = kept.with_memory_bytes(bytes);
+        }
+        if let Some(memory) = memory {
+            let budget = match memory.extract::<u64>() {
+                Ok(bytes) => bytes,
+                Err(_) => parse_bytes(&word("memory", memory)?).map_err(exception)?,
+            };
+            kept = kept.with_memory_budget(budget);
         }
         Shot::take(py, kept, &Follower::of(progress)?)
     }

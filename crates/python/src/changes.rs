@@ -14,8 +14,8 @@ use crate::{
     errors::{exception, wrong, wrong_type},
     input::{number, numbers, type_name},
     lens::Lens,
-    options::{count, diffraction, each_option, light, with_gamma, word},
-    scene::Scene,
+    options::{count, diffraction, each_option, with_gamma, word},
+    scene::{SCENE_OPTIONS, Scene, check_flat, set_scene_option},
     sensor::Sensor,
 };
 
@@ -64,6 +64,11 @@ pub(crate) const ALL: &[&str] = &[
     "scene",
     "fov_deg",
     "depth_m",
+    "width_mm",
+    "distance_mm",
+    "fill_depth",
+    "hidden",
+    "white_level",
     "illuminant",
     "illuminance_lux",
     "scene_light",
@@ -109,6 +114,7 @@ pub(crate) fn changed(
         }
     })?;
     let camera = changed.camera();
+    check_flat(&camera.scene)?;
     camera.validate().map_err(exception)?;
     if checks_lens {
         open_lens(&changed)?;
@@ -173,7 +179,20 @@ fn set_sensor(kept: &mut KeptCamera, value: &Bound<'_, PyAny>) -> PyResult<()> {
 }
 
 fn set(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
-    let scene = &mut camera.scene;
+    let scene_key = if key == "scene_light" { "light" } else { key };
+    let is_set = set_optics(camera, key, value)?
+        || set_film(camera, given, key, value)?
+        || set_imaging(camera, key, value)?
+        || (SCENE_OPTIONS.contains(&scene_key) && key != "light" && {
+            set_scene_option(&mut camera.scene, scene_key, value)?;
+            true
+        })
+        || set_frames(camera, key, value)?;
+    if is_set { Ok(()) } else { set_sensor_option(camera, key, value) }
+}
+
+/// Sets what stands before the film; returns whether the key is among that.
+fn set_optics(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
     match key {
         "name" => camera.name = word(key, value)?,
         "f_number" => camera.stop = StopSpec::FNumber(number(key, value)?),
@@ -188,6 +207,14 @@ fn set(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_, PyA
         "swing_deg" => camera.movements.swing_deg = number(key, value)?,
         "rise_mm" => camera.movements.rise_mm = number(key, value)?,
         "shift_mm" => camera.movements.shift_mm = number(key, value)?,
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// Sets what the film is; returns whether the key is among that.
+fn set_film(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    match key {
         "crop" => {
             let expected = "four whole numbers: the first column and row, columns and rows";
             let (x, y, columns, rows) = value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?;
@@ -217,6 +244,14 @@ fn set(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_, PyA
             FilmSpec::Pixels { pitch_um, .. } => *pitch_um = number(key, value)?,
             _ => return Err(wrong(key, number(key, value)?, "'pixels' with it: the film's pixels are the sensor's")),
         },
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// Sets how a lens forms an image, and of which bands; returns whether the key is among that.
+fn set_imaging(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    match key {
         "diffraction" => camera.diffraction = diffraction(key, value)?,
         "gamma" => camera.diffraction = with_gamma(camera.diffraction, number(key, value)?)?,
         "blur" => {
@@ -232,17 +267,19 @@ fn set(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_, PyA
             }
         }
         "bank_error" => camera.bank = BankSpec::Within { error: number(key, value)? },
-        "fov_deg" => scene.field_of_view_deg = Some(number(key, value)?),
-        "depth_m" => scene.depth_m = Some(number(key, value)?),
-        "illuminant" => scene.illuminant = Some(light(key, value)?),
-        "illuminance_lux" => scene.illuminance_lux = Some(number(key, value)?),
-        "scene_light" => scene.light = Some(light(key, value)?),
-        "mean_luminance_cd_m2" => scene.mean_luminance_cd_m2 = Some(number(key, value)?),
         "wavelengths_nm" if value.is_instance_of::<PyString>() => match word(key, value)?.as_str() {
             "scene" => camera.wavelengths = WavelengthSpec::Scene,
             other => return Err(wrong(key, format!("'{other}'"), "numbers, or 'scene' for the scene's own")),
         },
         "wavelengths_nm" => camera.wavelengths = WavelengthSpec::ListNm(numbers(key, value)?),
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// Sets exposures and their number; returns whether the key is among that.
+fn set_frames(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    match key {
         "exposure_s" if value.is_instance_of::<PyString>() => match word(key, value)?.as_str() {
             "auto" => camera.exposure = with_auto_exposure(camera.exposure),
             other => return Err(wrong(key, format!("'{other}'"), "a time in s, or 'auto'")),
@@ -254,9 +291,9 @@ fn set(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_, PyA
             camera.seed =
                 value.extract().map_err(|_| wrong_type(key, type_name(value), "a whole number of 0 or more"))?;
         }
-        _ => return set_sensor_option(camera, key, value),
+        _ => return Ok(false),
     }
-    Ok(())
+    Ok(true)
 }
 
 fn set_sensor_option(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {

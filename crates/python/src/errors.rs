@@ -2,10 +2,10 @@
 
 use std::{any::Any, panic::AssertUnwindSafe};
 
-use dioptric_optics::OpticsError;
 use dioptric_pipeline::PipelineError;
 use dioptric_scene::SceneError;
 use dioptric_sensor::SensorError;
+use dioptric_sweep::SweepError;
 use pyo3::{
     PyErr, PyResult,
     exceptions::{PyOSError, PyRuntimeError, PyTypeError, PyValueError},
@@ -16,16 +16,25 @@ pub(crate) fn exception(error: impl Into<PipelineError>) -> PyErr {
     let error = error.into();
     let sentence = error.to_string();
     match error {
-        PipelineError::Read { .. }
-        | PipelineError::Write { .. }
+        PipelineError::Write { .. }
         | PipelineError::Spill { .. }
-        | PipelineError::Optics(OpticsError::Io { .. })
-        | PipelineError::Sensor(SensorError::Read { .. } | SensorError::Write { .. })
-        | PipelineError::Scene(SceneError::Unreadable { .. } | SceneError::Unwritable { .. }) => {
-            PyOSError::new_err(sentence)
-        }
+        | PipelineError::Sensor(SensorError::Write { .. })
+        | PipelineError::Scene(SceneError::Unwritable { .. }) => PyOSError::new_err(sentence),
+        unreadable if unreadable.is_unreadable() => PyOSError::new_err(sentence),
         PipelineError::Cancelled(_) => PyRuntimeError::new_err(sentence),
         _ => PyValueError::new_err(sentence),
+    }
+}
+
+/// Returns the exception of a plan or a store: `OSError` where a file is to blame, else `ValueError`.
+pub(crate) fn sweep_exception(error: SweepError) -> PyErr {
+    match error {
+        SweepError::Pipeline(error) => exception(error),
+        SweepError::Cancelled(cancelled) => exception(PipelineError::Cancelled(cancelled)),
+        SweepError::Read { .. } | SweepError::Write { .. } | SweepError::Changed { .. } => {
+            PyOSError::new_err(error.to_string())
+        }
+        other => PyValueError::new_err(other.to_string()),
     }
 }
 

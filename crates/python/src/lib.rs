@@ -15,11 +15,14 @@ mod errors;
 mod input;
 mod lens;
 mod options;
+mod paintings;
 mod rays;
+mod samples;
 mod scene;
 mod sensor;
 mod serial;
 mod shot;
+mod sweep;
 mod view;
 mod worker;
 
@@ -33,9 +36,11 @@ mod _native {
         camera::Camera,
         lens::Lens,
         rays::Rays,
+        samples::read_samples,
         scene::Scene,
         sensor::Sensor,
         shot::Shot,
+        sweep::{Maker, Plan, Sweep},
         view::Memory,
         worker::{_panic, set_threads, threads},
     };

@@ -5,16 +5,18 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
-use dioptric_pipeline::{Camera, Given, KeptCamera, PipelineError, SceneSource, SceneSpec, parse_illuminant};
+use dioptric_pipeline::{
+    Camera, FillDepth, FlatSize, Given, KeptCamera, PipelineError, SceneSource, SceneSpec, parse_illuminant,
+};
 use dioptric_scene::{Pattern, Scene as RadianceScene, SceneLight, View, write_scene_exr};
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, Array3, ArrayView1, Axis, Ix2, Ix3};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    errors::{exception, guarded, wrong},
-    input::{is_single, number, numbers, owned_f32},
-    options::{each_option, light},
+    errors::{exception, guarded, wrong, wrong_type},
+    input::{is_single, number, numbers, owned_f32, type_name},
+    options::{each_option, light, word},
     view::view,
     worker::{Follower, run},
 };
@@ -146,6 +148,14 @@ impl Scene {
     ///     Horizontal field of view, for files that hold none.
     /// depth_m : float, optional
     ///     One depth for all of it, for files that hold none.
+    /// width_mm, distance_mm : float, optional
+    ///     In place of both a flat scene by its width from edge to edge and its distance from the first vertex of the lens.
+    /// fill_depth : {"beside", "far"} or float, optional
+    ///     The depth where none was measured: the farther of those beside it, the farthest of the scene, or so many metres.
+    /// hidden : str or os.PathLike, optional
+    ///     A file of what lies behind the first surface: radiance and depth of the same samples.
+    /// white_level : float, optional
+    ///     The number that a perfect white has in an ENVI file that does not state it.
     /// illuminant : str, optional
     ///     The light that it is put under, as ``"D65"``, ``"3200K"``, or a CSV file.
     /// illuminance_lux : float, optional
@@ -188,6 +198,8 @@ impl Scene {
     ///     Horizontal field of view from its left edge to its right.
     /// depth_m : float
     ///     Its distance along the axis.
+    /// width_mm, distance_mm : float
+    ///     In place of both, as of `Scene.read`.
     /// size : float, optional
     ///     Of the pattern: side of a square or distance of points in samples (default 16), slope of the bar (2.6), number of lines
     ///     (8) or of pairs of sectors (36).
@@ -224,7 +236,7 @@ impl Scene {
         let source = SceneSource::Target { pattern, columns, rows };
         let spec = with_options("target", SceneSpec { source, ..SceneSpec::of_file(PathBuf::new()) }, options)?;
         for (key, value) in [("fov_deg", spec.field_of_view_deg), ("depth_m", spec.depth_m)] {
-            if value.is_none() {
+            if value.is_none() && spec.flat.is_none() {
                 return Err(wrong(key, "missing", "a number: a target has none of its own"));
             }
         }
@@ -302,17 +314,73 @@ impl Scene {
 }
 
 fn with_options(function: &str, mut spec: SceneSpec, options: Option<&Bound<'_, PyDict>>) -> PyResult<SceneSpec> {
-    let known = ["fov_deg", "depth_m", "illuminant", "illuminance_lux", "light", "mean_luminance_cd_m2"];
-    each_option(function, options, &known, |key, value| {
-        match key {
-            "fov_deg" => spec.field_of_view_deg = Some(number(key, value)?),
-            "depth_m" => spec.depth_m = Some(number(key, value)?),
-            "illuminant" => spec.illuminant = Some(light(key, value)?),
-            "illuminance_lux" => spec.illuminance_lux = Some(number(key, value)?),
-            "light" => spec.light = Some(light(key, value)?),
-            _ => spec.mean_luminance_cd_m2 = Some(number(key, value)?),
-        }
-        Ok(())
-    })?;
+    each_option(function, options, SCENE_OPTIONS, |key, value| set_scene_option(&mut spec, key, value))?;
+    check_flat(&spec)?;
     Ok(spec)
+}
+
+/// What may be said of a scene beside where it comes from, in the order in which it is set; the words are those of the command line.
+pub(crate) const SCENE_OPTIONS: &[&str] = &[
+    "fov_deg",
+    "depth_m",
+    "width_mm",
+    "distance_mm",
+    "fill_depth",
+    "hidden",
+    "white_level",
+    "illuminant",
+    "illuminance_lux",
+    "light",
+    "mean_luminance_cd_m2",
+];
+
+/// Sets one of [`SCENE_OPTIONS`]. A size takes the place of a field of view and a depth, and these that of a size.
+pub(crate) fn set_scene_option(spec: &mut SceneSpec, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    match key {
+        "fov_deg" => {
+            spec.field_of_view_deg = Some(number(key, value)?);
+            spec.flat = None;
+        }
+        "depth_m" => {
+            spec.depth_m = Some(number(key, value)?);
+            spec.flat = None;
+        }
+        "width_mm" => {
+            let distance_mm = spec.flat.map_or(f64::NAN, |flat| flat.distance_mm);
+            spec.flat = Some(FlatSize { width_mm: number(key, value)?, distance_mm });
+            (spec.field_of_view_deg, spec.depth_m) = (None, None);
+        }
+        "distance_mm" => match &mut spec.flat {
+            Some(flat) => flat.distance_mm = number(key, value)?,
+            None => return Err(wrong(key, number(key, value)?, "'width_mm' with it, the width of a flat scene")),
+        },
+        "fill_depth" => {
+            let fill = match value.extract::<f64>() {
+                Ok(z_m) => FillDepth::Metres(z_m),
+                Err(_) => word(key, value)?.parse().map_err(exception)?,
+            };
+            fill.check().map_err(exception)?;
+            spec.fill_depth = Some(fill);
+        }
+        "hidden" => {
+            let expected = "a path: a file of what lies behind the first surface";
+            spec.hidden = Some(value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?);
+        }
+        "white_level" => spec.white_level = Some(number(key, value)?),
+        "illuminant" => spec.illuminant = Some(light(key, value)?),
+        "illuminance_lux" => spec.illuminance_lux = Some(number(key, value)?),
+        "light" => spec.light = Some(light(key, value)?),
+        _ => spec.mean_luminance_cd_m2 = Some(number(key, value)?),
+    }
+    Ok(())
+}
+
+/// Refuses the width of a flat scene without its distance.
+pub(crate) fn check_flat(spec: &SceneSpec) -> PyResult<()> {
+    match spec.flat {
+        Some(flat) if flat.distance_mm.is_nan() => {
+            Err(wrong("width_mm", flat.width_mm, "'distance_mm' with it, from the first vertex of the lens"))
+        }
+        _ => Ok(()),
+    }
 }

@@ -12,10 +12,11 @@ use std::{
 
 use dioptric_pipeline::{PipelineError, Progress, Stage};
 use dioptric_spectrum::Cancel;
+use dioptric_sweep::{SweepError, SweepProgress};
 use pyo3::{exceptions::PyRuntimeError, prelude::*};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::errors::{exception, guarded, of_panic, wrong};
+use crate::errors::{exception, guarded, of_panic, sweep_exception, wrong};
 
 /// How often a thread that waits looks at signals and tells how far the work is.
 const POLL: Duration = Duration::from_millis(25);
@@ -140,8 +141,8 @@ impl Follower {
     }
 
     fn tell(&self, py: Python<'_>, latest: &Latest) -> PyResult<()> {
-        let (Some(callable), Some((stage, fraction))) = (&self.callable, latest.take()) else { return Ok(()) };
-        callable.call1(py, (stage.title(), fraction)).map(|_| ())
+        let (Some(callable), Some((what, fraction))) = (&self.callable, latest.take()) else { return Ok(()) };
+        callable.call1(py, (what, fraction)).map(|_| ())
     }
 
     fn close(&self, py: Python<'_>) -> PyResult<()> {
@@ -154,17 +155,36 @@ impl Follower {
 
 /// The latest that is known of the work, until it is passed on.
 #[derive(Default)]
-struct Latest(Mutex<Option<(Stage, f64)>>);
+pub(crate) struct Latest {
+    known: Mutex<Option<(String, f64)>>,
+    /// Of a sweep: how many items there are, of how many.
+    items: Mutex<Option<(usize, usize)>>,
+}
 
 impl Latest {
-    fn take(&self) -> Option<(Stage, f64)> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    fn take(&self) -> Option<(String, f64)> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    fn set(&self, what: String, fraction: f64) {
+        *self.known.lock().unwrap_or_else(PoisonError::into_inner) = Some((what, fraction));
     }
 }
 
 impl Progress for Latest {
     fn at(&self, stage: Stage, fraction: f64) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some((stage, fraction));
+        match *self.items.lock().unwrap_or_else(PoisonError::into_inner) {
+            Some((n_made, n_all)) => {
+                self.set(format!("{}/{n_all} {}", n_made + 1, stage.title()), n_made as f64 / n_all as f64);
+            }
+            None => self.set(stage.title().to_owned(), fraction),
+        }
+    }
+}
+
+impl SweepProgress for Latest {
+    fn items(&self, n_made: usize, n_all: usize) {
+        *self.items.lock().unwrap_or_else(PoisonError::into_inner) = Some((n_made, n_all));
     }
 }
 
@@ -176,6 +196,24 @@ pub(crate) fn run<T: Send>(
     py: Python<'_>,
     follower: &Follower,
     work: impl FnOnce(&dyn Progress, &Cancel) -> Result<T, PipelineError> + Send,
+) -> PyResult<T> {
+    run_as(py, follower, |latest, cancel| work(latest, cancel), exception)
+}
+
+/// As [`run`], for work on a sweep.
+pub(crate) fn run_sweep<T: Send>(
+    py: Python<'_>,
+    follower: &Follower,
+    work: impl FnOnce(&Latest, &Cancel) -> Result<T, SweepError> + Send,
+) -> PyResult<T> {
+    run_as(py, follower, work, sweep_exception)
+}
+
+fn run_as<T: Send, E: Send>(
+    py: Python<'_>,
+    follower: &Follower,
+    work: impl FnOnce(&Latest, &Cancel) -> Result<T, E> + Send,
+    exception: impl FnOnce(E) -> PyErr,
 ) -> PyResult<T> {
     let threads = pool(py)?;
     let (cancel, latest) = (Cancel::new(), Latest::default());

@@ -1,6 +1,7 @@
 """Scenes and sensors made of arrays and dictionaries are those they equal."""
 
 import pickle
+import subprocess
 from pathlib import Path
 
 import dioptric as dp
@@ -88,3 +89,49 @@ def test_given_sensor_takes_the_picture(tiny: dp.Camera, shot: dp.Shot) -> None:
     assert np.array_equal(camera.render().raw, shot.raw)
     silent = camera.with_(sensor=by_hand.with_(read_noise_v=0.0), pixels=(48, 32), pixel_um=660)
     assert not np.array_equal(silent.render().raw, shot.raw)
+
+
+def test_options_of_scenes_are_those_of_the_program(tiny: dp.Camera, program: Path, tmp_path: Path) -> None:
+    """Each in the words of the command line: the same camera file, and the same picture of a flat scene by its size."""
+    scene = dp.Scene.target("siemens-star", 48, 32, width_mm=36, distance_mm=90)
+    camera = tiny.with_(scene=scene, film="scene", focus_mm=90)
+    spec = camera.to_dict()["scene"]
+    assert spec["flat"] == {"width_mm": 36, "distance_mm": 90} and spec["field_of_view_deg"] is None
+    assert camera.with_(fov_deg=20, depth_m=0.1).to_dict()["scene"].get("flat") is None
+    assert tiny.with_(scene=scene, width_mm=18).to_dict()["scene"]["flat"] == {"width_mm": 18, "distance_mm": 90}
+    shot = camera.with_(crop=(3, 2, 9, 7)).render()
+    assert shot.shape == (7, 9)
+    shot.camera.write(tmp_path / "camera.ron")
+    subprocess.run([program, "run", tmp_path / "camera.ron", "--out", tmp_path / "out", "--quiet"], check=True)
+    assert (tmp_path / "out" / "picture.png").read_bytes() == shot.png()
+
+    file = tmp_path / "a.exr"
+    dp.Scene.still_life(54, 36).write(file)
+    for fill, as_written in (("beside", "Beside"), ("far", "Far"), (2.5, {"Metres": 2.5})):
+        other = tiny.with_(scene=dp.Scene.read(file, fill_depth=fill, hidden=file, white_level=100))
+        spec = other.to_dict()["scene"]
+        assert (spec["fill_depth"], spec["hidden"], spec["white_level"]) == (as_written, str(file), 100)
+        assert tiny.with_(scene=file, fill_depth=fill, hidden=file, white_level=100) == other
+
+
+def test_wrong_options_of_scenes_are_named(tiny: dp.Camera) -> None:
+    star = ("siemens-star", 48, 32)
+    for change, words in [
+        (lambda: dp.Scene.target(*star, width_mm=36), "width_mm is 36, expected 'distance_mm' with it"),
+        (lambda: dp.Scene.target(*star, distance_mm=36), "distance_mm is 36, expected 'width_mm' with it"),
+        (lambda: dp.Scene.target(*star, fov_deg=20), "depth_m is missing"),
+        (lambda: tiny.with_(fill_depth="near"), "near"),
+        (lambda: tiny.with_(fill_depth=-1), "a number above 0"),
+        (lambda: tiny.with_(width_mm=36, distance_mm=90), "flat"),
+        (lambda: tiny.render(memory="much"), "an amount of memory is 'much'"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            change()
+
+
+def test_denoise_and_memory_are_those_of_the_program(tiny: dp.Camera) -> None:
+    shot = tiny.with_(exposure_s=1e-7, denoise=0).render()
+    assert shot.camera.to_dict()["processing"]["denoise"] == 0
+    assert not np.array_equal(shot.rgb, shot.develop(denoise=1.0).rgb)
+    assert np.array_equal(tiny.render(memory="1GiB").rgb, tiny.render().rgb)
+    assert tiny.render(quality="sketch").quality == "sketch"

@@ -1,6 +1,6 @@
 //! The program `dioptric-studio [CAMERA.ron]`: a window of the system around [`dioptric_studio::ui`].
 
-use std::{env, error::Error, path::PathBuf, process::ExitCode, time::UNIX_EPOCH};
+use std::{env, error::Error, path::PathBuf, process::ExitCode};
 
 use dioptric_pipeline::PaintingFolder;
 use dioptric_studio::{
@@ -9,7 +9,6 @@ use dioptric_studio::{
     ui::{Studio, StudioSettings},
 };
 use eframe::{Frame, NativeOptions, egui};
-use etcetera::{BaseStrategy, choose_base_strategy};
 
 /// The window's contents as eframe wants them.
 struct Shell(Studio);
@@ -34,7 +33,9 @@ fn main() -> ExitCode {
 fn run() -> Result<(), Box<dyn Error>> {
     let camera = env::args_os().nth(1).map(PathBuf::from);
     let settings = StudioSettings {
-        engine: EngineSettings { paintings: painting_folder() },
+        engine: EngineSettings {
+            paintings: env::current_exe().ok().and_then(|program| PaintingFolder::of_user(&program)),
+        },
         autosave: Autosave::of_user(),
         camera,
     };
@@ -46,17 +47,4 @@ fn run() -> Result<(), Box<dyn Error>> {
         Box::new(|context| Ok(Box::new(Shell(Studio::new(&context.egui_ctx, settings)?)))),
     )?;
     Ok(())
-}
-
-/// Returns the folder where paintings of the still life are kept, as the command line has it; `None` where none is wanted.
-fn painting_folder() -> Option<PaintingFolder> {
-    let folder = match env::var_os("DIOPTRIC_CACHE") {
-        Some(folder) => PathBuf::from(folder),
-        None => choose_base_strategy().ok()?.cache_dir().join("dioptric"),
-    };
-    let file = env::current_exe().ok()?.metadata().ok()?;
-    let built = file.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
-    // Another build may paint otherwise.
-    let build = format!("{} {} {}", env!("CARGO_PKG_VERSION"), file.len(), built.as_nanos());
-    (!folder.as_os_str().is_empty()).then(|| PaintingFolder::new(folder, build))
 }

@@ -52,6 +52,24 @@ pub enum SweepError {
         /// What was found.
         found: String,
     },
+    /// A name that no item has.
+    #[error("the name of an item is '{found}', expected 64 hexadecimal digits")]
+    Id {
+        /// What was found.
+        found: String,
+    },
+    /// An item that has another name here than where the plan was drawn up.
+    #[error(
+        "item {item} is called {found} here and {expected} where the plan was drawn up: its files, or the versions of dioptric, differ"
+    )]
+    Other {
+        /// Its number.
+        item: usize,
+        /// Its name here.
+        found: String,
+        /// Its name there.
+        expected: String,
+    },
     /// A place of the store that cannot be written to.
     #[error("cannot write {}: {reason}", path.display())]
     Write {

@@ -1,12 +1,12 @@
 //! One item: the picture of one camera and its files.
 
-use std::{fs, io, path::Path, sync::Arc};
+use std::{fmt, fs, io, path::Path, sync::Arc};
 
 use dioptric_analysis::{Run, RunOptics, RunReport};
 use dioptric_pictures::encode_rgb8_png;
 use dioptric_pipeline::{
-    Camera, Capture, FilmPlace, GivenParts, KeptCamera, PipelineError, Progress, ResolvedLens, SceneSummary, Stage,
-    write_capture, write_file, write_json,
+    Camera, Capture, FilmPlace, GivenParts, KeptCamera, PaintingFolder, PipelineError, Progress, ResolvedLens,
+    SceneSummary, Stage, write_capture, write_file, write_json,
 };
 use dioptric_psf::LensImageModel;
 use dioptric_spectrum::Cancel;
@@ -29,11 +29,28 @@ pub(crate) struct Refusal {
     pub(crate) reason: String,
 }
 
+/// What came of taking a picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Taken {
+    /// It is there.
+    Picture,
+    /// Its camera was refused; the reason is there.
+    Refused,
+    /// A file that the camera is made from cannot be read, for this reason.
+    Unreadable(String),
+}
+
 /// What items have in common, kept from one to the next.
-#[derive(Default)]
 pub(crate) struct Bench {
     camera: Option<KeptCamera>,
     optics: Option<(Shared, RunOptics)>,
+    paintings: Option<PaintingFolder>,
+}
+
+impl fmt::Debug for Bench {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Bench").field("camera", &self.camera.as_ref().map(KeptCamera::camera)).finish_non_exhaustive()
+    }
 }
 
 /// What the optics of a report are made from.
@@ -56,7 +73,12 @@ impl Shared {
 }
 
 impl Bench {
-    /// Takes the picture of a camera and writes all files of the item into a folder; returns whether there is a picture.
+    /// Returns a bench on which nothing is kept yet; paintings of the still life come from a folder and go there.
+    pub(crate) fn new(paintings: Option<PaintingFolder>) -> Self {
+        Self { camera: None, optics: None, paintings }
+    }
+
+    /// Takes the picture of a camera and writes all files of the item into a folder; returns what came of it.
     ///
     /// A camera that cannot be is written with the reason.
     pub(crate) fn make(
@@ -65,14 +87,15 @@ impl Bench {
         folder: &Path,
         progress: &dyn Progress,
         cancel: &Cancel,
-    ) -> Result<bool, SweepError> {
+    ) -> Result<Taken, SweepError> {
         write_file(&folder.join(CAMERA), (camera.to_ron() + "\n").as_bytes())?;
         match self.take(camera, folder, progress, cancel) {
-            Ok(()) => Ok(true),
+            Ok(()) => Ok(Taken::Picture),
+            Err(error) if error.is_unreadable() => Ok(Taken::Unreadable(error.to_string())),
             Err(error) if !error.is_passing() => {
                 leave_camera_alone(folder).map_err(SweepError::writing(folder))?;
                 write_json(&folder.join(REFUSED), &Refusal { reason: error.to_string() })?;
-                Ok(false)
+                Ok(Taken::Refused)
             }
             Err(error) => Err(error.into()),
         }
@@ -87,7 +110,7 @@ impl Bench {
     ) -> Result<(), PipelineError> {
         let kept = match self.camera.take() {
             Some(kept) => kept.with_camera(camera.clone(), GivenParts::default()),
-            None => KeptCamera::new(camera.clone()),
+            None => KeptCamera::new(camera.clone()).with_paintings(self.paintings.clone()),
         };
         let kept = self.camera.insert(kept);
         let capture = kept.capture(progress, cancel)?;

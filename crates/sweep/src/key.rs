@@ -1,6 +1,6 @@
 //! What an item is called: a hash of all that its results depend on.
 
-use std::fmt;
+use std::{fmt, str::FromStr};
 
 use dioptric_pipeline::{Camera, FilmSpec};
 use serde::{Serialize, Serializer};
@@ -29,6 +29,19 @@ impl fmt::Display for ItemId {
 impl fmt::Debug for ItemId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "ItemId({self})")
+    }
+}
+
+impl FromStr for ItemId {
+    type Err = SweepError;
+
+    /// Reads a name as it is displayed: 64 hexadecimal digits.
+    fn from_str(text: &str) -> Result<Self, SweepError> {
+        let digit = |byte: &u8| char::from(*byte).to_digit(16).map(|digit| digit as u8);
+        let bytes: Option<Vec<u8>> =
+            text.as_bytes().chunks(2).map(|pair| Some(16 * digit(&pair[0])? + digit(pair.get(1)?)?)).collect();
+        let id = bytes.and_then(|bytes| bytes.try_into().ok());
+        id.map(Self).ok_or_else(|| SweepError::Id { found: text.to_owned() })
     }
 }
 
@@ -115,7 +128,10 @@ mod tests {
         let (seed, stop) = (key(&|camera| camera.seed = 2), key(&|camera| camera.stop = StopSpec::FNumber(8.0)));
         assert!(first.id != seed.id && first.imaging == seed.imaging);
         assert!(first.id != stop.id && first.imaging != stop.imaging);
-        assert_eq!(first.id.to_string().len(), 64);
+        assert_eq!((first.id.to_string().len(), first.id.to_string().parse::<ItemId>().unwrap()), (64, first.id));
+        for text in ["", "0", "zz", &"a".repeat(63), &"a".repeat(66), &"ä".repeat(32)] {
+            assert!(text.parse::<ItemId>().unwrap_err().to_string().contains("64 hexadecimal digits"), "{text}");
+        }
         // The pixels of the sensor are those of the film only where they are asked to be.
         let sensor = key(&|camera| camera.sensor = dioptric_pipeline::SensorSpec::named("imx363"));
         assert!(first.imaging == sensor.imaging && first.id != sensor.id);

@@ -11,6 +11,7 @@
 #![doc = include_str!("../README.md")]
 
 mod axes;
+mod cameras;
 mod error;
 mod index;
 mod inputs;
@@ -33,7 +34,7 @@ pub use index::{Index, IndexRow};
 pub use key::{ItemId, RESULTS_EPOCH};
 pub use metrics::Metrics;
 pub use plan::{Base, Plan, PlanOutputs};
-pub use run::{Made, SweepProgress};
+pub use run::{Made, Maker, Outcome, SweepProgress};
 #[cfg(feature = "schema")]
 pub use schema::generated_schema;
 pub use schema::{PLAN_SCHEMA, PLAN_TEMPLATE};

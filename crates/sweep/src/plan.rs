@@ -89,6 +89,15 @@ impl PlanOutputs {
 }
 
 impl Plan {
+    /// Reads a plan file.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse), and when the file cannot be read.
+    pub fn read(path: &Path) -> Result<Self, SweepError> {
+        let text = fs::read_to_string(path).map_err(SweepError::reading(path))?;
+        Self::parse(&text, path)
+    }
+
     /// Reads a plan from text; `path` names it in errors.
     ///
     /// # Errors
@@ -164,12 +173,6 @@ fn is_same_place(one: &str, other: &str) -> bool {
             _ => return true,
         }
     }
-}
-
-/// Reads a plan file.
-pub(crate) fn read_plan(path: &Path) -> Result<Plan, SweepError> {
-    let text = fs::read_to_string(path).map_err(SweepError::reading(path))?;
-    Plan::parse(&text, path)
 }
 
 #[cfg(test)]

@@ -1,10 +1,16 @@
 //! The items of a sweep made, one after the other.
 
-use dioptric_pipeline::{Progress, Silent};
+use std::path::Path;
+
+use dioptric_pipeline::{Camera, PaintingFolder, Progress, Silent};
 use dioptric_spectrum::Cancel;
 use serde::Serialize;
 
-use crate::{Shard, Status, Store, Sweep, SweepError, Workplace, item::Bench};
+use crate::{
+    ItemId, Plan, Shard, Status, Store, Sweep, SweepError, Workplace,
+    cameras::Cameras,
+    item::{Bench, Taken},
+};
 
 /// Receives how far a sweep is, beside how far the item is that is being made.
 pub trait SweepProgress: Progress {
@@ -17,7 +23,7 @@ pub trait SweepProgress: Progress {
 impl SweepProgress for Silent {}
 
 /// What came of a sweep.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Made {
     /// Items that were there before.
     pub n_there: usize,
@@ -25,15 +31,52 @@ pub struct Made {
     pub n_done: usize,
     /// Items made now whose camera was refused.
     pub n_refused: usize,
+    /// Items whose files cannot be read: they are not there, and tried again by the next sweep.
+    pub n_failed: usize,
+    /// Why the first of these could not be made.
+    pub first_failure: Option<String>,
     /// Items left to be made.
     pub n_left: usize,
+}
+
+/// What came of making one item.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// It was there before.
+    There,
+    /// It has a picture.
+    Done,
+    /// Its camera was refused.
+    Refused,
+    /// A file that it is made from cannot be read, for this reason: the item is not there, and may be tried again.
+    Failed(String),
+}
+
+impl Made {
+    fn count(&mut self, outcome: Outcome) {
+        match outcome {
+            Outcome::There => self.n_there += 1,
+            Outcome::Done => self.n_done += 1,
+            Outcome::Refused => self.n_refused += 1,
+            Outcome::Failed(reason) => {
+                self.n_failed += 1;
+                self.first_failure.get_or_insert(reason);
+            }
+        }
+    }
+
+    /// Items that were tried now.
+    fn n_tried(&self) -> usize {
+        self.n_done + self.n_refused + self.n_failed
+    }
 }
 
 impl Sweep {
     /// Makes those items of a shard that are not in the store of a workplace, as many as `limit` at most.
     ///
     /// Each item is there whole or not at all, whenever the work ends. Items are the same to the byte whatever else was made
-    /// before, beside or after them, and for any number of threads.
+    /// before, beside or after them, and for any number of threads. An item whose files cannot be read is left out, and the others
+    /// are made.
     ///
     /// # Errors
     /// When the store cannot be written to, a file that a camera is made from changed, or the work is cancelled.
@@ -50,25 +93,23 @@ impl Sweep {
         let n_all = missing.len();
         missing.retain(|item| !store.has(self.id(*item)));
         let mut made = Made { n_there: n_all - missing.len(), ..Made::default() };
-        let mut bench = Bench::default();
+        let mut bench = Bench::new(self.paintings().cloned());
+        let n_there = made.n_there;
         for (n, &item) in missing.iter().enumerate() {
             cancel.check()?;
-            if limit.is_some_and(|limit| made.n_done + made.n_refused >= limit) {
+            if limit.is_some_and(|limit| made.n_tried() >= limit) {
                 made.n_left = missing.len() - n;
                 break;
             }
-            progress.items(made.n_there + n, n_all);
+            progress.items(n_there + n, n_all);
             let id = self.id(item);
             // Two points of a plan may be one item, and others may make items too.
             if store.has(id) {
-                made.n_there += 1;
+                made.count(Outcome::There);
                 continue;
             }
             let camera = self.camera(item)?;
-            let has_picture = bench.make(&camera, &place.item(id)?, progress, cancel)?;
-            self.inputs().check_unchanged(&camera)?;
-            place.keep(id)?;
-            if has_picture { made.n_done += 1 } else { made.n_refused += 1 }
+            made.count(make_item(self.cameras(), (&camera, id), place, &mut bench, (progress, cancel))?);
         }
         Ok(made)
     }
@@ -85,4 +126,73 @@ impl Sweep {
         }
         counts
     }
+}
+
+/// Makes items of a plan that another process drew up, each known by its number and its name.
+///
+/// Stages are shared by items that follow one another, from one call to the next as well.
+#[derive(Debug)]
+pub struct Maker {
+    cameras: Cameras,
+    bench: Bench,
+}
+
+impl Maker {
+    /// Opens a plan; `path` names it in errors, and its paths are relative to that one's folder. No item is drawn up yet.
+    ///
+    /// # Errors
+    /// When the base of the plan cannot be read.
+    pub fn of(plan: Plan, path: &Path, paintings: Option<PaintingFolder>) -> Result<Self, SweepError> {
+        Ok(Self { cameras: Cameras::of(plan, path)?, bench: Bench::new(paintings) })
+    }
+
+    /// Makes an item, unless it is there.
+    ///
+    /// # Errors
+    /// As [`Sweep::make`], and when the item has another name here: then its files, or the version of the program, differ from those
+    /// of the process that drew up the plan.
+    pub fn make(
+        &mut self,
+        place: &Workplace<'_>,
+        (item, id): (usize, ItemId),
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<Outcome, SweepError> {
+        cancel.check()?;
+        if place.store().has(id) {
+            return Ok(Outcome::There);
+        }
+        if item >= self.cameras.plan().count() {
+            let reason = format!("it has no item {item}, but {} items", self.cameras.plan().count());
+            return Err(SweepError::Plan { path: self.cameras.path().to_owned(), reason });
+        }
+        let camera = self.cameras.camera(item)?;
+        let found = self.cameras.key(&camera)?.id;
+        if found != id {
+            return Err(SweepError::Other { item, found: found.to_string(), expected: id.to_string() });
+        }
+        make_item(&self.cameras, (&camera, id), place, &mut self.bench, (progress, cancel))
+    }
+}
+
+/// Makes an item that is not there and puts it into the store.
+fn make_item(
+    cameras: &Cameras,
+    (camera, id): (&Camera, ItemId),
+    place: &Workplace<'_>,
+    bench: &mut Bench,
+    (progress, cancel): (&dyn Progress, &Cancel),
+) -> Result<Outcome, SweepError> {
+    let taken = bench.make(camera, &place.item(id)?, progress, cancel)?;
+    cameras.inputs().check_unchanged(camera)?;
+    let outcome = match taken {
+        Taken::Picture => Outcome::Done,
+        Taken::Refused => Outcome::Refused,
+        Taken::Unreadable(reason) => {
+            place.discard(id)?;
+            return Ok(Outcome::Failed(reason));
+        }
+    };
+    place.keep(id)?;
+    Ok(outcome)
 }

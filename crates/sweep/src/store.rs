@@ -1,19 +1,17 @@
 //! Where results are kept: a folder in which an item is there whole or not at all.
 
 use std::{
-    fs::{self, File, OpenOptions, TryLockError},
+    fs::{self, File, OpenOptions},
     io,
     path::{Path, PathBuf},
 };
 
-use tempfile::TempDir;
+use dioptric_pipeline::{HiddenFolder, Leftover};
 
 use crate::{ItemId, SweepError};
 
 /// What folders of items that are being made are called, beside those of finished ones.
 const UNFINISHED: &str = ".tmp-";
-/// The file in such a folder that its maker holds locked as long as it lives.
-const LOCK: &str = "lock";
 
 /// A folder of finished items: `items/` then the first two digits of the item's name, then its name.
 #[derive(Clone, Debug)]
@@ -75,54 +73,25 @@ impl Store {
     /// # Errors
     /// When the store cannot be written to.
     pub fn begin(&self) -> Result<Workplace<'_>, SweepError> {
+        self.remove_leftovers();
+        self.workplace()
+    }
+
+    /// Makes a place for items that are being made. Of many makers that begin again and again each would look at all others to find
+    /// what is left: that is for the first time, and for the end.
+    ///
+    /// # Errors
+    /// When the store cannot be written to.
+    pub fn workplace(&self) -> Result<Workplace<'_>, SweepError> {
         let cannot = SweepError::writing(&self.folder);
         fs::create_dir_all(&self.folder).map_err(&cannot)?;
-        self.remove_leftovers().map_err(&cannot)?;
-        // Another maker may take the folder for a leftover until it is locked.
-        for _ in 0..100 {
-            let unfinished = tempfile::Builder::new().prefix(UNFINISHED).tempdir_in(&self.folder).map_err(&cannot)?;
-            if let Lock::Held(file) | Lock::Unknown(file) = lock(unfinished.path()) {
-                return Ok(Workplace { store: self, _lock: file, unfinished });
-            }
-        }
-        Err(cannot(io::Error::other("no folder in it can be locked")))
+        let name = |attempt| format!("{UNFINISHED}{}-{attempt}", std::process::id());
+        Ok(Workplace { store: self, unfinished: HiddenFolder::make(&self.folder, name).map_err(&cannot)? })
     }
 
-    /// Removes the folders of makers that are no more; nobody holds their locks.
-    fn remove_leftovers(&self) -> io::Result<()> {
-        for entry in fs::read_dir(&self.folder)? {
-            let entry = entry?;
-            if entry.file_name().to_string_lossy().starts_with(UNFINISHED)
-                && let Lock::Held(file) = lock(&entry.path())
-            {
-                // What cannot be removed is left for the next one.
-                drop((fs::remove_dir_all(entry.path()), file));
-            }
-        }
-        Ok(())
-    }
-}
-
-/// What came of locking the folder of a maker.
-enum Lock {
-    /// It is ours.
-    Held(File),
-    /// Another holds it, or has removed the folder.
-    Taken,
-    /// The file system knows no locks: leftovers stay there.
-    Unknown(File),
-}
-
-fn lock(folder: &Path) -> Lock {
-    let path = folder.join(LOCK);
-    let Ok(file) = OpenOptions::new().create(true).truncate(false).write(true).open(&path) else {
-        return Lock::Taken;
-    };
-    match file.try_lock() {
-        // It may have been removed between being opened and being locked.
-        Ok(()) if path.exists() => Lock::Held(file),
-        Ok(()) | Err(TryLockError::WouldBlock) => Lock::Taken,
-        Err(TryLockError::Error(_)) => Lock::Unknown(file),
+    /// Removes what makers left that are no more.
+    pub fn remove_leftovers(&self) {
+        Leftover::all_in(&self.folder, UNFINISHED).into_iter().for_each(Leftover::remove);
     }
 }
 
@@ -130,9 +99,7 @@ fn lock(folder: &Path) -> Lock {
 #[derive(Debug)]
 pub struct Workplace<'a> {
     store: &'a Store,
-    // Before the folder: a file that is open cannot be removed everywhere.
-    _lock: File,
-    unfinished: TempDir,
+    unfinished: HiddenFolder,
 }
 
 impl Workplace<'_> {
@@ -156,6 +123,12 @@ impl Workplace<'_> {
         }
         fs::create_dir(&folder).map_err(cannot)?;
         Ok(folder)
+    }
+
+    /// Removes what was made of an item that cannot be finished.
+    pub(crate) fn discard(&self, id: ItemId) -> Result<(), SweepError> {
+        let folder = self.path().join(id.to_string());
+        fs::remove_dir_all(&folder).map_err(SweepError::writing(&folder))
     }
 
     /// Puts an item into the store, its files on the disk first. Where another maker was first, its item stays.
@@ -227,6 +200,12 @@ mod tests {
         let alive = store.begin().unwrap();
         let second = store.begin().unwrap();
         assert!(alive.path().is_dir() && second.path().is_dir());
+        assert_eq!(names(folder.path()).len(), 2);
+        fs::create_dir(folder.path().join(".tmp-dead")).unwrap();
+        let third = store.workplace().unwrap();
+        assert_eq!(names(folder.path()).len(), 4);
+        drop(third);
+        store.remove_leftovers();
         assert_eq!(names(folder.path()).len(), 2);
     }
 }

@@ -2,28 +2,23 @@
 
 use std::{
     collections::{HashMap, HashSet},
-    path::{Path, PathBuf},
+    path::Path,
     str::FromStr,
 };
 
-use dioptric_pipeline::Camera;
+use dioptric_pipeline::{Camera, PaintingFolder};
 use rayon::prelude::*;
 
-use crate::{ItemId, Plan, SweepError, Value, axes::Points, inputs::Inputs, key::ItemKey, plan::read_plan};
+use crate::{ItemId, Plan, SweepError, Value, cameras::Cameras, key::ItemKey};
 
 /// A plan with all its items.
 #[derive(Debug)]
 pub struct Sweep {
-    path: PathBuf,
-    /// That of the plan, absolute: what paths are relative to.
-    folder: PathBuf,
-    plan: Plan,
-    points: Vec<Points>,
-    base: Value,
+    cameras: Cameras,
     keys: Vec<ItemKey>,
     /// The items as they are made: those that share results follow one another.
     order: Vec<usize>,
-    inputs: Inputs,
+    paintings: Option<PaintingFolder>,
 }
 
 /// A share of the items: those of every n-th irradiance, by its hash.
@@ -70,7 +65,7 @@ impl Sweep {
     /// Names the line or the key of the plan that is wrong and what was expected, or the file that cannot be read. A camera
     /// whose numbers make no sense is none: that is the result of its item.
     pub fn read(path: &Path) -> Result<Self, SweepError> {
-        Self::of(read_plan(path)?, path)
+        Self::of(Plan::read(path)?, path)
     }
 
     /// Draws up the items of a plan; `path` names it in errors, and its paths are relative to that one's folder.
@@ -78,31 +73,29 @@ impl Sweep {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn of(plan: Plan, path: &Path) -> Result<Self, SweepError> {
-        let parent = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let folder = parent.canonicalize().map_err(SweepError::reading(parent))?;
-        let camera = plan.base.open(&folder, path)?;
-        let base = Value::parse(&camera.to_ron()).expect("what a camera writes is RON");
-        let points = plan.vary.iter().map(Points::of).collect();
-        let (keys, order) = (Vec::new(), Vec::new());
-        let mut sweep =
-            Self { path: path.to_owned(), folder, plan, points, base, keys, order, inputs: Inputs::default() };
+        let cameras = Cameras::of(plan, path)?;
         // What is wrong with the first item is found before all others are drawn up.
-        sweep.camera(0)?;
-        let still = Camera::demo()?;
-        let key = |item| ItemKey::of(&sweep.camera(item)?, &still, &sweep.inputs);
-        sweep.keys = (0..sweep.plan.count()).into_par_iter().map(key).collect::<Result<_, _>>()?;
-        sweep.order = in_order(&sweep.keys);
-        Ok(sweep)
+        cameras.camera(0)?;
+        let key = |item| cameras.key(&cameras.camera(item)?);
+        let keys: Vec<ItemKey> = (0..cameras.plan().count()).into_par_iter().map(key).collect::<Result<_, _>>()?;
+        Ok(Self { order: in_order(&keys), cameras, keys, paintings: None })
+    }
+
+    /// Returns the sweep whose items take paintings of the still life from a folder, and keep them there.
+    #[must_use]
+    pub fn with_paintings(mut self, folder: Option<PaintingFolder>) -> Self {
+        self.paintings = folder;
+        self
     }
 
     /// The plan.
     pub fn plan(&self) -> &Plan {
-        &self.plan
+        self.cameras.plan()
     }
 
     /// The plan's file.
     pub fn path(&self) -> &Path {
-        &self.path
+        self.cameras.path()
     }
 
     /// The number of items.
@@ -133,16 +126,23 @@ impl Sweep {
         self.order.iter().copied().filter(move |item| shard.has(&self.keys[*item]))
     }
 
-    /// Returns what an item sets, in the order of [`Plan::keys`].
-    pub fn values(&self, mut item: usize) -> Vec<Value> {
-        let mut blocks: Vec<Vec<Value>> = Vec::with_capacity(self.points.len());
-        for (sampling, points) in self.plan.vary.iter().zip(&self.points).rev() {
-            // Checked when the plan was read.
-            let n = sampling.count().unwrap_or(1);
-            blocks.push(points.at(item % n));
-            item /= n;
+    /// The items of a shard that share an irradiance, as they are made: none shares one with those of another group.
+    pub fn groups(&self, shard: Shard) -> Vec<Vec<usize>> {
+        let mut places = HashMap::new();
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for item in self.items(shard) {
+            let place = *places.entry(self.keys[item].imaging).or_insert(groups.len());
+            if place == groups.len() {
+                groups.push(Vec::new());
+            }
+            groups[place].push(item);
         }
-        blocks.into_iter().rev().flatten().collect()
+        groups
+    }
+
+    /// Returns what an item sets, in the order of [`Plan::keys`].
+    pub fn values(&self, item: usize) -> Vec<Value> {
+        self.cameras.values(item)
     }
 
     /// Returns the camera of an item, its paths absolute and its outputs those of the plan.
@@ -150,33 +150,15 @@ impl Sweep {
     /// # Errors
     /// When a key is unknown, or its value is of the wrong kind.
     pub fn camera(&self, item: usize) -> Result<Camera, SweepError> {
-        let values = self.values(item);
-        let mut camera = self.with(values.iter().enumerate()).map_err(|reason| self.blame(&values, reason))?;
-        camera.resolve_paths(&self.folder);
-        camera.outputs = self.plan.outputs.of_camera();
-        Ok(camera)
+        self.cameras.camera(item)
     }
 
-    /// Returns the base with some of the keys set.
-    fn with<'a>(&self, values: impl Iterator<Item = (usize, &'a Value)>) -> Result<Camera, String> {
-        let (keys, mut camera) = (self.plan.keys(), self.base.clone());
-        for (axis, value) in values {
-            camera.set(keys[axis], value.clone())?;
-        }
-        camera.typed()
+    pub(crate) fn cameras(&self) -> &Cameras {
+        &self.cameras
     }
 
-    /// Returns the error of values that make no camera, with the key that it is about.
-    fn blame(&self, values: &[Value], reason: String) -> SweepError {
-        let keys = self.plan.keys();
-        let alone = |axis: &usize| self.with(std::iter::once((*axis, &values[*axis]))).is_err_and(|own| own == reason);
-        let first = |n: &usize| self.with(values.iter().enumerate().take(*n + 1)).is_err();
-        let axis = (0..values.len()).find(alone).or_else(|| (0..values.len()).find(first)).unwrap_or(0);
-        SweepError::Axis { path: self.path.clone(), key: keys[axis].to_owned(), reason }
-    }
-
-    pub(crate) fn inputs(&self) -> &Inputs {
-        &self.inputs
+    pub(crate) fn paintings(&self) -> Option<&PaintingFolder> {
+        self.paintings.as_ref()
     }
 }
 
@@ -217,6 +199,7 @@ mod tests {
         assert_eq!(sweep.id(0), sweep.id(2));
         // The four items of one stop come before the two of the other.
         assert_eq!(sweep.items(Shard::ALL).collect::<Vec<_>>(), [0, 2, 3, 5, 1, 4]);
+        assert_eq!(sweep.groups(Shard::ALL), [vec![0, 2, 3, 5], vec![1, 4]]);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::{
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{Camera, KeptCamera, Progress, Silent, Stage, picture_png};
 use dioptric_spectrum::Cancel;
-use dioptric_sweep::{Index, Plan, Shard, Status, Store, Sweep, SweepError, SweepProgress};
+use dioptric_sweep::{Index, Maker, Outcome, Plan, Shard, Status, Store, Sweep, SweepError, SweepProgress};
 
 /// Two apertures, three exposures, and an f-number that the lens does not open to.
 const PLAN: &str = r#"(
@@ -233,4 +233,52 @@ fn changed_files_are_seen() {
     let error = sweep.make(&store.begin().unwrap(), Shard::ALL, None, &Silent, &Cancel::new()).unwrap_err();
     assert!(error.to_string().contains("sensor.ron changed"), "{error}");
     assert_eq!(sweep.counts(&store, Shard::ALL), [0, 0, 9]);
+}
+
+#[test]
+fn unreadable_files_fail_their_items_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    // Named as a picture, and none: no camera is to blame.
+    fs::write(folder.path().join("cut.exr"), [0x76, 0x2f, 0x31, 0x01]).unwrap();
+    let source = r#"(source: File("cut.exr"), field_of_view_deg: 14.0, depth_m: 2.0)"#;
+    let vary =
+        "Grid({\"exposure.Manual.time_s\": List([0.001])}), List(keys: [\"stop.FNumber\", \"scene\"], points: [[4, ";
+    let flat = "(source: Target(pattern: Uniform, columns: 32, rows: 32), field_of_view_deg: 14.0, depth_m: 2.0)";
+    let plan = PLAN.split("vary:").next().unwrap().to_owned() + &format!("vary: [{vary}{source}], [8, {flat}]])])");
+    let sweep = sweep(&plan, folder.path());
+    let store = Store::new(&folder.path().join("store"));
+    for n_there in [0, 1] {
+        let made = sweep.make(&store.begin().unwrap(), Shard::ALL, None, &Silent, &Cancel::new()).unwrap();
+        assert_eq!((made.n_there, made.n_done, made.n_failed), (n_there, 1 - n_there, 1));
+        assert!(made.first_failure.unwrap().contains("cut.exr"));
+    }
+    assert_eq!((store.status(sweep.id(0)), store.status(sweep.id(1))), (Status::Missing, Status::Done));
+    assert_eq!(files(store.folder()).len(), 4, "the item that is there, and nothing of the other");
+}
+
+#[test]
+fn items_are_made_by_number_and_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plan.ron");
+    let planned = sweep(PLAN, folder.path());
+    let (whole, parts) = (Store::new(&folder.path().join("whole")), Store::new(&folder.path().join("parts")));
+    make(&planned, &whole, "1/1");
+    let groups = planned.groups(Shard::ALL);
+    assert_eq!((groups.len(), groups.iter().map(Vec::len).sum::<usize>()), (3, 9));
+    let mut maker = Maker::of(Plan::parse(PLAN, &path).unwrap(), &path, None).unwrap();
+    let mut outcomes = Vec::new();
+    for item in groups.into_iter().rev().flatten().chain([0]) {
+        let place = parts.begin().unwrap();
+        outcomes.push(maker.make(&place, (item, planned.id(item)), &Silent, &Cancel::new()).unwrap());
+    }
+    let count = |outcome: Outcome| outcomes.iter().filter(|own| **own == outcome).count();
+    assert_eq!([Outcome::Done, Outcome::Refused, Outcome::There].map(count), [6, 3, 1]);
+    assert!(files(parts.folder()) == files(whole.folder()));
+    // Under the name of another item nothing is made.
+    let empty = Store::new(&folder.path().join("empty"));
+    let place = empty.begin().unwrap();
+    for (item, words) in [(0, "item 0 is called"), (9, "it has no item 9, but 9 items")] {
+        let error = maker.make(&place, (item, planned.id(1)), &Silent, &Cancel::new()).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
 }

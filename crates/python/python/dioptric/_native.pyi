@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, ClassVar, Literal, TypeAlias, final
 
 import numpy as np
@@ -20,8 +21,12 @@ __all__ = [
     "Scene",
     "Sensor",
     "Shot",
+    "Maker",
+    "Plan",
+    "Sweep",
     "Memory",
     "_panic",
+    "read_samples",
     "set_threads",
     "threads",
     "__version__",
@@ -32,6 +37,7 @@ __version__: str
 def set_threads(n: int) -> None: ...
 def threads() -> int: ...
 def _panic() -> None: ...
+def read_samples(path: _Path) -> tuple[NDArray[Any], list[Any]]: ...
 @final
 class Memory:
     @property
@@ -77,6 +83,11 @@ class Camera:
         scene: Scene | _Path | None = ...,
         fov_deg: float | None = ...,
         depth_m: float | None = ...,
+        width_mm: float | None = ...,
+        distance_mm: float | None = ...,
+        fill_depth: Literal["beside", "far"] | float | None = ...,
+        hidden: _Path | None = ...,
+        white_level: float | None = ...,
         illuminant: str | None = ...,
         illuminance_lux: float | None = ...,
         scene_light: str | None = ...,
@@ -103,6 +114,7 @@ class Camera:
         quality: Literal["full", "draft", "preview", "sketch"] = "full",
         progress: _Progress = None,
         memory_bytes: int | None = None,
+        memory: str | int | None = None,
     ) -> Shot: ...
     @property
     def name(self) -> str: ...
@@ -346,6 +358,11 @@ class Scene:
         *,
         fov_deg: float | None = ...,
         depth_m: float | None = ...,
+        width_mm: float | None = ...,
+        distance_mm: float | None = ...,
+        fill_depth: Literal["beside", "far"] | float | None = ...,
+        hidden: _Path | None = ...,
+        white_level: float | None = ...,
         illuminant: str | None = ...,
         illuminance_lux: float | None = ...,
         light: str | None = ...,
@@ -369,8 +386,10 @@ class Scene:
         rows: int,
         *,
         size: float | None = None,
-        fov_deg: float,
-        depth_m: float,
+        fov_deg: float | None = ...,
+        depth_m: float | None = ...,
+        width_mm: float | None = ...,
+        distance_mm: float | None = ...,
         illuminant: str | None = ...,
         illuminance_lux: float | None = ...,
         mean_luminance_cd_m2: float | None = ...,
@@ -416,3 +435,50 @@ class Sensor:
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __reduce__(self) -> tuple[Any, tuple[str]]: ...
+
+@final
+class Plan:
+    @staticmethod
+    def read(path: _Path) -> Plan: ...
+    @staticmethod
+    def from_ron(text: str, path: _Path | None = None) -> Plan: ...
+    @property
+    def path(self) -> Path: ...
+    @property
+    def store(self) -> Path: ...
+    @property
+    def keys(self) -> list[str]: ...
+    def to_ron(self) -> str: ...
+    def __len__(self) -> int: ...
+    def __reduce__(self) -> tuple[Any, tuple[str, Path]]: ...
+
+@final
+class Sweep:
+    def __new__(cls, plan: Plan) -> Sweep: ...
+    @property
+    def plan(self) -> Plan: ...
+    @property
+    def n_irradiances(self) -> int: ...
+    def __len__(self) -> int: ...
+    def id(self, item: int) -> str: ...
+    def values(self, item: int) -> dict[str, Any]: ...
+    def camera(self, item: int) -> Camera: ...
+    def groups(self, store: _Path | None = None, *, shard: str | None = None) -> list[list[int]]: ...
+    def run(
+        self,
+        store: _Path | None = None,
+        *,
+        shard: str | None = None,
+        limit: int | None = None,
+        progress: _Progress = None,
+    ) -> dict[str, Any]: ...
+    def write_index(self, store: _Path | None = None) -> None: ...
+    def counts(self, store: _Path | None = None, *, shard: str | None = None) -> dict[str, int]: ...
+    def pack(
+        self, target: _Path, *, store: _Path | None = None, items_per_tar: int | None = None
+    ) -> list[Path]: ...
+
+@final
+class Maker:
+    def __new__(cls, plan: Plan, store: _Path) -> Maker: ...
+    def make(self, items: Sequence[tuple[int, str]]) -> list[tuple[str, str | None]]: ...
