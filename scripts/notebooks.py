@@ -4,7 +4,7 @@
     python3 scripts/notebooks.py FOLDER [--execute] [--small] [NAME ...]
 
 The sources are Python with `# %%` before each cell (the percent format, which Jupytext, VS Code and Spyder open as they are). --execute, which needs
-nbclient and ipykernel, stores the outputs too; --small takes coarse scenes and few pictures, as the test does. Each is told with its seconds.
+nbclient and ipykernel, stores the outputs too; --small takes coarse scenes and few pictures, as the test does. Each is reported with its seconds.
 """
 
 import argparse

@@ -2,7 +2,7 @@
 # # Figure 2: line spread by ray bending, by waves, and in theory
 #
 # An ideal 50 mm f/22 lens images a point 2 m away. The paper bends rays at random (HURB); its line spread is narrower than Airy's by the factor .617, which
-# the sum of waves is not. [docs/diffraction.md](../diffraction.md) measures the models on real lenses.
+# the diffraction integral is not. [docs/diffraction.md](../diffraction.md) measures the models on real lenses.
 
 # %%
 import os

@@ -305,7 +305,7 @@ pub(crate) enum DiffractionKind {
     HurbScene3d,
     /// Ray bending with constants fitted to Airy's pattern
     HurbCalibrated,
-    /// The sum of waves while the blur is small enough for it, ray bending (γ = 1) beyond
+    /// The diffraction integral while the blur is small enough for it, HURB (γ = 1) beyond
     Wave,
 }
 

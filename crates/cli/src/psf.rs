@@ -199,12 +199,12 @@ fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
             let share = 100.0 * row.picture_share;
             writeln!(text, "{:>31} holds {share:.1} % of the light: LSF and EE50 are of that part", "picture")?;
         }
-        if let Some(share) = row.wave_share.filter(|_| row.is_of_waves()) {
+        if let Some(share) = row.wave_fraction.filter(|_| row.is_of_waves()) {
             write!(text, "{:>31} waves {:.0} %", "model", 100.0 * share)?;
             writeln!(text, "{}", row.strehl.map_or_else(String::new, |strehl| format!(", Strehl ratio {strehl:.4}")))?;
         }
         if let Some(reason) = &row.fallback {
-            writeln!(text, "{:>31} bent rays in place of waves: {reason}", "model")?;
+            writeln!(text, "{:>31} HURB in place of the diffraction integral: {reason}", "model")?;
         }
         for mtf in &row.mtf {
             writeln!(

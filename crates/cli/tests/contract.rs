@@ -316,7 +316,7 @@ fn psf_writes_plots_and_says_which_model_drew() {
     let plots = ["--wavelengths-nm", "500,600", "--plots", "plots", "--spectral-weights", "1,0.5"];
     let records = json(folder.path(), &[&common[..], &plots].concat());
     for record in records.as_array().unwrap() {
-        assert_eq!(record["wave_share"], 1.0);
+        assert_eq!(record["wave_fraction"], 1.0);
         check_numbers(record, "strehl ee80_radius_um");
         assert_eq!(record["energy"], 1.0);
     }

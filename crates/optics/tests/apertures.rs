@@ -1,4 +1,4 @@
-//! Openings and obscurations that are no round rims: what they stop, and how files say so.
+//! Openings and obscurations that are no round rims: what they stop, and how files state them.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use std::{f64::consts::PI, path::Path};

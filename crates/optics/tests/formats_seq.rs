@@ -168,7 +168,7 @@ fn mistakes_are_told_by_line_and_command() {
 }
 
 #[test]
-fn object_may_be_infinitely_far_in_words_and_unannounced_radii_are_noted() {
+fn object_may_be_infinitely_far_as_a_word_and_unannounced_radii_are_noted() {
     assert_eq!(read(&DOUBLET.replace("0.1e11", "inf")).unwrap(), read(DOUBLET).unwrap());
     let unsaid = DOUBLET.replace("RDM;LEN", "LEN");
     let file = read(&unsaid).unwrap();

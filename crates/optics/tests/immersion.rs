@@ -243,7 +243,7 @@ fn film_and_object_distances_belong_together() {
 }
 
 #[test]
-fn a_path_in_water_counts_with_its_index_and_swallows_light() {
+fn a_path_in_water_counts_with_its_index_and_absorbs_light() {
     // Rays to the edge and the middle of a plane: by Pythagoras.
     let water = lens(1.5, &[[f64::INFINITY, 5.0, 1.0, 0.0]], 0).at(GREEN_NM).unwrap();
     let rays = water.rays_towards(&point_on_axis(4.0), &[DVec2::ZERO, DVec2::new(0.0, 3.0)], 0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Hidden folders that their owners hold as long as they live, so that what the dead left is told from what the living make.
+//! Hidden folders that their owners hold as long as they live, so that what killed processes left is distinguished from what others are making.
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},

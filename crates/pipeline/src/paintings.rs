@@ -44,7 +44,7 @@ impl PaintingFolder {
     /// Returns the user's folder of paintings, which all programs share: the one that the environment variable `DIOPTRIC_CACHE` names,
     /// else `dioptric` in the user's cache; `None` where there is none or, by an empty variable, none is wanted.
     ///
-    /// `program` is the file of the program that paints, by which its builds are told apart.
+    /// `program` is the file of the program that paints, by which its builds are distinguished.
     pub fn of_user(program: &Path) -> Option<Self> {
         let folder = match env::var_os(VARIABLE) {
             Some(folder) => PathBuf::from(folder),

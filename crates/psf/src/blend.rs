@@ -17,7 +17,7 @@ impl RotationalBank {
         let depths = linear(&settings.dioptres, query.dioptres, |dioptres| 1.0 / dioptres);
         let colors = linear(&settings.wavelengths_nm, query.wavelength_nm, |nm| nm);
         let mut pictures = Vec::with_capacity(8);
-        let mut model = ModelUse { wave_share: 0.0, fallback: None };
+        let mut model = ModelUse { wave_fraction: 0.0, fallback: None };
         for (field, field_weight) in fields {
             for (dioptres, depth_weight) in depths {
                 for (wavelength_nm, color_weight) in colors {
@@ -27,7 +27,7 @@ impl RotationalBank {
                     }
                     let here = PsfQuery { field_tan: direction * field, dioptres, wavelength_nm, ..query };
                     let (picture, own) = self.draw_rays(here, side);
-                    model.wave_share += weight * own.wave_share;
+                    model.wave_fraction += weight * own.wave_fraction;
                     model.fallback = model.fallback.or(own.fallback);
                     pictures.push((picture, weight));
                 }

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 pub(crate) const LANES: usize = 8;
 /// Bits of a place within a pixel.
 pub(crate) const PLACE_BITS: u32 = 16;
-/// Bits of those by which a profile's rows are told apart; between rows it is read in proportion.
+/// Bits of those by which a profile's rows are distinguished; between rows it is read in proportion.
 pub(crate) const ROW_BITS: u32 = 4;
 const ROWS: usize = 1 << ROW_BITS;
 /// Pixels of a row of a profile, and the one in which its step begins.
@@ -22,7 +22,7 @@ pub(crate) struct BlurredEdgeTable([[f32; WIDTH]; ROWS + 1]);
 static PROFILES: LazyLock<Vec<BlurredEdgeTable>> =
     LazyLock::new(|| (0..N_PROFILES).map(|number| BlurredEdgeTable::new(variance_of(number))).collect());
 
-/// What is added to variances before they are told apart, pixels²: of the narrowest Gaussians, pixels see little.
+/// What is added to variances before they are compared, pixels²: of the narrowest Gaussians, pixels see little.
 const PART_OF_A_PIXEL: f32 = 0.0625;
 /// Sixteen profiles to each doubling of the sum: a hundred kilobytes. What a stroke has above its profile widens its even part.
 const PER_DOUBLING_BITS: u32 = 4;

@@ -33,8 +33,8 @@ pub struct PsfQuery {
 /// Which model a point spread function was drawn with.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModelUse {
-    /// The share that is the sum of waves; the rest is geometric or bent rays, as the bank's setting says.
-    pub wave_share: f64,
+    /// The share that is the diffraction integral; the rest is geometric rays or HURB, as the bank's setting says.
+    pub wave_fraction: f64,
     /// Why waves that were wanted were not summed, if so.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fallback: Option<String>,
@@ -78,7 +78,7 @@ impl RotationalBank {
     /// Returns how much of a kernel is wave optics.
     pub(crate) fn wave_fraction(&self, query: PsfQuery) -> f64 {
         let record = self.record(query.field_tan.length(), query.dioptres, query.wavelength_nm);
-        wave_share_of(&self.layout(&record, query, None), self.settings().diffraction)
+        wave_fraction_of(&self.layout(&record, query, None), self.settings().diffraction)
     }
 
     pub(crate) fn layout<'a>(&self, record: &'a RayMap, query: PsfQuery, side: Option<usize>) -> Layout<'a> {
@@ -116,19 +116,19 @@ pub(crate) fn composed(
     diffraction: Diffraction,
     waves: impl FnOnce(usize) -> Result<Array2<f64>, DiffractionError>,
 ) -> (Array2<f64>, ModelUse) {
-    let share = wave_share_of(&layout, diffraction);
+    let share = wave_fraction_of(&layout, diffraction);
     if share == 0.0 {
-        return (layout.draw(), ModelUse { wave_share: 0.0, fallback: None });
+        return (layout.draw(), ModelUse { wave_fraction: 0.0, fallback: None });
     }
     match waves(layout.side()) {
-        Ok(waves) if share == 1.0 => (waves, ModelUse { wave_share: 1.0, fallback: None }),
-        Ok(waves) => (waves * share + layout.draw() * (1.0 - share), ModelUse { wave_share: share, fallback: None }),
-        Err(error) => (layout.draw(), ModelUse { wave_share: 0.0, fallback: Some(error.to_string()) }),
+        Ok(waves) if share == 1.0 => (waves, ModelUse { wave_fraction: 1.0, fallback: None }),
+        Ok(waves) => (waves * share + layout.draw() * (1.0 - share), ModelUse { wave_fraction: share, fallback: None }),
+        Err(error) => (layout.draw(), ModelUse { wave_fraction: 0.0, fallback: Some(error.to_string()) }),
     }
 }
 
 /// Returns how much of a layout is wave optics: 1 up to a range of phases of 200, falling with its logarithm to 0 at 400.
-pub(crate) fn wave_share_of(layout: &Layout<'_>, diffraction: Diffraction) -> f64 {
+pub(crate) fn wave_fraction_of(layout: &Layout<'_>, diffraction: Diffraction) -> f64 {
     match diffraction {
         Diffraction::Wave => (2.0 - (layout.bandwidth() / ALL_WAVE).log2()).clamp(1.0, 2.0) - 1.0,
         _ => 0.0,

@@ -11,7 +11,7 @@ use crate::{
     BankSettings, Diffraction, Kernel, ModelUse, PsfError, PsfQuery,
     axis::Axis,
     dispersion::Dispersion,
-    drawing::{composed, wave_share_of},
+    drawing::{composed, wave_fraction_of},
     hurb_splatter::StopHurb,
     mesh::Mesh,
     pupil::Pupil,
@@ -157,7 +157,7 @@ impl GeneralBank {
     /// Returns how much of a kernel is wave optics; 0 of dark points.
     pub(crate) fn wave_fraction(&self, query: PsfQuery) -> f64 {
         let record = self.record(query.field_tan, query.dioptres, query.wavelength_nm);
-        record.map_or(0.0, |record| wave_share_of(&self.layout(&record, query, None), self.settings.diffraction))
+        record.map_or(0.0, |record| wave_fraction_of(&self.layout(&record, query, None), self.settings.diffraction))
     }
 
     pub(crate) fn layout<'a>(&self, record: &'a RayMap, query: PsfQuery, side: Option<usize>) -> Layout<'a> {

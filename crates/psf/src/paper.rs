@@ -133,7 +133,7 @@ impl Figure2 {
         Profile { at_um, values: smoothed(&values) }
     }
 
-    /// Returns the line spread by counting randomly bent rays, as the authors did; not smoothed.
+    /// Returns the line spread by counting rays that HURB deviates at random, as the authors did; not smoothed.
     ///
     /// # Errors
     /// When the diameter is not above 0.
@@ -203,7 +203,7 @@ mod tests {
         for point in rows.chunks(4) {
             let lenses: Vec<MonoLens> = point.iter().map(|row| lens.at(number(row, "wave_nm")).unwrap()).collect();
             let source_mm = DVec3::new(number(&point[0], "source_x_mm"), 0.0, number(&point[0], "source_z_mm"));
-            // Where the authors' film lay is told by the centroid that they stored, best by that of the widest blur.
+            // Where the authors' film lay follows from the centroid that they stored, best by that of the widest blur.
             let widest =
                 (0..4).max_by(|&a, &b| number(&point[a], "sigma_x_mm").total_cmp(&number(&point[b], "sigma_x_mm")));
             let widest = widest.unwrap();

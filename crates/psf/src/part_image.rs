@@ -42,7 +42,7 @@ impl PartImage {
     /// Returns the images through so many parts of the pupil of a lens.
     ///
     /// # Errors
-    /// For sums of waves, which parts of a pupil do not add up to; for blended pictures, and where fields are single points.
+    /// For diffraction integrals, which parts of a pupil do not add up to; for blended pictures, and where fields are single points.
     pub(crate) fn all(model: &LensImageModel, n_parts: usize) -> Result<Vec<Self>, PsfError> {
         let settings = model.settings();
         let refused = |reason| Err(PsfError::Undividable { reason });

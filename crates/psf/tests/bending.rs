@@ -1,4 +1,4 @@
-//! Drawn uncertainty bending, held to random bending at the stop.
+//! HURB as it is drawn, held to random deviations at the stop.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_diffraction::{CircularStop, Hurb, HurbForm, SampledHurb};
@@ -35,7 +35,7 @@ fn rays_at_stop(lens: &MonoLens, point: &ObjectPoint, n_rays: usize) -> RayBatch
     RayBatch::from_points(&points, &directions)
 }
 
-/// Returns the L1 difference of a kernel from bent rays counted on its pixels, and what random counts alone would give.
+/// Returns the L1 difference of a kernel from deviated rays counted on its pixels, and what random counts alone would give.
 fn difference(
     lens: &Lens,
     kernel: &Kernel,

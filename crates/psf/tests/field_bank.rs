@@ -50,7 +50,7 @@ fn of_a_symmetric_lens_it_is_the_turned_bank() {
             println!("{diffraction:?} {x} {y}: {l1}");
             // Each interpolates to a per cent, and the mesh of one is turned in the pupil of the other: outlines of 48
             // corners cut a per cent or two of a blur's pixels differently.
-            assert!(l1 < most && model.wave_share == 0.0, "{x} {y} {dioptres} {nm}: {l1}");
+            assert!(l1 < most && model.wave_fraction == 0.0, "{x} {y} {dioptres} {nm}: {l1}");
             let radius_mm = turned.radial_geometry(dioptres, nm).unwrap().image_radius_mm(query.field_tan.length());
             let centroid_mm = plane.centroid_mm(query.field_tan, dioptres, nm);
             // Distortion is of third order in the field: quadratics miss it by some µm of many mm.
@@ -127,7 +127,7 @@ fn waves_of_a_lens_of_two_powers_are_summed_and_dark_fields_are_none() {
     let narrow = lens.with_stop_diameter_mm(1.0).unwrap();
     let waves = BankSettings { diffraction: Diffraction::Wave, fields: points(vec![0.0]), ..wide.clone() };
     let (picture, model) = LensImageModel::build(&narrow, &waves).unwrap().picture(query, 201).unwrap();
-    assert!(model.wave_share > 0.9 && model.fallback.is_none(), "{model:?}");
+    assert!(model.wave_fraction > 0.9 && model.fallback.is_none(), "{model:?}");
     // Most of an Airy pattern of some 50 µm and a blur of 100 µm is on 0.8 mm.
     assert!(picture.sum() > 0.97 && picture.sum() < 1.001, "{}", picture.sum());
     assert!(LensImageModel::build(&lens, &BankSettings { fields: points(vec![0.1, 0.0]), ..wide }).is_err());
@@ -201,7 +201,7 @@ fn a_lens_with_a_round_hole_is_drawn_alike_by_both_banks() {
         let (of_plane, model) = LensImageModel::build(&lens, &plane).unwrap().picture(query, 41).unwrap();
         let (of_turned, again) = LensImageModel::build(&lens, &turned).unwrap().picture(query, 41).unwrap();
         assert_eq!(
-            (model.wave_share, again.wave_share),
+            (model.wave_fraction, again.wave_fraction),
             if diffraction == Diffraction::Wave { (1.0, 1.0) } else { (0.0, 0.0) }
         );
         let off: f64 = (&of_plane - &of_turned).iter().map(|e| e.abs()).sum();

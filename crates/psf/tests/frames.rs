@@ -128,7 +128,7 @@ fn moved_film_turns_waves() {
     let picture = |lens: &Lens| {
         let bank = bank(lens, film_distance_mm, (vec![field.x], vec![field.y]), Diffraction::Wave);
         let (picture, model) = bank.picture(query(field), 61).unwrap();
-        assert!(model.wave_share > 0.9, "{model:?}");
+        assert!(model.wave_fraction > 0.9, "{model:?}");
         picture
     };
     let straight = picture(&lens);

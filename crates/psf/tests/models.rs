@@ -1,4 +1,4 @@
-//! What each model of diffraction is good for: real pictures of points by each, held to the sum of waves.
+//! What each model of diffraction is good for: real pictures of points by each, held to the diffraction integral.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_optics::{Lens, glam::DVec2};
@@ -49,7 +49,7 @@ fn picture(case: &Case, diffraction: Diffraction) -> Array2<f64> {
     };
     let query = PsfQuery { field_tan, dioptres: case.dioptres, wavelength_nm: 550.0, pitch_um: PITCH_UM };
     let (picture, model) = LensImageModel::build(&lens, &settings).unwrap().picture(query, SIZE).unwrap();
-    assert_eq!(model.wave_share, if diffraction == Diffraction::Wave { 1.0 } else { 0.0 }, "{}", case.name);
+    assert_eq!(model.wave_fraction, if diffraction == Diffraction::Wave { 1.0 } else { 0.0 }, "{}", case.name);
     assert_eq!(model.fallback, None);
     picture
 }

@@ -25,7 +25,7 @@ fn errors(lens: &Lens, settings: &BankSettings, n_places: usize) -> Vec<f64> {
         let query = PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um: PITCH_UM };
         let (found, model) = bank.picture(query, SIZE).unwrap();
         assert_eq!(model.fallback, None);
-        if model.wave_share < 1.0 {
+        if model.wave_fraction < 1.0 {
             continue;
         }
         let point = ObjectPoint::from_field(&reference, field_tan, dioptres);

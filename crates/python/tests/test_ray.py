@@ -95,7 +95,7 @@ def test_lost_node_changes_nothing(tmp_path: Path) -> None:
 
 
 def test_items_that_end_their_worker_fail_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Their task is tried item by item; refused cameras are results, and unreadable files are told."""
+    """Their task is tried item by item; refused cameras are results, and unreadable files are reported."""
     (tmp_path / "cut.exr").write_bytes(b"\x76\x2f\x31\x01")
     cut = '(source: File("cut.exr"), field_of_view_deg: 14.0, depth_m: 2.0)'
     flat = "(source: Target(pattern: Uniform, columns: 32, rows: 32), field_of_view_deg: 14.0, depth_m: 2.0)"

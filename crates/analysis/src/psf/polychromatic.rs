@@ -70,7 +70,7 @@ impl PsfSet {
             distance_mm: first.distance_mm,
             wavelength_nm: 0.0,
         };
-        let (mut energy, mut picture_share, mut wave_share) = (0.0, 0.0, Some(0.0));
+        let (mut energy, mut picture_share, mut wave_fraction) = (0.0, 0.0, Some(0.0));
         for part in &parts {
             let (row, w) = (&self.rows[part.index], part.share);
             let (own, apart_um) = (row.second_moments_um2(), 1e3 * (row.centroid_mm() - centroid_mm));
@@ -79,14 +79,14 @@ impl PsfSet {
             name.wavelength_nm += w * row.wavelength_nm;
             energy += w * row.energy;
             picture_share += w * row.picture_share;
-            wave_share = wave_share.zip(row.wave_share).map(|(sum, share)| sum + w * share);
+            wave_fraction = wave_fraction.zip(row.wave_fraction).map(|(sum, share)| sum + w * share);
         }
         let picture = self.summed(&parts, self.side_of(&parts));
         let pictures = if mtf_per_mm.is_empty() { vec![] } else { self.waves_of(&parts) };
         let row = PsfRow::measure(name, centroid_mm, second, &Picture::new(picture.view(), self.pixel_um))
             .with_mtf(mtf_per_mm, |direction, f| self.modulation_of(&pictures, direction, f));
         Some(PolychromaticPsf {
-            row: PsfRow { is_polychromatic: true, energy, picture_share, wave_share, ..row },
+            row: PsfRow { is_polychromatic: true, energy, picture_share, wave_fraction, ..row },
             picture,
         })
     }

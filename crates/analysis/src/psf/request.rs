@@ -150,7 +150,7 @@ impl PsfRequest {
             return Err(self.wrong("rays", &n_across.to_string(), "2 to 20000"));
         }
         if matches!(self.sampling, PsfSampling::Paper { .. }) && self.diffraction == Diffraction::Wave {
-            return Err(self.wrong("diffraction", "wave", "bent rays or none in the paper mode"));
+            return Err(self.wrong("diffraction", "wave", "HURB or none in the paper mode"));
         }
         if let Some(BankSpec::Within { error }) = self.bank
             && !(error.is_finite() && error > 0.0)

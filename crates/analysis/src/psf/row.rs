@@ -58,9 +58,9 @@ pub struct PsfRow {
     /// The share of the point's light that lies on the picture: what the picture's metrics are of, but for the modulation, in which
     /// the rest counts as well.
     pub picture_share: f64,
-    /// The share of the picture that is the sum of waves; the rest is geometric or bent rays. Not in the paper mode.
+    /// The share of the picture that is the diffraction integral; the rest is geometric rays or HURB. Not in the paper mode.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub wave_share: Option<f64>,
+    pub wave_fraction: Option<f64>,
     /// Why waves that were asked for were not summed, if so.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fallback: Option<String>,
@@ -134,7 +134,7 @@ impl PsfRow {
             es80_half_width_um: lit(ensquared.reach_um(0.8)),
             energy: 0.0,
             picture_share: 0.0,
-            wave_share: None,
+            wave_fraction: None,
             fallback: None,
             strehl: None,
             bank: None,
@@ -168,9 +168,9 @@ impl PsfRow {
         !self.is_dark() && self.picture_share < 0.97
     }
 
-    /// Whether any of the picture is the sum of waves.
+    /// Whether any of the picture is the diffraction integral.
     pub fn is_of_waves(&self) -> bool {
-        self.wave_share.is_some_and(|share| share > 0.0)
+        self.wave_fraction.is_some_and(|share| share > 0.0)
     }
 
     /// The centroid, mm.
@@ -199,7 +199,7 @@ pub fn psf_csv(rows: &[PsfRow]) -> String {
     let mut csv =
         "field_deg,field_y_deg,distance_mm,wavelength_nm,is_polychromatic,centroid_x_mm,centroid_y_mm,rms_radius_um,sigma_x_um,\
                    sigma_y_um,second_moment_xy_um2,lsf_fwhm_um,lsf_fwhm_y_um,ee50_radius_um,ee80_radius_um,\
-                   es50_half_width_um,es80_half_width_um,energy,picture_share,wave_share,strehl"
+                   es50_half_width_um,es80_half_width_um,energy,picture_share,wave_fraction,strehl"
             .to_owned();
     for mtf in rows.first().map_or(&[][..], |row| &row.mtf) {
         let f = mtf.cycles_per_mm;
@@ -229,7 +229,7 @@ pub fn psf_csv(rows: &[PsfRow]) -> String {
         for value in numbers {
             let _ = write!(csv, ",{value}");
         }
-        let _ = write!(csv, ",{},{}", or_empty(row.wave_share), or_empty(row.strehl));
+        let _ = write!(csv, ",{},{}", or_empty(row.wave_fraction), or_empty(row.strehl));
         for mtf in &row.mtf {
             let _ = write!(csv, ",{},{}", mtf.tangential, mtf.sagittal);
         }

@@ -96,8 +96,8 @@ impl PsfRequest {
             }
         };
         let mut row = self.measure(item, &spot, &picture);
-        if let Some(ModelUse { wave_share, fallback }) = model {
-            (row.wave_share, row.fallback) = (Some(wave_share), fallback);
+        if let Some(ModelUse { wave_fraction, fallback }) = model {
+            (row.wave_fraction, row.fallback) = (Some(wave_fraction), fallback);
         }
         if row.is_of_waves() {
             let nodes =
@@ -299,7 +299,7 @@ mod tests {
             ..request()
         };
         let set = wave.compute(&Lens::built_in("dgauss-50mm").unwrap().with_f_number(8.0, 550.0).unwrap()).unwrap();
-        assert_eq!([set.rows[0].wave_share, set.rows[1].wave_share], [Some(1.0), Some(0.0)]);
+        assert_eq!([set.rows[0].wave_fraction, set.rows[1].wave_fraction], [Some(1.0), Some(0.0)]);
         let strehl = set.rows[0].strehl.unwrap();
         assert!(strehl > 0.7 && strehl <= 1.0 && set.rows[1].strehl.is_none(), "{strehl}");
         let paper = PsfRequest { sampling: PsfSampling::Paper { n_across: 21 }, ..wave };

@@ -63,7 +63,7 @@ pub fn hurb(name: &'static str, wavelengths_nm: &[f64], model: Hurb) -> Surface 
 /// percent, is far from the line too.
 const WAVE_ROWS: usize = 1341;
 
-/// Returns the line spread of the sum of waves through the ideal lens, from the point at 2 m.
+/// Returns the line spread of the diffraction integral through the ideal lens, from the point at 2 m.
 ///
 /// # Errors
 /// When the lens cannot be built or its light not be summed, which they can.
@@ -80,7 +80,7 @@ pub fn wave(wavelengths_nm: &[f64]) -> Result<Surface, PsfError> {
         Ok(Profile { at_um: places_um(), values })
     };
     let profiles = wavelengths_nm.par_iter().map(profile).collect::<Result<_, PsfError>>()?;
-    Ok(Surface { name: "sum of waves", wavelengths_nm: wavelengths_nm.to_vec(), profiles })
+    Ok(Surface { name: "diffraction integral", wavelengths_nm: wavelengths_nm.to_vec(), profiles })
 }
 
 /// Returns the theory: the line spread function of Airy's pattern.

@@ -38,7 +38,7 @@ pub struct EnviCube {
 }
 
 impl EnviCube {
-    /// Returns the cube as an image: radiance where the header's `data units` say so (`W/m^2/sr/nm`, `uW/(cm^2 sr nm)`,
+    /// Returns the cube as an image: radiance where the header's `data units` are of radiance (`W/m^2/sr/nm`, `uW/(cm^2 sr nm)`,
     /// `photons/s/m^2/sr/nm` and their like), or else the reflectance.
     ///
     /// Reflectance is relative to, in this order: `white_level`, the header's `reflectance scale factor`, or the cubes
@@ -374,7 +374,7 @@ mod tests {
         let image = cube.into_image(None).unwrap();
         let (row, column) = (15, 21);
         let at = |nm: f64| image.spectrum_at(row, column)[image.grid().nearest(nm)];
-        // A yellow kernel: blue is swallowed, red is not.
+        // A yellow kernel: blue is absorbed, red is not.
         assert!(at(450.0) < 0.5 * at(600.0) && at(600.0) > 0.2 && at(600.0) < 1.2);
     }
 }

@@ -63,7 +63,7 @@ pub(super) fn axial(distance_m: &Array2<f32>, view: View) -> Array2<f32> {
 
 /// Reads a spectral EXR file.
 ///
-/// Channels are `S0.…` (radiance, or irradiance where `emissiveUnits` says so) or `T.…` (reflectance), in any number
+/// Channels are `S0.…` (radiance, or irradiance by its `emissiveUnits`) or `T.…` (reflectance), in any number
 /// of decimals, with exponents and any unit of length or frequency, as half or single floats; so pbrt writes them too. `550nm`
 /// and a bin `360.00-375.67nm` (Mitsuba 0.6) are light likewise. Values are a nanometre, in W or photons. Other channels, such
 /// as RGB, are left alone, but for `Z` and `distance`.

@@ -23,7 +23,7 @@ pub struct Product {
     pub model: Arc<LensImageModel>,
     /// The depth of each sample of the scene, m.
     pub depth: Arc<DepthMap>,
-    /// Where the samples of the scene are, where it says so.
+    /// Where the samples of the scene are, where it has a view.
     pub view: Option<View>,
     /// The picture, 8 bits a channel, red, green and blue in turn, row by row from the top.
     pub rgb8: Vec<u8>,

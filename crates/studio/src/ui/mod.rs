@@ -130,7 +130,7 @@ impl std::fmt::Debug for Studio {
 }
 
 impl Studio {
-    /// Starts the engine and submits the first camera. What is wrong with a file that cannot be opened is told in the window.
+    /// Starts the engine and submits the first camera. What is wrong with a file that cannot be opened is shown in the window.
     ///
     /// # Errors
     /// When the system starts no thread.
