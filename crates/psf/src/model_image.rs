@@ -31,7 +31,7 @@ impl LensImage for LensImageModel {
         }
     }
 
-    /// Of [`FieldSampling::Points`] the map sees nothing.
+    /// Of [`FieldSampling::Points`](crate::FieldSampling::Points) the map sees nothing.
     fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
         match &self.form {
             Form::Rotational(bank) => {
