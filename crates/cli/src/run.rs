@@ -9,7 +9,7 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_pipeline::{
-    BankSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
+    BankSpec, BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
     ImagingTimes, KeptCamera, LensReadOptions, LensSpec, Progress, Quality, SceneSpec, SensorOptions, SensorSpec,
     Silent, Stage, Staged, StopSpec, WavelengthSpec, parse_illuminant, parse_numbers, with_exposure_s,
 };
@@ -63,6 +63,10 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
         let words = "where that is not black in the scene, the lens shows less of it than the film is large: take a smaller \
                      film (--film scene) or a wider scene";
         remark(common.quiet, &format!("{percent:.1} % of the film gets no light; {words}"));
+    }
+    let is_coarse = matches!(capture.quality, Quality::Preview | Quality::Sketch);
+    if is_coarse && matches!(capture.camera.blur, BlurSpec::Views(_)) {
+        remark(common.quiet, "a preview has layers of depth in place of views through parts of the pupil");
     }
     if common.json {
         return print_json(&report);

@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Kernels and alpha that a plan keeps when nothing else is asked for, bytes.
-const KEPT_BUDGET_BYTES: usize = 256 << 20;
+pub(crate) const KEPT_BUDGET_BYTES: usize = 256 << 20;
 
 /// What bands in flight take when nothing else is asked for, bytes.
 const IN_FLIGHT_BYTES: usize = 256 << 20;
@@ -202,6 +202,16 @@ impl Layout {
         let maps = self.maps().values().flat_map(|maps| maps.iter()).map(FilmMap::size_bytes).sum::<usize>();
         let blocks = self.blocks.values().map(BlockLayers::size_bytes).sum::<usize>();
         maps + blocks + self.tiling.size_bytes() + self.kept().size_bytes
+    }
+
+    /// Keeps at most so many bytes of kernels and alpha from now on, and none of those there are.
+    pub(crate) fn keep_at_most(&mut self, budget_bytes: usize) {
+        self.kept = Mutex::new(Kept { budget_bytes, ..Kept::default() });
+    }
+
+    /// Drops the maps of the bands that were asked for; they are made again where they are.
+    pub(crate) fn drop_maps(&self) {
+        self.maps().clear();
     }
 
     /// Rows and columns of the scene.

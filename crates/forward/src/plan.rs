@@ -1,6 +1,6 @@
 //! All of imaging that does not depend on the scene's light, made once.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use dioptric_psf::LensImage;
 use dioptric_spectrum::Cancel;
@@ -8,7 +8,6 @@ use ndarray::Array2;
 
 use crate::{
     BandKernels, BandRadiance, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
-    basis::Kept,
     framed::Framed,
     layout::Layout,
     stopwatch::{Clock, ImagingTimes, Stopwatch},
@@ -93,7 +92,7 @@ impl ImagingPlan {
     pub fn with_kernel_budget(mut self, bytes: usize) -> Self {
         let layouts = self.views.layouts_mut();
         let budget_bytes = bytes / layouts.len();
-        layouts.iter_mut().for_each(|layout| layout.kept = Mutex::new(Kept { budget_bytes, ..Kept::default() }));
+        layouts.iter_mut().for_each(|layout| layout.keep_at_most(budget_bytes));
         self
     }
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::{
     BandRadiance, BlurMode, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
     basis::BasisBetween,
-    layout::{Layout, SceneLayers},
+    layout::{KEPT_BUDGET_BYTES, Layout, SceneLayers},
     work::{Progress, Watch, Work},
 };
 
@@ -45,7 +45,11 @@ impl Views {
         let step = (range.1 - range.0) / parts.len() as f64;
         let part_range = |i: usize| (range.0 + step * i as f64, range.0 + step * (i + 1) as f64);
         let layouts = parts.iter().enumerate().map(|(i, part)| layout(part.as_ref(), part_range(i)));
-        Ok(Self { layouts: layouts.collect::<Result<_, _>>()?, parts })
+        let mut layouts: Vec<Layout> = layouts.collect::<Result<_, _>>()?;
+        // Together they keep no more than one would.
+        let n = layouts.len();
+        layouts.iter_mut().for_each(|layout| layout.keep_at_most(KEPT_BUDGET_BYTES / n));
+        Ok(Self { layouts, parts })
     }
 
     /// The first layout: what it holds of scene, film and bands is that of all.
@@ -134,6 +138,7 @@ impl Views {
                         add(sum, picture?);
                     }
                 }
+                layout.drop_maps();
             }
             for (band, sum) in bands.into_iter().zip(sums) {
                 hand_on(band, sum.expect("there is at least one view"))?;
