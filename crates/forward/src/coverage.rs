@@ -110,13 +110,18 @@ impl PsfDomain<'_> {
     pub fn grid_settings(&self) -> Result<BankSettings, ForwardError> {
         self.film.check()?;
         let half_mm = self.film.half_size_mm();
+        // Where lens and film are their own mirror images, so are the fields.
+        let center_mm = self.film.center_mm;
+        let symmetries = self.lens.mirror_symmetries();
+        let is_mirrored = [0, 1].map(|axis| symmetries[axis] && center_mm[axis] == 0.0);
+        let kept = DVec2::from(is_mirrored.map(|is_mirrored| if is_mirrored { 0.0 } else { 1.0 }));
         let corners = self.at_ends(|aim| {
-            let aim = Aim { film_center_mm: self.film.center_mm, ..*aim };
+            let aim = Aim { film_center_mm: center_mm, ..*aim };
             let wavelength_nm = aim.lens.wavelength_nm();
             let dark = || ForwardError::DarkFilm { lens: self.lens.name().to_owned(), wavelength_nm };
-            let center = aim.field_at_middle().ok_or_else(dark)?;
+            let center = kept * aim.field_at_middle().ok_or_else(dark)?;
             let beyond_mm = 1.02 * half_mm + BORDER_OF_BLUR * aim.blur_mm(center);
-            Ok(aim.fields_over(center, beyond_mm))
+            Ok(aim.fields_over(center, beyond_mm, is_mirrored))
         })?;
         let around = |(first, last): (DVec2, DVec2), (low, high)| (first.min(low), last.max(high));
         let (first, last) = corners.into_iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), around);
@@ -252,11 +257,16 @@ impl Aim<'_> {
     }
 
     /// Returns the corners of the rectangle of fields that holds all that land within `half_mm` of the film's middle, across and up.
-    fn fields_over(&self, center: DVec2, half_mm: DVec2) -> (DVec2, DVec2) {
+    ///
+    /// `is_mirrored` says that what lands to the left, or below, is the mirror image of what lands on the other side.
+    fn fields_over(&self, center: DVec2, half_mm: DVec2, is_mirrored: [bool; 2]) -> (DVec2, DVec2) {
         const ALONG: i32 = 8;
+        /// A side begins at this part of what first-order optics has, which magnification and distortion leave within the film.
+        const FIRST: f64 = 0.25;
+        const NARROWEST_TAN: f64 = 1e-3;
         let is_within = |field_tan: DVec2| self.lands_mm(field_tan).is_some_and(|at| at.abs().cmplt(half_mm).all());
         // Sides: left, bottom, right, top, as distances from the center.
-        let mut sides = [1e-3; 4];
+        let mut sides = [NARROWEST_TAN; 4];
         let corners =
             |sides: &[f64; 4]| (center - DVec2::new(sides[0], sides[1]), center + DVec2::new(sides[2], sides[3]));
         let sees_film = |sides: &[f64; 4], side: usize| {
@@ -271,12 +281,20 @@ impl Aim<'_> {
                 })
             })
         };
+        let first = FIRST * half_mm / self.lens.first_order().efl_mm.abs();
+        let wide = [first.x, first.y, first.x, first.y].map(|tan| tan.clamp(NARROWEST_TAN, WIDEST_TAN));
+        if first.is_finite() && (0..4).all(|side| sees_film(&wide, side)) {
+            sides = wide;
+        }
         // A side goes out until nothing along it lands on the film; others may then have to follow.
         loop {
             let mut has_grown = false;
-            for side in 0..4 {
+            for side in (0..4).filter(|side| *side >= 2 || !is_mirrored[*side]) {
                 while sides[side] < WIDEST_TAN && sees_film(&sides, side) {
                     sides[side] *= 1.15;
+                    if is_mirrored[side % 2] {
+                        sides[side - 2] = sides[side];
+                    }
                     has_grown = true;
                 }
             }

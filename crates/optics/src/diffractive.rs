@@ -43,6 +43,14 @@ pub enum PhaseProfile {
 }
 
 impl PhaseProfile {
+    /// Whether the phase stays when x (axis 0) or y (axis 1) changes its sign.
+    pub(crate) fn is_mirrored_along(&self, axis: usize) -> bool {
+        match self {
+            Self::Grating { lines_per_mm } => lines_per_mm[axis] == 0.0,
+            Self::Rings { .. } => true,
+        }
+    }
+
     /// Returns the phase at a place, in cycles.
     pub(crate) fn cycles_at(&self, place_mm: DVec2) -> f64 {
         match self {

@@ -358,6 +358,20 @@ impl Lens {
             && placement::motions(&self.moves, &self.vertices_z_mm()).is_none()
     }
 
+    /// Whether the lens and its film are their own mirror images when x changes its sign, and when y does: what a field to the right
+    /// sends to the film is then the mirror image of what the one to the left sends.
+    ///
+    /// A lens tilted about x alone is one of the first kind, a rotationally symmetric one of both.
+    pub fn mirror_symmetries(&self) -> [bool; 2] {
+        let mut places = self.placements();
+        places.push(self.film_motion());
+        [0, 1].map(|axis| {
+            self.apertures.iter().all(|aperture| aperture.center_mm[axis] == 0.0)
+                && self.diffractive.iter().all(|phase| phase.profile.is_mirrored_along(axis))
+                && places.iter().all(|place| place.is_mirrored_along(axis))
+        })
+    }
+
     /// Returns the lens on the axis, and how far this one is moved sideways from there, mm along x and y: of a lens that would be
     /// rotationally symmetric but for being decentered as a whole, before a flat film that stays. `None` of any other, the lens
     /// on the axis among them.

@@ -115,6 +115,13 @@ impl Placement {
         Self { vertex_mm: self.surface_from_lens(DVec3::ZERO), rotation: self.rotation.transpose() }
     }
 
+    /// Whether the frame is its own mirror image when x (axis 0) or y (axis 1) changes its sign.
+    pub(crate) fn is_mirrored_along(&self, axis: usize) -> bool {
+        let (mm, own) = (self.vertex_mm, self.rotation.col(axis));
+        let across = DVec3::AXES[axis] * own[axis];
+        mm[axis].abs() <= ROUNDING.0 && (own - across).abs().max_element() <= ROUNDING.1
+    }
+
     /// Returns the frame with its z the other way, x and y as they are: of the other handedness.
     pub(crate) fn flipped(&self) -> Self {
         let DMat3 { x_axis, y_axis, z_axis } = self.rotation;

@@ -11,11 +11,12 @@ use std::{
 };
 
 use dioptric_pipeline::{
-    Camera, FocusSpec, KeptCamera, Progress, Quality, SensorSpec, Silent, Stage, StopSpec, with_analog_gain,
-    with_exposure_s,
+    Camera, FocusSpec, KeptCamera, LensSpec, PaintingFolder, Progress, Quality, SceneSource, SensorSpec, Silent, Stage,
+    StopSpec, with_analog_gain, with_exposure_s,
 };
+use dioptric_scene::Pattern;
 use dioptric_sensor::{Demosaic, Sensor};
-use dioptric_spectrum::Cancel;
+use dioptric_spectrum::{Cancel, Illuminant};
 
 /// Runs a row of changes, each of another value.
 const REPEATS: usize = 5;
@@ -87,6 +88,24 @@ fn changes(kept: &KeptCamera, sensors: &[std::path::PathBuf], only: Option<&str>
     of("focus", &|camera, i| camera.focus = FocusSpec::DistanceMm(900.0 + 50.0 * i as f64));
     of("f-number", &|camera, i| camera.stop = StopSpec::FNumber(5.0 + i as f64));
     of("rise", &|camera, i| camera.movements.rise_mm = 0.1 * (1.0 + i as f64));
+    of("tilt", &|camera, i| camera.movements.tilt_deg = 0.5 * (1.0 + i as f64));
+    of("scene: another light", &|camera, i| {
+        let lights = [Illuminant::A, Illuminant::D50, Illuminant::D55, Illuminant::D65, Illuminant::E, Illuminant::Fl2];
+        camera.scene.illuminant = Some(lights[i].clone());
+    });
+    of("scene: another painting", &|camera, i| {
+        camera.scene.source = SceneSource::StillLife { columns: 1080 + 30 * (1 + i), rows: 720 + 20 * (1 + i) };
+    });
+    of("scene: a target", &|camera, i| {
+        (camera.scene.field_of_view_deg, camera.scene.depth_m) = (Some(34.0), Some(1.5));
+        camera.scene.source =
+            SceneSource::Target { pattern: Pattern::Checkerboard { check_px: 10 + i }, columns: 1080, rows: 720 };
+    });
+    of("lens", &|camera, i| {
+        let lenses = ["tessar-50mm", "dgauss-50mm", "canon-50mm", "paper-2el", "dgauss-50mm-schott", "singlet-50mm"];
+        camera.lens = LensSpec::BuiltIn(lenses[i].into());
+        camera.stop = StopSpec::FNumber(5.0);
+    });
 }
 
 fn main() {
@@ -117,7 +136,9 @@ fn main() {
         [("full", Quality::Full), ("draft", Quality::Draft), ("preview", Quality::Preview), ("sketch", Quality::Sketch)]
     {
         if is_wanted(section) {
-            let kept = KeptCamera::new(demo.clone()).with_quality(quality);
+            // As in the programs, what was painted once is kept for other light.
+            let paintings = PaintingFolder::new(folder.path(), "bench");
+            let kept = KeptCamera::new(demo.clone()).with_quality(quality).with_paintings(Some(paintings));
             row(&format!("{quality:?}: nothing kept"), vec![seconds(&kept)]);
             changes(&kept, &sensors, only.as_deref());
         }

@@ -14,6 +14,7 @@ use crate::{
     drawing::{composed, wave_fraction_of},
     hurb_splatter::StopHurb,
     mesh::Mesh,
+    mirror::MirroredFields,
     pupil::Pupil,
     ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, RayMapMoments},
     render::{self, Layout},
@@ -63,19 +64,18 @@ impl GeneralBank {
         let nm: Vec<f64> = settings.wavelengths_nm.iter().rev().copied().collect();
         let lenses: Vec<MonoLens> = nm.iter().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
         let mesh = Mesh { n_rings: settings.n_rings, n_azimuths: settings.n_azimuths };
+        let fields = MirroredFields::new(lens.mirror_symmetries(), mesh, tans_x, tans_y);
         let mut tasks = Vec::new();
         for lens in &lenses {
             for &dioptres in &settings.dioptres {
-                for &tan_y in tans_y {
-                    tasks.extend(tans_x.iter().map(|&tan_x| RayMapJob {
-                        lens,
-                        reference: &reference,
-                        field_tan: DVec2::new(tan_x, tan_y),
-                        dioptres,
-                        film_distance_mm: settings.film_distance_mm,
-                        mesh,
-                    }));
-                }
+                tasks.extend(fields.traced().map(|field_tan| RayMapJob {
+                    lens,
+                    reference: &reference,
+                    field_tan,
+                    dioptres,
+                    film_distance_mm: settings.film_distance_mm,
+                    mesh,
+                }));
             }
         }
         let has_stop = settings.diffraction != Diffraction::None;
@@ -92,7 +92,8 @@ impl GeneralBank {
             watch.done(1);
             Ok(sample)
         };
-        let samples = tasks.par_iter().map(watched).collect::<Result<_, Cancelled>>()?;
+        let traced: Vec<Option<Sample>> = tasks.par_iter().map(watched).collect::<Result<_, Cancelled>>()?;
+        let samples = traced.chunks_exact(fields.traced().count()).flat_map(|plane| fields.spread(plane)).collect();
         let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
         let axis = |knots: Vec<f64>| Axis::new(knots).expect("the settings were checked");
         Ok(Self {

@@ -32,6 +32,7 @@ mod kernel;
 mod lens_image;
 mod mesh;
 mod metrics;
+mod mirror;
 mod model;
 mod model_image;
 mod narrow_gaussian;

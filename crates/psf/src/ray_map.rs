@@ -123,14 +123,32 @@ impl RayMap {
         if share <= 0.0 {
             return None;
         }
-        let centroid_mm = self.weighted_sum_mm(energies.iter().copied()) / share;
         let mut part = self.clone();
-        let n = self.mesh.n_nodes();
-        part.numbers[..n].iter_mut().for_each(|x| *x -= centroid_mm.x as f32);
-        part.numbers[n..2 * n].iter_mut().for_each(|y| *y -= centroid_mm.y as f32);
         let first = part.numbers.len() - self.mesh.n_cells();
         part.numbers[first..].iter_mut().zip(energies).for_each(|(of_part, e)| *of_part = (e / share) as f32);
+        part.recenter();
         Some(part)
+    }
+
+    /// Moves the places so that they count from the centroid of what is drawn of them; returns where that was, mm.
+    pub(crate) fn recenter(&mut self) -> DVec2 {
+        let centroid_mm = self.weighted_sum_mm(self.energies().iter().map(|&e| f64::from(e)));
+        let n = self.mesh.n_nodes();
+        self.numbers[..n].iter_mut().for_each(|x| *x -= centroid_mm.x as f32);
+        self.numbers[n..2 * n].iter_mut().for_each(|y| *y -= centroid_mm.y as f32);
+        centroid_mm
+    }
+
+    /// Whether a list of nodes' numbers changes its sign in a mirror image with x or y or both of the other sign.
+    pub(crate) fn is_reversed(list: usize, [x, y]: [bool; 2]) -> bool {
+        match list {
+            // Places along x and along y.
+            0 | 2 => x,
+            1 | 3 => y,
+            // Movements over direction cosines: along the same axis both are reversed.
+            4 | 7 => false,
+            _ => x != y,
+        }
     }
 
     /// Returns the energies of the cells through a part of the pupil, each cell taken at its middle.

@@ -317,7 +317,9 @@ fn even_angles((first, last): (f64, f64), n: usize) -> Vec<f64> {
         return vec![first];
     }
     let (low, high) = (first.atan(), last.atan());
-    let mut tans: Vec<f64> = (0..n).map(|i| (low + (high - low) * i as f64 / (n - 1) as f64).tan()).collect();
+    // Of a range about 0 the two halves are mirror images to the bit.
+    let angle = |i: usize| ((n - 1 - i) as f64 * low + i as f64 * high) / (n - 1) as f64;
+    let mut tans: Vec<f64> = (0..n).map(|i| angle(i).tan()).collect();
     // The ends to the bit.
     (tans[0], tans[n - 1]) = (first, last);
     tans
