@@ -20,6 +20,7 @@ use crate::{
     geometry::check_extent,
     lateral_color::LateralColor,
     layers::{Blurs, Layers},
+    mixed::MixedSamples,
     occluded::OccludedSamples,
     occlusion::{BlurredPlane, Composite, LayerAlpha},
     raster::LayerRaster,
@@ -44,6 +45,8 @@ pub(crate) struct SceneLayers {
     pub(crate) basis_bands: Vec<usize>,
     layer_coordinates: LayerCoordinates,
     pub(crate) occluded: OccludedSamples,
+    /// Of a scene without a second layer of its own.
+    mixed: MixedSamples,
 }
 
 impl SceneLayers {
@@ -81,7 +84,15 @@ impl SceneLayers {
         let nearest = lens.film_map(layers.dioptres()[0], middle_nm, extent_mm);
         let scene_per_film = LayerRaster::new(film, 1, (scene.view, scene.size()), &nearest).sampler.scene_per_film;
         let occluded = OccludedSamples::find(scene, &layers, settings, scene_per_film, cancel)?;
-        Ok(Self { layers, kernel_bands, basis_bands, layer_coordinates, occluded })
+        // What a given layer holds of mixed samples, and what these show of it, make up each other.
+        let mixed = match hides(settings, &layers) && !occluded.needs_radiance() {
+            true => {
+                let distance = |row: usize, column: usize| layers.distance_px(z_m[(row, column)]);
+                MixedSamples::find(&plane_of(z_m.dim(), cancel, distance)?, settings.depth_edge_px as f32, cancel)?
+            }
+            false => MixedSamples::default(),
+        };
+        Ok(Self { layers, kernel_bands, basis_bands, layer_coordinates, occluded, mixed })
     }
 
     /// Rows and columns of the scene.
@@ -93,6 +104,7 @@ impl SceneLayers {
         self.layer_coordinates.size_bytes()
             + self.occluded.layer_coordinates().map_or(0, LayerCoordinates::size_bytes)
             + self.occluded.size_bytes()
+            + self.mixed.size_bytes()
     }
 }
 
@@ -441,8 +453,9 @@ impl Layout {
         work: &Work<'_>,
     ) -> Result<Array2<f32>, Cancelled> {
         let maps = self.maps_at(lens, band);
-        let occluded = self.scene.occluded.samples(light.front, light.occluded, work.cancel())?;
-        let front = light.front.as_standard_layout();
+        let front = self.scene.mixed.unmixed(light.front);
+        let occluded = self.scene.occluded.samples(&front, light.occluded, work.cancel())?;
+        let front = front.as_standard_layout();
         let occluded = occluded.as_ref().map(|samples| samples.as_standard_layout());
         let mut surfaces = vec![self.scene.layer_coordinates.surface(front.as_slice())];
         if let (Some(radiance), Some(depths)) = (&occluded, self.scene.occluded.layer_coordinates()) {

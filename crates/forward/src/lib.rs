@@ -29,6 +29,7 @@ mod knot_kernels;
 mod lateral_color;
 mod layers;
 mod layout;
+mod mixed;
 mod occluded;
 mod occlusion;
 mod plan;

@@ -16,7 +16,7 @@ use crate::{
     mesh::Mesh,
     mirror::MirroredFields,
     pupil::Pupil,
-    ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, RayMapMoments},
+    ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, Sample},
     render::{self, Layout},
     watch::Watch,
 };
@@ -41,13 +41,6 @@ pub(crate) struct GeneralBank {
     reference: MonoLens,
     /// Index around the stop at each of the colors.
     stop_indices: Vec<f64>,
-}
-
-/// The ray map of a point that is seen.
-#[derive(Clone, Debug)]
-pub(crate) struct Sample {
-    pub(crate) record: RayMap,
-    pub(crate) summary: RayMapMoments,
 }
 
 impl GeneralBank {

@@ -2,7 +2,10 @@
 
 use glam::DVec2;
 
-use crate::{general::Sample, mesh::Mesh, ray_map::RayMap};
+use crate::{
+    mesh::Mesh,
+    ray_map::{RayMap, Sample},
+};
 
 /// The mirror image of another sample: that of the field with its x, its y or both of the other sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -187,6 +187,13 @@ pub(crate) struct RayMapMoments {
     pub(crate) signed_rms_mm: f64,
 }
 
+/// The ray map of a point that is seen.
+#[derive(Clone, Debug)]
+pub(crate) struct Sample {
+    pub(crate) record: RayMap,
+    pub(crate) summary: RayMapMoments,
+}
+
 /// The radius that holds 95 % of an even disc over its rms radius: r² = 0.95 R², and the mean square is R²/2.
 pub(crate) const RIM_OVER_RMS: f64 = 1.378_404_875_209_022;
 

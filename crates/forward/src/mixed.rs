@@ -1,0 +1,166 @@
+//! Samples on edges of depth that show something of both sides.
+//!
+//! A picture whose samples are means over their squares has mixed ones along every outline, and each lies at one depth. Imaged there, what it shows of the
+//! other side would be as sharp, or as blurred, as its own: a near edge out of focus would leave a thin line of its color on the wall that is in focus.
+
+use std::borrow::Cow;
+
+use dioptric_spectrum::{Cancel, Cancelled};
+use ndarray::Array2;
+use rayon::prelude::*;
+
+/// Samples beside an edge of depth, and the samples around by which they are judged.
+#[derive(Default)]
+pub(crate) struct MixedSamples {
+    samples: Vec<Mixed>,
+    /// Indices of samples: of each mixed one those of its own side that lie beside no edge, then those of the other side.
+    around: Vec<u32>,
+}
+
+struct Mixed {
+    sample: u32,
+    first: u32,
+    first_other: u32,
+    end: u32,
+}
+
+/// How far around a sample others of its own side are looked for.
+const AROUND: usize = 2;
+
+impl MixedSamples {
+    /// Finds the samples of which a neighbor lies farther or nearer by more than a jump.
+    pub(crate) fn find(distances: &Array2<f32>, jump: f32, cancel: &Cancel) -> Result<Self, Cancelled> {
+        let (rows, columns) = distances.dim();
+        let near = |row: usize, column: usize, by: usize| {
+            let lines = row.saturating_sub(by)..(row + by + 1).min(rows);
+            let places = column.saturating_sub(by)..(column + by + 1).min(columns);
+            lines.flat_map(move |r| places.clone().map(move |c| (r, c)))
+        };
+        let is_apart = |a: (usize, usize), b: (usize, usize)| (distances[a] - distances[b]).abs() > jump;
+        let is_beside_edge = |at: (usize, usize)| near(at.0, at.1, 1).any(|other| is_apart(at, other));
+        let index = |(row, column): (usize, usize)| (row * columns + column) as u32;
+        let of_row = |row: usize| {
+            cancel.check()?;
+            let mut found = vec![];
+            for column in (0..columns).filter(|&column| is_beside_edge((row, column))) {
+                let at = (row, column);
+                let own = near(row, column, AROUND).filter(|&other| !is_apart(at, other) && !is_beside_edge(other));
+                let own: Vec<u32> = own.map(index).collect();
+                let other: Vec<u32> = near(row, column, 1).filter(|&other| is_apart(at, other)).map(index).collect();
+                // Something as thin as its own outline has no other color to go by.
+                if !own.is_empty() {
+                    found.push((index(at), own, other));
+                }
+            }
+            Ok(found)
+        };
+        let found: Vec<Vec<(u32, Vec<u32>, Vec<u32>)>> =
+            (0..rows).into_par_iter().map(of_row).collect::<Result<_, Cancelled>>()?;
+        let mut this = Self::default();
+        for (sample, own, other) in found.into_iter().flatten() {
+            let first = this.around.len() as u32;
+            this.around.extend(own);
+            let first_other = this.around.len() as u32;
+            this.around.extend(other);
+            this.samples.push(Mixed { sample, first, first_other, end: this.around.len() as u32 });
+        }
+        Ok(this)
+    }
+
+    /// The bytes of memory of the lists.
+    pub(crate) fn size_bytes(&self) -> usize {
+        size_of_val(self.samples.as_slice()) + size_of_val(self.around.as_slice())
+    }
+
+    /// Returns a band with what mixed samples show of the other side taken away: one that lies between the values of its own side and
+    /// those of the other becomes the nearest of its own side's.
+    pub(crate) fn unmixed<'a>(&self, plane: &'a Array2<f32>) -> Cow<'a, Array2<f32>> {
+        if self.samples.is_empty() {
+            return Cow::Borrowed(plane);
+        }
+        let samples = plane.as_standard_layout();
+        let samples = samples.as_slice().expect("it is in standard order");
+        let mut unmixed = plane.as_standard_layout().into_owned();
+        let own_only = unmixed.as_slice_mut().expect("it is in standard order");
+        for mixed in &self.samples {
+            let values =
+                |first: u32, end: u32| self.around[first as usize..end as usize].iter().map(|&at| samples[at as usize]);
+            let range = |first: u32, end: u32| {
+                values(first, end).fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+            };
+            let (least, most) = range(mixed.first, mixed.first_other);
+            let (other_least, other_most) = range(mixed.first_other, mixed.end);
+            let value = &mut own_only[mixed.sample as usize];
+            if (other_least..least).contains(value) {
+                *value = least;
+            } else if *value > most && *value <= other_most {
+                *value = most;
+            }
+        }
+        Cow::Owned(unmixed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(distances: &Array2<f32>) -> MixedSamples {
+        MixedSamples::find(distances, 3.0, &Cancel::new()).unwrap()
+    }
+
+    /// A near half plane of 2 before a wall of stripes of 5 and 6; the edge passes through column 8 or 9.
+    fn edge(share_of_near: [f32; 2]) -> (Array2<f32>, Array2<f32>) {
+        let distances = Array2::from_shape_fn((12, 20), |(_, column)| if column < 9 { 0.0 } else { 10.0 });
+        let wall = |row: usize| if row.is_multiple_of(2) { 5.0 } else { 6.0 };
+        let plane = Array2::from_shape_fn((12, 20), |(row, column)| {
+            let near = match column {
+                8 => share_of_near[0],
+                9 => share_of_near[1],
+                _ => {
+                    if column < 8 {
+                        1.0
+                    } else {
+                        0.0
+                    }
+                }
+            };
+            2.0 * near + (1.0 - near) * wall(row)
+        });
+        (distances, plane)
+    }
+
+    #[test]
+    fn mixed_colors_become_those_of_their_own_side() {
+        for share_of_near in [[1.0, 0.4], [0.6, 0.0], [1.0, 0.0]] {
+            let (distances, plane) = edge(share_of_near);
+            let mixed = found(&distances);
+            let unmixed = mixed.unmixed(&plane);
+            for ((row, column), &value) in unmixed.indexed_iter() {
+                match column {
+                    0..9 => assert_eq!(value, 2.0, "{row}, {column}"),
+                    // Between the stripes of the wall, or on one.
+                    9 => assert!((5.0..=6.0).contains(&value), "{row}, {column}: {value}"),
+                    _ => assert_eq!(value, plane[(row, column)]),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_bright_rim_and_a_continuous_surface_stay() {
+        let (distances, mut plane) = edge([1.0, 0.0]);
+        // Brighter than both sides: no mixture of them.
+        plane.column_mut(8).fill(40.0);
+        assert_eq!(*found(&distances).unmixed(&plane), plane);
+        let slope = Array2::from_shape_fn((12, 20), |(_, column)| 2.0 * column as f32);
+        assert!(found(&slope).samples.is_empty());
+    }
+
+    #[test]
+    fn what_is_too_thin_to_have_a_color_of_its_own_stays() {
+        let distances = Array2::from_shape_fn((12, 20), |(_, column)| if column == 9 { 0.0 } else { 10.0 });
+        let plane = Array2::from_shape_fn((12, 20), |(_, column)| if column == 9 { 3.0 } else { 8.0 });
+        assert_eq!(*found(&distances).unmixed(&plane), plane);
+    }
+}
