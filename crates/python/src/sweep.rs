@@ -370,7 +370,7 @@ impl Maker {
             let mut maker = self.maker.lock().unwrap_or_else(PoisonError::into_inner);
             let has_begun = self.has_begun.swap(true, Ordering::Relaxed);
             let place = if has_begun { self.store.workplace() } else { self.store.begin() }?;
-            items.into_iter().map(|item| Ok(words(maker.make(&place, item, latest, cancel)?))).collect()
+            Ok(maker.make(&place, &items, latest, cancel)?.into_iter().map(words).collect())
         })
     }
 }

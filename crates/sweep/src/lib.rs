@@ -16,6 +16,7 @@ mod error;
 mod index;
 mod inputs;
 mod item;
+mod keep;
 mod key;
 mod metrics;
 mod pack;

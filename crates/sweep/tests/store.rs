@@ -269,7 +269,7 @@ fn items_are_made_by_number_and_name() {
     let mut outcomes = Vec::new();
     for item in groups.into_iter().rev().flatten().chain([0]) {
         let place = parts.begin().unwrap();
-        outcomes.push(maker.make(&place, (item, planned.id(item)), &Silent, &Cancel::new()).unwrap());
+        outcomes.extend(maker.make(&place, &[(item, planned.id(item))], &Silent, &Cancel::new()).unwrap());
     }
     let count = |outcome: Outcome| outcomes.iter().filter(|own| **own == outcome).count();
     assert_eq!([Outcome::Done, Outcome::Refused, Outcome::There].map(count), [6, 3, 1]);
@@ -278,7 +278,7 @@ fn items_are_made_by_number_and_name() {
     let empty = Store::new(&folder.path().join("empty"));
     let place = empty.begin().unwrap();
     for (item, words) in [(0, "item 0 is called"), (9, "it has no item 9, but 9 items")] {
-        let error = maker.make(&place, (item, planned.id(1)), &Silent, &Cancel::new()).unwrap_err().to_string();
+        let error = maker.make(&place, &[(item, planned.id(1))], &Silent, &Cancel::new()).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
 }
