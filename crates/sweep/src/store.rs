@@ -6,6 +6,7 @@ use std::{
 };
 
 use dioptric_pipeline::{HiddenFolder, Leftover};
+use serde::{Deserialize, Serialize};
 
 use crate::{ItemId, SweepError};
 
@@ -19,7 +20,7 @@ pub struct Store {
 }
 
 /// What came of an item.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
     /// It has a picture.
