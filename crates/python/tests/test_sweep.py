@@ -123,7 +123,7 @@ def test_store_as_tables(made: tuple[Sweep, Path]) -> None:
     table = Store(folder).to_pandas()
     assert isinstance(table, pandas.DataFrame) and len(table) == 9
     assert table.index.dtype == np.int64 and table["stop.FNumber"].dtype == table["mean_e.G"].dtype == np.float64
-    assert table.loc[3, "reason"] is None and "the stop of" in table.loc[2, "reason"]
+    assert pandas.isna(table.loc[3, "reason"]) and "the stop of" in table.loc[2, "reason"]
     assert table.loc[3, "stop.FNumber"] == 4 and table.loc[2, "status"] == "refused"
 
 
