@@ -83,5 +83,5 @@ pub(crate) const OTHER: &[(&str, &str, &str)] = &[
     ("ron", "", "Expected opening `(` for struct `Prescription`"),
     ("dat", "", "a lens has exactly one stop, but 0 surfaces are marked"),
     ("txt", "# lens\n50\n", "a lens has exactly one stop, but 0 surfaces are marked"),
-    ("agf", "x", "l.agf: the extension '.agf' is no lens format; expected"),
+    ("agf", "x", "lens.agf: the extension '.agf' is no lens format; expected"),
 ];
