@@ -1,4 +1,6 @@
-//! `dioptric sweep`: the words that users rely on.
+//! `dioptric sweep`: the words that users rely on, and a store that outlives its maker.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot set up its files fails")]
 
 mod common;
 

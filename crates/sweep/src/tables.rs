@@ -97,7 +97,7 @@ impl Seen {
                 }
             }
         }
-        if row.item % self.every == 0 {
+        if row.item.is_multiple_of(self.every) {
             self.rows.push(row);
         }
     }
