@@ -109,7 +109,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("index.jsonl");
         let cut = &line(1, "done")[..60];
-        for wrong in [cut, "{}\n", "[1]\n", "\u{fe}\n", &line(1, "lost"), &line(1, "done").replace("000\"", "00\"")] {
+        for wrong in [cut, "{}\n", "[1]\n", "\u{fe}\n", &line(1, "lost"), &line(1, "done").replace("001\"", "01\"")] {
             std::fs::write(&path, line(0, "done") + wrong).unwrap();
             let message = IndexLines::read(&path).unwrap_err().to_string();
             assert!(message.contains("index.jsonl: line 2: ") && !message.contains('\n'), "{message}");
