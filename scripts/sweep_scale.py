@@ -1,12 +1,16 @@
 #!/usr/bin/env python3
 """Measures what sweeps cost beside their pictures, and from it says what a million pictures on a hundred machines take.
 
-    python3 scripts/sweep_scale.py target/release/dioptric FOLDER [reuse] [tiny] [kill] [paper]
+    python3 scripts/sweep_scale.py target/release/dioptric FOLDER [reuse] [overhead] [tiny] [kill] [paper] [index] [million]
 
 FOLDER is made and removed; on a disk it shows what bringing files to the disk costs, in /dev/shm what is left without. Of each
 command it prints seconds by the clock, those of processors, and the most memory; other programs on the machine make the first long.
+
+`index` and `million` are of 100,000 and 1,000,000 items that are not made: each is a folder with a link to one report. The latter takes some
+4 GB and ten minutes of two cores. Without words all but these two are run.
 """
 
+import json
 import os
 import random
 import shutil
@@ -60,6 +64,7 @@ BANDS = ", ".join(f"{nm}.0" for nm in range(420, 681, 20))
 LARGE_BANDS = ", ".join(f"{nm}.0" for nm in range(400, 701, 10))
 LARGE = {"columns": 960, "rows": 640, "pitch_um": 10, "bands": LARGE_BANDS, "lenses": 1, "exposures": 1}
 SMALL = {"columns": 240, "rows": 160, "pitch_um": 40, "bands": BANDS, "lenses": 10, "exposures": 20}
+ONE_LENS = {"columns": 24, "rows": 16, "pitch_um": 400, "bands": "450.0, 550.0, 650.0", "lenses": 1}
 TINY = {"columns": 16, "rows": 12, "pitch_um": 600, "bands": "450.0, 550.0, 650.0", "lenses": 10, "exposures": 1000}
 
 
@@ -79,6 +84,15 @@ def reuse(program: str, folder: Path) -> None:
     print(f"quicker by {wall_s / together[0]:.1f} by the clock, {cpu_s / together[1]:.1f} of processors")
 
 
+def overhead(program: str, folder: Path) -> None:
+    """What 1,000 items of 24 × 16 pixels and one irradiance take."""
+    path = plan(folder, **ONE_LENS, exposures=1)
+    one = run(program, "sweep", path, "--quiet")
+    shutil.rmtree(folder / "plan.store")
+    many = run(program, "sweep", plan(folder, **ONE_LENS, exposures=1001), "--quiet")
+    tell("1,000 more exposures of one irradiance", tuple(b - a for a, b in zip(one, many)), 1000)
+
+
 def tiny(program: str, folder: Path) -> None:
     """10,000 items of 16 × 12 pixels."""
     path = plan(folder, **TINY)
@@ -89,8 +103,56 @@ def tiny(program: str, folder: Path) -> None:
     store = folder / "plan.store"
     sizes = [file.stat().st_size for file in store.rglob("*") if file.is_file()]
     print(f"{len(sizes)} files of {sum(sizes) / 1e6:.0f} MB; index.jsonl {(store / 'index.jsonl').stat().st_size / 1e6:.1f} MB")
-    script = "import time; t = time.perf_counter(); from dioptric.sweep import Store; n = len(Store(%r)); print(n, 'items open in', round(time.perf_counter() - t, 2), 's')"
-    subprocess.run([sys.executable, "-c", script % str(store)], check=False)
+    open_index(store)
+
+
+OPEN = """
+import resource, sys, time
+from dioptric.sweep import Store
+most = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+before, start = most(), time.perf_counter()
+store = Store(sys.argv[1])
+print(f"{len(store):,} items open in {time.perf_counter() - start:.2f} s, {most() - before:.0f} MB")
+start = time.perf_counter()
+n = sum(item.metrics["mean_lux"] > 0 for item in store.done)
+print(f"gone through, {n:,} done: {time.perf_counter() - start:.1f} s, {most() - before:.0f} MB")
+"""
+
+
+def open_index(store: Path) -> None:
+    """Opens a store from Python, where the package is installed, and goes through its items."""
+    subprocess.run([sys.executable, "-c", OPEN, str(store)], check=False)
+
+
+def index(program: str, folder: Path, n_items: int = 100_000) -> None:
+    """The index of items that are there by name, all with one report."""
+    path = plan(folder, **{**TINY, "lenses": 1, "exposures": 1})
+    run(program, "sweep", path, "--store", folder / "one", "--quiet")
+    report = next((folder / "one").rglob("report.json"))
+    path = plan(folder, **{**TINY, "lenses": 10, "exposures": n_items // 10})
+    tell(f"drawing up {n_items:,} items", run(program, "sweep", path, "--dry-run", "--quiet"), n_items)
+    store = folder / "plan.store"
+    store.mkdir()
+    tell("the index while none is there", run(program, "sweep", "index", path, "--quiet"), n_items)
+    with (store / "index.jsonl").open() as lines:
+        for n, line in enumerate(lines):
+            # As many links as every file system allows a file.
+            if n % 30_000 == 0:
+                source = folder / f"report-{n}.json"
+                shutil.copyfile(report, source)
+            name = json.loads(line)["id"]
+            item = store / "items" / name[:2] / name
+            item.mkdir(parents=True)
+            os.link(source, item / "report.json")
+    tell("the index when all are there", run(program, "sweep", "index", path, "--quiet"), n_items)
+    for name in ("index.jsonl", "index.csv", "index.html"):
+        print(f"{name}: {(store / name).stat().st_size / 1e6:.1f} MB")
+    open_index(store)
+
+
+def million(program: str, folder: Path) -> None:
+    """The same of 1,000,000 items."""
+    index(program, folder, 1_000_000)
 
 
 def kill(program: str, folder: Path) -> None:
@@ -147,12 +209,15 @@ def main() -> None:
     if len(sys.argv) < 3:
         sys.exit(__doc__)
     program, target = sys.argv[1], Path(sys.argv[2])
-    parts = sys.argv[3:] or ["reuse", "tiny", "kill", "paper"]
+    steps = {step.__name__: step for step in (reuse, overhead, tiny, kill, paper, index, million)}
+    parts = sys.argv[3:] or ["reuse", "overhead", "tiny", "kill", "paper"]
+    if unknown := [name for name in parts if name not in steps]:
+        sys.exit(f"{unknown[0]} is none of {', '.join(steps)}")
     for name in parts:
         folder = target / name
         folder.mkdir(parents=True)
         print(f"-- {name}", flush=True)
-        {"reuse": reuse, "tiny": tiny, "kill": kill, "paper": paper}[name](program, folder)
+        steps[name](program, folder)
         shutil.rmtree(folder)
     target.rmdir()
 

@@ -17,7 +17,8 @@ from dioptric.torch import Dataset
 
 SMALL = "DIOPTRIC_SMALL" in os.environ
 N = 6 if SMALL else 1000
-folder = Path(tempfile.mkdtemp())
+scratch = tempfile.TemporaryDirectory()               # removed when Python ends
+folder = Path(scratch.name)
 plan = Plan.from_ron(
     """(
     base: Camera((

@@ -52,7 +52,8 @@ print(f"{n} of {len(strengths)} components hold 99 % of the variance")
 assert n < len(strengths)
 
 # %%
-folder = Path(tempfile.mkdtemp())
+scratch = tempfile.TemporaryDirectory()               # removed when Python ends
+folder = Path(scratch.name)
 np.savez_compressed(
     folder / "bank.npz", psf=normalized.astype(np.float32), energy=energy,
     fields_deg=fields_deg, distances_mm=distances_mm, wavelengths_nm=wavelengths_nm, pixel_um=PIXEL_UM,

@@ -46,6 +46,9 @@ struct Report {
 }
 
 pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()> {
+    if let Some(seconds) = arguments.seconds.filter(|seconds| !(seconds.is_finite() && *seconds > 0.0)) {
+        bail!("--seconds is {seconds}, expected a finite number above 0");
+    }
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
     let kept = KeptCamera::new(camera_of(arguments, common)?);
     kept.camera().validate()?;

@@ -133,6 +133,9 @@ fn film_of(kept: &KeptCamera, arguments: &RunArgs) -> anyhow::Result<FilmSpec> {
             // The whole of the new film lies within the old one.
             FilmSpec::Pixels { columns, rows, pitch_um: (width_um / columns as f64).min(height_um / rows as f64) }
         }
+        (None, Some(pitch_um)) if !(pitch_um > 0.0 && pitch_um.is_finite()) => {
+            bail!("--pixel-um is {pitch_um}, expected a finite number of µm above 0")
+        }
         (None, Some(pitch_um)) => {
             let [columns, rows] = size_um()?.map(|um| (um / pitch_um).round().max(1.0) as usize);
             FilmSpec::Pixels { columns, rows, pitch_um }

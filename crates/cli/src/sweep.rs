@@ -123,7 +123,7 @@ fn make(plan: &Path, arguments: &SweepArgs, common: &Common) -> anyhow::Result<(
     // Other shards are not done yet, and each of them would read the whole store.
     let has_index = !shard.is_part();
     if has_index {
-        Index::of(&sweep, &store)?.write(&store)?;
+        Index::of(&sweep, &store).write()?;
     }
     if common.json {
         print_json(&json!({
@@ -173,7 +173,7 @@ fn index(plan: &Path, store: Option<&Path>, common: &Common) -> anyhow::Result<(
     }
     // Of shards that were killed.
     store.remove_leftovers();
-    Index::of(&sweep, &store)?.write(&store)?;
+    Index::of(&sweep, &store).write()?;
     if common.json {
         return count(&sweep, &store, Shard::ALL, common);
     }

@@ -6,7 +6,7 @@ use std::{
     borrow::Cow,
     fmt,
     io::{self, IsTerminal, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{LazyLock, Mutex, PoisonError},
     time::Duration,
 };
@@ -58,6 +58,8 @@ pub(crate) fn output_error(error: io::Error) -> anyhow::Error {
 
 /// Prints an error and its causes as one sentence on one line.
 pub(crate) fn print_error(error: &anyhow::Error) {
+    // After an interrupt this waits for the end: what then cannot be written was just removed.
+    let _partial = PARTIAL.lock().unwrap_or_else(PoisonError::into_inner);
     let remedy = error.chain().filter_map(|cause| cause.downcast_ref()).find_map(remedy).unwrap_or_default();
     let sentence = format!("{error:#}{remedy}");
     let words: Vec<&str> = sentence.split_whitespace().collect();
@@ -94,13 +96,23 @@ pub(crate) fn remark_on_png(quiet: bool) {
 /// Removes half-written results when the user interrupts the program.
 pub(crate) fn remove_partial_files_on_interrupt() {
     let removed = ctrlc::set_handler(|| {
-        for path in PARTIAL.lock().unwrap_or_else(PoisonError::into_inner).iter() {
-            let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
-        }
+        let partial = PARTIAL.lock().unwrap_or_else(PoisonError::into_inner);
+        partial.iter().for_each(|path| remove(path));
         std::process::exit(INTERRUPTED);
     });
     // Without a handler an interrupt still ends the program; only hidden partial files may stay.
     drop(removed);
+}
+
+/// Removes what is half-written, under another name first: a thread that is about to move it to its place finds nothing
+/// then, rather than what is left of it.
+fn remove(path: &Path) {
+    let mut gone = path.as_os_str().to_owned();
+    gone.push("-interrupted");
+    if std::fs::rename(path, &gone).is_ok() {
+        let gone = Path::new(&gone);
+        let _ = if gone.is_dir() { std::fs::remove_dir_all(gone) } else { std::fs::remove_file(gone) };
+    }
 }
 
 /// Makes results known, so that an interrupt removes them while they are half-written.

@@ -1,8 +1,17 @@
-//! `dioptric sweep`: the words that users rely on.
+//! `dioptric sweep`: the words that users rely on, and a store that outlives its maker.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot set up its files fails")]
 
 mod common;
 
-use std::{fs, path::Path};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    thread::sleep,
+    time::{Duration, Instant},
+};
 
 use common::{CAMERA, check_error, dioptric, output};
 use serde_json::{Value, json};
@@ -95,4 +104,58 @@ fn unreadable_files_end_in_an_error_and_are_no_results() {
         let counts: Value = serde_json::from_slice(&done.stdout).unwrap();
         assert_eq!((&counts["failed"], &counts["refused"]), (&json!(2), &json!(0)));
     }
+}
+
+/// Returns every file below a folder with its bytes.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                all.insert(path.strip_prefix(folder).unwrap().to_owned(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    all
+}
+
+/// Killed without warning at ten moments of a sweep, each at another part of it, and ended: the store of one that was left alone.
+#[test]
+fn a_killed_sweep_goes_on_to_the_same_store() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    let vary = r#"Grid({"stop.FNumber": List([2.8, 4, 0.1]), "seed": Linear(first: 1, last: 40, count: 40)})"#;
+    fs::write(folder.path().join("plan.ron"), format!(r#"(base: File("camera.ron"), vary: [{vary}])"#)).unwrap();
+    let start = Instant::now();
+    let made = json(folder.path(), &["sweep", "plan.ron", "--store", "whole", "--json"]);
+    assert_eq!((&made["done"], &made["refused"]), (&json!(80), &json!(40)));
+    let whole = start.elapsed();
+    let cut = folder.path().join("cut");
+    let n_there = || {
+        fs::read_dir(cut.join("items")).map_or(0, |folders| {
+            folders.map(|above| fs::read_dir(above.unwrap().path()).unwrap().count()).sum::<usize>()
+        })
+    };
+    let mut seen = vec![0];
+    // Moments of a golden section, so that they are spread over what a part of a sweep does.
+    for n in 1..=10 {
+        let mut run = Command::new(env!("CARGO_BIN_EXE_dioptric"))
+            .args(["sweep", "plan.ron", "--store", "cut", "--quiet"])
+            .env("DIOPTRIC_CACHE", "")
+            .current_dir(folder.path())
+            .spawn()
+            .unwrap();
+        sleep(whole.mul_f64(0.05 + 0.25 * (f64::from(n) * 0.618_034).fract()).min(Duration::from_secs(3)));
+        run.kill().unwrap();
+        run.wait().unwrap();
+        seen.push(n_there());
+    }
+    assert!(seen.is_sorted() && seen[10] > 0, "what is there stays there: {seen:?}");
+    let made = json(folder.path(), &["sweep", "plan.ron", "--store", "cut", "--json"]);
+    assert_eq!(made["there"], json!(seen[10]));
+    assert!(files(&cut) == files(&folder.path().join("whole")), "the same store, and nothing of the killed");
 }

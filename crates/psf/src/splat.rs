@@ -187,8 +187,9 @@ impl Sampled {
     #[inline(always)]
     fn add(&self, rows: &mut PaddedRows) {
         let reach = REACH as f32 * self.sigma_x;
-        let first = (self.corner.0 + floor(self.at.0 - reach)).max(0);
-        let end = (self.corner.0 + floor(self.at.0 + reach) + 1).min(rows.n_pixels as i32);
+        // A Gaussian may be wider than any number of pixels.
+        let first = self.corner.0.saturating_add(floor(self.at.0 - reach)).max(0);
+        let end = self.corner.0.saturating_add(floor(self.at.0 + reach)).saturating_add(1).min(rows.n_pixels as i32);
         let mut column = first;
         while column < end {
             self.add_columns(rows, column as usize);
@@ -210,8 +211,9 @@ impl Sampled {
         let reach_y = ((self.fall_x * nearest * nearest - LEAST).max(0.0) * (2.0 / std::f32::consts::LOG2_E)).sqrt()
             * self.sigma_y;
         let corner = self.corner.1;
-        let first = (corner + floor(self.at.1 + y_from.min(y_to) - reach_y)).max(0);
-        let end = (corner + floor(self.at.1 + y_from.max(y_to) + reach_y) + 1).min(rows.n_lines as i32);
+        let first = corner.saturating_add(floor(self.at.1 + y_from.min(y_to) - reach_y)).max(0);
+        let end = corner.saturating_add(floor(self.at.1 + y_from.max(y_to) + reach_y)).saturating_add(1);
+        let end = end.min(rows.n_lines as i32);
         let most = (MOST_SIGMAS * self.sigma_y).clamp(2.0, MOST_ROWS) as i32;
         let mut row = first;
         while row < end {

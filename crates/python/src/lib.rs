@@ -40,7 +40,7 @@ mod _native {
         scene::Scene,
         sensor::Sensor,
         shot::Shot,
-        sweep::{Maker, Plan, Sweep},
+        sweep::{Maker, Plan, Sweep, read_index},
         view::Memory,
         worker::{_panic, set_threads, threads},
     };

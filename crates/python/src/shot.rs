@@ -193,7 +193,8 @@ impl Shot {
         self.plane_or_planes(py, planes.map(plane).collect::<PyResult<_>>()?)
     }
 
-    /// The levels of `raw`: ``black``, ``white`` (saturation) and ``top`` samples, and ``volts_per_electron`` after the gain.
+    /// The levels of `raw`: ``black``, ``white`` (saturation) and ``top`` samples, ``step_v`` from one sample to the next, V, and
+    /// ``volts_per_electron`` after the gain.
     #[getter]
     fn levels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let levels = &self.capture.frames.exposed.raw.levels;

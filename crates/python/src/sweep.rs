@@ -3,14 +3,15 @@
 use std::{
     path::{Path, PathBuf},
     sync::{
-        Mutex, PoisonError,
+        Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
 };
 
 use dioptric_sweep::{
-    Index, ItemId, Made, Outcome, Plan as SweepPlan, Shard, Store, Sweep as PlannedItems, SweepError,
+    Index, IndexLines, ItemId, Made, Outcome, Plan as SweepPlan, Shard, Store, Sweep as PlannedItems, SweepError,
 };
+use ndarray::Array1;
 use pyo3::{
     exceptions::PyIndexError,
     prelude::*,
@@ -19,9 +20,10 @@ use pyo3::{
 
 use crate::{
     camera::Camera,
-    errors::{guarded, sweep_exception},
+    errors::{guarded, sweep_exception, wrong},
     paintings::painting_folder,
     serial::to_python,
+    view::view,
     worker::{Follower, run_sweep},
 };
 
@@ -244,7 +246,7 @@ impl Sweep {
         let made = run_sweep(py, &Follower::of(progress)?, |latest, cancel| {
             let made = items.make(&store.begin()?, shard, limit, latest, cancel)?;
             if !shard.is_part() {
-                Index::of(items, &store)?.write(&store)?;
+                Index::of(items, &store).write()?;
             }
             Ok(made)
         })?;
@@ -262,7 +264,7 @@ impl Sweep {
         }
         run_sweep(py, &Follower::nobody(), |_, _| {
             store.remove_leftovers();
-            Index::of(items, &store)?.write(&store)
+            Index::of(items, &store).write()
         })
     }
 
@@ -291,6 +293,7 @@ impl Sweep {
     ///     The archive, or what those of ``items_per_tar`` are named after.
     /// store : str or os.PathLike, optional
     /// items_per_tar : int, optional
+    ///     So many items an archive, the last one fewer; the archives are then ``NAME-000000.tar`` and so on. Default: all in one.
     #[pyo3(signature = (target, *, store=None, items_per_tar=None))]
     fn pack(
         &self,
@@ -299,6 +302,9 @@ impl Sweep {
         store: Option<PathBuf>,
         items_per_tar: Option<usize>,
     ) -> PyResult<Vec<PathBuf>> {
+        if items_per_tar == Some(0) {
+            return Err(wrong("items_per_tar", 0, "1 or more"));
+        }
         let (store, items) = (self.store(py, store), &self.items);
         run_sweep(py, &Follower::nobody(), |_, _| items.pack(&store, &target, items_per_tar))
     }
@@ -370,9 +376,29 @@ impl Maker {
             let mut maker = self.maker.lock().unwrap_or_else(PoisonError::into_inner);
             let has_begun = self.has_begun.swap(true, Ordering::Relaxed);
             let place = if has_begun { self.store.workplace() } else { self.store.begin() }?;
-            items.into_iter().map(|item| Ok(words(maker.make(&place, item, latest, cancel)?))).collect()
+            Ok(maker.make(&place, &items, latest, cancel)?.into_iter().map(words).collect())
         })
     }
+}
+
+/// Looks through the ``index.jsonl`` of a store, so that its lines can be read one by one.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+///
+/// Returns
+/// -------
+/// starts : (lines + 1,) uint64 array
+///     Where each line begins, bytes from the beginning of the file; and where the file ends.
+/// done : (items,) uint64 array
+///     The lines, from 0, of items that are done, each item once.
+#[pyfunction]
+pub(crate) fn read_index(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyAny>, Bound<'_, PyAny>)> {
+    let IndexLines { starts, done } = run_sweep(py, &Follower::nobody(), |_, _| IndexLines::read(&path))?;
+    let done: Array1<u64> = done.into_iter().map(|line| line as u64).collect();
+    let of = |numbers| view(py, &Arc::new(numbers), |numbers: &Array1<u64>| numbers.view());
+    Ok((of(starts.into())?, of(done)?))
 }
 
 fn words(outcome: Outcome) -> (&'static str, Option<String>) {

@@ -33,6 +33,9 @@ impl Sample for u8 {
 impl Sample for u16 {
     const KIND: &'static str = "u2";
 }
+impl Sample for u64 {
+    const KIND: &'static str = "u8";
+}
 impl Sample for i16 {
     const KIND: &'static str = "i2";
 }

@@ -130,6 +130,8 @@ def test_errors_end_in_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[
     path = write_plan(tmp_path)
     assert dioptric.ray.main([str(path), "--threads", "0"]) == 1
     assert "expected 1 or more" in capsys.readouterr().err
+    assert dioptric.ray.main([str(path), "--workers", "2", "--address", "auto"]) == 1
+    assert "expected none with an address" in capsys.readouterr().err
     # A store that cannot be written to ends the sweep in the words of the worker.
     (tmp_path / "file").write_text("")
     assert dioptric.ray.main([str(path), "--workers", "1", "--quiet", "--store", str(tmp_path / "file" / "store")]) == 1

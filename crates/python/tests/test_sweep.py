@@ -122,6 +122,8 @@ def test_store_as_tables(made: tuple[Sweep, Path]) -> None:
     pandas = pytest.importorskip("pandas")
     table = Store(folder).to_pandas()
     assert isinstance(table, pandas.DataFrame) and len(table) == 9
+    assert table.index.dtype == np.int64 and table["stop.FNumber"].dtype == table["mean_e.G"].dtype == np.float64
+    assert pandas.isna(table.loc[3, "reason"]) and "the stop of" in table.loc[2, "reason"]
     assert table.loc[3, "stop.FNumber"] == 4 and table.loc[2, "status"] == "refused"
 
 
@@ -135,11 +137,16 @@ def test_wrong_plans_and_stores_end_in_a_sentence(tmp_path: Path) -> None:
         Plan.read(tmp_path / "none.ron")
     with pytest.raises(FileNotFoundError, match="dioptric sweep index"):
         Store(tmp_path)
+    (tmp_path / "index.jsonl").write_text('{"item": 0}\n')
+    with pytest.raises(OSError, match="line 1: missing field `id`"):
+        Store(tmp_path)
     sweep = Sweep(Plan.from_ron(PLAN, tmp_path / "other.ron"))
     with pytest.raises(OSError, match="other.store"):
         sweep.write_index()
     with pytest.raises(ValueError, match="expected I/N"):
         sweep.run(shard="3")
+    with pytest.raises(ValueError, match="items_per_tar is 0, expected 1 or more"):
+        sweep.pack(tmp_path / "a.tar", items_per_tar=0)
 
 
 def test_unreadable_files_are_no_results(tmp_path: Path) -> None:
@@ -180,6 +187,48 @@ def test_index_of_many_items_opens_quickly(tmp_path: Path) -> None:
     store = Store(tmp_path)
     assert len(store) == 10_000 and isinstance(store[9_999], Item) and store[9_999].values == {"seed": 9_999}
     assert time.perf_counter() - start < 1
+
+
+def write_lines(folder: Path, n_items: int) -> int:
+    """Writes an index of items that are done; returns its size, bytes."""
+    metrics = {f"m{n}": n + 0.123456789 for n in range(40)}
+    with (folder / "index.jsonl").open("w") as out:
+        for n in range(n_items):
+            row = {"item": n, "id": f"{n:064x}", "status": "done", "values": {"seed": n}, "metrics": metrics}
+            out.write(json.dumps(row) + "\n")
+    return (folder / "index.jsonl").stat().st_size
+
+
+def test_an_open_index_holds_no_lines(tmp_path: Path) -> None:
+    """Some 16 bytes an item, and as many again while it is opened; all lines gone through one by one."""
+    n_items = 60_000
+    size = write_lines(tmp_path, n_items)
+    script = (
+        "import resource, sys\n"
+        "from dioptric.sweep import Store\n"
+        "most = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "before, store = most(), Store(sys.argv[1])\n"
+        "assert sum(item.values['seed'] for item in store.done) == sum(range(len(store)))\n"
+        "print(most() - before)"
+    )
+    run = [sys.executable, "-c", script, str(tmp_path)]
+    grown = int(subprocess.run(run, check=True, capture_output=True, text=True).stdout)
+    # Names of 32 bytes in a table that is up to twice as large, the lines' places, and 4 MB of buffers and code.
+    unit = 1 if sys.platform == "darwin" else 1024
+    assert size > 55e6 and grown * unit < 200 * n_items + 4e6
+
+
+def test_an_index_that_was_written_anew_is_opened_again(tmp_path: Path) -> None:
+    write_lines(tmp_path, 3)
+    store = Store(tmp_path)
+    last, middle = store[-1], store[1:2]
+    assert (last.number, [item.number for item in middle], len(store.done)) == (2, [1], 3)
+    with pytest.raises(IndexError):
+        store[3]
+    write_lines(tmp_path, 4)
+    with pytest.raises(OSError, match="written anew"):
+        store[0]
+    assert pickle.loads(pickle.dumps(Store(tmp_path).done))[3].values == {"seed": 3}
 
 
 def test_importing_the_package_imports_no_extras() -> None:

@@ -192,7 +192,12 @@ impl Training {
         let light_values = light.spectrum().sample_held(&grid);
         let weights = sensor.electron_weights(&grid);
         let white = white_response(sensor, light);
-        let white_xyz = Observer::Cie1931.xyz(&grid, &light_values);
+        // Once for all colors: they take longer than everything else here.
+        let observer = Observer::Cie1931.weights(&grid);
+        let xyz_of = |values: &[f64]| -> Xyz {
+            Xyz(observer.each_ref().map(|w| w.iter().zip(values).map(|(w, v)| w * v).sum()))
+        };
+        let white_xyz = xyz_of(&light_values);
         let lit = |reflectance: &Spectrum| -> Vec<f64> {
             reflectance.sample_held(&grid).iter().zip(&light_values).map(|(r, s)| r * s).collect()
         };
@@ -205,7 +210,7 @@ impl Training {
                 if *white > 0.0 { signal / white } else { 0.0 }
             };
             channels.push(weights.iter().zip(&white).map(see).collect());
-            let xyz = Xyz(Observer::Cie1931.xyz(&grid, &lit).0.map(|v| v / white_xyz.0[1]));
+            let xyz = Xyz(xyz_of(&lit).0.map(|v| v / white_xyz.0[1]));
             let seen = adapt_bradford(xyz, unit_white, Xyz::D65);
             rgb.push(seen.to_linear_srgb());
             lab.push(seen.to_lab(Xyz::D65));

@@ -1,5 +1,7 @@
 //! From linear light to the codes of a picture.
 
+use std::sync::{Arc, LazyLock};
+
 use dioptric_spectrum::srgb_encode;
 use serde::{Deserialize, Serialize};
 
@@ -69,15 +71,21 @@ impl ToneCurve {
 
     /// Returns the curve as a table that is read with straight lines between its entries.
     pub(crate) fn table(self) -> ToneTable {
-        ToneTable((0..=TABLE_STEPS).map(|i| self.encode(i as f64 / TABLE_STEPS as f64) as f32).collect())
+        // For a small picture its powers take longer than all other processing.
+        static SRGB: LazyLock<Arc<[f32]>> = LazyLock::new(|| entries(ToneCurve::Srgb));
+        ToneTable(if self == Self::Srgb { SRGB.clone() } else { entries(self) })
     }
 }
 
 /// Enough steps that straight lines between them are within 1e-6 of sRGB, less than a sixteenth of a 16-bit code.
 const TABLE_STEPS: usize = 1 << 16;
 
+fn entries(curve: ToneCurve) -> Arc<[f32]> {
+    (0..=TABLE_STEPS).map(|i| curve.encode(i as f64 / TABLE_STEPS as f64) as f32).collect()
+}
+
 /// A tone curve as a table.
-pub(crate) struct ToneTable(Vec<f32>);
+pub(crate) struct ToneTable(Arc<[f32]>);
 
 impl ToneTable {
     #[inline]

@@ -1,5 +1,7 @@
 //! Lights and the reflectances of the 24-patch chart.
 
+use std::sync::LazyLock;
+
 use serde::{Deserialize, Serialize};
 
 use crate::{Observer, Spectrum, SpectrumError, WavelengthGrid, Xyz};
@@ -332,15 +334,15 @@ pub fn daylight(kelvin: f64) -> Spectrum {
 
 /// Returns the names and reflectances of the 24 patches, row by row from dark skin to black.
 pub fn color_checker_reflectances() -> Vec<(String, Spectrum)> {
-    let header = COLOR_CHECKER.lines().next().expect("the embedded table has a header");
-    header
-        .split(',')
-        .skip(1)
-        .map(|name| {
+    static PATCHES: LazyLock<Vec<(String, Spectrum)>> = LazyLock::new(|| {
+        let header = COLOR_CHECKER.lines().next().expect("the embedded table has a header");
+        let patch = |name: &str| {
             let spectrum = Spectrum::from_embedded_csv(COLOR_CHECKER, name).expect("the embedded table is whole");
             (name.to_owned(), spectrum)
-        })
-        .collect()
+        };
+        header.split(',').skip(1).map(patch).collect()
+    });
+    PATCHES.clone()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 "use strict";
 const sheet = JSON.parse(document.getElementById("sheet").textContent);
 const element = (id) => document.getElementById(id);
-const items = sheet.items.map(([status, place, values, metrics, reason], n) => ({ n, status, place, values, metrics, reason }));
+const items = sheet.items.map(([n, status, place, values, metrics, reason]) => ({ n, status, place, values, metrics, reason }));
 const PAGE = 120;
 const COLORS = ["#1b6ca8", "#c8502b", "#3a8f4d", "#8a5aa8", "#b58a16", "#4c9fb0", "#a33c63", "#6a7280"];
 

@@ -186,17 +186,20 @@ impl Values {
     }
 
     fn at(&self, index: usize) -> Value {
-        let between = |first: f64, last: f64, count: usize, at: &dyn Fn(f64) -> f64| match index {
+        let between = |first: f64, last: f64, count: usize, at: &dyn Fn(f64, f64) -> f64| match index {
             0 => Value::number(first),
             _ if index + 1 == count => Value::number(last),
-            _ => Value::number(at(index as f64 / (count - 1) as f64)),
+            _ => Value::number(at(index as f64, (count - 1) as f64)),
         };
         match self {
             Self::List(values) => values[index].clone(),
-            Self::Linear { first, last, count } => between(*first, *last, *count, &|t| first + (last - first) * t),
+            // Both ends weighed by whole numbers, so that steps of whole numbers are whole: seeds and counts.
+            Self::Linear { first, last, count } => {
+                between(*first, *last, *count, &|at, steps| (first * (steps - at) + last * at) / steps)
+            }
             // Exponents of `libm` have the same bits on every machine, and so have the names of items.
             Self::Log { first, last, count } => {
-                between(*first, *last, *count, &|t| first * libm::exp(libm::log(last / first) * t))
+                between(*first, *last, *count, &|at, steps| first * libm::exp(libm::log(last / first) * (at / steps)))
             }
         }
     }
@@ -389,6 +392,8 @@ mod tests {
         // Whole numbers stay whole: seeds and counts are read from them.
         let whole = sampling(r#"Grid({"seed": Linear(first: 1, last: 9, count: 5)})"#);
         assert_eq!(Points::of(&whole).at(3), [Value::Whole(7)]);
+        let many = sampling(r#"Grid({"seed": Linear(first: 1, last: 1000, count: 1000)})"#);
+        assert!((0..1000).all(|n| Points::of(&many).at(n) == [Value::Whole(n as u64 + 1)]));
     }
 
     #[test]

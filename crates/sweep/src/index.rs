@@ -11,6 +11,9 @@ use crate::{
     metrics::{Metrics, metrics},
 };
 
+/// So many items are read at a time, by all threads.
+const ROWS_AT_ONCE: usize = 1024;
+
 /// What came of one item.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IndexRow {
@@ -28,47 +31,38 @@ pub struct IndexRow {
     pub metrics: Metrics,
 }
 
-/// What came of all items of a plan, in its order.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Index {
-    /// What to call it: the name of the plan's file.
-    pub name: String,
-    /// The keys that are varied.
-    pub keys: Vec<String>,
-    /// A row an item.
-    pub rows: Vec<IndexRow>,
+/// What came of all items of a plan, in its order, read from a store as it is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Index<'a> {
+    pub(crate) sweep: &'a Sweep,
+    pub(crate) store: &'a Store,
 }
 
-impl Index {
-    /// Reads what came of the items of a plan from the store.
-    ///
-    /// # Errors
-    /// When a file of the store cannot be read.
-    pub fn of(sweep: &Sweep, store: &Store) -> Result<Self, SweepError> {
-        let rows = (0..sweep.len()).into_par_iter().map(|item| IndexRow::of(sweep, store, item));
-        Ok(Self {
-            name: sweep.path().file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            keys: sweep.plan().keys().into_iter().map(str::to_owned).collect(),
-            rows: rows.collect::<Result<_, _>>()?,
-        })
+impl<'a> Index<'a> {
+    /// The index of a plan and a store; nothing is read yet.
+    pub fn of(sweep: &'a Sweep, store: &'a Store) -> Self {
+        Self { sweep, store }
     }
 
-    /// The names of all metrics, in the order of a report.
-    pub fn metrics(&self) -> Vec<&str> {
-        let mut names: Vec<&str> = Vec::new();
-        for row in &self.rows {
-            let mut after = 0;
-            for (name, _) in &row.metrics {
-                match names.iter().position(|known| known == name) {
-                    Some(place) => after = place + 1,
-                    None => {
-                        names.insert(after, name);
-                        after += 1;
-                    }
-                }
-            }
-        }
-        names
+    /// What to call it: the name of the plan's file.
+    pub fn name(&self) -> String {
+        self.sweep.path().file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// The keys that are varied.
+    pub fn keys(&self) -> Vec<&'a str> {
+        self.sweep.plan().keys()
+    }
+
+    /// Reads what came of each item, a row an item; about a thousand are held at a time.
+    ///
+    /// A row is an error where a file of the store cannot be read.
+    pub fn rows(&self) -> impl Iterator<Item = Result<IndexRow, SweepError>> + use<'a> {
+        let (Self { sweep, store }, n_items) = (*self, self.sweep.len());
+        (0..n_items).step_by(ROWS_AT_ONCE).flat_map(move |first| {
+            let items = first..n_items.min(first + ROWS_AT_ONCE);
+            items.into_par_iter().map(|item| IndexRow::of(sweep, store, item)).collect::<Vec<_>>()
+        })
     }
 }
 

@@ -10,6 +10,7 @@ use crate::{
     ItemId, Plan, Shard, Status, Store, Sweep, SweepError, Workplace,
     cameras::Cameras,
     item::{Bench, Taken},
+    keep::Keeper,
 };
 
 /// Receives how far a sweep is, beside how far the item is that is being made.
@@ -76,7 +77,7 @@ impl Sweep {
     ///
     /// Each item is there whole or not at all, whenever the work ends. Items are the same to the byte whatever else was made
     /// before, beside or after them, and for any number of threads. An item whose files cannot be read is left out, and the others
-    /// are made.
+    /// are made. Finished items are brought to the disk while others are made, up to 16 of them together; all are there on return.
     ///
     /// # Errors
     /// When the store cannot be written to, a file that a camera is made from changed, or the work is cancelled.
@@ -88,13 +89,23 @@ impl Sweep {
         progress: &dyn SweepProgress,
         cancel: &Cancel,
     ) -> Result<Made, SweepError> {
-        let store = place.store();
         let mut missing: Vec<usize> = self.items(shard).collect();
         let n_all = missing.len();
-        missing.retain(|item| !store.has(self.id(*item)));
-        let mut made = Made { n_there: n_all - missing.len(), ..Made::default() };
+        missing.retain(|item| !place.store().has(self.id(*item)));
+        place.keeping(|keeper| self.make_missing(&missing, n_all, (place, keeper), limit, (progress, cancel)))
+    }
+
+    fn make_missing(
+        &self,
+        missing: &[usize],
+        n_all: usize,
+        (place, keeper): (&Workplace<'_>, &Keeper<'_>),
+        limit: Option<usize>,
+        (progress, cancel): (&dyn SweepProgress, &Cancel),
+    ) -> Result<Made, SweepError> {
+        let n_there = n_all - missing.len();
+        let mut made = Made { n_there, ..Made::default() };
         let mut bench = Bench::new(self.paintings().cloned());
-        let n_there = made.n_there;
         for (n, &item) in missing.iter().enumerate() {
             cancel.check()?;
             if limit.is_some_and(|limit| made.n_tried() >= limit) {
@@ -104,12 +115,12 @@ impl Sweep {
             progress.items(n_there + n, n_all);
             let id = self.id(item);
             // Two points of a plan may be one item, and others may make items too.
-            if store.has(id) {
+            if keeper.has(place, id) {
                 made.count(Outcome::There);
                 continue;
             }
             let camera = self.camera(item)?;
-            made.count(make_item(self.cameras(), (&camera, id), place, &mut bench, (progress, cancel))?);
+            made.count(make_item(self.cameras(), (&camera, id), (place, keeper), &mut bench, (progress, cancel))?);
         }
         Ok(made)
     }
@@ -146,20 +157,31 @@ impl Maker {
         Ok(Self { cameras: Cameras::of(plan, path)?, bench: Bench::new(paintings) })
     }
 
-    /// Makes an item, unless it is there.
+    /// Makes those of some items that are not there, one after the other; returns what came of each.
     ///
     /// # Errors
-    /// As [`Sweep::make`], and when the item has another name here: then its files, or the version of the program, differ from those
+    /// As [`Sweep::make`], and when an item has another name here: then its files, or the version of the program, differ from those
     /// of the process that drew up the plan.
     pub fn make(
         &mut self,
         place: &Workplace<'_>,
-        (item, id): (usize, ItemId),
+        items: &[(usize, ItemId)],
         progress: &dyn Progress,
         cancel: &Cancel,
+    ) -> Result<Vec<Outcome>, SweepError> {
+        place.keeping(|keeper| {
+            items.iter().map(|item| self.make_one(*item, (place, keeper), (progress, cancel))).collect()
+        })
+    }
+
+    fn make_one(
+        &mut self,
+        (item, id): (usize, ItemId),
+        (place, keeper): (&Workplace<'_>, &Keeper<'_>),
+        (progress, cancel): (&dyn Progress, &Cancel),
     ) -> Result<Outcome, SweepError> {
         cancel.check()?;
-        if place.store().has(id) {
+        if keeper.has(place, id) {
             return Ok(Outcome::There);
         }
         if item >= self.cameras.plan().count() {
@@ -171,15 +193,15 @@ impl Maker {
         if found != id {
             return Err(SweepError::Other { item, found: found.to_string(), expected: id.to_string() });
         }
-        make_item(&self.cameras, (&camera, id), place, &mut self.bench, (progress, cancel))
+        make_item(&self.cameras, (&camera, id), (place, keeper), &mut self.bench, (progress, cancel))
     }
 }
 
-/// Makes an item that is not there and puts it into the store.
+/// Makes an item that is not there and has it put into the store.
 fn make_item(
     cameras: &Cameras,
     (camera, id): (&Camera, ItemId),
-    place: &Workplace<'_>,
+    (place, keeper): (&Workplace<'_>, &Keeper<'_>),
     bench: &mut Bench,
     (progress, cancel): (&dyn Progress, &Cancel),
 ) -> Result<Outcome, SweepError> {
@@ -193,6 +215,6 @@ fn make_item(
             return Ok(Outcome::Failed(reason));
         }
     };
-    place.keep(id)?;
+    keeper.keep(id)?;
     Ok(outcome)
 }

@@ -1,12 +1,12 @@
 //! Where results are kept: a folder in which an item is there whole or not at all.
 
 use std::{
-    fs::{self, File, OpenOptions},
-    io,
+    fs, io,
     path::{Path, PathBuf},
 };
 
 use dioptric_pipeline::{HiddenFolder, Leftover};
+use serde::{Deserialize, Serialize};
 
 use crate::{ItemId, SweepError};
 
@@ -20,7 +20,7 @@ pub struct Store {
 }
 
 /// What came of an item.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
     /// It has a picture.
@@ -115,7 +115,7 @@ impl Workplace<'_> {
 
     /// Makes a folder for the files of an item.
     pub(crate) fn item(&self, id: ItemId) -> Result<PathBuf, SweepError> {
-        let folder = self.path().join(id.to_string());
+        let folder = self.unfinished(id);
         let cannot = SweepError::writing(&folder);
         match fs::remove_dir_all(&folder) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(cannot(error)),
@@ -127,45 +127,23 @@ impl Workplace<'_> {
 
     /// Removes what was made of an item that cannot be finished.
     pub(crate) fn discard(&self, id: ItemId) -> Result<(), SweepError> {
-        let folder = self.path().join(id.to_string());
+        let folder = self.unfinished(id);
         fs::remove_dir_all(&folder).map_err(SweepError::writing(&folder))
     }
 
-    /// Puts an item into the store, its files on the disk first. Where another maker was first, its item stays.
-    pub(crate) fn keep(&self, id: ItemId) -> Result<(), SweepError> {
-        let (made, place) = (self.path().join(id.to_string()), self.store.item(id));
-        let cannot = SweepError::writing(&place);
-        for entry in fs::read_dir(&made).map_err(&cannot)? {
-            let path = entry.map_err(&cannot)?.path();
-            OpenOptions::new().write(true).open(&path).and_then(|file| file.sync_all()).map_err(&cannot)?;
-        }
-        let above = place.parent().unwrap_or(&self.store.folder);
-        fs::create_dir_all(above).map_err(&cannot)?;
-        sync_folder(&made).map_err(&cannot)?;
-        match fs::rename(&made, &place) {
-            // A folder that is not empty is never replaced.
-            Err(_) if place.is_dir() => fs::remove_dir_all(&made).map_err(&cannot)?,
-            other => other.map_err(&cannot)?,
-        }
-        sync_folder(above).map_err(&cannot)
+    /// The folder of an item that is being made.
+    pub(crate) fn unfinished(&self, id: ItemId) -> PathBuf {
+        self.path().join(id.to_string())
     }
 }
 
-/// Brings the entries of a folder to the disk, where the system can.
-fn sync_folder(folder: &Path) -> io::Result<()> {
-    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
-}
-
 #[cfg(test)]
-mod tests {
-    use dioptric_pipeline::Camera;
-
+pub(crate) mod tests {
     use super::*;
-    use crate::{inputs::Inputs, key::ItemKey};
 
-    fn id() -> ItemId {
-        let demo = Camera::demo().unwrap();
-        ItemKey::of(&demo, &demo, &Inputs::default()).unwrap().id
+    /// Returns a name that differs from those of other numbers.
+    pub(crate) fn id(n: u64) -> ItemId {
+        format!("{n:064x}").parse().unwrap()
     }
 
     fn names(folder: &Path) -> Vec<String> {
@@ -178,13 +156,13 @@ mod tests {
         let store = Store::new(folder.path());
         let (one, other) = (store.begin().unwrap(), store.begin().unwrap());
         for (maker, text) in [(&one, "one"), (&other, "other")] {
-            fs::write(maker.item(id()).unwrap().join("report.json"), text).unwrap();
+            fs::write(maker.item(id(1)).unwrap().join("report.json"), text).unwrap();
         }
-        assert_eq!(store.status(id()), Status::Missing);
-        one.keep(id()).unwrap();
-        other.keep(id()).unwrap();
-        assert_eq!(fs::read_to_string(store.item(id()).join("report.json")).unwrap(), "one");
-        assert!(store.has(id()) && store.status(id()) == Status::Done);
+        assert_eq!(store.status(id(1)), Status::Missing);
+        one.keep_together(&[id(1)]).unwrap();
+        other.keep_together(&[id(1)]).unwrap();
+        assert_eq!(fs::read_to_string(store.item(id(1)).join("report.json")).unwrap(), "one");
+        assert!(store.has(id(1)) && store.status(id(1)) == Status::Done);
         drop((one, other));
         assert_eq!(names(folder.path()), ["items"]);
     }

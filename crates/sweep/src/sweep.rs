@@ -15,10 +15,17 @@ use crate::{ItemId, Plan, SweepError, Value, cameras::Cameras, key::ItemKey};
 #[derive(Debug)]
 pub struct Sweep {
     cameras: Cameras,
-    keys: Vec<ItemKey>,
+    keys: Vec<Key>,
     /// The items as they are made: those that share results follow one another.
     order: Vec<usize>,
     paintings: Option<PaintingFolder>,
+}
+
+/// What is kept of each item, for there may be millions: its name, and that of its irradiance.
+#[derive(Clone, Copy, Debug)]
+struct Key {
+    id: ItemId,
+    imaging: u64,
 }
 
 /// A share of the items: those of every n-th irradiance, by its hash.
@@ -40,7 +47,7 @@ impl Shard {
         self.of > 1
     }
 
-    fn has(self, key: &ItemKey) -> bool {
+    fn has(self, key: &Key) -> bool {
         key.imaging % self.of == self.index
     }
 }
@@ -78,7 +85,9 @@ impl Sweep {
         cameras.camera(0)?;
         let key = |item| cameras.key(&cameras.camera(item)?);
         let keys: Vec<ItemKey> = (0..cameras.plan().count()).into_par_iter().map(key).collect::<Result<_, _>>()?;
-        Ok(Self { order: in_order(&keys), cameras, keys, paintings: None })
+        let order = in_order(&keys);
+        let keys = keys.into_iter().map(|ItemKey { id, imaging, .. }| Key { id, imaging }).collect();
+        Ok(Self { order, cameras, keys, paintings: None })
     }
 
     /// Returns the sweep whose items take paintings of the still life from a folder, and keep them there.
@@ -165,14 +174,16 @@ impl Sweep {
 /// Returns the items so that those that share the results of stages follow one another, and else in the order of the plan.
 fn in_order(keys: &[ItemKey]) -> Vec<usize> {
     // Each setting of a stage counts by the item that has it first.
-    let mut first = HashMap::new();
-    let mut ranks: Vec<([u32; 7], usize)> = Vec::with_capacity(keys.len());
-    for (item, key) in keys.iter().enumerate() {
-        let rank = std::array::from_fn(|stage| *first.entry((stage, key.stages[stage])).or_insert(item as u32));
-        ranks.push((rank, item));
+    let mut ranks = vec![[0_u32; 7]; keys.len()];
+    for stage in 0..7 {
+        let mut first = HashMap::new();
+        for (item, (rank, key)) in ranks.iter_mut().zip(keys).enumerate() {
+            rank[stage] = *first.entry(key.stages[stage]).or_insert(item as u32);
+        }
     }
-    ranks.sort_unstable();
-    ranks.into_iter().map(|(_, item)| item).collect()
+    let mut order: Vec<usize> = (0..keys.len()).collect();
+    order.sort_unstable_by_key(|item| (ranks[*item], *item));
+    order
 }
 
 #[cfg(test)]

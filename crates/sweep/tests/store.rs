@@ -10,7 +10,7 @@ use std::{
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{Camera, KeptCamera, Progress, Silent, Stage, picture_png};
 use dioptric_spectrum::Cancel;
-use dioptric_sweep::{Index, Maker, Outcome, Plan, Shard, Status, Store, Sweep, SweepError, SweepProgress};
+use dioptric_sweep::{Index, IndexRow, Maker, Outcome, Plan, Shard, Status, Store, Sweep, SweepError, SweepProgress};
 
 /// Two apertures, three exposures, and an f-number that the lens does not open to.
 const PLAN: &str = r#"(
@@ -33,6 +33,10 @@ fn make(sweep: &Sweep, store: &Store, shard: &str) {
     let shard = shard.parse().expect("a shard");
     let made = sweep.make(&store.begin().expect("a workplace"), shard, None, &Silent, &Cancel::new());
     assert_eq!(made.expect("the items can be made").n_left, 0);
+}
+
+fn rows(sweep: &Sweep, store: &Store) -> Vec<IndexRow> {
+    Index::of(sweep, store).rows().collect::<Result<_, _>>().expect("the store can be read")
 }
 
 /// Returns every file below a folder with its bytes.
@@ -80,13 +84,13 @@ fn stores_depend_on_the_plan_alone() {
     let whole = store("whole");
     let made = sweep.make(&whole.begin().unwrap(), Shard::ALL, None, &Silent, &Cancel::new()).unwrap();
     assert_eq!((made.n_done, made.n_refused, made.n_there), (6, 3, 0));
-    Index::of(&sweep, &whole).unwrap().write(&whole).unwrap();
+    Index::of(&sweep, &whole).write().unwrap();
     let expected = files(whole.folder());
 
     // Again: nothing is made, and the index is the same.
     let again = sweep.make(&whole.begin().unwrap(), Shard::ALL, None, &Silent, &Cancel::new()).unwrap();
     assert_eq!((again.n_there, again.n_done + again.n_refused), (9, 0));
-    Index::of(&sweep, &whole).unwrap().write(&whole).unwrap();
+    Index::of(&sweep, &whole).write().unwrap();
     assert!(files(whole.folder()) == expected);
 
     // In two shards, the second first and on one thread.
@@ -95,7 +99,7 @@ fn stores_depend_on_the_plan_alone() {
     pool.install(|| make(&sweep, &shards, "2/2"));
     assert_eq!(sweep.counts(&shards, Shard::ALL)[2], sweep.items("1/2".parse().unwrap()).count());
     make(&sweep, &shards, "1/2");
-    Index::of(&sweep, &shards).unwrap().write(&shards).unwrap();
+    Index::of(&sweep, &shards).write().unwrap();
     assert!(files(shards.folder()) == expected);
 
     // Cut off again and again, with what a killed maker leaves behind.
@@ -110,7 +114,7 @@ fn stores_depend_on_the_plan_alone() {
     }
     assert!(n_cut >= 4, "{n_cut}");
     make(&sweep, &cut, "1/1");
-    Index::of(&sweep, &cut).unwrap().write(&cut).unwrap();
+    Index::of(&sweep, &cut).write().unwrap();
     assert!(files(cut.folder()) == expected);
 
     // What is in an item, and that it is what the camera gives by itself: this one shares its irradiance with another.
@@ -126,8 +130,8 @@ fn stores_depend_on_the_plan_alone() {
     assert_eq!(fs::read(item.join("report.json")).unwrap(), serde_json::to_vec_pretty(&report).unwrap());
 
     // A camera that cannot be is there with the reason.
-    let index = Index::of(&sweep, &whole).unwrap();
-    let refused = &index.rows[2];
+    let rows = rows(&sweep, &whole);
+    let refused = &rows[2];
     assert_eq!((refused.status, refused.values[1].as_f64()), (Status::Refused, Some(0.1)));
     let reason = refused.reason.as_ref().unwrap();
     assert!(reason.contains("the stop of") && !reason.contains('\n'), "{reason}");
@@ -135,7 +139,7 @@ fn stores_depend_on_the_plan_alone() {
     assert_eq!(names, ["camera.ron", "refused.json"].map(PathBuf::from));
 
     // Ten times the light makes ten times the electrons.
-    let mean_e = |row: usize| index.rows[row].metrics.iter().find(|(name, _)| name.starts_with("mean_e")).unwrap().1;
+    let mean_e = |row: usize| rows[row].metrics.iter().find(|(name, _)| name.starts_with("mean_e")).unwrap().1;
     // A sum of rounded products of the same rates.
     assert!((mean_e(3) / mean_e(0) - 10.0).abs() < 1e-9);
     let lines: Vec<serde_json::Value> = fs::read_to_string(whole.folder().join("index.jsonl"))
@@ -215,7 +219,7 @@ fn a_refused_item_has_no_picture() {
     let sweep = sweep(&plan.replace("List([4, 8, 0.1])", "List([4])"), folder.path());
     let store = Store::new(&folder.path().join("store"));
     sweep.make(&store.begin().unwrap(), Shard::ALL, Some(1), &Silent, &Cancel::new()).unwrap();
-    let row = Index::of(&sweep, &store).unwrap().rows.into_iter().find(|row| row.status != Status::Missing).unwrap();
+    let row = rows(&sweep, &store).into_iter().find(|row| row.status != Status::Missing).unwrap();
     assert!(row.reason.unwrap().contains("DNG"));
     let names: Vec<PathBuf> = files(&store.item(row.id)).into_keys().collect();
     assert_eq!(names, ["camera.ron", "refused.json"].map(PathBuf::from));
@@ -269,7 +273,7 @@ fn items_are_made_by_number_and_name() {
     let mut outcomes = Vec::new();
     for item in groups.into_iter().rev().flatten().chain([0]) {
         let place = parts.begin().unwrap();
-        outcomes.push(maker.make(&place, (item, planned.id(item)), &Silent, &Cancel::new()).unwrap());
+        outcomes.extend(maker.make(&place, &[(item, planned.id(item))], &Silent, &Cancel::new()).unwrap());
     }
     let count = |outcome: Outcome| outcomes.iter().filter(|own| **own == outcome).count();
     assert_eq!([Outcome::Done, Outcome::Refused, Outcome::There].map(count), [6, 3, 1]);
@@ -278,7 +282,7 @@ fn items_are_made_by_number_and_name() {
     let empty = Store::new(&folder.path().join("empty"));
     let place = empty.begin().unwrap();
     for (item, words) in [(0, "item 0 is called"), (9, "it has no item 9, but 9 items")] {
-        let error = maker.make(&place, (item, planned.id(1)), &Silent, &Cancel::new()).unwrap_err().to_string();
+        let error = maker.make(&place, &[(item, planned.id(1))], &Silent, &Cancel::new()).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
 }

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from .sweep import Item, check_shape, flat, layout, read_samples, rows
+from .sweep import Index, Item, Items, Store, check_shape, flat, kinds, layout, read_samples
 
 __all__ = ["main", "to_parquet", "to_zarr"]
 
@@ -50,27 +50,22 @@ def to_parquet(
     """
     arrow, parquet = _module("pyarrow"), _module("pyarrow.parquet", "pyarrow")
     folder, target = Path(store), Path(target)
-    kinds: dict[str, type] = {}
-    for row in rows(folder):
-        for name, value in flat(row).items():
-            if value is not None:
-                kinds[name] = _wider(kinds.get(name), type(value))
-            else:
-                kinds.setdefault(name, type(None))
+    index = Index(folder)
+    kind_of = kinds(index)
     types = {bool: arrow.bool_(), int: arrow.int64(), float: arrow.float64(), str: arrow.string(), type(None): arrow.string()}
-    order = sorted(kinds, key=lambda name: name == "reason")
-    schema = arrow.schema([(name, types[kinds[name]]) for name in order] + [(name, arrow.binary()) for name in files])
+    order = sorted(kind_of, key=lambda name: name == "reason")
+    schema = arrow.schema([(name, types[kind_of[name]]) for name in order] + [(name, arrow.binary()) for name in files])
     n_rows = 0
     partial = target.with_name(f".{target.name}.partial-{os.getpid()}")
     try:
         with parquet.ParquetWriter(partial, schema, compression="zstd") as writer:
-            for lines in _batches(rows(folder), _LINES_WITH_FILES if files else _LINES):
+            for lines in _batches(iter(index), _LINES_WITH_FILES if files else _LINES):
                 columns: dict[str, list[Any]] = {name: [] for name in schema.names}
                 for row in lines:
                     cells = flat(row)
                     for name in order:
                         value = cells.get(name)
-                        columns[name].append(str(value) if kinds[name] is str and value is not None else value)
+                        columns[name].append(str(value) if kind_of[name] is str and value is not None else value)
                     for name in files:
                         path = Item(folder, row).folder / name
                         columns[name].append(path.read_bytes() if path.is_file() else None)
@@ -103,24 +98,24 @@ def to_zarr(store: str | os.PathLike[str], target: str | os.PathLike[str], array
     folder, target = Path(store), Path(target)
     if target.exists():
         raise ValueError(f"{target} is there already, expected a new folder")
-    n_items = sum(1 for _ in _done(folder))
-    if n_items == 0:
+    items = Store(folder).done
+    if not items:
         raise ValueError(f"{folder}: none of its items is finished")
     partial = target.with_name(f".{target.name}.partial-{os.getpid()}")
     try:
         group = zarr.open_group(str(partial), mode="w", zarr_format=2)
-        _write_numbers(group, folder, n_items)
+        _write_numbers(group, items)
         for name in arrays:
-            _write_array(group, folder, name, n_items)
+            _write_array(group, name, items)
         os.rename(partial, target)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
-    return n_items
+    return len(items)
 
 
-def _write_array(group: Any, folder: Path, name: str, n_items: int) -> None:
+def _write_array(group: Any, name: str, items: Items) -> None:
     array = None
-    for n, item in enumerate(_done(folder)):
+    for n, item in enumerate(items):
         path = item.path(name)
         if not path.is_file():
             raise ValueError(f"item {item.number} has no {path.name}; the outputs of the plan say what is written of an item")
@@ -129,7 +124,7 @@ def _write_array(group: Any, folder: Path, name: str, n_items: int) -> None:
             dimensions, bands = layout(samples, names)
             array = group.create_array(
                 name,
-                shape=(n_items, *samples.shape),
+                shape=(len(items), *samples.shape),
                 chunks=(1, *samples.shape),
                 dtype=samples.dtype,
                 attributes={"_ARRAY_DIMENSIONS": ["item", *dimensions]},
@@ -144,56 +139,40 @@ def _write_array(group: Any, folder: Path, name: str, n_items: int) -> None:
         array[n] = samples
 
 
-def _write_numbers(group: Any, folder: Path, n_items: int) -> None:
+def _write_numbers(group: Any, items: Items) -> None:
     """Writes keys and metrics, a batch at a time; the first pass tells which are numbers, and how long the texts are."""
     lengths: dict[str, int] = {}
     texts: set[str] = set()
-    for item in _done(folder):
+    for item in items:
         for name, value in _cells(item).items():
             lengths[name] = max(lengths.get(name, 1), len(str(value)))
             if isinstance(value, str):
                 texts.add(name)
-    chunk = min(n_items, _LINES)
-    kinds = {name: f"<U{length}" if name in texts else "<f8" for name, length in lengths.items()}
-    for name, kind in kinds.items():
+    chunk = min(len(items), _LINES)
+    types = {name: f"<U{length}" if name in texts else "<f8" for name, length in lengths.items()}
+    for name, kind in types.items():
         group.create_array(
             name,
-            shape=(n_items,),
+            shape=(len(items),),
             chunks=(chunk,),
             dtype=kind,
             fill_value="" if name in texts else np.nan,
             attributes={"_ARRAY_DIMENSIONS": ["item"]},
         )
     first = 0
-    for items in _batches(_done(folder), chunk):
-        cells = [_cells(item) for item in items]
-        for name, kind in kinds.items():
+    for batch in _batches(iter(items), chunk):
+        cells = [_cells(item) for item in batch]
+        for name, kind in types.items():
             missing: Any = "" if name in texts else np.nan
             values = [row.get(name, missing) for row in cells]
             column = np.array([str(value) for value in values] if name in texts else values, kind)
-            group[name][first : first + len(items)] = column
-        first += len(items)
+            group[name][first : first + len(batch)] = column
+        first += len(batch)
 
 
 def _cells(item: Item) -> dict[str, Any]:
     own = flat(item._row)
     return {name: value for name, value in own.items() if value is not None and name != "status"}
-
-
-def _done(folder: Path) -> Iterator[Item]:
-    """Yields the items that have a picture, each once."""
-    known = set()
-    for row in rows(folder):
-        name = bytes.fromhex(row["id"])
-        if row["status"] == "done" and name not in known:
-            known.add(name)
-            yield Item(folder, row)
-
-
-def _wider(known: type | None, found: type) -> type:
-    if known is None or known is type(None) or known is found:
-        return found
-    return float if {known, found} == {int, float} else str
 
 
 def _batches(lines: Iterator[Any], n: int) -> Iterator[list[Any]]:

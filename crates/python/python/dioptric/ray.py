@@ -61,7 +61,7 @@ def run(
     address : str, optional
         Of a cluster, as ``"auto"`` or ``"ray://head:10001"``. Default: processes of this machine, unless Ray is connected already.
     workers : int, optional
-        Processes of this machine. Default: one a core.
+        Processes of this machine, without an address. Default: as many as its cores have room for.
     threads : int
         Threads, and so cores, of a task.
     progress : bool
@@ -108,7 +108,11 @@ def outcomes(
     """
     if threads < 1 or (workers is not None and workers < 1):
         raise ValueError(f"threads is {threads} and workers is {workers}, expected 1 or more")
+    if address is not None and workers is not None:
+        raise ValueError(f"workers is {workers}, expected none with an address: the cluster's nodes have so many as they have")
     ray = _ray()
+    if ray.is_initialized() and (address is not None or workers is not None):
+        raise ValueError("Ray is connected already, expected neither an address nor a number of workers")
     folder = Path(store).absolute()
     groups = sweep.groups(folder)
     if not groups:
@@ -193,13 +197,13 @@ def _tasks(groups: list[list[int]], slots: int) -> list[list[int]]:
 
 
 # The plan that this worker had last, with what its items share.
-_kept: tuple[tuple[str, str, str], Maker] | None = None
+_kept: tuple[tuple[str, str, str, int], Maker] | None = None
 
 
 def _make(plan: Plan, store: str, threads: int, items: list[tuple[int, str]]) -> list[tuple[str, str | None]]:
     """Runs in a worker."""
     global _kept
-    key = (plan.to_ron(), str(plan.path), store)
+    key = (plan.to_ron(), str(plan.path), store, threads)
     if _kept is None or _kept[0] != key:
         set_threads(threads)
         _kept = (key, Maker(plan, store))

@@ -9,20 +9,21 @@ A plan and a store are those of ``dioptric sweep``; an item is the same to the b
 
 from __future__ import annotations
 
+import copy
 import importlib
 import json
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._native import Camera, Maker, Plan, Sweep, read_samples
+from ._native import Camera, Maker, Plan, Sweep, read_index, read_samples
 
-__all__ = ["Item", "Maker", "Plan", "Store", "Sweep", "read_samples"]
+__all__ = ["Index", "Item", "Items", "Maker", "Plan", "Store", "Sweep", "read_samples"]
 
 _FILES = {
     "picture": "picture.png",
@@ -108,18 +109,117 @@ class Item:
         return f"<Item {self.number}: {self.status}, {self.values}>"
 
 
+class Index(Sequence[dict[str, Any]]):
+    """The lines of a store's index: a dictionary an item, with ``item``, ``id``, ``status``, ``values``, and ``metrics`` or ``reason``.
+
+    A line is read when it is asked for: what is held is where each begins, some 16 bytes an item.
+
+    Parameters
+    ----------
+    folder : str or os.PathLike
+        The store. When its index is written anew later, it must be opened again: reading from this one is an ``OSError``.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        self._path = Path(folder) / "index.jsonl"
+        try:
+            self._stamp = _stamp(os.stat(self._path))
+        except FileNotFoundError as error:
+            raise FileNotFoundError(
+                f"{self._path}: there is no index; `dioptric sweep index PLAN` writes one"
+            ) from error
+        self._starts, self._done = read_index(self._path)
+        self._numbers: NDArray[np.uint64] = np.arange(len(self._starts) - 1, dtype=np.uint64)
+
+    def done(self) -> Index:
+        """Returns the lines of items that have a picture, each item once."""
+        return self._of(self._done)
+
+    def _of(self, numbers: NDArray[np.uint64]) -> Index:
+        part = copy.copy(self)
+        part._numbers = numbers
+        return part
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    @overload
+    def __getitem__(self, number: int) -> dict[str, Any]: ...
+    @overload
+    def __getitem__(self, number: slice) -> Index: ...
+    def __getitem__(self, number: int | slice) -> dict[str, Any] | Index:
+        if isinstance(number, slice):
+            return self._of(self._numbers[number])
+        return next(self._read([int(self._numbers[number])]))
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return self._read(map(int, self._numbers))
+
+    def _read(self, numbers: Iterable[int]) -> Iterator[dict[str, Any]]:
+        with self._path.open("rb") as lines:
+            if _stamp(os.fstat(lines.fileno())) != self._stamp:
+                raise OSError(f"{self._path}: it was written anew since it was opened; open the store again")
+            place = 0
+            for number in numbers:
+                start, end = int(self._starts[number]), int(self._starts[number + 1])
+                if start != place:
+                    lines.seek(start)
+                row: dict[str, Any] = json.loads(lines.read(end - start))
+                place = end
+                yield row
+
+
+def _stamp(state: os.stat_result) -> tuple[int, int, int]:
+    return state.st_ino, state.st_size, state.st_mtime_ns
+
+
+class Items(Sequence[Item]):
+    """Items of a store, each read from its index when it is asked for.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        The store.
+    rows : Index
+        The lines of the items.
+    """
+
+    def __init__(self, folder: Path, rows: Index) -> None:
+        self._store = folder
+        self.rows: Index = rows
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @overload
+    def __getitem__(self, number: int) -> Item: ...
+    @overload
+    def __getitem__(self, number: slice) -> Items: ...
+    def __getitem__(self, number: int | slice) -> Item | Items:
+        if isinstance(number, slice):
+            return Items(self._store, self.rows[number])
+        return Item(self._store, self.rows[number])
+
+    def __iter__(self) -> Iterator[Item]:
+        return (Item(self._store, row) for row in self.rows)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} items of {self._store}>"
+
+
 class Store:
     """The items of a store as its index has them, in the order of the plan.
 
     Parameters
     ----------
     folder : str or os.PathLike
-        The store of a sweep. Its ``index.jsonl`` is read now; `Sweep.write_index` writes it anew.
+        The store of a sweep. Its ``index.jsonl`` is looked through now, and its lines are read when they are asked for;
+        `Sweep.write_index` writes it anew.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self._folder = Path(folder)
-        self._rows = list(rows(self._folder))
+        self._index = Index(self._folder)
 
     @property
     def folder(self) -> Path:
@@ -127,33 +227,27 @@ class Store:
         return self._folder
 
     @property
-    def index(self) -> list[dict[str, Any]]:
+    def index(self) -> Index:
         """A dictionary an item: ``item``, ``id``, ``status``, ``values``, and ``metrics`` or ``reason``."""
-        return self._rows
+        return self._index
 
     @property
-    def done(self) -> list[Item]:
+    def done(self) -> Items:
         """The items that have a picture, each once."""
-        known: dict[str, Item] = {}
-        for item in self:
-            if item.status == "done":
-                known.setdefault(item.id, item)
-        return list(known.values())
+        return Items(self._folder, self._index.done())
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return len(self._index)
 
     @overload
     def __getitem__(self, number: int) -> Item: ...
     @overload
-    def __getitem__(self, number: slice) -> list[Item]: ...
-    def __getitem__(self, number: int | slice) -> Item | list[Item]:
-        if isinstance(number, slice):
-            return [Item(self._folder, row) for row in self._rows[number]]
-        return Item(self._folder, self._rows[number])
+    def __getitem__(self, number: slice) -> Items: ...
+    def __getitem__(self, number: int | slice) -> Item | Items:
+        return Items(self._folder, self._index)[number]
 
     def __iter__(self) -> Iterator[Item]:
-        return (Item(self._folder, row) for row in self._rows)
+        return iter(self[:])
 
     def to_pandas(self) -> Any:
         """Returns the index as a ``pandas.DataFrame``: a row an item, a column a key and a metric."""
@@ -161,8 +255,7 @@ class Store:
             pandas = importlib.import_module("pandas")
         except ImportError as error:
             raise ImportError("to_pandas needs pandas: pip install pandas") from error
-        table = pandas.DataFrame([flat(row) for row in self._rows])
-        return table.set_index("item")
+        return pandas.DataFrame(columns(self._index, as_objects=True)).infer_objects().set_index("item")
 
     def to_xarray(self, arrays: Sequence[str] = ()) -> Any:
         """Returns the finished items as an ``xarray.Dataset``.
@@ -183,7 +276,7 @@ class Store:
         except ImportError as error:
             raise ImportError("to_xarray needs xarray: pip install 'dioptric[xarray]'") from error
         done = self.done
-        table = columns([flat(item._row) for item in done])
+        table = columns(done.rows)
         metrics = {name for item in done for name in item.metrics}
         coordinates: dict[str, Any] = {
             name: ("item", column)
@@ -199,7 +292,7 @@ class Store:
                 coordinates["wavelength"] = ("wavelength", bands, {"units": "nm"})
         return xr.Dataset(variables, coordinates)
 
-    def _stacked(self, name: str, done: list[Item]) -> tuple[tuple[str, ...], NDArray[Any], list[float] | None]:
+    def _stacked(self, name: str, done: Items) -> tuple[tuple[str, ...], NDArray[Any], list[float] | None]:
         stacked: NDArray[Any] | None = None
         dimensions: tuple[str, ...] = ()
         bands = None
@@ -218,18 +311,6 @@ class Store:
         return f"<Store {self._folder}: {len(self)} items>"
 
 
-def rows(folder: Path) -> Iterator[dict[str, Any]]:
-    """Yields the lines of a store's index, without holding them."""
-    path = folder / "index.jsonl"
-    try:
-        lines = path.open(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise FileNotFoundError(f"{path}: there is no index; `dioptric sweep index PLAN` writes one") from error
-    with lines:
-        for line in lines:
-            yield json.loads(line)
-
-
 def flat(row: dict[str, Any]) -> dict[str, Any]:
     """Returns a line of an index as the row of a table: values that are neither numbers nor words are their JSON text."""
     values = {key: cell(value) for key, value in row["values"].items()}
@@ -244,17 +325,42 @@ def cell(value: Any) -> Any:
     return json.dumps(value)
 
 
-def columns(table: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
-    """Returns rows as columns: numbers where all cells are, with NaN where there is none; else text."""
-    names = dict.fromkeys(name for row in table for name in row)
+def kinds(rows: Iterable[dict[str, Any]]) -> dict[str, type]:
+    """Returns the types of the columns of an index: bool, int, float, str where they differ otherwise; NoneType without a value."""
+    known: dict[str, type] = {}
+    for row in rows:
+        for name, value in flat(row).items():
+            known[name] = _wider(known.get(name, type(None)), type(value))
+    return known
+
+
+def _wider(known: type, found: type) -> type:
+    if known is found or found is type(None):
+        return known
+    if known is type(None):
+        return found
+    return float if {known, found} == {int, float} else str
+
+
+def columns(rows: Sequence[dict[str, Any]], *, as_objects: bool = False) -> dict[str, NDArray[Any]]:
+    """Returns lines of an index as columns: float64 where all cells are numbers, with NaN where there is none; else text.
+
+    As objects, the cells of other columns than those of floats stay what they are. The lines are gone through twice.
+    """
+    types = kinds(rows)
+    numeric = [float] if as_objects else [bool, int, float, type(None)]
     result: dict[str, NDArray[Any]] = {}
-    for name in names:
-        cells = [row.get(name) for row in table]
-        if all(isinstance(cell, (int, float)) or cell is None for cell in cells):
-            result[name] = np.array([math.nan if cell is None else cell for cell in cells], np.float64)
-        else:
-            result[name] = np.array(["" if cell is None else str(cell) for cell in cells])
-    return result
+    for name, kind in types.items():
+        is_number = kind in numeric
+        empty = math.nan if is_number else None if as_objects else ""
+        result[name] = np.full(len(rows), empty, np.float64 if is_number else object)
+    for n, row in enumerate(rows):
+        for name, value in flat(row).items():
+            if value is not None:
+                result[name][n] = value if as_objects or types[name] in numeric else str(value)
+    if as_objects:
+        return result
+    return {name: column if types[name] in numeric else column.astype(str) for name, column in result.items()}
 
 
 def layout(array: NDArray[Any], names: Sequence[Any]) -> tuple[tuple[str, ...], list[float] | None]:

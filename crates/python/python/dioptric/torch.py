@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 
 from ._native import Camera, set_threads
-from .sweep import Item, Store, Sweep
+from .sweep import Item, Items, Store, Sweep
 
 __all__ = ["Dataset", "Rendered"]
 
 _Sample = dict[str, Any]
+_ARRAYS = ("picture", "rgb", "raw", "irradiance", "depth_m", "volts", "electrons", "electron_rate")
 
 
 class Dataset:
@@ -62,7 +63,7 @@ class Dataset:
                 raise ValueError(f"arrays has '{name}', expected a file of the items, a key with numbers or a metric")
 
     @property
-    def items(self) -> list[Item]:
+    def items(self) -> Items:
         """The items, one a sample."""
         return self._items
 
@@ -92,8 +93,8 @@ class Rendered:
     n : int
         The number of samples; of a sweep all its items, if left out.
     arrays : list of str
-        What a sample has: names of arrays of a `Shot`, as ``"picture"``, ``"raw"``, ``"irradiance"``, ``"depth_m"``; ``"picture"`` is
-        float32 of 0-1.
+        What a sample has: names of arrays of a `Shot`, ``"picture"`` (float32, 0-1), ``"rgb"``, ``"raw"``, ``"irradiance"``,
+        ``"depth_m"``, ``"volts"``, ``"electrons"``, ``"electron_rate"``.
     seed : int
         Of the generators: sample i has one of its own from ``[seed, i]``, so that it is the same in any worker and any order. Another
         epoch is another seed.
@@ -120,6 +121,12 @@ class Rendered:
     ) -> None:
         if n is None and not isinstance(cameras, Sweep):
             raise ValueError("n is missing, expected a number of samples: a function has none of its own")
+        if n is not None and (n < 1 or (isinstance(cameras, Sweep) and n > len(cameras))):
+            most = f"1 to {len(cameras)}, the items of the sweep" if isinstance(cameras, Sweep) else "1 or more"
+            raise ValueError(f"n is {n}, expected {most}")
+        for name in arrays:
+            if name not in _ARRAYS:
+                raise ValueError(f"arrays has '{name}', expected names of {', '.join(_ARRAYS)}")
         self._plan = cameras.plan if isinstance(cameras, Sweep) else None
         self._cameras: Sweep | Callable[[np.random.Generator], Camera] | None = cameras
         self._n = len(cameras) if n is None and isinstance(cameras, Sweep) else int(n or 0)
@@ -170,7 +177,7 @@ def _tensor(torch: Any, name: str, value: Any) -> Any:
         return torch.tensor(value, dtype=torch.float32)
     if isinstance(value, tuple):
         value = np.stack(value)
-    if name.startswith("picture") and value.ndim == 3:
+    if name in ("picture", "rgb") and value.ndim == 3:
         value = value.transpose(2, 0, 1)
     kind = np.int32 if value.dtype == np.uint16 else value.dtype
     # A copy of its own: results are read-only.

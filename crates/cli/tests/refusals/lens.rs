@@ -1,0 +1,87 @@
+//! Lens files that are refused.
+
+/// A lens whose every key is needed.
+pub(crate) const RON: &str = r#"(name: "l", source: "t", surfaces: [(radius_mm: 50.0, thickness_mm: 4.0, semi_aperture_mm: 8.0, medium: Constant(index: 1.5)), (radius_mm: -50.0, thickness_mm: 1.0, semi_aperture_mm: 8.0), (stop: true, thickness_mm: 0.0, semi_aperture_mm: 4.0)])"#;
+
+/// Ending of a lens file, what takes the place of what in it, and words of the answer.
+pub(crate) const CHANGED: &[(&str, &str, &str, &str)] = &[
+    ("ron", "radius_mm: 50.0", "radius_mm: 0.0", "surface 0: radius_mm is 0, expected a radius other than"),
+    ("ron", "radius_mm: 50.0", "radius_mm: NaN", "surface 0: radius_mm is NaN, expected a radius other"),
+    ("ron", "radius_mm: 50.0", "radius_mm: 5.0", "surface 0: a rim of 8 mm does not fit on a surface of"),
+    ("ron", "index: 1.5", "index: 0.0", "glass: index is 0, expected a finite number above 0"),
+    ("ron", "index: 1.5", "index: NaN", "glass: index is NaN, expected a finite number above 0"),
+    ("ron", "index: 1.5", "index: -1.5", "glass: index is -1.5, expected a finite number above 0"),
+    ("ron", "thickness_mm: 4.0", "thickness_mm: inf", "surface 0: thickness_mm is inf, expected a finite number"),
+    ("ron", "semi_aperture_mm: 8.0", "semi_aperture_mm: 0.0", "surface 0: semi_aperture_mm is 0, expected a finite"),
+    ("ron", "semi_aperture_mm: 8.0", "semi_aperture_mm: -8.0", "surface 0: semi_aperture_mm is -8, expected a finite"),
+    ("ron", "stop: true, ", "", "a lens has exactly one stop, but 0 surfaces are marked"),
+    (
+        "ron",
+        "surfaces: [",
+        "surfaces: [(stop: true, thickness_mm: 0.0, semi_aperture_mm: 4.0),",
+        "a lens has exactly one stop, but 2 surfaces are marked",
+    ),
+    ("ron", "Constant(index: 1.5)", r#"Glass("N-BK77")"#, "Unexpected variant named `Glass` in enum `Glass`"),
+    ("ron", "Constant(index: 1.5)", r#"Catalogue("N-BK77")"#, "Unexpected variant named `Catalogue` in enum `Glass`"),
+    ("ron", "Constant(index: 1.5)", "Constant(index: 1.5", "Expected identifier"),
+    ("ron", r#"source: "t""#, r#"sauce: "t""#, "Unexpected field named `sauce` in `Prescription`"),
+    ("ron", "semi_aperture_mm: 4.0", "semi_aperture_mm: 1e308", "surface 2: a rim of"),
+    ("ron", "radius_mm: 50.0", "conic: NaN, radius_mm: 50.0", "Unexpected field named `conic` in `Row`, expected one"),
+    (
+        "ron",
+        "radius_mm: 50.0",
+        "asphere: [1e300], radius_mm: 50.0",
+        "Unexpected field named `asphere` in `Row`, expected one",
+    ),
+    ("dat", "34.3\t", "x\t", "'x' is not a number; expected radius, axpos, N and"),
+    ("dat", "1.628\t30.99", "1.628", "3 numbers in a row; expected 4: radius, axpos, N and"),
+    ("dat", "0\t4.95\t1\t19.29", "5\t4.95\t1\t19.29", "surface 6: a rim of 9.645 mm does not fit on a surface"),
+    ("dat", "34.3\t4.5", "34.3\tNaN", "surface 0: axpos is NaN, expected a finite number"),
+    ("dat", "1.628", "nan", "glass: index is NaN, expected a finite number above 0"),
+    ("dat", "51.4171479574396", "zero", "'zero' is not a number; expected radius, axpos, N and"),
+    ("dat", "30.99\n21.51", "-30.99\n21.51", "surface 1: semi_aperture_mm is -15.495, expected a"),
+    ("seq", "S 34.3 4.5 1.628:57.0", "S 34.3 4.5 NOGLASS", "S: no glass is named 'NOGLASS'; no name is similar"),
+    ("seq", "S 34.3 4.5 1.628:57.0", "S x y z", "S: 'x' is not a number"),
+    ("seq", "CIR 15.495", "CIR -1", "surface 0: semi_aperture_mm is -1, expected a finite"),
+    ("seq", "DIM M", "DIM Q", "DIM: 'Q' is no unit of length; expected M, C or I"),
+    ("seq", "SI 0 0", "", "the file has no image surface (SI); expected SO"),
+    ("seq", "S 34.3 4.5 1.628:57.0", "S 34.3 4.5 1.628:57.0\n  ASP\n  K x", "K: 'x' is not a number"),
+    ("zmx", "CURV 2.915451895043732e-2", "CURV x", "CURV: 'x' is not a number"),
+    (
+        "zmx",
+        "TYPE STANDARD\n  CURV 2.9",
+        "TYPE HOLOGRAM\n  CURV 2.9",
+        "surface 1: surfaces of type HOLOGRAM are not supported",
+    ),
+    ("zmx", "DISZ 4.5e0", "DISZ INFINITY", "surface 0: thickness is inf, expected a finite number"),
+    (
+        "zmx",
+        "GLAS ___BLANK 1 0 1.628e0 5.7e1",
+        "GLAS WOOD 0 0 0 0",
+        "surface 1: no glass is named 'WOOD'; no name is similar",
+    ),
+    ("zmx", "UNIT MM", "UNIT LY", "UNIT: 'LY' is no unit of length; expected MM, CM, IN or"),
+    ("zmx", "MODE SEQ", "MODE NSC", "MODE: NSC is not supported; expected SEQ"),
+    ("zmx", "DISZ 4.5e0", "DISZ NaN", "DISZ: 'NaN' is not a number"),
+    ("json", "400.0,", r#""red","#, r#"surfaces[0].ior[0][0] is "red", expected a number"#),
+    ("json", r#""surfaces""#, r#""surface""#, "surfaces is missing, expected a list of objects"),
+    ("json", "{\n", "[", "not JSON: expected `,` or `]` at line 1 column 17"),
+    ("deeplens.json", r#""Spheric""#, r#""Banana""#, "surfaces[0].type: surfaces of type 'Banana' are not"),
+    ("deeplens.json", r#""roc": 34.3"#, r#""roc": "x""#, r#"surfaces[0].roc is "x", expected a number"#),
+    ("deeplens.json", "1.628/57.0", "unobtainium", "surfaces[0].mat2: no glass is named 'unobtainium'; no"),
+];
+
+/// Ending and content of what is no lens file, and words of the answer.
+pub(crate) const OTHER: &[(&str, &str, &str)] = &[
+    ("xyz", "x", "the extension '.xyz' is no lens format; expected .ron"),
+    ("zmx", "", "the file has 0 surfaces; expected an object and an image"),
+    ("zmx", "MODE SEQ\n", "the file has 0 surfaces; expected an object and an image"),
+    ("seq", "nothing", "the file has no image surface (SI); expected SO"),
+    ("json", "[1]", "the file is [1], expected an object {…}"),
+    ("json", "{}", "surfaces is missing, expected a list of objects"),
+    ("ron", "[]", "Expected opening `(` for struct `Prescription`"),
+    ("ron", "", "Expected opening `(` for struct `Prescription`"),
+    ("dat", "", "a lens has exactly one stop, but 0 surfaces are marked"),
+    ("txt", "# lens\n50\n", "a lens has exactly one stop, but 0 surfaces are marked"),
+    ("agf", "x", "lens.agf: the extension '.agf' is no lens format; expected"),
+];

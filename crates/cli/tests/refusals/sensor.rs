@@ -1,0 +1,41 @@
+//! Sensor files that are refused.
+
+/// What takes the place of what in the file of a built-in sensor, and words of the answer.
+pub(crate) const CHANGED: &[(&str, &str, &str)] = &[
+    ("rows: 3024", "rows: 0", "rows of IMX363-class phone sensor is 0, expected 1 or"),
+    ("columns: 4032", "columns: 400000000", "columns of IMX363-class phone sensor is 400000000"),
+    ("pixel_pitch_um: 1.4", "pixel_pitch_um: 0.0", "pixel_pitch_um of IMX363-class phone sensor is 0"),
+    ("pixel_pitch_um: 1.4", "pixel_pitch_um: NaN", "pixel_pitch_um of IMX363-class phone sensor is NaN"),
+    ("fill_factor: 1.0", "fill_factor: 1.5", "fill_factor of IMX363-class phone sensor is 1.5"),
+    ("fill_factor: 1.0", "fill_factor: 0.0", "fill_factor of IMX363-class phone sensor is 0, expected"),
+    ("390.0,", "900.0,", "wavelengths must be finite, positive and ascending, but"),
+    ("0.005,", "1.7,", "the spectrum of 'R' of IMX363-class phone sensor is"),
+    ("0.005,", "-0.1,", "the spectrum of 'R' of IMX363-class phone sensor is"),
+    (
+        "conversion_gain_v_per_e: 7.6511875e-5",
+        "conversion_gain_v_per_e: 0.0",
+        "conversion_gain_v_per_e of IMX363-class phone sensor is",
+    ),
+    ("full_well_e: 6000.0", "full_well_e: -1.0", "full_well_e of IMX363-class phone sensor is -1"),
+    ("swing_v: 0.45907125", "swing_v: NaN", "swing_v of IMX363-class phone sensor is NaN, expected a"),
+    ("read_noise_v: 0.000226", "read_noise_v: -1.0", "read_noise_v of IMX363-class phone sensor is -1"),
+    ("read_noise_e: None", "read_noise_e: Some(2.0)", "read_noise_v of IMX363-class phone sensor is 0.000226"),
+    ("prnu_fraction: 0.00544", "prnu_fraction: -0.1", "prnu_fraction of IMX363-class phone sensor is -0.1"),
+    ("hot_fraction: 0.0", "hot_fraction: 1.5", "defects.hot_fraction of IMX363-class phone sensor is"),
+    ("response: Linear", "response: Log", "Unexpected variant named `Log` in enum `Response`"),
+    ("bits: 10", "bits: 0", "adc.bits of IMX363-class phone sensor is 0, expected 1"),
+    ("bits: 10", "bits: 64", "adc.bits of IMX363-class phone sensor is 64, expected 1"),
+    ("black_level_dn: 64", "black_level_dn: 5000", "adc.black_level_dn of IMX363-class phone sensor is"),
+    ("step_v: Some(0.00044875)", "step_v: Some(0.0)", "adc.step_v of IMX363-class phone sensor is 0, expected"),
+    ("row_time_us: 0.0", "row_time_us: -3.0", "row_time_us of IMX363-class phone sensor is -3"),
+    ("doubling_k: 7.0", "doubling_k: 0.0", "dark_current.doubling_k of IMX363-class phone sensor is"),
+    ("blooming_fraction: 0.0", "blooming_fraction: 2.0", "blooming_fraction of IMX363-class phone sensor is 2"),
+    ("defects: (", "defect: (", "Unexpected field named `defect` in `Sensor`, expected"),
+    (
+        "chief_ray_response: []",
+        "chief_ray_response: [(0.0, 1.0), (NaN, 1.0)]",
+        "chief_ray_response of IMX363-class phone sensor is NaN",
+    ),
+    ("optical_crosstalk: None", "optical_crosstalk: Some(2.0)", "Expected opening `(`"),
+    ("high_gain: None", "high_gain: Some(0.0)", "Expected opening `(` for struct `HighGain`"),
+];
