@@ -32,7 +32,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("sweep", &["pictures", "spectrum", "psf", "backward", "pipeline", "analysis"]),
     ("cli", &["pictures", "spectrum", "pipeline", "analysis", "report", "sweep"]),
     ("python", &["spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis", "sweep"]),
-    ("studio", &["pictures", "spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis"]),
+    ("studio", &["pictures", "spectrum", "optics", "psf", "scene", "sensor", "pipeline", "analysis", "report"]),
     ("xtask", &["pipeline", "report", "sweep"]),
 ];
 

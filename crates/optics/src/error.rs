@@ -93,6 +93,14 @@ pub enum OpticsError {
         /// How many were found.
         n_surfaces: usize,
     },
+    /// A change of a surface that is not there.
+    #[error("a change is of surface {surface}, expected 0 to {}", n_surfaces - 1)]
+    ChangeOfSurface {
+        /// The surface it names, counted from 0.
+        surface: usize,
+        /// How many surfaces the lens has.
+        n_surfaces: usize,
+    },
     /// A move of surfaces that are not there.
     #[error(
         "move {number} is of surfaces {first} to {last}, expected a first and a last of 0 to {n_surfaces} (the film)"

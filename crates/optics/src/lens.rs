@@ -1,10 +1,14 @@
 //! A lens: surfaces in a row, one of them the stop.
 
+mod changes;
+
 use glam::DVec2;
 
 use crate::{
     Aperture, CoordinateBreak, DiffractiveSurface, Glass, Interface, OpticsError, Placement, Shape, Surface, placement,
 };
+
+pub use self::changes::SurfaceChange;
 
 /// A lens that has been checked and can be traced.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,7 +12,7 @@ use std::{
 
 use cpu_time::ProcessTime;
 use dioptric_pipeline::{
-    Camera, FocusSpec, LensSpec, SceneSource, SensorSpec, StopSpec, with_analog_gain, with_exposure_s,
+    Camera, FocusSpec, LensSpec, SceneSource, SensorSpec, StopSpec, SurfaceChange, with_analog_gain, with_exposure_s,
 };
 use dioptric_sensor::{Demosaic, NoiseSource, NoiseSources};
 use dioptric_studio::engine::{Delivery, Engine, EngineSettings, Product, Rung};
@@ -44,6 +44,10 @@ const KINDS: &[Kind] = &[
     ("focus", 100.0, |camera, i| camera.focus = FocusSpec::DistanceMm(700.0 + 5.0 * i as f64)),
     ("movements: rise", 100.0, |camera, i| camera.movements.rise_mm = 0.01 * (1.0 + i as f64)),
     ("movements: swing", 100.0, |camera, i| camera.movements.swing_deg = 0.03 * (1.0 + i as f64)),
+    ("lens: curvature", 250.0, |camera, i| {
+        let change = SurfaceChange { surface: 0, curvature_per_mm: Some(0.02 + 1e-5 * i as f64), thickness_mm: None };
+        camera.lens = camera.lens.with_changes(vec![change]);
+    }),
     ("lens", 250.0, |camera, i| {
         let names = ["tessar-50mm", "cooke-50mm", "canon-50mm", "dgauss-50mm-schott", "achromat-100mm"];
         camera.lens = LensSpec::BuiltIn(names[i % names.len()].to_owned());
@@ -111,64 +115,81 @@ fn memory_mib(key: &str) -> f64 {
     line.split_whitespace().nth(1).and_then(|kib| kib.parse::<f64>().ok()).unwrap_or(0.0) / 1024.0
 }
 
-fn main() {
-    let wanted: Vec<String> = env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
-    let top = [("sketch", Rung::Sketch), ("preview", Rung::Preview)]
-        .into_iter()
-        .find(|(word, _)| wanted.iter().any(|w| w == word));
-    let top = top.map_or(Rung::Full, |(_, rung)| rung);
-    let n_edits: usize = wanted.iter().find_map(|word| word.parse().ok()).unwrap_or(200);
-    let kinds: Vec<&String> = wanted
-        .iter()
-        .filter(|word| word.parse::<usize>().is_err() && !["sketch", "preview", "full"].contains(&word.as_str()))
-        .collect();
-    let (sender, woken) = mpsc::channel();
-    let begin = Instant::now();
-    let engine = Engine::start(EngineSettings::default(), move || _ = sender.send(())).unwrap();
-    let bench = Bench { engine, woken };
-    let demo = Camera::demo().unwrap();
-    let first = bench.climb(&demo, Rung::Sketch);
-    println!("start to the first picture {:.0} ms", 1e3 * begin.elapsed().as_secs_f64());
-    drop(first);
-    let all = bench.climb(&demo, top);
-    let times: Vec<String> = all.iter().map(|d| format!("{:.0}", 1e3 * d.work.as_secs_f64())).collect();
-    println!("nothing kept: rungs of {} ms", times.join(", "));
-    if let [sketch, preview, full] = &*all {
-        let product = |delivery: &Delivery| delivery.outcome.clone().unwrap();
-        let rms_of = |few: &Delivery| format!("{:.2} %", 100.0 * rms(&product(few), &product(full)));
-        println!("rms from the full picture: sketch {}, preview {}", rms_of(sketch), rms_of(preview));
-    }
-    drop(all);
+/// What was asked for on the command line.
+struct Wanted {
+    top: Rung,
+    n_edits: usize,
+    /// Beginnings of the names of kinds; empty for all.
+    kinds: Vec<String>,
+}
 
-    println!("{:<24} {:>5} {:>8}  {:^17}  {:^17}  {:^17}", "change, ms", "bar", "work", "sketch", "preview", "full");
-    for (name, bar_ms, change) in
-        KINDS.iter().filter(|(name, ..)| kinds.is_empty() || kinds.iter().any(|k| name.starts_with(k.as_str())))
-    {
-        let mut times_ms: [Vec<f64>; 3] = Default::default();
-        let mut work_ms = Vec::new();
-        for i in 0..n_edits {
-            let mut camera = demo.clone();
-            change(&mut camera, i);
-            let begin = ProcessTime::now();
-            let sketch = bench.climb(&camera, Rung::Sketch);
-            work_ms.push(1e3 * begin.elapsed().as_secs_f64());
-            times_ms[0].push(1e3 * sketch[0].elapsed.as_secs_f64());
-            let is_full = i % n_edits.div_ceil(FULL) == 0;
-            let top = top.min(if is_full { Rung::Full } else { Rung::Preview });
-            if top == Rung::Sketch {
-                continue;
-            }
-            // Of the first rung the results are kept by now, so that what follows counts from its end.
-            for delivery in bench.climb(&camera, top).into_iter().skip(1) {
-                times_ms[delivery.rung as usize].push(1e3 * (sketch[0].elapsed + delivery.elapsed).as_secs_f64());
+impl Wanted {
+    fn of_arguments() -> Self {
+        let mut wanted = Self { top: Rung::Full, n_edits: 200, kinds: Vec::new() };
+        for word in env::args().skip(1).filter(|argument| !argument.starts_with('-')) {
+            match (word.as_str(), word.parse()) {
+                ("sketch", _) => wanted.top = Rung::Sketch,
+                ("preview", _) => wanted.top = Rung::Preview,
+                ("full", _) => wanted.top = Rung::Full,
+                (_, Ok(n_edits)) => wanted.n_edits = n_edits,
+                _ => wanted.kinds.push(word),
             }
         }
-        let cells = times_ms
-            .each_mut()
-            .map(|times| format!("{:>7.1} {:>8.1} ", percentile(times, 0.5), percentile(times, 0.95)));
-        println!("{name:<24} {bar_ms:>5} {:>8.1}  {}", percentile(&mut work_ms, 0.5), cells.join(" "));
+        wanted
     }
 
+    fn has(&self, name: &str) -> bool {
+        self.kinds.is_empty() || self.kinds.iter().any(|kind| name.starts_with(kind.as_str()))
+    }
+}
+
+/// Prints how long the first picture takes, the rungs of a camera of which nothing is kept, and how far they are from the full one.
+fn first_pictures(bench: &Bench, demo: &Camera, top: Rung, begin: Instant) {
+    drop(bench.climb(demo, Rung::Sketch));
+    println!("start to the first picture {:.0} ms", 1e3 * begin.elapsed().as_secs_f64());
+    let all = bench.climb(demo, top);
+    let times: Vec<String> = all.iter().map(|d| format!("{:.0}", 1e3 * d.work.as_secs_f64())).collect();
+    println!("nothing kept: rungs of {} ms", times.join(", "));
+    let [sketch, preview, full] = &*all else { return };
+    let product = |delivery: &Delivery| delivery.outcome.clone().unwrap();
+    let rms_of = |few: &Delivery| format!("{:.2} %", 100.0 * rms(&product(few), &product(full)));
+    println!(
+        "rms from the full picture: sketch {}, preview {}, full {}",
+        rms_of(sketch),
+        rms_of(preview),
+        rms_of(full)
+    );
+}
+
+/// Changes the camera again and again in one way, and prints median and 95th percentile of the time to each rung, and of the work for the
+/// first.
+fn edits(bench: &Bench, demo: &Camera, &(name, bar_ms, change): &Kind, wanted: &Wanted) {
+    let mut times_ms: [Vec<f64>; 3] = Default::default();
+    let mut work_ms = Vec::new();
+    for i in 0..wanted.n_edits {
+        let mut camera = demo.clone();
+        change(&mut camera, i);
+        let begin = ProcessTime::now();
+        let sketch = bench.climb(&camera, Rung::Sketch);
+        work_ms.push(1e3 * begin.elapsed().as_secs_f64());
+        times_ms[0].push(1e3 * sketch[0].elapsed.as_secs_f64());
+        let is_full = i % wanted.n_edits.div_ceil(FULL) == 0;
+        let top = wanted.top.min(if is_full { Rung::Full } else { Rung::Preview });
+        if top == Rung::Sketch {
+            continue;
+        }
+        // Of the first rung the results are kept by now, so that what follows counts from its end.
+        for delivery in bench.climb(&camera, top).into_iter().skip(1) {
+            times_ms[delivery.rung.number() - 1].push(1e3 * (sketch[0].elapsed + delivery.elapsed).as_secs_f64());
+        }
+    }
+    let both = |times: &mut Vec<f64>| format!("{:>7.1} {:>8.1} ", percentile(times, 0.5), percentile(times, 0.95));
+    let cells: Vec<String> = times_ms.each_mut().map(both).into();
+    println!("{name:<24} {bar_ms:>5} {}  {}", both(&mut work_ms), cells.join(" "));
+}
+
+/// Prints how soon the engine rests once it is stopped.
+fn stops(bench: &Bench, demo: &Camera) {
     let mut late_ms: Vec<f64> = (0..40)
         .map(|i| {
             let camera = Camera { stop: StopSpec::FNumber(3.0 + 0.1 * f64::from(i)), ..demo.clone() };
@@ -183,5 +204,32 @@ fn main() {
         })
         .collect();
     println!("from stop to rest, ms: {:.1} {:.1}", percentile(&mut late_ms, 0.5), percentile(&mut late_ms, 0.95));
+}
+
+/// Returns how many programs wait for processors; what times by the clock are worth.
+fn load() -> String {
+    std::fs::read_to_string("/proc/loadavg")
+        .map_or("unknown".to_owned(), |text| text.split(' ').take(2).collect::<Vec<_>>().join(", "))
+}
+
+fn main() {
+    let wanted = Wanted::of_arguments();
+    println!("load before (1 and 5 minutes): {}", load());
+    let (sender, woken) = mpsc::channel();
+    let begin = Instant::now();
+    let engine = Engine::start(EngineSettings::default(), move || _ = sender.send(())).unwrap();
+    let bench = Bench { engine, woken };
+    let demo = Camera::demo().unwrap();
+    first_pictures(&bench, &demo, wanted.top, begin);
+    println!(
+        "{} edits of each kind, median and 95th percentile, ms; work is that of all threads for the sketch",
+        wanted.n_edits
+    );
+    println!("{:<24} {:>5} {:^17}  {:^17}  {:^17}  {:^17}", "change", "bar", "work", "sketch", "preview", "full");
+    for kind in KINDS.iter().filter(|(name, ..)| wanted.has(name)) {
+        edits(&bench, &demo, kind, &wanted);
+    }
+    stops(&bench, &demo);
     println!("memory: {:.0} MiB, at most {:.0} MiB", memory_mib("VmRSS"), memory_mib("VmHWM"));
+    println!("load after (1 and 5 minutes): {}", load());
 }

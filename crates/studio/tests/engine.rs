@@ -7,7 +7,8 @@ use std::{
 };
 
 use dioptric_pipeline::{
-    Camera, FilmSpec, KeptCamera, SceneSource, SensorSpec, Silent, StopSpec, WavelengthSpec, write_capture,
+    Camera, FilmSpec, FocusSpec, KeptCamera, LensSpec, RenderEffort, SceneSource, SceneSpec, SensorSpec, Silent,
+    StopSpec, WavelengthSpec, WorldSpec, write_capture,
 };
 use dioptric_spectrum::Cancel;
 use dioptric_studio::engine::{Delivery, Engine, EngineSettings, Field, Rung};
@@ -153,4 +154,40 @@ fn progress_tells_the_rung_and_its_stage() {
     }
     let full: Vec<_> = seen.iter().filter(|(rung, _)| *rung == Rung::Full).collect();
     assert!(!full.is_empty() && full.windows(2).all(|pair| pair[0] <= pair[1]), "{seen:?}");
+}
+
+#[test]
+fn a_world_refines_to_the_bits_of_the_run() {
+    let mut world =
+        WorldSpec::of_file(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/worlds/room.pbrt"));
+    (world.effort, world.size) = (RenderEffort::Samples(64), Some((30, 20)));
+    let camera = Camera {
+        lens: LensSpec::Thin { focal_length_mm: 50.0, diameter_mm: 12.5 },
+        stop: StopSpec::AsGiven,
+        focus: FocusSpec::DistanceMm(3000.0),
+        film: FilmSpec::Pixels { columns: 24, rows: 16, pitch_um: 1400.0 },
+        scene: SceneSpec { source: SceneSource::World(world), ..SceneSpec::of_file("room.pbrt".into()) },
+        wavelengths: WavelengthSpec::ListNm(vec![450.0, 550.0, 650.0]),
+        ..demo(6)
+    };
+    let (engine, woken) = start();
+    let generation = engine.submit(camera.clone(), Rung::Full);
+    let all = wait(&engine, &woken, generation, Rung::Full);
+    let products: Vec<_> = all.iter().map(|delivery| delivery.outcome.as_ref().unwrap()).collect();
+    // Passes of 8 samples: after 1, 2 and 4 of them, and all 8.
+    let on_its_way: Vec<Option<u32>> = products.iter().map(|product| product.n_samples).collect();
+    assert_eq!(on_its_way, [None, None, Some(8), Some(16), Some(32), None]);
+    assert!(products.iter().all(|product| *product.camera() == camera));
+    let kept = KeptCamera::new(camera);
+    let run = kept.capture(&Silent, &Cancel::new()).unwrap();
+    let full = products.last().unwrap();
+    assert_eq!(full.capture.irradiance.cube(), run.irradiance.cube());
+    assert_eq!(full.rgb8, run.developed.picture.to_rgb8());
+    // Each is nearer to it than the one before, as noise falls by √2.
+    let off = |few: &dioptric_studio::engine::Product| {
+        let (few, whole) = (few.capture.irradiance.cube().unwrap(), run.irradiance.cube().unwrap());
+        few.iter().zip(whole).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>()
+    };
+    let offs: Vec<f64> = products[2..5].iter().map(|product| off(product)).collect();
+    assert!(offs[0] > offs[1] && offs[1] > offs[2] && offs[2] > 0.0, "{offs:?}");
 }

@@ -9,7 +9,7 @@ use std::{
     time::SystemTime,
 };
 
-use dioptric_pipeline::{Camera, LensSpec, SceneSource, SensorSpec};
+use dioptric_pipeline::{Camera, SceneSource, SensorSpec};
 
 use crate::SweepError;
 
@@ -79,7 +79,7 @@ impl Inputs {
 
 /// Returns the paths in a camera.
 fn paths(camera: &mut Camera) -> Vec<&mut PathBuf> {
-    let lens = if let LensSpec::File(path) = &mut camera.lens { Some(path) } else { None };
+    let lens = camera.lens.file_mut();
     let sensor = if let SensorSpec::File(path) = &mut camera.sensor { Some(path) } else { None };
     let scene = match &mut camera.scene.source {
         SceneSource::File(path) => Some(path),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions, SeqNumbers};
+use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions, SeqNumbers, SurfaceChange};
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +26,42 @@ impl LensSpec {
         if !is_built_in && is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
     }
 
+    /// The lens that this is, or is a changed form of.
+    pub fn base(&self) -> &Self {
+        match self {
+            Self::Changed { lens, .. } => lens.base(),
+            other => other,
+        }
+    }
+
+    /// What is changed of the lens; nothing of most.
+    pub fn changes(&self) -> &[SurfaceChange] {
+        match self {
+            Self::Changed { surfaces, .. } => surfaces,
+            _ => &[],
+        }
+    }
+
+    /// Returns this lens with these changes of its surfaces, and no others.
+    pub fn with_changes(&self, surfaces: Vec<SurfaceChange>) -> Self {
+        let lens = self.base().clone();
+        if surfaces.is_empty() { lens } else { Self::Changed { lens: Box::new(lens), surfaces } }
+    }
+
+    /// The file that it is read from.
+    pub fn file(&self) -> Option<&Path> {
+        if let Self::File(path) = self.base() { Some(path) } else { None }
+    }
+
+    /// The file that it is read from, to be named otherwise.
+    pub fn file_mut(&mut self) -> Option<&mut PathBuf> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Changed { lens, .. } => lens.file_mut(),
+            _ => None,
+        }
+    }
+
     /// Returns the lens, and what its file says of it.
     ///
     /// # Errors
@@ -38,6 +74,11 @@ impl LensSpec {
             Self::BuiltIn(name) => LensFile::from(Lens::built_in(name)?),
             Self::Thin { focal_length_mm, diameter_mm } => LensFile::from(Lens::thin(*focal_length_mm, *diameter_mm)?),
             Self::Pinhole { diameter_mm } => LensFile::from(Lens::pinhole(*diameter_mm)?),
+            Self::Changed { lens, surfaces } => {
+                let mut file = lens.open(reading)?;
+                file.lens = file.lens.with_surface_changes(surfaces)?;
+                return Ok(file);
+            }
         };
         if let Some(slope_per_nm) = reading.slope_per_nm {
             file.lens = file.lens.with_linear_dispersion(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
@@ -125,5 +166,20 @@ mod tests {
         for path in ["lens.dat", "./lens", "folder/lens"] {
             assert_eq!(LensSpec::named(path), LensSpec::File(PathBuf::from(path)));
         }
+    }
+
+    #[test]
+    fn a_changed_lens_is_that_lens_with_other_numbers() {
+        let plain = LensSpec::BuiltIn("dgauss-50mm".to_owned());
+        let reading = LensReadOptions::default();
+        let lens = plain.open(&reading).unwrap().lens;
+        let change = SurfaceChange { surface: 1, thickness_mm: Some(9.25), ..SurfaceChange::default() };
+        let changed = plain.with_changes(vec![change]);
+        let opened = changed.open(&reading).unwrap().lens;
+        assert_eq!(opened.interfaces()[1].thickness_after_mm, 9.25);
+        assert_eq!(opened.interfaces()[1].surface, lens.interfaces()[1].surface);
+        assert_eq!((changed.base(), changed.with_changes(Vec::new())), (&plain, plain.clone()));
+        let wrong = plain.with_changes(vec![SurfaceChange { surface: 99, ..change }]);
+        assert!(wrong.open(&reading).unwrap_err().to_string().contains("surface 99, expected 0 to"));
     }
 }

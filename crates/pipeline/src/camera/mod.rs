@@ -17,6 +17,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use dioptric_optics::SurfaceChange;
 use dioptric_psf::{Diffraction, PsfError};
 use dioptric_sensor::{AutoExposure, ExposureControl, Metering, NoiseSources, Processing};
 use dioptric_spectrum::WavelengthGrid;
@@ -128,6 +129,13 @@ pub enum LensSpec {
     Pinhole {
         /// Diameter, mm.
         diameter_mm: f64,
+    },
+    /// Another lens with some of its curvatures and distances changed.
+    Changed {
+        /// That lens, itself not a changed one.
+        lens: Box<Self>,
+        /// What is changed of it.
+        surfaces: Vec<SurfaceChange>,
     },
 }
 
@@ -280,13 +288,18 @@ impl Camera {
     }
 
     fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
-        match &self.lens {
+        if let LensSpec::Changed { lens, .. } = &self.lens
+            && let LensSpec::Changed { .. } = **lens
+        {
+            checker.wrong("lens", "Changed of Changed", "one list of changes")?;
+        }
+        match self.lens.base() {
             LensSpec::Thin { focal_length_mm, diameter_mm } => {
                 checker.positive("focal_length_mm", *focal_length_mm)?;
                 checker.positive("diameter_mm", *diameter_mm)?;
             }
             LensSpec::Pinhole { diameter_mm } => checker.positive("diameter_mm", *diameter_mm)?,
-            LensSpec::BuiltIn(_) | LensSpec::File(_) => {}
+            LensSpec::BuiltIn(_) | LensSpec::File(_) | LensSpec::Changed { .. } => {}
         }
         if let Some(slope_per_nm) = self.lens_reading.slope_per_nm {
             checker.finite("slope_per_nm", slope_per_nm)?;
@@ -352,7 +365,7 @@ impl Camera {
 
     /// Takes paths as relative to a folder; absolute ones stay.
     pub fn resolve_paths(&mut self, folder: &Path) {
-        if let LensSpec::File(path) = &mut self.lens {
+        if let Some(path) = self.lens.file_mut() {
             *path = folder.join(&path);
         }
         for path in &mut self.lens_reading.glasses {

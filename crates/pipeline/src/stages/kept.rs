@@ -424,6 +424,14 @@ impl KeptCamera {
         chain.world_render(&inputs)
     }
 
+    /// Whether the irradiance on the film is kept, so that a capture starts behind it.
+    ///
+    /// # Errors
+    /// When the sensor cannot be read.
+    pub fn has_irradiance(&self) -> Result<bool, PipelineError> {
+        Ok(self.kept.irradiance.get(&self.irradiance_inputs()?).is_some())
+    }
+
     /// Keeps a rendered picture as the irradiance of this camera, so that a capture starts behind it.
     ///
     /// # Errors
@@ -575,7 +583,7 @@ impl Chain<'_> {
 
     fn irradiance(&self, inputs: &IrradianceInputs) -> Result<Arc<Irradiance>, PipelineError> {
         self.kept.irradiance.get_or_make(inputs.clone(), |inputs| {
-            if let Some(effort) = inputs.scene.geometry.world().and_then(|(_, spec)| spec.backward()) {
+            if let Some(effort) = inputs.effort {
                 let picture = self.world_render(inputs)?.render(effort, &self.watch)?.picture;
                 let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
                 return Ok(Irradiance::of_image(picture, place.pitch_um));

@@ -19,8 +19,8 @@ use serde::{Deserialize, Serialize};
 use super::given::{Given, GivenParts};
 use crate::{
     BankSpec, BlurSpec, Camera, Crop, Diffraction, FilmSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions,
-    LensSpec, LightFieldSpec, Movements, PipelineError, Quality, SceneSource, SceneSpec, StopSpec, WavelengthSpec,
-    WorldSpec,
+    LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort, SceneSource, SceneSpec, StopSpec,
+    WavelengthSpec, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -143,6 +143,8 @@ pub(crate) struct IrradianceInputs {
     pub(crate) plan: PlanInputs,
     pub(crate) scene: SceneInputs,
     pub(crate) micro_array: Option<MicroArray>,
+    /// How well a world is rendered by rays from the film; none where its view is blurred, or there is no world.
+    pub(crate) effort: Option<RenderEffort>,
 }
 
 /// The mean rate of photo-electrons.
@@ -184,10 +186,7 @@ pub(crate) struct PictureInputs {
 
 impl LensInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts) -> Self {
-        let lens_file = match &camera.lens {
-            LensSpec::File(path) if given.lens.is_none() => FileStamp::all_of(path),
-            _ => Vec::new(),
-        };
+        let lens_file = camera.lens.file().filter(|_| given.lens.is_none()).map_or_else(Vec::new, FileStamp::all_of);
         let catalogues = camera.lens_reading.glasses.iter().map(|path| FileStamp::of(path));
         Self {
             given: given.lens.clone(),
@@ -233,7 +232,7 @@ impl SceneInputs {
         Self {
             geometry: GeometryInputs {
                 given: given.scene.clone(),
-                source: scene.source.clone(),
+                source: as_seen(&scene.source),
                 field_of_view_deg: scene.field_of_view_deg,
                 depth_m: scene.depth_m,
                 flat: scene.flat.map(|flat| (flat, Box::new(LensInputs::of(camera, given)))),
@@ -276,8 +275,23 @@ impl IrradianceInputs {
         };
         let bank = BankInputs { film, diffraction: camera.diffraction, bank: camera.bank };
         let micro_array = camera.light_field.as_ref().and_then(LightFieldSpec::micro_array);
-        Self { plan: PlanInputs { bank, blur: camera.blur }, scene, micro_array }
+        let effort = match &camera.scene.source {
+            SceneSource::World(spec) => spec.backward(),
+            _ => None,
+        };
+        Self { plan: PlanInputs { bank, blur: camera.blur }, scene, micro_array, effort }
     }
+}
+
+/// Returns a source as far as the view of it depends on it: not on the samples of rays from the film.
+fn as_seen(source: &SceneSource) -> SceneSource {
+    let mut seen = source.clone();
+    if let SceneSource::World(spec) = &mut seen
+        && spec.backward().is_some()
+    {
+        spec.effort = RenderEffort::default();
+    }
+    seen
 }
 
 impl IrradianceInputs {

@@ -43,7 +43,7 @@ impl LensQuestion {
     /// Returns the lens of a picture, at its focus, over its field.
     pub fn of(product: &Product) -> Self {
         let (lens, place) = (product.capture.lens.clone(), &product.capture.place);
-        let half_mm = 0.5e-3 * place.pitch_um * (place.columns as f64).hypot(place.rows as f64);
+        let half_mm = product.film_corner_mm();
         let by_scale = || half_mm / lens.reference.film_scale_mm(place.film_distance_mm).abs();
         let corner_tan = product.field_at_radius(half_mm).unwrap_or_else(by_scale);
         let distance_mm = place.focus_distance_mm.unwrap_or(f64::INFINITY);

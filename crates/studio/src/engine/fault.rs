@@ -67,7 +67,8 @@ fn field_of(error: &PipelineError, camera: &Camera) -> Field {
         PipelineError::Psf(_) | PipelineError::Spectrum(_) => Field::Simulation,
         PipelineError::Scene(_) | PipelineError::World(_) => Field::Scene,
         PipelineError::Forward(_) => Field::Film,
-        PipelineError::Unsuitable { what: "film: Scene", .. } => Field::Film,
+        PipelineError::Unsuitable { what: "film: Scene" | "crop", .. } => Field::Film,
+        PipelineError::Unsuitable { what: "lens_corrections", .. } => Field::Processing,
         PipelineError::Unsuitable { what: "scene", .. } => Field::Scene,
         PipelineError::Unsuitable { what: "a moving burst", .. } => Field::Exposure,
         PipelineError::Unsuitable { .. } | PipelineError::Backward(_) => Field::Simulation,
@@ -79,7 +80,7 @@ fn field_of(error: &PipelineError, camera: &Camera) -> Field {
 
 fn field_of_key(key: &str, camera: &Camera) -> Field {
     match key {
-        "focal_length_mm" | "diameter_mm" | "slope_per_nm" => Field::Lens,
+        "lens" | "focal_length_mm" | "diameter_mm" | "slope_per_nm" => Field::Lens,
         "FNumber" | "DiameterMm" => Field::Stop,
         "DistanceMm" | "FilmMm" => Field::Focus,
         "tilt_deg" | "swing_deg" | "rise_mm" | "shift_mm" => Field::Movements,
@@ -91,7 +92,9 @@ fn field_of_key(key: &str, camera: &Camera) -> Field {
             _ => Field::Scene,
         },
         "Burst" | "BracketStops" | "MovingBurst.frames" | "MovingBurst.motion_px" => Field::Exposure,
-        "first_nm" | "last_nm" | "step_nm" | "ListNm" | "error" | "gamma" => Field::Simulation,
+        "first_nm" | "last_nm" | "step_nm" | "ListNm" | "error" | "gamma" | "Views" | "diffraction" | "bank" => {
+            Field::Simulation
+        }
         _ => Field::Scene,
     }
 }

@@ -1,7 +1,7 @@
 //! The engine: from a camera to its pictures, the first of them at once. It knows of no window.
 //!
 //! One thread works on one camera at a time, the latest that was [submitted](Engine::submit), and delivers a ladder of
-//! pictures of it ([`Rung`]), each with its time; the last has the bytes of `dioptric run`. A second thread
+//! pictures of it ([`Rung`]), each with its time; the last has the bytes of `dioptric run`, and of a world it is shown on its way too. A second thread
 //! answers smaller questions ([`Asker`]): the point spread at a place, the analysis of the lens. Both wait without using the processor.
 
 mod asker;
@@ -10,6 +10,7 @@ mod fault;
 mod mailbox;
 mod probe;
 mod product;
+mod refine;
 mod rung;
 mod worker;
 

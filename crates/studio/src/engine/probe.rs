@@ -62,8 +62,27 @@ impl Product {
     /// Returns a place of the film, mm to the right and upwards in the picture, from shares of its width and height from the top left.
     fn place_mm(&self, share: [f64; 2]) -> DVec2 {
         let place = &self.capture.place;
-        let size_mm = DVec2::new(place.columns as f64, place.rows as f64) * place.pitch_um * 1e-3;
-        DVec2::new(share[0] - 0.5, 0.5 - share[1]) * size_mm
+        let (first, of) = match place.part {
+            Some(part) => ([part.first_column, part.first_row], [part.of_columns, part.of_rows]),
+            None => ([0, 0], [place.columns, place.rows]),
+        };
+        let right = first[0] as f64 + share[0] * place.columns as f64 - 0.5 * of[0] as f64;
+        let down = first[1] as f64 + share[1] * place.rows as f64 - 0.5 * of[1] as f64;
+        DVec2::new(right, -down) * place.pitch_um * 1e-3
+    }
+
+    /// Columns and rows of pixels of the whole film, of which the picture may show a part.
+    pub fn film_size(&self) -> [usize; 2] {
+        let place = &self.capture.place;
+        let of = place.part.map_or([place.columns, place.rows], |part| [part.of_columns, part.of_rows]);
+        of.map(|n| n * place.binning)
+    }
+
+    /// Half the diagonal of the whole film, mm.
+    pub(crate) fn film_corner_mm(&self) -> f64 {
+        let place = &self.capture.place;
+        let [columns, rows] = self.film_size().map(|n| n as f64 / place.binning as f64);
+        0.5e-3 * place.pitch_um * columns.hypot(rows)
     }
 
     /// Returns the field that is seen at a place, tangents, for something at a depth.

@@ -29,6 +29,8 @@ pub struct Product {
     pub rgb8: Vec<u8>,
     /// What the sensor saw.
     pub statistics: SensorStatistics,
+    /// Samples of a pixel, of the picture of a world on its way.
+    pub n_samples: Option<u32>,
 }
 
 /// A step of the way of the light from the scene to digital numbers.
@@ -56,7 +58,12 @@ impl Product {
         let view = kept.scene(progress, cancel)?.scene.view;
         let rgb8 = capture.developed.picture.to_rgb8();
         let statistics = SensorStatistics::new(&capture.frame_parts())?;
-        Ok(Self { camera: camera.clone(), rung, capture, model, depth, view, rgb8, statistics })
+        Ok(Self { camera: camera.clone(), rung, capture, model, depth, view, rgb8, statistics, n_samples: None })
+    }
+
+    /// Makes it a picture on its way to that of a camera, after so many samples of a pixel.
+    pub(super) fn take_camera(&mut self, camera: &Camera, n_samples: u32) {
+        (self.camera, self.n_samples) = (camera.clone(), Some(n_samples));
     }
 
     /// The camera.

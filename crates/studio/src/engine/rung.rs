@@ -9,12 +9,14 @@ pub enum Rung {
     Sketch,
     /// At most 480 columns and 5 bands.
     Preview,
+    /// The full picture of a world on its way, of fewer samples; no step of its own.
+    Refining,
     /// The picture of `dioptric run`, to the byte.
     Full,
 }
 
 impl Rung {
-    /// All rungs, lowest first.
+    /// The steps, lowest first.
     pub const ALL: [Self; 3] = [Self::Sketch, Self::Preview, Self::Full];
 
     /// The quality that is simulated.
@@ -22,7 +24,7 @@ impl Rung {
         match self {
             Self::Sketch => Quality::Sketch,
             Self::Preview => Quality::Preview,
-            Self::Full => Quality::Full,
+            Self::Refining | Self::Full => Quality::Full,
         }
     }
 
@@ -32,7 +34,7 @@ impl Rung {
         let most = match self {
             Self::Sketch => 2,
             Self::Preview => 8,
-            Self::Full => return camera.clone(),
+            Self::Refining | Self::Full => return camera.clone(),
         };
         let mut camera = camera.clone();
         if let SceneSource::World(world) = &mut camera.scene.source {
@@ -44,9 +46,13 @@ impl Rung {
         camera
     }
 
-    /// Its number, 1 for the lowest.
+    /// The number of its step, 1 for the lowest.
     pub fn number(self) -> usize {
-        self as usize + 1
+        match self {
+            Self::Sketch => 1,
+            Self::Preview => 2,
+            Self::Refining | Self::Full => 3,
+        }
     }
 
     /// What it is called.
@@ -54,6 +60,7 @@ impl Rung {
         match self {
             Self::Sketch => "sketch",
             Self::Preview => "preview",
+            Self::Refining => "refining",
             Self::Full => "full",
         }
     }

@@ -14,7 +14,7 @@ use std::{
 use dioptric_pipeline::{Camera, KeptCamera, PaintingFolder, PipelineError, Progress, Stage};
 use dioptric_spectrum::Cancel;
 
-use super::{Fault, Product, Rung, mailbox::Mailbox};
+use super::{Fault, Product, Rung, mailbox::Mailbox, refine};
 
 /// How long the first rung may go on for a camera that was changed meanwhile: while a hand drags, each step is shown, and a first rung
 /// that takes long does not hold up the next camera.
@@ -169,6 +169,22 @@ impl Shared {
         self.current.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Notes what is begun.
+    fn begin(&self, job: &Job, rung: Rung, started: Instant, cancel: &Cancel) {
+        let mut current = self.current();
+        current.cancel = cancel.clone();
+        current.started = Some(started);
+        current.busy = Some(Busy { generation: job.generation, rung, stage: Stage::Scene, fraction: 0.0 });
+    }
+
+    /// Hands a picture over, or what is wrong.
+    fn deliver(&self, job: &Job, rung: Rung, started: Instant, outcome: Result<Arc<Product>, Fault>) {
+        let (elapsed, work) = (job.submitted.elapsed(), started.elapsed());
+        let delivery = Delivery { generation: job.generation, rung, elapsed, work, outcome };
+        self.deliveries.lock().unwrap_or_else(PoisonError::into_inner).push(delivery);
+        (self.wake)();
+    }
+
     /// Ends the work on a camera that another waits to replace, but for a first rung that may soon be done.
     fn cancel_overdue(&self) {
         if !self.mailbox.is_full() {
@@ -214,12 +230,7 @@ fn work(shared: &Shared, settings: &EngineSettings) {
 fn climb(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job) {
     for (rung, kept) in Rung::ALL.into_iter().zip(ladder).filter(|(rung, _)| *rung <= job.top) {
         let (started, cancel) = (Instant::now(), Cancel::new());
-        {
-            let mut current = shared.current();
-            current.cancel = cancel.clone();
-            current.started = Some(started);
-            current.busy = Some(Busy { generation: job.generation, rung, stage: Stage::Scene, fraction: 0.0 });
-        }
+        shared.begin(job, rung, started, &cancel);
         if rung == Rung::Full {
             let is_waiting = || started.elapsed() < SETTLED && !cancel.is_cancelled() && !shared.mailbox.is_full();
             while is_waiting() {
@@ -231,7 +242,13 @@ fn climb(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job) {
         if is_stopped || (rung > Rung::Sketch && shared.mailbox.is_full()) {
             return;
         }
-        let make = || Product::make(kept, &job.camera, rung, &Follower(shared), &cancel);
+        let make = || {
+            if rung == Rung::Full {
+                let mut show = |product| shared.deliver(job, Rung::Refining, started, Ok(Arc::new(product)));
+                refine::refine(kept, &job.camera, &Follower(shared), &cancel, &mut show)?;
+            }
+            Product::make(kept, &job.camera, rung, &Follower(shared), &cancel)
+        };
         let outcome = match panic::catch_unwind(AssertUnwindSafe(make)) {
             Ok(Ok(product)) => Ok(Arc::new(product)),
             Ok(Err(PipelineError::Cancelled(_))) => return,
@@ -239,10 +256,7 @@ fn climb(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job) {
             Err(cause) => Err(Fault::of_panic(&*cause)),
         };
         let is_wrong = outcome.is_err();
-        let (elapsed, work) = (job.submitted.elapsed(), started.elapsed());
-        let delivery = Delivery { generation: job.generation, rung, elapsed, work, outcome };
-        shared.deliveries.lock().unwrap_or_else(PoisonError::into_inner).push(delivery);
-        (shared.wake)();
+        shared.deliver(job, rung, started, outcome);
         if is_wrong {
             return;
         }

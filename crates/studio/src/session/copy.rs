@@ -125,7 +125,7 @@ impl Telling {
         let named = match &camera.lens {
             LensSpec::BuiltIn(name) => name.clone(),
             LensSpec::File(path) => path.display().to_string(),
-            LensSpec::Thin { .. } | LensSpec::Pinhole { .. } => return,
+            LensSpec::Thin { .. } | LensSpec::Pinhole { .. } | LensSpec::Changed { .. } => return,
         };
         if LensSpec::named(&named) == camera.lens {
             self.text("lens", &named);

@@ -3,6 +3,7 @@
 mod autosave;
 mod copy;
 mod history;
+mod prescription;
 mod presets;
 
 use std::path::{Path, PathBuf};
@@ -13,6 +14,7 @@ pub use autosave::Autosave;
 pub use copy::{as_command, as_python, as_ron};
 pub(crate) use copy::{light_word, white_word};
 pub use history::History;
+pub use prescription::Prescription;
 pub use presets::{Preset, presets};
 
 /// One of the two snapshots that are compared.
@@ -107,6 +109,11 @@ impl Session {
     /// Keeps the camera as a snapshot.
     pub fn keep_snapshot(&mut self, which: Snapshot) {
         self.snapshots[which as usize] = Some(self.camera.clone());
+    }
+
+    /// Keeps another camera as a snapshot.
+    pub fn keep_snapshot_of(&mut self, which: Snapshot, camera: Camera) {
+        self.snapshots[which as usize] = Some(camera);
     }
 
     /// The camera of a snapshot.

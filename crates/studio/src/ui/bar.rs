@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use dioptric_pipeline::{Camera, write_capture};
-use egui::{Button, ProgressBar, RichText, Ui};
+use dioptric_pipeline::{Camera, display::code};
+use egui::{Button, Color32, ProgressBar, Rect, RichText, Sense, Ui, vec2};
 
-use super::{Studio, fields};
+use super::{Studio, dialog::Purpose, fields, views::images};
 use crate::{
-    engine::{Field, Probe, Rung, three},
-    session::{Autosave, Snapshot, as_command, as_python, as_ron, presets, write_beside},
+    engine::{Field, Probe, three},
+    session::{Autosave, Snapshot, as_command, as_python, as_ron, presets},
 };
 
 impl Studio {
@@ -62,31 +62,35 @@ impl Studio {
     fn files(&mut self, ui: &mut Ui) {
         let mark = if self.session.is_changed() { "Camera •" } else { "Camera" };
         ui.menu_button(mark, |ui| {
-            ui.set_min_width(420.0);
-            ui.label("Camera file, or any lens, sensor, scene or world:");
-            let edit = egui::TextEdit::singleline(&mut self.path).desired_width(400.0).hint_text("camera.ron");
-            ui.add(edit).accessible_name("path of the file");
-            ui.horizontal(|ui| {
-                if ui.button("Open").on_hover_text("Ctrl-O; files can be dropped on the window too").clicked() {
-                    self.open_typed();
+            let name = self.session.path().map_or("not saved yet".to_owned(), |path| path.display().to_string());
+            ui.weak(name);
+            let purposes = [
+                (
+                    "Open…",
+                    "A camera, lens, sensor, scene or world (Ctrl-O); files can be dropped on the window",
+                    Purpose::Open,
+                ),
+                ("Save as…", "The camera file (Ctrl-Shift-S)", Purpose::SaveCamera),
+                ("Save the picture…", "The full picture, as dioptric run writes it (Ctrl-P)", Purpose::SavePicture),
+                ("Export…", "Report, picture, irradiance, frames: the files of dioptric run (Ctrl-E)", Purpose::Export),
+            ];
+            for (words, hint, purpose) in purposes {
+                if ui.button(words).on_hover_text(hint).clicked() {
+                    self.choose(purpose);
                     ui.close();
                 }
-                if ui.button("Save").on_hover_text("Ctrl-S").clicked() {
-                    self.save();
-                    ui.close();
-                }
-                if ui
-                    .button("Export results beside it")
-                    .on_hover_text("picture, irradiance, volts, raw: the files of dioptric run")
-                    .clicked()
-                {
-                    self.export();
-                    ui.close();
-                }
-            });
+            }
+            if ui.button("Save").on_hover_text("The camera file (Ctrl-S)").clicked() {
+                self.save();
+                ui.close();
+            }
             let recent: Vec<PathBuf> = self.autosave.as_ref().map(Autosave::recent).unwrap_or_default();
+            if !recent.is_empty() {
+                ui.separator();
+                ui.weak("Lately:");
+            }
             for path in recent {
-                if ui.button(path.display().to_string()).clicked() {
+                if ui.button(path.display().to_string()).on_hover_text("Open it again").clicked() {
                     self.open(&path);
                     ui.close();
                 }
@@ -136,7 +140,8 @@ impl Studio {
             let delivery = &results.delivery;
             let seconds = delivery.work.as_secs_f64();
             let time = if seconds < 1.0 { format!("{:.0} ms", 1e3 * seconds) } else { format!("{seconds:.1} s") };
-            format!("{} {}/3, {time}", delivery.rung.name(), delivery.rung.number())
+            let samples = results.product.n_samples.map_or(String::new(), |n| format!(" ({n} samples)"));
+            format!("{} {}/3{samples}, {time}", delivery.rung.name(), delivery.rung.number())
         });
         ui.separator();
         ui.label(RichText::new(done.unwrap_or_default()).monospace());
@@ -168,7 +173,10 @@ impl Studio {
             });
         }
         ui.horizontal(|ui| match &self.hover {
-            Some(probe) => drop(ui.label(RichText::new(probe_words(probe)).monospace().small())),
+            Some(probe) => {
+                spectrum(ui, &probe.spectrum);
+                ui.label(RichText::new(probe_words(probe)).monospace().small());
+            }
             None => drop(
                 ui.weak(
                     self.note
@@ -178,30 +186,23 @@ impl Studio {
             ),
         });
     }
+}
 
-    /// Writes the files of a run beside the camera file.
-    fn export(&mut self) {
-        let Some(results) = &self.results else { return };
-        let product = results.product.clone();
-        if results.delivery.rung != Rung::Full {
-            self.note = Some("the full picture is not there yet".to_owned());
-            return;
-        }
-        let stem = PathBuf::from(self.path.trim());
-        let stem = stem.file_stem().map_or_else(|| "dioptric-out".into(), std::ffi::OsStr::to_owned);
-        let folder = PathBuf::from(self.path.trim()).with_file_name(stem);
-        let written = std::fs::create_dir_all(&folder).map_err(|error| error.to_string()).and_then(|()| {
-            let files =
-                write_capture(&product.capture, Some(&product.depth), &folder).map_err(|error| error.to_string())?.0;
-            let camera = as_ron(product.camera());
-            write_beside(&folder.join("camera.ron"), camera.as_bytes()).map_err(|error| error.to_string())?;
-            Ok(files.join(", "))
-        });
-        self.note = Some(match written {
-            Ok(files) => format!("{}: {files}, camera.ron", folder.display()),
-            Err(error) => format!("cannot write to {}: {error}", folder.display()),
-        });
+/// Draws the irradiance of a pixel over its bands, each in the color of its light.
+fn spectrum(ui: &mut Ui, spectrum: &[(f64, f64)]) {
+    let (response, painter) = ui.allocate_painter(vec2(92.0, 14.0), Sense::hover());
+    let rect = response.rect;
+    painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
+    let most = spectrum.iter().map(|(_, e)| *e).fold(f64::MIN_POSITIVE, f64::max);
+    let width = rect.width() / spectrum.len().max(1) as f32;
+    for (i, (nm, e)) in spectrum.iter().enumerate() {
+        let left = rect.left() + width * i as f32;
+        let top = rect.bottom() - rect.height() * (e / most) as f32;
+        let [r, g, b] = images::tint(*nm).map(code);
+        let bar = Rect::from_x_y_ranges(left..=left + width, top..=rect.bottom());
+        painter.rect_filled(bar, 0.0, Color32::from_rgb(r, g, b));
     }
+    response.accessible_name("spectrum under the pointer").on_hover_text("Irradiance on the film by wavelength");
 }
 
 /// Returns what is under the pointer in one line.

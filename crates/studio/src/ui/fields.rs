@@ -2,10 +2,13 @@
 
 use std::ops::RangeInclusive;
 
+use dioptric_pipeline::parse_numbers;
 use egui::{Color32, Key, Modifiers, RichText, Slider, TextEdit, Ui};
 
 /// Width of labels, points.
 const LABEL: f32 = 86.0;
+/// Width of a button beside a path, with its margin, points.
+const FILE_BUTTON: f32 = 40.0;
 /// Width of the text of a number, points.
 const NUMBER: f32 = 64.0;
 
@@ -23,6 +26,30 @@ pub(super) struct NumberField<'a> {
     pub(super) is_logarithmic: bool,
     /// What it is, for the tooltip.
     pub(super) words: &'a str,
+}
+
+impl<'a> NumberField<'a> {
+    /// A number whose slider has equal steps.
+    pub(super) fn even(
+        label: &'a str,
+        unit: &'a str,
+        range: RangeInclusive<f64>,
+        slider: RangeInclusive<f64>,
+        words: &'a str,
+    ) -> Self {
+        Self { label, unit, range, slider, is_logarithmic: false, words }
+    }
+
+    /// A number above 0 whose slider has equal factors.
+    pub(super) fn by_factors(
+        label: &'a str,
+        unit: &'a str,
+        range: RangeInclusive<f64>,
+        slider: RangeInclusive<f64>,
+        words: &'a str,
+    ) -> Self {
+        Self { label, unit, range, slider, is_logarithmic: true, words }
+    }
 }
 
 /// What is being typed, and the number that stood there before.
@@ -136,6 +163,59 @@ pub(super) fn choice<T: PartialEq + Clone>(
     *value != before
 }
 
+/// A choice of variants, whatever they hold; one that is chosen starts as it stands in the list.
+pub(super) fn variant<T: Clone>(ui: &mut Ui, title: &str, words: &str, value: &mut T, options: &[(T, &str)]) -> bool {
+    let kind = |value: &T| std::mem::discriminant(value);
+    let now = options.iter().position(|(option, _)| kind(option) == kind(value)).unwrap_or(options.len());
+    let numbers: Vec<(usize, &str)> = options.iter().enumerate().map(|(i, (_, name))| (i, *name)).collect();
+    let mut chosen = now;
+    let changed = choice(ui, title, words, &mut chosen, &numbers);
+    if changed && let Some((option, _)) = options.get(chosen) {
+        value.clone_from(option);
+    }
+    changed
+}
+
+/// Something that is so or not.
+pub(super) fn tick(ui: &mut Ui, title: &str, words: &str, value: &mut bool) -> bool {
+    ui.checkbox(value, title).on_hover_text(words).changed()
+}
+
+/// A line of text that means something: what it means, once, where it does; else what is wrong with it stands beneath.
+pub(super) fn meaning<T>(
+    ui: &mut Ui,
+    title: &str,
+    words: &str,
+    now: &str,
+    parse: impl Fn(&str) -> Result<T, String>,
+) -> Option<T> {
+    let id = ui.make_persistent_id(("meaning", title));
+    let mut meant = None;
+    if let Some(typed) = text(ui, title, words, now) {
+        match parse(&typed) {
+            Ok(value) => {
+                meant = Some(value);
+                ui.data_mut(|data| data.remove_temp::<String>(id));
+            }
+            Err(error) => ui.data_mut(|data| {
+                data.insert_temp(id, error);
+            }),
+        }
+    }
+    if let Some(error) = ui.data(|data| data.get_temp::<String>(id)) {
+        wrong(ui, &error);
+    }
+    meant
+}
+
+/// A list of numbers, such as `-2, 0, 2` or `400:700:10`.
+pub(super) fn numbers(ui: &mut Ui, title: &'static str, words: &str, value: &mut Vec<f64>) -> bool {
+    let now = value.iter().map(|number| number_text(*number)).collect::<Vec<_>>().join(", ");
+    let parse = |text: &str| parse_numbers(title, text).map_err(|error| error.to_string());
+    let typed = meaning(ui, title, words, &now, parse);
+    typed.map(|numbers| *value = numbers).is_some()
+}
+
 /// A line of text that takes effect when it is left or Enter is pressed; the new text, once.
 pub(super) fn text(ui: &mut Ui, title: &str, words: &str, value: &str) -> Option<String> {
     let id = ui.make_persistent_id(("text", title));
@@ -154,6 +234,16 @@ pub(super) fn text(ui: &mut Ui, title: &str, words: &str, value: &str) -> Option
         response.on_hover_text(words);
     });
     entered
+}
+
+/// Shows a field and, at its right, a button that chooses a file for it; what the field has, and whether the button was pressed.
+pub(super) fn with_choice_of_file<T>(ui: &mut Ui, words: &str, field: impl FnOnce(&mut Ui) -> T) -> (T, bool) {
+    ui.horizontal(|ui| {
+        let size = egui::vec2(ui.available_width() - FILE_BUTTON, ui.spacing().interact_size.y);
+        let inner = ui.allocate_ui(size, field).inner;
+        (inner, ui.button("…").on_hover_text(words).clicked())
+    })
+    .inner
 }
 
 /// Tells what is wrong, beneath a field.

@@ -4,11 +4,17 @@
 //! Nothing here computes a picture: panels change the camera of the [`Session`], the engine delivers, views show.
 
 mod bar;
+mod dialog;
 mod fields;
+mod files;
+mod keys;
+mod methods;
+mod middle;
 mod panels;
 mod views;
 
 use std::{
+    cell::Cell,
     io,
     path::{Path, PathBuf},
     sync::Arc,
@@ -16,9 +22,10 @@ use std::{
 };
 
 use dioptric_analysis::measure::NoiseData;
-use dioptric_pipeline::{Camera, FocusSpec, SceneSpec, SensorSpec};
+use dioptric_pipeline::{Camera, SensorSpec};
+use dioptric_sensor::EdgeResponse;
 use egui::{
-    CentralPanel, Context, Key, Modifiers, Panel, TextureHandle, TextureOptions, Ui,
+    CentralPanel, Context, Panel, TextureHandle, TextureOptions, Ui,
     epaint::text::{FontInsert, FontPriority, InsertFontFamily},
 };
 
@@ -31,8 +38,10 @@ use crate::{
 };
 
 use self::{
+    dialog::FileDialog,
+    methods::Comparison,
     panels::Desk,
-    views::{images, picture},
+    views::{camera_file::CameraText, images, picture},
 };
 
 pub use self::views::images::Shown;
@@ -41,9 +50,6 @@ pub use self::views::images::Shown;
 const AUTOSAVE: Duration = Duration::from_millis(500);
 /// How often progress is drawn.
 const TICK: Duration = Duration::from_millis(50);
-/// Amplification of the difference of A and B.
-const DIFFERENCE_GAIN: f32 = 4.0;
-
 /// What a window is started with.
 #[derive(Clone, Debug, Default)]
 pub struct StudioSettings {
@@ -65,6 +71,8 @@ pub enum Tab {
     LensBench,
     /// The sensor bench.
     SensorBench,
+    /// The camera file as text.
+    CameraFile,
 }
 
 /// The results that are shown.
@@ -72,12 +80,14 @@ pub enum Tab {
 struct Results {
     delivery: Delivery,
     product: Arc<Product>,
+    /// Counts all results of the window.
+    number: u64,
 }
 
 impl Results {
     /// A number that tells these results from others.
     fn stamp(&self) -> u64 {
-        4 * self.delivery.generation + self.delivery.rung.number() as u64
+        self.number
     }
 }
 
@@ -86,6 +96,14 @@ struct Texture {
     key: (u64, Shown, u64),
     handle: TextureHandle,
     words: String,
+}
+
+/// The edge that was marked on the picture, and of which results.
+#[derive(Clone, Debug)]
+struct MarkedEdge {
+    stamp: u64,
+    region: [[f64; 2]; 2],
+    response: Result<EdgeResponse, String>,
 }
 
 /// The window.
@@ -118,7 +136,14 @@ pub struct Studio {
     sensor_answer: Option<Result<NoiseData, String>>,
     sensor_answer_of: Option<SensorSpec>,
     region: Option<[[f64; 2]; 2]>,
-    path: String,
+    edge: Option<MarkedEdge>,
+    camera_text: CameraText,
+    dialog: Option<FileDialog>,
+    /// Where a file was chosen last.
+    folder: Option<PathBuf>,
+    /// What came of writing files.
+    exports: Asker<String>,
+    comparison: Option<Comparison>,
     /// What was done last, or could not be.
     note: Option<String>,
 }
@@ -143,7 +168,6 @@ impl Studio {
             move || context.request_repaint()
         };
         let mut studio = Self {
-            path: session.path().map(|path| path.display().to_string()).unwrap_or_default(),
             session,
             engine: Engine::start(engine, wake(context))?,
             autosave,
@@ -170,6 +194,12 @@ impl Studio {
             sensor_answer: None,
             sensor_answer_of: None,
             region: None,
+            edge: None,
+            camera_text: CameraText::default(),
+            dialog: None,
+            folder: None,
+            exports: Asker::start(wake(context)),
+            comparison: None,
             note,
         };
         studio.submit();
@@ -225,10 +255,13 @@ impl Studio {
         let mut camera = before.clone();
         Panel::top("bar").show(ui, |ui| self.bar(ui, &mut camera));
         Panel::bottom("notes").show(ui, |ui| self.notes(ui, &mut camera));
+        let mut wanted = None;
         Panel::left("camera").default_size(330.0).size_range(280.0..=520.0).show(ui, |ui| {
             let product = self.results.as_ref().map(|results| &*results.product);
             let stamp = self.results.as_ref().map_or(0, Results::stamp);
-            panels::show(ui, &mut camera, &Desk { fault: self.fault.as_ref(), product, stamp });
+            let desk = Desk { fault: self.fault.as_ref(), product, stamp, wanted: Cell::new(None) };
+            panels::show(ui, &mut camera, &desk);
+            wanted = desk.wanted.get();
         });
         Panel::bottom("charts")
             .default_size(190.0)
@@ -244,6 +277,10 @@ impl Studio {
         if gesture.is_none() {
             self.session.end_gesture();
         }
+        if let Some(wanted) = wanted {
+            self.grant(wanted);
+        }
+        self.dialogs(ui);
         self.keep(ui.ctx());
         if self.engine.is_busy() {
             ui.ctx().request_repaint_after(TICK);
@@ -270,7 +307,10 @@ impl Studio {
     fn receive(&mut self, context: &Context) {
         for delivery in self.engine.take() {
             match delivery.outcome.clone() {
-                Ok(product) => self.results = Some(Results { delivery, product }),
+                Ok(product) => {
+                    let number = self.results.as_ref().map_or(1, |results| results.number + 1);
+                    self.results = Some(Results { delivery, product, number });
+                }
                 // What is wrong with an older camera is no matter.
                 Err(fault) if delivery.generation == self.generation => self.fault = Some(fault),
                 Err(_) => {}
@@ -287,6 +327,10 @@ impl Studio {
         if let Some(answer) = self.sensor_answers.answer() {
             self.sensor_answer = Some(answer);
         }
+        if let Some(words) = self.exports.answer() {
+            self.note = Some(words);
+        }
+        self.go_on_comparing();
         self.ask();
     }
 
@@ -299,6 +343,11 @@ impl Studio {
             self.spread_of = Some(spread_of);
             let (product, cursor) = (results.product.clone(), self.cursor);
             self.spreads.ask(move || product.spread(cursor));
+        }
+        if let Some(region) = self.region
+            && self.edge.as_ref().is_none_or(|edge| (edge.stamp, edge.region) != (stamp, region))
+        {
+            self.edge = Some(MarkedEdge { stamp, region, response: results.product.edge(region) });
         }
         // Rays know nothing of rungs, but the film's corner moves by a part of a pixel.
         if self.tab == Tab::LensBench && self.lens_answer_of != Some(stamp) {
@@ -326,298 +375,6 @@ impl Studio {
         {
             self.note = Some("the camera cannot be kept in the user's folder of states".to_owned());
         }
-    }
-
-    fn middle(&mut self, ui: &mut Ui, camera: &mut Camera) {
-        ui.horizontal(|ui| {
-            for (tab, name) in
-                [(Tab::Picture, "Film"), (Tab::LensBench, "Lens bench"), (Tab::SensorBench, "Sensor bench")]
-            {
-                ui.selectable_value(&mut self.tab, tab, name);
-            }
-            ui.separator();
-            if self.tab == Tab::Picture {
-                for (shown, name) in Shown::ALL {
-                    ui.selectable_value(&mut self.shown, shown, name);
-                }
-            }
-        });
-        match self.tab {
-            Tab::Picture => self.picture(ui, camera),
-            Tab::LensBench => match &self.lens_answer {
-                Some(Ok(answer)) => views::lens_bench::show(ui, answer),
-                Some(Err(words)) => fields::wrong(ui, words),
-                None => drop(ui.weak("The lens is being analyzed.")),
-            },
-            Tab::SensorBench => self.sensor_bench(ui),
-        }
-    }
-
-    fn sensor_bench(&mut self, ui: &mut Ui) {
-        let edge = self.region.zip(self.results.as_ref()).map(|(region, results)| results.product.edge(region));
-        let noise = match &self.sensor_answer {
-            Some(Err(words)) => {
-                fields::wrong(ui, words);
-                None
-            }
-            Some(Ok(noise)) => Some(noise),
-            None => None,
-        };
-        views::sensor_bench::show(ui, noise, edge.as_ref());
-    }
-
-    fn picture(&mut self, ui: &mut Ui, camera: &mut Camera) {
-        let Some(results) = self.results.clone() else {
-            ui.centered_and_justified(|ui| {
-                if self.fault.is_none() {
-                    ui.spinner();
-                }
-            });
-            return;
-        };
-        if self.shown == Shown::Irradiance {
-            self.wavelengths(ui, &results.product);
-        }
-        let Some(texture) = self.texture(ui.ctx(), &results) else {
-            ui.weak("Keep two pictures of one size as A and B: their difference is shown here.");
-            return;
-        };
-        let (handle, words) = (texture.handle.clone(), texture.words.clone());
-        ui.horizontal(|ui| {
-            if ui.button("Fit").on_hover_text("The whole picture (F); a double click does the same").clicked() {
-                self.placement = picture::Placement::default();
-            }
-            if ui
-                .button("100 %")
-                .on_hover_text("A pixel of the film is a pixel of the screen (1); the wheel zooms, dragging moves")
-                .clicked()
-            {
-                self.placement.zoom = Some(1.0 / ui.ctx().pixels_per_point());
-            }
-            ui.small(words);
-        });
-        let place = &results.product.capture.place;
-        let film = [place.columns * place.binning, place.rows * place.binning];
-        let marks = picture::Marks { cursor: Some(self.cursor), region: self.region };
-        let pointed = picture::show(ui, &mut self.placement, &handle, film, &marks);
-        self.hover = pointed.hover.and_then(|share| results.product.probe(share));
-        if let Some(share) = pointed.click {
-            self.cursor = share;
-            if let Some(mm) = results.product.focus_distance_mm(share) {
-                camera.focus = FocusSpec::DistanceMm((10.0 * mm).round() / 10.0);
-            }
-        }
-        if let Some(share) = pointed.hover.filter(|_| ui.input(|input| input.modifiers.ctrl)) {
-            self.cursor = share;
-        }
-        if pointed.dragged.is_some() {
-            self.region = pointed.dragged;
-        }
-    }
-
-    fn wavelengths(&mut self, ui: &mut Ui, product: &Product) {
-        let (first_nm, last_nm) = product.capture.grid().range_nm();
-        ui.horizontal(|ui| {
-            ui.spacing_mut().slider_width = 260.0;
-            let slider = egui::Slider::new(&mut self.wavelength_nm, first_nm..=last_nm).suffix(" nm").fixed_decimals(0);
-            ui.add(slider)
-                .accessible_name("wavelength")
-                .on_hover_text("The nearest band is shown; the full picture has all of them");
-        });
-    }
-
-    /// Returns the image that is shown, made now where it is not at hand.
-    fn texture(&mut self, context: &Context, results: &Results) -> Option<&Texture> {
-        let product = &results.product;
-        let of_snapshots = || self.snapshots.iter().flatten().map(|product| Arc::as_ptr(product).addr() as u64).sum();
-        let detail = match self.shown {
-            Shown::Irradiance => self.wavelength_nm.to_bits(),
-            Shown::Difference => of_snapshots(),
-            _ => 0,
-        };
-        let key = (results.stamp(), self.shown, detail);
-        if self.texture.as_ref().is_none_or(|texture| texture.key != key) {
-            let (image, words) = match self.shown {
-                Shown::Picture => (images::picture(product), String::new()),
-                Shown::Raw => (images::raw(product), "raw samples from black to saturation".to_owned()),
-                Shown::Irradiance => {
-                    let (image, nm) = images::irradiance(product, self.wavelength_nm);
-                    (image, format!("irradiance at {nm:.0} nm, full scale its brightest pixel"))
-                }
-                Shown::Depth => {
-                    let (near_m, far_m) = product.depth.range_m();
-                    (
-                        images::depth(product),
-                        format!("depth of the scene, {near_m:.2} m (yellow) to {far_m:.2} m (violet)"),
-                    )
-                }
-                Shown::Difference => {
-                    let [Some(a), Some(b)] = &self.snapshots else { return None };
-                    let image = images::difference(a, b, DIFFERENCE_GAIN)?;
-                    let rms = 100.0 * images::difference_rms(a, b)?;
-                    (image, format!("A − B about gray, {DIFFERENCE_GAIN} times; rms {rms:.2} % of full scale"))
-                }
-            };
-            let options = TextureOptions { magnification: egui::TextureFilter::Nearest, ..TextureOptions::LINEAR };
-            let handle = context.load_texture("picture", image, options);
-            self.texture = Some(Texture { key, handle, words });
-        }
-        self.texture.as_ref()
-    }
-
-    fn charts(&mut self, ui: &mut Ui) {
-        let Some(results) = self.results.clone() else { return };
-        let spread = self.spread.as_ref();
-        ui.columns(4, |columns| {
-            let [of_spread, of_modulation, of_histogram, of_light] = columns else { return };
-            of_spread.strong("Point spread at +");
-            views::charts::spread(of_spread, spread.map(|(_, texture)| texture), spread.map(|(spread, _)| spread));
-            of_modulation.strong("Modulation at +");
-            views::charts::modulation(of_modulation, spread.map(|(spread, _)| spread));
-            of_histogram.strong("Histogram, raw");
-            views::charts::histogram(of_histogram, &results.product);
-            of_light.strong("Light");
-            views::charts::light(of_light, &results.product);
-        });
-    }
-
-    /// Takes keys that hold wherever the pointer is, but not while something is typed.
-    fn keys(&mut self, ui: &Ui) {
-        let pressed = |modifiers: Modifiers, key: Key| ui.input_mut(|input| input.consume_key(modifiers, key));
-        let redo = pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z) || pressed(Modifiers::COMMAND, Key::Y);
-        if redo {
-            self.redo();
-        } else if pressed(Modifiers::COMMAND, Key::Z) {
-            self.undo();
-        }
-        if pressed(Modifiers::COMMAND, Key::S) {
-            self.save();
-        }
-        if pressed(Modifiers::COMMAND, Key::O) {
-            self.open_typed();
-        }
-        if ui.memory(|memory| memory.focused()).is_some() {
-            return;
-        }
-        let plain = |key| pressed(Modifiers::NONE, key);
-        if plain(Key::Space) {
-            self.pause();
-        }
-        if plain(Key::A) {
-            self.recall(Snapshot::A);
-        }
-        if plain(Key::B) {
-            self.recall(Snapshot::B);
-        }
-        if plain(Key::F) {
-            self.placement = picture::Placement::default();
-        }
-        if plain(Key::Num1) {
-            self.placement.zoom = Some(1.0 / ui.ctx().pixels_per_point());
-        }
-        for (key, tab) in [(Key::F1, Tab::Picture), (Key::F2, Tab::LensBench), (Key::F3, Tab::SensorBench)] {
-            if plain(key) {
-                self.tab = tab;
-            }
-        }
-    }
-
-    /// Opens files that were dropped on the window: cameras, lenses, sensors, scenes, worlds.
-    fn drops(&mut self, ui: &Ui) {
-        let paths: Vec<PathBuf> =
-            ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_owned()).collect());
-        for path in paths {
-            self.open(&path);
-        }
-    }
-
-    /// Opens a file: a camera takes the place of the whole, a lens, a sensor, a scene or a world that of its part.
-    pub fn open(&mut self, path: &Path) {
-        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
-        let mut camera = self.session.camera().clone();
-        match ending.as_str() {
-            "ron" => match self.session.replace_by_file(path) {
-                Ok(()) => {
-                    self.path = path.display().to_string();
-                    self.remember(path);
-                    self.submit();
-                    return;
-                }
-                // A file of the same ending may hold a lens or a sensor.
-                Err(error) if SensorSpec::File(path.to_owned()).open().is_ok() => {
-                    drop(error);
-                    camera.sensor = SensorSpec::File(path.to_owned());
-                }
-                Err(error) if dioptric_optics::Lens::read(path).is_ok() => {
-                    drop(error);
-                    panels::lens::take_lens(&mut camera, &path.display().to_string());
-                }
-                Err(error) => {
-                    self.note = Some(error.to_string());
-                    return;
-                }
-            },
-            "zmx" | "seq" | "dat" | "json" => panels::lens::take_lens(&mut camera, &path.display().to_string()),
-            "pbrt" | "gltf" | "glb" | "obj" | "ply" => {
-                camera.scene = SceneSpec::of_file(path.to_owned());
-                camera.scene.source =
-                    dioptric_pipeline::SceneSource::World(dioptric_pipeline::WorldSpec::of_file(path.to_owned()));
-            }
-            _ => camera.scene = SceneSpec::of_file(path.to_owned()),
-        }
-        self.note = Some(format!("opened {}", path.display()));
-        self.take(camera, None);
-    }
-
-    fn remember(&self, path: &Path) {
-        if let Some(autosave) = &self.autosave {
-            autosave.remember(path);
-        }
-    }
-
-    fn undo(&mut self) {
-        if self.session.undo() {
-            self.submit();
-        }
-    }
-
-    fn redo(&mut self) {
-        if self.session.redo() {
-            self.submit();
-        }
-    }
-
-    fn recall(&mut self, which: Snapshot) {
-        if self.session.recall(which) {
-            self.submit();
-        }
-    }
-
-    fn pause(&mut self) {
-        self.is_paused = !self.is_paused;
-        if self.is_paused {
-            self.engine.stop();
-        } else {
-            self.submit();
-        }
-    }
-
-    fn open_typed(&mut self) {
-        let path = PathBuf::from(self.path.trim());
-        self.open(&path);
-    }
-
-    fn save(&mut self) {
-        let typed = self.path.trim();
-        let path = PathBuf::from(if typed.is_empty() { "camera.ron" } else { typed });
-        self.note = Some(match self.session.save(&path) {
-            Ok(()) => {
-                self.remember(&path);
-                format!("saved {}", path.display())
-            }
-            Err(error) => error.to_string(),
-        });
-        self.path = path.display().to_string();
     }
 }
 

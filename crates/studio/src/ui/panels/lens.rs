@@ -1,52 +1,57 @@
 //! The lens: which, how far open, focused where, turned and moved how.
 
+use std::path::PathBuf;
+
 use dioptric_optics::Lens;
-use dioptric_pipeline::{
-    BankSpec, BlurSpec, Camera, Diffraction, FocusSpec, LensReadOptions, LensSpec, StopSpec, WavelengthSpec,
-};
-use egui::Ui;
+use dioptric_pipeline::{Camera, FocusSpec, LensReadOptions, LensSpec, MissingGlass, SeqNumbers, StopSpec};
+use egui::{CollapsingHeader, Ui};
 
 use super::{
-    super::fields::{NumberField, choice, text},
-    Desk, lens_drawing,
+    super::fields::{NumberField, choice, optional, text, with_choice_of_file},
+    Desk, Wanted, focus_plane, lens_drawing, surfaces,
 };
 use crate::engine::Field;
 
 pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
-    which(ui, camera);
+    which(ui, camera, desk);
     desk.tell(ui, Field::Lens, camera);
     if let Some(product) = desk.product {
         lens_drawing::show(ui, camera, product, desk.stamp);
+        focus_plane::show(ui, camera, product, desk.stamp);
     }
+    surfaces::show(ui, camera, desk);
     stop(ui, camera, desk);
     desk.tell(ui, Field::Stop, camera);
     focus(ui, camera, desk);
     desk.tell(ui, Field::Focus, camera);
 }
 
-fn which(ui: &mut Ui, camera: &mut Camera) {
-    let mut named = match &camera.lens {
+fn which(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
+    let mut named = match camera.lens.base() {
         LensSpec::BuiltIn(name) => name.clone(),
         LensSpec::File(path) => path.display().to_string(),
         LensSpec::Thin { .. } => "thin".to_owned(),
         LensSpec::Pinhole { .. } => "pinhole".to_owned(),
+        LensSpec::Changed { .. } => "changed".to_owned(),
     };
     let before = named.clone();
     let mut names: Vec<(String, &str)> = Lens::built_in_names().map(|name| (name.to_owned(), name)).collect();
     names.extend([("thin".to_owned(), "ideal thin lens"), ("pinhole".to_owned(), "pinhole")]);
     choice(ui, "lens", "A built-in lens, an ideal one, or a pinhole", &mut named, &names);
-    if matches!(camera.lens, LensSpec::BuiltIn(_) | LensSpec::File(_))
-        && let Some(typed) = text(
-            ui,
-            "lens file",
-            "A lens file, or the name of a built-in lens; files can be dropped on the window",
-            &before,
-        )
-    {
-        named = typed;
+    if matches!(camera.lens.base(), LensSpec::BuiltIn(_) | LensSpec::File(_)) {
+        let words = "A lens file, or the name of a built-in lens; files can be dropped on the window";
+        let (typed, is_asked) =
+            with_choice_of_file(ui, "Choose a lens file", |ui| text(ui, "lens file", words, &before));
+        if is_asked {
+            desk.ask_for(Wanted::Lens);
+        }
+        named = typed.unwrap_or(named);
     }
     if named != before {
-        take_lens(camera, &named);
+        take_lens(camera, lens_of(&named));
+    }
+    if matches!(camera.lens.base(), LensSpec::File(_)) {
+        CollapsingHeader::new("What the file leaves open").show(ui, |ui| reading(ui, &mut camera.lens_reading));
     }
     match &mut camera.lens {
         LensSpec::Thin { focal_length_mm, diameter_mm } => {
@@ -56,21 +61,25 @@ fn which(ui: &mut Ui, camera: &mut Camera) {
         LensSpec::Pinhole { diameter_mm } => {
             millimetres("diameter", "Diameter of the hole", 0.01..=5.0).show(ui, diameter_mm);
         }
-        LensSpec::BuiltIn(_) | LensSpec::File(_) => {}
+        LensSpec::BuiltIn(_) | LensSpec::File(_) | LensSpec::Changed { .. } => {}
+    }
+}
+
+/// Returns the lens of a name, a path, or one of the two that are made of numbers.
+fn lens_of(named: &str) -> LensSpec {
+    match named {
+        "thin" => LensSpec::Thin { focal_length_mm: 50.0, diameter_mm: 12.5 },
+        "pinhole" => LensSpec::Pinhole { diameter_mm: 0.3 },
+        other => LensSpec::named(other),
     }
 }
 
 /// Puts another lens on the camera; stop and glasses of the one before meant that one.
-pub(in crate::ui) fn take_lens(camera: &mut Camera, named: &str) {
-    camera.lens = match named {
-        "thin" => LensSpec::Thin { focal_length_mm: 50.0, diameter_mm: 12.5 },
-        "pinhole" => {
-            camera.focus = FocusSpec::FilmMm(50.0);
-            LensSpec::Pinhole { diameter_mm: 0.3 }
-        }
-        other => LensSpec::named(other),
-    };
-    (camera.stop, camera.lens_reading) = (StopSpec::AsGiven, LensReadOptions::default());
+pub(in crate::ui) fn take_lens(camera: &mut Camera, lens: LensSpec) {
+    if let LensSpec::Pinhole { .. } = lens {
+        camera.focus = FocusSpec::FilmMm(50.0);
+    }
+    (camera.lens, camera.stop, camera.lens_reading) = (lens, StopSpec::AsGiven, LensReadOptions::default());
 }
 
 fn millimetres<'a>(label: &'a str, words: &'a str, slider: std::ops::RangeInclusive<f64>) -> NumberField<'a> {
@@ -211,32 +220,26 @@ pub(super) fn movements(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
     desk.tell(ui, Field::Movements, camera);
 }
 
-pub(super) fn simulation(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
-    let kinds = [
-        (Diffraction::None, "none"),
-        (Diffraction::Hurb { gamma: 1.0 }, "HURB"),
-        (Diffraction::HurbCalibrated, "HURB, calibrated"),
-        (Diffraction::Wave, "waves"),
+/// What the lens's file leaves open.
+fn reading(ui: &mut Ui, reading: &mut LensReadOptions) {
+    let now = reading.glasses.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join("; ");
+    let words = "Glass catalogues (.agf, .yml) to look in before the built-in one, with semicolons between them";
+    if let Some(typed) = text(ui, "catalogues", words, &now) {
+        let paths = typed.split(';').map(str::trim).filter(|path| !path.is_empty());
+        reading.glasses = paths.map(PathBuf::from).collect();
+    }
+    let missing = [
+        (MissingGlass::Refuse, "is refused"),
+        (MissingGlass::FromNdVd, "by index and Abbe number"),
+        (MissingGlass::Nearest, "by the nearest glass"),
     ];
-    choice(ui, "diffraction", "Diffraction at the stop", &mut camera.diffraction, &kinds);
-    let blurs = [
-        (BlurSpec::Layered, "layers of depth"),
-        (BlurSpec::Views(16), "layers, from 16 parts of the pupil"),
-        (BlurSpec::Pointwise, "point by point"),
-    ];
-    choice(ui, "blur", "How the point spread functions are laid over the scene", &mut camera.blur, &blurs);
-    let banks = [
-        (BankSpec::Standard, "standard"),
-        (BankSpec::Within { error: 0.02 }, "within 2 %"),
-        (BankSpec::Paper, "the paper's"),
-    ];
-    choice(ui, "sampling", "How the point spread functions are sampled", &mut camera.bank, &banks);
-    let bands = [
-        (WavelengthSpec::Scene, "those of the scene"),
-        (WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 10.0 }, "400–700 nm by 10"),
-        (WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 20.0 }, "400–700 nm by 20"),
-        (WavelengthSpec::ListNm(vec![450.0, 550.0, 650.0]), "450, 550, 650 nm"),
-    ];
-    choice(ui, "bands", "The wavelengths that are simulated", &mut camera.wavelengths, &bands);
-    desk.tell(ui, Field::Simulation, camera);
+    let words = "What becomes of a glass that no catalogue has";
+    choice(ui, "unknown glass", words, &mut reading.missing_glass, &missing);
+    let words = "Change of index a nanometre, of media of which one index is stated";
+    let slope = NumberField::even("index slope", "1/nm", -0.01..=0.01, -0.001..=0.001, words);
+    optional(ui, slope, &mut reading.slope_per_nm, -1.333e-4);
+    let numbers =
+        [(None, "what is plausible"), (Some(SeqNumbers::Radii), "radii"), (Some(SeqNumbers::Curvatures), "curvatures")];
+    let words = "What the numbers of surfaces are in a CODE V file that does not state it";
+    choice(ui, "seq numbers", words, &mut reading.seq_numbers, &numbers);
 }

@@ -1,258 +1,237 @@
-//! The lens in its meridional plane, with rays; its film can be dragged.
+//! The lens in its meridional plane, with rays; its film and its surfaces can be dragged.
 
-use dioptric_optics::{
-    Glass, Lens, MonoLens, ObjectPoint, Placement, PupilBoundary, RayBatch, Surface, Vignetting,
-    glam::{DVec2, DVec3},
-};
+use std::sync::Arc;
+
+use dioptric_optics::{SurfaceChange, glam::DVec2};
 use dioptric_pipeline::{Camera, FocusSpec};
-use egui::{Color32, Mesh, Pos2, Rect, Sense, Shape, Stroke, Ui, epaint::Vertex, pos2, vec2};
+use egui::{Painter, Pos2, Response, Sense, Shape, Stroke, Ui, pos2, vec2};
 
-use super::super::fields::LINES;
+use super::{
+    super::fields::LINES,
+    drawing::{Drawing, Frame, STEPS, glass},
+    surfaces,
+};
 use crate::engine::Product;
 
 /// Height of the drawing, points.
 const HEIGHT: f32 = 130.0;
-/// Rays of a field.
-const RAYS: usize = 7;
-/// Steps along the outline of a surface.
-const STEPS: usize = 24;
-/// Fields as shares of the film's corner.
-const FIELDS: [f64; 3] = [0.0, 0.6, 1.0];
-/// How near the film the pointer must be to drag it, points.
-const REACH: f32 = 8.0;
+/// How near the film or a surface the pointer must be to drag it, points.
+const REACH: f32 = 6.0;
+/// The share of a surface's half diameter within which it is held at its vertex.
+const VERTEX: f64 = 0.4;
+/// How far a surface moves of what the pointer does.
+const SURFACE_GEAR: f64 = 0.1;
 
-/// What is drawn, in mm along and across the axis.
-#[derive(Clone, Default)]
-struct Drawing {
-    /// Elements of glass: pairs of points, front and back, from bottom to top.
-    elements: Vec<(f64, Vec<[DVec2; 2]>)>,
-    /// Lines of surfaces.
-    surfaces: Vec<Vec<DVec2>>,
-    /// The two halves of the stop, from its rim outwards.
-    stop: [[DVec2; 2]; 2],
-    /// Rays, each with the number of its field.
-    rays: Vec<(usize, Vec<DVec2>)>,
-    film_z_mm: f64,
-    half_film_mm: f64,
+/// What the pointer has hold of, and what it was when it was taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Handle {
+    /// The film, which lay so far behind the last vertex, mm.
+    Film { mm: f64 },
+    /// A surface so far off its vertex, mm, which had this curvature.
+    Curvature { surface: usize, off_mm: f64, per_mm: f64 },
+    /// A surface at its vertex, which lay so far behind the one before it, mm.
+    Spacing { surface: usize, mm: f64 },
 }
 
-/// Draws the lens of the latest results; dragging the film focuses.
+/// Draws the lens of the latest results; its film, the vertices of its surfaces and what lies outside of these can be dragged.
 pub(super) fn show(ui: &mut Ui, camera: &mut Camera, product: &Product, key: u64) {
     let size = vec2(ui.available_width(), HEIGHT);
     let (response, painter) = ui.allocate_painter(size, Sense::click_and_drag());
-    let id = response.id.with("drawing");
-    let kept = ui.data(|data| data.get_temp::<(u64, std::sync::Arc<Drawing>)>(id)).filter(|(of, _)| *of == key);
-    let drawing = kept.map_or_else(
-        || {
-            let drawing = std::sync::Arc::new(Drawing::of(product));
-            ui.data_mut(|data| data.insert_temp(id, (key, drawing.clone())));
-            drawing
-        },
-        |(_, drawing)| drawing,
-    );
+    let drawing = kept(ui, response.id.with("drawing"), key, product);
     let frame = Frame::around(&drawing, response.rect);
-    let dark = ui.visuals().dark_mode;
-    painter.rect_filled(response.rect, 3.0, ui.visuals().extreme_bg_color);
-    let line = ui.visuals().text_color();
-    painter.line_segment(
-        [pos2(response.rect.left(), frame.y(0.0)), pos2(response.rect.right(), frame.y(0.0))],
-        Stroke::new(0.5, ui.visuals().weak_text_color()),
-    );
+    let held = drag(ui, &response, camera, product, &drawing);
+    let near = response.hover_pos().and_then(|at| handle_at(ui, at, camera, product, &drawing, &frame));
+    let handle = held.or(near);
+    if handle.is_some() {
+        ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
+    }
+    paint(ui, &painter, &drawing, &frame, handle);
+    if let Some(words) = held.and_then(|held| held_words(ui, held, camera)) {
+        let at = response.rect.left_bottom() + vec2(4.0, -3.0);
+        painter.text(at, egui::Align2::LEFT_BOTTOM, words, egui::FontId::proportional(11.0), ui.visuals().text_color());
+    }
+    let response = response.accessible_name("drawing of the lens");
+    if held.is_none() {
+        response.on_hover_text(words(product));
+    }
+}
+
+fn kept(ui: &Ui, id: egui::Id, key: u64, product: &Product) -> Arc<Drawing> {
+    if let Some((of, drawing)) = ui.data(|data| data.get_temp::<(u64, Arc<Drawing>)>(id))
+        && of == key
+    {
+        return drawing;
+    }
+    let drawing = Arc::new(Drawing::of(product));
+    ui.data_mut(|data| data.insert_temp(id, (key, drawing.clone())));
+    drawing
+}
+
+fn paint(ui: &Ui, painter: &Painter, drawing: &Drawing, frame: &Frame, handle: Option<Handle>) {
+    let rect = frame.rect;
+    let (dark, line) = (ui.visuals().dark_mode, ui.visuals().text_color());
+    painter.rect_filled(rect, 3.0, ui.visuals().extreme_bg_color);
+    let axis = [pos2(rect.left(), frame.y(0.0)), pos2(rect.right(), frame.y(0.0))];
+    painter.line_segment(axis, Stroke::new(0.5, ui.visuals().weak_text_color()));
     for (index, points) in &drawing.elements {
-        painter.add(Shape::mesh(glass(points, *index, dark, &frame)));
+        painter.add(Shape::mesh(glass(points, *index, dark, frame)));
     }
     for (field, points) in &drawing.rays {
         let points: Vec<Pos2> = points.iter().map(|at| frame.at(*at)).collect();
         painter.add(Shape::line(points, Stroke::new(0.8, LINES[field % LINES.len()].gamma_multiply(0.8))));
     }
-    for points in &drawing.surfaces {
+    for (surface, points) in &drawing.surfaces {
         let points: Vec<Pos2> = points.iter().map(|at| frame.at(*at)).collect();
-        painter.add(Shape::line(points, Stroke::new(1.0, line)));
+        let is_held = handle.is_some_and(|handle| handle.surface() == Some(*surface));
+        painter.add(Shape::line(points, Stroke::new(if is_held { 2.5 } else { 1.0 }, line)));
     }
     for half in drawing.stop {
         painter.line_segment(half.map(|at| frame.at(at)), Stroke::new(2.5, line));
     }
     let film = [-1.0, 1.0].map(|sign| frame.at(DVec2::new(drawing.film_z_mm, sign * drawing.half_film_mm)));
-    let is_near = response.hover_pos().is_some_and(|at| (at.x - film[0].x).abs() < REACH);
-    let dragged_id = response.id.with("film");
-    let mut is_dragged = ui.data(|data| data.get_temp::<bool>(dragged_id)).unwrap_or(false);
-    if response.drag_started() {
-        is_dragged = is_near;
+    let is_held = matches!(handle, Some(Handle::Film { .. }));
+    painter.line_segment(film, Stroke::new(if is_held { 3.5 } else { 2.0 }, line));
+}
+
+impl Handle {
+    fn surface(self) -> Option<usize> {
+        match self {
+            Self::Film { .. } => None,
+            Self::Curvature { surface, .. } | Self::Spacing { surface, .. } => Some(surface),
+        }
     }
-    if is_dragged && response.dragged() {
-        let moved_mm = f64::from(response.drag_delta().x / frame.px_per_mm);
-        // A film moves a hundredth of what the pointer does: its places are micrometres apart.
-        let from_mm = match camera.focus {
-            FocusSpec::FilmMm(mm) => mm,
-            _ => product.capture.place.film_distance_mm,
+}
+
+/// Returns what can be dragged at a place of the screen.
+fn handle_at(
+    ui: &Ui,
+    at: Pos2,
+    camera: &Camera,
+    product: &Product,
+    drawing: &Drawing,
+    frame: &Frame,
+) -> Option<Handle> {
+    // What is drawn is still another lens.
+    let is_same = product.camera().lens.base() == camera.lens.base();
+    let prescription = surfaces::prescription(ui, camera).filter(|_| is_same);
+    let off_px = |points: &[DVec2]| {
+        let pairs = points.windows(2).enumerate();
+        let off = pairs.map(|(i, pair)| (i, distance_px(at, [frame.at(pair[0]), frame.at(pair[1])])));
+        off.min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let nearest = drawing.surfaces.iter().filter_map(|(surface, points)| Some((*surface, off_px(points)?)));
+    let nearest = nearest.min_by(|a, b| a.1.1.total_cmp(&b.1.1)).filter(|(_, (_, px))| *px < REACH);
+    if let (Some(prescription), Some((surface, (step, _)))) = (prescription, nearest) {
+        let half_mm = product.capture.lens.lens.interfaces()[surface].surface.semi_aperture_mm;
+        let off_mm = half_mm * (2.0 * (step as f64 + 0.5) / STEPS as f64 - 1.0);
+        let at_vertex = surface.checked_sub(1).filter(|_| off_mm.abs() < VERTEX * half_mm);
+        return match at_vertex {
+            Some(before) => prescription.spacing_mm(before).map(|mm| Handle::Spacing { surface, mm }),
+            None => {
+                let off_mm = off_mm.abs().max(VERTEX * half_mm);
+                let per_mm = prescription.curvature_per_mm(surface);
+                per_mm.map(|per_mm| Handle::Curvature { surface, off_mm, per_mm })
+            }
         };
-        camera.focus = FocusSpec::FilmMm((1e4 * (from_mm + 0.05 * moved_mm)).round() / 1e4);
     }
-    if response.drag_stopped() {
-        is_dragged = false;
+    let is_near_film = (at.x - frame.at(DVec2::new(drawing.film_z_mm, 0.0)).x).abs() < REACH;
+    is_near_film.then(|| Handle::Film { mm: film_mm(camera, product) })
+}
+
+/// Returns the distance of a place from a line between two others.
+fn distance_px(at: Pos2, [from, to]: [Pos2; 2]) -> f32 {
+    let along = to - from;
+    let share = ((at - from).dot(along) / along.length_sq().max(1e-9)).clamp(0.0, 1.0);
+    (at - (from + share * along)).length()
+}
+
+fn film_mm(camera: &Camera, product: &Product) -> f64 {
+    match camera.focus {
+        FocusSpec::FilmMm(mm) => mm,
+        _ => product.capture.place.film_distance_mm,
     }
-    ui.data_mut(|data| data.insert_temp(dragged_id, is_dragged));
-    if is_near || is_dragged {
-        ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
+}
+
+/// What is held, where it was taken, and the scale there; the drawing may change under the hand.
+#[derive(Clone, Copy, Debug)]
+struct Hold {
+    handle: Handle,
+    from: Pos2,
+    px_per_mm: f32,
+}
+
+/// Takes hold of what is under the pointer, moves it, and returns what is held.
+fn drag(ui: &Ui, response: &Response, camera: &mut Camera, product: &Product, drawing: &Drawing) -> Option<Handle> {
+    let id = response.id.with("hold");
+    if response.drag_started() {
+        let frame = Frame::around(drawing, response.rect);
+        let hold = ui.input(|input| input.pointer.press_origin()).and_then(|from| {
+            let handle = handle_at(ui, from, camera, product, drawing, &frame)?;
+            Some(Hold { handle, from, px_per_mm: frame.px_per_mm })
+        });
+        ui.data_mut(|data| data.insert_temp(id, hold));
     }
-    painter.line_segment(film, Stroke::new(if is_near || is_dragged { 3.0 } else { 2.0 }, line));
-    response.accessible_name("drawing of the lens").on_hover_text(words(product));
+    let hold = ui.data(|data| data.get_temp::<Option<Hold>>(id)).flatten().filter(|_| response.dragged())?;
+    let moved_mm = f64::from((response.interact_pointer_pos()?.x - hold.from.x) / hold.px_per_mm);
+    match hold.handle {
+        // A film moves a twentieth of what the pointer does: its places are micrometres apart.
+        Handle::Film { mm } if moved_mm != 0.0 => {
+            camera.focus = FocusSpec::FilmMm((1e4 * (mm + 0.05 * moved_mm)).round() / 1e4);
+        }
+        Handle::Curvature { surface, off_mm, per_mm } => {
+            // The place that is held moves along, in the parabola that is nearest the sphere.
+            let curvature_per_mm = per_mm + SURFACE_GEAR * 2.0 * moved_mm / (off_mm * off_mm);
+            let rounded = (1e6 * curvature_per_mm).round() / 1e6;
+            let change = SurfaceChange { surface, curvature_per_mm: Some(rounded), thickness_mm: None };
+            take(ui, camera, change, moved_mm);
+        }
+        Handle::Spacing { surface, mm } => {
+            let spacing_mm = (1e4 * (mm + SURFACE_GEAR * moved_mm)).round() / 1e4;
+            let change = SurfaceChange { surface: surface - 1, curvature_per_mm: None, thickness_mm: Some(spacing_mm) };
+            take(ui, camera, change, moved_mm);
+        }
+        Handle::Film { .. } => {}
+    }
+    Some(hold.handle)
+}
+
+/// Changes the lens where it then still is one.
+fn take(ui: &Ui, camera: &mut Camera, change: SurfaceChange, moved_mm: f64) {
+    let changed = || surfaces::prescription(ui, camera)?.changed(change);
+    if moved_mm != 0.0
+        && let Some(lens) = changed()
+    {
+        camera.lens = lens;
+    }
+}
+
+/// Returns what is held and its number now.
+fn held_words(ui: &Ui, held: Handle, camera: &Camera) -> Option<String> {
+    let prescription = surfaces::prescription(ui, camera)?;
+    match held {
+        Handle::Film { .. } => None,
+        Handle::Curvature { surface, .. } => {
+            let per_mm = prescription.curvature_per_mm(surface)?;
+            let radius = if per_mm == 0.0 { "plane".to_owned() } else { format!("radius {:.3} mm", 1.0 / per_mm) };
+            Some(format!("surface {surface}: {radius}"))
+        }
+        Handle::Spacing { surface, .. } => {
+            Some(format!("surfaces {} to {surface}: {:.3} mm", surface - 1, prescription.spacing_mm(surface - 1)?))
+        }
+    }
 }
 
 fn words(product: &Product) -> String {
     let (lens, place) = (&product.capture.lens, &product.capture.place);
     let first = lens.reference.first_order();
     format!(
-        "{}: f = {:.2} mm, f/{:.2}, film {:.3} mm behind the last vertex{}\nrays of the axis, of 0.6 and of all of the corner's field; drag \
-         the film to focus",
+        "{}: f = {:.2} mm, f/{:.2}, film {:.3} mm behind the last vertex{}\nrays of the axis, of 0.6 and of all of the corner's field\n\
+         drag the film to focus, a surface near its rim to bend it, near the axis to move it and what lies behind; the lens moves a tenth of what the \
+         pointer does, the film a twentieth",
         lens.lens.name(),
         first.efl_mm,
         first.f_number,
         place.film_distance_mm,
         place.focus_distance_mm.map_or_else(String::new, |mm| format!(", focused on {mm:.0} mm"))
     )
-}
-
-/// From millimetres to points of the screen.
-struct Frame {
-    rect: Rect,
-    left_mm: f64,
-    px_per_mm: f32,
-}
-
-impl Frame {
-    fn around(drawing: &Drawing, rect: Rect) -> Self {
-        let all = || {
-            let surfaces = drawing.surfaces.iter().flatten();
-            surfaces.chain(drawing.rays.iter().flat_map(|(_, points)| points)).copied()
-        };
-        let (left, right) =
-            all().fold((0.0, drawing.film_z_mm), |(left, right), at: DVec2| (at.x.min(left), at.x.max(right)));
-        let half = all().map(|at| at.y.abs()).fold(drawing.half_film_mm, f64::max);
-        let by_width = f64::from(rect.width() - 12.0) / (right - left).max(1e-6);
-        let by_height = f64::from(rect.height() - 10.0) / (2.0 * half).max(1e-6);
-        let px_per_mm = by_width.min(by_height);
-        let spare = 0.5 * (f64::from(rect.width()) / px_per_mm - (right - left));
-        Self { rect, left_mm: left - spare, px_per_mm: px_per_mm as f32 }
-    }
-
-    fn at(&self, place_mm: DVec2) -> Pos2 {
-        pos2(self.rect.left() + self.px_per_mm * (place_mm.x - self.left_mm) as f32, self.y(place_mm.y))
-    }
-
-    fn y(&self, y_mm: f64) -> f32 {
-        self.rect.center().y - self.px_per_mm * y_mm as f32
-    }
-}
-
-fn glass(points: &[[DVec2; 2]], index: f64, dark: bool, frame: &Frame) -> Mesh {
-    // Denser glass is drawn deeper.
-    let depth = ((index - 1.45) / 0.5).clamp(0.0, 1.0) as f32;
-    let color = match dark {
-        true => Color32::from_rgba_unmultiplied(120, 170, 230, 40 + (60.0 * depth) as u8),
-        false => Color32::from_rgba_unmultiplied(60, 120, 200, 30 + (50.0 * depth) as u8),
-    };
-    let mut mesh = Mesh::default();
-    for (i, pair) in points.iter().enumerate() {
-        for at in pair {
-            mesh.vertices.push(Vertex { pos: frame.at(*at), uv: egui::epaint::WHITE_UV, color });
-        }
-        if i > 0 {
-            let first = 2 * (i as u32 - 1);
-            mesh.add_triangle(first, first + 1, first + 2);
-            mesh.add_triangle(first + 1, first + 2, first + 3);
-        }
-    }
-    mesh
-}
-
-impl Drawing {
-    fn of(product: &Product) -> Self {
-        let (lens, mono, place) = (&product.capture.lens.lens, &product.capture.lens.reference, &product.capture.place);
-        let placements = lens.placements();
-        let interfaces = lens.interfaces();
-        let half_mm = |i: usize| 0.999 * interfaces[i].surface.semi_aperture_mm;
-        let mut drawing = Self {
-            film_z_mm: lens.film_z_mm(place.film_distance_mm),
-            half_film_mm: 0.5e-3 * place.pitch_um * place.rows as f64,
-            ..Self::default()
-        };
-        for (i, interface) in interfaces.iter().enumerate() {
-            if i != lens.stop() || interface.surface.curvature_per_mm != 0.0 {
-                drawing.surfaces.push(outline(&interface.surface, &placements[i], half_mm(i)));
-            }
-            if interface.medium_after == Glass::Air || i + 1 == interfaces.len() {
-                continue;
-            }
-            let half = half_mm(i).min(half_mm(i + 1));
-            let front = outline(&interface.surface, &placements[i], half);
-            let back = outline(&interfaces[i + 1].surface, &placements[i + 1], half);
-            let index = interface.medium_after.nd_vd().map_or(1.5, |(nd, _)| nd);
-            drawing.elements.push((index, front.into_iter().zip(back).map(|(front, back)| [front, back]).collect()));
-        }
-        let stop_mm = lens.stop_semi_aperture_mm();
-        let widest_mm = (0..interfaces.len()).map(half_mm).fold(stop_mm, f64::max);
-        drawing.stop = [-1.0, 1.0].map(|sign| {
-            [stop_mm, (stop_mm + 0.2 * widest_mm).max(1.05 * widest_mm)].map(|y_mm| {
-                let at = placements[lens.stop()].lens_from_surface(DVec3::new(0.0, sign * y_mm, 0.0));
-                DVec2::new(at.z, at.y)
-            })
-        });
-        drawing.rays = rays(lens, mono, product);
-        drawing
-    }
-}
-
-fn outline(surface: &Surface, placement: &Placement, half_mm: f64) -> Vec<DVec2> {
-    (0..=STEPS)
-        .map(|i| {
-            let y_mm = half_mm * (2.0 * i as f64 / STEPS as f64 - 1.0);
-            let at = placement.lens_from_surface(DVec3::new(0.0, y_mm, surface.sag_at_mm(0.0, y_mm)));
-            DVec2::new(at.z, at.y)
-        })
-        .filter(|at| at.is_finite())
-        .collect()
-}
-
-/// Returns the rays of a few fields from before the lens to the film.
-fn rays(lens: &Lens, mono: &MonoLens, product: &Product) -> Vec<(usize, Vec<DVec2>)> {
-    let place = &product.capture.place;
-    let corner_mm = 0.5e-3 * place.pitch_um * (place.rows as f64).hypot(place.columns as f64);
-    let corner_tan = product
-        .field_at_radius(corner_mm)
-        .unwrap_or_else(|| corner_mm / mono.film_scale_mm(place.film_distance_mm).abs());
-    let distance_mm = place.focus_distance_mm.unwrap_or(f64::INFINITY);
-    let dioptres = 1e3 / (distance_mm + mono.projection_center_z_mm());
-    let lead_mm = 0.35 * lens.last_vertex_z_mm().abs().max(lens.front_semi_aperture_mm());
-    let mut lines = Vec::new();
-    for (field, share) in FIELDS.iter().enumerate() {
-        let point = ObjectPoint::from_field(mono, DVec2::new(0.0, -share * corner_tan), dioptres);
-        let Some(pupil) = PupilBoundary::find(mono, &point, 32) else { continue };
-        let (low, high) =
-            (pupil.rho_max_mm(-std::f64::consts::FRAC_PI_2), pupil.rho_max_mm(std::f64::consts::FRAC_PI_2));
-        let height = |i: usize| pupil.center_mm().y - low + (low + high) * (0.01 + 0.98 * i as f64 / (RAYS - 1) as f64);
-        let targets: Vec<DVec2> = (0..RAYS).map(|i| DVec2::new(pupil.center_mm().x, height(i))).collect();
-        let mut batch = pupil.plane().rays(mono, &point, &targets);
-        let mut paths: Vec<Vec<DVec2>> = (0..RAYS)
-            .map(|i| {
-                let (from, direction) = (batch.point_mm(i), batch.direction(i));
-                let start = from + direction * ((-lead_mm - from.z) / direction.z);
-                vec![DVec2::new(start.z, start.y)]
-            })
-            .collect();
-        let note = |paths: &mut [Vec<DVec2>], batch: &RayBatch| {
-            for (i, path) in paths.iter_mut().enumerate().filter(|(i, _)| batch.fate[*i].is_in_flight()) {
-                let at = batch.point_mm(i);
-                path.push(DVec2::new(at.z, at.y));
-            }
-        };
-        for surface in 0..mono.n_surfaces() {
-            mono.trace_surfaces(surface..surface + 1, &mut batch, Vignetting::On);
-            note(&mut paths, &batch);
-        }
-        mono.to_film(&mut batch, place.film_distance_mm);
-        note(&mut paths, &batch);
-        lines.extend(paths.into_iter().map(|path| (field, path)));
-    }
-    lines
 }

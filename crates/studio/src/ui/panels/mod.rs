@@ -1,9 +1,19 @@
 //! The left side: the camera as parameters.
 
+mod drawing;
+mod exposure;
+mod focus_plane;
 pub(super) mod lens;
 mod lens_drawing;
+mod path;
+mod processing;
 mod scene;
 mod sensor;
+mod simulation;
+mod surfaces;
+mod world;
+
+use std::cell::Cell;
 
 use egui::{Button, CollapsingHeader, ScrollArea, Ui};
 
@@ -20,6 +30,23 @@ pub(super) struct Desk<'a> {
     pub(super) product: Option<&'a Product>,
     /// A number that tells these results from others.
     pub(super) stamp: u64,
+    /// What a panel asks the window for.
+    pub(super) wanted: Cell<Option<Wanted>>,
+}
+
+/// What a panel cannot do alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// A lens file is to be chosen.
+    Lens,
+    /// A file is to be chosen that the lens is written to.
+    LensOut,
+    /// A sensor file is to be chosen.
+    Sensor,
+    /// A scene or a world is to be chosen.
+    Scene,
+    /// The pictures of a world by both methods are to be compared.
+    BothMethods,
 }
 
 impl Desk<'_> {
@@ -32,6 +59,11 @@ impl Desk<'_> {
         {
             camera.clone_from(mended);
         }
+    }
+
+    /// Asks the window for something, once the panels are drawn.
+    fn ask_for(&self, wanted: Wanted) {
+        self.wanted.set(Some(wanted));
     }
 
     /// Whether something of a section is wrong.
@@ -48,10 +80,11 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
         section(ui, "Lens", &of_lens, desk, true, |ui| lens::show(ui, camera, desk));
         section(ui, "Movements", &[Field::Movements], desk, true, |ui| lens::movements(ui, camera, desk));
         section(ui, "Film and sensor", &[Field::Film, Field::Sensor], desk, true, |ui| sensor::show(ui, camera, desk));
-        section(ui, "Exposure", &[Field::Exposure], desk, true, |ui| sensor::exposure(ui, camera, desk));
+        section(ui, "Exposure", &[Field::Exposure], desk, true, |ui| exposure::show(ui, camera, desk));
         section(ui, "Noise", &[], desk, false, |ui| sensor::noise(ui, camera));
-        section(ui, "Processing", &[Field::Processing], desk, false, |ui| sensor::processing(ui, camera, desk));
-        section(ui, "Simulation", &[Field::Simulation], desk, false, |ui| lens::simulation(ui, camera, desk));
+        section(ui, "Processing", &[Field::Processing], desk, false, |ui| processing::show(ui, camera, desk));
+        section(ui, "Simulation", &[Field::Simulation], desk, false, |ui| simulation::show(ui, camera, desk));
+        section(ui, "Output", &[], desk, false, |ui| simulation::output(ui, camera));
     });
 }
 

@@ -1,14 +1,15 @@
 //! The scene and its light.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use dioptric_pipeline::{Camera, RenderEffort, RenderMethod, SceneSource, WorldSpec, parse_illuminant};
+use dioptric_pipeline::{Camera, FillDepth, FlatSize, SceneSource, SceneSpec, WorldSpec, parse_illuminant};
 use dioptric_scene::Pattern;
-use egui::Ui;
+use dioptric_spectrum::Illuminant;
+use egui::{CollapsingHeader, Ui};
 
 use super::{
-    super::fields::{NumberField, choice, count, optional, text, wrong},
-    Desk,
+    super::fields::{NumberField, choice, count, meaning, optional, text, tick, variant},
+    Desk, path, world,
 };
 use crate::{engine::Field, session::light_word};
 
@@ -42,83 +43,109 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
             target(ui, pattern);
             size(ui, columns, rows);
         }
-        SceneSource::File(path) => file(ui, path, "Spectral EXR, ENVI header, folder of band pictures, or a picture"),
-        SceneSource::World(world) => {
-            file(ui, &mut world.file, "pbrt, glTF, OBJ or PLY");
-            let methods = [
-                (RenderMethod::Backward, "backward: rays from the film"),
-                (RenderMethod::Forward, "forward: the view, blurred"),
-            ];
-            choice(ui, "method", "How the light of the world comes to the film", &mut world.method, &methods);
-            if let RenderEffort::Samples(n) = &mut world.effort {
-                let mut samples = *n as usize;
-                if count(ui, "samples", "Rays of a pixel", 1..=65_536, &mut samples) {
-                    *n = samples as u32;
-                }
-            }
+        SceneSource::File(path) => {
+            path::show(ui, path, "Spectral EXR, ENVI header, folder of band pictures, or a picture", desk);
         }
+        SceneSource::World(spec) => world::show(ui, spec, desk),
     }
-    let is_world = kind_of(&camera.scene.source) == Kind::World;
-    let scene = &mut camera.scene;
-    let view = NumberField {
-        label: "field of view",
-        unit: "°",
-        range: 0.01..=179.9,
-        slider: 1.0..=120.0,
-        is_logarithmic: false,
-        words: "Horizontal field of view of the scene from edge to edge",
-    };
-    optional(ui, view, &mut scene.field_of_view_deg, 36.0);
-    if !is_world {
-        let depth = NumberField {
-            label: "depth",
-            unit: "m",
-            range: 1e-4..=1e6,
-            slider: 0.1..=100.0,
-            is_logarithmic: true,
-            words: "One depth for a scene that has none, from the entrance pupil",
-        };
-        optional(ui, depth, &mut scene.depth_m, 2.0);
-        let light = NumberField {
-            label: "illuminance",
-            unit: "lx",
-            range: 1e-6..=1e7,
-            slider: 0.1..=1e5,
-            is_logarithmic: true,
-            words: "Light on the scene; of a picture that of its white",
-        };
-        optional(ui, light, &mut scene.illuminance_lux, 1000.0);
-        illuminant(ui, camera);
+    let view = NumberField::even(
+        "field of view",
+        "°",
+        0.01..=179.9,
+        1.0..=120.0,
+        "Horizontal field of view of the scene from edge to edge",
+    );
+    optional(ui, view, &mut camera.scene.field_of_view_deg, 36.0);
+    if kind_of(&camera.scene.source) != Kind::World {
+        let words = "One depth for a scene that has none, from the entrance pupil";
+        let depth = NumberField::by_factors("depth", "m", 1e-4..=1e6, 0.1..=100.0, words);
+        optional(ui, depth, &mut camera.scene.depth_m, 2.0);
+        light(ui, &mut camera.scene);
+        CollapsingHeader::new("More of the scene").show(ui, |ui| more(ui, &mut camera.scene));
     }
     desk.tell(ui, Field::Scene, camera);
 }
 
-fn illuminant(ui: &mut Ui, camera: &mut Camera) {
-    let now = match &camera.scene.illuminant {
+fn light(ui: &mut Ui, scene: &mut SceneSpec) {
+    let words = "Light on the scene; of a picture that of its white";
+    let lux = NumberField::by_factors("illuminance", "lx", 1e-6..=1e7, 0.1..=1e5, words);
+    optional(ui, lux, &mut scene.illuminance_lux, 1000.0);
+    let words = "Light to put the scene under: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3, a temperature (3200K), a chromaticity \
+                 (0.46,0.414) or a CSV file; 'its own' for that of the scene";
+    illuminant(ui, "light", words, &mut scene.illuminant);
+}
+
+/// A light that may be left out.
+fn illuminant(ui: &mut Ui, title: &str, words: &str, value: &mut Option<Illuminant>) {
+    let now = match &value {
         None => "its own".to_owned(),
         Some(light) => light_word(light).unwrap_or_else(|| "measured".to_owned()),
     };
-    let id = ui.make_persistent_id("unknown light");
-    let words = "Light to put the scene under: A, D50, D55, D65, D75, E, FL2, FL11, LED-B3, a temperature (3200K), a chromaticity \
-                 (0.46,0.414) or a CSV file; 'its own' for that of the scene";
-    if let Some(typed) = text(ui, "light", words, &now) {
-        let parsed = match typed.as_str() {
-            "" | "its own" => Ok(None),
-            word => parse_illuminant(word).map(Some),
-        };
-        match parsed {
-            Ok(light) => {
-                camera.scene.illuminant = light;
-                ui.data_mut(|data| data.remove_temp::<String>(id));
-            }
-            Err(error) => {
-                ui.data_mut(|data| data.insert_temp(id, error.to_string()));
-            }
+    let parse = |typed: &str| match typed {
+        "" | "its own" => Ok(None),
+        word => parse_illuminant(word).map(Some).map_err(|error| error.to_string()),
+    };
+    if let Some(light) = meaning(ui, title, words, &now, parse) {
+        *value = light;
+    }
+}
+
+/// What few scenes need.
+fn more(ui: &mut Ui, scene: &mut SceneSpec) {
+    let words = "Scales the radiance to this mean luminance";
+    let luminance = NumberField::by_factors("mean luminance", "cd/m²", 1e-9..=1e9, 0.01..=1e4, words);
+    optional(ui, luminance, &mut scene.mean_luminance_cd_m2, 100.0);
+    let mut is_flat = scene.flat.is_some();
+    let words = "A flat scene stated by its size, in place of field of view and depth: slides, documents, wafers";
+    if tick(ui, "flat, by its size", words, &mut is_flat) {
+        scene.flat = is_flat.then_some(FlatSize { width_mm: 300.0, distance_mm: 1000.0 });
+        if is_flat {
+            (scene.field_of_view_deg, scene.depth_m) = (None, None);
         }
     }
-    if let Some(words) = ui.data(|data| data.get_temp::<String>(id)) {
-        wrong(ui, &words);
+    if let Some(flat) = &mut scene.flat {
+        let words = "From edge to edge of the flat scene";
+        NumberField::by_factors("flat width", "mm", 1e-6..=1e9, 1.0..=1e4, words).show(ui, &mut flat.width_mm);
+        let words = "From the first vertex of the lens to the flat scene";
+        NumberField::by_factors("flat distance", "mm", 1e-6..=1e12, 10.0..=1e5, words).show(ui, &mut flat.distance_mm);
     }
+    if let SceneSource::File(_) = scene.source {
+        of_file(ui, scene);
+    }
+}
+
+/// What files leave open.
+fn of_file(ui: &mut Ui, scene: &mut SceneSpec) {
+    let words = "The light that is on a file of radiance that does not state it: what white balance goes by";
+    illuminant(ui, "file's light", words, &mut scene.light);
+    let words = "The number that a perfect white has in an ENVI file that does not state it";
+    let white = NumberField::by_factors("white level", "", 1e-12..=1e12, 1.0..=65_535.0, words);
+    optional(ui, white, &mut scene.white_level, 1.0);
+    let fills = [
+        (None, "not filled"),
+        (Some(FillDepth::Beside), "that beside"),
+        (Some(FillDepth::Far), "far away"),
+        (Some(FillDepth::Metres(10.0)), "a depth"),
+    ];
+    let words = "The depth of samples where none was measured (code 0 of a depth picture)";
+    let mut kind = fills.iter().position(|(fill, _)| same_fill(fill, &scene.fill_depth)).unwrap_or(0);
+    let numbers: Vec<(usize, &str)> = fills.iter().enumerate().map(|(i, (_, name))| (i, *name)).collect();
+    if choice(ui, "missing depth", words, &mut kind, &numbers) {
+        scene.fill_depth = fills[kind].0;
+    }
+    if let Some(FillDepth::Metres(m)) = &mut scene.fill_depth {
+        let words = "Depth of samples where none was measured";
+        NumberField::by_factors("filled depth", "m", 1e-6..=1e9, 0.1..=1000.0, words).show(ui, m);
+    }
+    let now = scene.hidden.as_deref().unwrap_or(Path::new("")).display().to_string();
+    let words = "A file of what lies behind the first surface: radiance and depth of the same samples; empty for none";
+    if let Some(typed) = text(ui, "hidden file", words, &now) {
+        scene.hidden = (!typed.is_empty()).then(|| PathBuf::from(typed));
+    }
+}
+
+fn same_fill(a: &Option<FillDepth>, b: &Option<FillDepth>) -> bool {
+    a.map(|a| std::mem::discriminant(&a)) == b.map(|b| std::mem::discriminant(&b))
 }
 
 fn size(ui: &mut Ui, columns: &mut usize, rows: &mut usize) {
@@ -126,41 +153,33 @@ fn size(ui: &mut Ui, columns: &mut usize, rows: &mut usize) {
     if count(ui, "scene width", "Columns of samples of the scene; its height follows", 2..=8192, columns) {
         *rows = (before.1 * *columns).div_ceil(before.0.max(1)).max(1);
     }
+    count(ui, "scene height", "Rows of samples of the scene", 1..=8192, rows);
 }
 
 fn target(ui: &mut Ui, pattern: &mut Pattern) {
-    let name = |pattern: &Pattern| match pattern {
-        Pattern::Uniform => "uniform",
-        Pattern::Checkerboard { .. } => "checkerboard",
-        Pattern::SlantedBar { .. } => "slanted edge",
-        Pattern::RadialLines { .. } => "radial lines",
-        Pattern::PointArray { .. } => "points",
-        Pattern::SiemensStar { .. } => "Siemens star",
-        Pattern::ColorChart => "color chart",
-    };
     let all = [
-        Pattern::Uniform,
-        Pattern::Checkerboard { check_px: 40 },
-        Pattern::SlantedBar { slope: 0.0875 },
-        Pattern::RadialLines { n_lines: 12 },
-        Pattern::PointArray { spacing_px: 60 },
-        Pattern::SiemensStar { n_cycles: 36 },
-        Pattern::ColorChart,
+        (Pattern::Uniform, "uniform"),
+        (Pattern::Checkerboard { check_px: 40 }, "checkerboard"),
+        (Pattern::SlantedBar { slope: 0.0875 }, "slanted edge"),
+        (Pattern::RadialLines { n_lines: 12 }, "radial lines"),
+        (Pattern::PointArray { spacing_px: 60 }, "points"),
+        (Pattern::SiemensStar { n_cycles: 36 }, "Siemens star"),
+        (Pattern::ColorChart, "color chart"),
     ];
-    let names: Vec<(&str, &str)> = all.iter().map(|pattern| (name(pattern), name(pattern))).collect();
-    let mut chosen = name(pattern);
-    if choice(ui, "pattern", "What is drawn on the target", &mut chosen, &names)
-        && let Some(other) = all.into_iter().find(|pattern| name(pattern) == chosen)
-    {
-        *pattern = other;
-    }
-}
-
-fn file(ui: &mut Ui, path: &mut PathBuf, words: &str) {
-    if let Some(typed) =
-        text(ui, "path", &format!("{words}; files can be dropped on the window"), &path.display().to_string())
-    {
-        *path = PathBuf::from(typed);
+    variant(ui, "pattern", "What is drawn on the target", pattern, &all);
+    let whole = |ui: &mut Ui, title: &str, words: &str, value: &mut usize| {
+        count(ui, title, words, 1..=4096, value);
+    };
+    match pattern {
+        Pattern::Uniform | Pattern::ColorChart => {}
+        Pattern::Checkerboard { check_px } => whole(ui, "check", "Side of a square, samples", check_px),
+        Pattern::SlantedBar { slope } => {
+            let words = "Rows a column along the edge: 0.0875 is 5° from upright";
+            NumberField::even("slope", "", -1.0..=1.0, -0.3..=0.3, words).show(ui, slope);
+        }
+        Pattern::RadialLines { n_lines } => whole(ui, "lines", "Whole lines; 8 give 16 rays", n_lines),
+        Pattern::PointArray { spacing_px } => whole(ui, "points apart", "From point to point, samples", spacing_px),
+        Pattern::SiemensStar { n_cycles } => whole(ui, "cycles", "Pairs of sectors once around", n_cycles),
     }
 }
 
@@ -185,6 +204,9 @@ fn change_kind(camera: &mut Camera, kind: Kind) {
         SceneSource::World(world) => world.file.clone(),
         _ => PathBuf::new(),
     };
+    if kind != Kind::File {
+        (scene.light, scene.white_level, scene.fill_depth, scene.hidden) = (None, None, None, None);
+    }
     scene.source = match kind {
         Kind::StillLife => SceneSource::StillLife { columns, rows },
         Kind::Target => {
@@ -194,8 +216,8 @@ fn change_kind(camera: &mut Camera, kind: Kind) {
         }
         Kind::File => SceneSource::File(path),
         Kind::World => {
-            (scene.depth_m, scene.illuminance_lux, scene.illuminant, scene.mean_luminance_cd_m2) =
-                (None, None, None, None);
+            (scene.depth_m, scene.illuminance_lux, scene.illuminant) = (None, None, None);
+            (scene.mean_luminance_cd_m2, scene.flat) = (None, None);
             SceneSource::World(WorldSpec::of_file(path))
         }
     };

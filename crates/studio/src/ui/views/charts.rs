@@ -1,9 +1,10 @@
 //! The charts beneath the picture: point spread, modulation, histogram, light.
 
+use dioptric_sensor::EdgeResponse;
 use egui::{Color32, RichText, TextureHandle, Ui, vec2};
 use egui_plot::{Legend, Line, Plot, PlotPoints, VLine};
 
-use super::super::fields::LINES;
+use super::super::fields::{LINES, wrong};
 use crate::engine::{Product, Spread, three};
 
 /// Shows the point spread at the cursor.
@@ -22,12 +23,19 @@ pub(in crate::ui) fn spread(ui: &mut Ui, texture: Option<&TextureHandle>, spread
     });
 }
 
-/// Shows the modulation at the cursor.
-pub(in crate::ui) fn modulation(ui: &mut Ui, spread: Option<&Spread>) {
+/// Shows the modulation at the cursor, and the response of the edge that was marked on pixels of a pitch, µm.
+pub(in crate::ui) fn modulation(
+    ui: &mut Ui,
+    spread: Option<&Spread>,
+    edge: Option<(&Result<EdgeResponse, String>, f64)>,
+) {
     let Some(spread) = spread else {
         ui.weak("Point at the picture: the modulation there.");
         return;
     };
+    if let Some((Err(words), _)) = edge {
+        wrong(ui, words);
+    }
     let line = |name: &str, values: &[f64], color: Color32| {
         let points: PlotPoints<'_> = spread.frequencies_per_mm.iter().zip(values).map(|(f, m)| [*f, *m]).collect();
         Line::new(name, points).color(color).width(1.8)
@@ -36,6 +44,12 @@ pub(in crate::ui) fn modulation(ui: &mut Ui, spread: Option<&Spread>) {
     plot("modulation", ui, "cycles/mm", reach, 1.0).show(ui, |plot| {
         plot.line(line("tangential", &spread.tangential, LINES[0]));
         plot.line(line("sagittal", &spread.sagittal, LINES[1]).style(egui_plot::LineStyle::dashed_loose()));
+        if let Some((Ok(edge), pitch_um)) = edge {
+            let per_mm = edge.frequencies.iter().map(|f| f * 1e3 / pitch_um);
+            let shown = per_mm.zip(&edge.response).take_while(|(f, _)| *f <= reach);
+            let points: PlotPoints<'_> = shown.map(|(f, response)| [f, *response]).collect();
+            plot.line(Line::new("edge in the picture", points).color(LINES[2]).width(1.8));
+        }
         if spread.nyquist_per_mm < reach {
             plot.vline(VLine::new("Nyquist of the pixels", spread.nyquist_per_mm).color(Color32::GRAY));
         }

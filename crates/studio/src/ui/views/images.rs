@@ -86,7 +86,7 @@ pub(in crate::ui) fn irradiance(product: &Product, wavelength_nm: f64) -> (Color
 }
 
 /// Returns linear sRGB of the hue of a wavelength, 1 at most.
-fn tint(nm: f64) -> [f64; 3] {
+pub(in crate::ui) fn tint(nm: f64) -> [f64; 3] {
     let Ok(grid) = WavelengthGrid::new(vec![nm.clamp(405.0, 680.0)]) else { return [1.0; 3] };
     let rgb = SpectrumToRgb::new(&grid).of_band(0).map(|v| v.max(0.0));
     let most = rgb.iter().copied().fold(f64::MIN_POSITIVE, f64::max);

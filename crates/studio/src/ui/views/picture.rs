@@ -9,13 +9,27 @@ pub(in crate::ui) struct Placement {
     pub(in crate::ui) zoom: Option<f32>,
     /// The share of the picture that lies in the middle.
     pub(in crate::ui) middle: [f64; 2],
+    /// Points of the screen a pixel as it was drawn last, and where all of the picture just fits.
+    drawn: (f32, f32),
 }
 
 impl Default for Placement {
     fn default() -> Self {
-        Self { zoom: None, middle: [0.5; 2] }
+        Self { zoom: None, middle: [0.5; 2], drawn: (1.0, 1.0) }
     }
 }
+
+impl Placement {
+    /// Zooms, a place of the picture coming to lie in the middle.
+    pub(in crate::ui) fn zoom_by(&mut self, factor: f32, place: [f64; 2]) {
+        let (scale, fit) = self.drawn;
+        let next = (scale * factor).min(MOST_ZOOM);
+        (self.zoom, self.middle) = if next <= fit { (None, [0.5; 2]) } else { (Some(next), place) };
+    }
+}
+
+/// The most points of the screen a pixel.
+const MOST_ZOOM: f32 = 40.0;
 
 /// What was done with the picture.
 #[derive(Clone, Copy, Debug, Default)]
@@ -44,6 +58,7 @@ pub(in crate::ui) fn show(
     let shown_scale = placement.zoom.unwrap_or(fit);
     move_about(ui, &response, placement, shown_scale, film_size, fit);
     let scale = placement.zoom.unwrap_or(fit);
+    placement.drawn = (scale, fit);
     let shown = rect_of(place, placement, scale, film_size);
     painter.rect_filled(place, 0.0, ui.visuals().extreme_bg_color);
     painter.with_clip_rect(place).image(
@@ -130,7 +145,7 @@ fn move_about(ui: &Ui, response: &Response, placement: &mut Placement, scale: f3
     if (factor - 1.0).abs() < 1e-4 {
         return;
     }
-    let next = (scale * factor).clamp(0.5 * fit, 40.0);
+    let next = (scale * factor).clamp(0.5 * fit, MOST_ZOOM);
     if next <= fit {
         *placement = Placement::default();
         return;

@@ -1,85 +1,20 @@
-//! The window without a screen: what is typed and clicked changes camera, numbers and picture.
-#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+//! What is typed and clicked changes camera, numbers and picture.
 
 use std::{
     thread,
     time::{Duration, Instant},
 };
 
-use dioptric_pipeline::{Camera, FilmSpec, KeptCamera, SceneSource, Silent, StopSpec, WavelengthSpec};
-use dioptric_spectrum::Cancel;
+use dioptric_pipeline::StopSpec;
 use dioptric_studio::{
     engine::{EngineSettings, Field},
     session::{Autosave, Snapshot},
     ui::{Shown, Studio, StudioSettings, Tab},
 };
 use egui::{Key, Modifiers, accesskit::Role};
-use egui_kittest::{Harness, kittest::Queryable};
+use egui_kittest::kittest::Queryable;
 
-/// Longer than any picture here takes on a busy machine.
-const LONG: Duration = Duration::from_secs(120);
-
-/// The demo on a film of 96 × 64 pixels and three bands.
-fn small() -> Camera {
-    let mut camera = Camera::demo().unwrap();
-    camera.film = FilmSpec::Pixels { columns: 96, rows: 64, pitch_um: 330.0 };
-    camera.scene.source = SceneSource::StillLife { columns: 108, rows: 72 };
-    camera.wavelengths = WavelengthSpec::ListNm(vec![450.0, 550.0, 650.0]);
-    camera
-}
-
-/// A window of a small camera, drawn once.
-fn window<'a>(autosave: Option<Autosave>) -> Harness<'a, Option<Studio>> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("camera.ron");
-    std::fs::write(&file, small().to_ron()).unwrap();
-    let settings = StudioSettings { engine: EngineSettings::default(), autosave, camera: Some(file) };
-    let ui = |ui: &mut egui::Ui, studio: &mut Option<Studio>| {
-        if let Some(studio) = studio {
-            studio.ui(ui);
-        }
-    };
-    let mut harness = Harness::builder().with_size([1400.0, 900.0]).build_ui_state(ui, None);
-    let studio = Studio::new(&harness.ctx, settings).unwrap();
-    *harness.state_mut() = Some(studio);
-    settle(&mut harness);
-    harness
-}
-
-fn studio<'h>(harness: &'h Harness<'_, Option<Studio>>) -> &'h Studio {
-    harness.state().as_ref().unwrap()
-}
-
-/// Draws frames until the full picture of the camera is there, or what is wrong with it.
-fn settle(harness: &mut Harness<'_, Option<Studio>>) {
-    let start = Instant::now();
-    harness.step();
-    while !studio(harness).is_settled() {
-        assert!(start.elapsed() < LONG, "the picture did not come");
-        thread::sleep(Duration::from_millis(5));
-        harness.step();
-    }
-    harness.step();
-}
-
-/// The picture that the camera of a window has, taken elsewhere.
-fn taken_elsewhere(studio: &Studio) -> Vec<u8> {
-    let kept = KeptCamera::new(studio.session().camera().clone());
-    kept.capture(&Silent, &Cancel::new()).unwrap().developed.picture.to_rgb8()
-}
-
-/// Types a text into the field of a label, in place of what stands there.
-fn type_into(harness: &mut Harness<'_, Option<Studio>>, label: &str, text: &str) {
-    let field = || harness.get_by_role_and_label(Role::TextInput, label);
-    field().focus();
-    harness.step();
-    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
-    harness.step();
-    harness.get_by_role_and_label(Role::TextInput, label).type_text(text);
-    harness.step();
-    harness.key_press(Key::Enter);
-    harness.step();
-}
+use super::desk::{LONG, settle, small, studio, taken_elsewhere, type_into, window};
 
 #[test]
 fn typed_f_number_changes_numbers_and_picture() {
@@ -171,7 +106,7 @@ fn two_hundred_edits_leave_no_stale_picture() {
             }
             4 => {
                 let shown = Shown::ALL[numbers.below(5) as usize].0;
-                let tab = [Tab::Picture, Tab::LensBench, Tab::SensorBench][numbers.below(3) as usize];
+                let tab = [Tab::Picture, Tab::LensBench, Tab::SensorBench, Tab::CameraFile][numbers.below(4) as usize];
                 harness.state_mut().as_mut().unwrap().show_tab(tab, shown);
                 harness.step();
             }
@@ -243,7 +178,9 @@ fn every_tab_is_drawn() {
         harness.step();
         assert!(harness.query_by_label("picture").is_some(), "{shown:?}");
     }
-    for (tab, words) in [(Tab::LensBench, "Modulation"), (Tab::SensorBench, "dark noise")] {
+    for (tab, words) in
+        [(Tab::LensBench, "Modulation"), (Tab::SensorBench, "dark noise"), (Tab::CameraFile, "camera file")]
+    {
         harness.state_mut().as_mut().unwrap().show_tab(tab, Shown::Picture);
         let start = Instant::now();
         while harness.query_by_label_contains(words).is_none() {

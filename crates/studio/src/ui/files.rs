@@ -1,0 +1,238 @@
+//! Files in and out: opened, dropped, saved, exported.
+
+use std::path::{Path, PathBuf};
+
+use dioptric_analysis::{Run, RunTimes};
+use dioptric_optics::Lens;
+use dioptric_pipeline::{Camera, LensSpec, PipelineError, SceneSource, SceneSpec, SensorSpec, Staged, WorldSpec};
+use dioptric_report::write_run;
+use egui::Ui;
+
+use super::{
+    Studio,
+    dialog::{FileDialog, Outcome, Purpose},
+    panels::{self, Wanted},
+};
+use crate::{
+    engine::{Product, Rung},
+    session::{as_ron, write_beside},
+};
+
+/// Endings of files that hold a world.
+const WORLDS: [&str; 5] = ["pbrt", "gltf", "glb", "obj", "ply"];
+
+fn ending(path: &Path) -> String {
+    path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase()
+}
+
+impl Studio {
+    /// Opens files that were dropped on the window: cameras, lenses, sensors, scenes, worlds.
+    pub(super) fn drops(&mut self, ui: &Ui) {
+        let paths: Vec<PathBuf> =
+            ui.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_owned()).collect());
+        for path in paths {
+            self.open(&path);
+        }
+    }
+
+    /// Opens a file: a camera takes the place of the whole, a lens, a sensor, a scene or a world that of its part.
+    pub fn open(&mut self, path: &Path) {
+        let mut camera = self.session.camera().clone();
+        match ending(path).as_str() {
+            "ron" => match self.session.replace_by_file(path) {
+                Ok(()) => {
+                    self.remember(path);
+                    self.submit();
+                    return;
+                }
+                // A file of the same ending may hold a lens or a sensor.
+                Err(error) if SensorSpec::File(path.to_owned()).open().is_ok() => {
+                    drop(error);
+                    camera.sensor = SensorSpec::File(path.to_owned());
+                }
+                Err(error) if Lens::read(path).is_ok() => {
+                    drop(error);
+                    panels::lens::take_lens(&mut camera, LensSpec::File(path.to_owned()));
+                }
+                Err(error) => {
+                    self.note = Some(error.to_string());
+                    return;
+                }
+            },
+            "zmx" | "seq" | "dat" | "json" => {
+                panels::lens::take_lens(&mut camera, LensSpec::File(path.to_owned()));
+            }
+            _ => take_scene(&mut camera, path),
+        }
+        self.opened(path, camera);
+    }
+
+    fn opened(&mut self, path: &Path, camera: Camera) {
+        self.remember(path);
+        self.note = Some(format!("opened {}", path.display()));
+        self.take(camera, None);
+    }
+
+    fn remember(&self, path: &Path) {
+        if let Some(autosave) = &self.autosave {
+            autosave.remember(path);
+        }
+    }
+
+    /// Begins to choose a file.
+    pub(super) fn choose(&mut self, purpose: Purpose) {
+        let of_camera = self.session.path().and_then(Path::parent);
+        let folder = self.folder.clone().or_else(|| of_camera.map(Path::to_owned)).unwrap_or_default();
+        let stem = self.session.path().and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned());
+        let name = match purpose {
+            Purpose::SaveCamera => stem.unwrap_or_else(|| "camera".to_owned()) + ".ron",
+            Purpose::SaveLens => "lens.ron".to_owned(),
+            Purpose::SavePicture => "picture.png".to_owned(),
+            Purpose::Export => stem.unwrap_or_else(|| "dioptric".to_owned()) + "-out",
+            _ => String::new(),
+        };
+        self.dialog = Some(FileDialog::new(purpose, &folder, &name));
+    }
+
+    /// Does what a panel asked for.
+    pub(super) fn grant(&mut self, wanted: Wanted) {
+        match wanted {
+            Wanted::Lens => self.choose(Purpose::Lens),
+            Wanted::LensOut => self.choose(Purpose::SaveLens),
+            Wanted::Sensor => self.choose(Purpose::Sensor),
+            Wanted::Scene => self.choose(Purpose::Scene),
+            Wanted::BothMethods => self.compare_methods(),
+        }
+    }
+
+    /// Draws the dialog, where one is open, and uses what is chosen.
+    pub(super) fn dialogs(&mut self, ui: &Ui) {
+        let Some(dialog) = &mut self.dialog else { return };
+        let outcome = dialog.show(ui);
+        let purpose = dialog.purpose;
+        if outcome == Outcome::Open {
+            return;
+        }
+        self.folder = Some(dialog.folder().to_owned());
+        self.dialog = None;
+        if let Outcome::Chosen(path) = outcome {
+            self.use_file(purpose, &path);
+        }
+    }
+
+    fn use_file(&mut self, purpose: Purpose, path: &Path) {
+        let mut camera = self.session.camera().clone();
+        match purpose {
+            Purpose::Open => self.open(path),
+            Purpose::Lens => {
+                panels::lens::take_lens(&mut camera, LensSpec::File(path.to_owned()));
+                self.opened(path, camera);
+            }
+            Purpose::Sensor => {
+                camera.sensor = SensorSpec::File(path.to_owned());
+                self.opened(path, camera);
+            }
+            Purpose::Scene => {
+                take_scene(&mut camera, path);
+                self.opened(path, camera);
+            }
+            Purpose::SaveCamera => self.save_as(path),
+            Purpose::SaveLens => self.save_lens(path),
+            Purpose::SavePicture => {
+                let written = self.whole_product().and_then(|product| {
+                    let png = product.png().map_err(|error| error.to_string())?;
+                    write_beside(path, &png).map_err(|error| error.to_string())
+                });
+                self.note = Some(written.map_or_else(|error| error, |()| format!("saved {}", path.display())));
+            }
+            Purpose::Export => self.export(path),
+        }
+    }
+
+    /// Saves the camera where it came from, or asks where.
+    pub(super) fn save(&mut self) {
+        match self.session.path().map(Path::to_owned) {
+            Some(path) => self.save_as(&path),
+            None => self.choose(Purpose::SaveCamera),
+        }
+    }
+
+    fn save_as(&mut self, path: &Path) {
+        self.note = Some(match self.session.save(path) {
+            Ok(()) => {
+                self.remember(path);
+                format!("saved {}", path.display())
+            }
+            Err(error) => error.to_string(),
+        });
+    }
+
+    /// Writes the lens as a file of its own, which the camera then names.
+    fn save_lens(&mut self, path: &Path) {
+        let mut camera = self.session.camera().clone();
+        let written = camera.lens.open(&camera.lens_reading).and_then(|file| {
+            let text = file.to_ron() + "\n";
+            write_beside(path, text.as_bytes())
+        });
+        match written {
+            Ok(()) => {
+                // What was read with these options is whole in the new file.
+                (camera.lens, camera.lens_reading) = (LensSpec::File(path.to_owned()), Default::default());
+                self.opened(path, camera);
+                self.note = Some(format!("saved {}; the camera has the lens from there", path.display()));
+            }
+            Err(error) => self.note = Some(error.to_string()),
+        }
+    }
+
+    /// The full picture of the camera as it stands.
+    fn whole_product(&self) -> Result<std::sync::Arc<Product>, String> {
+        let results = self
+            .results
+            .as_ref()
+            .filter(|results| results.delivery.rung == Rung::Full && results.product.camera() == self.session.camera());
+        results.map(|results| results.product.clone()).ok_or_else(|| "the full picture is not there yet".to_owned())
+    }
+
+    /// Writes the files of a run into a folder, on a thread of its own.
+    fn export(&mut self, folder: &Path) {
+        match self.whole_product() {
+            Ok(product) => {
+                let (folder, work_s) = (folder.to_owned(), self.work_s());
+                self.note = Some(format!("writing {}", folder.display()));
+                self.exports.ask(move || match export(&product, &folder, work_s) {
+                    Ok(files) => format!("{}: {files}", folder.display()),
+                    Err(error) => error.to_string(),
+                });
+            }
+            Err(words) => self.note = Some(words),
+        }
+    }
+
+    /// How long the latest picture took, s.
+    fn work_s(&self) -> f64 {
+        self.results.as_ref().map_or(0.0, |results| results.delivery.work.as_secs_f64())
+    }
+}
+
+/// Puts a scene or a world before the camera.
+fn take_scene(camera: &mut Camera, path: &Path) {
+    camera.scene = SceneSpec::of_file(path.to_owned());
+    if WORLDS.contains(&ending(path).as_str()) {
+        camera.scene.source = SceneSource::World(WorldSpec::of_file(path.to_owned()));
+    }
+}
+
+/// Writes report, picture and frames as `dioptric run` does, and the camera file; returns the names of the files.
+fn export(product: &Product, folder: &Path, work_s: f64) -> Result<String, PipelineError> {
+    let staged = Staged::folder(folder)?;
+    let run = Run { capture: &product.capture, model: &product.model, depth: Some(&product.depth) };
+    let times = || RunTimes { stages_s: vec![("full picture".to_owned(), work_s)], imaging_s: Vec::new() };
+    write_run(&run, staged.path(), &times)?;
+    write_beside(&staged.path().join("camera.ron"), as_ron(product.camera()).as_bytes())?;
+    let names = std::fs::read_dir(staged.path()).into_iter().flatten().flatten();
+    let mut names: Vec<String> = names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    staged.commit()?;
+    Ok(names.join(", "))
+}

@@ -1,0 +1,9 @@
+//! The window without a screen.
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+mod desk;
+mod drags;
+mod edits;
+mod files;
+mod panels;
+mod worlds;
