@@ -17,6 +17,14 @@ pub(crate) struct MixedSamples {
     around: Vec<u32>,
 }
 
+/// A sample beside an edge, those of its own side that lie beside none, and its neighbors of the other side.
+struct Found {
+    sample: u32,
+    own: Vec<u32>,
+    other: Vec<u32>,
+}
+
+/// A sample beside an edge, and where its lists begin and end.
 struct Mixed {
     sample: u32,
     first: u32,
@@ -49,15 +57,14 @@ impl MixedSamples {
                 let other: Vec<u32> = near(row, column, 1).filter(|&other| is_apart(at, other)).map(index).collect();
                 // Something as thin as its own outline has no other color to go by.
                 if !own.is_empty() {
-                    found.push((index(at), own, other));
+                    found.push(Found { sample: index(at), own, other });
                 }
             }
             Ok(found)
         };
-        let found: Vec<Vec<(u32, Vec<u32>, Vec<u32>)>> =
-            (0..rows).into_par_iter().map(of_row).collect::<Result<_, Cancelled>>()?;
+        let found: Vec<Vec<Found>> = (0..rows).into_par_iter().map(of_row).collect::<Result<_, Cancelled>>()?;
         let mut this = Self::default();
-        for (sample, own, other) in found.into_iter().flatten() {
+        for Found { sample, own, other } in found.into_iter().flatten() {
             let first = this.around.len() as u32;
             this.around.extend(own);
             let first_other = this.around.len() as u32;

@@ -1,5 +1,5 @@
 //! Edges of depth through a double Gauss, layered and through views of the pupil, against a picture that pbrt traced.
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by panicking and shows its numbers")]
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking and shows its numbers")]
 
 use dioptric_backward::{
     BandSampling, Bands, Camera, LightPaths, Pinhole, PixelGrid, Placement, RenderSettings, Renderer, layered_depth,
