@@ -378,7 +378,7 @@ fn interpolating_over_the_field_meets_the_edge_error_asked_for() {
             .fold(0.0, f64::max)
     };
     let (coarse, fine) = (
-        error(&Settings { max_edge_error: 1.0, knot_spacing_px: 128, ..Settings::default() }),
+        error(&Settings { max_edge_error: 1.0, max_shading_error: 1.0, knot_spacing_px: 128, ..Settings::default() }),
         error(&Settings { max_edge_error: 0.01, knot_spacing_px: 128, ..Settings::default() }),
     );
     println!("edge error {coarse:.4} with one spacing, {fine:.4} with cells halved");

@@ -88,6 +88,8 @@ pub struct Settings {
     /// Largest error of the edge spread function that interpolation over the field may cause; a uniform plane may be off by
     /// a tenth of it.
     pub max_edge_error: f64,
+    /// Largest relative error of the irradiance of a uniform plane by interpolated PSFs: cells where it is larger are halved likewise.
+    pub max_shading_error: f64,
     /// Distance between depth layers, pixels of blur radius.
     pub layer_step_px: f64,
     /// A change of blur radius between neighbors that counts as a depth edge, pixels.
@@ -111,6 +113,7 @@ impl Default for Settings {
             mode: BlurMode::Layered,
             knot_spacing_px: 128,
             max_edge_error: 0.01,
+            max_shading_error: 5e-4,
             layer_step_px: 2.0,
             depth_edge_px: 3.0,
             chromatic_step_px: 0.25,
@@ -129,6 +132,7 @@ impl Settings {
     pub fn check(&self) -> Result<(), ForwardError> {
         let positive = [
             ("the largest edge error", self.max_edge_error),
+            ("the largest shading error", self.max_shading_error),
             ("the layer step", self.layer_step_px),
             ("the depth edge", self.depth_edge_px),
         ];

@@ -277,7 +277,7 @@ impl Tiling {
                 let Some(first) = cells.first() else { return Ok(vec![]) };
                 let mut mesh = Mesh { size: first.size, added: BTreeSet::new() };
                 let mut probe = Probe { lens, layer, symmetry, kernels: BTreeMap::new() };
-                probe.refine(&mut mesh, &cells, settings.max_edge_error, work)?;
+                probe.refine(&mut mesh, &cells, settings, work)?;
                 let mut patches = vec![];
                 cells.into_iter().for_each(|cell| mesh.patches_of(cell, &mut patches));
                 Ok(patches)
@@ -325,12 +325,12 @@ struct Probe<'a> {
 }
 
 impl Probe<'_> {
-    /// Adds knots to a mesh, in the quarters of cells at whose middle the spline is off by more than an edge error.
+    /// Adds knots to a mesh, in the quarters of cells at whose middle the spline is off by more than the settings allow.
     fn refine(
         &mut self,
         mesh: &mut Mesh,
         cells: &[Cell],
-        max_edge_error: f64,
+        settings: &Settings,
         work: &Work<'_>,
     ) -> Result<(), Cancelled> {
         let mut candidates: Vec<Cell> = cells.iter().copied().filter(Cell::is_divisible).collect();
@@ -351,11 +351,13 @@ impl Probe<'_> {
                     work.check()?;
                     let difference = spline_error(&known, cell.knot(), weights);
                     let edge_error = edge_spread_peak(&difference.samples, difference.width);
-                    Ok(edge_error.max(shading_error(&difference, cell.size) / SHADING_PER_EDGE_ERROR))
+                    let shading_error = shading_error(&difference, cell.size);
+                    // Over what is allowed.
+                    Ok((edge_error / settings.max_edge_error).max(shading_error / settings.max_shading_error))
                 })
                 .collect::<Result<_, Cancelled>>()?;
             self.kernels = known.into_kernels();
-            let too_coarse = candidates.iter().zip(errors).filter(|(_, error)| *error > max_edge_error);
+            let too_coarse = candidates.iter().zip(errors).filter(|(_, error)| *error > 1.0);
             let added: Vec<Cell> = too_coarse.flat_map(|(cell, _)| cell.children()).collect();
             mesh.added.extend(added.iter().copied());
             candidates = added.into_iter().filter(Cell::is_divisible).collect();
@@ -364,10 +366,6 @@ impl Probe<'_> {
         Ok(())
     }
 }
-
-/// The largest relative error of the irradiance of a uniform plane that a spline may cause where knots can be added, as a part
-/// of the largest error of edges: .05 % by default.
-const SHADING_PER_EDGE_ERROR: f64 = 0.05;
 
 /// Returns the kernel at a knot less that of a spline.
 fn spline_error(kernels: &LayerKernels, knot: Knot, spline: &Weights) -> KnotKernel {

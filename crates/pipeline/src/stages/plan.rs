@@ -32,6 +32,7 @@ pub(super) fn plan(
             chromatic_step_px: 1.0,
             coverage_step_px: 8.0,
             max_edge_error: 0.03,
+            max_shading_error: 0.01,
             negligible_edge: 1e-3,
             ..Settings::default()
         },
