@@ -414,7 +414,7 @@ mod tests {
     fn pixels_that_cannot_be_are_named() {
         for (options, word) in [
             (["--pixels", "0x4"], "columns"),
-            (["--pixel-um", "-2"], "pitch_um"),
+            (["--pixel-um", "-2"], "--pixel-um"),
             (["--pixel-um", "1e-9"], "columns"),
             (["--pixels", "4"], "WxH"),
         ] {
