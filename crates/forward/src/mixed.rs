@@ -36,8 +36,14 @@ struct Mixed {
 const AROUND: usize = 2;
 
 impl MixedSamples {
-    /// Finds the samples of which a neighbor lies farther or nearer by more than a jump.
-    pub(crate) fn find(distances: &Array2<f32>, jump: f32, cancel: &Cancel) -> Result<Self, Cancelled> {
+    /// Finds the samples of which a neighbor lies farther or nearer by more than a jump, where of neither is known what lies behind it: what a
+    /// second layer holds of mixed samples, and what these show of it, make up each other.
+    pub(crate) fn find(
+        distances: &Array2<f32>,
+        jump: f32,
+        is_known: &(dyn Fn((usize, usize)) -> bool + Sync),
+        cancel: &Cancel,
+    ) -> Result<Self, Cancelled> {
         let (rows, columns) = distances.dim();
         let near = |row: usize, column: usize, by: usize| {
             let lines = row.saturating_sub(by)..(row + by + 1).min(rows);
@@ -50,8 +56,11 @@ impl MixedSamples {
         let of_row = |row: usize| {
             cancel.check()?;
             let mut found = vec![];
-            for column in (0..columns).filter(|&column| is_beside_edge((row, column))) {
-                let at = (row, column);
+            for at in (0..columns).map(|column| (row, column)).filter(|&at| is_beside_edge(at)) {
+                let (row, column) = at;
+                if near(row, column, 1).any(|other| is_known(other)) {
+                    continue;
+                }
                 let own = near(row, column, AROUND).filter(|&other| !is_apart(at, other) && !is_beside_edge(other));
                 let own: Vec<u32> = own.map(index).collect();
                 let other: Vec<u32> = near(row, column, 1).filter(|&other| is_apart(at, other)).map(index).collect();
@@ -113,7 +122,7 @@ mod tests {
     use super::*;
 
     fn found(distances: &Array2<f32>) -> MixedSamples {
-        MixedSamples::find(distances, 3.0, &Cancel::new()).unwrap()
+        MixedSamples::find(distances, 3.0, &|_| false, &Cancel::new()).unwrap()
     }
 
     /// A near half plane of 2 before a wall of stripes of 5 and 6; the edge passes through column 8 or 9.

@@ -37,6 +37,11 @@ pub(crate) struct Guesses {
 /// How much farther than the first surface something must lie to be known as behind it, of a jump of depth: roundings.
 const LEAST_BEHIND: f32 = 0.05;
 
+/// Whether something at one distance is known to be behind what is at another.
+pub(crate) fn is_behind(distance: f32, front: f32, jump: f32) -> bool {
+    distance > front + LEAST_BEHIND * jump
+}
+
 impl OccludedSamples {
     /// Finds where blurred edges show what lies behind them.
     pub(crate) fn find(
@@ -62,7 +67,7 @@ impl OccludedSamples {
             let (known, reach) = (distances(depth)?, reach_of_edges(&front, &rule, cancel)?);
             let fill = Fill::find(&front, &rule, cancel)?;
             let is_guessed = |row: usize, column: usize| {
-                let is_known = known[(row, column)] > front[(row, column)] + LEAST_BEHIND * rule.jump;
+                let is_known = is_behind(known[(row, column)], front[(row, column)], rule.jump);
                 !is_known && !fill.distances[(row, column)].is_nan()
             };
             let place = |row: usize, column: usize| {
