@@ -58,7 +58,7 @@ impl MixedSamples {
             let mut found = vec![];
             for at in (0..columns).map(|column| (row, column)).filter(|&at| is_beside_edge(at)) {
                 let (row, column) = at;
-                if near(row, column, 1).any(|other| is_known(other)) {
+                if near(row, column, 1).any(is_known) {
                     continue;
                 }
                 let own = near(row, column, AROUND).filter(|&other| !is_apart(at, other) && !is_beside_edge(other));
