@@ -85,8 +85,7 @@ pub struct Settings {
     /// Distance between the points of the film at which the PSF is computed, pixels. Cells in which the
     /// interpolated PSF is off by more than `max_edge_error` are halved.
     pub knot_spacing_px: usize,
-    /// Largest error of the edge spread function that interpolation over the field may cause; a uniform plane may be off by
-    /// a tenth of it.
+    /// Largest error of the edge spread function that interpolation over the field may cause.
     pub max_edge_error: f64,
     /// Largest relative error of the irradiance of a uniform plane by interpolated PSFs: cells where it is larger are halved likewise.
     pub max_shading_error: f64,

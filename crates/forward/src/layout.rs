@@ -7,7 +7,7 @@ use std::{
 
 use dioptric_psf::{FilmMap, LensImage};
 use dioptric_scene::View;
-use dioptric_spectrum::{Cancel, Cancelled, DepthMap, WavelengthGrid};
+use dioptric_spectrum::{Cancel, Cancelled, WavelengthGrid};
 use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ use crate::{
     lateral_color::LateralColor,
     layers::{Blurs, Layers},
     mixed::MixedSamples,
-    occluded::{OccludedSamples, is_behind},
+    occluded::{Distances, OccludedSamples},
     occlusion::{BlurredPlane, Composite, LayerAlpha},
     raster::LayerRaster,
     sampler::{LayerCoordinates, Surface},
@@ -45,7 +45,7 @@ pub(crate) struct SceneLayers {
     pub(crate) basis_bands: Vec<usize>,
     layer_coordinates: LayerCoordinates,
     pub(crate) occluded: OccludedSamples,
-    /// Those where no second layer is known.
+    /// Samples that show both sides of an edge of depth.
     mixed: MixedSamples,
 }
 
@@ -83,20 +83,15 @@ impl SceneLayers {
         let layer_coordinates = LayerCoordinates::new(plane_of(z_m.dim(), cancel, coordinate)?, cancel)?;
         let nearest = lens.film_map(layers.dioptres()[0], middle_nm, extent_mm);
         let scene_per_film = LayerRaster::new(film, 1, (scene.view, scene.size()), &nearest).sampler.scene_per_film;
-        let occluded = OccludedSamples::find(scene, &layers, settings, scene_per_film, cancel)?;
-        let mixed = match hides(settings, &layers) {
+        let (occluded, mixed) = match hides(settings, &layers) {
             true => {
-                let jump = settings.depth_edge_px as f32;
-                let distances = |depth: &DepthMap| {
-                    let z_m = depth.z_m();
-                    plane_of(z_m.dim(), cancel, |row, column| layers.distance_px(z_m[(row, column)]))
-                };
-                let front = distances(scene.depth)?;
-                let behind = scene.occluded_depth.map(distances).transpose()?;
-                let is_known = |at| behind.as_ref().is_some_and(|behind| is_behind(behind[at], front[at], jump));
-                MixedSamples::find(&front, jump, &is_known, cancel)?
+                let distances = Distances::of(scene, &layers, cancel)?;
+                (
+                    OccludedSamples::find(&distances, &layers, settings, scene_per_film, cancel)?,
+                    MixedSamples::find(&distances, settings.depth_edge_px as f32, cancel)?,
+                )
             }
-            false => MixedSamples::default(),
+            false => (OccludedSamples::Nothing, MixedSamples::default()),
         };
         Ok(Self { layers, kernel_bands, basis_bands, layer_coordinates, occluded, mixed })
     }

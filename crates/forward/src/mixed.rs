@@ -9,6 +9,8 @@ use dioptric_spectrum::{Cancel, Cancelled};
 use ndarray::Array2;
 use rayon::prelude::*;
 
+use crate::occluded::Distances;
+
 /// Samples beside an edge of depth, and the samples around by which they are judged.
 #[derive(Default)]
 pub(crate) struct MixedSamples {
@@ -38,19 +40,15 @@ const AROUND: usize = 2;
 impl MixedSamples {
     /// Finds the samples of which a neighbor lies farther or nearer by more than a jump, where of neither is known what lies behind it: what a
     /// second layer holds of mixed samples, and what these show of it, make up each other.
-    pub(crate) fn find(
-        distances: &Array2<f32>,
-        jump: f32,
-        is_known: &(dyn Fn((usize, usize)) -> bool + Sync),
-        cancel: &Cancel,
-    ) -> Result<Self, Cancelled> {
-        let (rows, columns) = distances.dim();
+    pub(crate) fn find(distances: &Distances, jump: f32, cancel: &Cancel) -> Result<Self, Cancelled> {
+        let front = &distances.front;
+        let (rows, columns) = front.dim();
         let near = |row: usize, column: usize, by: usize| {
             let lines = row.saturating_sub(by)..(row + by + 1).min(rows);
             let places = column.saturating_sub(by)..(column + by + 1).min(columns);
             lines.flat_map(move |r| places.clone().map(move |c| (r, c)))
         };
-        let is_apart = |a: (usize, usize), b: (usize, usize)| (distances[a] - distances[b]).abs() > jump;
+        let is_apart = |a: (usize, usize), b: (usize, usize)| (front[a] - front[b]).abs() > jump;
         let is_beside_edge = |at: (usize, usize)| near(at.0, at.1, 1).any(|other| is_apart(at, other));
         let index = |(row, column): (usize, usize)| (row * columns + column) as u32;
         let of_row = |row: usize| {
@@ -58,7 +56,7 @@ impl MixedSamples {
             let mut found = vec![];
             for at in (0..columns).map(|column| (row, column)).filter(|&at| is_beside_edge(at)) {
                 let (row, column) = at;
-                if near(row, column, 1).any(is_known) {
+                if near(row, column, 1).any(|other| distances.is_known_behind(other, jump)) {
                     continue;
                 }
                 let own = near(row, column, AROUND).filter(|&other| !is_apart(at, other) && !is_beside_edge(other));
@@ -121,8 +119,9 @@ impl MixedSamples {
 mod tests {
     use super::*;
 
-    fn found(distances: &Array2<f32>) -> MixedSamples {
-        MixedSamples::find(distances, 3.0, &|_| false, &Cancel::new()).unwrap()
+    fn found(front: &Array2<f32>) -> MixedSamples {
+        let distances = Distances { front: front.clone(), behind: None };
+        MixedSamples::find(&distances, 3.0, &Cancel::new()).unwrap()
     }
 
     /// A near half plane of 2 before a wall of stripes of 5 and 6; the edge passes through column 8 or 9.
@@ -160,6 +159,19 @@ mod tests {
                     _ => assert_eq!(value, plane[(row, column)]),
                 }
             }
+        }
+    }
+
+    #[test]
+    fn what_is_made_up_for_by_a_second_layer_stays() {
+        let (front, plane) = edge([1.0, 0.4]);
+        // Known behind the near side, in the upper half.
+        let behind = Array2::from_shape_fn((12, 20), |(row, column)| if row < 6 && column < 9 { 10.0 } else { 0.0 });
+        let distances = Distances { front, behind: Some(behind) };
+        let unmixed = MixedSamples::find(&distances, 3.0, &Cancel::new()).unwrap().unmixed(&plane).into_owned();
+        for (row, value) in unmixed.column(9).iter().enumerate() {
+            // The row beside the known half has known neighbors.
+            assert_eq!(*value == plane[(row, 9)], row < 7, "{row}: {value}");
         }
     }
 

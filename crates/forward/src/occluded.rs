@@ -6,7 +6,7 @@ use dioptric_spectrum::{Cancel, Cancelled, DepthMap};
 use ndarray::Array2;
 
 use crate::{
-    BlurMode, SceneGeometry, Settings,
+    SceneGeometry, Settings,
     hidden::{EdgeRule, Fill, reach_of_edges},
     layers::Layers,
     sampler::LayerCoordinates,
@@ -37,38 +37,48 @@ pub(crate) struct Guesses {
 /// How much farther than the first surface something must lie to be known as behind it, of a jump of depth: roundings.
 const LEAST_BEHIND: f32 = 0.05;
 
-/// Whether something at one distance is known to be behind what is at another.
-pub(crate) fn is_behind(distance: f32, front: f32, jump: f32) -> bool {
-    distance > front + LEAST_BEHIND * jump
+/// Where the samples of a scene lie, in pixels of blur radius behind the nearest.
+pub(crate) struct Distances {
+    pub(crate) front: Array2<f32>,
+    /// Those of a second layer, where one is given.
+    pub(crate) behind: Option<Array2<f32>>,
+}
+
+impl Distances {
+    /// Returns those of a scene among layers.
+    pub(crate) fn of(scene: &SceneGeometry<'_>, layers: &Layers, cancel: &Cancel) -> Result<Self, Cancelled> {
+        let distances = |depth: &DepthMap| {
+            let z_m = depth.z_m();
+            plane_of(z_m.dim(), cancel, |row, column| layers.distance_px(z_m[(row, column)]))
+        };
+        Ok(Self { front: distances(scene.depth)?, behind: scene.occluded_depth.map(distances).transpose()? })
+    }
+
+    /// Whether it is known what lies behind a sample.
+    pub(crate) fn is_known_behind(&self, at: (usize, usize), jump: f32) -> bool {
+        self.behind.as_ref().is_some_and(|behind| behind[at] > self.front[at] + LEAST_BEHIND * jump)
+    }
 }
 
 impl OccludedSamples {
     /// Finds where blurred edges show what lies behind them.
     pub(crate) fn find(
-        scene: &SceneGeometry<'_>,
+        distances: &Distances,
         layers: &Layers,
         settings: &Settings,
         scene_per_film: f64,
         cancel: &Cancel,
     ) -> Result<Self, Cancelled> {
-        if layers.len() == 1 || settings.mode == BlurMode::Pointwise {
-            return Ok(Self::Nothing);
-        }
         let reach =
             |distance: f32| layers.radius_px_at(layers.coordinate_of_distance(distance)) as f32 * scene_per_film as f32;
         let rule = EdgeRule { jump: settings.depth_edge_px as f32, reach: &reach };
-        let size = scene.size();
-        let distances = |depth: &DepthMap| {
-            let z_m = depth.z_m();
-            plane_of(size, cancel, |row, column| layers.distance_px(z_m[(row, column)]))
-        };
-        let front = distances(scene.depth)?;
-        if let Some(depth) = scene.occluded_depth {
-            let (known, reach) = (distances(depth)?, reach_of_edges(&front, &rule, cancel)?);
-            let fill = Fill::find(&front, &rule, cancel)?;
+        let Distances { front, behind } = distances;
+        let size = front.dim();
+        if let Some(known) = behind {
+            let reach = reach_of_edges(front, &rule, cancel)?;
+            let fill = Fill::find(front, &rule, cancel)?;
             let is_guessed = |row: usize, column: usize| {
-                let is_known = is_behind(known[(row, column)], front[(row, column)], rule.jump);
-                !is_known && !fill.distances[(row, column)].is_nan()
+                !distances.is_known_behind((row, column), rule.jump) && !fill.distances[(row, column)].is_nan()
             };
             let place = |row: usize, column: usize| {
                 if is_guessed(row, column) {
@@ -85,7 +95,7 @@ impl OccludedSamples {
             let guesses = if places.is_empty() { None } else { Some(Box::new(Guesses { fill, places })) };
             return Ok(Self::Known { guesses, layer_coordinates });
         }
-        let fill = Fill::find(&front, &rule, cancel)?;
+        let fill = Fill::find(front, &rule, cancel)?;
         if fill.is_empty() {
             return Ok(Self::Nothing);
         }

@@ -135,10 +135,10 @@ mod tests {
         lens.with_moves(moves).unwrap()
     }
 
-    fn settings(n: f64) -> BankSettings {
+    fn settings() -> BankSettings {
         let corners = (DVec2::new(-0.3, -0.2), DVec2::new(0.3, 0.2));
         let grid = BankSettings::covering_grid(52.0, corners, (0.2, 1.0), (450.0, 650.0), Diffraction::default());
-        BankSettings { n_rings: 8, n_azimuths: n as usize, ..grid.coarse() }
+        BankSettings { n_rings: 8, n_azimuths: 32, ..grid.coarse() }
     }
 
     #[test]
@@ -161,7 +161,7 @@ mod tests {
             ([0.0, 4.0, 0.0], [1e-9, 4.0, 0.0], 2),
             ([0.0; 3], [1e-9, 1e-9, 0.0], 4),
         ] {
-            let settings = settings(32.0);
+            let settings = settings();
             let of = |tilt_deg| GeneralBank::build(&tilted(tilt_deg), &settings, &|_| {}, &Cancel::new()).unwrap();
             let (mirrored, traced) = (of(tilt_deg), of(spoilt_deg));
             let (tans_x, tans_y) = settings.fields.axes();

@@ -102,7 +102,7 @@ pub(crate) const CHANGED: &[(&str, &str, &str)] = &[
         r#"sensor: File("absent.ron")"#,
         "absent.ron: cannot be read: No such file or directory",
     ),
-    ("ListNm([450.0, 550.0, 650.0])", "ListNm([])", "wavelengths must be finite, positive and ascending, but"),
+    ("ListNm([450.0, 550.0, 650.0])", "ListNm([])", "ListNm is no wavelength, expected 1 or more"),
     (
         "ListNm([450.0, 550.0, 650.0])",
         "ListNm([550.0, 450.0])",

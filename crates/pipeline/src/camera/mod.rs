@@ -288,6 +288,35 @@ impl Camera {
     }
 
     fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
+        self.check_lens(checker)?;
+        self.check_film(checker)?;
+        if let Err(PsfError::Setting { key, found, expected }) = self.diffraction.check() {
+            checker.wrong(key, &found.to_string(), expected)?;
+        }
+        if let BankSpec::Within { error } = self.bank {
+            checker.positive("error", error)?;
+        }
+        self.blur.check(self.diffraction, self.bank, checker)?;
+        self.exposure.check().map_err(|error| checker.of_sensor(error))?;
+        match &self.wavelengths {
+            WavelengthSpec::Scene => {}
+            WavelengthSpec::Range { first_nm, last_nm, step_nm } => {
+                checker.positive("first_nm", *first_nm)?;
+                checker.positive("last_nm", *last_nm)?;
+                checker.positive("step_nm", *step_nm)?;
+            }
+            WavelengthSpec::ListNm(list) if list.is_empty() => checker.wrong("ListNm", "no wavelength", "1 or more")?,
+            WavelengthSpec::ListNm(list) => list.iter().try_for_each(|&nm| checker.positive("ListNm", nm))?,
+        }
+        self.frames.check()?;
+        if let Some(spec) = &self.light_field {
+            spec.check(checker)?;
+        }
+        self.scene.check(checker)
+    }
+
+    /// Checks the lens, its stop, focus and movements.
+    fn check_lens(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
         if let LensSpec::Changed { lens, .. } = &self.lens
             && let LensSpec::Changed { .. } = **lens
         {
@@ -321,6 +350,11 @@ impl Camera {
         {
             checker.finite(key, value)?;
         }
+        Ok(())
+    }
+
+    /// Checks the film, and what goes with a part of it or an array before it.
+    fn check_film(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
         if let FilmSpec::Pixels { columns, rows, pitch_um } = self.film {
             checker.count("columns", columns, 1..=65_536)?;
             checker.count("rows", rows, 1..=65_536)?;
@@ -339,28 +373,7 @@ impl Camera {
                 "are for the picture of a lens, expected none where an array stands before the film".to_owned();
             return Err(PipelineError::Unsuitable { what: "lens_corrections", reason });
         }
-        if let Err(PsfError::Setting { key, found, expected }) = self.diffraction.check() {
-            checker.wrong(key, &found.to_string(), expected)?;
-        }
-        if let BankSpec::Within { error } = self.bank {
-            checker.positive("error", error)?;
-        }
-        self.blur.check(self.diffraction, self.bank, checker)?;
-        self.exposure.check().map_err(|error| checker.of_sensor(error))?;
-        match &self.wavelengths {
-            WavelengthSpec::Scene => {}
-            WavelengthSpec::Range { first_nm, last_nm, step_nm } => {
-                checker.positive("first_nm", *first_nm)?;
-                checker.positive("last_nm", *last_nm)?;
-                checker.positive("step_nm", *step_nm)?;
-            }
-            WavelengthSpec::ListNm(list) => list.iter().try_for_each(|&nm| checker.positive("ListNm", nm))?,
-        }
-        self.frames.check()?;
-        if let Some(spec) = &self.light_field {
-            spec.check(checker)?;
-        }
-        self.scene.check(checker)
+        Ok(())
     }
 
     /// Takes paths as relative to a folder; absolute ones stay.

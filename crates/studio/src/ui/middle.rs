@@ -16,7 +16,7 @@ const DIFFERENCE_GAIN: f32 = 4.0;
 
 impl Studio {
     pub(super) fn middle(&mut self, ui: &mut Ui, camera: &mut Camera) {
-        // What is under the pointer is told only where there is a picture under it.
+        // What is under the pointer is shown only where there is a picture under it.
         self.hover = None;
         ui.horizontal(|ui| {
             for (tab, name) in [
