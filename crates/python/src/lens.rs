@@ -14,19 +14,17 @@ use dioptric_pipeline::{
     Camera, Diffraction, FocusSpec, Given, KeptCamera, LensReadOptions, LensSpec, MissingGlass, PipelineError,
     REFERENCE_WAVELENGTH_NM, StopSpec,
 };
-use ndarray::{ArrayD, ArrayView2, ArrayViewD, Axis, IxDyn};
-use numpy::PyReadonlyArrayDyn;
+use ndarray::{ArrayD, IxDyn};
 use pyo3::{
     prelude::*,
     types::{PyDict, PyType},
 };
-use rayon::prelude::*;
 
 use crate::{
     errors::{exception, guarded, wrong},
-    input::{array_f64, is_single, number, numbers},
+    input::{is_single, number, numbers},
     options::{count, diffraction, each_option, with_gamma},
-    rays::Rays,
+    rays::{GivenRays, Rays},
     serial::to_python,
     view::view,
     worker::{Follower, install, run},
@@ -331,16 +329,8 @@ impl Lens {
         film_mm: Option<f64>,
         clip: bool,
     ) -> PyResult<Rays> {
-        let points = array_f64("origins", origins, "(n, 3) or (3,)", &[1, 2])?;
-        let heads = array_f64("directions", directions, "(n, 3) or (3,)", &[1, 2])?;
-        let (points, heads) = (rows_of("origins", &points)?, rows_of("directions", &heads)?);
-        if points.dim() != heads.dim() {
-            return Err(wrong(
-                "directions",
-                format!("{} rows", heads.nrows()),
-                &format!("{}, as origins", points.nrows()),
-            ));
-        }
+        let given = GivenRays::read(origins, directions)?;
+        let given = given.rows();
         if let Some(film_mm) = film_mm.filter(|mm| !mm.is_finite()) {
             return Err(wrong("film_mm", film_mm, "a finite number"));
         }
@@ -351,16 +341,15 @@ impl Lens {
                 mono.to_film(rays, film_mm);
             }
         };
-        // The arrays are read with the interpreter's lock held, so that no other thread writes to them meanwhile.
-        if points.nrows() <= FEW_RAYS {
+        if given.len() <= FEW_RAYS {
             return guarded(|| {
-                let mut rays = batch_of(&points, &heads)?;
+                let mut rays = given.batch()?;
                 mono.trace(&mut rays, rims);
                 to_film(&mut rays);
                 Ok(Rays::new(rays))
             });
         }
-        let mut rays = install(py, || batch_of(&points, &heads))??;
+        let mut rays = install(py, || given.batch_parallel())??;
         run(py, &Follower::nobody(), |_, _| {
             mono.trace_parallel(&mut rays, rims);
             to_film(&mut rays);
@@ -641,54 +630,5 @@ impl PsfOptions {
 
     fn compute(&self, py: Python<'_>, lens: &Lens) -> PyResult<PsfSet> {
         run(py, &Follower::nobody(), |_, _| -> Result<PsfSet, PipelineError> { self.request.compute(&lens.file.lens) })
-    }
-}
-
-/// Returns an array of rows of three numbers; a single row may lack its axis.
-fn rows_of<'a>(key: &str, array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<ArrayView2<'a, f64>> {
-    let view: ArrayViewD<'a, f64> = array.as_array();
-    let shape = view.shape().to_vec();
-    let view = if view.ndim() == 1 { view.insert_axis(Axis(0)) } else { view };
-    let rows = view.into_dimensionality().ok().filter(|rows: &ArrayView2<'a, f64>| rows.ncols() == 3);
-    rows.ok_or_else(|| wrong(key, format!("of shape {shape:?}"), "an array of shape (n, 3) or (3,)"))
-}
-
-/// Returns rays from rows of points and directions.
-fn batch_of(points: &ArrayView2<'_, f64>, heads: &ArrayView2<'_, f64>) -> PyResult<RayBatch> {
-    const AT_ONCE: usize = 16_384;
-    let n = points.nrows();
-    let mut rays = RayBatch::with_capacity(0);
-    let fill = |rows: &ArrayView2<'_, f64>, column: usize| -> Vec<f64> {
-        let column = rows.column(column);
-        let mut list = vec![0.0; n];
-        let part = |(number, part): (usize, &mut [f64])| {
-            let first = number * AT_ONCE;
-            part.iter_mut().zip(column.iter().skip(first)).for_each(|(to, from)| *to = *from);
-        };
-        match n <= AT_ONCE {
-            true => list.chunks_mut(AT_ONCE).enumerate().for_each(part),
-            false => list.par_chunks_mut(AT_ONCE).enumerate().for_each(part),
-        }
-        list
-    };
-    (rays.x_mm, rays.y_mm, rays.z_mm) = (fill(points, 0), fill(points, 1), fill(points, 2));
-    (rays.l, rays.m, rays.n) = (fill(heads, 0), fill(heads, 1), fill(heads, 2));
-    rays.opl_mm = vec![0.0; n];
-    rays.fate = vec![dioptric_optics::RayFate::InFlight; n];
-    for ray in 0..n {
-        let (l, m, cosine) = (rays.l[ray], rays.m[ray], rays.n[ray]);
-        let squared = l * l + m * m + cosine * cosine;
-        if (squared - 1.0).abs() > 1e-15 {
-            let length = squared.sqrt();
-            if !(length.is_finite() && length > 0.0) {
-                return Err(wrong("directions", format!("[{l}, {m}, {cosine}] in row {ray}"), "a direction"));
-            }
-            (rays.l[ray], rays.m[ray], rays.n[ray]) = (l / length, m / length, cosine / length);
-        }
-    }
-    let is_finite = |list: &Vec<f64>| list.iter().all(|value| value.is_finite());
-    match is_finite(&rays.x_mm) && is_finite(&rays.y_mm) && is_finite(&rays.z_mm) {
-        true => Ok(rays),
-        false => Err(wrong("origins", "not finite somewhere", "finite numbers")),
     }
 }

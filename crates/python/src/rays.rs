@@ -1,12 +1,131 @@
-//! Rays that were traced.
+//! Rays that are given as arrays, and rays that were traced.
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
-use dioptric_optics::{RayBatch, RayFate};
+use dioptric_optics::{RayBatch, RayFate, glam::DVec3};
 use ndarray::{Array2, ArrayView1};
+use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::view::{list, view};
+use crate::{
+    errors::wrong,
+    input::array_f64,
+    view::{list, view},
+};
+
+/// Points and directions of rays as Python gave them.
+pub(crate) struct GivenRays<'py> {
+    origins: PyReadonlyArrayDyn<'py, f64>,
+    directions: PyReadonlyArrayDyn<'py, f64>,
+}
+
+impl<'py> GivenRays<'py> {
+    /// Reads two arrays of shape (n, 3), or (3,) for a single ray.
+    pub(crate) fn read(origins: &Bound<'py, PyAny>, directions: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let (origins, directions) = (read_rows("origins", origins)?, read_rows("directions", directions)?);
+        let (n_origins, n_directions) = (origins.len() / 3, directions.len() / 3);
+        match n_origins == n_directions {
+            true => Ok(Self { origins, directions }),
+            false => Err(wrong("directions", format!("{n_directions} rows"), &format!("{n_origins}, as origins"))),
+        }
+    }
+
+    /// Returns the rays to read while the interpreter's lock is held, so that no other thread writes to the arrays meanwhile.
+    pub(crate) fn rows(&self) -> RayRows<'_> {
+        let (origins, directions) = (Rows::new(&self.origins), Rows::new(&self.directions));
+        RayRows { n_rays: self.origins.len() / 3, origins, directions }
+    }
+}
+
+/// Reads an array of shape (n, 3) or (3,).
+fn read_rows<'py>(key: &str, value: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    const SHAPE: &str = "(n, 3) or (3,)";
+    let array = array_f64(key, value, SHAPE, &[1, 2])?;
+    match array.shape().last() {
+        Some(3) => Ok(array),
+        _ => Err(wrong(key, format!("of shape {:?}", array.shape()), &format!("an array of shape {SHAPE}"))),
+    }
+}
+
+/// Rows of three numbers, in the order that they lie in memory.
+enum Rows<'a> {
+    /// One row after the other.
+    ByRow(Cow<'a, [f64]>),
+    /// One column after the other, as where an array of shape (3, n) is transposed.
+    ByColumn([&'a [f64]; 3]),
+}
+
+impl<'a> Rows<'a> {
+    /// Shares the numbers of an array of shape (n, 3) or (3,), or copies them where they lie in yet another order.
+    fn new(array: &'a PyReadonlyArrayDyn<'_, f64>) -> Self {
+        let view = array.as_array();
+        if let Some(rows) = view.to_slice() {
+            return Self::ByRow(Cow::Borrowed(rows));
+        }
+        let columns = view.clone().reversed_axes().to_slice().filter(|_| view.ndim() == 2);
+        match columns.map(|columns| columns.split_at(columns.len() / 3)) {
+            Some((x, rest)) => {
+                let (y, z) = rest.split_at(x.len());
+                Self::ByColumn([x, y, z])
+            }
+            None => Self::ByRow(Cow::Owned(view.iter().copied().collect())),
+        }
+    }
+
+    fn row(&self, row: usize) -> DVec3 {
+        match self {
+            Self::ByRow(rows) => DVec3::from_slice(&rows[3 * row..3 * row + 3]),
+            Self::ByColumn([x, y, z]) => DVec3::new(x[row], y[row], z[row]),
+        }
+    }
+}
+
+/// Points and directions of so many rays.
+pub(crate) struct RayRows<'a> {
+    n_rays: usize,
+    origins: Rows<'a>,
+    directions: Rows<'a>,
+}
+
+impl RayRows<'_> {
+    /// The number of rays.
+    pub(crate) fn len(&self) -> usize {
+        self.n_rays
+    }
+
+    /// Returns the rays, made in this thread.
+    pub(crate) fn batch(&self) -> PyResult<RayBatch> {
+        let mut rays = RayBatch::with_capacity(self.len());
+        for ray in 0..self.len() {
+            let (point_mm, direction) = self.ray(ray)?;
+            rays.push(point_mm, direction, 0.0);
+        }
+        Ok(rays)
+    }
+
+    /// Returns the rays, made on the threads of the current pool.
+    pub(crate) fn batch_parallel(&self) -> PyResult<RayBatch> {
+        RayBatch::try_from_fn(self.len(), |ray| self.ray(ray))
+    }
+
+    /// Returns a ray's point and unit direction.
+    fn ray(&self, ray: usize) -> PyResult<(DVec3, DVec3)> {
+        let (point_mm, direction) = (self.origins.row(ray), self.directions.row(ray));
+        if !point_mm.is_finite() {
+            return Err(wrong("origins", format!("{point_mm} in row {ray}"), "finite numbers"));
+        }
+        let squared = direction.length_squared();
+        // Directions that are of unit length to their last digit stay as they are.
+        if (squared - 1.0).abs() <= 1e-15 {
+            return Ok((point_mm, direction));
+        }
+        let length = squared.sqrt();
+        match length.is_finite() && length > 0.0 {
+            true => Ok((point_mm, direction / length)),
+            false => Err(wrong("directions", format!("{direction} in row {ray}"), "a direction")),
+        }
+    }
+}
 
 /// Rays where a trace left them: on the last surface or on the film, bent into the image space, or where they ended.
 ///

@@ -72,7 +72,10 @@ def test_strided_and_integer_arrays_are_taken(gauss: dp.Lens) -> None:
     padded = np.zeros((40, 7))
     padded[:, ::3] = origins
     assert np.array_equal(gauss.trace(padded[:, ::3], directions).x_mm, gauss.trace(origins, directions).x_mm)
+    columns = np.asfortranarray(origins)
+    assert np.array_equal(gauss.trace(columns, directions).x_mm, gauss.trace(origins, directions).x_mm)
     assert len(gauss.trace([[0, 1, -5]], [[0, 0, 1]])) == 1
+    assert len(gauss.trace(np.zeros((0, 3)), np.zeros((0, 3)))) == 0
 
 
 def test_arrays_of_other_shapes_are_named(gauss: dp.Lens) -> None:
@@ -81,7 +84,9 @@ def test_arrays_of_other_shapes_are_named(gauss: dp.Lens) -> None:
         (np.zeros((2, 2, 3)), np.zeros((4, 3)), r"origins is of shape \[2, 2, 3\], expected"),
         (np.zeros((4, 3)), np.ones((5, 3)), "directions is 5 rows, expected 4, as origins"),
         (np.zeros((4, 3)), np.zeros((4, 3)), r"directions is \[0, 0, 0\] in row 0, expected a direction"),
-        (np.full((4, 3), np.nan), np.ones((4, 3)), "origins is not finite somewhere"),
+        (np.full((4, 3), np.nan), np.ones((4, 3)), r"origins is \[NaN, NaN, NaN\] in row 0, expected finite numbers"),
+        (np.zeros((4, 3)), np.array([[0, 0, 1.0]] * 3 + [[0, np.nan, 1]]), r"directions is \[0, NaN, 1\] in row 3"),
+        (np.zeros((900, 3)), np.array([[0, 0, 1.0]] * 899 + [[0, np.inf, 1]]), r"directions is \[0, inf, 1\] in row 899"),
     ]:
         with pytest.raises(ValueError, match=words):
             gauss.trace(origins, directions)
