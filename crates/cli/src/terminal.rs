@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use dioptric_pipeline::{PipelineError, SceneLack, Staged};
+use dioptric_pipeline::{PipelineError, SceneLack, Staged, has_kept_bands};
 use dioptric_report::{DRAWS_PNG, PNG_REMEDY};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -93,11 +93,17 @@ pub(crate) fn remark_on_png(quiet: bool) {
     }
 }
 
-/// Removes half-written results when the user interrupts the program.
+/// Removes half-written results when the user interrupts the program, but for bands from which the same run can go on.
 pub(crate) fn remove_partial_files_on_interrupt() {
     let removed = ctrlc::set_handler(|| {
         let partial = PARTIAL.lock().unwrap_or_else(PoisonError::into_inner);
-        partial.iter().for_each(|path| remove(path));
+        let (kept, unfinished): (Vec<_>, Vec<_>) = partial.iter().partition(|path| has_kept_bands(path));
+        unfinished.into_iter().for_each(|path| remove(path));
+        for folder in kept {
+            // Standard error may be closed too; then there is nobody to tell.
+            let words = "with --resume the same command goes on from its bands, and without removes them";
+            let _ = writeln!(io::stderr(), "\ninterrupted; {} is kept: {words}", folder.display());
+        }
         std::process::exit(INTERRUPTED);
     });
     // Without a handler an interrupt still ends the program; only hidden partial files may stay.

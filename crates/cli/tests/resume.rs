@@ -9,7 +9,7 @@ use std::{
     fs,
     hash::{DefaultHasher, Hash, Hasher},
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::{Child, Command, Output, Stdio},
     thread::sleep,
     time::Duration,
 };
@@ -49,11 +49,16 @@ fn leftovers(folder: &Path) -> Vec<PathBuf> {
 
 /// Runs the camera and kills it once so many bands are finished, and a moment later; returns how many there were then.
 fn kill_after(folder: &Path, out: &str, bands: u64, delay: Duration) -> u64 {
+    end_after(folder, out, bands, delay, |run| run.kill().unwrap()).0
+}
+
+/// Ends a run in another way; returns how many bands are left, and what it printed.
+fn end_after(folder: &Path, out: &str, bands: u64, delay: Duration, end: impl FnOnce(&mut Child)) -> (u64, Output) {
     let mut run = Command::new(env!("CARGO_BIN_EXE_dioptric"))
         .args(["run", "camera.ron", "--out", out, "--quiet", "--threads", "1"])
         .env("DIOPTRIC_CACHE", "")
         .current_dir(folder)
-        .stderr(Stdio::null())
+        .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     let finished = || {
@@ -64,9 +69,9 @@ fn kill_after(folder: &Path, out: &str, bands: u64, delay: Duration) -> u64 {
         sleep(Duration::from_micros(200));
     }
     sleep(delay);
-    run.kill().unwrap();
-    run.wait().unwrap();
-    finished()
+    end(&mut run);
+    let output = run.wait_with_output().unwrap();
+    (finished(), output)
 }
 
 /// Killed at ten moments, of which some are before the first band and some after the last, a run continues to the same bytes.
@@ -90,6 +95,34 @@ fn killed_runs_continue_to_the_same_bits() {
         n_continued += u32::from(left > 0 && !said.contains("starts from the beginning"));
     }
     assert!(n_continued >= 5, "{n_continued} of 10 were continued");
+}
+
+/// An interrupted run keeps its bands, names the folder and how to go on, and leaves nothing where there are none yet.
+#[cfg(unix)]
+#[test]
+fn interrupted_runs_keep_their_bands() {
+    let folder = folder();
+    let interrupt = |run: &mut Child| {
+        let sent = Command::new("kill").args(["-INT", &run.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+    };
+    for bands in [0, 2] {
+        let (left, output) = end_after(folder.path(), "out", bands, Duration::from_millis(60), interrupt);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        if output.status.code() != Some(130) {
+            // The run was quicker than the signal, or had not begun to listen to it.
+            assert!(output.status.success() || left == 0, "{said}");
+            continue;
+        }
+        let is_kept = !leftovers(folder.path()).is_empty();
+        assert_eq!(is_kept, said.contains("with --resume the same command goes on"), "{said}");
+        assert!(is_kept || left == 0, "{said}");
+        if left > 0 {
+            let run = dioptric(folder.path(), &["run", "camera.ron", "--out", "out", "--resume"]);
+            assert!(run.status.success() && !String::from_utf8_lossy(&run.stderr).contains("from the beginning"));
+        }
+    }
+    assert!(leftovers(folder.path()).is_empty());
 }
 
 #[test]

@@ -53,6 +53,6 @@ pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,
     IrradianceSummary, KeptCamera, LensAberrations, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene,
-    Resumed, SceneSummary, StageCounts, WorldRender, write_seen_png,
+    Resumed, SceneSummary, StageCounts, WorldRender, has_kept_bands, write_seen_png,
 };
 pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

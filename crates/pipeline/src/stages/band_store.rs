@@ -22,6 +22,11 @@ pub(super) struct BandFolder {
     pub(super) key: String,
 }
 
+/// Whether an unfinished run has kept bands in this folder.
+pub fn has_kept_bands(folder: &Path) -> bool {
+    fs::metadata(folder.join(BANDS)).is_ok_and(|bands| bands.len() > 0)
+}
+
 /// The file of the bands, open.
 pub(super) struct BandStore {
     file: File,

@@ -43,6 +43,7 @@ pub(crate) use frames::{MovedLight, expose};
 pub(crate) use spec::ShutterInputs;
 pub(crate) use watch::Watch;
 
+pub use band_store::has_kept_bands;
 pub use film::{FilmPart, FilmPlace};
 pub use frames::FrameSet;
 pub use given::{Given, GivenParts};
