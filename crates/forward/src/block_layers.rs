@@ -24,6 +24,12 @@ impl BlockLayers {
         Some(RowBlocks { first_column: self.first.1, ranges: ranges.to_slice()? })
     }
 
+    /// Returns blocks that pass nothing over.
+    #[cfg(test)]
+    pub(crate) fn of_everything() -> Self {
+        Self { first: (1 << 40, 0), ranges: Array2::default((0, 0)) }
+    }
+
     pub(crate) fn size_bytes(&self) -> usize {
         self.ranges.len() * size_of::<(u16, u16)>()
     }

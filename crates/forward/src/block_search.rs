@@ -111,7 +111,7 @@ mod tests {
     use dioptric_scene::View;
 
     use super::*;
-    use crate::{DiscLens, Film, geometry::FilmFrame, sampler::Rectangle, tiles::cells_over};
+    use crate::{DiscLens, Film, sampler::Rectangle, tiles::cells_over};
 
     /// What is passed over has nothing: sampled with and without the blocks, a layer is the same to the bit.
     #[test]
@@ -120,7 +120,7 @@ mod tests {
         let lens = DiscLens { focal_mm: 50.0, ..DiscLens::default() };
         let map = lens.film_map(0.5, 550.0, 2.0);
         let view = View { focal_px: 9000.0, center_x_px: 54.5, center_y_px: 44.5 };
-        let sampler = Sampler::new((view, size), FilmFrame::new(&film), &map, 16);
+        let sampler = Sampler::new((view, size), &film, &map, 16);
         let cancel = Cancel::new();
         let coordinate = |(row, column): (usize, usize)| match (row / 20 + column / 30) % 3 {
             0 => 0.25,
@@ -137,7 +137,7 @@ mod tests {
         for layer in 0..8 {
             let sampled =
                 |blocks: &BlockLayers| sampler.sample(rectangle, &map, layer, &surfaces, blocks, &cancel).unwrap();
-            let everything = BlockLayers { first: (1 << 40, 0), ranges: Array2::default((0, 0)) };
+            let everything = BlockLayers::of_everything();
             assert_eq!(sampled(&blocks), sampled(&everything), "{layer}");
             let row = blocks.of_row(10).unwrap();
             n_passed += (0..56).filter(|column| !row.may_have(*column, layer)).count();

@@ -1,7 +1,7 @@
 //! The sampling of point spread functions that a scene and a film need.
 
 use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, OpticsError, PupilBoundary, Vignetting, rays_towards};
-use dioptric_psf::{BankSettings, Diffraction, lens_on_axis};
+use dioptric_psf::{BankSettings, Diffraction, WIDEST_FIELD_TAN, lens_on_axis};
 use dioptric_spectrum::{DepthMap, WavelengthGrid};
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -171,9 +171,6 @@ struct Aim<'a> {
     film_center_mm: DVec2,
 }
 
-/// The widest fields that are sought: 60 is 89°.
-const WIDEST_TAN: f64 = 60.0;
-
 impl Aim<'_> {
     /// Returns where the middle of the light of a field lands, mm, picture frame; `None` where no light gets through.
     fn lands_mm(&self, field_tan: DVec2) -> Option<DVec2> {
@@ -218,7 +215,7 @@ impl Aim<'_> {
         let is_within = |tan: f64| self.lands_mm(DVec2::X * tan).map(|at| at.x.abs() < extent_mm);
         let (mut low, mut high) = (0.0, 0.01);
         // Widen until the light lands beyond, or there is none.
-        while high < WIDEST_TAN && is_within(high) == Some(true) {
+        while high < WIDEST_FIELD_TAN && is_within(high) == Some(true) {
             (low, high) = (high, 1.3 * high);
         }
         for _ in 0..24 {
@@ -282,7 +279,7 @@ impl Aim<'_> {
             })
         };
         let first = FIRST * half_mm / self.lens.first_order().efl_mm.abs();
-        let wide = [first.x, first.y, first.x, first.y].map(|tan| tan.clamp(NARROWEST_TAN, WIDEST_TAN));
+        let wide = [first.x, first.y, first.x, first.y].map(|tan| tan.clamp(NARROWEST_TAN, WIDEST_FIELD_TAN));
         if first.is_finite() && (0..4).all(|side| sees_film(&wide, side)) {
             sides = wide;
         }
@@ -290,7 +287,7 @@ impl Aim<'_> {
         loop {
             let mut has_grown = false;
             for side in (0..4).filter(|side| *side >= 2 || !is_mirrored[*side]) {
-                while sides[side] < WIDEST_TAN && sees_film(&sides, side) {
+                while sides[side] < WIDEST_FIELD_TAN && sees_film(&sides, side) {
                     sides[side] *= 1.15;
                     if is_mirrored[side % 2] {
                         sides[side - 2] = sides[side];

@@ -35,6 +35,7 @@ mod occlusion;
 mod plan;
 mod raster;
 mod render;
+mod sample_density;
 mod sampler;
 mod source;
 mod spec;

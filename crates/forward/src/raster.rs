@@ -3,7 +3,7 @@
 use dioptric_psf::FilmMap;
 use dioptric_scene::View;
 
-use crate::{Film, geometry::FilmFrame, sampler::Sampler};
+use crate::{Film, sampler::Sampler};
 
 /// The most samples of the scene a pixel of the film, each way.
 const MOST_SAMPLES: usize = 16;
@@ -36,7 +36,7 @@ impl LayerRaster {
         let n = |n: usize| if factor == 1 { n } else { n.div_ceil(factor) + 2 };
         let coarse = Film::centered(n(film.rows), n(film.columns), factor as f64 * film.pitch_um);
         let most = if factor == 1 { MOST_SAMPLES } else { MOST_SAMPLES_OF_WIDE };
-        let sampler = Sampler::new(view, FilmFrame::new(&coarse), map, most);
+        let sampler = Sampler::new(view, &coarse, map, most);
         Self { factor, film: coarse, sampler }
     }
 }

@@ -1,11 +1,13 @@
 //! The ideal picture of a layer: what an aberration-free lens of the same geometry would put on the film.
 
+use std::ops::Range;
+
 use dioptric_psf::{FieldsAlong, FilmMap};
 use dioptric_scene::View;
 use dioptric_spectrum::{Cancel, Cancelled};
 use ndarray::{Array2, Axis, parallel::prelude::*};
 
-use crate::{block_layers::BlockLayers, geometry::FilmFrame, layers::tent};
+use crate::{Film, block_layers::BlockLayers, geometry::FilmFrame, layers::tent, sample_density::SampleDensity};
 
 /// A rectangle of film pixels, which may reach beyond the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,20 +102,17 @@ pub(crate) struct Sampler {
     /// Rows and columns of the scene.
     size: (usize, usize),
     pub(crate) frame: FilmFrame,
-    /// Samples a pixel, each way: more than one where the scene is finer than the film.
-    pub(crate) per_pixel: usize,
+    density: SampleDensity,
     /// Samples of the scene a pixel of film, each way, at the axis.
     pub(crate) scene_per_film: f64,
 }
 
 impl Sampler {
-    /// Returns the sampler that takes as many samples a pixel as the scene has at the axis, at most `most` each way.
-    pub(crate) fn new((view, size): (View, (usize, usize)), frame: FilmFrame, map: &FilmMap, most: usize) -> Self {
-        let tan_per_px = map.tan_per_mm(frame.pitch_mm()) * frame.pitch_mm();
-        let scene_per_film = view.focal_px * tan_per_px;
-        // A quarter finer than the film does no harm.
-        let per_pixel = (scene_per_film - 0.25).ceil().clamp(1.0, most as f64) as usize;
-        Self { view, size, frame, per_pixel, scene_per_film }
+    /// Returns the sampler that takes as many samples of each pixel of the film as it sees of the scene, at most `most` each way.
+    pub(crate) fn new((view, size): (View, (usize, usize)), film: &Film, map: &FilmMap, most: usize) -> Self {
+        let frame = FilmFrame::new(film);
+        let scene_per_film = view.focal_px * map.tan_per_mm(frame.pitch_mm()) * frame.pitch_mm();
+        Self { view, size, frame, density: SampleDensity::of(&view, film, map, most), scene_per_film }
     }
 
     /// Returns the ideal picture of a layer within a rectangle, row by row, or `None` where there is nothing of it: irradiance,
@@ -130,21 +129,11 @@ impl Sampler {
         cancel: &Cancel,
     ) -> Result<Option<Vec<f32>>, Cancelled> {
         let mut ideal = vec![0.0; rectangle.rows * rectangle.columns];
-        let n = self.per_pixel;
-        let share = 1.0 / (n * n) as f32;
         let mut has_any = false;
-        // Places of the samples within pixels, mm from the axis.
-        let along = |first: i64, n_pixels: usize| -> Vec<f64> {
-            let place = |k: usize| first as f64 + (k as f64 + 0.5) / n as f64 - 0.5;
-            (0..n * n_pixels).map(place).collect()
-        };
-        let x_mm: Vec<f64> =
-            along(rectangle.first_column, rectangle.columns).iter().map(|&c| self.frame.x_mm(c)).collect();
-        let y_mm: Vec<f64> = along(rectangle.first_row, rectangle.rows).iter().map(|&r| self.frame.y_mm(r)).collect();
-        let (mut seen, mut squares) = (FieldsAlong::default(), Squares::default());
-        let lines = y_mm.chunks_exact(n).zip(ideal.chunks_exact_mut(rectangle.columns));
-        for (row, (y_mm, line)) in (rectangle.first_row..).zip(lines) {
+        let (mut x_mm, mut seen, mut squares) = (Vec::new(), FieldsAlong::default(), Squares::default());
+        for (down, line) in ideal.chunks_exact_mut(rectangle.columns).enumerate() {
             cancel.check()?;
+            let row = rectangle.first_row + down as i64;
             let blocks = blocks.of_row(row);
             let mut start = 0;
             while start < rectangle.columns {
@@ -152,9 +141,13 @@ impl Sampler {
                     Some(blocks) => blocks.next_run(rectangle.first_column, start..rectangle.columns, layer),
                     None => start..rectangle.columns,
                 };
-                let pixels = &mut line[run.clone()];
-                for &y_mm in y_mm {
-                    map.along(&x_mm[n * run.start..n * run.end], y_mm, &mut seen);
+                let (run, n) = self.density.first_run(row, rectangle.first_column, run);
+                start = run.end;
+                x_mm.clear();
+                x_mm.extend(within(rectangle.first_column, run.clone(), n).map(|column| self.frame.x_mm(column)));
+                let pixels = &mut line[run];
+                for row in within(rectangle.first_row, down..down + 1, n) {
+                    map.along(&x_mm, self.frame.y_mm(row), &mut seen);
                     self.locate(&seen, &mut squares);
                     for (pixel, first) in pixels.iter_mut().zip((0..).step_by(n)) {
                         for at in first..first + n {
@@ -162,8 +155,8 @@ impl Sampler {
                         }
                     }
                 }
+                let share = 1.0 / (n * n) as f32;
                 pixels.iter_mut().for_each(|pixel| *pixel *= share);
-                start = run.end;
             }
         }
         Ok(has_any.then_some(ideal))
@@ -207,6 +200,11 @@ impl Sampler {
         }
         has_any
     }
+}
+
+/// Returns the places of `n` samples within each of a range of pixels, counted from a row or column, as rows or columns of the film.
+fn within(first: i64, pixels: Range<usize>, n: usize) -> impl Iterator<Item = f64> {
+    (n * pixels.start..n * pixels.end).map(move |k| first as f64 + (k as f64 + 0.5) / n as f64 - 0.5)
 }
 
 /// Squares between four samples of the scene in which places lie; beyond the edge of the scene, at the edge.

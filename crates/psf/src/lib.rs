@@ -66,4 +66,4 @@ pub use metrics::{Picture, Profile};
 pub use model::LensImageModel;
 pub use pupil_division::PupilDivision;
 pub use raster::Raster;
-pub use settings::{BankSettings, Diffraction, FieldSampling, Interpolation, SampleCounts};
+pub use settings::{BankSettings, Diffraction, FieldSampling, Interpolation, SampleCounts, WIDEST_FIELD_TAN};

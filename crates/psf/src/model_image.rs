@@ -5,7 +5,8 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use crate::{
-    FilmMap, Kernel, LensImage, LensImageModel, PsfError, PsfQuery, RadialMap, model::Form, part_image::PartImage,
+    FilmMap, Kernel, LensImage, LensImageModel, PsfError, PsfQuery, RadialMap, WIDEST_FIELD_TAN, model::Form,
+    part_image::PartImage,
 };
 
 impl LensImage for LensImageModel {
@@ -23,8 +24,10 @@ impl LensImage for LensImageModel {
 
     fn is_dark_beyond_extent(&self) -> bool {
         match &self.form {
-            // Along a radius the fields that see no light are left out.
-            Form::Rotational(bank) => bank.n_fields() < bank.settings().fields.len(),
+            // Along a radius the fields that see no light are left out; none holds more than the widest.
+            Form::Rotational(bank) => {
+                bank.n_fields() < bank.settings().fields.len() || bank.last_field_tan() >= WIDEST_FIELD_TAN
+            }
             Form::General { bank, field_to_film } => {
                 field_to_film.as_ref().is_some_and(|inverse| inverse.is_dark_at_rim(bank))
             }

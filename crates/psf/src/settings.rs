@@ -171,6 +171,10 @@ pub struct BankSettings {
     pub interpolation: Interpolation,
 }
 
+/// The tangent of the widest fields worth sampling, of 89.05°: a scene is a perspective picture, which never shows half of a space, and
+/// what a fisheye lens sees beyond this is darkness to it.
+pub const WIDEST_FIELD_TAN: f64 = 60.0;
+
 impl BankSettings {
     /// Returns settings that cover these ranges at 9 fields, 9 depths and 4 wavelengths, evenly spaced in angle,
     /// in dioptres and in 1/λ², with 12 × 48 rays each: the error of an interpolated blur is about 1 %.
