@@ -21,6 +21,7 @@ use crate::{
     lateral_color::LateralColor,
     layers::{Blurs, Layers},
     mixed::MixedSamples,
+    narrow::NarrowRule,
     occluded::{Distances, OccludedSamples},
     occlusion::{BlurredPlane, Composite, LayerAlpha},
     raster::LayerRaster,
@@ -47,6 +48,8 @@ pub(crate) struct SceneLayers {
     pub(crate) occluded: OccludedSamples,
     /// Samples that show both sides of an edge of depth.
     mixed: MixedSamples,
+    /// The share of samples on surfaces narrower than the pupil.
+    pub(crate) narrow_fraction: f64,
 }
 
 impl SceneLayers {
@@ -83,17 +86,20 @@ impl SceneLayers {
         let layer_coordinates = LayerCoordinates::new(plane_of(z_m.dim(), cancel, coordinate)?, cancel)?;
         let nearest = lens.film_map(layers.dioptres()[0], middle_nm, extent_mm);
         let scene_per_film = LayerRaster::new(film, 1, (scene.view, scene.size()), &nearest).sampler.scene_per_film;
-        let (occluded, mixed) = match hides(settings, &layers) {
+        let (occluded, mixed, narrow_fraction) = match hides(settings, &layers) {
             true => {
                 let distances = Distances::of(scene, &layers, cancel)?;
+                let jump = settings.depth_edge_px as f32;
+                let narrow = NarrowRule { jump, scene_per_film: scene_per_film as f32 };
                 (
                     OccludedSamples::find(&distances, &layers, settings, scene_per_film, cancel)?,
-                    MixedSamples::find(&distances, settings.depth_edge_px as f32, cancel)?,
+                    MixedSamples::find(&distances, jump, cancel)?,
+                    narrow.fraction(&distances.front, cancel)?,
                 )
             }
-            false => (OccludedSamples::Nothing, MixedSamples::default()),
+            false => (OccludedSamples::Nothing, MixedSamples::default(), 0.0),
         };
-        Ok(Self { layers, kernel_bands, basis_bands, layer_coordinates, occluded, mixed })
+        Ok(Self { layers, kernel_bands, basis_bands, layer_coordinates, occluded, mixed, narrow_fraction })
     }
 
     /// Rows and columns of the scene.

@@ -30,6 +30,7 @@ mod lateral_color;
 mod layers;
 mod layout;
 mod mixed;
+mod narrow;
 mod occluded;
 mod occlusion;
 mod plan;

@@ -62,6 +62,14 @@ impl std::fmt::Debug for ImagingPlan {
 }
 
 impl ImagingPlan {
+    /// The share of the scene's samples on surfaces that are narrower than the pupil before what lies behind them, along rows or columns.
+    ///
+    /// Layers know how much of a pixel such a surface covers, not through which part of the pupil: where both it and what is behind it are out of
+    /// focus, [`BlurMode::Views`](crate::BlurMode::Views) tells them apart.
+    pub fn narrow_fraction(&self) -> f64 {
+        self.views.first().scene.narrow_fraction
+    }
+
     /// Plans the imaging of a scene geometry: layers of depth, what their edges hide, and where PSFs are needed.
     ///
     /// `progress` receives the fraction that is done, from 0 to 1.

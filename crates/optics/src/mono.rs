@@ -416,6 +416,17 @@ impl MonoLens {
         trace::trace_batch(&plan, Goal::Film { film_distance_mm }, rays.slices());
     }
 
+    /// As [`trace_to_film`](Self::trace_to_film), on the threads of the current rayon pool, to the same bits.
+    pub fn trace_to_film_parallel(&self, rays: &mut RayBatch, rims: Vignetting, film_distance_mm: f64) {
+        if !self.has_plain_film() {
+            self.trace_parallel(rays, rims);
+            return self.to_film(rays, film_distance_mm);
+        }
+        let plan = Plan::new(&self.steps_for(rays.object_z_mm), 0, rims);
+        let goal = Goal::Film { film_distance_mm };
+        rays.par_slices(CHUNK).with_max_len(1).for_each(|chunk| trace::trace_batch(&plan, goal, chunk));
+    }
+
     /// Traces rays in single precision through all surfaces and straight on to the film, `film_distance_mm` behind the last
     /// vertex.
     ///

@@ -52,7 +52,7 @@ pub use sense::{SenseRequest, Sensed};
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,
-    IrradianceSummary, KeptCamera, LensAberrations, RESUME_FILE, RenderingSummary, ResolvedLens, ResolvedScene,
-    Resumed, SceneSummary, StageCounts, WorldRender, has_kept_bands, write_seen_png,
+    IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, RESUME_FILE, RenderingSummary, ResolvedLens,
+    ResolvedScene, Resumed, SceneSummary, StageCounts, WorldRender, has_kept_bands, write_seen_png,
 };
 pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

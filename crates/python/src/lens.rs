@@ -9,7 +9,7 @@ use dioptric_analysis::{
     AnalysisFields, AnalysisFilm, AnalysisRequest, LensData, LensDefaults, LensInfoRequest, PsfRequest, PsfSampling,
     PsfSet, built_in_lenses, surface_rows,
 };
-use dioptric_optics::{Layout, LensFile, MonoLens, RayBatch, ReadOptions, Vignetting};
+use dioptric_optics::{Layout, LensFile, MonoLens, ReadOptions, Vignetting};
 use dioptric_pipeline::{
     Camera, Diffraction, FocusSpec, Given, KeptCamera, LensReadOptions, LensSpec, MissingGlass, PipelineError,
     REFERENCE_WAVELENGTH_NM, StopSpec,
@@ -336,23 +336,22 @@ impl Lens {
         }
         let mono = guarded(|| self.mono(wavelength_nm))?;
         let rims = if clip { Vignetting::On } else { Vignetting::Off };
-        let to_film = |rays: &mut RayBatch| {
-            if let Some(film_mm) = film_mm {
-                mono.to_film(rays, film_mm);
-            }
-        };
         if given.len() <= FEW_RAYS {
             return guarded(|| {
                 let mut rays = given.batch()?;
-                mono.trace(&mut rays, rims);
-                to_film(&mut rays);
+                match film_mm {
+                    Some(film_mm) => mono.trace_to_film(&mut rays, rims, film_mm),
+                    None => mono.trace(&mut rays, rims),
+                }
                 Ok(Rays::new(rays))
             });
         }
         let mut rays = install(py, || given.batch_parallel())??;
         run(py, &Follower::nobody(), |_, _| {
-            mono.trace_parallel(&mut rays, rims);
-            to_film(&mut rays);
+            match film_mm {
+                Some(film_mm) => mono.trace_to_film_parallel(&mut rays, rims, film_mm),
+                None => mono.trace_parallel(&mut rays, rims),
+            }
             Ok(Rays::new(rays))
         })
     }

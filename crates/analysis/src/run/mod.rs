@@ -199,7 +199,10 @@ impl RunReport {
                 mean_luminance_cd_m2: scene.mean_luminance_cd_m2,
                 light: scene.light.clone(),
                 light_temperature: scene.light.as_ref().map(|light| light.illuminant.color_temperature()),
-                notes: scene.notes.clone(),
+                notes: {
+                    let narrow = capture.irradiance.summary.narrow_surfaces;
+                    scene.notes.iter().cloned().chain(narrow.and_then(|narrow| narrow.note())).collect()
+                },
             },
             psf_bank: BankData::of(run.model),
             irradiance: IrradianceData {

@@ -79,6 +79,12 @@ fn pieces_and_threads_change_no_bit() {
     let losses = whole.losses();
     assert!(losses.n_in_flight > 1000 && losses.by_surface.iter().filter(|s| s.n_vignetted > 0).count() > 3);
 
+    let (mut whole_on_film, mut shared_on_film) = (rays.clone(), rays.clone());
+    lens.trace_to_film(&mut whole_on_film, Vignetting::On, 36.0);
+    lens.trace_to_film_parallel(&mut shared_on_film, Vignetting::On, 36.0);
+    assert_same_bits(&whole_on_film, &shared_on_film);
+    assert_eq!(whole_on_film.fate, whole.fate);
+
     // A trace in pieces passes the lens frame between them, which rounds z.
     let mut pieces = rays;
     lens.trace_surfaces(0..lens.stop() + 1, &mut pieces, Vignetting::On);

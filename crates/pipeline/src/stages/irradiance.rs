@@ -17,6 +17,7 @@ use super::{
     Watch,
     band_store::{BandFolder, BandStore, read_plane},
     film::FilmPlace,
+    narrow_surfaces::NarrowSurfaces,
 };
 use crate::{
     PipelineError, Stage,
@@ -61,6 +62,8 @@ pub struct IrradianceSummary {
     pub bands: Vec<(f64, Array2<f32>)>,
     /// All bands as an observer sees them, linear sRGB in lux.
     pub seen: LinearRgb,
+    /// Surfaces narrower than the pupil, where the scene has any and was imaged in layers of depth.
+    pub narrow_surfaces: Option<NarrowSurfaces>,
 }
 
 impl Irradiance {
@@ -115,6 +118,13 @@ impl Irradiance {
         let pitch_um = image.pitch_um().or(pitch_um);
         let pitch_um = pitch_um.ok_or_else(|| in_file("it states no distance between its samples".to_owned()))?;
         Ok(Self::of_image(image, pitch_um))
+    }
+
+    /// Returns it with the surfaces that are narrower than the pupil.
+    #[must_use]
+    pub(super) fn with_narrow_surfaces(mut self, narrow: Option<NarrowSurfaces>) -> Self {
+        self.summary.narrow_surfaces = narrow;
+        self
     }
 
     /// Returns it with bands in memory; `image` is an irradiance.
@@ -247,6 +257,7 @@ impl Summing {
             mean_lux: 0.0,
             bands: Vec::new(),
             seen: LinearRgb::black(rows, columns),
+            narrow_surfaces: None,
         };
         Self { wavelengths_nm: grid.centers_nm().to_vec(), to_rgb: SpectrumToRgb::new(grid), luminous, chosen, summary }
     }

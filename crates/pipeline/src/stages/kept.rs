@@ -20,6 +20,7 @@ use super::{
     lens::{self, ResolvedLens},
     lens_tables::{LensAberrations, TableParts},
     memory::MemoryBudget,
+    narrow_surfaces::NarrowSurfaces,
     plan,
     scene::{self, ResolvedScene, SceneSummary},
     slot::Slot,
@@ -30,7 +31,7 @@ use super::{
     world::{self, WorldRender},
 };
 use crate::{
-    Camera, Frames, Leftover, LensFacts, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage,
+    BlurSpec, Camera, Frames, Leftover, LensFacts, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage,
 };
 
 /// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
@@ -601,7 +602,11 @@ impl Chain<'_> {
                 None => self.camera.memory_bytes,
             };
             let folder = self.camera.band_folder(inputs)?;
-            irradiance::image(&plan, scene, &place, Keeping { memory_bytes, folder: folder.as_ref() }, &self.watch)
+            let keeping = Keeping { memory_bytes, folder: folder.as_ref() };
+            let irradiance = irradiance::image(&plan, scene, &place, keeping, &self.watch)?;
+            let is_layered = inputs.plan.blur == BlurSpec::Layered;
+            let narrow = if is_layered { NarrowSurfaces::of(&plan, scene) } else { None };
+            Ok(irradiance.with_narrow_surfaces(narrow))
         })
     }
 

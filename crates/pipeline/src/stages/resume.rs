@@ -10,6 +10,7 @@ use super::{
     film::FilmPlace,
     irradiance::{IRRADIANCE_FILE, Irradiance},
     kept::{Capture, KeptCamera},
+    narrow_surfaces::NarrowSurfaces,
     scene::SceneSummary,
     spec::FileStamp,
 };
@@ -26,6 +27,8 @@ struct Kept {
     files: Vec<FileStamp>,
     scene: SceneSummary,
     place: FilmPlace,
+    #[serde(default)]
+    narrow_surfaces: Option<NarrowSurfaces>,
 }
 
 /// A camera that continues a run.
@@ -55,6 +58,7 @@ impl KeptCamera {
             files: inputs.files().cloned().collect(),
             scene: (*capture.scene).clone(),
             place: (*capture.place).clone(),
+            narrow_surfaces: capture.irradiance.summary.narrow_surfaces,
         };
         let text = ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::new())
             .map_err(|e| PipelineError::Write { path: folder.join(RESUME_FILE), reason: e.to_string() })?;
@@ -95,6 +99,7 @@ impl KeptCamera {
         }
         let irradiance = Irradiance::read_exr(&folder.join(IRRADIANCE_FILE), Some(kept.place.pitch_um))?;
         kept.check(&irradiance).map_err(unreadable)?;
+        let irradiance = irradiance.with_narrow_surfaces(kept.narrow_surfaces);
         let results = camera.results();
         if let Some(depth) = read_depth(&folder.join("depth.exr"), (kept.scene.rows, kept.scene.columns)) {
             results.depth.put(inputs.scene.geometry.clone(), depth);
