@@ -108,6 +108,10 @@ class Camera:
         color: str | None = ...,
         sharpen_px: float | None = ...,
         local_tone: str | None = ...,
+        brightness: str | None = ...,
+        curve: str | None = ...,
+        space: str | None = ...,
+        defect_threshold: float | None = ...,
         seed: int | None = ...,
     ) -> Camera: ...
     def render(
@@ -186,6 +190,10 @@ class Shot:
         color: str | None = ...,
         sharpen_px: float | None = ...,
         local_tone: str | None = ...,
+        brightness: str | None = ...,
+        curve: str | None = ...,
+        space: str | None = ...,
+        defect_threshold: float | None = ...,
     ) -> Shot: ...
     def develop(
         self,
@@ -198,6 +206,10 @@ class Shot:
         color: str | None = ...,
         sharpen_px: float | None = ...,
         local_tone: str | None = ...,
+        brightness: str | None = ...,
+        curve: str | None = ...,
+        space: str | None = ...,
+        defect_threshold: float | None = ...,
     ) -> Shot: ...
     def png(self) -> bytes: ...
     def save(self, path: _Path) -> list[str]: ...
