@@ -12,6 +12,7 @@ use crate::{
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
     render_args::{CompareArgs, LightFieldArgs, RenderArgs},
+    show::ShowArgs,
     sweep::SweepArgs,
 };
 
@@ -93,6 +94,8 @@ pub(crate) enum Command {
     Sense(SenseArgs),
     /// Develops a raw file (DNG) of any camera as simulated frames are
     Develop(DevelopArgs),
+    /// Views a picture as on a given display: the scene of its spectral radiance
+    Show(ShowArgs),
     /// Takes many pictures of a varied camera from a plan, into a store that can be gone on with
     Sweep(SweepArgs),
     /// Measures pictures, frames and sensors as a laboratory does

@@ -23,6 +23,7 @@ mod progress;
 mod quality;
 mod schema;
 mod sense;
+mod shown;
 mod staged;
 mod stages;
 mod words;
@@ -51,6 +52,7 @@ pub use quality::Quality;
 pub use schema::generated_schemas;
 pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
+pub use shown::{ShowRequest, ShownPicture, open_display};
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,
