@@ -56,7 +56,7 @@ impl Area {
     }
 
     /// Returns how many rows and columns of light lie before those that are shown.
-    pub(super) fn from_active(&self) -> (usize, usize) {
+    pub(super) fn places_before(&self) -> (usize, usize) {
         (self.top - self.active_top, self.left - self.active_left)
     }
 }

@@ -197,7 +197,7 @@ fn pseudo_inverse(rows: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         let largest = (i..n).max_by(|&a, &b| wide[a][i].abs().total_cmp(&wide[b][i].abs()))?;
         wide.swap(i, largest);
         let pivot = wide[i][i];
-        if !(pivot.abs() > 1e-12) {
+        if pivot.is_nan() || pivot.abs() <= 1e-12 {
             return None;
         }
         wide[i].iter_mut().for_each(|v| *v /= pivot);

@@ -118,7 +118,7 @@ impl FileLevels {
             let levels = Levels::of_file((self.black[0], self.white[0], top), saturation_e, self.table.clone());
             return ((0..n).map(plane).collect(), levels);
         }
-        let (down, right) = area.from_active();
+        let (down, right) = area.places_before();
         let range = |plane: usize| self.white[plane] - self.highest_black(plane);
         let evened = |plane: usize| {
             let scale = range(0) / range(plane);

@@ -156,7 +156,7 @@ impl Scan<'_> {
     fn decode(&self, rows: usize, restart_rows: usize, bytes: &[u8]) -> Result<Vec<u16>, String> {
         let mut samples = vec![0; rows * self.row_samples];
         let mut bits = BitReader::new(bytes);
-        let none = vec![];
+        let none = [];
         for row in 0..rows {
             let restarts = restart_rows > 0 && row > 0 && row % restart_rows == 0;
             if restarts {

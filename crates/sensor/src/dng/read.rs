@@ -221,7 +221,7 @@ fn mosaic(frame: &Fields<'_>, n_planes: usize, area: &Area) -> Result<(Vec<Strin
     }
     let of_row = |row: &[usize]| row.iter().map(|&code| name(code)).collect::<Result<Vec<_>, _>>();
     let tile = pattern.chunks_exact(columns).map(of_row).collect::<Result<Vec<_>, _>>()?;
-    let (down, right) = area.from_active();
+    let (down, right) = area.places_before();
     let known: Vec<&str> = names.iter().map(String::as_str).collect();
     let tile = Cfa::Mosaic(tile).from_pixel(down, right).resolve("the file", &known).map_err(|e| e.to_string())?;
     Ok((names, tile))

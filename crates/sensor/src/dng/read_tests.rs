@@ -144,8 +144,8 @@ impl Stored {
         let n = self.n_planes;
         let lines: Vec<Vec<u16>> =
             (0..height).map(|r| (0..width * n).map(|i| code(r, i / n, i % n)).collect()).collect();
-        if self.jpeg_components > 0 {
-            let size = (height, width * n / self.jpeg_components, self.jpeg_components);
+        if let Some(columns) = (width * n).checked_div(self.jpeg_components) {
+            let size = (height, columns, self.jpeg_components);
             return encode(&lines.concat(), size, Coding::of_bits(self.bits));
         }
         lines.iter().flat_map(|line| self.packed(line)).collect()
