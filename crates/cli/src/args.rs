@@ -304,6 +304,10 @@ pub(crate) struct PictureArgs {
     /// Factors on the contrast between parts of the picture and within them, RANGE or RANGE,DETAIL, as 0.6,1.2 [default: 1,1]
     #[arg(long, value_name = "TONE", help_heading = heading::EXPOSURE)]
     pub(crate) local_tone: Option<String>,
+    /// Stretches a part of the picture to the whole of it: its corners clockwise from the upper left one, shares of width and
+    /// height, as 0.1,0,0.9,0,1,1,0,1 for verticals that lean inwards [default: none]
+    #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
+    pub(crate) perspective: Option<String>,
     /// How bright the picture is made: as-exposed, a factor, or a percentile of its luminance and where it is put, as 99%:0.9
     /// [default: as-exposed]
     #[arg(long, value_name = "B", help_heading = heading::EXPOSURE)]

@@ -285,6 +285,7 @@ pub(crate) fn picture_options(arguments: &PictureArgs) -> PictureOptions {
         color: arguments.color.clone(),
         sharpen_px: arguments.sharpen_px,
         local_tone: arguments.local_tone.clone(),
+        perspective: arguments.perspective.clone(),
         brightness: arguments.brightness.clone(),
         curve: arguments.curve.clone(),
         space: arguments.space.clone(),

@@ -142,6 +142,8 @@ impl Camera {
     ///     Aberrations of the lens that are undone: "all", "none", or of "distortion,lateral-color,vignetting".
     /// local_tone : str
     ///     Factors on the contrast between parts of the picture and within them: "0.6" or "0.6,1.2".
+    /// perspective : str
+    ///     The corners of the part that is stretched to the whole picture: "0.1,0,0.9,0,1,1,0,1".
     /// brightness : str
     ///     "as-exposed", a factor as "1.5", or a percentile and where it is put as "99%:0.9".
     /// curve : str

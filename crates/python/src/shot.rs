@@ -253,7 +253,7 @@ impl Shot {
     /// Parameters
     /// ----------
     /// seed, exposure_s, analog_gain, noise, burst, bracket_stops, white, demosaic, denoise, highlights, lens_corrections,
-    /// color, sharpen_px, local_tone, brightness, curve, space, defect_threshold
+    /// color, sharpen_px, local_tone, perspective, brightness, curve, space, defect_threshold
     ///     As of `Camera.with_`.
     ///
     /// Returns
@@ -268,7 +268,7 @@ impl Shot {
     ///
     /// Parameters
     /// ----------
-    /// white, demosaic, denoise, highlights, lens_corrections, color, sharpen_px, local_tone, brightness, curve, space,
+    /// white, demosaic, denoise, highlights, lens_corrections, color, sharpen_px, local_tone, perspective, brightness, curve, space,
     /// defect_threshold
     ///     As of `Camera.with_`.
     ///

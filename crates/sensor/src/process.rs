@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Highlights, LensCorrections, LensShading,
-    LensTables, LocalTone, Picture, Raw, Sensor, SensorError, Tile, ToneCurve, WhiteBalance,
+    LensTables, LocalTone, Perspective, Picture, Raw, Sensor, SensorError, Tile, ToneCurve, WhiteBalance,
     balance::gains,
     color::pairs,
     defects, demosaic,
@@ -46,6 +46,9 @@ pub struct Processing {
     pub demosaic: Demosaic,
     /// The standard deviation of the blur by lens and pixels that is undone, pixels, as far as noise allows: 0 none, 2 at most.
     pub sharpen_px: f64,
+    /// The part of the picture that is stretched to the whole of it; left out, it stays as it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub perspective: Option<Perspective>,
     /// How channels become colors.
     pub color: ColorCorrection,
     /// How bright the picture is made.
@@ -71,6 +74,7 @@ impl Default for Processing {
             highlights: Highlights::Reconstruct,
             demosaic: Demosaic::DirectionalRatio,
             sharpen_px: 0.0,
+            perspective: None,
             color: ColorCorrection::Auto,
             brightness: Brightness::AsExposed,
             local_tone: LocalTone::default(),
@@ -253,6 +257,9 @@ impl Profile<'_> {
             let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: middle(&noise) };
             sharpen(&mut channels, processing.sharpen_px, &of);
         }
+        if let Some(perspective) = processing.perspective {
+            channels = perspective.apply(&channels);
+        }
         let Processing { highlights, local_tone, .. } = processing;
         Ok(LinearPicture { light: mix(&channels, &color), highlights, local_tone, balance, color })
     }
@@ -289,6 +296,7 @@ impl Profile<'_> {
         if !(0.0..=2.0).contains(&processing.sharpen_px) {
             return Err(SensorError::value("the processing", "sharpen_px", processing.sharpen_px, "0 to 2 pixels"));
         }
+        processing.perspective.map_or(Ok(()), |perspective| perspective.check())?;
         processing.local_tone.check()?;
         processing.curve.check()?;
         self.check_processing(processing)

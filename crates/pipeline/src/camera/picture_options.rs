@@ -1,7 +1,8 @@
 //! What a command line changes of the way from the raw frame to the picture.
 
 use dioptric_sensor::{
-    Brightness, ColorCorrection, ColorSpace, Demosaic, Highlights, LensCorrections, LocalTone, Processing, ToneCurve,
+    Brightness, ColorCorrection, ColorSpace, Demosaic, Highlights, LensCorrections, LocalTone, Perspective, Processing,
+    ToneCurve,
 };
 
 use crate::{PipelineError, parse_white};
@@ -25,6 +26,8 @@ pub struct PictureOptions {
     pub sharpen_px: Option<f64>,
     /// Contrast between and within parts, as [`LocalTone::parse`] has it.
     pub local_tone: Option<String>,
+    /// The part that is stretched to the whole picture, as [`Perspective::parse`] has it.
+    pub perspective: Option<String>,
     /// How bright the picture is made, as [`Brightness::parse`] has it.
     pub brightness: Option<String>,
     /// The curve from light to codes, as [`ToneCurve::parse`] has it.
@@ -62,6 +65,9 @@ impl PictureOptions {
         processing.sharpen_px = self.sharpen_px.unwrap_or(processing.sharpen_px);
         if let Some(tone) = &self.local_tone {
             processing.local_tone = LocalTone::parse(tone)?;
+        }
+        if let Some(corners) = &self.perspective {
+            processing.perspective = Some(Perspective::parse(corners)?);
         }
         if let Some(text) = &self.brightness {
             processing.brightness = Brightness::parse(text)?;
