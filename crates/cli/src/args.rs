@@ -12,6 +12,7 @@ use crate::{
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
     render_args::{CompareArgs, LightFieldArgs, RenderArgs},
+    show::ShowArgs,
     sweep::SweepArgs,
 };
 
@@ -91,6 +92,10 @@ pub(crate) enum Command {
     LightField(LightFieldArgs),
     /// Exposes a sensor to an irradiance image and processes the picture
     Sense(SenseArgs),
+    /// Develops a raw file (DNG) of any camera as simulated frames are
+    Develop(DevelopArgs),
+    /// Views a picture as on a given display: the scene of its spectral radiance
+    Show(ShowArgs),
     /// Takes many pictures of a varied camera from a plan, into a store that can be gone on with
     Sweep(SweepArgs),
     /// Measures pictures, frames and sensors as a laboratory does
@@ -155,7 +160,7 @@ pub(crate) struct RunArgs {
     /// How finely the picture is simulated
     #[arg(long, value_name = "QUALITY", value_enum, default_value = "full", help_heading = heading::SIMULATION)]
     pub(crate) quality: QualityKind,
-    /// Lens, a file or the name of a built-in one
+    /// Lens: a file, the name of a built-in one, thin:50mm:f2 or pinhole:0.1mm
     #[arg(long, value_name = "LENS", help_heading = heading::LENS)]
     pub(crate) lens: Option<String>,
     #[command(flatten)]
@@ -265,6 +270,13 @@ pub(crate) struct FrameArgs {
     /// Factor on the voltage after the pixel [default: 1]
     #[arg(long, value_name = "G", help_heading = heading::EXPOSURE)]
     pub(crate) analog_gain: Option<f64>,
+    #[command(flatten)]
+    pub(crate) picture: PictureArgs,
+}
+
+/// From the raw frame to the picture.
+#[derive(Debug, Args)]
+pub(crate) struct PictureArgs {
     /// What the picture makes white: scene (its light, or its mean where that is unknown), none, gray-world, white-patch,
     /// shades-of-gray, gray-edge, patch:X,Y,W,H, or a light as --illuminant has it [default: scene]
     #[arg(long, value_name = "WHITE", help_heading = heading::EXPOSURE)]
@@ -292,6 +304,42 @@ pub(crate) struct FrameArgs {
     /// Factors on the contrast between parts of the picture and within them, RANGE or RANGE,DETAIL, as 0.6,1.2 [default: 1,1]
     #[arg(long, value_name = "TONE", help_heading = heading::EXPOSURE)]
     pub(crate) local_tone: Option<String>,
+    /// Stretches a part of the picture to the whole of it: its corners clockwise from the upper left one, shares of width and
+    /// height, as 0.1,0,0.9,0,1,1,0,1 for verticals that lean inwards [default: none]
+    #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
+    pub(crate) perspective: Option<String>,
+    /// How bright the picture is made: as-exposed, a factor, or a percentile of its luminance and where it is put, as 99%:0.9
+    /// [default: as-exposed]
+    #[arg(long, value_name = "B", help_heading = heading::EXPOSURE)]
+    pub(crate) brightness: Option<String>,
+    /// The curve from light to codes: linear, srgb, gamma:EXPONENT, filmic:CONTRAST [default: srgb]
+    #[arg(long, value_name = "CURVE", help_heading = heading::EXPOSURE)]
+    pub(crate) curve: Option<String>,
+    /// The primaries of the picture: srgb, display-p3 [default: srgb]
+    #[arg(long, value_name = "NAME", help_heading = heading::EXPOSURE)]
+    pub(crate) space: Option<String>,
+    /// Replaces pixels further than this above or below all their neighbors of the same filter, a share of saturation
+    /// [default: none]
+    #[arg(long, value_name = "F", help_heading = heading::EXPOSURE)]
+    pub(crate) defect_threshold: Option<f64>,
+}
+
+/// A raw file to be developed.
+#[derive(Debug, Args)]
+pub(crate) struct DevelopArgs {
+    /// Raw frame, DNG: a mosaic or linear planes of 8 to 16 bits, plain or as lossless JPEG
+    pub(crate) raw: PathBuf,
+    /// Folder for the results
+    #[arg(long, short, value_name = "DIR", help_heading = heading::RESULTS)]
+    pub(crate) out: PathBuf,
+    /// Camera file whose `processing` is used [default: that of the program]
+    #[arg(long, value_name = "FILE", help_heading = heading::EXPOSURE)]
+    pub(crate) camera: Option<PathBuf>,
+    /// Writes these files too: picture-png16, picture-tiff8, picture-tiff16
+    #[arg(long, value_name = "LIST", help_heading = heading::RESULTS)]
+    pub(crate) also: Option<String>,
+    #[command(flatten)]
+    pub(crate) picture: PictureArgs,
 }
 
 /// What diffraction to compute.

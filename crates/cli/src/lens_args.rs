@@ -21,7 +21,7 @@ pub(crate) enum LensCommand {
     Draw(LensDrawArgs),
     /// Writes a lens in another format, chosen by the extension
     Convert {
-        /// Lens to read, a file or the name of a built-in one
+        /// Lens to read: a file, the name of a built-in one, thin:50mm:f2 or pinhole:0.1mm
         input: String,
         /// File to write; a .zmx file of a lens with glasses of its own gets a catalogue (.agf) beside it
         output: PathBuf,
@@ -33,7 +33,7 @@ pub(crate) enum LensCommand {
 /// A lens, how far it is open and how it stands: what every command about one lens takes.
 #[derive(Debug, Args)]
 pub(crate) struct LensArgs {
-    /// Lens, a file or the name of a built-in one
+    /// Lens: a file, the name of a built-in one, thin:50mm:f2 or pinhole:0.1mm
     pub(crate) lens: String,
     #[command(flatten)]
     pub(crate) state: LensStateArgs,

@@ -8,6 +8,7 @@ mod args;
 mod camera;
 mod common;
 mod compare;
+mod develop;
 mod glass;
 mod lens;
 mod lens_args;
@@ -22,6 +23,7 @@ mod render;
 mod render_args;
 mod run;
 mod sense;
+mod show;
 mod studio;
 mod sweep;
 mod terminal;
@@ -68,6 +70,8 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Compare(arguments) => compare::run(&arguments, &common),
         Command::LightField(arguments) => light_field::run(&arguments, &common),
         Command::Sense(arguments) => sense::run(&arguments, &common),
+        Command::Develop(arguments) => develop::run(&arguments, &common),
+        Command::Show(arguments) => show::run(&arguments, &common),
         Command::Sweep(arguments) => sweep::run(&arguments, &common),
         Command::Measure(command) => measure::run(&command, &common),
         Command::Studio(arguments) => studio::run(&arguments),

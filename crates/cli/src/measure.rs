@@ -4,9 +4,9 @@ use std::{fmt::Write, path::Path};
 
 use dioptric_analysis::measure::{
     BenchRequest, ChartMeasurement, ChartRequest, CodeCurve, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest,
-    Measurement, NoiseData, PixelRegion, PointRequest, PointSet, measure_bench, measure_frames,
+    Measurement, NoiseData, PictureViewing, PixelRegion, PointRequest, PointSet, measure_bench, measure_frames,
 };
-use dioptric_pipeline::{SensorSpec, Staged, parse_illuminant};
+use dioptric_pipeline::{SensorSpec, Staged, open_display, parse_illuminant};
 
 use dioptric_report::write_measurement;
 
@@ -87,7 +87,7 @@ fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
     let out = arguments.picture_args.out.as_deref();
     if let Some(against) = &arguments.against {
         let request = CompareRequest {
-            pixels_per_degree: arguments.pixels_per_degree,
+            viewing: viewing(arguments)?,
             patch: arguments.patch.as_deref().map(PixelRegion::parse).transpose()?,
             curve,
         };
@@ -101,6 +101,15 @@ fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
     };
     let finish = Finish::new("color", out, common)?;
     finish.with(&request.measure(&arguments.picture)?, chart_table)
+}
+
+fn viewing(arguments: &ColorArgs) -> anyhow::Result<PictureViewing> {
+    Ok(match &arguments.display {
+        Some(name) => {
+            PictureViewing::Display { display: Box::new(open_display(name)?), distance_m: arguments.distance_m }
+        }
+        None => PictureViewing::PixelsPerDegree(arguments.pixels_per_degree),
+    })
 }
 
 fn curve(kind: CurveKind) -> CodeCurve {

@@ -140,6 +140,12 @@ pub(crate) struct ColorArgs {
     /// Pixels a degree of the viewer's field, for S-CIELAB and VSNR
     #[arg(long, value_name = "N", default_value_t = 60.0)]
     pub(crate) pixels_per_degree: f64,
+    /// Sees both pictures on a display in place of that: a RON file or srgb, display-p3, rec2020, apple-studio
+    #[arg(long, value_name = "DISPLAY", requires = "against", conflicts_with = "pixels_per_degree")]
+    pub(crate) display: Option<String>,
+    /// How far away the display is, m
+    #[arg(long, value_name = "D", default_value_t = 0.6, requires = "display")]
+    pub(crate) distance_m: f64,
     /// An even patch, whose visual SNR is measured
     #[arg(long, value_name = "x,y,w,h", requires = "against")]
     pub(crate) patch: Option<String>,

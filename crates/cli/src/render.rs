@@ -10,8 +10,8 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
-    Camera, Crop, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PipelineError, Progress, RenderEffort,
-    Rendering, RenderingSummary, SceneSource, SceneSpec, SensorOptions, SensorSpec, Silent, Stage, Staged, StopSpec,
+    Camera, Crop, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PictureOptions, PipelineError, Progress,
+    RenderEffort, Rendering, RenderingSummary, SceneSource, SceneSpec, SensorSpec, Silent, Stage, Staged, StopSpec,
     WavelengthSpec, WorldRender, WorldSpec, with_exposure_s, write_json, write_seen_png,
 };
 use dioptric_report::write_run;
@@ -129,8 +129,7 @@ fn camera_of(arguments: &RenderArgs, common: &Common) -> anyhow::Result<Camera> 
     if let Some(time_s) = arguments.exposure_s {
         camera.exposure = with_exposure_s(camera.exposure, time_s);
     }
-    let options = SensorOptions { white: arguments.white.clone(), ..SensorOptions::default() };
-    options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing)?;
+    PictureOptions { white: arguments.white.clone(), ..PictureOptions::default() }.apply(&mut camera.processing)?;
     Ok(camera)
 }
 

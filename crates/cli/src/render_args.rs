@@ -39,7 +39,7 @@ pub(crate) struct RenderArgs {
     /// Camera file, whose scene the world takes the place of [default: the camera of the world's file]
     #[arg(long, value_name = "CAMERA.ron", help_heading = "Lens")]
     pub(crate) camera: Option<PathBuf>,
-    /// Lens in place of the camera's, a file or the name of a built-in one
+    /// Lens in place of the camera's: a file, the name of a built-in one, thin:50mm:f2 or pinhole:0.1mm
     #[arg(long, value_name = "LENS", help_heading = "Lens")]
     pub(crate) lens: Option<String>,
     #[command(flatten)]

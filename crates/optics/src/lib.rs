@@ -54,6 +54,7 @@ pub use glam;
 pub use glass::{C_LINE_NM, CatalogueGlass, D_LINE_NM, F_LINE_NM, Glass, GlassCatalogue};
 pub use layout::{Layout, wavelength_color};
 pub use lens::{ImageSurface, Lens, SurfaceChange};
+pub use library::IdealLens;
 pub use mirror_shadows::MirrorShadow;
 pub use mono::{AxialBeam, MonoLens};
 pub use paraxial::{Conjugate, FirstOrder};

@@ -66,6 +66,21 @@ impl FrameFile {
         ("picture-exr", Self::PictureExr),
     ];
 
+    /// The name of the file on the command line.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, file)| *file == self).map_or("", |(name, _)| name)
+    }
+
+    /// Returns the name and the depth of a picture of codes; `None` for other files.
+    pub(crate) fn picture_name(self) -> Option<(&'static str, Depth)> {
+        match self {
+            Self::PicturePng16 => Some(("picture-16.png", Depth::Sixteen)),
+            Self::PictureTiff8 => Some(("picture-8.tiff", Depth::Eight)),
+            Self::PictureTiff16 => Some(("picture-16.tiff", Depth::Sixteen)),
+            Self::Electrons | Self::RawTiff | Self::RawDng | Self::PictureExr => None,
+        }
+    }
+
     /// Returns the files of a list of names, separated by commas.
     ///
     /// # Errors
@@ -161,10 +176,10 @@ fn write_also(
     file: FrameFile,
     folder: &Path,
 ) -> Result<Vec<String>, PipelineError> {
-    let write_picture = |name: &str, depth| {
+    if let Some((name, depth)) = file.picture_name() {
         picture.write(&folder.join(name), depth)?;
-        Ok(vec![name.to_owned()])
-    };
+        return Ok(vec![name.to_owned()]);
+    }
     match file {
         FrameFile::Electrons => {
             Ok(vec![write_planes(frames, &frames.exposed.electrons.planes_e, "e", "electrons.exr", folder)?])
@@ -174,10 +189,7 @@ fn write_also(
             frames.sensor.write_dng(&frames.exposed.raw, &dng_details(frames, picture), &folder.join("raw.dng"))?;
             Ok(vec!["raw.dng".to_owned()])
         }
-        FrameFile::PicturePng16 => write_picture("picture-16.png", Depth::Sixteen),
-        FrameFile::PictureTiff8 => write_picture("picture-8.tiff", Depth::Eight),
-        FrameFile::PictureTiff16 => write_picture("picture-16.tiff", Depth::Sixteen),
-        FrameFile::PictureExr => {
+        _ => {
             // Developed once more, because the picture holds codes.
             let (raw, processing) = (frames.exposed.developed_from(), frames.processing);
             let light = frames.sensor.develop_linear_with(raw, processing, frames.lens)?;

@@ -10,6 +10,7 @@
 
 mod camera;
 mod capture_files;
+mod develop;
 pub mod display;
 mod error;
 pub mod figures;
@@ -22,6 +23,7 @@ mod progress;
 mod quality;
 mod schema;
 mod sense;
+mod shown;
 mod staged;
 mod stages;
 mod words;
@@ -33,10 +35,11 @@ pub use dioptric_scene::FillDepth;
 
 pub use camera::{
     BankData, BankSpec, BlurSpec, Camera, Crop, Exposed, FilmSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions,
-    LensSpec, LightFieldSpec, Movements, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec,
-    SensorOptions, SensorSpec, StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
+    LensSpec, LightFieldSpec, Movements, PictureOptions, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod,
+    SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
 pub use capture_files::write_capture;
+pub use develop::DevelopedFile;
 pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};
 pub use hidden::{HiddenFolder, Leftover};
@@ -49,6 +52,7 @@ pub use quality::Quality;
 pub use schema::generated_schemas;
 pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
+pub use shown::{ShowRequest, ShownPicture, open_display};
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,

@@ -142,6 +142,16 @@ impl Camera {
     ///     Aberrations of the lens that are undone: "all", "none", or of "distortion,lateral-color,vignetting".
     /// local_tone : str
     ///     Factors on the contrast between parts of the picture and within them: "0.6" or "0.6,1.2".
+    /// perspective : str
+    ///     The corners of the part that is stretched to the whole picture: "0.1,0,0.9,0,1,1,0,1".
+    /// brightness : str
+    ///     "as-exposed", a factor as "1.5", or a percentile and where it is put as "99%:0.9".
+    /// curve : str
+    ///     "linear", "srgb", "gamma:0.45", "filmic:0.5".
+    /// space : str
+    ///     "srgb" or "display-p3".
+    /// defect_threshold : float
+    ///     How far a lone pixel is off before it is replaced, a share of saturation.
     /// seed : int
     /// name : str
     #[pyo3(signature = (**changes))]

@@ -35,10 +35,28 @@ pub(crate) const OF_EXPOSURE: &[&str] = &[
     "color",
     "sharpen_px",
     "local_tone",
+    "perspective",
+    "brightness",
+    "curve",
+    "space",
+    "defect_threshold",
 ];
 /// What changes the picture alone.
-pub(crate) const OF_PICTURE: &[&str] =
-    &["white", "demosaic", "denoise", "highlights", "lens_corrections", "color", "sharpen_px", "local_tone"];
+pub(crate) const OF_PICTURE: &[&str] = &[
+    "white",
+    "demosaic",
+    "denoise",
+    "highlights",
+    "lens_corrections",
+    "color",
+    "sharpen_px",
+    "local_tone",
+    "perspective",
+    "brightness",
+    "curve",
+    "space",
+    "defect_threshold",
+];
 /// All changes, in the order in which they are made.
 pub(crate) const ALL: &[&str] = &[
     "name",
@@ -87,6 +105,11 @@ pub(crate) const ALL: &[&str] = &[
     "color",
     "sharpen_px",
     "local_tone",
+    "perspective",
+    "brightness",
+    "curve",
+    "space",
+    "defect_threshold",
     "seed",
 ];
 
@@ -301,14 +324,19 @@ fn set_sensor_option(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -
     match key {
         "analog_gain" => options.analog_gain = Some(number(key, value)?),
         "noise" => options.noise = Some(word(key, value)?),
-        "white" => options.white = Some(word(key, value)?),
-        "demosaic" => options.demosaic = Some(word(key, value)?),
-        "denoise" => options.denoise = Some(number(key, value)?),
-        "lens_corrections" => options.lens_corrections = Some(word(key, value)?),
-        "color" => options.color = Some(word(key, value)?),
-        "sharpen_px" => options.sharpen_px = Some(number(key, value)?),
-        "local_tone" => options.local_tone = Some(word(key, value)?),
-        _ => options.highlights = Some(word(key, value)?),
+        "white" => options.picture.white = Some(word(key, value)?),
+        "demosaic" => options.picture.demosaic = Some(word(key, value)?),
+        "denoise" => options.picture.denoise = Some(number(key, value)?),
+        "lens_corrections" => options.picture.lens_corrections = Some(word(key, value)?),
+        "color" => options.picture.color = Some(word(key, value)?),
+        "sharpen_px" => options.picture.sharpen_px = Some(number(key, value)?),
+        "local_tone" => options.picture.local_tone = Some(word(key, value)?),
+        "perspective" => options.picture.perspective = Some(word(key, value)?),
+        "brightness" => options.picture.brightness = Some(word(key, value)?),
+        "curve" => options.picture.curve = Some(word(key, value)?),
+        "space" => options.picture.space = Some(word(key, value)?),
+        "defect_threshold" => options.picture.defect_threshold = Some(number(key, value)?),
+        _ => options.picture.highlights = Some(word(key, value)?),
     }
     options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing).map_err(exception)
 }

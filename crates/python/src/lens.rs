@@ -131,7 +131,7 @@ impl Lens {
         guarded(|| to_python(py, &built_in_lenses().map_err(exception)?))
     }
 
-    /// Returns a built-in lens.
+    /// Returns a built-in lens, or an ideal one by its numbers: "thin:50mm:f2", "thin:50mm:25mm", "pinhole:0.1mm".
     #[staticmethod]
     fn built_in(name: &str) -> PyResult<Self> {
         guarded(|| Self::of_choice(LensSpec::BuiltIn(name.to_owned()), LensReadOptions::default()))

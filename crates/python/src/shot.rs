@@ -188,7 +188,9 @@ impl Shot {
             RawPlane::Dn(_) => view(py, &self.capture, |capture| {
                 capture.frames.exposed.raw.planes[n].dn().expect("it holds digital numbers").view()
             }),
-            RawPlane::Volts(plane) => view(py, &Arc::new(plane.clone()), |plane| plane.view()),
+            RawPlane::Volts(plane) | RawPlane::Evened(plane) => {
+                view(py, &Arc::new(plane.clone()), |plane| plane.view())
+            }
         };
         self.plane_or_planes(py, planes.map(plane).collect::<PyResult<_>>()?)
     }
@@ -251,7 +253,7 @@ impl Shot {
     /// Parameters
     /// ----------
     /// seed, exposure_s, analog_gain, noise, burst, bracket_stops, white, demosaic, denoise, highlights, lens_corrections,
-    /// color, sharpen_px, local_tone
+    /// color, sharpen_px, local_tone, perspective, brightness, curve, space, defect_threshold
     ///     As of `Camera.with_`.
     ///
     /// Returns
@@ -266,7 +268,8 @@ impl Shot {
     ///
     /// Parameters
     /// ----------
-    /// white, demosaic, denoise, highlights, lens_corrections, color, sharpen_px, local_tone
+    /// white, demosaic, denoise, highlights, lens_corrections, color, sharpen_px, local_tone, perspective, brightness, curve, space,
+    /// defect_threshold
     ///     As of `Camera.with_`.
     ///
     /// Returns

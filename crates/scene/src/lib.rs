@@ -16,16 +16,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod display_model;
 mod error;
 mod formats;
 mod light;
 mod preview;
 mod resample;
 mod scene;
+mod shown;
 mod still_life;
 mod targets;
 mod view;
 
+pub use display_model::{DisplayCurve, DisplayModel, PixelLayout};
 pub use error::SceneError;
 pub use formats::{
     BandWriter, EnviCube, ExrParts, FillDepth, IsetScene, PictureSamples, ReadOptions, SpectralFile, read_band_folder,

@@ -5,7 +5,9 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{Demosaic, Sensor, SensorError, Tile, blur::gaussian_blur, demosaic, metering::percentile};
+use crate::{
+    Demosaic, Sensor, SensorError, Tile, blur::gaussian_blur, demosaic, metering::percentile, profile::Profile,
+};
 
 /// What is made white.
 ///
@@ -127,12 +129,12 @@ impl WhiteBalance {
 /// # Errors
 /// When a patch lies outside the frame or sees nothing of a channel, or the frame is too small for differences.
 pub(crate) fn gains(
-    sensor: &Sensor,
+    camera: Profile<'_>,
     planes: &[Array2<f32>],
     tile: Option<&Tile>,
     white: &WhiteBalance,
 ) -> Result<Vec<f64>, SensorError> {
-    let n_channels = sensor.filters.len();
+    let n_channels = camera.n_channels();
     let channels = |statistic: &(dyn Fn(Vec<f32>) -> f64 + Sync)| -> Vec<f64> {
         (0..n_channels).into_par_iter().map(|channel| statistic(samples_of(planes, tile, channel))).collect()
     };
@@ -161,12 +163,12 @@ pub(crate) fn gains(
             }
             let means = patch_means(planes, tile, n_channels, (left, top, width, height));
             if let Some(channel) = means.iter().position(|mean| mean.is_nan() || *mean <= 0.0) {
-                let reason = format!("sees no unsaturated light through {}", sensor.filters[channel].name);
+                let reason = format!("sees no unsaturated light through {}", camera.filter_name(channel));
                 return Err(SensorError::Unsuitable { what: "the patch that is made white", reason });
             }
             means
         }
-        WhiteBalance::Light(light) => white_response(sensor, light),
+        WhiteBalance::Light(light) => camera.white_response(light),
     };
     // A channel that sees nothing cannot be balanced: it is left as it is.
     let brightest = signals.iter().copied().fold(0.0, f64::max);

@@ -1,8 +1,20 @@
-//! Raw frames as DNG files (Adobe Digital Negative 1.4), which raw converters open.
+//! Raw frames as DNG files (Adobe Digital Negative 1.4): written, so that raw converters open them, and read.
 
+mod area;
 mod color;
+mod file_camera;
+mod file_color;
+mod file_profile;
+mod levels;
+mod lossless_jpeg;
 mod opcodes;
+mod read;
+#[cfg(test)]
+mod read_tests;
+mod samples;
+mod tags;
 mod tiff_file;
+mod tiff_reader;
 
 use std::path::Path;
 
@@ -11,7 +23,13 @@ use dioptric_spectrum::Illuminant;
 use self::{
     color::{camera_from_xyz, color_codes, plane_order, xyz_d50_from_balanced},
     opcodes::opcode_list_3,
+    tags::*,
     tiff_file::{Directory, Value},
+};
+pub use self::{
+    file_color::{DngColor, DngLight},
+    file_profile::{DngNoise, DngProfile},
+    read::DngFile,
 };
 use crate::{
     LensCorrections, LensTables, Picture, Raw, RawPlane, Sensor, SensorError,
@@ -19,59 +37,6 @@ use crate::{
     files::{write_beside_and_rename, write_error},
 };
 
-const NEW_SUBFILE_TYPE: u16 = 254;
-const IMAGE_WIDTH: u16 = 256;
-const IMAGE_LENGTH: u16 = 257;
-const BITS_PER_SAMPLE: u16 = 258;
-const COMPRESSION: u16 = 259;
-const PHOTOMETRIC_INTERPRETATION: u16 = 262;
-const MAKE: u16 = 271;
-const MODEL: u16 = 272;
-const ORIENTATION: u16 = 274;
-const SAMPLES_PER_PIXEL: u16 = 277;
-const ROWS_PER_STRIP: u16 = 278;
-const X_RESOLUTION: u16 = 282;
-const Y_RESOLUTION: u16 = 283;
-const PLANAR_CONFIGURATION: u16 = 284;
-const RESOLUTION_UNIT: u16 = 296;
-const SOFTWARE: u16 = 305;
-const SUB_DIRECTORIES: u16 = 330;
-const CFA_REPEAT_PATTERN_DIM: u16 = 33421;
-const CFA_PATTERN: u16 = 33422;
-const EXIF_DIRECTORY: u16 = 34665;
-const DNG_VERSION: u16 = 50706;
-const DNG_BACKWARD_VERSION: u16 = 50707;
-const UNIQUE_CAMERA_MODEL: u16 = 50708;
-const CFA_PLANE_COLOR: u16 = 50710;
-const CFA_LAYOUT: u16 = 50711;
-const LINEARIZATION_TABLE: u16 = 50712;
-const BLACK_LEVEL: u16 = 50714;
-const WHITE_LEVEL: u16 = 50717;
-const COLOR_MATRIX_1: u16 = 50721;
-const COLOR_MATRIX_2: u16 = 50722;
-const AS_SHOT_NEUTRAL: u16 = 50728;
-const CALIBRATION_ILLUMINANT_1: u16 = 50778;
-const CALIBRATION_ILLUMINANT_2: u16 = 50779;
-const FORWARD_MATRIX_1: u16 = 50964;
-const FORWARD_MATRIX_2: u16 = 50965;
-const OPCODE_LIST_3: u16 = 51022;
-const NOISE_PROFILE: u16 = 51041;
-
-/// Fields of the Exif directory (Exif 2.32).
-const EXPOSURE_TIME: u16 = 33434;
-const F_NUMBER: u16 = 33437;
-const PHOTOGRAPHIC_SENSITIVITY: u16 = 34855;
-const EXIF_VERSION: u16 = 36864;
-const FOCAL_LENGTH: u16 = 37386;
-const LENS_MODEL: u16 = 42036;
-
-/// Values of the tag `PhotometricInterpretation`.
-const RGB: u16 = 2;
-const COLOR_FILTER_ARRAY: u16 = 32803;
-const LINEAR_RAW: u16 = 34892;
-/// Values of the calibration illuminants (EXIF light sources).
-const STANDARD_LIGHT_A: u16 = 17;
-const D65: u16 = 21;
 /// The code of no light after a linearization table; room below it for noise.
 const LINEARIZED_BLACK: f64 = 4096.0;
 /// The longest side of a preview, pixels.

@@ -54,6 +54,7 @@ impl Raw {
     pub(crate) fn without_numbers(&self, what: &'static str) -> SensorError {
         let found = match self.planes.as_slice() {
             [RawPlane::Volts(_), ..] => "volts, from a sensor without converter",
+            [RawPlane::Evened(_), ..] => "numbers whose levels were evened out",
             _ => "several planes, from a sensor of stacked filters",
         };
         SensorError::Unsuitable {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use frame_table::FrameTable;
-pub(crate) use warp::warp;
+pub(crate) use warp::{sample as sample_at, warp};
 
 use self::frame_table::stencils;
 use crate::{SensorError, Tile};

@@ -1,6 +1,6 @@
 //! Pictures as they are shown.
 
-use ndarray::Array3;
+use ndarray::{Array3, Axis};
 
 /// A picture of red, green and blue codes.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +23,22 @@ impl Picture {
     /// Returns the codes of one pixel.
     pub fn rgb_at(&self, row: usize, column: usize) -> [f32; 3] {
         [0, 1, 2].map(|i| self.codes[(row, column, i)])
+    }
+
+    /// Returns the picture turned as a number of Exif's `Orientation` says, 1 to 8; others leave it as it is.
+    #[must_use]
+    pub fn oriented(self, orientation: usize) -> Self {
+        let mut codes = self.codes;
+        if matches!(orientation, 5..=8) {
+            codes.swap_axes(0, 1);
+        }
+        if matches!(orientation, 2 | 3 | 6 | 7) {
+            codes.invert_axis(Axis(1));
+        }
+        if matches!(orientation, 3 | 4 | 7 | 8) {
+            codes.invert_axis(Axis(0));
+        }
+        Self { codes: codes.as_standard_layout().into_owned() }
     }
 
     /// Returns 8-bit codes, row by row, red, green, blue.

@@ -1,21 +1,21 @@
 //! From a raw frame to a picture.
 
-use dioptric_spectrum::{Illuminant, Spectrum, color_checker_reflectances};
+use dioptric_spectrum::Illuminant;
 use ndarray::{Array2, Array3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Highlights, LensCorrections, LensShading,
-    LensTables, LocalTone, Picture, Raw, Sensor, SensorError, Tile, ToneCurve, WhiteBalance,
-    balance::{gains, light_of_gains},
+    LensTables, LocalTone, Perspective, Picture, Raw, Sensor, SensorError, Tile, ToneCurve, WhiteBalance,
+    balance::gains,
     color::pairs,
     defects, demosaic,
     denoise::{SampleNoise, automatic_strength, denoise},
-    hdr::merged_noise,
     highlights::{Saturated, dimmed, reconstruct},
     lens_tables::warp,
     metering::percentile,
+    profile::Profile,
     sharpen::{SharpenedChannels, sharpen},
 };
 
@@ -46,6 +46,9 @@ pub struct Processing {
     pub demosaic: Demosaic,
     /// The standard deviation of the blur by lens and pixels that is undone, pixels, as far as noise allows: 0 none, 2 at most.
     pub sharpen_px: f64,
+    /// The part of the picture that is stretched to the whole of it; left out, it stays as it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub perspective: Option<Perspective>,
     /// How channels become colors.
     pub color: ColorCorrection,
     /// How bright the picture is made.
@@ -71,6 +74,7 @@ impl Default for Processing {
             highlights: Highlights::Reconstruct,
             demosaic: Demosaic::DirectionalRatio,
             sharpen_px: 0.0,
+            perspective: None,
             color: ColorCorrection::Auto,
             brightness: Brightness::AsExposed,
             local_tone: LocalTone::default(),
@@ -195,21 +199,42 @@ impl Sensor {
         processing: &Processing,
         lens: Option<&LensTables>,
     ) -> Result<LinearPicture, SensorError> {
+        Profile::Sensor(self).develop_linear(raw, processing, lens)
+    }
+
+    /// Returns the noise of a frame that does not depend on the signal, rms electrons.
+    pub(crate) fn noise_floor_e(&self, raw: &Raw) -> f64 {
+        let volts = self.read_noise_v(raw.exposure.gain_mode).hypot(self.dsnu_v).hypot(self.row_noise_v);
+        let rounding_v = if self.adc == Adc::Analog { 0.0 } else { raw.levels.step_v / 12.0_f64.sqrt() };
+        let floor_v = (volts * raw.exposure.analog_gain).hypot(rounding_v);
+        let dark_e = self.dark_current.at(raw.exposure.temperature_c) * raw.exposure.time_s;
+        (floor_v / raw.levels.volts_per_electron).hypot(dark_e.sqrt())
+    }
+}
+
+impl Profile<'_> {
+    /// Returns the linear light of a frame of this camera.
+    pub(crate) fn develop_linear(
+        self,
+        raw: &Raw,
+        processing: &Processing,
+        lens: Option<&LensTables>,
+    ) -> Result<LinearPicture, SensorError> {
         raw.check()?;
         self.check_settings(raw, processing)?;
         let corrections = processing.lens_corrections;
+        let n_channels = self.n_channels();
         let lens = needed_tables(corrections, lens)?;
-        lens.map_or(Ok(()), |lens| lens.check(raw.size(), self.filters.len()))?;
+        lens.map_or(Ok(()), |lens| lens.check(raw.size(), n_channels))?;
         let processing = processing.under(None);
         let tile = raw.tile.as_ref();
-        let n_channels = self.filters.len();
         let noise = self.sample_noise(raw);
         let mut planes = raw.linear();
         let saturated = match processing.highlights {
             Highlights::Clip => None,
             Highlights::Reconstruct => Saturated::find(&planes, tile, n_channels, self.saturated_from(raw)),
         };
-        self.clean(&mut planes, tile, &processing, &noise);
+        clean(&mut planes, tile, &processing, &noise);
         if let Some(lens) = lens.filter(|_| corrections.vignetting) {
             lens.even_out(&mut planes, tile);
         }
@@ -226,71 +251,24 @@ impl Sensor {
             let sources: Vec<_> = (0..n_channels).map(|channel| lens.source_px(channel, corrections)).collect();
             channels = warp(&channels, &sources);
         }
-        let color = self.color_matrix(&processing.color, &balance);
+        let color = self.color_matrix(&processing.color, &balance)?;
         if processing.sharpen_px > 0.0 {
             let luminance = color.luminance_shares(n_channels);
-            let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: &noise };
+            let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: middle(&noise) };
             sharpen(&mut channels, processing.sharpen_px, &of);
+        }
+        if let Some(perspective) = processing.perspective {
+            channels = perspective.apply(&channels);
         }
         let Processing { highlights, local_tone, .. } = processing;
         Ok(LinearPicture { light: mix(&channels, &color), highlights, local_tone, balance, color })
-    }
-
-    /// Mends defects, undoes a given fall of light and takes out noise.
-    fn clean(&self, planes: &mut [Array2<f32>], tile: Option<&Tile>, processing: &Processing, noise: &SampleNoise) {
-        if let Some(threshold) = processing.defect_threshold {
-            defects::correct(planes, tile, threshold as f32);
-        }
-        if let Some(shading) = &processing.shading {
-            shading.correct(planes, tile);
-        }
-        let strength = processing.denoise.unwrap_or_else(|| automatic_strength(noise));
-        if strength > 0.0 {
-            denoise(planes, tile, &vec![noise.clone(); self.filters.len()], strength);
-        }
-    }
-
-    /// Returns the matrix from channels that were balanced so to linear sRGB.
-    fn color_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> ColorMatrix {
-        let chart = || -> Vec<Spectrum> { color_checker_reflectances().into_iter().map(|(_, s)| s).collect() };
-        match color {
-            ColorCorrection::None => ColorMatrix::identity(self.filters.len()),
-            ColorCorrection::Auto => ColorMatrix::fit(self, &light_of_gains(self, balance), &chart()),
-            ColorCorrection::Roots => ColorMatrix::fit_roots(self, &light_of_gains(self, balance), &chart()),
-            ColorCorrection::Fitted(light) => ColorMatrix::fit(self, light, &chart()),
-            ColorCorrection::FittedRoots(light) => ColorMatrix::fit_roots(self, light, &chart()),
-            ColorCorrection::Matrix(rows) => ColorMatrix { rows: rows.clone(), has_roots: false, delta_e: Vec::new() },
-        }
-    }
-
-    /// Returns the share of saturation from which on a sample is taken to be saturated: three deviations of noise below it.
-    fn saturated_from(&self, raw: &Raw) -> f32 {
-        let noise = self.noise_floor_e(raw) / raw.levels.saturation_e();
-        (0.998 - 3.0 * noise).max(0.9) as f32
-    }
-
-    /// Returns the noise of a frame's samples in units of saturation.
-    fn sample_noise(&self, raw: &Raw) -> SampleNoise {
-        if !raw.merged.is_empty() {
-            return merged_noise(&raw.merged);
-        }
-        SampleNoise::Frame { electrons_per_unit: raw.levels.saturation_e(), floor_e: self.noise_floor_e(raw) }
-    }
-
-    /// Returns the noise of a frame that does not depend on the signal, rms electrons.
-    pub(crate) fn noise_floor_e(&self, raw: &Raw) -> f64 {
-        let volts = self.read_noise_v(raw.exposure.gain_mode).hypot(self.dsnu_v).hypot(self.row_noise_v);
-        let rounding_v = if self.adc == Adc::Analog { 0.0 } else { raw.levels.step_v / 12.0_f64.sqrt() };
-        let floor_v = (volts * raw.exposure.analog_gain).hypot(rounding_v);
-        let dark_e = self.dark_current.at(raw.exposure.temperature_c) * raw.exposure.time_s;
-        (floor_v / raw.levels.volts_per_electron).hypot(dark_e.sqrt())
     }
 
     fn check_settings(&self, raw: &Raw, processing: &Processing) -> Result<(), SensorError> {
         let shape = |what, expected: usize, found: usize| {
             Err(SensorError::Shape { what, expected: expected.to_string(), found: found.to_string() })
         };
-        let n_channels = self.filters.len();
+        let n_channels = self.n_channels();
         let not_negative = [
             ("defect_threshold", processing.defect_threshold.unwrap_or(0.0)),
             ("denoise", processing.denoise.unwrap_or(0.0)),
@@ -318,9 +296,30 @@ impl Sensor {
         if !(0.0..=2.0).contains(&processing.sharpen_px) {
             return Err(SensorError::value("the processing", "sharpen_px", processing.sharpen_px, "0 to 2 pixels"));
         }
+        processing.perspective.map_or(Ok(()), |perspective| perspective.check())?;
         processing.local_tone.check()?;
-        processing.curve.check()
+        processing.curve.check()?;
+        self.check_processing(processing)
     }
+}
+
+/// Mends defects, undoes a given fall of light and takes out noise, that of each filter.
+fn clean(planes: &mut [Array2<f32>], tile: Option<&Tile>, processing: &Processing, noise: &[SampleNoise]) {
+    if let Some(threshold) = processing.defect_threshold {
+        defects::correct(planes, tile, threshold as f32);
+    }
+    if let Some(shading) = &processing.shading {
+        shading.correct(planes, tile);
+    }
+    let strength = processing.denoise.unwrap_or_else(|| automatic_strength(middle(noise)));
+    if strength > 0.0 {
+        denoise(planes, tile, noise, strength);
+    }
+}
+
+/// Returns the noise of the filter that stands for all: the second of several, which is green in most files, or the only one.
+fn middle(noise: &[SampleNoise]) -> &SampleNoise {
+    noise.get(1).unwrap_or(&noise[0])
 }
 
 impl LinearPicture {

@@ -1,5 +1,7 @@
 //! The frame that a sensor hands on, with what is needed to understand it.
 
+use std::{borrow::Cow, sync::Arc};
+
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -49,14 +51,33 @@ pub enum RawPlane {
     Dn(Array2<u16>),
     /// Volts after the analog gain.
     Volts(Array2<f32>),
+    /// Digital numbers of a file whose black or saturation differs from place to place, shifted and scaled to what
+    /// [`Levels`] states for all.
+    Evened(Array2<f32>),
 }
 
 impl RawPlane {
-    /// Returns the digital numbers, or `None` for volts.
+    /// Returns the digital numbers as they are, or `None` for volts and for evened numbers.
     pub fn dn(&self) -> Option<&Array2<u16>> {
         match self {
             Self::Dn(plane) => Some(plane),
-            Self::Volts(_) => None,
+            Self::Volts(_) | Self::Evened(_) => None,
+        }
+    }
+
+    /// Returns the samples as numbers of any kind.
+    pub fn samples(&self) -> Cow<'_, Array2<f32>> {
+        match self {
+            Self::Dn(plane) => Cow::Owned(plane.mapv(f32::from)),
+            Self::Volts(plane) | Self::Evened(plane) => Cow::Borrowed(plane),
+        }
+    }
+
+    /// Returns one sample, or `None` beyond the frame.
+    pub fn sample(&self, row: usize, column: usize) -> Option<f64> {
+        match self {
+            Self::Dn(plane) => plane.get((row, column)).map(|&dn| f64::from(dn)),
+            Self::Volts(plane) | Self::Evened(plane) => plane.get((row, column)).map(|&value| f64::from(value)),
         }
     }
 
@@ -64,7 +85,7 @@ impl RawPlane {
     pub fn size(&self) -> (usize, usize) {
         match self {
             Self::Dn(plane) => plane.dim(),
-            Self::Volts(plane) => plane.dim(),
+            Self::Volts(plane) | Self::Evened(plane) => plane.dim(),
         }
     }
 }
@@ -87,6 +108,8 @@ pub struct Levels {
     converter_black: f64,
     black_v: f64,
     white_v: f64,
+    /// What each code stands for on the straight scale of a file's levels.
+    table: Option<Arc<[u16]>>,
 }
 
 impl Levels {
@@ -112,19 +135,47 @@ impl Levels {
             converter_black,
             black_v,
             white_v,
+            table: None,
+        }
+    }
+
+    /// Returns the levels of a file: those of its codes, or with a table those of the table's entries.
+    ///
+    /// A step stands for a volt.
+    pub(crate) fn of_file((black, white, top): (f64, f64, f64), saturation_e: f64, table: Option<Arc<[u16]>>) -> Self {
+        let code_of = |level: f64| match &table {
+            Some(table) => table.partition_point(|&entry| f64::from(entry) < level).min(table.len() - 1) as f64,
+            None => level,
+        };
+        Self {
+            black: code_of(black),
+            white: code_of(white),
+            top,
+            step_v: 1.0,
+            volts_per_electron: (white - black) / saturation_e,
+            response: Response::Linear,
+            swing_v: top,
+            converter_black: 0.0,
+            black_v: black,
+            white_v: white,
+            table,
         }
     }
 
     /// Returns the light that a sample stands for: 0 for none, 1 at saturation; the response curve is undone.
     pub fn linear(&self, sample: f64) -> f64 {
-        let out_v = (sample - self.converter_black) * self.step_v;
+        let straight = match &self.table {
+            Some(table) => f64::from(table[(sample.max(0.0) as usize).min(table.len() - 1)]),
+            None => sample,
+        };
+        let out_v = (straight - self.converter_black) * self.step_v;
         let v = self.response.inverse(out_v.abs(), self.swing_v).copysign(out_v);
         (v - self.black_v) / (self.white_v - self.black_v)
     }
 
     /// Whether samples rise with light along a straight line.
     pub(crate) fn is_linear(&self) -> bool {
-        self.response == Response::Linear
+        self.response == Response::Linear && self.table.is_none()
     }
 
     /// Returns the electrons at saturation, [`linear`](Self::linear) = 1.
@@ -160,7 +211,7 @@ impl Raw {
                     (0..=self.levels.top as u16).map(|dn| self.levels.linear(f64::from(dn)) as f32).collect();
                 ndarray::Zip::from(plane).par_map_collect(|&dn| table.get(usize::from(dn)).copied().unwrap_or(1.0))
             }
-            RawPlane::Volts(plane) => {
+            RawPlane::Volts(plane) | RawPlane::Evened(plane) => {
                 ndarray::Zip::from(plane).par_map_collect(|&v| self.levels.linear(f64::from(v)) as f32)
             }
         };
@@ -173,7 +224,9 @@ impl Raw {
         let white = self.levels.white - if self.dn().is_some() { 0.5 } else { 1e-6 * self.levels.white };
         let count = |plane: &RawPlane| match plane {
             RawPlane::Dn(plane) => plane.par_iter().filter(|&&dn| f64::from(dn) >= white).count(),
-            RawPlane::Volts(plane) => plane.par_iter().filter(|&&v| f64::from(v) >= white).count(),
+            RawPlane::Volts(plane) | RawPlane::Evened(plane) => {
+                plane.par_iter().filter(|&&v| f64::from(v) >= white).count()
+            }
         };
         let (rows, columns) = self.size();
         self.planes.iter().map(count).sum::<usize>() as f64 / (rows * columns * self.planes.len()) as f64

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::SensorError;
+
 /// The primaries in which a picture is coded; white is D65 in all of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -18,6 +20,22 @@ const P3_FROM_SRGB: [[f32; 3]; 3] =
     [[0.822_461_96, 0.177_538_04, 0.0], [0.033_194_2, 0.966_805_8, 0.0], [0.017_082_63, 0.072_397_44, 0.910_519_93]];
 
 impl ColorSpace {
+    /// Reads `srgb` or `display-p3`.
+    ///
+    /// # Errors
+    /// When the text is neither.
+    pub fn parse(text: &str) -> Result<Self, SensorError> {
+        match text.to_ascii_lowercase().as_str() {
+            "srgb" => Ok(Self::Srgb),
+            "display-p3" => Ok(Self::DisplayP3),
+            _ => Err(SensorError::Word {
+                what: "the primaries",
+                found: text.to_owned(),
+                expected: "srgb, display-p3".to_owned(),
+            }),
+        }
+    }
+
     /// Returns linear light in these primaries, of linear sRGB.
     #[inline]
     pub fn from_linear_srgb(self, rgb: [f32; 3]) -> [f32; 3] {

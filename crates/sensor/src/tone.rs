@@ -25,6 +25,28 @@ pub enum Brightness {
     },
 }
 
+impl Brightness {
+    /// Reads `as-exposed`, a factor, or `P%:TO` for the luminance of a percentile put at a share of white.
+    ///
+    /// # Errors
+    /// When the text is none of these.
+    pub fn parse(text: &str) -> Result<Self, SensorError> {
+        let percentile = |(percent, to): (&str, &str)| {
+            Some(Self::Percentile { percent: percent.trim().parse().ok()?, to: to.trim().parse().ok()? })
+        };
+        let known = match text.split_once("%:") {
+            Some(parts) => percentile(parts),
+            None if text.eq_ignore_ascii_case("as-exposed") => Some(Self::AsExposed),
+            None => text.trim().parse().ok().map(Self::Factor),
+        };
+        known.ok_or_else(|| SensorError::Word {
+            what: "the brightness",
+            found: text.to_owned(),
+            expected: "as-exposed, a factor as 1.5, or a percentile and where it is put as 99%:0.9".to_owned(),
+        })
+    }
+}
+
 /// The curve from linear light to codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -44,6 +66,26 @@ pub enum ToneCurve {
 }
 
 impl ToneCurve {
+    /// Reads `linear`, `srgb`, `gamma:EXPONENT` or `filmic:CONTRAST`.
+    ///
+    /// # Errors
+    /// When the text is none of these.
+    pub fn parse(text: &str) -> Result<Self, SensorError> {
+        let word = text.to_ascii_lowercase();
+        let known = match word.split_once(':') {
+            Some(("gamma", exponent)) => exponent.trim().parse().ok().map(Self::Gamma),
+            Some(("filmic", contrast)) => contrast.trim().parse().ok().map(|contrast| Self::Filmic { contrast }),
+            None if word == "linear" => Some(Self::Linear),
+            None if word == "srgb" => Some(Self::Srgb),
+            _ => None,
+        };
+        known.ok_or_else(|| SensorError::Word {
+            what: "the tone curve",
+            found: text.to_owned(),
+            expected: "linear, srgb, gamma:EXPONENT as gamma:0.45, filmic:CONTRAST as filmic:0.5".to_owned(),
+        })
+    }
+
     pub(crate) fn check(self) -> Result<(), SensorError> {
         let (key, value, right) = match self {
             Self::Linear | Self::Srgb => return Ok(()),
@@ -102,6 +144,27 @@ impl ToneTable {
 mod tests {
     use super::*;
     use approx::assert_abs_diff_eq;
+
+    #[test]
+    fn words_name_brightness_and_curves() {
+        for (text, brightness) in [
+            ("as-exposed", Brightness::AsExposed),
+            ("1.5", Brightness::Factor(1.5)),
+            ("99%:0.9", Brightness::Percentile { percent: 99.0, to: 0.9 }),
+        ] {
+            assert_eq!(Brightness::parse(text).unwrap(), brightness);
+        }
+        for (text, curve) in [
+            ("linear", ToneCurve::Linear),
+            ("sRGB", ToneCurve::Srgb),
+            ("gamma:0.45", ToneCurve::Gamma(0.45)),
+            ("filmic:0.5", ToneCurve::Filmic { contrast: 0.5 }),
+        ] {
+            assert_eq!(ToneCurve::parse(text).unwrap(), curve);
+        }
+        assert!(Brightness::parse("bright").unwrap_err().to_string().contains("99%:0.9"));
+        assert!(ToneCurve::parse("gamma").unwrap_err().to_string().contains("filmic:CONTRAST"));
+    }
 
     #[test]
     fn the_table_is_the_curve() {

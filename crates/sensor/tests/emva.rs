@@ -38,7 +38,7 @@ fn frame(sensor: &Sensor, electrons: f64, time_s: f64, number: u64) -> Array2<f3
     let volts = sensor.volts(&collected, &exposure, &noise).unwrap();
     match sensor.digitize(&volts, &exposure).unwrap().planes.remove(0) {
         RawPlane::Dn(plane) => plane.mapv(f32::from),
-        RawPlane::Volts(plane) => plane,
+        RawPlane::Volts(plane) | RawPlane::Evened(plane) => plane,
     }
 }
 

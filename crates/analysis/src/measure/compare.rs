@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use dioptric_scene::DisplayModel;
 use dioptric_sensor::{psnr_db, scielab_delta_e, ssim, visual_snr};
+use ndarray::Array3;
 use serde::Serialize;
 
 use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion};
@@ -13,14 +15,46 @@ use dioptric_pipeline::PipelineError;
 const POINTS: usize = 100;
 
 /// How two pictures are compared.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CompareRequest {
-    /// Pixels a degree of the viewer's field.
-    pub pixels_per_degree: f64,
+    /// How they are seen.
+    pub viewing: PictureViewing,
     /// An even patch, whose visual signal-to-noise ratio is measured.
     pub patch: Option<PixelRegion>,
     /// How samples stand for light.
     pub curve: CodeCurve,
+}
+
+/// How a viewer sees pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PictureViewing {
+    /// As sRGB, at so many pixels a degree of the viewer's field.
+    PixelsPerDegree(f64),
+    /// On a display at a distance, m: codes are its own, and its white is white.
+    Display {
+        /// The display.
+        display: Box<DisplayModel>,
+        /// The distance, m.
+        distance_m: f64,
+    },
+}
+
+impl PictureViewing {
+    /// Pixels a degree of the viewer's field.
+    pub fn pixels_per_degree(&self) -> f64 {
+        match self {
+            Self::PixelsPerDegree(n) => *n,
+            Self::Display { display, distance_m } => display.pixels_per_degree(*distance_m),
+        }
+    }
+
+    /// Returns the light of a picture file as the viewer sees it, in linear sRGB.
+    fn light(&self, path: &Path, curve: CodeCurve) -> Result<Array3<f32>, PipelineError> {
+        match self {
+            Self::PixelsPerDegree(_) => MeasuredPicture::open(path, curve)?.rgb(),
+            Self::Display { display, .. } => Ok(display.seen(&MeasuredPicture::open(path, CodeCurve::Linear)?.rgb()?)),
+        }
+    }
 }
 
 /// How alike two pictures are.
@@ -67,16 +101,17 @@ impl CompareRequest {
     /// # Errors
     /// When a file cannot be read, the pictures differ in size, or a setting makes no sense.
     pub fn compare(&self, first: &Path, second: &Path) -> Result<Comparison, PipelineError> {
+        let pixels_per_degree = self.viewing.pixels_per_degree();
+        let (light, other_light) = (self.viewing.light(first, self.curve)?, self.viewing.light(second, self.curve)?);
         let open = |path: &Path| MeasuredPicture::open(path, self.curve);
         let (first, second) = (open(first)?, open(second)?);
         let patch = self.patch.map(|patch| patch.check_within(first.size())).transpose()?;
-        let (light, other_light) = (first.rgb()?, second.rgb()?);
         let (codes, other_codes) = (first.coded()?, second.coded()?);
         let psnr = psnr_db(&codes, &other_codes)?;
-        let delta_e = scielab_delta_e(&light, &other_light, self.pixels_per_degree)?;
+        let delta_e = scielab_delta_e(&light, &other_light, pixels_per_degree)?;
         let vsnr = |light: &ndarray::Array3<f32>| -> Result<Option<f64>, PipelineError> {
             let Some(patch) = patch else { return Ok(None) };
-            Ok(Some(visual_snr(&patch.of_picture(light), self.pixels_per_degree)?).filter(|v| v.is_finite()))
+            Ok(Some(visual_snr(&patch.of_picture(light), pixels_per_degree)?).filter(|v| v.is_finite()))
         };
         Ok(Comparison {
             vsnr: vsnr(&light)?,
@@ -85,7 +120,7 @@ impl CompareRequest {
             against: second.name,
             psnr_db: psnr.is_finite().then_some(psnr),
             ssim: ssim(&codes, &other_codes)?,
-            pixels_per_degree: self.pixels_per_degree,
+            pixels_per_degree,
             scielab: DeltaESummary::of(delta_e.iter().map(|&v| f64::from(v)).collect()),
         })
     }

@@ -13,7 +13,7 @@ mod region;
 use serde::Serialize;
 
 pub use chart::{ChartMeasurement, ChartRequest, PatchRow};
-pub use compare::{CompareRequest, Comparison, DeltaESummary};
+pub use compare::{CompareRequest, Comparison, DeltaESummary, PictureViewing};
 pub use edge::{EdgeChannel, EdgeMeasurement, EdgeRequest, UnmeasuredChannel};
 pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, measure_bench, measure_frames};
 pub use open::{CodeCurve, MeasuredPicture};

@@ -7,7 +7,6 @@ use std::{
 
 use dioptric_sensor::{
     Bench, BenchSettings, DarkCurrentEstimate, Exposure, FlatPoint, FrameStack, NonUniformity, PhotonTransfer, Raw,
-    RawPlane,
 };
 use dioptric_spectrum::Illuminant;
 use ndarray::Array2;
@@ -226,10 +225,7 @@ pub fn measure_frames(path: &Path) -> Result<NoiseData, PipelineError> {
 }
 
 fn numbers_of(raw: &Raw) -> Array2<f32> {
-    match &raw.planes[0] {
-        RawPlane::Dn(dn) => dn.mapv(f32::from),
-        RawPlane::Volts(volts) => volts.clone(),
-    }
+    raw.planes[0].samples().into_owned()
 }
 
 fn data_sheet(bench: &Bench) -> NoiseDataSheet {

@@ -1,6 +1,7 @@
 //! A run of the whole camera in numbers and charts.
 
 mod charts;
+mod dng_report;
 mod statistics;
 
 use dioptric_pipeline::{AberrationSummary, BankData, Camera, Capture, FilmPart, PipelineError, display::LinearRgb};
@@ -10,6 +11,7 @@ use dioptric_spectrum::{ColorTemperature, DepthMap};
 use serde::Serialize;
 
 pub use charts::{RunCharts, RunPlaces};
+pub use dng_report::DngReport;
 pub use statistics::{ChannelStatistics, LossRow, SensorStatistics};
 
 use crate::LensData;

@@ -1,7 +1,7 @@
 //! Numbers of a capture: what the sensor saw and what the lens lost.
 
 use dioptric_optics::{MonoLens, ObjectPoint, Vignetting, glam::DVec2, rays_over_front};
-use dioptric_sensor::{Raw, RawPlane, Tile};
+use dioptric_sensor::{Raw, Tile};
 use ndarray::Array2;
 use serde::Serialize;
 
@@ -144,13 +144,7 @@ fn of_filter<'a>(
 }
 
 fn raw_planes(raw: &Raw) -> Vec<Array2<f32>> {
-    raw.planes
-        .iter()
-        .map(|plane| match plane {
-            RawPlane::Dn(dn) => dn.mapv(f32::from),
-            RawPlane::Volts(volts) => volts.clone(),
-        })
-        .collect()
+    raw.planes.iter().map(|plane| plane.samples().into_owned()).collect()
 }
 
 /// Returns where the light of a few fields goes, at the reference wavelength and the depth in focus.

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use dioptric_optics::{GlassCatalogue, Lens, LensFile, MissingGlass, ReadOptions, SeqNumbers, SurfaceChange};
+use dioptric_optics::{
+    GlassCatalogue, IdealLens, Lens, LensFile, MissingGlass, ReadOptions, SeqNumbers, SurfaceChange,
+};
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
@@ -18,9 +20,19 @@ pub fn nearest_to_reference_nm(wavelengths_nm: &[f64]) -> f64 {
 }
 
 impl LensSpec {
-    /// Returns what `LENS` on the command line means: a built-in name where it is one, a path where it looks like one or
-    /// is one, else a name that is not known.
+    /// Returns what `LENS` on the command line means: an ideal lens where it is named by its numbers
+    /// ([`IdealLens::PATTERNS`]), a built-in name where it is one, a path where it looks like one or is one, else a name that is not
+    /// known.
     pub fn named(text: &str) -> Self {
+        match IdealLens::named(text) {
+            Some(Ok(IdealLens::Thin { focal_length_mm, diameter_mm })) => {
+                return Self::Thin { focal_length_mm, diameter_mm };
+            }
+            Some(Ok(IdealLens::Pinhole { diameter_mm })) => return Self::Pinhole { diameter_mm },
+            // What is wrong with the name is said when it is opened.
+            Some(Err(_)) if !Path::new(text).exists() => return Self::BuiltIn(text.to_owned()),
+            _ => {}
+        }
         // Names such as fisheye-12.5mm look as though they had an extension.
         let is_built_in = Lens::built_in_names().any(|name| name == text);
         if !is_built_in && is_path(text) { Self::File(PathBuf::from(text)) } else { Self::BuiltIn(text.to_owned()) }
@@ -163,6 +175,9 @@ mod tests {
     fn names_and_paths_are_told_apart() {
         assert_eq!(LensSpec::named("dgauss-50mm"), LensSpec::BuiltIn("dgauss-50mm".to_owned()));
         assert_eq!(LensSpec::named("fisheye-12.5mm"), LensSpec::BuiltIn("fisheye-12.5mm".to_owned()));
+        assert_eq!(LensSpec::named("thin:50mm:f2"), LensSpec::Thin { focal_length_mm: 50.0, diameter_mm: 25.0 });
+        assert_eq!(LensSpec::named("pinhole:0.1mm"), LensSpec::Pinhole { diameter_mm: 0.1 });
+        assert_eq!(LensSpec::named("pinhole:0.1"), LensSpec::BuiltIn("pinhole:0.1".to_owned()));
         for path in ["lens.dat", "./lens", "folder/lens"] {
             assert_eq!(LensSpec::named(path), LensSpec::File(PathBuf::from(path)));
         }

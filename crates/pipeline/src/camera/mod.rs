@@ -8,6 +8,7 @@ mod frames;
 mod lens;
 mod light_field;
 mod movements;
+mod picture_options;
 mod scene;
 mod sensor_options;
 mod world;
@@ -32,6 +33,7 @@ pub use frames::{Exposed, FramesSpec};
 pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 pub use light_field::LightFieldSpec;
 pub use movements::Movements;
+pub use picture_options::PictureOptions;
 pub use scene::{FlatSize, SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
 pub use world::{RenderEffort, RenderMethod, WorldSpec};
@@ -114,7 +116,7 @@ pub struct Camera {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum LensSpec {
-    /// A built-in lens by name.
+    /// A built-in lens by name; also "thin:50mm:f2" and "pinhole:0.1mm".
     BuiltIn(String),
     /// A lens file.
     File(PathBuf),

@@ -108,6 +108,11 @@ class Camera:
         color: str | None = ...,
         sharpen_px: float | None = ...,
         local_tone: str | None = ...,
+        perspective: str | None = ...,
+        brightness: str | None = ...,
+        curve: str | None = ...,
+        space: str | None = ...,
+        defect_threshold: float | None = ...,
         seed: int | None = ...,
     ) -> Camera: ...
     def render(
@@ -186,6 +191,11 @@ class Shot:
         color: str | None = ...,
         sharpen_px: float | None = ...,
         local_tone: str | None = ...,
+        perspective: str | None = ...,
+        brightness: str | None = ...,
+        curve: str | None = ...,
+        space: str | None = ...,
+        defect_threshold: float | None = ...,
     ) -> Shot: ...
     def develop(
         self,
@@ -198,6 +208,11 @@ class Shot:
         color: str | None = ...,
         sharpen_px: float | None = ...,
         local_tone: str | None = ...,
+        perspective: str | None = ...,
+        brightness: str | None = ...,
+        curve: str | None = ...,
+        space: str | None = ...,
+        defect_threshold: float | None = ...,
     ) -> Shot: ...
     def png(self) -> bytes: ...
     def save(self, path: _Path) -> list[str]: ...

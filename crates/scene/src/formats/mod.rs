@@ -20,6 +20,7 @@ mod spectral_exr;
 mod unmeasured;
 
 pub(crate) use beside::{PartialFile, unwritable};
+pub(crate) use picture::decode as decode_picture;
 
 pub use band_folder::read_band_folder;
 pub use envi::{EnviCube, read_envi};

@@ -3,6 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use super::tags::{STRIP_BYTE_COUNTS, STRIP_OFFSETS};
+
 /// The values of a field.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
@@ -54,9 +56,6 @@ pub(crate) struct Directory {
     strip: Option<Vec<u8>>,
 }
 
-const STRIP_OFFSETS: u16 = 273;
-const STRIP_BYTE_COUNTS: u16 = 279;
-
 impl Directory {
     pub(crate) fn set(&mut self, tag: u16, value: Value) {
         self.fields.insert(tag, value);
@@ -73,6 +72,16 @@ impl Directory {
     /// Returns the file whose first directory this is, or `None` if it were beyond 4 GiB.
     pub(crate) fn into_file(self) -> Option<Vec<u8>> {
         let mut file = b"II*\0\0\0\0\0".to_vec();
+        let first = self.append_to(&mut file)?;
+        file[4..8].copy_from_slice(&first.to_le_bytes());
+        Some(file)
+    }
+
+    /// Returns such a file with bytes between its header and all else.
+    #[cfg(test)]
+    pub(crate) fn into_file_behind(self, bytes: &[u8]) -> Option<Vec<u8>> {
+        let mut file = b"II*\0\0\0\0\0".to_vec();
+        file.extend(bytes);
         let first = self.append_to(&mut file)?;
         file[4..8].copy_from_slice(&first.to_le_bytes());
         Some(file)

@@ -54,7 +54,7 @@ fn is_on(place: f64, n: usize) -> bool {
 
 /// Returns the value at a place of a plane: columns and rows of pixels from the middle of the first.
 #[inline]
-fn sample(plane: &Array2<f32>, x: f64, y: f64) -> f32 {
+pub(crate) fn sample(plane: &Array2<f32>, x: f64, y: f64) -> f32 {
     let (rows, columns) = plane.dim();
     let values = plane.as_slice().expect("demosaiced planes are contiguous");
     let (left, top) = (x.floor(), y.floor());

@@ -3,7 +3,6 @@
 use dioptric_optics::glam::DVec2;
 use dioptric_pipeline::display::SpectrumToRgb;
 use dioptric_psf::{LensImage, Picture, PsfQuery};
-use dioptric_sensor::RawPlane;
 use dioptric_spectrum::WavelengthGrid;
 use ndarray::Array2;
 
@@ -145,10 +144,7 @@ impl Product {
         let spectrum = (0..grid.len()).filter_map(|band| Some((grid.centers_nm()[band], irradiance(band)?))).collect();
         let exposed = &capture.frames.exposed;
         let electrons = exposed.electrons.planes_e.iter().filter_map(|plane| plane.get((row, column)));
-        let samples = exposed.raw.planes.iter().filter_map(|plane| match plane {
-            RawPlane::Dn(plane) => plane.get((row, column)).map(|&dn| f64::from(dn)),
-            RawPlane::Volts(plane) => plane.get((row, column)).map(|&v| f64::from(v)),
-        });
+        let samples = exposed.raw.planes.iter().filter_map(|plane| plane.sample(row, column));
         let filter =
             exposed.raw.tile.as_ref().map(|tile| exposed.raw.filter_names[tile.filter_at(row, column)].clone());
         let first = 3 * (row * columns + column);

@@ -156,6 +156,8 @@ const TEXT: &[(&str, &str)] = &[
     ("LightFieldSpec", "as above"),
     ("MicroArray", "as above"),
     ("MicroElements", "as above"),
+    ("Processing.perspective", "eight numbers, which are read off the picture"),
+    ("Perspective", "as above"),
     ("LensShading.Map", "as many numbers as cells and filters, from a calibration"),
     ("ShadingMap", "as above"),
     ("ColorCorrection.Matrix", "nine numbers or more, from a calibration"),

@@ -1,7 +1,6 @@
 //! Results as images of the screen: pure functions of them.
 
 use dioptric_pipeline::display::{SpectrumToRgb, code};
-use dioptric_sensor::RawPlane;
 use dioptric_spectrum::WavelengthGrid;
 use egui::{Color32, ColorImage};
 use ndarray::{ArrayView2, Axis};
@@ -46,10 +45,7 @@ pub(in crate::ui) fn raw(product: &Product) -> ColorImage {
     let size = product.size();
     let (black, white) = (raw.levels.black, raw.levels.white);
     let level = |sample: f64| code(((sample - black) / (white - black)).clamp(0.0, 1.0));
-    let at = |row: usize, column: usize| match &raw.planes[0] {
-        RawPlane::Dn(plane) => f64::from(plane[(row, column)]),
-        RawPlane::Volts(plane) => f64::from(plane[(row, column)]),
-    };
+    let at = |row: usize, column: usize| raw.planes[0].sample(row, column).unwrap_or(black);
     let color = |filter: &str, level: u8| match filter.chars().next().map(|first| first.to_ascii_lowercase()) {
         Some('r') => Color32::from_rgb(level, 0, 0),
         Some('g') => Color32::from_rgb(0, level, 0),

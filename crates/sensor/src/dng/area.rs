@@ -1,0 +1,62 @@
+//! The part of a stored frame that is shown.
+
+use super::{
+    tags::{ACTIVE_AREA, DEFAULT_CROP_ORIGIN, DEFAULT_CROP_SIZE},
+    tiff_reader::Fields,
+};
+
+/// The pixels that are shown, and where those that see light begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Area {
+    /// The first row and column of those that see light, from which mosaics and levels count.
+    pub(super) active_top: usize,
+    pub(super) active_left: usize,
+    /// The first row and column that are shown, and how many.
+    pub(super) top: usize,
+    pub(super) left: usize,
+    pub(super) rows: usize,
+    pub(super) columns: usize,
+}
+
+impl Area {
+    /// Reads the default crop of the active area of a frame of so many rows and columns.
+    pub(super) fn read(frame: &Fields<'_>, (rows, columns): (usize, usize)) -> Result<Self, String> {
+        let active = frame.whole(ACTIVE_AREA)?;
+        let [top, left, bottom, right] = match active.as_slice() {
+            [] => [0, 0, rows, columns],
+            &[top, left, bottom, right] if top < bottom && left < right && bottom <= rows && right <= columns => {
+                [top, left, bottom, right]
+            }
+            other => {
+                return Err(format!("has an active area of {other:?}, expected one within {columns} × {rows} pixels"));
+            }
+        };
+        let (height, width) = (bottom - top, right - left);
+        let origin = frame.finite(DEFAULT_CROP_ORIGIN, 2)?.unwrap_or(vec![0.0; 2]);
+        let size = frame.finite(DEFAULT_CROP_SIZE, 2)?;
+        let size = size.unwrap_or(vec![width as f64 - origin[0], height as f64 - origin[1]]);
+        let is_within = |from: f64, n: f64, all: usize| {
+            (0.0..=all as f64).contains(&from) && n.round() >= 1.0 && from.round() + n.round() <= all as f64
+        };
+        if !is_within(origin[0], size[0], width) || !is_within(origin[1], size[1], height) {
+            return Err(format!(
+                "is to be cropped to {} × {} pixels from {}, {} on, expected some within {width} × {height}",
+                size[0], size[1], origin[0], origin[1]
+            ));
+        }
+        let whole = |value: f64| value.round() as usize;
+        Ok(Self {
+            active_top: top,
+            active_left: left,
+            top: top + whole(origin[1]),
+            left: left + whole(origin[0]),
+            rows: whole(size[1]),
+            columns: whole(size[0]),
+        })
+    }
+
+    /// Returns how many rows and columns of light lie before those that are shown.
+    pub(super) fn places_before(&self) -> (usize, usize) {
+        (self.top - self.active_top, self.left - self.active_left)
+    }
+}

@@ -1,0 +1,94 @@
+//! What a DNG file states of its camera, as far as developing needs it.
+
+use dioptric_spectrum::Illuminant;
+use serde::Serialize;
+
+use super::file_color::DngColor;
+use crate::{ColorCorrection, ColorMatrix, Processing, SensorError, WhiteBalance, denoise::SampleNoise};
+
+/// The camera of a file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DngProfile {
+    /// The filters of the mosaic, or of the planes.
+    pub filter_names: Vec<String>,
+    /// Its colors; `None` of a single filter, and where the file states none.
+    pub color: Option<DngColor>,
+    /// Its noise: none where the file states none, one for all filters, or one each.
+    pub noise: Vec<DngNoise>,
+}
+
+/// The variance of a sample, `scale` × x + `offset`, of light x that is 1 at saturation (`NoiseProfile`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DngNoise {
+    /// The variance a unit of light: one over the electrons at saturation.
+    pub scale: f64,
+    /// The variance in the dark.
+    pub offset: f64,
+}
+
+/// The least of variance that counts a unit of light; noise is none for wells beyond a thousand million electrons.
+const LEAST_SCALE: f64 = 1e-9;
+
+impl DngNoise {
+    fn of_samples(self) -> SampleNoise {
+        let electrons_per_unit = 1.0 / self.scale.max(LEAST_SCALE);
+        SampleNoise::Frame { electrons_per_unit, floor_e: self.offset.max(0.0).sqrt() * electrons_per_unit }
+    }
+}
+
+impl DngProfile {
+    /// Returns the noise of each filter; next to none where it is not known.
+    pub(crate) fn sample_noise(&self) -> Vec<SampleNoise> {
+        let none = DngNoise { scale: LEAST_SCALE, offset: 0.0 };
+        let of = |filter: usize| self.noise.get(filter).or(self.noise.first()).copied().unwrap_or(none);
+        (0..self.filter_names.len()).map(|filter| of(filter).of_samples()).collect()
+    }
+
+    /// Returns the largest standard deviation in the dark, as a share of saturation.
+    pub(crate) fn largest_floor(&self) -> f64 {
+        self.noise.iter().map(|noise| noise.offset.max(0.0).sqrt()).fold(0.0, f64::max)
+    }
+
+    pub(crate) fn white_response(&self, light: &Illuminant) -> Vec<f64> {
+        match &self.color {
+            Some(color) => color.neutral_of(light.chromaticity()),
+            None => vec![1.0; self.filter_names.len()],
+        }
+    }
+
+    pub(crate) fn color_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError> {
+        let Some(matrices) = &self.color else { return Ok(ColorMatrix::identity(self.filter_names.len())) };
+        let neutral = match color {
+            ColorCorrection::Fitted(light) => matrices.neutral_of(light.chromaticity()),
+            _ => balance.iter().map(|gain| 1.0 / gain).collect(),
+        };
+        let unsuitable = || SensorError::Unsuitable {
+            what: "the color matrix of the file",
+            reason: "has no inverse, expected one, or color: None".to_owned(),
+        };
+        matrices.matrix(&neutral).ok_or_else(unsuitable)
+    }
+
+    /// Refuses what a file does not hold.
+    pub(crate) fn check_processing(&self, processing: &Processing) -> Result<(), SensorError> {
+        let refused = |what, reason: &str| Err(SensorError::Unsuitable { what, reason: reason.to_owned() });
+        let has_colors = self.color.is_some() || self.filter_names.len() == 1;
+        let is_known = |white: &WhiteBalance| has_colors || !matches!(white, WhiteBalance::Light(_));
+        match &processing.color {
+            ColorCorrection::Roots | ColorCorrection::FittedRoots(_) => {
+                refused("color: Roots", "needs quantum efficiencies, which a DNG file does not hold, expected Auto")
+            }
+            ColorCorrection::Auto | ColorCorrection::Fitted(_) if !has_colors => {
+                refused("color", "needs color matrices, which the file does not have, expected None or Matrix")
+            }
+            _ if !is_known(&processing.white) => {
+                refused("white", "of a light needs color matrices, which the file does not have, expected GrayWorld")
+            }
+            _ if self.noise.is_empty() && processing.denoise.is_some_and(|strength| strength > 0.0) => refused(
+                "denoise",
+                "needs the noise of the frame, of which the file has none (NoiseProfile), expected 0",
+            ),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! Black and saturation of the frame of a DNG file, and the table that makes its codes straight.
+
+use std::sync::Arc;
+
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use super::{
+    area::Area,
+    samples::Samples,
+    tags::{
+        BLACK_LEVEL, BLACK_LEVEL_DELTA_H, BLACK_LEVEL_DELTA_V, BLACK_LEVEL_REPEAT_DIM, LINEARIZATION_TABLE, WHITE_LEVEL,
+    },
+    tiff_reader::Fields,
+};
+use crate::{Levels, RawPlane};
+
+/// The levels of a frame, places counted from the active area's first.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct FileLevels {
+    table: Option<Arc<[u16]>>,
+    /// The rows and columns after which black repeats.
+    repeat: (usize, usize),
+    /// Black of each place and plane.
+    black: Vec<f64>,
+    /// What is added to it in each column and row; none or too few add nothing.
+    of_columns: Vec<f64>,
+    of_rows: Vec<f64>,
+    /// Saturation of each plane.
+    white: Vec<f64>,
+}
+
+impl FileLevels {
+    pub(super) fn read(frame: &Fields<'_>, stored: &Samples) -> Result<Self, String> {
+        let n = stored.n_planes;
+        let table = frame.whole(LINEARIZATION_TABLE)?;
+        let table: Option<Arc<[u16]>> =
+            (!table.is_empty()).then(|| table.into_iter().map(|entry| entry as u16).collect());
+        let repeat = match frame.whole(BLACK_LEVEL_REPEAT_DIM)?.as_slice() {
+            [] => (1, 1),
+            &[rows, columns] if (1..=64).contains(&rows) && (1..=64).contains(&columns) => (rows, columns),
+            other => {
+                return Err(format!(
+                    "has levels of black that repeat after {other:?}, expected rows and columns of 1 to 64"
+                ));
+            }
+        };
+        let n_black = repeat.0 * repeat.1 * n;
+        // Some writers state one level for all planes.
+        let black = match frame.numbers(BLACK_LEVEL)?.as_slice() {
+            &[all] if all.is_finite() => vec![all; n_black],
+            _ => frame.finite(BLACK_LEVEL, n_black)?.unwrap_or(vec![0.0; n_black]),
+        };
+        let top = f64::from((1_u32 << stored.bits) - 1);
+        let top = table.as_ref().map_or(top, |table| table.iter().copied().max().map_or(top, f64::from));
+        let white = match frame.numbers(WHITE_LEVEL)?.as_slice() {
+            [] => vec![top; n],
+            &[all] => vec![all; n],
+            several if several.len() == n => several.to_vec(),
+            several => return Err(format!("has {} levels of saturation, expected {n}", several.len())),
+        };
+        let finite = |tag: u16| {
+            let values = frame.numbers(tag)?;
+            if values.iter().all(|value| value.is_finite()) {
+                Ok(values)
+            } else {
+                Err(format!("has no numbers in field {tag}"))
+            }
+        };
+        let levels = Self {
+            table,
+            repeat,
+            black,
+            of_columns: finite(BLACK_LEVEL_DELTA_H)?,
+            of_rows: finite(BLACK_LEVEL_DELTA_V)?,
+            white,
+        };
+        for plane in 0..n {
+            let (black, white) = (levels.highest_black(plane), levels.white[plane]);
+            if !(white > black && white.is_finite()) {
+                return Err(format!("is saturated at {white}, expected more than its black of {black}"));
+            }
+        }
+        Ok(levels)
+    }
+
+    fn highest_black(&self, plane: usize) -> f64 {
+        let highest = |values: &[f64]| values.iter().copied().reduce(f64::max).unwrap_or(0.0);
+        let n = self.white.len();
+        let places = self.black.iter().skip(plane).step_by(n).copied().fold(f64::NEG_INFINITY, f64::max);
+        places + highest(&self.of_columns) + highest(&self.of_rows)
+    }
+
+    fn black_at(&self, row: usize, column: usize, plane: usize) -> f64 {
+        let (rows, columns) = self.repeat;
+        let place = (row % rows * columns + column % columns) * self.white.len() + plane;
+        let more = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(0.0);
+        self.black[place] + more(&self.of_columns, column) + more(&self.of_rows, row)
+    }
+
+    /// Whether all places and planes have the same levels.
+    fn are_even(&self) -> bool {
+        let is_one = |values: &[f64]| values.iter().all(|value| *value == values[0]);
+        let is_zero = |values: &[f64]| values.iter().all(|value| *value == 0.0);
+        is_one(&self.black) && is_one(&self.white) && is_zero(&self.of_columns) && is_zero(&self.of_rows)
+    }
+
+    /// Returns the planes that are shown, as they are stored where their levels are the same everywhere, and these levels.
+    pub(super) fn planes(&self, stored: &Samples, area: &Area, saturation_e: f64) -> (Vec<RawPlane>, Levels) {
+        let top = f64::from((1_u32 << stored.bits) - 1);
+        let n = stored.n_planes;
+        let code = |row: usize, column: usize, plane: usize| {
+            stored.codes[((area.top + row) * stored.columns + area.left + column) * n + plane]
+        };
+        let size = (area.rows, area.columns);
+        if self.are_even() {
+            let plane = |plane: usize| RawPlane::Dn(Array2::from_shape_fn(size, |(r, c)| code(r, c, plane)));
+            let levels = Levels::of_file((self.black[0], self.white[0], top), saturation_e, self.table.clone());
+            return ((0..n).map(plane).collect(), levels);
+        }
+        let (down, right) = area.places_before();
+        let range = |plane: usize| self.white[plane] - self.highest_black(plane);
+        let evened = |plane: usize| {
+            let scale = range(0) / range(plane);
+            let mut values = Array2::zeros(size);
+            let rows = values.as_slice_mut().expect("a new array is contiguous").par_chunks_mut(area.columns);
+            rows.enumerate().for_each(|(row, values): (usize, &mut [f32])| {
+                for (column, value) in values.iter_mut().enumerate() {
+                    let straight = self.straight(code(row, column, plane));
+                    *value = (scale * (straight - self.black_at(down + row, right + column, plane))) as f32;
+                }
+            });
+            RawPlane::Evened(values)
+        };
+        let levels = Levels::of_file((0.0, range(0), range(0)), saturation_e, None);
+        ((0..n).map(evened).collect(), levels)
+    }
+
+    fn straight(&self, code: u16) -> f64 {
+        match &self.table {
+            Some(table) => f64::from(table[usize::from(code).min(table.len() - 1)]),
+            None => f64::from(code),
+        }
+    }
+}

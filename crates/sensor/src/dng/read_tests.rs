@@ -1,0 +1,443 @@
+//! Tests of reading DNG files: those written here, those built field by field, and broken ones.
+
+use dioptric_spectrum::{Illuminant, Quantity, SpectralImage, WavelengthGrid};
+use ndarray::Array2;
+
+use super::{
+    DngDetails, DngFile, DngNoise,
+    lossless_jpeg::tests::{Coding, encode, uneven},
+    tags::*,
+    tiff_file::{Directory, Value},
+};
+use crate::{
+    Exposure, ExposureControl, Illumination, Noise, Processing, Raw, RawPlane, Response, Sensor, WhiteBalance, psnr_db,
+};
+
+/// Returns a colorful frame of a sensor: patches of different spectra, and steps of brightness, with all noise.
+fn frame(sensor: &Sensor) -> Raw {
+    let grid = WavelengthGrid::uniform(400.0, 700.0, 20.0).unwrap();
+    let d65 = Illuminant::D65.spectrum().sample_held(&grid);
+    let (rows, columns) = (sensor.rows, sensor.columns);
+    let plane = |band: usize| {
+        Array2::from_shape_fn((rows, columns), |(row, column)| {
+            let hue = (column / 12) as f64;
+            let color = 0.5 + 0.4 * (0.35 * band as f64 + 1.3 * hue).sin();
+            (4e-5 * d65[band] * color * (1.0 + (row / 9) as f64)) as f32
+        })
+    };
+    let planes = (0..grid.len()).map(plane).collect();
+    let image = SpectralImage::new(Quantity::Irradiance, grid, planes).unwrap();
+    let exposure = ExposureControl::Manual(Exposure::seconds(0.01));
+    sensor.capture(&Illumination::on_pixels(&image), &exposure, &Noise::all(4)).unwrap().raw
+}
+
+fn written(sensor: &Sensor, raw: &Raw, details: &DngDetails<'_>) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("raw.dng");
+    sensor.write_dng(raw, details, &path).unwrap();
+    std::fs::read(path).unwrap()
+}
+
+fn small(name: &str) -> Sensor {
+    Sensor::built_in(name).unwrap().with_size(54, 72)
+}
+
+#[test]
+fn what_is_written_is_read_to_the_bit() {
+    let sensor = small("imx363");
+    let raw = frame(&sensor);
+    let details = DngDetails {
+        f_number: Some(1.8),
+        focal_length_mm: Some(4.38),
+        lens: Some("wide".to_owned()),
+        ..DngDetails::of_light(Illuminant::D65)
+    };
+    let file = DngFile::from_bytes(&written(&sensor, &raw, &details)).unwrap();
+    assert_eq!((&file.raw.planes, &file.raw.tile), (&raw.planes, &raw.tile));
+    assert_eq!((&file.raw.filter_names, file.raw.exposure.time_s), (&raw.filter_names, 0.01));
+    assert_eq!((file.raw.levels.black, file.raw.levels.white), (raw.levels.black, raw.levels.white.round()));
+    let saturation_e = raw.levels.saturation_e();
+    let offset = (sensor.noise_floor_e(&raw) / saturation_e).powi(2);
+    assert_eq!(file.profile.noise, [DngNoise { scale: 1.0 / saturation_e, offset }]);
+    assert_eq!((file.f_number, file.focal_length_mm, file.lens.as_deref()), (Some(1.8), Some(4.38), Some("wide")));
+    assert_eq!((file.iso_speed, file.orientation), (Some(sensor.iso_speed(&raw, &Illuminant::D65).round()), 1));
+    assert_eq!((file.make.as_deref(), file.model.as_deref()), (Some("dioptric"), Some(sensor.name.as_str())));
+    assert!(file.notes.is_empty(), "{:?}", file.notes);
+    // Matrices are written in ten thousandths, the neutral in millionths.
+    let color = file.profile.color.unwrap();
+    for (light, number, stated) in [(Illuminant::A, 17, &color.lights[0]), (Illuminant::D65, 21, &color.lights[1])] {
+        assert_eq!(stated.illuminant, number);
+        let rows = super::color::camera_from_xyz(&sensor, &light);
+        let wanted: Vec<[f64; 3]> =
+            rows.into_iter().map(|row| row.map(|v| (v * 10_000.0).round() / 10_000.0)).collect();
+        assert_eq!(stated.camera_from_xyz, wanted);
+    }
+    let neutral = file.neutral.unwrap();
+    let white = crate::balance::white_response(&sensor, &Illuminant::D65);
+    let brightest = white.iter().copied().fold(0.0, f64::max);
+    for (found, white) in neutral.iter().zip(&white) {
+        assert!((found - white / brightest).abs() <= 0.5e-6);
+    }
+}
+
+#[test]
+fn a_frame_through_a_file_is_developed_as_by_its_sensor() {
+    for name in ["imx363", "nikon-d5100", "machine-vision-mono"] {
+        let sensor = small(name);
+        let raw = frame(&sensor);
+        let file = DngFile::from_bytes(&written(&sensor, &raw, &DngDetails::of_light(Illuminant::D65))).unwrap();
+        let own = sensor.develop(&raw, &Processing::for_light(Illuminant::D65)).unwrap();
+        let through = file.develop(&Processing::default()).unwrap();
+        // The white level is rounded to a whole code, the matrices to four places.
+        let psnr = psnr_db(&own.picture, &through.picture).unwrap();
+        assert!(psnr > 55.0, "{name}: {psnr} dB");
+    }
+}
+
+#[test]
+fn a_response_that_is_no_line_is_undone_by_its_table() {
+    let sensor = Sensor { response: Response::Logarithmic { knee_v: 0.02 }, ..small("imx363") };
+    let raw = frame(&sensor);
+    let file = DngFile::from_bytes(&written(&sensor, &raw, &DngDetails::of_light(Illuminant::D65))).unwrap();
+    assert_eq!(file.raw.planes, raw.planes);
+    for (found, own) in file.raw.linear()[0].iter().zip(&raw.linear()[0]) {
+        // The table has whole numbers on a scale of 61 439 steps.
+        assert!((found - own).abs() <= 0.51 / 61_439.0, "{found} {own}");
+    }
+}
+
+#[test]
+fn stacked_filters_and_mosaics_of_four_are_read() {
+    let mut stacked = small("imx363");
+    stacked.cfa = crate::Cfa::Stacked;
+    let quad = Sensor { cfa: crate::Cfa::two_by_two("RGGB").unwrap().repeated(2), ..small("imx363") };
+    for sensor in [stacked, quad] {
+        let raw = frame(&sensor);
+        let file = DngFile::from_bytes(&written(&sensor, &raw, &DngDetails::of_light(Illuminant::A))).unwrap();
+        assert_eq!((file.raw.planes, file.raw.tile), (raw.planes, raw.tile));
+    }
+}
+
+/// A raw frame as other writers store it.
+struct Stored {
+    rows: usize,
+    columns: usize,
+    n_planes: usize,
+    bits: u8,
+    /// Rows and columns of a tile; strips of so many rows where there are no columns.
+    tile: (usize, Option<usize>),
+    /// The pixels that make one of lossless JPEG; 0 for plain samples.
+    jpeg_components: usize,
+}
+
+impl Stored {
+    fn codes(&self) -> Vec<u16> {
+        uneven(self.rows * self.columns * self.n_planes, self.bits)
+    }
+
+    /// The bytes of a tile, filled up with its last column and row where it reaches beyond the frame.
+    fn block(&self, codes: &[u16], (top, left): (usize, usize), (height, width): (usize, usize)) -> Vec<u8> {
+        let code = |row: usize, column: usize, plane: usize| {
+            let (row, column) = ((top + row).min(self.rows - 1), (left + column).min(self.columns - 1));
+            codes[(row * self.columns + column) * self.n_planes + plane]
+        };
+        let n = self.n_planes;
+        let lines: Vec<Vec<u16>> =
+            (0..height).map(|r| (0..width * n).map(|i| code(r, i / n, i % n)).collect()).collect();
+        if let Some(columns) = (width * n).checked_div(self.jpeg_components) {
+            let size = (height, columns, self.jpeg_components);
+            return encode(&lines.concat(), size, Coding::of_bits(self.bits));
+        }
+        lines.iter().flat_map(|line| self.packed(line)).collect()
+    }
+
+    /// Bits one after the other, the highest first; whole bytes in the file's order.
+    fn packed(&self, line: &[u16]) -> Vec<u8> {
+        if self.bits == 16 {
+            return line.iter().flat_map(|code| code.to_le_bytes()).collect();
+        }
+        let bits = line.iter().flat_map(|code| (0..self.bits).rev().map(move |bit| code >> bit & 1));
+        let bits: Vec<u8> = bits.map(|bit| bit as u8).collect();
+        bits.chunks(8).map(|byte| byte.iter().enumerate().map(|(i, bit)| bit << (7 - i)).sum()).collect()
+    }
+
+    /// The directory of a DNG whose samples these are, as a Bayer mosaic or linear planes.
+    fn directory(&self) -> Directory {
+        let mut d = Directory::default();
+        d.set(DNG_VERSION, Value::Byte(vec![1, 4, 0, 0]));
+        d.set(IMAGE_LENGTH, Value::Long(vec![self.rows as u32]));
+        d.set(IMAGE_WIDTH, Value::Long(vec![self.columns as u32]));
+        d.set(BITS_PER_SAMPLE, Value::Short(vec![u16::from(self.bits); self.n_planes]));
+        d.set(COMPRESSION, Value::Short(vec![if self.jpeg_components > 0 { 7 } else { 1 }]));
+        d.set(SAMPLES_PER_PIXEL, Value::Short(vec![self.n_planes as u16]));
+        let mosaic = self.n_planes == 1;
+        d.set(PHOTOMETRIC_INTERPRETATION, Value::Short(vec![if mosaic { COLOR_FILTER_ARRAY } else { LINEAR_RAW }]));
+        if mosaic {
+            d.set(CFA_REPEAT_PATTERN_DIM, Value::Short(vec![2, 2]));
+            d.set(CFA_PATTERN, Value::Byte(vec![1, 0, 2, 1]));
+        }
+        let matrix = [7000, -2000, -500, -4000, 13_000, 1500, -1000, 2000, 6000];
+        d.set(COLOR_MATRIX_1, Value::SignedRational(matrix.map(|m| (m, 10_000)).to_vec()));
+        d.set(CALIBRATION_ILLUMINANT_1, Value::Short(vec![21]));
+        d.set(AS_SHOT_NEUTRAL, Value::Rational(vec![(1, 2), (1, 1), (3, 5)]));
+        d
+    }
+
+    fn file(&self, change: impl FnOnce(&mut Directory)) -> Vec<u8> {
+        let codes = self.codes();
+        let mut d = self.directory();
+        let (height, width) = (self.tile.0, self.tile.1.unwrap_or(self.columns));
+        let mut blocks = Vec::new();
+        for top in (0..self.rows).step_by(height) {
+            for left in (0..self.columns).step_by(width) {
+                let height = if self.tile.1.is_some() { height } else { height.min(self.rows - top) };
+                blocks.push(self.block(&codes, (top, left), (height, width)));
+            }
+        }
+        let counts = blocks.iter().map(|block| block.len() as u32).collect();
+        // Blocks stand behind the header, before the directory.
+        let mut place = 8;
+        let places = blocks.iter().map(|block| {
+            let here = place;
+            place += block.len() as u32;
+            here
+        });
+        let places = places.collect();
+        let (offsets, byte_counts) = match self.tile.1 {
+            Some(width) => {
+                d.set(TILE_LENGTH, Value::Long(vec![height as u32]));
+                d.set(TILE_WIDTH, Value::Long(vec![width as u32]));
+                (TILE_OFFSETS, TILE_BYTE_COUNTS)
+            }
+            None => {
+                d.set(ROWS_PER_STRIP, Value::Long(vec![height as u32]));
+                (STRIP_OFFSETS, STRIP_BYTE_COUNTS)
+            }
+        };
+        d.set(offsets, Value::Long(places));
+        d.set(byte_counts, Value::Long(counts));
+        change(&mut d);
+        d.into_file_behind(&blocks.concat()).unwrap()
+    }
+}
+
+fn codes_of(raw: &Raw) -> Vec<u16> {
+    let planes: Vec<_> = raw.planes.iter().map(|plane| plane.dn().unwrap()).collect();
+    let (rows, columns) = raw.size();
+    (0..rows * columns).flat_map(|i| planes.iter().map(move |plane| plane[(i / columns, i % columns)])).collect()
+}
+
+const PLAIN: Stored = Stored { rows: 13, columns: 22, n_planes: 1, bits: 14, tile: (4, None), jpeg_components: 0 };
+
+#[test]
+fn strips_and_tiles_of_all_depths_are_read() {
+    for bits in [8, 10, 12, 14, 16] {
+        for (tile, n_planes, jpeg_components) in [
+            ((4, None), 1, 0),
+            ((13, None), 3, 0),
+            ((5, Some(8)), 1, 0),
+            ((8, Some(6)), 3, 0),
+            ((5, Some(8)), 1, 1),
+            ((6, Some(8)), 1, 2),
+            ((6, Some(8)), 3, 3),
+            ((5, None), 1, 2),
+        ] {
+            let stored = Stored { bits, tile, n_planes, jpeg_components, ..PLAIN };
+            let file = DngFile::from_bytes(&stored.file(|_| ())).unwrap();
+            assert_eq!(codes_of(&file.raw), stored.codes(), "{bits} bits, {tile:?}, {n_planes}, {jpeg_components}");
+            assert_eq!(file.bits, u32::from(bits));
+        }
+    }
+}
+
+#[test]
+fn a_tile_may_be_fewer_and_longer_rows_of_jpeg() {
+    // Two rows of a tile as one of the compressed image.
+    let stored = Stored { rows: 4, columns: 8, tile: (4, Some(8)), jpeg_components: 2, ..PLAIN };
+    let codes = stored.codes();
+    let block = encode(&codes, (2, 8, 2), Coding::of_bits(14));
+    let mut d = stored.directory();
+    d.set(TILE_LENGTH, Value::Long(vec![4]));
+    d.set(TILE_WIDTH, Value::Long(vec![8]));
+    d.set(TILE_OFFSETS, Value::Long(vec![8]));
+    d.set(TILE_BYTE_COUNTS, Value::Long(vec![block.len() as u32]));
+    let file = DngFile::from_bytes(&d.into_file_behind(&block).unwrap()).unwrap();
+    assert_eq!(codes_of(&file.raw), codes);
+}
+
+#[test]
+fn active_area_and_crop_move_the_mosaic() {
+    let file = PLAIN.file(|d| {
+        d.set(ACTIVE_AREA, Value::Short(vec![2, 3, 12, 21]));
+        d.set(DEFAULT_CROP_ORIGIN, Value::Rational(vec![(3, 1), (1, 1)]));
+        d.set(DEFAULT_CROP_SIZE, Value::Short(vec![12, 8]));
+    });
+    let file = DngFile::from_bytes(&file).unwrap();
+    assert_eq!((file.raw.size(), file.origin, file.stored), ((8, 12), (6, 3), (22, 13)));
+    let dn = file.raw.dn().unwrap();
+    assert_eq!(dn[(1, 2)], PLAIN.codes()[4 * 22 + 8]);
+    // The mosaic GR, BG begins at the active area: one row down and three columns across it is GB, RG.
+    let tile = file.raw.tile.unwrap();
+    let letters: String = [(0, 0), (0, 1), (1, 0), (1, 1)]
+        .map(|(row, column)| file.raw.filter_names[tile.filter_at(row, column)].clone())
+        .concat();
+    assert_eq!(letters, "GBRG");
+}
+
+#[test]
+fn black_of_each_place_column_and_row_is_taken_off() {
+    let file = PLAIN.file(|d| {
+        d.set(ACTIVE_AREA, Value::Short(vec![1, 1, 13, 22]));
+        d.set(BLACK_LEVEL_REPEAT_DIM, Value::Short(vec![2, 2]));
+        d.set(BLACK_LEVEL, Value::Rational(vec![(100, 1), (101, 1), (205, 2), (99, 1)]));
+        d.set(BLACK_LEVEL_DELTA_H, Value::SignedRational((0..21).map(|i| (i - 3, 4)).collect()));
+        d.set(BLACK_LEVEL_DELTA_V, Value::SignedRational((0..12).map(|i| (-i, 2)).collect()));
+        d.set(WHITE_LEVEL, Value::Long(vec![15_000]));
+    });
+    let file = DngFile::from_bytes(&file).unwrap();
+    assert!(matches!(file.raw.planes[0], RawPlane::Evened(_)));
+    let linear = &file.raw.linear()[0];
+    let codes = PLAIN.codes();
+    for (row, column, black) in [(0, 0, 100.0), (0, 3, 101.0), (3, 4, 102.5), (5, 7, 99.0)] {
+        let black = black + (column as f64 - 3.0) / 4.0 - row as f64 / 2.0;
+        let code = f64::from(codes[(row + 1) * 22 + column + 1]);
+        // Saturation is counted from the highest black: 102.5 + 17 / 4 (DNG 1.4, chapter 5, rescaling).
+        let wanted = (code - black) / (15_000.0 - 106.75);
+        assert!((f64::from(linear[(row, column)]) - wanted).abs() < 1e-6, "{row}, {column}");
+    }
+}
+
+#[test]
+fn a_linearization_table_stands_before_the_levels() {
+    let table: Vec<u16> = (0..=255_u16).map(|code| code * code).collect();
+    let stored = Stored { bits: 8, ..PLAIN };
+    let file = stored.file(|d| {
+        d.set(LINEARIZATION_TABLE, Value::Short(table));
+        d.set(BLACK_LEVEL, Value::Short(vec![25]));
+        d.set(WHITE_LEVEL, Value::Long(vec![60_025]));
+    });
+    let file = DngFile::from_bytes(&file).unwrap();
+    // Black is the code 5, saturation the code 245.
+    assert_eq!((file.raw.levels.black, file.raw.levels.white), (5.0, 245.0));
+    for (found, code) in file.raw.linear()[0].iter().zip(stored.codes()) {
+        let wanted = (f64::from(code).powi(2) - 25.0) / 60_000.0;
+        assert!((f64::from(*found) - wanted).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn the_picture_is_turned_and_white_by_the_shot() {
+    let stored = Stored { rows: 16, columns: 24, bits: 12, ..PLAIN };
+    let flat = |d: &mut Directory| d.set(ORIENTATION, Value::Short(vec![6]));
+    let file = DngFile::from_bytes(&stored.file(flat)).unwrap();
+    let developed = file.develop(&Processing { denoise: Some(0.0), ..Processing::default() }).unwrap();
+    assert_eq!((developed.picture.rows(), developed.picture.columns()), (24, 16));
+    assert_eq!(developed.balance, [2.0, 1.0, 1.0 / 0.6]);
+    for row in &developed.color.rows {
+        assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+    }
+    // The first row of the stored frame is the last column of the picture.
+    let upright = DngFile { orientation: 1, ..file.clone() }.develop(&Processing::default()).unwrap();
+    assert_eq!(developed.picture.rgb_at(5, 15), upright.picture.rgb_at(0, 5));
+}
+
+#[test]
+fn what_a_file_does_not_hold_is_refused() {
+    let file = DngFile::from_bytes(&PLAIN.file(|_| ())).unwrap();
+    let reason = |processing: Processing| file.develop(&processing).unwrap_err().to_string();
+    let usual = Processing::default;
+    assert!(reason(Processing { denoise: Some(0.5), ..usual() }).contains("NoiseProfile"));
+    assert!(reason(Processing { color: crate::ColorCorrection::Roots, ..usual() }).contains("quantum efficiencies"));
+    let all = crate::LensCorrections::parse("all").unwrap();
+    assert!(reason(Processing { lens_corrections: all, ..usual() }).contains("lens"));
+    let light = WhiteBalance::Light(Illuminant::A);
+    assert!(file.develop(&Processing { white: light, ..usual() }).is_ok());
+}
+
+#[test]
+fn what_is_asked_for_and_not_done_is_noted() {
+    let mut opcodes = vec![0, 0, 0, 2];
+    for number in [9, 3_u32] {
+        opcodes.extend([number, 0x0103_0000, 1, 3].into_iter().flat_map(u32::to_be_bytes));
+        opcodes.extend([1, 2, 3]);
+    }
+    let file = PLAIN.file(|d| {
+        d.set(OPCODE_LIST_2, Value::Undefined(opcodes));
+        d.set(BASELINE_EXPOSURE, Value::SignedRational(vec![(1, 4)]));
+    });
+    let notes = DngFile::from_bytes(&file).unwrap().notes.join("; ");
+    assert!(notes.contains("GainMap, FixVignetteRadial") && notes.contains("0.25 stops"), "{notes}");
+}
+
+#[test]
+fn files_that_are_no_such_frames_are_refused_in_a_sentence() {
+    let refused = |word: &str, change: &dyn Fn(&mut Directory)| {
+        let reason = DngFile::from_bytes(&PLAIN.file(change)).unwrap_err();
+        assert!(reason.contains(word) && !reason.contains('\n'), "{word}: {reason}");
+    };
+    refused("compression 34892", &|d| d.set(COMPRESSION, Value::Short(vec![34_892])));
+    refused("[32] bits", &|d| d.set(BITS_PER_SAMPLE, Value::Short(vec![32])));
+    refused("no whole numbers", &|d| d.set(SAMPLE_FORMAT, Value::Short(vec![3])));
+    refused("planes one after the other", &|d| d.set(PLANAR_CONFIGURATION, Value::Short(vec![2])));
+    refused("no raw frame", &|d| d.set(PHOTOMETRIC_INTERPRETATION, Value::Short(vec![2])));
+    refused("mosaic of the size", &|d| d.set(CFA_REPEAT_PATTERN_DIM, Value::Short(vec![2, 99])));
+    refused("number 9", &|d| d.set(CFA_PATTERN, Value::Byte(vec![0, 1, 9, 1])));
+    refused("'C' is not among", &|d| d.set(CFA_PATTERN, Value::Byte(vec![0, 1, 3, 1])));
+    refused("shifted", &|d| d.set(CFA_LAYOUT, Value::Short(vec![2])));
+    refused("active area", &|d| d.set(ACTIVE_AREA, Value::Short(vec![0, 0, 14, 22])));
+    refused("cropped", &|d| d.set(DEFAULT_CROP_SIZE, Value::Short(vec![23, 4])));
+    refused("saturated at 5", &|d| {
+        d.set(WHITE_LEVEL, Value::Long(vec![5]));
+        d.set(BLACK_LEVEL, Value::Short(vec![9]));
+    });
+    refused("neutral of 0", &|d| d.set(AS_SHOT_NEUTRAL, Value::Rational(vec![(0, 1), (1, 1), (1, 1)])));
+    refused("fraction over 0", &|d| d.set(AS_SHOT_NEUTRAL, Value::Rational(vec![(1, 0), (1, 1), (1, 1)])));
+    refused("NoiseProfile", &|d| d.set(NOISE_PROFILE, Value::Double(vec![1.0; 4])));
+    // Neither the samples of so many pixels nor their number may be taken on trust.
+    refused("strips or tiles", &|d| d.set(IMAGE_LENGTH, Value::Long(vec![4_000_000_000])));
+    refused("can hold", &|d| {
+        d.set(IMAGE_LENGTH, Value::Long(vec![4_000_000_000]));
+        d.set(ROWS_PER_STRIP, Value::Long(vec![4_000_000_000]));
+    });
+    refused("bytes in a strip", &|d| d.set(STRIP_BYTE_COUNTS, Value::Long(vec![7; 4])));
+    refused("ends before", &|d| d.set(STRIP_OFFSETS, Value::Long(vec![1 << 30; 4])));
+}
+
+#[test]
+fn mutations_are_read_or_refused() {
+    let sensor = small("imx363").with_size(12, 16);
+    let own = written(&sensor, &frame(&sensor), &DngDetails::of_light(Illuminant::D65));
+    let jpeg = Stored { tile: (6, Some(8)), jpeg_components: 2, ..PLAIN }.file(|d| {
+        d.set(LINEARIZATION_TABLE, Value::Short((0..300).collect()));
+        d.set(BLACK_LEVEL_REPEAT_DIM, Value::Short(vec![2, 2]));
+        d.set(BLACK_LEVEL, Value::Rational(vec![(1, 1), (2, 1), (3, 1), (4, 1)]));
+    });
+    let mut state = 1_u64;
+    let mut next = |below: usize| {
+        // Knuth's linear congruential generator (MMIX).
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below
+    };
+    let mut n_read = 0;
+    for whole in [own, jpeg, PLAIN.file(|_| ())] {
+        for _ in 0..1500 {
+            let mut bytes = whole.clone();
+            for _ in 0..=next(3) {
+                let at = next(bytes.len());
+                bytes[at] = [0, 1, 0x7f, 0xff, next(256) as u8][next(5)];
+            }
+            if next(4) == 0 {
+                bytes.truncate(next(bytes.len()));
+            }
+            match DngFile::from_bytes(&bytes) {
+                Ok(file) => {
+                    n_read += 1;
+                    // What is read can be developed, or is refused.
+                    let _ = file.develop(&Processing::plain());
+                }
+                Err(reason) => assert!(!reason.is_empty() && !reason.contains('\n'), "{reason}"),
+            }
+        }
+    }
+    assert!(n_read > 500, "{n_read}");
+}
