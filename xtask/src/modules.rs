@@ -27,7 +27,6 @@ const ALLOWED: &[(&str, &[&str], &str)] = &[
     ("psf", &["adaptive", "model"], "a model is built by adding samples to a coarser one"),
     ("psf", &["narrow_gaussian", "splat"], "splats are sorted into narrow Gaussians, which are made of a `Splat`"),
     ("scene", &["light", "scene"], "a scene has a light and is put under another"),
-    ("world", &["light", "placed"], "a placed shape may glow, and is then one of the lights"),
     ("cli", &["analyze", "lens"], "`lens` dispatches to `analyze`, which opens lenses as `lens` does"),
     ("forward", &["knot_kernels", "tiles"], "kernels lie at the knots of tiles, which are laid by how kernels change"),
     ("python", &["camera", "shot"], "a camera takes shots, and a shot has the camera that took it"),

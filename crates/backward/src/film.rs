@@ -66,7 +66,8 @@ impl Film {
     }
 
     /// Returns how many passes each pixel needs until its relative standard error, over all bands, is `noise`; between
-    /// those that it has had and `most`.
+    /// those that it has had and `most`. A pixel darker than a tenth of the mean of those that have light is held to the error of
+    /// one that is as bright.
     ///
     /// What a pixel needs is judged by its neighbors and never by itself: a pixel whose first passes happened to miss
     /// something bright would else stop too soon, and the picture would be too dark.
@@ -76,7 +77,9 @@ impl Film {
             bands.fold([0.0; 2], |sum, (mean, variance)| [sum[0] + mean, sum[1] + variance * self.n_bands as f64])
         };
         let pilot: Vec<[f64; 2]> = (0..self.n_passes.len()).map(of_pixel).collect();
-        let whole = pilot.iter().map(|[mean, _]| mean).sum::<f64>() / pilot.len() as f64;
+        // Pixels that light doesn't reach, as beyond a lens's image, say nothing of the picture.
+        let lit: Vec<f64> = pilot.iter().map(|[mean, _]| *mean).filter(|mean| *mean > 0.0).collect();
+        let whole = lit.iter().sum::<f64>() / lit.len().max(1) as f64;
         let needed = |pixel: usize| {
             let (row, column) = (pixel / self.columns, pixel % self.columns);
             let rows = row.saturating_sub(REACH)..(row + REACH + 1).min(self.rows);
@@ -87,8 +90,7 @@ impl Film {
                 n += 1.0;
                 sum = [sum[0] + mean, sum[1] + variance];
             }
-            // A hundredth of the picture's mean is dark enough to be held to that.
-            let mean = (sum[0] / n.max(1.0)).max(0.01 * whole);
+            let mean = (sum[0] / n.max(1.0)).max(DARK * whole);
             let passes = sum[1] / n.max(1.0) / (noise * mean).powi(2);
             let had = self.n_passes[pixel];
             if passes.is_finite() { (passes.ceil() as u32).clamp(had, most.max(had)) } else { had }
@@ -102,6 +104,9 @@ impl Film {
     }
 }
 
+/// Pixels of a smaller share of the picture's mean are dark: at the rim of a lens's image, where few rays get through, their number
+/// would grow without bound.
+const DARK: f64 = 0.1;
 /// How far the neighbors of a pixel reach that say what it needs.
 const REACH: usize = 3;
 
@@ -121,6 +126,37 @@ mod tests {
         // The sample variance is 14/3; over four passes.
         assert!((error.planes()[0][(0, 1)] - (14.0_f32 / 12.0).sqrt()).abs() < 1e-6);
         assert_eq!(picture.planes()[0][(0, 0)], 0.0);
+    }
+
+    /// A film twice as wide, the other half dark, needs the passes of the lit half and none beyond.
+    #[test]
+    fn dark_pixels_need_nothing() {
+        let render = |columns: usize| {
+            let mut film = Film::new(8, columns, 1);
+            for pass in 0..4 {
+                for pixel in 0..8 * columns {
+                    let column = pixel % columns;
+                    // A rim where one pass of four finds light, a hundredth of the rest in the mean.
+                    let rim = if (pixel / columns + pass).is_multiple_of(4) { 0.04 } else { 0.0 };
+                    film.add(
+                        pixel,
+                        &[match column {
+                            0..8 => 1.0 + 0.1 * (pass % 2) as f64,
+                            8..16 => rim,
+                            _ => 0.0,
+                        }],
+                    );
+                }
+            }
+            film.passes_needed(0.01, 100_000)
+        };
+        let (narrow, wide) = (render(16), render(32));
+        for row in 0..8 {
+            assert_eq!(narrow[16 * row..16 * row + 8], wide[32 * row..32 * row + 8]);
+            assert!(wide[32 * row + 20..32 * (row + 1)].iter().all(|&n| n == 4));
+            // Variance 4e-4 in six of seven columns around, held to a tenth of the mean of .53: 1,220. By its own brightness 47,000.
+            assert!((1_100..1_300).contains(&wide[32 * row + 13]), "{}", wide[32 * row + 13]);
+        }
     }
 
     #[test]

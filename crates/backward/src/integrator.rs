@@ -4,7 +4,7 @@
 //! that both could have found is shared between them by the balance heuristic (Veach 1997, ch. 9). Paths end by Russian
 //! roulette. A packet of wavelengths shares the path until it meets a surface that disperses it; there each goes on alone.
 
-use dioptric_world::{Ray, World, glam::Vec3};
+use dioptric_world::{Ray, Receiver, World};
 use serde::{Deserialize, Serialize};
 
 use crate::Sampler;
@@ -60,7 +60,7 @@ struct Path<const N: usize> {
     /// The share of radiance that reaches the camera.
     throughput: [f32; N],
     /// Where it was scattered last and the density of its direction; `None` where no drawn light could have found it.
-    scattered: Option<(Vec3, f32)>,
+    scattered: Option<(Receiver, f32)>,
     n_scatterings: u32,
 }
 
@@ -103,8 +103,9 @@ impl Integrator<'_> {
             // Look for a light.
             let pair = FIRST_PAIR + PAIRS * n_scatterings;
             let [[u_light, u_lobe], u_place, u_direction] = [0, 1, 2].map(|i| random.pair(pair + i));
+            let at = Receiver { point: hit.point, normal: bsdf.lit_side() };
             if !bsdf.is_delta()
-                && let Some(light) = self.world.sample_light(hit.point, u_light, u_place, wavelengths_nm)
+                && let Some(light) = self.world.sample_light(at, u_light, u_place, wavelengths_nm)
             {
                 let factor = bsdf.eval(light.direction);
                 let is_lit = light.pdf > 0.0 && factor.iter().zip(&light.radiance).any(|(f, l)| f * l > 0.0);
@@ -118,7 +119,7 @@ impl Integrator<'_> {
             let Some(next) = bsdf.sample(u_lobe, u_direction) else { return sum };
             path.ray = hit.ray_towards(next.incident);
             path.throughput = std::array::from_fn(|i| throughput[i] * next.weight[i]);
-            path.scattered = if next.is_delta { None } else { Some((hit.point, next.pdf)) };
+            path.scattered = if next.is_delta { None } else { Some((at, next.pdf)) };
             path.n_scatterings += 1;
             let greatest = path.throughput.iter().copied().fold(0.0, f32::max);
             if greatest <= 0.0 {

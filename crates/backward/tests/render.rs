@@ -514,6 +514,34 @@ fn adaptive_sampling_has_no_bias() {
     assert!((average - even).abs() < 4.0 * error && error < 0.01 * even, "{average} {even} {error}");
 }
 
+/// On a film twice as wide as the lens's image pixels at its rim need most, and those beyond it no more than the first passes.
+#[test]
+fn adaptive_sampling_leaves_out_what_the_lens_does_not_see() {
+    let bands = bands(&[550.0]);
+    let (world, lens) = (sky(), Lens::built_in("dgauss-50mm").unwrap());
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2_000.0).unwrap();
+    let camera = camera(&lens, &bands, lens_settings(film_distance_mm, 90.0, 24));
+    let even = mean(&render(&world, &camera, settings(&bands, 64), 16), 0);
+    let mut found = Vec::new();
+    for seed in 0..24 {
+        let of_seed = RenderSettings { seed: 100 + seed, ..settings(&bands, 4) };
+        let mut renderer = Renderer::new(&world, &camera, of_seed).unwrap();
+        (0..4).for_each(|_| assert!(pass(&mut renderer)));
+        renderer.aim_at_noise(0.1, 400).unwrap();
+        while pass(&mut renderer) {}
+        let rendering = renderer.rendering();
+        let at = |row: usize, column: usize| rendering.n_samples[(row, column)];
+        assert_eq!([at(0, 0), at(12, 0), at(0, 12)], [16; 3]);
+        assert!(rendering.n_samples.iter().any(|&n| n > 2 * at(12, 12)));
+        found.push(mean(&rendering, 0).0);
+    }
+    let n = found.len() as f64;
+    let average = found.iter().sum::<f64>() / n;
+    let variance = found.iter().map(|v| (v - average).powi(2)).sum::<f64>() / (n - 1.0);
+    let error = (variance / n).sqrt().hypot(even.1);
+    assert!((average - even.0).abs() < 4.0 * error && error < 2e-3 * even.0, "{average} {even:?} {error}");
+}
+
 #[test]
 fn depth_is_from_the_entrance_pupil() {
     let mut builder = WorldBuilder::new();

@@ -81,7 +81,8 @@ pub(crate) struct RenderArgs {
     /// Samples a pixel, rounded up to a multiple of 8 [default: 64, unless noise or time is given]
     #[arg(long, value_name = "N", conflicts_with_all = ["noise", "seconds"], help_heading = "Simulation")]
     pub(crate) samples: Option<u32>,
-    /// Renders until the relative standard error of a pixel over all bands is this, e.g. 0.02
+    /// Renders until the relative standard error of a pixel over all bands is this, e.g. 0.02; of a dark one as a share of a
+    /// tenth of the mean
     #[arg(long, value_name = "R", help_heading = "Simulation")]
     pub(crate) noise: Option<f64>,
     /// Renders for so long, s, or until the noise is reached where that is given too

@@ -163,6 +163,18 @@ impl<const N: usize> Bsdf<N> {
         sum
     }
 
+    /// The normal of the side from which light can be scattered towards `outgoing`; `None` where it can from both.
+    pub fn lit_side(&self) -> Option<Vec3> {
+        let is_opaque = |lobe: &Lobe<N>| match lobe {
+            Lobe::Diffuse { transmittance, .. } => transmittance.iter().all(|&t| t == 0.0),
+            Lobe::Mirror { .. } | Lobe::Metal { .. } | Lobe::Coated { .. } => true,
+            Lobe::Dielectric { .. } | Lobe::Open => false,
+        };
+        let n = self.geometric_normal;
+        let towards = if n.dot(self.outgoing) < 0.0 { -n } else { n };
+        self.lobes().iter().all(|(_, lobe)| is_opaque(lobe)).then_some(towards)
+    }
+
     /// The shading normal, bumps included, of length 1.
     pub fn normal(&self) -> Vec3 {
         self.frame.z

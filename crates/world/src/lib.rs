@@ -12,6 +12,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod area_light;
 mod bsdf;
 mod camera;
 mod curve;
@@ -22,6 +23,8 @@ mod group;
 mod ids;
 mod image_texture;
 mod light;
+mod light_tree;
+mod lights;
 mod material;
 mod mesh;
 mod metals;
@@ -48,7 +51,7 @@ pub use light::{Emission, Flux, Light, LightSample};
 pub use material::{Material, Relief, Roughness};
 pub use mesh::TriangleMesh;
 pub use metals::MetalKind;
-pub use ray::{Hit, Ray};
+pub use ray::{Hit, Ray, Receiver};
 pub use shape::Shape;
 pub use sky::{SkyImage, SkyMapping};
 pub use texture::{Texture, UvMapping};

@@ -47,6 +47,22 @@ pub struct Hit {
     pub instance: Option<InstanceId>,
 }
 
+/// A point that light is to fall on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Receiver {
+    /// The point, m.
+    pub point: Vec3,
+    /// The normal of the side from which light counts, of length 1; `None` where it does from all around.
+    pub normal: Option<Vec3>,
+}
+
+impl From<Vec3> for Receiver {
+    /// A point that light can come to from all around.
+    fn from(point: Vec3) -> Self {
+        Self { point, normal: None }
+    }
+}
+
 impl Hit {
     /// Returns a ray that leaves the surface in a direction of length 1, starting just off it on the side it leaves to.
     ///

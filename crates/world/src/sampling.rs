@@ -100,11 +100,15 @@ impl Distribution {
 
     /// Returns a thing, and what is left of the number, again in [0, 1).
     pub(crate) fn pick(&self, u: f32) -> (usize, f32) {
-        let u = f64::from(u);
+        let (index, rest) = self.pick_f64(f64::from(u));
+        (index, (rest as f32).clamp(0.0, ONE_MINUS_EPSILON))
+    }
+
+    /// Returns the same of a number in double precision.
+    pub(crate) fn pick_f64(&self, u: f64) -> (usize, f64) {
         let index = self.cumulative.partition_point(|&sum| sum <= u).min(self.len() - 1);
         let below = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
-        let rest = (u - below) / (self.cumulative[index] - below);
-        (index, (rest as f32).clamp(0.0, ONE_MINUS_EPSILON))
+        (index, (u - below) / (self.cumulative[index] - below))
     }
 
     /// Returns the probability of a thing.

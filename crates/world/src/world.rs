@@ -3,10 +3,10 @@
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use crate::{
-    Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Relief, Shape, ShapeId,
-    Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
+    Bsdf, Emission, GroupId, Hit, InstanceId, Light, LightSample, Material, MaterialId, Ray, Receiver, Relief, Shape,
+    ShapeId, Texture, TextureId, TriangleMesh, WorldCamera, WorldError,
     group::{Crossing, Group, GroupParts, Instance, Parts, Primitive},
-    light::Lights,
+    lights::Lights,
     material::{Surface, Surfaces},
     mesh::normal_matrix,
     placed::{PlacedKind, PlacedShape},
@@ -99,19 +99,19 @@ impl World {
     /// `u_light` and `u` are in [0, 1). Estimators divide by [`LightSample::pdf`], which holds the choice of the light.
     pub fn sample_light<const N: usize>(
         &self,
-        from: Vec3,
+        at: impl Into<Receiver>,
         u_light: f32,
         u: [f32; 2],
         wavelengths_nm: &[f32; N],
     ) -> Option<LightSample<N>> {
-        self.lights.sample(&self.geometry.shapes, from, u_light, u, wavelengths_nm)
+        self.lights.sample(&self.geometry.shapes, &at.into(), u_light, u, wavelengths_nm)
     }
 
     /// Returns the density, 1/sr, with which [`sample_light`](Self::sample_light) draws the glowing point of a hit.
     ///
     /// 0 where the surface doesn't glow, or glows within an instance, which isn't sampled.
-    pub fn light_pdf(&self, from: Vec3, hit: &Hit) -> f32 {
-        self.lights.pdf(&self.geometry.shapes, from, hit)
+    pub fn light_pdf(&self, at: impl Into<Receiver>, hit: &Hit) -> f32 {
+        self.lights.pdf(&self.geometry.shapes, &at.into(), hit)
     }
 
     /// Returns the density, 1/sr, with which [`sample_light`](Self::sample_light) draws a direction of the sky.

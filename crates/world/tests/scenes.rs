@@ -96,6 +96,24 @@ fn small_world_is_what_it_says() {
     assert!(matches!(camera.kind, CameraKind::Perspective { fov_deg: 40.0, lens_radius_m: 0.02, .. }));
 }
 
+/// A part of a picture and words of cameras that are not known are reported; the whole as a part, and names of files, are not.
+#[test]
+fn words_of_films_and_cameras_are_reported() {
+    let notes = |film: &str, camera: &str| {
+        let text = format!("Film \"rgb\" {film}\nCamera \"perspective\" {camera}\nWorldBegin\n");
+        read_text(&text).unwrap().notes().to_vec()
+    };
+    let film = "\"integer xresolution\" 30 \"integer yresolution\" 20 \"string filename\" \"a.exr\"";
+    let with = |more: &str| format!("{film} {more}");
+    assert_eq!(notes(&with("\"integer pixelbounds\" [ 0 30 0 20 ] \"float cropwindow\" [ 0 1 0 1 ]"), ""), [""; 0]);
+    for part in ["\"integer pixelbounds\" [ 5 30 0 20 ]", "\"float cropwindow\" [ 0 .5 0 1 ]"] {
+        let found = notes(&with(part), "");
+        assert!(found.len() == 1 && found[0].contains("a part of the picture"), "{found:?}");
+    }
+    let found = notes(film, "\"float fov\" 30 \"string cauchyfile\" \"a.txt\" \"float shutteropen\" 0");
+    assert_eq!(found, ["Camera \"perspective\": not supported and left out: cauchyfile"]);
+}
+
 /// The same scene in millimetres is the same world, light included.
 #[test]
 fn units_scale_lengths_and_keep_light() {

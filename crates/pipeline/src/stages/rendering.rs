@@ -24,7 +24,8 @@ pub struct RenderingSummary {
     pub wavelengths_nm: Vec<f64>,
     /// The mean of each band.
     pub mean: Vec<f64>,
-    /// The rms standard error of a pixel in each band, as a share of the band's mean; none after a single pass.
+    /// The rms standard error of a pixel in each band, as a share of the band's mean, both over the pixels that light reaches; none
+    /// after a single pass.
     pub relative_standard_error: Option<Vec<f64>>,
     /// Samples a pixel, in the mean.
     pub samples_per_pixel: f64,
@@ -40,8 +41,11 @@ impl RenderingSummary {
         let mean_of =
             |plane: &Array2<f32>, power: i32| plane.iter().map(|&v| f64::from(v).powi(power)).sum::<f64>() / n;
         let mean: Vec<f64> = picture.planes().iter().map(|plane| mean_of(plane, 1)).collect();
-        let error =
-            |(plane, &mean): (&Array2<f32>, &f64)| if mean > 0.0 { mean_of(plane, 2).sqrt() / mean } else { 0.0 };
+        let n_lit = n_lit(picture) as f64;
+        let error = |(plane, &mean): (&Array2<f32>, &f64)| match mean > 0.0 {
+            true => (mean_of(plane, 2) * n / n_lit).sqrt() / (mean * n / n_lit),
+            false => 0.0,
+        };
         let errors: Vec<f64> = rendering.standard_error.planes().iter().zip(&mean).map(error).collect();
         Self {
             world: spec.file.clone(),
@@ -54,6 +58,16 @@ impl RenderingSummary {
             notes: world.notes().to_vec(),
         }
     }
+}
+
+/// How many pixels have light in any band.
+fn n_lit(picture: &SpectralImage) -> usize {
+    let (rows, columns) = (picture.rows(), picture.columns());
+    let is_lit = |pixel: &usize| {
+        let place = (pixel / columns, pixel % columns);
+        picture.planes().iter().any(|plane| plane[place] > 0.0)
+    };
+    (0..rows * columns).filter(is_lit).count()
 }
 
 /// Writes a picture as the standard observer sees it, its brightest per cent white and each sample so many pixels wide and

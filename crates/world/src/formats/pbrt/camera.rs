@@ -45,11 +45,15 @@ impl CameraWords {
         };
     }
 
-    pub(super) fn set_film(&mut self, params: &Params<'_>) {
+    /// Takes what is said of the film; tells whether that asks for a part of the picture.
+    pub(super) fn set_film(&mut self, params: &Params<'_>) -> bool {
         if let (Some(x), Some(y)) = (params.number("xresolution"), params.number("yresolution")) {
             self.resolution = Some((x, y));
         }
         self.film_diagonal_mm = self.film_diagonal_mm.or_else(|| params.number("diagonal"));
+        let (x, y) = self.resolution.unwrap_or((0.0, 0.0));
+        let is_part = |name: &str, whole: [f64; 4]| params.numbers(name).is_some_and(|n| n != whole);
+        is_part("pixelbounds", [0.0, x, 0.0, y]) | is_part("cropwindow", [0.0, 1.0, 0.0, 1.0])
     }
 
     /// Returns the camera, or `None` where the file has none.

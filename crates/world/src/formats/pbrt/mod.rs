@@ -30,6 +30,25 @@ use crate::{Emission, GroupId, Material, MaterialId, SpectralCurve, Texture, Tex
 
 /// The most bytes that a file and all that it includes may have.
 const MAX_BYTES: u64 = 1 << 31;
+/// Words of films and cameras that change nothing here: names of files, their storage, and times of a still picture; bands and a
+/// sensor are chosen where a world is rendered.
+const NO_MATTER: [&str; 15] = [
+    "filename",
+    "savefp16",
+    "display",
+    "nbuckets",
+    "lambdamin",
+    "lambdamax",
+    "sensor",
+    "iso",
+    "scale",
+    "imagingratio",
+    "maxcomponentvalue",
+    "hither",
+    "yon",
+    "shutteropen",
+    "shutterclose",
+];
 /// How deep files may include each other, and attributes be nested.
 const MAX_DEPTH: usize = 32;
 
@@ -237,7 +256,12 @@ impl<'c> Reader<'c> {
         let params = Params::read(tokens)?;
         match directive {
             "Camera" => self.camera.set_camera(kind, &params, self.attributes.place),
-            "Film" => self.camera.set_film(&params),
+            "Film" => {
+                if self.camera.set_film(&params) {
+                    self.builder
+                        .note(format!("Film \"{kind}\": a part of the picture is asked for; all of it is the picture"));
+                }
+            }
             "Shape" => self.shape(kind, &params)?,
             "LightSource" => self.light(kind, &params)?,
             "AreaLightSource" => self.attributes.glow = Some(self.glow(&params)?),
@@ -264,12 +288,18 @@ impl<'c> Reader<'c> {
             // How a picture is computed is the renderer's affair.
             _ => return Ok(()),
         }
-        let unused = params.unused();
-        if !unused.is_empty() && directive != "Film" && directive != "Camera" {
+        self.report_unused(directive, kind, &params);
+        Ok(())
+    }
+
+    /// Reports parameters that nobody asked for.
+    fn report_unused(&mut self, directive: &str, kind: &str, params: &Params<'_>) {
+        let is_told = |name: &&str| !matches!(directive, "Film" | "Camera") || !NO_MATTER.contains(name);
+        let unused: Vec<&str> = params.unused().into_iter().filter(is_told).collect();
+        if !unused.is_empty() {
             let unused = unused.join(", ");
             self.builder.note(format!("{directive} \"{kind}\": not supported and left out: {unused}"));
         }
-        Ok(())
     }
 
     fn include(&mut self, name: &str, depth: usize) -> Result<(), Fault> {
