@@ -331,6 +331,11 @@ impl MonoLens {
         self.placements().map_or(point_mm, |placements| placements[self.stop].surface_from_lens(point_mm)).truncate()
     }
 
+    /// The first surface.
+    pub(crate) fn front(&self) -> &Surface {
+        &self.front
+    }
+
     /// Returns the point of the first surface over this place of its vertex plane, mm; beyond its equator, the place.
     pub(crate) fn on_front_mm(&self, place_mm: DVec2) -> DVec3 {
         let sag_mm = self.front.sag_at_mm(place_mm.x, place_mm.y);

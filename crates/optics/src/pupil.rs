@@ -1,6 +1,7 @@
 //! The pupil that an object point sees.
 
 mod corners;
+mod front;
 mod holes;
 mod light;
 mod plane;
@@ -9,6 +10,7 @@ mod strips;
 
 use glam::{DVec2, DVec3};
 
+use self::front::Front;
 pub use self::{plane::PupilPlane, region::PupilRegion};
 use crate::{
     MonoLens, ObjectPoint, RayBatch, Vignetting,
@@ -112,15 +114,20 @@ struct Search<'a> {
     lens: &'a MonoLens,
     point: &'a ObjectPoint,
     plane: PupilPlane,
+    /// Where it is looked for over the front of the lens instead of the plane.
+    front: Option<&'a Front>,
 }
 
 impl<'a> Search<'a> {
     fn new(lens: &'a MonoLens, point: &'a ObjectPoint) -> Self {
-        Self { lens, point, plane: PupilPlane::of(lens, point) }
+        Self { lens, point, plane: PupilPlane::of(lens, point), front: None }
     }
 
     fn clearances(&self, targets_mm: &[DVec2]) -> Vec<f64> {
-        self.lens.clearances_mm(self.plane.rays(self.lens, self.point, targets_mm))
+        match self.front {
+            None => self.lens.clearances_mm(self.plane.rays(self.lens, self.point, targets_mm)),
+            Some(front) => front.clearances(self.lens, targets_mm),
+        }
     }
 
     /// Returns the middle of the pupil's plane, if light passes there, as it does for most fields of most lenses.

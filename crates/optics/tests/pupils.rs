@@ -39,7 +39,7 @@ fn found_mm2(lens: &MonoLens, point: &ObjectPoint) -> f64 {
 fn check(name: &str, lens: &MonoLens, fields_deg: &[f64], n_across: usize, within: f64) {
     for &field_deg in fields_deg {
         let point = far(field_deg);
-        let (found, counted) = (found_mm2(lens, &point), cross_section_mm2(lens, &point, n_across));
+        let (found, counted) = (found_mm2(lens, &point), cross_section_mm2(lens, &point, n_across).0);
         assert!(counted > 0.0 && (found / counted - 1.0).abs() < within, "{name} {field_deg}: {found} {counted}");
     }
 }

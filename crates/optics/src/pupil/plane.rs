@@ -83,6 +83,11 @@ impl PupilPlane {
         rays
     }
 
+    /// Returns the point of the lens frame of a place of the plane, mm.
+    pub(super) fn in_lens_mm(&self, place_mm: DVec2) -> DVec3 {
+        self.placement.lens_from_surface(place_mm.extend(0.0))
+    }
+
     /// Returns where the line through a point of the lens frame, mm, with this direction meets the plane, mm.
     pub(super) fn meets_mm(&self, on_line_mm: DVec3, direction: DVec3) -> DVec2 {
         let (own_mm, along) =

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
-use super::{EDGE_MM, PupilBoundary, PupilPlane, Search, strips::Strips};
+use super::{EDGE_MM, PupilBoundary, PupilPlane, Search, front::Front, strips::Strips};
 use crate::{MonoLens, ObjectPoint, quadrature::gauss_legendre_on};
 
 /// The share of an outline's area that may be wrong at jumps of its edge.
@@ -13,6 +13,8 @@ const UNCERTAIN: f64 = 5e-4;
 const AREA_CHANGE: f64 = 2e-3;
 /// How often the number of azimuths is doubled for that.
 const MOST_DOUBLINGS: usize = 2;
+/// How far beyond an edge rays are looked at for what ends light there, over the distance from the center.
+const JUST_BEYOND: f64 = 1e-7;
 /// How far beyond an outline light counts as not seen, over the outline's radius.
 const BESIDE: f64 = 0.02;
 /// How far beyond an outline light is looked for, over its radius; at how many places of how many azimuths, at most.
@@ -44,13 +46,13 @@ impl PupilRegion {
     pub fn find(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize) -> Option<Self> {
         let n_azimuths = n_azimuths.max(8);
         let plane = PupilPlane::of_region(lens, point);
-        let search = Search { lens, point, plane };
+        let search = Search { lens, point, plane, front: None };
         let mut lit = search.lit_over_front();
         let in_middle = search.lit_middle().and_then(|seed| search.part_about(seed, n_azimuths));
         let part = in_middle.or_else(|| search.part_of(&lit, n_azimuths))?;
         let part = search.refined(part);
         let is_smooth = part.area_change() <= AREA_CHANGE;
-        if is_smooth && search.uncertain_mm2(&part) <= UNCERTAIN * part.area_mm2() {
+        if is_smooth && !search.grazes(&part) && search.uncertain_mm2(&part) <= UNCERTAIN * part.area_mm2() {
             let is_beside = |(place, _): &(DVec2, f64)| part.beyond_mm(*place) > BESIDE * part.rho_max();
             lit.extend(search.lit_beyond(&part));
             if !lit.iter().any(is_beside) && !search.lit_around(&part).iter().any(is_beside) {
@@ -58,9 +60,11 @@ impl PupilRegion {
             }
         }
         lit.extend(part.edge_mm().into_iter().map(|place| (place, 0.0)));
-        let strips = Strips::find(&search, &lit, n_azimuths);
+        let strips = search.strips(&lit, n_azimuths);
         // Lines that lost light would be worse than what one place sees, all of which is lit.
-        let is_less = |strips: &Strips| is_smooth && strips.area_mm2() < (1.0 - AREA_CHANGE) * part.area_mm2();
+        let is_less = |strips: &Strips| {
+            is_smooth && !search.grazes(&part) && strips.area_mm2() < (1.0 - AREA_CHANGE) * part.area_mm2()
+        };
         let shape = match strips.filter(|strips| !is_less(strips)) {
             Some(strips) => Shape::Strips(plane, strips),
             None => Shape::Outline(part),
@@ -140,6 +144,25 @@ impl Search<'_> {
             part.rho_mm = part.rho_mm.iter().zip(&rho_mm).flat_map(|(known, new)| [*known, *new]).collect();
         }
         part
+    }
+
+    /// Returns the region about places of it by lines: over the front of the lens, where that stands in its place.
+    fn strips(&self, lit: &[(DVec2, f64)], n_lines: usize) -> Option<Strips> {
+        let Some(front) = Front::of(self.lens, self.point, self.plane) else { return Strips::find(self, lit, n_lines) };
+        let targets: Vec<DVec2> = lit.iter().map(|(target, _)| *target).collect();
+        let places = front.places_mm(self.lens, &targets);
+        let search = Search { front: Some(&front), ..*self };
+        let clearances = search.clearances(&places);
+        Strips::find(&search, &places.into_iter().zip(clearances).collect::<Vec<_>>(), n_lines)
+    }
+
+    /// Whether rays just beyond the edge miss a surface or are totally reflected, rather than pass a rim.
+    ///
+    /// No clearance tells how far from there light begins again, and an outline may end in horns along the front.
+    fn grazes(&self, part: &PupilBoundary) -> bool {
+        let beyond = |edge_mm: DVec2| edge_mm + JUST_BEYOND * (edge_mm - part.center_mm);
+        let places: Vec<DVec2> = part.edge_mm().into_iter().map(beyond).collect();
+        self.clearances(&places).iter().any(|clearance| *clearance == f64::NEG_INFINITY)
     }
 
     /// Returns places of the pupil beyond the edge of a part, as the horns of a crescent beyond its hollow side.

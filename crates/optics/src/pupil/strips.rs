@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{Edge, Search};
+use super::{Edge, Front, Search};
 use crate::quadrature::gauss_legendre_on;
 
 /// Lines of a first look, and rays across each.
@@ -25,6 +25,8 @@ const MOST_SEEDS: usize = 16;
 const HALVINGS: usize = 10;
 /// The fewest lines between two such places.
 const LEAST_LINES: usize = 16;
+/// Places of Gauss's rule on a line whose light is summed.
+const N_OF_AREA: usize = 12;
 /// Clearance at which a ray is held to graze its rim, mm.
 const EDGE_MM: f64 = 1e-9;
 
@@ -32,6 +34,8 @@ const EDGE_MM: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Strips {
     lines: Vec<Line>,
+    /// What the lines lie on, where that is not the plane.
+    front: Option<Front>,
 }
 
 /// A line across a region: the strip of the region that it stands for.
@@ -76,14 +80,13 @@ impl Strips {
                 spans_mm,
             }));
         }
-        let strips = Self { lines: strips };
+        let strips = Self { lines: strips, front: search.front.cloned() };
         (strips.area_mm2() > 0.0).then_some(strips)
     }
 
     /// The area of the region, mm².
     pub(super) fn area_mm2(&self) -> f64 {
-        let length = |line: &Line| line.spans_mm.iter().map(|[from, to]| to - from).sum::<f64>();
-        self.lines.iter().map(|line| line.width_mm * length(line)).sum()
+        self.nodes(N_OF_AREA).iter().map(|(_, area_mm2)| area_mm2).sum()
     }
 
     /// Returns the places of Gauss's rule on each line, and the area that each stands for, mm².
@@ -94,12 +97,20 @@ impl Strips {
             for [from, to] in &line.spans_mm {
                 let node = |(share, weight): &(f64, f64)| {
                     let along_mm = from + (to - from) * share;
-                    (line.foot_mm + along_mm * line.direction, weight * (to - from) * line.width_mm)
+                    self.in_plane(line.foot_mm + along_mm * line.direction, weight * (to - from) * line.width_mm)
                 };
                 nodes.extend(rule.iter().map(node));
             }
         }
         nodes
+    }
+
+    /// Returns a place and an area about it as they are in the pupil's plane.
+    fn in_plane(&self, place_mm: DVec2, area_mm2: f64) -> (DVec2, f64) {
+        match &self.front {
+            None => (place_mm, area_mm2),
+            Some(front) => (front.target_mm(place_mm), area_mm2 * front.stretch(place_mm)),
+        }
     }
 }
 
