@@ -9,6 +9,7 @@ mod glasses;
 mod iset_json;
 mod json;
 mod lens_file;
+mod number;
 mod pbrt_list;
 mod prescription;
 mod read;
@@ -18,6 +19,7 @@ mod shapes;
 mod system;
 mod text_error;
 mod write;
+mod write_seq;
 mod write_zmx;
 mod zmx;
 

@@ -138,7 +138,9 @@ fn what_a_format_cannot_hold_is_named() {
     assert!(linear.starts_with("a .zmx file cannot hold this lens: surface 0 has behind it the medium of"), "{linear}");
     let thin = LensFile::from(Lens::thin(50.0, 10.0).unwrap());
     assert!(thin.to_omni_json().unwrap_err().to_string().contains("surface 0 is neither a sphere"));
-    assert!(thin.write(Path::new("a.step")).unwrap_err().to_string().contains("expected .ron, .dat, .json or .zmx"));
+    assert!(
+        thin.write(Path::new("a.step")).unwrap_err().to_string().contains("expected .ron, .dat, .json, .zmx or .seq")
+    );
 }
 
 #[test]

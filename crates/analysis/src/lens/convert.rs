@@ -11,7 +11,7 @@ pub struct ConvertedLens {
     pub text: String,
     /// The text of a glass catalogue (`.agf`) that belongs beside it with the same name, if it needs one.
     pub glasses: Option<String>,
-    /// What the file read says and this program does otherwise or not at all, a sentence each.
+    /// What the file read says and this program, or the format written, does otherwise or not at all, a sentence each.
     pub notes: Vec<String>,
 }
 
@@ -24,8 +24,9 @@ pub struct ConvertedLens {
 /// When there is no such lens, or the format cannot hold it.
 pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Result<ConvertedLens, PipelineError> {
     let mut file = LensSpec::named(input).open(reading)?;
-    let notes = std::mem::take(&mut file.notes);
     let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let mut notes = std::mem::take(&mut file.notes);
+    notes.extend(file.left_out(&extension));
     let (text, glasses) = match extension.as_str() {
         "ron" => (file.to_ron(), None),
         "dat" => (file.to_dat()?, None),
@@ -34,8 +35,9 @@ pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Re
             (file.to_omni_json()?, None)
         }
         "zmx" => file.to_zmx_and_agf(&target.file_stem().unwrap_or_default().to_string_lossy())?,
+        "seq" => (file.to_seq()?, None),
         _ => {
-            let expected = "expected .ron, .dat, .json (ISET) or .zmx";
+            let expected = "expected .ron, .dat, .json (ISET), .zmx or .seq";
             let reason = format!("'.{extension}' is no lens format that can be written; {expected}");
             return Err(PipelineError::Write { path: target.to_owned(), reason });
         }

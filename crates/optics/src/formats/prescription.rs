@@ -9,6 +9,7 @@ use crate::{
 
 use super::{
     lens_file::{Field, LensFile},
+    number::reciprocal,
     text_error::TextError,
 };
 
@@ -195,7 +196,7 @@ impl Lens {
 
     /// Returns the lens as it stands in our own file.
     fn prescription(&self) -> Prescription {
-        let radius_mm = |curvature_per_mm: f64| (curvature_per_mm != 0.0).then(|| 1.0 / curvature_per_mm);
+        let radius_mm = |curvature_per_mm: f64| (curvature_per_mm != 0.0).then(|| reciprocal(curvature_per_mm));
         let row = |(i, interface): (usize, &Interface)| Row {
             comment: String::new(),
             radius_mm: radius_mm(interface.surface.curvature_per_mm),

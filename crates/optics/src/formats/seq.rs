@@ -24,6 +24,7 @@ use super::{
 /// Reads a CODE V file; `name` serves where the file states none.
 pub(super) fn lens_from_seq(text: &str, name: &str, glasses: Glasses) -> Result<LensFile, TextError> {
     let mut file = Seq::new(name, glasses);
+    file.remarks = remarks_of(text);
     for command in commands_of(text) {
         file.take(&command)?;
     }
@@ -61,6 +62,8 @@ struct Seq<'a> {
     /// Wavelengths of a private catalogue that is being read.
     private_wavelengths_nm: Option<Vec<f64>>,
     surfaces: Vec<SeqSurface>,
+    /// The comments before the first command: where the lens is from, and what else there is to say.
+    remarks: Vec<String>,
     has_image: bool,
     notes: Vec<String>,
 }
@@ -91,6 +94,7 @@ impl<'a> Seq<'a> {
             vignetting: Default::default(),
             private_wavelengths_nm: None,
             surfaces: Vec::new(),
+            remarks: Vec::new(),
             has_image: false,
             notes: Vec::new(),
         }
@@ -357,7 +361,7 @@ impl<'a> Seq<'a> {
         };
         Ok(System {
             name: self.name.clone(),
-            source: "a CODE V file".to_owned(),
+            source: if self.remarks.is_empty() { "a CODE V file".to_owned() } else { self.remarks.remove(0) },
             object_distance_mm,
             object_medium,
             first_vertex_z_mm: 0.0,
@@ -373,7 +377,7 @@ impl<'a> Seq<'a> {
             field_weights: self.field_weights,
             wavelengths_nm: self.wavelengths_nm,
             wavelength_weights: self.wavelength_weights,
-            comments: Vec::new(),
+            comments: self.remarks,
             reference: self.reference.saturating_sub(1),
             notes: self.notes,
         })
@@ -399,6 +403,13 @@ impl<'a> Seq<'a> {
         };
         (0..x.len().max(y.len())).map(field).collect()
     }
+}
+
+/// Returns the lines of comment that a file begins with, those that say something.
+fn remarks_of(text: &str) -> Vec<String> {
+    let lines = text.lines().map(str::trim).take_while(|line| line.is_empty() || line.starts_with('!'));
+    let remarks = lines.map(|line| line.trim_start_matches('!').trim().to_owned());
+    remarks.filter(|remark| remark.contains(char::is_alphanumeric)).collect()
 }
 
 /// Whether the word in a glass's place makes the surface a mirror.

@@ -14,6 +14,7 @@ use crate::{
 
 use super::{
     lens_file::{Field, LensFile, weights_of},
+    number::decimal_sum,
     text_error::TextError,
 };
 
@@ -247,10 +248,13 @@ impl System {
             let thickness_mm = surface.thickness_after_mm;
             match i {
                 0 => {
-                    self.object_distance_mm += thickness_mm;
-                    self.first_vertex_z_mm += thickness_mm;
+                    self.object_distance_mm = decimal_sum(self.object_distance_mm, thickness_mm);
+                    self.first_vertex_z_mm = decimal_sum(self.first_vertex_z_mm, thickness_mm);
                 }
-                _ => self.surfaces[i - 1].thickness_after_mm += thickness_mm,
+                _ => {
+                    let before = &mut self.surfaces[i - 1];
+                    before.thickness_after_mm = decimal_sum(before.thickness_after_mm, thickness_mm);
+                }
             }
             dropped.push(self.surfaces.remove(i).line);
             self.moves.retain(|step| step.step.surfaces != (i, i));

@@ -6,7 +6,10 @@ use serde_json::{Value, json};
 
 use crate::{Glass, Interface, Lens, OpticsError, Placement, Shape, Surface, glass::D_LINE_NM};
 
-use super::lens_file::{LensFile, Microlens};
+use super::{
+    lens_file::{Field, LensFile, Microlens},
+    number::reciprocal,
+};
 
 impl From<Lens> for LensFile {
     fn from(lens: Lens) -> Self {
@@ -25,7 +28,7 @@ fn is_plane(surface: &Surface) -> bool {
 }
 
 impl LensFile {
-    /// Writes the lens to a file, in the format of its extension: `.ron`, `.dat`, `.json` (ISET) or `.zmx`.
+    /// Writes the lens to a file, in the format of its extension: `.ron`, `.dat`, `.json` (ISET), `.zmx` or `.seq`.
     ///
     /// # Errors
     /// When the format cannot hold the lens, the extension is none of these, or the file cannot be written.
@@ -37,8 +40,9 @@ impl LensFile {
             "dat" => self.to_dat()?,
             "json" => self.to_omni_json()?,
             "zmx" => self.to_zmx()?,
+            "seq" => self.to_seq()?,
             _ => {
-                let expected = "expected .ron, .dat, .json or .zmx";
+                let expected = "expected .ron, .dat, .json, .zmx or .seq";
                 return Err(failed(format!("the extension '.{extension}' is no format to write; {expected}")));
             }
         };
@@ -73,7 +77,7 @@ impl LensFile {
                 (true, true) => 0.0,
                 (true, false) => return Err(cannot(FORMAT, i, "is the stop but not a plane")),
                 (false, true) => return Err(cannot(FORMAT, i, "is a plane, which only the stop may be")),
-                (false, false) if surface.shape == Shape::Sphere => 1.0 / surface.curvature_per_mm,
+                (false, false) if surface.shape == Shape::Sphere => reciprocal(surface.curvature_per_mm),
                 (false, false) => return Err(cannot(FORMAT, i, "is not a sphere")),
             };
             let index = interface.medium_after.index_at(wavelength_nm)?;
@@ -120,6 +124,64 @@ impl LensFile {
     }
 }
 
+impl LensFile {
+    /// Where the film of a file stands that must state one, mm behind the last vertex: the lens's own place of it, or else where
+    /// first-order optics focuses the file's object; 0 where there is no such place.
+    pub(super) fn film_or_focus_mm(&self) -> f64 {
+        self.film_distance_mm.or_else(|| self.focus_mm()).unwrap_or(0.0)
+    }
+
+    fn focus_mm(&self) -> Option<f64> {
+        let lens = self.lens.at(self.reference_wavelength_nm.unwrap_or(D_LINE_NM)).ok()?;
+        lens.film_distance_mm_for(self.object_distance_mm.unwrap_or(f64::INFINITY)).ok().filter(|mm| mm.is_finite())
+    }
+
+    /// Returns the kind of the fields (angles 0, object heights 1, paraxial image heights 2, real ones 3), and their x and y.
+    pub(super) fn fields_of_one_kind(&self, format: &'static str) -> Result<(usize, [Vec<f64>; 2]), OpticsError> {
+        let of = |field: &Field| match *field {
+            Field::Angle { x_deg, y_deg } => (0, x_deg, y_deg),
+            Field::ObjectHeight { x_mm, y_mm } => (1, x_mm, y_mm),
+            Field::ImageHeight { x_mm, y_mm } => (2, x_mm, y_mm),
+            Field::RealImageHeight { x_mm, y_mm } => (3, x_mm, y_mm),
+        };
+        let fields: Vec<(usize, f64, f64)> = self.fields.iter().map(of).collect();
+        let kind = fields.first().map_or(0, |field| field.0);
+        if fields.iter().any(|field| field.0 != kind) {
+            let reason = "its fields are of several kinds, where the format has one".to_owned();
+            return Err(OpticsError::CannotWrite { format, reason });
+        }
+        Ok((kind, [fields.iter().map(|field| field.1).collect(), fields.iter().map(|field| field.2).collect()]))
+    }
+
+    /// Returns what the format of an extension has no place for and so leaves out of what the file says beside the lens, and what it
+    /// states that the file does not, a sentence each.
+    pub fn left_out(&self, extension: &str) -> Vec<String> {
+        let holds_use = matches!(extension, "ron" | "zmx" | "seq");
+        let stated = [
+            ("its array of microlenses", self.microlens.is_some() && extension != "json"),
+            ("the place of the film", self.film_distance_mm.is_some() && !holds_use),
+            ("the distance of the object", self.object_distance_mm.is_some() && !holds_use),
+            ("wavelengths", !self.wavelengths_nm.is_empty() && !holds_use),
+            ("fields", !self.fields.is_empty() && !holds_use),
+            ("names of surfaces", !self.surface_comments.is_empty() && !holds_use),
+            ("comments", !self.comments.is_empty() && !holds_use),
+        ];
+        let left_out: Vec<&str> =
+            stated.iter().filter(|(_, is_left_out)| *is_left_out).map(|(what, _)| *what).collect();
+        let mut notes = Vec::new();
+        if !left_out.is_empty() {
+            notes.push(format!("a .{extension} file has no place for {}: left out", left_out.join(", ")));
+        }
+        if matches!(extension, "zmx" | "seq") && self.film_distance_mm.is_none() {
+            notes.push(match self.focus_mm() {
+                Some(mm) => format!("the place of the film is not stated: the file has the paraxial focus, {mm:.4} mm"),
+                None => "the place of the film is not stated, and there is no focus: the file has 0 mm".to_owned(),
+            });
+        }
+        notes
+    }
+}
+
 const OMNI: &str = "a .json file of ISET";
 
 /// Checks that no surface reflects or diffracts, for which a format has no word.
@@ -144,7 +206,6 @@ fn check_air(format: &'static str, lens: &Lens) -> Result<(), OpticsError> {
     }
 }
 
-/// Returns the first surface that does not stand where its distances alone put it.
 /// Checks that all rims are circles about the axis, as these formats have them.
 fn check_round(format: &'static str, lens: &Lens) -> Result<(), OpticsError> {
     match lens.apertures().first() {
@@ -153,6 +214,7 @@ fn check_round(format: &'static str, lens: &Lens) -> Result<(), OpticsError> {
     }
 }
 
+/// Returns the first surface that does not stand where its distances alone put it.
 fn first_moved(lens: &Lens) -> Option<usize> {
     lens.placements()
         .iter()
@@ -183,7 +245,7 @@ fn omni_row(i: usize, is_stop: bool, interface: &Interface, wavelengths_nm: &[f6
     let radius = match (is_plane(surface), is_stop) {
         (true, true) => json!(0.0),
         _ if surface.curvature_per_mm == 0.0 => Value::Null,
-        _ => json!(1.0 / surface.curvature_per_mm),
+        _ => json!(reciprocal(surface.curvature_per_mm)),
     };
     let medium = &interface.medium_after;
     let ior = match medium {
@@ -208,7 +270,7 @@ fn omni_row(i: usize, is_stop: bool, interface: &Interface, wavelengths_nm: &[f6
         }
         Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
             // JSON has no infinity; ISET's readers take a huge radius for it.
-            let radius = |c: f64| if c == 0.0 { PLANE_RADIUS_MM } else { 1.0 / c };
+            let radius = |c: f64| if c == 0.0 { PLANE_RADIUS_MM } else { reciprocal(c) };
             row["radius"] = json!([radius(*curvature_x_per_mm), radius(surface.curvature_per_mm)]);
             row["conic_constant"] = json!([conic_x, conic]);
         }

@@ -11,7 +11,8 @@ use crate::{
 
 use super::{
     agf::agf_lines,
-    lens_file::{Field, LensFile},
+    lens_file::LensFile,
+    number::reciprocal,
     write::{cannot, one_line},
 };
 
@@ -144,7 +145,7 @@ impl LensFile {
         if !makers.is_empty() {
             let _ = write!(text, "GCAT {}\r\n", makers.join(" "));
         }
-        self.write_zmx_fields(&mut text);
+        self.write_zmx_fields(&mut text)?;
         let gaps = self.zmx_gaps();
         let mut n_written = 0;
         let distance_mm = match self.object_distance_mm {
@@ -187,7 +188,8 @@ impl LensFile {
     /// Returns the ways from the lens frame to the first surface, between surfaces, and to the film.
     fn zmx_gaps(&self) -> Vec<Gap> {
         let lens = &self.lens;
-        let film_z_mm = lens.film_z_mm(self.film_distance_mm.unwrap_or(0.0));
+        let film_mm = self.film_or_focus_mm();
+        let film_z_mm = lens.film_z_mm(film_mm);
         let film = lens.film_motion().after(&Placement::centered(film_z_mm));
         let mut before = Placement::centered(0.0);
         let gap = |(i, placement): (usize, Placement)| {
@@ -196,7 +198,13 @@ impl LensFile {
                 // Behind a far object the axis has no length to keep.
                 None if way.is_rest() => 0.0,
                 None => return Gap::turned(&way, 0.0),
-                Some(i) if i + 1 == lens.interfaces().len() => film_z_mm - lens.last_vertex_z_mm(),
+                Some(i) if i + 1 == lens.interfaces().len() => {
+                    if lens.is_backward_before(i + 1) {
+                        -film_mm
+                    } else {
+                        film_mm
+                    }
+                }
                 Some(i) => lens.interfaces()[i].thickness_after_mm,
             };
             Gap::new(&way, straight_mm)
@@ -231,19 +239,9 @@ impl LensFile {
         Ok(makers)
     }
 
-    fn write_zmx_fields(&self, text: &mut String) {
-        let (mut kind, mut rows) = (0, [String::new(), String::new()]);
-        for field in &self.fields {
-            let (this_kind, x, y) = match *field {
-                Field::Angle { x_deg, y_deg } => (0, x_deg, y_deg),
-                Field::ObjectHeight { x_mm, y_mm } => (1, x_mm, y_mm),
-                Field::ImageHeight { x_mm, y_mm } => (2, x_mm, y_mm),
-                Field::RealImageHeight { x_mm, y_mm } => (3, x_mm, y_mm),
-            };
-            kind = this_kind;
-            let _ = write!(rows[0], " {x:e}");
-            let _ = write!(rows[1], " {y:e}");
-        }
+    fn write_zmx_fields(&self, text: &mut String) -> Result<(), OpticsError> {
+        let (kind, rows) = self.fields_of_one_kind("a .zmx file")?;
+        let rows = rows.map(|row| row.iter().map(|number| format!(" {number:e}")).collect::<String>());
         let (n_fields, n_wavelengths) = (self.fields.len(), self.wavelengths_nm.len());
         let _ = write!(text, "FTYP {kind} 0 {n_fields} {n_wavelengths} 0 0 0\r\n");
         if n_fields > 0 {
@@ -261,6 +259,7 @@ impl LensFile {
         if let Some(reference) = self.wavelengths_nm.iter().position(is_reference) {
             let _ = write!(text, "PWAV {}\r\n", reference + 1);
         }
+        Ok(())
     }
 }
 
@@ -342,7 +341,7 @@ fn write_zmx_shape(text: &mut String, lens: &Lens, i: usize) -> Result<(), Optic
             ("EVENASPH", *conic, coefficients.iter().skip(1).step_by(2).copied().collect())
         }
         Shape::OddAsphere { conic, coefficients } => ("ODDASPHE", *conic, coefficients.clone()),
-        Shape::ThinLens { power_per_mm } => ("PARAXIAL", 0.0, vec![1.0 / power_per_mm]),
+        Shape::ThinLens { power_per_mm } => ("PARAXIAL", 0.0, vec![reciprocal(*power_per_mm)]),
         Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
             ("BICONICX", *conic, vec![zmx_radius(*curvature_x_per_mm), *conic_x])
         }
@@ -391,5 +390,5 @@ fn write_zmx_shape(text: &mut String, lens: &Lens, i: usize) -> Result<(), Optic
 
 /// Returns the radius of a curvature, of which Zemax writes 0 for that of a plane.
 fn zmx_radius(curvature_per_mm: f64) -> f64 {
-    if curvature_per_mm == 0.0 { 0.0 } else { 1.0 / curvature_per_mm }
+    reciprocal(curvature_per_mm)
 }

@@ -1,6 +1,8 @@
 //! A surface of a CODE V file.
 
-use crate::{Aperture, CoordinateBreak, Glass, Outline, Shape};
+use std::f64::consts::TAU;
+
+use crate::{Aperture, CoordinateBreak, Glass, Outline, PhaseProfile, Shape};
 
 use super::{
     super::{
@@ -33,6 +35,8 @@ pub(super) struct SeqSurface {
     pub(super) obscuration: SeqOpening,
     /// The radius of a hole through the surface.
     pub(super) hole_radius: Option<f64>,
+    /// What a grating or diffractive surface adds.
+    pub(super) phase: SeqPhase,
     /// What differs along x, where something does.
     pub(super) kind: SeqKind,
     pub(super) curvature_x: f64,
@@ -69,6 +73,114 @@ pub(super) struct SeqOpening {
     pub(super) ellipse: [Option<f64>; 2],
     /// ADX, ADY.
     pub(super) center: [f64; 2],
+}
+
+/// The phase of a grating (GRT) or of a diffractive surface of revolution (DIF DOE, HCT R), in the file's units.
+#[derive(Clone)]
+pub(super) struct SeqPhase {
+    kind: SeqPhaseKind,
+    /// GRO, HOR.
+    order: f64,
+    /// GRS.
+    spacing: f64,
+    /// GRX, GRY: the direction in which grooves follow one another.
+    across: [f64; 2],
+    /// HWL, nm.
+    construction_nm: f64,
+    /// HCO C1 and on: the path of the first order at that wavelength is their sum times r², r⁴ and on.
+    coefficients: Vec<f64>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum SeqPhaseKind {
+    None,
+    Grating,
+    Rings,
+}
+
+impl Default for SeqPhase {
+    fn default() -> Self {
+        Self {
+            kind: SeqPhaseKind::None,
+            order: 1.0,
+            spacing: 0.0,
+            across: [0.0, 1.0],
+            construction_nm: 0.0,
+            coefficients: Vec::new(),
+        }
+    }
+}
+
+/// The most coefficients of a diffractive surface.
+const MOST_COEFFICIENTS: usize = 20;
+
+impl SeqPhase {
+    /// Takes a command of a grating or diffractive surface.
+    fn take(&mut self, keyword: &str, command: &Command, place: usize) -> Result<(), TextError> {
+        let word = || command.words.get(place).map(|word| word.to_uppercase()).unwrap_or_default();
+        let fixed = |expected: &str| match word() == expected {
+            true => Ok(()),
+            false => Err(command.wrong(format!("'{}' is not supported; expected {expected}", word()))),
+        };
+        match keyword {
+            "GRT" => self.kind = SeqPhaseKind::Grating,
+            "DIF" => {
+                fixed("DOE")?;
+                self.kind = SeqPhaseKind::Rings;
+            }
+            "HCT" => fixed("R")?,
+            "GRO" | "HOR" => self.order = command.number(place)?,
+            "GRS" => self.spacing = command.number(place)?,
+            "GRX" | "GRY" => self.across[usize::from(keyword == "GRY")] = command.number(place)?,
+            "GRZ" if command.number(place)? != 0.0 => {
+                return Err(command.wrong("grooves that are not equidistant on the vertex plane are not supported"));
+            }
+            "HWL" => self.construction_nm = command.number(place)?,
+            "HCO" => {
+                let number = word().strip_prefix('C').and_then(|digits| digits.parse::<usize>().ok());
+                let number = number.filter(|number| (1..=MOST_COEFFICIENTS).contains(number));
+                let Some(number) = number else {
+                    return Err(
+                        command.wrong(format!("'{}' is not supported; expected C1 to C{MOST_COEFFICIENTS}", word()))
+                    );
+                };
+                self.coefficients.resize(self.coefficients.len().max(number), 0.0);
+                self.coefficients[number - 1] = command.number(place + 1)?;
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Returns the order and the phase.
+    fn in_mm(&self, mm: f64) -> Result<Option<(i32, PhaseProfile)>, String> {
+        let profile = match self.kind {
+            SeqPhaseKind::None => return Ok(None),
+            SeqPhaseKind::Grating => {
+                let [x, y] = self.across;
+                let length = x.hypot(y);
+                if !(self.spacing > 0.0 && length > 0.0) {
+                    return Err("GRT: a grating needs the distance of its grooves (GRS, above 0) and their direction"
+                        .to_owned());
+                }
+                let lines_per_mm = 1.0 / (self.spacing * mm);
+                PhaseProfile::Grating { lines_per_mm: [x / length * lines_per_mm, y / length * lines_per_mm] }
+            }
+            SeqPhaseKind::Rings => {
+                if self.construction_nm <= 0.0 {
+                    return Err("DIF DOE: the wavelength of construction (HWL) is missing or not above 0".to_owned());
+                }
+                let per_mm = TAU / (1e-6 * self.construction_nm);
+                let powers = (1..).map(|power| mm.powi(1 - 2 * power));
+                let coefficients_rad = self.coefficients.iter().zip(powers).map(|(a, scale)| a * scale * per_mm);
+                PhaseProfile::Rings { radius_mm: 1.0, coefficients_rad: coefficients_rad.collect() }
+            }
+        };
+        match self.order.fract() == 0.0 && self.order.abs() <= 1e6 {
+            true => Ok(Some((self.order as i32, profile))),
+            false => Err(format!("a diffraction order of {}; expected a whole number", self.order)),
+        }
+    }
 }
 
 impl SeqOpening {
@@ -158,7 +270,10 @@ impl SeqSurface {
             "AR" | "BR" | "CR" | "DR" | "AP" | "BP" | "CP" | "DP" if command.number(place)? != 0.0 => {
                 return Err(command.wrong("higher terms of an anamorphic asphere are not supported"));
             }
-            "SPS" | "SPL" | "GRT" | "DIF" | "HOE" => {
+            "GRT" | "GRO" | "GRS" | "GRX" | "GRY" | "GRZ" | "DIF" | "HOR" | "HWL" | "HCT" | "HCO" => {
+                self.phase.take(keyword, command, place)?;
+            }
+            "SPS" | "SPL" | "HOE" => {
                 let what = command.words.join(" ");
                 return Err(command.wrong(format!(
                     "surfaces of the kind '{what}' are not supported; expected spheres, K, ASP, CYL, YTO, XTO and AAS"
@@ -291,7 +406,7 @@ impl SeqSurface {
             thickness_after_mm: self.thickness * mm,
             semi_aperture_mm: self.clear_radius.map(|radius| radius * mm),
             is_mirror: self.is_mirror,
-            phase: None,
+            phase: self.phase.in_mm(mm).map_err(|reason| TextError { line: Some(self.line), reason })?,
             is_rim_fixed: self.clear_radius.is_some(),
             apertures: Vec::new(),
         };
@@ -311,6 +426,10 @@ impl SeqSurface {
             for outline in stated.outlines(mm) {
                 surface = surface.with_aperture(Aperture { surface: 0, outline, center_mm, is_obscuration });
             }
+        }
+        // A circle about the axis bounds light beside another opening.
+        if let (Some(radius), true) = (self.clear_radius, opening.center == [0.0; 2]) {
+            surface.semi_aperture_mm = surface.semi_aperture_mm.map(|rim_mm| rim_mm.min(radius * mm));
         }
         if let Some(radius) = self.hole_radius {
             let outline = Outline::Circle { radius_mm: radius * mm };
