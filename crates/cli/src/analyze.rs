@@ -25,7 +25,7 @@ const USUAL_NM: [f64; 3] = [450.0, 550.0, 650.0];
 pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.open(common)?;
     let request = request(arguments, &used, common)?;
-    let used = arguments.lens.state.apply(used, request.reference_nm())?;
+    let used = arguments.lens.state.apply(used, request.reference_nm(), common)?;
     // The place is tried before the work.
     let staged = arguments.out.as_ref().map(|path| Staged::folder(path)).transpose()?.map(guarded);
     let bar = Bar::new(common.quiet);

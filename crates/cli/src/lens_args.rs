@@ -94,9 +94,18 @@ impl LensStateArgs {
         self.f_number.map(StopSpec::FNumber).or(self.stop_mm.map(StopSpec::DiameterMm))
     }
 
-    /// Returns the lens with its stop and its movements; an f-number is that at this wavelength, nm.
-    pub(crate) fn apply(&self, used: LensDefaults, wavelength_nm: f64) -> anyhow::Result<LensDefaults> {
-        Ok(used.placed(self.stop().unwrap_or_default(), self.movements.movements(), wavelength_nm)?)
+    /// Returns the lens with its stop and its movements, and prints what is to be said of them; an f-number is that at this
+    /// wavelength, nm.
+    pub(crate) fn apply(
+        &self,
+        used: LensDefaults,
+        wavelength_nm: f64,
+        common: &Common,
+    ) -> anyhow::Result<LensDefaults> {
+        let n_told = used.notes.len();
+        let placed = used.placed(self.stop().unwrap_or_default(), self.movements.movements(), wavelength_nm)?;
+        placed.notes[n_told..].iter().for_each(|note| remark(common.quiet, note));
+        Ok(placed)
     }
 }
 

@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         spectral_weights,
     };
     let reference_nm = request.reference_nm(&used.lens)?;
-    let lens = arguments.lens.state.apply(used, reference_nm)?.lens;
+    let lens = arguments.lens.state.apply(used, reference_nm, common)?.lens;
     // The place is tried before the work.
     let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
     let csv = arguments.csv.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);

@@ -17,7 +17,7 @@ pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> 
     }
     let used = arguments.lens.open(common)?;
     let wavelength_nm = used.wavelength_or_usual();
-    let lens = arguments.lens.state.apply(used, wavelength_nm)?.lens;
+    let lens = arguments.lens.state.apply(used, wavelength_nm, common)?.lens;
     let rays = RayTable::open(&arguments.rays)?;
     let settings = TraceSettings { rims_clip: !arguments.no_clip, film_distance_mm: arguments.film_mm };
     let Some(path) = &arguments.output else {

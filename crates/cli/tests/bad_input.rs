@@ -221,7 +221,7 @@ fn an_analysis_that_cannot_be_leaves_nothing() {
     check(&["--fields-deg", "0,5/y"], &["--fields-deg", "'5/y'"]);
     check(&["--fields-mm", "0,5"], &["a finite one for fields in mm"]);
     check(&["--distance-mm", "5"], &["forms no image"]);
-    check(&["--f-number", "1.2"], &["opens to at most"]);
+    check(&["--f-number", "1.2"], &["opens to f/"]);
 }
 
 /// Writes a picture and the codes of its depth, millimetres.

@@ -159,19 +159,17 @@ pub enum OpticsError {
         /// The f-number of that diameter at the d line; NaN where the lens has none.
         smallest_f_number: f64,
     },
-    /// An f-number that the rims of other surfaces than the stop do not let through.
-    #[error(
-        "{lens} opens to f/{smallest:.3}, where the rim of surface {surface} limits its light, asked for f/{asked}"
-    )]
-    RimsTooNarrow {
+    /// An f-number below that of the lens with its stop fully open.
+    #[error("{lens} opens to f/{smallest:.3} at most{}, asked for f/{asked}", rim_words(*rim))]
+    FNumberTooSmall {
         /// The lens.
         lens: String,
         /// The f-number asked for.
         asked: f64,
-        /// The 0-based surface whose rim limits the light.
-        surface: usize,
         /// The f-number of what gets through.
         smallest: f64,
+        /// The 0-based surface whose rim limits the light then, where it is not the stop.
+        rim: Option<usize>,
     },
     /// A quantity that must be positive.
     #[error("{what} must be a positive number, found {found}")]
@@ -269,6 +267,10 @@ fn summary(names: &[String]) -> String {
 }
 
 /// Returns an f-number in brackets, or nothing for what is none.
+fn rim_words(rim: Option<usize>) -> String {
+    rim.map_or(String::new(), |surface| format!(", where the rim of surface {surface} limits its light"))
+}
+
 fn f_number_words(f_number: f64) -> String {
     if f_number.is_finite() { format!(" (f/{f_number:.3})") } else { String::new() }
 }

@@ -218,15 +218,26 @@ impl MonoLens {
         beam.filter(|beam| !beam.is_limited_by_stop)
     }
 
-    /// Returns a sentence on what limits the light of a far point on the axis, if it is not the stop.
-    pub fn note_on_limit(&self) -> Option<String> {
-        let beam = self.limiting_beam()?;
-        let (real, of_stop) = (self.first_order().f_number, self.first_order.f_number);
+    /// Returns a sentence on what limits the light of the point on the axis at this distance before the first vertex, mm (infinite
+    /// for a far one), if it is not the stop.
+    pub fn note_on_limit(&self, object_distance_mm: f64) -> Option<String> {
+        let is_far = object_distance_mm.is_infinite();
+        let beam = match is_far {
+            true => self.limiting_beam()?,
+            false => self.axial_beam(object_distance_mm).filter(|beam| !beam.is_limited_by_stop)?,
+        };
         let (surface, rim_mm) = (beam.limiting_surface, 2.0 * self.semi_aperture_mm(beam.limiting_surface));
         let (filled_mm, stop_mm) = (2.0 * beam.stop_radius_mm, 2.0 * self.stop_semi_aperture_mm());
+        let (point, f_numbers) = match is_far {
+            true => {
+                let (real, of_stop) = (self.first_order().f_number, self.first_order.f_number);
+                ("far away".to_owned(), format!(": f/{real:.3}, where the stop alone has f/{of_stop:.3}"))
+            }
+            false => (format!("{object_distance_mm} mm before the lens"), String::new()),
+        };
         Some(format!(
-            "the stop does not limit the light: the rim of surface {surface} ({rim_mm:.4} mm across) lets a beam of f/{real:.3} \
-             through, which fills {filled_mm:.4} of the {stop_mm:.4} mm of the stop (f/{of_stop:.3} alone)"
+            "light from the axis {point} is limited by the rim of surface {surface}, {rim_mm:.4} mm across, not by the stop, of \
+             which it fills {filled_mm:.4} of {stop_mm:.4} mm{f_numbers}"
         ))
     }
 

@@ -424,7 +424,7 @@ mod tests {
         let f4 = lens.with_f_number(4.0, 550.0).unwrap();
         assert!((f4.at(550.0).unwrap().first_order().f_number - 4.0).abs() < 1e-12);
         let message = f4.with_f_number(1.4, 550.0).unwrap_err().to_string();
-        assert!(message.contains("opens to at most 17.1 mm (f/2.0"), "{message}");
+        assert!(message.contains("opens to f/2.0"), "{message}");
         let full = f4.with_f_number(lens.at(550.0).unwrap().first_order().f_number, 550.0).unwrap();
         assert!((full.stop_semi_aperture_mm() - 8.55).abs() < 1e-12);
         for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {

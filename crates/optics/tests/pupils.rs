@@ -4,12 +4,14 @@ mod counted;
 
 use std::path::PathBuf;
 
-use counted::{beam_radius_mm, cross_section_mm2};
+use counted::{axial_spot_rms_mm, beam_radius_mm, cross_section_mm2};
 use dioptric_optics::{
-    Lens, MonoLens, ObjectPoint, PupilBoundary, PupilRegion,
-    analysis::{field_limit_deg, projected_solid_angle},
+    Glass, Interface, Lens, LensFile, MissingGlass, MonoLens, ObjectPoint, PupilBoundary, PupilRegion, ReadOptions,
+    Surface,
+    analysis::{Autofocus, PupilLight, PupilRule, field_limit_deg, projected_solid_angle},
     glam::{DVec2, DVec3},
 };
+use rayon::prelude::*;
 
 /// Azimuths of boundaries.
 const N_AZIMUTHS: usize = 192;
@@ -117,7 +119,9 @@ fn rims_narrower_than_the_stop_define_the_f_number() {
         assert!((first.entrance_pupil_diameter_mm * first.f_number / first.efl_mm.abs() - 1.0).abs() < 1e-12);
         let beam = lens.limiting_beam().expect("a rim limits the light");
         assert!(beam.limiting_surface != lens.stop() && beam.stop_radius_mm < lens.stop_semi_aperture_mm());
-        assert!(lens.note_on_limit().unwrap().starts_with("the stop does not limit the light: the rim of surface"));
+        let note = lens.note_on_limit(f64::INFINITY).unwrap();
+        assert!(note.starts_with("light from the axis far away is limited by the rim of surface"), "{note}");
+        assert!(note.contains(&format!(": f/{:.3}, where the stop alone has f/", first.f_number)), "{note}");
     }
 }
 
@@ -138,10 +142,79 @@ fn narrower_stop_limits_again() {
     let stopped = lens.with_f_number(8.0, 550.0).unwrap().at(550.0).unwrap();
     assert!(stopped.limiting_beam().is_none() && (stopped.first_order().f_number - 8.0).abs() < 1e-12);
     let message = lens.with_f_number(2.4, 550.0).unwrap_err().to_string();
-    assert!(message.contains("opens to f/2.7") && message.contains("rim of surface"), "{message}");
+    assert!(message.contains("opens to f/2.743 at most, where the") && message.contains("rim of surface"), "{message}");
     let rims = open.limiting_beam().unwrap().stop_radius_mm;
     assert!((open.stop_radius_filled_mm(f64::INFINITY) - rims).abs() < 1e-12 * rims);
     assert_eq!(stopped.stop_radius_filled_mm(f64::INFINITY), stopped.stop_semi_aperture_mm());
+}
+
+#[test]
+fn marked_f_number_is_the_widest_opening() {
+    let lens = Lens::built_in("dgauss-50mm").unwrap();
+    let full = lens.at(550.0).unwrap().first_order().f_number;
+    assert!(full > 2.02, "{full}");
+    assert_eq!(lens.with_f_number(2.0, 550.0).unwrap(), lens);
+    let note = lens.note_on_f_number(2.0, 550.0).unwrap();
+    assert_eq!(note, "f/2 is taken for the widest opening of dgauss-50mm, which is f/2.028");
+    let message = lens.with_f_number(1.8, 550.0).unwrap_err().to_string();
+    assert_eq!(message, "dgauss-50mm opens to f/2.028 at most, asked for f/1.8");
+    for as_it_is in [2.0277, 2.1, 8.0] {
+        assert_eq!(lens.note_on_f_number(as_it_is, 550.0), None);
+        let found = lens.with_f_number(as_it_is, 550.0).unwrap().at(550.0).unwrap().first_order().f_number;
+        assert!((found / as_it_is - 1.0).abs() < 1e-3, "{as_it_is} {found}");
+    }
+    // A rim that limits it is opened as wide as it goes, too.
+    let fisheye = Lens::built_in("fisheye-12.5mm").unwrap();
+    assert_eq!(fisheye.with_f_number(2.7, 550.0).unwrap(), fisheye);
+}
+
+#[test]
+fn note_on_a_near_point_is_of_its_own_light() {
+    // A stop of 4 mm behind a rim of 6 mm: far light fills it, a near point's cone is cut by no rim either; with a rim of 3 mm it is.
+    for (rim_mm, is_limited) in [(6.0, false), (3.0, true)] {
+        let plate = |semi_aperture_mm, thickness_after_mm| Interface {
+            surface: Surface::plane(semi_aperture_mm),
+            medium_after: Glass::Air,
+            thickness_after_mm,
+        };
+        let thin = Lens::thin(50.0, 8.0).unwrap().interfaces()[0].clone();
+        let lens = Lens::new("plates", "test", vec![plate(rim_mm, 5.0), thin], 1).unwrap().at(550.0).unwrap();
+        let note = lens.note_on_limit(120.0);
+        assert_eq!(note.is_some(), is_limited, "{note:?}");
+        assert!(note.is_none_or(|note| note.starts_with("light from the axis 120 mm before the lens is limited by")));
+    }
+}
+
+#[dioptric_golden::needs_shared]
+#[test]
+fn f_numbers_and_axial_spots_of_all_shared_files_are_those_of_counted_rays() {
+    let Some(folder) = dioptric_golden::shared("data/lenses") else { return };
+    let entries = [folder.join("more"), folder].into_iter().flat_map(|folder| std::fs::read_dir(folder).unwrap());
+    let paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).filter(|path| path.is_file()).collect();
+    let options = ReadOptions { missing_glass: MissingGlass::FromNdVd, ..ReadOptions::default() };
+    let check = |path: &PathBuf| {
+        let file = LensFile::read(path, &options).ok()?;
+        let lens = file.lens.at(file.reference_wavelength_nm.unwrap_or(550.0)).ok()?;
+        let real = lens.real_f_number().filter(|_| lens.is_rotational())?;
+        let name = path.display();
+        assert!((real / counted_f_number(&lens) - 1.0).abs() < 1e-4, "{name}: {real} {}", counted_f_number(&lens));
+        if let Some(limited) = lens.limiting_beam() {
+            assert!((lens.first_order().entrance_pupil_diameter_mm / (2.0 * limited.height_mm) - 1.0).abs() < 1e-12);
+        }
+        let from_mm = lens.film_distance_mm_for(f64::INFINITY).ok()?;
+        let (axis, rule) = (ObjectPoint::Infinite(DVec3::Z), PupilRule::of_rings(12));
+        let focus = Autofocus { lenses: std::slice::from_ref(&lens), points: &[axis], rule };
+        let (best_mm, least_mm) = focus.best_film_mm(from_mm).expect("light on the axis");
+        // In focus and out of it; a perfect mirror's spot is rounding alone.
+        for film_mm in [best_mm, best_mm + 8.0 * least_mm * real] {
+            let (_, [xx, yy, _]) = PupilLight::to_film(&lens, &axis, film_mm, rule).unwrap().moments(&lens, film_mm);
+            let (found, counted) = ((xx + yy).sqrt(), axial_spot_rms_mm(&lens, film_mm, 200_000).unwrap());
+            assert!((found - counted).abs() < 1e-4 * counted + 1e-9, "{name}: {found} {counted}");
+        }
+        Some(())
+    };
+    let n_checked = paths.par_iter().filter_map(check).count();
+    assert!(n_checked >= 28, "{n_checked}");
 }
 
 #[test]

@@ -39,18 +39,20 @@ impl LensDefaults {
     pub fn open(text: &str, reading: &LensReadOptions, stop_mm: Option<f64>) -> Result<Self, PipelineError> {
         let mut used = Self::of(LensSpec::named(text).open(reading)?);
         used.lens = stop_mm.map_or(StopSpec::AsGiven, StopSpec::DiameterMm).apply(used.lens)?;
-        let mono = used.lens.at(used.wavelength_or_usual());
-        used.notes.extend(mono.ok().and_then(|mono| mono.note_on_limit()));
         Ok(used)
     }
 
-    /// Returns it with the stop of the lens set and the lens turned and moved; an f-number is that at this wavelength, nm.
+    /// Returns it with the stop of the lens set and the lens turned and moved; an f-number is that at this wavelength, nm. What is to
+    /// be said of the stop is added to the notes.
     ///
     /// # Errors
     /// When the stop does not open so far, a movement is not finite, or a glass is not known at the wavelength.
     pub fn placed(self, stop: StopSpec, movements: Movements, wavelength_nm: f64) -> Result<Self, PipelineError> {
+        let mut notes = self.notes;
+        notes.extend(stop.note_at(&self.lens, wavelength_nm));
         let lens = movements.apply_at(stop.apply_at(self.lens, wavelength_nm)?, wavelength_nm)?;
-        Ok(Self { lens, ..self })
+        notes.extend(lens.at(wavelength_nm)?.note_on_limit(self.distance_mm));
+        Ok(Self { lens, notes, ..self })
     }
 
     /// Returns what a file says.

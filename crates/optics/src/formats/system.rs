@@ -145,6 +145,7 @@ impl System {
         let Some(mut stop) = self.stop.filter(|&stop| stop < self.surfaces.len()) else {
             return Err(OpticsError::Stops { n_stops: 0 }.into());
         };
+        self.check_use()?;
         self.drop_dummies(&mut stop);
         if self.is_film_backward() {
             self.image_surface.curvature_per_mm *= -1.0;
@@ -180,6 +181,41 @@ impl System {
             microlens: None,
             notes: self.notes,
         })
+    }
+
+    /// Checks the numbers that say how the lens is used.
+    fn check_use(&self) -> Result<(), TextError> {
+        let stated = [
+            (
+                "wavelength",
+                self.wavelengths_nm.iter().find(|nm| !(nm.is_finite() && **nm > 0.0)),
+                " nm, expected more than 0",
+            ),
+            (
+                "weight of a wavelength",
+                self.wavelength_weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)),
+                ", expected 0 or more",
+            ),
+            (
+                "weight of a field",
+                self.field_weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)),
+                ", expected 0 or more",
+            ),
+        ];
+        let is_wrong = |field: &Field| {
+            let (Field::Angle { x_deg: x, y_deg: y }
+            | Field::ObjectHeight { x_mm: x, y_mm: y }
+            | Field::ImageHeight { x_mm: x, y_mm: y }
+            | Field::RealImageHeight { x_mm: x, y_mm: y }) = field;
+            !(x.is_finite() && y.is_finite())
+        };
+        if self.fields.iter().any(|(field, _)| is_wrong(field)) {
+            return Err(plain("a field is infinite, expected finite angles or heights"));
+        }
+        match stated.into_iter().find_map(|(what, found, expected)| Some((what, found?, expected))) {
+            Some((what, found, expected)) => Err(plain(&format!("a {what} is {found}{expected}"))),
+            None => Ok(()),
+        }
     }
 
     /// Whether light runs towards −z before the film: behind an odd number of mirrors.

@@ -131,6 +131,20 @@ impl LensFile {
         self.film_distance_mm.or_else(|| self.focus_mm()).unwrap_or(0.0)
     }
 
+    /// Checks that surfaces and the film stand where tilts and decenters can be stated from one to the next.
+    pub(super) fn check_places(&self, format: &'static str) -> Result<(), OpticsError> {
+        let lens = &self.lens;
+        if lens.moves().is_empty() {
+            return Ok(());
+        }
+        let film_z_mm = lens.film_z_mm(self.film_or_focus_mm());
+        let places = lens.placements().into_iter().map(|place| place.vertex_mm.abs().max_element());
+        match places.chain([film_z_mm.abs()]).position(|mm| !(mm < 1e9)) {
+            Some(surface) => Err(cannot(format, surface, "stands 1e9 mm or more from the first")),
+            None => Ok(()),
+        }
+    }
+
     fn focus_mm(&self) -> Option<f64> {
         let lens = self.lens.at(self.reference_wavelength_nm.unwrap_or(D_LINE_NM)).ok()?;
         lens.film_distance_mm_for(self.object_distance_mm.unwrap_or(f64::INFINITY)).ok().filter(|mm| mm.is_finite())

@@ -41,6 +41,7 @@ impl LensFile {
     /// message names which.
     pub fn to_seq(&self) -> Result<String, OpticsError> {
         let lens = &self.lens;
+        self.check_places(FORMAT)?;
         let mut text = String::new();
         for line in [lens.source()].into_iter().chain(self.comments.iter().map(String::as_str)) {
             let _ = writeln!(text, "! {}", one_line(line));
@@ -292,11 +293,12 @@ fn write_phase(text: &mut String, lens: &Lens, i: usize, construction_nm: f64) -
     match profile {
         PhaseProfile::Grating { lines_per_mm: [along_x, along_y] } => {
             let lines_per_mm = along_x.hypot(*along_y);
-            let _ = writeln!(text, "  GRT\n  GRO {order}\n  GRS {}", written(reciprocal(lines_per_mm)));
-            if lines_per_mm > 0.0 {
-                let (x, y) = (along_x / lines_per_mm, along_y / lines_per_mm);
-                let _ = writeln!(text, "  GRX {}\n  GRY {}", written(x), written(y));
+            if !(1.0 / lines_per_mm).is_finite() {
+                return Err(cannot(FORMAT, i, "is a grating without grooves"));
             }
+            let _ = writeln!(text, "  GRT\n  GRO {order}\n  GRS {}", written(reciprocal(lines_per_mm)));
+            let (x, y) = (along_x / lines_per_mm, along_y / lines_per_mm);
+            let _ = writeln!(text, "  GRX {}\n  GRY {}", written(x), written(y));
         }
         PhaseProfile::Rings { radius_mm, coefficients_rad } => {
             // The program's coefficients are paths at the wavelength of construction, over powers of r.

@@ -127,6 +127,7 @@ impl LensFile {
     /// Returns the text with these lines of glass, one for the object and one a surface.
     fn zmx_text(&self, glasses: &[String], catalogue: Option<&str>) -> Result<String, OpticsError> {
         let lens = &self.lens;
+        self.check_places("a .zmx file")?;
         let mut text = format!("MODE SEQ\r\nNAME {}\r\nNOTE 0 {}\r\n", one_line(lens.name()), one_line(lens.source()));
         for comment in &self.comments {
             let _ = write!(text, "NOTE 0 {}\r\n", one_line(comment));

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::PupilPlane;
-use crate::{MonoLens, ObjectPoint, Surface, Vignetting};
+use crate::{MonoLens, ObjectPoint, Placement, Surface, Vignetting};
 
 /// How far from where a ray was aimed at on the first surface it may meet it, over the rim's radius.
 const SAME_PLACE: f64 = 1e-9;
@@ -17,36 +17,39 @@ const STEP: f64 = 1e-6;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Front {
     surface: Surface,
+    /// Where it stands.
+    placement: Placement,
     point: ObjectPoint,
     plane: PupilPlane,
 }
 
 impl Front {
-    /// Returns the front of a lens; `None` where the first surface does not stand in its place on the axis.
-    pub(super) fn of(lens: &MonoLens, point: &ObjectPoint, plane: PupilPlane) -> Option<Self> {
-        let is_in_place = lens.placements().is_none_or(|placements| placements[0].is_rest());
-        is_in_place.then(|| Self { surface: lens.front().clone(), point: *point, plane })
+    /// Returns the front of a lens.
+    pub(super) fn of(lens: &MonoLens, point: &ObjectPoint, plane: PupilPlane) -> Self {
+        let placement = lens.placements().map_or(Placement::centered(0.0), |placements| placements[0]);
+        Self { surface: lens.front().clone(), placement, point: *point, plane }
     }
 
     /// Returns the point of the first surface over a place, mm; `None` beyond its rim or its equator.
     fn on_front_mm(&self, place_mm: DVec2) -> Option<DVec3> {
         let z_mm = self.surface.sag_at_mm(place_mm.x, place_mm.y);
-        (place_mm.length() <= self.surface.semi_aperture_mm && z_mm.is_finite()).then(|| place_mm.extend(z_mm))
+        let is_on_front = place_mm.length() <= self.surface.semi_aperture_mm && z_mm.is_finite();
+        is_on_front.then(|| self.placement.lens_from_surface(place_mm.extend(z_mm)))
     }
 
     /// Returns where the ray through a place crosses the pupil's plane, mm.
     pub(super) fn target_mm(&self, place_mm: DVec2) -> DVec2 {
-        let on_front_mm = self.on_front_mm(place_mm).unwrap_or(place_mm.extend(0.0));
+        let on_front_mm = self.on_front_mm(place_mm).unwrap_or(self.placement.lens_from_surface(place_mm.extend(0.0)));
         self.plane.meets_mm(on_front_mm, self.point.direction_to(on_front_mm))
     }
 
-    /// The light's cross-section over the area of the places, where it meets the front from before it; below 0 where it would meet
-    /// it from behind.
-    fn facing(&self, on_front_mm: DVec3) -> f64 {
+    /// The light's cross-section over the area of the places, at a place and its point, where it meets the front from before it; below 0
+    /// where it would meet it from behind.
+    fn facing(&self, place_mm: DVec2, on_front_mm: DVec3) -> f64 {
         let step_mm = STEP * self.surface.semi_aperture_mm;
-        let sag_mm = |x: f64, y: f64| self.surface.sag_at_mm(on_front_mm.x + x * step_mm, on_front_mm.y + y * step_mm);
+        let sag_mm = |x: f64, y: f64| self.surface.sag_at_mm(place_mm.x + x * step_mm, place_mm.y + y * step_mm);
         let (rise_x, rise_y) = (sag_mm(1.0, 0.0) - sag_mm(-1.0, 0.0), sag_mm(0.0, 1.0) - sag_mm(0.0, -1.0));
-        let direction = self.point.direction_to(on_front_mm);
+        let direction = self.placement.direction_to_own(self.point.direction_to(on_front_mm));
         direction.z - 0.5 * (direction.x * rise_x + direction.y * rise_y) / step_mm
     }
 
@@ -54,7 +57,7 @@ impl Front {
     pub(super) fn stretch(&self, place_mm: DVec2) -> f64 {
         let Some(on_front_mm) = self.on_front_mm(place_mm) else { return 0.0 };
         let direction = self.point.direction_to(on_front_mm);
-        let across = self.facing(on_front_mm) / direction.dot(self.plane.normal()).abs();
+        let across = self.facing(place_mm, on_front_mm) / direction.dot(self.plane.normal()).abs();
         match self.point {
             ObjectPoint::Infinite(_) => across,
             // As seen from the point, areas grow with the square of their distance.
@@ -79,8 +82,9 @@ impl Front {
                 let beyond_mm = radius_mm - place.length();
                 return if beyond_mm < 0.0 { beyond_mm } else { f64::NEG_INFINITY };
             };
-            let facing_mm = self.facing(on_front_mm) * radius_mm;
-            let is_met = met.point_mm(i).truncate().distance(*place) <= SAME_PLACE * radius_mm;
+            let facing_mm = self.facing(*place, on_front_mm) * radius_mm;
+            let is_met =
+                self.placement.surface_from_lens(met.point_mm(i)).truncate().distance(*place) <= SAME_PLACE * radius_mm;
             match facing_mm > 0.0 {
                 true if is_met => clearances[i].min(facing_mm),
                 true => f64::NEG_INFINITY,
@@ -95,6 +99,6 @@ impl Front {
         let mut rays = self.plane.rays(lens, &self.point, targets_mm);
         lens.trace_surfaces(0..1, &mut rays, Vignetting::Off);
         let met = (0..rays.len()).filter(|&i| rays.fate[i].is_in_flight());
-        met.map(|i| rays.point_mm(i).truncate()).collect()
+        met.map(|i| self.placement.surface_from_lens(rays.point_mm(i)).truncate()).collect()
     }
 }

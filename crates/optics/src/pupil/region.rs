@@ -146,9 +146,9 @@ impl Search<'_> {
         part
     }
 
-    /// Returns the region about places of it by lines: over the front of the lens, where that stands in its place.
+    /// Returns the region about places of it by lines over the front of the lens.
     fn strips(&self, lit: &[(DVec2, f64)], n_lines: usize) -> Option<Strips> {
-        let Some(front) = Front::of(self.lens, self.point, self.plane) else { return Strips::find(self, lit, n_lines) };
+        let front = Front::of(self.lens, self.point, self.plane);
         let targets: Vec<DVec2> = lit.iter().map(|(target, _)| *target).collect();
         let places = front.places_mm(self.lens, &targets);
         let search = Search { front: Some(&front), ..*self };

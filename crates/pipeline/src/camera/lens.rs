@@ -108,6 +108,14 @@ impl StopSpec {
         self.apply_at(lens, REFERENCE_WAVELENGTH_NM)
     }
 
+    /// Returns a sentence where [`apply_at`](Self::apply_at) takes another opening of the lens than the number says.
+    pub fn note_at(self, lens: &Lens, wavelength_nm: f64) -> Option<String> {
+        match self {
+            Self::FNumber(n) => lens.note_on_f_number(n, wavelength_nm),
+            Self::AsGiven | Self::DiameterMm(_) => None,
+        }
+    }
+
     /// Returns the lens with its stop set; an f-number is that at this wavelength, nm.
     ///
     /// # Errors

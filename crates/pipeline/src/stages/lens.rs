@@ -21,8 +21,9 @@ pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError
         Some(lens) => LensFile::from(lens.clone()),
         None => inputs.choice.open(&inputs.reading)?,
     };
+    let note_on_stop = inputs.stop.note_at(&file.lens, REFERENCE_WAVELENGTH_NM);
     let lens = inputs.movements.apply(inputs.stop.apply(file.lens)?)?;
     let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
-    let notes = file.notes.into_iter().chain(reference.note_on_limit()).collect();
+    let notes = file.notes.into_iter().chain(note_on_stop).chain(reference.note_on_limit(f64::INFINITY)).collect();
     Ok(ResolvedLens { lens, reference, notes })
 }

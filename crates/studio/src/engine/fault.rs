@@ -111,7 +111,7 @@ fn field_of_sensor(error: &SensorError) -> Field {
 
 fn field_of_optics(error: &OpticsError) -> Field {
     match error {
-        OpticsError::StopTooWide { .. } | OpticsError::RimsTooNarrow { .. } => Field::Stop,
+        OpticsError::StopTooWide { .. } | OpticsError::FNumberTooSmall { .. } => Field::Stop,
         OpticsError::NoFocus { .. } | OpticsError::FilmInLens { .. } => Field::Focus,
         OpticsError::WavelengthOutsideGlass { .. } | OpticsError::Wavelength { .. } => Field::Simulation,
         _ => Field::Lens,
@@ -136,7 +136,7 @@ fn remedy(error: &PipelineError, camera: &Camera) -> Option<(String, Box<Camera>
                 }),
             }
         }
-        PipelineError::Optics(OpticsError::RimsTooNarrow { smallest, .. }) => {
+        PipelineError::Optics(OpticsError::FNumberTooSmall { smallest, .. }) => {
             let widest = rounded_up(*smallest);
             with(format!("open it to f/{widest}"), &|camera| camera.stop = StopSpec::FNumber(widest))
         }
