@@ -22,7 +22,7 @@ const PRECISIONS: usize = 2;
 /// Float arithmetic in a piece of machine code.
 #[derive(Clone, Copy, Debug, Default)]
 struct Arithmetic {
-    /// Instructions on whole 256-bit vectors.
+    /// Instructions on whole vectors of 256 or 512 bits.
     in_vectors: usize,
     /// Instructions on single numbers, or on narrower vectors.
     by_pieces: usize,
@@ -36,12 +36,8 @@ impl Arithmetic {
 
     fn count(&mut self, instruction: &Instruction) {
         match instruction.mnemonic() {
-            M::Vaddpd | M::Vsubpd | M::Vmulpd | M::Vdivpd | M::Vsqrtpd if instruction.op0_register().is_ymm() => {
-                self.in_vectors += 1;
-            }
-            M::Vaddps | M::Vsubps | M::Vmulps | M::Vdivps | M::Vsqrtps if instruction.op0_register().is_ymm() => {
-                self.in_vectors += 1;
-            }
+            M::Vaddpd | M::Vsubpd | M::Vmulpd | M::Vdivpd | M::Vsqrtpd if is_wide(instruction) => self.in_vectors += 1,
+            M::Vaddps | M::Vsubps | M::Vmulps | M::Vdivps | M::Vsqrtps if is_wide(instruction) => self.in_vectors += 1,
             M::Vaddpd | M::Vsubpd | M::Vmulpd | M::Vdivpd | M::Vsqrtpd => self.by_pieces += 1,
             M::Vaddps | M::Vsubps | M::Vmulps | M::Vdivps | M::Vsqrtps => self.by_pieces += 1,
             M::Vaddsd | M::Vsubsd | M::Vmulsd | M::Vdivsd | M::Vsqrtsd => self.by_pieces += 1,
@@ -51,17 +47,32 @@ impl Arithmetic {
     }
 }
 
-/// Counts the arithmetic of each function of this program whose path ends so.
-fn arithmetic_of(path_end: &str) -> Vec<Arithmetic> {
+fn is_wide(instruction: &Instruction) -> bool {
+    let register = instruction.op0_register();
+    register.is_ymm() || register.is_zmm()
+}
+
+/// Whether an instruction rounds once where the others round twice, which would give other bits.
+fn is_fused(instruction: &Instruction) -> bool {
+    format!("{:?}", instruction.mnemonic()).starts_with("Vfm")
+        || format!("{:?}", instruction.mnemonic()).starts_with("Vfnm")
+}
+
+/// Counts the arithmetic of each function of this program whose path has this part, up to the features that it is compiled for.
+fn arithmetic_of(path: &str) -> Vec<Arithmetic> {
     let program =
         std::fs::read(std::env::current_exe().expect("the program has a path")).expect("the program can be read");
     let file = object::File::parse(&*program).expect("the program is ELF");
-    let is_it = |name: &str| format!("{:#}", rustc_demangle::demangle(name)).ends_with(path_end);
+    let is_it = |name: &str| {
+        let name = format!("{:#}", rustc_demangle::demangle(name));
+        name.contains(path) && name.ends_with("_version")
+    };
     let count = |symbol: object::Symbol<'_, '_>| {
         let section = file.section_by_index(symbol.section_index()?).ok()?;
         let code = section.data_range(symbol.address(), symbol.size()).ok()??;
         let mut found = Arithmetic::default();
         for instruction in &mut Decoder::with_ip(64, code, symbol.address(), DecoderOptions::NONE) {
+            assert!(!is_fused(&instruction), "{path}: {:?}", instruction.mnemonic());
             found.count(&instruction);
         }
         Some(found)
@@ -77,18 +88,23 @@ fn arithmetic_of(path_end: &str) -> Vec<Arithmetic> {
 
 #[test]
 fn every_kind_of_surface_is_vector_code() {
-    let found = arithmetic_of("kernel::pass_blocks::pass_blocks_avx2_version");
-    assert_eq!(found.len(), PRECISIONS * (KINDS_IN_VECTORS + KINDS_RAY_BY_RAY), "{found:#?}");
-    let n_vector = found.iter().filter(|arithmetic| arithmetic.is_vector_code()).count();
-    assert_eq!(n_vector, PRECISIONS * KINDS_IN_VECTORS, "{found:#?}");
+    for copy in ["kernel::pass_blocks::pass_blocks_avx2_", "kernel::pass_blocks::pass_blocks_avx512"] {
+        let found = arithmetic_of(copy);
+        assert_eq!(found.len(), PRECISIONS * (KINDS_IN_VECTORS + KINDS_RAY_BY_RAY), "{copy}: {found:#?}");
+        let n_vector = found.iter().filter(|arithmetic| arithmetic.is_vector_code()).count();
+        assert_eq!(n_vector, PRECISIONS * KINDS_IN_VECTORS, "{copy}: {found:#?}");
+    }
 }
 
 #[test]
 fn way_to_the_lens_and_to_the_film_is_vector_code() {
-    let film = arithmetic_of("kernel::to_plane::to_plane_avx2_version");
-    assert!(film.len() == PRECISIONS && film.iter().all(|arithmetic| arithmetic.is_vector_code()), "{film:?}");
-    let lens = arithmetic_of("kernel::approach::approach_avx2_version");
-    assert!(lens.len() == PRECISIONS && lens.iter().all(|arithmetic| arithmetic.is_vector_code()), "{lens:?}");
+    for copy in ["avx2_", "avx512"] {
+        for way in ["kernel::to_plane::to_plane", "kernel::approach::approach"] {
+            let found = arithmetic_of(&format!("{way}_{copy}"));
+            let are_vectors = found.iter().all(|arithmetic| arithmetic.is_vector_code());
+            assert!(found.len() == PRECISIONS && are_vectors, "{way} {copy}: {found:?}");
+        }
+    }
 }
 
 /// Each number waits for the one before, so that no compiler makes vectors of them.
@@ -113,9 +129,9 @@ fn side_by_side(numbers: &mut [f64; 64]) {
 fn guard_tells_vectors_from_single_numbers() {
     one_after_another(black_box(&mut [1.0, 2.0, 3.0]));
     side_by_side(black_box(&mut [1.0; 64]));
-    let scalar = arithmetic_of("one_after_another_avx2_version");
+    let scalar = arithmetic_of("one_after_another_avx2_");
     assert!(scalar.len() == 1 && !scalar[0].is_vector_code(), "{scalar:?}");
-    let vector = arithmetic_of("side_by_side_avx2_version");
+    let vector = arithmetic_of("side_by_side_avx2_");
     assert!(vector.len() == 1 && vector[0].is_vector_code(), "{vector:?}");
     assert!(arithmetic_of("no_such_function").is_empty());
 }

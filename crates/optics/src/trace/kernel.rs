@@ -1,7 +1,7 @@
 //! The kernel: a block of rays through one surface, as vectors.
 //!
-//! Plain Rust over arrays of lanes, compiled once for the base instruction set and once for AVX2, chosen at run time.
-//! Neither uses fused multiply-add, and square roots and divisions are correctly rounded, so every machine gives the
+//! Plain Rust over arrays of lanes, compiled for the base instruction set, for AVX2 and for AVX-512, chosen at run time.
+//! None uses fused multiply-add, and square roots and divisions are correctly rounded, so every machine gives the
 //! same bits. Lanes whose ray has ended go on computing numbers that nobody reads.
 
 use multiversion::multiversion;
@@ -27,7 +27,7 @@ pub(super) trait Optic<T: Real> {
 }
 
 /// Takes blocks through a surface, and returns whether a ray ended there.
-#[multiversion(targets("x86_64+avx2"), dispatcher = "direct")]
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2"), dispatcher = "direct")]
 pub(super) fn pass_blocks<T: Real, O: Optic<T>>(optic: &O, shift: T, from: &[Block<T>], to: &mut [Block<T>]) -> bool {
     let mut ended = T::NO;
     for (from, to) in from.iter().zip(to) {
@@ -127,7 +127,7 @@ impl<T: Real> Optic<T> for TwoCurvatures<T> {
 }
 
 /// Moves each ray to where it passes nearest to the vertex, so that far starts cost no digits at the surface.
-#[multiversion(targets("x86_64+avx2"), dispatcher = "direct")]
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2"), dispatcher = "direct")]
 pub(super) fn approach<T: Real>(index: T, blocks: &mut [Block<T>]) {
     for block in blocks {
         approach_lanes(index, block);
@@ -146,7 +146,7 @@ pub(super) fn approach_lanes<T: Real, const N: usize>(index: T, block: &mut Bloc
 }
 
 /// Moves each ray along its line to the plane at `z` from the vertex.
-#[multiversion(targets("x86_64+avx2"), dispatcher = "direct")]
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2"), dispatcher = "direct")]
 pub(super) fn to_plane<T: Real>(z: T, index: T, blocks: &mut [Block<T>]) {
     for block in blocks {
         for i in 0..block.x.len() {
@@ -160,7 +160,7 @@ pub(super) fn to_plane<T: Real>(z: T, index: T, blocks: &mut [Block<T>]) {
 }
 
 /// Keeps for each ray the least so far of the rim's radius less the distance from the axis; −∞ for one that ended.
-#[multiversion(targets("x86_64+avx2"), dispatcher = "direct")]
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2"), dispatcher = "direct")]
 pub(super) fn keep_clearance<T: Real>(rim: T, blocks: &[Block<T>], least: &mut [T]) {
     for (block, least) in blocks.iter().zip(least.chunks_mut(LANES)) {
         for (i, least) in least.iter_mut().enumerate() {

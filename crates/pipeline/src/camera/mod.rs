@@ -149,7 +149,7 @@ pub enum StopSpec {
     /// As the lens file says.
     #[default]
     AsGiven,
-    /// At this f-number, for an object at infinity and the reference wavelength.
+    /// At this f-number, for an object at infinity and the reference wavelength; up to 5 % below that of the lens it is fully open.
     FNumber(f64),
     /// At this diameter of the stop, mm.
     DiameterMm(f64),
@@ -160,7 +160,8 @@ pub enum StopSpec {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub enum FocusSpec {
-    /// In focus for an object at this distance from the first vertex, mm.
+    /// In focus for an object at this distance from the first vertex, mm, by first-order optics at the reference wavelength; `lens
+    /// analyze` tells where the least spot is.
     DistanceMm(f64),
     /// At this distance from the last vertex, mm.
     FilmMm(f64),
