@@ -139,7 +139,7 @@ impl LensFile {
         }
         let film_z_mm = lens.film_z_mm(self.film_or_focus_mm());
         let places = lens.placements().into_iter().map(|place| place.vertex_mm.abs().max_element());
-        match places.chain([film_z_mm.abs()]).position(|mm| !(mm < 1e9)) {
+        match places.chain([film_z_mm.abs()]).position(|mm| mm.is_nan() || mm >= 1e9) {
             Some(surface) => Err(cannot(format, surface, "stands 1e9 mm or more from the first")),
             None => Ok(()),
         }

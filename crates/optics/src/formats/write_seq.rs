@@ -42,54 +42,55 @@ impl LensFile {
     pub fn to_seq(&self) -> Result<String, OpticsError> {
         let lens = &self.lens;
         self.check_places(FORMAT)?;
-        let mut text = String::new();
-        for line in [lens.source()].into_iter().chain(self.comments.iter().map(String::as_str)) {
-            let _ = writeln!(text, "! {}", one_line(line));
-        }
-        let _ = writeln!(text, "RDM;LEN\nTIT {}\nDIM M", quoted(lens.name()));
-        self.write_seq_wavelengths(&mut text);
-        let entrance_pupil_mm = lens
-            .at(self.reference_wavelength_nm.unwrap_or(D_LINE_NM))?
-            .first_order_of_stop()
-            .entrance_pupil_diameter_mm;
-        if entrance_pupil_mm.is_finite() {
-            let _ = writeln!(text, "EPD {}", written(entrance_pupil_mm));
-        }
-        self.write_seq_fields(&mut text)?;
+        let mut text = self.seq_header()?;
         let glasses = self.seq_glasses(&mut text)?;
         let (tilts, thicknesses_mm) = self.seq_tilts();
         let object = self.object_distance_mm.map_or(FAR.to_owned(), written);
         let _ = writeln!(text, "SO 0 {object} {}", glasses[0]);
-        for (i, interface) in lens.interfaces().iter().enumerate() {
-            let surface = &interface.surface;
-            let radius = written(reciprocal(surface.curvature_per_mm));
-            let _ = writeln!(text, "S {radius} {} {}", written(thicknesses_mm[i]), glasses[i + 1]);
-            if !has_reciprocal(surface.curvature_per_mm) {
-                let _ = writeln!(text, "  CUY {}", written(surface.curvature_per_mm));
-            }
+        for i in 0..lens.interfaces().len() {
+            let behind = format!("{} {}", written(thicknesses_mm[i]), glasses[i + 1]);
+            write_curvature(&mut text, "S", lens.interfaces()[i].surface.curvature_per_mm, &behind);
             if i == lens.stop() {
                 text.push_str("  STO\n");
             }
             if let Some(comment) = self.surface_comments.get(i).filter(|comment| !comment.is_empty()) {
                 let _ = writeln!(text, "  SLB S{} {}", i + 1, quoted(comment));
             }
-            write_shape(&mut text, i, surface)?;
-            write_phase(&mut text, lens, i, self.reference_wavelength_nm.unwrap_or(D_LINE_NM))?;
+            write_shape(&mut text, i, &lens.interfaces()[i].surface)?;
+            write_phase(&mut text, lens, i, self.main_wavelength_nm())?;
             write_apertures(&mut text, lens, i)?;
             write_tilt(&mut text, tilts[i]);
         }
         let image = lens.image_surface();
         let is_backward = lens.is_backward_before(lens.interfaces().len());
         let curvature = if is_backward { -image.curvature_per_mm } else { image.curvature_per_mm };
-        let _ = writeln!(text, "SI {} 0", written(reciprocal(curvature)));
-        if !has_reciprocal(curvature) {
-            let _ = writeln!(text, "  CUY {}", written(curvature));
-        }
+        write_curvature(&mut text, "SI", curvature, "0");
         if image.conic != 0.0 {
             let _ = writeln!(text, "  CON\n  K {}", written(image.conic));
         }
         write_tilt(&mut text, tilts[lens.interfaces().len()]);
         text.push_str("GO\n");
+        Ok(text)
+    }
+
+    fn main_wavelength_nm(&self) -> f64 {
+        self.reference_wavelength_nm.unwrap_or(D_LINE_NM)
+    }
+
+    /// Returns what stands before the surfaces, but for the glasses.
+    fn seq_header(&self) -> Result<String, OpticsError> {
+        let lens = &self.lens;
+        let mut text = String::new();
+        for line in [lens.source()].into_iter().chain(self.comments.iter().map(String::as_str)) {
+            let _ = writeln!(text, "! {}", one_line(line));
+        }
+        let _ = writeln!(text, "RDM;LEN\nTIT {}\nDIM M", quoted(lens.name()));
+        self.write_seq_wavelengths(&mut text);
+        let first = lens.at(self.main_wavelength_nm())?.first_order_of_stop();
+        if first.entrance_pupil_diameter_mm.is_finite() {
+            let _ = writeln!(text, "EPD {}", written(first.entrance_pupil_diameter_mm));
+        }
+        self.write_seq_fields(&mut text)?;
         Ok(text)
     }
 
@@ -209,6 +210,14 @@ fn turn_to(before: &mut Placement, place: Placement, straight_mm: f64) -> Option
     let mut decenter_mm = way.vertex_mm.to_array();
     decenter_mm[2] -= straight_mm;
     Some(SeqTilt { decenter_mm, tilt_deg: way.tilt_deg(), is_returned: false })
+}
+
+/// Writes a surface with its radius, and its curvature where no radius is exactly that.
+fn write_curvature(text: &mut String, keyword: &str, curvature_per_mm: f64, behind: &str) {
+    let _ = writeln!(text, "{keyword} {} {behind}", written(reciprocal(curvature_per_mm)));
+    if !has_reciprocal(curvature_per_mm) {
+        let _ = writeln!(text, "  CUY {}", written(curvature_per_mm));
+    }
 }
 
 fn write_tilt(text: &mut String, tilt: Option<SeqTilt>) {

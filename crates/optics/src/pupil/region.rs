@@ -162,7 +162,7 @@ impl Search<'_> {
     fn grazes(&self, part: &PupilBoundary) -> bool {
         let beyond = |edge_mm: DVec2| edge_mm + JUST_BEYOND * (edge_mm - part.center_mm);
         let places: Vec<DVec2> = part.edge_mm().into_iter().map(beyond).collect();
-        self.clearances(&places).iter().any(|clearance| *clearance == f64::NEG_INFINITY)
+        self.clearances(&places).contains(&f64::NEG_INFINITY)
     }
 
     /// Returns places of the pupil beyond the edge of a part, as the horns of a crescent beyond its hollow side.

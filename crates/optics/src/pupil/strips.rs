@@ -35,7 +35,7 @@ const EDGE_MM: f64 = 1e-9;
 pub(super) struct Strips {
     lines: Vec<Line>,
     /// What the lines lie on, where that is not the plane.
-    front: Option<Front>,
+    front: Option<Box<Front>>,
 }
 
 /// A line across a region: the strip of the region that it stands for.
@@ -80,7 +80,7 @@ impl Strips {
                 spans_mm,
             }));
         }
-        let strips = Self { lines: strips, front: search.front.cloned() };
+        let strips = Self { lines: strips, front: search.front.cloned().map(Box::new) };
         (strips.area_mm2() > 0.0).then_some(strips)
     }
 
