@@ -4,7 +4,8 @@ use crate::{Lens, OpticsError, glass::D_LINE_NM, lens::positive};
 
 /// The wavelength at which a message states an f-number, nm.
 const MESSAGE_WAVELENGTH_NM: f64 = D_LINE_NM;
-/// By how much of it the widest f-number of a lens may differ from the marked one: ISO 517 allows 5 %.
+/// By how much of it the widest f-number of a lens may differ from the marked one: lenses are marked with round numbers, and a twentieth is what we
+/// take to be rounding.
 const MARKED: f64 = 0.05;
 /// By how much of it an f-number may differ from another for both to be the same: numbers are printed with four digits.
 const SAME: f64 = 1e-3;
@@ -31,7 +32,7 @@ impl Lens {
     }
 
     /// Returns the lens stopped down to this f-number (for a far object) at this wavelength; fully open where that is no more than
-    /// 5 % above it, since lenses are marked with round numbers (ISO 517; [`note_on_f_number`](Self::note_on_f_number)).
+    /// 5 % above it, since lenses are marked with round numbers ([`note_on_f_number`](Self::note_on_f_number)).
     ///
     /// # Errors
     /// When the f-number is not positive or further below that of the full stop, or of what the rims let through.

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use counted::{axial_spot_rms_mm, beam_radius_mm, cross_section_mm2};
 use dioptric_optics::{
-    Glass, Interface, Lens, LensFile, MissingGlass, MonoLens, ObjectPoint, PupilBoundary, PupilRegion, ReadOptions,
-    Surface,
+    CoordinateBreak, Glass, Interface, Lens, LensFile, MissingGlass, MonoLens, ObjectPoint, PupilBoundary, PupilRegion,
+    ReadOptions, Surface,
     analysis::{Autofocus, PupilLight, PupilRule, field_limit_deg, projected_solid_angle},
     glam::{DVec2, DVec3},
 };
@@ -224,4 +224,36 @@ fn working_f_number_of_far_objects_is_the_f_number() {
         assert!((lens.working_f_number(f64::INFINITY) / lens.first_order().f_number - 1.0).abs() < 1e-9);
         assert!((near / lens.first_order().f_number - 1.0).abs() < 1e-4, "{near}");
     }
+}
+
+/// Where the last light grazes the front of a lens, what a ray meets is known to rounding over its cosine: places there count as passed by, where
+/// a search through them found light and darkness by turns, and never ended.
+#[test]
+fn the_last_light_of_a_tilted_lens_is_found() {
+    let front = Interface {
+        surface: Surface::sphere(50.0, 6.0),
+        medium_after: Glass::Constant { index: 1.5 },
+        thickness_after_mm: 3.0,
+    };
+    let back = Interface { surface: Surface::sphere(-50.0, 4.0), medium_after: Glass::Air, thickness_after_mm: 0.0 };
+    let lens = Lens::new("askew", "test", vec![front, back], 1).unwrap().with_f_number(8.0, 550.0).unwrap();
+    let pivot_mm = lens.at(550.0).unwrap().projection_center_z_mm();
+    let turn = CoordinateBreak {
+        surfaces: (0, 1),
+        pivot_mm,
+        decenter_mm: [0.0, 0.5, 0.0],
+        tilt_deg: [-5.0, 1.0, 0.0],
+        tilt_first: false,
+    };
+    let mono = lens.with_moves(vec![turn]).unwrap().at(550.0).unwrap();
+    let seen_mm2 = |field_deg: f64| {
+        let point = ObjectPoint::far(field_deg.to_radians(), DVec2::Y);
+        PupilRegion::find(&mono, &point, 48).map_or(0.0, |region| region.area_mm2())
+    };
+    let last_deg = field_limit_deg(&mono, 0.01).unwrap();
+    assert!((80.0..92.0).contains(&last_deg), "{last_deg}");
+    let steps: Vec<f64> = (0..200).map(|i| seen_mm2(last_deg - 0.1 + 0.001 * f64::from(i))).collect();
+    assert!(steps.windows(2).all(|pair| pair[1] <= pair[0] + 1e-6), "{steps:?}");
+    assert!(steps[0] > 0.0 && steps[199] < 1e-2 * steps[0], "{} {}", steps[0], steps[199]);
+    assert!(seen_mm2(86.582_519_531_25) < 1e-6);
 }

@@ -6,7 +6,10 @@ use super::PupilPlane;
 use crate::{MonoLens, ObjectPoint, Placement, Surface, Vignetting};
 
 /// How far from where a ray was aimed at on the first surface it may meet it, over the rim's radius.
-const SAME_PLACE: f64 = 1e-9;
+const SAME_PLACE: f64 = 1e-8;
+/// The cross-section over the area of a place below which light counts as passing the front by: where a ray meets it is known to rounding
+/// over this, and where it leaves a sphere again lies twice the radius times this from there. A hundred-millionth of the light of the axis and less comes so.
+const LEAST_FACING: f64 = 1e-5;
 /// The step of differences over the first surface, over the rim's radius.
 const STEP: f64 = 1e-6;
 
@@ -82,7 +85,7 @@ impl Front {
                 let beyond_mm = radius_mm - place.length();
                 return if beyond_mm < 0.0 { beyond_mm } else { f64::NEG_INFINITY };
             };
-            let facing_mm = self.facing(*place, on_front_mm) * radius_mm;
+            let facing_mm = (self.facing(*place, on_front_mm) - LEAST_FACING) * radius_mm;
             let is_met =
                 self.placement.surface_from_lens(met.point_mm(i)).truncate().distance(*place) <= SAME_PLACE * radius_mm;
             match facing_mm > 0.0 {
