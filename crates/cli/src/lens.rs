@@ -50,7 +50,6 @@ pub(crate) fn tell_taken(taken: &[String], common: &Common) {
 
 fn convert(input: &str, output: &Path, reading: &LensReadOptions, common: &Common) -> anyhow::Result<()> {
     let converted = convert_lens(input, output, reading)?;
-    tell(&converted.notes, common);
     if let Some(glasses) = converted.glasses {
         let beside = output.with_extension("agf");
         // A catalogue that is not this lens's own is left alone.
@@ -64,6 +63,7 @@ fn convert(input: &str, output: &Path, reading: &LensReadOptions, common: &Commo
         remark(common.quiet, &format!("wrote the lens's own glasses to {}", beside.display()));
     }
     write(output, &converted.text)?;
+    tell(&converted.notes, common);
     remark(common.quiet, &format!("wrote {}", output.display()));
     Ok(())
 }

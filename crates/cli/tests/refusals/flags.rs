@@ -83,7 +83,7 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("lens info note.txt", "'only' is not a number; expected radius, axpos, N and"),
     ("lens info dgauss-50mm --wavelengths-nm 5", "the glass of n_d 1.67, V_d 47.1 is known from 300 to"),
     ("lens info dgauss-50mm --wavelengths-nm 0", "a wavelength must be a positive number, found 0 nm"),
-    ("lens info dgauss-50mm --f-number 0.1", "the stop of dgauss-50mm opens to at most 17.1 mm"),
+    ("lens info dgauss-50mm --f-number 0.1", "dgauss-50mm opens to f/2.028 at most"),
     ("lens info dgauss-50mm --distance-mm -5", "the object: distance_mm is -5, expected a number above"),
     ("lens draw dgauss-50mm -o x.gif", "cannot write x.gif: '.gif' is no format of drawings"),
     ("lens draw dgauss-50mm --fields-deg 95 -o x.svg", "the drawing: fields_deg is 95, expected angles below"),
