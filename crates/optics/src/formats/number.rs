@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn sums_are_those_of_the_decimals() {
-        assert_ne!(12.3 + 3.02, 15.32);
+        assert_ne!(0.1 + 0.2, 0.3);
         assert_eq!(decimal_sum(12.3, 3.02), 15.32);
         assert_eq!(decimal_sum(0.1, 0.2), 0.3);
         assert_eq!(decimal_sum(-0.3, 0.1), -0.2);
