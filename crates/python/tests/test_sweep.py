@@ -81,7 +81,7 @@ def test_store_reads_back(made: tuple[Sweep, Path]) -> None:
     assert len(store) == 9 and len(store.done) == 6 and [item.number for item in store[1:3]] == [1, 2]
     assert store.index[3]["values"] == {"exposure.Manual.time_s": 0.01, "stop.FNumber": 4}
     refused, item = store[2], store[3]
-    assert refused.status == "refused" and "the stop of" in (refused.reason or "") and refused.metrics == {}
+    assert refused.status == "refused" and "opens to f/" in (refused.reason or "") and refused.metrics == {}
     shot = item.camera().render()
     assert np.array_equal(item.array("picture"), shot.rgb) and item.array("picture").dtype == np.uint8
     assert np.array_equal(item.array("raw"), shot.raw) and item.array("raw").dtype == np.uint16
@@ -123,7 +123,7 @@ def test_store_as_tables(made: tuple[Sweep, Path]) -> None:
     table = Store(folder).to_pandas()
     assert isinstance(table, pandas.DataFrame) and len(table) == 9
     assert table.index.dtype == np.int64 and table["stop.FNumber"].dtype == table["mean_e.G"].dtype == np.float64
-    assert pandas.isna(table.loc[3, "reason"]) and "the stop of" in table.loc[2, "reason"]
+    assert pandas.isna(table.loc[3, "reason"]) and "opens to f/" in table.loc[2, "reason"]
     assert table.loc[3, "stop.FNumber"] == 4 and table.loc[2, "status"] == "refused"
 
 

@@ -72,7 +72,7 @@ def test_samples_on_the_fly(sweep: Sweep) -> None:
     assert np.array_equal(raw, Store(sweep.plan.store)[4].array("raw"))
     # A copy in another process draws the plan up again.
     assert np.array_equal(np.asarray(pickle.loads(pickle.dumps(data))[4]["raw"]), raw)
-    with pytest.raises(ValueError, match="the stop of"):
+    with pytest.raises(ValueError, match="opens to f/"):
         data[2]
     with pytest.raises(IndexError, match="sample 9"):
         data[9]

@@ -134,7 +134,7 @@ fn stores_depend_on_the_plan_alone() {
     let refused = &rows[2];
     assert_eq!((refused.status, refused.values[1].as_f64()), (Status::Refused, Some(0.1)));
     let reason = refused.reason.as_ref().unwrap();
-    assert!(reason.contains("the stop of") && !reason.contains('\n'), "{reason}");
+    assert!(reason.contains("opens to f/2.028") && !reason.contains('\n'), "{reason}");
     let names: Vec<PathBuf> = files(&whole.item(refused.id)).into_keys().collect();
     assert_eq!(names, ["camera.ron", "refused.json"].map(PathBuf::from));
 
