@@ -124,6 +124,8 @@ impl<'a> Search<'a> {
     }
 
     fn clearances(&self, targets_mm: &[DVec2]) -> Vec<f64> {
+        #[cfg(test)]
+        tests::N_RAYS.with(|n_rays| n_rays.set(n_rays.get() + targets_mm.len()));
         match self.front {
             None => self.lens.clearances_mm(self.plane.rays(self.lens, self.point, targets_mm)),
             Some(front) => front.clearances(self.lens, targets_mm),
@@ -394,7 +396,12 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::{Lens, rays_towards};
+    use crate::{CoordinateBreak, Glass, Interface, Lens, Surface, rays_towards};
+
+    thread_local! {
+        /// The rays that searches of this thread looked at.
+        pub(super) static N_RAYS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+    }
 
     #[track_caller]
     fn pupil(lens: &MonoLens, field_deg: f64, dioptres: f64) -> PupilBoundary {
@@ -459,5 +466,52 @@ mod tests {
         let expected = PI / 4.0 * first.entrance_pupil_diameter_mm.powi(2);
         // Spherical aberration of the pupil falls with the square of its size.
         assert!((pupil.area_mm2() / expected - 1.0).abs() < 1e-3);
+    }
+
+    /// A singlet at f/8 that is tilted and raised, whose last light grazes its front.
+    fn askew() -> MonoLens {
+        let front = Interface {
+            surface: Surface::sphere(50.0, 6.0),
+            medium_after: Glass::Constant { index: 1.5 },
+            thickness_after_mm: 3.0,
+        };
+        let back =
+            Interface { surface: Surface::sphere(-50.0, 4.0), medium_after: Glass::Air, thickness_after_mm: 0.0 };
+        let lens = Lens::new("askew", "test", vec![front, back], 1).unwrap().with_f_number(8.0, 550.0).unwrap();
+        let turn = CoordinateBreak {
+            surfaces: (0, 1),
+            pivot_mm: lens.at(550.0).unwrap().projection_center_z_mm(),
+            decenter_mm: [0.0, 0.5, 0.0],
+            tilt_deg: [-5.0, 1.0, 0.0],
+            tilt_first: false,
+        };
+        lens.with_moves(vec![turn]).unwrap().at(550.0).unwrap()
+    }
+
+    #[track_caller]
+    fn check_rays_looked_at(lens: &MonoLens, field_deg: f64, most: usize) {
+        N_RAYS.set(0);
+        let region = PupilRegion::find(lens, &ObjectPoint::far(field_deg.to_radians(), DVec2::Y), 48);
+        let n_rays = N_RAYS.get();
+        assert!(n_rays <= most, "{n_rays} rays at {field_deg} degrees, {region:?}");
+    }
+
+    #[test]
+    fn searches_look_at_a_bounded_number_of_rays() {
+        let lens = askew();
+        let mut fields_deg: Vec<f64> = (0..150).map(|i| 86.0 + 0.01 * f64::from(i)).collect();
+        // The fields by whose bisection the last light is found, down to the one whose search never ended.
+        fields_deg.extend([86.582_519_531_25, 86.582_397_460_937_5, 86.582_5]);
+        for field_deg in fields_deg {
+            check_rays_looked_at(&lens, field_deg, 60_000);
+        }
+    }
+
+    #[test]
+    fn outline_that_grazes_the_front_smoothly_takes_few_rays() {
+        let lens = Lens::built_in("singlet-50mm").unwrap().at(550.0).unwrap();
+        for field_deg in [36.0, 48.0, 60.0, 64.0] {
+            check_rays_looked_at(&lens, field_deg, 12_000);
+        }
     }
 }

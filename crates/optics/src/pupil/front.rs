@@ -74,27 +74,32 @@ impl Front {
     /// Returns by how much each ray through these places stays inside what it comes nearest to, mm: the rims, or the outline of the
     /// front.
     pub(super) fn clearances(&self, lens: &MonoLens, places_mm: &[DVec2]) -> Vec<f64> {
-        let targets: Vec<DVec2> = places_mm.iter().map(|place| self.target_mm(*place)).collect();
-        let rays = self.plane.rays(lens, &self.point, &targets);
+        let radius_mm = self.surface.semi_aperture_mm;
+        let mut clearances = Vec::with_capacity(places_mm.len());
+        // Only where light meets the front from before it are there rays to trace.
+        let (mut faced, mut targets_mm) = (Vec::new(), Vec::new());
+        for (i, &place_mm) in places_mm.iter().enumerate() {
+            let Some(on_front_mm) = self.on_front_mm(place_mm) else {
+                let beyond_mm = radius_mm - place_mm.length();
+                clearances.push(if beyond_mm < 0.0 { beyond_mm } else { f64::NEG_INFINITY });
+                continue;
+            };
+            let facing_mm = (self.facing(place_mm, on_front_mm) - LEAST_FACING) * radius_mm;
+            clearances.push(facing_mm);
+            if facing_mm > 0.0 {
+                faced.push(i);
+                targets_mm.push(self.plane.meets_mm(on_front_mm, self.point.direction_to(on_front_mm)));
+            }
+        }
+        let rays = self.plane.rays(lens, &self.point, &targets_mm);
         let mut met = rays.clone();
         lens.trace_surfaces(0..1, &mut met, Vignetting::Off);
-        let radius_mm = self.surface.semi_aperture_mm;
-        let clearances = lens.clearances_mm(rays);
-        let clearance = |(i, place): (usize, &DVec2)| {
-            let Some(on_front_mm) = self.on_front_mm(*place) else {
-                let beyond_mm = radius_mm - place.length();
-                return if beyond_mm < 0.0 { beyond_mm } else { f64::NEG_INFINITY };
-            };
-            let facing_mm = (self.facing(*place, on_front_mm) - LEAST_FACING) * radius_mm;
-            let is_met =
-                self.placement.surface_from_lens(met.point_mm(i)).truncate().distance(*place) <= SAME_PLACE * radius_mm;
-            match facing_mm > 0.0 {
-                true if is_met => clearances[i].min(facing_mm),
-                true => f64::NEG_INFINITY,
-                false => facing_mm,
-            }
-        };
-        places_mm.iter().enumerate().map(clearance).collect()
+        for (number, (i, clearance_mm)) in faced.into_iter().zip(lens.clearances_mm(rays)).enumerate() {
+            let met_mm = self.placement.surface_from_lens(met.point_mm(number)).truncate();
+            let is_met = met_mm.distance(places_mm[i]) <= SAME_PLACE * radius_mm;
+            clearances[i] = if is_met { clearances[i].min(clearance_mm) } else { f64::NEG_INFINITY };
+        }
+        clearances
     }
 
     /// Returns where rays to these places of the pupil's plane, mm, meet the front.

@@ -11,6 +11,8 @@ use crate::{MonoLens, ObjectPoint, quadrature::gauss_legendre_on};
 const UNCERTAIN: f64 = 5e-4;
 /// By how much of an outline's area half of its azimuths may differ from all of them, which are good to a third or less of that.
 const AREA_CHANGE: f64 = 2e-3;
+/// The same where light grazes a surface at the edge, which bends sharply at the ends of that part.
+const GRAZING_AREA_CHANGE: f64 = 5e-4;
 /// How often the number of azimuths is doubled for that.
 const MOST_DOUBLINGS: usize = 2;
 /// How far beyond an edge rays are looked at for what ends light there, over the distance from the center.
@@ -50,9 +52,11 @@ impl PupilRegion {
         let mut lit = search.lit_over_front();
         let in_middle = search.lit_middle().and_then(|seed| search.part_about(seed, n_azimuths));
         let part = in_middle.or_else(|| search.part_of(&lit, n_azimuths))?;
-        let part = search.refined(part);
-        let is_smooth = part.area_change() <= AREA_CHANGE;
-        if is_smooth && !search.grazes(&part) && search.uncertain_mm2(&part) <= UNCERTAIN * part.area_mm2() {
+        let does_graze = search.grazes(&part);
+        let most_change = if does_graze { GRAZING_AREA_CHANGE } else { AREA_CHANGE };
+        let part = search.refined(part, most_change);
+        let is_smooth = part.area_change() <= most_change;
+        if is_smooth && search.uncertain_mm2(&part) <= UNCERTAIN * part.area_mm2() {
             let is_beside = |(place, _): &(DVec2, f64)| part.beyond_mm(*place) > BESIDE * part.rho_max();
             lit.extend(search.lit_beyond(&part));
             if !lit.iter().any(is_beside) && !search.lit_around(&part).iter().any(is_beside) {
@@ -62,9 +66,8 @@ impl PupilRegion {
         lit.extend(part.edge_mm().into_iter().map(|place| (place, 0.0)));
         let strips = search.strips(&lit, n_azimuths);
         // Lines that lost light would be worse than what one place sees, all of which is lit.
-        let is_less = |strips: &Strips| {
-            is_smooth && !search.grazes(&part) && strips.area_mm2() < (1.0 - AREA_CHANGE) * part.area_mm2()
-        };
+        let is_less =
+            |strips: &Strips| is_smooth && !does_graze && strips.area_mm2() < (1.0 - AREA_CHANGE) * part.area_mm2();
         let shape = match strips.filter(|strips| !is_less(strips)) {
             Some(strips) => Shape::Strips(plane, strips),
             None => Shape::Outline(part),
@@ -133,10 +136,10 @@ impl PupilBoundary {
 }
 
 impl Search<'_> {
-    /// Returns a part with as many azimuths as its area needs.
-    fn refined(&self, mut part: PupilBoundary) -> PupilBoundary {
+    /// Returns a part with as many azimuths as its area needs to change by no more than this from half of them.
+    fn refined(&self, mut part: PupilBoundary, most_change: f64) -> PupilBoundary {
         for _ in 0..MOST_DOUBLINGS {
-            if part.area_change() <= AREA_CHANGE {
+            if part.area_change() <= most_change {
                 break;
             }
             let between: Vec<DVec2> = PupilBoundary::azimuths(2 * part.rho_mm.len()).skip(1).step_by(2).collect();

@@ -27,6 +27,9 @@ const HALVINGS: usize = 10;
 const LEAST_LINES: usize = 16;
 /// Places of Gauss's rule on a line whose light is summed.
 const N_OF_AREA: usize = 12;
+/// The most places along a line that lines beside it lead to expect light at: a search of few places where rounding makes light and darkness
+/// alternate, which would be looked at ever more closely.
+const MOST_WINDOWS: usize = 32;
 /// Clearance at which a ray is held to graze its rim, mm.
 const EDGE_MM: f64 = 1e-9;
 
@@ -144,7 +147,22 @@ fn expected(known: &[Seen], s: f64) -> Vec<[f64; 2]> {
             windows.push([center - half, center + half]);
         }
     }
-    windows
+    if windows.len() > MOST_WINDOWS { widest(windows) } else { windows }
+}
+
+/// Returns the widest of these windows, after those that overlap are made one.
+fn widest(mut windows: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    windows.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut apart: Vec<[f64; 2]> = Vec::new();
+    for [from, to] in windows {
+        match apart.last_mut() {
+            Some(last) if from <= last[1] => last[1] = last[1].max(to),
+            _ => apart.push([from, to]),
+        }
+    }
+    apart.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
+    apart.truncate(MOST_WINDOWS);
+    apart
 }
 
 /// A rectangle of the plane: lines run across it, and follow one another along its longer side.
@@ -416,4 +434,38 @@ const TURN: f64 = 0.1;
 struct Change {
     before: (f64, usize),
     after: (f64, usize),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rays that alternate between light and darkness, as rounding makes them.
+    fn noisy(s: f64, n: usize) -> Seen {
+        let sample = |i: usize| (i as f64, if i.is_multiple_of(2) { 1e-9 } else { f64::NEG_INFINITY });
+        Seen { s, samples: (0..n).map(sample).collect() }
+    }
+
+    #[test]
+    fn noise_is_one_window() {
+        let known: Vec<Seen> = (0..4).map(|i| noisy(f64::from(i), 1000)).collect();
+        assert_eq!(known[0].windows().len(), 500);
+        assert_eq!(expected(&known, 1.5), [[0.0, 999.0]]);
+    }
+
+    #[test]
+    fn few_windows_stay_as_they_are_and_of_many_the_widest_stay() {
+        let islands = |n: usize| {
+            // Each a lit ray between dark ones, the later the wider.
+            let ends = (0..n).flat_map(|i| {
+                let (at, half) = (10.0 * i as f64, 1.0 + 1e-3 * i as f64);
+                [(at - half, -1.0), (at, 1.0), (at + half, -1.0)]
+            });
+            vec![Seen { s: 0.0, samples: ends.collect() }]
+        };
+        assert_eq!(expected(&islands(5), 1.0), islands(5)[0].windows());
+        let found = expected(&islands(100), 1.0);
+        assert_eq!(found.len(), MOST_WINDOWS);
+        assert!(found.iter().all(|[from, to]| to - from > 2.0 + 2e-3 * 67.5), "{found:?}");
+    }
 }
