@@ -73,37 +73,58 @@ impl Progress for CancelAt {
 
 impl SweepProgress for CancelAt {}
 
+/// The sweep of the plan in a folder of its own, and its store, made at one go.
+struct Whole {
+    folder: tempfile::TempDir,
+    sweep: Sweep,
+    store: Store,
+}
+
+impl Whole {
+    fn made() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let sweep = sweep(PLAN, folder.path());
+        let store = Store::new(&folder.path().join("whole"));
+        let made = sweep
+            .make(&store.begin().expect("a workplace"), Shard::ALL, None, &Silent, &Cancel::new())
+            .expect("it is made");
+        assert_eq!((made.n_done, made.n_refused, made.n_there), (6, 3, 0));
+        Index::of(&sweep, &store).write().expect("the index");
+        Self { folder, sweep, store }
+    }
+
+    fn store(&self, name: &str) -> Store {
+        Store::new(&self.folder.path().join(name))
+    }
+}
+
 #[test]
 fn stores_depend_on_the_plan_alone() {
-    let folder = tempfile::tempdir().unwrap();
-    let sweep = sweep(PLAN, folder.path());
+    let whole = Whole::made();
+    let (sweep, expected) = (&whole.sweep, files(whole.store.folder()));
     assert_eq!((sweep.len(), sweep.n_irradiances(Shard::ALL)), (9, 3));
-    let store = |name: &str| Store::new(&folder.path().join(name));
-
-    // At one go, each scene imaged once.
-    let whole = store("whole");
-    let made = sweep.make(&whole.begin().unwrap(), Shard::ALL, None, &Silent, &Cancel::new()).unwrap();
-    assert_eq!((made.n_done, made.n_refused, made.n_there), (6, 3, 0));
-    Index::of(&sweep, &whole).write().unwrap();
-    let expected = files(whole.folder());
 
     // Again: nothing is made, and the index is the same.
-    let again = sweep.make(&whole.begin().unwrap(), Shard::ALL, None, &Silent, &Cancel::new()).unwrap();
+    let again = sweep.make(&whole.store.begin().unwrap(), Shard::ALL, None, &Silent, &Cancel::new()).unwrap();
     assert_eq!((again.n_there, again.n_done + again.n_refused), (9, 0));
-    Index::of(&sweep, &whole).write().unwrap();
-    assert!(files(whole.folder()) == expected);
+    Index::of(sweep, &whole.store).write().unwrap();
+    assert!(files(whole.store.folder()) == expected);
 
     // In two shards, the second first and on one thread.
-    let shards = store("shards");
+    let shards = whole.store("shards");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    pool.install(|| make(&sweep, &shards, "2/2"));
+    pool.install(|| make(sweep, &shards, "2/2"));
     assert_eq!(sweep.counts(&shards, Shard::ALL)[2], sweep.items("1/2".parse().unwrap()).count());
-    make(&sweep, &shards, "1/2");
-    Index::of(&sweep, &shards).write().unwrap();
+    make(sweep, &shards, "1/2");
+    Index::of(sweep, &shards).write().unwrap();
     assert!(files(shards.folder()) == expected);
+}
 
-    // Cut off again and again, with what a killed maker leaves behind.
-    let cut = store("cut");
+/// Cut off again and again, with what a killed maker leaves behind.
+#[test]
+fn a_store_that_was_cut_off_is_completed() {
+    let whole = Whole::made();
+    let (sweep, cut) = (&whole.sweep, whole.store("cut"));
     let mut n_cut = 0;
     for n in [1, 2, 3, 5, 8, 13, 21, 34] {
         let progress = CancelAt { left: AtomicUsize::new(n), cancel: Cancel::new() };
@@ -113,12 +134,16 @@ fn stores_depend_on_the_plan_alone() {
         fs::write(cut.folder().join(format!(".tmp-{n}/{}/picture.png", sweep.id(0))), "half").unwrap();
     }
     assert!(n_cut >= 4, "{n_cut}");
-    make(&sweep, &cut, "1/1");
-    Index::of(&sweep, &cut).write().unwrap();
-    assert!(files(cut.folder()) == expected);
+    make(sweep, &cut, "1/1");
+    Index::of(sweep, &cut).write().unwrap();
+    assert!(files(cut.folder()) == files(whole.store.folder()));
+}
 
-    // What is in an item, and that it is what the camera gives by itself: this one shares its irradiance with another.
-    let item = whole.item(sweep.id(3));
+/// What is in an item is what the camera gives by itself: this one shares its irradiance with another.
+#[test]
+fn an_item_is_what_its_camera_gives() {
+    let whole = Whole::made();
+    let item = whole.store.item(whole.sweep.id(3));
     let names: Vec<PathBuf> = files(&item).into_keys().collect();
     let all = ["camera.ron", "picture.png", "raw.png", "report.json", "thumbnail.png"];
     assert_eq!(names, all.map(PathBuf::from));
@@ -128,32 +153,37 @@ fn stores_depend_on_the_plan_alone() {
     let run = Run { capture: &capture, model: &kept.model(&Silent, &Cancel::new()).unwrap(), depth: None };
     let report = RunReport::new(&run, vec!["picture.png".to_owned(), "raw.png".to_owned()]).unwrap();
     assert_eq!(fs::read(item.join("report.json")).unwrap(), serde_json::to_vec_pretty(&report).unwrap());
+}
 
+#[test]
+fn the_index_has_values_metrics_and_reasons() {
+    let whole = Whole::made();
     // A camera that cannot be is there with the reason.
-    let rows = rows(&sweep, &whole);
+    let rows = rows(&whole.sweep, &whole.store);
     let refused = &rows[2];
     assert_eq!((refused.status, refused.values[1].as_f64()), (Status::Refused, Some(0.1)));
     let reason = refused.reason.as_ref().unwrap();
     assert!(reason.contains("opens to f/2.028") && !reason.contains('\n'), "{reason}");
-    let names: Vec<PathBuf> = files(&whole.item(refused.id)).into_keys().collect();
+    let names: Vec<PathBuf> = files(&whole.store.item(refused.id)).into_keys().collect();
     assert_eq!(names, ["camera.ron", "refused.json"].map(PathBuf::from));
 
     // Ten times the light makes ten times the electrons.
     let mean_e = |row: usize| rows[row].metrics.iter().find(|(name, _)| name.starts_with("mean_e")).unwrap().1;
     // A sum of rounded products of the same rates.
     assert!((mean_e(3) / mean_e(0) - 10.0).abs() < 1e-9);
-    let lines: Vec<serde_json::Value> = fs::read_to_string(whole.folder().join("index.jsonl"))
-        .unwrap()
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let index = |name: &str| fs::read_to_string(whole.store.folder().join(name)).unwrap();
+    let lines: Vec<serde_json::Value> =
+        index("index.jsonl").lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!((lines.len(), &lines[3]["values"]["stop.FNumber"]), (9, &serde_json::json!(4)));
     assert_eq!(lines[3]["metrics"]["exposure_time_s"], serde_json::json!(0.01));
     assert!(lines[2]["reason"].is_string() && lines[2]["metrics"].is_null());
-    assert_eq!(fs::read_to_string(whole.folder().join("index.csv")).unwrap().lines().count(), 10);
+    assert_eq!(index("index.csv").lines().count(), 10);
+}
 
-    // Packed twice, the same to the byte, each item once.
-    let pack = |name: &str| sweep.pack(&whole, &folder.path().join(name), Some(4)).unwrap();
+#[test]
+fn packs_are_the_same_to_the_byte() {
+    let whole = Whole::made();
+    let pack = |name: &str| whole.sweep.pack(&whole.store, &whole.folder.path().join(name), Some(4)).unwrap();
     let (one, other) = (pack("one.tar"), pack("other.tar"));
     assert_eq!((one.len(), one[1].file_name().unwrap().to_str()), (2, Some("one-000001.tar")));
     let mut names = Vec::new();
@@ -166,6 +196,7 @@ fn stores_depend_on_the_plan_alone() {
             names.push(entry.path().unwrap().to_string_lossy().into_owned());
         }
     }
+    // Each item once.
     assert_eq!(names.len(), 6 * 5);
     assert!(names.is_sorted() && names[0].ends_with(".camera.ron") && names[4].ends_with(".values.json"), "{names:?}");
 }
