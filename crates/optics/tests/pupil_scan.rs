@@ -18,7 +18,7 @@ fn lenses() -> Vec<(&'static str, MonoLens)> {
 #[test]
 fn fields_have_the_light_of_counted_rays() {
     // 300 rays across count a disc to 300 to the power −1.5, 2e-4, and a cat's eye or crescent to some times that; of the last light it
-    // is told by how much the count itself may be wrong.
+    // is what the standard error of the count explains.
     let check = |(name, fields_deg): &(&str, [f64; 5])| {
         let lens = Lens::built_in(name).expect("a built-in lens").at(550.0).expect("glasses that are known");
         for field_deg in fields_deg {

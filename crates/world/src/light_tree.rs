@@ -360,8 +360,8 @@ mod tests {
                 let (mut counts, mut rests) = (vec![0.0; n_lights], vec![0.0; n_lights]);
                 for i in 0..n {
                     if let Some((light, probability, rest)) = tree.pick(&at, (f64::from(i) + 0.5) / f64::from(n)) {
-                        let told = tree.probability(&at, light);
-                        assert!((probability - told).abs() <= 1e-5 * probability, "{probability} {told}");
+                        let stated = tree.probability(&at, light);
+                        assert!((probability - stated).abs() <= 1e-5 * probability, "{probability} {stated}");
                         counts[light] += 1.0 / f64::from(n);
                         rests[light] += rest / f64::from(n);
                     }

@@ -388,13 +388,13 @@ mod tests {
             let number = |k: u32| (i.wrapping_mul(k).wrapping_mul(0x9e37_79b1) >> 8) as f32 / (1 << 24) as f32;
             let Some(drawn) = world.sample_light(at, number(1), [number(3), number(5)], &[550.0]) else { continue };
             let ray = crate::Ray { origin: at.point, direction: drawn.direction };
-            let told = match world.intersect(&ray, f32::INFINITY) {
+            let density = match world.intersect(&ray, f32::INFINITY) {
                 None => world.sky_pdf(drawn.direction),
                 Some(hit) if (hit.distance_m / drawn.distance_m - 1.0).abs() < 1e-4 => world.light_pdf(at, &hit),
                 Some(_) => continue,
             };
             n_compared += 1;
-            n_beside_edge += i32::from((told / drawn.pdf - 1.0).abs() > 1e-2);
+            n_beside_edge += i32::from((density / drawn.pdf - 1.0).abs() > 1e-2);
         }
         // A ray to a point beside an edge of a block can meet the other face.
         assert!(n_compared > 2000 && n_beside_edge < n_compared / 200, "{n_beside_edge} of {n_compared}");
