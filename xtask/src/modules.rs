@@ -30,11 +30,6 @@ const ALLOWED: &[(&str, &[&str], &str)] = &[
     ("cli", &["analyze", "lens"], "`lens` dispatches to `analyze`, which opens lenses as `lens` does"),
     ("forward", &["knot_kernels", "tiles"], "kernels lie at the knots of tiles, which are laid by how kernels change"),
     ("python", &["camera", "shot"], "a camera takes shots, and a shot has the camera that took it"),
-    (
-        "sensor",
-        &["balance", "color", "dng", "process", "profile"],
-        "white, color and the chain ask a profile, a sensor or what a raw file states, which answers in their types",
-    ),
     ("sensor", &["exposure", "sensor"], "an exposure is resolved for a sensor, whose methods take an exposure"),
 ];
 

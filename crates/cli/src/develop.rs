@@ -36,8 +36,12 @@ pub(crate) fn run(arguments: &DevelopArgs, common: &Common) -> anyhow::Result<()
 fn table(report: &DngReport) -> Result<String, std::fmt::Error> {
     let name = |text: &Option<String>| text.clone().unwrap_or_else(|| "unknown".to_owned());
     let (columns, rows) = report.shown_px;
-    let mut text =
-        format!("{} {}: {columns} × {rows} pixels, {} bits", name(&report.make), name(&report.model), report.bits);
+    let mut text = format!(
+        "{} {}: {columns} × {rows} pixels, {} bits",
+        name(&report.shot.make),
+        name(&report.shot.model),
+        report.bits
+    );
     if let Some(mosaic) = &report.mosaic {
         write!(text, ", {}", mosaic.join(" "))?;
     }
@@ -49,12 +53,12 @@ fn table(report: &DngReport) -> Result<String, std::fmt::Error> {
         100.0 * report.saturated_fraction
     )?;
     let number = |value: Option<f64>, unit: &str| value.map_or_else(String::new, |value| format!("  {value}{unit}"));
-    if let Some(time_s) = report.exposure_time_s {
+    if let Some(time_s) = report.shot.exposure_time_s {
         write!(text, "{time_s} s")?;
     }
-    write!(text, "{}", number(report.focal_length_mm, " mm"))?;
-    write!(text, "{}", report.f_number.map_or_else(String::new, |value| format!("  f/{value}")))?;
-    writeln!(text, "{}", report.iso_speed.map_or_else(String::new, |value| format!("  ISO {value}")))?;
+    write!(text, "{}", number(report.shot.focal_length_mm, " mm"))?;
+    write!(text, "{}", report.shot.f_number.map_or_else(String::new, |value| format!("  f/{value}")))?;
+    writeln!(text, "{}", report.shot.iso_speed.map_or_else(String::new, |value| format!("  ISO {value}")))?;
     let gains: Vec<String> = report.white_balance.iter().map(|gain| format!("{gain:.3}")).collect();
     write!(text, "white by {}", gains.join(" "))?;
     writeln!(text, "{}", report.white_kelvin.map_or_else(String::new, |kelvin| format!(", {kelvin:.0} K")))?;

@@ -3,7 +3,7 @@
 use dioptric_spectrum::{Illuminant, Observer, Xyz, adapt_bradford, color_checker_reflectances, delta_e_2000};
 use ndarray::Array3;
 
-use crate::{SensorError, balance::fine_grid};
+use crate::{SensorError, white_light::fine_grid};
 
 /// What a picture makes of the 24 patches.
 #[derive(Clone, Debug, PartialEq)]

@@ -264,7 +264,7 @@ mod tests {
 
     /// Linear sRGB of the patches under D65.
     fn colors() -> Vec<[f32; 3]> {
-        let grid = crate::balance::fine_grid();
+        let grid = crate::white_light::fine_grid();
         let light = Illuminant::D65.spectrum().sample_held(&grid);
         let white = Observer::Cie1931.xyz(&grid, &light).0[1];
         let color = |reflectance: &dioptric_spectrum::Spectrum| {

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Sensor, SensorError,
-    balance::{fine_grid, white_response},
     least_squares::Normal,
+    white_light::{fine_grid, white_response},
 };
 
 /// How the sensor's channels become colors.

@@ -29,12 +29,12 @@ use self::{
 pub use self::{
     file_color::{DngColor, DngLight},
     file_profile::{DngNoise, DngProfile},
-    read::DngFile,
+    read::{DngFile, DngShot},
 };
 use crate::{
     LensCorrections, LensTables, Picture, Raw, RawPlane, Sensor, SensorError,
-    balance::white_response,
     files::{write_beside_and_rename, write_error},
+    white_light::white_response,
 };
 
 /// The code of no light after a linearization table; room below it for noise.

@@ -61,6 +61,7 @@ mod speed;
 mod tile_cosine;
 mod tone;
 mod uniformity;
+mod white_light;
 
 pub use acuity::Viewing;
 pub use balance::WhiteBalance;
@@ -72,7 +73,7 @@ pub use chart_find::{ChartCorners, find_chart};
 pub use collect::{ExitPupil, Illumination};
 pub use color::{ColorCorrection, ColorMatrix};
 pub use demosaic::{Demosaic, demosaic};
-pub use dng::{DngColor, DngDetails, DngFile, DngLight, DngNoise, DngProfile};
+pub use dng::{DngColor, DngDetails, DngFile, DngLight, DngNoise, DngProfile, DngShot};
 pub use error::SensorError;
 pub use exposure::{AutoExposure, Exposure, ExposureControl, GainMode, Metering};
 pub use files::Depth;

@@ -15,7 +15,7 @@ use crate::{
     highlights::{Saturated, dimmed, reconstruct},
     lens_tables::warp,
     metering::percentile,
-    profile::Profile,
+    profile::CameraProfile,
     sharpen::{SharpenedChannels, sharpen},
 };
 
@@ -199,7 +199,7 @@ impl Sensor {
         processing: &Processing,
         lens: Option<&LensTables>,
     ) -> Result<LinearPicture, SensorError> {
-        Profile::Sensor(self).develop_linear(raw, processing, lens)
+        develop_linear(self, raw, processing, lens)
     }
 
     /// Returns the noise of a frame that does not depend on the signal, rms electrons.
@@ -212,95 +212,95 @@ impl Sensor {
     }
 }
 
-impl Profile<'_> {
-    /// Returns the linear light of a frame of this camera.
-    pub(crate) fn develop_linear(
-        self,
-        raw: &Raw,
-        processing: &Processing,
-        lens: Option<&LensTables>,
-    ) -> Result<LinearPicture, SensorError> {
-        raw.check()?;
-        self.check_settings(raw, processing)?;
-        let corrections = processing.lens_corrections;
-        let n_channels = self.n_channels();
-        let lens = needed_tables(corrections, lens)?;
-        lens.map_or(Ok(()), |lens| lens.check(raw.size(), n_channels))?;
-        let processing = processing.under(None);
-        let tile = raw.tile.as_ref();
-        let noise = self.sample_noise(raw);
-        let mut planes = raw.linear();
-        let saturated = match processing.highlights {
-            Highlights::Clip => None,
-            Highlights::Reconstruct => Saturated::find(&planes, tile, n_channels, self.saturated_from(raw)),
-        };
-        clean(&mut planes, tile, &processing, &noise);
-        if let Some(lens) = lens.filter(|_| corrections.vignetting) {
-            lens.even_out(&mut planes, tile);
-        }
-        let balance = gains(self, &planes, tile, &processing.white)?;
-        weigh(&mut planes, tile, &balance, processing.highlights);
-        let mut channels = match tile {
-            Some(tile) => demosaic(&planes[0], tile, n_channels, processing.demosaic)?,
-            None => planes.into_iter().map(|plane| plane.as_standard_layout().into_owned()).collect(),
-        };
-        if let Some(saturated) = saturated {
-            reconstruct(&mut channels, &saturated, &balance);
-        }
-        if let Some(lens) = lens.filter(|_| corrections.moves()) {
-            let sources: Vec<_> = (0..n_channels).map(|channel| lens.source_px(channel, corrections)).collect();
-            channels = warp(&channels, &sources);
-        }
-        let color = self.color_matrix(&processing.color, &balance)?;
-        if processing.sharpen_px > 0.0 {
-            let luminance = color.luminance_shares(n_channels);
-            let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: middle(&noise) };
-            sharpen(&mut channels, processing.sharpen_px, &of);
-        }
-        if let Some(perspective) = processing.perspective {
-            channels = perspective.apply(&channels);
-        }
-        let Processing { highlights, local_tone, .. } = processing;
-        Ok(LinearPicture { light: mix(&channels, &color), highlights, local_tone, balance, color })
+/// Returns the linear light of a frame of a camera.
+///
+/// # Errors
+/// When a setting makes no sense, or the frame, the lens and the camera do not fit each other.
+pub(crate) fn develop_linear(
+    camera: &dyn CameraProfile,
+    raw: &Raw,
+    processing: &Processing,
+    lens: Option<&LensTables>,
+) -> Result<LinearPicture, SensorError> {
+    raw.check()?;
+    check_settings(camera, raw, processing)?;
+    let corrections = processing.lens_corrections;
+    let n_channels = camera.n_channels();
+    let lens = needed_tables(corrections, lens)?;
+    lens.map_or(Ok(()), |lens| lens.check(raw.size(), n_channels))?;
+    let processing = processing.under(None);
+    let tile = raw.tile.as_ref();
+    let noise = camera.sample_noise(raw);
+    let mut planes = raw.linear();
+    let saturated = match processing.highlights {
+        Highlights::Clip => None,
+        Highlights::Reconstruct => Saturated::find(&planes, tile, n_channels, camera.saturated_from(raw)),
+    };
+    clean(&mut planes, tile, &processing, &noise);
+    if let Some(lens) = lens.filter(|_| corrections.vignetting) {
+        lens.even_out(&mut planes, tile);
     }
+    let balance = gains(camera, &planes, tile, &processing.white)?;
+    weigh(&mut planes, tile, &balance, processing.highlights);
+    let mut channels = match tile {
+        Some(tile) => demosaic(&planes[0], tile, n_channels, processing.demosaic)?,
+        None => planes.into_iter().map(|plane| plane.as_standard_layout().into_owned()).collect(),
+    };
+    if let Some(saturated) = saturated {
+        reconstruct(&mut channels, &saturated, &balance);
+    }
+    if let Some(lens) = lens.filter(|_| corrections.moves()) {
+        let sources: Vec<_> = (0..n_channels).map(|channel| lens.source_px(channel, corrections)).collect();
+        channels = warp(&channels, &sources);
+    }
+    let color = camera.color_matrix(&processing.color, &balance)?;
+    if processing.sharpen_px > 0.0 {
+        let luminance = color.luminance_shares(n_channels);
+        let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: middle(&noise) };
+        sharpen(&mut channels, processing.sharpen_px, &of);
+    }
+    if let Some(perspective) = processing.perspective {
+        channels = perspective.apply(&channels);
+    }
+    let Processing { highlights, local_tone, .. } = processing;
+    Ok(LinearPicture { light: mix(&channels, &color), highlights, local_tone, balance, color })
+}
 
-    fn check_settings(&self, raw: &Raw, processing: &Processing) -> Result<(), SensorError> {
-        let shape = |what, expected: usize, found: usize| {
-            Err(SensorError::Shape { what, expected: expected.to_string(), found: found.to_string() })
-        };
-        let n_channels = self.n_channels();
-        let not_negative = [
-            ("defect_threshold", processing.defect_threshold.unwrap_or(0.0)),
-            ("denoise", processing.denoise.unwrap_or(0.0)),
-        ];
-        if let Some((key, value)) = not_negative.into_iter().find(|(_, v)| !(*v >= 0.0 && v.is_finite())) {
-            return Err(SensorError::value("the processing", key, value, "a number of 0 or more"));
-        }
-        processing.shading.as_ref().map_or(Ok(()), |shading| shading.check(n_channels))?;
-        if raw.filter_names.len() != n_channels {
-            return shape("filters of the raw frame", n_channels, raw.filter_names.len());
-        }
-        processing.white.check(n_channels)?;
-        processing.color.check(n_channels)?;
-        let (key, value, right) = match processing.brightness {
-            Brightness::AsExposed => ("", 1.0, true),
-            Brightness::Factor(factor) => ("brightness.factor", factor, factor > 0.0 && factor.is_finite()),
-            Brightness::Percentile { percent, to } if (0.0..=100.0).contains(&percent) => {
-                ("brightness.to", to, to > 0.0 && to.is_finite())
-            }
-            Brightness::Percentile { percent, .. } => ("brightness.percent", percent, false),
-        };
-        if !right {
-            return Err(SensorError::value("the processing", key, value, "a number above 0, and at most 100 %"));
-        }
-        if !(0.0..=2.0).contains(&processing.sharpen_px) {
-            return Err(SensorError::value("the processing", "sharpen_px", processing.sharpen_px, "0 to 2 pixels"));
-        }
-        processing.perspective.map_or(Ok(()), |perspective| perspective.check())?;
-        processing.local_tone.check()?;
-        processing.curve.check()?;
-        self.check_processing(processing)
+fn check_settings(camera: &dyn CameraProfile, raw: &Raw, processing: &Processing) -> Result<(), SensorError> {
+    let shape = |what, expected: usize, found: usize| {
+        Err(SensorError::Shape { what, expected: expected.to_string(), found: found.to_string() })
+    };
+    let n_channels = camera.n_channels();
+    let not_negative = [
+        ("defect_threshold", processing.defect_threshold.unwrap_or(0.0)),
+        ("denoise", processing.denoise.unwrap_or(0.0)),
+    ];
+    if let Some((key, value)) = not_negative.into_iter().find(|(_, v)| !(*v >= 0.0 && v.is_finite())) {
+        return Err(SensorError::value("the processing", key, value, "a number of 0 or more"));
     }
+    processing.shading.as_ref().map_or(Ok(()), |shading| shading.check(n_channels))?;
+    if raw.filter_names.len() != n_channels {
+        return shape("filters of the raw frame", n_channels, raw.filter_names.len());
+    }
+    processing.white.check(n_channels)?;
+    processing.color.check(n_channels)?;
+    let (key, value, right) = match processing.brightness {
+        Brightness::AsExposed => ("", 1.0, true),
+        Brightness::Factor(factor) => ("brightness.factor", factor, factor > 0.0 && factor.is_finite()),
+        Brightness::Percentile { percent, to } if (0.0..=100.0).contains(&percent) => {
+            ("brightness.to", to, to > 0.0 && to.is_finite())
+        }
+        Brightness::Percentile { percent, .. } => ("brightness.percent", percent, false),
+    };
+    if !right {
+        return Err(SensorError::value("the processing", key, value, "a number above 0, and at most 100 %"));
+    }
+    if !(0.0..=2.0).contains(&processing.sharpen_px) {
+        return Err(SensorError::value("the processing", "sharpen_px", processing.sharpen_px, "0 to 2 pixels"));
+    }
+    processing.perspective.map_or(Ok(()), |perspective| perspective.check())?;
+    processing.local_tone.check()?;
+    processing.curve.check()
 }
 
 /// Mends defects, undoes a given fall of light and takes out noise, that of each filter.

@@ -1,99 +1,93 @@
-//! What developing needs to know of the camera that took a frame: its sensor, or what a file states of it.
+//! What developing needs to know of the camera that took a frame.
 
 use dioptric_spectrum::{Illuminant, Spectrum, color_checker_reflectances};
 
 use crate::{
-    ColorCorrection, ColorMatrix, Processing, Raw, Sensor, SensorError,
-    balance::{light_of_gains, white_response},
+    ColorCorrection, ColorMatrix, Raw, Sensor, SensorError,
     denoise::SampleNoise,
-    dng::DngProfile,
     hdr::merged_noise,
+    white_light::{light_of_gains, white_response},
 };
 
-/// The camera of a frame.
-#[derive(Clone, Copy)]
-pub(crate) enum Profile<'a> {
-    /// A sensor whose quantum efficiencies are known.
-    Sensor(&'a Sensor),
-    /// One of which a file states color matrices and noise.
-    File(&'a DngProfile),
-}
-
-impl Profile<'_> {
+/// The camera of a frame: a sensor whose quantum efficiencies are known, or one of which a file states matrices and noise.
+pub(crate) trait CameraProfile {
     /// The channels of a pixel.
-    pub(crate) fn n_channels(self) -> usize {
-        match self {
-            Self::Sensor(sensor) => sensor.filters.len(),
-            Self::File(file) => file.filter_names.len(),
-        }
-    }
+    fn n_channels(&self) -> usize;
 
-    pub(crate) fn filter_name(self, channel: usize) -> String {
-        match self {
-            Self::Sensor(sensor) => sensor.filters[channel].name.clone(),
-            Self::File(file) => file.filter_names[channel].clone(),
-        }
-    }
+    /// The name of a channel's filter.
+    fn filter_name(&self, channel: usize) -> &str;
 
     /// Returns what each channel sees of a perfect white under a light, up to a common factor.
-    pub(crate) fn white_response(self, light: &Illuminant) -> Vec<f64> {
-        match self {
-            Self::Sensor(sensor) => white_response(sensor, light),
-            Self::File(file) => file.white_response(light),
-        }
-    }
+    fn white_response(&self, light: &Illuminant) -> Vec<f64>;
 
+    /// Returns the matrix from channels that were balanced so to linear sRGB, for the corrections that depend on the camera.
+    ///
+    /// # Errors
+    /// When the matrices of the camera have no inverse.
+    fn fitted_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError>;
+
+    /// Returns the noise of a frame in the dark, standard deviation as a share of saturation.
+    fn noise_floor(&self, raw: &Raw) -> f64;
+
+    /// Returns the noise of a frame's samples in units of saturation, for each channel.
+    fn sample_noise(&self, raw: &Raw) -> Vec<SampleNoise>;
+}
+
+impl dyn CameraProfile + '_ {
     /// Returns the matrix from channels that were balanced so to linear sRGB.
-    pub(crate) fn color_matrix(self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError> {
-        let sensor = match (color, self) {
-            (ColorCorrection::None, _) => return Ok(ColorMatrix::identity(self.n_channels())),
-            (ColorCorrection::Matrix(rows), _) => {
-                return Ok(ColorMatrix { rows: rows.clone(), has_roots: false, delta_e: Vec::new() });
+    ///
+    /// # Errors
+    /// When the matrices of the camera have no inverse.
+    pub(crate) fn color_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError> {
+        match color {
+            ColorCorrection::None => Ok(ColorMatrix::identity(self.n_channels())),
+            ColorCorrection::Matrix(rows) => {
+                Ok(ColorMatrix { rows: rows.clone(), has_roots: false, delta_e: Vec::new() })
             }
-            (_, Self::File(file)) => return file.color_matrix(color, balance),
-            (_, Self::Sensor(sensor)) => sensor,
-        };
-        let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
-        Ok(match color {
-            ColorCorrection::Roots => ColorMatrix::fit_roots(sensor, &light_of_gains(sensor, balance), &chart),
-            ColorCorrection::Fitted(light) => ColorMatrix::fit(sensor, light, &chart),
-            ColorCorrection::FittedRoots(light) => ColorMatrix::fit_roots(sensor, light, &chart),
-            _ => ColorMatrix::fit(sensor, &light_of_gains(sensor, balance), &chart),
-        })
+            _ => self.fitted_matrix(color, balance),
+        }
     }
 
     /// Returns the share of saturation from which on a sample is taken to be saturated: three deviations of noise below it.
-    pub(crate) fn saturated_from(self, raw: &Raw) -> f32 {
-        let noise = match self {
-            Self::Sensor(sensor) => sensor.noise_floor_e(raw) / raw.levels.saturation_e(),
-            Self::File(file) => file.largest_floor(),
-        };
-        (0.998 - 3.0 * noise).max(0.9) as f32
+    pub(crate) fn saturated_from(&self, raw: &Raw) -> f32 {
+        (0.998 - 3.0 * self.noise_floor(raw)).max(0.9) as f32
+    }
+}
+
+impl CameraProfile for Sensor {
+    fn n_channels(&self) -> usize {
+        self.filters.len()
     }
 
-    /// Returns the noise of a frame's samples in units of saturation, for each channel.
-    pub(crate) fn sample_noise(self, raw: &Raw) -> Vec<SampleNoise> {
-        match self {
-            Self::Sensor(sensor) => {
-                let noise = if raw.merged.is_empty() {
-                    SampleNoise::Frame {
-                        electrons_per_unit: raw.levels.saturation_e(),
-                        floor_e: sensor.noise_floor_e(raw),
-                    }
-                } else {
-                    merged_noise(&raw.merged)
-                };
-                vec![noise; sensor.filters.len()]
+    fn filter_name(&self, channel: usize) -> &str {
+        &self.filters[channel].name
+    }
+
+    fn white_response(&self, light: &Illuminant) -> Vec<f64> {
+        white_response(self, light)
+    }
+
+    fn fitted_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError> {
+        let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
+        Ok(match color {
+            ColorCorrection::Roots => ColorMatrix::fit_roots(self, &light_of_gains(self, balance), &chart),
+            ColorCorrection::Fitted(light) => ColorMatrix::fit(self, light, &chart),
+            ColorCorrection::FittedRoots(light) => ColorMatrix::fit_roots(self, light, &chart),
+            _ => ColorMatrix::fit(self, &light_of_gains(self, balance), &chart),
+        })
+    }
+
+    fn noise_floor(&self, raw: &Raw) -> f64 {
+        self.noise_floor_e(raw) / raw.levels.saturation_e()
+    }
+
+    fn sample_noise(&self, raw: &Raw) -> Vec<SampleNoise> {
+        let noise = match raw.merged.is_empty() {
+            true => {
+                SampleNoise::Frame { electrons_per_unit: raw.levels.saturation_e(), floor_e: self.noise_floor_e(raw) }
             }
-            Self::File(file) => file.sample_noise(),
-        }
-    }
-
-    /// Checks what this camera cannot do.
-    pub(crate) fn check_processing(self, processing: &Processing) -> Result<(), SensorError> {
-        match self {
-            Self::Sensor(_) => Ok(()),
-            Self::File(file) => file.check_processing(processing),
-        }
+            false => merged_noise(&raw.merged),
+        };
+        vec![noise; self.filters.len()]
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use dioptric_spectrum::Illuminant;
 
-use crate::{Exposure, Sensor, balance::fine_grid};
+use crate::{Exposure, Sensor, white_light::fine_grid};
 
 impl Sensor {
     /// Returns the electrons that an exposure of one lux second on the sensor makes behind each filter.

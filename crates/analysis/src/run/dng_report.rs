@@ -1,27 +1,16 @@
 //! Numbers of a raw file and its picture.
 
 use dioptric_pipeline::DevelopedFile;
-use dioptric_sensor::{DngProfile, Processing};
+use dioptric_sensor::{DngProfile, DngShot, Processing};
 use dioptric_spectrum::ColorTemperature;
 use serde::Serialize;
 
 /// What a raw file holds and what was made of it, as `report.json` of `dioptric develop` has it.
 #[derive(Clone, Debug, Serialize)]
 pub struct DngReport {
-    /// The maker of the camera.
-    pub make: Option<String>,
-    /// Its model.
-    pub model: Option<String>,
-    /// The lens.
-    pub lens: Option<String>,
-    /// Exposure time, s.
-    pub exposure_time_s: Option<f64>,
-    /// The f-number.
-    pub f_number: Option<f64>,
-    /// The focal length, mm.
-    pub focal_length_mm: Option<f64>,
-    /// The ISO speed.
-    pub iso_speed: Option<f64>,
+    /// The camera and how it was set.
+    #[serde(flatten)]
+    pub shot: DngShot,
     /// Columns and rows that are stored.
     pub stored_px: (usize, usize),
     /// The first column and row that are shown.
@@ -70,13 +59,7 @@ impl DngReport {
         let neutral: Vec<f64> = developed.balance.iter().map(|gain| 1.0 / gain).collect();
         let white = file.profile.color.as_ref().map(|color| color.white_of(&neutral));
         Self {
-            make: file.make.clone(),
-            model: file.model.clone(),
-            lens: file.lens.clone(),
-            exposure_time_s: file.exposure_time_s,
-            f_number: file.f_number,
-            focal_length_mm: file.focal_length_mm,
-            iso_speed: file.iso_speed,
+            shot: file.shot.clone(),
             stored_px: file.stored,
             origin_px: file.origin,
             shown_px: (columns, rows),

@@ -4,12 +4,12 @@ use dioptric_spectrum::{Illuminant, Observer, Spectrum, Xyz, adapt_bradford, col
 
 use crate::{
     ColorMatrix, Raw, Sensor, SensorError, Tile,
-    balance::{fine_grid, white_response},
     least_squares::Normal,
+    white_light::{fine_grid, white_response},
 };
 
 /// The filters that DNG knows, in the order of their numbers (TIFF/EP, `CFAPattern`); W is clear.
-const KNOWN: [&str; 7] = ["R", "G", "B", "C", "M", "Y", "W"];
+pub(super) const FILTERS: [&str; 7] = ["R", "G", "B", "C", "M", "Y", "W"];
 /// The longest side of a tile.
 const LARGEST_TILE: usize = 8;
 /// How much more the white counts than a patch of the chart: a neutral must stay one.
@@ -22,7 +22,7 @@ pub(crate) fn color_codes(raw: &Raw) -> Result<Vec<u8>, SensorError> {
     if names.len() == 1 {
         return Ok(Vec::new());
     }
-    let number = |name: &String| KNOWN.iter().position(|known| known == name);
+    let number = |name: &String| FILTERS.iter().position(|known| known == name);
     let codes: Vec<u8> = names.iter().filter_map(number).map(|n| n as u8).collect();
     let most = if raw.tile.is_some() { 4 } else { 3 };
     if codes.len() != names.len() || !(3..=most).contains(&codes.len()) {
@@ -186,7 +186,7 @@ mod tests {
         let order = |letters: &str, names: &[&str]| {
             let tile = crate::Cfa::two_by_two(letters).unwrap().resolve("test", names).unwrap().unwrap();
             let codes: Vec<u8> =
-                names.iter().map(|name| KNOWN.iter().position(|known| known == name).unwrap() as u8).collect();
+                names.iter().map(|name| FILTERS.iter().position(|known| known == name).unwrap() as u8).collect();
             plane_order(&codes, Some(&tile)).iter().map(|&filter| names[filter]).collect::<String>()
         };
         assert_eq!(order("GBRG", &["R", "G", "B"]), "RGB");

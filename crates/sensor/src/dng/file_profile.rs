@@ -4,7 +4,10 @@ use dioptric_spectrum::Illuminant;
 use serde::Serialize;
 
 use super::file_color::DngColor;
-use crate::{ColorCorrection, ColorMatrix, Processing, SensorError, WhiteBalance, denoise::SampleNoise};
+use crate::{
+    ColorCorrection, ColorMatrix, Processing, Raw, SensorError, WhiteBalance, denoise::SampleNoise,
+    profile::CameraProfile,
+};
 
 /// The camera of a file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -36,27 +39,23 @@ impl DngNoise {
     }
 }
 
-impl DngProfile {
-    /// Returns the noise of each filter; next to none where it is not known.
-    pub(crate) fn sample_noise(&self) -> Vec<SampleNoise> {
-        let none = DngNoise { scale: LEAST_SCALE, offset: 0.0 };
-        let of = |filter: usize| self.noise.get(filter).or(self.noise.first()).copied().unwrap_or(none);
-        (0..self.filter_names.len()).map(|filter| of(filter).of_samples()).collect()
+impl CameraProfile for DngProfile {
+    fn n_channels(&self) -> usize {
+        self.filter_names.len()
     }
 
-    /// Returns the largest standard deviation in the dark, as a share of saturation.
-    pub(crate) fn largest_floor(&self) -> f64 {
-        self.noise.iter().map(|noise| noise.offset.max(0.0).sqrt()).fold(0.0, f64::max)
+    fn filter_name(&self, channel: usize) -> &str {
+        &self.filter_names[channel]
     }
 
-    pub(crate) fn white_response(&self, light: &Illuminant) -> Vec<f64> {
+    fn white_response(&self, light: &Illuminant) -> Vec<f64> {
         match &self.color {
             Some(color) => color.neutral_of(light.chromaticity()),
             None => vec![1.0; self.filter_names.len()],
         }
     }
 
-    pub(crate) fn color_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError> {
+    fn fitted_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError> {
         let Some(matrices) = &self.color else { return Ok(ColorMatrix::identity(self.filter_names.len())) };
         let neutral = match color {
             ColorCorrection::Fitted(light) => matrices.neutral_of(light.chromaticity()),
@@ -69,8 +68,22 @@ impl DngProfile {
         matrices.matrix(&neutral).ok_or_else(unsuitable)
     }
 
+    /// The largest of all filters.
+    fn noise_floor(&self, _: &Raw) -> f64 {
+        self.noise.iter().map(|noise| noise.offset.max(0.0).sqrt()).fold(0.0, f64::max)
+    }
+
+    /// Next to none where it is not known.
+    fn sample_noise(&self, _: &Raw) -> Vec<SampleNoise> {
+        let none = DngNoise { scale: LEAST_SCALE, offset: 0.0 };
+        let of = |filter: usize| self.noise.get(filter).or(self.noise.first()).copied().unwrap_or(none);
+        (0..self.filter_names.len()).map(|filter| of(filter).of_samples()).collect()
+    }
+}
+
+impl DngProfile {
     /// Refuses what a file does not hold.
-    pub(crate) fn check_processing(&self, processing: &Processing) -> Result<(), SensorError> {
+    pub(super) fn check_processing(&self, processing: &Processing) -> Result<(), SensorError> {
         let refused = |what, reason: &str| Err(SensorError::Unsuitable { what, reason: reason.to_owned() });
         let has_colors = self.color.is_some() || self.filter_names.len() == 1;
         let is_known = |white: &WhiteBalance| has_colors || !matches!(white, WhiteBalance::Light(_));

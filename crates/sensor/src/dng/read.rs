@@ -2,8 +2,11 @@
 
 use std::{fs, path::Path};
 
+use serde::Serialize;
+
 use super::{
     area::Area,
+    color::FILTERS,
     file_camera,
     file_profile::DngProfile,
     levels::FileLevels,
@@ -16,10 +19,8 @@ use super::{
     },
     tiff_reader::{Fields, TiffReader},
 };
-use crate::{Cfa, Developed, Exposure, Processing, Raw, SensorError, Tile, WhiteBalance, profile::Profile};
+use crate::{Cfa, Developed, Exposure, Processing, Raw, SensorError, Tile, WhiteBalance, process::develop_linear};
 
-/// The filters that DNG knows by their numbers.
-const NAMES: [&str; 7] = ["R", "G", "B", "C", "M", "Y", "W"];
 /// The longest side of a mosaic's tile that is read.
 const LONGEST_TILE: usize = 16;
 /// The opcodes by their numbers from 1 on.
@@ -57,6 +58,16 @@ pub struct DngFile {
     pub neutral: Option<Vec<f64>>,
     /// How the picture is turned (Exif `Orientation`, 1 to 8).
     pub orientation: usize,
+    /// The camera and how it was set.
+    pub shot: DngShot,
+    /// What the file asks for and is not done, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// What a raw file states of the camera and of how it was set (Exif); `None` where it does not.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct DngShot {
     /// The maker of the camera.
     pub make: Option<String>,
     /// Its model.
@@ -71,8 +82,6 @@ pub struct DngFile {
     pub focal_length_mm: Option<f64>,
     /// The ISO speed.
     pub iso_speed: Option<f64>,
-    /// What the file asks for and is not done, a sentence each.
-    pub notes: Vec<String>,
 }
 
 impl DngFile {
@@ -129,13 +138,15 @@ impl DngFile {
             profile,
             neutral,
             orientation: Some(first.one_or(ORIENTATION, 1)?).filter(|n| (1..=8).contains(n)).unwrap_or(1),
-            make: first.text(MAKE),
-            model: first.text(MODEL),
-            lens: exif.as_ref().and_then(|exif| exif.text(LENS_MODEL)),
-            exposure_time_s,
-            f_number: number(F_NUMBER)?,
-            focal_length_mm: number(FOCAL_LENGTH)?,
-            iso_speed: number(PHOTOGRAPHIC_SENSITIVITY)?,
+            shot: DngShot {
+                make: first.text(MAKE),
+                model: first.text(MODEL),
+                lens: exif.as_ref().and_then(|exif| exif.text(LENS_MODEL)),
+                exposure_time_s,
+                f_number: number(F_NUMBER)?,
+                focal_length_mm: number(FOCAL_LENGTH)?,
+                iso_speed: number(PHOTOGRAPHIC_SENSITIVITY)?,
+            },
             notes: notes(&first, &frame)?,
         })
     }
@@ -154,7 +165,8 @@ impl DngFile {
             (white, _) => white.clone(),
         };
         let processing = Processing { white, ..processing.clone() };
-        let linear = Profile::File(&self.profile).develop_linear(&self.raw, &processing, None)?;
+        self.profile.check_processing(&processing)?;
+        let linear = develop_linear(&self.profile, &self.raw, &processing, None)?;
         let mut developed = linear.encode(processing.brightness, processing.curve, processing.space);
         developed.picture = developed.picture.oriented(self.orientation);
         Ok(developed)
@@ -185,7 +197,7 @@ fn frame_directory<'a>(file: TiffReader<'a>, first: &Fields<'a>) -> Result<Field
 /// Returns the names of the filters in the order of the file's planes, and the mosaic from the first pixel that is shown.
 fn mosaic(frame: &Fields<'_>, n_planes: usize, area: &Area) -> Result<(Vec<String>, Option<Tile>), String> {
     let is_mosaic = frame.one_or(PHOTOMETRIC_INTERPRETATION, 0)? == usize::from(COLOR_FILTER_ARRAY);
-    let name = |code: usize| match NAMES.get(code) {
+    let name = |code: usize| match FILTERS.get(code) {
         Some(name) => Ok((*name).to_owned()),
         None => Err(format!("has a filter of number {code}, expected 0 to 6")),
     };
@@ -193,7 +205,7 @@ fn mosaic(frame: &Fields<'_>, n_planes: usize, area: &Area) -> Result<(Vec<Strin
     let planes = if planes.is_empty() { vec![0, 1, 2] } else { planes };
     match (is_mosaic, n_planes) {
         (false, 1) => return Ok((vec!["Y".to_owned()], Some(Tile::single(0)))),
-        (false, 3) => return Ok((NAMES[..3].iter().map(|name| (*name).to_owned()).collect(), None)),
+        (false, 3) => return Ok((FILTERS[..3].iter().map(|name| (*name).to_owned()).collect(), None)),
         (false, n) => return Err(format!("has {n} linear planes, expected 1 or 3")),
         (true, 1) => {}
         (true, n) => return Err(format!("has {n} samples a pixel of a mosaic, expected 1")),

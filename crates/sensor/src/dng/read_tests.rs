@@ -59,9 +59,12 @@ fn what_is_written_is_read_to_the_bit() {
     let saturation_e = raw.levels.saturation_e();
     let offset = (sensor.noise_floor_e(&raw) / saturation_e).powi(2);
     assert_eq!(file.profile.noise, [DngNoise { scale: 1.0 / saturation_e, offset }]);
-    assert_eq!((file.f_number, file.focal_length_mm, file.lens.as_deref()), (Some(1.8), Some(4.38), Some("wide")));
-    assert_eq!((file.iso_speed, file.orientation), (Some(sensor.iso_speed(&raw, &Illuminant::D65).round()), 1));
-    assert_eq!((file.make.as_deref(), file.model.as_deref()), (Some("dioptric"), Some(sensor.name.as_str())));
+    assert_eq!(
+        (file.shot.f_number, file.shot.focal_length_mm, file.shot.lens.as_deref()),
+        (Some(1.8), Some(4.38), Some("wide"))
+    );
+    assert_eq!((file.shot.iso_speed, file.orientation), (Some(sensor.iso_speed(&raw, &Illuminant::D65).round()), 1));
+    assert_eq!((file.shot.make.as_deref(), file.shot.model.as_deref()), (Some("dioptric"), Some(sensor.name.as_str())));
     assert!(file.notes.is_empty(), "{:?}", file.notes);
     // Matrices are written in ten thousandths, the neutral in millionths.
     let color = file.profile.color.unwrap();
@@ -73,7 +76,7 @@ fn what_is_written_is_read_to_the_bit() {
         assert_eq!(stated.camera_from_xyz, wanted);
     }
     let neutral = file.neutral.unwrap();
-    let white = crate::balance::white_response(&sensor, &Illuminant::D65);
+    let white = crate::white_light::white_response(&sensor, &Illuminant::D65);
     let brightest = white.iter().copied().fold(0.0, f64::max);
     for (found, white) in neutral.iter().zip(&white) {
         assert!((found - white / brightest).abs() <= 0.5e-6);
