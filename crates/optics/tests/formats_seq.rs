@@ -63,6 +63,38 @@ fn surfaces_pupil_fields_and_wavelengths_are_read() {
     assert!(file.notes.is_empty(), "{:?}", file.notes);
 }
 
+/// Returns the notes on the doublet with a text in the place of another.
+#[track_caller]
+fn notes(from: &str, to: &str) -> Vec<String> {
+    assert!(DOUBLET.contains(from), "{from}");
+    read(&DOUBLET.replacen(from, to, 1)).unwrap().notes
+}
+
+#[test]
+fn what_is_guessed_or_passed_over_is_noted_with_its_line() {
+    assert_eq!(notes("S     -200.0 95.0", "S     -200.0"), ["surface S3 (line 22) states no thickness: 0 is taken"]);
+    assert!(notes("S     -200.0 95.0", "S     -200.0\nTHI 95").is_empty());
+    let second = "two stops (STO): that of line 22, S2, takes the place of S1";
+    assert_eq!(notes("MYGLASS\nS ", "MYGLASS\nSTO\nS "), [second]);
+    assert!(notes("  STO\n", "  STO\n  STO S1\n").is_empty());
+    let unknown = "not understood, or before the first surface, and passed over: QXY (line 4), CIX (line 20)";
+    let text = DOUBLET.replace("EPD   10.0", "QXY 3;EPD 10").replace("  CCY 0; THC 0", "  CIX 7; QXY 2; CCY 0");
+    assert_eq!(read(&text).unwrap().notes, [unknown]);
+    assert_eq!(notes("EPD   10.0", "CIR 3; EPD 10"), [unknown.replace("QXY (line 4), CIX (line 20)", "CIR (line 4)")]);
+    let zoom = "ZOO 3\nZOO THI S1 4 5 6\nGO";
+    assert_eq!(notes("GO", zoom), ["of 3 configurations (ZOO, line 24) the first is read"]);
+    let solve = "solves and pickups are not worked out anew, the stored values stand: PIM (line 23)";
+    assert_eq!(notes("S     -200.0 95.0", "S -200.0 95.0\nPIM"), [solve]);
+}
+
+#[test]
+fn distance_of_the_object_and_the_surface_named_must_be_there() {
+    let object = message("SO    0.0 0.1e11", "SO 0.0");
+    assert!(object.contains("16: SO: the distance to the object is missing"), "{object}");
+    let stop = message("  STO\n", "  STO S7\n");
+    assert!(stop.contains("18: STO: there is no surface S7 before this line"), "{stop}");
+}
+
 #[test]
 fn wavelength_that_a_glass_does_not_reach_is_noted() {
     let file = read(&DOUBLET.replace("PWL 700.0 480.0", "PWL 700.0 500.0")).unwrap();

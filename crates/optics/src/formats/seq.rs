@@ -2,17 +2,20 @@
 //!
 //! Read are radii or curvatures, thicknesses, glasses of the catalogue or of a private one (`PRV` … `END`), conics, even
 //! aspheres, cylinders (`CYL`), toroids (`YTO`, `XTO`) and anamorphic conics (`AAS`), decenters and tilts (basic, `DAR` or
-//! `REV`), apertures, the pupil, fields and wavelengths. Commands that change no ray (solves, variables, labels) are passed
-//! over; what changes rays and cannot be traced is refused.
+//! `REV`), apertures, the pupil, fields and wavelengths. Commands that change no ray (variables, labels) are passed over;
+//! solves, configurations (`ZOO`) and words that are not understood are noted with their line; what changes rays and cannot
+//! be traced is refused.
 
 mod command;
 mod surface;
+mod words;
 
 use crate::{CatalogueGlass, Glass, ImageSurface};
 
 use self::{
     command::{Command, commands_of},
     surface::SeqSurface,
+    words::PassedOver,
 };
 use super::{
     glasses::{Glasses, constant, model},
@@ -65,6 +68,7 @@ struct Seq<'a> {
     /// The comments before the first command: where the lens is from, and what else there is to say.
     remarks: Vec<String>,
     has_image: bool,
+    passed_over: PassedOver,
     notes: Vec<String>,
 }
 
@@ -96,6 +100,7 @@ impl<'a> Seq<'a> {
             surfaces: Vec::new(),
             remarks: Vec::new(),
             has_image: false,
+            passed_over: PassedOver::default(),
             notes: Vec::new(),
         }
     }
@@ -192,7 +197,8 @@ impl<'a> Seq<'a> {
             (true, false) => 1.0 / value,
             _ => value,
         };
-        let thickness = if command.words.len() > 2 { command.distance(2)? } else { 0.0 };
+        let states_thickness = command.words.len() > 2;
+        let thickness = if states_thickness { command.distance(2)? } else { 0.0 };
         let is_mirror = command.words.get(3).is_some_and(|word| is_mirror(word));
         let medium = match command.words.get(3) {
             Some(word) if !is_mirror => self.medium(word, command)?,
@@ -204,6 +210,7 @@ impl<'a> Seq<'a> {
             line,
             curvature,
             thickness,
+            states_thickness,
             medium,
             is_mirror,
             number_of_s,
@@ -214,18 +221,28 @@ impl<'a> Seq<'a> {
 
     /// Takes a command that belongs to a surface: the last, or the one that the first word after it names (`S3`).
     fn take_of_surface(&mut self, keyword: &str, command: &Command) -> Result<(), TextError> {
+        if self.passed_over.takes(keyword, &command.words, command.line) {
+            return Ok(());
+        }
         let command = &command.without_labels();
         let named = command.words.get(1).and_then(|word| self.surface_named(word));
         let place = if named.is_some() { 2 } else { 1 };
-        let Some(surface) = named.or(self.surfaces.len().checked_sub(1)) else { return Ok(()) };
+        if let Some(word) =
+            command.words.get(1).filter(|word| named.is_none() && keyword != "SLB" && is_number_of_surface(word))
+        {
+            return Err(command.wrong(format!("there is no surface {word} before this line")));
+        }
+        let Some(surface) = named.or(self.surfaces.len().checked_sub(1)) else {
+            self.passed_over.unknown(keyword, command.line);
+            return Ok(());
+        };
         match keyword {
             "SLB" => {
                 self.surfaces[surface].label = command.words.get(place).cloned().unwrap_or_default();
                 Ok(())
             }
             "STO" => {
-                self.surfaces.iter_mut().for_each(|surface| surface.is_stop = false);
-                self.surfaces[surface].is_stop = true;
+                self.put_stop(surface, command.line);
                 Ok(())
             }
             "GLA" | "GL1" => {
@@ -245,8 +262,40 @@ impl<'a> Seq<'a> {
                 }
                 Ok(())
             }
-            _ => self.surfaces[surface].take(keyword, command, place),
+            _ => {
+                if !self.surfaces[surface].take(keyword, command, place)? {
+                    self.passed_over.unknown(keyword, command.line);
+                }
+                Ok(())
+            }
         }
+    }
+
+    /// Puts the stop at a surface; a later STO takes the place of an earlier one.
+    fn put_stop(&mut self, surface: usize, line: usize) {
+        let before = self.surfaces.iter().position(|surface| surface.is_stop);
+        if let Some(before) = before.filter(|&before| before != surface) {
+            self.surfaces[before].is_stop = false;
+            self.notes.push(format!("two stops (STO): that of line {line}, S{surface}, takes the place of S{before}"));
+        }
+        self.surfaces[surface].is_stop = true;
+    }
+
+    /// Notes the surfaces whose distance to the next the file does not state; the object's must be.
+    fn check_thicknesses(&mut self) -> Result<(), TextError> {
+        let last = self.surfaces.len().saturating_sub(1);
+        for (number, surface) in
+            self.surfaces[..last].iter().enumerate().filter(|(_, surface)| !surface.states_thickness)
+        {
+            let line = surface.line;
+            if number == 0 {
+                let reason = "SO: the distance to the object is missing; expected its radius and its distance (1e10 and more \
+                     is infinitely far)";
+                return Err(TextError { line: Some(line), reason: reason.to_owned() });
+            }
+            self.notes.push(format!("surface S{number} (line {line}) states no thickness: 0 is taken"));
+        }
+        Ok(())
     }
 
     /// Returns the surface that a word as `S3`, `SO` or `SI` names.
@@ -326,6 +375,8 @@ impl<'a> Seq<'a> {
             let reason = "the file has no image surface (SI); expected SO, surfaces S and SI".to_owned();
             return Err(TextError { line: None, reason });
         }
+        self.check_thicknesses()?;
+        self.notes.extend(self.passed_over.notes());
         let mm = self.mm_per_unit;
         let n_surfaces = self.surfaces.len();
         let stop = self.surfaces.iter().position(|surface| surface.is_stop);
@@ -415,6 +466,12 @@ fn remarks_of(text: &str) -> Vec<String> {
 /// Whether the word in a glass's place makes the surface a mirror.
 fn is_mirror(word: &str) -> bool {
     word.eq_ignore_ascii_case("REFL")
+}
+
+/// Whether a word is `S` and a number, as surfaces are named.
+fn is_number_of_surface(word: &str) -> bool {
+    let digits = word.strip_prefix(['S', 's']).unwrap_or_default();
+    !digits.is_empty() && digits.bytes().all(|sign| sign.is_ascii_digit())
 }
 
 fn is_no(command: &Command) -> bool {

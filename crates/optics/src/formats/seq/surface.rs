@@ -24,6 +24,7 @@ pub(super) struct SeqSurface {
     /// What stands for it in `S`, where that was taken for a radius.
     pub(super) number_of_s: Option<f64>,
     pub(super) thickness: f64,
+    pub(super) states_thickness: bool,
     pub(super) medium: Option<Glass>,
     /// Whether it reflects; the medium behind it is then that before it.
     pub(super) is_mirror: bool,
@@ -218,10 +219,14 @@ pub(super) enum SeqKind {
 }
 
 impl SeqSurface {
-    /// Takes a command of this surface, whose first number is at a place among the command's words.
-    pub(super) fn take(&mut self, keyword: &str, command: &Command, place: usize) -> Result<(), TextError> {
+    /// Takes a command of this surface, whose first number is at a place among the command's words; false where no
+    /// surface has such a command.
+    pub(super) fn take(&mut self, keyword: &str, command: &Command, place: usize) -> Result<bool, TextError> {
         match keyword {
-            "THI" => self.thickness = command.distance(place)?,
+            "THI" => {
+                self.thickness = command.distance(place)?;
+                self.states_thickness = true;
+            }
             "CIR" => match command.words.get(place).map(|word| word.to_uppercase()).as_deref() {
                 Some("EDG") => {}
                 Some("HOL") => self.hole_radius = Some(command.number(place + 1)?),
@@ -248,13 +253,15 @@ impl SeqSurface {
             "XOD" | "YOD" | "ZOD" if command.number(place)? != 0.0 => {
                 return Err(command.wrong("tilts about another point than the vertex are not supported"));
             }
-            _ => self.take_shape(keyword, command, place)?,
+            // With 0 they change nothing.
+            "ARO" | "XOD" | "YOD" | "ZOD" => {}
+            _ => return self.take_shape(keyword, command, place),
         }
-        Ok(())
+        Ok(true)
     }
 
-    /// Takes what a command says of the surface's shape.
-    fn take_shape(&mut self, keyword: &str, command: &Command, place: usize) -> Result<(), TextError> {
+    /// Takes what a command says of the surface's shape; false where none has such a command.
+    fn take_shape(&mut self, keyword: &str, command: &Command, place: usize) -> Result<bool, TextError> {
         let curvature = || command.number(place).map(|radius| if radius == 0.0 { 0.0 } else { 1.0 / radius });
         match keyword {
             "RDY" => self.curvature = curvature()?,
@@ -270,6 +277,7 @@ impl SeqSurface {
             "AR" | "BR" | "CR" | "DR" | "AP" | "BP" | "CP" | "DP" if command.number(place)? != 0.0 => {
                 return Err(command.wrong("higher terms of an anamorphic asphere are not supported"));
             }
+            "AR" | "BR" | "CR" | "DR" | "AP" | "BP" | "CP" | "DP" => {}
             "GRT" | "GRO" | "GRS" | "GRX" | "GRY" | "GRZ" | "DIF" | "HOR" | "HWL" | "HCT" | "HCO" => {
                 self.phase.take(keyword, command, place)?;
             }
@@ -279,13 +287,12 @@ impl SeqSurface {
                     "surfaces of the kind '{what}' are not supported; expected spheres, K, ASP, CYL, YTO, XTO and AAS"
                 )));
             }
-            _ => {
-                if let Some(power) = "ABCDEFGHJ".find(keyword).filter(|_| keyword.len() == 1) {
-                    self.coefficients[power] = command.number(place)?;
-                }
-            }
+            _ => match "ABCDEFGHJ".find(keyword).filter(|_| keyword.len() == 1) {
+                Some(power) => self.coefficients[power] = command.number(place)?,
+                None => return Ok(false),
+            },
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Takes half a width of an aperture along x or y, or the place of its middle there; `OBS` before the number makes
