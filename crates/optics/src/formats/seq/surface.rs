@@ -281,6 +281,8 @@ impl SeqSurface {
             "GRT" | "GRO" | "GRS" | "GRX" | "GRY" | "GRZ" | "DIF" | "HOR" | "HWL" | "HCT" | "HCO" => {
                 self.phase.take(keyword, command, place)?;
             }
+            // The base curve of a Fresnel surface: with 0 there is none.
+            "CUF" => return Ok(command.number(place)? == 0.0),
             "SPS" | "SPL" | "HOE" => {
                 let what = command.words.join(" ");
                 return Err(command.wrong(format!(
