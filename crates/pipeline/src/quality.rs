@@ -43,6 +43,18 @@ impl Quality {
         self.most().map_or(1, |(most, _)| (4 * columns).div_ceil(5 * most).max(1))
     }
 
+    /// Returns the columns and rows that stand for those of the still life: all paintings of one shape that are fine enough for a preview or a sketch
+    /// look alike there, so that a change of its size paints nothing.
+    pub(crate) fn still_life_size(self, (columns, rows): (usize, usize)) -> (usize, usize) {
+        const COLUMNS: usize = 1080;
+        match self {
+            Self::Preview | Self::Sketch if columns >= COLUMNS / self.scene_binning(COLUMNS) => {
+                (COLUMNS, ((rows as f64 * COLUMNS as f64 / columns as f64).round() as usize).max(1))
+            }
+            _ => (columns, rows),
+        }
+    }
+
     /// Returns the bands that stand for those of the full picture: as many as it has, or fewer that cover its range evenly.
     pub(crate) fn bands_of(self, full: &WavelengthGrid) -> Result<WavelengthGrid, SpectrumError> {
         let Some((_, most)) = self.most().filter(|(_, most)| full.len() > *most) else { return Ok(full.clone()) };
@@ -71,5 +83,17 @@ mod tests {
     fn full_quality_bins_nothing() {
         assert_eq!((Quality::Full.film_binning(9000), Quality::Preview.film_binning(960)), (1, 2));
         assert_eq!((Quality::Preview.scene_binning(1080), Quality::Draft.scene_binning(1080)), (2, 1));
+    }
+
+    #[test]
+    fn still_lifes_of_one_shape_are_one_in_a_preview() {
+        for size in [(1080, 720), (1200, 800), (4500, 3000), (540, 360)] {
+            assert_eq!(Quality::Preview.still_life_size(size), (1080, 720));
+            assert_eq!((Quality::Full.still_life_size(size), Quality::Draft.still_life_size(size)), (size, size));
+        }
+        // Of another shape, and coarser than a preview's own samples.
+        assert_eq!(Quality::Preview.still_life_size((2000, 1000)), (1080, 540));
+        assert_eq!(Quality::Preview.still_life_size((480, 320)), (480, 320));
+        assert_eq!(Quality::Sketch.still_life_size((480, 320)), (1080, 720));
     }
 }

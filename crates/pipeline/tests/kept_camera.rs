@@ -226,6 +226,20 @@ fn preview_and_sketch_show_the_full_picture() {
     }
 }
 
+/// A still life of another size is painted again for a full picture, not for a sketch; of another shape for both.
+#[test]
+fn sketch_shows_still_lifes_of_one_shape_alike() {
+    let sized = |kept: &KeptCamera, columns, rows| {
+        kept.with(|camera| camera.scene.source = SceneSource::StillLife { columns, rows })
+    };
+    let kept = sized(&KeptCamera::new(small()), 300, 200).with_quality(Quality::Sketch);
+    let before = capture(&kept);
+    let again = capture(&sized(&kept, 330, 220));
+    assert_eq!((before.developed.picture.to_rgb8(), 1), (again.developed.picture.to_rgb8(), kept.stage_counts().scene));
+    capture(&sized(&kept, 300, 250));
+    assert_eq!(kept.stage_counts().scene, 2);
+}
+
 /// So does a draft: of a strip of the picture that has its edges and its blurs.
 #[test]
 fn draft_shows_the_full_picture() {

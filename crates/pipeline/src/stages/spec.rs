@@ -232,7 +232,7 @@ impl SceneInputs {
         Self {
             geometry: GeometryInputs {
                 given: given.scene.clone(),
-                source: as_seen(&scene.source),
+                source: as_seen(&scene.source, camera.film, quality),
                 field_of_view_deg: scene.field_of_view_deg,
                 depth_m: scene.depth_m,
                 flat: scene.flat.map(|flat| (flat, Box::new(LensInputs::of(camera, given)))),
@@ -283,13 +283,16 @@ impl IrradianceInputs {
     }
 }
 
-/// Returns a source as far as the view of it depends on it: not on the samples of rays from the film.
-fn as_seen(source: &SceneSource) -> SceneSource {
+/// Returns a source as far as the view of it depends on it: not on the samples of rays from the film, and a preview not on those of the still
+/// life, which are finer than its own, unless the film has as many.
+fn as_seen(source: &SceneSource, film: FilmSpec, quality: Quality) -> SceneSource {
     let mut seen = source.clone();
-    if let SceneSource::World(spec) = &mut seen
-        && spec.backward().is_some()
-    {
-        spec.effort = RenderEffort::default();
+    match &mut seen {
+        SceneSource::World(spec) if spec.backward().is_some() => spec.effort = RenderEffort::default(),
+        SceneSource::StillLife { columns, rows } if film != FilmSpec::Scene => {
+            (*columns, *rows) = quality.still_life_size((*columns, *rows));
+        }
+        _ => {}
     }
     seen
 }
