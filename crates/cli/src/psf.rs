@@ -5,7 +5,7 @@ use std::fmt::Write;
 use anyhow::Context;
 use dioptric_analysis::{LensDefaults, PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
 use dioptric_pipeline::{BankSpec, FocusSpec, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
-use dioptric_report::{chart_svg, write_drawing, write_psfs};
+use dioptric_report::{PsfFormat, chart_svg, write_drawing, write_psfs};
 
 use crate::{
     args::{BankKind, Common, PsfArgs, PsfMode},
@@ -48,6 +48,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     let reference_nm = request.reference_nm(&used.lens)?;
     let lens = arguments.lens.state.apply(used, reference_nm, common)?.lens;
     // The place is tried before the work.
+    let format = arguments.output.as_deref().map(PsfFormat::of).transpose()?;
     let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
     let csv = arguments.csv.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
     let plots = arguments.plots.as_ref().map(|folder| Staged::folder(folder)).transpose()?.map(guarded);
@@ -64,8 +65,8 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         staged.commit()?;
         remark(common.quiet, &format!("wrote {}", path.display()));
     }
-    if let (Some(staged), Some(path)) = (staged, &arguments.output) {
-        write_psfs(&set, staged.path())?;
+    if let (Some(staged), Some(path), Some(format)) = (staged, &arguments.output, format) {
+        write_psfs(&set, staged.path(), format)?;
         staged.commit()?;
         remark(common.quiet, &format!("wrote {}", path.display()));
     }

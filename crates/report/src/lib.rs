@@ -28,7 +28,7 @@ pub use light_field::{LightFieldReport, write_light_field};
 pub use measurement::write_measurement;
 pub use methods::{comparison_picture, write_comparison};
 pub use plots::chart_svg;
-pub use psf::{MosaicPlan, PsfMosaic, psf_mosaic, write_psfs};
+pub use psf::{MosaicPlan, PsfFormat, PsfMosaic, psf_mosaic, write_psfs};
 pub use run::{write_run, write_sensed};
 #[cfg(feature = "png")]
 pub use svg_png::svg_to_png;

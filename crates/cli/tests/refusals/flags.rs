@@ -109,7 +109,8 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("psf dgauss-50mm --focus-mm 2000 --size 100000000 -o x.exr", "psf: size is 100000000, expected 1 to 4097"),
     ("psf dgauss-50mm --focus-mm 2000 --mode exact", "invalid value 'exact' for '--mode <MODE>'"),
     ("psf dgauss-50mm --focus-mm 2000 --mode paper --rays 0", "psf: rays is 0, expected 2 to 20000"),
-    ("psf dgauss-50mm --focus-mm 2000 -o x.bmp", "is no format of pictures here"),
+    ("psf dgauss-50mm --focus-mm 2000 -o x.bmp", "cannot write x.bmp: '.bmp' is no format of pictures here"),
+    ("psf dgauss-50mm --focus-mm 2000 -o x", "cannot write x: a name without an ending is no format of pictures here"),
     (
         "psf dgauss-50mm --focus-mm 2000 --spectral-weights 1,2 --polychromatic --wavelengths-nm 550",
         "psf: spectral_weights is [1.0, 2.0], expected 1 numbers",

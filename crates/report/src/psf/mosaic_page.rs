@@ -129,18 +129,43 @@ fn draw_bar(sheet: &mut RgbImage, (x, y): (u32, u32), length: u32) {
     }
 }
 
-/// Writes the pictures of point spread functions: an EXR with a channel a picture where the path ends in `.exr`, a labelled
-/// PNG [mosaic](psf_mosaic) where it ends in `.png`.
+/// How pictures of point spread functions are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PsfFormat {
+    /// An EXR with a channel a picture (`.exr`).
+    Exr,
+    /// A labelled [mosaic](psf_mosaic) (`.png`).
+    Png,
+}
+
+impl PsfFormat {
+    /// Returns the format that the name of a file ends in, of any case.
+    ///
+    /// # Errors
+    /// When it ends in neither.
+    pub fn of(path: &Path) -> Result<Self, PipelineError> {
+        let cannot = |what: String| PipelineError::Write {
+            path: path.to_owned(),
+            reason: format!("{what} is no format of pictures here; expected .exr or .png"),
+        };
+        let Some(extension) = path.extension() else { return Err(cannot("a name without an ending".to_owned())) };
+        match extension.to_string_lossy().to_lowercase().as_str() {
+            "exr" => Ok(Self::Exr),
+            "png" => Ok(Self::Png),
+            other => Err(cannot(format!("'.{other}'"))),
+        }
+    }
+}
+
+/// Writes the pictures of point spread functions.
 ///
 /// # Errors
-/// When the file cannot be written, or its name ends in neither.
-pub fn write_psfs(set: &PsfSet, path: &Path) -> Result<(), PipelineError> {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let cannot = |reason: String| PipelineError::Write { path: path.to_owned(), reason };
-    match extension.as_str() {
-        "exr" => set.write_exr(path),
-        "png" => std::fs::write(path, png_bytes(&psf_mosaic(set)?)?).map_err(|e| cannot(e.to_string())),
-        _ => Err(cannot(format!("'.{extension}' is no format of pictures here; expected .exr or .png"))),
+/// When the file cannot be written.
+pub fn write_psfs(set: &PsfSet, path: &Path, format: PsfFormat) -> Result<(), PipelineError> {
+    let cannot = |e: std::io::Error| PipelineError::Write { path: path.to_owned(), reason: e.to_string() };
+    match format {
+        PsfFormat::Exr => set.write_exr(path),
+        PsfFormat::Png => std::fs::write(path, png_bytes(&psf_mosaic(set)?)?).map_err(cannot),
     }
 }
 
