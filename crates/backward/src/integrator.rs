@@ -37,6 +37,9 @@ impl LightPaths {
 
 /// Scatterings from which on Russian roulette may end a path.
 const ROULETTE_FROM: u32 = 3;
+/// Scatterings from which on a path that has lost nothing may end too, as within glass that reflects it totally again and again. Sooner, the few paths
+/// that end would be rarer than what the spread of some passes shows.
+const ENDS_FROM: u32 = 16;
 /// The greatest chance to go on.
 const MOST_LIKELY: f32 = 0.95;
 /// Pairs of numbers that a scattering takes.
@@ -126,7 +129,8 @@ impl Integrator<'_> {
                 return sum;
             }
             if path.n_scatterings >= ROULETTE_FROM {
-                let chance = greatest.min(MOST_LIKELY);
+                let most_likely = if path.n_scatterings < ENDS_FROM { 1.0 } else { MOST_LIKELY };
+                let chance = greatest.min(most_likely);
                 if random.pair(pair + ROULETTE)[0] >= chance {
                     return sum;
                 }
