@@ -152,7 +152,8 @@ fn lamp_and_camera_change_places() {
     let textured =
         |builder: &mut WorldBuilder, value: f32| builder.add_texture(Texture::Curve(SpectralCurve::constant(value)));
     let curve = SpectralCurve::constant;
-    let materials: [(&str, &dyn Fn(&mut WorldBuilder) -> Material); 4] = [
+    type Make<'a> = &'a dyn Fn(&mut WorldBuilder) -> Material;
+    let materials: [(&str, Make<'_>); 4] = [
         ("matte", &|b| Material::Matte { reflectance: textured(b, 0.6) }),
         ("metal", &|b| Material::Metal {
             n: curve(0.2),
