@@ -189,7 +189,7 @@ impl Values {
         let between = |first: f64, last: f64, count: usize, at: &dyn Fn(f64, f64) -> f64| match index {
             0 => Value::number(first),
             _ if index + 1 == count => Value::number(last),
-            _ => Value::number(at(index as f64, (count - 1) as f64)),
+            _ => Value::number(as_typed(at(index as f64, (count - 1) as f64))),
         };
         match self {
             Self::List(values) => values[index].clone(),
@@ -203,6 +203,11 @@ impl Values {
             }
         }
     }
+}
+
+/// Returns a number without the digits that rounding left: .0004 of .0002 and .0016, not .00039999999999999996. Whole numbers stay.
+fn as_typed(number: f64) -> f64 {
+    if number.fract() == 0.0 { number } else { format!("{number:.11e}").parse().unwrap_or(number) }
 }
 
 impl Distribution {
@@ -399,11 +404,10 @@ mod tests {
     #[test]
     fn log_steps_have_one_ratio() {
         let steps = numbers(r#"Grid({"t": Log(first: 0.001, last: 1, count: 4)})"#);
-        for (step, expected) in steps.iter().zip([1e-3, 1e-2, 1e-1, 1.0]) {
-            // Of an exponential and a logarithm, each rounded once.
-            assert!((step[0] / expected - 1.0).abs() < 4e-15, "{step:?}");
-        }
-        assert_eq!((steps[0][0], steps[3][0]), (0.001, 1.0));
+        // As one would type them, in camera files, tables and legends.
+        assert_eq!(steps, [[1e-3], [1e-2], [1e-1], [1.0]]);
+        assert_eq!(numbers(r#"Grid({"t": Log(first: 0.0002, last: 0.0016, count: 4)})"#)[1], [0.0004]);
+        assert_eq!(numbers(r#"Grid({"t": Linear(first: 0, last: 1, count: 11)})"#)[3], [0.3]);
         assert_eq!(numbers(r#"Grid({"t": Log(first: 2, last: 3, count: 1)})"#), [[2.0]]);
     }
 
