@@ -205,9 +205,13 @@ impl Values {
     }
 }
 
-/// Returns a number without the digits that rounding left: .0004 of .0002 and .0016, not .00039999999999999996. Whole numbers stay.
+/// Returns a number without the digits that rounding left: .0004 of .0002 and .0016, not .00039999999999999996. What is no short number, a third,
+/// stays as it is.
 fn as_typed(number: f64) -> f64 {
-    if number.fract() == 0.0 { number } else { format!("{number:.11e}").parse().unwrap_or(number) }
+    // An exponential, a logarithm and a product, each off by a few last digits.
+    const ROUNDING: f64 = 32.0 * f64::EPSILON;
+    let short: f64 = format!("{number:.11e}").parse().unwrap_or(number);
+    if (short - number).abs() <= ROUNDING * number.abs() { short } else { number }
 }
 
 impl Distribution {
@@ -408,6 +412,7 @@ mod tests {
         assert_eq!(steps, [[1e-3], [1e-2], [1e-1], [1.0]]);
         assert_eq!(numbers(r#"Grid({"t": Log(first: 0.0002, last: 0.0016, count: 4)})"#)[1], [0.0004]);
         assert_eq!(numbers(r#"Grid({"t": Linear(first: 0, last: 1, count: 11)})"#)[3], [0.3]);
+        assert_eq!(numbers(r#"Grid({"t": Linear(first: 0, last: 1, count: 4)})"#)[1], [1.0 / 3.0]);
         assert_eq!(numbers(r#"Grid({"t": Log(first: 2, last: 3, count: 1)})"#), [[2.0]]);
     }
 
