@@ -40,7 +40,7 @@ const ROULETTE_FROM: u32 = 3;
 /// Scatterings from which on a path that has lost nothing may end too, as within glass that reflects it totally again and again. Sooner, the few paths
 /// that end would be rarer than what the spread of some passes shows.
 const ENDS_FROM: u32 = 16;
-/// The greatest chance to go on.
+/// The greatest chance to go on from there.
 const MOST_LIKELY: f32 = 0.95;
 /// Pairs of numbers that a scattering takes.
 const PAIRS: u32 = 3;
