@@ -226,6 +226,33 @@ fn preview_and_sketch_show_the_full_picture() {
     }
 }
 
+/// A plain wall out of focus stays plain in a preview through a lens whose blur changes fast over the film.
+#[test]
+fn previews_of_a_plain_wall_have_no_seams() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wall.exr");
+    let grid = WavelengthGrid::uniform(500.0, 600.0, 100.0).unwrap();
+    let planes = vec![ndarray::Array2::from_elem((64, 96), 0.01); 2];
+    write_spectral_exr(&path, &SpectralImage::new(Quantity::Radiance, grid, planes).unwrap(), &ExrParts::default())
+        .unwrap();
+    let mut camera = small();
+    camera.scene = dioptric_pipeline::SceneSpec::of_file(path);
+    (camera.scene.depth_m, camera.scene.field_of_view_deg) = (Some(0.5), Some(60.0));
+    camera.wavelengths = WavelengthSpec::default();
+    camera.lens = dioptric_pipeline::LensSpec::BuiltIn("paper-2el".into());
+    camera.stop = StopSpec::FNumber(5.0);
+    camera.focus = FocusSpec::DistanceMm(1000.0);
+    camera.film = FilmSpec::Pixels { columns: 480, rows: 320, pitch_um: 66.0 };
+    let wall = capture(&KeptCamera::new(camera).with_quality(Quality::Preview));
+    let band = wall.irradiance.band(0).unwrap();
+    let mean = band.mean().unwrap();
+    let bend = |r: usize, c: usize| (band[(r, c + 1)] - 2.0 * band[(r, c)] + band[(r, c - 1)]).abs() / mean;
+    let worst = (40..280).flat_map(|r| (40..440).map(move |c| (r, c))).map(|(r, c)| bend(r, c)).fold(0.0, f32::max);
+    println!("largest second difference {worst:.4} of the mean");
+    // 2.0 % was measured, here and before wide blurs had wide pixels 1.5; 6 % where terms of a hundredth of an edge were left out.
+    assert!(worst < 0.025, "{worst}");
+}
+
 /// A still life of another size is painted again for a full picture, not for a sketch; of another shape for both.
 #[test]
 fn sketch_shows_still_lifes_of_one_shape_alike() {
