@@ -96,6 +96,11 @@ fn changes(kept: &KeptCamera, sensors: &[std::path::PathBuf], only: Option<&str>
     of("scene: another painting", &|camera, i| {
         camera.scene.source = SceneSource::StillLife { columns: 1080 + 30 * (1 + i), rows: 720 + 20 * (1 + i) };
     });
+    // Of another shape each, by a fiftieth.
+    of("scene: another shape", &|camera, i| {
+        camera.scene.source = SceneSource::StillLife { columns: 1080, rows: 720 - 15 * (1 + i) };
+    });
+    of("scene: field of view", &|camera, i| camera.scene.field_of_view_deg = Some(35.0 + 0.5 * i as f64));
     of("scene: a target", &|camera, i| {
         (camera.scene.field_of_view_deg, camera.scene.depth_m) = (Some(34.0), Some(1.5));
         camera.scene.source =

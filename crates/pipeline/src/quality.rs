@@ -22,6 +22,9 @@ pub enum Quality {
     Full,
 }
 
+/// Columns of the still life that stand for more or fewer in previews and sketches.
+const STILL_LIFE_COLUMNS: usize = 1080;
+
 impl Quality {
     /// The most columns of a film and the most bands.
     fn most(self) -> Option<(usize, usize)> {
@@ -46,13 +49,19 @@ impl Quality {
     /// Returns the columns and rows that stand for those of the still life: all paintings of one shape that are fine enough for a preview or a sketch
     /// look alike there, so that a change of its size paints nothing.
     pub(crate) fn still_life_size(self, (columns, rows): (usize, usize)) -> (usize, usize) {
-        const COLUMNS: usize = 1080;
-        match self {
-            Self::Preview | Self::Sketch if columns >= COLUMNS / self.scene_binning(COLUMNS) => {
-                (COLUMNS, ((rows as f64 * COLUMNS as f64 / columns as f64).round() as usize).max(1))
+        match self.canvas_columns() {
+            Some(least) if columns >= least => {
+                let height = rows as f64 * STILL_LIFE_COLUMNS as f64 / columns as f64;
+                (STILL_LIFE_COLUMNS, (height.round() as usize).max(1))
             }
             _ => (columns, rows),
         }
+    }
+
+    /// Returns the columns of the still life in a preview or a sketch, where it is fine enough.
+    pub(crate) fn canvas_columns(self) -> Option<usize> {
+        let is_coarse = matches!(self, Self::Preview | Self::Sketch);
+        is_coarse.then(|| STILL_LIFE_COLUMNS / self.scene_binning(STILL_LIFE_COLUMNS))
     }
 
     /// Returns the bands that stand for those of the full picture: as many as it has, or fewer that cover its range evenly.

@@ -214,15 +214,18 @@ fn preview_and_sketch_show_the_full_picture() {
     camera.film = FilmSpec::Pixels { columns: 600, rows: 400, pitch_um: 52.8 };
     camera.scene.source = SceneSource::StillLife { columns: 680, rows: 454 };
     camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 20.0 };
-    let kept = KeptCamera::new(camera);
-    let full = capture(&kept);
-    let preview = capture(&kept.with_quality(Quality::Preview));
-    let sketch = capture(&kept.with_quality(Quality::Sketch));
-    assert_eq!((sketch.place.rows, sketch.place.columns, sketch.grid().len()), (100, 150, 4));
-    for (few, binning, most) in [(&preview, 2, 0.025), (&sketch, 4, 0.05)] {
-        let (rms, found) = rms_from_full(&full, few);
-        println!("{:?}: rms {rms:.4} of full scale", few.quality);
-        assert!(found == binning && rms < most, "{rms}");
+    // As it is arranged, and in a field of view that previews take from a wider or a finer painting.
+    for fov_deg in [34.0, 37.0, 33.0] {
+        let kept = KeptCamera::new(camera.clone()).with(|camera| camera.scene.field_of_view_deg = Some(fov_deg));
+        let full = capture(&kept);
+        let preview = capture(&kept.with_quality(Quality::Preview));
+        let sketch = capture(&kept.with_quality(Quality::Sketch));
+        assert_eq!((sketch.place.rows, sketch.place.columns, sketch.grid().len()), (100, 150, 4));
+        for (few, binning, most) in [(&preview, 2, 0.025), (&sketch, 4, 0.05)] {
+            let (rms, found) = rms_from_full(&full, few);
+            println!("{fov_deg}°, {:?}: rms {rms:.4} of full scale", few.quality);
+            assert!(found == binning && rms < most, "{rms}");
+        }
     }
 }
 
@@ -253,9 +256,9 @@ fn previews_of_a_plain_wall_have_no_seams() {
     assert!(worst < 0.025, "{worst}");
 }
 
-/// A still life of another size is painted again for a full picture, not for a sketch; of another shape for both.
+/// A still life of another size is the same to a sketch; one of another shape, field of view or light is taken from a painting that is larger.
 #[test]
-fn sketch_shows_still_lifes_of_one_shape_alike() {
+fn sketches_paint_the_still_life_once() {
     let sized = |kept: &KeptCamera, columns, rows| {
         kept.with(|camera| camera.scene.source = SceneSource::StillLife { columns, rows })
     };
@@ -263,8 +266,15 @@ fn sketch_shows_still_lifes_of_one_shape_alike() {
     let before = capture(&kept);
     let again = capture(&sized(&kept, 330, 220));
     assert_eq!((before.developed.picture.to_rgb8(), 1), (again.developed.picture.to_rgb8(), kept.stage_counts().scene));
-    capture(&sized(&kept, 300, 250));
-    assert_eq!(kept.stage_counts().scene, 2);
+    capture(&sized(&kept, 300, 190));
+    capture(&kept.with(|camera| camera.scene.illuminance_lux = Some(100.0)));
+    assert_eq!((kept.stage_counts().scene, kept.stage_counts().painting), (3, 1));
+    // Wider than the first painting by up to 19 %.
+    for (n_scenes, fov_deg) in [(4, 36.0), (5, 37.0), (6, 39.0)] {
+        let wider = capture(&kept.with(|camera| camera.scene.field_of_view_deg = Some(fov_deg)));
+        assert_eq!((kept.stage_counts().scene, kept.stage_counts().painting), (n_scenes, 2));
+        assert_ne!(wider.developed.picture.to_rgb8(), before.developed.picture.to_rgb8());
+    }
 }
 
 /// So does a draft: of a strip of the picture that has its edges and its blurs.

@@ -21,6 +21,7 @@ mod error;
 mod formats;
 mod light;
 mod preview;
+mod reframe;
 mod resample;
 mod scene;
 mod shown;

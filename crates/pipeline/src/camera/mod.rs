@@ -34,6 +34,7 @@ pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm
 pub use light_field::LightFieldSpec;
 pub use movements::Movements;
 pub use picture_options::PictureOptions;
+pub(crate) use scene::bands_or_own;
 pub use scene::{FlatSize, SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
 pub use world::{RenderEffort, RenderMethod, WorldSpec};

@@ -9,11 +9,11 @@ use dioptric_scene::{
     FillDepth, Pattern, ReadOptions, Scene, SceneLight, StillLife, Target, TargetLight, View, read_hidden_layer,
     read_scene,
 };
-use dioptric_spectrum::{Cancel, DepthMap, Illuminant, WavelengthGrid};
+use dioptric_spectrum::{DepthMap, Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
 use super::{check::Checker, world::WorldSpec};
-use crate::{PaintingFolder, PipelineError};
+use crate::PipelineError;
 
 /// What stands before the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -228,27 +228,29 @@ impl SceneSpec {
     /// # Errors
     /// When a file cannot be read, lacks what is needed or holds what cannot be.
     pub fn open(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
-        self.open_with(wanted, None, &|_| {}, &Cancel::new())
+        self.open_with(wanted, |life, grid| Ok(life.scene(grid)?))
     }
 
-    /// As [`open`](Self::open); the still life is taken from `paintings` where it is there, and kept there. `progress` gets the part that is done, 0–1, where a scene is painted, which a cancel ends
-    /// within milliseconds. Reading a file is one step.
+    /// Returns the still life of this size as it is pictured.
+    pub(crate) fn still_life(&self, columns: usize, rows: usize) -> StillLife {
+        let usual = StillLife::new(columns, rows);
+        StillLife { horizontal_fov_deg: self.field_of_view_deg.unwrap_or(usual.horizontal_fov_deg), ..usual }
+    }
+
+    /// As [`open`](Self::open); where it is the still life, `paint` has or makes it.
     ///
     /// # Errors
-    /// As [`open`](Self::open), and when the work is cancelled.
-    pub fn open_with(
+    /// As [`open`](Self::open), and those of `paint`.
+    pub(crate) fn open_with(
         &self,
         wanted: Option<&WavelengthGrid>,
-        paintings: Option<&PaintingFolder>,
-        progress: &(dyn Fn(f64) + Sync),
-        cancel: &Cancel,
+        paint: impl FnOnce(&StillLife, &WavelengthGrid) -> Result<Scene, PipelineError>,
     ) -> Result<Scene, PipelineError> {
         if self.flat.is_some() && self.depth_m.is_none() {
             let reason =
                 "a scene by its size is seen through a lens, expected a camera's, or a field of view and a depth";
             return Err(PipelineError::Unsuitable { what: "flat", reason: reason.to_owned() });
         }
-        let own_or = || wanted.cloned().map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok);
         let light = self.illuminant.clone().unwrap_or(Illuminant::D65);
         let illuminance_lux = self.illuminance_lux.unwrap_or(USUAL_LUX);
         let mut scene = match &self.source {
@@ -275,13 +277,7 @@ impl SceneSpec {
                 return Err(PipelineError::Unsuitable { what: "scene", reason });
             }
             SceneSource::StillLife { columns, rows } => {
-                let usual = StillLife::new(*columns, *rows);
-                let horizontal_fov_deg = self.field_of_view_deg.unwrap_or(usual.horizontal_fov_deg);
-                let (life, grid) = (StillLife { horizontal_fov_deg, ..usual }, own_or()?);
-                match paintings {
-                    Some(folder) => folder.scene(&life, &grid, progress, cancel)?,
-                    None => life.scene_with(&grid, progress, cancel)?,
-                }
+                paint(&self.still_life(*columns, *rows), &bands_or_own(wanted)?)?
             }
             SceneSource::Target { pattern, columns, rows } => Target {
                 pattern: *pattern,
@@ -294,7 +290,7 @@ impl SceneSpec {
                 horizontal_fov_deg: self.field_of_view_deg.unwrap_or(f64::NAN),
                 distance_m: self.depth_m.unwrap_or(f64::NAN),
             }
-            .scene(&own_or()?)?,
+            .scene(&bands_or_own(wanted)?)?,
         };
         self.light_up(&mut scene)?;
         Ok(scene)
@@ -355,6 +351,11 @@ impl SceneSpec {
             *hidden = folder.join(&hidden);
         }
     }
+}
+
+/// Returns the bands wanted, or those of what is computed: 400 nm to 700 nm in steps of 10 nm.
+pub(crate) fn bands_or_own(wanted: Option<&WavelengthGrid>) -> Result<WavelengthGrid, PipelineError> {
+    Ok(wanted.cloned().map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?)
 }
 
 fn check_size(checker: &Checker<'_>, columns: usize, rows: usize) -> Result<(), PipelineError> {

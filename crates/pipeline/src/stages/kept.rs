@@ -21,6 +21,7 @@ use super::{
     lens_tables::{LensAberrations, TableParts},
     memory::MemoryBudget,
     narrow_surfaces::NarrowSurfaces,
+    painting::{PaintingInputs, Paintings},
     plan,
     scene::{self, ResolvedScene, SceneSummary},
     slot::Slot,
@@ -75,6 +76,7 @@ pub struct KeptCamera {
 pub(super) struct KeptResults {
     pub(super) lens: Slot<LensInputs, ResolvedLens>,
     pub(super) world: Slot<WorldInputs, World>,
+    painting: Slot<PaintingInputs, Scene>,
     pub(super) scene: Slot<SceneInputs, ResolvedScene>,
     pub(super) summary: Slot<SceneInputs, SceneSummary>,
     pub(super) depth: Slot<GeometryInputs, DepthMap>,
@@ -94,6 +96,7 @@ impl Default for KeptResults {
         Self {
             lens: Slot::new(8),
             world: Slot::new(2),
+            painting: Slot::new(4),
             scene: Slot::new(2),
             summary: Slot::new(8),
             depth: Slot::new(2),
@@ -114,6 +117,8 @@ impl Default for KeptResults {
 pub struct StageCounts {
     /// Lenses resolved.
     pub lens: usize,
+    /// Pictures of the still life painted for previews.
+    pub painting: usize,
     /// Scenes read or made.
     pub scene: usize,
     /// Films placed.
@@ -279,6 +284,7 @@ impl KeptCamera {
         let kept = &*self.kept;
         StageCounts {
             lens: kept.lens.n_made(),
+            painting: kept.painting.n_made(),
             scene: kept.scene.n_made(),
             film: kept.film.n_made(),
             bank: kept.bank.n_made(),
@@ -519,7 +525,8 @@ impl Chain<'_> {
                 None => {
                     let lens = inputs.geometry.flat.as_ref().map(|(_, lens)| self.lens(lens)).transpose()?;
                     let pupil_z_mm = lens.map(|lens| lens.reference.projection_center_z_mm());
-                    scene::open(inputs, pupil_z_mm, self.paintings, &self.watch)?
+                    let paintings = Paintings { kept: &self.kept.painting, folder: self.paintings };
+                    scene::open(inputs, pupil_z_mm, paintings, &self.watch)?
                 }
             };
             self.watch.progress.at(Stage::Scene, 1.0);

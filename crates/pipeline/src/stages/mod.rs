@@ -3,6 +3,7 @@
 //! | stage | made from |
 //! |---|---|
 //! | lens | lens, what its file leaves open, stop, movements |
+//! | painting | the still life of a preview: size, field of view, bands |
 //! | scene | source, field of view, depth, bands; its light |
 //! | film | lens, geometry of the scene, focus, raster |
 //! | bank | film, diffraction, sampling |
@@ -28,6 +29,7 @@ mod lens_tables;
 mod light_field;
 mod memory;
 mod narrow_surfaces;
+mod painting;
 mod plan;
 mod rendering;
 mod resume;

@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Watch,
+    painting::Paintings,
     spec::{GeometryInputs, SceneInputs},
 };
-use crate::{PaintingFolder, PipelineError, Quality, SceneSource, SceneSpec, Stage};
+use crate::{PipelineError, Quality, SceneSource, SceneSpec, camera::bands_or_own};
 
 /// A scene in brief: what the stages after the imaging need of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,11 +78,11 @@ pub struct ResolvedScene {
 pub(super) fn open(
     inputs: &SceneInputs,
     pupil_z_mm: Option<f64>,
-    paintings: Option<&PaintingFolder>,
+    paintings: Paintings<'_>,
     watch: &Watch<'_>,
 ) -> Result<ResolvedScene, PipelineError> {
-    let read = |scene, wanted| read(scene, wanted, paintings, watch);
     let GeometryInputs { source, wavelengths, quality, .. } = &inputs.geometry;
+    let read = |scene, wanted| read(scene, wanted, *quality, paintings, watch);
     let wanted = wavelengths.grid()?;
     let whole = inputs.choice();
     let whole = match pupil_z_mm {
@@ -115,7 +116,7 @@ pub(super) fn open(
             Ok(ResolvedScene { scene: read(choice(source.clone()), wanted)?, binning: 1 })
         }
         Some((thinned, binning)) => {
-            let bands = wanted.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
+            let bands = bands_or_own(wanted.as_ref())?;
             Ok(ResolvedScene { scene: read(choice(thinned), Some(quality.bands_of(&bands)?))?, binning })
         }
         None => {
@@ -130,16 +131,15 @@ pub(super) fn open(
 fn read(
     scene: SceneSpec,
     wanted: Option<WavelengthGrid>,
-    paintings: Option<&PaintingFolder>,
+    quality: Quality,
+    paintings: Paintings<'_>,
     watch: &Watch<'_>,
 ) -> Result<Scene, PipelineError> {
     match scene.source {
-        SceneSource::StillLife { .. } => {
-            let report = |part| watch.progress.at(Stage::Scene, part);
-            let (cancel, paintings) = (watch.cancel.clone(), paintings.cloned());
-            watch.run_reporting(&report, move |progress| {
-                scene.open_with(wanted.as_ref(), paintings.as_ref(), progress, &cancel)
-            })
+        SceneSource::StillLife { columns, rows } => {
+            let (life, grid) = (scene.still_life(columns, rows), bands_or_own(wanted.as_ref())?);
+            let painting = paintings.scene(&life, &grid, quality, watch)?;
+            watch.run(move || scene.open_with(Some(&grid), |_, _| Ok(painting)))
         }
         SceneSource::File(_) | SceneSource::Target { .. } | SceneSource::World(_) => {
             watch.run(move || scene.open(wanted.as_ref()))

@@ -1,0 +1,124 @@
+//! The still life as previews see it: painted once, a little wider and finer than it is wanted, so that another light, another field of view
+//! or another shape paints nothing.
+
+use dioptric_scene::{Scene, StillLife, View};
+use dioptric_spectrum::WavelengthGrid;
+
+use super::{Watch, slot::Slot};
+use crate::{PaintingFolder, PipelineError, Quality, Stage};
+
+/// A picture of the still life on these bands.
+pub(crate) type PaintingInputs = (StillLife, WavelengthGrid);
+
+/// Steps to twice the width, the height or the fineness of a canvas.
+const STEPS_PER_OCTAVE: f64 = 4.0;
+
+/// Where paintings come from.
+#[derive(Clone, Copy)]
+pub(super) struct Paintings<'a> {
+    /// Those of previews.
+    pub(super) kept: &'a Slot<PaintingInputs, Scene>,
+    /// Those of earlier runs.
+    pub(super) folder: Option<&'a PaintingFolder>,
+}
+
+impl Paintings<'_> {
+    /// Returns the still life, painted now where it is not kept.
+    pub(super) fn scene(
+        &self,
+        life: &StillLife,
+        grid: &WavelengthGrid,
+        quality: Quality,
+        watch: &Watch<'_>,
+    ) -> Result<Scene, PipelineError> {
+        let Some(canvas) = canvas_of(life, quality) else { return self.painted(life, grid, watch) };
+        let make = |(canvas, grid): &PaintingInputs| self.painted(canvas, grid, watch);
+        let painting = self.kept.get_or_make((canvas, grid.clone()), make)?;
+        if canvas == *life {
+            return Ok((*painting).clone());
+        }
+        let StillLife { rows, columns, horizontal_fov_deg, .. } = *life;
+        let view = View::from_horizontal_fov_deg(horizontal_fov_deg, columns, rows)?;
+        watch.run(move || Ok(painting.reframed(view, rows, columns)?))
+    }
+
+    fn painted(&self, life: &StillLife, grid: &WavelengthGrid, watch: &Watch<'_>) -> Result<Scene, PipelineError> {
+        let report = |part| watch.progress.at(Stage::Scene, part);
+        let (cancel, folder, life, grid) = (watch.cancel.clone(), self.folder.cloned(), *life, grid.clone());
+        watch.run_reporting(&report, move |progress| match folder {
+            Some(folder) => folder.scene(&life, &grid, progress, &cancel),
+            None => Ok(life.scene_with(&grid, progress, &cancel)?),
+        })
+    }
+}
+
+/// Returns the picture that a preview of the still life is taken from: as wide and as high as it and at least as fine, all three in steps of
+/// 19 %; the picture that the arrangement is made for is its own. `None` for a picture that is not worth one: a coarse or a full one.
+fn canvas_of(life: &StillLife, quality: Quality) -> Option<StillLife> {
+    let columns = quality.canvas_columns()?;
+    if life.columns != columns || life.with_hidden {
+        return None;
+    }
+    let usual = StillLife::new(columns, 2 * columns / 3);
+    let half_width = |life: &StillLife| (0.5 * life.horizontal_fov_deg).to_radians().tan();
+    let half_height = |life: &StillLife| half_width(life) * life.rows as f64 / life.columns as f64;
+    let steps = |factor: f64| STEPS_PER_OCTAVE * factor.log2();
+    // A step is not missed by rounding.
+    let up = |factor: f64| (steps(factor) - 1e-6).ceil();
+    let stretched = |size: f64, n_steps: f64| size * (n_steps / STEPS_PER_OCTAVE).exp2();
+    let width = stretched(half_width(&usual), up(half_width(life) / half_width(&usual)));
+    let height = stretched(half_height(&usual), up(half_height(life) / half_height(&usual)));
+    let finer = up(half_width(&usual) / half_width(life));
+    let samples_per_tan = stretched(0.5 * columns as f64 / half_width(&usual), finer);
+    let count = |half_size: f64| (2.0 * half_size * samples_per_tan - 1e-6).ceil();
+    let (columns, rows) = (count(width), count(height));
+    let horizontal_fov_deg = 2.0 * (0.5 * columns / samples_per_tan).atan().to_degrees();
+    let canvas = StillLife { columns: columns as usize, rows: rows as usize, horizontal_fov_deg, with_hidden: false };
+    let is_usual = (canvas.columns, canvas.rows) == (usual.columns, usual.rows) && finer == 0.0;
+    Some(if is_usual { usual } else { canvas })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn preview(fov_deg: f64, rows: usize) -> StillLife {
+        StillLife { horizontal_fov_deg: fov_deg, ..StillLife::new(540, rows) }
+    }
+
+    #[test]
+    fn the_picture_of_the_arrangement_is_its_own_canvas() {
+        assert_eq!(canvas_of(&StillLife::new(540, 360), Quality::Preview), Some(StillLife::new(540, 360)));
+        assert_eq!(canvas_of(&StillLife::new(180, 120), Quality::Sketch), Some(StillLife::new(180, 120)));
+        // Of a full or a coarse picture there is none.
+        assert_eq!(canvas_of(&StillLife::new(1080, 720), Quality::Full), None);
+        assert_eq!(canvas_of(&StillLife::new(480, 320), Quality::Preview), None);
+    }
+
+    #[test]
+    fn canvases_cover_what_is_wanted_and_little_more() {
+        for tenth in 50..1600 {
+            for rows in [100, 300, 360, 405, 960] {
+                let life = preview(0.1 * f64::from(tenth), rows);
+                let canvas = canvas_of(&life, Quality::Preview).unwrap();
+                let tan = |life: &StillLife| (0.5 * life.horizontal_fov_deg).to_radians().tan();
+                let pitch = |life: &StillLife| 2.0 * tan(life) / life.columns as f64;
+                let height = |life: &StillLife| pitch(life) * life.rows as f64;
+                let finer = pitch(&life) / pitch(&canvas);
+                assert!((1.0 - 1e-9..1.19).contains(&finer), "{life:?}: {finer} times as fine");
+                for over in [tan(&canvas) / tan(&life), height(&canvas) / height(&life)] {
+                    // And one sample for rounding up.
+                    assert!((1.0 - 1e-9..1.19 * (1.0 + 1.2 / 100.0)).contains(&over), "{life:?}: {over} times as large");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn neighbors_share_a_canvas() {
+        let canvas = |fov_deg, rows| canvas_of(&preview(fov_deg, rows), Quality::Preview).unwrap();
+        assert_eq!(canvas(36.0, 360), canvas(39.0, 360));
+        assert_eq!(canvas(36.0, 370), canvas(36.0, 400));
+        assert_ne!(canvas(36.0, 360), canvas(42.0, 360));
+    }
+}
