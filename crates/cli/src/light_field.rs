@@ -2,7 +2,8 @@
 
 use anyhow::bail;
 use dioptric_pipeline::{
-    Camera, DepthSearch, IRRADIANCE_FILE, Irradiance, KeptCamera, LightField, RenderEffort, SceneSource, Staged,
+    Camera, DepthSearch, ExrSamples, IRRADIANCE_FILE, Irradiance, KeptCamera, LightField, RenderEffort, SceneSource,
+    Staged,
 };
 use dioptric_report::{LightFieldReport, write_light_field};
 use dioptric_spectrum::Cancel;
@@ -43,7 +44,7 @@ pub(crate) fn run(arguments: &LightFieldArgs, common: &Common) -> anyhow::Result
     let depths_m = if arguments.refocus_m.is_empty() { series(&field, &search) } else { arguments.refocus_m.clone() };
     let report = write_light_field(&field, &estimate, &depths_m, staged.path())?;
     if arguments.irradiance.is_none() && camera_has_array(&kept) {
-        kept.irradiance(&clock, &cancel)?.write_exr(&staged.path().join(IRRADIANCE_FILE))?;
+        kept.irradiance(&clock, &cancel)?.write_exr(&staged.path().join(IRRADIANCE_FILE), ExrSamples::Single)?;
     }
     staged.commit()?;
     drop(clock);

@@ -258,6 +258,7 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
     if let Some(list) = &arguments.frames.also {
         camera.outputs.also = FrameFile::parse_list(list)?;
     }
+    camera.outputs.exr_samples = arguments.frames.exr_samples.unwrap_or(camera.outputs.exr_samples);
     if let Some(time_s) = arguments.exposure_s {
         camera.exposure = with_exposure_s(camera.exposure, time_s);
     }

@@ -34,6 +34,7 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
         seed: common.seed.unwrap_or(demo.seed),
         outputs: Outputs {
             also: arguments.frames.also.as_deref().map_or(Ok(Vec::new()), FrameFile::parse_list)?,
+            exr_samples: arguments.frames.exr_samples.unwrap_or_default(),
             ..Outputs::default()
         },
     };

@@ -23,14 +23,40 @@ pub fn write_capture(
     depth: Option<&DepthMap>,
     folder: &Path,
 ) -> Result<(Vec<String>, Vec<u8>), PipelineError> {
+    write_irradiance(capture, folder)?;
+    let (files, png) = write_frames_and_depth(capture, depth, folder)?;
+    Ok((irradiance_file(capture).into_iter().chain(files).collect(), png))
+}
+
+/// The name of the file of the irradiance, where the camera's outputs ask for it.
+pub fn irradiance_file(capture: &Capture) -> Option<String> {
+    capture.camera.outputs.irradiance.then(|| IRRADIANCE_FILE.to_owned())
+}
+
+/// Writes the irradiance of a capture into a folder, where its camera's outputs ask for it.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_irradiance(capture: &Capture, folder: &Path) -> Result<(), PipelineError> {
+    match irradiance_file(capture) {
+        Some(file) => capture.irradiance.write_exr(&folder.join(file), capture.camera.outputs.exr_samples),
+        None => Ok(()),
+    }
+}
+
+/// Writes what [`write_capture`] does but for the irradiance, the largest file by far.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write_frames_and_depth(
+    capture: &Capture,
+    depth: Option<&DepthMap>,
+    folder: &Path,
+) -> Result<(Vec<String>, Vec<u8>), PipelineError> {
     let outputs = &capture.camera.outputs;
     let mut files = Vec::new();
-    if outputs.irradiance {
-        capture.irradiance.write_exr(&folder.join(IRRADIANCE_FILE))?;
-        files.push(IRRADIANCE_FILE.to_owned());
-    }
     if let Some(depth) = depth.filter(|_| outputs.depth) {
-        write_planes_exr(&folder.join("depth.exr"), &[("Z", depth.z_m())], true)?;
+        write_planes_exr(&folder.join("depth.exr"), &[("Z", depth.z_m())], outputs.exr_samples)?;
         files.push("depth.exr".to_owned());
     }
     let (frame_files, png) = write_frames(&capture.frame_parts(), &capture.developed.picture, outputs, folder)?;

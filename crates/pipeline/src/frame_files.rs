@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use dioptric_scene::write_planes_exr;
+use dioptric_scene::{ExrSamples, write_planes_exr};
 use dioptric_sensor::{Depth, DngDetails, ElectronRate, Exposure, LensTables, Picture, Processing, Raw, Sensor};
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use ndarray::{Array2, Axis};
@@ -25,12 +25,21 @@ pub struct Outputs {
     pub raw: bool,
     /// More files of the sensor's frames.
     pub also: Vec<FrameFile>,
+    /// How samples are stored in all EXR files. A run that continues from half floats is off by as much as they are.
+    pub exr_samples: ExrSamples,
 }
 
 impl Default for Outputs {
     /// Everything but the additional files.
     fn default() -> Self {
-        Self { irradiance: true, depth: true, volts: true, raw: true, also: Vec::new() }
+        Self {
+            irradiance: true,
+            depth: true,
+            volts: true,
+            raw: true,
+            also: Vec::new(),
+            exr_samples: ExrSamples::Single,
+        }
     }
 }
 
@@ -147,13 +156,19 @@ pub fn write_frames(
 ) -> Result<(Vec<String>, Vec<u8>), PipelineError> {
     let mut names = vec!["picture.png".to_owned()];
     if outputs.volts {
-        names.push(write_planes(frames, &frames.exposed.volts.planes_v, "V", "volts.exr", folder)?);
+        names.push(write_planes(
+            frames,
+            &frames.exposed.volts.planes_v,
+            ("V", "volts.exr"),
+            outputs.exr_samples,
+            folder,
+        )?);
     }
     if outputs.raw && frames.exposed.raw.planes.iter().all(|plane| plane.dn().is_some()) {
         names.extend(write_raw(&frames.exposed.raw, "png", folder)?);
     }
     for file in &outputs.also {
-        names.extend(write_also(frames, picture, *file, folder)?);
+        names.extend(write_also(frames, picture, (*file, outputs.exr_samples), folder)?);
     }
     let png = picture_png(picture)?;
     let path = folder.join("picture.png");
@@ -173,7 +188,7 @@ pub fn picture_png(picture: &Picture) -> Result<Vec<u8>, PipelineError> {
 fn write_also(
     frames: &Frames<'_>,
     picture: &Picture,
-    file: FrameFile,
+    (file, samples): (FrameFile, ExrSamples),
     folder: &Path,
 ) -> Result<Vec<String>, PipelineError> {
     if let Some((name, depth)) = file.picture_name() {
@@ -182,7 +197,7 @@ fn write_also(
     }
     match file {
         FrameFile::Electrons => {
-            Ok(vec![write_planes(frames, &frames.exposed.electrons.planes_e, "e", "electrons.exr", folder)?])
+            Ok(vec![write_planes(frames, &frames.exposed.electrons.planes_e, ("e", "electrons.exr"), samples, folder)?])
         }
         FrameFile::RawTiff => write_raw(&frames.exposed.raw, "tiff", folder),
         FrameFile::RawDng => {
@@ -196,7 +211,7 @@ fn write_also(
             let light = light.bright(frames.processing.brightness);
             let planes: Vec<Array2<f32>> = (0..3).map(|k| light.index_axis(Axis(2), k).to_owned()).collect();
             let named: Vec<(&str, &Array2<f32>)> = ["R", "G", "B"].into_iter().zip(&planes).collect();
-            write_planes_exr(&folder.join("picture.exr"), &named, true)?;
+            write_planes_exr(&folder.join("picture.exr"), &named, samples)?;
             Ok(vec!["picture.exr".to_owned()])
         }
     }
@@ -218,8 +233,8 @@ fn dng_details<'a>(frames: &Frames<'a>, picture: &'a Picture) -> DngDetails<'a> 
 fn write_planes(
     frames: &Frames<'_>,
     planes: &[Array2<f32>],
-    name: &str,
-    file: &str,
+    (name, file): (&str, &str),
+    samples: ExrSamples,
     folder: &Path,
 ) -> Result<String, PipelineError> {
     let names: Vec<&str> = match planes.len() {
@@ -227,7 +242,7 @@ fn write_planes(
         _ => frames.exposed.raw.filter_names.iter().map(String::as_str).collect(),
     };
     let named: Vec<_> = names.into_iter().zip(planes).collect();
-    write_planes_exr(&folder.join(file), &named, false)?;
+    write_planes_exr(&folder.join(file), &named, samples)?;
     Ok(file.to_owned())
 }
 

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use dioptric_scene::{DisplayModel, Scene, write_scene_exr};
+use dioptric_scene::{DisplayModel, ExrSamples, Scene, write_scene_exr};
 use dioptric_spectrum::{Observer, WavelengthGrid, Xyz};
 use ron::extensions::Extensions;
 use serde::Serialize;
@@ -115,7 +115,7 @@ impl ShowRequest {
     /// As [`show`](Self::show), and when the file cannot be written; then there is none.
     pub fn write(&self, picture: &Path, output: &Path) -> Result<ShownPicture, PipelineError> {
         let (scene, shown) = self.show(picture)?;
-        write_scene_exr(output, &scene, true)?;
+        write_scene_exr(output, &scene, ExrSamples::Single)?;
         Ok(shown)
     }
 }

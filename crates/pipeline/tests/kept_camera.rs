@@ -2,8 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_pipeline::{
-    BlurSpec, Camera, Capture, Diffraction, FilmSpec, FocusSpec, Given, KeptCamera, Quality, SceneSource, SensorSpec,
-    Silent, StageCounts, StopSpec, WavelengthSpec, with_exposure_s,
+    BlurSpec, Camera, Capture, Diffraction, ExrSamples, FilmSpec, FocusSpec, Given, KeptCamera, Quality, SceneSource,
+    SensorSpec, Silent, StageCounts, StopSpec, WavelengthSpec, with_exposure_s,
 };
 use dioptric_scene::{ExrParts, write_spectral_exr};
 use dioptric_sensor::WhiteBalance;
@@ -132,7 +132,7 @@ fn continued_run_images_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let kept = KeptCamera::new(small());
     let first = capture(&kept);
-    first.irradiance.write_exr(&folder.path().join("irradiance.exr")).unwrap();
+    first.irradiance.write_exr(&folder.path().join("irradiance.exr"), ExrSamples::Single).unwrap();
     kept.write_resume_file(&first, folder.path()).unwrap();
 
     let resumed = KeptCamera::resume(folder.path()).unwrap();
@@ -310,7 +310,7 @@ fn changed_scene_file_is_seen() {
     let first = capture(&kept);
     capture(&kept);
     assert_eq!(kept.stage_counts().irradiance, 1);
-    first.irradiance.write_exr(&folder.path().join("irradiance.exr")).unwrap();
+    first.irradiance.write_exr(&folder.path().join("irradiance.exr"), ExrSamples::Single).unwrap();
     kept.write_resume_file(&first, folder.path()).unwrap();
     assert!(KeptCamera::resume(folder.path()).unwrap().notes.is_empty());
 

@@ -11,9 +11,9 @@ use std::{
 };
 
 use dioptric_pipeline::{
-    Camera, Capture, Clock, Crop, Diffraction, FilmSpec, FocusSpec, FramesSpec, ImagingTimes, KeptCamera, LensSpec,
-    Movements, PipelineError, Progress, Quality, SceneSource, SceneSpec, SenseRequest, SensorSpec, Silent, Stage,
-    StopSpec, WavelengthSpec, with_exposure_s,
+    Camera, Capture, Clock, Crop, Diffraction, ExrSamples, FilmSpec, FocusSpec, FramesSpec, ImagingTimes, KeptCamera,
+    LensSpec, Movements, PipelineError, Progress, Quality, SceneSource, SceneSpec, SenseRequest, SensorSpec, Silent,
+    Stage, StopSpec, WavelengthSpec, with_exposure_s,
 };
 use dioptric_scene::Pattern;
 use dioptric_sensor::{NoiseSource, NoiseSources, Processing};
@@ -201,7 +201,7 @@ fn sensed_irradiance_is_the_picture_of_the_run() {
     camera.seed = 11;
     let shot = capture(camera.clone());
     let path = folder.path().join("irradiance.exr");
-    shot.irradiance.write_exr(&path).unwrap();
+    shot.irradiance.write_exr(&path, ExrSamples::Single).unwrap();
     let request = SenseRequest {
         sensor: camera.sensor.clone(),
         pixel_um: Some(330.0),

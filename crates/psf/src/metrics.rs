@@ -141,7 +141,21 @@ impl Picture {
         if along.x.abs() < ON_AXIS {
             return transform(&self.row_sums, |row| self.at_um(row, 0).y * wave.y);
         }
-        (self.mean(|p| p.dot(wave).cos()), self.mean(|p| p.dot(wave).sin()))
+        // A pixel's phase is the sum of its column's and its row's.
+        let (rows, columns) = self.energy.dim();
+        let of_columns: Vec<(f64, f64)> =
+            (0..columns).map(|column| (self.at_um(0, column).x * wave.x).sin_cos()).collect();
+        let mut sum = (0.0, 0.0);
+        for row in 0..rows {
+            let energies = self.energy.row(row);
+            let (real, imaginary) = energies
+                .iter()
+                .zip(&of_columns)
+                .fold((0.0, 0.0), |(real, imaginary), (e, phase)| (real + e * phase.1, imaginary + e * phase.0));
+            let (sin, cos) = (self.at_um(row, 0).y * wave.y).sin_cos();
+            sum = (sum.0 + real * cos - imaginary * sin, sum.1 + real * sin + imaginary * cos);
+        }
+        sum
     }
 }
 
@@ -228,6 +242,17 @@ pub(crate) mod tests {
         assert_eq!([-1.0, 0.0, 1.0].map(|y| at(&rows, y)), [Some(0.0), Some(3.0), Some(1.0)]);
         let edge = picture.edge_spread(0.0);
         assert_eq!(at(&edge, 0.5), Some(3.0));
+    }
+
+    #[test]
+    fn oblique_waves_are_those_of_every_pixel() {
+        let picture = gaussian(7.0, DVec2::new(40.3, 61.8));
+        for (direction, frequency) in [(0.4, 9.0), (2.0, 30.0), (-1.1, 140.0)] {
+            let wave = DVec2::from_angle(direction) * (2.0 * PI * frequency * 1e-3);
+            let found = picture.optical_transfer(direction, frequency);
+            assert_abs_diff_eq!(found.0, picture.mean(|p| p.dot(wave).cos()), epsilon = 1e-13);
+            assert_abs_diff_eq!(found.1, picture.mean(|p| p.dot(wave).sin()), epsilon = 1e-13);
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use std::{
 use dioptric_pipeline::{
     Camera, FillDepth, FlatSize, Given, KeptCamera, PipelineError, SceneSource, SceneSpec, parse_illuminant,
 };
-use dioptric_scene::{Pattern, Scene as RadianceScene, SceneLight, View, write_scene_exr};
+use dioptric_scene::{ExrSamples, Pattern, Scene as RadianceScene, SceneLight, View, write_scene_exr};
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, Array3, ArrayView1, Axis, Ix2, Ix3};
 use pyo3::{prelude::*, types::PyDict};
@@ -296,7 +296,7 @@ impl Scene {
     /// Writes the scene as spectral EXR with depth and view, which `Scene.read` and ``dioptric run --scene`` read.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let scene = self.opened(py)?;
-        run(py, &Follower::nobody(), |_, _| Ok(write_scene_exr(&path, scene, true)?))
+        run(py, &Follower::nobody(), |_, _| Ok(write_scene_exr(&path, scene, ExrSamples::Single)?))
     }
 
     fn __repr__(&self) -> String {

@@ -352,11 +352,11 @@ impl Shot {
         let outputs = &capture.camera.outputs;
         let mut files = Vec::new();
         if outputs.irradiance {
-            capture.irradiance.write_exr(&folder.join(IRRADIANCE_FILE))?;
+            capture.irradiance.write_exr(&folder.join(IRRADIANCE_FILE), outputs.exr_samples)?;
             files.push(IRRADIANCE_FILE.to_owned());
         }
         if outputs.depth {
-            write_planes_exr(&folder.join("depth.exr"), &[("Z", depth.z_m())], true)?;
+            write_planes_exr(&folder.join("depth.exr"), &[("Z", depth.z_m())], outputs.exr_samples)?;
             files.push("depth.exr".to_owned());
         }
         files.extend(write_frames(&capture.frame_parts(), &capture.developed.picture, outputs, folder)?.0);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dioptric_pipeline::{DepthEstimate, LightField, PipelineError, display::LinearRgb, write_file, write_json};
-use dioptric_scene::write_planes_exr;
+use dioptric_scene::{ExrSamples, write_planes_exr};
 use image::{Rgb, RgbImage, imageops};
 use ndarray::Array2;
 use serde::Serialize;
@@ -81,7 +81,7 @@ pub fn write_light_field(
     put("depth.png".to_owned(), &depth_picture(estimate, field, factor))?;
     let planes =
         [("Z", &estimate.depth_m), ("disparity", &estimate.disparity_px), ("confidence", &estimate.confidence)];
-    write_planes_exr(&folder.join("depth.exr"), &planes, true)?;
+    write_planes_exr(&folder.join("depth.exr"), &planes, ExrSamples::Single)?;
     files.push("depth.exr".to_owned());
     files.push("lightfield.json".to_owned());
     let told = estimate.depth_m.iter().zip(&estimate.confidence);

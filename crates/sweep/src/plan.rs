@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_pipeline::{Camera, FrameFile, Outputs};
+use dioptric_pipeline::{Camera, ExrSamples, FrameFile, Outputs};
 use ron::{extensions::Extensions, value::RawValue};
 use serde::Deserialize;
 
@@ -57,6 +57,8 @@ pub struct PlanOutputs {
     pub raw: bool,
     /// More files of the sensor's frames.
     pub also: Vec<FrameFile>,
+    /// How samples are stored in EXR files.
+    pub exr_samples: ExrSamples,
 }
 
 impl Base {
@@ -83,8 +85,8 @@ impl Base {
 impl PlanOutputs {
     /// Returns them as those of a camera.
     pub(crate) fn of_camera(&self) -> Outputs {
-        let Self { irradiance, depth, volts, raw, also } = self.clone();
-        Outputs { irradiance, depth, volts, raw, also }
+        let Self { irradiance, depth, volts, raw, also, exr_samples } = self.clone();
+        Outputs { irradiance, depth, volts, raw, also, exr_samples }
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use dioptric_diffraction::{PupilGrid, PupilSamples};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
 use dioptric_psf::{LensImageModel, ModelUse, Picture};
-use dioptric_scene::write_planes_exr;
+use dioptric_scene::{ExrSamples, write_planes_exr};
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -184,7 +184,7 @@ impl PsfSet {
             })
             .collect();
         let planes: Vec<(&str, &Array2<f32>)> = named.iter().map(|(name, plane)| (name.as_str(), plane)).collect();
-        Ok(write_planes_exr(path, &planes, true)?)
+        Ok(write_planes_exr(path, &planes, ExrSamples::Single)?)
     }
 
     /// Pixels along the side of the largest picture.

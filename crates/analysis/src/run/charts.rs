@@ -145,11 +145,10 @@ fn lsf(run: &Run<'_>, places: &RunPlaces) -> LineChart {
     }
 }
 
-/// Modulation up to the sensor's Nyquist frequency on the axis and towards the corner, in focus and at the far end.
+/// Modulation up to the lens's cutoff on the axis and towards the corner, in focus and at the far end, with the Nyquist frequency of the pixels.
 fn mtf(run: &Run<'_>, places: &RunPlaces) -> LineChart {
-    let bank = run.model;
     let nyquist_per_mm = 500.0 / run.capture.place.pitch_um;
-    let pitch_um = (run.capture.place.pitch_um / 8.0).min(2.0);
+    let last_per_mm = cutoff_per_mm(run, places).max(1.1 * nyquist_per_mm);
     let far = places.dioptres[0];
     let (radial, focus) = (places.corner.to_angle(), places.focus_dioptres);
     let tangential = radial + std::f64::consts::FRAC_PI_2;
@@ -161,32 +160,63 @@ fn mtf(run: &Run<'_>, places: &RunPlaces) -> LineChart {
     if (far - places.focus_dioptres).abs() > 1e-6 {
         lines.push(("axis, far end of the scene", DVec2::ZERO, far, 0.0, "#777788"));
     }
-    let series = lines
+    let mut series: Vec<Series> = lines
         .into_iter()
-        .map(|(label, field_tan, dioptres, direction, color)| {
-            let spot = picture(bank, field_tan, dioptres, REFERENCE_WAVELENGTH_NM, pitch_um);
-            let points = (0..=POINTS)
-                .map(|i| nyquist_per_mm * i as f64 / POINTS as f64)
-                .map(|f| (f, spot.mtf(direction, f)))
-                .collect();
-            Series {
-                label: Some(label.to_owned()),
-                color: color.to_owned(),
-                points,
-                is_dashed: label.ends_with("tangential"),
-            }
+        .map(|(label, field_tan, dioptres, direction, color)| Series {
+            label: Some(label.to_owned()),
+            color: color.to_owned(),
+            points: modulation(run.model, (field_tan, dioptres), direction, last_per_mm),
+            is_dashed: label.ends_with("tangential"),
         })
         .collect();
+    series.push(Series {
+        label: Some(format!("Nyquist frequency of the pixels, {nyquist_per_mm:.1} per mm")),
+        color: "#999999".to_owned(),
+        points: vec![(nyquist_per_mm, 0.0), (nyquist_per_mm, 1.05)],
+        is_dashed: true,
+    });
     LineChart {
-        title: format!("Modulation of the lens at {REFERENCE_WAVELENGTH_NM:.0} nm"),
+        title: format!("Modulation of the lens at {REFERENCE_WAVELENGTH_NM:.0} nm, to its cutoff"),
         x_label: "cycles per mm".to_owned(),
         y_label: "modulation".to_owned(),
-        x_range: (0.0, nyquist_per_mm),
+        x_range: (0.0, last_per_mm),
         y_range: (0.0, 1.05),
         series,
-        legend: Corner::BottomLeft,
+        legend: Corner::TopRight,
         scale: Scale::Linear,
     }
+}
+
+/// Returns the frequency beyond which diffraction leaves no modulation on the axis, in focus: 1 / (λ N) by the working f-number.
+fn cutoff_per_mm(run: &Run<'_>, places: &RunPlaces) -> f64 {
+    let reference = &run.capture.lens.reference;
+    let distance_mm = 1e3 / places.focus_dioptres - reference.projection_center_z_mm();
+    let distance_mm = if places.focus_dioptres > 0.0 { distance_mm } else { f64::INFINITY };
+    let cutoff_per_mm = 1e6 / (REFERENCE_WAVELENGTH_NM * reference.working_f_number(distance_mm));
+    if cutoff_per_mm.is_finite() { cutoff_per_mm } else { 0.0 }
+}
+
+/// Returns the modulation at frequencies up to the last, those near 0 denser, as far as a picture of the point can hold them.
+fn modulation(
+    bank: &LensImageModel,
+    (field_tan, dioptres): (DVec2, f64),
+    direction: f64,
+    last_per_mm: f64,
+) -> Vec<(f64, f64)> {
+    // Four pixels a wave; of a wide blur, which has modulation at low frequencies alone, as many pixels as are quick to add up.
+    const WIDEST_PX: f64 = 400.0;
+    let blur_um = 1e3 * bank.blur_radius_mm(field_tan, dioptres, REFERENCE_WAVELENGTH_NM).abs();
+    let pitch_um = (250.0 / last_per_mm).max(2.0 * blur_um / WIDEST_PX);
+    let spot = picture(bank, field_tan, dioptres, REFERENCE_WAVELENGTH_NM, pitch_um);
+    // The average over a pixel of the picture is not the lens's.
+    let along = std::f64::consts::PI * 1e-3 * pitch_um * DVec2::from_angle(direction);
+    let sinc = |x: f64| if x == 0.0 { 1.0 } else { x.sin() / x };
+    let of_pixel = |per_mm: f64| sinc(along.x * per_mm) * sinc(along.y * per_mm);
+    (0..=POINTS)
+        .map(|i| last_per_mm * (i as f64 / POINTS as f64).powi(2))
+        .take_while(|per_mm| per_mm * pitch_um <= 250.0 * (1.0 + 1e-9))
+        .map(|per_mm| (per_mm, spot.mtf(direction, per_mm) / of_pixel(per_mm)))
+        .collect()
 }
 
 fn over_field(places: &RunPlaces, of: impl Fn(DVec2) -> f64) -> Vec<(f64, f64)> {

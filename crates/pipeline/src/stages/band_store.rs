@@ -3,6 +3,7 @@
 use std::{
     fs::{self, File, OpenOptions},
     io::{Read, Seek, SeekFrom, Write},
+    ops::Range,
     path::{Path, PathBuf},
 };
 
@@ -103,11 +104,22 @@ fn band_bytes((rows, columns): (usize, usize)) -> u64 {
 
 /// Reads a band of a file of bands.
 pub(super) fn read_plane(file: &mut File, band: usize, size: (usize, usize)) -> std::io::Result<Array2<f32>> {
-    let mut bytes = vec![0; band_bytes(size) as usize];
-    file.seek(SeekFrom::Start(band as u64 * bytes.len() as u64))?;
-    file.read_exact(&mut bytes)?;
-    let samples = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    let samples = read_rows(file, band, 0..size.0, size)?;
     Ok(Array2::from_shape_vec(size, samples).expect("as many samples as were asked for"))
+}
+
+/// Reads rows of a band of a file of bands.
+pub(super) fn read_rows(
+    file: &mut File,
+    band: usize,
+    rows: Range<usize>,
+    size: (usize, usize),
+) -> std::io::Result<Vec<f32>> {
+    let row_bytes = 4 * size.1;
+    let mut bytes = vec![0; row_bytes * rows.len()];
+    file.seek(SeekFrom::Start(band as u64 * band_bytes(size) + (row_bytes * rows.start) as u64))?;
+    file.read_exact(&mut bytes)?;
+    Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
 }
 
 #[cfg(test)]

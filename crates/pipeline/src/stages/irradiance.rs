@@ -4,18 +4,19 @@ use std::{
     borrow::Cow,
     fs::File,
     io::Write,
+    ops::Range,
     path::Path,
     sync::{Mutex, PoisonError},
 };
 
 use dioptric_forward::{ImagingPlan, ImagingTimes, Source};
-use dioptric_scene::{BandWriter, ExrParts, Scene, read_spectral_exr};
+use dioptric_scene::{ExrSamples, Scene, SpectralHead, read_spectral_exr};
 use dioptric_spectrum::{Bands, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
-use ndarray::{Array2, Array3, ArrayView3, Axis};
+use ndarray::{Array2, Array3, ArrayView3, Axis, s};
 
 use super::{
     Watch,
-    band_store::{BandFolder, BandStore, read_plane},
+    band_store::{BandFolder, BandStore, read_plane, read_rows},
     film::FilmPlace,
     narrow_surfaces::NarrowSurfaces,
 };
@@ -90,17 +91,31 @@ impl Irradiance {
         }
     }
 
-    /// Writes it as spectral EXR.
+    /// Writes it as spectral EXR, a few rows of all bands at a time.
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn write_exr(&self, path: &Path) -> Result<(), PipelineError> {
-        let parts = ExrParts { pitch_um: Some(self.pitch_um), ..ExrParts::default() };
-        let mut file = BandWriter::create(path, Quantity::Irradiance, &self.grid, self.size, &parts)?;
-        for band in 0..self.grid.len() {
-            file.write_band(band, &*self.band(band)?)?;
+    pub fn write_exr(&self, path: &Path, samples: ExrSamples) -> Result<(), PipelineError> {
+        let head = SpectralHead {
+            quantity: Quantity::Irradiance,
+            grid: &self.grid,
+            size: self.size,
+            pitch_um: Some(self.pitch_um),
+            largest: self.summary.max.iter().fold(0.0, |a, &b| a.max(b as f32)),
+            samples,
+        };
+        Ok(head.write_exr(path, &mut |band, rows| self.rows_of(band, rows))?)
+    }
+
+    /// Returns the samples of rows of a band.
+    fn rows_of(&self, band: usize, rows: Range<usize>) -> Result<Vec<f32>, String> {
+        match &self.planes {
+            Planes::Memory(cube) => Ok(cube.slice(s![band, rows, ..]).iter().copied().collect()),
+            Planes::File(file) => {
+                let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+                read_rows(&mut file, band, rows, self.size).map_err(|error| error.to_string())
+            }
         }
-        Ok(file.finish()?)
     }
 
     /// Reads it from a spectral EXR; one without a distance between samples has that of the film given.
@@ -351,7 +366,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("irradiance.exr");
         let made = image_with(u64::MAX, None);
-        made.write_exr(&path).unwrap();
+        made.write_exr(&path, ExrSamples::Single).unwrap();
         let read = Irradiance::read_exr(&path, None).unwrap();
         assert_eq!((read.pitch_um(), read.grid()), (made.pitch_um(), made.grid()));
         for band in 0..3 {

@@ -108,7 +108,10 @@ mod tests {
                 assert!((1.0 - 1e-9..1.19).contains(&finer), "{life:?}: {finer} times as fine");
                 for over in [tan(&canvas) / tan(&life), height(&canvas) / height(&life)] {
                     // And one sample for rounding up.
-                    assert!((1.0 - 1e-9..1.19 * (1.0 + 1.2 / 100.0)).contains(&over), "{life:?}: {over} times as large");
+                    assert!(
+                        (1.0 - 1e-9..1.19 * (1.0 + 1.2 / 100.0)).contains(&over),
+                        "{life:?}: {over} times as large"
+                    );
                 }
             }
         }

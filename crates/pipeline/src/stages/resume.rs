@@ -2,7 +2,7 @@
 
 use std::{fs, io, path::Path};
 
-use dioptric_scene::read_planes_exr;
+use dioptric_scene::{ExrSamples, read_planes_exr};
 use dioptric_spectrum::DepthMap;
 use serde::{Deserialize, Serialize};
 
@@ -36,7 +36,7 @@ struct Kept {
 pub struct Resumed {
     /// The camera of the run, with what the run left.
     pub camera: KeptCamera,
-    /// Files that changed since, for which the scene is imaged anew.
+    /// What differs from the run: files that changed since, for which the scene is imaged anew, or an irradiance in half floats.
     pub notes: Vec<String>,
 }
 
@@ -89,7 +89,7 @@ impl KeptCamera {
         })?;
         let camera = Self::new(kept.camera.clone()).with_quality(Quality::Full);
         let inputs = camera.irradiance_inputs()?;
-        let notes: Vec<String> = inputs
+        let mut notes: Vec<String> = inputs
             .files()
             .filter(|now| !kept.files.contains(now))
             .map(|now| format!("{} is not what it was in the run", now.path().display()))
@@ -100,6 +100,9 @@ impl KeptCamera {
         let irradiance = Irradiance::read_exr(&folder.join(IRRADIANCE_FILE), Some(kept.place.pitch_um))?;
         kept.check(&irradiance).map_err(unreadable)?;
         let irradiance = irradiance.with_narrow_surfaces(kept.narrow_surfaces);
+        if kept.camera.outputs.exr_samples == ExrSamples::Half {
+            notes.push(format!("{IRRADIANCE_FILE} has half floats: its samples are those of the run to .05 %"));
+        }
         let results = camera.results();
         if let Some(depth) = read_depth(&folder.join("depth.exr"), (kept.scene.rows, kept.scene.columns)) {
             results.depth.put(inputs.scene.geometry.clone(), depth);

@@ -6,7 +6,10 @@ mod page;
 use std::path::Path;
 
 use dioptric_analysis::{Run, RunCharts, RunPlaces, RunReport, RunTimes, SensorStatistics};
-use dioptric_pipeline::{Outputs, PipelineError, Sensed, write_capture, write_file, write_frames, write_json};
+use dioptric_pipeline::{
+    Outputs, PipelineError, Sensed, irradiance_file, write_file, write_frames, write_frames_and_depth,
+    write_irradiance, write_json,
+};
 
 /// Writes everything of a run into a folder, and returns the report.
 ///
@@ -15,10 +18,22 @@ use dioptric_pipeline::{Outputs, PipelineError, Sensed, write_capture, write_fil
 ///
 /// # Errors
 /// When a file cannot be written.
-pub fn write_run(run: &Run<'_>, folder: &Path, times: &dyn Fn() -> RunTimes) -> Result<RunReport, PipelineError> {
-    let capture = run.capture;
-    let (files, png) = write_capture(capture, run.depth, folder)?;
-    let report = RunReport::new(run, files)?;
+pub fn write_run(
+    run: &Run<'_>,
+    folder: &Path,
+    times: &(dyn Fn() -> RunTimes + Sync),
+) -> Result<RunReport, PipelineError> {
+    // The largest file is compressed by all threads while the page is drawn by one.
+    let (irradiance, report) =
+        rayon::join(|| write_irradiance(run.capture, folder), || write_the_rest(run, folder, times));
+    irradiance?;
+    report
+}
+
+/// Writes all but the irradiance.
+fn write_the_rest(run: &Run<'_>, folder: &Path, times: &dyn Fn() -> RunTimes) -> Result<RunReport, PipelineError> {
+    let (files, png) = write_frames_and_depth(run.capture, run.depth, folder)?;
+    let report = RunReport::new(run, irradiance_file(run.capture).into_iter().chain(files).collect())?;
     let places = RunPlaces::of(run);
     let charts = RunCharts::of(run, &places, &report.sensor);
     let page =

@@ -37,11 +37,6 @@ impl PartialFile {
         self.file.as_mut().expect("the file is open until finished")
     }
 
-    /// Where the file will lie.
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Closes the file and moves it to its place.
     pub(crate) fn finish(mut self) -> Result<(), SceneError> {
         drop(self.file.take());

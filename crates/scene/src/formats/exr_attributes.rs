@@ -1,6 +1,5 @@
 //! The header attributes of our EXR files: units, sample pitch, camera data.
 
-use dioptric_spectrum::Quantity;
 use exr::prelude::{AttributeValue, LayerAttributes, Text};
 
 use super::light_unit::LightUnit;
@@ -71,22 +70,10 @@ pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
     }
 }
 
-/// Adds the layout's attributes, the pitch and the camera data to a layer.
-pub(crate) fn add_to(
-    layer: &mut LayerAttributes,
-    quantity: Option<Quantity>,
-    pitch_um: Option<f64>,
-    view: Option<View>,
-) {
+/// Adds the attributes of the spectral layout, the unit of light, the pitch and the camera data to a layer.
+pub(super) fn add_to(layer: &mut LayerAttributes, unit: Option<&str>, pitch_um: Option<f64>, view: Option<View>) {
     let mut put = |name: &str, value| layer.other.insert(Text::from(name), value);
-    let unit = match quantity {
-        Some(Quantity::Radiance) => Some("W.m^-2.sr^-1"),
-        Some(Quantity::Irradiance) => Some("W.m^-2"),
-        Some(Quantity::Reflectance) | None => None,
-    };
-    if quantity.is_some() {
-        put(LAYOUT_VERSION, AttributeValue::Text(Text::from("1.0")));
-    }
+    put(LAYOUT_VERSION, AttributeValue::Text(Text::from("1.0")));
     if let Some(unit) = unit {
         put(UNITS, AttributeValue::Text(Text::from(unit)));
     }
@@ -102,13 +89,15 @@ pub(crate) fn add_to(
 
 #[cfg(test)]
 mod tests {
+    use dioptric_spectrum::Quantity;
+
     use super::*;
 
     #[test]
     fn attributes_there_and_back() {
         let view = View { focal_px: 100.0 / 3.0, center_x_px: 1.5, center_y_px: 2.0 };
         let mut layer = LayerAttributes::default();
-        add_to(&mut layer, Some(Quantity::Irradiance), Some(1.4), Some(view));
+        add_to(&mut layer, Some("W.m^-2"), Some(1.4), Some(view));
         let back = from_layer(&layer);
         let quantity = back.unit.clone().unwrap().map(|unit| unit.quantity);
         assert_eq!((quantity, back.pitch_um), (Some(Quantity::Irradiance), Some(1.4)));

@@ -1,13 +1,13 @@
 //! Spectral EXR there and back, and files that must be refused.
 
-use std::{fs, path::PathBuf};
+use std::{fs, ops::Range, path::PathBuf};
 
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Text,
     WritableImage, f16,
 };
-use ndarray::Array2;
+use ndarray::{Array2, s};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -75,16 +75,16 @@ fn refused(channels: Vec<(&str, FlatSamples)>, attributes: &[(&str, &str)], word
 
 #[test]
 fn a_scene_comes_back_to_the_bit() {
-    for compress in [false, true] {
+    for samples in [ExrSamples::Single, ExrSamples::Uncompressed] {
         let (file, mut scene) = (file(), scene());
-        write_scene_exr(&file.path, &scene, compress).unwrap();
+        write_scene_exr(&file.path, &scene, samples).unwrap();
         let back = read_spectral_exr(&file.path).unwrap();
         assert_eq!(back.image, scene.radiance);
         assert_eq!((back.depth, back.view, back.hidden), (scene.depth.clone(), scene.view, None));
 
         let hidden = HiddenLayer { radiance: scene.radiance.clone(), depth: scene.depth.clone().unwrap() };
         scene.hidden = Some(hidden);
-        write_scene_exr(&file.path, &scene, compress).unwrap();
+        write_scene_exr(&file.path, &scene, samples).unwrap();
         let back = read_spectral_exr(&file.path).unwrap();
         assert_eq!((back.image, back.hidden), (scene.radiance, scene.hidden));
     }
@@ -97,7 +97,7 @@ fn the_same_scene_makes_the_same_bytes() {
         Some(HiddenLayer { radiance: scene.radiance.clone(), depth: scene.depth.clone().expect("the scene has one") });
     let bytes = || {
         let file = file();
-        write_scene_exr(&file.path, &scene, true).unwrap();
+        write_scene_exr(&file.path, &scene, ExrSamples::Single).unwrap();
         std::fs::read(&file.path).unwrap()
     };
     let first = bytes();
@@ -116,34 +116,70 @@ fn irradiance_keeps_its_pitch_and_reflectance_its_kind() {
     assert_eq!(read_spectral_exr(&file.path).unwrap().image, reflectance);
 }
 
-#[test]
-fn bands_written_one_by_one_make_the_same_file() {
-    let (file, scene) = (file(), scene());
-    let parts = ExrParts { depth: scene.depth.as_ref(), view: scene.view, pitch_um: Some(3.0), ..ExrParts::default() };
-    let grid = scene.radiance.grid();
-    let mut writer = BandWriter::create(&file.path, Quantity::Irradiance, grid, (ROWS, COLUMNS), &parts).unwrap();
-    for band in [2, 0, 3, 1] {
-        writer.write_band(band, &scene.radiance.planes()[band]).unwrap();
-    }
-    assert!(!file.path.exists());
-    writer.finish().unwrap();
-    let back = read_spectral_exr(&file.path).unwrap();
-    let planes = scene.radiance.planes().to_vec();
-    let expected = SpectralImage::new(Quantity::Irradiance, grid.clone(), planes).unwrap().with_pitch_um(3.0);
-    assert_eq!((back.image, back.depth, back.view), (expected, scene.depth, scene.view));
+/// Returns what is known of an image before its samples.
+fn head(image: &SpectralImage, samples: ExrSamples) -> SpectralHead<'_> {
+    let largest = image.planes().iter().flatten().fold(0.0_f32, |a, &b| a.max(b));
+    let size = (image.rows(), image.columns());
+    SpectralHead { quantity: image.quantity(), grid: image.grid(), size, pitch_um: image.pitch_um(), largest, samples }
+}
+
+fn rows_of(image: &SpectralImage) -> impl FnMut(usize, Range<usize>) -> Result<Vec<f32>, String> {
+    |band, rows| Ok(image.planes()[band].slice(s![rows, ..]).iter().copied().collect())
+}
+
+/// An irradiance of more rows than a block has.
+fn tall() -> SpectralImage {
+    let grid = WavelengthGrid::new(vec![400.0, 500.0, 1000.0]).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut plane = || Array2::from_shape_simple_fn((75, 11), || 1e-3 * rng.random::<f32>());
+    let planes = (0..grid.len()).map(|_| plane()).collect();
+    SpectralImage::new(Quantity::Irradiance, grid, planes).unwrap().with_pitch_um(1.4)
 }
 
 #[test]
-fn a_band_writer_left_unfinished_leaves_nothing() {
-    let (file, scene) = (file(), scene());
-    let grid = scene.radiance.grid();
-    let create = || BandWriter::create(&file.path, Quantity::Radiance, grid, (ROWS, COLUMNS), &ExrParts::default());
-    let mut writer = create().unwrap();
-    writer.write_band(0, &scene.radiance.planes()[0]).unwrap();
-    assert!(writer.write_band(9, &scene.radiance.planes()[0]).is_err());
-    assert!(writer.write_band(1, &Array2::zeros((1, 1))).unwrap_err().to_string().contains("1 × 1 samples"));
-    assert!(writer.finish().unwrap_err().to_string().contains("S0.550,000000nm"));
-    drop(create().unwrap());
+fn rows_make_the_file_that_the_whole_makes() {
+    let (file, tall) = (file(), tall());
+    for samples in ExrSamples::NAMES.map(|(_, samples)| samples) {
+        head(&tall, samples).write_exr(&file.path, &mut rows_of(&tall)).unwrap();
+        let in_rows = read_spectral_exr(&file.path).unwrap();
+        write_spectral_exr(&file.path, &tall, &ExrParts { samples, ..ExrParts::default() }).unwrap();
+        assert_eq!(in_rows, read_spectral_exr(&file.path).unwrap());
+        let is_exact = in_rows.image == tall;
+        assert_eq!(is_exact, samples != ExrSamples::Half);
+    }
+}
+
+#[test]
+fn half_floats_are_as_near_as_is_stated() {
+    let file = file();
+    // Light from a candle's to the sun's.
+    for scale in [1e-7, 1e-3, 1.0, 3e6] {
+        let mut bright = tall();
+        bright.planes_mut().for_each(|mut plane| plane *= scale);
+        head(&bright, ExrSamples::Half).write_exr(&file.path, &mut rows_of(&bright)).unwrap();
+        let back = read_spectral_exr(&file.path).unwrap().image;
+        assert_eq!((back.pitch_um(), back.quantity()), (Some(1.4), Quantity::Irradiance));
+        let largest = 1e-3 * scale;
+        for (found, sample) in back.planes().iter().flatten().zip(bright.planes().iter().flatten()) {
+            let bound = (0.0005 * sample).max(5e-10 * largest);
+            assert!((found - sample).abs() <= bound, "{sample} became {found}");
+        }
+    }
+}
+
+#[test]
+fn rows_that_cannot_be_had_leave_nothing() {
+    let (file, tall) = (file(), tall());
+    let mut fails = |band: usize, rows: Range<usize>| match (band, rows.start) {
+        (1, 32) => Err("the disk is gone".to_owned()),
+        _ => Ok(vec![0.0; rows.len() * 11]),
+    };
+    let message = head(&tall, ExrSamples::Single).write_exr(&file.path, &mut fails).unwrap_err().to_string();
+    assert!(message.contains("the disk is gone") && message.contains("test.exr"), "{message}");
+    let mut short = |_: usize, _: Range<usize>| Ok(vec![0.0; 3]);
+    assert!(head(&tall, ExrSamples::Single).write_exr(&file.path, &mut short).is_err());
+    let empty = SpectralHead { size: (0, 3), ..head(&tall, ExrSamples::Half) };
+    assert!(empty.write_exr(&file.path, &mut short).is_err());
     assert_eq!(fs::read_dir(file.path.parent().unwrap()).unwrap().count(), 0);
 }
 
@@ -151,10 +187,11 @@ fn a_band_writer_left_unfinished_leaves_nothing() {
 fn planes_of_volts_come_back() {
     let (file, scene) = (file(), scene());
     let volts = &scene.radiance.planes()[0];
-    write_planes_exr(&file.path, &[("V", volts), ("Z", scene.depth.as_ref().unwrap().z_m())], false).unwrap();
+    write_planes_exr(&file.path, &[("V", volts), ("Z", scene.depth.as_ref().unwrap().z_m())], ExrSamples::Uncompressed)
+        .unwrap();
     let planes = read_planes_exr(&file.path).unwrap();
     assert_eq!(planes.iter().find(|(name, _)| name == "V").map(|(_, plane)| plane), Some(volts));
-    assert!(write_planes_exr(&file.path, &[], false).is_err());
+    assert!(write_planes_exr(&file.path, &[], ExrSamples::Single).is_err());
     assert!(read_spectral_exr(&file.path).unwrap_err().to_string().contains("no spectral band"));
 }
 
@@ -244,7 +281,7 @@ fn a_hidden_layer_in_front_is_refused_by_its_place() {
     let mut z_m = scene.depth.as_ref().unwrap().z_m().clone();
     z_m[(3, 2)] *= 0.5;
     scene.hidden = Some(HiddenLayer { radiance: scene.radiance.clone(), depth: DepthMap::new(z_m).unwrap() });
-    write_scene_exr(&file.path, &scene, false).unwrap();
+    write_scene_exr(&file.path, &scene, ExrSamples::Uncompressed).unwrap();
     let message = read_scene(&file.path, &ReadOptions::default()).unwrap_err().to_string();
     assert!(message.contains("test.exr") && message.contains("row 3, column 2"), "{message}");
 }
@@ -278,7 +315,7 @@ fn wrong_contents_are_refused_in_one_sentence() {
 #[test]
 fn a_truncated_or_absent_or_foreign_file_is_refused() {
     let (file, scene) = (file(), scene());
-    write_scene_exr(&file.path, &scene, true).unwrap();
+    write_scene_exr(&file.path, &scene, ExrSamples::Single).unwrap();
     let whole = fs::read(&file.path).unwrap();
     fs::write(&file.path, &whole[..whole.len() - 20]).unwrap();
     let message = read_spectral_exr(&file.path).unwrap_err().to_string();
@@ -288,13 +325,13 @@ fn a_truncated_or_absent_or_foreign_file_is_refused() {
     fs::remove_file(&file.path).unwrap();
     assert!(matches!(read_spectral_exr(&file.path), Err(SceneError::Unreadable { .. })));
     let nowhere = file.path.join("no/folder.exr");
-    assert!(matches!(write_scene_exr(&nowhere, &scene, false), Err(SceneError::Unwritable { .. })));
+    assert!(matches!(write_scene_exr(&nowhere, &scene, ExrSamples::Uncompressed), Err(SceneError::Unwritable { .. })));
 }
 
 #[test]
 fn a_header_that_asks_for_terabytes_is_refused_before_it_is_believed() {
     let (file, scene) = (file(), scene());
-    write_scene_exr(&file.path, &scene, false).unwrap();
+    write_scene_exr(&file.path, &scene, ExrSamples::Uncompressed).unwrap();
     let mut bytes = fs::read(&file.path).unwrap();
     let key = b"dataWindow\0box2i\0";
     let at = bytes.windows(key.len()).position(|window| window == key).unwrap() + key.len() + 4;
@@ -310,8 +347,8 @@ fn no_mutation_of_a_file_makes_the_reader_panic() {
     let (file, scene) = (file(), scene());
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut n_refused = 0;
-    for compress in [false, true] {
-        write_scene_exr(&file.path, &scene, compress).unwrap();
+    for samples in [ExrSamples::Single, ExrSamples::Uncompressed] {
+        write_scene_exr(&file.path, &scene, samples).unwrap();
         let whole = fs::read(&file.path).unwrap();
         for _ in 0..1500 {
             let mut bytes = whole.clone();

@@ -101,6 +101,7 @@ impl Sum {
             "mW" => (&mut self.watts, -3),
             "uW" | "µW" | "μW" => (&mut self.watts, -6),
             "nW" => (&mut self.watts, -9),
+            "pW" => (&mut self.watts, -12),
             "photon" | "photons" | "quanta" | "ph" | "q" => (&mut self.photons, 0),
             "s" | "sec" => (&mut self.seconds, 0),
             "m" => (&mut self.metres, 0),

@@ -8,6 +8,8 @@ mod depth_picture;
 mod envi;
 mod envi_header;
 mod exr_attributes;
+mod exr_samples;
+mod exr_stream;
 #[cfg(test)]
 mod exr_tests;
 mod exr_write;
@@ -24,7 +26,9 @@ pub(crate) use picture::decode as decode_picture;
 
 pub use band_folder::read_band_folder;
 pub use envi::{EnviCube, read_envi};
-pub use exr_write::{BandWriter, ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
+pub use exr_samples::ExrSamples;
+pub use exr_stream::SpectralHead;
+pub use exr_write::{ExrParts, write_planes_exr, write_scene_exr, write_spectral_exr};
 pub use mat::{IsetScene, read_iset_mat};
 pub use picture::{PictureSamples, read_picture, read_picture_samples};
 pub use read_scene::{ReadOptions, read_hidden_layer, read_scene};

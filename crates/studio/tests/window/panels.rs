@@ -144,6 +144,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("scatterings", &["LightPaths.UpTo"]),
     ("world seed", &["WorldSpec.seed"]),
     ("irradiance", &["Camera.outputs", "Outputs.irradiance"]),
+    ("EXR samples", &["Outputs.exr_samples"]),
     ("depth map", &["Outputs.depth"]),
     ("volts", &["Outputs.volts"]),
     ("raw", &["Outputs.raw"]),

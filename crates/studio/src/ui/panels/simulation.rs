@@ -1,10 +1,10 @@
 //! How the picture is computed: diffraction, blur, sampling, bands; and what is written of it.
 
-use dioptric_pipeline::{BankSpec, BlurSpec, Camera, Diffraction, FrameFile, Outputs, WavelengthSpec};
+use dioptric_pipeline::{BankSpec, BlurSpec, Camera, Diffraction, ExrSamples, FrameFile, Outputs, WavelengthSpec};
 use egui::Ui;
 
 use super::{
-    super::fields::{NumberField, count, numbers, text, tick, variant},
+    super::fields::{NumberField, choice, count, numbers, text, tick, variant},
     Desk,
 };
 use crate::engine::{Field, Rung};
@@ -79,12 +79,15 @@ pub(super) fn output(ui: &mut Ui, camera: &mut Camera) {
         camera.name = name;
     }
     ui.label("Exported beside picture.png and report.html:");
-    let Outputs { irradiance, depth, volts, raw, also } = &mut camera.outputs;
+    let Outputs { irradiance, depth, volts, raw, also, exr_samples } = &mut camera.outputs;
     let spectra = "irradiance.exr, the spectral irradiance on the sensor";
     tick(ui, "irradiance", spectra, irradiance);
     tick(ui, "depth map", "depth.exr, the depth that was used", depth);
     tick(ui, "volts", "volts.exr, the voltages of the pixels", volts);
     tick(ui, "raw", "raw.png, the digital numbers in 16 bits", raw);
+    let kinds = ExrSamples::NAMES.map(|(name, samples)| (samples, name));
+    let words = "How EXR files hold their samples: single floats, half floats (a quarter of the size, off by at most .05 %), or uncompressed";
+    choice(ui, "EXR samples", words, exr_samples, &kinds);
     let files = [
         (FrameFile::Electrons, "electrons"),
         (FrameFile::RawTiff, "raw TIFF"),

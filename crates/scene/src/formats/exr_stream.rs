@@ -1,0 +1,168 @@
+//! Writing a spectral EXR whose bands need not be in memory together.
+
+use std::{
+    io::{BufWriter, Seek, Write},
+    ops::Range,
+    path::Path,
+};
+
+use dioptric_spectrum::{Quantity, WavelengthGrid, sort_exr_attributes};
+use exr::{
+    block::{
+        BlockIndex, UncompressedBlock,
+        chunk::Chunk,
+        write as write_chunks,
+        writer::{ChunkWriter, ChunksWriter},
+    },
+    meta::{BlockDescription, Headers, header::Header},
+    prelude::{ChannelDescription, LayerAttributes, LineOrder, SmallVec, Text, Vec2},
+};
+use rayon::prelude::*;
+
+use super::{
+    beside::{PartialFile, unwritable},
+    exr_attributes,
+    exr_samples::{ExrSamples, Stored},
+    exr_write::band_name,
+};
+use crate::SceneError;
+
+/// Bytes of samples that are in memory at a time, besides those of whoever has the bands.
+const AT_ONCE_BYTES: usize = 128 << 20;
+
+/// What is known of a spectral image before its samples.
+#[derive(Clone, Copy, Debug)]
+pub struct SpectralHead<'a> {
+    /// What the samples are.
+    pub quantity: Quantity,
+    /// Its bands.
+    pub grid: &'a WavelengthGrid,
+    /// Rows and columns.
+    pub size: (usize, usize),
+    /// Distance between samples on the film, µm.
+    pub pitch_um: Option<f64>,
+    /// The largest sample of all bands, which half floats are fitted to.
+    pub largest: f32,
+    /// How samples are stored.
+    pub samples: ExrSamples,
+}
+
+impl SpectralHead<'_> {
+    /// Writes a spectral EXR of one layer, a few rows of all bands at a time; `rows_of` returns the samples of rows of a band, row by row, and is called
+    /// in the order of rows and from one thread.
+    ///
+    /// # Errors
+    /// When the picture is empty, `rows_of` fails or returns another number of samples, or the file cannot be written; it is then not there.
+    pub fn write_exr(
+        &self,
+        path: &Path,
+        rows_of: &mut dyn FnMut(usize, Range<usize>) -> Result<Vec<f32>, String>,
+    ) -> Result<(), SceneError> {
+        let (rows, columns) = self.size;
+        if rows == 0 || columns == 0 {
+            return Err(unwritable(path, format!("a picture of {rows} × {columns} samples")));
+        }
+        let stored = self.samples.layout(self.quantity, self.largest);
+        let channels = Channels::of(self);
+        let mut partial = PartialFile::create(path)?;
+        let mut failed = None;
+        let writer = BufWriter::with_capacity(1 << 20, partial.file());
+        let written = write_chunks(writer, channels.headers(self, &stored), true, |meta, chunks| {
+            let mut lines = Lines { head: self, channels: &channels, stored: &stored, rows_of, failed: &mut failed };
+            lines.write(&meta.headers, chunks)
+        });
+        if let Some(reason) = failed {
+            return Err(unwritable(path, reason));
+        }
+        written.map_err(|error| unwritable(path, error))?;
+        sort_exr_attributes(partial.file()).map_err(|error| unwritable(path, error))?;
+        partial.finish()
+    }
+}
+
+/// The bands in the order of their channels.
+struct Channels {
+    /// The name of each channel and its band.
+    bands: Vec<(String, usize)>,
+}
+
+impl Channels {
+    fn of(head: &SpectralHead<'_>) -> Self {
+        let names = head.grid.centers_nm().iter().map(|&nm| band_name(head.quantity, nm));
+        let mut bands: Vec<(String, usize)> = names.zip(0..).collect();
+        bands.sort();
+        Self { bands }
+    }
+
+    fn headers(&self, head: &SpectralHead<'_>, stored: &Stored) -> Headers {
+        let kind = stored.sample_type();
+        let channels = self.bands.iter().map(|(name, _)| ChannelDescription::named(name.as_str(), kind)).collect();
+        let mut attributes = LayerAttributes::default();
+        exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), head.pitch_um, None);
+        let (rows, columns) = head.size;
+        let header = Header::new(Text::from("bands"), Vec2(columns, rows), channels)
+            .with_attributes(attributes)
+            .with_encoding(head.samples.compression(), BlockDescription::ScanLines, LineOrder::Increasing);
+        SmallVec::from_vec(vec![header])
+    }
+}
+
+/// The rows of all bands, as the blocks of a file.
+struct Lines<'a> {
+    head: &'a SpectralHead<'a>,
+    channels: &'a Channels,
+    stored: &'a Stored,
+    rows_of: &'a mut dyn FnMut(usize, Range<usize>) -> Result<Vec<f32>, String>,
+    /// Why the rows could not be had.
+    failed: &'a mut Option<String>,
+}
+
+impl Lines<'_> {
+    fn write<W: Write + Seek>(&mut self, headers: &[Header], chunks: &mut ChunkWriter<W>) -> exr::error::UnitResult {
+        let (rows, columns) = self.head.size;
+        let rows_per_block = self.head.samples.compression().scan_lines_per_block();
+        let block_bytes = 4 * columns * self.channels.bands.len() * rows_per_block;
+        let n_blocks = rows.div_ceil(rows_per_block);
+        // Blocks are fetched one by one and packed by all threads.
+        let n_at_once = (AT_ONCE_BYTES / block_bytes).clamp(1, 4 * rayon::current_num_threads());
+        for first in (0..n_blocks).step_by(n_at_once) {
+            let range = first..(first + n_at_once).min(n_blocks);
+            let blocks =
+                range.clone().map(|block| self.block(block * rows_per_block..rows.min((block + 1) * rows_per_block)));
+            let blocks = blocks.collect::<exr::error::Result<Vec<UncompressedBlock>>>()?;
+            let packed: Vec<exr::error::Result<Chunk>> =
+                blocks.into_par_iter().map(|block| block.compress_to_chunk(headers)).collect();
+            for (block, chunk) in range.zip(packed) {
+                chunks.write_chunk(block, chunk?)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn block(&mut self, rows: Range<usize>) -> exr::error::Result<UncompressedBlock> {
+        let columns = self.head.size.1;
+        let bands = self.channels.bands.iter().map(|&(_, band)| (self.rows_of)(band, rows.clone()));
+        let bands = bands.collect::<Result<Vec<Vec<f32>>, String>>().and_then(|bands| {
+            let is_whole = bands.iter().all(|band| band.len() == rows.len() * columns);
+            if is_whole { Ok(bands) } else { Err(format!("bands of other sizes in rows {rows:?}")) }
+        });
+        let bands = match bands {
+            Ok(bands) => bands,
+            Err(reason) => {
+                *self.failed = Some(reason);
+                return Err(exr::error::Error::Aborted);
+            }
+        };
+        let mut data = Vec::with_capacity(4 * columns * rows.len() * bands.len());
+        for row in 0..rows.len() {
+            bands.iter().for_each(|band| self.stored.append(&band[row * columns..][..columns], &mut data));
+        }
+        let index = BlockIndex {
+            layer: 0,
+            pixel_position: Vec2(0, rows.start),
+            pixel_size: Vec2(columns, rows.len()),
+            level: Vec2(0, 0),
+        };
+        Ok(UncompressedBlock { index, data })
+    }
+}
