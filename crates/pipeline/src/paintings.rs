@@ -8,7 +8,7 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
-use dioptric_scene::{ExrParts, Scene, StillLife, read_spectral_exr, write_spectral_exr};
+use dioptric_scene::{ExrParts, ExrSamples, Scene, StillLife, read_spectral_exr, write_spectral_exr};
 use dioptric_spectrum::{Cancel, Quantity, SpectralImage, WavelengthGrid};
 use etcetera::{BaseStrategy, choose_base_strategy};
 
@@ -89,7 +89,9 @@ impl PaintingFolder {
 
     /// Writes a painting, and removes the oldest of too many.
     fn keep(&self, file: &Path, scene: &Scene) {
-        let parts = ExrParts { depth: scene.depth.as_ref(), view: scene.view, ..ExrParts::default() };
+        // Quick to read again.
+        let samples = ExrSamples::Uncompressed;
+        let parts = ExrParts { depth: scene.depth.as_ref(), view: scene.view, samples, ..ExrParts::default() };
         let is_written =
             fs::create_dir_all(&self.path).is_ok() && write_spectral_exr(file, &scene.radiance, &parts).is_ok();
         if is_written {
