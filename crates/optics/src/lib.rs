@@ -48,7 +48,7 @@ pub use error::OpticsError;
 pub use exit_pupil::{ExitPupilBounds, PupilReach, PupilSample};
 pub use extinction::Absorption;
 pub use film_site::FilmSite;
-pub use formats::{Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};
+pub use formats::{Configuration, Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};
 pub use frame::{FilmPoint, StopPoint};
 pub use glam;
 pub use glass::{C_LINE_NM, CatalogueGlass, D_LINE_NM, F_LINE_NM, Glass, GlassCatalogue};

@@ -59,7 +59,7 @@ impl LensFile {
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let text = text_of(bytes);
         let glasses = Glasses::new(options);
-        let read = match extension.as_str() {
+        let read: Result<Self, TextError> = match extension.as_str() {
             "ron" => file_from_ron(&text),
             "dat" | "txt" => match pbrt_list::numbers_of(&text) {
                 Some(numbers) => pbrt_list::lens_from_numbers(&numbers, &name).map(Self::of_lens),
@@ -74,7 +74,17 @@ impl LensFile {
                 return Err(OpticsError::Io { path: path.to_owned(), reason });
             }
         };
+        let read = read.and_then(|file| file.in_use(options.configuration));
         read.map_err(|TextError { line, reason }| OpticsError::File { path: path.to_owned(), line, reason })
+    }
+
+    /// Returns the file with the configuration in use that was asked for; where none was, with a note on the one that is.
+    fn in_use(mut self, asked: Option<usize>) -> Result<Self, TextError> {
+        if let Some(number) = asked {
+            return Ok(self.with_configuration(number)?);
+        }
+        self.notes.extend(self.note_on_configuration());
+        Ok(self)
     }
 }
 

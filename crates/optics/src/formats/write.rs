@@ -186,6 +186,19 @@ impl LensFile {
         if !left_out.is_empty() {
             notes.push(format!("a .{extension} file has no place for {}: left out", left_out.join(", ")));
         }
+        let n_configurations = self.configurations.len();
+        if n_configurations > 1 && !holds_use {
+            let in_use = self.configuration;
+            notes.push(format!(
+                "a .{extension} file has no place for several configurations: of {n_configurations} it has number {in_use} alone"
+            ));
+        }
+        if n_configurations > 1 && extension == "seq" && self.configuration != 1 {
+            notes.push(format!(
+                "a .seq file does not say which configuration is in use: it is read with number 1, not {}",
+                self.configuration
+            ));
+        }
         if matches!(extension, "zmx" | "seq") && self.film_distance_mm.is_none() {
             notes.push(match self.focus_mm() {
                 Some(mm) => format!("the place of the film is not stated: the file has the paraxial focus, {mm:.4} mm"),
