@@ -9,6 +9,7 @@ mod glass_file;
 mod glasses;
 mod iset_json;
 mod json;
+mod len;
 mod lens_file;
 mod number;
 mod pbrt_list;

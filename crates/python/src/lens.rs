@@ -137,7 +137,8 @@ impl Lens {
         guarded(|| Self::of_choice(LensSpec::BuiltIn(name.to_owned()), LensReadOptions::default()))
     }
 
-    /// Reads a lens file: ``.ron`` (our own), ``.dat``, ``.json`` (ISET's or DeepLens's), ``.zmx`` (Zemax) or ``.seq`` (CODE V).
+    /// Reads a lens file: ``.ron`` (our own), ``.dat``, ``.json`` (ISET's or DeepLens's), ``.zmx`` (Zemax), ``.seq`` (CODE V) or
+    /// ``.len`` (OSLO).
     ///
     /// Parameters
     /// ----------

@@ -9,7 +9,7 @@ use super::{
     decode::{bytes_of, text_of},
     deeplens,
     glasses::Glasses,
-    iset_json,
+    iset_json, len,
     lens_file::{LensFile, ReadOptions},
     pbrt_list,
     prescription::file_from_ron,
@@ -19,7 +19,7 @@ use super::{
 };
 
 impl Lens {
-    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx` or `.seq`.
+    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx`, `.seq` or `.len`.
     ///
     /// [`LensFile::read`](crate::LensFile::read) tells what else the file says, as where the film lies.
     ///
@@ -33,7 +33,7 @@ impl Lens {
 
 impl LensFile {
     /// Reads a lens file, by its extension: `.ron` (our own), `.dat` or `.txt`, `.json` (ISET's omni format or
-    /// `DeepLens`), `.zmx` (Zemax) or `.seq` (CODE V).
+    /// `DeepLens`), `.zmx` (Zemax), `.seq` (CODE V) or `.len` (OSLO).
     ///
     /// A glass catalogue beside a `.zmx` file that has its name and the extension `.agf` is read with it.
     ///
@@ -66,10 +66,11 @@ impl LensFile {
                 None => dat::lens_from_dat(&text, &name).map(Self::of_lens),
             },
             "json" => json(&text, &name, &glasses),
+            "len" => len::lens_from_len(&text, &name, &glasses),
             "zmx" => zmx::lens_from_zmx(&text, &name, glasses),
             "seq" => seq::lens_from_seq(&text, &name, glasses),
             _ => {
-                let expected = "expected .ron, .dat, .txt, .json, .zmx or .seq";
+                let expected = "expected .ron, .dat, .txt, .json, .zmx, .seq or .len";
                 let reason = format!("the extension '.{extension}' is no lens format; {expected}");
                 return Err(OpticsError::Io { path: path.to_owned(), reason });
             }

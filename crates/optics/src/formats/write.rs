@@ -145,7 +145,8 @@ impl LensFile {
         }
     }
 
-    fn focus_mm(&self) -> Option<f64> {
+    /// Returns where first-order optics focuses the file's object, mm behind the last vertex.
+    pub(super) fn focus_mm(&self) -> Option<f64> {
         let lens = self.lens.at(self.reference_wavelength_nm.unwrap_or(D_LINE_NM)).ok()?;
         lens.film_distance_mm_for(self.object_distance_mm.unwrap_or(f64::INFINITY)).ok().filter(|mm| mm.is_finite())
     }

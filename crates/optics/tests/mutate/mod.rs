@@ -7,7 +7,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// The seeds: name and bytes. The name's extension tells the format.
-pub(crate) const SEEDS: [(&str, &[u8]); 17] = [
+pub(crate) const SEEDS: [(&str, &[u8]); 18] = [
     ("singlet.ron", include_bytes!("../corpus/singlet.ron")),
     ("doublet.dat", include_bytes!("../corpus/doublet.dat")),
     ("list.txt", include_bytes!("../corpus/list.txt")),
@@ -23,6 +23,7 @@ pub(crate) const SEEDS: [(&str, &[u8]); 17] = [
     ("zoom.ron", include_bytes!("../corpus/zoom.ron")),
     ("zoom.zmx", include_bytes!("../corpus/zoom.zmx")),
     ("zoom.seq", include_bytes!("../corpus/zoom.seq")),
+    ("triplet.len", include_bytes!("../corpus/triplet.len")),
     ("two.agf", include_bytes!("../corpus/two.agf")),
     ("formula.yml", include_bytes!("../corpus/formula.yml")),
 ];

@@ -13,7 +13,7 @@ use super::{
 /// plane, an infinite distance that of a far object.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct ConfigurationRow {
+pub(in crate::formats) struct ConfigurationRow {
     /// What it is called, if anything.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub(super) name: String,
