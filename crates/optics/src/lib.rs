@@ -43,7 +43,7 @@ pub use air::Air;
 pub use aperture::{Aperture, Outline};
 pub use beam::{Beam, rays_over_front};
 pub use bundle::{ObjectPoint, rays_towards};
-pub use diffractive::{DiffractiveSurface, PhaseProfile};
+pub use diffractive::{Blaze, DiffractiveSurface, PhaseProfile};
 pub use error::OpticsError;
 pub use exit_pupil::{ExitPupilBounds, PupilReach, PupilSample};
 pub use extinction::Absorption;

@@ -31,6 +31,8 @@ pub struct MonoLens {
     name: String,
     wavelength_nm: f64,
     steps: Vec<Step>,
+    /// The share of light that the orders of its diffractive surfaces have.
+    diffraction_efficiency: f64,
     stop: usize,
     front: Surface,
     rear: Surface,
@@ -127,6 +129,7 @@ impl MonoLens {
             name: lens.name().to_owned(),
             wavelength_nm,
             steps,
+            diffraction_efficiency: lens.diffraction_efficiency_at(wavelength_nm)?,
             stop: lens.stop(),
             front: lens.interfaces()[0].surface.clone(),
             rear,
@@ -597,6 +600,13 @@ impl MonoLens {
             return Ok(distance_mm);
         }
         Err(OpticsError::NoFocus { lens: self.name.clone(), side: "before it", distance_mm: film_distance_mm })
+    }
+}
+
+impl MonoLens {
+    /// The share of light that the orders of all diffractive surfaces have together; 1 where no relief is stated. Rays are traced as if it were 1.
+    pub fn diffraction_efficiency(&self) -> f64 {
+        self.diffraction_efficiency
     }
 }
 

@@ -257,7 +257,7 @@ impl System {
         let mirrors = self.surfaces.iter().enumerate().filter_map(|(i, surface)| surface.is_mirror.then_some(i));
         let diffractive = self.surfaces.iter().enumerate().filter_map(|(surface, stated)| {
             let (order, profile) = stated.phase.clone()?;
-            Some(DiffractiveSurface { surface, order, profile })
+            Some(DiffractiveSurface { surface, order, profile, blaze: None })
         });
         let lens = lens.with_diffractive(diffractive.collect())?;
         lens.with_mirrors(mirrors)?.with_moves(moves)?.with_image_surface(self.image_surface)

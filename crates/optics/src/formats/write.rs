@@ -172,6 +172,7 @@ impl LensFile {
     /// states that the file does not, a sentence each.
     pub fn left_out(&self, extension: &str) -> Vec<String> {
         let holds_use = matches!(extension, "ron" | "zmx" | "seq");
+        let is_blazed = self.lens.diffractive().iter().any(|phase| phase.blaze.is_some());
         let stated = [
             ("its array of microlenses", self.microlens.is_some() && extension != "json"),
             ("the place of the film", self.film_distance_mm.is_some() && !holds_use),
@@ -180,6 +181,7 @@ impl LensFile {
             ("fields", !self.fields.is_empty() && !holds_use),
             ("names of surfaces", !self.surface_comments.is_empty() && !holds_use),
             ("comments", !self.comments.is_empty() && !holds_use),
+            ("the relief of gratings (blaze)", is_blazed && extension != "ron"),
         ];
         let left_out: Vec<&str> =
             stated.iter().filter(|(_, is_left_out)| *is_left_out).map(|(what, _)| *what).collect();
