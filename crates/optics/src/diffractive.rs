@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::{Lens, OpticsError};
+use crate::OpticsError;
 
 /// What a surface adds to the light that it refracts or reflects: the phase of one diffraction order.
 ///
@@ -79,32 +79,6 @@ impl Blaze {
             }
             _ => Ok(()),
         }
-    }
-}
-
-impl Lens {
-    /// Returns the share of light of a wavelength that the orders of all diffractive surfaces have together, by scalar theory; 1 where no
-    /// [`Blaze`] is stated.
-    ///
-    /// # Errors
-    /// When a medium is not known at that wavelength or at a design wavelength.
-    pub fn diffraction_efficiency_at(&self, wavelength_nm: f64) -> Result<f64, OpticsError> {
-        let share = |phase: &DiffractiveSurface| {
-            let Some(blaze) = phase.blaze else { return Ok(1.0) };
-            let before =
-                phase.surface.checked_sub(1).map_or(self.object_medium(), |i| &self.interfaces()[i].medium_after);
-            let after = &self.interfaces()[phase.surface].medium_after;
-            let step = |nm: f64| match self.is_mirror(phase.surface) {
-                true => Ok::<f64, OpticsError>(2.0 * before.index_at(nm)?),
-                false => Ok(after.index_at(nm)? - before.index_at(nm)?),
-            };
-            let (now, design) = (step(wavelength_nm)?, step(blaze.design_nm)?);
-            let dispersion = if after == before && !self.is_mirror(phase.surface) { 1.0 } else { now / design };
-            let design_order = f64::from(blaze.order.unwrap_or(phase.order));
-            let waves = design_order * blaze.design_nm / wavelength_nm * dispersion;
-            Ok(blaze.share_of(phase.order, waves))
-        };
-        self.diffractive().iter().map(share).product()
     }
 }
 
