@@ -17,8 +17,8 @@ mod sensor_table;
 
 pub use chart::{Corner, LineChart, Scale, Series};
 pub use lens::{
-    AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ConvertedLens, FanRow, FieldPlace, FieldRow,
-    FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis, LensData, LensDefaults,
+    AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ConfigurationData, ConvertedLens, FanRow, FieldPlace,
+    FieldRow, FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis, LensData, LensDefaults,
     LensInfoRequest, LensModulation, LensPageData, LensRow, OpdMap, PlaneData, PupilRow, RayTable, SpotRow, SurfaceRow,
     TraceError, TraceSettings, WavefrontRow, built_in_lenses, convert_lens, glass_data, glass_rows, placement_lines,
     surface_rows,

@@ -192,8 +192,9 @@ impl LensCamera {
                 }
             }
             let indices = lens.forward().image_index() / lens.forward().object_index();
+            let share = lens.forward().diffraction_efficiency();
             for (i, &weight) in weights.iter().enumerate() {
-                let weight = if rays.fate[i].is_in_flight() { weight * indices * indices } else { 0.0 };
+                let weight = if rays.fate[i].is_in_flight() { weight * indices * indices * share } else { 0.0 };
                 let point = Vec3::new(rays.x_mm[i], rays.y_mm[i], rays.z_mm[i]).as_dvec3();
                 let direction = Vec3::new(rays.l[i], rays.m[i], rays.n[i]).as_dvec3();
                 let direction = if weight > 0.0 { direction } else { -DVec3::Z };

@@ -4,7 +4,8 @@ use std::{fmt::Write, fs, path::Path};
 
 use anyhow::Context;
 use dioptric_analysis::{
-    LensData, LensInfoRequest, SurfaceRow, built_in_lenses, convert_lens, placement_lines, surface_rows,
+    ConfigurationData, LensData, LensInfoRequest, SurfaceRow, built_in_lenses, convert_lens, placement_lines,
+    surface_rows,
 };
 use dioptric_pipeline::{
     LensReadOptions, PipelineError, REFERENCE_WAVELENGTH_NM, Staged, nearest_to_reference_nm, parse_numbers,
@@ -118,7 +119,9 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
         .map(|&wavelength_nm| {
             let LensInfoArgs { distance_mm, field_deg, .. } = *arguments;
             let distance_mm = distance_mm.or(Some(used.distance_mm).filter(|mm| mm.is_finite()));
-            LensData::new(lens, &LensInfoRequest { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm })
+            let request = LensInfoRequest { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm };
+            let configurations = used.configurations(wavelength_nm)?;
+            Ok::<_, PipelineError>(LensData { configurations, ..LensData::new(lens, &request)? })
         })
         .collect::<Result<_, _>>()?;
     if common.json {
@@ -133,9 +136,29 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     for line in placement_lines(lens) {
         writeln!(text, "{line}")?;
     }
+    if let Some(of_one_wavelength) = data.first() {
+        text += &configuration_table(&of_one_wavelength.configurations)?;
+    }
     text += "\n";
     text += &data_table(&data)?;
     print(&text)
+}
+
+/// Lists the configurations of a file that has several.
+fn configuration_table(rows: &[ConfigurationData]) -> Result<String, std::fmt::Error> {
+    if rows.is_empty() {
+        return Ok(String::new());
+    }
+    let mut text =
+        format!("\n{:>13} {:>12} {:>8} {:>12} {:>12}  name\n", "configuration", "EFL mm", "f/", "object mm", "film mm");
+    for row in rows {
+        let ConfigurationData { number, name, efl_mm, f_number, object_distance_mm, film_distance_mm, .. } = row;
+        let film = film_distance_mm.map_or("–".to_owned(), |mm| format!("{mm:.4}"));
+        let in_use = if row.in_use { "  (in use)" } else { "" };
+        let object = format!("{object_distance_mm:.4}");
+        writeln!(text, "{number:>13} {efl_mm:>12.4} {f_number:>8.3} {object:>12} {film:>12}  {name}{in_use}")?;
+    }
+    Ok(text)
 }
 
 fn surface_table(rows: &[SurfaceRow]) -> Result<String, std::fmt::Error> {
@@ -163,7 +186,7 @@ fn data_table(data: &[LensData]) -> anyhow::Result<String> {
         .map(|d| serde_json::to_value(d)?.as_object().cloned().context("the data of a lens is a record"))
         .collect::<anyhow::Result<_>>()?;
     let Some(first) = records.first() else { return Ok(text) };
-    for key in first.keys().filter(|key| *key != "lens" && *key != "seidel_surfaces") {
+    for key in first.keys().filter(|key| !matches!(key.as_str(), "lens" | "configurations" | "seidel_surfaces")) {
         if let Some(sums) = first[key].as_object() {
             for name in sums.keys() {
                 write!(text, "{:<28}", format!("{key} {name}"))?;

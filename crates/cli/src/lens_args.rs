@@ -139,6 +139,9 @@ pub(crate) struct LensReadingArgs {
     /// What the numbers of S are in a .seq file that says neither RDM nor CUM [default: what is plausible]
     #[arg(long, value_name = "KIND")]
     pub(crate) seq_numbers: Option<SeqNumbersArg>,
+    /// Which configuration of a file that has several, as the positions of a zoom lens, from 1 [default: the file's own]
+    #[arg(long, value_name = "N")]
+    pub(crate) configuration: Option<usize>,
 }
 
 /// What the numbers of surfaces are in a CODE V file that does not say.
@@ -186,6 +189,7 @@ impl LensReadingArgs {
                 SeqNumbersArg::Curvatures => SeqNumbers::Curvatures,
             });
         }
+        reading.configuration = self.configuration.or(reading.configuration);
         reading.slope_per_nm = self.slope_per_nm.or(reading.slope_per_nm);
     }
 }

@@ -11,8 +11,8 @@ use crate::OpticsError;
 ///
 /// In the order m, with cycles ψ(x, y) of the profile, a ray of wavelength λ leaves with `n₂ d₂ = n₁ d₁ + m λ ∇ψ + Γ N`: the
 /// components along the surface obey the grating equation, and Γ along the normal N is what makes d₂ a unit vector. Its path is
-/// m λ ψ longer. Where no d₂ exists the order does not propagate, and the ray ends as a totally reflected one does. How much
-/// light the order has is not worked out.
+/// m λ ψ longer. Where no d₂ exists the order does not propagate, and the ray ends as a totally reflected one does. The order has
+/// all of the light where no [`Blaze`] is stated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DiffractiveSurface {
@@ -22,6 +22,64 @@ pub struct DiffractiveSurface {
     pub order: i32,
     /// The phase of the first order.
     pub profile: PhaseProfile,
+    /// The relief by which the order has less than all of the light; left out, it has all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blaze: Option<Blaze>,
+}
+
+/// A blazed relief: in each groove or ring the path rises evenly, at the design wavelength by a whole number of it.
+///
+/// By scalar theory the order m has the share sinc²(α − m) of the light, α = d (λ₀/λ) Δn(λ)/Δn(λ₀) with the design order d and the step of the index
+/// at the surface, 2n at a mirror; where the media on both sides are the same, only λ₀/λ is left. A staircase of N levels a groove gives
+/// |sinc(m/N) sin(π(α − m)) / (N sin(π(α − m)/N))|² (Swanson, Lincoln Laboratory report 854, 1989). The shares of all orders add up to 1. It holds for grooves that are many wavelengths
+/// wide, near normal incidence, and knows no shadowing, reflection or absorption.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Blaze {
+    /// The (vacuum) wavelength at which the design order has all of the light of a smooth relief, nm.
+    pub design_nm: f64,
+    /// The design order; left out, the order of the surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<i32>,
+    /// Levels of a staircase; left out, the relief is smooth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub levels: Option<u32>,
+}
+
+/// Returns sin(πx)/(πx).
+fn sinc(x: f64) -> f64 {
+    if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) }
+}
+
+impl Blaze {
+    /// Returns the share of light of an order where the relief makes a path of this many wavelengths in a groove.
+    pub fn share_of(&self, order: i32, waves: f64) -> f64 {
+        let off = waves - f64::from(order);
+        let amplitude = match self.levels {
+            None => sinc(off),
+            Some(levels) => {
+                let n = f64::from(levels);
+                // The mean over the levels repeats with their number, but for its sign.
+                let turns = off / n - (off / n).round();
+                let mean = if turns == 0.0 { 1.0 } else { (PI * n * turns).sin() / (n * (PI * turns).sin()) };
+                sinc(f64::from(order) / n) * mean
+            }
+        };
+        amplitude * amplitude
+    }
+
+    fn check(&self, surface: usize) -> Result<(), OpticsError> {
+        let wrong = |key, found, expected| Err(OpticsError::Surface { surface, key, found, expected });
+        if !(self.design_nm > 0.0 && self.design_nm.is_finite()) {
+            return wrong("design_nm of a blaze", self.design_nm, "a finite number above 0");
+        }
+        match self.levels {
+            Some(levels) if !(2..=1_000_000).contains(&levels) => {
+                wrong("levels of a blaze", f64::from(levels), "2 to 1000000")
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// A phase as a function of x and y on the vertex plane of a surface, in its own frame.
@@ -112,7 +170,7 @@ impl DiffractiveSurface {
         };
         match numbers.iter().find(|number| !number.is_finite()) {
             Some(found) => wrong("number of a phase", *found, "a finite number"),
-            None => Ok(()),
+            None => self.blaze.map_or(Ok(()), |blaze| blaze.check(surface)),
         }
     }
 }

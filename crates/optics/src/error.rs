@@ -115,6 +115,14 @@ pub enum OpticsError {
         /// How many surfaces the lens has.
         n_surfaces: usize,
     },
+    /// A configuration that a lens file does not have.
+    #[error("configuration {number} is asked for, expected {}", configurations_of(*n_configurations))]
+    Configuration {
+        /// The one asked for.
+        number: usize,
+        /// How many there are.
+        n_configurations: usize,
+    },
     /// More apertures than any lens needs.
     #[error("a lens has at most {most} apertures, found {n_apertures}")]
     ApertureCount {
@@ -273,4 +281,12 @@ fn rim_words(rim: Option<usize>) -> String {
 
 fn f_number_words(f_number: f64) -> String {
     if f_number.is_finite() { format!(" (f/{f_number:.3})") } else { String::new() }
+}
+
+/// Returns which configurations there are, in words.
+fn configurations_of(n_configurations: usize) -> String {
+    match n_configurations {
+        1 => "1: the lens has one alone".to_owned(),
+        n => format!("1 to {n}"),
+    }
 }

@@ -1,6 +1,7 @@
 //! Lens files, told apart by their extension.
 
 mod agf;
+mod configuration;
 mod dat;
 mod decode;
 mod deeplens;
@@ -8,6 +9,7 @@ mod glass_file;
 mod glasses;
 mod iset_json;
 mod json;
+mod len;
 mod lens_file;
 mod number;
 mod pbrt_list;
@@ -17,11 +19,12 @@ mod rii_yaml;
 mod seq;
 mod shapes;
 mod system;
+mod system_states;
 mod text_error;
 mod write;
 mod write_seq;
 mod write_zmx;
 mod zmx;
 
-pub use lens_file::{Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};
+pub use lens_file::{Configuration, Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};
 pub(crate) use prescription::lens_from_ron;

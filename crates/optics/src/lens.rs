@@ -442,6 +442,14 @@ impl Lens {
         lens
     }
 
+    /// Returns the lens with another rim of a surface that is not the stop.
+    pub(crate) fn with_semi_aperture_mm(&self, surface: usize, semi_aperture_mm: f64) -> Result<Self, OpticsError> {
+        let mut lens = self.clone();
+        lens.interfaces[surface].surface.semi_aperture_mm = semi_aperture_mm;
+        lens.interfaces[surface].surface.check(surface, &lens.apertures)?;
+        Ok(lens)
+    }
+
     /// Returns the lens with the same dispersion given to every medium of constant index but air: a straight line of this
     /// slope through the index at `reference_nm`.
     ///

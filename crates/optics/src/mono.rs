@@ -31,6 +31,8 @@ pub struct MonoLens {
     name: String,
     wavelength_nm: f64,
     steps: Vec<Step>,
+    /// The share of light that the orders of its diffractive surfaces have.
+    diffraction_efficiency: f64,
     stop: usize,
     front: Surface,
     rear: Surface,
@@ -127,6 +129,7 @@ impl MonoLens {
             name: lens.name().to_owned(),
             wavelength_nm,
             steps,
+            diffraction_efficiency: lens.diffraction_efficiency_at(wavelength_nm)?,
             stop: lens.stop(),
             front: lens.interfaces()[0].surface.clone(),
             rear,
@@ -597,6 +600,39 @@ impl MonoLens {
             return Ok(distance_mm);
         }
         Err(OpticsError::NoFocus { lens: self.name.clone(), side: "before it", distance_mm: film_distance_mm })
+    }
+}
+
+impl Lens {
+    /// Returns the share of light of a wavelength that the orders of all diffractive surfaces have together, by scalar theory; 1 where no
+    /// [`Blaze`](crate::Blaze) is stated.
+    ///
+    /// # Errors
+    /// When a medium is not known at that wavelength or at a design wavelength.
+    pub fn diffraction_efficiency_at(&self, wavelength_nm: f64) -> Result<f64, OpticsError> {
+        let share = |phase: &crate::DiffractiveSurface| {
+            let Some(blaze) = phase.blaze else { return Ok(1.0) };
+            let before =
+                phase.surface.checked_sub(1).map_or(self.object_medium(), |i| &self.interfaces()[i].medium_after);
+            let after = &self.interfaces()[phase.surface].medium_after;
+            let step = |nm: f64| match self.is_mirror(phase.surface) {
+                true => Ok::<f64, OpticsError>(2.0 * before.index_at(nm)?),
+                false => Ok(after.index_at(nm)? - before.index_at(nm)?),
+            };
+            let (now, design) = (step(wavelength_nm)?, step(blaze.design_nm)?);
+            let dispersion = if after == before && !self.is_mirror(phase.surface) { 1.0 } else { now / design };
+            let design_order = f64::from(blaze.order.unwrap_or(phase.order));
+            let waves = design_order * blaze.design_nm / wavelength_nm * dispersion;
+            Ok(blaze.share_of(phase.order, waves))
+        };
+        self.diffractive().iter().map(share).product()
+    }
+}
+
+impl MonoLens {
+    /// The share of light that the orders of all diffractive surfaces have together; 1 where no relief is stated. Rays are traced as if it were 1.
+    pub fn diffraction_efficiency(&self) -> f64 {
+        self.diffraction_efficiency
     }
 }
 

@@ -4,9 +4,9 @@
 use std::f64::consts::{PI, TAU};
 
 use dioptric_optics::{
-    DiffractiveSurface, Glass, Interface, Lens, LensFile, MonoLens, ObjectPoint, PhaseProfile, RayBatch, RayFate,
-    ReadOptions, SeidelSettings, Shape, Surface, Vignetting,
-    analysis::PupilCoordinates,
+    Blaze, DiffractiveSurface, Glass, Interface, Lens, LensFile, MonoLens, ObjectPoint, PhaseProfile, RayBatch,
+    RayFate, ReadOptions, SeidelSettings, Shape, Surface, Vignetting,
+    analysis::{PupilCoordinates, projected_solid_angle},
     glam::{DVec2, DVec3},
 };
 
@@ -17,7 +17,7 @@ fn single(surface: Surface, indices: [f64; 2], order: i32, profile: PhaseProfile
     let [before, after] = indices.map(|index| Glass::Constant { index });
     let interface = Interface { surface, medium_after: after, thickness_after_mm: 0.0 };
     let lens = Lens::new("diffractive", "test", vec![interface], 0).unwrap().with_object_medium(before).unwrap();
-    lens.with_diffractive(vec![DiffractiveSurface { surface: 0, order, profile }]).unwrap()
+    lens.with_diffractive(vec![DiffractiveSurface { surface: 0, order, profile, blaze: None }]).unwrap()
 }
 
 fn ray(lens: &MonoLens, place_mm: DVec2, direction: DVec3) -> RayBatch {
@@ -174,8 +174,8 @@ fn hybrid() -> Lens {
     let rings = PhaseProfile::Rings { radius_mm: 6.0, coefficients_rad: vec![-150.0, 12.0, 1.0] };
     let grating = PhaseProfile::Grating { lines_per_mm: [0.0, 200.0] };
     lens.with_diffractive(vec![
-        DiffractiveSurface { surface: 0, order: 1, profile: rings },
-        DiffractiveSurface { surface: 2, order: -1, profile: grating },
+        DiffractiveSurface { surface: 0, order: 1, profile: rings, blaze: None },
+        DiffractiveSurface { surface: 2, order: -1, profile: grating, blaze: None },
     ])
     .unwrap()
 }
@@ -221,7 +221,7 @@ fn gratings_survive_our_own_and_zemax_files() {
 #[test]
 fn impossible_diffractive_surfaces_are_refused() {
     let lens = Lens::built_in("dgauss-50mm").unwrap();
-    let at = |surface: usize, profile: PhaseProfile| DiffractiveSurface { surface, order: 1, profile };
+    let at = |surface: usize, profile: PhaseProfile| DiffractiveSurface { surface, order: 1, profile, blaze: None };
     let message = |list: Vec<DiffractiveSurface>| lens.clone().with_diffractive(list).unwrap_err().to_string();
     assert!(message(vec![at(99, GRATING)]).contains("expected a surface that the lens has"));
     assert!(
@@ -272,5 +272,81 @@ fn deeplens_grating_is_read() {
             assert!(file.notes.iter().any(|note| note.starts_with("DOE: of the grating the first order")));
         }
         Err(error) => panic!("{error}"),
+    }
+}
+
+const SMOOTH: Blaze = Blaze { design_nm: 550.0, order: None, levels: None };
+
+#[test]
+fn shares_of_orders_are_those_of_scalar_theory_and_add_up_to_one() {
+    // sinc² of a smooth relief; of staircases the figures that are usually published.
+    assert_eq!(SMOOTH.share_of(1, 1.0), 1.0);
+    assert!((SMOOTH.share_of(1, 1.5) - (2.0 / PI).powi(2)).abs() < 1e-15 && SMOOTH.share_of(3, 1.0) < 1e-30);
+    for (levels, published) in [(2, 0.41), (4, 0.81), (8, 0.95), (16, 0.99)] {
+        let found = Blaze { levels: Some(levels), ..SMOOTH }.share_of(1, 1.0);
+        let x = PI / f64::from(levels);
+        assert!((found - (x.sin() / x).powi(2)).abs() < 1e-15 && (found - published).abs() < 5e-3, "{levels}: {found}");
+    }
+    let many = Blaze { levels: Some(1_000_000), ..SMOOTH };
+    for waves in [0.3, 0.9, 1.0, 1.234, 2.5] {
+        assert!((many.share_of(1, waves) - SMOOTH.share_of(1, waves)).abs() < 1e-11);
+        // What the orders beyond ±n have falls off as 2/(π² n) for a jump of 2 in a groove.
+        let n = 100_000;
+        for blaze in [SMOOTH, Blaze { levels: Some(2), ..SMOOTH }, Blaze { levels: Some(5), ..SMOOTH }] {
+            let sum: f64 = (-n..=n).map(|order| blaze.share_of(order, waves)).sum();
+            // A groove of N steps has jumps of 2 N in all at most.
+            let jumps = f64::from(blaze.levels.unwrap_or(1));
+            let rest = 2.1 * jumps * jumps / (PI * PI * f64::from(n));
+            assert!((1.0 - sum).abs() < rest, "{blaze:?} {waves}: {sum}");
+        }
+    }
+}
+
+#[test]
+fn a_kinoform_has_less_light_off_its_wavelength() {
+    let glass = Glass::Named("SCHOTT:N-BK7".to_owned());
+    let rings = PhaseProfile::Rings { radius_mm: 5.0, coefficients_rad: vec![-100.0] };
+    let with = |blaze: Option<Blaze>, order: i32, media: [Glass; 2], mirrors: &[usize]| {
+        let [before, after] = media;
+        let interface = Interface { surface: Surface::plane(4.0), medium_after: after, thickness_after_mm: 0.0 };
+        let lens = Lens::new("kinoform", "test", vec![interface], 0).unwrap().with_object_medium(before).unwrap();
+        let phase = DiffractiveSurface { surface: 0, order, profile: rings.clone(), blaze };
+        lens.with_mirrors(mirrors.iter().copied()).unwrap().with_diffractive(vec![phase]).unwrap()
+    };
+    let sinc2 = |x: f64| if x == 0.0 { 1.0 } else { ((PI * x).sin() / (PI * x)).powi(2) };
+    let far = ObjectPoint::far(0.05, DVec2::Y);
+    let step = |nm: f64| glass.index_at(nm).unwrap() - Glass::Air.index_at(nm).unwrap();
+    for nm in [450.0, 550.0, 632.8] {
+        for order in [1, -1, 2, 0] {
+            let design = Blaze { order: Some(1), ..SMOOTH };
+            let lens = with(Some(design), order, [Glass::Air, glass.clone()], &[]);
+            let waves = 550.0 / nm * step(nm) / step(550.0);
+            let expected = sinc2(waves - f64::from(order));
+            assert!((lens.diffraction_efficiency_at(nm).unwrap() - expected).abs() < 1e-14);
+            let plain = with(None, order, [Glass::Air, glass.clone()], &[]);
+            assert_eq!(plain.at(nm).unwrap().diffraction_efficiency(), 1.0);
+            let cone = |lens: &Lens| projected_solid_angle(&lens.at(nm).unwrap(), &far, 64);
+            assert!((cone(&lens) - expected * cone(&plain)).abs() < 1e-15);
+        }
+        // Between equal media, and at a mirror of no dispersion, only the wavelength counts; the order of the surface is the design's.
+        let vacuum = Glass::Constant { index: 1.0 };
+        for mirrors in [&[][..], &[0]] {
+            let lens = with(Some(SMOOTH), -2, [vacuum.clone(), vacuum.clone()], mirrors);
+            let found = lens.diffraction_efficiency_at(nm).unwrap();
+            assert!((found - sinc2(2.0 - 2.0 * 550.0 / nm)).abs() < 1e-14, "{nm} {found}");
+        }
+    }
+    let lens = with(Some(Blaze { levels: Some(8), ..SMOOTH }), 1, [Glass::Air, glass.clone()], &[]);
+    let file = LensFile::from(lens);
+    let again = LensFile::from_bytes("a.ron".as_ref(), file.to_ron().as_bytes(), &ReadOptions::default()).unwrap();
+    assert_eq!(again.lens, file.lens);
+    assert!(file.left_out("zmx")[0].contains("the relief of gratings (blaze)"));
+    for (from, to, expected) in [
+        ("design_nm: 550.0", "design_nm: 0.0", "design_nm of a blaze is 0, expected a finite number above 0"),
+        ("levels: 8", "levels: 1", "levels of a blaze is 1, expected 2 to 1000000"),
+    ] {
+        let text = file.to_ron().replace(from, to);
+        let error = LensFile::from_bytes("a.ron".as_ref(), text.as_bytes(), &ReadOptions::default()).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
     }
 }

@@ -82,7 +82,7 @@ fn what_is_guessed_or_passed_over_is_noted_with_its_line() {
     assert_eq!(read(&text).unwrap().notes, [unknown]);
     assert_eq!(notes("EPD   10.0", "CIR 3; EPD 10"), [unknown.replace("QXY (line 4), CIX (line 20)", "CIR (line 4)")]);
     let zoom = "ZOO 3\nZOO THI S1 4 5 6\nGO";
-    assert_eq!(notes("GO", zoom), ["of 3 configurations (ZOO, line 24) the first is read"]);
+    assert_eq!(notes("GO", zoom), ["of 3 configurations number 1 is in use"]);
     let solve = "solves and pickups are not worked out anew, the stored values stand: PIM (line 23)";
     assert_eq!(notes("S     -200.0 95.0", "S -200.0 95.0\nPIM"), [solve]);
 }

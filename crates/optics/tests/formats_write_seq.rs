@@ -148,9 +148,9 @@ fn mirrors_and_gratings_read_back() {
         vec![interface(0.0, 5.0, Glass::Constant { index: 1.5 }, 3.0), interface(0.0, 5.0, Glass::Air, 0.0)];
     let lens = Lens::new("grating", "made up", interfaces, 0).unwrap();
     let profile = PhaseProfile::Grating { lines_per_mm: [0.0, -300.0] };
-    let grating = DiffractiveSurface { surface: 1, order: -2, profile };
+    let grating = DiffractiveSurface { surface: 1, order: -2, profile, blaze: None };
     let rings = |radius_mm, coefficients_rad| PhaseProfile::Rings { radius_mm, coefficients_rad };
-    let ring = DiffractiveSurface { surface: 0, order: 1, profile: rings(4.0, vec![-900.0, 2.5]) };
+    let ring = DiffractiveSurface { surface: 0, order: 1, profile: rings(4.0, vec![-900.0, 2.5]), blaze: None };
     let mut file = LensFile::from(lens.clone().with_diffractive(vec![grating]).unwrap());
     file.film_distance_mm = Some(20.0);
     check_round_trip(&file);

@@ -3,7 +3,10 @@
 
 use std::f64::consts::PI;
 
-use dioptric_optics::{FilmPoint, Lens, ObjectPoint, PupilBoundary, Vignetting, glam::DVec2, rays_towards};
+use dioptric_optics::{
+    Blaze, DiffractiveSurface, FilmPoint, Glass, Interface, Lens, ObjectPoint, PhaseProfile, PupilBoundary, Surface,
+    Vignetting, glam::DVec2, rays_towards,
+};
 use dioptric_psf::{BankSettings, Diffraction, FieldSampling, Kernel, LensImageModel, Picture, PsfQuery};
 
 #[test]
@@ -151,5 +154,34 @@ fn a_mesh_of_576_rays_is_as_good_as_a_million_counted_ones() {
         let l1: f32 = fine.samples.indexed_iter().map(|((r, c), e)| (e - at(r, c).unwrap_or(0.0)).abs()).sum();
 
         assert!(l1 < 0.01, "{field_tan}, {dioptres} D: {l1} from a finer mesh");
+    }
+}
+
+/// Of a wavelength at which a kinoform sends a part of the light into its order, the film has that part, and the spread is as it was.
+#[test]
+fn a_blaze_takes_light_and_no_sharpness() {
+    let glass = Glass::Constant { index: 1.5 };
+    let interface = |surface, medium_after, thickness_after_mm| Interface { surface, medium_after, thickness_after_mm };
+    let interfaces =
+        vec![interface(Surface::sphere(50.0, 5.0), glass, 2.0), interface(Surface::plane(5.0), Glass::Air, 0.0)];
+    let lens = Lens::new("hybrid", "test", interfaces, 0).unwrap();
+    let phase = |blaze| {
+        let profile = PhaseProfile::Rings { radius_mm: 5.0, coefficients_rad: vec![-60.0] };
+        let phase = DiffractiveSurface { surface: 1, order: 1, profile, blaze };
+        lens.clone().with_diffractive(vec![phase]).unwrap()
+    };
+    let film_distance_mm = phase(None).at(550.0).unwrap().first_order().bfl_mm;
+    let blaze = Blaze { design_nm: 550.0, order: None, levels: Some(8) };
+    for diffraction in [Diffraction::None, Diffraction::Hurb { gamma: 1.0 }] {
+        let settings = BankSettings::covering(film_distance_mm, 0.1, (0.0, 0.0), (450.0, 550.0), diffraction);
+        let [plain, blazed] = [None, Some(blaze)].map(|blaze| LensImageModel::build(&phase(blaze), &settings).unwrap());
+        for nm in [450.0, 550.0] {
+            let share = blaze.share_of(1, 550.0 / nm);
+            let light = |bank: &LensImageModel| bank.radial_geometry(0.0, nm).unwrap().irradiance_per_radiance(0.05);
+            assert!((light(&blazed) / light(&plain) / share - 1.0).abs() < 1e-9, "{nm}");
+            let kernel = |bank: &LensImageModel| bank.kernel(PsfQuery::new(DVec2::new(0.05, 0.0), 0.0, nm, 4.0));
+            let (a, b) = (kernel(&blazed), kernel(&plain));
+            assert!(a.difference_from(&b) < 1e-5 && (a.sum() - b.sum()).abs() < 1e-5, "{nm}");
+        }
     }
 }

@@ -137,7 +137,8 @@ impl Lens {
         guarded(|| Self::of_choice(LensSpec::BuiltIn(name.to_owned()), LensReadOptions::default()))
     }
 
-    /// Reads a lens file: ``.ron`` (our own), ``.dat``, ``.json`` (ISET's or DeepLens's), ``.zmx`` (Zemax) or ``.seq`` (CODE V).
+    /// Reads a lens file: ``.ron`` (our own), ``.dat``, ``.json`` (ISET's or DeepLens's), ``.zmx`` (Zemax), ``.seq`` (CODE V) or
+    /// ``.len`` (OSLO).
     ///
     /// Parameters
     /// ----------
@@ -148,13 +149,17 @@ impl Lens {
     ///     What to do with a glass that no catalogue has.
     /// slope_per_nm : float, optional
     ///     Change of index a nanometre of media of which the file states one index alone.
+    /// configuration : int, optional
+    ///     Which configuration of a file that has several, as the positions of a zoom lens, counted from 1; without it the one that the file
+    ///     has in use.
     #[staticmethod]
-    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", slope_per_nm=None))]
+    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", slope_per_nm=None, configuration=None))]
     fn read(
         path: PathBuf,
         glasses: Option<Vec<PathBuf>>,
         missing_glass: &str,
         slope_per_nm: Option<f64>,
+        configuration: Option<usize>,
     ) -> PyResult<Self> {
         let missing_glass = match missing_glass {
             "refuse" => MissingGlass::Refuse,
@@ -163,7 +168,8 @@ impl Lens {
             other => return Err(wrong("missing_glass", format!("'{other}'"), "'refuse', 'nd-vd' or 'nearest'")),
         };
         let glasses = glasses.unwrap_or_default();
-        let reading = LensReadOptions { glasses, missing_glass, slope_per_nm, ..LensReadOptions::default() };
+        let reading =
+            LensReadOptions { glasses, missing_glass, slope_per_nm, configuration, ..LensReadOptions::default() };
         guarded(|| Self::of_choice(LensSpec::File(path), reading))
     }
 
@@ -229,6 +235,18 @@ impl Lens {
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.file.notes.clone()
+    }
+
+    /// What the lens's file calls its configurations, as the positions of a zoom lens, "" where it does not; empty of a file with one.
+    #[getter]
+    fn configurations(&self) -> Vec<&str> {
+        self.file.configuration_names()
+    }
+
+    /// Which of them is in use, counted from 1.
+    #[getter]
+    fn configuration(&self) -> usize {
+        self.file.configuration
     }
 
     /// The number of surfaces, the stop included.

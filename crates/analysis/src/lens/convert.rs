@@ -26,6 +26,13 @@ pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Re
     let mut file = LensSpec::named(input).open(reading)?;
     let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let mut notes = std::mem::take(&mut file.notes);
+    if reading.configuration.is_some() {
+        let n_configurations = file.configurations.len();
+        if n_configurations > 1 {
+            notes.push(format!("configuration {} of {n_configurations} is written alone", file.configuration));
+        }
+        file = file.of_one_configuration();
+    }
     notes.extend(file.left_out(&extension));
     let (text, glasses) = match extension.as_str() {
         "ron" => (file.to_ron(), None),

@@ -2,7 +2,7 @@
 
 use dioptric_optics::{Field, Lens, LensFile, glam::DVec2};
 
-use crate::AnalysisFields;
+use crate::{AnalysisFields, ConfigurationData};
 use dioptric_pipeline::{
     LensReadOptions, LensSpec, Movements, PipelineError, REFERENCE_WAVELENGTH_NM, StopSpec, nearest_to_reference_nm,
 };
@@ -26,6 +26,8 @@ pub struct LensDefaults {
     pub surface_comments: Vec<String>,
     /// The points of the field, as the file names them.
     fields: Vec<Field>,
+    /// The file, of one that has several configurations.
+    several: Option<Box<LensFile>>,
     /// Distance of the film behind the last vertex that the file states, mm.
     pub film_distance_mm: Option<f64>,
 }
@@ -61,7 +63,9 @@ impl LensDefaults {
         let wavelengths_nm: Vec<f64> = file.wavelengths_nm.iter().copied().filter(is_known).collect();
         let weighed = file.wavelengths_nm.iter().zip(&file.wavelength_weights);
         let wavelength_weights = weighed.filter(|(nm, _)| is_known(nm)).map(|(_, weight)| *weight).collect();
+        let several = (file.configurations.len() > 1).then(|| Box::new(file.clone()));
         Self {
+            several,
             wavelength_weights,
             reference_nm: file.reference_wavelength_nm.filter(|nm| wavelengths_nm.contains(nm)),
             wavelengths_nm,
@@ -72,6 +76,14 @@ impl LensDefaults {
             lens: file.lens,
             notes: file.notes,
         }
+    }
+
+    /// Returns all configurations of a file that has several; nothing of others.
+    ///
+    /// # Errors
+    /// When a glass is not known at the wavelength.
+    pub fn configurations(&self, wavelength_nm: f64) -> Result<Vec<ConfigurationData>, PipelineError> {
+        self.several.as_ref().map_or(Ok(Vec::new()), |file| ConfigurationData::all(file, wavelength_nm))
     }
 
     /// Whether all media of the lens are known at a wavelength.

@@ -24,5 +24,5 @@ pub use rows::{
     WavefrontRow,
 };
 pub use surface_table::{SurfaceRow, placement_lines, surface_rows};
-pub use table::{ImageData, LensData, LensInfoRequest, LensRow, PlaneData, built_in_lenses};
+pub use table::{ConfigurationData, ImageData, LensData, LensInfoRequest, LensRow, PlaneData, built_in_lenses};
 pub use trace_table::{RayTable, TraceError, TraceSettings};

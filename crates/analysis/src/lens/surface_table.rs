@@ -1,6 +1,6 @@
 //! The surfaces of a lens in words and numbers.
 
-use dioptric_optics::{DiffractiveSurface, Glass, Lens, Outline, PhaseProfile, Shape, Surface};
+use dioptric_optics::{Blaze, DiffractiveSurface, Glass, Lens, Outline, PhaseProfile, Shape, Surface};
 use serde::Serialize;
 
 /// A surface of a lens as a row of a table.
@@ -45,8 +45,9 @@ pub fn surface_rows(lens: &Lens) -> Vec<SurfaceRow> {
 
 /// Returns what there is to say of the phase that a surface adds.
 fn phase_summary(lens: &Lens, surface: usize) -> Option<String> {
-    let DiffractiveSurface { order, profile, .. } = lens.diffractive().iter().find(|phase| phase.surface == surface)?;
-    Some(match profile {
+    let DiffractiveSurface { order, profile, blaze, .. } =
+        lens.diffractive().iter().find(|phase| phase.surface == surface)?;
+    let words = match profile {
         PhaseProfile::Grating { lines_per_mm: [x, y] } => {
             format!("grating of {} lines/mm along x and {} along y in the order {order}", short(*x), short(*y))
         }
@@ -54,6 +55,13 @@ fn phase_summary(lens: &Lens, surface: usize) -> Option<String> {
             let terms = (1..).zip(coefficients_rad).map(|(i, a)| format!("{} ρ^{}", short(*a), 2 * i));
             let sum = terms.collect::<Vec<_>>().join(" + ");
             format!("phase of {sum} rad with ρ = r/{} mm in the order {order}", short(*radius_mm))
+        }
+    };
+    Some(match blaze {
+        None => words,
+        Some(Blaze { design_nm, levels, .. }) => {
+            let levels = levels.map_or(String::new(), |levels| format!(" in {levels} levels"));
+            format!("{words}, blazed for {design_nm} nm{levels}")
         }
     })
 }

@@ -1,11 +1,53 @@
 //! A lens described in numbers.
 
 use dioptric_optics::{
-    C_LINE_NM, F_LINE_NM, FirstOrder, Lens, MonoLens, SeidelSettings, SeidelSums, analysis::field_limit_deg,
+    C_LINE_NM, F_LINE_NM, FirstOrder, Lens, LensFile, MonoLens, SeidelSettings, SeidelSums, analysis::field_limit_deg,
 };
 use serde::Serialize;
 
 use dioptric_pipeline::PipelineError;
+
+/// One of the configurations of a lens file that has several: a position of a zoom lens, say.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ConfigurationData {
+    /// Counted from 1.
+    pub number: usize,
+    /// What the file calls it; empty where it does not.
+    pub name: String,
+    /// Whether it is the one in use.
+    pub in_use: bool,
+    /// The focal length, mm.
+    pub efl_mm: f64,
+    /// The f-number, of a far object.
+    pub f_number: f64,
+    /// Distance of the object before the first vertex, mm; infinite for a far one.
+    pub object_distance_mm: f64,
+    /// Distance of the film behind the last vertex, mm, where the file states it.
+    pub film_distance_mm: Option<f64>,
+}
+
+impl ConfigurationData {
+    /// Returns all configurations of a file that has several.
+    ///
+    /// # Errors
+    /// When a glass is not known at the wavelength.
+    pub fn all(file: &LensFile, wavelength_nm: f64) -> Result<Vec<Self>, PipelineError> {
+        let states = file.states();
+        let row = |(i, (state, name)): (usize, (&LensFile, &str))| {
+            let first = state.lens.at(wavelength_nm)?.first_order();
+            Ok(Self {
+                number: i + 1,
+                name: name.to_owned(),
+                in_use: i + 1 == file.configuration,
+                efl_mm: first.efl_mm,
+                f_number: first.f_number,
+                object_distance_mm: state.object_distance_mm.unwrap_or(f64::INFINITY),
+                film_distance_mm: state.film_distance_mm,
+            })
+        };
+        states.iter().zip(file.configuration_names()).enumerate().map(row).collect()
+    }
+}
 
 /// The first-order data and third-order sums of a lens at one wavelength.
 ///
@@ -15,6 +57,9 @@ use dioptric_pipeline::PipelineError;
 pub struct LensData {
     /// The lens.
     pub lens: String,
+    /// All configurations of a lens file that has several; the data are of the one in use.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub configurations: Vec<ConfigurationData>,
     /// Focal lengths, principal planes, pupils and f-number at a wavelength.
     #[serde(flatten)]
     pub first_order: FirstOrder,
@@ -133,6 +178,7 @@ impl LensData {
         let (first, limit) = (mono.first_order(), mono.limiting_beam());
         Ok(Self {
             lens: lens.name().to_owned(),
+            configurations: Vec::new(),
             first_order: first,
             real_f_number: mono.real_f_number(),
             stop_limits: limit.is_none(),

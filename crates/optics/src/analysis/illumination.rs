@@ -6,7 +6,7 @@ use crate::{MonoLens, ObjectPoint, PupilBoundary, PupilRegion, Vignetting};
 
 /// Returns the projected solid angle of the cone of light that arrives at the image of a point, times the square of the
 /// image space's index over the object space's, sr: the irradiance there for a uniform scene of radiance 1; 0 where no
-/// light gets through.
+/// light gets through. Of the light that diffractive surfaces send into other orders it is left out.
 ///
 /// The solid angle is the area that the rays' direction cosines (l, m) fill; its edge is that of the true, vignetted
 /// pupil, found at `n_azimuths` (rounded up to an even number), less what obscurations stop. It is exact for a sharp image; where aberrations are
@@ -18,7 +18,8 @@ pub fn projected_solid_angle(lens: &MonoLens, point: &ObjectPoint, n_azimuths: u
 
 /// Returns the same for a film with this normal at the image, a unit vector of the lens frame.
 pub fn projected_solid_angle_onto(lens: &MonoLens, point: &ObjectPoint, n_azimuths: usize, normal: DVec3) -> f64 {
-    lens.over_clear_pupil(&|lens| whole_cone(lens, point, n_azimuths.max(16).next_multiple_of(2), normal))
+    let cone = |lens: &MonoLens| whole_cone(lens, point, n_azimuths.max(16).next_multiple_of(2), normal);
+    lens.diffraction_efficiency() * lens.over_clear_pupil(&cone)
 }
 
 /// Places on each line across a region, and the distance, over the size of the region, across which directions are compared.

@@ -133,7 +133,7 @@ impl Grating {
 
     fn diffractive(&self, surface: usize) -> DiffractiveSurface {
         let profile = PhaseProfile::Grating { lines_per_mm: self.lines_per_mm.to_array() };
-        DiffractiveSurface { surface, order: 1, profile }
+        DiffractiveSurface { surface, order: 1, profile, blaze: None }
     }
 }
 
@@ -231,7 +231,7 @@ mod tests {
         let file = read(&with(grating)).ok().unwrap();
         assert_eq!((file.lens.interfaces().len(), file.lens.last_vertex_z_mm()), (4, 8.5));
         assert_eq!((file.film_distance_mm, file.lens.apertures().len(), file.notes.len()), (Some(44.0), 1, 1));
-        let [DiffractiveSurface { surface: 3, order: 1, profile: PhaseProfile::Grating { lines_per_mm } }] =
+        let [DiffractiveSurface { surface: 3, order: 1, profile: PhaseProfile::Grating { lines_per_mm }, .. }] =
             file.lens.diffractive()
         else {
             panic!("{:?}", file.lens.diffractive())

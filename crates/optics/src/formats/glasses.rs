@@ -5,6 +5,7 @@ use crate::{CatalogueGlass, Glass, GlassCatalogue, OpticsError};
 use super::lens_file::{MissingGlass, ReadOptions, SeqNumbers};
 
 /// Where a lens file's glasses are looked up.
+#[derive(Clone)]
 pub(super) struct Glasses<'a> {
     options: &'a ReadOptions,
     /// The catalogues that the file itself names, in order.
@@ -27,6 +28,11 @@ impl<'a> Glasses<'a> {
     /// What the numbers of a CODE V file are taken for.
     pub(super) fn seq_numbers(&self) -> Option<SeqNumbers> {
         self.options.seq_numbers
+    }
+
+    /// The configuration that is asked for, counted from 1.
+    pub(super) fn configuration(&self) -> Option<usize> {
+        self.options.configuration
     }
 
     /// Returns the glass of this name; `nd_vd` is what the file states of it besides.

@@ -31,8 +31,37 @@ pub struct LensFile {
     pub comments: Vec<String>,
     /// The array of microlenses before the film that the file states. It is kept, not traced.
     pub microlens: Option<Microlens>,
+    /// All configurations of a file that has several, the one in use among them; empty where there is one alone.
+    pub configurations: Vec<Configuration>,
+    /// Which of them is in use, counted from 1: the lens and its use are its own.
+    pub configuration: usize,
     /// What the file says and this crate does otherwise or not at all, a sentence each.
     pub notes: Vec<String>,
+}
+
+/// One of several configurations of a lens: a position of a zoom lens, a distance that it is focused on, a glass put in.
+///
+/// All configurations of a file have the same surfaces; what differs is how these stand, and how the lens is used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Configuration {
+    /// What the file calls it; empty where it does not.
+    pub name: String,
+    /// The lens.
+    pub lens: Lens,
+    /// As [`LensFile::film_distance_mm`].
+    pub film_distance_mm: Option<f64>,
+    /// As [`LensFile::object_distance_mm`].
+    pub object_distance_mm: Option<f64>,
+    /// As [`LensFile::wavelengths_nm`].
+    pub wavelengths_nm: Vec<f64>,
+    /// As [`LensFile::wavelength_weights`].
+    pub wavelength_weights: Vec<f64>,
+    /// As [`LensFile::reference_wavelength_nm`].
+    pub reference_wavelength_nm: Option<f64>,
+    /// As [`LensFile::fields`].
+    pub fields: Vec<Field>,
+    /// As [`LensFile::field_weights`].
+    pub field_weights: Vec<f64>,
 }
 
 /// An array of like microlenses before the film.
@@ -113,6 +142,8 @@ pub struct ReadOptions {
     pub missing_glass: MissingGlass,
     /// What the numbers of surfaces are in a CODE V file that does not say; `None` for what is plausible.
     pub seq_numbers: Option<SeqNumbers>,
+    /// Which configuration of a file that has several, counted from 1; `None` for the one that the file has in use.
+    pub configuration: Option<usize>,
 }
 
 impl LensFile {
@@ -129,6 +160,8 @@ impl LensFile {
             surface_comments: Vec::new(),
             comments: Vec::new(),
             microlens: None,
+            configurations: Vec::new(),
+            configuration: 1,
             notes: Vec::new(),
         }
     }

@@ -1,5 +1,7 @@
 //! Our own lens file: RON, with every number named and its unit in the name.
 
+mod configuration_row;
+
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +9,9 @@ use crate::{
     Aperture, CoordinateBreak, DiffractiveSurface, Glass, ImageSurface, Interface, Lens, OpticsError, Shape, Surface,
 };
 
+use self::configuration_row::ConfigurationRow;
 use super::{
+    configuration::MOST_CONFIGURATIONS,
     lens_file::{Field, LensFile},
     number::reciprocal,
     text_error::TextError,
@@ -16,71 +20,86 @@ use super::{
 /// A lens as it stands in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Prescription {
-    name: String,
-    source: String,
+pub(super) struct Prescription {
+    pub(super) name: String,
+    pub(super) source: String,
     /// Left out for air.
     #[serde(default, skip_serializing_if = "is_air")]
-    object_medium: Glass,
-    surfaces: Vec<Row>,
+    pub(super) object_medium: Glass,
+    pub(super) surfaces: Vec<Row>,
     /// Tilts and decenters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    moves: Vec<CoordinateBreak>,
+    pub(super) moves: Vec<CoordinateBreak>,
     /// Openings and obscurations beside the round rims.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    apertures: Vec<Aperture>,
+    pub(super) apertures: Vec<Aperture>,
     /// Gratings and diffractive surfaces.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    diffractive: Vec<DiffractiveSurface>,
+    pub(super) diffractive: Vec<DiffractiveSurface>,
     /// Left out for a flat film.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    image_radius_mm: Option<f64>,
+    pub(super) image_radius_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "is_zero")]
-    image_conic: f64,
+    pub(super) image_conic: f64,
     /// How the lens is meant to be used, as far as that is known: the place of the film behind the last vertex, that of the
     /// object before the first (left out for a far one), wavelengths and the main one of them, and the points of the field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    film_distance_mm: Option<f64>,
+    pub(super) film_distance_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    object_distance_mm: Option<f64>,
+    pub(super) object_distance_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    wavelengths_nm: Vec<f64>,
+    pub(super) wavelengths_nm: Vec<f64>,
     /// One each of the wavelengths; left out where they count alike.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    wavelength_weights: Vec<f64>,
+    pub(super) wavelength_weights: Vec<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    reference_wavelength_nm: Option<f64>,
+    pub(super) reference_wavelength_nm: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    fields: Vec<Field>,
+    pub(super) fields: Vec<Field>,
     /// One each of the fields; left out where they count alike.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    field_weights: Vec<f64>,
+    pub(super) field_weights: Vec<f64>,
     /// What there is to say beside the source, a line each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    comments: Vec<String>,
+    pub(super) comments: Vec<String>,
+    /// What differs in each of several configurations, the positions of a zoom lens, from what stands above.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) configurations: Vec<ConfigurationRow>,
+    /// Which of them is in use, counted from 1.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub(super) configuration: usize,
 }
 
 /// A surface as it stands in a file, with what follows it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Row {
+pub(super) struct Row {
     /// What it is called, if anything.
     #[serde(default, skip_serializing_if = "String::is_empty")]
-    comment: String,
+    pub(super) comment: String,
     /// Left out for a plane.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    radius_mm: Option<f64>,
+    pub(super) radius_mm: Option<f64>,
     #[serde(default, skip_serializing_if = "is_sphere")]
-    shape: Shape,
+    pub(super) shape: Shape,
     #[serde(default, skip_serializing_if = "is_false")]
-    stop: bool,
+    pub(super) stop: bool,
     #[serde(default, skip_serializing_if = "is_false")]
-    mirror: bool,
-    semi_aperture_mm: f64,
+    pub(super) mirror: bool,
+    pub(super) semi_aperture_mm: f64,
     /// Left out for air. Behind a mirror it is that before it.
     #[serde(default, skip_serializing_if = "is_air")]
-    medium: Glass,
-    thickness_mm: f64,
+    pub(super) medium: Glass,
+    pub(super) thickness_mm: f64,
+}
+
+fn one() -> usize {
+    1
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_one(number: &usize) -> bool {
+    *number == 1
 }
 
 fn is_sphere(shape: &Shape) -> bool {
@@ -111,6 +130,30 @@ pub(super) fn file_from_ron(text: &str) -> Result<LensFile, TextError> {
     let prescription: Prescription = ron_options()
         .from_str(text)
         .map_err(|error| TextError { line: Some(error.span.start.line), reason: error.code.to_string() })?;
+    if prescription.configurations.is_empty() {
+        if prescription.configuration != 1 {
+            let error = OpticsError::Configuration { number: prescription.configuration, n_configurations: 1 };
+            return Err(error.into());
+        }
+        return file_of(prescription);
+    }
+    if prescription.configurations.len() > MOST_CONFIGURATIONS {
+        let found = prescription.configurations.len();
+        let reason = format!("{found} configurations, expected at most {MOST_CONFIGURATIONS}");
+        return Err(TextError { line: None, reason });
+    }
+    let state = |(i, row): (usize, &ConfigurationRow)| {
+        let file = row.clone().of(&prescription).and_then(file_of);
+        let of_state =
+            |error: TextError| TextError { reason: format!("configuration {}: {}", i + 1, error.reason), ..error };
+        Ok((row.name.clone(), file.map_err(of_state)?))
+    };
+    let files = prescription.configurations.iter().enumerate().map(state).collect::<Result<_, TextError>>()?;
+    LensFile::of_configurations(files, prescription.configuration)
+}
+
+/// Returns the lens of a prescription and its use, whatever its configurations.
+fn file_of(prescription: Prescription) -> Result<LensFile, TextError> {
     let stops: Vec<usize> = (0..prescription.surfaces.len()).filter(|&i| prescription.surfaces[i].stop).collect();
     let &[stop] = stops.as_slice() else { return Err(OpticsError::Stops { n_stops: stops.len() }.into()) };
     let mirrors: Vec<usize> = (0..prescription.surfaces.len()).filter(|&i| prescription.surfaces[i].mirror).collect();
@@ -225,6 +268,8 @@ impl Lens {
             fields: Vec::new(),
             field_weights: Vec::new(),
             comments: Vec::new(),
+            configurations: Vec::new(),
+            configuration: 1,
         }
     }
 }
@@ -233,6 +278,29 @@ impl LensFile {
     /// Returns the lens, and what is known of its use, as the text of our own file, which reads back as the same but for an
     /// array of microlenses.
     pub fn to_ron(&self) -> String {
+        let states: Vec<Prescription> = self.states().iter().map(Self::own_prescription).collect();
+        let mut body = self.own_prescription();
+        if let [first, ..] = states.as_slice()
+            && !self.configurations.is_empty()
+        {
+            body.clone_from(first);
+            // What some configuration does without is not said of all.
+            if states.iter().any(|state| state.film_distance_mm.is_none()) {
+                body.film_distance_mm = None;
+            }
+            if states.iter().any(|state| state.reference_wavelength_nm.is_none()) {
+                body.reference_wavelength_nm = None;
+            }
+            let rows = states.iter().zip(self.configuration_names());
+            body.configurations = rows.map(|(state, name)| ConfigurationRow::between(&body, state, name)).collect();
+            body.configuration = self.configuration;
+        }
+        let pretty = ron::ser::PrettyConfig::new().depth_limit(2);
+        ron_options().to_string_pretty(&body, pretty).expect("numbers and text always have a RON form")
+    }
+
+    /// Returns the lens in use as it stands in our own file.
+    fn own_prescription(&self) -> Prescription {
         let mut prescription = Prescription {
             wavelength_weights: self.wavelength_weights.clone(),
             field_weights: self.field_weights.clone(),
@@ -247,8 +315,7 @@ impl LensFile {
         for (row, comment) in prescription.surfaces.iter_mut().zip(&self.surface_comments) {
             row.comment.clone_from(comment);
         }
-        let pretty = ron::ser::PrettyConfig::new().depth_limit(2);
-        ron_options().to_string_pretty(&prescription, pretty).expect("numbers and text always have a RON form")
+        prescription
     }
 }
 

@@ -9,7 +9,7 @@ use super::{
     decode::{bytes_of, text_of},
     deeplens,
     glasses::Glasses,
-    iset_json,
+    iset_json, len,
     lens_file::{LensFile, ReadOptions},
     pbrt_list,
     prescription::file_from_ron,
@@ -19,7 +19,7 @@ use super::{
 };
 
 impl Lens {
-    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx` or `.seq`.
+    /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx`, `.seq` or `.len`.
     ///
     /// [`LensFile::read`](crate::LensFile::read) tells what else the file says, as where the film lies.
     ///
@@ -33,7 +33,7 @@ impl Lens {
 
 impl LensFile {
     /// Reads a lens file, by its extension: `.ron` (our own), `.dat` or `.txt`, `.json` (ISET's omni format or
-    /// `DeepLens`), `.zmx` (Zemax) or `.seq` (CODE V).
+    /// `DeepLens`), `.zmx` (Zemax), `.seq` (CODE V) or `.len` (OSLO).
     ///
     /// A glass catalogue beside a `.zmx` file that has its name and the extension `.agf` is read with it.
     ///
@@ -59,22 +59,33 @@ impl LensFile {
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let text = text_of(bytes);
         let glasses = Glasses::new(options);
-        let read = match extension.as_str() {
+        let read: Result<Self, TextError> = match extension.as_str() {
             "ron" => file_from_ron(&text),
             "dat" | "txt" => match pbrt_list::numbers_of(&text) {
                 Some(numbers) => pbrt_list::lens_from_numbers(&numbers, &name).map(Self::of_lens),
                 None => dat::lens_from_dat(&text, &name).map(Self::of_lens),
             },
             "json" => json(&text, &name, &glasses),
+            "len" => len::lens_from_len(&text, &name, &glasses),
             "zmx" => zmx::lens_from_zmx(&text, &name, glasses),
             "seq" => seq::lens_from_seq(&text, &name, glasses),
             _ => {
-                let expected = "expected .ron, .dat, .txt, .json, .zmx or .seq";
+                let expected = "expected .ron, .dat, .txt, .json, .zmx, .seq or .len";
                 let reason = format!("the extension '.{extension}' is no lens format; {expected}");
                 return Err(OpticsError::Io { path: path.to_owned(), reason });
             }
         };
+        let read = read.and_then(|file| file.in_use(options.configuration));
         read.map_err(|TextError { line, reason }| OpticsError::File { path: path.to_owned(), line, reason })
+    }
+
+    /// Returns the file with the configuration in use that was asked for; where none was, with a note on the one that is.
+    fn in_use(mut self, asked: Option<usize>) -> Result<Self, TextError> {
+        if let Some(number) = asked {
+            return Ok(self.with_configuration(number)?);
+        }
+        self.notes.extend(self.note_on_configuration());
+        Ok(self)
     }
 }
 

@@ -3,12 +3,13 @@
 //! Read are radii or curvatures, thicknesses, glasses of the catalogue or of a private one (`PRV` … `END`), conics, even
 //! aspheres, cylinders (`CYL`), toroids (`YTO`, `XTO`) and anamorphic conics (`AAS`), decenters and tilts (basic, `DAR` or
 //! `REV`), apertures, the pupil, fields and wavelengths. Commands that change no ray (variables, labels) are passed over;
-//! solves, configurations (`ZOO`) and words that are not understood are noted with their line; what changes rays and cannot
-//! be traced is refused.
+//! solves and words that are not understood are noted with their line; what changes rays and cannot
+//! be traced is refused. Zoom positions (`ZOO`) are the configurations of the file.
 
 mod command;
 mod surface;
 mod words;
+mod zoom;
 
 use crate::{CatalogueGlass, Glass, ImageSurface};
 
@@ -16,6 +17,7 @@ use self::{
     command::{Command, commands_of},
     surface::SeqSurface,
     words::PassedOver,
+    zoom::Zoom,
 };
 use super::{
     glasses::{Glasses, constant, model},
@@ -32,7 +34,7 @@ pub(super) fn lens_from_seq(text: &str, name: &str, glasses: Glasses) -> Result<
         file.take(&command)?;
     }
     let unstated = file.decide_mode();
-    let built = file.into_system().and_then(System::build);
+    let built = file.build();
     built.map_err(|TextError { line, reason }| match unstated {
         None => TextError { line, reason },
         Some(note) => TextError { line, reason: format!("{reason}; {note}") },
@@ -46,6 +48,7 @@ const CURVATURES_TAKEN: &str = "neither radii (RDM) nor curvatures (CUM) are ann
      smaller than the beam or the glass, are taken for curvatures";
 
 /// What a file says, in its own units.
+#[derive(Clone)]
 struct Seq<'a> {
     glasses: Glasses<'a>,
     name: String,
@@ -68,6 +71,7 @@ struct Seq<'a> {
     /// The comments before the first command: where the lens is from, and what else there is to say.
     remarks: Vec<String>,
     has_image: bool,
+    zoom: Zoom,
     passed_over: PassedOver,
     notes: Vec<String>,
 }
@@ -100,6 +104,7 @@ impl<'a> Seq<'a> {
             surfaces: Vec::new(),
             remarks: Vec::new(),
             has_image: false,
+            zoom: Zoom::default(),
             passed_over: PassedOver::default(),
             notes: Vec::new(),
         }
@@ -110,7 +115,18 @@ impl<'a> Seq<'a> {
         if self.private_wavelengths_nm.is_some() {
             return self.take_private(&keyword, command);
         }
-        match keyword.as_str() {
+        if self.zoom.takes(&keyword, command, self.surfaces.len().saturating_sub(1))? {
+            return Ok(());
+        }
+        self.take_value(&keyword, command)
+    }
+
+    /// Takes a command that does not speak of zoom positions.
+    fn take_value(&mut self, keyword: &str, command: &Command) -> Result<(), TextError> {
+        if self.takes_element(keyword, command)? {
+            return Ok(());
+        }
+        match keyword {
             "TIT" | "TITLE" => {
                 if let Some(title) = command.words.get(1).filter(|title| !title.trim().is_empty()) {
                     self.name = title.trim().to_owned();
@@ -138,20 +154,36 @@ impl<'a> Seq<'a> {
             "VUY" => self.vignetting[2] = command.numbers()?,
             "VLY" => self.vignetting[3] = command.numbers()?,
             "PRV" => self.private_wavelengths_nm = Some(Vec::new()),
-            "SO" | "S" | "SI" => self.add_surface(&keyword, command)?,
+            "SO" | "S" | "SI" => self.add_surface(keyword, command)?,
             "S0" => self.add_surface("SO", command)?,
-            _ => self.take_of_surface(&keyword, command)?,
+            _ => self.take_of_surface(keyword, command)?,
         }
         Ok(())
     }
 
     fn take_fields(&mut self, kind: FieldKind, command: &Command) -> Result<(), TextError> {
+        self.put_kind(kind, command)?;
+        let axis = usize::from(command.words[0].to_uppercase().starts_with('Y'));
+        self.fields[axis] = command.numbers()?;
+        Ok(())
+    }
+
+    /// Takes the kind of fields that a command of them means.
+    fn put_field_kind(&mut self, keyword: &str, command: &Command) -> Result<(), TextError> {
+        let kind = match &keyword[1..] {
+            "OB" => FieldKind::ObjectHeight,
+            "IM" => FieldKind::ImageHeight,
+            "RI" => FieldKind::RealImageHeight,
+            _ => FieldKind::Angle,
+        };
+        self.put_kind(kind, command)
+    }
+
+    fn put_kind(&mut self, kind: FieldKind, command: &Command) -> Result<(), TextError> {
         if self.field_kind.is_some_and(|before| before != kind) {
             return Err(command.wrong("fields of two kinds; expected angles, object heights or image heights alone"));
         }
         self.field_kind = Some(kind);
-        let axis = usize::from(command.words[0].to_uppercase().starts_with('Y'));
-        self.fields[axis] = command.numbers()?;
         Ok(())
     }
 
@@ -221,7 +253,7 @@ impl<'a> Seq<'a> {
 
     /// Takes a command that belongs to a surface: the last, or the one that the first word after it names (`S3`).
     fn take_of_surface(&mut self, keyword: &str, command: &Command) -> Result<(), TextError> {
-        if self.passed_over.takes(keyword, &command.words, command.line) {
+        if self.passed_over.takes(keyword, command.line) {
             return Ok(());
         }
         let command = &command.without_labels();
@@ -431,6 +463,7 @@ impl<'a> Seq<'a> {
             comments: self.remarks,
             reference: self.reference.saturating_sub(1),
             notes: self.notes,
+            is_reduced: false,
         })
     }
 

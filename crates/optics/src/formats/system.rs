@@ -127,6 +127,8 @@ pub(super) struct System {
     pub(super) field_weights: Vec<f64>,
     pub(super) comments: Vec<String>,
     pub(super) notes: Vec<String>,
+    /// Whether the planes at which nothing happens are left out already.
+    pub(super) is_reduced: bool,
 }
 
 /// How far from the axis a ray is that stands for those of first-order theory, mm.
@@ -142,11 +144,16 @@ impl System {
         if !(1..=1000).contains(&self.surfaces.len()) {
             return Err(OpticsError::SurfaceCount { n_surfaces: self.surfaces.len() }.into());
         }
-        let Some(mut stop) = self.stop.filter(|&stop| stop < self.surfaces.len()) else {
+        let stop_of = |system: &Self| system.stop.filter(|&stop| stop < system.surfaces.len());
+        if stop_of(&self).is_none() {
             return Err(OpticsError::Stops { n_stops: 0 }.into());
-        };
+        }
         self.check_use()?;
-        self.drop_dummies(&mut stop);
+        if !self.is_reduced {
+            let is_kept: Vec<bool> = self.dummies().into_iter().map(|is_dummy| !is_dummy).collect();
+            self.keep(&is_kept);
+        }
+        let Some(stop) = stop_of(&self) else { return Err(OpticsError::Stops { n_stops: 0 }.into()) };
         if self.is_film_backward() {
             self.image_surface.curvature_per_mm *= -1.0;
         }
@@ -179,6 +186,8 @@ impl System {
             surface_comments: comments_of(&self.surfaces),
             comments: self.comments,
             microlens: None,
+            configurations: Vec::new(),
+            configuration: 1,
             notes: self.notes,
         })
     }
@@ -248,7 +257,7 @@ impl System {
         let mirrors = self.surfaces.iter().enumerate().filter_map(|(i, surface)| surface.is_mirror.then_some(i));
         let diffractive = self.surfaces.iter().enumerate().filter_map(|(surface, stated)| {
             let (order, profile) = stated.phase.clone()?;
-            Some(DiffractiveSurface { surface, order, profile })
+            Some(DiffractiveSurface { surface, order, profile, blaze: None })
         });
         let lens = lens.with_diffractive(diffractive.collect())?;
         lens.with_mirrors(mirrors)?.with_moves(moves)?.with_image_surface(self.image_surface)
@@ -262,26 +271,32 @@ impl System {
         self.surfaces.iter().enumerate().flat_map(of_surface).collect()
     }
 
-    /// Drops planes at which nothing happens to any ray.
-    fn drop_dummies(&mut self, stop: &mut usize) {
-        let (mut i, mut dropped, first_z_mm) = (0, Vec::new(), self.first_vertex_z_mm);
-        while i < self.surfaces.len() && self.surfaces.len() > 1 {
+    /// Which surfaces are planes at which nothing happens to any ray.
+    pub(super) fn dummies(&self) -> Vec<bool> {
+        let is_dummy = |(i, surface): (usize, &SystemSurface)| {
             let medium_before = match i {
                 0 => &self.object_medium,
                 _ => &self.surfaces[i - 1].medium_after,
             };
-            let surface = &self.surfaces[i];
             let is_plane = surface.shape == Shape::Sphere && surface.curvature_per_mm == 0.0;
-            if i == *stop
-                || !is_plane
-                || surface.is_mirror
-                || surface.is_rim_fixed
-                || surface.medium_after != *medium_before
-            {
-                i += 1;
-                continue;
+            self.stop != Some(i)
+                && is_plane
+                && !surface.is_mirror
+                && surface.phase.is_none()
+                && !surface.is_rim_fixed
+                && surface.medium_after == *medium_before
+        };
+        self.surfaces.iter().enumerate().map(is_dummy).collect()
+    }
+
+    /// Drops all surfaces but these, of which at least one is left.
+    pub(super) fn keep(&mut self, is_kept: &[bool]) {
+        let (mut dropped, first_z_mm) = (Vec::new(), self.first_vertex_z_mm);
+        for i in (0..self.surfaces.len()).rev().filter(|&i| !is_kept[i]) {
+            if self.surfaces.len() == 1 {
+                break;
             }
-            let thickness_mm = surface.thickness_after_mm;
+            let thickness_mm = self.surfaces[i].thickness_after_mm;
             match i {
                 0 => {
                     self.object_distance_mm = decimal_sum(self.object_distance_mm, thickness_mm);
@@ -298,10 +313,10 @@ impl System {
                 let (first, last) = step.surfaces;
                 step.surfaces = (first - usize::from(first > i), last - usize::from(last >= i && last != usize::MAX));
             }
-            if i < *stop {
-                *stop -= 1;
-            }
+            self.stop = self.stop.map(|stop| stop - usize::from(i < stop));
         }
+        self.is_reduced = true;
+        dropped.reverse();
         self.notes.extend(note_on_dummies(&dropped, self.first_vertex_z_mm - first_z_mm));
     }
 

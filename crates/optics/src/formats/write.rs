@@ -145,7 +145,8 @@ impl LensFile {
         }
     }
 
-    fn focus_mm(&self) -> Option<f64> {
+    /// Returns where first-order optics focuses the file's object, mm behind the last vertex.
+    pub(super) fn focus_mm(&self) -> Option<f64> {
         let lens = self.lens.at(self.reference_wavelength_nm.unwrap_or(D_LINE_NM)).ok()?;
         lens.film_distance_mm_for(self.object_distance_mm.unwrap_or(f64::INFINITY)).ok().filter(|mm| mm.is_finite())
     }
@@ -171,6 +172,7 @@ impl LensFile {
     /// states that the file does not, a sentence each.
     pub fn left_out(&self, extension: &str) -> Vec<String> {
         let holds_use = matches!(extension, "ron" | "zmx" | "seq");
+        let is_blazed = self.lens.diffractive().iter().any(|phase| phase.blaze.is_some());
         let stated = [
             ("its array of microlenses", self.microlens.is_some() && extension != "json"),
             ("the place of the film", self.film_distance_mm.is_some() && !holds_use),
@@ -179,12 +181,26 @@ impl LensFile {
             ("fields", !self.fields.is_empty() && !holds_use),
             ("names of surfaces", !self.surface_comments.is_empty() && !holds_use),
             ("comments", !self.comments.is_empty() && !holds_use),
+            ("the relief of gratings (blaze)", is_blazed && extension != "ron"),
         ];
         let left_out: Vec<&str> =
             stated.iter().filter(|(_, is_left_out)| *is_left_out).map(|(what, _)| *what).collect();
         let mut notes = Vec::new();
         if !left_out.is_empty() {
             notes.push(format!("a .{extension} file has no place for {}: left out", left_out.join(", ")));
+        }
+        let n_configurations = self.configurations.len();
+        if n_configurations > 1 && !holds_use {
+            let in_use = self.configuration;
+            notes.push(format!(
+                "a .{extension} file has no place for several configurations: of {n_configurations} it has number {in_use} alone"
+            ));
+        }
+        if n_configurations > 1 && extension == "seq" && self.configuration != 1 {
+            notes.push(format!(
+                "a .seq file does not say which configuration is in use: it is read with number 1, not {}",
+                self.configuration
+            ));
         }
         if matches!(extension, "zmx" | "seq") && self.film_distance_mm.is_none() {
             notes.push(match self.focus_mm() {

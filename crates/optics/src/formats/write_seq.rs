@@ -1,5 +1,7 @@
 //! CODE V files written.
 
+mod zoom;
+
 use std::{f64::consts::TAU, fmt::Write as _};
 
 use crate::{
@@ -40,6 +42,12 @@ impl LensFile {
     /// When the format has no word for a glass, shape, aperture or phase of the lens, or its fields are of several kinds; the
     /// message names which.
     pub fn to_seq(&self) -> Result<String, OpticsError> {
+        let texts = self.states().iter().map(Self::seq_text).collect::<Result<Vec<_>, _>>()?;
+        zoom::with_zoom(&texts, &self.configuration_names())
+    }
+
+    /// Returns the text of the configuration in use.
+    fn seq_text(&self) -> Result<String, OpticsError> {
         let lens = &self.lens;
         self.check_places(FORMAT)?;
         let mut text = self.seq_header()?;

@@ -1,5 +1,7 @@
 //! Zemax files written.
 
+mod operands;
+
 use std::fmt::Write as _;
 
 use glam::DVec2;
@@ -79,12 +81,7 @@ impl LensFile {
     /// When a glass is neither of the catalogue nor given by index and Abbe number: the format has no place for others.
     /// [`to_zmx_and_agf`](Self::to_zmx_and_agf) gives them a catalogue of their own.
     pub fn to_zmx(&self) -> Result<String, OpticsError> {
-        let glass = |(place, medium): (Option<usize>, &Glass)| match place {
-            Some(surface) if self.lens.is_mirror(surface) => Ok(MIRROR.to_owned()),
-            _ => zmx_glass(place, medium),
-        };
-        let glasses = media(&self.lens).map(glass).collect::<Result<Vec<_>, _>>()?;
-        self.zmx_text(&glasses, None)
+        self.zmx_of_states(None, None)
     }
 
     /// Returns the lens as a Zemax file, and as an `.agf` catalogue of this name its glasses that Zemax does not know, if
@@ -93,39 +90,35 @@ impl LensFile {
     /// # Errors
     /// When a glass has a law that the catalogue's formulas cannot say.
     pub fn to_zmx_and_agf(&self, catalogue: &str) -> Result<(String, Option<String>), OpticsError> {
-        let mut private: Vec<&Glass> = Vec::new();
-        let mut lines = Vec::new();
-        for (place, medium) in media(&self.lens) {
-            if place.is_some_and(|surface| self.lens.is_mirror(surface)) {
-                lines.push(MIRROR.to_owned());
-                continue;
-            }
-            let refusal = match zmx_glass(place, medium) {
-                Ok(line) => {
-                    lines.push(line);
-                    continue;
-                }
-                Err(refusal) => refusal,
-            };
-            let number = private.iter().position(|glass| *glass == medium).unwrap_or_else(|| {
-                private.push(medium);
-                private.len() - 1
-            });
-            if agf_lines("", medium).is_none() {
-                return Err(refusal);
-            }
-            let (nd, vd) = medium.nd_vd().unwrap_or((0.0, 0.0));
-            lines.push(format!("  GLAS {} 0 0 {nd:.6} {vd:.3}\r\n", private_name(number)));
-        }
-        let entry = |(i, glass): (usize, &&Glass)| agf_lines(&private_name(i), glass);
+        let mut private: Vec<Glass> = Vec::new();
+        let name = one_line(catalogue).replace(' ', "_").to_uppercase();
+        let text = self.zmx_of_states(Some(&mut private), Some(&name))?;
+        let entry = |(i, glass): (usize, &Glass)| agf_lines(&private_name(i), glass);
         let entries: String = private.iter().enumerate().filter_map(entry).collect();
         let agf = (!private.is_empty()).then(|| format!("CC glasses of {}\r\n{entries}", one_line(self.lens.name())));
-        let catalogue = one_line(catalogue).replace(' ', "_").to_uppercase();
-        Ok((self.zmx_text(&lines, agf.is_some().then_some(catalogue.as_str()))?, agf))
+        Ok((text, agf))
     }
 
-    /// Returns the text with these lines of glass, one for the object and one a surface.
-    fn zmx_text(&self, glasses: &[String], catalogue: Option<&str>) -> Result<String, OpticsError> {
+    /// Returns the text of all configurations, and adds to the private glasses, where there may be such.
+    fn zmx_of_states(
+        &self,
+        mut private: Option<&mut Vec<Glass>>,
+        catalogue: Option<&str>,
+    ) -> Result<String, OpticsError> {
+        let states = self.states();
+        let lines = states.iter().map(|state| zmx_glasses(&state.lens, private.as_deref_mut()));
+        let lines = lines.collect::<Result<Vec<Vec<String>>, _>>()?;
+        let mut makers = zmx_makers(&states)?;
+        if private.is_some_and(|private| !private.is_empty()) {
+            makers.extend(catalogue.map(str::to_owned));
+        }
+        let texts = states.iter().zip(&lines).map(|(state, lines)| state.zmx_text(lines, &makers));
+        let texts = texts.collect::<Result<Vec<String>, _>>()?;
+        operands::with_operands(&texts, &self.configuration_names(), self.configuration)
+    }
+
+    /// Returns the text with these lines of glass, one for the object and one a surface, of these makers.
+    fn zmx_text(&self, glasses: &[String], makers: &[String]) -> Result<String, OpticsError> {
         let lens = &self.lens;
         self.check_places("a .zmx file")?;
         let mut text = format!("MODE SEQ\r\nNAME {}\r\nNOTE 0 {}\r\n", one_line(lens.name()), one_line(lens.source()));
@@ -141,8 +134,6 @@ impl LensFile {
                 let _ = write!(text, "ENPD {:e}\r\n", first.entrance_pupil_diameter_mm);
             }
         }
-        let mut makers = self.zmx_makers()?;
-        makers.extend(catalogue.map(str::to_owned));
         if !makers.is_empty() {
             let _ = write!(text, "GCAT {}\r\n", makers.join(" "));
         }
@@ -213,33 +204,6 @@ impl LensFile {
         lens.placements().into_iter().chain([film]).enumerate().map(gap).collect()
     }
 
-    /// Returns the makers of the glasses, in an order in which each glass's name means it.
-    fn zmx_makers(&self) -> Result<Vec<String>, OpticsError> {
-        let named = media(&self.lens).filter_map(|(_, medium)| match medium {
-            Glass::Named(name) => Some(GlassCatalogue::built_in().find(name)),
-            _ => None,
-        });
-        let mut left: Vec<&CatalogueGlass> = named.collect::<Result<_, _>>()?;
-        let mut makers: Vec<String> = Vec::new();
-        while let Some(first) = left.first() {
-            // Next comes a maker of whom no name left means another glass.
-            let means_its_own = |maker: &&String| {
-                let listed = std::slice::from_ref(*maker);
-                left.iter().all(|glass| match GlassCatalogue::built_in().find_among(&glass.name, listed) {
-                    Ok(meant) if meant.maker == **maker => meant == *glass,
-                    _ => glass.maker != **maker,
-                })
-            };
-            let Some(maker) = left.iter().map(|glass| &glass.maker).find(means_its_own).cloned() else {
-                let reason = format!("{} and a glass of another maker have one name", first.full_name());
-                return Err(OpticsError::CannotWrite { format: "a .zmx file", reason });
-            };
-            left.retain(|glass| glass.maker != maker);
-            makers.push(maker);
-        }
-        Ok(makers)
-    }
-
     fn write_zmx_fields(&self, text: &mut String) -> Result<(), OpticsError> {
         let (kind, rows) = self.fields_of_one_kind("a .zmx file")?;
         let rows = rows.map(|row| row.iter().map(|number| format!(" {number:e}")).collect::<String>());
@@ -262,6 +226,58 @@ impl LensFile {
         }
         Ok(())
     }
+}
+
+/// Returns the makers of the glasses, in an order in which each glass's name means it.
+fn zmx_makers(states: &[LensFile]) -> Result<Vec<String>, OpticsError> {
+    let named = states.iter().flat_map(|state| media(&state.lens)).filter_map(|(_, medium)| match medium {
+        Glass::Named(name) => Some(GlassCatalogue::built_in().find(name)),
+        _ => None,
+    });
+    let mut left: Vec<&CatalogueGlass> = named.collect::<Result<_, _>>()?;
+    let mut makers: Vec<String> = Vec::new();
+    while let Some(first) = left.first() {
+        // Next comes a maker of whom no name left means another glass.
+        let means_its_own = |maker: &&String| {
+            let listed = std::slice::from_ref(*maker);
+            left.iter().all(|glass| match GlassCatalogue::built_in().find_among(&glass.name, listed) {
+                Ok(meant) if meant.maker == **maker => meant == *glass,
+                _ => glass.maker != **maker,
+            })
+        };
+        let Some(maker) = left.iter().map(|glass| &glass.maker).find(means_its_own).cloned() else {
+            let reason = format!("{} and a glass of another maker have one name", first.full_name());
+            return Err(OpticsError::CannotWrite { format: "a .zmx file", reason });
+        };
+        left.retain(|glass| glass.maker != maker);
+        makers.push(maker);
+    }
+    Ok(makers)
+}
+
+/// Returns the lines of the media around the object and behind the surfaces. What the format has no word for is added to the private glasses,
+/// where there may be such, and named there.
+fn zmx_glasses(lens: &Lens, mut private: Option<&mut Vec<Glass>>) -> Result<Vec<String>, OpticsError> {
+    let mut lines = Vec::new();
+    for (place, medium) in media(lens) {
+        lines.push(match zmx_glass(place, medium) {
+            _ if place.is_some_and(|surface| lens.is_mirror(surface)) => MIRROR.to_owned(),
+            Ok(line) => line,
+            Err(refusal) => {
+                let Some(private) = private.as_deref_mut() else { return Err(refusal) };
+                if agf_lines("", medium).is_none() {
+                    return Err(refusal);
+                }
+                let number = private.iter().position(|glass| glass == medium).unwrap_or_else(|| {
+                    private.push(medium.clone());
+                    private.len() - 1
+                });
+                let (nd, vd) = medium.nd_vd().unwrap_or((0.0, 0.0));
+                format!("  GLAS {} 0 0 {nd:.6} {vd:.3}\r\n", private_name(number))
+            }
+        });
+    }
+    Ok(lines)
 }
 
 /// Whether the one opening of a surface reaches beyond its rim.

@@ -2,15 +2,16 @@
 //!
 //! Read are sequential systems of the surfaces STANDARD, EVENASPH, ODDASPHE, BICONICX, TOROIDAL, PARAXIAL, DGRATING, `BINARY_2`
 //! and COORDBRK, mirrors among them,
-//! with the entrance pupil, fields and wavelengths of the first configuration. Solves and pickups keep the values that
+//! with the entrance pupil, fields, wavelengths and configurations. Solves and pickups keep the values that
 //! the file stores. Keywords that change no ray (colors, tolerances, merit functions) are
 //! passed over; whatever changes rays and cannot be traced is refused by name.
 
+mod configurations;
 mod surface;
 
 use crate::ImageSurface;
 
-use self::surface::ZmxSurface;
+use self::{configurations::ZmxOperand, surface::ZmxSurface};
 use super::{
     glasses::Glasses,
     lens_file::{Field, LensFile},
@@ -28,7 +29,7 @@ pub(super) fn lens_from_zmx(text: &str, name: &str, glasses: Glasses) -> Result<
             file.take(&Line { number: number + 1, keyword, words })?;
         }
     }
-    file.into_system(name, glasses)?.build()
+    file.build(name, &glasses)
 }
 
 /// A line of the file: a keyword and what follows it.
@@ -80,7 +81,7 @@ impl Line<'_> {
 }
 
 /// What a file says, in its own units.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Zmx {
     name: String,
     remarks: Vec<String>,
@@ -97,6 +98,9 @@ struct Zmx {
     field_weights: Vec<f64>,
     primary: usize,
     n_configurations: usize,
+    /// The configuration for which values are stored, counted from 1.
+    stored: usize,
+    operands: Vec<ZmxOperand>,
     surfaces: Vec<ZmxSurface>,
     notes: Vec<String>,
 }
@@ -156,7 +160,11 @@ impl Zmx {
             }
             "FWGN" | "FWGT" => self.field_weights = line.numbers()?,
             "PWAV" => self.primary = line.count(0)?,
-            "MNUM" => self.n_configurations = line.count(0)?,
+            "MNUM" => {
+                self.n_configurations = line.count(0)?;
+                self.stored = if line.words.len() > 1 { line.count(1)? } else { 1 };
+            }
+            _ if self.n_configurations > 1 => self.operands.extend(ZmxOperand::of(line)?),
             _ => {}
         }
         Ok(())
@@ -177,7 +185,12 @@ impl Zmx {
     /// Returns a sentence on the solves and pickups, if there are any.
     fn note_on_solves(&self) -> Option<String> {
         let of_surface = |(number, surface): (usize, &ZmxSurface)| {
-            (!surface.solves.is_empty()).then(|| format!("{number} ({})", surface.solves.join(", ")))
+            (!surface.solves.is_empty()).then(|| {
+                format!(
+                    "{number} ({})",
+                    surface.solves.iter().map(|solve| solve.keyword.as_str()).collect::<Vec<_>>().join(", ")
+                )
+            })
         };
         let solves: Vec<String> = self.surfaces.iter().enumerate().filter_map(of_surface).collect();
         let which = solves.join(", ");
@@ -190,9 +203,6 @@ impl Zmx {
         let mm = self.mm_per_unit.unwrap_or(1.0);
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(self.note_on_solves());
-        if self.n_configurations > 1 {
-            notes.push(format!("of {} configurations the one that is stored is read", self.n_configurations));
-        }
         let [object, .., image] = self.surfaces.as_slice() else {
             let reason = format!("the file has {} surfaces; expected an object and an image", self.surfaces.len());
             return Err(TextError { line: None, reason });
@@ -256,6 +266,7 @@ impl Zmx {
             reference: self.primary.saturating_sub(1),
             fields: fields(self.field_type, self.n_fields, mm, &self.fields, &self.vignetting)?,
             notes,
+            is_reduced: false,
         })
     }
 }
@@ -270,7 +281,8 @@ fn makers(catalogues: &[&str]) -> Vec<String> {
 
 /// Returns the wavelength in nm whose micrometres a file states: the nearest number of ten digits, so that 0.486 is 486.
 pub(super) fn nm_of_um(um: f64) -> f64 {
-    (um * 1e13).round() / 1e10
+    let nm = (um * 1e13).round() / 1e10;
+    if nm.is_finite() { nm } else { um * 1e3 }
 }
 
 fn mm_per_unit(line: &Line) -> Result<f64, TextError> {

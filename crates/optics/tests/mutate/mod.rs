@@ -7,7 +7,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// The seeds: name and bytes. The name's extension tells the format.
-pub(crate) const SEEDS: [(&str, &[u8]); 14] = [
+pub(crate) const SEEDS: [(&str, &[u8]); 18] = [
     ("singlet.ron", include_bytes!("../corpus/singlet.ron")),
     ("doublet.dat", include_bytes!("../corpus/doublet.dat")),
     ("list.txt", include_bytes!("../corpus/list.txt")),
@@ -20,6 +20,10 @@ pub(crate) const SEEDS: [(&str, &[u8]); 14] = [
     ("phases.zmx", include_bytes!("../corpus/phases.zmx")),
     ("phases.seq", include_bytes!("../corpus/phases.seq")),
     ("cassegrain.seq", include_bytes!("../corpus/cassegrain.seq")),
+    ("zoom.ron", include_bytes!("../corpus/zoom.ron")),
+    ("zoom.zmx", include_bytes!("../corpus/zoom.zmx")),
+    ("zoom.seq", include_bytes!("../corpus/zoom.seq")),
+    ("triplet.len", include_bytes!("../corpus/triplet.len")),
     ("two.agf", include_bytes!("../corpus/two.agf")),
     ("formula.yml", include_bytes!("../corpus/formula.yml")),
 ];
@@ -53,6 +57,7 @@ fn check_writers(file: &LensFile) {
         let again = LensFile::from_bytes(Path::new(name), text.as_bytes(), &ReadOptions::default());
         let again = again.unwrap_or_else(|error| panic!("{error}\n{text}"));
         assert_eq!(again.lens.interfaces().len(), file.lens.interfaces().len(), "{text}");
+        assert_eq!(again.configurations.len(), file.configurations.len(), "{text}");
     }
 }
 

@@ -92,8 +92,15 @@ impl LensSpec {
                 return Ok(file);
             }
         };
+        // A file has chosen already, and names itself where it cannot.
+        if let (Some(number), false) = (reading.configuration, matches!(self, Self::File(_))) {
+            file = file.with_configuration(number)?;
+        }
         if let Some(slope_per_nm) = reading.slope_per_nm {
-            file.lens = file.lens.with_linear_dispersion(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
+            let lenses = file.configurations.iter_mut().map(|configuration| &mut configuration.lens);
+            for lens in lenses.chain([&mut file.lens]) {
+                *lens = lens.with_linear_dispersion(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
+            }
         }
         Ok(file)
     }
@@ -165,13 +172,17 @@ pub struct LensReadOptions {
     pub slope_per_nm: Option<f64>,
     /// What the numbers of surfaces are in a CODE V file that says neither radii nor curvatures; `None` for what is plausible.
     pub seq_numbers: Option<SeqNumbers>,
+    /// Which configuration of a lens file that has several, as the positions of a zoom lens, counted from 1; `None` for the one that the
+    /// file has in use.
+    pub configuration: Option<usize>,
 }
 
 impl LensReadOptions {
     /// Returns it as options of the lens readers.
     fn options(&self) -> Result<ReadOptions, PipelineError> {
         let catalogues = self.glasses.iter().map(|path| GlassCatalogue::read(path)).collect::<Result<_, _>>()?;
-        Ok(ReadOptions { catalogues, missing_glass: self.missing_glass, seq_numbers: self.seq_numbers })
+        let Self { missing_glass, seq_numbers, configuration, .. } = *self;
+        Ok(ReadOptions { catalogues, missing_glass, seq_numbers, configuration })
     }
 }
 

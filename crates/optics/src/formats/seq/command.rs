@@ -3,6 +3,7 @@
 use super::super::text_error::TextError;
 
 /// A command and what follows it.
+#[derive(Clone)]
 pub(super) struct Command {
     pub(super) line: usize,
     pub(super) words: Vec<String>,

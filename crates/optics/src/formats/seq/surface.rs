@@ -14,7 +14,7 @@ use super::{
 };
 
 /// A surface as the file states it, in the file's units; the first is the object, the last the image.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct SeqSurface {
     pub(super) line: usize,
     /// What SLB calls it.

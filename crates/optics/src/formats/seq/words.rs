@@ -1,7 +1,7 @@
 //! The words of a CODE V file that are not worked out, and the notes on them.
 
 /// Commands that change no ray: frames of a file, types that their own coefficients state, control codes of variables.
-const WITHOUT_EFFECT: [&str; 36] = [
+pub(super) const WITHOUT_EFFECT: [&str; 36] = [
     "LEN", "GO", "INI", "DDM", "END", "SPH", "CON", "ASP", "CCY", "CCX", "THC", "KC", "KCX", "GLC", "AC", "BC", "CC",
     "DC", "EC", "FC", "GC", "HC", "JC", "ADC", "BDC", "CDC", "XDC", "YDC", "ZDC", "CA", "GRC", "HCC", "XOC", "YOC",
     "ZOC", "PSC",
@@ -14,30 +14,29 @@ const SOLVES: [&str; 6] = ["PIM", "PIK", "UMY", "UMX", "HMY", "HMX"];
 const MOST_NAMED: usize = 10;
 
 /// Words that a file holds and that are passed over, each with the line where it stands first.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct PassedOver {
     solves: Vec<(String, usize)>,
     unknown: Vec<(String, usize)>,
-    /// The number of configurations of ZOO, and its line.
-    configurations: Option<(usize, usize)>,
 }
 
 impl PassedOver {
     /// Whether a command changes no ray, or is noted here instead of worked out.
-    pub(super) fn takes(&mut self, keyword: &str, words: &[String], line: usize) -> bool {
-        if keyword == "ZOO" {
-            let count = words.get(1).and_then(|word| word.parse().ok());
-            let (before, line) = self.configurations.unwrap_or((0, line));
-            // `ZOO THI S2 1 2 3` has a value for each.
-            let n_values = words.iter().rev().take_while(|word| word.parse::<f64>().is_ok()).count();
-            self.configurations = Some((count.unwrap_or(before).max(before).max(n_values), line));
-            return true;
-        }
+    pub(super) fn takes(&mut self, keyword: &str, line: usize) -> bool {
         if SOLVES.contains(&keyword) {
             note(&mut self.solves, keyword, line);
             return true;
         }
         WITHOUT_EFFECT.contains(&keyword)
+    }
+
+    /// The first solve, and its line.
+    pub(super) fn first_solve(&self) -> Option<(&str, usize)> {
+        self.solves.first().map(|(word, line)| (word.as_str(), *line))
+    }
+
+    pub(super) fn n_unknown(&self) -> usize {
+        self.unknown.len()
     }
 
     /// Keeps a word that no command has, or whose surface has not begun.
@@ -47,10 +46,6 @@ impl PassedOver {
 
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
-        if let Some((count, line)) = self.configurations {
-            let count = if count > 1 { count.to_string() } else { "several".to_owned() };
-            notes.push(format!("of {count} configurations (ZOO, line {line}) the first is read"));
-        }
         if !self.solves.is_empty() {
             let named = named(&self.solves);
             notes.push(format!("solves and pickups are not worked out anew, the stored values stand: {named}"));

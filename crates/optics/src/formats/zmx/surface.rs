@@ -11,7 +11,7 @@ use super::super::{
 use super::Line;
 
 /// A surface as the file states it, in the file's units.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct ZmxSurface {
     pub(super) line: usize,
     pub(super) is_stop: bool,
@@ -32,10 +32,29 @@ pub(super) struct ZmxSurface {
     aperture: Option<(String, [f64; 2])>,
     aperture_center: [f64; 2],
     pub(super) glass: Option<ZmxGlass>,
-    /// Keywords of the solves and pickups by which the program would find some of the numbers anew.
-    pub(super) solves: Vec<String>,
+    /// The solves and pickups by which the program would find some of the numbers anew.
+    pub(super) solves: Vec<ZmxSolve>,
 }
 
+/// A solve or pickup.
+#[derive(Clone)]
+pub(super) struct ZmxSolve {
+    line: usize,
+    pub(super) keyword: String,
+    /// The surface that it refers to, if it does.
+    pub(super) surface: Option<usize>,
+    /// The sum of thicknesses, of one that makes them one.
+    pub(super) sum: f64,
+}
+
+impl ZmxSolve {
+    /// Returns what is wrong with the solve at this surface.
+    pub(super) fn wrong(&self, number: usize, reason: &str) -> TextError {
+        TextError { line: Some(self.line), reason: format!("{}: the solve of surface {number} {reason}", self.keyword) }
+    }
+}
+
+#[derive(Clone)]
 pub(super) struct ZmxGlass {
     line: usize,
     name: String,
@@ -50,12 +69,15 @@ const OTHER_APERTURES: [(&str, &str); 4] = [
     ("UDAP", "a user-defined aperture"),
 ];
 
+/// The largest number of a parameter.
+const MOST_PARAMETERS: usize = 200;
+
 /// The most numbers of extra data of a surface.
 const MOST_EXTRA_DATA: usize = 500;
 
 /// Solves and pickups: a curvature, thickness or parameter picked up from another surface, and a thickness that brings
-/// the marginal or the chief ray to a height, or an edge to a width.
-const SOLVES: [&str; 6] = ["PKUP", "PZUP", "PPAR", "MAZH", "CHZH", "EDGE"];
+/// the marginal or the chief ray to a height, an edge to a width, or several distances to a sum.
+const SOLVES: [&str; 8] = ["PKUP", "PZUP", "PPAR", "MAZH", "CHZH", "EDGE", "TCOM", "TOLE"];
 
 impl ZmxSurface {
     /// Returns a plane that begins at this line.
@@ -75,15 +97,7 @@ impl ZmxSurface {
             "PARM" => {
                 let place = line.count(0)?;
                 // Newer files state a parameter 0 of every surface; it means something to diffractive ones alone.
-                if place == 0 {
-                    self.parameter_zero = line.number(1)?;
-                    return Ok(true);
-                }
-                if place > 200 {
-                    return Err(line.wrong(format!("parameter {place}; expected 0 to 200")));
-                }
-                self.parameters.resize(self.parameters.len().max(place), 0.0);
-                self.parameters[place - 1] = line.number(1)?;
+                self.put_parameter(place, line.number(1)?).map_err(|what| line.wrong(what))?;
             }
             "DIAM" => {
                 let semi_diameter = line.number(0)?;
@@ -114,7 +128,12 @@ impl ZmxSurface {
                 let (nd, vd) = (line.number_or(3, 0.0)?, line.number_or(4, 0.0)?);
                 self.glass = Some(ZmxGlass { line: line.number, name, nd_vd: (nd > 0.0).then_some((nd, vd)) });
             }
-            solve if SOLVES.contains(&solve) => self.solves.push(solve.to_owned()),
+            solve if SOLVES.contains(&solve) => self.solves.push(ZmxSolve {
+                line: line.number,
+                keyword: solve.to_owned(),
+                surface: line.count(0).ok(),
+                sum: line.number_or(1, 0.0)?,
+            }),
             keyword => {
                 if let Some((_, what)) = OTHER_APERTURES.iter().find(|(other, _)| *other == keyword) {
                     return Err(line.wrong(format!("{what} is not supported")));
@@ -123,6 +142,61 @@ impl ZmxSurface {
             }
         }
         Ok(true)
+    }
+
+    /// Forgets a rim that the program found for another configuration than this.
+    pub(super) fn forget_automatic_rim(&mut self) {
+        if !self.is_semi_diameter_fixed && !self.is_stop {
+            self.semi_diameter = None;
+        }
+    }
+
+    /// Puts the glass of this name behind the surface, or air.
+    pub(super) fn put_glass(&mut self, line: usize, name: &str) {
+        if self.glass.as_ref().is_some_and(|glass| glass.name.eq_ignore_ascii_case(name)) {
+            return;
+        }
+        self.glass = (!name.is_empty()).then(|| ZmxGlass { line, name: name.to_owned(), nd_vd: None });
+    }
+
+    /// Gives a model glass another index, or another Abbe number; gives false where there is none.
+    pub(super) fn put_model_glass(&mut self, is_index: bool, value: f64) -> bool {
+        match self.glass.as_mut().filter(|glass| glass.name == "___BLANK").and_then(|glass| glass.nd_vd.as_mut()) {
+            Some((nd, vd)) => {
+                *(if is_index { nd } else { vd }) = value;
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// Gives a parameter another value.
+    pub(super) fn put_parameter(&mut self, place: usize, value: f64) -> Result<(), String> {
+        match place {
+            0 => self.parameter_zero = value,
+            1..=MOST_PARAMETERS => {
+                self.parameters.resize(self.parameters.len().max(place), 0.0);
+                self.parameters[place - 1] = value;
+            }
+            _ => return Err(format!("parameter {place}; expected 0 to {MOST_PARAMETERS}")),
+        }
+        Ok(())
+    }
+
+    /// Gives a number of the rim or the aperture (`SDIA`, `APMN`, `APMX`, `APDX`, `APDY`) another value.
+    pub(super) fn put_rim(&mut self, keyword: &str, value: f64) -> Result<(), String> {
+        match keyword {
+            "SDIA" => (self.semi_diameter, self.is_semi_diameter_fixed) = ((value > 0.0).then_some(value), true),
+            "APDX" => self.aperture_center[0] = value,
+            "APDY" => self.aperture_center[1] = value,
+            _ => {
+                let Some((_, numbers)) = &mut self.aperture else {
+                    return Err("the surface has no aperture".to_owned());
+                };
+                numbers[usize::from(keyword == "APMX")] = value;
+            }
+        }
+        Ok(())
     }
 
     /// Whether it reflects.
