@@ -3,7 +3,7 @@
 use dioptric_spectrum::{Spectrum, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
-use crate::{Adc, Cfa, Exposure, GainMode, Response, SensorError, SplitPixel, Tile};
+use crate::{Adc, Cfa, Exposure, GainMode, Response, SensorError, Tile};
 
 /// The data sheet of an image sensor.
 ///
@@ -152,6 +152,23 @@ pub struct HighGain {
     pub full_well_e: f64,
     /// Read noise, rms V.
     pub read_noise_v: f64,
+}
+
+/// The small photodiode of a split pixel, as in sensors for cars; the sensor's own numbers are those of the large one.
+///
+/// Both see the light of the whole pixel's aperture: that the small one stands beside the large one is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct SplitPixel {
+    /// The area of the large photodiode over that of the small one, above 1: so much less light and dark current it collects.
+    pub area_ratio: f64,
+    /// Volts an electron of the small one.
+    pub conversion_gain_v_per_e: f64,
+    /// The electrons that the small one holds.
+    pub full_well_e: f64,
+    /// Read noise of the small one, rms electrons.
+    pub read_noise_e: f64,
 }
 
 /// Dark current and how it grows with temperature.

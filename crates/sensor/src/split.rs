@@ -1,25 +1,6 @@
 //! Pixels of a large and a small photodiode, exposed together: the small one saturates last.
 
-use serde::{Deserialize, Serialize};
-
 use crate::{DarkCurrent, Defects, ElectronRate, MergedFrame, Noise, Raw, Sensor, SensorError};
-
-/// The small photodiode of a split pixel, as in sensors for cars; the sensor's own numbers are those of the large one.
-///
-/// Both see the light of the whole pixel's aperture: that the small one stands beside the large one is left out.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub struct SplitPixel {
-    /// The area of the large photodiode over that of the small one, above 1: so much less light and dark current it collects.
-    pub area_ratio: f64,
-    /// Volts an electron of the small one.
-    pub conversion_gain_v_per_e: f64,
-    /// The electrons that the small one holds.
-    pub full_well_e: f64,
-    /// Read noise of the small one, rms electrons.
-    pub read_noise_e: f64,
-}
 
 impl Sensor {
     /// Returns the data sheet of the small photodiodes of split pixels, or `None` where pixels are whole.
