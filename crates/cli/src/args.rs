@@ -260,6 +260,12 @@ pub(crate) struct FrameArgs {
     /// Takes exposures that differ by powers of two and merges them, e.g. -4,-2,0
     #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
     pub(crate) bracket_stops: Option<String>,
+    /// Exposes rows for the chosen time and for one so many times shorter in turn, and merges them
+    #[arg(long, value_name = "R", conflicts_with_all = ["burst", "bracket_stops"], help_heading = heading::EXPOSURE)]
+    pub(crate) interleaved_ratio: Option<f64>,
+    /// How many neighboring rows share a time [default: 2]
+    #[arg(long, value_name = "N", requires = "interleaved_ratio", help_heading = heading::EXPOSURE)]
+    pub(crate) interleaved_rows: Option<usize>,
     /// Writes these files too: electrons, raw-tiff, raw-dng, picture-png16, picture-tiff8, picture-tiff16, picture-exr
     #[arg(long, value_name = "LIST", help_heading = heading::RESULTS)]
     pub(crate) also: Option<String>,

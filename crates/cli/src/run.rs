@@ -302,7 +302,9 @@ pub(crate) fn frames_of(arguments: &FrameArgs) -> anyhow::Result<Option<FramesSp
             None => FramesSpec::Burst(frames),
         }),
         (None, Some(list)) => Some(FramesSpec::BracketStops(parse_numbers("--bracket-stops", list)?)),
-        (None, None) => None,
+        (None, None) => arguments
+            .interleaved_ratio
+            .map(|ratio| FramesSpec::Interleaved { ratio, period_rows: arguments.interleaved_rows.unwrap_or(2) }),
     })
 }
 

@@ -135,6 +135,8 @@ impl Camera {
     /// burst : int
     /// bracket_stops : list of float
     ///     Several frames, merged.
+    /// interleaved_ratio : float
+    ///     Pairs of rows exposed for the chosen time and for one so many times shorter in turn, merged.
     /// white, demosaic, highlights, color : str
     /// denoise, sharpen_px : float
     ///     Of the processing.

@@ -27,6 +27,7 @@ pub(crate) const OF_EXPOSURE: &[&str] = &[
     "noise",
     "burst",
     "bracket_stops",
+    "interleaved_ratio",
     "white",
     "demosaic",
     "denoise",
@@ -97,6 +98,7 @@ pub(crate) const ALL: &[&str] = &[
     "noise",
     "burst",
     "bracket_stops",
+    "interleaved_ratio",
     "white",
     "demosaic",
     "denoise",
@@ -310,6 +312,9 @@ fn set_frames(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRes
         "exposure_s" => camera.exposure = with_exposure_s(camera.exposure, number(key, value)?),
         "burst" => camera.frames = FramesSpec::Burst(count(key, value)?),
         "bracket_stops" => camera.frames = FramesSpec::BracketStops(numbers(key, value)?),
+        "interleaved_ratio" => {
+            camera.frames = FramesSpec::Interleaved { ratio: number(key, value)?, period_rows: 2 };
+        }
         "seed" => {
             camera.seed =
                 value.extract().map_err(|_| wrong_type(key, type_name(value), "a whole number of 0 or more"))?;

@@ -73,6 +73,7 @@ def test_every_choice_survives_a_dictionary(tiny: dp.Camera) -> None:
         {"bank_error": 0.02},
         {"burst": 4},
         {"bracket_stops": [-2, 0]},
+        {"interleaved_ratio": 8},
         {"noise": "photon,read"},
         {"white": "patch:1,2,3,4"},
         {"white": "0.46,0.414"},

@@ -61,7 +61,12 @@ impl Sensor {
         sum.iter_mut().for_each(|plane| plane.par_mapv_inplace(|v| v * share));
         let planes = phases::join(sum, tile, first.size()).into_iter().map(RawPlane::Volts).collect();
         let merged = frames.iter().map(|frame| self.source_of(frame)).collect();
-        Ok(Raw { planes, levels: self.unit_levels(&first.exposure), merged, ..first.clone() })
+        Ok(Raw {
+            planes,
+            levels: self.unit_levels(self.saturation_e(&first.exposure), &first.exposure),
+            merged,
+            ..first.clone()
+        })
     }
 }
 

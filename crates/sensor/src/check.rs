@@ -41,6 +41,8 @@ impl Sensor {
             ("iso_at_unity_gain", self.iso_at_unity_gain.unwrap_or(1.0)),
             ("high_gain.conversion_gain_v_per_e", self.high_gain.map_or(1.0, |h| h.conversion_gain_v_per_e)),
             ("high_gain.full_well_e", self.high_gain.map_or(1.0, |h| h.full_well_e)),
+            ("split_pixel.conversion_gain_v_per_e", self.split_pixel.map_or(1.0, |s| s.conversion_gain_v_per_e)),
+            ("split_pixel.full_well_e", self.split_pixel.map_or(1.0, |s| s.full_well_e)),
         ];
         let not_negative = [
             ("read_noise_v", self.read_noise_v),
@@ -55,6 +57,7 @@ impl Sensor {
             ("row_time_us", self.row_time_us),
             ("defects.hot_e_per_s", self.defects.hot_e_per_s),
             ("high_gain.read_noise_v", self.high_gain.map_or(0.0, |h| h.read_noise_v)),
+            ("split_pixel.read_noise_e", self.split_pixel.map_or(0.0, |s| s.read_noise_e)),
         ];
         let shares = [
             ("fill_factor", self.fill_factor),
@@ -71,6 +74,12 @@ impl Sensor {
             let found = fields.iter().find(|&&(_, value)| !(value.is_finite() && right(value)));
             found.map_or(Ok(()), |&(key, value)| Err(SensorError::value(&self.name, key, value, expected)))
         };
+        for filter in &self.filters {
+            let share = [("exposure_fraction", filter.exposure_fraction)];
+            wrong(&share, |v| v > 0.0 && v <= 1.0, "a share above 0 and at most 1")?;
+        }
+        let area_ratio = [("split_pixel.area_ratio", self.split_pixel.map_or(2.0, |s| s.area_ratio))];
+        wrong(&area_ratio, |v| v > 1.0, "a number above 1")?;
         wrong(&positive, |v| v > 0.0, "a number above 0")?;
         wrong(&not_negative, |v| v >= 0.0, "a number of 0 or more")?;
         wrong(&shares, |v| (0.0..=1.0).contains(&v), "a share from 0 to 1")?;

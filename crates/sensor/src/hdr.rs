@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// Samples above this share of saturation are not used: noise has begun to be clipped there.
-const USABLE_BELOW: f32 = 0.95;
+pub(crate) const USABLE_BELOW: f32 = 0.95;
 
 impl Exposure {
     /// Returns exposures whose times differ from this one by powers of two: −2 is a quarter of the time.
@@ -30,9 +30,14 @@ impl Sensor {
     /// When there are no frames, or they differ in size or mosaic, or one was not exposed.
     pub fn merge(&self, frames: &[Raw]) -> Result<Raw, SensorError> {
         self.check_merge(frames)?;
+        let sources = frames.iter().map(|frame| self.source_of(frame)).collect();
+        Ok(self.merge_as(frames, sources))
+    }
+
+    /// Merges frames that were checked, of which it is known what they are in the merge.
+    pub(crate) fn merge_as(&self, frames: &[Raw], sources: Vec<MergedFrame>) -> Raw {
         let first = &frames[0];
         let linear: Vec<Vec<Array2<f32>>> = frames.iter().map(Raw::linear).collect();
-        let sources: Vec<MergedFrame> = frames.iter().map(|frame| self.source_of(frame)).collect();
         // What saturates last sets the scale.
         let (shortest, scale) = (0..frames.len())
             .map(|i| (i, sources[i].saturation_e_per_s()))
@@ -48,7 +53,8 @@ impl Sensor {
         };
         let exposure = frames[shortest].exposure;
         let planes = (0..first.planes.len()).map(merge_plane).collect();
-        Ok(Raw { planes, levels: self.unit_levels(&exposure), exposure, merged: sources, ..first.clone() })
+        let saturation_e = sources[shortest].saturation_e * (exposure.time_s / sources[shortest].time_s);
+        Raw { planes, levels: self.unit_levels(saturation_e, &exposure), exposure, merged: sources, ..first.clone() }
     }
 
     /// Checks that frames can be merged.
@@ -89,9 +95,8 @@ impl Sensor {
         }
     }
 
-    /// Returns the levels of samples that are shares of saturation.
-    pub(crate) fn unit_levels(&self, exposure: &Exposure) -> Levels {
-        let saturation_e = self.saturation_e(exposure);
+    /// Returns the levels of samples that are shares of so many electrons.
+    pub(crate) fn unit_levels(&self, saturation_e: f64, exposure: &Exposure) -> Levels {
         let units = Self {
             adc: Adc::Analog,
             response: crate::Response::Linear,

@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::{
-    ElectronRate, Electrons, Exposure, Noise, NoiseSource, Sensor, SensorError, noise::Kind, poisson::poisson,
+    ElectronRate, Electrons, Exposure, Noise, NoiseSource, Sensor, SensorError, Tile, noise::Kind, poisson::poisson,
 };
 
 impl Sensor {
@@ -18,17 +18,30 @@ impl Sensor {
     /// # Errors
     /// When the exposure makes no sense.
     pub fn electrons(&self, rate: &ElectronRate, exposure: &Exposure, noise: &Noise) -> Result<Electrons, SensorError> {
-        exposure.check()?;
-        let shutter = Shutter::new(self, exposure, noise);
+        self.electrons_by_row(rate, &[*exposure], &|_| 0, noise)
+    }
+
+    /// Returns the electrons of a frame of which each row has one of several exposures.
+    pub(crate) fn electrons_by_row(
+        &self,
+        rate: &ElectronRate,
+        exposures: &[Exposure],
+        exposure_of: &(dyn Fn(usize) -> usize + Sync),
+        noise: &Noise,
+    ) -> Result<Electrons, SensorError> {
+        exposures.iter().try_for_each(Exposure::check)?;
+        let tile = self.tile()?;
+        let shutters: Vec<Shutter<'_>> =
+            exposures.iter().map(|exposure| Shutter::new(self, tile.as_ref(), exposure, noise)).collect();
         let plane = |(number, rate): (usize, &Array2<f32>)| {
             let mut electrons = rate.as_standard_layout().into_owned();
             let n_columns = electrons.ncols();
             let rows = electrons.as_slice_mut().expect("a standard layout is contiguous").par_chunks_mut(n_columns);
             rows.enumerate().for_each_init(
                 || vec![RowPixel::default(); n_columns],
-                |pixels, (row, values)| shutter.expose_row(number, row, values, pixels),
+                |pixels, (row, values)| shutters[exposure_of(row)].expose_row(number, row, values, pixels),
             );
-            shutter.spill(&mut electrons);
+            shutters[0].spill(&mut electrons);
             electrons
         };
         Ok(Electrons { planes_e: rate.planes_e_per_s.iter().enumerate().map(plane).collect() })
@@ -51,6 +64,7 @@ impl Default for RowPixel {
 /// One exposure of one sensor.
 struct Shutter<'a> {
     sensor: &'a Sensor,
+    tile: Option<&'a Tile>,
     noise: &'a Noise,
     time_s: f64,
     full_well_e: f64,
@@ -59,11 +73,12 @@ struct Shutter<'a> {
 }
 
 impl<'a> Shutter<'a> {
-    fn new(sensor: &'a Sensor, exposure: &Exposure, noise: &'a Noise) -> Self {
+    fn new(sensor: &'a Sensor, tile: Option<&'a Tile>, exposure: &Exposure, noise: &'a Noise) -> Self {
         let dark_e = sensor.dark_current.at(exposure.temperature_c) * exposure.time_s;
         let growth = ((exposure.temperature_c - sensor.dark_current.at_c) / sensor.dark_current.doubling_k).exp2();
         Self {
             sensor,
+            tile,
             noise,
             time_s: exposure.time_s,
             full_well_e: sensor.full_well_e(exposure.gain_mode),
@@ -112,6 +127,16 @@ impl<'a> Shutter<'a> {
                     pixel.dark_e += self.hot_e;
                 }
             }
+        }
+        self.shorten_dark(plane, row, pixels);
+    }
+
+    /// Leaves of the dark current what filters gather that are exposed for a share of the time; light has that share in its rate.
+    fn shorten_dark(&self, plane: usize, row: usize, pixels: &mut [RowPixel]) {
+        let filters = self.tile.map_or(std::slice::from_ref(&plane), |tile| tile.row(row));
+        let share = |&filter: &usize| self.sensor.filters[filter].exposure_fraction;
+        if filters.iter().any(|filter| share(filter) < 1.0) {
+            pixels.iter_mut().zip(filters.iter().cycle()).for_each(|(pixel, filter)| pixel.dark_e *= share(filter));
         }
     }
 

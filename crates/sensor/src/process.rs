@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Highlights, LensCorrections, LensShading,
-    LensTables, LocalTone, Perspective, Picture, Raw, Sensor, SensorError, Tile, ToneCurve, WhiteBalance,
+    Adc, Brightness, ColorCorrection, ColorMatrix, ColorSpace, Demosaic, Exposure, Highlights, LensCorrections,
+    LensShading, LensTables, LocalTone, Perspective, Picture, Raw, Sensor, SensorError, Tile, ToneCurve, WhiteBalance,
     balance::gains,
     color::pairs,
     defects, demosaic,
@@ -16,6 +16,7 @@ use crate::{
     lens_tables::warp,
     metering::percentile,
     profile::CameraProfile,
+    raw::Levels,
     sharpen::{SharpenedChannels, sharpen},
 };
 
@@ -204,11 +205,16 @@ impl Sensor {
 
     /// Returns the noise of a frame that does not depend on the signal, rms electrons.
     pub(crate) fn noise_floor_e(&self, raw: &Raw) -> f64 {
-        let volts = self.read_noise_v(raw.exposure.gain_mode).hypot(self.dsnu_v).hypot(self.row_noise_v);
-        let rounding_v = if self.adc == Adc::Analog { 0.0 } else { raw.levels.step_v / 12.0_f64.sqrt() };
-        let floor_v = (volts * raw.exposure.analog_gain).hypot(rounding_v);
-        let dark_e = self.dark_current.at(raw.exposure.temperature_c) * raw.exposure.time_s;
-        (floor_v / raw.levels.volts_per_electron).hypot(dark_e.sqrt())
+        self.floor_e(&raw.levels, &raw.exposure)
+    }
+
+    /// Returns the same of samples of these levels and this exposure.
+    pub(crate) fn floor_e(&self, levels: &Levels, exposure: &Exposure) -> f64 {
+        let volts = self.read_noise_v(exposure.gain_mode).hypot(self.dsnu_v).hypot(self.row_noise_v);
+        let rounding_v = if self.adc == Adc::Analog { 0.0 } else { levels.step_v / 12.0_f64.sqrt() };
+        let floor_v = (volts * exposure.analog_gain).hypot(rounding_v);
+        let dark_e = self.dark_current.at(exposure.temperature_c) * exposure.time_s;
+        (floor_v / levels.volts_per_electron).hypot(dark_e.sqrt())
     }
 }
 

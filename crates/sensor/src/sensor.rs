@@ -48,6 +48,9 @@ pub struct Sensor {
     /// The second readout of a dual-gain pixel.
     #[serde(default)]
     pub high_gain: Option<HighGain>,
+    /// The small photodiode of a split pixel, exposed with the other and merged with it.
+    #[serde(default)]
+    pub split_pixel: Option<SplitPixel>,
     /// The range of the output and of the converter, V.
     pub swing_v: f64,
     /// Read noise, rms V at the pixel's output (before the analog gain); with correlated double sampling where the
@@ -122,6 +125,9 @@ pub struct Filter {
     /// Electrons a photon that falls on the pixel's aperture; 0 beyond the table, but for the rest of a band whose center
     /// the table holds.
     pub quantum_efficiency: Spectrum,
+    /// The share of the exposure time for which its pixels collect light, above 0 and at most 1: exposure channel by channel.
+    #[serde(default = "whole")]
+    pub exposure_fraction: f64,
 }
 
 /// A layer over the whole array.
@@ -146,6 +152,23 @@ pub struct HighGain {
     pub full_well_e: f64,
     /// Read noise, rms V.
     pub read_noise_v: f64,
+}
+
+/// The small photodiode of a split pixel, as in sensors for cars; the sensor's own numbers are those of the large one.
+///
+/// Both see the light of the whole pixel's aperture: that the small one stands beside the large one is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct SplitPixel {
+    /// The area of the large photodiode over that of the small one, above 1: so much less light and dark current it collects.
+    pub area_ratio: f64,
+    /// Volts an electron of the small one.
+    pub conversion_gain_v_per_e: f64,
+    /// The electrons that the small one holds.
+    pub full_well_e: f64,
+    /// Read noise of the small one, rms electrons.
+    pub read_noise_e: f64,
 }
 
 /// Dark current and how it grows with temperature.
@@ -186,6 +209,10 @@ pub struct Defects {
     pub hot_e_per_s: f64,
     /// The share of pixels that see no light.
     pub dead_fraction: f64,
+}
+
+const fn whole() -> f64 {
+    1.0
 }
 
 fn yes() -> bool {
@@ -232,6 +259,7 @@ impl Sensor {
 
     /// Returns, for each filter and band, the electrons a second that an irradiance of 1 W m⁻² nm⁻¹ makes in a pixel.
     ///
+    /// The second is one of the frame's exposure: a filter that is exposed for a share of it collects that share.
     /// The quantum efficiency × the wavelength is averaged over the width of the band. In a band whose center lies within
     /// a filter's table the end values of the table are held; one whose center lies beyond collects what the table holds
     /// of it, and nothing of the rest: [`bands_beyond_tables`](Self::bands_beyond_tables) lists those.
@@ -240,6 +268,7 @@ impl Sensor {
         (0..self.filters.len())
             .map(|filter| {
                 let table = &self.filters[filter].quantum_efficiency;
+                let collected_m2 = area_m2 * self.filters[filter].exposure_fraction;
                 let weight = |(&center_nm, &width_nm): (&f64, &f64)| {
                     let (first_nm, last_nm) = table.range_nm();
                     let is_within = (first_nm..=last_nm).contains(&center_nm);
@@ -250,7 +279,7 @@ impl Sensor {
                         .map(|nm| table.at_or_zero(in_table(nm)) * self.layers_transmittance(nm) * 1e-9 * nm)
                         .sum::<f64>()
                         / n as f64;
-                    area_m2 * width_nm * mean / HC_J_M
+                    collected_m2 * width_nm * mean / HC_J_M
                 };
                 grid.centers_nm().iter().zip(grid.widths_nm()).map(weight).collect()
             })

@@ -35,6 +35,7 @@ fn mosaic_sensor() -> Sensor {
     let filter = |name: &str, value: f64| Filter {
         name: name.to_owned(),
         quantum_efficiency: Spectrum::new(vec![400.0, 700.0], vec![value, value]).unwrap(),
+        exposure_fraction: 1.0,
     };
     Sensor {
         cfa: Cfa::two_by_two("GRBG").unwrap(),
@@ -213,7 +214,10 @@ fn no_time_is_a_bias_frame() {
 fn the_last_band_of_a_table_is_whole() {
     let flat = |first_nm: f64, last_nm: f64| {
         let quantum_efficiency = Spectrum::new(vec![first_nm, last_nm], vec![0.5, 0.5]).unwrap();
-        Sensor { filters: vec![Filter { name: "Y".to_owned(), quantum_efficiency }], ..photon_counter() }
+        Sensor {
+            filters: vec![Filter { name: "Y".to_owned(), quantum_efficiency, exposure_fraction: 1.0 }],
+            ..photon_counter()
+        }
     };
     let grid = WavelengthGrid::uniform(400.0, 700.0, 10.0).unwrap();
     let (short, long) = (flat(400.0, 700.0), flat(300.0, 800.0));

@@ -75,7 +75,7 @@ fn with_filters(cfa: Cfa, filters: &[(&str, [f64; 3])]) -> Sensor {
             weights.iter().zip(&imx363.filters).map(|(w, f)| w * f.quantum_efficiency.at_held(nm)).sum()
         };
         let values = nm.iter().map(value).collect();
-        Filter { name: name.to_owned(), quantum_efficiency: Spectrum::new(nm, values).unwrap() }
+        Filter { name: name.to_owned(), quantum_efficiency: Spectrum::new(nm, values).unwrap(), exposure_fraction: 1.0 }
     };
     Sensor { cfa, filters: filters.iter().map(filter).collect(), adc: Adc::Analog, ..imx363 }
 }

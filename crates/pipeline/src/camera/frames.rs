@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use dioptric_sensor::{ElectronRate, Electrons, Exposure, Noise, Raw, Sensor, Volts};
+use dioptric_sensor::{ElectronRate, Electrons, Exposure, Interleaved, Noise, Raw, Sensor, SensorError, Volts};
 use serde::{Deserialize, Serialize};
 
 use crate::PipelineError;
@@ -33,6 +33,13 @@ pub enum FramesSpec {
     /// Exposures that differ from the chosen one by powers of two, merged into one of more range; −2 is a quarter of the
     /// time.
     BracketStops(Vec<f64>),
+    /// One whose rows are exposed for the chosen time and for a part of it in turn, merged into one of more range.
+    Interleaved {
+        /// The chosen time over that of the short rows, above 1.
+        ratio: f64,
+        /// How many neighboring rows share a time; a multiple of the rows after which the mosaic repeats.
+        period_rows: usize,
+    },
 }
 
 /// What a sensor gives for one picture: every stage of the first frame, and all frames merged.
@@ -44,7 +51,7 @@ pub struct Exposed {
     pub volts: Volts,
     /// The frame as the converter gives it.
     pub raw: Raw,
-    /// All frames merged; none for a single one.
+    /// All frames merged, those of both photodiodes of split pixels among them; none for a single one.
     pub merged: Option<Raw>,
 }
 
@@ -84,6 +91,12 @@ impl FramesSpec {
             Self::MovingBurst { motion_px, .. } if !(0.0..=MOST_PX).contains(motion_px) => {
                 wrong("MovingBurst.motion_px", motion_px.to_string(), format!("0 to {MOST_PX} pixels"))
             }
+            Self::Interleaved { ratio, .. } if !(*ratio > 1.0 && ratio.is_finite()) => {
+                wrong("Interleaved.ratio", ratio.to_string(), "a number above 1".to_owned())
+            }
+            Self::Interleaved { period_rows: 0, .. } => {
+                wrong("Interleaved.period_rows", "0".to_owned(), "1 row or more".to_owned())
+            }
             Self::BracketStops(stops) if stops.is_empty() || stops.len() > MOST => {
                 wrong("BracketStops", format!("{} stops", stops.len()), format!("1 to {MOST}"))
             }
@@ -108,7 +121,15 @@ impl FramesSpec {
             Self::Single => vec![*exposure],
             Self::Burst(n) | Self::MovingBurst { frames: n, .. } => vec![*exposure; *n],
             Self::BracketStops(stops) => exposure.bracket(stops),
+            &Self::Interleaved { ratio, period_rows } => {
+                return expose_interleaved(sensor, rate, exposure, &Interleaved { ratio, period_rows }, noise);
+            }
         };
+        let small_sensor = sensor.small_photodiode();
+        if small_sensor.is_some() && matches!(self, Self::MovingBurst { .. }) {
+            return Err(split_pixels_want("a burst of a moving camera"));
+        }
+        let mut small_frames = Vec::new();
         let (mut first, mut frames) = (None, Vec::new());
         for (number, exposure) in exposures.iter().enumerate() {
             let moved_px = match self {
@@ -116,19 +137,53 @@ impl FramesSpec {
                 _ => [0.0; 2],
             };
             let noise = noise.frame(number as u64);
-            let electrons = sensor.electrons(&*rate(moved_px)?, exposure, &noise)?;
+            let rate = rate(moved_px)?;
+            let electrons = sensor.electrons(&rate, exposure, &noise)?;
             let volts = sensor.volts(&electrons, exposure, &noise)?;
             frames.push(sensor.digitize(&volts, exposure)?);
+            if let (Some(small), Some(rate)) = (&small_sensor, sensor.small_rate(&rate)) {
+                small_frames.push(digitized(small, &rate, exposure, &noise.of_small_photodiode())?);
+            }
             first.get_or_insert((electrons, volts));
         }
         let (electrons, volts) = first.expect("a checked choice has a frame");
         let merged = match self {
-            Self::Single => None,
+            _ if small_sensor.is_some() => Some(sensor.merge_split(&frames, &small_frames)?),
             Self::MovingBurst { .. } => Some(sensor.merge_moving(&frames)?),
             Self::Burst(_) | Self::BracketStops(_) => Some(sensor.merge(&frames)?),
+            Self::Single | Self::Interleaved { .. } => None,
         };
         Ok(Exposed { electrons, volts, raw: frames.swap_remove(0), merged })
     }
+}
+
+/// Takes one frame whose rows have two times in turn, and merges them.
+fn expose_interleaved(
+    sensor: &Sensor,
+    rate: &MovedRate<'_>,
+    exposure: &Exposure,
+    rows: &Interleaved,
+    noise: &Noise,
+) -> Result<Exposed, PipelineError> {
+    if sensor.split_pixel.is_some() {
+        return Err(split_pixels_want("interleaved rows"));
+    }
+    let electrons = sensor.electrons_interleaved(&*rate([0.0; 2])?, exposure, rows, noise)?;
+    // Volts and codes do not depend on the time.
+    let volts = sensor.volts(&electrons, exposure, noise)?;
+    let raw = sensor.digitize(&volts, exposure)?;
+    let merged = Some(sensor.merge_interleaved(&raw, rows)?);
+    Ok(Exposed { electrons, volts, raw, merged })
+}
+
+fn digitized(sensor: &Sensor, rate: &ElectronRate, exposure: &Exposure, noise: &Noise) -> Result<Raw, SensorError> {
+    let electrons = sensor.electrons(rate, exposure, noise)?;
+    sensor.digitize(&sensor.volts(&electrons, exposure, noise)?, exposure)
+}
+
+fn split_pixels_want(what: &'static str) -> PipelineError {
+    let reason = "cannot be merged where pixels are split; expected frames: Single, Burst or BracketStops".to_owned();
+    PipelineError::Unsuitable { what, reason }
 }
 
 /// Returns the rate of an image that does not move; a moving burst is refused.

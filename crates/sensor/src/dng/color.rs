@@ -151,6 +151,7 @@ mod tests {
         let three = Sensor::built_in("imx363").unwrap();
         let mut four = three.clone();
         let clear = crate::Filter {
+            exposure_fraction: 1.0,
             name: "W".to_owned(),
             quantum_efficiency: Spectrum::new(vec![380.0, 730.0], vec![0.8; 2]).unwrap(),
         };

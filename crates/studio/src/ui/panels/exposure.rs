@@ -74,6 +74,7 @@ fn frames(ui: &mut Ui, frames: &mut FramesSpec) {
         (FramesSpec::Burst(8), "burst"),
         (FramesSpec::MovingBurst { frames: 8, motion_px: 4.0 }, "burst by hand"),
         (FramesSpec::BracketStops(vec![-4.0, -2.0, 0.0]), "bracket"),
+        (FramesSpec::Interleaved { ratio: 8.0, period_rows: 2 }, "interleaved rows"),
     ];
     variant(ui, "frames", "How many frames the picture is made of", frames, &kinds);
     match frames {
@@ -87,6 +88,11 @@ fn frames(ui: &mut Ui, frames: &mut FramesSpec) {
         FramesSpec::BracketStops(stops) => {
             let words = "Exposures as stops from the chosen one: −2 is a quarter of the time";
             numbers(ui, "stops", words, stops);
+        }
+        FramesSpec::Interleaved { ratio, period_rows } => {
+            let words = "The time of the long rows over that of the short ones";
+            NumberField::by_factors("ratio of times", "×", 1.01..=1e6, 2.0..=64.0, words).show(ui, ratio);
+            count(ui, "rows of one time", "Neighboring rows that share a time", 1..=64, period_rows);
         }
     }
 }

@@ -1,0 +1,161 @@
+//! One frame of more range: rows of two times, split pixels, and filters that are exposed for a share of the time.
+
+#![expect(clippy::unwrap_used, reason = "a test fails by a panic")]
+
+use approx::assert_relative_eq;
+use dioptric_sensor::{
+    Cfa, ElectronRate, Exposure, Filter, Illumination, Interleaved, Levels, Noise, Raw, Sensor, SplitPixel,
+};
+use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
+use ndarray::{Array2, s};
+
+const ROWS: Interleaved = Interleaved { ratio: 8.0, period_rows: 2 };
+
+/// Returns a monochrome sensor without a fixed pattern.
+fn even_sensor() -> Sensor {
+    Sensor { prnu_fraction: 0.0, dsnu_v: 0.0, column_offset_v: 0.0, ..Sensor::built_in("machine-vision-mono").unwrap() }
+}
+
+fn flat(e_per_s: f32) -> ElectronRate {
+    ElectronRate { planes_e_per_s: vec![Array2::from_elem((64, 64), e_per_s)] }
+}
+
+fn exposed(sensor: &Sensor, rate: &ElectronRate, exposure: &Exposure, noise: &Noise) -> Raw {
+    let electrons = sensor.electrons(rate, exposure, noise).unwrap();
+    sensor.digitize(&sensor.volts(&electrons, exposure, noise).unwrap(), exposure).unwrap()
+}
+
+fn interleaved(sensor: &Sensor, rate: &ElectronRate, exposure: &Exposure, noise: &Noise) -> Raw {
+    let electrons = sensor.electrons_interleaved(rate, exposure, &ROWS, noise).unwrap();
+    sensor.digitize(&sensor.volts(&electrons, exposure, noise).unwrap(), exposure).unwrap()
+}
+
+/// Returns the samples as rates, electrons a second.
+fn rates(raw: &Raw) -> Array2<f64> {
+    let scale = raw.levels.saturation_e() / raw.exposure.time_s;
+    raw.linear()[0].mapv(|v| f64::from(v) * scale)
+}
+
+#[test]
+fn rows_have_the_volts_of_their_time() {
+    let sensor = even_sensor();
+    let exposure = Exposure::seconds(0.01);
+    let electrons = sensor.electrons_interleaved(&flat(4e5), &exposure, &ROWS, &Noise::none()).unwrap();
+    let volts = sensor.volts(&electrons, &exposure, &Noise::none()).unwrap();
+    for row in 0..64 {
+        let time_s = if row % 4 < 2 { 0.01 } else { 0.01 / 8.0 };
+        // A dark current of 1 electron a second.
+        let expected_v = (4e5 + 1.0) * time_s * sensor.conversion_gain_v_per_e;
+        assert_relative_eq!(f64::from(volts.planes_v[0][(row, 5)]), expected_v, max_relative = 1e-6);
+    }
+}
+
+#[test]
+fn an_even_field_keeps_its_mean_and_gains_range_by_the_ratio() {
+    let sensor = even_sensor();
+    let exposure = Exposure::seconds(0.01);
+    let raw = interleaved(&sensor, &flat(4e5), &exposure, &Noise::all(1));
+    let merged = sensor.merge_interleaved(&raw, &ROWS).unwrap();
+    // 4000 electrons a long sample, half of 4096 pixels: 3.5e-4 of the mean, which the short samples hardly change.
+    assert_relative_eq!(rates(&merged).mean().unwrap(), 4e5, max_relative = 1.5e-3);
+    let top = |levels: &Levels, exposure: &Exposure| levels.saturation_e() / exposure.time_s;
+    assert_relative_eq!(
+        top(&merged.levels, &merged.exposure) / top(&raw.levels, &raw.exposure),
+        8.0,
+        max_relative = 1e-9
+    );
+    // In the dark the merged frame is no noisier than one of the long time.
+    let dark = interleaved(&sensor, &flat(0.0), &exposure, &Noise::all(2));
+    let long = exposed(&sensor, &flat(0.0), &exposure, &Noise::all(2));
+    let merged = sensor.merge_interleaved(&dark, &ROWS).unwrap();
+    let (merged_noise, long_noise) = (rates(&merged).std(0.0), rates(&long).std(0.0));
+    assert!(merged_noise < long_noise, "{merged_noise} {long_noise}");
+}
+
+#[test]
+fn a_lamp_twice_over_saturation_is_recovered() {
+    let sensor = even_sensor();
+    let exposure = Exposure::seconds(0.01);
+    let lamp = 2.0 * sensor.saturation_e(&exposure) / exposure.time_s;
+    let mut light = Array2::from_elem((64, 64), 1e5_f32);
+    light.slice_mut(s![20..44, 20..44]).fill(lamp as f32);
+    let rate = ElectronRate { planes_e_per_s: vec![light] };
+    let raw = interleaved(&sensor, &rate, &exposure, &Noise::all(3));
+    let merged = rates(&sensor.merge_interleaved(&raw, &ROWS).unwrap());
+    // 2600 electrons a short sample, 20 rows and columns of them: .1 % of the mean.
+    assert_relative_eq!(merged.slice(s![22..42, 22..42]).mean().unwrap(), lamp, max_relative = 4e-3);
+    assert_relative_eq!(merged.slice(s![2..18, ..]).mean().unwrap(), 1e5, max_relative = 4e-3);
+    // Every saturated long row says at least that much.
+    assert!(merged.slice(s![20..44, 20..44]).iter().all(|&rate| rate > 0.47 * lamp));
+}
+
+#[test]
+fn filters_are_interpolated_from_their_own_rows() {
+    let mono = even_sensor();
+    let filter = |name: &str| Filter { name: name.to_owned(), ..mono.filters[0].clone() };
+    let sensor =
+        Sensor { cfa: Cfa::two_by_two("RGGB").unwrap(), filters: ["R", "G", "B"].map(filter).to_vec(), ..mono.clone() };
+    let exposure = Exposure::seconds(0.01);
+    let at = |r: usize, c: usize| [[3e5_f32, 2e6], [2e6, 8e5]][r % 2][c % 2];
+    let rate = ElectronRate { planes_e_per_s: vec![Array2::from_shape_fn((32, 32), |(r, c)| at(r, c))] };
+    let raw = interleaved(&sensor, &rate, &exposure, &Noise::none());
+    for ((r, c), found) in rates(&sensor.merge_interleaved(&raw, &ROWS).unwrap()).indexed_iter() {
+        // Twelve bits: half a step of 2.6 electrons of 2500 short green ones, and of 375 red ones.
+        assert_relative_eq!(*found, f64::from(at(r, c)), max_relative = 4e-3);
+    }
+    let odd = Interleaved { period_rows: 1, ..ROWS };
+    let error = sensor.electrons_interleaved(&rate, &exposure, &odd, &Noise::none()).unwrap_err();
+    assert!(error.to_string().contains("period_rows"), "{error}");
+}
+
+fn split_sensor() -> Sensor {
+    let split_pixel =
+        Some(SplitPixel { area_ratio: 10.0, conversion_gain_v_per_e: 8.0e-5, full_well_e: 9000.0, read_noise_e: 3.0 });
+    Sensor { split_pixel, ..even_sensor() }
+}
+
+#[test]
+fn a_small_photodiode_collects_its_share_and_extends_the_range() {
+    let sensor = split_sensor();
+    let small = sensor.small_photodiode().unwrap();
+    let exposure = Exposure::seconds(0.01);
+    let merge = |e_per_s: f32, seed: u64| {
+        let (rate, noise) = (flat(e_per_s), Noise::all(seed));
+        let large = exposed(&sensor, &rate, &exposure, &noise);
+        let low = exposed(&small, &sensor.small_rate(&rate).unwrap(), &exposure, &noise.of_small_photodiode());
+        (sensor.merge_split(&[large], std::slice::from_ref(&low)).unwrap(), low)
+    };
+    let (dim, low) = merge(2e5, 1);
+    // 200 electrons of 2000, by shot noise of 14 over 4096 pixels.
+    assert_relative_eq!(rates(&low).mean().unwrap(), 2e4, max_relative = 5e-3);
+    assert_relative_eq!(rates(&dim).mean().unwrap(), 2e5, max_relative = 1.5e-3);
+    // Five times what saturates the large photodiode.
+    let lamp = 5.0 * sensor.saturation_e(&exposure) / exposure.time_s;
+    assert_relative_eq!(rates(&merge(lamp as f32, 2).0).mean().unwrap(), lamp, max_relative = 2e-3);
+    let range = dim.levels.saturation_e() / sensor.saturation_e(&exposure);
+    assert_relative_eq!(
+        range,
+        10.0 * small.saturation_e(&exposure) / sensor.saturation_e(&exposure),
+        max_relative = 1e-9
+    );
+    assert!(even_sensor().merge_split(&[], &[]).unwrap_err().to_string().contains("split_pixel"));
+}
+
+#[test]
+fn a_filter_exposed_for_a_quarter_of_the_time_collects_a_quarter() {
+    let whole = even_sensor();
+    let filter = Filter { exposure_fraction: 0.25, ..whole.filters[0].clone() };
+    let part = Sensor { filters: vec![filter.clone()], ..whole.clone() };
+    let grid = WavelengthGrid::uniform(500.0, 600.0, 10.0).unwrap();
+    let planes = vec![Array2::from_elem((4, 4), 1e-4_f32); grid.len()];
+    let image = SpectralImage::new(Quantity::Irradiance, grid, planes).unwrap();
+    // Light and dark current alike.
+    let exposure = Exposure { temperature_c: 90.0, ..Exposure::seconds(0.01) };
+    let electrons = |sensor: &Sensor| {
+        let rate = sensor.electron_rate(&Illumination::on_pixels(&image)).unwrap();
+        f64::from(sensor.electrons(&rate, &exposure, &Noise::none()).unwrap().planes_e[0][(1, 1)])
+    };
+    assert_relative_eq!(electrons(&part) / electrons(&whole), 0.25, max_relative = 1e-6);
+    let none = Sensor { filters: vec![Filter { exposure_fraction: 0.0, ..filter }], ..whole };
+    assert!(none.check().unwrap_err().to_string().contains("exposure_fraction"));
+}
