@@ -33,6 +33,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("curvature", &["SurfaceChange.curvature_per_mm"]),
     ("spacing", &["SurfaceChange.thickness_mm"]),
     ("unknown glass", &["Camera.lens_reading", "LensReadOptions.missing_glass"]),
+    ("configuration", &["LensReadOptions.configuration"]),
     ("catalogues", &["LensReadOptions.glasses"]),
     ("index slope", &["LensReadOptions.slope_per_nm"]),
     ("seq numbers", &["LensReadOptions.seq_numbers"]),
@@ -83,6 +84,8 @@ const PANELS: &[(&str, &[&str])] = &[
     ("frames of burst", &["FramesSpec.Burst", "FramesSpec.MovingBurst", "FramesSpec.MovingBurst.frames"]),
     ("motion", &["FramesSpec.MovingBurst.motion_px"]),
     ("stops", &["FramesSpec.BracketStops"]),
+    ("ratio of times", &["FramesSpec.Interleaved", "FramesSpec.Interleaved.ratio"]),
+    ("rows of one time", &["FramesSpec.Interleaved.period_rows"]),
     ("demosaic", &["Camera.processing", "Processing.demosaic"]),
     ("highlights", &["Processing.highlights"]),
     ("denoising", &["Processing.denoise"]),
@@ -209,6 +212,7 @@ fn cameras() -> Vec<Camera> {
             scene.flat = Some(FlatSize { width_mm: 10.0, distance_mm: 100.0 });
             camera.lens = LensSpec::File("none.zmx".into());
             camera.lens_reading.slope_per_nm = Some(-1e-4);
+            camera.frames = FramesSpec::Interleaved { ratio: 8.0, period_rows: 2 };
         }),
         world(RenderEffort::Samples(8)),
         world(RenderEffort::Noise(0.1)),

@@ -7,7 +7,7 @@ use dioptric_pipeline::{Camera, FocusSpec, LensReadOptions, LensSpec, MissingGla
 use egui::{CollapsingHeader, Ui};
 
 use super::{
-    super::fields::{NumberField, choice, optional, text, with_choice_of_file},
+    super::fields::{NumberField, choice, count, optional, text, with_choice_of_file},
     Desk, Wanted, focus_plane, lens_drawing, surfaces,
 };
 use crate::engine::Field;
@@ -222,6 +222,11 @@ pub(super) fn movements(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
 
 /// What the lens's file leaves open.
 fn reading(ui: &mut Ui, reading: &mut LensReadOptions) {
+    let mut number = reading.configuration.unwrap_or(0);
+    let words = "Which position of a zoom lens, or other configuration of the file, counted from 1; 0 for the one that it has in use";
+    if count(ui, "configuration", words, 0..=100, &mut number) {
+        reading.configuration = (number > 0).then_some(number);
+    }
     let now = reading.glasses.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join("; ");
     let words = "Glass catalogues (.agf, .yml) to look in before the built-in one, with semicolons between them";
     if let Some(typed) = text(ui, "catalogues", words, &now) {
