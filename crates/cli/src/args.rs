@@ -447,7 +447,7 @@ pub(crate) struct PsfArgs {
     #[arg(long, value_name = "F", help_heading = heading::RESULTS)]
     pub(crate) csv: Option<PathBuf>,
     /// Writes plots into this folder: line and edge spread, MTF, encircled and ensquared energy, MTF through focus;
-    /// SVG and the lines as CSV; PNG too in a build with the feature png
+    /// SVG and the lines as CSV; PNG too in a build with the feature png; and a page with pictures, plots and numbers, report.html
     #[arg(long, value_name = "DIR", help_heading = heading::RESULTS)]
     pub(crate) plots: Option<PathBuf>,
     /// Adds a row for the light of all wavelengths together to those of each point

@@ -8,7 +8,7 @@ use dioptric_analysis::measure::{
 };
 use dioptric_pipeline::{SensorSpec, Staged, open_display, parse_illuminant};
 
-use dioptric_report::write_measurement;
+use dioptric_report::{MeasurementWords, write_measurement};
 
 use crate::{
     args::Common,
@@ -36,7 +36,12 @@ fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
         pixel_um: arguments.pixel_um,
         curve: curve(arguments.picture_args.curve),
     };
-    let finish = Finish::new("mtf", arguments.picture_args.out.as_deref(), common)?;
+    let finish = Finish::new(
+        ("mtf", "Edge response"),
+        file_name(&arguments.picture),
+        arguments.picture_args.out.as_deref(),
+        common,
+    )?;
     finish.with(&request.measure(&arguments.picture)?, mtf_table)
 }
 
@@ -47,12 +52,15 @@ fn spot(arguments: &SpotArgs, common: &Common) -> anyhow::Result<()> {
         background: arguments.background,
         curve: curve(arguments.picture_args.curve),
     };
-    let finish = Finish::new("spot", arguments.picture_args.out.as_deref(), common)?;
+    let finish =
+        Finish::new(("spot", "Points"), file_name(&arguments.picture), arguments.picture_args.out.as_deref(), common)?;
     finish.with(&request.measure(&arguments.picture)?, spot_table)
 }
 
 fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {
-    let finish = Finish::new("noise", arguments.out.as_deref(), common)?;
+    let of_frames = || arguments.frames.as_deref().map(file_name).unwrap_or_default();
+    let of_what = arguments.sensor.clone().unwrap_or_else(of_frames);
+    let finish = Finish::new(("noise", "Noise"), of_what, arguments.out.as_deref(), common)?;
     let data = match (&arguments.frames, &arguments.sensor) {
         (Some(frames), _) => measure_frames(frames)?,
         (None, Some(sensor)) => {
@@ -91,7 +99,8 @@ fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
             patch: arguments.patch.as_deref().map(PixelRegion::parse).transpose()?,
             curve,
         };
-        let finish = Finish::new("compare", out, common)?;
+        let subject = format!("{} against {}", file_name(&arguments.picture), file_name(against));
+        let finish = Finish::new(("compare", "Two pictures"), subject, out, common)?;
         return finish.with(&request.compare(&arguments.picture, against)?, comparison_table);
     }
     let request = ChartRequest {
@@ -99,7 +108,7 @@ fn color(arguments: &ColorArgs, common: &Common) -> anyhow::Result<()> {
         light: arguments.illuminant.as_deref().map(parse_illuminant).transpose()?,
         curve,
     };
-    let finish = Finish::new("color", out, common)?;
+    let finish = Finish::new(("color", "Color chart"), file_name(&arguments.picture), out, common)?;
     finish.with(&request.measure(&arguments.picture)?, chart_table)
 }
 
@@ -123,15 +132,23 @@ fn curve(kind: CurveKind) -> CodeCurve {
 /// What becomes of a measurement: files in a folder, and numbers on standard output.
 struct Finish<'a> {
     name: &'static str,
+    title: &'static str,
+    /// What is measured, as the user named it.
+    subject: String,
     common: &'a Common,
     staged: Option<Staged>,
 }
 
 impl<'a> Finish<'a> {
     /// Tries the place before the work.
-    fn new(name: &'static str, folder: Option<&Path>, common: &'a Common) -> anyhow::Result<Self> {
+    fn new(
+        (name, title): (&'static str, &'static str),
+        subject: String,
+        folder: Option<&Path>,
+        common: &'a Common,
+    ) -> anyhow::Result<Self> {
         let staged = folder.map(Staged::folder).transpose()?.map(guarded);
-        Ok(Self { name, common, staged })
+        Ok(Self { name, title, subject, common, staged })
     }
 
     fn with<M: Measurement>(
@@ -139,17 +156,23 @@ impl<'a> Finish<'a> {
         measured: &M,
         table: impl Fn(&M) -> Result<String, std::fmt::Error>,
     ) -> anyhow::Result<()> {
+        let table = table(measured)?;
         if let Some(staged) = self.staged {
-            write_measurement(measured, self.name, staged.path())?;
+            let words = MeasurementWords { name: self.name, title: self.title, subject: &self.subject, table: &table };
+            write_measurement(measured, &words, staged.path())?;
             staged.commit()?;
             remark_on_png(self.common.quiet);
         }
         match (self.common.json, self.common.quiet) {
             (true, _) => print_json(measured),
             (false, true) => Ok(()),
-            (false, false) => print(&table(measured)?),
+            (false, false) => print(&table),
         }
     }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 fn or_dash(value: Option<f64>, digits: usize) -> String {

@@ -24,7 +24,7 @@ pub(crate) struct PictureArgs {
     /// How samples stand for light
     #[arg(long, value_name = "KIND", value_enum, default_value_t = CurveKind::ByFile)]
     pub(crate) curve: CurveKind,
-    /// Folder for the numbers as JSON and the plots as SVG; as PNG too in a build with the feature png
+    /// Folder for a page (report.html), the numbers as JSON and the plots as SVG; as PNG too in a build with the feature png
     #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }
@@ -118,7 +118,7 @@ pub(crate) struct NoiseArgs {
     /// Keeps the frames as 16-bit PNG with a descriptor in this folder
     #[arg(long, value_name = "DIR", requires = "sensor")]
     pub(crate) keep_frames: Option<PathBuf>,
-    /// Folder for the numbers as JSON and the plots as SVG; as PNG too in a build with the feature png
+    /// Folder for a page (report.html), the numbers as JSON and the plots as SVG; as PNG too in a build with the feature png
     #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

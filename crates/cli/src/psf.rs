@@ -5,7 +5,7 @@ use std::fmt::Write;
 use anyhow::Context;
 use dioptric_analysis::{LensDefaults, PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
 use dioptric_pipeline::{BankSpec, FocusSpec, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
-use dioptric_report::{PsfFormat, chart_svg, write_drawing, write_psfs};
+use dioptric_report::{PsfFormat, chart_svg, psf_page, write_drawing, write_psfs};
 
 use crate::{
     args::{BankKind, Common, PsfArgs, PsfMode},
@@ -71,11 +71,14 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         remark(common.quiet, &format!("wrote {}", path.display()));
     }
     if let (Some(staged), Some(folder)) = (plots, &arguments.plots) {
-        for (name, chart) in set.charts(&request.through_focus(&lens, &set)?) {
-            let svg = chart_svg(&chart, 640.0, 420.0);
-            write_drawing(&svg, staged.path(), &name, PNG_SCALE)?;
+        let (names, charts): (Vec<_>, Vec<_>) = set.charts(&request.through_focus(&lens, &set)?).into_iter().unzip();
+        for (name, chart) in names.iter().zip(&charts) {
+            let svg = chart_svg(chart, 640.0, 420.0);
+            write_drawing(&svg, staged.path(), name, PNG_SCALE)?;
             std::fs::write(staged.path().join(format!("{name}.csv")), chart.to_csv())?;
         }
+        let page = psf_page(&set, lens.name(), &charts, &table(&set, &rows)?)?;
+        std::fs::write(staged.path().join("report.html"), page)?;
         staged.commit()?;
         remark(common.quiet, &format!("wrote plots into {}", folder.display()));
         remark_on_png(common.quiet);

@@ -60,7 +60,7 @@ fn an_edge_is_found_and_has_its_mtf50() {
     assert!((mtf50 / half_frequency() - 1.0).abs() < 0.01, "{mtf50}, not {}", half_frequency());
     assert!((number(&channel["mtf50_cycles_per_mm"]) / (mtf50 * 250.0) - 1.0).abs() < 1e-9);
     assert!((number(&measured["slant_deg"]) - 5.0).abs() < 0.1);
-    for name in ["mtf.json", "mtf.svg"] {
+    for name in ["mtf.json", "mtf.svg", "report.html"] {
         assert!(fs::metadata(folder.path().join("out").join(name)).unwrap().len() > 1000, "{name}");
     }
     assert!(output(folder.path(), &["measure", "mtf", "edge.png"]).contains("MTF50P"));
@@ -138,7 +138,7 @@ fn a_sensor_on_the_bench_and_its_frames_from_files_agree() {
         // The descriptor holds photons to six places.
         assert!((a / b - 1.0).abs() < 1e-6, "{key}: {a} and {b}");
     }
-    for name in ["noise.json", "photon-transfer.svg", "snr.svg"] {
+    for name in ["noise.json", "photon-transfer.svg", "snr.svg", "report.html"] {
         assert!(folder.path().join("frames").join(name).exists(), "{name}");
     }
     // Without a descriptor the photons are not known, but the gain is.

@@ -13,6 +13,7 @@ mod light_field;
 mod measurement;
 mod mesh;
 mod methods;
+mod page;
 mod panel;
 mod plots;
 mod png;
@@ -25,10 +26,10 @@ pub use drawing_file::{DRAWS_PNG, PNG_REMEDY, check_drawing_name, drawing_file, 
 pub use figures::{Drawing, draw_all, draw_figure4};
 pub use lens::{AnalysisPlots, LensDrawing, LensPage};
 pub use light_field::{LightFieldReport, write_light_field};
-pub use measurement::write_measurement;
+pub use measurement::{MeasurementWords, write_measurement};
 pub use methods::{comparison_picture, write_comparison};
 pub use plots::chart_svg;
-pub use psf::{MosaicPlan, PsfFormat, PsfMosaic, psf_mosaic, write_psfs};
+pub use psf::{MosaicPlan, PsfFormat, PsfMosaic, psf_mosaic, psf_page, write_psfs};
 pub use run::{write_run, write_sensed};
 #[cfg(feature = "png")]
 pub use svg_png::svg_to_png;

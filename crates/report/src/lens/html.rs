@@ -4,11 +4,10 @@ use dioptric_analysis::{LensData, LensPageData, placement_lines, surface_rows};
 use dioptric_pipeline::PipelineError;
 
 use super::{AnalysisPlots, LensDrawing, glass_map::glass_map_svg};
-use crate::{chart_svg, panel::escaped};
-
-const STYLE: &str = include_str!("../run/report.css");
-/// Size of a chart, px.
-const CHART_PX: (f64, f64) = (620.0, 380.0);
+use crate::{
+    page::{self, note, section},
+    panel::escaped,
+};
 
 /// All that the page of a lens shows.
 #[derive(Clone, Copy, Debug)]
@@ -33,12 +32,11 @@ impl LensPage<'_> {
         body += &section("Prescription", &self.prescription());
         body += &section("First order", &self.first_order());
         if let Ok(modulation) = &self.shown.modulation {
-            let charts = [&modulation.over_frequency, &modulation.over_field, &modulation.through_focus];
-            let charts: String = charts.map(|chart| chart_svg(chart, CHART_PX.0, CHART_PX.1)).concat();
+            let charts = page::charts([&modulation.over_frequency, &modulation.over_field, &modulation.through_focus]);
             let words = "Tangential (solid): lines across the plane of axis and field, a wave along the radius. Sagittal \
                          (dashed): lines along it. By the waves of all wavelengths together; where the blur is too large for \
                          that, by HURB.";
-            body += &section("Modulation", &format!("<div class=\"pair\">\n{charts}</div>\n{}", note(words)));
+            body += &section("Modulation", &(charts + &note(words)));
         }
         let fans = "Tangential rays and curves are those in the plane of axis and field (along y), sagittal ones across it \
                     (along x): solid and dashed where they share a plot. Each spot has its own scale; the gray circle is Airy's \
@@ -50,14 +48,8 @@ impl LensPage<'_> {
         if let Some(map) = glass_map_svg(&self.shown.lens) {
             body += &section("Glasses", &(map + &note("Numbers in brackets: the surfaces that a glass lies behind.")));
         }
-        body += &section("Numbers", &format!("<pre>{}</pre>\n", escaped(self.tables)));
-        let (name, source) = (escaped(&analysis.lens), escaped(self.shown.lens.source()));
-        Ok(format!(
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{name} – dioptric</title>\n\
-             <style>\n{STYLE}main {{ max-width: 1480px; }} section {{ overflow-x: auto; }}\n</style>\n</head>\n<body>\n\
-             <header>\n<h1>{name}</h1>\n<p>{source}</p>\n</header>\n<main>\n{body}</main>\n</body>\n</html>\n"
-        ))
+        body += &section("Numbers", &page::lines(self.tables));
+        Ok(page::page(&analysis.lens, self.shown.lens.source(), &body))
     }
 
     /// Draws the lens with the rays of the fields, as far as a drawing shows them.
@@ -143,12 +135,4 @@ impl LensPage<'_> {
         };
         format!("<table>\n<tr><th></th>{head}</tr>\n{}</table>\n", quantities.iter().map(row).collect::<String>())
     }
-}
-
-fn section(title: &str, inside: &str) -> String {
-    format!("<section>\n<h2>{title}</h2>\n{inside}</section>\n")
-}
-
-fn note(words: &str) -> String {
-    if words.is_empty() { String::new() } else { format!("<p class=\"note\">{}</p>\n", escaped(words)) }
 }

@@ -8,9 +8,10 @@ use ndarray::Array2;
 use crate::{
     axis::round_up,
     lettering::{Ink, Weight, write},
+    page,
     png::png_bytes,
 };
-use dioptric_analysis::{PsfRow, PsfSet};
+use dioptric_analysis::{LineChart, PsfRow, PsfSet};
 use dioptric_pipeline::{PipelineError, display::LinearRgb, display::code, number};
 
 /// Side of a tile where there is room, pixels.
@@ -167,6 +168,20 @@ pub fn write_psfs(set: &PsfSet, path: &Path, format: PsfFormat) -> Result<(), Pi
         PsfFormat::Exr => set.write_exr(path),
         PsfFormat::Png => std::fs::write(path, png_bytes(&psf_mosaic(set)?)?).map_err(cannot),
     }
+}
+
+/// Returns a self-contained page of point spread functions: the [mosaic](psf_mosaic), the charts, and the numbers as lines of text.
+///
+/// # Errors
+/// When there are more points than a picture holds.
+pub fn psf_page(set: &PsfSet, lens: &str, charts: &[LineChart], table: &str) -> Result<String, PipelineError> {
+    let n = set.rows.len();
+    let alt = format!("{n} point spread functions: wavelengths across, fields and distances down");
+    let mut body = page::section("Point spread functions", &page::picture(&png_bytes(&psf_mosaic(set)?)?, &alt));
+    body += &page::section("Charts", &page::charts(charts));
+    body += &page::section("Numbers", &page::lines(table));
+    let source = format!("{n} point spread functions on pixels of {} µm", number(set.pixel_um));
+    Ok(page::page(lens, &source, &body))
 }
 
 /// Where tiles lie.

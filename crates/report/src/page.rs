@@ -1,0 +1,47 @@
+//! Pages for a browser: one style, and what they are made of.
+
+use base64::{Engine, engine::general_purpose::STANDARD};
+use dioptric_analysis::LineChart;
+
+use crate::{chart_svg, panel::escaped};
+
+const STYLE: &str = include_str!("run/report.css");
+/// Size of a chart, px.
+const CHART_PX: (f64, f64) = (620.0, 380.0);
+/// Charts and tables that are wider than the window scroll in their card.
+const WIDE: &str = "main { max-width: 1480px; } section { overflow-x: auto; }";
+
+/// Returns a self-contained page; `body` is HTML, name and source are text.
+pub(crate) fn page(name: &str, source: &str, body: &str) -> String {
+    let (name, source) = (escaped(name), escaped(source));
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{name} – dioptric</title>\n\
+         <style>\n{STYLE}{WIDE}\n</style>\n</head>\n<body>\n\
+         <header>\n<h1>{name}</h1>\n<p>{source}</p>\n</header>\n<main>\n{body}</main>\n</body>\n</html>\n"
+    )
+}
+
+pub(crate) fn section(title: &str, inside: &str) -> String {
+    format!("<section>\n<h2>{title}</h2>\n{inside}</section>\n")
+}
+
+pub(crate) fn note(words: &str) -> String {
+    if words.is_empty() { String::new() } else { format!("<p class=\"note\">{}</p>\n", escaped(words)) }
+}
+
+/// Returns charts two by two, or one under the other where the window is narrow.
+pub(crate) fn charts<'a>(charts: impl IntoIterator<Item = &'a LineChart>) -> String {
+    let drawn: String = charts.into_iter().map(|chart| chart_svg(chart, CHART_PX.0, CHART_PX.1)).collect();
+    format!("<div class=\"pair\">\n{drawn}</div>\n")
+}
+
+/// Returns lines of text as they are.
+pub(crate) fn lines(text: &str) -> String {
+    format!("<pre>{}</pre>\n", escaped(text))
+}
+
+/// Returns a PNG picture as a part of the page.
+pub(crate) fn picture(png: &[u8], alt: &str) -> String {
+    format!("<img src=\"data:image/png;base64,{}\" alt=\"{}\">\n", STANDARD.encode(png), escaped(alt))
+}
