@@ -4,7 +4,7 @@ use dioptric_spectrum::{DepthMap, SpectralImage};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{HiddenLayer, Scene, SceneError, View};
+use crate::{Scene, SceneError, View};
 
 /// How far beyond the outermost centers of the old samples new ones may lie, in old samples: to the edge of the picture and rounding.
 const MARGIN: f64 = 0.5 + 1e-6;
@@ -29,19 +29,7 @@ impl Scene {
             SpectralImage::new(image.quantity(), image.grid().clone(), planes)
         };
         let depth = |depth: &DepthMap| DepthMap::new(nearest(depth.z_m(), &rows, &columns));
-        let hidden = match &self.hidden {
-            Some(h) => Some(HiddenLayer { radiance: image(&h.radiance)?, depth: depth(&h.depth)? }),
-            None => None,
-        };
-        Ok(Self {
-            name: self.name.clone(),
-            radiance: image(&self.radiance)?,
-            depth: self.depth.as_ref().map(depth).transpose()?,
-            view: Some(view),
-            hidden,
-            light: self.light.clone(),
-            notes: self.notes.clone(),
-        })
+        self.with_samples(image, depth, Some(view))
     }
 }
 

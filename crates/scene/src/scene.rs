@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use dioptric_spectrum::{DepthMap, Observer, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{DepthMap, Observer, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use ndarray::{Array2, s};
 
 use crate::{SceneError, SceneLight, View, resample::resampled};
@@ -175,15 +175,26 @@ impl Scene {
         let image = |i: &SpectralImage| {
             SpectralImage::new(i.quantity(), i.grid().clone(), i.planes().iter().map(plane).collect())
         };
+        let depth = |depth: &DepthMap| DepthMap::new(plane(depth.z_m()));
+        self.with_samples(image, depth, self.view.map(|v| v.cropped(rows.start, columns.start)))
+    }
+
+    /// Returns the scene with other samples in all its layers, as another view has them.
+    pub(crate) fn with_samples(
+        &self,
+        image: impl Fn(&SpectralImage) -> Result<SpectralImage, SpectrumError>,
+        depth: impl Fn(&DepthMap) -> Result<DepthMap, SpectrumError>,
+        view: Option<View>,
+    ) -> Result<Self, SceneError> {
         let hidden = match &self.hidden {
-            Some(h) => Some(HiddenLayer { radiance: image(&h.radiance)?, depth: DepthMap::new(plane(h.depth.z_m()))? }),
+            Some(h) => Some(HiddenLayer { radiance: image(&h.radiance)?, depth: depth(&h.depth)? }),
             None => None,
         };
         Ok(Self {
             name: self.name.clone(),
             radiance: image(&self.radiance)?,
-            depth: self.depth.as_ref().map(|d| DepthMap::new(plane(d.z_m()))).transpose()?,
-            view: self.view.map(|v| v.cropped(rows.start, columns.start)),
+            depth: self.depth.as_ref().map(depth).transpose()?,
+            view,
             hidden,
             light: self.light.clone(),
             notes: self.notes.clone(),
@@ -221,19 +232,7 @@ impl Scene {
             let middle = |i: usize| i * factor + factor / 2;
             DepthMap::new(Array2::from_shape_fn((rows, columns), |(r, c)| depth.z_m()[(middle(r), middle(c))]))
         };
-        let hidden = match &self.hidden {
-            Some(h) => Some(HiddenLayer { radiance: image(&h.radiance)?, depth: depth(&h.depth)? }),
-            None => None,
-        };
-        Ok(Self {
-            name: self.name.clone(),
-            radiance: image(&self.radiance)?,
-            depth: self.depth.as_ref().map(depth).transpose()?,
-            view: self.view.map(|view| view.binned(factor)),
-            hidden,
-            light: self.light.clone(),
-            notes: self.notes.clone(),
-        })
+        self.with_samples(image, depth, self.view.map(|view| view.binned(factor)))
     }
 
     /// Returns the scene on other bands.
