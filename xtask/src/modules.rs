@@ -28,7 +28,6 @@ const ALLOWED: &[(&str, &[&str], &str)] = &[
     ("psf", &["narrow_gaussian", "splat"], "splats are sorted into narrow Gaussians, which are made of a `Splat`"),
     ("scene", &["light", "scene"], "a scene has a light and is put under another"),
     ("cli", &["analyze", "lens"], "`lens` dispatches to `analyze`, which opens lenses as `lens` does"),
-    ("forward", &["knot_kernels", "tiles"], "kernels lie at the knots of tiles, which are laid by how kernels change"),
     ("python", &["camera", "shot"], "a camera takes shots, and a shot has the camera that took it"),
     ("sensor", &["exposure", "sensor"], "an exposure is resolved for a sensor, whose methods take an exposure"),
 ];

@@ -26,8 +26,12 @@ impl BandKernels {
 
     /// Returns the kernels between two bands.
     pub(crate) fn mixed(&self, upper: &Self, fraction: f32) -> Self {
+        // At its ends they are those of one band, no wider: sums of transforms of another size have another rounding.
         if fraction == 0.0 {
             return self.clone();
+        }
+        if fraction == 1.0 {
+            return upper.clone();
         }
         let pairs = self.by_layer.iter().zip(upper.by_layer.iter());
         Self { by_layer: Arc::new(pairs.map(|(lower, upper)| lower.mixed(upper, fraction)).collect()) }

@@ -6,8 +6,8 @@ use ndarray::{Array2, Axis, parallel::prelude::*};
 
 use crate::{
     block_layers::{BLOCK, BlockLayers},
+    patch::Cell,
     sampler::{LayerCoordinates, Sampler},
-    tiles::Cell,
 };
 
 /// Samples of the scene around a block that count as its own: maps are curved.

@@ -9,12 +9,15 @@ use rayon::prelude::*;
 
 use crate::{
     block_layers::BlockLayers,
+    by_knots::spread_by_knots,
     convolve::{STRIP_COLUMNS, STRIP_ROWS, Strip, fast_size, multiply_add, with_fft},
-    knot_kernels::{KnotKernel, LayerKernels, edge_spread_peak},
+    expansion::Expansion,
+    knot_kernels::{KnotKernel, LayerKernels},
     occlusion::BlurredPlane,
+    patch::{Knot, Patch},
+    patch_samples::{BlurredCell, PatchSamples, Places},
     sampler::{Rectangle, Sampler, Surface},
     stopwatch::{Part, Stopwatch},
-    tiles::{Knot, LARGEST, Patch, polynomials},
     work::Work,
 };
 
@@ -39,10 +42,13 @@ pub(crate) struct LayerTask<'a> {
     pub(crate) stopwatch: &'a Stopwatch,
 }
 
-/// The blurred light or alpha of a cell.
-struct BlurredCell {
-    at: Rectangle,
-    values: Vec<f32>,
+/// What becomes of a patch.
+enum Spread<'a> {
+    /// Nothing of the layer is in it.
+    Nothing,
+    Done(BlurredCell),
+    /// It takes less time together with the patches around it.
+    ByKnots(PatchSamples<'a>),
 }
 
 /// Blurs a layer into `out`, which must be clear; each patch counts as `patch_units` of work.
@@ -52,47 +58,65 @@ pub(crate) fn blur_layer(
     work: &Work<'_>,
     patch_units: u64,
 ) -> Result<(), Cancelled> {
-    let mut knots: Vec<Knot> =
-        task.patches.iter().flat_map(|patch| patch.shares.iter().map(|&(knot, _)| knot)).collect();
+    let whole = task.patches.iter().filter(|patch| !patch.is_by_knots);
+    let mut knots: Vec<Knot> = whole.flat_map(|patch| patch.shares.iter().map(|&(knot, _)| knot)).collect();
     knots.sort_unstable();
     knots.dedup();
     let kernels: BTreeMap<Knot, KnotKernel> = knots.into_par_iter().map(|knot| (knot, task.kernels.at(knot))).collect();
+    let mut by_knots = vec![];
     for patches in task.patches.chunks(CELLS_AT_ONCE) {
         let blur = |patch| {
-            let blurred = blur_patch(task, &kernels, patch, work.cancel());
+            let spread = blur_patch(task, &kernels, patch, work.cancel());
             work.advance(patch_units);
-            blurred
+            spread
         };
-        let blurred: Vec<Option<BlurredCell>> = patches.par_iter().map(blur).collect::<Result<_, Cancelled>>()?;
+        let spreads: Vec<Spread<'_>> = patches.par_iter().map(blur).collect::<Result<_, Cancelled>>()?;
         task.stopwatch.time(Part::Compositing, || {
-            blurred.iter().flatten().for_each(|cell| add_cell(task, cell, out));
+            for spread in spreads {
+                match spread {
+                    Spread::Nothing => {}
+                    Spread::Done(cell) => add_cell(task, &cell, out),
+                    Spread::ByKnots(patch) => by_knots.push(patch),
+                }
+            }
         });
     }
-    Ok(())
+    spread_by_knots(task.kernels, &by_knots, (task.stopwatch, work.cancel()), &mut |cell| add_cell(task, cell, out))
 }
 
-fn blur_patch(
-    task: &LayerTask<'_>,
+impl LayerTask<'_> {
+    /// The samples along a side of the widest kernel of a patch.
+    fn width_of(&self, patch: &Patch) -> usize {
+        patch.shares.iter().map(|&(knot, _)| self.kernels.width_at(knot)).max().unwrap_or(1)
+    }
+}
+
+fn blur_patch<'a>(
+    task: &LayerTask<'a>,
     kernels: &BTreeMap<Knot, KnotKernel>,
-    patch: &Patch,
+    patch: &'a Patch,
     cancel: &Cancel,
-) -> Result<Option<BlurredCell>, Cancelled> {
+) -> Result<Spread<'a>, Cancelled> {
     let cell = &patch.cell;
-    let width = patch.shares.iter().map(|(knot, _)| kernels[knot].width).max().unwrap_or(1);
+    let width = task.width_of(patch);
     let half = width / 2;
     let (first_row, first_column) = cell.first_pixel(&task.sampler.frame);
     let whole = Rectangle { first_row, first_column, rows: cell.size, columns: cell.size };
-    let Some(source) = whole.clipped(task.film_rows, task.film_columns, half) else { return Ok(None) };
+    let Some(source) = whole.clipped(task.film_rows, task.film_columns, half) else { return Ok(Spread::Nothing) };
     let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, task.blocks, cancel);
-    let Some(mut ideal) = task.stopwatch.time(Part::Sampling, sample)? else { return Ok(None) };
-    let expansion = Expansion::of(patch, kernels, (width, task.negligible_edge), cancel)?;
+    let Some(mut ideal) = task.stopwatch.time(Part::Sampling, sample)? else { return Ok(Spread::Nothing) };
     if task.surfaces.iter().all(|surface| surface.radiance.is_none()) {
         // What a surface covers is 1 all over it, however its kernels change.
-        let share = (1.0 / expansion.uniform_response(cell.size)) as f32;
+        let share = (1.0 / uniform_response(task.kernels, patch)) as f32;
         ideal.iter_mut().for_each(|alpha| *alpha *= share);
     }
     let places = Places::new(patch, &source, task.sampler);
-    let values = if expansion.is_better_direct(&source) {
+    if patch.is_by_knots {
+        return Ok(Spread::ByKnots(PatchSamples { patch, source, places, ideal }));
+    }
+    let expansion = Expansion::of(patch, kernels, task.negligible_edge, cancel)?;
+    let cost = expansion.cost();
+    let values = if cost.is_better_direct((source.rows, source.columns)) {
         task.stopwatch.time(Part::Direct, || spread_directly(&ideal, &places, &expansion, cancel))
     } else {
         task.stopwatch.time(Part::Transforms, || spread_by_transform(&ideal, &places, &expansion, cancel))
@@ -103,111 +127,19 @@ fn blur_patch(
         rows: source.rows + 2 * half,
         columns: source.columns + 2 * half,
     };
-    Ok(Some(BlurredCell { at, values: values? }))
+    Ok(Spread::Done(BlurredCell { at, values: values? }))
 }
 
-/// The kernel over a cell: a sum of squares of samples, each times a polynomial down and one across the cell.
-struct Expansion {
-    width: usize,
-    terms: Vec<Term>,
-}
-
-struct Term {
-    /// Numbers of the polynomials.
-    down: usize,
-    across: usize,
-    samples: Vec<f32>,
-}
-
-/// Multiplications that take about as long as the transform of a sample.
-const COST_OF_TRANSFORM: usize = 64;
-
-impl Expansion {
-    fn of(
-        patch: &Patch,
-        kernels: &BTreeMap<Knot, KnotKernel>,
-        (width, negligible_edge): (usize, f64),
-        cancel: &Cancel,
-    ) -> Result<Self, Cancelled> {
-        let mut terms = vec![];
-        for product in 0..9 {
-            cancel.check()?;
-            let (down, across) = (product / 3, product % 3);
-            let mut samples = vec![0.0; width * width];
-            for (knot, shares) in patch.shares.iter().filter(|(_, shares)| shares[product] != 0.0) {
-                kernels[knot].add_to(&mut samples, width, shares[product]);
-            }
-            let largest = LARGEST[down] * LARGEST[across];
-            if product == 0 || largest * edge_spread_peak(&samples, width) > negligible_edge {
-                terms.push(Term { down, across, samples });
-            }
-        }
-        Ok(Self { width, terms })
-    }
-
-    /// Returns what these kernels make of a uniform plane of 1, to the second moments (docs/forward.md, eq. 2).
-    fn uniform_response(&self, cell_size: usize) -> f64 {
-        let middle = (self.width / 2) as f64;
-        let moment = |term: &Term| -> f64 {
-            let of = |(i, sample): (usize, &f32)| {
-                let (down, across) = ((i / self.width) as f64 - middle, (i % self.width) as f64 - middle);
-                f64::from(*sample) * down.powi(term.down as i32) * across.powi(term.across as i32)
-            };
-            term.samples.iter().enumerate().map(of).sum()
-        };
-        let second = self.terms.iter().filter(|term| term.down + term.across == 2);
-        let excess = second.map(moment).sum::<f64>() / (cell_size * cell_size) as f64;
-        // The expansion holds while it is small.
-        1.0 + excess.clamp(-0.2, 0.2)
-    }
-
-    /// The number of polynomials across the cell.
-    fn n_across(&self) -> usize {
-        1 + self.terms.iter().map(|term| term.across).max().unwrap_or(0)
-    }
-
-    /// The side of the transforms of a rectangle.
-    fn transform_size(&self, source: &Rectangle) -> usize {
-        fast_size(source.rows.max(source.columns) + self.width - 1)
-    }
-
-    /// Whether a sum takes less time than transforms.
-    fn is_better_direct(&self, source: &Rectangle) -> bool {
-        let lanes = source.rows * (source.columns + self.width - 1);
-        let direct = self.n_across() * self.width * self.width * lanes;
-        let n_transforms = 2 * self.terms.len() + 1;
-        direct <= n_transforms * self.transform_size(source).pow(2) * COST_OF_TRANSFORM
-    }
-
-    /// Returns the kernel at a place down the cell, for each polynomial across it.
-    fn at_row(&self, down: &[f32; 3], kernels: &mut [f32]) {
-        kernels.fill(0.0);
-        let n = self.width * self.width;
-        for term in &self.terms {
-            let factor = down[term.down];
-            let kernel = &mut kernels[term.across * n..][..n];
-            kernel.iter_mut().zip(&term.samples).for_each(|(kernel, sample)| *kernel += factor * sample);
-        }
-    }
-}
-
-/// The polynomials of a cell at the rows and columns of a rectangle in it.
-struct Places {
-    down: Vec<[f32; 3]>,
-    across: Vec<[f32; 3]>,
-}
-
-impl Places {
-    fn new(patch: &Patch, source: &Rectangle, sampler: &Sampler) -> Self {
-        let at = |row: usize, column: usize| {
-            let (row, column) = (source.first_row + row as i64, source.first_column + column as i64);
-            patch.cell.place_of(&sampler.frame, row, column)
-        };
-        Self {
-            down: (0..source.rows).map(|row| polynomials(at(row, 0).0 as f32)).collect(),
-            across: (0..source.columns).map(|column| polynomials(at(0, column).1 as f32)).collect(),
-        }
-    }
+/// Returns what the kernels over a patch make of a uniform plane of 1, to the second moments (docs/forward.md, eq. 5).
+fn uniform_response(kernels: &LayerKernels, patch: &Patch) -> f64 {
+    let excess = |(knot, shares): &(Knot, [f32; 9])| {
+        let moments = kernels.canonical_at(*knot).second_moments();
+        let [down, mixed, across] = kernels.symmetry.mirror(*knot).moments_at_knot(moments);
+        f64::from(shares[6]) * down + f64::from(shares[4]) * mixed + f64::from(shares[2]) * across
+    };
+    let excess = patch.shares.iter().map(excess).sum::<f64>() / (patch.cell.size * patch.cell.size) as f64;
+    // The expansion holds while it is small.
+    1.0 + excess.clamp(-0.2, 0.2)
 }
 
 /// Spreads a plane by sums: exactly the kernel of each row, and along a row that of each sample.

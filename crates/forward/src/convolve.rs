@@ -131,8 +131,15 @@ pub(crate) fn multiply_add(sum: &mut [Complex<f32>], a: &[Complex<f32>], b: &[Co
     }
 }
 
+/// Multiplies a spectrum by another.
+pub(crate) fn multiply(product: &mut [Complex<f32>], factor: &[Complex<f32>]) {
+    for (product, factor) in product.iter_mut().zip(factor) {
+        *product *= factor;
+    }
+}
+
 /// Samples of the output that stay in registers together.
-const LANES: usize = 32;
+pub(crate) const LANES: usize = 32;
 
 /// Rows of samples that are convolved directly at once.
 pub(crate) const STRIP_ROWS: usize = 16;

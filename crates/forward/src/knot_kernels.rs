@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use dioptric_psf::LensImage;
 use ndarray::Array2;
 
-use crate::tiles::Knot;
+use crate::patch::Knot;
 
 /// Which knots have kernels that follow from each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +30,18 @@ impl Symmetry {
                 Knot { right: a.max(b), down: -a.min(b) }
             }
             Self::None => knot,
+        }
+    }
+
+    /// Returns what takes the surroundings of a knot to those of its canonical one.
+    pub(crate) fn mirror(self, knot: Knot) -> Mirror {
+        match self {
+            Self::Octants => Mirror {
+                flips_rows: knot.down > 0,
+                flips_columns: knot.right < 0,
+                swaps: knot.down.abs() > knot.right.abs(),
+            },
+            Self::None => Mirror::default(),
         }
     }
 }
@@ -75,28 +87,82 @@ impl KnotKernel {
         Self { width, samples }
     }
 
-    /// Returns the kernel of a canonical knot turned to another: mirrored about the axes and the diagonal.
-    fn mirrored(&self, knot: Knot) -> Self {
-        let (n, last) = (self.width, self.width - 1);
-        let swap = knot.down.abs() > knot.right.abs();
-        let (flip_columns, flip_rows) = (knot.right < 0, knot.down > 0);
-        let mut samples = Vec::with_capacity(n * n);
-        for row in 0..n {
-            let row = if flip_rows { last - row } else { row };
-            for column in 0..n {
-                let column = if flip_columns { last - column } else { column };
-                let (r, c) = if swap { (last - column, last - row) } else { (row, column) };
-                samples.push(self.samples[r * n + c]);
+    /// Returns the kernel of a canonical knot at another.
+    fn mirrored(&self, mirror: Mirror) -> Self {
+        Self { width: self.width, samples: mirror.restored(&self.samples, (self.width, self.width)) }
+    }
+
+    /// Returns the second moments about the middle: down twice, down and across, across twice; square pixels.
+    pub(crate) fn second_moments(&self) -> [f64; 3] {
+        let middle = (self.width / 2) as f64;
+        let mut moments = [0.0; 3];
+        for (row, line) in self.samples.chunks_exact(self.width).enumerate() {
+            let down = row as f64 - middle;
+            for (column, &sample) in line.iter().enumerate() {
+                let (across, sample) = (column as f64 - middle, f64::from(sample));
+                moments[0] += sample * down * down;
+                moments[1] += sample * down * across;
+                moments[2] += sample * across * across;
             }
         }
-        Self { width: n, samples }
+        moments
+    }
+}
+
+/// What takes the surroundings of a knot to those of its canonical knot: rows and columns turned about, then both exchanged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Mirror {
+    flips_rows: bool,
+    flips_columns: bool,
+    /// About the diagonal from lower left to upper right.
+    swaps: bool,
+}
+
+impl Mirror {
+    /// Returns the rows and columns of a block once it is mirrored.
+    pub(crate) fn size(self, (rows, columns): (usize, usize)) -> (usize, usize) {
+        if self.swaps { (columns, rows) } else { (rows, columns) }
+    }
+
+    /// Returns where the first sample of a row of a block comes to lie in the mirrored block, and by how much the next one follows.
+    pub(crate) fn line(self, row: usize, (rows, columns): (usize, usize)) -> (usize, isize) {
+        let row = if self.flips_rows { rows - 1 - row } else { row };
+        let first = if self.flips_columns { columns - 1 } else { 0 };
+        match (self.swaps, self.flips_columns) {
+            (false, false) => (row * columns + first, 1),
+            (false, true) => (row * columns + first, -1),
+            (true, false) => ((columns - 1 - first) * rows + rows - 1 - row, -(rows as isize)),
+            (true, true) => ((columns - 1 - first) * rows + rows - 1 - row, rows as isize),
+        }
+    }
+
+    /// Returns the block of so many rows and columns of which this is the mirrored one.
+    pub(crate) fn restored(self, mirrored: &[f32], size: (usize, usize)) -> Vec<f32> {
+        let mut block = Vec::with_capacity(mirrored.len());
+        for row in 0..size.0 {
+            match self.line(row, size) {
+                (first, 1) => block.extend_from_slice(&mirrored[first..][..size.1]),
+                (first, -1) => block.extend(mirrored[..=first].iter().rev().take(size.1)),
+                (first, step) if step > 0 => block.extend(mirrored[first..].iter().step_by(step as usize).take(size.1)),
+                (first, step) => {
+                    block.extend(mirrored[..=first].iter().rev().step_by(step.unsigned_abs()).take(size.1));
+                }
+            }
+        }
+        block
+    }
+
+    /// Returns the second moments of a kernel of which the canonical ones are known.
+    pub(crate) fn moments_at_knot(self, [down, mixed, across]: [f64; 3]) -> [f64; 3] {
+        let mixed = if self.flips_rows == self.flips_columns { mixed } else { -mixed };
+        if self.swaps { [across, mixed, down] } else { [down, mixed, across] }
     }
 }
 
 /// The kernels of one layer at one wavelength, at the canonical knots.
 #[derive(Clone, Debug)]
 pub(crate) struct LayerKernels {
-    symmetry: Symmetry,
+    pub(crate) symmetry: Symmetry,
     by_knot: BTreeMap<Knot, KnotKernel>,
 }
 
@@ -128,11 +194,22 @@ impl LayerKernels {
 
     /// Returns the kernel at a knot anywhere on the film: that of its canonical knot, mirrored.
     pub(crate) fn at(&self, knot: Knot) -> KnotKernel {
-        let kernel = &self.by_knot[&self.symmetry.canonical(knot)];
-        match self.symmetry {
-            Symmetry::Octants => kernel.mirrored(knot),
-            Symmetry::None => kernel.clone(),
-        }
+        self.canonical_at(knot).mirrored(self.symmetry.mirror(knot))
+    }
+
+    /// Whether the kernel at a knot is known.
+    pub(crate) fn has(&self, knot: Knot) -> bool {
+        self.by_knot.contains_key(&self.symmetry.canonical(knot))
+    }
+
+    /// Returns the samples along a side of the kernel at a knot.
+    pub(crate) fn width_at(&self, knot: Knot) -> usize {
+        self.canonical_at(knot).width
+    }
+
+    /// Returns the kernel of the canonical knot of a knot.
+    pub(crate) fn canonical_at(&self, knot: Knot) -> &KnotKernel {
+        &self.by_knot[&self.symmetry.canonical(knot)]
     }
 }
 

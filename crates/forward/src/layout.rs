@@ -24,10 +24,11 @@ use crate::{
     narrow::NarrowRule,
     occluded::{Distances, OccludedSamples},
     occlusion::{BlurredPlane, Composite, LayerAlpha},
+    patch::Cell,
     raster::LayerRaster,
     sampler::{LayerCoordinates, Surface},
     stopwatch::{Part, Stopwatch},
-    tiles::{Cell, FilmLens, Tiling, active_cells, cells_over, joined_for},
+    tiles::{FilmLens, Tiling, active_cells, cells_over, joined_for},
     work::{Progress, Work, plane_of},
 };
 

@@ -9,46 +9,21 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use dioptric_psf::{FilmMap, LensImage, PsfQuery};
 use dioptric_spectrum::{Cancel, Cancelled};
-use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
     Film, Settings,
-    geometry::FilmFrame,
+    cost::{Cost, patches_by_knots},
+    expansion::Expansion,
     knot_kernels::{KnotKernel, LayerKernels, Symmetry, edge_spread_peak},
     layers::Layers,
+    patch::{Cell, Knot, Patch},
     raster::LayerRaster,
     sampler::Sampler,
     stopwatch::{Part, Stopwatch},
     work::Work,
 };
-
-/// A point of the film at which the PSF is computed: pixels to the right of the axis and below it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Knot {
-    pub(crate) right: i32,
-    pub(crate) down: i32,
-}
-
-impl Knot {
-    /// Returns the field at the knot.
-    fn field_tan(self, map: &FilmMap, pitch_mm: f64) -> DVec2 {
-        map.field_tan(DVec2::new(f64::from(self.right), -f64::from(self.down)) * pitch_mm)
-    }
-}
-
-/// A square of the film, which may reach beyond its edges: `across` and `down` sides from the axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Cell {
-    pub(crate) down: i32,
-    pub(crate) across: i32,
-    /// Length of a side, pixels; even.
-    pub(crate) size: usize,
-}
-
-/// Cells are not halved below this size, pixels.
-const SMALLEST: usize = 16;
 
 /// Weights of three knots in a row at the middle of the second's cell.
 const AT_MIDDLE: [f64; 3] = [0.125, 0.75, 0.125];
@@ -56,62 +31,6 @@ const AT_MIDDLE: [f64; 3] = [0.125, 0.75, 0.125];
 /// From the coefficients of three knots in a row to those of the polynomials 1, u and u² − 1/12 in the second's cell,
 /// where u runs from −1/2 to 1/2.
 const TO_POLYNOMIALS: [[f64; 3]; 3] = [[1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], [-0.5, 0.0, 0.5], [0.5, -1.0, 0.5]];
-
-/// Returns the three polynomials at u, parts of a cell from its middle.
-pub(crate) fn polynomials(u: f32) -> [f32; 3] {
-    [1.0, u, u * u - 1.0 / 12.0]
-}
-
-/// The largest magnitude of each polynomial within a cell.
-pub(crate) const LARGEST: [f64; 3] = [1.0, 0.5, 1.0 / 6.0];
-
-impl Cell {
-    /// The knot of the cell, at its middle.
-    pub(crate) fn knot(&self) -> Knot {
-        let (size, half) = (self.size as i32, (self.size / 2) as i32);
-        Knot { right: self.across * size + half, down: self.down * size + half }
-    }
-
-    /// Returns the cell so many places below and to the right.
-    fn beside(&self, down: i32, across: i32) -> Self {
-        Self { down: self.down + down, across: self.across + across, size: self.size }
-    }
-
-    fn parent(&self) -> Self {
-        Self { down: self.down.div_euclid(2), across: self.across.div_euclid(2), size: 2 * self.size }
-    }
-
-    fn children(&self) -> [Self; 4] {
-        let child =
-            |down, across| Self { down: 2 * self.down + down, across: 2 * self.across + across, size: self.size / 2 };
-        [child(0, 0), child(0, 1), child(1, 0), child(1, 1)]
-    }
-
-    /// Whether it may be halved: its quarters need a knot on whole pixels.
-    fn is_divisible(&self) -> bool {
-        self.size / 2 >= SMALLEST && self.size.is_multiple_of(4)
-    }
-
-    /// The row and column of the first pixel whose center lies in the cell.
-    pub(crate) fn first_pixel(&self, frame: &FilmFrame) -> (i64, i64) {
-        let (center_row, center_column) = frame.center();
-        let size = self.size as f64;
-        (
-            (f64::from(self.down) * size + center_row).ceil() as i64,
-            (f64::from(self.across) * size + center_column).ceil() as i64,
-        )
-    }
-
-    /// Returns how far a pixel's center lies below and to the right of the middle, in parts of the cell.
-    pub(crate) fn place_of(&self, frame: &FilmFrame, row: i64, column: i64) -> (f64, f64) {
-        let (center_row, center_column) = frame.center();
-        let size = self.size as f64;
-        (
-            (row as f64 - center_row) / size - f64::from(self.down) - 0.5,
-            (column as f64 - center_column) / size - f64::from(self.across) - 0.5,
-        )
-    }
-}
 
 /// Returns the cells of a film and of a border of `pad_px` around it.
 pub(crate) fn cells_over(film: &Film, pad_px: usize, size: usize) -> Vec<Cell> {
@@ -130,14 +49,6 @@ pub(crate) fn joined_for(blur_px: f64, mut cells: Vec<Cell>) -> Vec<Cell> {
         cells = parents.into_iter().collect();
     }
     cells
-}
-
-/// A cell, and how the kernels of knots around it make up those of its samples.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Patch {
-    pub(crate) cell: Cell,
-    /// The knots that take part, each with its share of the nine products of polynomials: down × across, row by row.
-    pub(crate) shares: Vec<(Knot, [f32; 9])>,
 }
 
 /// A mesh of cells over a layer: those of one size, and halves of them where knots were added.
@@ -204,7 +115,7 @@ impl Mesh {
             }
         }
         let shares = shares.into_iter().map(|(knot, share)| (knot, share.map(|s| s as f32))).collect();
-        patches.push(Patch { cell, shares });
+        patches.push(Patch { cell, is_by_knots: false, shares });
     }
 }
 
@@ -280,6 +191,9 @@ impl Tiling {
                 probe.refine(&mut mesh, &cells, settings, work)?;
                 let mut patches = vec![];
                 cells.into_iter().for_each(|cell| mesh.patches_of(cell, &mut patches));
+                let costs = probe.costs(&patches, (mesh.size, settings.negligible_edge), work)?;
+                let by_knots = patches_by_knots(&patches, &costs, symmetry);
+                patches.iter_mut().zip(by_knots).for_each(|(patch, by_knots)| patch.is_by_knots = by_knots);
                 Ok(patches)
             })
             .collect::<Result<_, Cancelled>>()?;
@@ -364,6 +278,32 @@ impl Probe<'_> {
         }
         work.advance(cells.len() as u64);
         Ok(())
+    }
+}
+
+impl Probe<'_> {
+    /// Returns what patches take by themselves; `largest` is the size of whole cells.
+    fn costs(
+        &mut self,
+        patches: &[Patch],
+        (largest, negligible_edge): (usize, f64),
+        work: &Work<'_>,
+    ) -> Result<Vec<Cost>, Cancelled> {
+        let known = LayerKernels::new(self.symmetry, std::mem::take(&mut self.kernels));
+        let cost = |patch: &Patch| -> Result<Cost, Cancelled> {
+            if patch.shares.iter().all(|(knot, _)| known.has(*knot)) {
+                let kernels = patch.shares.iter().map(|(knot, _)| (*knot, known.at(*knot))).collect();
+                return Ok(Expansion::of(patch, &kernels, negligible_edge, work.cancel())?.cost());
+            }
+            // Knots of the smallest cells are not known yet: as wide as that of a cell around it, and changing in all ways.
+            let around = std::iter::successors(Some(patch.cell), |cell| (cell.size < largest).then(|| cell.parent()));
+            let width =
+                around.map(|cell| cell.knot()).find(|knot| known.has(*knot)).map_or(1, |knot| known.width_at(knot));
+            Ok(Cost { n_terms: 9, n_across: 3, width })
+        };
+        let costs = patches.par_iter().map(cost).collect();
+        self.kernels = known.into_kernels();
+        costs
     }
 }
 
@@ -458,6 +398,7 @@ fn layers_in(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{geometry::FilmFrame, patch::polynomials};
 
     #[test]
     fn cells_cover_the_film_and_its_border_once() {

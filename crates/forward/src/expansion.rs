@@ -1,0 +1,71 @@
+//! The kernel over a patch as a polynomial of the place.
+
+use std::collections::BTreeMap;
+
+use dioptric_spectrum::{Cancel, Cancelled};
+
+use crate::{
+    cost::Cost,
+    knot_kernels::{KnotKernel, edge_spread_peak},
+    patch::{Knot, LARGEST, Patch},
+};
+
+/// The kernel over a cell: a sum of squares of samples, each times a polynomial down and one across the cell.
+pub(crate) struct Expansion {
+    pub(crate) width: usize,
+    pub(crate) terms: Vec<Term>,
+}
+
+pub(crate) struct Term {
+    /// Numbers of the polynomials.
+    pub(crate) down: usize,
+    pub(crate) across: usize,
+    pub(crate) samples: Vec<f32>,
+}
+
+impl Expansion {
+    /// Takes the kernels at the patch's knots. A term that changes no edge by more than `negligible_edge` is left out.
+    pub(crate) fn of(
+        patch: &Patch,
+        kernels: &BTreeMap<Knot, KnotKernel>,
+        negligible_edge: f64,
+        cancel: &Cancel,
+    ) -> Result<Self, Cancelled> {
+        let width = patch.shares.iter().map(|(knot, _)| kernels[knot].width).max().unwrap_or(1);
+        let mut terms = vec![];
+        for product in 0..9 {
+            cancel.check()?;
+            let (down, across) = (product / 3, product % 3);
+            let mut samples = vec![0.0; width * width];
+            for (knot, shares) in patch.shares.iter().filter(|(_, shares)| shares[product] != 0.0) {
+                kernels[knot].add_to(&mut samples, width, shares[product]);
+            }
+            let largest = LARGEST[down] * LARGEST[across];
+            if product == 0 || largest * edge_spread_peak(&samples, width) > negligible_edge {
+                terms.push(Term { down, across, samples });
+            }
+        }
+        Ok(Self { width, terms })
+    }
+
+    /// The number of polynomials across the cell.
+    pub(crate) fn n_across(&self) -> usize {
+        1 + self.terms.iter().map(|term| term.across).max().unwrap_or(0)
+    }
+
+    /// What it takes to spread a patch by it.
+    pub(crate) fn cost(&self) -> Cost {
+        Cost { n_terms: self.terms.len(), n_across: self.n_across(), width: self.width }
+    }
+
+    /// Returns the kernel at a place down the cell, for each polynomial across it.
+    pub(crate) fn at_row(&self, down: &[f32; 3], kernels: &mut [f32]) {
+        kernels.fill(0.0);
+        let n = self.width * self.width;
+        for term in &self.terms {
+            let factor = down[term.down];
+            let kernel = &mut kernels[term.across * n..][..n];
+            kernel.iter_mut().zip(&term.samples).for_each(|(kernel, sample)| *kernel += factor * sample);
+        }
+    }
+}
