@@ -154,7 +154,7 @@ fn check_way(index_at: &dyn Fn(f64) -> f64, (end_nm, nm): (f64, f64), possible_e
     if let Some((nm, _)) = way.iter().find(|(_, index)| !(*index >= 1.0 && index.is_finite())) {
         return Err(format!("its continuation has no index of at least 1 at {nm:.1} nm"));
     }
-    if !(possible_error <= MOST_ERROR) {
+    if possible_error.is_nan() || possible_error > MOST_ERROR {
         return Err(format!("its index could be off by {possible_error:.1e} there, more than {MOST_ERROR}"));
     }
     // Clear media disperse normally: the index falls as the wavelength grows.

@@ -43,10 +43,12 @@ pub(super) fn write_page(page: &Page<'_>, pictures: &Pictures) -> String {
     let report = page.report;
     let name = escaped(&report.camera.name);
     let head = [&report.lens.lens, &report.sensor.sensor, &report.scene.name].map(|words| escaped(words)).join(" · ");
+    // A picture of few pixels is shown larger, so that they can be seen.
+    let small = if report.film.columns < 240 { " class=\"small\"" } else { "" };
     let body = [
         format!(
             "<section class=\"picture\"><a href=\"picture.png\" title=\"every pixel\"><img src=\"{}\" alt=\"The picture\" \
-             width=\"{}\" height=\"{}\"></a></section>\n",
+             width=\"{}\" height=\"{}\"{small}></a></section>\n",
             pictures.picture, report.film.columns, report.film.rows
         ),
         section("At a glance", &glance(report)),
