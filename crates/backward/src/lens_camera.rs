@@ -309,9 +309,9 @@ fn is_achromatic(lens: &Lens, wavelengths_nm: &[f64]) -> Result<bool, BackwardEr
     }
     let media = lens.interfaces().iter().map(|interface| &interface.medium_after);
     for medium in media.chain([lens.object_medium()]) {
-        let first = medium.index_at(wavelengths_nm[0])?;
+        let first = lens.index_in(medium, wavelengths_nm[0])?;
         for &nm in wavelengths_nm {
-            if medium.index_at(nm)? != first {
+            if lens.index_in(medium, nm)? != first {
                 return Ok(false);
             }
         }

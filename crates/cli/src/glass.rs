@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use dioptric_analysis::{GlassRow, glass_data, glass_rows};
+use dioptric_pipeline::GlassRange;
 
 use crate::{
     args::Common,
@@ -16,7 +17,9 @@ const USUAL_NM: [f64; 7] = [400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0];
 pub(crate) fn run(command: &GlassCommand, common: &Common) -> anyhow::Result<()> {
     match command {
         GlassCommand::List { filter } => list(filter.as_deref(), common),
-        GlassCommand::Show { name, bands } => show(name, bands, common),
+        GlassCommand::Show { name, bands, glass_range } => {
+            show(name, bands, glass_range.map(GlassRange::from).unwrap_or_default(), common)
+        }
     }
 }
 
@@ -37,8 +40,8 @@ fn list(filter: Option<&str>, common: &Common) -> anyhow::Result<()> {
     print(&text)
 }
 
-fn show(name: &str, bands: &BandArgs, common: &Common) -> anyhow::Result<()> {
-    let data = glass_data(name, &bands.nm()?.unwrap_or(USUAL_NM.to_vec()))?;
+fn show(name: &str, bands: &BandArgs, glass_range: GlassRange, common: &Common) -> anyhow::Result<()> {
+    let data = glass_data(name, &bands.nm()?.unwrap_or(USUAL_NM.to_vec()), glass_range)?;
     if common.json {
         return print_json(&data);
     }
@@ -46,10 +49,16 @@ fn show(name: &str, bands: &BandArgs, common: &Common) -> anyhow::Result<()> {
     if let (Some(nd), Some(vd)) = (data.glass.nd, data.glass.vd) {
         writeln!(text, "n_d {nd:.6}   V_d {vd:.3}")?;
     }
-    writeln!(text, "\n{:>14} {:>12} {:>14}", "wavelength nm", "index", "through 10 mm")?;
+    let is_extended = data.possible_errors.iter().any(|error| *error > 0.0);
+    let last = if is_extended { "  may be off by" } else { "" };
+    writeln!(text, "\n{:>14} {:>12} {:>14}{last}", "wavelength nm", "index", "through 10 mm")?;
     for (i, (wavelength_nm, index)) in data.wavelengths_nm.iter().zip(&data.indices).enumerate() {
         let through = data.transmittances_10_mm[i].map_or("–".to_owned(), |share| format!("{share:.4}"));
-        writeln!(text, "{wavelength_nm:>14} {index:>12.7} {through:>14}")?;
+        let off = match data.possible_errors[i] {
+            error if error > 0.0 => format!(" {error:>14.1e}"),
+            _ => String::new(),
+        };
+        writeln!(text, "{wavelength_nm:>14} {index:>12.7} {through:>14}{off}")?;
     }
     print(&text)
 }

@@ -110,6 +110,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     };
     let wavelength_nm = nearest_to_reference_nm(&wavelengths_nm);
     let used = arguments.lens.state.apply(used, wavelength_nm, common)?;
+    tell(&used.lens.notes_on_glass_range(&wavelengths_nm), common);
     let lens = &used.lens;
     let ends = |ends: (f64, f64), nm: &f64| (ends.0.min(*nm), ends.1.max(*nm));
     let (first_nm, last_nm) = wavelengths_nm.iter().fold((f64::INFINITY, 0.0), ends);
@@ -252,6 +253,7 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     tell_taken(&taken, common);
     let wavelength_nm = wavelengths_nm.first().copied().unwrap_or(REFERENCE_WAVELENGTH_NM);
     let used = arguments.lens.state.apply(used, wavelength_nm, common)?;
+    tell(&used.lens.notes_on_glass_range(&wavelengths_nm), common);
     let film_distance_mm = match (arguments.film.focus_mm, arguments.film.film_mm) {
         (Some(focus_mm), _) => {
             let mono = used.lens.at(wavelength_nm)?;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use dioptric_analysis::LensDefaults;
-use dioptric_pipeline::{FocusSpec, LensReadOptions, MissingGlass, SeqNumbers, StopSpec, parse_numbers};
+use dioptric_pipeline::{FocusSpec, GlassRange, LensReadOptions, MissingGlass, SeqNumbers, StopSpec, parse_numbers};
 
 use crate::{common::Common, movement_args::MovementArgs, terminal::remark};
 
@@ -133,6 +133,9 @@ pub(crate) struct LensReadingArgs {
     /// What to do with a glass that no catalogue has [default: refuse]
     #[arg(long, value_enum)]
     pub(crate) missing_glass: Option<MissingGlassArg>,
+    /// What becomes of a wavelength outside the range in which a glass is known [default: refuse]
+    #[arg(long, value_enum)]
+    pub(crate) glass_range: Option<GlassRangeArg>,
     /// Change of index a nm, about 550 nm, of media with one stated index, as .dat files have (the paper: -0.000133)
     #[arg(long, value_name = "S")]
     pub(crate) slope_per_nm: Option<f64>,
@@ -164,6 +167,24 @@ pub(crate) enum MissingGlassArg {
     Nearest,
 }
 
+/// What becomes of a wavelength outside the range in which a glass is known.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum GlassRangeArg {
+    /// Refuse it
+    Refuse,
+    /// Continue the glass, and state the possible error of its index
+    Extend,
+}
+
+impl From<GlassRangeArg> for GlassRange {
+    fn from(argument: GlassRangeArg) -> Self {
+        match argument {
+            GlassRangeArg::Refuse => Self::Refuse,
+            GlassRangeArg::Extend => Self::Extend,
+        }
+    }
+}
+
 impl LensReadingArgs {
     pub(crate) fn reading(&self) -> LensReadOptions {
         let mut reading = LensReadOptions::default();
@@ -183,6 +204,7 @@ impl LensReadingArgs {
                 MissingGlassArg::Nearest => MissingGlass::Nearest,
             };
         }
+        reading.glass_range = self.glass_range.map_or(reading.glass_range, GlassRange::from);
         if let Some(numbers) = self.seq_numbers {
             reading.seq_numbers = Some(match numbers {
                 SeqNumbersArg::Radii => SeqNumbers::Radii,
@@ -273,5 +295,8 @@ pub(crate) enum GlassCommand {
         name: String,
         #[command(flatten)]
         bands: BandArgs,
+        /// What becomes of a wavelength outside the range in which the glass is known [default: refuse]
+        #[arg(long, value_enum)]
+        glass_range: Option<GlassRangeArg>,
     },
 }

@@ -9,7 +9,7 @@ use dioptric_report::{PsfFormat, chart_svg, psf_page, write_drawing, write_psfs}
 
 use crate::{
     args::{BankKind, Common, PsfArgs, PsfMode},
-    lens::{list_of, tell_taken},
+    lens::{list_of, tell, tell_taken},
     run::{diffraction, with_gamma},
     terminal::{Bar, fixed, guarded, print, print_json, remark, remark_on_png},
 };
@@ -47,6 +47,8 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     };
     let reference_nm = request.reference_nm(&used.lens)?;
     let lens = arguments.lens.state.apply(used, reference_nm, common)?.lens;
+    let notes = lens.notes_on_glass_range(&request.wavelengths_nm);
+    tell(&notes, common);
     // The place is tried before the work.
     let format = arguments.output.as_deref().map(PsfFormat::of).transpose()?;
     let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
@@ -77,7 +79,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
             write_drawing(&svg, staged.path(), name, PNG_SCALE)?;
             std::fs::write(staged.path().join(format!("{name}.csv")), chart.to_csv())?;
         }
-        let page = psf_page(&set, lens.name(), &charts, &table(&set, &rows)?)?;
+        let page = psf_page(&set, lens.name(), &charts, &(table(&set, &rows)? + &lines(&notes)))?;
         std::fs::write(staged.path().join("report.html"), page)?;
         staged.commit()?;
         remark(common.quiet, &format!("wrote plots into {}", folder.display()));
@@ -147,6 +149,10 @@ fn with_polychromatic(set: &PsfSet, mtf_per_mm: &[f64]) -> Vec<PsfRow> {
         rows.insert(after, row);
     }
     rows
+}
+
+fn lines(notes: &[String]) -> String {
+    notes.iter().map(|note| format!("\n{note}\n")).collect()
 }
 
 fn bank(kind: Option<BankKind>, error: Option<f64>) -> Option<BankSpec> {

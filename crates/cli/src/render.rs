@@ -251,7 +251,7 @@ fn finish(
     kept.write_resume_file(&capture, staged.path())?;
     staged.commit()?;
     remove_preview(out);
-    tell(&capture.lens.notes, common);
+    tell(&capture.lens_notes(), common);
     if common.json {
         return print_json(&report);
     }

@@ -55,7 +55,7 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     staged.commit()?;
     let total_s = clock.total_s();
     drop(clock);
-    tell(&capture.lens.notes, common);
+    tell(&report.lens_notes, common);
     tell(&report.sensor.notes, common);
     tell(&report.scene.notes, common);
     if report.film.dark_fraction > LEAST_DARK {

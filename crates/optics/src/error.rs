@@ -6,7 +6,7 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OpticsError {
     /// A wavelength at which a glass is not known.
-    #[error("{glass} is known from {first_nm} to {last_nm} nm, not at {wavelength_nm} nm")]
+    #[error("{glass} is known from {first_nm} to {last_nm} nm, not at {wavelength_nm} nm{remedy}")]
     WavelengthOutsideGlass {
         /// The glass, in words.
         glass: String,
@@ -16,6 +16,18 @@ pub enum OpticsError {
         first_nm: f64,
         /// Longest wavelength known, nm.
         last_nm: f64,
+        /// What to do about it; nothing of a glass that cannot be continued.
+        remedy: &'static str,
+    },
+    /// A wavelength to which a glass cannot be continued.
+    #[error("{glass} cannot be continued to {wavelength_nm} nm: {reason}")]
+    NotExtended {
+        /// The glass, in words.
+        glass: String,
+        /// The wavelength asked for, nm.
+        wavelength_nm: f64,
+        /// Why not.
+        reason: String,
     },
     /// A wavelength that is not a positive number.
     #[error("a wavelength must be a positive number, found {wavelength_nm} nm")]
@@ -257,7 +269,8 @@ impl OpticsError {
     /// Returns the error of a glass with the surface that it lies behind, where its description alone does not tell it from
     /// others.
     pub(crate) fn behind_surface(mut self, surface: usize) -> Self {
-        if let Self::WavelengthOutsideGlass { glass, .. } | Self::Index { glass, .. } = &mut self
+        if let Self::WavelengthOutsideGlass { glass, .. } | Self::NotExtended { glass, .. } | Self::Index { glass, .. } =
+            &mut self
             && glass.starts_with("a ")
         {
             *glass = format!("{glass} behind surface {surface}");

@@ -1,6 +1,7 @@
 //! Media and their refractive index as a function of wavelength.
 
 mod catalogue;
+mod extend;
 mod formula;
 
 use serde::{Deserialize, Serialize};
@@ -8,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Air, OpticsError};
 
 pub use self::catalogue::{CatalogueGlass, GlassCatalogue};
+pub use self::extend::{ExtendedIndex, GlassRange};
 use self::formula::formula_index;
 
 /// The helium d line, at which catalogues state the main index, nm.
@@ -28,7 +30,7 @@ const ND_VD_RANGE_NM: (f64, f64) = (300.0, 2500.0);
 /// itself changes with its temperature is not taken into account.
 ///
 /// The formulas take vacuum wavelengths. A range, where one is stated, is where the index is known; asking beyond
-/// it is an error, never an extrapolation.
+/// it is an error, unless one asks for a continuation ([`Glass::extended_at`]).
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Glass {
@@ -130,6 +132,7 @@ impl Glass {
                 wavelength_nm,
                 first_nm,
                 last_nm,
+                remedy: self.remedy(),
             });
         }
         let found = self.index_unchecked(wavelength_nm);

@@ -1,11 +1,13 @@
 //! A lens: surfaces in a row, one of them the stop.
 
 mod changes;
+mod media;
 
 use glam::DVec2;
 
 use crate::{
-    Aperture, CoordinateBreak, DiffractiveSurface, Glass, Interface, OpticsError, Placement, Shape, Surface, placement,
+    Aperture, CoordinateBreak, DiffractiveSurface, Glass, GlassRange, Interface, OpticsError, Placement, Shape,
+    Surface, placement,
 };
 
 pub use self::changes::SurfaceChange;
@@ -27,6 +29,7 @@ pub struct Lens {
     mirrors: Vec<usize>,
     diffractive: Vec<DiffractiveSurface>,
     image_surface: ImageSurface,
+    glass_range: GlassRange,
 }
 
 /// The shape of the film: a conic with its vertex on the axis. As it stands by default, it is a plane.
@@ -113,6 +116,7 @@ impl Lens {
             mirrors: Vec::new(),
             diffractive: Vec::new(),
             image_surface: ImageSurface::default(),
+            glass_range: GlassRange::default(),
         })
     }
 
@@ -260,6 +264,7 @@ impl Lens {
             .with_mirrors(self.mirrors.clone())?
             .with_diffractive(self.diffractive.clone())?
             .with_moves(self.moves.iter().map(to_film).collect())?
+            .with_glass_range(self.glass_range)
             .with_image_surface(self.image_surface)
     }
 

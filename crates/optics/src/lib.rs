@@ -51,7 +51,7 @@ pub use film_site::FilmSite;
 pub use formats::{Configuration, Field, LensFile, Microlens, MissingGlass, ReadOptions, SeqNumbers};
 pub use frame::{FilmPoint, StopPoint};
 pub use glam;
-pub use glass::{C_LINE_NM, CatalogueGlass, D_LINE_NM, F_LINE_NM, Glass, GlassCatalogue};
+pub use glass::{C_LINE_NM, CatalogueGlass, D_LINE_NM, ExtendedIndex, F_LINE_NM, Glass, GlassCatalogue, GlassRange};
 pub use layout::{Layout, wavelength_color};
 pub use lens::{ImageSurface, Lens, SurfaceChange};
 pub use library::IdealLens;

@@ -86,7 +86,9 @@ impl Lens {
         let phase = |phase: &DiffractiveSurface| DiffractiveSurface { surface: now(phase.surface), ..phase.clone() };
         let lens = lens.with_object_medium(self.object_medium().clone())?;
         let lens = lens.with_diffractive(self.diffractive().iter().map(phase).collect())?;
-        lens.with_mirrors(self.mirrors().iter().map(|&mirror| now(mirror)))?.with_image_surface(self.image_surface())
+        lens.with_mirrors(self.mirrors().iter().map(|&mirror| now(mirror)))?
+            .with_glass_range(self.glass_range())
+            .with_image_surface(self.image_surface())
     }
 }
 

@@ -91,12 +91,12 @@ impl Placed {
 
 impl MonoLens {
     pub(crate) fn new(lens: &Lens, wavelength_nm: f64) -> Result<Self, OpticsError> {
-        let (mut steps, mut index_before) = (Vec::new(), lens.object_medium().index_at(wavelength_nm)?);
+        let (mut steps, mut index_before) = (Vec::new(), lens.index_in(lens.object_medium(), wavelength_nm)?);
         let (vertices_z_mm, n_surfaces) = (lens.vertices_z_mm(), lens.interfaces().len());
         let (mut vertex_z, mut before_z_mm) = (0.0, 0.0);
         for (i, interface) in lens.interfaces().iter().enumerate() {
             let index_after =
-                interface.medium_after.index_at(wavelength_nm).map_err(|error| error.behind_surface(i))?;
+                lens.index_in(&interface.medium_after, wavelength_nm).map_err(|error| error.behind_surface(i))?;
             let (is_backward, is_mirror) = (lens.is_backward_before(i), lens.is_mirror(i));
             let as_met = is_backward.then(|| interface.surface.flipped());
             let surface = as_met.as_ref().unwrap_or(&interface.surface);
@@ -616,8 +616,8 @@ impl Lens {
                 phase.surface.checked_sub(1).map_or(self.object_medium(), |i| &self.interfaces()[i].medium_after);
             let after = &self.interfaces()[phase.surface].medium_after;
             let step = |nm: f64| match self.is_mirror(phase.surface) {
-                true => Ok::<f64, OpticsError>(2.0 * before.index_at(nm)?),
-                false => Ok(after.index_at(nm)? - before.index_at(nm)?),
+                true => Ok::<f64, OpticsError>(2.0 * self.index_in(before, nm)?),
+                false => Ok(self.index_in(after, nm)? - self.index_in(before, nm)?),
             };
             let (now, design) = (step(wavelength_nm)?, step(blaze.design_nm)?);
             let dispersion = if after == before && !self.is_mirror(phase.surface) { 1.0 } else { now / design };

@@ -29,7 +29,7 @@ mod stages;
 mod words;
 
 pub use dioptric_backward::{BandSampling, LightPaths, MicroArray, MicroElements, MicroLayout, Renderer, Rendering};
-pub use dioptric_optics::{MissingGlass, SeqNumbers, SurfaceChange};
+pub use dioptric_optics::{GlassRange, MissingGlass, SeqNumbers, SurfaceChange};
 pub use dioptric_psf::Diffraction;
 pub use dioptric_scene::{ExrSamples, FillDepth};
 

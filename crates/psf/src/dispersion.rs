@@ -24,7 +24,7 @@ impl Dispersion {
     /// Returns the measure at a wavelength for which the lens has indices.
     pub(crate) fn coordinate(&self, wavelength_nm: f64) -> f64 {
         let index_sum = self.lens.as_ref().and_then(|lens| {
-            let indices = lens.interfaces().iter().map(|i| i.medium_after.index_at(wavelength_nm).ok());
+            let indices = lens.interfaces().iter().map(|i| lens.index_in(&i.medium_after, wavelength_nm).ok());
             indices.sum::<Option<f64>>()
         });
         index_sum.unwrap_or(1e6 / (wavelength_nm * wavelength_nm))

@@ -11,8 +11,8 @@ use dioptric_analysis::{
 };
 use dioptric_optics::{Layout, LensFile, MonoLens, ReadOptions, Vignetting};
 use dioptric_pipeline::{
-    Camera, Diffraction, FocusSpec, Given, KeptCamera, LensReadOptions, LensSpec, MissingGlass, PipelineError,
-    REFERENCE_WAVELENGTH_NM, StopSpec,
+    Camera, Diffraction, FocusSpec, Given, GlassRange, KeptCamera, LensReadOptions, LensSpec, MissingGlass,
+    PipelineError, REFERENCE_WAVELENGTH_NM, StopSpec,
 };
 use ndarray::{ArrayD, IxDyn};
 use pyo3::{
@@ -116,6 +116,15 @@ impl Lens {
     }
 }
 
+/// Returns what a word means for wavelengths outside the range in which a glass is known.
+fn range_of(glass_range: &str) -> PyResult<GlassRange> {
+    match glass_range {
+        "refuse" => Ok(GlassRange::Refuse),
+        "extend" => Ok(GlassRange::Extend),
+        other => Err(wrong("glass_range", format!("'{other}'"), "'refuse' or 'extend'")),
+    }
+}
+
 #[pymethods]
 impl Lens {
     /// Returns the names of the built-in lenses.
@@ -147,17 +156,21 @@ impl Lens {
     ///     Glass catalogues (``.agf``, ``.yml``) to look in before the built-in one.
     /// missing_glass : {"refuse", "nd-vd", "nearest"}
     ///     What to do with a glass that no catalogue has.
+    /// glass_range : {"refuse", "extend"}
+    ///     What becomes of a wavelength outside the range in which a glass is known: an error, or the glass is continued
+    ///     and `notes_at` states how far its index may be off.
     /// slope_per_nm : float, optional
     ///     Change of index a nanometre of media of which the file states one index alone.
     /// configuration : int, optional
     ///     Which configuration of a file that has several, as the positions of a zoom lens, counted from 1; without it the one that the file
     ///     has in use.
     #[staticmethod]
-    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", slope_per_nm=None, configuration=None))]
+    #[pyo3(signature = (path, *, glasses=None, missing_glass="refuse", glass_range="refuse", slope_per_nm=None, configuration=None))]
     fn read(
         path: PathBuf,
         glasses: Option<Vec<PathBuf>>,
         missing_glass: &str,
+        glass_range: &str,
         slope_per_nm: Option<f64>,
         configuration: Option<usize>,
     ) -> PyResult<Self> {
@@ -167,9 +180,16 @@ impl Lens {
             "nearest" => MissingGlass::Nearest,
             other => return Err(wrong("missing_glass", format!("'{other}'"), "'refuse', 'nd-vd' or 'nearest'")),
         };
+        let glass_range = range_of(glass_range)?;
         let glasses = glasses.unwrap_or_default();
-        let reading =
-            LensReadOptions { glasses, missing_glass, slope_per_nm, configuration, ..LensReadOptions::default() };
+        let reading = LensReadOptions {
+            glasses,
+            missing_glass,
+            glass_range,
+            slope_per_nm,
+            configuration,
+            ..LensReadOptions::default()
+        };
         guarded(|| Self::of_choice(LensSpec::File(path), reading))
     }
 
@@ -205,6 +225,29 @@ impl Lens {
     #[staticmethod]
     fn pinhole(diameter_mm: f64) -> PyResult<Self> {
         guarded(|| Self::of_choice(LensSpec::Pinhole { diameter_mm }, LensReadOptions::default()))
+    }
+
+    /// Returns the lens with wavelengths outside the range in which a glass is known refused ("refuse") or its glasses
+    /// continued ("extend"); `notes_at` states how far an index may be off.
+    fn with_glass_range(&self, glass_range: &str) -> PyResult<Self> {
+        let glass_range = range_of(glass_range)?;
+        let lens = self.file.lens.clone().with_glass_range(glass_range);
+        let of_range = |(lens, reading): &(LensSpec, LensReadOptions)| {
+            (lens.clone(), LensReadOptions { glass_range, ..reading.clone() })
+        };
+        Ok(Self {
+            file: LensFile { lens, ..self.file.clone() },
+            choice: self.choice.as_ref().map(of_range),
+            stop: self.stop,
+            mono: Mutex::default(),
+        })
+    }
+
+    /// Returns what is to be said of the lens at these wavelengths, a list of sentences: `notes`, and which glasses are
+    /// continued beyond the range in which they are known.
+    fn notes_at(&self, wavelengths_nm: Vec<f64>) -> Vec<String> {
+        let of_glasses = self.file.lens.notes_on_glass_range(&wavelengths_nm);
+        self.file.notes.iter().cloned().chain(of_glasses).collect()
     }
 
     /// Returns the lens with its stop set: to an f-number (for a far object at 550 nm) or to a diameter in mm.

@@ -158,6 +158,22 @@ def test_lens_is_read_written_and_sent(gauss: dp.Lens, tmp_path: Path) -> None:
     assert dp.Lens.parse(wide.to_ron()) == wide != gauss
 
 
+def test_glasses_go_on_beyond_their_tables_where_asked() -> None:
+    text = """(name: "ball", source: "test", surfaces: [
+        (stop: true, radius_mm: 20.0, semi_aperture_mm: 5.0, medium: Named("SCHOTT:N-BK7"), thickness_mm: 5.0),
+        (radius_mm: -20.0, semi_aperture_mm: 5.0, thickness_mm: 0.0)])"""
+    lens = dp.Lens.parse(text)
+    with pytest.raises(ValueError, match="known from 300 to 2500 nm, not at 290 nm; --glass-range extend"):
+        lens.info([290])
+    extended = lens.with_glass_range("extend")
+    assert extended.info([290])[0]["first_order"]["efl_mm"] < lens.info([300])[0]["first_order"]["efl_mm"]
+    assert lens.notes_at([290]) == extended.notes_at([550]) == []
+    (note,) = extended.notes_at([290])
+    assert note.startswith("the glass SCHOTT:N-BK7 is known from 300 to 2500 nm and continued: at 290 nm")
+    with pytest.raises(ValueError, match="expected 'refuse' or 'extend'"):
+        lens.with_glass_range("far")
+
+
 def test_lists_name_every_lens() -> None:
     rows = dp.Lens.library()
     assert [row["name"] for row in rows] == dp.Lens.names()

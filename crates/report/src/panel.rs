@@ -44,6 +44,8 @@ pub(crate) enum MarkKind {
 /// A sheet that plots are put on.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sheet {
+    /// What it shows, for those who cannot see it.
+    pub(crate) title: String,
     body: String,
 }
 
@@ -67,7 +69,8 @@ impl Sheet {
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
              viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"{FONT}\">\n\
-             <rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n{}</svg>\n",
+             <title>{}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n{}</svg>\n",
+            escaped(&self.title),
             self.body
         )
     }
@@ -185,7 +188,7 @@ impl Mark {
 }
 
 pub(crate) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -36,7 +36,8 @@ pub fn chart_svg(chart: &LineChart, width_px: f64, height_px: f64) -> String {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width_px:.0}\" height=\"{height_px:.0}\" \
          viewBox=\"0 0 {width_px:.0} {height_px:.0}\" font-family=\"{FONT}\" font-size=\"{WORD_PX}\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n"
+         <title>{}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
+        escaped(&chart.title)
     );
     frame.draw(chart, &mut svg);
     legend.draw(&places, &mut svg);

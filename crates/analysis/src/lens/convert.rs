@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use dioptric_optics::D_LINE_NM;
 use dioptric_pipeline::{LensReadOptions, LensSpec, PipelineError};
 
 /// A lens in the format of another file.
@@ -34,6 +35,13 @@ pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Re
         file = file.of_one_configuration();
     }
     notes.extend(file.left_out(&extension));
+    // These two alone hold indices instead of glasses.
+    let written_nm = match extension.as_str() {
+        "dat" => vec![file.reference_wavelength_nm.unwrap_or(D_LINE_NM)],
+        "json" => (0..=30).map(|step| 400.0 + 10.0 * f64::from(step)).collect(),
+        _ => Vec::new(),
+    };
+    notes.extend(file.lens.notes_on_glass_range(&written_nm));
     let (text, glasses) = match extension.as_str() {
         "ron" => (file.to_ron(), None),
         "dat" => (file.to_dat()?, None),

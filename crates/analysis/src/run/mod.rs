@@ -36,6 +36,9 @@ pub struct RunReport {
     pub camera: Camera,
     /// The lens, at the reference wavelength and the distance in focus.
     pub lens: LensData,
+    /// What is to be said of it, a sentence each ([`Capture::lens_notes`](dioptric_pipeline::Capture::lens_notes)).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lens_notes: Vec<String>,
     /// Distance of the film behind the last vertex, mm.
     #[serde(rename = "film_mm")]
     pub film_distance_mm: f64,
@@ -184,6 +187,7 @@ impl RunReport {
             dioptric: env!("CARGO_PKG_VERSION"),
             camera: capture.camera.clone(),
             lens: optics.lens,
+            lens_notes: capture.lens_notes(),
             film_distance_mm: place.film_distance_mm,
             film: FilmData {
                 columns: place.columns,

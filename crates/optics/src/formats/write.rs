@@ -4,7 +4,7 @@ use std::{fmt::Write as _, fs, path::Path};
 
 use serde_json::{Value, json};
 
-use crate::{Glass, Interface, Lens, OpticsError, Placement, Shape, Surface, glass::D_LINE_NM};
+use crate::{Glass, Lens, OpticsError, Placement, Shape, Surface, glass::D_LINE_NM};
 
 use super::{
     lens_file::{Field, LensFile, Microlens},
@@ -80,7 +80,7 @@ impl LensFile {
                 (false, false) if surface.shape == Shape::Sphere => reciprocal(surface.curvature_per_mm),
                 (false, false) => return Err(cannot(FORMAT, i, "is not a sphere")),
             };
-            let index = interface.medium_after.index_at(wavelength_nm)?;
+            let index = lens.index_in(&interface.medium_after, wavelength_nm)?;
             let (thickness_mm, diameter_mm) = (interface.thickness_after_mm, 2.0 * surface.semi_aperture_mm);
             let _ = writeln!(text, "{radius_mm}\t{thickness_mm}\t{index}\t{diameter_mm}");
         }
@@ -254,8 +254,8 @@ fn first_moved(lens: &Lens) -> Option<usize> {
 
 fn omni_rows(lens: &Lens, wavelengths_nm: &[f64]) -> Result<Vec<Value>, OpticsError> {
     let (placements, vertices_z_mm) = (lens.placements(), lens.vertices_z_mm());
-    let row = |(i, interface): (usize, &Interface)| {
-        let mut row = omni_row(i, i == lens.stop(), interface, wavelengths_nm)?;
+    let row = |i: usize| {
+        let mut row = omni_row(lens, i, wavelengths_nm)?;
         let Placement { vertex_mm, rotation } = placements[i];
         if placements[i] != Placement::centered(vertices_z_mm[i]) {
             let shift_mm = vertex_mm - Placement::centered(vertices_z_mm[i]).vertex_mm;
@@ -264,13 +264,14 @@ fn omni_rows(lens: &Lens, wavelengths_nm: &[f64]) -> Result<Vec<Value>, OpticsEr
         }
         Ok(row)
     };
-    lens.interfaces().iter().enumerate().map(row).collect()
+    (0..lens.interfaces().len()).map(row).collect()
 }
 
 /// Stands for infinity where a biconic is flat along one axis: 1 m off its axis it sags by 5e-13 mm.
 const PLANE_RADIUS_MM: f64 = 1e18;
 
-fn omni_row(i: usize, is_stop: bool, interface: &Interface, wavelengths_nm: &[f64]) -> Result<Value, OpticsError> {
+fn omni_row(lens: &Lens, i: usize, wavelengths_nm: &[f64]) -> Result<Value, OpticsError> {
+    let (interface, is_stop) = (&lens.interfaces()[i], i == lens.stop());
     let surface = &interface.surface;
     let radius = match (is_plane(surface), is_stop) {
         (true, true) => json!(0.0),
@@ -281,7 +282,8 @@ fn omni_row(i: usize, is_stop: bool, interface: &Interface, wavelengths_nm: &[f6
     let ior = match medium {
         Glass::Air | Glass::Constant { .. } => json!(medium.index_at(D_LINE_NM)?),
         _ => {
-            let indices = wavelengths_nm.iter().map(|&nm| medium.index_at(nm)).collect::<Result<Vec<f64>, _>>()?;
+            let indices =
+                wavelengths_nm.iter().map(|&nm| lens.index_in(medium, nm)).collect::<Result<Vec<f64>, _>>()?;
             json!([wavelengths_nm, indices])
         }
     };

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use dioptric_optics::{
-    GlassCatalogue, IdealLens, Lens, LensFile, MissingGlass, ReadOptions, SeqNumbers, SurfaceChange,
+    GlassCatalogue, GlassRange, IdealLens, Lens, LensFile, MissingGlass, ReadOptions, SeqNumbers, SurfaceChange,
 };
 use dioptric_sensor::Sensor;
 use serde::{Deserialize, Serialize};
@@ -96,11 +96,12 @@ impl LensSpec {
         if let (Some(number), false) = (reading.configuration, matches!(self, Self::File(_))) {
             file = file.with_configuration(number)?;
         }
-        if let Some(slope_per_nm) = reading.slope_per_nm {
-            let lenses = file.configurations.iter_mut().map(|configuration| &mut configuration.lens);
-            for lens in lenses.chain([&mut file.lens]) {
+        let lenses = file.configurations.iter_mut().map(|configuration| &mut configuration.lens);
+        for lens in lenses.chain([&mut file.lens]) {
+            if let Some(slope_per_nm) = reading.slope_per_nm {
                 *lens = lens.with_linear_dispersion(slope_per_nm, REFERENCE_WAVELENGTH_NM)?;
             }
+            *lens = lens.clone().with_glass_range(reading.glass_range);
         }
         Ok(file)
     }
@@ -168,6 +169,8 @@ pub struct LensReadOptions {
     pub glasses: Vec<PathBuf>,
     /// What to do with a glass that no catalogue has.
     pub missing_glass: MissingGlass,
+    /// What becomes of a wavelength outside the range in which a glass is known.
+    pub glass_range: GlassRange,
     /// The change of index a nanometre, about [`REFERENCE_WAVELENGTH_NM`], of the media of which only one index is stated.
     pub slope_per_nm: Option<f64>,
     /// What the numbers of surfaces are in a CODE V file that says neither radii nor curvatures; `None` for what is plausible.

@@ -174,6 +174,13 @@ impl Capture {
         self.irradiance.grid()
     }
 
+    /// What is to be said of the lens at the bands of the picture, a sentence each: what its file states and this program does otherwise,
+    /// and which glasses are continued beyond the range in which they are known.
+    pub fn lens_notes(&self) -> Vec<String> {
+        let of_glasses = self.lens.lens.notes_on_glass_range(self.grid().centers_nm());
+        self.lens.notes.iter().cloned().chain(of_glasses).collect()
+    }
+
     /// What is written of the frames.
     pub fn frame_parts(&self) -> Frames<'_> {
         let first = self.lens.reference.first_order();

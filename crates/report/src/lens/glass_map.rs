@@ -40,7 +40,7 @@ pub(super) fn glass_map_svg(lens: &Lens) -> Option<String> {
     let y = |nd: f64| top + h * (index[1] - nd) / (index[1] - index[0]);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0}\" height=\"{1:.0}\" viewBox=\"0 0 {0:.0} {1:.0}\" \
-         font-family=\"{FONT}\" font-size=\"11\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
+         font-family=\"{FONT}\" font-size=\"11\">\n<title>Glasses</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
         SIZE_PX[0], SIZE_PX[1]
     );
     let mut text = |(x, y): (f64, f64), anchor: &str, more: &str, words: &str| {

@@ -64,7 +64,8 @@ impl AnalysisPlots<'_> {
 
     /// Writes what is analyzed, and what colors mean.
     pub(super) fn head(&self, sheet: &mut Sheet, what: &str) {
-        sheet.text((MARGIN_PX, 32.0), 19.0, ("#111", "bold"), &format!("{} — {what}", self.0.lens));
+        sheet.title = format!("{} — {what}", self.0.lens);
+        sheet.text((MARGIN_PX, 32.0), 19.0, ("#111", "bold"), &sheet.title.clone());
         let object = match self.0.distance_mm.is_infinite() {
             true => "object far away".to_owned(),
             false => format!("object at {} mm", short(self.0.distance_mm)),

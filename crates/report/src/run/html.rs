@@ -11,8 +11,6 @@ use crate::{PsfMosaic, chart_svg, panel::escaped};
 const STYLE: &str = include_str!("report.css");
 /// Width and height of a plot, pixels.
 const CHART: (f64, f64) = (560.0, 340.0);
-/// Width of a column of the mosaic, pixels.
-const MOSAIC_PX: usize = 150;
 
 /// Everything that the page shows.
 pub(super) struct Page<'a> {
@@ -45,10 +43,12 @@ pub(super) fn write_page(page: &Page<'_>, pictures: &Pictures) -> String {
     let report = page.report;
     let name = escaped(&report.camera.name);
     let head = [&report.lens.lens, &report.sensor.sensor, &report.scene.name].map(|words| escaped(words)).join(" · ");
+    // A picture of few pixels is shown larger, so that they can be seen.
+    let small = if report.film.columns < 240 { " class=\"small\"" } else { "" };
     let body = [
         format!(
             "<section class=\"picture\"><a href=\"picture.png\" title=\"every pixel\"><img src=\"{}\" alt=\"The picture\" \
-             width=\"{}\" height=\"{}\"></a></section>\n",
+             width=\"{}\" height=\"{}\"{small}></a></section>\n",
             pictures.picture, report.film.columns, report.film.rows
         ),
         section("At a glance", &glance(report)),
@@ -102,7 +102,8 @@ fn table(heads: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
 }
 
 fn figure(src: &str, caption: &str) -> String {
-    format!("<figure><img src=\"{src}\" alt=\"\"><figcaption>{}</figcaption></figure>\n", escaped(caption))
+    let words = escaped(caption);
+    format!("<figure><img src=\"{src}\" alt=\"{words}\"><figcaption>{words}</figcaption></figure>\n")
 }
 
 fn glance(report: &RunReport) -> String {
@@ -142,7 +143,7 @@ fn lens(report: &RunReport, svg: &str) -> String {
         "Rays on the axis, at 70 % of the field and to the corner of the film, at {:.0} nm.",
         report.lens.first_order.wavelength_nm
     );
-    format!("{svg}\n{}", note(&words))
+    format!("{svg}\n{}{}", note(&words), note(&report.lens_notes.join(" · ")))
 }
 
 fn spreads(page: &Page<'_>, (mosaic, src): &(PsfMosaic, String)) -> String {
@@ -152,9 +153,7 @@ fn spreads(page: &Page<'_>, (mosaic, src): &(PsfMosaic, String)) -> String {
     }
     let _ = write!(
         html,
-        "</div>\n<img src=\"{src}\" alt=\"Point-spread functions over field and depth\" style=\"width:{}px\">\n\
-         <div class=\"fields\">",
-        MOSAIC_PX * mosaic.fields_deg.len()
+        "</div>\n<img src=\"{src}\" alt=\"Point-spread functions over field and depth\">\n<div class=\"fields\">"
     );
     for field_deg in &mosaic.fields_deg {
         let _ = write!(html, "<div>{field_deg:.1}°</div>");

@@ -15,6 +15,8 @@ mod exr_tests;
 mod exr_write;
 mod light_unit;
 mod mat;
+#[cfg(test)]
+mod payload_tests;
 mod photons;
 mod picture;
 mod read_scene;

@@ -113,7 +113,9 @@ fn field_of_optics(error: &OpticsError) -> Field {
     match error {
         OpticsError::StopTooWide { .. } | OpticsError::FNumberTooSmall { .. } => Field::Stop,
         OpticsError::NoFocus { .. } | OpticsError::FilmInLens { .. } => Field::Focus,
-        OpticsError::WavelengthOutsideGlass { .. } | OpticsError::Wavelength { .. } => Field::Simulation,
+        OpticsError::WavelengthOutsideGlass { .. }
+        | OpticsError::NotExtended { .. }
+        | OpticsError::Wavelength { .. } => Field::Simulation,
         _ => Field::Lens,
     }
 }

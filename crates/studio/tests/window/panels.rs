@@ -33,6 +33,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("curvature", &["SurfaceChange.curvature_per_mm"]),
     ("spacing", &["SurfaceChange.thickness_mm"]),
     ("unknown glass", &["Camera.lens_reading", "LensReadOptions.missing_glass"]),
+    ("beyond its table", &["LensReadOptions.glass_range"]),
     ("configuration", &["LensReadOptions.configuration"]),
     ("catalogues", &["LensReadOptions.glasses"]),
     ("index slope", &["LensReadOptions.slope_per_nm"]),

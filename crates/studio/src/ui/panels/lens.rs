@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use dioptric_optics::Lens;
-use dioptric_pipeline::{Camera, FocusSpec, LensReadOptions, LensSpec, MissingGlass, SeqNumbers, StopSpec};
+use dioptric_pipeline::{Camera, FocusSpec, GlassRange, LensReadOptions, LensSpec, MissingGlass, SeqNumbers, StopSpec};
 use egui::{CollapsingHeader, Ui};
 
 use super::{
@@ -240,6 +240,10 @@ fn reading(ui: &mut Ui, reading: &mut LensReadOptions) {
     ];
     let words = "What becomes of a glass that no catalogue has";
     choice(ui, "unknown glass", words, &mut reading.missing_glass, &missing);
+    let ranges = [(GlassRange::Refuse, "is refused"), (GlassRange::Extend, "continues the glass")];
+    let words = "What becomes of a wavelength outside the range in which a glass is known; where the glass is continued, a note states how \
+                 far its index may be off";
+    choice(ui, "beyond its table", words, &mut reading.glass_range, &ranges);
     let words = "Change of index a nanometre, of media of which one index is stated";
     let slope = NumberField::even("index slope", "1/nm", -0.01..=0.01, -0.001..=0.001, words);
     optional(ui, slope, &mut reading.slope_per_nm, -1.333e-4);
