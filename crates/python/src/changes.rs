@@ -3,8 +3,10 @@
 use dioptric_optics::Lens as OpticsLens;
 use dioptric_pipeline::{
     BankSpec, Camera, Crop, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions, LensSpec,
-    SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure, with_exposure_s,
+    PictureOptions, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure,
+    with_exposure_s,
 };
+use dioptric_sensor::Processing;
 use pyo3::{
     prelude::*,
     types::{PyDict, PyString},
@@ -329,21 +331,39 @@ fn set_sensor_option(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -
     match key {
         "analog_gain" => options.analog_gain = Some(number(key, value)?),
         "noise" => options.noise = Some(word(key, value)?),
-        "white" => options.picture.white = Some(word(key, value)?),
-        "demosaic" => options.picture.demosaic = Some(word(key, value)?),
-        "denoise" => options.picture.denoise = Some(number(key, value)?),
-        "lens_corrections" => options.picture.lens_corrections = Some(word(key, value)?),
-        "color" => options.picture.color = Some(word(key, value)?),
-        "sharpen_px" => options.picture.sharpen_px = Some(number(key, value)?),
-        "local_tone" => options.picture.local_tone = Some(word(key, value)?),
-        "perspective" => options.picture.perspective = Some(word(key, value)?),
-        "brightness" => options.picture.brightness = Some(word(key, value)?),
-        "curve" => options.picture.curve = Some(word(key, value)?),
-        "space" => options.picture.space = Some(word(key, value)?),
-        "defect_threshold" => options.picture.defect_threshold = Some(number(key, value)?),
-        _ => options.picture.highlights = Some(word(key, value)?),
+        _ => options.picture = picture_option(key, value)?,
     }
     options.apply(&mut camera.noise, &mut camera.exposure, &mut camera.processing).map_err(exception)
+}
+
+/// Returns one option of [`OF_PICTURE`].
+fn picture_option(key: &str, value: &Bound<'_, PyAny>) -> PyResult<PictureOptions> {
+    let mut options = PictureOptions::default();
+    match key {
+        "white" => options.white = Some(word(key, value)?),
+        "demosaic" => options.demosaic = Some(word(key, value)?),
+        "denoise" => options.denoise = Some(number(key, value)?),
+        "lens_corrections" => options.lens_corrections = Some(word(key, value)?),
+        "color" => options.color = Some(word(key, value)?),
+        "sharpen_px" => options.sharpen_px = Some(number(key, value)?),
+        "local_tone" => options.local_tone = Some(word(key, value)?),
+        "perspective" => options.perspective = Some(word(key, value)?),
+        "brightness" => options.brightness = Some(word(key, value)?),
+        "curve" => options.curve = Some(word(key, value)?),
+        "space" => options.space = Some(word(key, value)?),
+        "defect_threshold" => options.defect_threshold = Some(number(key, value)?),
+        _ => options.highlights = Some(word(key, value)?),
+    }
+    Ok(options)
+}
+
+/// Returns the usual processing with changes made.
+pub(crate) fn changed_processing(function: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Processing> {
+    let mut processing = Processing::default();
+    each_option(function, options, OF_PICTURE, |key, value| {
+        picture_option(key, value)?.apply(&mut processing).map_err(exception)
+    })?;
+    Ok(processing)
 }
 
 fn path_or_name(key: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {

@@ -11,6 +11,7 @@
 
 mod camera;
 mod changes;
+mod developed;
 mod errors;
 mod input;
 mod lens;
@@ -18,6 +19,7 @@ mod options;
 mod paintings;
 mod rays;
 mod samples;
+mod save;
 mod scene;
 mod sensor;
 mod serial;
@@ -34,6 +36,7 @@ mod _native {
     #[pymodule_export]
     use super::{
         camera::Camera,
+        developed::{Developed, develop},
         lens::Lens,
         rays::Rays,
         samples::read_samples,

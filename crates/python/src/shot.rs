@@ -12,20 +12,19 @@ use dioptric_pipeline::{
 };
 use dioptric_psf::LensImageModel;
 use dioptric_scene::write_planes_exr;
-use dioptric_sensor::RawPlane;
 use dioptric_spectrum::{Bands, DepthMap};
 use ndarray::{Array2, Array3, ArrayView1, Axis};
 use pyo3::{
     prelude::*,
-    types::{PyBytes, PyDict, PyTuple},
+    types::{PyBytes, PyDict},
 };
 
 use crate::{
     camera::Camera,
     changes::{OF_EXPOSURE, OF_PICTURE, changed},
-    errors::wrong,
+    save::{is_picture, write_picture},
     serial::to_python,
-    view::view,
+    view::{plane_or_planes, raw_planes, rgb8, view},
     worker::{Follower, run},
 };
 
@@ -69,14 +68,6 @@ impl Shot {
         pick: impl Fn(&Capture) -> &Vec<Array2<f32>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         (0..pick(&self.capture).len()).map(|n| view(py, &self.capture, |capture| pick(capture)[n].view())).collect()
-    }
-
-    /// Returns the plane of a frame that has one, else all of them.
-    fn plane_or_planes<'py>(&self, py: Python<'py>, mut planes: Vec<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
-        match planes.len() {
-            1 => Ok(planes.swap_remove(0)),
-            _ => Ok(PyTuple::new(py, planes)?.into_any()),
-        }
     }
 
     fn model_and_depth(&self, py: Python<'_>) -> PyResult<(Arc<LensImageModel>, Arc<DepthMap>)> {
@@ -164,35 +155,26 @@ impl Shot {
     /// filters.
     #[getter]
     fn electron_rate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.plane_or_planes(py, self.planes(py, |capture| &capture.rate.planes_e_per_s)?)
+        plane_or_planes(py, self.planes(py, |capture| &capture.rate.planes_e_per_s)?)
     }
 
     /// Electrons at the end of the exposure, with shot noise; (rows, columns) float32, or a tuple, one a filter.
     #[getter]
     fn electrons<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.plane_or_planes(py, self.planes(py, |capture| &capture.frames.exposed.electrons.planes_e)?)
+        plane_or_planes(py, self.planes(py, |capture| &capture.frames.exposed.electrons.planes_e)?)
     }
 
     /// Voltages at the pixels' outputs before the analog gain, V; (rows, columns) float32, or a tuple, one a filter.
     #[getter]
     fn volts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.plane_or_planes(py, self.planes(py, |capture| &capture.frames.exposed.volts.planes_v)?)
+        plane_or_planes(py, self.planes(py, |capture| &capture.frames.exposed.volts.planes_v)?)
     }
 
     /// The frame as the converter gives it: digital numbers, (rows, columns) uint16; float32 volts without a converter; a tuple,
     /// one a filter, of a sensor of stacked filters.
     #[getter]
     fn raw<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let planes = 0..self.capture.frames.exposed.raw.planes.len();
-        let plane = |n: usize| match &self.capture.frames.exposed.raw.planes[n] {
-            RawPlane::Dn(_) => view(py, &self.capture, |capture| {
-                capture.frames.exposed.raw.planes[n].dn().expect("it holds digital numbers").view()
-            }),
-            RawPlane::Volts(plane) | RawPlane::Evened(plane) => {
-                view(py, &Arc::new(plane.clone()), |plane| plane.view())
-            }
-        };
-        self.plane_or_planes(py, planes.map(plane).collect::<PyResult<_>>()?)
+        plane_or_planes(py, raw_planes(py, &self.capture, |capture| &capture.frames.exposed.raw)?)
     }
 
     /// The levels of `raw`: ``black``, ``white`` (saturation) and ``top`` samples, ``step_v`` from one sample to the next, V, and
@@ -222,11 +204,7 @@ impl Shot {
     /// The picture's 8-bit codes, those of ``picture.png``; (rows, columns, 3) uint8, rounded at the first access.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let rgb = self.rgb.get_or_init(|| {
-            let picture = &self.capture.developed.picture;
-            let shape = (picture.rows(), picture.columns(), 3);
-            Arc::new(Array3::from_shape_vec(shape, picture.to_rgb8()).expect("three codes a pixel"))
-        });
+        let rgb = self.rgb.get_or_init(|| rgb8(&self.capture.developed.picture));
         view(py, rgb, |rgb| rgb.view())
     }
 
@@ -297,18 +275,8 @@ impl Shot {
     /// -------
     /// list of str, the names of the files.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<Vec<String>> {
-        let is_picture = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
-        if is_picture && !path.is_dir() {
-            let developed = &self.capture.developed;
-            return run(py, &Follower::nobody(), |_, _| {
-                let staged = Staged::file(&path)?;
-                write_file(staged.path(), &picture_png(&developed.picture)?)?;
-                staged.commit()?;
-                Ok(vec![path.file_name().unwrap_or_default().to_string_lossy().into_owned()])
-            });
-        }
-        if path.extension().is_some() && !path.is_dir() {
-            return Err(wrong("path", format!("'{}'", path.display()), "a folder, or a file that ends in .png"));
+        if is_picture(&path)? {
+            return run(py, &Follower::nobody(), |_, _| write_picture(&self.capture.developed.picture, &path));
         }
         let (model, depth) = self.model_and_depth(py)?;
         run(py, &Follower::nobody(), |_, _| {

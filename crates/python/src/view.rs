@@ -7,7 +7,8 @@
 
 use std::{any::Any, sync::Arc};
 
-use ndarray::{ArrayView, CowArray, Dimension};
+use dioptric_sensor::{Picture, Raw, RawPlane};
+use ndarray::{Array3, ArrayView, CowArray, Dimension};
 use pyo3::{
     intern,
     prelude::*,
@@ -75,6 +76,33 @@ impl Memory {
     #[getter]
     fn address(&self) -> usize {
         self.address
+    }
+}
+
+/// Returns an array for each plane of a raw frame: digital numbers of 16 bits, or volts.
+pub(crate) fn raw_planes<'py, T: Send + Sync + 'static>(
+    py: Python<'py>,
+    owner: &Arc<T>,
+    raw: impl Fn(&T) -> &Raw,
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let plane = |n: usize| match &raw(owner).planes[n] {
+        RawPlane::Dn(_) => view(py, owner, |of| raw(of).planes[n].dn().expect("it holds digital numbers").view()),
+        RawPlane::Volts(plane) | RawPlane::Evened(plane) => view(py, &Arc::new(plane.clone()), |plane| plane.view()),
+    };
+    (0..raw(owner).planes.len()).map(plane).collect()
+}
+
+/// Returns the 8-bit codes of a picture; rows × columns × 3.
+pub(crate) fn rgb8(picture: &Picture) -> Arc<Array3<u8>> {
+    let shape = (picture.rows(), picture.columns(), 3);
+    Arc::new(Array3::from_shape_vec(shape, picture.to_rgb8()).expect("three codes a pixel"))
+}
+
+/// Returns the plane of a frame that has one, else all of them.
+pub(crate) fn plane_or_planes<'py>(py: Python<'py>, mut planes: Vec<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+    match planes.len() {
+        1 => Ok(planes.swap_remove(0)),
+        _ => Ok(PyTuple::new(py, planes)?.into_any()),
     }
 }
 

@@ -24,7 +24,7 @@ def test_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_everything_is_documented() -> None:
-    for kind in (dp.Camera, dp.Lens, dp.Rays, dp.Scene, dp.Sensor, dp.Shot):
+    for kind in (dp.Camera, dp.Developed, dp.Lens, dp.Rays, dp.Scene, dp.Sensor, dp.Shot):
         assert kind.__doc__
         public = [name for name in vars(kind) if not name.startswith("_") and name != "FATES"]
         assert public

@@ -9,6 +9,30 @@ Radiance is W m⁻² sr⁻¹ nm⁻¹, irradiance W m⁻² nm⁻¹; lens lengths 
 Row 0 of a picture is its top. Arrays that come back are read-only views of the results, without a copy.
 """
 
-from ._native import Camera, Lens, Rays, Scene, Sensor, Shot, __version__, set_threads, threads
+from ._native import (
+    Camera,
+    Developed,
+    Lens,
+    Rays,
+    Scene,
+    Sensor,
+    Shot,
+    __version__,
+    develop,
+    set_threads,
+    threads,
+)
 
-__all__ = ["Camera", "Lens", "Rays", "Scene", "Sensor", "Shot", "__version__", "set_threads", "threads"]
+__all__ = [
+    "Camera",
+    "Developed",
+    "Lens",
+    "Rays",
+    "Scene",
+    "Sensor",
+    "Shot",
+    "__version__",
+    "develop",
+    "set_threads",
+    "threads",
+]

@@ -16,6 +16,7 @@ _Progress: TypeAlias = bool | Callable[[str, float], object] | None
 
 __all__ = [
     "Camera",
+    "Developed",
     "Lens",
     "Rays",
     "Scene",
@@ -26,6 +27,7 @@ __all__ = [
     "Sweep",
     "Memory",
     "_panic",
+    "develop",
     "read_index",
     "read_samples",
     "set_threads",
@@ -221,6 +223,41 @@ class Shot:
     def to_xarray(self) -> Any: ...
     def _repr_png_(self) -> bytes: ...
     def _repr_html_(self) -> str: ...
+
+@final
+class Developed:
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def raw(self) -> NDArray[np.uint16] | _Planes: ...
+    @property
+    def picture(self) -> NDArray[np.float32]: ...
+    @property
+    def rgb(self) -> NDArray[np.uint8]: ...
+    @property
+    def notes(self) -> list[str]: ...
+    def report(self) -> dict[str, Any]: ...
+    def png(self) -> bytes: ...
+    def save(self, path: _Path) -> list[str]: ...
+    def _repr_png_(self) -> bytes: ...
+
+def develop(
+    path: _Path,
+    *,
+    white: str | None = ...,
+    demosaic: str | None = ...,
+    denoise: float | None = ...,
+    highlights: str | None = ...,
+    lens_corrections: str | None = ...,
+    color: str | None = ...,
+    sharpen_px: float | None = ...,
+    local_tone: str | None = ...,
+    perspective: str | None = ...,
+    brightness: str | None = ...,
+    curve: str | None = ...,
+    space: str | None = ...,
+    defect_threshold: float | None = ...,
+) -> Developed: ...
 
 @final
 class Lens:

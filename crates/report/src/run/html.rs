@@ -143,7 +143,8 @@ fn lens(report: &RunReport, svg: &str) -> String {
         "Rays on the axis, at 70 % of the field and to the corner of the film, at {:.0} nm.",
         report.lens.first_order.wavelength_nm
     );
-    format!("{svg}\n{}{}", note(&words), note(&report.lens_notes.join(" · ")))
+    let notes: String = report.lens_notes.iter().map(|words| note(&escaped(words))).collect();
+    format!("{svg}\n{}{notes}", note(&words))
 }
 
 fn spreads(page: &Page<'_>, (mosaic, src): &(PsfMosaic, String)) -> String {
