@@ -6,7 +6,8 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{CAMERA, check_error, output, read_picture};
+use common::{CAMERA, check_error, output, read_picture, sheet};
+use image::{ImageBuffer, Luma};
 use serde_json::Value;
 
 /// Returns a folder with `run/raw.dng` of a small camera, and its picture.
@@ -41,6 +42,110 @@ fn a_raw_file_of_a_run_becomes_the_picture_of_the_run() {
     assert!(folder.path().join("out/picture-16.png").exists() && folder.path().join("out/picture-8.tiff").exists());
     let written: Value = serde_json::from_slice(&fs::read(folder.path().join("out/report.json")).unwrap()).unwrap();
     assert_eq!(written, report);
+}
+
+/// Runs the small camera without noise, with one change to its data sheet; returns its codes and the report of
+/// developing its raw file.
+fn run_and_develop(
+    folder: &Path,
+    (before, after): (&str, &str),
+    options: &[&str],
+) -> (ImageBuffer<Luma<u16>, Vec<u16>>, Value) {
+    let sheet = sheet();
+    assert!(sheet.contains(before));
+    fs::write(folder.join("own.ron"), sheet.replacen(before, after, 1)).unwrap();
+    let usual =
+        ["run", "camera.ron", "--out", "run", "--quiet", "--sensor", "own.ron", "--also", "raw-dng,picture-png16"];
+    output(folder, &[&usual, &["--noise", "none", "--denoise", "0"][..], options].concat());
+    (read_picture(&folder.join("run/raw.png")).into_luma16(), develop(folder, &["--denoise", "0"]))
+}
+
+/// Returns the only note of a report, and checks that the file's description is the same.
+#[track_caller]
+fn only_note(report: &Value) -> String {
+    let notes = report["notes"].as_array().unwrap();
+    assert_eq!((notes.len(), &notes[0]), (1, &report["description"]));
+    notes[0].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn rows_of_two_times_are_merged_in_the_picture_and_marked_in_the_raw_file() {
+    let folder = folder();
+    let options = ["--interleaved-ratio", "8", "--curve", "linear"];
+    let (codes, report) = run_and_develop(folder.path(), ("", ""), &options);
+    let at = |row: u32| f64::from(codes.get_pixel(24, row).0[0]);
+    // Long rows 16 and 17 between short ones; half a code of some 300 of them.
+    for row in [16, 17] {
+        let ratio = 2.0 * at(row) / (at(row - 2) + at(row + 2));
+        assert!((ratio / 8.0 - 1.0).abs() < 3e-3, "row {row}: {ratio}");
+    }
+    let picture = read_picture(&folder.path().join("run/picture.png")).into_rgb8();
+    let green = |row: u32| picture.get_pixel(24, row).0[1];
+    let rows: Vec<u8> = (12..20).map(green).collect();
+    assert!(rows.iter().all(|code| code.abs_diff(rows[0]) <= 1) && rows[0] > 20, "{rows:?}");
+    let note = only_note(&report);
+    assert!(note.contains("2 of the stated time, then 2 of 1/8 of it"), "{note}");
+}
+
+#[test]
+fn split_pixels_reach_beyond_the_large_photodiode_and_the_raw_file_is_marked() {
+    let folder = folder();
+    let small =
+        "split_pixel: (area_ratio: 10.0, conversion_gain_v_per_e: 3.0e-5, full_well_e: 33000.0, read_noise_e: 3.0),";
+    let split = format!("{small}\n    full_well_e: 33000.0,");
+    let code = |sheet: (&str, &str), time_s: &str| {
+        let options = ["--exposure-s", time_s, "--curve", "linear"];
+        let (codes, report) = run_and_develop(folder.path(), sheet, &options);
+        let picture = read_picture(&folder.path().join("run/picture-16.png")).into_rgb16();
+        (codes.get_pixel(24, 16).0[0], f64::from(picture.get_pixel(24, 16).0[1]), report)
+    };
+    // The large photodiode under green saturates at 31 µs.
+    let (below, above) = ("1e-5", "1e-4");
+    let (whole, split) = (("", ""), ("full_well_e: 33000.0,", split.as_str()));
+    let [whole_below, whole_above, split_below, split_above] =
+        [(whole, below), (whole, above), (split, below), (split, above)].map(|(sheet, time_s)| code(sheet, time_s));
+    assert_eq!((whole_above.0, whole_above.1, split_above.0), (16220, 65535.0, 16220));
+    // Ten times the range on the same codes, and light in proportion past it: half a code of 2091.
+    for ratio in [whole_below.1 / split_below.1, split_above.1 / split_below.1] {
+        assert!((ratio / 10.0 - 1.0).abs() < 1e-3, "{ratio}");
+    }
+    for note in [only_note(&split_below.2), only_note(&split_above.2)] {
+        assert_eq!(note, "this raw frame holds the large photodiodes of split pixels, without the small ones");
+    }
+    assert!(whole_above.2["notes"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn a_filter_exposed_for_a_quarter_of_the_time_stays_neutral_through_its_raw_file() {
+    let folder = folder();
+    let name = r#"(name: "R", "#;
+    let part = format!("{name}exposure_fraction: 0.25, ");
+    let options = ["--exposure-s", "2e-6"];
+    let (whole, _) = run_and_develop(folder.path(), ("", ""), &options);
+    let (codes, report) = run_and_develop(folder.path(), (name, &part), &options);
+    let at = |codes: &ImageBuffer<Luma<u16>, Vec<u16>>, column: u32| f64::from(codes.get_pixel(column, 16).0[0]);
+    let shares = [24, 25].map(|column| at(&codes, column) / at(&whole, column));
+    // Half a code of 170.
+    assert!((shares[0] - 0.25).abs() < 1e-3 && shares[1] == 1.0, "{shares:?}");
+    assert!(report["notes"].as_array().unwrap().is_empty() && report["description"].is_null());
+    let [own, through] =
+        ["run/picture.png", "out/picture.png"].map(|name| read_picture(&folder.path().join(name)).into_rgb8());
+    let off = own.iter().zip(through.iter()).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+    assert!(off <= 3, "{off}");
+    let [r, g, b] = through.get_pixel(24, 16).0.map(i32::from);
+    assert!((r - g).abs() <= 3 && (b - g).abs() <= 3, "{r} {g} {b}");
+}
+
+#[test]
+fn raw_files_of_several_frames_are_marked() {
+    let folder = folder();
+    for (options, words) in [
+        (&["--burst", "3"][..], "the first of 3 frames of a burst"),
+        (&["--bracket-stops", "0,-2"], "the first of 2 frames of a bracket"),
+    ] {
+        let (_, report) = run_and_develop(folder.path(), ("", ""), options);
+        assert!(only_note(&report).ends_with(words), "{report}");
+    }
 }
 
 #[test]

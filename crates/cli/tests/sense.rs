@@ -6,25 +6,9 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{CAMERA, check_error, output, read_picture};
+use common::{CAMERA, check_error, output, read_picture, sheet};
 use image::{ColorType, DynamicImage};
 use serde_json::Value;
-
-/// The data sheet of a color camera with the pixels of that film.
-fn sheet() -> String {
-    let sheet = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../sensor/data/nikon-d5100.ron")).unwrap();
-    let sized = |line: &str| match line.trim_start().split(':').next() {
-        Some("rows") => "    rows: 32,".to_owned(),
-        Some("columns") => "    columns: 48,".to_owned(),
-        Some("pixel_pitch_um") => "    pixel_pitch_um: 200.0,".to_owned(),
-        Some("row_time_us") => String::new(),
-        _ => line.to_owned(),
-    };
-    let lines: Vec<String> = sheet.lines().map(sized).collect();
-    let text = lines.join("\n");
-    let end = text.rfind(')').unwrap();
-    format!("{}    row_time_us: 10.0,\n)", &text[..end])
-}
 
 /// Returns a folder with `light.exr`, a spectral irradiance, and `small.ron`, a sensor for it.
 fn folder() -> tempfile::TempDir {

@@ -224,6 +224,7 @@ fn dng_details<'a>(frames: &Frames<'a>, picture: &'a Picture) -> DngDetails<'a> 
         f_number: frames.optics.map(|lens| lens.f_number),
         focal_length_mm: frames.optics.map(|lens| lens.focal_length_mm),
         lens: frames.optics.map(|lens| lens.name.to_owned()),
+        description: frames.exposed.raw_note.clone(),
         picture: Some(picture),
         corrections: frames.lens.map(|tables| (frames.processing.lens_corrections, tables)),
     }

@@ -53,6 +53,8 @@ pub struct DngDetails<'a> {
     pub focal_length_mm: Option<f64>,
     /// Its name.
     pub lens: Option<String>,
+    /// What a reader has to know of the frame, in ASCII: that it is one of several, or that its rows differ (`ImageDescription`).
+    pub description: Option<String>,
     /// The developed picture, shown small by programs that list files.
     pub picture: Option<&'a Picture>,
     /// What readers may undo of the lens, and the tables by which.
@@ -62,7 +64,15 @@ pub struct DngDetails<'a> {
 impl DngDetails<'_> {
     /// Nothing but the light.
     pub fn of_light(light: Illuminant) -> Self {
-        Self { light, f_number: None, focal_length_mm: None, lens: None, picture: None, corrections: None }
+        Self {
+            light,
+            f_number: None,
+            focal_length_mm: None,
+            lens: None,
+            description: None,
+            picture: None,
+            corrections: None,
+        }
     }
 }
 
@@ -134,8 +144,11 @@ impl Tags<'_> {
     /// Writes what is of the camera: in the first directory.
     fn write_camera(&self, first: &mut Directory) {
         let model = &self.sensor.name;
-        first.set(MAKE, Value::Ascii("dioptric".to_owned()));
+        first.set(MAKE, Value::Ascii(OWN_MAKE.to_owned()));
         first.set(MODEL, Value::Ascii(model.clone()));
+        if let Some(description) = &self.details.description {
+            first.set(IMAGE_DESCRIPTION, Value::Ascii(description.clone()));
+        }
         first.set(ORIENTATION, Value::Short(vec![1]));
         first.set(X_RESOLUTION, Value::Rational(vec![(72, 1)]));
         first.set(Y_RESOLUTION, Value::Rational(vec![(72, 1)]));

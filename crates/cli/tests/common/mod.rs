@@ -19,6 +19,24 @@ pub(crate) const CAMERA: &str = r#"(
     wavelengths: ListNm([450.0, 550.0, 650.0]),
 )"#;
 
+/// The data sheet of a color camera with the pixels of that film.
+#[allow(dead_code, reason = "not every test file needs it")]
+pub(crate) fn sheet() -> String {
+    let sheet = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../sensor/data/nikon-d5100.ron"))
+        .expect("the data sheet of the library");
+    let sized = |line: &str| match line.trim_start().split(':').next() {
+        Some("rows") => "    rows: 32,".to_owned(),
+        Some("columns") => "    columns: 48,".to_owned(),
+        Some("pixel_pitch_um") => "    pixel_pitch_um: 200.0,".to_owned(),
+        Some("row_time_us") => String::new(),
+        _ => line.to_owned(),
+    };
+    let lines: Vec<String> = sheet.lines().map(sized).collect();
+    let text = lines.join("\n");
+    let end = text.rfind(')').expect("the data sheet of the library");
+    format!("{}    row_time_us: 10.0,\n)", &text[..end])
+}
+
 /// Runs `dioptric` with these arguments in a folder.
 pub(crate) fn dioptric(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_dioptric"))

@@ -51,6 +51,8 @@ pub struct Exposed {
     pub volts: Volts,
     /// The frame as the converter gives it.
     pub raw: Raw,
+    /// What `raw` is of the picture where it is not all of it, in ASCII.
+    pub raw_note: Option<String>,
     /// All frames merged, those of both photodiodes of split pixels among them; none for a single one.
     pub merged: Option<Raw>,
 }
@@ -108,6 +110,26 @@ impl FramesSpec {
         }
     }
 
+    /// Returns what the first frame is of the picture where it is not all of it, in ASCII.
+    fn raw_note(&self, sensor: &Sensor) -> Option<String> {
+        let of_several = match self {
+            Self::Single => None,
+            Self::Burst(n) | Self::MovingBurst { frames: n, .. } => {
+                (*n > 1).then(|| format!("the first of {n} frames of a burst"))
+            }
+            Self::BracketStops(stops) => {
+                (stops.len() > 1).then(|| format!("the first of {} frames of a bracket", stops.len()))
+            }
+            Self::Interleaved { ratio, period_rows: n } => Some(format!(
+                "rows of two exposure times in turn, not merged: {n} of the stated time, then {n} of 1/{ratio} of it"
+            )),
+        };
+        let of_pixels =
+            sensor.split_pixel.map(|_| "the large photodiodes of split pixels, without the small ones".to_owned());
+        let parts: Vec<String> = of_several.into_iter().chain(of_pixels).collect();
+        (!parts.is_empty()).then(|| format!("this raw frame holds {}", parts.join("; ")))
+    }
+
     /// Takes the frames; each has temporal noise of its own and the same fixed pattern.
     pub(crate) fn expose(
         &self,
@@ -122,7 +144,9 @@ impl FramesSpec {
             Self::Burst(n) | Self::MovingBurst { frames: n, .. } => vec![*exposure; *n],
             Self::BracketStops(stops) => exposure.bracket(stops),
             &Self::Interleaved { ratio, period_rows } => {
-                return expose_interleaved(sensor, rate, exposure, &Interleaved { ratio, period_rows }, noise);
+                let rows = Interleaved { ratio, period_rows };
+                let exposed = expose_interleaved(sensor, rate, exposure, &rows, noise)?;
+                return Ok(Exposed { raw_note: self.raw_note(sensor), ..exposed });
             }
         };
         let small_sensor = sensor.small_photodiode();
@@ -153,7 +177,7 @@ impl FramesSpec {
             Self::Burst(_) | Self::BracketStops(_) => Some(sensor.merge(&frames)?),
             Self::Single | Self::Interleaved { .. } => None,
         };
-        Ok(Exposed { electrons, volts, raw: frames.swap_remove(0), merged })
+        Ok(Exposed { electrons, volts, raw: frames.swap_remove(0), raw_note: self.raw_note(sensor), merged })
     }
 }
 
@@ -173,7 +197,7 @@ fn expose_interleaved(
     let volts = sensor.volts(&electrons, exposure, noise)?;
     let raw = sensor.digitize(&volts, exposure)?;
     let merged = Some(sensor.merge_interleaved(&raw, rows)?);
-    Ok(Exposed { electrons, volts, raw, merged })
+    Ok(Exposed { electrons, volts, raw, raw_note: None, merged })
 }
 
 fn digitized(sensor: &Sensor, rate: &ElectronRate, exposure: &Exposure, noise: &Noise) -> Result<Raw, SensorError> {

@@ -13,9 +13,9 @@ use super::{
     samples,
     tags::{
         BASELINE_EXPOSURE, CFA_LAYOUT, CFA_PATTERN, CFA_PLANE_COLOR, CFA_REPEAT_PATTERN_DIM, COLOR_FILTER_ARRAY,
-        DEFAULT_SCALE, DNG_VERSION, EXIF_DIRECTORY, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, IMAGE_LENGTH, IMAGE_WIDTH,
-        LENS_MODEL, LINEAR_RAW, MAKE, MODEL, NEW_SUBFILE_TYPE, OPCODE_LIST_1, OPCODE_LIST_2, OPCODE_LIST_3,
-        ORIENTATION, PHOTOGRAPHIC_SENSITIVITY, PHOTOMETRIC_INTERPRETATION, SUB_DIRECTORIES,
+        DEFAULT_SCALE, DNG_VERSION, EXIF_DIRECTORY, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, IMAGE_DESCRIPTION,
+        IMAGE_LENGTH, IMAGE_WIDTH, LENS_MODEL, LINEAR_RAW, MAKE, MODEL, NEW_SUBFILE_TYPE, OPCODE_LIST_1, OPCODE_LIST_2,
+        OPCODE_LIST_3, ORIENTATION, OWN_MAKE, PHOTOGRAPHIC_SENSITIVITY, PHOTOMETRIC_INTERPRETATION, SUB_DIRECTORIES,
     },
     tiff_reader::{Fields, TiffReader},
 };
@@ -72,6 +72,8 @@ pub struct DngShot {
     pub make: Option<String>,
     /// Its model.
     pub model: Option<String>,
+    /// What the file tells of its frame (`ImageDescription`).
+    pub description: Option<String>,
     /// The name of the lens.
     pub lens: Option<String>,
     /// Exposure time, s.
@@ -141,6 +143,7 @@ impl DngFile {
             shot: DngShot {
                 make: first.text(MAKE),
                 model: first.text(MODEL),
+                description: first.text(IMAGE_DESCRIPTION),
                 lens: exif.as_ref().and_then(|exif| exif.text(LENS_MODEL)),
                 exposure_time_s,
                 f_number: number(F_NUMBER)?,
@@ -242,6 +245,10 @@ fn mosaic(frame: &Fields<'_>, n_planes: usize, area: &Area) -> Result<(Vec<Strin
 /// Returns what the file asks for and is not done.
 fn notes(first: &Fields<'_>, frame: &Fields<'_>) -> Result<Vec<String>, String> {
     let mut notes = Vec::new();
+    // Cameras write names and captions there; frames of this program what the frame lacks.
+    if let (Some(OWN_MAKE), Some(description)) = (first.text(MAKE).as_deref(), first.text(IMAGE_DESCRIPTION)) {
+        notes.push(description);
+    }
     for tag in [OPCODE_LIST_1, OPCODE_LIST_2, OPCODE_LIST_3] {
         let names = frame.bytes(tag).map(opcodes).unwrap_or_default();
         if !names.is_empty() {

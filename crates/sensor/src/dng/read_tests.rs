@@ -373,6 +373,21 @@ fn what_is_asked_for_and_not_done_is_noted() {
 }
 
 #[test]
+fn what_a_frame_lacks_is_noted_and_captions_of_cameras_are_not() {
+    let read = |make: &str| {
+        let file = PLAIN.file(|d| {
+            d.set(MAKE, Value::Ascii(make.to_owned()));
+            d.set(IMAGE_DESCRIPTION, Value::Ascii("a street".to_owned()));
+        });
+        DngFile::from_bytes(&file).unwrap()
+    };
+    for (make, n_notes) in [(OWN_MAKE, 1), ("Nikon", 0)] {
+        let file = read(make);
+        assert_eq!((file.notes.len(), file.shot.description.as_deref()), (n_notes, Some("a street")), "{make}");
+    }
+}
+
+#[test]
 fn files_that_are_no_such_frames_are_refused_in_a_sentence() {
     let refused = |word: &str, change: &dyn Fn(&mut Directory)| {
         let reason = DngFile::from_bytes(&PLAIN.file(change)).unwrap_err();

@@ -6,6 +6,7 @@ pub(super) const IMAGE_LENGTH: u16 = 257;
 pub(super) const BITS_PER_SAMPLE: u16 = 258;
 pub(super) const COMPRESSION: u16 = 259;
 pub(super) const PHOTOMETRIC_INTERPRETATION: u16 = 262;
+pub(super) const IMAGE_DESCRIPTION: u16 = 270;
 pub(super) const MAKE: u16 = 271;
 pub(super) const MODEL: u16 = 272;
 pub(super) const ORIENTATION: u16 = 274;
@@ -53,6 +54,9 @@ pub(super) const LINEAR_RAW: u16 = 34892;
 /// Values of the calibration illuminants (EXIF light sources).
 pub(super) const STANDARD_LIGHT_A: u16 = 17;
 pub(super) const D65: u16 = 21;
+
+/// The value of the tag `Make` in frames of this program.
+pub(super) const OWN_MAKE: &str = "dioptric";
 
 /// Fields that are read alone.
 pub(super) const TILE_WIDTH: u16 = 322;
