@@ -30,7 +30,7 @@ impl Box2 {
 }
 
 impl BlockLayers {
-    /// Finds the layers over cells that cover a rectangle; `maps` are those at the ends of all that is imaged.
+    /// Finds the layers over the rectangle that cells lie in; `maps` are those at the ends of all that is imaged.
     pub(crate) fn find(
         sampler: &Sampler,
         cells: &[Cell],
@@ -38,14 +38,12 @@ impl BlockLayers {
         surfaces: &[&LayerCoordinates],
         cancel: &Cancel,
     ) -> Result<Self, Cancelled> {
-        let corners = || cells.iter().map(|cell| (cell.first_pixel(&sampler.frame), cell.size));
-        let first = (
-            corners().map(|((row, _), _)| row).min().unwrap_or(0),
-            corners().map(|((_, column), _)| column).min().unwrap_or(0),
-        );
+        let pixels = || cells.iter().map(|cell| cell.pixels(&sampler.frame));
+        let first =
+            (pixels().map(|at| at.first_row).min().unwrap_or(0), pixels().map(|at| at.first_column).min().unwrap_or(0));
         let n_blocks = |end: i64, first: i64| ((end - first) as usize).div_ceil(BLOCK);
-        let last_row = corners().map(|((row, _), size)| row + size as i64).max().unwrap_or(0);
-        let last_column = corners().map(|((_, column), size)| column + size as i64).max().unwrap_or(0);
+        let last_row = pixels().map(|at| at.first_row + at.rows as i64).max().unwrap_or(0);
+        let last_column = pixels().map(|at| at.first_column + at.columns as i64).max().unwrap_or(0);
         let size = (n_blocks(last_row, first.0), n_blocks(last_column, first.1));
         let mut ranges = Array2::from_elem(size, (u16::MAX, 0));
         let edge = |first: i64, block: usize| first as f64 - 0.5 + (BLOCK * block) as f64;
@@ -111,7 +109,7 @@ mod tests {
     use dioptric_scene::View;
 
     use super::*;
-    use crate::{DiscLens, Film, sampler::Rectangle, tiles::cells_over};
+    use crate::{DiscLens, Film, active::cells_over, sampler::Rectangle};
 
     /// What is passed over has nothing: sampled with and without the blocks, a layer is the same to the bit.
     #[test]
@@ -120,7 +118,7 @@ mod tests {
         let lens = DiscLens { focal_mm: 50.0, ..DiscLens::default() };
         let map = lens.film_map(0.5, 550.0, 2.0);
         let view = View { focal_px: 9000.0, center_x_px: 54.5, center_y_px: 44.5 };
-        let sampler = Sampler::new((view, size), &film, &map, 16);
+        let sampler = Sampler::new((view, size), (&film, 1), &map, 16);
         let cancel = Cancel::new();
         let coordinate = |(row, column): (usize, usize)| match (row / 20 + column / 30) % 3 {
             0 => 0.25,

@@ -1,4 +1,4 @@
-//! One layer in one band: its ideal picture, light or alpha, spread by PSFs that vary over the film.
+//! One layer in one band on one raster: its ideal picture, light or alpha, spread by PSFs that vary over the film.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::{
     expansion::Expansion,
     knot_kernels::{KnotKernel, LayerKernels},
     occlusion::BlurredPlane,
-    patch::{Knot, Patch},
+    patch::{Knot, Patch, Shares},
     patch_samples::{BlurredCell, PatchSamples, Places},
     sampler::{Rectangle, Sampler, Surface},
     stopwatch::{Part, Stopwatch},
@@ -100,14 +100,14 @@ fn blur_patch<'a>(
     let cell = &patch.cell;
     let width = task.width_of(patch);
     let half = width / 2;
-    let (first_row, first_column) = cell.first_pixel(&task.sampler.frame);
-    let whole = Rectangle { first_row, first_column, rows: cell.size, columns: cell.size };
-    let Some(source) = whole.clipped(task.film_rows, task.film_columns, half) else { return Ok(Spread::Nothing) };
+    let Some(source) = cell.pixels(&task.sampler.frame).clipped(task.film_rows, task.film_columns, half) else {
+        return Ok(Spread::Nothing);
+    };
     let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, task.blocks, cancel);
     let Some(mut ideal) = task.stopwatch.time(Part::Sampling, sample)? else { return Ok(Spread::Nothing) };
     if task.surfaces.iter().all(|surface| surface.radiance.is_none()) {
         // What a surface covers is 1 all over it, however its kernels change.
-        let share = (1.0 / uniform_response(task.kernels, patch)) as f32;
+        let share = (1.0 / uniform_response(task.kernels, patch, task.sampler.frame.factor())) as f32;
         ideal.iter_mut().for_each(|alpha| *alpha *= share);
     }
     let places = Places::new(patch, &source, task.sampler);
@@ -130,14 +130,20 @@ fn blur_patch<'a>(
     Ok(Spread::Done(BlurredCell { at, values: values? }))
 }
 
-/// Returns what the kernels over a patch make of a uniform plane of 1, to the second moments (docs/forward.md, eq. 5).
-fn uniform_response(kernels: &LayerKernels, patch: &Patch) -> f64 {
+/// Returns what the kernels over a patch make of a uniform plane of 1, to the second moments (docs/forward.md, eq. 5): those of all its
+/// knots, on this raster, whose factor is given, and on others.
+fn uniform_response(kernels: &LayerKernels, patch: &Patch, factor: usize) -> f64 {
     let excess = |(knot, shares): &(Knot, [f32; 9])| {
         let moments = kernels.canonical_at(*knot).second_moments();
         let [down, mixed, across] = kernels.symmetry.mirror(*knot).moments_at_knot(moments);
         f64::from(shares[6]) * down + f64::from(shares[4]) * mixed + f64::from(shares[2]) * across
     };
-    let excess = patch.shares.iter().map(excess).sum::<f64>() / (patch.cell.size * patch.cell.size) as f64;
+    let on_raster = |factor: usize, shares: &Shares| {
+        let size = patch.cell.size as f64 / factor as f64;
+        shares.iter().map(excess).sum::<f64>() / (size * size)
+    };
+    let elsewhere = patch.elsewhere.iter().map(|(factor, shares)| on_raster(*factor, shares));
+    let excess = on_raster(factor, &patch.shares) + elsewhere.sum::<f64>();
     // The expansion holds while it is small.
     1.0 + excess.clamp(-0.2, 0.2)
 }

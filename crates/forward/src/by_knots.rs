@@ -181,7 +181,12 @@ mod tests {
                         (*knot, shares.try_into().expect("nine"))
                     };
                     let cell = Cell { down: 0, across, size: 16 };
-                    Patch { cell, is_by_knots: true, shares: knots.iter().enumerate().map(share).collect() }
+                    Patch {
+                        cell,
+                        is_by_knots: true,
+                        shares: knots.iter().enumerate().map(share).collect(),
+                        elsewhere: vec![],
+                    }
                 })
                 .to_vec();
             let places = Places {

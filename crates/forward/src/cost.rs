@@ -59,7 +59,7 @@ fn of_knot(symmetry: Symmetry, side: usize, width: usize) -> usize {
 
 /// A knot, and the patches in which it has weight.
 struct AroundKnot {
-    /// First and last of their cells' sides, pixels: down, then across.
+    /// First and last of their cells' sides, pixels of the film: down, then across.
     reach: [(i64, i64); 2],
     width: usize,
     n_patches: usize,
@@ -75,18 +75,21 @@ impl AroundKnot {
         self.n_patches += 1;
     }
 
-    fn cost(&self, symmetry: Symmetry) -> f64 {
-        let side = self.reach.iter().map(|(first, last)| (last - first) as usize).max().unwrap_or(1);
+    fn cost(&self, factor: usize, symmetry: Symmetry) -> f64 {
+        let side = self.reach.iter().map(|(first, last)| (last - first) as usize).max().unwrap_or(1).div_ceil(factor);
         of_knot(symmetry, side, self.width) as f64
     }
 }
 
 /// Returns which patches are spread by knots: those that take less time so than by themselves, each knot shared by the patches in
-/// which it has weight.
-pub(crate) fn patches_by_knots(patches: &[Patch], costs: &[Cost], symmetry: Symmetry) -> Vec<bool> {
+/// which it has weight. Their raster has pixels `factor` times as wide as the film's.
+pub(crate) fn patches_by_knots(patches: &[Patch], costs: &[Cost], factor: usize, symmetry: Symmetry) -> Vec<bool> {
     /// Patches that leave make those that stay dearer; few are left to leave after these rounds.
     const ROUNDS: usize = 8;
-    let alone = |(patch, cost): (&Patch, &Cost)| cost.alone((patch.cell.size, patch.cell.size)) as f64;
+    let alone = |(patch, cost): (&Patch, &Cost)| {
+        let side = patch.cell.size.div_ceil(factor);
+        cost.alone((side, side)) as f64
+    };
     let alone: Vec<f64> = patches.iter().zip(costs).map(alone).collect();
     let mut chosen = vec![true; patches.len()];
     for _ in 0..ROUNDS {
@@ -97,8 +100,10 @@ pub(crate) fn patches_by_knots(patches: &[Patch], costs: &[Cost], symmetry: Symm
                 knots.entry(*knot).or_insert(nowhere).add(&patch.cell, cost.width);
             }
         }
-        let shares: BTreeMap<Knot, f64> =
-            knots.into_iter().map(|(knot, around)| (knot, around.cost(symmetry) / around.n_patches as f64)).collect();
+        let shares: BTreeMap<Knot, f64> = knots
+            .into_iter()
+            .map(|(knot, around)| (knot, around.cost(factor, symmetry) / around.n_patches as f64))
+            .collect();
         let mut has_changed = false;
         for ((patch, alone), chosen) in patches.iter().zip(&alone).zip(&mut chosen).filter(|(_, chosen)| **chosen) {
             *chosen = patch.shares.iter().map(|(knot, _)| shares[knot]).sum::<f64>() < *alone;
@@ -121,7 +126,7 @@ mod tests {
             let around = (-1..2).flat_map(|d| (-1..2).map(move |a| (down + d, across + a)));
             let knot = |(down, across)| Cell { down, across, size: 16 }.knot();
             let shares = around.map(|at| (knot(at), [1.0; 9])).collect();
-            Patch { cell: Cell { down, across, size: 16 }, is_by_knots: false, shares }
+            Patch { cell: Cell { down, across, size: 16 }, is_by_knots: false, shares, elsewhere: vec![] }
         };
         cells.map(patch).collect()
     }
@@ -129,7 +134,7 @@ mod tests {
     fn chosen(patches: &[Patch], n_terms: usize, width: usize) -> Vec<bool> {
         let costs: Vec<Cost> =
             patches.iter().map(|_| Cost { n_terms, n_across: if n_terms == 1 { 1 } else { 3 }, width }).collect();
-        patches_by_knots(patches, &costs, Symmetry::Octants)
+        patches_by_knots(patches, &costs, 1, Symmetry::Octants)
     }
 
     #[test]

@@ -101,8 +101,8 @@ pub struct Settings {
     /// A change of kernels over a cell that moves no edge spread function by more than this is left out. What is left out shows as
     /// steps between cells.
     pub negligible_edge: f64,
-    /// Largest blur radius of a layer that is imaged on the pixels of the film; wider blurs have pixels 2, 4, 8 … times as
-    /// wide, so that the radius is between half of this and this. At least 4.
+    /// Largest blur radius that is imaged on the pixels of the film; where on the film a blur is wider, pixels are 2, 4, 8 … times
+    /// as wide, so that the radius is between half of this and this. At least 4.
     pub widest_blur_px: f64,
 }
 

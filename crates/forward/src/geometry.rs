@@ -6,20 +6,24 @@ use glam::DVec2;
 
 use crate::{Film, ForwardError};
 
-/// A place on the film in pixels: columns to the right of the axis and rows below it.
+/// Where the pixels of a raster lie: columns to the right of the axis and rows below it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FilmFrame {
+    /// Pixels of the film along a side of a pixel of the raster.
+    factor: usize,
     pitch_mm: f64,
     center_row: f64,
     center_column: f64,
 }
 
 impl FilmFrame {
-    pub(crate) fn new(film: &Film) -> Self {
+    /// `factor` is the number of pixels of the film along a side of a pixel of the raster.
+    pub(crate) fn new(raster: &Film, factor: usize) -> Self {
         Self {
-            pitch_mm: 1e-3 * film.pitch_um,
-            center_row: 0.5 * (film.rows as f64 - 1.0),
-            center_column: 0.5 * (film.columns as f64 - 1.0),
+            factor,
+            pitch_mm: 1e-3 * raster.pitch_um,
+            center_row: 0.5 * (raster.rows as f64 - 1.0),
+            center_column: 0.5 * (raster.columns as f64 - 1.0),
         }
     }
 
@@ -40,6 +44,11 @@ impl FilmFrame {
 
     pub(crate) fn center(&self) -> (f64, f64) {
         (self.center_row, self.center_column)
+    }
+
+    /// Pixels of the film along a side of a pixel of the raster.
+    pub(crate) fn factor(&self) -> usize {
+        self.factor
     }
 
     pub(crate) fn pitch_mm(&self) -> f64 {

@@ -159,7 +159,7 @@ impl Mirror {
     }
 }
 
-/// The kernels of one layer at one wavelength, at the canonical knots.
+/// The kernels of one layer at one wavelength, at the canonical knots, each on the raster of its knot.
 #[derive(Clone, Debug)]
 pub(crate) struct LayerKernels {
     pub(crate) symmetry: Symmetry,
@@ -187,9 +187,9 @@ impl LayerKernels {
         Self { symmetry: self.symmetry, by_knot: self.by_knot.iter().map(mix).collect() }
     }
 
-    /// Returns the kernels of the canonical knots.
-    pub(crate) fn into_kernels(self) -> BTreeMap<Knot, KnotKernel> {
-        self.by_knot
+    /// Adds kernels of canonical knots.
+    pub(crate) fn extend(&mut self, by_knot: BTreeMap<Knot, KnotKernel>) {
+        self.by_knot.extend(by_knot);
     }
 
     /// Returns the kernel at a knot anywhere on the film: that of its canonical knot, mirrored.

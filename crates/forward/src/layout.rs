@@ -1,7 +1,7 @@
 //! The work of a plan: layers of depth over the film, their kernels, and the imaging of a band.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
@@ -14,10 +14,12 @@ use rayon::prelude::*;
 
 use crate::{
     BandKernels, BandRadiance, BlurMode, Film, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Settings,
+    active::{Seen, active_cells, cells_over, joined_for},
     basis::{BandBasis, BasisBetween, Kept},
     block_layers::BlockLayers,
     blur::{LayerTask, blur_layer},
-    geometry::check_extent,
+    film_lens::FilmLens,
+    geometry::{FilmFrame, check_extent},
     lateral_color::LateralColor,
     layers::{Blurs, Layers},
     mixed::MixedSamples,
@@ -28,7 +30,7 @@ use crate::{
     raster::LayerRaster,
     sampler::{LayerCoordinates, Surface},
     stopwatch::{Part, Stopwatch},
-    tiles::{FilmLens, Tiling, active_cells, cells_over, joined_for},
+    tiles::{LayerTiles, Tiling},
     work::{Progress, Work, plane_of},
 };
 
@@ -120,8 +122,8 @@ impl SceneLayers {
 pub(crate) struct Layout {
     pub(crate) spec: ImagingSpec,
     pub(crate) scene: Arc<SceneLayers>,
-    /// Of each layer.
-    rasters: Vec<LayerRaster>,
+    /// Of each layer, by their factor.
+    rasters: Vec<BTreeMap<usize, LayerRaster>>,
     tiling: Tiling,
     /// By the factor of their raster.
     blocks: BTreeMap<usize, BlockLayers>,
@@ -177,31 +179,35 @@ impl Layout {
         let middle_nm = middle_nm(grid);
         let maps: Vec<FilmMap> =
             layers.dioptres().par_iter().map(|&d| lens.film_map(d, middle_nm, extent_mm)).collect();
-        let factor = |radius_px: f64| LayerRaster::factor_for(radius_px, settings.widest_blur_px);
-        let raster = |(&radius_px, map)| LayerRaster::new(film, factor(radius_px), (view, scene.size()), map);
-        let rasters: Vec<LayerRaster> = radius_px.iter().zip(&maps).map(raster).collect();
 
         // Find the cells in which a layer has anything, and halve them until the spline follows the PSFs.
         let wavelengths_nm = grid.centers_nm();
-        let ends: Vec<FilmMap> = [wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1], middle_nm]
+        let wavelengths_nm = [wavelengths_nm[0], wavelengths_nm[wavelengths_nm.len() - 1], middle_nm];
+        let ends: Vec<FilmMap> = wavelengths_nm
             .into_par_iter()
             .flat_map(|w| [0, layers.len() - 1].map(|l| lens.film_map(layers.dioptres()[l], w, extent_mm)))
             .collect();
         let surfaces: Vec<&LayerCoordinates> =
             std::iter::once(&scene.layer_coordinates).chain(scene.occluded.layer_coordinates()).collect();
         let extents = Extents { radius_px: &radius_px, maps: &ends, surfaces: &surfaces };
-        let (active, blocks) = active_cells_of(&rasters, &extents, settings.knot_spacing_px, cancel)?;
+        let active = active_cells_of(film, view, &extents, settings, cancel)?;
         let work = Work::new(cancel, progress, range, active.iter().map(Vec::len).sum::<usize>() as u64);
         let stopwatch = Stopwatch::default();
         let film_lens = FilmLens {
             image: lens,
-            rasters: &rasters,
+            pitch_um: film.pitch_um,
             layers,
             maps: &maps,
             wavelength_nm: middle_nm,
             stopwatch: &stopwatch,
         };
-        let tiling = Tiling::new(active, &film_lens, settings, &work)?;
+        let tiling = Tiling::new(active, &film_lens, settings, &wavelengths_nm, &work)?;
+        let rasters_of = |(tiles, map): (&LayerTiles, &FilmMap)| -> BTreeMap<usize, LayerRaster> {
+            let raster = |&factor: &usize| (factor, LayerRaster::new(film, factor, (view, scene.size()), map));
+            tiles.patches.keys().map(raster).collect()
+        };
+        let rasters: Vec<_> = tiling.layers.iter().zip(&maps).map(rasters_of).collect();
+        let blocks = blocks_of(&rasters, &tiling, &extents, cancel)?;
         let kept = Mutex::new(Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() });
         Ok(Self {
             scene,
@@ -292,7 +298,7 @@ impl Layout {
         let wavelength_nm = self.spec.grid.centers_nm()[band];
         let film_lens = FilmLens {
             image: lens,
-            rasters: &self.rasters,
+            pitch_um: self.spec.film.pitch_um,
             layers: &self.scene.layers,
             maps: &maps,
             wavelength_nm,
@@ -429,7 +435,8 @@ impl Layout {
 
     /// What a band takes while it is imaged, bytes: planes of the film, or of the scene where that is larger.
     pub(crate) fn band_bytes(&self) -> usize {
-        const PLANES: usize = 4;
+        // Light, what is uncovered, a blurred layer, the samples that are spread by knots, and half as much for wide pixels and what is in flight.
+        const PLANES: usize = 5;
         let (Film { rows, columns, .. }, (scene_rows, scene_columns)) = (self.spec.film, self.size());
         PLANES * size_of::<f32>() * (rows * columns).max(scene_rows * scene_columns)
     }
@@ -501,24 +508,25 @@ impl Layout {
         blurred: &mut BlurredPlane,
         work: &Work<'_>,
     ) -> Result<(), Cancelled> {
-        let LayerRaster { factor, film, sampler } = &self.rasters[layer];
-        let patches = &self.tiling.patches[layer];
-        let task = LayerTask {
-            sampler,
-            map,
-            layer,
-            surfaces,
-            blocks: &self.blocks[factor],
-            patches,
-            kernels: &kernels.by_layer[layer],
-            film_rows: film.rows,
-            film_columns: film.columns,
-            negligible_edge: self.spec.settings.negligible_edge,
-            stopwatch: &self.stopwatch,
-        };
-        if *factor == 1 {
-            blur_layer(&task, blurred, work, PATCH_UNITS)?;
-        } else if !patches.is_empty() {
+        for (factor, patches) in &self.tiling.layers[layer].patches {
+            let LayerRaster { film, sampler } = &self.rasters[layer][factor];
+            let task = LayerTask {
+                sampler,
+                map,
+                layer,
+                surfaces,
+                blocks: &self.blocks[factor],
+                patches,
+                kernels: &kernels.by_layer[layer],
+                film_rows: film.rows,
+                film_columns: film.columns,
+                negligible_edge: self.spec.settings.negligible_edge,
+                stopwatch: &self.stopwatch,
+            };
+            if *factor == 1 {
+                blur_layer(&task, blurred, work, PATCH_UNITS)?;
+                continue;
+            }
             let mut coarse = BlurredPlane::new(film.rows, film.columns);
             blur_layer(&task, &mut coarse, work, PATCH_UNITS)?;
             self.stopwatch.time(Part::Compositing, || blurred.add_magnified(&coarse, *factor, work.cancel()))?;
@@ -537,34 +545,52 @@ struct Extents<'a> {
     surfaces: &'a [&'a LayerCoordinates],
 }
 
-/// The cells of each layer in which it has anything, and the layers of blocks of pixels by the factor of their raster.
-type Active = (Vec<Vec<Cell>>, BTreeMap<usize, BlockLayers>);
-
-/// Finds where layers have anything.
+/// Finds the cells of each layer in which it has anything.
 fn active_cells_of(
-    rasters: &[LayerRaster],
+    film: &Film,
+    view: View,
     extents: &Extents<'_>,
-    cell_size: usize,
+    settings: &Settings,
     cancel: &Cancel,
-) -> Result<Active, Cancelled> {
+) -> Result<Vec<Vec<Cell>>, Cancelled> {
     let Extents { radius_px, maps, surfaces } = *extents;
-    let n_layers = rasters.len();
+    let n_layers = radius_px.len();
     let samples: Vec<&Array2<f32>> = surfaces.iter().map(|surface| surface.samples()).collect();
-    let (mut active, mut blocks): Active = (vec![vec![]; n_layers], BTreeMap::new());
-    let factors: BTreeSet<usize> = rasters.iter().map(|raster| raster.factor).collect();
-    for factor in factors {
-        let members: Vec<usize> = (0..n_layers).filter(|&layer| rasters[layer].factor == factor).collect();
-        let LayerRaster { film, sampler, .. } = &rasters[members[0]];
-        let pad_px = members.iter().map(|&layer| pad_for(radius_px[layer])).fold(0.0, f64::max) / factor as f64;
-        let cells = cells_over(film, pad_px.ceil() as usize, cell_size);
-        let mut found = active_cells(&cells, sampler, maps, &samples, n_layers, cancel)?;
-        blocks.insert(factor, BlockLayers::find(sampler, &cells, maps, surfaces, cancel)?);
-        for layer in members {
-            let blur_px = 2.0 * radius_px[layer] / factor as f64;
-            active[layer] = joined_for(blur_px, std::mem::take(&mut found[layer]));
+    let frame = FilmFrame::new(film, 1);
+    // Layers by the factor of their coarsest raster: what is imaged on wide pixels has cells as much larger.
+    let mut by_factor: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (layer, &radius_px) in radius_px.iter().enumerate() {
+        by_factor.entry(LayerRaster::factor_for(radius_px, settings.widest_blur_px)).or_default().push(layer);
+    }
+    let mut active = vec![vec![]; n_layers];
+    for (factor, layers) in by_factor {
+        let pad_px = layers.iter().map(|&layer| pad_for(radius_px[layer])).fold(0.0, f64::max);
+        let cells = cells_over(film, pad_px.ceil() as usize, settings.knot_spacing_px * factor);
+        let seen = Seen { view: &view, frame: &frame, margin_px: 0.5 * (factor - 1) as f64 };
+        let mut found = active_cells(&cells, seen, maps, &samples, n_layers, cancel)?;
+        for layer in layers {
+            active[layer] = joined_for(2.0 * radius_px[layer], factor, std::mem::take(&mut found[layer]));
         }
     }
-    Ok((active, blocks))
+    Ok(active)
+}
+
+/// Finds the layers of the blocks of pixels over all patches, by the factor of their raster.
+fn blocks_of(
+    rasters: &[BTreeMap<usize, LayerRaster>],
+    tiling: &Tiling,
+    extents: &Extents<'_>,
+    cancel: &Cancel,
+) -> Result<BTreeMap<usize, BlockLayers>, Cancelled> {
+    let mut cells: BTreeMap<usize, Vec<Cell>> = BTreeMap::new();
+    for (&factor, patches) in tiling.layers.iter().flat_map(|tiles| &tiles.patches) {
+        cells.entry(factor).or_default().extend(patches.iter().map(|patch| patch.cell));
+    }
+    let blocks = cells.into_iter().filter_map(|(factor, cells)| {
+        let LayerRaster { sampler, .. } = rasters.iter().find_map(|rasters| rasters.get(&factor))?;
+        Some(BlockLayers::find(sampler, &cells, extents.maps, extents.surfaces, cancel).map(|found| (factor, found)))
+    });
+    blocks.collect()
 }
 
 /// Returns how far beyond the film light is taken from, pixels: the 95 % radius of a blur, doubled, holds all but the

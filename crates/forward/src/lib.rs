@@ -12,6 +12,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod active;
 mod basis;
 mod block_layers;
 mod block_search;
@@ -24,6 +25,7 @@ mod disc_lens;
 mod error;
 mod expansion;
 mod film;
+mod film_lens;
 mod framed;
 mod geometry;
 mod hidden;
@@ -32,6 +34,7 @@ mod knot_kernels;
 mod lateral_color;
 mod layers;
 mod layout;
+mod mesh;
 mod mixed;
 mod narrow;
 mod occluded;
@@ -39,6 +42,7 @@ mod occlusion;
 mod patch;
 mod patch_samples;
 mod plan;
+mod probe;
 mod raster;
 mod render;
 mod sample_density;

@@ -1,11 +1,13 @@
 //! Squares of the film and the knots around them.
 
+use std::collections::BTreeMap;
+
 use dioptric_psf::FilmMap;
 use glam::DVec2;
 
-use crate::geometry::FilmFrame;
+use crate::{geometry::FilmFrame, sampler::Rectangle};
 
-/// A point of the film at which the PSF is computed: pixels to the right of the axis and below it.
+/// A point of the film at which the PSF is computed: pixels of the film to the right of the axis and below it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Knot {
     pub(crate) right: i32,
@@ -13,7 +15,7 @@ pub(crate) struct Knot {
 }
 
 impl Knot {
-    /// Returns the field at the knot.
+    /// Returns the field at the knot, of pixels of the film.
     pub(crate) fn field_tan(self, map: &FilmMap, pitch_mm: f64) -> DVec2 {
         map.field_tan(DVec2::new(f64::from(self.right), -f64::from(self.down)) * pitch_mm)
     }
@@ -24,7 +26,7 @@ impl Knot {
 pub(crate) struct Cell {
     pub(crate) down: i32,
     pub(crate) across: i32,
-    /// Length of a side, pixels; even.
+    /// Length of a side, pixels of the film; even.
     pub(crate) size: usize,
 }
 
@@ -36,6 +38,15 @@ impl Cell {
     pub(crate) fn knot(&self) -> Knot {
         let (size, half) = (self.size as i32, (self.size / 2) as i32);
         Knot { right: self.across * size + half, down: self.down * size + half }
+    }
+
+    /// Returns its corners: row by row.
+    pub(crate) fn corners(&self) -> [Knot; 4] {
+        let corner = |down: i32, across: i32| {
+            let size = self.size as i32;
+            Knot { right: (self.across + across) * size, down: (self.down + down) * size }
+        };
+        [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)]
     }
 
     /// Returns the cell so many places below and to the right.
@@ -55,23 +66,37 @@ impl Cell {
 
     /// Whether it may be halved: its quarters need a knot on whole pixels.
     pub(crate) fn is_divisible(&self) -> bool {
-        self.size / 2 >= SMALLEST && self.size.is_multiple_of(4)
+        self.is_divisible_to(SMALLEST)
     }
 
-    /// The row and column of the first pixel whose center lies in the cell.
-    pub(crate) fn first_pixel(&self, frame: &FilmFrame) -> (i64, i64) {
+    /// Whether it may be halved to cells of no less than a size, pixels of the film.
+    pub(crate) fn is_divisible_to(&self, size: usize) -> bool {
+        self.size / 2 >= size.max(SMALLEST) && self.size.is_multiple_of(4)
+    }
+
+    /// The pixels of a raster whose centers lie in the cell: none of wide ones may.
+    pub(crate) fn pixels(&self, frame: &FilmFrame) -> Rectangle {
         let (center_row, center_column) = frame.center();
-        let size = self.size as f64;
-        (
-            (f64::from(self.down) * size + center_row).ceil() as i64,
-            (f64::from(self.across) * size + center_column).ceil() as i64,
-        )
+        let size = self.size_in(frame);
+        let first = |place: i32, center: f64| (f64::from(place) * size + center).ceil() as i64;
+        let (first_row, first_column) = (first(self.down, center_row), first(self.across, center_column));
+        Rectangle {
+            first_row,
+            first_column,
+            rows: (first(self.down + 1, center_row) - first_row) as usize,
+            columns: (first(self.across + 1, center_column) - first_column) as usize,
+        }
+    }
+
+    /// Returns the length of a side in pixels of a raster.
+    pub(crate) fn size_in(&self, frame: &FilmFrame) -> f64 {
+        self.size as f64 / frame.factor() as f64
     }
 
     /// Returns how far a pixel's center lies below and to the right of the middle, in parts of the cell.
     pub(crate) fn place_of(&self, frame: &FilmFrame, row: i64, column: i64) -> (f64, f64) {
         let (center_row, center_column) = frame.center();
-        let size = self.size as f64;
+        let size = self.size_in(frame);
         (
             (row as f64 - center_row) / size - f64::from(self.down) - 0.5,
             (column as f64 - center_column) / size - f64::from(self.across) - 0.5,
@@ -87,12 +112,41 @@ pub(crate) fn polynomials(u: f32) -> [f32; 3] {
 /// The largest magnitude of each polynomial within a cell.
 pub(crate) const LARGEST: [f64; 3] = [1.0, 0.5, 1.0 / 6.0];
 
-/// A cell, and how the kernels of knots around it make up those of its samples.
+/// Knots, each with its share of the nine products of polynomials: down × across, row by row.
+pub(crate) type Shares = Vec<(Knot, [f32; 9])>;
+
+/// A cell, and how the kernels of knots around it make up those of its samples, as far as these kernels are on one raster.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Patch {
     pub(crate) cell: Cell,
     /// Whether it is spread together with those around it, knot by knot.
     pub(crate) is_by_knots: bool,
-    /// The knots that take part, each with its share of the nine products of polynomials: down × across, row by row.
-    pub(crate) shares: Vec<(Knot, [f32; 9])>,
+    /// The knots with kernels on this raster.
+    pub(crate) shares: Shares,
+    /// Those with kernels on rasters of other factors, and these factors.
+    pub(crate) elsewhere: Vec<(usize, Shares)>,
+}
+
+impl Patch {
+    /// Returns the patches of a cell, one for each factor of the rasters that the kernels of its knots are on.
+    pub(crate) fn by_factor(cell: Cell, shares: Shares, factor_of: impl Fn(Knot) -> usize) -> Vec<(usize, Self)> {
+        let mut by_factor: BTreeMap<usize, Shares> = BTreeMap::new();
+        for share in shares {
+            by_factor.entry(factor_of(share.0)).or_default().push(share);
+        }
+        let elsewhere = |own: usize| {
+            let others = by_factor.iter().filter(|(factor, _)| **factor != own);
+            others.map(|(factor, shares)| (*factor, shares.clone())).collect()
+        };
+        let patch = |(&factor, shares): (&usize, &Shares)| {
+            (factor, Self { cell, is_by_knots: false, shares: shares.clone(), elsewhere: elsewhere(factor) })
+        };
+        by_factor.iter().map(patch).collect()
+    }
+
+    /// The bytes of memory that it takes.
+    pub(crate) fn size_bytes(&self) -> usize {
+        let of = |shares: &Shares| size_of_val(shares.as_slice());
+        size_of::<Self>() + of(&self.shares) + self.elsewhere.iter().map(|(_, shares)| of(shares)).sum::<usize>()
+    }
 }

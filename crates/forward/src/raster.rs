@@ -1,4 +1,4 @@
-//! The raster on which a layer is imaged: the film's, or a coarser one where the blur is wide.
+//! The rasters on which a layer is imaged: the film's, and coarser ones where the blur is wide.
 
 use dioptric_psf::FilmMap;
 use dioptric_scene::View;
@@ -11,10 +11,8 @@ const MOST_SAMPLES: usize = 16;
 /// The same of a coarser raster: a blur holds thousands of its pixels, over which what is missed averages out.
 const MOST_SAMPLES_OF_WIDE: usize = 8;
 
-/// The pixels on which a layer is imaged; they have the film's axis in their middle.
+/// The pixels on which a layer, or a part of it, is imaged; they have the film's axis in their middle.
 pub(crate) struct LayerRaster {
-    /// Pixels of the film along a side of a pixel of this raster: a power of two.
-    pub(crate) factor: usize,
     pub(crate) film: Film,
     pub(crate) sampler: Sampler,
 }
@@ -29,14 +27,13 @@ impl LayerRaster {
         factor
     }
 
-    /// `view` is that of the scene, with its rows and columns.
-    ///
-    /// Returns the raster of pixels `factor` times as wide as the film's, which reaches beyond its edges.
+    /// Returns the raster of pixels `factor` times as wide as the film's, which reaches beyond its edges. `view` is
+    /// that of the scene, with its rows and columns.
     pub(crate) fn new(film: &Film, factor: usize, view: (View, (usize, usize)), map: &FilmMap) -> Self {
         let n = |n: usize| if factor == 1 { n } else { n.div_ceil(factor) + 2 };
         let coarse = Film::centered(n(film.rows), n(film.columns), factor as f64 * film.pitch_um);
         let most = if factor == 1 { MOST_SAMPLES } else { MOST_SAMPLES_OF_WIDE };
-        let sampler = Sampler::new(view, &coarse, map, most);
-        Self { factor, film: coarse, sampler }
+        let sampler = Sampler::new(view, (&coarse, factor), map, most);
+        Self { film: coarse, sampler }
     }
 }

@@ -28,7 +28,7 @@ impl SampleDensity {
     pub(crate) fn of(view: &View, film: &Film, map: &FilmMap, most: usize) -> Self {
         let block_px = film.rows.max(film.columns).div_ceil(MOST_BLOCKS).max(LEAST_BLOCK_PX);
         let blocks = (film.rows.div_ceil(block_px), film.columns.div_ceil(block_px));
-        let frame = FilmFrame::new(film);
+        let frame = FilmFrame::new(film, 1);
         let samples_of = |block: usize| {
             let corner = ((block / blocks.1 * block_px) as f64 - 0.5, (block % blocks.1 * block_px) as f64 - 0.5);
             let densest = [0.0, 0.5, 1.0].into_iter().flat_map(|down| [0.0, 0.5, 1.0].map(|across| (down, across)));
@@ -153,7 +153,7 @@ mod tests {
         let bars: Vec<f32> = (0..size.0 * size.1).map(|at| if at % size.1 / 3 % 2 == 0 { 1.0 } else { 0.0 }).collect();
         let (cancel, everything) = (Cancel::new(), BlockLayers::of_everything());
         let depths = LayerCoordinates::new(Array2::zeros(size), &cancel).unwrap();
-        let sampler = Sampler::new((view, size), &film, &map, 16);
+        let sampler = Sampler::new((view, size), (&film, 1), &map, 16);
         let rectangle = Rectangle { first_row: 4, first_column: 0, rows: 1, columns: 401 };
         let line =
             sampler.sample(rectangle, &map, 0, &[depths.surface(Some(&bars))], &everything, &cancel).unwrap().unwrap();

@@ -108,9 +108,15 @@ pub(crate) struct Sampler {
 }
 
 impl Sampler {
-    /// Returns the sampler that takes as many samples of each pixel of the film as it sees of the scene, at most `most` each way.
-    pub(crate) fn new((view, size): (View, (usize, usize)), film: &Film, map: &FilmMap, most: usize) -> Self {
-        let frame = FilmFrame::new(film);
+    /// Returns the sampler that takes as many samples of each pixel of a raster as it sees of the scene, at most `most` each way.
+    /// The pixels of the raster are `factor` times as wide as the film's.
+    pub(crate) fn new(
+        (view, size): (View, (usize, usize)),
+        (film, factor): (&Film, usize),
+        map: &FilmMap,
+        most: usize,
+    ) -> Self {
+        let frame = FilmFrame::new(film, factor);
         let scene_per_film = view.focal_px * map.tan_per_mm(frame.pitch_mm()) * frame.pitch_mm();
         Self { view, size, frame, density: SampleDensity::of(&view, film, map, most), scene_per_film }
     }
