@@ -3,7 +3,8 @@ const sheet = JSON.parse(document.getElementById("sheet").textContent);
 const element = (id) => document.getElementById(id);
 const items = sheet.items.map(([n, status, place, values, metrics, reason]) => ({ n, status, place, values, metrics, reason }));
 const PAGE = 120;
-const COLORS = ["#1b6ca8", "#c8502b", "#3a8f4d", "#8a5aa8", "#b58a16", "#4c9fb0", "#a33c63", "#6a7280"];
+// Apart for all eyes: those of the charts of reports.
+const COLORS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#333333", "#773300", "#3300bb"];
 
 // A value as the plan has it.
 const words = (value) => {
@@ -55,13 +56,13 @@ fill("order", [["", "plan"], ...named(columns)], "");
 fill("status", [["", "all"], ["done", "done"], ["refused", "refused"], ["missing", "missing"]], "");
 const column = (id) => columns.find((own) => own.name === element(id).value);
 
-// An axis: numbers in proportion or by logarithms, else each word a place of its own.
-const axis = (values, first, last, wantsLog) => {
+// An axis with about so many ticks: numbers in proportion or by logarithms, else each word a place of its own.
+const axis = (values, first, last, wantsLog, nTicks) => {
   const isNumeric = values.every((value) => typeof value === "number");
   if (!isNumeric) {
     const names = [...new Set(values.map(words))];
     const places = new Map(names.map((name, i) => [name, first + (last - first) * (i + 0.5) / names.length]));
-    const every = Math.ceil(names.length / 12);
+    const every = Math.ceil(names.length / (2 * nTicks));
     return { at: (value) => places.get(words(value)), ticks: names.filter((_, i) => i % every === 0).map((name) => [places.get(name), name]) };
   }
   let least = Infinity, most = -Infinity;
@@ -72,7 +73,7 @@ const axis = (values, first, last, wantsLog) => {
     const at = (value) => first + (last - first) * (Math.log10(value) - a + pad) / (b - a + 2 * pad);
     const ticks = [];
     for (let decade = Math.floor(a); decade <= Math.ceil(b); decade++) {
-      for (const digit of b - a > 3 ? [1] : b - a > 1 ? [1, 2, 5] : [1, 2, 3, 4, 5, 6, 7, 8, 9]) {
+      for (const digit of b - a > nTicks / 3 ? [1] : b - a > nTicks / 9 ? [1, 2, 5] : [1, 2, 3, 4, 5, 6, 7, 8, 9]) {
         const value = digit * 10 ** decade;
         if (value >= 10 ** (a - pad) && value <= 10 ** (b + pad)) ticks.push([at(value), short(value)]);
       }
@@ -82,7 +83,7 @@ const axis = (values, first, last, wantsLog) => {
   const pad = most > least ? 0.04 * (most - least) : Math.abs(most) * 0.5 || 1;
   [least, most] = [least - pad, most + pad];
   const at = (value) => first + (last - first) * (value - least) / (most - least);
-  const raw = (most - least) / 6, power = 10 ** Math.floor(Math.log10(raw));
+  const raw = (most - least) / nTicks, power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map((digit) => digit * power).find((own) => own >= raw);
   const ticks = [];
   for (let i = Math.ceil(least / step); i * step <= most; i++) ticks.push([at(i * step), short(i * step)]);
@@ -102,7 +103,10 @@ const plot = () => {
   if (!x || !y) return;
   const shown = items.filter((item) => x.of(item) !== undefined && typeof y.of(item) === "number");
   if (shown.length === 0) return;
-  const [width, height, left, top, bottom] = [1100, 420, 90, 14, 52];
+  // One unit is a pixel of the page, so that words are as large as elsewhere in windows of any width.
+  const width = Math.max(280, Math.min(1100, element("plot").clientWidth || 1100));
+  const isNarrow = width < 620;
+  const [left, top, bottom] = [isNarrow ? 64 : 90, 14, 52];
   const places = new Map(), colors = new Map();
   const groups = [];
   for (const item of color ? shown : []) {
@@ -110,22 +114,27 @@ const plot = () => {
     if (!places.has(group)) places.set(group, groups.push(group) - 1);
     colors.set(item, group);
   }
-  const right = groups.length ? 200 : 20;
+  // The key: beside the plot, below it in narrow windows.
+  const every = Math.ceil(groups.length / 20);
+  const key = groups.filter((_, i) => i % every === 0);
+  const right = key.length && !isNarrow ? 200 : 20;
+  const keyHeight = key.length && isNarrow ? 18 * key.length + 8 : 0;
+  const height = (isNarrow ? 280 : 420) + keyHeight, floor = height - keyHeight - bottom;
   const isLog = element("log").checked;
-  const across = axis(shown.map(x.of), left, width - right, isLog);
-  const up = axis(shown.map(y.of), height - bottom, top, isLog);
-  const drawing = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img" });
+  const across = axis(shown.map(x.of), left, width - right, isLog, isNarrow ? 4 : 9);
+  const up = axis(shown.map(y.of), floor, top, isLog, 6);
+  const drawing = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${y.name} against ${x.name}${color ? `, colored by ${color.name}` : ""}: ${shown.length} items` });
   for (const [place, text] of across.ticks) {
-    drawing.append(svg("line", { x1: place, x2: place, y1: top, y2: height - bottom, stroke: "#e2e5ea" }));
-    drawing.append(svg("text", { x: place, y: height - bottom + 18, "text-anchor": "middle", fill: "#1d2330" }, text));
+    drawing.append(svg("line", { x1: place, x2: place, y1: top, y2: floor, stroke: "#e2e5ea" }));
+    drawing.append(svg("text", { x: place, y: floor + 18, "text-anchor": "middle", fill: "#1d2330" }, text));
   }
   for (const [place, text] of up.ticks) {
     drawing.append(svg("line", { x1: left, x2: width - right, y1: place, y2: place, stroke: "#e2e5ea" }));
     drawing.append(svg("text", { x: left - 8, y: place + 4, "text-anchor": "end", fill: "#1d2330" }, text));
   }
-  drawing.append(svg("rect", { x: left, y: top, width: width - right - left, height: height - bottom - top, fill: "none", stroke: "#6b7280" }));
-  drawing.append(svg("text", { x: (left + width - right) / 2, y: height - 10, "text-anchor": "middle", fill: "#1d2330" }, x.name));
-  const middle = (top + height - bottom) / 2;
+  drawing.append(svg("rect", { x: left, y: top, width: width - right - left, height: floor - top, fill: "none", stroke: "#6b7280" }));
+  drawing.append(svg("text", { x: (left + width - right) / 2, y: floor + bottom - 10, "text-anchor": "middle", fill: "#1d2330" }, x.name));
+  const middle = (top + floor) / 2;
   drawing.append(svg("text", { x: 16, y: middle, "text-anchor": "middle", fill: "#1d2330", transform: `rotate(-90 16 ${middle})` }, y.name));
   const shade = (item) => {
     if (!color) return COLORS[0];
@@ -164,12 +173,11 @@ const plot = () => {
     const item = nearest(event);
     if (item) choose(item);
   });
-  const every = Math.ceil(groups.length / 20);
-  groups.filter((_, i) => i % every === 0).forEach((group, row) => {
-    const place = top + 12 + 18 * row;
+  key.forEach((group, row) => {
+    const [across, place] = isNarrow ? [left, floor + bottom + 12 + 18 * row] : [width - right + 18, top + 12 + 18 * row];
     const one = shown.find((item) => colors.get(item) === group);
-    drawing.append(svg("circle", { cx: width - right + 18, cy: place - 4, r: 5, fill: shade(one) }));
-    drawing.append(svg("text", { x: width - right + 30, y: place, fill: "#1d2330" }, group.length > 24 ? group.slice(0, 23) + "…" : group));
+    drawing.append(svg("circle", { cx: across, cy: place - 4, r: 5, fill: shade(one) }));
+    drawing.append(svg("text", { x: across + 12, y: place, fill: "#1d2330" }, group.length > 24 ? group.slice(0, 23) + "…" : group));
   });
   element("plot").append(drawing);
 };
@@ -234,6 +242,11 @@ const choose = (item) => {
 for (const id of ["x", "y", "color", "log"]) element(id).addEventListener("change", plot);
 for (const id of ["order", "status"]) element(id).addEventListener("change", list);
 element("more").addEventListener("click", more);
+let drawn = window.innerWidth;
+window.addEventListener("resize", () => {
+  if (window.innerWidth !== drawn) plot();
+  drawn = window.innerWidth;
+});
 element("log").checked = (() => {
   const values = items.map(column("x").of).filter((value) => typeof value === "number" && value > 0);
   let least = Infinity, most = 0;
