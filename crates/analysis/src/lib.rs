@@ -11,6 +11,7 @@ mod chart;
 mod lens;
 pub mod measure;
 mod methods;
+mod palette;
 mod psf;
 mod run;
 mod sensor_table;

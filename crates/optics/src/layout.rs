@@ -34,8 +34,8 @@ pub struct Layout {
     pub width_px: f64,
 }
 
-/// Colors of fields, in their order: blue, green, red, orange, violet, gray.
-const FIELD_COLORS: [&str; 6] = ["#2166ac", "#1b7837", "#b2182b", "#d9810c", "#762a83", "#555555"];
+/// Colors of fields, in their order: blue, green, vermilion, orange, pink, dark gray; apart for all eyes (Okabe & Ito).
+const FIELD_COLORS: [&str; 6] = ["#0072b2", "#009e73", "#d55e00", "#e69f00", "#cc79a7", "#333333"];
 /// Dashes of wavelengths, in their order, where colors tell fields; the first is a whole line.
 const DASHES: [&str; 4] = ["none", "7 3", "2 2", "9 2 2 2"];
 

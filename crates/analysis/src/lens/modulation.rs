@@ -6,11 +6,10 @@ use dioptric_optics::Lens;
 use dioptric_psf::Diffraction;
 
 use super::rows::{FieldPlace, LensAnalysis};
-use crate::{Corner, LineChart, PsfRequest, PsfSampling, PsfSet, Scale, Series};
+use crate::{Corner, LineChart, PsfRequest, PsfSampling, PsfSet, Scale, Series, palette};
 use dioptric_pipeline::{FocusSpec, PipelineError, number};
 
 /// Colors of lines, told apart also by those who see few.
-const COLORS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 /// Steps along the axis of frequencies.
 const STEPS: usize = 60;
 /// One in so many of the fields of an analysis's curves has a place in the curve over field.
@@ -217,7 +216,7 @@ impl Bench<'_> {
 fn pair(label: Option<String>, i: usize, x: &[f64], values: &[[f64; 2]]) -> [Series; 2] {
     [0, 1].map(|which| Series {
         label: label.clone().filter(|_| which == 0),
-        color: COLORS[i % COLORS.len()].to_owned(),
+        color: palette::line(i),
         points: x.iter().zip(values).map(|(x, value)| (*x, value[which])).collect(),
         is_dashed: which == 1,
     })

@@ -8,7 +8,7 @@ use ndarray::Array3;
 use serde::Serialize;
 
 use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion};
-use crate::{Corner, LineChart, Scale, Series};
+use crate::{Corner, LineChart, Scale, Series, palette};
 use dioptric_pipeline::PipelineError;
 
 /// Points of the plotted distribution.
@@ -155,7 +155,7 @@ impl Measurement for Comparison {
             y_range: (0.0, 1.0),
             series: vec![Series {
                 label: None,
-                color: "#2f55c8".to_owned(),
+                color: palette::line(0),
                 points: self.scielab.distribution.clone(),
                 is_dashed: false,
             }],

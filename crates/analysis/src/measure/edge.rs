@@ -6,8 +6,8 @@ use dioptric_sensor::{EdgeResponse, find_edge};
 use ndarray::{Array2, ArrayView2, s};
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion, channel_color};
-use crate::{Corner, LineChart, Scale, Series};
+use super::{CodeCurve, MeasuredPicture, Measurement, PixelRegion};
+use crate::{Corner, LineChart, Scale, Series, palette};
 use dioptric_pipeline::PipelineError;
 
 /// The side of the region that is looked for, in samples of one channel.
@@ -239,7 +239,7 @@ impl Measurement for EdgeMeasurement {
     fn charts(&self) -> Vec<(String, LineChart)> {
         let series = self.channels.iter().map(|channel| Series {
             label: Some(channel.channel.clone()),
-            color: channel_color(&channel.channel),
+            color: palette::channel(&channel.channel),
             points: channel
                 .frequencies_cycles_per_pixel
                 .iter()

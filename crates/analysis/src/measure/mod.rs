@@ -27,13 +27,3 @@ pub trait Measurement: Serialize {
     /// Returns the plots, each with the name of its file.
     fn charts(&self) -> Vec<(String, LineChart)>;
 }
-
-/// The color of a channel's line: its own where the name is a color's.
-fn channel_color(name: &str) -> String {
-    match name {
-        "R" => "#c03030".to_owned(),
-        "G" => "#208a35".to_owned(),
-        "B" => "#2f55c8".to_owned(),
-        _ => "#333340".to_owned(),
-    }
-}

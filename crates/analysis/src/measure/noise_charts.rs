@@ -1,7 +1,7 @@
 //! Plots of the photon transfer.
 
 use super::{Measurement, NoiseData, NoisePoint};
-use crate::{Corner, LineChart, Scale, Series};
+use crate::{Corner, LineChart, Scale, Series, palette};
 
 impl Measurement for NoiseData {
     fn charts(&self) -> Vec<(String, LineChart)> {
@@ -9,8 +9,8 @@ impl Measurement for NoiseData {
     }
 }
 
-const MEASURED: &str = "#2f55c8";
-const MODEL: &str = "#c03030";
+const MEASURED: &str = palette::LINES[0];
+const MODEL: &str = palette::LINES[1];
 
 impl NoiseData {
     fn transfer_plot(&self) -> LineChart {

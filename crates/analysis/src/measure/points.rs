@@ -7,8 +7,8 @@ use dioptric_sensor::{PointWindow, find_points};
 use ndarray::{Array2, s};
 use serde::Serialize;
 
-use super::{CodeCurve, MeasuredPicture, Measurement, channel_color};
-use crate::{Corner, LineChart, Scale, Series};
+use super::{CodeCurve, MeasuredPicture, Measurement};
+use crate::{Corner, LineChart, Scale, Series, palette};
 use dioptric_pipeline::PipelineError;
 
 /// Shares of the energy whose radii are listed.
@@ -165,7 +165,7 @@ impl Measurement for PointSet {
         // More than a few lines cannot be distinguished.
         let series = self.spots.iter().take(12).map(|spot| Series {
             label: Some(format!("{} {}", spot.spot, spot.channel)),
-            color: channel_color(&spot.channel),
+            color: palette::channel(&spot.channel),
             points: [(0.0, 0.0)].into_iter().chain(spot.encircled_energy.iter().copied()).collect(),
             is_dashed: spot.spot > 0,
         });

@@ -6,13 +6,10 @@ use dioptric_pipeline::number;
 use dioptric_psf::{EnclosedEnergy, Picture, Profile};
 
 use super::windowed::Windowed;
-use crate::{Corner, LineChart, PsfRow, PsfSet, Scale, Series, ThroughFocus};
+use crate::{Corner, LineChart, PsfRow, PsfSet, Scale, Series, ThroughFocus, palette};
 
 /// Point-spread functions that a plot tells apart.
-const MOST_LINES: usize = 9;
-/// Colors of lines, the first six distinguishable with color vision deficiency.
-const COLORS: [&str; MOST_LINES] =
-    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f3c8d", "#8c6d31", "#808080"];
+const MOST_LINES: usize = palette::LINES.len();
 /// Steps along the axis of a plot.
 const STEPS: i32 = 60;
 
@@ -132,7 +129,7 @@ impl PsfSet {
             let meridian = row.meridian_rad();
             [(meridian, false), (meridian + FRAC_PI_2, true)].map(|(direction, is_dashed)| Series {
                 label: (!is_dashed).then(|| self.point_label(row)),
-                color: color(i),
+                color: palette::line(i),
                 points: steps(reach_per_mm).map(|f| (f, whole(direction, f))).collect(),
                 is_dashed,
             })
@@ -151,7 +148,7 @@ impl PsfSet {
         let reach_um = energies.iter().map(|energy| energy.reach_um(0.98)).fold(0.0, f64::max) * 1.2;
         let lines = energies.iter().zip(plotted).enumerate().map(|(i, (energy, p))| Series {
             label: Some(self.label(p.row)),
-            color: color(i),
+            color: palette::line(i),
             points: steps(reach_um).map(|reach| (reach, energy.within(reach))).collect(),
             is_dashed: false,
         });
@@ -165,7 +162,12 @@ impl PsfSet {
             let line = |is_dashed: bool| {
                 let values = modulations.iter().map(|(along, across)| if is_dashed { *across } else { *along });
                 let points = found.shifts_mm.iter().copied().zip(values).collect();
-                Series { label: (!is_dashed).then(|| self.label(&self.rows[*row])), color: color(i), points, is_dashed }
+                Series {
+                    label: (!is_dashed).then(|| self.label(&self.rows[*row])),
+                    color: palette::line(i),
+                    points,
+                    is_dashed,
+                }
             };
             [line(false), line(true)]
         });
@@ -182,7 +184,7 @@ impl PsfSet {
             let row = plotted.row;
             let line = |direction: f64, is_dashed: bool| Series {
                 label: (!is_dashed).then(|| self.label(row)),
-                color: color(i),
+                color: palette::line(i),
                 points: of(plotted, direction),
                 is_dashed,
             };
@@ -233,10 +235,6 @@ fn evenly<T: Clone>(all: Vec<T>) -> Vec<T> {
 
 fn steps(last: f64) -> impl Iterator<Item = f64> {
     (0..=STEPS).map(move |i| last * f64::from(i) / f64::from(STEPS))
-}
-
-fn color(i: usize) -> String {
-    COLORS[i % COLORS.len()].to_owned()
 }
 
 fn chart(

@@ -5,13 +5,11 @@ use dioptric_psf::{LensImage, LensImageModel, Picture, PsfQuery};
 
 use super::Run;
 use crate::SensorStatistics;
-use crate::{Corner, LineChart, Scale, Series};
+use crate::{Corner, LineChart, Scale, Series, palette};
 use dioptric_pipeline::{Capture, REFERENCE_WAVELENGTH_NM, display::wavelength_color};
 
 /// Points of a curve.
 const POINTS: usize = 64;
-/// Colors of the channels of a frame that are not red, green or blue.
-const OTHER_CHANNEL: &str = "#555566";
 
 /// The plots of the report.
 #[derive(Clone, Debug)]
@@ -153,12 +151,12 @@ fn mtf(run: &Run<'_>, places: &RunPlaces) -> LineChart {
     let (radial, focus) = (places.corner.to_angle(), places.focus_dioptres);
     let tangential = radial + std::f64::consts::FRAC_PI_2;
     let mut lines = vec![
-        ("axis, in focus", DVec2::ZERO, focus, 0.0, "#1b6ca8"),
-        ("70 % field, radial", places.field(0.7), focus, radial, "#c2571a"),
-        ("70 % field, tangential", places.field(0.7), focus, tangential, "#7a9e2c"),
+        ("axis, in focus", DVec2::ZERO, focus, 0.0, palette::LINES[0]),
+        ("70 % field, radial", places.field(0.7), focus, radial, palette::LINES[1]),
+        ("70 % field, tangential", places.field(0.7), focus, tangential, palette::LINES[2]),
     ];
     if (far - places.focus_dioptres).abs() > 1e-6 {
-        lines.push(("axis, far end of the scene", DVec2::ZERO, far, 0.0, "#777788"));
+        lines.push(("axis, far end of the scene", DVec2::ZERO, far, 0.0, palette::LINES[6]));
     }
     let mut series: Vec<Series> = lines
         .into_iter()
@@ -171,7 +169,7 @@ fn mtf(run: &Run<'_>, places: &RunPlaces) -> LineChart {
         .collect();
     series.push(Series {
         label: Some(format!("Nyquist frequency of the pixels, {nyquist_per_mm:.1} per mm")),
-        color: "#999999".to_owned(),
+        color: palette::REFERENCE.to_owned(),
         points: vec![(nyquist_per_mm, 0.0), (nyquist_per_mm, 1.05)],
         is_dashed: true,
     });
@@ -243,7 +241,10 @@ fn illumination(bank: &LensImageModel, places: &RunPlaces) -> LineChart {
         y_label: "share of the axis".to_owned(),
         x_range: (0.0, places.corner_tan().atan().to_degrees()),
         y_range: (0.0, 1.05),
-        series: vec![series("this lens", "#1b6ca8", real, false), series("cos⁴", "#999999", cosines, true)],
+        series: vec![
+            series("this lens", palette::LINES[0], real, false),
+            series("cos⁴", palette::REFERENCE, cosines, true),
+        ],
         legend: Corner::BottomLeft,
         scale: Scale::Linear,
     }
@@ -297,7 +298,7 @@ fn spectrum(capture: &Capture) -> LineChart {
         y_label: "mW m⁻² nm⁻¹".to_owned(),
         x_range: if last > first { (first, last) } else { (first - 1.0, first + 1.0) },
         y_range: (0.0, 1.05 * top.max(f64::MIN_POSITIVE)),
-        series: vec![Series { label: None, color: "#1b6ca8".to_owned(), points, is_dashed: false }],
+        series: vec![Series { label: None, color: palette::line(0), points, is_dashed: false }],
         legend: Corner::TopRight,
         scale: Scale::Linear,
     }
@@ -313,7 +314,7 @@ fn histogram(capture: &Capture, sensor: &SensorStatistics) -> LineChart {
             let center = |bin: usize| (bin as f64 + 0.5) / n * top;
             Series {
                 label: Some(channel.filter.clone()),
-                color: channel_color(&channel.filter).to_owned(),
+                color: palette::channel(&channel.filter),
                 points: channel
                     .histogram
                     .iter()
@@ -334,14 +335,5 @@ fn histogram(capture: &Capture, sensor: &SensorStatistics) -> LineChart {
         series,
         legend: Corner::TopRight,
         scale: Scale::Linear,
-    }
-}
-
-fn channel_color(filter: &str) -> &'static str {
-    match filter.chars().next().map(|c| c.to_ascii_lowercase()) {
-        Some('r') => "#c23b22",
-        Some('g') => "#2e8b3d",
-        Some('b') => "#2855b5",
-        _ => OTHER_CHANNEL,
     }
 }
