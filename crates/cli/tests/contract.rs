@@ -351,6 +351,25 @@ fn traced_rays_have_their_columns_and_seventeen_digits() {
     assert!(fs::read_to_string(folder.path().join("out.csv")).unwrap().lines().count() > 14);
 }
 
+/// Rays of an ultraviolet that a glass's table does not reach: refused, or continued and said.
+#[test]
+fn traced_rays_tell_of_a_glass_that_is_continued() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(
+        folder.path().join("rays.csv"),
+        "x_mm,y_mm,z_mm,l,m,n,wavelength_nm\n0,2,-10,0,0,1,315\n0,2,-10,0,0,1,550\n",
+    )
+    .unwrap();
+    let common = ["trace", "achromat-100mm", "--rays", "rays.csv"];
+    common::check_error(folder.path(), &common, &["315 nm", "--glass-range extend"]);
+    let traced = common::dioptric(folder.path(), &[&common[..], &["--glass-range", "extend"]].concat());
+    let notes = String::from_utf8(traced.stderr).unwrap();
+    assert!(
+        traced.status.success() && notes.contains("at 315 nm its index") && notes.contains("may be off by"),
+        "{notes}"
+    );
+}
+
 /// A germanium lens of a design program's file: what it says of its use stands where the command says nothing.
 #[test]
 fn use_that_a_file_states_is_taken() {

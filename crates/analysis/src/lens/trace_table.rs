@@ -29,6 +29,14 @@ pub struct TraceSettings {
 }
 
 impl RayTable {
+    /// The wavelengths of the rays, nm, each once, shortest first.
+    pub fn wavelengths_nm(&self) -> Vec<f64> {
+        let mut all: Vec<f64> = self.rays.iter().map(|(_, _, wavelength_nm)| *wavelength_nm).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
+    }
+
     /// Reads CSV text with the columns `x_mm,y_mm,z_mm,l,m,n,wavelength_nm`: start point and direction cosines in the
     /// lens frame.
     ///
