@@ -8,7 +8,7 @@ use dioptric_world::{
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{BackwardError, Camera, Pinhole};
+use crate::{BackwardError, Camera, Pinhole, peeling::Surfaces};
 
 /// Pictures of what each pixel's middle sees through the middle of the pupil.
 #[derive(Clone, Debug)]
@@ -82,7 +82,7 @@ pub fn auxiliary(
 /// Returns the depth along the axis, m, of the first surfaces that a pinhole sees through the middle of each pixel, one
 /// after another: the first map what is seen, the second what that hides, and so on; infinite where there is no more.
 ///
-/// Both sides of a closed object are surfaces, so that its back is what its front hides first.
+/// The back of a closed shape is none of them: its front hides what lies behind both. A shape that is open and folded is taken for closed.
 ///
 /// # Errors
 /// When it was cancelled.
@@ -95,19 +95,19 @@ pub fn layered_depth(
     view.pixels.check()?;
     let (rows, columns) = view.pixels.size();
     let (center_m, axis) = projection_center(&Camera::Pinhole(*view));
-    let mut layers = vec![Array2::from_elem((rows, columns), f32::INFINITY); n_layers];
-    for row in 0..rows {
+    let depths_of = |row: usize| {
         cancel.check()?;
-        for column in 0..columns {
-            let mut ray = view.ray(row * columns + column, [0.5; 2]);
-            for layer in &mut layers {
-                let Some(hit) = world.intersect(&ray, f32::INFINITY) else { break };
-                layer[(row, column)] = (hit.point.as_dvec3() - center_m).dot(axis) as f32;
-                ray = hit.ray_towards(ray.direction);
-            }
+        let mut depths = vec![f32::INFINITY; columns * n_layers];
+        for (column, depths) in depths.chunks_exact_mut(n_layers.max(1)).enumerate() {
+            let surfaces = Surfaces::along(world, view.ray(row * columns + column, [0.5; 2]));
+            let depth_m = |hit: Hit| (hit.point.as_dvec3() - center_m).dot(axis) as f32;
+            depths.iter_mut().zip(surfaces).for_each(|(depth, hit)| *depth = depth_m(hit));
         }
-    }
-    Ok(layers)
+        Ok(depths)
+    };
+    let by_row: Vec<Vec<f32>> = (0..rows).into_par_iter().map(depths_of).collect::<Result<_, BackwardError>>()?;
+    let layer = |layer: usize| Array2::from_shape_fn((rows, columns), |(r, c)| by_row[r][c * n_layers + layer]);
+    Ok((0..n_layers).map(layer).collect())
 }
 
 /// Returns the point that depth counts from, and the direction of the axis, in the world.

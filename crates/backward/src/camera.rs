@@ -28,7 +28,8 @@ pub struct Pinhole {
     pub pixels: PixelGrid,
     /// The tangents of half the angles across the picture's width and height.
     pub half_tangents: DVec2,
-    /// How many surfaces are looked through: 0 shows what is seen, 1 what the first hides, and so on.
+    /// How many surfaces are looked through: 0 shows what is seen, 1 what the first hides, and so on. The back of a closed shape is none of
+    /// them, as in [`layered_depth`](crate::layered_depth).
     pub layer: u32,
 }
 

@@ -22,6 +22,7 @@ mod lens_camera;
 mod micro_array;
 mod output;
 mod packets;
+mod peeling;
 mod placement;
 mod renderer;
 mod sampler;

@@ -13,6 +13,7 @@ use crate::{
     film::Film,
     integrator::Integrator,
     packets::{PACKET, Packets},
+    peeling::Surfaces,
     sampler::mix,
 };
 
@@ -249,10 +250,10 @@ impl<'a> Renderer<'a> {
 
     /// Moves a ray through the surfaces that are looked through; `None` where there are not so many.
     fn behind_layers(&self, ray: Ray) -> Option<Ray> {
-        (0..self.camera.layer()).try_fold(ray, |ray, _| {
-            let hit = self.world.intersect(&ray, f32::INFINITY)?;
-            Some(hit.ray_towards(ray.direction))
-        })
+        match self.camera.layer() {
+            0 => Some(ray),
+            n => Surfaces::along(self.world, ray).ray_behind(n),
+        }
     }
 }
 

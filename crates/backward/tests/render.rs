@@ -583,6 +583,35 @@ fn second_layer_shows_what_first_hides() {
     }
 }
 
+/// A ball of radius 0.3 m before another and a wall: what each hides is the next, and never its own back, in depth as in light.
+#[test]
+fn backs_of_closed_shapes_hide_nothing() {
+    let mut builder = WorldBuilder::new();
+    add_gray(&mut builder, quad([-5.0, -5.0, 6.0], 10.0, 10.0), 0.0, 3.0);
+    let gray = builder.add_texture(Texture::Curve(SpectralCurve::constant(0.0)));
+    let material = builder.add_material("ball", Material::Matte { reflectance: gray });
+    for (z_m, radiance) in [(2.0, 1.0), (4.0, 2.0)] {
+        let emission = Emission { radiance: SpectralCurve::constant(radiance), is_two_sided: true };
+        let place = DAffine3::from_translation(DVec3::new(0.0, 0.0, z_m));
+        builder.add_shape(Shape::Sphere { radius_m: 0.3 }, place, material, Some(emission));
+    }
+    let world = builder.build().unwrap();
+    let view = pinhole(4, 0.02);
+    let layers = layered_depth(&world, &view, 4, &Cancel::new()).unwrap();
+    let bands = bands(&[550.0]);
+    for (layer, (nearest_m, radiance)) in
+        [(1.7, 1.0), (3.7, 2.0), (6.0, 3.0), (f32::INFINITY, 0.0)].into_iter().enumerate()
+    {
+        // The balls' fronts lie up to r − √(r² − x²) farther off the axis: x is 1.5 % of 4 m, in pixels at √2 times that.
+        let slack_m = 0.3 - (0.09_f32 - 2.0 * 0.06 * 0.06).sqrt();
+        let is_there = |&z_m: &f32| z_m == nearest_m || (nearest_m..nearest_m + slack_m).contains(&z_m);
+        assert!(layers[layer].iter().all(is_there), "{layer}: {}", layers[layer]);
+        let camera = Camera::Pinhole(Pinhole { layer: layer as u32, ..view });
+        let picture = render(&world, &camera, settings(&bands, 1), 1);
+        assert!(picture.picture.planes()[0].iter().all(|&found| found == radiance), "{layer}");
+    }
+}
+
 #[test]
 fn bad_settings_end_in_a_sentence() {
     let world = sky();

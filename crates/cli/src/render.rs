@@ -11,8 +11,8 @@ use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport};
 use dioptric_pipeline::{
     Camera, Crop, FilmSpec, KeptCamera, LensReadOptions, LensSpec, LightPaths, PictureOptions, PipelineError, Progress,
-    RenderEffort, Rendering, RenderingSummary, SceneSource, SceneSpec, SensorSpec, Silent, Stage, Staged, StopSpec,
-    WavelengthSpec, WorldRender, WorldSpec, with_exposure_s, write_json, write_seen_png,
+    RenderEffort, RenderMethod, Rendering, RenderingSummary, SceneSource, SceneSpec, SensorSpec, Silent, Stage, Staged,
+    StopSpec, WavelengthSpec, WorldRender, WorldSpec, with_exposure_s, write_json, write_scene, write_seen_png,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::{Cancel, WavelengthGrid};
@@ -28,6 +28,8 @@ use crate::{
 
 /// The name of a checkpoint.
 const STATE: &str = "render.state";
+/// The name of the scene as the middle of the entrance pupil sees it.
+const SCENE: &str = "scene.exr";
 /// Checkpoints are written at least so far apart.
 const BETWEEN_CHECKPOINTS: Duration = Duration::from_secs(10);
 /// The name of the picture so far, until the whole one takes its place.
@@ -242,6 +244,9 @@ fn finish(
             .map(str::to_owned)
             .collect::<Vec<_>>(),
     );
+    if arguments.layers.is_some() {
+        report.files.push(SCENE.to_owned());
+    }
     let world = kept.world(&Silent, cancel)?;
     let SceneSource::World(spec) = &kept.camera().scene.source else { unreachable!("the scene is a world") };
     let rendering = RenderingSummary::of(rendering, &world, spec);
@@ -249,6 +254,14 @@ fn finish(
     write_json(&staged.path().join("report.json"), &report)?;
     write_json(&staged.path().join("timings.json"), &clock.times())?;
     kept.write_resume_file(&capture, staged.path())?;
+    if let Some(layers) = arguments.layers {
+        let seen = KeptCamera::new(kept.camera().clone()).with(|camera| {
+            if let SceneSource::World(spec) = &mut camera.scene.source {
+                (spec.method, spec.layers) = (RenderMethod::Forward, layers);
+            }
+        });
+        write_scene(&seen, &staged.path().join(SCENE), clock, cancel)?;
+    }
     staged.commit()?;
     remove_preview(out);
     tell(&capture.lens_notes(), common);
@@ -271,6 +284,9 @@ fn render_without_sensor(
     sum_up: &dyn Fn(&Rendering) -> RenderingSummary,
 ) -> anyhow::Result<()> {
     let (render, clock, cancel) = job;
+    if arguments.layers.is_some() {
+        bail!("--layers is of a whole picture on the film of a lens, expected --lens or --camera, and no --crop");
+    }
     let rendering = refine(arguments, job)?;
     let out = &arguments.out;
     let staged = guarded(Staged::folder(out)?);

@@ -88,6 +88,10 @@ pub(crate) struct RenderArgs {
     /// Renders for so long, s, or until the noise is reached where that is given too
     #[arg(long, value_name = "S", help_heading = "Simulation")]
     pub(crate) seconds: Option<f64>,
+    /// Writes scene.exr too, a scene for `run --scene`: radiance and depth as the middle of the entrance pupil sees them and, of 2
+    /// layers, what that hides
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=2), help_heading = "Results")]
+    pub(crate) layers: Option<u32>,
     /// Goes on from where an earlier rendering into the same folder was stopped; the bits are those of one without a stop
     #[arg(long, help_heading = "Results")]
     pub(crate) resume: bool,

@@ -68,6 +68,25 @@ fn world_ends_in_a_picture_and_a_report() {
     output(folder.path(), &["sense", "out/irradiance.exr", "--sensor", "nikon-d100", "--quiet", "-o", "sensed"]);
 }
 
+/// The scene beside the rendering images as the world does: a wall that hides nothing, in two layers.
+#[test]
+fn scene_seen_from_the_pupil_is_one_for_run() {
+    let folder = folder();
+    render(folder.path(), &["--samples", "16", "--layers", "2", "-o", "out"]);
+    assert!(report(&folder.path().join("out"))["files"].as_array().unwrap().iter().any(|name| name == "scene.exr"));
+    output(
+        folder.path(),
+        &[&["run", "--scene", "out/scene.exr", "--pixels", "24x16", "--pixel-um", "400", "-o", "blurred"], LENS]
+            .concat(),
+    );
+    let mean = |of: &str| report(&folder.path().join(of))["irradiance"]["mean"][1].as_f64().unwrap();
+    // Both have the light of the same part of the wall, but for the noise of 16 samples a pixel and the frame, whose films differ.
+    println!("{} {}", mean("out"), mean("blurred"));
+    assert!((mean("blurred") / mean("out") - 1.0).abs() < 0.05, "{} {}", mean("out"), mean("blurred"));
+    check_error(folder.path(), &["render", "wall.pbrt", "--layers", "2"], &["--layers", "expected --lens or --camera"]);
+    check_error(folder.path(), &["render", "wall.pbrt", "--layers", "3"], &["--layers", "3"]);
+}
+
 #[test]
 fn camera_of_the_file_sees_radiance() {
     let folder = folder();

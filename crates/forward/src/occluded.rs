@@ -37,6 +37,10 @@ pub(crate) struct Guesses {
 /// How much farther than the first surface something must lie to be known as behind it, of a jump of depth: roundings.
 const LEAST_BEHIND: f32 = 0.05;
 
+/// A change of blur radius between neighbors from which on an edge shows what is known to lie behind it, pixels: far less than what a guess
+/// takes for an edge, since what is known does no harm beside a slope.
+const KNOWN_EDGE_PX: f32 = 0.5;
+
 /// Where the samples of a scene lie, in pixels of blur radius behind the nearest.
 pub(crate) struct Distances {
     pub(crate) front: Array2<f32>,
@@ -75,7 +79,8 @@ impl OccludedSamples {
         let Distances { front, behind } = distances;
         let size = front.dim();
         if let Some(known) = behind {
-            let reach = reach_of_edges(front, &rule, cancel)?;
+            let known_rule = EdgeRule { jump: rule.jump.min(KNOWN_EDGE_PX), reach: rule.reach };
+            let reach = reach_of_edges(front, &known_rule, cancel)?;
             let fill = Fill::find(front, &rule, cancel)?;
             let is_guessed = |row: usize, column: usize| {
                 !distances.is_known_behind((row, column), rule.jump) && !fill.distances[(row, column)].is_nan()
@@ -85,7 +90,8 @@ impl OccludedSamples {
                     return layers.coordinate_of_distance(fill.distances[(row, column)]);
                 }
                 let distance = known[(row, column)];
-                let shows = reach[row * size.1 + column] > 0.0 && distance > front[(row, column)] + 0.5 * rule.jump;
+                let shows =
+                    reach[row * size.1 + column] > 0.0 && distance > front[(row, column)] + 0.5 * known_rule.jump;
                 if shows { layers.coordinate_of_distance(distance) } else { f32::NAN }
             };
             let layer_coordinates = LayerCoordinates::new(plane_of(size, cancel, place)?, cancel)?;

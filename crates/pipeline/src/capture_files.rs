@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use dioptric_scene::write_planes_exr;
-use dioptric_spectrum::DepthMap;
+use dioptric_scene::{write_planes_exr, write_scene_exr};
+use dioptric_spectrum::{Cancel, DepthMap};
 
 use crate::{
-    PipelineError,
+    PipelineError, Progress,
     frame_files::write_frames,
-    stages::{Capture, IRRADIANCE_FILE},
+    stages::{Capture, IRRADIANCE_FILE, KeptCamera},
 };
 
 /// Writes what the camera's outputs ask for of a capture into a folder: irradiance, depth, frames and picture. Returns the names
@@ -62,4 +62,18 @@ pub fn write_frames_and_depth(
     let (frame_files, png) = write_frames(&capture.frame_parts(), &capture.developed.picture, outputs, folder)?;
     files.extend(frame_files);
     Ok((files, png))
+}
+
+/// Writes the scene of a camera as it is imaged, a scene file of its own: radiance, depth, view, and what its surfaces hide where that is known.
+///
+/// # Errors
+/// As [`KeptCamera::scene`], and when the file cannot be written.
+pub fn write_scene(
+    kept: &KeptCamera,
+    path: &Path,
+    progress: &dyn Progress,
+    cancel: &Cancel,
+) -> Result<(), PipelineError> {
+    let resolved = kept.scene(progress, cancel)?;
+    Ok(write_scene_exr(path, &resolved.scene, kept.camera().outputs.exr_samples)?)
 }

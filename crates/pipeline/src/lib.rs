@@ -38,7 +38,7 @@ pub use camera::{
     LensSpec, LightFieldSpec, Movements, PictureOptions, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod,
     SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
-pub use capture_files::{irradiance_file, write_capture, write_frames_and_depth, write_irradiance};
+pub use capture_files::{irradiance_file, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;
 pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};

@@ -37,6 +37,10 @@ pub struct WorldSpec {
     /// How far the camera stands to the right of the place of the file's and above it, as the picture shows it, mm.
     #[serde(default)]
     pub aside_mm: (f64, f64),
+    /// How many surfaces, one behind another, the view knows, 1 or 2: of 2 it is rendered once more without what stands in front, and blurred
+    /// edges show what lies behind them instead of a guess. The back of a closed shape is none of them.
+    #[serde(default = "one_layer")]
+    pub layers: u32,
     /// Whether a band is the mean over its width, or the value at its center.
     #[serde(default)]
     pub bands: BandSampling,
@@ -81,6 +85,10 @@ fn one_meter() -> f64 {
     1.0
 }
 
+fn one_layer() -> u32 {
+    1
+}
+
 fn one() -> u64 {
     1
 }
@@ -96,6 +104,7 @@ impl WorldSpec {
             size: None,
             advance_mm: 0.0,
             aside_mm: (0.0, 0.0),
+            layers: one_layer(),
             bands: BandSampling::default(),
             paths: LightPaths::default(),
             seed: one(),
@@ -116,6 +125,7 @@ impl WorldSpec {
             checker.count("size", columns, 1..=65_536)?;
             checker.count("size", rows, 1..=65_536)?;
         }
+        checker.count("layers", self.layers as usize, 1..=2)?;
         match self.effort {
             RenderEffort::Samples(n) => checker.count("Samples", n as usize, 1..=1 << 24),
             RenderEffort::Noise(noise) => checker.positive("Noise", noise),

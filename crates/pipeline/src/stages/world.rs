@@ -4,16 +4,17 @@ use std::{fs, path::Path, sync::Arc};
 
 use dioptric_backward::{
     Auxiliary, BandSampling, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
-    Placement, RenderSettings, Renderer, Rendering, auxiliary, write_auxiliary_exr, write_rendering_exr,
+    Placement, RenderSettings, Renderer, Rendering, auxiliary, layered_depth, write_auxiliary_exr, write_rendering_exr,
 };
 use dioptric_optics::{Lens, glam::DVec2};
-use dioptric_scene::{Scene, SceneLight, View};
+use dioptric_scene::{HiddenLayer, Scene, SceneLight, View};
 use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use dioptric_world::{
     CameraKind, ReadOptions, World, WorldCamera,
     glam::{DAffine3, DVec3},
     read_world,
 };
+use ndarray::Array2;
 
 use super::{
     IRRADIANCE_FILE, Watch,
@@ -96,18 +97,46 @@ pub(super) fn view(
     let camera = Camera::Pinhole(pinhole);
     let (paths, seed) = (spec.paths, spec.seed);
     let render = WorldRender { world, camera, bands, paths, seed, samples_per_pass, identity: String::new() };
-    let mut renderer = render.renderer()?;
-    let progress = AtStage { progress: watch.progress, stage: Stage::Scene };
-    render.refine(&mut renderer, effort, &progress, watch.cancel, &mut |_| Ok(true))?;
-    let depth = DepthMap::new(auxiliary(&render.world, &render.camera, &reference_band()?.grid, watch.cancel)?.z_m)?;
+    let n_layers = if spec.method == RenderMethod::Forward { spec.layers } else { 1 };
+    let seen = |layer: u32| -> Result<SpectralImage, PipelineError> {
+        let render = WorldRender { camera: Camera::Pinhole(Pinhole { layer, ..pinhole }), ..render.clone() };
+        let mut renderer = render.renderer()?;
+        let share = f64::from(n_layers).recip();
+        let range = (share * f64::from(layer), share * f64::from(layer + 1));
+        let progress = AtStage { progress: watch.progress, stage: Stage::Scene, range };
+        render.refine(&mut renderer, effort, &progress, watch.cancel, &mut |_| Ok(true))?;
+        Ok(renderer.rendering().picture)
+    };
+    let radiance = seen(0)?;
+    let mut depths = layered_depth(&render.world, &pinhole, n_layers as usize, watch.cancel)?.into_iter();
+    let depth = DepthMap::new(depths.next().unwrap_or_default())?;
+    let hidden = match depths.next() {
+        Some(behind_m) => Some(hidden_layer((&radiance, &depth), seen(1)?, behind_m)?),
+        None => None,
+    };
     let name = spec.file.file_stem().unwrap_or(spec.file.as_os_str()).to_string_lossy().into_owned();
     let light = match &inputs.light {
         Some(stated) => Some(SceneLight { illuminant: stated.clone(), illuminance_lux: None }),
         None => light_on(&render.world, &pinhole)?,
     };
-    let radiance = renderer.rendering().picture;
-    let scene = Scene { depth: Some(depth), view: Some(view), light, ..Scene::new(name, radiance) };
+    let scene = Scene { depth: Some(depth), view: Some(view), hidden, light, ..Scene::new(name, radiance) };
     Ok(ResolvedScene { scene, binning })
+}
+
+/// Returns what the first surfaces hide; where they hide nothing, the layer repeats them.
+fn hidden_layer(
+    (radiance, depth): (&SpectralImage, &DepthMap),
+    mut behind: SpectralImage,
+    mut behind_m: Array2<f32>,
+) -> Result<HiddenLayer, PipelineError> {
+    for (at, &first_m) in depth.z_m().indexed_iter() {
+        // Through the sky nothing is hidden.
+        if first_m == f32::INFINITY {
+            behind_m[at] = first_m;
+            behind.planes_mut().zip(radiance.planes()).for_each(|(mut behind, first)| behind[at] = first[at]);
+        }
+    }
+    Ok(HiddenLayer { radiance: behind, depth: DepthMap::new(behind_m)? })
 }
 
 /// Returns the angle across the picture of a camera that states one, degrees.
@@ -131,11 +160,13 @@ pub(super) fn reference_band() -> Result<Bands, SpectrumError> {
 struct AtStage<'a> {
     progress: &'a dyn Progress,
     stage: Stage,
+    /// The fractions reported at the start and at the end.
+    range: (f64, f64),
 }
 
 impl Progress for AtStage<'_> {
     fn at(&self, _: Stage, fraction: f64) {
-        self.progress.at(self.stage, fraction);
+        self.progress.at(self.stage, self.range.0 + (self.range.1 - self.range.0) * fraction);
     }
 }
 

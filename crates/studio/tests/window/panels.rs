@@ -143,6 +143,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("advance", &["WorldSpec.advance_mm"]),
     ("to the right", &["WorldSpec.aside_mm"]),
     ("own size of the view", &["WorldSpec.size"]),
+    ("what edges hide", &["WorldSpec.layers"]),
     ("value of a band", &["WorldSpec.bands"]),
     ("scattering", &["WorldSpec.paths"]),
     ("scatterings", &["LightPaths.UpTo"]),

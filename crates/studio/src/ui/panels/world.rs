@@ -54,6 +54,12 @@ fn more(ui: &mut Ui, world: &mut WorldSpec) {
         count(ui, "view columns", "Columns of the view from the entrance pupil", 1..=65_536, columns);
         count(ui, "view rows", "Rows of the view from the entrance pupil", 1..=65_536, rows);
     }
+    let mut knows_hidden = world.layers > 1;
+    let words =
+        "Renders what the first surfaces hide too, for views that are blurred: edges then show it instead of a guess";
+    if tick(ui, "what edges hide", words, &mut knows_hidden) {
+        world.layers = if knows_hidden { 2 } else { 1 };
+    }
     let samplings = [(BandSampling::Mean, "mean over its width"), (BandSampling::Center, "at its center")];
     choice(ui, "value of a band", "What of the light a band holds", &mut world.bands, &samplings);
     let paths = [
