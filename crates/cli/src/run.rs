@@ -17,7 +17,7 @@ use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
 
 use crate::{
-    args::{BankKind, Common, DiffractionKind, FilmKind, FrameArgs, PictureArgs, QualityKind, RunArgs},
+    args::{BankKind, Common, DiffractionKind, DualPixelArg, FilmKind, FrameArgs, PictureArgs, QualityKind, RunArgs},
     lens::tell,
     memory::memory_budget,
     paintings::{build, painting_folder},
@@ -251,6 +251,9 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
         if arguments.scene.is_none() {
             camera.film = FilmSpec::Sensor;
         }
+    }
+    if let Some(DualPixelArg(spec)) = arguments.dual_pixel {
+        camera.dual_pixel = spec;
     }
     if let Some(frames) = frames_of(&arguments.frames)? {
         camera.frames = frames;

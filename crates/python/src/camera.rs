@@ -114,6 +114,8 @@ impl Camera {
     /// pixels : (columns, rows)
     /// pixel_um : float
     ///     A film of pixels of one's own.
+    /// dual_pixel : {"none", "left-right", "top-bottom", "quad", "left-right:CROSSTALK:DEGREES"}
+    ///     Reads the photodiodes below each microlens one by one.
     /// diffraction : {"none", "hurb", "hurb-scene3d", "hurb-calibrated", "wave"}
     /// gamma : float
     ///     Strength of HURB.

@@ -77,6 +77,7 @@ pub(crate) const ALL: &[&str] = &[
     "crop",
     "pixels",
     "pixel_um",
+    "dual_pixel",
     "diffraction",
     "gamma",
     "blur",
@@ -246,6 +247,14 @@ fn set_film(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_
             let expected = "four whole numbers: the first column and row, columns and rows";
             let (x, y, columns, rows) = value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?;
             camera.crop = Some(Crop { x, y, columns, rows });
+        }
+        "dual_pixel" => {
+            let found = word(key, value)?;
+            let expected = "'none', 'left-right', 'top-bottom' or 'quad', also as 'left-right:0.05:3'";
+            camera.dual_pixel = match found.as_str() {
+                "none" => None,
+                _ => Some(found.parse().map_err(|_| wrong(key, format!("'{found}'"), expected))?),
+            };
         }
         "film" => {
             camera.film = match word(key, value)?.as_str() {

@@ -3,9 +3,9 @@
 use std::{collections::BTreeSet, sync::LazyLock, time::Duration};
 
 use dioptric_pipeline::{
-    BankSpec, BlurSpec, CAMERA_SCHEMA, Camera, Crop, Diffraction, FillDepth, FlatSize, FocusSpec, FramesSpec, LensSpec,
-    LightPaths, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange, WavelengthSpec, WorldSpec,
-    with_exposure_s,
+    BankSpec, BlurSpec, CAMERA_SCHEMA, Camera, Crop, Diffraction, DualPixelSpec, FillDepth, FlatSize, FocusSpec,
+    FramesSpec, LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange,
+    WavelengthSpec, WorldSpec, with_exposure_s,
 };
 use dioptric_scene::Pattern;
 use dioptric_sensor::{Brightness, ColorCorrection, LensShading, ToneCurve};
@@ -70,6 +70,9 @@ const PANELS: &[(&str, &[&str])] = &[
     ("list of bands", &["WavelengthSpec.ListNm"]),
     ("sensor", &["Camera.sensor", "SensorSpec.BuiltIn"]),
     ("sensor file", &["SensorSpec.File"]),
+    ("photodiodes", &["Camera.dual_pixel", "DualPixelSpec.photodiodes"]),
+    ("crosstalk", &["DualPixelSpec.crosstalk"]),
+    ("transition", &["DualPixelSpec.transition_deg"]),
     ("exposure", &["Camera.exposure", "ExposureControl.Manual", "ExposureControl.Auto"]),
     ("time", &["Exposure.time_s"]),
     ("gain", &["Exposure.analog_gain"]),
@@ -254,6 +257,7 @@ fn everything(camera: &mut Camera) {
 }
 
 fn otherwise(camera: &mut Camera) {
+    camera.dual_pixel = Some(DualPixelSpec::of(Photodiodes::LeftRight));
     camera.focus = FocusSpec::FilmMm(50.0);
     camera.wavelengths = WavelengthSpec::ListNm(vec![450.0, 550.0]);
     camera.frames = FramesSpec::BracketStops(vec![-1.0, 0.0]);
