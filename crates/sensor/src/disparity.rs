@@ -10,7 +10,7 @@ use crate::{Raw, SensorError, Tile};
 const SMOOTHING: [f32; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
 /// The variance of white noise over what the smoothing leaves of it, 256/70: it leaves all of the slow part that blocks are matched by.
 const SMOOTHED_VARIANCE: f64 = 256.0 / 70.0;
-/// How far the best correlation may be from 1, over how far the best one elsewhere is.
+/// How far the best likeness may be from 1, over how far the best one elsewhere is.
 const DISTINCT: f64 = 0.7;
 /// Steps of the refinement between cells.
 const MOST_STEPS: usize = 20;
@@ -73,7 +73,7 @@ impl DisparityMap {
     /// Measures how far two views of one exposure lie apart.
     ///
     /// Samples of a mosaic are averaged over its tile first, so that all filters count. For each block the whole number of cells is that of the
-    /// largest normalized cross-correlation of the views smoothed that way, so that views of other brightness match; then disparity, gain and offset between
+    /// largest correlation of the views smoothed that way, one brightened to the other's mean and their contrasts compared too; then disparity, gain and offset between
     /// the views are fitted by least squares between cells with both views moved half the way, outliers weighing less.
     ///
     /// # Errors
@@ -170,7 +170,7 @@ struct Block<'a> {
 impl Block<'_> {
     fn matched(&self, most: isize) -> Option<Match> {
         let scores: Vec<(isize, f64)> =
-            (-most..=most).filter_map(|whole| Some((whole, self.correlation(whole)?))).collect();
+            (-most..=most).filter_map(|whole| Some((whole, self.likeness(whole)?))).collect();
         let (place, &(whole, best)) = scores.iter().enumerate().max_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
         // What matches best at the end of the search may match better beyond.
         if place == 0 || place + 1 == scores.len() || best <= 0.0 {
@@ -196,8 +196,9 @@ impl Block<'_> {
         starts.iter().all(|start| (0..=last).contains(start)).then(|| starts.map(|start| start as usize))
     }
 
-    /// Returns the normalized cross-correlation of the views moved apart by whole cells.
-    fn correlation(&self, whole: isize) -> Option<f64> {
+    /// Returns how alike the views are, moved apart by whole cells, at most 1: 2 g cov(a, b) / (var a + g² var b) with g the ratio of the means, a
+    /// correlation that falls also where contrasts differ.
+    fn likeness(&self, whole: isize) -> Option<f64> {
         let starts = self.columns(whole)?;
         let n = (self.window.0 * self.window.1) as f64;
         let [a, b] = [0, 1].map(|view| {
@@ -213,7 +214,8 @@ impl Block<'_> {
             bb += b * b;
             ab += a * b;
         }
-        (aa > 0.0 && bb > 0.0).then(|| ab / (aa * bb).sqrt())
+        let gain = means[0] / means[1];
+        (aa > 0.0 && bb > 0.0 && gain > 0.0).then(|| 2.0 * gain * ab / (aa + gain * gain * bb))
     }
 
     /// Fits disparity, gain and offset between the views by Gauss and Newton's steps.
