@@ -74,6 +74,8 @@ def test_every_choice_survives_a_dictionary(tiny: dp.Camera) -> None:
         {"burst": 4},
         {"bracket_stops": [-2, 0]},
         {"interleaved_ratio": 8},
+        {"dual_pixel": "left-right"},
+        {"dual_pixel": "quad:0.1:2"},
         {"noise": "photon,read"},
         {"white": "patch:1,2,3,4"},
         {"white": "0.46,0.414"},

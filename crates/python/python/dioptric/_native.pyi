@@ -79,6 +79,7 @@ class Camera:
         crop: tuple[int, int, int, int] | None = ...,
         pixels: tuple[int, int] | None = ...,
         pixel_um: float | None = ...,
+        dual_pixel: str | None = ...,
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
         blur: str | None = ...,
