@@ -275,8 +275,11 @@ pub(crate) struct FrameArgs {
     /// Exposes rows for the chosen time and for one so many times shorter in turn, and merges them
     #[arg(long, value_name = "R", conflicts_with_all = ["burst", "bracket_stops"], help_heading = heading::EXPOSURE)]
     pub(crate) interleaved_ratio: Option<f64>,
-    /// How many neighboring rows share a time [default: 2]
-    #[arg(long, value_name = "N", requires = "interleaved_ratio", help_heading = heading::EXPOSURE)]
+    /// Reads rows with the chosen analog gain and with one so many times lower in turn, and merges them; with --interleaved-ratio both differ
+    #[arg(long, value_name = "G", conflicts_with_all = ["burst", "bracket_stops"], help_heading = heading::EXPOSURE)]
+    pub(crate) interleaved_gain_ratio: Option<f64>,
+    /// How many neighboring rows share time and gain [default: 2]
+    #[arg(long, value_name = "N", help_heading = heading::EXPOSURE)]
     pub(crate) interleaved_rows: Option<usize>,
     /// Writes these files too: electrons, raw-tiff, raw-dng, picture-png16, picture-tiff8, picture-tiff16, picture-exr
     #[arg(long, value_name = "LIST", help_heading = heading::RESULTS)]

@@ -305,9 +305,21 @@ pub(crate) fn frames_of(arguments: &FrameArgs) -> anyhow::Result<Option<FramesSp
             None => FramesSpec::Burst(frames),
         }),
         (None, Some(list)) => Some(FramesSpec::BracketStops(parse_numbers("--bracket-stops", list)?)),
-        (None, None) => arguments
-            .interleaved_ratio
-            .map(|ratio| FramesSpec::Interleaved { ratio, period_rows: arguments.interleaved_rows.unwrap_or(2) }),
+        (None, None) => {
+            match (arguments.interleaved_ratio, arguments.interleaved_gain_ratio, arguments.interleaved_rows) {
+                (None, None, None) => None,
+                (None, None, Some(_)) => {
+                    bail!(
+                        "--interleaved-rows needs --interleaved-ratio or --interleaved-gain-ratio, which rows of two kinds differ by"
+                    )
+                }
+                (ratio, gain_ratio, rows) => Some(FramesSpec::Interleaved {
+                    ratio: ratio.unwrap_or(1.0),
+                    period_rows: rows.unwrap_or(2),
+                    gain_ratio: gain_ratio.unwrap_or(1.0),
+                }),
+            }
+        }
     })
 }
 

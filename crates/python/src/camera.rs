@@ -139,6 +139,8 @@ impl Camera {
     ///     Several frames, merged.
     /// interleaved_ratio : float
     ///     Pairs of rows exposed for the chosen time and for one so many times shorter in turn, merged.
+    /// interleaved_gain_ratio : float
+    ///     Pairs of rows read with the chosen analog gain and with one so many times lower in turn, merged.
     /// white, demosaic, highlights, color : str
     /// denoise, sharpen_px : float
     ///     Of the processing.

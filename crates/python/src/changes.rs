@@ -30,6 +30,7 @@ pub(crate) const OF_EXPOSURE: &[&str] = &[
     "burst",
     "bracket_stops",
     "interleaved_ratio",
+    "interleaved_gain_ratio",
     "white",
     "demosaic",
     "denoise",
@@ -102,6 +103,7 @@ pub(crate) const ALL: &[&str] = &[
     "burst",
     "bracket_stops",
     "interleaved_ratio",
+    "interleaved_gain_ratio",
     "white",
     "demosaic",
     "denoise",
@@ -324,7 +326,16 @@ fn set_frames(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRes
         "burst" => camera.frames = FramesSpec::Burst(count(key, value)?),
         "bracket_stops" => camera.frames = FramesSpec::BracketStops(numbers(key, value)?),
         "interleaved_ratio" => {
-            camera.frames = FramesSpec::Interleaved { ratio: number(key, value)?, period_rows: 2 };
+            camera.frames = FramesSpec::Interleaved { ratio: number(key, value)?, period_rows: 2, gain_ratio: 1.0 };
+        }
+        "interleaved_gain_ratio" => {
+            let gain_ratio = number(key, value)?;
+            camera.frames = match camera.frames {
+                FramesSpec::Interleaved { ratio, period_rows, .. } => {
+                    FramesSpec::Interleaved { ratio, period_rows, gain_ratio }
+                }
+                _ => FramesSpec::Interleaved { ratio: 1.0, period_rows: 2, gain_ratio },
+            };
         }
         "seed" => {
             camera.seed =

@@ -74,6 +74,7 @@ def test_every_choice_survives_a_dictionary(tiny: dp.Camera) -> None:
         {"burst": 4},
         {"bracket_stops": [-2, 0]},
         {"interleaved_ratio": 8},
+        {"interleaved_gain_ratio": 4},
         {"dual_pixel": "left-right"},
         {"dual_pixel": "quad:0.1:2"},
         {"noise": "photon,read"},

@@ -177,7 +177,7 @@ mod tests {
         assert!(check(&|camera| set(camera, 0.1, f64::NAN)).unwrap_err().contains("transition_deg"));
         assert!(check(&|camera| camera.diffraction = Diffraction::Wave).unwrap_err().contains("HURB"));
         assert!(check(&|camera| camera.blur = BlurSpec::Views(4)).unwrap_err().contains("layered or pointwise"));
-        let frames = FramesSpec::Interleaved { ratio: 4.0, period_rows: 2 };
+        let frames = FramesSpec::Interleaved { ratio: 4.0, period_rows: 2, gain_ratio: 1.0 };
         assert!(check(&|camera| camera.frames = frames.clone()).unwrap_err().contains("BracketStops"));
     }
 

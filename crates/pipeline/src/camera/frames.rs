@@ -38,13 +38,21 @@ pub enum FramesSpec {
     /// Exposures that differ from the chosen one by powers of two, merged into one of more range; −2 is a quarter of the
     /// time.
     BracketStops(Vec<f64>),
-    /// One whose rows are exposed for the chosen time and for a part of it in turn, merged into one of more range.
+    /// One whose rows are exposed for the chosen time and for a part of it in turn, or read with the chosen analog gain and a part of it, merged
+    /// into one of more range.
     Interleaved {
-        /// The chosen time over that of the short rows, above 1.
+        /// The chosen time over that of the short rows: above 1, or 1 where the gains differ.
         ratio: f64,
-        /// How many neighboring rows share a time; a multiple of the rows after which the mosaic repeats.
+        /// How many neighboring rows share time and gain; a multiple of the rows after which the mosaic repeats.
         period_rows: usize,
+        /// The chosen analog gain over that of the short rows, 1 or more.
+        #[serde(default = "same_gain")]
+        gain_ratio: f64,
     },
+}
+
+fn same_gain() -> f64 {
+    1.0
 }
 
 /// What a sensor gives for one picture: every stage of the first frame, and all frames merged.
@@ -129,8 +137,14 @@ impl FramesSpec {
             Self::MovingBurst { motion_px, .. } if !(0.0..=MOST_PX).contains(motion_px) => {
                 wrong("MovingBurst.motion_px", motion_px.to_string(), format!("0 to {MOST_PX} pixels"))
             }
-            Self::Interleaved { ratio, .. } if !(*ratio > 1.0 && ratio.is_finite()) => {
-                wrong("Interleaved.ratio", ratio.to_string(), "a number above 1".to_owned())
+            Self::Interleaved { gain_ratio, .. } if !(*gain_ratio >= 1.0 && gain_ratio.is_finite()) => {
+                wrong("Interleaved.gain_ratio", gain_ratio.to_string(), "1 or more".to_owned())
+            }
+            Self::Interleaved { ratio, gain_ratio, .. }
+                if !(*ratio >= 1.0 && ratio.is_finite()) || ratio * gain_ratio <= 1.0 =>
+            {
+                let expected = "a number above 1, or 1 where gain_ratio is above it".to_owned();
+                wrong("Interleaved.ratio", ratio.to_string(), expected)
             }
             Self::Interleaved { period_rows: 0, .. } => {
                 wrong("Interleaved.period_rows", "0".to_owned(), "1 row or more".to_owned())
@@ -156,8 +170,12 @@ impl FramesSpec {
             Self::BracketStops(stops) => {
                 (stops.len() > 1).then(|| format!("the first of {} frames of a bracket", stops.len()))
             }
-            Self::Interleaved { ratio, period_rows: n } => Some(format!(
+            Self::Interleaved { ratio, period_rows: n, gain_ratio: 1.0 } => Some(format!(
                 "rows of two exposure times in turn, not merged: {n} of the stated time, then {n} of 1/{ratio} of it"
+            )),
+            Self::Interleaved { ratio, period_rows: n, gain_ratio } => Some(format!(
+                "rows of two exposures in turn, not merged: {n} of the stated time and gain, then {n} of 1/{ratio} of the time and \
+                 1/{gain_ratio} of the gain"
             )),
         };
         let of_pixels =
@@ -179,8 +197,8 @@ impl FramesSpec {
             Self::Single => vec![*exposure],
             Self::Burst(n) | Self::MovingBurst { frames: n, .. } => vec![*exposure; *n],
             Self::BracketStops(stops) => exposure.bracket(stops),
-            &Self::Interleaved { ratio, period_rows } => {
-                let rows = Interleaved { ratio, period_rows };
+            &Self::Interleaved { ratio, period_rows, gain_ratio } => {
+                let rows = Interleaved { ratio, period_rows, gain_ratio };
                 let exposed = expose_interleaved(sensor, rate, exposure, &rows, noise)?;
                 return Ok(Exposed { raw_note: self.raw_note(sensor), ..exposed });
             }
@@ -284,9 +302,9 @@ fn expose_interleaved(
         return Err(split_pixels_want("interleaved rows"));
     }
     let electrons = sensor.electrons_interleaved(&*rate([0.0; 2])?, exposure, rows, noise)?;
-    // Volts and codes do not depend on the time.
+    // Volts depend neither on the time nor on the gain.
     let volts = sensor.volts(&electrons, exposure, noise)?;
-    let raw = sensor.digitize(&volts, exposure)?;
+    let raw = sensor.digitize_interleaved(&volts, exposure, rows)?;
     let merged = Some(sensor.merge_interleaved(&raw, rows)?);
     Ok(Exposed { electrons, volts, raw, raw_note: None, merged, photodiodes: None })
 }

@@ -89,6 +89,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("motion", &["FramesSpec.MovingBurst.motion_px"]),
     ("stops", &["FramesSpec.BracketStops"]),
     ("ratio of times", &["FramesSpec.Interleaved", "FramesSpec.Interleaved.ratio"]),
+    ("ratio of gains", &["FramesSpec.Interleaved.gain_ratio"]),
     ("rows of one time", &["FramesSpec.Interleaved.period_rows"]),
     ("demosaic", &["Camera.processing", "Processing.demosaic"]),
     ("highlights", &["Processing.highlights"]),
@@ -216,7 +217,7 @@ fn cameras() -> Vec<Camera> {
             scene.flat = Some(FlatSize { width_mm: 10.0, distance_mm: 100.0 });
             camera.lens = LensSpec::File("none.zmx".into());
             camera.lens_reading.slope_per_nm = Some(-1e-4);
-            camera.frames = FramesSpec::Interleaved { ratio: 8.0, period_rows: 2 };
+            camera.frames = FramesSpec::Interleaved { ratio: 8.0, period_rows: 2, gain_ratio: 1.0 };
         }),
         world(RenderEffort::Samples(8)),
         world(RenderEffort::Noise(0.1)),
