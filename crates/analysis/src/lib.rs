@@ -27,7 +27,7 @@ pub use lens::{
 pub use methods::{Fit, MethodComparison, MethodRow};
 pub use psf::{MtfRow, PolychromaticPsf, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, psf_csv};
 pub use run::{
-    ChannelStatistics, DngReport, FilmData, IrradianceData, LossRow, Run, RunCharts, RunOptics, RunPlaces, RunReport,
-    RunTimes, SceneData, SensorStatistics,
+    ChannelStatistics, DisparityData, DngReport, DualPixelData, FilmData, IrradianceData, LossRow, MOST_ERROR_PX, Run,
+    RunCharts, RunOptics, RunPlaces, RunReport, RunTimes, SceneData, SensorStatistics,
 };
 pub use sensor_table::{SensorRow, built_in_sensors};

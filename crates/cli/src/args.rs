@@ -4,7 +4,7 @@ use std::{any::TypeId, ffi::OsString, path::PathBuf};
 
 use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use dioptric_pipeline::{BlurSpec, Crop, ExrSamples};
+use dioptric_pipeline::{BlurSpec, Crop, DualPixelSpec, ExrSamples, PipelineError};
 
 pub(crate) use crate::common::Common;
 use crate::{
@@ -213,6 +213,10 @@ pub(crate) struct RunArgs {
     /// Part of the film to simulate in place of all of it: first column and row, columns and rows, e.g. 100,80,64,48
     #[arg(long, value_name = "X,Y,W,H", help_heading = heading::FILM)]
     pub(crate) crop: Option<Crop>,
+    /// Reads the photodiodes below each microlens one by one: 'left-right', 'top-bottom' or 'quad', with crosstalk and transition in degrees if
+    /// they are to be others than 'left-right:0.05:3'; 'none' for whole pixels [default: none]
+    #[arg(long, value_name = "KIND", value_parser = parse_dual_pixel, help_heading = heading::FILM)]
+    pub(crate) dual_pixel: Option<DualPixelArg>,
     /// Exposure time, s [default: automatic]
     #[arg(long, value_name = "T", help_heading = heading::EXPOSURE)]
     pub(crate) exposure_s: Option<f64>,
@@ -236,6 +240,14 @@ pub(crate) struct RunArgs {
     pub(crate) blur: Option<BlurSpec>,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
+}
+
+/// Photodiodes that are read one by one, or whole pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DualPixelArg(pub(crate) Option<DualPixelSpec>);
+
+fn parse_dual_pixel(text: &str) -> Result<DualPixelArg, PipelineError> {
+    if text == "none" { Ok(DualPixelArg(None)) } else { text.parse().map(|spec| DualPixelArg(Some(spec))) }
 }
 
 /// How large the film is.
@@ -263,8 +275,11 @@ pub(crate) struct FrameArgs {
     /// Exposes rows for the chosen time and for one so many times shorter in turn, and merges them
     #[arg(long, value_name = "R", conflicts_with_all = ["burst", "bracket_stops"], help_heading = heading::EXPOSURE)]
     pub(crate) interleaved_ratio: Option<f64>,
-    /// How many neighboring rows share a time [default: 2]
-    #[arg(long, value_name = "N", requires = "interleaved_ratio", help_heading = heading::EXPOSURE)]
+    /// Reads rows with the chosen analog gain and with one so many times lower in turn, and merges them; with --interleaved-ratio both differ
+    #[arg(long, value_name = "G", conflicts_with_all = ["burst", "bracket_stops"], help_heading = heading::EXPOSURE)]
+    pub(crate) interleaved_gain_ratio: Option<f64>,
+    /// How many neighboring rows share time and gain [default: 2]
+    #[arg(long, value_name = "N", help_heading = heading::EXPOSURE)]
     pub(crate) interleaved_rows: Option<usize>,
     /// Writes these files too: electrons, raw-tiff, raw-dng, picture-png16, picture-tiff8, picture-tiff16, picture-exr
     #[arg(long, value_name = "LIST", help_heading = heading::RESULTS)]

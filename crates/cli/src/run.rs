@@ -17,7 +17,7 @@ use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
 
 use crate::{
-    args::{BankKind, Common, DiffractionKind, FilmKind, FrameArgs, PictureArgs, QualityKind, RunArgs},
+    args::{BankKind, Common, DiffractionKind, DualPixelArg, FilmKind, FrameArgs, PictureArgs, QualityKind, RunArgs},
     lens::tell,
     memory::memory_budget,
     paintings::{build, painting_folder},
@@ -252,6 +252,9 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
             camera.film = FilmSpec::Sensor;
         }
     }
+    if let Some(DualPixelArg(spec)) = arguments.dual_pixel {
+        camera.dual_pixel = spec;
+    }
     if let Some(frames) = frames_of(&arguments.frames)? {
         camera.frames = frames;
     }
@@ -302,9 +305,21 @@ pub(crate) fn frames_of(arguments: &FrameArgs) -> anyhow::Result<Option<FramesSp
             None => FramesSpec::Burst(frames),
         }),
         (None, Some(list)) => Some(FramesSpec::BracketStops(parse_numbers("--bracket-stops", list)?)),
-        (None, None) => arguments
-            .interleaved_ratio
-            .map(|ratio| FramesSpec::Interleaved { ratio, period_rows: arguments.interleaved_rows.unwrap_or(2) }),
+        (None, None) => {
+            match (arguments.interleaved_ratio, arguments.interleaved_gain_ratio, arguments.interleaved_rows) {
+                (None, None, None) => None,
+                (None, None, Some(_)) => {
+                    bail!(
+                        "--interleaved-rows needs --interleaved-ratio or --interleaved-gain-ratio, which rows of two kinds differ by"
+                    )
+                }
+                (ratio, gain_ratio, rows) => Some(FramesSpec::Interleaved {
+                    ratio: ratio.unwrap_or(1.0),
+                    period_rows: rows.unwrap_or(2),
+                    gain_ratio: gain_ratio.unwrap_or(1.0),
+                }),
+            }
+        }
     })
 }
 

@@ -8,7 +8,7 @@ use dioptric_spectrum::{Cancel, DepthMap};
 use crate::{
     PipelineError, Progress,
     frame_files::write_frames,
-    stages::{Capture, IRRADIANCE_FILE, KeptCamera},
+    stages::{Capture, IRRADIANCE_FILE, KeptCamera, photodiode_irradiance_file},
 };
 
 /// Writes what the camera's outputs ask for of a capture into a folder: irradiance, depth, frames and picture. Returns the names
@@ -25,12 +25,18 @@ pub fn write_capture(
 ) -> Result<(Vec<String>, Vec<u8>), PipelineError> {
     write_irradiance(capture, folder)?;
     let (files, png) = write_frames_and_depth(capture, depth, folder)?;
-    Ok((irradiance_file(capture).into_iter().chain(files).collect(), png))
+    Ok((irradiance_files(capture).into_iter().chain(files).collect(), png))
 }
 
-/// The name of the file of the irradiance, where the camera's outputs ask for it.
-pub fn irradiance_file(capture: &Capture) -> Option<String> {
-    capture.camera.outputs.irradiance.then(|| IRRADIANCE_FILE.to_owned())
+/// The names of the files of the irradiance, where the camera's outputs ask for it: that of whole pixels, and where photodiodes are read one
+/// by one that of each.
+pub fn irradiance_files(capture: &Capture) -> Vec<String> {
+    if !capture.camera.outputs.irradiance {
+        return Vec::new();
+    }
+    let of_photodiodes = capture.camera.dual_pixel.map(|spec| spec.photodiodes.names()).unwrap_or_default();
+    let of_photodiodes = of_photodiodes.iter().map(|name| photodiode_irradiance_file(name));
+    std::iter::once(IRRADIANCE_FILE.to_owned()).chain(of_photodiodes).collect()
 }
 
 /// Writes the irradiance of a capture into a folder, where its camera's outputs ask for it.
@@ -38,10 +44,9 @@ pub fn irradiance_file(capture: &Capture) -> Option<String> {
 /// # Errors
 /// When the file cannot be written.
 pub fn write_irradiance(capture: &Capture, folder: &Path) -> Result<(), PipelineError> {
-    match irradiance_file(capture) {
-        Some(file) => capture.irradiance.write_exr(&folder.join(file), capture.camera.outputs.exr_samples),
-        None => Ok(()),
-    }
+    let irradiances = std::iter::once(&*capture.irradiance).chain(capture.irradiance.photodiodes());
+    let mut files = irradiance_files(capture).into_iter().zip(irradiances);
+    files.try_for_each(|(file, own)| own.write_exr(&folder.join(file), capture.camera.outputs.exr_samples))
 }
 
 /// Writes what [`write_capture`] does but for the irradiance, the largest file by far.

@@ -15,13 +15,13 @@ use crate::{Exposed, PipelineError};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Outputs {
-    /// `irradiance.exr`, the spectral irradiance on the sensor.
+    /// `irradiance.exr`, the spectral irradiance on the sensor; of photodiodes that are read one by one also `irradiance-left.exr` and so on.
     pub irradiance: bool,
     /// `depth.exr`, the depth that was used.
     pub depth: bool,
     /// `volts.exr`, the voltages of the pixels.
     pub volts: bool,
-    /// `raw.png`, the digital numbers in 16 bits.
+    /// `raw.png`, the digital numbers in 16 bits; of photodiodes that are read one by one also `raw-left.png` and so on.
     pub raw: bool,
     /// More files of the sensor's frames.
     pub also: Vec<FrameFile>,
@@ -166,6 +166,12 @@ pub fn write_frames(
     }
     if outputs.raw && frames.exposed.raw.planes.iter().all(|plane| plane.dn().is_some()) {
         names.extend(write_raw(&frames.exposed.raw, "png", folder)?);
+        names.extend(write_photodiodes(frames, "png", folder)?);
+    }
+    if let Some(map) = frames.exposed.photodiodes.as_ref().and_then(|reads| reads.disparity.as_ref()) {
+        let planes = [("disparity", &map.disparity_px), ("standard_error", &map.standard_error_px)];
+        write_planes_exr(&folder.join("disparity.exr"), &planes, outputs.exr_samples)?;
+        names.push("disparity.exr".to_owned());
     }
     for file in &outputs.also {
         names.extend(write_also(frames, picture, (*file, outputs.exr_samples), folder)?);
@@ -199,7 +205,10 @@ fn write_also(
         FrameFile::Electrons => {
             Ok(vec![write_planes(frames, &frames.exposed.electrons.planes_e, ("e", "electrons.exr"), samples, folder)?])
         }
-        FrameFile::RawTiff => write_raw(&frames.exposed.raw, "tiff", folder),
+        FrameFile::RawTiff => {
+            let whole = write_raw(&frames.exposed.raw, "tiff", folder)?;
+            Ok([whole, write_photodiodes(frames, "tiff", folder)?].concat())
+        }
         FrameFile::RawDng => {
             frames.sensor.write_dng(&frames.exposed.raw, &dng_details(frames, picture), &folder.join("raw.dng"))?;
             Ok(vec!["raw.dng".to_owned()])
@@ -247,11 +256,23 @@ fn write_planes(
     Ok(file.to_owned())
 }
 
+/// Writes the frame of each photodiode that was read by itself.
+fn write_photodiodes(frames: &Frames<'_>, extension: &str, folder: &Path) -> Result<Vec<String>, PipelineError> {
+    let Some(reads) = &frames.exposed.photodiodes else { return Ok(Vec::new()) };
+    let names = reads.photodiodes.names().iter().zip(&reads.frames);
+    let files = names.map(|(name, raw)| write_raw_as(&format!("raw-{name}"), raw, extension, folder));
+    Ok(files.collect::<Result<Vec<_>, _>>()?.concat())
+}
+
 /// Writes each plane of digital numbers as a 16-bit gray picture.
 fn write_raw(raw: &Raw, extension: &str, folder: &Path) -> Result<Vec<String>, PipelineError> {
+    write_raw_as("raw", raw, extension, folder)
+}
+
+fn write_raw_as(stem: &str, raw: &Raw, extension: &str, folder: &Path) -> Result<Vec<String>, PipelineError> {
     let names = raw.planes.iter().zip(&raw.filter_names).map(|(plane, filter)| {
         let is_single = raw.planes.len() == 1;
-        let name = if is_single { format!("raw.{extension}") } else { format!("raw.{filter}.{extension}") };
+        let name = if is_single { format!("{stem}.{extension}") } else { format!("{stem}.{filter}.{extension}") };
         let own = Raw { planes: vec![plane.clone()], ..raw.clone() };
         own.write(&folder.join(&name))?;
         Ok(name)

@@ -34,11 +34,12 @@ pub use dioptric_psf::Diffraction;
 pub use dioptric_scene::{ExrSamples, FillDepth};
 
 pub use camera::{
-    BankData, BankSpec, BlurSpec, Camera, Crop, Exposed, FilmSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions,
-    LensSpec, LightFieldSpec, Movements, PictureOptions, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod,
-    SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
+    BankData, BankSpec, BlurSpec, Camera, Crop, DualPixelSpec, Exposed, FilmSpec, FlatSize, FocusSpec, FramesSpec,
+    LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads, Photodiodes, PictureOptions,
+    REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec,
+    WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
-pub use capture_files::{irradiance_file, write_capture, write_frames_and_depth, write_irradiance, write_scene};
+pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;
 pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};

@@ -64,6 +64,6 @@ pub use kernel::Kernel;
 pub use lens_image::LensImage;
 pub use metrics::{Picture, Profile};
 pub use model::LensImageModel;
-pub use pupil_division::PupilDivision;
+pub use pupil_division::{PupilDivision, PupilSides, Sides};
 pub use raster::Raster;
 pub use settings::{BankSettings, Diffraction, FieldSampling, Interpolation, SampleCounts, WIDEST_FIELD_TAN};

@@ -56,6 +56,26 @@ impl Mesh {
         (0..self.n_rings).flat_map(move |ring| (0..self.n_azimuths).map(move |j| (ring, j)))
     }
 
+    /// Returns the mean over each cell of what is known at places of the unit disc: at its middle, or at `n_across`² places that are even in its
+    /// area.
+    pub(crate) fn cell_means(self, n_across: usize, at: impl Fn(DVec2) -> f64) -> Vec<f64> {
+        let middle = |(ring, j): (usize, usize)| {
+            let [inner, outer] = [ring, ring + 1].map(|ring| self.share(ring as f64));
+            let radius = (inner * inner + inner * outer + outer * outer) / (1.5 * (inner + outer));
+            polar(DVec2::ZERO, radius, self.azimuth(j as f64 + 0.5))
+        };
+        let within = |(ring, j): (usize, usize), k: usize| {
+            let [inner, outer] = [ring, ring + 1].map(|ring| self.share(ring as f64).powi(2));
+            let [out, around] = [k / n_across, k % n_across].map(|i| (i as f64 + 0.5) / n_across as f64);
+            polar(DVec2::ZERO, (inner + (outer - inner) * out).sqrt(), self.azimuth(j as f64 + around))
+        };
+        let mean = |cell: (usize, usize)| match n_across {
+            1 => at(middle(cell)),
+            n => (0..n * n).map(|k| at(within(cell, k))).sum::<f64>() / (n * n) as f64,
+        };
+        self.cells().map(mean).collect()
+    }
+
     /// Returns the share of a cell's area in the pupil that lies in the triangle on its outer side.
     pub(crate) fn outer_share(self, ring: usize) -> f64 {
         let (inner, outer) = (self.share(ring as f64), self.share((ring + 1) as f64));

@@ -5,9 +5,23 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use crate::{
-    FilmMap, Kernel, LensImage, LensImageModel, PsfError, PsfQuery, RadialMap, WIDEST_FIELD_TAN, model::Form,
-    part_image::PartImage,
+    FilmMap, Kernel, LensImage, LensImageModel, PsfError, PsfQuery, PupilDivision, RadialMap, WIDEST_FIELD_TAN,
+    model::Form, part_image::PartImage,
 };
+
+impl LensImageModel {
+    /// Returns the images through the parts of a division of the pupil, which add up to that of the whole: views of the scene from as many
+    /// places, each blurred by what goes through its part. Blur radii are those of the whole pupil.
+    ///
+    /// The pupil of each field is divided as that field sees it, vignetted or not.
+    ///
+    /// # Errors
+    /// For diffraction integrals, which parts of a pupil do not add up to; for blended pictures, and where fields are single points.
+    pub fn through(&self, division: PupilDivision) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
+        let images = PartImage::all(self, division)?;
+        Ok(images.into_iter().map(|image| Arc::new(image) as Arc<dyn LensImage + Send>).collect())
+    }
+}
 
 impl LensImage for LensImageModel {
     fn is_symmetric(&self) -> bool {
@@ -56,8 +70,7 @@ impl LensImage for LensImageModel {
     }
 
     fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
-        let images = PartImage::all(self, n_parts)?;
-        Ok(images.into_iter().map(|image| Arc::new(image) as Arc<dyn LensImage + Send>).collect())
+        self.through(PupilDivision::new(n_parts))
     }
 
     fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {

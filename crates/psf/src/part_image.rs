@@ -8,6 +8,7 @@ use crate::{
     Diffraction, FieldSampling, FilmMap, Interpolation, Kernel, LensImage, LensImageModel, PartOfPoint, PsfError,
     PsfQuery, ShiftedMap,
     axis::{Axis, Stencil},
+    mesh::Mesh,
     pupil_division::PupilDivision,
     ray_map::RayMap,
     render,
@@ -39,11 +40,11 @@ struct Moments {
 }
 
 impl PartImage {
-    /// Returns the images through so many parts of the pupil of a lens.
+    /// Returns the images through the parts of the pupil of a lens.
     ///
     /// # Errors
     /// For diffraction integrals, which parts of a pupil do not add up to; for blended pictures, and where fields are single points.
-    pub(crate) fn all(model: &LensImageModel, n_parts: usize) -> Result<Vec<Self>, PsfError> {
+    pub(crate) fn all(model: &LensImageModel, division: PupilDivision) -> Result<Vec<Self>, PsfError> {
         let settings = model.settings();
         let refused = |reason| Err(PsfError::Undividable { reason });
         if settings.diffraction == Diffraction::Wave {
@@ -55,7 +56,7 @@ impl PartImage {
         if matches!(settings.fields, FieldSampling::Points { .. }) {
             return refused("its fields are single points: take fields along a radius or over a grid");
         }
-        let (model, division) = (Arc::new(model.clone()), Arc::new(PupilDivision::new(n_parts)));
+        let (model, division) = (Arc::new(model.clone()), Arc::new(division));
         let image = |part: usize| {
             let moments = Moments::of(&model, &division, part);
             Self { model: model.clone(), division: division.clone(), part, moments }
@@ -106,11 +107,20 @@ impl Moments {
         let n_directions = if model.form().is_ok() { N_DIRECTIONS } else { 1 };
         let turns: Vec<DVec2> =
             (0..n_directions).map(|i| DVec2::from_angle(TAU * i as f64 / n_directions as f64)).collect();
-        let of_record = |record: &RayMap| -> Vec<(f64, DVec2)> {
-            turns.iter().map(|turn| record.part_moments(|at| division.share(part, turn.rotate(at)))).collect()
+        let shares_of = |mesh: Mesh| -> Vec<Vec<f64>> {
+            turns.iter().map(|turn| division.cell_shares(part, mesh, *turn)).collect()
+        };
+        // Mostly all have one mesh.
+        let mut known: Vec<(Mesh, Vec<Vec<f64>>)> = vec![];
+        let mut of_record = |record: &RayMap| -> Vec<(f64, DVec2)> {
+            if !known.iter().any(|(mesh, _)| *mesh == record.mesh) {
+                known.push((record.mesh, shares_of(record.mesh)));
+            }
+            let (_, shares) = known.iter().find(|(mesh, _)| *mesh == record.mesh).expect("it was added");
+            shares.iter().map(|shares| record.part_moments(shares)).collect()
         };
         let of_samples = match model.form() {
-            Ok(bank) => bank.records().iter().flat_map(of_record).collect(),
+            Ok(bank) => bank.records().iter().flat_map(&mut of_record).collect(),
             // Dark fields have others that stand for them.
             Err(bank) => bank
                 .samples
@@ -218,7 +228,7 @@ impl LensImage for PartImage {
 
     fn kernel(&self, query: PsfQuery) -> Kernel {
         let (record, turn) = self.model.record(query);
-        let Some(record) = record.part(|at| self.division.share(self.part, turn.rotate(at))) else {
+        let Some(record) = record.part(&self.division.cell_shares(self.part, record.mesh, turn)) else {
             return Kernel::identity(query.pitch_um);
         };
         let energies = self.model.ray_layout(&record, query).draw();

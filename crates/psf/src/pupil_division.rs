@@ -1,8 +1,10 @@
-//! A division of the pupil in parts that overlap smoothly.
+//! Divisions of the pupil: in parts that overlap smoothly, or among the photodiodes below a microlens.
+
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use glam::DVec2;
 
-use crate::mesh::polar;
+use crate::mesh::{Mesh, polar};
 
 /// Points of the unit disc over which the centers of parts are spread.
 const N_POINTS: usize = 4000;
@@ -10,18 +12,84 @@ const N_POINTS: usize = 4000;
 const N_ROUNDS: usize = 60;
 /// How far a part reaches from its center, over the farthest that any point lies from the nearest center.
 const REACH: f64 = 1.3;
+/// Rings and azimuths of the sum over the disc that gives the centroid of a part.
+const N_RINGS: usize = 400;
+const N_AZIMUTHS: usize = 800;
 
-/// Parts of a pupil about evenly spread centers. At each place their shares sum to 1, and each falls to 0 smoothly.
+/// Parts of a pupil. At each place their shares sum to 1.
 ///
-/// Places are those of the unit disc onto which the pupil of each field is mapped: x right and y up as seen from the scene.
+/// Places are those of the unit disc onto which the pupil of each field is mapped: x right and y up as the photographer sees the picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PupilDivision {
-    centers: Vec<DVec2>,
-    reach: f64,
+pub struct PupilDivision(Kind);
+
+#[derive(Clone, Debug, PartialEq)]
+enum Kind {
+    /// Parts about evenly spread centers; each falls to 0 smoothly.
+    Even { centers: Vec<DVec2>, reach: f64 },
+    /// Halves or quarters.
+    Sides(PupilSides),
+}
+
+/// Which sides of the pupil the photodiodes below one microlens see.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sides {
+    /// Left, right.
+    LeftRight,
+    /// Top, bottom.
+    TopBottom,
+    /// Top left, top right, bottom left, bottom right.
+    Quarters,
+}
+
+/// How the photodiodes below one microlens share the pupil.
+///
+/// Across each boundary the share of a side runs from c to 1 − c as c + (1 − 2 c) Φ(x / t), with Φ the normal distribution and x the distance
+/// from the boundary in radii of the pupil: c is what the photodiode of the other side gets of light far from the boundary, t how soft
+/// the boundary is, as diffraction at the microlens and its defocus make it. All light arrives at one of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PupilSides {
+    /// Which sides.
+    pub sides: Sides,
+    /// The share of light from far on one side that the photodiode of the other side gets, 0 to .5.
+    pub crosstalk: f64,
+    /// Standard deviation of the boundary, radii of the pupil; 0 for a sharp one.
+    pub transition: f64,
+}
+
+impl PupilSides {
+    /// Returns the share of the light on the positive side of a boundary.
+    fn share_beyond(&self, x: f64) -> f64 {
+        let passed = match self.transition > 0.0 {
+            true => 0.5 * libm::erfc(-x / self.transition * FRAC_1_SQRT_2),
+            false if x == 0.0 => 0.5,
+            false => f64::from(u8::from(x > 0.0)),
+        };
+        self.crosstalk + (1.0 - 2.0 * self.crosstalk) * passed
+    }
+
+    fn share(&self, part: usize, at: DVec2) -> f64 {
+        let [left, right, top, bottom] = [-at.x, at.x, at.y, -at.y].map(|x| self.share_beyond(x));
+        match (self.sides, part) {
+            (Sides::LeftRight, 0) => left,
+            (Sides::LeftRight, _) => right,
+            (Sides::TopBottom, 0) => top,
+            (Sides::TopBottom, _) => bottom,
+            (Sides::Quarters, 0) => top * left,
+            (Sides::Quarters, 1) => top * right,
+            (Sides::Quarters, 2) => bottom * left,
+            (Sides::Quarters, _) => bottom * right,
+        }
+    }
+}
+
+impl From<PupilSides> for PupilDivision {
+    fn from(sides: PupilSides) -> Self {
+        Self(Kind::Sides(sides))
+    }
 }
 
 impl PupilDivision {
-    /// Divides the pupil in so many parts, at least one.
+    /// Divides the pupil in so many parts of about the same shape, at least one, which overlap smoothly.
     pub fn new(n_parts: usize) -> Self {
         let points = spiral(N_POINTS);
         let mut centers = spiral(n_parts.max(1));
@@ -37,22 +105,59 @@ impl PupilDivision {
             }
         }
         let farthest = points.iter().map(|&point| nearest(&centers, point).1).fold(0.0, f64::max);
-        Self { centers, reach: REACH * farthest.sqrt() }
+        Self(Kind::Even { centers, reach: REACH * farthest.sqrt() })
     }
 
     /// The number of parts.
     pub fn n_parts(&self) -> usize {
-        self.centers.len()
+        match &self.0 {
+            Kind::Even { centers, .. } => centers.len(),
+            Kind::Sides(PupilSides { sides: Sides::Quarters, .. }) => 4,
+            Kind::Sides(_) => 2,
+        }
     }
 
     /// Returns the share of the light at a place that goes through a part.
     pub fn share(&self, part: usize, at: DVec2) -> f64 {
-        let bump = |center: &DVec2| {
-            let inner = 1.0 - at.distance_squared(*center) / (self.reach * self.reach);
-            if inner > 0.0 { inner * inner } else { 0.0 }
+        match &self.0 {
+            Kind::Even { centers, reach } => {
+                let bump = |center: &DVec2| {
+                    let inner = 1.0 - at.distance_squared(*center) / (reach * reach);
+                    if inner > 0.0 { inner * inner } else { 0.0 }
+                };
+                let own = bump(&centers[part]);
+                if own == 0.0 { 0.0 } else { own / centers.iter().map(bump).sum::<f64>() }
+            }
+            Kind::Sides(sides) => sides.share(part, at),
+        }
+    }
+
+    /// Returns the centroid of the light of a part where the disc is lit evenly, radii of the pupil.
+    ///
+    /// Of a half without crosstalk it lies 4/(3π) from the boundary.
+    pub fn centroid(&self, part: usize) -> DVec2 {
+        let (mut sum, mut weight) = (DVec2::ZERO, 0.0);
+        for ring in 0..N_RINGS {
+            let radius = (ring as f64 + 0.5) / N_RINGS as f64;
+            for azimuth in 0..N_AZIMUTHS {
+                let at = polar(DVec2::ZERO, radius, TAU * (azimuth as f64 + 0.5) / N_AZIMUTHS as f64);
+                let share = radius * self.share(part, at);
+                sum += share * at;
+                weight += share;
+            }
+        }
+        sum / weight
+    }
+
+    /// Returns the shares that a part has of the light of the cells of a mesh, which is turned by an angle, given as its unit vector.
+    pub(crate) fn cell_shares(&self, part: usize, mesh: Mesh, turn: DVec2) -> Vec<f64> {
+        let n_across = match &self.0 {
+            // Smooth over many cells.
+            Kind::Even { .. } => 1,
+            Kind::Sides(PupilSides { transition, .. }) if *transition > 0.1 => 2,
+            Kind::Sides(_) => 4,
         };
-        let own = bump(&self.centers[part]);
-        if own == 0.0 { 0.0 } else { own / self.centers.iter().map(bump).sum::<f64>() }
+        mesh.cell_means(n_across, |at| self.share(part, turn.rotate(at)))
     }
 }
 
@@ -104,5 +209,48 @@ mod tests {
                 }
             }
         }
+    }
+
+    fn sides(sides: Sides, crosstalk: f64, transition: f64) -> PupilDivision {
+        PupilSides { sides, crosstalk, transition }.into()
+    }
+
+    #[test]
+    fn photodiodes_share_all_light() {
+        for (of, n_parts) in [(Sides::LeftRight, 2), (Sides::TopBottom, 2), (Sides::Quarters, 4)] {
+            for (crosstalk, transition) in [(0.0, 0.0), (0.1, 0.0), (0.0, 0.3), (0.07, 0.2)] {
+                let division = sides(of, crosstalk, transition);
+                assert_eq!(division.n_parts(), n_parts);
+                for at in spiral(1000) {
+                    let sum: f64 = (0..n_parts).map(|part| division.share(part, at)).sum();
+                    assert!((sum - 1.0).abs() < 4.0 * f64::EPSILON, "{of:?} at {at}: {sum}");
+                }
+            }
+        }
+    }
+
+    /// A half disc has its centroid at 4/(3π). Crosstalk c takes the part 2 c of that away. A boundary as wide as the pupil, t ≫ 1, leaves
+    /// a share of ½ + x/(t √(2π)), whose centroid is at ⟨x²⟩ · 2/(t √(2π)) with ⟨x²⟩ = ¼.
+    #[test]
+    fn centroids_are_those_of_half_discs() {
+        let half = 4.0 / (3.0 * std::f64::consts::PI);
+        let check = |crosstalk: f64, transition: f64, expected: f64, tolerance: f64| {
+            for (of, part, way) in [
+                (Sides::LeftRight, 0, -DVec2::X),
+                (Sides::LeftRight, 1, DVec2::X),
+                (Sides::TopBottom, 0, DVec2::Y),
+                (Sides::TopBottom, 1, -DVec2::Y),
+            ] {
+                let found = sides(of, crosstalk, transition).centroid(part);
+                assert!((found - expected * way).length() < tolerance * expected, "{found} {expected}");
+            }
+        };
+        // Midpoints over 400 rings: 1e-5.
+        check(0.0, 0.0, half, 1e-5);
+        check(0.1, 0.0, 0.8 * half, 1e-5);
+        // The next term of Φ is (x/t)²/6 of the first.
+        check(0.0, 20.0, 0.5 / (20.0 * TAU.sqrt()), 1e-3);
+        let quarter = sides(Sides::Quarters, 0.0, 0.0).centroid(1);
+        assert!((quarter - DVec2::splat(half)).length() < 1e-5, "{quarter}");
     }
 }

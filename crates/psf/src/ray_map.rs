@@ -110,24 +110,26 @@ impl RayMap {
 
     /// Returns the part of the energy that goes through a part of the pupil, and the sum of its places, each times its energy, mm.
     ///
-    /// `share_at` is the share of the light at a place of the unit disc onto which the pupil is mapped.
-    pub(crate) fn part_moments(&self, share_at: impl Fn(DVec2) -> f64) -> (f64, DVec2) {
-        let energies = self.part_energies(share_at);
-        (energies.iter().sum(), self.weighted_sum_mm(energies.into_iter()))
+    /// `shares` are the part's shares of the light of the cells.
+    pub(crate) fn part_moments(&self, shares: &[f64]) -> (f64, DVec2) {
+        (self.part_energies(shares).sum(), self.weighted_sum_mm(self.part_energies(shares)))
     }
 
     /// Returns the map of what goes through a part of the pupil, about its own centroid, of energy 1; `None` where nothing does.
-    pub(crate) fn part(&self, share_at: impl Fn(DVec2) -> f64) -> Option<Self> {
-        let energies = self.part_energies(share_at);
-        let share: f64 = energies.iter().sum();
+    pub(crate) fn part(&self, shares: &[f64]) -> Option<Self> {
+        let share: f64 = self.part_energies(shares).sum();
         if share <= 0.0 {
             return None;
         }
         let mut part = self.clone();
         let first = part.numbers.len() - self.mesh.n_cells();
-        part.numbers[first..].iter_mut().zip(energies).for_each(|(of_part, e)| *of_part = (e / share) as f32);
+        part.numbers[first..].iter_mut().zip(self.part_energies(shares)).for_each(|(own, e)| *own = (e / share) as f32);
         part.recenter();
         Some(part)
+    }
+
+    fn part_energies<'a>(&'a self, shares: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        self.energies().iter().zip(shares).map(|(&energy, share)| f64::from(energy) * share)
     }
 
     /// Moves the places so that they count from the centroid of what is drawn of them; returns where that was, mm.
@@ -149,17 +151,6 @@ impl RayMap {
             4 | 7 => false,
             _ => x != y,
         }
-    }
-
-    /// Returns the energies of the cells through a part of the pupil, each cell taken at its middle.
-    fn part_energies(&self, share_at: impl Fn(DVec2) -> f64) -> Vec<f64> {
-        let place = |(ring, j): (usize, usize)| {
-            let [inner, outer] = [ring, ring + 1].map(|ring| self.mesh.share(ring as f64));
-            let radius = (inner * inner + inner * outer + outer * outer) / (1.5 * (inner + outer));
-            polar(DVec2::ZERO, radius, self.mesh.azimuth(j as f64 + 0.5))
-        };
-        let cells = self.mesh.cells().zip(self.energies());
-        cells.map(|(cell, &energy)| f64::from(energy) * share_at(place(cell))).collect()
     }
 
     /// The energies of the cells; their sum is 1.

@@ -114,6 +114,8 @@ impl Camera {
     /// pixels : (columns, rows)
     /// pixel_um : float
     ///     A film of pixels of one's own.
+    /// dual_pixel : {"none", "left-right", "top-bottom", "quad", "left-right:CROSSTALK:DEGREES"}
+    ///     Reads the photodiodes below each microlens one by one.
     /// diffraction : {"none", "hurb", "hurb-scene3d", "hurb-calibrated", "wave"}
     /// gamma : float
     ///     Strength of HURB.
@@ -137,6 +139,8 @@ impl Camera {
     ///     Several frames, merged.
     /// interleaved_ratio : float
     ///     Pairs of rows exposed for the chosen time and for one so many times shorter in turn, merged.
+    /// interleaved_gain_ratio : float
+    ///     Pairs of rows read with the chosen analog gain and with one so many times lower in turn, merged.
     /// white, demosaic, highlights, color : str
     /// denoise, sharpen_px : float
     ///     Of the processing.

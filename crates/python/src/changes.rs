@@ -30,6 +30,7 @@ pub(crate) const OF_EXPOSURE: &[&str] = &[
     "burst",
     "bracket_stops",
     "interleaved_ratio",
+    "interleaved_gain_ratio",
     "white",
     "demosaic",
     "denoise",
@@ -77,6 +78,7 @@ pub(crate) const ALL: &[&str] = &[
     "crop",
     "pixels",
     "pixel_um",
+    "dual_pixel",
     "diffraction",
     "gamma",
     "blur",
@@ -101,6 +103,7 @@ pub(crate) const ALL: &[&str] = &[
     "burst",
     "bracket_stops",
     "interleaved_ratio",
+    "interleaved_gain_ratio",
     "white",
     "demosaic",
     "denoise",
@@ -247,6 +250,14 @@ fn set_film(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_
             let (x, y, columns, rows) = value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?;
             camera.crop = Some(Crop { x, y, columns, rows });
         }
+        "dual_pixel" => {
+            let found = word(key, value)?;
+            let expected = "'none', 'left-right', 'top-bottom' or 'quad', also as 'left-right:0.05:3'";
+            camera.dual_pixel = match found.as_str() {
+                "none" => None,
+                _ => Some(found.parse().map_err(|_| wrong(key, format!("'{found}'"), expected))?),
+            };
+        }
         "film" => {
             camera.film = match word(key, value)?.as_str() {
                 "sensor" => FilmSpec::Sensor,
@@ -315,7 +326,16 @@ fn set_frames(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRes
         "burst" => camera.frames = FramesSpec::Burst(count(key, value)?),
         "bracket_stops" => camera.frames = FramesSpec::BracketStops(numbers(key, value)?),
         "interleaved_ratio" => {
-            camera.frames = FramesSpec::Interleaved { ratio: number(key, value)?, period_rows: 2 };
+            camera.frames = FramesSpec::Interleaved { ratio: number(key, value)?, period_rows: 2, gain_ratio: 1.0 };
+        }
+        "interleaved_gain_ratio" => {
+            let gain_ratio = number(key, value)?;
+            camera.frames = match camera.frames {
+                FramesSpec::Interleaved { ratio, period_rows, .. } => {
+                    FramesSpec::Interleaved { ratio, period_rows, gain_ratio }
+                }
+                _ => FramesSpec::Interleaved { ratio: 1.0, period_rows: 2, gain_ratio },
+            };
         }
         "seed" => {
             camera.seed =

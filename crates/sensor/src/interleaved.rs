@@ -1,43 +1,56 @@
-//! Frames whose rows are exposed for a long and a short time in turn, and their merge.
+//! Frames whose rows are exposed for a long and a short time, or read with a high and a low gain, in turn, and their merge.
 
 use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    ElectronRate, Electrons, Exposure, MergedFrame, Noise, Raw, RawPlane, Sensor, SensorError, Tile, hdr::USABLE_BELOW,
+    ElectronRate, Electrons, Exposure, Levels, MergedFrame, Noise, Raw, RawPlane, Sensor, SensorError, Tile, Volts,
+    hdr::USABLE_BELOW,
 };
 
-/// Rows of two exposure times in turn: some rows for the time of the exposure, then as many for a part of it.
+/// Rows of two exposures in turn: some rows of the time and gain of the exposure, then as many of a part of one, or of both.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Interleaved {
-    /// The time of the long rows, which is that of the exposure, over the time of the short ones; above 1.
+    /// The time of the long rows, which is that of the exposure, over the time of the short ones; 1 or more.
     pub ratio: f64,
     /// How many neighboring rows share a time; a multiple of the rows after which the mosaic repeats.
     pub period_rows: usize,
+    /// The analog gain of the long rows, which is that of the exposure, over the gain of the short ones; 1 or more, and above 1 where
+    /// the times are equal.
+    #[serde(default = "same_gain")]
+    pub gain_ratio: f64,
+}
+
+fn same_gain() -> f64 {
+    1.0
 }
 
 impl Interleaved {
-    /// Whether a row is exposed for the whole time; row 0 is.
+    /// Whether a row has the whole time and gain; row 0 has.
     pub fn is_long(&self, row: usize) -> bool {
         (row / self.period_rows).is_multiple_of(2)
     }
 
     /// Returns the exposure of the short rows.
     pub fn short(&self, long: &Exposure) -> Exposure {
-        Exposure { time_s: long.time_s / self.ratio, ..*long }
+        let (time_s, analog_gain) = (long.time_s / self.ratio, long.analog_gain / self.gain_ratio);
+        Exposure { time_s, analog_gain, ..*long }
     }
 
     /// Checks that the numbers make sense for a mosaic.
     ///
     /// # Errors
-    /// When the ratio is not above 1, or some filter would be found in rows of one time alone.
+    /// When the ratios are below 1 or both 1, or some filter would be found in rows of one kind alone.
     pub fn check(&self, tile: Option<&Tile>) -> Result<(), SensorError> {
         let wrong = |key, value, expected| Err(SensorError::value("the interleaved rows", key, value, expected));
-        if !(self.ratio > 1.0 && self.ratio.is_finite()) {
-            return wrong("ratio", self.ratio, "a number above 1");
+        if !(self.gain_ratio >= 1.0 && self.gain_ratio.is_finite()) {
+            return wrong("gain_ratio", self.gain_ratio, "1 or more");
+        }
+        if !(self.ratio >= 1.0 && self.ratio.is_finite()) || self.ratio * self.gain_ratio <= 1.0 {
+            return wrong("ratio", self.ratio, "a number above 1, or 1 where gain_ratio is above it");
         }
         if self.period_rows == 0 || !self.period_rows.is_multiple_of(tile.map_or(1, Tile::rows)) {
             let expected = "a multiple, 1 or more, of the rows after which the mosaic repeats";
@@ -72,6 +85,20 @@ impl Sensor {
         self.electrons_by_row(rate, &[*exposure, rows.short(exposure)], &|row| usize::from(!rows.is_long(row)), noise)
     }
 
+    /// Returns the frame as the converter gives it where rows have two gains in turn. Its levels are those of the long rows.
+    ///
+    /// # Errors
+    /// When the sensor, the exposure or the rows make no sense.
+    pub fn digitize_interleaved(
+        &self,
+        volts: &Volts,
+        exposure: &Exposure,
+        rows: &Interleaved,
+    ) -> Result<Raw, SensorError> {
+        rows.check(self.tile()?.as_ref())?;
+        self.digitize_by_row(volts, &[*exposure, rows.short(exposure)], &|row| usize::from(!rows.is_long(row)))
+    }
+
     /// Merges the rows of two times into one frame of more range, in units of the short rows' saturation.
     ///
     /// Each pixel has a sample of its own, and one of the other time between the nearest rows of its filter above and below, in a
@@ -95,15 +122,24 @@ impl Sensor {
             });
         }
         let exposure = rows.short(&raw.exposure);
-        let saturation_e = raw.levels.saturation_e();
-        let source = |exposure: &Exposure| MergedFrame {
+        let short_levels = if rows.gain_ratio > 1.0 { Levels::new(self, &exposure) } else { raw.levels.clone() };
+        let source = |exposure: &Exposure, levels: &Levels| MergedFrame {
             time_s: exposure.time_s,
-            saturation_e,
-            floor_e: self.floor_e(&raw.levels, exposure),
+            saturation_e: levels.saturation_e(),
+            floor_e: self.floor_e(levels, exposure),
         };
-        let merge = RowMerge { rows, tile_rows, long: source(&raw.exposure), short: source(&exposure) };
-        let planes = raw.linear().iter().map(|plane| RawPlane::Volts(merge.plane(plane))).collect();
-        let levels = self.unit_levels(saturation_e, &exposure);
+        let (long, short) = (source(&raw.exposure, &raw.levels), source(&exposure, &short_levels));
+        let merge = RowMerge { rows, tile_rows, long, short };
+        // Codes of short rows stand for more light where their gain is lower.
+        let mut linear = raw.linear();
+        let of_short = Raw { levels: short_levels, ..raw.clone() }.linear();
+        for (plane, of_short) in linear.iter_mut().zip(&of_short) {
+            for row in (0..n_rows).filter(|&row| !rows.is_long(row)) {
+                plane.row_mut(row).assign(&of_short.row(row));
+            }
+        }
+        let planes = linear.iter().map(|plane| RawPlane::Volts(merge.plane(plane))).collect();
+        let levels = self.unit_levels(merge.short.saturation_e, &exposure);
         Ok(Raw { planes, levels, exposure, merged: vec![merge.long, merge.short], ..raw.clone() })
     }
 }

@@ -34,10 +34,23 @@ impl Sensor {
     /// # Errors
     /// When the sensor or the exposure makes no sense.
     pub fn digitize(&self, volts: &Volts, exposure: &Exposure) -> Result<Raw, SensorError> {
+        self.digitize_by_row(volts, &[*exposure], &|_| 0)
+    }
+
+    /// Returns a frame of which each row is amplified as one of several exposures asks; its levels are those of the first.
+    pub(crate) fn digitize_by_row(
+        &self,
+        volts: &Volts,
+        exposures: &[Exposure],
+        exposure_of: &(dyn Fn(usize) -> usize + Sync),
+    ) -> Result<Raw, SensorError> {
         self.check()?;
-        exposure.check()?;
+        exposures.iter().try_for_each(Exposure::check)?;
+        let exposure = &exposures[0];
         let levels = Levels::new(self, exposure);
-        let planes = volts.planes_v.iter().map(|plane| self.convert(plane, exposure)).collect();
+        let gains: Vec<f64> = exposures.iter().map(|exposure| exposure.analog_gain).collect();
+        let gain_of = |row: usize| gains[exposure_of(row)];
+        let planes = volts.planes_v.iter().map(|plane| self.convert(plane, &gain_of)).collect();
         Ok(Raw {
             planes,
             tile: self.tile()?,
@@ -49,25 +62,27 @@ impl Sensor {
         })
     }
 
-    fn convert(&self, volts: &Array2<f32>, exposure: &Exposure) -> RawPlane {
+    fn convert(&self, volts: &Array2<f32>, gain_of: &(dyn Fn(usize) -> f64 + Sync)) -> RawPlane {
         let black_v = match self.adc {
             crate::Adc::Bits { black_level_dn, .. } => {
                 self.adc.step_v(self.swing_v).map_or(0.0, |step_v| step_v * f64::from(black_level_dn))
             }
             crate::Adc::Analog => 0.0,
         };
-        let out_v = |v: f32| {
-            let amplified = (f64::from(v) + self.offset_v) * exposure.analog_gain;
+        let out_v = |row: usize, v: f32| {
+            let amplified = (f64::from(v) + self.offset_v) * gain_of(row);
             let clipped = amplified.clamp(-black_v, self.swing_v);
             // Below 0 the curve is continued by symmetry.
             self.response.apply(clipped.abs(), self.swing_v).copysign(clipped)
         };
         match (self.adc.step_v(self.swing_v), self.adc.top_dn()) {
             (Some(step_v), Some(top)) => {
-                let code = |&v: &f32| ((out_v(v) + black_v) / step_v + 0.5).floor().clamp(0.0, f64::from(top)) as u16;
-                RawPlane::Dn(ndarray::Zip::from(volts).par_map_collect(code))
+                let code = |(row, _): (usize, usize), &v: &f32| {
+                    ((out_v(row, v) + black_v) / step_v + 0.5).floor().clamp(0.0, f64::from(top)) as u16
+                };
+                RawPlane::Dn(ndarray::Zip::indexed(volts).par_map_collect(code))
             }
-            _ => RawPlane::Volts(ndarray::Zip::from(volts).par_map_collect(|&v| out_v(v) as f32)),
+            _ => RawPlane::Volts(ndarray::Zip::indexed(volts).par_map_collect(|(row, _), &v| out_v(row, v) as f32)),
         }
     }
 }

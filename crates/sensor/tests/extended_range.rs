@@ -4,12 +4,12 @@
 
 use approx::assert_relative_eq;
 use dioptric_sensor::{
-    Cfa, ElectronRate, Exposure, Filter, Illumination, Interleaved, Levels, Noise, Raw, Sensor, SplitPixel,
+    Adc, Cfa, ElectronRate, Exposure, Filter, Illumination, Interleaved, Levels, Noise, Raw, Sensor, SplitPixel,
 };
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, s};
 
-const ROWS: Interleaved = Interleaved { ratio: 8.0, period_rows: 2 };
+const ROWS: Interleaved = Interleaved { ratio: 8.0, period_rows: 2, gain_ratio: 1.0 };
 
 /// Returns a monochrome sensor without a fixed pattern.
 fn even_sensor() -> Sensor {
@@ -106,6 +106,44 @@ fn filters_are_interpolated_from_their_own_rows() {
     let odd = Interleaved { period_rows: 1, ..ROWS };
     let error = sensor.electrons_interleaved(&rate, &exposure, &odd, &Noise::none()).unwrap_err();
     assert!(error.to_string().contains("period_rows"), "{error}");
+}
+
+/// Rows of the whole and of a quarter of the gain, exposed alike: what saturates the converter in one has room in the other, and shadows keep the
+/// fine steps of the high gain.
+#[test]
+fn rows_of_two_gains_reach_as_far_as_the_lower_one() {
+    let sensor = Sensor { adc: Adc::Bits { bits: 8, black_level_dn: 16, step_v: None }, ..even_sensor() };
+    let rows = Interleaved { ratio: 1.0, period_rows: 2, gain_ratio: 4.0 };
+    let high = Exposure { analog_gain: 8.0, ..Exposure::seconds(0.01) };
+    let low = rows.short(&high);
+    assert_eq!((low.analog_gain, low.time_s), (2.0, high.time_s));
+    let frame = |e_per_s: f64, noise: &Noise| {
+        let electrons = sensor.electrons_interleaved(&flat(e_per_s as f32), &high, &rows, noise).unwrap();
+        let volts = sensor.volts(&electrons, &high, noise).unwrap();
+        sensor.digitize_interleaved(&volts, &high, &rows).unwrap()
+    };
+    // Each row has the code of a frame of its own gain.
+    let dim = 0.2 * sensor.saturation_e(&high) / high.time_s;
+    let raw = frame(dim, &Noise::none());
+    let own = |exposure: &Exposure| exposed(&sensor, &flat(dim as f32), exposure, &Noise::none());
+    for row in 0..64 {
+        let expected = own(if row % 4 < 2 { &high } else { &low });
+        assert_eq!(raw.dn().unwrap().row(row), expected.dn().unwrap().row(row), "row {row}");
+    }
+    // Three times what saturates the high gain comes back, to half a step of the converter.
+    let bright = 3.0 * sensor.saturation_e(&high) / high.time_s;
+    let merged = sensor.merge_interleaved(&frame(bright, &Noise::none()), &rows).unwrap();
+    assert_relative_eq!(rates(&merged).mean().unwrap(), bright, max_relative = 4e-3);
+    let reach = merged.levels.saturation_e() / sensor.saturation_e(&high);
+    assert_relative_eq!(reach, sensor.saturation_e(&low) / sensor.saturation_e(&high), max_relative = 1e-9);
+    assert!(reach > 3.5, "{reach}");
+    // In the shadows a step of the low gain is as large as four of the high one; the merge is nearly as quiet as the high gain alone.
+    let noise = |exposure: &Exposure| rates(&exposed(&sensor, &flat(dim as f32), exposure, &Noise::all(4))).std(0.0);
+    let merged = rates(&sensor.merge_interleaved(&frame(dim, &Noise::all(4)), &rows).unwrap()).std(0.0);
+    assert!(merged < noise(&high) && noise(&high) < noise(&low), "{merged} {} {}", noise(&high), noise(&low));
+    let none = Interleaved { gain_ratio: 1.0, ..rows };
+    let error = sensor.electrons_interleaved(&flat(1.0), &high, &none, &Noise::none()).unwrap_err().to_string();
+    assert!(error.contains("gain_ratio"), "{error}");
 }
 
 fn split_sensor() -> Sensor {

@@ -2,6 +2,7 @@
 
 mod charts;
 mod dng_report;
+mod dual_pixel;
 mod statistics;
 
 use dioptric_pipeline::{AberrationSummary, BankData, Camera, Capture, FilmPart, PipelineError, display::LinearRgb};
@@ -12,6 +13,7 @@ use serde::Serialize;
 
 pub use charts::{RunCharts, RunPlaces};
 pub use dng_report::DngReport;
+pub use dual_pixel::{DisparityData, DualPixelData, MOST_ERROR_PX};
 pub use statistics::{ChannelStatistics, LossRow, SensorStatistics};
 
 use crate::LensData;
@@ -64,6 +66,9 @@ pub struct RunReport {
     /// How much the corrections of the lens do, where some are asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lens_corrections: Option<AberrationSummary>,
+    /// What photodiodes that are read one by one tell of the focus.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dual_pixel: Option<DualPixelData>,
     /// The files beside the report.
     pub files: Vec<String>,
 }
@@ -223,6 +228,7 @@ impl RunReport {
             color_matrix: capture.developed.color.rows.clone(),
             color_matrix_mean_delta_e: capture.developed.color.mean_delta_e(),
             lens_corrections: capture.aberrations.as_ref().map(|aberrations| aberrations.summary),
+            dual_pixel: DualPixelData::of(capture),
             files,
         })
     }

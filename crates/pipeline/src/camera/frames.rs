@@ -2,9 +2,14 @@
 
 use std::borrow::Cow;
 
-use dioptric_sensor::{ElectronRate, Electrons, Exposure, Interleaved, Noise, Raw, Sensor, SensorError, Volts};
+use dioptric_sensor::{
+    DisparityMap, DisparitySearch, ElectronRate, Electrons, Exposure, Interleaved, Noise, Raw, Sensor, SensorError,
+    Volts,
+};
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
+use super::Photodiodes;
 use crate::PipelineError;
 
 /// The most frames of one picture.
@@ -33,13 +38,21 @@ pub enum FramesSpec {
     /// Exposures that differ from the chosen one by powers of two, merged into one of more range; −2 is a quarter of the
     /// time.
     BracketStops(Vec<f64>),
-    /// One whose rows are exposed for the chosen time and for a part of it in turn, merged into one of more range.
+    /// One whose rows are exposed for the chosen time and for a part of it in turn, or read with the chosen analog gain and a part of it, merged
+    /// into one of more range.
     Interleaved {
-        /// The chosen time over that of the short rows, above 1.
+        /// The chosen time over that of the short rows: above 1, or 1 where the gains differ.
         ratio: f64,
-        /// How many neighboring rows share a time; a multiple of the rows after which the mosaic repeats.
+        /// How many neighboring rows share time and gain; a multiple of the rows after which the mosaic repeats.
         period_rows: usize,
+        /// The chosen analog gain over that of the short rows, 1 or more.
+        #[serde(default = "same_gain")]
+        gain_ratio: f64,
     },
+}
+
+fn same_gain() -> f64 {
+    1.0
 }
 
 /// What a sensor gives for one picture: every stage of the first frame, and all frames merged.
@@ -55,6 +68,37 @@ pub struct Exposed {
     pub raw_note: Option<String>,
     /// All frames merged, those of both photodiodes of split pixels among them; none for a single one.
     pub merged: Option<Raw>,
+    /// What each photodiode gave, where they are read one by one: electrons, volts and `raw` are the sums.
+    pub photodiodes: Option<PhotodiodeReads>,
+}
+
+/// What the photodiodes that share the light of each pixel give in the first exposure.
+#[derive(Clone, Debug)]
+pub struct PhotodiodeReads {
+    /// Which they are.
+    pub photodiodes: Photodiodes,
+    /// The frame of each, in the order of their names.
+    pub frames: Vec<Raw>,
+    /// How far the two halves of the pupil see things apart; `None` of frames that are smaller than what is matched.
+    pub disparity: Option<DisparityMap>,
+}
+
+impl PhotodiodeReads {
+    fn of(photodiodes: Photodiodes, frames: Vec<Raw>, sheet: &Sensor) -> Result<Self, SensorError> {
+        let search = DisparitySearch::default();
+        let (rows, columns) = frames[0].size();
+        let disparity = if rows.min(columns) < search.window_px {
+            None
+        } else {
+            let half = |numbers: &[usize]| match *numbers {
+                [number] => Ok(frames[number].clone()),
+                _ => sheet.sum_reads(&numbers.iter().map(|&number| frames[number].clone()).collect::<Vec<_>>()),
+            };
+            let [first, second] = photodiodes.halves();
+            Some(DisparityMap::of([&half(first)?, &half(second)?], photodiodes.disparity_axis(), &search)?)
+        };
+        Ok(Self { photodiodes, frames, disparity })
+    }
 }
 
 impl Exposed {
@@ -93,8 +137,14 @@ impl FramesSpec {
             Self::MovingBurst { motion_px, .. } if !(0.0..=MOST_PX).contains(motion_px) => {
                 wrong("MovingBurst.motion_px", motion_px.to_string(), format!("0 to {MOST_PX} pixels"))
             }
-            Self::Interleaved { ratio, .. } if !(*ratio > 1.0 && ratio.is_finite()) => {
-                wrong("Interleaved.ratio", ratio.to_string(), "a number above 1".to_owned())
+            Self::Interleaved { gain_ratio, .. } if !(*gain_ratio >= 1.0 && gain_ratio.is_finite()) => {
+                wrong("Interleaved.gain_ratio", gain_ratio.to_string(), "1 or more".to_owned())
+            }
+            Self::Interleaved { ratio, gain_ratio, .. }
+                if !(*ratio >= 1.0 && ratio.is_finite()) || ratio * gain_ratio <= 1.0 =>
+            {
+                let expected = "a number above 1, or 1 where gain_ratio is above it".to_owned();
+                wrong("Interleaved.ratio", ratio.to_string(), expected)
             }
             Self::Interleaved { period_rows: 0, .. } => {
                 wrong("Interleaved.period_rows", "0".to_owned(), "1 row or more".to_owned())
@@ -120,8 +170,12 @@ impl FramesSpec {
             Self::BracketStops(stops) => {
                 (stops.len() > 1).then(|| format!("the first of {} frames of a bracket", stops.len()))
             }
-            Self::Interleaved { ratio, period_rows: n } => Some(format!(
+            Self::Interleaved { ratio, period_rows: n, gain_ratio: 1.0 } => Some(format!(
                 "rows of two exposure times in turn, not merged: {n} of the stated time, then {n} of 1/{ratio} of it"
+            )),
+            Self::Interleaved { ratio, period_rows: n, gain_ratio } => Some(format!(
+                "rows of two exposures in turn, not merged: {n} of the stated time and gain, then {n} of 1/{ratio} of the time and \
+                 1/{gain_ratio} of the gain"
             )),
         };
         let of_pixels =
@@ -143,8 +197,8 @@ impl FramesSpec {
             Self::Single => vec![*exposure],
             Self::Burst(n) | Self::MovingBurst { frames: n, .. } => vec![*exposure; *n],
             Self::BracketStops(stops) => exposure.bracket(stops),
-            &Self::Interleaved { ratio, period_rows } => {
-                let rows = Interleaved { ratio, period_rows };
+            &Self::Interleaved { ratio, period_rows, gain_ratio } => {
+                let rows = Interleaved { ratio, period_rows, gain_ratio };
                 let exposed = expose_interleaved(sensor, rate, exposure, &rows, noise)?;
                 return Ok(Exposed { raw_note: self.raw_note(sensor), ..exposed });
             }
@@ -177,8 +231,63 @@ impl FramesSpec {
             Self::Burst(_) | Self::BracketStops(_) => Some(sensor.merge(&frames)?),
             Self::Single | Self::Interleaved { .. } => None,
         };
-        Ok(Exposed { electrons, volts, raw: frames.swap_remove(0), raw_note: self.raw_note(sensor), merged })
+        let raw_note = self.raw_note(sensor);
+        Ok(Exposed { electrons, volts, raw: frames.swap_remove(0), raw_note, merged, photodiodes: None })
     }
+
+    /// Takes the frames of a sensor whose photodiodes are read one by one, each with noise of its own.
+    pub(crate) fn expose_photodiodes(
+        &self,
+        sensor: &Sensor,
+        kind: Photodiodes,
+        rates: &[ElectronRate],
+        exposure: &Exposure,
+        noise: &Noise,
+    ) -> Result<Exposed, PipelineError> {
+        self.check()?;
+        let exposures = match self {
+            Self::Single => vec![*exposure],
+            Self::Burst(n) => vec![*exposure; *n],
+            Self::BracketStops(stops) => exposure.bracket(stops),
+            Self::MovingBurst { .. } | Self::Interleaved { .. } => {
+                let reason = "are not read photodiode by photodiode, expected Single, Burst or BracketStops".to_owned();
+                return Err(PipelineError::Unsuitable { what: "moving bursts and interleaved rows", reason });
+            }
+        };
+        let (one, sum) = (sensor.photodiode(rates.len())?, sensor.of_summed_reads(rates.len()));
+        let mut first = None;
+        let mut frames = Vec::new();
+        for (number, exposure) in exposures.iter().enumerate() {
+            let noise = noise.frame(number as u64);
+            let electrons = sensor.photodiode_electrons(rates, exposure, &noise)?;
+            let read = |(photodiode, electrons): (usize, Electrons)| -> Result<_, SensorError> {
+                let noise = noise.of_photodiode(photodiode);
+                let volts = one.volts(&electrons, exposure, &noise)?;
+                let raw = one.digitize(&volts, exposure)?;
+                Ok((electrons, volts, raw))
+            };
+            let mut reads = electrons.into_iter().enumerate().map(read).collect::<Result<Vec<_>, _>>()?;
+            let raws: Vec<Raw> = reads.iter().map(|(_, _, raw)| raw.clone()).collect();
+            frames.push(sum.sum_reads(&raws)?);
+            if first.is_none() {
+                let (mut electrons, mut volts, _) = reads.remove(0);
+                for (other_electrons, other_volts, _) in reads {
+                    add(&mut electrons.planes_e, &other_electrons.planes_e);
+                    add(&mut volts.planes_v, &other_volts.planes_v);
+                }
+                first = Some((electrons, volts, PhotodiodeReads::of(kind, raws, &sum)?));
+            }
+        }
+        let (electrons, volts, photodiodes) = first.expect("a checked choice has a frame");
+        let merged = if *self == Self::Single { None } else { Some(sum.merge(&frames)?) };
+        let raw_note = self.raw_note(sensor);
+        let (raw, photodiodes) = (frames.swap_remove(0), Some(photodiodes));
+        Ok(Exposed { electrons, volts, raw, raw_note, merged, photodiodes })
+    }
+}
+
+fn add(sums: &mut [Array2<f32>], planes: &[Array2<f32>]) {
+    sums.iter_mut().zip(planes).for_each(|(sum, plane)| *sum += plane);
 }
 
 /// Takes one frame whose rows have two times in turn, and merges them.
@@ -193,11 +302,11 @@ fn expose_interleaved(
         return Err(split_pixels_want("interleaved rows"));
     }
     let electrons = sensor.electrons_interleaved(&*rate([0.0; 2])?, exposure, rows, noise)?;
-    // Volts and codes do not depend on the time.
+    // Volts depend neither on the time nor on the gain.
     let volts = sensor.volts(&electrons, exposure, noise)?;
-    let raw = sensor.digitize(&volts, exposure)?;
+    let raw = sensor.digitize_interleaved(&volts, exposure, rows)?;
     let merged = Some(sensor.merge_interleaved(&raw, rows)?);
-    Ok(Exposed { electrons, volts, raw, raw_note: None, merged })
+    Ok(Exposed { electrons, volts, raw, raw_note: None, merged, photodiodes: None })
 }
 
 fn digitized(sensor: &Sensor, rate: &ElectronRate, exposure: &Exposure, noise: &Noise) -> Result<Raw, SensorError> {
@@ -224,7 +333,6 @@ pub(crate) fn at_rest<'a>(rate: &'a ElectronRate) -> impl Fn([f64; 2]) -> Result
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ndarray::Array2;
 
     #[test]
     fn a_burst_has_less_noise_and_its_first_frame_is_the_single_one() {

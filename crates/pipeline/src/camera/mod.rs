@@ -4,10 +4,12 @@ mod bank;
 mod blur;
 mod check;
 mod crop;
+mod dual_pixel;
 mod frames;
 mod lens;
 mod light_field;
 mod movements;
+mod photodiodes;
 mod picture_options;
 mod scene;
 mod sensor_options;
@@ -28,11 +30,13 @@ use serde::{Deserialize, Serialize};
 pub use bank::{BankData, BankSpec};
 pub use blur::BlurSpec;
 pub use crop::Crop;
+pub use dual_pixel::DualPixelSpec;
 pub(crate) use frames::at_rest;
-pub use frames::{Exposed, FramesSpec};
+pub use frames::{Exposed, FramesSpec, PhotodiodeReads};
 pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 pub use light_field::LightFieldSpec;
 pub use movements::Movements;
+pub use photodiodes::Photodiodes;
 pub use picture_options::PictureOptions;
 pub(crate) use scene::bands_or_own;
 pub use scene::{FlatSize, SceneSource, SceneSpec};
@@ -87,6 +91,9 @@ pub struct Camera {
     pub light_field: Option<LightFieldSpec>,
     /// The sensor.
     pub sensor: SensorSpec,
+    /// Photodiodes that share the light below each microlens and are read one by one; whole pixels if left out.
+    #[serde(default)]
+    pub dual_pixel: Option<DualPixelSpec>,
     /// The exposure.
     #[serde(default = "automatic")]
     pub exposure: ExposureControl,
@@ -315,6 +322,9 @@ impl Camera {
         self.frames.check()?;
         if let Some(spec) = &self.light_field {
             spec.check(checker)?;
+        }
+        if let Some(spec) = &self.dual_pixel {
+            spec.check(self, checker)?;
         }
         self.scene.check(checker)
     }

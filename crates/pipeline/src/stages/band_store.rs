@@ -21,11 +21,14 @@ const BANDS: &str = "bands.raw";
 pub(super) struct BandFolder {
     pub(super) path: PathBuf,
     pub(super) key: String,
+    /// The photodiode that they are the light of; none of whole pixels.
+    pub(super) photodiode: Option<usize>,
 }
 
 /// Whether an unfinished run has kept bands in this folder.
 pub fn has_kept_bands(folder: &Path) -> bool {
-    fs::metadata(folder.join(BANDS)).is_ok_and(|bands| bands.len() > 0)
+    let has_any = |name: &str| fs::metadata(folder.join(name)).is_ok_and(|bands| bands.len() > 0);
+    has_any(BANDS) || has_any(&format!("photodiode-0-{BANDS}"))
 }
 
 /// The file of the bands, open.
@@ -37,12 +40,23 @@ pub(super) struct BandStore {
 }
 
 impl BandFolder {
+    /// Returns the folder of the bands of one of the photodiodes that share the light of each pixel.
+    pub(super) fn of_photodiode(&self, number: usize) -> Self {
+        Self { photodiode: Some(number), ..self.clone() }
+    }
+
+    /// The name of the file of the bands, or of that which says what they are made from.
+    fn name(&self, name: &str) -> String {
+        self.photodiode.map_or_else(|| name.to_owned(), |number| format!("photodiode-{number}-{name}"))
+    }
+
     /// Takes the bands of another folder if they are of this camera; returns whether they were.
     pub(super) fn adopt(&self, other: &Path) -> Result<bool, PipelineError> {
-        if fs::read_to_string(other.join(KEY)).ok().as_ref() != Some(&self.key) {
+        let names = [BANDS, KEY].map(|name| self.name(name));
+        if fs::read_to_string(other.join(&names[1])).ok().as_ref() != Some(&self.key) {
             return Ok(false);
         }
-        for name in [BANDS, KEY] {
+        for name in &names {
             fs::rename(other.join(name), self.path.join(name)).map_err(|error| self.unwritable(&error))?;
         }
         Ok(true)
@@ -51,15 +65,16 @@ impl BandFolder {
     /// Opens the file of the bands: what of it is whole stays, if it is of this camera.
     pub(super) fn open(&self, size: (usize, usize), n_bands: usize) -> Result<BandStore, PipelineError> {
         let opened = || -> std::io::Result<BandStore> {
-            let path = self.path.join(BANDS);
-            let is_ours = fs::read_to_string(self.path.join(KEY)).ok().as_ref() == Some(&self.key);
+            let path = self.path.join(self.name(BANDS));
+            let key = self.path.join(self.name(KEY));
+            let is_ours = fs::read_to_string(&key).ok().as_ref() == Some(&self.key);
             let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(!is_ours).open(&path)?;
             let n_done = ((file.metadata()?.len() / band_bytes(size)) as usize).min(n_bands);
             // Half a band, which the end of the process cut off, is made anew.
             file.set_len(n_done as u64 * band_bytes(size))?;
             file.seek(SeekFrom::End(0))?;
             if !is_ours {
-                fs::write(self.path.join(KEY), &self.key)?;
+                fs::write(&key, &self.key)?;
             }
             Ok(BandStore { file, path, size, n_done })
         };
@@ -129,7 +144,8 @@ mod tests {
     #[test]
     fn only_whole_bands_of_the_same_camera_stay() {
         let (one, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        let folder = |path: &Path, key: &str| BandFolder { path: path.to_owned(), key: key.to_owned() };
+        let folder =
+            |path: &Path, key: &str| BandFolder { path: path.to_owned(), key: key.to_owned(), photodiode: None };
         let size = (2, 3);
         let plane = |band: usize| Array2::from_shape_fn(size, |(r, c)| (100 * band + 10 * r + c) as f32 + 0.1);
         let first = folder(one.path(), "camera");

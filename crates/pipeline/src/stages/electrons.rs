@@ -4,8 +4,26 @@ use std::sync::Arc;
 
 use dioptric_sensor::{ElectronRate, ExitPupil, Illumination, Sensor};
 
-use super::{Watch, film::FilmPlace, irradiance::Irradiance};
+use super::{Watch, film::FilmPlace, irradiance::Irradiance, spec::ElectronInputs};
 use crate::{PipelineError, Stage};
+
+/// The mean rates of photo-electrons of a sensor.
+#[derive(Debug)]
+pub(crate) struct PixelRates {
+    /// Those of whole pixels.
+    pub(crate) whole: Arc<ElectronRate>,
+    /// Those of the photodiodes that are read by themselves, whose sum the whole is; none of whole pixels.
+    pub(crate) photodiodes: Vec<ElectronRate>,
+}
+
+/// Returns the sensor as it lies on the film, with the noise of as many reads as the samples of its frames are sums of.
+pub(super) fn read_out(inputs: &ElectronInputs, place: &FilmPlace) -> Sensor {
+    let sensor = on_film(&inputs.sensor, place);
+    match inputs.irradiance.dual_pixel {
+        Some(spec) => sensor.of_summed_reads(spec.photodiodes.names().len()),
+        None => sensor,
+    }
+}
 
 /// Returns the sensor as it lies on the film: its pixels are the film's samples, its mosaic that of the whole film.
 pub(super) fn on_film(sensor: &Sensor, place: &FilmPlace) -> Sensor {
@@ -30,11 +48,23 @@ pub(super) fn collect(
     sensor: Sensor,
     place: &FilmPlace,
     watch: &Watch<'_>,
-) -> Result<ElectronRate, PipelineError> {
+) -> Result<PixelRates, PipelineError> {
     watch.progress.at(Stage::Sensor, 0.0);
     let exit_pupil = exit_pupil(&sensor, place);
     watch.run(move || {
-        let light = Illumination { exit_pupil, ..Illumination::on_pixels(&*irradiance) };
-        Ok(sensor.electron_rate(&light)?)
+        let rate = |irradiance: &Irradiance| {
+            sensor.electron_rate(&Illumination { exit_pupil, ..Illumination::on_pixels(irradiance) })
+        };
+        let photodiodes = irradiance.photodiodes().iter().map(rate).collect::<Result<Vec<_>, _>>()?;
+        let whole = match photodiodes.split_first() {
+            None => rate(&irradiance)?,
+            Some((first, others)) => {
+                let mut sum = first.clone();
+                let planes = others.iter().flat_map(|rate| rate.planes_e_per_s.iter().enumerate());
+                planes.for_each(|(number, plane)| sum.planes_e_per_s[number] += plane);
+                sum
+            }
+        };
+        Ok(PixelRates { whole: Arc::new(whole), photodiodes })
     })
 }

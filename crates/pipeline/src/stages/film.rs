@@ -86,6 +86,11 @@ impl FilmPlace {
         Film { center_mm: center_mm.unwrap_or_default(), ..Film::centered(self.rows, self.columns, self.pitch_um) }
     }
 
+    /// Returns the f-number of the cone of light that a lens sends to a point of this film that is in focus.
+    pub fn working_f_number(&self, lens: &ResolvedLens) -> f64 {
+        lens.reference.working_f_number(self.focus_distance_mm.unwrap_or(f64::INFINITY))
+    }
+
     /// The distance between the pixels of the sensor on this film, µm.
     pub fn pixel_pitch_um(&self) -> f64 {
         self.pitch_um / self.binning as f64

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use dioptric_sensor::{ElectronRate, Exposure, Illumination, Moved, Sensor};
 
-use super::spec::ShutterInputs;
-use crate::{Exposed, FramesSpec, PipelineError, camera::at_rest};
+use super::{electrons::PixelRates, spec::ShutterInputs};
+use crate::{DualPixelSpec, Exposed, FramesSpec, PipelineError, camera::at_rest};
 
 /// What a sensor gives for one picture, and how it was exposed.
 #[derive(Clone, Debug)]
@@ -46,6 +46,19 @@ pub(crate) fn expose(
             inputs.frames.expose(sensor, &moved, &exposure, &inputs.noise)?
         }
     };
+    Ok(FrameSet { exposure, exposed })
+}
+
+/// Exposes a sensor whose photodiodes are read one by one.
+pub(crate) fn expose_photodiodes(
+    inputs: &ShutterInputs,
+    sensor: &Sensor,
+    spec: DualPixelSpec,
+    rates: &PixelRates,
+) -> Result<FrameSet, PipelineError> {
+    let exposure = sensor.expose(&rates.whole, &inputs.exposure)?;
+    let (frames, noise) = (&inputs.frames, &inputs.noise);
+    let exposed = frames.expose_photodiodes(sensor, spec.photodiodes, &rates.photodiodes, &exposure, noise)?;
     Ok(FrameSet { exposure, exposed })
 }
 

@@ -28,6 +28,11 @@ use crate::{
 /// The name of the file of spectral irradiance.
 pub const IRRADIANCE_FILE: &str = "irradiance.exr";
 
+/// Returns the name of the file of the spectral irradiance by which a photodiode is lit.
+pub(crate) fn photodiode_irradiance_file(name: &str) -> String {
+    format!("irradiance-{name}.exr")
+}
+
 /// The spectral irradiance on the film, W m⁻² nm⁻¹, bands × rows × columns.
 ///
 /// Its bands are in memory, or in a temporary file where they would take more than was allowed.
@@ -37,6 +42,8 @@ pub struct Irradiance {
     size: (usize, usize),
     pitch_um: f64,
     planes: Planes,
+    /// What falls on each of the photodiodes that it is the sum of; none for whole pixels.
+    photodiodes: Vec<Self>,
     /// Means, largest samples and a few bands.
     pub summary: IrradianceSummary,
 }
@@ -48,6 +55,8 @@ enum Planes {
     Memory(Array3<f32>),
     /// All bands one after the other, little-endian.
     File(Mutex<File>),
+    /// The sums of those of the photodiodes, made when they are asked for.
+    Sums,
 }
 
 /// Spectral irradiance in brief.
@@ -75,7 +84,35 @@ impl Irradiance {
 
     /// Whether the bands are in a file and not in memory.
     pub fn is_spilled(&self) -> bool {
-        matches!(self.planes, Planes::File(_))
+        !matches!(self.planes, Planes::Memory(_))
+    }
+
+    /// The irradiance by which each photodiode of a pixel is lit, which is the sum of them; none for whole pixels.
+    pub fn photodiodes(&self) -> &[Self] {
+        &self.photodiodes
+    }
+
+    /// Returns the sum of the irradiances by which the photodiodes of pixels are lit; kept whole where all together take no more than so many
+    /// bytes of memory.
+    ///
+    /// # Errors
+    /// When a band cannot be read.
+    pub(super) fn of_photodiodes(photodiodes: Vec<Self>, memory_bytes: u64) -> Result<Self, PipelineError> {
+        let first = &photodiodes[0];
+        let (grid, size, pitch_um) = (first.grid.clone(), first.size, first.pitch_um);
+        let total_bytes = size_bytes(size, grid.len()) * (photodiodes.len() as u64 + 1);
+        let is_kept = total_bytes <= memory_bytes && !photodiodes.iter().any(Self::is_spilled);
+        let mut cube = Array3::zeros((if is_kept { grid.len() } else { 0 }, size.0, size.1));
+        let mut summing = Summing::new(&grid, size);
+        for band in 0..grid.len() {
+            let plane = sum_of(&photodiodes, band)?;
+            summing.add(band, &plane);
+            if is_kept {
+                cube.index_axis_mut(Axis(0), band).assign(&plane);
+            }
+        }
+        let planes = if is_kept { Planes::Memory(cube) } else { Planes::Sums };
+        Ok(Self { grid, size, pitch_um, planes, photodiodes, summary: summing.summary })
     }
 
     /// The distance between samples on the film, µm.
@@ -87,7 +124,7 @@ impl Irradiance {
     pub fn cube(&self) -> Option<ArrayView3<'_, f32>> {
         match &self.planes {
             Planes::Memory(cube) => Some(cube.view()),
-            Planes::File(_) => None,
+            Planes::File(_) | Planes::Sums => None,
         }
     }
 
@@ -114,6 +151,14 @@ impl Irradiance {
             Planes::File(file) => {
                 let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
                 read_rows(&mut file, band, rows, self.size).map_err(|error| error.to_string())
+            }
+            Planes::Sums => {
+                let mut sums = vec![0.0; rows.len() * self.size.1];
+                for part in &self.photodiodes {
+                    let samples = part.rows_of(band, rows.clone())?;
+                    sums.iter_mut().zip(samples).for_each(|(sum, sample)| *sum += sample);
+                }
+                Ok(sums)
             }
         }
     }
@@ -151,7 +196,7 @@ impl Irradiance {
             summing.add(band, &plane);
             cube.index_axis_mut(Axis(0), band).assign(&plane);
         }
-        Self { grid, size, pitch_um, planes: Planes::Memory(cube), summary: summing.summary }
+        Self { grid, size, pitch_um, planes: Planes::Memory(cube), photodiodes: Vec::new(), summary: summing.summary }
     }
 }
 
@@ -183,8 +228,18 @@ impl Bands for Irradiance {
                 let plane = read_plane(&mut file, band, self.size);
                 plane.map(Cow::Owned).map_err(|error| SpectrumError::Band { band, reason: error.to_string() })
             }
+            Planes::Sums => sum_of(&self.photodiodes, band).map(Cow::Owned),
         }
     }
+}
+
+/// Returns the sum of a band of several irradiances.
+fn sum_of(parts: &[Irradiance], band: usize) -> Result<Array2<f32>, SpectrumError> {
+    let mut sum = parts[0].band(band)?.into_owned();
+    for part in &parts[1..] {
+        sum += &*part.band(band)?;
+    }
+    Ok(sum)
 }
 
 fn size_bytes((rows, columns): (usize, usize), n_bands: usize) -> u64 {
@@ -247,7 +302,8 @@ pub(super) fn image(
     }
     let file = file.or(store.filter(|_| is_spilled).map(BandStore::into_file));
     let planes = file.map_or(Planes::Memory(cube), |file| Planes::File(Mutex::new(file)));
-    Ok(Irradiance { grid, size, pitch_um: place.pitch_um, planes, summary: summing.summary })
+    let photodiodes = Vec::new();
+    Ok(Irradiance { grid, size, pitch_um: place.pitch_um, planes, photodiodes, summary: summing.summary })
 }
 
 /// Sums up bands as they come.
@@ -329,7 +385,7 @@ mod tests {
     #[test]
     fn bands_of_a_killed_run_are_gone_on_with() {
         let folder = tempfile::tempdir().unwrap();
-        let bands = BandFolder { path: folder.path().to_owned(), key: "camera".to_owned() };
+        let bands = BandFolder { path: folder.path().to_owned(), key: "camera".to_owned(), photodiode: None };
         let whole = image_with(u64::MAX, None);
         for memory_bytes in [u64::MAX, 100] {
             for n_left in [0, 1, 2, 3] {

@@ -3,7 +3,7 @@
 use std::{fs, path::PathBuf, sync::Arc};
 
 use dioptric_forward::{ImagingPlan, check_depth_map};
-use dioptric_psf::LensImageModel;
+use dioptric_psf::{LensImage, LensImageModel};
 use dioptric_scene::Scene;
 use dioptric_sensor::{Developed, ElectronRate, Illumination, Processing, Sensor};
 use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, Quantity, SpectralImage, WavelengthGrid};
@@ -12,7 +12,8 @@ use dioptric_world::World;
 use super::{
     Watch,
     band_store::BandFolder,
-    bank, electrons,
+    bank,
+    electrons::{self, PixelRates},
     film::{self, FilmPlace},
     frames::{self, FrameSet, MovedLight},
     given::GivenParts,
@@ -22,6 +23,7 @@ use super::{
     memory::MemoryBudget,
     narrow_surfaces::NarrowSurfaces,
     painting::{PaintingInputs, Paintings},
+    part::Part,
     plan,
     scene::{self, ResolvedScene, SceneSummary},
     slot::Slot,
@@ -32,7 +34,8 @@ use super::{
     world::{self, WorldRender},
 };
 use crate::{
-    BlurSpec, Camera, Frames, Leftover, LensFacts, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage,
+    BlurSpec, Camera, DualPixelSpec, Frames, Leftover, LensFacts, PaintingFolder, PipelineError, Progress, Quality,
+    SceneSource, Stage,
 };
 
 /// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
@@ -84,7 +87,7 @@ pub(super) struct KeptResults {
     pub(super) bank: Slot<BankInputs, LensImageModel>,
     pub(super) plan: Slot<PlanInputs, ImagingPlan>,
     pub(super) irradiance: Slot<IrradianceInputs, Irradiance>,
-    pub(super) electrons: Slot<ElectronInputs, ElectronRate>,
+    pub(super) electrons: Slot<ElectronInputs, PixelRates>,
     pub(super) frames: Slot<FrameInputs, FrameSet>,
     aberrations: Slot<AberrationInputs, LensAberrations>,
     pub(super) picture: Slot<PictureInputs, Developed>,
@@ -154,7 +157,7 @@ pub struct Capture {
     pub sensor: Sensor,
     /// The irradiance on the film.
     pub irradiance: Arc<Irradiance>,
-    /// The mean rate of photo-electrons.
+    /// The mean rate of photo-electrons of whole pixels.
     pub rate: Arc<ElectronRate>,
     /// The frames.
     pub frames: Arc<FrameSet>,
@@ -166,6 +169,8 @@ pub struct Capture {
     pub developed: Arc<Developed>,
     /// What the rate of electrons was made from.
     pub(super) inputs: ElectronInputs,
+    /// The rates of photodiodes that are read by themselves, besides that of whole pixels.
+    pub(super) rates: Arc<PixelRates>,
 }
 
 impl Capture {
@@ -251,8 +256,16 @@ impl KeptCamera {
     pub fn take_bands(&self, leftovers: &[Leftover]) -> Result<bool, PipelineError> {
         let inputs = self.irradiance_inputs()?;
         let Some(folder) = self.band_folder(&inputs)? else { return Ok(false) };
+        let folders = match inputs.dual_pixel {
+            None => vec![folder],
+            Some(spec) => (0..spec.photodiodes.names().len()).map(|number| folder.of_photodiode(number)).collect(),
+        };
         for leftover in leftovers {
-            if folder.adopt(leftover.path())? {
+            let mut is_any = false;
+            for folder in &folders {
+                is_any |= folder.adopt(leftover.path())?;
+            }
+            if is_any {
                 return Ok(true);
             }
         }
@@ -267,7 +280,7 @@ impl KeptCamera {
         let key = (build, self.quality, &self.camera, inputs.files().collect::<Vec<_>>());
         let key = ron::to_string(&key)
             .map_err(|error| PipelineError::Write { path: path.clone(), reason: error.to_string() })?;
-        Ok(Some(BandFolder { path: path.clone(), key }))
+        Ok(Some(BandFolder { path: path.clone(), key, photodiode: None }))
     }
 
     /// Returns the camera that keeps paintings of the still life in a folder, for it and others to take from there.
@@ -321,8 +334,8 @@ impl KeptCamera {
         let irradiance = chain.irradiance(irradiance_inputs)?;
         let place = chain.film(&irradiance_inputs.plan.bank.film, &irradiance_inputs.scene)?;
         let scene = chain.summary(&irradiance_inputs.scene)?;
-        let rate = chain.electrons(electron_inputs)?;
-        let sensor = electrons::on_film(&electron_inputs.sensor, &place);
+        let rates = chain.electrons(electron_inputs)?;
+        let sensor = electrons::read_out(electron_inputs, &place);
         let frames = chain.frames(frame_inputs)?;
         let processing = self.camera.processing.under(scene.light.as_ref().map(|light| &light.illuminant));
         let aberrations = chain.aberrations(&inputs)?;
@@ -336,12 +349,13 @@ impl KeptCamera {
             place,
             sensor,
             irradiance,
-            rate,
+            rate: rates.whole.clone(),
             frames,
             processing,
             aberrations,
             developed,
             inputs: electron_inputs.clone(),
+            rates,
         })
     }
 
@@ -592,12 +606,23 @@ impl Chain<'_> {
             // What is too large for it is found before the lens is traced.
             budget.map_or(Ok(()), |budget| budget.check(&resolved.scene, &place))?;
             let model = self.bank(&inputs.bank, scene)?;
-            plan::plan(inputs, model, &place, &resolved.scene, budget, &self.watch)
+            let lens: Arc<dyn LensImage + Send> = match inputs.photodiode {
+                None => model,
+                Some((spec, number)) => {
+                    let f_number = place.working_f_number(&*self.lens(&inputs.bank.film.lens)?);
+                    let images = model.through(spec.pupil_division(f_number))?;
+                    images.into_iter().nth(number).expect("a photodiode of those that there are")
+                }
+            };
+            plan::plan(inputs, lens, &place, &resolved.scene, budget, &self.watch)
         })
     }
 
     fn irradiance(&self, inputs: &IrradianceInputs) -> Result<Arc<Irradiance>, PipelineError> {
         self.kept.irradiance.get_or_make(inputs.clone(), |inputs| {
+            if let Some(spec) = inputs.dual_pixel {
+                return self.irradiance_of_photodiodes(inputs, spec);
+            }
             if let Some(effort) = inputs.effort {
                 let picture = self.world_render(inputs)?.render(effort, &self.watch)?.picture;
                 let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
@@ -607,24 +632,54 @@ impl Chain<'_> {
                 let reason = "only rays from the film go through its array, expected a world with method: Backward";
                 return Err(PipelineError::Unsuitable { what: "light_field", reason: reason.to_owned() });
             }
-            let plan = self.plan(&inputs.plan, &inputs.scene)?;
-            let resolved = self.scene(&inputs.scene)?;
-            let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
-            let scene: &Scene = &resolved.scene;
-            let memory_bytes = match self.camera.budget {
-                Some(budget) => budget.irradiance_bytes(&plan, scene, &place)?.min(self.camera.memory_bytes),
-                None => self.camera.memory_bytes,
-            };
-            let folder = self.camera.band_folder(inputs)?;
-            let keeping = Keeping { memory_bytes, folder: folder.as_ref() };
-            let irradiance = irradiance::image(&plan, scene, &place, keeping, &self.watch)?;
-            let is_layered = inputs.plan.blur == BlurSpec::Layered;
-            let narrow = if is_layered { NarrowSurfaces::of(&plan, scene) } else { None };
-            Ok(irradiance.with_narrow_surfaces(narrow))
+            self.imaged(inputs)
         })
     }
 
-    fn electrons(&self, inputs: &ElectronInputs) -> Result<Arc<ElectronRate>, PipelineError> {
+    /// Images the scene through the pupil, or the part of it that a photodiode sees.
+    fn imaged(&self, inputs: &IrradianceInputs) -> Result<Irradiance, PipelineError> {
+        let plan = self.plan(&inputs.plan, &inputs.scene)?;
+        let resolved = self.scene(&inputs.scene)?;
+        let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
+        let scene: &Scene = &resolved.scene;
+        let memory_bytes = match self.camera.budget {
+            Some(budget) => budget.irradiance_bytes(&plan, scene, &place)?.min(self.camera.memory_bytes),
+            None => self.camera.memory_bytes,
+        };
+        let folder = match inputs.plan.photodiode {
+            None => self.camera.band_folder(inputs)?,
+            Some((_, number)) => self.camera.band_folder(inputs)?.map(|folder| folder.of_photodiode(number)),
+        };
+        let keeping = Keeping { memory_bytes, folder: folder.as_ref() };
+        let irradiance = irradiance::image(&plan, scene, &place, keeping, &self.watch)?;
+        let is_layered = inputs.plan.blur == BlurSpec::Layered;
+        let narrow = if is_layered { NarrowSurfaces::of(&plan, scene) } else { None };
+        Ok(irradiance.with_narrow_surfaces(narrow))
+    }
+
+    /// Images the scene through the part of the pupil that each photodiode sees, one after the other.
+    fn irradiance_of_photodiodes(
+        &self,
+        inputs: &IrradianceInputs,
+        spec: DualPixelSpec,
+    ) -> Result<Irradiance, PipelineError> {
+        let n = spec.photodiodes.names().len();
+        // The sum is as large as each of them.
+        let memory_bytes = self.camera.memory_bytes;
+        let camera = KeptCamera { memory_bytes: memory_bytes / (n as u64 + 1), ..self.camera.clone() };
+        let irradiance = |number: usize| {
+            let plan = PlanInputs { photodiode: Some((spec, number)), ..inputs.plan.clone() };
+            let inputs = IrradianceInputs { plan, dual_pixel: None, ..inputs.clone() };
+            let progress = Part { progress: self.watch.progress, number, of: n };
+            let watch = Watch { progress: &progress, cancel: self.watch.cancel };
+            Chain { camera: &camera, kept: self.kept, paintings: self.paintings, watch }.imaged(&inputs)
+        };
+        let photodiodes = (0..n).map(irradiance).collect::<Result<Vec<_>, _>>()?;
+        let narrow = photodiodes[0].summary.narrow_surfaces;
+        Ok(Irradiance::of_photodiodes(photodiodes, memory_bytes)?.with_narrow_surfaces(narrow))
+    }
+
+    fn electrons(&self, inputs: &ElectronInputs) -> Result<Arc<PixelRates>, PipelineError> {
         self.kept.electrons.get_or_make(inputs.clone(), |inputs| {
             let irradiance = self.irradiance(&inputs.irradiance)?;
             let place = self.film(&inputs.irradiance.plan.bank.film, &inputs.irradiance.scene)?;
@@ -636,18 +691,22 @@ impl Chain<'_> {
         self.kept.frames.get_or_make(inputs.clone(), |inputs| {
             let irradiance = &inputs.electrons.irradiance;
             let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
-            let rate = self.electrons(&inputs.electrons)?;
+            let rates = self.electrons(&inputs.electrons)?;
+            let dual_pixel = irradiance.dual_pixel;
             self.watch.progress.at(Stage::Sensor, 0.5);
             let (shutter, sensor) = (inputs.shutter.clone(), electrons::on_film(&inputs.electrons.sensor, &place));
             // What moves between frames is the irradiance.
             let irradiance = if shutter.moves() { Some(self.irradiance(irradiance)?) } else { None };
             let exit_pupil = electrons::exit_pupil(&sensor, &place);
             self.watch.run(move || {
+                if let Some(spec) = dual_pixel {
+                    return frames::expose_photodiodes(&shutter, &sensor, spec, &rates);
+                }
                 let moved = irradiance.as_deref().map(|irradiance| MovedLight {
                     light: Illumination { exit_pupil, ..Illumination::on_pixels(irradiance) },
                     samples_per_px: 1.0 / place.binning as f64,
                 });
-                frames::expose(&shutter, &sensor, &rate, moved.as_ref())
+                frames::expose(&shutter, &sensor, &rates.whole, moved.as_ref())
             })
         })
     }
@@ -687,7 +746,7 @@ impl Chain<'_> {
             let irradiance = &inputs.frames.electrons.irradiance;
             let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
             let frames = self.frames(&inputs.frames)?;
-            let sensor = electrons::on_film(&inputs.frames.electrons.sensor, &place);
+            let sensor = electrons::read_out(&inputs.frames.electrons, &place);
             let processing = processing.clone();
             self.watch.run(move || {
                 let tables = aberrations.as_ref().map(|aberrations| &aberrations.tables);

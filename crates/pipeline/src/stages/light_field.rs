@@ -3,24 +3,11 @@
 use dioptric_spectrum::Cancel;
 use ndarray::Array2;
 
-use super::{Irradiance, KeptCamera};
+use super::{Irradiance, KeptCamera, part::Part};
 use crate::{
-    FilmSpec, FocusSpec, LightField, LightFieldSpec, PipelineError, Progress, SceneSource, Stage, ViewGeometry,
+    FilmSpec, FocusSpec, LightField, LightFieldSpec, PipelineError, Progress, SceneSource, ViewGeometry,
     light_field::{ArrayFilm, Decoding, View},
 };
-
-/// Progress of one of so many equal parts.
-struct Part<'a> {
-    progress: &'a dyn Progress,
-    number: usize,
-    of: usize,
-}
-
-impl Progress for Part<'_> {
-    fn at(&self, stage: Stage, fraction: f64) {
-        self.progress.at(stage, (self.number as f64 + fraction) / self.of as f64);
-    }
-}
 
 impl KeptCamera {
     /// Returns the light field that the camera takes, its channels red, green and blue as an observer sees the irradiance,

@@ -8,7 +8,7 @@
 //! | film | lens, geometry of the scene, focus, raster |
 //! | bank | film, diffraction, sampling |
 //! | plan | bank, kind of blur |
-//! | irradiance | plan, light in the scene |
+//! | irradiance | plan, light in the scene; of photodiodes that see parts of the pupil, a plan for each |
 //! | electrons | irradiance, sensor |
 //! | frames | electrons, exposure, number of frames, noise |
 //! | picture | frames, processing |
@@ -30,6 +30,7 @@ mod light_field;
 mod memory;
 mod narrow_surfaces;
 mod painting;
+mod part;
 mod plan;
 mod rendering;
 mod resume;
@@ -43,6 +44,7 @@ mod world_camera;
 mod world_light;
 
 pub(crate) use frames::{MovedLight, expose};
+pub(crate) use irradiance::photodiode_irradiance_file;
 pub(crate) use spec::ShutterInputs;
 pub(crate) use watch::Watch;
 

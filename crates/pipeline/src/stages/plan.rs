@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dioptric_forward::{BlurMode, ImagingPlan, ImagingSpec, Settings, Source};
-use dioptric_psf::LensImageModel;
+use dioptric_psf::LensImage;
 use dioptric_scene::Scene;
 
 use super::{Watch, film::FilmPlace, memory::MemoryBudget, spec::PlanInputs};
@@ -11,7 +11,7 @@ use crate::{BlurSpec, PipelineError, Quality, Stage};
 
 pub(super) fn plan(
     inputs: &PlanInputs,
-    model: Arc<LensImageModel>,
+    lens: Arc<dyn LensImage + Send>,
     place: &FilmPlace,
     scene: &Scene,
     budget: Option<MemoryBudget>,
@@ -42,7 +42,7 @@ pub(super) fn plan(
     };
     let spec = ImagingSpec { film: place.film(), grid: scene.radiance.grid().clone(), settings };
     let progress = |fraction| watch.progress.at(Stage::Plan, fraction);
-    let plan = ImagingPlan::new(model, &Source::of_scene(scene)?.geometry(), spec, &progress, watch.cancel)?;
+    let plan = ImagingPlan::new(lens, &Source::of_scene(scene)?.geometry(), spec, &progress, watch.cancel)?;
     let plan = match budget {
         Some(budget) => budget.fit(plan, scene, place)?,
         None => plan,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     film::FilmPlace,
-    irradiance::{IRRADIANCE_FILE, Irradiance},
+    irradiance::{IRRADIANCE_FILE, Irradiance, photodiode_irradiance_file},
     kept::{Capture, KeptCamera},
     narrow_surfaces::NarrowSurfaces,
     scene::SceneSummary,
@@ -97,8 +97,20 @@ impl KeptCamera {
         if !notes.is_empty() {
             return Ok(Resumed { camera, notes });
         }
-        let irradiance = Irradiance::read_exr(&folder.join(IRRADIANCE_FILE), Some(kept.place.pitch_um))?;
-        kept.check(&irradiance).map_err(unreadable)?;
+        let read = |file: &str| -> Result<Irradiance, PipelineError> {
+            let irradiance = Irradiance::read_exr(&folder.join(file), Some(kept.place.pitch_um))?;
+            kept.check(&irradiance, file).map_err(unreadable)?;
+            Ok(irradiance)
+        };
+        let irradiance = match kept.camera.dual_pixel {
+            None => read(IRRADIANCE_FILE)?,
+            Some(spec) => {
+                let names = spec.photodiodes.names().iter();
+                let photodiodes =
+                    names.map(|name| read(&photodiode_irradiance_file(name))).collect::<Result<_, _>>()?;
+                Irradiance::of_photodiodes(photodiodes, u64::MAX)?
+            }
+        };
         let irradiance = irradiance.with_narrow_surfaces(kept.narrow_surfaces);
         if kept.camera.outputs.exr_samples == ExrSamples::Half {
             notes.push(format!("{IRRADIANCE_FILE} has half floats: its samples are those of the run to .05 %"));
@@ -116,18 +128,18 @@ impl KeptCamera {
 
 impl Kept {
     /// Returns why an irradiance cannot be that of the run.
-    fn check(&self, irradiance: &Irradiance) -> Result<(), String> {
+    fn check(&self, irradiance: &Irradiance, file: &str) -> Result<(), String> {
         use dioptric_spectrum::Bands;
         let (found, expected) = (irradiance.size(), (self.place.rows, self.place.columns));
         if found != expected {
             return Err(format!(
-                "{IRRADIANCE_FILE} has {} × {} samples, expected {} × {}",
+                "{file} has {} × {} samples, expected {} × {}",
                 found.1, found.0, expected.1, expected.0
             ));
         }
         let (found, expected) = (irradiance.grid().len(), self.scene.wavelengths_nm.len());
         if found != expected {
-            return Err(format!("{IRRADIANCE_FILE} has {found} bands, expected {expected}"));
+            return Err(format!("{file} has {found} bands, expected {expected}"));
         }
         Ok(())
     }

@@ -18,9 +18,9 @@ use serde::{Deserialize, Serialize};
 
 use super::given::{Given, GivenParts};
 use crate::{
-    BankSpec, BlurSpec, Camera, Crop, Diffraction, FilmSpec, FlatSize, FocusSpec, FramesSpec, LensReadOptions,
-    LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort, SceneSource, SceneSpec, StopSpec,
-    WavelengthSpec, WorldSpec,
+    BankSpec, BlurSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FlatSize, FocusSpec, FramesSpec,
+    LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort, SceneSource, SceneSpec,
+    StopSpec, WavelengthSpec, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -135,6 +135,8 @@ pub(crate) struct BankInputs {
 pub(crate) struct PlanInputs {
     pub(crate) bank: BankInputs,
     pub(crate) blur: BlurSpec,
+    /// The photodiode whose part of the pupil is imaged through, by number; none for the whole pupil.
+    pub(crate) photodiode: Option<(DualPixelSpec, usize)>,
 }
 
 /// The spectral irradiance on the film.
@@ -143,6 +145,8 @@ pub(crate) struct IrradianceInputs {
     pub(crate) plan: PlanInputs,
     pub(crate) scene: SceneInputs,
     pub(crate) micro_array: Option<MicroArray>,
+    /// The photodiodes whose irradiances it is the sum of; none for whole pixels.
+    pub(crate) dual_pixel: Option<DualPixelSpec>,
     /// How well a world is rendered by rays from the film; none where its view is blurred, or there is no world.
     pub(crate) effort: Option<RenderEffort>,
 }
@@ -279,7 +283,8 @@ impl IrradianceInputs {
             SceneSource::World(spec) => spec.backward(),
             _ => None,
         };
-        Self { plan: PlanInputs { bank, blur: camera.blur }, scene, micro_array, effort }
+        let plan = PlanInputs { bank, blur: camera.blur, photodiode: None };
+        Self { plan, scene, micro_array, dual_pixel: camera.dual_pixel, effort }
     }
 }
 

@@ -81,6 +81,6 @@ impl KeptCamera {
         results.film.put_shared(film.clone(), capture.place.clone());
         results.summary.put_shared(irradiance.scene.clone(), capture.scene.clone());
         results.irradiance.put_shared(irradiance.clone(), capture.irradiance.clone());
-        results.electrons.put_shared(electrons.clone(), capture.rate.clone());
+        results.electrons.put_shared(electrons.clone(), capture.rates.clone());
     }
 }

@@ -36,6 +36,7 @@ pub(super) struct Pictures {
     pub(super) seen: String,
     pub(super) bands: Vec<Figure>,
     pub(super) depth: String,
+    pub(super) disparity: Option<Figure>,
 }
 
 /// Returns the page.
@@ -56,7 +57,7 @@ pub(super) fn write_page(page: &Page<'_>, pictures: &Pictures) -> String {
         section("Point spread over field and depth", &spreads(page, &pictures.mosaic)),
         section("Geometry and light over the field", &field(page)),
         section("Spectral irradiance on the film", &irradiance(page, pictures)),
-        section(&format!("Sensor: {}", escaped(&report.sensor.sensor)), &sensor(report)),
+        section(&format!("Sensor: {}", escaped(&report.sensor.sensor)), &sensor(report, pictures)),
         if page.times.stages_s.is_empty() { String::new() } else { section("Time", &timings(page.times)) },
         format!(
             "<section>\n<details><summary>All settings, as a camera file</summary><pre>{}</pre></details>\n</section>\n",
@@ -199,7 +200,7 @@ fn irradiance(page: &Page<'_>, pictures: &Pictures) -> String {
     html + "</div>\n" + &pair([&page.charts.spectrum, &page.charts.histogram])
 }
 
-fn sensor(report: &RunReport) -> String {
+fn sensor(report: &RunReport, pictures: &Pictures) -> String {
     let heads = ["channel", "mean, e⁻", "largest, e⁻", "SNR at the mean", "mean of the raw frame", "white balance"];
     let sensor = &report.sensor;
     let rows = sensor.channels.iter().zip(&report.white_balance).map(|(channel, balance)| {
@@ -223,7 +224,28 @@ fn sensor(report: &RunReport) -> String {
         sensor.read_noise_e,
         sensor.analog_gain
     );
-    table(&heads, rows) + &note(&words)
+    table(&heads, rows) + &note(&words) + &phase_detection(report, pictures)
+}
+
+fn phase_detection(report: &RunReport, pictures: &Pictures) -> String {
+    let Some(data) = &report.dual_pixel else { return String::new() };
+    let defocus = data.defocus_um_per_px.map_or_else(
+        || "Both halves see the same.".to_owned(),
+        |um| format!("A pixel of disparity is {um:.1} µm between film and image."),
+    );
+    let found = data.disparity.as_ref().map_or_else(String::new, |found| {
+        format!(
+            " {} of {} blocks tell theirs to {} px: {:.2} to {:.2} px, {:.2} px the median.",
+            found.known_blocks, found.blocks, found.most_error_px, found.least_px, found.greatest_px, found.median_px
+        )
+    });
+    let words = format!(
+        "Photodiodes read one by one: {}; the picture is made of their sum. The centroids of the halves lie {:.3} radii of \
+         the pupil apart. {defocus}{found}",
+        data.photodiodes.join(", "),
+        data.centroid_separation
+    );
+    note(&words) + &pictures.disparity.as_ref().map_or_else(String::new, |map| figure(&map.src, &map.caption))
 }
 
 fn timings(times: &RunTimes) -> String {

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use dioptric_analysis::{Run, RunCharts, RunPlaces, RunReport, RunTimes, SensorStatistics};
 use dioptric_pipeline::{
-    Outputs, PipelineError, Sensed, irradiance_file, write_file, write_frames, write_frames_and_depth,
+    Outputs, PipelineError, Sensed, irradiance_files, write_file, write_frames, write_frames_and_depth,
     write_irradiance, write_json,
 };
 
@@ -33,7 +33,7 @@ pub fn write_run(
 /// Writes all but the irradiance.
 fn write_the_rest(run: &Run<'_>, folder: &Path, times: &dyn Fn() -> RunTimes) -> Result<RunReport, PipelineError> {
     let (files, png) = write_frames_and_depth(run.capture, run.depth, folder)?;
-    let report = RunReport::new(run, irradiance_file(run.capture).into_iter().chain(files).collect())?;
+    let report = RunReport::new(run, irradiance_files(run.capture).into_iter().chain(files).collect())?;
     let places = RunPlaces::of(run);
     let charts = RunCharts::of(run, &places, &report.sensor);
     let page =

@@ -5,6 +5,8 @@ use image::RgbImage;
 use ndarray::Array2;
 
 use super::html::{Figure, Page, Pictures, write_page};
+use dioptric_analysis::MOST_ERROR_PX;
+
 use crate::{LensDrawing, MosaicPlan, PsfMosaic, png::png_bytes};
 use dioptric_pipeline::{
     PipelineError, REFERENCE_WAVELENGTH_NM, display::LinearRgb, display::code, display::wavelength_color,
@@ -34,6 +36,7 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
         seen: seen(&page.run.capture.irradiance.summary.seen),
         bands: bands(page),
         depth: depth(page),
+        disparity: disparity(page),
     };
     Ok(write_page(page, &pictures))
 }
@@ -123,6 +126,32 @@ fn depth(page: &Page<'_>) -> String {
         image::Rgb([level, level, level])
     });
     embedded(&thumbnail(&picture))
+}
+
+/// Disparities of photodiodes, red for what is nearer than the focus, blue for what is beyond it, dark where nothing is known.
+fn disparity(page: &Page<'_>) -> Option<Figure> {
+    /// Pixels of the picture for each block.
+    const BLOCK: u32 = 8;
+    let map = page.run.capture.frames.exposed.photodiodes.as_ref()?.disparity.as_ref()?;
+    let known = map.known_px(MOST_ERROR_PX);
+    // A few blocks are matched with others that look alike.
+    let ends = [known.len() / 50, known.len() - known.len() / 50];
+    let of_most = known[ends[0]..ends[1]].iter().map(|px| px.abs());
+    let most = of_most.fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+    let picture =
+        RgbImage::from_fn(BLOCK * map.disparity_px.ncols() as u32, BLOCK * map.disparity_px.nrows() as u32, |x, y| {
+            let at = ((y / BLOCK) as usize, (x / BLOCK) as usize);
+            if f64::from(map.standard_error_px[at]).is_nan() || f64::from(map.standard_error_px[at]) > MOST_ERROR_PX {
+                return image::Rgb([40, 40, 40]);
+            }
+            let share = (f64::from(map.disparity_px[at]) / most).clamp(-1.0, 1.0);
+            let pale = (240.0 * (1.0 - share.abs())).round() as u8;
+            image::Rgb(if share > 0.0 { [240, pale, pale] } else { [pale, pale, 240] })
+        });
+    let caption = format!(
+        "disparity of the photodiodes: red nearer than the focus, blue beyond, full color {most:.1} px; dark unknown"
+    );
+    Some(Figure { src: embedded(&picture), caption })
 }
 
 fn level_at(plane: &Array2<f32>, share: f64) -> f64 {

@@ -202,6 +202,10 @@ impl Telling {
             self.number("pixel-um", pitch_um);
             self.made.film = camera.film;
         }
+        if camera.dual_pixel != self.made.dual_pixel {
+            self.text("dual-pixel", &camera.dual_pixel.map_or_else(|| "none".to_owned(), |spec| spec.to_string()));
+            self.made.dual_pixel = camera.dual_pixel;
+        }
         let time_s = |control: &ExposureControl| match control {
             ExposureControl::Manual(exposure) => Some(exposure.time_s),
             ExposureControl::Auto(_) => None,

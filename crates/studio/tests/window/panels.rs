@@ -3,9 +3,9 @@
 use std::{collections::BTreeSet, sync::LazyLock, time::Duration};
 
 use dioptric_pipeline::{
-    BankSpec, BlurSpec, CAMERA_SCHEMA, Camera, Crop, Diffraction, FillDepth, FlatSize, FocusSpec, FramesSpec, LensSpec,
-    LightPaths, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange, WavelengthSpec, WorldSpec,
-    with_exposure_s,
+    BankSpec, BlurSpec, CAMERA_SCHEMA, Camera, Crop, Diffraction, DualPixelSpec, FillDepth, FlatSize, FocusSpec,
+    FramesSpec, LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange,
+    WavelengthSpec, WorldSpec, with_exposure_s,
 };
 use dioptric_scene::Pattern;
 use dioptric_sensor::{Brightness, ColorCorrection, LensShading, ToneCurve};
@@ -70,6 +70,9 @@ const PANELS: &[(&str, &[&str])] = &[
     ("list of bands", &["WavelengthSpec.ListNm"]),
     ("sensor", &["Camera.sensor", "SensorSpec.BuiltIn"]),
     ("sensor file", &["SensorSpec.File"]),
+    ("photodiodes", &["Camera.dual_pixel", "DualPixelSpec.photodiodes"]),
+    ("crosstalk", &["DualPixelSpec.crosstalk"]),
+    ("transition", &["DualPixelSpec.transition_deg"]),
     ("exposure", &["Camera.exposure", "ExposureControl.Manual", "ExposureControl.Auto"]),
     ("time", &["Exposure.time_s"]),
     ("gain", &["Exposure.analog_gain"]),
@@ -86,6 +89,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("motion", &["FramesSpec.MovingBurst.motion_px"]),
     ("stops", &["FramesSpec.BracketStops"]),
     ("ratio of times", &["FramesSpec.Interleaved", "FramesSpec.Interleaved.ratio"]),
+    ("ratio of gains", &["FramesSpec.Interleaved.gain_ratio"]),
     ("rows of one time", &["FramesSpec.Interleaved.period_rows"]),
     ("demosaic", &["Camera.processing", "Processing.demosaic"]),
     ("highlights", &["Processing.highlights"]),
@@ -214,7 +218,7 @@ fn cameras() -> Vec<Camera> {
             scene.flat = Some(FlatSize { width_mm: 10.0, distance_mm: 100.0 });
             camera.lens = LensSpec::File("none.zmx".into());
             camera.lens_reading.slope_per_nm = Some(-1e-4);
-            camera.frames = FramesSpec::Interleaved { ratio: 8.0, period_rows: 2 };
+            camera.frames = FramesSpec::Interleaved { ratio: 8.0, period_rows: 2, gain_ratio: 1.0 };
         }),
         world(RenderEffort::Samples(8)),
         world(RenderEffort::Noise(0.1)),
@@ -255,6 +259,7 @@ fn everything(camera: &mut Camera) {
 }
 
 fn otherwise(camera: &mut Camera) {
+    camera.dual_pixel = Some(DualPixelSpec::of(Photodiodes::LeftRight));
     camera.focus = FocusSpec::FilmMm(50.0);
     camera.wavelengths = WavelengthSpec::ListNm(vec![450.0, 550.0]);
     camera.frames = FramesSpec::BracketStops(vec![-1.0, 0.0]);

@@ -74,7 +74,7 @@ fn frames(ui: &mut Ui, frames: &mut FramesSpec) {
         (FramesSpec::Burst(8), "burst"),
         (FramesSpec::MovingBurst { frames: 8, motion_px: 4.0 }, "burst by hand"),
         (FramesSpec::BracketStops(vec![-4.0, -2.0, 0.0]), "bracket"),
-        (FramesSpec::Interleaved { ratio: 8.0, period_rows: 2 }, "interleaved rows"),
+        (FramesSpec::Interleaved { ratio: 8.0, period_rows: 2, gain_ratio: 1.0 }, "interleaved rows"),
     ];
     variant(ui, "frames", "How many frames the picture is made of", frames, &kinds);
     match frames {
@@ -89,9 +89,11 @@ fn frames(ui: &mut Ui, frames: &mut FramesSpec) {
             let words = "Exposures as stops from the chosen one: −2 is a quarter of the time";
             numbers(ui, "stops", words, stops);
         }
-        FramesSpec::Interleaved { ratio, period_rows } => {
+        FramesSpec::Interleaved { ratio, period_rows, gain_ratio } => {
             let words = "The time of the long rows over that of the short ones";
-            NumberField::by_factors("ratio of times", "×", 1.01..=1e6, 2.0..=64.0, words).show(ui, ratio);
+            NumberField::by_factors("ratio of times", "×", 1.0..=1e6, 1.0..=64.0, words).show(ui, ratio);
+            let words = "The analog gain of the long rows over that of the short ones";
+            NumberField::by_factors("ratio of gains", "×", 1.0..=1e6, 1.0..=64.0, words).show(ui, gain_ratio);
             count(ui, "rows of one time", "Neighboring rows that share a time", 1..=64, period_rows);
         }
     }

@@ -1,6 +1,6 @@
 //! Film and sensor, and the sources of noise.
 
-use dioptric_pipeline::{Camera, Crop, FilmSpec, SensorSpec};
+use dioptric_pipeline::{Camera, Crop, DualPixelSpec, FilmSpec, Photodiodes, SensorSpec};
 use dioptric_sensor::{NoiseSource, NoiseSources, Sensor};
 use egui::Ui;
 
@@ -36,10 +36,33 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
     if named != before {
         camera.sensor = SensorSpec::named(&named);
     }
+    dual_pixel(ui, &mut camera.dual_pixel);
     desk.tell(ui, Field::Sensor, camera);
     film(ui, camera, desk);
     crop(ui, camera, desk);
     desk.tell(ui, Field::Film, camera);
+}
+
+/// Photodiodes that are read one by one, or whole pixels.
+fn dual_pixel(ui: &mut Ui, spec: &mut Option<DualPixelSpec>) {
+    let mut kind = spec.map(|spec| spec.photodiodes);
+    let kinds = [
+        (None, "whole pixels"),
+        (Some(Photodiodes::LeftRight), "left and right"),
+        (Some(Photodiodes::TopBottom), "top and bottom"),
+        (Some(Photodiodes::Quad), "four"),
+    ];
+    let words = "Photodiodes below each microlens that are read one by one, each seeing a part of the pupil";
+    if choice(ui, "photodiodes", words, &mut kind, &kinds) {
+        *spec = kind
+            .map(|photodiodes| spec.map_or(DualPixelSpec::of(photodiodes), |own| DualPixelSpec { photodiodes, ..own }));
+    }
+    if let Some(DualPixelSpec { crosstalk, transition_deg, .. }) = spec {
+        let words = "Share of light from far on one side of the pupil that the photodiode of the other side gets";
+        NumberField::even("crosstalk", "", 0.0..=0.5, 0.0..=0.5, words).show(ui, crosstalk);
+        let words = "How soft the boundary between the sides is: standard deviation over the angle of incidence";
+        NumberField::even("transition", "°", 0.0..=45.0, 0.0..=15.0, words).show(ui, transition_deg);
+    }
 }
 
 /// Columns, rows and pitch of the whole film as it is, pixels and µm.
