@@ -79,9 +79,8 @@ fn scene_seen_from_the_pupil_is_one_for_run() {
         &[&["run", "--scene", "out/scene.exr", "--pixels", "24x16", "--pixel-um", "400", "-o", "blurred"], LENS]
             .concat(),
     );
-    let mean = |of: &str| report(&folder.path().join(of))["irradiance"]["mean"][1].as_f64().unwrap();
+    let mean = |of: &str| report(&folder.path().join(of))["irradiance"]["mean_w_m2_nm"][1].as_f64().unwrap();
     // Both have the light of the same part of the wall, but for the noise of 16 samples a pixel and the frame, whose films differ.
-    println!("{} {}", mean("out"), mean("blurred"));
     assert!((mean("blurred") / mean("out") - 1.0).abs() < 0.05, "{} {}", mean("out"), mean("blurred"));
     check_error(folder.path(), &["render", "wall.pbrt", "--layers", "2"], &["--layers", "expected --lens or --camera"]);
     check_error(folder.path(), &["render", "wall.pbrt", "--layers", "3"], &["--layers", "3"]);

@@ -124,14 +124,13 @@ impl FromStr for DualPixelSpec {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let mut parts = text.split(':');
-        let read = || -> Option<Self> {
+        let mut read = || -> Option<Self> {
             let name = parts.next()?;
             let (_, photodiodes) = Photodiodes::NAMES.iter().find(|(known, _)| *known == name)?;
             let mut number = |usual: f64| parts.next().map_or(Some(usual), |part| part.parse().ok());
             let (crosstalk, transition_deg) = (number(CROSSTALK)?, number(TRANSITION_DEG)?);
             parts.next().is_none().then_some(Self { photodiodes: *photodiodes, crosstalk, transition_deg })
         };
-        let mut read = read;
         read().ok_or_else(|| {
             let reason = format!(
                 "found '{text}', expected left-right, top-bottom or quad, with crosstalk and transition in degrees if \
