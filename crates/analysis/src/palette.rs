@@ -62,7 +62,7 @@ mod tests {
                 for other in &LINES[..i] {
                     let (a, b) = (seen(one, eye), seen(other, eye));
                     let apart = ((a.l - b.l).powi(2) + (a.a - b.a).powi(2) + (a.b - b.b).powi(2)).sqrt();
-                    // Thin lines are told apart from some 10 on; 16.1 is the least, of green and light blue without S cones.
+                    // Thin lines are distinguishable from some 10 on; 16.1 is the least, of green and light blue without S cones.
                     assert!(apart > 15.0, "{one} and {other} are {apart:.1} apart with {name}");
                 }
             }

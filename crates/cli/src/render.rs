@@ -258,6 +258,10 @@ fn finish(
         let seen = KeptCamera::new(kept.camera().clone()).with(|camera| {
             if let SceneSource::World(spec) = &mut camera.scene.source {
                 (spec.method, spec.layers) = (RenderMethod::Forward, layers);
+                // Where time ended the rendering, as many samples as it took.
+                if arguments.seconds.is_some() {
+                    spec.effort = RenderEffort::Samples((report.rendering.samples_per_pixel as u32).max(1));
+                }
             }
         });
         write_scene(&seen, &staged.path().join(SCENE), clock, cancel)?;

@@ -80,6 +80,9 @@ fn scene_seen_from_the_pupil_is_one_for_run() {
     let mean = |of: &str| report(&folder.path().join(of))["irradiance"]["mean_w_m2_nm"][1].as_f64().unwrap();
     // But for the noise of 16 samples a pixel; .3 % is found.
     assert!((mean("blurred") / mean("out") - 1.0).abs() < 0.01, "{} {}", mean("out"), mean("blurred"));
+    // What time ends has a scene of as many samples.
+    render(folder.path(), &["--seconds", "0.2", "--layers", "1", "-o", "timed"]);
+    assert!(folder.path().join("timed/scene.exr").exists());
     check_error(folder.path(), &["render", "wall.pbrt", "--layers", "2"], &["--layers", "expected --lens or --camera"]);
 }
 
