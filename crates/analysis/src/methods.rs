@@ -7,7 +7,7 @@ use std::sync::Arc;
 use dioptric_optics::glam::DVec2;
 use dioptric_pipeline::{
     BandSampling, Camera, Irradiance, KeptCamera, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, RenderEffort,
-    RenderMethod, Rendering, SceneSource, display::LinearRgb,
+    RenderMethod, Rendering, SceneSource, WorldSpec, display::LinearRgb,
 };
 use dioptric_psf::{LensImage, LensImageModel};
 use dioptric_spectrum::{Bands, Cancel};
@@ -68,8 +68,14 @@ impl MethodComparison {
     /// # Errors
     /// When the scene is no world, or as [`KeptCamera::capture`].
     pub fn of(camera: &Camera, progress: &dyn Progress, cancel: &Cancel) -> Result<Self, PipelineError> {
+        let mut camera = camera.clone();
+        if let SceneSource::StillLife { columns, rows } = camera.scene.source {
+            // As a world, of which what edges hide is known.
+            camera.scene.source = SceneSource::World(WorldSpec { layers: 2, ..WorldSpec::still_life((columns, rows)) });
+            camera.validate()?;
+        }
         let SceneSource::World(spec) = &camera.scene.source else {
-            let reason = "it is no world, expected 'source: World((file: ...))'".to_owned();
+            let reason = "it is no world, expected 'source: World((file: ...))' or the still life".to_owned();
             return Err(PipelineError::Unsuitable { what: "scene", reason });
         };
         let effort = spec.effort;

@@ -3,12 +3,12 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use dioptric_spectrum::{Cancel, WavelengthGrid};
-use dioptric_world::{Ray, World};
+use dioptric_world::Ray;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    BackwardError, BandSampling, Camera, LightPaths, Rendering, Sampler,
+    BackwardError, BandSampling, Camera, LightPaths, Rendering, Sampler, Subject,
     camera::{CameraRays, PixelSample},
     film::Film,
     integrator::Integrator,
@@ -49,7 +49,7 @@ pub struct RenderSettings {
 /// A picture being rendered.
 #[derive(Clone, Debug)]
 pub struct Renderer<'a> {
-    world: &'a World,
+    subject: Subject<'a>,
     camera: &'a Camera,
     settings: RenderSettings,
     packets: Packets,
@@ -66,9 +66,18 @@ impl<'a> Renderer<'a> {
     /// Returns a renderer that has not begun.
     ///
     /// # Errors
-    /// When a setting makes no sense, or the camera was made for other bands.
-    pub fn new(world: &'a World, camera: &'a Camera, settings: RenderSettings) -> Result<Self, BackwardError> {
+    /// When a setting makes no sense, or the camera was made for other bands; or when the light of a scene that knows it is to
+    /// be followed otherwise, or looked for behind its first surfaces.
+    pub fn new(
+        subject: impl Into<Subject<'a>>,
+        camera: &'a Camera,
+        settings: RenderSettings,
+    ) -> Result<Self, BackwardError> {
+        let subject = subject.into();
         camera.check()?;
+        if let Subject::Radiant(_) = subject {
+            check_radiant(camera, &settings)?;
+        }
         if !(1..=MOST_SAMPLES).contains(&settings.samples_per_pass) {
             let found = settings.samples_per_pass;
             return Err(BackwardError::setting("the samples of a pass", found, "1 to 65536"));
@@ -89,7 +98,7 @@ impl<'a> Renderer<'a> {
         };
         let (rows, columns) = camera.pixels().size();
         let film = Film::new(rows, columns, settings.bands.grid.len());
-        Ok(Self { world, camera, settings, packets, film, targets: None, n_passes: 0 })
+        Ok(Self { subject, camera, settings, packets, film, targets: None, n_passes: 0 })
     }
 
     /// The settings, with the samples of a pass as they are.
@@ -191,8 +200,7 @@ impl<'a> Renderer<'a> {
 
     /// Returns the means of a pass for each pixel of a tile, bands together.
     fn render_tile(&self, tile: &Tile, cancel: &Cancel) -> Result<Vec<f64>, BackwardError> {
-        let RenderSettings { samples_per_pass, seed, paths, clamp, .. } = self.settings;
-        let integrator = Integrator { world: self.world, paths, clamp };
+        let RenderSettings { samples_per_pass, seed, .. } = self.settings;
         let (n_bands, n_pixels, grid) = (self.film.n_bands, tile.pixels.len(), self.camera.pixels());
         let (mut sums, mut counts) = (vec![0.0; n_bands * n_pixels], vec![0_u32; n_bands]);
         let mut rays = CameraRays::default();
@@ -212,7 +220,7 @@ impl<'a> Renderer<'a> {
                 cancel.check()?;
                 let share = f64::from(random.pair(WAVELENGTH_PAIR)[0]);
                 let wavelengths_nm = nodes.map(|node| self.packets.wavelength_nm(node, share) as f32);
-                let radiance = self.packet_radiance(&integrator, &rays, (i, n_pixels), &wavelengths_nm, random);
+                let radiance = self.packet_radiance(&rays, (i, n_pixels), &wavelengths_nm, random);
                 for (node, value) in nodes.iter().zip(radiance) {
                     sums[i * n_bands + Packets::band_of(*node)] += f64::from(value);
                 }
@@ -228,7 +236,6 @@ impl<'a> Renderer<'a> {
     /// Returns what the rays of one of so many pixels see, times what they count.
     fn packet_radiance(
         &self,
-        integrator: &Integrator<'_>,
         rays: &CameraRays,
         (i, n_pixels): (usize, usize),
         wavelengths_nm: &[f32; PACKET],
@@ -236,25 +243,59 @@ impl<'a> Renderer<'a> {
     ) -> [f32; PACKET] {
         if rays.is_shared {
             let weight = rays.weights[i];
-            let ray = if weight > 0.0 { self.behind_layers(rays.rays[i]) } else { None };
-            return ray.map_or([0.0; PACKET], |ray| {
-                integrator.radiance(ray, wavelengths_nm, random).map(|value| value * weight)
-            });
+            let radiance = || self.radiance(rays.rays[i], wavelengths_nm, random).map(|value| value * weight);
+            return if weight > 0.0 { radiance() } else { [0.0; PACKET] };
         }
         std::array::from_fn(|k| {
             let weight = rays.weights[k * n_pixels + i];
-            let radiance = || integrator.radiance(rays.rays[k * n_pixels + i], &[wavelengths_nm[k]], random)[0];
+            let radiance = || self.radiance(rays.rays[k * n_pixels + i], &[wavelengths_nm[k]], random)[0];
             if weight > 0.0 { radiance() * weight } else { 0.0 }
         })
     }
 
-    /// Moves a ray through the surfaces that are looked through; `None` where there are not so many.
-    fn behind_layers(&self, ray: Ray) -> Option<Ray> {
-        match self.camera.layer() {
+    /// Returns an estimate of the radiance along a ray, behind the surfaces that are looked through.
+    fn radiance<const N: usize>(&self, ray: Ray, wavelengths_nm: &[f32; N], random: &Sampler) -> [f32; N] {
+        let world = match self.subject {
+            Subject::World(world) => world,
+            Subject::Radiant(scene) => {
+                let mut radiance = [0.0; N];
+                scene.add_radiance(&ray, wavelengths_nm, random, &mut radiance);
+                return radiance;
+            }
+        };
+        // There may not be so many surfaces.
+        let ray = match self.camera.layer() {
             0 => Some(ray),
-            n => Surfaces::along(self.world, ray).ray_behind(n),
-        }
+            n => Surfaces::along(world, ray).ray_behind(n),
+        };
+        let RenderSettings { paths, clamp, .. } = self.settings;
+        let integrator = Integrator { world, paths, clamp };
+        ray.map_or([0.0; N], |ray| integrator.radiance(ray, wavelengths_nm, random))
     }
+}
+
+/// Checks that nothing is asked of a scene that knows its light which only a world can do.
+fn check_radiant(camera: &Camera, settings: &RenderSettings) -> Result<(), BackwardError> {
+    if settings.paths != LightPaths::Full {
+        let found = format!("{:?}", settings.paths);
+        return Err(BackwardError::setting(
+            "the light that is followed",
+            found,
+            "Full of a scene that knows its light",
+        ));
+    }
+    if let Some(clamp) = settings.clamp {
+        return Err(BackwardError::setting(
+            "the clamp of scattered light",
+            clamp,
+            "none of a scene that knows its light",
+        ));
+    }
+    if camera.layer() > 0 {
+        let found = camera.layer();
+        return Err(BackwardError::setting("the surfaces looked through", found, "0 of a scene that knows its light"));
+    }
+    Ok(())
 }
 
 /// The pair of numbers that chooses wavelengths; those below are the stop's and the integrator's.

@@ -40,7 +40,7 @@ pub use light::SceneLight;
 pub use preview::{srgb_preview, write_preview_png};
 pub use resample::{reflectance_under, resampled};
 pub use scene::{HiddenLayer, Scene};
-pub use still_life::StillLife;
+pub use still_life::{LitStillLife, StillLife, StillLifePoint};
 pub use targets::{Pattern, Target, TargetLight};
 pub use view::View;
 

@@ -83,7 +83,8 @@ fn paths(camera: &mut Camera) -> Vec<&mut PathBuf> {
     let sensor = if let SensorSpec::File(path) = &mut camera.sensor { Some(path) } else { None };
     let scene = match &mut camera.scene.source {
         SceneSource::File(path) => Some(path),
-        SceneSource::World(world) => Some(&mut world.file),
+        SceneSource::World(world) if !world.is_still_life() => Some(&mut world.file),
+        SceneSource::World(_) => None,
         SceneSource::StillLife { .. } | SceneSource::Target { .. } => None,
     };
     lens.into_iter()

@@ -344,7 +344,8 @@ impl SceneSpec {
     pub(crate) fn resolve_paths(&mut self, folder: &Path) {
         match &mut self.source {
             SceneSource::File(path) => *path = folder.join(&path),
-            SceneSource::World(world) => world.file = folder.join(&world.file),
+            SceneSource::World(world) if !world.is_still_life() => world.file = folder.join(&world.file),
+            SceneSource::World(_) => {}
             SceneSource::StillLife { .. } | SceneSource::Target { .. } => {}
         }
         if let Some(hidden) = &mut self.hidden {

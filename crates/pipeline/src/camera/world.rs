@@ -16,7 +16,7 @@ use crate::PipelineError;
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WorldSpec {
-    /// The file: `.pbrt`, `.gltf`, `.glb`, `.obj` or `.ply`.
+    /// The file: `.pbrt`, `.gltf`, `.glb`, `.obj` or `.ply`; or `still-life`, the built-in scene of the demo.
     pub file: PathBuf,
     /// How long the file's unit of length is, m.
     #[serde(default = "one_meter")]
@@ -111,6 +111,19 @@ impl WorldSpec {
         }
     }
 
+    /// The name of the built-in still life, in place of a file.
+    pub const STILL_LIFE: &str = "still-life";
+
+    /// The built-in still life in a view of so many columns and rows, with the defaults for all else.
+    pub fn still_life(size: (usize, usize)) -> Self {
+        Self { size: Some(size), ..Self::of_file(PathBuf::from(Self::STILL_LIFE)) }
+    }
+
+    /// Whether it is the built-in still life and no file.
+    pub fn is_still_life(&self) -> bool {
+        self.file.as_os_str() == Self::STILL_LIFE
+    }
+
     /// Returns the effort of rays from the film, or `None` where the view is blurred instead.
     pub(crate) fn backward(&self) -> Option<RenderEffort> {
         (self.method == RenderMethod::Backward).then_some(self.effort)
@@ -126,6 +139,15 @@ impl WorldSpec {
             checker.count("size", rows, 1..=65_536)?;
         }
         checker.count("layers", self.layers as usize, 1..=2)?;
+        if self.is_still_life() {
+            if self.unit_m != one_meter() {
+                checker.wrong("unit_m", &self.unit_m.to_string(), "1, the unit of the still life")?;
+            }
+            if self.paths != LightPaths::Full {
+                let expected = "Full: the light in the still life was followed before";
+                checker.wrong("paths", &format!("{:?}", self.paths), expected)?;
+            }
+        }
         match self.effort {
             RenderEffort::Samples(n) => checker.count("Samples", n as usize, 1..=1 << 24),
             RenderEffort::Noise(noise) => checker.positive("Noise", noise),

@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf, sync::Arc};
 
 use dioptric_forward::{ImagingPlan, check_depth_map};
 use dioptric_psf::{LensImage, LensImageModel};
-use dioptric_scene::Scene;
+use dioptric_scene::{Scene, StillLife};
 use dioptric_sensor::{Developed, ElectronRate, Illumination, Processing, Sensor};
 use dioptric_spectrum::{Bands, Cancel, DepthMap, Illuminant, Quantity, SpectralImage, WavelengthGrid};
 use dioptric_world::World;
@@ -20,6 +20,7 @@ use super::{
     irradiance::{self, Irradiance, Keeping},
     lens::{self, ResolvedLens},
     lens_tables::{LensAberrations, TableParts},
+    lit_still_life::{self, RadiantStillLife},
     memory::MemoryBudget,
     narrow_surfaces::NarrowSurfaces,
     painting::{PaintingInputs, Paintings},
@@ -31,7 +32,7 @@ use super::{
         AberrationInputs, BankInputs, ElectronInputs, FilmInputs, FrameInputs, GeometryInputs, IrradianceInputs,
         LensInputs, PictureInputs, PlanInputs, Raster, SceneInputs, WorldInputs,
     },
-    world::{self, WorldRender},
+    world::{self, WorldRender, WorldStage},
 };
 use crate::{
     BlurSpec, Camera, DualPixelSpec, Frames, Leftover, LensFacts, PaintingFolder, PipelineError, Progress, Quality,
@@ -80,6 +81,7 @@ pub(super) struct KeptResults {
     pub(super) lens: Slot<LensInputs, ResolvedLens>,
     pub(super) world: Slot<WorldInputs, World>,
     painting: Slot<PaintingInputs, Scene>,
+    lit: Slot<StillLife, RadiantStillLife>,
     pub(super) scene: Slot<SceneInputs, ResolvedScene>,
     pub(super) summary: Slot<SceneInputs, SceneSummary>,
     pub(super) depth: Slot<GeometryInputs, DepthMap>,
@@ -100,6 +102,7 @@ impl Default for KeptResults {
             lens: Slot::new(8),
             world: Slot::new(2),
             painting: Slot::new(4),
+            lit: Slot::new(1),
             scene: Slot::new(2),
             summary: Slot::new(8),
             depth: Slot::new(2),
@@ -371,7 +374,7 @@ impl KeptCamera {
         check_glasses(&lens, self.camera.wavelengths.grid()?.as_ref())?;
         let file = match &self.camera.scene.source {
             SceneSource::File(path) => Some(path),
-            SceneSource::World(world) => Some(&world.file),
+            SceneSource::World(world) => Some(&world.file).filter(|_| !world.is_still_life()),
             SceneSource::StillLife { .. } | SceneSource::Target { .. } => None,
         };
         if let Some(path) = file.filter(|_| self.given.scene.is_none()) {
@@ -541,12 +544,15 @@ impl Chain<'_> {
         self.kept.scene.get_or_make(inputs.clone(), |inputs| {
             self.watch.progress.at(Stage::Scene, 0.0);
             self.watch.cancel.check()?;
+            let paintings = Paintings { kept: &self.kept.painting, folder: self.paintings };
             let scene = match inputs.geometry.world() {
+                _ if let Some(spec) = inputs.geometry.still_life() => {
+                    lit_still_life::view(inputs, spec, paintings, &self.watch)?
+                }
                 Some((_, spec)) => world::view(inputs, spec, &self.world(&inputs.geometry)?, &self.watch)?,
                 None => {
                     let lens = inputs.geometry.flat.as_ref().map(|(_, lens)| self.lens(lens)).transpose()?;
                     let pupil_z_mm = lens.map(|lens| lens.reference.projection_center_z_mm());
-                    let paintings = Paintings { kept: &self.kept.painting, folder: self.paintings };
                     scene::open(inputs, pupil_z_mm, paintings, &self.watch)?
                 }
             };
@@ -564,11 +570,19 @@ impl Chain<'_> {
     }
 
     fn world_render(&self, inputs: &IrradianceInputs) -> Result<WorldRender, PipelineError> {
-        let world = self.world(&inputs.scene.geometry)?;
+        let geometry = &inputs.scene.geometry;
+        let stage = match geometry.still_life() {
+            Some(spec) => {
+                let (life, _) = lit_still_life::picture_of(geometry, spec);
+                let light = |life: &StillLife| RadiantStillLife::new(life, &self.watch);
+                WorldStage::StillLife(self.kept.lit.get_or_make(life, light)?)
+            }
+            None => WorldStage::World(self.world(geometry)?),
+        };
         let film = &inputs.plan.bank.film;
         let grid = self.summary(&inputs.scene)?.grid()?;
         let (lens, place) = (self.lens(&film.lens)?, self.film(film, &inputs.scene)?);
-        WorldRender::through_lens(world, inputs, (&lens, &place), grid)
+        WorldRender::through_lens(stage, inputs, (&lens, &place), grid)
     }
 
     fn summary(&self, inputs: &SceneInputs) -> Result<Arc<SceneSummary>, PipelineError> {

@@ -27,6 +27,7 @@ mod kept;
 mod lens;
 mod lens_tables;
 mod light_field;
+mod lit_still_life;
 mod memory;
 mod narrow_surfaces;
 mod painting;

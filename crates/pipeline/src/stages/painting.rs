@@ -56,7 +56,7 @@ impl Paintings<'_> {
 /// 19 %; the picture that the arrangement is made for is its own. `None` for a picture that is not worth one: a coarse or a full one.
 fn canvas_of(life: &StillLife, quality: Quality) -> Option<StillLife> {
     let columns = quality.canvas_columns()?;
-    if life.columns != columns || life.with_hidden {
+    if life.columns != columns || life.with_hidden || life.moved_m != [0.0; 3] {
         return None;
     }
     let usual = StillLife::new(columns, 2 * columns / 3);
@@ -73,7 +73,7 @@ fn canvas_of(life: &StillLife, quality: Quality) -> Option<StillLife> {
     let count = |half_size: f64| (2.0 * half_size * samples_per_tan - 1e-6).ceil();
     let (columns, rows) = (count(width), count(height));
     let horizontal_fov_deg = 2.0 * (0.5 * columns / samples_per_tan).atan().to_degrees();
-    let canvas = StillLife { columns: columns as usize, rows: rows as usize, horizontal_fov_deg, with_hidden: false };
+    let canvas = StillLife { columns: columns as usize, rows: rows as usize, horizontal_fov_deg, ..*life };
     let is_usual = (canvas.columns, canvas.rows) == (usual.columns, usual.rows) && finer == 0.0;
     Some(if is_usual { usual } else { canvas })
 }

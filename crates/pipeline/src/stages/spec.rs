@@ -204,9 +204,18 @@ impl LensInputs {
 }
 
 impl GeometryInputs {
-    /// Returns what the world of this geometry is read from, or `None` for a scene that is none.
+    /// Returns the built-in still life as a world, or `None` for any other scene.
+    pub(crate) fn still_life(&self) -> Option<&WorldSpec> {
+        let SceneSource::World(spec) = &self.source else { return None };
+        spec.is_still_life().then_some(spec)
+    }
+
+    /// Returns what the world of this geometry is read from, or `None` for a scene that is none or is built in.
     pub(crate) fn world(&self) -> Option<(WorldInputs, &WorldSpec)> {
         let SceneSource::World(spec) = &self.source else { return None };
+        if spec.is_still_life() {
+            return None;
+        }
         let inputs = WorldInputs { file: spec.file.clone(), unit_m: spec.unit_m, files: self.files.clone() };
         Some((inputs, spec))
     }
@@ -249,7 +258,7 @@ impl SceneInputs {
                         let hidden = scene.hidden.iter().flat_map(|path| FileStamp::all_of(path));
                         FileStamp::all_of(path).into_iter().chain(hidden).collect()
                     }
-                    SceneSource::World(world) => FileStamp::all_of(&world.file),
+                    SceneSource::World(world) if !world.is_still_life() => FileStamp::all_of(&world.file),
                     _ => Vec::new(),
                 },
             },

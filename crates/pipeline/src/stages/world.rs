@@ -4,7 +4,8 @@ use std::{fs, path::Path, sync::Arc};
 
 use dioptric_backward::{
     Auxiliary, BandSampling, Bands, Camera, LensCamera, LensCameraSettings, LensOrigin, LightPaths, Pinhole, PixelGrid,
-    Placement, RenderSettings, Renderer, Rendering, auxiliary, layered_depth, write_auxiliary_exr, write_rendering_exr,
+    Placement, RenderSettings, Renderer, Rendering, Subject, auxiliary, layered_depth, write_auxiliary_exr,
+    write_rendering_exr,
 };
 use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_scene::{HiddenLayer, Scene, SceneLight, View};
@@ -20,12 +21,14 @@ use super::{
     IRRADIANCE_FILE, Watch,
     film::FilmPlace,
     lens::ResolvedLens,
+    lit_still_life::RadiantStillLife,
     scene::ResolvedScene,
     spec::{IrradianceInputs, SceneInputs, WorldInputs},
     world_light::light_on,
 };
 use crate::{
-    Diffraction, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, Stage, WorldSpec,
+    Diffraction, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, Stage,
+    WorldSpec,
 };
 
 /// Samples of a pass: as many as spread well, and few enough for a first picture soon.
@@ -38,13 +41,46 @@ const MOST_PASSES: u32 = 4096;
 /// A world as a camera sees it, to be rendered pass by pass.
 #[derive(Clone, Debug)]
 pub struct WorldRender {
-    world: Arc<World>,
+    stage: WorldStage,
     camera: Camera,
     bands: Bands,
     paths: LightPaths,
     seed: u64,
     samples_per_pass: u32,
     identity: String,
+}
+
+/// What rays from the film meet.
+#[derive(Clone, Debug)]
+pub(super) enum WorldStage {
+    /// The world of a file.
+    World(Arc<World>),
+    /// The built-in still life.
+    StillLife(Arc<RadiantStillLife>),
+}
+
+impl WorldStage {
+    fn subject(&self) -> Subject<'_> {
+        match self {
+            Self::World(world) => (&**world).into(),
+            Self::StillLife(life) => Subject::Radiant(&**life),
+        }
+    }
+
+    fn placement(&self, spec: &WorldSpec) -> Placement {
+        match self {
+            Self::World(world) => placement(world, spec),
+            Self::StillLife(life) => life.placement(),
+        }
+    }
+
+    /// Returns words that differ between worlds.
+    fn fingerprint(&self, spec: &WorldSpec) -> String {
+        match self {
+            Self::World(world) => fingerprint(world, spec),
+            Self::StillLife(life) => life.identity(),
+        }
+    }
 }
 
 /// Reads a world.
@@ -93,10 +129,10 @@ pub(super) fn view(
         RenderMethod::Backward => (RenderEffort::Samples(1), 1),
         RenderMethod::Forward => (spec.effort, SAMPLES_PER_PASS),
     };
-    let world = world.clone();
+    let stage = WorldStage::World(world.clone());
     let camera = Camera::Pinhole(pinhole);
     let (paths, seed) = (spec.paths, spec.seed);
-    let render = WorldRender { world, camera, bands, paths, seed, samples_per_pass, identity: String::new() };
+    let render = WorldRender { stage, camera, bands, paths, seed, samples_per_pass, identity: String::new() };
     let n_layers = if spec.method == RenderMethod::Forward { spec.layers } else { 1 };
     let seen = |layer: u32| -> Result<SpectralImage, PipelineError> {
         let render = WorldRender { camera: Camera::Pinhole(Pinhole { layer, ..pinhole }), ..render.clone() };
@@ -108,7 +144,7 @@ pub(super) fn view(
         Ok(renderer.rendering().picture)
     };
     let radiance = seen(0)?;
-    let mut depths = layered_depth(&render.world, &pinhole, n_layers as usize, watch.cancel)?.into_iter();
+    let mut depths = layered_depth(world, &pinhole, n_layers as usize, watch.cancel)?.into_iter();
     let depth = DepthMap::new(depths.next().unwrap_or_default())?;
     let hidden = match depths.next() {
         Some(behind_m) => Some(hidden_layer((&radiance, &depth), seen(1)?, behind_m)?),
@@ -117,7 +153,7 @@ pub(super) fn view(
     let name = spec.file.file_stem().unwrap_or(spec.file.as_os_str()).to_string_lossy().into_owned();
     let light = match &inputs.light {
         Some(stated) => Some(SceneLight { illuminant: stated.clone(), illuminance_lux: None }),
-        None => light_on(&render.world, &pinhole)?,
+        None => light_on(world, &pinhole)?,
     };
     let scene = Scene { depth: Some(depth), view: Some(view), hidden, light, ..Scene::new(name, radiance) };
     Ok(ResolvedScene { scene, binning })
@@ -173,12 +209,12 @@ impl Progress for AtStage<'_> {
 impl WorldRender {
     /// Returns the world as the lens of a camera file sees it.
     pub(super) fn through_lens(
-        world: Arc<World>,
+        stage: WorldStage,
         inputs: &IrradianceInputs,
         (lens, place): (&ResolvedLens, &FilmPlace),
         grid: WavelengthGrid,
     ) -> Result<Self, PipelineError> {
-        let Some((_, spec)) = inputs.scene.geometry.world() else {
+        let SceneSource::World(spec) = &inputs.scene.geometry.source else {
             unreachable!("the world that is given is that of these inputs");
         };
         if inputs.plan.bank.diffraction == Diffraction::Wave {
@@ -192,15 +228,15 @@ impl WorldRender {
             film_distance_mm: place.film_distance_mm + inputs.micro_array.map_or(0.0, |array| array.gap_mm),
             film_size_mm: DVec2::new(columns as f64, rows as f64) * (1e-3 * place.pitch_um),
             pixels: PixelGrid::new(columns, rows),
-            placement: placement(&world, spec),
+            placement: stage.placement(spec),
             origin: LensOrigin::EntrancePupil,
             diffraction: inputs.plan.bank.diffraction.hurb(),
             micro_array: inputs.micro_array,
         };
-        let identity = format!("{} {:?} {settings:?}", fingerprint(&world, spec), lens.lens);
+        let identity = format!("{} {:?} {settings:?}", stage.fingerprint(spec), lens.lens);
         let camera = Camera::Lens(Box::new(LensCamera::new(&lens.lens, &bands, settings)?));
         let (paths, seed) = (spec.paths, spec.seed);
-        let whole = Self { world, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity };
+        let whole = Self { stage, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity };
         match place.part {
             Some(part) => whole.cropped((part.first_column, part.first_row), (place.columns, place.rows)),
             None => Ok(whole),
@@ -227,7 +263,8 @@ impl WorldRender {
         let identity = format!("{} {camera:?}", fingerprint(&world, spec));
         let camera = Camera::from_world(&camera, &bands, &read_lens)?;
         let (paths, seed) = (spec.paths, spec.seed);
-        Ok(Self { world, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity })
+        let stage = WorldStage::World(world);
+        Ok(Self { stage, camera, bands, paths, seed, samples_per_pass: SAMPLES_PER_PASS, identity })
     }
 
     /// Returns the rendering of a part of the picture: from this column and row on, so many of each; its samples are those of
@@ -279,7 +316,7 @@ impl WorldRender {
             seed: self.seed,
             clamp: None,
         };
-        Ok(Renderer::new(&self.world, &self.camera, settings)?)
+        Ok(Renderer::new(self.stage.subject(), &self.camera, settings)?)
     }
 
     /// Makes passes until the picture is good enough, or `is_wanted`, which is called after each, returns false.
@@ -332,7 +369,7 @@ impl WorldRender {
     /// # Errors
     /// When the work is cancelled.
     pub fn auxiliary(&self, cancel: &Cancel) -> Result<Auxiliary, PipelineError> {
-        Ok(auxiliary(&self.world, &self.camera, &self.bands.grid, cancel)?)
+        Ok(auxiliary(self.stage.subject(), &self.camera, &self.bands.grid, cancel)?)
     }
 
     /// Writes a picture with its standard errors and its depth, and beside it `auxiliary.exr`; returns the names of the files.

@@ -3,7 +3,14 @@
 use dioptric_spectrum::{Illuminant, Observer, Spectrum, WavelengthGrid};
 use glam::DVec3;
 
-use super::{eye, pigment::Pigment, shade::Shader, shape::Ray, world::World};
+use super::{
+    eye,
+    pigment::Pigment,
+    render::pixel_offsets,
+    shade::{Colors, Shader},
+    shape::Ray,
+    world::World,
+};
 use crate::{SceneError, SceneLight, View};
 
 /// Rows and columns of the rays that look for the grays, over the angle that the arrangement is made for.
@@ -18,9 +25,10 @@ const GRAYS: std::ops::Range<u8> = 18..23;
 /// When the eye sees none.
 pub(super) fn light_on_grays(world: &World) -> Result<SceneLight, SceneError> {
     let (rows, columns) = RASTER;
-    let eye = eye(View::from_horizontal_fov_deg(RASTER_FOV_DEG, columns, rows)?);
+    let eye = eye(View::from_horizontal_fov_deg(RASTER_FOV_DEG, columns, rows)?, [0.0; 3]);
     let grid = WavelengthGrid::uniform(360.0, 830.0, 5.0)?;
-    let shader = Shader::new(world, eye.origin, &grid);
+    let colors = Colors::on(&grid);
+    let shader = Shader::new(world, eye.origin, &colors);
     let mut sum = vec![0.0_f64; grid.len()];
     let mut n = 0.0;
     for row in 0..rows {
@@ -34,7 +42,8 @@ pub(super) fn light_on_grays(world: &World) -> Result<SceneLight, SceneError> {
                 continue;
             }
             let mut spectrum = vec![0.0_f32; grid.len()];
-            shader.add_lit(&shader.gather(&seen, row, column), &[(pigment, 1.0)], 0.0, &mut spectrum);
+            let lights = shader.gather(&seen, &pixel_offsets(row, column));
+            shader.add_lit(&lights, &[(pigment, 1.0)], 0.0, (&colors, &mut spectrum));
             for ((sum, radiance), reflectance) in sum.iter_mut().zip(spectrum).zip(shader.palette.of(pigment)) {
                 *sum += f64::from(radiance) / f64::from(*reflectance);
             }

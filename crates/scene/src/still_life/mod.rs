@@ -4,6 +4,7 @@ mod filter;
 mod floor_plan;
 mod light_probe;
 mod lights;
+mod lit;
 mod material;
 mod noise;
 mod pattern;
@@ -20,6 +21,7 @@ use glam::{DMat3, DVec3};
 
 use crate::{HiddenLayer, Scene, SceneError, View};
 use light_probe::light_on_grays;
+pub use lit::{LitStillLife, StillLifePoint};
 use render::{Eye, Painting, Which, picture};
 
 /// How the still life is pictured.
@@ -33,12 +35,14 @@ pub struct StillLife {
     pub horizontal_fov_deg: f64,
     /// Whether to picture what lies behind each first thing too, which takes twice the time.
     pub with_hidden: bool,
+    /// How far the eye stands from its place in the arrangement, to its right, up and ahead, m.
+    pub moved_m: [f64; 3],
 }
 
 impl StillLife {
     /// The picture that the arrangement is made for.
     pub fn new(columns: usize, rows: usize) -> Self {
-        Self { rows, columns, horizontal_fov_deg: 34.0, with_hidden: false }
+        Self { rows, columns, horizontal_fov_deg: 34.0, with_hidden: false, moved_m: [0.0; 3] }
     }
 
     /// Returns the still life on these bands: absolute radiance, the depth at the center of each sample, the view.
@@ -69,16 +73,9 @@ impl StillLife {
         progress: &(dyn Fn(f64) + Sync),
         cancel: &Cancel,
     ) -> Result<Scene, SceneError> {
-        if self.rows == 0 || self.columns == 0 || self.rows.saturating_mul(self.columns) > 1 << 28 {
-            return Err(SceneError::Setting {
-                what: "the size of the still life",
-                value: format!("{} × {} samples", self.columns, self.rows),
-                expected: "1 to 2²⁸ samples".to_owned(),
-            });
-        }
-        let view = View::from_horizontal_fov_deg(self.horizontal_fov_deg, self.columns, self.rows)?;
+        self.check()?;
         let world = room::world();
-        let eye = eye(view);
+        let eye = eye(self.view()?, self.moved_m);
         let n_layers = if self.with_hidden { 2 } else { 1 };
         let painting = Painting::new(n_layers * 2 * self.rows, progress, cancel);
         let layer = |which| picture(&world, &eye, (self.rows, self.columns), grid, which, &painting);
@@ -88,6 +85,29 @@ impl StillLife {
             false => None,
         };
         Ok(Scene { hidden, ..self.of_painting(first.radiance, first.depth)? })
+    }
+
+    fn view(&self) -> Result<View, SceneError> {
+        View::from_horizontal_fov_deg(self.horizontal_fov_deg, self.columns, self.rows)
+    }
+
+    fn check(&self) -> Result<(), SceneError> {
+        if self.rows == 0 || self.columns == 0 || self.rows.saturating_mul(self.columns) > 1 << 28 {
+            return Err(SceneError::Setting {
+                what: "the size of the still life",
+                value: format!("{} × {} samples", self.columns, self.rows),
+                expected: "1 to 2²⁸ samples".to_owned(),
+            });
+        }
+        let at = eye(self.view()?, self.moved_m).origin;
+        if !room::is_inside(at) {
+            return Err(SceneError::Setting {
+                what: "the place of the eye before the still life",
+                value: format!("{:?} m from where it stands", self.moved_m),
+                expected: "one within the room".to_owned(),
+            });
+        }
+        Ok(())
     }
 
     /// Returns the scene of what [`scene`](Self::scene) painted before, without a hidden layer.
@@ -107,7 +127,7 @@ impl StillLife {
             name: "still life".to_owned(),
             radiance,
             depth: Some(depth),
-            view: Some(View::from_horizontal_fov_deg(self.horizontal_fov_deg, self.columns, self.rows)?),
+            view: Some(self.view()?),
             hidden: None,
             light: Some(light_on_grays(&room::world())?),
             notes: vec![],
@@ -115,13 +135,13 @@ impl StillLife {
     }
 }
 
-/// The eye, a hand's breadth above the table, looking slightly down.
-fn eye(view: View) -> Eye {
+/// The eye, a hand's breadth above the table, looking slightly down; moved so far to its right, up and ahead, m.
+fn eye(view: View, moved_m: [f64; 3]) -> Eye {
     const HEIGHT_M: f64 = 0.225;
     const DOWN_DEG: f64 = 5.6;
     let (sin, cos) = DOWN_DEG.to_radians().sin_cos();
     let axes = DMat3::from_cols(DVec3::X, DVec3::new(0.0, cos, sin), DVec3::new(0.0, -sin, cos));
-    Eye { origin: DVec3::new(0.0, HEIGHT_M, 0.0), axes, view }
+    Eye { origin: DVec3::new(0.0, HEIGHT_M, 0.0) + axes * DVec3::from_array(moved_m), axes, view }
 }
 
 #[cfg(test)]

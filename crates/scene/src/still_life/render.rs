@@ -11,7 +11,7 @@ use super::{
     filter::{Guide, Lights, smoothed},
     noise::{pixel_offset, spread},
     pigment::PigmentIndex,
-    shade::Shader,
+    shade::{Colors, N_OFFSETS, Shader},
     shape::Ray,
     world::{Hit, Seen, World},
 };
@@ -152,6 +152,37 @@ impl<'a> Painting<'a> {
     }
 }
 
+/// The surface of the largest part of each pixel, and the light on it, smoothed; row by row.
+#[derive(Clone, Debug)]
+pub(super) struct LitPixels {
+    pub(super) guides: Vec<Guide>,
+    pub(super) lights: Vec<Lights>,
+}
+
+impl LitPixels {
+    fn of(drawn: &[Row], columns: usize, cancel: &Cancel) -> Result<Self, Cancelled> {
+        let guides: Vec<Guide> = drawn.iter().flat_map(|row| &row.guides).copied().collect();
+        let lights = drawn.iter().flat_map(|row| &row.lights).copied().collect();
+        let lights = smoothed(&guides, lights, columns, cancel)?;
+        Ok(Self { guides, lights })
+    }
+}
+
+/// Returns the light on what the pixels of a picture show, without the picture.
+pub(super) fn lit_pixels(
+    (world, colors): (&World, &Colors),
+    eye: &Eye,
+    (rows, columns): (usize, usize),
+    which: Which,
+    painting: &Painting<'_>,
+) -> Result<LitPixels, Cancelled> {
+    let shader = Shader::new(world, eye.origin, colors);
+    // Light is kept in tones, on whatever bands: there is no picture, hence there are none.
+    let painter = Painter { shader, colors, eye, n_bands: 0, which, painting };
+    let drawn = (0..rows).into_par_iter().map(|row| painter.row(row, columns)).collect::<Result<Vec<Row>, _>>()?;
+    LitPixels::of(&drawn, columns, painting.cancel)
+}
+
 /// Returns the picture of a world.
 pub(super) fn picture(
     world: &World,
@@ -161,11 +192,11 @@ pub(super) fn picture(
     which: Which,
     painting: &Painting<'_>,
 ) -> Result<Layer, SceneError> {
-    let painter = Painter { shader: Shader::new(world, eye.origin, grid), eye, n_bands: grid.len(), which, painting };
+    let colors = Colors::on(grid);
+    let shader = Shader::new(world, eye.origin, &colors);
+    let painter = Painter { shader, colors: &colors, eye, n_bands: grid.len(), which, painting };
     let drawn = (0..rows).into_par_iter().map(|row| painter.row(row, columns)).collect::<Result<Vec<Row>, _>>()?;
-    let guides: Vec<Guide> = drawn.iter().flat_map(|row| &row.guides).copied().collect();
-    let lights = drawn.iter().flat_map(|row| &row.lights).copied().collect();
-    let lights = smoothed(&guides, lights, columns, painting.cancel)?;
+    let LitPixels { guides, lights } = LitPixels::of(&drawn, columns, painting.cancel)?;
     let z_m = Array2::from_shape_fn((rows, columns), |(r, c)| drawn[r].z_m[c]);
     let finish = |(row, drawn): (usize, Row)| painter.finished(row, drawn, &guides, &lights);
     let finished = drawn.into_par_iter().enumerate().map(finish).collect::<Result<Vec<Vec<f32>>, _>>()?;
@@ -194,6 +225,7 @@ fn planes(spectra: &[Vec<f32>], columns: usize, n_bands: usize) -> Vec<Array2<f3
 
 struct Painter<'a> {
     shader: Shader<'a>,
+    colors: &'a Colors,
     eye: &'a Eye,
     n_bands: usize,
     which: Which,
@@ -211,7 +243,7 @@ impl Painter<'_> {
             let largest = &parts[0].seen;
             let guide = Guide { object: largest.object as u32, point: largest.point, normal: largest.normal };
             drawn.guides.push(guide);
-            drawn.lights.push(self.shader.gather(largest, row, column));
+            drawn.lights.push(self.shader.gather(largest, &pixel_offsets(row, column)));
             drawn.push(parts);
         }
         self.painting.row_is_done();
@@ -227,12 +259,17 @@ impl Painter<'_> {
         let mut parts: Vec<Part> = Vec::new();
         let looks = first.into_iter().chain((4..4 + rest).map(|point| aim.look(self, point)));
         for (point, seen) in looks.enumerate() {
-            self.shader.add_glow(&seen, share, None, own);
+            self.shader.add_glow(&seen, share, None, (self.colors, &mut *own));
             let coat = seen.surface.coat;
             let fresnel = self.shader.fresnel(&seen) as f32;
             let is_clear = coat.f0 > 0.0 && coat.roughness == 0.0;
             if is_clear {
-                self.shader.add_mirrored(&seen, share * fresnel, spread(2 * point, aim.offset), own);
+                self.shader.add_mirrored(
+                    &seen,
+                    share * fresnel,
+                    spread(2 * point, aim.offset),
+                    (self.colors, &mut *own),
+                );
             }
             let shown = match parts.iter().position(|p| p.seen.object == seen.object) {
                 Some(index) => &mut parts[index],
@@ -265,11 +302,11 @@ impl Painter<'_> {
                 let lights = match &fragment.seen {
                     None => lights[row * columns + column],
                     Some(seen) => light_beside(row, column, columns, fragment.object, guides, lights)
-                        .unwrap_or_else(|| self.shader.gather(seen, row, column)),
+                        .unwrap_or_else(|| self.shader.gather(seen, &pixel_offsets(row, column))),
                 };
                 let (own, rest) = pigments.split_at(fragment.n_pigments);
                 pigments = rest;
-                self.shader.add_lit(&lights, own, fragment.sheen, spectrum);
+                self.shader.add_lit(&lights, own, fragment.sheen, (self.colors, &mut *spectrum));
             }
         }
         self.painting.row_is_done();
@@ -297,6 +334,11 @@ fn light_beside(
         }
     }
     (n > 0.0).then(|| sum.map(|s| s / n))
+}
+
+/// Returns the offsets by which the light of a pixel is gathered.
+pub(super) fn pixel_offsets(row: usize, column: usize) -> [DVec2; N_OFFSETS] {
+    std::array::from_fn(|which| pixel_offset(row, column, which))
 }
 
 /// Tells whether two points of a pixel look so alike that more need not be looked at.
@@ -355,10 +397,16 @@ impl Aim {
         let at = |cell: u8, within: u8| (f64::from(cell) + (f64::from(within) + 0.5) / 4.0) / 4.0 - 0.5;
         let ray = painter.eye.ray(self.row + at(j, i), self.column + at(i, j));
         let hit = self.hit(painter, ray);
-        let cosine = painter.shader.world.cosine(&hit, ray.direction).max(0.12);
-        // The side of a square of the mean of the pixel's width and its length along the slope.
-        let width = hit.t / painter.eye.view.focal_px;
-        let footprint = 0.5 * (width + width / cosine);
-        painter.shader.world.seen(&hit, ray.direction, 0.7 * footprint)
+        let world = painter.shader.world;
+        world.seen(&hit, ray.direction, footprint_m(world, &hit, ray.direction, painter.eye.view))
     }
+}
+
+/// Returns the size of details that a pixel of a view blurs away at a hit.
+pub(super) fn footprint_m(world: &World, hit: &Hit, direction: DVec3, view: View) -> f64 {
+    let cosine = world.cosine(hit, direction).max(0.12);
+    // The side of a square of the mean of the pixel's width and its length along the slope.
+    let width = hit.t / view.focal_px;
+    let footprint = 0.5 * (width + width / cosine);
+    0.7 * footprint
 }

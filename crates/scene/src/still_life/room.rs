@@ -14,6 +14,11 @@ use super::{
 /// Objects that belong together, and more of them.
 type Things = Vec<Vec<Object>>;
 
+/// Whether a point is within the walls.
+pub(super) fn is_inside(point: DVec3) -> bool {
+    (point - ROOM_CENTER).abs().cmplt(ROOM_HALF).all()
+}
+
 /// Builds the room.
 pub(super) fn world() -> World {
     let mut things = Vec::new();

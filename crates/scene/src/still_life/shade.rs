@@ -7,7 +7,7 @@ use super::{
     filter::{BOUNCE, Lights, SHEEN},
     lights::{Lux, direct},
     material::{Light, Mix},
-    noise::{on_disc, pixel_offset, spread},
+    noise::{on_disc, spread},
     pigment::{N_TONES, Palette, PigmentIndex},
     world::{Seen, World},
 };
@@ -17,6 +17,8 @@ const N_WINDOW: usize = 4;
 const N_BULB: usize = 3;
 const N_BOUNCES: usize = 2;
 const N_SHEEN: usize = 2;
+/// The offsets that its rays take.
+pub(super) const N_OFFSETS: usize = 6;
 /// What light bounced twice and more adds where it has bounced once, lx by day and by lamp.
 const FAR_LUX: [f64; 2] = [70.0, 35.0];
 /// A rough coat smears the image of a bulb, brighter than the first, as if it were no brighter than the second, cd/m²:
@@ -26,25 +28,57 @@ const BULB_SHEEN: [f64; 2] = [10_000.0, 800.0];
 /// The daylight that comes in by the window.
 pub(super) const WINDOW: Illuminant = Illuminant::Daylight(6200.0);
 
-/// Everything that light meets, on the bands of the picture.
-pub(super) struct Shader<'a> {
-    pub(super) world: &'a World,
-    /// Where the eye is.
-    pub(super) eye: DVec3,
+/// The colors of lights and pigments at the wavelengths of a spectrum, by number.
+pub(super) trait Spectra {
+    /// Radiance of a white of 1 lx.
+    fn white(&self, light: Light, number: usize) -> f32;
+    /// The reflectance of a pigment.
+    fn reflectance(&self, pigment: PigmentIndex, number: usize) -> f32;
+    /// One of the tones that light bounced is kept in.
+    fn tone(&self, tone: usize, number: usize) -> f32;
+}
+
+/// The colors on the bands of a picture.
+#[derive(Clone, Debug)]
+pub(super) struct Colors {
     pub(super) palette: Palette,
     /// Radiance of a white of 1 lx, by day and by lamp.
     white: [Vec<f32>; 2],
 }
 
-impl<'a> Shader<'a> {
-    pub(super) fn new(world: &'a World, eye: DVec3, grid: &WavelengthGrid) -> Self {
+impl Colors {
+    pub(super) fn on(grid: &WavelengthGrid) -> Self {
         let white = [WINDOW, Illuminant::Blackbody(2850.0)]
             .map(|light| light.white_radiance(grid, 1.0).into_iter().map(|v| v as f32).collect());
-        Self { world, eye, palette: Palette::on(grid), white }
+        Self { palette: Palette::on(grid), white }
+    }
+}
+
+impl Spectra for Colors {
+    fn white(&self, light: Light, number: usize) -> f32 {
+        self.white[usize::from(light == Light::Warm)][number]
     }
 
-    fn white(&self, light: Light) -> &[f32] {
-        &self.white[usize::from(light == Light::Warm)]
+    fn reflectance(&self, pigment: PigmentIndex, number: usize) -> f32 {
+        self.palette.of(pigment)[number]
+    }
+
+    fn tone(&self, tone: usize, number: usize) -> f32 {
+        self.palette.tones[tone][number]
+    }
+}
+
+/// Everything that light meets, seen from one place.
+pub(super) struct Shader<'a> {
+    pub(super) world: &'a World,
+    /// Where the eye is.
+    pub(super) eye: DVec3,
+    pub(super) palette: &'a Palette,
+}
+
+impl<'a> Shader<'a> {
+    pub(super) fn new(world: &'a World, eye: DVec3, colors: &'a Colors) -> Self {
+        Self { world, eye, palette: &colors.palette }
     }
 
     /// Returns the share of light that the coat sends to the eye.
@@ -58,16 +92,31 @@ impl<'a> Shader<'a> {
     }
 
     /// Adds a share of what a surface glows.
-    pub(super) fn add_glow(&self, seen: &Seen, share: f32, tint: Option<&[f32]>, own: &mut [f32]) {
+    pub(super) fn add_glow(
+        &self,
+        seen: &Seen,
+        share: f32,
+        tint: Option<PigmentIndex>,
+        (spectra, own): (&impl Spectra, &mut [f32]),
+    ) {
         let Some((light, luminance)) = seen.surface.glow else { return };
         let factor = share * (std::f64::consts::PI * luminance) as f32;
-        for (band, (own, white)) in own.iter_mut().zip(self.white(light)).enumerate() {
-            *own += factor * white * tint.map_or(1.0, |t| t[band]);
+        for (band, own) in own.iter_mut().enumerate() {
+            *own += factor * spectra.white(light, band) * tint.map_or(1.0, |t| spectra.reflectance(t, band));
         }
     }
 
     /// Adds a share of what a clear coat or a polished metal mirrors.
-    pub(super) fn add_mirrored(&self, seen: &Seen, share: f32, offset: DVec2, own: &mut [f32]) {
+    pub(super) fn add_mirrored(
+        &self,
+        seen: &Seen,
+        share: f32,
+        offset: DVec2,
+        (spectra, own): (&impl Spectra, &mut [f32]),
+    ) {
+        if own.is_empty() {
+            return;
+        }
         let direction = self.mirrored(seen, DVec2::ZERO);
         let Some(hit) = self.world.first_hit(seen.ray(direction), 0.0, None) else { return };
         let far = self.world.seen(&hit, direction, 0.004);
@@ -75,14 +124,15 @@ impl<'a> Shader<'a> {
         let (n_window, n_bulb) = if seen.surface.coat.metal.is_some() { (4, 2) } else { (1, 1) };
         let lux = direct(self.world, &far, n_window, n_bulb, [offset, (offset + DVec2::splat(0.5)).fract()]);
         let light = [(lux.day + FAR_LUX[0]) as f32, (lux.warm + FAR_LUX[1]) as f32];
-        let tint = seen.surface.coat.metal.map(|pigment| self.palette.of(pigment));
+        let tint = seen.surface.coat.metal;
         for &(pigment, part) in far.surface.mix.parts() {
-            for (band, (own, reflectance)) in own.iter_mut().zip(self.palette.of(pigment)).enumerate() {
-                let white = light[0] * self.white[0][band] + light[1] * self.white[1][band];
-                *own += share * part * reflectance * white * tint.map_or(1.0, |t| t[band]);
+            for (band, own) in own.iter_mut().enumerate() {
+                let white = light[0] * spectra.white(Light::Day, band) + light[1] * spectra.white(Light::Warm, band);
+                let reflectance = spectra.reflectance(pigment, band);
+                *own += share * part * reflectance * white * tint.map_or(1.0, |t| spectra.reflectance(t, band));
             }
         }
-        self.add_glow(&far, share, tint, own);
+        self.add_glow(&far, share, tint, (spectra, own));
     }
 
     /// Returns where the eye looks in the coat, turned by the roughness towards a point of the unit disc.
@@ -98,9 +148,8 @@ impl<'a> Shader<'a> {
     }
 
     /// Gathers the light on a surface: straight from the lights, bounced once by the room, and the sheen of a rough
-    /// coat, which is what it sends on to the eye.
-    pub(super) fn gather(&self, seen: &Seen, row: usize, column: usize) -> Lights {
-        let offsets: [DVec2; 6] = std::array::from_fn(|which| pixel_offset(row, column, which));
+    /// coat, which is what it sends on to the eye. The offsets turn the points that its rays go to.
+    pub(super) fn gather(&self, seen: &Seen, offsets: &[DVec2; N_OFFSETS]) -> Lights {
         let lux = direct(self.world, seen, N_WINDOW, N_BULB, [offsets[0], offsets[1]]);
         let mut lights = Lights::default();
         (lights[0], lights[1]) = (lux.day as f32, lux.warm as f32);
@@ -154,25 +203,23 @@ impl<'a> Shader<'a> {
     }
 
     /// Adds what a pixel sends from pigments under light, and the sheen over them.
-    pub(super) fn add_lit(&self, lights: &Lights, pigments: &[(PigmentIndex, f32)], sheen: f32, spectrum: &mut [f32]) {
-        let [day, warm] = &self.white;
-        let tones = &self.palette.tones;
-        let in_tones =
-            |first: usize, band: usize| -> f32 { (0..N_TONES).map(|i| lights[first + i] * tones[i][band]).sum() };
-        let light: Vec<f32> = (0..spectrum.len())
-            .map(|band| {
-                (lights[0] + in_tones(BOUNCE, band)) * day[band]
-                    + (lights[1] + in_tones(BOUNCE + N_TONES, band)) * warm[band]
-            })
-            .collect();
-        for &(pigment, share) in pigments {
-            for ((s, reflectance), light) in spectrum.iter_mut().zip(self.palette.of(pigment)).zip(&light) {
-                *s += share * reflectance * light;
+    pub(super) fn add_lit(
+        &self,
+        lights: &Lights,
+        pigments: &[(PigmentIndex, f32)],
+        sheen: f32,
+        (spectra, spectrum): (&impl Spectra, &mut [f32]),
+    ) {
+        for (band, s) in spectrum.iter_mut().enumerate() {
+            let in_tones =
+                |first: usize| -> f32 { (0..N_TONES).map(|i| lights[first + i] * spectra.tone(i, band)).sum() };
+            let [day, warm] = [Light::Day, Light::Warm].map(|light| spectra.white(light, band));
+            let light = (lights[0] + in_tones(BOUNCE)) * day + (lights[1] + in_tones(BOUNCE + N_TONES)) * warm;
+            for &(pigment, share) in pigments {
+                *s += share * spectra.reflectance(pigment, band) * light;
             }
-        }
-        if sheen > 0.0 {
-            for (band, s) in spectrum.iter_mut().enumerate() {
-                *s += sheen * (in_tones(SHEEN, band) * day[band] + in_tones(SHEEN + N_TONES, band) * warm[band]);
+            if sheen > 0.0 {
+                *s += sheen * (in_tones(SHEEN) * day + in_tones(SHEEN + N_TONES) * warm);
             }
         }
     }

@@ -62,6 +62,11 @@ impl World {
         Self { objects, thing_of_object, tree }
     }
 
+    /// What each object is made of.
+    pub(super) fn materials(&self) -> impl Iterator<Item = Material> {
+        self.objects.iter().map(|object| object.material)
+    }
+
     /// The thing that an object belongs to.
     pub(super) fn thing_of(&self, object: usize) -> usize {
         self.thing_of_object[object]
