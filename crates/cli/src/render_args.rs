@@ -103,7 +103,7 @@ pub(crate) struct RenderArgs {
 /// A world that is rendered both ways.
 #[derive(Debug, Args)]
 pub(crate) struct CompareArgs {
-    /// Camera file whose scene is a world: `scene: (source: World((file: "room.pbrt")))`
+    /// Camera file whose scene is a world, `scene: (source: World((file: "room.pbrt")))`, or the built-in still life
     pub(crate) camera: PathBuf,
     /// Samples a pixel, of both [default: those of the camera file]
     #[arg(long, value_name = "N")]

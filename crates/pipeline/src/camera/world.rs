@@ -37,7 +37,7 @@ pub struct WorldSpec {
     /// How far the camera stands to the right of the place of the file's and above it, as the picture shows it, mm.
     #[serde(default)]
     pub aside_mm: (f64, f64),
-    /// How many surfaces, one behind another, the view knows, 1 or 2: of 2 it is rendered once more without what stands in front, and blurred
+    /// How many surfaces, one behind another, the view knows, 1 or 2; counts for `method: Forward` and `dioptric compare` alone. Of 2 it is rendered once more without what stands in front, and blurred
     /// edges show what lies behind them instead of a guess. The back of a closed shape is none of them.
     #[serde(default = "one_layer")]
     pub layers: u32,

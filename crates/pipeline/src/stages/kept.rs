@@ -563,7 +563,13 @@ impl Chain<'_> {
 
     fn world(&self, geometry: &GeometryInputs) -> Result<Arc<World>, PipelineError> {
         let Some((inputs, _)) = geometry.world() else {
-            let reason = "it is no world, expected 'source: World((file: ...))'".to_owned();
+            let reason = match geometry.still_life() {
+                Some(_) => {
+                    "the still life is built in and no world that is read, expected one of a file; 'run' and 'compare' take it"
+                }
+                None => "it is no world, expected 'source: World((file: ...))'",
+            };
+            let reason = reason.to_owned();
             return Err(PipelineError::Unsuitable { what: "scene", reason });
         };
         self.kept.world.get_or_make(inputs, |inputs| world::read(inputs, &self.watch))
