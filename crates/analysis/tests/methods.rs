@@ -112,3 +112,22 @@ fn what_a_beam_hides_is_known_with_two_layers() {
     assert!(guessed.0 < -0.1 && guessed.1 > 0.5, "{guessed:?}");
     assert!(known.0.abs() < 0.07 && known.1 < 0.3, "{known:?}");
 }
+
+/// The demo's scene is taken as it is, as a world of which what edges hide is known.
+#[test]
+fn still_life_is_the_same_both_ways() {
+    let text = CAMERA
+        .replace("World((file: \"wall.pbrt\", effort: Samples(256)))", "StillLife(columns: 270, rows: 180)")
+        .replace("columns: 40, rows: 30, pitch_um: 150.0", "columns: 40, rows: 24, pitch_um: 600.0")
+        .replace("DistanceMm(1450.0)", "DistanceMm(960.0)");
+    let camera = Camera::parse(&text, "camera.ron".as_ref()).unwrap();
+    let found = MethodComparison::of(&camera, &Silent, &Cancel::new()).unwrap();
+    for row in &found.rows {
+        // A coarse view: bulbs and glints are as wide as its samples, which are at 16 points of them; 64 rays a pixel are noise beside it.
+        assert!(row.total.abs() < 0.02 + 4.0 * row.total_error, "{row:?}");
+        assert!(row.edge_band.unwrap() < 0.06 + 2.0 * row.noise, "{row:?}");
+        let [_, right_error, down_error, ..] = row.fit.errors;
+        assert!(row.fit.right_px.abs() < 0.02 + 3.0 * right_error, "{row:?}");
+        assert!(row.fit.down_px.abs() < 0.02 + 3.0 * down_error, "{row:?}");
+    }
+}
