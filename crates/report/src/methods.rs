@@ -8,13 +8,15 @@ use image::{Rgb, RgbImage, imageops};
 use ndarray::Array2;
 
 use crate::{
-    lettering::{Ink, Weight, write},
+    lettering::{Ink, Weight, width_px, write},
     png::png_bytes,
 };
 
-/// Space between pictures and above them for their names, px.
+/// Space between pictures, px.
 const GAP: u32 = 8;
-const TOP: u32 = 26;
+/// Height of the lines of their names, and what is below the last of them, px.
+const LINE: u32 = 16;
+const BELOW_NAMES: u32 = 10;
 /// The difference that is full color, as a share of the mean of the picture.
 const FULL: f64 = 0.25;
 
@@ -61,19 +63,39 @@ fn difference(comparison: &MethodComparison) -> RgbImage {
     })
 }
 
-/// Returns pictures of one size beside each other on white, each below its name.
+/// Returns pictures of one size beside each other on white, each below its name, which is broken into lines as wide as the picture.
 pub(crate) fn side_by_side(pictures: &[(String, RgbImage)]) -> RgbImage {
-    let width = pictures.iter().map(|(_, picture)| picture.width()).sum::<u32>() + GAP * (pictures.len() as u32 + 1);
-    let height = pictures.iter().map(|(_, picture)| picture.height()).max().unwrap_or(0) + TOP + GAP;
-    let mut sheet = RgbImage::from_pixel(width, height, Rgb([255; 3]));
     let ink = Ink { em_px: 12.0, weight: Weight::Regular, color: [40; 3] };
+    let names: Vec<Vec<String>> =
+        pictures.iter().map(|(name, picture)| lines(name, f64::from(picture.width()), &ink)).collect();
+    let top = LINE * names.iter().map(Vec::len).max().unwrap_or(0) as u32 + BELOW_NAMES;
+    let width = pictures.iter().map(|(_, picture)| picture.width()).sum::<u32>() + GAP * (pictures.len() as u32 + 1);
+    let height = pictures.iter().map(|(_, picture)| picture.height()).max().unwrap_or(0) + top + GAP;
+    let mut sheet = RgbImage::from_pixel(width, height, Rgb([255; 3]));
     let mut x = GAP;
-    for (name, picture) in pictures {
-        write(&mut sheet, (f64::from(x), f64::from(TOP) - 8.0), &ink, name);
-        imageops::replace(&mut sheet, picture, i64::from(x), i64::from(TOP));
+    for ((_, picture), lines) in pictures.iter().zip(names) {
+        for (row, line) in lines.iter().rev().enumerate() {
+            write(&mut sheet, (f64::from(x), f64::from(top - 8 - LINE * row as u32)), &ink, line);
+        }
+        imageops::replace(&mut sheet, picture, i64::from(x), i64::from(top));
         x += picture.width() + GAP;
     }
     sheet
+}
+
+/// Breaks words into lines no wider than so many pixels, a word that is wider by itself on a line of its own.
+fn lines(words: &str, width: f64, ink: &Ink) -> Vec<String> {
+    let mut lines: Vec<String> = vec![];
+    for word in words.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if width_px(&format!("{line} {word}"), ink.em_px, ink.weight) <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 #[cfg(test)]
@@ -84,9 +106,22 @@ mod tests {
     fn pictures_stand_beside_each_other_below_their_names() {
         let picture = |value: u8| RgbImage::from_pixel(40, 30, Rgb([value; 3]));
         let sheet = side_by_side(&[("a".to_owned(), picture(10)), ("b".to_owned(), picture(200))]);
-        assert_eq!(sheet.dimensions(), (3 * GAP + 80, TOP + 30 + GAP));
-        let at = |x: u32| sheet.get_pixel(x, TOP + 15).0[0];
+        let top = LINE + BELOW_NAMES;
+        assert_eq!(sheet.dimensions(), (3 * GAP + 80, top + 30 + GAP));
+        let at = |x: u32| sheet.get_pixel(x, top + 15).0[0];
         assert_eq!([at(GAP + 5), at(2 * GAP + 45)], [10, 200]);
-        assert!((0..TOP).any(|y| (GAP..GAP + 12).any(|x| sheet.get_pixel(x, y).0[0] < 128)));
+        assert!((0..top).any(|y| (GAP..GAP + 12).any(|x| sheet.get_pixel(x, y).0[0] < 128)));
+    }
+
+    #[test]
+    fn names_wider_than_their_pictures_take_several_lines() {
+        let ink = Ink { em_px: 12.0, weight: Weight::Regular, color: [0; 3] };
+        let name = "forward − backward, full color ±25 % of the mean";
+        let broken = lines(name, 120.0, &ink);
+        assert!(broken.len() > 1 && broken.join(" ") == name, "{broken:?}");
+        assert!(broken.iter().all(|line| width_px(line, 12.0, Weight::Regular) <= 120.0));
+        let sheet =
+            side_by_side(&[(name.to_owned(), RgbImage::new(120, 30)), ("b".to_owned(), RgbImage::new(120, 30))]);
+        assert_eq!(sheet.height(), LINE * broken.len() as u32 + BELOW_NAMES + 30 + GAP);
     }
 }
