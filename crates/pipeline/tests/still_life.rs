@@ -1,7 +1,7 @@
 //! The built-in still life as a world: the painting against rays, through a pinhole and through a lens.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set up its files fails")]
 
-use dioptric_pipeline::{Camera, KeptCamera, RenderEffort, SceneSource, Silent, WorldSpec};
+use dioptric_pipeline::{Camera, KeptCamera, RenderEffort, SceneSource, Silent, WavelengthSpec, WorldSpec};
 use dioptric_scene::StillLife;
 use dioptric_spectrum::{Bands, Cancel, WavelengthGrid};
 use glam::DVec3;
@@ -116,4 +116,30 @@ fn what_the_still_life_cannot_be_is_refused() {
     let kept = KeptCamera::new(Camera::parse(&outside, "camera.ron".as_ref()).unwrap());
     let error = kept.irradiance(&Silent, &Cancel::new()).unwrap_err().to_string();
     assert!(error.contains("within the room"), "{error}");
+}
+
+/// Colors beyond 300 to 1100 nm would be those at the ends.
+#[test]
+fn bands_that_rays_do_not_know_are_refused() {
+    let with = |wavelengths: &str, more: &str| {
+        let text = CAMERA.replace("[450.0, 550.0, 650.0]", wavelengths).replace("effort:", &format!("{more} effort:"));
+        Camera::parse(&text, "camera.ron".as_ref())
+    };
+    let wrong = [
+        ("[550.0, 1000.0, 1150.0]", "", "325 to 1225 nm"),
+        // 300 and 1100 stand for what is 50 nm around them, unless the value at the middle is asked for.
+        ("[300.0, 400.0]", "", "250 to 450 nm"),
+        ("[1000.0, 1100.5]", "bands: Center,", "1000 to 1100.5 nm"),
+    ];
+    for (wavelengths, more, reach) in wrong {
+        let error = with(wavelengths, more).unwrap_err().to_string();
+        assert!(error.contains(reach) && error.contains("within 300 to 1100 nm"), "{error}");
+    }
+    assert!(with("[300.0, 1100.0]", "bands: Center,").is_ok());
+    // The painter has colors of any wavelength.
+    assert!(with("[1000.0, 1200.0]", "method: Forward,").is_ok());
+    // A camera that is changed after it was read is found too.
+    let changed = camera().with(|camera| camera.wavelengths = WavelengthSpec::ListNm(vec![1200.0]));
+    let error = changed.irradiance(&Silent, &Cancel::new()).unwrap_err().to_string();
+    assert!(error.contains("within 300 to 1100 nm"), "{error}");
 }

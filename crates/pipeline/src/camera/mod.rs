@@ -243,6 +243,11 @@ impl WavelengthSpec {
             Self::ListNm(list) => Some(WavelengthGrid::new(list.clone())?),
         })
     }
+
+    /// Returns the bands before a world, which has none of its own.
+    pub(crate) fn of_world(&self) -> Result<WavelengthGrid, PipelineError> {
+        Ok(self.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?)
+    }
 }
 
 fn one() -> u64 {
@@ -326,7 +331,13 @@ impl Camera {
         if let Some(spec) = &self.dual_pixel {
             spec.check(self, checker)?;
         }
-        self.scene.check(checker)
+        self.scene.check(checker)?;
+        match &self.scene.source {
+            SceneSource::World(spec) if spec.is_still_life() => {
+                spec.check_bands(&self.wavelengths.of_world()?, checker)
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Checks the lens, its stop, focus and movements.

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use dioptric_backward::{BandSampling, LightPaths};
+use dioptric_scene::LitStillLife;
+use dioptric_spectrum::WavelengthGrid;
 use serde::{Deserialize, Serialize};
 
 use super::check::Checker;
@@ -127,6 +129,26 @@ impl WorldSpec {
     /// Returns the effort of rays from the film, or `None` where the view is blurred instead.
     pub(crate) fn backward(&self) -> Option<RenderEffort> {
         (self.method == RenderMethod::Backward).then_some(self.effort)
+    }
+
+    /// Checks that the colors of the still life are known to rays from the film on all bands.
+    pub(crate) fn check_bands(&self, grid: &WavelengthGrid, checker: &Checker<'_>) -> Result<(), PipelineError> {
+        if self.backward().is_none() {
+            return Ok(());
+        }
+        let share = if self.bands == BandSampling::Mean { 0.5 } else { 0.0 };
+        let ((first_nm, last_nm), widths_nm) = (grid.range_nm(), grid.widths_nm());
+        let reached_nm = (first_nm - share * widths_nm[0], last_nm + share * widths_nm[widths_nm.len() - 1]);
+        let known_nm = LitStillLife::RANGE_NM;
+        if known_nm.0 <= reached_nm.0 && reached_nm.1 <= known_nm.1 {
+            return Ok(());
+        }
+        let found = format!("bands that reach from {} to {} nm", reached_nm.0, reached_nm.1);
+        let expected = format!(
+            "ones within {} to {} nm, where rays from the film know the colors of the still life",
+            known_nm.0, known_nm.1
+        );
+        checker.wrong("wavelengths", &found, &expected)
     }
 
     pub(super) fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {

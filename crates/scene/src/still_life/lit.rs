@@ -21,9 +21,6 @@ use super::{
 };
 use crate::SceneError;
 
-/// Wavelengths of which colors are known, every nanometer; beyond, they are those at the ends.
-const RANGE_NM: (f64, f64) = (300.0, 1100.0);
-
 /// The still life with light on its surfaces, to be met by rays.
 ///
 /// Points are in meters in the frame of the room; [`world_from_eye`](Self::world_from_eye) is where the eye of the
@@ -77,14 +74,25 @@ impl StillLife {
     /// # Errors
     /// As [`scene_with`](Self::scene_with).
     pub fn lit(&self, progress: &(dyn Fn(f64) + Sync), cancel: &Cancel) -> Result<LitStillLife, SceneError> {
+        let unlit = self.unlit()?;
+        let which: &[Which] = if self.with_hidden { &[Which::First, Which::Behind] } else { &[Which::First] };
+        let painting = Painting::new(which.len() * self.rows, progress, cancel);
+        let (scene, size) = ((&unlit.world, &unlit.colors), (self.rows, self.columns));
+        let lit = |&which| lit_pixels(scene, &unlit.eye, size, which, &painting);
+        let layers = which.iter().map(lit).collect::<Result<Vec<LitPixels>, Cancelled>>()?;
+        Ok(LitStillLife { layers, ..unlit })
+    }
+
+    /// Returns the still life for rays at once: light is gathered anew for each of them, with more noise and for longer than
+    /// where it is [`lit`](Self::lit) before.
+    ///
+    /// # Errors
+    /// When the size is 0, the angle is not between 0° and 180°, or the eye stands outside the room.
+    pub fn unlit(&self) -> Result<LitStillLife, SceneError> {
         self.check()?;
         let world = room::world();
         let eye = eye(self.view()?, self.moved_m);
-        let which: &[Which] = if self.with_hidden { &[Which::First, Which::Behind] } else { &[Which::First] };
-        let painting = Painting::new(which.len() * self.rows, progress, cancel);
-        let colors = Colors::on(&WavelengthGrid::uniform(RANGE_NM.0, RANGE_NM.1, 1.0)?);
-        let lit = |&which| lit_pixels((&world, &colors), &eye, (self.rows, self.columns), which, &painting);
-        let layers = which.iter().map(lit).collect::<Result<Vec<LitPixels>, Cancelled>>()?;
+        let colors = Colors::on(&WavelengthGrid::uniform(LitStillLife::RANGE_NM.0, LitStillLife::RANGE_NM.1, 1.0)?);
         let mut known: Vec<Material> = Vec::new();
         let mut number_of = |material: Material| {
             let number = known.iter().position(|other| *other == material).unwrap_or_else(|| {
@@ -94,11 +102,14 @@ impl StillLife {
             number as u32
         };
         let material_of = world.materials().map(&mut number_of).collect();
-        Ok(LitStillLife { life: *self, world, eye, layers, colors, material_of })
+        Ok(LitStillLife { life: *self, world, eye, layers: Vec::new(), colors, material_of })
     }
 }
 
 impl LitStillLife {
+    /// The wavelengths at which colors are known, every nanometer; beyond, they would be those at the ends.
+    pub const RANGE_NM: (f64, f64) = (300.0, 1100.0);
+
     /// The picture whose eye it is lit for.
     pub fn picture(&self) -> &StillLife {
         &self.life
@@ -110,7 +121,7 @@ impl LitStillLife {
     }
 
     /// Adds to `radiance` the spectral radiance that comes along a ray at each of some wavelengths, W m⁻² sr⁻¹ nm⁻¹: to the origin
-    /// (m) from the direction, of length 1, into which it looks.
+    /// (m) from the direction, of length 1, into which it looks. Wavelengths are of [`RANGE_NM`](Self::RANGE_NM).
     ///
     /// Details finer than a pixel of the picture are blurred away, as they are in the picture. `random` returns the pair of numbers of 0–1
     /// of a number: what is mirrored, and light that is gathered anew, are sampled with them without bias.
@@ -241,7 +252,8 @@ struct At<'a> {
 
 impl At<'_> {
     fn between(&self, number: usize, value: impl Fn(usize) -> f32) -> f32 {
-        let place = f64::from(self.wavelengths_nm[number]).clamp(RANGE_NM.0, RANGE_NM.1) - RANGE_NM.0;
+        let place = f64::from(self.wavelengths_nm[number]).clamp(LitStillLife::RANGE_NM.0, LitStillLife::RANGE_NM.1)
+            - LitStillLife::RANGE_NM.0;
         let (first, share) = (place as usize, place.fract() as f32);
         if share == 0.0 { value(first) } else { value(first) + share * (value(first + 1) - value(first)) }
     }
