@@ -1,21 +1,23 @@
 //! A world rendered both ways: rays from the film against the view blurred by point spread functions.
 
 mod fit;
-
-use std::sync::Arc;
+mod parts;
 
 use dioptric_optics::glam::DVec2;
 use dioptric_pipeline::{
-    BandSampling, Camera, Irradiance, KeptCamera, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, RenderEffort,
-    RenderMethod, Rendering, SceneSource, WorldSpec, display::LinearRgb,
+    BandSampling, Camera, KeptCamera, PipelineError, Progress, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod,
+    Rendering, SceneSource, WorldSpec, display::LinearRgb,
 };
 use dioptric_psf::{LensImage, LensImageModel};
-use dioptric_spectrum::{Bands, Cancel};
+use dioptric_spectrum::{Cancel, SpectralImage};
 use ndarray::{Array2, Zip};
 use serde::Serialize;
 
 pub use self::fit::Fit;
-use self::fit::fit;
+use self::{
+    fit::fit,
+    parts::{divided, means_over_pixels, parts_of_pixels},
+};
 
 /// A picture of a world both ways, and how they differ.
 #[derive(Clone, Debug, Serialize)]
@@ -26,6 +28,8 @@ pub struct MethodComparison {
     pub effort: RenderEffort,
     /// The share of pixels in the band of depth edges: those that the blur of an edge reaches.
     pub edge_fraction: f64,
+    /// In how many parts each way the view was imaged on each pixel.
+    pub parts_of_pixels: usize,
     /// A row a band.
     pub rows: Vec<MethodRow>,
     /// The picture by rays from the film as an observer sees it, lux.
@@ -87,37 +91,48 @@ impl MethodComparison {
             })
         };
         let (forward, backward) = (by(RenderMethod::Forward), by(RenderMethod::Backward));
-        let blurred = forward.irradiance(progress, cancel)?;
-        let render = backward.world_render(progress, cancel)?;
+        // What one way cannot do is said before the other is gone.
+        backward.camera().validate()?;
+        let parts = parts_of_pixels(&camera, forward.depth(progress, cancel)?.z_m().ncols())?;
+        let divided = divided(&camera, parts)?;
+        let forward = forward.with(|camera| (camera.film, camera.crop) = divided);
+        let of_parts = forward.irradiance(progress, cancel)?;
+        let blurred = means_over_pixels(&of_parts, parts)?;
+        let render = backward.world_render(progress, cancel)?.in_large_passes(effort);
         let mut renderer = render.renderer()?;
         render.refine(&mut renderer, effort, progress, cancel, &mut |_| Ok(true))?;
         let z_m = render.auxiliary(cancel)?.z_m;
-        let is_edge = edge_band(&z_m, &*forward.model(progress, cancel)?, blurred.pitch_um());
-        Self::new(&camera.name, effort, (&blurred, &renderer.rendering()), is_edge)
+        let pitch_um = of_parts.pitch_um() * parts as f64;
+        let is_edge = edge_band(&z_m, &*forward.model(progress, cancel)?, pitch_um);
+        Ok(Self {
+            parts_of_pixels: parts,
+            ..Self::new(&camera.name, effort, (&blurred, &renderer.rendering()), is_edge)
+        })
     }
 
     fn new(
         name: &str,
         effort: RenderEffort,
-        (forward, backward): (&Arc<Irradiance>, &Rendering),
+        (forward, backward): (&SpectralImage, &Rendering),
         is_edge: Array2<bool>,
-    ) -> Result<Self, PipelineError> {
+    ) -> Self {
         let mut rows = Vec::new();
         let grid = backward.picture.grid();
         for (band, &wavelength_nm) in grid.centers_nm().iter().enumerate() {
             let (truth, error) = (&backward.picture.planes()[band], &backward.standard_error.planes()[band]);
-            rows.push(MethodRow::of(wavelength_nm, &*forward.band(band)?, (truth, error), &is_edge));
+            rows.push(MethodRow::of(wavelength_nm, &forward.planes()[band], (truth, error), &is_edge));
         }
         let n_edge = is_edge.iter().filter(|&&is| is).count();
-        Ok(Self {
+        Self {
             name: name.to_owned(),
             effort,
             edge_fraction: n_edge as f64 / is_edge.len() as f64,
+            parts_of_pixels: 1,
             rows,
             backward: LinearRgb::of_image(&backward.picture),
-            forward: forward.summary.seen.clone(),
+            forward: LinearRgb::of_image(forward),
             is_edge,
-        })
+        }
     }
 }
 

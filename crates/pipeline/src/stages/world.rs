@@ -33,6 +33,9 @@ use crate::{
 
 /// Samples of a pass: as many as spread well, and few enough for a first picture soon.
 const SAMPLES_PER_PASS: u32 = 8;
+/// Samples of a pass that is as large as it may be, and passes that tell the noise to a sixth or better.
+const MOST_SAMPLES_PER_PASS: u32 = 1024;
+const TELLING_PASSES: u32 = 16;
 /// Passes that noise is judged by.
 const PILOT_PASSES: u32 = 4;
 /// The most passes where noise decides.
@@ -119,7 +122,7 @@ pub(super) fn view(
         reason: format!("missing, and {} has no camera that states an angle; expected degrees", spec.file.display()),
     })?;
     let view = View::from_horizontal_fov_deg(fov_deg, columns, rows)?;
-    let wanted = geometry.wavelengths.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
+    let wanted = geometry.wavelengths.of_world()?;
     let bands = Bands { grid: geometry.quality.bands_of(&wanted)?, sampling: spec.bands };
     let half_tangents = 0.5 * DVec2::new(columns as f64, rows as f64) / view.focal_px;
     let pixels = PixelGrid::new(columns, rows);
@@ -289,6 +292,15 @@ impl WorldRender {
         let mut renderer = coarse.renderer()?;
         renderer.pass(cancel, &|_| {})?;
         Ok(renderer.rendering().picture)
+    }
+
+    /// Returns the same in passes of as many samples as leave some that tell the noise, where their number is known: a large
+    /// pass spreads its samples better than many small ones, and shows its picture later.
+    #[must_use]
+    pub fn in_large_passes(self, effort: RenderEffort) -> Self {
+        let RenderEffort::Samples(n) = effort else { return self };
+        let most = 1 << (n / TELLING_PASSES).max(1).ilog2();
+        Self { samples_per_pass: self.samples_per_pass.max(most.min(MOST_SAMPLES_PER_PASS)), ..self }
     }
 
     /// What the pixels are of: irradiance on a film, or the radiance that a camera by formula sees.
