@@ -54,25 +54,27 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
     let kept = KeptCamera::new(camera_of(arguments, common)?);
     kept.camera().validate()?;
-    let world = kept.world(&clock, &cancel)?;
-    tell(world.notes(), common);
+    let world = kept.world_of_file(&clock, &cancel)?;
+    let notes = world.as_ref().map_or(&[][..], |world| world.notes());
+    tell(notes, common);
     let mut camera = kept.camera().clone();
-    let has_lens = arguments.lens.is_some() || arguments.camera.is_some();
-    let own = world.cameras().first();
+    // The demo's lens is that of the still life.
+    let has_lens = arguments.lens.is_some() || arguments.camera.is_some() || world.is_none();
+    let own = world.as_ref().and_then(|world| world.cameras().first());
     let own_has_lens = match own {
         Some(own) if arguments.camera.is_none() => camera.take_from_world(own)?,
         None if !has_lens => bail!("{}: has no camera, expected one, or --lens", arguments.world.display()),
         _ => false,
     };
     if !has_lens && !own_has_lens {
-        let (Some(own), SceneSource::World(spec)) = (own, &camera.scene.source) else {
+        let (Some(world), Some(own), SceneSource::World(spec)) = (&world, own, &camera.scene.source) else {
             bail!("{}: has no camera, expected one, or --lens", arguments.world.display());
         };
         let grid = camera.wavelengths.grid()?.map_or_else(|| WavelengthGrid::uniform(400.0, 700.0, 10.0), Ok)?;
         let render = WorldRender::of_own_camera(world.clone(), own, spec, grid)?;
         let render = cropped(render, arguments)?;
         return render_without_sensor(arguments, common, (&render, &clock, &cancel), &|rendering| {
-            RenderingSummary::of(rendering, &world, spec)
+            RenderingSummary::of(rendering, notes, spec)
         });
     }
     change_lens(&mut camera, arguments);
@@ -80,19 +82,41 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     camera.focus = match arguments.place.focus() {
         Some(focus) => focus,
         // What stands ahead in the middle.
-        None if arguments.lens.is_some() => camera.focus_ahead(&world)?,
+        None if arguments.lens.is_some() => camera.focus_ahead(world.as_deref())?,
         None => camera.focus,
     };
     let kept = kept.with(|own| *own = camera);
+    show_before_light(arguments, (&kept, &clock, &cancel))?;
     let render = kept.world_render(&clock, &cancel)?;
     if let (Some(_), SceneSource::World(spec)) = (&arguments.crop, &kept.camera().scene.source) {
         let render = cropped(render, arguments)?;
         return render_without_sensor(arguments, common, (&render, &clock, &cancel), &|rendering| {
-            RenderingSummary::of(rendering, &world, spec)
+            RenderingSummary::of(rendering, notes, spec)
         });
     }
     let rendering = refine(arguments, (&render, &clock, &cancel))?;
     finish(arguments, common, (&kept, &clock, &cancel), (&render, &rendering))
+}
+
+/// Shows the still life before its light is known, which takes some seconds; of a rendering that goes on there is a picture.
+fn show_before_light(
+    arguments: &RenderArgs,
+    (kept, clock, cancel): (&KeptCamera, &Clock, &Cancel),
+) -> anyhow::Result<()> {
+    if arguments.resume && arguments.out.join(STATE).exists() {
+        return Ok(());
+    }
+    let Some(unlit) = kept.unlit_render(clock, cancel)? else { return Ok(()) };
+    make_folder(&arguments.out)?;
+    show_first_look(&cropped(unlit, arguments)?, FIRST_LOOKS[0], &arguments.out, cancel)
+}
+
+fn make_folder(out: &Path) -> anyhow::Result<()> {
+    fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))
+}
+
+fn show_first_look(render: &WorldRender, factor: usize, out: &Path, cancel: &Cancel) -> anyhow::Result<()> {
+    Ok(write_seen_png(&render.preview(factor, cancel)?, factor, &out.join(PREVIEW))?)
 }
 
 /// Returns the part that is asked for.
@@ -105,13 +129,15 @@ fn cropped(render: WorldRender, arguments: &RenderArgs) -> anyhow::Result<WorldR
 fn camera_of(arguments: &RenderArgs, common: &Common) -> anyhow::Result<Camera> {
     let mut camera = arguments.camera.as_deref().map_or_else(Camera::demo, Camera::read)?;
     let size = arguments.pixels.as_deref().map(parse_size).transpose()?;
+    let of_file = WorldSpec::of_file(arguments.world.clone());
     let spec = WorldSpec {
         unit_m: arguments.unit_m,
         effort: effort(arguments),
-        size,
+        // How finely the still life is lit does not hang on the film, unless that has its pixels.
+        size: size.filter(|_| !of_file.is_still_life() || camera.film == FilmSpec::Scene),
         paths: arguments.bounces.map_or_else(LightPaths::default, LightPaths::UpTo),
         seed: common.seed.unwrap_or(1),
-        ..WorldSpec::of_file(arguments.world.clone())
+        ..of_file
     };
     camera.scene = SceneSpec {
         source: SceneSource::World(spec),
@@ -187,7 +213,7 @@ type Job<'a> = (&'a WorldRender, &'a Clock, &'a Cancel);
 fn refine(arguments: &RenderArgs, (render, clock, cancel): Job<'_>) -> anyhow::Result<Rendering> {
     let (began, effort) = (Instant::now(), effort(arguments));
     let out = &arguments.out;
-    fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
+    make_folder(out)?;
     let (state, identity) = (out.join(STATE), render.identity(effort));
     guard(state.with_extension(format!("{}.partial", process::id())));
     let mut renderer = render.renderer()?;
@@ -198,7 +224,7 @@ fn refine(arguments: &RenderArgs, (render, clock, cancel): Job<'_>) -> anyhow::R
     if renderer.n_passes() == 0 {
         clock.at(Stage::Irradiance, 0.0);
         for factor in FIRST_LOOKS {
-            write_seen_png(&render.preview(factor, cancel)?, factor, &preview)?;
+            show_first_look(render, factor, out, cancel)?;
         }
     }
     let (mut saved, mut shown): (Option<Instant>, Option<Instant>) = (None, None);
@@ -247,9 +273,10 @@ fn finish(
     if arguments.layers.is_some() {
         report.files.push(SCENE.to_owned());
     }
-    let world = kept.world(&Silent, cancel)?;
+    let world = kept.world_of_file(&Silent, cancel)?;
+    let notes = world.as_ref().map_or(&[][..], |world| world.notes());
     let SceneSource::World(spec) = &kept.camera().scene.source else { unreachable!("the scene is a world") };
-    let rendering = RenderingSummary::of(rendering, &world, spec);
+    let rendering = RenderingSummary::of(rendering, notes, spec);
     let report = Report { run: Some(report), rendering };
     write_json(&staged.path().join("report.json"), &report)?;
     write_json(&staged.path().join("timings.json"), &clock.times())?;

@@ -34,7 +34,7 @@ impl From<RayDiffraction> for Diffraction {
 /// A world, and the camera that renders it.
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
-    /// World to render: .pbrt, .gltf, .glb, .obj or .ply
+    /// World to render: .pbrt, .gltf, .glb, .obj or .ply; or still-life, the built-in scene of the demo
     pub(crate) world: PathBuf,
     /// Camera file, whose scene the world takes the place of [default: the camera of the world's file]
     #[arg(long, value_name = "CAMERA.ron", help_heading = "Lens")]

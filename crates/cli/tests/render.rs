@@ -216,6 +216,31 @@ fn light_field_ends_in_views_and_depth() {
     check_error(folder.path(), &["lightfield", "camera.ron", "--refocus-m", "0"], &["--refocus-m has 0"]);
 }
 
+/// The demo's lens stands before it unless another is named; what it cannot have is refused by name.
+#[test]
+fn built_in_still_life_is_rendered() {
+    let folder = folder();
+    let still_life = |options: &[&'static str]| {
+        [&["render", "still-life", "--pixels", "30x20", "--samples", "8"], BANDS, options].concat()
+    };
+    output(folder.path(), &still_life(&["-o", "out"]));
+    let out = folder.path().join("out");
+    for name in ["irradiance.exr", "auxiliary.exr", "picture.png", "report.html", "render.state", "kept.ron"] {
+        assert!(out.join(name).exists(), "{name}");
+    }
+    assert!(!out.join("preview.png").exists());
+    let report = report(&out);
+    assert_eq!((&report["rendering"]["world"], &report["rendering"]["size"]), (&"still-life".into(), &[30, 20].into()));
+    // Taken up again it makes no further pass, and once more from the start the same bits.
+    output(folder.path(), &still_life(&["-o", "whole"]));
+    output(folder.path(), &still_life(&["--resume", "-o", "out"]));
+    assert_eq!(bits(&out), bits(&folder.path().join("whole")));
+    check_error(folder.path(), &still_life(&["--unit-m", "2"]), &["unit_m is 2"]);
+    check_error(folder.path(), &still_life(&["--bounces", "1"]), &["paths is UpTo(1)"]);
+    let infrared = ["render", "still-life", "--wavelengths-nm", "900:1200:100", "--quiet"];
+    check_error(folder.path(), &infrared, &["850 to 1250 nm", "within 300 to 1100 nm"]);
+}
+
 #[test]
 fn noise_and_time_end_a_rendering() {
     let folder = folder();

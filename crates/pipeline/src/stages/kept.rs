@@ -438,6 +438,15 @@ impl KeptCamera {
         chain.world(&scene.geometry)
     }
 
+    /// Returns the world of a file before the camera; `None` where that is the built-in still life.
+    ///
+    /// # Errors
+    /// As [`world`](Self::world).
+    pub fn world_of_file(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Option<Arc<World>>, PipelineError> {
+        let is_still_life = matches!(&self.camera.scene.source, SceneSource::World(spec) if spec.is_still_life());
+        if is_still_life { Ok(None) } else { self.world(progress, cancel).map(Some) }
+    }
+
     /// Returns the world before the camera as its lens sees it, to be rendered pass by pass.
     ///
     /// # Errors
@@ -453,6 +462,21 @@ impl KeptCamera {
         check_glasses(&lens, Some(grid))?;
         check_depth_map(&lens.lens, grid, resolved.scene.require_depth()?)?;
         chain.world_render(&inputs)
+    }
+
+    /// Returns the built-in still life as the lens sees it, for a look at the picture before it is lit: at once, but slow and with more
+    /// noise; `None` of a world, which needs no light before.
+    ///
+    /// # Errors
+    /// As [`world_render`](Self::world_render).
+    pub fn unlit_render(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Option<WorldRender>, PipelineError> {
+        self.camera.validate()?;
+        let inputs = self.irradiance_inputs()?;
+        let chain = self.chain(progress, cancel);
+        let Some(spec) = inputs.scene.geometry.still_life() else { return Ok(None) };
+        let (life, _) = lit_still_life::picture_of(&inputs.scene.geometry, spec);
+        let stage = WorldStage::StillLife(Arc::new(RadiantStillLife::unlit(&life)?));
+        chain.through_lens(stage, &inputs).map(Some)
     }
 
     /// Whether the irradiance on the film is kept, so that a capture starts behind it.
@@ -564,9 +588,7 @@ impl Chain<'_> {
     fn world(&self, geometry: &GeometryInputs) -> Result<Arc<World>, PipelineError> {
         let Some((inputs, _)) = geometry.world() else {
             let reason = match geometry.still_life() {
-                Some(_) => {
-                    "the still life is built in and no world that is read, expected one of a file; 'run' and 'compare' take it"
-                }
+                Some(_) => "the still life is built in and no world that is read, expected one of a file",
                 None => "it is no world, expected 'source: World((file: ...))'",
             };
             let reason = reason.to_owned();
@@ -585,6 +607,10 @@ impl Chain<'_> {
             }
             None => WorldStage::World(self.world(geometry)?),
         };
+        self.through_lens(stage, inputs)
+    }
+
+    fn through_lens(&self, stage: WorldStage, inputs: &IrradianceInputs) -> Result<WorldRender, PipelineError> {
         let film = &inputs.plan.bank.film;
         let grid = self.summary(&inputs.scene)?.grid()?;
         let (lens, place) = (self.lens(&film.lens)?, self.film(film, &inputs.scene)?);

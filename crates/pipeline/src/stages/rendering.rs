@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use dioptric_backward::Rendering;
 use dioptric_spectrum::SpectralImage;
-use dioptric_world::World;
 use image::RgbImage;
 use ndarray::Array2;
 use serde::Serialize;
@@ -34,8 +33,8 @@ pub struct RenderingSummary {
 }
 
 impl RenderingSummary {
-    /// Sums up a rendering of a world.
-    pub fn of(rendering: &Rendering, world: &World, spec: &WorldSpec) -> Self {
+    /// Sums up a rendering of a world, of whose file so much is not supported.
+    pub fn of(rendering: &Rendering, notes: &[String], spec: &WorldSpec) -> Self {
         let picture = &rendering.picture;
         let n = (picture.rows() * picture.columns()) as f64;
         let mean_of =
@@ -55,7 +54,7 @@ impl RenderingSummary {
             relative_standard_error: errors.iter().any(|&error| error > 0.0).then_some(errors),
             mean,
             samples_per_pixel: rendering.n_samples.iter().map(|&n| f64::from(n)).sum::<f64>() / n,
-            notes: world.notes().to_vec(),
+            notes: notes.to_vec(),
         }
     }
 }

@@ -81,6 +81,8 @@ pub(crate) struct GeometryInputs {
     pub(crate) hidden: Option<PathBuf>,
     pub(crate) wavelengths: WavelengthSpec,
     pub(crate) quality: Quality,
+    /// Whether the view of the still life is but the summary of a picture that rays from the film make.
+    pub(crate) is_summary: bool,
     files: Vec<FileStamp>,
 }
 
@@ -253,6 +255,7 @@ impl SceneInputs {
                 hidden: scene.hidden.clone(),
                 wavelengths: camera.wavelengths.clone(),
                 quality,
+                is_summary: is_summary(&scene.source, camera.film),
                 files: match &scene.source {
                     SceneSource::File(path) if given.scene.is_none() => {
                         let hidden = scene.hidden.iter().flat_map(|path| FileStamp::all_of(path));
@@ -295,6 +298,13 @@ impl IrradianceInputs {
         let plan = PlanInputs { bank, blur: camera.blur, photodiode: None };
         Self { plan, scene, micro_array, dual_pixel: camera.dual_pixel, effort }
     }
+}
+
+/// Whether a view of the still life is needed for no more than what is told of the scene: rays from the film make the picture, and it has
+/// not as many pixels as the view.
+fn is_summary(source: &SceneSource, film: FilmSpec) -> bool {
+    let SceneSource::World(spec) = source else { return false };
+    spec.is_still_life() && spec.backward().is_some() && film != FilmSpec::Scene
 }
 
 /// Returns a source as far as the view of it depends on it: not on the samples of rays from the film, and a preview not on those of the still
