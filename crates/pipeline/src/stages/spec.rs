@@ -300,8 +300,8 @@ impl IrradianceInputs {
     }
 }
 
-/// Whether a view of the still life is needed for no more than what is told of the scene: rays from the film make the picture, and it has
-/// not as many pixels as the view.
+/// Whether a view of the still life is needed for the summary of the scene alone: rays from the film make the picture, which does not have
+/// as many pixels as the view.
 fn is_summary(source: &SceneSource, film: FilmSpec) -> bool {
     let SceneSource::World(spec) = source else { return false };
     spec.is_still_life() && spec.backward().is_some() && film != FilmSpec::Scene
