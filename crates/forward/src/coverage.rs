@@ -25,8 +25,8 @@ pub struct PsfDomain<'a> {
     pub diffraction: Diffraction,
 }
 
-/// How far beyond the film fields are sampled, over the radius of the blur: the border of the film is blurred by light from beyond it, and
-/// kernels there are between those at knots farther out.
+/// How far beyond the film fields are sampled, over the radius of the blur at the axis and at the film's corners: the border of the film is
+/// blurred by light from beyond it, and kernels there are between those at knots farther out.
 const BORDER_OF_BLUR: f64 = 1.5;
 
 impl PsfDomain<'_> {
@@ -94,8 +94,9 @@ impl PsfDomain<'_> {
         // A lens moved aside has its axis on the other side of the picture.
         let corner_mm = self.film.half_diagonal_mm() + (self.film.center_mm + aside_mm).length();
         let fields_tan = PsfDomain { lens: &centered, ..*self }.at_ends(|aim| {
-            let extent_mm = 1.02 * corner_mm + BORDER_OF_BLUR * aim.axial_blur_mm();
-            Ok(aim.field_tan_at(extent_mm))
+            let corner_blur_mm = aim.blur_mm(DVec2::X * aim.field_tan_at(corner_mm));
+            let sampled_mm = 1.02 * corner_mm + BORDER_OF_BLUR * aim.axial_blur_mm();
+            Ok(aim.field_tan_at(sampled_mm.max(corner_mm + BORDER_OF_BLUR * corner_blur_mm)))
         })?;
         let last_field_tan = fields_tan.into_iter().fold(0.0, f64::max);
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
@@ -121,6 +122,10 @@ impl PsfDomain<'_> {
             let dark = || ForwardError::DarkFilm { lens: self.lens.name().to_owned(), wavelength_nm };
             let center = kept * aim.field_at_middle().ok_or_else(dark)?;
             let beyond_mm = 1.02 * half_mm + BORDER_OF_BLUR * aim.blur_mm(center);
+            let (low, high) = aim.fields_over(center, half_mm, is_mirrored);
+            let corners = [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)];
+            let corner_blur_mm = corners.map(|field_tan| aim.blur_mm(field_tan)).into_iter().fold(0.0, f64::max);
+            let beyond_mm = beyond_mm.max(half_mm + BORDER_OF_BLUR * corner_blur_mm);
             Ok(aim.fields_over(center, beyond_mm, is_mirrored))
         })?;
         let around = |(first, last): (DVec2, DVec2), (low, high)| (first.min(low), last.max(high));

@@ -90,6 +90,25 @@ fn of_a_symmetric_lens_the_picture_is_that_of_the_turned_bank() {
     }
 }
 
+/// A singlet's corners are blurred far more than its middle: fields were sampled as if they were not.
+#[test]
+fn light_from_beyond_the_film_reaches_the_corners_of_any_lens() {
+    let lens = Lens::built_in("singlet-50mm").unwrap().with_f_number(2.0, 550.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+    let grid = WavelengthGrid::new(vec![550.0]).unwrap();
+    let camera =
+        Camera { lens, film: Film::centered(64, 64, 243.0), film_distance_mm, depth_range_m: (2.0, 2.0), grid };
+    let flat = |value| Array2::from_elem((100, 100), value);
+    // Twice as wide as the film.
+    let scene = scene(vec![flat(1.0)], &camera.grid, flat(2.0), 75.0);
+    let turned = LensImageModel::build(&camera.lens, &camera.domain().radial_settings().unwrap()).unwrap();
+    let [any, turned] = [&camera.any_lens(), &turned].map(|lens| camera.image(lens, &scene).remove(0));
+    for (at, &light) in turned.indexed_iter() {
+        // A per cent, to which both interpolate.
+        assert!((any[at] / light - 1.0).abs() < 0.01, "{at:?}: {}, about the axis {light}", any[at]);
+    }
+}
+
 /// A lens of two powers, 50 mm across and 40 mm up at 550 nm, its stop in front.
 fn anamorphic() -> Lens {
     let surface = |radius_mm: f64, radius_x_mm: f64| Surface {
