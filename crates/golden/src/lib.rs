@@ -2,7 +2,9 @@
 //!
 //! This crate is a dev-dependency only; no product crate may use it outside tests.
 
-#![expect(clippy::print_stderr, reason = "a test says on one line that it was skipped")]
+#![expect(clippy::print_stderr, clippy::print_stdout, reason = "tests say what they skip, commands what they read")]
+
+mod mutants;
 
 use std::{
     fs,
@@ -10,6 +12,7 @@ use std::{
 };
 
 pub use dioptric_golden_macros::needs_shared;
+pub use mutants::{mutant, mutants_wanted, read_mutants};
 
 /// The lenses of the shared reference data (`reference/optics/NAME.json`).
 pub const REFERENCE_LENSES: [&str; 10] = [

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use dioptric_optics::{LensFile, OpticsError, ReadOptions};
 
-use mutate::{SEEDS, mutant, read};
+use dioptric_golden::mutant;
+use mutate::{SEEDS, read};
 
 #[test]
 fn every_seed_is_read_and_thousands_of_its_mutants_end_in_a_lens_or_an_error() {

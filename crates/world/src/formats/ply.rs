@@ -86,6 +86,27 @@ impl PropertyAccess for Other {
     }
 }
 
+/// Returns what is wrong in a file in one sentence, with its line where the parser knows it.
+fn malformed(file: &Path, error: &dyn std::fmt::Display) -> WorldError {
+    let message = error.to_string();
+    let numbered = message.strip_prefix("Line ").and_then(|rest| {
+        let (line, rest) = rest.split_once(": ")?;
+        Some((line.parse().ok()?, rest))
+    });
+    // The first line says what is wrong and another which words; the rest is the parser's grammar.
+    let mut lines = numbered.map_or(message.as_str(), |(_, rest)| rest).lines().map(str::trim);
+    let what = lines.next().unwrap_or_default().trim_end_matches('.');
+    let words = lines.find_map(|line| line.strip_prefix("String: ")).map(|words| words.trim_matches('\''));
+    let reason = match words {
+        Some(words) => format!("{what}: '{}'", words.escape_debug()),
+        None => what.escape_debug().to_string(),
+    };
+    match numbered {
+        Some((line, _)) => WorldError::Line { file: file.to_owned(), line, reason },
+        None => WorldError::Unreadable { file: file.to_owned(), reason },
+    }
+}
+
 /// Reads the mesh of a PLY file: `vertex` (x, y, z; nx, ny, nz; u, v or s, t) and `face` (polygons become fans).
 ///
 /// # Errors
@@ -95,7 +116,7 @@ pub fn read_ply(path: &Path) -> Result<TriangleMesh, WorldError> {
     let file = File::open(path).map_err(|e| unreadable(e.to_string()))?;
     let n_bytes = file.metadata().map_err(|e| unreadable(e.to_string()))?.len();
     let mut reader = Reader::new(BufReader::with_capacity(1 << 20, file));
-    let header = Parser::<Other>::new().read_header(&mut reader).map_err(|e| unreadable(e.to_string()))?;
+    let header = Parser::<Other>::new().read_header(&mut reader).map_err(|e| malformed(path, &e))?;
     let mut mesh = TriangleMesh::default();
     for (_, element) in &header.elements {
         if element.count as u64 > n_bytes {
@@ -106,7 +127,7 @@ pub fn read_ply(path: &Path) -> Result<TriangleMesh, WorldError> {
         match element.name.as_str() {
             "vertex" => {
                 let vertices = Parser::<Vertex>::new().read_payload_for_element(&mut reader, element, &header);
-                let vertices = vertices.map_err(|e| unreadable(e.to_string()))?;
+                let vertices = vertices.map_err(|e| malformed(path, &e))?;
                 mesh.positions = vertices.iter().map(|v| v.position).collect();
                 if has(&["nx"]) {
                     mesh.normals = vertices.iter().map(|v| v.normal).collect();
@@ -117,14 +138,14 @@ pub fn read_ply(path: &Path) -> Result<TriangleMesh, WorldError> {
             }
             "face" => {
                 let faces = Parser::<Face>::new().read_payload_for_element(&mut reader, element, &header);
-                for face in faces.map_err(|e| unreadable(e.to_string()))? {
+                for face in faces.map_err(|e| malformed(path, &e))? {
                     let fan = face.vertices();
                     mesh.triangles.extend(fan.windows(2).skip(1).map(|pair| [fan[0], pair[0], pair[1]]));
                 }
             }
             _ => {
                 let passed = Parser::<Other>::new().read_payload_for_element(&mut reader, element, &header);
-                passed.map_err(|e| unreadable(e.to_string()))?;
+                passed.map_err(|e| malformed(path, &e))?;
             }
         }
     }
@@ -175,7 +196,10 @@ mod tests {
             assert!(error.contains("wrong.ply"), "{error}");
             error
         };
-        refused("nothing of the kind");
+        // With its line, and in one: the parser's own message has its grammar in further lines.
+        let error = refused(&HEADER.replace("element face", "elephant face"));
+        assert!(error.contains("line 9") && error.contains("'elephant face 1") && !error.contains('\n'), "{error}");
+        assert!(!refused("nothing of the kind").contains('\n'));
         refused(HEADER);
         assert!(refused(&HEADER.replace("vertex 4", "vertex 4000000000")).contains("4000000000"));
         let vertices = "0 0 0 0 0\n".repeat(4);
