@@ -70,7 +70,7 @@ pub(super) fn read(path: &Path, place: DAffine3, cancel: &Cancel) -> Result<Worl
 }
 
 /// Parses and validates a file. The crate's validation looks up the accessor of POSITION before it has checked that
-/// there is one, so this is checked first.
+/// there is one, and does not see images without a source, which it takes for granted later: both are checked here.
 fn parse(bytes: &[u8]) -> Result<Gltf, String> {
     let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).map_err(|e| e.to_string())?;
     let root = document.into_json();
@@ -78,6 +78,13 @@ fn parse(bytes: &[u8]) -> Result<Gltf, String> {
     if let Some(index) = used.find(|index| index.value() >= root.accessors.len()) {
         let n = root.accessors.len();
         return Err(format!("a mesh names accessor {}, of which there are {n}", index.value()));
+    }
+    let has_source = |image: &gltf::json::Image| match image.buffer_view {
+        Some(_) => image.mime_type.is_some(),
+        None => image.uri.is_some(),
+    };
+    if let Some(index) = root.images.iter().position(|image| !has_source(image)) {
+        return Err(format!("image {index} has neither a uri nor a bufferView with its mimeType"));
     }
     let document = gltf::Document::from_json(root).map_err(|e| e.to_string())?;
     Ok(Gltf { document, blob })
@@ -395,6 +402,11 @@ mod tests {
         let no_accessor = file("3", 3).replace("\"POSITION\":0", "\"POSITION\":9");
         assert!(read_text(&no_accessor).unwrap_err().to_string().contains("accessor 9, of which there are 2"));
         assert!(read_text("{}").is_err());
+        for image in ["{}", r#"{"bufferView":0}"#] {
+            let images = format!(r#""images":[{{"uri":"data:,"}},{image}],"buffers""#);
+            let error = read_text(&file("3", 3).replace("\"buffers\"", &images)).unwrap_err().to_string();
+            assert!(error.contains("image 1") && error.contains("uri"), "{error}");
+        }
         let floats = file("1", 3).replace("\"componentType\":5123", "\"componentType\":5126");
         assert!(read_text(&floats).unwrap_err().to_string().contains("accessor 1"));
     }
