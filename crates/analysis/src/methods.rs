@@ -16,7 +16,7 @@ use serde::Serialize;
 pub use self::fit::Fit;
 use self::{
     fit::fit,
-    parts::{divided, means_over_pixels, parts_of_pixels},
+    parts::{Parts, divided, means_over_pixels},
 };
 
 /// A picture of a world both ways, and how they differ.
@@ -30,6 +30,10 @@ pub struct MethodComparison {
     pub edge_fraction: f64,
     /// In how many parts each way the view was imaged on each pixel.
     pub parts_of_pixels: usize,
+    /// The share of pixels that are lit by rays from the film and see nothing of the view, which ends before them.
+    pub beyond_view_fraction: f64,
+    /// What is to be known about the comparison, a sentence each.
+    pub notes: Vec<String>,
     /// A row a band.
     pub rows: Vec<MethodRow>,
     /// The picture by rays from the film as an observer sees it, lux.
@@ -93,21 +97,21 @@ impl MethodComparison {
         let (forward, backward) = (by(RenderMethod::Forward), by(RenderMethod::Backward));
         // What one way cannot do is said before the other is gone.
         backward.camera().validate()?;
-        let parts = parts_of_pixels(&camera, forward.depth(progress, cancel)?.z_m().ncols())?;
-        let divided = divided(&camera, parts)?;
+        let parts = Parts::of(&camera, forward.depth(progress, cancel)?.z_m().ncols())?;
+        let divided = divided(&camera, parts.n)?;
         let forward = forward.with(|camera| (camera.film, camera.crop) = divided);
         let of_parts = forward.irradiance(progress, cancel)?;
-        let blurred = means_over_pixels(&of_parts, parts)?;
+        let blurred = means_over_pixels(&of_parts, parts.n)?;
         let render = backward.world_render(progress, cancel)?.in_large_passes(effort);
         let mut renderer = render.renderer()?;
         render.refine(&mut renderer, effort, progress, cancel, &mut |_| Ok(true))?;
         let z_m = render.auxiliary(cancel)?.z_m;
-        let pitch_um = of_parts.pitch_um() * parts as f64;
+        let pitch_um = of_parts.pitch_um() * parts.n as f64;
         let is_edge = edge_band(&z_m, &*forward.model(progress, cancel)?, pitch_um);
-        Ok(Self {
-            parts_of_pixels: parts,
-            ..Self::new(&camera.name, effort, (&blurred, &renderer.rendering()), is_edge)
-        })
+        let mut comparison = Self::new(&camera.name, effort, (&blurred, &renderer.rendering()), is_edge);
+        comparison.parts_of_pixels = parts.n;
+        comparison.notes.extend(parts.note());
+        Ok(comparison)
     }
 
     fn new(
@@ -123,14 +127,25 @@ impl MethodComparison {
             rows.push(MethodRow::of(wavelength_nm, &forward.planes()[band], (truth, error), &is_edge));
         }
         let n_edge = is_edge.iter().filter(|&&is| is).count();
+        let (forward_seen, backward_seen) = (LinearRgb::of_image(forward), LinearRgb::of_image(&backward.picture));
+        let beyond_view_fraction = beyond_view_fraction(forward.planes(), backward.picture.planes());
+        let is_beyond = (beyond_view_fraction > LEAST_BEYOND_VIEW).then(|| {
+            format!(
+                "{:.1} % of the film is lit by rays and dark in the blurred view, which ends before it: a larger \
+                 'field_of_view_deg' of the scene shows it",
+                100.0 * beyond_view_fraction
+            )
+        });
         Self {
             name: name.to_owned(),
             effort,
             edge_fraction: n_edge as f64 / is_edge.len() as f64,
             parts_of_pixels: 1,
+            beyond_view_fraction,
+            notes: is_beyond.into_iter().collect(),
             rows,
-            backward: LinearRgb::of_image(&backward.picture),
-            forward: LinearRgb::of_image(forward),
+            backward: backward_seen,
+            forward: forward_seen,
             is_edge,
         }
     }
@@ -152,6 +167,17 @@ impl MethodComparison {
         }
         text
     }
+}
+
+/// The share of pixels beyond the view from which on there is a note.
+const LEAST_BEYOND_VIEW: f64 = 1e-3;
+
+/// Returns the share of pixels without light in any band of a blurred view that have light in a picture by rays.
+fn beyond_view_fraction(forward: &[Array2<f32>], backward: &[Array2<f32>]) -> f64 {
+    let is_lit = |planes: &[Array2<f32>], at: (usize, usize)| planes.iter().any(|plane| plane[at] > 0.0);
+    let Some(first) = forward.first() else { return 0.0 };
+    let n_beyond = first.indexed_iter().filter(|(at, _)| !is_lit(forward, *at) && is_lit(backward, *at)).count();
+    n_beyond as f64 / first.len() as f64
 }
 
 impl MethodRow {
@@ -241,5 +267,15 @@ mod tests {
         // Single precision.
         assert!((row.off_edges - 0.01).abs() < 1e-5 && (row.edge_band.unwrap() - 0.05).abs() < 1e-5, "{row:?}");
         assert!((row.total - (0.01 * 5.0 + 0.05) / 6.0).abs() < 1e-5, "{row:?}");
+    }
+
+    #[test]
+    fn film_beyond_the_view_is_found() {
+        let lit = Array2::from_elem((4, 10), 2.0_f32);
+        // In one band light ends after seven columns, in the other after eight; where no ray brings any, none is missing.
+        let ends = |end: usize| Array2::from_shape_fn((4, 10), |(_, c)| if c < end { 1.0 } else { 0.0 });
+        assert_eq!(beyond_view_fraction(&[ends(7), ends(8)], &[lit.clone(), lit.clone()]), 0.2);
+        assert_eq!(beyond_view_fraction(&[ends(7), ends(8)], &[ends(9), ends(7)]), 0.1);
+        assert_eq!(beyond_view_fraction(std::slice::from_ref(&lit), std::slice::from_ref(&lit)), 0.0);
     }
 }

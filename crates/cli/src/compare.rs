@@ -9,6 +9,7 @@ use dioptric_spectrum::Cancel;
 
 use crate::{
     args::Common,
+    lens::tell,
     render_args::CompareArgs,
     run::Clock,
     terminal::{guarded, print, print_json, remark},
@@ -27,6 +28,7 @@ pub(crate) fn run(arguments: &CompareArgs, common: &Common) -> anyhow::Result<()
     write_comparison(&comparison, staged.path())?;
     staged.commit()?;
     drop(clock);
+    tell(&comparison.notes, common);
     if common.json {
         return print_json(&comparison);
     }

@@ -12,11 +12,32 @@ use ndarray::Array2;
 /// Parts of a pixel each way; where more were needed the film has hardly any pixels.
 const PARTS: RangeInclusive<usize> = 1..=16;
 
-/// Returns in how many parts each way a pixel of a camera's film is imaged: so many that the samples of the view, so many
-/// across, which is no narrower than what the film sees, are no finer than they are.
-pub(super) fn parts_of_pixels(camera: &Camera, columns_of_view: usize) -> Result<usize, PipelineError> {
-    let Some((columns, ..)) = pixels(camera)? else { return Ok(1) };
-    Ok(columns_of_view.div_ceil(columns.max(1)).clamp(*PARTS.start(), *PARTS.end()))
+/// In how many parts each way a pixel of film is imaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Parts {
+    pub(super) n: usize,
+    /// As many as would be no wider than the samples of the view.
+    pub(super) wanted: usize,
+}
+
+impl Parts {
+    /// Returns the parts of the pixels of a camera's film: so many that the samples of the view, so many across, which is no
+    /// narrower than what the film sees, are no finer than they are, if that is not too many.
+    pub(super) fn of(camera: &Camera, columns_of_view: usize) -> Result<Self, PipelineError> {
+        let wanted = pixels(camera)?.map_or(1, |(columns, ..)| columns_of_view.div_ceil(columns.max(1)));
+        Ok(Self { n: wanted.clamp(*PARTS.start(), *PARTS.end()), wanted })
+    }
+
+    /// Returns what is to be known of a view that is finer than the parts.
+    pub(super) fn note(&self) -> Option<String> {
+        let Self { n, wanted } = self;
+        (wanted > n).then(|| {
+            format!(
+                "the view has {wanted} samples across for a pixel and is imaged on {n} parts: light keeps its place to about a \
+                 quarter of a part, which shows where a source is smaller than one"
+            )
+        })
+    }
 }
 
 /// Returns columns, rows and pitch, µm, of a camera's film; `None` where its pixels are the samples of the scene.
@@ -69,15 +90,18 @@ mod tests {
         let mut camera = Camera::demo().unwrap();
         camera.film = FilmSpec::Pixels { columns: 180, rows: 120, pitch_um: 176.0 };
         camera.crop = Some(Crop { x: 10, y: 20, columns: 30, rows: 40 });
-        assert_eq!(parts_of_pixels(&camera, 1080).unwrap(), 6);
-        assert_eq!(parts_of_pixels(&camera, 181).unwrap(), 2);
-        assert_eq!(parts_of_pixels(&camera, 90).unwrap(), 1);
+        let of = |camera: &Camera, columns: usize| Parts::of(camera, columns).unwrap();
+        for (columns, n) in [(1080, 6), (181, 2), (90, 1)] {
+            assert_eq!((of(&camera, columns).n, of(&camera, columns).note()), (n, None));
+        }
+        assert_eq!(of(&camera, 180 * 17), Parts { n: 16, wanted: 17 });
+        assert!(of(&camera, 180 * 17).note().unwrap().contains("17 samples"));
         let film = FilmSpec::Pixels { columns: 1080, rows: 720, pitch_um: 176.0 / 6.0 };
         let crop = Crop { x: 60, y: 120, columns: 180, rows: 240 };
         assert_eq!(divided(&camera, 6).unwrap(), (film, Some(crop)));
         // The film has the width that it had.
         assert_eq!(divided(&camera, 1).unwrap(), (camera.film, camera.crop));
         camera.film = FilmSpec::Scene;
-        assert_eq!(parts_of_pixels(&camera, 1080).unwrap(), 1);
+        assert_eq!(of(&camera, 1080).n, 1);
     }
 }
