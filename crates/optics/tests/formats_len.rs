@@ -3,7 +3,10 @@
 
 use std::path::Path;
 
-use dioptric_optics::{Field, Glass, LensFile, OpticsError, PhaseProfile, ReadOptions, Shape, glam::DVec2};
+use dioptric_optics::{
+    Field, Glass, LensFile, OpticsError, PhaseProfile, ReadOptions, Shape,
+    glam::{DMat3, DVec2},
+};
 
 fn try_read(name: &str, text: &str, configuration: Option<usize>) -> Result<LensFile, OpticsError> {
     let options = ReadOptions { configuration, ..ReadOptions::default() };
@@ -94,6 +97,16 @@ fn tilts_of_the_kind_are_those_of_the_same_code_v_file() {
     let (sine, cosine) = 3.0_f64.to_radians().sin_cos();
     let shift = DVec2::new(other.y, other.z - 2.0);
     assert!((shift - DVec2::new(0.3 * cosine, -0.3 * sine)).length() < 1e-12, "{other}");
+}
+
+/// The maker's own translation: about the fixed axes of the right-hand rule by TLC about z, then −TLB about y, then −TLA about x
+/// (lambdares.com/kb/comparing-tilt-values-in-oslo-vs-tracepro-after-importing-oslo-lens-file).
+#[test]
+fn tilts_are_those_that_the_maker_of_the_program_states() {
+    let file = read(&singlet("EBR 2", "", "TLA 3; TLB -2; TLC 5"));
+    let [a, b, c] = [3.0_f64, -2.0, 5.0].map(f64::to_radians);
+    let expected = DMat3::from_rotation_x(-a) * DMat3::from_rotation_y(-b) * DMat3::from_rotation_z(c);
+    assert!((file.lens.placements()[1].rotation - expected).to_cols_array().iter().all(|e| e.abs() < 1e-15));
 }
 
 #[test]
