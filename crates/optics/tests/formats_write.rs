@@ -209,3 +209,18 @@ fn makers_are_listed_in_an_order_in_which_every_name_means_its_glass() {
     let message = lens_of(["HIKARI:F2", "SCHOTT:F2"]).to_zmx().unwrap_err().to_string();
     assert!(message.contains("and a glass of another maker have one name"), "{message}");
 }
+
+/// A perfect lens of focal length infinity, which a file may state, was written with a focal length of 0 and could not be read again.
+#[test]
+fn perfect_lens_without_power_is_written_as_a_plane() {
+    let plane = Interface {
+        surface: Surface::plane(4.0),
+        medium_after: Glass::Constant { index: 1.0 },
+        thickness_after_mm: 5.0,
+    };
+    let mut perfect = plane.clone();
+    perfect.surface.shape = Shape::ThinLens { power_per_mm: 0.0 };
+    let lens = Lens::new("window", "a test", vec![plane, perfect], 0).unwrap();
+    let again = read("a.zmx", &LensFile::from(lens).to_zmx().unwrap());
+    assert_eq!(again.lens.interfaces()[1].surface.shape, Shape::Sphere);
+}

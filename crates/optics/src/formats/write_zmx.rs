@@ -358,6 +358,8 @@ fn write_zmx_shape(text: &mut String, lens: &Lens, i: usize) -> Result<(), Optic
             ("EVENASPH", *conic, coefficients.iter().skip(1).step_by(2).copied().collect())
         }
         Shape::OddAsphere { conic, coefficients } => ("ODDASPHE", *conic, coefficients.clone()),
+        // No focal length states that a lens has no power.
+        Shape::ThinLens { power_per_mm: 0.0 } => ("STANDARD", 0.0, Vec::new()),
         Shape::ThinLens { power_per_mm } => ("PARAXIAL", 0.0, vec![reciprocal(*power_per_mm)]),
         Shape::Biconic { conic, curvature_x_per_mm, conic_x } => {
             ("BICONICX", *conic, vec![zmx_radius(*curvature_x_per_mm), *conic_x])
