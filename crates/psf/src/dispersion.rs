@@ -1,4 +1,4 @@
-//! The coordinate in which a lens changes evenly with the wavelength.
+//! How a lens changes with the wavelength: the coordinate in which rays change evenly, and what is not left to them.
 
 use dioptric_optics::Lens;
 
@@ -29,6 +29,12 @@ impl Dispersion {
         });
         index_sum.unwrap_or(1e6 / (wavelength_nm * wavelength_nm))
     }
+}
+
+/// Returns the share of light that the diffraction orders of a lens have, at a wavelength between those of a bank. It may change faster over
+/// wavelengths than rays do (of a high order), so it is not among what is interpolated.
+pub(crate) fn share_of_orders(lens: &Lens, wavelength_nm: f64) -> f64 {
+    lens.diffraction_efficiency_at(wavelength_nm).expect("a lens is known between wavelengths at which it was traced")
 }
 
 #[cfg(test)]

@@ -70,6 +70,12 @@ impl FieldGeometry {
         self
     }
 
+    /// Returns the same with a share of the light.
+    pub(crate) fn with_share(mut self, share: f64) -> Self {
+        self.nodes.iter_mut().for_each(|node| node[2] *= share);
+        self
+    }
+
     /// Returns the field (tangents) seen at a place of the film and the irradiance there over the radiance of a locally
     /// uniform scene, sr; `None` where the bank has no field for it.
     ///

@@ -76,8 +76,8 @@ impl FieldToFilm {
     /// Returns which field is seen where on the film, and how bright, at one depth and wavelength.
     pub(crate) fn geometry(&self, bank: &GeneralBank, dioptres: f64, wavelength_nm: f64) -> FieldGeometry {
         let planes = bank.planes(dioptres, wavelength_nm);
-        FieldGeometry::mix(planes.iter().map(|&(plane, weight)| (&self.geometries[plane], weight)))
-            .expect("every stencil has a knot")
+        let all_light = FieldGeometry::mix(planes.iter().map(|&(plane, weight)| (&self.geometries[plane], weight)));
+        all_light.expect("every stencil has a knot").with_share(bank.share_of_orders(wavelength_nm))
     }
 
     /// Returns where the centroid of a point lands, mm, picture frame.
@@ -97,7 +97,9 @@ impl FieldToFilm {
     }
 
     fn landed(&self, bank: &GeneralBank, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Landed {
-        self.landing(bank, bank.planes(dioptres, wavelength_nm).into_iter()).of(field_tan)
+        let mut landed = self.landing(bank, bank.planes(dioptres, wavelength_nm).into_iter()).of(field_tan);
+        landed.pupil_mm2 *= bank.share_of_orders(wavelength_nm);
+        landed
     }
 
     /// Returns where the fields land in a weighted sum of depths and wavelengths.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::{
     BankSettings, Diffraction, Kernel, ModelUse, PsfError, PsfQuery,
     axis::Axis,
-    dispersion::Dispersion,
+    dispersion::{Dispersion, share_of_orders},
     drawing::{composed, wave_fraction_of},
     hurb_splatter::StopHurb,
     mesh::Mesh,
@@ -249,6 +249,11 @@ impl GeneralBank {
         let colors = self.colors.stencil(self.dispersion.coordinate(self.within_colors(wavelength_nm)));
         let planes = |(c, wc): (usize, f64)| depths.iter().map(move |(d, wd)| (c * n_depths + d, wc * wd));
         colors.iter().flat_map(|color| planes(color).collect::<Vec<_>>()).collect()
+    }
+
+    /// Returns the share of light that diffraction orders have at a wavelength.
+    pub(crate) fn share_of_orders(&self, wavelength_nm: f64) -> f64 {
+        share_of_orders(&self.lens, self.within_colors(wavelength_nm))
     }
 
     fn within_colors(&self, wavelength_nm: f64) -> f64 {

@@ -283,17 +283,16 @@ impl RayMapJob<'_> {
     }
 
     /// Returns the weight of pupil area at each target: cos⁴ of the angle, or for near points (Z/d)² cos²: projected
-    /// solid angle times the square of the axial distance; times the share of light that diffraction orders have.
+    /// solid angle times the square of the axial distance.
     fn weights(self, point: &ObjectPoint, targets: &[DVec2], z_mm: f64) -> Vec<f64> {
-        let share = self.lens.diffraction_efficiency();
         match *point {
-            ObjectPoint::Infinite(direction) => vec![share * direction.z.powi(4); targets.len()],
+            ObjectPoint::Infinite(direction) => vec![direction.z.powi(4); targets.len()],
             ObjectPoint::Finite(point) => {
                 let axial_mm = 1e3 / self.dioptres;
                 let weight = |target: &DVec2| {
                     let way = target.extend(z_mm) - point;
                     let square = way.length_squared();
-                    share * (axial_mm * axial_mm / square * (way.z * way.z / square))
+                    axial_mm * axial_mm / square * (way.z * way.z / square)
                 };
                 targets.iter().map(weight).collect()
             }

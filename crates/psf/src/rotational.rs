@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::{
     BankSettings, Diffraction, FieldSampling, PsfError, RadialGeometry,
     axis::{Axis, Stencil},
-    dispersion::Dispersion,
+    dispersion::{Dispersion, share_of_orders},
     mesh::Mesh,
     pupil::Pupil,
     ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, RayMapMoments},
@@ -195,10 +195,12 @@ impl RotationalBank {
         let n = self.geometry_fields.len();
         let mut magnification_mm = vec![0.0; n];
         let mut pupil_mm2 = vec![0.0; n];
+        // Known at every wavelength, and less smooth over them than pupils are.
+        let share = share_of_orders(&self.lens, self.within_colors(wavelength_nm));
         for (column, weight) in self.columns(dioptres, wavelength_nm) {
             for (i, summary) in self.summaries[column * n..][..n].iter().enumerate() {
                 magnification_mm[i] += weight * summary.centroid_mm.x;
-                pupil_mm2[i] += weight * summary.pupil_mm2;
+                pupil_mm2[i] += share * (weight * summary.pupil_mm2);
             }
         }
         RadialGeometry::new(self.geometry_fields.clone(), magnification_mm, &pupil_mm2)
