@@ -112,6 +112,7 @@ fn info(arguments: &LensInfoArgs, common: &Common) -> anyhow::Result<()> {
     let used = arguments.lens.state.apply(used, wavelength_nm, common)?;
     tell(&used.lens.notes_on_glass_range(&wavelengths_nm), common);
     let lens = &used.lens;
+    tell(&Vec::from_iter(LensData::note_on_third_order(lens)), common);
     let ends = |ends: (f64, f64), nm: &f64| (ends.0.min(*nm), ends.1.max(*nm));
     let (first_nm, last_nm) = wavelengths_nm.iter().fold((f64::INFINITY, 0.0), ends);
     let instead_of_f_and_c_nm = (first_nm < last_nm).then_some([first_nm, last_nm]);

@@ -73,7 +73,7 @@ pub struct LensData {
     /// Exit-pupil diameter over entrance-pupil diameter.
     pub pupil_magnification: f64,
     /// Radius of the image surface if there were no astigmatism (Petzval's), mm; negative when it bends towards the lens.
-    /// Only a rotationally symmetric lens has one.
+    /// Only a rotationally symmetric lens without diffractive surfaces has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub petzval_radius_mm: Option<f64>,
     /// The field angle at which the illumination of a far object falls to half, degrees: half the field of view, where
@@ -86,7 +86,7 @@ pub struct LensData {
     pub image: Option<ImageData>,
     /// The two wavelengths between which the third-order sums count color, nm; `None` where their color is unknown.
     pub seidel_colors_nm: Option<[f64; 2]>,
-    /// The third-order sums of the whole lens, mm. Only a rotationally symmetric lens has them.
+    /// The third-order sums of the whole lens, mm. Only a rotationally symmetric lens without diffractive surfaces has them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seidel: Option<SeidelSums>,
     /// The third-order sums of each surface, mm.
@@ -152,6 +152,22 @@ impl PlaneData {
 }
 
 impl LensData {
+    /// Whether third-order sums of a lens are known: those of diffractive surfaces are not.
+    fn has_third_order(lens: &Lens) -> bool {
+        lens.is_rotational() && lens.diffractive().is_empty()
+    }
+
+    /// Returns what of the data of a lens is left out and why, in one sentence; nothing where the lens has no axis of symmetry, of which
+    /// no such data are expected.
+    pub fn note_on_third_order(lens: &Lens) -> Option<String> {
+        (lens.is_rotational() && !Self::has_third_order(lens)).then(|| {
+            format!(
+                "{}: third-order sums and Petzval's radius are left out, diffractive surfaces are not in them",
+                lens.name()
+            )
+        })
+    }
+
     /// Returns the data of a lens; with those of an image where an object distance is given.
     ///
     /// The third-order sums are those of an object at that distance, else of a far one.
@@ -169,7 +185,8 @@ impl LensData {
             object_distance_mm: distance_mm.unwrap_or(f64::INFINITY),
             chief_slope: field_deg.to_radians().tan(),
         };
-        let mut seidel = lens.is_rotational().then(|| lens.seidel(&settings)).transpose()?;
+        let has_sums = Self::has_third_order(lens);
+        let mut seidel = has_sums.then(|| lens.seidel(&settings)).transpose()?;
         if let (Some(seidel), None) = (&mut seidel, colors_nm) {
             for sums in seidel.per_surface.iter_mut().chain([&mut seidel.total]) {
                 (sums.c1, sums.c2) = (f64::NAN, f64::NAN);
@@ -184,7 +201,7 @@ impl LensData {
             stop_limits: limit.is_none(),
             limiting_surface: limit.map_or(mono.stop(), |beam| beam.limiting_surface),
             pupil_magnification: first.pupil_magnification(),
-            petzval_radius_mm: lens.is_rotational().then(|| petzval_radius_mm(lens, &mono)).transpose()?,
+            petzval_radius_mm: has_sums.then(|| petzval_radius_mm(lens, &mono)).transpose()?,
             half_light_field_deg: field_limit_deg(&mono, 0.5),
             last_light_field_deg: field_limit_deg(&mono, 0.01),
             image: distance_mm.map(|distance_mm| image_of(&mono, distance_mm)).transpose()?,
@@ -323,6 +340,24 @@ mod tests {
         assert_relative_eq!(data.seidel.unwrap().c1, expected, max_relative = 1e-12);
         let narrower = LensInfoRequest { instead_of_f_and_c_nm: Some([1e3, 12e3]), ..question };
         assert!(LensData::new(&lens, &narrower).unwrap().seidel_colors_nm.is_none());
+    }
+
+    /// A lens with rings has no third-order sums here, and all the rest: they were refused, and with them `info`, `analyze` and `run`.
+    #[test]
+    fn diffractive_lenses_have_all_but_third_order() {
+        let profile = dioptric_optics::PhaseProfile::Rings { radius_mm: 12.7, coefficients_rad: vec![-40.0] };
+        let rings = dioptric_optics::DiffractiveSurface { surface: 0, order: 1, profile, blaze: None };
+        let plain = Lens::built_in("singlet-50mm").unwrap();
+        let lens = plain.clone().with_diffractive(vec![rings]).unwrap();
+        let data = LensData::new(&lens, &question(None)).unwrap();
+        assert!(data.seidel.is_none() && data.seidel_surfaces.is_empty() && data.petzval_radius_mm.is_none());
+        let whole = LensData::new(&plain, &question(None)).unwrap();
+        // The power of the rings is −m λ A₁ / (π R²): with it the focal length is shorter.
+        let rings_per_mm = 40.0 * whole.first_order.wavelength_nm * 1e-6 / (std::f64::consts::PI * 12.7 * 12.7);
+        let apart = 1.0 / data.first_order.efl_mm - 1.0 / whole.first_order.efl_mm;
+        assert!((apart / rings_per_mm - 1.0).abs() < 0.1, "{apart} {rings_per_mm}");
+        assert!(LensData::note_on_third_order(&lens).unwrap().contains("third-order"));
+        assert_eq!(LensData::note_on_third_order(&plain), None);
     }
 
     #[test]
