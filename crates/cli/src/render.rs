@@ -54,6 +54,7 @@ pub(crate) fn run(arguments: &RenderArgs, common: &Common) -> anyhow::Result<()>
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
     let kept = KeptCamera::new(camera_of(arguments, common)?);
     kept.camera().validate()?;
+    check_lens(kept.camera(), arguments)?;
     let world = kept.world_of_file(&clock, &cancel)?;
     let notes = world.as_ref().map_or(&[][..], |world| world.notes());
     tell(notes, common);
@@ -169,6 +170,16 @@ fn effort(arguments: &RenderArgs) -> RenderEffort {
         (None, None, Some(_)) => RenderEffort::Samples(1 << 24),
         (None, None, None) => RenderEffort::default(),
     }
+}
+
+/// Checks that there is such a lens, which a large world is not read without.
+fn check_lens(camera: &Camera, arguments: &RenderArgs) -> anyhow::Result<()> {
+    if arguments.lens.is_some() {
+        let mut camera = camera.clone();
+        change_lens(&mut camera, arguments);
+        camera.lens.open(&camera.lens_reading)?;
+    }
+    Ok(())
 }
 
 fn change_lens(camera: &mut Camera, arguments: &RenderArgs) {
