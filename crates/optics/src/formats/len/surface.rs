@@ -188,8 +188,8 @@ impl LenSurface {
     }
 
     /// Returns the tilts and decenters at this surface, whose number and z along the axis are these. About x and y the program turns by the
-    /// left-hand rule, about z by the right-hand rule, as CODE V does: its maker says so where it translates them into turns of another of its
-    /// programs (lambdares.com/kb/comparing-tilt-values-in-oslo-vs-tracepro-after-importing-oslo-lens-file).
+    /// left-hand rule, about z by the right-hand rule, as CODE V does: Lambda Research's translation of these angles into
+    /// those of its `TracePro` (lambdares.com/kb/comparing-tilt-values-in-oslo-vs-tracepro-after-importing-oslo-lens-file).
     pub(super) fn moves(&self, surface: usize, mm: f64, z_mm: f64) -> Result<Vec<SystemMove>, TextError> {
         let [a, b, c] = self.tilt_deg;
         let is_moved = self.decenter.iter().chain(&self.tilt_deg).any(|&v| v != 0.0);
