@@ -44,8 +44,21 @@ pub use strehl::Peak;
 pub enum WindowCenter {
     /// On the centroid of the light.
     Centroid,
+    /// So far from the centroid, mm along the film's own x and y.
+    FromCentroid(DVec2),
     /// At this place of the film, mm along its own x and y.
     At(DVec2),
+}
+
+impl WindowCenter {
+    /// Returns the place on the film, mm along its own x and y.
+    fn on_film_mm(self, centroid_mm: impl FnOnce() -> DVec2) -> DVec2 {
+        match self {
+            Self::Centroid => centroid_mm(),
+            Self::FromCentroid(aside_mm) => centroid_mm() + aside_mm,
+            Self::At(on_film_mm) => on_film_mm,
+        }
+    }
 }
 
 /// A window of square pixels on the film.
@@ -138,8 +151,8 @@ pub fn pupil_samples(
     quality: WaveQuality,
 ) -> Result<PupilSamples, DiffractionError> {
     let reference_mm = match window.center {
-        WindowCenter::Centroid => None,
-        WindowCenter::At(film_distance_mm) => Some(film_distance_mm),
+        WindowCenter::Centroid | WindowCenter::FromCentroid(_) => None,
+        WindowCenter::At(on_film_mm) => Some(on_film_mm),
     };
     let trace = |grid| PupilSamples::trace(lens, point, film_distance_mm, grid, reference_mm);
     let extent_mm = window.check()?;
@@ -156,7 +169,7 @@ pub fn pupil_samples(
 }
 
 impl WaveWindow {
-    /// Checks the numbers, and returns the distance from the middle to a corner, mm.
+    /// Checks the numbers, and returns the distance to the farthest corner, mm, from the middle or, where that is stated from the centroid, from there.
     fn check(&self) -> Result<f64, DiffractionError> {
         let setting = |what, found, expected| Err(DiffractionError::Setting { what, found, expected });
         if !(self.pitch_um > 0.0 && self.pitch_um.is_finite()) {
@@ -167,7 +180,11 @@ impl WaveWindow {
             return setting("the number of rows or columns of a window", 0.0, "at least 1");
         }
         let (rows, columns) = (self.rows as f64, self.columns as f64);
-        Ok(0.5e-3 * self.pitch_um * rows.hypot(columns))
+        let aside_mm = match self.center {
+            WindowCenter::FromCentroid(aside_mm) => aside_mm.length(),
+            WindowCenter::Centroid | WindowCenter::At(_) => 0.0,
+        };
+        Ok(0.5e-3 * self.pitch_um * rows.hypot(columns) + aside_mm)
     }
 }
 
@@ -195,10 +212,7 @@ impl PupilSamples {
     /// When the window makes no sense or needs more nodes than there are.
     pub fn psf(&self, window: &WaveWindow, points_per_pixel: Option<usize>) -> Result<WavePsf, DiffractionError> {
         let extent_mm = window.check()?;
-        let center_mm = match window.center {
-            WindowCenter::Centroid => self.centroid_mm(),
-            WindowCenter::At(film_distance_mm) => film_distance_mm,
-        };
+        let center_mm = window.center.on_film_mm(|| self.centroid_mm());
         if center_mm != self.reference_mm {
             return self
                 .clone()

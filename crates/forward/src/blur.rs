@@ -14,10 +14,11 @@ use crate::{
     expansion::Expansion,
     knot_kernels::{KnotKernel, LayerKernels},
     occlusion::BlurredPlane,
-    patch::{Knot, Patch, Shares},
+    patch::{Knot, Patch},
     patch_samples::{BlurredCell, PatchSamples, Places},
     sampler::{Rectangle, Sampler, Surface},
     stopwatch::{Part, Stopwatch},
+    uniform_response::UniformResponse,
     work::Work,
 };
 
@@ -105,12 +106,14 @@ fn blur_patch<'a>(
     };
     let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, task.blocks, cancel);
     let Some(mut ideal) = task.stopwatch.time(Part::Sampling, sample)? else { return Ok(Spread::Nothing) };
+    let places = Places::new(patch, &source, task.sampler);
     if task.surfaces.iter().all(|surface| surface.radiance.is_none()) {
         // What a surface covers is 1 all over it, however its kernels change.
-        let share = (1.0 / uniform_response(task.kernels, patch, task.sampler.frame.factor())) as f32;
-        ideal.iter_mut().for_each(|alpha| *alpha *= share);
+        let response = UniformResponse::of(task.kernels, patch, task.sampler.frame.factor());
+        for (line, down) in ideal.chunks_exact_mut(source.columns).zip(&places.down) {
+            line.iter_mut().zip(&places.across).for_each(|(alpha, across)| *alpha /= response.at(down, across));
+        }
     }
-    let places = Places::new(patch, &source, task.sampler);
     if patch.is_by_knots {
         return Ok(Spread::ByKnots(PatchSamples { patch, source, places, ideal }));
     }
@@ -128,24 +131,6 @@ fn blur_patch<'a>(
         columns: source.columns + 2 * half,
     };
     Ok(Spread::Done(BlurredCell { at, values: values? }))
-}
-
-/// Returns what the kernels over a patch make of a uniform plane of 1, to the second moments (docs/forward.md, eq. 5): those of all its
-/// knots, on this raster, whose factor is given, and on others.
-fn uniform_response(kernels: &LayerKernels, patch: &Patch, factor: usize) -> f64 {
-    let excess = |(knot, shares): &(Knot, [f32; 9])| {
-        let moments = kernels.canonical_at(*knot).second_moments();
-        let [down, mixed, across] = kernels.symmetry.mirror(*knot).moments_at_knot(moments);
-        f64::from(shares[6]) * down + f64::from(shares[4]) * mixed + f64::from(shares[2]) * across
-    };
-    let on_raster = |factor: usize, shares: &Shares| {
-        let size = patch.cell.size as f64 / factor as f64;
-        shares.iter().map(excess).sum::<f64>() / (size * size)
-    };
-    let elsewhere = patch.elsewhere.iter().map(|(factor, shares)| on_raster(*factor, shares));
-    let excess = on_raster(factor, &patch.shares) + elsewhere.sum::<f64>();
-    // The expansion holds while it is small.
-    1.0 + excess.clamp(-0.2, 0.2)
 }
 
 /// Spreads a plane by sums: exactly the kernel of each row, and along a row that of each sample.

@@ -31,7 +31,7 @@ impl FilmLens<'_> {
         let field_tan = knot.field_tan(&self.maps[layer], 1e-3 * self.pitch_um);
         let pitch_um = factor as f64 * self.pitch_um;
         let query = PsfQuery::new(field_tan, self.layers.dioptres()[layer], self.wavelength_nm, pitch_um);
-        KnotKernel::new(&self.image.kernel(query).samples)
+        KnotKernel::new(&self.image.kernel(query))
     }
 
     /// Computes the kernels of canonical knots of a layer, each on pixels so many times as wide as the film's.

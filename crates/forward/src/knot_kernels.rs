@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use dioptric_psf::LensImage;
-use ndarray::Array2;
+use dioptric_psf::{Kernel, LensImage};
+use glam::DVec2;
 
 use crate::patch::Knot;
 
@@ -46,7 +46,7 @@ impl Symmetry {
     }
 }
 
-/// A kernel whose samples sum to 1, and whose centroid is its middle.
+/// A kernel whose samples sum to 1, about the reference point of a lens.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct KnotKernel {
     /// Samples along a side; odd.
@@ -55,8 +55,9 @@ pub(crate) struct KnotKernel {
 }
 
 impl KnotKernel {
-    /// Takes a kernel of odd sides, scales it to a sum of 1, pads it to a square and centers it.
-    pub(crate) fn new(kernel: &Array2<f32>) -> Self {
+    /// Takes a kernel of odd sides, scales it to a sum of 1, pads it to a square and moves the centroid of its samples to its own.
+    pub(crate) fn new(kernel: &Kernel) -> Self {
+        let (kernel, centroid_px) = (&kernel.samples, kernel.centroid_px);
         let (rows, columns) = kernel.dim();
         let width = rows.max(columns);
         let (top, left) = ((width - rows) / 2, (width - columns) / 2);
@@ -66,7 +67,7 @@ impl KnotKernel {
         for ((row, column), &value) in kernel.indexed_iter() {
             samples[(top + row) * width + left + column] = f64::from(value) * scale;
         }
-        center(&mut samples, width);
+        center(&mut samples, width, centroid_px);
         Self { width, samples: samples.into_iter().map(|sample| sample as f32).collect() }
     }
 
@@ -90,6 +91,19 @@ impl KnotKernel {
     /// Returns the kernel of a canonical knot at another.
     fn mirrored(&self, mirror: Mirror) -> Self {
         Self { width: self.width, samples: mirror.restored(&self.samples, (self.width, self.width)) }
+    }
+
+    /// Returns the place of the centroid: pixels below the middle and to the right of it.
+    pub(crate) fn first_moments(&self) -> [f64; 2] {
+        let middle = (self.width / 2) as f64;
+        let mut moments = [0.0; 2];
+        for (row, line) in self.samples.chunks_exact(self.width).enumerate() {
+            for (column, &sample) in line.iter().enumerate() {
+                moments[0] += f64::from(sample) * (row as f64 - middle);
+                moments[1] += f64::from(sample) * (column as f64 - middle);
+            }
+        }
+        moments
     }
 
     /// Returns the second moments about the middle: down twice, down and across, across twice; square pixels.
@@ -150,6 +164,12 @@ impl Mirror {
             }
         }
         block
+    }
+
+    /// Returns the first moments of a kernel of which the canonical ones are known.
+    pub(crate) fn first_moments_at_knot(self, [down, across]: [f64; 2]) -> [f64; 2] {
+        let [down, across] = if self.swaps { [-across, -down] } else { [down, across] };
+        [if self.flips_rows { -down } else { down }, if self.flips_columns { -across } else { across }]
     }
 
     /// Returns the second moments of a kernel of which the canonical ones are known.
@@ -232,19 +252,19 @@ pub(crate) fn edge_spread_peak(kernel: &[f32], width: usize) -> f64 {
     peak
 }
 
-/// Distance of a kernel's centroid from its middle that changes no picture, pixels.
+/// Distance of a kernel's centroid from where it belongs that changes no picture, pixels.
 const CENTERED_PX: f64 = 1e-7;
 
-/// Moves the centroid of a square kernel of sum 1 to its middle, without blurring it and without negative samples.
+/// Moves the centroid of a square kernel of sum 1 to a place (pixels to the right of the middle and below it), without blurring it and without negative samples.
 ///
-/// What falls on the pixels of a spread about its centroid has its own centroid elsewhere where the spread is small: the part within a pixel counts as its
+/// What falls on the pixels of a spread has its own centroid elsewhere where the spread is small: the part within a pixel counts as its
 /// middle. Such a shift changes over the film, and a change of shift is light that is drawn together or apart: half a per cent of a
 /// uniform plane in focus. Each round adds the derivative by central differences, which leaves second moments as they are.
-fn center(samples: &mut Vec<f64>, width: usize) {
+fn center(samples: &mut Vec<f64>, width: usize, centroid_px: DVec2) {
     const ROUNDS: usize = 16;
     let middle = (width / 2) as f64;
     for _ in 0..ROUNDS {
-        let (mut across, mut down) = (0.0, 0.0);
+        let (mut across, mut down) = (-centroid_px.x, -centroid_px.y);
         for (i, sample) in samples.iter().enumerate() {
             across += sample * ((i % width) as f64 - middle);
             down += sample * ((i / width) as f64 - middle);
@@ -269,13 +289,23 @@ fn center(samples: &mut Vec<f64>, width: usize) {
 
 #[cfg(test)]
 mod tests {
+    use ndarray::Array2;
+
     use super::*;
+
+    fn knot_kernel(samples: Array2<f32>, centroid_px: DVec2) -> KnotKernel {
+        KnotKernel::new(&Kernel { samples, pitch_um: 1.0, centroid_px })
+    }
+
+    fn even(rows: usize, columns: usize) -> KnotKernel {
+        knot_kernel(Array2::ones((rows, columns)), DVec2::ZERO)
+    }
 
     /// A spread whose flare leaves the pixel of its core on one side: pixels count it as farther out than it is.
     #[test]
     fn kernels_are_centered_and_as_wide_as_before() {
         let lopsided = Array2::from_shape_vec((3, 3), vec![0.0, 0.01, 0.02, 0.0, 0.82, 0.12, 0.0, 0.01, 0.02]).unwrap();
-        let kernel = KnotKernel::new(&lopsided);
+        let kernel = knot_kernel(lopsided.clone(), DVec2::ZERO);
         let moment = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
             let samples = kernel.samples.iter().enumerate();
             samples.map(|(i, &s)| f64::from(s) * of((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0)).sum()
@@ -286,7 +316,10 @@ mod tests {
         assert!((moment(&|x, _| x * x) - 0.16).abs() < 0.03, "{}", moment(&|x, _| x * x));
         assert!((moment(&|_, y| y * y) - 0.06).abs() < 0.01, "{}", moment(&|_, y| y * y));
         assert!(kernel.samples.iter().all(|&sample| sample >= 0.0));
-        let point = KnotKernel::new(&Array2::ones((1, 1)));
+        let aside = knot_kernel(lopsided, DVec2::new(0.2, -0.1));
+        let [down, across] = aside.first_moments();
+        assert!((across - 0.2).abs() < 1e-6 && (down + 0.1).abs() < 1e-6, "{down} {across}");
+        let point = even(1, 1);
         assert_eq!((point.width, point.samples), (1, vec![1.0]));
     }
 
@@ -294,7 +327,7 @@ mod tests {
     fn comet(x: f64, y: f64) -> KnotKernel {
         let mut kernel = Array2::zeros((5, 5));
         kernel[((2.0 - y) as usize, (2.0 + x) as usize)] = 1.0;
-        KnotKernel::new(&kernel)
+        knot_kernel(kernel, DVec2::new(x, -y))
     }
 
     #[test]
@@ -310,7 +343,10 @@ mod tests {
             (32, 64, 1.0, -2.0),
             (-32, -64, -1.0, 2.0),
         ] {
-            assert_eq!(kernels.at(Knot { right, down }), comet(x, y), "at {right}, {down}");
+            let knot = Knot { right, down };
+            assert_eq!(kernels.at(knot), comet(x, y), "at {right}, {down}");
+            let moments = kernels.canonical_at(knot).first_moments();
+            assert_eq!(kernels.symmetry.mirror(knot).first_moments_at_knot(moments), [-y, x], "at {right}, {down}");
         }
         let both = [(64, comet(2.0, 1.0)), (-64, comet(1.0, 0.0))].map(|(right, k)| (Knot { right, down: 9 }, k));
         let kernels = LayerKernels::new(Symmetry::None, BTreeMap::from(both.clone()));
@@ -321,7 +357,7 @@ mod tests {
 
     #[test]
     fn mixed_kernels_keep_their_sum() {
-        let (small, large) = (KnotKernel::new(&Array2::ones((3, 3))), KnotKernel::new(&Array2::ones((7, 5))));
+        let (small, large) = (even(3, 3), even(7, 5));
         let mixed = small.mixed(&large, 0.25);
         assert_eq!(mixed.width, 7);
         assert!((mixed.samples.iter().sum::<f32>() - 1.0).abs() < 1e-6);

@@ -51,6 +51,7 @@ mod source;
 mod spec;
 mod stopwatch;
 mod tiles;
+mod uniform_response;
 mod views;
 mod work;
 

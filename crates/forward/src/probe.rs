@@ -75,31 +75,12 @@ impl<'a> Probe<'a> {
     }
 
     /// Adds knots to a mesh, in the quarters of cells at whose middle the spline is off by more than the settings allow, and of
-    /// those that are too large for the raster of their kernel.
+    /// those that are too large for the raster of their kernel; and of those around, where a change of size would be seen.
     pub(crate) fn refine(&mut self, mesh: &mut Mesh, cells: &[Cell], work: &Work<'_>) -> Result<(), Cancelled> {
-        /// The least size of a cell, parts of the blur radius up to which its raster serves.
-        const PER_BLUR: f64 = 0.25;
-        let widest_px = self.settings.widest_blur_px;
         let mut candidates: Vec<Cell> = cells.iter().copied().filter(Cell::is_divisible).collect();
         while !candidates.is_empty() {
-            let mut added = vec![];
-            // The spline at the middle of each cell, by the factor of the coarsest raster of its kernels.
-            let mut splines: BTreeMap<usize, Vec<(Cell, Weights)>> = BTreeMap::new();
-            for cell in candidates {
-                let weights = mesh.at_middle(&cell);
-                let knots = weights.keys().copied().chain([cell.knot()]);
-                let coarsest = knots.map(|knot| self.factor_at(knot)).max().unwrap_or(1);
-                let is_large = cell.size > LARGEST_JOINED * self.factor_at(cell.knot());
-                let may_divide = cell.is_divisible_to((PER_BLUR * widest_px * coarsest as f64) as usize);
-                if is_large || may_divide && self.is_off_at_corners(mesh, &cell) {
-                    added.extend(cell.children());
-                } else if may_divide {
-                    splines.entry(coarsest).or_default().push((cell, weights));
-                }
-            }
-            for (factor, splines) in splines {
-                added.extend(self.too_coarse(factor, &splines, work)?.iter().flat_map(Cell::children));
-            }
+            let divided = self.divided(mesh, candidates, work)?;
+            let added: Vec<Cell> = divided.iter().flat_map(Cell::children).collect();
             mesh.added.extend(added.iter().copied());
             candidates = added.into_iter().filter(Cell::is_divisible).collect();
         }
@@ -107,13 +88,46 @@ impl<'a> Probe<'a> {
         Ok(())
     }
 
-    /// Returns the cells at whose middle a spline is off by more than the settings allow.
-    fn too_coarse(
+    /// Returns those of some cells of one size that are to be halved.
+    fn divided(&mut self, mesh: &Mesh, cells: Vec<Cell>, work: &Work<'_>) -> Result<BTreeSet<Cell>, Cancelled> {
+        /// The least size of a cell, parts of the blur radius up to which its raster serves.
+        const PER_BLUR: f64 = 0.25;
+        let widest_px = self.settings.widest_blur_px;
+        let mut divided = BTreeSet::new();
+        // The spline at the middle of each cell, by the factor of the coarsest raster of its kernels.
+        let mut splines: BTreeMap<usize, Vec<(Cell, Weights)>> = BTreeMap::new();
+        for cell in cells {
+            let weights = mesh.at_middle(&cell);
+            let knots = weights.keys().copied().chain([cell.knot()]);
+            let coarsest = knots.map(|knot| self.factor_at(knot)).max().unwrap_or(1);
+            let is_large = cell.size > LARGEST_JOINED * self.factor_at(cell.knot());
+            let may_divide = cell.is_divisible_to((PER_BLUR * widest_px * coarsest as f64) as usize);
+            if is_large || may_divide && self.is_off_at_corners(mesh, &cell) {
+                divided.insert(cell);
+            } else if may_divide {
+                splines.entry(coarsest).or_default().push((cell, weights));
+            }
+        }
+        let mut shadings: BTreeMap<Cell, f64> = BTreeMap::new();
+        for (factor, splines) in splines {
+            for (cell, SplineError { edge, shading }) in self.spline_errors(factor, &splines, work)? {
+                if edge > self.settings.max_edge_error {
+                    divided.insert(cell);
+                }
+                shadings.insert(cell, shading * what_blur_leaves(self.spread_px(cell.knot()) / cell.size as f64));
+            }
+        }
+        divide_for_shading(&shadings, self.settings.max_shading_error, &mut divided);
+        Ok(divided)
+    }
+
+    /// Returns by how much splines are off at the middles of cells.
+    fn spline_errors(
         &mut self,
         factor: usize,
         splines: &[(Cell, Weights)],
         work: &Work<'_>,
-    ) -> Result<Vec<Cell>, Cancelled> {
+    ) -> Result<Vec<(Cell, SplineError)>, Cancelled> {
         let symmetry = self.symmetry;
         let known = self.kernels.entry(factor).or_insert_with(|| LayerKernels::new(symmetry, BTreeMap::new()));
         let knots = splines.iter().flat_map(|(cell, weights)| weights.keys().copied().chain([cell.knot()]));
@@ -122,16 +136,14 @@ impl<'a> Probe<'a> {
         let unobserved = Work::unobserved(work.cancel());
         let wanted = wanted.into_iter().map(|knot| (knot, factor));
         known.extend(self.lens.layer_kernels(self.layer, wanted, &unobserved)?);
-        let is_too_coarse = |(cell, weights): &(Cell, Weights)| {
+        let error = |(cell, weights): &(Cell, Weights)| {
             work.check()?;
             let difference = spline_error(known, cell.knot(), weights);
-            let edge_error = edge_spread_peak(&difference.samples, difference.width);
-            let shading_error = shading_error(&difference, cell.size as f64 / factor as f64);
-            let is_off = edge_error > self.settings.max_edge_error || shading_error > self.settings.max_shading_error;
-            Ok(is_off.then_some(*cell))
+            let edge = edge_spread_peak(&difference.samples, difference.width);
+            let shading = shading_error(&difference, cell.size as f64 / factor as f64);
+            Ok((*cell, SplineError { edge, shading }))
         };
-        let found: Vec<Option<Cell>> = splines.par_iter().map(is_too_coarse).collect::<Result<_, Cancelled>>()?;
-        Ok(found.into_iter().flatten().collect())
+        splines.par_iter().map(error).collect()
     }
 
     /// Returns what patches on a raster take by themselves; `largest` is the size of whole cells.
@@ -171,6 +183,48 @@ fn spline_error(kernels: &LayerKernels, knot: Knot, spline: &Weights) -> KnotKer
     KnotKernel { width, samples }
 }
 
+/// By how much a spline is off at the middle of a cell.
+struct SplineError {
+    /// Largest error of the edge spread functions along rows and columns.
+    edge: f64,
+    /// That of the irradiance of a uniform plane, were the cell halved and none around it; above or below 0.
+    shading: f64,
+}
+
+/// Marks cells of one size, beside those that are marked, whose halving or not would be seen on a uniform plane.
+///
+/// Where all cells are of one size the spline is off by the same second moments everywhere, which no uniform plane shows: only where cells of
+/// two sizes meet, or where its curvature changes from cell to cell (docs/forward.md 2).
+fn divide_for_shading(shadings: &BTreeMap<Cell, f64>, most: f64, divided: &mut BTreeSet<Cell>) {
+    let beside = |cell: &Cell| {
+        let cell = *cell;
+        let around = (-1..=1).flat_map(|down| (-1..=1).map(move |across| (down, across)));
+        around.filter(|at| *at != (0, 0)).map(move |(down, across)| cell.beside(down, across))
+    };
+    for (cell, shading) in shadings {
+        let steps =
+            [(-1, 0), (1, 0), (0, -1), (0, 1)].into_iter().filter_map(|(d, a)| shadings.get(&cell.beside(d, a)));
+        // The curvature of the spline is that of each cell; a smooth one lies half-way where they meet.
+        if steps.into_iter().any(|next| 0.5 * (next - shading).abs() > most) {
+            divided.insert(*cell);
+        }
+    }
+    let mut border: Vec<Cell> = divided.iter().copied().collect();
+    while let Some(cell) = border.pop() {
+        for next in beside(&cell) {
+            if shadings.get(&next).is_some_and(|shading| shading.abs() > most) && divided.insert(next) {
+                border.push(next);
+            }
+        }
+    }
+}
+
+/// Returns the share of a ripple of the period of a cell that a blur leaves, whose radius is so many cells: that of an even disc, between its zeros.
+fn what_blur_leaves(radius_per_cell: f64) -> f64 {
+    // |2 J₁(x) / x| is at most 1.6 x^(−3/2), x = 2π times the radius over the period.
+    1.0 / (1.0 + (std::f64::consts::TAU * radius_per_cell).powf(1.5) / 1.6)
+}
+
 /// Returns by how much the irradiance of a uniform plane changes when a difference of kernels is added at knots half
 /// a cell apart: half the second derivative of its second moments (docs/forward.md, eq. 2).
 fn shading_error(difference: &KnotKernel, cell_size: f64) -> f64 {
@@ -182,5 +236,5 @@ fn shading_error(difference: &KnotKernel, cell_size: f64) -> f64 {
     });
     // The spline of one knot has the second derivative −2 over the square of its cell.
     let half_cell = 0.5 * cell_size;
-    moments.sum::<f64>().abs() / (half_cell * half_cell)
+    moments.sum::<f64>() / (half_cell * half_cell)
 }

@@ -41,6 +41,8 @@ pub(crate) struct Surface<'a> {
     layer_coordinates: &'a [f32],
     /// Of [`LayerCoordinates`].
     ranges: &'a [(u16, u16)],
+    /// Whether all samples lie in the first layer and no other.
+    is_flat: bool,
 }
 
 /// The layer coordinates of a surface.
@@ -50,6 +52,7 @@ pub(crate) struct LayerCoordinates {
     /// The layers that have weight in each square between four samples, first and last: most squares lie in few layers, so
     /// most of the work of a layer is to find that it has no part of a square.
     ranges: Array2<(u16, u16)>,
+    is_flat: bool,
 }
 
 impl LayerCoordinates {
@@ -70,14 +73,16 @@ impl LayerCoordinates {
             }
             Ok(())
         })?;
-        Ok(Self { samples, ranges })
+        let is_flat = samples.iter().all(|coordinate| *coordinate == 0.0);
+        Ok(Self { samples, ranges, is_flat })
     }
 
     /// The surface, with its radiance in standard layout where its light is wanted.
     pub(crate) fn surface<'a>(&'a self, radiance: Option<&'a [f32]>) -> Surface<'a> {
         let (samples, ranges) = (self.samples.as_slice(), self.ranges.as_slice());
         let standard = "made in standard layout";
-        Surface { radiance, layer_coordinates: samples.expect(standard), ranges: ranges.expect(standard) }
+        let (layer_coordinates, ranges) = (samples.expect(standard), ranges.expect(standard));
+        Surface { radiance, layer_coordinates, ranges, is_flat: self.is_flat }
     }
 
     pub(crate) fn samples(&self) -> &Array2<f32> {
@@ -118,7 +123,7 @@ impl Sampler {
     ) -> Self {
         let frame = FilmFrame::new(film, factor);
         let scene_per_film = view.focal_px * map.tan_per_mm(frame.pitch_mm()) * frame.pitch_mm();
-        Self { view, size, frame, density: SampleDensity::of(&view, film, map, most), scene_per_film }
+        Self { view, size, frame, density: SampleDensity::of((&view, size), film, map, most), scene_per_film }
     }
 
     /// Returns the ideal picture of a layer within a rectangle, row by row, or `None` where there is nothing of it: irradiance,
@@ -134,6 +139,11 @@ impl Sampler {
         blocks: &BlockLayers,
         cancel: &Cancel,
     ) -> Result<Option<Vec<f32>>, Cancelled> {
+        // All that a scene at one depth has is in one layer, with weight 1: no weights to look up, to the same bits.
+        let flat = match surfaces {
+            [Surface { radiance: Some(radiance), is_flat: true, .. }] if layer == 0 => Some(*radiance),
+            _ => None,
+        };
         let mut ideal = vec![0.0; rectangle.rows * rectangle.columns];
         let mut has_any = false;
         let (mut x_mm, mut seen, mut squares) = (Vec::new(), FieldsAlong::default(), Squares::default());
@@ -147,21 +157,29 @@ impl Sampler {
                     Some(blocks) => blocks.next_run(rectangle.first_column, start..rectangle.columns, layer),
                     None => start..rectangle.columns,
                 };
-                let (run, n) = self.density.first_run(row, rectangle.first_column, run);
+                let (run, samples) = self.density.first_run(row, rectangle.first_column, run);
                 start = run.end;
+                if flat.is_some() && samples.is_beyond_scene {
+                    continue;
+                }
+                let n = samples.across;
                 x_mm.clear();
                 x_mm.extend(within(rectangle.first_column, run.clone(), n).map(|column| self.frame.x_mm(column)));
                 let pixels = &mut line[run];
-                for row in within(rectangle.first_row, down..down + 1, n) {
+                for row in within(rectangle.first_row, down..down + 1, samples.down) {
                     map.along(&x_mm, self.frame.y_mm(row), &mut seen);
                     self.locate(&seen, &mut squares);
+                    if let Some(radiance) = flat {
+                        has_any |= squares.add_light((radiance, self.size), n, pixels);
+                        continue;
+                    }
                     for (pixel, first) in pixels.iter_mut().zip((0..).step_by(n)) {
                         for at in first..first + n {
                             has_any |= self.add(&squares, at, surfaces, layer, pixel);
                         }
                     }
                 }
-                let share = 1.0 / (n * n) as f32;
+                let share = 1.0 / (samples.down * n) as f32;
                 pixels.iter_mut().for_each(|pixel| *pixel *= share);
             }
         }
@@ -225,6 +243,32 @@ struct Squares {
     gain: Vec<f32>,
 }
 
+impl Squares {
+    /// Adds the light at `n` places in a row of each of some pixels, of a surface without holes in one layer. Returns whether anything is seen.
+    fn add_light(&self, (radiance, (rows, columns)): (&[f32], (usize, usize)), n: usize, pixels: &mut [f32]) -> bool {
+        let (beside, below) = (usize::from(columns > 1), if rows > 1 { columns } else { 0 });
+        let mut is_seen = false;
+        let of_pixels = self.first.chunks_exact(n).zip(self.down.chunks_exact(n).zip(self.across.chunks_exact(n)));
+        for ((pixel, gains), (first, (down, across))) in pixels.iter_mut().zip(self.gain.chunks_exact(n)).zip(of_pixels)
+        {
+            for (((&first, &down), &across), &gain) in first.iter().zip(down).zip(across).zip(gains) {
+                if first == UNSEEN {
+                    continue;
+                }
+                is_seen = true;
+                let upper = &radiance[first as usize..];
+                let lower = &upper[below..];
+                let light = (1.0 - down) * (1.0 - across) * upper[0]
+                    + (1.0 - down) * across * upper[beside]
+                    + down * (1.0 - across) * lower[0]
+                    + down * across * lower[beside];
+                *pixel += light * gain;
+            }
+        }
+        is_seen
+    }
+}
+
 /// Stands for the square of a place that nothing is seen from.
 const UNSEEN: u32 = u32::MAX;
 
@@ -249,6 +293,6 @@ fn locate((view, (rows, columns)): (&View, (usize, usize)), seen: &FieldsAlong, 
         let (top, left) = (row.min(last_top) as i32, column.min(last_left) as i32);
         (*down, *across) = ((row - f64::from(top)) as f32, (column - f64::from(left)) as f32);
         *first = if gain.is_nan() { UNSEEN } else { top as u32 * columns as u32 + left as u32 };
-        *bright = if is_inside { gain as f32 } else { 0.0 };
+        *bright = if is_inside && !gain.is_nan() { gain as f32 } else { 0.0 };
     }
 }

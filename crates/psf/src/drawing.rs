@@ -72,7 +72,24 @@ impl RotationalBank {
     pub(crate) fn draw_rays(&self, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
         let record = self.record(query.field_tan.length(), query.dioptres, query.wavelength_nm);
         let layout = self.layout(&record, query, side);
-        composed(layout, self.settings().diffraction, |side| self.wave_energies(query, side))
+        composed(layout, self.settings().diffraction, |side| self.wave_energies(query, side, DVec2::ZERO))
+    }
+
+    /// Returns the point spread function of a point about its middle ray. Fields outside the bank are moved to its ends.
+    pub(crate) fn kernel_about_middle_ray(&self, query: PsfQuery) -> Kernel {
+        let field_tan = query.field_tan.length();
+        let outwards_mm = self.middle_rays(query.dioptres, query.wavelength_nm).outwards_mm(field_tan);
+        if outwards_mm == 0.0 {
+            return self.kernel_and_model(query).0;
+        }
+        let about_mm = query.field_tan / field_tan * outwards_mm;
+        let about_px = about_mm * DVec2::new(1e3, -1e3) / query.pitch_um;
+        let record = self.record(field_tan, query.dioptres, query.wavelength_nm);
+        let layout = self.layout(&record, query, None).about(about_px);
+        let diffraction = self.settings().diffraction;
+        let (energies, _) = composed(layout, diffraction, |side| self.wave_energies(query, side, about_mm));
+        let kernel = render::kernel(&energies, diffraction != Diffraction::None, query.pitch_um);
+        Kernel { centroid_px: -about_px, ..kernel }
     }
 
     /// Returns how much of a kernel is wave optics.
@@ -93,19 +110,20 @@ impl RotationalBank {
         Layout::new(record, turn, bending, query.pitch_um).with_side(side)
     }
 
-    /// Returns the wave-optical energies about the centroid.
-    fn wave_energies(&self, query: PsfQuery, side: usize) -> Result<Array2<f64>, DiffractionError> {
+    /// Returns the wave-optical energies about a place beside the centroid, mm, picture frame.
+    fn wave_energies(&self, query: PsfQuery, side: usize, about_mm: DVec2) -> Result<Array2<f64>, DiffractionError> {
         let PsfQuery { field_tan, dioptres, pitch_um, .. } = query;
         let wavelength_nm = self.within_colors(query.wavelength_nm);
+        // The picture is the film turned by 180°.
+        let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::FromCentroid(-about_mm) };
         if let Some(map) = self.wave_map(field_tan.length(), dioptres, wavelength_nm) {
             let turn = field_tan.try_normalize().unwrap_or(DVec2::X);
-            return Ok(map.psf(wavelength_nm, turn, pitch_um, (side, side))?.samples);
+            return Ok(map.psf(wavelength_nm, turn, &window)?.samples);
         }
         let lens = self.lens().at(wavelength_nm)?;
         let (least, most) = self.dioptre_range();
         let field_tan = field_tan.clamp_length_max(self.last_field_tan());
         let point = ObjectPoint::from_field(self.reference(), field_tan, dioptres.clamp(least, most));
-        let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::Centroid };
         Ok(wave_psf(&lens, &point, self.settings().film_distance_mm, &window, WaveQuality::default())?.samples)
     }
 }

@@ -8,12 +8,8 @@
 pub struct RadialGeometry {
     // Invariants: fields ascend from 0, and the heights with them; all lists are of one length.
     field_tans: Vec<f64>,
-    /// Angles of the fields.
-    angles: Vec<f64>,
-    /// Image height over field, mm: even in the angle.
-    magnification_mm: Vec<f64>,
-    /// Second derivatives of the cubic spline through these over the angle, in which it is smooth up to 90°.
-    bends: Vec<f64>,
+    /// Image height over field, mm, over the angle, in which it is smooth up to 90°.
+    magnification_mm: EvenSpline,
     radii_mm: Vec<f64>,
     irradiance_per_radiance: Vec<f64>,
     /// Derivatives of these by the angle.
@@ -28,13 +24,10 @@ impl RadialGeometry {
         let n = 1 + radii.windows(2).take_while(|pair| pair[1].abs() > pair[0].abs()).count();
         field_tans.truncate(n);
         magnification_mm.truncate(n);
-        let angles: Vec<f64> = field_tans.iter().map(|tan| tan.atan()).collect();
-        let bends = even_spline(&angles, &magnification_mm);
+        let angles = field_tans.iter().map(|tan| tan.atan()).collect();
         let mut this = Self {
             field_tans,
-            angles,
-            magnification_mm,
-            bends,
+            magnification_mm: EvenSpline::new(angles, magnification_mm),
             radii_mm: radii[..n].to_vec(),
             irradiance_per_radiance: vec![],
             irradiance_slopes: vec![],
@@ -45,7 +38,7 @@ impl RadialGeometry {
                 pupil_mm2[i] / (g * (g + this.field_tans[i] * slope)).abs()
             })
             .collect();
-        this.irradiance_slopes = monotone_slopes(&this.angles, &this.irradiance_per_radiance);
+        this.irradiance_slopes = monotone_slopes(this.angles(), &this.irradiance_per_radiance);
         this
     }
 
@@ -70,7 +63,7 @@ impl RadialGeometry {
             return None;
         }
         let above = self.radii_mm.partition_point(|&r| r * sign < target * sign).clamp(1, n - 1);
-        let (mut low, mut high) = (self.angles[above - 1], self.angles[above]);
+        let (mut low, mut high) = (self.angles()[above - 1], self.angles()[above]);
         let (r_low, r_high) = (self.radii_mm[above - 1], self.radii_mm[above]);
         let mut angle = low + (high - low) * (target - r_low) / (r_high - r_low);
         // Newton's method in the angle, kept inside the bracket.
@@ -101,8 +94,8 @@ impl RadialGeometry {
         }
         let at = field_tan.clamp(0.0, self.last_field_tan());
         let above = self.field_tans.partition_point(|&f| f < at).clamp(1, n - 1);
-        let width = self.angles[above] - self.angles[above - 1];
-        let t = (at.atan() - self.angles[above - 1]) / width;
+        let width = self.angles()[above] - self.angles()[above - 1];
+        let t = (at.atan() - self.angles()[above - 1]) / width;
         let (a, b) = (self.irradiance_per_radiance[above - 1], self.irradiance_per_radiance[above]);
         let (slope_a, slope_b) = (self.irradiance_slopes[above - 1] * width, self.irradiance_slopes[above] * width);
         // Hermite's cubic.
@@ -120,21 +113,49 @@ impl RadialGeometry {
         self.radii_mm[self.radii_mm.len() - 1]
     }
 
+    /// The angles of the fields.
+    fn angles(&self) -> &[f64] {
+        &self.magnification_mm.x
+    }
+
     /// Returns height over field, mm, and its derivative by the field.
     fn magnification_at(&self, field_tan: f64) -> (f64, f64) {
-        let n = self.field_tans.len();
+        let (value, slope) = self.magnification_mm.value_and_slope(field_tan.atan());
+        (value, slope / (1.0 + field_tan * field_tan))
+    }
+}
+
+/// The cubic spline through values of an even function, from x = 0 on; its curvature is constant over the last interval.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct EvenSpline {
+    // Invariant: x ascends, and all lists are of one length, at least 1.
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// Second derivatives at x.
+    bends: Vec<f64>,
+}
+
+impl EvenSpline {
+    pub(crate) fn new(x: Vec<f64>, y: Vec<f64>) -> Self {
+        let bends = even_spline(&x, &y);
+        Self { x, y, bends }
+    }
+
+    /// Returns the value and the slope at a place; beyond the last value the last cubic goes on.
+    pub(crate) fn value_and_slope(&self, at: f64) -> (f64, f64) {
+        let n = self.x.len();
         if n == 1 {
-            return (self.magnification_mm[0], 0.0);
+            return (self.y[0], 0.0);
         }
-        let above = self.field_tans.partition_point(|&f| f < field_tan).clamp(1, n - 1);
-        let (x0, x1, angle) = (self.angles[above - 1], self.angles[above], field_tan.atan());
-        let (y0, y1) = (self.magnification_mm[above - 1], self.magnification_mm[above]);
+        let above = self.x.partition_point(|&x| x < at).clamp(1, n - 1);
+        let (x0, x1) = (self.x[above - 1], self.x[above]);
+        let (y0, y1) = (self.y[above - 1], self.y[above]);
         let (m0, m1) = (self.bends[above - 1], self.bends[above]);
         let h = x1 - x0;
-        let (a, b) = ((x1 - angle) / h, (angle - x0) / h);
+        let (a, b) = ((x1 - at) / h, (at - x0) / h);
         let value = a * y0 + b * y1 + ((a * a * a - a) * m0 + (b * b * b - b) * m1) * h * h / 6.0;
         let slope = (y1 - y0) / h + ((1.0 - 3.0 * a * a) * m0 + (3.0 * b * b - 1.0) * m1) * h / 6.0;
-        (value, slope / (1.0 + field_tan * field_tan))
+        (value, slope)
     }
 }
 

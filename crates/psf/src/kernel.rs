@@ -1,9 +1,9 @@
 //! A point spread function on pixels.
 
+use glam::DVec2;
 use ndarray::{Array2, s};
 
-/// A point spread function on square pixels: odd × odd, its centroid in the middle of the middle pixel, in the
-/// picture frame (row 0 is the top).
+/// A point spread function on square pixels: odd × odd, about the middle of the middle pixel, in the picture frame (row 0 is the top).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kernel {
     /// The share of the point's transmitted energy that falls on each pixel. The sum is what the window holds, 1 or
@@ -11,12 +11,14 @@ pub struct Kernel {
     pub samples: Array2<f32>,
     /// Side of a pixel, µm.
     pub pitch_um: f64,
+    /// Where the centroid lies, pixels to the right of the middle of the middle pixel and below it; mostly 0.
+    pub centroid_px: DVec2,
 }
 
 impl Kernel {
     /// Returns the kernel that blurs nothing.
     pub fn identity(pitch_um: f64) -> Self {
-        Self { samples: Array2::ones((1, 1)), pitch_um }
+        Self { samples: Array2::ones((1, 1)), pitch_um, centroid_px: DVec2::ZERO }
     }
 
     /// The share of the energy that the window holds.

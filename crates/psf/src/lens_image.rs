@@ -24,10 +24,11 @@ pub trait LensImage: Sync {
     /// Whether the lens passes no light beyond the extent of its maps; if not, what comes there is not known.
     fn is_dark_beyond_extent(&self) -> bool;
 
-    /// Returns the map from the film, at least up to `extent_mm` from its middle where the lens is known so far, to fields.
+    /// Returns the map from the film, at least up to `extent_mm` from its middle where the lens is known so far, to fields: to those whose reference
+    /// points lie there. Those are the centroids of their light or other places that follow smoothly from the field.
     fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap;
 
-    /// Returns the point spread function of a point about its centroid; of a dark point that of one near by.
+    /// Returns the point spread function of a point about its reference point; of a dark point that of one near by.
     fn kernel(&self, query: PsfQuery) -> Kernel;
 
     /// Returns the images through so many parts of the pupil, which add up to that of the whole: views of the scene from as many

@@ -32,6 +32,7 @@ mod kernel;
 mod lens_image;
 mod mesh;
 mod metrics;
+mod middle_rays;
 mod mirror;
 mod model;
 mod model_image;

@@ -6,7 +6,7 @@ use glam::DVec2;
 use ndarray::Array2;
 
 use crate::{
-    BankSettings, FieldSampling, Kernel, LensImage, MeasuredError, ModelUse, PsfError, PsfQuery, RadialGeometry,
+    BankSettings, FieldSampling, Kernel, MeasuredError, ModelUse, PsfError, PsfQuery, RadialGeometry,
     decenter::Decenter, field_to_film::FieldToFilm, general::GeneralBank, ray_map::RayMap, render::Layout,
     rotational::RotationalBank,
 };

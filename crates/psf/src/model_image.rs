@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use crate::{
-    FilmMap, Kernel, LensImage, LensImageModel, PsfError, PsfQuery, PupilDivision, RadialMap, WIDEST_FIELD_TAN,
-    model::Form, part_image::PartImage,
+    FilmMap, Kernel, LensImage, LensImageModel, PsfError, PsfQuery, PupilDivision, RadialGeometry, RadialMap,
+    WIDEST_FIELD_TAN, model::Form, part_image::PartImage,
 };
 
 impl LensImageModel {
@@ -20,6 +20,27 @@ impl LensImageModel {
     pub fn through(&self, division: PupilDivision) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
         let images = PartImage::all(self, division)?;
         Ok(images.into_iter().map(|image| Arc::new(image) as Arc<dyn LensImage + Send>).collect())
+    }
+
+    /// Returns the map from places of the film to the fields whose centroids land there, at least up to `extent_mm` from its middle where the lens is
+    /// known so far.
+    ///
+    /// Of [`FieldSampling::Points`](crate::FieldSampling::Points) the map sees nothing.
+    pub fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
+        match &self.form {
+            Form::Rotational(bank) => self.radial_map(&bank.geometry(dioptres, wavelength_nm), dioptres, extent_mm),
+            Form::General { bank, field_to_film: Some(inverse) } => {
+                inverse.geometry(bank, dioptres, wavelength_nm).into()
+            }
+            Form::General { .. } => RadialMap::tabulate(extent_mm, |_| None, |_| 0.0).into(),
+        }
+    }
+
+    fn radial_map(&self, geometry: &RadialGeometry, dioptres: f64, extent_mm: f64) -> FilmMap {
+        let gain = |tan: f64| geometry.irradiance_per_radiance(tan);
+        let extent_mm = extent_mm + self.decenter().length_mm();
+        let map = RadialMap::tabulate(extent_mm, |r| geometry.field_tan(r), gain);
+        map.about(self.decenter().axis_mm(), self.decenter().axis_tan(dioptres)).into()
     }
 }
 
@@ -48,25 +69,21 @@ impl LensImage for LensImageModel {
         }
     }
 
-    /// Of [`FieldSampling::Points`](crate::FieldSampling::Points) the map sees nothing.
+    /// Of a lens with an axis, where middle rays land; of others, centroids ([`LensImageModel::film_map`]).
     fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
         match &self.form {
             Form::Rotational(bank) => {
-                let geometry = bank.geometry(dioptres, wavelength_nm);
-                let gain = |tan: f64| geometry.irradiance_per_radiance(tan);
-                let extent_mm = extent_mm + self.decenter().length_mm();
-                let map = RadialMap::tabulate(extent_mm, |r| geometry.field_tan(r), gain);
-                map.about(self.decenter().axis_mm(), self.decenter().axis_tan(dioptres)).into()
+                self.radial_map(&bank.middle_geometry(dioptres, wavelength_nm), dioptres, extent_mm)
             }
-            Form::General { bank, field_to_film: Some(inverse) } => {
-                inverse.geometry(bank, dioptres, wavelength_nm).into()
-            }
-            Form::General { .. } => RadialMap::tabulate(extent_mm, |_| None, |_| 0.0).into(),
+            Form::General { .. } => self.film_map(dioptres, wavelength_nm, extent_mm),
         }
     }
 
     fn kernel(&self, query: PsfQuery) -> Kernel {
-        self.kernel(query)
+        match &self.form {
+            Form::Rotational(bank) => bank.kernel_about_middle_ray(self.decenter().query(query)),
+            Form::General { .. } => self.kernel(query),
+        }
     }
 
     fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {

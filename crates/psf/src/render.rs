@@ -29,7 +29,7 @@ pub(crate) struct Layout<'a> {
     /// λN, pixels; 0 without diffraction.
     unit: f64,
     side: usize,
-    /// The side that holds the picture.
+    /// The side that holds the picture about its centroid.
     natural_side: usize,
 }
 
@@ -44,10 +44,17 @@ impl<'a> Layout<'a> {
                 *v = turn.rotate(*v) * DVec2::new(scale, -scale);
             }
         }
-        let reach = lit_nodes(record).map(|i| nodes[i].at_mm.abs().max_element()).fold(0.0, f64::max);
+        let reach = reach(record, &nodes);
         let unit = bending.map_or(0.0, |bending| unit(record, &nodes, bending));
-        let half = (reach + TAILS * unit - 0.5).ceil().clamp(0.0, MOST_PIXELS) as usize;
-        Self { record, nodes, bending, reach, unit, side: 2 * half + 1, natural_side: 2 * half + 1 }
+        let side = side_for(reach, unit);
+        Self { record, nodes, bending, reach, unit, side, natural_side: side }
+    }
+
+    /// Returns the layout about a place beside the centroid, pixels to the right and down, in a window that holds the picture about it.
+    pub(crate) fn about(mut self, place_px: DVec2) -> Self {
+        self.nodes.iter_mut().for_each(|node| node.at_mm -= place_px);
+        let side = side_for(reach(self.record, &self.nodes), self.unit);
+        Self { side, ..self }
     }
 
     /// Returns the layout with a window of so many pixels along its side, if any are asked for.
@@ -84,6 +91,16 @@ impl<'a> Layout<'a> {
     }
 }
 
+/// Returns how far the picture reaches from the middle, pixels.
+fn reach(record: &RayMap, nodes: &[Node]) -> f64 {
+    lit_nodes(record).map(|i| nodes[i].at_mm.abs().max_element()).fold(0.0, f64::max)
+}
+
+/// Returns the side of a window that holds a picture of this reach and its tails, pixels: an odd number.
+fn side_for(reach: f64, unit: f64) -> usize {
+    2 * (reach + TAILS * unit - 0.5).ceil().clamp(0.0, MOST_PIXELS) as usize + 1
+}
+
 /// Returns the corners of the cells that have energy, some of them several times.
 fn lit_nodes(record: &RayMap) -> impl Iterator<Item = usize> {
     let lit = record.mesh.cells().zip(record.energies()).filter(|(_, energy)| **energy != 0.0);
@@ -93,7 +110,7 @@ fn lit_nodes(record: &RayMap) -> impl Iterator<Item = usize> {
 /// Returns drawn energies as a kernel, trimmed to what matters.
 pub(crate) fn kernel(energies: &Array2<f64>, is_diffracted: bool, pitch_um: f64) -> Kernel {
     let kept = if is_diffracted { KEPT_OF_TAILS } else { 1.0 - 1e-7 };
-    Kernel { samples: trim(energies, kept), pitch_um }
+    Kernel { samples: trim(energies, kept), pitch_um, centroid_px: DVec2::ZERO }
 }
 
 /// Returns λN in pixels: what the Gaussian of a ray through the middle of the stop would give.

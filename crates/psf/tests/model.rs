@@ -162,3 +162,66 @@ fn lens_moved_sideways_is_sampled_about_its_axis() {
         assert!((blurs[0] - blurs[1]).abs() < 0.02 * blurs[1].abs() + 1e-3, "{field_tan}: {blurs:?}");
     }
 }
+
+/// Of a comet the kernel that imaging takes is about its middle ray: its centroid lies where it says, and where the map puts it beside the middle
+/// ray, so that light is where the model says. Without diffraction, with HURB and with waves.
+#[test]
+fn kernels_and_maps_are_about_one_place() {
+    let lens = Lens::built_in("paper-2el").unwrap().with_f_number(8.0, 550.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+    let (dioptres, wavelength_nm, pitch_um) = (0.5, 550.0, 8.0);
+    for diffraction in [Diffraction::None, HURB, Diffraction::Wave] {
+        let settings = BankSettings::covering(
+            film_distance_mm,
+            0.2,
+            (dioptres, dioptres),
+            (wavelength_nm, wavelength_nm),
+            diffraction,
+        );
+        let model = LensImageModel::build(&lens, &settings).unwrap();
+        let imaging: &dyn LensImage = &model;
+        let (map, centroids) =
+            (imaging.film_map(dioptres, wavelength_nm, 9.0), model.film_map(dioptres, wavelength_nm, 9.0));
+        for place_mm in [DVec2::new(0.02, 0.0), DVec2::new(3.0, 4.0), DVec2::new(-7.5, 2.0)] {
+            let (field_tan, gain) = map.at(place_mm).unwrap();
+            let query = PsfQuery::new(field_tan, dioptres, wavelength_nm, pitch_um);
+            let kernel = imaging.kernel(query);
+            let aside_mm = kernel.centroid_px * DVec2::new(1e-3, -1e-3) * pitch_um;
+            let centroid_mm = model.centroid_mm(field_tan, dioptres, wavelength_nm);
+            // Tables of the map: a hundredth of a pixel.
+            assert!((place_mm + aside_mm - centroid_mm).length() < 1e-4, "{place_mm}: {aside_mm} {centroid_mm}");
+            // Outwards of the axis, as far as coma grows: by some per cent of the height at most.
+            assert!(
+                aside_mm.length() < 0.02 * place_mm.length() && (place_mm.length() < 1.0 || aside_mm.length() > 1e-3)
+            );
+            // The same picture as about the centroid, but for where pixels begin: its own centroid and its width.
+            let [moments, about] = [&kernel, &model.kernel(query)].map(|kernel| moments(&kernel.samples));
+            let off = (moments.0 - kernel.centroid_px).length();
+            assert!(off < 0.05, "{diffraction:?} {place_mm}: {off}");
+            assert!((moments.1 / about.1 - 1.0).abs() < 0.03, "{diffraction:?} {place_mm}: {} {}", moments.1, about.1);
+            // A plane is as bright by both maps, once centroids that move against middle rays thin it out.
+            let thinned = |mm: DVec2| {
+                let tan = map.at(mm).unwrap().0;
+                let kernel = imaging.kernel(PsfQuery::new(tan, dioptres, wavelength_nm, pitch_um));
+                kernel.centroid_px * DVec2::new(1e-3, -1e-3) * pitch_um
+            };
+            let by = 0.01;
+            let slope = |way: DVec2| (thinned(place_mm + way * by) - thinned(place_mm - way * by)) / (2.0 * by);
+            let det = (DVec2::X + slope(DVec2::X)).perp_dot(DVec2::Y + slope(DVec2::Y));
+            let expected = centroids.at(centroid_mm).unwrap().1;
+            assert!((gain / det / expected - 1.0).abs() < 2e-4, "{place_mm}: {}", gain / det / expected - 1.0);
+        }
+    }
+}
+
+/// The centroid, pixels right of and below the middle, and the rms distance from it.
+fn moments(samples: &ndarray::Array2<f32>) -> (DVec2, f64) {
+    let middle = DVec2::new(samples.ncols() as f64 - 1.0, samples.nrows() as f64 - 1.0) / 2.0;
+    let sum = |of: &dyn Fn(DVec2) -> DVec2| -> DVec2 {
+        let at = |(row, column): (usize, usize)| DVec2::new(column as f64, row as f64) - middle;
+        samples.indexed_iter().map(|(place, &sample)| of(at(place)) * f64::from(sample)).sum()
+    };
+    let total = sum(&|_| DVec2::X).x;
+    let centroid = sum(&|at| at) / total;
+    (centroid, (sum(&|at| DVec2::X * at.distance_squared(centroid)).x / total).sqrt())
+}

@@ -306,20 +306,12 @@ impl PupilFunctionFit {
         }
     }
 
-    /// Returns the point spread function about the centroid, on a window of so many rows and columns of a pitch, with as
-    /// many nodes as it needs.
+    /// Returns the point spread function on a window, with as many nodes as it needs.
     ///
     /// # Errors
     /// When the window makes no sense, the blur and window are too large for a wave sum, or those of
     /// [`nodes`](Self::nodes).
-    pub fn psf(
-        &self,
-        wavelength_nm: f64,
-        turn: DVec2,
-        pitch_um: f64,
-        (rows, columns): (usize, usize),
-    ) -> Result<WavePsf, DiffractionError> {
-        let window = WaveWindow { pitch_um, rows, columns, center: WindowCenter::Centroid };
+    pub fn psf(&self, wavelength_nm: f64, turn: DVec2, window: &WaveWindow) -> Result<WavePsf, DiffractionError> {
         let extent_mm = window.check()?;
         ROOM.with_borrow_mut(|room| {
             // A few nodes tell how many are needed.
@@ -327,7 +319,8 @@ impl PupilFunctionFit {
             while let Some(grid) = room.nodes.finer_grid(extent_mm)? {
                 self.fill(room, grid, wavelength_nm, turn)?;
             }
-            room.nodes.psf(&WaveWindow { center: WindowCenter::At(room.nodes.reference_mm), ..window }, None)
+            let center = WindowCenter::At(window.center.on_film_mm(|| room.nodes.reference_mm));
+            room.nodes.psf(&WaveWindow { center, ..*window }, None)
         })
     }
 }

@@ -32,10 +32,7 @@ pub fn polychromatic_psf(
         let nodes = PupilSamples::trace(&lens.at(wavelength_nm)?, point, film_distance_mm, PupilGrid::STANDARD, None)?;
         centroid_mm += nodes.centroid_mm() * (weight / total);
     }
-    let center_mm = match window.center {
-        WindowCenter::Centroid => centroid_mm,
-        WindowCenter::At(film_distance_mm) => film_distance_mm,
-    };
+    let center_mm = window.center.on_film_mm(|| centroid_mm);
     let window = WaveWindow { center: WindowCenter::At(center_mm), ..*window };
     let mut sum: Option<WavePsf> = None;
     for &(wavelength_nm, weight) in spectrum {

@@ -1,0 +1,95 @@
+//! What kernels that change over the film make of a uniform plane.
+
+use crate::{
+    knot_kernels::LayerKernels,
+    patch::{Knot, Patch, Shares},
+};
+
+/// The irradiance of a uniform plane of 1 under the kernels over a patch, to their second moments (docs/forward.md, eq. 5).
+pub(crate) struct UniformResponse {
+    /// Of the second moments, all over the patch.
+    excess: f64,
+    /// First moments down and across, over the size of the cell: coefficients of the products of polynomials, down × across.
+    down: [f64; 9],
+    across: [f64; 9],
+}
+
+impl UniformResponse {
+    /// Sums up the kernels of all knots of a patch: those on its raster, whose factor is given, and those on others.
+    pub(crate) fn of(kernels: &LayerKernels, patch: &Patch, factor: usize) -> Self {
+        let mut sum = Self { excess: 0.0, down: [0.0; 9], across: [0.0; 9] };
+        sum.add(kernels, &patch.shares, patch.cell.size as f64 / factor as f64);
+        for (factor, shares) in &patch.elsewhere {
+            sum.add(kernels, shares, patch.cell.size as f64 / *factor as f64);
+        }
+        // The expansion holds while it is small.
+        sum.excess = sum.excess.clamp(-0.2, 0.2);
+        sum
+    }
+
+    /// Adds knots with kernels on a raster on which the cell has a size.
+    fn add(&mut self, kernels: &LayerKernels, shares: &Shares, size: f64) {
+        for (knot, shares) in shares {
+            let (first, [down, mixed, across]) = moments(kernels, *knot);
+            let second = f64::from(shares[6]) * down + f64::from(shares[4]) * mixed + f64::from(shares[2]) * across;
+            self.excess += second / (size * size);
+            for (i, share) in shares.iter().enumerate() {
+                self.down[i] += f64::from(*share) * first[0] / size;
+                self.across[i] += f64::from(*share) * first[1] / size;
+            }
+        }
+    }
+
+    /// Returns the irradiance where the polynomials have these values.
+    pub(crate) fn at(&self, down: &[f32; 3], across: &[f32; 3]) -> f32 {
+        let (u, v) = (f64::from(across[1]), f64::from(down[1]));
+        let [phi_v, phi_u] = [down, across].map(|values| values.map(f64::from));
+        // The polynomials are 1, u and u² − 1/12.
+        let slope_across = |i: usize| self.across[3 * i + 1] + 2.0 * u * self.across[3 * i + 2];
+        let slope_down = |j: usize| self.down[3 + j] + 2.0 * v * self.down[6 + j];
+        let spread: f64 = (0..3).map(|i| phi_v[i] * slope_across(i) + phi_u[i] * slope_down(i)).sum();
+        (1.0 + self.excess - spread.clamp(-0.5, 0.5)) as f32
+    }
+}
+
+/// Returns the first and second moments of the kernel at a knot.
+fn moments(kernels: &LayerKernels, knot: Knot) -> ([f64; 2], [f64; 3]) {
+    let (kernel, mirror) = (kernels.canonical_at(knot), kernels.symmetry.mirror(knot));
+    (mirror.first_moments_at_knot(kernel.first_moments()), mirror.moments_at_knot(kernel.second_moments()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
+    use super::*;
+    use crate::{
+        knot_kernels::{KnotKernel, Symmetry},
+        mesh::Mesh,
+        patch::{Cell, polynomials},
+    };
+
+    /// Kernels that move by a hundredth of a pixel each pixel to the right, and twice that down: a plane is that much darker.
+    #[test]
+    fn moving_kernels_thin_a_plane_out() {
+        let mesh = Mesh { size: 64, added: BTreeSet::new() };
+        let mut pieces = vec![];
+        mesh.pieces_of(Cell { down: 1, across: -1, size: 64 }, &mut pieces);
+        let (cell, shares) = pieces.remove(0);
+        // Shares of a pixel's light on the pixels around it.
+        let kernel = |knot: Knot| {
+            let (right, down) = (0.01 * knot.right as f32, 0.02 * knot.down as f32);
+            let mut samples = vec![0.0; 9];
+            (samples[4], samples[5], samples[7]) = (1.0 - right - down, right, down);
+            (knot, KnotKernel { width: 3, samples })
+        };
+        let by_knot: BTreeMap<Knot, KnotKernel> = shares.iter().map(|(knot, _)| kernel(*knot)).collect();
+        let kernels = LayerKernels::new(Symmetry::None, by_knot);
+        let patch = Patch { cell, is_by_knots: false, shares, elsewhere: vec![] };
+        let response = UniformResponse::of(&kernels, &patch, 1);
+        for (v, u) in [(0.0, 0.0), (0.4, -0.3)] {
+            let found = response.at(&polynomials(v), &polynomials(u));
+            assert!((found - 0.97).abs() < 1e-4, "{found}");
+        }
+    }
+}
