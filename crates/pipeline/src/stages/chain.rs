@@ -173,7 +173,8 @@ impl Chain<'_> {
             let inputs = IrradianceInputs { plan, dual_pixel: None, ..inputs.clone() };
             let progress = Part { progress: self.watch.progress, number, of: n };
             let watch = Watch { progress: &progress, cancel: self.watch.cancel };
-            Self { memory_bytes, watch, ..*self }.imaged(&inputs)
+            let chain: Chain<'_> = *self;
+            Chain { memory_bytes, watch, ..chain }.imaged(&inputs)
         };
         let photodiodes = (0..n).map(irradiance).collect::<Result<Vec<_>, _>>()?;
         let narrow = photodiodes[0].summary.narrow_surfaces;
