@@ -95,7 +95,7 @@ impl MethodComparison {
             })
         };
         let (forward, backward) = (by(RenderMethod::Forward), by(RenderMethod::Backward));
-        // What one way cannot do is said before the other is gone.
+        // What one way cannot do is reported before the other is run.
         backward.camera().validate()?;
         let parts = Parts::of(&camera, forward.depth(progress, cancel)?.z_m().ncols())?;
         let divided = divided(&camera, parts.n)?;

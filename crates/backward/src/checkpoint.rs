@@ -14,7 +14,7 @@ const MAGIC: &[u8; 16] = b"dioptric render1";
 impl Renderer<'_> {
     /// Writes a checkpoint beside its place and renames it when it is whole.
     ///
-    /// `identity` says in words what is rendered beyond the settings: the world and the camera. A checkpoint resumes
+    /// `identity` describes what is rendered beyond the settings: the world and the camera. A checkpoint resumes
     /// nothing else.
     ///
     /// # Errors

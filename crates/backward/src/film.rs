@@ -5,7 +5,7 @@ use ndarray::Array2;
 
 /// Sums over passes for each pixel and band: of their means, and of the squares of those.
 ///
-/// Passes are independent estimates of the same picture, so that their spread says how far their mean may be off.
+/// Passes are independent estimates of the same picture, so that their spread estimates the error of their mean.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Film {
     pub(crate) rows: usize,

@@ -147,7 +147,7 @@ fn tables(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
     Ok(text)
 }
 
-/// Returns what is said of the whole lens.
+/// Returns the part about the whole lens.
 fn head(analysis: &LensAnalysis) -> Result<String, std::fmt::Error> {
     let LensAnalysis { lens, efl_mm, f_number, film_distance_mm, .. } = analysis;
     let mut text =

@@ -37,7 +37,7 @@ pub(crate) fn list_of(numbers: &[f64]) -> String {
     }
 }
 
-/// Tells what the file of a lens says that is done otherwise or not at all.
+/// Reports what the file of a lens states that is done otherwise or not at all.
 pub(crate) fn tell(notes: &[String], common: &Common) {
     notes.iter().for_each(|note| remark(common.quiet, note));
 }

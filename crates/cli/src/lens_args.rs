@@ -94,7 +94,7 @@ impl LensStateArgs {
         self.f_number.map(StopSpec::FNumber).or(self.stop_mm.map(StopSpec::DiameterMm))
     }
 
-    /// Returns the lens with its stop and its movements, and prints what is to be said of them; an f-number is that at this
+    /// Returns the lens with its stop and its movements, and prints the notes on them; an f-number is that at this
     /// wavelength, nm.
     pub(crate) fn apply(
         &self,

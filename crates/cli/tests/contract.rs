@@ -370,7 +370,7 @@ fn traced_rays_tell_of_a_glass_that_is_continued() {
     );
 }
 
-/// A germanium lens of a design program's file: what it says of its use stands where the command says nothing.
+/// A germanium lens of a design program's file: what it states of its use holds where the command has no such option.
 #[test]
 fn use_that_a_file_states_is_taken() {
     let folder = tempfile::tempdir().unwrap();
@@ -524,9 +524,9 @@ fn threads_change_no_bit_of_any_frame() {
 }
 
 #[test]
-fn bent_rays_have_the_strength_asked_for() {
+fn hurb_widens_by_the_gamma_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    // Of an ideal lens of long focus, nothing but bending widens a star.
+    // Of an ideal lens of long focus, nothing but HURB widens a star.
     let lens = r#"(name: "ideal", source: "test", surfaces: [(shape: ThinLens(power_per_mm: 0.005),
         semi_aperture_mm: 2.0, stop: true, thickness_mm: 0.0)])"#;
     fs::write(folder.path().join("ideal.ron"), lens).unwrap();

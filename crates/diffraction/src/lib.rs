@@ -4,7 +4,7 @@
 //! Lengths are millimetres, wavelengths nanometres (vacuum), angles radians, in the lens frame of `dioptric-optics`.
 //! Theory curves ([`airy`], [`Hurb::lsf`]) are in units of λN, N being the working f-number.
 //!
-//! This crate knows nothing of scenes or sensors. It bends rays between two calls of the tracer, says how far each ray
+//! This crate knows nothing of scenes or sensors. It deviates rays between two calls of the tracer, computes how far each ray
 //! is spread on the film, and sums the waves of one point there.
 #![doc = include_str!("../README.md")]
 

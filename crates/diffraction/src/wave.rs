@@ -139,7 +139,7 @@ pub fn wave_psf(
     pupil_samples(lens, point, film_distance_mm, window, quality)?.psf(window, quality.points_per_pixel)
 }
 
-/// Returns the nodes that [`wave_psf`] sums: as many as `quality` says, or the window needs.
+/// Returns the nodes that [`wave_psf`] sums: as many as `quality` has, or the window needs.
 ///
 /// # Errors
 /// Those of [`wave_psf`].

@@ -27,7 +27,7 @@ const WORDS: [&str; 18] = [
     "0.5",
 ];
 
-/// Returns the seed changed at random in one to eight places; the number tells which of all such files.
+/// Returns the seed changed at random in one to eight places; the number selects one of all such files.
 pub fn mutant(seed: &[u8], number: u64) -> Vec<u8> {
     let mut random = ChaCha8Rng::seed_from_u64(number);
     let mut bytes = seed.to_vec();

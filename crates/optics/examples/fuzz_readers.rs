@@ -1,4 +1,4 @@
-//! Reads N randomly changed files of every format, as the test `formats_robust` does with a few thousand.
+//! Reads N randomly changed files of every format, as the test `formats::robust` does with a few thousand.
 //!
 //! `cargo run --release -p dioptric-optics --example fuzz_readers -- 1000000 [first] [name]`: mutants `first` and on of
 //! each seed, or of those whose name holds this. A panic names the seed and the mutant's number, and its input is left in `crash-NUMBER-NAME`.

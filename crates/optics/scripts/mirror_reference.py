@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes tests/mirror_reference.csv: first order and rays of lens files with mirrors by ray-optics, an independent program.
+"""Writes tests/surfaces/mirror_reference.csv: first order and rays of lens files with mirrors by ray-optics, an independent program.
 
 Rays start 10 mm before the first surface (file's count, dummies included) with these x and y and travel at this tangent
 in y; they end on the image surface of the file, where x and y and the direction cosines are those of its own frame.
@@ -9,7 +9,7 @@ Indices of the glasses are written too, so that only the optics is compared. All
     file,lens,wavelength in nm,efl,bfl less the distance to the image,index behind the object:behind surface 1:…
     ray,lens,x,y,tan,x_image,y_image,l,m,n
 
-Usage: mirror_reference.py FOLDER > ../tests/mirror_reference.csv, with the folder of mirror.seq, paraboloid.seq,
+Usage: mirror_reference.py FOLDER > ../tests/surfaces/mirror_reference.csv, with the folder of mirror.seq, paraboloid.seq,
 rc_f16.seq, mangin.seq, schmidt.seq and one_mirror_up_45deg.zmx. Needs rayoptics 0.9.8 and
 opticalglass 1.1.1 from PyPI.
 """

@@ -2,7 +2,7 @@
 //! bounds to sample rays in.
 //!
 //! For film places in a table, rays are traced back through a grid of points without rims, and the least clearance from
-//! any rim says which points are lit. Bounds are a span of x for each of some rows of y. Each is one cell of the grid wider than
+//! any rim gives the points that are lit. Bounds are a span of x for each of some rows of y. Each is one cell of the grid wider than
 //! the points that were lit, and holds those of all wavelengths and of the neighboring film places about their middles,
 //! so that nothing lit lies outside.
 

@@ -36,7 +36,7 @@ pub struct Layout {
 
 /// Colors of fields, in their order: blue, green, vermilion, orange, pink, dark gray; apart for all eyes (Okabe & Ito).
 const FIELD_COLORS: [&str; 6] = ["#0072b2", "#009e73", "#d55e00", "#e69f00", "#cc79a7", "#333333"];
-/// Dashes of wavelengths, in their order, where colors tell fields; the first is a whole line.
+/// Dashes of wavelengths, in their order, where colors stand for fields; the first is a whole line.
 const DASHES: [&str; 4] = ["none", "7 3", "2 2", "9 2 2 2"];
 
 impl Lens {
@@ -79,7 +79,7 @@ impl Lens {
 /// How the rays of a wavelength are distinguished from those of others.
 struct WavelengthKey {
     wavelength_nm: f64,
-    /// Its own color, where colors do not tell fields.
+    /// Its own color, where colors do not stand for fields.
     color: Option<String>,
     dashes: &'static str,
 }
@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn dark_fields_and_several_wavelengths_are_told() {
+    fn dark_fields_and_several_wavelengths_are_reported() {
         let lens = Lens::built_in("microscope-20x").unwrap();
         let svg = draw(&lens, &[0.0, 30.0]);
         assert!(svg.contains(">0.0°<") && svg.contains(">30.0° dark<"));

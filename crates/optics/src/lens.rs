@@ -398,7 +398,7 @@ impl Lens {
         (is_whole && centered.is_rotational()).then_some((centered, aside))
     }
 
-    /// Checks that the lens is rotationally symmetric; `task` says what needs that, in words.
+    /// Checks that the lens is rotationally symmetric; `task` names what needs that, for the error.
     ///
     /// # Errors
     /// When it is not.
@@ -414,7 +414,7 @@ impl Lens {
         self.vertices_z_mm().last().copied().unwrap_or(0.0)
     }
 
-    /// z of each vertex from the first, mm, along the axis that moves may bend; [`placements`](Self::placements) says where it is.
+    /// z of each vertex from the first, mm, along the axis that moves may bend; [`placements`](Self::placements) has where it is.
     pub fn vertices_z_mm(&self) -> Vec<f64> {
         let mut z = 0.0;
         let vertex = |interface: &Interface| {

@@ -1,6 +1,8 @@
 //! A lens at one wavelength: the thing that is traced.
 
 mod axial;
+mod film;
+mod first_order;
 
 use std::{borrow::Cow, ops::Range, sync::OnceLock};
 
@@ -8,9 +10,8 @@ use glam::{DVec2, DVec3};
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::{
-    Aperture, Conjugate, FirstOrder, ImageSurface, Lens, OpticsError, Placement, RayBatch, RayBatchF32, Shape, Surface,
-    Vignetting,
-    paraxial::{self, MarginalRay, Matrix},
+    Aperture, FirstOrder, ImageSurface, Lens, OpticsError, Placement, RayBatch, Shape, Surface, Vignetting,
+    paraxial::{self, Matrix},
     placement,
     trace::{self, Goal, Kind, Phase, Plan, Step},
 };
@@ -19,10 +20,6 @@ pub use self::axial::AxialBeam;
 
 /// Rays that one task of [`MonoLens::trace_parallel`] traces.
 const CHUNK: usize = 4096;
-
-/// How far an entrance pupil may be for counting from its center, over the first rim's radius: then counts are good to
-/// 1e-12 of the rim.
-const FARTHEST_PUPIL: f64 = 1e4;
 
 /// A lens at one wavelength, its indices resolved; tracing it cannot fail as a whole.
 #[derive(Clone, Debug)]
@@ -191,88 +188,6 @@ impl MonoLens {
         self.wavelength_nm
     }
 
-    /// Focal lengths, principal planes and pupils.
-    ///
-    /// Of a lens that is not rotationally symmetric they are those of its axis with all surfaces put back on it (a bent
-    /// axis made straight), in the y–z plane; [`first_order_x`](Self::first_order_x) gives those of the x–z plane. A
-    /// tilted or decentered lens forms its image by them only as far as its tilts are small.
-    ///
-    /// Where a rim ends the light of a far point on the axis before the stop does ([`limiting_beam`](Self::limiting_beam)),
-    /// the diameters of the pupils and the f-number are those of the real beam that gets through; the pupils stay where the
-    /// images of the stop are.
-    pub fn first_order(&self) -> FirstOrder {
-        let Some(beam) = self.limiting_beam() else { return self.first_order };
-        self.first_order.with_entrance_pupil_diameter_mm(2.0 * beam.height_mm)
-    }
-
-    /// The same for a beam that fills the stop, whether it gets through or not.
-    pub fn first_order_of_stop(&self) -> FirstOrder {
-        self.first_order
-    }
-
-    /// The real beam of a far point on the axis, if a rim limits it and not the stop; `None` as a rule.
-    ///
-    /// Some lens files state a stop that is wider than what their rims let through.
-    pub fn limiting_beam(&self) -> Option<AxialBeam> {
-        if !(self.first_order.entrance_pupil_diameter_mm.is_finite() && self.first_order.power_per_mm != 0.0) {
-            return None;
-        }
-        let beam = self.far_beam.get_or_init(|| self.axial_beam(f64::INFINITY));
-        beam.filter(|beam| !beam.is_limited_by_stop)
-    }
-
-    /// Returns a sentence on what limits the light of the point on the axis at this distance before the first vertex, mm (infinite
-    /// for a far one), if it is not the stop.
-    pub fn note_on_limit(&self, object_distance_mm: f64) -> Option<String> {
-        let is_far = object_distance_mm.is_infinite();
-        let beam = match is_far {
-            true => self.limiting_beam()?,
-            false => self.axial_beam(object_distance_mm).filter(|beam| !beam.is_limited_by_stop)?,
-        };
-        let (surface, rim_mm) = (beam.limiting_surface, 2.0 * self.semi_aperture_mm(beam.limiting_surface));
-        let (filled_mm, stop_mm) = (2.0 * beam.stop_radius_mm, 2.0 * self.stop_semi_aperture_mm());
-        let (point, f_numbers) = match is_far {
-            true => {
-                let (real, of_stop) = (self.first_order().f_number, self.first_order.f_number);
-                ("far away".to_owned(), format!(": f/{real:.3}, where the stop alone has f/{of_stop:.3}"))
-            }
-            false => (format!("{object_distance_mm} mm before the lens"), String::new()),
-        };
-        Some(format!(
-            "light from the axis {point} is limited by the rim of surface {surface}, {rim_mm:.4} mm across, not by the stop, of \
-             which it fills {filled_mm:.4} of {stop_mm:.4} mm{f_numbers}"
-        ))
-    }
-
-    /// The f-number for a far object by the real rays that get through: effective focal length over the diameter of the
-    /// beam before the lens; `None` where no light does, or the lens has no power.
-    ///
-    /// It differs from the paraxial f-number by the aberration of the entrance pupil.
-    pub fn real_f_number(&self) -> Option<f64> {
-        let beam = (*self.far_beam.get_or_init(|| self.axial_beam(f64::INFINITY)))?;
-        let f_number = (self.first_order.efl_mm / (2.0 * beam.height_mm)).abs();
-        f_number.is_finite().then_some(f_number)
-    }
-
-    /// Focal lengths, principal planes and pupils in the x–z plane; those of [`first_order`](Self::first_order) unless
-    /// a surface is curved differently along x and y.
-    pub fn first_order_x(&self) -> FirstOrder {
-        // Of a lens of revolution nothing differs.
-        if self.steps.iter().all(|step| !matches!(step.kind, Kind::Toric(_))) {
-            return self.first_order();
-        }
-        paraxial::first_order(&self.steps_along_x(), self.stop, self.wavelength_nm)
-    }
-
-    /// Returns the steps as the x–z plane cuts them.
-    fn steps_along_x(&self) -> Vec<Step> {
-        let along_x = |step: &Step| match &step.kind {
-            Kind::Toric(toric) => Step { kind: Kind::Sphere, curvature: toric.vertex_curvatures()[0], ..step.clone() },
-            _ => step.clone(),
-        };
-        self.steps.iter().map(along_x).collect()
-    }
-
     /// The index of the surface that is the stop.
     pub fn stop(&self) -> usize {
         self.stop
@@ -363,28 +278,6 @@ impl MonoLens {
         self.rear.sag_at_mm(place_mm.x, place_mm.y)
     }
 
-    /// Where a film stands that lies `film_distance_mm` behind the last vertex, its z along the light: behind an odd number of mirrors
-    /// the frame is left-handed, so that x and y stay those of the lens.
-    pub fn film_placement(&self, film_distance_mm: f64) -> Placement {
-        let last_z_mm = self.last_vertex_z_mm();
-        match &self.placed {
-            None => Placement::centered(last_z_mm + film_distance_mm),
-            Some(placed) if placed.is_film_backward => {
-                placed.film.after(&Placement::centered(last_z_mm - film_distance_mm)).flipped()
-            }
-            Some(placed) => placed.film.after(&Placement::centered(last_z_mm + film_distance_mm)),
-        }
-    }
-
-    /// Returns where a point of the lens frame lies on a film `film_distance_mm` behind the last vertex, mm, along the film's own
-    /// x and y: those of the lens, unless the film is tilted or decentered.
-    pub(crate) fn on_film_mm(&self, point_mm: DVec3, film_distance_mm: f64) -> DVec2 {
-        match &self.placed {
-            None => point_mm.truncate(),
-            Some(_) => self.film_placement(film_distance_mm).surface_from_lens(point_mm).truncate(),
-        }
-    }
-
     /// Traces rays through all surfaces, on this thread.
     ///
     /// Each ray in flight ends on the last surface, bent into the image space, or where it was lost.
@@ -423,45 +316,6 @@ impl MonoLens {
         rays.par_slices(CHUNK).with_max_len(1).for_each(|chunk| trace::trace_batch(&plan, Goal::LastSurface, chunk));
     }
 
-    /// Traces rays through all surfaces and straight on to the film, `film_distance_mm` behind the last vertex.
-    ///
-    /// What [`trace`](Self::trace) and [`to_film`](Self::to_film) do, in one go.
-    pub fn trace_to_film(&self, rays: &mut RayBatch, rims: Vignetting, film_distance_mm: f64) {
-        if !self.has_plain_film() {
-            self.trace(rays, rims);
-            return self.to_film(rays, film_distance_mm);
-        }
-        let plan = Plan::new(&self.steps_for(rays.object_z_mm), 0, rims);
-        trace::trace_batch(&plan, Goal::Film { film_distance_mm }, rays.slices());
-    }
-
-    /// As [`trace_to_film`](Self::trace_to_film), on the threads of the current rayon pool, to the same bits.
-    pub fn trace_to_film_parallel(&self, rays: &mut RayBatch, rims: Vignetting, film_distance_mm: f64) {
-        if !self.has_plain_film() {
-            self.trace_parallel(rays, rims);
-            return self.to_film(rays, film_distance_mm);
-        }
-        let plan = Plan::new(&self.steps_for(rays.object_z_mm), 0, rims);
-        let goal = Goal::Film { film_distance_mm };
-        rays.par_slices(CHUNK).with_max_len(1).for_each(|chunk| trace::trace_batch(&plan, goal, chunk));
-    }
-
-    /// Traces rays in single precision through all surfaces and straight on to the film, `film_distance_mm` behind the last
-    /// vertex.
-    ///
-    /// They land within 0.05 µm of where [`trace_to_film`](Self::trace_to_film) lands them. Through tilted and
-    /// decentered surfaces and to curved films they go in double precision, no faster than there.
-    pub fn trace_to_film_f32(&self, rays: &mut RayBatchF32, rims: Vignetting, film_distance_mm: f64) {
-        if !self.has_plain_film() {
-            let mut wide = rays.widened();
-            self.trace_to_film(&mut wide, rims, film_distance_mm);
-            return rays.set_rounded(&wide, |point, _| point);
-        }
-        // Where the object plane lies matters to path lengths only.
-        let plan = Plan::new(&self.steps, 0, rims);
-        trace::trace_batch(&plan, Goal::Film { film_distance_mm }, rays.slices());
-    }
-
     /// Returns the steps, in which ideal lenses know where the object plane appears to them.
     pub(crate) fn steps_for(&self, object_z_mm: f64) -> Cow<'_, [Step]> {
         if !self.steps.iter().any(|step| matches!(step.kind, Kind::ThinLens { .. })) {
@@ -483,123 +337,6 @@ impl MonoLens {
             }
         }
         Cow::Owned(steps)
-    }
-
-    /// Moves rays straight on to the film as it is curved, its vertex `film_distance_mm` behind the last vertex.
-    ///
-    /// A ray that does not meet a curved film ends as one that missed the surface after the last. Points stay in the lens
-    /// frame; [`film_points`](Self::film_points) gives the places on the film itself.
-    pub fn to_film(&self, rays: &mut RayBatch, film_distance_mm: f64) {
-        let ImageSurface { curvature_per_mm, conic } = self.image_surface;
-        if curvature_per_mm == 0.0 {
-            return self.to_film_plane(rays, film_distance_mm);
-        }
-        let medium = (self.image_index(), self.n_surfaces() as u16);
-        let placement = self.film_placement(film_distance_mm);
-        trace::move_to_placed_conic(&placement, [curvature_per_mm, conic], medium, &mut rays.slices());
-    }
-
-    /// Moves rays straight on to the plane through the film's vertex, `film_distance_mm` behind the last vertex, however the film is
-    /// curved.
-    pub fn to_film_plane(&self, rays: &mut RayBatch, film_distance_mm: f64) {
-        match &self.placed {
-            None => trace::move_to_plane(rays.slices(), self.last_vertex_z_mm() + film_distance_mm, self.image_index()),
-            Some(_) => {
-                trace::move_to_placed_plane(
-                    &self.film_placement(film_distance_mm),
-                    self.image_index(),
-                    &mut rays.slices(),
-                );
-            }
-        }
-    }
-
-    /// Whether every surface is centered and the film flat: then lens and film are traced in one go.
-    pub(crate) fn has_plain_film(&self) -> bool {
-        self.placed.is_none() && self.image_surface.curvature_per_mm == 0.0
-    }
-
-    /// The shape of the film.
-    pub fn image_surface(&self) -> ImageSurface {
-        self.image_surface
-    }
-
-    /// Returns the image of the axial point at `object_distance_mm` before the first vertex (infinite for far ones).
-    pub fn conjugate(&self, object_distance_mm: f64) -> Conjugate {
-        let (before, after) = (self.steps[0].index_before, self.image_index());
-        Matrix::of(&self.steps).image_of(-object_distance_mm, before, after)
-    }
-
-    /// Returns the working f-number for an object at this distance before the first vertex (infinite for a far one):
-    /// one over twice the sine of the image-side cone times the index there, by first order.
-    ///
-    /// It is `N (1 + |m| / m_p)` with `m_p` the magnification of the pupils, and holds where those are infinite too.
-    /// With it an unvignetted axial image of a Lambertian plane has `E = π L / (4 N_w²)` to 0.1 % at f/8, at any
-    /// magnification; the textbook's `N (1 + |m|)` has not, unless the pupils are equal. Where a rim limits the light and not
-    /// the stop, the cone is that of the real marginal ray.
-    pub fn working_f_number(&self, object_distance_mm: f64) -> f64 {
-        0.5 / self.marginal_ray(object_distance_mm).reduced_slope_after.abs()
-    }
-
-    /// Returns the paraxial ray from the axial point at this distance before the first vertex to the edge of the stop; where
-    /// a rim limits the light and not the stop, the one that starts as the real marginal ray does.
-    pub(crate) fn marginal_ray(&self, object_distance_mm: f64) -> MarginalRay {
-        let to_stop = self.marginal_ray_of_stop(object_distance_mm);
-        let beam = match object_distance_mm.is_infinite() {
-            true => self.limiting_beam(),
-            false => self.axial_beam(object_distance_mm).filter(|beam| !beam.is_limited_by_stop),
-        };
-        match beam {
-            Some(beam) if object_distance_mm.is_infinite() => to_stop.scaled(beam.height_mm / to_stop.height_mm),
-            Some(beam) => to_stop.scaled((beam.slope_before * self.object_index() / to_stop.reduced_slope).abs()),
-            None => to_stop,
-        }
-    }
-
-    /// The same to the edge of the stop, whether the light gets through or not.
-    pub(crate) fn marginal_ray_of_stop(&self, object_distance_mm: f64) -> MarginalRay {
-        MarginalRay::of(&self.steps, self.stop, object_distance_mm)
-    }
-
-    /// z from the first vertex of the point that fields and depths are counted from, mm: the center of the paraxial
-    /// entrance pupil, or the first vertex where that is infinitely far or so far (10⁴ times the first rim) that a
-    /// count from it would lose digits.
-    pub fn projection_center_z_mm(&self) -> f64 {
-        let z_mm = self.first_order.entrance_pupil_z_mm;
-        if z_mm.abs() <= FARTHEST_PUPIL * self.front.semi_aperture_mm { z_mm } else { 0.0 }
-    }
-
-    /// Returns the image in the x–z plane, which differs from that of [`conjugate`](Self::conjugate) where a surface is
-    /// curved differently along x and y.
-    pub fn conjugate_x(&self, object_distance_mm: f64) -> Conjugate {
-        let (before, after) = (self.steps[0].index_before, self.image_index());
-        Matrix::of(&self.steps_along_x()).image_of(-object_distance_mm, before, after)
-    }
-
-    /// Returns how far behind the last vertex the film is in focus for an object at this distance before the first.
-    ///
-    /// # Errors
-    /// When there is no real image behind the lens.
-    pub fn film_distance_mm_for(&self, object_distance_mm: f64) -> Result<f64, OpticsError> {
-        let film_distance_mm = self.conjugate(object_distance_mm).image_z_mm;
-        if film_distance_mm > 0.0 && film_distance_mm.is_finite() && object_distance_mm > 0.0 {
-            return Ok(film_distance_mm);
-        }
-        Err(OpticsError::NoFocus { lens: self.name.clone(), side: "behind it", distance_mm: object_distance_mm })
-    }
-
-    /// Returns how far before the first vertex an object is in focus on a film at this distance behind the last;
-    /// infinite where the film lies in the rear focal plane.
-    ///
-    /// # Errors
-    /// When there is no real object in front of the lens.
-    pub fn object_distance_mm_for(&self, film_distance_mm: f64) -> Result<f64, OpticsError> {
-        let (before, after) = (self.steps[0].index_before, self.image_index());
-        let distance_mm = -Matrix::of(&self.steps).object_of(film_distance_mm, before, after);
-        if distance_mm > 0.0 {
-            return Ok(distance_mm);
-        }
-        Err(OpticsError::NoFocus { lens: self.name.clone(), side: "before it", distance_mm: film_distance_mm })
     }
 }
 

@@ -5,14 +5,10 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-use dioptric_analysis::{
-    AnalysisFields, AnalysisFilm, AnalysisRequest, LensData, LensDefaults, LensInfoRequest, PsfRequest, PsfSampling,
-    PsfSet, built_in_lenses, surface_rows,
-};
+use dioptric_analysis::{LensData, LensDefaults, LensInfoRequest, built_in_lenses, surface_rows};
 use dioptric_optics::{Layout, LensFile, MonoLens, ReadOptions, Vignetting};
 use dioptric_pipeline::{
-    Camera, Diffraction, FocusSpec, Given, GlassRange, KeptCamera, LensReadOptions, LensSpec, MissingGlass,
-    PipelineError, REFERENCE_WAVELENGTH_NM, StopSpec,
+    Camera, Given, GlassRange, KeptCamera, LensReadOptions, LensSpec, MissingGlass, REFERENCE_WAVELENGTH_NM, StopSpec,
 };
 use ndarray::{ArrayD, IxDyn};
 use pyo3::{
@@ -22,8 +18,8 @@ use pyo3::{
 
 use crate::{
     errors::{exception, guarded, wrong},
-    input::{is_single, number, numbers},
-    options::{count, diffraction, each_option, with_gamma},
+    input::{is_single, numbers},
+    lens_requests::{PsfOptions, analysis_request},
     rays::{GivenRays, Rays},
     serial::to_python,
     view::view,
@@ -32,8 +28,6 @@ use crate::{
 
 /// Rays below which a trace is done at once, without giving up the interpreter's lock: some 50 µs of work.
 const FEW_RAYS: usize = 500;
-/// Wavelengths of an analysis where neither the caller nor the lens's file names some, nm.
-const USUAL_NM: [f64; 3] = [450.0, 550.0, 650.0];
 /// Rays of each fan of a drawing.
 const DRAWN_RAYS: usize = 9;
 
@@ -243,7 +237,7 @@ impl Lens {
         })
     }
 
-    /// Returns what is to be said of the lens at these wavelengths, a list of sentences: `notes`, and which glasses are
+    /// Returns notes on the lens at these wavelengths, a list of sentences: `notes`, and which glasses are
     /// continued beyond the range in which they are known.
     fn notes_at(&self, wavelengths_nm: Vec<f64>) -> Vec<String> {
         let of_glasses = self.file.lens.notes_on_glass_range(&wavelengths_nm);
@@ -451,7 +445,7 @@ impl Lens {
     #[pyo3(signature = (**options))]
     fn psf<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
         let asked = PsfOptions::read("psf", options)?;
-        let set = asked.compute(py, self)?;
+        let set = asked.compute(py, &self.file.lens)?;
         let (n, n_points) = (asked.request.size.unwrap_or(1), set.pictures.len());
         let mut samples: Vec<f32> = Vec::with_capacity(n_points * n * n);
         for picture in &set.pictures {
@@ -470,7 +464,7 @@ impl Lens {
     /// ``mtf_per_mm`` lists spatial frequencies, the MTF. Arguments as of `psf`; fields outermost, then distances, then wavelengths.
     #[pyo3(signature = (**options))]
     fn psf_table<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
-        let set = PsfOptions::read("psf_table", options)?.compute(py, self)?;
+        let set = PsfOptions::read("psf_table", options)?.compute(py, &self.file.lens)?;
         to_python(py, &set.rows)
     }
 
@@ -494,7 +488,7 @@ impl Lens {
     /// dict, with the keys of ``dioptric lens analyze --json``.
     #[pyo3(signature = (**options))]
     fn analyze<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
-        let request = self.analysis_request(options)?;
+        let request = analysis_request(&self.used(), options)?;
         let analysis = run(py, &Follower::nobody(), |_, _| request.compute(&self.file.lens))?;
         to_python(py, &analysis)
     }
@@ -578,117 +572,5 @@ impl Lens {
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
         let parse = PyType::new::<Self>(py).getattr("parse")?;
         Ok((parse, (self.to_ron(),)))
-    }
-}
-
-impl Lens {
-    fn analysis_request(&self, options: Option<&Bound<'_, PyDict>>) -> PyResult<AnalysisRequest> {
-        let used = self.used();
-        let mut request = AnalysisRequest {
-            fields: AnalysisFields::ByLight,
-            main_wavelength_nm: used.reference_nm,
-            wavelengths_nm: used.wavelengths_or(&USUAL_NM),
-            distance_mm: used.distance_mm,
-            film: AnalysisFilm::BestFocus,
-            n_rings: 6,
-        };
-        let (mut has_fields, mut has_distance) = (false, false);
-        let known = ["fields_deg", "wavelengths_nm", "distance_mm", "film_mm", "focus_mm", "rings"];
-        each_option("analyze", options, &known, |key, value| {
-            match key {
-                "fields_deg" => {
-                    request.fields = AnalysisFields::above_axis_deg(&numbers(key, value)?);
-                    has_fields = true;
-                }
-                "wavelengths_nm" => {
-                    request.wavelengths_nm = numbers(key, value)?;
-                    request.main_wavelength_nm = None;
-                }
-                "distance_mm" => {
-                    request.distance_mm = number(key, value)?;
-                    has_distance = true;
-                }
-                "film_mm" => request.film = AnalysisFilm::FilmMm(number(key, value)?),
-                "focus_mm" => request.film = AnalysisFilm::FocusMm(number(key, value)?),
-                _ => request.n_rings = count(key, value)?,
-            }
-            Ok(())
-        })?;
-        let of_file = used.analysis_fields(request.reference_nm());
-        // Places of an object elsewhere say nothing of this one.
-        let fits = |fields: &AnalysisFields| !(has_distance && matches!(fields, AnalysisFields::HeightsMm(_)));
-        if let Some(fields) = of_file.filter(fits).filter(|_| !has_fields) {
-            request.fields = fields;
-        }
-        Ok(request)
-    }
-}
-
-/// What is asked of point spread functions.
-struct PsfOptions {
-    request: PsfRequest,
-    /// Whether field, distance and wavelength are single numbers.
-    is_single: [bool; 3],
-}
-
-impl PsfOptions {
-    fn read(function: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut request = PsfRequest {
-            fields_deg: vec![0.0],
-            field_y_deg: 0.0,
-            distances_mm: vec![f64::INFINITY],
-            wavelengths_nm: vec![REFERENCE_WAVELENGTH_NM],
-            focus: FocusSpec::NearObject,
-            diffraction: Diffraction::Hurb { gamma: 1.0 },
-            pixel_um: 1.0,
-            size: Some(65),
-            sampling: PsfSampling::Pupil,
-            bank: None,
-            mtf_per_mm: Vec::new(),
-            seed: 1,
-            spectral_weights: Vec::new(),
-        };
-        let mut single = [true; 3];
-        let known = [
-            "field_deg",
-            "field_y_deg",
-            "distance_mm",
-            "wavelengths_nm",
-            "focus_mm",
-            "film_mm",
-            "pixel_um",
-            "shape",
-            "diffraction",
-            "gamma",
-            "rays",
-            "seed",
-            "mtf_per_mm",
-        ];
-        each_option(function, options, &known, |key, value| {
-            match key {
-                "field_deg" => (request.fields_deg, single[0]) = (numbers(key, value)?, is_single(value)),
-                "field_y_deg" => request.field_y_deg = number(key, value)?,
-                "distance_mm" => (request.distances_mm, single[1]) = (numbers(key, value)?, is_single(value)),
-                "wavelengths_nm" => (request.wavelengths_nm, single[2]) = (numbers(key, value)?, is_single(value)),
-                "focus_mm" => request.focus = FocusSpec::DistanceMm(number(key, value)?),
-                "film_mm" => request.focus = FocusSpec::FilmMm(number(key, value)?),
-                "pixel_um" => request.pixel_um = number(key, value)?,
-                "shape" => request.size = Some(count(key, value)?),
-                "diffraction" => request.diffraction = diffraction(key, value)?,
-                "gamma" => request.diffraction = with_gamma(request.diffraction, number(key, value)?)?,
-                "rays" => request.sampling = PsfSampling::Paper { n_across: count(key, value)? },
-                "seed" => request.seed = count(key, value)? as u64,
-                _ => request.mtf_per_mm = numbers(key, value)?,
-            }
-            Ok(())
-        })?;
-        if request.focus == FocusSpec::NearObject {
-            request.focus = FocusSpec::DistanceMm(request.distances_mm[0]);
-        }
-        Ok(Self { request, is_single: single })
-    }
-
-    fn compute(&self, py: Python<'_>, lens: &Lens) -> PyResult<PsfSet> {
-        run(py, &Follower::nobody(), |_, _| -> Result<PsfSet, PipelineError> { self.request.compute(&lens.file.lens) })
     }
 }

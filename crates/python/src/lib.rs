@@ -15,6 +15,7 @@ mod developed;
 mod errors;
 mod input;
 mod lens;
+mod lens_requests;
 mod options;
 mod paintings;
 mod rays;

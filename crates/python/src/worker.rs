@@ -18,7 +18,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::errors::{exception, guarded, of_panic, sweep_exception, wrong};
 
-/// How often a thread that waits looks at signals and tells how far the work is.
+/// How often a thread that waits looks at signals and reports how far the work is.
 const POLL: Duration = Duration::from_millis(25);
 
 /// The pool of a process.

@@ -44,7 +44,7 @@ pub enum SceneError {
         /// The cargo feature with which it can.
         feature: &'static str,
     },
-    /// A file whose kind the name does not tell.
+    /// A file whose name does not determine its kind.
     #[error(
         "{}: expected a .exr, .hdr (ENVI), .mat (ISETCam), .png, .jpg or .tif file, or a folder with one picture a band",
         file.display()

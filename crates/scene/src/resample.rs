@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::SceneError;
 
-/// Returns an image on other bands, as [`Scene::resampled`](crate::Scene::resampled) tells.
+/// Returns an image on other bands, as [`Scene::resampled`](crate::Scene::resampled) does.
 ///
 /// # Errors
 /// When the new bands reach more than a band's width beyond the old ones.

@@ -292,7 +292,7 @@ mod tests {
         for (row, column) in [(30, 40), (30, 46), (25, 33), (36, 40)] {
             let [r, g, b] = [0, 1, 2].map(|k| channels[k][(row, column)]);
             let [tr, tg, tb] = [0, 1, 2].map(|k| truth[k][(row, column)]);
-            // Blue never saturates: it tells how bright the lamp is. The ground mixes in by less than a tenth.
+            // Blue never saturates: it shows how bright the lamp is. The ground mixes in by less than a tenth.
             assert!((r / tr - 1.0).abs() < 0.1 && (g / tg - 1.0).abs() < 0.1 && b == tb, "{r} {g} {b}: {tr} {tg} {tb}");
         }
     }
@@ -307,7 +307,7 @@ mod tests {
         assert!(r == 1.0 && (g - 0.5).abs() < 0.05 && (b - 0.19).abs() < 0.04, "{r} {g} {b}");
     }
 
-    /// The teal of a wall says nothing of the bulb before it.
+    /// The teal of a wall is no evidence of the bulb before it.
     #[test]
     fn all_blown_before_a_dim_wall_is_white() {
         let wall = [0.12, 0.2, 0.21];

@@ -213,7 +213,7 @@ fn refined_slope(region: &ArrayView2<'_, f32>, rough_slope: f64, middle: (f64, f
             }
             points.push((row as f64, moment / mass));
         }
-        // A line through a few rows says nothing, and one that left the region is none.
+        // A line through a few rows determines nothing, and one that left the region is none.
         if points.len() < 8 || points.iter().any(|p| !p.1.is_finite()) {
             return None;
         }

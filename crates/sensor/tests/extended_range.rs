@@ -85,7 +85,7 @@ fn a_lamp_twice_over_saturation_is_recovered() {
     // 2600 electrons a short sample, 20 rows and columns of them: .1 % of the mean.
     assert_relative_eq!(merged.slice(s![22..42, 22..42]).mean().unwrap(), lamp, max_relative = 4e-3);
     assert_relative_eq!(merged.slice(s![2..18, ..]).mean().unwrap(), 1e5, max_relative = 4e-3);
-    // Every saturated long row says at least that much.
+    // Every saturated long row means at least that much.
     assert!(merged.slice(s![20..44, 20..44]).iter().all(|&rate| rate > 0.47 * lamp));
 }
 

@@ -16,7 +16,7 @@ use crate::SweepError;
 
 /// The name of the camera file.
 const CAMERA: &str = "camera.ron";
-/// The name of the file that says why a camera was refused.
+/// The name of the file with the reason for which a camera was refused.
 pub(crate) const REFUSED: &str = "refused.json";
 /// The name of the small picture.
 pub(crate) const THUMBNAIL: &str = "thumbnail.png";
@@ -124,7 +124,7 @@ impl Bench {
         write_file(&folder.join(THUMBNAIL), &thumbnail(&capture)?)
     }
 
-    /// Returns what the report says of the lens, from the item before where that shares it.
+    /// Returns the report on the lens, from the item before where that shares it.
     fn optics_of(&mut self, run: &Run<'_>, model: Arc<LensImageModel>) -> Result<RunOptics, PipelineError> {
         let Capture { lens, place, scene, .. } = run.capture;
         let own = Shared { lens: lens.clone(), place: place.clone(), scene: scene.clone(), model };

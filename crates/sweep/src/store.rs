@@ -25,7 +25,7 @@ pub struct Store {
 pub enum Status {
     /// It has a picture.
     Done,
-    /// Its camera was refused; `refused.json` says why.
+    /// Its camera was refused; `refused.json` has the reason.
     Refused,
     /// It is not there.
     Missing,

@@ -55,7 +55,7 @@ impl AreaLight {
         sides * std::f64::consts::PI * area * f64::from(visible_power(&self.emission.radiance))
     }
 
-    /// Adds the bounds of each triangle, or of the whole where there are more than `most`; tells which.
+    /// Adds the bounds of each triangle, or of the whole where there are more than `most`; returns which.
     pub(crate) fn add_bounds(&self, shapes: &[PlacedShape], most: usize, bounds: &mut Vec<LightBounds>) -> bool {
         let placed = &shapes[self.shape as usize];
         let is_two_sided = self.emission.is_two_sided;

@@ -25,7 +25,7 @@ pub enum WorldError {
         /// What is wrong and what was expected.
         reason: String,
     },
-    /// A file whose kind the name does not tell.
+    /// A file whose name does not determine its kind.
     #[error("{}: expected a .pbrt, .gltf, .glb, .obj or .ply file", file.display())]
     UnknownKind {
         /// The file.

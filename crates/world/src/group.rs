@@ -117,7 +117,7 @@ impl GroupParts {
     }
 }
 
-/// One box of a list, as the tree's builder wants it.
+/// One box of a list, as the tree's builder takes it.
 struct PaddedBox(Aabb);
 
 impl Boundable for PaddedBox {

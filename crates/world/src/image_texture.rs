@@ -54,7 +54,7 @@ enum Texels {
 const MAX_SAMPLES: u64 = 1 << 28;
 
 impl ImageTexture {
-    /// Reads a PNG, JPEG, TGA, TIFF or EXR file; EXR is linear whatever `encoding` says.
+    /// Reads a PNG, JPEG, TGA, TIFF or EXR file; EXR is linear whatever `encoding` is.
     ///
     /// # Errors
     /// When the file can't be read as a picture, or has more than 2²⁸ samples.

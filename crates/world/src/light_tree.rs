@@ -347,7 +347,7 @@ mod tests {
         Receiver { point: 12.0 * rng.random::<f32>() * unit(rng), normal }
     }
 
-    /// Stepping evenly through the number draws each light as often as its probability says, and what is left is even again.
+    /// Stepping evenly through the number draws each light in proportion to its probability, and what is left is even again.
     #[test]
     fn probabilities_are_those_of_picks() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);

@@ -425,7 +425,7 @@ impl WorldBuilder {
             shape.add_to(&mut parts[shape.group as usize], index as u32);
         }
         parts.iter().try_for_each(GroupParts::check_extent)?;
-        // Groups first, so that the root knows how large they are.
+        // Groups first: the root needs their bounds.
         let mut groups: Vec<Group> = parts.drain(1..).map(Group::build).collect();
         let mut root = parts.remove(0);
         for (index, instance) in instances.iter().enumerate() {

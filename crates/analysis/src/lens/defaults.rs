@@ -45,7 +45,7 @@ impl LensDefaults {
     }
 
     /// Returns it with the stop of the lens set and the lens turned and moved; an f-number is that at this wavelength, nm. What is to
-    /// be said of the stop is added to the notes.
+    /// be noted about the stop is added to the notes.
     ///
     /// # Errors
     /// When the stop does not open so far, a movement is not finite, or a glass is not known at the wavelength.

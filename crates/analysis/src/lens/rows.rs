@@ -1,4 +1,4 @@
-//! What an analysis of a lens says, as records.
+//! An analysis of a lens as records.
 
 use serde::Serialize;
 

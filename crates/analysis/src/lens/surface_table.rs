@@ -171,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shapes_openings_and_places_are_told() {
+    fn shapes_openings_and_places_are_reported() {
         let text = r#"(name: "all", source: "test", image_radius_mm: -40.0, surfaces: [
             (radius_mm: 50.0, shape: EvenAsphere(conic: -0.5, coefficients: [1e-6, 0.0, -2e-10]), stop: true,
                 semi_aperture_mm: 5.0, medium: Constant(index: 1.5), thickness_mm: 2.0),

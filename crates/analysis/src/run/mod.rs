@@ -38,7 +38,7 @@ pub struct RunReport {
     pub camera: Camera,
     /// The lens, at the reference wavelength and the distance in focus.
     pub lens: LensData,
-    /// What is to be said of it, a sentence each ([`Capture::lens_notes`](dioptric_pipeline::Capture::lens_notes)).
+    /// Notes on it, a sentence each ([`Capture::lens_notes`](dioptric_pipeline::Capture::lens_notes)).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lens_notes: Vec<String>,
     /// Distance of the film behind the last vertex, mm.
@@ -146,7 +146,7 @@ pub struct IrradianceData {
     pub mean_lux: f64,
 }
 
-/// What a report says of the lens before its film: the same for all runs that share lens, film, scene and model, whatever is
+/// The report on the lens before its film: the same for all runs that share lens, film, scene and model, whatever is
 /// behind the irradiance.
 #[derive(Clone, Debug)]
 pub struct RunOptics {
@@ -155,7 +155,7 @@ pub struct RunOptics {
 }
 
 impl RunOptics {
-    /// Returns what the report of a run says of its lens; rays are traced for it.
+    /// Returns the report of a run on its lens; rays are traced for it.
     ///
     /// # Errors
     /// When a glass is not known at the reference wavelength.

@@ -29,7 +29,7 @@ pub(super) fn cells(lens: &MonoLens, point: &ObjectPoint, n_across: usize) -> Op
         (low, high) = (low.min(edge), high.max(edge));
     }
     let z_mm = boundary.z_mm();
-    // The boundary says only where to look.
+    // The boundary is used only to find where to look.
     let mut trial = None;
     for _ in 0..WIDENINGS {
         let margin = MARGIN * (high - low);

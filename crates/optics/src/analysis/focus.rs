@@ -111,7 +111,7 @@ impl Autofocus<'_> {
     /// Returns the film's distance behind the last vertex at which the spots are smallest, and their size there, both
     /// mm; `None` if no light gets through, or none that comes to a focus.
     ///
-    /// `film_distance_mm` says from which film the rays are taken; it changes the result by rounding only. A curved film comes to
+    /// `film_distance_mm` is the film from which the rays are taken; it changes the result by rounding only. A curved film comes to
     /// rest in a few rounds.
     pub fn best_film_mm(&self, film_distance_mm: f64) -> Option<(f64, f64)> {
         let is_flat = self.lenses.iter().all(|lens| lens.image_surface().curvature_per_mm == 0.0);

@@ -40,7 +40,7 @@ fn whole_cone(lens: &MonoLens, point: &ObjectPoint, n: usize, normal: DVec3) -> 
             let pairs = corners.iter().zip(corners.iter().cycle().skip(1));
             0.5 * pairs.map(|(a, b)| a.perp_dot(*b)).sum::<f64>().abs()
         };
-        // A polygon falls short by the square of its sides; two of them tell by how much.
+        // A polygon falls short by the square of its sides; two of them show by how much.
         (4.0 * area(1) - area(2)) / 3.0
     };
     let of_nodes = |region: &PupilRegion| {

@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_by_line_and_glass() {
+    fn mistakes_are_reported_by_line_and_glass() {
         let message = |from: &str, to: &str| {
             let error = glasses_from_agf(&TWO.replace(from, to), "").err().unwrap();
             format!("{}: {}", error.line.unwrap_or(0), error.reason)

@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_rows_are_told_by_their_line() {
+    fn broken_rows_are_reported_by_their_line() {
         assert!(message(&TWO_ELEMENT.replace("67\t1.5\t1.65\t25\n0", "67\t1.5\t1.65\n0")).starts_with("4: 3 numbers"));
         assert!(message(&TWO_ELEMENT.replace("-67", "R67")).starts_with("6: 'R67' is not a number"));
         assert!(message(&TWO_ELEMENT.replace("-67", "NaN")).starts_with("6: surface 2: curvature is NaN"));

@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_or_not_supported_is_told_by_its_key() {
+    fn what_is_wrong_or_not_supported_is_reported_by_its_key() {
         assert!(
             message(&SINGLET.replace("Spheric", "Cubic")).starts_with("surfaces[2].type: surfaces of type 'Cubic'")
         );

@@ -21,7 +21,7 @@ impl GlassCatalogue {
         Self::from_bytes(path, &bytes_of(path)?)
     }
 
-    /// Reads a file of glasses from its bytes; the path tells the format and the name, and is not opened.
+    /// Reads a file of glasses from its bytes; the path gives the format and the name, and is not opened.
     ///
     /// # Errors
     /// As [`read`](Self::read).

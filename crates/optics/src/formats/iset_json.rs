@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_by_their_key() {
+    fn mistakes_are_reported_by_their_key() {
         assert_eq!(message("[]"), "the file is [], expected an object {…}");
         assert_eq!(message("{}"), "surfaces is missing, expected a list of objects");
         assert_eq!(

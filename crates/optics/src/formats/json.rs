@@ -1,4 +1,4 @@
-//! JSON values by their place in the file, so that a mistake can be told by its key.
+//! JSON values by their place in the file, so that a mistake is reported by its key.
 
 use serde_json::{Map, Value};
 

@@ -21,7 +21,7 @@ use super::{
 impl Lens {
     /// Reads a lens file, by its extension: `.ron` (our own), `.dat`, `.json`, `.zmx`, `.seq` or `.len`.
     ///
-    /// [`LensFile::read`](crate::LensFile::read) tells what else the file says, as where the film lies.
+    /// [`LensFile::read`](crate::LensFile::read) returns what else the file states, as where the film lies.
     ///
     /// # Errors
     /// When the file cannot be read or is not what it should be; the message names the file and, where it can, the
@@ -50,7 +50,7 @@ impl LensFile {
         Self::from_bytes(path, &bytes_of(path)?, options)
     }
 
-    /// Reads a lens file from its bytes; the path tells the format and the name, and is not opened.
+    /// Reads a lens file from its bytes; the path gives the format and the name, and is not opened.
     ///
     /// # Errors
     /// As [`read`](Self::read).

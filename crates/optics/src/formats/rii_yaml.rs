@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_by_line_and_key() {
+    fn mistakes_are_reported_by_line_and_key() {
         let message = |text: &str, from: &str, to: &str| {
             let error = glass_from_yaml(&text.replace(from, to), "").err().unwrap();
             format!("{}: {}", error.line.unwrap_or(0), error.reason)

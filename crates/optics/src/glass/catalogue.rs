@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn name_of_several_or_none_is_told() {
+    fn name_of_several_or_none_is_reported() {
         let expected = "glass 'F2' could be CDGM:F2, HIKARI:F2 or SCHOTT:F2; name one of them";
         assert_eq!(message("F2"), expected);
         let similar = "no glass is named 'SK5'; similar names are HIKARI:E-SK5, HIKARI:J-SK5, SCHOTT:N-SK5";

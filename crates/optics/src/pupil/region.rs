@@ -161,7 +161,7 @@ impl Search<'_> {
 
     /// Whether rays just beyond the edge miss a surface or are totally reflected, rather than pass a rim.
     ///
-    /// No clearance tells how far from there light begins again, and an outline may end in horns along the front.
+    /// No clearance determines how far from there light begins again, and an outline may end in horns along the front.
     fn grazes(&self, part: &PupilBoundary) -> bool {
         let beyond = |edge_mm: DVec2| edge_mm + JUST_BEYOND * (edge_mm - part.center_mm);
         let places: Vec<DVec2> = part.edge_mm().into_iter().map(beyond).collect();

@@ -54,7 +54,7 @@ pub(super) struct Interface<T> {
 pub(super) struct Interaction<T> {
     /// The ray on the surface, turned.
     pub(super) ray: Ray<T>,
-    /// Whether it goes on; if not, the rest says why.
+    /// Whether it goes on; if not, the rest has the reason.
     pub(super) survives: bool,
     /// Whether its crossing, if it has a finite one, is of the right sheet.
     pub(super) is_front: bool,

@@ -21,7 +21,7 @@ pub(super) trait Optic<T: Real> {
     /// Takes the rays of `from`, whose z counts from a vertex that lies before this one by `shift`, on to the surface
     /// and turns them there.
     ///
-    /// The new block says which rays are still in flight, and which crossed the right sheet of it; where one ended it holds what
+    /// The new block has which rays are still in flight, and which crossed the right sheet of it; where one ended it holds what
     /// [`Interaction`] does.
     fn pass<const N: usize>(&self, shift: T, from: &Block<T, N>, to: &mut Block<T, N>);
 }

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{Placement, RayFate, rays::RaySlices};
 
-/// Traces rays given in the lens frame through these steps, each of which stands as its placement says; `first` is the
+/// Traces rays given in the lens frame through these steps, each of which stands at its placement; `first` is the
 /// number of the first of them.
 pub(crate) fn trace_placed(
     steps: &[Step],

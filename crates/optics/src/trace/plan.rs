@@ -1,4 +1,4 @@
-//! A train of surfaces as the kernel wants it: constants worked out once, in the kernel's own kind of float.
+//! A train of surfaces as the kernel takes it: constants worked out once, in the kernel's own kind of float.
 
 use super::{
     Kind, Step, Vignetting,
@@ -68,7 +68,7 @@ pub(super) enum Form<T> {
     TwoCurvatures(TwoCurvatures<T>),
 }
 
-/// Does the same with a form's optic, whichever it is: by a plain reference, which the compiler knows to stand alone.
+/// Does the same with a form's optic, whichever it is: by a plain reference, which the compiler can prove unaliased.
 macro_rules! with_optic {
     ($form:expr, $optic:ident => $result:expr) => {
         match $form {

@@ -75,7 +75,7 @@ impl Grid {
         low.is_finite().then_some([low, high])
     }
 
-    /// Returns a grid of so many rays across about all light, of which `lit` tells from where to where a grid sees it.
+    /// Returns a grid of so many rays across about all light, of which `lit` is from where to where a grid sees it.
     fn about_light(self, n_across: usize, lit: impl Fn(&Self) -> Option<[DVec2; 2]>) -> Option<Self> {
         let (mut grid, mut seen) = (self, lit(&self)?);
         for _ in 0..MOST_ZOOMS {
@@ -130,7 +130,7 @@ pub(crate) fn cross_section_mm2(lens: &MonoLens, point: &ObjectPoint, n_across: 
     let Some(grid) = about_light(lens, &light, n_across) else {
         return cross_section_over_front_mm2(lens, &light, n_across);
     };
-    // Four grids, each of every other ray of every other row: how far they differ tells how far all may be off.
+    // Four grids, each of every other ray of every other row: how far they differ bounds how far all may be off.
     let (mut n_lit, mut row) = ([0.0_f64; 4], 0);
     grid.trace(lens, &light, |_, rays| {
         for (column, _) in rays.fate.iter().enumerate().filter(|(_, fate)| fate.is_in_flight()) {
@@ -234,7 +234,7 @@ pub(crate) fn spot_rms_mm(lens: &MonoLens, point: &ObjectPoint, film_distance_mm
 #[allow(dead_code, reason = "not every test looks at spots on the axis")]
 pub(crate) fn axial_spot_rms_mm(lens: &MonoLens, film_distance_mm: f64, n_rays: usize) -> Option<f64> {
     const LOT: usize = 10_000;
-    // A few rays tell how far out light gets through; the front of a wide-angle lens is many times wider.
+    // A few rays show how far out light gets through; the front of a wide-angle lens is many times wider.
     let n_first = n_rays / 100;
     let first_mm = lens.semi_aperture_mm(0) / n_first as f64;
     let points: Vec<DVec3> = (0..n_first).map(|i| DVec3::new(0.0, first_mm * (i as f64 + 0.5), -1.0)).collect();

@@ -29,7 +29,7 @@ impl LensSpec {
                 return Self::Thin { focal_length_mm, diameter_mm };
             }
             Some(Ok(IdealLens::Pinhole { diameter_mm })) => return Self::Pinhole { diameter_mm },
-            // What is wrong with the name is said when it is opened.
+            // What is wrong with the name is reported when it is opened.
             Some(Err(_)) if !Path::new(text).exists() => return Self::BuiltIn(text.to_owned()),
             _ => {}
         }
@@ -116,7 +116,7 @@ impl StopSpec {
         self.apply_at(lens, REFERENCE_WAVELENGTH_NM)
     }
 
-    /// Returns a sentence where [`apply_at`](Self::apply_at) takes another opening of the lens than the number says.
+    /// Returns a sentence where [`apply_at`](Self::apply_at) takes another opening of the lens than that of the number.
     pub fn note_at(self, lens: &Lens, wavelength_nm: f64) -> Option<String> {
         match self {
             Self::FNumber(n) => lens.note_on_f_number(n, wavelength_nm),

@@ -9,12 +9,34 @@ use std::{
 
 use ndarray::Array2;
 
-use crate::PipelineError;
+use super::spec::IrradianceInputs;
+use crate::{Camera, PipelineError, Quality};
 
 /// What the bands are made from.
 const KEY: &str = "bands.ron";
 /// The bands one after the other, little-endian.
 const BANDS: &str = "bands.raw";
+
+/// How a camera keeps bands as they are finished.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BandKeeping<'a> {
+    /// The folder.
+    pub(super) path: &'a Path,
+    /// The build of the program, since another may image otherwise.
+    pub(super) build: &'a str,
+    pub(super) quality: Quality,
+    pub(super) camera: &'a Camera,
+}
+
+impl BandKeeping<'_> {
+    /// Returns the folder with what its bands are made from.
+    pub(super) fn folder(&self, inputs: &IrradianceInputs) -> Result<BandFolder, PipelineError> {
+        let key = (self.build, self.quality, self.camera, inputs.files().collect::<Vec<_>>());
+        let key = ron::to_string(&key)
+            .map_err(|error| PipelineError::Write { path: self.path.to_owned(), reason: error.to_string() })?;
+        Ok(BandFolder { path: self.path.to_owned(), key, photodiode: None })
+    }
+}
 
 /// A folder in which bands are kept as they are finished, and what they are made from: another camera's are not taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,7 +67,7 @@ impl BandFolder {
         Self { photodiode: Some(number), ..self.clone() }
     }
 
-    /// The name of the file of the bands, or of that which says what they are made from.
+    /// The name of the file of the bands, or of the file that holds what they are made from.
     fn name(&self, name: &str) -> String {
         self.photodiode.map_or_else(|| name.to_owned(), |number| format!("photodiode-{number}-{name}"))
     }

@@ -223,7 +223,7 @@ fn height_per_tan_mm(lens: &MonoLens, film_distance_mm: f64) -> f64 {
     lens.film_scale_mm(film_distance_mm).abs()
 }
 
-/// Returns by how much the chief ray of a field lands farther out than first order says; 1 where it does not get through.
+/// Returns by how much the chief ray of a field lands farther out than in first order; 1 where it does not get through.
 fn height_over_paraxial(lens: &MonoLens, tan: f64, film_distance_mm: f64) -> f64 {
     let landed = chief_ray_mm(lens, DVec2::new(tan, 0.0), film_distance_mm);
     landed.map_or(1.0, |at_mm| at_mm.x.abs() / (tan * height_per_tan_mm(lens, film_distance_mm)))

@@ -1,6 +1,7 @@
 //! The lens: read, its stop set, moved before the film.
 
 use dioptric_optics::{Lens, LensFile, MonoLens};
+use dioptric_spectrum::WavelengthGrid;
 
 use super::spec::LensInputs;
 use crate::{PipelineError, REFERENCE_WAVELENGTH_NM};
@@ -26,4 +27,12 @@ pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError
     let reference = lens.at(REFERENCE_WAVELENGTH_NM)?;
     let notes = file.notes.into_iter().chain(note_on_stop).chain(reference.note_on_limit(f64::INFINITY)).collect();
     Ok(ResolvedLens { lens, reference, notes })
+}
+
+/// Checks that every medium of the lens is known at bands that are known before the scene is.
+pub(super) fn check_glasses(lens: &ResolvedLens, grid: Option<&WavelengthGrid>) -> Result<(), PipelineError> {
+    for &wavelength_nm in grid.iter().flat_map(|grid| grid.centers_nm()) {
+        lens.lens.at(wavelength_nm)?;
+    }
+    Ok(())
 }

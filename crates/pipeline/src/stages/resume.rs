@@ -7,9 +7,10 @@ use dioptric_spectrum::DepthMap;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    capture::Capture,
     film::FilmPlace,
     irradiance::{IRRADIANCE_FILE, Irradiance, photodiode_irradiance_file},
-    kept::{Capture, KeptCamera},
+    kept::KeptCamera,
     narrow_surfaces::NarrowSurfaces,
     scene::SceneSummary,
     spec::FileStamp,

@@ -22,7 +22,7 @@ pub(crate) struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    /// Runs a step that knows of no cancel, on a thread of its own, and leaves it when the work is cancelled; it then ends by
+    /// Runs a step that does not check for a cancel, on a thread of its own, and leaves it when the work is cancelled; it then ends by
     /// itself, and its result is lost. For steps of a fraction of a second, and for reading files.
     ///
     /// On a thread of a pool of rayon the step runs there and to its end: another thread would use another pool.

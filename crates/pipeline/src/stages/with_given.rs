@@ -7,8 +7,9 @@ use dioptric_scene::Scene;
 use dioptric_sensor::Sensor;
 
 use super::{
+    capture::Capture,
     given::{Given, GivenParts},
-    kept::{Capture, KeptCamera},
+    kept::KeptCamera,
 };
 use crate::{Camera, LensReadOptions, LensSpec, SceneSource, SensorSpec, StopSpec};
 

@@ -23,7 +23,7 @@ const LIMIT_HEADER_BYTES: u64 = 64 << 20;
 /// Endings of the file of numbers beside `NAME.hdr`; none at all as well.
 const DATA_ENDINGS: [&str; 8] = ["", "raw", "img", "dat", "bsq", "bil", "bip", "bin"];
 
-/// The numbers of an ENVI file, as stored, with what its header tells of them.
+/// The numbers of an ENVI file, as stored, with what its header states of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnviCube {
     file: PathBuf,
@@ -46,7 +46,7 @@ impl EnviCube {
     /// sample gives, become 0.
     ///
     /// # Errors
-    /// When nothing tells what a perfect white is.
+    /// When nothing states what a perfect white is.
     pub fn into_image(self, white_level: Option<f64>) -> Result<SpectralImage, SceneError> {
         let unit = self.data_units.as_deref().and_then(LightUnit::parse);
         if let (None, Some(unit)) = (white_level, unit.filter(|unit| unit.quantity == Quantity::Radiance)) {
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn white_is_told_by_the_caller_the_header_or_references() {
+    fn white_is_reported_by_the_caller_the_header_or_references() {
         let folder = tempfile::tempdir().unwrap();
         let (text, bytes) = (header(1, "bsq", 0), samples(1, "bsq", 0));
         let path = write(folder.path(), "a", &text, &bytes);

@@ -13,7 +13,7 @@ const CENTER_X: &str = "viewCenterXPx";
 const CENTER_Y: &str = "viewCenterYPx";
 const FOV: &str = "viewHorizontalFovDeg";
 
-/// What the header of a layer tells.
+/// What the header of a layer states.
 #[derive(Clone, Debug)]
 pub(crate) struct Attributes {
     /// Of radiance or irradiance, `None` where nothing is said; or the text of a unit that is not known.
@@ -43,7 +43,7 @@ impl Attributes {
     }
 }
 
-/// Returns what the attributes of a layer tell.
+/// Returns what the attributes of a layer state.
 pub(crate) fn from_layer(layer: &LayerAttributes) -> Attributes {
     let get = |name: &str| layer.other.get(&Text::from(name));
     let number = |name: &str| match get(name) {

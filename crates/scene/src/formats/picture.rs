@@ -124,7 +124,7 @@ pub fn read_picture_samples(path: &Path) -> Result<PictureSamples, SceneError> {
     Ok(PictureSamples { planes, top })
 }
 
-/// Decodes a picture of any kind that the file's content tells.
+/// Decodes a picture of any kind that is recognized by the file's content.
 pub(crate) fn decode(path: &Path) -> Result<DynamicImage, SceneError> {
     let mut limits = Limits::default();
     limits.max_alloc = Some(4 << 30);

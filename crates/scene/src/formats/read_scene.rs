@@ -63,7 +63,7 @@ impl Default for ReadOptions {
 ///
 /// Camera data comes from the options, else from the file, else from a `NAME.camera.json` beside it; depth from the file, else
 /// from a gray 16-bit `NAME.depth.png` beside it (millimetres, or what `depth_unit_m` of the camera file says; 0 where it was
-/// not measured), else from the options. Depth and view may still be absent afterwards: [`Scene::require_depth_and_view`] says
+/// not measured), else from the options. Depth and view may still be absent afterwards: [`Scene::require_depth_and_view`] reports
 /// so. What was filled or resampled is in [`Scene::notes`].
 ///
 /// # Errors
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn resampled_bands_are_told() {
+    fn resampled_bands_are_reported() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("uneven.exr");
         let own = WavelengthGrid::new(vec![400.0, 420.0, 450.0, 500.0, 560.0, 640.0, 700.0]).unwrap();
@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn unmeasured_depth_of_a_picture_is_told() {
+    fn unmeasured_depth_of_a_picture_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("room.png");
         dioptric_pictures::save(&image::RgbImage::new(4, 2).into(), &path).unwrap();

@@ -28,13 +28,13 @@ const LIMIT_RATIO: u64 = 2000;
 /// What a spectral EXR file holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpectralFile {
-    /// Radiance, irradiance or reflectance; with the sample pitch where the file tells it.
+    /// Radiance, irradiance or reflectance; with the sample pitch where the file states it.
     pub image: SpectralImage,
     /// Axial depth, from channel `Z`.
     pub depth: Option<DepthMap>,
     /// Distance from the projection center, m, from channel `distance`.
     pub distance_m: Option<Array2<f32>>,
-    /// Pinhole geometry, where the file tells it.
+    /// Pinhole geometry, where the file states it.
     pub view: Option<View>,
     /// What lies behind the first surface, from a second layer of that name.
     pub hidden: Option<HiddenLayer>,

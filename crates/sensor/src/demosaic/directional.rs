@@ -210,7 +210,7 @@ impl Planes {
 /// Holds an estimate of one color to the values of its neighbors.
 ///
 /// It may leave their range only as far as `guide`, a color known here, is from the mean of its values there
-/// (`guides`), and by less where the guide is the brighter color: an edge of a saturated color says nothing about
+/// (`guides`), and by less where the guide is the brighter color: an edge of a saturated color is no evidence of
 /// colors that are absent.
 #[inline]
 fn held<const N: usize>(estimate: f32, neighbors: [f32; N], guide: f32, guides: [f32; N]) -> f32 {

@@ -30,7 +30,7 @@ pub struct LensQuestion {
     corner_tan: f64,
 }
 
-/// What the analysis of a lens says.
+/// The analysis of a lens.
 #[derive(Clone, Debug)]
 pub struct LensAnswer {
     /// Spots, fans, field curvature and the like.
@@ -70,7 +70,7 @@ impl LensQuestion {
     }
 }
 
-/// Returns what a simulated bench says of a sensor, of few frames, so that it is there at once.
+/// Returns what a simulated bench measures of a sensor, on few frames, so that it is there at once.
 ///
 /// # Errors
 /// When the sensor cannot be read.

@@ -44,7 +44,7 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// Returns what an error says of a camera.
+    /// Returns the fault of a camera that an error reports.
     pub fn of(error: &PipelineError, camera: &Camera) -> Self {
         Self { field: field_of(error, camera), message: error.to_string(), remedy: remedy(error, camera) }
     }

@@ -349,7 +349,7 @@ impl Studio {
         {
             self.edge = Some(MarkedEdge { stamp, region, response: results.product.edge(region) });
         }
-        // Rays know nothing of rungs, but the film's corner moves by a part of a pixel.
+        // Rays do not depend on the rung, but the film's corner moves by a part of a pixel.
         if self.tab == Tab::LensBench && self.lens_answer_of != Some(stamp) {
             self.lens_answer_of = Some(stamp);
             let question = LensQuestion::of(&results.product);

@@ -54,7 +54,7 @@ fn undo_restores_the_bits() {
 }
 
 #[test]
-fn what_cannot_be_is_told_beside_its_field() {
+fn what_cannot_be_is_reported_beside_its_field() {
     let mut harness = window(None);
     // No number at all: the camera stays.
     type_into(&mut harness, "f-number", "wide");

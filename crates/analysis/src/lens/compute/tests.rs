@@ -109,7 +109,7 @@ fn on_film(lens: &Lens, film_distance_mm: f64, fields: AnalysisFields) -> LensAn
 }
 
 #[test]
-fn steep_fields_are_cut_and_told() {
+fn steep_fields_are_cut_and_reported() {
     let fisheye = Lens::built_in("fisheye-12.5mm").unwrap();
     let fields = AnalysisFields::AnglesDeg(vec![[0.0, 80.0], [0.0, 89.5], [0.0, -89.0], [89.0, 60.0]]);
     let analysis = on_film(&fisheye, 20.0, fields);

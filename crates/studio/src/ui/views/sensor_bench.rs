@@ -11,7 +11,7 @@ use crate::engine::three;
 /// Height of a chart, points.
 const HEIGHT: f32 = 240.0;
 
-/// Shows what the bench says of the sensor, and the edge that was dragged on the picture.
+/// Shows what the bench measured of the sensor, and the edge that was dragged on the picture.
 pub(in crate::ui) fn show(ui: &mut Ui, noise: Option<&NoiseData>, edge: Option<&Result<EdgeResponse, String>>) {
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         let width = (ui.available_width() / 2.0 - 8.0).max(160.0);

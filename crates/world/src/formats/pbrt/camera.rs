@@ -45,7 +45,7 @@ impl CameraWords {
         };
     }
 
-    /// Takes what is said of the film; tells whether that asks for a part of the picture.
+    /// Takes the parameters of the film; returns whether they ask for a part of the picture.
     pub(super) fn set_film(&mut self, params: &Params<'_>) -> bool {
         if let (Some(x), Some(y)) = (params.number("xresolution"), params.number("yresolution")) {
             self.resolution = Some((x, y));

@@ -152,7 +152,7 @@ fn ideal_diffractive_lens_images_a_far_point_perfectly() {
     let third = single(Surface::plane(radius_mm), [1.0; 2], 3, ideal(focal_mm, radius_mm, WAVELENGTH_NM));
     let third = third.at(WAVELENGTH_NM).unwrap().first_order().efl_mm;
     assert!((3.0 * third / focal_mm - 1.0).abs() < 1e-13, "{third}");
-    // A ray near the axis meets it where first-order optics says, on a glass surface too.
+    // A ray near the axis meets it where first-order optics predicts, on a glass surface too.
     let curved = Surface::sphere(60.0, 4.0);
     let rings = PhaseProfile::Rings { radius_mm: 4.0, coefficients_rad: vec![-200.0, 30.0] };
     let mono = single(curved, [1.0, 1.6], 1, rings).at(WAVELENGTH_NM).unwrap();

@@ -1,13 +1,11 @@
 //! No file, however broken, makes a reader panic or hang.
 
-mod mutate;
-
 use std::path::Path;
 
 use dioptric_optics::{LensFile, OpticsError, ReadOptions};
 
+use crate::mutate::{SEEDS, read};
 use dioptric_golden::mutant;
-use mutate::{SEEDS, read};
 
 #[test]
 fn every_seed_is_read_and_thousands_of_its_mutants_end_in_a_lens_or_an_error() {

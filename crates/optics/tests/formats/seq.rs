@@ -189,7 +189,7 @@ fn what_cannot_be_traced_is_refused_by_name() {
 }
 
 #[test]
-fn mistakes_are_told_by_line_and_command() {
+fn mistakes_are_reported_by_line_and_command() {
     assert_eq!(message("S     60.0", "S     6O.0"), "lens.seq:17: S: '6O.0' is not a number");
     assert!(message("NBK7_SCHOTT", "NBK8_SCHOTT").starts_with("lens.seq:17: S: no glass is named 'SCHOTT:NBK8'"));
     assert!(message("1.60 1.62", "1.60").contains("lens.seq:14: MYGLASS: 1 indices for 2 wavelengths (PWL)"));

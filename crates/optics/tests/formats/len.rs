@@ -55,7 +55,7 @@ fn units_are_millimetres() {
 
 #[test]
 fn a_triplet_with_everything_is_as_its_words_say() {
-    let file = read(include_str!("corpus/triplet.len"));
+    let file = read(include_str!("../corpus/triplet.len"));
     let lens = &file.lens;
     assert_eq!((lens.name(), lens.source(), lens.stop()), ("own triplet", "made up", 3));
     assert_eq!(
@@ -81,7 +81,7 @@ fn a_triplet_with_everything_is_as_its_words_say() {
     assert_eq!(file.wavelength_weights, [1.0, 0.5, 0.5]);
     assert_eq!((file.reference_wavelength_nm, file.fields.len()), (Some(587.56), 2));
     assert_eq!(file.field_weights, [1.0, 0.5]);
-    let near = try_read("a.len", include_str!("corpus/triplet.len"), Some(2)).unwrap();
+    let near = try_read("a.len", include_str!("../corpus/triplet.len"), Some(2)).unwrap();
     assert_eq!((near.lens.interfaces()[1].thickness_after_mm, near.film_distance_mm), (7.0, Some(43.0)));
     assert_eq!(near.configurations.len(), 2);
 }

@@ -176,7 +176,7 @@ fn catalogues_of_the_file_decide_between_makers() {
 }
 
 #[test]
-fn glass_of_a_maker_that_the_file_does_not_name_is_told() {
+fn glass_of_a_maker_that_the_file_does_not_name_is_reported() {
     let notes = |makers: &str| {
         let text = SINGLET.replace("N-BK7", "S-FPL53").replace("GCAT SCHOTT MISC", makers);
         read(&text).unwrap().notes
@@ -212,7 +212,7 @@ fn what_cannot_be_traced_is_refused_by_name() {
 }
 
 #[test]
-fn mistakes_are_told_by_line_and_keyword() {
+fn mistakes_are_reported_by_line_and_keyword() {
     assert_eq!(message("CURV 2.0E-2", "CURV 2.0F-2"), "lens.zmx:21: CURV: '2.0F-2' is not a number");
     assert_eq!(message("CURV 2.0E-2", "CURV"), "lens.zmx:21: CURV: expected 1 numbers, found 0");
     assert_eq!(

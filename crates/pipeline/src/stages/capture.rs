@@ -1,0 +1,79 @@
+//! What came of a camera.
+
+use std::sync::Arc;
+
+use dioptric_sensor::{Developed, ElectronRate, Processing, Sensor};
+use dioptric_spectrum::{Bands, Illuminant, WavelengthGrid};
+
+use super::{
+    electrons::PixelRates, film::FilmPlace, frames::FrameSet, irradiance::Irradiance, lens::ResolvedLens,
+    lens_tables::LensAberrations, scene::SceneSummary, spec::ElectronInputs,
+};
+use crate::{Camera, Frames, LensFacts, Quality};
+
+/// What came of a camera, stage by stage.
+#[derive(Clone, Debug)]
+pub struct Capture {
+    /// The camera.
+    pub camera: Camera,
+    /// How finely it was simulated.
+    pub quality: Quality,
+    /// The lens.
+    pub lens: Arc<ResolvedLens>,
+    /// The scene, in brief.
+    pub scene: Arc<SceneSummary>,
+    /// The film.
+    pub place: Arc<FilmPlace>,
+    /// The sensor, of the film's size.
+    pub sensor: Sensor,
+    /// The irradiance on the film.
+    pub irradiance: Arc<Irradiance>,
+    /// The mean rate of photo-electrons of whole pixels.
+    pub rate: Arc<ElectronRate>,
+    /// The frames.
+    pub frames: Arc<FrameSet>,
+    /// From the raw frame to the picture.
+    pub processing: Processing,
+    /// What the lens does to the frame, where the processing undoes some of it.
+    pub aberrations: Option<Arc<LensAberrations>>,
+    /// The picture.
+    pub developed: Arc<Developed>,
+    /// What the rate of electrons was made from.
+    pub(super) inputs: ElectronInputs,
+    /// The rates of photodiodes that are read by themselves, besides that of whole pixels.
+    pub(super) rates: Arc<PixelRates>,
+}
+
+impl Capture {
+    /// The bands.
+    pub fn grid(&self) -> &WavelengthGrid {
+        self.irradiance.grid()
+    }
+
+    /// Notes on the lens at the bands of the picture, a sentence each: what its file states and this program does otherwise,
+    /// and which glasses are continued beyond the range in which they are known.
+    pub fn lens_notes(&self) -> Vec<String> {
+        let of_glasses = self.lens.lens.notes_on_glass_range(self.grid().centers_nm());
+        self.lens.notes.iter().cloned().chain(of_glasses).collect()
+    }
+
+    /// What is written of the frames.
+    pub fn frame_parts(&self) -> Frames<'_> {
+        let first = self.lens.reference.first_order();
+        Frames {
+            sensor: &self.sensor,
+            exposure: &self.frames.exposure,
+            rate: &self.rate,
+            exposed: &self.frames.exposed,
+            processing: &self.processing,
+            lens: self.aberrations.as_ref().map(|aberrations| &aberrations.tables),
+            optics: Some(LensFacts {
+                name: self.lens.lens.name(),
+                f_number: first.f_number,
+                focal_length_mm: first.efl_mm,
+            }),
+            grid: self.grid(),
+            light: self.scene.light.as_ref().map_or(Illuminant::D65, |light| light.illuminant.clone()),
+        }
+    }
+}

@@ -1,0 +1,259 @@
+//! The stages of a kept camera in their order.
+
+use std::sync::Arc;
+
+use dioptric_forward::{ImagingPlan, check_depth_map};
+use dioptric_psf::{LensImage, LensImageModel};
+use dioptric_scene::Scene;
+use dioptric_sensor::{Developed, Illumination, Processing};
+
+use super::{
+    Watch,
+    band_store::BandKeeping,
+    bank,
+    electrons::{self, PixelRates},
+    film::{self, FilmPlace},
+    frames::{self, FrameSet, MovedLight},
+    irradiance::{self, Irradiance, Keeping},
+    lens::{self, ResolvedLens, check_glasses},
+    lens_tables::{LensAberrations, TableParts},
+    lit_still_life,
+    memory::MemoryBudget,
+    narrow_surfaces::NarrowSurfaces,
+    painting::Paintings,
+    part::Part,
+    plan,
+    results::KeptResults,
+    scene::{self, ResolvedScene, SceneSummary},
+    spec::{
+        AberrationInputs, BankInputs, ElectronInputs, FilmInputs, FrameInputs, IrradianceInputs, LensInputs,
+        PictureInputs, PlanInputs, SceneInputs,
+    },
+    world,
+};
+use crate::{BlurSpec, DualPixelSpec, PaintingFolder, PipelineError, Stage};
+
+/// The stages in their order, each asking for the ones it needs.
+#[derive(Clone, Copy)]
+pub(super) struct Chain<'a> {
+    pub(super) kept: &'a KeptResults,
+    /// Irradiance of more bytes goes to a temporary file.
+    pub(super) memory_bytes: u64,
+    /// What imaging may take in all, where that is limited.
+    pub(super) budget: Option<MemoryBudget>,
+    pub(super) bands: Option<BandKeeping<'a>>,
+    pub(super) paintings: Option<&'a PaintingFolder>,
+    pub(super) watch: Watch<'a>,
+}
+
+impl Chain<'_> {
+    pub(super) fn lens(&self, inputs: &LensInputs) -> Result<Arc<ResolvedLens>, PipelineError> {
+        self.kept.lens.get_or_make(inputs.clone(), lens::resolve)
+    }
+
+    pub(super) fn scene(&self, inputs: &SceneInputs) -> Result<Arc<ResolvedScene>, PipelineError> {
+        self.kept.scene.get_or_make(inputs.clone(), |inputs| {
+            self.watch.progress.at(Stage::Scene, 0.0);
+            self.watch.cancel.check()?;
+            let paintings = Paintings { kept: &self.kept.painting, folder: self.paintings };
+            let scene = match inputs.geometry.world() {
+                _ if let Some(spec) = inputs.geometry.still_life() => {
+                    lit_still_life::view(inputs, spec, paintings, &self.watch)?
+                }
+                Some((_, spec)) => world::view(inputs, spec, &self.world(&inputs.geometry)?, &self.watch)?,
+                None => {
+                    let lens = inputs.geometry.flat.as_ref().map(|(_, lens)| self.lens(lens)).transpose()?;
+                    let pupil_z_mm = lens.map(|lens| lens.reference.projection_center_z_mm());
+                    scene::open(inputs, pupil_z_mm, paintings, &self.watch)?
+                }
+            };
+            self.watch.progress.at(Stage::Scene, 1.0);
+            Ok(scene)
+        })
+    }
+
+    pub(super) fn summary(&self, inputs: &SceneInputs) -> Result<Arc<SceneSummary>, PipelineError> {
+        self.kept.summary.get_or_make(inputs.clone(), |inputs| SceneSummary::of(&self.scene(inputs)?.scene))
+    }
+
+    pub(super) fn film(&self, inputs: &FilmInputs, scene: &SceneInputs) -> Result<Arc<FilmPlace>, PipelineError> {
+        self.kept.film.get_or_make(inputs.clone(), |inputs| {
+            let scene = self.scene(scene)?;
+            film::place(inputs, &*self.lens(&inputs.lens)?, &scene)
+        })
+    }
+
+    pub(super) fn bank(&self, inputs: &BankInputs, scene: &SceneInputs) -> Result<Arc<LensImageModel>, PipelineError> {
+        self.kept.bank.get_or_make(inputs.clone(), |inputs| {
+            let summary = self.summary(scene)?;
+            let (lens, place) = (self.lens(&inputs.film.lens)?, self.film(&inputs.film, scene)?);
+            // Every medium must be known at every band before rays are traced.
+            let grid = summary.grid()?;
+            check_glasses(&lens, Some(&grid))?;
+            // The scene itself can tell where it is too near; a continued run has been through this.
+            let resolved = self.kept.scene.get(scene);
+            if let Some(depth) = resolved.as_ref().and_then(|resolved| resolved.scene.depth.as_ref()) {
+                check_depth_map(&lens.lens, &grid, depth)?;
+            }
+            self.watch.progress.at(Stage::Lens, 0.0);
+            bank::build(inputs, &lens, &place, (summary.near_m, summary.far_m), &grid, &self.watch)
+        })
+    }
+
+    pub(super) fn plan(&self, inputs: &PlanInputs, scene: &SceneInputs) -> Result<Arc<ImagingPlan>, PipelineError> {
+        self.kept.plan.get_or_make(inputs.clone(), |inputs| {
+            let (place, resolved) = (self.film(&inputs.bank.film, scene)?, self.scene(scene)?);
+            let budget = self.budget;
+            // What is too large for it is found before the lens is traced.
+            budget.map_or(Ok(()), |budget| budget.check(&resolved.scene, &place))?;
+            let model = self.bank(&inputs.bank, scene)?;
+            let lens: Arc<dyn LensImage + Send> = match inputs.photodiode {
+                None => model,
+                Some((spec, number)) => {
+                    let f_number = place.working_f_number(&*self.lens(&inputs.bank.film.lens)?);
+                    let images = model.through(spec.pupil_division(f_number))?;
+                    images.into_iter().nth(number).expect("a photodiode of those that there are")
+                }
+            };
+            plan::plan(inputs, lens, &place, &resolved.scene, budget, &self.watch)
+        })
+    }
+
+    pub(super) fn irradiance(&self, inputs: &IrradianceInputs) -> Result<Arc<Irradiance>, PipelineError> {
+        self.kept.irradiance.get_or_make(inputs.clone(), |inputs| {
+            if let Some(spec) = inputs.dual_pixel {
+                return self.irradiance_of_photodiodes(inputs, spec);
+            }
+            if let Some(effort) = inputs.effort {
+                let picture = self.world_render(inputs)?.render(effort, &self.watch)?.picture;
+                let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
+                return Ok(Irradiance::of_image(picture, place.pitch_um));
+            }
+            if inputs.micro_array.is_some() {
+                let reason = "only rays from the film go through its array, expected a world with method: Backward";
+                return Err(PipelineError::Unsuitable { what: "light_field", reason: reason.to_owned() });
+            }
+            self.imaged(inputs)
+        })
+    }
+
+    /// Images the scene through the pupil, or the part of it that a photodiode sees.
+    pub(super) fn imaged(&self, inputs: &IrradianceInputs) -> Result<Irradiance, PipelineError> {
+        let plan = self.plan(&inputs.plan, &inputs.scene)?;
+        let resolved = self.scene(&inputs.scene)?;
+        let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
+        let scene: &Scene = &resolved.scene;
+        let memory_bytes = match self.budget {
+            Some(budget) => budget.irradiance_bytes(&plan, scene, &place)?.min(self.memory_bytes),
+            None => self.memory_bytes,
+        };
+        let folder = self.bands.map(|keeping| keeping.folder(inputs)).transpose()?;
+        let folder = match inputs.plan.photodiode {
+            None => folder,
+            Some((_, number)) => folder.map(|folder| folder.of_photodiode(number)),
+        };
+        let keeping = Keeping { memory_bytes, folder: folder.as_ref() };
+        let irradiance = irradiance::image(&plan, scene, &place, keeping, &self.watch)?;
+        let is_layered = inputs.plan.blur == BlurSpec::Layered;
+        let narrow = if is_layered { NarrowSurfaces::of(&plan, scene) } else { None };
+        Ok(irradiance.with_narrow_surfaces(narrow))
+    }
+
+    /// Images the scene through the part of the pupil that each photodiode sees, one after the other.
+    pub(super) fn irradiance_of_photodiodes(
+        &self,
+        inputs: &IrradianceInputs,
+        spec: DualPixelSpec,
+    ) -> Result<Irradiance, PipelineError> {
+        let n = spec.photodiodes.names().len();
+        // The sum is as large as each of them.
+        let memory_bytes = self.memory_bytes / (n as u64 + 1);
+        let irradiance = |number: usize| {
+            let plan = PlanInputs { photodiode: Some((spec, number)), ..inputs.plan.clone() };
+            let inputs = IrradianceInputs { plan, dual_pixel: None, ..inputs.clone() };
+            let progress = Part { progress: self.watch.progress, number, of: n };
+            let watch = Watch { progress: &progress, cancel: self.watch.cancel };
+            let chain: Chain<'_> = *self;
+            Chain { memory_bytes, watch, ..chain }.imaged(&inputs)
+        };
+        let photodiodes = (0..n).map(irradiance).collect::<Result<Vec<_>, _>>()?;
+        let narrow = photodiodes[0].summary.narrow_surfaces;
+        Ok(Irradiance::of_photodiodes(photodiodes, self.memory_bytes)?.with_narrow_surfaces(narrow))
+    }
+
+    pub(super) fn electrons(&self, inputs: &ElectronInputs) -> Result<Arc<PixelRates>, PipelineError> {
+        self.kept.electrons.get_or_make(inputs.clone(), |inputs| {
+            let irradiance = self.irradiance(&inputs.irradiance)?;
+            let place = self.film(&inputs.irradiance.plan.bank.film, &inputs.irradiance.scene)?;
+            electrons::collect(irradiance, electrons::on_film(&inputs.sensor, &place), &place, &self.watch)
+        })
+    }
+
+    pub(super) fn frames(&self, inputs: &FrameInputs) -> Result<Arc<FrameSet>, PipelineError> {
+        self.kept.frames.get_or_make(inputs.clone(), |inputs| {
+            let irradiance = &inputs.electrons.irradiance;
+            let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
+            let rates = self.electrons(&inputs.electrons)?;
+            let dual_pixel = irradiance.dual_pixel;
+            self.watch.progress.at(Stage::Sensor, 0.5);
+            let (shutter, sensor) = (inputs.shutter.clone(), electrons::on_film(&inputs.electrons.sensor, &place));
+            // What moves between frames is the irradiance.
+            let irradiance = if shutter.moves() { Some(self.irradiance(irradiance)?) } else { None };
+            let exit_pupil = electrons::exit_pupil(&sensor, &place);
+            self.watch.run(move || {
+                if let Some(spec) = dual_pixel {
+                    return frames::expose_photodiodes(&shutter, &sensor, spec, &rates);
+                }
+                let moved = irradiance.as_deref().map(|irradiance| MovedLight {
+                    light: Illumination { exit_pupil, ..Illumination::on_pixels(irradiance) },
+                    samples_per_px: 1.0 / place.binning as f64,
+                });
+                frames::expose(&shutter, &sensor, &rates.whole, moved.as_ref())
+            })
+        })
+    }
+
+    /// Returns what the lens does to the frame, where the processing undoes some of it.
+    pub(super) fn aberrations(&self, inputs: &PictureInputs) -> Result<Option<Arc<LensAberrations>>, PipelineError> {
+        if inputs.processing.lens_corrections.is_none() {
+            return Ok(None);
+        }
+        let ElectronInputs { irradiance, sensor } = &inputs.frames.electrons;
+        let film = irradiance.plan.bank.film.clone();
+        let inputs = AberrationInputs { film, scene: irradiance.scene.clone(), sensor: sensor.clone() };
+        let aberrations = self.kept.aberrations.get_or_make(inputs, |inputs| {
+            let (lens, summary) = (self.lens(&inputs.film.lens)?, self.summary(&inputs.scene)?);
+            let place = self.film(&inputs.film, &inputs.scene)?;
+            let parts = TableParts {
+                lens: &lens,
+                place: &place,
+                sensor: &electrons::on_film(&inputs.sensor, &place),
+                light: summary.light.as_ref().map(|light| &light.illuminant),
+                grid: &summary.grid()?,
+                depth_range_m: (summary.near_m, summary.far_m),
+            };
+            parts.aberrations(&self.watch)
+        })?;
+        Ok(Some(aberrations))
+    }
+
+    pub(super) fn picture(
+        &self,
+        inputs: PictureInputs,
+        processing: &Processing,
+        aberrations: Option<Arc<LensAberrations>>,
+    ) -> Result<Arc<Developed>, PipelineError> {
+        self.kept.picture.get_or_make(inputs, |inputs| {
+            self.watch.progress.at(Stage::Picture, 0.0);
+            let irradiance = &inputs.frames.electrons.irradiance;
+            let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
+            let frames = self.frames(&inputs.frames)?;
+            let sensor = electrons::read_out(&inputs.frames.electrons, &place);
+            let processing = processing.clone();
+            self.watch.run(move || {
+                let tables = aberrations.as_ref().map(|aberrations| &aberrations.tables);
+                Ok(sensor.develop_with(frames.exposed.developed_from(), &processing, tables)?)
+            })
+        })
+    }
+}
