@@ -270,11 +270,8 @@ fn landscape(ringed: usize, per_mm: [f64; 2]) -> Lens {
 
 /// A concave mirror with rings, the stop before it.
 fn ringed_mirror() -> Lens {
-    let at = |surface: Surface, thickness_after_mm: f64| Interface {
-        surface,
-        medium_after: Glass::Air,
-        thickness_after_mm,
-    };
+    let at =
+        |surface: Surface, thickness_after_mm: f64| Interface { surface, medium_after: Glass::Air, thickness_after_mm };
     let interfaces = vec![at(Surface::plane(3.0), 30.0), at(Surface::sphere(-160.0, 9.0), 0.0)];
     let lens = Lens::new("mirror", "test", interfaces, 0).unwrap().with_mirrors([1]).unwrap();
     rings_on(lens, 1, [-5e-4, 2e-7])
