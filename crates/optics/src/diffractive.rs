@@ -144,6 +144,16 @@ impl PhaseProfile {
         }
     }
 
+    /// Returns the coefficient of r⁴, cycles/mm⁴.
+    pub(crate) fn fourth_order_per_mm4(&self) -> f64 {
+        match self {
+            Self::Grating { .. } => 0.0,
+            Self::Rings { radius_mm, coefficients_rad } => {
+                coefficients_rad.get(1).copied().unwrap_or(0.0) / (TAU * radius_mm.powi(4))
+            }
+        }
+    }
+
     /// Whether the phase depends on the distance from the axis alone.
     pub(crate) fn is_rotational(&self) -> bool {
         match self {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::trace::{Kind, Step};
+use crate::trace::{Kind, Phase, Step};
 
 /// The first-order data of a lens at one wavelength.
 ///
@@ -222,7 +222,7 @@ fn reduced_gap_mm(steps: &[Step], surface: usize) -> f64 {
 impl Step {
     /// The paraxial power of the surface, 1/mm.
     pub(crate) fn power(&self) -> f64 {
-        let of_phase = self.phase.as_ref().map_or(0.0, |phase| phase.profile.power_of_path() * phase.path_per_cycle_mm);
+        let of_phase = self.phase.as_ref().map_or(0.0, Phase::power);
         of_phase + self.power_of_shape()
     }
 

@@ -95,6 +95,13 @@ impl PupilBoundary {
         self.rho_mm.iter().copied().fold(0.0, f64::max)
     }
 
+    /// The area between the edge at an azimuth and at the next, beyond a circle through the nearer one.
+    fn ramp_mm2(&self, i: usize) -> f64 {
+        let n = self.rho_mm.len();
+        let squares = self.rho_mm[i].powi(2) - self.rho_mm[(i + 1) % n].powi(2);
+        0.25 * squares.abs() * std::f64::consts::TAU / n as f64
+    }
+
     fn centroid_mm(&self) -> DVec2 {
         let n = self.rho_mm.len();
         let moment = |(r, u): (&f64, DVec2)| u * (r * r * r / 3.0);
@@ -199,11 +206,26 @@ impl<'a> Search<'a> {
         let n = edge.len();
         let within = |i: usize| part.center_mm + WITHIN_CHORD * (edge[i].midpoint(edge[(i + 1) % n]) - part.center_mm);
         let clearances = self.clearances(&(0..n).map(within).collect::<Vec<_>>());
-        let ramp_mm2 = |i: usize| {
-            let squares = part.rho_mm[i].powi(2) - part.rho_mm[(i + 1) % n].powi(2);
-            0.25 * squares.abs() * std::f64::consts::TAU / n as f64
+        (0..n).filter(|&i| clearances[i] <= 0.0).map(|i| part.ramp_mm2(i)).sum()
+    }
+
+    /// Returns how much of a part's area may be wrong where its edge comes nearer from one azimuth to the next by more than this, mm²,
+    /// and light that the nearer edge hides lies beyond it, as that of a horn seen from its foot.
+    fn hidden_mm2(&self, part: &PupilBoundary, least_mm2: f64) -> f64 {
+        let n = part.rho_mm.len();
+        let jumps: Vec<usize> = (0..n).filter(|&i| part.ramp_mm2(i) > least_mm2).collect();
+        let beyond = |&i: &usize| {
+            let next = (i + 1) % n;
+            let (near, far) = if part.rho_mm[i] < part.rho_mm[next] { (i, next) } else { (next, i) };
+            let direction = DVec2::from_angle(std::f64::consts::TAU * near as f64 / n as f64);
+            let step_mm = (part.rho_mm[far] - part.rho_mm[near]) / HIDDEN_PLACES as f64;
+            let rho_mm = part.rho_mm[near];
+            (0..HIDDEN_PLACES).map(move |k| part.center_mm + (rho_mm + (k as f64 + 0.5) * step_mm) * direction)
         };
-        (0..n).filter(|&i| clearances[i] <= 0.0).map(ramp_mm2).sum()
+        let clearances = self.clearances(&jumps.iter().flat_map(beyond).collect::<Vec<_>>());
+        let is_lit = |clearances: &[f64]| clearances.iter().any(|clearance| *clearance > 0.0);
+        let hiding = jumps.iter().zip(clearances.chunks(HIDDEN_PLACES)).filter(|(_, clearances)| is_lit(clearances));
+        hiding.map(|(&i, _)| part.ramp_mm2(i)).sum()
     }
 
     /// Returns the part of the pupil around a place of it, as far as rays see the edge from the part's centroid or, where
@@ -300,6 +322,8 @@ const LEAST_STEP: f64 = 0.02;
 const WITHIN_CHORD: f64 = 0.99;
 /// The share of what a first place sees of a part that the part's centroid must see to be its center.
 const SEES_ENOUGH: f64 = 0.98;
+/// Places beyond an edge that are looked at for light that it hides.
+const HIDDEN_PLACES: usize = 12;
 /// Places between center and edge that are looked at for darkness, and how often.
 const GAP_PLACES: usize = 11;
 const GAP_ROUNDS: usize = 4;

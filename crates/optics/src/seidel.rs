@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::{
     C_LINE_NM, D_LINE_NM, F_LINE_NM, Lens, MonoLens, OpticsError,
-    trace::{Kind, Step},
+    trace::{Kind, Phase, Step},
 };
 
 /// The Seidel sums of a surface or of a whole lens, mm, in the sign convention of Welford.
@@ -110,16 +110,13 @@ impl Lens {
     ///
     /// The marginal ray passes the edge of the paraxial entrance pupil, the chief ray its center. (Of a far object and a
     /// lens that is telecentric on its side, where such rays do not exist, the sums are infinite.) An ideal lens in
-    /// the train adds nothing; a conic or asphere adds what its r⁴ term departs from the sphere.
+    /// the train adds nothing; a conic or asphere adds what its r⁴ term departs from the sphere, diffractive rings what their order
+    /// does to the path (docs/mirrors.md), with the color of their power.
     ///
     /// # Errors
     /// When a glass is not known at one of the wavelengths, or the lens is not rotationally symmetric.
     pub fn seidel(&self, settings: &SeidelSettings) -> Result<Seidel, OpticsError> {
         self.check_rotational("a sum of Seidel aberrations")?;
-        if !self.diffractive().is_empty() {
-            let reason = "Seidel sums of diffractive surfaces are not supported".to_owned();
-            return Err(OpticsError::Diffractive { lens: self.name().to_owned(), reason });
-        }
         let mono = self.at(settings.wavelength_nm)?;
         let [short, long] = [self.at(settings.colors_nm[0])?, self.at(settings.colors_nm[1])?];
         let index_before = mono.steps()[0].index_before;
@@ -135,8 +132,11 @@ impl Lens {
                 let gap = step.vertex_z - steps[i - 1].vertex_z;
                 (marginal, chief) = (marginal.moved(gap), chief.moved(gap));
             }
-            let index_difference = [&short.steps()[i], &long.steps()[i]].map(|s| [s.index_before, s.index_after]);
-            let at = AtSurface { step, marginal, chief, lagrange_mm, index_difference: difference(index_difference) };
+            let colors = [&short.steps()[i], &long.steps()[i]];
+            let index_difference = difference(colors.map(|s| [s.index_before, s.index_after]));
+            let [of_short, of_long] = colors.map(|s| s.phase.as_ref().map_or(0.0, Phase::power));
+            let phase_power_difference = of_short - of_long;
+            let at = AtSurface { step, marginal, chief, lagrange_mm, index_difference, phase_power_difference };
             let sums = at.sums();
             per_surface.push(sums);
             total += sums;
@@ -158,11 +158,16 @@ struct AtSurface<'a> {
     lagrange_mm: f64,
     /// Dispersion before and after.
     index_difference: [f64; 2],
+    /// By how much the power of a phase at the shorter wavelength exceeds that at the longer one, 1/mm.
+    phase_power_difference: f64,
 }
 
 impl AtSurface<'_> {
     fn sums(&self) -> SeidelSums {
         let (step, h) = (self.step, self.lagrange_mm);
+        if let Some(phase) = &step.phase {
+            return self.sums_with_phase(phase);
+        }
         if matches!(step.kind, Kind::Window | Kind::ThinLens { .. }) {
             return SeidelSums::default();
         }
@@ -177,14 +182,7 @@ impl AtSurface<'_> {
         // Free of the quotient of Ā and A, which fails where the marginal ray meets the surface head-on.
         let s5 = a_bar * (petzval * y_bar * (a_bar * y - h) - a_bar * a_bar * y * (1.0 / (n1 * n1) - 1.0 / (n0 * n0)));
         let color = self.index_difference[1] / step.index_after - self.index_difference[0] / n0;
-        // How much the r⁴ term departs from that of the sphere of the vertex's curvature, eightfold.
-        let fourth = |conic: f64, a4: f64| (1.0 + conic) * step.curvature.powi(3) + 8.0 * a4 - c.powi(3);
-        let bent = match &step.kind {
-            Kind::Conic { conic } => fourth(*conic, 0.0),
-            Kind::EvenAsphere { conic, coefficients, .. } => fourth(*conic, at_or_zero(coefficients, 0)),
-            Kind::OddAsphere { conic, coefficients } => fourth(*conic, at_or_zero(coefficients, 3)),
-            _ => 0.0,
-        } * (n1 - n0);
+        let bent = (step.fourth_order() - c.powi(3)) * (n1 - n0);
         SeidelSums {
             s1: -a * a * y * u_over_n + bent * y.powi(4),
             s2: -a * a_bar * y * u_over_n + bent * y.powi(3) * y_bar,
@@ -193,6 +191,61 @@ impl AtSurface<'_> {
             s5: s5 + bent * y * y_bar.powi(3),
             c1: a * y * color,
             c2: a_bar * y * color,
+        }
+    }
+
+    /// The sums where a phase is added: A = n (u + c y), on which the usual sums rest, is not the same before and after.
+    ///
+    /// The terms of fourth order of the path along paraxial rays (docs/mirrors.md, "Third order").
+    fn sums_with_phase(&self, phase: &Phase) -> SeidelSums {
+        let (step, c) = (self.step, self.step.vertex_curvature());
+        let (y, y_bar) = (self.marginal.y, self.chief.y);
+        // A mirror is a boundary to the opposite index, behind which slopes are opposite too.
+        let sign = if step.is_mirror { -1.0 } else { 1.0 };
+        let (marginal, chief) = (self.marginal.refracted(step), self.chief.refracted(step));
+        let before = Side { n: step.index_before, u: self.marginal.u, u_bar: self.chief.u };
+        let after = Side { n: sign * step.index_after, u: sign * marginal.u, u_bar: sign * chief.u };
+        let step_of = |of: &dyn Fn(Side) -> f64| of(after) - of(before);
+        let fourth = (after.n - before.n) * step.fourth_order() - 8.0 * phase.fourth_order_per_mm3();
+        let [dn_before, dn_after] = self.index_difference;
+        let color = |u_before: f64, u_after: f64, y: f64| {
+            sign * dn_after * (u_after + c * y) - dn_before * (u_before + c * y) + self.phase_power_difference * y
+        };
+        SeidelSums {
+            s1: fourth * y.powi(4) - y * step_of(&|Side { n, u, .. }| n * u * u * (u + 2.0 * c * y)),
+            s2: fourth * y.powi(3) * y_bar
+                - y * step_of(&|Side { n, u, u_bar }| n * u * (u * u_bar + c * (y * u_bar + y_bar * u))),
+            s3: fourth * (y * y_bar).powi(2)
+                - y * step_of(&|Side { n, u, u_bar }| n * u * u_bar * (u_bar + 2.0 * c * y_bar)),
+            // The power of a phase has no Petzval curvature.
+            s4: -self.lagrange_mm * self.lagrange_mm * c * step_of(&|Side { n, .. }| 1.0 / n),
+            s5: fourth * y * y_bar.powi(3)
+                - step_of(&|Side { n, u, u_bar }| {
+                    n * u_bar * (y * u_bar * u_bar + c * y_bar * (y * u_bar + y_bar * u))
+                }),
+            c1: y * color(before.u, after.u, y),
+            c2: y * color(before.u_bar, after.u_bar, y_bar),
+        }
+    }
+}
+
+/// A side of a surface: the index, and the slopes of the marginal and the chief ray.
+#[derive(Clone, Copy)]
+struct Side {
+    n: f64,
+    u: f64,
+    u_bar: f64,
+}
+
+impl Step {
+    /// Eight times the coefficient of r⁴ of the sag, 1/mm³: the cube of the curvature for a sphere.
+    fn fourth_order(&self) -> f64 {
+        let of = |conic: f64, a4: f64| (1.0 + conic) * self.curvature.powi(3) + 8.0 * a4;
+        match &self.kind {
+            Kind::Conic { conic } => of(*conic, 0.0),
+            Kind::EvenAsphere { conic, coefficients, .. } => of(*conic, at_or_zero(coefficients, 0)),
+            Kind::OddAsphere { conic, coefficients } => of(*conic, at_or_zero(coefficients, 3)),
+            _ => self.vertex_curvature().powi(3),
         }
     }
 }

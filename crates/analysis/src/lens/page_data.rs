@@ -5,6 +5,9 @@ use dioptric_optics::Lens;
 use crate::{AnalysisRequest, LensAnalysis, LensData, LensDefaults, LensInfoRequest, LensModulation};
 use dioptric_pipeline::PipelineError;
 
+/// The widest field that third-order sums are shown of, degrees.
+const MOST_FIELD_OF_SUMS_DEG: f64 = 45.0;
+
 /// The lens that was analyzed, its first-order data and its modulation.
 #[derive(Clone, Debug)]
 pub struct LensPageData {
@@ -12,8 +15,10 @@ pub struct LensPageData {
     pub lens: Lens,
     /// What the lens's file calls its surfaces; empty where it names none.
     pub surface_comments: Vec<String>,
-    /// First-order data of the lens itself, one each of the wavelengths.
+    /// First- and third-order data of the lens itself, one each of the wavelengths.
     pub data: Vec<LensData>,
+    /// The field that its third-order sums are of, degrees.
+    pub sums_field_deg: f64,
     /// The modulation, or why there is none.
     pub modulation: Result<LensModulation, String>,
 }
@@ -26,9 +31,16 @@ impl LensPageData {
     pub fn of(request: &AnalysisRequest, used: &LensDefaults, analysis: &LensAnalysis) -> Result<Self, PipelineError> {
         let lens = request.lens_with_image(&used.lens)?.0.into_owned();
         let field_deg = analysis.fields.iter().map(|row| row.place.field_deg).fold(0.0, f64::max);
+        // Third-order sums say little of wide fields.
+        let sums_field_deg = field_deg.min(MOST_FIELD_OF_SUMS_DEG);
         let distance_mm = Some(request.distance_mm).filter(|mm| mm.is_finite());
         let data = |&wavelength_nm: &f64| {
-            let question = LensInfoRequest { wavelength_nm, distance_mm, field_deg, instead_of_f_and_c_nm: None };
+            let question = LensInfoRequest {
+                wavelength_nm,
+                distance_mm,
+                field_deg: sums_field_deg,
+                instead_of_f_and_c_nm: None,
+            };
             LensData::new(&used.lens, &question)
         };
         let weights = used.weights_of(&request.wavelengths_nm);
@@ -36,6 +48,7 @@ impl LensPageData {
             data: request.wavelengths_nm.iter().map(data).collect::<Result<_, _>>()?,
             modulation: analysis.modulation(&lens, &weights).map_err(|error| error.to_string()),
             surface_comments: used.surface_comments.clone(),
+            sums_field_deg,
             lens,
         })
     }

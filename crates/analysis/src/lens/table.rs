@@ -73,7 +73,7 @@ pub struct LensData {
     /// Exit-pupil diameter over entrance-pupil diameter.
     pub pupil_magnification: f64,
     /// Radius of the image surface if there were no astigmatism (Petzval's), mm; negative when it bends towards the lens.
-    /// Only a rotationally symmetric lens without diffractive surfaces has one.
+    /// Only a rotationally symmetric lens has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub petzval_radius_mm: Option<f64>,
     /// The field angle at which the illumination of a far object falls to half, degrees: half the field of view, where
@@ -86,7 +86,7 @@ pub struct LensData {
     pub image: Option<ImageData>,
     /// The two wavelengths between which the third-order sums count color, nm; `None` where their color is unknown.
     pub seidel_colors_nm: Option<[f64; 2]>,
-    /// The third-order sums of the whole lens, mm. Only a rotationally symmetric lens without diffractive surfaces has them.
+    /// The third-order sums of the whole lens, mm. Only a rotationally symmetric lens has them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seidel: Option<SeidelSums>,
     /// The third-order sums of each surface, mm.
@@ -152,17 +152,11 @@ impl PlaneData {
 }
 
 impl LensData {
-    /// Whether third-order sums of a lens are known: those of diffractive surfaces are not.
-    fn has_third_order(lens: &Lens) -> bool {
-        lens.is_rotational() && lens.diffractive().is_empty()
-    }
-
-    /// Returns what of the data of a lens is left out and why, in one sentence; nothing where the lens has no axis of symmetry, of which
-    /// no such data are expected.
+    /// Returns what of the data of a lens is left out and why, in one sentence; nothing where it has all.
     pub fn note_on_third_order(lens: &Lens) -> Option<String> {
-        (lens.is_rotational() && !Self::has_third_order(lens)).then(|| {
+        (!lens.is_rotational()).then(|| {
             format!(
-                "{}: third-order sums and Petzval's radius are left out, diffractive surfaces are not in them",
+                "{}: third-order sums and Petzval's radius are left out: only a centered lens of revolution has them",
                 lens.name()
             )
         })
@@ -185,7 +179,7 @@ impl LensData {
             object_distance_mm: distance_mm.unwrap_or(f64::INFINITY),
             chief_slope: field_deg.to_radians().tan(),
         };
-        let has_sums = Self::has_third_order(lens);
+        let has_sums = lens.is_rotational();
         let mut seidel = has_sums.then(|| lens.seidel(&settings)).transpose()?;
         if let (Some(seidel), None) = (&mut seidel, colors_nm) {
             for sums in seidel.per_surface.iter_mut().chain([&mut seidel.total]) {
@@ -342,22 +336,28 @@ mod tests {
         assert!(LensData::new(&lens, &narrower).unwrap().seidel_colors_nm.is_none());
     }
 
-    /// A lens with rings has no third-order sums here, and all the rest: they were refused, and with them `info`, `analyze` and `run`.
     #[test]
-    fn diffractive_lenses_have_all_but_third_order() {
-        let profile = dioptric_optics::PhaseProfile::Rings { radius_mm: 12.7, coefficients_rad: vec![-40.0] };
-        let rings = dioptric_optics::DiffractiveSurface { surface: 0, order: 1, profile, blaze: None };
-        let plain = Lens::built_in("singlet-50mm").unwrap();
-        let lens = plain.clone().with_diffractive(vec![rings]).unwrap();
-        let data = LensData::new(&lens, &question(None)).unwrap();
-        assert!(data.seidel.is_none() && data.seidel_surfaces.is_empty() && data.petzval_radius_mm.is_none());
-        let whole = LensData::new(&plain, &question(None)).unwrap();
+    fn rings_have_third_order_and_gratings_a_note() {
+        use dioptric_optics::{DiffractiveSurface, PhaseProfile};
+
+        let with = |profile: PhaseProfile| {
+            let surface = DiffractiveSurface { surface: 0, order: 1, profile, blaze: None };
+            Lens::built_in("singlet-50mm").unwrap().with_diffractive(vec![surface]).unwrap()
+        };
+        let plain = LensData::new(&Lens::built_in("singlet-50mm").unwrap(), &question(None)).unwrap();
+        let rings = with(PhaseProfile::Rings { radius_mm: 12.7, coefficients_rad: vec![-40.0] });
+        let data = LensData::new(&rings, &question(None)).unwrap();
         // The power of the rings is −m λ A₁ / (π R²): with it the focal length is shorter.
-        let rings_per_mm = 40.0 * whole.first_order.wavelength_nm * 1e-6 / (std::f64::consts::PI * 12.7 * 12.7);
-        let apart = 1.0 / data.first_order.efl_mm - 1.0 / whole.first_order.efl_mm;
+        let rings_per_mm = 40.0 * plain.first_order.wavelength_nm * 1e-6 / (std::f64::consts::PI * 12.7 * 12.7);
+        let apart = 1.0 / data.first_order.efl_mm - 1.0 / plain.first_order.efl_mm;
         assert!((apart / rings_per_mm - 1.0).abs() < 0.1, "{apart} {rings_per_mm}");
-        assert!(LensData::note_on_third_order(&lens).unwrap().contains("third-order"));
-        assert_eq!(LensData::note_on_third_order(&plain), None);
+        // It has no Petzval curvature, and a color of the other sign.
+        assert_relative_eq!(data.petzval_radius_mm.unwrap(), plain.petzval_radius_mm.unwrap(), max_relative = 1e-12);
+        assert!(data.seidel_surfaces[0].c1 < plain.seidel_surfaces[0].c1);
+        assert_eq!(LensData::note_on_third_order(&rings), None);
+        let grating = with(PhaseProfile::Grating { lines_per_mm: [0.0, 100.0] });
+        assert!(LensData::new(&grating, &question(None)).unwrap().seidel.is_none());
+        assert!(LensData::note_on_third_order(&grating).unwrap().contains("third-order sums"));
     }
 
     #[test]

@@ -221,6 +221,11 @@ impl System {
         if self.fields.iter().any(|(field, _)| is_wrong(field)) {
             return Err(plain("a field is infinite, expected finite angles or heights"));
         }
+        let n_wavelengths = self.wavelengths_nm.len();
+        if n_wavelengths > 0 && self.reference >= n_wavelengths {
+            let found = self.reference.saturating_add(1);
+            return Err(plain(&format!("the reference wavelength is number {found}, expected 1 to {n_wavelengths}")));
+        }
         match stated.into_iter().find_map(|(what, found, expected)| Some((what, found?, expected))) {
             Some((what, found, expected)) => Err(plain(&format!("a {what} is {found}{expected}"))),
             None => Ok(()),

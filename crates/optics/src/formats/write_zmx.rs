@@ -199,7 +199,11 @@ impl LensFile {
                 }
                 Some(i) => lens.interfaces()[i].thickness_after_mm,
             };
-            Gap::new(&way, straight_mm)
+            match lens.moves() {
+                // Far from the first surface rounding alone would be a turn.
+                [] => Gap { thickness_mm: straight_mm, turn: None },
+                _ => Gap::new(&way, straight_mm),
+            }
         };
         lens.placements().into_iter().chain([film]).enumerate().map(gap).collect()
     }

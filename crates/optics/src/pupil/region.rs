@@ -13,6 +13,8 @@ const UNCERTAIN: f64 = 5e-4;
 const AREA_CHANGE: f64 = 2e-3;
 /// The same where light grazes a surface at the edge, which bends sharply at the ends of that part.
 const GRAZING_AREA_CHANGE: f64 = 5e-4;
+/// The share of that area from which on a jump of an outline that grazes is looked behind.
+const HIDING: f64 = 0.1;
 /// How often the number of azimuths is doubled for that.
 const MOST_DOUBLINGS: usize = 2;
 /// How far beyond an edge rays are looked at for what ends light there, over the distance from the center.
@@ -56,7 +58,9 @@ impl PupilRegion {
         let most_change = if does_graze { GRAZING_AREA_CHANGE } else { AREA_CHANGE };
         let part = search.refined(part, most_change);
         let is_smooth = part.area_change() <= most_change;
-        if is_smooth && search.uncertain_mm2(&part) <= UNCERTAIN * part.area_mm2() {
+        let most_mm2 = UNCERTAIN * part.area_mm2();
+        let hidden_mm2 = || if does_graze { search.hidden_mm2(&part, HIDING * most_mm2) } else { 0.0 };
+        if is_smooth && search.uncertain_mm2(&part) + hidden_mm2() <= most_mm2 {
             let is_beside = |(place, _): &(DVec2, f64)| part.beyond_mm(*place) > BESIDE * part.rho_max();
             lit.extend(search.lit_beyond(&part));
             if !lit.iter().any(is_beside) && !search.lit_around(&part).iter().any(is_beside) {

@@ -13,6 +13,18 @@ pub(crate) struct Phase {
     pub(crate) path_per_cycle_mm: f64,
 }
 
+impl Phase {
+    /// The paraxial power, 1/mm.
+    pub(crate) fn power(&self) -> f64 {
+        self.profile.power_of_path() * self.path_per_cycle_mm
+    }
+
+    /// The coefficient of r⁴ of the path, 1/mm³.
+    pub(crate) fn fourth_order_per_mm3(&self) -> f64 {
+        self.profile.fourth_order_per_mm4() * self.path_per_cycle_mm
+    }
+}
+
 impl Step {
     /// Returns the step at which nothing bends, so that rays come to the surface and no further.
     pub(super) fn reached(&self) -> Self {

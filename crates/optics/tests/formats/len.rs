@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dioptric_optics::{
     Field, Glass, LensFile, OpticsError, PhaseProfile, ReadOptions, Shape,
-    glam::{DMat3, DVec2},
+    glam::{DMat3, DVec2, DVec3},
 };
 
 fn try_read(name: &str, text: &str, configuration: Option<usize>) -> Result<LensFile, OpticsError> {
@@ -107,6 +107,15 @@ fn tilts_are_those_that_the_maker_of_the_program_states() {
     let [a, b, c] = [3.0_f64, -2.0, 5.0].map(f64::to_radians);
     let expected = DMat3::from_rotation_x(-a) * DMat3::from_rotation_y(-b) * DMat3::from_rotation_z(c);
     assert!((file.lens.placements()[1].rotation - expected).to_cols_array().iter().all(|e| e.abs() < 1e-15));
+}
+
+/// The program's user guide: the local origin lies by DCX, DCY, DCZ beside the vertex of the base system, and what follows
+/// stands on the axis of the local one (sinopt.com/software1/usrguide54/enterdat/tiltdec.htm).
+#[test]
+fn decenters_move_along_the_axes_of_the_frame() {
+    let text = singlet("EBR 2\nUNI 10.0", "DCX 0.1; DCY -0.2; DCZ 0.3", "");
+    let vertices_mm: Vec<DVec3> = read(&text).lens.placements().into_iter().map(|placed| placed.vertex_mm).collect();
+    assert_eq!(vertices_mm, [DVec3::new(1.0, -2.0, 3.0), DVec3::new(1.0, -2.0, 23.0)]);
 }
 
 #[test]

@@ -143,6 +143,12 @@ fn glass_may_be_a_name_a_code_or_an_index() {
 }
 
 #[test]
+fn reference_wavelength_must_be_one_of_the_list() {
+    let message = read(&DOUBLET.replace("REF   2", "REF   9")).unwrap_err().to_string();
+    assert!(message.contains("the reference wavelength is number 9, expected 1 to 3"), "{message}");
+}
+
+#[test]
 fn conics_aspheres_and_curvatures_are_read() {
     let text = DOUBLET.replace("  CIR 7.0", "  ASP; K -0.7; A 1E-6; C 1E-10").replace("S     -200.0", "S  0 ");
     let lens = read(&text).unwrap().lens;

@@ -224,3 +224,12 @@ fn perfect_lens_without_power_is_written_as_a_plane() {
     let again = read("a.zmx", &LensFile::from(lens).to_zmx().unwrap());
     assert_eq!(again.lens.interfaces()[1].surface.shape, Shape::Sphere);
 }
+
+#[test]
+fn distances_that_round_stay_straight() {
+    // The focus lies 1.5e12 mm behind: the sum of both distances less the first is not the second.
+    let file = read("list.txt", "[ 999999999999 999999999999 1.65 25 0 0.5 0 1 ]\n");
+    let zmx = file.to_zmx().unwrap();
+    assert!(zmx.contains("DISZ 1.53") && !zmx.contains("COORDBRK"), "{zmx}");
+    assert_eq!(read("again.zmx", &zmx).lens.vertices_z_mm(), file.lens.vertices_z_mm());
+}

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 
 use dioptric_optics::{
     Blaze, DiffractiveSurface, Glass, Interface, Lens, LensFile, MonoLens, ObjectPoint, PhaseProfile, RayBatch,
-    RayFate, ReadOptions, SeidelSettings, Shape, Surface, Vignetting,
+    RayFate, ReadOptions, SeidelSettings, SeidelSums, Shape, Surface, Vignetting,
     analysis::{PupilCoordinates, projected_solid_angle},
     glam::{DVec2, DVec3},
 };
@@ -230,9 +230,194 @@ fn impossible_diffractive_surfaces_are_refused() {
     let rings = |radius_mm: f64, a: f64| PhaseProfile::Rings { radius_mm, coefficients_rad: vec![a] };
     assert!(message(vec![at(1, rings(0.0, 1.0))]).contains("radius_mm of a phase is 0"));
     assert!(message(vec![at(1, rings(1.0, f64::NAN))]).contains("number of a phase is NaN"));
-    let round = lens.clone().with_diffractive(vec![at(1, rings(5.0, -3.0))]).unwrap();
-    let message = round.seidel(&SeidelSettings::far(0.0)).unwrap_err().to_string();
-    assert!(message.contains("Seidel sums of diffractive surfaces are not supported"), "{message}");
+}
+
+/// Rings of a path of `per_mm[0]` r² + `per_mm[1]` r⁴ at the wavelength.
+fn rings_of_path(per_mm: [f64; 2]) -> PhaseProfile {
+    let radius_mm = 5.0_f64;
+    let cycles = |per_mm: f64, power: i32| TAU * per_mm * radius_mm.powi(power) / (1e-6 * WAVELENGTH_NM);
+    PhaseProfile::Rings { radius_mm, coefficients_rad: vec![cycles(per_mm[0], 2), cycles(per_mm[1], 4)] }
+}
+
+fn rings_on(lens: Lens, surface: usize, per_mm: [f64; 2]) -> Lens {
+    let rings = DiffractiveSurface { surface, order: 1, profile: rings_of_path(per_mm), blaze: None };
+    lens.with_diffractive(vec![rings]).unwrap()
+}
+
+fn settings(object_distance_mm: f64, chief_slope: f64) -> SeidelSettings {
+    SeidelSettings { wavelength_nm: WAVELENGTH_NM, object_distance_mm, ..SeidelSettings::far(chief_slope) }
+}
+
+fn list(sums: &SeidelSums) -> [f64; 7] {
+    [sums.s1, sums.s2, sums.s3, sums.s4, sums.s5, sums.c1, sums.c2]
+}
+
+/// A stop 8 mm before an aspheric and a plain surface of glass, of which the one with this number is `ringed`.
+fn landscape(ringed: usize, per_mm: [f64; 2]) -> Lens {
+    let at = |surface: Surface, index: f64, thickness_after_mm: f64| Interface {
+        surface,
+        medium_after: Glass::Constant { index },
+        thickness_after_mm,
+    };
+    let asphere = Shape::EvenAsphere { conic: -0.6, coefficients: vec![-3e-6, 2e-8] };
+    let interfaces = vec![
+        at(Surface::plane(3.0), 1.0, 8.0),
+        at(Surface { shape: asphere, ..Surface::sphere(60.0, 8.0) }, 1.6, 4.0),
+        at(Surface::sphere(-90.0, 8.0), 1.0, 0.0),
+    ];
+    rings_on(Lens::new("landscape", "test", interfaces, 0).unwrap(), ringed, per_mm)
+}
+
+/// A concave mirror with rings, the stop before it.
+fn ringed_mirror() -> Lens {
+    let at =
+        |surface: Surface, thickness_after_mm: f64| Interface { surface, medium_after: Glass::Air, thickness_after_mm };
+    let interfaces = vec![at(Surface::plane(3.0), 30.0), at(Surface::sphere(-160.0, 9.0), 0.0)];
+    let lens = Lens::new("mirror", "test", interfaces, 0).unwrap().with_mirrors([1]).unwrap();
+    rings_on(lens, 1, [-5e-4, 2e-7])
+}
+
+/// Real rays of a small pupil and a small field land off the paraxial image by the gradient of the third-order sums, the rest falls
+/// off with the square of both.
+#[track_caller]
+fn check_against_rays(lens: &Lens, object_distance_mm: f64) {
+    let chief_slope = 0.1;
+    let sums = lens.seidel(&settings(object_distance_mm, chief_slope)).unwrap();
+    let SeidelSums { s1, s2, s3, s4, s5, .. } = sums.total;
+    let mono = lens.at(WAVELENGTH_NM).unwrap();
+    let first = mono.first_order();
+    let (pupil_z_mm, pupil_mm) = (first.entrance_pupil_z_mm, 0.5 * first.entrance_pupil_diameter_mm);
+    let film_mm = mono.film_distance_mm_for(object_distance_mm).unwrap();
+    // n'u' of the marginal ray, over the height of which the image is the invariant.
+    let slope = match object_distance_mm.is_finite() {
+        true => pupil_mm / (object_distance_mm + pupil_z_mm) / mono.conjugate(object_distance_mm).magnification,
+        false => -first.power_per_mm * pupil_mm,
+    };
+    let image_mm = sums.lagrange_mm / slope;
+    let size = s1.abs() + s2.abs() + s3.abs() + s4.abs() + s5.abs();
+    for (rho, field) in [
+        (DVec2::new(0.3, 0.8), DVec2::ZERO),
+        (DVec2::new(0.5, -0.7), DVec2::new(0.0, 1.0)),
+        (DVec2::new(-0.9, 0.4), DVec2::new(0.6, 0.8)),
+        (DVec2::ZERO, DVec2::new(0.6, 0.8)),
+    ] {
+        let (a, b, e) = (rho.length_squared(), rho.dot(field), field.length_squared());
+        let gradient = rho * (4.0 * s1 * a + 8.0 * s2 * b + 4.0 * (s3 + s4) * e)
+            + field * (4.0 * s2 * a + 8.0 * s3 * b + 4.0 * s5 * e);
+        let expected = gradient / (8.0 * slope);
+        let of_rays = |scale: f64| {
+            let point = match object_distance_mm.is_finite() {
+                true => {
+                    let height_mm = -chief_slope * (object_distance_mm + pupil_z_mm);
+                    ObjectPoint::Finite((scale * height_mm * field).extend(-object_distance_mm))
+                }
+                false => ObjectPoint::Infinite((scale * chief_slope * field).extend(1.0).normalize()),
+            };
+            let mut rays = mono.rays_towards(&point, &[scale * pupil_mm * rho], pupil_z_mm, 0.0);
+            mono.trace_to_film(&mut rays, Vignetting::Off, film_mm);
+            (rays.point_mm(0).truncate() - scale * image_mm * field) / scale.powi(3)
+        };
+        let (coarse, fine) = (of_rays(0.04), of_rays(0.02));
+        // What is left of the fifth order once halved scales have been extrapolated is of the seventh, 1e-6 here.
+        let found = (4.0 * fine - coarse) / 3.0;
+        let off_mm = (found - expected).length();
+        assert!(off_mm < 2e-5 * size / slope.abs(), "{found} {expected}, {rho} {field}");
+    }
+}
+
+#[test]
+fn third_order_of_rings_is_that_of_rays() {
+    for object_distance_mm in [f64::INFINITY, 300.0] {
+        for ringed in [1, 2] {
+            check_against_rays(&landscape(ringed, [-2e-3, 3e-6]), object_distance_mm);
+        }
+        check_against_rays(&ringed_mirror(), object_distance_mm);
+    }
+}
+
+#[test]
+fn rings_without_phase_leave_the_sums() {
+    let settings = settings(250.0, 0.1);
+    let plain = landscape(1, [0.0; 2]).with_diffractive(vec![]).unwrap().seidel(&settings).unwrap();
+    for ringed in [1, 2] {
+        let found = landscape(ringed, [0.0; 2]).seidel(&settings).unwrap();
+        for (found, expected) in found.per_surface.iter().zip(&plain.per_surface) {
+            for (found, expected) in list(found).into_iter().zip(list(expected)) {
+                assert!((found - expected).abs() < 1e-14, "{found} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn diffractive_lens_in_air_has_its_published_sums() {
+    // Buralli & Morris, Applied Optics 28, 3950 (1989): a plane lens at its stop, a far object. S1 = y⁴ φ³ − 8 λ G y⁴, S2 = y² φ² H,
+    // S3 = φ H², no Petzval curvature and no distortion; the Abbe number is λ / (λ_F − λ_C).
+    let (power, fourth, y, slope) = (0.02, 4e-7, 3.0, 0.1);
+    let lens = |stop_mm: f64| {
+        let plane = |semi_aperture_mm: f64, thickness_after_mm: f64| Interface {
+            surface: Surface::plane(semi_aperture_mm),
+            medium_after: Glass::Air,
+            thickness_after_mm,
+        };
+        let interfaces = vec![plane(y, stop_mm), plane(20.0, 0.0)];
+        rings_on(Lens::new("rings", "test", interfaces, 0).unwrap(), 1, [-0.5 * power, fourth])
+    };
+    let found = lens(0.0).seidel(&settings(f64::INFINITY, slope)).unwrap();
+    let h = found.lagrange_mm;
+    let abbe = WAVELENGTH_NM / (486.1327 - 656.2725);
+    let y4 = y.powi(4);
+    let expected = [
+        y4 * power.powi(3) - 8.0 * fourth * y4,
+        y * y * power * power * h,
+        power * h * h,
+        0.0,
+        0.0,
+        y * y * power / abbe,
+        0.0,
+    ];
+    for (found, expected) in list(&found.total).into_iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-15, "{found} {expected}");
+    }
+    // With the stop in the front focal plane neither coma nor astigmatism: the rays of all fields meet the lens alike.
+    let landscape = rings_on(lens(1.0 / power).with_diffractive(vec![]).unwrap(), 1, [-0.5 * power, 0.0]);
+    let found = landscape.seidel(&settings(f64::INFINITY, slope)).unwrap().total;
+    assert!(found.s2.abs() < 1e-16 && found.s3.abs() < 1e-16 && found.s4 == 0.0, "{found:?}");
+    assert!((found.s1 - y4 * power.powi(3)).abs() < 1e-16, "{found:?}");
+}
+
+#[test]
+fn rings_are_thin_lens_of_endless_index() {
+    // Sweatt, J. Opt. Soc. Am. 67, 803 (1977): of index N, its faces differ by the path over N − 1. What is left falls as 1/N.
+    let (index, [square, fourth], bent_per_mm) = (1e7, [-2e-3, 3e-6], 1.0 / 70.0);
+    let at = |surface: Surface, index: f64, thickness_after_mm: f64| Interface {
+        surface,
+        medium_after: Glass::Constant { index },
+        thickness_after_mm,
+    };
+    let stop = || at(Surface::plane(3.0), 1.0, 8.0);
+    let face = |square_per_mm: f64, fourth_per_mm3: f64| Surface {
+        shape: Shape::OddAsphere { conic: 0.0, coefficients: vec![0.0, square_per_mm, 0.0, fourth_per_mm3] },
+        ..Surface::sphere(1.0 / bent_per_mm, 8.0)
+    };
+    let thin = |path: f64| -path / (index - 1.0);
+    let sweatt = vec![
+        stop(),
+        // The front face bulges where the path is longer. Light in the layer runs along the normal of its faces, which shortens the
+        // layer's extent along z by the cosine of their slope.
+        at(face(thin(square), thin(fourth + 0.5 * square * bent_per_mm * bent_per_mm)), index, 0.0),
+        at(face(0.0, 0.0), 1.5, 0.0),
+    ];
+    let rings = vec![stop(), at(face(0.0, 0.0), 1.5, 0.0)];
+    let sweatt = Lens::new("sweatt", "test", sweatt, 0).unwrap();
+    let rings = rings_on(Lens::new("rings", "test", rings, 0).unwrap(), 1, [square, fourth]);
+    for object_distance_mm in [f64::INFINITY, 300.0] {
+        let settings = settings(object_distance_mm, 0.1);
+        let (found, expected) = (rings.seidel(&settings).unwrap().total, sweatt.seidel(&settings).unwrap().total);
+        for (found, expected) in list(&found).into_iter().zip(list(&expected)).take(5) {
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        }
+    }
 }
 
 #[dioptric_golden::needs_shared]

@@ -31,6 +31,7 @@ impl LensPage<'_> {
         let mut body = section("Lens", &(self.drawing()? + &note(&analysis.notes.join(" · "))));
         body += &section("Prescription", &self.prescription());
         body += &section("First order", &self.first_order());
+        body += &section("Third order", &self.third_order());
         if let Ok(modulation) = &self.shown.modulation {
             let charts = page::charts([&modulation.over_frequency, &modulation.over_field, &modulation.through_focus]);
             let words = "Tangential (solid): lines across the plane of axis and field, a wave along the radius. Sagittal \
@@ -93,9 +94,8 @@ impl LensPage<'_> {
         )
     }
 
-    /// One line a quantity, one column a wavelength.
     fn first_order(&self) -> String {
-        type Quantity = (&'static str, fn(&LensData) -> Option<f64>);
+        let row = |(name, of): &Quantity| self.quantity(name, *of, |v| format!("{v:.4}"));
         let quantities: [Quantity; 17] = [
             ("focal length, mm", |d| Some(d.first_order.efl_mm)),
             ("back focal length, mm", |d| Some(d.first_order.bfl_mm)),
@@ -115,24 +115,57 @@ impl LensPage<'_> {
             ("field where it ends, °", |d| d.last_light_field_deg),
             ("pupil magnification", |d| Some(d.pupil_magnification)),
         ];
-        let head: String = self
-            .shown
-            .data
-            .iter()
-            .map(|d| format!("<th class=\"n\">{:.1} nm</th>", d.first_order.wavelength_nm))
-            .collect();
-        let row = |(name, of): &(&str, fn(&LensData) -> Option<f64>)| {
-            let values: Vec<Option<f64>> = self.shown.data.iter().map(of).collect();
-            if values.iter().all(Option::is_none) {
-                return String::new();
-            }
-            let cell = |value: &Option<f64>| match value {
-                Some(value) if value.is_finite() => format!("<td class=\"n\">{value:.4}</td>"),
-                Some(_) => "<td class=\"n\">∞</td>".to_owned(),
-                None => "<td class=\"n\">–</td>".to_owned(),
-            };
-            format!("<tr><td>{name}</td>{}</tr>\n", values.iter().map(cell).collect::<String>())
+        self.by_wavelength(&quantities.iter().map(row).collect::<String>())
+    }
+
+    /// The Seidel sums of the whole lens, or why there are none.
+    fn third_order(&self) -> String {
+        let quantities: [Quantity; 7] = [
+            ("S1 (spherical aberration), mm", |d| d.seidel.map(|sums| sums.s1)),
+            ("S2 (coma), mm", |d| d.seidel.map(|sums| sums.s2)),
+            ("S3 (astigmatism), mm", |d| d.seidel.map(|sums| sums.s3)),
+            ("S4 (Petzval curvature), mm", |d| d.seidel.map(|sums| sums.s4)),
+            ("S5 (distortion), mm", |d| d.seidel.map(|sums| sums.s5)),
+            ("C1 (axial color), mm", |d| d.seidel.map(|sums| sums.c1).filter(|c1| c1.is_finite())),
+            ("C2 (lateral color), mm", |d| d.seidel.map(|sums| sums.c2).filter(|c2| c2.is_finite())),
+        ];
+        let row = |(name, of): &Quantity| self.quantity(name, *of, |v| format!("{v:.4e}"));
+        let rows: String = quantities.iter().map(row).collect();
+        let Some(data) = self.shown.data.first().filter(|_| !rows.is_empty()) else {
+            let why = LensData::note_on_third_order(&self.shown.lens);
+            return note(&why.unwrap_or_else(|| "Third-order sums are left out.".to_owned()));
         };
-        format!("<table>\n<tr><th></th>{head}</tr>\n{}</table>\n", quantities.iter().map(row).collect::<String>())
+        let color = data.seidel_colors_nm.map_or(String::new(), |[short, long]| {
+            format!(" Color from {short:.1} to {long:.1} nm.")
+        });
+        let words = format!(
+            "Seidel sums of the full aperture and a field of {:.2}°, in Welford's signs: a positive S1 is undercorrected.{color}",
+            self.shown.sums_field_deg
+        );
+        self.by_wavelength(&rows) + &note(&words)
+    }
+
+    /// Returns a table of rows with one column a wavelength.
+    fn by_wavelength(&self, rows: &str) -> String {
+        let head = |d: &LensData| format!("<th class=\"n\">{:.1} nm</th>", d.first_order.wavelength_nm);
+        let head: String = self.shown.data.iter().map(head).collect();
+        format!("<table>\n<tr><th></th>{head}</tr>\n{rows}</table>\n")
+    }
+
+    /// Returns the row of a quantity; nothing where no wavelength has it.
+    fn quantity(&self, name: &str, of: fn(&LensData) -> Option<f64>, written: impl Fn(f64) -> String) -> String {
+        let values: Vec<Option<f64>> = self.shown.data.iter().map(of).collect();
+        if values.iter().all(Option::is_none) {
+            return String::new();
+        }
+        let cell = |value: &Option<f64>| match value {
+            Some(value) if value.is_finite() => format!("<td class=\"n\">{}</td>", written(*value)),
+            Some(_) => "<td class=\"n\">∞</td>".to_owned(),
+            None => "<td class=\"n\">–</td>".to_owned(),
+        };
+        format!("<tr><td>{name}</td>{}</tr>\n", values.iter().map(cell).collect::<String>())
     }
 }
+
+/// A quantity of the data of a lens, with its name and unit.
+type Quantity = (&'static str, fn(&LensData) -> Option<f64>);
