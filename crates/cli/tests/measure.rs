@@ -233,6 +233,10 @@ fn bad_input_ends_in_one_sentence() {
     let path = folder.path();
     save(&GrayImage::from_pixel(64, 64, Luma([90])).into(), &path.join("even.png")).unwrap();
     save(&chart_picture(0).into(), &path.join("chart.png")).unwrap();
+    let mut hidden = chart_picture(0);
+    let before = (60..136).flat_map(|y| (60..136).map(move |x| (x, y)));
+    before.for_each(|(x, y)| hidden.put_pixel(x, y, Rgb([240; 3])));
+    save(&hidden.into(), &path.join("hidden.png")).unwrap();
     fs::write(path.join("text.png"), "no picture").unwrap();
     fs::write(path.join("list.txt"), "b 10 many\n").unwrap();
     fs::create_dir(path.join("empty")).unwrap();
@@ -256,6 +260,7 @@ fn bad_input_ends_in_one_sentence() {
         (&["noise", "--sensor", "imx363", "--wavelength-nm", "2000"], &["2000 nm"]),
         (&["noise", "--sensor", "imx363", "--size", "2"], &["side", "2"]),
         (&["color", "even.png"], &["even.png", "chart", "corners"]),
+        (&["color", "hidden.png"], &["4 (purplish blue, moderate red, green, red)", "not seen whole"]),
         (&["color", "chart.png", "--corners", "0,0,1"], &["--corners"]),
         (&["color", "chart.png", "--corners", "0,0,900,0,900,900,0,900"], &["within"]),
         (&["color", "chart.png", "--illuminant", "D66"], &["D66", "D65"]),

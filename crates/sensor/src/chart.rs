@@ -49,15 +49,50 @@ impl ChartReport {
 
     /// The median ΔE₀₀.
     pub fn median_delta_e(&self) -> f64 {
-        let mut sorted = self.delta_e.clone();
-        sorted.sort_by(f64::total_cmp);
-        let n = sorted.len();
-        0.5 * (sorted[(n - 1) / 2] + sorted[n / 2])
+        median(&self.delta_e)
     }
 
     /// The largest ΔE₀₀.
     pub fn max_delta_e(&self) -> f64 {
         self.delta_e.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Returns how many times as bright each patch is as it should be, of the median of all, which some hidden patches do not move.
+    fn brightness(&self) -> Vec<f64> {
+        let luminance = |rgb: &[f64; 3]| Xyz::from_linear_srgb(*rgb).luminance_cd_m2();
+        let pairs = self.linear_srgb.iter().zip(&self.wanted_linear_srgb);
+        let ratios: Vec<f64> = pairs.map(|(found, wanted)| luminance(found).max(0.0) / luminance(wanted)).collect();
+        let median = median(&ratios);
+        ratios.iter().map(|ratio| if median > 0.0 { ratio / median } else { f64::INFINITY }).collect()
+    }
+
+    /// The rms of the patches' brightness about what the median of all makes them, stops: unevenness of the light, errors of
+    /// the curve and patches that something hides. Patches darker than a tenth of white, where flare is much, do not count.
+    pub fn brightness_spread_stops(&self) -> f64 {
+        let is_bright = |rgb: &&[f64; 3]| Xyz::from_linear_srgb(**rgb).luminance_cd_m2() > 0.1;
+        let bright = self.brightness().into_iter().zip(&self.wanted_linear_srgb).filter(|(_, rgb)| is_bright(rgb));
+        let squares: Vec<f64> = bright.map(|(ratio, _)| ratio.log2().powi(2)).collect();
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    }
+
+    /// The patches, from 0, that cannot be those of the chart: more than twice as bright or dark as all together make them, and off by
+    /// more than a twentieth of white. Something hides or shades them, they are clipped, or the corners are others.
+    pub fn misfits(&self) -> Vec<usize> {
+        let wanted = self.wanted_linear_srgb.iter().map(|rgb| Xyz::from_linear_srgb(*rgb).luminance_cd_m2());
+        let is_off =
+            |(ratio, wanted): (f64, f64)| !(0.5..=2.0).contains(&ratio) && ((ratio - 1.0) * wanted).abs() > 0.05;
+        let ratios = self.brightness().into_iter().zip(wanted).enumerate();
+        ratios.filter(|(_, pair)| is_off(*pair)).map(|(patch, _)| patch).collect()
+    }
+}
+
+/// Returns the median of values, or NaN of none.
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => f64::NAN,
+        n => 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]),
     }
 }
 
@@ -178,6 +213,26 @@ mod tests {
         // Read upright its dark skin is the black.
         let wrong = ChartReport::measure(&turned, CORNERS, &Illuminant::D65).unwrap();
         assert!(wrong.delta_e[0] > 10.0);
+    }
+
+    #[test]
+    fn hidden_patches_do_not_fit() {
+        // Unlike what a camera does to all of them: an exposure, flare of 1 % of white, a cast, light that falls off by half.
+        let upright = chart(&Illuminant::D65, 1.0);
+        let seen = Array3::from_shape_fn(upright.dim(), |(row, column, k)| {
+            let light = [0.5, 0.4, 0.3][k] * (1.0 - 0.5 * column as f32 / 71.0);
+            light * (upright[(row, column, k)] + 0.01)
+        });
+        let measured = |picture: &Array3<f32>| ChartReport::measure(picture, CORNERS, &Illuminant::D65).unwrap();
+        let whole = measured(&seen);
+        assert_eq!((whole.misfits(), measured(&upright).brightness_spread_stops() < 1e-4), (vec![], true));
+        assert!((0.2..0.4).contains(&whole.brightness_spread_stops()), "{}", whole.brightness_spread_stops());
+        // A white vase before the first column, the white patch too.
+        let mut hidden = seen;
+        hidden.slice_mut(ndarray::s![.., ..SIDE, ..]).fill(0.9);
+        let report = measured(&hidden);
+        assert_eq!(report.misfits(), [0, 6, 12, 18]);
+        assert!(report.brightness_spread_stops() > 0.5);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! Even patches are parted by their borders; those of like size that lie on a common lattice are the chart, and of the
 //! ways to turn it the one whose colors fit best is taken.
 
-use dioptric_spectrum::Illuminant;
+use dioptric_spectrum::{Illuminant, color_checker_reflectances};
 use ndarray::{Array2, Array3};
 
 use crate::{
@@ -30,7 +30,8 @@ pub type ChartCorners = [(f64, f64); 4];
 /// It may be turned and seen at a slant, but not mirrored; patches may touch or have a frame between them.
 ///
 /// # Errors
-/// When there is no such chart, or patches are under about five pixels.
+/// When there is no such chart, patches are under about five pixels, or some are not those of the chart
+/// ([`ChartReport::misfits`]).
 pub fn find_chart(light_rgb: &Array3<f32>, light: &Illuminant) -> Result<ChartCorners, SensorError> {
     let factor = light_rgb.dim().0.max(light_rgb.dim().1).div_ceil(SEARCH_SIDE).max(1);
     let logs = binned_logs(light_rgb, factor);
@@ -53,7 +54,20 @@ pub fn find_chart(light_rgb: &Array3<f32>, light: &Illuminant) -> Result<ChartCo
         ChartReport::measure(light_rgb, *corners, light).map_or(f64::INFINITY, |report| report.mean_delta_e())
     };
     let best = turned.into_iter().min_by(|a, b| error_of(a).total_cmp(&error_of(b)));
-    best.filter(|corners| error_of(corners).is_finite()).ok_or_else(none)
+    let corners = best.filter(|corners| error_of(corners).is_finite()).ok_or_else(none)?;
+    let misfits = ChartReport::measure(light_rgb, corners, light)?.misfits();
+    if misfits.is_empty() {
+        return Ok(corners);
+    }
+    let chart = color_checker_reflectances();
+    let names: Vec<&str> = misfits.iter().map(|&patch| chart[patch].0.as_str()).collect();
+    let reason = format!(
+        "is not seen whole: of its 24 patches {} ({}) are more than twice as bright or as dark as the others make them, hidden, shaded or \
+         clipped; give its corners to measure it all the same",
+        names.len(),
+        names.join(", ")
+    );
+    Err(SensorError::Unsuitable { what: "the chart", reason })
 }
 
 /// Returns the logarithms of the three channels, binned.
@@ -260,7 +274,7 @@ fn best_window(seen: &[Seen]) -> Option<((i32, i32), usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dioptric_spectrum::{Observer, Xyz, color_checker_reflectances};
+    use dioptric_spectrum::{Observer, Xyz};
 
     /// Linear sRGB of the patches under D65.
     fn colors() -> Vec<[f32; 3]> {
@@ -312,6 +326,15 @@ mod tests {
             // Single precision and the 2 nm grid of the reference leave less than this.
             assert!(report.max_delta_e() < 0.1, "turned by {turn_deg}°: {:.2}", report.max_delta_e());
         }
+    }
+
+    #[test]
+    fn half_hidden_charts_are_refused() {
+        let mut picture = picture(0.0, 40.0, 0.0);
+        // Before four patches in the middle of an upright chart of 240 × 160 pixels about (210, 210).
+        picture.slice_mut(ndarray::s![170..250, 130..210, ..]).fill(0.9);
+        let reason = find_chart(&picture, &Illuminant::D65).unwrap_err().to_string();
+        assert!(reason.contains("4 (purplish blue, moderate red, green, red)"), "{reason}");
     }
 
     #[test]

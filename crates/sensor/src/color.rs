@@ -15,12 +15,15 @@ use crate::{
 pub enum ColorCorrection {
     /// A matrix fitted under the light that white is balanced for; where white is found in the picture, under the light on
     /// the scene if that is known, and else under the black body or daylight that comes nearest. None where white is not
-    /// balanced.
+    /// balanced. Where no matrix comes near enough to the observer's colors (a mean ΔE₀₀ beyond 1.5 of the 24 patches), roots as in
+    /// `Roots` count as well, with all their weight from 2 on, and less in frames of much noise.
     #[default]
     Auto,
+    /// The same, fitted under this light.
+    AutoUnder(Illuminant),
     /// The first three channels are taken as red, green and blue; one channel alone is gray.
     None,
-    /// As `Auto`, of the channels and the square roots of their products: nearer to the observer's colors than a matrix can come, at
+    /// As `Auto`, always of the channels and the square roots of their products: nearer to the observer's colors than a matrix can come, at
     /// every exposure alike. For three or four channels; noise grows a little more.
     Roots,
     /// A matrix fitted to the sensor, the 1931 observer and the 24-patch chart under this light.
@@ -53,7 +56,7 @@ impl ColorCorrection {
     pub(crate) fn check(&self, n_channels: usize) -> Result<(), SensorError> {
         let (rows, light) = match self {
             Self::Auto | Self::None => return Ok(()),
-            Self::Fitted(light) => return Ok(light.check()?),
+            Self::AutoUnder(light) | Self::Fitted(light) => return Ok(light.check()?),
             Self::Roots => (None, None),
             Self::FittedRoots(light) => (None, Some(light)),
             Self::Matrix(rows) => (Some(rows), None),
@@ -82,6 +85,11 @@ impl ColorCorrection {
 pub(crate) fn pairs(n_channels: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n_channels).flat_map(move |i| (i + 1..n_channels).map(move |j| (i, j)))
 }
+
+/// The mean ΔE₀₀ of a matrix from which on roots are mixed with it, and from which on they stand alone. Roots amplify noise more and
+/// have a mean of their own where it is as large as the signal (docs/sensor.md), so that sensors that see nearly as the observer does
+/// go without. In between both are mixed, so that no picture jumps as its light changes.
+const MISSED_DELTA_E: [f64; 2] = [1.5, 2.0];
 
 /// A matrix from balanced channels to linear sRGB, and how well it does.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -119,6 +127,28 @@ impl ColorMatrix {
         let mut training = Training::new(sensor, light, reflectances);
         training.channels = training.channels.iter().map(|channels| with_roots(channels)).collect();
         Self::fitted(&training, true)
+    }
+
+    /// Returns the matrix, mixed with that of roots as far as the matrix alone misses the observer's colors and the frame's noise lets it:
+    /// `roots_weight` is 1 without noise and 0 where it is much.
+    pub(crate) fn fit_mixed(sensor: &Sensor, light: &Illuminant, reflectances: &[Spectrum], roots_weight: f64) -> Self {
+        let matrix = Self::fit(sensor, light, reflectances);
+        let [least, most] = MISSED_DELTA_E;
+        let missed = (matrix.mean_delta_e().unwrap_or(0.0) - least) / (most - least);
+        let weight = roots_weight * missed.clamp(0.0, 1.0);
+        if weight <= 0.0 || !(3..=4).contains(&sensor.filters.len()) {
+            return matrix;
+        }
+        let mut training = Training::new(sensor, light, reflectances);
+        training.channels = training.channels.iter().map(|channels| with_roots(channels)).collect();
+        let roots = Self::fitted(&training, true);
+        let mut rows = roots.rows;
+        for (row, without) in rows.iter_mut().zip(&matrix.rows) {
+            row.iter_mut().for_each(|factor| *factor *= weight);
+            row.iter_mut().zip(without).for_each(|(factor, without)| *factor += (1.0 - weight) * without);
+        }
+        let delta_e = (0..training.rgb.len()).map(|i| training.delta_e(&rows, i)).collect();
+        Self { rows, has_roots: true, delta_e }
     }
 
     fn fitted(training: &Training, has_roots: bool) -> Self {

@@ -66,15 +66,20 @@ const NOISE_SHARES: [f64; 2] = [0.05, 0.1];
 /// The strength at which a noisy photograph comes nearest to a clean one (docs/sensor.md).
 const AUTOMATIC_STRENGTH: f64 = 0.5;
 
-/// Returns the strength that a frame's noise asks for: none where a middle gray stands 20 times above it, all where it stands ten
-/// times above it, which ISO 12232 takes to be just acceptable.
+/// Returns the strength that a frame's noise asks for.
 pub(crate) fn automatic_strength(noise: &SampleNoise) -> f64 {
+    AUTOMATIC_STRENGTH * noisiness(noise)
+}
+
+/// Returns how much noise a frame has: 0 where a middle gray stands 20 times above it or more, 1 where it stands ten times above it or less,
+/// which ISO 12232 takes to be just acceptable.
+pub(crate) fn noisiness(noise: &SampleNoise) -> f64 {
     // The slope of the scale on which noise is 1 is one over the noise.
     let (below, above) = (0.98 * MIDDLE_GRAY, 1.02 * MIDDLE_GRAY);
     let slope = f64::from(noise.stabilized(above as f32) - noise.stabilized(below as f32)) / (above - below);
     let [least, most] = NOISE_SHARES;
     let share = 1.0 / (slope * MIDDLE_GRAY);
-    AUTOMATIC_STRENGTH * ((share - least) / (most - least)).clamp(0.0, 1.0)
+    ((share - least) / (most - least)).clamp(0.0, 1.0)
 }
 
 /// A scale on which noise is 1, for a noise that changes with the sample in any way: the integral of 1 / deviation.

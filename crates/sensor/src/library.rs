@@ -4,16 +4,38 @@ use std::{fs, path::Path};
 
 use crate::{Sensor, SensorError};
 
-/// The names of the built-in sensors and their data sheets.
-const BUILT_IN: [(&str, &str); 8] = [
+/// The names of the built-in sensors and their data sheets: ideal ones, cameras, machine vision, microscopes, astronomy.
+const BUILT_IN: [(&str, &str); 30] = [
     ("ideal", include_str!("../data/ideal.ron")),
     ("ideal-mono", include_str!("../data/ideal-mono.ron")),
     ("imx363", include_str!("../data/imx363.ron")),
     ("mt9v024", include_str!("../data/mt9v024.ron")),
     ("nikon-d100", include_str!("../data/nikon-d100.ron")),
     ("nikon-d5100", include_str!("../data/nikon-d5100.ron")),
+    ("sony-a7r2", include_str!("../data/sony-a7r2.ron")),
     ("machine-vision-mono", include_str!("../data/machine-vision-mono.ron")),
+    ("imx174", include_str!("../data/imx174.ron")),
+    ("imx178", include_str!("../data/imx178.ron")),
+    ("imx183", include_str!("../data/imx183.ron")),
+    ("imx226", include_str!("../data/imx226.ron")),
+    ("imx250", include_str!("../data/imx250.ron")),
+    ("imx900", include_str!("../data/imx900.ron")),
+    ("cmv4000", include_str!("../data/cmv4000.ron")),
+    ("kac-12040", include_str!("../data/kac-12040.ron")),
+    ("kai-02170", include_str!("../data/kai-02170.ron")),
+    ("python-5000", include_str!("../data/python-5000.ron")),
     ("scmos", include_str!("../data/scmos.ron")),
+    ("gsense400bsi", include_str!("../data/gsense400bsi.ron")),
+    ("gsense4040bsi", include_str!("../data/gsense4040bsi.ron")),
+    ("gsense6510bsi", include_str!("../data/gsense6510bsi.ron")),
+    ("hwk4123", include_str!("../data/hwk4123.ron")),
+    ("icx285", include_str!("../data/icx285.ron")),
+    ("imx455", include_str!("../data/imx455.ron")),
+    ("imx492", include_str!("../data/imx492.ron")),
+    ("ccd42-80", include_str!("../data/ccd42-80.ron")),
+    ("ccd44-82", include_str!("../data/ccd44-82.ron")),
+    ("cis115", include_str!("../data/cis115.ron")),
+    ("wfc3-uvis", include_str!("../data/wfc3-uvis.ron")),
 ];
 
 impl Sensor {

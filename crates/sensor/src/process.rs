@@ -11,7 +11,7 @@ use crate::{
     balance::gains,
     color::pairs,
     defects, demosaic,
-    denoise::{SampleNoise, automatic_strength, denoise},
+    denoise::{SampleNoise, automatic_strength, denoise, noisiness},
     highlights::{Saturated, dimmed, reconstruct},
     lens_tables::warp,
     metering::percentile,
@@ -118,7 +118,7 @@ impl Processing {
         let color = match (&self.color, &white, light) {
             (ColorCorrection::Auto | ColorCorrection::Roots, WhiteBalance::None, _) => ColorCorrection::None,
             (ColorCorrection::Auto, WhiteBalance::Light(light), _) | (ColorCorrection::Auto, _, Some(light)) => {
-                ColorCorrection::Fitted(light.clone())
+                ColorCorrection::AutoUnder(light.clone())
             }
             (ColorCorrection::Roots, WhiteBalance::Light(light), _) | (ColorCorrection::Roots, _, Some(light)) => {
                 ColorCorrection::FittedRoots(light.clone())
@@ -259,7 +259,8 @@ pub(crate) fn develop_linear(
         let sources: Vec<_> = (0..n_channels).map(|channel| lens.source_px(channel, corrections)).collect();
         channels = warp(&channels, &sources);
     }
-    let color = camera.color_matrix(&processing.color, &balance)?;
+    let roots_weight = 1.0 - noisiness(middle(&noise));
+    let color = camera.color_matrix(&processing.color, &balance, roots_weight)?;
     if processing.sharpen_px > 0.0 {
         let luminance = color.luminance_shares(n_channels);
         let of = SharpenedChannels { luminance: &luminance, balance: &balance, noise: middle(&noise) };

@@ -20,11 +20,17 @@ pub(crate) trait CameraProfile {
     /// Returns what each channel sees of a perfect white under a light, up to a common factor.
     fn white_response(&self, light: &Illuminant) -> Vec<f64>;
 
-    /// Returns the matrix from channels that were balanced so to linear sRGB, for the corrections that depend on the camera.
+    /// Returns the matrix from channels that were balanced so to linear sRGB, for the corrections that depend on the camera;
+    /// `roots_weight` is how far noise lets automatic ones take roots.
     ///
     /// # Errors
     /// When the matrices of the camera have no inverse.
-    fn fitted_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError>;
+    fn fitted_matrix(
+        &self,
+        color: &ColorCorrection,
+        balance: &[f64],
+        roots_weight: f64,
+    ) -> Result<ColorMatrix, SensorError>;
 
     /// Returns the noise of a frame in the dark, standard deviation as a share of saturation.
     fn noise_floor(&self, raw: &Raw) -> f64;
@@ -34,17 +40,22 @@ pub(crate) trait CameraProfile {
 }
 
 impl dyn CameraProfile + '_ {
-    /// Returns the matrix from channels that were balanced so to linear sRGB.
+    /// Returns the matrix from channels that were balanced so to linear sRGB; `roots_weight` is how far noise lets automatic ones take roots.
     ///
     /// # Errors
     /// When the matrices of the camera have no inverse.
-    pub(crate) fn color_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError> {
+    pub(crate) fn color_matrix(
+        &self,
+        color: &ColorCorrection,
+        balance: &[f64],
+        roots_weight: f64,
+    ) -> Result<ColorMatrix, SensorError> {
         match color {
             ColorCorrection::None => Ok(ColorMatrix::identity(self.n_channels())),
             ColorCorrection::Matrix(rows) => {
                 Ok(ColorMatrix { rows: rows.clone(), has_roots: false, delta_e: Vec::new() })
             }
-            _ => self.fitted_matrix(color, balance),
+            _ => self.fitted_matrix(color, balance, roots_weight),
         }
     }
 
@@ -67,13 +78,19 @@ impl CameraProfile for Sensor {
         white_response(self, light)
     }
 
-    fn fitted_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError> {
+    fn fitted_matrix(
+        &self,
+        color: &ColorCorrection,
+        balance: &[f64],
+        roots_weight: f64,
+    ) -> Result<ColorMatrix, SensorError> {
         let chart: Vec<Spectrum> = color_checker_reflectances().into_iter().map(|(_, s)| s).collect();
         Ok(match color {
             ColorCorrection::Roots => ColorMatrix::fit_roots(self, &light_of_gains(self, balance), &chart),
             ColorCorrection::Fitted(light) => ColorMatrix::fit(self, light, &chart),
             ColorCorrection::FittedRoots(light) => ColorMatrix::fit_roots(self, light, &chart),
-            _ => ColorMatrix::fit(self, &light_of_gains(self, balance), &chart),
+            ColorCorrection::AutoUnder(light) => ColorMatrix::fit_mixed(self, light, &chart, roots_weight),
+            _ => ColorMatrix::fit_mixed(self, &light_of_gains(self, balance), &chart, roots_weight),
         })
     }
 

@@ -58,8 +58,8 @@ pub struct RunReport {
     pub losses: Vec<LossRow>,
     /// Factor on each channel that made white neutral.
     pub white_balance: Vec<f64>,
-    /// The matrix from balanced channels to linear sRGB, a row for each of red, green and blue; with `color: Roots` the factors of the
-    /// roots of their products follow.
+    /// The matrix from balanced channels to linear sRGB, a row for each of red, green and blue; where roots of their products count, their factors
+    /// follow.
     pub color_matrix: [Vec<f64>; 3],
     /// The mean ΔE₀₀ that is left of the 24-patch chart after the matrix; none where it was not fitted.
     pub color_matrix_mean_delta_e: Option<f64>,

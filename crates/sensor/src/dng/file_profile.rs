@@ -55,10 +55,12 @@ impl CameraProfile for DngProfile {
         }
     }
 
-    fn fitted_matrix(&self, color: &ColorCorrection, balance: &[f64]) -> Result<ColorMatrix, SensorError> {
+    fn fitted_matrix(&self, color: &ColorCorrection, balance: &[f64], _: f64) -> Result<ColorMatrix, SensorError> {
         let Some(matrices) = &self.color else { return Ok(ColorMatrix::identity(self.filter_names.len())) };
         let neutral = match color {
-            ColorCorrection::Fitted(light) => matrices.neutral_of(light.chromaticity()),
+            ColorCorrection::AutoUnder(light) | ColorCorrection::Fitted(light) => {
+                matrices.neutral_of(light.chromaticity())
+            }
             _ => balance.iter().map(|gain| 1.0 / gain).collect(),
         };
         let unsuitable = || SensorError::Unsuitable {
@@ -91,7 +93,7 @@ impl DngProfile {
             ColorCorrection::Roots | ColorCorrection::FittedRoots(_) => {
                 refused("color: Roots", "needs quantum efficiencies, which a DNG file does not hold, expected Auto")
             }
-            ColorCorrection::Auto | ColorCorrection::Fitted(_) if !has_colors => {
+            ColorCorrection::Auto | ColorCorrection::AutoUnder(_) | ColorCorrection::Fitted(_) if !has_colors => {
                 refused("color", "needs color matrices, which the file does not have, expected None or Matrix")
             }
             _ if !is_known(&processing.white) => {

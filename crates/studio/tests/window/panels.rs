@@ -105,7 +105,7 @@ const PANELS: &[(&str, &[&str])] = &[
     ("vignetting", &["LensCorrections.vignetting"]),
     ("white", &["Processing.white", "WhiteBalance.Light", "WhiteBalance.Patch"]),
     ("colors", &["Processing.color"]),
-    ("fitted under", &["ColorCorrection.Fitted", "ColorCorrection.FittedRoots"]),
+    ("fitted under", &["ColorCorrection.AutoUnder", "ColorCorrection.Fitted", "ColorCorrection.FittedRoots"]),
     ("primaries", &["Processing.space"]),
     ("brightness", &["Processing.brightness", "Brightness.Percentile"]),
     ("factor", &["Brightness.Factor"]),

@@ -77,7 +77,8 @@ fn colors(ui: &mut Ui, processing: &mut Processing) {
     }
     let mut corrections = vec![
         (ColorCorrection::Auto, "matrix for the white's light"),
-        (ColorCorrection::Roots, "the same with roots of products"),
+        (ColorCorrection::AutoUnder(Illuminant::D65), "the same for a light"),
+        (ColorCorrection::Roots, "always with roots of products"),
         (ColorCorrection::Fitted(Illuminant::D65), "matrix for a light"),
         (ColorCorrection::FittedRoots(Illuminant::D65), "matrix with roots for a light"),
         (ColorCorrection::None, "none"),
@@ -86,7 +87,9 @@ fn colors(ui: &mut Ui, processing: &mut Processing) {
         corrections.push((processing.color.clone(), "the matrix of the camera file"));
     }
     variant(ui, "colors", "How channels become colors", &mut processing.color, &corrections);
-    if let ColorCorrection::Fitted(light) | ColorCorrection::FittedRoots(light) = &mut processing.color {
+    if let ColorCorrection::AutoUnder(light) | ColorCorrection::Fitted(light) | ColorCorrection::FittedRoots(light) =
+        &mut processing.color
+    {
         let now = light_word(light).unwrap_or_else(|| "measured".to_owned());
         let parse = |text: &str| parse_illuminant(text).map_err(|error| error.to_string());
         if let Some(other) = meaning(ui, "fitted under", "The light that the matrix is fitted under", &now, parse) {
