@@ -312,6 +312,12 @@ pub fn blackbody(kelvin: f64) -> Spectrum {
     Spectrum::new(wavelengths_nm, values).expect("Planck's law is finite at a positive temperature")
 }
 
+/// Returns the largest spectral radiance of a black body at any wavelength, W m⁻² sr⁻¹ nm⁻¹: that at 2.897 771 955 mm K / T (Wien's
+/// displacement law).
+pub fn blackbody_peak(kelvin: f64) -> f64 {
+    planck(2.897_771_955e6 / kelvin, kelvin)
+}
+
 /// Returns the CIE daylight of a correlated color temperature, 100 at 560 nm (CIE 015:2018, 4.1.2).
 ///
 /// The temperature is moved into 4000–25000 K, where the formulas hold.

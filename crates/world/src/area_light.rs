@@ -74,7 +74,12 @@ impl AreaLight {
                 bounds.extend((0..mesh.triangles.len()).map(|triangle| {
                     let corners = mesh.corners(triangle);
                     let [a, b, c] = corners;
-                    flat(a.min(b).min(c), a.max(b).max(c), mesh.outward_normal(triangle), triangle_area(corners))
+                    flat(
+                        a.min(b).min(c),
+                        a.max(b).max(c),
+                        mesh.outward_normal(triangle, corners),
+                        triangle_area(corners),
+                    )
                 }));
                 true
             }
@@ -115,9 +120,10 @@ impl AreaLight {
             PlacedKind::Mesh(mesh) => {
                 let area = triangle.map_or(self.parts.total(), |triangle| triangle_area(mesh.corners(triangle)));
                 let triangle = triangle.unwrap_or_else(|| self.parts.pick(u_part).0);
-                let [a, b, c] = mesh.corners(triangle);
+                let corners = mesh.corners(triangle);
+                let [a, b, c] = corners;
                 let [b1, b2] = on_triangle(u);
-                let normal = mesh.outward_normal(triangle);
+                let normal = mesh.outward_normal(triangle, corners);
                 ((1.0 - b1 - b2) * a + b1 * b + b2 * c, normal, (1.0 / area) as f32)
             }
             PlacedKind::Quadric(quadric) => match quadric.cone_to(from) {

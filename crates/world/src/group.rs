@@ -1,22 +1,15 @@
 //! Primitives in a tree of boxes, so that a ray is tried on few of them.
 
-use glam::{DAffine3, DVec3, UVec2, Vec3, Vec3A};
+use glam::{DAffine3, DVec3, Vec3, Vec3A};
 use multiversion::multiversion;
-use obvhs::{
-    Boundable, BvhBuildParams,
-    aabb::Aabb,
-    bvh2::reinsertion::ReinsertionOptimizer,
-    cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh},
-    ploc::PlocBuilder,
-    ray::Ray as TreeRay,
-    traverse,
-};
+use obvhs::aabb::Aabb;
 use rayon::prelude::*;
 
 use crate::{
     WorldError,
     shape::{Quadric, placed_bounds},
-    triangle::{ShearedRay, TriangleHit},
+    tree::{Bounded, BoxRay, Leaf, MOST_THINGS, NONE, Tree},
+    triangle::{FourTriangles, LANES, ShearedRay},
 };
 
 /// A group of the world that has been placed in another.
@@ -27,7 +20,7 @@ pub(crate) struct Instance {
     pub(crate) inverse: DAffine3,
 }
 
-/// A leaf of the tree: a triangle with its corners, or something else by number.
+/// A triangle with its corners, or something else by number.
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     corners: [Vec3; 3],
@@ -37,15 +30,25 @@ struct Slot {
     primitive: u32,
 }
 
+/// What a leaf of the tree holds: up to four triangles, or one thing else as the first.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Block {
+    triangles: FourTriangles,
+    /// Of each triangle, what [`Slot`] has.
+    indices: [u32; LANES],
+    primitives: [u32; LANES],
+}
+
 const QUADRIC: u32 = u32::MAX;
 const INSTANCE: u32 = u32::MAX - 1;
 
 /// Shapes and instances of groups below it, in one frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Group {
-    tree: CwBvh,
-    /// In the order of the tree's leaves.
-    slots: Vec<Slot>,
+    tree: Tree,
+    /// One a leaf of the tree.
+    blocks: Vec<Block>,
     bounds: (DVec3, DVec3),
 }
 
@@ -76,7 +79,7 @@ pub(crate) struct Crossing {
 /// Which part of a shape.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Primitive {
-    Triangle { index: u32, b1: f32, b2: f32 },
+    Triangle { index: u32, corners: [Vec3; 3], b1: f32, b2: f32 },
     Quadric,
 }
 
@@ -103,8 +106,12 @@ impl GroupParts {
 }
 
 impl GroupParts {
-    /// Checks that everything lies within 1e12 m of the origin, so that areas of boxes stay finite.
+    /// Checks that everything lies within 1e12 m of the origin, so that areas of boxes stay finite, and can be numbered.
     pub(crate) fn check_extent(&self) -> Result<(), WorldError> {
+        if self.boxes.len() > MOST_THINGS {
+            let (what, n) = ("triangles and other shapes in one group", self.boxes.len() as u64);
+            return Err(WorldError::TooMany { what, n, limit: MOST_THINGS as u64 });
+        }
         let is_near = |corner: Vec3A| corner.is_finite() && corner.abs().max_element() <= 1e12;
         match self.boxes.iter().find(|aabb| !is_near(aabb.min) || !is_near(aabb.max)) {
             None => Ok(()),
@@ -117,31 +124,21 @@ impl GroupParts {
     }
 }
 
-/// One box of a list, as the tree's builder takes it.
-struct PaddedBox(Aabb);
-
-impl Boundable for PaddedBox {
-    fn aabb(&self) -> Aabb {
-        self.0
-    }
-}
-
 impl Group {
     /// Builds the tree over the parts.
     pub(crate) fn build(parts: GroupParts) -> Self {
         let GroupParts { slots, boxes } = parts;
         let bounds =
             boxes.iter().fold((Vec3A::MAX, Vec3A::MIN), |(low, high), aabb| (low.min(aabb.min), high.max(aabb.max)));
-        // Rounding moves the crossing of a ray with the side of a box by a few ulps of the coordinates.
+        // Rounding moves the crossing of a ray with the side of a box, and of a ray with a triangle, by a few ulps of the
+        // coordinates.
         let largest = bounds.0.abs().max(bounds.1.abs()).max_element();
-        let pad = if largest.is_finite() { 4.0 * f32::EPSILON * largest.max(1e-3) } else { 0.0 };
-        let boxes: Vec<PaddedBox> =
-            boxes.into_par_iter().enumerate().map(|(index, b)| PaddedBox(padded(b, pad, index as u32))).collect();
-        let tree = build_tree(&boxes);
-        drop(boxes);
-        let ordered = tree.primitive_indices.par_iter().map(|&index| slots[index as usize]).collect();
-        let tree = CwBvh { primitive_indices: Vec::new(), ..tree };
-        Self { tree, slots: ordered, bounds: (bounds.0.as_dvec3(), bounds.1.as_dvec3()) }
+        let pad = if largest.is_finite() { 8.0 * f32::EPSILON * largest.max(1e-3) } else { 0.0 };
+        let boxes: Vec<Bounded> =
+            boxes.into_par_iter().enumerate().map(|(index, b)| Bounded(padded(b, pad, index as u32))).collect();
+        let (tree, leaves) = Tree::build(boxes, |index| slots[index as usize].primitive < INSTANCE);
+        let blocks = leaves.par_iter().map(|leaf| Block::of(leaf, &slots)).collect();
+        Self { tree, blocks, bounds: (bounds.0.as_dvec3(), bounds.1.as_dvec3()) }
     }
 
     /// The corners of an upright box around it; reversed where it is empty.
@@ -151,15 +148,12 @@ impl Group {
 
     /// Returns the nearest crossing with `0 < t < t_max`.
     pub(crate) fn nearest(&self, parts: &impl Parts, origin: Vec3, direction: Vec3, t_max: f32) -> Option<Crossing> {
-        let mut found = None;
-        let ray = GroupRay::new(origin, direction, t_max);
-        nearest_in(self, parts, ray, &mut found);
-        found
+        nearest_in(self, parts, &GroupRay::new(origin, direction), t_max)
     }
 
     /// Tells whether anything is crossed with `0 < t < t_max`.
     pub(crate) fn is_crossed(&self, parts: &impl Parts, origin: Vec3, direction: Vec3, t_max: f32) -> bool {
-        is_crossed_in(self, parts, GroupRay::new(origin, direction, t_max))
+        is_crossed_in(self, parts, &GroupRay::new(origin, direction), t_max)
     }
 }
 
@@ -177,55 +171,33 @@ fn padded(aabb: Aabb, pad: f32, index: u32) -> Aabb {
     Aabb::new(aabb.min - three(0x1656_67b1), aabb.max + three(0xd3a2_646c))
 }
 
-/// A tree of eight-way nodes over boxes, of which there can be none.
-fn build_tree(boxes: &[PaddedBox]) -> CwBvh {
-    if boxes.is_empty() {
-        return CwBvh::default();
+impl Block {
+    fn of(leaf: &Leaf, slots: &[Slot]) -> Self {
+        let mut block = Self { triangles: FourTriangles::NONE, indices: [0; LANES], primitives: [0; LANES] };
+        for (lane, &thing) in leaf.iter().enumerate().filter(|(_, thing)| **thing != NONE) {
+            let Slot { corners, index, primitive } = slots[thing as usize];
+            (block.indices[lane], block.primitives[lane]) = (index, primitive);
+            if primitive < INSTANCE {
+                block.triangles.set(lane, corners);
+            }
+        }
+        block
     }
-    // The steps of obvhs's own `build_cwbvh`, without its validation in debug builds, which takes minutes.
-    let settings = BvhBuildParams::medium_build();
-    let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
-        settings.ploc_search_distance,
-        boxes,
-        (0..boxes.len() as u32).collect(),
-        settings.sort_precision,
-        settings.search_depth_threshold,
-    );
-    ReinsertionOptimizer::default().run(&mut binary, settings.reinsertion_batch_ratio, None);
-    bvh2_to_cwbvh(&binary, 3, true, false)
 }
 
 /// A ray in the frame of a group, with what the tests of boxes and triangles need of it.
 #[derive(Clone, Copy)]
 struct GroupRay {
-    tree: TreeRay,
+    boxes: BoxRay,
     triangles: ShearedRay,
     origin: Vec3,
     direction: Vec3,
 }
 
-/// The box test of the tree takes `t` below 1e-4 for behind the ray; it is given directions shorter by this factor, so
-/// that this is 1e-7 of a direction's length.
-const SHORTENED: f32 = 1.0 / 1024.0;
-
 impl GroupRay {
-    fn new(origin: Vec3, direction: Vec3, t_max: f32) -> Self {
-        let shortened = SHORTENED * Vec3A::from(direction);
-        // A component of 0 is as good as one so small that the ray doesn't move along it.
-        // The tree takes −0 for positive.
-        let inverse = |d: f32| match d {
-            d if d.abs() >= 1e-18 => 1.0 / d,
-            d if d < 0.0 => -1e18,
-            _ => 1e18,
-        };
+    fn new(origin: Vec3, direction: Vec3) -> Self {
         Self {
-            tree: TreeRay {
-                origin: origin.into(),
-                direction: shortened,
-                inv_direction: Vec3A::new(inverse(shortened.x), inverse(shortened.y), inverse(shortened.z)),
-                tmin: 0.0,
-                tmax: t_max / SHORTENED,
-            },
+            boxes: BoxRay::new(origin.to_array(), direction.to_array()),
             triangles: ShearedRay::new(origin, direction),
             origin,
             direction,
@@ -233,10 +205,10 @@ impl GroupRay {
     }
 
     /// Returns the ray in the frame of an instance; `t` means the same.
-    fn within(&self, instance: &Instance, t_max: f32) -> Self {
+    fn within(&self, instance: &Instance) -> Self {
         let origin = instance.inverse.transform_point3(self.origin.as_dvec3()).as_vec3();
         let direction = instance.inverse.transform_vector3(self.direction.as_dvec3()).as_vec3();
-        Self::new(origin, direction, t_max)
+        Self::new(origin, direction)
     }
 
     fn meets_quadric(&self, quadric: &Quadric, t_max: f32) -> Option<f32> {
@@ -246,62 +218,53 @@ impl GroupRay {
 }
 
 #[multiversion(targets("x86_64+avx+avx2+bmi1+bmi2+lzcnt+popcnt"), dispatcher = "direct")]
-fn nearest_in<P: Parts>(group: &Group, parts: &P, ray: GroupRay, found: &mut Option<Crossing>) {
-    let mut tree_ray = ray.tree;
-    let mut t_max = tree_ray.tmax * SHORTENED;
-    let mut state = group.tree.new_traversal(tree_ray.direction);
-    let mut node;
-    traverse!(group.tree, node, state, node.intersect_ray(&tree_ray, state.oct_inv4), {
-        let slot = &group.slots[state.primitive_id as usize];
-        let crossing = match slot.primitive {
-            QUADRIC => ray.meets_quadric(parts.quadric(slot.index), t_max).map(|t| Crossing {
+fn nearest_in<P: Parts>(group: &Group, parts: &P, ray: &GroupRay, t_max: f32) -> Option<Crossing> {
+    let mut found = None;
+    group.tree.nearest(&ray.boxes, t_max, |leaf, t_max| {
+        let block = &group.blocks[leaf];
+        let shape = block.indices[0];
+        let crossing = match block.primitives[0] {
+            QUADRIC => ray.meets_quadric(parts.quadric(shape), *t_max).map(|t| Crossing {
                 t,
-                shape: slot.index,
+                shape,
                 primitive: Primitive::Quadric,
                 instance: None,
             }),
             INSTANCE => {
-                let instance = parts.instance(slot.index);
-                let mut within = None;
-                nearest_in(parts.group(instance.group), parts, ray.within(instance, t_max), &mut within);
-                within.map(|crossing| Crossing { instance: Some(slot.index), ..crossing })
+                let instance = parts.instance(shape);
+                nearest_in(parts.group(instance.group), parts, &ray.within(instance), *t_max)
+                    .map(|crossing| Crossing { instance: Some(shape), ..crossing })
             }
-            index => ray.triangles.meets(&slot.corners, t_max).map(|TriangleHit { t, b1, b2 }| Crossing {
-                t,
-                shape: slot.index,
-                primitive: Primitive::Triangle { index, b1, b2 },
-                instance: None,
+            _ => ray.triangles.meets(&block.triangles, *t_max).map(|hit| {
+                let index = block.primitives[hit.lane];
+                let corners = block.triangles.get(hit.lane);
+                Crossing {
+                    t: hit.t,
+                    shape: block.indices[hit.lane],
+                    primitive: Primitive::Triangle { index, corners, b1: hit.b1, b2: hit.b2 },
+                    instance: None,
+                }
             }),
         };
         if let Some(crossing) = crossing {
-            t_max = crossing.t;
-            tree_ray.tmax = t_max / SHORTENED;
-            *found = Some(crossing);
+            *t_max = crossing.t;
+            found = Some(crossing);
         }
     });
+    found
 }
 
 #[multiversion(targets("x86_64+avx+avx2+bmi1+bmi2+lzcnt+popcnt"), dispatcher = "direct")]
-fn is_crossed_in<P: Parts>(group: &Group, parts: &P, ray: GroupRay) -> bool {
-    let t_max = ray.tree.tmax * SHORTENED;
-    let mut state = group.tree.new_traversal(ray.tree.direction);
-    let mut node;
-    let mut is_crossed = false;
-    'tree: {
-        traverse!(group.tree, node, state, node.intersect_ray(&ray.tree, state.oct_inv4), {
-            let slot = &group.slots[state.primitive_id as usize];
-            is_crossed = match slot.primitive {
-                QUADRIC => ray.meets_quadric(parts.quadric(slot.index), t_max).is_some(),
-                INSTANCE => {
-                    let instance = parts.instance(slot.index);
-                    is_crossed_in(parts.group(instance.group), parts, ray.within(instance, t_max))
-                }
-                _ => ray.triangles.meets(&slot.corners, t_max).is_some(),
-            };
-            if is_crossed {
-                break 'tree;
+fn is_crossed_in<P: Parts>(group: &Group, parts: &P, ray: &GroupRay, t_max: f32) -> bool {
+    group.tree.any(&ray.boxes, t_max, |leaf| {
+        let block = &group.blocks[leaf];
+        match block.primitives[0] {
+            QUADRIC => ray.meets_quadric(parts.quadric(block.indices[0]), t_max).is_some(),
+            INSTANCE => {
+                let instance = parts.instance(block.indices[0]);
+                is_crossed_in(parts.group(instance.group), parts, &ray.within(instance), t_max)
             }
-        });
-    }
-    is_crossed
+            _ => ray.triangles.meets(&block.triangles, t_max).is_some(),
+        }
+    })
 }

@@ -35,6 +35,7 @@ mod sampling;
 mod shape;
 mod sky;
 mod texture;
+mod tree;
 mod triangle;
 mod upsample;
 mod world;

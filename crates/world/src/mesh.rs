@@ -75,9 +75,10 @@ impl TriangleMesh {
         self.triangles[triangle].map(|v| self.positions[v as usize])
     }
 
-    /// Returns the outward normal of a triangle, of length 1: the side its vertex normals point to, where it has them.
-    pub(crate) fn outward_normal(&self, triangle: usize) -> Vec3 {
-        let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
+    /// Returns the outward normal of a triangle with these corners, of length 1: the side its vertex normals point to, where
+    /// it has them.
+    pub(crate) fn outward_normal(&self, triangle: usize, corners: [Vec3; 3]) -> Vec3 {
+        let [a, b, c] = corners.map(|p| p.as_dvec3());
         let normal = (b - a).cross(c - a).normalize_or(DVec3::Z).as_vec3();
         let is_inward = !self.normals.is_empty()
             && self.triangles[triangle].iter().map(|&v| self.normals[v as usize]).sum::<Vec3>().dot(normal) < 0.0;

@@ -161,7 +161,9 @@ impl Geometry {
         let shape = &self.shapes[crossing.shape as usize];
         let instance = crossing.instance.map(|index| &self.instances[index as usize]);
         let mut hit = match (&shape.kind, crossing.primitive) {
-            (PlacedKind::Mesh(mesh), Primitive::Triangle { index, b1, b2 }) => mesh.hit(index, b1, b2),
+            (PlacedKind::Mesh(mesh), Primitive::Triangle { index, corners, b1, b2 }) => {
+                mesh.hit(index, corners, b1, b2)
+            }
             (PlacedKind::Quadric(quadric), _) => {
                 let world_point = ray.origin.as_dvec3() + f64::from(crossing.t) * ray.direction.as_dvec3();
                 quadric.hit(instance.map_or(world_point, |i| i.inverse.transform_point3(world_point)))
@@ -186,20 +188,22 @@ impl Geometry {
 
 impl TriangleMesh {
     /// Returns a hit of a triangle in the mesh's own frame, with what the mesh doesn't know left at 0.
-    fn hit(&self, triangle: u32, b1: f32, b2: f32) -> Hit {
-        let corners = self.corners(triangle as usize);
-        let vertices = self.triangles[triangle as usize].map(|v| v as usize);
+    ///
+    /// The corners are given, since the tree holds them too: a mesh without normals and texture coordinates is not looked
+    /// into, which on a large one means waiting for memory.
+    fn hit(&self, triangle: u32, corners: [Vec3; 3], b1: f32, b2: f32) -> Hit {
+        let vertices = || self.triangles[triangle as usize].map(|v| v as usize);
         let b0 = 1.0 - b1 - b2;
         let weigh = |[a, b, c]: [Vec3; 3]| b0 * a + b1 * b + b2 * c;
         let [a, b, c] = corners;
         // Rounding of the weighted sum: γ₇ of the sum of magnitudes (pbrt, 4th edition, 6.8.5), by its largest component.
         let magnitude = weigh(corners.map(Vec3::abs)).max_element();
-        let geometric_normal = self.outward_normal(triangle as usize);
+        let geometric_normal = self.outward_normal(triangle as usize, corners);
         let shading_normal = match self.normals.is_empty() {
             true => geometric_normal,
-            false => weigh(vertices.map(|v| self.normals[v])).normalize_or(geometric_normal),
+            false => weigh(vertices().map(|v| self.normals[v])).normalize_or(geometric_normal),
         };
-        let uvs = if self.uvs.is_empty() { [Vec2::ZERO, Vec2::X, Vec2::ONE] } else { vertices.map(|v| self.uvs[v]) };
+        let uvs = if self.uvs.is_empty() { [Vec2::ZERO, Vec2::X, Vec2::ONE] } else { vertices().map(|v| self.uvs[v]) };
         let (dp_du, dp_dv) = derivatives([b - a, c - a], [uvs[1] - uvs[0], uvs[2] - uvs[0]], geometric_normal);
         Hit {
             distance_m: 0.0,

@@ -5,7 +5,7 @@ mod mutate;
 use std::path::{Path, PathBuf};
 
 use dioptric_golden::mutant;
-use dioptric_spectrum::Cancel;
+use dioptric_spectrum::{Cancel, Observer, WavelengthGrid};
 use dioptric_world::{
     CameraKind, Ray, ReadOptions, World, WorldError,
     glam::{DVec3, Vec3},
@@ -111,6 +111,54 @@ fn explicit_spectra_of_lights_keep_their_mean() {
     };
     assert!((radiance(text) - 2.0).abs() < 1e-5);
     assert!((radiance(&format!("{text} WorldEnd")) - 6.0).abs() < 1e-5);
+}
+
+/// A black body is scaled to a peak of 1 at its own wavelength, be that beyond the visible, in textures and lights alike; the fourth
+/// version scales lights to a photopic mean of 1.
+#[test]
+fn black_bodies_peak_at_one() {
+    // (1450 nm / 550 nm)⁵ (e^4.965114 − 1)/(e^13.0798 − 1) of 2000 K, and the like of 6500 K.
+    let share = |kelvin: f64| {
+        let x = 1.438_776_877e7 / (550.0 * kelvin);
+        ((x / 4.965_114_232).powi(5) * 4.965_114_232_f64.exp_m1() / x.exp_m1()) as f32
+    };
+    let glow = |kelvin: f64, words: &str, end: &str| {
+        let light = words.replace('@', &format!("[ {kelvin} ]"));
+        let world = read_text(&format!("WorldBegin {light} Shape \"sphere\" {end}")).unwrap();
+        assert_eq!(world.notes(), [""; 0]);
+        let ball = hit(&world, [0.0, 0.0, -5.0], [0.0, 0.0, 1.0]).unwrap();
+        let emission = world.emission(&ball, Vec3::NEG_Z, &[550.0])[0];
+        let albedo = world.bsdf(&ball, Vec3::NEG_Z, &[550.0]).albedo()[0];
+        (emission, albedo)
+    };
+    for kelvin in [2000.0, 6500.0] {
+        let share = share(kelvin);
+        let is_share = |value: f32, factor: f32| (value / (factor * share) - 1.0).abs() < 1e-5;
+        let area = "AreaLightSource \"diffuse\" \"blackbody L\" @ \"float scale\" 3";
+        assert!(is_share(glow(kelvin, area, "WorldEnd").0, 3.0), "{kelvin}");
+        // The same curve by another factor, whose photopic mean is 3.
+        let by_version_4 = glow(kelvin, area, "").0 / share;
+        let planck = |nm: f64| {
+            (nm / 550.0).powi(-5) * (2.61596e4 / kelvin).exp_m1() / (1.438_776_877e7 / (nm * kelvin)).exp_m1()
+        };
+        let grid = WavelengthGrid::uniform(380.0, 780.0, 5.0).unwrap();
+        let weights = &Observer::Cie1931.weights(&grid)[1];
+        let weighted: f64 = grid.centers_nm().iter().zip(weights).map(|(&nm, weight)| weight * planck(nm)).sum();
+        let expected = 3.0 * weights.iter().sum::<f64>() / weighted / f64::from(share);
+        assert!((f64::from(by_version_4) / expected - 1.0).abs() < 1e-3, "{kelvin}: {by_version_4} {expected}");
+        for texture in [
+            "Material \"diffuse\" \"blackbody reflectance\" @",
+            "Texture \"warm\" \"spectrum\" \"constant\" \"blackbody value\" @ Material \"diffuse\" \"texture reflectance\" \"warm\"",
+            "Texture \"warm\" \"spectrum\" \"scale\" \"blackbody tex\" @ \"float scale\" 1 Material \"diffuse\" \"texture reflectance\" \"warm\"",
+            "Texture \"warm\" \"spectrum\" \"mix\" \"blackbody tex1\" @ \"blackbody tex2\" @ Material \"diffuse\" \"texture reflectance\" \"warm\"",
+        ] {
+            assert!(is_share(glow(kelvin, texture, "").1, 1.0), "{texture}");
+        }
+    }
+    // The third version has a factor after the temperature.
+    let with_factor = "WorldBegin LightSource \"infinite\" \"blackbody L\" [ 2000 5 ] WorldEnd";
+    let sky = read_text(with_factor).unwrap().sky(Vec3::Y, &[550.0])[0];
+    assert!((sky / (5.0 * share(2000.0)) - 1.0).abs() < 1e-5, "{sky}");
 }
 
 #[test]

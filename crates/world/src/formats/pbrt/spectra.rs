@@ -1,7 +1,7 @@
 //! Spectra of pbrt files.
 
 use dioptric_optics::{Glass, GlassCatalogue};
-use dioptric_spectrum::{Illuminant, Observer, Spectrum, WavelengthGrid, Xyz, blackbody};
+use dioptric_spectrum::{Illuminant, Observer, Spectrum, WavelengthGrid, Xyz, blackbody, blackbody_peak};
 
 use super::{Fault, Reader, Version, params::Param};
 use crate::{Beyond, MetalKind, SpectralCurve};
@@ -38,10 +38,8 @@ impl Reader<'_> {
                     return Err(wrong("a temperature from 100 to 1000000 K"));
                 }
                 // Both versions scale a black body so that its peak is 1; the third has a factor after it.
-                let spectrum = blackbody(kelvin);
-                let peak = spectrum.values().iter().fold(0.0, |a: f64, b| a.max(*b));
                 let factor = param.numbers.get(1).copied().unwrap_or(1.0);
-                SpectralCurve::new(&spectrum.scaled(factor / peak), beyond)
+                SpectralCurve::new(&blackbody(kelvin).scaled(factor / blackbody_peak(kelvin)), beyond)
             }
             "spectrum" if !param.numbers.is_empty() => {
                 SpectralCurve::new(&knots(&param.numbers).map_err(Fault::Here)?, beyond)
