@@ -46,6 +46,9 @@ impl Symmetry {
     }
 }
 
+/// Kernels of so many samples along a side get a border before they are moved: of larger ones the outermost hold too little to matter.
+const SMALL: usize = 9;
+
 /// A kernel whose samples sum to 1, about the reference point of a lens.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct KnotKernel {
@@ -59,7 +62,9 @@ impl KnotKernel {
     pub(crate) fn new(kernel: &Kernel) -> Self {
         let (kernel, centroid_px) = (&kernel.samples, kernel.centroid_px);
         let (rows, columns) = kernel.dim();
-        let width = rows.max(columns);
+        // Light that is moved from the outermost samples needs a place.
+        let border = if centroid_px != DVec2::ZERO && rows.max(columns) <= SMALL { 2 } else { 0 };
+        let width = rows.max(columns) + border;
         let (top, left) = ((width - rows) / 2, (width - columns) / 2);
         let sum: f64 = kernel.iter().map(|&v| f64::from(v)).sum();
         let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
@@ -321,6 +326,9 @@ mod tests {
         assert!((across - 0.2).abs() < 1e-6 && (down + 0.1).abs() < 1e-6, "{down} {across}");
         let point = even(1, 1);
         assert_eq!((point.width, point.samples), (1, vec![1.0]));
+        // A point aside is shared by two pixels.
+        let [down, across] = knot_kernel(Array2::ones((1, 1)), DVec2::new(0.03, -0.3)).first_moments();
+        assert!((across - 0.03).abs() < 1e-5 && (down + 0.3).abs() < 1e-3, "{down} {across}");
     }
 
     /// A comet pointing away from the axis at (tan 2, 1): right and up.
