@@ -35,12 +35,8 @@ impl LensPageData {
         let sums_field_deg = field_deg.min(MOST_FIELD_OF_SUMS_DEG);
         let distance_mm = Some(request.distance_mm).filter(|mm| mm.is_finite());
         let data = |&wavelength_nm: &f64| {
-            let question = LensInfoRequest {
-                wavelength_nm,
-                distance_mm,
-                field_deg: sums_field_deg,
-                instead_of_f_and_c_nm: None,
-            };
+            let question =
+                LensInfoRequest { wavelength_nm, distance_mm, field_deg: sums_field_deg, instead_of_f_and_c_nm: None };
             LensData::new(&used.lens, &question)
         };
         let weights = used.weights_of(&request.wavelengths_nm);

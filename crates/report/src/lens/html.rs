@@ -135,9 +135,9 @@ impl LensPage<'_> {
             let why = LensData::note_on_third_order(&self.shown.lens);
             return note(&why.unwrap_or_else(|| "Third-order sums are left out.".to_owned()));
         };
-        let color = data.seidel_colors_nm.map_or(String::new(), |[short, long]| {
-            format!(" Color from {short:.1} to {long:.1} nm.")
-        });
+        let color = data
+            .seidel_colors_nm
+            .map_or(String::new(), |[short, long]| format!(" Color from {short:.1} to {long:.1} nm."));
         let words = format!(
             "Seidel sums of the full aperture and a field of {:.2}°, in Welford's signs: a positive S1 is undercorrected.{color}",
             self.shown.sums_field_deg
