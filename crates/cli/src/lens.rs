@@ -217,7 +217,13 @@ fn number(key: &str, value: &serde_json::Value) -> String {
         return if is_so { "yes" } else { "no" }.to_owned();
     }
     match value.as_f64() {
-        None if key.ends_with("_deg") || key.ends_with("colors_nm") || key.starts_with('C') => "–".to_owned(),
+        None if key.ends_with("_deg")
+            || key.ends_with("colors_nm")
+            || key.starts_with('C')
+            || key == "real_f_number" =>
+        {
+            "–".to_owned()
+        }
         Some(v) if v == 0.0 || (1e-3..1e6).contains(&v.abs()) => format!("{v:.6}"),
         Some(v) => format!("{v:.5e}"),
         None => "inf".to_owned(),

@@ -140,11 +140,11 @@ impl LensDefaults {
         let mono = self.lens.at(wavelength_nm).ok()?;
         let first = mono.first_order();
         let sign = if mono.is_rotational() { 1.0 } else { -1.0 };
-        let far = |tan: DVec2| tan.to_array().map(|tan| tan.atan().to_degrees());
+        // Not −0.
+        let far = |tan: DVec2| tan.to_array().map(|tan| tan.atan().to_degrees() + 0.0);
         let (mut angles_deg, mut heights_mm) = (Vec::new(), Vec::new());
         for field in &self.fields {
             match *field {
-                // Not −0.
                 Field::Angle { x_deg, y_deg } => angles_deg.push([x_deg, y_deg].map(|deg| sign * deg + 0.0)),
                 Field::ObjectHeight { x_mm, y_mm } => heights_mm.push([x_mm, y_mm]),
                 Field::RealImageHeight { x_mm, y_mm } => {

@@ -192,7 +192,10 @@ impl RunReport {
             dioptric: env!("CARGO_PKG_VERSION"),
             camera: capture.camera.clone(),
             lens: optics.lens,
-            lens_notes: capture.lens_notes(),
+            lens_notes: {
+                let without_sums = LensData::note_on_third_order(&capture.lens.lens);
+                capture.lens_notes().into_iter().chain(without_sums).collect()
+            },
             film_distance_mm: place.film_distance_mm,
             film: FilmData {
                 columns: place.columns,
