@@ -197,31 +197,54 @@ fn shrink(plane: &Array2<f32>, strength: f32) -> Array2<f32> {
     kept + smooth
 }
 
+/// The taps of the B₃ spline.
+const TAPS: [f32; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
+
+/// Returns where the taps about a place lie, `hole` apart; the border is mirrored.
+fn tapped(place: usize, hole: usize, n: usize) -> [usize; 5] {
+    [-2_isize, -1, 0, 1, 2].map(|tap| {
+        let last = n as isize - 1;
+        let place = (place as isize + tap * hole as isize).abs();
+        // One reflection is enough unless the plane is smaller than the filter.
+        (if place > last { (2 * last - place).max(0) } else { place }) as usize
+    })
+}
+
 /// Returns the plane smoothed by the B₃ spline with `hole` pixels between its taps; the border is mirrored.
 fn smoothed(plane: &Array2<f32>, hole: usize) -> Array2<f32> {
-    const TAPS: [f32; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
     let (n_rows, n_columns) = plane.dim();
-    let places = |i: usize, n: usize| {
-        [-2_isize, -1, 0, 1, 2].map(|tap| {
-            let last = n as isize - 1;
-            let place = (i as isize + tap * hole as isize).abs();
-            // One reflection is enough unless the plane is smaller than the filter.
-            (if place > last { (2 * last - place).max(0) } else { place }) as usize
-        })
-    };
     let mut along = Array2::zeros((n_rows, n_columns));
     for (from, mut to) in plane.outer_iter().zip(along.outer_iter_mut()) {
-        for (column, value) in to.iter_mut().enumerate() {
-            *value = places(column, n_columns).iter().zip(TAPS).map(|(&c, tap)| tap * from[c]).sum();
-        }
+        let to = to.as_slice_mut().expect("a new array is contiguous");
+        smooth_row(from.as_slice().expect("planes of phases are contiguous"), to, hole);
     }
     let mut both = Array2::zeros((n_rows, n_columns));
+    let lines = along.as_slice().expect("a new array is contiguous");
     for (row, mut to) in both.outer_iter_mut().enumerate() {
-        for (&r, tap) in places(row, n_rows).iter().zip(TAPS) {
-            to.scaled_add(tap, &along.row(r));
-        }
+        let to = to.as_slice_mut().expect("a new array is contiguous");
+        sum_taps(to, tapped(row, hole, n_rows).map(|r| &lines[r * n_columns..][..n_columns]));
     }
     both
+}
+
+fn smooth_row(from: &[f32], to: &mut [f32], hole: usize) {
+    let (n, reach) = (from.len(), 2 * hole);
+    let at_border = |column: usize| tapped(column, hole, n).iter().zip(TAPS).map(|(&c, tap)| tap * from[c]).sum();
+    if n <= 2 * reach {
+        to.iter_mut().enumerate().for_each(|(column, value)| *value = at_border(column));
+        return;
+    }
+    (0..reach).chain(n - reach..n).for_each(|column| to[column] = at_border(column));
+    let inner = n - 2 * reach;
+    sum_taps(&mut to[reach..][..inner], [0, 1, 2, 3, 4].map(|tap| &from[tap * hole..][..inner]));
+}
+
+/// Sums five rows by the taps: in one loop over slices of one length, which is vector code.
+fn sum_taps(to: &mut [f32], [a, b, c, d, e]: [&[f32]; 5]) {
+    let outer = a.iter().zip(b).zip(c).zip(d).zip(e);
+    for (value, ((((a, b), c), d), e)) in to.iter_mut().zip(outer) {
+        *value = TAPS[0] * a + TAPS[1] * b + TAPS[2] * c + TAPS[3] * d + TAPS[4] * e;
+    }
 }
 
 #[cfg(test)]
