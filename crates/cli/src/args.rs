@@ -319,7 +319,7 @@ pub(crate) struct PictureArgs {
     /// Aberrations of the simulated lens that are undone: all, none, or of distortion, lateral-color, vignetting [default: none]
     #[arg(long, value_name = "LIST", help_heading = heading::EXPOSURE)]
     pub(crate) lens_corrections: Option<String>,
-    /// How channels become colors: auto (a matrix fitted for sensor and light), roots (of their products too: nearer), none
+    /// How channels become colors: auto (a matrix fitted for sensor and light, with roots of their products where no matrix comes near), roots, none
     /// [default: auto]
     #[arg(long, value_name = "KIND", help_heading = heading::EXPOSURE)]
     pub(crate) color: Option<String>,

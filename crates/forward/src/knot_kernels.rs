@@ -266,7 +266,7 @@ const CENTERED_PX: f64 = 1e-7;
 /// middle. Such a shift changes over the film, and a change of shift is light that is drawn together or apart: half a per cent of a
 /// uniform plane in focus. Each round adds the derivative by central differences, which leaves second moments as they are.
 fn center(samples: &mut Vec<f64>, width: usize, centroid_px: DVec2) {
-    const ROUNDS: usize = 16;
+    const ROUNDS: usize = 40;
     let middle = (width / 2) as f64;
     for _ in 0..ROUNDS {
         let (mut across, mut down) = (-centroid_px.x, -centroid_px.y);

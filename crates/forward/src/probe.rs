@@ -108,13 +108,14 @@ impl<'a> Probe<'a> {
                 splines.entry(coarsest).or_default().push((cell, weights));
             }
         }
-        let mut shadings: BTreeMap<Cell, f64> = BTreeMap::new();
+        let mut shadings: BTreeMap<Cell, Shading> = BTreeMap::new();
         for (factor, splines) in splines {
             for (cell, SplineError { edge, shading }) in self.spline_errors(factor, &splines, work)? {
                 if edge > self.settings.max_edge_error {
                     divided.insert(cell);
                 }
-                shadings.insert(cell, shading * what_blur_leaves(self.spread_px(cell.knot()) / cell.size as f64));
+                let left = what_blur_leaves(self.spread_px(cell.knot()) / cell.size as f64);
+                shadings.insert(cell, shading.times(left));
             }
         }
         divide_for_shading(&shadings, self.settings.max_shading_error, &mut divided);
@@ -140,7 +141,7 @@ impl<'a> Probe<'a> {
             work.check()?;
             let difference = spline_error(known, cell.knot(), weights);
             let edge = edge_spread_peak(&difference.samples, difference.width);
-            let shading = shading_error(&difference, cell.size as f64 / factor as f64);
+            let shading = Shading::of(&difference, cell.size as f64 / factor as f64);
             Ok((*cell, SplineError { edge, shading }))
         };
         splines.par_iter().map(error).collect()
@@ -187,32 +188,67 @@ fn spline_error(kernels: &LayerKernels, knot: Knot, spline: &Weights) -> KnotKer
 struct SplineError {
     /// Largest error of the edge spread functions along rows and columns.
     edge: f64,
-    /// That of the irradiance of a uniform plane, were the cell halved and none around it; above or below 0.
-    shading: f64,
+    shading: Shading,
+}
+
+/// By how much the moments of a spline are off at the middle of a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Shading {
+    /// Change of the irradiance of a uniform plane, were the cell halved and none around it; above or below 0.
+    second: f64,
+    /// How far the centroid is off, down and across, over the size of the cell.
+    first: [f64; 2],
+}
+
+impl Shading {
+    /// Returns that of the difference of a kernel from the spline: of second moments, by how much the irradiance of a uniform plane changes when it is
+    /// added at knots half a cell apart, half the second derivative of the second moments (docs/forward.md, eq. 2).
+    fn of(difference: &KnotKernel, cell_size: f64) -> Self {
+        let [down, _, across] = difference.second_moments();
+        // The spline of one knot has the second derivative −2 over the square of its cell.
+        let half_cell = 0.5 * cell_size;
+        Self {
+            second: (down + across) / (half_cell * half_cell),
+            first: difference.first_moments().map(|moment| moment / cell_size),
+        }
+    }
+
+    fn times(self, factor: f64) -> Self {
+        Self { second: self.second * factor, first: self.first.map(|moment| moment * factor) }
+    }
+
+    /// Returns the divergence of what first moments are off between the cells above and below, and to the left and right, as far as there are any.
+    fn spread_between(&self, vertical: [Option<&Self>; 2], horizontal: [Option<&Self>; 2]) -> f64 {
+        let slope = |beside: [Option<&Self>; 2], i: usize| {
+            let [before, after] = beside.map(|next| next.unwrap_or(self).first[i]);
+            (after - before) / beside.iter().flatten().count().max(1) as f64
+        };
+        slope(vertical, 0) + slope(horizontal, 1)
+    }
 }
 
 /// Marks cells of one size, beside those that are marked, whose halving or not would be seen on a uniform plane.
 ///
 /// Where all cells are of one size the spline is off by the same second moments everywhere, which no uniform plane shows: only where cells of
-/// two sizes meet, or where its curvature changes from cell to cell (docs/forward.md 2).
-fn divide_for_shading(shadings: &BTreeMap<Cell, f64>, most: f64, divided: &mut BTreeSet<Cell>) {
-    let beside = |cell: &Cell| {
-        let cell = *cell;
-        let around = (-1..=1).flat_map(|down| (-1..=1).map(move |across| (down, across)));
-        around.filter(|at| *at != (0, 0)).map(move |(down, across)| cell.beside(down, across))
-    };
+/// two sizes meet, or where its curvature changes from cell to cell; of first moments, where they are off by more in one cell than in the next
+/// (docs/forward.md 2).
+fn divide_for_shading(shadings: &BTreeMap<Cell, Shading>, most: f64, divided: &mut BTreeSet<Cell>) {
     for (cell, shading) in shadings {
-        let steps =
-            [(-1, 0), (1, 0), (0, -1), (0, 1)].into_iter().filter_map(|(d, a)| shadings.get(&cell.beside(d, a)));
+        let beside = |down: i32, across: i32| shadings.get(&cell.beside(down, across));
+        let [above, below, left, right] = [beside(-1, 0), beside(1, 0), beside(0, -1), beside(0, 1)];
         // The curvature of the spline is that of each cell; a smooth one lies half-way where they meet.
-        if steps.into_iter().any(|next| 0.5 * (next - shading).abs() > most) {
+        let steps = [above, below, left, right].into_iter().flatten().map(|next| next.second - shading.second);
+        let has_step = steps.into_iter().any(|step| 0.5 * step.abs() > most);
+        if has_step || shading.spread_between([above, below], [left, right]).abs() > most {
             divided.insert(*cell);
         }
     }
     let mut border: Vec<Cell> = divided.iter().copied().collect();
     while let Some(cell) = border.pop() {
-        for next in beside(&cell) {
-            if shadings.get(&next).is_some_and(|shading| shading.abs() > most) && divided.insert(next) {
+        let around = (-1..=1).flat_map(|down| (-1..=1).map(move |across| cell.beside(down, across)));
+        for next in around {
+            let is_seen = |shading: &Shading| shading.second.abs() > most;
+            if shadings.get(&next).is_some_and(is_seen) && divided.insert(next) {
                 border.push(next);
             }
         }
@@ -225,16 +261,56 @@ fn what_blur_leaves(radius_per_cell: f64) -> f64 {
     1.0 / (1.0 + (std::f64::consts::TAU * radius_per_cell).powf(1.5) / 1.6)
 }
 
-/// Returns by how much the irradiance of a uniform plane changes when a difference of kernels is added at knots half
-/// a cell apart: half the second derivative of its second moments (docs/forward.md, eq. 2).
-fn shading_error(difference: &KnotKernel, cell_size: f64) -> f64 {
-    let width = difference.width;
-    let middle = (width / 2) as f64;
-    let moments = difference.samples.iter().enumerate().map(|(i, &sample)| {
-        let (row, column) = ((i / width) as f64 - middle, (i % width) as f64 - middle);
-        f64::from(sample) * (row * row + column * column)
-    });
-    // The spline of one knot has the second derivative −2 over the square of its cell.
-    let half_cell = 0.5 * cell_size;
-    moments.sum::<f64>() / (half_cell * half_cell)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the rows of cells that are marked, of rows from above down whose cells are all alike, once some are.
+    fn marked(of_row: &[Shading], first: &[i32]) -> Vec<i32> {
+        let cell = |down: i32, across: i32| Cell { down, across, size: 64 };
+        let rows = of_row.iter().zip(0..);
+        let cells = rows.flat_map(|(shading, down)| (-2..3).map(move |across| (cell(down, across), *shading)));
+        let mut divided = first.iter().map(|&down| cell(down, 0)).collect();
+        divide_for_shading(&cells.collect(), 1e-3, &mut divided);
+        (0..of_row.len() as i32).filter(|&down| divided.contains(&cell(down, 0))).collect()
+    }
+
+    fn second(values: &[f64]) -> Vec<Shading> {
+        values.iter().map(|&second| Shading { second, ..Shading::default() }).collect()
+    }
+
+    #[test]
+    fn even_curvature_is_seen_nowhere() {
+        assert!(marked(&second(&[0.2; 6]), &[]).is_empty());
+        assert!(marked(&second(&[0.200, 0.201, 0.202, 0.203]), &[]).is_empty());
+    }
+
+    #[test]
+    fn steps_of_curvature_are_halved() {
+        assert_eq!(marked(&second(&[1e-4, 2e-4, 5e-3, 5e-3, 4e-3, 3.5e-3, 9e-4]), &[]), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(marked(&second(&[1e-4, 2e-4, 2.5e-3, 9e-4, 1e-4]), &[]), [1, 2]);
+    }
+
+    #[test]
+    fn sizes_meet_where_it_does_not_show() {
+        let row = second(&[2e-3, 1.9e-3, 1.5e-3, 1.1e-3, 0.9e-3, 0.5e-3, 1.2e-3]);
+        assert_eq!(marked(&row, &[1]), [0, 1, 2, 3]);
+        assert!(marked(&row, &[]).is_empty());
+    }
+
+    #[test]
+    fn centroids_that_are_off_unevenly_are_seen() {
+        let rows = |values: &[f64]| -> Vec<Shading> {
+            values.iter().map(|&down| Shading { first: [down, 0.0], ..Shading::default() }).collect()
+        };
+        assert!(marked(&rows(&[4e-3; 5]), &[]).is_empty());
+        assert_eq!(marked(&rows(&[0.0, 1e-4, 2e-4, 5e-3, 5e-3]), &[]), [2, 3]);
+    }
+
+    #[test]
+    fn wide_blur_leaves_little_of_small_cells() {
+        assert_eq!(what_blur_leaves(0.0), 1.0);
+        // 2 J₁(x)/x of a disc as wide as the cell is −.067, and between its zeros .1 and .02 at most.
+        assert!((0.067..0.1).contains(&what_blur_leaves(1.0)) && (0.015..0.025).contains(&what_blur_leaves(3.0)));
+    }
 }

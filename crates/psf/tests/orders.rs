@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use dioptric_optics::{Blaze, DiffractiveSurface, Lens, PhaseProfile, glam::DVec2};
-use dioptric_psf::{BankSettings, Diffraction, FilmMap, LensImage, LensImageModel};
+use dioptric_psf::{BankSettings, Diffraction, FilmMap, LensImageModel};
 
 /// A singlet with rings so weak that they bend nothing, of a high order: its share changes from 1 to 0 and back within 60 nm.
 fn singlet(blaze: Option<Blaze>) -> Lens {

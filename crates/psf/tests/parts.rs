@@ -8,8 +8,8 @@ use dioptric_optics::{
     glam::{DMat2, DVec2},
 };
 use dioptric_psf::{
-    BankSettings, Diffraction, Interpolation, Kernel, LensImage, LensImageModel, PsfQuery, PupilDivision, PupilSides,
-    Sides,
+    BankSettings, Diffraction, FilmMap, Interpolation, Kernel, LensImage, LensImageModel, PsfQuery, PupilDivision,
+    PupilSides, Sides,
 };
 
 const PITCH_UM: f64 = 4.0;
@@ -50,8 +50,7 @@ fn models(diffraction: Diffraction) -> Vec<(&'static str, LensImageModel)> {
 }
 
 /// Where a field lands by a film map, mm, how that moves with the field, and the irradiance per radiance there.
-fn landed(lens: &dyn LensImage, field_tan: DVec2, dioptres: f64, nm: f64) -> (DVec2, f64, f64) {
-    let map = lens.film_map(dioptres, nm, 20.0);
+fn landed(map: &FilmMap, field_tan: DVec2) -> (DVec2, f64, f64) {
     let place = |field_tan: DVec2| {
         let mut at_mm = 50.0 * field_tan;
         for _ in 0..60 {
@@ -89,12 +88,12 @@ fn parts_add_up_to_the_whole() {
         for (x, y, dioptres, nm) in [(0.0, 0.0, 1.1, 550.0), (0.15, -0.1, 1.1, 480.0), (-0.08, 0.17, 0.25, 630.0)] {
             let field_tan = DVec2::new(x, y);
             let query = PsfQuery::new(field_tan, dioptres, nm, PITCH_UM);
-            let (whole_mm, whole_det, whole_gain) = landed(&model, field_tan, dioptres, nm);
+            let (whole_mm, whole_det, whole_gain) = landed(&model.film_map(dioptres, nm, 20.0), field_tan);
             let (_, whole_square) = moments(&model.kernel(query));
             let (mut share, mut centroid_mm, mut square) = (0.0, DVec2::ZERO, [0.0; 3]);
             let mut widest_mm2 = 0.0_f64;
             for part in &parts {
-                let (at_mm, det, gain) = landed(part.as_ref(), field_tan, dioptres, nm);
+                let (at_mm, det, gain) = landed(&part.film_map(dioptres, nm, 20.0), field_tan);
                 let of_light = gain * det / (whole_gain * whole_det);
                 let aside_mm = at_mm - whole_mm;
                 let (mean_mm, inner) = moments(&part.kernel(query));
@@ -131,7 +130,8 @@ fn parts_see_from_their_places() {
     let model = LensImageModel::build(&lens, &settings(film_distance_mm, Diffraction::default())).unwrap();
     let parts = model.through_parts(7).unwrap();
     let aside = |part: &Arc<dyn LensImage + Send>, dioptres: f64| {
-        landed(part.as_ref(), DVec2::ZERO, dioptres, 550.0).0 - landed(&model, DVec2::ZERO, dioptres, 550.0).0
+        landed(&part.film_map(dioptres, 550.0, 20.0), DVec2::ZERO).0
+            - landed(&model.film_map(dioptres, 550.0, 20.0), DVec2::ZERO).0
     };
     let (near_blur_mm, far_blur_mm) =
         (model.blur_radius_mm(DVec2::ZERO, 1.2, 550.0), model.blur_radius_mm(DVec2::ZERO, 0.2, 550.0));
@@ -191,7 +191,7 @@ fn halves_of_a_thin_lens_are_as_far_apart_as_their_centroids() {
             let defocus = 1.0 - film_distance_mm / image_mm(dioptres);
             let expected_mm = of_ideal * radius_mm * 8.0 / (3.0 * PI) * defocus;
             for field_tan in [DVec2::ZERO, DVec2::new(0.12, -0.1), DVec2::new(-0.07, 0.2)] {
-                let at = |part: &Arc<dyn LensImage + Send>| landed(part.as_ref(), field_tan, dioptres, 550.0).0;
+                let at = |part: &Arc<dyn LensImage + Send>| landed(&part.film_map(dioptres, 550.0, 20.0), field_tan).0;
                 let apart_mm = at(&left) - at(&right);
                 // .4 %: cells on the boundary belong to both sides, and cubics run between 32 directions of the field. In focus, a
                 // tenth of a micrometer.

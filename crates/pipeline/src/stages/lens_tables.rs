@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use dioptric_forward::{Film, PsfDomain};
 use dioptric_optics::glam::{DMat2, DVec2};
-use dioptric_psf::{Diffraction, FilmMap, LensImage, LensImageModel, SampleCounts};
+use dioptric_psf::{Diffraction, FilmMap, LensImageModel, SampleCounts};
 use dioptric_sensor::{ExitPupil, FrameTable, LensTables, Sensor};
 use dioptric_spectrum::{Illuminant, Observer, WavelengthGrid};
 use rayon::prelude::*;
