@@ -21,7 +21,7 @@ pub(crate) type Leaf = [u32; 4];
 /// No thing.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// How many things a tree can hold: leaves and nodes are told apart by a bit of their numbers.
+/// How many things a tree can hold: a bit of their numbers distinguishes leaves from nodes.
 pub(crate) const MOST_THINGS: usize = (1 << 31) - 1;
 
 /// The tree; what its leaves hold is kept by whom it was made for.

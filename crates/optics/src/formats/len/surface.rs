@@ -190,9 +190,10 @@ impl LenSurface {
     /// Returns the tilts and decenters at this surface, whose number and z along the axis are these. About x and y the program turns by the
     /// left-hand rule, about z by the right-hand rule, as CODE V does: Lambda Research's translation of these angles into
     /// those of its `TracePro` (lambdares.com/kb/comparing-tilt-values-in-oslo-vs-tracepro-after-importing-oslo-lens-file). The
-    /// program's user guide (5.4, "Tilted and/or decentered surfaces", sinopt.com/software1/usrguide54/enterdat/tiltdec.htm) says so too,
-    /// that the origin of the surface lies by DCX, DCY and DCZ beside the vertex of its base system, which is right-handed with z along the
-    /// axis and its origin one thickness behind the surface before, and that DT tells which of shift and turn comes first.
+    /// program's user guide (5.4, "Tilted and/or decentered surfaces", sinopt.com/software1/usrguide54/enterdat/tiltdec.htm) has the same
+    /// senses: the origin of the surface lies by DCX, DCY and DCZ beside the vertex of its base system, which is right-handed with z along the
+    /// axis and its origin one thickness behind the surface before, and DT states which of shift and turn comes first (which of its values
+    /// is which is assumed).
     pub(super) fn moves(&self, surface: usize, mm: f64, z_mm: f64) -> Result<Vec<SystemMove>, TextError> {
         let [a, b, c] = self.tilt_deg;
         let is_moved = self.decenter.iter().chain(&self.tilt_deg).any(|&v| v != 0.0);
