@@ -112,7 +112,7 @@ impl Default for Settings {
             mode: BlurMode::Layered,
             knot_spacing_px: 128,
             max_edge_error: 0.01,
-            max_shading_error: 1e-4,
+            max_shading_error: 5e-4,
             layer_step_px: 2.0,
             depth_edge_px: 3.0,
             chromatic_step_px: 0.25,

@@ -114,7 +114,8 @@ impl<'a> Probe<'a> {
                 if edge > self.settings.max_edge_error {
                     divided.insert(cell);
                 }
-                let left = what_blur_leaves(self.spread_px(cell.knot()) / cell.size as f64);
+                // What cells of another size, or other moments, do to a plane spans two of them at least.
+                let left = what_blur_leaves(self.spread_px(cell.knot()) / (2 * cell.size) as f64);
                 shadings.insert(cell, shading.times(left));
             }
         }
@@ -217,11 +218,11 @@ impl Shading {
         Self { second: self.second * factor, first: self.first.map(|moment| moment * factor) }
     }
 
-    /// Returns the divergence of what first moments are off between the cells above and below, and to the left and right, as far as there are any.
+    /// Returns how much of a plane the first moments, which are off by other amounts above, below, left and right as far as there are cells, draw together or
+    /// apart at most: their largest slopes from cell to cell, down and across.
     fn spread_between(&self, vertical: [Option<&Self>; 2], horizontal: [Option<&Self>; 2]) -> f64 {
         let slope = |beside: [Option<&Self>; 2], i: usize| {
-            let [before, after] = beside.map(|next| next.unwrap_or(self).first[i]);
-            (after - before) / beside.iter().flatten().count().max(1) as f64
+            beside.into_iter().flatten().map(|next| (next.first[i] - self.first[i]).abs()).fold(0.0, f64::max)
         };
         slope(vertical, 0) + slope(horizontal, 1)
     }
@@ -239,7 +240,7 @@ fn divide_for_shading(shadings: &BTreeMap<Cell, Shading>, most: f64, divided: &m
         // The curvature of the spline is that of each cell; a smooth one lies half-way where they meet.
         let steps = [above, below, left, right].into_iter().flatten().map(|next| next.second - shading.second);
         let has_step = steps.into_iter().any(|step| 0.5 * step.abs() > most);
-        if has_step || shading.spread_between([above, below], [left, right]).abs() > most {
+        if has_step || shading.spread_between([above, below], [left, right]) > most {
             divided.insert(*cell);
         }
     }
@@ -255,10 +256,10 @@ fn divide_for_shading(shadings: &BTreeMap<Cell, Shading>, most: f64, divided: &m
     }
 }
 
-/// Returns the share of a ripple of the period of a cell that a blur leaves, whose radius is so many cells: that of an even disc, between its zeros.
-fn what_blur_leaves(radius_per_cell: f64) -> f64 {
+/// Returns the share of a ripple that a blur leaves, whose radius is so many of its periods: that of an even disc, between its zeros.
+fn what_blur_leaves(radius_per_period: f64) -> f64 {
     // |2 J₁(x) / x| is at most 1.6 x^(−3/2), x = 2π times the radius over the period.
-    1.0 / (1.0 + (std::f64::consts::TAU * radius_per_cell).powf(1.5) / 1.6)
+    1.0 / (1.0 + (std::f64::consts::TAU * radius_per_period).powf(1.5) / 1.6)
 }
 
 #[cfg(test)]
@@ -310,7 +311,7 @@ mod tests {
     #[test]
     fn wide_blur_leaves_little_of_small_cells() {
         assert_eq!(what_blur_leaves(0.0), 1.0);
-        // 2 J₁(x)/x of a disc as wide as the cell is −.067, and between its zeros .1 and .02 at most.
+        // 2 J₁(x)/x of a disc of that radius is −.067, and between its zeros .1 and .02 at most.
         assert!((0.067..0.1).contains(&what_blur_leaves(1.0)) && (0.015..0.025).contains(&what_blur_leaves(3.0)));
     }
 }
