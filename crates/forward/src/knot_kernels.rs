@@ -267,29 +267,115 @@ const CENTERED_PX: f64 = 1e-7;
 /// uniform plane in focus. Each round adds the derivative by central differences, which leaves second moments as they are.
 fn center(samples: &mut Vec<f64>, width: usize, centroid_px: DVec2) {
     const ROUNDS: usize = 40;
-    let middle = (width / 2) as f64;
+    let mut bordered = Bordered::new(samples, width);
+    let mut sums = bordered.sums();
     for _ in 0..ROUNDS {
-        let (mut across, mut down) = (-centroid_px.x, -centroid_px.y);
-        for (i, sample) in samples.iter().enumerate() {
-            across += sample * ((i % width) as f64 - middle);
-            down += sample * ((i / width) as f64 - middle);
+        let off_px = sums.centroid_px(width) - centroid_px;
+        if f64::max(off_px.x.abs(), off_px.y.abs()) < CENTERED_PX {
+            break;
         }
-        if f64::max(across.abs(), down.abs()) < CENTERED_PX {
-            return;
-        }
-        let at =
-            |row: usize, column: usize| if row < width && column < width { samples[row * width + column] } else { 0.0 };
-        let moved = (0..width * width).map(|i| {
-            let (row, column) = (i / width, i % width);
-            // Below the first is beyond the last: both are outside.
-            let slope_across = at(row, column + 1) - at(row, column.wrapping_sub(1));
-            let slope_down = at(row + 1, column) - at(row.wrapping_sub(1), column);
-            (at(row, column) + 0.5 * (across * slope_across + down * slope_down)).max(0.0)
-        });
-        let moved: Vec<f64> = moved.collect();
-        let sum: f64 = moved.iter().sum();
-        *samples = moved.into_iter().map(|sample| sample / sum).collect();
+        sums = bordered.moved(off_px);
     }
+    let scale = 1.0 / sums.all;
+    samples.clear();
+    samples.extend(bordered.rows().flatten().map(|sample| sample * scale));
+}
+
+/// Sums over a square of samples: of all, and times column and row, counted from 0.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    all: f64,
+    across: f64,
+    down: f64,
+}
+
+impl Sums {
+    /// Returns how far right of the middle sample and below it the centroid lies.
+    fn centroid_px(&self, width: usize) -> DVec2 {
+        DVec2::new(self.across, self.down) / self.all - DVec2::splat((width / 2) as f64)
+    }
+}
+
+/// A square of samples with a border of zeros all around.
+struct Bordered {
+    width: usize,
+    samples: Vec<f64>,
+    next: Vec<f64>,
+}
+
+impl Bordered {
+    fn new(samples: &[f64], width: usize) -> Self {
+        let stride = width + 2;
+        let mut bordered = vec![0.0; stride * stride];
+        for (to, from) in bordered.chunks_exact_mut(stride).skip(1).zip(samples.chunks_exact(width)) {
+            to[1..=width].copy_from_slice(from);
+        }
+        Self { width, next: vec![0.0; stride * stride], samples: bordered }
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.samples.chunks_exact(self.width + 2).skip(1).take(self.width).map(|row| &row[1..=self.width])
+    }
+
+    fn sums(&self) -> Sums {
+        let mut sums = Sums::default();
+        for (row, line) in self.rows().enumerate() {
+            add_sums(line, row, &mut sums);
+        }
+        sums
+    }
+
+    /// Moves the samples back by a part of a pixel to first order; none below 0.
+    fn moved(&mut self, off_px: DVec2) -> Sums {
+        let sums = move_back(&self.samples, self.width, off_px, &mut self.next);
+        std::mem::swap(&mut self.samples, &mut self.next);
+        sums
+    }
+}
+
+/// Lines are summed in so many lanes: vectors, and an order of the sum that does not depend on the machine.
+const LANES: usize = 8;
+
+#[inline(always)]
+fn add_sums(line: &[f64], row: usize, sums: &mut Sums) {
+    let (mut all, mut across) = ([0.0; LANES], [0.0; LANES]);
+    let (whole, rest) = line.as_chunks::<LANES>();
+    let mut column = 0.0;
+    for lanes in whole {
+        for k in 0..LANES {
+            all[k] += lanes[k];
+            across[k] += lanes[k] * (column + k as f64);
+        }
+        column += LANES as f64;
+    }
+    for (k, sample) in rest.iter().enumerate() {
+        all[k] += sample;
+        across[k] += sample * (column + k as f64);
+    }
+    let all: f64 = all.iter().sum();
+    sums.all += all;
+    sums.across += across.iter().sum::<f64>();
+    sums.down += all * row as f64;
+}
+
+/// Puts samples moved back by a part of a pixel into `moved`; both have a border of zeros.
+#[multiversion::multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn move_back(samples: &[f64], width: usize, off_px: DVec2, moved: &mut [f64]) -> Sums {
+    let stride = width + 2;
+    let (across, down) = (0.5 * off_px.x, 0.5 * off_px.y);
+    let mut sums = Sums::default();
+    for row in 0..width {
+        let first = (row + 1) * stride;
+        let (above, below) = (&samples[first - stride + 1..][..width], &samples[first + stride + 1..][..width]);
+        let (left, own, right) =
+            (&samples[first..][..width], &samples[first + 1..][..width], &samples[first + 2..][..width]);
+        let line = &mut moved[first + 1..][..width];
+        for i in 0..width {
+            line[i] = (own[i] + across * (right[i] - left[i]) + down * (below[i] - above[i])).max(0.0);
+        }
+        add_sums(line, row, &mut sums);
+    }
+    sums
 }
 
 #[cfg(test)]
