@@ -21,6 +21,37 @@ pub struct SkyImage {
     pub scale: f32,
 }
 
+impl SkyImage {
+    /// Returns the illuminance by the picture, before `scale`, of a surface that faces its +z: ∫ Y cos θ dΩ over the upper half of the sky, in the unit of its
+    /// colors, Y the luminance.
+    pub(crate) fn image_illuminance(&self) -> f64 {
+        let (columns, rows) = self.image.size();
+        let mut sum = 0.0;
+        for y in 0..rows {
+            let down = (y as f32 + 0.5) / rows as f32;
+            for x in 0..columns {
+                let at = Vec2::new((x as f32 + 0.5) / columns as f32, down);
+                let (cos, solid_angle) = match self.mapping {
+                    SkyMapping::LatLong => {
+                        let (sin, cos) = (PI * down).sin_cos();
+                        (cos, TAU * PI * sin)
+                    }
+                    SkyMapping::EqualArea => (sphere_of_square(at).z, 2.0 * TAU),
+                };
+                if cos > 0.0 {
+                    sum += luminance(self.image.rgb_at(Vec2::new(at.x, 1.0 - down))) * f64::from(cos * solid_angle);
+                }
+            }
+        }
+        sum / (columns * rows) as f64
+    }
+}
+
+/// The luminance of a linear sRGB color, 1 of white.
+fn luminance([r, g, b]: [f32; 3]) -> f64 {
+    f64::from(0.2126 * r + 0.7152 * g + 0.0722 * b)
+}
+
 /// How the directions are laid out on a picture of the sky, in whose frame +z is up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SkyMapping {
@@ -42,12 +73,12 @@ pub(crate) struct SampledSky {
 impl SampledSky {
     pub(crate) fn new(sky: SkyImage) -> Self {
         let (columns, rows) = sky.image.size();
-        let luminance = |x: usize, y: usize| {
-            let uv = Vec2::new((x as f32 + 0.5) / columns as f32, 1.0 - (y as f32 + 0.5) / rows as f32);
-            let [r, g, b] = sky.image.rgb_at(uv);
-            f64::from(0.2126 * r + 0.7152 * g + 0.0722 * b)
+        let luminance_of = |x: usize, y: usize| {
+            luminance(
+                sky.image.rgb_at(Vec2::new((x as f32 + 0.5) / columns as f32, 1.0 - (y as f32 + 0.5) / rows as f32)),
+            )
         };
-        let weights: Vec<f64> = (0..rows * columns).map(|i| luminance(i % columns, i / columns)).collect();
+        let weights: Vec<f64> = (0..rows * columns).map(|i| luminance_of(i % columns, i / columns)).collect();
         let around = |x: usize, y: usize| {
             // Interpolation spreads a sample's light over its neighbors: each gets a share of what is around it.
             let mut sum = 0.0;
@@ -182,6 +213,24 @@ mod tests {
             let direction = sphere_of_square(at);
             assert!((direction.length() - 1.0).abs() < 1e-6);
             assert!(square_of_sphere(direction).abs_diff_eq(at, 1e-5), "{at}");
+        }
+    }
+
+    /// A sky that grows brighter upwards and is dark below: ∫ z · z dω = 2π/3 by closed form.
+    #[test]
+    fn illuminance_is_that_of_the_upper_half() {
+        for mapping in [SkyMapping::LatLong, SkyMapping::EqualArea] {
+            let side = 256;
+            let rgb = (0..side * side).map(|i| {
+                let at = Vec2::new((i % side) as f32 + 0.5, (i / side) as f32 + 0.5) / side as f32;
+                let z = if mapping == SkyMapping::LatLong { (PI * at.y).cos() } else { sphere_of_square(at).z };
+                [z.max(0.0); 3]
+            });
+            let image = Arc::new(ImageTexture::from_linear(side, rgb.collect(), Wrap::Repeat).unwrap());
+            let sky = SkyImage { image, mapping, world_from_sky: DMat3::from_rotation_x(0.7), scale: 2.0 };
+            let expected = 2.0 / 3.0 * std::f64::consts::PI;
+            // Samples of 256 × 256.
+            assert!((sky.image_illuminance() / expected - 1.0).abs() < 1e-4, "{mapping:?} {}", sky.image_illuminance());
         }
     }
 

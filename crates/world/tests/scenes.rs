@@ -113,6 +113,71 @@ fn explicit_spectra_of_lights_keep_their_mean() {
     assert!((radiance(&format!("{text} WorldEnd")) - 6.0).abs() < 1e-5);
 }
 
+/// `power` and `illuminance` of pbrt's 4th version multiply what a light gives by itself: the flux of a point into all directions, of a cone with half its
+/// edge, of a Lambertian surface π A L, each side counted; the illuminance by a sky π L.
+#[test]
+fn power_and_illuminance_set_the_light() {
+    use std::f64::consts::PI;
+    // What falls on the origin, which faces it, or comes to it.
+    let light = |text: String, metres_per_unit: f64| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("world.pbrt");
+        std::fs::write(&path, format!("WorldBegin {text}")).unwrap();
+        let world = read_world(&path, &ReadOptions { metres_per_unit }, &Cancel::new()).unwrap();
+        let sample = world.sample_light(Vec3::ZERO, 0.5, [0.3, 0.4], &[550.0]);
+        (f64::from(sample.expect("a light that is seen").radiance[0]), world.notes().to_vec())
+    };
+    let ratio = |with: &str, of: &dyn Fn(&str) -> String| {
+        [1.0, 0.001].map(|unit| light(of(with), unit).0 / light(of(""), unit).0)
+    };
+    let check = |with: &str, expected: f64, of: &dyn Fn(&str) -> String| {
+        for found in ratio(with, of) {
+            assert!((found / expected - 1.0).abs() < 1e-5, "{}: {found}, not {expected}", of(with));
+        }
+    };
+    let point = |with: &str| format!(r#"LightSource "point" "point3 from" [0 0 2] {with}"#);
+    check(r#""float power" 30 "float scale" 2"#, 2.0 * 30.0 / (4.0 * PI), &point);
+    let spot = |with: &str| {
+        format!(
+            r#"LightSource "spot" "point3 from" [0 0 2] "point3 to" [0 0 0] "float coneangle" 40 "float conedeltaangle" 10 {with}"#
+        )
+    };
+    let solid_angle = 2.0 * PI * (1.0 - 0.5 * (30f64.to_radians().cos() + 40f64.to_radians().cos()));
+    check(r#""float power" 30"#, 30.0 / solid_angle, &spot);
+    let distant = |with: &str| format!(r#"LightSource "distant" "point3 from" [0 0 1] "point3 to" [0 0 0] {with}"#);
+    check(r#""float illuminance" 500"#, 500.0, &distant);
+    let sky = |with: &str| format!(r#"LightSource "infinite" {with}"#);
+    check(r#""float illuminance" 500 "float scale" 3"#, 1500.0 / PI, &sky);
+    let of_shape = |shape: &'static str| {
+        move |with: &str| format!(r#"AreaLightSource "diffuse" {with} Translate 0 0 3 Rotate 180 1 0 0 {shape}"#)
+    };
+    let disc = of_shape(r#"Scale 2 2 2 Shape "disk" "float radius" 0.5"#);
+    check(r#""float power" 7"#, 7.0 / (PI * PI), &disc);
+    check(r#""float power" 7 "bool twosided" true"#, 7.0 / (2.0 * PI * PI), &disc);
+    check(r#""float power" 7"#, 7.0 / (PI * 4.0 * PI * 0.25), &of_shape(r#"Shape "sphere" "float radius" 0.5"#));
+    check(
+        r#""float power" 7"#,
+        7.0 / (PI * 2.0 * PI * 0.5),
+        &of_shape(r#"Rotate 90 1 0 0 Shape "cylinder" "float radius" 0.5 "float zmin" 0 "float zmax" 1"#),
+    );
+    // Each triangle of 4.5 square units is a light of its own, and each patch.
+    let square = r#""point3 P" [-1.5 -1.5 0  1.5 -1.5 0  1.5 1.5 0  -1.5 1.5 0] "integer indices" [0 1 2 0 2 3]"#;
+    let mesh = move |with: &str| of_shape("")(with) + &format!(r#"Shape "trianglemesh" {square}"#);
+    check(r#""float power" 7"#, 7.0 / (PI * 4.5), &mesh);
+    let patch = r#""point3 P" [-1.5 -1.5 0  1.5 -1.5 0  -1.5 1.5 0  1.5 1.5 0]"#;
+    let patch = move |with: &str| of_shape("")(with) + &format!(r#"Shape "bilinearmesh" {patch}"#);
+    check(r#""float power" 7"#, 7.0 / (PI * 9.0), &patch);
+    // Of unequal triangles, 1 and 3 square units, all shine alike, and the file is told so.
+    let unequal =
+        r#"Shape "trianglemesh" "point3 P" [-1 -1 0  1 -1 0  -1 0 0  -1 -4 0] "integer indices" [0 1 2 0 3 1]"#;
+    let unequal = of_shape(unequal);
+    check(r#""float power" 7"#, 14.0 / (PI * 4.0), &unequal);
+    let (_, notes) = light(unequal(r#""float power" 7"#), 1.0);
+    assert!(notes.iter().any(|note| note.contains("2 faces of unequal areas")), "{notes:?}");
+    // As without.
+    check(r#""float power" -1"#, 1.0, &point);
+}
+
 /// A black body is scaled to a peak of 1 at its own wavelength, be that beyond the visible, in textures and lights alike; the fourth
 /// version scales lights to a photopic mean of 1.
 #[test]

@@ -1,19 +1,55 @@
 //! Lights of pbrt files.
 
-use std::sync::Arc;
+use std::{f64::consts::PI, sync::Arc};
 
 use glam::{DMat3, DVec3};
 
-use super::{Fault, Reader, params::Params};
+use super::{Fault, Reader, params::Params, shapes::FaceAreas};
 use crate::{Emission, Encoding, ImageTexture, Light, SkyImage, SkyMapping, Wrap};
 
 use super::Version;
 
+/// What the shapes that follow emit.
+#[derive(Clone, Debug)]
+pub(super) struct Glow {
+    emission: Emission,
+    /// The flux that each shape emits by a radiance of 1, in the file's unit of radiance times area; none where its radiance is given.
+    power: Option<f64>,
+}
+
+impl Glow {
+    /// Returns the emission of each of some faces, square units of the file: with a power, each face has that of its own.
+    pub(super) fn of_faces(&self, faces: &FaceAreas) -> Emission {
+        let sides = if self.emission.is_two_sided { 2.0 } else { 1.0 };
+        let factor = match self.power {
+            Some(power) if faces.sum > 0.0 => faces.n as f64 * power / (sides * PI * faces.sum),
+            Some(_) => 0.0,
+            None => 1.0,
+        };
+        Emission { radiance: self.emission.radiance.clone().scaled(factor as f32), ..self.emission.clone() }
+    }
+
+    pub(super) fn has_power(&self) -> bool {
+        self.power.is_some()
+    }
+}
+
+/// The flux of a light in units of its own, where the file states one: above 0.
+fn power_of(params: &Params<'_>) -> Option<f64> {
+    params.number("power").filter(|power| *power > 0.0)
+}
+
+/// The illuminance of a light far away, where the file states one: above 0.
+fn illuminance_of(params: &Params<'_>) -> Option<f64> {
+    params.number("illuminance").filter(|illuminance| *illuminance > 0.0)
+}
+
 impl Reader<'_> {
-    pub(super) fn glow(&mut self, params: &Params<'_>) -> Result<Emission, Fault> {
+    pub(super) fn glow(&mut self, params: &Params<'_>) -> Result<Glow, Fault> {
         let scale = params.number("scale").unwrap_or(1.0);
         let radiance = self.light_curve(params.find("L"), scale)?;
-        Ok(Emission { radiance, is_two_sided: params.flag("twosided").unwrap_or(false) })
+        let emission = Emission { radiance, is_two_sided: params.flag("twosided").unwrap_or(false) };
+        Ok(Glow { emission, power: power_of(params) })
     }
 
     pub(super) fn light(&mut self, kind: &str, params: &Params<'_>) -> Result<(), Fault> {
@@ -33,13 +69,8 @@ impl Reader<'_> {
                     self.builder.note(format!("LightSource \"{kind}\": a point that shines alike in all directions"));
                 }
                 let position = place.transform_point3(point("from", [0.0; 3]));
-                let mut intensity = self.light_curve(params.find("I"), of_point)?;
-                if let Some(power) = params.number("power") {
-                    let own = f64::from(intensity.mean_visible());
-                    let wanted = power * unit * unit / (4.0 * std::f64::consts::PI);
-                    intensity = intensity.scaled(if own > 0.0 { (wanted / own) as f32 } else { 0.0 });
-                }
-                Light::Point { position, intensity }
+                let of_power = power_of(params).map_or(1.0, |power| power / (4.0 * PI));
+                Light::Point { position, intensity: self.light_curve(params.find("I"), of_point * of_power)? }
             }
             "spot" => {
                 let position = place.transform_point3(point("from", [0.0; 3]));
@@ -47,23 +78,27 @@ impl Reader<'_> {
                 let direction = (aim - position).try_normalize().ok_or("a spot light without direction".to_owned())?;
                 let outer_deg = params.number("coneangle").unwrap_or(30.0);
                 let inner_deg = outer_deg - params.number_of(&["conedeltaangle", "conedelta"]).unwrap_or(5.0);
-                Light::Spot {
-                    position,
-                    direction,
-                    intensity: self.light_curve(params.find("I"), of_point)?,
-                    inner_rad: inner_deg.to_radians().clamp(0.0, std::f64::consts::PI),
-                    outer_rad: outer_deg.to_radians().clamp(0.0, std::f64::consts::PI),
-                }
+                let (inner_rad, outer_rad) =
+                    (inner_deg.to_radians().clamp(0.0, PI), outer_deg.to_radians().clamp(0.0, PI));
+                // The edge of the cone counts half, as in pbrt.
+                let solid_angle = 2.0 * PI * (1.0 - 0.5 * (inner_rad.cos() + outer_rad.cos()));
+                let of_power = power_of(params).map_or(1.0, |power| power / solid_angle);
+                let intensity = self.light_curve(params.find("I"), of_point * of_power)?;
+                Light::Spot { position, direction, intensity, inner_rad, outer_rad }
             }
             "distant" => {
                 let way = point("to", [0.0, 0.0, 1.0]) - point("from", [0.0; 3]);
                 let way = place.transform_vector3(way);
                 let direction = way.try_normalize().ok_or("a distant light without direction".to_owned())?;
+                let scale = scale * illuminance_of(params).unwrap_or(1.0);
                 Light::Distant { direction, irradiance: self.light_curve(params.find("L"), scale)? }
             }
             "infinite" => match params.text("mapname").or_else(|| params.text("filename")) {
-                Some(name) => return self.sky_image(name, scale),
-                None => Light::Sky { radiance: self.light_curve(params.find("L"), scale)? },
+                Some(name) => return self.sky_image(name, scale, illuminance_of(params)),
+                None => {
+                    let scale = scale * illuminance_of(params).map_or(1.0, |illuminance| illuminance / PI);
+                    Light::Sky { radiance: self.light_curve(params.find("L"), scale)? }
+                }
             },
             _ => {
                 self.builder.note(format!("LightSource \"{kind}\": not supported, left out"));
@@ -74,19 +109,22 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn sky_image(&mut self, name: &str, scale: f64) -> Result<(), Fault> {
+    /// Adds a picture of the sky, which puts `illuminance` on a surface that faces its +z, where that is given.
+    fn sky_image(&mut self, name: &str, scale: f64, illuminance: Option<f64>) -> Result<(), Fault> {
+        // Of an even sky in its place.
+        let of_even = scale * illuminance.map_or(1.0, |illuminance| illuminance / PI);
         let image = self.find_file(name).map(|path| ImageTexture::read(&path, Encoding::Srgb, Wrap::Repeat));
         let image = match image {
             Some(Ok(image)) => image,
             Some(Err(error)) => {
                 self.builder.note(format!("a sky of radiance 1 W m⁻² sr⁻¹ nm⁻¹ in place of a picture: {error}"));
-                let radiance = self.light_curve(None, scale)?;
+                let radiance = self.light_curve(None, of_even)?;
                 self.builder.add_light(Light::Sky { radiance });
                 return Ok(());
             }
             None => {
                 self.builder.note(format!("LightSource \"infinite\": no file '{name}', an even sky in its place"));
-                let radiance = self.light_curve(None, scale)?;
+                let radiance = self.light_curve(None, of_even)?;
                 self.builder.add_light(Light::Sky { radiance });
                 return Ok(());
             }
@@ -99,8 +137,12 @@ impl Reader<'_> {
             self.builder.note("LightSource \"infinite\": a transform that isn't a rotation is left out");
         }
         let world_from_sky = if is_turned { DMat3::from_cols(axes[0], axes[1], axes[2]) } else { DMat3::IDENTITY };
-        let image = Arc::new(image);
-        self.builder.add_light(Light::SkyImage(SkyImage { image, mapping, world_from_sky, scale: scale as f32 }));
+        let mut sky = SkyImage { image: Arc::new(image), mapping, world_from_sky, scale: scale as f32 };
+        if let Some(illuminance) = illuminance {
+            let own = sky.image_illuminance();
+            sky.scale *= if own > 0.0 { (illuminance / own) as f32 } else { 0.0 };
+        }
+        self.builder.add_light(Light::SkyImage(sky));
         Ok(())
     }
 }

@@ -26,7 +26,7 @@ use self::{
     tokens::{Token, Tokens},
 };
 use super::read_bytes;
-use crate::{Emission, GroupId, Material, MaterialId, SpectralCurve, Texture, TextureId, WorldBuilder, WorldError};
+use crate::{GroupId, Material, MaterialId, SpectralCurve, Texture, TextureId, WorldBuilder, WorldError};
 
 /// The most bytes that a file and all that it includes may have.
 const MAX_BYTES: u64 = 1 << 31;
@@ -90,7 +90,7 @@ struct Attributes {
     /// File units from object units.
     place: DAffine3,
     material: MaterialId,
-    glow: Option<Emission>,
+    glow: Option<lights::Glow>,
     is_reversed: bool,
 }
 

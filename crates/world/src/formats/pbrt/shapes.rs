@@ -1,5 +1,7 @@
 //! Shapes of pbrt files.
 
+use std::f64::consts::PI;
+
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use super::{Fault, Reader, params::Params};
@@ -47,16 +49,67 @@ impl Reader<'_> {
         };
         shape.check().map_err(|e| e.to_string())?;
         let glow = self.attributes.glow.clone();
+        let emission = glow.map(|glow| {
+            let faces = FaceAreas::of(&shape, &place, if kind == "bilinearmesh" { 2 } else { 1 });
+            if glow.has_power() && !faces.are_alike {
+                let n = faces.n;
+                self.builder
+                    .note(format!("Shape \"{kind}\": {n} faces of unequal areas glow alike, with their power in all"));
+            }
+            glow.of_faces(&faces.per_square_unit(self.metres_per_unit))
+        });
         let mut material = self.attributes.material;
         if params.number("alpha") == Some(0.0) {
             material = self.builder.add_material("open", Material::Open);
         }
         let group = self.object.unwrap_or(GroupId::ROOT);
-        let id = self.builder.add_shape_to(group, shape, place, material, glow);
+        let id = self.builder.add_shape_to(group, shape, place, material, emission);
         if self.attributes.is_reversed {
             self.builder.reverse(id);
         }
         Ok(())
+    }
+}
+
+/// The areas of the faces of a shape, each of which is a light by itself.
+pub(super) struct FaceAreas {
+    pub(super) n: usize,
+    /// Of all together, m² or square units of the file.
+    pub(super) sum: f64,
+    are_alike: bool,
+}
+
+impl FaceAreas {
+    /// Returns those of a shape at its place, m²; a mesh has so many triangles a face.
+    fn of(shape: &Shape, place: &DAffine3, triangles_a_face: usize) -> Self {
+        let m = place.matrix3;
+        // Of shapes that a place stretches alike in all directions.
+        let stretch = m.determinant().abs().powf(2.0 / 3.0);
+        let one = |area: f64| Self { n: 1, sum: area, are_alike: true };
+        match shape {
+            Shape::Sphere { radius_m } => one(4.0 * PI * radius_m * radius_m * stretch),
+            Shape::Cylinder { radius_m, z_min_m, z_max_m } => one(2.0 * PI * radius_m * (z_max_m - z_min_m) * stretch),
+            Shape::Disc { radius_m, inner_radius_m } => {
+                let ratio = m.x_axis.cross(m.y_axis).length();
+                one(PI * (radius_m * radius_m - inner_radius_m * inner_radius_m) * ratio)
+            }
+            Shape::Mesh(mesh) => {
+                let area = |triangle: &[u32; 3]| {
+                    let [a, b, c] = triangle.map(|i| place.transform_point3(mesh.positions[i as usize].as_dvec3()));
+                    0.5 * (b - a).cross(c - a).length()
+                };
+                let faces = mesh.triangles.chunks(triangles_a_face);
+                let areas: Vec<f64> = faces.map(|face| face.iter().map(area).sum()).collect();
+                let (least, most) =
+                    areas.iter().fold((f64::INFINITY, 0.0), |(a, b), &v| (f64::min(a, v), f64::max(b, v)));
+                Self { n: areas.len(), sum: areas.iter().sum(), are_alike: most - least <= 1e-3 * most }
+            }
+        }
+    }
+
+    /// Returns them in square units of a file.
+    fn per_square_unit(self, metres_per_unit: f64) -> Self {
+        Self { sum: self.sum / (metres_per_unit * metres_per_unit), ..self }
     }
 }
 
