@@ -111,6 +111,8 @@ impl MethodComparison {
         let mut comparison = Self::new(&camera.name, effort, (&blurred, &renderer.rendering()), is_edge);
         comparison.parts_of_pixels = parts.n;
         comparison.notes.extend(parts.note());
+        let centers_nm: Vec<f64> = comparison.rows.iter().map(|row| row.wavelength_nm).collect();
+        comparison.notes.extend(forward.lens(progress, cancel)?.notes_at(&centers_nm));
         Ok(comparison)
     }
 

@@ -56,6 +56,27 @@ fn even_wall_is_the_same_both_ways() {
     }
 }
 
+/// A glass is continued beyond its table for both, and that is said.
+#[test]
+fn continued_glass_is_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("wall.pbrt"), WORLD).unwrap();
+    let of = |glass_range: &str| {
+        let text = CAMERA
+            .replace("dgauss-50mm\")", &format!("achromat-100mm\"), lens_reading: (glass_range: {glass_range})"))
+            .replace("Samples(256)", "Samples(16)")
+            .replace("450.0, 550.0, 650.0", "310.0, 550.0");
+        let camera = Camera::parse(&text, &folder.path().join("camera.ron")).unwrap();
+        MethodComparison::of(&camera, &Silent, &Cancel::new())
+    };
+    let notes = of("Extend").unwrap().notes;
+    assert!(
+        notes.len() == 1 && notes[0].contains("SCHOTT:F2 is known from 320 to 2500 nm and continued: at 310 nm"),
+        "{notes:?}"
+    );
+    assert!(of("Refuse").unwrap_err().to_string().contains("not at 310 nm"));
+}
+
 #[test]
 fn bar_before_a_wall_differs_at_its_edges_alone() {
     let found = compare(&[WORLD, BAR].concat());

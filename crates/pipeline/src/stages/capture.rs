@@ -53,8 +53,7 @@ impl Capture {
     /// Notes on the lens at the bands of the picture, a sentence each: what its file states and this program does otherwise,
     /// and which glasses are continued beyond the range in which they are known.
     pub fn lens_notes(&self) -> Vec<String> {
-        let of_glasses = self.lens.lens.notes_on_glass_range(self.grid().centers_nm());
-        self.lens.notes.iter().cloned().chain(of_glasses).collect()
+        self.lens.notes_at(self.grid().centers_nm())
     }
 
     /// What is written of the frames.

@@ -225,6 +225,15 @@ impl KeptCamera {
         chain.bank(&inputs.plan.bank, &inputs.scene)
     }
 
+    /// Returns the lens as it is used, read now where it is not kept.
+    ///
+    /// # Errors
+    /// When the camera or its lens cannot be read or built.
+    pub fn lens(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<Arc<ResolvedLens>, PipelineError> {
+        let inputs = self.irradiance_inputs()?;
+        self.chain(progress, cancel).lens(&inputs.plan.bank.film.lens)
+    }
+
     /// Returns the scene as it is imaged at this quality, read or made now where it is not kept.
     ///
     /// # Errors

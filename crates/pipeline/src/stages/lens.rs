@@ -17,6 +17,14 @@ pub struct ResolvedLens {
     pub notes: Vec<String>,
 }
 
+impl ResolvedLens {
+    /// What is to be known of it at these wavelengths, a sentence each: its [`notes`](Self::notes), and which glasses are continued beyond
+    /// the range in which they are known.
+    pub fn notes_at(&self, wavelengths_nm: &[f64]) -> Vec<String> {
+        self.notes.iter().cloned().chain(self.lens.notes_on_glass_range(wavelengths_nm)).collect()
+    }
+}
+
 pub(super) fn resolve(inputs: &LensInputs) -> Result<ResolvedLens, PipelineError> {
     let file = match inputs.given.as_deref() {
         Some(lens) => LensFile::from(lens.clone()),
