@@ -446,6 +446,9 @@ pub(crate) struct PsfArgs {
     /// Rays along the side of the paper mode's square grid
     #[arg(long, value_name = "N", default_value_t = 201, help_heading = heading::SIMULATION)]
     pub(crate) rays: usize,
+    /// Keeps the paper mode's rays on the exact grid, which beats with the pixels; without it each is moved by up to half a step, drawn from --seed
+    #[arg(long, help_heading = heading::SIMULATION)]
+    pub(crate) exact_grid: bool,
     /// Draws from a bank over the range of the points, not traced at each, and tells the error of that
     #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error", help_heading = heading::SIMULATION)]
     pub(crate) bank: Option<BankKind>,

@@ -273,8 +273,8 @@ fn noise_table(data: &NoiseData) -> Result<String, std::fmt::Error> {
 
 fn chart_table(measured: &ChartMeasurement) -> Result<String, std::fmt::Error> {
     let mut text = format!(
-        "ΔE00: mean {:.3}, median {:.3}, largest {:.3}\n\n",
-        measured.mean_delta_e, measured.median_delta_e, measured.max_delta_e
+        "ΔE00: mean {:.3}, median {:.3}, largest {:.3}; brightness spreads by {:.3} stops rms\n\n",
+        measured.mean_delta_e, measured.median_delta_e, measured.max_delta_e, measured.brightness_spread_stops
     );
     for patch in &measured.patches {
         let [l, a, b] = patch.lab;

@@ -334,6 +334,7 @@ class Lens:
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
         rays: int | None = ...,
+        exact_grid: bool | None = ...,
         seed: int | None = ...,
     ) -> NDArray[np.float32]: ...
     def psf_table(
@@ -350,6 +351,7 @@ class Lens:
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
         rays: int | None = ...,
+        exact_grid: bool | None = ...,
         seed: int | None = ...,
         mtf_per_mm: _Numbers | None = ...,
     ) -> list[dict[str, Any]]: ...
