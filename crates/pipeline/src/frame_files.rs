@@ -3,7 +3,9 @@
 use std::{fs, path::Path};
 
 use dioptric_scene::{ExrSamples, write_planes_exr};
-use dioptric_sensor::{Depth, DngDetails, ElectronRate, Exposure, LensTables, Picture, Processing, Raw, Sensor};
+use dioptric_sensor::{
+    Depth, DngDetails, ElectronRate, Exposure, LensTables, OpticalFilter, Picture, Processing, Raw, Sensor,
+};
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
@@ -126,6 +128,8 @@ pub struct LensFacts<'a> {
 pub struct Frames<'a> {
     /// The sensor.
     pub sensor: &'a Sensor,
+    /// Filters before the lens.
+    pub filters: &'a [OpticalFilter],
     /// The exposure, metered or given.
     pub exposure: &'a Exposure,
     /// The mean rate of photo-electrons.
@@ -269,7 +273,12 @@ fn write_raw(raw: &Raw, extension: &str, folder: &Path) -> Result<Vec<String>, P
     write_raw_as("raw", raw, extension, folder)
 }
 
-fn write_raw_as(stem: &str, raw: &Raw, extension: &str, folder: &Path) -> Result<Vec<String>, PipelineError> {
+pub(crate) fn write_raw_as(
+    stem: &str,
+    raw: &Raw,
+    extension: &str,
+    folder: &Path,
+) -> Result<Vec<String>, PipelineError> {
     let names = raw.planes.iter().zip(&raw.filter_names).map(|(plane, filter)| {
         let is_single = raw.planes.len() == 1;
         let name = if is_single { format!("{stem}.{extension}") } else { format!("{stem}.{filter}.{extension}") };

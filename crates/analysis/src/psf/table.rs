@@ -409,7 +409,11 @@ mod tests {
             PsfRequest { size: Some(0), ..request() },
             PsfRequest { focus: FocusSpec::NearObject, ..request() },
             PsfRequest { bank: Some(BankSpec::Within { error: f64::NAN }), ..request() },
-            PsfRequest { bank: Some(BankSpec::Paper), sampling: PsfSampling::Paper { n_across: 21, jitter: true }, ..request() },
+            PsfRequest {
+                bank: Some(BankSpec::Paper),
+                sampling: PsfSampling::Paper { n_across: 21, jitter: true },
+                ..request()
+            },
         ] {
             assert!(wrong.compute(&paper_lens()).is_err(), "{wrong:?}");
         }

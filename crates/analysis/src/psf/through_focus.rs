@@ -98,7 +98,8 @@ impl Here<'_> {
                 Ok(self.items.par_iter().map(|item| self.of_picture(item, &source)).collect())
             }
             PsfSampling::Paper { n_across, jitter } => {
-                let rays = PaperRays { n_across, jitter, bending: self.request.diffraction.hurb(), seed: self.request.seed };
+                let rays =
+                    PaperRays { n_across, jitter, bending: self.request.diffraction.hurb(), seed: self.request.seed };
                 self.items.par_iter().map(|item| self.of_rays(item, &rays)).collect()
             }
         }

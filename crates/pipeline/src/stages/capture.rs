@@ -62,6 +62,7 @@ impl Capture {
         let first = self.lens.reference.first_order();
         Frames {
             sensor: &self.sensor,
+            filters: &self.inputs.filters,
             exposure: &self.frames.exposure,
             rate: &self.rate,
             exposed: &self.frames.exposed,

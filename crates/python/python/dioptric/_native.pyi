@@ -80,6 +80,7 @@ class Camera:
         pixels: tuple[int, int] | None = ...,
         pixel_um: float | None = ...,
         dual_pixel: str | None = ...,
+        filters: Sequence[str] | None = ...,
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
         blur: str | None = ...,
