@@ -8,6 +8,7 @@
 #![doc = include_str!("../README.md")]
 
 mod chart;
+mod filter_table;
 mod lens;
 pub mod measure;
 mod methods;
@@ -17,6 +18,7 @@ mod run;
 mod sensor_table;
 
 pub use chart::{Corner, LineChart, Scale, Series};
+pub use filter_table::{FilterRow, built_in_filters};
 pub use lens::{
     AnalysisFields, AnalysisFilm, AnalysisRequest, AxialColorRow, ConfigurationData, ConvertedLens, FanRow, FieldPlace,
     FieldRow, FocusData, GRID_LINES, GlassData, GlassRow, GridRow, ImageData, LensAnalysis, LensData, LensDefaults,

@@ -4,16 +4,18 @@ use std::{any::TypeId, ffi::OsString, path::PathBuf};
 
 use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use dioptric_pipeline::{BlurSpec, Crop, DualPixelSpec, ExrSamples, PipelineError};
+use dioptric_pipeline::{BlurSpec, Crop, DualPixelSpec, ExrSamples, FilterSpec, PipelineError};
 
 pub(crate) use crate::common::Common;
 use crate::{
     camera::{CameraCommand, SensorCommand},
+    filter::FilterCommand,
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
     render_args::{CompareArgs, LightFieldArgs, RenderArgs},
     show::ShowArgs,
     sweep::SweepArgs,
+    video_args::TurnArgs,
 };
 
 /// Simulates a camera from the scene's spectral radiance to the final picture.
@@ -67,6 +69,8 @@ mod heading {
 pub(crate) enum Command {
     /// Runs the whole camera: scene, lens, sensor, picture; with no arguments, the built-in demo
     Run(Box<RunArgs>),
+    /// Takes the frames of a camera that turns, each row at its own time
+    Video(Box<VideoArgs>),
     /// Lists, describes, analyzes, draws and converts lenses
     #[command(subcommand)]
     Lens(LensCommand),
@@ -76,6 +80,9 @@ pub(crate) enum Command {
     /// Lists sensors, and writes and describes sensor files
     #[command(subcommand)]
     Sensor(SensorCommand),
+    /// Lists and describes filters that go before a lens
+    #[command(subcommand)]
+    Filter(FilterCommand),
     /// Lists and describes glasses
     #[command(subcommand)]
     Glass(GlassCommand),
@@ -242,6 +249,15 @@ pub(crate) struct RunArgs {
     pub(crate) bands: BandArgs,
 }
 
+/// A video to take.
+#[derive(Debug, Args)]
+pub(crate) struct VideoArgs {
+    #[command(flatten)]
+    pub(crate) camera: RunArgs,
+    #[command(flatten)]
+    pub(crate) turn: TurnArgs,
+}
+
 /// Photodiodes that are read one by one, or whole pixels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DualPixelArg(pub(crate) Option<DualPixelSpec>);
@@ -262,6 +278,10 @@ pub(crate) enum FilmKind {
 /// Which exposures are taken, and which files are written of them.
 #[derive(Debug, Args)]
 pub(crate) struct FrameArgs {
+    /// Puts a filter before the lens: a built-in one (`filter list`), a file, nd:0.9, polarizer, polarizers:60, longpass:590nm, shortpass:650nm,
+    /// bandpass:550nm:40nm or glass:N-BK7:3mm; once for each of several
+    #[arg(long = "filter", value_name = "FILTER", help_heading = heading::FILM)]
+    pub(crate) filters: Vec<FilterSpec>,
     /// Takes so many frames and merges them
     #[arg(long, value_name = "N", conflicts_with = "bracket_stops", help_heading = heading::EXPOSURE)]
     pub(crate) burst: Option<usize>,
@@ -446,6 +466,9 @@ pub(crate) struct PsfArgs {
     /// Rays along the side of the paper mode's square grid
     #[arg(long, value_name = "N", default_value_t = 201, help_heading = heading::SIMULATION)]
     pub(crate) rays: usize,
+    /// Keeps the paper mode's rays on the exact grid, which beats with the pixels; without it each is moved by up to half a step, drawn from --seed
+    #[arg(long, help_heading = heading::SIMULATION)]
+    pub(crate) exact_grid: bool,
     /// Draws from a bank over the range of the points, not traced at each, and tells the error of that
     #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error", help_heading = heading::SIMULATION)]
     pub(crate) bank: Option<BankKind>,

@@ -9,6 +9,7 @@ mod camera;
 mod common;
 mod compare;
 mod develop;
+mod filter;
 mod glass;
 mod lens;
 mod lens_args;
@@ -28,6 +29,8 @@ mod studio;
 mod sweep;
 mod terminal;
 mod trace;
+mod video;
+mod video_args;
 mod words;
 
 #[cfg(test)]
@@ -63,8 +66,10 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
         Command::Lens(command) => lens::run(&command, &common),
         Command::Camera(command) => camera::run(&command, &common),
         Command::Sensor(command) => camera::run_sensor(&command, &common),
+        Command::Filter(command) => filter::run(&command, &common),
         Command::Glass(command) => glass::run(&command, &common),
         Command::Trace(arguments) => trace::run(&arguments, &common),
+        Command::Video(arguments) => video::run(&arguments, &common),
         Command::Psf(arguments) => psf::run(&arguments, &common),
         Command::Render(arguments) => render::run(&arguments, &common),
         Command::Compare(arguments) => compare::run(&arguments, &common),

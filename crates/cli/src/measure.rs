@@ -34,6 +34,7 @@ fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
         side: arguments.size,
         mosaic: arguments.mosaic.clone(),
         pixel_um: arguments.pixel_um,
+        pixels_per_degree: arguments.pixels_per_degree,
         curve: curve(arguments.picture_args.curve),
     };
     let finish = Finish::new(
@@ -187,19 +188,30 @@ fn mtf_table(measured: &EdgeMeasurement) -> Result<String, std::fmt::Error> {
     );
     writeln!(
         text,
-        "{:<12} {:>13} {:>13} {:>13} {:>13} {:>10}",
-        "channel", "MTF50 c/px", "MTF50P c/px", "MTF50 c/mm", "MTF50P c/mm", "at 0.5 c/px"
+        "{:<12} {:>13} {:>13} {:>13} {:>13} {:>11} {:>9} {:>9} {:>9}",
+        "channel",
+        "MTF50 c/px",
+        "MTF50P c/px",
+        "MTF50 c/mm",
+        "MTF50P c/mm",
+        "at 0.5 c/px",
+        "aliased",
+        "acutance",
+        "SQRI jnd"
     )?;
     for channel in &measured.channels {
         writeln!(
             text,
-            "{:<12} {:>13} {:>13} {:>13} {:>13} {:>10}",
+            "{:<12} {:>13} {:>13} {:>13} {:>13} {:>11} {:>9} {:>9} {:>9}",
             channel.channel,
             or_dash(channel.mtf50_cycles_per_pixel, 4),
             or_dash(channel.mtf50p_cycles_per_pixel, 4),
             or_dash(channel.mtf50_cycles_per_mm, 2),
             or_dash(channel.mtf50p_cycles_per_mm, 2),
-            or_dash(channel.response_at_nyquist, 4)
+            or_dash(channel.response_at_nyquist, 4),
+            or_dash(channel.aliasing_share, 4),
+            or_dash(channel.acutance, 4),
+            or_dash(channel.square_root_integral_jnd, 2)
         )?;
     }
     for channel in &measured.not_measured {
@@ -273,8 +285,8 @@ fn noise_table(data: &NoiseData) -> Result<String, std::fmt::Error> {
 
 fn chart_table(measured: &ChartMeasurement) -> Result<String, std::fmt::Error> {
     let mut text = format!(
-        "ΔE00: mean {:.3}, median {:.3}, largest {:.3}\n\n",
-        measured.mean_delta_e, measured.median_delta_e, measured.max_delta_e
+        "ΔE00: mean {:.3}, median {:.3}, largest {:.3}; brightness spreads by {:.3} stops rms\n\n",
+        measured.mean_delta_e, measured.median_delta_e, measured.max_delta_e, measured.brightness_spread_stops
     );
     for patch in &measured.patches {
         let [l, a, b] = patch.lab;

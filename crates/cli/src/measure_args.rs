@@ -57,6 +57,9 @@ pub(crate) struct MtfArgs {
     /// Distance between pixels, µm, for cycles/mm
     #[arg(long, value_name = "P")]
     pub(crate) pixel_um: Option<f64>,
+    /// Pixels a degree of the viewer's field, for acutance and square-root integral [default: 60]
+    #[arg(long, value_name = "N")]
+    pub(crate) pixels_per_degree: Option<f64>,
     /// The picture and the results
     #[command(flatten)]
     pub(crate) picture_args: PictureArgs,

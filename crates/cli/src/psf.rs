@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         size: arguments.size,
         sampling: match arguments.mode {
             PsfMode::Pupil => PsfSampling::Pupil,
-            PsfMode::Paper => PsfSampling::Paper { n_across: arguments.rays },
+            PsfMode::Paper => PsfSampling::Paper { n_across: arguments.rays, jitter: !arguments.exact_grid },
         },
         bank: bank(arguments.bank, arguments.bank_error),
         mtf_per_mm: match &arguments.mtf_per_mm {

@@ -28,7 +28,7 @@ use crate::{
 const LEAST_DARK: f64 = 1e-3;
 
 /// Where results go when nothing else is asked for.
-const OUT: &str = "dioptric-out";
+pub(crate) const OUT: &str = "dioptric-out";
 
 pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     let kept = camera_of(arguments, common)?;
@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 /// Returns the camera of the file, of the run to continue or of the demo, with what the command line changes.
-fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera> {
+pub(crate) fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera> {
     let kept = match (&arguments.from, &arguments.camera) {
         (Some(folder), _) => {
             let resumed = KeptCamera::resume(folder)?;
@@ -251,6 +251,9 @@ fn change_sensor(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()>
         if arguments.scene.is_none() {
             camera.film = FilmSpec::Sensor;
         }
+    }
+    if !arguments.frames.filters.is_empty() {
+        camera.filters.clone_from(&arguments.frames.filters);
     }
     if let Some(DualPixelArg(spec)) = arguments.dual_pixel {
         camera.dual_pixel = spec;

@@ -24,6 +24,7 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
     sensor_options(&arguments.frames).apply(&mut noise, &mut exposure, &mut processing)?;
     let request = SenseRequest {
         sensor: SensorSpec::named(&arguments.sensor),
+        filters: arguments.frames.filters.clone(),
         pixel_um: arguments.pixel_um,
         exposure,
         frames: frames_of(&arguments.frames)?.unwrap_or(demo.frames),

@@ -109,6 +109,7 @@ fn split_pixels_reach_beyond_the_large_photodiode_and_the_raw_file_is_marked() {
     for ratio in [whole_below.1 / split_below.1, split_above.1 / split_below.1] {
         assert!((ratio / 10.0 - 1.0).abs() < 1e-3, "{ratio}");
     }
+    assert!(folder.path().join("run/raw-small.dng").is_file() && folder.path().join("run/raw-small.png").is_file());
     for note in [only_note(&split_below.2), only_note(&split_above.2)] {
         assert_eq!(note, "this raw frame holds the large photodiodes of split pixels, without the small ones");
     }

@@ -95,10 +95,16 @@ impl LinearRgb {
 
     /// Returns the 8-bit picture in which linear `white` is full.
     pub fn to_srgb(&self, white: f64) -> RgbImage {
+        self.to_srgb_with_black(white, [0.0; 3])
+    }
+
+    /// Returns the 8-bit picture on a display that lights up where the picture is dark: `black` is that light of red, green and blue as a share of
+    /// white, whose light stays.
+    pub fn to_srgb_with_black(&self, white: f64, black: [f64; 3]) -> RgbImage {
         let (rows, columns) = self.planes[0].dim();
         RgbImage::from_fn(columns as u32, rows as u32, |x, y| {
             let at = (y as usize, x as usize);
-            image::Rgb(self.planes.each_ref().map(|plane| code(f64::from(plane[at]) / white)))
+            image::Rgb([0, 1, 2].map(|i| code(black[i] + (1.0 - black[i]) * f64::from(self.planes[i][at]) / white)))
         })
     }
 }
@@ -123,6 +129,8 @@ pub fn wavelength_color(wavelength_nm: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use dioptric_spectrum::srgb_decode;
+
     use super::*;
 
     #[test]
@@ -157,6 +165,18 @@ mod tests {
         let shown = picture.clone().within_gamut();
         approx::assert_abs_diff_eq!(luminance(&shown), luminance(&picture), epsilon = 1e-6);
         approx::assert_abs_diff_eq!(shown.planes[0][(0, 0)], 0.0, epsilon = 1e-6);
+    }
+
+    #[test]
+    fn a_lifted_black_leaves_white() {
+        let mut picture = LinearRgb::black(1, 3);
+        picture.add(&ndarray::array![[0.0, 1.0, 2.0]], [1.0, 1.0, 1.0]);
+        let shown = picture.to_srgb_with_black(2.0, [19, 31, 36].map(|of| srgb_decode(f64::from(of) / 255.0)));
+        assert_eq!((shown[(0, 0)].0, shown[(2, 0)].0), ([19, 31, 36], [255; 3]));
+        // Half the light of white and half that of black.
+        let half = 0.5 + 0.5 * srgb_decode(31.0 / 255.0);
+        assert_eq!(shown[(1, 0)].0[1], code(half));
+        assert_eq!(picture.to_srgb(2.0), picture.to_srgb_with_black(2.0, [0.0; 3]));
     }
 
     #[test]

@@ -3,7 +3,9 @@
 use std::{fs, path::Path};
 
 use dioptric_scene::{ExrSamples, write_planes_exr};
-use dioptric_sensor::{Depth, DngDetails, ElectronRate, Exposure, LensTables, Picture, Processing, Raw, Sensor};
+use dioptric_sensor::{
+    Depth, DngDetails, ElectronRate, Exposure, LensTables, OpticalFilter, Picture, Processing, Raw, Sensor,
+};
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
@@ -21,7 +23,8 @@ pub struct Outputs {
     pub depth: bool,
     /// `volts.exr`, the voltages of the pixels.
     pub volts: bool,
-    /// `raw.png`, the digital numbers in 16 bits; of photodiodes that are read one by one also `raw-left.png` and so on.
+    /// `raw.png`, the digital numbers in 16 bits; of photodiodes that are read one by one also `raw-left.png` and so on, of the small ones of split
+    /// pixels `raw-small.png`.
     pub raw: bool,
     /// More files of the sensor's frames.
     pub also: Vec<FrameFile>,
@@ -51,7 +54,7 @@ pub enum FrameFile {
     Electrons,
     /// `raw.tiff`: the digital numbers, 16 bits.
     RawTiff,
-    /// `raw.dng`: the digital numbers with mosaic, levels and color matrices.
+    /// `raw.dng`: the digital numbers with mosaic, levels and color matrices; of single photodiodes also `raw-left.dng` and so on.
     RawDng,
     /// `picture-16.png`: the picture, 16 bits.
     PicturePng16,
@@ -126,6 +129,8 @@ pub struct LensFacts<'a> {
 pub struct Frames<'a> {
     /// The sensor.
     pub sensor: &'a Sensor,
+    /// Filters before the lens.
+    pub filters: &'a [OpticalFilter],
     /// The exposure, metered or given.
     pub exposure: &'a Exposure,
     /// The mean rate of photo-electrons.
@@ -211,7 +216,18 @@ fn write_also(
         }
         FrameFile::RawDng => {
             frames.sensor.write_dng(&frames.exposed.raw, &dng_details(frames, picture), &folder.join("raw.dng"))?;
-            Ok(vec!["raw.dng".to_owned()])
+            let mut names = vec!["raw.dng".to_owned()];
+            for PhotodiodeFrame { name, raw, of } in photodiode_frames(frames) {
+                let (file, description) = (format!("raw-{name}.dng"), Some(format!("this raw frame holds {of}")));
+                let details = DngDetails { description, ..dng_details(frames, picture) };
+                let sheet = match &frames.exposed.photodiodes {
+                    Some(reads) => frames.sensor.of_one_read(reads.frames.len())?,
+                    None => frames.sensor.small_photodiode().unwrap_or_else(|| frames.sensor.clone()),
+                };
+                sheet.write_dng(raw, &details, &folder.join(&file))?;
+                names.push(file);
+            }
+            Ok(names)
         }
         _ => {
             // Developed once more, because the picture holds codes.
@@ -256,11 +272,33 @@ fn write_planes(
     Ok(file.to_owned())
 }
 
+/// The frame of photodiodes that were read by themselves.
+struct PhotodiodeFrame<'a> {
+    /// Which they are, in names of files.
+    name: &'a str,
+    raw: &'a Raw,
+    /// Which they are, in a sentence, in ASCII.
+    of: String,
+}
+
+/// Returns the frames of the first exposure that belong to photodiodes alone: each of those below a microlens, or the small ones of split pixels.
+fn photodiode_frames<'a>(frames: &Frames<'a>) -> Vec<PhotodiodeFrame<'a>> {
+    let Exposed { photodiodes, small, .. } = frames.exposed;
+    let of_reads = photodiodes.iter().flat_map(|reads| {
+        let of = |name: &str| format!("the {name} photodiode of each pixel alone, which sees its part of the pupil");
+        let names = reads.photodiodes.names().iter().zip(&reads.frames);
+        names.map(move |(name, raw)| PhotodiodeFrame { name, raw, of: of(name) })
+    });
+    let of_small = "the small photodiodes of split pixels, without the large ones";
+    let of_small = small.iter().map(|raw| PhotodiodeFrame { name: "small", raw, of: of_small.to_owned() });
+    of_reads.chain(of_small).collect()
+}
+
 /// Writes the frame of each photodiode that was read by itself.
 fn write_photodiodes(frames: &Frames<'_>, extension: &str, folder: &Path) -> Result<Vec<String>, PipelineError> {
-    let Some(reads) = &frames.exposed.photodiodes else { return Ok(Vec::new()) };
-    let names = reads.photodiodes.names().iter().zip(&reads.frames);
-    let files = names.map(|(name, raw)| write_raw_as(&format!("raw-{name}"), raw, extension, folder));
+    let files = photodiode_frames(frames)
+        .into_iter()
+        .map(|PhotodiodeFrame { name, raw, .. }| write_raw_as(&format!("raw-{name}"), raw, extension, folder));
     Ok(files.collect::<Result<Vec<_>, _>>()?.concat())
 }
 
@@ -269,7 +307,12 @@ fn write_raw(raw: &Raw, extension: &str, folder: &Path) -> Result<Vec<String>, P
     write_raw_as("raw", raw, extension, folder)
 }
 
-fn write_raw_as(stem: &str, raw: &Raw, extension: &str, folder: &Path) -> Result<Vec<String>, PipelineError> {
+pub(crate) fn write_raw_as(
+    stem: &str,
+    raw: &Raw,
+    extension: &str,
+    folder: &Path,
+) -> Result<Vec<String>, PipelineError> {
     let names = raw.planes.iter().zip(&raw.filter_names).map(|(plane, filter)| {
         let is_single = raw.planes.len() == 1;
         let name = if is_single { format!("{stem}.{extension}") } else { format!("{stem}.{filter}.{extension}") };

@@ -26,6 +26,7 @@ mod sense;
 mod shown;
 mod staged;
 mod stages;
+mod video_files;
 mod words;
 
 pub use dioptric_backward::{BandSampling, LightPaths, MicroArray, MicroElements, MicroLayout, Renderer, Rendering};
@@ -34,10 +35,10 @@ pub use dioptric_psf::Diffraction;
 pub use dioptric_scene::{ExrSamples, FillDepth};
 
 pub use camera::{
-    BankData, BankSpec, BlurSpec, Camera, Crop, DualPixelSpec, Exposed, FilmSpec, FlatSize, FocusSpec, FramesSpec,
-    LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads, Photodiodes, PictureOptions,
-    REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec,
-    WavelengthSpec, WorldSpec, nearest_to_reference_nm,
+    BankData, BankSpec, BlurSpec, Camera, CameraTurn, Crop, DualPixelSpec, Exposed, FilmSpec, FilterSpec, FlatSize,
+    FocusSpec, FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads, Photodiodes,
+    PictureOptions, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec, SensorOptions,
+    SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
 pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;
@@ -58,6 +59,8 @@ pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,
     IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, RESUME_FILE, RenderingSummary, ResolvedLens,
-    ResolvedScene, Resumed, SceneSummary, StageCounts, WorldRender, has_kept_bands, write_seen_png,
+    ResolvedScene, Resumed, SceneSummary, StageCounts, Video, VideoFrame, VideoFrameFacts, WorldRender, has_kept_bands,
+    write_seen_png,
 };
+pub use video_files::{VideoFacts, write_video_frame};
 pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

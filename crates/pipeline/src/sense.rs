@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use dioptric_sensor::{
-    Developed, ElectronRate, ExitPupil, ExposureControl, Illumination, Noise, NoiseSources, Processing, Sensor,
+    Developed, ElectronRate, ExitPupil, ExposureControl, Illumination, Noise, NoiseSources, OpticalFilter, Processing,
+    Sensor,
 };
 use dioptric_spectrum::{Bands, Illuminant, WavelengthGrid};
 
 use crate::{
-    FrameSet, Frames, FramesSpec, Irradiance, Outputs, PipelineError, SensorSpec, number,
+    FilterSpec, FrameSet, Frames, FramesSpec, Irradiance, Outputs, PipelineError, SensorSpec, number,
     stages::{MovedLight, ShutterInputs, expose},
 };
 
@@ -17,6 +18,8 @@ use crate::{
 pub struct SenseRequest {
     /// The sensor; where the image has another pitch or size, its pixels are laid over the image's middle.
     pub sensor: SensorSpec,
+    /// Filters before the lens.
+    pub filters: Vec<FilterSpec>,
     /// The distance between the sensor's pixels, µm, where it is not the sensor's own: that of the samples of an image gives
     /// one pixel a sample, as in the run that made it.
     pub pixel_um: Option<f64>,
@@ -44,6 +47,8 @@ pub struct SenseRequest {
 pub struct Sensed {
     /// The sensor, of the size that the image covers.
     pub sensor: Sensor,
+    /// The filters before the lens.
+    pub filters: Vec<OpticalFilter>,
     /// The mean rate of photo-electrons.
     pub rate: ElectronRate,
     /// The exposure and the frames.
@@ -65,6 +70,7 @@ impl Sensed {
     pub fn frame_parts(&self) -> Frames<'_> {
         Frames {
             sensor: &self.sensor,
+            filters: &self.filters,
             exposure: &self.frames.exposure,
             rate: &self.rate,
             exposed: &self.frames.exposed,
@@ -93,6 +99,7 @@ impl SenseRequest {
             return Err(PipelineError::Unsuitable { what: "lens_corrections", reason: reason.to_owned() });
         }
         let sensor = self.sensor.open()?;
+        let filters = FilterSpec::open_all(&self.filters)?;
         let sensor = match self.pixel_um {
             Some(pixel_pitch_um) => Sensor { pixel_pitch_um, ..sensor },
             None => sensor,
@@ -119,18 +126,20 @@ impl SenseRequest {
             ));
         }
         let light = Illumination { exit_pupil: self.exit_pupil_mm.map(ExitPupil::centered), ..light };
-        let rate = sensor.electron_rate(&light)?;
+        let exposed = sensor.behind(&filters);
+        let rate = exposed.electron_rate(&light)?;
         let shutter = ShutterInputs {
             exposure: self.exposure,
             frames: self.frames.clone(),
             noise: Noise { sources: self.noise, ..Noise::all(self.seed) },
         };
         let samples_per_px = light.pitch_um.map_or(1.0, |sample_um| sensor.pixel_pitch_um / sample_um);
-        let frames = expose(&shutter, &sensor, &rate, Some(&MovedLight { light, samples_per_px }))?;
+        let frames = expose(&shutter, &exposed, &rate, Some(&MovedLight { light, samples_per_px }))?;
         let processing = self.processing.under(self.illuminant.as_ref());
         let developed = sensor.develop(frames.exposed.developed_from(), &processing)?;
         Ok(Sensed {
             sensor,
+            filters,
             rate,
             frames,
             processing,

@@ -261,6 +261,7 @@ fn a_light_field_is_refused() {
 fn irradiance_without_its_lens_is_refused() {
     let camera = with(&before(Pattern::Uniform), LensCorrections::ALL);
     let request = SenseRequest {
+        filters: Vec::new(),
         sensor: camera.sensor,
         pixel_um: None,
         exposure: camera.exposure,

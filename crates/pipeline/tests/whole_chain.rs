@@ -203,6 +203,7 @@ fn sensed_irradiance_is_the_picture_of_the_run() {
     let path = folder.path().join("irradiance.exr");
     shot.irradiance.write_exr(&path, ExrSamples::Single).unwrap();
     let request = SenseRequest {
+        filters: Vec::new(),
         sensor: camera.sensor.clone(),
         pixel_um: Some(330.0),
         exposure: camera.exposure,

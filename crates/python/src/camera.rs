@@ -116,6 +116,8 @@ impl Camera {
     ///     A film of pixels of one's own.
     /// dual_pixel : {"none", "left-right", "top-bottom", "quad", "left-right:CROSSTALK:DEGREES"}
     ///     Reads the photodiodes below each microlens one by one.
+    /// filters : list of str
+    ///     Filters before the lens: built-in ones, files, ``"nd:0.9"``, ``"longpass:590nm"``, ``"glass:N-BK7:3mm"`` and the like.
     /// diffraction : {"none", "hurb", "hurb-scene3d", "hurb-calibrated", "wave"}
     /// gamma : float
     ///     Strength of HURB.

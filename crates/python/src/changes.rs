@@ -79,6 +79,7 @@ pub(crate) const ALL: &[&str] = &[
     "pixels",
     "pixel_um",
     "dual_pixel",
+    "filters",
     "diffraction",
     "gamma",
     "blur",
@@ -257,6 +258,11 @@ fn set_film(camera: &mut Camera, given: &GivenParts, key: &str, value: &Bound<'_
                 "none" => None,
                 _ => Some(found.parse().map_err(|_| wrong(key, format!("'{found}'"), expected))?),
             };
+        }
+        "filters" => {
+            let expected = "a list of names, files and words as 'nd:0.9'";
+            let found: Vec<String> = value.extract().map_err(|_| wrong_type(key, type_name(value), expected))?;
+            camera.filters = found.iter().map(|word| word.parse()).collect::<Result<_, _>>().map_err(exception)?;
         }
         "film" => {
             camera.film = match word(key, value)?.as_str() {

@@ -92,9 +92,11 @@ impl PsfOptions {
             "diffraction",
             "gamma",
             "rays",
+            "exact_grid",
             "seed",
             "mtf_per_mm",
         ];
+        let mut is_exact_grid = false;
         each_option(function, options, &known, |key, value| {
             match key {
                 "field_deg" => (request.fields_deg, single[0]) = (numbers(key, value)?, is_single(value)),
@@ -107,12 +109,16 @@ impl PsfOptions {
                 "shape" => request.size = Some(count(key, value)?),
                 "diffraction" => request.diffraction = diffraction(key, value)?,
                 "gamma" => request.diffraction = with_gamma(request.diffraction, number(key, value)?)?,
-                "rays" => request.sampling = PsfSampling::Paper { n_across: count(key, value)? },
+                "rays" => request.sampling = PsfSampling::Paper { n_across: count(key, value)?, jitter: true },
+                "exact_grid" => is_exact_grid = value.extract()?,
                 "seed" => request.seed = count(key, value)? as u64,
                 _ => request.mtf_per_mm = numbers(key, value)?,
             }
             Ok(())
         })?;
+        if let PsfSampling::Paper { jitter, .. } = &mut request.sampling {
+            *jitter = !is_exact_grid;
+        }
         if request.focus == FocusSpec::NearObject {
             request.focus = FocusSpec::DistanceMm(request.distances_mm[0]);
         }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dioptric_diffraction::Hurb;
 use dioptric_psf::Profile;
-use dioptric_spectrum::{Cancel, WavelengthGrid};
+use dioptric_spectrum::{Cancel, WavelengthGrid, srgb_decode};
 use image::{Rgb, RgbImage, imageops};
 
 use crate::{
@@ -64,9 +64,13 @@ pub fn draw_all(worlds: &Path, announce: &dyn Fn(&str)) -> Result<Vec<Drawing>, 
     drawings.push(Drawing::new("figure2_all.svg", meshes(all)));
     let closed = figure2::hurb("HURB, closed form", &nm, Hurb::with_gamma(1.0));
     drawings.push(Drawing::new("figure2.csv", figure2::table(&[counted, closed, calibrated, wave, theory])));
-    for (name, scale) in [("figure3", figure3::PRINTED_BLUR_SCALE), ("figure3_true_scale", 1.0)] {
+    for (name, scale, blacks) in [
+        ("figure3", figure3::PRINTED_BLUR_SCALE, None),
+        ("figure3_lifted_blacks", figure3::PRINTED_BLUR_SCALE, Some(figure3::PRINTED_BLACKS)),
+        ("figure3_true_scale", 1.0, None),
+    ] {
         announce("figure 3: chromatic aberration at 8 m and 2 m");
-        drawings.push(Drawing::new(&format!("{name}.png"), png_bytes(&panels(scale)?)?));
+        drawings.push(Drawing::new(&format!("{name}.png"), png_bytes(&panels(scale, blacks)?)?));
     }
     drawings.push(Drawing::new("figure3.csv", figure3::table()?));
     drawings.extend(draw_figure4(worlds, announce)?);
@@ -132,41 +136,46 @@ fn mosaic(thumbnails: &[Thumbnail]) -> RgbImage {
     sheet
 }
 
-/// Returns surfaces over place and wavelength, two side by side, as one SVG document; heights are over the last's peak.
+/// Returns surfaces over place and wavelength, two side by side, as one SVG document; heights are over the last's peak, and all boxes end at the
+/// highest of them.
 fn meshes<const N: usize>(surfaces: [&Surface; N]) -> String {
     const WIDTH: f64 = 560.0;
     const HEIGHT: f64 = 470.0;
     let last = surfaces[N - 1];
     let peak = last.profiles.iter().flat_map(|p| &p.values).copied().fold(0.0, f64::max);
-    let part = |(i, surface): (usize, &Surface)| {
-        let over_peak = |profile: &Profile| profile.values.iter().map(|v| v / peak).collect();
-        let heights: Vec<Vec<f64>> = surface.profiles.iter().map(over_peak).collect();
+    let over_peak = |profile: &Profile| -> Vec<f64> { profile.values.iter().map(|v| v / peak).collect() };
+    let heights = |surface: &&Surface| -> Vec<Vec<f64>> { surface.profiles.iter().map(over_peak).collect() };
+    let heights: Vec<Vec<Vec<f64>>> = surfaces.iter().map(heights).collect();
+    let highest = heights.iter().flatten().flatten().copied().fold(1.0, f64::max);
+    let part = |(i, (surface, heights)): (usize, (&Surface, Vec<Vec<f64>>))| {
         let mesh = Mesh {
             title: surface.name,
             labels: ["place, µm", "wavelength, nm", "relative irradiance"],
             x: &surface.profiles[0].at_um,
             y: &surface.wavelengths_nm,
-            highest: heights.iter().flatten().copied().fold(1.0, f64::max),
+            highest,
             heights,
         };
         mesh.to_svg([(i % 2) as f64 * WIDTH, (i / 2) as f64 * HEIGHT, WIDTH, HEIGHT])
     };
     let (width, height) = (2.0 * WIDTH, N.div_ceil(2) as f64 * HEIGHT);
-    let parts: String = surfaces.into_iter().enumerate().map(part).collect();
+    let parts: String = surfaces.into_iter().zip(heights).enumerate().map(part).collect();
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\">\n{parts}</svg>\n"
     )
 }
 
-/// Returns the six pictures of Figure 3: targets to the right, 8 m above 2 m.
-fn panels(blur_scale: f64) -> Result<RgbImage, PipelineError> {
+/// Returns the six pictures of Figure 3: targets to the right, 8 m above 2 m; `blacks` are the codes of the display's black in each.
+fn panels(blur_scale: f64, blacks: Option<[[[u8; 3]; 3]; 2]>) -> Result<RgbImage, PipelineError> {
     const SIDE: u32 = 300;
     let mut sheet = RgbImage::new(3 * SIDE, 2 * SIDE);
     for (row, distance_mm) in figure3::DISTANCES_MM.into_iter().enumerate() {
         for (column, target) in figure3::targets().iter().enumerate() {
             let irradiance = figure3::irradiance(target, distance_mm, blur_scale)?;
             let rgb = LinearRgb::of_image(&irradiance).within_gamut();
-            let picture = rgb.to_srgb(rgb.level_at(1.0));
+            let black = blacks.map_or([0; 3], |blacks| blacks[row][column]);
+            let black = black.map(|of| srgb_decode(f64::from(of) / 255.0));
+            let picture = rgb.to_srgb_with_black(rgb.level_at(1.0), black);
             let tile = imageops::resize(&picture, SIDE, SIDE, imageops::FilterType::Triangle);
             imageops::replace(&mut sheet, &tile, i64::from(column as u32 * SIDE), i64::from(row as u32 * SIDE));
         }

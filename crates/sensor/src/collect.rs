@@ -97,7 +97,9 @@ impl Sensor {
                 }
             }
         }
-        Ok(ElectronRate { planes_e_per_s: planes.into_iter().map(|plane| optics.after_filters(self, plane)).collect() })
+        Ok(ElectronRate {
+            planes_e_per_s: planes.into_iter().map(|plane| after_filters(self, optics.exit_pupil, plane)).collect(),
+        })
     }
 }
 
@@ -153,7 +155,7 @@ impl PixelOptics {
             size: if light.pitch_um.is_some() { (sensor.rows, sensor.columns) } else { (n_rows, n_columns) },
             overlaps: light.pitch_um.map(axes),
             optical_crosstalk: sensor.optical_crosstalk,
-            exit_pupil: light.exit_pupil.filter(|_| !sensor.chief_ray_response.is_empty()),
+            exit_pupil: light.exit_pupil,
         })
     }
 
@@ -171,24 +173,25 @@ impl PixelOptics {
             None => on_pixels,
         })
     }
+}
 
-    /// Returns the rate after the chief-ray response and the spread of electrons.
-    fn after_filters(&self, sensor: &Sensor, mut rate: Array2<f32>) -> Array2<f32> {
-        if let Some(ExitPupil { distance_mm, axis_mm: [right_mm, down_mm] }) = self.exit_pupil {
-            let (n_rows, n_columns) = rate.dim();
-            let pitch_mm = 1e-3 * sensor.pixel_pitch_um;
-            let (middle_row, middle_column) = (0.5 * (n_rows as f64 - 1.0), 0.5 * (n_columns as f64 - 1.0));
-            ndarray::Zip::indexed(&mut rate).par_for_each(|(row, column), value| {
-                let y_mm = pitch_mm * (row as f64 - middle_row) - down_mm;
-                let x_mm = pitch_mm * (column as f64 - middle_column) - right_mm;
-                let angle_deg = (x_mm.hypot(y_mm) / distance_mm.abs()).atan().to_degrees();
-                *value *= sensor.chief_ray_factor(angle_deg) as f32;
-            });
-        }
-        match &sensor.electrical_crosstalk {
-            Some(kernel) => spread(&rate, kernel),
-            None => rate,
-        }
+/// Returns the rate after the chief-ray response and the spread of electrons.
+pub(crate) fn after_filters(sensor: &Sensor, exit_pupil: Option<ExitPupil>, mut rate: Array2<f32>) -> Array2<f32> {
+    let exit_pupil = exit_pupil.filter(|_| !sensor.chief_ray_response.is_empty());
+    if let Some(ExitPupil { distance_mm, axis_mm: [right_mm, down_mm] }) = exit_pupil {
+        let (n_rows, n_columns) = rate.dim();
+        let pitch_mm = 1e-3 * sensor.pixel_pitch_um;
+        let (middle_row, middle_column) = (0.5 * (n_rows as f64 - 1.0), 0.5 * (n_columns as f64 - 1.0));
+        ndarray::Zip::indexed(&mut rate).par_for_each(|(row, column), value| {
+            let y_mm = pitch_mm * (row as f64 - middle_row) - down_mm;
+            let x_mm = pitch_mm * (column as f64 - middle_column) - right_mm;
+            let angle_deg = (x_mm.hypot(y_mm) / distance_mm.abs()).atan().to_degrees();
+            *value *= sensor.chief_ray_factor(angle_deg) as f32;
+        });
+    }
+    match &sensor.electrical_crosstalk {
+        Some(kernel) => spread(&rate, kernel),
+        None => rate,
     }
 }
 

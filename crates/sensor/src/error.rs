@@ -15,6 +15,14 @@ pub enum SensorError {
         /// The names that would do.
         known: String,
     },
+    /// A name that names no built-in filter.
+    #[error("no filter is named '{name}'; known: {known}")]
+    UnknownFilter {
+        /// The name given.
+        name: String,
+        /// The names that would do.
+        known: String,
+    },
     /// A file that cannot be read.
     #[error("{}: cannot be read: {reason}", path.display())]
     Read {

@@ -63,7 +63,7 @@ fn moved_down(plane: &Array2<f32>, shift: f64) -> Array2<f32> {
 }
 
 /// Returns the weights of the samples before, at, after and two after a place that lies a fraction behind a sample.
-fn keys(t: f64) -> [f32; 4] {
+pub(crate) fn keys(t: f64) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [0.5 * (-t3 + 2.0 * t2 - t), 0.5 * (3.0 * t3 - 5.0 * t2 + 2.0), 0.5 * (-3.0 * t3 + 4.0 * t2 + t), 0.5 * (t3 - t2)]
         .map(|w| w as f32)

@@ -69,7 +69,18 @@ impl Sensor {
     /// The rounding of the converter is counted once.
     #[must_use]
     pub fn of_summed_reads(&self, n_photodiodes: usize) -> Self {
-        let root = (n_photodiodes as f64).sqrt();
+        self.with_noise_of_reads((n_photodiodes as f64).sqrt())
+    }
+
+    /// Returns the data sheet of one of so many photodiodes, from that of the sum of their reads.
+    ///
+    /// # Errors
+    /// As [`photodiode`](Self::photodiode).
+    pub fn of_one_read(&self, n_photodiodes: usize) -> Result<Self, SensorError> {
+        self.with_noise_of_reads((n_photodiodes as f64).sqrt().recip()).photodiode(n_photodiodes)
+    }
+
+    fn with_noise_of_reads(&self, root: f64) -> Self {
         Self {
             read_noise_v: root * self.read_noise_v,
             read_noise_e: self.read_noise_e.map(|electrons| root * electrons),
@@ -229,6 +240,14 @@ mod tests {
         check(&[0.7, 0.1], &[0.5, 0.3]);
         check(&[0.9, 0.4], &[0.5, 0.5]);
         check(&[0.45, 0.05, 0.15, 0.15], &[0.25, 0.15, 0.2, 0.2]);
+    }
+
+    #[test]
+    fn one_read_has_the_noise_of_the_sheet() {
+        let sensor = Sensor::built_in("imx363").unwrap();
+        let (found, expected) = (sensor.of_summed_reads(4).of_one_read(4).unwrap(), sensor.photodiode(4).unwrap());
+        assert_eq!((found.full_well_e, found.read_noise_e, &found.name), (1500.0, None, &expected.name));
+        assert!((found.read_noise_v / expected.read_noise_v - 1.0).abs() < 1e-12);
     }
 
     #[test]

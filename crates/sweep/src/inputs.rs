@@ -9,7 +9,7 @@ use std::{
     time::SystemTime,
 };
 
-use dioptric_pipeline::{Camera, SceneSource, SensorSpec};
+use dioptric_pipeline::{Camera, FilterSpec, SceneSource, SensorSpec};
 
 use crate::SweepError;
 
@@ -90,6 +90,7 @@ fn paths(camera: &mut Camera) -> Vec<&mut PathBuf> {
     lens.into_iter()
         .chain(&mut camera.lens_reading.glasses)
         .chain(sensor)
+        .chain(camera.filters.iter_mut().filter_map(FilterSpec::file_mut))
         .chain(scene)
         .chain(&mut camera.scene.hidden)
         .collect()

@@ -76,7 +76,7 @@ impl ItemKey {
             of(&((camera.focus, camera.film, camera.crop), sensor, camera.diffraction, camera.bank)),
             of(&(camera.blur, &camera.light_field)),
             of(&(&scene.illuminant, scene.illuminance_lux, &scene.light, scene.mean_luminance_cd_m2)),
-            of(&camera.sensor),
+            of(&(&camera.sensor, &camera.filters)),
             of(&(camera.exposure, camera.noise, &camera.frames, camera.seed)),
         ];
         let imaging = Camera {

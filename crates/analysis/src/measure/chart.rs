@@ -33,6 +33,8 @@ pub struct ChartMeasurement {
     pub median_delta_e: f64,
     /// The largest ΔE₀₀.
     pub max_delta_e: f64,
+    /// The rms of the patches' brightness about what the median of all makes them, stops: [`ChartReport::brightness_spread_stops`].
+    pub brightness_spread_stops: f64,
     /// The chart's corners as column and row: beside dark skin, bluish green, black and white.
     pub corners: [[f64; 2]; 4],
     /// A row a patch.
@@ -109,6 +111,7 @@ impl ChartRequest {
             mean_delta_e: report.mean_delta_e(),
             median_delta_e: report.median_delta_e(),
             max_delta_e: report.max_delta_e(),
+            brightness_spread_stops: report.brightness_spread_stops(),
             corners: corners.map(|(row, column)| [column, row]),
             patches: rows.collect(),
         })

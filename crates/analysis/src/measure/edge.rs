@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_sensor::{EdgeResponse, find_edge};
+use dioptric_sensor::{EdgeResponse, Viewing, find_edge};
 use ndarray::{Array2, ArrayView2, s};
 use serde::Serialize;
 
@@ -12,6 +12,10 @@ use dioptric_pipeline::PipelineError;
 
 /// The side of the region that is looked for, in samples of one channel.
 const SIDE: usize = 64;
+/// Pixels a degree where none are given: one a minute of arc.
+const PIXELS_PER_DEGREE: f64 = 60.0;
+/// The luminance at which pictures are looked at, cd/m².
+const LUMINANCE_CD_M2: f64 = 100.0;
 /// The most letters a mosaic may have.
 const MOST_LETTERS: usize = 64;
 
@@ -26,6 +30,8 @@ pub struct EdgeRequest {
     pub mosaic: Option<String>,
     /// The distance between pixels, µm.
     pub pixel_um: Option<f64>,
+    /// Pixels a degree of the viewer's field, for acutance and square-root integral; 60 where it is not given.
+    pub pixels_per_degree: Option<f64>,
     /// How samples stand for light.
     pub curve: CodeCurve,
 }
@@ -62,6 +68,13 @@ pub struct EdgeChannel {
     pub mtf50p_cycles_per_mm: Option<f64>,
     /// The response at half a cycle a pixel; none where the channel's samples are too far apart to tell.
     pub response_at_nyquist: Option<f64>,
+    /// The response weighed by the eye's contrast sensitivity, 1 of a perfect picture (IEEE 1858); none where the channel's samples are too far apart to
+    /// tell.
+    pub acutance: Option<f64>,
+    /// The square-root integral of the whole picture at 100 cd/m², just noticeable differences (Barten 1990).
+    pub square_root_integral_jnd: Option<f64>,
+    /// The share of the response that lies beyond half a cycle a pixel and comes back as coarser patterns.
+    pub aliasing_share: Option<f64>,
     /// Frequencies, cycles a pixel.
     pub frequencies_cycles_per_pixel: Vec<f64>,
     /// The response at each frequency, 1 at 0.
@@ -90,6 +103,7 @@ impl EdgeRequest {
             return Err(wrong("--pixel-um", value.to_string(), "a number above 0"));
         }
         let picture = MeasuredPicture::open(path, self.curve)?;
+        let viewing = self.viewing(picture.size())?;
         let samples = self.samples(&picture)?;
         let region = self.region(&picture, samples.period)?;
         let mut measured: Vec<(String, EdgeResponse)> = Vec::new();
@@ -110,7 +124,10 @@ impl EdgeRequest {
                 region,
                 slant_deg: last.slant_deg,
                 pixel_um: self.pixel_um,
-                channels: measured.iter().map(|(name, response)| self.channel(name, response)).collect(),
+                channels: measured
+                    .iter()
+                    .map(|(name, response)| self.channel(name, response, &viewing))
+                    .collect::<Result<_, _>>()?,
                 not_measured,
             }),
             (None, first) => {
@@ -118,6 +135,16 @@ impl EdgeRequest {
                 Err(PipelineError::Read { path: path.to_owned(), reason })
             }
         }
+    }
+
+    /// Returns how the picture is looked at.
+    fn viewing(&self, (rows, columns): (usize, usize)) -> Result<Viewing, PipelineError> {
+        let pixels_per_degree = self.pixels_per_degree.unwrap_or(PIXELS_PER_DEGREE);
+        if !(pixels_per_degree > 0.0 && pixels_per_degree.is_finite()) {
+            return Err(wrong("--pixels-per-degree", pixels_per_degree.to_string(), "a number above 0"));
+        }
+        let picture_deg = (rows as f64 * columns as f64).sqrt() / pixels_per_degree;
+        Ok(Viewing { pixels_per_degree, picture_deg, luminance_cd_m2: LUMINANCE_CD_M2 })
     }
 
     /// Parts a picture into channels.
@@ -172,20 +199,24 @@ impl EdgeRequest {
         Ok(PixelRegion { row: row * period, column: column * period, rows, columns })
     }
 
-    fn channel(&self, name: &str, response: &EdgeResponse) -> EdgeChannel {
+    fn channel(&self, name: &str, response: &EdgeResponse, viewing: &Viewing) -> Result<EdgeChannel, PipelineError> {
         let per_mm = |cycles_per_pixel: f64| self.pixel_um.map(|um| cycles_per_pixel / um * 1e3);
         let (mtf50, mtf50p) = (response.mtf50(), response.mtf50p());
         let last = response.frequencies.last().copied().unwrap_or(0.0);
-        EdgeChannel {
+        let is_known = last > 0.5 - 1e-9;
+        Ok(EdgeChannel {
             channel: name.to_owned(),
             mtf50_cycles_per_pixel: mtf50,
             mtf50p_cycles_per_pixel: mtf50p,
             mtf50_cycles_per_mm: mtf50.and_then(per_mm),
             mtf50p_cycles_per_mm: mtf50p.and_then(per_mm),
-            response_at_nyquist: (last > 0.5 - 1e-9).then(|| response.at(0.5)),
+            response_at_nyquist: is_known.then(|| response.at(0.5)),
+            acutance: is_known.then(|| response.acutance(viewing)).transpose()?,
+            square_root_integral_jnd: is_known.then(|| response.square_root_integral(viewing)).transpose()?,
+            aliasing_share: (last > 1.0 - 1e-9).then(|| response.aliasing_share()),
             frequencies_cycles_per_pixel: response.frequencies.clone(),
             response: response.response.clone(),
-        }
+        })
     }
 }
 

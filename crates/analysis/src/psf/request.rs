@@ -35,7 +35,7 @@ pub struct PsfRequest {
     pub bank: Option<BankSpec>,
     /// Spatial frequencies of the MTF tables, cycles per mm.
     pub mtf_per_mm: Vec<f64>,
-    /// The seed of the paper mode's diffraction.
+    /// The seed of the paper mode's jitter and diffraction.
     pub seed: u64,
     /// Weights of the wavelengths in the light of all of them; none for all alike.
     pub spectral_weights: Vec<f64>,
@@ -50,6 +50,9 @@ pub enum PsfSampling {
     Paper {
         /// Rays along the side of the grid.
         n_across: usize,
+        /// Whether each ray is moved by up to half a step of the grid both ways, drawn from the seed, as the authors did: an exact grid beats
+        /// with the pixels, so that rows of them get several times the rays of their neighbors.
+        jitter: bool,
     },
 }
 
@@ -144,7 +147,7 @@ impl PsfRequest {
         {
             return Err(self.wrong("size", &size.to_string(), &format!("1 to {LARGEST}")));
         }
-        if let PsfSampling::Paper { n_across } = self.sampling
+        if let PsfSampling::Paper { n_across, .. } = self.sampling
             && !(2..=20_000).contains(&n_across)
         {
             return Err(self.wrong("rays", &n_across.to_string(), "2 to 20000"));

@@ -5,8 +5,8 @@ use dioptric_optics::{
     FilmPoint, MonoLens, ObjectPoint, PupilRegion, Vignetting,
     analysis::{PupilLight, PupilRule},
     glam::{DVec2, DVec3, Vec2Swizzles},
-    rays_over_front,
 };
+use dioptric_psf::FrontGrid;
 
 /// Azimuths of a pupil.
 const AZIMUTHS: usize = 96;
@@ -57,7 +57,7 @@ impl Spot {
     ///
     /// `energy` is the share of the rays that reached the film.
     pub(crate) fn over_front(mono: &MonoLens, point: &ObjectPoint, film_distance_mm: f64, paper: &PaperRays) -> Self {
-        let mut rays = rays_over_front(mono, point, paper.n_across);
+        let mut rays = mono.rays_towards(point, &paper.grid().targets_mm(mono), 0.0, 0.0);
         let stop = mono.stop();
         mono.trace_surfaces(0..stop + 1, &mut rays, Vignetting::On);
         if let Some(model) = paper.bending {
@@ -109,9 +109,18 @@ fn area_of(point: &ObjectPoint, pupil: &PupilRegion) -> f64 {
 pub(crate) struct PaperRays {
     /// Rays along the side of the square grid.
     pub(crate) n_across: usize,
+    /// Whether rays are moved within the steps of the grid.
+    pub(crate) jitter: bool,
     /// Diffraction drawn at the stop.
     pub(crate) bending: Option<Hurb>,
     pub(crate) seed: u64,
+}
+
+impl PaperRays {
+    fn grid(&self) -> FrontGrid {
+        // Diffraction draws from the seed itself.
+        FrontGrid { n_across: self.n_across, jitter_seed: self.jitter.then(|| self.seed.wrapping_add(1)) }
+    }
 }
 
 #[cfg(test)]

@@ -97,8 +97,9 @@ impl Here<'_> {
                 let source = self.request.exact_source(self.lens, self.items, self.film_distance_mm)?;
                 Ok(self.items.par_iter().map(|item| self.of_picture(item, &source)).collect())
             }
-            PsfSampling::Paper { n_across } => {
-                let rays = PaperRays { n_across, bending: self.request.diffraction.hurb(), seed: self.request.seed };
+            PsfSampling::Paper { n_across, jitter } => {
+                let rays =
+                    PaperRays { n_across, jitter, bending: self.request.diffraction.hurb(), seed: self.request.seed };
                 self.items.par_iter().map(|item| self.of_rays(item, &rays)).collect()
             }
         }

@@ -96,7 +96,11 @@ impl SensorStatistics {
             read_noise_e,
             row_time_us: raw.row_time_us,
             last_row_later_ms: 1e3 * raw.row_start_s(raw.size().0 - 1),
-            notes: sensor.bands_beyond_tables(frames.grid),
+            notes: sensor
+                .bands_beyond_tables(frames.grid)
+                .into_iter()
+                .chain(frames.filters.iter().filter_map(|filter| filter.note_beyond_table(frames.grid)))
+                .collect(),
             channels,
         })
     }

@@ -68,6 +68,8 @@ pub struct Exposed {
     pub raw_note: Option<String>,
     /// All frames merged, those of both photodiodes of split pixels among them; none for a single one.
     pub merged: Option<Raw>,
+    /// What the small photodiodes of split pixels gave in the first exposure.
+    pub small: Option<Raw>,
     /// What each photodiode gave, where they are read one by one: electrons, volts and `raw` are the sums.
     pub photodiodes: Option<PhotodiodeReads>,
 }
@@ -232,7 +234,8 @@ impl FramesSpec {
             Self::Single | Self::Interleaved { .. } => None,
         };
         let raw_note = self.raw_note(sensor);
-        Ok(Exposed { electrons, volts, raw: frames.swap_remove(0), raw_note, merged, photodiodes: None })
+        let small = small_frames.into_iter().next();
+        Ok(Exposed { electrons, volts, raw: frames.swap_remove(0), raw_note, merged, small, photodiodes: None })
     }
 
     /// Takes the frames of a sensor whose photodiodes are read one by one, each with noise of its own.
@@ -282,7 +285,7 @@ impl FramesSpec {
         let merged = if *self == Self::Single { None } else { Some(sum.merge(&frames)?) };
         let raw_note = self.raw_note(sensor);
         let (raw, photodiodes) = (frames.swap_remove(0), Some(photodiodes));
-        Ok(Exposed { electrons, volts, raw, raw_note, merged, photodiodes })
+        Ok(Exposed { electrons, volts, raw, raw_note, merged, small: None, photodiodes })
     }
 }
 
@@ -306,7 +309,7 @@ fn expose_interleaved(
     let volts = sensor.volts(&electrons, exposure, noise)?;
     let raw = sensor.digitize_interleaved(&volts, exposure, rows)?;
     let merged = Some(sensor.merge_interleaved(&raw, rows)?);
-    Ok(Exposed { electrons, volts, raw, raw_note: None, merged, photodiodes: None })
+    Ok(Exposed { electrons, volts, raw, raw_note: None, merged, small: None, photodiodes: None })
 }
 
 fn digitized(sensor: &Sensor, rate: &ElectronRate, exposure: &Exposure, noise: &Noise) -> Result<Raw, SensorError> {

@@ -155,7 +155,7 @@ impl SensorSpec {
     }
 }
 
-fn is_path(text: &str) -> bool {
+pub(super) fn is_path(text: &str) -> bool {
     let path = Path::new(text);
     path.extension().is_some() || text.contains(std::path::MAIN_SEPARATOR) || path.exists()
 }

@@ -5,6 +5,7 @@ mod blur;
 mod check;
 mod crop;
 mod dual_pixel;
+mod filters;
 mod frames;
 mod lens;
 mod light_field;
@@ -13,6 +14,7 @@ mod photodiodes;
 mod picture_options;
 mod scene;
 mod sensor_options;
+mod video;
 mod world;
 
 use std::{
@@ -31,6 +33,7 @@ pub use bank::{BankData, BankSpec};
 pub use blur::BlurSpec;
 pub use crop::Crop;
 pub use dual_pixel::DualPixelSpec;
+pub use filters::FilterSpec;
 pub(crate) use frames::at_rest;
 pub use frames::{Exposed, FramesSpec, PhotodiodeReads};
 pub use lens::{LensReadOptions, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
@@ -41,6 +44,7 @@ pub use picture_options::PictureOptions;
 pub(crate) use scene::bands_or_own;
 pub use scene::{FlatSize, SceneSource, SceneSpec};
 pub use sensor_options::SensorOptions;
+pub use video::{CameraTurn, TurnPath, VideoSpec};
 pub use world::{RenderEffort, RenderMethod, WorldSpec};
 
 use self::check::Checker;
@@ -89,6 +93,9 @@ pub struct Camera {
     /// What makes a light-field camera of it: an array of small lenses or holes before the film, or more cameras beside it.
     #[serde(default)]
     pub light_field: Option<LightFieldSpec>,
+    /// Filters before the lens, which the picture is not corrected for; what belongs to the camera is in `filter_stack` of its sensor.
+    #[serde(default)]
+    pub filters: Vec<FilterSpec>,
     /// The sensor.
     pub sensor: SensorSpec,
     /// Photodiodes that share the light below each microlens and are read one by one; whole pixels if left out.
@@ -103,6 +110,9 @@ pub struct Camera {
     /// How many frames the picture is made of.
     #[serde(default)]
     pub frames: FramesSpec,
+    /// What `dioptric video` takes in place of one picture.
+    #[serde(default)]
+    pub video: Option<VideoSpec>,
     /// From the raw frame to the picture.
     #[serde(default)]
     pub processing: Processing,
@@ -331,6 +341,9 @@ impl Camera {
         if let Some(spec) = &self.dual_pixel {
             spec.check(self, checker)?;
         }
+        if let Some(spec) = &self.video {
+            spec.check(self, checker)?;
+        }
         self.scene.check(checker)?;
         match &self.scene.source {
             SceneSource::World(spec) if spec.is_still_life() => {
@@ -412,6 +425,7 @@ impl Camera {
         if let SensorSpec::File(path) = &mut self.sensor {
             *path = folder.join(&path);
         }
+        filters::resolve_paths(&mut self.filters, folder);
         self.scene.resolve_paths(folder);
     }
 

@@ -61,6 +61,7 @@ impl Capture {
         let first = self.lens.reference.first_order();
         Frames {
             sensor: &self.sensor,
+            filters: &self.inputs.filters,
             exposure: &self.frames.exposure,
             rate: &self.rate,
             exposed: &self.frames.exposed,

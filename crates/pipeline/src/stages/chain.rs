@@ -185,7 +185,7 @@ impl Chain<'_> {
         self.kept.electrons.get_or_make(inputs.clone(), |inputs| {
             let irradiance = self.irradiance(&inputs.irradiance)?;
             let place = self.film(&inputs.irradiance.plan.bank.film, &inputs.irradiance.scene)?;
-            electrons::collect(irradiance, electrons::on_film(&inputs.sensor, &place), &place, &self.watch)
+            electrons::collect(irradiance, electrons::exposed(inputs, &place), &place, &self.watch)
         })
     }
 
@@ -196,7 +196,7 @@ impl Chain<'_> {
             let rates = self.electrons(&inputs.electrons)?;
             let dual_pixel = irradiance.dual_pixel;
             self.watch.progress.at(Stage::Sensor, 0.5);
-            let (shutter, sensor) = (inputs.shutter.clone(), electrons::on_film(&inputs.electrons.sensor, &place));
+            let (shutter, sensor) = (inputs.shutter.clone(), electrons::exposed(&inputs.electrons, &place));
             // What moves between frames is the irradiance.
             let irradiance = if shutter.moves() { Some(self.irradiance(irradiance)?) } else { None };
             let exit_pupil = electrons::exit_pupil(&sensor, &place);
@@ -218,7 +218,7 @@ impl Chain<'_> {
         if inputs.processing.lens_corrections.is_none() {
             return Ok(None);
         }
-        let ElectronInputs { irradiance, sensor } = &inputs.frames.electrons;
+        let ElectronInputs { irradiance, sensor, .. } = &inputs.frames.electrons;
         let film = irradiance.plan.bank.film.clone();
         let inputs = AberrationInputs { film, scene: irradiance.scene.clone(), sensor: sensor.clone() };
         let aberrations = self.kept.aberrations.get_or_make(inputs, |inputs| {

@@ -25,6 +25,11 @@ pub(super) fn read_out(inputs: &ElectronInputs, place: &FilmPlace) -> Sensor {
     }
 }
 
+/// Returns the sensor as it lies on the film, behind the filters.
+pub(super) fn exposed(inputs: &ElectronInputs, place: &FilmPlace) -> Sensor {
+    on_film(&inputs.sensor, place).behind(&inputs.filters)
+}
+
 /// Returns the sensor as it lies on the film: its pixels are the film's samples, its mosaic that of the whole film.
 pub(super) fn on_film(sensor: &Sensor, place: &FilmPlace) -> Sensor {
     let cfa = match place.part {

@@ -308,7 +308,7 @@ impl KeptCamera {
         Ok(self.picture_inputs()?.frames.electrons.irradiance)
     }
 
-    fn picture_inputs(&self) -> Result<PictureInputs, PipelineError> {
+    pub(super) fn picture_inputs(&self) -> Result<PictureInputs, PipelineError> {
         PictureInputs::of(&self.camera, &self.given, self.quality)
     }
 

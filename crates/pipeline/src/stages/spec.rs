@@ -12,15 +12,15 @@ use dioptric_backward::MicroArray;
 use dioptric_forward::Film;
 use dioptric_optics::Lens;
 use dioptric_scene::{FillDepth, Scene};
-use dioptric_sensor::{ExposureControl, Noise, Processing, Sensor};
+use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor};
 use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
 
 use super::given::{Given, GivenParts};
 use crate::{
-    BankSpec, BlurSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FlatSize, FocusSpec, FramesSpec,
-    LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort, SceneSource, SceneSpec,
-    StopSpec, WavelengthSpec, WorldSpec,
+    BankSpec, BlurSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec,
+    FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort,
+    SceneSource, SceneSpec, StopSpec, WavelengthSpec, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -158,6 +158,8 @@ pub(crate) struct IrradianceInputs {
 pub(crate) struct ElectronInputs {
     pub(crate) irradiance: IrradianceInputs,
     pub(crate) sensor: Sensor,
+    /// Filters before the lens.
+    pub(crate) filters: Vec<OpticalFilter>,
 }
 
 /// The frames of the sensor.
@@ -337,7 +339,7 @@ impl PictureInputs {
         let sensor = given.sensor.as_deref().map_or_else(|| camera.sensor.open(), |sensor| Ok(sensor.clone()))?;
         let irradiance = IrradianceInputs::of(camera, given, &sensor, quality);
         let frames = FrameInputs {
-            electrons: ElectronInputs { irradiance, sensor },
+            electrons: ElectronInputs { irradiance, sensor, filters: FilterSpec::open_all(&camera.filters)? },
             shutter: ShutterInputs {
                 exposure: camera.exposure,
                 frames: camera.frames.clone(),

@@ -80,6 +80,7 @@ class Camera:
         pixels: tuple[int, int] | None = ...,
         pixel_um: float | None = ...,
         dual_pixel: str | None = ...,
+        filters: Sequence[str] | None = ...,
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
         blur: str | None = ...,
@@ -334,6 +335,7 @@ class Lens:
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
         rays: int | None = ...,
+        exact_grid: bool | None = ...,
         seed: int | None = ...,
     ) -> NDArray[np.float32]: ...
     def psf_table(
@@ -350,6 +352,7 @@ class Lens:
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
         rays: int | None = ...,
+        exact_grid: bool | None = ...,
         seed: int | None = ...,
         mtf_per_mm: _Numbers | None = ...,
     ) -> list[dict[str, Any]]: ...
