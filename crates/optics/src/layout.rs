@@ -270,7 +270,7 @@ fn glass_colors(glass: &Glass) -> (String, String) {
     let (nd, vd) = glass.nd_vd().unwrap_or((1.5, 60.0));
     let hue = 205.0 + 55.0 * ((60.0 - vd.clamp(25.0, 60.0)) / 35.0);
     let lightness = 93.0 - 22.0 * (nd - 1.45).clamp(0.0, 0.5);
-    (format!("hsl({hue:.0}, 60%, {lightness:.0}%)"), format!("hsl({hue:.0}, 35%, 38%)"))
+    (hex_of_hsl(hue, 0.6, 0.01 * lightness), hex_of_hsl(hue, 0.35, 0.38))
 }
 
 fn stop(lens: &Lens, frame: &Frame, svg: &mut String) {
@@ -309,19 +309,43 @@ fn film(lens: &Lens, layout: &Layout, fans: &[Fan], frame: &Frame, svg: &mut Str
     frame.label((frame.x(top.x) + 3.0, frame.y(top.y) - 6.0), "end", "film", svg);
 }
 
-/// Returns a color that stands for a wavelength, as CSS writes it: the hue of its light, dark enough for lines on white.
+/// Returns a color that stands for a wavelength, as six hexadecimal digits behind a `#`: the hue of its light, dark enough for lines on white.
 pub fn wavelength_color(wavelength_nm: f64) -> String {
     const HUES: [(f64, f64); 7] =
         [(400.0, 270.0), (450.0, 235.0), (490.0, 185.0), (530.0, 130.0), (580.0, 48.0), (620.0, 15.0), (700.0, 0.0)];
     let above = HUES.partition_point(|(nm, _)| *nm < wavelength_nm).clamp(1, HUES.len() - 1);
     let ((w0, h0), (w1, h1)) = (HUES[above - 1], HUES[above]);
     let fraction = ((wavelength_nm - w0) / (w1 - w0)).clamp(0.0, 1.0);
-    format!("hsl({:.0}, 85%, 42%)", h0 + (h1 - h0) * fraction)
+    hex_of_hsl(h0 + (h1 - h0) * fraction, 0.85, 0.42)
+}
+
+/// Returns a color of hue (degrees), saturation and lightness as six hexadecimal digits (CSS Color 3, 4.2.4): SVG 1.1 knows no `hsl()`, and what reads
+/// no more than that draws it black.
+fn hex_of_hsl(hue_deg: f64, saturation: f64, lightness: f64) -> String {
+    let spread = saturation * lightness.min(1.0 - lightness);
+    let channel = |n: f64| {
+        let k = (n + hue_deg / 30.0).rem_euclid(12.0);
+        let value = lightness - spread * (k - 3.0).min(9.0 - k).clamp(-1.0, 1.0);
+        (255.0 * value).round() as u8
+    };
+    format!("#{:02x}{:02x}{:02x}", channel(0.0), channel(8.0), channel(4.0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn hues_are_those_of_css() {
+        for (hue, color) in
+            [(0.0, "#ff0000"), (120.0, "#00ff00"), (240.0, "#0000ff"), (60.0, "#ffff00"), (300.0, "#ff00ff")]
+        {
+            assert_eq!(hex_of_hsl(hue, 1.0, 0.5), color);
+        }
+        assert_eq!(hex_of_hsl(77.0, 0.0, 0.2), "#333333");
+        // hsl(30, 60%, 70%): 224, 178.5, 133.
+        assert_eq!(hex_of_hsl(30.0, 0.6, 0.7), "#e0b385");
+    }
 
     fn draw(lens: &Lens, degrees: &[f64]) -> String {
         let mono = lens.at(550.0).unwrap();

@@ -176,6 +176,11 @@ fn power_and_illuminance_set_the_light() {
     assert!(notes.iter().any(|note| note.contains("2 faces of unequal areas")), "{notes:?}");
     // As without.
     check(r#""float power" -1"#, 1.0, &point);
+    // Earlier versions don't know the words.
+    let third = |with: &str| format!("{} WorldEnd", point(with));
+    check(r#""float power" 30"#, 1.0, &third);
+    let (_, notes) = light(third(r#""float power" 30"#), 1.0);
+    assert!(notes.iter().any(|note| note.contains("left out: power")), "{notes:?}");
 }
 
 /// A black body is scaled to a peak of 1 at its own wavelength, be that beyond the visible, in textures and lights alike; the fourth

@@ -34,22 +34,27 @@ impl Glow {
     }
 }
 
-/// The flux of a light in units of its own, where the file states one: above 0.
-fn power_of(params: &Params<'_>) -> Option<f64> {
-    params.number("power").filter(|power| *power > 0.0)
-}
-
-/// The illuminance of a light far away, where the file states one: above 0.
-fn illuminance_of(params: &Params<'_>) -> Option<f64> {
-    params.number("illuminance").filter(|illuminance| *illuminance > 0.0)
-}
-
 impl Reader<'_> {
+    /// Returns a number above 0 that the fourth version has of lights, and earlier ones don't.
+    fn of_fourth(&self, params: &Params<'_>, name: &str) -> Option<f64> {
+        (self.version == Version::Four).then(|| params.number(name).filter(|value| *value > 0.0))?
+    }
+
+    /// Returns the flux of a light, in the file's unit of radiance times area, where the file states one.
+    fn power(&self, params: &Params<'_>) -> Option<f64> {
+        self.of_fourth(params, "power")
+    }
+
+    /// Returns the illuminance by a light far away, in the file's unit of radiance, where the file states one.
+    fn illuminance(&self, params: &Params<'_>) -> Option<f64> {
+        self.of_fourth(params, "illuminance")
+    }
+
     pub(super) fn glow(&mut self, params: &Params<'_>) -> Result<Glow, Fault> {
         let scale = params.number("scale").unwrap_or(1.0);
         let radiance = self.light_curve(params.find("L"), scale)?;
         let emission = Emission { radiance, is_two_sided: params.flag("twosided").unwrap_or(false) };
-        Ok(Glow { emission, power: power_of(params) })
+        Ok(Glow { emission, power: self.power(params) })
     }
 
     pub(super) fn light(&mut self, kind: &str, params: &Params<'_>) -> Result<(), Fault> {
@@ -69,7 +74,7 @@ impl Reader<'_> {
                     self.builder.note(format!("LightSource \"{kind}\": a point that shines alike in all directions"));
                 }
                 let position = place.transform_point3(point("from", [0.0; 3]));
-                let of_power = power_of(params).map_or(1.0, |power| power / (4.0 * PI));
+                let of_power = self.power(params).map_or(1.0, |power| power / (4.0 * PI));
                 Light::Point { position, intensity: self.light_curve(params.find("I"), of_point * of_power)? }
             }
             "spot" => {
@@ -82,7 +87,7 @@ impl Reader<'_> {
                     (inner_deg.to_radians().clamp(0.0, PI), outer_deg.to_radians().clamp(0.0, PI));
                 // The edge of the cone counts half, as in pbrt.
                 let solid_angle = 2.0 * PI * (1.0 - 0.5 * (inner_rad.cos() + outer_rad.cos()));
-                let of_power = power_of(params).map_or(1.0, |power| power / solid_angle);
+                let of_power = self.power(params).map_or(1.0, |power| power / solid_angle);
                 let intensity = self.light_curve(params.find("I"), of_point * of_power)?;
                 Light::Spot { position, direction, intensity, inner_rad, outer_rad }
             }
@@ -90,13 +95,13 @@ impl Reader<'_> {
                 let way = point("to", [0.0, 0.0, 1.0]) - point("from", [0.0; 3]);
                 let way = place.transform_vector3(way);
                 let direction = way.try_normalize().ok_or("a distant light without direction".to_owned())?;
-                let scale = scale * illuminance_of(params).unwrap_or(1.0);
+                let scale = scale * self.illuminance(params).unwrap_or(1.0);
                 Light::Distant { direction, irradiance: self.light_curve(params.find("L"), scale)? }
             }
             "infinite" => match params.text("mapname").or_else(|| params.text("filename")) {
-                Some(name) => return self.sky_image(name, scale, illuminance_of(params)),
+                Some(name) => return self.sky_image(name, scale, self.illuminance(params)),
                 None => {
-                    let scale = scale * illuminance_of(params).map_or(1.0, |illuminance| illuminance / PI);
+                    let scale = scale * self.illuminance(params).map_or(1.0, |illuminance| illuminance / PI);
                     Light::Sky { radiance: self.light_curve(params.find("L"), scale)? }
                 }
             },
