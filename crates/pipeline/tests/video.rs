@@ -47,6 +47,8 @@ fn a_panned_camera_sees_its_picture_moved() {
     let pan_deg = (6.0 / still.samples_per_tan).atan().to_degrees();
     let motion = CameraTurn { pan_deg_per_s: 10.0 * pan_deg, ..CameraTurn::default() };
     let panned = video(&rest.with(|camera| camera.video.as_mut().unwrap().motion = motion));
+    let states = |video: &Video| video.notes.iter().any(|note| note.contains("without distortion"));
+    assert!(states(&panned) && !states(&still), "{:?}", panned.notes);
     assert_eq!(panned.size(), still.size());
     let (still, moved) = (green(&still, 0), green(&panned, 1));
     let (from, to) = (still.slice(s![5..45, 13..60]), moved.slice(s![5..45, 10..57]));

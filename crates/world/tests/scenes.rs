@@ -167,7 +167,7 @@ fn power_and_illuminance_set_the_light() {
     let patch = r#""point3 P" [-1.5 -1.5 0  1.5 -1.5 0  -1.5 1.5 0  1.5 1.5 0]"#;
     let patch = move |with: &str| of_shape("")(with) + &format!(r#"Shape "bilinearmesh" {patch}"#);
     check(r#""float power" 7"#, 7.0 / (PI * 9.0), &patch);
-    // Of unequal triangles, 1 and 3 square units, all shine alike, and the file is told so.
+    // Of unequal triangles, 1 and 3 square units, all emit the same radiance, which a note states.
     let unequal =
         r#"Shape "trianglemesh" "point3 P" [-1 -1 0  1 -1 0  -1 0 0  -1 -4 0] "integer indices" [0 1 2 0 3 1]"#;
     let unequal = of_shape(unequal);

@@ -10,7 +10,7 @@ use dioptric_spectrum::{Bands, Cancel};
 use serde::Serialize;
 
 use super::{KeptCamera, electrons, film::FilmPlace};
-use crate::{FilmSpec, PipelineError, Progress, Stage, TurnPath, VideoSpec};
+use crate::{CameraTurn, FilmSpec, PipelineError, Progress, Stage, TurnPath, VideoSpec};
 
 /// The farthest that the film of a video is larger than its frames, as a share of them, each way.
 const LARGEST_MARGIN: f64 = 2.0;
@@ -155,6 +155,13 @@ impl KeptCamera {
         notes.extend(
             inputs.frames.electrons.filters.iter().filter_map(|filter| filter.note_beyond_table(irradiance.grid())),
         );
+        if spec.motion != CameraTurn::default() {
+            notes.push(
+                "frames move as through a lens without distortion that turns about its entrance pupil: straight lines stay straight and near \
+                 things do not move before far ones"
+                    .to_owned(),
+            );
+        }
         let mut video = Video {
             spec,
             exposure: Exposure::seconds(0.0),
