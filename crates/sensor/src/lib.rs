@@ -54,6 +54,7 @@ mod readout;
 mod regions;
 mod response;
 mod rolling;
+mod ron_file;
 mod sampling;
 mod scielab;
 mod sensor;

@@ -1,8 +1,8 @@
 //! Built-in sensors, and sensors from files.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
-use crate::{Sensor, SensorError};
+use crate::{Sensor, SensorError, ron_file};
 
 /// The names of the built-in sensors and their data sheets: ideal ones, cameras, machine vision, microscopes, astronomy.
 const BUILT_IN: [(&str, &str); 30] = [
@@ -63,9 +63,7 @@ impl Sensor {
     /// # Errors
     /// Names the file and line that cannot be read, or the field whose value makes no sense.
     pub fn read(path: &Path) -> Result<Self, SensorError> {
-        let read_error = |e: std::io::Error| SensorError::Read { path: path.to_owned(), reason: e.to_string() };
-        let text = fs::read_to_string(path).map_err(read_error)?;
-        Self::from_ron(&text, &path.display().to_string())
+        Self::from_ron(&ron_file::read_text(path)?, &path.display().to_string())
     }
 
     /// Returns the sensor of a data sheet's text; `origin` names it in errors.
@@ -73,20 +71,14 @@ impl Sensor {
     /// # Errors
     /// Names the line that cannot be read, or the field whose value makes no sense.
     pub fn from_ron(text: &str, origin: &str) -> Result<Self, SensorError> {
-        let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
-        let sensor: Self = options.from_str(text).map_err(|e| SensorError::Syntax {
-            origin: origin.to_owned(),
-            line: e.span.start.line,
-            column: e.span.start.col,
-            reason: e.code.to_string(),
-        })?;
+        let sensor: Self = ron_file::parse(text, origin)?;
         sensor.check()?;
         Ok(sensor)
     }
 
     /// Returns the data sheet as RON text, which reads back the same.
     pub fn to_ron(&self) -> String {
-        ron::ser::to_string_pretty(self, ron::ser::PrettyConfig::default()).expect("a data sheet can be written")
+        ron_file::write(self)
     }
 }
 

@@ -1,11 +1,11 @@
 //! Filters before a lens: measured ones, and some that have a closed form.
 
-use std::{f64::consts::PI, fs, path::Path};
+use std::{f64::consts::PI, path::Path};
 
 use dioptric_spectrum::{Illuminant, Observer, Spectrum, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
-use crate::{Layer, Sensor, SensorError, white_light::fine_grid};
+use crate::{Layer, Sensor, SensorError, ron_file, white_light::fine_grid};
 
 /// The names of the built-in filters and their data.
 const BUILT_IN: [(&str, &str); 22] = [
@@ -75,9 +75,7 @@ impl OpticalFilter {
     /// # Errors
     /// Names the file and line that cannot be read, or the value that is no share.
     pub fn read(path: &Path) -> Result<Self, SensorError> {
-        let read_error = |e: std::io::Error| SensorError::Read { path: path.to_owned(), reason: e.to_string() };
-        let text = fs::read_to_string(path).map_err(read_error)?;
-        Self::from_ron(&text, &path.display().to_string())
+        Self::from_ron(&ron_file::read_text(path)?, &path.display().to_string())
     }
 
     /// Returns the filter of a file's text; `origin` names it in errors.
@@ -85,13 +83,7 @@ impl OpticalFilter {
     /// # Errors
     /// Names the line that cannot be read, or the value that is no share.
     pub fn from_ron(text: &str, origin: &str) -> Result<Self, SensorError> {
-        let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
-        let filter: Self = options.from_str(text).map_err(|e| SensorError::Syntax {
-            origin: origin.to_owned(),
-            line: e.span.start.line,
-            column: e.span.start.col,
-            reason: e.code.to_string(),
-        })?;
+        let filter: Self = ron_file::parse(text, origin)?;
         match filter.transmittance.values().iter().find(|v| !(0.0..=1.0).contains(*v)) {
             Some(&value) => Err(SensorError::value(origin, "transmittance", value, "shares from 0 to 1")),
             None => Ok(filter),
@@ -100,7 +92,7 @@ impl OpticalFilter {
 
     /// Returns the filter as RON text, which reads back the same.
     pub fn to_ron(&self) -> String {
-        ron::ser::to_string_pretty(self, ron::ser::PrettyConfig::default()).expect("a filter can be written")
+        ron_file::write(self)
     }
 
     /// A neutral filter of an optical density D: 10^−D of all light passes.
