@@ -27,6 +27,9 @@ fn is_plane(surface: &Surface) -> bool {
     surface.shape == Shape::Sphere && surface.curvature_per_mm == 0.0
 }
 
+/// The longest way to a surface whose tilts and decenters are written, mm: the moves that these become are then within 1e9, which readers hold to.
+const MOST_REACH_MM: f64 = 2.5e8;
+
 impl LensFile {
     /// Writes the lens to a file, in the format of its extension: `.ron`, `.dat`, `.json` (ISET), `.zmx` or `.seq`.
     ///
@@ -137,10 +140,16 @@ impl LensFile {
         if lens.moves().is_empty() {
             return Ok(());
         }
-        let film_z_mm = lens.film_z_mm(self.film_or_focus_mm());
-        let places = lens.placements().into_iter().map(|place| place.vertex_mm.abs().max_element());
-        match places.chain([film_z_mm.abs()]).position(|mm| mm.is_nan() || mm >= 1e9) {
-            Some(surface) => Err(cannot(format, surface, "stands 1e9 mm or more from the first")),
+        let film_mm = self.film_or_focus_mm();
+        let distances_mm = lens.interfaces().iter().map(|interface| interface.thickness_after_mm.abs());
+        let places_mm = lens
+            .placements()
+            .into_iter()
+            .zip(distances_mm)
+            .map(|(place, distance_mm)| place.vertex_mm.abs().max_element().max(distance_mm));
+        let film_reach_mm = lens.film_z_mm(film_mm).abs().max(film_mm.abs());
+        match places_mm.chain([film_reach_mm]).position(|mm| mm.is_nan() || mm >= MOST_REACH_MM) {
+            Some(surface) => Err(cannot(format, surface, "stands 2.5e8 mm or more from the first or the next")),
             None => Ok(()),
         }
     }

@@ -17,6 +17,21 @@ fn every_seed_is_read_and_thousands_of_its_mutants_end_in_a_lens_or_an_error() {
     }
 }
 
+/// What would be written has a distance that readers refuse.
+#[test]
+fn tilted_film_too_far_to_be_read_again_is_not_written() {
+    let of = |film_mm: &str| {
+        let text = format!(
+            "RDM;LEN\nDIM M\nWL 588\nEPD 300\nSO 0 1e11\nS -1600 -550 REFL\n  STO\nS -666.7 550 REFL\n  ADE 45; BEN\nSI 0 {film_mm}\nGO\n"
+        );
+        LensFile::from_bytes(Path::new("far.seq"), text.as_bytes(), &ReadOptions::default()).unwrap()
+    };
+    assert!(read("near.seq", of("1000").to_seq().unwrap().as_bytes()));
+    let error = of("999999999").to_seq().unwrap_err();
+    assert!(matches!(error, OpticsError::CannotWrite { .. }), "{error}");
+    assert!(error.to_string().contains("2.5e8 mm"), "{error}");
+}
+
 fn error_of(name: &str, bytes: &[u8]) -> Option<OpticsError> {
     LensFile::from_bytes(Path::new(name), bytes, &ReadOptions::default()).err()
 }
