@@ -79,7 +79,7 @@ impl Integrator<'_> {
             let Path { ray, throughput, scattered, n_scatterings } = path;
             // Beyond everything lies the sky.
             let Some(hit) = self.world.intersect(&ray, f32::INFINITY) else {
-                let share = scattered.map_or(1.0, |(_, pdf)| share(pdf, self.world.sky_pdf(ray.direction)));
+                let share = scattered.map_or(1.0, |(from, pdf)| share(pdf, self.world.sky_pdf(from, ray.direction)));
                 let sky = self.world.sky(ray.direction, wavelengths_nm);
                 self.add(&mut sum, n_scatterings, &throughput, &sky.map(|l| l * share));
                 return sum;

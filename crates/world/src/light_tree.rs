@@ -31,7 +31,7 @@ pub(crate) struct LightBounds {
     pub(crate) reach_rad: f32,
     /// Whether they shine to the opposite directions as well.
     pub(crate) is_two_sided: bool,
-    /// Their power, in any unit.
+    /// Their power as if they shone all around as brightly as where they are brightest: 4π times that intensity, in any unit.
     pub(crate) power: f32,
 }
 
@@ -229,6 +229,17 @@ impl LightTree {
         Some((node.link as usize, probability, u))
     }
 
+    /// Returns the irradiance that all lights may give a point, roughly; W m⁻² where powers are 4π times the greatest intensity, W sr⁻¹. 0 only
+    /// where none can shine on it.
+    pub(crate) fn irradiance(&self, at: &Receiver) -> f32 {
+        let Some(root) = self.nodes.first() else { return 0.0 };
+        let importance = match root.is_leaf {
+            true => root.importance(at),
+            false => self.nodes[1].importance(at) + self.nodes[root.link as usize].importance(at),
+        };
+        importance / (4.0 * PI)
+    }
+
     /// Returns the probability with which `pick` draws a light.
     pub(crate) fn probability(&self, at: &Receiver, light: usize) -> f32 {
         let mut number = self.leaves[light];
@@ -257,7 +268,7 @@ impl LightTree {
 }
 
 /// The largest number below 1.
-const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
+pub(crate) const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
 
 /// Orders some lights so that they can be divided in two, and returns where.
 fn divide(lights: &[LightBounds], some: &mut [u32], depth: u32) -> usize {

@@ -1,16 +1,16 @@
 //! All lights of a world, and which of them is drawn.
 //!
-//! Of few lights one is drawn by its power. Of many, those far away stand beside a tree of the others ([`LightTree`]), in which one is
-//! drawn by what may fall on the point; a mesh that glows is as many lights there as it has triangles.
+//! Those far away stand beside a tree of the others ([`LightTree`]), in which one is drawn by what may fall on the point, as is which of the two
+//! groups; a mesh that glows is as many lights there as it has triangles. A light that is the only one needs neither.
 
 use glam::Vec3;
-use std::f32::consts::TAU;
+use std::{f32::consts::TAU, f64::consts::PI};
 
 use crate::{
     Hit, Light, LightId, LightSample, Receiver, SpectralCurve,
     area_light::AreaLight,
     light::visible_power,
-    light_tree::{LightBounds, LightTree},
+    light_tree::{BELOW_ONE, LightBounds, LightTree},
     placed::PlacedShape,
     sampling::Distribution,
     sky::SampledSky,
@@ -35,8 +35,8 @@ enum Source {
 /// How one light is chosen.
 #[derive(Clone, Debug)]
 enum Choice {
-    /// By its power.
-    Power(Distribution),
+    /// By fixed weights.
+    Fixed(Distribution),
     /// By what may fall on the point.
     Tree(Box<ManyLights>),
 }
@@ -44,9 +44,9 @@ enum Choice {
 /// Lights in a tree, and those that are too far away to be in one.
 #[derive(Clone, Debug)]
 struct ManyLights {
-    /// By power: each light far away, and the whole tree last.
-    groups: Distribution,
     far: Vec<u32>,
+    /// Those far away by the irradiance, W m⁻², that they give a plane that faces them.
+    far_choice: Distribution,
     tree: LightTree,
     /// Light and triangle of each leaf.
     leaves: Vec<(u32, Option<u32>)>,
@@ -56,7 +56,7 @@ struct ManyLights {
 
 #[derive(Clone, Copy, Debug)]
 enum Place {
-    /// In this group.
+    /// This one of those far away.
     Far(u32),
     /// In the tree, from this leaf on: one leaf, or one a triangle.
     Near { first_leaf: u32, is_divided: bool },
@@ -72,15 +72,16 @@ struct Chosen {
     rest: f32,
 }
 
-/// As many lights, or so many triangles of theirs, are chosen from by power alone.
-const FEW_LIGHTS: usize = 2;
+/// A light alone, of so many triangles, needs no tree.
 const FEW_PARTS: usize = 16;
+/// The least probability of the lights far away, and of the others, where both may shine: what hides them is not known.
+const LEAST_SHARE: f32 = 1.0 / 16.0;
 /// Meshes of more triangles are one light of the tree each.
 const MOST_PARTS: usize = 1 << 20;
 
 impl Lights {
     /// Returns the lights of a world: those that are no shapes, then the glowing shapes of the root group.
-    pub(crate) fn new(alone: Vec<Light>, shapes: &mut [PlacedShape], scene_radius_m: f64) -> Self {
+    pub(crate) fn new(alone: Vec<Light>, shapes: &mut [PlacedShape]) -> Self {
         let mut lights: Vec<Source> = alone
             .into_iter()
             .map(|light| match light {
@@ -96,9 +97,9 @@ impl Lights {
         let is_sky = |light: &Source| matches!(light, Source::Alone(Light::Sky { .. }) | Source::Sky(_));
         let skies = (0..lights.len() as u32).filter(|&i| is_sky(&lights[i as usize])).collect();
         let n_parts: usize = lights.iter().map(Source::n_parts).sum();
-        let choice = match lights.len() <= FEW_LIGHTS && n_parts <= FEW_PARTS {
-            true => by_power(&lights, scene_radius_m),
-            false => Choice::Tree(Box::new(ManyLights::new(&lights, shapes, scene_radius_m))),
+        let choice = match lights.len() < 2 && n_parts <= FEW_PARTS {
+            true => Choice::Fixed(Distribution::new(&vec![1.0; lights.len()])),
+            false => Choice::Tree(Box::new(ManyLights::new(&lights, shapes))),
         };
         Self { lights, choice, skies }
     }
@@ -152,7 +153,7 @@ impl Lights {
         let index = light.0 as usize;
         let Source::Area(area) = &self.lights[index] else { return 0.0 };
         let (probability, triangle) = match &self.choice {
-            Choice::Power(pick) => (pick.probability(index), None),
+            Choice::Fixed(pick) => (pick.probability(index), None),
             Choice::Tree(many) => many.probability(at, index, hit.primitive),
         };
         if probability > 0.0 { probability * area.pdf(placed, at.point, hit, triangle) } else { 0.0 }
@@ -172,11 +173,11 @@ impl Lights {
         sum
     }
 
-    /// The density with which `sample` draws a direction of the sky.
-    pub(crate) fn sky_pdf(&self, direction: Vec3) -> f32 {
+    /// The density with which `sample` draws a direction of the sky for this point.
+    pub(crate) fn sky_pdf(&self, at: &Receiver, direction: Vec3) -> f32 {
         let probability = |index: usize| match &self.choice {
-            Choice::Power(pick) => pick.probability(index),
-            Choice::Tree(many) => many.probability_of_far(index),
+            Choice::Fixed(pick) => pick.probability(index),
+            Choice::Tree(many) => many.probability_of_far(at, index),
         };
         let of_sky = |&index: &u32| match &self.lights[index as usize] {
             Source::Alone(Light::Sky { .. }) => probability(index as usize) / (2.0 * TAU),
@@ -191,18 +192,13 @@ impl Lights {
             return None;
         }
         match &self.choice {
-            Choice::Power(pick) => {
+            Choice::Fixed(pick) => {
                 let (light, rest) = pick.pick(u_light);
                 Some(Chosen { light, triangle: None, probability: pick.probability(light), rest })
             }
             Choice::Tree(many) => many.choose(at, refined(u_light, u)),
         }
     }
-}
-
-/// Returns the choice by power alone.
-fn by_power(lights: &[Source], scene_radius_m: f64) -> Choice {
-    Choice::Power(Distribution::new(&lights.iter().map(|light| light.power_about(scene_radius_m)).collect::<Vec<_>>()))
 }
 
 /// Returns a number with bits below its last that are as good as random: 24 do not choose among millions of lights.
@@ -215,44 +211,61 @@ fn refined(u_light: f32, u: [f32; 2]) -> f64 {
 }
 
 impl ManyLights {
-    fn new(lights: &[Source], shapes: &[PlacedShape], scene_radius_m: f64) -> Self {
-        let (mut far, mut far_powers, mut near_power) = (Vec::new(), Vec::new(), 0.0);
+    fn new(lights: &[Source], shapes: &[PlacedShape]) -> Self {
+        let (mut far, mut far_irradiances) = (Vec::new(), Vec::new());
         let (mut bounds, mut leaves, mut places) = (Vec::<LightBounds>::new(), Vec::new(), Vec::new());
         for (index, light) in lights.iter().enumerate() {
-            let first_leaf = bounds.len() as u32;
-            let is_divided = match light {
-                Source::Alone(alone) => alone.bounds().map(|own| bounds.push(own)).is_some().then_some(false),
-                Source::Sky(_) => None,
-                Source::Area(area) => Some(area.add_bounds(shapes, MOST_PARTS, &mut bounds)),
-            };
-            let power = light.power_about(scene_radius_m);
-            let Some(is_divided) = is_divided else {
+            if let Some(irradiance) = light.irradiance_from_afar() {
                 places.push(Place::Far(far.len() as u32));
                 far.push(index as u32);
-                far_powers.push(power);
+                far_irradiances.push(irradiance);
                 continue;
+            }
+            let first_leaf = bounds.len() as u32;
+            let is_divided = match light {
+                Source::Alone(alone) => {
+                    bounds.extend(alone.bounds());
+                    false
+                }
+                Source::Area(area) => area.add_bounds(shapes, MOST_PARTS, &mut bounds),
+                Source::Sky(_) => false,
             };
-            near_power += power;
             places.push(Place::Near { first_leaf, is_divided });
             let n_leaves = bounds.len() as u32 - first_leaf;
             leaves.extend((0..n_leaves).map(|part| (index as u32, is_divided.then_some(part))));
         }
-        far_powers.push(near_power);
-        Self { groups: Distribution::new(&far_powers), far, tree: LightTree::new(&bounds), leaves, places }
+        Self { far, far_choice: Distribution::new(&far_irradiances), tree: LightTree::new(&bounds), leaves, places }
+    }
+
+    /// Returns the probability that the light comes from the tree: the share of the irradiance that it may give the point.
+    fn near_share(&self, at: &Receiver) -> f32 {
+        if self.far.is_empty() {
+            return 1.0;
+        }
+        let near = self.tree.irradiance(at);
+        if near > 0.0 {
+            let share = near / (near + self.far_choice.total() as f32);
+            // The irradiance beside a point that shines has no bound.
+            if share.is_finite() { share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) } else { 1.0 - LEAST_SHARE }
+        } else {
+            0.0
+        }
     }
 
     fn choose(&self, at: &Receiver, u: f64) -> Option<Chosen> {
-        let (group, rest) = self.groups.pick_f64(u);
-        let of_group = self.groups.probability(group);
-        if let Some(&light) = self.far.get(group) {
-            return Some(Chosen { light: light as usize, triangle: None, probability: of_group, rest: rest as f32 });
+        let near_share = self.near_share(at);
+        let near = f64::from(near_share);
+        if u >= near {
+            let (far, rest) = self.far_choice.pick_f64(((u - near) / (1.0 - near)).min(BELOW_ONE));
+            let probability = (1.0 - near_share) * self.far_choice.probability(far);
+            return Some(Chosen { light: self.far[far] as usize, triangle: None, probability, rest: rest as f32 });
         }
-        let (leaf, probability, rest) = self.tree.pick(at, rest)?;
+        let (leaf, probability, rest) = self.tree.pick(at, (u / near).min(BELOW_ONE))?;
         let (light, triangle) = self.leaves[leaf];
         Some(Chosen {
             light: light as usize,
             triangle: triangle.map(|triangle| triangle as usize),
-            probability: of_group * probability,
+            probability: near_share * probability,
             rest: (rest as f32).min(crate::sampling::ONE_MINUS_EPSILON),
         })
     }
@@ -260,17 +273,18 @@ impl ManyLights {
     /// Returns the probability with which a light is chosen, and of a mesh the triangle that is chosen with it.
     fn probability(&self, at: &Receiver, light: usize, primitive: u32) -> (f32, Option<usize>) {
         match self.places[light] {
-            Place::Far(group) => (self.groups.probability(group as usize), None),
+            Place::Far(_) => (self.probability_of_far(at, light), None),
             Place::Near { first_leaf, is_divided } => {
                 let leaf = first_leaf + if is_divided { primitive } else { 0 };
-                let probability = self.groups.probability(self.far.len()) * self.tree.probability(at, leaf as usize);
+                let probability = self.near_share(at) * self.tree.probability(at, leaf as usize);
                 (probability, is_divided.then_some(primitive as usize))
             }
         }
     }
 
-    fn probability_of_far(&self, light: usize) -> f32 {
-        if let Place::Far(group) = self.places[light] { self.groups.probability(group as usize) } else { 0.0 }
+    fn probability_of_far(&self, at: &Receiver, light: usize) -> f32 {
+        let Place::Far(far) = self.places[light] else { return 0.0 };
+        (1.0 - self.near_share(at)) * self.far_choice.probability(far as usize)
     }
 }
 
@@ -280,20 +294,14 @@ impl Source {
         if let Self::Area(area) = self { area.n_parts() } else { 1 }
     }
 
-    /// The power, W, that reaches a scene of this radius, roughly: to choose lights by.
-    fn power_about(&self, scene_radius_m: f64) -> f64 {
-        let area = std::f64::consts::PI * scene_radius_m * scene_radius_m;
+    /// The irradiance, W m⁻², of a light far away on a plane that faces it, roughly: to choose lights by. `None` where its distance matters.
+    fn irradiance_from_afar(&self) -> Option<f64> {
         let power = |curve: &SpectralCurve| f64::from(visible_power(curve));
         match self {
-            Self::Alone(Light::Point { intensity, .. }) => 4.0 * std::f64::consts::PI * power(intensity),
-            Self::Alone(Light::Spot { intensity, outer_rad, .. }) => {
-                2.0 * std::f64::consts::PI * (1.0 - outer_rad.cos()) * power(intensity)
-            }
-            Self::Alone(Light::Distant { irradiance, .. }) => area * power(irradiance),
-            Self::Alone(Light::Sky { radiance }) => 4.0 * std::f64::consts::PI * area * power(radiance),
-            Self::Sky(sky) => 4.0 * std::f64::consts::PI * area * sky.mean(),
-            Self::Alone(Light::SkyImage(_)) => 0.0,
-            Self::Area(light) => light.power(),
+            Self::Alone(Light::Distant { irradiance, .. }) => Some(power(irradiance)),
+            Self::Alone(Light::Sky { radiance }) => Some(PI * power(radiance)),
+            Self::Sky(sky) => Some(PI * sky.mean()),
+            Self::Alone(Light::Point { .. } | Light::Spot { .. } | Light::SkyImage(_)) | Self::Area(_) => None,
         }
     }
 }
@@ -352,9 +360,9 @@ mod tests {
     #[test]
     fn tree_has_the_mean_of_even_choice_and_far_less_variance() {
         let mut shapes = panes();
-        let tree = Lights::new(Vec::new(), &mut shapes, 4.0);
+        let tree = Lights::new(Vec::new(), &mut shapes);
         assert!(matches!(tree.choice, Choice::Tree(_)));
-        let even = Lights { choice: Choice::Power(Distribution::new(&[1.0; 1000])), ..tree.clone() };
+        let even = Lights { choice: Choice::Fixed(Distribution::new(&[1.0; 1000])), ..tree.clone() };
         for point in [Vec3::ZERO, Vec3::new(1.2, -0.7, 0.0), Vec3::new(-1.9, 1.9, 0.5)] {
             let (n_tree, n_even) = (40_000, 400_000);
             let (mean, variance) = irradiance(&tree, &shapes, point, n_tree);
@@ -364,6 +372,33 @@ mod tests {
             assert!((mean - even_mean).abs() < 3.0 * sigma, "{mean} {even_mean} {sigma}");
             assert!(variance < even_variance / 5.0, "{variance} {even_variance}");
         }
+    }
+
+    /// Lights are shared by what they give the point: neither a faint sky about a wide scene nor a strong lamp far away takes a near lamp's samples.
+    #[test]
+    fn near_lamp_is_chosen_beside_sky_and_strong_lamp_afar() {
+        let lamp = |height_m: f64, intensity| Light::Point {
+            position: DVec3::new(0.0, 0.0, height_m),
+            intensity: SpectralCurve::constant(intensity),
+        };
+        let sky = Light::Sky { radiance: SpectralCurve::constant(1e-3) };
+        // Irradiances of 1 and .01 W m⁻² nm⁻¹ by the lamps, π/1000 by the sky.
+        let lights = Lights::new(vec![sky, lamp(10.0, 1.0), lamp(0.1, 0.01)], &mut []);
+        let at = Receiver { point: Vec3::ZERO, normal: Some(Vec3::Z) };
+        let chosen = |light| match &lights.choice {
+            Choice::Tree(many) => f64::from(many.probability(&at, light, 0).0),
+            Choice::Fixed(_) => panic!("three lights are chosen by the point"),
+        };
+        let [sky, far, near] = [0, 1, 2].map(chosen);
+        assert!((sky - 1.0 / 16.0).abs() < 1e-6, "{sky}");
+        assert!((near + far + sky - 1.0).abs() < 1e-6 && (near / far / 100.0 - 1.0).abs() < 1e-5, "{near} {far}");
+        let (mean, variance) = irradiance(&lights, &[], at.point, 40_000);
+        let truth = 1.01 + PI * 1e-3;
+        assert!((mean - truth).abs() < 4.0 * (variance / 40_000.0).sqrt(), "{mean} {truth} {variance}");
+        // Below the horizon no lamp shines: all goes to the sky.
+        let below = Receiver { point: Vec3::ZERO, normal: Some(-Vec3::Z) };
+        let Choice::Tree(many) = &lights.choice else { panic!("three lights are chosen by the point") };
+        assert_eq!(many.probability_of_far(&below, 0), 1.0);
     }
 
     /// What a ray finds has the density with which it would have been drawn, so that bounced rays and lights share without loss.
@@ -389,7 +424,7 @@ mod tests {
             let Some(drawn) = world.sample_light(at, number(1), [number(3), number(5)], &[550.0]) else { continue };
             let ray = crate::Ray { origin: at.point, direction: drawn.direction };
             let density = match world.intersect(&ray, f32::INFINITY) {
-                None => world.sky_pdf(drawn.direction),
+                None => world.sky_pdf(at, drawn.direction),
                 Some(hit) if (hit.distance_m / drawn.distance_m - 1.0).abs() < 1e-4 => world.light_pdf(at, &hit),
                 Some(_) => continue,
             };
@@ -409,7 +444,7 @@ mod tests {
         for n_white in [1, 3] {
             let mut all = vec![infrared.clone()];
             all.extend(vec![white.clone(); n_white]);
-            let lights = Lights::new(all, &mut [], 1.0);
+            let lights = Lights::new(all, &mut []);
             let drawn = |i: u32| lights.sample(&[], &Vec3::ZERO.into(), (i as f32 + 0.5) / 4096.0, [0.5; 2], &[850.0]);
             let n_infrared = (0..4096).filter_map(drawn).filter(|sample| sample.light == LightId(0)).count();
             assert!(n_infrared > 0, "{n_white}");

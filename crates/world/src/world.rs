@@ -114,9 +114,9 @@ impl World {
         self.lights.pdf(&self.geometry.shapes, &at.into(), hit)
     }
 
-    /// Returns the density, 1/sr, with which [`sample_light`](Self::sample_light) draws a direction of the sky.
-    pub fn sky_pdf(&self, direction: Vec3) -> f32 {
-        self.lights.sky_pdf(direction)
+    /// Returns the density, 1/sr, with which [`sample_light`](Self::sample_light) draws a direction of the sky for this point.
+    pub fn sky_pdf(&self, at: impl Into<Receiver>, direction: Vec3) -> f32 {
+        self.lights.sky_pdf(&at.into(), direction)
     }
 
     /// How many lights there are, glowing shapes included.
@@ -440,9 +440,7 @@ impl WorldBuilder {
         }
         root.check_extent()?;
         groups.insert(0, Group::build(root));
-        let (low, high) = groups[0].bounds();
-        let radius_m = if low.cmple(high).all() { 0.5 * (high - low).length() } else { 1.0 };
-        let lights = Lights::new(lights, &mut placed, radius_m);
+        let lights = Lights::new(lights, &mut placed);
         let geometry = Geometry { shapes: placed, instances, groups };
         Ok(World { geometry, surfaces, textures, lights, cameras, notes })
     }

@@ -283,6 +283,11 @@ impl<'c> Reader<'c> {
             }
             "SurfaceIntegrator" | "VolumeIntegrator" | "Renderer" => {
                 self.version = Version::Two;
+                if kind == "directlighting" {
+                    self.builder.note(format!(
+                        "{directive} \"{kind}\": light that is scattered more than once is followed too, unless its scatterings are limited"
+                    ));
+                }
                 return Ok(());
             }
             // How a picture is computed is the renderer's affair.
