@@ -19,7 +19,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("world", &["pictures", "spectrum", "optics"]),
     ("backward", &["spectrum", "optics", "diffraction", "world"]),
     ("forward", &["fft", "pictures", "spectrum", "optics", "psf", "scene"]),
-    ("sensor", &["pictures", "spectrum"]),
+    ("sensor", &["fft", "pictures", "spectrum"]),
     (
         "pipeline",
         &["pictures", "spectrum", "optics", "diffraction", "psf", "scene", "world", "backward", "forward", "sensor"],

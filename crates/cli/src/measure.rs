@@ -4,7 +4,8 @@ use std::{fmt::Write, path::Path};
 
 use dioptric_analysis::measure::{
     BenchRequest, ChartMeasurement, ChartRequest, CodeCurve, CompareRequest, Comparison, EdgeMeasurement, EdgeRequest,
-    Measurement, NoiseData, PictureViewing, PixelRegion, PointRequest, PointSet, measure_bench, measure_frames,
+    Measurement, NoiseData, PictureViewing, PixelRegion, PointRequest, PointSet, TextureCurve, TextureMeasurement,
+    TextureNoiseRequest, TextureRequest, measure_bench, measure_frames,
 };
 use dioptric_pipeline::{SensorSpec, Staged, open_display, parse_illuminant};
 
@@ -12,7 +13,7 @@ use dioptric_report::{MeasurementWords, write_measurement};
 
 use crate::{
     args::Common,
-    measure_args::{ColorArgs, CurveKind, MeasureCommand, MtfArgs, NoiseArgs, SpotArgs},
+    measure_args::{ColorArgs, CurveKind, MeasureCommand, MtfArgs, NoiseArgs, SpotArgs, TextureArgs},
     terminal::{guarded, print, print_json, remark_on_png},
 };
 
@@ -22,6 +23,7 @@ const SEED: u64 = 1;
 pub(crate) fn run(command: &MeasureCommand, common: &Common) -> anyhow::Result<()> {
     match command {
         MeasureCommand::Mtf(arguments) => mtf(arguments, common),
+        MeasureCommand::Texture(arguments) => texture(arguments, common),
         MeasureCommand::Spot(arguments) => spot(arguments, common),
         MeasureCommand::Noise(arguments) => noise(arguments, common),
         MeasureCommand::Color(arguments) => color(arguments, common),
@@ -44,6 +46,24 @@ fn mtf(arguments: &MtfArgs, common: &Common) -> anyhow::Result<()> {
         common,
     )?;
     finish.with(&request.measure(&arguments.picture)?, mtf_table)
+}
+
+fn texture(arguments: &TextureArgs, common: &Common) -> anyhow::Result<()> {
+    let region = |text: &Option<String>| text.as_deref().map(PixelRegion::parse).transpose();
+    let request = TextureRequest {
+        reference: arguments.reference.clone(),
+        region: region(&arguments.region)?,
+        noise: match (region(&arguments.flat)?, &arguments.second_frame) {
+            (Some(patch), _) => TextureNoiseRequest::Flat(patch),
+            (None, Some(second)) => TextureNoiseRequest::SecondFrame(second.clone()),
+            (None, None) => TextureNoiseRequest::None,
+        },
+        pixels_per_degree: arguments.pixels_per_degree,
+        curve: curve(arguments.picture_args.curve),
+    };
+    let subject = format!("{} against {}", file_name(&arguments.picture), file_name(&arguments.reference));
+    let finish = Finish::new(("texture", "Texture response"), subject, arguments.picture_args.out.as_deref(), common)?;
+    finish.with(&request.measure(&arguments.picture)?, texture_table)
 }
 
 fn spot(arguments: &SpotArgs, common: &Common) -> anyhow::Result<()> {
@@ -216,6 +236,34 @@ fn mtf_table(measured: &EdgeMeasurement) -> Result<String, std::fmt::Error> {
     }
     for channel in &measured.not_measured {
         writeln!(text, "{:<12} {}", channel.channel, channel.reason)?;
+    }
+    Ok(text)
+}
+
+fn texture_table(measured: &TextureMeasurement) -> Result<String, std::fmt::Error> {
+    let PixelRegion { column, row, columns, rows } = measured.region;
+    let mut text = format!("texture in {columns} × {rows} pixels from column {column}, row {row}\n\n");
+    writeln!(text, "{:<12} {:<15} {:>11} {:>11} {:>9}", "channel", "method", "MTF50 c/px", "at 0.5 c/px", "acutance")?;
+    for channel in &measured.channels {
+        let mut line = |method: &str, curve: &TextureCurve| {
+            writeln!(
+                text,
+                "{:<12} {method:<15} {:>11} {:>11.4} {:>9.4}",
+                channel.channel,
+                or_dash(curve.mtf50_cycles_per_pixel, 4),
+                curve.response_at_nyquist,
+                curve.acutance
+            )
+        };
+        line("direct", &channel.direct)?;
+        match &channel.full_reference {
+            Some(curve) => line("full reference", curve)?,
+            None => writeln!(
+                text,
+                "{:<12} {:<15} the reference does not show this part of the texture (coherence {:.2})",
+                channel.channel, "full reference", channel.coherence
+            )?,
+        }
     }
     Ok(text)
 }

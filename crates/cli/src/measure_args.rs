@@ -9,6 +9,8 @@ use clap::{Args, Subcommand, ValueEnum};
 pub(crate) enum MeasureCommand {
     /// Spatial frequency response of a slanted edge: SFR, MTF50, MTF50P of each channel
     Mtf(MtfArgs),
+    /// Response of a texture (dead leaves, IEEE 1858) by its power and by a reference: MTF50, acutance of each channel
+    Texture(TextureArgs),
     /// Pictures of points: centroid, second moments, encircled energy
     Spot(SpotArgs),
     /// Photon transfer after EMVA 1288, of flat and dark frames or of a sensor on a simulated bench
@@ -58,6 +60,31 @@ pub(crate) struct MtfArgs {
     #[arg(long, value_name = "P")]
     pub(crate) pixel_um: Option<f64>,
     /// Pixels a degree of the viewer's field, for acutance and square-root integral [default: 60]
+    #[arg(long, value_name = "N")]
+    pub(crate) pixels_per_degree: Option<f64>,
+    /// The picture and the results
+    #[command(flatten)]
+    pub(crate) picture_args: PictureArgs,
+}
+
+/// A texture.
+#[derive(Debug, Args)]
+pub(crate) struct TextureArgs {
+    /// Picture of the texture: PNG, TIFF, JPEG, EXR
+    pub(crate) picture: PathBuf,
+    /// Picture of the same framing by an ideal camera, which the texture is compared with
+    #[arg(long, value_name = "PICTURE")]
+    pub(crate) reference: PathBuf,
+    /// Where the texture is in both, pixels [default: all of the picture]
+    #[arg(long, value_name = "x,y,w,h")]
+    pub(crate) region: Option<String>,
+    /// An even patch of the picture, whose noise is taken off the power of the texture
+    #[arg(long, value_name = "x,y,w,h", conflicts_with = "second_frame")]
+    pub(crate) flat: Option<String>,
+    /// Another frame of the same camera, by which the noise is told and taken off
+    #[arg(long, value_name = "PICTURE")]
+    pub(crate) second_frame: Option<PathBuf>,
+    /// Pixels a degree of the viewer's field, for acutance [default: 60]
     #[arg(long, value_name = "N")]
     pub(crate) pixels_per_degree: Option<f64>,
     /// The picture and the results

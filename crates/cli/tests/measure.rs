@@ -66,6 +66,49 @@ fn an_edge_is_found_and_has_its_mtf50() {
     assert!(output(folder.path(), &["measure", "mtf", "edge.png"]).contains("MTF50P"));
 }
 
+/// A linear 16-bit gray picture of discs in a fixed disorder, pixels of 1 or of the mean over so many neighbors along a row.
+fn disc_picture(side: u32, box_px: u32) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+    let mix = |i: u32| f64::from((i.wrapping_mul(2_654_435_761) >> 8) & 0xffff) / 65536.0;
+    let mut plane = vec![0.5; (side * side) as usize];
+    for i in 0..side * side / 2 {
+        let radius = (1.5 / (1.0 - mix(4 * i)).sqrt()).min(20.0);
+        let (x, y) = (mix(4 * i + 1) * f64::from(side), mix(4 * i + 2) * f64::from(side));
+        let (n, reach) = (side as usize, |at: f64| ((at - radius).max(0.0) as usize, (at + radius) as usize + 1));
+        for row in reach(y).0..reach(y).1.min(n) {
+            for column in reach(x).0..reach(x).1.min(n) {
+                if (column as f64 - x).hypot(row as f64 - y) <= radius {
+                    plane[row * n + column] = 0.2 + 0.6 * mix(4 * i + 3);
+                }
+            }
+        }
+    }
+    ImageBuffer::from_fn(side, side, |x, y| {
+        let among = |i: u32| plane[(y * side + (x + i).min(side - 1)) as usize];
+        Luma([((0..box_px).map(among).sum::<f64>() / f64::from(box_px) * 65535.0).round() as u16])
+    })
+}
+
+#[test]
+fn a_texture_is_measured_against_its_reference() {
+    let folder = tempfile::tempdir().unwrap();
+    let keep = |name: &str, box_px: u32| save(&disc_picture(160, box_px).into(), &folder.path().join(name)).unwrap();
+    keep("sharp.png", 1);
+    keep("soft.png", 2);
+    let arguments = ["measure", "texture", "soft.png", "--reference", "sharp.png", "--json", "-o", "out"];
+    let measured = json(folder.path(), &arguments);
+    let channel = &measured["channels"][0];
+    for method in ["direct", "full_reference"] {
+        let acutance = number(&channel[method]["acutance"]);
+        assert!((0.5..0.99).contains(&acutance), "{acutance}");
+    }
+    // A mean of a pixel and the next one is half a pixel to the left of the pixel.
+    assert!((number(&channel["shift_columns_px"]) + 0.5).abs() < 0.02, "{channel}");
+    assert!(number(&channel["shift_rows_px"]).abs() < 0.02 && number(&channel["coherence"]) > 0.99);
+    assert!(folder.path().join("out/texture.json").exists() && folder.path().join("out/texture.svg").exists());
+    let table = output(folder.path(), &["measure", "texture", "sharp.png", "--reference", "sharp.png"]);
+    assert!(table.contains("full reference") && table.contains("1.0000"), "{table}");
+}
+
 #[test]
 fn a_mosaic_is_measured_filter_by_filter() {
     let folder = tempfile::tempdir().unwrap();
@@ -250,6 +293,13 @@ fn bad_input_ends_in_one_sentence() {
         (&["mtf", "chart.png", "--mosaic", "RGGB"], &["--mosaic"]),
         (&["mtf", "even.png", "--pixel-um", "0"], &["--pixel-um"]),
         (&["mtf", "even.png", "-o", "even.png"], &["cannot write even.png"]),
+        (&["texture", "even.png", "--reference", "absent.png"], &["absent.png"]),
+        (&["texture", "even.png", "--reference", "even.png"], &["even.png", "the texture", "flat"]),
+        (&["texture", "even.png", "--reference", "chart.png"], &["chart.png", "64 × 64"]),
+        (&["texture", "even.png", "--reference", "even.png", "--region", "0,0,32,32"], &["at least 64 × 64"]),
+        (&["texture", "chart.png", "--reference", "chart.png", "--flat", "0,0,8,8"], &["patch of at least 32 × 32"]),
+        (&["texture", "chart.png", "--reference", "chart.png", "--second-frame", "even.png"], &["even.png", "280"]),
+        (&["texture", "even.png", "--reference", "even.png", "--pixels-per-degree", "0"], &["--pixels-per-degree"]),
         (&["spot", "even.png"], &["even.png", "spot"]),
         (&["spot", "chart.png", "--window", "4"], &["--window", "odd"]),
         (&["noise", "absent"], &["absent"]),

@@ -202,7 +202,7 @@ impl Scene {
     ///     In place of both, as of `Scene.read`.
     /// size : float, optional
     ///     Of the pattern: side of a square or distance of points in samples (default 16), slope of the bar (2.6), number of lines
-    ///     (8) or of pairs of sectors (36).
+    ///     (8) or of pairs of sectors (36), radius of the largest of the dead leaves in samples (100; the smallest has 1).
     /// illuminant, illuminance_lux, mean_luminance_cd_m2
     ///     As of `Scene.read`.
     #[staticmethod]
@@ -227,9 +227,15 @@ impl Scene {
             "point-array" => Pattern::PointArray { spacing_px: whole(16)? },
             "siemens-star" => Pattern::SiemensStar { n_cycles: whole(36)? },
             "color-chart" => Pattern::ColorChart,
+            "dead-leaves" => Pattern::DeadLeaves {
+                min_radius_px: 1.0,
+                max_radius_px: size.unwrap_or(100.0),
+                min_reflectance: 0.25,
+                max_reflectance: 0.75,
+                seed: 1,
+            },
             other => {
-                let expected =
-                    "uniform, checkerboard, slanted-bar, radial-lines, point-array, siemens-star or color-chart";
+                let expected = "uniform, checkerboard, slanted-bar, radial-lines, point-array, siemens-star, color-chart or dead-leaves";
                 return Err(wrong("pattern", format!("'{other}'"), expected));
             }
         };

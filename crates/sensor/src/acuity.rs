@@ -48,14 +48,7 @@ impl EdgeResponse {
     /// # Errors
     /// When the viewing has a number that is not above 0.
     pub fn acutance(&self, viewing: &Viewing) -> Result<f64, SensorError> {
-        viewing.check()?;
-        let sensitivity = |nu: f64| nu.powf(0.8) * (-0.2 * nu).exp();
-        let (mut seen, mut all) = (0.0, 0.0);
-        for nu in frequencies() {
-            all += sensitivity(nu);
-            seen += sensitivity(nu) * self.shown(nu, viewing);
-        }
-        Ok(seen / all)
+        acutance(|frequency| self.at(frequency), viewing)
     }
 
     /// Returns the square-root integral, just noticeable differences (Barten, "Evaluation of subjective image quality with
@@ -74,7 +67,8 @@ impl EdgeResponse {
             let b = 0.3 * (1.0 + 100.0 / luminance).powf(0.15);
             a * nu * (-b * nu).exp() * (1.0 + 0.06 * (b * nu).exp()).sqrt()
         };
-        let part = |nu: f64| (self.shown(nu, viewing).max(0.0) * sensitivity(nu)).sqrt() / nu;
+        let shown = |nu: f64| shown(&|frequency| self.at(frequency), nu, viewing);
+        let part = |nu: f64| (shown(nu).max(0.0) * sensitivity(nu)).sqrt() / nu;
         Ok(STEP_PER_DEG * frequencies().map(part).sum::<f64>() / std::f64::consts::LN_2)
     }
 
@@ -86,12 +80,27 @@ impl EdgeResponse {
         let above: f64 = (STEPS / 2..STEPS).map(response).sum();
         above / (0..STEPS).map(response).sum::<f64>()
     }
+}
 
-    /// Returns the response at a frequency of the eye's field, cycles a degree, as far as pixels show it.
-    fn shown(&self, nu: f64, viewing: &Viewing) -> f64 {
-        let per_pixel = nu / viewing.pixels_per_degree;
-        if per_pixel <= 0.5 { self.at(per_pixel) } else { 0.0 }
+/// Returns the acutance of a response by cycles a pixel, as [`EdgeResponse::acutance`] has it.
+///
+/// # Errors
+/// When the viewing has a number that is not above 0.
+pub(crate) fn acutance(response: impl Fn(f64) -> f64, viewing: &Viewing) -> Result<f64, SensorError> {
+    viewing.check()?;
+    let sensitivity = |nu: f64| nu.powf(0.8) * (-0.2 * nu).exp();
+    let (mut seen, mut all) = (0.0, 0.0);
+    for nu in frequencies() {
+        all += sensitivity(nu);
+        seen += sensitivity(nu) * shown(&response, nu, viewing);
     }
+    Ok(seen / all)
+}
+
+/// Returns the response at a frequency of the eye's field, cycles a degree, as far as pixels show it.
+fn shown(response: &impl Fn(f64) -> f64, nu: f64, viewing: &Viewing) -> f64 {
+    let per_pixel = nu / viewing.pixels_per_degree;
+    if per_pixel <= 0.5 { response(per_pixel) } else { 0.0 }
 }
 
 /// The middles of the steps of the sums, cycles a degree.

@@ -65,11 +65,7 @@ impl EdgeResponse {
 
     /// Returns the response at a frequency, cycles a pixel, with straight lines between the tabled ones.
     pub fn at(&self, frequency: f64) -> f64 {
-        let step = self.frequencies[1];
-        let place = (frequency / step).clamp(0.0, (self.frequencies.len() - 1) as f64);
-        let below = (place as usize).min(self.frequencies.len() - 2);
-        let (low, high) = (self.response[below], self.response[below + 1]);
-        low + (high - low) * (place - below as f64)
+        interpolated(&self.frequencies, &self.response, frequency)
     }
 
     /// Returns the first frequency at which the response falls to a level, cycles a pixel.
@@ -94,6 +90,13 @@ impl EdgeResponse {
         let (f, r) = (&self.frequencies, &self.response);
         Some(f[i - 1] + (f[i] - f[i - 1]) * (r[i - 1] - half) / (r[i - 1] - r[i]))
     }
+}
+
+/// Returns a value of a table at evenly spaced frequencies from 0 on, with straight lines between.
+pub(crate) fn interpolated(frequencies: &[f64], values: &[f64], frequency: f64) -> f64 {
+    let place = (frequency / frequencies[1]).clamp(0.0, (values.len() - 1) as f64);
+    let below = (place as usize).min(values.len() - 2);
+    values[below] + (values[below + 1] - values[below]) * (place - below as f64)
 }
 
 /// Returns the corner of the square that most looks like a single slanted edge.

@@ -103,7 +103,7 @@ impl EdgeRequest {
             return Err(wrong("--pixel-um", value.to_string(), "a number above 0"));
         }
         let picture = MeasuredPicture::open(path, self.curve)?;
-        let viewing = self.viewing(picture.size())?;
+        let viewing = viewing_of(self.pixels_per_degree, picture.size())?;
         let samples = self.samples(&picture)?;
         let region = self.region(&picture, samples.period)?;
         let mut measured: Vec<(String, EdgeResponse)> = Vec::new();
@@ -135,16 +135,6 @@ impl EdgeRequest {
                 Err(PipelineError::Read { path: path.to_owned(), reason })
             }
         }
-    }
-
-    /// Returns how the picture is looked at.
-    fn viewing(&self, (rows, columns): (usize, usize)) -> Result<Viewing, PipelineError> {
-        let pixels_per_degree = self.pixels_per_degree.unwrap_or(PIXELS_PER_DEGREE);
-        if !(pixels_per_degree > 0.0 && pixels_per_degree.is_finite()) {
-            return Err(wrong("--pixels-per-degree", pixels_per_degree.to_string(), "a number above 0"));
-        }
-        let picture_deg = (rows as f64 * columns as f64).sqrt() / pixels_per_degree;
-        Ok(Viewing { pixels_per_degree, picture_deg, luminance_cd_m2: LUMINANCE_CD_M2 })
     }
 
     /// Parts a picture into channels.
@@ -260,6 +250,19 @@ fn mean_response(parts: &[EdgeResponse], period: usize) -> EdgeResponse {
         response: (0..parts[0].response.len()).map(|i| mean(&|part| part.response[i])).collect(),
         slant_deg: mean(&|part| part.slant_deg),
     }
+}
+
+/// Returns how a picture of so many rows and columns is looked at.
+pub(super) fn viewing_of(
+    pixels_per_degree: Option<f64>,
+    (rows, columns): (usize, usize),
+) -> Result<Viewing, PipelineError> {
+    let pixels_per_degree = pixels_per_degree.unwrap_or(PIXELS_PER_DEGREE);
+    if !(pixels_per_degree > 0.0 && pixels_per_degree.is_finite()) {
+        return Err(wrong("--pixels-per-degree", pixels_per_degree.to_string(), "a number above 0"));
+    }
+    let picture_deg = (rows as f64 * columns as f64).sqrt() / pixels_per_degree;
+    Ok(Viewing { pixels_per_degree, picture_deg, luminance_cd_m2: LUMINANCE_CD_M2 })
 }
 
 fn wrong(key: &'static str, found: String, expected: &str) -> PipelineError {

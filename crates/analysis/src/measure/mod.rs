@@ -9,6 +9,7 @@ mod noise_charts;
 mod open;
 mod points;
 mod region;
+mod texture;
 
 use serde::Serialize;
 
@@ -19,6 +20,7 @@ pub use noise::{BenchRequest, NoiseData, NoiseDataSheet, NoisePoint, measure_ben
 pub use open::{CodeCurve, MeasuredPicture};
 pub use points::{PointRequest, PointRow, PointSet};
 pub use region::PixelRegion;
+pub use texture::{TextureChannel, TextureCurve, TextureMeasurement, TextureNoiseRequest, TextureRequest};
 
 use crate::LineChart;
 

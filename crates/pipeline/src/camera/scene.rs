@@ -286,7 +286,8 @@ impl SceneSpec {
                 light: TargetLight::Illuminant(light),
                 luminance_cd_m2: illuminance_lux / PI,
                 dark: 0.02,
-                supersampling: 4,
+                // Small discs show in the spectrum of a texture how exactly their edges are drawn.
+                supersampling: if matches!(pattern, Pattern::DeadLeaves { .. }) { 8 } else { 4 },
                 horizontal_fov_deg: self.field_of_view_deg.unwrap_or(f64::NAN),
                 distance_m: self.depth_m.unwrap_or(f64::NAN),
             }

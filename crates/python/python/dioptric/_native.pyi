@@ -450,7 +450,14 @@ class Scene:
     @staticmethod
     def target(
         pattern: Literal[
-            "uniform", "checkerboard", "slanted-bar", "radial-lines", "point-array", "siemens-star", "color-chart"
+            "uniform",
+            "checkerboard",
+            "slanted-bar",
+            "radial-lines",
+            "point-array",
+            "siemens-star",
+            "color-chart",
+            "dead-leaves",
         ],
         columns: int,
         rows: int,

@@ -1,5 +1,6 @@
 //! Test targets made from formulas: a flat pattern at one distance under one light.
 
+mod leaves;
 mod pattern;
 
 pub(crate) use pattern::patch_at;
@@ -10,7 +11,12 @@ use dioptric_spectrum::{
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
+use self::leaves::Leaves;
 use crate::{Scene, SceneError, SceneLight};
+
+/// The radii that leaves may have, samples: smaller ones take long to cover a target and show nothing.
+const MIN_LEAF_PX: f64 = 0.1;
+const MAX_LEAF_PX: f64 = 1e6;
 
 /// What is drawn on a target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,6 +52,19 @@ pub enum Pattern {
     },
     /// The 24 patches of the `ColorChecker`, four rows of six, on a black frame.
     ColorChart,
+    /// Discs of many sizes and grays that hide one another ("dead leaves", IEEE Std 1858); their number falls as the cube of the radius.
+    DeadLeaves {
+        /// Radius of the smallest discs, in samples, 0.1 or more.
+        min_radius_px: f64,
+        /// Radius of the largest discs, in samples, above that of the smallest.
+        max_radius_px: f64,
+        /// What the darkest discs reflect, as a share of white; grays are evenly spread.
+        min_reflectance: f64,
+        /// What the lightest discs reflect.
+        max_reflectance: f64,
+        /// The seed of all discs: the same seed, the same discs.
+        seed: u64,
+    },
 }
 
 /// The shape of a target's spectrum.
@@ -91,7 +110,7 @@ pub struct Target {
     pub light: TargetLight,
     /// The luminance of its white, cd/m².
     pub luminance_cd_m2: f64,
-    /// What its dark reflects, as a share of its white; a chart does without.
+    /// What its dark reflects, as a share of its white; a chart and dead leaves do without.
     pub dark: f64,
     /// Points a sample and direction at which the pattern is looked up: 1 gives hard steps, as in the paper.
     pub supersampling: usize,
@@ -141,8 +160,7 @@ impl Target {
         let radiance = match self.pattern {
             Pattern::ColorChart => self.chart(grid, &white)?,
             _ => {
-                let light = pattern::light_share(self);
-                let reflected = light.mapv(|share| self.dark + (1.0 - self.dark) * share);
+                let reflected = self.reflectance();
                 let planes = white.iter().map(|w| reflected.mapv(|r| (r * w) as f32)).collect();
                 SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?
             }
@@ -159,6 +177,18 @@ impl Target {
             .or_horizontal_fov_deg(self.horizontal_fov_deg)
     }
 
+    /// Returns what each sample of a gray pattern reflects, as a share of white.
+    fn reflectance(&self) -> Array2<f64> {
+        match self.pattern {
+            Pattern::DeadLeaves { min_radius_px, max_radius_px, min_reflectance, max_reflectance, seed } => {
+                let (size, radii_px) = ((self.rows, self.columns), [min_radius_px, max_radius_px]);
+                let leaves = Leaves::new(size, radii_px, [min_reflectance, max_reflectance], seed);
+                leaves::reflectance(leaves, size, self.supersampling)
+            }
+            _ => pattern::light_share(self).mapv(|share| self.dark + (1.0 - self.dark) * share),
+        }
+    }
+
     /// The name of the pattern, in words.
     fn name(&self) -> &'static str {
         match self.pattern {
@@ -169,6 +199,7 @@ impl Target {
             Pattern::PointArray { .. } => "point array",
             Pattern::SiemensStar { .. } => "Siemens star",
             Pattern::ColorChart => "color chart",
+            Pattern::DeadLeaves { .. } => "dead leaves",
         }
     }
 
@@ -190,13 +221,24 @@ impl Target {
         if !(1..=64).contains(&self.supersampling) {
             return setting("the supersampling of the target", self.supersampling.to_string(), "1 to 64");
         }
+        if let Pattern::DeadLeaves { min_radius_px, max_radius_px, min_reflectance, max_reflectance, .. } = self.pattern
+        {
+            if !(MIN_LEAF_PX <= min_radius_px && min_radius_px < max_radius_px && max_radius_px <= MAX_LEAF_PX) {
+                let value = format!("{min_radius_px} to {max_radius_px} samples");
+                return setting("the radius of the leaves", value, "a range within 0.1 to 1000000 samples");
+            }
+            if !(0.0 <= min_reflectance && min_reflectance <= max_reflectance && max_reflectance <= 1.0) {
+                let value = format!("{min_reflectance} to {max_reflectance}");
+                return setting("the reflectance of the leaves", value, "a range of shares within 0 to 1");
+            }
+        }
         let (counts, finite) = match self.pattern {
             Pattern::Checkerboard { check_px: n }
             | Pattern::RadialLines { n_lines: n }
             | Pattern::PointArray { spacing_px: n }
             | Pattern::SiemensStar { n_cycles: n } => (n > 0, true),
             Pattern::SlantedBar { slope } => (true, slope.is_finite()),
-            Pattern::Uniform | Pattern::ColorChart => (true, true),
+            Pattern::Uniform | Pattern::ColorChart | Pattern::DeadLeaves { .. } => (true, true),
         };
         if !(counts && finite) {
             return setting(
@@ -316,6 +358,29 @@ mod tests {
         }
     }
 
+    fn leaves(radii_px: [f64; 2], reflectances: [f64; 2]) -> Pattern {
+        Pattern::DeadLeaves {
+            min_radius_px: radii_px[0],
+            max_radius_px: radii_px[1],
+            min_reflectance: reflectances[0],
+            max_reflectance: reflectances[1],
+            seed: 7,
+        }
+    }
+
+    #[test]
+    fn leaves_are_the_same_by_one_thread_and_two() {
+        let target = of(leaves([1.0, 30.0], [0.25, 0.75]));
+        let by = |n: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+            pool.install(|| target.scene(&grid()).unwrap()).radiance
+        };
+        let one = by(1);
+        assert!(one == by(2));
+        let white = target.white_radiance(&grid()).unwrap()[15] as f32;
+        assert!(one.planes()[15].iter().all(|v| (0.25 * 0.9999..=0.75 * 1.0001).contains(&(v / white))));
+    }
+
     #[test]
     fn targets_that_cannot_be_are_refused() {
         let good = of(Pattern::Uniform);
@@ -328,6 +393,11 @@ mod tests {
             Target { distance_m: -1.0, ..good },
             of(Pattern::Checkerboard { check_px: 0 }),
             of(Pattern::SlantedBar { slope: f64::INFINITY }),
+            of(leaves([0.0, 30.0], [0.2, 0.8])),
+            of(leaves([30.0, 30.0], [0.2, 0.8])),
+            of(leaves([1.0, f64::NAN], [0.2, 0.8])),
+            of(leaves([1.0, 30.0], [0.8, 0.2])),
+            of(leaves([1.0, 30.0], [0.2, 1.1])),
         ] {
             assert!(wrong.scene(&grid()).is_err(), "{wrong:?}");
         }

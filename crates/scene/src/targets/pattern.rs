@@ -47,7 +47,11 @@ fn is_light(target: &Target, row: f64, column: f64) -> bool {
             let turns = y.atan2(x) / (2.0 * PI) * n_cycles as f64;
             turns.rem_euclid(1.0) < 0.5
         }
-        Pattern::Uniform | Pattern::RadialLines { .. } | Pattern::PointArray { .. } | Pattern::ColorChart => true,
+        Pattern::Uniform
+        | Pattern::RadialLines { .. }
+        | Pattern::PointArray { .. }
+        | Pattern::ColorChart
+        | Pattern::DeadLeaves { .. } => true,
     }
 }
 

@@ -125,6 +125,11 @@ const PANELS: &[(&str, &[&str])] = &[
     ("lines", &["Pattern.RadialLines", "Pattern.RadialLines.n_lines"]),
     ("points apart", &["Pattern.PointArray", "Pattern.PointArray.spacing_px"]),
     ("cycles", &["Pattern.SiemensStar", "Pattern.SiemensStar.n_cycles"]),
+    ("smallest leaf", &["Pattern.DeadLeaves", "Pattern.DeadLeaves.min_radius_px"]),
+    ("largest leaf", &["Pattern.DeadLeaves.max_radius_px"]),
+    ("darkest leaf", &["Pattern.DeadLeaves.min_reflectance"]),
+    ("lightest leaf", &["Pattern.DeadLeaves.max_reflectance"]),
+    ("leaf seed", &["Pattern.DeadLeaves.seed"]),
     ("path", &["SceneSource.File", "SceneSource.World", "WorldSpec.file"]),
     ("field of view", &["SceneSpec.field_of_view_deg"]),
     ("depth", &["SceneSpec.depth_m"]),
@@ -233,6 +238,13 @@ fn cameras() -> Vec<Camera> {
         target(Pattern::RadialLines { n_lines: 5 }),
         target(Pattern::PointArray { spacing_px: 10 }),
         target(Pattern::SiemensStar { n_cycles: 9 }),
+        target(Pattern::DeadLeaves {
+            min_radius_px: 2.0,
+            max_radius_px: 20.0,
+            min_reflectance: 0.25,
+            max_reflectance: 0.75,
+            seed: 1,
+        }),
     ]
 }
 

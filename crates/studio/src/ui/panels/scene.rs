@@ -165,6 +165,16 @@ fn target(ui: &mut Ui, pattern: &mut Pattern) {
         (Pattern::PointArray { spacing_px: 60 }, "points"),
         (Pattern::SiemensStar { n_cycles: 36 }, "Siemens star"),
         (Pattern::ColorChart, "color chart"),
+        (
+            Pattern::DeadLeaves {
+                min_radius_px: 1.0,
+                max_radius_px: 100.0,
+                min_reflectance: 0.25,
+                max_reflectance: 0.75,
+                seed: 1,
+            },
+            "dead leaves",
+        ),
     ];
     variant(ui, "pattern", "What is drawn on the target", pattern, &all);
     let whole = |ui: &mut Ui, title: &str, words: &str, value: &mut usize| {
@@ -180,6 +190,33 @@ fn target(ui: &mut Ui, pattern: &mut Pattern) {
         Pattern::RadialLines { n_lines } => whole(ui, "lines", "Whole lines; 8 give 16 rays", n_lines),
         Pattern::PointArray { spacing_px } => whole(ui, "points apart", "From point to point, samples", spacing_px),
         Pattern::SiemensStar { n_cycles } => whole(ui, "cycles", "Pairs of sectors once around", n_cycles),
+        Pattern::DeadLeaves { min_radius_px, max_radius_px, min_reflectance, max_reflectance, seed } => {
+            // A field that is set beyond the other end of its range takes that along.
+            let words = "Radius of the smallest discs, samples";
+            if NumberField::by_factors("smallest leaf", "", 0.1..=5e5, 0.3..=30.0, words).show(ui, min_radius_px)
+                && *min_radius_px >= *max_radius_px
+            {
+                *max_radius_px = 2.0 * *min_radius_px;
+            }
+            let words = "Radius of the largest discs, samples";
+            if NumberField::by_factors("largest leaf", "", 0.2..=1e6, 10.0..=1000.0, words).show(ui, max_radius_px)
+                && *min_radius_px >= *max_radius_px
+            {
+                *min_radius_px = 0.5 * *max_radius_px;
+            }
+            let words = "What the darkest discs reflect, as a share of white";
+            if NumberField::even("darkest leaf", "", 0.0..=1.0, 0.0..=1.0, words).show(ui, min_reflectance) {
+                *max_reflectance = max_reflectance.max(*min_reflectance);
+            }
+            let words = "What the lightest discs reflect, as a share of white";
+            if NumberField::even("lightest leaf", "", 0.0..=1.0, 0.0..=1.0, words).show(ui, max_reflectance) {
+                *min_reflectance = min_reflectance.min(*max_reflectance);
+            }
+            let mut number = *seed as usize;
+            if count(ui, "leaf seed", "The same seed, the same discs", 0..=1_000_000, &mut number) {
+                *seed = number as u64;
+            }
+        }
     }
 }
 
