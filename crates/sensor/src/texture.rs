@@ -2,7 +2,7 @@
 //!
 //! Both methods compare a picture with its reference: the target as an ideal camera of the same framing pictures it. The
 //! direct one takes the root of the ratio of power spectra, the power of noise taken off (Cao, Guichard & Hornung, "Measuring
-//! texture sharpness of a digital camera", Proc. SPIE 7250, 2009; McElvain et al., "Texture-based measurement of spatial
+//! texture sharpness of a digital camera", Proc. SPIE 7250, 2009; McElvain, Campbell, Miller & Jin, "Texture-based measurement of spatial
 //! frequency response using the dead leaves target", Proc. SPIE 7537, 2010). The full-reference one takes the cross-power
 //! over the power of the reference, to which nothing adds that is not in the reference (Kirk, Herzer, Artmann & Kunz,
 //! "Description of texture loss using the dead leaves target", Proc. SPIE 9023, 2014). What the reference averages over, such as
