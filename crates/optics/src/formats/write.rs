@@ -142,16 +142,21 @@ impl LensFile {
         }
         let film_mm = self.film_or_focus_mm();
         let distances_mm = lens.interfaces().iter().map(|interface| interface.thickness_after_mm.abs());
-        let places_mm = lens
+        let mut places_mm = lens
             .placements()
             .into_iter()
             .zip(distances_mm)
             .map(|(place, distance_mm)| place.vertex_mm.abs().max_element().max(distance_mm));
         let film_reach_mm = lens.film_z_mm(film_mm).abs().max(film_mm.abs());
-        match places_mm.chain([film_reach_mm]).position(|mm| mm.is_nan() || mm >= MOST_REACH_MM) {
-            Some(surface) => Err(cannot(format, surface, "stands 2.5e8 mm or more from the first or the next")),
-            None => Ok(()),
+        let is_too_far = |mm: f64| mm.is_nan() || mm >= MOST_REACH_MM;
+        if let Some(surface) = places_mm.position(is_too_far) {
+            return Err(cannot(format, surface, "stands 2.5e8 mm or more from the first or the next"));
         }
+        if is_too_far(film_reach_mm) {
+            let reason = "the film stands 2.5e8 mm or more from the first or the last surface".to_owned();
+            return Err(OpticsError::CannotWrite { format, reason });
+        }
+        Ok(())
     }
 
     /// Returns where first-order optics focuses the file's object, mm behind the last vertex.

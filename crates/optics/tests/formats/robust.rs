@@ -29,7 +29,7 @@ fn tilted_film_too_far_to_be_read_again_is_not_written() {
     assert!(read("near.seq", of("1000").to_seq().unwrap().as_bytes()));
     let error = of("999999999").to_seq().unwrap_err();
     assert!(matches!(error, OpticsError::CannotWrite { .. }), "{error}");
-    assert!(error.to_string().contains("2.5e8 mm"), "{error}");
+    assert!(error.to_string().contains("the film stands 2.5e8 mm"), "{error}");
 }
 
 fn error_of(name: &str, bytes: &[u8]) -> Option<OpticsError> {
