@@ -265,6 +265,15 @@ fn texture_table(measured: &TextureMeasurement) -> Result<String, std::fmt::Erro
             )?,
         }
     }
+    for channel in &measured.channels {
+        if let Some(frequency) = channel.noise_from_cycles_per_pixel {
+            writeln!(
+                text,
+                "{}: the noise has all of the power at {frequency:.3} c/px and perhaps beyond; the direct response is 0 there",
+                channel.channel
+            )?;
+        }
+    }
     Ok(text)
 }
 

@@ -78,10 +78,10 @@ pub(crate) struct TextureArgs {
     /// Where the texture is in both, pixels [default: all of the picture]
     #[arg(long, value_name = "x,y,w,h")]
     pub(crate) region: Option<String>,
-    /// An even patch of the picture, whose noise is taken off the power of the texture
+    /// An even patch of the picture, whose noise power is subtracted from that of the texture
     #[arg(long, value_name = "x,y,w,h", conflicts_with = "second_frame")]
     pub(crate) flat: Option<String>,
-    /// Another frame of the same camera, by which the noise is told and taken off
+    /// Another frame of the same camera, whose difference is the temporal noise, which is subtracted
     #[arg(long, value_name = "PICTURE")]
     pub(crate) second_frame: Option<PathBuf>,
     /// Pixels a degree of the viewer's field, for acutance [default: 60]

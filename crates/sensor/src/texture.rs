@@ -118,51 +118,29 @@ impl TextureSpectra {
         }
         let mut planner = Planner::new();
         let (of_picture, of_reference) = (transform(picture, &mut planner), transform(reference, &mut planner));
-        let picture_power = Rings::new((rows, columns), |at| of_picture[at].norm_sqr().into());
-        let reference_power = Rings::new((rows, columns), |at| of_reference[at].norm_sqr().into());
+        let picture_power = Rings::of_power(&of_picture);
+        let reference_power = Rings::of_power(&of_reference);
         let frequencies = picture_power.frequencies();
         let noise_power = match noise {
             None => vec![0.0; frequencies.len()],
             Some(TextureNoise::Flat(patch)) => flat_power(&patch, &frequencies, &mut planner)?,
-            Some(TextureNoise::SecondFrame(second)) => {
-                same_size("the second frame of a texture, rows × columns", picture, &second)?;
-                let difference = picture - &second;
-                if is_flat(&second) {
-                    return Err(unsuitable("is not in the second frame, which is flat".to_owned()));
-                }
-                let of_difference = transform(&difference.view(), &mut planner);
-                let twice = Rings::new((rows, columns), |at| of_difference[at].norm_sqr().into());
-                twice.means.iter().map(|power| 0.5 * power).collect()
-            }
+            Some(TextureNoise::SecondFrame(second)) => second_frame_power(picture, &second, &mut planner)?,
         };
 
-        let ratios = |of_ring: &dyn Fn(usize) -> f64| -> Option<TextureResponse> {
-            let ratios: Vec<f64> = (0..frequencies.len()).map(of_ring).collect();
-            let at_zero = extrapolated_to_zero(&frequencies, &ratios, &picture_power.counts)?;
-            let mut response: Vec<f64> = ratios.iter().map(|ratio| ratio / at_zero).collect();
-            // The mean is subtracted: the first ring has little, and the middle nothing.
-            response[0] = 1.0;
-            Some(TextureResponse { frequencies: frequencies.clone(), response })
-        };
         let texture_power = |ring: usize| (picture_power.means[ring] - noise_power[ring]).max(0.0);
-        let direct = ratios(&|ring| (texture_power(ring) / reference_power.means[ring]).sqrt())
+        let direct: Vec<f64> =
+            (0..frequencies.len()).map(|ring| (texture_power(ring) / reference_power.means[ring]).sqrt()).collect();
+        let direct = response_of(&frequencies, &direct, &picture_power.counts)
             .ok_or_else(|| unsuitable("has less power at low frequencies than the noise".to_owned()))?;
 
         let cross = Array2::from_shape_fn((rows, columns), |at| of_picture[at] * of_reference[at].conj());
         let shift_px = shift(&cross, &mut planner);
-        let aligned = Rings::new((rows, columns), |(i, j)| {
-            let (down, along) = (signed(i, rows), signed(j, columns));
-            let (sin, cos) = (TAU * (down * shift_px.0 + along * shift_px.1)).sin_cos();
-            f64::from(cross[(i, j)].re) * cos - f64::from(cross[(i, j)].im) * sin
-        });
-        let low = || (FIRST_RING..frequencies.len()).take_while(|&ring| frequencies[ring] <= low_end(&frequencies));
-        let sum =
-            |values: &dyn Fn(usize) -> f64| low().map(|ring| values(ring) * picture_power.counts[ring]).sum::<f64>();
-        let common = sum(&|ring| aligned.means[ring]);
-        let (own, ideal) = (sum(&|ring| picture_power.means[ring]), sum(&|ring| reference_power.means[ring]));
-        let coherence = (common * common.abs() / (own * ideal)).clamp(0.0, 1.0);
+        let aligned = aligned_power(&cross, shift_px);
+        let coherence = low_coherence(&aligned, &picture_power, &reference_power);
+        let common: Vec<f64> =
+            aligned.means.iter().zip(&reference_power.means).map(|(common, ideal)| common / ideal).collect();
         let full_reference = match coherence >= LEAST_COHERENCE {
-            true => ratios(&|ring| aligned.means[ring] / reference_power.means[ring]),
+            true => response_of(&frequencies, &common, &aligned.counts),
             false => None,
         };
         Ok(Self {
@@ -176,6 +154,42 @@ impl TextureSpectra {
             frequencies,
         })
     }
+
+    /// Returns the least frequency, cycles a pixel, at which the noise has all of the picture's power; the direct response is 0 there.
+    pub fn noise_from(&self) -> Option<f64> {
+        let is_noise = |ring: &usize| self.noise_power[*ring] >= self.picture_power[*ring];
+        (FIRST_RING..self.frequencies.len()).find(is_noise).map(|ring| self.frequencies[ring])
+    }
+}
+
+/// Returns the response of ratios at frequencies, 1 toward frequency 0; `None` where they do not lead there.
+fn response_of(frequencies: &[f64], ratios: &[f64], counts: &[f64]) -> Option<TextureResponse> {
+    let at_zero = extrapolated_to_zero(frequencies, ratios, counts)?;
+    let mut response: Vec<f64> = ratios.iter().map(|ratio| ratio / at_zero).collect();
+    // The mean is subtracted: the first ring has little, and the middle nothing.
+    response[0] = 1.0;
+    Some(TextureResponse { frequencies: frequencies.to_vec(), response })
+}
+
+/// Returns the power that a picture shares with its reference once the shift between them is made up for.
+fn aligned_power(cross: &Array2<Complex<f32>>, shift_px: (f64, f64)) -> Rings {
+    let (rows, columns) = cross.dim();
+    Rings::new((rows, columns), |(i, j)| {
+        let (down, along) = (signed(i, rows), signed(j, columns));
+        let (sin, cos) = (TAU * (down * shift_px.0 + along * shift_px.1)).sin_cos();
+        f64::from(cross[(i, j)].re) * cos - f64::from(cross[(i, j)].im) * sin
+    })
+}
+
+/// Returns the coherence of a picture and its reference over the low frequencies, 0 to 1.
+fn low_coherence(aligned: &Rings, picture: &Rings, reference: &Rings) -> f64 {
+    let frequencies = picture.frequencies();
+    let sum = |power: &Rings| -> f64 {
+        let low = (FIRST_RING..frequencies.len()).take_while(|&ring| frequencies[ring] <= low_end(&frequencies));
+        low.map(|ring| power.means[ring] * power.counts[ring]).sum()
+    };
+    let common = sum(aligned);
+    (common * common.abs() / (sum(picture) * sum(reference))).clamp(0.0, 1.0)
 }
 
 fn unsuitable(reason: String) -> SensorError {
@@ -273,9 +287,31 @@ impl Rings {
         Self { side, means, counts }
     }
 
+    /// The power of a transform.
+    fn of_power(transform: &Array2<Complex<f32>>) -> Self {
+        Self::new(transform.dim(), |at| transform[at].norm_sqr().into())
+    }
+
     fn frequencies(&self) -> Vec<f64> {
         (0..self.means.len()).map(|ring| ring as f64 / self.side as f64).collect()
     }
+}
+
+/// Returns the power of the noise that differs between two frames: half that of their difference.
+fn second_frame_power(
+    picture: &ArrayView2<'_, f32>,
+    second: &ArrayView2<'_, f32>,
+    planner: &mut Planner,
+) -> Result<Vec<f64>, SensorError> {
+    same_size("the second frame of a texture, rows × columns", picture, second)?;
+    if is_flat(second) {
+        return Err(unsuitable("is not in the second frame, which is flat".to_owned()));
+    }
+    if picture == second {
+        return Err(unsuitable("has no second frame: both are the same, expected another exposure".to_owned()));
+    }
+    let twice = Rings::of_power(&transform(&(picture - second).view(), planner));
+    Ok(twice.means.iter().map(|power| 0.5 * power).collect())
 }
 
 /// Returns the power of an even patch at frequencies.
@@ -291,7 +327,7 @@ fn flat_power(
         )));
     }
     let of_patch = transform(patch, planner);
-    let power = Rings::new((rows, columns), |at| of_patch[at].norm_sqr().into());
+    let power = Rings::of_power(&of_patch);
     let own = power.frequencies();
     // The mean is subtracted and the shading of the patch is no noise: the first rings say nothing.
     let lowest = own[FIRST_RING];
@@ -432,5 +468,21 @@ mod tests {
         let loud = squares(96, 9).mapv(|v| 9.0 * v);
         refused(&texture, &texture, Some(TextureNoise::Flat(loud.view())), "less power at low frequencies");
         refused(&texture, &texture, Some(TextureNoise::SecondFrame(flat.view())), "second frame, which is flat");
+        refused(&texture, &texture, Some(TextureNoise::SecondFrame(texture.view())), "expected another exposure");
+    }
+
+    #[test]
+    fn where_noise_has_all_of_the_power_is_stated() {
+        let texture = squares(128, 5);
+        let measure =
+            |noise: Option<TextureNoise<'_>>| TextureSpectra::measure(&texture.view(), &texture.view(), noise).unwrap();
+        assert_eq!(measure(None).noise_from(), None);
+        // White noise whose power lies between the texture's at low and at high frequencies.
+        let mut random = ChaCha8Rng::seed_from_u64(6);
+        let patch = Array2::from_shape_simple_fn((64, 64), || 0.5 + 0.1 * (random.random::<f32>() - 0.5));
+        let spectra = measure(Some(TextureNoise::Flat(patch.view())));
+        let from = spectra.noise_from().unwrap();
+        assert!((0.05..0.5).contains(&from), "{from}");
+        assert_eq!(spectra.direct.at(from), 0.0);
     }
 }

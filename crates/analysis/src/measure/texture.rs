@@ -70,6 +70,8 @@ pub struct TextureChannel {
     pub frequencies_cycles_per_pixel: Vec<f64>,
     /// The power of the picture at each frequency; white noise has its variance there.
     pub picture_power: Vec<f64>,
+    /// The least frequency at which the noise has all of the picture's power, cycles a pixel: the direct response is 0 there.
+    pub noise_from_cycles_per_pixel: Option<f64>,
     /// The power of the noise, 0 where nothing shows it.
     pub noise_power: Vec<f64>,
     /// The power of the reference.
@@ -171,6 +173,7 @@ impl TextureChannel {
     fn of(name: &str, spectra: TextureSpectra, viewing: &Viewing) -> Result<Self, PipelineError> {
         Ok(Self {
             channel: name.to_owned(),
+            noise_from_cycles_per_pixel: spectra.noise_from(),
             direct: TextureCurve::of(spectra.direct, viewing)?,
             full_reference: spectra.full_reference.map(|response| TextureCurve::of(response, viewing)).transpose()?,
             coherence: spectra.coherence,
