@@ -479,7 +479,7 @@ mod tests {
         assert_eq!(measure(None).noise_from(), None);
         // White noise whose power lies between the texture's at low and at high frequencies.
         let mut random = ChaCha8Rng::seed_from_u64(6);
-        let patch = Array2::from_shape_simple_fn((64, 64), || 0.5 + 0.1 * (random.random::<f32>() - 0.5));
+        let patch = Array2::from_shape_simple_fn((64, 64), || 0.5 + 0.3 * (random.random::<f32>() - 0.5));
         let spectra = measure(Some(TextureNoise::Flat(patch.view())));
         let from = spectra.noise_from().unwrap();
         assert!((0.05..0.5).contains(&from), "{from}");
