@@ -3,6 +3,7 @@
 mod charts;
 mod dng_report;
 mod dual_pixel;
+mod pixel_optics;
 mod statistics;
 
 use dioptric_pipeline::{AberrationSummary, BankData, Camera, Capture, FilmPart, PipelineError, display::LinearRgb};
@@ -14,6 +15,7 @@ use serde::Serialize;
 pub use charts::{RunCharts, RunPlaces};
 pub use dng_report::DngReport;
 pub use dual_pixel::{DisparityData, DualPixelData, MOST_ERROR_PX};
+pub use pixel_optics::{PixelOpticsData, PixelOpticsRow, PixelPlace, pixel_optics_rows};
 pub use statistics::{ChannelStatistics, LossRow, SensorStatistics};
 
 use crate::LensData;

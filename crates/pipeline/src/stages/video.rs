@@ -130,7 +130,8 @@ impl KeptCamera {
         let irradiance = larger.irradiance(progress, cancel)?;
         progress.at(Stage::Sensor, 0.0);
         // A preview of a larger film may be coarser.
-        let binning = larger.lens_and_film(progress, cancel)?.1.binning;
+        let (lens, place) = larger.lens_and_film(progress, cancel)?;
+        let binning = place.binning;
         if binning != frame.binning {
             let fewer = |n: usize| (n * frame.binning / binning).max(1);
             samples_per_tan *= frame.pitch_um / irradiance.pitch_um();
@@ -144,7 +145,7 @@ impl KeptCamera {
         }
         let sensor = electrons::on_film(&inputs.frames.electrons.sensor, &frame);
         let exposed = sensor.behind(&inputs.frames.electrons.filters);
-        let exit_pupil = electrons::exit_pupil(&sensor, &frame);
+        let exit_pupil = electrons::exit_pupil(&sensor, &frame, &lens);
         let still = Arc::new(exposed.filter_rates(&Illumination::on_pixels(&*irradiance))?);
         let chain = self.chain(progress, cancel);
         let scene = chain.summary(&inputs.frames.electrons.irradiance.scene)?;
