@@ -29,7 +29,8 @@ pub use lens::{
 pub use methods::{Fit, MethodComparison, MethodRow};
 pub use psf::{MtfRow, PolychromaticPsf, PsfRequest, PsfRow, PsfSampling, PsfSet, ThroughFocus, psf_csv};
 pub use run::{
-    ChannelStatistics, DisparityData, DngReport, DualPixelData, FilmData, IrradianceData, LossRow, MOST_ERROR_PX, Run,
-    RunCharts, RunOptics, RunPlaces, RunReport, RunTimes, SceneData, SensorStatistics,
+    ChannelStatistics, DisparityData, DngReport, DualPixelData, FilmData, IrradianceData, LossRow, MOST_ERROR_PX,
+    PixelOpticsData, PixelOpticsRow, PixelPlace, Run, RunCharts, RunOptics, RunPlaces, RunReport, RunTimes, SceneData,
+    SensorStatistics, pixel_optics_rows,
 };
 pub use sensor_table::{SensorRow, built_in_sensors};

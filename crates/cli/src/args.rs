@@ -525,6 +525,9 @@ pub(crate) struct SenseArgs {
     /// Distance of the exit pupil from the sensor, mm, for the chief-ray angle [default: light along the axis]
     #[arg(long, value_name = "D", help_heading = heading::FILM)]
     pub(crate) exit_pupil_mm: Option<f64>,
+    /// The f-number of the cone of light on the sensor, for pixels whose data sheet states a `pixel_stack` [default: collimated light]
+    #[arg(long, value_name = "N", help_heading = heading::FILM)]
+    pub(crate) f_number: Option<f64>,
     /// The light on the scene, which is made white: a name, a temperature, a chromaticity or a CSV file, as for `run`
     /// [default: unknown]
     #[arg(long, value_name = "LIGHT", help_heading = heading::EXPOSURE)]

@@ -7,9 +7,11 @@ use std::{
 };
 
 use anyhow::{Context, bail};
-use clap::Subcommand;
-use dioptric_analysis::built_in_sensors;
-use dioptric_pipeline::{CAMERA_SCHEMA, CAMERA_TEMPLATE, Camera, KeptCamera, SENSOR_SCHEMA, SensorSpec, Staged};
+use clap::{Args, Subcommand};
+use dioptric_analysis::{built_in_sensors, pixel_optics_rows};
+use dioptric_pipeline::{
+    CAMERA_SCHEMA, CAMERA_TEMPLATE, Camera, KeptCamera, SENSOR_SCHEMA, SensorSpec, Staged, parse_numbers,
+};
 use serde_json::json;
 
 use crate::{
@@ -54,8 +56,26 @@ pub(crate) enum SensorCommand {
         #[arg(long, short, value_name = "F.ron")]
         output: Option<PathBuf>,
     },
+    /// Prints the share of a lens's light that the optics of a sensor's pixels lead to the photodiodes, by image height and f-number
+    Optics(PixelOpticsArgs),
     /// Prints the JSON schema of sensor files
     Schema,
+}
+
+/// The light before pixels of a stack.
+#[derive(Debug, Args)]
+pub(crate) struct PixelOpticsArgs {
+    /// Sensor, a file or the name of a built-in one
+    sensor: String,
+    /// F-numbers of the cone of light; inf for collimated light
+    #[arg(long, value_name = "LIST", default_value = "1.4,2,2.8,4,8,inf")]
+    f_numbers: String,
+    /// Image heights towards a corner, mm [default: from the middle of the sensor to its corner]
+    #[arg(long, value_name = "LIST")]
+    heights_mm: Option<String>,
+    /// Distance of the exit pupil from the sensor, mm [default: a telecentric lens]
+    #[arg(long, value_name = "D")]
+    exit_pupil_mm: Option<f64>,
 }
 
 pub(crate) fn run(command: &CameraCommand, common: &Common) -> anyhow::Result<()> {
@@ -73,8 +93,33 @@ pub(crate) fn run_sensor(command: &SensorCommand, common: &Common) -> anyhow::Re
         SensorCommand::Init { sensor, output } => {
             write_new(output.as_deref(), &(SensorSpec::named(sensor).open()?.to_ron() + "\n"), common)
         }
+        SensorCommand::Optics(arguments) => optics(arguments, common),
         SensorCommand::Schema => print(SENSOR_SCHEMA),
     }
+}
+
+fn optics(arguments: &PixelOpticsArgs, common: &Common) -> anyhow::Result<()> {
+    let heights_mm = arguments.heights_mm.as_deref().map(|list| parse_numbers("--heights-mm", list)).transpose()?;
+    let f_numbers = parse_numbers("--f-numbers", &arguments.f_numbers)?;
+    let distance_mm = arguments.exit_pupil_mm.unwrap_or(f64::INFINITY);
+    let sensor = SensorSpec::named(&arguments.sensor).open()?;
+    let rows = pixel_optics_rows(&sensor, distance_mm, &f_numbers, heights_mm.as_deref())?;
+    if common.json {
+        return print_json(&rows);
+    }
+    let mut text = format!(
+        "{:>9} {:>10} {:>12} {:>10} {:>8} {:>8}\n",
+        "f-number", "height mm", "chief ray °", "shift µm", "share", "factor"
+    );
+    for row in rows {
+        let f_number = row.f_number.unwrap_or(f64::INFINITY);
+        writeln!(
+            text,
+            "{f_number:>9} {:>10.3} {:>12.2} {:>10.3} {:>8.4} {:>8.4}",
+            row.height_mm, row.chief_ray_deg, row.microlens_shift_um, row.share, row.factor
+        )?;
+    }
+    print(&text)
 }
 
 /// Writes a file that is not there yet, or to standard output.

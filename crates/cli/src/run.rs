@@ -11,7 +11,8 @@ use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_pipeline::{
     BankSpec, BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
     ImagingTimes, KeptCamera, LensReadOptions, LensSpec, PictureOptions, Progress, Quality, SceneSpec, SensorOptions,
-    SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, parse_illuminant, parse_numbers, with_exposure_s,
+    SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, parse_illuminant, parse_numbers,
+    with_exposure_s,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
@@ -23,9 +24,6 @@ use crate::{
     paintings::{build, painting_folder},
     terminal::{Bar, guarded, print, print_json, remark},
 };
-
-/// The share of a film without light that is worth a word.
-const LEAST_DARK: f64 = 1e-3;
 
 /// Where results go when nothing else is asked for.
 pub(crate) const OUT: &str = "dioptric-out";
@@ -58,7 +56,7 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     tell(&report.lens_notes, common);
     tell(&report.sensor.notes, common);
     tell(&report.scene.notes, common);
-    if report.film.dark_fraction > LEAST_DARK {
+    if report.film.dark_fraction > display::LEAST_DARK_FRACTION {
         let percent = 100.0 * report.film.dark_fraction;
         let words = "where that is not black in the scene, the lens shows less of it than the film is large: take a smaller \
                      film (--film scene) or a wider scene";

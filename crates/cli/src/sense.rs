@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dioptric_analysis::SensorStatistics;
+use dioptric_analysis::{PixelPlace, SensorStatistics};
 use dioptric_pipeline::{
     Camera, FrameFile, Outputs, SenseRequest, SensorSpec, Staged, parse_illuminant, with_exposure_s,
 };
@@ -32,6 +32,7 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
         noise,
         illuminant: arguments.illuminant.as_deref().map(parse_illuminant).transpose()?,
         exit_pupil_mm: arguments.exit_pupil_mm,
+        f_number: arguments.f_number,
         seed: common.seed.unwrap_or(demo.seed),
         outputs: Outputs {
             also: arguments.frames.also.as_deref().map_or(Ok(Vec::new()), FrameFile::parse_list)?,
@@ -66,6 +67,11 @@ fn table(statistics: &SensorStatistics) -> Result<String, std::fmt::Error> {
             "{:<8} mean {:>10.1} e  largest {:>10.1} e  SNR {:>6.1} dB  raw mean {:>9.2}",
             channel.filter, channel.mean_e, channel.max_e, channel.snr_db, channel.mean_raw
         )?;
+    }
+    if let Some(optics) = &statistics.pixel_optics {
+        let place = |place: &PixelPlace| format!("{:.4} ({:.2}°)", place.share, place.chief_ray_deg);
+        let (middle, corner) = (place(&optics.middle), place(&optics.corner));
+        writeln!(text, "pixel optics: share of the light {middle} in the middle, {corner} in the darkest corner")?;
     }
     Ok(text)
 }

@@ -97,6 +97,25 @@ fn oblique_light_darkens_the_corners_of_a_sensor_that_minds_it() {
 }
 
 #[test]
+fn fast_light_is_lost_by_pixels_with_a_stack() {
+    let folder = folder();
+    let sheet = sheet();
+    let end = sheet.rfind(')').unwrap();
+    let stack = "pixel_stack: (photodiode_um: 100.0, layers: [(thickness_um: 600.0, index: 1.5)], \
+                 microlens: (power: FocusOnPhotodiode, shift: ExitPupilMm(10.0))),";
+    fs::write(folder.path().join("stack.ron"), format!("{}    {stack}\n)", &sheet[..end])).unwrap();
+    let of = |options: &[&str]| sense(folder.path(), "stack.ron", &[&["--exposure-s", "1e-6"], options].concat());
+    let optics = |options: &[&str], place: &str| of(options)["pixel_optics"][place]["factor"].as_f64().unwrap();
+    let fast = ["--exit-pupil-mm", "10", "--f-number", "1.4"];
+    // The image of an f/1.4 pupil, a disc of 307 µm, covers the photodiode of 100 µm seven times; the shift keeps it over that in the corner.
+    assert!((0.1..0.3).contains(&optics(&fast, "middle")) && optics(&fast, "corner") > 0.1);
+    assert!(optics(&["--exit-pupil-mm", "10", "--f-number", "16"], "corner") > 0.95);
+    assert!(optics(&["--exit-pupil-mm", "4", "--f-number", "16"], "corner") < 0.3);
+    let mean = |options: &[&str]| of(options)["channels"][1]["mean_e"].as_f64().unwrap();
+    assert!(mean(&fast) < 0.35 * mean(&["--f-number", "16", "--exit-pupil-mm", "10"]));
+}
+
+#[test]
 fn noise_and_white_are_chosen_on_the_command_line() {
     let folder = folder();
     let raw = |options: &[&str]| {

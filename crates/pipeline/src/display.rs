@@ -47,10 +47,24 @@ pub struct LinearRgb {
     pub planes: [Array2<f32>; 3],
 }
 
+/// The share of a film without light that is worth a word.
+pub const LEAST_DARK_FRACTION: f64 = 1e-3;
+
 impl LinearRgb {
     /// A picture without light.
     pub fn black(rows: usize, columns: usize) -> Self {
         Self { planes: [(); 3].map(|()| Array2::zeros((rows, columns))) }
+    }
+
+    /// Returns the share of pixels that get next to nothing of the mean light.
+    pub fn dark_fraction(&self) -> f64 {
+        /// A blur leaves nothing beyond its window; the mean of a night scene is a thousand times its darkest places.
+        const DARK: f32 = 1e-6;
+        let [red, green, blue] = &self.planes;
+        let light = || red.iter().zip(green).zip(blue).map(|((r, g), b)| r.abs() + g.abs() + b.abs());
+        let n = red.len().max(1) as f64;
+        let mean = (light().map(f64::from).sum::<f64>() / n) as f32;
+        light().filter(|&light| light <= DARK * mean).count() as f64 / n
     }
 
     /// Adds a band seen in this color.
@@ -177,6 +191,16 @@ mod tests {
         let half = 0.5 + 0.5 * srgb_decode(31.0 / 255.0);
         assert_eq!(shown[(1, 0)].0[1], code(half));
         assert_eq!(picture.to_srgb(2.0), picture.to_srgb_with_black(2.0, [0.0; 3]));
+    }
+
+    #[test]
+    fn film_beyond_the_light_is_counted() {
+        let mut seen = LinearRgb::black(10, 10);
+        assert_eq!(seen.dark_fraction(), 1.0);
+        // A dim corner is no darkness.
+        let lit = |(row, column): (usize, usize)| if column < 7 { if row == 0 { 1e-3 } else { 5.0 } } else { 0.0 };
+        seen.add(&Array2::from_shape_fn((10, 10), lit), [0.3, -0.1, 0.8]);
+        assert_eq!(seen.dark_fraction(), 0.3);
     }
 
     #[test]

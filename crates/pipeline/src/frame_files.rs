@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use dioptric_scene::{ExrSamples, write_planes_exr};
 use dioptric_sensor::{
-    Depth, DngDetails, ElectronRate, Exposure, LensTables, OpticalFilter, Picture, Processing, Raw, Sensor,
+    Depth, DngDetails, ElectronRate, ExitPupil, Exposure, LensTables, OpticalFilter, Picture, Processing, Raw, Sensor,
 };
 use dioptric_spectrum::{Illuminant, WavelengthGrid};
 use ndarray::{Array2, Axis};
@@ -147,6 +147,8 @@ pub struct Frames<'a> {
     pub grid: &'a WavelengthGrid,
     /// The light on the scene; D65 where it is not known.
     pub light: Illuminant,
+    /// Where the light of the sensor's pixels comes from, where that is known and they mind it.
+    pub exit_pupil: Option<ExitPupil>,
 }
 
 /// Writes the frames and the picture; returns the names of the files and the bytes of the 8-bit PNG picture.

@@ -33,9 +33,11 @@ pub struct SenseRequest {
     pub noise: NoiseSources,
     /// The light that white balance goes by; the mean of the picture where it is not known.
     pub illuminant: Option<Illuminant>,
-    /// The distance of the exit pupil from the sensor, mm, from which each pixel's chief-ray angle follows; `None` for
-    /// light along the axis everywhere.
+    /// The distance of the exit pupil from the sensor, mm, from which each pixel's chief ray follows; `None` for chief rays along the
+    /// axis everywhere.
     pub exit_pupil_mm: Option<f64>,
+    /// The f-number of the cone of light on the sensor, for pixels whose stack minds it; `None` for collimated light.
+    pub f_number: Option<f64>,
     /// The seed of all noise.
     pub seed: u64,
     /// What is written besides the picture and the report; of irradiance and depth there is nothing to write.
@@ -61,6 +63,8 @@ pub struct Sensed {
     pub light: Illuminant,
     /// The bands of the image.
     pub grid: WavelengthGrid,
+    /// Where the light comes from, where that is stated.
+    pub exit_pupil: Option<ExitPupil>,
     /// What a user should know of how the image was laid over the pixels, a sentence each.
     pub notes: Vec<String>,
 }
@@ -79,6 +83,7 @@ impl Sensed {
             optics: None,
             light: self.light.clone(),
             grid: &self.grid,
+            exit_pupil: self.exit_pupil,
         }
     }
 }
@@ -101,7 +106,7 @@ impl SenseRequest {
         let sensor = self.sensor.open()?;
         let filters = FilterSpec::open_all(&self.filters)?;
         let sensor = match self.pixel_um {
-            Some(pixel_pitch_um) => Sensor { pixel_pitch_um, ..sensor },
+            Some(pixel_pitch_um) => sensor.with_pitch_um(pixel_pitch_um),
             None => sensor,
         };
         // One that states no distance between its samples has one a pixel.
@@ -125,7 +130,8 @@ impl SenseRequest {
                 number(pixel_um)
             ));
         }
-        let light = Illumination { exit_pupil: self.exit_pupil_mm.map(ExitPupil::centered), ..light };
+        let exit_pupil = self.exit_pupil(&sensor, &mut notes);
+        let light = Illumination { exit_pupil, ..light };
         let exposed = sensor.behind(&filters);
         let rate = exposed.electron_rate(&light)?;
         let shutter = ShutterInputs {
@@ -146,7 +152,27 @@ impl SenseRequest {
             developed,
             light: self.illuminant.clone().unwrap_or(Illuminant::D65),
             grid: irradiance.grid().clone(),
+            exit_pupil,
             notes,
         })
+    }
+
+    /// Returns the pupil that the light comes from, if one is stated.
+    fn exit_pupil(&self, sensor: &Sensor, notes: &mut Vec<String>) -> Option<ExitPupil> {
+        let Self { exit_pupil_mm, f_number, .. } = *self;
+        match (&sensor.pixel_stack, f_number) {
+            (Some(_), None) => notes.push(format!(
+                "the pixels of {} are of a stack that minds the cone of light: with no f-number the light is collimated",
+                sensor.name
+            )),
+            (None, Some(_)) => notes.push(format!("{} states no pixel_stack, which alone minds the f-number", sensor.name)),
+            _ => {}
+        }
+        let distance_mm = match (exit_pupil_mm, f_number) {
+            (None, None) => return None,
+            (None, Some(_)) => f64::INFINITY,
+            (Some(distance_mm), _) => distance_mm,
+        };
+        Some(ExitPupil { f_number: f_number.unwrap_or(f64::INFINITY), ..ExitPupil::centered(distance_mm) })
     }
 }

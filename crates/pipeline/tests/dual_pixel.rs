@@ -139,3 +139,19 @@ fn another_exposure_images_nothing_again() {
     let counts = first.stage_counts();
     assert_eq!((counts.bank, counts.plan, counts.irradiance), (1, 3, 2));
 }
+
+/// A stack works out itself how much of the pupil's light arrives, which a `dual_pixel` states.
+#[test]
+fn pixels_of_a_stack_are_refused() {
+    let mut sensor = dioptric_sensor::Sensor::built_in("machine-vision-mono").unwrap();
+    sensor.pixel_stack = Some(dioptric_sensor::PixelStack {
+        photodiode_um: 2.0,
+        layers: Vec::new(),
+        microlens: None,
+        interfaces: dioptric_sensor::Interfaces::Coated,
+        quantum_efficiency: dioptric_sensor::QuantumEfficiencyOf::Pixel,
+    });
+    let camera = camera(2.0, Some(DualPixelSpec::of(Photodiodes::LeftRight))).with_given_sensor(Given::new(sensor));
+    let message = camera.capture(&Silent, &Cancel::new()).unwrap_err().to_string();
+    assert!(message.contains("pixel_stack") && message.contains("dual_pixel"), "{message}");
+}

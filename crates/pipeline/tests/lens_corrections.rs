@@ -9,8 +9,8 @@ use dioptric_pipeline::{
 };
 use dioptric_scene::Pattern;
 use dioptric_sensor::{
-    AutoExposure, ColorCorrection, ExposureControl, LensCorrections, Metering, NoiseSources, Processing, ToneCurve,
-    WhiteBalance,
+    AutoExposure, ColorCorrection, ExposureControl, Interfaces, LensCorrections, Metering, NoiseSources, PixelStack,
+    Processing, QuantumEfficiencyOf, Sensor, StackLayer, ToneCurve, WhiteBalance,
 };
 use dioptric_spectrum::Cancel;
 
@@ -220,10 +220,29 @@ fn an_even_plane_is_even() {
     let mut camera = before(Pattern::Uniform);
     camera.lens = LensSpec::BuiltIn("wide-6mm".to_owned());
     camera.film = FilmSpec::Pixels { columns: 300, rows: 200, pitch_um: 20.0 };
-    let mut sensor = camera.sensor.open().unwrap();
-    sensor.chief_ray_response = vec![(0.0, 1.0), (10.0, 0.95), (30.0, 0.6)];
+    let mut by_table = camera.sensor.open().unwrap();
+    by_table.chief_ray_response = vec![(0.0, 1.0), (10.0, 0.95), (30.0, 0.6)];
+    let by_stack = Sensor { chief_ray_response: Vec::new(), pixel_stack: Some(stack()), ..by_table.clone() };
+    for sensor in [by_table, by_stack] {
+        check_evenness(&camera, &sensor);
+    }
+}
+
+/// Pixels of 4 µm that lose oblique light: a bare photodiode below 4 µm of oxide.
+fn stack() -> PixelStack {
+    PixelStack {
+        photodiode_um: 3.6,
+        layers: vec![StackLayer { thickness_um: 4.0, index: 1.46 }],
+        microlens: None,
+        interfaces: Interfaces::Coated,
+        quantum_efficiency: QuantumEfficiencyOf::Pixel,
+    }
+}
+
+#[track_caller]
+fn check_evenness(camera: &Camera, sensor: &Sensor) {
     let shoot = |corrections: LensCorrections| {
-        let kept = KeptCamera::new(with(&camera, corrections));
+        let kept = KeptCamera::new(with(camera, corrections));
         kept.with_given_sensor(dioptric_pipeline::Given::new(sensor.clone())).capture(&Silent, &Cancel::new()).unwrap()
     };
     let evenness = |shot: &Capture| {
@@ -270,6 +289,7 @@ fn irradiance_without_its_lens_is_refused() {
         noise: camera.noise,
         illuminant: None,
         exit_pupil_mm: None,
+        f_number: None,
         seed: 1,
         outputs: camera.outputs,
     };

@@ -77,3 +77,13 @@ fn videos_that_cannot_be_are_named() {
         assert!(message.contains(word) && !message.contains('\n'), "{word}: {message}");
     }
 }
+
+#[test]
+fn film_beyond_the_scene_is_stated() {
+    let states = |pan_deg_per_s: f64| {
+        let motion = CameraTurn { pan_deg_per_s, ..CameraTurn::default() };
+        video(&camera(motion)).notes.iter().any(|note| note.contains("gets no light"))
+    };
+    // At rest the frame lies within the scene, which the pan leaves.
+    assert!(!states(0.0) && states(60.0));
+}

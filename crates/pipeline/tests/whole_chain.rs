@@ -212,6 +212,7 @@ fn sensed_irradiance_is_the_picture_of_the_run() {
         noise: camera.noise,
         illuminant: Some(Illuminant::D65),
         exit_pupil_mm: shot.place.exit_pupil_distance_mm,
+        f_number: None,
         seed: camera.seed,
         outputs: camera.outputs.clone(),
     };

@@ -1,11 +1,13 @@
 """Measures pictures with dioptric and with independent implementations: PSNR and SSIM of scikit-image, S-CIELAB in
-numpy with scipy's Gaussian filters and scikit-image's color difference, the response of a slanted edge in numpy.
+numpy with scipy's Gaussian filters and scikit-image's color difference, the response of a slanted edge in numpy, what is weighed by the eye
+with scipy's quadrature, the response of a texture (dead leaves) in numpy.
 
     pip install numpy scipy scikit-image
     python crates/sensor/scripts/check_metrics.py target/debug/dioptric > crates/sensor/scripts/check_metrics.txt
 
 The pictures are made here by formula: a color texture, and the same blurred, shifted in color and with noise. The edge
-is examples/scenes/edge.png, a step blurred by a Gaussian of .8 pixel, whose response is known.
+is examples/scenes/edge.png, a step blurred by a Gaussian of .8 pixel, whose response is known, and so is that of the leaves, drawn here and
+blurred by a Gaussian of 1.1 pixels.
 """
 
 import json
@@ -15,6 +17,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import quad
 from scipy.ndimage import gaussian_filter
 from skimage.color import deltaE_ciede2000
 from skimage.io import imread, imsave
@@ -95,6 +98,61 @@ def edge_response(picture, region, slope):
     return frequency, spectrum / spectrum[0] / quarter, np.degrees(np.arctan(fit[0]))
 
 
+def acutance(response):
+    """Returns the integral of a response (by cycles a pixel) times the eye's sensitivity over that of the sensitivity (IEEE Std 1858-2016)."""
+    sensitivity = lambda nu: nu**0.8 * np.exp(-0.2 * nu)
+    end = PIXELS_PER_DEGREE / 2
+    seen, _ = quad(lambda nu: sensitivity(nu) * response(nu / PIXELS_PER_DEGREE), 0, end, limit=500)
+    return seen / quad(sensitivity, 0, np.inf)[0]
+
+
+def square_root_integral(response, picture_deg, luminance=100.0):
+    """Returns Barten's square-root integral, just noticeable differences (J. Opt. Soc. Am. A 7, 1990)."""
+
+    def sensitivity(nu):
+        a = 540 * (1 + 0.7 / luminance) ** -0.2 / (1 + 12 / (picture_deg * (1 + nu / 3) ** 2))
+        b = 0.3 * (1 + 100 / luminance) ** 0.15
+        return a * nu * np.exp(-b * nu) * np.sqrt(1 + 0.06 * np.exp(b * nu))
+
+    # With nu = exp(t) the integral over nu / nu is one over t.
+    part = lambda t: np.sqrt(response(np.exp(t) / PIXELS_PER_DEGREE) * sensitivity(np.exp(t)))
+    return quad(part, np.log(1e-12), np.log(PIXELS_PER_DEGREE / 2), limit=500)[0] / np.log(2)
+
+
+def leaves(side=512, margin=24):
+    """Returns dead leaves: discs of even grays, each over those before, radii by the inverse cube from 2 to 120 pixels."""
+    random = np.random.default_rng(5)
+    whole = side + 2 * margin
+    row, column = np.mgrid[0:whole, 0:whole]
+    picture, is_free = np.full((whole, whole), 0.5), np.ones((whole, whole), bool)
+    # From the front: a disc shows where none has been.
+    for _ in range(60000):
+        radius = (2.0**-2 + random.random() * (120.0**-2 - 2.0**-2)) ** -0.5
+        y, x = random.random(2) * (whole + 2 * radius) - radius
+        gray = 0.25 + 0.5 * random.random()
+        rows, columns = (slice(max(0, int(v - radius)), max(0, int(v + radius) + 2)) for v in (y, x))
+        disc = (row[rows, columns] - y) ** 2 + (column[rows, columns] - x) ** 2 < radius**2
+        picture[rows, columns][disc & is_free[rows, columns]] = gray
+        is_free[rows, columns] &= ~disc
+    blurred = gaussian_filter(picture, 1.1, truncate=8)
+    inner = slice(margin, margin + side)
+    return [np.round(65535 * plane[inner, inner]).astype(np.uint16) for plane in (picture, blurred)]
+
+
+def texture_response(picture, reference):
+    """Returns the mean responses over rings at multiples of 1 / side: by powers, and by cross-power over the reference's."""
+    side = len(picture)
+    window = np.hanning(side + 1)[:side]
+    spectra = [np.fft.fft2((p - p.mean()) * np.outer(window, window)) for p in (picture / 65535, reference / 65535)]
+    frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(side), np.fft.fftfreq(side)))
+    ring = np.round(frequency * side).astype(int).ravel()
+    mean = lambda values: (np.bincount(ring, values.ravel()) / np.bincount(ring))[: side // 2 + 1]
+    power = mean(np.abs(spectra[1]) ** 2)
+    direct = np.sqrt(mean(np.abs(spectra[0]) ** 2) / power)
+    common = mean((spectra[0] * spectra[1].conj()).real) / power
+    return np.arange(side // 2 + 1) / side, direct, common
+
+
 def main():
     program = sys.argv[1]
 
@@ -110,10 +168,10 @@ def main():
     luma = [codes / 255.0 @ [0.299, 0.587, 0.114] for codes in (first, second)]
     _, ssim = structural_similarity(
         *luma, data_range=1.0, gaussian_weights=True, sigma=1.5, truncate=4, use_sample_covariance=False, full=True)
-    print(f"{'':34}{'dioptric':>12}{'independent':>14}")
+    print(f"{'':44}{'dioptric':>12}{'independent':>14}")
 
     def row(name, own, other):
-        print(f"{name:34}{own:12.5f}{other:14.5f}")
+        print(f"{name:44}{own:12.5f}{other:14.5f}")
 
     row("PSNR, dB (scikit-image)", found["psnr_db"], peak_signal_noise_ratio(first, second, data_range=255))
     row("SSIM (scikit-image)", found["ssim"], ssim.mean())
@@ -135,6 +193,29 @@ def main():
     crossing = np.argmax(response < 0.5)
     half = np.interp(0.5, response[[crossing, crossing - 1]], frequency[[crossing, crossing - 1]])
     row("MTF50, cycles a pixel", channel["mtf50_cycles_per_pixel"], half)
+
+    # What is weighed by the eye, of the response that is known.
+    gauss = lambda spread: lambda f: np.exp(-2 * (np.pi * spread * f) ** 2)
+    row("acutance (scipy)", channel["acutance"], acutance(gauss(0.8)))
+    picture_deg = np.sqrt(picture.size) / PIXELS_PER_DEGREE
+    row("square-root integral, JND (scipy)", channel["square_root_integral_jnd"], square_root_integral(gauss(0.8), picture_deg))
+    areas = [quad(gauss(0.8), first, 1)[0] for first in (0.5, 0)]
+    row("aliasing share (scipy)", channel["aliasing_share"], areas[0] / areas[1])
+
+    reference, texture = leaves()
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder) / name for name in ("texture.png", "reference.png")]
+        imsave(paths[0], texture, check_contrast=False)
+        imsave(paths[1], reference, check_contrast=False)
+        found = measured("texture", paths[0], "--reference", paths[1], "--pixels-per-degree", PIXELS_PER_DEGREE)["channels"][0]
+    frequency, *both = texture_response(texture, reference)
+    for name, response in zip(("direct", "full_reference"), both):
+        own = np.interp([0.1, 0.2, 0.3], found["frequencies_cycles_per_pixel"], found[name]["response"])
+        for at, value in zip((0.1, 0.2, 0.3), own):
+            row(f"texture, {name}, at {at} ({gauss(1.1)(at):.5f})", value, np.interp(at, frequency, response))
+        row(f"texture, {name}, MTF50 ({np.sqrt(np.log(2) / 2) / np.pi / 1.1:.5f})", found[name]["mtf50_cycles_per_pixel"],
+            np.interp(-0.5, -response[: np.argmax(response < 0.4)], frequency[: np.argmax(response < 0.4)]))
+        row(f"texture, {name}, acutance (scipy)", found[name]["acutance"], acutance(gauss(1.1)))
 
 
 main()

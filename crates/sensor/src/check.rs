@@ -15,6 +15,7 @@ impl Sensor {
         self.check_numbers()?;
         self.check_converter()?;
         self.check_tables()?;
+        self.check_stack()?;
         self.tile().map(drop)
     }
 
@@ -115,6 +116,18 @@ impl Sensor {
                 Ok(())
             }
         }
+    }
+
+    fn check_stack(&self) -> Result<(), SensorError> {
+        let Some(stack) = &self.pixel_stack else { return Ok(()) };
+        if !self.chief_ray_response.is_empty() {
+            let reason = format!(
+                "of {} states the response to angles that its chief_ray_response states too, expected one of them",
+                self.name
+            );
+            return Err(SensorError::Unsuitable { what: "pixel_stack", reason });
+        }
+        stack.check(&self.name, self.pixel_pitch_um, self.opening_um())
     }
 
     fn check_tables(&self) -> Result<(), SensorError> {

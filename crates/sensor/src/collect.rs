@@ -7,7 +7,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
-    ElectronRate, Sensor, SensorError, Tile,
+    ElectronRate, ExitPupil, Sensor, SensorError, Tile,
     sampling::{Overlaps, average, spread},
 };
 
@@ -23,37 +23,9 @@ pub struct Illumination<'a> {
     /// over their apertures, and the frame has the sensor's rows and columns. `None` when there is one sample
     /// (already averaged) a pixel: the frame then has the size of the irradiance, from the tile's first pixel on.
     pub pitch_um: Option<f64>,
-    /// Where the light of each pixel comes from, from which its chief-ray angle follows; `None` for light along the
-    /// axis everywhere.
+    /// Where the light of each pixel comes from, from which its chief ray and its cone of light follow; `None` for
+    /// collimated light along the axis everywhere.
     pub exit_pupil: Option<ExitPupil>,
-}
-
-/// Where the exit pupil of the lens stands before the frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ExitPupil {
-    /// Its distance before the film, mm; negative where it lies behind the film. The chief ray of a pixel is the line
-    /// through both, so that the sign does not change its angle; 0 is refused.
-    pub distance_mm: f64,
-    /// Where its axis meets the film, mm from the middle of the frame: to the right and down, as the picture is seen.
-    pub axis_mm: [f64; 2],
-}
-
-impl ExitPupil {
-    /// Returns a pupil before the middle of the frame.
-    pub fn centered(distance_mm: f64) -> Self {
-        Self { distance_mm, axis_mm: [0.0; 2] }
-    }
-
-    fn check(&self) -> Result<(), SensorError> {
-        let wrong = |key, value, expected| Err(SensorError::value("the illumination", key, value, expected));
-        if self.distance_mm == 0.0 || !self.distance_mm.is_finite() {
-            return wrong("exit_pupil.distance_mm", self.distance_mm, "a number other than 0");
-        }
-        match self.axis_mm.into_iter().find(|mm| !mm.is_finite()) {
-            Some(mm) => wrong("exit_pupil.axis_mm", mm, "a finite number"),
-            None => Ok(()),
-        }
-    }
 }
 
 impl<'a> Illumination<'a> {
@@ -97,9 +69,7 @@ impl Sensor {
                 }
             }
         }
-        Ok(ElectronRate {
-            planes_e_per_s: planes.into_iter().map(|plane| after_filters(self, optics.exit_pupil, plane)).collect(),
-        })
+        Ok(after_filters(self, optics.exit_pupil, planes))
     }
 }
 
@@ -146,7 +116,7 @@ impl PixelOptics {
         }
         light.exit_pupil.map_or(Ok(()), |pupil| pupil.check())?;
         let (n_rows, n_columns) = light.irradiance.size();
-        let side_um = sensor.pixel_pitch_um * sensor.fill_factor.sqrt();
+        let side_um = sensor.opening_um();
         let overlaps = |n_samples, pitch_um, n_pixels| {
             Overlaps::new(n_samples, pitch_um, n_pixels, sensor.pixel_pitch_um, side_um)
         };
@@ -175,24 +145,18 @@ impl PixelOptics {
     }
 }
 
-/// Returns the rate after the chief-ray response and the spread of electrons.
-pub(crate) fn after_filters(sensor: &Sensor, exit_pupil: Option<ExitPupil>, mut rate: Array2<f32>) -> Array2<f32> {
-    let exit_pupil = exit_pupil.filter(|_| !sensor.chief_ray_response.is_empty());
-    if let Some(ExitPupil { distance_mm, axis_mm: [right_mm, down_mm] }) = exit_pupil {
-        let (n_rows, n_columns) = rate.dim();
-        let pitch_mm = 1e-3 * sensor.pixel_pitch_um;
-        let (middle_row, middle_column) = (0.5 * (n_rows as f64 - 1.0), 0.5 * (n_columns as f64 - 1.0));
-        ndarray::Zip::indexed(&mut rate).par_for_each(|(row, column), value| {
-            let y_mm = pitch_mm * (row as f64 - middle_row) - down_mm;
-            let x_mm = pitch_mm * (column as f64 - middle_column) - right_mm;
-            let angle_deg = (x_mm.hypot(y_mm) / distance_mm.abs()).atan().to_degrees();
-            *value *= sensor.chief_ray_factor(angle_deg) as f32;
-        });
-    }
-    match &sensor.electrical_crosstalk {
-        Some(kernel) => spread(&rate, kernel),
-        None => rate,
-    }
+/// Returns rates after the response to angles and the spread of electrons.
+pub(crate) fn after_filters(
+    sensor: &Sensor,
+    exit_pupil: Option<ExitPupil>,
+    mut planes: Vec<Array2<f32>>,
+) -> ElectronRate {
+    sensor.response_to(exit_pupil).apply(&mut planes);
+    let spread = |plane: Array2<f32>| match &sensor.electrical_crosstalk {
+        Some(kernel) => spread(&plane, kernel),
+        None => plane,
+    };
+    ElectronRate { planes_e_per_s: planes.into_iter().map(spread).collect() }
 }
 
 /// Checks that a band has the size it should and that every sample is finite and not negative.

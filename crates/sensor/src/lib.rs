@@ -7,6 +7,7 @@
 #![doc = include_str!("../README.md")]
 
 mod acuity;
+mod angular_response;
 mod balance;
 mod bench;
 mod blur;
@@ -24,6 +25,7 @@ mod denoise;
 mod disparity;
 mod dng;
 mod error;
+mod exit_pupil;
 mod exposure;
 mod files;
 mod frames;
@@ -44,6 +46,7 @@ mod phases;
 mod photodiodes;
 mod photon_transfer;
 mod picture;
+mod pixel_stack;
 mod plane_rows;
 mod points;
 mod poisson;
@@ -72,18 +75,20 @@ mod uniformity;
 mod white_light;
 
 pub use acuity::Viewing;
+pub use angular_response::{AngularResponse, PixelLight};
 pub use balance::WhiteBalance;
 pub use bench::{Bench, BenchSeries, BenchSettings};
 pub use capture::Capture;
 pub use cfa::{Bayer, Cfa, Tile};
 pub use chart::ChartReport;
 pub use chart_find::{ChartCorners, find_chart};
-pub use collect::{ExitPupil, Illumination};
+pub use collect::Illumination;
 pub use color::{ColorCorrection, ColorMatrix};
 pub use demosaic::{Demosaic, demosaic};
 pub use disparity::{DisparityAxis, DisparityMap, DisparitySearch};
 pub use dng::{DngColor, DngDetails, DngFile, DngLight, DngNoise, DngProfile, DngShot};
 pub use error::SensorError;
+pub use exit_pupil::ExitPupil;
 pub use exposure::{AutoExposure, Exposure, ExposureControl, GainMode, Metering};
 pub use files::Depth;
 pub use frames::{ElectronRate, Electrons, Volts};
@@ -97,6 +102,10 @@ pub use optical_filter::OpticalFilter;
 pub use perspective::Perspective;
 pub use photon_transfer::{DarkCurrentEstimate, FlatPoint, PhotonTransfer};
 pub use picture::Picture;
+pub use pixel_stack::{
+    Interfaces, Microlens, MicrolensOutline, MicrolensPower, MicrolensShift, PixelStack, QuantumEfficiencyOf,
+    StackLayer,
+};
 pub use points::{PointWindow, find_points};
 pub use process::{Developed, LinearPicture, Processing};
 pub use raw::{Levels, MergedFrame, Raw, RawPlane};

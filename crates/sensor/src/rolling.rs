@@ -81,9 +81,9 @@ impl Sensor {
                     *value = share * sum;
                 }
             });
-            after_filters(self, exit_pupil, rate)
+            rate
         });
-        Ok(ElectronRate { planes_e_per_s: planes.collect() })
+        Ok(after_filters(self, exit_pupil, planes.collect()))
     }
 }
 

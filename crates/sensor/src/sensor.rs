@@ -3,7 +3,7 @@
 use dioptric_spectrum::{Spectrum, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
-use crate::{Adc, Cfa, Exposure, GainMode, Response, SensorError, Tile};
+use crate::{Adc, Cfa, Exposure, GainMode, PixelStack, QuantumEfficiencyOf, Response, SensorError, Tile};
 
 /// The data sheet of an image sensor.
 ///
@@ -110,6 +110,10 @@ pub struct Sensor {
     /// Relative sensitivity against the chief-ray angle: pairs of degrees and share, ascending, straight lines between.
     #[serde(default)]
     pub chief_ray_response: Vec<(f64, f64)>,
+    /// Photodiode, layers and microlens, from which the sensitivity to the lens's cone of light is worked out; either this or
+    /// `chief_ray_response`.
+    #[serde(default)]
+    pub pixel_stack: Option<PixelStack>,
     /// The share of the electrons above the full well that spills into the pixels above and below.
     #[serde(default)]
     pub blooming_fraction: f64,
@@ -232,10 +236,24 @@ impl Sensor {
         Self { rows, columns, ..self.clone() }
     }
 
+    /// Returns a sensor of pixels of another pitch, whose stack is as many times as large: it takes light from the same angles.
+    #[must_use]
+    pub fn with_pitch_um(&self, pixel_pitch_um: f64) -> Self {
+        let factor = pixel_pitch_um / self.pixel_pitch_um;
+        let pixel_stack =
+            self.pixel_stack.as_ref().map(|stack| if factor == 1.0 { stack.clone() } else { stack.scaled(factor) });
+        Self { pixel_pitch_um, pixel_stack, ..self.clone() }
+    }
+
     /// The width and the height of the array, mm.
     pub fn size_mm(&self) -> (f64, f64) {
         let pitch_mm = 1e-3 * self.pixel_pitch_um;
         (pitch_mm * self.columns as f64, pitch_mm * self.rows as f64)
+    }
+
+    /// The side of the square that collects a pixel's light, µm.
+    pub(crate) fn opening_um(&self) -> f64 {
+        self.pixel_pitch_um * self.fill_factor.sqrt()
     }
 
     /// Returns the tile of the mosaic, or `None` where every pixel has all filters.
@@ -252,19 +270,31 @@ impl Sensor {
         if self.cfa == Cfa::Stacked { self.filters.len() } else { 1 }
     }
 
-    /// Returns the electrons an incident photon of a wavelength makes behind a filter, with all layers.
+    /// Returns the electrons an incident photon of a wavelength makes behind a filter, with all layers, in collimated light along the axis.
     pub fn quantum_efficiency(&self, filter: usize, wavelength_nm: f64) -> f64 {
-        self.filters[filter].quantum_efficiency.at_or_zero(wavelength_nm) * self.layers_transmittance(wavelength_nm)
+        let table = &self.filters[filter].quantum_efficiency;
+        self.axial_share() * table.at_or_zero(wavelength_nm) * self.layers_transmittance(wavelength_nm)
+    }
+
+    /// Returns the share of collimated light along the axis that quantum efficiencies do not count yet: 1 unless they are those of the photodiode.
+    fn axial_share(&self) -> f64 {
+        match &self.pixel_stack {
+            Some(stack) if stack.quantum_efficiency == QuantumEfficiencyOf::Photodiode => {
+                stack.axial_share(self.opening_um())
+            }
+            _ => 1.0,
+        }
     }
 
     /// Returns, for each filter and band, the electrons a second that an irradiance of 1 W m⁻² nm⁻¹ makes in a pixel.
     ///
+    /// Light comes collimated along the axis: [`AngularResponse`](crate::AngularResponse) has the factor of any other.
     /// The second is one of the frame's exposure: a filter that is exposed for a share of it collects that share.
     /// The quantum efficiency × the wavelength is averaged over the width of the band. In a band whose center lies within
     /// a filter's table the end values of the table are held; one whose center lies beyond collects what the table holds
     /// of it, and nothing of the rest: [`bands_beyond_tables`](Self::bands_beyond_tables) lists those.
     pub fn electron_weights(&self, grid: &WavelengthGrid) -> Vec<Vec<f64>> {
-        let area_m2 = 1e-12 * self.pixel_pitch_um.powi(2) * self.fill_factor;
+        let area_m2 = 1e-12 * self.pixel_pitch_um.powi(2) * self.fill_factor * self.axial_share();
         (0..self.filters.len())
             .map(|filter| {
                 let table = &self.filters[filter].quantum_efficiency;

@@ -169,7 +169,7 @@ fn chief_rays_follow_the_exit_pupil() {
     // A chief ray is a line: which side of the film the pupil lies on does not turn it.
     assert_eq!(rate(&sensor, ExitPupil::centered(-3.0)).unwrap(), before);
     // With the axis half a millimeter to the right and 0.3 mm down, so is the frame of rates.
-    let aside = rate(&sensor, ExitPupil { distance_mm: 3.0, axis_mm: [0.5, 0.3] }).unwrap();
+    let aside = rate(&sensor, ExitPupil { axis_mm: [0.5, 0.3], ..ExitPupil::centered(3.0) }).unwrap();
     for (row, column) in [(20, 30), (3, 12), (30, 48)] {
         // Pixels of the same filter; the places round differently.
         assert_relative_eq!(aside[(row + 6, column + 10)], before[(row, column)], max_relative = 1e-6);
@@ -177,7 +177,12 @@ fn chief_rays_follow_the_exit_pupil() {
     // A sensor that does not mind the angle takes a pupil on either side too.
     let plain = Sensor { chief_ray_response: Vec::new(), ..sensor.clone() };
     assert_eq!(rate(&plain, ExitPupil::centered(-3.0)).unwrap(), rate(&plain, ExitPupil::centered(3.0)).unwrap());
-    for wrong in [0.0, f64::NAN, f64::INFINITY] {
+    // Of a telecentric lens every chief ray runs along the axis.
+    assert_eq!(
+        rate(&sensor, ExitPupil::centered(f64::INFINITY)).unwrap(),
+        rate(&plain, ExitPupil::centered(3.0)).unwrap()
+    );
+    for wrong in [0.0, f64::NAN] {
         assert!(rate(&sensor, ExitPupil::centered(wrong)).unwrap_err().to_string().contains("exit_pupil"), "{wrong}");
     }
 }

@@ -3,9 +3,10 @@
 mod charts;
 mod dng_report;
 mod dual_pixel;
+mod pixel_optics;
 mod statistics;
 
-use dioptric_pipeline::{AberrationSummary, BankData, Camera, Capture, FilmPart, PipelineError, display::LinearRgb};
+use dioptric_pipeline::{AberrationSummary, BankData, Camera, Capture, FilmPart, PipelineError};
 use dioptric_psf::LensImageModel;
 use dioptric_scene::SceneLight;
 use dioptric_spectrum::{ColorTemperature, DepthMap};
@@ -14,6 +15,7 @@ use serde::Serialize;
 pub use charts::{RunCharts, RunPlaces};
 pub use dng_report::DngReport;
 pub use dual_pixel::{DisparityData, DualPixelData, MOST_ERROR_PX};
+pub use pixel_optics::{PixelOpticsData, PixelOpticsRow, PixelPlace, pixel_optics_rows};
 pub use statistics::{ChannelStatistics, LossRow, SensorStatistics};
 
 use crate::LensData;
@@ -97,17 +99,6 @@ pub struct FilmData {
     pub part: Option<FilmPart>,
     /// The share of pixels that get no light: beyond the scene, or beyond what the lens sees.
     pub dark_fraction: f64,
-}
-
-/// Returns the share of pixels that get next to nothing of the mean light.
-fn dark_fraction(seen: &LinearRgb) -> f64 {
-    /// A blur leaves nothing beyond its window; the mean of a night scene is a thousand times its darkest places.
-    const DARK: f32 = 1e-6;
-    let [red, green, blue] = &seen.planes;
-    let light = || red.iter().zip(green).zip(blue).map(|((r, g), b)| r.abs() + g.abs() + b.abs());
-    let n = red.len().max(1) as f64;
-    let mean = (light().map(f64::from).sum::<f64>() / n) as f32;
-    light().filter(|&light| light <= DARK * mean).count() as f64 / n
 }
 
 /// The scene of a run.
@@ -202,7 +193,7 @@ impl RunReport {
                 rows: place.rows,
                 pitch_um: place.pitch_um,
                 part: place.part,
-                dark_fraction: dark_fraction(&run.capture.irradiance.summary.seen),
+                dark_fraction: run.capture.irradiance.summary.seen.dark_fraction(),
             },
             scene: SceneData {
                 name: scene.name.clone(),
@@ -234,22 +225,5 @@ impl RunReport {
             dual_pixel: DualPixelData::of(capture),
             files,
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use ndarray::Array2;
-
-    use super::*;
-
-    #[test]
-    fn film_beyond_the_light_is_counted() {
-        let mut seen = LinearRgb::black(10, 10);
-        assert_eq!(dark_fraction(&seen), 1.0);
-        // A dim corner is no darkness.
-        let lit = |(row, column): (usize, usize)| if column < 7 { if row == 0 { 1e-3 } else { 5.0 } } else { 0.0 };
-        seen.add(&Array2::from_shape_fn((10, 10), lit), [0.3, -0.1, 0.8]);
-        assert_eq!(dark_fraction(&seen), 0.3);
     }
 }

@@ -5,6 +5,7 @@ use dioptric_sensor::{Raw, Tile};
 use ndarray::Array2;
 use serde::Serialize;
 
+use super::pixel_optics::PixelOpticsData;
 use crate::psf::spot::Spot;
 use crate::{LensData, LensInfoRequest};
 use dioptric_pipeline::{Capture, Frames, PipelineError, REFERENCE_WAVELENGTH_NM};
@@ -33,6 +34,9 @@ pub struct SensorStatistics {
     pub row_time_us: f64,
     /// How much later the last row is exposed than the first, ms.
     pub last_row_later_ms: f64,
+    /// What the optics of its pixels let through, where the data sheet states their stack.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pixel_optics: Option<PixelOpticsData>,
     /// What the data sheet leaves open, a sentence each.
     pub notes: Vec<String>,
     /// A row a filter.
@@ -96,6 +100,7 @@ impl SensorStatistics {
             read_noise_e,
             row_time_us: raw.row_time_us,
             last_row_later_ms: 1e3 * raw.row_start_s(raw.size().0 - 1),
+            pixel_optics: PixelOpticsData::of(frames)?,
             notes: sensor
                 .bands_beyond_tables(frames.grid)
                 .into_iter()

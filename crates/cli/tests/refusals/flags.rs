@@ -167,6 +167,12 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("sense good.exr --sensor imx363 --out o --pixel-um 0", "pixel_pitch_um of IMX363-class phone sensor is 0"),
     ("sense good.exr --sensor imx363 --out o --exit-pupil-mm nan", "exit_pupil.distance_mm of the illumination is NaN"),
     (
+        "sense good.exr --sensor imx363 --out o --f-number .4",
+        "exit_pupil.f_number of the illumination is 0.4, expected a number above",
+    ),
+    ("sensor optics imx363", "need a pixel_stack, which IMX363-class phone sensor does not state"),
+    ("sensor optics imx363 --f-numbers two", "--f-numbers"),
+    (
         "sense good.exr --sensor imx363 --out o --burst-motion-px -3",
         "the following required arguments were not provided",
     ),

@@ -36,6 +36,16 @@ pub(crate) const CHANGED: &[(&str, &str, &str)] = &[
         "chief_ray_response: [(0.0, 1.0), (NaN, 1.0)]",
         "chief_ray_response of IMX363-class phone sensor is NaN",
     ),
+    (
+        "pixel_stack: None",
+        "pixel_stack: (photodiode_um: 1.5)",
+        "pixel_stack.photodiode_um of IMX363-class phone sensor is 1.5, expected a number above 0 and at most the pixel pitch",
+    ),
+    (
+        "pixel_stack: None",
+        "pixel_stack: (photodiode: 1.0)",
+        "Unexpected field named `photodiode` in `PixelStack`, expected",
+    ),
     ("optical_crosstalk: None", "optical_crosstalk: Some(2.0)", "Expected opening `(`"),
     ("high_gain: None", "high_gain: Some(0.0)", "Expected opening `(` for struct `HighGain`"),
 ];

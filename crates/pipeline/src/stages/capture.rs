@@ -6,8 +6,14 @@ use dioptric_sensor::{Developed, ElectronRate, Processing, Sensor};
 use dioptric_spectrum::{Bands, Illuminant, WavelengthGrid};
 
 use super::{
-    electrons::PixelRates, film::FilmPlace, frames::FrameSet, irradiance::Irradiance, lens::ResolvedLens,
-    lens_tables::LensAberrations, scene::SceneSummary, spec::ElectronInputs,
+    electrons::{self, PixelRates},
+    film::FilmPlace,
+    frames::FrameSet,
+    irradiance::Irradiance,
+    lens::ResolvedLens,
+    lens_tables::LensAberrations,
+    scene::SceneSummary,
+    spec::ElectronInputs,
 };
 use crate::{Camera, Frames, LensFacts, Quality};
 
@@ -73,6 +79,7 @@ impl Capture {
                 focal_length_mm: first.efl_mm,
             }),
             grid: self.grid(),
+            exit_pupil: electrons::exit_pupil(&self.sensor, &self.place, &self.lens),
             light: self.scene.light.as_ref().map_or(Illuminant::D65, |light| light.illuminant.clone()),
         }
     }

@@ -185,21 +185,25 @@ impl Chain<'_> {
         self.kept.electrons.get_or_make(inputs.clone(), |inputs| {
             let irradiance = self.irradiance(&inputs.irradiance)?;
             let place = self.film(&inputs.irradiance.plan.bank.film, &inputs.irradiance.scene)?;
-            electrons::collect(irradiance, electrons::exposed(inputs, &place), &place, &self.watch)
+            let sensor = electrons::exposed(inputs, &place);
+            let exit_pupil =
+                electrons::exit_pupil(&sensor, &place, &*self.lens(&inputs.irradiance.plan.bank.film.lens)?);
+            electrons::collect(irradiance, sensor, exit_pupil, &self.watch)
         })
     }
 
     pub(super) fn frames(&self, inputs: &FrameInputs) -> Result<Arc<FrameSet>, PipelineError> {
         self.kept.frames.get_or_make(inputs.clone(), |inputs| {
             let irradiance = &inputs.electrons.irradiance;
-            let place = self.film(&irradiance.plan.bank.film, &irradiance.scene)?;
+            let film = &irradiance.plan.bank.film;
+            let (lens, place) = (self.lens(&film.lens)?, self.film(film, &irradiance.scene)?);
             let rates = self.electrons(&inputs.electrons)?;
             let dual_pixel = irradiance.dual_pixel;
             self.watch.progress.at(Stage::Sensor, 0.5);
             let (shutter, sensor) = (inputs.shutter.clone(), electrons::exposed(&inputs.electrons, &place));
             // What moves between frames is the irradiance.
             let irradiance = if shutter.moves() { Some(self.irradiance(irradiance)?) } else { None };
-            let exit_pupil = electrons::exit_pupil(&sensor, &place);
+            let exit_pupil = electrons::exit_pupil(&sensor, &place, &lens);
             self.watch.run(move || {
                 if let Some(spec) = dual_pixel {
                     return frames::expose_photodiodes(&shutter, &sensor, spec, &rates);

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use dioptric_sensor::{ElectronRate, ExitPupil, Illumination, Sensor};
+use dioptric_optics::glam::DVec2;
+use dioptric_sensor::{ElectronRate, ExitPupil, Illumination, PixelStack, Sensor};
 
-use super::{Watch, film::FilmPlace, irradiance::Irradiance, spec::ElectronInputs};
+use super::{Watch, film::FilmPlace, irradiance::Irradiance, lens::ResolvedLens, spec::ElectronInputs};
 use crate::{PipelineError, Stage};
 
 /// The mean rates of photo-electrons of a sensor.
@@ -36,26 +37,35 @@ pub(super) fn on_film(sensor: &Sensor, place: &FilmPlace) -> Sensor {
         Some(part) => sensor.cfa.from_pixel(part.first_row, part.first_column),
         None => sensor.cfa.clone(),
     };
-    Sensor { pixel_pitch_um: place.pixel_pitch_um(), cfa, ..sensor.clone().with_size(place.rows, place.columns) }
+    let sensor = sensor.with_pitch_um(place.pixel_pitch_um()).with_size(place.rows, place.columns);
+    let DVec2 { x: right_mm, y: up_mm } = place.film().center_mm;
+    let in_part = |stack: PixelStack| stack.seen_in_part([right_mm, -up_mm], place.binning);
+    Sensor { cfa, pixel_stack: sensor.pixel_stack.map(in_part), ..sensor }
 }
 
 /// Returns where the light of the sensor's pixels comes from, if its responses depend on that.
-pub(super) fn exit_pupil(sensor: &Sensor, place: &FilmPlace) -> Option<ExitPupil> {
+pub(super) fn exit_pupil(sensor: &Sensor, place: &FilmPlace, lens: &ResolvedLens) -> Option<ExitPupil> {
+    if !sensor.minds_angles() {
+        return None;
+    }
     // Pixels of a binned film are the full film's, farther apart: angles are those of the places they stand for.
     let closer = |mm: f64| mm / place.binning as f64;
-    let pupil = place.exit_pupil_distance_mm.filter(|_| !sensor.chief_ray_response.is_empty());
-    pupil.map(|mm| ExitPupil { distance_mm: closer(mm), axis_mm: place.exit_pupil_axis_mm.map(closer) })
+    let f_number = if sensor.pixel_stack.is_some() { place.working_f_number(lens) } else { f64::INFINITY };
+    Some(ExitPupil {
+        distance_mm: closer(place.exit_pupil_distance_mm.unwrap_or(f64::INFINITY)),
+        axis_mm: place.exit_pupil_axis_mm.map(closer),
+        f_number,
+    })
 }
 
 /// Collects the electrons of all bands; the pixels are one sample each.
 pub(super) fn collect(
     irradiance: Arc<Irradiance>,
     sensor: Sensor,
-    place: &FilmPlace,
+    exit_pupil: Option<ExitPupil>,
     watch: &Watch<'_>,
 ) -> Result<PixelRates, PipelineError> {
     watch.progress.at(Stage::Sensor, 0.0);
-    let exit_pupil = exit_pupil(&sensor, place);
     watch.run(move || {
         let rate = |irradiance: &Irradiance| {
             sensor.electron_rate(&Illumination { exit_pupil, ..Illumination::on_pixels(irradiance) })

@@ -5,7 +5,7 @@ use std::ops::Range;
 use dioptric_forward::{Film, PsfDomain};
 use dioptric_optics::glam::{DMat2, DVec2};
 use dioptric_psf::{Diffraction, FilmMap, LensImageModel, SampleCounts};
-use dioptric_sensor::{ExitPupil, FrameTable, LensTables, Sensor};
+use dioptric_sensor::{AngularResponse, FrameTable, LensTables, Sensor};
 use dioptric_spectrum::{Illuminant, Observer, WavelengthGrid};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -122,13 +122,11 @@ impl TableParts<'_> {
         best.map_or(0, |(channel, _)| channel)
     }
 
-    /// Returns the sensitivity of pixels to the chief rays of a place of the frame, mm to the right and up of its middle.
-    fn chief_ray_factor(&self, exit_pupil: Option<ExitPupil>, at_mm: DVec2) -> f64 {
-        let Some(ExitPupil { distance_mm, axis_mm: [right_mm, down_mm] }) = exit_pupil else { return 1.0 };
+    /// Returns the sensitivity of pixels to the light of a place of the frame, mm to the right and up of its middle.
+    fn angular_factor(&self, response: &AngularResponse<'_>, at_mm: DVec2) -> f64 {
         // Pixels of a binned film stand for places farther apart, as the pupil's distance does.
         let at_mm = at_mm / self.place.binning as f64;
-        let off_axis_mm = (at_mm - DVec2::new(right_mm, -down_mm)).length();
-        self.sensor.chief_ray_factor((off_axis_mm / distance_mm.abs()).atan().to_degrees())
+        response.factor_at_mm([at_mm.x, -at_mm.y])
     }
 }
 
@@ -295,7 +293,7 @@ impl<'a> Geometry<'a> {
             .collect();
         let distortion_px = to_tables(&filled(&distortion))?;
         let filled_lateral: Vec<Vec<DVec2>> = lateral.iter().map(|moved| filled(moved)).collect();
-        let gains = self.gains(parts);
+        let gains = self.gains(parts)?;
         let tables = LensTables {
             size: (self.frame.rows, self.frame.columns),
             distortion_px,
@@ -333,24 +331,24 @@ impl<'a> Geometry<'a> {
     }
 
     /// Returns for each channel and node the factor that makes an even surface even.
-    fn gains(&self, parts: &TableParts<'_>) -> Vec<Vec<f64>> {
-        let exit_pupil = electrons::exit_pupil(parts.sensor, parts.place);
+    fn gains(&self, parts: &TableParts<'_>) -> Result<Vec<Vec<f64>>, PipelineError> {
+        let response = parts.sensor.angular_response(electrons::exit_pupil(parts.sensor, parts.place, parts.lens))?;
         let of_channel = |channel: usize| {
             let light = |node: usize| {
                 let at_mm = self.node_mm(node);
-                let seen = parts.chief_ray_factor(exit_pupil, at_mm - self.frame.center_mm);
+                let seen = parts.angular_factor(&response, at_mm - self.frame.center_mm);
                 seen * self.channels.irradiance_per_radiance(channel, at_mm)
             };
             let lights: Vec<f64> = nodes().into_par_iter().map(light).collect();
             // The brightest place of the whole film, so that its parts are as bright as it is.
-            let brightest = self.brightest(channel, parts, exit_pupil).max(lights.iter().copied().fold(0.0, f64::max));
+            let brightest = self.brightest(channel, parts, &response).max(lights.iter().copied().fold(0.0, f64::max));
             lights.into_iter().map(|light| (brightest / light).min(MOST_GAIN)).collect()
         };
-        (0..self.channels.weights.len()).map(of_channel).collect()
+        Ok((0..self.channels.weights.len()).map(of_channel).collect())
     }
 
     /// Returns the light of a channel where the whole film has most.
-    fn brightest(&self, channel: usize, parts: &TableParts<'_>, exit_pupil: Option<ExitPupil>) -> f64 {
+    fn brightest(&self, channel: usize, parts: &TableParts<'_>, response: &AngularResponse<'_>) -> f64 {
         let whole = Self {
             frame: self.whole,
             channels: ChannelImages { bands: self.channels.bands, weights: self.channels.weights.clone() },
@@ -358,7 +356,7 @@ impl<'a> Geometry<'a> {
         };
         let light = |node: usize| {
             let at_mm = whole.node_mm(node);
-            parts.chief_ray_factor(exit_pupil, at_mm - self.frame.center_mm)
+            parts.angular_factor(response, at_mm - self.frame.center_mm)
                 * whole.channels.irradiance_per_radiance(channel, at_mm)
         };
         nodes().into_par_iter().map(light).reduce(|| 0.0, f64::max)

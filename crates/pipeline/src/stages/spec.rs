@@ -192,6 +192,18 @@ pub(crate) struct PictureInputs {
     pub(crate) processing: Processing,
 }
 
+/// Checks that light comes to pixels of a stack from the whole exit pupil, as their optics take it to.
+fn check_stack(camera: &Camera, sensor: &Sensor) -> Result<(), PipelineError> {
+    let expected = match (camera.dual_pixel, &camera.light_field) {
+        _ if sensor.pixel_stack.is_none() => return Ok(()),
+        (Some(_), _) => "dual_pixel, which states itself how photodiodes share the light of the pupil",
+        (None, Some(LightFieldSpec::Array(_))) => "a light_field, whose array sends light of other angles",
+        (None, _) => return Ok(()),
+    };
+    let reason = format!("of {} does not go with {expected}, expected a sensor without it", sensor.name);
+    Err(PipelineError::Unsuitable { what: "pixel_stack", reason })
+}
+
 impl LensInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts) -> Self {
         let lens_file = camera.lens.file().filter(|_| given.lens.is_none()).map_or_else(Vec::new, FileStamp::all_of);
@@ -337,6 +349,7 @@ impl PictureInputs {
     /// When the sensor cannot be read.
     pub(crate) fn of(camera: &Camera, given: &GivenParts, quality: Quality) -> Result<Self, PipelineError> {
         let sensor = given.sensor.as_deref().map_or_else(|| camera.sensor.open(), |sensor| Ok(sensor.clone()))?;
+        check_stack(camera, &sensor)?;
         let irradiance = IrradianceInputs::of(camera, given, &sensor, quality);
         let frames = FrameInputs {
             electrons: ElectronInputs { irradiance, sensor, filters: FilterSpec::open_all(&camera.filters)? },

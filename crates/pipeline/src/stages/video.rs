@@ -10,7 +10,7 @@ use dioptric_spectrum::{Bands, Cancel};
 use serde::Serialize;
 
 use super::{KeptCamera, electrons, film::FilmPlace};
-use crate::{CameraTurn, FilmSpec, PipelineError, Progress, Stage, TurnPath, VideoSpec};
+use crate::{CameraTurn, FilmSpec, PipelineError, Progress, Stage, TurnPath, VideoSpec, display::LEAST_DARK_FRACTION};
 
 /// The farthest that the film of a video is larger than its frames, as a share of them, each way.
 const LARGEST_MARGIN: f64 = 2.0;
@@ -87,6 +87,28 @@ impl Video {
         Ok(VideoFrame { facts, raw, developed })
     }
 
+    /// Checks that exposure and readout take no longer than a frame lasts.
+    fn check_times(&self) -> Result<(), PipelineError> {
+        let refused = |reason: String| Err(PipelineError::Unsuitable { what: "video", reason });
+        let frame_s = 1.0 / self.spec.frames_per_s;
+        if self.exposure.time_s > frame_s {
+            return refused(format!(
+                "an exposure of {:.4} s is longer than a frame of {frame_s:.4} s, expected fewer frames a second, a shorter exposure or a \
+                 higher gain",
+                self.exposure.time_s
+            ));
+        }
+        let readout_s = 1e-6 * self.row_time_us * self.sensor.rows as f64;
+        if readout_s > frame_s {
+            return refused(format!(
+                "reading {} rows takes {readout_s:.4} s, longer than a frame of {frame_s:.4} s, expected fewer frames a second or a shorter \
+                 row_time_us",
+                self.sensor.rows
+            ));
+        }
+        Ok(())
+    }
+
     fn shutter(&self, number: usize) -> RollingShutter {
         let start_s = self.spec.start_s(number);
         RollingShutter { start_s, exposure_s: self.exposure.time_s, row_time_s: 1e-6 * self.row_time_us }
@@ -130,7 +152,8 @@ impl KeptCamera {
         let irradiance = larger.irradiance(progress, cancel)?;
         progress.at(Stage::Sensor, 0.0);
         // A preview of a larger film may be coarser.
-        let binning = larger.lens_and_film(progress, cancel)?.1.binning;
+        let (lens, place) = larger.lens_and_film(progress, cancel)?;
+        let binning = place.binning;
         if binning != frame.binning {
             let fewer = |n: usize| (n * frame.binning / binning).max(1);
             samples_per_tan *= frame.pitch_um / irradiance.pitch_um();
@@ -144,7 +167,7 @@ impl KeptCamera {
         }
         let sensor = electrons::on_film(&inputs.frames.electrons.sensor, &frame);
         let exposed = sensor.behind(&inputs.frames.electrons.filters);
-        let exit_pupil = electrons::exit_pupil(&sensor, &frame);
+        let exit_pupil = electrons::exit_pupil(&sensor, &frame, &lens);
         let still = Arc::new(exposed.filter_rates(&Illumination::on_pixels(&*irradiance))?);
         let chain = self.chain(progress, cancel);
         let scene = chain.summary(&inputs.frames.electrons.irradiance.scene)?;
@@ -155,6 +178,7 @@ impl KeptCamera {
         notes.extend(
             inputs.frames.electrons.filters.iter().filter_map(|filter| filter.note_beyond_table(irradiance.grid())),
         );
+        notes.extend(note_on_dark_film(irradiance.summary.seen.dark_fraction()));
         if spec.motion != CameraTurn::default() {
             notes.push(
                 "frames move as through a lens without distortion that turns about its entrance pupil: straight lines stay straight and near \
@@ -179,24 +203,7 @@ impl KeptCamera {
         };
         let rate = video.rate(&video.shutter(0))?;
         video.exposure = video.exposed.expose(&rate, &inputs.frames.shutter.exposure)?;
-        let frame_s = 1.0 / spec.frames_per_s;
-        if video.exposure.time_s > frame_s {
-            let reason = format!(
-                "an exposure of {:.4} s is longer than a frame of {frame_s:.4} s, expected fewer frames a second, a shorter exposure or a \
-                 higher gain",
-                video.exposure.time_s
-            );
-            return refused("video", reason);
-        }
-        let readout_s = 1e-6 * row_time_us * video.sensor.rows as f64;
-        if readout_s > frame_s {
-            let reason = format!(
-                "reading {} rows takes {readout_s:.4} s, longer than a frame of {frame_s:.4} s, expected fewer frames a second or a shorter \
-                 row_time_us",
-                video.sensor.rows
-            );
-            return refused("video", reason);
-        }
+        video.check_times()?;
         Ok(video)
     }
 
@@ -234,6 +241,17 @@ impl KeptCamera {
         let film_margin = beyond.map(|px| if px > 1e-9 { px.ceil() as usize + 4 } else { 0 });
         Ok(FrameLayout { frame: (*frame).clone(), film_margin, samples_per_tan, path })
     }
+}
+
+/// Returns a sentence on a film of which more than a thousandth gets no light.
+fn note_on_dark_film(dark_fraction: f64) -> Option<String> {
+    (dark_fraction > LEAST_DARK_FRACTION).then(|| {
+        let percent = 100.0 * dark_fraction;
+        format!(
+            "{percent:.1} % of the film that frames move over gets no light: where that is not black in the scene, take a slower motion, a \
+             smaller film or a wider scene"
+        )
+    })
 }
 
 /// A frame, and the film that it moves over.

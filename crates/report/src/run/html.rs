@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use dioptric_analysis::{LineChart, Run, RunCharts, RunPlaces, RunReport, RunTimes};
+use dioptric_analysis::{LineChart, PixelPlace, Run, RunCharts, RunPlaces, RunReport, RunTimes};
 use dioptric_pipeline::BankData;
 use dioptric_sensor::WhiteBalance;
 
@@ -224,7 +224,19 @@ fn sensor(report: &RunReport, pictures: &Pictures) -> String {
         sensor.read_noise_e,
         sensor.analog_gain
     );
-    table(&heads, rows) + &note(&words) + &phase_detection(report, pictures)
+    table(&heads, rows) + &note(&words) + &pixel_optics(report) + &phase_detection(report, pictures)
+}
+
+fn pixel_optics(report: &RunReport) -> String {
+    let Some(data) = &report.sensor.pixel_optics else { return String::new() };
+    let place = |place: &PixelPlace| format!("{:.1} % (chief ray at {:.1}°)", 100.0 * place.share, place.chief_ray_deg);
+    note(&format!(
+        "Of the light on a pixel its optics lead {} to the photodiode in the middle and {} in the darkest corner; of collimated light along \
+         the axis {:.1} %.",
+        place(&data.middle),
+        place(&data.corner),
+        100.0 * data.axial_share
+    ))
 }
 
 fn phase_detection(report: &RunReport, pictures: &Pictures) -> String {
