@@ -147,7 +147,7 @@ pub struct Frames<'a> {
     pub grid: &'a WavelengthGrid,
     /// The light on the scene; D65 where it is not known.
     pub light: Illuminant,
-    /// Where the light of the sensor's pixels comes from, where that is known and they mind it.
+    /// Where the light of the sensor's pixels comes from, where that is known and they depend on it.
     pub exit_pupil: Option<ExitPupil>,
 }
 

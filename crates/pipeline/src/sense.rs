@@ -36,7 +36,7 @@ pub struct SenseRequest {
     /// The distance of the exit pupil from the sensor, mm, from which each pixel's chief ray follows; `None` for chief rays along the
     /// axis everywhere.
     pub exit_pupil_mm: Option<f64>,
-    /// The f-number of the cone of light on the sensor, for pixels whose stack minds it; `None` for collimated light.
+    /// The f-number of the cone of light on the sensor, for pixels of a stack; `None` for collimated light.
     pub f_number: Option<f64>,
     /// The seed of all noise.
     pub seed: u64,
@@ -162,10 +162,10 @@ impl SenseRequest {
         let Self { exit_pupil_mm, f_number, .. } = *self;
         match (&sensor.pixel_stack, f_number) {
             (Some(_), None) => notes.push(format!(
-                "the pixels of {} are of a stack that minds the cone of light: with no f-number the light is collimated",
+                "the pixels of {} are of a stack, whose share of light depends on the f-number: none is stated, so the light is taken as collimated",
                 sensor.name
             )),
-            (None, Some(_)) => notes.push(format!("{} states no pixel_stack, which alone minds the f-number", sensor.name)),
+            (None, Some(_)) => notes.push(format!("{} states no pixel_stack, so the f-number changes nothing", sensor.name)),
             _ => {}
         }
         let distance_mm = match (exit_pupil_mm, f_number) {

@@ -65,7 +65,7 @@ impl Sensor {
     }
 
     /// Whether the place of a pixel on the sensor changes how it sees light.
-    pub fn minds_angles(&self) -> bool {
+    pub fn depends_on_angle(&self) -> bool {
         self.pixel_stack.is_some() || !self.chief_ray_response.is_empty()
     }
 }

@@ -11,7 +11,7 @@ pub struct ExitPupil {
     /// Where its axis meets the film, mm from the middle of the frame: to the right and down, as the picture is seen.
     pub axis_mm: [f64; 2],
     /// The working f-number of the cone of light that it sends to the axis: 1 / (2 sin U) with U half the angle of the cone, above .5; infinity
-    /// for collimated light. Only pixels of a [`PixelStack`](crate::PixelStack) mind it.
+    /// for collimated light. Only pixels of a [`PixelStack`](crate::PixelStack) depend on it.
     pub f_number: f64,
 }
 

@@ -122,7 +122,7 @@ pub enum Interfaces {
     /// Nothing.
     #[default]
     Coated,
-    /// What Fresnel's equations say of unpolarized light at each boundary from air to photodiode, each counted by itself, without interference.
+    /// What Fresnel's equations give for unpolarized light at each boundary from air to photodiode, each counted by itself, without interference.
     Fresnel {
         /// The refractive index of the photodiode.
         photodiode_index: f64,

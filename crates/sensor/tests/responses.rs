@@ -174,7 +174,7 @@ fn chief_rays_follow_the_exit_pupil() {
         // Pixels of the same filter; the places round differently.
         assert_relative_eq!(aside[(row + 6, column + 10)], before[(row, column)], max_relative = 1e-6);
     }
-    // A sensor that does not mind the angle takes a pupil on either side too.
+    // A sensor that does not depend on the angle takes a pupil on either side too.
     let plain = Sensor { chief_ray_response: Vec::new(), ..sensor.clone() };
     assert_eq!(rate(&plain, ExitPupil::centered(-3.0)).unwrap(), rate(&plain, ExitPupil::centered(3.0)).unwrap());
     // Of a telecentric lens every chief ray runs along the axis.

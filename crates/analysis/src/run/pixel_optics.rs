@@ -7,6 +7,10 @@ use serde::Serialize;
 /// What the optics of the pixels of a frame let through.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PixelOpticsData {
+    /// The pitch of the pixels that it is worked out for, µm: on a film of other pixels than the data sheet's the stack is as much larger.
+    pub pixel_pitch_um: f64,
+    /// The side of their photodiodes, µm.
+    pub photodiode_um: f64,
     /// The f-number of the cone of light on the axis; none for collimated light.
     pub f_number: Option<f64>,
     /// The share of collimated light along the axis on a pixel's opening that reaches its photodiode: what factors are counted from.
@@ -38,10 +42,17 @@ impl PixelOpticsData {
     pub fn of(frames: &Frames<'_>) -> Result<Option<Self>, PipelineError> {
         let Frames { sensor, exit_pupil, .. } = frames;
         let response = sensor.angular_response(*exit_pupil)?;
-        let Some(middle) = response.light_at_mm([0.0; 2]) else { return Ok(None) };
+        let (Some(stack), Some(middle)) = (&sensor.pixel_stack, response.light_at_mm([0.0; 2])) else { return Ok(None) };
         let f_number = exit_pupil.map(|pupil| pupil.f_number).filter(|n| n.is_finite());
         let (middle, corner) = (place(middle), place(darkest_corner(sensor, &response).unwrap_or(middle)));
-        Ok(Some(Self { f_number, axial_share: middle.share / middle.factor, middle, corner }))
+        Ok(Some(Self {
+            pixel_pitch_um: sensor.pixel_pitch_um,
+            photodiode_um: stack.photodiode_um,
+            f_number,
+            axial_share: middle.share / middle.factor,
+            middle,
+            corner,
+        }))
     }
 }
 

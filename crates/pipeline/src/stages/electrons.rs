@@ -45,7 +45,7 @@ pub(super) fn on_film(sensor: &Sensor, place: &FilmPlace) -> Sensor {
 
 /// Returns where the light of the sensor's pixels comes from, if its responses depend on that.
 pub(super) fn exit_pupil(sensor: &Sensor, place: &FilmPlace, lens: &ResolvedLens) -> Option<ExitPupil> {
-    if !sensor.minds_angles() {
+    if !sensor.depends_on_angle() {
         return None;
     }
     // Pixels of a binned film are the full film's, farther apart: angles are those of the places they stand for.

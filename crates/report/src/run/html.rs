@@ -231,9 +231,11 @@ fn pixel_optics(report: &RunReport) -> String {
     let Some(data) = &report.sensor.pixel_optics else { return String::new() };
     let place = |place: &PixelPlace| format!("{:.1} % (chief ray at {:.1}°)", 100.0 * place.share, place.chief_ray_deg);
     note(&format!(
-        "Of the light on a pixel its optics lead {} to the photodiode in the middle and {} in the darkest corner; of collimated light along \
-         the axis {:.1} %.",
+        "Of the light on a pixel of {} µm its optics lead {} to the photodiode of {:.2} µm in the middle and {} in the darkest corner; of collimated \
+         light along the axis {:.1} %.",
+        data.pixel_pitch_um,
         place(&data.middle),
+        data.photodiode_um,
         place(&data.corner),
         100.0 * data.axial_share
     ))
