@@ -52,7 +52,7 @@ impl BlockLayers {
             let places = |row: usize| -> Vec<Vec<Option<(f64, f64)>>> {
                 let place = |map: &FilmMap, column: usize| {
                     let (tan, _) = map.at(sampler.frame.place_mm(edge(first.0, row), edge(first.1, column)))?;
-                    Some(sampler.view.position_of(tan.x, tan.y))
+                    Some(sampler.scene.view.position_of(tan.x, tan.y))
                 };
                 maps.iter().map(|map| (0..=size.1).map(|column| place(map, column)).collect()).collect()
             };

@@ -1,14 +1,15 @@
 //! A layer spread knot by knot: the samples around each, times its weights, with its kernel.
 
-use std::collections::BTreeMap;
+use std::{cell::RefCell, collections::BTreeMap};
 
 use dioptric_fft::Complex;
 use dioptric_spectrum::{Cancel, Cancelled};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::{
     convolve::{Fft2, fast_size, multiply, with_fft},
-    knot_kernels::{LayerKernels, Mirror},
+    knot_kernels::{KnotKernel, LayerKernels, Mirror},
     patch::Knot,
     patch_samples::{BlurredCell, PatchSamples},
     sampler::Rectangle,
@@ -51,23 +52,37 @@ pub(crate) fn spread_by_knots(
 
 /// Spreads what lies around the knots of a group: each is mirrored to the canonical knot, whose kernel is transformed once.
 fn spread_group(kernels: &LayerKernels, group: &Group<'_>, cancel: &Cancel) -> Result<Vec<BlurredCell>, Cancelled> {
-    let around: Vec<(Knot, Rectangle)> = group
-        .iter()
-        .map(|(knot, members)| (*knot, bounds(members.iter().map(|(sampled, _)| sampled.source))))
-        .collect();
-    let Some(kernel) = around.first().map(|(knot, _)| kernels.canonical_at(*knot)) else { return Ok(vec![]) };
-    let largest = around.iter().map(|(_, at)| at.rows.max(at.columns)).max().unwrap_or(1);
-    with_fft(fast_size(largest + kernel.width - 1), |fft| {
-        let mut spectrum = vec![];
-        fft.forward(&kernel.samples, kernel.width, &mut spectrum);
-        let mut buffers = Buffers::default();
-        let spread = |((knot, at), members): ((Knot, Rectangle), &Vec<Member<'_>>)| {
-            cancel.check()?;
-            let mirror = kernels.symmetry.mirror(knot);
-            Ok(buffers.spread(fft, (&spectrum, kernel.width), (mirror, at), members))
-        };
-        around.into_iter().zip(group.values()).map(spread).collect()
-    })
+    let place = |(knot, members): (&Knot, &'_ Vec<Member<'_>>)| {
+        (kernels.symmetry.mirror(*knot), bounds(members.iter().map(|(sampled, _)| sampled.source)))
+    };
+    let around: Vec<Around<'_>> = group.iter().map(|own| (place(own), own.1)).collect();
+    let Some(kernel) = group.keys().next().map(|knot| kernels.canonical_at(*knot)) else { return Ok(vec![]) };
+    let largest = around.iter().map(|((_, at), _)| at.rows.max(at.columns)).max().unwrap_or(1);
+    let size = fast_size(largest + kernel.width - 1);
+    with_fft(size, |fft| BUFFERS.with_borrow_mut(|buffers| spread_around(&around, (kernel, fft), buffers, cancel)))
+}
+
+/// What is spread by a kernel: the mirror of a knot, what its samples lie in, and the patches that have them.
+type Around<'a> = ((Mirror, Rectangle), &'a Vec<Member<'a>>);
+
+/// Spreads what lies around knots by their canonical kernel: two at a time, or one that is alone.
+fn spread_around(
+    around: &[Around<'_>],
+    (kernel, fft): (&KnotKernel, &mut Fft2),
+    buffers: &mut Buffers,
+    cancel: &Cancel,
+) -> Result<Vec<BlurredCell>, Cancelled> {
+    if let [own] = around {
+        cancel.check()?;
+        return Ok(vec![buffers.spread(fft, kernel, own)]);
+    }
+    buffers.transform_kernel(fft, kernel);
+    let mut cells = Vec::with_capacity(around.len());
+    for pair in around.chunks(2) {
+        cancel.check()?;
+        buffers.spread_pair(fft, kernel.width, pair, &mut cells);
+    }
+    Ok(cells)
 }
 
 /// Returns the rectangle that holds all of these.
@@ -80,65 +95,114 @@ fn bounds(rectangles: impl Iterator<Item = Rectangle>) -> Rectangle {
     Rectangle { first_row: top, first_column: left, rows: (bottom - top) as usize, columns: (right - left) as usize }
 }
 
-/// Memory that knots of a group use one after the other.
+thread_local! {
+    // Kept from group to group, for its pages not to be asked for anew.
+    static BUFFERS: RefCell<Buffers> = RefCell::default();
+}
+
+/// Memory that knots use one after the other.
 #[derive(Default)]
 struct Buffers {
     block: Vec<f32>,
-    weighted: Vec<f32>,
+    mirrored: Vec<f32>,
+    lines: Vec<Complex<f32>>,
     spectrum: Vec<Complex<f32>>,
-    spread: Vec<f32>,
+    kernel: Vec<Complex<f32>>,
 }
 
 impl Buffers {
     /// Spreads the samples around a knot by the canonical kernel.
-    fn spread(
-        &mut self,
-        fft: &mut Fft2,
-        (kernel, width): (&[Complex<f32>], usize),
-        (mirror, at): (Mirror, Rectangle),
-        members: &[Member<'_>],
-    ) -> BlurredCell {
+    fn spread(&mut self, fft: &mut Fft2, kernel: &KnotKernel, ((mirror, at), members): &Around<'_>) -> BlurredCell {
+        fft.forward(&kernel.samples, kernel.width, &mut self.kernel);
+        let (_, columns) = self.gather((*mirror, at), members);
+        fft.forward(&self.mirrored, columns, &mut self.spectrum);
+        multiply(&mut self.spectrum, &self.kernel);
+        let at = widened(at, kernel.width);
+        let (rows, columns) = mirror.size((at.rows, at.columns));
+        fft.inverse(&mut self.spectrum, rows, columns, &mut self.mirrored);
+        BlurredCell { at, values: mirror.restored(&self.mirrored, (at.rows, at.columns)) }
+    }
+
+    /// Finds what the spectra of pairs are multiplied by to be spread by a kernel, the scale of the transforms included.
+    fn transform_kernel(&mut self, fft: &mut Fft2, kernel: &KnotKernel) {
+        let (size, width) = (fft.size(), kernel.width);
+        let scale = 1.0 / (size * size) as f32;
+        self.lines.clear();
+        self.lines.resize(width * size, Complex::new(0.0, 0.0));
+        for (line, samples) in self.lines.chunks_exact_mut(size).zip(kernel.samples.chunks_exact(width)) {
+            line.iter_mut().zip(samples).for_each(|(value, sample)| value.re = sample * scale);
+        }
+        fft.forward_pair(&mut self.lines, &mut self.kernel);
+    }
+
+    /// Spreads the samples around two knots, or around the last of an odd number, by the canonical kernel. Those around one are the real parts of
+    /// the samples of a block, around the other the imaginary ones: a kernel, which is real, leaves them apart.
+    fn spread_pair(&mut self, fft: &mut Fft2, width: usize, pair: &[Around<'_>], cells: &mut Vec<BlurredCell>) {
+        let size = fft.size();
+        let rows_of = |((mirror, at), _): &Around<'_>| mirror.size((at.rows, at.columns)).0;
+        let n_rows = pair.iter().map(rows_of).max().unwrap_or(0);
+        self.lines.clear();
+        self.lines.resize(n_rows * size, Complex::new(0.0, 0.0));
+        for (part, ((mirror, at), members)) in pair.iter().enumerate() {
+            let (_, columns) = self.gather((*mirror, at), members);
+            for (line, samples) in self.lines.chunks_exact_mut(size).zip(self.mirrored.chunks_exact(columns)) {
+                line.iter_mut().zip(samples).for_each(|(value, sample)| *part_mut(value, part) = *sample);
+            }
+        }
+        fft.forward_pair(&mut self.lines, &mut self.spectrum);
+        multiply(&mut self.spectrum, &self.kernel);
+        fft.inverse_pair(&mut self.spectrum, n_rows + width - 1, &mut self.lines);
+        for (part, ((mirror, at), _)) in pair.iter().enumerate() {
+            let at = widened(at, width);
+            let (rows, columns) = mirror.size((at.rows, at.columns));
+            self.mirrored.resize(rows * columns, 0.0);
+            for (line, spread) in self.lines.chunks_exact(size).zip(self.mirrored.chunks_exact_mut(columns)) {
+                spread
+                    .iter_mut()
+                    .zip(line)
+                    .for_each(|(spread, value)| *spread = if part == 0 { value.re } else { value.im });
+            }
+            cells.push(BlurredCell { at, values: mirror.restored(&self.mirrored, (at.rows, at.columns)) });
+        }
+    }
+
+    /// Puts the samples of the patches around a knot, times its weights, mirrored, into `mirrored`, and returns its rows and columns.
+    fn gather(&mut self, (mirror, at): (Mirror, &Rectangle), members: &[Member<'_>]) -> (usize, usize) {
         self.block.clear();
         self.block.resize(at.rows * at.columns, 0.0);
-        for member in members {
-            add_weighted(member, (mirror, &at), &mut self.block, &mut self.weighted);
+        for (sampled, shares) in members {
+            let PatchSamples { source, places, ideal, .. } = sampled;
+            let first = (source.first_row - at.first_row) as usize * at.columns
+                + (source.first_column - at.first_column) as usize;
+            let block = self.block[first..].chunks_mut(at.columns);
+            for ((line, down), block) in ideal.chunks_exact(source.columns).zip(&places.down).zip(block) {
+                let along: [f32; 3] = std::array::from_fn(|j| (0..3).map(|i| shares[3 * i + j] * down[i]).sum());
+                add_weighted(line, &places.across, along, block);
+            }
         }
-        fft.forward(&self.block, mirror.size((at.rows, at.columns)).1, &mut self.spectrum);
-        multiply(&mut self.spectrum, kernel);
-        let size = (at.rows + width - 1, at.columns + width - 1);
-        let (rows, columns) = mirror.size(size);
-        fft.inverse(&mut self.spectrum, rows, columns, &mut self.spread);
-        let half = (width / 2) as i64;
-        let (first_row, first_column) = (at.first_row - half, at.first_column - half);
-        let at = Rectangle { first_row, first_column, rows: size.0, columns: size.1 };
-        BlurredCell { at, values: mirror.restored(&self.spread, size) }
+        mirror.applied(&self.block, (at.rows, at.columns), &mut self.mirrored);
+        mirror.size((at.rows, at.columns))
     }
 }
 
-/// Adds the samples of a patch, times the weights of a knot, to the mirrored block around the knot.
-fn add_weighted(
-    (sampled, shares): &Member<'_>,
-    (mirror, at): (Mirror, &Rectangle),
-    block: &mut [f32],
-    weighted: &mut Vec<f32>,
-) {
-    let PatchSamples { source, places, ideal, .. } = sampled;
-    let skip_rows = (source.first_row - at.first_row) as usize;
-    let skip_columns = (source.first_column - at.first_column) as isize;
-    for (row, (line, down)) in ideal.chunks_exact(source.columns).zip(&places.down).enumerate() {
-        let along: [f32; 3] = std::array::from_fn(|j| (0..3).map(|i| shares[3 * i + j] * down[i]).sum());
-        weighted.clear();
-        let along = |across: &[f32; 3]| along[0] + along[1] * across[1] + along[2] * across[2];
-        weighted.extend(line.iter().zip(&places.across).map(|(value, across)| value * along(across)));
-        let (first, step) = mirror.line(skip_rows + row, (at.rows, at.columns));
-        let first = first as isize + skip_columns * step;
-        if step == 1 {
-            let block = &mut block[first as usize..][..weighted.len()];
-            block.iter_mut().zip(&*weighted).for_each(|(sum, value)| *sum += value);
-        } else {
-            let places = (0..).map(|column: isize| (first + column * step) as usize);
-            places.zip(&*weighted).for_each(|(place, value)| block[place] += value);
-        }
+/// The real or the imaginary part.
+#[inline]
+fn part_mut(value: &mut Complex<f32>, part: usize) -> &mut f32 {
+    if part == 0 { &mut value.re } else { &mut value.im }
+}
+
+/// Returns what light from a rectangle reaches that is spread by a kernel.
+fn widened(at: &Rectangle, width: usize) -> Rectangle {
+    let half = (width / 2) as i64;
+    let (rows, columns) = (at.rows + width - 1, at.columns + width - 1);
+    Rectangle { first_row: at.first_row - half, first_column: at.first_column - half, rows, columns }
+}
+
+/// Adds samples times their weights to a line: a sum of the polynomials at each, times `along`.
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn add_weighted(line: &[f32], across: &[[f32; 3]], along: [f32; 3], sum: &mut [f32]) {
+    for ((sum, value), across) in sum.iter_mut().zip(line).zip(across) {
+        *sum += value * (along[0] + along[1] * across[1] + along[2] * across[2]);
     }
 }
 
@@ -146,7 +210,7 @@ fn add_weighted(
 mod tests {
     use super::*;
     use crate::{
-        knot_kernels::{KnotKernel, Symmetry},
+        knot_kernels::Symmetry,
         patch::{Cell, Patch, polynomials},
         patch_samples::Places,
     };

@@ -3,6 +3,7 @@
 use std::{cell::RefCell, collections::HashMap, ops::Range, rc::Rc, sync::Arc};
 
 use dioptric_fft::{Complex, ComplexToReal, Fft, Planner, RealToComplex};
+use multiversion::multiversion;
 
 /// Rows transformed together, so that the transpose writes whole cache lines.
 const BATCH: usize = 8;
@@ -74,6 +75,38 @@ impl Fft2 {
         self.size * (self.size / 2 + 1)
     }
 
+    /// Samples along a side of the squares.
+    pub(crate) fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Puts the spectrum of two blocks, one as the real and one as the imaginary part of some whole rows, padded with zeros below, into `spectrum`: column by
+    /// column, as many as there are rows. Leaves the rows in disorder.
+    pub(crate) fn forward_pair(&mut self, lines: &mut [Complex<f32>], spectrum: &mut Vec<Complex<f32>>) {
+        let (size, scratch) = (self.size, &mut self.work.scratch);
+        self.column_forward.process_with_scratch(lines, scratch);
+        spectrum.clear();
+        spectrum.resize(size * size, Complex::new(0.0, 0.0));
+        transpose(lines, size, spectrum, size);
+        self.column_forward.process_with_scratch(spectrum, scratch);
+    }
+
+    /// Puts the first rows of the square of the spectrum of a pair into `lines`, and leaves the spectrum in disorder. What [`Fft2::forward_pair`]
+    /// was given comes back times the number of samples of the square.
+    pub(crate) fn inverse_pair(&mut self, spectrum: &mut [Complex<f32>], n_rows: usize, lines: &mut Vec<Complex<f32>>) {
+        let (size, scratch) = (self.size, &mut self.work.scratch);
+        self.column_inverse.process_with_scratch(spectrum, scratch);
+        lines.resize(n_rows * size, Complex::new(0.0, 0.0));
+        for (first, lines) in (0..).step_by(BATCH).zip(lines.chunks_mut(BATCH * size)) {
+            for (k, column) in spectrum.chunks_exact(size).enumerate() {
+                for (i, value) in column[first..][..lines.len() / size].iter().enumerate() {
+                    lines[i * size + k] = *value;
+                }
+            }
+        }
+        self.column_inverse.process_with_scratch(lines, scratch);
+    }
+
     /// Puts the spectrum of a block of `columns` samples a row, padded with zeros, into `spectrum`.
     pub(crate) fn forward(&mut self, block: &[f32], columns: usize, spectrum: &mut Vec<Complex<f32>>) {
         let (size, n_half) = (self.size, self.size / 2 + 1);
@@ -123,7 +156,21 @@ impl Fft2 {
     }
 }
 
+/// Puts the transpose of lines of `from_len` values, one after the other, into the first values of lines of `to_len`.
+fn transpose(from: &[Complex<f32>], from_len: usize, to: &mut [Complex<f32>], to_len: usize) {
+    // As many lines together as fill a line of the cache.
+    for (first, lines) in (0..).step_by(BATCH).zip(from.chunks(BATCH * from_len)) {
+        let n_lines = (lines.len() / from_len).min(to_len - first);
+        for (k, to) in to.chunks_exact_mut(to_len).enumerate().take(from_len) {
+            for (i, to) in to[first..first + n_lines].iter_mut().enumerate() {
+                *to = lines[i * from_len + k];
+            }
+        }
+    }
+}
+
 /// Adds the product of two spectra to a third.
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn multiply_add(sum: &mut [Complex<f32>], a: &[Complex<f32>], b: &[Complex<f32>]) {
     for ((sum, a), b) in sum.iter_mut().zip(a).zip(b) {
         sum.re += a.re * b.re - a.im * b.im;
@@ -132,13 +179,14 @@ pub(crate) fn multiply_add(sum: &mut [Complex<f32>], a: &[Complex<f32>], b: &[Co
 }
 
 /// Multiplies a spectrum by another.
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn multiply(product: &mut [Complex<f32>], factor: &[Complex<f32>]) {
     for (product, factor) in product.iter_mut().zip(factor) {
         *product *= factor;
     }
 }
 
-/// Samples of the output that stay in registers together.
+/// Samples of the output that stay in registers together, or half as many.
 pub(crate) const LANES: usize = 32;
 
 /// Rows of samples that are convolved directly at once.
@@ -147,48 +195,80 @@ pub(crate) const STRIP_ROWS: usize = 16;
 /// Columns of samples that are convolved directly at once, at most.
 pub(crate) const STRIP_COLUMNS: usize = 128;
 
-/// Adds the full convolution of a strip of samples to `out`, which begins at the strip's first sample less half a kernel and
-/// has `stride` samples a row.
-///
-/// A strip has planes of samples, each with a kernel of `width` × `width` samples of its own for every row. `padded`
-/// holds the rows of the planes with `width − 1` zeros before each and at least as many behind; of each row only the columns `lit`
-/// of it hold more than zeros.
-#[multiversion::multiversion(targets("x86_64+avx2", "aarch64+neon"))]
-fn convolve_padded(
-    padded: &[f32],
+/// Adds a vector times a factor to another.
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+pub(crate) fn add_scaled(sum: &mut [f32], factor: f32, values: &[f32]) {
+    sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
+}
+
+/// The full convolution of a strip of samples, which has planes of samples, each with a kernel of `width` × `width` samples of its own for every row.
+struct PaddedStrip<'a> {
+    /// The rows of the planes with `width − 1` zeros before each and at least as many behind.
+    padded: &'a [f32],
     padded_stride: usize,
-    kernels: &[f32],
-    (width, n_planes): (usize, usize),
-    (n_columns, lit): (usize, &[Range<usize>]),
-    (out, stride): (&mut [f32], usize),
-) {
-    let kernel_len = width * width;
-    let n_rows = lit.len();
-    for row in 0..n_rows + width - 1 {
-        let kernel_rows = (row + 1).saturating_sub(n_rows)..width.min(row + 1);
-        for first in (0..n_columns + width - 1).step_by(LANES) {
-            let mut sum = [0.0_f32; LANES];
-            for kernel_row in kernel_rows.clone() {
-                let source = row - kernel_row;
-                if lit[source].end <= first || lit[source].start >= first + LANES + width - 1 {
-                    continue;
+    kernels: &'a [f32],
+    width: usize,
+    n_columns: usize,
+    /// Of each row, the columns that hold more than zeros.
+    lit: &'a [Range<usize>],
+}
+
+impl PaddedStrip<'_> {
+    /// Adds the convolution to `out`, which begins at the strip's first sample less half a kernel and has `stride` samples a row.
+    #[inline(always)]
+    fn add_to<const PLANES: usize>(&self, out: &mut [f32], stride: usize) {
+        let n_out = self.n_columns + self.width - 1;
+        for (row, out) in out.chunks_mut(stride).take(self.lit.len() + self.width - 1).enumerate() {
+            let mut first = 0;
+            while first < n_out {
+                if n_out - first > LANES {
+                    self.add_part::<PLANES, { 2 * LANES }>(row, first, &mut out[..n_out]);
+                    first += 2 * LANES;
+                } else {
+                    self.add_part::<PLANES, LANES>(row, first, &mut out[..n_out]);
+                    first += LANES;
                 }
-                for plane in 0..n_planes {
-                    let line = (source * n_planes + plane) * padded_stride;
-                    let samples = &padded[line + first..][..LANES + width - 1];
-                    let kernel = (source * n_planes + plane) * kernel_len + kernel_row * width;
-                    for (j, weight) in kernels[kernel..][..width].iter().rev().enumerate() {
-                        for (sum, sample) in sum.iter_mut().zip(&samples[j..j + LANES]) {
-                            *sum += weight * sample;
-                        }
-                    }
-                }
-            }
-            let n = LANES.min(n_columns + width - 1 - first);
-            for (out, sum) in out[row * stride + first..][..n].iter_mut().zip(&sum) {
-                *out += sum;
             }
         }
+    }
+
+    /// Adds `N` samples of a row, from one on, to it.
+    #[inline(always)]
+    fn add_part<const PLANES: usize, const N: usize>(&self, row: usize, first: usize, out: &mut [f32]) {
+        let width = self.width;
+        // Planes are summed apart, so that no sum waits for the one before it.
+        let mut sums = [[0.0_f32; N]; PLANES];
+        for source in ((row + 1).saturating_sub(width)..self.lit.len().min(row + 1)).rev() {
+            let lit = &self.lit[source];
+            if lit.end <= first || lit.start >= first + N + width - 1 {
+                continue;
+            }
+            for (plane, sums) in sums.iter_mut().enumerate() {
+                let mut sum = *sums;
+                let line = source * PLANES + plane;
+                let samples = &self.padded[line * self.padded_stride + first..][..N + width - 1];
+                let kernel = &self.kernels[(line * width + row - source) * width..][..width];
+                for (weight, samples) in kernel.iter().rev().zip(samples.windows(N)) {
+                    sum.iter_mut().zip(samples).for_each(|(sum, sample)| *sum += weight * sample);
+                }
+                *sums = sum;
+            }
+        }
+        let (total, others) = sums.split_first_mut().expect("there is a plane");
+        for other in others {
+            total.iter_mut().zip(other).for_each(|(sum, other)| *sum += *other);
+        }
+        out[first..].iter_mut().zip(total).for_each(|(out, sum)| *out += *sum);
+    }
+}
+
+/// Adds the full convolution of a strip to `out`; see [`PaddedStrip::add_to`].
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2", "aarch64+neon"))]
+fn convolve_padded(strip: &PaddedStrip<'_>, n_planes: usize, (out, stride): (&mut [f32], usize)) {
+    match n_planes {
+        1 => strip.add_to::<1>(out, stride),
+        2 => strip.add_to::<2>(out, stride),
+        _ => strip.add_to::<3>(out, stride),
     }
 }
 
@@ -243,9 +323,15 @@ impl Strip {
 
     /// Adds the full convolution of the strip to `out`, whose first sample belongs to the strip's first less half a kernel.
     pub(crate) fn add_to(&self, out: &mut [f32], stride: usize) {
-        let shape = (self.width, self.n_polynomials);
-        let columns = (self.n_columns, self.lit.as_slice());
-        convolve_padded(&self.padded, self.padded_stride, &self.kernels, shape, columns, (out, stride));
+        let strip = PaddedStrip {
+            padded: &self.padded,
+            padded_stride: self.padded_stride,
+            kernels: &self.kernels,
+            width: self.width,
+            n_columns: self.n_columns,
+            lit: &self.lit,
+        };
+        convolve_padded(&strip, self.n_polynomials, (out, stride));
     }
 }
 

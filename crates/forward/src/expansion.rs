@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use dioptric_spectrum::{Cancel, Cancelled};
 
 use crate::{
+    convolve::add_scaled,
     cost::Cost,
     knot_kernels::{KnotKernel, edge_spread_peak},
     patch::{Knot, LARGEST, Patch},
@@ -64,8 +65,7 @@ impl Expansion {
         let n = self.width * self.width;
         for term in &self.terms {
             let factor = down[term.down];
-            let kernel = &mut kernels[term.across * n..][..n];
-            kernel.iter_mut().zip(&term.samples).for_each(|(kernel, sample)| *kernel += factor * sample);
+            add_scaled(&mut kernels[term.across * n..][..n], factor, &term.samples);
         }
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use dioptric_psf::{Kernel, LensImage};
 use glam::DVec2;
 
-use crate::patch::Knot;
+use crate::{convolve::add_scaled, patch::Knot};
 
 /// Which knots have kernels that follow from each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,8 +69,8 @@ impl KnotKernel {
         let sum: f64 = kernel.iter().map(|&v| f64::from(v)).sum();
         let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
         let mut samples = vec![0.0; width * width];
-        for ((row, column), &value) in kernel.indexed_iter() {
-            samples[(top + row) * width + left + column] = f64::from(value) * scale;
+        for (line, values) in samples.chunks_exact_mut(width).skip(top).zip(kernel.rows()) {
+            line[left..].iter_mut().zip(values).for_each(|(sample, &value)| *sample = f64::from(value) * scale);
         }
         center(&mut samples, width, centroid_px);
         Self { width, samples: samples.into_iter().map(|sample| sample as f32).collect() }
@@ -78,6 +78,9 @@ impl KnotKernel {
 
     /// Adds the kernel times a factor to a square of `width` samples a side, at least its own, middle on middle.
     pub(crate) fn add_to(&self, sum: &mut [f32], width: usize, factor: f32) {
+        if width == self.width {
+            return add_scaled(sum, factor, &self.samples);
+        }
         let margin = (width - self.width) / 2;
         for (row, samples) in self.samples.chunks_exact(self.width).enumerate() {
             let line = &mut sum[(margin + row) * width + margin..][..self.width];
@@ -143,32 +146,23 @@ impl Mirror {
         if self.swaps { (columns, rows) } else { (rows, columns) }
     }
 
-    /// Returns where the first sample of a row of a block comes to lie in the mirrored block, and by how much the next one follows.
-    pub(crate) fn line(self, row: usize, (rows, columns): (usize, usize)) -> (usize, isize) {
-        let row = if self.flips_rows { rows - 1 - row } else { row };
-        let first = if self.flips_columns { columns - 1 } else { 0 };
-        match (self.swaps, self.flips_columns) {
-            (false, false) => (row * columns + first, 1),
-            (false, true) => (row * columns + first, -1),
-            (true, false) => ((columns - 1 - first) * rows + rows - 1 - row, -(rows as isize)),
-            (true, true) => ((columns - 1 - first) * rows + rows - 1 - row, rows as isize),
-        }
-    }
-
     /// Returns the block of so many rows and columns of which this is the mirrored one.
-    pub(crate) fn restored(self, mirrored: &[f32], size: (usize, usize)) -> Vec<f32> {
-        let mut block = Vec::with_capacity(mirrored.len());
-        for row in 0..size.0 {
-            match self.line(row, size) {
-                (first, 1) => block.extend_from_slice(&mirrored[first..][..size.1]),
-                (first, -1) => block.extend(mirrored[..=first].iter().rev().take(size.1)),
-                (first, step) if step > 0 => block.extend(mirrored[first..].iter().step_by(step as usize).take(size.1)),
-                (first, step) => {
-                    block.extend(mirrored[..=first].iter().rev().step_by(step.unsigned_abs()).take(size.1));
-                }
-            }
+    pub(crate) fn restored(self, mirrored: &[f32], (rows, columns): (usize, usize)) -> Vec<f32> {
+        let mut block = vec![];
+        if self.swaps {
+            // As `applied` has it, seen from the mirrored block.
+            copy_mirrored(mirrored, (columns, rows), [!self.flips_columns, !self.flips_rows, true], &mut block);
+        } else {
+            copy_mirrored(mirrored, (rows, columns), [self.flips_rows, self.flips_columns, false], &mut block);
         }
         block
+    }
+
+    /// Puts the mirrored block of one of so many rows and columns into `mirrored`.
+    pub(crate) fn applied(self, block: &[f32], size: (usize, usize), mirrored: &mut Vec<f32>) {
+        // About the diagonal from lower left to upper right both are turned about once more.
+        let flips = [self.flips_rows != self.swaps, self.flips_columns != self.swaps];
+        copy_mirrored(block, size, [flips[0], flips[1], self.swaps], mirrored);
     }
 
     /// Returns the first moments of a kernel of which the canonical ones are known.
@@ -181,6 +175,35 @@ impl Mirror {
     pub(crate) fn moments_at_knot(self, [down, mixed, across]: [f64; 3]) -> [f64; 3] {
         let mixed = if self.flips_rows == self.flips_columns { mixed } else { -mixed };
         if self.swaps { [across, mixed, down] } else { [down, mixed, across] }
+    }
+}
+
+/// Copies a block of rows and columns with the order of its rows turned about, of its columns, and then both exchanged.
+fn copy_mirrored(
+    block: &[f32],
+    (rows, columns): (usize, usize),
+    [flips_rows, flips_columns, swaps]: [bool; 3],
+    copy: &mut Vec<f32>,
+) {
+    /// Rows that become columns together.
+    const BATCH: usize = 8;
+    copy.clear();
+    let row_at = |row: usize| &block[if flips_rows { rows - 1 - row } else { row } * columns..][..columns];
+    if !swaps {
+        for line in (0..rows).map(row_at) {
+            if flips_columns { copy.extend(line.iter().rev()) } else { copy.extend_from_slice(line) }
+        }
+        return;
+    }
+    copy.resize(rows * columns, 0.0);
+    for first in (0..rows).step_by(BATCH) {
+        let n_rows = BATCH.min(rows - first);
+        let lines: [&[f32]; BATCH] = std::array::from_fn(|i| row_at(first + i.min(n_rows - 1)));
+        for (column, copy) in copy.chunks_exact_mut(rows).enumerate() {
+            let column = if flips_columns { columns - 1 - column } else { column };
+            let values = lines.map(|line| line[column]);
+            copy[first..first + n_rows].copy_from_slice(&values[..n_rows]);
+        }
     }
 }
 

@@ -477,7 +477,12 @@ impl Layout {
             surfaces.push(depths.surface(radiance.as_slice()));
         }
         let Film { rows, columns, .. } = self.spec.film;
-        let (mut picture, mut blurred) = (Composite::new(rows, columns), self.blank());
+        let mut blurred = self.blank();
+        if let ([map], false) = (maps.as_slice(), self.hides()) {
+            self.blur_onto_film(0, map, &surfaces, &basis.kernels, &mut blurred, work)?;
+            return Ok(self.stopwatch.time(Part::Compositing, || blurred.into_picture()));
+        }
+        let mut picture = Composite::new(rows, columns);
         for (layer, map) in maps.iter().enumerate() {
             self.blur_onto_film(layer, map, &surfaces, &basis.kernels, &mut blurred, work)?;
             self.stopwatch.time(Part::Compositing, || {

@@ -49,6 +49,7 @@ mod sample_density;
 mod sampler;
 mod source;
 mod spec;
+mod squares;
 mod stopwatch;
 mod tiles;
 mod uniform_response;

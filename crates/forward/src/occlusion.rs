@@ -54,6 +54,11 @@ impl BlurredPlane {
         Ok(())
     }
 
+    /// Returns the plane as the picture of a scene of one layer.
+    pub(crate) fn into_picture(self) -> Array2<f32> {
+        self.values.mapv_into(|light| light.max(0.0))
+    }
+
     /// Wipes the plane for the next layer.
     fn clear(&mut self) {
         let columns = self.values.ncols();

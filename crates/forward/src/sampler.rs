@@ -1,13 +1,18 @@
 //! The ideal picture of a layer: what an aberration-free lens of the same geometry would put on the film.
 
-use std::ops::Range;
-
-use dioptric_psf::{FieldsAlong, FilmMap};
+use dioptric_psf::FilmMap;
 use dioptric_scene::View;
 use dioptric_spectrum::{Cancel, Cancelled};
 use ndarray::{Array2, Axis, parallel::prelude::*};
 
-use crate::{Film, block_layers::BlockLayers, geometry::FilmFrame, layers::tent, sample_density::SampleDensity};
+use crate::{
+    Film,
+    block_layers::BlockLayers,
+    geometry::FilmFrame,
+    layers::tent,
+    sample_density::SampleDensity,
+    squares::{SceneRaster, Squares, UNSEEN},
+};
 
 /// A rectangle of film pixels, which may reach beyond the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,9 +108,7 @@ impl LayerCoordinates {
 
 /// Resamples surfaces of the scene on the film.
 pub(crate) struct Sampler {
-    pub(crate) view: View,
-    /// Rows and columns of the scene.
-    size: (usize, usize),
+    pub(crate) scene: SceneRaster,
     pub(crate) frame: FilmFrame,
     density: SampleDensity,
     /// Samples of the scene a pixel of film, each way, at the axis.
@@ -123,7 +126,8 @@ impl Sampler {
     ) -> Self {
         let frame = FilmFrame::new(film, factor);
         let scene_per_film = view.focal_px * map.tan_per_mm(frame.pitch_mm()) * frame.pitch_mm();
-        Self { view, size, frame, density: SampleDensity::of((&view, size), film, map, most), scene_per_film }
+        let scene = SceneRaster { view, rows: size.0, columns: size.1 };
+        Self { scene, frame, density: SampleDensity::of((&view, size), film, map, most), scene_per_film }
     }
 
     /// Returns the ideal picture of a layer within a rectangle, row by row, or `None` where there is nothing of it: irradiance,
@@ -146,7 +150,7 @@ impl Sampler {
         };
         let mut ideal = vec![0.0; rectangle.rows * rectangle.columns];
         let mut has_any = false;
-        let (mut x_mm, mut seen, mut squares) = (Vec::new(), FieldsAlong::default(), Squares::default());
+        let (mut squares, mut light) = (Squares::default(), vec![]);
         for (down, line) in ideal.chunks_exact_mut(rectangle.columns).enumerate() {
             cancel.check()?;
             let row = rectangle.first_row + down as i64;
@@ -163,16 +167,20 @@ impl Sampler {
                     continue;
                 }
                 let n = samples.across;
-                x_mm.clear();
-                x_mm.extend(within(rectangle.first_column, run.clone(), n).map(|column| self.frame.x_mm(column)));
+                let first_column = rectangle.first_column + run.start as i64;
+                let x_mm = |place: usize| self.frame.x_mm(place_in(first_column, place, n));
                 let pixels = &mut line[run];
-                for row in within(rectangle.first_row, down..down + 1, samples.down) {
-                    map.along(&x_mm, self.frame.y_mm(row), &mut seen);
-                    self.locate(&seen, &mut squares);
+                for place in 0..samples.down {
+                    let y_mm = self.frame.y_mm(place_in(row, place, samples.down));
+                    let n_places = n * pixels.len();
                     if let Some(radiance) = flat {
-                        has_any |= squares.add_light((radiance, self.size), n, pixels);
+                        squares.find(&self.scene, map, n_places, (x_mm, y_mm));
+                        squares.light(&self.scene, radiance, &mut light);
+                        add_by_pixel(&light, n, pixels);
+                        has_any |= squares.sees_any(n_places);
                         continue;
                     }
+                    squares.find_each(&self.scene, map, n_places, (x_mm, y_mm));
                     for (pixel, first) in pixels.iter_mut().zip((0..).step_by(n)) {
                         for at in first..first + n {
                             has_any |= self.add(&squares, at, surfaces, layer, pixel);
@@ -186,11 +194,6 @@ impl Sampler {
         Ok(has_any.then_some(ideal))
     }
 
-    /// Puts the squares of the scene that are seen along a row into `squares`.
-    fn locate(&self, seen: &FieldsAlong, squares: &mut Squares) {
-        locate((&self.view, self.size), seen, squares);
-    }
-
     /// Adds what of a layer is seen at a place to a pixel: light where the surfaces have radiance, weight where not. Returns
     /// whether there is any.
     #[inline]
@@ -199,8 +202,7 @@ impl Sampler {
         if first == UNSEEN as usize {
             return false;
         }
-        let (rows, columns) = self.size;
-        let (beside, below) = (usize::from(columns > 1), if rows > 1 { columns } else { 0 });
+        let (beside, below) = self.scene.steps();
         let corners = [first, first + beside, first + below, first + below + beside];
         let (down, across) = (squares.down[at], squares.across[at]);
         let shares = [(1.0 - down) * (1.0 - across), (1.0 - down) * across, down * (1.0 - across), down * across];
@@ -226,73 +228,14 @@ impl Sampler {
     }
 }
 
-/// Returns the places of `n` samples within each of a range of pixels, counted from a row or column, as rows or columns of the film.
-fn within(first: i64, pixels: Range<usize>, n: usize) -> impl Iterator<Item = f64> {
-    (n * pixels.start..n * pixels.end).map(move |k| first as f64 + (k as f64 + 0.5) / n as f64 - 0.5)
+/// Returns the place of a sample, `n` of which lie in each of some pixels, as a row or column of the film; pixels are counted from `first`.
+fn place_in(first: i64, sample: usize, n: usize) -> f64 {
+    first as f64 + (sample as f64 + 0.5) / n as f64 - 0.5
 }
 
-/// Squares between four samples of the scene in which places lie; beyond the edge of the scene, at the edge.
-#[derive(Default)]
-struct Squares {
-    /// The number of the sample at the upper left of each, or [`UNSEEN`].
-    first: Vec<u32>,
-    /// How far below and to the right of it the place lies, 0 to 1.
-    down: Vec<f32>,
-    across: Vec<f32>,
-    /// Irradiance per radiance, sr; 0 beyond the edge.
-    gain: Vec<f32>,
-}
-
-impl Squares {
-    /// Adds the light at `n` places in a row of each of some pixels, of a surface without holes in one layer. Returns whether anything is seen.
-    fn add_light(&self, (radiance, (rows, columns)): (&[f32], (usize, usize)), n: usize, pixels: &mut [f32]) -> bool {
-        let (beside, below) = (usize::from(columns > 1), if rows > 1 { columns } else { 0 });
-        let mut is_seen = false;
-        let of_pixels = self.first.chunks_exact(n).zip(self.down.chunks_exact(n).zip(self.across.chunks_exact(n)));
-        for ((pixel, gains), (first, (down, across))) in pixels.iter_mut().zip(self.gain.chunks_exact(n)).zip(of_pixels)
-        {
-            for (((&first, &down), &across), &gain) in first.iter().zip(down).zip(across).zip(gains) {
-                if first == UNSEEN {
-                    continue;
-                }
-                is_seen = true;
-                let upper = &radiance[first as usize..];
-                let lower = &upper[below..];
-                let light = (1.0 - down) * (1.0 - across) * upper[0]
-                    + (1.0 - down) * across * upper[beside]
-                    + down * (1.0 - across) * lower[0]
-                    + down * across * lower[beside];
-                *pixel += light * gain;
-            }
-        }
-        is_seen
-    }
-}
-
-/// Stands for the square of a place that nothing is seen from.
-const UNSEEN: u32 = u32::MAX;
-
-/// Finds the squares of the scene in the fields along a row.
-#[multiversion::multiversion(targets("x86_64+avx2", "aarch64+neon"))]
-fn locate((view, (rows, columns)): (&View, (usize, usize)), seen: &FieldsAlong, squares: &mut Squares) {
-    let n = seen.tan_x.len();
-    squares.first.resize(n, 0);
-    for values in [&mut squares.down, &mut squares.across, &mut squares.gain] {
-        values.resize(n, 0.0);
-    }
-    let (last_row, last_column) = ((rows - 1) as f64, (columns - 1) as f64);
-    let (last_top, last_left) = (rows.saturating_sub(2) as f64, columns.saturating_sub(2) as f64);
-    let fields = seen.tan_x.iter().zip(&seen.tan_y).zip(&seen.irradiance_per_radiance);
-    let places = squares.down.iter_mut().zip(&mut squares.across).zip(&mut squares.gain);
-    for (((&tan_x, &tan_y), &gain), (first, ((down, across), bright))) in
-        fields.zip(squares.first.iter_mut().zip(places))
-    {
-        let (row, column) = (view.center_y_px - view.focal_px * tan_y, view.center_x_px + view.focal_px * tan_x);
-        let is_inside = row >= -0.5 && column >= -0.5 && row <= last_row + 0.5 && column <= last_column + 0.5;
-        let (row, column) = (row.clamp(0.0, last_row), column.clamp(0.0, last_column));
-        let (top, left) = (row.min(last_top) as i32, column.min(last_left) as i32);
-        (*down, *across) = ((row - f64::from(top)) as f32, (column - f64::from(left)) as f32);
-        *first = if gain.is_nan() { UNSEEN } else { top as u32 * columns as u32 + left as u32 };
-        *bright = if is_inside && !gain.is_nan() { gain as f32 } else { 0.0 };
+/// Adds `n` samples to each of some pixels.
+fn add_by_pixel(samples: &[f32], n: usize, pixels: &mut [f32]) {
+    for (pixel, samples) in pixels.iter_mut().zip(samples.chunks_exact(n)) {
+        samples.iter().for_each(|sample| *pixel += sample);
     }
 }

@@ -1,6 +1,8 @@
 //! Spectra as colors on a screen.
 
-use dioptric_spectrum::{Observer, SpectralImage, WavelengthGrid, Xyz, srgb_encode};
+use std::sync::LazyLock;
+
+use dioptric_spectrum::{Observer, SpectralImage, WavelengthGrid, Xyz, srgb_decode, srgb_encode};
 use image::RgbImage;
 use ndarray::Array2;
 
@@ -125,7 +127,36 @@ impl LinearRgb {
 
 /// Returns the 8-bit sRGB code of a linear value.
 pub fn code(linear: f64) -> u8 {
-    (255.0 * srgb_encode(linear)).round() as u8
+    static CODES: LazyLock<Codes> = LazyLock::new(Codes::new);
+    CODES.of(linear)
+}
+
+/// The 8-bit sRGB codes of linear values, to look up: the power that defines them takes ten times as long.
+struct Codes {
+    /// The code at the beginning of each part of the values from 0 to 1, all of one width, which hold one step of codes at most.
+    begin: Vec<u8>,
+    /// The least value of each code from 1 on.
+    least: Vec<f64>,
+}
+
+impl Codes {
+    const PARTS: usize = 4096;
+
+    fn new() -> Self {
+        let begin = (0..=Self::PARTS).map(|part| Self::computed(part as f64 / Self::PARTS as f64)).collect();
+        Self { begin, least: (1..=u8::MAX).map(|code| srgb_decode((f64::from(code) - 0.5) / 255.0)).collect() }
+    }
+
+    fn computed(linear: f64) -> u8 {
+        (255.0 * srgb_encode(linear)).round() as u8
+    }
+
+    fn of(&self, linear: f64) -> u8 {
+        // No number is 0.
+        let part = (linear * Self::PARTS as f64) as usize;
+        let code = self.begin[part.min(Self::PARTS)];
+        code + u8::from(self.least.get(usize::from(code)).is_some_and(|least| linear >= *least))
+    }
 }
 
 /// Returns the color of a single wavelength as `#rrggbb`, bright enough for a line on white.
@@ -143,9 +174,21 @@ pub fn wavelength_color(wavelength_nm: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use dioptric_spectrum::srgb_decode;
-
     use super::*;
+
+    #[test]
+    fn codes_are_those_of_the_curve() {
+        for step in -1000..=201_000 {
+            // Beside all thresholds but by a part of a step, and beyond both ends.
+            let linear = f64::from(step) / 200_000.0 + 1.7e-7;
+            assert_eq!(code(linear), Codes::computed(linear), "{linear}");
+        }
+        let ends = [f64::NAN, f64::NEG_INFINITY, f64::INFINITY].map(code);
+        assert_eq!(ends, [0, 0, 255]);
+        for (at, least) in (1..=255).zip(Codes::new().least) {
+            assert_eq!([code(least * (1.0 - 1e-9)), code(least * (1.0 + 1e-9))], [at - 1, at]);
+        }
+    }
 
     #[test]
     fn the_white_given_is_white() {

@@ -10,6 +10,9 @@ use rayon::prelude::*;
 use super::beside::unreadable;
 use crate::SceneError;
 
+/// Pixels that are lifted to spectra at a time.
+const AT_ONCE: usize = 1 << 13;
+
 /// Reads a PNG, JPEG or TIFF picture of 8 or 16 bits as the radiance of a display that shows it.
 ///
 /// The picture's white has the luminance `white_cd_m2`. A color beyond the display's gamut is clipped at 0 in the
@@ -28,17 +31,30 @@ pub fn read_picture(
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
     let linear: Vec<f64> = (0..=u16::MAX).map(|code| srgb_decode(f64::from(code) / 65535.0)).collect();
     let basis = display.srgb_basis(grid, white_cd_m2);
-    let pixels: Vec<[f64; 3]> = picture.pixels().map(|p| p.0.map(|code| linear[usize::from(code)])).collect();
-    let planes = (0..grid.len())
-        .into_par_iter()
-        .map(|band| {
-            let [r, g, b] = [0, 1, 2].map(|i| basis[i][band]);
-            let samples = pixels.iter().map(|p| (r * p[0] + g * p[1] + b * p[2]).max(0.0) as f32).collect();
-            Array2::from_shape_vec((rows, columns), samples).expect("a sample a pixel")
-        })
-        .collect();
+    let mut planes: Vec<Array2<f32>> = (0..grid.len()).map(|_| Array2::zeros((rows, columns))).collect();
+    // A part of the picture in all bands before the next, while its colors are at hand.
+    let mut parts: Vec<Vec<&mut [f32]>> = (0..(rows * columns).div_ceil(AT_ONCE)).map(|_| vec![]).collect();
+    for plane in &mut planes {
+        let samples = plane.as_slice_mut().expect("a new plane is in standard order");
+        parts.iter_mut().zip(samples.chunks_mut(AT_ONCE)).for_each(|(part, samples)| part.push(samples));
+    }
+    parts.into_par_iter().zip(picture.as_raw().par_chunks(3 * AT_ONCE)).for_each(|(bands, codes)| {
+        let colors = [0, 1, 2].map(|color| -> Vec<f64> {
+            codes.iter().skip(color).step_by(3).map(|&code| linear[usize::from(code)]).collect()
+        });
+        for (band, samples) in bands.into_iter().enumerate() {
+            lift(&colors, [0, 1, 2].map(|color| basis[color][band]), samples);
+        }
+    });
     SpectralImage::new(Quantity::Radiance, grid.clone(), planes)
         .map_err(|reason| SceneError::Values { file: path.to_owned(), reason })
+}
+
+/// Puts the radiance of colors in a band into `samples`.
+fn lift([red, green, blue]: &[Vec<f64>; 3], [r, g, b]: [f64; 3], samples: &mut [f32]) {
+    for (((sample, red), green), blue) in samples.iter_mut().zip(red).zip(green).zip(blue) {
+        *sample = (r * red + g * green + b * blue).max(0.0) as f32;
+    }
 }
 
 fn check_white(white_cd_m2: f64) -> Result<(), SceneError> {
