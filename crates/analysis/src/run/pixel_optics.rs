@@ -42,7 +42,9 @@ impl PixelOpticsData {
     pub fn of(frames: &Frames<'_>) -> Result<Option<Self>, PipelineError> {
         let Frames { sensor, exit_pupil, .. } = frames;
         let response = sensor.angular_response(*exit_pupil)?;
-        let (Some(stack), Some(middle)) = (&sensor.pixel_stack, response.light_at_mm([0.0; 2])) else { return Ok(None) };
+        let (Some(stack), Some(middle)) = (&sensor.pixel_stack, response.light_at_mm([0.0; 2])) else {
+            return Ok(None);
+        };
         let f_number = exit_pupil.map(|pupil| pupil.f_number).filter(|n| n.is_finite());
         let (middle, corner) = (place(middle), place(darkest_corner(sensor, &response).unwrap_or(middle)));
         Ok(Some(Self {
