@@ -158,9 +158,14 @@ impl SpectralImage {
     /// # Errors
     /// Names the first sample that is not.
     pub fn check_samples(&self) -> Result<(), SpectrumError> {
+        let is_light = |value: f32| value.is_finite() && value >= 0.0;
         for (plane, &wavelength_nm) in self.planes.iter().zip(self.grid.centers_nm()) {
-            for ((row, column), &value) in plane.indexed_iter() {
-                if !(value.is_finite() && value >= 0.0) {
+            for (row, samples) in plane.outer_iter().enumerate() {
+                // All of a row, so that samples are compared in vectors.
+                if samples.iter().fold(true, |are_light, &value| are_light & is_light(value)) {
+                    continue;
+                }
+                if let Some((column, &value)) = samples.iter().enumerate().find(|(_, value)| !is_light(**value)) {
                     return Err(SpectrumError::Sample { wavelength_nm, row, column, value });
                 }
             }
