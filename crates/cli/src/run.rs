@@ -73,12 +73,19 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     if common.quiet { Ok(()) } else { print(&summary(&report, total_s, out)) }
 }
 
+/// What is to be known of a budget for a run that is continued.
+const MEMORY_WITH_FROM: &str =
+    "--memory limits scene and imaging: the irradiance of the run that is continued is read whole beside it";
+
 /// Returns the camera of the file, of the run to continue or of the demo, with what the command line changes.
 pub(crate) fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<KeptCamera> {
     let kept = match (&arguments.from, &arguments.camera) {
         (Some(folder), _) => {
             let resumed = KeptCamera::resume(folder)?;
             tell(&resumed.notes, common);
+            if arguments.memory.is_some() {
+                tell(&[MEMORY_WITH_FROM.to_owned()], common);
+            }
             resumed.camera
         }
         (None, Some(path)) => KeptCamera::new(Camera::read(path)?),

@@ -12,7 +12,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{CAMERA, check_error, output, read_picture};
+use common::{CAMERA, check_error, dioptric, output, read_picture};
 
 /// A gray wall 2 m before the camera, and a lamp beside the view.
 const WORLD: &str = r#"
@@ -63,8 +63,10 @@ fn world_ends_in_a_picture_and_a_report() {
     // Single precision.
     assert!((report["scene"]["near_m"].as_f64().unwrap() - 2.0).abs() < 1e-6);
     // What follows the film starts from its irradiance.
-    output(folder.path(), &["run", "--from", "out", "--seed", "2", "--quiet", "-o", "again"]);
-    assert!(folder.path().join("again/picture.png").exists());
+    let again = dioptric(folder.path(), &["run", "--from", "out", "--seed", "2", "--memory", "2GiB", "-o", "again"]);
+    assert!(again.status.success() && folder.path().join("again/picture.png").exists());
+    // No imaging takes the budget's memory.
+    assert!(String::from_utf8_lossy(&again.stderr).contains("--memory limits scene and imaging"));
     output(folder.path(), &["sense", "out/irradiance.exr", "--sensor", "nikon-d100", "--quiet", "-o", "sensed"]);
 }
 
