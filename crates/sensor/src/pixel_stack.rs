@@ -5,6 +5,8 @@
 
 mod optics;
 mod overlap;
+#[cfg(test)]
+mod samples;
 mod surface;
 
 use serde::{Deserialize, Serialize};
@@ -458,33 +460,10 @@ fn chief_ray_deg(table: &[(f64, f64)], height_mm: f64) -> f64 {
 mod tests {
     use approx::assert_abs_diff_eq;
 
-    use super::*;
-
-    const PITCH_UM: f64 = 4.0;
-
-    fn layer(thickness_um: f64, index: f64) -> StackLayer {
-        StackLayer { thickness_um, index }
-    }
-
-    fn bare(photodiode_um: f64, layers: &[StackLayer]) -> PixelStack {
-        PixelStack {
-            photodiode_um,
-            layers: layers.to_vec(),
-            microlens: None,
-            interfaces: Interfaces::Coated,
-            quantum_efficiency: QuantumEfficiencyOf::Pixel,
-        }
-    }
-
-    fn with_lens(photodiode_um: f64, layers: &[StackLayer], power: MicrolensPower) -> PixelStack {
-        let microlens =
-            Microlens { power, outline: MicrolensOutline::Gapless, shift: MicrolensShift::None, center_mm: [0.0; 2] };
-        PixelStack { microlens: Some(microlens), ..bare(photodiode_um, layers) }
-    }
-
-    fn focused(photodiode_um: f64, layers: &[StackLayer]) -> PixelStack {
-        with_lens(photodiode_um, layers, MicrolensPower::FocusOnPhotodiode)
-    }
+    use super::{
+        samples::{PITCH_UM, focused, layer},
+        *,
+    };
 
     #[test]
     fn designed_shifts_agree_where_they_mean_the_same() {

@@ -204,33 +204,10 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::pixel_stack::{Interfaces, Microlens, MicrolensPower, MicrolensShift, QuantumEfficiencyOf, StackLayer};
-
-    const PITCH_UM: f64 = 4.0;
-
-    fn layer(thickness_um: f64, index: f64) -> StackLayer {
-        StackLayer { thickness_um, index }
-    }
-
-    fn bare(photodiode_um: f64, layers: &[StackLayer]) -> PixelStack {
-        PixelStack {
-            photodiode_um,
-            layers: layers.to_vec(),
-            microlens: None,
-            interfaces: Interfaces::Coated,
-            quantum_efficiency: QuantumEfficiencyOf::Pixel,
-        }
-    }
-
-    fn with_lens(photodiode_um: f64, layers: &[StackLayer], power: MicrolensPower) -> PixelStack {
-        let microlens =
-            Microlens { power, outline: MicrolensOutline::Gapless, shift: MicrolensShift::None, center_mm: [0.0; 2] };
-        PixelStack { microlens: Some(microlens), ..bare(photodiode_um, layers) }
-    }
-
-    fn focused(photodiode_um: f64, layers: &[StackLayer]) -> PixelStack {
-        with_lens(photodiode_um, layers, MicrolensPower::FocusOnPhotodiode)
-    }
+    use crate::pixel_stack::{
+        Interfaces, MicrolensPower, MicrolensShift, StackLayer,
+        samples::{PITCH_UM, bare, focused, layer, with_lens},
+    };
 
     fn cone(chief_deg: [f64; 2], f_number: f64) -> Cone {
         let tangent = (4.0 * f_number * f_number - 1.0).sqrt().recip();
