@@ -143,7 +143,7 @@ pub enum QuantumEfficiencyOf {
 }
 
 impl PixelStack {
-    /// Returns the stack of an array that is so many times as large in everything: it takes light from the same angles.
+    /// Returns the stack of pixels that are so many times as large at the same places of a film: each takes light from the same angles.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         let layer = |layer: &StackLayer| StackLayer { thickness_um: factor * layer.thickness_um, ..*layer };
@@ -375,7 +375,11 @@ impl Microlens {
             MicrolensOutline::SquareUm(um) => MicrolensOutline::SquareUm(factor * um),
             MicrolensOutline::RoundUm(um) => MicrolensOutline::RoundUm(factor * um),
         };
-        Self { power, outline, ..self.with_array_scaled(factor) }
+        let shift = match self.shift {
+            MicrolensShift::Shrink(share) => MicrolensShift::Shrink(factor * share),
+            _ => self.shift.clone(),
+        };
+        Self { power, outline, shift, ..self.clone() }
     }
 
     /// Returns the same lenses where distances on the array and before it are so many times as large.

@@ -236,7 +236,8 @@ impl Sensor {
         Self { rows, columns, ..self.clone() }
     }
 
-    /// Returns a sensor of pixels of another pitch, whose stack is as many times as large: it takes light from the same angles.
+    /// Returns a sensor of pixels of another pitch, whose stack is as many times as large: at the same place of a film it takes light from the
+    /// same angles.
     #[must_use]
     pub fn with_pitch_um(&self, pixel_pitch_um: f64) -> Self {
         let factor = pixel_pitch_um / self.pixel_pitch_um;
