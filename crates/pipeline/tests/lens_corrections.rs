@@ -228,6 +228,25 @@ fn an_even_plane_is_even() {
     }
 }
 
+/// A rise is followed; that a turned lens's axis meets the film elsewhere is not, and is stated where pixels depend on it.
+#[test]
+fn angles_that_are_left_out_are_stated() {
+    let mut camera = before(Pattern::Uniform);
+    camera.film = FilmSpec::Pixels { columns: 60, rows: 40, pitch_um: 100.0 };
+    let plain = camera.sensor.open().unwrap();
+    let by_stack = Sensor { pixel_stack: Some(stack()), ..plain.clone() };
+    let notes = |movements: Movements, sensor: &Sensor| {
+        let kept = KeptCamera::new(Camera { movements, ..camera.clone() }).with_quality(Quality::Sketch);
+        let shot =
+            kept.with_given_sensor(dioptric_pipeline::Given::new(sensor.clone())).capture(&Silent, &Cancel::new());
+        shot.unwrap().lens_notes().iter().filter(|note| note.contains("tilts and decentered surfaces are")).count()
+    };
+    let tilted = Movements { tilt_deg: 2.0, ..Movements::default() };
+    let raised = Movements { rise_mm: 1.0, ..Movements::default() };
+    assert_eq!([tilted, raised, Movements::default()].map(|moved| notes(moved, &by_stack)), [1, 0, 0]);
+    assert_eq!(notes(tilted, &plain), 0);
+}
+
 /// Pixels of 4 µm that lose oblique light: a bare photodiode below 4 µm of oxide.
 fn stack() -> PixelStack {
     PixelStack {

@@ -57,9 +57,10 @@ impl Capture {
     }
 
     /// Notes on the lens at the bands of the picture, a sentence each: what its file states and this program does otherwise,
-    /// and which glasses are continued beyond the range in which they are known.
+    /// which glasses are continued beyond the range in which they are known, and what of it the pixels' response to angles leaves out.
     pub fn lens_notes(&self) -> Vec<String> {
-        self.lens.notes_at(self.grid().centers_nm())
+        let on_angles = electrons::note_on_angles(&self.sensor, &self.lens.lens, self.camera.movements);
+        self.lens.notes_at(self.grid().centers_nm()).into_iter().chain(on_angles).collect()
     }
 
     /// What is written of the frames.

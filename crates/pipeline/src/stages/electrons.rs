@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use dioptric_optics::glam::DVec2;
+use dioptric_optics::{Lens, glam::DVec2};
 use dioptric_sensor::{ElectronRate, ExitPupil, Illumination, PixelStack, Sensor};
 
 use super::{Watch, film::FilmPlace, irradiance::Irradiance, lens::ResolvedLens, spec::ElectronInputs};
-use crate::{PipelineError, Stage};
+use crate::{Movements, PipelineError, Stage};
 
 /// The mean rates of photo-electrons of a sensor.
 #[derive(Debug)]
@@ -56,6 +56,26 @@ pub(super) fn exit_pupil(sensor: &Sensor, place: &FilmPlace, lens: &ResolvedLens
         axis_mm: place.exit_pupil_axis_mm.map(closer),
         f_number,
     })
+}
+
+/// Returns a sentence on what the angles leave out at which light comes to a sensor that depends on them: the lens is what movements made of its file.
+pub(super) fn note_on_angles(sensor: &Sensor, lens: &Lens, movements: Movements) -> Option<String> {
+    // A rise and a shift of the whole lens are followed.
+    let followed = usize::from(movements != Movements::default());
+    let is_moved = lens.moves().len() > followed || lens.moves().iter().any(|part| part.tilt_deg != [0.0; 3]);
+    let is_curved = lens.image_surface().curvature_per_mm != 0.0;
+    let left_out = match (is_moved, is_curved) {
+        _ if !sensor.depends_on_angle() => return None,
+        (false, false) => return None,
+        (true, false) => "tilts and decentered surfaces are",
+        (false, true) => "the curvature of the film is",
+        (true, true) => "tilts, decentered surfaces and the curvature of the film are",
+    };
+    Some(format!(
+        "the pixels of {} depend on the angle of light, which is taken from an exit pupil on the lens's own axis and a flat film at right \
+         angles to it: {left_out} left out",
+        sensor.name
+    ))
 }
 
 /// Collects the electrons of all bands; the pixels are one sample each.

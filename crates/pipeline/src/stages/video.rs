@@ -178,6 +178,7 @@ impl KeptCamera {
         notes.extend(
             inputs.frames.electrons.filters.iter().filter_map(|filter| filter.note_beyond_table(irradiance.grid())),
         );
+        notes.extend(electrons::note_on_angles(&sensor, &lens.lens, self.camera().movements));
         notes.extend(note_on_dark_film(irradiance.summary.seen.dark_fraction()));
         if spec.motion != CameraTurn::default() {
             notes.push(
