@@ -101,6 +101,16 @@ fn changes(kept: &KeptCamera, sensors: &[std::path::PathBuf], only: Option<&str>
         camera.scene.source = SceneSource::StillLife { columns: 1080, rows: 720 - 15 * (1 + i) };
     });
     of("scene: field of view", &|camera, i| camera.scene.field_of_view_deg = Some(35.0 + 0.5 * i as f64));
+    if only.is_none_or(|only| "scene: field of view, painted ahead".starts_with(only)) {
+        // Steps of a sixth, the next of which is prepared while the picture is looked at.
+        let times_s = (0..REPEATS).map(|i| {
+            let fov_deg = |i: usize| Some(34.0 * 1.16_f64.powi(i as i32));
+            let before = kept.with(|camera| camera.scene.field_of_view_deg = fov_deg(i));
+            before.paint_ahead(&Silent, &Cancel::new()).unwrap();
+            seconds(&kept.with(|camera| camera.scene.field_of_view_deg = fov_deg(i + 1)))
+        });
+        row("scene: field of view, painted ahead", times_s.collect());
+    }
     of("scene: a target", &|camera, i| {
         (camera.scene.field_of_view_deg, camera.scene.depth_m) = (Some(34.0), Some(1.5));
         camera.scene.source =

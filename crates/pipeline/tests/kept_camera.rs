@@ -2,8 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_pipeline::{
-    BlurSpec, Camera, Capture, Diffraction, ExrSamples, FilmSpec, FocusSpec, Given, KeptCamera, Quality, SceneSource,
-    SensorSpec, Silent, StageCounts, StopSpec, WavelengthSpec, with_exposure_s,
+    BlurSpec, Camera, Capture, Diffraction, ExrSamples, FilmSpec, FocusSpec, Given, KeptCamera, PipelineError, Quality,
+    SceneSource, SensorSpec, Silent, StageCounts, StopSpec, WavelengthSpec, with_exposure_s,
 };
 use dioptric_scene::{ExrParts, write_spectral_exr};
 use dioptric_sensor::WhiteBalance;
@@ -275,6 +275,38 @@ fn sketches_paint_the_still_life_once() {
         assert_eq!((kept.stage_counts().scene, kept.stage_counts().painting), (n_scenes, 2));
         assert_ne!(wider.developed.picture.to_rgb8(), before.developed.picture.to_rgb8());
     }
+}
+
+/// What was painted while the picture was looked at is what the next fields of view are taken from, and changes no picture.
+#[test]
+fn fields_of_view_are_painted_ahead() {
+    let camera = |fov_deg| {
+        let mut camera = small();
+        camera.scene.field_of_view_deg = Some(fov_deg);
+        camera.scene.source = SceneSource::StillLife { columns: 300, rows: 200 };
+        KeptCamera::new(camera).with_quality(Quality::Sketch)
+    };
+    let kept = camera(34.0);
+    capture(&kept);
+    kept.paint_ahead(&Silent, &Cancel::new()).unwrap();
+    assert_eq!((kept.stage_counts().scene, kept.stage_counts().painting), (1, 3));
+    for fov_deg in [30.0, 38.0] {
+        let changed = kept.with(|camera| camera.scene.field_of_view_deg = Some(fov_deg));
+        let ahead = capture(&changed);
+        assert_eq!(kept.stage_counts().painting, 3);
+        assert_eq!(ahead.developed.picture.to_rgb8(), capture(&camera(fov_deg)).developed.picture.to_rgb8());
+    }
+    // A second call has nothing left to paint; a cancelled one paints nothing.
+    kept.paint_ahead(&Silent, &Cancel::new()).unwrap();
+    let cancel = Cancel::new();
+    cancel.cancel();
+    let far = kept.with(|camera| camera.scene.field_of_view_deg = Some(60.0));
+    assert!(matches!(far.paint_ahead(&Silent, &cancel), Err(PipelineError::Cancelled(_))));
+    kept.with_quality(Quality::Full).paint_ahead(&Silent, &cancel).unwrap();
+    kept.with(|camera| camera.scene.source = SceneSource::File("none.exr".into()))
+        .paint_ahead(&Silent, &cancel)
+        .unwrap();
+    assert_eq!(kept.stage_counts().painting, 3);
 }
 
 /// So does a draft: of a strip of the picture that has its edges and its blurs.

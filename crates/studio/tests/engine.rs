@@ -7,8 +7,8 @@ use std::{
 };
 
 use dioptric_pipeline::{
-    Camera, FilmSpec, FocusSpec, KeptCamera, LensSpec, RenderEffort, SceneSource, SceneSpec, SensorSpec, Silent,
-    StopSpec, WavelengthSpec, WorldSpec, write_capture,
+    Camera, FilmSpec, FocusSpec, KeptCamera, LensSpec, PaintingFolder, RenderEffort, SceneSource, SceneSpec,
+    SensorSpec, Silent, StopSpec, WavelengthSpec, WorldSpec, write_capture,
 };
 use dioptric_spectrum::Cancel;
 use dioptric_studio::engine::{Delivery, Engine, EngineSettings, Field, Rung};
@@ -64,6 +64,29 @@ fn the_last_rung_is_the_run() {
     let (_, png) = write_capture(&capture, None, folder.path()).unwrap();
     let product = all.last().unwrap().outcome.as_ref().unwrap();
     assert!(product.png().unwrap() == png && std::fs::read(folder.path().join("picture.png")).unwrap() == png);
+}
+
+#[test]
+fn field_of_view_is_painted_ahead_and_holds_nothing_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = EngineSettings { paintings: Some(PaintingFolder::new(folder.path(), "test")) };
+    let (sender, woken) = mpsc::channel();
+    let engine = Engine::start(settings, move || _ = sender.send(())).unwrap();
+    // A preview's paintings are large enough to be kept in files: its own, and one each for narrower and wider fields of view.
+    let n_paintings = || std::fs::read_dir(folder.path()).map_or(0, Iterator::count);
+    let camera = demo(1);
+    let generation = engine.submit(camera.clone(), Rung::Preview);
+    wait(&engine, &woken, generation, Rung::Preview);
+    // The next camera comes in the middle of it, and is not kept waiting for its end.
+    let generation = engine.submit(Camera { seed: 4, ..camera }, Rung::Preview);
+    wait(&engine, &woken, generation, Rung::Preview);
+    assert!(n_paintings() < 3);
+    let start = Instant::now();
+    while n_paintings() < 3 {
+        assert!(start.elapsed() < LONG);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(!engine.is_busy());
 }
 
 #[test]

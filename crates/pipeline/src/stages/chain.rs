@@ -55,7 +55,7 @@ impl Chain<'_> {
         self.kept.scene.get_or_make(inputs.clone(), |inputs| {
             self.watch.progress.at(Stage::Scene, 0.0);
             self.watch.cancel.check()?;
-            let paintings = Paintings { kept: &self.kept.painting, folder: self.paintings };
+            let paintings = self.paintings();
             let scene = match inputs.geometry.world() {
                 _ if let Some(spec) = inputs.geometry.still_life() => {
                     lit_still_life::view(inputs, spec, paintings, &self.watch)?
@@ -70,6 +70,16 @@ impl Chain<'_> {
             self.watch.progress.at(Stage::Scene, 1.0);
             Ok(scene)
         })
+    }
+
+    /// Paints what previews of the still life need once its field of view is changed by little.
+    pub(super) fn paint_ahead(&self, inputs: &SceneInputs) -> Result<(), PipelineError> {
+        let Some((life, grid)) = scene::still_life(inputs)? else { return Ok(()) };
+        self.paintings().paint_ahead(&life, &grid, inputs.geometry.quality, &self.watch)
+    }
+
+    fn paintings(&self) -> Paintings<'_> {
+        Paintings { kept: &self.kept.painting, folder: self.paintings }
     }
 
     pub(super) fn summary(&self, inputs: &SceneInputs) -> Result<Arc<SceneSummary>, PipelineError> {

@@ -42,6 +42,20 @@ impl Paintings<'_> {
         watch.run(move || Ok(painting.reframed(view, rows, columns)?))
     }
 
+    /// Paints what the still life is taken from in a field of view narrower or wider by up to 19 %, where that is not kept.
+    pub(super) fn paint_ahead(
+        &self,
+        life: &StillLife,
+        grid: &WavelengthGrid,
+        quality: Quality,
+        watch: &Watch<'_>,
+    ) -> Result<(), PipelineError> {
+        for canvas in neighbors_of(life, quality) {
+            self.kept.get_or_make((canvas, grid.clone()), |(canvas, grid)| self.painted(canvas, grid, watch))?;
+        }
+        Ok(())
+    }
+
     fn painted(&self, life: &StillLife, grid: &WavelengthGrid, watch: &Watch<'_>) -> Result<Scene, PipelineError> {
         let report = |part| watch.progress.at(Stage::Scene, part);
         let (cancel, folder, life, grid) = (watch.cancel.clone(), self.folder.cloned(), *life, grid.clone());
@@ -76,6 +90,23 @@ fn canvas_of(life: &StillLife, quality: Quality) -> Option<StillLife> {
     let canvas = StillLife { columns: columns as usize, rows: rows as usize, horizontal_fov_deg, ..*life };
     let is_usual = (canvas.columns, canvas.rows) == (usual.columns, usual.rows) && finer == 0.0;
     Some(if is_usual { usual } else { canvas })
+}
+
+/// Returns the pictures that previews of fields of view narrower and wider than this one by less than a step are taken from, those of the nearest
+/// first. There are two for the shape that the arrangement is made for, up to four for others, whose height is rounded elsewhere than
+/// their width, and one more where a whole step is met.
+fn neighbors_of(life: &StillLife, quality: Quality) -> Vec<StillLife> {
+    let half_width = (0.5 * life.horizontal_fov_deg).to_radians().tan();
+    let mut canvases = vec![canvas_of(life, quality)];
+    // At the whole step itself the one after it begins.
+    for n_steps in (1..100).flat_map(|percent| [-0.01, 0.01].map(|way| way * f64::from(percent))) {
+        let horizontal_fov_deg = 2.0 * (half_width * (n_steps / STEPS_PER_OCTAVE).exp2()).atan().to_degrees();
+        let canvas = canvas_of(&StillLife { horizontal_fov_deg, ..*life }, quality);
+        if !canvases.contains(&canvas) {
+            canvases.push(canvas);
+        }
+    }
+    canvases.into_iter().skip(1).flatten().collect()
 }
 
 #[cfg(test)]
@@ -115,6 +146,25 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_is_painted_ahead_serves_the_next_fields_of_view() {
+        let canvas = |fov_deg, rows| canvas_of(&preview(fov_deg, rows), Quality::Preview).unwrap();
+        for tenth in 60..1500 {
+            for (rows, most) in [(360, 3), (405, 5), (100, 5)] {
+                let fov_deg = 0.1 * f64::from(tenth);
+                let mut known = neighbors_of(&preview(fov_deg, rows), Quality::Preview);
+                assert!(known.len() <= most, "{fov_deg}°, {rows} rows: {known:?}");
+                known.push(canvas(fov_deg, rows));
+                let tan = (0.5 * fov_deg).to_radians().tan();
+                for percent in 86..=118 {
+                    let other_deg = 2.0 * (0.01 * f64::from(percent) * tan).atan().to_degrees();
+                    assert!(known.contains(&canvas(other_deg, rows)), "{fov_deg}° and {other_deg}°, {rows} rows");
+                }
+            }
+        }
+        assert_eq!(neighbors_of(&StillLife::new(1080, 720), Quality::Full), []);
     }
 
     #[test]

@@ -50,7 +50,7 @@ impl Default for KeptResults {
         Self {
             lens: Slot::new(8),
             world: Slot::new(2),
-            painting: Slot::new(4),
+            painting: Slot::new(6),
             lit: Slot::new(1),
             scene: Slot::new(2),
             summary: Slot::new(8),

@@ -213,22 +213,52 @@ impl Progress for Follower<'_> {
 fn work(shared: &Shared, settings: &EngineSettings) {
     // A camera a rung: each keeps results of its own quality.
     let mut ladder: Option<[KeptCamera; 3]> = None;
+    let mut field_of_view_deg = None;
     while let Some(job) = shared.mailbox.take() {
+        // A hand that has changed the field of view goes on to change it; of the first camera nothing is known.
+        let own_deg = job.camera.scene.field_of_view_deg;
+        let is_zooming = field_of_view_deg.replace(own_deg).is_some_and(|before| before != own_deg);
         let ladder = ladder.get_or_insert_with(|| {
             Rung::ALL.map(|rung| {
                 let kept = KeptCamera::new(job.camera.clone()).with_quality(rung.quality());
                 kept.with_paintings(settings.paintings.clone())
             })
         });
-        climb(shared, ladder, &job);
+        climb(shared, ladder, &job, is_zooming);
+        paint_ahead(shared, ladder, &job);
         let mut current = shared.current();
         (current.busy, current.started) = (None, None);
     }
 }
 
-/// Delivers the rungs of a camera until another is asked for.
-fn climb(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job) {
+/// Paints what the next change of the field of view needs, until another camera is asked for.
+fn paint_ahead(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job) {
+    let cancel = Cancel::new();
+    {
+        let mut current = shared.current();
+        (current.busy, current.started, current.cancel) = (None, None, cancel.clone());
+    }
+    for kept in ladder {
+        // Whoever stopped the work or has another camera may have come before this cancel could be seen.
+        let is_stopped = shared.stopped.load(Ordering::SeqCst) >= job.generation;
+        if is_stopped || shared.mailbox.is_full() {
+            return;
+        }
+        let kept = kept.with(|own| own.clone_from(&job.camera));
+        let painted = panic::catch_unwind(AssertUnwindSafe(|| kept.paint_ahead(&Follower(shared), &cancel)));
+        if !matches!(painted, Ok(Ok(()))) {
+            // What is wrong with the camera has been delivered.
+            return;
+        }
+    }
+}
+
+/// Delivers the rungs of a camera until another is asked for; while its field of view is changed, the full picture waits for what the next change needs.
+fn climb(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job, is_zooming: bool) {
     for (rung, kept) in Rung::ALL.into_iter().zip(ladder).filter(|(rung, _)| *rung <= job.top) {
+        if rung == Rung::Full && is_zooming {
+            paint_ahead(shared, ladder, job);
+        }
         let (started, cancel) = (Instant::now(), Cancel::new());
         shared.begin(job, rung, started, &cancel);
         if rung == Rung::Full {
