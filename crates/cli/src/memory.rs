@@ -15,6 +15,22 @@ pub(crate) fn memory_budget(asked: Option<&str>) -> anyhow::Result<Option<u64>> 
     }
 }
 
+/// Gives memory that was freed back to the system where the allocator would keep it: kernels of a lens are many small pieces, and one of them
+/// that stays holds megabytes of freed ones.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+pub(crate) fn give_back_freed() {
+    #[expect(unsafe_code, reason = "a function of the C library without a safe form")]
+    unsafe extern "C" {
+        safe fn malloc_trim(pad: usize) -> std::ffi::c_int;
+    }
+    // Whether anything was given back.
+    let _ = malloc_trim(0);
+}
+
+/// Other allocators give back what they see fit.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub(crate) fn give_back_freed() {}
+
 /// Returns the memory that Linux says the machine has.
 fn total_bytes(meminfo: &str) -> Option<u64> {
     let line = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;

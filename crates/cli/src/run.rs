@@ -20,7 +20,7 @@ use dioptric_spectrum::Cancel;
 use crate::{
     args::{BankKind, Common, DiffractionKind, DualPixelArg, FilmKind, FrameArgs, PictureArgs, QualityKind, RunArgs},
     lens::tell,
-    memory::memory_budget,
+    memory::{give_back_freed, memory_budget},
     paintings::{build, painting_folder},
     terminal::{Bar, guarded, print, print_json, remark},
 };
@@ -391,6 +391,8 @@ impl Progress for Clock {
         let mut stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
         if stages.last().is_none_or(|(last, _)| *last != stage) {
             stages.push((stage, Instant::now()));
+            // What a stage needed is not what the next one does.
+            give_back_freed();
         }
         self.bar.show(stage.title(), fraction);
     }

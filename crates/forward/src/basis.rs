@@ -45,6 +45,14 @@ pub(crate) struct BandBasis {
     pub(crate) alpha: Option<Arc<Vec<LayerAlpha>>>,
 }
 
+impl BandBasis {
+    /// The bytes of memory that it takes.
+    pub(crate) fn size_bytes(&self) -> usize {
+        let alpha = self.alpha.iter().flat_map(|alpha| alpha.iter());
+        self.kernels.size_bytes() + alpha.map(LayerAlpha::size_bytes).sum::<usize>()
+    }
+}
+
 /// A band between two whose bases are known.
 pub(crate) struct BasisBetween {
     pub(crate) kernels: BandKernels,

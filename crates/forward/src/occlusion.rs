@@ -70,46 +70,73 @@ impl BlurredPlane {
         }
     }
 
-    /// Returns the plane as alpha, without the zeros at the ends of its rows.
+    /// Returns the plane as alpha, without the zeros at the ends of its rows and in gaps.
     pub(crate) fn into_alpha(self) -> LayerAlpha {
-        let lit = |((start, end), row): (&(usize, usize), ArrayView1<'_, f32>)| {
-            let covers = |column: &usize| row[*column] != 0.0;
-            let first = (*start..*end).find(covers).unwrap_or(*start);
-            first..(first..*end).rfind(covers).map_or(first, |last| last + 1)
-        };
-        let lines: Vec<Range<usize>> = self.touched.iter().zip(self.values.rows()).map(lit).collect();
-        let mut alpha = Vec::with_capacity(lines.iter().map(Range::len).sum());
-        let mut starts = Vec::with_capacity(lines.len());
-        for (line, row) in lines.iter().zip(self.values.rows()) {
-            starts.push(alpha.len());
-            alpha.extend(row.iter().skip(line.start).take(line.len()));
+        let rows = || self.touched.iter().zip(self.values.rows());
+        let lit = |(&(start, end), row): (&(usize, usize), ArrayView1<'_, f32>)| runs_of(row, start..end);
+        let lines: Vec<Vec<Range<usize>>> = rows().map(lit).collect();
+        let mut alpha = Vec::with_capacity(lines.iter().flatten().map(Range::len).sum());
+        let (mut runs, mut first_runs) = (Vec::with_capacity(lines.iter().map(Vec::len).sum()), vec![0]);
+        for (line, row) in lines.into_iter().zip(self.values.rows()) {
+            for columns in line {
+                let start = alpha.len();
+                alpha.extend(row.iter().skip(columns.start).take(columns.len()));
+                runs.push(Run { columns, start });
+            }
+            first_runs.push(runs.len());
         }
-        LayerAlpha { lines, starts, alpha }
+        LayerAlpha { first_runs, runs, alpha }
     }
 }
 
-/// The alpha of a blurred layer: the share of each pixel that it covers, of each row the part where it covers any.
+/// Columns without alpha that part a run of alpha from the next: fewer cost less than another run.
+const LEAST_GAP: usize = 32;
+
+/// Returns the columns of a row in which there is anything, gaps left out.
+fn runs_of(row: ArrayView1<'_, f32>, columns: Range<usize>) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for column in columns.filter(|&column| row[column] != 0.0) {
+        match runs.last_mut() {
+            Some(run) if column < run.end + LEAST_GAP => run.end = column + 1,
+            _ => runs.push(column..column + 1),
+        }
+    }
+    runs
+}
+
+/// The alpha of a blurred layer: the share of each pixel that it covers, of each row the parts where it covers any.
 #[derive(Debug)]
 pub(crate) struct LayerAlpha {
-    /// The columns of each row.
-    lines: Vec<Range<usize>>,
-    /// Where the alpha of each row begins.
-    starts: Vec<usize>,
+    /// Which run is the first of each row, and how many there are.
+    first_runs: Vec<usize>,
+    runs: Vec<Run>,
     alpha: Vec<f32>,
+}
+
+/// Neighboring pixels of a row.
+#[derive(Debug)]
+struct Run {
+    columns: Range<usize>,
+    /// Where their alpha begins.
+    start: usize,
 }
 
 impl LayerAlpha {
     /// The bytes of memory that it takes.
     pub(crate) fn size_bytes(&self) -> usize {
-        size_of_val(self.lines.as_slice()) + size_of_val(self.starts.as_slice()) + size_of_val(self.alpha.as_slice())
+        size_of_val(self.first_runs.as_slice()) + size_of_val(self.runs.as_slice()) + size_of_val(self.alpha.as_slice())
+    }
+
+    /// The runs of a row.
+    fn line(&self, row: usize) -> &[Run] {
+        &self.runs[self.first_runs[row]..self.first_runs[row + 1]]
     }
 
     /// Adds its alpha in a row, times a factor, to that from column `first` on.
     fn add_to(&self, row: usize, factor: f32, alpha: &mut [f32], first: usize) {
-        let line = &self.lines[row];
-        let own = &self.alpha[self.starts[row]..][..line.len()];
-        if let Some(alpha) = alpha.get_mut(line.start.wrapping_sub(first)..) {
-            alpha.iter_mut().zip(own).for_each(|(sum, own)| *sum += factor * own);
+        for Run { columns, start } in self.line(row) {
+            let own = &self.alpha[*start..][..columns.len()];
+            alpha[columns.start - first..].iter_mut().zip(own).for_each(|(sum, own)| *sum += factor * own);
         }
     }
 }
@@ -128,9 +155,10 @@ impl AlphaBetween<'_> {
     fn line(&self, row: usize, alpha: &mut Vec<f32>) -> usize {
         alpha.clear();
         let parts = [(self.lower, 1.0 - self.fraction), (self.upper, self.fraction)];
-        let parts = parts.into_iter().filter(|(part, factor)| *factor != 0.0 && !part.lines[row].is_empty());
-        let ends = |(start, end): (usize, usize), line: &Range<usize>| (start.min(line.start), end.max(line.end));
-        let (start, end) = parts.clone().map(|(part, _)| &part.lines[row]).fold((usize::MAX, 0), ends);
+        let parts = parts.into_iter().filter(|(_, factor)| *factor != 0.0);
+        let runs = parts.clone().flat_map(|(part, _)| part.line(row));
+        let ends = |(start, end): (usize, usize), run: &Run| (start.min(run.columns.start), end.max(run.columns.end));
+        let (start, end) = runs.fold((usize::MAX, 0), ends);
         alpha.resize(end.saturating_sub(start), 0.0);
         parts.for_each(|(part, factor)| part.add_to(row, factor, alpha, start));
         start.min(end)
@@ -255,6 +283,19 @@ mod tests {
         assert_eq!(line(1, 0.0), (2, vec![0.5, 1.0, 1.0]));
         assert_eq!(line(1, 1.0), (4, vec![1.0, 0.5]));
         assert_eq!(line(0, 0.25), (0, vec![]));
+    }
+
+    #[test]
+    fn gaps_of_a_row_take_no_memory() {
+        let mut plane = BlurredPlane::new(1, 200);
+        plane.add_row(0, 2, &[0.5, 0.0, 0.25]);
+        plane.add_row(0, 100, &[1.0]);
+        let values: Vec<f32> = plane.values.row(0).to_vec();
+        let layer = plane.into_alpha();
+        assert_eq!((layer.alpha.as_slice(), layer.runs.len()), (&[0.5, 0.0, 0.25, 1.0][..], 2));
+        let mut alpha = Vec::new();
+        let first = AlphaBetween { lower: &layer, upper: &layer, fraction: 1.0 }.line(0, &mut alpha);
+        assert_eq!((first, alpha.as_slice()), (2, &values[2..101]));
     }
 
     #[test]

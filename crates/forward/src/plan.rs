@@ -116,6 +116,12 @@ impl ImagingPlan {
         self.views.first().band_bytes()
     }
 
+    /// Returns about how many bytes of memory the bases of two bands take, between which others are interpolated: what layers that hide each other
+    /// cover. Their kernels are counted where they are kept.
+    pub fn bases_bytes(&self) -> usize {
+        self.views.first().bases_bytes()
+    }
+
     /// Returns the plan that adds up, by a clock, the time that its parts take; see [`times`](Self::times).
     #[must_use]
     pub fn with_clock(mut self, clock: Arc<Clock>) -> Self {

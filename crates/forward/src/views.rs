@@ -125,7 +125,7 @@ impl Views {
             for (lens, layout) in self.iter(whole) {
                 let lower = layout.basis(lens, pair[0], work)?;
                 let upper = if pair[1] == pair[0] { lower.clone() } else { layout.basis(lens, pair[1], work)? };
-                let at_once = layout.bands_at_once();
+                let at_once = layout.bands_at_once([&lower, &upper]);
                 for (group, sums) in bands.chunks(at_once).zip(sums.chunks_mut(at_once)) {
                     let pictures: Vec<Result<Array2<f32>, ForwardError>> = group
                         .par_iter()

@@ -104,9 +104,7 @@ impl LinearRgb {
 
     /// Returns the level below which this share of all samples lie.
     pub fn level_at(&self, share: f64) -> f64 {
-        let mut values: Vec<f32> = self.planes.iter().flatten().copied().collect();
-        let index = ((values.len() - 1) as f64 * share) as usize;
-        *values.select_nth_unstable_by(index, f32::total_cmp).1 as f64
+        level_at(&self.planes.each_ref(), share)
     }
 
     /// Returns the 8-bit picture in which linear `white` is full.
@@ -123,6 +121,43 @@ impl LinearRgb {
             image::Rgb([0, 1, 2].map(|i| code(black[i] + (1.0 - black[i]) * f64::from(self.planes[i][at]) / white)))
         })
     }
+}
+
+/// Returns the level below which this share of all samples of planes lie, found by counting: the samples are not copied.
+///
+/// # Panics
+/// When there is no sample.
+pub fn level_at(planes: &[&Array2<f32>], share: f64) -> f64 {
+    let n_samples: usize = planes.iter().map(|plane| plane.len()).sum();
+    let mut place = (n_samples.checked_sub(1).expect("at least one sample") as f64 * share) as usize;
+    let keys = || planes.iter().copied().flatten().map(|&sample| ordered_key(sample));
+    // The upper half of the key that has the place, then the lower half among those.
+    let upper = of_place(keys().map(|key| key >> 16), &mut place);
+    let lower = of_place(keys().filter(|key| key >> 16 == upper).map(|key| key & 0xffff), &mut place);
+    f64::from(sample_of_key(upper << 16 | lower))
+}
+
+/// Returns which of 2¹⁶ numbers stands at a place of their order, and leaves the place among those that equal it.
+fn of_place(numbers: impl Iterator<Item = u32>, place: &mut usize) -> u32 {
+    let mut counts = vec![0_usize; 1 << 16];
+    numbers.for_each(|number| counts[number as usize] += 1);
+    let mut number = 0;
+    while number + 1 < counts.len() && *place >= counts[number] {
+        *place -= counts[number];
+        number += 1;
+    }
+    number as u32
+}
+
+/// Returns a number that orders samples as `f32::total_cmp` does.
+fn ordered_key(sample: f32) -> u32 {
+    let bits = sample.to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+}
+
+/// Returns the sample of a key of [`ordered_key`].
+fn sample_of_key(key: u32) -> f32 {
+    f32::from_bits(if key >> 31 == 1 { key & !(1 << 31) } else { !key })
 }
 
 /// Returns the 8-bit sRGB code of a linear value.
@@ -251,5 +286,21 @@ mod tests {
         let mut picture = LinearRgb::black(1, 4);
         picture.add(&ndarray::array![[1.0, 2.0, 3.0, 4.0]], [1.0, 1.0, 1.0]);
         assert_eq!([picture.level_at(0.0), picture.level_at(1.0)], [1.0, 4.0]);
+    }
+
+    #[test]
+    fn counted_levels_are_the_sorted_ones() {
+        // Of both signs and many magnitudes, some alike, with zeros and infinities.
+        let sample = |i: usize| ((i * 7919 % 613) as f32 - 300.0).powi(3) * 10.0_f32.powi(i as i32 % 11 - 5);
+        let mut one = Array2::from_shape_fn((23, 31), |(r, c)| sample(31 * r + c));
+        one[(3, 4)] = f32::INFINITY;
+        one[(5, 6)] = -0.0;
+        let other = one.mapv(|v| 0.5 * v);
+        let mut sorted: Vec<f32> = one.iter().chain(&other).copied().collect();
+        sorted.sort_by(f32::total_cmp);
+        for share in [0.0, 0.02, 0.37, 0.5, 0.99, 1.0] {
+            let expected = sorted[((sorted.len() - 1) as f64 * share) as usize];
+            assert_eq!(level_at(&[&one, &other], share).to_bits(), f64::from(expected).to_bits(), "{share}");
+        }
     }
 }

@@ -115,7 +115,7 @@ pub enum PipelineError {
     Cancelled(#[from] Cancelled),
     /// Less memory than the imaging of a scene takes.
     #[error(
-        "the imaging may take {}, but scene, plan and film take at least {}: give it more memory, or take fewer pixels or bands",
+        "the imaging may take {}, but it and its film take at least {}: give it more memory, or take fewer pixels or bands",
         shown_bytes(*budget_bytes),
         shown_bytes(*least_bytes)
     )]

@@ -318,8 +318,7 @@ pub(crate) fn write_raw_as(
     let names = raw.planes.iter().zip(&raw.filter_names).map(|(plane, filter)| {
         let is_single = raw.planes.len() == 1;
         let name = if is_single { format!("{stem}.{extension}") } else { format!("{stem}.{filter}.{extension}") };
-        let own = Raw { planes: vec![plane.clone()], ..raw.clone() };
-        own.write(&folder.join(&name))?;
+        plane.write(&folder.join(&name))?;
         Ok(name)
     });
     names.collect()

@@ -11,6 +11,9 @@ use image::ImageBuffer;
 
 use crate::{Picture, Raw, RawPlane, SensorError};
 
+/// What frames of digital numbers are written as.
+const A_PICTURE: &str = "a 16-bit picture";
+
 /// How many bits a file has for each code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Depth {
@@ -44,24 +47,45 @@ impl Raw {
     /// When the frame is in volts or has stacked filters, the extension is another or the file cannot be written; then
     /// there is no file.
     pub fn write(&self, path: &Path) -> Result<(), SensorError> {
-        let dn = self.dn().ok_or_else(|| self.without_numbers("a 16-bit picture"))?;
+        match self.planes.as_slice() {
+            [plane @ RawPlane::Dn(_)] => plane.write(path),
+            _ => Err(self.without_numbers(A_PICTURE)),
+        }
+    }
+
+    /// Returns the error of a frame that has no plane of digital numbers.
+    pub(crate) fn without_numbers(&self, what: &'static str) -> SensorError {
+        match self.planes.as_slice() {
+            [plane] => plane.without_numbers(what),
+            _ => needs_numbers(what, "several planes, from a sensor of stacked filters"),
+        }
+    }
+}
+
+impl RawPlane {
+    /// Writes the digital numbers as [`Raw::write`] does those of a frame.
+    ///
+    /// # Errors
+    /// When the samples are no digital numbers, the extension is another or the file cannot be written; then there is no file.
+    pub fn write(&self, path: &Path) -> Result<(), SensorError> {
+        let dn = self.dn().ok_or_else(|| self.without_numbers(A_PICTURE))?;
         let codes: Vec<u16> = dn.iter().copied().collect();
         let image = ImageBuffer::from_raw(dn.ncols() as u32, dn.nrows() as u32, codes).map(DynamicImage::ImageLuma16);
         write_image(path, &image.expect("one code a pixel"))
     }
 
-    /// Returns the error of a frame that has no plane of digital numbers.
-    pub(crate) fn without_numbers(&self, what: &'static str) -> SensorError {
-        let found = match self.planes.as_slice() {
-            [RawPlane::Volts(_), ..] => "volts, from a sensor without converter",
-            [RawPlane::Evened(_), ..] => "numbers whose levels were evened out",
-            _ => "several planes, from a sensor of stacked filters",
+    fn without_numbers(&self, what: &'static str) -> SensorError {
+        let found = match self {
+            Self::Volts(_) => "volts, from a sensor without converter",
+            Self::Evened(_) => "numbers whose levels were evened out",
+            Self::Dn(_) => "digital numbers",
         };
-        SensorError::Unsuitable {
-            what,
-            reason: format!("needs one plane of digital numbers, but the frame has {found}"),
-        }
+        needs_numbers(what, found)
     }
+}
+
+fn needs_numbers(what: &'static str, found: &str) -> SensorError {
+    SensorError::Unsuitable { what, reason: format!("needs one plane of digital numbers, but the frame has {found}") }
 }
 
 fn write_image(path: &Path, image: &DynamicImage) -> Result<(), SensorError> {

@@ -248,8 +248,9 @@ pub(crate) fn develop_linear(
     }
     let balance = gains(camera, &planes, tile, &processing.white)?;
     weigh(&mut planes, tile, &balance, processing.highlights);
+    // Either way the planes are given up here: frames are large.
     let mut channels = match tile {
-        Some(tile) => demosaic(&planes[0], tile, n_channels, processing.demosaic)?,
+        Some(tile) => demosaic(&planes.swap_remove(0), tile, n_channels, processing.demosaic)?,
         None => planes.into_iter().map(|plane| plane.as_standard_layout().into_owned()).collect(),
     };
     if let Some(saturated) = saturated {

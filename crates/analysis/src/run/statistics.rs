@@ -1,8 +1,7 @@
 //! Numbers of a capture: what the sensor saw and what the lens lost.
 
 use dioptric_optics::{MonoLens, ObjectPoint, Vignetting, glam::DVec2, rays_over_front};
-use dioptric_sensor::{Raw, Tile};
-use ndarray::Array2;
+use dioptric_sensor::Tile;
 use serde::Serialize;
 
 use super::pixel_optics::PixelOpticsData;
@@ -114,46 +113,36 @@ impl SensorStatistics {
 fn channel(frames: &Frames<'_>, tile: Option<&Tile>, filter: usize, read_noise_e: f64) -> ChannelStatistics {
     let Frames { sensor, exposure, rate, exposed, .. } = frames;
     let raw = &exposed.raw;
-    let electrons: Vec<f64> =
-        of_filter(&rate.planes_e_per_s, tile, filter).map(|rate| f64::from(rate) * exposure.time_s).collect();
-    let top = raw.levels.top;
-    let raw = raw_planes(raw);
-    let samples: Vec<f64> = of_filter(&raw, tile, filter).map(f64::from).collect();
-    let mean_of = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let mean_e = mean_of(&electrons);
-    let mut histogram = vec![0.0; BINS];
-    for sample in &samples {
-        let bin = (sample / top * BINS as f64) as usize;
-        histogram[bin.min(BINS - 1)] += 1.0 / samples.len() as f64;
+    let plane = if tile.is_some() { 0 } else { filter };
+    let (mut sum_e, mut max_e, mut sum_raw, mut counts) = (0.0, 0.0_f64, 0.0, vec![0_usize; BINS]);
+    for at in places_of_filter(raw.size(), tile, filter) {
+        let electrons = f64::from(rate.planes_e_per_s[plane][at]) * exposure.time_s;
+        sum_e += electrons;
+        max_e = max_e.max(electrons);
+        let sample = raw.planes[plane].sample(at.0, at.1).unwrap_or_default();
+        sum_raw += sample;
+        counts[((sample / raw.levels.top * BINS as f64) as usize).min(BINS - 1)] += 1;
     }
+    let n_pixels = counts.iter().sum::<usize>().max(1) as f64;
+    let mean_e = sum_e / n_pixels;
     ChannelStatistics {
         filter: sensor.filters[filter].name.clone(),
         mean_e,
-        max_e: electrons.iter().copied().fold(0.0, f64::max),
+        max_e,
         snr_db: 20.0 * (mean_e / (mean_e + read_noise_e.powi(2)).sqrt()).log10(),
-        mean_raw: mean_of(&samples),
-        histogram,
+        mean_raw: sum_raw / n_pixels,
+        histogram: counts.into_iter().map(|count| count as f64 / n_pixels).collect(),
     }
 }
 
-/// Returns the samples of the pixels behind a filter.
-fn of_filter<'a>(
-    planes: &'a [Array2<f32>],
-    tile: Option<&'a Tile>,
+/// Returns the rows and columns of the pixels behind a filter: all of them where filters are stacked.
+fn places_of_filter(
+    (rows, columns): (usize, usize),
+    tile: Option<&Tile>,
     filter: usize,
-) -> Box<dyn Iterator<Item = f32> + 'a> {
-    match tile {
-        None => Box::new(planes[filter].iter().copied()),
-        Some(tile) => Box::new(
-            planes[0]
-                .indexed_iter()
-                .filter_map(move |((row, column), &value)| (tile.filter_at(row, column) == filter).then_some(value)),
-        ),
-    }
-}
-
-fn raw_planes(raw: &Raw) -> Vec<Array2<f32>> {
-    raw.planes.iter().map(|plane| plane.samples().into_owned()).collect()
+) -> impl Iterator<Item = (usize, usize)> {
+    let places = (0..rows).flat_map(move |row| (0..columns).map(move |column| (row, column)));
+    places.filter(move |&(row, column)| tile.is_none_or(|tile| tile.filter_at(row, column) == filter))
 }
 
 /// Returns where the light of a few fields goes, at the reference wavelength and the depth in focus.

@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File, OpenOptions},
-    io::{Read, Seek, SeekFrom, Write},
+    io::{BufWriter, Read, Seek, SeekFrom, Write},
     ops::Range,
     path::{Path, PathBuf},
 };
@@ -16,6 +16,9 @@ use crate::{Camera, PipelineError, Quality};
 const KEY: &str = "bands.ron";
 /// The bands one after the other, little-endian.
 const BANDS: &str = "bands.raw";
+
+/// Rows of a band that are read at a time.
+const ROWS_AT_ONCE: usize = 64;
 
 /// How a camera keeps bands as they are finished.
 #[derive(Clone, Copy, Debug)]
@@ -123,8 +126,7 @@ impl BandStore {
     /// Adds the next band.
     pub(super) fn append(&mut self, plane: &Array2<f32>) -> std::io::Result<()> {
         self.file.seek(SeekFrom::Start(self.n_done as u64 * band_bytes(self.size)))?;
-        let bytes: Vec<u8> = plane.iter().flat_map(|sample| sample.to_le_bytes()).collect();
-        self.file.write_all(&bytes)?;
+        write_plane(&mut self.file, plane)?;
         self.n_done += 1;
         Ok(())
     }
@@ -139,9 +141,22 @@ fn band_bytes((rows, columns): (usize, usize)) -> u64 {
     4 * rows as u64 * columns as u64
 }
 
+/// Writes a band where the file stands, a row at a time.
+pub(super) fn write_plane(file: &mut File, plane: &Array2<f32>) -> std::io::Result<()> {
+    let mut writer = BufWriter::with_capacity(1 << 20, file);
+    for row in plane.rows() {
+        let bytes: Vec<u8> = row.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+        writer.write_all(&bytes)?;
+    }
+    writer.flush()
+}
+
 /// Reads a band of a file of bands.
 pub(super) fn read_plane(file: &mut File, band: usize, size: (usize, usize)) -> std::io::Result<Array2<f32>> {
-    let samples = read_rows(file, band, 0..size.0, size)?;
+    let mut samples = Vec::with_capacity(size.0 * size.1);
+    for first in (0..size.0).step_by(ROWS_AT_ONCE) {
+        samples.extend(read_rows(file, band, first..(first + ROWS_AT_ONCE).min(size.0), size)?);
+    }
     Ok(Array2::from_shape_vec(size, samples).expect("as many samples as were asked for"))
 }
 

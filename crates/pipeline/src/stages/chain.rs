@@ -6,6 +6,7 @@ use dioptric_forward::{ImagingPlan, check_depth_map};
 use dioptric_psf::{LensImage, LensImageModel};
 use dioptric_scene::Scene;
 use dioptric_sensor::{Developed, Illumination, Processing};
+use dioptric_spectrum::Bands;
 
 use super::{
     Watch,
@@ -132,7 +133,9 @@ impl Chain<'_> {
     pub(super) fn irradiance(&self, inputs: &IrradianceInputs) -> Result<Arc<Irradiance>, PipelineError> {
         self.kept.irradiance.get_or_make(inputs.clone(), |inputs| {
             if let Some(spec) = inputs.dual_pixel {
-                return self.irradiance_of_photodiodes(inputs, spec);
+                let irradiance = self.irradiance_of_photodiodes(inputs, spec)?;
+                self.make_room_for_film(inputs, &irradiance)?;
+                return Ok(irradiance);
             }
             if let Some(effort) = inputs.effort {
                 let picture = self.world_render(inputs)?.render(effort, &self.watch)?.picture;
@@ -143,8 +146,32 @@ impl Chain<'_> {
                 let reason = "only rays from the film go through its array, expected a world with method: Backward";
                 return Err(PipelineError::Unsuitable { what: "light_field", reason: reason.to_owned() });
             }
-            self.imaged(inputs)
+            let irradiance = self.imaged(inputs)?;
+            self.make_room_for_film(inputs, &irradiance)?;
+            Ok(irradiance)
         })
+    }
+
+    /// Lets go of plans, then of scenes but for the depth, where the budget does not hold them beside what becomes of the irradiance.
+    fn make_room_for_film(&self, inputs: &IrradianceInputs, irradiance: &Irradiance) -> Result<(), PipelineError> {
+        let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
+        if self.drops_plans(&place, irradiance) {
+            let resolved = self.scene(&inputs.scene)?;
+            self.kept.depth.put(inputs.scene.geometry.clone(), resolved.scene.require_depth()?.clone());
+            self.kept.let_go_of_scenes();
+        }
+        Ok(())
+    }
+
+    /// Lets go of plans where the budget does not hold them beside what becomes of an irradiance; returns whether more has to go.
+    fn drops_plans(&self, place: &FilmPlace, irradiance: &Irradiance) -> bool {
+        let Some(budget) = self.budget else { return false };
+        let has_room =
+            || budget.holds(self.kept.imaging_bytes() + irradiance.memory_bytes(), place, irradiance.grid().len());
+        if !has_room() {
+            self.kept.plan.clear();
+        }
+        !has_room()
     }
 
     /// Images the scene through the pupil, or the part of it that a photodiode sees.
@@ -154,7 +181,12 @@ impl Chain<'_> {
         let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
         let scene: &Scene = &resolved.scene;
         let memory_bytes = match self.budget {
-            Some(budget) => budget.irradiance_bytes(&plan, scene, &place)?.min(self.memory_bytes),
+            // The sum of photodiodes' light is as large as each of them.
+            Some(budget) => {
+                let n_irradiances =
+                    inputs.plan.photodiode.map_or(1, |(spec, _)| 1 + spec.photodiodes.names().len() as u64);
+                (budget.irradiance_bytes(&plan, scene, &place)? / n_irradiances).min(self.memory_bytes)
+            }
             None => self.memory_bytes,
         };
         let folder = self.bands.map(|keeping| keeping.folder(inputs)).transpose()?;
@@ -184,9 +216,11 @@ impl Chain<'_> {
             let progress = Part { progress: self.watch.progress, number, of: n };
             let watch = Watch { progress: &progress, cancel: self.watch.cancel };
             let chain: Chain<'_> = *self;
-            Chain { memory_bytes, watch, ..chain }.imaged(&inputs)
+            let irradiance = Chain { memory_bytes, watch, ..chain }.imaged(&inputs)?;
+            self.drops_plans(&*self.film(&inputs.plan.bank.film, &inputs.scene)?, &irradiance);
+            Ok(irradiance)
         };
-        let photodiodes = (0..n).map(irradiance).collect::<Result<Vec<_>, _>>()?;
+        let photodiodes = (0..n).map(irradiance).collect::<Result<Vec<_>, PipelineError>>()?;
         let narrow = photodiodes[0].summary.narrow_surfaces;
         Ok(Irradiance::of_photodiodes(photodiodes, self.memory_bytes)?.with_narrow_surfaces(narrow))
     }

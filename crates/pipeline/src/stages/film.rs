@@ -10,7 +10,7 @@ use super::{
     scene::ResolvedScene,
     spec::{FilmInputs, Raster},
 };
-use crate::{Crop, FocusSpec, Movements, PipelineError};
+use crate::{Crop, FocusSpec, Movements, PipelineError, display::level_at};
 
 /// The share of the scene's samples that may be nearer than the near object.
 const NEAR_SHARE: f64 = 0.02;
@@ -153,9 +153,7 @@ fn place_film(focus: FocusSpec, lens: &MonoLens, scene: &Scene) -> Result<f64, P
 
 /// Returns the depth that a small share of the samples do not reach.
 fn near_depth_m(scene: &Scene) -> Result<f64, PipelineError> {
-    let mut depths: Vec<f32> = scene.require_depth()?.z_m().iter().copied().collect();
-    let index = ((depths.len() - 1) as f64 * NEAR_SHARE) as usize;
-    Ok(f64::from(*depths.select_nth_unstable_by(index, f32::total_cmp).1))
+    Ok(level_at(&[scene.require_depth()?.z_m()], NEAR_SHARE))
 }
 
 /// Returns as many pixels as the scene has samples about the axis, of such a pitch that they see the scene's field.

@@ -3,7 +3,6 @@
 use std::{
     borrow::Cow,
     fs::File,
-    io::Write,
     ops::Range,
     path::Path,
     sync::{Mutex, PoisonError},
@@ -16,7 +15,7 @@ use ndarray::{Array2, Array3, ArrayView3, Axis, s};
 
 use super::{
     Watch,
-    band_store::{BandFolder, BandStore, read_plane, read_rows},
+    band_store::{BandFolder, BandStore, read_plane, read_rows, write_plane},
     film::FilmPlace,
     narrow_surfaces::NarrowSurfaces,
 };
@@ -27,6 +26,9 @@ use crate::{
 
 /// The name of the file of spectral irradiance.
 pub const IRRADIANCE_FILE: &str = "irradiance.exr";
+
+/// Bytes of rows of all bands that are written at a time where memory is scarce.
+const STRIP_BYTES: usize = 32 << 20;
 
 /// Returns the name of the file of the spectral irradiance by which a photodiode is lit.
 pub(crate) fn photodiode_irradiance_file(name: &str) -> String {
@@ -44,7 +46,7 @@ pub struct Irradiance {
     planes: Planes,
     /// What falls on each of the photodiodes that it is the sum of; none for whole pixels.
     photodiodes: Vec<Self>,
-    /// Means, largest samples and a few bands.
+    /// Means and largest samples.
     pub summary: IrradianceSummary,
 }
 
@@ -68,8 +70,6 @@ pub struct IrradianceSummary {
     pub max: Vec<f64>,
     /// Mean illuminance, lux.
     pub mean_lux: f64,
-    /// A few whole bands, each with its wavelength, nm.
-    pub bands: Vec<(f64, Array2<f32>)>,
     /// All bands as an observer sees them, linear sRGB in lux.
     pub seen: LinearRgb,
     /// Surfaces narrower than the pupil, where the scene has any and was imaged in layers of depth.
@@ -82,9 +82,24 @@ impl Irradiance {
         size_bytes(self.size, self.grid.len())
     }
 
+    /// Returns the bytes of memory that bands take, those of photodiodes included.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        let own = if self.is_spilled() { 0 } else { self.size_bytes() };
+        own + self.photodiodes.iter().map(Self::memory_bytes).sum::<u64>()
+    }
+
     /// Whether the bands are in a file and not in memory.
     pub fn is_spilled(&self) -> bool {
         !matches!(self.planes, Planes::Memory(_))
+    }
+
+    /// The numbers of up to four bands that stand for all, from the first to the last.
+    pub fn shown_bands(&self) -> Vec<usize> {
+        let (first_nm, last_nm) = self.grid.range_nm();
+        let nearest = |i: i32| self.grid.nearest(first_nm + (last_nm - first_nm) * f64::from(i) / 3.0);
+        let mut shown: Vec<usize> = (0..4).map(nearest).collect();
+        shown.dedup();
+        shown
     }
 
     /// The irradiance by which each photodiode of a pixel is lit, which is the sum of them; none for whole pixels.
@@ -140,6 +155,7 @@ impl Irradiance {
             pitch_um: Some(self.pitch_um),
             largest: self.summary.max.iter().fold(0.0, |a, &b| a.max(b as f32)),
             samples,
+            at_once_bytes: if self.is_spilled() { STRIP_BYTES } else { 4 * STRIP_BYTES },
         };
         Ok(head.write_exr(path, &mut |band, rows| self.rows_of(band, rows))?)
     }
@@ -288,8 +304,7 @@ pub(super) fn image(
             store.append(&plane)?;
         }
         if let Some(file) = &mut file {
-            let bytes: Vec<u8> = plane.iter().flat_map(|sample| sample.to_le_bytes()).collect();
-            file.write_all(&bytes)?;
+            write_plane(file, &plane)?;
         }
         if !is_spilled {
             cube.index_axis_mut(Axis(0), band).assign(&plane);
@@ -308,29 +323,22 @@ pub(super) fn image(
 
 /// Sums up bands as they come.
 struct Summing {
-    wavelengths_nm: Vec<f64>,
     to_rgb: SpectrumToRgb,
     luminous: Vec<f64>,
-    chosen: Vec<usize>,
     summary: IrradianceSummary,
 }
 
 impl Summing {
     fn new(grid: &WavelengthGrid, (rows, columns): (usize, usize)) -> Self {
         let [_, luminous, _] = Observer::Cie1931.weights(grid);
-        let (first, last) = grid.range_nm();
-        let mut chosen: Vec<usize> =
-            (0..4).map(|i| grid.nearest(first + (last - first) * f64::from(i) / 3.0)).collect();
-        chosen.dedup();
         let summary = IrradianceSummary {
             mean: Vec::with_capacity(grid.len()),
             max: Vec::with_capacity(grid.len()),
             mean_lux: 0.0,
-            bands: Vec::new(),
             seen: LinearRgb::black(rows, columns),
             narrow_surfaces: None,
         };
-        Self { wavelengths_nm: grid.centers_nm().to_vec(), to_rgb: SpectrumToRgb::new(grid), luminous, chosen, summary }
+        Self { to_rgb: SpectrumToRgb::new(grid), luminous, summary }
     }
 
     fn add(&mut self, band: usize, plane: &Array2<f32>) {
@@ -339,9 +347,6 @@ impl Summing {
         self.summary.max.push(plane.iter().copied().fold(0.0, f32::max).into());
         self.summary.mean_lux += self.luminous[band] * mean;
         self.summary.seen.add(plane, self.to_rgb.of_band(band));
-        if self.chosen.contains(&band) {
-            self.summary.bands.push((self.wavelengths_nm[band], plane.clone()));
-        }
     }
 }
 

@@ -6,15 +6,26 @@ use dioptric_scene::Scene;
 use super::film::FilmPlace;
 use crate::PipelineError;
 
-/// What the stages after the irradiance take for a pixel of the film, bytes: electrons, volts, codes and colors.
-const FILM_BYTES: u64 = 96;
+/// What the program takes before it has a scene: code, tables, the lens and its rays, bytes.
+const PROGRAM_BYTES: u64 = 48 << 20;
+
+/// What is summed up of the irradiance while it is imaged, for a pixel of the film, bytes: its colors, kept to the end.
+const SEEN_BYTES: u64 = 12;
+
+/// What the stages after the irradiance take for a pixel of the film, its colors included, bytes: electrons, volts, codes, channels and
+/// light.
+const FILM_BYTES: u64 = 62;
+
+/// Rows of all bands that take memory while `irradiance.exr` is written: two blocks of 32 as they are read and packed by two threads, and packed.
+const WRITTEN_ROWS: u64 = 7 * 32;
 
 /// What bands in flight and kept kernels take where nobody counts, bytes.
 const USUAL_BYTES: u64 = 256 << 20;
 
-/// The memory that imaging may take: the scene, its plan, the bands that are worked on, and what becomes of the film.
+/// The memory that a capture may take: the program, then scene, plan and bands that are worked on, then the frames of the film and the
+/// picture. Scene and plan make room for frames where both do not fit.
 ///
-/// Beside that the program itself, the rays of the lens and, while it is read, the file of a scene take memory of their own.
+/// The file of a scene takes memory of its own while it is read, and so do frames of more than one plane and merged ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct MemoryBudget {
     pub(crate) bytes: u64,
@@ -36,7 +47,7 @@ impl MemoryBudget {
     /// Says the least that would do, as far as that is known.
     pub(crate) fn check(self, scene: &Scene, place: &FilmPlace) -> Result<(), PipelineError> {
         let samples = (scene.rows() * scene.columns()).max(place.rows * place.columns) as u64;
-        self.left(fixed_bytes(scene, place), 16 * samples).map(|_| ())
+        self.left(imaging_bytes(scene, place), 16 * samples, film_bytes(place, n_bands(scene))).map(|_| ())
     }
 
     /// Returns the plan with bands in flight and kept kernels that fit.
@@ -47,7 +58,7 @@ impl MemoryBudget {
         let shares = self.shares(&plan, scene, place)?;
         let plan = plan.with_kernel_budget(shares.kernels.min(USUAL_BYTES) as usize);
         // Where there is room for what is usual, it stays as usual.
-        let is_tight = shares.bands < USUAL_BYTES.max(4 * plan.band_bytes() as u64);
+        let is_tight = shares.bands < USUAL_BYTES.max(4 * (plan.band_bytes() + plan.bases_bytes()) as u64);
         Ok(if is_tight { plan.with_band_budget(shares.bands as usize) } else { plan })
     }
 
@@ -64,28 +75,53 @@ impl MemoryBudget {
         Ok(self.shares(plan, scene, place)?.irradiance)
     }
 
-    /// Half of what scene, plan and film leave is for bands in flight, a quarter each for kernels and irradiance; kernels and bands
-    /// take no more than is usual.
-    fn shares(self, plan: &ImagingPlan, scene: &Scene, place: &FilmPlace) -> Result<Shares, PipelineError> {
-        let band = plan.band_bytes() as u64;
-        let left = self.left(fixed_bytes(scene, place) + plan.size_bytes() as u64, band)?;
-        let bands = (left / 2).clamp(band, USUAL_BYTES.max(4 * band));
-        let kernels = ((left - bands) / 2).min(USUAL_BYTES);
-        Ok(Shares { bands, kernels, irradiance: left - bands - kernels })
+    /// Whether so many bytes can stay in memory while frames are taken and developed.
+    pub(crate) fn holds(self, bytes: u64, place: &FilmPlace, n_bands: usize) -> bool {
+        PROGRAM_BYTES + bytes + film_bytes(place, n_bands) <= self.bytes
     }
 
-    fn left(self, fixed: u64, band: u64) -> Result<u64, PipelineError> {
-        let least_bytes = fixed + band;
-        match self.bytes.checked_sub(fixed) {
-            Some(left) if left >= band => Ok(left),
-            _ => Err(PipelineError::Memory { budget_bytes: self.bytes, least_bytes }),
+    /// Half of what scene and plan leave is for bands in flight and what they are interpolated from, a quarter each for kernels and irradiance, or
+    /// all of it for kernels where the irradiance does not fit; kernels and bands take no more than is usual, and irradiance no more than the stages
+    /// after it leave.
+    fn shares(self, plan: &ImagingPlan, scene: &Scene, place: &FilmPlace) -> Result<Shares, PipelineError> {
+        let band = (plan.band_bytes() + plan.bases_bytes()) as u64;
+        let film = film_bytes(place, n_bands(scene));
+        let left = self.left(imaging_bytes(scene, place) + plan.size_bytes() as u64, band, film)?;
+        let bands = (left / 2).clamp(band, USUAL_BYTES.max(4 * band));
+        let rest = left - bands;
+        let whole = 4 * (n_bands(scene) * place.rows * place.columns) as u64;
+        let kernels = if rest / 2 < whole { rest } else { rest / 2 }.min(USUAL_BYTES);
+        let beside_film = self.bytes - PROGRAM_BYTES - film;
+        Ok(Shares { bands, kernels, irradiance: (rest - kernels).min(beside_film) })
+    }
+
+    /// Returns what is left where imaging takes `fixed` bytes and those of a band at least, and what comes after it those of `film`.
+    fn left(self, fixed: u64, band: u64, film: u64) -> Result<u64, PipelineError> {
+        let least_bytes = PROGRAM_BYTES + (fixed + band).max(film);
+        if self.bytes < least_bytes {
+            return Err(PipelineError::Memory { budget_bytes: self.bytes, least_bytes });
         }
+        Ok(self.bytes - PROGRAM_BYTES - fixed)
     }
 }
 
-/// Returns what the scene and the film take whatever is done, bytes.
-fn fixed_bytes(scene: &Scene, place: &FilmPlace) -> u64 {
+/// Returns what the scene takes, bytes.
+pub(crate) fn scene_bytes(scene: &Scene) -> u64 {
     let layers = 1 + u64::from(scene.hidden.is_some());
-    let planes = layers * (scene.radiance.grid().len() as u64 + 1);
-    4 * planes * (scene.rows() * scene.columns()) as u64 + FILM_BYTES * (place.rows * place.columns) as u64
+    let planes = layers * (n_bands(scene) as u64 + 1);
+    4 * planes * (scene.rows() * scene.columns()) as u64
+}
+
+/// Returns what imaging takes whatever is done, the plan left out, bytes.
+fn imaging_bytes(scene: &Scene, place: &FilmPlace) -> u64 {
+    scene_bytes(scene) + SEEN_BYTES * (place.rows * place.columns) as u64
+}
+
+/// Returns what the stages after an irradiance of so many bands take, bytes.
+fn film_bytes(place: &FilmPlace, n_bands: usize) -> u64 {
+    FILM_BYTES * (place.rows * place.columns) as u64 + 4 * WRITTEN_ROWS * (place.columns * n_bands) as u64
+}
+
+fn n_bands(scene: &Scene) -> usize {
+    scene.radiance.grid().len()
 }

@@ -15,6 +15,7 @@ use super::{
     lens::ResolvedLens,
     lens_tables::LensAberrations,
     lit_still_life::RadiantStillLife,
+    memory::scene_bytes,
     painting::PaintingInputs,
     scene::{ResolvedScene, SceneSummary},
     slot::Slot,
@@ -93,6 +94,21 @@ pub struct StageCounts {
 }
 
 impl KeptResults {
+    /// Returns the bytes of memory that scenes and plans take.
+    pub(super) fn imaging_bytes(&self) -> u64 {
+        let scenes: u64 = self.scene.all().iter().map(|resolved| scene_bytes(&resolved.scene)).sum();
+        scenes + self.plan.all().iter().map(|plan| plan.size_bytes() as u64).sum::<u64>()
+    }
+
+    /// Lets go of scenes and of plans for them, the largest of what imaging needs and nothing after it does.
+    pub(super) fn let_go_of_scenes(&self) {
+        self.plan.clear();
+        self.scene.clear();
+        self.painting.clear();
+        self.lit.clear();
+        self.world.clear();
+    }
+
     /// How often each stage was run.
     pub(super) fn counts(&self) -> StageCounts {
         StageCounts {

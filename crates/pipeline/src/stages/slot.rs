@@ -62,6 +62,17 @@ impl<K: PartialEq, T> Slot<K, T> {
         result
     }
 
+    /// Returns all results that are kept, the one that was asked for last at the end.
+    pub(crate) fn all(&self) -> Vec<Arc<T>> {
+        let entries = self.entries.lock().unwrap_or_else(PoisonError::into_inner);
+        entries.iter().map(|(_, result)| result.clone()).collect()
+    }
+
+    /// Lets go of all results; who holds one keeps it.
+    pub(crate) fn clear(&self) {
+        self.entries.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+
     /// The number of results that were made.
     pub(crate) fn n_made(&self) -> usize {
         self.n_made.load(Ordering::Relaxed)
@@ -88,6 +99,16 @@ mod tests {
         let ask = |key: u32| *slot.get_or_make(key, |k| Ok::<_, Infallible>(*k)).unwrap();
         let _ = [ask(1), ask(2), ask(1), ask(3)];
         assert!(slot.get(&1).is_some() && slot.get(&2).is_none() && slot.get(&3).is_some());
+    }
+
+    #[test]
+    fn cleared_results_are_made_again() {
+        let slot = Slot::new(2);
+        let ask = |key: u32| slot.get_or_make(key, |k| Ok::<_, Infallible>(k * 10)).unwrap();
+        let held = ask(1);
+        assert_eq!((*ask(2), slot.all()), (20, vec![Arc::new(10), Arc::new(20)]));
+        slot.clear();
+        assert_eq!((slot.all().len(), *held, *ask(1), slot.n_made()), (0, 10, 10, 3));
     }
 
     #[test]

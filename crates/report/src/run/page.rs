@@ -2,15 +2,16 @@
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use image::RgbImage;
-use ndarray::Array2;
 
 use super::html::{Figure, Page, Pictures, write_page};
 use dioptric_analysis::MOST_ERROR_PX;
 
 use crate::{LensDrawing, MosaicPlan, PsfMosaic, png::png_bytes};
 use dioptric_pipeline::{
-    PipelineError, REFERENCE_WAVELENGTH_NM, display::LinearRgb, display::code, display::wavelength_color,
+    PipelineError, REFERENCE_WAVELENGTH_NM,
+    display::{LinearRgb, code, level_at, wavelength_color},
 };
+use dioptric_spectrum::Bands;
 
 /// Widest small picture, pixels.
 const THUMBNAIL: usize = 480;
@@ -34,7 +35,7 @@ pub(super) fn render(page: &Page<'_>) -> Result<String, PipelineError> {
         lens_svg: drawing.to_svg(&page.run.capture.lens.lens).unwrap_or_default(),
         mosaic: mosaic(page)?,
         seen: seen(&page.run.capture.irradiance.summary.seen),
-        bands: bands(page),
+        bands: bands(page)?,
         depth: depth(page),
         disparity: disparity(page),
     };
@@ -81,27 +82,29 @@ fn mosaic(page: &Page<'_>) -> Result<(PsfMosaic, String), PipelineError> {
 
 /// The irradiance as an observer sees it, exposed for its brightest per cent.
 fn seen(light: &LinearRgb) -> String {
-    embedded(&thumbnail(&light.to_srgb(light.level_at(0.99).max(f64::MIN_POSITIVE))))
+    embedded(&thumbnail(light.to_srgb(light.level_at(0.99).max(f64::MIN_POSITIVE))))
 }
 
 /// A few bands, each in its color and exposed alike.
-fn bands(page: &Page<'_>) -> Vec<Figure> {
-    let bands = &page.run.capture.irradiance.summary.bands;
-    let top = bands.iter().map(|(_, plane)| level_at(plane, 0.995)).fold(f64::MIN_POSITIVE, f64::max);
-    bands
-        .iter()
-        .map(|(nm, plane)| {
-            let tint = tint(*nm);
-            let picture = RgbImage::from_fn(plane.ncols() as u32, plane.nrows() as u32, |x, y| {
-                let value = f64::from(plane[(y as usize, x as usize)]) / top;
-                image::Rgb(tint.map(|t| code(value * t)))
-            });
-            Figure {
-                src: embedded(&thumbnail(&picture)),
-                caption: format!("{nm:.0} nm, full scale {:.3} mW m⁻² nm⁻¹", 1e3 * top),
-            }
-        })
-        .collect()
+fn bands(page: &Page<'_>) -> Result<Vec<Figure>, PipelineError> {
+    let irradiance = &page.run.capture.irradiance;
+    let shown = irradiance.shown_bands();
+    // Each is read twice, so that only one is in memory at a time.
+    let mut top = f64::MIN_POSITIVE;
+    for &band in &shown {
+        top = top.max(level_at(&[&*irradiance.band(band)?], 0.995));
+    }
+    let figure = |&band: &usize| {
+        let (plane, nm) = (irradiance.band(band)?, irradiance.grid().centers_nm()[band]);
+        let tint = tint(nm);
+        let picture = RgbImage::from_fn(plane.ncols() as u32, plane.nrows() as u32, |x, y| {
+            let value = f64::from(plane[(y as usize, x as usize)]) / top;
+            image::Rgb(tint.map(|t| code(value * t)))
+        });
+        let caption = format!("{nm:.0} nm, full scale {:.3} mW m⁻² nm⁻¹", 1e3 * top);
+        Ok(Figure { src: embedded(&thumbnail(picture)), caption })
+    };
+    shown.iter().map(figure).collect()
 }
 
 /// The color of a band, its largest part 1.
@@ -125,7 +128,7 @@ fn depth(page: &Page<'_>) -> String {
         let level = (30.0 + 210.0 * share).round() as u8;
         image::Rgb([level, level, level])
     });
-    embedded(&thumbnail(&picture))
+    embedded(&thumbnail(picture))
 }
 
 /// Disparities of photodiodes, red for what is nearer than the focus, blue for what is beyond it, dark where nothing is known.
@@ -154,16 +157,10 @@ fn disparity(page: &Page<'_>) -> Option<Figure> {
     Some(Figure { src: embedded(&picture), caption })
 }
 
-fn level_at(plane: &Array2<f32>, share: f64) -> f64 {
-    let mut values: Vec<f32> = plane.iter().copied().collect();
-    let index = ((values.len() - 1) as f64 * share) as usize;
-    f64::from(*values.select_nth_unstable_by(index, f32::total_cmp).1)
-}
-
 /// Returns the picture made smaller by a whole number where it is wide.
-fn thumbnail(picture: &RgbImage) -> RgbImage {
+fn thumbnail(picture: RgbImage) -> RgbImage {
     let factor = (picture.width() as usize).div_ceil(THUMBNAIL).max(1) as u32;
-    if factor == 1 { picture.clone() } else { shrunk(picture, factor) }
+    if factor == 1 { picture } else { shrunk(&picture, factor) }
 }
 
 fn shrunk(picture: &RgbImage, factor: u32) -> RgbImage {

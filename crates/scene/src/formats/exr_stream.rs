@@ -27,9 +27,6 @@ use super::{
 };
 use crate::SceneError;
 
-/// Bytes of samples that are in memory at a time, besides those of whoever has the bands.
-const AT_ONCE_BYTES: usize = 128 << 20;
-
 /// What is known of a spectral image before its samples.
 #[derive(Clone, Copy, Debug)]
 pub struct SpectralHead<'a> {
@@ -45,6 +42,8 @@ pub struct SpectralHead<'a> {
     pub largest: f32,
     /// How samples are stored.
     pub samples: ExrSamples,
+    /// Bytes of samples that are in memory at a time, besides those of whoever has the bands; a few rows of all bands are at least.
+    pub at_once_bytes: usize,
 }
 
 impl SpectralHead<'_> {
@@ -124,7 +123,7 @@ impl Lines<'_> {
         let block_bytes = 4 * columns * self.channels.bands.len() * rows_per_block;
         let n_blocks = rows.div_ceil(rows_per_block);
         // Blocks are fetched one by one and packed by all threads.
-        let n_at_once = (AT_ONCE_BYTES / block_bytes).clamp(1, 4 * rayon::current_num_threads());
+        let n_at_once = (self.head.at_once_bytes / block_bytes).clamp(1, 4 * rayon::current_num_threads());
         for first in (0..n_blocks).step_by(n_at_once) {
             let range = first..(first + n_at_once).min(n_blocks);
             let blocks =

@@ -120,7 +120,15 @@ fn irradiance_keeps_its_pitch_and_reflectance_its_kind() {
 fn head(image: &SpectralImage, samples: ExrSamples) -> SpectralHead<'_> {
     let largest = image.planes().iter().flatten().fold(0.0_f32, |a, &b| a.max(b));
     let size = (image.rows(), image.columns());
-    SpectralHead { quantity: image.quantity(), grid: image.grid(), size, pitch_um: image.pitch_um(), largest, samples }
+    SpectralHead {
+        quantity: image.quantity(),
+        grid: image.grid(),
+        size,
+        pitch_um: image.pitch_um(),
+        largest,
+        samples,
+        at_once_bytes: 1 << 20,
+    }
 }
 
 fn rows_of(image: &SpectralImage) -> impl FnMut(usize, Range<usize>) -> Result<Vec<f32>, String> {
