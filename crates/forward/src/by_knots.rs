@@ -114,8 +114,9 @@ impl Buffers {
     /// Spreads the samples around a knot by the canonical kernel.
     fn spread(&mut self, fft: &mut Fft2, kernel: &KnotKernel, ((mirror, at), members): &Around<'_>) -> BlurredCell {
         fft.forward(&kernel.samples, kernel.width, &mut self.kernel);
-        let (_, columns) = self.gather((*mirror, at), members);
-        fft.forward(&self.mirrored, columns, &mut self.spectrum);
+        self.gather(at, members);
+        mirror.applied(&self.block, (at.rows, at.columns), &mut self.mirrored);
+        fft.forward(&self.mirrored, mirror.size((at.rows, at.columns)).1, &mut self.spectrum);
         multiply(&mut self.spectrum, &self.kernel);
         let at = widened(at, kernel.width);
         let (rows, columns) = mirror.size((at.rows, at.columns));
@@ -144,9 +145,11 @@ impl Buffers {
         self.lines.clear();
         self.lines.resize(n_rows * size, Complex::new(0.0, 0.0));
         for (part, ((mirror, at), members)) in pair.iter().enumerate() {
-            let (_, columns) = self.gather((*mirror, at), members);
-            for (line, samples) in self.lines.chunks_exact_mut(size).zip(self.mirrored.chunks_exact(columns)) {
-                line.iter_mut().zip(samples).for_each(|(value, sample)| *part_mut(value, part) = *sample);
+            self.gather(at, members);
+            let (block, lines) = (&self.block, (&mut self.lines[..], size));
+            match part {
+                0 => mirror.applied_to(block, (at.rows, at.columns), lines, |value, sample| value.re = sample),
+                _ => mirror.applied_to(block, (at.rows, at.columns), lines, |value, sample| value.im = sample),
             }
         }
         fft.forward_pair(&mut self.lines, &mut self.spectrum);
@@ -154,20 +157,17 @@ impl Buffers {
         fft.inverse_pair(&mut self.spectrum, n_rows + width - 1, &mut self.lines);
         for (part, ((mirror, at), _)) in pair.iter().enumerate() {
             let at = widened(at, width);
-            let (rows, columns) = mirror.size((at.rows, at.columns));
-            self.mirrored.resize(rows * columns, 0.0);
-            for (line, spread) in self.lines.chunks_exact(size).zip(self.mirrored.chunks_exact_mut(columns)) {
-                spread
-                    .iter_mut()
-                    .zip(line)
-                    .for_each(|(spread, value)| *spread = if part == 0 { value.re } else { value.im });
-            }
-            cells.push(BlurredCell { at, values: mirror.restored(&self.mirrored, (at.rows, at.columns)) });
+            let (size, lines) = ((at.rows, at.columns), (&self.lines[..], size));
+            let values = match part {
+                0 => mirror.restored_from(lines, size, |value| value.re),
+                _ => mirror.restored_from(lines, size, |value| value.im),
+            };
+            cells.push(BlurredCell { at, values });
         }
     }
 
-    /// Puts the samples of the patches around a knot, times its weights, mirrored, into `mirrored`, and returns its rows and columns.
-    fn gather(&mut self, (mirror, at): (Mirror, &Rectangle), members: &[Member<'_>]) -> (usize, usize) {
+    /// Puts the samples of the patches around a knot, times its weights, into `block`.
+    fn gather(&mut self, at: &Rectangle, members: &[Member<'_>]) {
         self.block.clear();
         self.block.resize(at.rows * at.columns, 0.0);
         for (sampled, shares) in members {
@@ -180,15 +180,7 @@ impl Buffers {
                 add_weighted(line, &places.across, along, block);
             }
         }
-        mirror.applied(&self.block, (at.rows, at.columns), &mut self.mirrored);
-        mirror.size((at.rows, at.columns))
     }
-}
-
-/// The real or the imaginary part.
-#[inline]
-fn part_mut(value: &mut Complex<f32>, part: usize) -> &mut f32 {
-    if part == 0 { &mut value.re } else { &mut value.im }
 }
 
 /// Returns what light from a rectangle reaches that is spread by a kernel.

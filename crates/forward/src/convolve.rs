@@ -85,9 +85,11 @@ impl Fft2 {
     pub(crate) fn forward_pair(&mut self, lines: &mut [Complex<f32>], spectrum: &mut Vec<Complex<f32>>) {
         let (size, scratch) = (self.size, &mut self.work.scratch);
         self.column_forward.process_with_scratch(lines, scratch);
-        spectrum.clear();
         spectrum.resize(size * size, Complex::new(0.0, 0.0));
         transpose(lines, size, spectrum, size);
+        // Below the rows there may be those of another block.
+        let n_rows = lines.len() / size;
+        spectrum.chunks_exact_mut(size).for_each(|column| column[n_rows..].fill(Complex::new(0.0, 0.0)));
         self.column_forward.process_with_scratch(spectrum, scratch);
     }
 

@@ -68,12 +68,11 @@ impl KnotKernel {
         let (top, left) = ((width - rows) / 2, (width - columns) / 2);
         let sum: f64 = kernel.iter().map(|&v| f64::from(v)).sum();
         let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
-        let mut samples = vec![0.0; width * width];
-        for (line, values) in samples.chunks_exact_mut(width).skip(top).zip(kernel.rows()) {
+        let mut bordered = Bordered::new(width);
+        for (line, values) in bordered.rows_mut().skip(top).zip(kernel.rows()) {
             line[left..].iter_mut().zip(values).for_each(|(sample, &value)| *sample = f64::from(value) * scale);
         }
-        center(&mut samples, width, centroid_px);
-        Self { width, samples: samples.into_iter().map(|sample| sample as f32).collect() }
+        Self { width, samples: centered(bordered, centroid_px) }
     }
 
     /// Adds the kernel times a factor to a square of `width` samples a side, at least its own, middle on middle.
@@ -148,21 +147,46 @@ impl Mirror {
 
     /// Returns the block of so many rows and columns of which this is the mirrored one.
     pub(crate) fn restored(self, mirrored: &[f32], (rows, columns): (usize, usize)) -> Vec<f32> {
-        let mut block = vec![];
-        if self.swaps {
-            // As `applied` has it, seen from the mirrored block.
-            copy_mirrored(mirrored, (columns, rows), [!self.flips_columns, !self.flips_rows, true], &mut block);
-        } else {
-            copy_mirrored(mirrored, (rows, columns), [self.flips_rows, self.flips_columns, false], &mut block);
-        }
+        self.restored_from((mirrored, self.size((rows, columns)).1), (rows, columns), |sample| sample)
+    }
+
+    /// Returns the block of so many rows and columns whose mirrored one a number of each value is; lines begin so many values apart.
+    pub(crate) fn restored_from<T: Copy>(
+        self,
+        (mirrored, stride): (&[T], usize),
+        (rows, columns): (usize, usize),
+        sample: impl Fn(T) -> f32,
+    ) -> Vec<f32> {
+        let mut block = vec![0.0; rows * columns];
+        // Rows and columns exchanged as `applied_to` has it, seen from the mirrored block.
+        let turned = match self.swaps {
+            true => Turned { flips_rows: !self.flips_columns, flips_columns: !self.flips_rows, swaps: true },
+            false => Turned { flips_rows: self.flips_rows, flips_columns: self.flips_columns, swaps: false },
+        };
+        turned
+            .copy((mirrored, stride), self.size((rows, columns)), (&mut block, columns), |to, from| *to = sample(from));
         block
     }
 
     /// Puts the mirrored block of one of so many rows and columns into `mirrored`.
-    pub(crate) fn applied(self, block: &[f32], size: (usize, usize), mirrored: &mut Vec<f32>) {
+    pub(crate) fn applied(self, block: &[f32], (rows, columns): (usize, usize), mirrored: &mut Vec<f32>) {
+        mirrored.resize(rows * columns, 0.0);
+        let stride = self.size((rows, columns)).1;
+        self.applied_to(block, (rows, columns), (mirrored, stride), |to, from| *to = from);
+    }
+
+    /// Puts the samples of the mirrored block of one of so many rows and columns into lines that begin so many values apart.
+    pub(crate) fn applied_to<T>(
+        self,
+        block: &[f32],
+        (rows, columns): (usize, usize),
+        lines: (&mut [T], usize),
+        put: impl Fn(&mut T, f32),
+    ) {
         // About the diagonal from lower left to upper right both are turned about once more.
-        let flips = [self.flips_rows != self.swaps, self.flips_columns != self.swaps];
-        copy_mirrored(block, size, [flips[0], flips[1], self.swaps], mirrored);
+        let (flips_rows, flips_columns) = (self.flips_rows != self.swaps, self.flips_columns != self.swaps);
+        let turned = Turned { flips_rows, flips_columns, swaps: self.swaps };
+        turned.copy((block, columns), (rows, columns), lines, put);
     }
 
     /// Returns the first moments of a kernel of which the canonical ones are known.
@@ -178,31 +202,45 @@ impl Mirror {
     }
 }
 
-/// Copies a block of rows and columns with the order of its rows turned about, of its columns, and then both exchanged.
-fn copy_mirrored(
-    block: &[f32],
-    (rows, columns): (usize, usize),
-    [flips_rows, flips_columns, swaps]: [bool; 3],
-    copy: &mut Vec<f32>,
-) {
-    /// Rows that become columns together.
-    const BATCH: usize = 8;
-    copy.clear();
-    let row_at = |row: usize| &block[if flips_rows { rows - 1 - row } else { row } * columns..][..columns];
-    if !swaps {
-        for line in (0..rows).map(row_at) {
-            if flips_columns { copy.extend(line.iter().rev()) } else { copy.extend_from_slice(line) }
+/// How a block is turned: the order of its rows, of its columns, and then both exchanged.
+#[derive(Clone, Copy)]
+struct Turned {
+    flips_rows: bool,
+    flips_columns: bool,
+    swaps: bool,
+}
+
+impl Turned {
+    /// Copies a block of so many rows and columns, turned. Lines of both begin so many values apart.
+    fn copy<A: Copy, B>(
+        self,
+        (from, from_stride): (&[A], usize),
+        (rows, columns): (usize, usize),
+        (to, to_stride): (&mut [B], usize),
+        put: impl Fn(&mut B, A),
+    ) {
+        /// Rows that become columns together.
+        const BATCH: usize = 8;
+        let row_at = |row: usize| &from[if self.flips_rows { rows - 1 - row } else { row } * from_stride..][..columns];
+        if !self.swaps {
+            for (row, to) in to.chunks_mut(to_stride).take(rows).enumerate() {
+                let (to, from) = (to[..columns].iter_mut(), row_at(row).iter());
+                if self.flips_columns {
+                    to.zip(from.rev()).for_each(|(to, from)| put(to, *from));
+                } else {
+                    to.zip(from).for_each(|(to, from)| put(to, *from));
+                }
+            }
+            return;
         }
-        return;
-    }
-    copy.resize(rows * columns, 0.0);
-    for first in (0..rows).step_by(BATCH) {
-        let n_rows = BATCH.min(rows - first);
-        let lines: [&[f32]; BATCH] = std::array::from_fn(|i| row_at(first + i.min(n_rows - 1)));
-        for (column, copy) in copy.chunks_exact_mut(rows).enumerate() {
-            let column = if flips_columns { columns - 1 - column } else { column };
-            let values = lines.map(|line| line[column]);
-            copy[first..first + n_rows].copy_from_slice(&values[..n_rows]);
+        for first in (0..rows).step_by(BATCH) {
+            let n_rows = BATCH.min(rows - first);
+            let lines: [&[A]; BATCH] = std::array::from_fn(|i| row_at(first + i.min(n_rows - 1)));
+            for (column, to) in to.chunks_mut(to_stride).take(columns).enumerate() {
+                let column = if self.flips_columns { columns - 1 - column } else { column };
+                let values = lines.map(|line| line[column]);
+                to[first..first + n_rows].iter_mut().zip(values).for_each(|(to, from)| put(to, from));
+            }
         }
     }
 }
@@ -283,25 +321,28 @@ pub(crate) fn edge_spread_peak(kernel: &[f32], width: usize) -> f64 {
 /// Distance of a kernel's centroid from where it belongs that changes no picture, pixels.
 const CENTERED_PX: f64 = 1e-7;
 
-/// Moves the centroid of a square kernel of sum 1 to a place (pixels to the right of the middle and below it), without blurring it and without negative samples.
+/// Moves the centroid of a square kernel to a place (pixels to the right of the middle and below it), without blurring it and without negative samples,
+/// and returns its samples, of sum 1.
 ///
 /// What falls on the pixels of a spread has its own centroid elsewhere where the spread is small: the part within a pixel counts as its
 /// middle. Such a shift changes over the film, and a change of shift is light that is drawn together or apart: half a per cent of a
 /// uniform plane in focus. Each round adds the derivative by central differences, which leaves second moments as they are.
-fn center(samples: &mut Vec<f64>, width: usize, centroid_px: DVec2) {
+fn centered(mut kernel: Bordered, centroid_px: DVec2) -> Vec<f32> {
     const ROUNDS: usize = 40;
-    let mut bordered = Bordered::new(samples, width);
-    let mut sums = bordered.sums();
+    let mut sums = kernel.sums();
     for _ in 0..ROUNDS {
-        let off_px = sums.centroid_px(width) - centroid_px;
+        let off_px = sums.centroid_px(kernel.width) - centroid_px;
         if f64::max(off_px.x.abs(), off_px.y.abs()) < CENTERED_PX {
             break;
         }
-        sums = bordered.moved(off_px);
+        sums = kernel.moved(off_px);
     }
     let scale = 1.0 / sums.all;
-    samples.clear();
-    samples.extend(bordered.rows().flatten().map(|sample| sample * scale));
+    let mut samples = Vec::with_capacity(kernel.width * kernel.width);
+    for row in kernel.rows() {
+        samples.extend(row.iter().map(|sample| (sample * scale) as f32));
+    }
+    samples
 }
 
 /// Sums over a square of samples: of all, and times column and row, counted from 0.
@@ -327,13 +368,14 @@ struct Bordered {
 }
 
 impl Bordered {
-    fn new(samples: &[f64], width: usize) -> Self {
-        let stride = width + 2;
-        let mut bordered = vec![0.0; stride * stride];
-        for (to, from) in bordered.chunks_exact_mut(stride).skip(1).zip(samples.chunks_exact(width)) {
-            to[1..=width].copy_from_slice(from);
-        }
-        Self { width, next: vec![0.0; stride * stride], samples: bordered }
+    fn new(width: usize) -> Self {
+        let n = (width + 2) * (width + 2);
+        Self { width, samples: vec![0.0; n], next: vec![] }
+    }
+
+    fn rows_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
+        let width = self.width;
+        self.samples.chunks_exact_mut(width + 2).skip(1).take(width).map(move |row| &mut row[1..=width])
     }
 
     fn rows(&self) -> impl Iterator<Item = &[f64]> {
@@ -350,6 +392,7 @@ impl Bordered {
 
     /// Moves the samples back by a part of a pixel to first order; none below 0.
     fn moved(&mut self, off_px: DVec2) -> Sums {
+        self.next.resize(self.samples.len(), 0.0);
         let sums = move_back(&self.samples, self.width, off_px, &mut self.next);
         std::mem::swap(&mut self.samples, &mut self.next);
         sums

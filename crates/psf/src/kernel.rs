@@ -52,9 +52,11 @@ pub(crate) fn trim(energy: &Array2<f64>, share: f64) -> Array2<f32> {
     let middle = energy.nrows() / 2;
     let mut by_ring = vec![0.0; middle + 1];
     for (row, energies) in energy.rows().into_iter().enumerate() {
-        let from_middle = row.abs_diff(middle);
-        for (column, e) in energies.iter().enumerate() {
-            by_ring[from_middle.max(column.abs_diff(middle))] += e;
+        // Of a row so far from the middle, as many samples on both sides of it lie in its own ring.
+        let ring = row.abs_diff(middle);
+        by_ring[ring] += energies.slice(s![middle - ring..=middle + ring]).sum();
+        for beyond in ring + 1..=middle {
+            by_ring[beyond] += energies[middle - beyond] + energies[middle + beyond];
         }
     }
     let wanted = share * by_ring.iter().sum::<f64>();
