@@ -27,6 +27,23 @@ pub(crate) fn give_back_freed() {
     let _ = malloc_trim(0);
 }
 
+/// Lets what is larger than 128 KiB be given back as soon as it is freed, and not only what is larger than the largest that was ever freed.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+pub(crate) fn give_back_at_once() {
+    #[expect(unsafe_code, reason = "a function of the C library without a safe form")]
+    unsafe extern "C" {
+        safe fn mallopt(parameter: std::ffi::c_int, value: std::ffi::c_int) -> std::ffi::c_int;
+    }
+    /// `M_MMAP_THRESHOLD` of malloc.h.
+    const MMAP_THRESHOLD: std::ffi::c_int = -3;
+    // Whether it was obeyed.
+    let _ = mallopt(MMAP_THRESHOLD, 128 << 10);
+}
+
+/// Other allocators give back what they see fit.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub(crate) fn give_back_at_once() {}
+
 /// Other allocators give back what they see fit.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub(crate) fn give_back_freed() {}

@@ -2,7 +2,10 @@
 
 use std::{
     path::Path,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -20,7 +23,7 @@ use dioptric_spectrum::Cancel;
 use crate::{
     args::{BankKind, Common, DiffractionKind, DualPixelArg, FilmKind, FrameArgs, PictureArgs, QualityKind, RunArgs},
     lens::tell,
-    memory::{give_back_freed, memory_budget},
+    memory::{give_back_at_once, give_back_freed, memory_budget},
     paintings::{build, painting_folder},
     terminal::{Bar, guarded, print, print_json, remark},
 };
@@ -40,7 +43,7 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     if arguments.resume && !kept.take_bands(&staged.leftovers())? {
         remark(common.quiet, "no killed run of this camera left bands here: it starts from the beginning");
     }
-    let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
+    let (clock, cancel) = (Clock::new(common.quiet).sparing(arguments.memory.is_some()), Cancel::new());
     let capture = kept.capture(&clock, &cancel)?;
     let model = kept.model(&clock, &cancel)?;
     let depth = kept.depth(&clock, &cancel)?;
@@ -358,11 +361,23 @@ pub(crate) struct Clock {
     started: Instant,
     stages: Mutex<Vec<(Stage, Instant)>>,
     imaging: Mutex<Option<ImagingTimes>>,
+    is_sparing: bool,
+    /// The thirty-second of the imaging at which memory was last given back.
+    last_given: AtomicUsize,
 }
 
 impl Clock {
     pub(crate) fn new(quiet: bool) -> Self {
-        Self { bar: Bar::new(quiet), started: Instant::now(), stages: Mutex::default(), imaging: Mutex::default() }
+        let (stages, imaging, last_given) = (Mutex::default(), Mutex::default(), AtomicUsize::new(0));
+        Self { bar: Bar::new(quiet), started: Instant::now(), stages, imaging, is_sparing: false, last_given }
+    }
+
+    /// Returns the clock of a run that has a budget of memory, or has none: what bands needed is given back as they are done, not to add up in the allocator.
+    fn sparing(self, is_sparing: bool) -> Self {
+        if is_sparing {
+            give_back_at_once();
+        }
+        Self { is_sparing, ..self }
     }
 
     /// Returns how long the work has taken so far, s.
@@ -392,6 +407,11 @@ impl Progress for Clock {
         if stages.last().is_none_or(|(last, _)| *last != stage) {
             stages.push((stage, Instant::now()));
             // What a stage needed is not what the next one does.
+            give_back_freed();
+        }
+        drop(stages);
+        let part = (32.0 * fraction) as usize;
+        if self.is_sparing && stage == Stage::Irradiance && self.last_given.fetch_max(part, Ordering::Relaxed) < part {
             give_back_freed();
         }
         self.bar.show(stage.title(), fraction);

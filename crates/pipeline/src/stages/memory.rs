@@ -80,17 +80,16 @@ impl MemoryBudget {
         PROGRAM_BYTES + bytes + film_bytes(place, n_bands) <= self.bytes
     }
 
-    /// Half of what scene and plan leave is for bands in flight and what they are interpolated from, a quarter each for kernels and irradiance, or
-    /// all of it for kernels where the irradiance does not fit; kernels and bands take no more than is usual, and irradiance no more than the stages
-    /// after it leave.
+    /// Half of what scene and plan leave is for bands in flight and what they are interpolated from, a quarter each for kernels and irradiance;
+    /// kernels and bands take no more than is usual, and irradiance no more than the stages after it leave. Where the irradiance does not fit and goes
+    /// to a file, its quarter is left to the allocator, which holds a tenth more than the many kernels are.
     fn shares(self, plan: &ImagingPlan, scene: &Scene, place: &FilmPlace) -> Result<Shares, PipelineError> {
         let band = (plan.band_bytes() + plan.bases_bytes()) as u64;
         let film = film_bytes(place, n_bands(scene));
         let left = self.left(imaging_bytes(scene, place) + plan.size_bytes() as u64, band, film)?;
         let bands = (left / 2).clamp(band, USUAL_BYTES.max(4 * band));
         let rest = left - bands;
-        let whole = 4 * (n_bands(scene) * place.rows * place.columns) as u64;
-        let kernels = if rest / 2 < whole { rest } else { rest / 2 }.min(USUAL_BYTES);
+        let kernels = (rest / 2).min(USUAL_BYTES);
         let beside_film = self.bytes - PROGRAM_BYTES - film;
         Ok(Shares { bands, kernels, irradiance: (rest - kernels).min(beside_film) })
     }
