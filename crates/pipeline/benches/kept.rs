@@ -11,8 +11,8 @@ use std::{
 };
 
 use dioptric_pipeline::{
-    Camera, FocusSpec, KeptCamera, LensSpec, PaintingFolder, Progress, Quality, SceneSource, SensorSpec, Silent, Stage,
-    StopSpec, with_analog_gain, with_exposure_s,
+    Camera, FocusSpec, KeptCamera, LensSpec, PaintReach, PaintingFolder, Progress, Quality, SceneSource, SensorSpec,
+    Silent, Stage, StopSpec, with_analog_gain, with_exposure_s,
 };
 use dioptric_scene::Pattern;
 use dioptric_sensor::{Demosaic, Sensor};
@@ -106,10 +106,19 @@ fn changes(kept: &KeptCamera, sensors: &[std::path::PathBuf], only: Option<&str>
         let times_s = (0..REPEATS).map(|i| {
             let fov_deg = |i: usize| Some(34.0 * 1.16_f64.powi(i as i32));
             let before = kept.with(|camera| camera.scene.field_of_view_deg = fov_deg(i));
-            before.paint_ahead(&Silent, &Cancel::new()).unwrap();
+            before.paint_ahead(PaintReach::Next, &Silent, &Cancel::new()).unwrap();
             seconds(&kept.with(|camera| camera.scene.field_of_view_deg = fov_deg(i + 1)))
         });
         row("scene: field of view, painted ahead", times_s.collect());
+    }
+    if only.is_none_or(|only| "scene: field of view, jumps".starts_with(only)) {
+        // Anywhere, once all has been painted while pictures were looked at.
+        kept.paint_ahead(PaintReach::All, &Silent, &Cancel::new()).unwrap();
+        let jumps_deg = [60.0, 12.0, 95.0, 25.0, 7.0];
+        row(
+            "scene: field of view, jumps",
+            jumps_deg.map(|deg| seconds(&kept.with(|c| c.scene.field_of_view_deg = Some(deg)))).into(),
+        );
     }
     of("scene: a target", &|camera, i| {
         (camera.scene.field_of_view_deg, camera.scene.depth_m) = (Some(34.0), Some(1.5));

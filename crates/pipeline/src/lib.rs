@@ -58,9 +58,9 @@ pub use shown::{ShowRequest, ShownPicture, open_display};
 pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,
-    IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, RESUME_FILE, RenderingSummary, ResolvedLens,
-    ResolvedScene, Resumed, SceneSummary, StageCounts, Video, VideoFrame, VideoFrameFacts, WorldRender, has_kept_bands,
-    write_seen_png,
+    IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach, RESUME_FILE, RenderingSummary,
+    ResolvedLens, ResolvedScene, Resumed, SceneSummary, StageCounts, Video, VideoFrame, VideoFrameFacts, WorldRender,
+    has_kept_bands, write_seen_png,
 };
 pub use video_files::{VideoFacts, write_video_frame};
 pub use words::{parse_illuminant, parse_white, with_analog_gain, with_auto_exposure, with_exposure_s};

@@ -67,7 +67,7 @@ impl PaintingFolder {
         progress: &(dyn Fn(f64) + Sync),
         cancel: &Cancel,
     ) -> Result<Scene, PipelineError> {
-        if life.with_hidden || life.rows.saturating_mul(life.columns) < LEAST_PIXELS {
+        if !is_kept(life) {
             return Ok(life.scene_with(grid, progress, cancel)?);
         }
         let file = self.file(life, grid);
@@ -77,6 +77,11 @@ impl PaintingFolder {
         let scene = life.scene_with(grid, progress, cancel)?;
         self.keep(&file, &scene);
         Ok(scene)
+    }
+
+    /// Whether a painting that would be kept is not.
+    pub(crate) fn lacks(&self, life: &StillLife, grid: &WavelengthGrid) -> bool {
+        is_kept(life) && !self.file(life, grid).exists()
     }
 
     fn file(&self, life: &StillLife, grid: &WavelengthGrid) -> PathBuf {
@@ -98,6 +103,11 @@ impl PaintingFolder {
             remove_oldest(&self.path, MOST_BYTES);
         }
     }
+}
+
+/// Whether a painting is worth a file.
+fn is_kept(life: &StillLife) -> bool {
+    !life.with_hidden && life.rows.saturating_mul(life.columns) >= LEAST_PIXELS
 }
 
 /// Returns the scene of a file of this size and these bands, `None` where there is none.

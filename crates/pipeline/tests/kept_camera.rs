@@ -2,8 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
 use dioptric_pipeline::{
-    BlurSpec, Camera, Capture, Diffraction, ExrSamples, FilmSpec, FocusSpec, Given, KeptCamera, PipelineError, Quality,
-    SceneSource, SensorSpec, Silent, StageCounts, StopSpec, WavelengthSpec, with_exposure_s,
+    BlurSpec, Camera, Capture, Diffraction, ExrSamples, FilmSpec, FocusSpec, Given, KeptCamera, PaintReach,
+    PipelineError, Quality, SceneSource, SensorSpec, Silent, StageCounts, StopSpec, WavelengthSpec, with_exposure_s,
 };
 use dioptric_scene::{ExrParts, write_spectral_exr};
 use dioptric_sensor::WhiteBalance;
@@ -288,7 +288,7 @@ fn fields_of_view_are_painted_ahead() {
     };
     let kept = camera(34.0);
     capture(&kept);
-    kept.paint_ahead(&Silent, &Cancel::new()).unwrap();
+    kept.paint_ahead(PaintReach::All, &Silent, &Cancel::new()).unwrap();
     assert_eq!((kept.stage_counts().scene, kept.stage_counts().painting), (1, 3));
     for fov_deg in [30.0, 38.0] {
         let changed = kept.with(|camera| camera.scene.field_of_view_deg = Some(fov_deg));
@@ -297,14 +297,14 @@ fn fields_of_view_are_painted_ahead() {
         assert_eq!(ahead.developed.picture.to_rgb8(), capture(&camera(fov_deg)).developed.picture.to_rgb8());
     }
     // A second call has nothing left to paint; a cancelled one paints nothing.
-    kept.paint_ahead(&Silent, &Cancel::new()).unwrap();
+    kept.paint_ahead(PaintReach::All, &Silent, &Cancel::new()).unwrap();
     let cancel = Cancel::new();
     cancel.cancel();
     let far = kept.with(|camera| camera.scene.field_of_view_deg = Some(60.0));
-    assert!(matches!(far.paint_ahead(&Silent, &cancel), Err(PipelineError::Cancelled(_))));
-    kept.with_quality(Quality::Full).paint_ahead(&Silent, &cancel).unwrap();
+    assert!(matches!(far.paint_ahead(PaintReach::All, &Silent, &cancel), Err(PipelineError::Cancelled(_))));
+    kept.with_quality(Quality::Full).paint_ahead(PaintReach::All, &Silent, &cancel).unwrap();
     kept.with(|camera| camera.scene.source = SceneSource::File("none.exr".into()))
-        .paint_ahead(&Silent, &cancel)
+        .paint_ahead(PaintReach::All, &Silent, &cancel)
         .unwrap();
     assert_eq!(kept.stage_counts().painting, 3);
 }

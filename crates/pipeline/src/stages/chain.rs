@@ -21,7 +21,7 @@ use super::{
     lit_still_life,
     memory::MemoryBudget,
     narrow_surfaces::NarrowSurfaces,
-    painting::Paintings,
+    painting::{PaintReach, Paintings},
     part::Part,
     plan,
     results::KeptResults,
@@ -73,10 +73,10 @@ impl Chain<'_> {
         })
     }
 
-    /// Paints what previews of the still life need once its field of view is changed by little.
-    pub(super) fn paint_ahead(&self, inputs: &SceneInputs) -> Result<(), PipelineError> {
-        let Some((life, grid)) = scene::still_life(inputs)? else { return Ok(()) };
-        self.paintings().paint_ahead(&life, &grid, inputs.geometry.quality, &self.watch)
+    /// Paints what previews of the still life need in other fields of view.
+    pub(super) fn paint_ahead(&self, inputs: &SceneInputs, reach: PaintReach) -> Result<(), PipelineError> {
+        let Some(painting) = scene::still_life(inputs)? else { return Ok(()) };
+        self.paintings().paint_ahead(&painting, inputs.geometry.quality, reach, &self.watch)
     }
 
     fn paintings(&self) -> Paintings<'_> {

@@ -16,6 +16,7 @@ use super::{
     irradiance::Irradiance,
     lens::{self, ResolvedLens, check_glasses},
     memory::MemoryBudget,
+    painting::PaintReach,
     results::{KeptResults, StageCounts},
     scene::ResolvedScene,
     spec::{IrradianceInputs, PictureInputs, Raster},
@@ -244,15 +245,20 @@ impl KeptCamera {
         chain.scene(&inputs.scene)
     }
 
-    /// Paints what previews of the built-in still life are taken from once its field of view is made up to 19 % narrower or wider, where that is
-    /// not kept: a second or so that is better spent while the picture is looked at than after the change. Nothing is done for
-    /// other scenes and qualities.
+    /// Paints what previews of the built-in still life are taken from in other fields of view, where that is not kept: in memory, and in the folder of
+    /// [`with_paintings`](Self::with_paintings). A second or less for each of 2 (next) or up to 25 paintings (all), which is better spent while a picture is
+    /// looked at than after the change. Nothing is done for other scenes and qualities.
     ///
     /// # Errors
     /// As [`scene`](Self::scene).
-    pub fn paint_ahead(&self, progress: &dyn Progress, cancel: &Cancel) -> Result<(), PipelineError> {
+    pub fn paint_ahead(
+        &self,
+        reach: PaintReach,
+        progress: &dyn Progress,
+        cancel: &Cancel,
+    ) -> Result<(), PipelineError> {
         let inputs = self.irradiance_inputs()?;
-        self.chain(progress, cancel).paint_ahead(&inputs.scene)
+        self.chain(progress, cancel).paint_ahead(&inputs.scene, reach)
     }
 
     /// Returns the depth of each sample of the scene, m; of a camera that continues a run, what that wrote of it.

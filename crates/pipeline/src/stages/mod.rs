@@ -64,6 +64,7 @@ pub use kept::KeptCamera;
 pub use lens::ResolvedLens;
 pub use lens_tables::{AberrationSummary, LensAberrations};
 pub use narrow_surfaces::NarrowSurfaces;
+pub use painting::PaintReach;
 pub use rendering::{RenderingSummary, write_seen_png};
 pub use results::StageCounts;
 pub use resume::{RESUME_FILE, Resumed};

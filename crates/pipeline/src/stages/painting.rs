@@ -1,6 +1,8 @@
 //! The still life as previews see it: painted once, a little wider and finer than it is wanted, so that another light, another field of view
 //! or another shape paints nothing.
 
+use std::ops::Range;
+
 use dioptric_scene::{Scene, StillLife, View};
 use dioptric_spectrum::WavelengthGrid;
 
@@ -12,6 +14,22 @@ pub(crate) type PaintingInputs = (StillLife, WavelengthGrid);
 
 /// Steps to twice the width, the height or the fineness of a canvas.
 const STEPS_PER_OCTAVE: f64 = 4.0;
+
+/// Fields of view that are looked at for what they are taken from lie so many steps apart; not a part of a step, where a painting serves one field of view
+/// alone.
+const STRIDE: f64 = 0.013;
+
+/// The narrowest and the widest field of view that is painted ahead, degrees.
+const AHEAD_DEG: [f64; 2] = [5.0, 120.0];
+
+/// Of which fields of view the still life is painted ahead.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PaintReach {
+    /// Those narrower or wider than the camera's by up to 19 %.
+    Next,
+    /// These, and all from 5° to 120° where paintings are kept in a folder; the nearest first.
+    All,
+}
 
 /// Where paintings come from.
 #[derive(Clone, Copy)]
@@ -42,16 +60,24 @@ impl Paintings<'_> {
         watch.run(move || Ok(painting.reframed(view, rows, columns)?))
     }
 
-    /// Paints what the still life is taken from in a field of view narrower or wider by up to 19 %, where that is not kept.
+    /// Paints what the still life is taken from in other fields of view, where that is not kept.
     pub(super) fn paint_ahead(
         &self,
-        life: &StillLife,
-        grid: &WavelengthGrid,
+        (life, grid): &PaintingInputs,
         quality: Quality,
+        reach: PaintReach,
         watch: &Watch<'_>,
     ) -> Result<(), PipelineError> {
-        for canvas in neighbors_of(life, quality) {
+        let own = steps_of(life.horizontal_fov_deg);
+        for canvas in canvases_within(life, quality, own - 1.0..own + 1.0) {
             self.kept.get_or_make((canvas, grid.clone()), |(canvas, grid)| self.painted(canvas, grid, watch))?;
+        }
+        let Some(folder) = self.folder.filter(|_| reach == PaintReach::All) else { return Ok(()) };
+        let [narrowest, widest] = AHEAD_DEG.map(steps_of);
+        for canvas in canvases_within(life, quality, narrowest..widest) {
+            if folder.lacks(&canvas, grid) {
+                self.painted(&canvas, grid, watch)?;
+            }
         }
         Ok(())
     }
@@ -92,21 +118,34 @@ fn canvas_of(life: &StillLife, quality: Quality) -> Option<StillLife> {
     Some(if is_usual { usual } else { canvas })
 }
 
-/// Returns the pictures that previews of fields of view narrower and wider than this one by less than a step are taken from, those of the nearest
-/// first. There are two for the shape that the arrangement is made for, up to four for others, whose height is rounded elsewhere than
-/// their width, and one more where a whole step is met.
-fn neighbors_of(life: &StillLife, quality: Quality) -> Vec<StillLife> {
-    let half_width = (0.5 * life.horizontal_fov_deg).to_radians().tan();
+/// Returns the pictures that previews of fields of view in a range are taken from, but for this one's own: those of the nearest fields of view first. The ends
+/// of the range do not belong to it.
+fn canvases_within(life: &StillLife, quality: Quality, range: Range<f64>) -> Vec<StillLife> {
+    let own = steps_of(life.horizontal_fov_deg);
     let mut canvases = vec![canvas_of(life, quality)];
-    // At the whole step itself the one after it begins.
-    for n_steps in (1..100).flat_map(|percent| [-0.01, 0.01].map(|way| way * f64::from(percent))) {
-        let horizontal_fov_deg = 2.0 * (half_width * (n_steps / STEPS_PER_OCTAVE).exp2()).atan().to_degrees();
-        let canvas = canvas_of(&StillLife { horizontal_fov_deg, ..*life }, quality);
-        if !canvases.contains(&canvas) {
-            canvases.push(canvas);
+    let mut n_steps = STRIDE;
+    while n_steps < (own - range.start).max(range.end - own) {
+        for steps in
+            [own - n_steps, own + n_steps].into_iter().filter(|steps| range.start < *steps && *steps < range.end)
+        {
+            let canvas = canvas_of(&StillLife { horizontal_fov_deg: fov_deg_at(steps), ..*life }, quality);
+            if !canvases.contains(&canvas) {
+                canvases.push(canvas);
+            }
         }
+        n_steps += STRIDE;
     }
     canvases.into_iter().skip(1).flatten().collect()
+}
+
+/// Returns the steps from a field of view of 90° to another.
+fn steps_of(fov_deg: f64) -> f64 {
+    STEPS_PER_OCTAVE * (0.5 * fov_deg).to_radians().tan().log2()
+}
+
+/// Returns the field of view so many steps from 90°.
+fn fov_deg_at(n_steps: f64) -> f64 {
+    2.0 * (n_steps / STEPS_PER_OCTAVE).exp2().atan().to_degrees()
 }
 
 #[cfg(test)]
@@ -154,7 +193,8 @@ mod tests {
         for tenth in 60..1500 {
             for (rows, most) in [(360, 3), (405, 5), (100, 5)] {
                 let fov_deg = 0.1 * f64::from(tenth);
-                let mut known = neighbors_of(&preview(fov_deg, rows), Quality::Preview);
+                let own = steps_of(fov_deg);
+                let mut known = canvases_within(&preview(fov_deg, rows), Quality::Preview, own - 1.0..own + 1.0);
                 assert!(known.len() <= most, "{fov_deg}°, {rows} rows: {known:?}");
                 known.push(canvas(fov_deg, rows));
                 let tan = (0.5 * fov_deg).to_radians().tan();
@@ -164,7 +204,26 @@ mod tests {
                 }
             }
         }
-        assert_eq!(neighbors_of(&StillLife::new(1080, 720), Quality::Full), []);
+        assert_eq!(canvases_within(&StillLife::new(1080, 720), Quality::Full, -8.0..8.0), []);
+    }
+
+    #[test]
+    fn all_that_is_painted_ahead_is_a_few_paintings() {
+        let [narrowest, widest] = AHEAD_DEG.map(steps_of);
+        for fov_deg in [5.1, 34.0, 47.3, 119.0] {
+            let life = preview(fov_deg, 360);
+            let mut known = canvases_within(&life, Quality::Preview, narrowest..widest);
+            let distance = |canvas: &StillLife| (steps_of(canvas.horizontal_fov_deg) - steps_of(fov_deg)).abs();
+            // Whole canvases apart, the next is farther off by a step at most.
+            assert!(known.windows(2).all(|pair| distance(&pair[1]) > distance(&pair[0]) - 2.0), "{known:?}");
+            known.push(canvas_of(&life, Quality::Preview).unwrap());
+            assert!(known.len() <= 25, "{}", known.len());
+            for other in (51..1199).map(|tenth| preview(0.1 * f64::from(tenth), 360)) {
+                let canvas = canvas_of(&other, Quality::Preview).unwrap();
+                // The picture of the arrangement serves its own field of view alone.
+                assert!(known.contains(&canvas) || other.horizontal_fov_deg == 34.0, "{fov_deg}° and {other:?}");
+            }
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use dioptric_pipeline::{Camera, KeptCamera, PaintingFolder, PipelineError, Progress, Stage};
+use dioptric_pipeline::{Camera, KeptCamera, PaintReach, PaintingFolder, PipelineError, Progress, Stage};
 use dioptric_spectrum::Cancel;
 
 use super::{Fault, Product, Rung, mailbox::Mailbox, refine};
@@ -225,14 +225,14 @@ fn work(shared: &Shared, settings: &EngineSettings) {
             })
         });
         climb(shared, ladder, &job, is_zooming);
-        paint_ahead(shared, ladder, &job);
+        paint_ahead(shared, ladder, &job, PaintReach::All);
         let mut current = shared.current();
         (current.busy, current.started) = (None, None);
     }
 }
 
-/// Paints what the next change of the field of view needs, until another camera is asked for.
-fn paint_ahead(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job) {
+/// Paints what changes of the field of view need, until another camera is asked for.
+fn paint_ahead(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job, reach: PaintReach) {
     let cancel = Cancel::new();
     {
         let mut current = shared.current();
@@ -245,7 +245,7 @@ fn paint_ahead(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job) {
             return;
         }
         let kept = kept.with(|own| own.clone_from(&job.camera));
-        let painted = panic::catch_unwind(AssertUnwindSafe(|| kept.paint_ahead(&Follower(shared), &cancel)));
+        let painted = panic::catch_unwind(AssertUnwindSafe(|| kept.paint_ahead(reach, &Follower(shared), &cancel)));
         if !matches!(painted, Ok(Ok(()))) {
             // What is wrong with the camera has been delivered.
             return;
@@ -257,7 +257,7 @@ fn paint_ahead(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job) {
 fn climb(shared: &Shared, ladder: &[KeptCamera; 3], job: &Job, is_zooming: bool) {
     for (rung, kept) in Rung::ALL.into_iter().zip(ladder).filter(|(rung, _)| *rung <= job.top) {
         if rung == Rung::Full && is_zooming {
-            paint_ahead(shared, ladder, job);
+            paint_ahead(shared, ladder, job, PaintReach::Next);
         }
         let (started, cancel) = (Instant::now(), Cancel::new());
         shared.begin(job, rung, started, &cancel);
