@@ -29,7 +29,7 @@ pub(crate) const LINES: &[(&str, &str)] = &[
     ("run camera.ron --blur soft", "invalid value 'soft' for '--blur <MODE>': blur: found"),
     ("run camera.ron --memory 0", "an amount of memory is '0', expected a number with a"),
     ("run camera.ron --memory 3parsecs", "an amount of memory is '3parsecs', expected a number"),
-    ("run camera.ron --memory 1kB", "the imaging may take 1 MiB, but scene, plan and film"),
+    ("run camera.ron --memory 1kB", "the imaging may take 1 MiB, but it and its film take at least"),
     ("run camera.ron --quality best", "invalid value 'best' for '--quality <QUALITY>'"),
     ("run camera.ron --exposure-s -1", "time_s of the exposure is -1, expected a number of 0 or"),
     ("run camera.ron --exposure-s nan", "time_s of the exposure is NaN, expected a number of 0"),
