@@ -56,7 +56,7 @@ impl Raw {
     /// Returns the error of a frame that has no plane of digital numbers.
     pub(crate) fn without_numbers(&self, what: &'static str) -> SensorError {
         match self.planes.as_slice() {
-            [plane] => plane.without_numbers(what),
+            [plane] | [plane @ (RawPlane::Volts(_) | RawPlane::Evened(_)), ..] => plane.without_numbers(what),
             _ => needs_numbers(what, "several planes, from a sensor of stacked filters"),
         }
     }

@@ -21,7 +21,7 @@ use super::{
     lit_still_life,
     memory::MemoryBudget,
     narrow_surfaces::NarrowSurfaces,
-    painting::{PaintReach, Paintings},
+    painting::Paintings,
     part::Part,
     plan,
     results::KeptResults,
@@ -73,13 +73,7 @@ impl Chain<'_> {
         })
     }
 
-    /// Paints what previews of the still life need in other fields of view.
-    pub(super) fn paint_ahead(&self, inputs: &SceneInputs, reach: PaintReach) -> Result<(), PipelineError> {
-        let Some(painting) = scene::still_life(inputs)? else { return Ok(()) };
-        self.paintings().paint_ahead(&painting, inputs.geometry.quality, reach, &self.watch)
-    }
-
-    fn paintings(&self) -> Paintings<'_> {
+    pub(super) fn paintings(&self) -> Paintings<'_> {
         Paintings { kept: &self.kept.painting, folder: self.paintings }
     }
 

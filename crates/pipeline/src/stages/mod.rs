@@ -16,6 +16,7 @@
 //! A stage is a function of its inputs and keeps its latest results beside them ([`slot`]); [`spec`] has the inputs of each
 //! as data. Nothing is ever declared out of date: equal inputs have equal results. Files are written by others.
 
+mod ahead;
 mod band_store;
 mod bank;
 mod capture;

@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Watch,
-    lit_still_life::picture_of,
-    painting::{PaintingInputs, Paintings},
+    painting::Paintings,
     spec::{GeometryInputs, SceneInputs},
 };
 use crate::{PipelineError, Quality, SceneSource, SceneSpec, camera::bands_or_own};
@@ -71,27 +70,6 @@ pub struct ResolvedScene {
     pub binning: usize,
 }
 
-/// Returns the picture of the built-in still life that a quality asks for, and its bands; `None` for any other scene.
-pub(super) fn still_life(inputs: &SceneInputs) -> Result<Option<PaintingInputs>, PipelineError> {
-    let GeometryInputs { source, wavelengths, quality, given, .. } = &inputs.geometry;
-    if let Some(spec) = inputs.geometry.still_life() {
-        let (life, _) = picture_of(&inputs.geometry, spec);
-        return Ok(Some((life, quality.bands_of(&wavelengths.of_world()?)?)));
-    }
-    let SceneSource::StillLife { columns, rows } = source else { return Ok(None) };
-    if given.is_some() {
-        return Ok(None);
-    }
-    let binning = quality.scene_binning(*columns);
-    let bands = quality.bands_of(&bands_or_own(wavelengths.grid()?.as_ref())?)?;
-    Ok(Some((inputs.choice().still_life(fewer(*columns, binning), fewer(*rows, binning)), bands)))
-}
-
-/// Returns the samples that are left of so many.
-fn fewer(n: usize, binning: usize) -> usize {
-    (n / binning).max(1)
-}
-
 /// Reads or makes the scene.
 ///
 /// A full scene has the samples and bands of its source. Of a lower quality a computed scene is made with fewer of both,
@@ -119,6 +97,7 @@ pub(super) fn open(
         let scene = if bands == *whole.radiance.grid() { whole } else { whole.resampled(&bands)? };
         return Ok(ResolvedScene { scene: scene.binned(binning)?, binning });
     }
+    let fewer = |n: usize, binning: usize| (n / binning).max(1);
     let computed = match source {
         SceneSource::File(_) | SceneSource::World(_) => None,
         SceneSource::StillLife { columns, rows } => {
