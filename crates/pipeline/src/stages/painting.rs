@@ -77,6 +77,10 @@ impl Paintings<'_> {
         for canvas in canvases_within(life, quality, narrowest..widest) {
             if folder.lacks(&canvas, grid) {
                 self.painted(&canvas, grid, watch)?;
+                if folder.lacks(&canvas, grid) {
+                    // It takes no file: what else is painted would be painted again each time.
+                    break;
+                }
             }
         }
         Ok(())
