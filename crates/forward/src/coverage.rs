@@ -1,7 +1,7 @@
 //! The sampling of point spread functions that a scene and a film need.
 
 use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, OpticsError, PupilBoundary, Vignetting, rays_towards};
-use dioptric_psf::{BankSettings, Diffraction, WIDEST_FIELD_TAN, lens_on_axis};
+use dioptric_psf::{BankSettings, Diffraction, WIDEST_FIELD_TAN, last_gathered_tan, lens_on_axis};
 use dioptric_spectrum::{DepthMap, WavelengthGrid};
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -93,12 +93,17 @@ impl PsfDomain<'_> {
         let (centered, aside_mm) = lens_on_axis(self.lens, self.middle_nm()).ok_or_else(has_none)?;
         // A lens moved aside has its axis on the other side of the picture.
         let corner_mm = self.film.half_diagonal_mm() + (self.film.center_mm + aside_mm).length();
-        let fields_tan = PsfDomain { lens: &centered, ..*self }.at_ends(|aim| {
+        let domain = PsfDomain { lens: &centered, ..*self };
+        let fields_tan = domain.at_ends(|aim| {
             let corner_blur_mm = aim.blur_mm(DVec2::X * aim.field_tan_at(corner_mm));
             let sampled_mm = 1.02 * corner_mm + BORDER_OF_BLUR * aim.axial_blur_mm();
             Ok(aim.field_tan_at(sampled_mm.max(corner_mm + BORDER_OF_BLUR * corner_blur_mm)))
         })?;
-        let last_field_tan = fields_tan.into_iter().fold(0.0, f64::max);
+        let wanted_tan = fields_tan.into_iter().fold(0.0, f64::max);
+        let gathered_tan = domain.at_ends(|aim| {
+            Ok(last_gathered_tan((aim.lens, aim.reference), aim.dioptres, aim.film_distance_mm, wanted_tan))
+        })?;
+        let last_field_tan = gathered_tan.into_iter().fold(wanted_tan, f64::min);
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
         Ok(BankSettings::covering(self.film_distance_mm, last_field_tan, dioptres, wavelengths_nm, self.diffraction))
     }

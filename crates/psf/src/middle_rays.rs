@@ -14,23 +14,49 @@ pub(crate) struct MiddleRays {
     last_tan: f64,
 }
 
+/// Where the light of a field lands.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct MiddleRay {
+    /// The tangent of the field.
+    pub(crate) field_tan: f64,
+    /// How far outwards from the centroid of the light the middle ray lands, mm.
+    pub(crate) outwards_mm: f64,
+    /// How far from the axis the centroid lands, mm.
+    pub(crate) radius_mm: f64,
+    /// Rms distance of the light from its centroid, mm.
+    pub(crate) rms_mm: f64,
+}
+
+impl MiddleRay {
+    /// Returns how much a field counts: fully where its light is not spread wider than that on the axis by more than a hundredth of the largest image height, and
+    /// beyond that by the square of what it is spread wider. What a reference point is off by is seen where an image is sharp, and not where it is blurred.
+    fn weight(&self, axis: &Self, last: &Self) -> f64 {
+        const PART: f64 = 0.01;
+        let unseen_mm2 = (PART * last.radius_mm).powi(2);
+        let added_mm2 = self.rms_mm.powi(2) - axis.rms_mm.powi(2);
+        if added_mm2 > unseen_mm2 { unseen_mm2 / added_mm2 } else { 1.0 }
+    }
+}
+
 impl MiddleRays {
-    /// Takes the tangents of fields, ascending from 0, and how far outwards from the centroid their middle rays land, mm.
-    pub(crate) fn new(field_tans: &[f64], outwards_mm: &[f64]) -> Self {
+    /// Takes fields, their tangents ascending from 0.
+    pub(crate) fn new(fields: &[MiddleRay]) -> Self {
+        let (first, last) = (fields[0], fields[fields.len() - 1]);
         // Least squares of both coefficients, or of the first alone where there is but one field off the axis.
         let (mut aa, mut ab, mut bb, mut ac, mut bc) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for (tan, mm) in field_tans.iter().zip(outwards_mm) {
-            let (a, b) = (*tan, tan * tan.atan().powi(2));
-            (aa, ab, bb) = (aa + a * a, ab + a * b, bb + b * b);
-            (ac, bc) = (ac + a * mm, bc + b * mm);
+        for field in fields {
+            let (a, b) = (field.field_tan, field.field_tan * field.field_tan.atan().powi(2));
+            let weight = field.weight(&first, &last);
+            (aa, ab, bb) = (aa + weight * a * a, ab + weight * a * b, bb + weight * b * b);
+            (ac, bc) = (ac + weight * a * field.outwards_mm, bc + weight * b * field.outwards_mm);
         }
         let determinant = aa * bb - ab * ab;
-        let over_tan_mm = match field_tans.len() {
+        let over_tan_mm = match fields.len() {
             1 => [0.0; 2],
             2 => [ac / aa, 0.0],
             _ => [(bb * ac - ab * bc) / determinant, (aa * bc - ab * ac) / determinant],
         };
-        Self { over_tan_mm, last_tan: field_tans[field_tans.len() - 1] }
+        Self { over_tan_mm, last_tan: last.field_tan }
     }
 
     /// Returns how far outwards the middle ray of a field lands, over the tangent of the field, mm.
@@ -50,8 +76,17 @@ impl MiddleRays {
 mod tests {
     use super::*;
 
+    /// Rays of fields of a lens of 50 mm whose light is spread by so much.
+    fn spread(tans: &[f64], mm: impl Fn(f64) -> f64, rms_mm: impl Fn(f64) -> f64) -> MiddleRays {
+        let ray = |&field_tan: &f64| {
+            let (outwards_mm, rms_mm) = (mm(field_tan), rms_mm(field_tan));
+            MiddleRay { field_tan, outwards_mm, radius_mm: 50.0 * field_tan, rms_mm }
+        };
+        MiddleRays::new(&tans.iter().map(ray).collect::<Vec<_>>())
+    }
+
     fn of(tans: &[f64], mm: impl Fn(f64) -> f64) -> MiddleRays {
-        MiddleRays::new(tans, &tans.iter().map(|tan| mm(*tan)).collect::<Vec<_>>())
+        spread(tans, mm, |_| 0.02)
     }
 
     /// Coma of third order grows with the field, that of fifth with its cube.
@@ -76,5 +111,17 @@ mod tests {
         let values: Vec<f64> = (0..400).map(|i| rays.outwards_mm(0.001 * f64::from(i))).collect();
         let bends: Vec<f64> = values.windows(3).map(|v| v[2] - 2.0 * v[1] + v[0]).collect();
         assert!(bends.windows(2).all(|pair| pair[0] >= pair[1] - 1e-12), "the third derivative has one sign");
+    }
+
+    /// Where the outer fields are spread over much of the film, the middle rays of the inner ones are met as if there were no others.
+    #[test]
+    fn spread_fields_count_little() {
+        let tans: Vec<f64> = (0..25).map(|i| (0.04 * f64::from(i)).tan()).collect();
+        let mm = |tan: f64| -0.02 * tan - tan.powi(9);
+        let inner: Vec<f64> = tans.iter().copied().filter(|tan| *tan < 0.4).collect();
+        let alone = of(&inner, mm).over_tan_mm(0.05);
+        let [even, blurred] = [of(&tans, mm), spread(&tans, mm, |tan| 0.02 + 20.0 * tan.powi(6))];
+        let [even, blurred] = [even, blurred].map(|rays| (rays.over_tan_mm(0.05) - alone).abs());
+        assert!(blurred < 0.1 * even && even > 0.1, "off by {blurred} and {even} mm");
     }
 }

@@ -164,6 +164,12 @@ impl LensImageModel {
         }
     }
 
+    /// The field (tangent) beyond which light reaches the film but is not gathered to an image ([`last_gathered_tan`](crate::last_gathered_tan)), where the model
+    /// ends for that.
+    pub fn scattered_beyond_tan(&self) -> Option<f64> {
+        self.form().ok().filter(|bank| bank.is_scattered_beyond()).map(|bank| bank.last_field_tan())
+    }
+
     /// Whether samples about a point see light: of dark points there are no pictures.
     pub fn is_lit(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> bool {
         match self.form() {

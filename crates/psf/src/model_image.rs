@@ -59,9 +59,11 @@ impl LensImage for LensImageModel {
 
     fn is_dark_beyond_extent(&self) -> bool {
         match &self.form {
-            // Along a radius the fields that see no light are left out; none holds more than the widest.
+            // Along a radius the fields that see no light, or scatter it, are left out; none holds more than the widest.
             Form::Rotational(bank) => {
-                bank.n_fields() < bank.settings().fields.len() || bank.last_field_tan() >= WIDEST_FIELD_TAN
+                bank.n_fields() < bank.settings().fields.len()
+                    || bank.last_field_tan() >= WIDEST_FIELD_TAN
+                    || bank.is_scattered_beyond()
             }
             Form::General { bank, field_to_film } => {
                 field_to_film.as_ref().is_some_and(|inverse| inverse.is_dark_at_rim(bank))

@@ -176,6 +176,8 @@ pub(crate) struct RayMapMoments {
     /// Rms radius on the film of the part of the map that is linear in the pupil, mm; negative for what was in focus
     /// before it reached the film.
     pub(crate) signed_rms_mm: f64,
+    /// Rms distance of the energy from the centroid, mm.
+    pub(crate) rms_mm: f64,
 }
 
 /// The ray map of a point that is seen.
@@ -250,8 +252,8 @@ impl RayMapJob<'_> {
             })
             .sum();
         nodes.iter_mut().for_each(|node| node.at_mm -= centroid_mm);
-        let signed_rms_mm = self.signed_rms_mm(&nodes, &targets, &energies);
-        Some(Traced { nodes, energies, summary: RayMapMoments { centroid_mm, pupil_mm2, signed_rms_mm } })
+        let [signed_rms_mm, rms_mm] = self.signed_and_whole_rms_mm(&nodes, &targets, &energies);
+        Some(Traced { nodes, energies, summary: RayMapMoments { centroid_mm, pupil_mm2, signed_rms_mm, rms_mm } })
     }
 
     /// Returns where rays aimed at the pupil land, in the picture frame. A ray that fails at the pupil's very edge
@@ -346,7 +348,7 @@ impl RayMapJob<'_> {
         holed.chunks(N * N).zip(whole.chunks(N * N)).map(share).collect()
     }
 
-    fn signed_rms_mm(self, nodes: &[Node], targets: &[DVec2], energies: &[f64]) -> f64 {
+    fn signed_and_whole_rms_mm(self, nodes: &[Node], targets: &[DVec2], energies: &[f64]) -> [f64; 2] {
         let mean_of = |of: &dyn Fn(usize) -> DVec2, ring, j| -> DVec2 {
             self.mesh.corners(ring, j).map(of).into_iter().sum::<DVec2>() / 4.0
         };
@@ -360,7 +362,8 @@ impl RayMapJob<'_> {
         let product: f64 = cells.iter().map(|(p, at, e)| (*p - center).dot(*at) * e).sum();
         let square: f64 = cells.iter().map(|(p, _, e)| (*p - center).length_squared() * e).sum();
         // Before its focus a bundle is still on the pupil's side; the picture frame is turned by 180°.
-        -product / square.sqrt()
+        let whole: f64 = cells.iter().map(|(_, at, e)| at.length_squared() * e).sum();
+        [-product / square.sqrt(), whole.sqrt()]
     }
 }
 

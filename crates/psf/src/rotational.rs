@@ -10,8 +10,9 @@ use crate::{
     BankSettings, Diffraction, FieldSampling, Interpolation, PsfError, RadialGeometry,
     axis::{Axis, Stencil},
     dispersion::{Dispersion, share_of_orders},
+    gathering::{BEYOND_LAST, is_gathered},
     mesh::Mesh,
-    middle_rays::MiddleRays,
+    middle_rays::{MiddleRay, MiddleRays},
     pupil::Pupil,
     ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, RayMapMoments},
     watch::Watch,
@@ -32,6 +33,8 @@ pub(crate) struct RotationalBank {
     settings: BankSettings,
     /// Tangents of the fields that see light.
     field_tans: Vec<f64>,
+    /// Whether light of the fields beyond reaches the film, but is not gathered to an image.
+    is_scattered_beyond: bool,
     /// Their angles, in which rays change evenly up to 90°.
     fields: Axis,
     dioptres: Axis,
@@ -52,7 +55,7 @@ pub(crate) struct RotationalBank {
 impl RotationalBank {
     /// Traces the samples on all threads.
     ///
-    /// Fields that see no light at some depth or wavelength are left out, and those beyond them.
+    /// Fields that see no light at some depth or wavelength, or whose light is not gathered there (`gathering.rs`), are left out, and those beyond them.
     pub(crate) fn build(
         lens: &Lens,
         settings: &BankSettings,
@@ -95,9 +98,11 @@ impl RotationalBank {
             let wavelength_nm = lens_there.wavelength_nm();
             return Err(PsfError::Dark { lens: lens.name().to_owned(), dioptres, wavelength_nm });
         }
+        let is_scattered_beyond =
+            traced.iter().any(|column| column.is_scattered_beyond && column.summaries.len() == n_lit);
         let n_fields = (n_lit - 1) / GEOMETRY_STEPS + 1;
         let n_geometry = Self::n_geometry(n_fields);
-        let mut parts = Parts { n_fields, ..Parts::default() };
+        let mut parts = Parts { n_fields, is_scattered_beyond, ..Parts::default() };
         for column in traced {
             parts.records.extend(column.records.into_iter().take(n_fields));
             parts.waves.extend(column.waves.into_iter().take(n_fields));
@@ -112,7 +117,7 @@ impl RotationalBank {
 
     /// Puts a bank together from what was traced.
     fn assemble(lens: &Lens, settings: &BankSettings, parts: Parts) -> Result<Self, PsfError> {
-        let Parts { n_fields, records, summaries, waves } = parts;
+        let Parts { n_fields, is_scattered_beyond, records, summaries, waves } = parts;
         let colors: Vec<f64> = settings.wavelengths_nm.iter().rev().copied().collect();
         let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
         let stop_index = |&nm: &f64| Ok(lens.at(nm)?.stop_medium_index());
@@ -123,6 +128,7 @@ impl RotationalBank {
         Ok(Self {
             fields: axis(field_tans.iter().map(|tan| tan.atan()).collect()),
             field_tans,
+            is_scattered_beyond,
             dioptres: axis(settings.dioptres.clone()),
             colors: axis(colors.iter().map(|&nm| dispersion.coordinate(nm)).collect()),
             dispersion,
@@ -154,6 +160,11 @@ impl RotationalBank {
 
     pub(crate) fn n_fields(&self) -> usize {
         self.field_tans.len()
+    }
+
+    /// Whether light of the fields beyond reaches the film, but is not gathered to an image.
+    pub(crate) fn is_scattered_beyond(&self) -> bool {
+        self.is_scattered_beyond
     }
 
     /// The angles of the fields that see light.
@@ -223,15 +234,22 @@ impl RotationalBank {
     /// Returns where the rays through the middles of pupils land beside the centroids, at one depth and wavelength. Blended pictures lie
     /// centroid on centroid: for them it is nowhere else.
     pub(crate) fn middle_rays(&self, dioptres: f64, wavelength_nm: f64) -> MiddleRays {
-        let n = self.field_tans.len();
-        let mut outwards_mm = vec![0.0; n];
+        let ray = |&field_tan: &f64| MiddleRay { field_tan, ..MiddleRay::default() };
+        let mut rays: Vec<MiddleRay> = self.field_tans.iter().map(ray).collect();
         if self.settings.interpolation == Interpolation::Rays {
+            let (n, n_geometry) = (self.field_tans.len(), self.geometry_fields.len());
             for (column, weight) in self.columns(dioptres, wavelength_nm) {
-                let records = &self.records[column * n..][..n];
-                outwards_mm.iter_mut().zip(records).for_each(|(sum, record)| *sum += weight * record.node(0).at_mm.x);
+                let (records, summaries) = (&self.records[column * n..][..n], &self.summaries[column * n_geometry..]);
+                for (ray, (record, summary)) in
+                    rays.iter_mut().zip(records.iter().zip(summaries.iter().step_by(GEOMETRY_STEPS)))
+                {
+                    ray.outwards_mm += weight * record.node(0).at_mm.x;
+                    ray.radius_mm += weight * summary.centroid_mm.x * ray.field_tan;
+                    ray.rms_mm += weight * summary.rms_mm;
+                }
             }
         }
-        MiddleRays::new(&self.field_tans, &outwards_mm)
+        MiddleRays::new(&rays)
     }
 
     /// Returns the signed radius of the circle of confusion, mm: above 0 for objects nearer than the focus.
@@ -320,6 +338,7 @@ impl RotationalBank {
 #[derive(Default)]
 struct Parts {
     n_fields: usize,
+    is_scattered_beyond: bool,
     records: Vec<RayMap>,
     summaries: Vec<RayMapMoments>,
     /// As many as there are records, or none.
@@ -333,6 +352,8 @@ struct Column {
     summaries: Vec<RayMapMoments>,
     /// Up to the first field whose waves are not smooth.
     waves: Vec<PupilFunctionFit>,
+    /// Whether it ends at a field whose light is not gathered.
+    is_scattered_beyond: bool,
 }
 
 /// How columns are traced.
@@ -357,7 +378,7 @@ impl ColumnTracer<'_> {
         }
     }
 
-    /// Traces field by field, up to the first that sees no light.
+    /// Traces field by field, up to the first that sees no light or whose light is not gathered.
     fn column(&self, lens: &MonoLens, dioptres: f64) -> Result<Column, Cancelled> {
         let has_stop = self.settings.diffraction != Diffraction::None;
         let mut column = Column::default();
@@ -381,6 +402,11 @@ impl ColumnTracer<'_> {
                 let Some(beside) = beside.trace(&nearby, false) else { break };
                 summary.centroid_mm = beside.summary.centroid_mm / near_axis;
             }
+            let axial = column.summaries.first().unwrap_or(&traced.summary);
+            if !is_gathered(&traced.summary, axial) {
+                column.is_scattered_beyond = true;
+                break;
+            }
             column.summaries.push(summary);
             self.watch.done(1);
             if !is_knot {
@@ -392,6 +418,12 @@ impl ColumnTracer<'_> {
                 has_waves = map.is_some();
                 column.waves.extend(map);
             }
+        }
+        if let (Some(axial), true) = (column.summaries.first(), column.summaries.len() == self.geometry_fields.len()) {
+            let last_tan = self.geometry_fields[self.geometry_fields.len() - 1];
+            let beyond = self.task(lens, last_tan * (1.0 + BEYOND_LAST), dioptres);
+            let traced = pupil.near(lens, &beyond.point()).and_then(|pupil| beyond.trace(&pupil, false));
+            column.is_scattered_beyond = traced.is_some_and(|traced| !is_gathered(&traced.summary, axial));
         }
         self.watch.done(self.geometry_fields.len() - column.summaries.len());
         Ok(column)
