@@ -163,13 +163,24 @@ fn thumbnail(picture: RgbImage) -> RgbImage {
     if factor == 1 { picture } else { shrunk(&picture, factor) }
 }
 
+/// Returns the picture with the mean of each block of so many pixels each way in place of them; what is left over at the right and below is left out.
 fn shrunk(picture: &RgbImage, factor: u32) -> RgbImage {
-    image::imageops::resize(
-        picture,
-        (picture.width() / factor).max(1),
-        (picture.height() / factor).max(1),
-        image::imageops::FilterType::Triangle,
-    )
+    let (columns, rows) = (picture.width() / factor, picture.height() / factor);
+    let (factor, n_blocks) = (factor as usize, columns as usize);
+    let n = (factor * factor) as u32;
+    let mut codes = Vec::with_capacity(3 * n_blocks * rows as usize);
+    for lines in picture.as_raw().chunks_exact(3 * factor * picture.width() as usize) {
+        let mut sums = vec![0; 3 * n_blocks];
+        for line in lines.chunks_exact(3 * picture.width() as usize) {
+            for (sums, block) in sums.chunks_exact_mut(3).zip(line.chunks_exact(3 * factor)) {
+                for pixel in block.chunks_exact(3) {
+                    sums.iter_mut().zip(pixel).for_each(|(sum, code)| *sum += u32::from(*code));
+                }
+            }
+        }
+        codes.extend(sums.iter().map(|sum| ((sum + n / 2) / n) as u8));
+    }
+    RgbImage::from_raw(columns, rows, codes).unwrap_or_default()
 }
 
 #[cfg(test)]
