@@ -241,4 +241,30 @@ mod tests {
         // A pixel of 8 samples holds one and a third periods.
         assert!(spread(5..30) < 0.2 && spread(371..396) < 0.2, "{} {}", spread(5..30), spread(371..396));
     }
+
+    /// A scene of a twelfth of the film's width, nearer above than below: all of the film beyond it is dark, and still covered by one layer or the other.
+    #[test]
+    fn beyond_the_scene_is_darkness_that_hides() {
+        let film = Film::centered(96, 144, 24.0);
+        let (lens, size) = (DiscLens { focal_mm: 10.0, ..DiscLens::default() }, (30, 30));
+        let view = View { focal_px: 1000.0, center_x_px: 14.5, center_y_px: 14.5 };
+        let map = lens.film_map(0.5, 550.0, 2.0 * film.half_diagonal_mm());
+        let (cancel, everything) = (Cancel::new(), BlockLayers::of_everything());
+        let nearer_above = Array2::from_shape_fn(size, |(row, _)| if row < 15 { 0.0 } else { 1.0 });
+        let depths = LayerCoordinates::new(nearer_above, &cancel).unwrap();
+        let sampler = Sampler::new((view, size), (&film, 1), &map, 16);
+        let rectangle = Rectangle { first_row: 0, first_column: 0, rows: 96, columns: 144 };
+        let of = |layer: usize, radiance: Option<&[f32]>| {
+            sampler.sample(rectangle, &map, layer, &[depths.surface(radiance)], &everything, &cancel).unwrap()
+        };
+        let radiance = vec![1.0; size.0 * size.1];
+        let at = |picture: &Option<Vec<f32>>, row: usize, column: usize| picture.as_ref().unwrap()[row * 144 + column];
+        let (light, covered) = ([0, 1].map(|k| of(k, Some(&radiance))), [0, 1].map(|k| of(k, None)));
+        for (row, column) in [(0, 0), (0, 72), (40, 8), (60, 140), (95, 72), (95, 143)] {
+            assert_eq!([0, 1].map(|k| at(&light[k], row, column)), [0.0; 2], "{row} {column}");
+            let expected = if row < 48 { [1.0, 0.0] } else { [0.0, 1.0] };
+            assert_eq!([0, 1].map(|k| at(&covered[k], row, column)), expected, "{row} {column}");
+        }
+        assert!(at(&light[0], 45, 72) > 0.0 && at(&light[1], 51, 72) > 0.0);
+    }
 }

@@ -148,6 +148,7 @@ impl Sampler {
             [Surface { radiance: Some(radiance), is_flat: true, .. }] if layer == 0 => Some(*radiance),
             _ => None,
         };
+        let is_of_light = surfaces.iter().all(|surface| surface.radiance.is_some());
         let mut ideal = vec![0.0; rectangle.rows * rectangle.columns];
         let mut has_any = false;
         let (mut squares, mut light) = (Squares::default(), vec![]);
@@ -163,15 +164,16 @@ impl Sampler {
                 };
                 let (run, samples) = self.density.first_run(row, rectangle.first_column, run);
                 start = run.end;
-                if flat.is_some() && samples.is_beyond_scene {
+                // Beyond the scene there is no light, but what lies there may hide some: a look a pixel is enough for that.
+                if is_of_light && samples.is_beyond_scene {
                     continue;
                 }
-                let n = samples.across;
+                let (n_down, n) = if samples.is_beyond_scene { (1, 1) } else { (samples.down, samples.across) };
                 let first_column = rectangle.first_column + run.start as i64;
                 let x_mm = |place: usize| self.frame.x_mm(place_in(first_column, place, n));
                 let pixels = &mut line[run];
-                for place in 0..samples.down {
-                    let y_mm = self.frame.y_mm(place_in(row, place, samples.down));
+                for place in 0..n_down {
+                    let y_mm = self.frame.y_mm(place_in(row, place, n_down));
                     let n_places = n * pixels.len();
                     if let Some(radiance) = flat {
                         squares.find(&self.scene, map, n_places, (x_mm, y_mm));
@@ -187,7 +189,7 @@ impl Sampler {
                         }
                     }
                 }
-                let share = 1.0 / (samples.down * n) as f32;
+                let share = 1.0 / (n_down * n) as f32;
                 pixels.iter_mut().for_each(|pixel| *pixel *= share);
             }
         }
