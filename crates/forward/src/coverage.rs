@@ -1,7 +1,7 @@
 //! The sampling of point spread functions that a scene and a film need.
 
 use dioptric_optics::{FilmPoint, Lens, MonoLens, ObjectPoint, OpticsError, PupilBoundary, Vignetting, rays_towards};
-use dioptric_psf::{BankSettings, Diffraction, WIDEST_FIELD_TAN, last_gathered_tan, lens_on_axis};
+use dioptric_psf::{BankSettings, Diffraction, GatheredFields, WIDEST_FIELD_TAN, lens_on_axis};
 use dioptric_spectrum::{DepthMap, WavelengthGrid};
 use glam::{DMat2, DVec2};
 use rayon::prelude::*;
@@ -100,10 +100,11 @@ impl PsfDomain<'_> {
             Ok(aim.field_tan_at(sampled_mm.max(corner_mm + BORDER_OF_BLUR * corner_blur_mm)))
         })?;
         let wanted_tan = fields_tan.into_iter().fold(0.0, f64::max);
-        let gathered_tan = domain.at_ends(|aim| {
-            Ok(last_gathered_tan((aim.lens, aim.reference), aim.dioptres, aim.film_distance_mm, wanted_tan))
+        let shares = domain.at_ends(|aim| {
+            let gathered = aim.gathered_about(DVec2::ZERO);
+            Ok(gathered.map_or(1.0, |gathered| gathered.largest_share(|share| [DVec2::X * (share * wanted_tan)])))
         })?;
-        let last_field_tan = gathered_tan.into_iter().fold(wanted_tan, f64::min);
+        let last_field_tan = shares.into_iter().fold(wanted_tan, |least, share| least.min(share * wanted_tan));
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
         Ok(BankSettings::covering(self.film_distance_mm, last_field_tan, dioptres, wavelengths_nm, self.diffraction))
     }
@@ -121,20 +122,32 @@ impl PsfDomain<'_> {
         let symmetries = self.lens.mirror_symmetries();
         let is_mirrored = [0, 1].map(|axis| symmetries[axis] && center_mm[axis] == 0.0);
         let kept = DVec2::from(is_mirrored.map(|is_mirrored| if is_mirrored { 0.0 } else { 1.0 }));
-        let corners = self.at_ends(|aim| {
+        let ends = self.at_ends(|aim| {
             let aim = Aim { film_center_mm: center_mm, ..*aim };
             let wavelength_nm = aim.lens.wavelength_nm();
             let dark = || ForwardError::DarkFilm { lens: self.lens.name().to_owned(), wavelength_nm };
             let center = kept * aim.field_at_middle().ok_or_else(dark)?;
             let beyond_mm = 1.02 * half_mm + BORDER_OF_BLUR * aim.blur_mm(center);
             let (low, high) = aim.fields_over(center, half_mm, is_mirrored);
-            let corners = [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)];
-            let corner_blur_mm = corners.map(|field_tan| aim.blur_mm(field_tan)).into_iter().fold(0.0, f64::max);
+            let corner_blur_mm =
+                corners_of((low, high)).map(|field_tan| aim.blur_mm(field_tan)).into_iter().fold(0.0, f64::max);
             let beyond_mm = beyond_mm.max(half_mm + BORDER_OF_BLUR * corner_blur_mm);
-            Ok(aim.fields_over(center, beyond_mm, is_mirrored))
+            Ok([(low, high), aim.fields_over(center, beyond_mm, is_mirrored)])
         })?;
-        let around = |(first, last): (DVec2, DVec2), (low, high)| (first.min(low), last.max(high));
-        let (first, last) = corners.into_iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), around);
+        // All that the film sees and a little more, and of what lies beyond it as much as is gathered to an image.
+        const MORE: f64 = 0.02;
+        let nothing = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        let around = |i: usize| {
+            ends.iter().fold(nothing, |(first, last), corners| (first.min(corners[i].0), last.max(corners[i].1)))
+        };
+        let (film, far) = (around(0), around(1));
+        let more = 0.5 * MORE * (film.1 - film.0);
+        let within = |share: f64| ((film.0 - more).lerp(far.0, share), (film.1 + more).lerp(far.1, share));
+        let shares = self.at_ends(|aim| {
+            let gathered = aim.gathered_about(0.5 * (film.0 + film.1));
+            Ok(gathered.map_or(1.0, |gathered| gathered.largest_share(|share| corners_of(within(share)))))
+        })?;
+        let (first, last) = within(shares.into_iter().fold(1.0, f64::min));
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
         Ok(BankSettings::covering_grid(
             self.film_distance_mm,
@@ -144,6 +157,11 @@ impl PsfDomain<'_> {
             self.diffraction,
         ))
     }
+}
+
+/// Returns the four corners of a rectangle, of which two across from each other are given.
+fn corners_of((low, high): (DVec2, DVec2)) -> [DVec2; 4] {
+    [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)]
 }
 
 /// Checks that no part of a scene lies inside a lens.
@@ -203,6 +221,11 @@ impl Aim<'_> {
         }
         let landed = self.lens.landed(&rays, self.film_distance_mm).map(FilmPoint::in_picture_mm);
         Some(landed.map(|at_mm| at_mm - self.film_center_mm).collect())
+    }
+
+    /// Returns which fields about one are gathered to an image; `None` where that sees no light.
+    fn gathered_about(&self, middle_tan: DVec2) -> Option<GatheredFields<'_>> {
+        GatheredFields::about(middle_tan, (self.lens, self.reference), self.dioptres, self.film_distance_mm)
     }
 
     /// Returns the radius of the blur on the axis, mm, from first-order optics.

@@ -4,7 +4,7 @@
 
 use dioptric_forward::{Film, PsfDomain, Settings, irradiance};
 use dioptric_optics::Lens;
-use dioptric_psf::{Diffraction, LensImageModel, SampleCounts};
+use dioptric_psf::{Diffraction, FieldSampling, LensImageModel, SampleCounts};
 use dioptric_scene::{Scene, View};
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
@@ -60,4 +60,24 @@ fn a_larger_film_has_the_same_picture_in_its_middle() {
         let last_deg = scattered_beyond.unwrap().atan().to_degrees();
         assert!((52.0..56.0).contains(&last_deg), "{rows} rows: {last_deg}");
     }
+}
+
+/// Fields of a lens without an axis are sampled on a grid, which has to cover the film, and beyond it no fields whose light goes anywhere.
+#[test]
+fn grid_of_fields_ends_where_light_is_scattered() {
+    let lens = Lens::built_in("asphere-15mm").unwrap().with_f_number(4.0, 550.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+    let grid = WavelengthGrid::new(vec![450.0, 550.0, 650.0]).unwrap();
+    let corner_deg = |rows: usize| {
+        let film = Film::centered(rows, rows * 3 / 2, 66.0);
+        let (diffraction, depth_range_m) = (Diffraction::None, (1.0, 3.0));
+        let domain = PsfDomain { lens: &lens, film: &film, film_distance_mm, depth_range_m, grid: &grid, diffraction };
+        match domain.grid_settings().unwrap().fields {
+            FieldSampling::Grid { tans_x: x, tans_y: y } => x[x.len() - 1].hypot(y[y.len() - 1]).atan().to_degrees(),
+            other => panic!("a grid was asked for, not {other:?}"),
+        }
+    };
+    // The corner of 24 × 16 mm lies 14.3 mm out, at 44°; that of 32 × 21 mm 19 mm out, at 52°.
+    let [small, large] = [240, 320].map(corner_deg);
+    assert!((44.0..56.5).contains(&small) && (52.0..57.5).contains(&large), "{small} {large}");
 }

@@ -19,44 +19,64 @@ const MOST_SPREAD: f64 = 1.0 / 3.0;
 /// A mesh that is fine enough for an rms spread.
 const MESH: Mesh = Mesh { n_rings: 8, n_azimuths: 32 };
 
-/// Whether the light of a point is gathered to an image, by the moments of its ray map and of that of the axis.
-pub(crate) fn is_gathered(here: &RayMapMoments, axial: &RayMapMoments) -> bool {
-    here.rms_mm <= axial.rms_mm + MOST_SPREAD * here.centroid_mm.length()
+/// Whether the light of a point is gathered to an image that lies `radius_mm` from that of the middle of all fields, by the rms spreads of both.
+pub(crate) fn is_gathered(rms_mm: f64, middle_rms_mm: f64, radius_mm: f64) -> bool {
+    rms_mm <= middle_rms_mm + MOST_SPREAD * radius_mm
 }
 
 /// How far beyond the last field of a model its end is looked for, as a part of it; and how far before the end a model of it stops.
 pub(crate) const BEYOND_LAST: f64 = 2e-3;
 const BEFORE_END: f64 = 5e-4;
 
-/// Returns a field (tangent) just before the first whose light is not gathered to an image, or `last_tan` if that of all fields up to there is.
-///
-/// Light of a point is gathered where its rms spread is larger than that on the axis by at most a third of its image height. Models of the images of a lens
-/// with an axis end there. `reference` is the lens at the wavelength whose entrance pupil fields and `dioptres` count from; the film lies `film_distance_mm` behind
-/// the last vertex.
-#[must_use]
-pub fn last_gathered_tan(
-    (lens, reference): (&MonoLens, &MonoLens),
-    dioptres: f64,
-    film_distance_mm: f64,
-    last_tan: f64,
-) -> f64 {
-    /// Halvings of the range of fields.
-    const STEPS: usize = 24;
-    let moments = |tan: f64| {
-        let job = RayMapJob { lens, reference, field_tan: DVec2::X * tan, dioptres, film_distance_mm, mesh: MESH };
-        let pupil = Pupil::find(lens, &job.point(), MESH.n_azimuths)?;
-        Some(job.trace(&pupil, false)?.summary)
-    };
-    let Some(axial) = moments(0.0) else { return last_tan };
-    // Fields without light end a model by themselves.
-    let is_within = |tan: f64| moments(tan).is_none_or(|here| is_gathered(&here, &axial));
-    if is_within(last_tan) {
-        return last_tan;
+/// The fields whose light a lens gathers to an image, at one wavelength and depth: those whose rms spread is larger than that of a field in their middle by at
+/// most a third of the distance between both images. Models of the images of a lens with an axis end there.
+#[derive(Clone, Copy, Debug)]
+pub struct GatheredFields<'a> {
+    job: RayMapJob<'a>,
+    middle: RayMapMoments,
+}
+
+impl<'a> GatheredFields<'a> {
+    /// Looks about a field (tangents), where light gets through. `reference` is the lens at the wavelength whose entrance pupil fields and `dioptres` count
+    /// from; the film lies `film_distance_mm` behind the last vertex.
+    #[must_use]
+    pub fn about(
+        middle_tan: DVec2,
+        (lens, reference): (&'a MonoLens, &'a MonoLens),
+        dioptres: f64,
+        film_distance_mm: f64,
+    ) -> Option<Self> {
+        let job = RayMapJob { lens, reference, field_tan: middle_tan, dioptres, film_distance_mm, mesh: MESH };
+        Some(Self { job, middle: moments(job)? })
     }
-    let (mut low, mut high) = (0.0, last_tan);
-    for _ in 0..STEPS {
-        let middle = 0.5 * (low + high);
-        if is_within(middle) { low = middle } else { high = middle }
+
+    /// Whether a field is one of them, or without light: such fields end a model by themselves.
+    #[must_use]
+    pub fn holds(&self, field_tan: DVec2) -> bool {
+        moments(RayMapJob { field_tan, ..self.job }).is_none_or(|here| {
+            is_gathered(here.rms_mm, self.middle.rms_mm, here.centroid_mm.distance(self.middle.centroid_mm))
+        })
     }
-    low * (1.0 - BEFORE_END)
+
+    /// Returns the largest share, from 0 to 1, at which all fields of a family are held; just less than that where it is not 1.
+    #[must_use]
+    pub fn largest_share<const N: usize>(&self, fields: impl Fn(f64) -> [DVec2; N]) -> f64 {
+        /// Halvings of the range.
+        const STEPS: usize = 24;
+        let holds = |share: f64| fields(share).into_iter().all(|field_tan| self.holds(field_tan));
+        if holds(1.0) {
+            return 1.0;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..STEPS {
+            let middle = 0.5 * (low + high);
+            if holds(middle) { low = middle } else { high = middle }
+        }
+        low * (1.0 - BEFORE_END)
+    }
+}
+
+fn moments(job: RayMapJob<'_>) -> Option<RayMapMoments> {
+    let pupil = Pupil::find(job.lens, &job.point(), MESH.n_azimuths)?;
+    Some(job.trace(&pupil, false)?.summary)
 }

@@ -61,7 +61,7 @@ pub use error::PsfError;
 pub use field_geometry::FieldGeometry;
 pub use fields_along::FieldsAlong;
 pub use film_map::{FilmMap, PartOfPoint, RadialMap, ShiftedMap};
-pub use gathering::last_gathered_tan;
+pub use gathering::GatheredFields;
 pub use geometry::RadialGeometry;
 pub use kernel::Kernel;
 pub use lens_image::LensImage;

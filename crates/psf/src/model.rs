@@ -164,7 +164,7 @@ impl LensImageModel {
         }
     }
 
-    /// The field (tangent) beyond which light reaches the film but is not gathered to an image ([`last_gathered_tan`](crate::last_gathered_tan)), where the model
+    /// The field (tangent) beyond which light reaches the film but is not gathered to an image ([`GatheredFields`](crate::GatheredFields)), where the model
     /// ends for that.
     pub fn scattered_beyond_tan(&self) -> Option<f64> {
         self.form().ok().filter(|bank| bank.is_scattered_beyond()).map(|bank| bank.last_field_tan())

@@ -14,7 +14,7 @@ use crate::{
     mesh::Mesh,
     middle_rays::{MiddleRay, MiddleRays},
     pupil::Pupil,
-    ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, RayMapMoments},
+    ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, RayMapMoments, Traced},
     watch::Watch,
 };
 
@@ -403,7 +403,7 @@ impl ColumnTracer<'_> {
                 summary.centroid_mm = beside.summary.centroid_mm / near_axis;
             }
             let axial = column.summaries.first().unwrap_or(&traced.summary);
-            if !is_gathered(&traced.summary, axial) {
+            if !is_gathered(traced.summary.rms_mm, axial.rms_mm, traced.summary.centroid_mm.length()) {
                 column.is_scattered_beyond = true;
                 break;
             }
@@ -423,7 +423,9 @@ impl ColumnTracer<'_> {
             let last_tan = self.geometry_fields[self.geometry_fields.len() - 1];
             let beyond = self.task(lens, last_tan * (1.0 + BEYOND_LAST), dioptres);
             let traced = pupil.near(lens, &beyond.point()).and_then(|pupil| beyond.trace(&pupil, false));
-            column.is_scattered_beyond = traced.is_some_and(|traced| !is_gathered(&traced.summary, axial));
+            column.is_scattered_beyond = traced.is_some_and(|Traced { summary, .. }| {
+                !is_gathered(summary.rms_mm, axial.rms_mm, summary.centroid_mm.length())
+            });
         }
         self.watch.done(self.geometry_fields.len() - column.summaries.len());
         Ok(column)
