@@ -160,6 +160,13 @@ impl RunOptics {
     }
 }
 
+/// States from which field on light is not in the irradiance, though it reaches the film: where a lens does not gather it to an image.
+fn note_on_scattered_light(run: &Run<'_>) -> Option<String> {
+    let last_deg = run.model.scattered_beyond_tan()?.atan().to_degrees();
+    let lens = run.capture.lens.lens.name();
+    Some(format!("{lens}: light from beyond {last_deg:.1}° off axis is left out: the lens scatters it over the film"))
+}
+
 impl RunReport {
     /// Returns the numbers of a run.
     ///
@@ -185,7 +192,7 @@ impl RunReport {
             lens: optics.lens,
             lens_notes: {
                 let without_sums = LensData::note_on_third_order(&capture.lens.lens);
-                capture.lens_notes().into_iter().chain(without_sums).collect()
+                capture.lens_notes().into_iter().chain(without_sums).chain(note_on_scattered_light(run)).collect()
             },
             film_distance_mm: place.film_distance_mm,
             film: FilmData {

@@ -91,9 +91,6 @@ pub struct BankData {
     /// What was asked for of nine tenths of the places: no more than this, unless that takes more samples than there may be.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wanted_error: Option<f64>,
-    /// The field beyond which light reaches the film but is scattered over more of it than an image takes up, degrees: none of it is in the irradiance.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub scattered_beyond_deg: Option<f64>,
 }
 
 impl BankData {
@@ -113,7 +110,6 @@ impl BankData {
             n_places: error.n_places,
             pitch_um: error.pitch_um,
             wanted_error: error.target,
-            scattered_beyond_deg: model.scattered_beyond_tan().map(|tan| tan.atan().to_degrees()),
         })
     }
 
@@ -131,12 +127,9 @@ impl BankData {
             }
             _ => String::new(),
         };
-        let scattered = self.scattered_beyond_deg.map_or_else(String::new, |deg| {
-            format!("; light from beyond {deg:.1}° is left out: the lens scatters it over the film")
-        });
         format!(
             "{kind} {n_fields} fields × {n_depths} depths × {n_wavelengths} wavelengths; error on pixels of {pitch_um} \
-             µm at {n_places} places: median {:.2} %, nine tenths below {:.2} %{missed}{scattered}",
+             µm at {n_places} places: median {:.2} %, nine tenths below {:.2} %{missed}",
             100.0 * self.median_error,
             100.0 * self.p90_error,
         )
