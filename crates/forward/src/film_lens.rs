@@ -7,6 +7,7 @@ use dioptric_spectrum::Cancelled;
 use rayon::prelude::*;
 
 use crate::{
+    Film,
     knot_kernels::KnotKernel,
     layers::Layers,
     patch::Knot,
@@ -17,8 +18,7 @@ use crate::{
 /// A lens at one wavelength, its maps and kernels on the film.
 pub(crate) struct FilmLens<'a> {
     pub(crate) image: &'a dyn LensImage,
-    /// Distance between the pixels of the film, µm.
-    pub(crate) pitch_um: f64,
+    pub(crate) film: &'a Film,
     pub(crate) layers: &'a Layers,
     /// Of each layer.
     pub(crate) maps: &'a [FilmMap],
@@ -28,8 +28,8 @@ pub(crate) struct FilmLens<'a> {
 
 impl FilmLens<'_> {
     fn kernel(&self, layer: usize, knot: Knot, factor: usize) -> KnotKernel {
-        let field_tan = knot.field_tan(&self.maps[layer], 1e-3 * self.pitch_um);
-        let pitch_um = factor as f64 * self.pitch_um;
+        let field_tan = knot.field_tan(&self.maps[layer], 1e-3 * self.film.pitch_um);
+        let pitch_um = factor as f64 * self.film.pitch_um;
         let query = PsfQuery::new(field_tan, self.layers.dioptres()[layer], self.wavelength_nm, pitch_um);
         KnotKernel::new(&self.image.kernel(query))
     }
@@ -53,7 +53,7 @@ impl FilmLens<'_> {
 
     /// Returns the largest spread of a point at a knot of a layer over some wavelengths, pixels of the film.
     pub(crate) fn spread_px(&self, layer: usize, knot: Knot, wavelengths_nm: &[f64]) -> f64 {
-        let pitch_mm = 1e-3 * self.pitch_um;
+        let pitch_mm = 1e-3 * self.film.pitch_um;
         let field_tan = knot.field_tan(&self.maps[layer], pitch_mm);
         let spread_mm = |&wavelength_nm| self.image.spread_mm(field_tan, self.layers.dioptres()[layer], wavelength_nm);
         wavelengths_nm.iter().map(spread_mm).fold(0.0, f64::max) / pitch_mm

@@ -193,14 +193,8 @@ impl Layout {
         let active = active_cells_of(film, view, &extents, settings, cancel)?;
         let work = Work::new(cancel, progress, range, active.iter().map(Vec::len).sum::<usize>() as u64);
         let stopwatch = Stopwatch::default();
-        let film_lens = FilmLens {
-            image: lens,
-            pitch_um: film.pitch_um,
-            layers,
-            maps: &maps,
-            wavelength_nm: middle_nm,
-            stopwatch: &stopwatch,
-        };
+        let film_lens =
+            FilmLens { image: lens, film, layers, maps: &maps, wavelength_nm: middle_nm, stopwatch: &stopwatch };
         let tiling = Tiling::new(active, &film_lens, settings, &wavelengths_nm, &work)?;
         let rasters_of = |(tiles, map): (&LayerTiles, &FilmMap)| -> BTreeMap<usize, LayerRaster> {
             let raster = |&factor: &usize| (factor, LayerRaster::new(film, factor, (view, scene.size()), map));
@@ -298,7 +292,7 @@ impl Layout {
         let wavelength_nm = self.spec.grid.centers_nm()[band];
         let film_lens = FilmLens {
             image: lens,
-            pitch_um: self.spec.film.pitch_um,
+            film: &self.spec.film,
             layers: &self.scene.layers,
             maps: &maps,
             wavelength_nm,

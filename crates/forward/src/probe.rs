@@ -11,6 +11,7 @@ use crate::{
     cost::Cost,
     expansion::Expansion,
     film_lens::FilmLens,
+    geometry::FilmFrame,
     knot_kernels::{KnotKernel, LayerKernels, Symmetry, edge_spread_peak},
     mesh::{Mesh, Weights},
     patch::{Cell, Knot, Patch},
@@ -58,6 +59,16 @@ impl<'a> Probe<'a> {
         *self.spreads_px.entry(canonical).or_insert_with(compute)
     }
 
+    /// Whether a cell lies farther beyond the film than a point in it is spread, of which 5 % is left for the film then.
+    fn is_beyond_reach(&mut self, cell: &Cell) -> bool {
+        let film = self.lens.film;
+        let at = cell.pixels(&FilmFrame::new(film, 1));
+        let beyond = |first: i64, n: usize, film: usize| (-(first + n as i64)).max(first - film as i64).max(0) as f64;
+        let (down, across) =
+            (beyond(at.first_row, at.rows, film.rows), beyond(at.first_column, at.columns, film.columns));
+        down.hypot(across) > self.spread_px(cell.knot())
+    }
+
     /// Whether the spline is off by more than the settings allow at a corner of a cell, by the spread of a point alone: where cells are
     /// large beside what the blur changes over, the middles of cells around a sharp place all lie where it is wide.
     fn is_off_at_corners(&mut self, mesh: &Mesh, cell: &Cell) -> bool {
@@ -97,10 +108,13 @@ impl<'a> Probe<'a> {
         // The spline at the middle of each cell, by the factor of the coarsest raster of its kernels.
         let mut splines: BTreeMap<usize, Vec<(Cell, Weights)>> = BTreeMap::new();
         for cell in cells {
+            let is_large = cell.size > LARGEST_JOINED * self.factor_at(cell.knot());
+            if !is_large && self.is_beyond_reach(&cell) {
+                continue;
+            }
             let weights = mesh.at_middle(&cell);
             let knots = weights.keys().copied().chain([cell.knot()]);
             let coarsest = knots.map(|knot| self.factor_at(knot)).max().unwrap_or(1);
-            let is_large = cell.size > LARGEST_JOINED * self.factor_at(cell.knot());
             let may_divide = cell.is_divisible_to((PER_BLUR * widest_px * coarsest as f64) as usize);
             if is_large || may_divide && self.is_off_at_corners(mesh, &cell) {
                 divided.insert(cell);
