@@ -1,6 +1,6 @@
 //! One layer in one band on one raster: its ideal picture, light or alpha, spread by PSFs that vary over the film.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use dioptric_fft::Complex;
 use dioptric_psf::FilmMap;
@@ -9,16 +9,16 @@ use rayon::prelude::*;
 
 use crate::{
     block_layers::BlockLayers,
-    by_knots::spread_by_knots,
+    by_knots::{KnotRaster, spread_by_knots},
     convolve::{STRIP_COLUMNS, STRIP_ROWS, Strip, fast_size, multiply_add, with_fft},
     expansion::Expansion,
     knot_kernels::{KnotKernel, LayerKernels},
     occlusion::BlurredPlane,
-    patch::{Knot, Patch},
+    patch::{Knot, Patch, Products, value_of},
     patch_samples::{BlurredCell, PatchSamples, Places},
     sampler::{Rectangle, Sampler, Surface},
     stopwatch::{Part, Stopwatch},
-    uniform_response::UniformResponse,
+    uniform_response::uniform_response,
     work::Work,
 };
 
@@ -38,6 +38,8 @@ pub(crate) struct LayerTask<'a> {
     pub(crate) kernels: &'a LayerKernels,
     pub(crate) film_rows: usize,
     pub(crate) film_columns: usize,
+    /// Length that the weights of knots are smoothed over, pixels.
+    pub(crate) smoothing_px: usize,
     /// A term that changes no edge by more than this is left out.
     pub(crate) negligible_edge: f64,
     pub(crate) stopwatch: &'a Stopwatch,
@@ -82,10 +84,35 @@ pub(crate) fn blur_layer(
             }
         });
     }
-    spread_by_knots(task.kernels, &by_knots, (task.stopwatch, work.cancel()), &mut |cell| add_cell(task, cell, out))
+    let raster = KnotRaster {
+        kernels: task.kernels,
+        patches: task.patches,
+        frame: &task.sampler.frame,
+        half_px: task.smoothing_px / 2,
+    };
+    let responses = task.responses_around(&by_knots);
+    raster.level(&mut by_knots, responses.as_ref());
+    spread_by_knots(&raster, &by_knots, (task.stopwatch, work.cancel()), &mut |cell| add_cell(task, cell, out))
 }
 
 impl LayerTask<'_> {
+    /// Whether what the layer covers is blurred, not its light.
+    fn is_alpha(&self) -> bool {
+        self.surfaces.iter().all(|surface| surface.radiance.is_none())
+    }
+
+    fn response_of(&self, patch: &Patch) -> Products {
+        uniform_response(self.kernels, patch, self.sampler.frame.factor())
+    }
+
+    /// Returns the responses around samples whose weights are smoothed, by the number of the patch, where they are needed.
+    fn responses_around(&self, sampled: &[PatchSamples<'_>]) -> Option<BTreeMap<u32, Products>> {
+        let around = sampled.iter().filter_map(|sampled| sampled.patch.around.as_ref());
+        let near: BTreeSet<u32> = around.flat_map(|around| around.patches.iter().copied()).collect();
+        let of = |number: u32| (number, self.response_of(&self.patches[number as usize]));
+        self.is_alpha().then(|| near.into_par_iter().map(of).collect())
+    }
+
     /// The samples along a side of the widest kernel of a patch.
     fn width_of(&self, patch: &Patch) -> usize {
         patch.shares.iter().map(|&(knot, _)| self.kernels.width_at(knot)).max().unwrap_or(1)
@@ -107,11 +134,12 @@ fn blur_patch<'a>(
     let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, task.blocks, cancel);
     let Some(mut ideal) = task.stopwatch.time(Part::Sampling, sample)? else { return Ok(Spread::Nothing) };
     let places = Places::new(patch, &source, task.sampler);
-    if task.surfaces.iter().all(|surface| surface.radiance.is_none()) {
+    if task.is_alpha() && patch.around.is_none() {
         // What a surface covers is 1 all over it, however its kernels change.
-        let response = UniformResponse::of(task.kernels, patch, task.sampler.frame.factor());
+        let response = task.response_of(patch);
         for (line, down) in ideal.chunks_exact_mut(source.columns).zip(&places.down) {
-            line.iter_mut().zip(&places.across).for_each(|(alpha, across)| *alpha /= response.at(down, across));
+            let level = |across| value_of(&response, down, across).max(0.1);
+            line.iter_mut().zip(&places.across).for_each(|(alpha, across)| *alpha /= level(across));
         }
     }
     if patch.is_by_knots {

@@ -1,6 +1,9 @@
 //! A layer spread knot by knot: the samples around each, times its weights, with its kernel.
 
-use std::{cell::RefCell, collections::BTreeMap};
+use std::{
+    cell::RefCell,
+    collections::{BTreeMap, BTreeSet},
+};
 
 use dioptric_fft::Complex;
 use dioptric_spectrum::{Cancel, Cancelled};
@@ -9,65 +12,194 @@ use rayon::prelude::*;
 
 use crate::{
     convolve::{Fft2, fast_size, multiply, with_fft},
+    geometry::FilmFrame,
     knot_kernels::{KnotKernel, LayerKernels, Mirror},
-    patch::Knot,
+    patch::{Knot, Patch, Products},
     patch_samples::{BlurredCell, PatchSamples},
     sampler::Rectangle,
+    smoothing::Smoother,
     stopwatch::{Part, Stopwatch},
 };
 
-/// A patch in which a knot has weight, and its share of the products of polynomials.
-type Member<'a> = (&'a PatchSamples<'a>, &'a [f32; 9]);
+/// A raster of a layer that is spread by knots.
+pub(crate) struct KnotRaster<'a> {
+    pub(crate) kernels: &'a LayerKernels,
+    /// All of it, those that are spread by themselves too.
+    pub(crate) patches: &'a [Patch],
+    pub(crate) frame: &'a FilmFrame,
+    /// Half the length that weights are smoothed over.
+    pub(crate) half_px: usize,
+}
+
+/// Where a knot has weight.
+#[derive(Default)]
+struct Reach<'a> {
+    /// Samples of patches, each with the knot's share of the products of polynomials.
+    plain: Vec<(&'a PatchSamples<'a>, &'a Products)>,
+    /// Those over which its weights are smoothed.
+    smooth: Vec<&'a PatchSamples<'a>>,
+    /// Its weights around these, before they are smoothed.
+    weights: Vec<(&'a Patch, &'a Products)>,
+}
 
 /// The knots that have one canonical knot.
-type Group<'a> = BTreeMap<Knot, Vec<Member<'a>>>;
+type Group<'a> = BTreeMap<Knot, Reach<'a>>;
 
 /// Knots blurred before their results are added up: bounds the memory, and keeps the order of the sums.
 const KNOTS_AT_ONCE: usize = 32;
 
 /// Spreads patches and hands on what they make, in an order that does not depend on the number of threads.
 pub(crate) fn spread_by_knots(
-    kernels: &LayerKernels,
+    raster: &KnotRaster<'_>,
     sampled: &[PatchSamples<'_>],
     (stopwatch, cancel): (&Stopwatch, &Cancel),
     add: &mut dyn FnMut(&BlurredCell),
 ) -> Result<(), Cancelled> {
-    let mut groups: BTreeMap<Knot, Group<'_>> = BTreeMap::new();
-    for sampled in sampled {
-        for (knot, shares) in &sampled.patch.shares {
-            let group = groups.entry(kernels.symmetry.canonical(*knot)).or_default();
-            group.entry(*knot).or_default().push((sampled, shares));
-        }
-    }
-    let groups: Vec<Group<'_>> = groups.into_values().collect();
+    let groups: Vec<Group<'_>> = raster.groups(sampled).into_values().collect();
     let n_knots: usize = groups.iter().map(Group::len).sum();
     let groups_at_once = (KNOTS_AT_ONCE * groups.len()).div_ceil(n_knots.max(1)).max(1);
     for groups in groups.chunks(groups_at_once) {
-        let spread = |group| stopwatch.time(Part::Transforms, || spread_group(kernels, group, cancel));
+        let spread = |group| stopwatch.time(Part::Transforms, || raster.spread_group(group, cancel));
         let cells: Vec<Vec<BlurredCell>> = groups.par_iter().map(spread).collect::<Result<_, Cancelled>>()?;
         stopwatch.time(Part::Compositing, || cells.iter().flatten().for_each(&mut *add));
     }
     Ok(())
 }
 
-/// Spreads what lies around the knots of a group: each is mirrored to the canonical knot, whose kernel is transformed once.
-fn spread_group(kernels: &LayerKernels, group: &Group<'_>, cancel: &Cancel) -> Result<Vec<BlurredCell>, Cancelled> {
-    let place = |(knot, members): (&Knot, &'_ Vec<Member<'_>>)| {
-        (kernels.symmetry.mirror(*knot), bounds(members.iter().map(|(sampled, _)| sampled.source)))
-    };
-    let around: Vec<Around<'_>> = group.iter().map(|own| (place(own), own.1)).collect();
-    let Some(kernel) = group.keys().next().map(|knot| kernels.canonical_at(*knot)) else { return Ok(vec![]) };
-    let largest = around.iter().map(|((_, at), _)| at.rows.max(at.columns)).max().unwrap_or(1);
-    let size = fast_size(largest + kernel.width - 1);
-    with_fft(size, |fft| BUFFERS.with_borrow_mut(|buffers| spread_around(&around, (kernel, fft), buffers, cancel)))
+impl KnotRaster<'_> {
+    /// Divides samples by what the smoothed weights of all knots sum to: less than 1 where patches end, or go on with kernels on another raster. For
+    /// `responses`, those of a uniform plane by the number of the patch, the division is by them as well, smoothed likewise.
+    pub(crate) fn level(&self, sampled: &mut [PatchSamples<'_>], responses: Option<&BTreeMap<u32, Products>>) {
+        sampled.par_iter_mut().for_each_init(
+            Smoother::default,
+            |smoother, PatchSamples { patch, source, ideal, .. }| {
+                let Some(around) = &patch.around else { return };
+                if around.is_whole && responses.is_none() {
+                    return;
+                }
+                smoother.begin(source, self.half_px);
+                for &number in &around.patches {
+                    let near = &self.patches[number as usize];
+                    let mut products = near.total();
+                    if let Some(response) = responses.and_then(|responses| responses.get(&number)) {
+                        products.iter_mut().zip(response).for_each(|(product, response)| *product += response);
+                        products[0] -= 1.0;
+                    }
+                    smoother.add(near, self.frame, &products);
+                }
+                // A plane is 1, give or take what kernels change over a cell.
+                ideal.iter_mut().zip(smoother.finish()).for_each(|(value, level)| *value /= level.max(0.1));
+            },
+        );
+    }
+
+    /// Finds the knots that have weight in samples, by their canonical knot.
+    fn groups<'a>(&'a self, sampled: &'a [PatchSamples<'a>]) -> BTreeMap<Knot, Group<'a>> {
+        let symmetry = self.kernels.symmetry;
+        let mut groups: BTreeMap<Knot, Group<'_>> = BTreeMap::new();
+        let mut near = BTreeSet::new();
+        for sampled in sampled {
+            let Some(around) = &sampled.patch.around else {
+                for (knot, shares) in &sampled.patch.shares {
+                    let group = groups.entry(symmetry.canonical(*knot)).or_default();
+                    group.entry(*knot).or_default().plain.push((sampled, shares));
+                }
+                continue;
+            };
+            near.extend(around.patches.iter().copied());
+            let patches = around.patches.iter().map(|&number| &self.patches[number as usize]);
+            let reaches = |patch: &&Patch| {
+                patch.cell.pixels(self.frame).grown(self.half_px).intersection(&sampled.source).is_some()
+            };
+            let knots: BTreeSet<Knot> =
+                patches.filter(reaches).flat_map(|patch| patch.shares.iter().map(|(knot, _)| *knot)).collect();
+            for knot in knots {
+                groups.entry(symmetry.canonical(knot)).or_default().entry(knot).or_default().smooth.push(sampled);
+            }
+        }
+        for number in near {
+            let patch = &self.patches[number as usize];
+            for (knot, shares) in &patch.shares {
+                let group = groups.get_mut(&symmetry.canonical(*knot));
+                if let Some(reach) = group.and_then(|group| group.get_mut(knot)) {
+                    reach.weights.push((patch, shares));
+                }
+            }
+        }
+        groups
+    }
+
+    /// Spreads what lies around the knots of a group: each is mirrored to the canonical knot, whose kernel is transformed once.
+    fn spread_group(&self, group: &Group<'_>, cancel: &Cancel) -> Result<Vec<BlurredCell>, Cancelled> {
+        let Some(kernel) = group.keys().next().map(|knot| self.kernels.canonical_at(*knot)) else { return Ok(vec![]) };
+        let around: Vec<Surroundings<'_>> =
+            group.iter().filter_map(|(knot, reach)| self.around(*knot, reach)).collect();
+        let largest = around.iter().map(|Surroundings { at, .. }| at.rows.max(at.columns)).max().unwrap_or(1);
+        let size = fast_size(largest + kernel.width - 1);
+        with_fft(size, |fft| BUFFERS.with_borrow_mut(|buffers| spread_around(&around, (kernel, fft), buffers, cancel)))
+    }
+
+    /// Returns what lies around a knot, if anything does.
+    fn around<'a>(&'a self, knot: Knot, reach: &'a Reach<'a>) -> Option<Surroundings<'a>> {
+        let weights = reach.weights.iter().map(|(patch, _)| patch.cell.pixels(self.frame));
+        let has_weight = bounds(weights).map(|weights| weights.grown(self.half_px));
+        let plain = reach.plain.iter().map(|(sampled, _)| sampled.source);
+        let smooth = reach.smooth.iter().filter_map(|sampled| sampled.source.intersection(&has_weight?));
+        let at = bounds(plain.chain(smooth))?;
+        Some(Surroundings { mirror: self.kernels.symmetry.mirror(knot), at, reach, raster: self })
+    }
 }
 
-/// What is spread by a kernel: the mirror of a knot, what its samples lie in, and the patches that have them.
-type Around<'a> = ((Mirror, Rectangle), &'a Vec<Member<'a>>);
+/// What is spread by a kernel: the mirror of a knot, what its samples lie in, and where they are from.
+struct Surroundings<'a> {
+    mirror: Mirror,
+    at: Rectangle,
+    reach: &'a Reach<'a>,
+    raster: &'a KnotRaster<'a>,
+}
+
+impl Surroundings<'_> {
+    /// Puts the samples around the knot, times its weights, into `block`.
+    fn gather(&self, smoother: &mut Smoother, block: &mut Vec<f32>) {
+        let at = &self.at;
+        block.clear();
+        block.resize(at.rows * at.columns, 0.0);
+        for (sampled, shares) in &self.reach.plain {
+            let PatchSamples { source, places, ideal, .. } = sampled;
+            let block = block[offset_of(source, at)..].chunks_mut(at.columns);
+            for ((line, down), block) in ideal.chunks_exact(source.columns).zip(&places.down).zip(block) {
+                let along: [f32; 3] = std::array::from_fn(|j| (0..3).map(|i| shares[3 * i + j] * down[i]).sum());
+                add_weighted(line, &places.across, along, block);
+            }
+        }
+        if self.reach.smooth.is_empty() {
+            return;
+        }
+        let KnotRaster { frame, half_px, .. } = self.raster;
+        smoother.begin(at, *half_px);
+        self.reach.weights.iter().for_each(|(patch, shares)| smoother.add(patch, frame, shares));
+        let weights = smoother.finish();
+        for PatchSamples { source, ideal, .. } in &self.reach.smooth {
+            let Some(common) = source.intersection(at) else { continue };
+            let lines = ideal[offset_of(&common, source)..].chunks(source.columns).take(common.rows);
+            let first = offset_of(&common, at);
+            let sums = block[first..].chunks_mut(at.columns).zip(weights[first..].chunks(at.columns));
+            for (line, (sums, weights)) in lines.zip(sums) {
+                let products = line.iter().zip(weights).take(common.columns);
+                sums.iter_mut().zip(products).for_each(|(sum, (value, weight))| *sum += value * weight);
+            }
+        }
+    }
+}
+
+/// Returns the number of a rectangle's first pixel in another around it, row by row.
+fn offset_of(inner: &Rectangle, outer: &Rectangle) -> usize {
+    (inner.first_row - outer.first_row) as usize * outer.columns + (inner.first_column - outer.first_column) as usize
+}
 
 /// Spreads what lies around knots by their canonical kernel: two at a time, or one that is alone.
 fn spread_around(
-    around: &[Around<'_>],
+    around: &[Surroundings<'_>],
     (kernel, fft): (&KnotKernel, &mut Fft2),
     buffers: &mut Buffers,
     cancel: &Cancel,
@@ -85,14 +217,21 @@ fn spread_around(
     Ok(cells)
 }
 
-/// Returns the rectangle that holds all of these.
-fn bounds(rectangles: impl Iterator<Item = Rectangle>) -> Rectangle {
-    let (mut top, mut left, mut bottom, mut right) = (i64::MAX, i64::MAX, i64::MIN, i64::MIN);
+/// Returns the rectangle that holds all of these, if there are any.
+fn bounds(mut rectangles: impl Iterator<Item = Rectangle>) -> Option<Rectangle> {
+    let first = rectangles.next()?;
+    let end = |at: &Rectangle| (at.first_row + at.rows as i64, at.first_column + at.columns as i64);
+    let ((mut top, mut left), (mut bottom, mut right)) = ((first.first_row, first.first_column), end(&first));
     for at in rectangles {
         (top, left) = (top.min(at.first_row), left.min(at.first_column));
-        (bottom, right) = (bottom.max(at.first_row + at.rows as i64), right.max(at.first_column + at.columns as i64));
+        (bottom, right) = (bottom.max(end(&at).0), right.max(end(&at).1));
     }
-    Rectangle { first_row: top, first_column: left, rows: (bottom - top) as usize, columns: (right - left) as usize }
+    Some(Rectangle {
+        first_row: top,
+        first_column: left,
+        rows: (bottom - top) as usize,
+        columns: (right - left) as usize,
+    })
 }
 
 thread_local! {
@@ -108,13 +247,15 @@ struct Buffers {
     lines: Vec<Complex<f32>>,
     spectrum: Vec<Complex<f32>>,
     kernel: Vec<Complex<f32>>,
+    smoother: Smoother,
 }
 
 impl Buffers {
     /// Spreads the samples around a knot by the canonical kernel.
-    fn spread(&mut self, fft: &mut Fft2, kernel: &KnotKernel, ((mirror, at), members): &Around<'_>) -> BlurredCell {
+    fn spread(&mut self, fft: &mut Fft2, kernel: &KnotKernel, around: &Surroundings<'_>) -> BlurredCell {
+        let Surroundings { mirror, at, .. } = around;
         fft.forward(&kernel.samples, kernel.width, &mut self.kernel);
-        self.gather(at, members);
+        around.gather(&mut self.smoother, &mut self.block);
         mirror.applied(&self.block, (at.rows, at.columns), &mut self.mirrored);
         fft.forward(&self.mirrored, mirror.size((at.rows, at.columns)).1, &mut self.spectrum);
         multiply(&mut self.spectrum, &self.kernel);
@@ -138,14 +279,15 @@ impl Buffers {
 
     /// Spreads the samples around two knots, or around the last of an odd number, by the canonical kernel. Those around one are the real parts of
     /// the samples of a block, around the other the imaginary ones: a kernel, which is real, leaves them apart.
-    fn spread_pair(&mut self, fft: &mut Fft2, width: usize, pair: &[Around<'_>], cells: &mut Vec<BlurredCell>) {
+    fn spread_pair(&mut self, fft: &mut Fft2, width: usize, pair: &[Surroundings<'_>], cells: &mut Vec<BlurredCell>) {
         let size = fft.size();
-        let rows_of = |((mirror, at), _): &Around<'_>| mirror.size((at.rows, at.columns)).0;
+        let rows_of = |Surroundings { mirror, at, .. }: &Surroundings<'_>| mirror.size((at.rows, at.columns)).0;
         let n_rows = pair.iter().map(rows_of).max().unwrap_or(0);
         self.lines.clear();
         self.lines.resize(n_rows * size, Complex::new(0.0, 0.0));
-        for (part, ((mirror, at), members)) in pair.iter().enumerate() {
-            self.gather(at, members);
+        for (part, around) in pair.iter().enumerate() {
+            let Surroundings { mirror, at, .. } = around;
+            around.gather(&mut self.smoother, &mut self.block);
             let (block, lines) = (&self.block, (&mut self.lines[..], size));
             match part {
                 0 => mirror.applied_to(block, (at.rows, at.columns), lines, |value, sample| value.re = sample),
@@ -155,7 +297,7 @@ impl Buffers {
         fft.forward_pair(&mut self.lines, &mut self.spectrum);
         multiply(&mut self.spectrum, &self.kernel);
         fft.inverse_pair(&mut self.spectrum, n_rows + width - 1, &mut self.lines);
-        for (part, ((mirror, at), _)) in pair.iter().enumerate() {
+        for (part, Surroundings { mirror, at, .. }) in pair.iter().enumerate() {
             let at = widened(at, width);
             let (size, lines) = ((at.rows, at.columns), (&self.lines[..], size));
             let values = match part {
@@ -163,22 +305,6 @@ impl Buffers {
                 _ => mirror.restored_from(lines, size, |value| value.im),
             };
             cells.push(BlurredCell { at, values });
-        }
-    }
-
-    /// Puts the samples of the patches around a knot, times its weights, into `block`.
-    fn gather(&mut self, at: &Rectangle, members: &[Member<'_>]) {
-        self.block.clear();
-        self.block.resize(at.rows * at.columns, 0.0);
-        for (sampled, shares) in members {
-            let PatchSamples { source, places, ideal, .. } = sampled;
-            let first = (source.first_row - at.first_row) as usize * at.columns
-                + (source.first_column - at.first_column) as usize;
-            let block = self.block[first..].chunks_mut(at.columns);
-            for ((line, down), block) in ideal.chunks_exact(source.columns).zip(&places.down).zip(block) {
-                let along: [f32; 3] = std::array::from_fn(|j| (0..3).map(|i| shares[3 * i + j] * down[i]).sum());
-                add_weighted(line, &places.across, along, block);
-            }
         }
     }
 }
@@ -202,8 +328,9 @@ fn add_weighted(line: &[f32], across: &[[f32; 3]], along: [f32; 3], sum: &mut [f
 mod tests {
     use super::*;
     use crate::{
+        Film,
         knot_kernels::Symmetry,
-        patch::{Cell, Patch, polynomials},
+        patch::{Around, Cell, polynomials, value_of},
         patch_samples::Places,
     };
 
@@ -221,6 +348,7 @@ mod tests {
     #[test]
     fn knots_spread_as_samples_do() {
         let (rows, columns, width) = (12, 7, 5);
+        let frame = FilmFrame::new(&Film::centered(64, 64, 1.0), 1);
         let ways = [(64, -32), (-64, -32), (64, 32), (32, -64), (-32, 64), (32, 64), (-32, -64), (-64, 32), (0, 0)];
         let knots = ways.map(|(right, down)| Knot { right, down });
         for symmetry in [Symmetry::Octants, Symmetry::None] {
@@ -240,6 +368,7 @@ mod tests {
                     Patch {
                         cell,
                         is_by_knots: true,
+                        around: None,
                         shares: knots.iter().enumerate().map(share).collect(),
                         elsewhere: vec![],
                     }
@@ -265,7 +394,8 @@ mod tests {
                 }
             };
             let observers = (&Stopwatch::default(), &Cancel::new());
-            spread_by_knots(&kernels, &samples, observers, &mut |cell| add(&cell.at, &cell.values)).unwrap();
+            let raster = KnotRaster { kernels: &kernels, patches: &patches, frame: &frame, half_px: 0 };
+            spread_by_knots(&raster, &samples, observers, &mut |cell| add(&cell.at, &cell.values)).unwrap();
             for PatchSamples { patch, source, places, ideal } in &samples {
                 for (i, value) in ideal.iter().enumerate() {
                     let (row, column) = (i / columns, i % columns);
@@ -290,5 +420,72 @@ mod tests {
             // What both patches cover, and half a kernel around.
             assert_eq!(spread.len(), (rows + 1 + width - 1) * (16 + columns + width - 1));
         }
+    }
+
+    /// Two patches beside each other, of which the left one alone has light: with the means of weights over squares of 8 pixels, and weights that sum to 1 to
+    /// the outermost pixel.
+    #[test]
+    fn weights_are_means_over_squares() {
+        let (width, half) = (5, 4);
+        let frame = FilmFrame::new(&Film::centered(64, 64, 1.0), 1);
+        let knots = [Knot { right: 8, down: 8 }, Knot { right: 24, down: 8 }];
+        let kernel = |knot: Knot| (knot, KnotKernel { width, samples: noise(width * width, knot.right as u32) });
+        let kernels = LayerKernels::new(Symmetry::None, knots.map(kernel).into_iter().collect());
+        // One knot gives way to the other; the second patch has its weight in part elsewhere.
+        let shares = [[0.7, -0.2, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.2], [0.3, 0.2, -0.1, -0.1, 0.0, 0.0, 0.0, 0.0, -0.2]];
+        let patch = |across: i32, part: f32| Patch {
+            cell: Cell { down: 0, across, size: 16 },
+            is_by_knots: true,
+            around: Some(Around { patches: vec![0, 1], is_whole: false }),
+            shares: knots.into_iter().zip(shares.map(|share| share.map(|share| part * share))).collect(),
+            elsewhere: if part < 1.0 { vec![(2, vec![])] } else { vec![] },
+        };
+        let patches = [patch(0, 1.0), patch(1, 0.5)];
+        let source = patches[0].cell.pixels(&frame);
+        let ideal = noise(16 * 16, 5);
+        let places = Places { down: vec![], across: vec![] };
+        let mut samples = [PatchSamples { patch: &patches[0], source, places, ideal: ideal.clone() }];
+        let raster = KnotRaster { kernels: &kernels, patches: &patches, frame: &frame, half_px: half };
+        raster.level(&mut samples, None);
+        let mut spread: BTreeMap<(i64, i64), f64> = BTreeMap::new();
+        let mut add = |at: &Rectangle, values: &[f32]| {
+            for (i, &value) in values.iter().enumerate() {
+                let place = (at.first_row + (i / at.columns) as i64, at.first_column + (i % at.columns) as i64);
+                *spread.entry(place).or_default() += f64::from(value);
+            }
+        };
+        let observers = (&Stopwatch::default(), &Cancel::new());
+        spread_by_knots(&raster, &samples, observers, &mut |cell| add(&cell.at, &cell.values)).unwrap();
+
+        // The weight of a knot at a pixel, counted from the first of the left patch; nothing beyond both.
+        let weight_at = |knot: usize, row: i64, column: i64| -> f64 {
+            let (patch, column) =
+                (&patches[(column >= 16) as usize], column as f32 - if column >= 16 { 16.0 } else { 0.0 });
+            let (down, across) = ((row as f32 + 0.5) / 16.0 - 0.5, (column + 0.5) / 16.0 - 0.5);
+            f64::from(value_of(&patch.shares[knot].1, &polynomials(down), &polynomials(across)))
+        };
+        let mean_at = |knot: usize, row: i64, column: i64| -> f64 {
+            let (mut sum, half) = (0.0, half as i64);
+            for (down, across) in (-half..=half).flat_map(|down| (-half..=half).map(move |across| (down, across))) {
+                let (row, column) = (row + down, column + across);
+                if (0..16).contains(&row) && (0..32).contains(&column) {
+                    let part = |by: i64| if by.abs() == half { 0.5 } else { 1.0 } / (2 * half) as f64;
+                    sum += part(down) * part(across) * weight_at(knot, row, column);
+                }
+            }
+            sum
+        };
+        for (i, &value) in ideal.iter().enumerate() {
+            let (row, column) = (i as i64 / 16, i as i64 % 16);
+            let means = [0, 1].map(|knot| mean_at(knot, row, column));
+            let mut kernel = vec![0.0; width * width];
+            for (knot, mean) in knots.into_iter().zip(means) {
+                kernels.at(knot).add_to(&mut kernel, width, -value * (mean / (means[0] + means[1])) as f32);
+            }
+            let (first_row, first_column) = (source.first_row + row - 2, source.first_column + column - 2);
+            add(&Rectangle { first_row, first_column, rows: width, columns: width }, &kernel);
+        }
+        let worst = spread.values().fold(0.0, |worst: f64, left| worst.max(left.abs()));
+        assert!(worst < 2e-5, "{worst}");
     }
 }

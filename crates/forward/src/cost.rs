@@ -126,7 +126,7 @@ mod tests {
             let around = (-1..2).flat_map(|d| (-1..2).map(move |a| (down + d, across + a)));
             let knot = |(down, across)| Cell { down, across, size: 16 }.knot();
             let shares = around.map(|at| (knot(at), [1.0; 9])).collect();
-            Patch { cell: Cell { down, across, size: 16 }, is_by_knots: false, shares, elsewhere: vec![] }
+            Patch { cell: Cell { down, across, size: 16 }, is_by_knots: false, around: None, shares, elsewhere: vec![] }
         };
         cells.map(patch).collect()
     }

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use crate::ForwardError;
+use crate::{ForwardError, patch::SMALLEST};
 
 /// The raster of the sensor's pixels, anywhere in the lens's image.
 ///
@@ -104,6 +104,9 @@ pub struct Settings {
     /// Largest blur radius that is imaged on the pixels of the film; where on the film a blur is wider, pixels are 2, 4, 8 … times
     /// as wide, so that the radius is between half of this and this. At least 4.
     pub widest_blur_px: f64,
+    /// Length that the weights of knots are smoothed over where cells are small and kernels change between them, pixels: the seams that cells would leave
+    /// on a uniform plane become as much wider. An even number up to 16; 0 leaves seams.
+    pub smoothing_px: usize,
 }
 
 impl Default for Settings {
@@ -119,6 +122,7 @@ impl Default for Settings {
             coverage_step_px: 0.25,
             negligible_edge: 4e-6,
             widest_blur_px: 64.0,
+            smoothing_px: 4,
         }
     }
 }
@@ -159,6 +163,10 @@ impl Settings {
         if !(self.widest_blur_px.is_finite() && self.widest_blur_px >= 4.0) {
             let (what, value) = ("the widest blur", self.widest_blur_px);
             return Err(ForwardError::Setting { what, value, expected: "a number, 4 pixels or more" });
+        }
+        if self.smoothing_px > SMALLEST || self.smoothing_px % 2 == 1 {
+            let (what, value) = ("the smoothing of weights", self.smoothing_px as f64);
+            return Err(ForwardError::Setting { what, value, expected: "an even number of pixels, 16 at most" });
         }
         if !(16..=1024).contains(&self.knot_spacing_px) || self.knot_spacing_px % 2 == 1 {
             let (what, value) = ("the knot spacing", self.knot_spacing_px as f64);

@@ -551,6 +551,7 @@ impl Layout {
                 kernels: &kernels.by_layer[layer],
                 film_rows: film.rows,
                 film_columns: film.columns,
+                smoothing_px: self.spec.settings.smoothing_px,
                 negligible_edge: self.spec.settings.negligible_edge,
                 stopwatch: &self.stopwatch,
             };

@@ -31,7 +31,7 @@ pub(crate) struct Cell {
 }
 
 /// Cells are not halved below this size, pixels.
-const SMALLEST: usize = 16;
+pub(crate) const SMALLEST: usize = 16;
 
 impl Cell {
     /// The knot of the cell, at its middle.
@@ -104,16 +104,36 @@ impl Cell {
     }
 }
 
+/// Nine numbers for the products of polynomials, down × across, row by row: what a function over a cell is made of.
+pub(crate) type Products = [f32; 9];
+
+/// What is 1 all over a cell.
+pub(crate) const ONE: Products = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+
 /// Returns the three polynomials at u, parts of a cell from its middle.
 pub(crate) fn polynomials(u: f32) -> [f32; 3] {
     [1.0, u, u * u - 1.0 / 12.0]
 }
 
+/// Returns a function over a cell where the polynomials have these values.
+pub(crate) fn value_of(products: &Products, down: &[f32; 3], across: &[f32; 3]) -> f32 {
+    (0..3).map(|i| down[i] * (0..3).map(|j| products[3 * i + j] * across[j]).sum::<f32>()).sum()
+}
+
 /// The largest magnitude of each polynomial within a cell.
 pub(crate) const LARGEST: [f64; 3] = [1.0, 0.5, 1.0 / 6.0];
 
-/// Knots, each with its share of the nine products of polynomials: down × across, row by row.
-pub(crate) type Shares = Vec<(Knot, [f32; 9])>;
+/// Knots, each with its share of the products of polynomials.
+pub(crate) type Shares = Vec<(Knot, Products)>;
+
+/// The patches around one whose weights of knots are smoothed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Around {
+    /// Numbers of those of the same raster that it touches, and its own.
+    pub(crate) patches: Vec<u32>,
+    /// Whether they surround it, and have all their knots on their raster.
+    pub(crate) is_whole: bool,
+}
 
 /// A cell, and how the kernels of knots around it make up those of its samples, as far as these kernels are on one raster.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,6 +141,8 @@ pub(crate) struct Patch {
     pub(crate) cell: Cell,
     /// Whether it is spread together with those around it, knot by knot.
     pub(crate) is_by_knots: bool,
+    /// The patches around it, if the weights of knots are smoothed over it and them.
+    pub(crate) around: Option<Around>,
     /// The knots with kernels on this raster.
     pub(crate) shares: Shares,
     /// Those with kernels on rasters of other factors, and these factors.
@@ -139,14 +161,29 @@ impl Patch {
             others.map(|(factor, shares)| (*factor, shares.clone())).collect()
         };
         let patch = |(&factor, shares): (&usize, &Shares)| {
-            (factor, Self { cell, is_by_knots: false, shares: shares.clone(), elsewhere: elsewhere(factor) })
+            (
+                factor,
+                Self { cell, is_by_knots: false, around: None, shares: shares.clone(), elsewhere: elsewhere(factor) },
+            )
         };
         by_factor.iter().map(patch).collect()
+    }
+
+    /// Returns the sum of the weights of its knots on this raster: 1, but for the weights of those elsewhere.
+    pub(crate) fn total(&self) -> Products {
+        if self.elsewhere.is_empty() {
+            return ONE;
+        }
+        std::array::from_fn(|i| self.shares.iter().map(|(_, shares)| shares[i]).sum())
     }
 
     /// The bytes of memory that it takes.
     pub(crate) fn size_bytes(&self) -> usize {
         let of = |shares: &Shares| size_of_val(shares.as_slice());
-        size_of::<Self>() + of(&self.shares) + self.elsewhere.iter().map(|(_, shares)| of(shares)).sum::<usize>()
+        let beside = self.around.as_ref().map_or(0, |around| size_of_val(around.patches.as_slice()));
+        size_of::<Self>()
+            + beside
+            + of(&self.shares)
+            + self.elsewhere.iter().map(|(_, shares)| of(shares)).sum::<usize>()
     }
 }

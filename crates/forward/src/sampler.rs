@@ -35,6 +35,27 @@ impl Rectangle {
         let (first_column, columns) = clip(self.first_column, self.columns, film_columns)?;
         Some(Self { first_row, first_column, rows, columns })
     }
+
+    /// Returns it with a margin all around.
+    pub(crate) fn grown(&self, margin: usize) -> Self {
+        Self {
+            first_row: self.first_row - margin as i64,
+            first_column: self.first_column - margin as i64,
+            rows: self.rows + 2 * margin,
+            columns: self.columns + 2 * margin,
+        }
+    }
+
+    /// Returns what it and another have in common, or `None`.
+    pub(crate) fn intersection(&self, other: &Self) -> Option<Self> {
+        let common = |(first, n): (i64, usize), (other, m): (i64, usize)| {
+            let (start, end) = (first.max(other), (first + n as i64).min(other + m as i64));
+            (end > start).then(|| (start, (end - start) as usize))
+        };
+        let (first_row, rows) = common((self.first_row, self.rows), (other.first_row, other.rows))?;
+        let (first_column, columns) = common((self.first_column, self.columns), (other.first_column, other.columns))?;
+        Some(Self { first_row, first_column, rows, columns })
+    }
 }
 
 /// One surface of the scene: its layer coordinates, and its radiance in one band where its light is wanted.

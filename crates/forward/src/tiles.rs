@@ -11,6 +11,7 @@ use crate::{
     film_lens::FilmLens,
     knot_kernels::{LayerKernels, Symmetry},
     mesh::Mesh,
+    neighbors::Neighbors,
     patch::{Cell, Knot, Patch},
     probe::Probe,
     work::Work,
@@ -27,7 +28,7 @@ pub(crate) struct LayerTiles {
 
 impl LayerTiles {
     /// Halves the cells of a layer until the spline is as near to the kernels of the lens as the settings ask.
-    fn new(cells: Vec<Cell>, mut probe: Probe<'_>, work: &Work<'_>) -> Result<Self, Cancelled> {
+    fn new(cells: Vec<Cell>, mut probe: Probe<'_>, smoothing_px: usize, work: &Work<'_>) -> Result<Self, Cancelled> {
         let Some(first) = cells.first() else { return Ok(Self::default()) };
         let mut mesh = Mesh { size: first.size, added: BTreeSet::new() };
         probe.refine(&mut mesh, &cells, work)?;
@@ -45,6 +46,15 @@ impl LayerTiles {
             let costs = probe.costs(factor, patches, mesh.size, work)?;
             let by_knots = patches_by_knots(patches, &costs, factor, probe.symmetry());
             patches.iter_mut().zip(by_knots).for_each(|(patch, by_knots)| patch.is_by_knots = by_knots);
+        }
+        if let Some(patches) = patches.get_mut(&1).filter(|_| smoothing_px > 0) {
+            // Seams on wide pixels are spread over several of the film's.
+            let neighbors = Neighbors::of(patches);
+            for number in probe.smoothed_patches(patches, &neighbors, work)? {
+                let around = neighbors.around(patches, number, smoothing_px / 2);
+                let patch = &mut patches[number as usize];
+                (patch.is_by_knots, patch.around) = (true, Some(around));
+            }
         }
         let knots = factors.into_iter().map(|(knot, factor)| (probe.symmetry().canonical(knot), factor)).collect();
         Ok(Self { patches, knots })
@@ -70,10 +80,10 @@ impl Tiling {
         wavelengths_nm: &[f64],
         work: &Work<'_>,
     ) -> Result<Self, Cancelled> {
-        let tiles = active
-            .into_par_iter()
-            .enumerate()
-            .map(|(layer, cells)| LayerTiles::new(cells, Probe::new((lens, layer), settings, wavelengths_nm), work));
+        let tiles = active.into_par_iter().enumerate().map(|(layer, cells)| {
+            let probe = Probe::new((lens, layer), settings, wavelengths_nm);
+            LayerTiles::new(cells, probe, settings.smoothing_px, work)
+        });
         Ok(Self { layers: tiles.collect::<Result<_, Cancelled>>()?, symmetry: Symmetry::of(lens.image) })
     }
 

@@ -2,11 +2,17 @@
 
 use crate::{
     knot_kernels::LayerKernels,
-    patch::{Knot, Patch, Shares},
+    patch::{Knot, ONE, Patch, Products, Shares},
 };
 
-/// The irradiance of a uniform plane of 1 under the kernels over a patch, to their second moments (docs/forward.md, eq. 5).
-pub(crate) struct UniformResponse {
+/// Returns the irradiance of a uniform plane of 1 under the kernels over a patch, to their second moments (docs/forward.md, eq. 5): of all knots, those
+/// on its raster, whose factor is given, and those on others.
+pub(crate) fn uniform_response(kernels: &LayerKernels, patch: &Patch, factor: usize) -> Products {
+    UniformResponse::of(kernels, patch, factor).products()
+}
+
+/// The moments that it is made of.
+struct UniformResponse {
     /// Of the second moments, all over the patch.
     excess: f64,
     /// First moments down and across, over the size of the cell: coefficients of the products of polynomials, down × across.
@@ -15,8 +21,7 @@ pub(crate) struct UniformResponse {
 }
 
 impl UniformResponse {
-    /// Sums up the kernels of all knots of a patch: those on its raster, whose factor is given, and those on others.
-    pub(crate) fn of(kernels: &LayerKernels, patch: &Patch, factor: usize) -> Self {
+    fn of(kernels: &LayerKernels, patch: &Patch, factor: usize) -> Self {
         let mut sum = Self { excess: 0.0, down: [0.0; 9], across: [0.0; 9] };
         sum.add(kernels, &patch.shares, patch.cell.size as f64 / factor as f64);
         for (factor, shares) in &patch.elsewhere {
@@ -40,15 +45,18 @@ impl UniformResponse {
         }
     }
 
-    /// Returns the irradiance where the polynomials have these values.
-    pub(crate) fn at(&self, down: &[f32; 3], across: &[f32; 3]) -> f32 {
-        let (u, v) = (f64::from(across[1]), f64::from(down[1]));
-        let [phi_v, phi_u] = [down, across].map(|values| values.map(f64::from));
-        // The polynomials are 1, u and u² − 1/12.
-        let slope_across = |i: usize| self.across[3 * i + 1] + 2.0 * u * self.across[3 * i + 2];
-        let slope_down = |j: usize| self.down[3 + j] + 2.0 * v * self.down[6 + j];
-        let spread: f64 = (0..3).map(|i| phi_v[i] * slope_across(i) + phi_u[i] * slope_down(i)).sum();
-        (1.0 + self.excess - spread.clamp(-0.5, 0.5)) as f32
+    /// Returns the irradiance over the patch: products of polynomials.
+    fn products(&self) -> Products {
+        // The derivatives of the polynomials 1, u and u² − 1/12 are 0, 1 and 2u.
+        let mut products = ONE;
+        products[0] += self.excess as f32;
+        for i in 0..3 {
+            products[3 * i] -= self.across[3 * i + 1] as f32;
+            products[3 * i + 1] -= 2.0 * self.across[3 * i + 2] as f32;
+            products[i] -= self.down[3 + i] as f32;
+            products[3 + i] -= 2.0 * self.down[6 + i] as f32;
+        }
+        products
     }
 }
 
@@ -66,7 +74,7 @@ mod tests {
     use crate::{
         knot_kernels::{KnotKernel, Symmetry},
         mesh::Mesh,
-        patch::{Cell, polynomials},
+        patch::{Cell, polynomials, value_of},
     };
 
     /// Kernels that move by a hundredth of a pixel each pixel to the right, and twice that down: a plane is that much darker.
@@ -85,10 +93,10 @@ mod tests {
         };
         let by_knot: BTreeMap<Knot, KnotKernel> = shares.iter().map(|(knot, _)| kernel(*knot)).collect();
         let kernels = LayerKernels::new(Symmetry::None, by_knot);
-        let patch = Patch { cell, is_by_knots: false, shares, elsewhere: vec![] };
-        let response = UniformResponse::of(&kernels, &patch, 1);
+        let patch = Patch { cell, is_by_knots: false, around: None, shares, elsewhere: vec![] };
+        let response = uniform_response(&kernels, &patch, 1);
         for (v, u) in [(0.0, 0.0), (0.4, -0.3)] {
-            let found = response.at(&polynomials(v), &polynomials(u));
+            let found = value_of(&response, &polynomials(v), &polynomials(u));
             assert!((found - 0.97).abs() < 1e-4, "{found}");
         }
     }

@@ -38,6 +38,7 @@ pub(super) fn plan(
             max_shading_error: 0.1,
             negligible_edge: 5e-4,
             widest_blur_px: 8.0,
+            smoothing_px: 0,
             ..Settings::default()
         },
     };

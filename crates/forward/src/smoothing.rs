@@ -1,0 +1,128 @@
+//! Functions over patches, smoothed over the borders between them.
+
+use multiversion::multiversion;
+
+use crate::{
+    geometry::FilmFrame,
+    patch::{Patch, Products, polynomials},
+    sampler::Rectangle,
+};
+
+/// Takes a function over a rectangle patch by patch, 0 where there is none, and replaces it by its means over squares.
+///
+/// The mean is that of a function which is straight between pixels, over `2 * half` pixels each way, so it leaves constants and planes as they are.
+#[derive(Default)]
+pub(crate) struct Smoother {
+    half: usize,
+    /// The rectangle, with `half` pixels around it.
+    at: Option<Rectangle>,
+    values: Vec<f32>,
+    along_rows: Vec<f32>,
+    smooth: Vec<f32>,
+}
+
+impl Smoother {
+    /// Begins a function over a rectangle.
+    pub(crate) fn begin(&mut self, at: &Rectangle, half: usize) {
+        let grown = at.grown(half);
+        self.half = half;
+        self.at = Some(grown);
+        self.values.clear();
+        self.values.resize(grown.rows * grown.columns, 0.0);
+    }
+
+    /// Puts in what the function is over a patch: products of its polynomials.
+    pub(crate) fn add(&mut self, patch: &Patch, frame: &FilmFrame, products: &Products) {
+        let Some(at) = self.at else { return };
+        let Some(inside) = patch.cell.pixels(frame).intersection(&at) else { return };
+        let skip = ((inside.first_row - at.first_row) as usize, (inside.first_column - at.first_column) as usize);
+        let place_of = |row: usize, column: usize| {
+            patch.cell.place_of(frame, inside.first_row + row as i64, inside.first_column + column as i64)
+        };
+        let across: Vec<[f32; 3]> =
+            (0..inside.columns).map(|column| polynomials(place_of(0, column).1 as f32)).collect();
+        let lines = self.values.chunks_exact_mut(at.columns).skip(skip.0).take(inside.rows);
+        for (row, line) in lines.enumerate() {
+            let down = polynomials(place_of(row, 0).0 as f32);
+            let along: [f32; 3] = std::array::from_fn(|j| (0..3).map(|i| products[3 * i + j] * down[i]).sum());
+            for (value, across) in line[skip.1..].iter_mut().zip(&across) {
+                *value = along[0] + along[1] * across[1] + along[2] * across[2];
+            }
+        }
+    }
+
+    /// Returns the smoothed function, row by row.
+    pub(crate) fn finish(&mut self) -> &[f32] {
+        let Some(at) = self.at.take() else { return &[] };
+        let half = self.half;
+        if half == 0 {
+            return &self.values;
+        }
+        let (rows, columns) = (at.rows - 2 * half, at.columns - 2 * half);
+        self.along_rows.clear();
+        self.along_rows.resize(at.rows * columns, 0.0);
+        for (line, values) in self.along_rows.chunks_exact_mut(columns).zip(self.values.chunks_exact(at.columns)) {
+            mean_of(|place| &values[place..], 2 * half, line);
+        }
+        self.smooth.clear();
+        self.smooth.resize(rows * columns, 0.0);
+        for (row, line) in self.smooth.chunks_exact_mut(columns).enumerate() {
+            mean_of(|place| &self.along_rows[(row + place) * columns..], 2 * half, line);
+        }
+        &self.smooth
+    }
+}
+
+/// Puts the means of `length + 1` lines, the first and the last counted half, into one.
+fn mean_of<'a>(line_at: impl Fn(usize) -> &'a [f32], length: usize, mean: &mut [f32]) {
+    let weight = 1.0 / length as f32;
+    for place in 0..=length {
+        let is_end = place == 0 || place == length;
+        add_line(mean, line_at(place), if is_end { 0.5 * weight } else { weight });
+    }
+}
+
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn add_line(sum: &mut [f32], line: &[f32], weight: f32) {
+    sum.iter_mut().zip(line).for_each(|(sum, value)| *sum += weight * value);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Film, patch::Cell};
+
+    fn patch(down: i32, across: i32) -> Patch {
+        let cell = Cell { down, across, size: 16 };
+        Patch { cell, is_by_knots: true, around: None, shares: vec![], elsewhere: vec![] }
+    }
+
+    /// A plane over two patches stays what it is; a step between them becomes a ramp.
+    #[test]
+    fn planes_stay_and_steps_become_ramps() {
+        let frame = FilmFrame::new(&Film::centered(64, 64, 1.0), 1);
+        let (left, right) = (patch(0, 0), patch(0, 1));
+        let first = left.cell.pixels(&frame);
+        let at =
+            Rectangle { first_row: first.first_row + 4, first_column: first.first_column + 4, rows: 8, columns: 24 };
+        let mut smoother = Smoother::default();
+        // 2 + 3u over the first cell, and what goes on from it over the next.
+        smoother.begin(&at, 4);
+        smoother.add(&left, &frame, &[2.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        smoother.add(&right, &frame, &[5.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        for line in smoother.finish().chunks(24) {
+            for (column, value) in line.iter().enumerate() {
+                let u = (column as f32 + 4.5) / 16.0 - 0.5;
+                assert!((value - (2.0 + 3.0 * u)).abs() < 1e-5, "{value} in column {column}");
+            }
+        }
+        smoother.begin(&at, 4);
+        smoother.add(&right, &frame, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        // Pixels 4 to 27 of the first cell on: the step is between 15 and 16.
+        let eighths: Vec<f32> = smoother.finish()[..24].iter().map(|value| 8.0 * value).collect();
+        let expected: Vec<f32> = (4..28).map(|pixel| (pixel as f32 - 15.5).clamp(-4.0, 4.0) + 4.0).collect();
+        for (value, expected) in eighths.iter().zip(&expected) {
+            assert!((value - expected).abs() < 1e-5, "{eighths:?}");
+        }
+    }
+}
