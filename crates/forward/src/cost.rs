@@ -36,8 +36,10 @@ impl Cost {
         self.direct(size) <= self.by_transform(size)
     }
 
+    /// Returns what a patch takes by itself, the terms of its expansion included: nine kernels for each of nine, and their edge spread functions.
     fn alone(&self, size: (usize, usize)) -> usize {
-        self.direct(size).min(self.by_transform(size))
+        const OF_EXPANSION: usize = 128;
+        self.direct(size).min(self.by_transform(size)) + OF_EXPANSION * self.width * self.width
     }
 }
 

@@ -4,6 +4,8 @@
 //! end, turns the edges of all triangles into coverage. The cost is that of the outlines, and energy is conserved to
 //! rounding. Folds do no harm: every triangle counts by the magnitude of its area.
 
+use std::cell::RefCell;
+
 use glam::DVec2;
 use multiversion::multiversion;
 use ndarray::Array2;
@@ -13,6 +15,22 @@ use crate::mesh::Mesh;
 /// Below this area, in pixels², a triangle is a segment: the rounding error of the running sum is its energy
 /// × 1e-16 / area.
 const SEGMENT_AREA: f64 = 1e-6;
+
+/// Samples of the largest buffer that is kept for the next grid.
+const MOST_SPARE: usize = 1 << 20;
+
+thread_local! {
+    // The grids of kernels come and go by the thousand: fresh memory for each is a page fault every 512 samples.
+    static SPARE: RefCell<Vec<Vec<f64>>> = const { RefCell::new(vec![]) };
+}
+
+/// Returns so many zeros, in the buffer of an earlier grid if there is one.
+fn spare_zeros(n: usize) -> Vec<f64> {
+    let mut zeros = SPARE.with_borrow_mut(Vec::pop).unwrap_or_default();
+    zeros.clear();
+    zeros.resize(n, 0.0);
+    zeros
+}
 
 /// Energy on a grid of pixels, in the making. Pixel (row, column) covers [column, column + 1] × [row, row + 1].
 #[derive(Clone, Debug)]
@@ -28,7 +46,7 @@ pub struct Raster {
 impl Raster {
     /// Returns an empty grid.
     pub fn new(rows: usize, columns: usize) -> Self {
-        Self { rows, columns, edges: vec![0.0; rows * (columns + 2)], direct: vec![0.0; rows * columns] }
+        Self { rows, columns, edges: spare_zeros(rows * (columns + 2)), direct: spare_zeros(rows * columns) }
     }
 
     /// Deposits energy at a point; what falls outside is lost.
@@ -94,15 +112,19 @@ impl Raster {
     }
 
     /// Returns the energy of each pixel.
-    pub fn finish(mut self) -> Array2<f64> {
-        for (row, edges) in self.direct.chunks_mut(self.columns).zip(self.edges.chunks(self.columns + 2)) {
+    pub fn finish(self) -> Array2<f64> {
+        let mut pixels = Vec::with_capacity(self.direct.len());
+        for (row, edges) in self.direct.chunks(self.columns).zip(self.edges.chunks(self.columns + 2)) {
             let mut covered = 0.0;
-            for (pixel, slope) in row.iter_mut().zip(edges) {
+            pixels.extend(row.iter().zip(edges).map(|(direct, slope)| {
                 covered += slope;
-                *pixel += covered;
-            }
+                direct + covered
+            }));
         }
-        Array2::from_shape_vec((self.rows, self.columns), self.direct).expect("as many pixels as there are")
+        SPARE.with_borrow_mut(|spare| {
+            spare.extend([self.edges, self.direct].into_iter().filter(|b| b.len() <= MOST_SPARE))
+        });
+        Array2::from_shape_vec((self.rows, self.columns), pixels).expect("as many pixels as there are")
     }
 
     #[inline(always)]
