@@ -123,6 +123,15 @@ fn path_px(frame: usize, n_frames: usize, motion_px: f64) -> [f64; 2] {
 }
 
 impl FramesSpec {
+    /// The number of frames that are taken.
+    pub(crate) fn count(&self) -> usize {
+        match self {
+            Self::Single | Self::Interleaved { .. } => 1,
+            Self::Burst(frames) | Self::MovingBurst { frames, .. } => *frames,
+            Self::BracketStops(stops) => stops.len(),
+        }
+    }
+
     /// Checks that the number of frames makes sense.
     ///
     /// # Errors

@@ -91,7 +91,7 @@ impl KeptCamera {
     /// does not fit goes to a temporary file. A plan that is kept already stays as it is.
     #[must_use]
     pub fn with_memory_budget(&self, bytes: u64) -> Self {
-        Self { budget: Some(MemoryBudget { bytes }), ..self.clone() }
+        Self { budget: Some(MemoryBudget::new(bytes)), ..self.clone() }
     }
 
     /// Returns the camera that keeps bands of the irradiance in a folder as they are finished, for a run that goes on after this one
@@ -314,11 +314,20 @@ impl KeptCamera {
         Chain {
             kept: &self.kept,
             memory_bytes: self.memory_bytes,
-            budget: self.budget,
+            budget: self.budget.map(|budget| self.with_frames(budget)),
             bands: self.band_keeping(),
             paintings: self.paintings.as_ref(),
             watch: Watch { progress, cancel },
         }
+    }
+
+    /// Returns a budget with what the frames of the camera take; a camera that is wrong says so elsewhere.
+    fn with_frames(&self, budget: MemoryBudget) -> MemoryBudget {
+        let Ok(PictureInputs { frames, .. }) = self.picture_inputs() else { return budget };
+        let sensor = &frames.electrons.sensor;
+        let photodiodes = self.camera.dual_pixel.map_or(1, |spec| spec.photodiodes.names().len());
+        let reads = if sensor.split_pixel.is_some() { 2 } else { 1 };
+        budget.with_frames(reads * frames.shutter.frames.count(), photodiodes * sensor.n_planes())
     }
 
     pub(super) fn irradiance_inputs(&self) -> Result<IrradianceInputs, PipelineError> {
