@@ -15,7 +15,7 @@ use crate::{
     knot_kernels::{KnotKernel, LayerKernels, Symmetry, edge_spread_peak},
     mesh::{Mesh, Weights},
     neighbors::Neighbors,
-    patch::{Cell, Knot, Patch},
+    patch::{Cell, Knot, Patch, SMALLEST},
     raster::LayerRaster,
     seams::{Bend, may_have_seams, smoothed_patches},
     work::Work,
@@ -61,14 +61,15 @@ impl<'a> Probe<'a> {
         *self.spreads_px.entry(canonical).or_insert_with(compute)
     }
 
-    /// Whether a cell lies farther beyond the film than a point in it is spread, of which 5 % is left for the film then.
+    /// Whether a cell lies farther beyond the film than a point in it is spread, of which 5 % is left for the film then, and than the smallest cells at its edge, whose
+    /// splines take up the kernels beside them.
     fn is_beyond_reach(&mut self, cell: &Cell) -> bool {
         let film = self.lens.film;
         let at = cell.pixels(&FilmFrame::new(film, 1));
         let beyond = |first: i64, n: usize, film: usize| (-(first + n as i64)).max(first - film as i64).max(0) as f64;
         let (down, across) =
             (beyond(at.first_row, at.rows, film.rows), beyond(at.first_column, at.columns, film.columns));
-        down.hypot(across) > self.spread_px(cell.knot())
+        down.hypot(across) > self.spread_px(cell.knot()) + SMALLEST as f64
     }
 
     /// Whether the spline is off by more than the settings allow at a corner of a cell, by the spread of a point alone: where cells are
