@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use crate::{ForwardError, patch::SMALLEST};
+use crate::ForwardError;
 
 /// The raster of the sensor's pixels, anywhere in the lens's image.
 ///
@@ -164,7 +164,7 @@ impl Settings {
             let (what, value) = ("the widest blur", self.widest_blur_px);
             return Err(ForwardError::Setting { what, value, expected: "a number, 4 pixels or more" });
         }
-        if self.smoothing_px > SMALLEST || self.smoothing_px % 2 == 1 {
+        if self.smoothing_px > 16 || self.smoothing_px % 2 == 1 {
             let (what, value) = ("the smoothing of weights", self.smoothing_px as f64);
             return Err(ForwardError::Setting { what, value, expected: "an even number of pixels, 16 at most" });
         }
