@@ -17,12 +17,46 @@ pub use shifted::{PartOfPoint, ShiftedMap};
 pub struct RadialMap {
     // Invariants: at least two entries, evenly spaced in the square of the distance, as many gains as ratios.
     entries_per_mm2: f64,
-    tan_per_mm: Vec<f64>,
-    irradiance_per_radiance: Vec<f64>,
+    tan_per_mm: Table,
+    irradiance_per_radiance: Table,
     extent_mm: f64,
     /// Where the axis meets the film and the field seen there, in the picture frame.
     axis_mm: DVec2,
     axis_tan: DVec2,
+}
+
+/// Evenly spaced values of a smooth function, and parabolas between them. Straight lines left a kink at each in a picture: of 3e-4 of the light at the first
+/// one, 11 pixels from the axis, in red light through a double Gauss at f/2.
+#[derive(Clone, Debug)]
+struct Table {
+    values: Vec<f64>,
+    /// A quarter of the sum of the second differences at both ends of each interval (Bessel's interpolation).
+    bends: Vec<f64>,
+}
+
+impl Table {
+    /// Takes two values or more.
+    fn new(values: Vec<f64>) -> Self {
+        let last = values.len() - 1;
+        // At its ends it bends as beside them.
+        let second_difference = |i: usize| match i.clamp(1, (last - 1).max(1)) {
+            i if i < last => values[i - 1] - 2.0 * values[i] + values[i + 1],
+            _ => 0.0,
+        };
+        let bends = (0..last).map(|i| 0.25 * (second_difference(i) + second_difference(i + 1))).collect();
+        Self { values, bends }
+    }
+
+    /// Returns the value a fraction of the way from one entry to the next.
+    #[inline(always)]
+    fn at(&self, below: usize, fraction: f64) -> f64 {
+        let (from, to) = (self.values[below], self.values[below + 1]);
+        from + fraction * (to - from) + fraction * (fraction - 1.0) * self.bends[below]
+    }
+
+    fn size_bytes(&self) -> usize {
+        size_of_val(self.values.as_slice()) + size_of_val(self.bends.as_slice())
+    }
 }
 
 impl RadialMap {
@@ -50,6 +84,7 @@ impl RadialMap {
         if tan_per_mm.len() < 2 {
             (tan_per_mm, irradiance_per_radiance) = (vec![0.0; 2], vec![0.0; 2]);
         }
+        let (tan_per_mm, irradiance_per_radiance) = (Table::new(tan_per_mm), Table::new(irradiance_per_radiance));
         let (axis_mm, axis_tan) = (DVec2::ZERO, DVec2::ZERO);
         Self { entries_per_mm2, tan_per_mm, irradiance_per_radiance, extent_mm, axis_mm, axis_tan }
     }
@@ -77,14 +112,13 @@ impl RadialMap {
     #[inline]
     pub fn at(&self, radius2_mm2: f64) -> Option<(f64, f64)> {
         let place = radius2_mm2 * self.entries_per_mm2;
-        let last = self.tan_per_mm.len() - 1;
+        let last = self.tan_per_mm.bends.len();
         if place > last as f64 || self.extent_mm == 0.0 {
             return None;
         }
         let below = (place as usize).min(last - 1);
         let fraction = place - below as f64;
-        let mix = |table: &[f64]| table[below] + fraction * (table[below + 1] - table[below]);
-        Some((mix(&self.tan_per_mm), mix(&self.irradiance_per_radiance)))
+        Some((self.tan_per_mm.at(below, fraction), self.irradiance_per_radiance.at(below, fraction)))
     }
 
     /// As [`at`](Self::at) at each place.
@@ -93,7 +127,7 @@ impl RadialMap {
             seen.irradiance_per_radiance.fill(f64::NAN);
             return;
         }
-        let tables = (self.tan_per_mm.as_slice(), self.irradiance_per_radiance.as_slice());
+        let tables = (&self.tan_per_mm, &self.irradiance_per_radiance);
         look_up(tables, self.entries_per_mm2, (x_mm, y_mm), (self.axis_mm, self.axis_tan), seen);
     }
 
@@ -103,7 +137,7 @@ impl RadialMap {
         if let Some((tan_per_mm, _)) = self.at(place_mm.length_squared()) {
             return place_mm * tan_per_mm + self.axis_tan;
         }
-        let tan = self.tan_per_mm[self.tan_per_mm.len() - 1] * self.extent_mm;
+        let tan = self.tan_per_mm.values[self.tan_per_mm.bends.len()] * self.extent_mm;
         place_mm / place_mm.length() * tan + self.axis_tan
     }
 }
@@ -111,14 +145,14 @@ impl RadialMap {
 /// Looks up a radial map at each place of a row.
 #[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
 fn look_up(
-    (tan_per_mm, irradiance_per_radiance): (&[f64], &[f64]),
+    (tan_per_mm, irradiance_per_radiance): (&Table, &Table),
     entries_per_mm2: f64,
     (x_mm, y_mm): (&[f64], f64),
     (axis_mm, axis_tan): (DVec2, DVec2),
     seen: &mut FieldsAlong,
 ) {
     let y_mm = y_mm - axis_mm.y;
-    let last = tan_per_mm.len() - 1;
+    let last = tan_per_mm.bends.len();
     let end = last as f64;
     let FieldsAlong { tan_x, tan_y, irradiance_per_radiance: gain } = seen;
     let outputs = tan_x.iter_mut().zip(tan_y.iter_mut()).zip(gain.iter_mut());
@@ -128,10 +162,9 @@ fn look_up(
         // Beyond the table its last entry is read, and not used.
         let below = (place.min(end) as i32 as usize).min(last - 1);
         let fraction = place - below as f64;
-        let mix = |table: &[f64]| table[below] + fraction * (table[below + 1] - table[below]);
-        let tan = mix(tan_per_mm);
+        let tan = tan_per_mm.at(below, fraction);
         (*tan_x, *tan_y) = (x_mm * tan + axis_tan.x, y_mm * tan + axis_tan.y);
-        *gain = if place > end { f64::NAN } else { mix(irradiance_per_radiance) };
+        *gain = if place > end { f64::NAN } else { irradiance_per_radiance.at(below, fraction) };
     }
 }
 
@@ -231,9 +264,7 @@ impl FilmMap {
     /// The bytes of memory that it takes.
     pub fn size_bytes(&self) -> usize {
         match self {
-            Self::Radial(map) => {
-                size_of_val(map.tan_per_mm.as_slice()) + size_of_val(map.irradiance_per_radiance.as_slice())
-            }
+            Self::Radial(map) => map.tan_per_mm.size_bytes() + map.irradiance_per_radiance.size_bytes(),
             Self::Plane(map) => map.size_bytes(),
             Self::Shifted(map) => map.size_bytes(),
         }
@@ -287,6 +318,21 @@ mod tests {
             assert!((tan - expected).abs() < 1e-7, "{r} mm: {tan} {expected}");
             let gain = map.at(r * r).unwrap().1;
             assert!((gain - (1.0 + expected * expected).powi(-2)).abs() < 1e-6);
+        }
+    }
+
+    /// Near the axis, where entries lie farthest apart, light that falls off there alone has no kinks.
+    #[test]
+    fn light_has_no_kinks_at_entries() {
+        let peak = |r2: f64| 1.0 + 0.01 / (1.0 + r2 / 0.5);
+        let map = RadialMap::tabulate(12.0, |r| Some(r / 50.0), |tan| peak((50.0 * tan).powi(2)));
+        let gain = |i: i32| map.at((0.01 * f64::from(i)).powi(2)).unwrap().1;
+        for i in 1..400 {
+            let expected = |i: i32| peak((0.01 * f64::from(i)).powi(2));
+            let bend = |value: &dyn Fn(i32) -> f64| value(i - 1) - 2.0 * value(i) + value(i + 1);
+            let kink = bend(&gain) - bend(&expected);
+            // 3.1e-6; straight lines between entries leave 2.9e-5.
+            assert!(kink.abs() < 5e-6, "{kink} {i} hundredths of a millimetre off axis");
         }
     }
 
