@@ -19,6 +19,9 @@ const SEGMENT_AREA: f64 = 1e-6;
 /// Samples of the largest buffer that is kept for the next grid.
 const MOST_SPARE: usize = 1 << 20;
 
+/// Buffers that a thread keeps: those of one grid.
+const N_SPARE: usize = 2;
+
 thread_local! {
     // The grids of kernels come and go by the thousand: fresh memory for each is a page fault every 512 samples.
     static SPARE: RefCell<Vec<Vec<f64>>> = const { RefCell::new(vec![]) };
@@ -122,7 +125,9 @@ impl Raster {
             }));
         }
         SPARE.with_borrow_mut(|spare| {
-            spare.extend([self.edges, self.direct].into_iter().filter(|b| b.len() <= MOST_SPARE))
+            let buffers = [self.edges, self.direct].into_iter().filter(|buffer| buffer.len() <= MOST_SPARE);
+            spare.extend(buffers);
+            spare.truncate(N_SPARE);
         });
         Array2::from_shape_vec((self.rows, self.columns), pixels).expect("as many pixels as there are")
     }

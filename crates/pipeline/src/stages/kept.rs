@@ -321,7 +321,7 @@ impl KeptCamera {
         }
     }
 
-    /// Returns a budget with what the frames of the camera take; a camera that is wrong says so elsewhere.
+    /// Returns a budget with what the frames of the camera take. Errors of the camera are those of its stages, which meet them as well.
     fn with_frames(&self, budget: MemoryBudget) -> MemoryBudget {
         let Ok(PictureInputs { frames, .. }) = self.picture_inputs() else { return budget };
         let sensor = &frames.electrons.sensor;

@@ -35,7 +35,7 @@ const USUAL_BYTES: u64 = 256 << 20;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct MemoryBudget {
     bytes: u64,
-    /// What the stages after the irradiance take, bytes.
+    /// What the stages after the irradiance take for a pixel of the film, bytes.
     pixel_bytes: u64,
 }
 
@@ -83,6 +83,8 @@ impl MemoryBudget {
     /// # Errors
     /// Says the least that would do.
     pub(crate) fn fit(self, plan: ImagingPlan, scene: &Scene, place: &FilmPlace) -> Result<ImagingPlan, PipelineError> {
+        // What is kept by now is computed again where there is room for it.
+        let plan = plan.with_kernel_budget(0);
         let shares = self.shares(&plan, scene, place)?;
         let plan = plan.with_kernel_budget(shares.kernels.min(USUAL_BYTES) as usize);
         // Where there is room for what is usual, it stays as usual.
