@@ -90,6 +90,21 @@ pub(crate) struct Kept {
 }
 
 impl Kept {
+    /// Changes the budget, and drops alpha and kernels that do not fit into it.
+    pub(crate) fn limit(&mut self, budget_bytes: usize) {
+        let Self { kernels, .. } = std::mem::replace(self, Self { budget_bytes, ..Self::default() });
+        for (band, kernels) in kernels {
+            self.keep(band, &kernels);
+        }
+    }
+
+    /// Keeps the kernels of a band, if they are not kept and there is room for them.
+    pub(crate) fn keep(&mut self, band: usize, kernels: &BandKernels) {
+        if !self.kernels.contains_key(&band) && self.takes(kernels.size_bytes()) {
+            self.kernels.insert(band, kernels.clone());
+        }
+    }
+
     /// Whether there is room for so many more bytes; if so, they count as taken.
     pub(crate) fn takes(&mut self, size_bytes: usize) -> bool {
         let fits = self.size_bytes + size_bytes <= self.budget_bytes;

@@ -7,7 +7,7 @@ use dioptric_spectrum::{Cancel, Cancelled};
 use crate::{
     convolve::add_scaled,
     cost::Cost,
-    knot_kernels::{KnotKernel, edge_spread_peak},
+    knot_kernels::{KnotKernel, corner_spread_exceeds},
     patch::{Knot, LARGEST, Patch},
 };
 
@@ -25,7 +25,8 @@ pub(crate) struct Term {
 }
 
 impl Expansion {
-    /// Takes the kernels at the patch's knots. A term that changes no edge by more than `negligible_edge` is left out.
+    /// Takes the kernels at the patch's knots. A term that changes no edge and no corner by more than `negligible_edge` is left out: at corners of patches
+    /// what is left out shows alone.
     pub(crate) fn of(
         patch: &Patch,
         kernels: &BTreeMap<Knot, KnotKernel>,
@@ -42,7 +43,7 @@ impl Expansion {
                 kernels[knot].add_to(&mut samples, width, shares[product]);
             }
             let largest = LARGEST[down] * LARGEST[across];
-            if product == 0 || largest * edge_spread_peak(&samples, width) > negligible_edge {
+            if product == 0 || corner_spread_exceeds(&samples, width, negligible_edge / largest) {
                 terms.push(Term { down, across, samples });
             }
         }

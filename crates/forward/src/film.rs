@@ -98,14 +98,14 @@ pub struct Settings {
     /// Largest motion of a point of the film between wavelengths among which what layers cover is interpolated, pixels; off an even
     /// motion it may be by a 25th of it.
     pub coverage_step_px: f64,
-    /// A change of kernels over a cell that moves no edge spread function by more than this is left out. What is left out shows as
+    /// A change of kernels over a cell that moves no spread function of an edge or a corner by more than this is left out. What is left out shows as
     /// steps between cells.
     pub negligible_edge: f64,
     /// Largest blur radius that is imaged on the pixels of the film; where on the film a blur is wider, pixels are 2, 4, 8 … times
     /// as wide, so that the radius is between half of this and this. At least 4.
     pub widest_blur_px: f64,
-    /// Length that the weights of knots are smoothed over where cells are small and kernels change between them, pixels: the seams that cells would leave
-    /// on a uniform plane become as much wider. An even number up to 16; 0 leaves seams.
+    /// Length that the weights of knots are smoothed over where kernels change so from cell to cell that a uniform plane would show seams, pixels; twice
+    /// that where they would show most. An even number up to 8; 0 leaves seams.
     pub smoothing_px: usize,
 }
 
@@ -164,9 +164,10 @@ impl Settings {
             let (what, value) = ("the widest blur", self.widest_blur_px);
             return Err(ForwardError::Setting { what, value, expected: "a number, 4 pixels or more" });
         }
-        if self.smoothing_px > 16 || self.smoothing_px % 2 == 1 {
+        // Twice that is no longer than the smallest cell.
+        if self.smoothing_px > 8 || self.smoothing_px % 2 == 1 {
             let (what, value) = ("the smoothing of weights", self.smoothing_px as f64);
-            return Err(ForwardError::Setting { what, value, expected: "an even number of pixels, 16 at most" });
+            return Err(ForwardError::Setting { what, value, expected: "an even number of pixels, 8 at most" });
         }
         if !(16..=1024).contains(&self.knot_spacing_px) || self.knot_spacing_px % 2 == 1 {
             let (what, value) = ("the knot spacing", self.knot_spacing_px as f64);

@@ -318,6 +318,34 @@ pub(crate) fn edge_spread_peak(kernel: &[f32], width: usize) -> f64 {
     peak
 }
 
+/// Returns the largest magnitude of the corner spread function of a kernel, what it makes of a quadrant of the plane: at least that of its edge spread
+/// functions, and more where its rows and columns sum to nothing.
+pub(crate) fn corner_spread_peak(kernel: &[f32], width: usize) -> f64 {
+    corner_spread_peaks(kernel, width).fold(0.0, f64::max)
+}
+
+/// Returns whether the corner spread function of a kernel has a magnitude above a limit.
+pub(crate) fn corner_spread_exceeds(kernel: &[f32], width: usize, limit: f64) -> bool {
+    // Corner spreads are sums of samples.
+    let most: f64 =
+        kernel.chunks_exact(width).map(|line| f64::from(line.iter().map(|value| value.abs()).sum::<f32>())).sum();
+    most > limit && corner_spread_peaks(kernel, width).any(|peak| peak > limit)
+}
+
+/// The largest magnitudes of the corner spread function of a kernel, line by line.
+fn corner_spread_peaks(kernel: &[f32], width: usize) -> impl Iterator<Item = f64> {
+    let mut above = vec![0.0_f64; width];
+    kernel.chunks_exact(width).map(move |line| {
+        let (mut left, mut peak) = (0.0, 0.0_f64);
+        for (corner, &value) in above.iter_mut().zip(line) {
+            left += f64::from(value);
+            *corner += left;
+            peak = peak.max(corner.abs());
+        }
+        peak
+    })
+}
+
 /// Distance of a kernel's centroid from where it belongs that changes no picture, pixels.
 const CENTERED_PX: f64 = 1e-7;
 
@@ -529,5 +557,18 @@ mod tests {
         // A tenth of the light moved by one column changes an edge by a tenth.
         let difference = [0.0, 0.0, 0.0, 0.0, -0.1, 0.1, 0.0, 0.0, 0.0];
         assert!((edge_spread_peak(&difference, 3) - 0.1).abs() < 1e-7);
+    }
+
+    /// Light that moves between four pixels of a square, whose rows and columns stay what they are: no edge shows it, a corner does.
+    #[test]
+    fn corners_show_what_edges_do_not() {
+        let mut difference = vec![0.0; 9];
+        (difference[0], difference[1], difference[3], difference[4]) = (0.25, -0.25, -0.25, 0.25);
+        assert_eq!(edge_spread_peak(&difference, 3), 0.0);
+        assert_eq!(corner_spread_peak(&difference, 3), 0.25);
+        assert!(corner_spread_exceeds(&difference, 3, 0.24) && !corner_spread_exceeds(&difference, 3, 0.26));
+        // What is beside an edge is a corner far down.
+        let edge = [0.0, 0.125, 0.0, 0.0, 0.25, 0.0, 0.0, -0.125, 0.0];
+        assert_eq!((edge_spread_peak(&edge, 3), corner_spread_peak(&edge, 3)), (0.375, 0.375));
     }
 }

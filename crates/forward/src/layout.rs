@@ -1,7 +1,7 @@
 //! The work of a plan: layers of depth over the film, their kernels, and the imaging of a band.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
@@ -195,14 +195,29 @@ impl Layout {
         let stopwatch = Stopwatch::default();
         let film_lens =
             FilmLens { image: lens, film, layers, maps: &maps, wavelength_nm: middle_nm, stopwatch: &stopwatch };
-        let tiling = Tiling::new(active, &film_lens, settings, &wavelengths_nm, &work)?;
+        let mut tiling = Tiling::new(active, &film_lens, settings, &wavelengths_nm, &work)?;
+        let mut kept = Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() };
+        if let Some(mut seams) = tiling.seams().filter(|_| settings.smoothing_px > 0) {
+            // Where colors differ most; these kernels are needed for imaging anyway.
+            let bands = &scene.kernel_bands;
+            for band in BTreeSet::from([0, bands.len() / 2, bands.len() - 1].map(|number| bands[number])) {
+                let wavelength_nm = grid.centers_nm()[band];
+                let map = |&dioptres: &f64| lens.film_map(dioptres, wavelength_nm, extent_mm);
+                let maps: Vec<FilmMap> = layers.dioptres().par_iter().map(map).collect();
+                let film_lens = FilmLens { maps: &maps, wavelength_nm, ..film_lens };
+                let by_layer = Arc::new(tiling.kernels_at(&film_lens, &Work::unobserved(cancel))?);
+                tiling.add_band(&mut seams, &by_layer, cancel)?;
+                kept.keep(band, &BandKernels { by_layer });
+            }
+            tiling.smooth(seams, settings.smoothing_px);
+        }
         let rasters_of = |(tiles, map): (&LayerTiles, &FilmMap)| -> BTreeMap<usize, LayerRaster> {
             let raster = |&factor: &usize| (factor, LayerRaster::new(film, factor, (view, scene.size()), map));
             tiles.patches.keys().map(raster).collect()
         };
         let rasters: Vec<_> = tiling.layers.iter().zip(&maps).map(rasters_of).collect();
         let blocks = blocks_of(&rasters, &tiling, &extents, cancel)?;
-        let kept = Mutex::new(Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() });
+        let kept = Mutex::new(kept);
         Ok(Self {
             scene,
             rasters,
@@ -224,9 +239,9 @@ impl Layout {
         maps + blocks + self.tiling.size_bytes() + self.kept().size_bytes
     }
 
-    /// Keeps at most so many bytes of kernels and alpha from now on, and none of those there are.
+    /// Keeps at most so many bytes of kernels and alpha from now on; alpha that was kept is dropped.
     pub(crate) fn keep_at_most(&mut self, budget_bytes: usize) {
-        self.kept = Mutex::new(Kept { budget_bytes, ..Kept::default() });
+        self.kept().limit(budget_bytes);
     }
 
     /// Drops the maps of the bands that were asked for; they are made again where they are.
@@ -300,10 +315,7 @@ impl Layout {
         };
         let by_layer = self.tiling.kernels_at(&film_lens, work)?;
         let kernels = BandKernels { by_layer: Arc::new(by_layer) };
-        let mut kept = self.kept();
-        if !kept.kernels.contains_key(&band) && kept.takes(kernels.size_bytes()) {
-            kept.kernels.insert(band, kernels.clone());
-        }
+        self.kept().keep(band, &kernels);
         Ok(kernels)
     }
 
@@ -551,7 +563,7 @@ impl Layout {
                 kernels: &kernels.by_layer[layer],
                 film_rows: film.rows,
                 film_columns: film.columns,
-                smoothing_px: self.spec.settings.smoothing_px,
+                smoothing_px: self.tiling.layers[layer].smoothing_px,
                 negligible_edge: self.spec.settings.negligible_edge,
                 stopwatch: &self.stopwatch,
             };

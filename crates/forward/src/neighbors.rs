@@ -43,14 +43,14 @@ impl Neighbors {
     }
 
     /// Returns what lies around a patch, within `half_px` pixels of the film.
-    pub(crate) fn around(&self, patches: &[Patch], number: u32, half_px: usize) -> Around {
-        let around: Vec<u32> = self.of_patch(number as usize).iter().copied().chain([number]).collect();
+    pub(crate) fn around(&self, patches: &[Patch], number: usize, half_px: usize) -> Around {
+        let around: Vec<u32> = self.of_patch(number).iter().copied().chain([number as u32]).collect();
         let sides = |cell: &Cell| {
             let size = cell.size as i64;
             [cell.down, cell.across].map(|place| (i64::from(place) * size, (i64::from(place) + 1) * size))
         };
         let half = half_px as i64;
-        let grown = sides(&patches[number as usize].cell).map(|(first, end)| (first - half, end + half));
+        let grown = sides(&patches[number].cell).map(|(first, end)| (first - half, end + half));
         let common = |other: u32| -> i64 {
             let ranges = sides(&patches[other as usize].cell).into_iter().zip(grown);
             ranges.map(|(a, b)| (a.1.min(b.1) - a.0.max(b.0)).max(0)).product()

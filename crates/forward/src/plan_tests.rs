@@ -118,20 +118,29 @@ fn light_changes_without_another_plan() {
 #[test]
 fn size_counts_kept_kernels() {
     let scene = Scene::new();
-    let plan = scene.plan();
-    let empty = plan.size_bytes();
+    let keeps_none = scene.plan().with_kernel_budget(0);
+    let empty = keeps_none.size_bytes();
     // Depth layers of all samples and the second samples behind edges, at least.
     assert!(empty >= 2 * 4 * ROWS * COLUMNS, "{empty}");
-    let kernels = plan.kernels(0, &Cancel::new()).unwrap().remove(0);
+    // Where seams are looked for, kernels were computed: in the first, the middle and the last band.
+    let plan = scene.plan();
+    let of_seams: usize =
+        [0, 3, 6].map(|band| plan.kernels(band, &Cancel::new()).unwrap()[0].size_bytes()).iter().sum();
+    let planned = scene.plan().size_bytes();
+    assert_eq!(planned, empty + of_seams);
+    let plan = scene.plan();
+    let kernels = plan.kernels(1, &Cancel::new()).unwrap().remove(0);
     assert!(kernels.n_kernels() > 0);
-    let grown = plan.size_bytes() - empty;
-    plan.kernels(0, &Cancel::new()).unwrap();
-    assert_eq!(plan.size_bytes() - empty, grown);
+    let grown = plan.size_bytes() - planned;
+    plan.kernels(1, &Cancel::new()).unwrap();
+    assert_eq!(plan.size_bytes() - planned, grown);
     // Without the kernels what is left is maps.
-    let keeps_none = scene.plan().with_kernel_budget(kernels.size_bytes() - 1);
-    keeps_none.kernels(0, &Cancel::new()).unwrap();
+    keeps_none.kernels(1, &Cancel::new()).unwrap();
     assert_eq!(keeps_none.size_bytes() - empty, grown - kernels.size_bytes());
     assert!(grown > kernels.size_bytes());
+    // A smaller budget keeps what fits into it.
+    let kept = scene.plan().with_kernel_budget(of_seams - 1).size_bytes();
+    assert!(kept > empty && kept < planned, "{kept}");
 }
 
 /// A lens that cancels the work when it has been asked for a number of kernels, and counts them all.
@@ -180,8 +189,9 @@ fn cancelled_work_ends_at_once() {
         let plan = ImagingPlan::new(lens.clone(), &scene.geometry(), scene.spec(), &|_| {}, &cancel);
         let n_planned = lens.asked.load(Ordering::Relaxed);
         let ended = plan.and_then(|plan| {
-            let front = &scene.radiance.planes()[0];
-            plan.image(0, BandRadiance { front, occluded: None }, &cancel)
+            // Kernels in the first band are those that seams were looked for with.
+            let front = &scene.radiance.planes()[1];
+            plan.image(1, BandRadiance { front, occluded: None }, &cancel)
         });
         (n_planned, lens.asked.load(Ordering::Relaxed), ended)
     };

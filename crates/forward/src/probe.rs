@@ -14,10 +14,8 @@ use crate::{
     geometry::FilmFrame,
     knot_kernels::{KnotKernel, LayerKernels, Symmetry, edge_spread_peak},
     mesh::{Mesh, Weights},
-    neighbors::Neighbors,
     patch::{Cell, Knot, Patch, SMALLEST},
     raster::LayerRaster,
-    seams::{Bend, may_have_seams, smoothed_patches},
     work::Work,
 };
 
@@ -147,8 +145,14 @@ impl<'a> Probe<'a> {
         splines: &[(Cell, Weights)],
         work: &Work<'_>,
     ) -> Result<Vec<(Cell, SplineError)>, Cancelled> {
+        let symmetry = self.symmetry;
+        let known = self.kernels.entry(factor).or_insert_with(|| LayerKernels::new(symmetry, BTreeMap::new()));
         let knots = splines.iter().flat_map(|(cell, weights)| weights.keys().copied().chain([cell.knot()]));
-        let known = self.kernels_at(factor, knots, work)?;
+        let wanted: BTreeSet<Knot> =
+            knots.filter(|knot| !known.has(*knot)).map(|knot| symmetry.canonical(knot)).collect();
+        let unobserved = Work::unobserved(work.cancel());
+        let wanted = wanted.into_iter().map(|knot| (knot, factor));
+        known.extend(self.lens.layer_kernels(self.layer, wanted, &unobserved)?);
         let error = |(cell, weights): &(Cell, Weights)| {
             work.check()?;
             let difference = spline_error(known, cell.knot(), weights);
@@ -157,47 +161,6 @@ impl<'a> Probe<'a> {
             Ok((*cell, SplineError { edge, shading }))
         };
         splines.par_iter().map(error).collect()
-    }
-
-    /// Returns the kernels on a raster that are known, among them those at some knots.
-    fn kernels_at(
-        &mut self,
-        factor: usize,
-        knots: impl Iterator<Item = Knot>,
-        work: &Work<'_>,
-    ) -> Result<&LayerKernels, Cancelled> {
-        let symmetry = self.symmetry;
-        let known = self.kernels.entry(factor).or_insert_with(|| LayerKernels::new(symmetry, BTreeMap::new()));
-        let wanted: BTreeSet<Knot> =
-            knots.filter(|knot| !known.has(*knot)).map(|knot| symmetry.canonical(knot)).collect();
-        let unobserved = Work::unobserved(work.cancel());
-        let wanted = wanted.into_iter().map(|knot| (knot, factor));
-        known.extend(self.lens.layer_kernels(self.layer, wanted, &unobserved)?);
-        Ok(known)
-    }
-
-    /// Returns which of the patches on the film's pixels are to have smoothed weights, as the kernels of the middle band have it.
-    pub(crate) fn smoothed_patches(
-        &mut self,
-        patches: &[Patch],
-        neighbors: &Neighbors,
-        work: &Work<'_>,
-    ) -> Result<BTreeSet<u32>, Cancelled> {
-        if !patches.iter().any(may_have_seams) {
-            return Ok(BTreeSet::new());
-        }
-        let on_film = patches.iter().zip(0..).filter(|(patch, _)| patch.elsewhere.is_empty());
-        let concerned: Vec<u32> = on_film.map(|(_, number)| number).collect();
-        let knots = concerned.iter().flat_map(|number| patches[*number as usize].shares.iter().map(|(knot, _)| *knot));
-        let knots: BTreeSet<Knot> = knots.collect();
-        let known = self.kernels_at(1, knots.iter().copied(), work)?;
-        let kernels: BTreeMap<Knot, KnotKernel> = knots.into_iter().map(|knot| (knot, known.at(knot))).collect();
-        let bend = |number: u32| {
-            work.check()?;
-            Ok((number, Bend::of(&patches[number as usize], &kernels)))
-        };
-        let bends: BTreeMap<u32, Bend> = concerned.into_par_iter().map(bend).collect::<Result<_, Cancelled>>()?;
-        Ok(smoothed_patches(patches, neighbors, &bends, self.settings.smoothing_px))
     }
 
     /// Returns what patches on a raster take by themselves; `largest` is the size of whole cells.

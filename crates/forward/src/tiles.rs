@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use dioptric_spectrum::Cancelled;
+use dioptric_spectrum::{Cancel, Cancelled};
 use rayon::prelude::*;
 
 use crate::{
@@ -11,24 +11,29 @@ use crate::{
     film_lens::FilmLens,
     knot_kernels::{LayerKernels, Symmetry},
     mesh::Mesh,
-    neighbors::Neighbors,
     patch::{Cell, Knot, Patch},
     probe::Probe,
+    seams::Seams,
     work::Work,
 };
+
+/// The factor of the film's own raster.
+const FILM: usize = 1;
 
 /// The patches of a layer, fine enough for the spline to follow the PSF.
 #[derive(Default)]
 pub(crate) struct LayerTiles {
     /// Those with something in them, by the factor of the raster that their kernels are on.
     pub(crate) patches: BTreeMap<usize, Vec<Patch>>,
+    /// Length that weights of knots are smoothed over where patches have it so, pixels.
+    pub(crate) smoothing_px: usize,
     /// The canonical knots, each with the factor of its raster.
     knots: BTreeMap<Knot, usize>,
 }
 
 impl LayerTiles {
     /// Halves the cells of a layer until the spline is as near to the kernels of the lens as the settings ask.
-    fn new(cells: Vec<Cell>, mut probe: Probe<'_>, smoothing_px: usize, work: &Work<'_>) -> Result<Self, Cancelled> {
+    fn new(cells: Vec<Cell>, mut probe: Probe<'_>, work: &Work<'_>) -> Result<Self, Cancelled> {
         let Some(first) = cells.first() else { return Ok(Self::default()) };
         let mut mesh = Mesh { size: first.size, added: BTreeSet::new() };
         probe.refine(&mut mesh, &cells, work)?;
@@ -47,17 +52,13 @@ impl LayerTiles {
             let by_knots = patches_by_knots(patches, &costs, factor, probe.symmetry());
             patches.iter_mut().zip(by_knots).for_each(|(patch, by_knots)| patch.is_by_knots = by_knots);
         }
-        if let Some(patches) = patches.get_mut(&1).filter(|_| smoothing_px > 0) {
-            // Seams on wide pixels are spread over several of the film's.
-            let neighbors = Neighbors::of(patches);
-            for number in probe.smoothed_patches(patches, &neighbors, work)? {
-                let around = neighbors.around(patches, number, smoothing_px / 2);
-                let patch = &mut patches[number as usize];
-                (patch.is_by_knots, patch.around) = (true, Some(around));
-            }
-        }
         let knots = factors.into_iter().map(|(knot, factor)| (probe.symmetry().canonical(knot), factor)).collect();
-        Ok(Self { patches, knots })
+        Ok(Self { patches, smoothing_px: 0, knots })
+    }
+
+    /// Those on the film's pixels.
+    fn on_film(&self) -> &[Patch] {
+        self.patches.get(&FILM).map_or(&[], Vec::as_slice)
     }
 
     fn n_patches(&self) -> usize {
@@ -80,11 +81,41 @@ impl Tiling {
         wavelengths_nm: &[f64],
         work: &Work<'_>,
     ) -> Result<Self, Cancelled> {
-        let tiles = active.into_par_iter().enumerate().map(|(layer, cells)| {
-            let probe = Probe::new((lens, layer), settings, wavelengths_nm);
-            LayerTiles::new(cells, probe, settings.smoothing_px, work)
-        });
+        let tiles = active
+            .into_par_iter()
+            .enumerate()
+            .map(|(layer, cells)| LayerTiles::new(cells, Probe::new((lens, layer), settings, wavelengths_nm), work));
         Ok(Self { layers: tiles.collect::<Result<_, Cancelled>>()?, symmetry: Symmetry::of(lens.image) })
+    }
+
+    /// Begins to look for seams between the patches on the film's pixels, layer by layer; `None` where no layer has any.
+    pub(crate) fn seams(&self) -> Option<Vec<Seams>> {
+        let has_any = self.layers.iter().any(|tiles| tiles.patches.contains_key(&FILM));
+        has_any.then(|| self.layers.iter().map(|tiles| Seams::between(tiles.on_film())).collect())
+    }
+
+    /// Adds the seams that kernels of another band leave.
+    pub(crate) fn add_band(
+        &self,
+        seams: &mut [Seams],
+        kernels: &[LayerKernels],
+        cancel: &Cancel,
+    ) -> Result<(), Cancelled> {
+        let layers = self.layers.par_iter().zip(seams).zip(kernels);
+        layers.try_for_each(|((tiles, seams), kernels)| seams.add_band(tiles.on_film(), kernels, cancel))
+    }
+
+    /// Has patches around seams spread by knots, whose weights are smoothed over a length, or over twice that in layers with large ones.
+    pub(crate) fn smooth(&mut self, seams: Vec<Seams>, length_px: usize) {
+        for (tiles, seams) in self.layers.iter_mut().zip(seams) {
+            let (length_px, smoothed) = seams.smoothed(tiles.on_film(), length_px);
+            tiles.smoothing_px = length_px;
+            for (number, around) in smoothed {
+                if let Some(patch) = tiles.patches.get_mut(&FILM).map(|patches| &mut patches[number]) {
+                    (patch.is_by_knots, patch.around) = (true, Some(around));
+                }
+            }
+        }
     }
 
     /// The number of canonical knots, all layers together.

@@ -44,11 +44,13 @@ impl Views {
         }
         let step = (range.1 - range.0) / parts.len() as f64;
         let part_range = |i: usize| (range.0 + step * i as f64, range.0 + step * (i + 1) as f64);
-        let layouts = parts.iter().enumerate().map(|(i, part)| layout(part.as_ref(), part_range(i)));
-        let mut layouts: Vec<Layout> = layouts.collect::<Result<_, _>>()?;
-        // Together they keep no more than one would.
-        let n = layouts.len();
-        layouts.iter_mut().for_each(|layout| layout.keep_at_most(KEPT_BUDGET_BYTES / n));
+        let of_part = |(i, part): (usize, &Arc<dyn LensImage + Send>)| {
+            let mut layout = layout(part.as_ref(), part_range(i))?;
+            // Together they keep no more than one would.
+            layout.keep_at_most(KEPT_BUDGET_BYTES / parts.len());
+            Ok(layout)
+        };
+        let layouts = parts.iter().enumerate().map(of_part).collect::<Result<_, ForwardError>>()?;
         Ok(Self { layouts, parts })
     }
 

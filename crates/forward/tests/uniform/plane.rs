@@ -8,7 +8,11 @@ use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectralImage, WavelengthGri
 use glam::DVec2;
 use ndarray::Array2;
 
+/// The wavelength for which lenses are focused, and at which real rays are traced.
 pub(crate) const WAVELENGTH_NM: f64 = 550.0;
+
+/// Bands of which the middle one has the kernels that halve cells.
+pub(crate) const THREE_BANDS_NM: &[f64] = &[450.0, WAVELENGTH_NM, 650.0];
 
 /// A strip of film from the axis' neighborhood to the corner of a square film, and the depth of a plane.
 #[derive(Clone, Copy)]
@@ -20,6 +24,8 @@ pub(crate) struct Case {
     pub(crate) columns: usize,
     pub(crate) pitch_um: f64,
     pub(crate) diffraction: Diffraction,
+    /// With [`WAVELENGTH_NM`] in the middle.
+    pub(crate) bands_nm: &'static [f64],
     /// Whether samples are added until pictures between them are right, as `dioptric run` does, or are as many as usual.
     pub(crate) is_adaptive: bool,
 }
@@ -30,7 +36,9 @@ pub(crate) struct Uniform {
     film: Film,
     film_distance_mm: f64,
     plane_m: f64,
-    picture: Array2<f32>,
+    bands_nm: &'static [f64],
+    /// One a band.
+    pictures: Vec<Array2<f32>>,
 }
 
 impl Uniform {
@@ -38,7 +46,7 @@ impl Uniform {
         let lens = Lens::built_in(case.lens).unwrap().with_f_number(case.f_number, WAVELENGTH_NM).unwrap();
         let mono = lens.at(WAVELENGTH_NM).unwrap();
         let film = Film::centered(48, case.columns, case.pitch_um);
-        let grid = WavelengthGrid::new(vec![WAVELENGTH_NM]).unwrap();
+        let grid = WavelengthGrid::new(case.bands_nm.to_vec()).unwrap();
         let plane_m = 1e-3 * (case.plane_mm + mono.projection_center_z_mm());
         let film_distance_mm = mono.film_distance_mm_for(case.focus_mm).unwrap();
         let domain = PsfDomain {
@@ -62,36 +70,27 @@ impl Uniform {
         };
         // A hundred samples over twice the film, all of one radiance.
         let view = View { focal_px: 49.0 / last_tan, center_x_px: 49.5, center_y_px: 49.5 };
-        let radiance = SpectralImage::new(Quantity::Radiance, grid, vec![Array2::ones((100, 100))]).unwrap();
+        let radiance =
+            SpectralImage::new(Quantity::Radiance, grid, vec![Array2::ones((100, 100)); case.bands_nm.len()]).unwrap();
         let depth = DepthMap::flat(100, 100, plane_m).unwrap();
         let source = Source { radiance: &radiance, depth: &depth, view, occluded: None };
-        let mut picture = Array2::zeros((0, 0));
+        let mut pictures = vec![];
         render(&source, &bank, &film, &Settings::default(), &|_| {}, &mut |_, band| {
-            picture = band;
+            pictures.push(band);
             Ok(())
         })
         .unwrap();
-        Self { lens, bank, film, film_distance_mm, plane_m, picture }
+        Self { lens, bank, film, film_distance_mm, plane_m, bands_nm: case.bands_nm, pictures }
     }
 
-    /// Returns the largest second difference along rows and columns, over the mean, and where: of neighbors, less that of pixels
-    /// eight apart, which is the curvature that a smooth picture has on both scales.
-    pub(crate) fn worst_step(&self) -> (f64, (usize, usize)) {
-        const APART: usize = 8;
-        let mean = f64::from(self.picture.mean().unwrap());
-        let (rows, columns) = self.picture.dim();
-        let bend = |(row, column): (usize, usize), (down, across): (usize, usize)| {
-            let at = |row: usize, column: usize| f64::from(self.picture[(row, column)]) / mean;
-            at(row - down, column - across) + at(row + down, column + across) - 2.0 * at(row, column)
-        };
-        let far = (APART * APART) as f64;
-        let inner = (APART..rows - APART).flat_map(|row| (APART..columns - APART).map(move |column| (row, column)));
-        let steps = inner.map(|at| {
-            let down = bend(at, (1, 0)) - bend(at, (APART, 0)) / far;
-            let across = bend(at, (0, 1)) - bend(at, (0, APART)) / far;
-            (down.abs().max(across.abs()), at)
+    /// Returns the largest second difference along rows and columns in any band, over the mean, and where: of neighbors, less that
+    /// of pixels eight apart, which is the curvature that a smooth picture has on both scales.
+    pub(crate) fn worst_step(&self) -> WorstStep {
+        let steps = self.bands_nm.iter().zip(&self.pictures).map(|(&wavelength_nm, picture)| {
+            let (step, (row, column)) = worst_step_of(picture);
+            WorstStep { step, wavelength_nm, row, column }
         });
-        steps.fold((0.0, (0, 0)), |worst, here| if here.0 > worst.0 { here } else { worst })
+        steps.max_by(|a, b| a.step.total_cmp(&b.step)).unwrap()
     }
 
     /// Returns the largest difference from the irradiance by traced rays, as a share of it, and where, mm.
@@ -100,7 +99,10 @@ impl Uniform {
         let differences = (8..self.film.columns).step_by((self.film.columns - 16) / 13).map(|column| {
             let (x, y) = (column as f64 + 0.5 - 0.5 * self.film.columns as f64, -0.5);
             let place_mm = 1e-3 * self.film.pitch_um * DVec2::new(x, y);
-            (f64::from(self.picture[(row, column)]) / self.solid_angle(place_mm) - 1.0, place_mm.length())
+            (
+                f64::from(self.pictures[self.bands_nm.len() / 2][(row, column)]) / self.solid_angle(place_mm) - 1.0,
+                place_mm.length(),
+            )
         });
         differences.fold((0.0, 0.0), |worst: (f64, f64), here| if here.0.abs() > worst.0.abs() { here } else { worst })
     }
@@ -140,4 +142,30 @@ impl Uniform {
         0.5 * pairs.map(|(a, b)| a.perp_dot(*b)).sum::<f64>().abs()
             * (1.0 + (std::f64::consts::TAU / N as f64).powi(2) / 6.0)
     }
+}
+
+/// The largest second difference of a uniform plane, over its mean, and where it is.
+pub(crate) struct WorstStep {
+    pub(crate) step: f64,
+    pub(crate) wavelength_nm: f64,
+    pub(crate) row: usize,
+    pub(crate) column: usize,
+}
+
+fn worst_step_of(picture: &Array2<f32>) -> (f64, (usize, usize)) {
+    const APART: usize = 8;
+    let mean = f64::from(picture.mean().unwrap());
+    let (rows, columns) = picture.dim();
+    let bend = |(row, column): (usize, usize), (down, across): (usize, usize)| {
+        let at = |row: usize, column: usize| f64::from(picture[(row, column)]) / mean;
+        at(row - down, column - across) + at(row + down, column + across) - 2.0 * at(row, column)
+    };
+    let far = (APART * APART) as f64;
+    let inner = (APART..rows - APART).flat_map(|row| (APART..columns - APART).map(move |column| (row, column)));
+    let steps = inner.map(|at| {
+        let down = bend(at, (1, 0)) - bend(at, (APART, 0)) / far;
+        let across = bend(at, (0, 1)) - bend(at, (0, APART)) / far;
+        (down.abs().max(across.abs()), at)
+    });
+    steps.fold((0.0, (0, 0)), |worst, here| if here.0 > worst.0 { here } else { worst })
 }
