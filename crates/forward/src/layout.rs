@@ -399,58 +399,6 @@ impl Layout {
         pairs.map(with_bands).filter(|(_, bands): &(_, Vec<usize>)| !bands.is_empty()).collect()
     }
 
-    /// Images the bands from `first` on, and hands on each as soon as those before it are done.
-    ///
-    /// Where memory is not limited, bands are handed on, and the basis of the bands after them is computed, while the next ones are imaged.
-    pub(crate) fn stream_from(
-        &self,
-        first: usize,
-        lens: &dyn LensImage,
-        radiance: &SceneRadiance<'_>,
-        work: &Work<'_>,
-        hand_on: &mut dyn FnMut(usize, Array2<f32>) -> Result<(), ForwardError>,
-    ) -> Result<(), ForwardError> {
-        let has_room = self.in_flight_bytes.is_none();
-        let pairs = self.bands_between_bases(first);
-        let (mut last_upper, mut ahead): (Option<(usize, BandBasis)>, Option<BandBasis>) = (None, None);
-        let mut imaged: Vec<(usize, Array2<f32>)> = vec![];
-        for (number, (pair, bands)) in pairs.iter().enumerate() {
-            let lower = match last_upper.take() {
-                Some((band, basis)) if band == pair[0] => basis,
-                _ => self.basis(lens, pair[0], work)?,
-            };
-            let upper = match ahead.take() {
-                Some(basis) => basis,
-                None if pair[1] == pair[0] => lower.clone(),
-                None => self.basis(lens, pair[1], work)?,
-            };
-            let next = pairs.get(number + 1).map(|(pair, _)| pair[1]).filter(|_| has_room);
-            let groups: Vec<&[usize]> = bands.chunks(self.bands_at_once([&lower, &upper])).collect();
-            for (left, group) in (0..groups.len()).rev().zip(groups) {
-                let image = |&band: &usize| {
-                    let basis = BasisBetween::at(band, *pair, &lower, &upper);
-                    self.image_of(lens, band, &basis, radiance, work).map(|picture| (band, picture))
-                };
-                let mut pictures: Result<Vec<(usize, Array2<f32>)>, ForwardError> = Ok(vec![]);
-                let mut next_upper: Result<Option<BandBasis>, Cancelled> = Ok(None);
-                rayon::in_place_scope(|scope| {
-                    scope.spawn(|_| pictures = group.par_iter().map(image).collect());
-                    if let Some(band) = next.filter(|_| left == 0) {
-                        let found = &mut next_upper;
-                        scope.spawn(move |_| *found = self.basis(lens, band, work).map(Some));
-                    }
-                    imaged.drain(..).try_for_each(|(band, picture)| hand_on(band, picture))
-                })?;
-                (imaged, ahead) = (pictures?, next_upper?);
-                if !has_room {
-                    imaged.drain(..).try_for_each(|(band, picture)| hand_on(band, picture))?;
-                }
-            }
-            last_upper = Some((pair[1], upper));
-        }
-        imaged.into_iter().try_for_each(|(band, picture)| hand_on(band, picture))
-    }
-
     /// How many bands between two bases are worked on at once: more than there are threads, so that none waits, where pictures are small.
     ///
     /// Where their bytes are limited the bases count, and each band has kernels of its own.

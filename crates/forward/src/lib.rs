@@ -54,6 +54,7 @@ mod source;
 mod spec;
 mod squares;
 mod stopwatch;
+mod stream;
 mod tiles;
 mod uniform_response;
 mod views;

@@ -1,6 +1,8 @@
 //! A plan that is used again, held to one that is made for a single use.
 
 use std::{
+    borrow::Cow,
+    panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Mutex,
         atomic::{AtomicUsize, Ordering},
@@ -10,13 +12,13 @@ use std::{
 
 use dioptric_psf::{FilmMap, Kernel, LensImage, PsfQuery};
 use dioptric_scene::View;
-use dioptric_spectrum::{Cancel, DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use dioptric_spectrum::{Bands, Cancel, DepthMap, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use glam::DVec2;
 use ndarray::Array2;
 
 use crate::{
-    BandRadiance, DiscLens, Film, ForwardError, ImagingPlan, ImagingSpec, ImagingTimes, SceneGeometry, Settings,
-    Source, render,
+    BandRadiance, DiscLens, Film, ForwardError, ImagingPlan, ImagingSpec, ImagingTimes, SceneGeometry, SceneRadiance,
+    Settings, Source, render,
 };
 
 const ROWS: usize = 60;
@@ -225,6 +227,63 @@ fn cancelled_stream_hands_on_no_more() {
     });
     assert!(matches!(ended, Err(ForwardError::Cancelled(_))));
     assert!(n_bands < 7 && *seen.lock().unwrap() < 0.9, "{n_bands} bands, progress {}", seen.lock().unwrap());
+}
+
+/// The thread that hands bands on may be the only one that images them.
+#[test]
+fn threads_of_a_pool_stream_bands() {
+    let scene = Scene::new();
+    let rendered = scene.rendered();
+    for n_threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+        assert_eq!(pool.install(|| scene.rendered()), rendered, "{n_threads} threads");
+    }
+}
+
+/// Bands whose samples cannot be had: reading one panics, or is an error.
+struct Unreadable<'a> {
+    image: &'a SpectralImage,
+    panics: bool,
+}
+
+impl Bands for Unreadable<'_> {
+    fn quantity(&self) -> Quantity {
+        Quantity::Radiance
+    }
+    fn grid(&self) -> &WavelengthGrid {
+        self.image.grid()
+    }
+    fn size(&self) -> (usize, usize) {
+        self.image.size()
+    }
+    fn band(&self, band: usize) -> Result<Cow<'_, Array2<f32>>, SpectrumError> {
+        assert!(!(self.panics && band == 4), "the fourth band panics");
+        if band == 4 { Err(SpectrumError::Depth { row: 0, column: 0, value: 0.0 }) } else { self.image.band(band) }
+    }
+}
+
+/// A stream that cannot go on ends, with the error or the panic, and hands on no band behind it.
+#[test]
+fn streams_end_where_a_band_fails() {
+    let scene = Scene::new();
+    let plan = scene.plan();
+    let handed_on = Mutex::new(vec![]);
+    let stream = |panics: bool, refused: usize| {
+        handed_on.lock().unwrap().clear();
+        let front = Unreadable { image: &scene.radiance, panics };
+        let light = SceneRadiance { front: &front, occluded: None };
+        let mut sink = |band: usize, _: Array2<f32>| {
+            handed_on.lock().unwrap().push(band);
+            if band == refused { Err("the disk is full".into()) } else { Ok(()) }
+        };
+        catch_unwind(AssertUnwindSafe(|| plan.stream(&light, &|_| {}, &Cancel::new(), &mut sink)))
+    };
+    assert!(matches!(stream(false, 7), Ok(Err(ForwardError::Spectrum(_)))));
+    assert!(handed_on.lock().unwrap().iter().all(|&band| band < 4));
+    assert!(stream(true, 7).is_err());
+    assert!(handed_on.lock().unwrap().iter().all(|&band| band < 4));
+    assert!(matches!(stream(false, 2), Ok(Err(ForwardError::Sink { band: 2, .. } | ForwardError::Spectrum(_)))));
+    assert!(handed_on.lock().unwrap().iter().all(|&band| band <= 2));
 }
 
 #[test]

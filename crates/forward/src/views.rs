@@ -11,6 +11,7 @@ use crate::{
     BandRadiance, BlurMode, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
     basis::BasisBetween,
     layout::{KEPT_BUDGET_BYTES, Layout, SceneLayers},
+    stream::HandOn,
     work::{Progress, Watch, Work},
 };
 
@@ -120,7 +121,7 @@ impl Views {
         whole: &dyn LensImage,
         radiance: &SceneRadiance<'_>,
         work: &Work<'_>,
-        hand_on: &mut dyn FnMut(usize, Array2<f32>) -> Result<(), ForwardError>,
+        hand_on: &mut HandOn<'_>,
     ) -> Result<(), ForwardError> {
         for (pair, bands) in self.first().bands_between_bases(first) {
             let mut sums: Vec<Option<Array2<f32>>> = vec![None; bands.len()];
