@@ -185,8 +185,7 @@ impl Surroundings<'_> {
             let first = offset_of(&common, at);
             let sums = block[first..].chunks_mut(at.columns).zip(weights[first..].chunks(at.columns));
             for (line, (sums, weights)) in lines.zip(sums) {
-                let products = line.iter().zip(weights).take(common.columns);
-                sums.iter_mut().zip(products).for_each(|(sum, (value, weight))| *sum += value * weight);
+                add_products(&mut sums[..common.columns], line, weights);
             }
         }
     }
@@ -322,6 +321,12 @@ fn add_weighted(line: &[f32], across: &[[f32; 3]], along: [f32; 3], sum: &mut [f
     for ((sum, value), across) in sum.iter_mut().zip(line).zip(across) {
         *sum += value * (along[0] + along[1] * across[1] + along[2] * across[2]);
     }
+}
+
+/// Adds samples times their weights to a line.
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn add_products(sums: &mut [f32], line: &[f32], weights: &[f32]) {
+    sums.iter_mut().zip(line).zip(weights).for_each(|((sum, value), weight)| *sum += value * weight);
 }
 
 #[cfg(test)]

@@ -99,13 +99,7 @@ impl Fft2 {
         let (size, scratch) = (self.size, &mut self.work.scratch);
         self.column_inverse.process_with_scratch(spectrum, scratch);
         lines.resize(n_rows * size, Complex::new(0.0, 0.0));
-        for (first, lines) in (0..).step_by(BATCH).zip(lines.chunks_mut(BATCH * size)) {
-            for (k, column) in spectrum.chunks_exact(size).enumerate() {
-                for (i, value) in column[first..][..lines.len() / size].iter().enumerate() {
-                    lines[i * size + k] = *value;
-                }
-            }
-        }
+        transpose(spectrum, size, lines, size);
         self.column_inverse.process_with_scratch(lines, scratch);
     }
 
@@ -158,15 +152,28 @@ impl Fft2 {
     }
 }
 
-/// Puts the transpose of lines of `from_len` values, one after the other, into the first values of lines of `to_len`.
+/// Puts the transpose of lines of `from_len` values, one after the other, into lines of `to_len`: as many as there are of these, and of each no more than
+/// there are lines.
 fn transpose(from: &[Complex<f32>], from_len: usize, to: &mut [Complex<f32>], to_len: usize) {
-    // As many lines together as fill a line of the cache.
-    for (first, lines) in (0..).step_by(BATCH).zip(from.chunks(BATCH * from_len)) {
-        let n_lines = (lines.len() / from_len).min(to_len - first);
-        for (k, to) in to.chunks_exact_mut(to_len).enumerate().take(from_len) {
-            for (i, to) in to[first..first + n_lines].iter_mut().enumerate() {
-                *to = lines[i * from_len + k];
+    let (n_from, n_to) = ((from.len() / from_len).min(to_len), (to.len() / to_len).min(from_len));
+    // Squares of as many values a side as fill a line of the cache.
+    let (whole_from, whole_to) = (n_from - n_from % BATCH, n_to - n_to % BATCH);
+    for row in (0..whole_from).step_by(BATCH) {
+        for column in (0..whole_to).step_by(BATCH) {
+            let mut square = [[Complex::new(0.0, 0.0); BATCH]; BATCH];
+            for (line, from) in square.iter_mut().zip(from[row * from_len + column..].chunks(from_len)) {
+                line.copy_from_slice(&from[..BATCH]);
             }
+            for (i, to) in to[column * to_len + row..].chunks_mut(to_len).take(BATCH).enumerate() {
+                to[..BATCH].iter_mut().zip(&square).for_each(|(to, line)| *to = line[i]);
+            }
+        }
+    }
+    for row in 0..n_from {
+        let from = &from[row * from_len..][..n_to];
+        let first = if row < whole_from { whole_to } else { 0 };
+        for (column, value) in (first..).zip(&from[first..]) {
+            to[column * to_len + row] = *value;
         }
     }
 }

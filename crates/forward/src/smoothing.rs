@@ -19,6 +19,8 @@ pub(crate) struct Smoother {
     values: Vec<f32>,
     along_rows: Vec<f32>,
     smooth: Vec<f32>,
+    /// The polynomials along a line of a patch, 1 and 2.
+    across: [Vec<f32>; 2],
 }
 
 impl Smoother {
@@ -39,15 +41,19 @@ impl Smoother {
         let place_of = |row: usize, column: usize| {
             patch.cell.place_of(frame, inside.first_row + row as i64, inside.first_column + column as i64)
         };
-        let across: Vec<[f32; 3]> =
-            (0..inside.columns).map(|column| polynomials(place_of(0, column).1 as f32)).collect();
+        let [first, second] = &mut self.across;
+        first.clear();
+        second.clear();
+        for column in 0..inside.columns {
+            let [_, linear, square] = polynomials(place_of(0, column).1 as f32);
+            first.push(linear);
+            second.push(square);
+        }
         let lines = self.values.chunks_exact_mut(at.columns).skip(skip.0).take(inside.rows);
         for (row, line) in lines.enumerate() {
             let down = polynomials(place_of(row, 0).0 as f32);
             let along: [f32; 3] = std::array::from_fn(|j| (0..3).map(|i| products[3 * i + j] * down[i]).sum());
-            for (value, across) in line[skip.1..].iter_mut().zip(&across) {
-                *value = along[0] + along[1] * across[1] + along[2] * across[2];
-            }
+            put_line(&mut line[skip.1..], along, [&*first, &*second]);
         }
     }
 
@@ -62,29 +68,43 @@ impl Smoother {
         self.along_rows.clear();
         self.along_rows.resize(at.rows * columns, 0.0);
         for (line, values) in self.along_rows.chunks_exact_mut(columns).zip(self.values.chunks_exact(at.columns)) {
-            mean_of(|place| &values[place..], 2 * half, line);
+            put_means(line, (values, 1), 2 * half);
         }
         self.smooth.clear();
         self.smooth.resize(rows * columns, 0.0);
         for (row, line) in self.smooth.chunks_exact_mut(columns).enumerate() {
-            mean_of(|place| &self.along_rows[(row + place) * columns..], 2 * half, line);
+            put_means(line, (&self.along_rows[row * columns..], columns), 2 * half);
         }
         &self.smooth
     }
 }
 
-/// Puts the means of `length + 1` lines, the first and the last counted half, into one.
-fn mean_of<'a>(line_at: impl Fn(usize) -> &'a [f32], length: usize, mean: &mut [f32]) {
-    let weight = 1.0 / length as f32;
-    for place in 0..=length {
-        let is_end = place == 0 || place == length;
-        add_line(mean, line_at(place), if is_end { 0.5 * weight } else { weight });
+/// Puts a sum of the polynomials 0, 1 and 2 at each place of a line into it.
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn put_line(line: &mut [f32], along: [f32; 3], [first, second]: [&[f32]; 2]) {
+    for ((value, first), second) in line.iter_mut().zip(first).zip(second) {
+        *value = along[0] + along[1] * first + along[2] * second;
     }
 }
 
+/// Puts the means of `length + 1` lines, each so many values behind the one before it, into one; the first and the last line are counted half.
 #[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
-fn add_line(sum: &mut [f32], line: &[f32], weight: f32) {
-    sum.iter_mut().zip(line).for_each(|(sum, value)| *sum += weight * value);
+fn put_means(means: &mut [f32], (values, step): (&[f32], usize), length: usize) {
+    const LANES: usize = 32;
+    let weight = |place: usize| if place == 0 || place == length { 0.5 } else { 1.0 } / length as f32;
+    let (whole, rest) = means.as_chunks_mut::<LANES>();
+    let n_whole = LANES * whole.len();
+    for (first, means) in (0..).step_by(LANES).zip(whole) {
+        let mut sums = [0.0; LANES];
+        for place in 0..=length {
+            let (line, weight) = (&values[first + place * step..][..LANES], weight(place));
+            sums.iter_mut().zip(line).for_each(|(sum, value)| *sum += weight * value);
+        }
+        *means = sums;
+    }
+    for (first, mean) in (n_whole..).zip(rest) {
+        *mean = (0..=length).map(|place| weight(place) * values[first + place * step]).sum();
+    }
 }
 
 #[cfg(test)]
