@@ -85,9 +85,10 @@ pub struct Settings {
     /// Distance between the points of the film at which the PSF is computed, pixels. Cells in which the
     /// interpolated PSF is off by more than `max_edge_error` are halved.
     pub knot_spacing_px: usize,
-    /// Largest error of the edge spread function that interpolation over the field may cause.
+    /// Largest error of the edge spread function in the middle band that interpolation over the field may cause, where cells are not yet as small as the
+    /// raster of their kernels allows.
     pub max_edge_error: f64,
-    /// Largest relative error of the irradiance of a uniform plane by interpolated PSFs: cells where it is larger are halved likewise.
+    /// Largest relative error of the irradiance of a uniform plane in the middle band by interpolated PSFs: cells where it is larger are halved likewise.
     pub max_shading_error: f64,
     /// Distance between depth layers, pixels of blur radius.
     pub layer_step_px: f64,
