@@ -30,9 +30,41 @@ impl BlockLayers {
         Self { first: (1 << 40, 0), ranges: Array2::default((0, 0)) }
     }
 
+    /// Returns about how many pixels of a raster of this size a layer reaches whose points are spread by a radius, pixels.
+    pub(crate) fn n_reached(&self, layer: usize, radius_px: f64, (rows, columns): (usize, usize)) -> usize {
+        let reach = (radius_px / BLOCK as f64).ceil() as usize;
+        let is_in = |&(first, last): &(u16, u16)| (usize::from(first)..=usize::from(last)).contains(&layer);
+        let along_rows = dilated(&self.ranges.map(is_in), reach);
+        let reached = dilated(&along_rows.reversed_axes(), reach).reversed_axes();
+        let on_raster = |first: i64, block: usize, n: usize| {
+            let at = first + (BLOCK * block) as i64;
+            (at + BLOCK as i64).min(n as i64) - at.max(0)
+        };
+        let pixels = |((row, column), reached): ((usize, usize), &bool)| {
+            let (down, across) = (on_raster(self.first.0, row, rows), on_raster(self.first.1, column, columns));
+            if *reached { (down.max(0) * across.max(0)) as usize } else { 0 }
+        };
+        reached.indexed_iter().map(pixels).sum()
+    }
+
     pub(crate) fn size_bytes(&self) -> usize {
         self.ranges.len() * size_of::<(u16, u16)>()
     }
+}
+
+/// Returns a plane in which each mark is so many places longer along its row, both ways.
+fn dilated(marks: &Array2<bool>, reach: usize) -> Array2<bool> {
+    let mut longer = Array2::default(marks.dim());
+    for (marks, mut longer) in marks.rows().into_iter().zip(longer.rows_mut()) {
+        let n = marks.len();
+        let mut end = 0;
+        for at in (0..n).filter(|&at| marks[at]) {
+            let next_end = (at + reach + 1).min(n);
+            (at.saturating_sub(reach).max(end)..next_end).for_each(|at| longer[at] = true);
+            end = next_end;
+        }
+    }
+    longer
 }
 
 /// The layers of the blocks along a row of pixels.
@@ -64,5 +96,22 @@ impl RowBlocks<'_> {
         };
         let start = next_where(range.start, true);
         start..next_where(start, false)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Layer 2 is in one block of a raster of 12 × 16 pixels, whose blocks begin 4 pixels above and to the left of it.
+    #[test]
+    fn layers_reach_as_far_as_they_are_spread() {
+        let mut ranges = Array2::from_elem((5, 6), (1, 0));
+        ranges[(2, 2)] = (1, 3);
+        let blocks = BlockLayers { first: (-4, -4), ranges };
+        let reached = |layer, radius_px| blocks.n_reached(layer, radius_px, (12, 16));
+        assert_eq!((reached(2, 0.0), reached(4, 0.0)), (16, 0));
+        // A block more all around, of which all are on the raster; then rows 0 to 12 and columns 0 to 16 of 20.
+        assert_eq!((reached(2, 1.0), reached(2, 8.0)), (144, 192));
     }
 }

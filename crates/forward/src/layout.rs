@@ -130,6 +130,10 @@ pub(crate) struct Layout {
     /// How far off axis light is taken from, mm.
     extent_mm: f64,
     pub(crate) kept: Mutex<Kept>,
+    /// What the kernels of a band take, as far as the plan has seen them.
+    kernel_bytes: usize,
+    /// About how many pixels of the film layers cover, all layers together.
+    n_covered: usize,
     /// Of each band that was asked for, those of all layers.
     maps: Mutex<BTreeMap<usize, Arc<Vec<FilmMap>>>>,
     pub(crate) stopwatch: Stopwatch,
@@ -197,9 +201,11 @@ impl Layout {
             FilmLens { image: lens, film, layers, maps: &maps, wavelength_nm: middle_nm, stopwatch: &stopwatch };
         let mut tiling = Tiling::new(active, &film_lens, settings, &wavelengths_nm, &work)?;
         let mut kept = Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() };
-        if let Some(mut seams) = tiling.seams().filter(|_| settings.smoothing_px > 0) {
+        let mut kernel_bytes = 0;
+        if settings.smoothing_px > 0 {
             // Where colors differ most; these kernels are needed for imaging anyway.
             let bands = &scene.kernel_bands;
+            let mut seams = tiling.seams();
             for band in BTreeSet::from([0, bands.len() / 2, bands.len() - 1].map(|number| bands[number])) {
                 let wavelength_nm = grid.centers_nm()[band];
                 let map = |&dioptres: &f64| lens.film_map(dioptres, wavelength_nm, extent_mm);
@@ -207,7 +213,9 @@ impl Layout {
                 let film_lens = FilmLens { maps: &maps, wavelength_nm, ..film_lens };
                 let by_layer = Arc::new(tiling.kernels_at(&film_lens, &Work::unobserved(cancel))?);
                 tiling.add_band(&mut seams, &by_layer, cancel)?;
-                kept.keep(band, &BandKernels { by_layer });
+                let kernels = BandKernels { by_layer };
+                kernel_bytes = kernel_bytes.max(kernels.size_bytes());
+                kept.keep(band, &kernels);
             }
             tiling.smooth(seams, settings.smoothing_px);
         }
@@ -217,6 +225,7 @@ impl Layout {
         };
         let rasters: Vec<_> = tiling.layers.iter().zip(&maps).map(rasters_of).collect();
         let blocks = blocks_of(&rasters, &tiling, &extents, cancel)?;
+        let n_covered = n_covered(&tiling, &blocks, &radius_px, film);
         let kept = Mutex::new(kept);
         Ok(Self {
             scene,
@@ -225,6 +234,8 @@ impl Layout {
             blocks,
             extent_mm,
             kept,
+            kernel_bytes,
+            n_covered,
             maps: Mutex::default(),
             stopwatch,
             in_flight_bytes: None,
@@ -419,12 +430,11 @@ impl Layout {
         PLANES * size_of::<f32>() * (rows * columns).max(scene_rows * scene_columns)
     }
 
-    /// What the coverage of layers takes in two bands, bytes; nothing where no layer hides another.
+    /// About what two bases take, bytes: the coverage of layers where they hide each other, and kernels as far as the plan has seen any.
     pub(crate) fn bases_bytes(&self) -> usize {
-        // Of the still life on 12 megapixels it was about 15: blurred layers overlap, and parts of a row that are near each other are one run.
-        const PIXEL_BYTES: usize = 18;
-        let Film { rows, columns, .. } = self.spec.film;
-        if self.hides() { 2 * PIXEL_BYTES * rows * columns } else { 0 }
+        // .9 to 1.5 times as much as this coverage was measured.
+        let coverage = if self.hides() { size_of::<f32>() * self.n_covered } else { 0 };
+        2 * (coverage + self.kernel_bytes)
     }
 
     /// Reads a band and images it.
@@ -565,6 +575,18 @@ fn active_cells_of(
         }
     }
     Ok(active)
+}
+
+/// Returns about how many pixels of the film layers cover, all layers together.
+fn n_covered(tiling: &Tiling, blocks: &BTreeMap<usize, BlockLayers>, radius_px: &[f64], film: &Film) -> usize {
+    let of_layer = |(layer, tiles): (usize, &LayerTiles)| {
+        let on_raster = |factor: &usize| {
+            let size = (film.rows.div_ceil(*factor), film.columns.div_ceil(*factor));
+            factor * factor * blocks[factor].n_reached(layer, radius_px[layer] / *factor as f64, size)
+        };
+        tiles.patches.keys().map(on_raster).sum::<usize>().min(film.rows * film.columns)
+    };
+    tiling.layers.par_iter().enumerate().map(of_layer).sum()
 }
 
 /// Finds the layers of the blocks of pixels over all patches, by the factor of their raster.

@@ -116,10 +116,9 @@ impl ImagingPlan {
         self.views.first().band_bytes()
     }
 
-    /// Returns about how many bytes of memory the bases of two bands take, between which others are interpolated: what layers that hide each other
-    /// cover. Their kernels are counted where they are kept.
+    /// Returns about how many bytes of memory the bases of two bands take, between which others are interpolated.
     pub fn bases_bytes(&self) -> usize {
-        self.views.first().bases_bytes()
+        self.views.largest_bases_bytes()
     }
 
     /// Returns the plan that adds up, by a clock, the time that its parts take; see [`times`](Self::times).

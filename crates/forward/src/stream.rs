@@ -73,6 +73,8 @@ impl Task<'_> {
                 let pictures: Vec<(usize, Array2<f32>)> = group.par_iter().map(image).collect::<Result<_, _>>()?;
                 pictures.into_iter().try_for_each(|(band, picture)| hand_on(band, picture))?;
             }
+            // Those of a lens without an axis are many.
+            layout.drop_maps();
             last_upper = Some((pair[1], upper));
         }
         Ok(())

@@ -88,10 +88,9 @@ impl Tiling {
         Ok(Self { layers: tiles.collect::<Result<_, Cancelled>>()?, symmetry: Symmetry::of(lens.image) })
     }
 
-    /// Begins to look for seams between the patches on the film's pixels, layer by layer; `None` where no layer has any.
-    pub(crate) fn seams(&self) -> Option<Vec<Seams>> {
-        let has_any = self.layers.iter().any(|tiles| tiles.patches.contains_key(&FILM));
-        has_any.then(|| self.layers.iter().map(|tiles| Seams::between(tiles.on_film())).collect())
+    /// Begins to look for seams between the patches on the film's pixels, layer by layer.
+    pub(crate) fn seams(&self) -> Vec<Seams> {
+        self.layers.iter().map(|tiles| Seams::between(tiles.on_film())).collect()
     }
 
     /// Adds the seams that kernels of another band leave.

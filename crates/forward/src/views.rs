@@ -73,6 +73,11 @@ impl Views {
         self.layouts.iter().enumerate().map(move |(i, layout)| (lens(i), layout))
     }
 
+    /// What the bases of two bands take, of one layout at a time.
+    pub(crate) fn largest_bases_bytes(&self) -> usize {
+        self.layouts.iter().map(Layout::bases_bytes).max().unwrap_or(0)
+    }
+
     pub(crate) fn size_bytes(&self) -> usize {
         self.first().scene.size_bytes() + self.layouts.iter().map(Layout::size_bytes).sum::<usize>()
     }
