@@ -229,6 +229,26 @@ fn cancelled_stream_hands_on_no_more() {
     assert!(n_bands < 7 && *seen.lock().unwrap() < 0.9, "{n_bands} bands, progress {}", seen.lock().unwrap());
 }
 
+/// Work that was interrupted goes on with the bands that are left, of which there may be none.
+#[test]
+fn streams_begin_anywhere() {
+    let scene = Scene::new();
+    let rendered = scene.rendered();
+    let source = Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None };
+    for plan in [scene.plan(), scene.plan().with_band_budget(1)] {
+        for first in 0..=7 {
+            let mut left = vec![];
+            let mut sink = |band: usize, picture: Array2<f32>| {
+                assert_eq!(band, first + left.len());
+                left.push(picture);
+                Ok(())
+            };
+            plan.stream_from(first, &source.light(), &|_| {}, &Cancel::new(), &mut sink).unwrap();
+            assert_eq!(left, rendered[first..]);
+        }
+    }
+}
+
 /// The thread that hands bands on may be the only one that images them.
 #[test]
 fn threads_of_a_pool_stream_bands() {

@@ -132,6 +132,9 @@ impl<'a> Stream<'a> {
 
     /// Images all bands; the calling thread hands them on, as others work on the next ones.
     fn run(&self, hand_on: &mut HandOn<'_>) -> Result<(), ForwardError> {
+        if self.bands.is_empty() {
+            return Ok(());
+        }
         let (sender, receiver) = channel();
         rayon::in_place_scope(|scope| {
             self.begin(scope, &sender);
@@ -191,8 +194,8 @@ impl<'a> Stream<'a> {
             return None;
         }
         let next = self.bands.get(state.n_begun).copied();
-        let wanted_pair = next.map_or(self.pairs.len(), |(_, pair)| pair + 1).min(self.pairs.len() - 1);
-        let last_wanted = self.pairs[wanted_pair][1];
+        let wanted_pair = next.and_then(|(_, pair)| self.pairs.get(pair + 1)).or(self.pairs.last())?;
+        let last_wanted = wanted_pair[1];
         let basis = self.basis_bands.get(state.n_bases).filter(|&&band| band <= last_wanted);
         if let Some(&band) = basis.filter(|_| !state.is_computing_basis) {
             (state.n_bases, state.is_computing_basis) = (state.n_bases + 1, true);
