@@ -14,7 +14,7 @@ pub type Clock = dyn Fn() -> Duration + Send + Sync;
 /// The time that the parts of imaging took, summed over threads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImagingTimes {
-    /// Computing kernels of the lens.
+    /// Computing kernels of the lens, but for those that the plan was made with.
     pub kernels: Duration,
     /// Sampling the scene on the film.
     pub sampling: Duration,
