@@ -106,8 +106,8 @@ impl<'a> Probe<'a> {
         const PER_BLUR: f64 = 0.25;
         let widest_px = self.settings.widest_blur_px;
         let mut divided = BTreeSet::new();
-        // The spline at the middle of each cell, by the factor of the coarsest raster of its kernels.
-        let mut splines: BTreeMap<usize, Vec<(Cell, Weights)>> = BTreeMap::new();
+        // The spline at the middle of each cell and on the axis, by the factor of the coarsest raster of its kernels.
+        let mut splines: BTreeMap<usize, Vec<(Cell, Knot, Weights)>> = BTreeMap::new();
         for cell in cells {
             let is_large = cell.size > LARGEST_JOINED * self.factor_at(cell.knot());
             if !is_large && self.is_beyond_reach(&cell) {
@@ -120,45 +120,49 @@ impl<'a> Probe<'a> {
             if is_large || may_divide && self.is_off_at_corners(mesh, &cell) {
                 divided.insert(cell);
             } else if may_divide {
-                splines.entry(coarsest).or_default().push((cell, weights));
+                let splines = splines.entry(coarsest).or_default();
+                splines.push((cell, cell.knot(), weights));
+                splines.extend(at_axis(mesh, &cell).map(|weights| (cell, AXIS, weights)));
             }
         }
-        let mut shadings: BTreeMap<Cell, Shading> = BTreeMap::new();
+        let (mut shadings, mut on_axis) = (BTreeMap::new(), BTreeMap::new());
         for (factor, splines) in splines {
-            for (cell, SplineError { edge, shading }) in self.spline_errors(factor, &splines, work)? {
+            for (cell, knot, SplineError { edge, shading }) in self.spline_errors(factor, &splines, work)? {
                 if edge > self.settings.max_edge_error {
                     divided.insert(cell);
                 }
                 // What cells of another size, or other moments, do to a plane spans two of them at least.
                 let left = what_blur_leaves(self.spread_px(cell.knot()) / (2 * cell.size) as f64);
-                shadings.insert(cell, shading.times(left));
+                let shading = shading.times(left);
+                let shadings = if knot == AXIS { &mut on_axis } else { &mut shadings };
+                shadings.insert(cell, shading);
             }
         }
-        divide_for_shading(&shadings, self.settings.max_shading_error, &mut divided);
+        divide_for_shading(&shadings, &on_axis, self.settings.max_shading_error, &mut divided);
         Ok(divided)
     }
 
-    /// Returns by how much splines are off at the middles of cells.
+    /// Returns by how much splines are off at places of cells.
     fn spline_errors(
         &mut self,
         factor: usize,
-        splines: &[(Cell, Weights)],
+        splines: &[(Cell, Knot, Weights)],
         work: &Work<'_>,
-    ) -> Result<Vec<(Cell, SplineError)>, Cancelled> {
+    ) -> Result<Vec<(Cell, Knot, SplineError)>, Cancelled> {
         let symmetry = self.symmetry;
         let known = self.kernels.entry(factor).or_insert_with(|| LayerKernels::new(symmetry, BTreeMap::new()));
-        let knots = splines.iter().flat_map(|(cell, weights)| weights.keys().copied().chain([cell.knot()]));
+        let knots = splines.iter().flat_map(|(_, knot, weights)| weights.keys().copied().chain([*knot]));
         let wanted: BTreeSet<Knot> =
             knots.filter(|knot| !known.has(*knot)).map(|knot| symmetry.canonical(knot)).collect();
         let unobserved = Work::unobserved(work.cancel());
         let wanted = wanted.into_iter().map(|knot| (knot, factor));
         known.extend(self.lens.layer_kernels(self.layer, wanted, &unobserved)?);
-        let error = |(cell, weights): &(Cell, Weights)| {
+        let error = |(cell, knot, weights): &(Cell, Knot, Weights)| {
             work.check()?;
-            let difference = spline_error(known, cell.knot(), weights);
+            let difference = spline_error(known, *knot, weights);
             let edge = edge_spread_peak(&difference.samples, difference.width);
             let shading = Shading::of(&difference, cell.size as f64 / factor as f64);
-            Ok((*cell, SplineError { edge, shading }))
+            Ok((*cell, *knot, SplineError { edge, shading }))
         };
         splines.par_iter().map(error).collect()
     }
@@ -188,6 +192,16 @@ impl<'a> Probe<'a> {
     }
 }
 
+/// The axis, on which four cells have a corner. Where the pupil is cut off from the smallest fields on, on opposite sides of the axis, kernels change with the
+/// magnitude of the field there: the spline of cells that are large beside the blur rounds that off, and the middles of cells do not show it.
+const AXIS: Knot = Knot { right: 0, down: 0 };
+
+/// Returns the weights of knots on the axis, of a cell with a corner there.
+fn at_axis(mesh: &Mesh, cell: &Cell) -> Option<Weights> {
+    let corner = cell.corners().iter().position(|corner| *corner == AXIS)?;
+    Some(mesh.at_corners(cell)[corner].clone())
+}
+
 /// Returns the kernel at a knot less that of a spline.
 fn spline_error(kernels: &LayerKernels, knot: Knot, spline: &Weights) -> KnotKernel {
     let terms = || spline.iter().map(|(&at, &weight)| (at, -weight)).chain([(knot, 1.0)]);
@@ -200,14 +214,14 @@ fn spline_error(kernels: &LayerKernels, knot: Knot, spline: &Weights) -> KnotKer
     KnotKernel { width, samples }
 }
 
-/// By how much a spline is off at the middle of a cell.
+/// By how much a spline is off at a place of a cell.
 struct SplineError {
     /// Largest error of the edge spread functions along rows and columns.
     edge: f64,
     shading: Shading,
 }
 
-/// By how much the moments of a spline are off at the middle of a cell.
+/// By how much the moments of a spline are off at a place of a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Shading {
     /// Change of the irradiance of a uniform plane, were the cell halved and none around it; above or below 0.
@@ -248,14 +262,21 @@ impl Shading {
 /// Where all cells are of one size the spline is off by the same second moments everywhere, which no uniform plane shows: only where cells of
 /// two sizes meet, or where its curvature changes from cell to cell; of first moments, where they are off by more in one cell than in the next
 /// (docs/forward.md 2).
-fn divide_for_shading(shadings: &BTreeMap<Cell, Shading>, most: f64, divided: &mut BTreeSet<Cell>) {
+fn divide_for_shading(
+    shadings: &BTreeMap<Cell, Shading>,
+    on_axis: &BTreeMap<Cell, Shading>,
+    most: f64,
+    divided: &mut BTreeSet<Cell>,
+) {
     for (cell, shading) in shadings {
         let beside = |down: i32, across: i32| shadings.get(&cell.beside(down, across));
         let [above, below, left, right] = [beside(-1, 0), beside(1, 0), beside(0, -1), beside(0, 1)];
         // The curvature of the spline is that of each cell; a smooth one lies half-way where they meet.
         let steps = [above, below, left, right].into_iter().flatten().map(|next| next.second - shading.second);
         let has_step = steps.into_iter().any(|step| 0.5 * step.abs() > most);
-        if has_step || shading.spread_between([above, below], [left, right]) > most {
+        // Half the second derivative, by the middles around it.
+        let has_peak = on_axis.get(cell).is_some_and(|axis| (axis.second - shading.second).abs() > most);
+        if has_step || has_peak || shading.spread_between([above, below], [left, right]) > most {
             divided.insert(*cell);
         }
     }
@@ -287,7 +308,7 @@ mod tests {
         let rows = of_row.iter().zip(0..);
         let cells = rows.flat_map(|(shading, down)| (-2..3).map(move |across| (cell(down, across), *shading)));
         let mut divided = first.iter().map(|&down| cell(down, 0)).collect();
-        divide_for_shading(&cells.collect(), 1e-3, &mut divided);
+        divide_for_shading(&cells.collect(), &BTreeMap::new(), 1e-3, &mut divided);
         (0..of_row.len() as i32).filter(|&down| divided.contains(&cell(down, 0))).collect()
     }
 
@@ -305,6 +326,21 @@ mod tests {
     fn steps_of_curvature_are_halved() {
         assert_eq!(marked(&second(&[1e-4, 2e-4, 5e-3, 5e-3, 4e-3, 3.5e-3, 9e-4]), &[]), [1, 2, 3, 4, 5, 6]);
         assert_eq!(marked(&second(&[1e-4, 2e-4, 2.5e-3, 9e-4, 1e-4]), &[]), [1, 2]);
+    }
+
+    #[test]
+    fn peaks_on_the_axis_are_halved() {
+        let cell = |down: i32| Cell { down, across: 0, size: 64 };
+        let shading = |second: f64| Shading { second, ..Shading::default() };
+        let middles = (-3..3).map(|down| (cell(down), shading(2e-4))).collect();
+        let halved = |peak: f64| {
+            let on_axis = [-1, 0].map(|down| (cell(down), shading(peak))).into();
+            let mut divided = BTreeSet::new();
+            divide_for_shading(&middles, &on_axis, 1e-3, &mut divided);
+            divided
+        };
+        assert_eq!(halved(1.3e-3), BTreeSet::from([cell(-1), cell(0)]));
+        assert!(halved(1.1e-3).is_empty());
     }
 
     #[test]

@@ -80,6 +80,26 @@ fn defocused_lens_has_no_seams() {
     );
 }
 
+/// Through a wide lens pupils are cut off from the smallest fields on, on opposite sides of the axis: cells of 128 pixels rounded that off, and the middle of
+/// the picture was .67 % too bright.
+#[test]
+fn half_defocused_lens_is_as_bright_in_the_middle() {
+    check(
+        &Case {
+            lens: "dgauss-50mm",
+            f_number: 2.03,
+            focus_mm: 2000.0,
+            plane_mm: 667.0,
+            columns: 724,
+            pitch_um: 31.2155,
+            diffraction: Diffraction::None,
+            bands_nm: ONE_BAND_NM,
+            is_adaptive: false,
+        },
+        1.2e-3,
+    );
+}
+
 /// A curved field brings one line focus or the other onto the film: thin lines in wide kernels, which count in one pixel or the next. Cells left steps of
 /// 3.8e-4.
 #[test]
