@@ -25,7 +25,7 @@ pub struct RadialMap {
     axis_tan: DVec2,
 }
 
-/// Evenly spaced values of a smooth function, and parabolas between them. Straight lines left a kink at each in a picture: of 3e-4 of the light at the first
+/// Evenly spaced values of a smooth function, and parabolas between them, which pass values where these bend: light beside darkness falls below 0. Straight lines left a kink at each in a picture: of 3e-4 of the light at the first
 /// one, 11 pixels from the axis, in red light through a double Gauss at f/2.
 #[derive(Clone, Debug)]
 struct Table {
@@ -118,7 +118,7 @@ impl RadialMap {
         }
         let below = (place as usize).min(last - 1);
         let fraction = place - below as f64;
-        Some((self.tan_per_mm.at(below, fraction), self.irradiance_per_radiance.at(below, fraction)))
+        Some((self.tan_per_mm.at(below, fraction), self.irradiance_per_radiance.at(below, fraction).max(0.0)))
     }
 
     /// As [`at`](Self::at) at each place.
@@ -164,7 +164,7 @@ fn look_up(
         let fraction = place - below as f64;
         let tan = tan_per_mm.at(below, fraction);
         (*tan_x, *tan_y) = (x_mm * tan + axis_tan.x, y_mm * tan + axis_tan.y);
-        *gain = if place > end { f64::NAN } else { irradiance_per_radiance.at(below, fraction) };
+        *gain = if place > end { f64::NAN } else { irradiance_per_radiance.at(below, fraction).max(0.0) };
     }
 }
 
@@ -334,6 +334,19 @@ mod tests {
             // 3.1e-6; straight lines between entries leave 2.9e-5.
             assert!(kink.abs() < 5e-6, "{kink} {i} hundredths of a millimetre off axis");
         }
+    }
+
+    /// Where light ends at an entry the parabola beside it falls below 0.
+    #[test]
+    fn light_is_never_below_darkness() {
+        let map = FilmMap::Radial(RadialMap::tabulate(32.0, |r| Some(r / 50.0), |tan| f64::from(50.0 * tan < 8.0)));
+        let x_mm: Vec<f64> = (0..4000).map(|i| 7.9 + 5e-5 * f64::from(i)).collect();
+        let mut seen = FieldsAlong::default();
+        map.along(&x_mm, 0.0, &mut seen);
+        let gains =
+            || x_mm.iter().map(|&x| map.at(DVec2::new(x, 0.0)).unwrap().1).chain(seen.irradiance_per_radiance.clone());
+        assert!(gains().all(|gain| (0.0..1.1).contains(&gain)));
+        assert!(gains().any(|gain| gain == 0.0) && gains().any(|gain| (0.3..0.7).contains(&gain)));
     }
 
     #[test]
