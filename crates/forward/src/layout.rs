@@ -132,7 +132,7 @@ pub(crate) struct Layout {
     pub(crate) kept: Mutex<Kept>,
     /// What the kernels of a band take, as far as the plan has seen them.
     kernel_bytes: usize,
-    /// About how many pixels of the film layers cover, all layers together.
+    /// About how many pixels of the film layers cover, all layers together; 0 where none hides another.
     n_covered: usize,
     /// Of each band that was asked for, those of all layers.
     maps: Mutex<BTreeMap<usize, Arc<Vec<FilmMap>>>>,
@@ -201,31 +201,27 @@ impl Layout {
             FilmLens { image: lens, film, layers, maps: &maps, wavelength_nm: middle_nm, stopwatch: &stopwatch };
         let mut tiling = Tiling::new(active, &film_lens, settings, &wavelengths_nm, &work)?;
         let mut kept = Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() };
-        let mut kernel_bytes = 0;
-        if settings.smoothing_px > 0 {
-            // Where colors differ most; these kernels are needed for imaging anyway.
-            let bands = &scene.kernel_bands;
-            let mut seams = tiling.seams();
-            for band in BTreeSet::from([0, bands.len() / 2, bands.len() - 1].map(|number| bands[number])) {
-                let wavelength_nm = grid.centers_nm()[band];
-                let map = |&dioptres: &f64| lens.film_map(dioptres, wavelength_nm, extent_mm);
-                let maps: Vec<FilmMap> = layers.dioptres().par_iter().map(map).collect();
-                let film_lens = FilmLens { maps: &maps, wavelength_nm, ..film_lens };
-                let by_layer = Arc::new(tiling.kernels_at(&film_lens, &Work::unobserved(cancel))?);
-                tiling.add_band(&mut seams, &by_layer, cancel)?;
-                let kernels = BandKernels { by_layer };
-                kernel_bytes = kernel_bytes.max(kernels.size_bytes());
-                kept.keep(band, &kernels);
+        let kernel_bytes = match settings.smoothing_px {
+            0 => 0,
+            length_px => {
+                let bands = &scene.kernel_bands;
+                // Where colors differ most.
+                let of_bands = BTreeSet::from([0, bands.len() / 2, bands.len() - 1].map(|number| bands[number]));
+                let wavelengths: Vec<(usize, f64)> =
+                    of_bands.into_iter().map(|band| (band, grid.centers_nm()[band])).collect();
+                smooth_seams(&mut tiling, (&film_lens, extent_mm), &wavelengths, length_px, &mut kept, cancel)?
             }
-            tiling.smooth(seams, settings.smoothing_px);
-        }
+        };
         let rasters_of = |(tiles, map): (&LayerTiles, &FilmMap)| -> BTreeMap<usize, LayerRaster> {
             let raster = |&factor: &usize| (factor, LayerRaster::new(film, factor, (view, scene.size()), map));
             tiles.patches.keys().map(raster).collect()
         };
         let rasters: Vec<_> = tiling.layers.iter().zip(&maps).map(rasters_of).collect();
         let blocks = blocks_of(&rasters, &tiling, &extents, cancel)?;
-        let n_covered = n_covered(&tiling, &blocks, &radius_px, film);
+        let n_covered = match hides(settings, layers) {
+            true => n_covered(&tiling, &blocks, &radius_px, film),
+            false => 0,
+        };
         let kept = Mutex::new(kept);
         Ok(Self {
             scene,
@@ -433,8 +429,7 @@ impl Layout {
     /// About what two bases take, bytes: the coverage of layers where they hide each other, and kernels as far as the plan has seen any.
     pub(crate) fn bases_bytes(&self) -> usize {
         // .9 to 1.5 times as much as this coverage was measured.
-        let coverage = if self.hides() { size_of::<f32>() * self.n_covered } else { 0 };
-        2 * (coverage + self.kernel_bytes)
+        2 * (size_of::<f32>() * self.n_covered + self.kernel_bytes)
     }
 
     /// Reads a band and images it.
@@ -575,6 +570,31 @@ fn active_cells_of(
         }
     }
     Ok(active)
+}
+
+/// Smooths weights of knots where kernels of some bands would leave seams. Keeps these kernels, which imaging needs anyway, and returns the bytes of the largest.
+fn smooth_seams(
+    tiling: &mut Tiling,
+    (film_lens, extent_mm): (&FilmLens<'_>, f64),
+    wavelengths: &[(usize, f64)],
+    length_px: usize,
+    kept: &mut Kept,
+    cancel: &Cancel,
+) -> Result<usize, Cancelled> {
+    let mut kernel_bytes = 0;
+    let mut seams = tiling.seams();
+    for &(band, wavelength_nm) in wavelengths {
+        let map = |&dioptres: &f64| film_lens.image.film_map(dioptres, wavelength_nm, extent_mm);
+        let maps: Vec<FilmMap> = film_lens.layers.dioptres().par_iter().map(map).collect();
+        let film_lens = FilmLens { maps: &maps, wavelength_nm, ..*film_lens };
+        let by_layer = Arc::new(tiling.kernels_at(&film_lens, &Work::unobserved(cancel))?);
+        tiling.add_band(&mut seams, &by_layer, cancel)?;
+        let kernels = BandKernels { by_layer };
+        kernel_bytes = kernel_bytes.max(kernels.size_bytes());
+        kept.keep(band, &kernels);
+    }
+    tiling.smooth(seams, length_px);
+    Ok(kernel_bytes)
 }
 
 /// Returns about how many pixels of the film layers cover, all layers together.
