@@ -1,6 +1,6 @@
 //! Kernels at knots of the film.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::OnceLock};
 
 use dioptric_psf::{Kernel, LensImage};
 use glam::DVec2;
@@ -190,13 +190,13 @@ impl Mirror {
     }
 
     /// Returns the first moments of a kernel of which the canonical ones are known.
-    pub(crate) fn first_moments_at_knot(self, [down, across]: [f64; 2]) -> [f64; 2] {
+    fn first_moments_at_knot(self, [down, across]: [f64; 2]) -> [f64; 2] {
         let [down, across] = if self.swaps { [-across, -down] } else { [down, across] };
         [if self.flips_rows { -down } else { down }, if self.flips_columns { -across } else { across }]
     }
 
     /// Returns the second moments of a kernel of which the canonical ones are known.
-    pub(crate) fn moments_at_knot(self, [down, mixed, across]: [f64; 3]) -> [f64; 3] {
+    fn second_moments_at_knot(self, [down, mixed, across]: [f64; 3]) -> [f64; 3] {
         let mixed = if self.flips_rows == self.flips_columns { mixed } else { -mixed };
         if self.swaps { [across, mixed, down] } else { [down, mixed, across] }
     }
@@ -249,12 +249,34 @@ impl Turned {
 #[derive(Clone, Debug)]
 pub(crate) struct LayerKernels {
     pub(crate) symmetry: Symmetry,
-    by_knot: BTreeMap<Knot, KnotKernel>,
+    by_knot: BTreeMap<Knot, Known>,
+}
+
+/// A kernel, and its moments once something has asked for them: each knot has weight in nine patches or more.
+#[derive(Clone, Debug)]
+struct Known {
+    kernel: KnotKernel,
+    moments: OnceLock<Moments>,
+}
+
+impl From<KnotKernel> for Known {
+    fn from(kernel: KnotKernel) -> Self {
+        Self { kernel, moments: OnceLock::new() }
+    }
+}
+
+/// Moments of a kernel about its middle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moments {
+    /// Down and across, pixels.
+    pub(crate) first: [f64; 2],
+    /// Down twice, down and across, across twice; square pixels.
+    pub(crate) second: [f64; 3],
 }
 
 impl LayerKernels {
     pub(crate) fn new(symmetry: Symmetry, by_knot: BTreeMap<Knot, KnotKernel>) -> Self {
-        Self { symmetry, by_knot }
+        Self { symmetry, by_knot: known(by_knot) }
     }
 
     /// The number of kernels.
@@ -264,18 +286,20 @@ impl LayerKernels {
 
     /// The bytes of memory of the kernels' samples.
     pub(crate) fn size_bytes(&self) -> usize {
-        self.by_knot.values().map(|kernel| size_of_val(kernel.samples.as_slice())).sum()
+        self.by_knot.values().map(|known| size_of_val(known.kernel.samples.as_slice())).sum()
     }
 
     /// Returns the kernels between two wavelengths.
     pub(crate) fn mixed(&self, other: &Self, fraction: f32) -> Self {
-        let mix = |(knot, kernel): (&Knot, &KnotKernel)| (*knot, kernel.mixed(&other.by_knot[knot], fraction));
+        let mix = |(knot, known): (&Knot, &Known)| {
+            (*knot, Known::from(known.kernel.mixed(&other.by_knot[knot].kernel, fraction)))
+        };
         Self { symmetry: self.symmetry, by_knot: self.by_knot.iter().map(mix).collect() }
     }
 
     /// Adds kernels of canonical knots.
     pub(crate) fn extend(&mut self, by_knot: BTreeMap<Knot, KnotKernel>) {
-        self.by_knot.extend(by_knot);
+        self.by_knot.extend(known(by_knot));
     }
 
     /// Returns the kernel at a knot anywhere on the film: that of its canonical knot, mirrored.
@@ -295,8 +319,20 @@ impl LayerKernels {
 
     /// Returns the kernel of the canonical knot of a knot.
     pub(crate) fn canonical_at(&self, knot: Knot) -> &KnotKernel {
-        &self.by_knot[&self.symmetry.canonical(knot)]
+        &self.by_knot[&self.symmetry.canonical(knot)].kernel
     }
+
+    /// Returns the moments of the kernel at a knot anywhere on the film.
+    pub(crate) fn moments_at(&self, knot: Knot) -> Moments {
+        let Known { kernel, moments } = &self.by_knot[&self.symmetry.canonical(knot)];
+        let of_kernel = || Moments { first: kernel.first_moments(), second: kernel.second_moments() };
+        let (mirror, Moments { first, second }) = (self.symmetry.mirror(knot), *moments.get_or_init(of_kernel));
+        Moments { first: mirror.first_moments_at_knot(first), second: mirror.second_moments_at_knot(second) }
+    }
+}
+
+fn known(by_knot: BTreeMap<Knot, KnotKernel>) -> BTreeMap<Knot, Known> {
+    by_knot.into_iter().map(|(knot, kernel)| (knot, kernel.into())).collect()
 }
 
 /// Returns the largest magnitude of the edge spread functions, along rows and columns, of a kernel.
@@ -533,8 +569,7 @@ mod tests {
         ] {
             let knot = Knot { right, down };
             assert_eq!(kernels.at(knot), comet(x, y), "at {right}, {down}");
-            let moments = kernels.canonical_at(knot).first_moments();
-            assert_eq!(kernels.symmetry.mirror(knot).first_moments_at_knot(moments), [-y, x], "at {right}, {down}");
+            assert_eq!(kernels.moments_at(knot).first, [-y, x], "at {right}, {down}");
         }
         let both = [(64, comet(2.0, 1.0)), (-64, comet(1.0, 0.0))].map(|(right, k)| (Knot { right, down: 9 }, k));
         let kernels = LayerKernels::new(Symmetry::None, BTreeMap::from(both.clone()));

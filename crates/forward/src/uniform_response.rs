@@ -1,8 +1,8 @@
 //! What kernels that change over the film make of a uniform plane.
 
 use crate::{
-    knot_kernels::LayerKernels,
-    patch::{Knot, ONE, Patch, Products, Shares},
+    knot_kernels::{LayerKernels, Moments},
+    patch::{ONE, Patch, Products, Shares},
 };
 
 /// Returns the irradiance of a uniform plane of 1 under the kernels over a patch, to their second moments (docs/forward.md, eq. 5): of all knots, those
@@ -35,7 +35,7 @@ impl UniformResponse {
     /// Adds knots with kernels on a raster on which the cell has a size.
     fn add(&mut self, kernels: &LayerKernels, shares: &Shares, size: f64) {
         for (knot, shares) in shares {
-            let (first, [down, mixed, across]) = moments(kernels, *knot);
+            let Moments { first, second: [down, mixed, across] } = kernels.moments_at(*knot);
             let second = f64::from(shares[6]) * down + f64::from(shares[4]) * mixed + f64::from(shares[2]) * across;
             self.excess += second / (size * size);
             for (i, share) in shares.iter().enumerate() {
@@ -60,12 +60,6 @@ impl UniformResponse {
     }
 }
 
-/// Returns the first and second moments of the kernel at a knot.
-fn moments(kernels: &LayerKernels, knot: Knot) -> ([f64; 2], [f64; 3]) {
-    let (kernel, mirror) = (kernels.canonical_at(knot), kernels.symmetry.mirror(knot));
-    (mirror.first_moments_at_knot(kernel.first_moments()), mirror.moments_at_knot(kernel.second_moments()))
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::{BTreeMap, BTreeSet};
@@ -74,7 +68,7 @@ mod tests {
     use crate::{
         knot_kernels::{KnotKernel, Symmetry},
         mesh::Mesh,
-        patch::{Cell, polynomials, value_of},
+        patch::{Cell, Knot, polynomials, value_of},
     };
 
     /// Kernels that move by a hundredth of a pixel each pixel to the right, and twice that down: a plane is that much darker.
