@@ -368,15 +368,22 @@ pub(crate) fn corner_spread_exceeds(kernel: &[f32], width: usize, limit: f64) ->
     most > limit && corner_spread_peaks(kernel, width).any(|peak| peak > limit)
 }
 
-/// The largest magnitudes of the corner spread function of a kernel, line by line.
+/// The largest magnitudes of the corner spread function of a kernel, in eight lines after the other: sums along them do not wait for each other.
 fn corner_spread_peaks(kernel: &[f32], width: usize) -> impl Iterator<Item = f64> {
+    const LINES: usize = 8;
     let mut above = vec![0.0_f64; width];
-    kernel.chunks_exact(width).map(move |line| {
-        let (mut left, mut peak) = (0.0, 0.0_f64);
-        for (corner, &value) in above.iter_mut().zip(line) {
-            left += f64::from(value);
-            *corner += left;
-            peak = peak.max(corner.abs());
+    kernel.chunks(LINES * width).map(move |lines| {
+        // Where there are fewer the last one stands for those that lack, and is not counted.
+        let n_lines = lines.len() / width;
+        let line_at = |i: usize| &lines[i.min(n_lines - 1) * width..][..width];
+        let line: [&[f32]; LINES] = std::array::from_fn(line_at);
+        let (mut left, mut peak) = ([0.0; LINES], 0.0_f64);
+        for (column, corner) in above.iter_mut().enumerate() {
+            left.iter_mut().zip(line).for_each(|(left, line)| *left += f64::from(line[column]));
+            for left in &left[..n_lines] {
+                *corner += left;
+                peak = peak.max(corner.abs());
+            }
         }
         peak
     })

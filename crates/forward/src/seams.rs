@@ -47,16 +47,23 @@ impl Seams {
             Ok(patch.elsewhere.is_empty().then(|| Bend::of(patch, kernels)))
         };
         let bends: Vec<Option<Bend>> = patches.par_iter().map(bend).collect::<Result<_, Cancelled>>()?;
-        let step_at = |number: usize| {
+        // Each side once, for the patches on both.
+        let steps_from = |number: usize| -> Vec<(usize, f64)> {
             let step_to = |&other: &u32| {
                 let other = other as usize;
-                let side = Side::between(&patches[number].cell, &patches[other].cell)?;
-                Some(bends[number].as_ref()?.step_to(bends[other].as_ref()?, side))
+                let side = Side::between(&patches[number].cell, &patches[other].cell).filter(|_| other > number)?;
+                Some((other, bends[number].as_ref()?.step_to(bends[other].as_ref()?, side)))
             };
-            self.neighbors.of_patch(number).iter().filter_map(step_to).fold(0.0, f64::max)
+            self.neighbors.of_patch(number).iter().filter_map(step_to).collect()
         };
-        let steps: Vec<f64> = (0..patches.len()).into_par_iter().map(step_at).collect();
-        self.largest_step.iter_mut().zip(steps).for_each(|(largest, step)| *largest = step.max(*largest));
+        let steps: Vec<Vec<(usize, f64)>> = (0..patches.len()).into_par_iter().map(steps_from).collect();
+        for (number, (other, step)) in
+            steps.iter().enumerate().flat_map(|(i, steps)| steps.iter().map(move |s| (i, *s)))
+        {
+            for patch in [number, other] {
+                self.largest_step[patch] = step.max(self.largest_step[patch]);
+            }
+        }
         for (largest, bend) in self.largest_bend.iter_mut().zip(&bends) {
             *largest = bend.as_ref().map_or(0.0, Bend::peak).max(*largest);
         }
