@@ -352,7 +352,7 @@ mod tests {
         let mut probe = Probe::new((&film_lens, 0), &settings, &wavelengths_nm);
         assert_eq!(probe.factor_at(knot), 4);
         let expected = kernels_on(4)[&knot].width;
-        // By the spread of the point, and by a kernel on the film's pixels.
+        // By the spread of the point, which holds 95 % of its light, and by a kernel on the film's pixels, whose border of a sample on each side is narrower.
         let by_spread = probe.width_of(vec![knot], 4);
         probe.kernels.insert(1, LayerKernels::new(probe.symmetry, kernels_on(1)));
         let by_other = probe.width_of(vec![knot], 4);
