@@ -46,6 +46,7 @@ fn main() {
                         plane_mm,
                         columns,
                         pitch_um,
+                        aside_mm: 0.0,
                         diffraction,
                         bands_nm,
                         is_adaptive: true,

@@ -65,6 +65,17 @@ impl Mesh {
         })
     }
 
+    /// Returns the weights of knots in the kernel at a place in a cell that is whole, with its edges.
+    pub(crate) fn at_place(&self, cell: &Cell, place: Knot) -> Weights {
+        let weights = |place: i32, cell: i32, size: usize| {
+            let u = f64::from(place) / size as f64 - f64::from(cell) - 0.5;
+            [0.5 * (0.5 - u).powi(2), 0.75 - u * u, 0.5 * (0.5 + u).powi(2)]
+        };
+        let (down, across) = (weights(place.down, cell.down, cell.size), weights(place.right, cell.across, cell.size));
+        let terms = around(cell).map(|(cell, [i, j])| (cell, down[i] * across[j]));
+        self.sum(terms.filter(|(_, weight)| *weight != 0.0))
+    }
+
     /// Whether knots were added whose weight is not zero all over a cell, so that it is no polynomial.
     fn is_divided(&self, cell: &Cell) -> bool {
         let quarter = cell.children()[0];
@@ -150,6 +161,21 @@ mod tests {
         let area: usize = pieces.iter().map(|(cell, _)| cell.size.pow(2)).sum();
         assert_eq!(area, 25 * 64 * 64);
         assert_eq!(pieces.iter().map(|(cell, _)| cell.size).min(), Some(16));
+    }
+
+    #[test]
+    fn places_of_a_cell_are_its_middle_and_its_corners() {
+        let (mesh, _) = mesh();
+        for cell in [Cell { down: 0, across: 1, size: 64 }, Cell { down: -1, across: 0, size: 32 }] {
+            let near = |a: &Weights, b: &Weights| {
+                let knots: BTreeSet<Knot> = a.keys().chain(b.keys()).copied().collect();
+                let weight = |weights: &Weights, knot| weights.get(&knot).copied().unwrap_or(0.0);
+                knots.into_iter().all(|knot| (weight(a, knot) - weight(b, knot)).abs() < 1e-12)
+            };
+            assert!(near(&mesh.at_place(&cell, cell.knot()), &mesh.at_middle(&cell)));
+            let corners = cell.corners().into_iter().zip(mesh.at_corners(&cell));
+            assert!(corners.into_iter().all(|(corner, weights)| near(&mesh.at_place(&cell, corner), &weights)));
+        }
     }
 
     /// A plane is reproduced exactly, whatever the sizes of the cells.

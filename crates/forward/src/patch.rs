@@ -15,6 +15,12 @@ pub(crate) struct Knot {
 }
 
 impl Knot {
+    /// Returns the knot nearest to a place of the film, mm from its middle, to the right and upwards.
+    pub(crate) fn nearest(place_mm: DVec2, pitch_mm: f64) -> Self {
+        let place = (place_mm / pitch_mm).round();
+        Self { right: place.x as i32, down: -place.y as i32 }
+    }
+
     /// Returns the field at the knot, of pixels of the film.
     pub(crate) fn field_tan(self, map: &FilmMap, pitch_mm: f64) -> DVec2 {
         map.field_tan(DVec2::new(f64::from(self.right), -f64::from(self.down)) * pitch_mm)
@@ -47,6 +53,13 @@ impl Cell {
             Knot { right: (self.across + across) * size, down: (self.down + down) * size }
         };
         [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)]
+    }
+
+    /// Whether a place is in it or on its edges.
+    pub(crate) fn holds(&self, place: Knot) -> bool {
+        let size = self.size as i32;
+        let is_along = |cell: i32, place: i32| (cell * size..=(cell + 1) * size).contains(&place);
+        is_along(self.down, place.down) && is_along(self.across, place.right)
     }
 
     /// Returns the cell so many places below and to the right.

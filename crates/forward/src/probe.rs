@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use dioptric_psf::FilmMap;
 use dioptric_spectrum::Cancelled;
 use rayon::prelude::*;
 
@@ -27,6 +28,9 @@ pub(crate) struct Probe<'a> {
     /// Wavelengths over which a blur is at its widest, nm.
     wavelengths_nm: &'a [f64],
     symmetry: Symmetry,
+    /// The axis of the lens, where the layer's map has one. Where the pupil is cut off from the smallest fields on, on opposite sides of the axis, kernels change with the
+    /// magnitude of the field there: the spline of cells that are large beside the blur rounds that off, and the middles of cells do not show it.
+    axis: Option<Knot>,
     /// The spread of a point at canonical knots, pixels of the film.
     spreads_px: BTreeMap<Knot, f64>,
     /// Those computed so far, by the factor of the raster.
@@ -40,7 +44,20 @@ impl<'a> Probe<'a> {
         wavelengths_nm: &'a [f64],
     ) -> Self {
         let symmetry = Symmetry::of(lens.image);
-        Self { lens, layer, settings, wavelengths_nm, symmetry, spreads_px: BTreeMap::new(), kernels: BTreeMap::new() }
+        let axis = match &lens.maps[layer] {
+            FilmMap::Radial(map) => Some(Knot::nearest(map.axis_mm(), 1e-3 * lens.film.pitch_um)),
+            FilmMap::Plane(_) | FilmMap::Shifted(_) => None,
+        };
+        Self {
+            lens,
+            layer,
+            settings,
+            wavelengths_nm,
+            symmetry,
+            axis,
+            spreads_px: BTreeMap::new(),
+            kernels: BTreeMap::new(),
+        }
     }
 
     /// Which knots have kernels that follow from each other.
@@ -122,7 +139,9 @@ impl<'a> Probe<'a> {
             } else if may_divide {
                 let splines = splines.entry(coarsest).or_default();
                 splines.push((cell, cell.knot(), weights));
-                splines.extend(at_axis(mesh, &cell).map(|weights| (cell, AXIS, weights)));
+                // The axis in its middle is looked at as it is.
+                let axis = self.axis.filter(|axis| cell.holds(*axis) && *axis != cell.knot());
+                splines.extend(axis.map(|axis| (cell, axis, mesh.at_place(&cell, axis))));
             }
         }
         let (mut shadings, mut on_axis) = (BTreeMap::new(), BTreeMap::new());
@@ -134,7 +153,7 @@ impl<'a> Probe<'a> {
                 // What cells of another size, or other moments, do to a plane spans two of them at least.
                 let left = what_blur_leaves(self.spread_px(cell.knot()) / (2 * cell.size) as f64);
                 let shading = shading.times(left);
-                let shadings = if knot == AXIS { &mut on_axis } else { &mut shadings };
+                let shadings = if knot == cell.knot() { &mut shadings } else { &mut on_axis };
                 shadings.insert(cell, shading);
             }
         }
@@ -206,16 +225,6 @@ impl<'a> Probe<'a> {
         let widest_px = knots.iter().filter_map(spread_px).fold(0.0, |widest: f64, spread| widest.max(*spread));
         2 * (widest_px / factor as f64).ceil() as usize + 1
     }
-}
-
-/// The axis, on which four cells have a corner. Where the pupil is cut off from the smallest fields on, on opposite sides of the axis, kernels change with the
-/// magnitude of the field there: the spline of cells that are large beside the blur rounds that off, and the middles of cells do not show it.
-const AXIS: Knot = Knot { right: 0, down: 0 };
-
-/// Returns the weights of knots on the axis, of a cell with a corner there.
-fn at_axis(mesh: &Mesh, cell: &Cell) -> Option<Weights> {
-    let corner = cell.corners().iter().position(|corner| *corner == AXIS)?;
-    Some(mesh.at_corners(cell)[corner].clone())
 }
 
 /// Returns the kernel at a knot less that of a spline.

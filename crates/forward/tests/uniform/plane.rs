@@ -23,6 +23,8 @@ pub(crate) struct Case {
     pub(crate) plane_mm: f64,
     pub(crate) columns: usize,
     pub(crate) pitch_um: f64,
+    /// How far to the right of the axis the middle of the film lies.
+    pub(crate) aside_mm: f64,
     pub(crate) diffraction: Diffraction,
     /// With [`WAVELENGTH_NM`] in the middle.
     pub(crate) bands_nm: &'static [f64],
@@ -45,7 +47,8 @@ impl Uniform {
     pub(crate) fn new(case: &Case) -> Self {
         let lens = Lens::built_in(case.lens).unwrap().with_f_number(case.f_number, WAVELENGTH_NM).unwrap();
         let mono = lens.at(WAVELENGTH_NM).unwrap();
-        let film = Film::centered(48, case.columns, case.pitch_um);
+        let center_mm = DVec2::X * case.aside_mm;
+        let film = Film { center_mm, ..Film::centered(48, case.columns, case.pitch_um) };
         let grid = WavelengthGrid::new(case.bands_nm.to_vec()).unwrap();
         let plane_m = 1e-3 * (case.plane_mm + mono.projection_center_z_mm());
         let film_distance_mm = mono.film_distance_mm_for(case.focus_mm).unwrap();
@@ -98,7 +101,7 @@ impl Uniform {
         let row = self.film.rows / 2;
         let differences = (8..self.film.columns).step_by((self.film.columns - 16) / 13).map(|column| {
             let (x, y) = (column as f64 + 0.5 - 0.5 * self.film.columns as f64, -0.5);
-            let place_mm = 1e-3 * self.film.pitch_um * DVec2::new(x, y);
+            let place_mm = self.film.center_mm + 1e-3 * self.film.pitch_um * DVec2::new(x, y);
             (
                 f64::from(self.pictures[self.bands_nm.len() / 2][(row, column)]) / self.solid_angle(place_mm) - 1.0,
                 place_mm.length(),
