@@ -62,15 +62,9 @@ pub(crate) struct BasisBetween {
 }
 
 impl BasisBetween {
-    pub(crate) fn new(lower: &BandBasis, upper: &BandBasis, fraction: f32) -> Self {
-        let kernels = lower.kernels.mixed(&upper.kernels, fraction);
+    /// Returns the basis with these kernels a fraction of the way from one band to another.
+    pub(crate) fn new(kernels: BandKernels, [lower, upper]: [&BandBasis; 2], fraction: f32) -> Self {
         Self { kernels, lower: lower.alpha.clone(), upper: upper.alpha.clone(), fraction }
-    }
-
-    /// Returns that of a band between two, or of one of them.
-    pub(crate) fn at(band: usize, [lower_band, upper_band]: [usize; 2], lower: &BandBasis, upper: &BandBasis) -> Self {
-        let fraction = (band - lower_band) as f32 / (upper_band - lower_band).max(1) as f32;
-        Self::new(lower, upper, fraction)
     }
 
     /// The alpha of a layer, where layers hide each other.

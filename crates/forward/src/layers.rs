@@ -86,17 +86,29 @@ impl Layers {
     /// Returns the bands at which PSFs are computed: first, last, and enough between them that the blur radius changes
     /// by at most `step_px` from one to the next, all over the film and the depths.
     pub(crate) fn chromatic_knots(&self, step_px: f64, lens: &Blurs<'_>) -> Vec<usize> {
+        self.bands_by_blur(|_| step_px, lens)
+    }
+
+    /// Returns the bands at which the coverage of layers is computed, as far as blur tells: those of [`chromatic_knots`](Self::chromatic_knots) where it is small, and
+    /// where it is wide those between which it changes by as small a part of it as from layer to layer. A step of 0 asks for all bands.
+    pub(crate) fn coverage_knots(&self, step_px: f64, lens: &Blurs<'_>) -> Vec<usize> {
+        let of_radius = if step_px > 0.0 { STEP_OF_RADIUS } else { 0.0 };
+        self.bands_by_blur(|radius_px| step_px.max(of_radius * radius_px), lens)
+    }
+
+    /// Returns first and last band, and enough between them that blur radii change by at most a step from one to the next.
+    fn bands_by_blur(&self, step_at_radius: impl Fn(f64) -> f64, lens: &Blurs<'_>) -> Vec<usize> {
         let ends = [self.dioptres[0], self.dioptres[self.len() - 1]];
         let blurs = |band: usize| -> Vec<f64> {
             lens.samples(band).flat_map(|sample| ends.map(|d| lens.blur_px(sample, d))).collect()
         };
         let all: Vec<Vec<f64>> = (0..lens.wavelengths_nm.len()).map(blurs).collect();
-        let change = |a: usize, b: usize| all[a].iter().zip(&all[b]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let is_far = |(a, b): (&f64, &f64)| (a - b).abs() > step_at_radius(a.abs().max(b.abs()));
         let mut knots = vec![0];
         for band in 1..all.len() {
             let last = knots[knots.len() - 1];
             // A blur may come back to what it was, so every band on the way counts.
-            if band - last > 1 && (last + 1..=band).any(|between| change(last, between) > step_px) {
+            if band - last > 1 && (last + 1..=band).any(|between| all[last].iter().zip(&all[between]).any(is_far)) {
                 knots.push(band - 1);
             }
         }
@@ -212,6 +224,9 @@ mod tests {
         // 0.02 pixels a band: 12 bands make 0.24 pixels.
         assert_eq!(layers.chromatic_knots(0.25, &lens), [0, 12, 24, 30]);
         assert_eq!(layers.chromatic_knots(0.0, &lens), (0..31).collect::<Vec<_>>());
+        // Of the narrower blur, of 2.3 to 1.7 pixels, 6 % are six bands at first and five at last.
+        assert_eq!(layers.coverage_knots(0.01, &lens), [0, 6, 12, 18, 23, 28, 30]);
+        assert_eq!(layers.coverage_knots(0.25, &lens), [0, 12, 24, 30]);
     }
 
     #[test]

@@ -44,8 +44,8 @@ const IN_FLIGHT_BYTES: usize = 256 << 20;
 pub(crate) struct SceneLayers {
     pub(crate) layers: Layers,
     /// The bands at which PSFs are computed; between them they are interpolated.
-    kernel_bands: Vec<usize>,
-    /// Those and more, at which the alpha of layers is computed: interpolated between them as well.
+    pub(crate) kernel_bands: Vec<usize>,
+    /// Those at which the alpha of layers is computed: interpolated between them as well. Others than those of kernels, where points move, and fewer, where blur is wide.
     pub(crate) basis_bands: Vec<usize>,
     layer_coordinates: LayerCoordinates,
     pub(crate) occluded: OccludedSamples,
@@ -80,7 +80,9 @@ impl SceneLayers {
         let extent_mm = extent_of(&radii_px(&layers), film, settings);
         let basis_bands = match hides(settings, &layers) {
             true => {
-                LateralColor { lens, film, grid, extent_mm }.knots(&kernel_bands, dioptres, settings.coverage_step_px)
+                let by_blur = layers.coverage_knots(settings.chromatic_step_px, &blurs);
+                let of_kernels = with_others_beside(&kernel_bands, &by_blur);
+                LateralColor { lens, film, grid, extent_mm }.knots(&of_kernels, dioptres, settings.coverage_step_px)
             }
             false => kernel_bands.clone(),
         };
@@ -139,6 +141,14 @@ pub(crate) struct Layout {
     pub(crate) stopwatch: Stopwatch,
     /// Bytes that bands in flight may take; `None` for the usual ones, and as many bands as there are threads (up to four) at least.
     pub(crate) in_flight_bytes: Option<usize>,
+}
+
+/// Returns those of the bands at which kernels are computed at which coverage has to be: where blur asks for it, and all beside which kernels are interpolated, so that those
+/// between two bases are theirs.
+fn with_others_beside(kernel_bands: &[usize], by_blur: &[usize]) -> Vec<usize> {
+    let is_in = |bands: &[usize], band: usize| bands.binary_search(&band).is_ok();
+    let is_amid = |band: usize| band > 0 && is_in(kernel_bands, band - 1) && is_in(kernel_bands, band + 1);
+    kernel_bands.iter().copied().filter(|&band| !is_amid(band) || is_in(by_blur, band)).collect()
 }
 
 /// Returns the blur radius of each layer, pixels of the film.
@@ -335,12 +345,30 @@ impl Layout {
     ) -> Result<BasisBetween, Cancelled> {
         let above = self.scene.basis_bands.partition_point(|&knot| knot < band);
         let (upper, lower) = (self.scene.basis_bands[above], self.scene.basis_bands[above.saturating_sub(1)]);
-        if upper == band {
-            let basis = self.basis(lens, band, work)?;
-            return Ok(BasisBetween::new(&basis, &basis, 0.0));
-        }
-        let fraction = (band - lower) as f32 / (upper - lower) as f32;
-        Ok(BasisBetween::new(&self.basis(lens, lower, work)?, &self.basis(lens, upper, work)?, fraction))
+        let upper_basis = self.basis(lens, upper, work)?;
+        let lower_basis = if upper == band { upper_basis.clone() } else { self.basis(lens, lower, work)? };
+        self.between(lens, (band, [lower, upper]), [&lower_basis, &upper_basis], work)
+    }
+
+    /// Returns the basis of a band between two, or of one of them; its kernels are its own where kernels are computed at bands between.
+    pub(crate) fn between(
+        &self,
+        lens: &dyn LensImage,
+        (band, pair): (usize, [usize; 2]),
+        [lower, upper]: [&BandBasis; 2],
+        work: &Work<'_>,
+    ) -> Result<BasisBetween, Cancelled> {
+        let fraction = (band - pair[0]) as f32 / (pair[1] - pair[0]).max(1) as f32;
+        let kernels = match self.has_kernels_within(pair) && !pair.contains(&band) {
+            true => self.kernels(lens, band, work)?,
+            false => lower.kernels.mixed(&upper.kernels, fraction),
+        };
+        Ok(BasisBetween::new(kernels, [lower, upper], fraction))
+    }
+
+    /// Whether kernels are computed at bands between two.
+    fn has_kernels_within(&self, [lower, upper]: [usize; 2]) -> bool {
+        self.scene.kernel_bands.iter().any(|band| (lower + 1..upper).contains(band))
     }
 
     /// Returns the basis of a band at which it is computed.
@@ -412,10 +440,16 @@ impl Layout {
     pub(crate) fn bands_at_once(&self, bases: [&BandBasis; 2]) -> usize {
         let threads = rayon::current_num_threads();
         let Some(limit) = self.in_flight_bytes else {
-            return (IN_FLIGHT_BYTES / self.band_bytes().max(1)).clamp(threads.min(4), 4 * threads);
+            let own_kernels = if self.has_bands_with_own_kernels() { bases[0].kernels.size_bytes() } else { 0 };
+            return (IN_FLIGHT_BYTES / (self.band_bytes() + own_kernels).max(1)).clamp(threads.min(4), 4 * threads);
         };
         let left = limit.saturating_sub(bases.map(BandBasis::size_bytes).iter().sum());
         (left / (self.band_bytes() + bases[0].kernels.size_bytes()).max(1)).clamp(1, 4 * threads)
+    }
+
+    /// Whether kernels are computed at bands between those at which the coverage of layers is.
+    fn has_bands_with_own_kernels(&self) -> bool {
+        self.scene.basis_bands.windows(2).any(|pair| self.has_kernels_within([pair[0], pair[1]]))
     }
 
     /// What a band takes while it is imaged, bytes: planes of the film, or of the scene where that is larger.

@@ -48,7 +48,7 @@ use crate::{
 /// ```
 pub struct ImagingPlan {
     lens: Arc<dyn LensImage + Send>,
-    views: Views,
+    pub(crate) views: Views,
 }
 
 impl std::fmt::Debug for ImagingPlan {

@@ -14,12 +14,7 @@ use dioptric_psf::LensImage;
 use ndarray::Array2;
 use rayon::{Scope, prelude::*};
 
-use crate::{
-    ForwardError, SceneRadiance,
-    basis::{BandBasis, BasisBetween},
-    layout::Layout,
-    work::Work,
-};
+use crate::{ForwardError, SceneRadiance, basis::BandBasis, layout::Layout, work::Work};
 
 /// Receives bands in their order.
 pub(crate) type HandOn<'a> = dyn FnMut(usize, Array2<f32>) -> Result<(), ForwardError> + 'a;
@@ -67,7 +62,7 @@ impl Task<'_> {
             let upper = if pair[1] == pair[0] { lower.clone() } else { layout.basis(lens, pair[1], work)? };
             for group in bands.chunks(layout.bands_at_once([&lower, &upper])) {
                 let image = |&band: &usize| {
-                    let basis = BasisBetween::at(band, pair, &lower, &upper);
+                    let basis = layout.between(lens, (band, pair), [&lower, &upper], work)?;
                     layout.image_of(lens, band, &basis, radiance, work).map(|picture| (band, picture))
                 };
                 let pictures: Vec<(usize, Array2<f32>)> = group.par_iter().map(image).collect::<Result<_, _>>()?;
@@ -229,7 +224,7 @@ impl<'a> Stream<'a> {
                 Ok(None)
             }
             Step::Image { number, band, pair, bases } => {
-                let basis = BasisBetween::at(band, pair, &bases[0], &bases[1]);
+                let basis = layout.between(lens, (band, pair), [&bases[0], &bases[1]], work)?;
                 let picture = layout.image_of(lens, band, &basis, radiance, work)?;
                 self.state().n_done += 1;
                 Ok(Some((number, picture)))

@@ -9,7 +9,6 @@ use rayon::prelude::*;
 
 use crate::{
     BandRadiance, BlurMode, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
-    basis::BasisBetween,
     layout::{KEPT_BUDGET_BYTES, Layout, SceneLayers},
     stream::HandOn,
     work::{Progress, Watch, Work},
@@ -138,7 +137,7 @@ impl Views {
                     let pictures: Vec<Result<Array2<f32>, ForwardError>> = group
                         .par_iter()
                         .map(|&band| {
-                            let basis = BasisBetween::at(band, pair, &lower, &upper);
+                            let basis = layout.between(lens, (band, pair), [&lower, &upper], work)?;
                             layout.image_of(lens, band, &basis, radiance, work)
                         })
                         .collect();
