@@ -13,6 +13,7 @@ use crate::{
     convolve::{STRIP_COLUMNS, STRIP_ROWS, Strip, fast_size, multiply_add, with_fft},
     expansion::Expansion,
     knot_kernels::{KnotKernel, LayerKernels},
+    level::Level,
     occlusion::BlurredPlane,
     patch::{Knot, Patch, Products, value_of},
     patch_samples::{BlurredCell, PatchSamples, Places},
@@ -36,6 +37,8 @@ pub(crate) struct LayerTask<'a> {
     pub(crate) blocks: &'a BlockLayers,
     pub(crate) patches: &'a [Patch],
     pub(crate) kernels: &'a LayerKernels,
+    /// A factor of alpha.
+    pub(crate) level: Option<&'a Level>,
     pub(crate) film_rows: usize,
     pub(crate) film_columns: usize,
     /// Length that the weights of knots are smoothed over, pixels.
@@ -101,6 +104,18 @@ impl LayerTask<'_> {
         self.surfaces.iter().all(|surface| surface.radiance.is_none())
     }
 
+    /// Multiplies the alpha of a rectangle by what levels it.
+    fn level_by(&self, level: &Level, source: &Rectangle, alpha: &mut [f32]) {
+        let frame = &self.sampler.frame;
+        let ((center_row, center_column), factor) = (frame.center(), frame.factor() as f64);
+        for (line, row) in alpha.chunks_exact_mut(source.columns).zip(source.first_row..) {
+            let down_px = factor * (row as f64 - center_row);
+            for (alpha, column) in line.iter_mut().zip(source.first_column..).filter(|(alpha, _)| **alpha != 0.0) {
+                *alpha *= level.at(factor * (column as f64 - center_column), down_px);
+            }
+        }
+    }
+
     fn response_of(&self, patch: &Patch) -> Products {
         uniform_response(self.kernels, patch, self.sampler.frame.factor())
     }
@@ -134,6 +149,9 @@ fn blur_patch<'a>(
     let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, task.blocks, cancel);
     let Some(mut ideal) = task.stopwatch.time(Part::Sampling, sample)? else { return Ok(Spread::Nothing) };
     let places = Places::new(patch, &source, task.sampler);
+    if let (true, Some(level)) = (task.is_alpha(), task.level) {
+        task.level_by(level, &source, &mut ideal);
+    }
     if task.is_alpha() && patch.around.is_none() {
         // What a surface covers is 1 all over it, however its kernels change.
         let response = task.response_of(patch);

@@ -27,7 +27,8 @@ pub(crate) struct FilmLens<'a> {
 }
 
 impl FilmLens<'_> {
-    fn kernel(&self, layer: usize, knot: Knot, factor: usize) -> KnotKernel {
+    /// Returns the kernel at a knot of a layer, on pixels so many times as wide as the film's.
+    pub(crate) fn kernel(&self, layer: usize, knot: Knot, factor: usize) -> KnotKernel {
         let field_tan = knot.field_tan(&self.maps[layer], 1e-3 * self.film.pitch_um);
         let pitch_um = factor as f64 * self.film.pitch_um;
         let query = PsfQuery::new(field_tan, self.layers.dioptres()[layer], self.wavelength_nm, pitch_um);

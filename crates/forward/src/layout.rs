@@ -2,7 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
 };
 
 use dioptric_psf::{FilmMap, LensImage};
@@ -22,6 +22,7 @@ use crate::{
     geometry::{FilmFrame, check_extent},
     lateral_color::LateralColor,
     layers::{Blurs, Layers},
+    level::Level,
     mixed::MixedSamples,
     narrow::NarrowRule,
     occluded::{Distances, OccludedSamples},
@@ -138,6 +139,8 @@ pub(crate) struct Layout {
     n_covered: usize,
     /// Of each band that was asked for, those of all layers.
     maps: Mutex<BTreeMap<usize, Arc<Vec<FilmMap>>>>,
+    /// Of the layers in some bands, once anything was asked for.
+    levels: OnceLock<BTreeMap<usize, Vec<Option<Level>>>>,
     pub(crate) stopwatch: Stopwatch,
     /// Bytes that bands in flight may take; `None` for the usual ones, and as many bands as there are threads (up to four) at least.
     pub(crate) in_flight_bytes: Option<usize>,
@@ -243,6 +246,7 @@ impl Layout {
             kernel_bytes,
             n_covered,
             maps: Mutex::default(),
+            levels: OnceLock::new(),
             stopwatch,
             in_flight_bytes: None,
             spec,
@@ -321,19 +325,22 @@ impl Layout {
             return Ok(kernels.clone());
         }
         let maps = self.maps_at(lens, band);
-        let wavelength_nm = self.spec.grid.centers_nm()[band];
-        let film_lens = FilmLens {
-            image: lens,
-            film: &self.spec.film,
-            layers: &self.scene.layers,
-            maps: &maps,
-            wavelength_nm,
-            stopwatch: &self.stopwatch,
-        };
-        let by_layer = self.tiling.kernels_at(&film_lens, work)?;
+        let by_layer = self.tiling.kernels_at(&self.film_lens(lens, band, &maps), work)?;
         let kernels = BandKernels { by_layer: Arc::new(by_layer) };
         self.kept().keep(band, &kernels);
         Ok(kernels)
+    }
+
+    /// The lens in a band, of which these are the maps.
+    fn film_lens<'a>(&'a self, image: &'a dyn LensImage, band: usize, maps: &'a [FilmMap]) -> FilmLens<'a> {
+        FilmLens {
+            image,
+            film: &self.spec.film,
+            layers: &self.scene.layers,
+            maps,
+            wavelength_nm: self.spec.grid.centers_nm()[band],
+            stopwatch: &self.stopwatch,
+        }
     }
 
     /// Returns the basis of a band between the two around it at which they are computed.
@@ -405,12 +412,44 @@ impl Layout {
             .map(|depths| depths.surface(None))
             .collect();
         let maps = self.maps_at(lens, band);
+        let levels = self.levels_at(lens, band, work)?;
         let covered = |layer: usize| {
             let mut blurred = self.blank();
-            self.blur_onto_film(layer, &maps[layer], &surfaces, kernels, &mut blurred, work)?;
+            let surfaces = (surfaces.as_slice(), levels[layer].as_ref());
+            self.blur_onto_film((layer, &maps[layer]), surfaces, kernels, &mut blurred, work)?;
             Ok(blurred.into_alpha())
         };
         (0..self.scene.layers.len()).into_par_iter().map(covered).collect()
+    }
+
+    /// Returns what levels the alpha of each layer in a band: between a few bands, over which it changes little.
+    fn levels_at(&self, lens: &dyn LensImage, band: usize, work: &Work<'_>) -> Result<Vec<Option<Level>>, Cancelled> {
+        let levels = match self.levels.get() {
+            Some(levels) => levels,
+            None => {
+                let bases = &self.scene.basis_bands;
+                let bands = BTreeSet::from([0, bases.len() / 2, bases.len() - 1].map(|number| bases[number]));
+                let at = |band: usize| {
+                    let maps = self.maps_at(lens, band);
+                    let film_lens = self.film_lens(lens, band, &maps);
+                    let of =
+                        |layer: usize| Level::of(&film_lens, layer, self.scene.layers.radius_px_at(layer as f32), work);
+                    let levels = (0..self.scene.layers.len()).into_par_iter().map(of);
+                    Ok((band, levels.collect::<Result<_, Cancelled>>()?))
+                };
+                let levels: BTreeMap<usize, Vec<Option<Level>>> =
+                    bands.into_iter().map(at).collect::<Result<_, Cancelled>>()?;
+                self.levels.get_or_init(|| levels)
+            }
+        };
+        let (Some((lower, below)), Some((upper, above))) =
+            (levels.range(..=band).next_back(), levels.range(band..).next())
+        else {
+            return Ok(vec![None; self.scene.layers.len()]);
+        };
+        let fraction = (band - lower) as f64 / (upper - lower).max(1) as f64;
+        let pairs = below.iter().zip(above);
+        Ok(pairs.map(|(below, above)| Level::between(below.as_ref(), above.as_ref(), fraction)).collect())
     }
 
     /// Returns the units of work of all bands from `first` on; with `alone`, a basis is computed again for each pair of bands that it is an end of.
@@ -504,12 +543,12 @@ impl Layout {
         let Film { rows, columns, .. } = self.spec.film;
         let mut blurred = self.blank();
         if let ([map], false) = (maps.as_slice(), self.hides()) {
-            self.blur_onto_film(0, map, &surfaces, &basis.kernels, &mut blurred, work)?;
+            self.blur_onto_film((0, map), (&surfaces, None), &basis.kernels, &mut blurred, work)?;
             return Ok(self.stopwatch.time(Part::Compositing, || blurred.into_picture()));
         }
         let mut picture = Composite::new(rows, columns);
         for (layer, map) in maps.iter().enumerate() {
-            self.blur_onto_film(layer, map, &surfaces, &basis.kernels, &mut blurred, work)?;
+            self.blur_onto_film((layer, map), (&surfaces, None), &basis.kernels, &mut blurred, work)?;
             self.stopwatch.time(Part::Compositing, || {
                 if let Some(alpha) = basis.alpha(layer) {
                     return picture.composite_under(&mut blurred, alpha, work.cancel());
@@ -528,12 +567,11 @@ impl Layout {
         BlurredPlane::new(rows, columns)
     }
 
-    /// Adds the light of a layer, or its alpha where the surfaces have no radiance, blurred, to a plane of the film.
+    /// Adds the light of a layer, or its alpha, levelled, where the surfaces have no radiance, blurred, to a plane of the film.
     fn blur_onto_film(
         &self,
-        layer: usize,
-        map: &FilmMap,
-        surfaces: &[Surface<'_>],
+        (layer, map): (usize, &FilmMap),
+        (surfaces, level): (&[Surface<'_>], Option<&Level>),
         kernels: &BandKernels,
         blurred: &mut BlurredPlane,
         work: &Work<'_>,
@@ -548,6 +586,7 @@ impl Layout {
                 blocks: &self.blocks[factor],
                 patches,
                 kernels: &kernels.by_layer[layer],
+                level,
                 film_rows: film.rows,
                 film_columns: film.columns,
                 smoothing_px: self.tiling.layers[layer].smoothing_px,

@@ -34,6 +34,7 @@ mod knot_kernels;
 mod lateral_color;
 mod layers;
 mod layout;
+mod level;
 mod mesh;
 mod mixed;
 mod narrow;

@@ -139,8 +139,9 @@ fn bands_between_bases_have_their_own_kernels() {
         let own = scene.band(&every_band, band);
         let mean = own.mean().unwrap();
         let worst = own.iter().zip(rendered).map(|(a, b)| (a - b).abs() / mean).fold(0.0, f32::max);
-        // Coverage is off by an eighth of what it bends by over two bands.
-        assert!(worst < 2e-3 && (worst > 0.0) == (band % 2 == 1), "{band}: {worst}");
+        // Coverage is off by an eighth of what it bends by over two bands; where it is computed, by what levels it, which is between fewer bands.
+        let most = if band % 2 == 1 { 2e-3 } else { 1e-4 };
+        assert!(worst < most, "{band}: {worst}");
     }
 }
 
