@@ -18,10 +18,14 @@ pub(crate) struct Level {
     radius_px: f64,
 }
 
-/// The least spread of a point, parts of the radius of the film's corner, whose fourth moments matter.
+/// The least spread of a point, parts of the distance of the film's corner from the axis, whose fourth moments matter.
 const LEAST_SPREAD: f64 = 0.1;
+/// The spreads up to which the factor is that, and from which on there is none: blur about as wide as the film is known too roughly.
+const WIDE_SPREAD: (f64, f64) = (0.5, 1.0);
 /// A factor that is nowhere farther from 1 than this is none.
 const NEGLIGIBLE: f64 = 1e-4;
+/// How far from 1 it is at most: what second moments make is clamped likewise, and of blur wider than the film little is known.
+const MOST: f64 = 0.2;
 /// Distances from the axis at which kernels are computed, the axis left out.
 const N_KERNELS: i32 = 32;
 /// Places between two of them.
@@ -46,7 +50,8 @@ impl Level {
         let axis = Knot::nearest(map.axis_mm(), 1e-3 * lens.film.pitch_um);
         let farthest = |n: usize, axis: i32| 0.5 * n as f64 + f64::from(axis.abs());
         let corner_px = farthest(lens.film.rows, axis.down).hypot(farthest(lens.film.columns, axis.right));
-        if spread_px < LEAST_SPREAD * corner_px {
+        let part = ((WIDE_SPREAD.1 - spread_px / corner_px) / (WIDE_SPREAD.1 - WIDE_SPREAD.0)).min(1.0);
+        if spread_px < LEAST_SPREAD * corner_px || part <= 0.0 {
             return Ok(None);
         }
         let radius_px = corner_px + spread_px;
@@ -57,12 +62,16 @@ impl Level {
         let second = gram * points.iter().map(|p| p.rho_px * p.to_second).sum::<DVec4>();
         let mut coefficients = DVec4::X;
         for _ in 0..N_ROUNDS {
-            let alpha = |p: &Point| coefficients.dot(p.powers) / (1.0 + second.dot(p.powers));
+            let alpha = |p: &Point| coefficients.dot(p.powers) / (1.0 + second.dot(p.powers).clamp(-MOST, MOST));
             let spread = points.iter().map(|p| p.rho_px * alpha(p) * p.spread).sum::<DVec4>();
             coefficients -= gram * (spread - plane);
         }
         let off = points.iter().map(|p| (p.powers.dot(coefficients) - 1.0).abs()).fold(0.0, f64::max);
-        Ok((off > NEGLIGIBLE).then_some(Self { coefficients, axis, radius_px }))
+        if !(coefficients.is_finite() && off > NEGLIGIBLE) {
+            return Ok(None);
+        }
+        let coefficients = DVec4::X.lerp(coefficients, part * (MOST / off).min(1.0));
+        Ok(Some(Self { coefficients, axis, radius_px }))
     }
 
     /// Returns the factor between those of two bands of a layer; none is 1.
