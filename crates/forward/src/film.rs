@@ -108,6 +108,9 @@ pub struct Settings {
     /// Length that the weights of knots are smoothed over where kernels change so from cell to cell that a uniform plane would show seams, pixels; twice
     /// that where they would show most. An even number up to 8; 0 leaves seams.
     pub smoothing_px: usize,
+    /// Whether what layers cover takes account of fourth moments of kernels where blur is a tenth of the film wide or more: whole surfaces are up to 2.5 % too bright
+    /// without, in scenes of several depths.
+    pub levels_wide_blur: bool,
 }
 
 impl Default for Settings {
@@ -124,6 +127,7 @@ impl Default for Settings {
             negligible_edge: 4e-6,
             widest_blur_px: 64.0,
             smoothing_px: 4,
+            levels_wide_blur: true,
         }
     }
 }

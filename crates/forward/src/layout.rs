@@ -424,6 +424,9 @@ impl Layout {
 
     /// Returns what levels the alpha of each layer in a band: between a few bands, over which it changes little.
     fn levels_at(&self, lens: &dyn LensImage, band: usize, work: &Work<'_>) -> Result<Vec<Option<Level>>, Cancelled> {
+        if !self.spec.settings.levels_wide_blur {
+            return Ok(vec![None; self.scene.layers.len()]);
+        }
         let levels = match self.levels.get() {
             Some(levels) => levels,
             None => {

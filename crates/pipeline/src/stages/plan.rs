@@ -39,6 +39,7 @@ pub(super) fn plan(
             negligible_edge: 5e-4,
             widest_blur_px: 8.0,
             smoothing_px: 0,
+            levels_wide_blur: false,
             ..Settings::default()
         },
     };
