@@ -44,7 +44,7 @@ impl Level {
         spread_px: f64,
         work: &Work<'_>,
     ) -> Result<Option<Self>, Cancelled> {
-        /// Each leaves a tenth of what was off.
+        /// Rounds of the correction.
         const N_ROUNDS: usize = 3;
         let FilmMap::Radial(map) = &lens.maps[layer] else { return Ok(None) };
         let axis = Knot::nearest(map.axis_mm(), 1e-3 * lens.film.pitch_um);
