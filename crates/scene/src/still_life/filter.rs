@@ -22,55 +22,103 @@ pub(super) struct Guide {
 /// Light on each pixel's surface.
 pub(super) type Lights = [f32; N_LIGHTS];
 
-/// Returns the light with the noise of its samples smoothed away, edges of surfaces kept.
+/// The passes: how far apart the pixels of a window are, and the first number that takes part.
 ///
-/// Three passes of a 5 × 5 binomial window, 1, 2 and 4 pixels apart, in which a pixel of another object, another
-/// slope or off the plane does not count (Dammertz et al. 2010). Only bounced light takes part in the third.
-pub(super) fn smoothed(
-    guides: &[Guide],
-    lights: Vec<Lights>,
-    columns: usize,
-    cancel: &Cancel,
-) -> Result<Vec<Lights>, Cancelled> {
-    let mut lights = lights;
-    for (step, first) in [(1, 0), (2, 0), (4, BOUNCE)] {
-        lights = (0..guides.len())
-            .into_par_iter()
-            .with_min_len(columns)
-            .map(|index| {
-                cancel.check()?;
-                Ok(smoothed_pixel(guides, &lights, columns, index, step, first))
-            })
-            .collect::<Result<_, _>>()?;
+/// A 5 × 5 binomial window each, in which a pixel of another object, another slope or off the plane does not count
+/// (Dammertz et al. 2010). Only bounced light takes part in the third.
+const PASSES: [(usize, usize); 3] = [(1, 0), (2, 0), (4, BOUNCE)];
+
+/// Light on the rows of a picture, which come one after another, with the noise of its samples smoothed away and the edges of
+/// surfaces kept; a row is smoothed as soon as those about it are there.
+pub(super) struct Smoothing {
+    /// By row; empty where a row has not come yet or is forgotten.
+    guides: Vec<Vec<Guide>>,
+    /// Likewise, as gathered and after each pass.
+    lights: [Vec<Vec<Lights>>; PASSES.len() + 1],
+    /// How many rows are there, as gathered and after each pass.
+    n_ready: [usize; PASSES.len() + 1],
+}
+
+impl Smoothing {
+    /// Returns that of a picture of so many rows, none of which has come.
+    pub(super) fn of_rows(rows: usize) -> Self {
+        Self {
+            guides: vec![Vec::new(); rows],
+            lights: std::array::from_fn(|_| vec![Vec::new(); rows]),
+            n_ready: [0; PASSES.len() + 1],
+        }
     }
-    Ok(lights)
+
+    /// Adds the next rows, of one length all, and smooths what can be.
+    pub(super) fn push(
+        &mut self,
+        rows: impl IntoIterator<Item = (Vec<Guide>, Vec<Lights>)>,
+        cancel: &Cancel,
+    ) -> Result<(), Cancelled> {
+        for (guides, lights) in rows {
+            let row = self.n_ready[0];
+            (self.guides[row], self.lights[0][row]) = (guides, lights);
+            self.n_ready[0] += 1;
+        }
+        for (pass, (step, first)) in PASSES.into_iter().enumerate() {
+            let is_whole = self.n_ready[pass] == self.guides.len();
+            let to = if is_whole { self.guides.len() } else { self.n_ready[pass].saturating_sub(2 * step) };
+            let (before, after) = self.lights.split_at_mut(pass + 1);
+            let (before, from) = (&before[pass], self.n_ready[pass + 1]);
+            let rows = after[0].get_mut(from..to).unwrap_or_default();
+            rows.par_iter_mut().enumerate().try_for_each(|(n, smoothed)| {
+                let row = from + n;
+                let pixel = |column| {
+                    cancel.check()?;
+                    Ok(smoothed_pixel(&self.guides, before, (row, column), step, first))
+                };
+                *smoothed = (0..before[row].len()).map(pixel).collect::<Result<_, Cancelled>>()?;
+                Ok(())
+            })?;
+            self.n_ready[pass + 1] = from.max(to);
+        }
+        Ok(())
+    }
+
+    /// How many rows are smoothed.
+    pub(super) fn n_smoothed(&self) -> usize {
+        self.n_ready[PASSES.len()]
+    }
+
+    /// The surfaces of all rows, and the light on them as far as it is smoothed.
+    pub(super) fn smoothed(&self) -> (&[Vec<Guide>], &[Vec<Lights>]) {
+        (&self.guides, &self.lights[PASSES.len()])
+    }
+
+    /// Forgets the rows before one, as far as those to come need them no more.
+    pub(super) fn forget_before(&mut self, row: usize) {
+        let mut least = row;
+        for (pass, (step, _)) in PASSES.into_iter().enumerate() {
+            let needed = self.n_ready[pass + 1].saturating_sub(2 * step);
+            self.lights[pass][..needed].iter_mut().for_each(|row| *row = Vec::new());
+            least = least.min(needed);
+        }
+        self.lights[PASSES.len()][..row].iter_mut().for_each(|row| *row = Vec::new());
+        self.guides[..least].iter_mut().for_each(|row| *row = Vec::new());
+    }
 }
 
 fn smoothed_pixel(
-    guides: &[Guide],
-    lights: &[Lights],
-    columns: usize,
-    index: usize,
-    step: i64,
+    guides: &[Vec<Guide>],
+    lights: &[Vec<Lights>],
+    (row, column): (usize, usize),
+    step: usize,
     first: usize,
 ) -> Lights {
     const WINDOW: [f64; 5] = [1.0, 4.0, 6.0, 4.0, 1.0];
-    let rows = guides.len() / columns;
-    let (row, column) = ((index / columns) as i64, (index % columns) as i64);
-    let here = &guides[index];
+    let here = &guides[row][column];
     let (mut sum, mut weights) = ([0.0; N_LIGHTS], 0.0);
     for (i, wy) in WINDOW.iter().enumerate() {
-        let r = row + step * (i as i64 - 2);
-        if r < 0 || r >= rows as i64 {
-            continue;
-        }
+        let Some(r) = (row + step * i).checked_sub(2 * step).filter(|&r| r < guides.len()) else { continue };
+        let (guides, lights) = (&guides[r], &lights[r]);
         for (j, wx) in WINDOW.iter().enumerate() {
-            let c = column + step * (j as i64 - 2);
-            if c < 0 || c >= columns as i64 {
-                continue;
-            }
-            let other = r as usize * columns + c as usize;
-            let there = &guides[other];
+            let Some(c) = (column + step * j).checked_sub(2 * step).filter(|&c| c < guides.len()) else { continue };
+            let there = &guides[c];
             let slope = here.normal.dot(there.normal);
             if there.object != here.object || slope < 0.7 {
                 continue;
@@ -81,11 +129,11 @@ fn smoothed_pixel(
             let weight = wx * wy * slope.powi(8) * (-8.0 * off_plane).exp();
             weights += weight;
             for k in first..N_LIGHTS {
-                sum[k] += weight * f64::from(lights[other][k]);
+                sum[k] += weight * f64::from(lights[c][k]);
             }
         }
     }
-    let mut result = lights[index];
+    let mut result = lights[row][column];
     for k in first..N_LIGHTS {
         result[k] = (sum[k] / weights) as f32;
     }
@@ -104,15 +152,46 @@ mod tests {
             point: DVec3::new((index % columns) as f64, (index / columns) as f64, 0.0),
             normal: DVec3::Z,
         };
-        let guides: Vec<Guide> = (0..columns * 8).map(guide).collect();
         let noisy = |index: usize| {
             let (row, column) = (index / columns, index % columns);
             [if column >= 16 { 100.0 } else { 10.0 } + ((row + column) % 2) as f32; N_LIGHTS]
         };
-        let lights = smoothed(&guides, (0..columns * 8).map(noisy).collect(), columns, &Cancel::new()).unwrap();
+        let row = |row: usize| {
+            let indices = || row * columns..(row + 1) * columns;
+            (indices().map(guide).collect(), indices().map(noisy).collect())
+        };
+        let mut whole = Smoothing::of_rows(40);
+        whole.push((0..40).map(row), &Cancel::new()).unwrap();
+        assert_eq!(whole.n_smoothed(), 40);
+        let lights = whole.smoothed().1.concat();
         for (index, light) in lights.iter().enumerate() {
             let expected = if index % columns >= 16 { 100.5 } else { 10.5 };
             assert!(light.iter().all(|v| (v - expected).abs() < 0.2), "{index}: {light:?}");
         }
+    }
+
+    #[test]
+    fn rows_are_the_same_in_pieces_and_forgotten() {
+        let (rows, columns) = (61, 9);
+        let row = |row: usize| {
+            let at = |column: usize| DVec3::new(column as f64, row as f64, 0.1 * ((row * column) % 7) as f64);
+            let guide = |column| Guide { object: u32::from(row > 40), point: at(column), normal: DVec3::Z };
+            let light = |column| [(row * 31 + column * 17) as f32 % 11.0; N_LIGHTS];
+            ((0..columns).map(guide).collect(), (0..columns).map(light).collect())
+        };
+        let mut whole = Smoothing::of_rows(rows);
+        whole.push((0..rows).map(row), &Cancel::new()).unwrap();
+        let (mut pieces, mut taken, mut first) = (Smoothing::of_rows(rows), 0, 0);
+        for n in [1, 3, 20, 2, 30, 5] {
+            pieces.push((first..first + n).map(row), &Cancel::new()).unwrap();
+            first += n;
+            for row in taken..pieces.n_smoothed() {
+                assert_eq!(pieces.smoothed().1[row], whole.smoothed().1[row], "{row}");
+            }
+            taken = pieces.n_smoothed();
+            pieces.forget_before(taken);
+        }
+        assert_eq!((first, taken), (rows, rows));
+        assert!(pieces.smoothed().1.iter().all(Vec::is_empty));
     }
 }

@@ -1,6 +1,10 @@
 //! The picture of the still life: rays from the eye, light gathered, smoothed and colored.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::{
+    collections::VecDeque,
+    ops::Range,
+    sync::atomic::{AtomicUsize, Ordering},
+};
 
 use dioptric_spectrum::{Cancel, Cancelled, DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use glam::{DMat3, DVec2, DVec3};
@@ -8,7 +12,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    filter::{Guide, Lights, smoothed},
+    filter::{Guide, Lights, Smoothing},
     noise::{pixel_offset, spread},
     pigment::PigmentIndex,
     shade::{Colors, N_OFFSETS, Shader},
@@ -159,15 +163,6 @@ pub(super) struct LitPixels {
     pub(super) lights: Vec<Lights>,
 }
 
-impl LitPixels {
-    fn of(drawn: &[Row], columns: usize, cancel: &Cancel) -> Result<Self, Cancelled> {
-        let guides: Vec<Guide> = drawn.iter().flat_map(|row| &row.guides).copied().collect();
-        let lights = drawn.iter().flat_map(|row| &row.lights).copied().collect();
-        let lights = smoothed(&guides, lights, columns, cancel)?;
-        Ok(Self { guides, lights })
-    }
-}
-
 /// Returns the light on what the pixels of a picture show, without the picture.
 pub(super) fn lit_pixels(
     (world, colors): (&World, &Colors),
@@ -179,9 +174,15 @@ pub(super) fn lit_pixels(
     let shader = Shader::new(world, eye.origin, colors);
     // Light is kept in tones, on whatever bands: there is no picture, hence there are none.
     let painter = Painter { shader, colors, eye, n_bands: 0, which, painting };
-    let drawn = (0..rows).into_par_iter().map(|row| painter.row(row, columns)).collect::<Result<Vec<Row>, _>>()?;
-    LitPixels::of(&drawn, columns, painting.cancel)
+    let drawn = painter.rows(0..rows, columns)?;
+    let mut smoothing = Smoothing::of_rows(rows);
+    smoothing.push(drawn.into_iter().map(|row| (row.guides, row.lights)), painting.cancel)?;
+    let (guides, lights) = smoothing.smoothed();
+    Ok(LitPixels { guides: guides.concat(), lights: lights.concat() })
 }
+
+/// Rows that are drawn in one go: of more than these and as many again nothing but the picture is kept.
+const ROWS_AT_ONCE: usize = 48;
 
 /// Returns the picture of a world.
 pub(super) fn picture(
@@ -195,32 +196,80 @@ pub(super) fn picture(
     let colors = Colors::on(grid);
     let shader = Shader::new(world, eye.origin, &colors);
     let painter = Painter { shader, colors: &colors, eye, n_bands: grid.len(), which, painting };
-    let drawn = (0..rows).into_par_iter().map(|row| painter.row(row, columns)).collect::<Result<Vec<Row>, _>>()?;
-    let LitPixels { guides, lights } = LitPixels::of(&drawn, columns, painting.cancel)?;
-    let z_m = Array2::from_shape_fn((rows, columns), |(r, c)| drawn[r].z_m[c]);
-    let finish = |(row, drawn): (usize, Row)| painter.finished(row, drawn, &guides, &lights);
-    let finished = drawn.into_par_iter().enumerate().map(finish).collect::<Result<Vec<Vec<f32>>, _>>()?;
-    let planes = planes(&finished, columns, grid.len());
+    let mut planes = vec![Array2::<f32>::zeros((rows, columns)); grid.len()];
+    let mut z_m = Array2::zeros((rows, columns));
+    let mut finishing = Finishing {
+        painter: &painter,
+        smoothing: Smoothing::of_rows(rows),
+        drawn: VecDeque::new(),
+        n_finished: 0,
+        lines: lines(&mut planes),
+        z_m: &mut z_m,
+    };
+    let after = |row: usize| row..(row + ROWS_AT_ONCE).min(rows);
+    let mut next = after(0);
+    let mut drawn = painter.rows(next.clone(), columns)?;
+    while !drawn.is_empty() {
+        next = after(next.end);
+        // The next rows are drawn while the last ones are finished.
+        let (more, finished) = rayon::join(|| painter.rows(next.clone(), columns), || finishing.push(drawn));
+        finished?;
+        drawn = more?;
+    }
     Ok(Layer { radiance: SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?, depth: DepthMap::new(z_m)? })
 }
 
-/// Turns rows of columns × bands into bands of rows × columns.
-fn planes(spectra: &[Vec<f32>], columns: usize, n_bands: usize) -> Vec<Array2<f32>> {
-    let mut planes = vec![Array2::<f32>::zeros((spectra.len(), columns)); n_bands];
-    let mut rows: Vec<Vec<&mut [f32]>> = spectra.iter().map(|_| Vec::with_capacity(n_bands)).collect();
-    for plane in &mut planes {
+/// Returns the rows of bands, those of all bands together.
+fn lines(planes: &mut [Array2<f32>]) -> Vec<Vec<&mut [f32]>> {
+    let (rows, columns) = planes.first().map_or((0, 0), Array2::dim);
+    let mut lines: Vec<Vec<&mut [f32]>> = (0..rows).map(|_| Vec::with_capacity(planes.len())).collect();
+    for plane in planes {
         let samples = plane.as_slice_mut().expect("a new plane is in standard order");
-        samples.chunks_exact_mut(columns).zip(&mut rows).for_each(|(row, bands)| bands.push(row));
+        samples.chunks_exact_mut(columns).zip(&mut lines).for_each(|(line, bands)| bands.push(line));
     }
-    rows.into_par_iter().zip(spectra).for_each(|(bands, spectra)| {
-        for (band, samples) in bands.into_iter().enumerate() {
-            samples
-                .iter_mut()
-                .zip(spectra[band..].iter().step_by(n_bands))
-                .for_each(|(sample, value)| *sample = *value);
+    lines
+}
+
+/// What becomes of rows that are drawn.
+struct Finishing<'a> {
+    painter: &'a Painter<'a>,
+    smoothing: Smoothing,
+    /// Rows whose light waits for those below, from `n_finished` on.
+    drawn: VecDeque<Row>,
+    n_finished: usize,
+    /// The rows of the picture, all bands of each.
+    lines: Vec<Vec<&'a mut [f32]>>,
+    z_m: &'a mut Array2<f32>,
+}
+
+impl Finishing<'_> {
+    /// Takes the next rows, and paints all whose light is smoothed.
+    fn push(&mut self, mut drawn: Vec<Row>) -> Result<(), Cancelled> {
+        let take = |row: &mut Row| (std::mem::take(&mut row.guides), std::mem::take(&mut row.lights));
+        self.smoothing.push(drawn.iter_mut().map(take), self.painter.painting.cancel)?;
+        self.drawn.extend(drawn);
+        // Of the light beside an outline the row below is needed.
+        let n_smoothed = self.smoothing.n_smoothed();
+        let end = if n_smoothed == self.lines.len() { n_smoothed } else { n_smoothed.saturating_sub(1) };
+        let first = self.n_finished;
+        let ready: Vec<Row> = self.drawn.drain(..end.saturating_sub(first)).collect();
+        for (drawn, mut line) in ready.iter().zip(self.z_m.rows_mut().into_iter().skip(first)) {
+            line.iter_mut().zip(&drawn.z_m).for_each(|(to, from)| *to = *from);
         }
-    });
-    planes
+        let (guides, lights) = self.smoothing.smoothed();
+        let lines = &mut self.lines[first..first + ready.len()];
+        ready.into_par_iter().zip(lines).enumerate().try_for_each(|(n, (drawn, bands))| {
+            let spectra = self.painter.finished(first + n, drawn, guides, lights)?;
+            for (band, samples) in bands.iter_mut().enumerate() {
+                let values = spectra[band..].iter().step_by(self.painter.n_bands);
+                samples.iter_mut().zip(values).for_each(|(sample, value)| *sample = *value);
+            }
+            Ok(())
+        })?;
+        self.n_finished = first.max(end);
+        self.smoothing.forget_before(self.n_finished.saturating_sub(1));
+        Ok(())
+    }
 }
 
 struct Painter<'a> {
@@ -233,6 +282,10 @@ struct Painter<'a> {
 }
 
 impl Painter<'_> {
+    fn rows(&self, rows: Range<usize>, columns: usize) -> Result<Vec<Row>, Cancelled> {
+        rows.into_par_iter().map(|row| self.row(row, columns)).collect()
+    }
+
     fn row(&self, row: usize, columns: usize) -> Result<Row, Cancelled> {
         let mut drawn = Row::empty(columns, self.n_bands);
         for column in 0..columns {
@@ -293,15 +346,20 @@ impl Painter<'_> {
     }
 
     /// Returns the spectra of a row, columns × bands, under the smoothed light.
-    fn finished(&self, row: usize, mut drawn: Row, guides: &[Guide], lights: &[Lights]) -> Result<Vec<f32>, Cancelled> {
-        let columns = drawn.guides.len();
+    fn finished(
+        &self,
+        row: usize,
+        mut drawn: Row,
+        guides: &[Vec<Guide>],
+        lights: &[Vec<Lights>],
+    ) -> Result<Vec<f32>, Cancelled> {
         let (mut fragments, mut pigments) = (drawn.fragments.iter(), drawn.pigments.as_slice());
         for (column, spectrum) in drawn.own.chunks_exact_mut(self.n_bands).enumerate() {
             self.painting.cancel.check()?;
             for fragment in fragments.by_ref().take(drawn.n_fragments[column]) {
                 let lights = match &fragment.seen {
-                    None => lights[row * columns + column],
-                    Some(seen) => light_beside(row, column, columns, fragment.object, guides, lights)
+                    None => lights[row][column],
+                    Some(seen) => light_beside(row, column, fragment.object, guides, lights)
                         .unwrap_or_else(|| self.shader.gather(seen, &pixel_offsets(row, column))),
                 };
                 let (own, rest) = pigments.split_at(fragment.n_pigments);
@@ -318,17 +376,15 @@ impl Painter<'_> {
 fn light_beside(
     row: usize,
     column: usize,
-    columns: usize,
     object: u32,
-    guides: &[Guide],
-    lights: &[Lights],
+    guides: &[Vec<Guide>],
+    lights: &[Vec<Lights>],
 ) -> Option<Lights> {
-    let rows = guides.len() / columns;
     let (mut sum, mut n) = (Lights::default(), 0.0);
-    for r in row.saturating_sub(1)..(row + 2).min(rows) {
-        for c in column.saturating_sub(1)..(column + 2).min(columns) {
-            if guides[r * columns + c].object == object {
-                sum.iter_mut().zip(&lights[r * columns + c]).for_each(|(s, l)| *s += l);
+    for r in row.saturating_sub(1)..(row + 2).min(guides.len()) {
+        for c in column.saturating_sub(1)..(column + 2).min(guides[r].len()) {
+            if guides[r][c].object == object {
+                sum.iter_mut().zip(&lights[r][c]).for_each(|(s, l)| *s += l);
                 n += 1.0;
             }
         }
