@@ -51,18 +51,25 @@ impl Film {
         (mean, variance)
     }
 
+    /// Returns the picture so far.
+    pub(crate) fn picture(&self, quantity: Quantity, grid: &WavelengthGrid) -> SpectralImage {
+        let mut picture = SpectralImage::zeros(quantity, grid.clone(), self.rows, self.columns);
+        for (band, mut means) in picture.planes_mut().enumerate() {
+            means.iter_mut().enumerate().for_each(|(pixel, mean)| *mean = self.mean_and_variance(pixel, band).0 as f32);
+        }
+        picture
+    }
+
     /// Returns the picture so far, and the standard error of each of its samples.
     pub(crate) fn develop(&self, quantity: Quantity, grid: &WavelengthGrid) -> (SpectralImage, SpectralImage) {
-        let mut picture = SpectralImage::zeros(quantity, grid.clone(), self.rows, self.columns);
-        let mut error = picture.clone();
-        for (band, (mut means, mut errors)) in picture.planes_mut().zip(error.planes_mut()).enumerate() {
-            for (pixel, (mean, error)) in means.iter_mut().zip(errors.iter_mut()).enumerate() {
-                let (m, v) = self.mean_and_variance(pixel, band);
-                *mean = m as f32;
-                *error = (v / f64::from(self.n_passes[pixel].max(1))).sqrt() as f32;
+        let mut error = SpectralImage::zeros(quantity, grid.clone(), self.rows, self.columns);
+        for (band, mut errors) in error.planes_mut().enumerate() {
+            for (pixel, error) in errors.iter_mut().enumerate() {
+                let (_, variance) = self.mean_and_variance(pixel, band);
+                *error = (variance / f64::from(self.n_passes[pixel].max(1))).sqrt() as f32;
             }
         }
-        (picture, error)
+        (self.picture(quantity, grid), error)
     }
 
     /// Returns how many passes each pixel needs until its relative standard error, over all bands, is `noise`; between

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use dioptric_spectrum::{Cancel, WavelengthGrid};
+use dioptric_spectrum::{Cancel, SpectralImage, WavelengthGrid};
 use dioptric_world::Ray;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -165,14 +165,22 @@ impl<'a> Renderer<'a> {
         Ok(!tiles.is_empty())
     }
 
-    /// Returns the picture so far.
-    pub fn rendering(&self) -> Rendering {
-        let quantity = self.camera.quantity();
-        let (mut picture, mut standard_error) = self.film.develop(quantity, &self.settings.bands.grid);
-        if let Some(pitch_um) = self.camera.pitch_um() {
-            picture = picture.with_pitch_um(pitch_um);
-            standard_error = standard_error.with_pitch_um(pitch_um);
+    /// Returns the picture so far, without its error.
+    pub fn picture(&self) -> SpectralImage {
+        self.with_pitch(self.film.picture(self.camera.quantity(), &self.settings.bands.grid))
+    }
+
+    fn with_pitch(&self, image: SpectralImage) -> SpectralImage {
+        match self.camera.pitch_um() {
+            Some(pitch_um) => image.with_pitch_um(pitch_um),
+            None => image,
         }
+    }
+
+    /// Returns the picture so far with its error.
+    pub fn rendering(&self) -> Rendering {
+        let (picture, standard_error) = self.film.develop(self.camera.quantity(), &self.settings.bands.grid);
+        let [picture, standard_error] = [picture, standard_error].map(|image| self.with_pitch(image));
         let n_samples = self.film.passes() * self.settings.samples_per_pass;
         Rendering { picture, standard_error, n_samples }
     }

@@ -248,7 +248,7 @@ fn refine(arguments: &RenderArgs, (render, clock, cancel): Job<'_>) -> anyhow::R
             saved = Some(Instant::now());
         }
         if is_over || is_due(shown, BETWEEN_PREVIEWS) {
-            write_seen_png(&renderer.rendering().picture, 1, &preview)?;
+            write_seen_png(&renderer.picture(), 1, &preview)?;
             shown = Some(Instant::now());
         }
         Ok::<bool, PipelineError>(!is_over)

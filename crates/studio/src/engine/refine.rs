@@ -36,13 +36,13 @@ pub(super) fn refine(
         let n_samples = renderer.n_passes() * renderer.settings().samples_per_pass;
         let partial = with_samples(camera, n_samples);
         let on_its_way = kept.with(|own| *own = partial);
-        on_its_way.keep_irradiance(renderer.rendering().picture)?;
+        on_its_way.keep_irradiance(renderer.picture())?;
         let mut product = Product::make(&on_its_way, on_its_way.camera(), Rung::Refining, progress, cancel)?;
         product.take_camera(camera, n_samples);
         show(product);
         Ok(true)
     })?;
-    kept.keep_irradiance(renderer.rendering().picture)
+    kept.keep_irradiance(renderer.picture())
 }
 
 /// Whether as many passes are the whole rendering.
