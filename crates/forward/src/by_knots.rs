@@ -19,6 +19,7 @@ use crate::{
     sampler::Rectangle,
     smoothing::Smoother,
     stopwatch::{Part, Stopwatch},
+    tiles::SpreadSquares,
 };
 
 /// A raster of a layer that is spread by knots.
@@ -47,6 +48,18 @@ type Group<'a> = BTreeMap<Knot, Reach<'a>>;
 
 /// Knots blurred before their results are added up: bounds the memory, and keeps the order of the sums.
 const KNOTS_AT_ONCE: usize = 32;
+
+/// About what is spread around knots before it is added up, bytes.
+pub(crate) fn spread_bytes(squares: &SpreadSquares) -> usize {
+    KNOTS_AT_ONCE * size_of::<f32>() * squares.mean_px2
+}
+
+/// What a thread transforms in, bytes: lines, a spectrum and that of a kernel, which it keeps, and for a patch by itself three half spectra, its samples and what
+/// becomes of them.
+pub(crate) fn buffer_bytes(squares: &SpreadSquares) -> usize {
+    let square = squares.largest_px * squares.largest_px;
+    3 * size_of::<Complex<f32>>() * square + 3 * size_of::<Complex<f32>>() * square / 2 + 2 * size_of::<f32>() * square
+}
 
 /// Spreads patches and hands on what they make, in an order that does not depend on the number of threads.
 pub(crate) fn spread_by_knots(

@@ -18,6 +18,7 @@ use crate::{
     basis::{BandBasis, BasisBetween, Kept},
     block_layers::BlockLayers,
     blur::{LayerTask, blur_layer},
+    by_knots::{buffer_bytes, spread_bytes},
     film_lens::FilmLens,
     geometry::{FilmFrame, check_extent},
     lateral_color::LateralColor,
@@ -31,7 +32,7 @@ use crate::{
     raster::LayerRaster,
     sampler::{LayerCoordinates, Surface},
     stopwatch::{Part, Stopwatch},
-    tiles::{LayerTiles, Tiling},
+    tiles::{LayerTiles, SpreadSquares, Tiling},
     work::{Progress, Work, plane_of},
 };
 
@@ -133,8 +134,8 @@ pub(crate) struct Layout {
     /// How far off axis light is taken from, mm.
     extent_mm: f64,
     pub(crate) kept: Mutex<Kept>,
-    /// What the kernels of a band take, as far as the plan has seen them.
-    kernel_bytes: usize,
+    /// Of the kernels that the plan has seen.
+    largest: Largest,
     /// About how many pixels of the film layers cover, all layers together; 0 where none hides another.
     n_covered: usize,
     /// Of each band that was asked for, those of all layers.
@@ -214,8 +215,8 @@ impl Layout {
             FilmLens { image: lens, film, layers, maps: &maps, wavelength_nm: middle_nm, stopwatch: &stopwatch };
         let mut tiling = Tiling::new(active, &film_lens, settings, &wavelengths_nm, &work)?;
         let mut kept = Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() };
-        let kernel_bytes = match settings.smoothing_px {
-            0 => 0,
+        let largest = match settings.smoothing_px {
+            0 => Largest::default(),
             length_px => {
                 let bands = &scene.kernel_bands;
                 // Where colors differ most.
@@ -243,7 +244,7 @@ impl Layout {
             blocks,
             extent_mm,
             kept,
-            kernel_bytes,
+            largest,
             n_covered,
             maps: Mutex::default(),
             levels: OnceLock::new(),
@@ -483,10 +484,11 @@ impl Layout {
         let threads = rayon::current_num_threads();
         let Some(limit) = self.in_flight_bytes else {
             let own_kernels = if self.has_bands_with_own_kernels() { bases[0].kernels.size_bytes() } else { 0 };
-            return (IN_FLIGHT_BYTES / (self.band_bytes() + own_kernels).max(1)).clamp(threads.min(4), 4 * threads);
+            return (IN_FLIGHT_BYTES / (self.plane_bytes() + own_kernels).max(1)).clamp(threads.min(4), 4 * threads);
         };
         let left = limit.saturating_sub(bases.map(BandBasis::size_bytes).iter().sum());
-        (left / (self.band_bytes() + bases[0].kernels.size_bytes()).max(1)).clamp(1, 4 * threads)
+        let band = self.plane_bytes() + spread_bytes(&self.largest.squares) + bases[0].kernels.size_bytes();
+        (left / band.max(1)).clamp(1, 4 * threads)
     }
 
     /// Whether kernels are computed at bands between those at which the coverage of layers is.
@@ -494,18 +496,26 @@ impl Layout {
         self.scene.basis_bands.windows(2).any(|pair| self.has_kernels_within([pair[0], pair[1]]))
     }
 
-    /// What a band takes while it is imaged, bytes: planes of the film, or of the scene where that is larger.
-    pub(crate) fn band_bytes(&self) -> usize {
+    /// What the planes of a band take while it is imaged, bytes: those of the film, or of the scene where that is larger.
+    fn plane_bytes(&self) -> usize {
         // Light, what is uncovered, a blurred layer, the samples that are spread by knots, and half as much for wide pixels and what is in flight.
         const PLANES: usize = 5;
         let (Film { rows, columns, .. }, (scene_rows, scene_columns)) = (self.spec.film, self.size());
         PLANES * size_of::<f32>() * (rows * columns).max(scene_rows * scene_columns)
     }
 
-    /// About what two bases take, bytes: the coverage of layers where they hide each other, and kernels as far as the plan has seen any.
+    /// About what a band takes while it is imaged, bytes: its planes, what is spread around knots before it is added to them, and kernels as far as the plan
+    /// has seen any.
+    pub(crate) fn band_bytes(&self) -> usize {
+        self.plane_bytes() + spread_bytes(&self.largest.squares) + self.largest.kernel_bytes
+    }
+
+    /// About what two bases take, bytes: the coverage of layers where they hide each other, and kernels as far as the plan has seen any; and what threads
+    /// transform in.
     pub(crate) fn bases_bytes(&self) -> usize {
         // .9 to 1.5 times as much as this coverage was measured.
-        2 * (size_of::<f32>() * self.n_covered + self.kernel_bytes)
+        let bases = 2 * (size_of::<f32>() * self.n_covered + self.largest.kernel_bytes);
+        bases + rayon::current_num_threads() * buffer_bytes(&self.largest.squares)
     }
 
     /// Reads a band and images it.
@@ -648,7 +658,15 @@ fn active_cells_of(
     Ok(active)
 }
 
-/// Smooths weights of knots where kernels of some bands would leave seams. Keeps these kernels, which imaging needs anyway, and returns the bytes of the largest.
+/// What the largest kernels of a band take.
+#[derive(Clone, Copy, Debug, Default)]
+struct Largest {
+    /// All kernels of a band, bytes.
+    kernel_bytes: usize,
+    squares: SpreadSquares,
+}
+
+/// Smooths weights of knots where kernels of some bands would leave seams. Keeps these kernels, which imaging needs anyway, and returns what the largest take.
 fn smooth_seams(
     tiling: &mut Tiling,
     (film_lens, extent_mm): (&FilmLens<'_>, f64),
@@ -656,8 +674,8 @@ fn smooth_seams(
     length_px: usize,
     kept: &mut Kept,
     cancel: &Cancel,
-) -> Result<usize, Cancelled> {
-    let mut kernel_bytes = 0;
+) -> Result<Largest, Cancelled> {
+    let (mut kernel_bytes, mut of_bands) = (0, vec![]);
     let mut seams = tiling.seams();
     for &(band, wavelength_nm) in wavelengths {
         let map = |&dioptres: &f64| film_lens.image.film_map(dioptres, wavelength_nm, extent_mm);
@@ -665,12 +683,14 @@ fn smooth_seams(
         let film_lens = FilmLens { maps: &maps, wavelength_nm, ..*film_lens };
         let by_layer = Arc::new(tiling.kernels_at(&film_lens, &Work::unobserved(cancel))?);
         tiling.add_band(&mut seams, &by_layer, cancel)?;
+        of_bands.push(by_layer.clone());
         let kernels = BandKernels { by_layer };
         kernel_bytes = kernel_bytes.max(kernels.size_bytes());
         kept.keep(band, &kernels);
     }
     tiling.smooth(seams, length_px);
-    Ok(kernel_bytes)
+    let size = (film_lens.film.rows, film_lens.film.columns);
+    Ok(Largest { kernel_bytes, squares: tiling.spread_squares(&of_bands, size) })
 }
 
 /// Returns about how many pixels of the film layers cover, all layers together.

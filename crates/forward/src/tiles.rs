@@ -1,12 +1,16 @@
 //! The film cut into patches, layer by layer and raster by raster, over which PSFs change smoothly.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use dioptric_spectrum::{Cancel, Cancelled};
 use rayon::prelude::*;
 
 use crate::{
     Settings,
+    convolve::fast_size,
     cost::patches_by_knots,
     film_lens::FilmLens,
     knot_kernels::{LayerKernels, Symmetry},
@@ -56,6 +60,40 @@ impl LayerTiles {
         Ok(Self { patches, smoothing_px: 0, knots })
     }
 
+    /// Returns the squares of all rasters; `film_px` is the longer side of the film.
+    fn spread_squares(&self, kernels: &[&LayerKernels], film_px: usize) -> SpreadSquares {
+        let width_at = |knot: Knot| kernels.iter().map(|kernels| kernels.width_at(knot)).max().unwrap_or(1);
+        let side_px = |factor: usize, width: usize, size_px: usize| {
+            (size_px.div_ceil(factor) + self.smoothing_px).min(film_px.div_ceil(factor) + width - 1) + width - 1
+        };
+        let of_raster = |(&factor, patches): (&usize, &Vec<Patch>)| {
+            let mut spans: BTreeMap<Knot, [Knot; 2]> = BTreeMap::new();
+            for patch in patches.iter().filter(|patch| patch.is_by_knots) {
+                let [first, .., last] = patch.cell.corners();
+                for (knot, _) in &patch.shares {
+                    let span = spans.entry(*knot).or_insert([first, last]);
+                    span[0] = Knot { right: span[0].right.min(first.right), down: span[0].down.min(first.down) };
+                    span[1] = Knot { right: span[1].right.max(last.right), down: span[1].down.max(last.down) };
+                }
+            }
+            let around_knots = spans.iter().map(|(knot, [first, last])| {
+                let size_px = (last.right - first.right).max(last.down - first.down);
+                side_px(factor, width_at(*knot), size_px as usize)
+            });
+            let sides: Vec<usize> = around_knots.collect();
+            let alone = patches.iter().filter(|patch| !patch.is_by_knots).map(|patch| {
+                let width = patch.shares.iter().map(|&(knot, _)| width_at(knot)).max().unwrap_or(1);
+                side_px(factor, width, patch.cell.size)
+            });
+            let sum_px2: usize = sides.iter().map(|side| side * side).sum();
+            SpreadSquares {
+                largest_px: fast_size(sides.iter().copied().chain(alone).max().unwrap_or(0)),
+                mean_px2: sum_px2 / sides.len().max(1),
+            }
+        };
+        self.patches.iter().map(of_raster).fold(SpreadSquares::default(), SpreadSquares::larger)
+    }
+
     /// Those on the film's pixels.
     fn on_film(&self) -> &[Patch] {
         self.patches.get(&FILM).map_or(&[], Vec::as_slice)
@@ -63,6 +101,21 @@ impl LayerTiles {
 
     fn n_patches(&self) -> usize {
         self.patches.values().map(Vec::len).sum()
+    }
+}
+
+/// The squares in which samples are spread by kernels.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SpreadSquares {
+    /// The longest side of one that is transformed, samples.
+    pub(crate) largest_px: usize,
+    /// Samples of those around the knots of a raster in the mean, where they are largest.
+    pub(crate) mean_px2: usize,
+}
+
+impl SpreadSquares {
+    fn larger(self, other: Self) -> Self {
+        Self { largest_px: self.largest_px.max(other.largest_px), mean_px2: self.mean_px2.max(other.mean_px2) }
     }
 }
 
@@ -131,6 +184,20 @@ impl Tiling {
     pub(crate) fn size_bytes(&self) -> usize {
         let patches = self.layers.iter().flat_map(|tiles| tiles.patches.values()).flatten();
         patches.map(Patch::size_bytes).sum::<usize>() + self.n_knots() * size_of::<(Knot, usize)>()
+    }
+
+    /// Returns about how large the squares are in which the samples of a film of this size are spread by kernels of some bands.
+    pub(crate) fn spread_squares(
+        &self,
+        bands: &[Arc<Vec<LayerKernels>>],
+        (rows, columns): (usize, usize),
+    ) -> SpreadSquares {
+        let layers = self.layers.par_iter().enumerate();
+        let of_layer = |(layer, tiles): (usize, &LayerTiles)| {
+            let kernels: Vec<&LayerKernels> = bands.iter().map(|by_layer| &by_layer[layer]).collect();
+            tiles.spread_squares(&kernels, rows.max(columns))
+        };
+        layers.map(of_layer).reduce(SpreadSquares::default, SpreadSquares::larger)
     }
 
     /// Computes the kernels of all layers at a wavelength; none for a layer without cells.

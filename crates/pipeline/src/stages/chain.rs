@@ -61,7 +61,12 @@ impl Chain<'_> {
                 _ if let Some(spec) = inputs.geometry.still_life() => {
                     lit_still_life::view(inputs, spec, paintings, &self.watch)?
                 }
-                Some((_, spec)) => world::view(inputs, spec, &self.world(&inputs.geometry)?, &self.watch)?,
+                Some((_, spec)) => {
+                    let has_room = |size, n_bands, n_layers| {
+                        self.budget.map_or(Ok(()), |budget| budget.check_rendering(size, n_bands, n_layers))
+                    };
+                    world::view(inputs, spec, &self.world(&inputs.geometry)?, &has_room, &self.watch)?
+                }
                 None => {
                     let lens = inputs.geometry.flat.as_ref().map(|(_, lens)| self.lens(lens)).transpose()?;
                     let pupil_z_mm = lens.map(|lens| lens.reference.projection_center_z_mm());
@@ -132,8 +137,10 @@ impl Chain<'_> {
                 return Ok(irradiance);
             }
             if let Some(effort) = inputs.effort {
-                let picture = self.world_render(inputs)?.render(effort, &self.watch)?.picture;
                 let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
+                let n_bands = self.summary(&inputs.scene)?.wavelengths_nm.len();
+                self.budget.map_or(Ok(()), |budget| budget.check_rendering_on(&place, n_bands))?;
+                let picture = self.world_render(inputs)?.render(effort, &self.watch)?;
                 return Ok(Irradiance::of_image(picture, place.pitch_um));
             }
             if inputs.micro_array.is_some() {
@@ -211,12 +218,23 @@ impl Chain<'_> {
             let watch = Watch { progress: &progress, cancel: self.watch.cancel };
             let chain: Chain<'_> = *self;
             let irradiance = Chain { memory_bytes, watch, ..chain }.imaged(&inputs)?;
-            self.drops_plans(&*self.film(&inputs.plan.bank.film, &inputs.scene)?, &irradiance);
-            Ok(irradiance)
+            // The next photodiode has a plan of its own.
+            if self.budget.is_some_and(|budget| !budget.is_ample_for(self.kept.imaging_bytes())) {
+                self.kept.plan.clear();
+            }
+            Ok(irradiance.without_seen())
         };
         let photodiodes = (0..n).map(irradiance).collect::<Result<Vec<_>, PipelineError>>()?;
         let narrow = photodiodes[0].summary.narrow_surfaces;
-        Ok(Irradiance::of_photodiodes(photodiodes, self.memory_bytes)?.with_narrow_surfaces(narrow))
+        let memory_bytes = match self.budget {
+            Some(budget) => {
+                let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
+                budget.left_beside_film(&place, photodiodes[0].grid().len(), self.kept.imaging_bytes())
+            }
+            None => u64::MAX,
+        };
+        let memory_bytes = memory_bytes.min(self.memory_bytes);
+        Ok(Irradiance::of_photodiodes(photodiodes, memory_bytes)?.with_narrow_surfaces(narrow))
     }
 
     pub(super) fn electrons(&self, inputs: &ElectronInputs) -> Result<Arc<PixelRates>, PipelineError> {

@@ -27,8 +27,8 @@ use crate::{
 /// The name of the file of spectral irradiance.
 pub const IRRADIANCE_FILE: &str = "irradiance.exr";
 
-/// Bytes of rows of all bands that are written at a time where memory is scarce.
-const STRIP_BYTES: usize = 32 << 20;
+/// Bytes of rows of all bands that are written at a time.
+pub(super) const STRIP_BYTES: usize = 32 << 20;
 
 /// Returns the name of the file of the spectral irradiance by which a photodiode is lit.
 pub(crate) fn photodiode_irradiance_file(name: &str) -> String {
@@ -70,7 +70,7 @@ pub struct IrradianceSummary {
     pub max: Vec<f64>,
     /// Mean illuminance, lux.
     pub mean_lux: f64,
-    /// All bands as an observer sees them, linear sRGB in lux.
+    /// All bands as an observer sees them, linear sRGB in lux; without pixels where it is that of a photodiode.
     pub seen: LinearRgb,
     /// Surfaces narrower than the pupil, where the scene has any and was imaged in layers of depth.
     pub narrow_surfaces: Option<NarrowSurfaces>,
@@ -153,9 +153,11 @@ impl Irradiance {
             grid: &self.grid,
             size: self.size,
             pitch_um: Some(self.pitch_um),
+            depth: None,
+            view: None,
             largest: self.summary.max.iter().fold(0.0, |a, &b| a.max(b as f32)),
             samples,
-            at_once_bytes: if self.is_spilled() { STRIP_BYTES } else { 4 * STRIP_BYTES },
+            at_once_bytes: STRIP_BYTES,
         };
         Ok(head.write_exr(path, &mut |band, rows| self.rows_of(band, rows))?)
     }
@@ -200,6 +202,13 @@ impl Irradiance {
     #[must_use]
     pub(super) fn with_narrow_surfaces(mut self, narrow: Option<NarrowSurfaces>) -> Self {
         self.summary.narrow_surfaces = narrow;
+        self
+    }
+
+    /// Returns it without all bands as an observer sees them, which for photodiodes nobody looks at.
+    #[must_use]
+    pub(super) fn without_seen(mut self) -> Self {
+        self.summary.seen = LinearRgb::black(0, 0);
         self
     }
 

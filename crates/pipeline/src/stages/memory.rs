@@ -3,7 +3,7 @@
 use dioptric_forward::ImagingPlan;
 use dioptric_scene::Scene;
 
-use super::film::FilmPlace;
+use super::{film::FilmPlace, irradiance::STRIP_BYTES};
 use crate::PipelineError;
 
 /// What the program takes before it has a scene: code, tables, the lens and its rays, bytes.
@@ -22,8 +22,12 @@ const MERGED_BYTES: u64 = 25;
 const CODE_BYTES: u64 = 2;
 const MERGING_BYTES: u64 = 4;
 
-/// Rows of all bands that take memory while `irradiance.exr` is written: two blocks of 32 as they are read and packed by two threads, and packed.
-const WRITTEN_ROWS: u64 = 7 * 32;
+/// What a picture takes for a sample while it is rendered, bytes: sums of its means and of their squares, and the picture; and for a pixel more.
+const RENDERED_BYTES: u64 = 20;
+const RENDERED_PIXEL_BYTES: u64 = 8;
+
+/// Rows of all bands that are one block of `irradiance.exr`.
+const BLOCK_ROWS: u64 = 32;
 
 /// What bands in flight and kept kernels take where nobody counts, bytes.
 const USUAL_BYTES: u64 = 256 << 20;
@@ -66,7 +70,7 @@ impl MemoryBudget {
 
     /// Returns what the stages after an irradiance of so many bands take, bytes.
     fn film_bytes(self, place: &FilmPlace, n_bands: usize) -> u64 {
-        self.pixel_bytes * (place.rows * place.columns) as u64 + 4 * WRITTEN_ROWS * (place.columns * n_bands) as u64
+        self.pixel_bytes * (place.rows * place.columns) as u64 + written_bytes(place.columns, n_bands)
     }
 
     /// Checks that a scene and its film fit before the lens is traced.
@@ -76,6 +80,27 @@ impl MemoryBudget {
     pub(crate) fn check(self, scene: &Scene, place: &FilmPlace) -> Result<(), PipelineError> {
         let samples = (scene.rows() * scene.columns()).max(place.rows * place.columns) as u64;
         self.left(imaging_bytes(scene, place), 16 * samples, self.film_bytes(place, n_bands(scene))).map(|_| ())
+    }
+
+    /// Checks that a world fits that is rendered as so many rows and columns, in some layers one after the other.
+    ///
+    /// # Errors
+    /// Says the least that would do.
+    pub(crate) fn check_rendering(
+        self,
+        (rows, columns): (usize, usize),
+        n_bands: usize,
+        n_layers: u32,
+    ) -> Result<(), PipelineError> {
+        let (n_pixels, n_bands) = ((rows * columns) as u64, n_bands as u64);
+        let first = u64::from(n_layers.saturating_sub(1)) * 4 * n_bands * n_pixels;
+        self.left(first + (RENDERED_BYTES * n_bands + RENDERED_PIXEL_BYTES) * n_pixels, 0, 0).map(|_| ())
+    }
+
+    /// As [`check_rendering`](Self::check_rendering), of a picture on a film.
+    pub(crate) fn check_rendering_on(self, place: &FilmPlace, n_bands: usize) -> Result<(), PipelineError> {
+        self.check_rendering((place.rows, place.columns), n_bands, 1)?;
+        self.left(0, 0, self.film_bytes(place, n_bands)).map(|_| ())
     }
 
     /// Returns the plan with bands in flight and kept kernels that fit.
@@ -107,7 +132,17 @@ impl MemoryBudget {
 
     /// Whether so many bytes can stay in memory while frames are taken and developed.
     pub(crate) fn holds(self, bytes: u64, place: &FilmPlace, n_bands: usize) -> bool {
-        PROGRAM_BYTES + bytes + self.film_bytes(place, n_bands) <= self.bytes
+        bytes <= self.left_beside_film(place, n_bands, 0)
+    }
+
+    /// Whether so many bytes are a small part, beside which nothing need be counted.
+    pub(crate) fn is_ample_for(self, bytes: u64) -> bool {
+        4 * bytes <= self.bytes
+    }
+
+    /// Returns the bytes that are left beside what becomes of an irradiance, and beside others that are taken.
+    pub(crate) fn left_beside_film(self, place: &FilmPlace, n_bands: usize, taken_bytes: u64) -> u64 {
+        self.bytes.saturating_sub(PROGRAM_BYTES + taken_bytes + self.film_bytes(place, n_bands))
     }
 
     /// Half of what scene and plan leave is for bands in flight and what they are interpolated from, a quarter each for kernels and irradiance;
@@ -132,6 +167,13 @@ impl MemoryBudget {
         }
         Ok(self.bytes - PROGRAM_BYTES - fixed)
     }
+}
+
+/// Returns what takes memory while `irradiance.exr` is written, bytes: blocks as they are read and packed, and those that two threads pack.
+fn written_bytes(columns: usize, n_bands: usize) -> u64 {
+    let block = 4 * BLOCK_ROWS * (columns * n_bands) as u64;
+    let n_at_once = (STRIP_BYTES as u64 / block.max(1)).clamp(1, 4 * rayon::current_num_threads() as u64);
+    2 * n_at_once * block + 3 * block
 }
 
 /// Returns what the scene takes, bytes.

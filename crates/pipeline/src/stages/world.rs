@@ -104,11 +104,13 @@ const SIZE: (usize, usize) = (720, 480);
 
 /// Renders the view from the middle of the entrance pupil: radiance and depth.
 ///
-/// Where rays from the film make the picture, the view is but its summary, and one pass does.
+/// Where rays from the film make the picture, the view is but its summary, and one pass does. `has_room` tells whether so many rows, columns, bands and
+/// layers may take the memory that they do.
 pub(super) fn view(
     inputs: &SceneInputs,
     spec: &WorldSpec,
     world: &Arc<World>,
+    has_room: &dyn Fn((usize, usize), usize, u32) -> Result<(), PipelineError>,
     watch: &Watch<'_>,
 ) -> Result<ResolvedScene, PipelineError> {
     let geometry = &inputs.geometry;
@@ -124,6 +126,8 @@ pub(super) fn view(
     let view = View::from_horizontal_fov_deg(fov_deg, columns, rows)?;
     let wanted = geometry.wavelengths.of_world()?;
     let bands = Bands { grid: geometry.quality.bands_of(&wanted)?, sampling: spec.bands };
+    let n_layers = if spec.method == RenderMethod::Forward { spec.layers } else { 1 };
+    has_room((rows, columns), bands.grid.len(), n_layers)?;
     let half_tangents = 0.5 * DVec2::new(columns as f64, rows as f64) / view.focal_px;
     let pixels = PixelGrid::new(columns, rows);
     let pinhole = Pinhole { placement: placement(world, spec), pixels, half_tangents, layer: 0 };
@@ -136,7 +140,6 @@ pub(super) fn view(
     let camera = Camera::Pinhole(pinhole);
     let (paths, seed) = (spec.paths, spec.seed);
     let render = WorldRender { stage, camera, bands, paths, seed, samples_per_pass, identity: String::new() };
-    let n_layers = if spec.method == RenderMethod::Forward { spec.layers } else { 1 };
     let seen = |layer: u32| -> Result<SpectralImage, PipelineError> {
         let render = WorldRender { camera: Camera::Pinhole(Pinhole { layer, ..pinhole }), ..render.clone() };
         let mut renderer = render.renderer()?;
@@ -144,7 +147,7 @@ pub(super) fn view(
         let range = (share * f64::from(layer), share * f64::from(layer + 1));
         let progress = AtStage { progress: watch.progress, stage: Stage::Scene, range };
         render.refine(&mut renderer, effort, &progress, watch.cancel, &mut |_| Ok(true))?;
-        Ok(renderer.rendering().picture)
+        Ok(renderer.picture())
     };
     let radiance = seen(0)?;
     let mut depths = layered_depth(world, &pinhole, n_layers as usize, watch.cancel)?.into_iter();
@@ -291,7 +294,7 @@ impl WorldRender {
         let coarse = Self { camera: self.camera.clone().with_pixels(pixels), samples_per_pass: 1, ..self.clone() };
         let mut renderer = coarse.renderer()?;
         renderer.pass(cancel, &|_| {})?;
-        Ok(renderer.rendering().picture)
+        Ok(renderer.picture())
     }
 
     /// Returns the same in passes of as many samples as leave some that tell the noise, where their number is known: a large
@@ -370,10 +373,10 @@ impl WorldRender {
     ///
     /// # Errors
     /// When the work is cancelled.
-    pub(crate) fn render(&self, effort: RenderEffort, watch: &Watch<'_>) -> Result<Rendering, PipelineError> {
+    pub(crate) fn render(&self, effort: RenderEffort, watch: &Watch<'_>) -> Result<SpectralImage, PipelineError> {
         let mut renderer = self.renderer()?;
         self.refine(&mut renderer, effort, watch.progress, watch.cancel, &mut |_| Ok(true))?;
-        Ok(renderer.rendering())
+        Ok(renderer.picture())
     }
 
     /// Returns what the camera sees besides light: depth, normals, materials.

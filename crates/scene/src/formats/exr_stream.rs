@@ -1,4 +1,4 @@
-//! Writing a spectral EXR whose bands need not be in memory together.
+//! Writing a spectral EXR, with depth, whose bands need not be in memory together.
 
 use std::{
     io::{BufWriter, Seek, Write},
@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use dioptric_spectrum::{Quantity, WavelengthGrid, sort_exr_attributes};
+use dioptric_spectrum::{DepthMap, Quantity, WavelengthGrid, sort_exr_attributes};
 use exr::{
     block::{
         BlockIndex, UncompressedBlock,
@@ -17,15 +17,16 @@ use exr::{
     meta::{BlockDescription, Headers, header::Header},
     prelude::{ChannelDescription, LayerAttributes, LineOrder, SmallVec, Text, Vec2},
 };
+use ndarray::s;
 use rayon::prelude::*;
 
 use super::{
     beside::{PartialFile, unwritable},
     exr_attributes,
     exr_samples::{ExrSamples, Stored},
-    exr_write::band_name,
+    exr_write::{band_name, check_size},
 };
-use crate::SceneError;
+use crate::{SceneError, View};
 
 /// What is known of a spectral image before its samples.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +39,10 @@ pub struct SpectralHead<'a> {
     pub size: (usize, usize),
     /// Distance between samples on the film, µm.
     pub pitch_um: Option<f64>,
+    /// Axial depth, written as channel `Z` of single floats.
+    pub depth: Option<&'a DepthMap>,
+    /// Pinhole geometry, written as attributes.
+    pub view: Option<View>,
     /// The largest sample of all bands, which half floats are fitted to.
     pub largest: f32,
     /// How samples are stored.
@@ -51,7 +56,7 @@ impl SpectralHead<'_> {
     /// in the order of rows and from one thread.
     ///
     /// # Errors
-    /// When the picture is empty, `rows_of` fails or returns another number of samples, or the file cannot be written; it is then not there.
+    /// When the picture is empty or the depth of another size, `rows_of` fails or returns another number of samples, or the file cannot be written; it is then not there.
     pub fn write_exr(
         &self,
         path: &Path,
@@ -60,6 +65,9 @@ impl SpectralHead<'_> {
         let (rows, columns) = self.size;
         if rows == 0 || columns == 0 {
             return Err(unwritable(path, format!("a picture of {rows} × {columns} samples")));
+        }
+        if let Some(depth) = self.depth {
+            check_size(path, DEPTH, depth.z_m(), self.size)?;
         }
         let stored = self.samples.layout(self.quantity, self.largest);
         let channels = Channels::of(self);
@@ -79,25 +87,41 @@ impl SpectralHead<'_> {
     }
 }
 
-/// The bands in the order of their channels.
+/// The name of the channel of depth.
+const DEPTH: &str = "Z";
+
+/// What a channel holds.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Content {
+    Band(usize),
+    Depth,
+}
+
+/// The channels of a file.
 struct Channels {
-    /// The name of each channel and its band.
-    bands: Vec<(String, usize)>,
+    /// Ascending by name.
+    by_name: Vec<(String, Content)>,
 }
 
 impl Channels {
     fn of(head: &SpectralHead<'_>) -> Self {
         let names = head.grid.centers_nm().iter().map(|&nm| band_name(head.quantity, nm));
-        let mut bands: Vec<(String, usize)> = names.zip(0..).collect();
-        bands.sort();
-        Self { bands }
+        let bands = names.zip((0..).map(Content::Band));
+        let depth = head.depth.map(|_| (DEPTH.to_owned(), Content::Depth));
+        let mut by_name: Vec<(String, Content)> = bands.chain(depth).collect();
+        by_name.sort();
+        Self { by_name }
     }
 
     fn headers(&self, head: &SpectralHead<'_>, stored: &Stored) -> Headers {
-        let kind = stored.sample_type();
-        let channels = self.bands.iter().map(|(name, _)| ChannelDescription::named(name.as_str(), kind)).collect();
+        let kind_of = |content| match content {
+            Content::Band(_) => stored.sample_type(),
+            Content::Depth => Stored::single().sample_type(),
+        };
+        let channel = |(name, content): &(String, Content)| ChannelDescription::named(name.as_str(), kind_of(*content));
+        let channels = self.by_name.iter().map(channel).collect();
         let mut attributes = LayerAttributes::default();
-        exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), head.pitch_um, None);
+        exr_attributes::add_to(&mut attributes, stored.unit.text.as_deref(), head.pitch_um, head.view);
         let (rows, columns) = head.size;
         let header = Header::new(Text::from("bands"), Vec2(columns, rows), channels)
             .with_attributes(attributes)
@@ -120,7 +144,7 @@ impl Lines<'_> {
     fn write<W: Write + Seek>(&mut self, headers: &[Header], chunks: &mut ChunkWriter<W>) -> exr::error::UnitResult {
         let (rows, columns) = self.head.size;
         let rows_per_block = self.head.samples.compression().scan_lines_per_block();
-        let block_bytes = 4 * columns * self.channels.bands.len() * rows_per_block;
+        let block_bytes = 4 * columns * self.channels.by_name.len() * rows_per_block;
         let n_blocks = rows.div_ceil(rows_per_block);
         // Blocks are fetched one by one and packed by all threads.
         let n_at_once = (self.head.at_once_bytes / block_bytes).clamp(1, 4 * rayon::current_num_threads());
@@ -140,21 +164,29 @@ impl Lines<'_> {
 
     fn block(&mut self, rows: Range<usize>) -> exr::error::Result<UncompressedBlock> {
         let columns = self.head.size.1;
-        let bands = self.channels.bands.iter().map(|&(_, band)| (self.rows_of)(band, rows.clone()));
-        let bands = bands.collect::<Result<Vec<Vec<f32>>, String>>().and_then(|bands| {
-            let is_whole = bands.iter().all(|band| band.len() == rows.len() * columns);
-            if is_whole { Ok(bands) } else { Err(format!("bands of other sizes in rows {rows:?}")) }
+        let channels = self.channels.by_name.iter().map(|&(_, content)| match content {
+            Content::Band(band) => Ok((self.stored.clone(), (self.rows_of)(band, rows.clone())?)),
+            Content::Depth => {
+                let of_row = |depth: &DepthMap| depth.z_m().slice(s![rows.clone(), ..]).iter().copied().collect();
+                Ok((Stored::single(), self.head.depth.map_or(vec![], of_row)))
+            }
         });
-        let bands = match bands {
-            Ok(bands) => bands,
+        let channels = channels.collect::<Result<Vec<(Stored, Vec<f32>)>, String>>().and_then(|channels| {
+            let is_whole = channels.iter().all(|(_, samples)| samples.len() == rows.len() * columns);
+            if is_whole { Ok(channels) } else { Err(format!("bands of other sizes in rows {rows:?}")) }
+        });
+        let channels = match channels {
+            Ok(channels) => channels,
             Err(reason) => {
                 *self.failed = Some(reason);
                 return Err(exr::error::Error::Aborted);
             }
         };
-        let mut data = Vec::with_capacity(4 * columns * rows.len() * bands.len());
+        let mut data = Vec::with_capacity(4 * columns * rows.len() * channels.len());
         for row in 0..rows.len() {
-            bands.iter().for_each(|band| self.stored.append(&band[row * columns..][..columns], &mut data));
+            channels
+                .iter()
+                .for_each(|(stored, samples)| stored.append(&samples[row * columns..][..columns], &mut data));
         }
         let index = BlockIndex {
             layer: 0,

@@ -125,6 +125,8 @@ fn head(image: &SpectralImage, samples: ExrSamples) -> SpectralHead<'_> {
         grid: image.grid(),
         size,
         pitch_um: image.pitch_um(),
+        depth: None,
+        view: None,
         largest,
         samples,
         at_once_bytes: 1 << 20,
@@ -145,15 +147,26 @@ fn tall() -> SpectralImage {
 }
 
 #[test]
-fn rows_make_the_file_that_the_whole_makes() {
+fn rows_make_the_file_that_layers_make() {
     let (file, tall) = (file(), tall());
+    let depth =
+        DepthMap::new(Array2::from_shape_fn((75, 11), |(row, column)| 1.0 + (row * 11 + column) as f32)).unwrap();
+    let view = Some(View { focal_px: 40.0, center_x_px: 5.5, center_y_px: 30.0 });
+    let hidden = HiddenLayer { radiance: tall.clone(), depth: depth.clone() };
     for samples in ExrSamples::NAMES.map(|(_, samples)| samples) {
-        head(&tall, samples).write_exr(&file.path, &mut rows_of(&tall)).unwrap();
-        let in_rows = read_spectral_exr(&file.path).unwrap();
-        write_spectral_exr(&file.path, &tall, &ExrParts { samples, ..ExrParts::default() }).unwrap();
-        assert_eq!(in_rows, read_spectral_exr(&file.path).unwrap());
-        let is_exact = in_rows.image == tall;
-        assert_eq!(is_exact, samples != ExrSamples::Half);
+        let whole = |at_once_bytes| SpectralHead { depth: Some(&depth), view, at_once_bytes, ..head(&tall, samples) };
+        whole(1 << 20).write_exr(&file.path, &mut rows_of(&tall)).unwrap();
+        let (in_rows, bytes) = (read_spectral_exr(&file.path).unwrap(), fs::read(&file.path).unwrap());
+        assert_eq!((in_rows.depth.as_ref(), in_rows.view), (Some(&depth), view));
+        assert_eq!(in_rows.image == tall, samples != ExrSamples::Half);
+        whole(1).write_exr(&file.path, &mut rows_of(&tall)).unwrap();
+        assert_eq!(fs::read(&file.path).unwrap(), bytes);
+        let parts = ExrParts { samples, depth: Some(&depth), view, ..ExrParts::default() };
+        write_spectral_exr(&file.path, &tall, &parts).unwrap();
+        assert_eq!(fs::read(&file.path).unwrap(), bytes);
+        write_spectral_exr(&file.path, &tall, &ExrParts { hidden: Some(&hidden), ..parts }).unwrap();
+        let layered = read_spectral_exr(&file.path).unwrap();
+        assert_eq!((layered.image, layered.depth, layered.view), (in_rows.image, in_rows.depth, in_rows.view));
     }
 }
 

@@ -7,16 +7,20 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder, SmallVec, Text,
     WritableImage,
 };
-use ndarray::Array2;
+use ndarray::{Array2, s};
 
 use super::{
     band_name::{self, BandKind},
     beside::{PartialFile, unwritable},
     exr_attributes,
     exr_samples::{ExrSamples, Stored},
+    exr_stream::SpectralHead,
     spectral_exr::HIDDEN_LAYER,
 };
 use crate::{HiddenLayer, Scene, SceneError, View};
+
+/// Bytes of samples that are packed at a time.
+const AT_ONCE_BYTES: usize = 32 << 20;
 
 /// The name of what is seen, beside a layer that is hidden.
 const FIRST_LAYER: &str = "visible";
@@ -41,13 +45,28 @@ pub struct ExrParts<'a> {
 /// # Errors
 /// When the depth is not of the image's size, or the file cannot be written; it is then not there.
 pub fn write_spectral_exr(path: &Path, image: &SpectralImage, parts: &ExrParts<'_>) -> Result<(), SceneError> {
+    let Some(hidden) = parts.hidden else { return write_single_layer(path, image, parts) };
     // Only a file of several layers names them.
-    let name = parts.hidden.map(|_| FIRST_LAYER);
-    let mut layers = vec![layer_of(path, image, parts.depth, parts, name)?];
-    if let Some(hidden) = parts.hidden {
-        layers.push(layer_of(path, &hidden.radiance, Some(&hidden.depth), parts, Some(HIDDEN_LAYER))?);
-    }
-    write_layers(path, layers)
+    let visible = layer_of(path, image, parts.depth, parts, Some(FIRST_LAYER))?;
+    let hidden = layer_of(path, &hidden.radiance, Some(&hidden.depth), parts, Some(HIDDEN_LAYER))?;
+    write_layers(path, vec![visible, hidden])
+}
+
+/// Writes an image a few rows at a time, without a copy of it.
+fn write_single_layer(path: &Path, image: &SpectralImage, parts: &ExrParts<'_>) -> Result<(), SceneError> {
+    let head = SpectralHead {
+        quantity: image.quantity(),
+        grid: image.grid(),
+        size: (image.rows(), image.columns()),
+        pitch_um: image.pitch_um().or(parts.pitch_um),
+        depth: parts.depth,
+        view: parts.view,
+        largest: largest(image.planes()),
+        samples: parts.samples,
+        at_once_bytes: AT_ONCE_BYTES,
+    };
+    let planes = image.planes();
+    head.write_exr(path, &mut |band, rows| Ok(planes[band].slice(s![rows, ..]).iter().copied().collect()))
 }
 
 /// Writes a scene with all that it has.
@@ -134,7 +153,12 @@ fn channel(
     Ok(AnyChannel::new(name, stored.samples(plane.iter())))
 }
 
-fn check_size(path: &Path, name: &str, plane: &Array2<f32>, (rows, columns): (usize, usize)) -> Result<(), SceneError> {
+pub(super) fn check_size(
+    path: &Path,
+    name: &str,
+    plane: &Array2<f32>,
+    (rows, columns): (usize, usize),
+) -> Result<(), SceneError> {
     if plane.dim() == (rows, columns) {
         return Ok(());
     }
