@@ -19,7 +19,7 @@ pub(crate) struct Level {
 }
 
 /// The least spread of a point, parts of the distance of the film's corner from the axis, whose fourth moments matter.
-const LEAST_SPREAD: f64 = 0.1;
+const LEAST_SPREAD: f64 = 0.05;
 /// The spreads up to which the factor is that, and from which on there is none: blur about as wide as the film is known too roughly.
 const WIDE_SPREAD: (f64, f64) = (0.5, 1.0);
 /// A factor that is nowhere farther from 1 than this is none.
