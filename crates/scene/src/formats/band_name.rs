@@ -1,6 +1,8 @@
 //! The names of spectral channels: `S0.550,000000nm`, `T.5,5e-7m`, `S0.545THz` (Fichet et al. 2021, and pbrt's spectral film),
 //! `360.00-375.67nm` (a bin of Mitsuba 0.6) and the bare `550nm`.
 
+use dioptric_spectrum::Quantity;
+
 /// Metres a second.
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
@@ -11,6 +13,15 @@ pub(crate) enum BandKind {
     Emissive,
     /// `T`: a reflectance or transmittance factor.
     Reflective,
+}
+
+/// Returns the name of the channel of a band.
+pub(super) fn of(quantity: Quantity, wavelength_nm: f64) -> String {
+    let kind = match quantity {
+        Quantity::Radiance | Quantity::Irradiance => BandKind::Emissive,
+        Quantity::Reflectance => BandKind::Reflective,
+    };
+    format(kind, wavelength_nm)
 }
 
 /// Returns the kind and wavelength (nm) of a channel name, or `None` if it is no spectral channel.
@@ -53,7 +64,7 @@ fn wavelength_nm(text: &str) -> Option<f64> {
 }
 
 /// Returns the name of a band; parsed again it gives the same wavelength to the bit.
-pub(crate) fn format(kind: BandKind, wavelength_nm: f64) -> String {
+fn format(kind: BandKind, wavelength_nm: f64) -> String {
     let prefix = match kind {
         BandKind::Emissive => "S0",
         BandKind::Reflective => "T",

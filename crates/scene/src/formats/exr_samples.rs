@@ -1,11 +1,13 @@
 //! How samples are stored in OpenEXR files.
 
-use std::str::FromStr;
+use std::{path::Path, str::FromStr};
 
 use dioptric_spectrum::Quantity;
 use exr::prelude::{Compression, FlatSamples, SampleType, f16};
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
+use super::beside::unwritable;
 use crate::SceneError;
 
 /// The largest half float.
@@ -126,6 +128,21 @@ impl Stored {
             block.extend(samples.iter().flat_map(|sample| sample.to_ne_bytes()));
         }
     }
+}
+
+/// Checks that the plane of a channel has as many rows and columns as the file.
+pub(super) fn check_size(
+    path: &Path,
+    name: &str,
+    plane: &Array2<f32>,
+    (rows, columns): (usize, usize),
+) -> Result<(), SceneError> {
+    if plane.dim() == (rows, columns) {
+        return Ok(());
+    }
+    let (found_rows, found_columns) = plane.dim();
+    let reason = format!("channel '{name}' has {found_rows} × {found_columns} samples, expected {rows} × {columns}");
+    Err(unwritable(path, reason))
 }
 
 #[cfg(test)]

@@ -21,10 +21,10 @@ use ndarray::s;
 use rayon::prelude::*;
 
 use super::{
+    band_name,
     beside::{PartialFile, unwritable},
     exr_attributes,
-    exr_samples::{ExrSamples, Stored},
-    exr_write::{band_name, check_size},
+    exr_samples::{ExrSamples, Stored, check_size},
 };
 use crate::{SceneError, View};
 
@@ -105,7 +105,7 @@ struct Channels {
 
 impl Channels {
     fn of(head: &SpectralHead<'_>) -> Self {
-        let names = head.grid.centers_nm().iter().map(|&nm| band_name(head.quantity, nm));
+        let names = head.grid.centers_nm().iter().map(|&nm| band_name::of(head.quantity, nm));
         let bands = names.zip((0..).map(Content::Band));
         let depth = head.depth.map(|_| (DEPTH.to_owned(), Content::Depth));
         let mut by_name: Vec<(String, Content)> = bands.chain(depth).collect();

@@ -2,7 +2,7 @@
 
 use std::{io::BufWriter, path::Path};
 
-use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, sort_exr_attributes};
+use dioptric_spectrum::{DepthMap, SpectralImage, sort_exr_attributes};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder, SmallVec, Text,
     WritableImage,
@@ -10,10 +10,10 @@ use exr::prelude::{
 use ndarray::{Array2, s};
 
 use super::{
-    band_name::{self, BandKind},
+    band_name,
     beside::{PartialFile, unwritable},
     exr_attributes,
-    exr_samples::{ExrSamples, Stored},
+    exr_samples::{ExrSamples, Stored, check_size},
     exr_stream::SpectralHead,
     spectral_exr::HIDDEN_LAYER,
 };
@@ -117,7 +117,7 @@ fn layer_of(
     let stored = parts.samples.layout(image.quantity(), largest(image.planes()));
     let mut list = SmallVec::new();
     for (plane, &wavelength_nm) in image.planes().iter().zip(image.grid().centers_nm()) {
-        list.push(channel(path, &band_name(image.quantity(), wavelength_nm), plane, size, &stored)?);
+        list.push(channel(path, &band_name::of(image.quantity(), wavelength_nm), plane, size, &stored)?);
     }
     if let Some(depth) = depth {
         list.push(channel(path, "Z", depth.z_m(), size, &Stored::single())?);
@@ -151,29 +151,6 @@ fn channel(
 ) -> Result<AnyChannel<FlatSamples>, SceneError> {
     check_size(path, name, plane, size)?;
     Ok(AnyChannel::new(name, stored.samples(plane.iter())))
-}
-
-pub(super) fn check_size(
-    path: &Path,
-    name: &str,
-    plane: &Array2<f32>,
-    (rows, columns): (usize, usize),
-) -> Result<(), SceneError> {
-    if plane.dim() == (rows, columns) {
-        return Ok(());
-    }
-    let (found_rows, found_columns) = plane.dim();
-    let reason = format!("channel '{name}' has {found_rows} × {found_columns} samples, expected {rows} × {columns}");
-    Err(unwritable(path, reason))
-}
-
-/// Returns the name of the channel of a band.
-pub(super) fn band_name(quantity: Quantity, wavelength_nm: f64) -> String {
-    let kind = match quantity {
-        Quantity::Radiance | Quantity::Irradiance => BandKind::Emissive,
-        Quantity::Reflectance => BandKind::Reflective,
-    };
-    band_name::format(kind, wavelength_nm)
 }
 
 fn write_layers(path: &Path, mut layers: Vec<Layer<AnyChannels<FlatSamples>>>) -> Result<(), SceneError> {
