@@ -174,15 +174,22 @@ pub(super) fn lit_pixels(
     let shader = Shader::new(world, eye.origin, colors);
     // Light is kept in tones, on whatever bands: there is no picture, hence there are none.
     let painter = Painter { shader, colors, eye, n_bands: 0, which, painting };
-    let drawn = painter.rows(0..rows, columns)?;
     let mut smoothing = Smoothing::of_rows(rows);
-    smoothing.push(drawn.into_iter().map(|row| (row.guides, row.lights)), painting.cancel)?;
+    let n_at_once = rows_at_once();
+    for first in (0..rows).step_by(n_at_once) {
+        let drawn = painter.rows(first..(first + n_at_once).min(rows), columns)?;
+        smoothing.push(drawn.into_iter().map(|row| (row.guides, row.lights)), painting.cancel)?;
+        // All rows are kept as they end, none as they were gathered.
+        smoothing.forget_before(0);
+    }
     let (guides, lights) = smoothing.smoothed();
     Ok(LitPixels { guides: guides.concat(), lights: lights.concat() })
 }
 
-/// Rows that are drawn in one go: of more than these and as many again nothing but the picture is kept.
-const ROWS_AT_ONCE: usize = 48;
+/// Returns how many rows are drawn in one go, enough for no thread to wait for long: of more than these and as many again nothing but the picture is kept.
+fn rows_at_once() -> usize {
+    48.max(8 * rayon::current_num_threads())
+}
 
 /// Returns the picture of a world.
 pub(super) fn picture(
@@ -206,7 +213,8 @@ pub(super) fn picture(
         lines: lines(&mut planes),
         z_m: &mut z_m,
     };
-    let after = |row: usize| row..(row + ROWS_AT_ONCE).min(rows);
+    let n_at_once = rows_at_once();
+    let after = |row: usize| row..(row + n_at_once).min(rows);
     let mut next = after(0);
     let mut drawn = painter.rows(next.clone(), columns)?;
     while !drawn.is_empty() {
