@@ -4,27 +4,56 @@ use glam::{DVec2, DVec3};
 
 /// Mixes three numbers into a well-spread one.
 pub(super) fn hash(x: i64, y: i64, z: i64) -> u32 {
-    let mut h = (x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
-        ^ (y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
-        ^ (z as u64).wrapping_mul(0x1656_67B1_9E37_79F9);
+    mixed(times(x, X_FACTOR) ^ times(y, Y_FACTOR) ^ times(z, Z_FACTOR))
+}
+
+const X_FACTOR: u64 = 0x9E37_79B9_7F4A_7C15;
+const Y_FACTOR: u64 = 0xC2B2_AE3D_27D4_EB4F;
+const Z_FACTOR: u64 = 0x1656_67B1_9E37_79F9;
+
+fn times(number: i64, factor: u64) -> u64 {
+    (number as u64).wrapping_mul(factor)
+}
+
+fn mixed(h: u64) -> u32 {
+    let mut h = h;
     h = (h ^ (h >> 32)).wrapping_mul(0xD6E8_FEB8_6659_FD93);
     h = (h ^ (h >> 32)).wrapping_mul(0xD6E8_FEB8_6659_FD93);
     (h ^ (h >> 32)) as u32
 }
 
+fn in_unit(h: u32) -> f64 {
+    f64::from(h) / 4_294_967_296.0
+}
+
 /// Returns a number in 0–1 of three integers.
 pub(super) fn unit(x: i64, y: i64, z: i64) -> f64 {
-    f64::from(hash(x, y, z)) / 4_294_967_296.0
+    in_unit(hash(x, y, z))
+}
+
+/// Returns the whole number not above another, and how far that is from it.
+fn floor(v: f64) -> (i64, f64) {
+    let towards_zero = v as i64;
+    let whole = towards_zero - i64::from(towards_zero as f64 > v);
+    (whole, v - whole as f64)
 }
 
 /// Smooth noise, 0–1, of unit scale.
 pub(super) fn smooth(at: DVec3) -> f64 {
-    let cell = at.floor();
-    let (x, y, z) = (cell.x as i64, cell.y as i64, cell.z as i64);
-    let f = at - cell;
+    let [(x, fx), (y, fy), (z, fz)] = at.to_array().map(floor);
+    let f = DVec3::new(fx, fy, fz);
     let s = f * f * (DVec3::splat(3.0) - 2.0 * f);
     let lerp = |a: f64, b: f64, t: f64| a + (b - a) * t;
-    let edge = |dy: i64, dz: i64| lerp(unit(x, y + dy, z + dz), unit(x + 1, y + dy, z + dz), s.x);
+    // The corners of the cell, as `unit` of them.
+    let (x, y, z) = (
+        [x, x + 1].map(|x| times(x, X_FACTOR)),
+        [y, y + 1].map(|y| times(y, Y_FACTOR)),
+        [z, z + 1].map(|z| times(z, Z_FACTOR)),
+    );
+    let edge = |j: usize, k: usize| {
+        let [a, b] = x.map(|x| in_unit(mixed(x ^ y[j] ^ z[k])));
+        lerp(a, b, s.x)
+    };
     lerp(lerp(edge(0, 0), edge(1, 0), s.y), lerp(edge(0, 1), edge(1, 1), s.y), s.z)
 }
 
@@ -40,7 +69,8 @@ pub(super) fn cloudy(at: DVec3, blur: f64) -> f64 {
 /// Returns point `index` of a sequence that fills the square evenly (Roberts 2018), turned by an offset.
 pub(super) fn spread(index: usize, offset: DVec2) -> DVec2 {
     const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
-    (offset + (index as f64) * STEP).fract()
+    let DVec2 { x, y } = offset + (index as f64) * STEP;
+    DVec2::new(floor(x).1, floor(y).1)
 }
 
 /// Returns the offset of a pixel: neighbors differ as much as they can.

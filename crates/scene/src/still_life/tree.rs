@@ -1,117 +1,183 @@
 //! A tree of boxes, so that a ray is tried on few objects.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3, Vec4};
 
 use super::shape::Ray;
 
-/// Objects in boxes within boxes.
+/// Boxes of a node, which a ray is tried on together.
+const WIDTH: usize = 4;
+
+/// Objects in boxes within boxes, four to a node.
+///
+/// Boxes are of single precision, and widened by more than a ray of single precision errs: no object is missed.
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     nodes: Vec<Node>,
-    /// Objects in the order of the leaves.
-    order: Vec<usize>,
 }
 
-#[derive(Clone, Copy, Debug)]
+/// The boxes of up to four objects or nodes.
+#[derive(Clone, Debug)]
 struct Node {
-    low: DVec3,
-    high: DVec3,
-    /// The first of its objects in a leaf; else its second child, the first being the next node.
-    first: usize,
-    /// How many objects; 0 for a node with children.
+    /// By axis.
+    low: [Vec4; 3],
+    high: [Vec4; 3],
+    children: [Child; WIDTH],
+    /// How many they are.
     len: usize,
-    /// The axis along which the children were parted.
-    axis: usize,
+}
+
+/// The number of a node, or that of an object after all those of nodes.
+#[derive(Clone, Copy, Debug)]
+struct Child(u32);
+
+impl Child {
+    const FIRST_OBJECT: u32 = 1 << 31;
+
+    fn object(object: usize) -> Self {
+        Self(Self::FIRST_OBJECT + object as u32)
+    }
+
+    /// Returns the node's number, or else the object's.
+    fn number(self) -> Result<usize, usize> {
+        match self.0.checked_sub(Self::FIRST_OBJECT) {
+            None => Ok(self.0 as usize),
+            Some(object) => Err(object as usize),
+        }
+    }
 }
 
 type Bounds = (DVec3, DVec3);
 
 impl Tree {
-    /// Returns the tree over objects in these boxes, of which there is at least one.
-    pub(super) fn over(boxes: &[Bounds]) -> Self {
-        let mut tree = Self { nodes: Vec::new(), order: Vec::new() };
-        let mut objects: Vec<usize> = (0..boxes.len()).collect();
+    /// Returns the tree over these of the objects in boxes.
+    pub(super) fn over(boxes: &[Bounds], objects: impl IntoIterator<Item = usize>) -> Self {
+        let mut tree = Self { nodes: Vec::new() };
+        let mut objects: Vec<usize> = objects.into_iter().collect();
         tree.add(boxes, &mut objects);
         tree
     }
 
-    fn add(&mut self, boxes: &[Bounds], objects: &mut [usize]) -> usize {
-        let index = self.nodes.len();
-        let (low, high) = around(boxes, objects);
-        self.nodes.push(Node { low, high, first: self.order.len(), len: objects.len(), axis: 0 });
-        let Some((axis, at)) = best_split(boxes, objects) else {
-            self.order.extend_from_slice(objects);
-            return index;
-        };
-        objects.sort_by(|&a, &b| middle(boxes[a], axis).total_cmp(&middle(boxes[b], axis)).then(a.cmp(&b)));
-        let (left, right) = objects.split_at_mut(at);
-        self.add(boxes, left);
-        let second = self.add(boxes, right);
-        self.nodes[index] = Node { first: second, len: 0, axis, ..self.nodes[index] };
-        index
+    /// Adds the node of some objects, and returns its number.
+    fn add(&mut self, boxes: &[Bounds], objects: &mut [usize]) -> u32 {
+        let number = self.nodes.len();
+        let groups = groups(boxes, objects);
+        let none = [Vec4::ZERO; 3];
+        self.nodes.push(Node { low: none, high: none, children: [Child(0); WIDTH], len: groups.len() });
+        for (place, group) in groups.into_iter().enumerate() {
+            let (low, high) = around(boxes, group);
+            for axis in 0..3 {
+                self.nodes[number].low[axis][place] = low[axis] as f32;
+                self.nodes[number].high[axis][place] = high[axis] as f32;
+            }
+            self.nodes[number].children[place] = match group {
+                [object] => Child::object(*object),
+                _ => Child(self.add(boxes, group)),
+            };
+        }
+        number as u32
     }
 
     /// Calls `visit(object, t_max)` for objects whose boxes the ray meets before `t_max`; it returns the new `t_max`.
     pub(super) fn walk(&self, ray: Ray, t_max: f64, mut visit: impl FnMut(usize, f64) -> f64) {
-        let inverse = ray.direction.recip();
+        /// Above all roundings of a difference, a product and a quotient of single precision.
+        const ROUNDING: f32 = 1e-6;
+        /// A level of the tree leaves three of its nodes' boxes to be looked at.
+        const STACK: usize = 48;
+        let origin = ray.origin.as_vec3();
+        // Where it is 0 the planes are met far away, on the right side of them.
+        let inverse = ray.direction.as_vec3().to_array().map(|d| 1.0 / d.abs().max(1e-9).copysign(d));
+        let slack = ROUNDING * (Vec3::splat(4.0) + origin.abs());
+        // The origin moved against the planes that the ray comes in by and goes out by.
+        let (before, behind) = ((origin + slack).to_array(), (origin - slack).to_array());
         let mut t_max = t_max;
-        let mut stack = [0; 48];
+        let mut stack = [(0.0_f32, Child(0)); STACK];
         let mut height = 1;
         while height > 0 {
             height -= 1;
-            let index = stack[height];
-            let node = &self.nodes[index];
-            let (a, b) = ((node.low - ray.origin) * inverse, (node.high - ray.origin) * inverse);
-            let (t_in, t_out) = (a.min(b).max_element(), a.max(b).min_element());
-            if t_in > t_out || t_out < 0.0 || t_in > t_max {
+            let (t_in, child) = stack[height];
+            if f64::from(t_in) > t_max {
                 continue;
             }
-            if node.len > 0 {
-                for &object in &self.order[node.first..node.first + node.len] {
+            let node = match child.number() {
+                Ok(number) => &self.nodes[number],
+                Err(object) => {
                     t_max = visit(object, t_max);
+                    continue;
                 }
-            } else {
-                // The nearer child last, so that it is looked at first.
-                let children = [index + 1, node.first];
-                let nearer = usize::from(ray.direction[node.axis] < 0.0);
-                stack[height] = children[1 - nearer];
-                stack[height + 1] = children[nearer];
-                height += 2;
+            };
+            let (mut t_in, mut t_out) = (Vec4::ZERO, Vec4::INFINITY);
+            for axis in 0..3 {
+                let inverse = Vec4::splat(inverse[axis]);
+                let low = (node.low[axis] - Vec4::splat(before[axis])) * inverse;
+                let high = (node.high[axis] - Vec4::splat(behind[axis])) * inverse;
+                t_in = t_in.max(low.min(high));
+                t_out = t_out.min(low.max(high));
+            }
+            t_in *= 1.0 - ROUNDING;
+            let is_met = t_in.cmple(t_out * (1.0 + ROUNDING)).bitmask();
+            let first = height;
+            for place in 0..node.len {
+                if is_met & 1 << place == 0 {
+                    continue;
+                }
+                // The nearest last, so that it is looked at first.
+                let mut at = height;
+                while at > first && stack[at - 1].0 < t_in[place] {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = (t_in[place], node.children[place]);
+                height += 1;
             }
         }
     }
+}
+
+/// Parts objects into up to four groups, those that take up most first.
+fn groups<'a>(boxes: &[Bounds], objects: &'a mut [usize]) -> Vec<&'a mut [usize]> {
+    let mut groups = vec![objects];
+    while groups.len() < WIDTH {
+        let cost = |group: &&mut [usize]| group.len() as f64 * area(around(boxes, group));
+        let divisible = (0..groups.len()).filter(|&i| groups[i].len() > 1);
+        let Some(most) = divisible.max_by(|&a, &b| cost(&groups[a]).total_cmp(&cost(&groups[b]))) else { break };
+        let group = groups.swap_remove(most);
+        let at = split(boxes, group);
+        let (left, right) = group.split_at_mut(at);
+        groups.extend([left, right]);
+    }
+    groups
 }
 
 fn around(boxes: &[Bounds], objects: &[usize]) -> Bounds {
     objects.iter().fold((DVec3::MAX, DVec3::MIN), |(low, high), &o| (low.min(boxes[o].0), high.max(boxes[o].1)))
 }
 
-fn middle((low, high): Bounds, axis: usize) -> f64 {
-    low[axis] + high[axis]
+fn area((low, high): Bounds) -> f64 {
+    let d = high - low;
+    d.x * d.y + d.y * d.z + d.z * d.x
 }
 
-/// Returns the axis and place at which to part objects, or `None` when they had better stay together.
+/// Sorts two objects or more along the axis that parts them best, and returns the place at which to part them.
 ///
 /// The cost of a side is its area times its objects: a ray meets a box in proportion to the box's area.
-fn best_split(boxes: &[Bounds], objects: &[usize]) -> Option<(usize, usize)> {
-    let area = |(low, high): Bounds| {
-        let d = high - low;
-        d.x * d.y + d.y * d.z + d.z * d.x
+fn split(boxes: &[Bounds], objects: &mut [usize]) -> usize {
+    let sort = |objects: &mut [usize], axis: usize| {
+        let middle = |object: usize| boxes[object].0[axis] + boxes[object].1[axis];
+        objects.sort_by(|&a, &b| middle(a).total_cmp(&middle(b)).then(a.cmp(&b)));
     };
-    let n = objects.len();
-    let mut best = (n as f64 * area(around(boxes, objects)), None);
-    let mut sorted = objects.to_vec();
+    let mut best = (f64::INFINITY, 0, 1);
     for axis in 0..3 {
-        sorted.sort_by(|&a, &b| middle(boxes[a], axis).total_cmp(&middle(boxes[b], axis)).then(a.cmp(&b)));
-        for at in 1..n {
+        sort(objects, axis);
+        for at in 1..objects.len() {
             let side = |part: &[usize]| (part.len() as f64 + 0.5) * area(around(boxes, part));
-            let cost = side(&sorted[..at]) + side(&sorted[at..]);
+            let cost = side(&objects[..at]) + side(&objects[at..]);
             if cost < best.0 {
-                best = (cost, Some((axis, at)));
+                best = (cost, axis, at);
             }
         }
     }
-    best.1
+    sort(objects, best.1);
+    best.2
 }
 
 #[cfg(test)]
@@ -126,7 +192,7 @@ mod tests {
                 (corner, corner + DVec3::splat(0.5))
             })
             .collect();
-        let tree = Tree::over(&boxes);
+        let tree = Tree::over(&boxes, 0..boxes.len());
         for i in 0..200 {
             let turn = 0.1 * f64::from(i);
             let direction = DVec3::new(turn.cos(), (0.7 * turn).sin(), turn.sin()).normalize();

@@ -23,6 +23,8 @@ pub(super) struct World {
     objects: Vec<Object>,
     thing_of_object: Vec<usize>,
     tree: Tree,
+    /// Of what casts a shadow.
+    shadows: Tree,
 }
 
 /// Where a ray meets an object.
@@ -58,8 +60,9 @@ impl World {
             things.iter().enumerate().flat_map(|(thing, objects)| std::iter::repeat_n(thing, objects.len())).collect();
         let objects: Vec<Object> = things.into_iter().flatten().collect();
         let boxes: Vec<_> = objects.iter().map(|object| object.shape.bounds(&object.frame)).collect();
-        let tree = Tree::over(&boxes);
-        Self { objects, thing_of_object, tree }
+        let tree = Tree::over(&boxes, 0..objects.len());
+        let shadows = Tree::over(&boxes, (0..objects.len()).filter(|&object| objects[object].casts_shadow));
+        Self { objects, thing_of_object, tree, shadows }
     }
 
     /// What each object is made of.
@@ -80,12 +83,13 @@ impl World {
                 return t_max;
             }
             let Object { shape, frame, .. } = &self.objects[object];
-            match shape.cross(frame.inward(ray), t_min, t_max) {
-                Some(crossing) => {
+            // Where the faces of two objects lie in each other the first of them is met, in whatever order they are tried.
+            match shape.cross(frame.inward(ray), t_min, t_max.next_up()) {
+                Some(crossing) if crossing.t < t_max || found.is_none_or(|(other, _)| object < other) => {
                     found = Some((object, crossing));
                     crossing.t
                 }
-                None => t_max,
+                _ => t_max,
             }
         });
         found.map(|(object, crossing)| Hit {
@@ -99,9 +103,9 @@ impl World {
     /// Tells whether anything casts a shadow on the way from a point, over a length.
     pub(super) fn is_shadowed(&self, ray: Ray, length: f64) -> bool {
         let mut is_shadowed = false;
-        self.tree.walk(ray, length, |object, t_max| {
-            let Object { shape, frame, casts_shadow, .. } = &self.objects[object];
-            if *casts_shadow && shape.cross(frame.inward(ray), OFFSET_M, length).is_some() {
+        self.shadows.walk(ray, length, |object, t_max| {
+            let Object { shape, frame, .. } = &self.objects[object];
+            if shape.cross(frame.inward(ray), OFFSET_M, length).is_some() {
                 is_shadowed = true;
                 // Nothing more need be looked at.
                 return f64::NEG_INFINITY;
@@ -144,7 +148,7 @@ impl Seen {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::still_life::pigment::Pigment;
+    use crate::still_life::{noise::unit, pigment::Pigment, room};
 
     fn ball(z: f64) -> Object {
         Object {
@@ -153,6 +157,36 @@ mod tests {
             material: Material::Matte(Pigment::Paper.index()),
             casts_shadow: true,
         }
+    }
+
+    #[test]
+    fn the_tree_misses_nothing_in_the_room() {
+        let world = room::world();
+        let cross = |object: usize, ray: Ray, t_min: f64, t_max: f64| {
+            let Object { shape, frame, .. } = &world.objects[object];
+            shape.cross(frame.inward(ray), t_min, t_max).map(|crossing| (crossing.t, object))
+        };
+        let mut n_shadowed = 0;
+        for i in 0..20_000 {
+            let random = |number: i64| 2.0 * unit(i, number, 77) - 1.0;
+            let direction = DVec3::new(random(0), random(1), 1.0).normalize();
+            let from_eye = Ray { origin: DVec3::new(0.0, 0.225, 0.0), direction };
+            let seen = world.seen(&world.first_hit(from_eye, 0.0, None).unwrap(), direction, 1e-3);
+            // Along an axis too, where the ray never meets most faces.
+            let axis = DVec3::AXES[i as usize % 3] * random(2).signum();
+            for direction in [DVec3::new(random(3), random(4), random(5)).normalize(), axis] {
+                let ray = seen.ray(direction);
+                let all = (0..world.objects.len()).filter_map(|object| cross(object, ray, 0.0, f64::INFINITY));
+                let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                assert_eq!(world.first_hit(ray, 0.0, None).map(|hit| (hit.t, hit.object)), nearest, "{ray:?}");
+                let casts = |&object: &usize| world.objects[object].casts_shadow;
+                let is_shadowed =
+                    (0..world.objects.len()).filter(casts).any(|object| cross(object, ray, OFFSET_M, 1.0).is_some());
+                assert_eq!(world.is_shadowed(ray, 1.0), is_shadowed, "{ray:?}");
+                n_shadowed += usize::from(is_shadowed);
+            }
+        }
+        assert!((2_000..30_000).contains(&n_shadowed), "{n_shadowed}");
     }
 
     #[test]
