@@ -85,9 +85,9 @@ impl PaintingFolder {
     }
 
     fn file(&self, life: &StillLife, grid: &WavelengthGrid) -> PathBuf {
-        let StillLife { rows, columns, horizontal_fov_deg, moved_m, .. } = *life;
+        let StillLife { rows, columns, horizontal_fov_deg, quick, moved_m, .. } = *life;
         let mut hasher = DefaultHasher::new();
-        (&self.build, rows, columns, horizontal_fov_deg.to_bits(), moved_m.map(f64::to_bits)).hash(&mut hasher);
+        (&self.build, rows, columns, horizontal_fov_deg.to_bits(), quick, moved_m.map(f64::to_bits)).hash(&mut hasher);
         grid.centers_nm().iter().for_each(|nm| nm.to_bits().hash(&mut hasher));
         self.path.join(format!("still-life-{columns}x{rows}-{:016x}.exr", hasher.finish()))
     }

@@ -1,5 +1,5 @@
 //! The still life as previews see it: painted once, a little wider and finer than it is wanted, so that another light, another field of view
-//! or another shape paints nothing.
+//! or another shape paints nothing. Those of previews are painted quickly.
 
 use std::ops::Range;
 
@@ -13,7 +13,10 @@ use crate::{PaintingFolder, PipelineError, Quality, Stage};
 pub(crate) type PaintingInputs = (StillLife, WavelengthGrid);
 
 /// Steps to twice the width, the height or the fineness of a canvas.
-const STEPS_PER_OCTAVE: f64 = 4.0;
+const STEPS_PER_OCTAVE: f64 = 8.0;
+
+/// Steps to those fields of view that are painted ahead first.
+const STEPS_AHEAD: f64 = 2.0;
 
 /// Fields of view that are looked at for what they are taken from lie so many steps apart; not a part of a step, where a painting serves one field of view
 /// alone.
@@ -69,7 +72,7 @@ impl Paintings<'_> {
         watch: &Watch<'_>,
     ) -> Result<(), PipelineError> {
         let own = steps_of(life.horizontal_fov_deg);
-        for canvas in canvases_within(life, quality, own - 1.0..own + 1.0) {
+        for canvas in canvases_within(life, quality, own - STEPS_AHEAD..own + STEPS_AHEAD) {
             self.kept.get_or_make((canvas, grid.clone()), |(canvas, grid)| self.painted(canvas, grid, watch))?;
         }
         let Some(folder) = self.folder.filter(|_| reach == PaintReach::All) else { return Ok(()) };
@@ -97,7 +100,7 @@ impl Paintings<'_> {
 }
 
 /// Returns the picture that a preview of the still life is taken from: as wide and as high as it and at least as fine, all three in steps of
-/// 19 %; the picture that the arrangement is made for is its own. `None` for a picture that is not worth one: a coarse or a full one.
+/// 9 %; the picture that the arrangement is made for is its own. `None` for a picture that is not worth one: a coarse or a full one.
 fn canvas_of(life: &StillLife, quality: Quality) -> Option<StillLife> {
     let columns = quality.canvas_columns()?;
     if life.columns != columns || life.with_hidden || life.moved_m != [0.0; 3] {
@@ -119,7 +122,7 @@ fn canvas_of(life: &StillLife, quality: Quality) -> Option<StillLife> {
     let horizontal_fov_deg = 2.0 * (0.5 * columns / samples_per_tan).atan().to_degrees();
     let canvas = StillLife { columns: columns as usize, rows: rows as usize, horizontal_fov_deg, ..*life };
     let is_usual = (canvas.columns, canvas.rows) == (usual.columns, usual.rows) && finer == 0.0;
-    Some(if is_usual { usual } else { canvas })
+    Some(StillLife { quick: quality == Quality::Preview, ..if is_usual { usual } else { canvas } })
 }
 
 /// Returns the pictures that previews of fields of view in a range are taken from, but for this one's own: those of the nearest fields of view first. The ends
@@ -162,7 +165,8 @@ mod tests {
 
     #[test]
     fn the_picture_of_the_arrangement_is_its_own_canvas() {
-        assert_eq!(canvas_of(&StillLife::new(540, 360), Quality::Preview), Some(StillLife::new(540, 360)));
+        let quick = StillLife { quick: true, ..StillLife::new(540, 360) };
+        assert_eq!(canvas_of(&StillLife::new(540, 360), Quality::Preview), Some(quick));
         assert_eq!(canvas_of(&StillLife::new(180, 120), Quality::Sketch), Some(StillLife::new(180, 120)));
         // Of a full or a coarse picture there is none.
         assert_eq!(canvas_of(&StillLife::new(1080, 720), Quality::Full), None);
@@ -179,11 +183,11 @@ mod tests {
                 let pitch = |life: &StillLife| 2.0 * tan(life) / life.columns as f64;
                 let height = |life: &StillLife| pitch(life) * life.rows as f64;
                 let finer = pitch(&life) / pitch(&canvas);
-                assert!((1.0 - 1e-9..1.19).contains(&finer), "{life:?}: {finer} times as fine");
+                assert!((1.0 - 1e-9..1.091).contains(&finer), "{life:?}: {finer} times as fine");
                 for over in [tan(&canvas) / tan(&life), height(&canvas) / height(&life)] {
                     // And one sample for rounding up.
                     assert!(
-                        (1.0 - 1e-9..1.19 * (1.0 + 1.2 / 100.0)).contains(&over),
+                        (1.0 - 1e-9..1.091 * (1.0 + 1.2 / 100.0)).contains(&over),
                         "{life:?}: {over} times as large"
                     );
                 }
@@ -195,10 +199,11 @@ mod tests {
     fn what_is_painted_ahead_serves_the_next_fields_of_view() {
         let canvas = |fov_deg, rows| canvas_of(&preview(fov_deg, rows), Quality::Preview).unwrap();
         for tenth in 60..1500 {
-            for (rows, most) in [(360, 3), (405, 5), (100, 5)] {
+            for (rows, most) in [(360, 5), (405, 9), (100, 9)] {
                 let fov_deg = 0.1 * f64::from(tenth);
                 let own = steps_of(fov_deg);
-                let mut known = canvases_within(&preview(fov_deg, rows), Quality::Preview, own - 1.0..own + 1.0);
+                let ahead = own - STEPS_AHEAD..own + STEPS_AHEAD;
+                let mut known = canvases_within(&preview(fov_deg, rows), Quality::Preview, ahead);
                 assert!(known.len() <= most, "{fov_deg}°, {rows} rows: {known:?}");
                 known.push(canvas(fov_deg, rows));
                 let tan = (0.5 * fov_deg).to_radians().tan();
@@ -221,7 +226,7 @@ mod tests {
             // Whole canvases apart, the next is farther off by a step at most.
             assert!(known.windows(2).all(|pair| distance(&pair[1]) > distance(&pair[0]) - 2.0), "{known:?}");
             known.push(canvas_of(&life, Quality::Preview).unwrap());
-            assert!(known.len() <= 25, "{}", known.len());
+            assert!(known.len() <= 48, "{}", known.len());
             for other in (51..1199).map(|tenth| preview(0.1 * f64::from(tenth), 360)) {
                 let canvas = canvas_of(&other, Quality::Preview).unwrap();
                 // The picture of the arrangement serves its own field of view alone.
@@ -233,7 +238,7 @@ mod tests {
     #[test]
     fn neighbors_share_a_canvas() {
         let canvas = |fov_deg, rows| canvas_of(&preview(fov_deg, rows), Quality::Preview).unwrap();
-        assert_eq!(canvas(36.0, 360), canvas(39.0, 360));
+        assert_eq!(canvas(36.0, 360), canvas(36.7, 360));
         assert_eq!(canvas(36.0, 370), canvas(36.0, 400));
         assert_ne!(canvas(36.0, 360), canvas(42.0, 360));
     }

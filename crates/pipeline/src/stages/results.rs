@@ -51,7 +51,7 @@ impl Default for KeptResults {
         Self {
             lens: Slot::new(8),
             world: Slot::new(2),
-            painting: Slot::new(6),
+            painting: Slot::new(10),
             lit: Slot::new(1),
             scene: Slot::new(2),
             summary: Slot::new(8),

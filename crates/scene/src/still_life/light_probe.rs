@@ -7,7 +7,7 @@ use super::{
     eye,
     pigment::Pigment,
     render::pixel_offsets,
-    shade::{Colors, Shader},
+    shade::{Colors, LightRays, Shader},
     shape::Ray,
     world::World,
 };
@@ -42,7 +42,7 @@ pub(super) fn light_on_grays(world: &World) -> Result<SceneLight, SceneError> {
                 continue;
             }
             let mut spectrum = vec![0.0_f32; grid.len()];
-            let lights = shader.gather(&seen, &pixel_offsets(row, column));
+            let lights = shader.gather(&seen, LightRays::ALL, &pixel_offsets(row, column));
             shader.add_lit(&lights, &[(pigment, 1.0)], 0.0, (&colors, &mut spectrum));
             for ((sum, radiance), reflectance) in sum.iter_mut().zip(spectrum).zip(shader.palette.of(pigment)) {
                 *sum += f64::from(radiance) / f64::from(*reflectance);

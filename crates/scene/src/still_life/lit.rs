@@ -10,12 +10,12 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::{
     StillLife, eye,
-    filter::{Guide, Lights},
+    filter::{Guide, Lights, light_between},
     material::{Light, Material},
     pigment::PigmentIndex,
     render::{Eye, LitPixels, Painting, Which, footprint_m, lit_pixels},
     room,
-    shade::{Colors, Shader, Spectra},
+    shade::{Colors, LightRays, Shader, Spectra},
     shape::Ray,
     world::{Hit, Seen, World},
 };
@@ -150,7 +150,7 @@ impl LitStillLife {
         let parts = seen.surface.mix.parts();
         let pigments = &mut pigments[..parts.len()];
         pigments.iter_mut().zip(parts).for_each(|(own, &(pigment, part))| *own = (pigment, diffuse * part));
-        let gathered = || shader.gather(&seen, &std::array::from_fn(|which| pair(1 + which as u32)));
+        let gathered = || shader.gather(&seen, LightRays::ALL, &std::array::from_fn(|which| pair(1 + which as u32)));
         let lights = self.light_on(&seen).unwrap_or_else(gathered);
         shader.add_lit(&lights, pigments, sheen, (&spectra, radiance));
     }
@@ -193,35 +193,13 @@ impl LitStillLife {
         // The pixels of a surface lie no farther apart than this, sloped as it may be.
         let cosine = (seen.flat_normal.dot(to_point_in_room(seen, &self.eye)) / to_point.length()).abs();
         let reach_m = 3.0 * to_point.length() / (self.eye.view.focal_px * cosine.max(0.05));
+        let (here, size) = (Guide::of(seen), (self.life.rows, self.life.columns));
         self.layers.iter().find_map(|layer| {
-            let size = (self.life.rows as i64, self.life.columns as i64);
-            // Between the four pixels around; where none of them is of the surface, as along an outline, from those about.
-            [1, 2].into_iter().find_map(|reach| {
-                let (mut sum, mut weights) = ([0.0; std::mem::size_of::<Lights>() / 4], 0.0);
-                for r in row.floor() as i64 + 1 - reach..=row.floor() as i64 + reach {
-                    for c in column.floor() as i64 + 1 - reach..=column.floor() as i64 + reach {
-                        if !(0..size.0).contains(&r) || !(0..size.1).contains(&c) {
-                            continue;
-                        }
-                        let index = (r * size.1 + c) as usize;
-                        let width = reach as f64;
-                        let near =
-                            (width - (row - r as f64).abs()).max(0.0) * (width - (column - c as f64).abs()).max(0.0);
-                        let weight = near * likeness(seen, &layer.guides[index], reach_m);
-                        if weight > 0.0 {
-                            weights += weight;
-                            sum.iter_mut().zip(&layer.lights[index]).for_each(|(s, l)| *s += weight * f64::from(*l));
-                        }
-                    }
-                }
-                (weights > LEAST_WEIGHT).then(|| sum.map(|s| (s / weights) as f32))
-            })
+            let pixel = |r: usize, c: usize| (&layer.guides[r * size.1 + c], &layer.lights[r * size.1 + c]);
+            light_between(&here, (row, column), size, reach_m, pixel)
         })
     }
 }
-
-/// Less than this the pixels around are not of the surface.
-const LEAST_WEIGHT: f64 = 1e-3;
 
 fn to_point_in_room(seen: &Seen, eye: &Eye) -> DVec3 {
     seen.point - eye.origin
@@ -230,18 +208,6 @@ fn to_point_in_room(seen: &Seen, eye: &Eye) -> DVec3 {
 /// The share of light that pigments scatter: none of a metal, all that the coat lets through of others.
 fn diffuse_share(seen: &Seen, fresnel: f32) -> f32 {
     if seen.surface.coat.metal.is_some() { 0.0 } else { 1.0 - fresnel }
-}
-
-/// Returns how well the light of a pixel is that of a point, 0–1: by object, slope and plane, as the painter smooths it.
-fn likeness(seen: &Seen, guide: &Guide, reach_m: f64) -> f64 {
-    let slope = seen.normal.dot(guide.normal);
-    let apart = guide.point - seen.point;
-    let square = apart.length_squared();
-    if guide.object as usize != seen.object || slope < 0.7 || square > reach_m * reach_m {
-        return 0.0;
-    }
-    let off_plane = seen.normal.dot(apart).powi(2) / (square + 1e-12);
-    slope.powi(8) * (-8.0 * off_plane).exp()
 }
 
 /// Colors at any wavelengths, between those that are known.

@@ -9,6 +9,7 @@ mod material;
 mod noise;
 mod pattern;
 mod pigment;
+mod quick;
 mod render;
 mod room;
 mod shade;
@@ -16,12 +17,15 @@ mod shape;
 mod tree;
 mod world;
 
+use std::sync::OnceLock;
+
 use dioptric_spectrum::{Cancel, DepthMap, SpectralImage, WavelengthGrid};
 use glam::{DMat3, DVec3};
 
-use crate::{HiddenLayer, Scene, SceneError, View};
+use crate::{HiddenLayer, Scene, SceneError, SceneLight, View};
 use light_probe::light_on_grays;
 pub use lit::{LitStillLife, StillLifePoint};
+use quick::quick_picture;
 use render::{Eye, Painting, Which, picture};
 
 /// How the still life is pictured.
@@ -35,6 +39,9 @@ pub struct StillLife {
     pub horizontal_fov_deg: f64,
     /// Whether to picture what lies behind each first thing too, which takes twice the time.
     pub with_hidden: bool,
+    /// Whether to paint it in a quarter of the time, for previews: pixels are looked at through fewer points, and light is gathered by a quarter of the
+    /// rays. Edges and shadows are rougher; depth is the same. What is hidden is painted as always.
+    pub quick: bool,
     /// How far the eye stands from its place in the arrangement, to its right, up and ahead, m.
     pub moved_m: [f64; 3],
 }
@@ -42,7 +49,7 @@ pub struct StillLife {
 impl StillLife {
     /// The picture that the arrangement is made for.
     pub fn new(columns: usize, rows: usize) -> Self {
-        Self { rows, columns, horizontal_fov_deg: 34.0, with_hidden: false, moved_m: [0.0; 3] }
+        Self { rows, columns, horizontal_fov_deg: 34.0, with_hidden: false, quick: false, moved_m: [0.0; 3] }
     }
 
     /// Returns the still life on these bands: absolute radiance, the depth at the center of each sample, the view.
@@ -79,7 +86,10 @@ impl StillLife {
         let n_layers = if self.with_hidden { 2 } else { 1 };
         let painting = Painting::new(n_layers * 2 * self.rows, progress, cancel);
         let layer = |which| picture(&world, &eye, (self.rows, self.columns), grid, which, &painting);
-        let first = layer(Which::First)?;
+        let first = match self.quick {
+            true => quick_picture(&world, &eye, (self.rows, self.columns), grid, &painting)?,
+            false => layer(Which::First)?,
+        };
         let hidden = match self.with_hidden {
             true => Some(layer(Which::Behind)?).map(|l| HiddenLayer { radiance: l.radiance, depth: l.depth }),
             false => None,
@@ -129,10 +139,20 @@ impl StillLife {
             depth: Some(depth),
             view: Some(self.view()?),
             hidden: None,
-            light: Some(light_on_grays(&room::world())?),
+            light: Some(light()?),
             notes: vec![],
         })
     }
+}
+
+/// Returns the light on the grays, measured once: it is the same for all pictures.
+fn light() -> Result<SceneLight, SceneError> {
+    static LIGHT: OnceLock<SceneLight> = OnceLock::new();
+    if let Some(light) = LIGHT.get() {
+        return Ok(light.clone());
+    }
+    let light = light_on_grays(&room::world())?;
+    Ok(LIGHT.get_or_init(|| light).clone())
 }
 
 /// The eye, a hand's breadth above the table, looking slightly down; moved so far to its right, up and ahead, m.
@@ -181,31 +201,79 @@ mod tests {
     #[test]
     fn one_thread_and_three_make_the_same_picture() {
         let grid = WavelengthGrid::uniform(450.0, 650.0, 100.0).unwrap();
-        let on = |n_threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
-            pool.install(|| StillLife::new(48, 32).scene(&grid).unwrap())
-        };
-        assert_eq!(on(1), on(3));
+        for quick in [false, true] {
+            let on = |n_threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+                pool.install(|| StillLife { quick, ..StillLife::new(48, 32) }.scene(&grid).unwrap())
+            };
+            assert_eq!(on(1), on(3));
+        }
+    }
+
+    /// Of its pixels' edges, textures and shadows, not of its light or its depth.
+    #[test]
+    fn a_quick_picture_shows_what_the_whole_one_does() {
+        let grid = WavelengthGrid::uniform(450.0, 650.0, 100.0).unwrap();
+        // More rows than are drawn in one go; an odd number of them and of columns; narrow, and so wide that its light is gathered otherwise.
+        for (columns, rows, fov_deg) in [(203, 137, 34.0), (150, 101, 8.0), (150, 101, 70.0), (3, 1, 34.0)] {
+            let whole = StillLife { horizontal_fov_deg: fov_deg, ..StillLife::new(columns, rows) };
+            let quick = StillLife { quick: true, ..whole }.scene(&grid).unwrap();
+            let whole = whole.scene(&grid).unwrap();
+            assert_eq!(quick.depth, whole.depth);
+            let (mut squares, mut n) = (0.0, 0.0);
+            for (few, all) in quick.radiance.planes().iter().zip(whole.radiance.planes()) {
+                let mean = |plane: &ndarray::Array2<f32>| {
+                    plane.iter().map(|v| f64::from(*v)).sum::<f64>() / plane.len() as f64
+                };
+                let full_scale = 4.0 * mean(all);
+                // A highlight is seen or missed.
+                assert!(
+                    (mean(few) / mean(all) - 1.0).abs() < 0.04 || rows == 1,
+                    "{fov_deg}°: {} for {}",
+                    mean(few),
+                    mean(all)
+                );
+                for (few, all) in few.iter().zip(all) {
+                    let [few, all] = [few, all].map(|v| (f64::from(*v) / full_scale).min(1.0));
+                    squares += (few - all).powi(2);
+                    n += 1.0;
+                }
+            }
+            let rms = f64::sqrt(squares / n);
+            println!("{fov_deg}°: {rms:.4} of full scale");
+            // Coarse as they are, a pixel in five is an edge.
+            assert!(rms < 0.05 || rows == 1, "{fov_deg}°: {rms}");
+        }
+    }
+
+    #[test]
+    fn what_is_hidden_behind_a_quick_picture_is_that_of_the_whole_one() {
+        let grid = WavelengthGrid::new(vec![550.0]).unwrap();
+        let whole = StillLife { with_hidden: true, ..StillLife::new(36, 24) };
+        let quick = StillLife { quick: true, ..whole }.scene(&grid).unwrap();
+        assert_eq!(quick.hidden, whole.scene(&grid).unwrap().hidden);
     }
 
     #[test]
     fn painting_reports_progress_and_is_cancelled() {
         let grid = WavelengthGrid::new(vec![550.0]).unwrap();
-        let life = StillLife { with_hidden: true, ..StillLife::new(24, 16) };
-        let (done, cancel) = (Mutex::new(Vec::new()), Cancel::new());
-        life.scene_with(&grid, &|part| done.lock().unwrap().push(part), &cancel).unwrap();
-        let mut done = done.into_inner().unwrap();
-        done.sort_by(f64::total_cmp);
-        // Two layers, each row of which is drawn and then lit.
-        assert_eq!(done, (1..=64).map(|n| f64::from(n) / 64.0).collect::<Vec<_>>());
-        for after in [0.0, 0.2, 0.4, 0.7] {
-            let cancel = Cancel::new();
-            let stop = |part: f64| {
-                if part > after {
-                    cancel.cancel()
-                }
-            };
-            assert!(matches!(life.scene_with(&grid, &stop, &cancel), Err(SceneError::Cancelled(_))), "{after}");
+        for quick in [false, true] {
+            let life = StillLife { with_hidden: true, quick, ..StillLife::new(24, 16) };
+            let (done, cancel) = (Mutex::new(Vec::new()), Cancel::new());
+            life.scene_with(&grid, &|part| done.lock().unwrap().push(part), &cancel).unwrap();
+            let mut done = done.into_inner().unwrap();
+            done.sort_by(f64::total_cmp);
+            // Two layers, each row of which is drawn and then lit.
+            assert_eq!(done, (1..=64).map(|n| f64::from(n) / 64.0).collect::<Vec<_>>());
+            for after in [0.0, 0.2, 0.4, 0.7] {
+                let cancel = Cancel::new();
+                let stop = |part: f64| {
+                    if part > after {
+                        cancel.cancel()
+                    }
+                };
+                assert!(matches!(life.scene_with(&grid, &stop, &cancel), Err(SceneError::Cancelled(_))), "{after}");
+            }
         }
     }
 

@@ -141,6 +141,16 @@ impl Palette {
         Self { n_bands: grid.len(), reflectances, tones, in_tones }
     }
 
+    /// The mean reflectance of a mixture over each tone.
+    pub(super) fn mean_in_tones(&self, mixture: &[(PigmentIndex, f32)]) -> [f32; N_TONES] {
+        let mut sum = [0.0; N_TONES];
+        for &(pigment, part) in mixture {
+            let tones = &self.in_tones[usize::from(pigment)];
+            sum.iter_mut().zip(tones).for_each(|(sum, tone)| *sum += part * tone);
+        }
+        sum
+    }
+
     /// The reflectance of a pigment, a value a band.
     pub(super) fn of(&self, pigment: PigmentIndex) -> &[f32] {
         &self.reflectances[usize::from(pigment) * self.n_bands..][..self.n_bands]

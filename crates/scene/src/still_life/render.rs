@@ -12,10 +12,10 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    filter::{Guide, Lights, Smoothing},
+    filter::{Guide, Lights, PASSES, Smoothing},
     noise::{pixel_offset, spread},
     pigment::PigmentIndex,
-    shade::{Colors, N_OFFSETS, Shader},
+    shade::{Colors, LightRays, N_OFFSETS, Shader},
     shape::Ray,
     world::{Hit, Seen, World},
 };
@@ -50,25 +50,25 @@ pub(super) struct Eye {
 }
 
 impl Eye {
-    fn ray(&self, row: f64, column: f64) -> Ray {
+    pub(super) fn ray(&self, row: f64, column: f64) -> Ray {
         let (x, y) = self.view.tan_at(row, column);
         Ray { origin: self.origin, direction: (self.axes * DVec3::new(x, y, 1.0)).normalize() }
     }
 
-    fn depth_m(&self, point: DVec3) -> f64 {
+    pub(super) fn depth_m(&self, point: DVec3) -> f64 {
         (point - self.origin).dot(self.axes.z_axis)
     }
 }
 
 /// A part of a pixel that shows one object, while the pixel is looked through.
-struct Part {
-    seen: Seen,
+pub(super) struct Part {
+    pub(super) seen: Seen,
     /// Share of the pixel.
-    share: f32,
+    pub(super) share: f32,
     /// The part of the share whose coat is rough.
-    sheen: f32,
+    pub(super) sheen: f32,
     /// Pigments, each with its share of the pixel.
-    pigments: Vec<(PigmentIndex, f32)>,
+    pub(super) pigments: Vec<(PigmentIndex, f32)>,
 }
 
 /// What is kept of a part until the light is smoothed.
@@ -142,7 +142,7 @@ pub(super) struct Painting<'a> {
     n_rows: usize,
     n_done: AtomicUsize,
     progress: &'a (dyn Fn(f64) + Sync),
-    cancel: &'a Cancel,
+    pub(super) cancel: &'a Cancel,
 }
 
 impl<'a> Painting<'a> {
@@ -150,7 +150,7 @@ impl<'a> Painting<'a> {
         Self { n_rows, n_done: AtomicUsize::new(0), progress, cancel }
     }
 
-    fn row_is_done(&self) {
+    pub(super) fn row_is_done(&self) {
         let n_done = 1 + self.n_done.fetch_add(1, Ordering::Relaxed);
         (self.progress)(n_done as f64 / self.n_rows as f64);
     }
@@ -174,7 +174,7 @@ pub(super) fn lit_pixels(
     let shader = Shader::new(world, eye.origin, colors);
     // Light is kept in tones, on whatever bands: there is no picture, hence there are none.
     let painter = Painter { shader, colors, eye, n_bands: 0, which, painting };
-    let mut smoothing = Smoothing::of_rows(rows);
+    let mut smoothing = Smoothing::of_rows(rows, PASSES);
     let n_at_once = rows_at_once();
     for first in (0..rows).step_by(n_at_once) {
         let drawn = painter.rows(first..(first + n_at_once).min(rows), columns)?;
@@ -187,7 +187,7 @@ pub(super) fn lit_pixels(
 }
 
 /// Returns how many rows are drawn in one go, enough for no thread to wait for long: of more than these and as many again nothing but the picture is kept.
-fn rows_at_once() -> usize {
+pub(super) fn rows_at_once() -> usize {
     48.max(8 * rayon::current_num_threads())
 }
 
@@ -207,7 +207,7 @@ pub(super) fn picture(
     let mut z_m = Array2::zeros((rows, columns));
     let mut finishing = Finishing {
         painter: &painter,
-        smoothing: Smoothing::of_rows(rows),
+        smoothing: Smoothing::of_rows(rows, PASSES),
         drawn: VecDeque::new(),
         n_finished: 0,
         lines: lines(&mut planes),
@@ -228,7 +228,7 @@ pub(super) fn picture(
 }
 
 /// Returns the rows of bands, those of all bands together.
-fn lines(planes: &mut [Array2<f32>]) -> Vec<Vec<&mut [f32]>> {
+pub(super) fn lines(planes: &mut [Array2<f32>]) -> Vec<Vec<&mut [f32]>> {
     let (rows, columns) = planes.first().map_or((0, 0), Array2::dim);
     let mut lines: Vec<Vec<&mut [f32]>> = (0..rows).map(|_| Vec::with_capacity(planes.len())).collect();
     for plane in planes {
@@ -280,13 +280,13 @@ impl Finishing<'_> {
     }
 }
 
-struct Painter<'a> {
-    shader: Shader<'a>,
-    colors: &'a Colors,
-    eye: &'a Eye,
-    n_bands: usize,
-    which: Which,
-    painting: &'a Painting<'a>,
+pub(super) struct Painter<'a> {
+    pub(super) shader: Shader<'a>,
+    pub(super) colors: &'a Colors,
+    pub(super) eye: &'a Eye,
+    pub(super) n_bands: usize,
+    pub(super) which: Which,
+    pub(super) painting: &'a Painting<'a>,
 }
 
 impl Painter<'_> {
@@ -302,13 +302,24 @@ impl Painter<'_> {
             drawn.z_m.push(aim.z_m as f32);
             let parts = self.parts(&aim, &mut drawn.own[column * self.n_bands..][..self.n_bands]);
             let largest = &parts[0].seen;
-            let guide = Guide { object: largest.object as u32, point: largest.point, normal: largest.normal };
-            drawn.guides.push(guide);
-            drawn.lights.push(self.shader.gather(largest, &pixel_offsets(row, column)));
+            drawn.guides.push(Guide::of(largest));
+            drawn.lights.push(self.shader.gather(largest, LightRays::ALL, &pixel_offsets(row, column)));
             drawn.push(parts);
         }
         self.painting.row_is_done();
         Ok(drawn)
+    }
+
+    /// Returns what is seen first at a place of the picture.
+    pub(super) fn look(&self, row: f64, column: f64) -> Seen {
+        let ray = self.eye.ray(row, column);
+        let hit = self.shader.world.first_hit(ray, 0.0, None);
+        self.seen(&hit.expect("the room is closed: every ray from inside meets it"), ray)
+    }
+
+    fn seen(&self, hit: &Hit, ray: Ray) -> Seen {
+        let world = self.shader.world;
+        world.seen(hit, ray.direction, footprint_m(world, hit, ray.direction, self.eye.view))
     }
 
     /// Looks through the points of a pixel.
@@ -320,37 +331,20 @@ impl Painter<'_> {
         let mut parts: Vec<Part> = Vec::new();
         let looks = first.into_iter().chain((4..4 + rest).map(|point| aim.look(self, point)));
         for (point, seen) in looks.enumerate() {
-            self.shader.add_glow(&seen, share, None, (self.colors, &mut *own));
-            let coat = seen.surface.coat;
             let fresnel = self.shader.fresnel(&seen) as f32;
-            let is_clear = coat.f0 > 0.0 && coat.roughness == 0.0;
-            if is_clear {
-                self.shader.add_mirrored(
-                    &seen,
-                    share * fresnel,
-                    spread(2 * point, aim.offset),
-                    (self.colors, &mut *own),
-                );
-            }
-            let shown = match parts.iter().position(|p| p.seen.object == seen.object) {
-                Some(index) => &mut parts[index],
-                None => {
-                    parts.push(Part { seen, share: 0.0, sheen: 0.0, pigments: Vec::new() });
-                    parts.last_mut().expect("one has just been added")
-                }
-            };
-            shown.share += share;
-            shown.sheen += if is_clear { 0.0 } else { share };
-            let diffuse = if coat.metal.is_some() { 0.0 } else { share * (1.0 - fresnel) };
-            for &(pigment, part) in seen.surface.mix.parts() {
-                match shown.pigments.iter_mut().find(|(known, _)| *known == pigment) {
-                    Some((_, sum)) => *sum += diffuse * part,
-                    None => shown.pigments.push((pigment, diffuse * part)),
-                }
-            }
+            self.add_own(&seen, fresnel, share, spread(2 * point, aim.offset), own);
+            add_part(&mut parts, &seen, fresnel, share);
         }
         parts.sort_by(|a, b| b.share.total_cmp(&a.share));
         parts
+    }
+
+    /// Adds a share of what a surface glows and of what its clear coat mirrors.
+    pub(super) fn add_own(&self, seen: &Seen, fresnel: f32, share: f32, offset: DVec2, own: &mut [f32]) {
+        self.shader.add_glow(seen, share, None, (self.colors, &mut *own));
+        if is_clear(seen) {
+            self.shader.add_mirrored(seen, share * fresnel, offset, (self.colors, own));
+        }
     }
 
     /// Returns the spectra of a row, columns × bands, under the smoothed light.
@@ -368,7 +362,7 @@ impl Painter<'_> {
                 let lights = match &fragment.seen {
                     None => lights[row][column],
                     Some(seen) => light_beside(row, column, fragment.object, guides, lights)
-                        .unwrap_or_else(|| self.shader.gather(seen, &pixel_offsets(row, column))),
+                        .unwrap_or_else(|| self.shader.gather(seen, LightRays::ALL, &pixel_offsets(row, column))),
                 };
                 let (own, rest) = pigments.split_at(fragment.n_pigments);
                 pigments = rest;
@@ -377,6 +371,30 @@ impl Painter<'_> {
         }
         self.painting.row_is_done();
         Ok(drawn.own)
+    }
+}
+
+fn is_clear(seen: &Seen) -> bool {
+    seen.surface.coat.f0 > 0.0 && seen.surface.coat.roughness == 0.0
+}
+
+/// Adds a share of a pixel that shows a surface to the part of its object.
+pub(super) fn add_part(parts: &mut Vec<Part>, seen: &Seen, fresnel: f32, share: f32) {
+    let shown = match parts.iter().position(|p| p.seen.object == seen.object) {
+        Some(index) => &mut parts[index],
+        None => {
+            parts.push(Part { seen: *seen, share: 0.0, sheen: 0.0, pigments: Vec::new() });
+            parts.last_mut().expect("one has just been added")
+        }
+    };
+    shown.share += share;
+    shown.sheen += if is_clear(seen) { 0.0 } else { share };
+    let diffuse = if seen.surface.coat.metal.is_some() { 0.0 } else { share * (1.0 - fresnel) };
+    for &(pigment, part) in seen.surface.mix.parts() {
+        match shown.pigments.iter_mut().find(|(known, _)| *known == pigment) {
+            Some((_, sum)) => *sum += diffuse * part,
+            None => shown.pigments.push((pigment, diffuse * part)),
+        }
     }
 }
 
@@ -406,7 +424,7 @@ pub(super) fn pixel_offsets(row: usize, column: usize) -> [DVec2; N_OFFSETS] {
 }
 
 /// Tells whether two points of a pixel look so alike that more need not be looked at.
-fn alike(a: &Seen, b: &Seen) -> bool {
+pub(super) fn alike(a: &Seen, b: &Seen) -> bool {
     let (main_a, main_b) = (a.surface.mix.parts()[0], b.surface.mix.parts()[0]);
     a.object == b.object
         && a.normal.dot(b.normal) > 0.985
@@ -418,17 +436,18 @@ fn alike(a: &Seen, b: &Seen) -> bool {
 }
 
 /// A pixel to look through.
-struct Aim {
+pub(super) struct Aim {
     row: f64,
     column: f64,
     /// The thing at its center and where it begins, when what is behind it is wanted.
     without: Option<(usize, f64)>,
-    z_m: f64,
+    /// The depth at its center.
+    pub(super) z_m: f64,
     offset: DVec2,
 }
 
 impl Aim {
-    fn new(painter: &Painter<'_>, row: usize, column: usize) -> Self {
+    pub(super) fn new(painter: &Painter<'_>, row: usize, column: usize) -> Self {
         let mut aim = Self {
             row: row as f64,
             column: column as f64,
@@ -456,13 +475,18 @@ impl Aim {
         behind.or_else(first).expect("the room is closed: every ray from inside meets it")
     }
 
-    fn look(&self, painter: &Painter<'_>, point: usize) -> Seen {
+    /// Returns what is seen through one of its points.
+    pub(super) fn look(&self, painter: &Painter<'_>, point: usize) -> Seen {
+        let (down, right) = Self::point(point);
+        let ray = painter.eye.ray(self.row + down, self.column + right);
+        painter.seen(&self.hit(painter, ray), ray)
+    }
+
+    /// Returns how far a point lies below and right of the center of the pixel.
+    pub(super) fn point(point: usize) -> (f64, f64) {
         let (i, j) = POINTS[point];
         let at = |cell: u8, within: u8| (f64::from(cell) + (f64::from(within) + 0.5) / 4.0) / 4.0 - 0.5;
-        let ray = painter.eye.ray(self.row + at(j, i), self.column + at(i, j));
-        let hit = self.hit(painter, ray);
-        let world = painter.shader.world;
-        world.seen(&hit, ray.direction, footprint_m(world, &hit, ray.direction, painter.eye.view))
+        (at(j, i), at(i, j))
     }
 }
 

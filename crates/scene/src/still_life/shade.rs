@@ -12,11 +12,26 @@ use super::{
     world::{Seen, World},
 };
 
-/// Rays for light a pixel: to the window, to each bulb, into the room, and for the sheen of a rough coat.
-const N_WINDOW: usize = 4;
-const N_BULB: usize = 3;
-const N_BOUNCES: usize = 2;
-const N_SHEEN: usize = 2;
+/// Rays by which the light on a point is gathered.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightRays {
+    /// To the window.
+    n_window: usize,
+    /// To the brighter bulb.
+    n_bulb: usize,
+    /// Into the room.
+    n_bounces: usize,
+    /// For the sheen of a rough coat.
+    n_sheen: usize,
+}
+
+impl LightRays {
+    /// Those of a picture.
+    pub(super) const ALL: Self = Self { n_window: 4, n_bulb: 3, n_bounces: 2, n_sheen: 2 };
+    /// The fewest.
+    pub(super) const FEW: Self = Self { n_window: 1, n_bulb: 1, n_bounces: 1, n_sheen: 1 };
+}
+
 /// The offsets that its rays take.
 pub(super) const N_OFFSETS: usize = 6;
 /// What light bounced twice and more adds where it has bounced once, lx by day and by lamp.
@@ -149,23 +164,24 @@ impl<'a> Shader<'a> {
 
     /// Gathers the light on a surface: straight from the lights, bounced once by the room, and the sheen of a rough
     /// coat, which is what it sends on to the eye. The offsets turn the points that its rays go to.
-    pub(super) fn gather(&self, seen: &Seen, offsets: &[DVec2; N_OFFSETS]) -> Lights {
-        let lux = direct(self.world, seen, N_WINDOW, N_BULB, [offsets[0], offsets[1]]);
+    pub(super) fn gather(&self, seen: &Seen, rays: LightRays, offsets: &[DVec2; N_OFFSETS]) -> Lights {
+        let LightRays { n_window, n_bulb, n_bounces, n_sheen } = rays;
+        let lux = direct(self.world, seen, n_window, n_bulb, [offsets[0], offsets[1]]);
         let mut lights = Lights::default();
         (lights[0], lights[1]) = (lux.day as f32, lux.warm as f32);
         let (x, y) = seen.normal.any_orthonormal_pair();
-        for i in 0..N_BOUNCES {
+        for i in 0..n_bounces {
             let disc = on_disc(spread(i, offsets[2]));
             let up = (1.0 - disc.length_squared()).max(0.0).sqrt();
             let direction = disc.x * x + disc.y * y + up * seen.normal;
             // The window and the lamps have been counted: what glows does not count again.
             if let Some((far, lux)) = self.look(seen, direction, 0.02, spread(i, offsets[3])) {
-                self.add_tones(&far.surface.mix, lux, 1.0 / N_BOUNCES as f32, &mut lights[BOUNCE..]);
+                self.add_tones(&far.surface.mix, lux, 1.0 / n_bounces as f32, &mut lights[BOUNCE..]);
             }
         }
         if seen.surface.coat.roughness > 0.0 {
-            let share = self.fresnel(seen) as f32 / N_SHEEN as f32;
-            for i in 0..N_SHEEN {
+            let share = self.fresnel(seen) as f32 / n_sheen as f32;
+            for i in 0..n_sheen {
                 let direction = self.mirrored(seen, on_disc(spread(i, offsets[4])));
                 if let Some((far, lux)) = self.look(seen, direction, 0.01, spread(i, offsets[5])) {
                     self.add_tones(&far.surface.mix, lux, share, &mut lights[SHEEN..]);
