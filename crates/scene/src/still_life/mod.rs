@@ -39,8 +39,8 @@ pub struct StillLife {
     pub horizontal_fov_deg: f64,
     /// Whether to picture what lies behind each first thing too, which takes twice the time.
     pub with_hidden: bool,
-    /// Whether to paint it in a quarter of the time, for previews: pixels are looked at through fewer points, and light is gathered by a quarter of the
-    /// rays. Edges and shadows are rougher; depth is the same. What is hidden is painted as always.
+    /// Whether to paint it in a quarter of the time, for previews: pixels share the points they are looked at through, and light is gathered by a quarter of the
+    /// rays. Edges and shadows are rougher, and things much thinner than a pixel can be missed. What is hidden is painted as always.
     pub quick: bool,
     /// How far the eye stands from its place in the arrangement, to its right, up and ahead, m.
     pub moved_m: [f64; 3],
@@ -219,7 +219,10 @@ mod tests {
             let whole = StillLife { horizontal_fov_deg: fov_deg, ..StillLife::new(columns, rows) };
             let quick = StillLife { quick: true, ..whole }.scene(&grid).unwrap();
             let whole = whole.scene(&grid).unwrap();
-            assert_eq!(quick.depth, whole.depth);
+            // To the rounding of single precision, but where something thin is missed between the corners of a pixel.
+            let depths = [&quick, &whole].map(|scene| scene.require_depth().unwrap().z_m());
+            let n_other = depths[0].iter().zip(depths[1]).filter(|(a, b)| (*a / *b - 1.0).abs() > 3e-7).count();
+            assert!(n_other * 500 < rows * columns, "{n_other} depths");
             let (mut squares, mut n) = (0.0, 0.0);
             for (few, all) in quick.radiance.planes().iter().zip(whole.radiance.planes()) {
                 let mean = |plane: &ndarray::Array2<f32>| {

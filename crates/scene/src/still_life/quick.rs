@@ -1,7 +1,7 @@
 //! The picture of the still life in a quarter of the time or less, for previews.
 //!
-//! A pixel is looked at through its center, and through more points only where the pixels beside it show something else. Light
-//! is gathered by a quarter of the rays, smoothed, and taken from between the pixels that it was gathered at.
+//! Pixels share what is seen through their corners, and more points are looked at only where the corners of one are not alike. Light
+//! is gathered by a quarter of the rays, smoothed, and taken from between the corners that it was gathered at.
 
 use std::{collections::VecDeque, ops::Range};
 
@@ -21,15 +21,15 @@ use crate::{SceneError, View};
 
 /// How the light is gathered and smoothed.
 struct Sampling {
-    /// Light is gathered at every so manyth pixel, each way.
+    /// Light is gathered at every so manyth corner, each way.
     pitch: usize,
     rays: LightRays,
     passes: Passes,
 }
 
 impl Sampling {
-    /// Returns that of a view: a fourth of the rays, at a fourth of the pixels, or of a wide view, in which things are small and shadows narrow, at all of
-    /// them.
+    /// Returns that of a view: all rays at a fourth of the corners, or in a wide view, in which things are small and shadows narrow, a fourth of the rays at
+    /// all of them.
     fn of(view: View, columns: usize) -> Self {
         const WIDE_DEG: f64 = 45.0;
         if view.horizontal_fov_deg(columns) > WIDE_DEG {
@@ -40,10 +40,11 @@ impl Sampling {
     }
 }
 
-/// Points of a pixel that are looked at beside its center where the pixels beside it are not alike.
-const N_MORE: usize = 4;
+/// Points within a pixel that are looked at where its corners are not alike, and what each counts; the corners count the rest.
+const N_WITHIN: usize = 4;
+const SHARE_WITHIN: f32 = 0.1875;
 
-/// What is seen through the center of a pixel.
+/// What is seen through a corner of pixels.
 struct Look {
     seen: Seen,
     fresnel: f32,
@@ -51,10 +52,10 @@ struct Look {
     tones: [f32; N_TONES],
 }
 
-/// What is seen through the centers of a row of pixels.
-struct Looks {
+/// What is seen through the upper corners of a row of pixels.
+struct Corners {
     looks: Vec<Look>,
-    /// What is mirrored or glows, columns × bands.
+    /// What is mirrored or glows, corners × bands.
     own: Vec<f32>,
     /// The surfaces on which light is gathered here, and that light.
     guides: Vec<Guide>,
@@ -77,33 +78,31 @@ pub(super) fn quick_picture(
     let mut z_m = Array2::zeros((rows, columns));
     let mut finishing = Finishing {
         painter: &painter,
-        smoothing: Smoothing::of_rows(rows.div_ceil(painter.sampling.pitch), painter.sampling.passes),
-        looks: VecDeque::new(),
-        n_forgotten: 0,
+        smoothing: Smoothing::of_rows(rows / painter.sampling.pitch + 1, painter.sampling.passes),
+        corners: VecDeque::new(),
         n_finished: 0,
         lines: lines(&mut planes),
         depths: z_m.as_slice_mut().expect("a new plane is in standard order").chunks_exact_mut(columns).collect(),
     };
     let n_at_once = rows_at_once();
-    let after = |row: usize| row..(row + n_at_once).min(rows);
+    let after = |row: usize| row..(row + n_at_once).min(rows + 1);
     let mut next = after(0);
-    let mut drawn = painter.looks(next.clone())?;
+    let mut drawn = painter.corners(next.clone())?;
     while !drawn.is_empty() {
         next = after(next.end);
-        let (more, finished) = rayon::join(|| painter.looks(next.clone()), || finishing.push(drawn));
+        let (more, finished) = rayon::join(|| painter.corners(next.clone()), || finishing.push(drawn));
         finished?;
         drawn = more?;
     }
     Ok(Layer { radiance: SpectralImage::new(Quantity::Radiance, grid.clone(), planes)?, depth: DepthMap::new(z_m)? })
 }
 
-/// What becomes of rows that were looked at.
+/// What becomes of corners that were looked through.
 struct Finishing<'a> {
     painter: &'a QuickPainter<'a>,
     smoothing: Smoothing,
-    /// From the row `n_forgotten` on.
-    looks: VecDeque<Looks>,
-    n_forgotten: usize,
+    /// Those of the rows of pixels from `n_finished` on.
+    corners: VecDeque<Corners>,
     n_finished: usize,
     /// The rows of the picture, all bands of each.
     lines: Vec<Vec<&'a mut [f32]>>,
@@ -111,37 +110,31 @@ struct Finishing<'a> {
 }
 
 impl Finishing<'_> {
-    /// Takes the next rows, and paints all whose light is smoothed.
-    fn push(&mut self, mut looks: Vec<Looks>) -> Result<(), Cancelled> {
-        let take = |row: &mut Looks| (std::mem::take(&mut row.guides), std::mem::take(&mut row.lights));
-        let lit = looks.iter_mut().filter(|row| !row.guides.is_empty());
+    /// Takes the next rows of corners, and paints all pixels whose light is smoothed.
+    fn push(&mut self, mut corners: Vec<Corners>) -> Result<(), Cancelled> {
+        let take = |row: &mut Corners| (std::mem::take(&mut row.guides), std::mem::take(&mut row.lights));
+        let lit = corners.iter_mut().filter(|row| !row.guides.is_empty());
         self.smoothing.push(lit.map(take), self.painter.painter.painting.cancel)?;
-        self.looks.extend(looks);
+        self.corners.extend(corners);
         let pitch = self.painter.sampling.pitch;
-        // Light is taken from up to two rows of it below, and the next row of pixels is compared.
+        // Light is taken from up to two rows of it below.
         let n_smoothed = self.smoothing.n_smoothed();
         let first = self.n_finished;
         let (guides, lights) = self.smoothing.smoothed();
-        let is_whole = self.n_forgotten + self.looks.len() == self.lines.len() && n_smoothed == guides.len();
+        let is_whole = n_smoothed == guides.len() && first + self.corners.len() == self.lines.len() + 1;
         let end = if is_whole { self.lines.len() } else { pitch * n_smoothed.saturating_sub(2) }.max(first);
-        let looks = &*self.looks.make_contiguous();
-        let n_forgotten = self.n_forgotten;
+        let corners = self.corners.make_contiguous();
         let ready = self.lines[first..end].par_iter_mut().zip(&mut self.depths[first..end]).enumerate();
         ready.try_for_each(|(n, (bands, depths))| {
-            let index = first + n - n_forgotten;
-            let about = [index.checked_sub(1), Some(index), Some(index + 1)].map(|i| i.and_then(|i| looks.get(i)));
-            let spectra = self.painter.pixels(first + n, about, (guides, lights), depths)?;
+            let spectra = self.painter.pixels(first + n, [&corners[n], &corners[n + 1]], (guides, lights), depths)?;
             for (band, samples) in bands.iter_mut().enumerate() {
                 let values = spectra[band..].iter().step_by(self.painter.painter.n_bands);
                 samples.iter_mut().zip(values).for_each(|(sample, value)| *sample = *value);
             }
             Ok(())
         })?;
+        self.corners.drain(..end - first);
         self.n_finished = end;
-        // The last of them is compared once more.
-        let n_more = end.saturating_sub(1) - self.n_forgotten;
-        self.looks.drain(..n_more);
-        self.n_forgotten += n_more;
         self.smoothing.forget_before((end / pitch).saturating_sub(1));
         Ok(())
     }
@@ -149,83 +142,82 @@ impl Finishing<'_> {
 
 struct QuickPainter<'a> {
     painter: &'a Painter<'a>,
+    /// Of pixels.
     columns: usize,
     sampling: Sampling,
 }
 
 impl QuickPainter<'_> {
-    fn looks(&self, rows: Range<usize>) -> Result<Vec<Looks>, Cancelled> {
-        rows.into_par_iter().map(|row| self.row(row)).collect()
+    fn corners(&self, rows: Range<usize>) -> Result<Vec<Corners>, Cancelled> {
+        rows.into_par_iter().map(|row| self.corners_of_row(row)).collect()
     }
 
-    /// Looks through the centers of a row of pixels.
-    fn row(&self, row: usize) -> Result<Looks, Cancelled> {
+    /// Looks through the upper corners of a row of pixels.
+    fn corners_of_row(&self, row: usize) -> Result<Corners, Cancelled> {
         let Painter { shader, n_bands, painting, .. } = self.painter;
         let Sampling { pitch, rays, .. } = self.sampling;
-        let mut drawn = Looks {
-            looks: Vec::with_capacity(self.columns),
-            own: vec![0.0; self.columns * n_bands],
+        let n = self.columns + 1;
+        let mut corners = Corners {
+            looks: Vec::with_capacity(n),
+            own: vec![0.0; n * n_bands],
             guides: Vec::new(),
             lights: Vec::new(),
         };
-        for (column, own) in drawn.own.chunks_exact_mut(*n_bands).enumerate() {
+        for (column, own) in corners.own.chunks_exact_mut(*n_bands).enumerate() {
             painting.cancel.check()?;
-            let seen = self.painter.look(row as f64, column as f64);
+            let seen = self.painter.look(row as f64 - 0.5, column as f64 - 0.5);
             let fresnel = shader.fresnel(&seen) as f32;
             self.painter.add_own(&seen, fresnel, 1.0, pixel_offset(row, column, 6), own);
             if row.is_multiple_of(pitch) && column.is_multiple_of(pitch) {
-                drawn.guides.push(Guide::of(&seen));
-                drawn.lights.push(shader.gather(&seen, rays, &pixel_offsets(row, column)));
+                corners.guides.push(Guide::of(&seen));
+                corners.lights.push(shader.gather(&seen, rays, &pixel_offsets(row, column)));
             }
-            drawn.looks.push(Look { tones: shader.palette.mean_in_tones(seen.surface.mix.parts()), seen, fresnel });
+            corners.looks.push(Look { tones: shader.palette.mean_in_tones(seen.surface.mix.parts()), seen, fresnel });
         }
-        painting.row_is_done();
-        Ok(drawn)
+        // The last corners end a row of pixels and begin none.
+        if row > 0 {
+            painting.row_is_done();
+        }
+        Ok(corners)
     }
 
     /// Returns the spectra of a row of pixels, columns × bands, and sets the depth at their centers.
     fn pixels(
         &self,
         row: usize,
-        [above, here, below]: [Option<&Looks>; 3],
+        corners: [&Corners; 2],
         (guides, lights): (&[Vec<Guide>], &[Vec<Lights>]),
         depths: &mut [f32],
     ) -> Result<Vec<f32>, Cancelled> {
-        let Painter { shader, colors, eye, n_bands, painting, .. } = self.painter;
-        let here = here.expect("the row was looked at");
+        let Painter { shader, colors, n_bands, painting, .. } = self.painter;
         let mut spectra = vec![0.0; self.columns * n_bands];
         let mut parts: Vec<Part> = Vec::new();
         let pitch = self.sampling.pitch;
-        let size = (guides.len(), self.columns.div_ceil(pitch));
+        let size = (guides.len(), self.columns / pitch + 1);
         for (column, spectrum) in spectra.chunks_exact_mut(*n_bands).enumerate() {
             painting.cancel.check()?;
-            let look = &here.looks[column];
-            let beside = [
-                above.and_then(|looks| looks.looks.get(column)),
-                below.and_then(|looks| looks.looks.get(column)),
-                column.checked_sub(1).and_then(|column| here.looks.get(column)),
-                here.looks.get(column + 1),
-            ];
-            let is_plain = beside.into_iter().flatten().all(|other| alike(look, other));
-            let share = if is_plain { 1.0 } else { 1.0 / (1 + N_MORE) as f32 };
+            let places = [(0, column), (0, column + 1), (1, column), (1, column + 1)];
+            let looks = places.map(|(side, column)| &corners[side].looks[column]);
+            let is_plain = looks[1..].iter().all(|look| alike(look, looks[0]));
+            let share = if is_plain { 0.25 } else { 0.25 * (1.0 - N_WITHIN as f32 * SHARE_WITHIN) };
             parts.clear();
-            add_part(&mut parts, &look.seen, look.fresnel, share);
-            let own = &here.own[column * n_bands..][..*n_bands];
-            spectrum.iter_mut().zip(own).for_each(|(s, own)| *s += share * own);
-            if !is_plain {
-                for point in 0..N_MORE {
-                    let (down, right) = Aim::point(point);
-                    let seen = self.painter.look(row as f64 + down, column as f64 + right);
-                    let fresnel = shader.fresnel(&seen) as f32;
-                    self.painter.add_own(&seen, fresnel, share, pixel_offset(row, column, 6), spectrum);
-                    add_part(&mut parts, &seen, fresnel, share);
-                }
+            for ((side, column), look) in places.into_iter().zip(looks) {
+                let own = &corners[side].own[column * n_bands..][..*n_bands];
+                spectrum.iter_mut().zip(own).for_each(|(s, own)| *s += share * own);
+                add_part(&mut parts, &look.seen, look.fresnel, share);
             }
-            depths[column] = eye.depth_m(look.seen.point) as f32;
-            let place = (row as f64 / pitch as f64, column as f64 / pitch as f64);
+            for point in 0..if is_plain { 0 } else { N_WITHIN } {
+                let (down, right) = Aim::point(point);
+                let seen = self.painter.look(row as f64 + down, column as f64 + right);
+                let fresnel = shader.fresnel(&seen) as f32;
+                self.painter.add_own(&seen, fresnel, SHARE_WITHIN, pixel_offset(row, column, 6), spectrum);
+                add_part(&mut parts, &seen, fresnel, SHARE_WITHIN);
+            }
+            depths[column] = self.depth_m((row, column), looks) as f32;
+            let place = [row, column].map(|at| (at as f64 + 0.5) / pitch as f64);
             for part in &parts {
                 let pixel = |r: usize, c: usize| (&guides[r][c], &lights[r][c]);
-                let lights = light_between(&Guide::of(&part.seen), place, size, f64::INFINITY, pixel)
+                let lights = light_between(&Guide::of(&part.seen), place.into(), size, f64::INFINITY, pixel)
                     .unwrap_or_else(|| shader.gather(&part.seen, LightRays::ALL, &pixel_offsets(row, column)));
                 shader.add_lit(&lights, &part.pigments, part.sheen, (*colors, &mut *spectrum));
             }
@@ -233,9 +225,26 @@ impl QuickPainter<'_> {
         painting.row_is_done();
         Ok(spectra)
     }
+
+    /// Returns the depth at the center of a pixel with these corners.
+    fn depth_m(&self, (row, column): (usize, usize), corners: [&Look; 4]) -> f64 {
+        let first = &corners[0].seen;
+        let is_beside = |look: &Look| {
+            look.seen.object == first.object
+                && look.seen.flat_normal.dot(first.flat_normal) > 1.0 - 1e-9
+                && (look.seen.point - first.point).dot(first.flat_normal).abs() < 1e-7
+        };
+        let eye = self.painter.eye;
+        if corners[1..].iter().all(|look| is_beside(look)) {
+            // Of a plane 1 / depth is even over the picture.
+            4.0 / corners.iter().map(|look| 1.0 / eye.depth_m(look.seen.point)).sum::<f64>()
+        } else {
+            Aim::new(self.painter, row, column).z_m
+        }
+    }
 }
 
-/// Tells whether two pixels look so alike that nothing need be looked at between them.
+/// Tells whether two corners look so alike that nothing need be looked at between them.
 fn alike(a: &Look, b: &Look) -> bool {
     const LEAST_COSINE: f64 = 0.97;
     const LARGEST_STEP: f32 = 0.12;
