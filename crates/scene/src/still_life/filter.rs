@@ -33,12 +33,12 @@ pub(super) type Lights = [f32; N_LIGHTS];
 /// Passes of smoothing: how far apart the pixels of a window are, and the first number that takes part.
 ///
 /// A 5 × 5 binomial window each, in which a pixel of another object, another slope or off the plane does not count
-/// (Dammertz et al. 2010). Only bounced light takes part in the third.
+/// (Dammertz et al. 2010).
 pub(super) type Passes = [(usize, usize); N_PASSES];
 
 const N_PASSES: usize = 3;
 
-/// Those for light on each pixel.
+/// Those for light on each pixel. Only bounced light takes part in the third.
 pub(super) const PASSES: Passes = [(1, 0), (2, 0), (4, BOUNCE)];
 
 /// Light on the rows of a picture, which come one after another, with the noise of its samples smoothed away and the edges of

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     floor_plan::{BULBS, Bulb, ROOM_CENTER, WINDOW_CD_M2, WINDOW_HIGH, WINDOW_LOW},
-    noise::{on_disc, spread},
+    noise::{fract, on_disc, spread},
     world::{Seen, World},
 };
 
@@ -27,7 +27,7 @@ pub(super) fn direct(world: &World, seen: &Seen, n_window: usize, n_bulb: usize,
     for (index, bulb) in BULBS.iter().enumerate() {
         // The far lamp is smooth on all that is near; the near one makes the sharpest shadows.
         let n = if index == 0 { n_bulb } else { 1 };
-        let offset = (offsets[1] + DVec2::splat(0.37 * index as f64)).fract();
+        let offset = fract(offsets[1] + DVec2::splat(0.37 * index as f64));
         lux.warm += from_bulb(world, seen, bulb, n, offset);
     }
     lux

@@ -69,14 +69,18 @@ pub(super) fn cloudy(at: DVec3, blur: f64) -> f64 {
 /// Returns point `index` of a sequence that fills the square evenly (Roberts 2018), turned by an offset.
 pub(super) fn spread(index: usize, offset: DVec2) -> DVec2 {
     const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
-    let DVec2 { x, y } = offset + (index as f64) * STEP;
-    DVec2::new(floor(x).1, floor(y).1)
+    fract(offset + (index as f64) * STEP)
+}
+
+/// Returns how far both numbers are from the whole numbers below.
+pub(super) fn fract(v: DVec2) -> DVec2 {
+    DVec2::new(floor(v.x).1, floor(v.y).1)
 }
 
 /// Returns the offset of a pixel: neighbors differ as much as they can.
 pub(super) fn pixel_offset(row: usize, column: usize, which: usize) -> DVec2 {
     let (x, y) = (column as f64 + 5.588 * which as f64, row as f64 + 3.171 * which as f64);
-    let gradient = (52.982_918_9 * (0.067_110_56 * x + 0.005_837_15 * y).fract()).fract();
+    let gradient = floor(52.982_918_9 * floor(0.067_110_56 * x + 0.005_837_15 * y).1).1;
     DVec2::new(gradient, unit(column as i64, row as i64, 31 + which as i64))
 }
 

@@ -1,7 +1,7 @@
 //! The picture of the still life in a quarter of the time or less, for previews.
 //!
 //! Pixels share what is seen through their corners, and more points are looked at only where the corners of one are not alike. Light
-//! is gathered by a quarter of the rays, smoothed, and taken from between the corners that it was gathered at.
+//! is gathered at a quarter of the corners, smoothed, and taken from between them.
 
 use std::{collections::VecDeque, ops::Range};
 
@@ -10,39 +10,50 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    filter::{BOUNCE, Guide, Lights, PASSES, Passes, Smoothing, light_between},
+    filter::{BOUNCE, Guide, Lights, Passes, Smoothing, light_between},
+    material::Light,
     noise::pixel_offset,
     pigment::N_TONES,
     render::{Aim, Eye, Layer, Painter, Painting, Part, Which, add_part, lines, pixel_offsets, rows_at_once},
-    shade::{Colors, LightRays, Shader},
+    shade::{Colors, LightRays, Shader, Spectra},
     world::{Seen, World},
 };
-use crate::{SceneError, View};
+use crate::SceneError;
 
-/// How the light is gathered and smoothed.
-struct Sampling {
-    /// Light is gathered at every so manyth corner, each way.
-    pitch: usize,
-    rays: LightRays,
-    passes: Passes,
+/// Light is gathered at every so manyth corner, each way, and smoothed by these passes: bounced light over what it takes for a few rays to be many.
+const PITCH: usize = 2;
+const PASSES: Passes = [(1, 0), (2, BOUNCE), (4, BOUNCE)];
+
+/// Points within a pixel that are looked at, below and right of its center, and what each counts; the corners count the rest.
+struct Within {
+    points: &'static [(f64, f64)],
+    share: f32,
 }
 
-impl Sampling {
-    /// Returns that of a view: all rays at a fourth of the corners, or in a wide view, in which things are small and shadows narrow, a fourth of the rays at
-    /// all of them.
-    fn of(view: View, columns: usize) -> Self {
-        const WIDE_DEG: f64 = 45.0;
-        if view.horizontal_fov_deg(columns) > WIDE_DEG {
-            Self { pitch: 1, rays: LightRays::FEW, passes: PASSES }
+impl Within {
+    /// Where all corners are alike.
+    const NOTHING: Self = Self { points: &[], share: 0.0 };
+    /// Where corners show one object, which has a pattern or is curved.
+    const ONE_OBJECT: Self = Self { points: &[(-0.22, -0.22), (0.22, 0.22)], share: 0.34 };
+    /// Where an outline passes.
+    const OUTLINE: Self = Self { points: &[(-0.22, -0.41), (0.34, -0.03), (-0.34, 0.03), (0.22, 0.41)], share: 0.1875 };
+
+    fn of(corners: [&Look; 4]) -> Self {
+        let [first, rest @ ..] = corners;
+        if rest.iter().all(|look| alike(look, first)) {
+            Self::NOTHING
+        } else if rest.iter().all(|look| look.seen.object == first.seen.object) {
+            Self::ONE_OBJECT
         } else {
-            Self { pitch: 2, rays: LightRays::ALL, passes: [(1, 0), (1, 0), (2, BOUNCE)] }
+            Self::OUTLINE
         }
     }
-}
 
-/// Points within a pixel that are looked at where its corners are not alike, and what each counts; the corners count the rest.
-const N_WITHIN: usize = 4;
-const SHARE_WITHIN: f32 = 0.1875;
+    /// What each corner counts.
+    fn share_of_corner(&self) -> f32 {
+        0.25 * (1.0 - self.points.len() as f32 * self.share)
+    }
+}
 
 /// What is seen through a corner of pixels.
 struct Look {
@@ -50,6 +61,8 @@ struct Look {
     fresnel: f32,
     /// The mean reflectance over each tone.
     tones: [f32; N_TONES],
+    /// The light by which white would send what it mirrors or glows, lx.
+    own_lux: f32,
 }
 
 /// What is seen through the upper corners of a row of pixels.
@@ -73,12 +86,12 @@ pub(super) fn quick_picture(
     let colors = Colors::on(grid);
     let shader = Shader::new(world, eye.origin, &colors);
     let painter = Painter { shader, colors: &colors, eye, n_bands: grid.len(), which: Which::First, painting };
-    let painter = QuickPainter { painter: &painter, columns, sampling: Sampling::of(eye.view, columns) };
+    let painter = QuickPainter { painter: &painter, columns };
     let mut planes = vec![Array2::<f32>::zeros((rows, columns)); grid.len()];
     let mut z_m = Array2::zeros((rows, columns));
     let mut finishing = Finishing {
         painter: &painter,
-        smoothing: Smoothing::of_rows(rows / painter.sampling.pitch + 1, painter.sampling.passes),
+        smoothing: Smoothing::of_rows(rows / PITCH + 1, PASSES),
         corners: VecDeque::new(),
         n_finished: 0,
         lines: lines(&mut planes),
@@ -116,13 +129,12 @@ impl Finishing<'_> {
         let lit = corners.iter_mut().filter(|row| !row.guides.is_empty());
         self.smoothing.push(lit.map(take), self.painter.painter.painting.cancel)?;
         self.corners.extend(corners);
-        let pitch = self.painter.sampling.pitch;
         // Light is taken from up to two rows of it below.
         let n_smoothed = self.smoothing.n_smoothed();
         let first = self.n_finished;
         let (guides, lights) = self.smoothing.smoothed();
         let is_whole = n_smoothed == guides.len() && first + self.corners.len() == self.lines.len() + 1;
-        let end = if is_whole { self.lines.len() } else { pitch * n_smoothed.saturating_sub(2) }.max(first);
+        let end = if is_whole { self.lines.len() } else { PITCH * n_smoothed.saturating_sub(2) }.max(first);
         let corners = self.corners.make_contiguous();
         let ready = self.lines[first..end].par_iter_mut().zip(&mut self.depths[first..end]).enumerate();
         ready.try_for_each(|(n, (bands, depths))| {
@@ -135,7 +147,7 @@ impl Finishing<'_> {
         })?;
         self.corners.drain(..end - first);
         self.n_finished = end;
-        self.smoothing.forget_before((end / pitch).saturating_sub(1));
+        self.smoothing.forget_before((end / PITCH).saturating_sub(1));
         Ok(())
     }
 }
@@ -144,7 +156,6 @@ struct QuickPainter<'a> {
     painter: &'a Painter<'a>,
     /// Of pixels.
     columns: usize,
-    sampling: Sampling,
 }
 
 impl QuickPainter<'_> {
@@ -155,8 +166,8 @@ impl QuickPainter<'_> {
     /// Looks through the upper corners of a row of pixels.
     fn corners_of_row(&self, row: usize) -> Result<Corners, Cancelled> {
         let Painter { shader, n_bands, painting, .. } = self.painter;
-        let Sampling { pitch, rays, .. } = self.sampling;
         let n = self.columns + 1;
+        let whites: Vec<f32> = (0..*n_bands).map(|band| self.painter.colors.white(Light::Day, band)).collect();
         let mut corners = Corners {
             looks: Vec::with_capacity(n),
             own: vec![0.0; n * n_bands],
@@ -168,11 +179,17 @@ impl QuickPainter<'_> {
             let seen = self.painter.look(row as f64 - 0.5, column as f64 - 0.5);
             let fresnel = shader.fresnel(&seen) as f32;
             self.painter.add_own(&seen, fresnel, 1.0, pixel_offset(row, column, 6), own);
-            if row.is_multiple_of(pitch) && column.is_multiple_of(pitch) {
+            if row.is_multiple_of(PITCH) && column.is_multiple_of(PITCH) {
                 corners.guides.push(Guide::of(&seen));
-                corners.lights.push(shader.gather(&seen, rays, &pixel_offsets(row, column)));
+                let offsets = pixel_offsets(row / PITCH, column / PITCH);
+                corners.lights.push(shader.gather(&seen, LightRays::FEW, &offsets));
             }
-            corners.looks.push(Look { tones: shader.palette.mean_in_tones(seen.surface.mix.parts()), seen, fresnel });
+            corners.looks.push(Look {
+                tones: shader.palette.mean_in_tones(seen.surface.mix.parts()),
+                own_lux: own.iter().zip(&whites).map(|(own, white)| own / white).sum::<f32>() / *n_bands as f32,
+                seen,
+                fresnel,
+            });
         }
         // The last corners end a row of pixels and begin none.
         if row > 0 {
@@ -192,29 +209,27 @@ impl QuickPainter<'_> {
         let Painter { shader, colors, n_bands, painting, .. } = self.painter;
         let mut spectra = vec![0.0; self.columns * n_bands];
         let mut parts: Vec<Part> = Vec::new();
-        let pitch = self.sampling.pitch;
-        let size = (guides.len(), self.columns / pitch + 1);
+        let size = (guides.len(), self.columns / PITCH + 1);
         for (column, spectrum) in spectra.chunks_exact_mut(*n_bands).enumerate() {
             painting.cancel.check()?;
             let places = [(0, column), (0, column + 1), (1, column), (1, column + 1)];
             let looks = places.map(|(side, column)| &corners[side].looks[column]);
-            let is_plain = looks[1..].iter().all(|look| alike(look, looks[0]));
-            let share = if is_plain { 0.25 } else { 0.25 * (1.0 - N_WITHIN as f32 * SHARE_WITHIN) };
+            let within = Within::of(looks);
+            let share = within.share_of_corner();
             parts.clear();
             for ((side, column), look) in places.into_iter().zip(looks) {
                 let own = &corners[side].own[column * n_bands..][..*n_bands];
                 spectrum.iter_mut().zip(own).for_each(|(s, own)| *s += share * own);
                 add_part(&mut parts, &look.seen, look.fresnel, share);
             }
-            for point in 0..if is_plain { 0 } else { N_WITHIN } {
-                let (down, right) = Aim::point(point);
+            for (down, right) in within.points {
                 let seen = self.painter.look(row as f64 + down, column as f64 + right);
                 let fresnel = shader.fresnel(&seen) as f32;
-                self.painter.add_own(&seen, fresnel, SHARE_WITHIN, pixel_offset(row, column, 6), spectrum);
-                add_part(&mut parts, &seen, fresnel, SHARE_WITHIN);
+                self.painter.add_own(&seen, fresnel, within.share, pixel_offset(row, column, 6), spectrum);
+                add_part(&mut parts, &seen, fresnel, within.share);
             }
             depths[column] = self.depth_m((row, column), looks) as f32;
-            let place = [row, column].map(|at| (at as f64 + 0.5) / pitch as f64);
+            let place = [row, column].map(|at| (at as f64 + 0.5) / PITCH as f64);
             for part in &parts {
                 let pixel = |r: usize, c: usize| (&guides[r][c], &lights[r][c]);
                 let lights = light_between(&Guide::of(&part.seen), place.into(), size, f64::INFINITY, pixel)
@@ -248,9 +263,12 @@ impl QuickPainter<'_> {
 fn alike(a: &Look, b: &Look) -> bool {
     const LEAST_COSINE: f64 = 0.97;
     const LARGEST_STEP: f32 = 0.12;
+    /// A tenth of the light on the table.
+    const LARGEST_STEP_LUX: f32 = 60.0;
     let is_like = |(a, b): (&f32, &f32)| (a - b).abs() < LARGEST_STEP;
     a.seen.object == b.seen.object
         && a.seen.normal.dot(b.seen.normal) > LEAST_COSINE
         && a.tones.iter().zip(&b.tones).all(is_like)
+        && (a.own_lux - b.own_lux).abs() < LARGEST_STEP_LUX
         && a.seen.surface.glow.map(|(light, _)| light) == b.seen.surface.glow.map(|(light, _)| light)
 }

@@ -7,7 +7,7 @@ use super::{
     filter::{BOUNCE, Lights, SHEEN},
     lights::{Lux, direct},
     material::{Light, Mix},
-    noise::{on_disc, spread},
+    noise::{fract, on_disc, spread},
     pigment::{N_TONES, Palette, PigmentIndex},
     world::{Seen, World},
 };
@@ -28,8 +28,8 @@ pub(super) struct LightRays {
 impl LightRays {
     /// Those of a picture.
     pub(super) const ALL: Self = Self { n_window: 4, n_bulb: 3, n_bounces: 2, n_sheen: 2 };
-    /// The fewest.
-    pub(super) const FEW: Self = Self { n_window: 1, n_bulb: 1, n_bounces: 1, n_sheen: 1 };
+    /// Fewer, where it is smoothed more.
+    pub(super) const FEW: Self = Self { n_window: 3, n_bulb: 2, n_bounces: 2, n_sheen: 2 };
 }
 
 /// The offsets that its rays take.
@@ -137,7 +137,7 @@ impl<'a> Shader<'a> {
         let far = self.world.seen(&hit, direction, 0.004);
         // A metal shows the noise of what it shows; under a clear coat hardly any is seen.
         let (n_window, n_bulb) = if seen.surface.coat.metal.is_some() { (4, 2) } else { (1, 1) };
-        let lux = direct(self.world, &far, n_window, n_bulb, [offset, (offset + DVec2::splat(0.5)).fract()]);
+        let lux = direct(self.world, &far, n_window, n_bulb, [offset, fract(offset + DVec2::splat(0.5))]);
         let light = [(lux.day + FAR_LUX[0]) as f32, (lux.warm + FAR_LUX[1]) as f32];
         let tint = seen.surface.coat.metal;
         for &(pigment, part) in far.surface.mix.parts() {
@@ -204,7 +204,7 @@ impl<'a> Shader<'a> {
         }
         let hit = self.world.first_hit(seen.ray(direction), 0.0, None)?;
         let far = self.world.seen(&hit, direction, footprint_m);
-        let lux = direct(self.world, &far, 1, 1, [offset, (offset + DVec2::splat(0.5)).fract()]);
+        let lux = direct(self.world, &far, 1, 1, [offset, fract(offset + DVec2::splat(0.5))]);
         Some((far, Lux { day: lux.day + FAR_LUX[0], warm: lux.warm + FAR_LUX[1] }))
     }
 

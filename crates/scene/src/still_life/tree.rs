@@ -7,6 +7,9 @@ use super::shape::Ray;
 /// Boxes of a node, which a ray is tried on together.
 const WIDTH: usize = 4;
 
+/// The most levels of nodes.
+const DEPTH: usize = 8;
+
 /// Objects in boxes within boxes, four to a node.
 ///
 /// Boxes are of single precision, and widened by more than a ray of single precision errs: no object is missed.
@@ -15,15 +18,16 @@ pub(super) struct Tree {
     nodes: Vec<Node>,
 }
 
-/// The boxes of up to four objects or nodes.
+/// The boxes of up to four objects or nodes; no ray meets those of the places left.
 #[derive(Clone, Debug)]
 struct Node {
-    /// By axis.
-    low: [Vec4; 3],
-    high: [Vec4; 3],
+    /// The lower and the upper planes, by axis.
+    planes: [[Vec4; 3]; 2],
     children: [Child; WIDTH],
-    /// How many they are.
-    len: usize,
+}
+
+impl Node {
+    const EMPTY: Self = Self { planes: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]], children: [Child(0); WIDTH] };
 }
 
 /// The number of a node, or that of an object after all those of nodes.
@@ -53,25 +57,25 @@ impl Tree {
     pub(super) fn over(boxes: &[Bounds], objects: impl IntoIterator<Item = usize>) -> Self {
         let mut tree = Self { nodes: Vec::new() };
         let mut objects: Vec<usize> = objects.into_iter().collect();
-        tree.add(boxes, &mut objects);
+        tree.add(boxes, &mut objects, 0);
         tree
     }
 
-    /// Adds the node of some objects, and returns its number.
-    fn add(&mut self, boxes: &[Bounds], objects: &mut [usize]) -> u32 {
+    /// Adds the node of some objects below so many others, and returns its number.
+    fn add(&mut self, boxes: &[Bounds], objects: &mut [usize], depth: usize) -> u32 {
+        assert!(depth < DEPTH, "a few hundred objects make {DEPTH} levels of four at most");
         let number = self.nodes.len();
         let groups = groups(boxes, objects);
-        let none = [Vec4::ZERO; 3];
-        self.nodes.push(Node { low: none, high: none, children: [Child(0); WIDTH], len: groups.len() });
+        self.nodes.push(Node::EMPTY);
         for (place, group) in groups.into_iter().enumerate() {
             let (low, high) = around(boxes, group);
             for axis in 0..3 {
-                self.nodes[number].low[axis][place] = low[axis] as f32;
-                self.nodes[number].high[axis][place] = high[axis] as f32;
+                self.nodes[number].planes[0][axis][place] = low[axis] as f32;
+                self.nodes[number].planes[1][axis][place] = high[axis] as f32;
             }
             self.nodes[number].children[place] = match group {
                 [object] => Child::object(*object),
-                _ => Child(self.add(boxes, group)),
+                _ => Child(self.add(boxes, group, depth + 1)),
             };
         }
         number as u32
@@ -82,51 +86,53 @@ impl Tree {
         /// Above all roundings of a difference, a product and a quotient of single precision.
         const ROUNDING: f32 = 1e-6;
         /// A level of the tree leaves three of its nodes' boxes to be looked at.
-        const STACK: usize = 48;
+        const STACK: usize = (WIDTH - 1) * DEPTH + 1;
         let origin = ray.origin.as_vec3();
         // Where it is 0 the planes are met far away, on the right side of them.
         let inverse = ray.direction.as_vec3().to_array().map(|d| 1.0 / d.abs().max(1e-9).copysign(d));
         let slack = ROUNDING * (Vec3::splat(4.0) + origin.abs());
-        // The origin moved against the planes that the ray comes in by and goes out by.
-        let (before, behind) = ((origin + slack).to_array(), (origin - slack).to_array());
+        // The origin moved against the lower planes and against the upper ones.
+        let moved = [(origin + slack).to_array(), (origin - slack).to_array()];
+        // By axis: the planes by which the ray comes in, and for these and those by which it goes out the origin.
+        let sides: [(usize, Vec4, Vec4, Vec4); 3] = std::array::from_fn(|axis| {
+            let comes_in = usize::from(inverse[axis] < 0.0);
+            let [from_in, from_out] = [comes_in, 1 - comes_in].map(|side| Vec4::splat(moved[side][axis]));
+            (comes_in, from_in, from_out, Vec4::splat(inverse[axis]))
+        });
         let mut t_max = t_max;
-        let mut stack = [(0.0_f32, Child(0)); STACK];
+        let (mut entries, mut children) = ([0.0_f32; STACK], [Child(0); STACK]);
         let mut height = 1;
         while height > 0 {
             height -= 1;
-            let (t_in, child) = stack[height];
-            if f64::from(t_in) > t_max {
+            if f64::from(entries[height]) > t_max {
                 continue;
             }
-            let node = match child.number() {
+            let node = match children[height].number() {
                 Ok(number) => &self.nodes[number],
                 Err(object) => {
                     t_max = visit(object, t_max);
                     continue;
                 }
             };
-            let (mut t_in, mut t_out) = (Vec4::ZERO, Vec4::INFINITY);
-            for axis in 0..3 {
-                let inverse = Vec4::splat(inverse[axis]);
-                let low = (node.low[axis] - Vec4::splat(before[axis])) * inverse;
-                let high = (node.high[axis] - Vec4::splat(behind[axis])) * inverse;
-                t_in = t_in.max(low.min(high));
-                t_out = t_out.min(low.max(high));
+            let (mut t_in, mut t_out) = (Vec4::ZERO, Vec4::splat(t_max as f32));
+            for (axis, (comes_in, from_in, from_out, inverse)) in sides.into_iter().enumerate() {
+                t_in = t_in.max((node.planes[comes_in][axis] - from_in) * inverse);
+                t_out = t_out.min((node.planes[1 - comes_in][axis] - from_out) * inverse);
             }
             t_in *= 1.0 - ROUNDING;
-            let is_met = t_in.cmple(t_out * (1.0 + ROUNDING)).bitmask();
+            let mut met = t_in.cmple(t_out * (1.0 + ROUNDING)).bitmask();
+            let t_in = t_in.to_array();
             let first = height;
-            for place in 0..node.len {
-                if is_met & 1 << place == 0 {
-                    continue;
-                }
+            while met != 0 {
+                let place = met.trailing_zeros() as usize;
+                met &= met - 1;
                 // The nearest last, so that it is looked at first.
                 let mut at = height;
-                while at > first && stack[at - 1].0 < t_in[place] {
-                    stack[at] = stack[at - 1];
+                while at > first && entries[at - 1] < t_in[place] {
+                    (entries[at], children[at]) = (entries[at - 1], children[at - 1]);
                     at -= 1;
                 }
-                stack[at] = (t_in[place], node.children[place]);
+                (entries[at], children[at]) = (t_in[place], node.children[place]);
                 height += 1;
             }
         }
