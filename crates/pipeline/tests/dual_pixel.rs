@@ -1,11 +1,14 @@
 //! Photodiodes that see halves of the pupil, held to the closed form of a thin lens.
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
-use std::f64::consts::PI;
+use std::{
+    f64::consts::PI,
+    sync::atomic::{AtomicBool, Ordering},
+};
 
 use dioptric_pipeline::{
     Camera, Capture, Diffraction, DualPixelSpec, FilmSpec, FocusSpec, Given, KeptCamera, LensSpec, Photodiodes,
-    SensorSpec, Silent, StopSpec, WavelengthSpec,
+    PipelineError, Progress, Quality, SceneSource, SensorSpec, Silent, Stage, StopSpec, WavelengthSpec,
 };
 use dioptric_scene::{Scene, View};
 use dioptric_sensor::{DisparityMap, DisparitySearch, NoiseSources, Processing};
@@ -138,6 +141,43 @@ fn another_exposure_images_nothing_again() {
     captured(&first.with(|camera| camera.dual_pixel = None));
     let counts = first.stage_counts();
     assert_eq!((counts.bank, counts.plan, counts.irradiance), (1, 3, 2));
+}
+
+/// Whether the imaging has begun.
+#[derive(Default)]
+struct Imaging(AtomicBool);
+
+impl Progress for Imaging {
+    fn at(&self, stage: Stage, _: f64) {
+        self.0.fetch_or(stage == Stage::Irradiance, Ordering::Relaxed);
+    }
+}
+
+/// The plan of one photodiode may take more than that of another: a budget that holds only one of them is refused before that one is imaged.
+#[test]
+fn no_photodiode_is_imaged_within_a_budget_too_small_for_another() {
+    let mut camera = Camera::demo().unwrap();
+    camera.scene.source = SceneSource::StillLife { columns: 150, rows: 100 };
+    camera.film = FilmSpec::Pixels { columns: 120, rows: 80, pitch_um: 64.0 };
+    camera.wavelengths = WavelengthSpec::ListNm(vec![450.0, 550.0, 650.0]);
+    camera.stop = StopSpec::FNumber(4.0);
+    camera.movements.shift_mm = 9.0;
+    camera.dual_pixel = Some(DualPixelSpec { crosstalk: 0.2, ..DualPixelSpec::of(Photodiodes::LeftRight) });
+    let (mut too_small, mut enough) = (48_u64 << 20, 64_u64 << 20);
+    while enough - too_small > 1 << 12 {
+        let budget = u64::midpoint(too_small, enough);
+        let imaging = Imaging::default();
+        // The error of the bank is not measured.
+        let kept = KeptCamera::new(camera.clone()).with_quality(Quality::Draft).with_memory_budget(budget);
+        match kept.irradiance(&imaging, &Cancel::new()) {
+            Ok(_) => enough = budget,
+            Err(error) => {
+                assert!(matches!(error, PipelineError::Memory { .. }), "{error}");
+                assert!(!imaging.0.into_inner(), "{budget} bytes: {error}");
+                too_small = budget;
+            }
+        }
+    }
 }
 
 /// A stack works out itself how much of the pupil's light arrives, which a `dual_pixel` states.

@@ -32,7 +32,7 @@ use super::{
     },
     world,
 };
-use crate::{BlurSpec, DualPixelSpec, PaintingFolder, PipelineError, Stage};
+use crate::{BlurSpec, DualPixelSpec, PaintingFolder, PipelineError, Progress, Stage};
 
 /// The stages in their order, each asking for the ones it needs.
 #[derive(Clone, Copy)]
@@ -202,6 +202,11 @@ impl Chain<'_> {
         Ok(irradiance.with_narrow_surfaces(narrow))
     }
 
+    /// Returns the chain with its progress reported elsewhere.
+    fn reporting<'b>(&'b self, progress: &'b dyn Progress) -> Chain<'b> {
+        Chain { watch: Watch { progress, cancel: self.watch.cancel }, ..*self }
+    }
+
     /// Images the scene through the part of the pupil that each photodiode sees, one after the other.
     pub(super) fn irradiance_of_photodiodes(
         &self,
@@ -211,13 +216,22 @@ impl Chain<'_> {
         let n = spec.photodiodes.names().len();
         // The sum is as large as each of them.
         let memory_bytes = self.memory_bytes / (n as u64 + 1);
+        let plan_of = |number: usize| PlanInputs { photodiode: Some((spec, number)), ..inputs.plan.clone() };
+        let part = |number: usize| Part { progress: self.watch.progress, number, of: n };
+        let (place, resolved) = (self.film(&inputs.plan.bank.film, &inputs.scene)?, self.scene(&inputs.scene)?);
+        // What is too large for the budget is found before any of them is imaged. Their plans are of much the same size.
+        for number in 0..n {
+            let Some(budget) = self.budget else { break };
+            let plan = self.reporting(&part(number)).plan(&plan_of(number), &inputs.scene)?;
+            if budget.would_fit_twice(&plan, &resolved.scene, &place) {
+                break;
+            }
+            self.kept.plan.clear();
+        }
+        drop(resolved);
         let irradiance = |number: usize| {
-            let plan = PlanInputs { photodiode: Some((spec, number)), ..inputs.plan.clone() };
-            let inputs = IrradianceInputs { plan, dual_pixel: None, ..inputs.clone() };
-            let progress = Part { progress: self.watch.progress, number, of: n };
-            let watch = Watch { progress: &progress, cancel: self.watch.cancel };
-            let chain: Chain<'_> = *self;
-            let irradiance = Chain { memory_bytes, watch, ..chain }.imaged(&inputs)?;
+            let inputs = IrradianceInputs { plan: plan_of(number), dual_pixel: None, ..inputs.clone() };
+            let irradiance = Chain { memory_bytes, ..self.reporting(&part(number)) }.imaged(&inputs)?;
             // The next photodiode has a plan of its own.
             if self.budget.is_some_and(|budget| !budget.is_ample_for(self.kept.imaging_bytes())) {
                 self.kept.plan.clear();
@@ -227,10 +241,7 @@ impl Chain<'_> {
         let photodiodes = (0..n).map(irradiance).collect::<Result<Vec<_>, PipelineError>>()?;
         let narrow = photodiodes[0].summary.narrow_surfaces;
         let memory_bytes = match self.budget {
-            Some(budget) => {
-                let place = self.film(&inputs.plan.bank.film, &inputs.scene)?;
-                budget.left_beside_film(&place, photodiodes[0].grid().len(), self.kept.imaging_bytes())
-            }
+            Some(budget) => budget.left_beside_film(&place, photodiodes[0].grid().len(), self.kept.imaging_bytes()),
             None => u64::MAX,
         };
         let memory_bytes = memory_bytes.min(self.memory_bytes);

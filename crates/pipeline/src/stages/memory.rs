@@ -117,6 +117,13 @@ impl MemoryBudget {
         Ok(if is_tight { plan.with_band_budget(shares.bands as usize) } else { plan })
     }
 
+    /// Whether a plan twice as large would fit too.
+    pub(crate) fn would_fit_twice(self, plan: &ImagingPlan, scene: &Scene, place: &FilmPlace) -> bool {
+        let band = (plan.band_bytes() + plan.bases_bytes()) as u64;
+        let fixed = imaging_bytes(scene, place) + 2 * plan.size_bytes() as u64;
+        self.left(fixed, 2 * band, self.film_bytes(place, n_bands(scene))).is_ok()
+    }
+
     /// Returns the bytes of irradiance that may stay in memory.
     ///
     /// # Errors
