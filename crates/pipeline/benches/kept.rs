@@ -100,7 +100,8 @@ fn changes(kept: &KeptCamera, sensors: &[std::path::PathBuf], only: Option<&str>
     of("scene: another shape", &|camera, i| {
         camera.scene.source = SceneSource::StillLife { columns: 1080, rows: 720 - 15 * (1 + i) };
     });
-    of("scene: field of view", &|camera, i| camera.scene.field_of_view_deg = Some(35.0 + 0.5 * i as f64));
+    // Each painted anew.
+    of("scene: field of view", &|camera, i| camera.scene.field_of_view_deg = Some(36.0 * 1.12_f64.powi(i as i32)));
     if only.is_none_or(|only| "scene: field of view, painted ahead".starts_with(only)) {
         // Steps of a sixth, the next of which is prepared while the picture is looked at.
         let times_s = (0..REPEATS).map(|i| {
