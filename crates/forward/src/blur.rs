@@ -19,7 +19,7 @@ use crate::{
     patch_samples::{BlurredCell, PatchSamples, Places},
     sampler::{Rectangle, Sampler, Surface},
     stopwatch::{Part, Stopwatch},
-    uniform_response::uniform_response,
+    uniform_response::{LEAST_RESPONSE, uniform_response},
     work::Work,
 };
 
@@ -156,7 +156,7 @@ fn blur_patch<'a>(
         // What a surface covers is 1 all over it, however its kernels change.
         let response = task.response_of(patch);
         for (line, down) in ideal.chunks_exact_mut(source.columns).zip(&places.down) {
-            let level = |across| value_of(&response, down, across).max(0.1);
+            let level = |across| value_of(&response, down, across).max(LEAST_RESPONSE);
             line.iter_mut().zip(&places.across).for_each(|(alpha, across)| *alpha /= level(across));
         }
     }

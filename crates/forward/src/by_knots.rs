@@ -20,6 +20,7 @@ use crate::{
     smoothing::Smoother,
     stopwatch::{Part, Stopwatch},
     tiles::SpreadSquares,
+    uniform_response::LEAST_RESPONSE,
 };
 
 /// A raster of a layer that is spread by knots.
@@ -101,7 +102,7 @@ impl KnotRaster<'_> {
                     smoother.add(near, self.frame, &products);
                 }
                 // A plane is 1, give or take what kernels change over a cell.
-                ideal.iter_mut().zip(smoother.finish()).for_each(|(value, level)| *value /= level.max(0.1));
+                ideal.iter_mut().zip(smoother.finish()).for_each(|(value, level)| *value /= level.max(LEAST_RESPONSE));
             },
         );
     }

@@ -7,7 +7,14 @@ use dioptric_psf::FilmMap;
 use dioptric_spectrum::Cancelled;
 use glam::{DMat4, DVec4};
 
-use crate::{film_lens::FilmLens, knot_kernels::KnotKernel, patch::Knot, raster::LayerRaster, work::Work};
+use crate::{
+    film_lens::FilmLens,
+    knot_kernels::KnotKernel,
+    patch::Knot,
+    raster::LayerRaster,
+    uniform_response::{LEAST_RESPONSE, MOST_EXCESS},
+    work::Work,
+};
 
 /// A factor of the alpha of a layer's samples: a polynomial of the square of their distance from the axis.
 #[derive(Clone, Debug)]
@@ -24,7 +31,7 @@ const LEAST_SPREAD: f64 = 0.05;
 const WIDE_SPREAD: (f64, f64) = (0.5, 1.0);
 /// A factor that is nowhere farther from 1 than this is none.
 const NEGLIGIBLE: f64 = 1e-4;
-/// How far from 1 it is at most: what second moments make is clamped likewise, and of blur wider than the film little is known.
+/// How far from 1 it is at most: of blur wider than the film little is known.
 const MOST: f64 = 0.2;
 /// Distances from the axis at which kernels are computed, the axis left out.
 const N_KERNELS: i32 = 32;
@@ -59,10 +66,16 @@ impl Level {
         let points = Point::along((lens, layer), axis, &tests, (spread_px, radius_px + 2.0 * spread_px), work)?;
         let gram = matrix(points.iter().map(|p| (p.rho_px, p.here, p.powers))).inverse();
         let plane = points.iter().map(|p| p.rho_px * p.here).sum::<DVec4>();
-        let second = gram * points.iter().map(|p| p.rho_px * p.to_second).sum::<DVec4>();
+        let of_moments = |order: usize| gram * points.iter().map(|p| p.rho_px * p.to_moments[order]).sum::<DVec4>();
+        let [first, second] = [0, 1].map(of_moments);
         let mut coefficients = DVec4::X;
         for _ in 0..N_ROUNDS {
-            let alpha = |p: &Point| coefficients.dot(p.powers) / (1.0 + second.dot(p.powers).clamp(-MOST, MOST));
+            // Clamped as it is where samples are divided by it.
+            let response = |p: &Point| {
+                let excess = second.dot(p.powers).clamp(-MOST_EXCESS, MOST_EXCESS);
+                (1.0 + first.dot(p.powers) + excess).max(f64::from(LEAST_RESPONSE))
+            };
+            let alpha = |p: &Point| coefficients.dot(p.powers) / response(p);
             let spread = points.iter().map(|p| p.rho_px * alpha(p) * p.spread).sum::<DVec4>();
             coefficients -= gram * (spread - plane);
         }
@@ -102,8 +115,8 @@ struct Point {
     here: DVec4,
     /// Their means over it.
     spread: DVec4,
-    /// Their means over it less their values at its place, as far as first and second moments make them.
-    to_second: DVec4,
+    /// By how much their means over it differ from their values at its place as far as first moments make them, and as far as second ones do.
+    to_moments: [DVec4; 2],
 }
 
 impl Point {
@@ -127,7 +140,8 @@ impl Point {
                 let rho_px = f64::from(step) * (f64::from(i) + fraction);
                 let [mut point, next] = [&pair[0], &pair[1]].map(|kernel| tests.at(rho_px, kernel, factor as f64));
                 point.spread += fraction * (next.spread - point.spread);
-                point.to_second += fraction * (next.to_second - point.to_second);
+                let moments = point.to_moments.iter_mut().zip(next.to_moments);
+                moments.for_each(|(here, next)| *here += fraction * (next - *here));
                 point
             };
             (0..N_BETWEEN).map(at).collect::<Vec<_>>()
@@ -180,9 +194,9 @@ impl Tests {
         let slope = 2.0 * rho_px / self.radius2_px;
         let bend_along = second * (slope * slope) + first * (2.0 / self.radius2_px);
         let bend_around = first * (2.0 / self.radius2_px);
-        let to_second =
-            first * (slope * factor * outwards) + 0.5 * factor * factor * (along * bend_along + around * bend_around);
-        Point { rho_px, powers: self.powers(rho_px), here: self.values(rho_px * rho_px), spread, to_second }
+        let to_moments =
+            [first * (slope * factor * outwards), 0.5 * factor * factor * (along * bend_along + around * bend_around)];
+        Point { rho_px, powers: self.powers(rho_px), here: self.values(rho_px * rho_px), spread, to_moments }
     }
 }
 

@@ -5,6 +5,12 @@ use crate::{
     patch::{ONE, Patch, Products, Shares},
 };
 
+/// How much second moments are taken to make of a plane at most: the expansion holds while it is small.
+pub(crate) const MOST_EXCESS: f64 = 0.2;
+
+/// The least irradiance by which samples are divided.
+pub(crate) const LEAST_RESPONSE: f32 = 0.1;
+
 /// Returns the irradiance of a uniform plane of 1 under the kernels over a patch, to their second moments (docs/forward.md, eq. 5): of all knots, those
 /// on its raster, whose factor is given, and those on others.
 pub(crate) fn uniform_response(kernels: &LayerKernels, patch: &Patch, factor: usize) -> Products {
@@ -27,8 +33,7 @@ impl UniformResponse {
         for (factor, shares) in &patch.elsewhere {
             sum.add(kernels, shares, patch.cell.size as f64 / *factor as f64);
         }
-        // The expansion holds while it is small.
-        sum.excess = sum.excess.clamp(-0.2, 0.2);
+        sum.excess = sum.excess.clamp(-MOST_EXCESS, MOST_EXCESS);
         sum
     }
 

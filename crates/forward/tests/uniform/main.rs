@@ -187,20 +187,44 @@ fn light_from_beyond_the_film_reaches_its_corners() {
     }
 }
 
+/// The singlet on the demo's film.
+const WIDE_SINGLET: Wall = Wall {
+    lens: "singlet-50mm",
+    f_number: 2.0,
+    focus_mm: 540.0,
+    pitch_um: 101.0,
+    dioptres: 0.3,
+    center_mm: DVec2::ZERO,
+};
+
+/// Beyond the corner second moments would make a third more of a plane, and are taken to make a fifth: the wall was 2.5 % too dark in the corner where its level had all of them.
+/// What is left are ripples of the fields at which the model is sampled.
+#[test]
+fn walls_are_level_where_second_moments_are_clamped() {
+    for dioptres in [0.3, 1.0] {
+        let wall = Wall { dioptres, ..WIDE_SINGLET };
+        let error = wall.error_among_layers();
+        println!("{wall:?}: {error:+.5}");
+        assert!(error.abs() <= 6e-3, "{wall:?}: {error}");
+    }
+}
+
 /// Out of focus through a curved field, blur is a seventh of the film wide in the middle and a third in the corners. Layers covered what second moments left of a plane: the wall was
 /// .5 % too bright in the middle and 1.6 % in the corners once something else was in the scene.
 #[test]
 fn walls_among_other_things_are_as_bright_as_alone() {
     for center_mm in [DVec2::ZERO, DVec2::new(-1.0, 0.5)] {
         for dioptres in [0.25, 0.6] {
-            let wall = Wall { f_number: 2.08, focus_mm: 540.0, pitch_um: 55.0, dioptres, center_mm };
+            let lens = "paper-2el";
+            let wall = Wall { lens, f_number: 2.08, focus_mm: 540.0, pitch_um: 55.0, dioptres, center_mm };
             let error = wall.error_among_layers();
             println!("{wall:?}: {error:+.5}");
             assert!(error.abs() <= 1e-3, "{wall:?}: {error}");
         }
     }
     // Blur of a fifteenth of the film's diagonal: .31 % with second moments alone.
-    let wall = Wall { f_number: 4.0, focus_mm: 960.0, pitch_um: 106.0, dioptres: 0.8, center_mm: DVec2::ZERO };
+    let wall = Wall { f_number: 4.0, focus_mm: 960.0, pitch_um: 106.0, dioptres: 0.8, ..WIDE_SINGLET };
+    let wall = Wall { lens: "paper-2el", ..wall };
     let error = wall.error_among_layers();
     println!("{wall:?}: {error:+.5}");
     assert!(error.abs() <= 1e-3, "{wall:?}: {error}");

@@ -13,9 +13,10 @@ use crate::plane::WAVELENGTH_NM;
 /// Farthest and nearest depth, dioptres.
 const DEPTHS: (f64, f64) = (0.25, 1.35);
 
-/// A wall before the two-element lens.
+/// A wall before a lens.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wall {
+    pub(crate) lens: &'static str,
     pub(crate) f_number: f64,
     /// From the first vertex.
     pub(crate) focus_mm: f64,
@@ -29,8 +30,8 @@ impl Wall {
     /// Returns by how much brighter the wall is, at the place of a strip of film where the difference is largest, once the scene's outermost rows lie at other depths.
     pub(crate) fn error_among_layers(&self) -> f32 {
         const N: usize = 400;
-        let Self { f_number, focus_mm, dioptres, pitch_um, center_mm } = *self;
-        let lens = Lens::built_in("paper-2el").unwrap().with_f_number(f_number, WAVELENGTH_NM).unwrap();
+        let Self { lens, f_number, focus_mm, dioptres, pitch_um, center_mm } = *self;
+        let lens = Lens::built_in(lens).unwrap().with_f_number(f_number, WAVELENGTH_NM).unwrap();
         let film = Film { center_mm, ..Film::centered(24, 362, pitch_um) };
         let grid = WavelengthGrid::new(vec![WAVELENGTH_NM]).unwrap();
         let domain = PsfDomain {
