@@ -12,7 +12,7 @@ impl Chain<'_> {
     /// Paints what previews of the still life need in other fields of view; nothing of any other scene.
     pub(super) fn paint_ahead(&self, inputs: &SceneInputs, reach: PaintReach) -> Result<(), PipelineError> {
         let Some(painting) = painting_of(inputs)? else { return Ok(()) };
-        self.paintings().paint_ahead(&painting, inputs.geometry.quality, reach, &self.watch)
+        self.paintings().paint_ahead(&painting, inputs.geometry.viewing(), reach, &self.watch)
     }
 }
 

@@ -10,7 +10,7 @@ use super::{
     scene::ResolvedScene,
     spec::{FilmInputs, Raster},
 };
-use crate::{Crop, FocusSpec, Movements, PipelineError, display::level_at};
+use crate::{Crop, FocusSpec, Movements, PipelineError, Quality, display::level_at};
 
 /// The share of the scene's samples that may be nearer than the near object.
 const NEAR_SHARE: f64 = 0.02;
@@ -106,12 +106,7 @@ pub(super) fn place(
     let (reference, scene) = (&lens.reference, &resolved.scene);
     let film_distance_mm = place_film(inputs.focus, reference, scene)?;
     let (film, binning) = match inputs.raster {
-        Raster::Pixels(full) => {
-            let binning = inputs.geometry.quality.film_binning(full.columns);
-            let fewer = |n: usize| (n / binning).max(1);
-            let pitch_um = full.pitch_um * binning as f64;
-            (Film::centered(fewer(full.rows), fewer(full.columns), pitch_um), binning)
-        }
+        Raster::Pixels(full) => binned(&full, inputs.geometry.quality),
         // As coarse as the scene is by now.
         Raster::Scene => (size_film(reference, film_distance_mm, scene)?, resolved.binning),
     };
@@ -140,6 +135,13 @@ pub(super) fn place(
     })
 }
 
+/// Returns the film of a quality, and how many pixels of the full one are one of it, each way.
+pub(super) fn binned(full: &Film, quality: Quality) -> (Film, usize) {
+    let binning = quality.film_binning(full.columns);
+    let fewer = |n: usize| (n / binning).max(1);
+    (Film::centered(fewer(full.rows), fewer(full.columns), full.pitch_um * binning as f64), binning)
+}
+
 fn place_film(focus: FocusSpec, lens: &MonoLens, scene: &Scene) -> Result<f64, PipelineError> {
     match focus {
         FocusSpec::FilmMm(film_distance_mm) => Ok(film_distance_mm),
@@ -147,6 +149,18 @@ fn place_film(focus: FocusSpec, lens: &MonoLens, scene: &Scene) -> Result<f64, P
         FocusSpec::NearObject => {
             let z_mm = 1e3 * near_depth_m(scene)?;
             Ok(lens.film_distance_mm_for(z_mm - lens.projection_center_z_mm())?)
+        }
+    }
+}
+
+/// Returns the least and the most that the film is behind the last vertex, mm, of all scenes in which nothing is nearer than half a metre.
+pub(super) fn film_distances_mm(focus: FocusSpec, lens: &MonoLens) -> Result<[f64; 2], PipelineError> {
+    match focus {
+        FocusSpec::FilmMm(film_distance_mm) => Ok([film_distance_mm; 2]),
+        FocusSpec::DistanceMm(distance_mm) => Ok([lens.film_distance_mm_for(distance_mm)?; 2]),
+        FocusSpec::NearObject => {
+            let nearest_mm = 500.0 - lens.projection_center_z_mm();
+            Ok([lens.film_distance_mm_for(f64::INFINITY)?, lens.film_distance_mm_for(nearest_mm)?])
         }
     }
 }

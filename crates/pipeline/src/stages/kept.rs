@@ -8,10 +8,12 @@ use dioptric_spectrum::{Cancel, DepthMap};
 use super::{
     Watch,
     band_store::BandKeeping,
+    canvas::frame_that,
     capture::Capture,
     chain::Chain,
     electrons,
-    film::FilmPlace,
+    film::{FilmPlace, binned, film_distances_mm},
+    film_reach::FilmReach,
     given::GivenParts,
     irradiance::Irradiance,
     lens::{self, ResolvedLens, check_glasses},
@@ -335,7 +337,27 @@ impl KeptCamera {
     }
 
     pub(super) fn picture_inputs(&self) -> Result<PictureInputs, PipelineError> {
-        PictureInputs::of(&self.camera, &self.given, self.quality)
+        let mut inputs = PictureInputs::of(&self.camera, &self.given, self.quality)?;
+        let irradiance = &mut inputs.frames.electrons.irradiance;
+        irradiance.set_frame(self.frame_of_film(irradiance));
+        Ok(inputs)
+    }
+
+    /// Returns the frame in which a preview of the still life has all that the film sees of it; `None` where that does not matter, or is not known. Errors
+    /// of the lens are those of its stage, which meets them as well.
+    fn frame_of_film(&self, inputs: &IrradianceInputs) -> Option<i32> {
+        let (lens, focus, pixels) = inputs.onlooker()?;
+        let lens = self.kept.lens.get_or_make(lens.clone(), lens::resolve).ok()?;
+        let (film, _) = binned(pixels, self.quality);
+        let reaches = film_distances_mm(focus, &lens.reference).ok()?.map(|film_distance_mm| FilmReach {
+            lens: &lens.reference,
+            film_distance_mm,
+            film: &film,
+        });
+        let half_size = reaches[0].half_size_tan();
+        frame_that(self.quality, half_size, |half_size, pitch| {
+            reaches.iter().all(|reach| reach.is_within(half_size, pitch))
+        })
     }
 
     pub(super) fn results(&self) -> &KeptResults {

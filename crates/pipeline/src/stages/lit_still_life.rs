@@ -58,7 +58,7 @@ pub(super) fn view(
         binning *= fewer;
     }
     let wanted = geometry.wavelengths.of_world()?;
-    let scene = paintings.scene(&life, &geometry.quality.bands_of(&wanted)?, geometry.quality, watch)?;
+    let scene = paintings.scene(&life, &geometry.quality.bands_of(&wanted)?, geometry.viewing(), watch)?;
     Ok(ResolvedScene { scene, binning })
 }
 

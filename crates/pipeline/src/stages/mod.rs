@@ -19,10 +19,12 @@
 mod ahead;
 mod band_store;
 mod bank;
+mod canvas;
 mod capture;
 mod chain;
 mod electrons;
 mod film;
+mod film_reach;
 mod frames;
 mod given;
 mod irradiance;

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Watch,
+    canvas::Viewing,
     painting::Paintings,
     spec::{GeometryInputs, SceneInputs},
 };
@@ -82,7 +83,8 @@ pub(super) fn open(
     watch: &Watch<'_>,
 ) -> Result<ResolvedScene, PipelineError> {
     let GeometryInputs { source, wavelengths, quality, .. } = &inputs.geometry;
-    let read = |scene, wanted| read(scene, wanted, *quality, paintings, watch);
+    let viewing = inputs.geometry.viewing();
+    let read = |scene, wanted| read(scene, wanted, viewing, paintings, watch);
     let wanted = wavelengths.grid()?;
     let whole = inputs.choice();
     let whole = match pupil_z_mm {
@@ -131,14 +133,14 @@ pub(super) fn open(
 fn read(
     scene: SceneSpec,
     wanted: Option<WavelengthGrid>,
-    quality: Quality,
+    viewing: Viewing,
     paintings: Paintings<'_>,
     watch: &Watch<'_>,
 ) -> Result<Scene, PipelineError> {
     match scene.source {
         SceneSource::StillLife { columns, rows } => {
             let (life, grid) = (scene.still_life(columns, rows), bands_or_own(wanted.as_ref())?);
-            let painting = paintings.scene(&life, &grid, quality, watch)?;
+            let painting = paintings.scene(&life, &grid, viewing, watch)?;
             watch.run(move || scene.open_with(Some(&grid), |_, _| Ok(painting)))
         }
         SceneSource::File(_) | SceneSource::Target { .. } | SceneSource::World(_) => {

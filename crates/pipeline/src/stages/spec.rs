@@ -16,7 +16,10 @@ use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor}
 use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
 
-use super::given::{Given, GivenParts};
+use super::{
+    canvas::Viewing,
+    given::{Given, GivenParts},
+};
 use crate::{
     BankSpec, BlurSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec,
     FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort,
@@ -83,6 +86,8 @@ pub(crate) struct GeometryInputs {
     pub(crate) quality: Quality,
     /// Whether the view of the still life is but the summary of a picture that rays from the film make.
     pub(crate) is_summary: bool,
+    /// The frame in which a preview has all that the film sees of the still life, where that matters and is known from the lens and the film.
+    pub(crate) frame: Option<i32>,
     files: Vec<FileStamp>,
 }
 
@@ -220,6 +225,11 @@ impl LensInputs {
 }
 
 impl GeometryInputs {
+    /// Returns how a still life is looked at.
+    pub(crate) fn viewing(&self) -> Viewing {
+        Viewing { quality: self.quality, frame: self.frame }
+    }
+
     /// Returns the built-in still life as a world, or `None` for any other scene.
     pub(crate) fn still_life(&self) -> Option<&WorldSpec> {
         let SceneSource::World(spec) = &self.source else { return None };
@@ -270,6 +280,7 @@ impl SceneInputs {
                 wavelengths: camera.wavelengths.clone(),
                 quality,
                 is_summary: is_summary(&scene.source, camera.film),
+                frame: None,
                 files: match &scene.source {
                     SceneSource::File(path) if given.scene.is_none() => {
                         let hidden = scene.hidden.iter().flat_map(|path| FileStamp::all_of(path));
@@ -336,6 +347,23 @@ fn as_seen(source: &SceneSource, film: FilmSpec, quality: Quality) -> SceneSourc
 }
 
 impl IrradianceInputs {
+    /// Returns the lens, its focus and the film where it matters to a preview of the still life how much of it they see.
+    pub(crate) fn onlooker(&self) -> Option<(&LensInputs, FocusSpec, &Film)> {
+        let (geometry, film) = (&self.scene.geometry, &self.plan.bank.film);
+        let Raster::Pixels(pixels) = &film.raster else { return None };
+        let is_painting = matches!(geometry.source, SceneSource::StillLife { .. }) && geometry.given.is_none();
+        // The mean luminance that a scene is brought to is that of all of it.
+        let is_whole = self.scene.mean_luminance_cd_m2.is_some() || geometry.hidden.is_some();
+        let matters = is_painting && !is_whole && geometry.field_of_view_deg.is_some();
+        matters.then_some((&film.lens, film.focus, pixels))
+    }
+
+    /// Sets the frame in which a preview has all that the film sees of the still life.
+    pub(crate) fn set_frame(&mut self, frame: Option<i32>) {
+        self.scene.geometry.frame = frame;
+        self.plan.bank.film.geometry.frame = frame;
+    }
+
     /// Returns the files that the irradiance is made from.
     pub(crate) fn files(&self) -> impl Iterator<Item = &FileStamp> {
         self.plan.bank.film.lens.files.iter().chain(&self.scene.geometry.files)
