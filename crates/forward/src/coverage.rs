@@ -100,9 +100,10 @@ impl PsfDomain<'_> {
             Ok(aim.field_tan_at(sampled_mm.max(corner_mm + BORDER_OF_BLUR * corner_blur_mm)))
         })?;
         let wanted_tan = fields_tan.into_iter().fold(0.0, f64::max);
+        // Up to the last that sees light: of fields that end beyond it a whole step would be dark.
         let shares = domain.at_ends(|aim| {
             let gathered = aim.gathered_about(DVec2::ZERO);
-            Ok(gathered.map_or(1.0, |gathered| gathered.largest_share(|share| [DVec2::X * (share * wanted_tan)])))
+            Ok(gathered.map_or(1.0, |gathered| gathered.largest_lit_share(DVec2::X * wanted_tan)))
         })?;
         let last_field_tan = shares.into_iter().fold(wanted_tan, |least, share| least.min(share * wanted_tan));
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());

@@ -28,6 +28,10 @@ pub(crate) fn is_gathered(rms_mm: f64, middle_rms_mm: f64, radius_mm: f64) -> bo
 pub(crate) const BEYOND_LAST: f64 = 2e-3;
 const BEFORE_END: f64 = 5e-4;
 
+/// How far before the last field that sees light a model stops, where the pupil is not yet so narrow that whether it is found depends on how finely it is looked
+/// for; and how far beyond the last field of a model it must be dark where no light is taken to come from farther out.
+pub(crate) const BEFORE_DARK: f64 = 0.03;
+
 /// The fields whose light a lens gathers to an image, at one wavelength and depth: those whose rms spread is larger than that of a field in their middle by at
 /// most a third of the distance between both images. Models of the images of a lens with an axis end there.
 #[derive(Clone, Copy, Debug)]
@@ -61,9 +65,20 @@ impl<'a> GatheredFields<'a> {
     /// Returns the largest share, from 0 to 1, at which all fields of a family are held; just less than that where it is not 1.
     #[must_use]
     pub fn largest_share<const N: usize>(&self, fields: impl Fn(f64) -> [DVec2; N]) -> f64 {
+        Self::largest(|share| fields(share).into_iter().all(|field_tan| self.holds(field_tan)))
+    }
+
+    /// Returns the largest share, from 0 to 1, of a field that is held and sees light; a little less than that where it is not 1.
+    #[must_use]
+    pub fn largest_lit_share(&self, field_tan: DVec2) -> f64 {
+        let is_lit = |share: f64| moments(RayMapJob { field_tan: share * field_tan, ..self.job }).is_some();
+        let lit = if is_lit(1.0) { 1.0 } else { Self::largest(is_lit) * (1.0 - BEFORE_DARK) };
+        lit.min(Self::largest(|share| self.holds(share * field_tan)))
+    }
+
+    fn largest(holds: impl Fn(f64) -> bool) -> f64 {
         /// Halvings of the range.
         const STEPS: usize = 24;
-        let holds = |share: f64| fields(share).into_iter().all(|field_tan| self.holds(field_tan));
         if holds(1.0) {
             return 1.0;
         }

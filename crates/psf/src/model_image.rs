@@ -61,7 +61,8 @@ impl LensImage for LensImageModel {
         match &self.form {
             // Along a radius the fields that see no light, or scatter it, are left out; none holds more than the widest.
             Form::Rotational(bank) => {
-                bank.n_fields() < bank.settings().fields.len()
+                bank.is_dark_beyond()
+                    || bank.n_fields() < bank.settings().fields.len()
                     || bank.last_field_tan() >= WIDEST_FIELD_TAN
                     || bank.is_scattered_beyond()
             }

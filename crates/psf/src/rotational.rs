@@ -10,7 +10,7 @@ use crate::{
     BankSettings, Diffraction, FieldSampling, Interpolation, PsfError, RadialGeometry,
     axis::{Axis, Stencil},
     dispersion::{Dispersion, share_of_orders},
-    gathering::{BEYOND_LAST, is_gathered},
+    gathering::{BEFORE_DARK, BEYOND_LAST, is_gathered},
     mesh::Mesh,
     middle_rays::{MiddleRay, MiddleRays},
     pupil::Pupil,
@@ -35,6 +35,8 @@ pub(crate) struct RotationalBank {
     field_tans: Vec<f64>,
     /// Whether light of the fields beyond reaches the film, but is not gathered to an image.
     is_scattered_beyond: bool,
+    /// Whether no light of the fields just beyond gets through, at some depth and wavelength.
+    is_dark_beyond: bool,
     /// Their angles, in which rays change evenly up to 90°.
     fields: Axis,
     dioptres: Axis,
@@ -100,9 +102,10 @@ impl RotationalBank {
         }
         let is_scattered_beyond =
             traced.iter().any(|column| column.is_scattered_beyond && column.summaries.len() == n_lit);
+        let is_dark_beyond = traced.iter().any(|column| column.is_dark_beyond);
         let n_fields = (n_lit - 1) / GEOMETRY_STEPS + 1;
         let n_geometry = Self::n_geometry(n_fields);
-        let mut parts = Parts { n_fields, is_scattered_beyond, ..Parts::default() };
+        let mut parts = Parts { n_fields, is_scattered_beyond, is_dark_beyond, ..Parts::default() };
         for column in traced {
             parts.records.extend(column.records.into_iter().take(n_fields));
             parts.waves.extend(column.waves.into_iter().take(n_fields));
@@ -117,7 +120,7 @@ impl RotationalBank {
 
     /// Puts a bank together from what was traced.
     fn assemble(lens: &Lens, settings: &BankSettings, parts: Parts) -> Result<Self, PsfError> {
-        let Parts { n_fields, is_scattered_beyond, records, summaries, waves } = parts;
+        let Parts { n_fields, is_scattered_beyond, is_dark_beyond, records, summaries, waves } = parts;
         let colors: Vec<f64> = settings.wavelengths_nm.iter().rev().copied().collect();
         let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
         let stop_index = |&nm: &f64| Ok(lens.at(nm)?.stop_medium_index());
@@ -129,6 +132,7 @@ impl RotationalBank {
             fields: axis(field_tans.iter().map(|tan| tan.atan()).collect()),
             field_tans,
             is_scattered_beyond,
+            is_dark_beyond,
             dioptres: axis(settings.dioptres.clone()),
             colors: axis(colors.iter().map(|&nm| dispersion.coordinate(nm)).collect()),
             dispersion,
@@ -165,6 +169,11 @@ impl RotationalBank {
     /// Whether light of the fields beyond reaches the film, but is not gathered to an image.
     pub(crate) fn is_scattered_beyond(&self) -> bool {
         self.is_scattered_beyond
+    }
+
+    /// Whether no light of the fields just beyond gets through, at some depth and wavelength.
+    pub(crate) fn is_dark_beyond(&self) -> bool {
+        self.is_dark_beyond
     }
 
     /// The angles of the fields that see light.
@@ -339,6 +348,7 @@ impl RotationalBank {
 struct Parts {
     n_fields: usize,
     is_scattered_beyond: bool,
+    is_dark_beyond: bool,
     records: Vec<RayMap>,
     summaries: Vec<RayMapMoments>,
     /// As many as there are records, or none.
@@ -354,6 +364,8 @@ struct Column {
     waves: Vec<PupilFunctionFit>,
     /// Whether it ends at a field whose light is not gathered.
     is_scattered_beyond: bool,
+    /// Whether all its fields see light, and the next would not.
+    is_dark_beyond: bool,
 }
 
 /// How columns are traced.
@@ -421,9 +433,12 @@ impl ColumnTracer<'_> {
         }
         if let (Some(axial), true) = (column.summaries.first(), column.summaries.len() == self.geometry_fields.len()) {
             let last_tan = self.geometry_fields[self.geometry_fields.len() - 1];
-            let beyond = self.task(lens, last_tan * (1.0 + BEYOND_LAST), dioptres);
-            let traced = pupil.near(lens, &beyond.point()).and_then(|pupil| beyond.trace(&pupil, false));
-            column.is_scattered_beyond = traced.is_some_and(|Traced { summary, .. }| {
+            let traced = |share: f64| {
+                let beyond = self.task(lens, last_tan * (1.0 + share), dioptres);
+                pupil.near(lens, &beyond.point()).and_then(|pupil| beyond.trace(&pupil, false))
+            };
+            column.is_dark_beyond = last_tan > 0.0 && traced(2.0 * BEFORE_DARK).is_none();
+            column.is_scattered_beyond = traced(BEYOND_LAST).is_some_and(|Traced { summary, .. }| {
                 !is_gathered(summary.rms_mm, axial.rms_mm, summary.centroid_mm.length())
             });
         }
