@@ -1,5 +1,4 @@
 //! A film larger than what a lens sees: models end where the light does, however few fields they have.
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use dioptric_forward::{Film, PsfDomain};
 use dioptric_optics::{Lens, glam::DVec2};
