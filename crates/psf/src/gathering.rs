@@ -71,9 +71,38 @@ impl<'a> GatheredFields<'a> {
     /// Returns the largest share, from 0 to 1, of a field that is held and sees light; a little less than that where it is not 1.
     #[must_use]
     pub fn largest_lit_share(&self, field_tan: DVec2) -> f64 {
-        let is_lit = |share: f64| moments(RayMapJob { field_tan: share * field_tan, ..self.job }).is_some();
-        let lit = if is_lit(1.0) { 1.0 } else { Self::largest(is_lit) * (1.0 - BEFORE_DARK) };
-        lit.min(Self::largest(|share| self.holds(share * field_tan)))
+        let held = Self::largest(|share| self.holds(share * field_tan));
+        let lit = self.lit_share(held * field_tan);
+        if lit < 1.0 { held * lit * (1.0 - BEFORE_DARK) } else { held }
+    }
+
+    /// Returns the share of a field up to which light gets through, each pupil being looked for about the last: narrow ones are not found from nothing.
+    fn lit_share(&self, field_tan: DVec2) -> f64 {
+        /// Steps to the field, and halvings of the one in which the light ends.
+        const STEPS: u32 = 16;
+        const HALVINGS: usize = 10;
+        let at = |share: f64| RayMapJob { field_tan: share * field_tan, ..self.job };
+        let lit = |pupil: &Pupil, share: f64| {
+            let found = pupil.near(self.job.lens, &at(share).point())?;
+            at(share).trace(&found, false).is_some().then_some(found)
+        };
+        let Some(mut pupil) = Pupil::find(self.job.lens, &at(0.0).point(), MESH.n_azimuths) else { return 1.0 };
+        let mut low = 0.0;
+        for step in 1..=STEPS {
+            let share = f64::from(step) / f64::from(STEPS);
+            match lit(&pupil, share) {
+                Some(found) => (pupil, low) = (found, share),
+                None => break,
+            }
+        }
+        let mut half = 0.5 / f64::from(STEPS);
+        for _ in 0..if low < 1.0 { HALVINGS } else { 0 } {
+            if let Some(found) = lit(&pupil, low + half) {
+                (pupil, low) = (found, low + half);
+            }
+            half *= 0.5;
+        }
+        low
     }
 
     fn largest(holds: impl Fn(f64) -> bool) -> f64 {
