@@ -296,6 +296,9 @@ fn paintings_are_as_wide_and_as_fine_as_the_film_sees() {
         kept.stage_counts().painting - before
     };
     assert_eq!(n_paintings(&|camera| camera.scene.field_of_view_deg = Some(60.0)), 1);
+    // So nothing is painted ahead, from the usual field of view either.
+    kept.paint_ahead(PaintReach::All, &Silent, &Cancel::new()).unwrap();
+    assert_eq!((kept.stage_counts().painting, n_paintings(&|_| {})), (1, 0));
     let wide = |change: &dyn Fn(&mut Camera)| {
         n_paintings(&|camera| {
             camera.scene.field_of_view_deg = Some(50.0);

@@ -249,7 +249,8 @@ impl KeptCamera {
 
     /// Paints what previews of the built-in still life are taken from in other fields of view, where that is not kept: in memory, and in the folder of
     /// [`with_paintings`](Self::with_paintings). A second or less for each of 2 (next) or up to 25 paintings (all), which is better spent while a picture is
-    /// looked at than after the change. Nothing is done for other scenes and qualities.
+    /// looked at than after the change. Nothing is done for other scenes and qualities, nor where it is known how much the film sees: one painting serves
+    /// all fields of view there.
     ///
     /// # Errors
     /// As [`scene`](Self::scene).

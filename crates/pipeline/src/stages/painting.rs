@@ -51,7 +51,8 @@ impl Paintings<'_> {
         };
         if shown.horizontal_fov_deg < life.horizontal_fov_deg {
             let (wide, part) = (life.horizontal_fov_deg, shown.horizontal_fov_deg);
-            scene.notes.push(format!("of its {wide:.1}° a preview has {part:.1}°, more than the film sees"));
+            let note = format!("of the {wide:.1}° of the still life a preview has {part:.1}°, more than the film sees");
+            scene.notes.push(note);
         }
         Ok(scene)
     }

@@ -354,8 +354,7 @@ impl IrradianceInputs {
         let is_painting = matches!(geometry.source, SceneSource::StillLife { .. }) && geometry.given.is_none();
         // The mean luminance that a scene is brought to is that of all of it.
         let is_whole = self.scene.mean_luminance_cd_m2.is_some() || geometry.hidden.is_some();
-        let matters = is_painting && !is_whole && geometry.field_of_view_deg.is_some();
-        matters.then_some((&film.lens, film.focus, pixels))
+        (is_painting && !is_whole).then_some((&film.lens, film.focus, pixels))
     }
 
     /// Sets the frame in which a preview has all that the film sees of the still life.
