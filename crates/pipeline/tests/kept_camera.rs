@@ -285,7 +285,7 @@ fn sketches_paint_the_still_life_once() {
 }
 
 /// A wider film sees more than the arrangement, and a longer lens sees it finer: each has a painting for all fields of view but the usual one. Of a camera
-/// whose lens is moved it is not known how much the film sees; to one that is told how bright the scene is on average, all of it counts.
+/// whose lens is moved it is not known how much the film sees; where the scene is brought to a mean luminance, all of it counts.
 #[test]
 fn paintings_are_as_wide_and_as_fine_as_the_film_sees() {
     let kept = KeptCamera::new(small()).with_quality(Quality::Sketch);
