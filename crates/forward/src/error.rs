@@ -118,6 +118,20 @@ pub enum ForwardError {
         /// Depth of the first surface, m.
         least_m: f64,
     },
+    /// Film towards its corner sees fields that a lens without an axis was not traced for, or that it does not pass: where its light ends is not known between the
+    /// fields of a grid.
+    #[error(
+        "the film reaches {corner_mm:.3} mm from its middle, and what a lens without an axis, as a tilted one, shows at {wavelength_nm} nm is known only to {extent_mm:.3} mm on the way to \
+         its corners or sides; expected a film within the lens's image"
+    )]
+    FilmBeyondImage {
+        /// Half the film's diagonal, mm.
+        corner_mm: f64,
+        /// How far from the middle of the film something is seen, mm.
+        extent_mm: f64,
+        /// Wavelength, nm.
+        wavelength_nm: f64,
+    },
     /// The corner of the film sees a field that was not traced, or that the lens does not pass.
     #[error(
         "the film's corner is {corner_mm:.3} mm off axis, but at {wavelength_nm} nm the lens was traced only to {extent_mm:.3} mm"

@@ -84,10 +84,16 @@ pub(crate) fn check_extent(
     for &wavelength_nm in grid.centers_nm() {
         for dioptres in [dioptres.0, dioptres.1] {
             cancel.check()?;
-            if let Some(extent_mm) = ends_before(&lens.film_map(dioptres, wavelength_nm, 1.1 * half_mm), film) {
-                let corner_mm = film.reach_mm();
-                return Err(ForwardError::FilmBeyondField { corner_mm, extent_mm, wavelength_nm });
-            }
+            let map = lens.film_map(dioptres, wavelength_nm, 1.1 * half_mm);
+            let Some(extent_mm) = ends_before(&map, film) else { continue };
+            return Err(match map {
+                FilmMap::Radial(_) => {
+                    ForwardError::FilmBeyondField { corner_mm: film.reach_mm(), extent_mm, wavelength_nm }
+                }
+                FilmMap::Plane(_) | FilmMap::Shifted(_) => {
+                    ForwardError::FilmBeyondImage { corner_mm: half_mm, extent_mm, wavelength_nm }
+                }
+            });
         }
     }
     Ok(())

@@ -220,6 +220,24 @@ fn the_depth_in_focus_of_a_turned_lens_follows_the_hinge_rule() {
     assert!((in_focus(DVec2::X * 0.06) - in_focus(DVec2::X * -0.06)).abs() < 1e-3);
 }
 
+/// A grid of fields does not hold where light ends between them: the picture would end in the shape of the grid, not of the light.
+#[test]
+fn a_film_beyond_the_image_of_a_turned_lens_is_refused() {
+    let lens = double_gauss();
+    let last = lens.interfaces().len() - 1;
+    let lens = lens.with_moves(vec![turned((0, last), 0.0, [1.0, 0.0, 0.0])]).unwrap();
+    let grid = WavelengthGrid::new(vec![550.0]).unwrap();
+    let film = Film::centered(32, 48, 1320.0);
+    let camera = Camera { lens, film, film_distance_mm: 37.0, depth_range_m: (2.0, 2.0), grid };
+    let model = camera.any_lens();
+    let plane = Array2::from_elem((8, 12), 1.0);
+    let scene = scene(vec![plane], &camera.grid, Array2::from_elem((8, 12), 2.0), 10.0);
+    let refused = irradiance(&scene, &model, &film, &Settings::default(), &|_| {}, &mut |_, _| Ok(()));
+    let Err(ForwardError::FilmBeyondImage { corner_mm, extent_mm, .. }) = refused else { panic!("{refused:?}") };
+    assert!((corner_mm - film.half_diagonal_mm()).abs() < 1e-9);
+    assert!((15.0..corner_mm).contains(&extent_mm), "{extent_mm}");
+}
+
 #[test]
 fn a_lens_that_sends_no_light_to_the_film_is_told() {
     let lens = double_gauss();
