@@ -103,6 +103,10 @@ impl LensImage for PartOfDisc {
     fn is_dark_beyond_extent(&self) -> bool {
         self.lens.is_dark_beyond_extent()
     }
+
+    fn is_dark_beyond_extent_on(&self, low_mm: DVec2, high_mm: DVec2) -> bool {
+        self.lens.is_dark_beyond_extent_on(low_mm, high_mm)
+    }
     fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
         let radius_mm = |field_tan: DVec2| self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm);
         let (share, middle) = self.moments;

@@ -118,11 +118,10 @@ pub enum ForwardError {
         /// Depth of the first surface, m.
         least_m: f64,
     },
-    /// Film towards its corner sees fields that a lens without an axis was not traced for, or that it does not pass: where its light ends is not known between the
-    /// fields of a grid.
+    /// Film towards its corner sees fields that a lens without an axis is not traced for, though they have light: beyond 78.7°, or not gathered to an image.
     #[error(
         "the film reaches {corner_mm:.3} mm from its middle, and what a lens without an axis, as a tilted one, shows at {wavelength_nm} nm is known only to {extent_mm:.3} mm on the way to \
-         its corners or sides; expected a film within the lens's image"
+         its corners or sides: light there comes from more than 78.7° or is not gathered to an image; expected a smaller film"
     )]
     FilmBeyondImage {
         /// Half the film's diagonal, mm.

@@ -33,6 +33,10 @@ where
         self.lens.is_dark_beyond_extent()
     }
 
+    fn is_dark_beyond_extent_on(&self, low_mm: DVec2, high_mm: DVec2) -> bool {
+        self.lens.is_dark_beyond_extent_on(low_mm + self.center_mm, high_mm + self.center_mm)
+    }
+
     fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
         let extent_mm = extent_mm + self.center_mm.length();
         self.lens.film_map(dioptres, wavelength_nm, extent_mm).counted_from(self.center_mm)

@@ -77,7 +77,8 @@ pub(crate) fn check_extent(
         let [far_m, near_m, bank_far_m, bank_near_m] = [dioptres.0, dioptres.1, far, near].map(|d| 1.0 / d);
         return Err(ForwardError::DepthOutside { near_m, far_m, bank_near_m, bank_far_m });
     }
-    if lens.is_dark_beyond_extent() {
+    let half_size_mm = film.half_size_mm();
+    if lens.is_dark_beyond_extent_on(-half_size_mm, half_size_mm) {
         return Ok(());
     }
     let half_mm = film.half_diagonal_mm();

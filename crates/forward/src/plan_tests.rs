@@ -205,6 +205,10 @@ impl LensImage for Cancelling {
     fn is_dark_beyond_extent(&self) -> bool {
         self.lens.is_dark_beyond_extent()
     }
+
+    fn is_dark_beyond_extent_on(&self, low_mm: DVec2, high_mm: DVec2) -> bool {
+        self.lens.is_dark_beyond_extent_on(low_mm, high_mm)
+    }
     fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
         self.lens.film_map(dioptres, wavelength_nm, extent_mm)
     }

@@ -6,6 +6,7 @@ use glam::{DMat2, DVec2};
 use crate::{
     FieldsAlong,
     axis::{Axis, Stencil},
+    lit_fields::LitFields,
 };
 
 /// Nodes of a table along each side, for fields sampled as they are by default.
@@ -166,6 +167,8 @@ impl FieldGeometry {
                 *sum += weight * node;
             }
         }
+        // Quadratics swing below 0 where light ends. What is not a number stays so.
+        sum.nodes.iter_mut().filter(|node| node[2] < 0.0).for_each(|node| node[2] = 0.0);
         Some(sum)
     }
 }
@@ -178,6 +181,8 @@ pub(crate) struct Landing<'a> {
     pub(crate) centroids_mm: Vec<DVec2>,
     /// Areas of the pupil, mm², as in a ray map's summary; 0 of fields that see no light.
     pub(crate) pupils_mm2: Vec<f64>,
+    /// Where light ends within the grid, and the pupils up to there.
+    pub(crate) lit_fields: Option<LitFields>,
 }
 
 /// Where a field lands, and how places move with it.
@@ -212,12 +217,17 @@ impl Landing<'_> {
                 (sum + weight * self.pupils_mm2[node], lit && self.pupils_mm2[node] > 0.0)
             })
         };
-        let (smooth_mm2, is_lit) = pupil(&x, &y);
-        // Cubics swing at the edge of the light; straight lines do not.
-        let pupil_mm2 = match is_lit {
-            true => smooth_mm2,
-            false => pupil(&self.x.linear(field_tan.x), &self.y.linear(field_tan.y)).0,
-        };
+        let pupil_mm2 = self.lit_fields.as_ref().map_or_else(
+            || {
+                let (smooth_mm2, is_lit) = pupil(&x, &y);
+                // Cubics swing at the edge of the light; straight lines do not.
+                match is_lit {
+                    true => smooth_mm2,
+                    false => pupil(&self.x.linear(field_tan.x), &self.y.linear(field_tan.y)).0,
+                }
+            },
+            |lit| lit.pupil_mm2(field_tan),
+        );
         Landed {
             at_mm: sum(&x, &y),
             slope_mm: DMat2::from_cols(sum(&x_slope, &y), sum(&x, &y_slope)),
@@ -293,7 +303,13 @@ mod tests {
 
     fn landing<'a>(x: &'a Axis, y: &'a Axis, pupil: impl Fn(DVec2) -> f64) -> Landing<'a> {
         let fields = || y.knots().iter().flat_map(|&up| x.knots().iter().map(move |&across| DVec2::new(across, up)));
-        Landing { x, y, centroids_mm: fields().map(land).collect(), pupils_mm2: fields().map(pupil).collect() }
+        Landing {
+            x,
+            y,
+            centroids_mm: fields().map(land).collect(),
+            pupils_mm2: fields().map(pupil).collect(),
+            lit_fields: None,
+        }
     }
 
     fn axis(half: f64, n: usize) -> Axis {

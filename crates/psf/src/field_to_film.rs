@@ -6,19 +6,22 @@ use rayon::prelude::*;
 
 use crate::{
     FieldGeometry, Kernel, PsfError, PsfQuery,
+    dark_fields::StandIn,
     field_geometry::{Area, Landed, Landing},
+    gathering::BEFORE_DARK,
     general::GeneralBank,
+    lit_fields::LitFields,
     ray_map::RayMap,
 };
 
 /// Where the fields of a [`GeneralBank`] land on the film, and which field is seen at each place.
 ///
-/// Fields that see no light get none; the centroids beyond the last lit fields go on straight, and their kernels, which
-/// nothing needs but blends at the edge of the light, are those of the nearest lit field.
+/// Where light ends within the fields, pupils are known up to there, and images of fields just before it stand for those of dark ones: their centroids go on
+/// straight outwards. Where such an image is not found the nearest lit field stands for a dark one.
 #[derive(Clone, Debug)]
 pub(crate) struct FieldToFilm {
     // Invariant: all lists are indexed as the bank's samples are: by (wavelength, depth, y, x), x innermost, or the first two.
-    /// For each sample the nearest lit one of its depth and wavelength.
+    /// For each sample the one that stands for it: itself where it is lit.
     nearest_lit: Vec<usize>,
     centroids_mm: Vec<DVec2>,
     pupils_mm2: Vec<f64>,
@@ -27,11 +30,12 @@ pub(crate) struct FieldToFilm {
 }
 
 impl FieldToFilm {
-    /// Tabulates the way back from the film.
+    /// Tabulates the way back from the film. Images that stand for those of dark fields are added to the bank's samples, behind all others.
     ///
     /// # Errors
     /// When the bank has fewer than two lit fields each way at some depth and wavelength, or the work was cancelled.
-    pub(crate) fn new(bank: &GeneralBank, cancel: &Cancel) -> Result<Self, PsfError> {
+    pub(crate) fn new(bank: &mut GeneralBank, cancel: &Cancel) -> Result<Self, PsfError> {
+        let stand_ins = StandIn::of_dark(bank, cancel)?;
         let (n_x, n_y) = (bank.x.knots().len(), bank.y.knots().len());
         let n_plane = n_x * n_y;
         let (mut nearest_lit, mut centroids_mm, mut pupils_mm2) = (vec![], vec![], vec![]);
@@ -39,7 +43,9 @@ impl FieldToFilm {
             cancel.check()?;
             let lit: Vec<Option<DVec2>> =
                 samples.iter().map(|sample| Some(sample.as_ref()?.summary.centroid_mm)).collect();
-            let Some(whole) = straight_on(lit.clone(), n_x) else {
+            let stand_in = |at: usize| stand_ins.get(plane * n_plane + at)?.as_ref();
+            let known = lit.iter().enumerate().map(|(at, lit)| lit.or_else(|| Some(stand_in(at)?.centroid_mm)));
+            let Some(whole) = straight_on(known.collect(), n_x) else {
                 let dioptres = bank.settings().dioptres[plane % bank.settings().dioptres.len()];
                 let nm = &bank.settings().wavelengths_nm;
                 let wavelength_nm = nm[nm.len() - 1 - plane / bank.settings().dioptres.len()];
@@ -49,6 +55,12 @@ impl FieldToFilm {
             nearest_lit.extend((0..n_plane).map(|at| plane * n_plane + nearest(&lit, at, n_x)));
             pupils_mm2.extend(samples.iter().map(|s| s.as_ref().map_or(0.0, |s| s.summary.pupil_mm2)));
         }
+        for (at, stand_in) in stand_ins.into_iter().enumerate() {
+            let Some(stand_in) = stand_in else { continue };
+            nearest_lit[at] = bank.samples.len();
+            bank.samples.push(Some(stand_in.sample));
+        }
+        let bank = &*bank;
         let mut this = Self { nearest_lit, centroids_mm, pupils_mm2, geometries: vec![] };
         let area = Area::around(this.centroids_mm.iter().copied(), n_x.max(n_y)).expect("there are samples");
         let n_planes = this.centroids_mm.len() / n_plane;
@@ -57,20 +69,33 @@ impl FieldToFilm {
         Ok(this)
     }
 
-    /// For each sample of the bank the nearest lit one of its depth and wavelength.
+    /// For each sample of the bank the one that stands for it: itself where it is lit.
     pub(crate) fn nearest_lit(&self) -> &[usize] {
         &self.nearest_lit
     }
 
-    /// Whether the fields at the rim of the bank see no light, at any depth and wavelength: then nothing lights the film from
-    /// beyond them.
-    pub(crate) fn is_dark_at_rim(&self, bank: &GeneralBank) -> bool {
+    /// Whether no light from beyond the fields of the bank lands on a part of the film, at any depth and wavelength: those at their rim are dark, or land off it.
+    ///
+    /// The part is given by its corners left below and right above, mm; `None` is a film without an end.
+    pub(crate) fn is_dark_beyond(&self, bank: &GeneralBank, film_mm: Option<(DVec2, DVec2)>) -> bool {
         let (n_x, n_y) = (bank.x.knots().len(), bank.y.knots().len());
-        let is_rim = |at: usize| {
-            let (row, column) = (at / n_x % n_y, at % n_x);
-            row == 0 || column == 0 || row == n_y - 1 || column == n_x - 1
+        let n_plane = n_x * n_y;
+        let is_rim = |row: usize, column: usize| row == 0 || column == 0 || row == n_y - 1 || column == n_x - 1;
+        let lands_on_film = |at_mm: DVec2| {
+            film_mm.is_none_or(|(low_mm, high_mm)| at_mm.cmpge(low_mm).all() && at_mm.cmple(high_mm).all())
         };
-        self.pupils_mm2.iter().enumerate().all(|(at, pupil_mm2)| !is_rim(at) || *pupil_mm2 == 0.0)
+        let is_dark = |at: usize| {
+            let field_tan = DVec2::new(bank.x.knots()[at % n_x], bank.y.knots()[at / n_x % n_y]);
+            // Narrow pupils are not told from none.
+            let is_ended = |lit: &Vec<LitFields>| {
+                let lit = &lit[at / n_plane];
+                lit.is_dark_at(lit.middle_tan().lerp(field_tan, 1.0 + BEFORE_DARK))
+            };
+            bank.lit_fields.as_ref().map_or(self.pupils_mm2[at] == 0.0, is_ended)
+        };
+        (0..self.pupils_mm2.len())
+            .filter(|at| is_rim(at / n_x % n_y, at % n_x))
+            .all(|at| is_dark(at) || !lands_on_film(self.centroids_mm[at]))
     }
 
     /// Returns which field is seen where on the film, and how bright, at one depth and wavelength.
@@ -107,22 +132,26 @@ impl FieldToFilm {
         let (x, y) = (&bank.x, &bank.y);
         let n = x.knots().len() * y.knots().len();
         let (mut centroids_mm, mut pupils_mm2) = (vec![DVec2::ZERO; n], vec![0.0; n]);
+        let planes: Vec<(usize, f64)> = planes.collect();
+        let lit_fields = bank.lit_fields.as_ref();
+        let lit_fields =
+            lit_fields.and_then(|lit| LitFields::mix(planes.iter().map(|&(plane, weight)| (&lit[plane], weight))));
         for (plane, weight) in planes {
             for at in 0..n {
                 centroids_mm[at] += self.centroids_mm[plane * n + at] * weight;
                 pupils_mm2[at] += self.pupils_mm2[plane * n + at] * weight;
             }
         }
-        Landing { x, y, centroids_mm, pupils_mm2 }
+        Landing { x, y, centroids_mm, pupils_mm2, lit_fields }
     }
 
-    /// Returns the point spread function of a point about its centroid; of a dark one that of the nearest lit field.
+    /// Returns the point spread function of a point about its centroid; of a dark one that of a lit field near by.
     pub(crate) fn kernel(&self, bank: &GeneralBank, query: PsfQuery) -> Kernel {
         let PsfQuery { field_tan, dioptres, wavelength_nm, .. } = query;
         bank.kernel_of(&self.record(bank, field_tan, dioptres, wavelength_nm), query).0
     }
 
-    /// Returns the ray map of a point; of a dark one that of the nearest lit field.
+    /// Returns the ray map of a point; of a dark one that of a lit field near by.
     pub(crate) fn record(&self, bank: &GeneralBank, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> RayMap {
         let samples = bank.lit_samples(Some(&self.nearest_lit), field_tan, dioptres, wavelength_nm);
         let record = RayMap::mix(samples.map(|(sample, weight)| (&sample.record, weight)));

@@ -7,6 +7,7 @@ use dioptric_optics::MonoLens;
 use glam::DVec2;
 
 use crate::{
+    lit_fields::LitFields,
     mesh::Mesh,
     pupil::Pupil,
     ray_map::{RayMapJob, RayMapMoments},
@@ -103,6 +104,13 @@ impl<'a> GatheredFields<'a> {
             half *= 0.5;
         }
         low
+    }
+
+    /// Returns the fields about the middle that see light, as far as `reach_tan` from it, gathered to an image or not; their end to a thousandth of the
+    /// angle of that.
+    #[must_use]
+    pub fn lit_fields(&self, reach_tan: f64) -> Option<LitFields> {
+        LitFields::about(self.job, reach_tan)
     }
 
     fn largest(holds: impl Fn(f64) -> bool) -> f64 {

@@ -10,12 +10,13 @@ use rayon::prelude::*;
 use crate::{
     BankSettings, Diffraction, Kernel, ModelUse, PsfError, PsfQuery,
     axis::Axis,
+    dark_fields,
     dispersion::{Dispersion, share_of_orders},
     drawing::{composed, wave_fraction_of},
     hurb_splatter::StopHurb,
+    lit_fields::LitFields,
     mesh::Mesh,
     mirror::MirroredFields,
-    pupil::Pupil,
     ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, Sample},
     render::{self, Layout},
     watch::Watch,
@@ -37,6 +38,8 @@ pub(crate) struct GeneralBank {
     colors: Axis,
     dispersion: Dispersion,
     pub(crate) samples: Vec<Option<Sample>>,
+    /// Where light ends within the fields, for each wavelength and depth; `None` where it does not.
+    pub(crate) lit_fields: Option<Vec<LitFields>>,
     lens: Lens,
     reference: MonoLens,
     /// Index around the stop at each of the colors.
@@ -58,28 +61,23 @@ impl GeneralBank {
         let lenses: Vec<MonoLens> = nm.iter().map(|&nm| lens.at(nm)).collect::<Result<_, _>>()?;
         let mesh = Mesh { n_rings: settings.n_rings, n_azimuths: settings.n_azimuths };
         let fields = MirroredFields::new(lens.mirror_symmetries(), mesh, tans_x, tans_y);
+        let planes = planes_of(settings, &lenses, &reference);
+        let lit_fields = dark_fields::lit_fields(&planes, &settings.fields, cancel)?;
         let mut tasks = Vec::new();
-        for lens in &lenses {
-            for &dioptres in &settings.dioptres {
-                tasks.extend(fields.traced().map(|field_tan| RayMapJob {
-                    lens,
-                    reference: &reference,
-                    field_tan,
-                    dioptres,
-                    film_distance_mm: settings.film_distance_mm,
-                    mesh,
-                }));
-            }
+        for (plane, job) in planes.iter().enumerate() {
+            let lit = lit_fields.as_ref().map(|lit| &lit[plane]);
+            tasks.extend(fields.traced().map(|field_tan| (RayMapJob { field_tan, ..*job }, lit)));
         }
         let has_stop = settings.diffraction != Diffraction::None;
-        let sample = |task: &RayMapJob<'_>| {
-            let pupil = Pupil::find(task.lens, &task.point(), mesh.n_azimuths)?;
-            let pupil = pupil.near(task.lens, &task.point())?;
-            let traced = task.trace(&pupil, has_stop)?;
+        let sample = |(task, lit): &(RayMapJob<'_>, Option<&LitFields>)| {
+            if lit.is_some_and(|lit| lit.is_dark_at(task.field_tan)) {
+                return None;
+            }
+            let traced = task.trace(&task.pupil()?, has_stop)?;
             Some(Sample { record: traced.record(mesh, has_stop), summary: traced.summary })
         };
         let watch = Watch::new(tasks.len(), progress, cancel);
-        let watched = |task: &RayMapJob<'_>| {
+        let watched = |task: &(RayMapJob<'_>, Option<&LitFields>)| {
             watch.check()?;
             let sample = sample(task);
             watch.done(1);
@@ -96,6 +94,7 @@ impl GeneralBank {
             colors: axis(nm.iter().map(|&nm| dispersion.coordinate(nm)).collect()),
             dispersion,
             samples,
+            lit_fields,
             lens: lens.clone(),
             stop_indices: lenses.iter().map(MonoLens::stop_medium_index).collect(),
             reference,
@@ -116,6 +115,17 @@ impl GeneralBank {
 
     pub(crate) fn lens(&self) -> &Lens {
         &self.lens
+    }
+
+    /// Returns how to trace the field along the axis at each wavelength and depth of the samples, in their order, and has `look` see them.
+    ///
+    /// # Errors
+    /// None that building the bank has not met.
+    pub(crate) fn with_planes<T>(&self, look: impl FnOnce(&[RayMapJob<'_>]) -> T) -> Result<T, PsfError> {
+        let settings = &self.settings;
+        let lenses: Vec<MonoLens> =
+            settings.wavelengths_nm.iter().rev().map(|&nm| self.lens.at(nm)).collect::<Result<_, _>>()?;
+        Ok(look(&planes_of(settings, &lenses, &self.reference)))
     }
 
     /// Returns where the centroid of a point lands, mm, picture frame; `None` where samples about it are dark.
@@ -260,4 +270,12 @@ impl GeneralBank {
         let nm = &self.settings.wavelengths_nm;
         wavelength_nm.clamp(nm[0], nm[nm.len() - 1])
     }
+}
+
+/// Returns how to trace the field along the axis at each wavelength and depth, in the order of samples.
+fn planes_of<'a>(settings: &BankSettings, lenses: &'a [MonoLens], reference: &'a MonoLens) -> Vec<RayMapJob<'a>> {
+    let mesh = Mesh { n_rings: settings.n_rings, n_azimuths: settings.n_azimuths };
+    let (field_tan, film_distance_mm) = (DVec2::ZERO, settings.film_distance_mm);
+    let job = |lens, dioptres| RayMapJob { lens, reference, field_tan, dioptres, film_distance_mm, mesh };
+    lenses.iter().flat_map(|lens| settings.dioptres.iter().map(move |&dioptres| job(lens, dioptres))).collect()
 }

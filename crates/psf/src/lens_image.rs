@@ -24,6 +24,12 @@ pub trait LensImage: Sync {
     /// Whether the lens passes no light beyond the extent of its maps; if not, what comes there is not known.
     fn is_dark_beyond_extent(&self) -> bool;
 
+    /// Whether none that it passes from beyond the extent of its maps lands on a rectangle of the film, given by its corners left below and right above, mm.
+    fn is_dark_beyond_extent_on(&self, low_mm: DVec2, high_mm: DVec2) -> bool {
+        let _ = (low_mm, high_mm);
+        self.is_dark_beyond_extent()
+    }
+
     /// Returns the map from the film, at least up to `extent_mm` from its middle where the lens is known so far, to fields: to those whose reference
     /// points lie there. Those are the centroids of their light or other places that follow smoothly from the field.
     fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap;

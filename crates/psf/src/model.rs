@@ -73,8 +73,8 @@ impl LensImageModel {
                 Form::Rotational(Box::new(RotationalBank::build(&centered, settings, progress, cancel)?))
             }
             FieldSampling::Grid { .. } => {
-                let bank = GeneralBank::build(lens, settings, progress, cancel)?;
-                let field_to_film = Some(Box::new(FieldToFilm::new(&bank, cancel)?));
+                let mut bank = GeneralBank::build(lens, settings, progress, cancel)?;
+                let field_to_film = Some(Box::new(FieldToFilm::new(&mut bank, cancel)?));
                 Form::General { bank: Box::new(bank), field_to_film }
             }
             FieldSampling::Points { .. } => {

@@ -67,8 +67,17 @@ impl LensImage for LensImageModel {
                     || bank.is_scattered_beyond()
             }
             Form::General { bank, field_to_film } => {
-                field_to_film.as_ref().is_some_and(|inverse| inverse.is_dark_at_rim(bank))
+                field_to_film.as_ref().is_some_and(|inverse| inverse.is_dark_beyond(bank, None))
             }
+        }
+    }
+
+    fn is_dark_beyond_extent_on(&self, low_mm: DVec2, high_mm: DVec2) -> bool {
+        match &self.form {
+            Form::General { bank, field_to_film: Some(inverse) } => {
+                inverse.is_dark_beyond(bank, Some((low_mm, high_mm)))
+            }
+            _ => self.is_dark_beyond_extent(),
         }
     }
 

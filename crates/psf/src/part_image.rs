@@ -220,6 +220,10 @@ impl LensImage for PartImage {
         self.model.is_dark_beyond_extent()
     }
 
+    fn is_dark_beyond_extent_on(&self, low_mm: DVec2, high_mm: DVec2) -> bool {
+        self.model.is_dark_beyond_extent_on(low_mm, high_mm)
+    }
+
     fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
         let points = self.points(dioptres, wavelength_nm);
         let whole = self.model.film_map(dioptres, wavelength_nm, extent_mm + points.most_aside_mm());

@@ -32,11 +32,15 @@ impl Pupil {
 
     /// Finds the pupil of a point whose pupil should be like this one, or from nothing if it is not.
     pub(crate) fn near(&self, lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
-        let guess = Self { z_mm: lens.projection_center_z_mm(), ..self.clone() };
-        guess.settled(lens, point).or_else(|| {
+        self.clone().moved(lens, point).or_else(|| {
             let found = Self::find(lens, point, self.rho_mm.len())?;
             Some(found.clone().settled(lens, point).unwrap_or(found))
         })
+    }
+
+    /// Finds the pupil of a point whose pupil has the middle of this one within it; `None` where it has not, or there is none.
+    pub(crate) fn moved(self, lens: &MonoLens, point: &ObjectPoint) -> Option<Self> {
+        Self { z_mm: lens.projection_center_z_mm(), ..self }.settled(lens, point)
     }
 
     /// Returns the region about its own centroid, its edge moved to where clearances are 0; `None` if that does not converge.
@@ -56,7 +60,7 @@ impl Pupil {
         here.refined(lens, point, TOLERANCE_MM)
     }
 
-    fn mean_radius_mm(&self) -> f64 {
+    pub(crate) fn mean_radius_mm(&self) -> f64 {
         self.rho_mm.iter().sum::<f64>() / self.rho_mm.len() as f64
     }
 

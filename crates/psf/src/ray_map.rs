@@ -215,6 +215,12 @@ impl RayMapJob<'_> {
         ObjectPoint::from_field(self.reference, self.field_tan, self.dioptres)
     }
 
+    /// Finds the pupil from nothing, about its own center.
+    pub(crate) fn pupil(self) -> Option<Pupil> {
+        let point = self.point();
+        Pupil::find(self.lens, &point, self.mesh.n_azimuths)?.near(self.lens, &point)
+    }
+
     /// Traces the mesh in a pupil, or returns `None` if its middle ray does not reach the film.
     pub(crate) fn trace(self, pupil: &Pupil, has_stop: bool) -> Option<Traced> {
         let point = &self.point();

@@ -215,8 +215,8 @@ impl BankSettings {
         let n = SampleCounts::STANDARD.n_grid;
         Self {
             fields: FieldSampling::Grid {
-                tans_x: even_angles((first_tan.x, last_tan.x), n),
-                tans_y: even_angles((first_tan.y, last_tan.y), n),
+                tans_x: grid_angles((first_tan.x, last_tan.x), n),
+                tans_y: grid_angles((first_tan.y, last_tan.y), n),
             },
             ..Self::covering(film_distance_mm, 0.0, dioptres, wavelengths_nm, diffraction)
         }
@@ -229,8 +229,8 @@ impl BankSettings {
         let fields = match &self.fields {
             FieldSampling::Radial(tans) => FieldSampling::Radial(even_angles(ends(tans), n.n_radial)),
             FieldSampling::Grid { tans_x, tans_y } => FieldSampling::Grid {
-                tans_x: even_angles(ends(tans_x), n.n_grid),
-                tans_y: even_angles(ends(tans_y), n.n_grid),
+                tans_x: grid_angles(ends(tans_x), n.n_grid),
+                tans_y: grid_angles(ends(tans_y), n.n_grid),
             },
             points @ FieldSampling::Points { .. } => points.clone(),
         };
@@ -313,6 +313,17 @@ fn spaced((first, last): (f64, f64), n: usize) -> Vec<f64> {
         return vec![first];
     }
     (0..n).map(|i| first + (last - first) * i as f64 / (n - 1) as f64).collect()
+}
+
+/// Returns tangents of even angles from end to end of a side of a grid: `n`, and up to three times as many beyond 45° off the axis, where cubics in tangents
+/// follow a lens less and less.
+fn grid_angles(ends_tan: (f64, f64), n: usize) -> Vec<f64> {
+    const MOST: f64 = 3.0;
+    let widest_tan = ends_tan.0.abs().max(ends_tan.1.abs());
+    let more = widest_tan.sqrt().clamp(1.0, MOST);
+    // An odd number keeps an odd one: of fields about the axis one is on it.
+    let n = if more > 1.0 { n + 2 * (0.5 * (more - 1.0) * n as f64).ceil() as usize } else { n };
+    even_angles(ends_tan, n)
 }
 
 /// Returns `n` tangents of evenly spaced angles from one end of a range to the other, or its one number.

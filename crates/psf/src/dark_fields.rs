@@ -1,0 +1,95 @@
+//! Fields of a grid that see no light: where they begin, and what stands for them.
+
+use dioptric_spectrum::{Cancel, Cancelled};
+use glam::DVec2;
+use rayon::prelude::*;
+
+use crate::{
+    Diffraction, FieldSampling, PsfError,
+    gathering::BEFORE_DARK,
+    general::GeneralBank,
+    lit_fields::LitFields,
+    mesh::Mesh,
+    ray_map::{RayMapJob, Sample},
+};
+
+/// Follows the light of a grid of fields outwards from their middle, at each wavelength and depth that a job is given for; `None` where it does not end
+/// within the grid, or there is none in the middle.
+pub(crate) fn lit_fields(
+    planes: &[RayMapJob<'_>],
+    fields: &FieldSampling,
+    cancel: &Cancel,
+) -> Result<Option<Vec<LitFields>>, Cancelled> {
+    let FieldSampling::Grid { tans_x, tans_y } = fields else { return Ok(None) };
+    let (x, y) = ((tans_x[0], tans_x[tans_x.len() - 1]), (tans_y[0], tans_y[tans_y.len() - 1]));
+    let corners = [(x.0, y.0), (x.1, y.0), (x.0, y.1), (x.1, y.1)].map(DVec2::from);
+    let middle_tan = 0.5 * (corners[0] + corners[3]);
+    // Lit fields have no hollows: where the corners are lit, all between them are.
+    let ends = [0, planes.len() - 1].map(|plane| planes[plane]);
+    let is_dark =
+        |(job, field_tan): &(RayMapJob<'_>, DVec2)| RayMapJob { field_tan: *field_tan, ..*job }.pupil().is_none();
+    let looks: Vec<(RayMapJob<'_>, DVec2)> =
+        ends.into_iter().flat_map(|job| corners.map(|corner| (job, corner))).collect();
+    if !looks.par_iter().any(is_dark) {
+        return Ok(None);
+    }
+    /// A mesh that is fine enough for the area of a pupil, with the edge of the bank's.
+    const N_RINGS: usize = 4;
+    let reach_tan = 1.1 * middle_tan.distance(corners[0]);
+    let found = planes.par_iter().map(|job| {
+        cancel.check()?;
+        let mesh = Mesh { n_rings: N_RINGS, ..job.mesh };
+        Ok(LitFields::about(RayMapJob { field_tan: middle_tan, mesh, ..*job }, reach_tan))
+    });
+    found.collect()
+}
+
+/// The image of a lit field that stands for that of a dark one.
+#[derive(Debug)]
+pub(crate) struct StandIn {
+    pub(crate) sample: Sample,
+    /// Where the dark field would land, mm, if the image went on straight.
+    pub(crate) centroid_mm: DVec2,
+}
+
+impl StandIn {
+    /// Returns for each dark sample of a bank the image of the last lit field on the way to it; none where light does not end within its fields.
+    ///
+    /// # Errors
+    /// When the work was cancelled.
+    pub(crate) fn of_dark(bank: &GeneralBank, cancel: &Cancel) -> Result<Vec<Option<Self>>, PsfError> {
+        let Some(lit_fields) = &bank.lit_fields else { return Ok(vec![]) };
+        let (x, y) = (bank.x.knots(), bank.y.knots());
+        let fields: Vec<DVec2> = y.iter().flat_map(|&y| x.iter().map(move |&x| DVec2::new(x, y))).collect();
+        let has_stop = bank.settings().diffraction != Diffraction::None;
+        let found = bank.with_planes(|planes| {
+            let stand_in = |(at, sample): (usize, &Option<Sample>)| {
+                cancel.check()?;
+                let (plane, field_tan) = (at / fields.len(), fields[at % fields.len()]);
+                let find = || Self::find(planes[plane], &lit_fields[plane], field_tan, has_stop);
+                Ok(if sample.is_none() { find() } else { None })
+            };
+            bank.samples.par_iter().enumerate().map(stand_in).collect::<Result<_, Cancelled>>()
+        })?;
+        Ok(found?)
+    }
+
+    /// Looks for the last field on the way to a dark one whose image is found.
+    fn find(job: RayMapJob<'_>, lit_fields: &LitFields, field_tan: DVec2, has_stop: bool) -> Option<Self> {
+        let share = lit_fields.share_of(field_tan);
+        let at = |lit: f64| {
+            let job = RayMapJob { field_tan: lit_fields.field_at(lit, field_tan), ..job };
+            let traced = job.trace(&job.pupil()?, has_stop)?;
+            Some(Sample { record: traced.record(job.mesh, has_stop), summary: traced.summary })
+        };
+        // Where a pupil is too narrow to be found, the next field within.
+        let within = (1..=8).map(|steps| (1.0 - BEFORE_DARK * f64::from(steps)).min(share));
+        let (lit, sample) = within.into_iter().find_map(|lit| Some((lit, at(lit)?)))?;
+        let inner = at(lit - BEFORE_DARK)?;
+        let away_tan = |share: f64| lit_fields.field_at(share, field_tan).distance(lit_fields.middle_tan());
+        let slope_mm =
+            (sample.summary.centroid_mm - inner.summary.centroid_mm) / (away_tan(lit) - away_tan(lit - BEFORE_DARK));
+        let centroid_mm = sample.summary.centroid_mm + slope_mm * (away_tan(share) - away_tan(lit));
+        Some(Self { sample, centroid_mm })
+    }
+}
