@@ -25,12 +25,9 @@ pub(crate) fn lit_fields(
     let corners = [(x.0, y.0), (x.1, y.0), (x.0, y.1), (x.1, y.1)].map(DVec2::from);
     let middle_tan = 0.5 * (corners[0] + corners[3]);
     // Lit fields have no hollows: where the corners are lit, all between them are.
-    let ends = [0, planes.len() - 1].map(|plane| planes[plane]);
     let is_dark =
-        |(job, field_tan): &(RayMapJob<'_>, DVec2)| RayMapJob { field_tan: *field_tan, ..*job }.pupil().is_none();
-    let looks: Vec<(RayMapJob<'_>, DVec2)> =
-        ends.into_iter().flat_map(|job| corners.map(|corner| (job, corner))).collect();
-    if !looks.par_iter().any(is_dark) {
+        |job: &RayMapJob<'_>| corners.iter().any(|&field_tan| RayMapJob { field_tan, ..*job }.pupil().is_none());
+    if !planes.par_iter().any(is_dark) {
         return Ok(None);
     }
     /// A mesh that is fine enough for the area of a pupil, with the edge of the bank's.
