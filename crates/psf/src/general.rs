@@ -10,11 +10,10 @@ use rayon::prelude::*;
 use crate::{
     BankSettings, Diffraction, Kernel, ModelUse, PsfError, PsfQuery,
     axis::Axis,
-    dark_fields,
     dispersion::{Dispersion, share_of_orders},
     drawing::{composed, wave_fraction_of},
     hurb_splatter::StopHurb,
-    lit_fields::LitFields,
+    lit_fields::{self, LitFields},
     mesh::Mesh,
     mirror::MirroredFields,
     ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, Sample},
@@ -62,7 +61,7 @@ impl GeneralBank {
         let mesh = Mesh { n_rings: settings.n_rings, n_azimuths: settings.n_azimuths };
         let fields = MirroredFields::new(lens.mirror_symmetries(), mesh, tans_x, tans_y);
         let planes = planes_of(settings, &lenses, &reference);
-        let lit_fields = dark_fields::lit_fields(&planes, &settings.fields, cancel)?;
+        let lit_fields = lit_fields::within_grid(&planes, &settings.fields, cancel)?;
         let mut tasks = Vec::new();
         for (plane, job) in planes.iter().enumerate() {
             let lit = lit_fields.as_ref().map(|lit| &lit[plane]);

@@ -4,9 +4,11 @@
 
 use std::f64::consts::TAU;
 
+use dioptric_spectrum::{Cancel, Cancelled};
 use glam::DVec2;
+use rayon::prelude::*;
 
-use crate::{axis::Axis, pupil::Pupil, ray_map::RayMapJob};
+use crate::{FieldSampling, axis::Axis, mesh::Mesh, pupil::Pupil, ray_map::RayMapJob};
 
 /// Azimuths at which the end of the light is looked for.
 const N_AZIMUTHS: usize = 32;
@@ -197,6 +199,34 @@ impl LitFields {
     }
 }
 
+/// Follows the light of a grid of fields outwards from their middle, at each wavelength and depth that a job is given for; `None` where it does not end
+/// within the grid, or there is none in the middle.
+pub(crate) fn within_grid(
+    planes: &[RayMapJob<'_>],
+    fields: &FieldSampling,
+    cancel: &Cancel,
+) -> Result<Option<Vec<LitFields>>, Cancelled> {
+    let FieldSampling::Grid { tans_x, tans_y } = fields else { return Ok(None) };
+    let (x, y) = ((tans_x[0], tans_x[tans_x.len() - 1]), (tans_y[0], tans_y[tans_y.len() - 1]));
+    let corners = [(x.0, y.0), (x.1, y.0), (x.0, y.1), (x.1, y.1)].map(DVec2::from);
+    let middle_tan = 0.5 * (corners[0] + corners[3]);
+    // Lit fields have no hollows: where the corners are lit, all between them are.
+    let is_dark =
+        |job: &RayMapJob<'_>| corners.iter().any(|&field_tan| RayMapJob { field_tan, ..*job }.pupil().is_none());
+    if !planes.par_iter().any(is_dark) {
+        return Ok(None);
+    }
+    /// A mesh that is fine enough for the area of a pupil, with the edge of the bank's.
+    const N_RINGS: usize = 4;
+    let reach_tan = 1.1 * middle_tan.distance(corners[0]);
+    let found = planes.par_iter().map(|job| {
+        cancel.check()?;
+        let mesh = Mesh { n_rings: N_RINGS, ..job.mesh };
+        Ok(LitFields::about(RayMapJob { field_tan: middle_tan, mesh, ..*job }, reach_tan))
+    });
+    found.collect()
+}
+
 fn direction(azimuth: usize) -> DVec2 {
     DVec2::from_angle(TAU * azimuth as f64 / N_AZIMUTHS as f64)
 }
@@ -236,7 +266,6 @@ mod tests {
     use dioptric_optics::Lens;
 
     use super::*;
-    use crate::mesh::Mesh;
 
     /// Of a lens with an axis light ends at one angle all around, where pupils found by halving along a radius end.
     #[test]
