@@ -35,6 +35,9 @@ const BORDER_OF_BLUR: f64 = 1.5;
 /// 2 % off with this limit, 6 % with 8, 21 % with 12, and nothing is left of the picture at 89°.
 const WIDEST_OF_GRID_TAN: f64 = 5.0;
 
+/// How far a grid reaches beyond the last lit fields, over half of what they span: two squares of the coarsest table, of 64 each way, over the lit fields.
+const BEYOND_LIT: f64 = 2.0 * 2.0 / 64.0;
+
 impl PsfDomain<'_> {
     /// Returns the farthest and nearest depth, dioptres.
     fn dioptres(&self) -> Result<(f64, f64), ForwardError> {
@@ -173,7 +176,9 @@ impl PsfDomain<'_> {
             DVec2::from([0, 1].map(|axis| if is_mirrored[axis] { side[axis].max(-other[axis]) } else { side[axis] }))
         };
         let lit = (-mirrored(-lit.0, -lit.1), mirrored(lit.1, lit.0));
-        let (first, last) = (first.max(lit.0), last.min(lit.1));
+        // A little of it: what is seen where is tabulated over the film, and no square of that table that the last lit fields lie in may reach beyond the grid.
+        let beyond = BEYOND_LIT * 0.5 * (lit.1 - lit.0);
+        let (first, last) = (first.max(lit.0 - beyond), last.min(lit.1 + beyond));
         let (dioptres, wavelengths_nm) = (self.dioptres()?, self.grid.range_nm());
         Ok(BankSettings::covering_grid(
             self.film_distance_mm,

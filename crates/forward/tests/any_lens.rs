@@ -290,9 +290,10 @@ fn light_through_a_turned_lens_ends_where_pupils_do() {
                 if pupil(way * middle).is_some() { lit = middle } else { dark = middle }
             }
             let [inner_mm, outer_mm] = [0.9, 0.97].map(|share| lands_mm(share * lit * way));
-            let [inside, outside] = [inner_mm, outer_mm + (outer_mm - inner_mm)].map(light);
-            println!("{i}: light ends at {lit:.4}; at .90 of that {inside:.4}, at 1.04 {outside:.5}");
-            assert!(inside > 0.05 && outside < 0.002, "{inside} {outside}");
+            let [inside, rim, outside] = [inner_mm, outer_mm, outer_mm + (outer_mm - inner_mm)].map(light);
+            println!("{i}: light ends at {lit:.4}; at .90 of that {inside:.4}, at .97 {rim:.4}, at 1.04 {outside:.5}");
+            // The middle of the nearest pixel lies up to .25 mm farther out, at .979 of the end, where pupils leave .022 of the light; less the .005 that grids are off by.
+            assert!(inside > 0.05 && rim > 0.015 && outside < 0.002, "{inside} {rim} {outside}");
         }
     }
 }

@@ -86,7 +86,7 @@ impl FieldToFilm {
         };
         let is_dark = |at: usize| {
             let field_tan = DVec2::new(bank.x.knots()[at % n_x], bank.y.knots()[at / n_x % n_y]);
-            // Narrow pupils are not told from none.
+            // Light ends a little beyond the last pupil that is found.
             let is_ended = |lit: &Vec<LitFields>| {
                 let lit = &lit[at / n_plane];
                 lit.is_dark_at(lit.middle_tan().lerp(field_tan, 1.0 + BEFORE_DARK))
