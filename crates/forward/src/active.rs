@@ -103,7 +103,7 @@ fn layers_in(cell: &Cell, seen: Seen<'_>, maps: &[FilmMap], surfaces: &[&Array2<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampler::Rectangle;
+    use crate::rectangle::Rectangle;
 
     #[test]
     fn cells_cover_the_film_and_its_border_once() {

@@ -109,7 +109,7 @@ mod tests {
     use dioptric_scene::View;
 
     use super::*;
-    use crate::{DiscLens, Film, active::cells_over, sampler::Rectangle};
+    use crate::{DiscLens, Film, active::cells_over, rectangle::Rectangle};
 
     /// What is passed over has nothing: sampled with and without the blocks, a layer is the same to the bit.
     #[test]

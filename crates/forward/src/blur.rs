@@ -17,7 +17,8 @@ use crate::{
     occlusion::BlurredPlane,
     patch::{Knot, Patch, Products, value_of},
     patch_samples::{BlurredCell, PatchSamples, Places},
-    sampler::{Rectangle, Sampler, Surface},
+    rectangle::Rectangle,
+    sampler::{Sampler, Surface},
     stopwatch::{Part, Stopwatch},
     uniform_response::{LEAST_RESPONSE, uniform_response},
     work::Work,
@@ -128,9 +129,10 @@ impl LayerTask<'_> {
         self.is_alpha().then(|| near.into_par_iter().map(of).collect())
     }
 
-    /// The samples along a side of the widest kernel of a patch.
-    fn width_of(&self, patch: &Patch) -> usize {
-        patch.shares.iter().map(|&(knot, _)| self.kernels.width_at(knot)).max().unwrap_or(1)
+    /// Where samples of any kernel of a patch lie.
+    fn window_of(&self, patch: &Patch) -> Rectangle {
+        let windows = patch.shares.iter().map(|&(knot, _)| self.kernels.window_at(knot));
+        Rectangle::around(windows).unwrap_or(Rectangle::PIXEL)
     }
 }
 
@@ -141,9 +143,8 @@ fn blur_patch<'a>(
     cancel: &Cancel,
 ) -> Result<Spread<'a>, Cancelled> {
     let cell = &patch.cell;
-    let width = task.width_of(patch);
-    let half = width / 2;
-    let Some(source) = cell.pixels(&task.sampler.frame).clipped(task.film_rows, task.film_columns, half) else {
+    let pixels = cell.pixels(&task.sampler.frame);
+    let Some(source) = pixels.in_reach_of(task.film_rows, task.film_columns, &task.window_of(patch)) else {
         return Ok(Spread::Nothing);
     };
     let sample = || task.sampler.sample(source, task.map, task.layer, task.surfaces, task.blocks, cancel);
@@ -170,13 +171,7 @@ fn blur_patch<'a>(
     } else {
         task.stopwatch.time(Part::Transforms, || spread_by_transform(&ideal, &places, &expansion, cancel))
     };
-    let at = Rectangle {
-        first_row: source.first_row - half as i64,
-        first_column: source.first_column - half as i64,
-        rows: source.rows + 2 * half,
-        columns: source.columns + 2 * half,
-    };
-    Ok(Spread::Done(BlurredCell { at, values: values? }))
+    Ok(Spread::Done(BlurredCell { at: source.spread_over(&expansion.at), values: values? }))
 }
 
 /// Spreads a plane by sums: exactly the kernel of each row, and along a row that of each sample.
@@ -187,10 +182,10 @@ fn spread_directly(
     cancel: &Cancel,
 ) -> Result<Vec<f32>, Cancelled> {
     let (rows, columns) = (places.down.len(), places.across.len());
-    let (width, n_across) = (expansion.width, expansion.n_across());
-    let (out_rows, out_columns) = (rows + width - 1, columns + width - 1);
+    let kernel_size = (expansion.at.rows, expansion.at.columns);
+    let (out_rows, out_columns) = (rows + kernel_size.0 - 1, columns + kernel_size.1 - 1);
     let mut out = vec![0.0; out_rows * out_columns];
-    let mut strip = Strip::new(width, n_across);
+    let mut strip = Strip::new(kernel_size, expansion.n_across());
     for top in (0..rows).step_by(STRIP_ROWS) {
         let n_rows = STRIP_ROWS.min(rows - top);
         for (row, down) in places.down[top..top + n_rows].iter().enumerate() {
@@ -216,15 +211,15 @@ fn spread_by_transform(
     expansion: &Expansion,
     cancel: &Cancel,
 ) -> Result<Vec<f32>, Cancelled> {
-    let (rows, columns, width) = (places.down.len(), places.across.len(), expansion.width);
-    let size = fast_size(rows.max(columns) + width - 1);
-    with_fft(size, |fft| {
+    let (rows, columns) = (places.down.len(), places.across.len());
+    let (out_rows, out_columns) = (rows + expansion.at.rows - 1, columns + expansion.at.columns - 1);
+    with_fft((fast_size(out_rows), fast_size(out_columns)), |fft| {
         let (mut kernel, mut spectrum) = (vec![], vec![]);
         let mut sum = vec![Complex::new(0.0, 0.0); fft.spectrum_len()];
         let mut weighted = vec![0.0; rows * columns];
         for term in &expansion.terms {
             cancel.check()?;
-            fft.forward(&term.samples, width, &mut kernel);
+            fft.forward(&term.samples, expansion.at.columns, &mut kernel);
             cancel.check()?;
             let lines = weighted.chunks_exact_mut(columns).zip(values.chunks_exact(columns));
             for ((weighted, values), down) in lines.zip(&places.down) {
@@ -238,14 +233,14 @@ fn spread_by_transform(
         }
         cancel.check()?;
         let mut out = vec![];
-        fft.inverse(&mut sum, rows + width - 1, columns + width - 1, &mut out);
+        fft.inverse(&mut sum, out_rows, out_columns, &mut out);
         Ok(out)
     })
 }
 
 /// Adds what of a blurred cell lies on the film.
 fn add_cell(task: &LayerTask<'_>, cell: &BlurredCell, out: &mut BlurredPlane) {
-    let Some(on_film) = cell.at.clipped(task.film_rows, task.film_columns, 0) else { return };
+    let Some(on_film) = cell.at.clipped(task.film_rows, task.film_columns) else { return };
     let (skip_rows, skip_columns) =
         ((on_film.first_row - cell.at.first_row) as usize, (on_film.first_column - cell.at.first_column) as usize);
     for row in 0..on_film.rows {

@@ -16,10 +16,10 @@ use crate::{
     knot_kernels::{KnotKernel, LayerKernels, Mirror},
     patch::{Knot, Patch, Products},
     patch_samples::{BlurredCell, PatchSamples},
-    sampler::Rectangle,
+    rectangle::Rectangle,
     smoothing::Smoother,
     stopwatch::{Part, Stopwatch},
-    tiles::SpreadSquares,
+    tiles::SpreadBlocks,
     uniform_response::LEAST_RESPONSE,
 };
 
@@ -51,15 +51,15 @@ type Group<'a> = BTreeMap<Knot, Reach<'a>>;
 const KNOTS_AT_ONCE: usize = 32;
 
 /// About what is spread around knots before it is added up, bytes.
-pub(crate) fn spread_bytes(squares: &SpreadSquares) -> usize {
-    KNOTS_AT_ONCE * size_of::<f32>() * squares.mean_px2
+pub(crate) fn spread_bytes(blocks: &SpreadBlocks) -> usize {
+    KNOTS_AT_ONCE * size_of::<f32>() * blocks.mean_px2
 }
 
 /// What a thread transforms in, bytes: lines, a spectrum and that of a kernel, which it keeps, and for a patch by itself three half spectra, its samples and what
 /// becomes of them.
-pub(crate) fn buffer_bytes(squares: &SpreadSquares) -> usize {
-    let square = squares.largest_px * squares.largest_px;
-    3 * size_of::<Complex<f32>>() * square + 3 * size_of::<Complex<f32>>() * square / 2 + 2 * size_of::<f32>() * square
+pub(crate) fn buffer_bytes(blocks: &SpreadBlocks) -> usize {
+    let n = blocks.largest_px2;
+    3 * size_of::<Complex<f32>>() * n + 3 * size_of::<Complex<f32>>() * n / 2 + 2 * size_of::<f32>() * n
 }
 
 /// Spreads patches and hands on what they make, in an order that does not depend on the number of threads.
@@ -148,18 +148,19 @@ impl KnotRaster<'_> {
         let Some(kernel) = group.keys().next().map(|knot| self.kernels.canonical_at(*knot)) else { return Ok(vec![]) };
         let around: Vec<Surroundings<'_>> =
             group.iter().filter_map(|(knot, reach)| self.around(*knot, reach)).collect();
-        let largest = around.iter().map(|Surroundings { at, .. }| at.rows.max(at.columns)).max().unwrap_or(1);
-        let size = fast_size(largest + kernel.width - 1);
+        let sizes = around.iter().map(|Surroundings { mirror, at, .. }| mirror.size((at.rows, at.columns)));
+        let (rows, columns) = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1))).unwrap_or((1, 1));
+        let size = (fast_size(rows + kernel.at.rows - 1), fast_size(columns + kernel.at.columns - 1));
         with_fft(size, |fft| BUFFERS.with_borrow_mut(|buffers| spread_around(&around, (kernel, fft), buffers, cancel)))
     }
 
     /// Returns what lies around a knot, if anything does.
     fn around<'a>(&'a self, knot: Knot, reach: &'a Reach<'a>) -> Option<Surroundings<'a>> {
         let weights = reach.weights.iter().map(|(patch, _)| patch.cell.pixels(self.frame));
-        let has_weight = bounds(weights).map(|weights| weights.grown(self.half_px));
+        let has_weight = Rectangle::around(weights).map(|weights| weights.grown(self.half_px));
         let plain = reach.plain.iter().map(|(sampled, _)| sampled.source);
         let smooth = reach.smooth.iter().filter_map(|sampled| sampled.source.intersection(&has_weight?));
-        let at = bounds(plain.chain(smooth))?;
+        let at = Rectangle::around(plain.chain(smooth))?;
         Some(Surroundings { mirror: self.kernels.symmetry.mirror(knot), at, reach, raster: self })
     }
 }
@@ -180,7 +181,7 @@ impl Surroundings<'_> {
         block.resize(at.rows * at.columns, 0.0);
         for (sampled, shares) in &self.reach.plain {
             let PatchSamples { source, places, ideal, .. } = sampled;
-            let block = block[offset_of(source, at)..].chunks_mut(at.columns);
+            let block = block[source.offset_in(at)..].chunks_mut(at.columns);
             for ((line, down), block) in ideal.chunks_exact(source.columns).zip(&places.down).zip(block) {
                 let along: [f32; 3] = std::array::from_fn(|j| (0..3).map(|i| shares[3 * i + j] * down[i]).sum());
                 add_weighted(line, &places.across, along, block);
@@ -195,19 +196,14 @@ impl Surroundings<'_> {
         let weights = smoother.finish();
         for PatchSamples { source, ideal, .. } in &self.reach.smooth {
             let Some(common) = source.intersection(at) else { continue };
-            let lines = ideal[offset_of(&common, source)..].chunks(source.columns).take(common.rows);
-            let first = offset_of(&common, at);
+            let lines = ideal[common.offset_in(source)..].chunks(source.columns).take(common.rows);
+            let first = common.offset_in(at);
             let sums = block[first..].chunks_mut(at.columns).zip(weights[first..].chunks(at.columns));
             for (line, (sums, weights)) in lines.zip(sums) {
                 add_products(&mut sums[..common.columns], line, weights);
             }
         }
     }
-}
-
-/// Returns the number of a rectangle's first pixel in another around it, row by row.
-fn offset_of(inner: &Rectangle, outer: &Rectangle) -> usize {
-    (inner.first_row - outer.first_row) as usize * outer.columns + (inner.first_column - outer.first_column) as usize
 }
 
 /// Spreads what lies around knots by their canonical kernel: two at a time, or one that is alone.
@@ -225,26 +221,9 @@ fn spread_around(
     let mut cells = Vec::with_capacity(around.len());
     for pair in around.chunks(2) {
         cancel.check()?;
-        buffers.spread_pair(fft, kernel.width, pair, &mut cells);
+        buffers.spread_pair(fft, &kernel.at, pair, &mut cells);
     }
     Ok(cells)
-}
-
-/// Returns the rectangle that holds all of these, if there are any.
-fn bounds(mut rectangles: impl Iterator<Item = Rectangle>) -> Option<Rectangle> {
-    let first = rectangles.next()?;
-    let end = |at: &Rectangle| (at.first_row + at.rows as i64, at.first_column + at.columns as i64);
-    let ((mut top, mut left), (mut bottom, mut right)) = ((first.first_row, first.first_column), end(&first));
-    for at in rectangles {
-        (top, left) = (top.min(at.first_row), left.min(at.first_column));
-        (bottom, right) = (bottom.max(end(&at).0), right.max(end(&at).1));
-    }
-    Some(Rectangle {
-        first_row: top,
-        first_column: left,
-        rows: (bottom - top) as usize,
-        columns: (right - left) as usize,
-    })
 }
 
 thread_local! {
@@ -267,12 +246,12 @@ impl Buffers {
     /// Spreads the samples around a knot by the canonical kernel.
     fn spread(&mut self, fft: &mut Fft2, kernel: &KnotKernel, around: &Surroundings<'_>) -> BlurredCell {
         let Surroundings { mirror, at, .. } = around;
-        fft.forward(&kernel.samples, kernel.width, &mut self.kernel);
+        fft.forward(&kernel.samples, kernel.at.columns, &mut self.kernel);
         around.gather(&mut self.smoother, &mut self.block);
         mirror.applied(&self.block, (at.rows, at.columns), &mut self.mirrored);
         fft.forward(&self.mirrored, mirror.size((at.rows, at.columns)).1, &mut self.spectrum);
         multiply(&mut self.spectrum, &self.kernel);
-        let at = widened(at, kernel.width);
+        let at = at.spread_over(&mirror.window_at_knot(&kernel.at));
         let (rows, columns) = mirror.size((at.rows, at.columns));
         fft.inverse(&mut self.spectrum, rows, columns, &mut self.mirrored);
         BlurredCell { at, values: mirror.restored(&self.mirrored, (at.rows, at.columns)) }
@@ -280,28 +259,33 @@ impl Buffers {
 
     /// Finds what the spectra of pairs are multiplied by to be spread by a kernel, the scale of the transforms included.
     fn transform_kernel(&mut self, fft: &mut Fft2, kernel: &KnotKernel) {
-        let (size, width) = (fft.size(), kernel.width);
-        let scale = 1.0 / (size * size) as f32;
+        let (stride, scale) = (fft.columns(), 1.0 / fft.len() as f32);
         self.lines.clear();
-        self.lines.resize(width * size, Complex::new(0.0, 0.0));
-        for (line, samples) in self.lines.chunks_exact_mut(size).zip(kernel.samples.chunks_exact(width)) {
+        self.lines.resize(kernel.at.rows * stride, Complex::new(0.0, 0.0));
+        for (line, samples) in self.lines.chunks_exact_mut(stride).zip(kernel.samples.chunks_exact(kernel.at.columns)) {
             line.iter_mut().zip(samples).for_each(|(value, sample)| value.re = sample * scale);
         }
         fft.forward_pair(&mut self.lines, &mut self.kernel);
     }
 
-    /// Spreads the samples around two knots, or around the last of an odd number, by the canonical kernel. Those around one are the real parts of
+    /// Spreads the samples around two knots, or around the last of an odd number, by the canonical kernel, whose samples lie in a rectangle. Those around one are the real parts of
     /// the samples of a block, around the other the imaginary ones: a kernel, which is real, leaves them apart.
-    fn spread_pair(&mut self, fft: &mut Fft2, width: usize, pair: &[Surroundings<'_>], cells: &mut Vec<BlurredCell>) {
-        let size = fft.size();
+    fn spread_pair(
+        &mut self,
+        fft: &mut Fft2,
+        kernel: &Rectangle,
+        pair: &[Surroundings<'_>],
+        cells: &mut Vec<BlurredCell>,
+    ) {
+        let stride = fft.columns();
         let rows_of = |Surroundings { mirror, at, .. }: &Surroundings<'_>| mirror.size((at.rows, at.columns)).0;
         let n_rows = pair.iter().map(rows_of).max().unwrap_or(0);
         self.lines.clear();
-        self.lines.resize(n_rows * size, Complex::new(0.0, 0.0));
+        self.lines.resize(n_rows * stride, Complex::new(0.0, 0.0));
         for (part, around) in pair.iter().enumerate() {
             let Surroundings { mirror, at, .. } = around;
             around.gather(&mut self.smoother, &mut self.block);
-            let (block, lines) = (&self.block, (&mut self.lines[..], size));
+            let (block, lines) = (&self.block, (&mut self.lines[..], stride));
             match part {
                 0 => mirror.applied_to(block, (at.rows, at.columns), lines, |value, sample| value.re = sample),
                 _ => mirror.applied_to(block, (at.rows, at.columns), lines, |value, sample| value.im = sample),
@@ -309,10 +293,10 @@ impl Buffers {
         }
         fft.forward_pair(&mut self.lines, &mut self.spectrum);
         multiply(&mut self.spectrum, &self.kernel);
-        fft.inverse_pair(&mut self.spectrum, n_rows + width - 1, &mut self.lines);
+        fft.inverse_pair(&mut self.spectrum, n_rows + kernel.rows - 1, &mut self.lines);
         for (part, Surroundings { mirror, at, .. }) in pair.iter().enumerate() {
-            let at = widened(at, width);
-            let (size, lines) = ((at.rows, at.columns), (&self.lines[..], size));
+            let at = at.spread_over(&mirror.window_at_knot(kernel));
+            let (size, lines) = ((at.rows, at.columns), (&self.lines[..], stride));
             let values = match part {
                 0 => mirror.restored_from(lines, size, |value| value.re),
                 _ => mirror.restored_from(lines, size, |value| value.im),
@@ -320,13 +304,6 @@ impl Buffers {
             cells.push(BlurredCell { at, values });
         }
     }
-}
-
-/// Returns what light from a rectangle reaches that is spread by a kernel.
-fn widened(at: &Rectangle, width: usize) -> Rectangle {
-    let half = (width / 2) as i64;
-    let (rows, columns) = (at.rows + width - 1, at.columns + width - 1);
-    Rectangle { first_row: at.first_row - half, first_column: at.first_column - half, rows, columns }
 }
 
 /// Adds samples times their weights to a line: a sum of the polynomials at each, times `along`.
@@ -366,7 +343,9 @@ mod tests {
     /// Eight knots that mirror each other, and one on the axis, all with weight in two patches: as each sample spread by its own kernel.
     #[test]
     fn knots_spread_as_samples_do() {
-        let (rows, columns, width) = (12, 7, 5);
+        let (rows, columns) = (12, 7);
+        // To the right of the reference point and above it, as a comet.
+        let window = Rectangle { first_row: -4, first_column: -1, rows: 6, columns: 5 };
         let frame = FilmFrame::new(&Film::centered(64, 64, 1.0), 1);
         let ways = [(64, -32), (-64, -32), (64, 32), (32, -64), (-32, 64), (32, 64), (-32, -64), (-64, 32), (0, 0)];
         let knots = ways.map(|(right, down)| Knot { right, down });
@@ -374,7 +353,7 @@ mod tests {
             let canonical = knots.iter().map(|&knot| symmetry.canonical(knot));
             let kernel = |knot: Knot| {
                 let seed = (knot.right + 1000 * knot.down).unsigned_abs();
-                (knot, KnotKernel { width, samples: noise(width * width, seed) })
+                (knot, KnotKernel { at: window, samples: noise(window.len(), seed) })
             };
             let kernels = LayerKernels::new(symmetry, canonical.map(kernel).collect());
             let patches: Vec<Patch> = [0, 1]
@@ -418,26 +397,27 @@ mod tests {
             for PatchSamples { patch, source, places, ideal } in &samples {
                 for (i, value) in ideal.iter().enumerate() {
                     let (row, column) = (i / columns, i % columns);
-                    let at = Rectangle {
-                        first_row: source.first_row + row as i64 - 2,
-                        first_column: source.first_column + column as i64 - 2,
-                        rows: width,
-                        columns: width,
-                    };
-                    let mut kernel = vec![0.0; width * width];
+                    let (first_row, first_column) =
+                        (source.first_row + row as i64, source.first_column + column as i64);
+                    let pixel = Rectangle { first_row, first_column, ..Rectangle::PIXEL };
                     for (knot, shares) in &patch.shares {
                         let weight: f32 =
                             (0..9).map(|k| shares[k] * places.down[row][k / 3] * places.across[column][k % 3]).sum();
-                        kernels.at(*knot).add_to(&mut kernel, width, -weight * value);
+                        let kernel = kernels.at(*knot);
+                        let spread: Vec<f32> = kernel.samples.iter().map(|sample| -weight * value * sample).collect();
+                        add(&pixel.spread_over(&kernel.at), &spread);
                     }
-                    add(&at, &kernel);
                 }
             }
             // Sums of some hundred products near 1, in single precision.
             let worst = spread.values().fold(0.0, |worst: f64, left| worst.max(left.abs()));
             assert!(worst < 1e-3, "{symmetry:?}: {worst}");
-            // What both patches cover, and half a kernel around.
-            assert_eq!(spread.len(), (rows + 1 + width - 1) * (16 + columns + width - 1));
+            // What both patches cover, and a kernel around: as it is, or turned all ways.
+            let reached = |height: usize, width: usize| (rows + 1 + height - 1) * (16 + columns + width - 1);
+            match symmetry {
+                Symmetry::None => assert_eq!(spread.len(), reached(window.rows, window.columns)),
+                Symmetry::Octants => assert!((reached(6, 6)..=reached(9, 9)).contains(&spread.len())),
+            }
         }
     }
 
@@ -445,10 +425,10 @@ mod tests {
     /// the outermost pixel.
     #[test]
     fn weights_are_means_over_squares() {
-        let (width, half) = (5, 4);
+        let (window, half) = (Rectangle::PIXEL.grown(2), 4);
         let frame = FilmFrame::new(&Film::centered(64, 64, 1.0), 1);
         let knots = [Knot { right: 8, down: 8 }, Knot { right: 24, down: 8 }];
-        let kernel = |knot: Knot| (knot, KnotKernel { width, samples: noise(width * width, knot.right as u32) });
+        let kernel = |knot: Knot| (knot, KnotKernel { at: window, samples: noise(window.len(), knot.right as u32) });
         let kernels = LayerKernels::new(Symmetry::None, knots.map(kernel).into_iter().collect());
         // One knot gives way to the other; the second patch has its weight in part elsewhere.
         let shares = [[0.7, -0.2, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.2], [0.3, 0.2, -0.1, -0.1, 0.0, 0.0, 0.0, 0.0, -0.2]];
@@ -497,12 +477,13 @@ mod tests {
         for (i, &value) in ideal.iter().enumerate() {
             let (row, column) = (i as i64 / 16, i as i64 % 16);
             let means = [0, 1].map(|knot| mean_at(knot, row, column));
-            let mut kernel = vec![0.0; width * width];
+            let (first_row, first_column) = (source.first_row + row, source.first_column + column);
+            let at = Rectangle { first_row, first_column, ..Rectangle::PIXEL }.spread_over(&window);
             for (knot, mean) in knots.into_iter().zip(means) {
-                kernels.at(knot).add_to(&mut kernel, width, -value * (mean / (means[0] + means[1])) as f32);
+                let weight = -value * (mean / (means[0] + means[1])) as f32;
+                let kernel: Vec<f32> = kernels.at(knot).samples.iter().map(|sample| weight * sample).collect();
+                add(&at, &kernel);
             }
-            let (first_row, first_column) = (source.first_row + row - 2, source.first_column + column - 2);
-            add(&Rectangle { first_row, first_column, rows: width, columns: width }, &kernel);
         }
         let worst = spread.values().fold(0.0, |worst: f64, left| worst.max(left.abs()));
         assert!(worst < 2e-5, "{worst}");

@@ -21,91 +21,129 @@ pub(crate) fn fast_size(n: usize) -> usize {
     (n.max(2)..).find(|&m| m % 2 == 0 && is_fast(m)).expect("powers of two have no end")
 }
 
-/// Transforms of real squares of one size.
-///
-/// A spectrum is stored column by column: `size / 2 + 1` columns of `size` values.
-pub(crate) struct Fft2 {
+/// Transforms of lines of one size.
+struct Plans {
     size: usize,
-    row_forward: Arc<dyn RealToComplex<f32>>,
-    row_inverse: Arc<dyn ComplexToReal<f32>>,
-    column_forward: Arc<dyn Fft<f32>>,
-    column_inverse: Arc<dyn Fft<f32>>,
+    real_forward: Arc<dyn RealToComplex<f32>>,
+    real_inverse: Arc<dyn ComplexToReal<f32>>,
+    forward: Arc<dyn Fft<f32>>,
+    inverse: Arc<dyn Fft<f32>>,
+}
+
+impl Plans {
+    fn new(size: usize, planner: &mut Planner) -> Self {
+        Self {
+            size,
+            real_forward: planner.real_forward(size),
+            real_inverse: planner.real_inverse(size),
+            forward: planner.forward(size),
+            inverse: planner.inverse(size),
+        }
+    }
+
+    fn scratch_len(&self) -> usize {
+        let of_real = self.real_forward.get_scratch_len().max(self.real_inverse.get_scratch_len());
+        of_real.max(self.forward.get_inplace_scratch_len()).max(self.inverse.get_inplace_scratch_len())
+    }
+}
+
+/// Transforms of real rectangles of one size.
+///
+/// A spectrum is stored column by column: half as many as the rectangle has and one more, as long as its own.
+pub(crate) struct Fft2 {
+    down: Rc<Plans>,
+    across: Rc<Plans>,
     work: Work,
 }
 
 /// Working memory of the transforms.
+#[derive(Default)]
 struct Work {
     row: Vec<f32>,
     half: Vec<Complex<f32>>,
     scratch: Vec<Complex<f32>>,
 }
 
-thread_local! {
-    static PLANS: RefCell<HashMap<usize, Rc<RefCell<Fft2>>>> = RefCell::new(HashMap::new());
+/// What a thread transforms with.
+#[derive(Default)]
+struct Transforms {
+    planner: Planner,
+    by_size: HashMap<usize, Rc<Plans>>,
+    work: Work,
 }
 
-/// Lends the transforms of a size; each thread keeps its own.
-pub(crate) fn with_fft<R>(size: usize, body: impl FnOnce(&mut Fft2) -> R) -> R {
-    let plan = PLANS.with(|plans| {
-        Rc::clone(plans.borrow_mut().entry(size).or_insert_with(|| Rc::new(RefCell::new(Fft2::new(size)))))
+impl Transforms {
+    fn plans(&mut self, size: usize) -> Rc<Plans> {
+        self.by_size.entry(size).or_insert_with(|| Rc::new(Plans::new(size, &mut self.planner))).clone()
+    }
+}
+
+thread_local! {
+    static TRANSFORMS: RefCell<Transforms> = RefCell::default();
+}
+
+/// Lends the transforms of rectangles of so many rows and columns; each thread keeps its own.
+pub(crate) fn with_fft<R>((rows, columns): (usize, usize), body: impl FnOnce(&mut Fft2) -> R) -> R {
+    let mut fft = TRANSFORMS.with_borrow_mut(|transforms| {
+        let (down, across) = (transforms.plans(rows), transforms.plans(columns));
+        Fft2::new(down, across, std::mem::take(&mut transforms.work))
     });
-    body(&mut plan.borrow_mut())
+    let result = body(&mut fft);
+    TRANSFORMS.with_borrow_mut(|transforms| transforms.work = fft.work);
+    result
 }
 
 impl Fft2 {
-    fn new(size: usize) -> Self {
-        let mut planner = Planner::new();
-        let (row_forward, row_inverse) = (planner.real_forward(size), planner.real_inverse(size));
-        let (column_forward, column_inverse) = (planner.forward(size), planner.inverse(size));
-        let n_scratch = [
-            row_forward.get_scratch_len(),
-            row_inverse.get_scratch_len(),
-            column_forward.get_inplace_scratch_len(),
-            column_inverse.get_inplace_scratch_len(),
-        ];
-        let n_scratch = n_scratch.into_iter().max().expect("four lengths");
+    fn new(down: Rc<Plans>, across: Rc<Plans>, mut work: Work) -> Self {
         let zero = Complex::new(0.0, 0.0);
-        let work =
-            Work { row: vec![0.0; size], half: vec![zero; BATCH * (size / 2 + 1)], scratch: vec![zero; n_scratch] };
-        Self { size, row_forward, row_inverse, column_forward, column_inverse, work }
+        work.row.resize(across.size, 0.0);
+        work.half.resize(BATCH * (across.size / 2 + 1), zero);
+        work.scratch.resize(down.scratch_len().max(across.scratch_len()), zero);
+        Self { down, across, work }
     }
 
     /// The number of values of a spectrum.
     pub(crate) fn spectrum_len(&self) -> usize {
-        self.size * (self.size / 2 + 1)
+        self.down.size * (self.across.size / 2 + 1)
     }
 
-    /// Samples along a side of the squares.
-    pub(crate) fn size(&self) -> usize {
-        self.size
+    /// Samples along a row of the rectangles.
+    pub(crate) fn columns(&self) -> usize {
+        self.across.size
+    }
+
+    /// Samples of a rectangle.
+    pub(crate) fn len(&self) -> usize {
+        self.down.size * self.across.size
     }
 
     /// Puts the spectrum of two blocks, one as the real and one as the imaginary part of some whole rows, padded with zeros below, into `spectrum`: column by
-    /// column, as many as there are rows. Leaves the rows in disorder.
+    /// column, as many as a row has samples. Leaves the rows in disorder.
     pub(crate) fn forward_pair(&mut self, lines: &mut [Complex<f32>], spectrum: &mut Vec<Complex<f32>>) {
-        let (size, scratch) = (self.size, &mut self.work.scratch);
-        self.column_forward.process_with_scratch(lines, scratch);
-        spectrum.resize(size * size, Complex::new(0.0, 0.0));
-        transpose(lines, size, spectrum, size);
+        let (rows, columns, len) = (self.down.size, self.across.size, self.len());
+        let scratch = &mut self.work.scratch;
+        self.across.forward.process_with_scratch(lines, scratch);
+        spectrum.resize(len, Complex::new(0.0, 0.0));
+        transpose(lines, columns, spectrum, rows);
         // Below the rows there may be those of another block.
-        let n_rows = lines.len() / size;
-        spectrum.chunks_exact_mut(size).for_each(|column| column[n_rows..].fill(Complex::new(0.0, 0.0)));
-        self.column_forward.process_with_scratch(spectrum, scratch);
+        let n_rows = lines.len() / columns;
+        spectrum.chunks_exact_mut(rows).for_each(|column| column[n_rows..].fill(Complex::new(0.0, 0.0)));
+        self.down.forward.process_with_scratch(spectrum, scratch);
     }
 
-    /// Puts the first rows of the square of the spectrum of a pair into `lines`, and leaves the spectrum in disorder. What [`Fft2::forward_pair`]
-    /// was given comes back times the number of samples of the square.
+    /// Puts the first rows of the rectangle of the spectrum of a pair into `lines`, and leaves the spectrum in disorder. What [`Fft2::forward_pair`]
+    /// was given comes back times the number of samples of the rectangle.
     pub(crate) fn inverse_pair(&mut self, spectrum: &mut [Complex<f32>], n_rows: usize, lines: &mut Vec<Complex<f32>>) {
-        let (size, scratch) = (self.size, &mut self.work.scratch);
-        self.column_inverse.process_with_scratch(spectrum, scratch);
-        lines.resize(n_rows * size, Complex::new(0.0, 0.0));
-        transpose(spectrum, size, lines, size);
-        self.column_inverse.process_with_scratch(lines, scratch);
+        let (rows, columns, scratch) = (self.down.size, self.across.size, &mut self.work.scratch);
+        self.down.inverse.process_with_scratch(spectrum, scratch);
+        lines.resize(n_rows * columns, Complex::new(0.0, 0.0));
+        transpose(spectrum, rows, lines, columns);
+        self.across.inverse.process_with_scratch(lines, scratch);
     }
 
     /// Puts the spectrum of a block of `columns` samples a row, padded with zeros, into `spectrum`.
     pub(crate) fn forward(&mut self, block: &[f32], columns: usize, spectrum: &mut Vec<Complex<f32>>) {
-        let (size, n_half) = (self.size, self.size / 2 + 1);
+        let (size, n_half) = (self.down.size, self.across.size / 2 + 1);
         spectrum.clear();
         spectrum.resize(self.spectrum_len(), Complex::new(0.0, 0.0));
         let Work { row, half, scratch } = &mut self.work;
@@ -113,7 +151,8 @@ impl Fft2 {
             for (samples, half) in rows.chunks_exact(columns).zip(half.chunks_exact_mut(n_half)) {
                 row[..columns].copy_from_slice(samples);
                 row[columns..].fill(0.0);
-                self.row_forward.process_with_scratch(row, half, scratch).expect("lengths are those of the plan");
+                let transform = &self.across.real_forward;
+                transform.process_with_scratch(row, half, scratch).expect("lengths are those of the plan");
             }
             let n_rows = rows.len() / columns;
             for (k, column) in spectrum.chunks_exact_mut(size).enumerate() {
@@ -122,16 +161,15 @@ impl Fft2 {
                 }
             }
         }
-        self.column_forward.process_with_scratch(spectrum, scratch);
+        self.down.forward.process_with_scratch(spectrum, scratch);
     }
 
-    /// Puts the first `rows` rows of the square of a spectrum into `block`, `columns` samples each, and
+    /// Puts the first `rows` rows of the rectangle of a spectrum into `block`, `columns` samples each, and
     /// leaves the spectrum in disorder. The transform is scaled so that it undoes [`Fft2::forward`].
     pub(crate) fn inverse(&mut self, spectrum: &mut [Complex<f32>], rows: usize, columns: usize, block: &mut Vec<f32>) {
-        let (size, n_half) = (self.size, self.size / 2 + 1);
+        let (size, n_half, scale) = (self.down.size, self.across.size / 2 + 1, 1.0 / self.len() as f32);
         let Work { row, half, scratch } = &mut self.work;
-        self.column_inverse.process_with_scratch(spectrum, scratch);
-        let scale = 1.0 / (size * size) as f32;
+        self.down.inverse.process_with_scratch(spectrum, scratch);
         block.clear();
         block.reserve(rows * columns);
         for first in (0..rows).step_by(BATCH) {
@@ -145,7 +183,8 @@ impl Fft2 {
                 // A real row has real first and last coefficients; rounding leaves a trace that the plan refuses.
                 half[0].im = 0.0;
                 half[n_half - 1].im = 0.0;
-                self.row_inverse.process_with_scratch(half, row, scratch).expect("lengths are those of the plan");
+                let transform = &self.across.real_inverse;
+                transform.process_with_scratch(half, row, scratch).expect("lengths are those of the plan");
                 block.extend(row[..columns].iter().map(|value| value * scale));
             }
         }
@@ -210,24 +249,26 @@ pub(crate) fn add_scaled(sum: &mut [f32], factor: f32, values: &[f32]) {
     sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
 }
 
-/// The full convolution of a strip of samples, which has planes of samples, each with a kernel of `width` × `width` samples of its own for every row.
+/// The full convolution of a strip of samples, which has planes of samples, each with a kernel of its own for every row.
 struct PaddedStrip<'a> {
-    /// The rows of the planes with `width − 1` zeros before each and at least as many behind.
+    /// The rows of the planes with one zero less than kernels have columns before each and at least as many behind.
     padded: &'a [f32],
     padded_stride: usize,
     kernels: &'a [f32],
-    width: usize,
+    /// Rows and columns of kernels.
+    kernel_size: (usize, usize),
     n_columns: usize,
     /// Of each row, the columns that hold more than zeros.
     lit: &'a [Range<usize>],
 }
 
 impl PaddedStrip<'_> {
-    /// Adds the convolution to `out`, which begins at the strip's first sample less half a kernel and has `stride` samples a row.
+    /// Adds the convolution to `out`, which begins with what a kernel's first sample makes of the strip's first and has `stride` samples a row.
     #[inline(always)]
     fn add_to<const PLANES: usize>(&self, out: &mut [f32], stride: usize) {
-        let n_out = self.n_columns + self.width - 1;
-        for (row, out) in out.chunks_mut(stride).take(self.lit.len() + self.width - 1).enumerate() {
+        let (height, width) = self.kernel_size;
+        let n_out = self.n_columns + width - 1;
+        for (row, out) in out.chunks_mut(stride).take(self.lit.len() + height - 1).enumerate() {
             let mut first = 0;
             while first < n_out {
                 if n_out - first > LANES {
@@ -244,10 +285,10 @@ impl PaddedStrip<'_> {
     /// Adds `N` samples of a row, from one on, to it.
     #[inline(always)]
     fn add_part<const PLANES: usize, const N: usize>(&self, row: usize, first: usize, out: &mut [f32]) {
-        let width = self.width;
+        let (height, width) = self.kernel_size;
         // Planes are summed apart, so that no sum waits for the one before it.
         let mut sums = [[0.0_f32; N]; PLANES];
-        for source in ((row + 1).saturating_sub(width)..self.lit.len().min(row + 1)).rev() {
+        for source in ((row + 1).saturating_sub(height)..self.lit.len().min(row + 1)).rev() {
             let lit = &self.lit[source];
             if lit.end <= first || lit.start >= first + N + width - 1 {
                 continue;
@@ -256,7 +297,7 @@ impl PaddedStrip<'_> {
                 let mut sum = *sums;
                 let line = source * PLANES + plane;
                 let samples = &self.padded[line * self.padded_stride + first..][..N + width - 1];
-                let kernel = &self.kernels[(line * width + row - source) * width..][..width];
+                let kernel = &self.kernels[(line * height + row - source) * width..][..width];
                 for (weight, samples) in kernel.iter().rev().zip(samples.windows(N)) {
                     sum.iter_mut().zip(samples).for_each(|(sum, sample)| *sum += weight * sample);
                 }
@@ -283,7 +324,8 @@ fn convolve_padded(strip: &PaddedStrip<'_>, n_planes: usize, (out, stride): (&mu
 
 /// A strip of samples and the kernels of its rows, which change along a row as polynomials.
 pub(crate) struct Strip {
-    width: usize,
+    /// Rows and columns of kernels.
+    kernel_size: (usize, usize),
     n_polynomials: usize,
     n_columns: usize,
     padded_stride: usize,
@@ -294,22 +336,22 @@ pub(crate) struct Strip {
 }
 
 impl Strip {
-    /// Returns an empty strip for kernels of `width` samples a side.
-    pub(crate) fn new(width: usize, n_polynomials: usize) -> Self {
-        let kernels = vec![0.0; STRIP_ROWS * n_polynomials * width * width];
-        Self { width, n_polynomials, n_columns: 0, padded_stride: 0, padded: vec![], lit: vec![], kernels }
+    /// Returns an empty strip for kernels of so many rows and columns.
+    pub(crate) fn new(kernel_size: (usize, usize), n_polynomials: usize) -> Self {
+        let kernels = vec![0.0; STRIP_ROWS * n_polynomials * kernel_size.0 * kernel_size.1];
+        Self { kernel_size, n_polynomials, n_columns: 0, padded_stride: 0, padded: vec![], lit: vec![], kernels }
     }
 
     /// The kernels of a row, one for each polynomial.
     pub(crate) fn kernels_of_row(&mut self, row: usize) -> &mut [f32] {
-        let n = self.n_polynomials * self.width * self.width;
+        let n = self.n_polynomials * self.kernel_size.0 * self.kernel_size.1;
         &mut self.kernels[row * n..][..n]
     }
 
     /// Takes rows of samples, at most [`STRIP_ROWS`] × [`STRIP_COLUMNS`], and the polynomials at their columns; returns whether
     /// there is anything but zeros.
     pub(crate) fn load<'a>(&mut self, lines: impl Iterator<Item = &'a [f32]>, polynomials: &[[f32; 3]]) -> bool {
-        let width = self.width;
+        let width = self.kernel_size.1;
         self.n_columns = polynomials.len();
         self.padded_stride = (self.n_columns + width - 1).next_multiple_of(LANES) + width - 1;
         self.padded.clear();
@@ -330,13 +372,13 @@ impl Strip {
         self.lit.iter().any(|lit| !lit.is_empty())
     }
 
-    /// Adds the full convolution of the strip to `out`, whose first sample belongs to the strip's first less half a kernel.
+    /// Adds the full convolution of the strip to `out`, which begins with what a kernel's first sample makes of the strip's first.
     pub(crate) fn add_to(&self, out: &mut [f32], stride: usize) {
         let strip = PaddedStrip {
             padded: &self.padded,
             padded_stride: self.padded_stride,
             kernels: &self.kernels,
-            width: self.width,
+            kernel_size: self.kernel_size,
             n_columns: self.n_columns,
             lit: &self.lit,
         };
@@ -357,9 +399,9 @@ mod tests {
         (0..n).map(next).collect()
     }
 
-    fn brute_force(block: &[f32], rows: usize, columns: usize, kernel: &[f32], width: usize) -> Vec<f64> {
+    fn brute_force(block: &[f32], (rows, columns): (usize, usize), kernel: &[f32], width: usize) -> Vec<f64> {
         let stride = columns + width - 1;
-        let mut out = vec![0.0; (rows + width - 1) * stride];
+        let mut out = vec![0.0; (rows + kernel.len() / width - 1) * stride];
         for (at, &sample) in block.iter().enumerate() {
             let (row, column) = (at / columns, at % columns);
             for (k, &weight) in kernel.iter().enumerate() {
@@ -376,9 +418,9 @@ mod tests {
 
     #[test]
     fn transform_convolves_as_the_sum_does() {
-        for (rows, columns, width) in [(5, 9, 3), (40, 64, 33), (128, 128, 63)] {
-            let (block, kernel) = (noise(rows * columns, 1), noise(width * width, 2));
-            let size = fast_size(rows.max(columns) + width - 1);
+        for (rows, columns, height, width) in [(5, 9, 3, 3), (40, 64, 33, 17), (128, 128, 63, 63), (70, 9, 1, 40)] {
+            let (block, kernel) = (noise(rows * columns, 1), noise(height * width, 2));
+            let size = (fast_size(rows + height - 1), fast_size(columns + width - 1));
             let mut out = Vec::new();
             with_fft(size, |fft| {
                 let (mut a, mut b) = (Vec::new(), Vec::new());
@@ -386,37 +428,37 @@ mod tests {
                 fft.forward(&kernel, width, &mut b);
                 let mut sum = vec![Complex::new(0.0, 0.0); fft.spectrum_len()];
                 multiply_add(&mut sum, &a, &b);
-                fft.inverse(&mut sum, rows + width - 1, columns + width - 1, &mut out);
+                fft.inverse(&mut sum, rows + height - 1, columns + width - 1, &mut out);
             });
-            let expected = brute_force(&block, rows, columns, &kernel, width);
+            let expected = brute_force(&block, (rows, columns), &kernel, width);
             let largest = expected.iter().copied().fold(0.0, f64::max);
             let worst = out.iter().zip(&expected).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max);
             // Single precision: 6e-8 a step, some tens of steps.
-            assert!(worst < 2e-6 * largest, "{rows} x {columns} with {width}: {worst} of {largest}");
+            assert!(worst < 2e-6 * largest, "{rows} x {columns} with {height} x {width}: {worst} of {largest}");
         }
     }
 
     #[test]
     fn strips_convolve_as_the_sum_does() {
-        for (rows, columns, width) in [(16, 32, 1), (16, 32, 7), (11, 5, 25), (16, 128, 25)] {
+        for (rows, columns, height, width) in [(16, 32, 1, 1), (16, 32, 7, 7), (11, 5, 3, 25), (16, 128, 25, 14)] {
             let block = noise(rows * columns, 3);
             // Three kernels for each row, and three polynomials along it.
-            let kernels: Vec<Vec<f32>> = (0..3 * rows as u32).map(|i| noise(width * width, 4 + i)).collect();
+            let kernels: Vec<Vec<f32>> = (0..3 * rows as u32).map(|i| noise(height * width, 4 + i)).collect();
             let polynomials: Vec<[f32; 3]> =
                 (0..columns).map(|column| [1.0, 0.01 * column as f32, 1e-4 * (column * column) as f32]).collect();
             let stride = columns + width - 1;
-            let mut strip = Strip::new(width, 3);
+            let mut strip = Strip::new((height, width), 3);
             for row in 0..rows {
                 strip.kernels_of_row(row).copy_from_slice(&kernels[3 * row..3 * row + 3].concat());
             }
-            let mut out = vec![0.0; (rows + width - 1) * stride];
+            let mut out = vec![0.0; (rows + height - 1) * stride];
             assert!(strip.load(block.chunks(columns), &polynomials));
             strip.add_to(&mut out, stride);
             let mut expected = vec![0.0; out.len()];
             for (row, line) in block.chunks(columns).enumerate() {
                 for plane in 0..3 {
                     let weighted: Vec<f32> = line.iter().zip(&polynomials).map(|(v, p)| v * p[plane]).collect();
-                    let spread = brute_force(&weighted, 1, columns, &kernels[3 * row + plane], width);
+                    let spread = brute_force(&weighted, (1, columns), &kernels[3 * row + plane], width);
                     expected[row * stride..].iter_mut().zip(spread).for_each(|(sum, v)| *sum += v);
                 }
             }

@@ -16,19 +16,20 @@ pub(crate) struct Cost {
     pub(crate) n_terms: usize,
     /// The number of polynomials across the cell.
     pub(crate) n_across: usize,
-    /// Samples along a side of the kernels.
-    pub(crate) width: usize,
+    /// Rows and columns of the kernels.
+    pub(crate) kernel_size: (usize, usize),
 }
 
 impl Cost {
     fn direct(&self, (rows, columns): (usize, usize)) -> usize {
+        let (height, width) = self.kernel_size;
         // Fetching a kernel's samples takes as long as the products of another group of lanes.
-        let lanes = (columns + self.width - 1).next_multiple_of(LANES) + LANES;
-        self.n_across * self.width * self.width * rows * lanes
+        let lanes = (columns + width - 1).next_multiple_of(LANES) + LANES;
+        self.n_across * height * width * rows * lanes
     }
 
-    fn by_transform(&self, (rows, columns): (usize, usize)) -> usize {
-        (2 * self.n_terms + 1) * of_transform(rows.max(columns) + self.width - 1)
+    fn by_transform(&self, size: (usize, usize)) -> usize {
+        (2 * self.n_terms + 1) * of_transform(size, self.kernel_size)
     }
 
     /// Whether a sum over a rectangle takes less time than transforms.
@@ -39,47 +40,46 @@ impl Cost {
     /// Returns what a patch takes by itself, the terms of its expansion included: nine kernels for each of nine, and their edge spread functions.
     fn alone(&self, size: (usize, usize)) -> usize {
         const OF_EXPANSION: usize = 128;
-        self.direct(size).min(self.by_transform(size)) + OF_EXPANSION * self.width * self.width
+        self.direct(size).min(self.by_transform(size)) + OF_EXPANSION * self.kernel_size.0 * self.kernel_size.1
     }
 }
 
-/// Returns what the transform of a square takes whose side is at least this.
-fn of_transform(side: usize) -> usize {
-    let size = fast_size(side);
-    size * size * COST_OF_TRANSFORM
+/// Returns what the transform of a rectangle takes that is spread by kernels of so many rows and columns.
+fn of_transform((rows, columns): (usize, usize), (height, width): (usize, usize)) -> usize {
+    fast_size(rows + height - 1) * fast_size(columns + width - 1) * COST_OF_TRANSFORM
 }
 
-/// Returns what a knot takes whose weights are over a square of this side.
-fn of_knot(symmetry: Symmetry, side: usize, width: usize) -> usize {
+/// Returns what a knot takes whose weights are over a rectangle of this size.
+fn of_knot(symmetry: Symmetry, size: (usize, usize), kernel_size: (usize, usize)) -> usize {
     let n_halves = match symmetry {
         // One forth and one back, and half of one for weighing and mirroring; eight knots share that of the kernel.
         Symmetry::Octants => 5,
         Symmetry::None => 7,
     };
-    n_halves * of_transform(side + width - 1) / 2
+    n_halves * of_transform(size, kernel_size) / 2
 }
 
 /// A knot, and the patches in which it has weight.
 struct AroundKnot {
     /// First and last of their cells' sides, pixels of the film: down, then across.
     reach: [(i64, i64); 2],
-    width: usize,
+    kernel_size: (usize, usize),
     n_patches: usize,
 }
 
 impl AroundKnot {
-    fn add(&mut self, cell: &Cell, width: usize) {
+    fn add(&mut self, cell: &Cell, (height, width): (usize, usize)) {
         let size = cell.size as i64;
         for ((first, last), at) in self.reach.iter_mut().zip([cell.down, cell.across]) {
             (*first, *last) = ((*first).min(i64::from(at) * size), (*last).max((i64::from(at) + 1) * size));
         }
-        self.width = self.width.max(width);
+        self.kernel_size = (self.kernel_size.0.max(height), self.kernel_size.1.max(width));
         self.n_patches += 1;
     }
 
     fn cost(&self, factor: usize, symmetry: Symmetry) -> f64 {
-        let side = self.reach.iter().map(|(first, last)| (last - first) as usize).max().unwrap_or(1).div_ceil(factor);
-        of_knot(symmetry, side, self.width) as f64
+        let [rows, columns] = self.reach.map(|(first, last)| ((last - first) as usize).div_ceil(factor));
+        of_knot(symmetry, (rows, columns), self.kernel_size) as f64
     }
 }
 
@@ -98,8 +98,8 @@ pub(crate) fn patches_by_knots(patches: &[Patch], costs: &[Cost], factor: usize,
         let mut knots: BTreeMap<Knot, AroundKnot> = BTreeMap::new();
         for ((patch, cost), _) in patches.iter().zip(costs).zip(&chosen).filter(|(_, chosen)| **chosen) {
             for (knot, _) in &patch.shares {
-                let nowhere = AroundKnot { reach: [(i64::MAX, i64::MIN); 2], width: 1, n_patches: 0 };
-                knots.entry(*knot).or_insert(nowhere).add(&patch.cell, cost.width);
+                let nowhere = AroundKnot { reach: [(i64::MAX, i64::MIN); 2], kernel_size: (1, 1), n_patches: 0 };
+                knots.entry(*knot).or_insert(nowhere).add(&patch.cell, cost.kernel_size);
             }
         }
         let shares: BTreeMap<Knot, f64> = knots
@@ -134,8 +134,9 @@ mod tests {
     }
 
     fn chosen(patches: &[Patch], n_terms: usize, width: usize) -> Vec<bool> {
+        let n_across = if n_terms == 1 { 1 } else { 3 };
         let costs: Vec<Cost> =
-            patches.iter().map(|_| Cost { n_terms, n_across: if n_terms == 1 { 1 } else { 3 }, width }).collect();
+            patches.iter().map(|_| Cost { n_terms, n_across, kernel_size: (width, width) }).collect();
         patches_by_knots(patches, &costs, 1, Symmetry::Octants)
     }
 
@@ -152,7 +153,7 @@ mod tests {
     #[test]
     fn a_patch_alone_is_spread_alone() {
         assert_eq!(chosen(&patches([(3, -4)].into_iter()), 9, 45), [false]);
-        let row = patches((0..40).map(|across| (0, 2 * across)));
+        let row = patches((0..40).map(|across| (0, 3 * across)));
         assert!(chosen(&row, 9, 45).iter().all(|by_knots| !by_knots));
     }
 }

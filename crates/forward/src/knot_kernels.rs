@@ -4,8 +4,9 @@ use std::{collections::BTreeMap, sync::OnceLock};
 
 use dioptric_psf::{Kernel, LensImage};
 use glam::DVec2;
+use ndarray::Array2;
 
-use crate::{convolve::add_scaled, patch::Knot};
+use crate::{convolve::add_scaled, patch::Knot, rectangle::Rectangle};
 
 /// Which knots have kernels that follow from each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,84 +50,133 @@ impl Symmetry {
 /// Kernels of so many samples along a side get a border before they are moved: of larger ones the outermost hold too little to matter.
 const SMALL: usize = 9;
 
+/// The share of a kernel's light that is left out on each side of it.
+const LEFT_OUT: f64 = 1e-7;
+
 /// A kernel whose samples sum to 1, about the reference point of a lens.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct KnotKernel {
-    /// Samples along a side; odd.
-    pub(crate) width: usize,
+    /// Where its samples lie: rows below the reference point's and columns to the right of it. A comet lies to one side of it.
+    pub(crate) at: Rectangle,
     pub(crate) samples: Vec<f32>,
 }
 
 impl KnotKernel {
-    /// Takes a kernel of odd sides, scales it to a sum of 1, pads it to a square and moves the centroid of its samples to its own.
+    /// Takes a kernel of odd sides, its reference point in the middle, scales it to a sum of 1, leaves out the borders without light and moves the centroid of its
+    /// samples to its own.
     pub(crate) fn new(kernel: &Kernel) -> Self {
         let (kernel, centroid_px) = (&kernel.samples, kernel.centroid_px);
         let (rows, columns) = kernel.dim();
-        // Light that is moved from the outermost samples needs a place.
-        let border = if centroid_px != DVec2::ZERO && rows.max(columns) <= SMALL { 2 } else { 0 };
-        let width = rows.max(columns) + border;
-        let (top, left) = ((width - rows) / 2, (width - columns) / 2);
+        let (half_rows, half_columns) = ((rows / 2) as i64, (columns / 2) as i64);
+        let whole = Rectangle { first_row: -half_rows, first_column: -half_columns, rows, columns };
         let sum: f64 = kernel.iter().map(|&v| f64::from(v)).sum();
-        let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
-        let mut bordered = Bordered::new(width);
-        for (line, values) in bordered.rows_mut().skip(top).zip(kernel.rows()) {
-            line[left..].iter_mut().zip(values).for_each(|(sample, &value)| *sample = f64::from(value) * scale);
+        if sum <= 0.0 {
+            // No light is spread by it.
+            return Self { at: Rectangle::PIXEL, samples: vec![1.0] };
         }
-        Self { width, samples: centered(bordered, centroid_px) }
+        let scale = 1.0 / sum;
+        // Light that is moved from the outermost samples needs a place.
+        let border = usize::from(centroid_px != DVec2::ZERO && rows.max(columns) <= SMALL);
+        let (within, lit) = (whole.grown(border), lit_part(kernel, &whole, sum));
+        let at = lit.grown(1).intersection(&within).unwrap_or(lit);
+        let mut bordered = Bordered::new(at);
+        let lines = kernel.rows().into_iter().skip((lit.first_row + half_rows) as usize).take(lit.rows);
+        let (skipped, margin) =
+            ((lit.first_column + half_columns) as usize, (lit.first_column - at.first_column) as usize);
+        for (line, values) in bordered.rows_mut().skip((lit.first_row - at.first_row) as usize).zip(lines) {
+            let values = values.into_iter().skip(skipped).take(lit.columns);
+            line[margin..].iter_mut().zip(values).for_each(|(sample, &value)| *sample = f64::from(value) * scale);
+        }
+        Self { at, samples: centered(bordered, centroid_px) }
     }
 
-    /// Adds the kernel times a factor to a square of `width` samples a side, at least its own, middle on middle.
-    pub(crate) fn add_to(&self, sum: &mut [f32], width: usize, factor: f32) {
-        if width == self.width {
+    /// Adds the kernel times a factor to a block about the reference point that holds all of it.
+    pub(crate) fn add_to(&self, sum: &mut [f32], block: &Rectangle, factor: f32) {
+        if *block == self.at {
             return add_scaled(sum, factor, &self.samples);
         }
-        let margin = (width - self.width) / 2;
-        for (row, samples) in self.samples.chunks_exact(self.width).enumerate() {
-            let line = &mut sum[(margin + row) * width + margin..][..self.width];
+        let lines = sum[self.at.offset_in(block)..].chunks_mut(block.columns);
+        for (line, samples) in lines.zip(self.samples.chunks_exact(self.at.columns)) {
             line.iter_mut().zip(samples).for_each(|(sum, sample)| *sum += factor * sample);
         }
     }
 
+    /// Returns the sum of kernels times factors.
+    pub(crate) fn sum_of<'a>(terms: impl Iterator<Item = (&'a Self, f32)> + Clone) -> Self {
+        let at = Rectangle::around(terms.clone().map(|(kernel, _)| kernel.at)).unwrap_or(Rectangle::PIXEL);
+        let mut samples = vec![0.0; at.len()];
+        terms.for_each(|(kernel, factor)| kernel.add_to(&mut samples, &at, factor));
+        Self { at, samples }
+    }
+
     fn mixed(&self, other: &Self, fraction: f32) -> Self {
-        let width = self.width.max(other.width);
-        let mut samples = vec![0.0; width * width];
-        self.add_to(&mut samples, width, 1.0 - fraction);
-        other.add_to(&mut samples, width, fraction);
-        Self { width, samples }
+        Self::sum_of([(self, 1.0 - fraction), (other, fraction)].into_iter())
     }
 
     /// Returns the kernel of a canonical knot at another.
     fn mirrored(&self, mirror: Mirror) -> Self {
-        Self { width: self.width, samples: mirror.restored(&self.samples, (self.width, self.width)) }
+        let at = mirror.window_at_knot(&self.at);
+        Self { at, samples: mirror.restored(&self.samples, (at.rows, at.columns)) }
     }
 
-    /// Returns the place of the centroid: pixels below the middle and to the right of it.
+    /// Returns the place of the centroid: pixels below the reference point and to the right of it.
     pub(crate) fn first_moments(&self) -> [f64; 2] {
-        let middle = (self.width / 2) as f64;
         let mut moments = [0.0; 2];
-        for (row, line) in self.samples.chunks_exact(self.width).enumerate() {
-            for (column, &sample) in line.iter().enumerate() {
-                moments[0] += f64::from(sample) * (row as f64 - middle);
-                moments[1] += f64::from(sample) * (column as f64 - middle);
-            }
-        }
+        self.for_each(|down, across, sample| {
+            moments[0] += sample * down;
+            moments[1] += sample * across;
+        });
         moments
     }
 
-    /// Returns the second moments about the middle: down twice, down and across, across twice; square pixels.
+    /// Returns the second moments about the reference point: down twice, down and across, across twice; square pixels.
     pub(crate) fn second_moments(&self) -> [f64; 3] {
-        let middle = (self.width / 2) as f64;
         let mut moments = [0.0; 3];
-        for (row, line) in self.samples.chunks_exact(self.width).enumerate() {
-            let down = row as f64 - middle;
-            for (column, &sample) in line.iter().enumerate() {
-                let (across, sample) = (column as f64 - middle, f64::from(sample));
-                moments[0] += sample * down * down;
-                moments[1] += sample * down * across;
-                moments[2] += sample * across * across;
+        self.for_each(|down, across, sample| {
+            moments[0] += sample * down * down;
+            moments[1] += sample * down * across;
+            moments[2] += sample * across * across;
+        });
+        moments
+    }
+
+    /// Calls a function for each sample: with its row and its column, counted from the reference point's, and its value.
+    #[inline]
+    pub(crate) fn for_each(&self, mut function: impl FnMut(f64, f64, f64)) {
+        let Rectangle { first_row, first_column, columns, .. } = self.at;
+        for (row, line) in (first_row..).zip(self.samples.chunks_exact(columns)) {
+            for (column, &sample) in (first_column..).zip(line) {
+                function(row as f64, column as f64, f64::from(sample));
             }
         }
-        moments
+    }
+}
+
+/// Returns the part of a kernel that holds all but a negligible share of its light on each side; `whole` is where all of it lies.
+fn lit_part(kernel: &Array2<f32>, whole: &Rectangle, sum: f64) -> Rectangle {
+    let by_row: Vec<f64> = kernel.rows().into_iter().map(|line| line.iter().map(|&v| f64::from(v)).sum()).collect();
+    let mut by_column = vec![0.0; kernel.ncols()];
+    for line in kernel.rows() {
+        by_column.iter_mut().zip(line).for_each(|(sum, &value)| *sum += f64::from(value));
+    }
+    let dark = |sums: &mut dyn Iterator<Item = &f64>| {
+        let mut left_out = 0.0;
+        let is_dark = |part: &&f64| {
+            left_out += **part;
+            left_out <= LEFT_OUT * sum
+        };
+        sums.take_while(is_dark).count()
+    };
+    let lit = |sums: &[f64]| {
+        let before = dark(&mut sums.iter());
+        (before, sums.len() - before - dark(&mut sums[before + 1..].iter().rev()))
+    };
+    let ((above, rows), (left, columns)) = (lit(&by_row), lit(&by_column));
+    Rectangle {
+        first_row: whole.first_row + above as i64,
+        first_column: whole.first_column + left as i64,
+        rows,
+        columns,
     }
 }
 
@@ -187,6 +237,21 @@ impl Mirror {
         let (flips_rows, flips_columns) = (self.flips_rows != self.swaps, self.flips_columns != self.swaps);
         let turned = Turned { flips_rows, flips_columns, swaps: self.swaps };
         turned.copy((block, columns), (rows, columns), lines, put);
+    }
+
+    /// Returns where the samples of a kernel lie of which the canonical ones are known.
+    pub(crate) fn window_at_knot(self, canonical: &Rectangle) -> Rectangle {
+        let Rectangle { first_row, first_column, rows, columns } = *canonical;
+        let turned_about = |first: i64, n: usize| 1 - first - n as i64;
+        let (below, right) = (turned_about(first_row, rows), turned_about(first_column, columns));
+        let (first_row, first_column) = if self.swaps { (right, below) } else { (first_row, first_column) };
+        let (rows, columns) = self.size((rows, columns));
+        Rectangle {
+            first_row: if self.flips_rows { turned_about(first_row, rows) } else { first_row },
+            first_column: if self.flips_columns { turned_about(first_column, columns) } else { first_column },
+            rows,
+            columns,
+        }
     }
 
     /// Returns the first moments of a kernel of which the canonical ones are known.
@@ -312,9 +377,9 @@ impl LayerKernels {
         self.by_knot.contains_key(&self.symmetry.canonical(knot))
     }
 
-    /// Returns the samples along a side of the kernel at a knot.
-    pub(crate) fn width_at(&self, knot: Knot) -> usize {
-        self.canonical_at(knot).width
+    /// Returns where the samples of the kernel at a knot lie.
+    pub(crate) fn window_at(&self, knot: Knot) -> Rectangle {
+        self.symmetry.mirror(knot).window_at_knot(&self.canonical_at(knot).at)
     }
 
     /// Returns the kernel of the canonical knot of a knot.
@@ -392,7 +457,7 @@ fn corner_spread_peaks(kernel: &[f32], width: usize) -> impl Iterator<Item = f64
 /// Distance of a kernel's centroid from where it belongs that changes no picture, pixels.
 const CENTERED_PX: f64 = 1e-7;
 
-/// Moves the centroid of a square kernel to a place (pixels to the right of the middle and below it), without blurring it and without negative samples,
+/// Moves the centroid of a kernel to a place (pixels to the right of the reference point and below it), without blurring it and without negative samples,
 /// and returns its samples, of sum 1.
 ///
 /// What falls on the pixels of a spread has its own centroid elsewhere where the spread is small: the part within a pixel counts as its
@@ -402,21 +467,21 @@ fn centered(mut kernel: Bordered, centroid_px: DVec2) -> Vec<f32> {
     const ROUNDS: usize = 40;
     let mut sums = kernel.sums();
     for _ in 0..ROUNDS {
-        let off_px = sums.centroid_px(kernel.width) - centroid_px;
+        let off_px = sums.centroid_px(&kernel.at) - centroid_px;
         if f64::max(off_px.x.abs(), off_px.y.abs()) < CENTERED_PX {
             break;
         }
         sums = kernel.moved(off_px);
     }
     let scale = 1.0 / sums.all;
-    let mut samples = Vec::with_capacity(kernel.width * kernel.width);
+    let mut samples = Vec::with_capacity(kernel.at.len());
     for row in kernel.rows() {
         samples.extend(row.iter().map(|sample| (sample * scale) as f32));
     }
     samples
 }
 
-/// Sums over a square of samples: of all, and times column and row, counted from 0.
+/// Sums over a block of samples: of all, and times column and row, counted from 0.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     all: f64,
@@ -425,32 +490,32 @@ struct Sums {
 }
 
 impl Sums {
-    /// Returns how far right of the middle sample and below it the centroid lies.
-    fn centroid_px(&self, width: usize) -> DVec2 {
-        DVec2::new(self.across, self.down) / self.all - DVec2::splat((width / 2) as f64)
+    /// Returns how far right of the reference point and below it the centroid lies; `at` is where the samples lie.
+    fn centroid_px(&self, at: &Rectangle) -> DVec2 {
+        DVec2::new(self.across, self.down) / self.all + DVec2::new(at.first_column as f64, at.first_row as f64)
     }
 }
 
-/// A square of samples with a border of zeros all around.
+/// A block of samples with a border of zeros all around.
 struct Bordered {
-    width: usize,
+    at: Rectangle,
     samples: Vec<f64>,
     next: Vec<f64>,
 }
 
 impl Bordered {
-    fn new(width: usize) -> Self {
-        let n = (width + 2) * (width + 2);
-        Self { width, samples: vec![0.0; n], next: vec![] }
+    fn new(at: Rectangle) -> Self {
+        Self { at, samples: vec![0.0; at.grown(1).len()], next: vec![] }
     }
 
     fn rows_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
-        let width = self.width;
-        self.samples.chunks_exact_mut(width + 2).skip(1).take(width).map(move |row| &mut row[1..=width])
+        let Rectangle { rows, columns, .. } = self.at;
+        self.samples.chunks_exact_mut(columns + 2).skip(1).take(rows).map(move |row| &mut row[1..=columns])
     }
 
     fn rows(&self) -> impl Iterator<Item = &[f64]> {
-        self.samples.chunks_exact(self.width + 2).skip(1).take(self.width).map(|row| &row[1..=self.width])
+        let Rectangle { rows, columns, .. } = self.at;
+        self.samples.chunks_exact(columns + 2).skip(1).take(rows).map(move |row| &row[1..=columns])
     }
 
     fn sums(&self) -> Sums {
@@ -464,7 +529,7 @@ impl Bordered {
     /// Moves the samples back by a part of a pixel to first order; none below 0.
     fn moved(&mut self, off_px: DVec2) -> Sums {
         self.next.resize(self.samples.len(), 0.0);
-        let sums = move_back(&self.samples, self.width, off_px, &mut self.next);
+        let sums = move_back(&self.samples, (self.at.rows, self.at.columns), off_px, &mut self.next);
         std::mem::swap(&mut self.samples, &mut self.next);
         sums
     }
@@ -497,11 +562,11 @@ fn add_sums(line: &[f64], row: usize, sums: &mut Sums) {
 
 /// Puts samples moved back by a part of a pixel into `moved`; both have a border of zeros.
 #[multiversion::multiversion(targets("x86_64+avx2", "aarch64+neon"))]
-fn move_back(samples: &[f64], width: usize, off_px: DVec2, moved: &mut [f64]) -> Sums {
+fn move_back(samples: &[f64], (rows, width): (usize, usize), off_px: DVec2, moved: &mut [f64]) -> Sums {
     let stride = width + 2;
     let (across, down) = (0.5 * off_px.x, 0.5 * off_px.y);
     let mut sums = Sums::default();
-    for row in 0..width {
+    for row in 0..rows {
         let first = (row + 1) * stride;
         let (above, below) = (&samples[first - stride + 1..][..width], &samples[first + stride + 1..][..width]);
         let (left, own, right) =
@@ -517,8 +582,6 @@ fn move_back(samples: &[f64], width: usize, off_px: DVec2, moved: &mut [f64]) ->
 
 #[cfg(test)]
 mod tests {
-    use ndarray::Array2;
-
     use super::*;
 
     fn knot_kernel(samples: Array2<f32>, centroid_px: DVec2) -> KnotKernel {
@@ -548,10 +611,28 @@ mod tests {
         let [down, across] = aside.first_moments();
         assert!((across - 0.2).abs() < 1e-6 && (down + 0.1).abs() < 1e-6, "{down} {across}");
         let point = even(1, 1);
-        assert_eq!((point.width, point.samples), (1, vec![1.0]));
+        assert_eq!((point.at, point.samples), (Rectangle::PIXEL, vec![1.0]));
         // A point aside is shared by two pixels.
         let [down, across] = knot_kernel(Array2::ones((1, 1)), DVec2::new(0.03, -0.3)).first_moments();
         assert!((across - 0.03).abs() < 1e-5 && (down + 0.3).abs() < 1e-3, "{down} {across}");
+    }
+
+    /// Samples are kept where there is light, wherever the reference point is, and around it where it is moved.
+    #[test]
+    fn borders_without_light_are_left_out() {
+        let mut samples = Array2::zeros((21, 21));
+        (samples[(3, 12)], samples[(5, 18)], samples[(5, 19)]) = (0.5, 0.25, 0.25);
+        samples[(20, 0)] = 5e-8;
+        let kernel = knot_kernel(samples, DVec2::new(5.2, -6.0));
+        assert_eq!(kernel.at, Rectangle { first_row: -8, first_column: 1, rows: 5, columns: 10 });
+        let [down, across] = kernel.first_moments();
+        assert!((down + 6.0).abs() < 1e-5 && (across - 5.2).abs() < 1e-5, "{down} {across}");
+        // One sample of light in a corner, and none at all.
+        let mut corner = Array2::zeros((5, 3));
+        corner[(4, 2)] = 2.0;
+        let at = Rectangle { first_row: 1, first_column: 0, rows: 2, columns: 2 };
+        assert_eq!(knot_kernel(corner, DVec2::new(1.0, 2.0)).at.intersection(&at), Some(at));
+        assert_eq!(knot_kernel(Array2::zeros((5, 3)), DVec2::ZERO), even(1, 1));
     }
 
     /// A comet pointing away from the axis at (tan 2, 1): right and up.
@@ -576,6 +657,7 @@ mod tests {
         ] {
             let knot = Knot { right, down };
             assert_eq!(kernels.at(knot), comet(x, y), "at {right}, {down}");
+            assert_eq!(kernels.window_at(knot), comet(x, y).at, "at {right}, {down}");
             assert_eq!(kernels.moments_at(knot).first, [-y, x], "at {right}, {down}");
         }
         let both = [(64, comet(2.0, 1.0)), (-64, comet(1.0, 0.0))].map(|(right, k)| (Knot { right, down: 9 }, k));
@@ -589,9 +671,9 @@ mod tests {
     fn mixed_kernels_keep_their_sum() {
         let (small, large) = (even(3, 3), even(7, 5));
         let mixed = small.mixed(&large, 0.25);
-        assert_eq!(mixed.width, 7);
+        assert_eq!(mixed.at, Rectangle { first_row: -3, first_column: -2, rows: 7, columns: 5 });
         assert!((mixed.samples.iter().sum::<f32>() - 1.0).abs() < 1e-6);
-        assert!((mixed.samples[3 * 7 + 3] - (0.75 / 9.0 + 0.25 / 35.0)).abs() < 1e-6);
+        assert!((mixed.samples[3 * 5 + 2] - (0.75 / 9.0 + 0.25 / 35.0)).abs() < 1e-6);
     }
 
     #[test]

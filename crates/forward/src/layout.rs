@@ -32,7 +32,7 @@ use crate::{
     raster::LayerRaster,
     sampler::{LayerCoordinates, Surface},
     stopwatch::{Part, Stopwatch},
-    tiles::{LayerTiles, SpreadSquares, Tiling},
+    tiles::{LayerTiles, SpreadBlocks, Tiling},
     work::{Progress, Work, plane_of},
 };
 
@@ -487,7 +487,7 @@ impl Layout {
             return (IN_FLIGHT_BYTES / (self.plane_bytes() + own_kernels).max(1)).clamp(threads.min(4), 4 * threads);
         };
         let left = limit.saturating_sub(bases.map(BandBasis::size_bytes).iter().sum());
-        let band = self.plane_bytes() + spread_bytes(&self.largest.squares) + bases[0].kernels.size_bytes();
+        let band = self.plane_bytes() + spread_bytes(&self.largest.blocks) + bases[0].kernels.size_bytes();
         (left / band.max(1)).clamp(1, 4 * threads)
     }
 
@@ -507,7 +507,7 @@ impl Layout {
     /// About what a band takes while it is imaged, bytes: its planes, what is spread around knots before it is added to them, and kernels as far as the plan
     /// has seen any.
     pub(crate) fn band_bytes(&self) -> usize {
-        self.plane_bytes() + spread_bytes(&self.largest.squares) + self.largest.kernel_bytes
+        self.plane_bytes() + spread_bytes(&self.largest.blocks) + self.largest.kernel_bytes
     }
 
     /// About what two bases take, bytes: the coverage of layers where they hide each other, and kernels as far as the plan has seen any; and what threads
@@ -515,7 +515,7 @@ impl Layout {
     pub(crate) fn bases_bytes(&self) -> usize {
         // .9 to 1.5 times as much as this coverage was measured.
         let bases = 2 * (size_of::<f32>() * self.n_covered + self.largest.kernel_bytes);
-        bases + rayon::current_num_threads() * buffer_bytes(&self.largest.squares)
+        bases + rayon::current_num_threads() * buffer_bytes(&self.largest.blocks)
     }
 
     /// Reads a band and images it.
@@ -663,7 +663,7 @@ fn active_cells_of(
 struct Largest {
     /// All kernels of a band, bytes.
     kernel_bytes: usize,
-    squares: SpreadSquares,
+    blocks: SpreadBlocks,
 }
 
 /// Smooths weights of knots where kernels of some bands would leave seams. Keeps these kernels, which imaging needs anyway, and returns what the largest take.
@@ -690,7 +690,7 @@ fn smooth_seams(
     }
     tiling.smooth(seams, length_px);
     let size = (film_lens.film.rows, film_lens.film.columns);
-    Ok(Largest { kernel_bytes, squares: tiling.spread_squares(&of_bands, size) })
+    Ok(Largest { kernel_bytes, blocks: tiling.spread_blocks(&of_bands, size) })
 }
 
 /// Returns about how many pixels of the film layers cover, all layers together.

@@ -180,15 +180,11 @@ impl Tests {
 
     /// Returns what a kernel at a distance to the right of the axis does, on pixels `factor` times as wide as the film's.
     fn at(&self, rho_px: f64, kernel: &KnotKernel, factor: f64) -> Point {
-        let middle = (kernel.width / 2) as f64;
         let mut spread = DVec4::ZERO;
-        for (row, line) in kernel.samples.chunks_exact(kernel.width).enumerate() {
-            let down = factor * (row as f64 - middle);
-            for (column, &sample) in line.iter().enumerate() {
-                let right = rho_px + factor * (column as f64 - middle);
-                spread += f64::from(sample) * self.values(right * right + down * down);
-            }
-        }
+        kernel.for_each(|down_px, right_px, sample| {
+            let (down, right) = (factor * down_px, rho_px + factor * right_px);
+            spread += sample * self.values(right * right + down * down);
+        });
         let ([_, outwards], [around, _, along]) = (kernel.first_moments(), kernel.second_moments());
         let [first, second] = self.derivatives(rho_px * rho_px);
         let slope = 2.0 * rho_px / self.radius2_px;

@@ -46,6 +46,7 @@ mod patch_samples;
 mod plan;
 mod probe;
 mod raster;
+mod rectangle;
 mod render;
 mod sample_density;
 mod sampler;

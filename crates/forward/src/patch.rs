@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use dioptric_psf::FilmMap;
 use glam::DVec2;
 
-use crate::{geometry::FilmFrame, sampler::Rectangle};
+use crate::{geometry::FilmFrame, rectangle::Rectangle};
 
 /// A point of the film at which the PSF is computed: pixels of the film to the right of the axis and below it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

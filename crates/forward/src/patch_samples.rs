@@ -2,7 +2,8 @@
 
 use crate::{
     patch::{Patch, polynomials},
-    sampler::{Rectangle, Sampler},
+    rectangle::Rectangle,
+    sampler::Sampler,
 };
 
 /// A patch and the ideal picture in it.

@@ -179,7 +179,7 @@ impl<'a> Probe<'a> {
         let error = |(cell, knot, weights): &(Cell, Knot, Weights)| {
             work.check()?;
             let difference = spline_error(known, *knot, weights);
-            let edge = edge_spread_peak(&difference.samples, difference.width);
+            let edge = edge_spread_peak(&difference.samples, difference.at.columns);
             let shading = Shading::of(&difference, cell.size as f64 / factor as f64);
             Ok((*cell, *knot, SplineError { edge, shading }))
         };
@@ -204,39 +204,37 @@ impl<'a> Probe<'a> {
             // Knots of the smallest cells are not known yet: as wide as that of a cell around it, and changing in all ways.
             let around = std::iter::successors(Some(patch.cell), |cell| (cell.size < largest).then(|| cell.parent()));
             let knots = around.map(|cell| cell.knot()).chain(patch.shares.iter().map(|(knot, _)| *knot));
-            let width = self.width_of(knots.collect(), factor);
-            Ok(Cost { n_terms: 9, n_across: 3, width })
+            let kernel_size = self.kernel_size_of(knots.collect(), factor);
+            Ok(Cost { n_terms: 9, n_across: 3, kernel_size })
         };
         patches.par_iter().map(cost).collect()
     }
 
-    /// Returns about how many samples wide kernels are on a raster: as the first knot's whose kernel is known there, or on another raster, or by the spread of a point.
-    fn width_of(&self, knots: Vec<Knot>, factor: usize) -> usize {
+    /// Returns about how many rows and columns of samples kernels have on a raster: as the first knot's whose kernel is known there, or on another raster, or by the spread of a
+    /// point.
+    fn kernel_size_of(&self, knots: Vec<Knot>, factor: usize) -> (usize, usize) {
         let known_on = |factor: usize, known: &LayerKernels| {
             let knot = knots.iter().find(|knot| known.has(**knot))?;
-            Some((factor, known.width_at(*knot)))
+            Some((factor, known.window_at(*knot)))
         };
         let own = self.kernels.get(&factor).and_then(|known| known_on(factor, known));
         let other = || self.kernels.iter().find_map(|(factor, known)| known_on(*factor, known));
-        if let Some((raster, width)) = own.or_else(other) {
-            return (width * raster).div_ceil(factor);
+        if let Some((raster, window)) = own.or_else(other) {
+            let [rows, columns] = [window.rows, window.columns].map(|n| (n * raster).div_ceil(factor));
+            return (rows, columns);
         }
         let spread_px = |knot: &Knot| self.spreads_px.get(&self.symmetry.canonical(*knot));
         let widest_px = knots.iter().filter_map(spread_px).fold(0.0, |widest: f64, spread| widest.max(*spread));
-        2 * (widest_px / factor as f64).ceil() as usize + 1
+        let width = 2 * (widest_px / factor as f64).ceil() as usize + 1;
+        (width, width)
     }
 }
 
 /// Returns the kernel at a knot less that of a spline.
 fn spline_error(kernels: &LayerKernels, knot: Knot, spline: &Weights) -> KnotKernel {
-    let terms = || spline.iter().map(|(&at, &weight)| (at, -weight)).chain([(knot, 1.0)]);
-    let kernels: Vec<(KnotKernel, f64)> = terms().map(|(at, weight)| (kernels.at(at), weight)).collect();
-    let width = kernels.iter().map(|(kernel, _)| kernel.width).max().unwrap_or(1);
-    let mut samples = vec![0.0; width * width];
-    for (kernel, weight) in kernels {
-        kernel.add_to(&mut samples, width, weight as f32);
-    }
-    KnotKernel { width, samples }
+    let terms = spline.iter().map(|(&at, &weight)| (at, -weight)).chain([(knot, 1.0)]);
+    let kernels: Vec<(KnotKernel, f32)> = terms.map(|(at, weight)| (kernels.at(at), weight as f32)).collect();
+    KnotKernel::sum_of(kernels.iter().map(|(kernel, weight)| (kernel, *weight)))
 }
 
 /// By how much a spline is off at a place of a cell.
@@ -360,17 +358,17 @@ mod tests {
             |factor: usize| film_lens.layer_kernels(0, [(knot, factor)], &Work::unobserved(&cancel)).unwrap();
         let mut probe = Probe::new((&film_lens, 0), &settings, &wavelengths_nm);
         assert_eq!(probe.factor_at(knot), 4);
-        let expected = kernels_on(4)[&knot].width;
+        let expected = kernels_on(4)[&knot].at;
         // By the spread of the point, which holds 95 % of its light, and by a kernel on the film's pixels, whose border of a sample on each side is narrower.
-        let by_spread = probe.width_of(vec![knot], 4);
+        let by_spread = probe.kernel_size_of(vec![knot], 4);
         probe.kernels.insert(1, LayerKernels::new(probe.symmetry, kernels_on(1)));
-        let by_other = probe.width_of(vec![knot], 4);
-        assert!(
-            by_spread.abs_diff(expected) <= 4 && by_other.abs_diff(expected) <= 2,
-            "{by_spread} {by_other} {expected}"
-        );
+        let by_other = probe.kernel_size_of(vec![knot], 4);
+        for (found, most) in [(by_spread, 4), (by_other, 2)] {
+            let off = found.0.abs_diff(expected.rows).max(found.1.abs_diff(expected.columns));
+            assert!(off <= most, "{found:?} {expected:?}");
+        }
         probe.kernels.insert(4, LayerKernels::new(probe.symmetry, kernels_on(4)));
-        assert_eq!(probe.width_of(vec![knot], 4), expected);
+        assert_eq!(probe.kernel_size_of(vec![knot], 4), (expected.rows, expected.columns));
     }
 
     /// Returns the rows of cells that are marked, of rows from above down whose cells are all alike, once some are.

@@ -136,7 +136,8 @@ mod tests {
     use crate::{
         DiscLens,
         block_layers::BlockLayers,
-        sampler::{LayerCoordinates, Rectangle, Sampler},
+        rectangle::Rectangle,
+        sampler::{LayerCoordinates, Sampler},
     };
 
     /// A scene wider than the film sees.

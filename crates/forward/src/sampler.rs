@@ -10,53 +10,10 @@ use crate::{
     block_layers::BlockLayers,
     geometry::FilmFrame,
     layers::tent,
+    rectangle::Rectangle,
     sample_density::SampleDensity,
     squares::{SceneRaster, Squares, UNSEEN},
 };
-
-/// A rectangle of film pixels, which may reach beyond the film.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Rectangle {
-    pub(crate) first_row: i64,
-    pub(crate) first_column: i64,
-    pub(crate) rows: usize,
-    pub(crate) columns: usize,
-}
-
-impl Rectangle {
-    /// Returns the part within `margin` pixels of a film, or `None` if there is none.
-    pub(crate) fn clipped(&self, film_rows: usize, film_columns: usize, margin: usize) -> Option<Self> {
-        let clip = |first: i64, n: usize, film: usize| {
-            let start = first.max(-(margin as i64));
-            let end = (first + n as i64).min((film + margin) as i64);
-            (end > start).then(|| (start, (end - start) as usize))
-        };
-        let (first_row, rows) = clip(self.first_row, self.rows, film_rows)?;
-        let (first_column, columns) = clip(self.first_column, self.columns, film_columns)?;
-        Some(Self { first_row, first_column, rows, columns })
-    }
-
-    /// Returns it with a margin all around.
-    pub(crate) fn grown(&self, margin: usize) -> Self {
-        Self {
-            first_row: self.first_row - margin as i64,
-            first_column: self.first_column - margin as i64,
-            rows: self.rows + 2 * margin,
-            columns: self.columns + 2 * margin,
-        }
-    }
-
-    /// Returns what it and another have in common, or `None`.
-    pub(crate) fn intersection(&self, other: &Self) -> Option<Self> {
-        let common = |(first, n): (i64, usize), (other, m): (i64, usize)| {
-            let (start, end) = (first.max(other), (first + n as i64).min(other + m as i64));
-            (end > start).then(|| (start, (end - start) as usize))
-        };
-        let (first_row, rows) = common((self.first_row, self.rows), (other.first_row, other.rows))?;
-        let (first_column, columns) = common((self.first_column, self.columns), (other.first_column, other.columns))?;
-        Some(Self { first_row, first_column, rows, columns })
-    }
-}
 
 /// One surface of the scene: its layer coordinates, and its radiance in one band where its light is wanted.
 #[derive(Clone, Copy)]

@@ -7,6 +7,7 @@ use crate::{
     knot_kernels::{KnotKernel, LayerKernels, corner_spread_peak},
     neighbors::Neighbors,
     patch::{Around, Cell, Patch},
+    rectangle::Rectangle,
 };
 
 /// Largest step of the second derivative of a uniform plane's irradiance that is left as it is, 1/px²: four fifths of what a picture may have.
@@ -131,13 +132,14 @@ impl Bend {
         const DOWN: usize = 6;
         // The second derivative of u², u in parts of the cell.
         let scale = 2.0 / (patch.cell.size * patch.cell.size) as f32;
-        let width = patch.shares.iter().map(|(knot, _)| kernels.width_at(*knot)).max().unwrap_or(1);
-        let nothing = KnotKernel { width, samples: vec![0.0; width * width] };
+        let at = patch.shares.iter().map(|(knot, _)| kernels.window_at(*knot));
+        let at = Rectangle::around(at).unwrap_or(Rectangle::PIXEL);
+        let nothing = KnotKernel { at, samples: vec![0.0; at.len()] };
         let mut bend = Self { across: nothing.clone(), down: nothing };
         for (knot, shares) in &patch.shares {
             let kernel = kernels.at(*knot);
-            kernel.add_to(&mut bend.across.samples, width, scale * shares[ACROSS]);
-            kernel.add_to(&mut bend.down.samples, width, scale * shares[DOWN]);
+            kernel.add_to(&mut bend.across.samples, &at, scale * shares[ACROSS]);
+            kernel.add_to(&mut bend.down.samples, &at, scale * shares[DOWN]);
         }
         bend
     }
@@ -145,18 +147,14 @@ impl Bend {
     /// Returns the step of the second derivative of a uniform plane's irradiance over a side to another patch, at its ends too.
     fn step_to(&self, other: &Self, side: Side) -> f64 {
         let [a, b] = [self, other].map(|bend| if side == Side::Beside { &bend.across } else { &bend.down });
-        let width = a.width.max(b.width);
-        let mut difference = vec![0.0; width * width];
-        a.add_to(&mut difference, width, 1.0);
-        b.add_to(&mut difference, width, -1.0);
-        corner_spread_peak(&difference, width)
+        let difference = KnotKernel::sum_of([(a, 1.0), (b, -1.0)].into_iter());
+        corner_spread_peak(&difference.samples, difference.at.columns)
     }
 
     /// Returns the largest second derivative of corner spread functions, along rows and columns together.
     fn peak(&self) -> f64 {
-        let mut both = self.across.samples.clone();
-        self.down.add_to(&mut both, self.across.width, 1.0);
-        corner_spread_peak(&both, self.across.width)
+        let both = KnotKernel::sum_of([(&self.across, 1.0), (&self.down, 1.0)].into_iter());
+        corner_spread_peak(&both.samples, both.at.columns)
     }
 }
 
@@ -174,7 +172,7 @@ mod tests {
         let kernel = |(i, part): (usize, &f32)| {
             let mut samples = vec![0.0; 9];
             (samples[4], samples[5]) = (1.0 - part, *part);
-            (cell(i).knot(), KnotKernel { width: 3, samples })
+            (cell(i).knot(), KnotKernel { at: Rectangle::PIXEL.grown(1), samples })
         };
         LayerKernels::new(Symmetry::None, parts.iter().enumerate().map(kernel).collect())
     }

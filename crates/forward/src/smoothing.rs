@@ -5,7 +5,7 @@ use multiversion::multiversion;
 use crate::{
     geometry::FilmFrame,
     patch::{Patch, Products, polynomials},
-    sampler::Rectangle,
+    rectangle::Rectangle,
 };
 
 /// Takes a function over a rectangle patch by patch, 0 where there is none, and replaces it by its means over squares.

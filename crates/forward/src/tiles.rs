@@ -17,6 +17,7 @@ use crate::{
     mesh::Mesh,
     patch::{Cell, Knot, Patch},
     probe::Probe,
+    rectangle::Rectangle,
     seams::Seams,
     work::Work,
 };
@@ -60,11 +61,18 @@ impl LayerTiles {
         Ok(Self { patches, smoothing_px: 0, knots })
     }
 
-    /// Returns the squares of all rasters; `film_px` is the longer side of the film.
-    fn spread_squares(&self, kernels: &[&LayerKernels], film_px: usize) -> SpreadSquares {
-        let width_at = |knot: Knot| kernels.iter().map(|kernels| kernels.width_at(knot)).max().unwrap_or(1);
-        let side_px = |factor: usize, width: usize, size_px: usize| {
-            (size_px.div_ceil(factor) + self.smoothing_px).min(film_px.div_ceil(factor) + width - 1) + width - 1
+    /// Returns the blocks of all rasters, of a film of so many rows and columns.
+    fn spread_blocks(&self, kernels: &[&LayerKernels], film: (usize, usize)) -> SpreadBlocks {
+        let window_at = |knot: Knot| {
+            let windows = kernels.iter().map(|kernels| kernels.window_at(knot));
+            Rectangle::around(windows).unwrap_or(Rectangle::PIXEL)
+        };
+        // What is spread, over a part of the film and its margin, by a kernel.
+        let along = |factor: usize, size_px: usize, (n, film_px): (usize, usize)| {
+            (size_px.div_ceil(factor) + self.smoothing_px).min(film_px.div_ceil(factor) + n - 1) + n - 1
+        };
+        let block = |factor: usize, (down_px, across_px): (usize, usize), window: Rectangle| {
+            (along(factor, down_px, (window.rows, film.0)), along(factor, across_px, (window.columns, film.1)))
         };
         let of_raster = |(&factor, patches): (&usize, &Vec<Patch>)| {
             let mut spans: BTreeMap<Knot, [Knot; 2]> = BTreeMap::new();
@@ -77,21 +85,23 @@ impl LayerTiles {
                 }
             }
             let around_knots = spans.iter().map(|(knot, [first, last])| {
-                let size_px = (last.right - first.right).max(last.down - first.down);
-                side_px(factor, width_at(*knot), size_px as usize)
+                let size_px = ((last.down - first.down) as usize, (last.right - first.right) as usize);
+                block(factor, size_px, window_at(*knot))
             });
-            let sides: Vec<usize> = around_knots.collect();
+            let sizes: Vec<(usize, usize)> = around_knots.collect();
             let alone = patches.iter().filter(|patch| !patch.is_by_knots).map(|patch| {
-                let width = patch.shares.iter().map(|&(knot, _)| width_at(knot)).max().unwrap_or(1);
-                side_px(factor, width, patch.cell.size)
+                let windows = patch.shares.iter().map(|&(knot, _)| window_at(knot));
+                let window = Rectangle::around(windows).unwrap_or(Rectangle::PIXEL);
+                block(factor, (patch.cell.size, patch.cell.size), window)
             });
-            let sum_px2: usize = sides.iter().map(|side| side * side).sum();
-            SpreadSquares {
-                largest_px: fast_size(sides.iter().copied().chain(alone).max().unwrap_or(0)),
-                mean_px2: sum_px2 / sides.len().max(1),
+            let sum_px2: usize = sizes.iter().map(|(rows, columns)| rows * columns).sum();
+            let transformed = sizes.iter().copied().chain(alone);
+            SpreadBlocks {
+                largest_px2: transformed.map(|(rows, columns)| fast_size(rows) * fast_size(columns)).max().unwrap_or(0),
+                mean_px2: sum_px2 / sizes.len().max(1),
             }
         };
-        self.patches.iter().map(of_raster).fold(SpreadSquares::default(), SpreadSquares::larger)
+        self.patches.iter().map(of_raster).fold(SpreadBlocks::default(), SpreadBlocks::larger)
     }
 
     /// Those on the film's pixels.
@@ -104,18 +114,18 @@ impl LayerTiles {
     }
 }
 
-/// The squares in which samples are spread by kernels.
+/// The blocks in which samples are spread by kernels.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct SpreadSquares {
-    /// The longest side of one that is transformed, samples.
-    pub(crate) largest_px: usize,
+pub(crate) struct SpreadBlocks {
+    /// Samples of the largest one that is transformed.
+    pub(crate) largest_px2: usize,
     /// Samples of those around the knots of a raster in the mean, where they are largest.
     pub(crate) mean_px2: usize,
 }
 
-impl SpreadSquares {
+impl SpreadBlocks {
     fn larger(self, other: Self) -> Self {
-        Self { largest_px: self.largest_px.max(other.largest_px), mean_px2: self.mean_px2.max(other.mean_px2) }
+        Self { largest_px2: self.largest_px2.max(other.largest_px2), mean_px2: self.mean_px2.max(other.mean_px2) }
     }
 }
 
@@ -186,18 +196,14 @@ impl Tiling {
         patches.map(Patch::size_bytes).sum::<usize>() + self.n_knots() * size_of::<(Knot, usize)>()
     }
 
-    /// Returns about how large the squares are in which the samples of a film of this size are spread by kernels of some bands.
-    pub(crate) fn spread_squares(
-        &self,
-        bands: &[Arc<Vec<LayerKernels>>],
-        (rows, columns): (usize, usize),
-    ) -> SpreadSquares {
+    /// Returns about how large the blocks are in which the samples of a film of this size are spread by kernels of some bands.
+    pub(crate) fn spread_blocks(&self, bands: &[Arc<Vec<LayerKernels>>], film: (usize, usize)) -> SpreadBlocks {
         let layers = self.layers.par_iter().enumerate();
         let of_layer = |(layer, tiles): (usize, &LayerTiles)| {
             let kernels: Vec<&LayerKernels> = bands.iter().map(|by_layer| &by_layer[layer]).collect();
-            tiles.spread_squares(&kernels, rows.max(columns))
+            tiles.spread_blocks(&kernels, film)
         };
-        layers.map(of_layer).reduce(SpreadSquares::default, SpreadSquares::larger)
+        layers.map(of_layer).reduce(SpreadBlocks::default, SpreadBlocks::larger)
     }
 
     /// Computes the kernels of all layers at a wavelength; none for a layer without cells.

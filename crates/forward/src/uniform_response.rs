@@ -74,6 +74,7 @@ mod tests {
         knot_kernels::{KnotKernel, Symmetry},
         mesh::Mesh,
         patch::{Cell, Knot, polynomials, value_of},
+        rectangle::Rectangle,
     };
 
     /// Kernels that move by a hundredth of a pixel each pixel to the right, and twice that down: a plane is that much darker.
@@ -88,7 +89,7 @@ mod tests {
             let (right, down) = (0.01 * knot.right as f32, 0.02 * knot.down as f32);
             let mut samples = vec![0.0; 9];
             (samples[4], samples[5], samples[7]) = (1.0 - right - down, right, down);
-            (knot, KnotKernel { width: 3, samples })
+            (knot, KnotKernel { at: Rectangle::PIXEL.grown(1), samples })
         };
         let by_knot: BTreeMap<Knot, KnotKernel> = shares.iter().map(|(knot, _)| kernel(*knot)).collect();
         let kernels = LayerKernels::new(Symmetry::None, by_knot);
