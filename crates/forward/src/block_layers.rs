@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use ndarray::Array2;
 
+use crate::rectangle::Rectangle;
+
 /// Pixels along a side of a block.
 pub(crate) const BLOCK: usize = 4;
 
@@ -22,6 +24,21 @@ impl BlockLayers {
         let block = usize::try_from(row - self.first.0).ok()? / BLOCK;
         let ranges = (block < self.ranges.nrows()).then(|| self.ranges.row(block))?;
         Some(RowBlocks { first_column: self.first.1, ranges: ranges.to_slice()? })
+    }
+
+    /// Whether a layer may have anything in a rectangle of pixels.
+    pub(crate) fn may_have_any(&self, at: &Rectangle, layer: usize) -> bool {
+        let (rows, columns) = self.ranges.dim();
+        let block = |pixel: i64, first: i64| (pixel - first).div_euclid(BLOCK as i64);
+        let (last_row, last_column) = (at.first_row + at.rows as i64 - 1, at.first_column + at.columns as i64 - 1);
+        let is_in = |row: i64, column: i64| {
+            let known = usize::try_from(row).ok().zip(usize::try_from(column).ok());
+            let range = known.filter(|&(row, column)| row < rows && column < columns).map(|at| self.ranges[at]);
+            range.is_none_or(|(first, last)| (usize::from(first)..=usize::from(last)).contains(&layer))
+        };
+        let mut of_rows = block(at.first_row, self.first.0)..=block(last_row, self.first.0);
+        let of_columns = block(at.first_column, self.first.1)..=block(last_column, self.first.1);
+        of_rows.any(|row| of_columns.clone().any(|column| is_in(row, column)))
     }
 
     /// Returns blocks that pass nothing over.
@@ -111,6 +128,15 @@ mod tests {
         let blocks = BlockLayers { first: (-4, -4), ranges };
         let reached = |layer, radius_px| blocks.n_reached(layer, radius_px, (12, 16));
         assert_eq!((reached(2, 0.0), reached(4, 0.0)), (16, 0));
+        let has = |first_row, first_column, layer| {
+            blocks.may_have_any(&Rectangle { first_row, first_column, rows: 2, columns: 3 }, layer)
+        };
+        // Beside the block and at its first pixels, and beyond all blocks, where nothing is known.
+        assert_eq!(
+            [(2, 4), (3, 4), (4, 1), (4, 2), (7, 7), (8, 8)].map(|(row, column)| has(row, column, 2)),
+            [false, true, false, true, true, false]
+        );
+        assert!(!has(5, 5, 4) && has(-5, 5, 4));
         // A block more all around, of which all are on the raster; then rows 0 to 12 and columns 0 to 16 of 20.
         assert_eq!((reached(2, 1.0), reached(2, 8.0)), (144, 192));
     }

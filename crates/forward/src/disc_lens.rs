@@ -65,7 +65,7 @@ impl LensImage for DiscLens {
     fn kernel(&self, query: PsfQuery) -> Kernel {
         let PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um } = query;
         let radius_mm = self.blur_radius_mm(field_tan, dioptres, wavelength_nm).abs();
-        Kernel { samples: disc(1e3 * radius_mm / pitch_um), pitch_um, centroid_px: DVec2::ZERO }
+        Kernel::centered(disc(1e3 * radius_mm / pitch_um), pitch_um)
     }
     fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
         let division = Arc::new(PupilDivision::new(n_parts));
@@ -120,7 +120,7 @@ impl LensImage for PartOfDisc {
         let PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um } = query;
         let radius_px = 1e3 * self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm) / pitch_um;
         let samples = part_of_disc(-radius_px, self.moments.1, |at| self.division.share(self.part, at));
-        Kernel { samples, pitch_um, centroid_px: DVec2::ZERO }
+        Kernel::centered(samples, pitch_um)
     }
     fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm)

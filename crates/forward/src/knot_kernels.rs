@@ -4,7 +4,6 @@ use std::{collections::BTreeMap, sync::OnceLock};
 
 use dioptric_psf::{Kernel, LensImage};
 use glam::DVec2;
-use ndarray::Array2;
 
 use crate::{convolve::add_scaled, patch::Knot, rectangle::Rectangle};
 
@@ -62,35 +61,41 @@ pub(crate) struct KnotKernel {
 }
 
 impl KnotKernel {
-    /// Takes a kernel of odd sides, its reference point in the middle, scales it to a sum of 1, leaves out the borders without light and moves the centroid of its
-    /// samples to its own.
+    /// Takes a kernel of odd sides, scales it to a sum of 1, leaves out the borders without light and moves the centroid of its samples to its own.
     pub(crate) fn new(kernel: &Kernel) -> Self {
-        let (kernel, centroid_px) = (&kernel.samples, kernel.centroid_px);
-        let (rows, columns) = kernel.dim();
-        let (half_rows, half_columns) = ((rows / 2) as i64, (columns / 2) as i64);
-        let whole = Rectangle { first_row: -half_rows, first_column: -half_columns, rows, columns };
-        let sum: f64 = kernel.iter().map(|&v| f64::from(v)).sum();
+        let Kernel { samples, middle_px, centroid_px, .. } = kernel;
+        let (rows, columns) = samples.dim();
+        let first = |middle: i32, n: usize| i64::from(middle) - (n / 2) as i64;
+        let (first_row, first_column) = (first(middle_px.y, rows), first(middle_px.x, columns));
+        let whole = Rectangle { first_row, first_column, rows, columns };
+        let samples = samples.as_standard_layout();
+        let samples = samples.as_slice().expect("it is in standard order");
+        let (by_row, by_column) = sums_of_lines(samples, columns);
+        let sum: f64 = by_row.iter().sum();
         if sum <= 0.0 {
             // No light is spread by it.
             return Self { at: Rectangle::PIXEL, samples: vec![1.0] };
         }
-        let scale = 1.0 / sum;
+        let (above, lit_rows) = lit_part(&by_row, sum);
+        let (left, lit_columns) = lit_part(&by_column, sum);
+        let (first_row, first_column) = (first_row + above as i64, first_column + left as i64);
+        let lit = Rectangle { first_row, first_column, rows: lit_rows, columns: lit_columns };
         // Light that is moved from the outermost samples needs a place.
-        let border = usize::from(centroid_px != DVec2::ZERO && rows.max(columns) <= SMALL);
-        let (within, lit) = (whole.grown(border), lit_part(kernel, &whole, sum));
-        let at = lit.grown(1).intersection(&within).unwrap_or(lit);
+        let border = usize::from(*centroid_px != DVec2::ZERO && rows.max(columns) <= SMALL);
+        let at = lit.grown(1).intersection(&whole.grown(border)).unwrap_or(lit);
         let mut bordered = Bordered::new(at);
-        let lines = kernel.rows().into_iter().skip((lit.first_row + half_rows) as usize).take(lit.rows);
-        let (skipped, margin) =
-            ((lit.first_column + half_columns) as usize, (lit.first_column - at.first_column) as usize);
-        for (line, values) in bordered.rows_mut().skip((lit.first_row - at.first_row) as usize).zip(lines) {
-            let values = values.into_iter().skip(skipped).take(lit.columns);
-            line[margin..].iter_mut().zip(values).for_each(|(sample, &value)| *sample = f64::from(value) * scale);
+        let (skipped_rows, margin) =
+            ((lit.first_row - at.first_row) as usize, (lit.first_column - at.first_column) as usize);
+        let lines = samples.chunks_exact(columns).skip(above).take(lit_rows);
+        for (line, samples) in bordered.rows_mut().skip(skipped_rows).zip(lines) {
+            let line = line[margin..].iter_mut().zip(&samples[left..][..lit_columns]);
+            line.for_each(|(scaled, &sample)| *scaled = f64::from(sample) / sum);
         }
-        Self { at, samples: centered(bordered, centroid_px) }
+        Self { at, samples: centered(bordered, middle_px.as_dvec2() + *centroid_px) }
     }
 
     /// Adds the kernel times a factor to a block about the reference point that holds all of it.
+    #[inline(never)]
     pub(crate) fn add_to(&self, sum: &mut [f32], block: &Rectangle, factor: f32) {
         if *block == self.at {
             return add_scaled(sum, factor, &self.samples);
@@ -102,15 +107,16 @@ impl KnotKernel {
     }
 
     /// Returns the sum of kernels times factors.
-    pub(crate) fn sum_of<'a>(terms: impl Iterator<Item = (&'a Self, f32)> + Clone) -> Self {
-        let at = Rectangle::around(terms.clone().map(|(kernel, _)| kernel.at)).unwrap_or(Rectangle::PIXEL);
+    #[inline(never)]
+    pub(crate) fn sum_of(terms: &[(&Self, f32)]) -> Self {
+        let at = Rectangle::around(terms.iter().map(|(kernel, _)| kernel.at)).unwrap_or(Rectangle::PIXEL);
         let mut samples = vec![0.0; at.len()];
-        terms.for_each(|(kernel, factor)| kernel.add_to(&mut samples, &at, factor));
+        terms.iter().for_each(|(kernel, factor)| kernel.add_to(&mut samples, &at, *factor));
         Self { at, samples }
     }
 
     fn mixed(&self, other: &Self, fraction: f32) -> Self {
-        Self::sum_of([(self, 1.0 - fraction), (other, fraction)].into_iter())
+        Self::sum_of(&[(self, 1.0 - fraction), (other, fraction)])
     }
 
     /// Returns the kernel of a canonical knot at another.
@@ -152,13 +158,24 @@ impl KnotKernel {
     }
 }
 
-/// Returns the part of a kernel that holds all but a negligible share of its light on each side; `whole` is where all of it lies.
-fn lit_part(kernel: &Array2<f32>, whole: &Rectangle, sum: f64) -> Rectangle {
-    let by_row: Vec<f64> = kernel.rows().into_iter().map(|line| line.iter().map(|&v| f64::from(v)).sum()).collect();
-    let mut by_column = vec![0.0; kernel.ncols()];
-    for line in kernel.rows() {
+/// Returns the sums of the rows and of the columns of a block of samples.
+fn sums_of_lines(samples: &[f32], columns: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut by_row = Vec::with_capacity(samples.len() / columns);
+    let mut by_column = vec![0.0; columns];
+    for line in samples.chunks_exact(columns) {
+        let mut lanes = [0.0; LANES];
+        let (whole, rest) = line.as_chunks::<LANES>();
+        for samples in whole {
+            (0..LANES).for_each(|k| lanes[k] += f64::from(samples[k]));
+        }
+        by_row.push(lanes.iter().sum::<f64>() + rest.iter().map(|&v| f64::from(v)).sum::<f64>());
         by_column.iter_mut().zip(line).for_each(|(sum, &value)| *sum += f64::from(value));
     }
+    (by_row, by_column)
+}
+
+/// Returns the first of some lines of a kernel that hold all but a negligible share of its light on each side, and their number.
+fn lit_part(sums: &[f64], sum: f64) -> (usize, usize) {
     let dark = |sums: &mut dyn Iterator<Item = &f64>| {
         let mut left_out = 0.0;
         let is_dark = |part: &&f64| {
@@ -167,17 +184,8 @@ fn lit_part(kernel: &Array2<f32>, whole: &Rectangle, sum: f64) -> Rectangle {
         };
         sums.take_while(is_dark).count()
     };
-    let lit = |sums: &[f64]| {
-        let before = dark(&mut sums.iter());
-        (before, sums.len() - before - dark(&mut sums[before + 1..].iter().rev()))
-    };
-    let ((above, rows), (left, columns)) = (lit(&by_row), lit(&by_column));
-    Rectangle {
-        first_row: whole.first_row + above as i64,
-        first_column: whole.first_column + left as i64,
-        rows,
-        columns,
-    }
+    let before = dark(&mut sums.iter());
+    (before, sums.len() - before - dark(&mut sums[before + 1..].iter().rev()))
 }
 
 /// What takes the surroundings of a knot to those of its canonical knot: rows and columns turned about, then both exchanged.
@@ -378,6 +386,7 @@ impl LayerKernels {
     }
 
     /// Returns where the samples of the kernel at a knot lie.
+    #[inline(never)]
     pub(crate) fn window_at(&self, knot: Knot) -> Rectangle {
         self.symmetry.mirror(knot).window_at_knot(&self.canonical_at(knot).at)
     }
@@ -582,10 +591,12 @@ fn move_back(samples: &[f64], (rows, width): (usize, usize), off_px: DVec2, move
 
 #[cfg(test)]
 mod tests {
+    use ndarray::Array2;
+
     use super::*;
 
     fn knot_kernel(samples: Array2<f32>, centroid_px: DVec2) -> KnotKernel {
-        KnotKernel::new(&Kernel { samples, pitch_um: 1.0, centroid_px })
+        KnotKernel::new(&Kernel { centroid_px, ..Kernel::centered(samples, 1.0) })
     }
 
     fn even(rows: usize, columns: usize) -> KnotKernel {

@@ -213,7 +213,9 @@ impl Layout {
         let stopwatch = Stopwatch::default();
         let film_lens =
             FilmLens { image: lens, film, layers, maps: &maps, wavelength_nm: middle_nm, stopwatch: &stopwatch };
-        let mut tiling = Tiling::new(active, &film_lens, settings, &wavelengths_nm, &work)?;
+        let on_film = LayerRaster::new(film, 1, (view, scene.size()), &maps[0]).sampler;
+        let content = BlockLayers::find(&on_film, &active.concat(), extents.maps, extents.surfaces, cancel)?;
+        let mut tiling = Tiling::new((active, &content), &film_lens, settings, &wavelengths_nm, &work)?;
         let mut kept = Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() };
         let largest = match settings.smoothing_px {
             0 => Largest::default(),
@@ -231,7 +233,7 @@ impl Layout {
             tiles.patches.keys().map(raster).collect()
         };
         let rasters: Vec<_> = tiling.layers.iter().zip(&maps).map(rasters_of).collect();
-        let blocks = blocks_of(&rasters, &tiling, &extents, cancel)?;
+        let blocks = blocks_of(&rasters, &tiling, content, &extents, cancel)?;
         let n_covered = match hides(settings, layers) {
             true => n_covered(&tiling, &blocks, &radius_px, film),
             false => 0,
@@ -705,22 +707,24 @@ fn n_covered(tiling: &Tiling, blocks: &BTreeMap<usize, BlockLayers>, radius_px: 
     tiling.layers.par_iter().enumerate().map(of_layer).sum()
 }
 
-/// Finds the layers of the blocks of pixels over all patches, by the factor of their raster.
+/// Finds the layers of the blocks of pixels over all patches, by the factor of their raster; those of the film's pixels are known.
 fn blocks_of(
     rasters: &[BTreeMap<usize, LayerRaster>],
     tiling: &Tiling,
+    on_film: BlockLayers,
     extents: &Extents<'_>,
     cancel: &Cancel,
 ) -> Result<BTreeMap<usize, BlockLayers>, Cancelled> {
     let mut cells: BTreeMap<usize, Vec<Cell>> = BTreeMap::new();
-    for (&factor, patches) in tiling.layers.iter().flat_map(|tiles| &tiles.patches) {
+    for (&factor, patches) in tiling.layers.iter().flat_map(|tiles| &tiles.patches).filter(|(factor, _)| **factor > 1) {
         cells.entry(factor).or_default().extend(patches.iter().map(|patch| patch.cell));
     }
-    let blocks = cells.into_iter().filter_map(|(factor, cells)| {
+    let blocks = cells.iter().filter_map(|(&factor, cells)| {
         let LayerRaster { sampler, .. } = rasters.iter().find_map(|rasters| rasters.get(&factor))?;
-        Some(BlockLayers::find(sampler, &cells, extents.maps, extents.surfaces, cancel).map(|found| (factor, found)))
+        let found = BlockLayers::find(sampler, cells, extents.maps, extents.surfaces, cancel);
+        Some(found.map(|found| (factor, found)))
     });
-    blocks.collect()
+    blocks.chain([Ok((1, on_film))]).collect()
 }
 
 /// Returns how far beyond the film light is taken from, pixels: the 95 % radius of a blur, doubled, holds all but the

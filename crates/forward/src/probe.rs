@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::{
     Settings,
     active::LARGEST_JOINED,
+    block_layers::BlockLayers,
     cost::Cost,
     expansion::Expansion,
     film_lens::FilmLens,
@@ -24,6 +25,8 @@ use crate::{
 pub(crate) struct Probe<'a> {
     lens: &'a FilmLens<'a>,
     layer: usize,
+    /// Where on the film's pixels layers have anything.
+    content: &'a BlockLayers,
     settings: &'a Settings,
     /// Wavelengths over which a blur is at its widest, nm.
     wavelengths_nm: &'a [f64],
@@ -40,6 +43,7 @@ pub(crate) struct Probe<'a> {
 impl<'a> Probe<'a> {
     pub(crate) fn new(
         (lens, layer): (&'a FilmLens<'a>, usize),
+        content: &'a BlockLayers,
         settings: &'a Settings,
         wavelengths_nm: &'a [f64],
     ) -> Self {
@@ -51,6 +55,7 @@ impl<'a> Probe<'a> {
         Self {
             lens,
             layer,
+            content,
             settings,
             wavelengths_nm,
             symmetry,
@@ -70,6 +75,7 @@ impl<'a> Probe<'a> {
         LayerRaster::factor_for(self.spread_px(knot), self.settings.widest_blur_px)
     }
 
+    #[inline(never)]
     fn spread_px(&mut self, knot: Knot) -> f64 {
         let canonical = self.symmetry.canonical(knot);
         let compute = || self.lens.spread_px(self.layer, canonical, self.wavelengths_nm);
@@ -85,6 +91,12 @@ impl<'a> Probe<'a> {
         let (down, across) =
             (beyond(at.first_row, at.rows, film.rows), beyond(at.first_column, at.columns, film.columns));
         down.hypot(across) > self.spread_px(cell.knot()) + SMALLEST as f64
+    }
+
+    /// Whether the layer may have anything within a number of pixels of a cell.
+    pub(crate) fn may_have_any(&self, cell: &Cell, margin_px: usize) -> bool {
+        let at = cell.pixels(&FilmFrame::new(self.lens.film, 1)).grown(margin_px);
+        self.content.may_have_any(&at, self.layer)
     }
 
     /// Whether the spline is off by more than the settings allow at a corner of a cell, by the spread of a point alone: where cells are
@@ -127,7 +139,8 @@ impl<'a> Probe<'a> {
         let mut splines: BTreeMap<usize, Vec<(Cell, Knot, Weights)>> = BTreeMap::new();
         for cell in cells {
             let is_large = cell.size > LARGEST_JOINED * self.factor_at(cell.knot());
-            if !is_large && self.is_beyond_reach(&cell) {
+            // The spline over a cell is that of the cells around it as well.
+            if !is_large && (!self.may_have_any(&cell, cell.size) || self.is_beyond_reach(&cell)) {
                 continue;
             }
             let weights = mesh.at_middle(&cell);
@@ -234,7 +247,8 @@ impl<'a> Probe<'a> {
 fn spline_error(kernels: &LayerKernels, knot: Knot, spline: &Weights) -> KnotKernel {
     let terms = spline.iter().map(|(&at, &weight)| (at, -weight)).chain([(knot, 1.0)]);
     let kernels: Vec<(KnotKernel, f32)> = terms.map(|(at, weight)| (kernels.at(at), weight as f32)).collect();
-    KnotKernel::sum_of(kernels.iter().map(|(kernel, weight)| (kernel, *weight)))
+    let terms: Vec<(&KnotKernel, f32)> = kernels.iter().map(|(kernel, weight)| (kernel, *weight)).collect();
+    KnotKernel::sum_of(&terms)
 }
 
 /// By how much a spline is off at a place of a cell.
@@ -356,7 +370,8 @@ mod tests {
         let cancel = Cancel::new();
         let kernels_on =
             |factor: usize| film_lens.layer_kernels(0, [(knot, factor)], &Work::unobserved(&cancel)).unwrap();
-        let mut probe = Probe::new((&film_lens, 0), &settings, &wavelengths_nm);
+        let content = BlockLayers::of_everything();
+        let mut probe = Probe::new((&film_lens, 0), &content, &settings, &wavelengths_nm);
         assert_eq!(probe.factor_at(knot), 4);
         let expected = kernels_on(4)[&knot].at;
         // By the spread of the point, which holds 95 % of its light, and by a kernel on the film's pixels, whose border of a sample on each side is narrower.

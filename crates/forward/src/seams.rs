@@ -147,13 +147,13 @@ impl Bend {
     /// Returns the step of the second derivative of a uniform plane's irradiance over a side to another patch, at its ends too.
     fn step_to(&self, other: &Self, side: Side) -> f64 {
         let [a, b] = [self, other].map(|bend| if side == Side::Beside { &bend.across } else { &bend.down });
-        let difference = KnotKernel::sum_of([(a, 1.0), (b, -1.0)].into_iter());
+        let difference = KnotKernel::sum_of(&[(a, 1.0), (b, -1.0)]);
         corner_spread_peak(&difference.samples, difference.at.columns)
     }
 
     /// Returns the largest second derivative of corner spread functions, along rows and columns together.
     fn peak(&self) -> f64 {
-        let both = KnotKernel::sum_of([(&self.across, 1.0), (&self.down, 1.0)].into_iter());
+        let both = KnotKernel::sum_of(&[(&self.across, 1.0), (&self.down, 1.0)]);
         corner_spread_peak(&both.samples, both.at.columns)
     }
 }

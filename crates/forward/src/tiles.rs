@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::{
     Settings,
+    block_layers::BlockLayers,
     convolve::fast_size,
     cost::patches_by_knots,
     film_lens::FilmLens,
@@ -44,6 +45,11 @@ impl LayerTiles {
         probe.refine(&mut mesh, &cells, work)?;
         let mut pieces = vec![];
         cells.into_iter().for_each(|cell| mesh.pieces_of(cell, &mut pieces));
+        // Pixels of the widest raster with centers in a piece reach half a pixel beyond it.
+        pieces.retain(|(cell, shares)| {
+            let widest = shares.iter().map(|(knot, _)| probe.factor_at(*knot)).max().unwrap_or(1);
+            probe.may_have_any(cell, widest / 2)
+        });
         let all = pieces.iter().flat_map(|(_, shares)| shares.iter().map(|(knot, _)| *knot));
         let factors: BTreeMap<Knot, usize> = all.map(|knot| (knot, probe.factor_at(knot))).collect();
         let mut patches: BTreeMap<usize, Vec<Patch>> = BTreeMap::new();
@@ -136,18 +142,16 @@ pub(crate) struct Tiling {
 }
 
 impl Tiling {
-    /// Tiles each layer over its cells. `wavelengths_nm` are those over which a blur is at its widest.
+    /// Tiles each layer over its cells, where it has `content`. `wavelengths_nm` are those over which a blur is at its widest.
     pub(crate) fn new(
-        active: Vec<Vec<Cell>>,
+        (active, content): (Vec<Vec<Cell>>, &BlockLayers),
         lens: &FilmLens<'_>,
         settings: &Settings,
         wavelengths_nm: &[f64],
         work: &Work<'_>,
     ) -> Result<Self, Cancelled> {
-        let tiles = active
-            .into_par_iter()
-            .enumerate()
-            .map(|(layer, cells)| LayerTiles::new(cells, Probe::new((lens, layer), settings, wavelengths_nm), work));
+        let probe = |layer: usize| Probe::new((lens, layer), content, settings, wavelengths_nm);
+        let tiles = active.into_par_iter().enumerate().map(|(layer, cells)| LayerTiles::new(cells, probe(layer), work));
         Ok(Self { layers: tiles.collect::<Result<_, Cancelled>>()?, symmetry: Symmetry::of(lens.image) })
     }
 

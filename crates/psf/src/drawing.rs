@@ -82,14 +82,17 @@ impl RotationalBank {
         if outwards_mm == 0.0 {
             return self.kernel_and_model(query).0;
         }
-        let about_mm = query.field_tan / field_tan * outwards_mm;
-        let about_px = about_mm * DVec2::new(1e3, -1e3) / query.pitch_um;
+        let per_mm = DVec2::new(1e3, -1e3) / query.pitch_um;
+        let middle_ray_px = query.field_tan / field_tan * outwards_mm * per_mm;
+        // The pixels are those about the middle ray; the window is about the one in which the centroid lies, where it is smallest.
+        let middle_px = (-middle_ray_px).round();
+        let about_px = middle_ray_px + middle_px;
         let record = self.record(field_tan, query.dioptres, query.wavelength_nm);
         let layout = self.layout(&record, query, None).about(about_px);
         let diffraction = self.settings().diffraction;
-        let (energies, _) = composed(layout, diffraction, |side| self.wave_energies(query, side, about_mm));
+        let (energies, _) = composed(layout, diffraction, |side| self.wave_energies(query, side, about_px / per_mm));
         let kernel = render::kernel(&energies, diffraction != Diffraction::None, query.pitch_um);
-        Kernel { centroid_px: -about_px, ..kernel }
+        Kernel { middle_px: middle_px.as_ivec2(), centroid_px: -about_px, ..kernel }
     }
 
     /// Returns how much of a kernel is wave optics.

@@ -1,9 +1,10 @@
 //! A point spread function on pixels.
 
-use glam::DVec2;
+use glam::{DVec2, IVec2};
 use ndarray::{Array2, s};
 
-/// A point spread function on square pixels: odd × odd, about the middle of the middle pixel, in the picture frame (row 0 is the top).
+/// A point spread function on square pixels: odd × odd, in the picture frame (row 0 is the top). The point of the film that it is about is the middle of a pixel:
+/// of the middle one, or of another where the light lies far to one side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kernel {
     /// The share of the point's transmitted energy that falls on each pixel. The sum is what the window holds, 1 or
@@ -11,14 +12,21 @@ pub struct Kernel {
     pub samples: Array2<f32>,
     /// Side of a pixel, µm.
     pub pitch_um: f64,
+    /// Where the middle pixel lies, pixels to the right of the one that the kernel is about and below it; mostly 0.
+    pub middle_px: IVec2,
     /// Where the centroid lies, pixels to the right of the middle of the middle pixel and below it; mostly 0.
     pub centroid_px: DVec2,
 }
 
 impl Kernel {
+    /// Returns the kernel of these samples, odd × odd, that is about the middle of the middle one, where its centroid lies.
+    pub fn centered(samples: Array2<f32>, pitch_um: f64) -> Self {
+        Self { samples, pitch_um, middle_px: IVec2::ZERO, centroid_px: DVec2::ZERO }
+    }
+
     /// Returns the kernel that blurs nothing.
     pub fn identity(pitch_um: f64) -> Self {
-        Self { samples: Array2::ones((1, 1)), pitch_um, centroid_px: DVec2::ZERO }
+        Self::centered(Array2::ones((1, 1)), pitch_um)
     }
 
     /// The share of the energy that the window holds.

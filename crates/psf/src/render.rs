@@ -110,7 +110,7 @@ fn lit_nodes(record: &RayMap) -> impl Iterator<Item = usize> {
 /// Returns drawn energies as a kernel, trimmed to what matters.
 pub(crate) fn kernel(energies: &Array2<f64>, is_diffracted: bool, pitch_um: f64) -> Kernel {
     let kept = if is_diffracted { KEPT_OF_TAILS } else { 1.0 - 1e-7 };
-    Kernel { samples: trim(energies, kept), pitch_um, centroid_px: DVec2::ZERO }
+    Kernel::centered(trim(energies, kept), pitch_um)
 }
 
 /// Returns λN in pixels: what the Gaussian of a ray through the middle of the stop would give.

@@ -6,8 +6,8 @@ use std::sync::Mutex;
 
 use dioptric_optics::{CoordinateBreak, Lens, glam::DVec2};
 use dioptric_psf::{
-    BankSettings, Diffraction, ErrorPlaces, FieldSampling, LensImage, LensImageModel, PsfError, PsfQuery, SampleCounts,
-    lens_on_axis,
+    BankSettings, Diffraction, ErrorPlaces, FieldSampling, Kernel, LensImage, LensImageModel, PsfError, PsfQuery,
+    SampleCounts, lens_on_axis,
 };
 use dioptric_spectrum::Cancel;
 
@@ -186,7 +186,10 @@ fn kernels_and_maps_are_about_one_place() {
             let (field_tan, gain) = map.at(place_mm).unwrap();
             let query = PsfQuery::new(field_tan, dioptres, wavelength_nm, pitch_um);
             let kernel = imaging.kernel(query);
-            let aside_mm = kernel.centroid_px * DVec2::new(1e-3, -1e-3) * pitch_um;
+            let aside = |kernel: &Kernel| {
+                (kernel.middle_px.as_dvec2() + kernel.centroid_px) * DVec2::new(1e-3, -1e-3) * pitch_um
+            };
+            let aside_mm = aside(&kernel);
             let centroid_mm = model.centroid_mm(field_tan, dioptres, wavelength_nm);
             // Tables of the map: a hundredth of a pixel.
             assert!((place_mm + aside_mm - centroid_mm).length() < 1e-4, "{place_mm}: {aside_mm} {centroid_mm}");
@@ -203,8 +206,7 @@ fn kernels_and_maps_are_about_one_place() {
             // A plane is as bright by both maps, once centroids that move against middle rays thin it out.
             let thinned = |mm: DVec2| {
                 let tan = map.at(mm).unwrap().0;
-                let kernel = imaging.kernel(PsfQuery::new(tan, dioptres, wavelength_nm, pitch_um));
-                kernel.centroid_px * DVec2::new(1e-3, -1e-3) * pitch_um
+                aside(&imaging.kernel(PsfQuery::new(tan, dioptres, wavelength_nm, pitch_um)))
             };
             let by = 0.01;
             let slope = |way: DVec2| (thinned(place_mm + way * by) - thinned(place_mm - way * by)) / (2.0 * by);

@@ -110,7 +110,7 @@ impl LensImage for CountedPsfs {
     fn kernel(&self, query: PsfQuery) -> Kernel {
         let PsfQuery { wavelength_nm, pitch_um, .. } = query;
         let samples = on_pixels(&self.psfs[self.nearest(wavelength_nm)], COUNTING_PITCH_UM, pitch_um);
-        Kernel { samples, pitch_um, centroid_px: DVec2::ZERO }
+        Kernel::centered(samples, pitch_um)
     }
     fn blur_radius_mm(&self, _field_tan: DVec2, _dioptres: f64, wavelength_nm: f64) -> f64 {
         self.radii_mm[self.nearest(wavelength_nm)]
