@@ -11,7 +11,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::{
-    convolve::{Fft2, fast_size, multiply, with_fft},
+    convolve::{Fft2, fast_size, multiply_by_real, with_fft},
     geometry::FilmFrame,
     knot_kernels::{KnotKernel, LayerKernels, Mirror},
     patch::{Knot, Patch, Products},
@@ -213,15 +213,14 @@ fn spread_around(
     buffers: &mut Buffers,
     cancel: &Cancel,
 ) -> Result<Vec<BlurredCell>, Cancelled> {
-    if let [own] = around {
-        cancel.check()?;
-        return Ok(vec![buffers.spread(fft, kernel, own)]);
-    }
-    buffers.transform_kernel(fft, kernel);
+    fft.forward(&kernel.samples, kernel.at.columns, &mut buffers.kernel);
     let mut cells = Vec::with_capacity(around.len());
     for pair in around.chunks(2) {
         cancel.check()?;
-        buffers.spread_pair(fft, &kernel.at, pair, &mut cells);
+        match pair {
+            [own] => cells.push(buffers.spread(fft, &kernel.at, own)),
+            _ => buffers.spread_pair(fft, &kernel.at, pair, &mut cells),
+        }
     }
     Ok(cells)
 }
@@ -243,33 +242,21 @@ struct Buffers {
 }
 
 impl Buffers {
-    /// Spreads the samples around a knot by the canonical kernel.
-    fn spread(&mut self, fft: &mut Fft2, kernel: &KnotKernel, around: &Surroundings<'_>) -> BlurredCell {
+    /// Spreads the samples around a knot by the canonical kernel, which is transformed and whose samples lie in a rectangle.
+    fn spread(&mut self, fft: &mut Fft2, kernel: &Rectangle, around: &Surroundings<'_>) -> BlurredCell {
         let Surroundings { mirror, at, .. } = around;
-        fft.forward(&kernel.samples, kernel.at.columns, &mut self.kernel);
         around.gather(&mut self.smoother, &mut self.block);
         mirror.applied(&self.block, (at.rows, at.columns), &mut self.mirrored);
         fft.forward(&self.mirrored, mirror.size((at.rows, at.columns)).1, &mut self.spectrum);
-        multiply(&mut self.spectrum, &self.kernel);
-        let at = at.spread_over(&mirror.window_at_knot(&kernel.at));
+        multiply_by_real(&mut self.spectrum, &self.kernel, fft.rows());
+        let at = at.spread_over(&mirror.window_at_knot(kernel));
         let (rows, columns) = mirror.size((at.rows, at.columns));
         fft.inverse(&mut self.spectrum, rows, columns, &mut self.mirrored);
         BlurredCell { at, values: mirror.restored(&self.mirrored, (at.rows, at.columns)) }
     }
 
-    /// Finds what the spectra of pairs are multiplied by to be spread by a kernel, the scale of the transforms included.
-    fn transform_kernel(&mut self, fft: &mut Fft2, kernel: &KnotKernel) {
-        let (stride, scale) = (fft.columns(), 1.0 / fft.len() as f32);
-        self.lines.clear();
-        self.lines.resize(kernel.at.rows * stride, Complex::new(0.0, 0.0));
-        for (line, samples) in self.lines.chunks_exact_mut(stride).zip(kernel.samples.chunks_exact(kernel.at.columns)) {
-            line.iter_mut().zip(samples).for_each(|(value, sample)| value.re = sample * scale);
-        }
-        fft.forward_pair(&mut self.lines, &mut self.kernel);
-    }
-
-    /// Spreads the samples around two knots, or around the last of an odd number, by the canonical kernel, whose samples lie in a rectangle. Those around one are the real parts of
-    /// the samples of a block, around the other the imaginary ones: a kernel, which is real, leaves them apart.
+    /// Spreads the samples around two knots likewise. Those around one are the real parts of the samples of a block, around the other the imaginary ones: a
+    /// kernel, which is real, leaves them apart.
     fn spread_pair(
         &mut self,
         fft: &mut Fft2,
@@ -277,7 +264,7 @@ impl Buffers {
         pair: &[Surroundings<'_>],
         cells: &mut Vec<BlurredCell>,
     ) {
-        let stride = fft.columns();
+        let (stride, scale) = (fft.columns(), 1.0 / fft.len() as f32);
         let rows_of = |Surroundings { mirror, at, .. }: &Surroundings<'_>| mirror.size((at.rows, at.columns)).0;
         let n_rows = pair.iter().map(rows_of).max().unwrap_or(0);
         self.lines.clear();
@@ -292,14 +279,14 @@ impl Buffers {
             }
         }
         fft.forward_pair(&mut self.lines, &mut self.spectrum);
-        multiply(&mut self.spectrum, &self.kernel);
+        multiply_by_real(&mut self.spectrum, &self.kernel, fft.rows());
         fft.inverse_pair(&mut self.spectrum, n_rows + kernel.rows - 1, &mut self.lines);
         for (part, Surroundings { mirror, at, .. }) in pair.iter().enumerate() {
             let at = at.spread_over(&mirror.window_at_knot(kernel));
             let (size, lines) = ((at.rows, at.columns), (&self.lines[..], stride));
             let values = match part {
-                0 => mirror.restored_from(lines, size, |value| value.re),
-                _ => mirror.restored_from(lines, size, |value| value.im),
+                0 => mirror.restored_from(lines, size, |value| value.re * scale),
+                _ => mirror.restored_from(lines, size, |value| value.im * scale),
             };
             cells.push(BlurredCell { at, values });
         }

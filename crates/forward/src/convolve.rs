@@ -107,6 +107,11 @@ impl Fft2 {
         self.down.size * (self.across.size / 2 + 1)
     }
 
+    /// Samples along a column of the rectangles.
+    pub(crate) fn rows(&self) -> usize {
+        self.down.size
+    }
+
     /// Samples along a row of the rectangles.
     pub(crate) fn columns(&self) -> usize {
         self.across.size
@@ -226,11 +231,20 @@ pub(crate) fn multiply_add(sum: &mut [Complex<f32>], a: &[Complex<f32>], b: &[Co
     }
 }
 
-/// Multiplies a spectrum by another.
+/// Multiplies the spectrum of a block or a pair, columns of so many values, by that of a real block, of which there are half the columns: the others are
+/// their complex conjugates, turned about.
 #[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn multiply(product: &mut [Complex<f32>], factor: &[Complex<f32>]) {
-    for (product, factor) in product.iter_mut().zip(factor) {
-        *product *= factor;
+pub(crate) fn multiply_by_real(spectrum: &mut [Complex<f32>], half: &[Complex<f32>], rows: usize) {
+    let (columns, n_half) = (spectrum.len() / rows, half.len() / rows);
+    for (k, column) in spectrum.chunks_exact_mut(rows).enumerate() {
+        if k < n_half {
+            column.iter_mut().zip(&half[k * rows..][..rows]).for_each(|(value, factor)| *value *= factor);
+            continue;
+        }
+        let mirrored = &half[(columns - k) * rows..][..rows];
+        column[0] *= mirrored[0].conj();
+        let turned_about = mirrored[1..].iter().rev();
+        column[1..].iter_mut().zip(turned_about).for_each(|(value, factor)| *value *= factor.conj());
     }
 }
 
