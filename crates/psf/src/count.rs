@@ -1,6 +1,6 @@
 //! The paper's way: rays spread evenly over the front of the lens, and counted on pixels.
 //!
-//! Kept so that the paper can be reproduced. For anything else a [`PsfBank`](crate::PsfBank) needs a thousandth of the
+//! Kept so that the paper can be reproduced. For anything else a [`LensImageModel`](crate::LensImageModel) needs a thousandth of the
 //! rays, keeps the light that is lost, and has no noise.
 
 use dioptric_diffraction::{CircularStop, Hurb, HurbForm, SampledHurb};

@@ -13,7 +13,7 @@ use crate::{
     dispersion::{Dispersion, share_of_orders},
     drawing::{composed, wave_fraction_of},
     hurb_splatter::StopHurb,
-    lit_fields::{self, LitFields},
+    lit_fields::{self, LitFields, Planes},
     mesh::Mesh,
     mirror::MirroredFields,
     ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, Sample},
@@ -61,7 +61,12 @@ impl GeneralBank {
         let mesh = Mesh { n_rings: settings.n_rings, n_azimuths: settings.n_azimuths };
         let fields = MirroredFields::new(lens.mirror_symmetries(), mesh, tans_x, tans_y);
         let planes = planes_of(settings, &lenses, &reference);
-        let lit_fields = lit_fields::within_grid(&planes, &settings.fields, cancel)?;
+        let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
+        let axis = |knots: Vec<f64>| Axis::new(knots).expect("the settings were checked");
+        let colors = axis(nm.iter().map(|&nm| dispersion.coordinate(nm)).collect());
+        let dioptres = axis(settings.dioptres.clone());
+        let followed = Planes { jobs: &planes, colors: &colors, dioptres: &dioptres };
+        let lit_fields = lit_fields::within_grid(&followed, &settings.fields, cancel)?;
         let mut tasks = Vec::new();
         for (plane, job) in planes.iter().enumerate() {
             let lit = lit_fields.as_ref().map(|lit| &lit[plane]);
@@ -84,13 +89,11 @@ impl GeneralBank {
         };
         let traced: Vec<Option<Sample>> = tasks.par_iter().map(watched).collect::<Result<_, Cancelled>>()?;
         let samples = traced.chunks_exact(fields.traced().count()).flat_map(|plane| fields.spread(plane)).collect();
-        let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
-        let axis = |knots: Vec<f64>| Axis::new(knots).expect("the settings were checked");
         Ok(Self {
             x: axis(tans_x.to_vec()),
             y: axis(tans_y.to_vec()),
-            dioptres: axis(settings.dioptres.clone()),
-            colors: axis(nm.iter().map(|&nm| dispersion.coordinate(nm)).collect()),
+            dioptres,
+            colors,
             dispersion,
             samples,
             lit_fields,

@@ -199,10 +199,78 @@ impl LitFields {
     }
 }
 
+/// Wavelengths, by a coordinate, and depths at which light is followed: planes are those of each wavelength at all depths.
+pub(crate) struct Planes<'a> {
+    pub(crate) jobs: &'a [RayMapJob<'a>],
+    pub(crate) colors: &'a Axis,
+    pub(crate) dioptres: &'a Axis,
+}
+
+impl Planes<'_> {
+    /// Follows the light outwards from a field at some of them.
+    #[inline(never)]
+    fn follow(
+        &self,
+        numbers: &[usize],
+        start: (DVec2, f64),
+        cancel: &Cancel,
+    ) -> Result<Option<Vec<LitFields>>, Cancelled> {
+        /// A mesh that is fine enough for the area of a pupil, with the edge of the bank's.
+        const N_RINGS: usize = 4;
+        let (field_tan, reach_tan) = start;
+        let found = numbers.par_iter().map(|&number| {
+            cancel.check()?;
+            let job = self.jobs[number];
+            let mesh = Mesh { n_rings: N_RINGS, ..job.mesh };
+            Ok(LitFields::about(RayMapJob { field_tan, mesh, ..job }, reach_tan))
+        });
+        found.collect()
+    }
+
+    /// Follows the light at all of them: by rays at three wavelengths and three depths, between which its end is a parabola.
+    fn follow_all(&self, start: (DVec2, f64), cancel: &Cancel) -> Result<Option<Vec<LitFields>>, Cancelled> {
+        let (colors, depths) = (ends_and_middle(self.colors), ends_and_middle(self.dioptres));
+        let n_depths = self.dioptres.knots().len();
+        let few: Vec<usize> =
+            colors.iter().flat_map(|color| depths.iter().map(move |depth| color * n_depths + depth)).collect();
+        let Some(followed) = self.follow(&few, start, cancel)? else { return Ok(None) };
+        let is_alike = followed.iter().all(|lit| lit.is_dark_beyond == followed[0].is_dark_beyond);
+        if !is_alike {
+            // Light that ends at one wavelength and is not followed to its end at another.
+            return self.follow(&(0..self.jobs.len()).collect::<Vec<_>>(), start, cancel);
+        }
+        let among = |axis: &Axis, numbers: &[usize]| Axis::new(numbers.iter().map(|&i| axis.knots()[i]).collect());
+        let (Some(few_colors), Some(few_depths)) = (among(self.colors, &colors), among(self.dioptres, &depths)) else {
+            return Ok(None);
+        };
+        let places =
+            self.colors.knots().iter().flat_map(|&color| self.dioptres.knots().iter().map(move |&d| (color, d)));
+        let n_few = depths.len();
+        let between = |(color, dioptres): (f64, f64)| {
+            let (of_colors, of_depths) = (few_colors.stencil(color), few_depths.stencil(dioptres));
+            let of_color = |(i, weight): (usize, f64)| of_depths.iter().map(move |(j, w)| (i * n_few + j, weight * w));
+            let weighted = of_colors.iter().flat_map(of_color);
+            LitFields::mix(weighted.map(|(i, weight)| (&followed[i], weight)))
+        };
+        Ok(places.map(between).collect())
+    }
+}
+
+/// Returns the numbers of the first knot of an axis, that nearest to its middle, and the last.
+fn ends_and_middle(axis: &Axis) -> Vec<usize> {
+    let knots = axis.knots();
+    let last = knots.len() - 1;
+    let off = |i: usize| (knots[i] - 0.5 * (knots[0] + knots[last])).abs();
+    let middle = (1..last).min_by(|&a, &b| off(a).total_cmp(&off(b)));
+    let mut numbers: Vec<usize> = [0].into_iter().chain(middle).chain([last]).collect();
+    numbers.dedup();
+    numbers
+}
+
 /// Follows the light of a grid of fields outwards from their middle, at each wavelength and depth that a job is given for; `None` where it does not end
 /// within the grid, or there is none in the middle.
 pub(crate) fn within_grid(
-    planes: &[RayMapJob<'_>],
+    planes: &Planes<'_>,
     fields: &FieldSampling,
     cancel: &Cancel,
 ) -> Result<Option<Vec<LitFields>>, Cancelled> {
@@ -213,18 +281,10 @@ pub(crate) fn within_grid(
     // Lit fields have no hollows: where the corners are lit, all between them are.
     let is_dark =
         |job: &RayMapJob<'_>| corners.iter().any(|&field_tan| RayMapJob { field_tan, ..*job }.pupil().is_none());
-    if !planes.par_iter().any(is_dark) {
+    if !planes.jobs.par_iter().any(is_dark) {
         return Ok(None);
     }
-    /// A mesh that is fine enough for the area of a pupil, with the edge of the bank's.
-    const N_RINGS: usize = 4;
-    let reach_tan = 1.1 * middle_tan.distance(corners[0]);
-    let found = planes.par_iter().map(|job| {
-        cancel.check()?;
-        let mesh = Mesh { n_rings: N_RINGS, ..job.mesh };
-        Ok(LitFields::about(RayMapJob { field_tan: middle_tan, mesh, ..*job }, reach_tan))
-    });
-    found.collect()
+    planes.follow_all((middle_tan, 1.1 * middle_tan.distance(corners[0])), cancel)
 }
 
 fn direction(azimuth: usize) -> DVec2 {
@@ -263,7 +323,7 @@ impl Around {
 
 #[cfg(test)]
 mod tests {
-    use dioptric_optics::Lens;
+    use dioptric_optics::{CoordinateBreak, Lens, MonoLens};
 
     use super::*;
 
@@ -331,5 +391,49 @@ mod tests {
         let short = LitFields::about(job, 0.1).unwrap();
         assert!(short.bounds_tan().0 == DVec2::NEG_INFINITY && !short.is_dark_at(DVec2::X));
         assert!((short.pupil_mm2(DVec2::new(0.15, 0.0)) / lit.pupil_mm2(DVec2::new(0.15, 0.0)) - 1.0).abs() < 0.02);
+    }
+
+    /// Light through a tilted lens at five wavelengths and nine depths: followed at three of each it ends where it does when it is followed at all.
+    #[test]
+    fn light_between_some_wavelengths_and_depths_ends_where_it_is_followed_to() {
+        let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(4.0, 550.0).unwrap();
+        let tilt = CoordinateBreak {
+            surfaces: (0, lens.interfaces().len() - 1),
+            pivot_mm: 20.0,
+            decenter_mm: [0.0; 3],
+            tilt_deg: [3.0, 1.0, 0.0],
+            tilt_first: false,
+        };
+        let lens = lens.with_moves(vec![tilt]).unwrap();
+        let wavelengths_nm = [700.0, 625.0, 550.0, 475.0, 400.0];
+        let lenses: Vec<MonoLens> = wavelengths_nm.iter().map(|&nm| lens.at(nm).unwrap()).collect();
+        let dioptres: Vec<f64> = (0..9).map(|i| 0.05 + 0.3 * f64::from(i)).collect();
+        let job = |lens, dioptres| RayMapJob {
+            lens,
+            reference: &lenses[2],
+            field_tan: DVec2::ZERO,
+            dioptres,
+            film_distance_mm: 37.0,
+            mesh: Mesh { n_rings: 4, n_azimuths: 32 },
+        };
+        let jobs: Vec<RayMapJob<'_>> =
+            lenses.iter().flat_map(|lens| dioptres.iter().map(move |&d| job(lens, d))).collect();
+        let axis = |knots: &[f64]| Axis::new(knots.to_vec()).unwrap();
+        let (colors, depths) = (axis(&wavelengths_nm.map(|nm| -nm)), axis(&dioptres));
+        let planes = Planes { jobs: &jobs, colors: &colors, dioptres: &depths };
+        let (start, cancel) = ((DVec2::ZERO, 1.2), Cancel::new());
+        let between = planes.follow_all(start, &cancel).unwrap().unwrap();
+        for number in [0, 12, 20, 26, 31, 44] {
+            let followed = &planes.follow(&[number], start, &cancel).unwrap().unwrap()[0];
+            assert_eq!(between[number].is_dark_beyond, followed.is_dark_beyond);
+            for (found, expected) in between[number].ends_rad.iter().zip(&followed.ends_rad) {
+                // Each is found to a thousandth of the way.
+                assert!((found - expected).abs() < 2e-3, "{number}: {found} {expected}");
+            }
+            let whole_mm2 = followed.pupils_mm2[0];
+            for (found, expected) in between[number].pupils_mm2.iter().zip(&followed.pupils_mm2) {
+                assert!((found - expected).abs() < 1e-2 * whole_mm2, "{number}: {found} {expected}");
+            }
+        }
     }
 }
