@@ -34,17 +34,26 @@ impl Kernel {
         self.samples.iter().map(|&e| f64::from(e)).sum()
     }
 
-    /// Returns the L1 difference from another kernel of the same pixels, middle on middle, over the other's energy: 0
+    /// Returns the pixels of the first sample and after the last one, to the right of the one that the kernel is about and below it.
+    fn window_px(&self) -> (IVec2, IVec2) {
+        let (rows, columns) = self.samples.dim();
+        let first = self.middle_px - IVec2::new((columns / 2) as i32, (rows / 2) as i32);
+        (first, first + IVec2::new(columns as i32, rows as i32))
+    }
+
+    /// Returns the L1 difference from another kernel of the same pixels, about the same point, over the other's energy: 0
     /// where they are equal, 2 where they hold as much and share no pixel.
     pub fn difference_from(&self, other: &Self) -> f64 {
-        let side = self.samples.nrows().max(other.samples.nrows());
-        let at = |kernel: &Self, row: usize, column: usize| {
-            let margin = (side - kernel.samples.nrows()) / 2;
-            let place = row.checked_sub(margin).zip(column.checked_sub(margin));
+        let ((first, end), (other_first, other_end)) = (self.window_px(), other.window_px());
+        let (low, high) = (first.min(other_first), end.max(other_end));
+        let at = |kernel: &Self, first: IVec2, place: IVec2| {
+            let (row, column) = (usize::try_from(place.y - first.y), usize::try_from(place.x - first.x));
+            let place = row.ok().zip(column.ok());
             place.and_then(|place| kernel.samples.get(place)).map_or(0.0, |e| f64::from(*e))
         };
-        let places = (0..side).flat_map(|row| (0..side).map(move |column| (row, column)));
-        places.map(|(row, column)| (at(self, row, column) - at(other, row, column)).abs()).sum::<f64>() / other.sum()
+        let places = (low.y..high.y).flat_map(|y| (low.x..high.x).map(move |x| IVec2::new(x, y)));
+        let differences = places.map(|place| (at(self, first, place) - at(other, other_first, place)).abs());
+        differences.sum::<f64>() / other.sum()
     }
 
     /// Returns the kernel with the sum 1.
@@ -83,6 +92,20 @@ pub(crate) fn trim(energy: &Array2<f64>, share: f64) -> Array2<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The same light in windows about two pixels, and as much beside it.
+    #[test]
+    fn differences_are_those_of_pixels_about_one_point() {
+        let mut wide = Array2::zeros((5, 5));
+        (wide[(1, 4)], wide[(2, 4)]) = (0.75, 0.25);
+        let mut narrow = Array2::zeros((3, 3));
+        (narrow[(0, 1)], narrow[(1, 1)]) = (0.75, 0.25);
+        let wide = Kernel::centered(wide, 1.0);
+        let aside = Kernel { middle_px: IVec2::new(2, 0), ..Kernel::centered(narrow, 1.0) };
+        assert_eq!((wide.difference_from(&aside), aside.difference_from(&wide)), (0.0, 0.0));
+        let elsewhere = Kernel { middle_px: IVec2::new(-2, 3), ..aside.clone() };
+        assert_eq!(elsewhere.difference_from(&aside), 2.0);
+    }
 
     #[test]
     fn trimming_keeps_the_share_and_the_middle() {

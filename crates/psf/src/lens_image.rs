@@ -34,7 +34,8 @@ pub trait LensImage: Sync {
     /// points lie there. Those are the centroids of their light or other places that follow smoothly from the field.
     fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap;
 
-    /// Returns the point spread function of a point about its reference point; of a dark point that of one near by.
+    /// Returns the point spread function of a point about its reference point, which need not lie in the middle of the samples ([`Kernel::middle_px`]); of a dark
+    /// point that of one near by.
     fn kernel(&self, query: PsfQuery) -> Kernel;
 
     /// Returns the images through so many parts of the pupil, which add up to that of the whole: views of the scene from as many
