@@ -30,6 +30,7 @@ use crate::{
     occlusion::{BlurredPlane, Composite, LayerAlpha},
     patch::Cell,
     raster::LayerRaster,
+    rectangle::Rectangle,
     sampler::{LayerCoordinates, Surface},
     stopwatch::{Part, Stopwatch},
     tiles::{LayerTiles, SpreadBlocks, Tiling},
@@ -213,9 +214,12 @@ impl Layout {
         let stopwatch = Stopwatch::default();
         let film_lens =
             FilmLens { image: lens, film, layers, maps: &maps, wavelength_nm: middle_nm, stopwatch: &stopwatch };
-        let on_film = LayerRaster::new(film, 1, (view, scene.size()), &maps[0]).sampler;
-        let content = BlockLayers::find(&on_film, &active.concat(), extents.maps, extents.surfaces, cancel)?;
-        let mut tiling = Tiling::new((active, &content), &film_lens, settings, &wavelengths_nm, &work)?;
+        let all_cells = active.concat();
+        let content_factor = content_factor(film, &all_cells);
+        let on_pixels = LayerRaster::new(film, content_factor, (view, scene.size()), &maps[0]).sampler;
+        let content = BlockLayers::find(&on_pixels, &all_cells, extents.maps, extents.surfaces, cancel)?;
+        let seen = (active, (&content, &on_pixels.frame));
+        let mut tiling = Tiling::new(seen, &film_lens, settings, &wavelengths_nm, &work)?;
         let mut kept = Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() };
         let largest = match settings.smoothing_px {
             0 => Largest::default(),
@@ -233,7 +237,7 @@ impl Layout {
             tiles.patches.keys().map(raster).collect()
         };
         let rasters: Vec<_> = tiling.layers.iter().zip(&maps).map(rasters_of).collect();
-        let blocks = blocks_of(&rasters, &tiling, content, &extents, cancel)?;
+        let blocks = blocks_of(&rasters, &tiling, (content_factor, content), &extents, cancel)?;
         let n_covered = match hides(settings, layers) {
             true => n_covered(&tiling, &blocks, &radius_px, film),
             false => 0,
@@ -707,16 +711,31 @@ fn n_covered(tiling: &Tiling, blocks: &BTreeMap<usize, BlockLayers>, radius_px: 
     tiling.layers.par_iter().enumerate().map(of_layer).sum()
 }
 
-/// Finds the layers of the blocks of pixels over all patches, by the factor of their raster; those of the film's pixels are known.
+/// Returns how many times as wide as the film's pixels are to be in whose blocks all that layers have is looked for: there are no more blocks than over four films, or over a
+/// million pixels, however far beyond the film light is blurred from.
+fn content_factor(film: &Film, cells: &[Cell]) -> usize {
+    let frame = FilmFrame::new(film, 1);
+    let n_pixels = Rectangle::around(cells.iter().map(|cell| cell.pixels(&frame))).map_or(0, |all| all.len());
+    let most = (4 * film.rows * film.columns).max(1 << 20);
+    let mut factor = 1;
+    while n_pixels > most * factor * factor {
+        factor *= 2;
+    }
+    factor
+}
+
+/// Finds the layers of the blocks of pixels over all patches, by the factor of their raster; those of one are known.
 fn blocks_of(
     rasters: &[BTreeMap<usize, LayerRaster>],
     tiling: &Tiling,
-    on_film: BlockLayers,
+    known: (usize, BlockLayers),
     extents: &Extents<'_>,
     cancel: &Cancel,
 ) -> Result<BTreeMap<usize, BlockLayers>, Cancelled> {
     let mut cells: BTreeMap<usize, Vec<Cell>> = BTreeMap::new();
-    for (&factor, patches) in tiling.layers.iter().flat_map(|tiles| &tiles.patches).filter(|(factor, _)| **factor > 1) {
+    for (&factor, patches) in
+        tiling.layers.iter().flat_map(|tiles| &tiles.patches).filter(|(factor, _)| **factor != known.0)
+    {
         cells.entry(factor).or_default().extend(patches.iter().map(|patch| patch.cell));
     }
     let blocks = cells.iter().filter_map(|(&factor, cells)| {
@@ -724,7 +743,7 @@ fn blocks_of(
         let found = BlockLayers::find(sampler, cells, extents.maps, extents.surfaces, cancel);
         Some(found.map(|found| (factor, found)))
     });
-    blocks.chain([Ok((1, on_film))]).collect()
+    blocks.chain([Ok(known)]).collect()
 }
 
 /// Returns how far beyond the film light is taken from, pixels: the 95 % radius of a blur, doubled, holds all but the

@@ -25,8 +25,8 @@ use crate::{
 pub(crate) struct Probe<'a> {
     lens: &'a FilmLens<'a>,
     layer: usize,
-    /// Where on the film's pixels layers have anything.
-    content: &'a BlockLayers,
+    /// Where layers have anything, in blocks of the pixels of a frame.
+    content: (&'a BlockLayers, &'a FilmFrame),
     settings: &'a Settings,
     /// Wavelengths over which a blur is at its widest, nm.
     wavelengths_nm: &'a [f64],
@@ -43,7 +43,7 @@ pub(crate) struct Probe<'a> {
 impl<'a> Probe<'a> {
     pub(crate) fn new(
         (lens, layer): (&'a FilmLens<'a>, usize),
-        content: &'a BlockLayers,
+        content: (&'a BlockLayers, &'a FilmFrame),
         settings: &'a Settings,
         wavelengths_nm: &'a [f64],
     ) -> Self {
@@ -95,8 +95,10 @@ impl<'a> Probe<'a> {
 
     /// Whether the layer may have anything within a number of pixels of a cell.
     pub(crate) fn may_have_any(&self, cell: &Cell, margin_px: usize) -> bool {
-        let at = cell.pixels(&FilmFrame::new(self.lens.film, 1)).grown(margin_px);
-        self.content.may_have_any(&at, self.layer)
+        let (blocks, frame) = self.content;
+        // A pixel reaches half of one beyond cells that hold its center.
+        let margin = if frame.factor() == 1 { margin_px } else { margin_px.div_ceil(frame.factor()) + 1 };
+        blocks.may_have_any(&cell.pixels(frame).grown(margin), self.layer)
     }
 
     /// Whether the spline is off by more than the settings allow at a corner of a cell, by the spread of a point alone: where cells are
@@ -370,8 +372,8 @@ mod tests {
         let cancel = Cancel::new();
         let kernels_on =
             |factor: usize| film_lens.layer_kernels(0, [(knot, factor)], &Work::unobserved(&cancel)).unwrap();
-        let content = BlockLayers::of_everything();
-        let mut probe = Probe::new((&film_lens, 0), &content, &settings, &wavelengths_nm);
+        let (everything, frame) = (BlockLayers::of_everything(), FilmFrame::new(&film, 1));
+        let mut probe = Probe::new((&film_lens, 0), (&everything, &frame), &settings, &wavelengths_nm);
         assert_eq!(probe.factor_at(knot), 4);
         let expected = kernels_on(4)[&knot].at;
         // By the spread of the point, which holds 95 % of its light, and by a kernel on the film's pixels, whose border of a sample on each side is narrower.

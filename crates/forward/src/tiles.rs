@@ -14,6 +14,7 @@ use crate::{
     convolve::fast_size,
     cost::patches_by_knots,
     film_lens::FilmLens,
+    geometry::FilmFrame,
     knot_kernels::{LayerKernels, Symmetry},
     mesh::Mesh,
     patch::{Cell, Knot, Patch},
@@ -144,7 +145,7 @@ pub(crate) struct Tiling {
 impl Tiling {
     /// Tiles each layer over its cells, where it has `content`. `wavelengths_nm` are those over which a blur is at its widest.
     pub(crate) fn new(
-        (active, content): (Vec<Vec<Cell>>, &BlockLayers),
+        (active, content): (Vec<Vec<Cell>>, (&BlockLayers, &FilmFrame)),
         lens: &FilmLens<'_>,
         settings: &Settings,
         wavelengths_nm: &[f64],

@@ -239,10 +239,10 @@ impl Planes<'_> {
             // Light that ends at one wavelength and is not followed to its end at another.
             return self.follow(&(0..self.jobs.len()).collect::<Vec<_>>(), start, cancel);
         }
-        let among = |axis: &Axis, numbers: &[usize]| Axis::new(numbers.iter().map(|&i| axis.knots()[i]).collect());
-        let (Some(few_colors), Some(few_depths)) = (among(self.colors, &colors), among(self.dioptres, &depths)) else {
-            return Ok(None);
+        let among = |axis: &Axis, numbers: &[usize]| {
+            Axis::new(numbers.iter().map(|&i| axis.knots()[i]).collect()).expect("knots of an axis ascend")
         };
+        let (few_colors, few_depths) = (among(self.colors, &colors), among(self.dioptres, &depths));
         let places =
             self.colors.knots().iter().flat_map(|&color| self.dioptres.knots().iter().map(move |&d| (color, d)));
         let n_few = depths.len();
