@@ -21,6 +21,7 @@ use crate::{
     by_knots::{buffer_bytes, spread_bytes},
     film_lens::FilmLens,
     geometry::{FilmFrame, check_extent},
+    halo::{Halo, Halos},
     lateral_color::LateralColor,
     layers::{Blurs, Layers},
     level::Level,
@@ -143,6 +144,7 @@ pub(crate) struct Layout {
     maps: Mutex<BTreeMap<usize, Arc<Vec<FilmMap>>>>,
     /// Of the layers in some bands, once anything was asked for.
     levels: OnceLock<BTreeMap<usize, Vec<Option<Level>>>>,
+    halos: Halos,
     pub(crate) stopwatch: Stopwatch,
     /// Bytes that bands in flight may take; `None` for the usual ones, and as many bands as there are threads (up to four) at least.
     pub(crate) in_flight_bytes: Option<usize>,
@@ -166,6 +168,11 @@ fn extent_of(radius_px: &[f64], film: &Film, settings: &Settings) -> f64 {
     let pad_px = radius_px.iter().map(|&radius_px| pad_for(radius_px)).fold(0.0, f64::max);
     let border_px = pad_px + 2.0 * settings.knot_spacing_px as f64;
     film.half_diagonal_mm() + 1e-3 * film.pitch_um * std::f64::consts::SQRT_2 * border_px
+}
+
+/// Returns the first, the middle and the last of some bands.
+fn few_of(bands: &[usize]) -> impl Iterator<Item = usize> {
+    BTreeSet::from([0, bands.len() / 2, bands.len() - 1].map(|number| bands[number])).into_iter()
 }
 
 /// The wavelength of the middle band.
@@ -224,11 +231,9 @@ impl Layout {
         let largest = match settings.smoothing_px {
             0 => Largest::default(),
             length_px => {
-                let bands = &scene.kernel_bands;
                 // Where colors differ most.
-                let of_bands = BTreeSet::from([0, bands.len() / 2, bands.len() - 1].map(|number| bands[number]));
                 let wavelengths: Vec<(usize, f64)> =
-                    of_bands.into_iter().map(|band| (band, grid.centers_nm()[band])).collect();
+                    few_of(&scene.kernel_bands).map(|band| (band, grid.centers_nm()[band])).collect();
                 smooth_seams(&mut tiling, (&film_lens, extent_mm), &wavelengths, length_px, &mut kept, cancel)?
             }
         };
@@ -254,6 +259,7 @@ impl Layout {
             n_covered,
             maps: Mutex::default(),
             levels: OnceLock::new(),
+            halos: Halos::default(),
             stopwatch,
             in_flight_bytes: None,
             spec,
@@ -264,7 +270,7 @@ impl Layout {
     pub(crate) fn size_bytes(&self) -> usize {
         let maps = self.maps().values().flat_map(|maps| maps.iter()).map(FilmMap::size_bytes).sum::<usize>();
         let blocks = self.blocks.values().map(BlockLayers::size_bytes).sum::<usize>();
-        maps + blocks + self.tiling.size_bytes() + self.kept().size_bytes
+        maps + blocks + self.halos.size_bytes() + self.tiling.size_bytes() + self.kept().size_bytes
     }
 
     /// Keeps at most so many bytes of kernels and alpha from now on; alpha that was kept is dropped.
@@ -437,8 +443,6 @@ impl Layout {
         let levels = match self.levels.get() {
             Some(levels) => levels,
             None => {
-                let bases = &self.scene.basis_bands;
-                let bands = BTreeSet::from([0, bases.len() / 2, bases.len() - 1].map(|number| bases[number]));
                 let at = |band: usize| {
                     let maps = self.maps_at(lens, band);
                     let film_lens = self.film_lens(lens, band, &maps);
@@ -448,7 +452,7 @@ impl Layout {
                     Ok((band, levels.collect::<Result<_, Cancelled>>()?))
                 };
                 let levels: BTreeMap<usize, Vec<Option<Level>>> =
-                    bands.into_iter().map(at).collect::<Result<_, Cancelled>>()?;
+                    few_of(&self.scene.basis_bands).map(at).collect::<Result<_, Cancelled>>()?;
                 self.levels.get_or_init(|| levels)
             }
         };
@@ -563,7 +567,7 @@ impl Layout {
         let mut blurred = self.blank();
         if let ([map], false) = (maps.as_slice(), self.hides()) {
             self.blur_onto_film((0, map), (&surfaces, None), &basis.kernels, &mut blurred, work)?;
-            return Ok(self.stopwatch.time(Part::Compositing, || blurred.into_picture()));
+            return Ok(self.finished(lens, band, || blurred.into_picture()));
         }
         let mut picture = Composite::new(rows, columns);
         for (layer, map) in maps.iter().enumerate() {
@@ -577,7 +581,22 @@ impl Layout {
             })?;
         }
         let finish = || if self.hides() { picture.finish() } else { picture.finish_sum() };
-        Ok(self.stopwatch.time(Part::Compositing, finish))
+        Ok(self.finished(lens, band, finish))
+    }
+
+    /// Returns the picture of a band with the halos of its points.
+    fn finished(&self, lens: &dyn LensImage, band: usize, picture: impl FnOnce() -> Array2<f32>) -> Array2<f32> {
+        let halo = self.stopwatch.time(Part::Kernels, || self.halo_at(lens, band));
+        self.stopwatch.time(Part::Compositing, || match halo {
+            Some(halo) => halo.applied(picture()),
+            None => picture(),
+        })
+    }
+
+    fn halo_at(&self, lens: &dyn LensImage, band: usize) -> Option<Halo> {
+        let ImagingSpec { film, grid, settings } = &self.spec;
+        let bands = few_of(&self.scene.kernel_bands).map(|band| (band, grid.centers_nm()[band]));
+        self.halos.at(band, (lens, &self.scene.layers), (film, settings.widest_blur_px), bands)
     }
 
     /// A plane of the film with nothing on it.

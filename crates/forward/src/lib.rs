@@ -28,6 +28,7 @@ mod film;
 mod film_lens;
 mod framed;
 mod geometry;
+mod halo;
 mod hidden;
 mod irradiance;
 mod knot_kernels;

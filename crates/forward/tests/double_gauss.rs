@@ -85,6 +85,47 @@ fn a_lambertian_plane_gets_the_irradiance_of_the_working_f_number() {
     check_radiometry(4.0, 1.0, 0.006);
 }
 
+/// Kernels hold what is within twelve λN, .985 of all; the rest is spread over the film as an aperture does.
+#[test]
+fn light_far_from_a_point_is_that_of_waves() {
+    const N: usize = 401;
+    let (f_number, pitch_um) = (16.0, 5.0);
+    let film = Film::centered(N, N, pitch_um);
+    let camera = Camera::new(f_number, 2.0, film);
+    let mut points = Array2::zeros((N, N));
+    points[(N / 2, N / 2)] = 1.0;
+    let scene = scene(vec![points], vec![550.0], 2.0, 1e3 * camera.film_distance_mm / pitch_um);
+    let beyond = |picture: &Array2<f64>, r_px: f64| -> f64 {
+        let from_middle = |i: usize| i as f64 - (N / 2) as f64;
+        let lights = picture.indexed_iter();
+        let far = lights.filter(|((row, column), _)| from_middle(*row).hypot(from_middle(*column)) > r_px);
+        far.map(|(_, light)| light).sum()
+    };
+    for diffraction in [Diffraction::Wave, Diffraction::Hurb { gamma: 1.0 }] {
+        let picture = camera.image(&scene, diffraction, &Settings::default()).remove(0).mapv(f64::from);
+        let picture = &picture / picture.sum();
+        let law = 2.0 / std::f64::consts::PI.powi(2) * 1e-3 * 550.0 * f_number / pitch_um / std::f64::consts::TAU;
+        for r in (18..32).chain([35, 40, 50, 60, 80]) {
+            // Across the border of the window, 21 pixels from the middle, and from one raster to the next.
+            for (place, distance) in [((0, r), r as f64), ((r, r), std::f64::consts::SQRT_2 * r as f64)] {
+                let ratio = picture[(N / 2 - place.0, N / 2 + place.1)] * distance.powi(3) / law;
+                assert!((0.6..1.5).contains(&ratio), "{diffraction:?} {distance} px: {ratio}");
+            }
+        }
+        // Of an Airy disc, 2 λN / π² r lies beyond a radius r (the mean over its rings), and as much less as falls beside the film stays where it is.
+        let unit_px = 1e-3 * 550.0 * f_number / pitch_um;
+        for times in [13.0, 20.0, 40.0, 80.0] {
+            let r_px = times * unit_px;
+            let off_film = 4.0 * std::f64::consts::SQRT_2 / (std::f64::consts::PI * N as f64);
+            let expected = 2.0 / (std::f64::consts::PI.powi(2)) * unit_px * (1.0 / r_px - off_film);
+            let found = beyond(&picture, r_px);
+            println!("{diffraction:?} beyond {times} λN: {found:.5}, {expected:.5}");
+            // What windows leave out of kernels is known to a twentieth, and wide pixels take some of it inwards and outwards.
+            assert!((found / expected - 1.0).abs() < 0.12, "{diffraction:?} beyond {times} λN: {found}, {expected}");
+        }
+    }
+}
+
 #[test]
 fn a_point_lands_where_its_rays_do() {
     let film = Film::centered(600, 900, 24.0);

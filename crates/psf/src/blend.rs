@@ -3,14 +3,14 @@
 use glam::DVec2;
 use ndarray::{Array2, s};
 
-use crate::{ModelUse, PsfQuery, rotational::RotationalBank};
+use crate::{ModelUse, PsfQuery, drawing::Drawn, rotational::RotationalBank};
 
 impl RotationalBank {
     /// Returns the blend of the pictures of the samples about a point, of sum 1.
     ///
     /// Weights are linear in the tangent of the field, in metres and in nanometres, as the paper's are; pictures are
     /// laid centroid on centroid and turned with the field. A depth between a sample and infinity is that of the sample.
-    pub(crate) fn blend(&self, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
+    pub(crate) fn blend(&self, query: PsfQuery, side: Option<usize>) -> Drawn {
         let settings = self.settings();
         let direction = query.field_tan.try_normalize().unwrap_or(DVec2::X);
         let fields = linear(self.field_tans(), query.field_tan.length(), |tan| tan);
@@ -18,6 +18,7 @@ impl RotationalBank {
         let colors = linear(&settings.wavelengths_nm, query.wavelength_nm, |nm| nm);
         let mut pictures = Vec::with_capacity(8);
         let mut model = ModelUse { wave_fraction: 0.0, fallback: None };
+        let mut lambda_n_px = 0.0;
         for (field, field_weight) in fields {
             for (dioptres, depth_weight) in depths {
                 for (wavelength_nm, color_weight) in colors {
@@ -26,14 +27,15 @@ impl RotationalBank {
                         continue;
                     }
                     let here = PsfQuery { field_tan: direction * field, dioptres, wavelength_nm, ..query };
-                    let (picture, own) = self.draw_rays(here, side);
-                    model.wave_fraction += weight * own.wave_fraction;
-                    model.fallback = model.fallback.or(own.fallback);
-                    pictures.push((picture, weight));
+                    let own = self.draw_rays(here, side);
+                    model.wave_fraction += weight * own.model.wave_fraction;
+                    model.fallback = model.fallback.or(own.model.fallback);
+                    lambda_n_px += weight * own.lambda_n_px;
+                    pictures.push((own.energies, weight));
                 }
             }
         }
-        (blended(&pictures), model)
+        Drawn { energies: blended(&pictures), lambda_n_px, model }
     }
 }
 

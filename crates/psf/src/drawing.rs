@@ -51,17 +51,17 @@ impl RotationalBank {
     /// Returns the energy on each pixel of a window of `size` × `size` about the centroid, in the picture frame, and
     /// the model that drew it.
     pub(crate) fn picture(&self, query: PsfQuery, size: usize) -> (Array2<f64>, ModelUse) {
-        self.draw(query, Some(size))
+        let Drawn { energies, model, .. } = self.draw(query, Some(size));
+        (energies, model)
     }
 
     /// Returns the point spread function of a point about its centroid and the model that drew it. Fields outside the bank
     /// are moved to its ends.
     pub(crate) fn kernel_and_model(&self, query: PsfQuery) -> (Kernel, ModelUse) {
-        let (energies, model) = self.draw(query, None);
-        (render::kernel(&energies, self.settings().diffraction != Diffraction::None, query.pitch_um), model)
+        self.draw(query, None).into_kernel(query.pitch_um)
     }
 
-    fn draw(&self, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
+    fn draw(&self, query: PsfQuery, side: Option<usize>) -> Drawn {
         match self.settings().interpolation {
             Interpolation::Rays => self.draw_rays(query, side),
             Interpolation::Images => self.blend(query, side),
@@ -69,7 +69,7 @@ impl RotationalBank {
     }
 
     /// Draws interpolated rays or waves.
-    pub(crate) fn draw_rays(&self, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
+    pub(crate) fn draw_rays(&self, query: PsfQuery, side: Option<usize>) -> Drawn {
         let record = self.record(query.field_tan.length(), query.dioptres, query.wavelength_nm);
         let layout = self.layout(&record, query, side);
         composed(layout, self.settings().diffraction, |side| self.wave_energies(query, side, DVec2::ZERO))
@@ -90,8 +90,8 @@ impl RotationalBank {
         let record = self.record(field_tan, query.dioptres, query.wavelength_nm);
         let layout = self.layout(&record, query, None).about(about_px);
         let diffraction = self.settings().diffraction;
-        let (energies, _) = composed(layout, diffraction, |side| self.wave_energies(query, side, about_px / per_mm));
-        let kernel = render::kernel(&energies, diffraction != Diffraction::None, query.pitch_um);
+        let drawn = composed(layout, diffraction, |side| self.wave_energies(query, side, about_px / per_mm));
+        let (kernel, _) = drawn.into_kernel(query.pitch_um);
         Kernel { middle_px: middle_px.as_ivec2(), centroid_px: -about_px, ..kernel }
     }
 
@@ -131,21 +131,38 @@ impl RotationalBank {
     }
 }
 
+/// What was drawn of a point.
+pub(crate) struct Drawn {
+    /// The share of its energy on each pixel.
+    pub(crate) energies: Array2<f64>,
+    /// λN, pixels; 0 without diffraction.
+    pub(crate) lambda_n_px: f64,
+    pub(crate) model: ModelUse,
+}
+
+impl Drawn {
+    pub(crate) fn into_kernel(self, pitch_um: f64) -> (Kernel, ModelUse) {
+        (render::kernel(&self.energies, self.lambda_n_px, pitch_um), self.model)
+    }
+}
+
 /// Draws a layout, with waves of a window of a given side in so far as the setting and its blur want them.
 pub(crate) fn composed(
     layout: Layout<'_>,
     diffraction: Diffraction,
     waves: impl FnOnce(usize) -> Result<Array2<f64>, DiffractionError>,
-) -> (Array2<f64>, ModelUse) {
-    let share = wave_fraction_of(&layout, diffraction);
+) -> Drawn {
+    let (share, lambda_n_px) = (wave_fraction_of(&layout, diffraction), layout.lambda_n_px());
+    let none = ModelUse { wave_fraction: 0.0, fallback: None };
     if share == 0.0 {
-        return (layout.draw(), ModelUse { wave_fraction: 0.0, fallback: None });
+        return Drawn { energies: layout.draw(), lambda_n_px, model: none };
     }
-    match waves(layout.side()) {
-        Ok(waves) if share == 1.0 => (waves, ModelUse { wave_fraction: 1.0, fallback: None }),
-        Ok(waves) => (waves * share + layout.draw() * (1.0 - share), ModelUse { wave_fraction: share, fallback: None }),
-        Err(error) => (layout.draw(), ModelUse { wave_fraction: 0.0, fallback: Some(error.to_string()) }),
-    }
+    let (energies, model) = match waves(layout.side()) {
+        Ok(waves) if share == 1.0 => (waves, ModelUse { wave_fraction: 1.0, ..none }),
+        Ok(waves) => (waves * share + layout.draw() * (1.0 - share), ModelUse { wave_fraction: share, ..none }),
+        Err(error) => (layout.draw(), ModelUse { fallback: Some(error.to_string()), ..none }),
+    };
+    Drawn { energies, lambda_n_px, model }
 }
 
 /// Returns how much of a layout is wave optics: 1 up to a range of phases of 200, falling with its logarithm to 0 at 400.

@@ -11,13 +11,13 @@ use crate::{
     BankSettings, Diffraction, Kernel, ModelUse, PsfError, PsfQuery,
     axis::Axis,
     dispersion::{Dispersion, share_of_orders},
-    drawing::{composed, wave_fraction_of},
+    drawing::{Drawn, composed, wave_fraction_of},
     hurb_splatter::StopHurb,
     lit_fields::{self, LitFields, Planes},
     mesh::Mesh,
     mirror::MirroredFields,
     ray_map::{RIM_OVER_RMS, RayMap, RayMapJob, Sample},
-    render::{self, Layout},
+    render::Layout,
     watch::Watch,
 };
 
@@ -150,14 +150,15 @@ impl GeneralBank {
 
     /// Draws the kernel of a point's ray map.
     pub(crate) fn kernel_of(&self, record: &RayMap, query: PsfQuery) -> (Kernel, ModelUse) {
-        let (energies, model) = self.draw(record, query, None);
-        (render::kernel(&energies, self.settings.diffraction != Diffraction::None, query.pitch_um), model)
+        self.draw(record, query, None).into_kernel(query.pitch_um)
     }
 
     /// Returns the energy on each pixel of a window of `size` × `size` about the centroid, with the model that drew it;
     /// `None` where samples about it are dark.
     pub(crate) fn picture(&self, query: PsfQuery, size: usize) -> Option<(Array2<f64>, ModelUse)> {
-        Some(self.draw(&self.record(query.field_tan, query.dioptres, query.wavelength_nm)?, query, Some(size)))
+        let record = self.record(query.field_tan, query.dioptres, query.wavelength_nm)?;
+        let Drawn { energies, model, .. } = self.draw(&record, query, Some(size));
+        Some((energies, model))
     }
 
     /// Returns how much of a kernel is wave optics; 0 of dark points.
@@ -177,7 +178,7 @@ impl GeneralBank {
         Layout::new(record, DVec2::X, bending, query.pitch_um).with_side(side)
     }
 
-    fn draw(&self, record: &RayMap, query: PsfQuery, side: Option<usize>) -> (Array2<f64>, ModelUse) {
+    fn draw(&self, record: &RayMap, query: PsfQuery, side: Option<usize>) -> Drawn {
         let PsfQuery { field_tan, dioptres, pitch_um, .. } = query;
         let wavelength_nm = self.within_colors(query.wavelength_nm);
         let layout = self.layout(record, query, side);

@@ -3,6 +3,9 @@
 use glam::{DVec2, IVec2};
 use ndarray::{Array2, s};
 
+/// Within how much of the borders of a window diffracted light fades out, in units of λN: what is spread beyond has no edge there then.
+const FADE: f64 = 4.0;
+
 /// A point spread function on square pixels: odd × odd, in the picture frame (row 0 is the top). The point of the film that it is about is the middle of a pixel:
 /// of the middle one, or of another where the light lies far to one side.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,17 +19,38 @@ pub struct Kernel {
     pub middle_px: IVec2,
     /// Where the centroid lies, pixels to the right of the middle of the middle pixel and below it; mostly 0.
     pub centroid_px: DVec2,
+    /// λN of the light on the film, pixels; 0 without diffraction. The samples of diffracted light, which has no end at the borders, fade out there:
+    /// [`fade_px`](Self::fade_px).
+    pub lambda_n_px: f64,
 }
 
 impl Kernel {
     /// Returns the kernel of these samples, odd × odd, that is about the middle of the middle one, where its centroid lies.
     pub fn centered(samples: Array2<f32>, pitch_um: f64) -> Self {
-        Self { samples, pitch_um, middle_px: IVec2::ZERO, centroid_px: DVec2::ZERO }
+        Self { samples, pitch_um, middle_px: IVec2::ZERO, centroid_px: DVec2::ZERO, lambda_n_px: 0.0 }
     }
 
     /// Returns the kernel that blurs nothing.
     pub fn identity(pitch_um: f64) -> Self {
         Self::centered(Array2::ones((1, 1)), pitch_um)
+    }
+
+    /// Within how much of the borders the samples fade out linearly, pixels: four λN, or up to the middle.
+    pub fn fade_px(&self) -> f64 {
+        (FADE * self.lambda_n_px).min(0.5 * self.samples.nrows() as f64)
+    }
+
+    /// Returns the kernel of light with this λN, faded out for it.
+    pub(crate) fn faded_out(mut self, lambda_n_px: f64) -> Self {
+        self.lambda_n_px = lambda_n_px;
+        let (fade_px, side) = (self.fade_px(), self.samples.nrows());
+        if fade_px > 0.0 {
+            for ((row, column), sample) in self.samples.indexed_iter_mut() {
+                let from_border = row.min(column).min(side - 1 - row.max(column)) as f64 + 0.5;
+                *sample *= (from_border / fade_px).min(1.0) as f32;
+            }
+        }
+        self
     }
 
     /// The share of the energy that the window holds.

@@ -235,9 +235,9 @@ impl LensImage for PartImage {
         let Some(record) = record.part(&self.division.cell_shares(self.part, record.mesh, turn)) else {
             return Kernel::identity(query.pitch_um);
         };
-        let energies = self.model.ray_layout(&record, query).draw();
-        let is_diffracted = self.model.settings().diffraction != Diffraction::None;
-        render::kernel(&energies, is_diffracted, query.pitch_um)
+        let layout = self.model.ray_layout(&record, query);
+        let lambda_n_px = layout.lambda_n_px();
+        render::kernel(&layout.draw(), lambda_n_px, query.pitch_um)
     }
 
     fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {

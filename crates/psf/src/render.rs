@@ -18,7 +18,6 @@ const MOST_PIXELS: f64 = 600.0;
 const KEPT_OF_TAILS: f64 = 0.999;
 /// How far diffraction's tails are followed beyond the geometric picture, in units of λN.
 const TAILS: f64 = 12.0;
-
 /// A ray map turned to its field and scaled to pixels, and the window that holds it.
 pub(crate) struct Layout<'a> {
     record: &'a RayMap,
@@ -67,6 +66,11 @@ impl<'a> Layout<'a> {
         self.side
     }
 
+    /// λN, pixels; 0 without diffraction.
+    pub(crate) fn lambda_n_px(&self) -> f64 {
+        self.unit
+    }
+
     /// The range of phases B that a wave sum would have to follow, radians: over the pupil's radius, for light from
     /// its outermost ray to the corner of the window that holds the picture.
     pub(crate) fn bandwidth(&self) -> f64 {
@@ -107,10 +111,10 @@ fn lit_nodes(record: &RayMap) -> impl Iterator<Item = usize> {
     lit.flat_map(|((ring, j), _)| record.mesh.corners(ring, j))
 }
 
-/// Returns drawn energies as a kernel, trimmed to what matters.
-pub(crate) fn kernel(energies: &Array2<f64>, is_diffracted: bool, pitch_um: f64) -> Kernel {
-    let kept = if is_diffracted { KEPT_OF_TAILS } else { 1.0 - 1e-7 };
-    Kernel::centered(trim(energies, kept), pitch_um)
+/// Returns drawn energies as a kernel, trimmed to what matters; `lambda_n_px` is 0 without diffraction.
+pub(crate) fn kernel(energies: &Array2<f64>, lambda_n_px: f64, pitch_um: f64) -> Kernel {
+    let kept = if lambda_n_px > 0.0 { KEPT_OF_TAILS } else { 1.0 - 1e-7 };
+    Kernel::centered(trim(energies, kept), pitch_um).faded_out(lambda_n_px)
 }
 
 /// Returns λN in pixels: what the Gaussian of a ray through the middle of the stop would give.

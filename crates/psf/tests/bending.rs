@@ -102,12 +102,11 @@ fn kernels_are_those_of_rays_bent_at_random() {
                 Diffraction::Hurb { gamma },
             )
         };
-        let kernel = LensImageModel::build(&lens, &settings).unwrap().kernel(PsfQuery::new(
-            DVec2::new(field_tan, 0.0),
-            dioptres,
-            550.0,
-            PITCH_UM,
-        ));
+        let model = LensImageModel::build(&lens, &settings).unwrap();
+        let query = PsfQuery::new(DVec2::new(field_tan, 0.0), dioptres, 550.0, PITCH_UM);
+        // Of the window of the kernel, which fades out at its borders.
+        let (energies, _) = model.picture(query, model.kernel(query).samples.nrows()).unwrap();
+        let kernel = Kernel::centered(energies.mapv(|energy| energy as f32), PITCH_UM);
         let (l1, noise) = difference(&lens, &kernel, field_tan, dioptres, film_distance_mm, gamma);
         println!(
             "f/{f_number}, {field_tan}, {dioptres} D: {l1:.4}, noise {noise:.4}, drawing {:.4}",

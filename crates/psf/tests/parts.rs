@@ -144,7 +144,9 @@ fn parts_see_from_their_places() {
         assert!((far_mm + far_blur_mm * middle).length() < 0.1 * far_blur_mm.abs(), "{middle}: {far_mm}");
         // What is left in focus is that spherical aberration: some 10 µm at f/2.8.
         assert!(aside(part, 0.5).length() < 0.06 * near_blur_mm);
-        assert!((part.kernel(PsfQuery::new(DVec2::ZERO, 1.2, 550.0, PITCH_UM)).sum() - 1.0).abs() < 2e-3);
+        // But for what diffraction takes beyond the window.
+        let sum = part.kernel(PsfQuery::new(DVec2::ZERO, 1.2, 550.0, PITCH_UM)).sum();
+        assert!((0.985..1.001).contains(&sum), "{middle}: {sum}");
     }
 }
 

@@ -1,0 +1,393 @@
+//! The light of a point that diffraction takes beyond the window of its kernel.
+//!
+//! A window holds all but a hundredth of the light of a point; the rest falls with the third power of the distance (`docs/forward.md`, 2). It is taken
+//! from the finished picture of a band and spread on pixels 2, 4, 8 … times as wide, the farther the wider.
+
+use std::{
+    collections::BTreeMap,
+    f64::consts::{PI, SQRT_2},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
+};
+
+use dioptric_psf::{LensImage, PsfQuery};
+use glam::DVec2;
+use multiversion::multiversion;
+use ndarray::Array2;
+
+use crate::{Film, layers::Layers, raster::LayerRaster};
+
+/// A share of the light beyond the window that is not worth spreading: kernels leave out as little on each side.
+const NEGLIGIBLE: f64 = 1e-6;
+
+/// What an edge bends beyond a square, times half the side over λN: 2 / π² r beyond a circle, the mean of whose 1/r is 2 √2 / π over half the side.
+const BENT: f64 = 4.0 * SQRT_2 / (PI * PI * PI);
+/// Halos are computed for so many shares of what falls faster.
+const STEPS: f64 = 16.0;
+
+/// Distance, in pixels of a raster, over which a halo passes to the next one of wider pixels.
+const PASSES_OVER: [f64; 2] = [3.0, 4.5];
+/// Distance at which the halo begins on the first raster, in its pixels, or more; where that is less than on the film's own, that is the first.
+const FIRST: f64 = 1.25;
+/// The variance each way by which rasters blur what they bring: splines to wider pixels and back, and their own pixels between, in square pixels.
+const BLUR: f64 = 2.0 * 0.25 + 1.0 / 12.0;
+/// Points along each side of a pixel at which the halo is looked up.
+const POINTS: usize = 16;
+/// Pixels beside the middle that the halo of one raster reaches.
+const REACH: usize = 5;
+
+/// What lies beyond the windows of kernels in a band.
+#[derive(Clone, Copy, Debug, Default)]
+struct Beyond {
+    /// Share of the light.
+    share: f64,
+    /// Half the side of the window, to the middle of where samples fade out, pixels.
+    half_px: f64,
+    /// Of that, the share that falls faster than what edges bend.
+    steep: f64,
+}
+
+impl Beyond {
+    /// Of the sharpest layer, on the axis. Where windows are wider, off the axis or out of focus, halos are the same from some distance on.
+    fn of(lens: &dyn LensImage, layers: &Layers, (wavelength_nm, pitch_um): (f64, f64), widest_px: f64) -> Self {
+        let radius_px = |layer: &usize| layers.radius_px_at(*layer as f32);
+        let sharpest = (0..layers.len()).min_by(|a, b| radius_px(a).total_cmp(&radius_px(b))).unwrap_or(0);
+        let factor = LayerRaster::factor_for(radius_px(&sharpest), widest_px) as f64;
+        let dioptres = layers.dioptres()[sharpest];
+        let kernel = lens.kernel(PsfQuery::new(DVec2::ZERO, dioptres, wavelength_nm, factor * pitch_um));
+        let (share, half_px) = (1.0 - kernel.sum(), 0.5 * (kernel.samples.nrows() as f64 - kernel.fade_px()));
+        let bent = BENT * kernel.lambda_n_px / half_px;
+        Self { share, half_px: factor * half_px, steep: (1.0 - bent / share).clamp(0.0, 1.0) }
+    }
+
+    /// Returns what lies beyond between two bands: share times distance, which stands for the halo far out, and the window are linear there.
+    fn between(below: Self, above: Self, fraction: f64) -> Self {
+        let mix = |below: f64, above: f64| below + fraction * (above - below);
+        let half_px = mix(below.half_px, above.half_px);
+        // Few halos, so that many bands have one in common.
+        let half_px = (2.0 * half_px).round().max(1.0) / 2.0;
+        let share = mix(below.share * below.half_px, above.share * above.half_px) / half_px;
+        Self { share, half_px, steep: (STEPS * mix(below.steep, above.steep)).round() / STEPS }
+    }
+}
+
+type Spreads = BTreeMap<(usize, usize), Arc<HaloSpread>>;
+
+/// The halos of the bands of a plan.
+#[derive(Debug, Default)]
+pub(crate) struct Halos {
+    /// At some bands.
+    beyond: OnceLock<BTreeMap<usize, Beyond>>,
+    /// By the side of the window, and by steps of the steep share.
+    spreads: Mutex<Spreads>,
+}
+
+impl Halos {
+    /// Returns the halo of a band on a film, if any light lies beyond its windows. Windows are looked up in some of the bands, of given wavelengths, and
+    /// are between two of them in the others.
+    pub(crate) fn at(
+        &self,
+        band: usize,
+        (lens, layers): (&dyn LensImage, &Layers),
+        (film, widest_px): (&Film, f64),
+        looked_up: impl Iterator<Item = (usize, f64)>,
+    ) -> Option<Halo> {
+        // Nothing is computed under a lock: a thread that waits for a part of it may take up another band, which needs the same.
+        let beyond = match self.beyond.get() {
+            Some(beyond) => beyond,
+            None => {
+                let of =
+                    |(band, wavelength_nm)| (band, Beyond::of(lens, layers, (wavelength_nm, film.pitch_um), widest_px));
+                let beyond = looked_up.map(of).collect();
+                self.beyond.get_or_init(|| beyond)
+            }
+        };
+        let ((lower, below), (upper, above)) = (beyond.range(..=band).next_back()?, beyond.range(band..).next()?);
+        let fraction = (band - lower) as f64 / (upper - lower).max(1) as f64;
+        let beyond = Beyond::between(*below, *above, fraction);
+        if beyond.share < NEGLIGIBLE {
+            return None;
+        }
+        let key = ((2.0 * beyond.half_px) as usize, (STEPS * beyond.steep) as usize);
+        let known = self.spreads().get(&key).cloned();
+        let spread = known.unwrap_or_else(|| {
+            let new = Arc::new(HaloSpread::new(beyond, (film.rows, film.columns)));
+            self.spreads().entry(key).or_insert(new).clone()
+        });
+        Some(Halo { share: beyond.share as f32, spread })
+    }
+
+    fn spreads(&self) -> MutexGuard<'_, Spreads> {
+        // Whoever panicked with the lock had nothing half-written in it.
+        self.spreads.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The bytes of memory that they take.
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.spreads().values().map(|spread| size_of::<f32>() * spread.landing.len()).sum()
+    }
+}
+
+/// The halo around each point of a band.
+pub(crate) struct Halo {
+    /// The share of the light of a point that lies in it.
+    share: f32,
+    spread: Arc<HaloSpread>,
+}
+
+impl Halo {
+    /// Takes from each pixel of a picture what its halo takes to others, and adds that to them.
+    ///
+    /// With T the halo of a point, E + T ⊗ E − E (T ⊗ 1): the sum of the picture is kept, and an even one stays even, for beyond its edges it counts as even.
+    pub(crate) fn applied(&self, mut picture: Array2<f32>) -> Array2<f32> {
+        let spread = self.spread.of(&picture);
+        let columns = picture.ncols();
+        for (row, mut line) in picture.rows_mut().into_iter().enumerate() {
+            let came = self.spread.on_film(&spread, row, columns);
+            let went = self.spread.on_film(&self.spread.landing, row, columns);
+            for ((light, came), went) in line.iter_mut().zip(came).zip(went) {
+                // Where rasters are sharpened to make up for their blur, next to a bright point, less than nothing may come.
+                *light = (*light + self.share * (came - *light * went)).max(0.0);
+            }
+        }
+        picture
+    }
+}
+
+/// The halo of a point, of sum 1, beyond a square window: parts of it on rasters of pixels 2, 4, 8 … times as wide as the film's.
+#[derive(Debug)]
+struct HaloSpread {
+    /// How many times pixels are doubled before the first raster.
+    n_doublings: usize,
+    rasters: Vec<RasterPart>,
+    /// How much of the halo of each pixel lands on the film, on pixels as `of` has them.
+    landing: Array2<f32>,
+}
+
+/// The part of a halo on one raster: of each pixel from the middle, to the right and down.
+#[derive(Debug)]
+struct RasterPart([[f32; REACH + 1]; REACH + 1]);
+
+impl HaloSpread {
+    fn new(beyond: Beyond, (rows, columns): (usize, usize)) -> Self {
+        let half_px = beyond.half_px;
+        let n_doublings = (half_px / FIRST).log2().floor().max(0.0) as usize;
+        let n_rasters = f64::hypot(rows as f64, columns as f64).log2().ceil().max(0.0) as usize + 1;
+        let part = |doublings: usize| RasterPart::new(beyond, doublings, doublings == n_doublings);
+        let rasters = (n_doublings..n_rasters.max(n_doublings + 1)).map(part).collect();
+        let mut spread = Self { n_doublings, rasters, landing: Array2::default((0, 0)) };
+        spread.landing = spread.of(&Array2::ones((rows, columns)));
+        spread
+    }
+
+    /// Returns what halos bring to each pixel of a picture, on its own or on pixels twice as wide: see [`on_film`](Self::on_film).
+    fn of(&self, picture: &Array2<f32>) -> Array2<f32> {
+        match self.n_doublings {
+            0 => on_rasters(picture, &self.rasters),
+            n => self.by_doublings(&halved(picture), n - 1),
+        }
+    }
+
+    fn by_doublings(&self, picture: &Array2<f32>, n_doublings: usize) -> Array2<f32> {
+        match n_doublings {
+            0 => on_rasters(picture, &self.rasters),
+            n => doubled(&self.by_doublings(&halved(picture), n - 1), picture.dim()),
+        }
+    }
+
+    /// Returns a row of the film of what halos bring.
+    fn on_film(&self, brought: &Array2<f32>, row: usize, columns: usize) -> Vec<f32> {
+        match self.n_doublings {
+            0 => brought.row(row).to_vec(),
+            _ => doubled_row(brought, row, columns),
+        }
+    }
+}
+
+/// Returns what the parts of a halo on a raster and wider ones bring to each pixel of a picture on the first.
+fn on_rasters(picture: &Array2<f32>, rasters: &[RasterPart]) -> Array2<f32> {
+    let [part, wider @ ..] = rasters else { return Array2::zeros(picture.dim()) };
+    let mut brought = part.of(picture);
+    if !wider.is_empty() {
+        let from_farther = on_rasters(&halved(picture), wider);
+        for (row, mut line) in brought.rows_mut().into_iter().enumerate() {
+            let more = doubled_row(&from_farther, row, line.len());
+            line.iter_mut().zip(more).for_each(|(sum, more)| *sum += more);
+        }
+    }
+    brought
+}
+
+impl RasterPart {
+    /// Returns the part of the halo beyond a window on pixels that are doubled so many times.
+    fn new(Beyond { half_px, steep, .. }: Beyond, doublings: usize, is_first: bool) -> Self {
+        let pixel = (doublings as f64).exp2();
+        // Of sum 1: the integrals of r⁻³ and r⁻⁵ beyond the square are 4 √2 / a and 10 √2 / 9 a³.
+        let (bent, steep) = ((1.0 - steep) * half_px / (4.0 * SQRT_2), steep * half_px.powi(3) * 9.0 / (10.0 * SQRT_2));
+        let density = |x: f64, y: f64| {
+            let r = x.hypot(y);
+            if x.max(y) < half_px { 0.0 } else { bent * r.powi(-3) + steep * r.powi(-5) }
+        };
+        let passed = |r_pixels: f64| {
+            let [start, end] = PASSES_OVER;
+            ((r_pixels - start) / (end - start)).clamp(0.0, 1.0)
+        };
+        let share = |r: f64| (if is_first { 1.0 } else { passed(2.0 * r) }) - passed(r);
+        let at = |pixel_at: usize, point: usize| pixel_at as f64 + (point as f64 + 0.5) / POINTS as f64 - 0.5;
+        let energy = |right: usize, down: usize| {
+            let points = (0..POINTS * POINTS).map(|i| (at(right, i % POINTS).abs(), at(down, i / POINTS).abs()));
+            let energies = points.map(|(x, y)| share(x.hypot(y)) * density(pixel * x, pixel * y));
+            energies.sum::<f64>() * (pixel / POINTS as f64).powi(2)
+        };
+        let raw: [[f64; REACH + 2]; REACH + 2] =
+            std::array::from_fn(|down| std::array::from_fn(|right| energy(right, down)));
+        // Less half the variance of the blur times the second differences, so that it is blurred back to what it is.
+        let sharp = |right: usize, down: usize| {
+            let beside = raw[down][right.abs_diff(1)]
+                + raw[down][right + 1]
+                + raw[down.abs_diff(1)][right]
+                + raw[down + 1][right];
+            raw[down][right] + 0.5 * BLUR * (4.0 * raw[down][right] - beside)
+        };
+        Self(std::array::from_fn(|down| std::array::from_fn(|right| sharp(right, down) as f32)))
+    }
+
+    /// Returns what it brings to each pixel of a picture.
+    fn of(&self, picture: &Array2<f32>) -> Array2<f32> {
+        let (rows, columns) = picture.dim();
+        let mut spread = vec![0.0; rows * columns];
+        let line_at = |row: isize| {
+            let row = usize::try_from(row).ok().filter(|row| *row < rows);
+            row.and_then(|row| picture.as_slice().map(|values| &values[row * columns..][..columns]))
+        };
+        let mut padded = vec![0.0; columns + 2 * REACH];
+        for (row, sums) in (0..).zip(spread.chunks_exact_mut(columns)) {
+            for (down, energies) in (0..).zip(&self.0) {
+                // Rows above and below have the same energies.
+                padded[REACH..][..columns].fill(0.0);
+                let above = if down == 0 { None } else { line_at(row - down) };
+                for line in above.into_iter().chain(line_at(row + down)) {
+                    padded[REACH..].iter_mut().zip(line).for_each(|(sum, light)| *sum += light);
+                }
+                add_line(energies, &padded, sums);
+            }
+        }
+        Array2::from_shape_vec((rows, columns), spread).expect("it has a value for each pixel")
+    }
+}
+
+/// Adds a line with a margin, spread to both sides.
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn add_line(energies: &[f32; REACH + 1], padded: &[f32], sums: &mut [f32]) {
+    sums.iter_mut().zip(&padded[REACH..]).for_each(|(sum, light)| *sum += energies[0] * light);
+    for (right, energy) in (1..).zip(&energies[1..]) {
+        let pairs = padded[REACH - right..].iter().zip(&padded[REACH + right..]);
+        sums.iter_mut().zip(pairs).for_each(|(sum, (left, right))| *sum += energy * (left + right));
+    }
+}
+
+/// Pixels beyond the edges that a raster of wider pixels has.
+const MARGIN: usize = 1;
+
+/// Returns the means of a picture over pixels twice as wide, by quadratic splines, with a margin: ⅛, ⅜, ⅜, ⅛ each way.
+fn halved(picture: &Array2<f32>) -> Array2<f32> {
+    let (rows, columns) = picture.dim();
+    let (n_rows, n_columns) = (rows.div_ceil(2) + 2 * MARGIN, columns.div_ceil(2) + 2 * MARGIN);
+    let mut means = Array2::zeros((n_rows, n_columns));
+    let mut down = vec![0.0; 2 * n_columns + 2];
+    for (row, mut means) in means.rows_mut().into_iter().enumerate() {
+        // Pixel i of these has the pixels 2 (i − 1) and the next one in it.
+        down.fill(0.0);
+        for (k, weight) in WEIGHTS.into_iter().enumerate() {
+            let line = (2 * row + k).checked_sub(3).filter(|row| *row < rows);
+            let line = line.and_then(|row| picture.as_slice().map(|values| &values[row * columns..][..columns]));
+            if let Some(line) = line {
+                down[3..].iter_mut().zip(line).for_each(|(sum, light)| *sum += weight * light);
+            }
+        }
+        for (mean, four) in means.iter_mut().zip(down.windows(4).step_by(2)) {
+            *mean = WEIGHTS[0] * (four[0] + four[3]) + WEIGHTS[1] * (four[1] + four[2]);
+        }
+    }
+    means
+}
+
+const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
+
+/// Returns a plane on pixels half as wide, by quadratic splines: ¾ of the wider pixel and ¼ of the next, each way.
+fn doubled(plane: &Array2<f32>, (rows, columns): (usize, usize)) -> Array2<f32> {
+    let values = (0..rows).flat_map(|row| doubled_row(plane, row, columns)).collect();
+    Array2::from_shape_vec((rows, columns), values).expect("it has a value for each pixel")
+}
+
+fn doubled_row(plane: &Array2<f32>, row: usize, columns: usize) -> Vec<f32> {
+    let own = row / 2 + MARGIN;
+    let next = if row.is_multiple_of(2) { own - 1 } else { own + 1 };
+    let mut line = Vec::with_capacity(plane.ncols());
+    line.extend(plane.row(own).iter().zip(plane.row(next)).map(|(own, next)| 0.75 * own + 0.25 * next));
+    let mut doubled = vec![0.0; 2 * columns.div_ceil(2)];
+    for (two, three) in doubled.as_chunks_mut::<2>().0.iter_mut().zip(line.windows(3)) {
+        *two = [0.75 * three[1] + 0.25 * three[0], 0.75 * three[1] + 0.25 * three[2]];
+    }
+    doubled.truncate(columns);
+    doubled
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn halo(half_px: f64, share: f32, size: (usize, usize)) -> Halo {
+        let beyond = Beyond { share: f64::from(share), half_px, steep: 0.0 };
+        Halo { share, spread: Arc::new(HaloSpread::new(beyond, size)) }
+    }
+
+    #[test]
+    fn even_pictures_stay_even_and_sums_are_kept() {
+        for (half_px, size) in [(0.5, (33, 70)), (2.5, (64, 48)), (5.5, (101, 90)), (23.5, (40, 61)), (200.5, (7, 1))] {
+            let halo = halo(half_px, 0.02, size);
+            for light in halo.applied(Array2::from_elem(size, 3.0)) {
+                assert!((light - 3.0).abs() < 1e-6, "{half_px}: {light}");
+            }
+            let uneven = Array2::from_shape_fn(size, |(row, column)| ((row * 7 + column * 13) % 11) as f32);
+            let (before, after) = (uneven.sum(), halo.applied(uneven).sum());
+            assert!((after / before - 1.0).abs() < 1e-5, "{half_px}: {before} {after}");
+        }
+    }
+
+    /// Beyond a square of half the side h lies 1, and π / (2 √2) h / r beyond a circle of radius r outside of it.
+    #[test]
+    fn a_halo_falls_with_the_third_power_of_the_distance() {
+        let (n, share) = (801, 0.5);
+        for half_px in [0.5, 1.5, 2.5, 4.5, 9.5, 14.5] {
+            let halo = halo(half_px, share, (n, n));
+            // Wherever the point lies among the pixels of wider rasters.
+            for at in [(400, 400), (403, 398), (397, 401)] {
+                let mut point = Array2::zeros((n, n));
+                point[at] = 1.0;
+                let picture = halo.applied(point);
+                let from_point = |row: usize, column: usize| {
+                    DVec2::new(column as f64 - at.1 as f64, row as f64 - at.0 as f64).length()
+                };
+                let beyond = |r: f64| PI * f64::from(share) * half_px / (2.0 * SQRT_2 * r);
+                for r in [2.0, 3.0, 5.0, 10.0].map(|times| times * half_px).into_iter().filter(|r| *r > 4.0) {
+                    let lights = picture.indexed_iter();
+                    let between = lights.filter(|((row, column), _)| (r..395.0).contains(&from_point(*row, *column)));
+                    let sum: f64 = between.map(|(_, light)| f64::from(*light)).sum();
+                    let ratio = sum / (beyond(r) - beyond(395.0));
+                    assert!((0.92..1.12).contains(&ratio), "{half_px} {at:?}, beyond {r}: {ratio}");
+                }
+                // Single pixels of a ring: parts of the halo are shares of wide pixels.
+                for r in [3.0, 5.0, 7.0, 10.0].map(|times| times * half_px).into_iter().filter(|r| *r > 7.0) {
+                    let on_ring = (0..63).map(|i| DVec2::from_angle(0.1 * f64::from(i)) * r);
+                    for place in on_ring {
+                        let pixel =
+                            ((at.0 as f64 + place.y).round() as usize, (at.1 as f64 + place.x).round() as usize);
+                        let law = f64::from(share) * half_px / (4.0 * SQRT_2) / from_point(pixel.0, pixel.1).powi(3);
+                        let ratio = f64::from(picture[pixel]) / law;
+                        assert!((0.63..1.35).contains(&ratio), "{half_px} {at:?}, at {place}: {ratio}");
+                    }
+                }
+            }
+        }
+    }
+}
