@@ -44,6 +44,7 @@ pub(crate) struct RotationalBank {
     colors: Axis,
     dispersion: Dispersion,
     records: Vec<RayMap>,
+    /// Those with others between them, and where light ends beyond the last of them, some up to there.
     geometry_fields: Vec<f64>,
     summaries: Vec<RayMapMoments>,
     /// As many as there are records, or none.
@@ -105,11 +106,17 @@ impl RotationalBank {
         let is_dark_beyond = traced.iter().any(|column| column.is_dark_beyond);
         let n_fields = (n_lit - 1) / GEOMETRY_STEPS + 1;
         let n_geometry = Self::n_geometry(n_fields);
-        let mut parts = Parts { n_fields, is_scattered_beyond, is_dark_beyond, ..Parts::default() };
-        for column in traced {
+        let ends_before_dark = is_dark_beyond && n_lit == geometry_fields.len();
+        let rim_fields = if ends_before_dark { rim_fields(geometry_fields[n_lit - 1]) } else { vec![] };
+        let rim = |(&(lens, dioptres), column): (&(&MonoLens, f64), &Column)| {
+            tracer.rim(&rim_fields, (lens, dioptres), column)
+        };
+        let rims: Vec<Vec<RayMapMoments>> = columns.par_iter().zip(&traced).map(rim).collect();
+        let mut parts = Parts { n_fields, is_scattered_beyond, is_dark_beyond, rim_fields, ..Parts::default() };
+        for (column, rim) in traced.into_iter().zip(rims) {
             parts.records.extend(column.records.into_iter().take(n_fields));
             parts.waves.extend(column.waves.into_iter().take(n_fields));
-            parts.summaries.extend(column.summaries.into_iter().take(n_geometry));
+            parts.summaries.extend(column.summaries.into_iter().take(n_geometry).chain(rim));
         }
         // A point whose waves are not smooth over its pupil leaves all of them to be traced when they are needed.
         if parts.waves.len() < parts.records.len() {
@@ -120,13 +127,14 @@ impl RotationalBank {
 
     /// Puts a bank together from what was traced.
     fn assemble(lens: &Lens, settings: &BankSettings, parts: Parts) -> Result<Self, PsfError> {
-        let Parts { n_fields, is_scattered_beyond, is_dark_beyond, records, summaries, waves } = parts;
+        let Parts { n_fields, is_scattered_beyond, is_dark_beyond, rim_fields, records, summaries, waves } = parts;
         let colors: Vec<f64> = settings.wavelengths_nm.iter().rev().copied().collect();
         let dispersion = Dispersion::of(lens, &settings.wavelengths_nm);
         let stop_index = |&nm: &f64| Ok(lens.at(nm)?.stop_medium_index());
         let axis = |knots: Vec<f64>| Axis::new(knots).expect("the settings were checked");
         let mut geometry_fields = geometry_fields(radius(settings));
         geometry_fields.truncate(Self::n_geometry(n_fields));
+        geometry_fields.extend(rim_fields);
         let field_tans = radius(settings)[..n_fields].to_vec();
         Ok(Self {
             fields: axis(field_tans.iter().map(|tan| tan.atan()).collect()),
@@ -349,7 +357,10 @@ struct Parts {
     n_fields: usize,
     is_scattered_beyond: bool,
     is_dark_beyond: bool,
+    /// Fields beyond the last ones, over which the light ends.
+    rim_fields: Vec<f64>,
     records: Vec<RayMap>,
+    /// Of geometry and rim.
     summaries: Vec<RayMapMoments>,
     /// As many as there are records, or none.
     waves: Vec<PupilFunctionFit>,
@@ -366,6 +377,8 @@ struct Column {
     is_scattered_beyond: bool,
     /// Whether all its fields see light, and the next would not.
     is_dark_beyond: bool,
+    /// Of the last field that sees light.
+    last_pupil: Option<Pupil>,
 }
 
 /// How columns are traced.
@@ -443,8 +456,35 @@ impl ColumnTracer<'_> {
             });
         }
         self.watch.done(self.geometry_fields.len() - column.summaries.len());
+        column.last_pupil = Some(pupil);
         Ok(column)
     }
+
+    /// Traces fields beyond the last of a column, one after the other. Of those without light the image goes on straight, with a pupil of no area.
+    fn rim(&self, fields: &[f64], (lens, dioptres): (&MonoLens, f64), column: &Column) -> Vec<RayMapMoments> {
+        let mut pupil = column.last_pupil.clone();
+        let mut known: Vec<(f64, RayMapMoments)> =
+            self.geometry_fields.iter().copied().zip(column.summaries.iter().copied()).collect();
+        let n_known = known.len();
+        for &field in fields {
+            let here = self.task(lens, field, dioptres);
+            pupil = pupil.and_then(|pupil| pupil.near(lens, &here.point()));
+            let traced = pupil.as_ref().and_then(|pupil| here.trace(pupil, false));
+            let summary = traced
+                .map(|Traced { summary, .. }| RayMapMoments { centroid_mm: summary.centroid_mm / field, ..summary });
+            pupil = pupil.filter(|_| summary.is_some());
+            known.push((field, summary.unwrap_or_else(|| dark_beyond(&known, field))));
+        }
+        known.split_off(n_known).into_iter().map(|(_, summary)| summary).collect()
+    }
+}
+
+/// Returns what stands for a field beyond others, of which heights over fields are known: it lies where the image goes on straight, and has no light.
+fn dark_beyond(known: &[(f64, RayMapMoments)], field: f64) -> RayMapMoments {
+    let [.., (inner, before), (last, at)] = known else { return RayMapMoments::default() };
+    let (height_before, height_mm) = (before.centroid_mm * *inner, at.centroid_mm * *last);
+    let goes_on_mm = height_mm + (height_mm - height_before) * ((field - last) / (last - inner));
+    RayMapMoments { centroid_mm: goes_on_mm / field, pupil_mm2: 0.0, ..*at }
 }
 
 /// Returns the waves of a point, if they are smooth over its pupil and that has no holes.
@@ -464,6 +504,12 @@ fn radius(settings: &BankSettings) -> &[f64] {
         FieldSampling::Radial(tans) => tans,
         FieldSampling::Grid { .. } | FieldSampling::Points { .. } => unreachable!("another model samples these"),
     }
+}
+
+/// Returns fields beyond the last one of a model that ends just before the light does: up to where the dark is looked for.
+fn rim_fields(last_tan: f64) -> Vec<f64> {
+    const N: usize = 8;
+    (1..=N).map(|i| last_tan * (1.0 + 2.0 * BEFORE_DARK * i as f64 / N as f64)).collect()
 }
 
 /// Returns the fields with others between them, evenly in angle.
