@@ -6,13 +6,14 @@
 use std::{
     collections::BTreeMap,
     f64::consts::{PI, SQRT_2},
-    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
+    sync::Arc,
 };
 
 use dioptric_psf::{LensImage, PsfQuery};
 use glam::DVec2;
 use multiversion::multiversion;
 use ndarray::Array2;
+use rayon::prelude::*;
 
 use crate::{Film, layers::Layers, raster::LayerRaster};
 
@@ -21,8 +22,8 @@ const NEGLIGIBLE: f64 = 1e-6;
 
 /// What an edge bends beyond a square, times half the side over λN: 2 / π² r beyond a circle, the mean of whose 1/r is 2 √2 / π over half the side.
 const BENT: f64 = 4.0 * SQRT_2 / (PI * PI * PI);
-/// Halos are computed for so many shares of what falls faster.
-const STEPS: f64 = 16.0;
+/// Halos are computed for so many windows from one to the next of twice the side, and for so many shares of what falls faster.
+const STEPS: f64 = 4.0;
 
 /// Distance, in pixels of a raster, over which a halo passes to the next one of wider pixels.
 const PASSES_OVER: [f64; 2] = [3.0, 4.5];
@@ -31,7 +32,7 @@ const FIRST: f64 = 1.25;
 /// The variance each way by which rasters blur what they bring: splines to wider pixels and back, and their own pixels between, in square pixels.
 const BLUR: f64 = 2.0 * 0.25 + 1.0 / 12.0;
 /// Points along each side of a pixel at which the halo is looked up.
-const POINTS: usize = 16;
+const POINTS: usize = 8;
 /// Pixels beside the middle that the halo of one raster reaches.
 const REACH: usize = 5;
 
@@ -63,71 +64,71 @@ impl Beyond {
     fn between(below: Self, above: Self, fraction: f64) -> Self {
         let mix = |below: f64, above: f64| below + fraction * (above - below);
         let half_px = mix(below.half_px, above.half_px);
-        // Few halos, so that many bands have one in common.
-        let half_px = (2.0 * half_px).round().max(1.0) / 2.0;
         let share = mix(below.share * below.half_px, above.share * above.half_px) / half_px;
-        Self { share, half_px, steep: (STEPS * mix(below.steep, above.steep)).round() / STEPS }
+        Self { share, half_px, steep: mix(below.steep, above.steep) }
+    }
+
+    /// Returns the halo whose window is nearest of few, as bright far out, and its number: so that many bands have one in common.
+    fn of_few(self) -> (Self, [i32; 2]) {
+        let number = [self.half_px.log2(), self.steep].map(|value| (STEPS * value).round() as i32);
+        let [half_px, steep] = [f64::from(number[0]) / STEPS, f64::from(number[1]) / STEPS];
+        let half_px = half_px.exp2();
+        (Self { share: self.share * self.half_px / half_px, half_px, steep }, number)
     }
 }
-
-type Spreads = BTreeMap<(usize, usize), Arc<HaloSpread>>;
 
 /// The halos of the bands of a plan.
 #[derive(Debug, Default)]
 pub(crate) struct Halos {
-    /// At some bands.
-    beyond: OnceLock<BTreeMap<usize, Beyond>>,
-    /// By the side of the window, and by steps of the steep share.
-    spreads: Mutex<Spreads>,
+    /// None where no light lies beyond the windows.
+    of_bands: Vec<Option<Halo>>,
 }
 
 impl Halos {
-    /// Returns the halo of a band on a film, if any light lies beyond its windows. Windows are looked up in some of the bands, of given wavelengths, and
-    /// are between two of them in the others.
-    pub(crate) fn at(
-        &self,
-        band: usize,
+    /// Returns the halos of so many bands on a film. Windows are looked up in some of them, of given wavelengths, the first and the last among them, and lie
+    /// between two of those in the others.
+    pub(crate) fn of(
         (lens, layers): (&dyn LensImage, &Layers),
         (film, widest_px): (&Film, f64),
-        looked_up: impl Iterator<Item = (usize, f64)>,
-    ) -> Option<Halo> {
-        // Nothing is computed under a lock: a thread that waits for a part of it may take up another band, which needs the same.
-        let beyond = match self.beyond.get() {
-            Some(beyond) => beyond,
-            None => {
-                let of =
-                    |(band, wavelength_nm)| (band, Beyond::of(lens, layers, (wavelength_nm, film.pitch_um), widest_px));
-                let beyond = looked_up.map(of).collect();
-                self.beyond.get_or_init(|| beyond)
-            }
+        looked_up: &[(usize, f64)],
+        n_bands: usize,
+    ) -> Self {
+        let of = |&(band, wavelength_nm): &(usize, f64)| {
+            (band, Beyond::of(lens, layers, (wavelength_nm, film.pitch_um), widest_px))
         };
-        let ((lower, below), (upper, above)) = (beyond.range(..=band).next_back()?, beyond.range(band..).next()?);
-        let fraction = (band - lower) as f64 / (upper - lower).max(1) as f64;
-        let beyond = Beyond::between(*below, *above, fraction);
-        if beyond.share < NEGLIGIBLE {
-            return None;
-        }
-        let key = ((2.0 * beyond.half_px) as usize, (STEPS * beyond.steep) as usize);
-        let known = self.spreads().get(&key).cloned();
-        let spread = known.unwrap_or_else(|| {
-            let new = Arc::new(HaloSpread::new(beyond, (film.rows, film.columns)));
-            self.spreads().entry(key).or_insert(new).clone()
-        });
-        Some(Halo { share: beyond.share as f32, spread })
+        let known: BTreeMap<usize, Beyond> = looked_up.par_iter().map(of).collect();
+        let at = |band: usize| {
+            let ((lower, below), (upper, above)) = (known.range(..=band).next_back()?, known.range(band..).next()?);
+            let fraction = (band - lower) as f64 / (upper - lower).max(1) as f64;
+            Some(Beyond::between(*below, *above, fraction).of_few()).filter(|(beyond, _)| beyond.share > NEGLIGIBLE)
+        };
+        let of_bands: Vec<Option<(Beyond, [i32; 2])>> = (0..n_bands).map(at).collect();
+        let few: BTreeMap<[i32; 2], Beyond> =
+            of_bands.iter().flatten().map(|&(beyond, number)| (number, beyond)).collect();
+        let spread = |(&number, &beyond): (&[i32; 2], &Beyond)| {
+            (number, Arc::new(HaloSpread::new(beyond, (film.rows, film.columns))))
+        };
+        let spreads: BTreeMap<[i32; 2], Arc<HaloSpread>> = few.par_iter().map(spread).collect();
+        let halo =
+            |(beyond, number): (Beyond, _)| Halo { share: beyond.share as f32, spread: spreads[&number].clone() };
+        Self { of_bands: of_bands.into_iter().map(|of_band| of_band.map(halo)).collect() }
     }
 
-    fn spreads(&self) -> MutexGuard<'_, Spreads> {
-        // Whoever panicked with the lock had nothing half-written in it.
-        self.spreads.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The halo of a band, if any light lies beyond its windows.
+    pub(crate) fn at(&self, band: usize) -> Option<&Halo> {
+        self.of_bands.get(band)?.as_ref()
     }
 
     /// The bytes of memory that they take.
     pub(crate) fn size_bytes(&self) -> usize {
-        self.spreads().values().map(|spread| size_of::<f32>() * spread.landing.len()).sum()
+        let mut spreads: Vec<&Arc<HaloSpread>> = self.of_bands.iter().flatten().map(|halo| &halo.spread).collect();
+        spreads.dedup_by(|a, b| Arc::ptr_eq(a, b));
+        spreads.iter().map(|spread| size_of::<f32>() * spread.landing.len()).sum()
     }
 }
 
 /// The halo around each point of a band.
+#[derive(Debug)]
 pub(crate) struct Halo {
     /// The share of the light of a point that lies in it.
     share: f32,

@@ -21,7 +21,7 @@ use crate::{
     by_knots::{buffer_bytes, spread_bytes},
     film_lens::FilmLens,
     geometry::{FilmFrame, check_extent},
-    halo::{Halo, Halos},
+    halo::Halos,
     lateral_color::LateralColor,
     layers::{Blurs, Layers},
     level::Level,
@@ -228,12 +228,12 @@ impl Layout {
         let seen = (active, (&content, &on_pixels.frame));
         let mut tiling = Tiling::new(seen, &film_lens, settings, &wavelengths_nm, &work)?;
         let mut kept = Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() };
+        // Where colors differ most.
+        let wavelengths: Vec<(usize, f64)> =
+            few_of(&scene.kernel_bands).map(|band| (band, grid.centers_nm()[band])).collect();
         let largest = match settings.smoothing_px {
             0 => Largest::default(),
             length_px => {
-                // Where colors differ most.
-                let wavelengths: Vec<(usize, f64)> =
-                    few_of(&scene.kernel_bands).map(|band| (band, grid.centers_nm()[band])).collect();
                 smooth_seams(&mut tiling, (&film_lens, extent_mm), &wavelengths, length_px, &mut kept, cancel)?
             }
         };
@@ -243,6 +243,7 @@ impl Layout {
         };
         let rasters: Vec<_> = tiling.layers.iter().zip(&maps).map(rasters_of).collect();
         let blocks = blocks_of(&rasters, &tiling, (content_factor, content), &extents, cancel)?;
+        let halos = Halos::of((lens, layers), (film, settings.widest_blur_px), &wavelengths, grid.len());
         let n_covered = match hides(settings, layers) {
             true => n_covered(&tiling, &blocks, &radius_px, film),
             false => 0,
@@ -259,7 +260,7 @@ impl Layout {
             n_covered,
             maps: Mutex::default(),
             levels: OnceLock::new(),
-            halos: Halos::default(),
+            halos,
             stopwatch,
             in_flight_bytes: None,
             spec,
@@ -567,7 +568,7 @@ impl Layout {
         let mut blurred = self.blank();
         if let ([map], false) = (maps.as_slice(), self.hides()) {
             self.blur_onto_film((0, map), (&surfaces, None), &basis.kernels, &mut blurred, work)?;
-            return Ok(self.finished(lens, band, || blurred.into_picture()));
+            return Ok(self.finished(band, || blurred.into_picture()));
         }
         let mut picture = Composite::new(rows, columns);
         for (layer, map) in maps.iter().enumerate() {
@@ -581,22 +582,15 @@ impl Layout {
             })?;
         }
         let finish = || if self.hides() { picture.finish() } else { picture.finish_sum() };
-        Ok(self.finished(lens, band, finish))
+        Ok(self.finished(band, finish))
     }
 
     /// Returns the picture of a band with the halos of its points.
-    fn finished(&self, lens: &dyn LensImage, band: usize, picture: impl FnOnce() -> Array2<f32>) -> Array2<f32> {
-        let halo = self.stopwatch.time(Part::Kernels, || self.halo_at(lens, band));
-        self.stopwatch.time(Part::Compositing, || match halo {
+    fn finished(&self, band: usize, picture: impl FnOnce() -> Array2<f32>) -> Array2<f32> {
+        self.stopwatch.time(Part::Compositing, || match self.halos.at(band) {
             Some(halo) => halo.applied(picture()),
             None => picture(),
         })
-    }
-
-    fn halo_at(&self, lens: &dyn LensImage, band: usize) -> Option<Halo> {
-        let ImagingSpec { film, grid, settings } = &self.spec;
-        let bands = few_of(&self.scene.kernel_bands).map(|band| (band, grid.centers_nm()[band]));
-        self.halos.at(band, (lens, &self.scene.layers), (film, settings.widest_blur_px), bands)
     }
 
     /// A plane of the film with nothing on it.
