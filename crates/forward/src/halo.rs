@@ -43,7 +43,7 @@ struct Beyond {
     share: f64,
     /// Half the side of the window, to the middle of where samples fade out, pixels.
     half_px: f64,
-    /// Of that, the share that falls faster than what edges bend.
+    /// The part of the share that falls faster than what edges bend.
     steep: f64,
 }
 
@@ -55,6 +55,10 @@ impl Beyond {
         let factor = LayerRaster::factor_for(radius_px(&sharpest), widest_px) as f64;
         let dioptres = layers.dioptres()[sharpest];
         let kernel = lens.kernel(PsfQuery::new(DVec2::ZERO, dioptres, wavelength_nm, factor * pitch_um));
+        if kernel.lambda_n_px == 0.0 {
+            // It holds all that there is, whatever it is scaled by.
+            return Self { share: 0.0, half_px: factor, steep: 0.0 };
+        }
         let (share, half_px) = (1.0 - kernel.sum(), 0.5 * (kernel.samples.nrows() as f64 - kernel.fade_px()));
         let bent = BENT * kernel.lambda_n_px / half_px;
         Self { share, half_px: factor * half_px, steep: (1.0 - bent / share).clamp(0.0, 1.0) }

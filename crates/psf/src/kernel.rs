@@ -11,7 +11,7 @@ const FADE: f64 = 4.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kernel {
     /// The share of the point's transmitted energy that falls on each pixel. The sum is what the window holds, 1 or
-    /// a little less.
+    /// up to some hundredths less.
     pub samples: Array2<f32>,
     /// Side of a pixel, µm.
     pub pitch_um: f64,

@@ -18,6 +18,7 @@ const MOST_PIXELS: f64 = 600.0;
 const KEPT_OF_TAILS: f64 = 0.999;
 /// How far diffraction's tails are followed beyond the geometric picture, in units of λN.
 const TAILS: f64 = 12.0;
+
 /// A ray map turned to its field and scaled to pixels, and the window that holds it.
 pub(crate) struct Layout<'a> {
     record: &'a RayMap,
