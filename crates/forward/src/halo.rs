@@ -6,7 +6,7 @@
 use std::{
     collections::BTreeMap,
     f64::consts::{PI, SQRT_2},
-    sync::Arc,
+    sync::{Arc, OnceLock},
 };
 
 use dioptric_psf::{LensImage, PsfQuery};
@@ -86,6 +86,8 @@ impl Beyond {
 pub(crate) struct Halos {
     /// None where no light lies beyond the windows.
     of_bands: Vec<Option<Halo>>,
+    /// Whether what lands of them is computed for each band anew.
+    keeps_none: bool,
 }
 
 impl Halos {
@@ -115,25 +117,40 @@ impl Halos {
         let spreads: BTreeMap<[i32; 2], Arc<HaloSpread>> = few.par_iter().map(spread).collect();
         let halo =
             |(beyond, number): (Beyond, _)| Halo { share: beyond.share as f32, spread: spreads[&number].clone() };
-        Self { of_bands: of_bands.into_iter().map(|of_band| of_band.map(halo)).collect() }
+        Self { of_bands: of_bands.into_iter().map(|of_band| of_band.map(halo)).collect(), keeps_none: false }
     }
 
-    /// The halo of a band, if any light lies beyond its windows.
-    pub(crate) fn at(&self, band: usize) -> Option<&Halo> {
-        self.of_bands.get(band)?.as_ref()
+    /// Returns the picture of a band with the halos of its points, if any light lies beyond its windows.
+    pub(crate) fn applied(&self, band: usize, picture: Array2<f32>) -> Array2<f32> {
+        match self.of_bands.get(band) {
+            Some(Some(halo)) => halo.applied(picture, !self.keeps_none),
+            _ => picture,
+        }
+    }
+
+    /// Keeps what lands of halos from now on if that takes no more than some bytes, and returns what is left of these.
+    pub(crate) fn keep_at_most(&mut self, budget_bytes: usize) -> usize {
+        let wanted_bytes: usize = self.spreads().map(|spread| size_of::<f32>() * spread.n_landing()).sum();
+        self.keeps_none = wanted_bytes > budget_bytes;
+        if self.keeps_none { budget_bytes } else { budget_bytes - wanted_bytes }
+    }
+
+    fn spreads(&self) -> impl Iterator<Item = &HaloSpread> {
+        let mut spreads: Vec<&Arc<HaloSpread>> = self.of_bands.iter().flatten().map(|halo| &halo.spread).collect();
+        spreads.sort_by_key(|spread| Arc::as_ptr(spread));
+        spreads.dedup_by(|a, b| Arc::ptr_eq(a, b));
+        spreads.into_iter().map(Arc::as_ref)
     }
 
     /// The bytes of memory that they take.
     pub(crate) fn size_bytes(&self) -> usize {
-        let mut spreads: Vec<&Arc<HaloSpread>> = self.of_bands.iter().flatten().map(|halo| &halo.spread).collect();
-        spreads.dedup_by(|a, b| Arc::ptr_eq(a, b));
-        spreads.iter().map(|spread| size_of::<f32>() * spread.landing.len()).sum()
+        self.spreads().filter_map(|spread| spread.landing.get()).map(|landing| size_of::<f32>() * landing.len()).sum()
     }
 }
 
 /// The halo around each point of a band.
 #[derive(Debug)]
-pub(crate) struct Halo {
+struct Halo {
     /// The share of the light of a point that lies in it.
     share: f32,
     spread: Arc<HaloSpread>,
@@ -143,12 +160,20 @@ impl Halo {
     /// Takes from each pixel of a picture what its halo takes to others, and adds that to them.
     ///
     /// With T the halo of a point, E + T ⊗ E − E (T ⊗ 1): the sum of the picture is kept, and an even one stays even, for beyond its edges it counts as even.
-    pub(crate) fn applied(&self, mut picture: Array2<f32>) -> Array2<f32> {
+    fn applied(&self, mut picture: Array2<f32>, keeps_landing: bool) -> Array2<f32> {
         let spread = self.spread.of(&picture);
+        let once;
+        let landing = match keeps_landing {
+            true => self.spread.landing.get_or_init(|| self.spread.computed_landing()),
+            false => {
+                once = self.spread.computed_landing();
+                &once
+            }
+        };
         let columns = picture.ncols();
         for (row, mut line) in picture.rows_mut().into_iter().enumerate() {
             let came = self.spread.on_film(&spread, row, columns);
-            let went = self.spread.on_film(&self.spread.landing, row, columns);
+            let went = self.spread.on_film(landing, row, columns);
             for ((light, came), went) in line.iter_mut().zip(came).zip(went) {
                 // Where rasters are sharpened to make up for their blur, next to a bright point, less than nothing may come.
                 *light = (*light + self.share * (came - *light * went)).max(0.0);
@@ -164,8 +189,10 @@ struct HaloSpread {
     /// How many times pixels are doubled before the first raster.
     n_doublings: usize,
     rasters: Vec<RasterPart>,
-    /// How much of the halo of each pixel lands on the film, on pixels as `of` has them.
-    landing: Array2<f32>,
+    /// Rows and columns of the film.
+    size: (usize, usize),
+    /// How much of the halo of each pixel lands on the film, on pixels as `of` has them; once it is needed.
+    landing: OnceLock<Array2<f32>>,
 }
 
 /// The part of a halo on one raster: of each pixel from the middle, to the right and down.
@@ -179,9 +206,32 @@ impl HaloSpread {
         let n_rasters = f64::hypot(rows as f64, columns as f64).log2().ceil().max(0.0) as usize + 1;
         let part = |doublings: usize| RasterPart::new(beyond, doublings, doublings == n_doublings);
         let rasters = (n_doublings..n_rasters.max(n_doublings + 1)).map(part).collect();
-        let mut spread = Self { n_doublings, rasters, landing: Array2::default((0, 0)) };
-        spread.landing = spread.of(&Array2::ones((rows, columns)));
-        spread
+        Self { n_doublings, rasters, size: (rows, columns), landing: OnceLock::new() }
+    }
+
+    /// The number of pixels that `landing` has.
+    fn n_landing(&self) -> usize {
+        let (rows, columns) = self.size;
+        match self.n_doublings {
+            0 => rows * columns,
+            _ => n_halved(rows) * n_halved(columns),
+        }
+    }
+
+    fn computed_landing(&self) -> Array2<f32> {
+        match self.n_doublings {
+            0 => on_rasters(&Array2::ones(self.size), &self.rasters),
+            n => {
+                // The mean of ones over wide pixels, without a picture of them.
+                let part_on_film = |n: usize, i: usize| -> f32 {
+                    let pixels = WEIGHTS.iter().enumerate();
+                    pixels.filter(|(k, _)| (3..n + 3).contains(&(2 * i + k))).map(|(_, weight)| weight).sum()
+                };
+                let size = (n_halved(self.size.0), n_halved(self.size.1));
+                let halved = |(row, column)| part_on_film(self.size.0, row) * part_on_film(self.size.1, column);
+                self.by_doublings(&Array2::from_shape_fn(size, halved), n - 1)
+            }
+        }
     }
 
     /// Returns what halos bring to each pixel of a picture, on its own or on pixels twice as wide: see [`on_film`](Self::on_film).
@@ -293,10 +343,15 @@ fn add_line(energies: &[f32; REACH + 1], padded: &[f32], sums: &mut [f32]) {
 /// Pixels beyond the edges that a raster of wider pixels has.
 const MARGIN: usize = 1;
 
+/// Returns the number of pixels twice as wide that cover some, with their margin.
+fn n_halved(n: usize) -> usize {
+    n.div_ceil(2) + 2 * MARGIN
+}
+
 /// Returns the means of a picture over pixels twice as wide, by quadratic splines, with a margin: ⅛, ⅜, ⅜, ⅛ each way.
 fn halved(picture: &Array2<f32>) -> Array2<f32> {
     let (rows, columns) = picture.dim();
-    let (n_rows, n_columns) = (rows.div_ceil(2) + 2 * MARGIN, columns.div_ceil(2) + 2 * MARGIN);
+    let (n_rows, n_columns) = (n_halved(rows), n_halved(columns));
     let mut means = Array2::zeros((n_rows, n_columns));
     let mut down = vec![0.0; 2 * n_columns + 2];
     for (row, mut means) in means.rows_mut().into_iter().enumerate() {
@@ -350,11 +405,11 @@ mod tests {
     fn even_pictures_stay_even_and_sums_are_kept() {
         for (half_px, size) in [(0.5, (33, 70)), (2.5, (64, 48)), (5.5, (101, 90)), (23.5, (40, 61)), (200.5, (7, 1))] {
             let halo = halo(half_px, 0.02, size);
-            for light in halo.applied(Array2::from_elem(size, 3.0)) {
+            for light in halo.applied(Array2::from_elem(size, 3.0), true) {
                 assert!((light - 3.0).abs() < 1e-6, "{half_px}: {light}");
             }
             let uneven = Array2::from_shape_fn(size, |(row, column)| ((row * 7 + column * 13) % 11) as f32);
-            let (before, after) = (uneven.sum(), halo.applied(uneven).sum());
+            let (before, after) = (uneven.sum(), halo.applied(uneven, false).sum());
             assert!((after / before - 1.0).abs() < 1e-5, "{half_px}: {before} {after}");
         }
     }
@@ -369,7 +424,7 @@ mod tests {
             for at in [(400, 400), (403, 398), (397, 401)] {
                 let mut point = Array2::zeros((n, n));
                 point[at] = 1.0;
-                let picture = halo.applied(point);
+                let picture = halo.applied(point, true);
                 let from_point = |row: usize, column: usize| {
                     DVec2::new(column as f64 - at.1 as f64, row as f64 - at.0 as f64).length()
                 };

@@ -274,9 +274,10 @@ impl Layout {
         maps + blocks + self.halos.size_bytes() + self.tiling.size_bytes() + self.kept().size_bytes
     }
 
-    /// Keeps at most so many bytes of kernels and alpha from now on; alpha that was kept is dropped.
+    /// Keeps at most so many bytes of what lands of halos, of kernels and of alpha from now on; alpha that was kept is dropped.
     pub(crate) fn keep_at_most(&mut self, budget_bytes: usize) {
-        self.kept().limit(budget_bytes);
+        let left_bytes = self.halos.keep_at_most(budget_bytes);
+        self.kept().limit(left_bytes);
     }
 
     /// Drops the maps of the bands that were asked for; they are made again where they are.
@@ -509,8 +510,9 @@ impl Layout {
 
     /// What the planes of a band take while it is imaged, bytes: those of the film, or of the scene where that is larger.
     fn plane_bytes(&self) -> usize {
-        // Light, what is uncovered, a blurred layer, the samples that are spread by knots, and half as much for wide pixels and what is in flight.
-        const PLANES: usize = 5;
+        // Light, what is uncovered, a blurred layer and the samples that are spread by knots, of which some planes are never whole: wide pixels and what is in
+        // flight take as much less.
+        const PLANES: usize = 4;
         let (Film { rows, columns, .. }, (scene_rows, scene_columns)) = (self.spec.film, self.size());
         PLANES * size_of::<f32>() * (rows * columns).max(scene_rows * scene_columns)
     }
@@ -587,10 +589,7 @@ impl Layout {
 
     /// Returns the picture of a band with the halos of its points.
     fn finished(&self, band: usize, picture: impl FnOnce() -> Array2<f32>) -> Array2<f32> {
-        self.stopwatch.time(Part::Compositing, || match self.halos.at(band) {
-            Some(halo) => halo.applied(picture()),
-            None => picture(),
-        })
+        self.stopwatch.time(Part::Compositing, || self.halos.applied(band, picture()))
     }
 
     /// A plane of the film with nothing on it.
