@@ -708,7 +708,8 @@ fn smooth_seams(
     }
     tiling.smooth(seams, length_px);
     let size = (film_lens.film.rows, film_lens.film.columns);
-    Ok(Largest { kernel_bytes, blocks: tiling.spread_blocks(&of_bands, size) })
+    // The allocator holds a tenth more than many kernels are.
+    Ok(Largest { kernel_bytes: kernel_bytes + kernel_bytes / 10, blocks: tiling.spread_blocks(&of_bands, size) })
 }
 
 /// Returns about how many pixels of the film layers cover, all layers together.
