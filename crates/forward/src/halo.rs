@@ -6,7 +6,6 @@
 use std::{
     collections::BTreeMap,
     f64::consts::{PI, SQRT_2},
-    sync::{Arc, OnceLock},
 };
 
 use dioptric_psf::{LensImage, PsfQuery};
@@ -22,8 +21,6 @@ const NEGLIGIBLE: f64 = 1e-6;
 
 /// What an edge bends beyond a square, times half the side over λN: 2 / π² r beyond a circle, the mean of whose 1/r is 2 √2 / π over half the side.
 const BENT: f64 = 4.0 * SQRT_2 / (PI * PI * PI);
-/// Halos are computed for so many windows from one to the next of twice the side, and for so many shares of what falls faster.
-const STEPS: f64 = 4.0;
 
 /// Distance, in pixels of a raster, over which a halo passes to the next one of wider pixels.
 const PASSES_OVER: [f64; 2] = [3.0, 4.5];
@@ -71,23 +68,13 @@ impl Beyond {
         let share = mix(below.share * below.half_px, above.share * above.half_px) / half_px;
         Self { share, half_px, steep: mix(below.steep, above.steep) }
     }
-
-    /// Returns the halo whose window is nearest of few, as bright far out, and its number: so that many bands have one in common.
-    fn of_few(self) -> (Self, [i32; 2]) {
-        let number = [self.half_px.log2(), self.steep].map(|value| (STEPS * value).round() as i32);
-        let [half_px, steep] = [f64::from(number[0]) / STEPS, f64::from(number[1]) / STEPS];
-        let half_px = half_px.exp2();
-        (Self { share: self.share * self.half_px / half_px, half_px, steep }, number)
-    }
 }
 
 /// The halos of the bands of a plan.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Halos {
     /// None where no light lies beyond the windows.
     of_bands: Vec<Option<Halo>>,
-    /// Whether what lands of them is computed for each band anew.
-    keeps_none: bool,
 }
 
 impl Halos {
@@ -103,77 +90,56 @@ impl Halos {
             (band, Beyond::of(lens, layers, (wavelength_nm, film.pitch_um), widest_px))
         };
         let known: BTreeMap<usize, Beyond> = looked_up.par_iter().map(of).collect();
-        let at = |band: usize| {
+        let halo = |band: usize| {
             let ((lower, below), (upper, above)) = (known.range(..=band).next_back()?, known.range(band..).next()?);
             let fraction = (band - lower) as f64 / (upper - lower).max(1) as f64;
-            Some(Beyond::between(*below, *above, fraction).of_few()).filter(|(beyond, _)| beyond.share > NEGLIGIBLE)
+            let beyond = Beyond::between(*below, *above, fraction);
+            (beyond.share > NEGLIGIBLE).then(|| Halo::new(beyond, (film.rows, film.columns)))
         };
-        let of_bands: Vec<Option<(Beyond, [i32; 2])>> = (0..n_bands).map(at).collect();
-        let few: BTreeMap<[i32; 2], Beyond> =
-            of_bands.iter().flatten().map(|&(beyond, number)| (number, beyond)).collect();
-        let spread = |(&number, &beyond): (&[i32; 2], &Beyond)| {
-            (number, Arc::new(HaloSpread::new(beyond, (film.rows, film.columns))))
-        };
-        let spreads: BTreeMap<[i32; 2], Arc<HaloSpread>> = few.par_iter().map(spread).collect();
-        let halo =
-            |(beyond, number): (Beyond, _)| Halo { share: beyond.share as f32, spread: spreads[&number].clone() };
-        Self { of_bands: of_bands.into_iter().map(|of_band| of_band.map(halo)).collect(), keeps_none: false }
+        Self { of_bands: (0..n_bands).into_par_iter().map(halo).collect() }
     }
 
     /// Returns the picture of a band with the halos of its points, if any light lies beyond its windows.
     pub(crate) fn applied(&self, band: usize, picture: Array2<f32>) -> Array2<f32> {
         match self.of_bands.get(band) {
-            Some(Some(halo)) => halo.applied(picture, !self.keeps_none),
+            Some(Some(halo)) => halo.applied(picture),
             _ => picture,
         }
     }
-
-    /// Keeps what lands of halos from now on if that takes no more than some bytes, and returns what is left of these.
-    pub(crate) fn keep_at_most(&mut self, budget_bytes: usize) -> usize {
-        let wanted_bytes: usize = self.spreads().map(|spread| size_of::<f32>() * spread.n_landing()).sum();
-        self.keeps_none = wanted_bytes > budget_bytes;
-        if self.keeps_none { budget_bytes } else { budget_bytes - wanted_bytes }
-    }
-
-    fn spreads(&self) -> impl Iterator<Item = &HaloSpread> {
-        let mut spreads: Vec<&Arc<HaloSpread>> = self.of_bands.iter().flatten().map(|halo| &halo.spread).collect();
-        spreads.sort_by_key(|spread| Arc::as_ptr(spread));
-        spreads.dedup_by(|a, b| Arc::ptr_eq(a, b));
-        spreads.into_iter().map(Arc::as_ref)
-    }
-
-    /// The bytes of memory that they take.
-    pub(crate) fn size_bytes(&self) -> usize {
-        self.spreads().filter_map(|spread| spread.landing.get()).map(|landing| size_of::<f32>() * landing.len()).sum()
-    }
 }
 
-/// The halo around each point of a band.
+/// The halo around each point of a band: parts of it on rasters of pixels 2, 4, 8 … times as wide as the film's, of sum 1.
 #[derive(Debug)]
 struct Halo {
     /// The share of the light of a point that lies in it.
     share: f32,
-    spread: Arc<HaloSpread>,
+    /// How many times pixels are doubled before the first raster.
+    n_doublings: usize,
+    rasters: Vec<RasterPart>,
 }
 
+/// The part of a halo on one raster: of each pixel from the middle, to the right and down.
+#[derive(Debug)]
+struct RasterPart([[f32; REACH + 1]; REACH + 1]);
+
 impl Halo {
+    fn new(beyond: Beyond, (rows, columns): (usize, usize)) -> Self {
+        let n_doublings = (beyond.half_px / FIRST).log2().floor().max(0.0) as usize;
+        let n_rasters = f64::hypot(rows as f64, columns as f64).log2().ceil().max(0.0) as usize + 1;
+        let part = |doublings: usize| RasterPart::new(beyond, doublings, doublings == n_doublings);
+        let rasters = (n_doublings..n_rasters.max(n_doublings + 1)).map(part).collect();
+        Self { share: beyond.share as f32, n_doublings, rasters }
+    }
+
     /// Takes from each pixel of a picture what its halo takes to others, and adds that to them.
     ///
     /// With T the halo of a point, E + T ⊗ E − E (T ⊗ 1): the sum of the picture is kept, and an even one stays even, for beyond its edges it counts as even.
-    fn applied(&self, mut picture: Array2<f32>, keeps_landing: bool) -> Array2<f32> {
-        let spread = self.spread.of(&picture);
-        let once;
-        let landing = match keeps_landing {
-            true => self.spread.landing.get_or_init(|| self.spread.computed_landing()),
-            false => {
-                once = self.spread.computed_landing();
-                &once
-            }
-        };
+    fn applied(&self, mut picture: Array2<f32>) -> Array2<f32> {
+        let (brought, landing) = (self.of(&picture), self.of_ones(picture.dim()));
         let columns = picture.ncols();
         for (row, mut line) in picture.rows_mut().into_iter().enumerate() {
-            let came = self.spread.on_film(&spread, row, columns);
-            let went = self.spread.on_film(landing, row, columns);
+            let came = self.on_film(&brought, row, columns);
+            let went = self.on_film(&landing, row, columns);
             for ((light, came), went) in line.iter_mut().zip(came).zip(went) {
                 // Where rasters are sharpened to make up for their blur, next to a bright point, less than nothing may come.
                 *light = (*light + self.share * (came - *light * went)).max(0.0);
@@ -181,55 +147,19 @@ impl Halo {
         }
         picture
     }
-}
 
-/// The halo of a point, of sum 1, beyond a square window: parts of it on rasters of pixels 2, 4, 8 … times as wide as the film's.
-#[derive(Debug)]
-struct HaloSpread {
-    /// How many times pixels are doubled before the first raster.
-    n_doublings: usize,
-    rasters: Vec<RasterPart>,
-    /// Rows and columns of the film.
-    size: (usize, usize),
-    /// How much of the halo of each pixel lands on the film, on pixels as `of` has them; once it is needed.
-    landing: OnceLock<Array2<f32>>,
-}
-
-/// The part of a halo on one raster: of each pixel from the middle, to the right and down.
-#[derive(Debug)]
-struct RasterPart([[f32; REACH + 1]; REACH + 1]);
-
-impl HaloSpread {
-    fn new(beyond: Beyond, (rows, columns): (usize, usize)) -> Self {
-        let half_px = beyond.half_px;
-        let n_doublings = (half_px / FIRST).log2().floor().max(0.0) as usize;
-        let n_rasters = f64::hypot(rows as f64, columns as f64).log2().ceil().max(0.0) as usize + 1;
-        let part = |doublings: usize| RasterPart::new(beyond, doublings, doublings == n_doublings);
-        let rasters = (n_doublings..n_rasters.max(n_doublings + 1)).map(part).collect();
-        Self { n_doublings, rasters, size: (rows, columns), landing: OnceLock::new() }
-    }
-
-    /// The number of pixels that `landing` has.
-    fn n_landing(&self) -> usize {
-        let (rows, columns) = self.size;
+    /// Returns how much of the halo of each pixel lands on a film of so many rows and columns, on pixels as [`of`](Self::of) has them.
+    fn of_ones(&self, (rows, columns): (usize, usize)) -> Array2<f32> {
         match self.n_doublings {
-            0 => rows * columns,
-            _ => n_halved(rows) * n_halved(columns),
-        }
-    }
-
-    fn computed_landing(&self) -> Array2<f32> {
-        match self.n_doublings {
-            0 => on_rasters(&Array2::ones(self.size), &self.rasters),
+            0 => on_rasters(&Array2::ones((rows, columns)), &self.rasters),
             n => {
-                // The mean of ones over wide pixels, without a picture of them.
+                // The means of ones over wide pixels are products.
                 let part_on_film = |n: usize, i: usize| -> f32 {
                     let pixels = WEIGHTS.iter().enumerate();
                     pixels.filter(|(k, _)| (3..n + 3).contains(&(2 * i + k))).map(|(_, weight)| weight).sum()
                 };
-                let size = (n_halved(self.size.0), n_halved(self.size.1));
-                let halved = |(row, column)| part_on_film(self.size.0, row) * part_on_film(self.size.1, column);
-                self.by_doublings(&Array2::from_shape_fn(size, halved), n - 1)
+                let mean = |(row, column)| part_on_film(rows, row) * part_on_film(columns, column);
+                self.by_doublings(&Array2::from_shape_fn((n_halved(rows), n_halved(columns)), mean), n - 1)
             }
         }
     }
@@ -396,20 +326,19 @@ fn doubled_row(plane: &Array2<f32>, row: usize, columns: usize) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    fn halo(half_px: f64, share: f32, size: (usize, usize)) -> Halo {
-        let beyond = Beyond { share: f64::from(share), half_px, steep: 0.0 };
-        Halo { share, spread: Arc::new(HaloSpread::new(beyond, size)) }
+    fn halo(half_px: f64, share: f64, size: (usize, usize)) -> Halo {
+        Halo::new(Beyond { share, half_px, steep: 0.0 }, size)
     }
 
     #[test]
     fn even_pictures_stay_even_and_sums_are_kept() {
         for (half_px, size) in [(0.5, (33, 70)), (2.5, (64, 48)), (5.5, (101, 90)), (23.5, (40, 61)), (200.5, (7, 1))] {
             let halo = halo(half_px, 0.02, size);
-            for light in halo.applied(Array2::from_elem(size, 3.0), true) {
+            for light in halo.applied(Array2::from_elem(size, 3.0)) {
                 assert!((light - 3.0).abs() < 1e-6, "{half_px}: {light}");
             }
             let uneven = Array2::from_shape_fn(size, |(row, column)| ((row * 7 + column * 13) % 11) as f32);
-            let (before, after) = (uneven.sum(), halo.applied(uneven, false).sum());
+            let (before, after) = (uneven.sum(), halo.applied(uneven).sum());
             assert!((after / before - 1.0).abs() < 1e-5, "{half_px}: {before} {after}");
         }
     }
@@ -424,11 +353,11 @@ mod tests {
             for at in [(400, 400), (403, 398), (397, 401)] {
                 let mut point = Array2::zeros((n, n));
                 point[at] = 1.0;
-                let picture = halo.applied(point, true);
+                let picture = halo.applied(point);
                 let from_point = |row: usize, column: usize| {
                     DVec2::new(column as f64 - at.1 as f64, row as f64 - at.0 as f64).length()
                 };
-                let beyond = |r: f64| PI * f64::from(share) * half_px / (2.0 * SQRT_2 * r);
+                let beyond = |r: f64| PI * share * half_px / (2.0 * SQRT_2 * r);
                 for r in [2.0, 3.0, 5.0, 10.0].map(|times| times * half_px).into_iter().filter(|r| *r > 4.0) {
                     let lights = picture.indexed_iter();
                     let between = lights.filter(|((row, column), _)| (r..395.0).contains(&from_point(*row, *column)));
@@ -442,7 +371,7 @@ mod tests {
                     for place in on_ring {
                         let pixel =
                             ((at.0 as f64 + place.y).round() as usize, (at.1 as f64 + place.x).round() as usize);
-                        let law = f64::from(share) * half_px / (4.0 * SQRT_2) / from_point(pixel.0, pixel.1).powi(3);
+                        let law = share * half_px / (4.0 * SQRT_2) / from_point(pixel.0, pixel.1).powi(3);
                         let ratio = f64::from(picture[pixel]) / law;
                         assert!((0.63..1.35).contains(&ratio), "{half_px} {at:?}, at {place}: {ratio}");
                     }

@@ -271,13 +271,12 @@ impl Layout {
     pub(crate) fn size_bytes(&self) -> usize {
         let maps = self.maps().values().flat_map(|maps| maps.iter()).map(FilmMap::size_bytes).sum::<usize>();
         let blocks = self.blocks.values().map(BlockLayers::size_bytes).sum::<usize>();
-        maps + blocks + self.halos.size_bytes() + self.tiling.size_bytes() + self.kept().size_bytes
+        maps + blocks + self.tiling.size_bytes() + self.kept().size_bytes
     }
 
-    /// Keeps at most so many bytes of what lands of halos, of kernels and of alpha from now on; alpha that was kept is dropped.
+    /// Keeps at most so many bytes of kernels and alpha from now on; alpha that was kept is dropped.
     pub(crate) fn keep_at_most(&mut self, budget_bytes: usize) {
-        let left_bytes = self.halos.keep_at_most(budget_bytes);
-        self.kept().limit(left_bytes);
+        self.kept().limit(budget_bytes);
     }
 
     /// Drops the maps of the bands that were asked for; they are made again where they are.
