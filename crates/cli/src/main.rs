@@ -48,6 +48,9 @@ use crate::{
 fn main() -> ExitCode {
     let cli = Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
     terminal::remove_partial_files_on_interrupt();
+    if !matches!(cli.command, Command::Studio(_)) {
+        memory::keep_freed();
+    }
     match dispatch(cli) {
         Ok(()) => ExitCode::SUCCESS,
         // Whoever read the output has seen enough.
