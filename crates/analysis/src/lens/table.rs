@@ -1,7 +1,7 @@
 //! A lens described in numbers.
 
 use dioptric_optics::{
-    C_LINE_NM, F_LINE_NM, FirstOrder, Lens, LensFile, MonoLens, SeidelSettings, SeidelSums, analysis::field_limit_deg,
+    C_LINE_NM, F_LINE_NM, FirstOrder, Lens, LensFile, MonoLens, SeidelSettings, SeidelSums, analysis::field_limits_deg,
 };
 use serde::Serialize;
 
@@ -187,6 +187,7 @@ impl LensData {
             }
         }
         let (first, limit) = (mono.first_order(), mono.limiting_beam());
+        let [half_light_field_deg, last_light_field_deg] = field_limits_deg(&mono, [0.5, 0.01]);
         Ok(Self {
             lens: lens.name().to_owned(),
             configurations: Vec::new(),
@@ -196,8 +197,8 @@ impl LensData {
             limiting_surface: limit.map_or(mono.stop(), |beam| beam.limiting_surface),
             pupil_magnification: first.pupil_magnification(),
             petzval_radius_mm: has_sums.then(|| petzval_radius_mm(lens, &mono)).transpose()?,
-            half_light_field_deg: field_limit_deg(&mono, 0.5),
-            last_light_field_deg: field_limit_deg(&mono, 0.01),
+            half_light_field_deg,
+            last_light_field_deg,
             image: distance_mm.map(|distance_mm| image_of(&mono, distance_mm)).transpose()?,
             seidel_colors_nm: colors_nm,
             seidel: seidel.as_ref().map(|seidel| seidel.total),

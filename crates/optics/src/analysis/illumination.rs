@@ -74,32 +74,92 @@ pub const WIDEST_FIELD_DEG: f64 = 120.0;
 ///
 /// Twice this angle is a lens's field of view where its film sets no limit.
 pub fn field_limit_deg(lens: &MonoLens, share: f64) -> Option<f64> {
+    field_limits_deg(lens, [share])[0]
+}
+
+/// Returns the same for several shares, in less time than one after the other.
+pub fn field_limits_deg<const N: usize>(lens: &MonoLens, shares: [f64; N]) -> [Option<f64>; N] {
     let point = |field_deg: f64| ObjectPoint::far(field_deg.to_radians(), DVec2::Y);
-    limit_deg(lens, share, WIDEST_FIELD_DEG, &point)
+    let mut cones = Cones::of(lens, WIDEST_FIELD_DEG, &point);
+    shares.map(|share| cones.limit_deg(share))
 }
 
 /// Returns the same along a direction of the field, a unit vector, for points `dioptres` = 1/Z away; at most 88°.
 pub fn field_limit_along_deg(lens: &MonoLens, share: f64, direction: DVec2, dioptres: f64) -> Option<f64> {
     let point = |field_deg: f64| ObjectPoint::from_field(lens, direction * field_deg.to_radians().tan(), dioptres);
-    limit_deg(lens, share, STEEPEST_FIELD_DEG, &point)
+    Cones::of(lens, STEEPEST_FIELD_DEG, &point).limit_deg(share)
 }
 
-fn limit_deg(lens: &MonoLens, share: f64, last_deg: f64, point: &dyn Fn(f64) -> ObjectPoint) -> Option<f64> {
-    const N_AZIMUTHS: usize = 48;
-    let cone = |field_deg: f64| projected_solid_angle(lens, &point(field_deg), N_AZIMUTHS);
-    let least = share * cone(0.0);
-    if least <= 0.0 {
-        return None;
+/// The cones of light of points along a direction of the field.
+struct Cones<'a> {
+    lens: &'a MonoLens,
+    last_deg: f64,
+    /// The point of a field in degrees.
+    point: &'a dyn Fn(f64) -> ObjectPoint,
+    /// Projected solid angles from the axis on, a degree apart, as far as they were asked for.
+    by_degree: Vec<f64>,
+}
+
+impl<'a> Cones<'a> {
+    fn of(lens: &'a MonoLens, last_deg: f64, point: &'a dyn Fn(f64) -> ObjectPoint) -> Self {
+        Self { lens, last_deg, point, by_degree: Vec::new() }
     }
-    // The first degree that is too dark, then halves of it.
-    let dark = (1..=last_deg as u32).map(f64::from).find(|&field_deg| cone(field_deg) < least);
-    let Some(mut dark) = dark else { return Some(last_deg) };
-    let mut bright = dark - 1.0;
-    while dark - bright > 1e-4 {
-        let middle = 0.5 * (bright + dark);
-        *(if cone(middle) < least { &mut dark } else { &mut bright }) = middle;
+
+    fn at(&self, field_deg: f64) -> f64 {
+        const N_AZIMUTHS: usize = 48;
+        projected_solid_angle(self.lens, &(self.point)(field_deg), N_AZIMUTHS)
     }
-    Some(bright)
+
+    fn at_degree(&mut self, degree: usize) -> f64 {
+        while self.by_degree.len() <= degree {
+            self.by_degree.push(self.at(self.by_degree.len() as f64));
+        }
+        self.by_degree[degree]
+    }
+
+    /// Returns the field at which the light has fallen to a share of that on the axis.
+    fn limit_deg(&mut self, share: f64) -> Option<f64> {
+        let least = share * self.at_degree(0);
+        if least <= 0.0 {
+            return None;
+        }
+        // The first degree that is too dark, then the place within it.
+        let dark = (1..=self.last_deg as usize).find(|&degree| self.at_degree(degree) < least);
+        let Some(dark) = dark else { return Some(self.last_deg) };
+        let excesses = [dark - 1, dark].map(|degree| self.at_degree(degree) - least);
+        Some(last_above_zero([dark as f64 - 1.0, dark as f64], excesses, 1e-4, |field_deg| self.at(field_deg) - least))
+    }
+}
+
+/// Returns the last place, but for `within` or less, at which a function is not below 0 that falls below it between two: the ITP method (Oliveira & Takahashi 2020, An
+/// enhancement of the bisection method average performance preserving minmax optimality), which takes one look more than halving at most.
+fn last_above_zero(
+    [mut above, mut below]: [f64; 2],
+    [mut at_above, mut at_below]: [f64; 2],
+    within: f64,
+    function: impl Fn(f64) -> f64,
+) -> f64 {
+    let whole = below - above;
+    let n_looks = (whole / within).log2().ceil() + 1.0;
+    let mut projected = 0.5 * within * n_looks.exp2();
+    while below - above > within {
+        let half = 0.5 * (below - above);
+        let middle = above + half;
+        // Interpolated, moved a little towards the middle, and no farther from it than leaves enough looks to halve what is left.
+        let straight = above + 2.0 * half * at_above / (at_above - at_below);
+        let little = 0.2 * (2.0 * half).powi(2) / whole;
+        let towards = (middle - straight).clamp(-little, little);
+        let most = (projected - half).max(0.0);
+        let place = middle + (straight + towards - middle).clamp(-most, most);
+        let value = function(place);
+        if value < 0.0 {
+            (below, at_below) = (place, value);
+        } else {
+            (above, at_above) = (place, value);
+        }
+        projected *= 0.5;
+    }
+    above
 }
 
 #[cfg(test)]
@@ -151,6 +211,30 @@ mod tests {
         let lens = Lens::built_in("dgauss-50mm").unwrap().at(550.0).unwrap();
         let point = ObjectPoint::from_field(&lens, DVec2::new(1.2, 0.0), 0.0);
         assert_eq!(projected_solid_angle(&lens, &point, 64), 0.0);
+    }
+
+    /// A smooth fall takes half the looks of halving, a step one more than it at most.
+    #[test]
+    fn falls_are_found_with_few_looks() {
+        let (smooth, step) = (|x: f64| (1.0 - x).powi(3) - 0.2, |x: f64| if x < 0.7341 { 0.4 } else { -1e-3 });
+        let cases: [(&dyn Fn(f64) -> f64, f64, usize); 2] = [(&smooth, 1.0 - 0.2f64.cbrt(), 7), (&step, 0.7341, 15)];
+        for (function, expected, most) in cases {
+            let looks = std::cell::Cell::new(0);
+            let counted = |x: f64| {
+                looks.set(looks.get() + 1);
+                function(x)
+            };
+            let found = last_above_zero([0.0, 1.0], [function(0.0), function(1.0)], 1e-4, counted);
+            assert!((0.0..=1e-4).contains(&(expected - found)), "{found} {expected}");
+            assert!(looks.get() <= most, "{} looks", looks.get());
+        }
+    }
+
+    #[test]
+    fn several_shares_are_those_one_by_one() {
+        let lens = Lens::built_in("cooke-50mm").unwrap().at(550.0).unwrap();
+        let shares = [0.5, 0.01, 0.8];
+        assert_eq!(field_limits_deg(&lens, shares), shares.map(|share| field_limit_deg(&lens, share)));
     }
 
     #[test]

@@ -22,8 +22,8 @@ pub use field_grid::StraightMap;
 pub use field_map::{Distortion, Projection};
 pub use focus::{Autofocus, FocusRays};
 pub use illumination::{
-    STEEPEST_FIELD_DEG, WIDEST_FIELD_DEG, field_limit_along_deg, field_limit_deg, projected_solid_angle,
-    projected_solid_angle_onto,
+    STEEPEST_FIELD_DEG, WIDEST_FIELD_DEG, field_limit_along_deg, field_limit_deg, field_limits_deg,
+    projected_solid_angle, projected_solid_angle_onto,
 };
 pub use pupil_light::{PupilLight, PupilRule};
 pub use pupil_places::{PupilCoordinates, PupilSampling, hexapolar, pupil_line};
