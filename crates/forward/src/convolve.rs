@@ -8,17 +8,21 @@ use multiversion::multiversion;
 /// Rows transformed together, so that the transpose writes whole cache lines.
 const BATCH: usize = 8;
 
-/// Returns the smallest even size of at least `n` whose transform is fast (factors 2, 3 and 5).
+/// Returns the smallest size of at least `n` whose transform is fast: a multiple of 4 with the factors 2 and 3, or of 8 with one of 5, 7 and 11 besides. Others are up to
+/// four times as slow a sample (docs/PERFORMANCE.md).
 pub(crate) fn fast_size(n: usize) -> usize {
-    let is_fast = |mut m: usize| {
-        for factor in [2, 3, 5] {
-            while m.is_multiple_of(factor) {
-                m /= factor;
-            }
+    let without = |mut m: usize, factor: usize| {
+        while m.is_multiple_of(factor) {
+            m /= factor;
         }
-        m == 1
+        m
     };
-    (n.max(2)..).find(|&m| m % 2 == 0 && is_fast(m)).expect("powers of two have no end")
+    let is_fast = |m: usize| match without(without(m, 2), 3) {
+        1 => m.is_multiple_of(4),
+        5 | 7 | 11 => m.is_multiple_of(8),
+        _ => false,
+    };
+    (n..).find(|&m| m > 0 && is_fast(m)).expect("powers of two have no end")
 }
 
 /// Transforms of lines of one size.
@@ -426,8 +430,8 @@ mod tests {
     }
 
     #[test]
-    fn sizes_are_even_and_have_small_factors() {
-        assert_eq!([1, 7, 97, 191, 193, 257].map(fast_size), [2, 8, 100, 192, 200, 270]);
+    fn sizes_have_few_factors() {
+        assert_eq!([0, 1, 7, 97, 191, 193, 241, 257, 265].map(fast_size), [4, 4, 8, 108, 192, 216, 256, 264, 288]);
     }
 
     #[test]
