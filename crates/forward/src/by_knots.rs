@@ -265,10 +265,17 @@ impl Buffers {
         cells: &mut Vec<BlurredCell>,
     ) {
         let (stride, scale) = (fft.columns(), 1.0 / fft.len() as f32);
-        let rows_of = |Surroundings { mirror, at, .. }: &Surroundings<'_>| mirror.size((at.rows, at.columns)).0;
-        let n_rows = pair.iter().map(rows_of).max().unwrap_or(0);
-        self.lines.clear();
-        self.lines.resize(n_rows * stride, Complex::new(0.0, 0.0));
+        const ZERO: Complex<f32> = Complex::new(0.0, 0.0);
+        let size_of = |part: usize| {
+            let Surroundings { mirror, at, .. } = &pair[part];
+            mirror.size((at.rows, at.columns))
+        };
+        let sizes = [size_of(0), size_of(1)];
+        let n_rows = sizes[0].0.max(sizes[1].0);
+        self.lines.resize(n_rows * stride, ZERO);
+        // Samples fill what they lie in, if both blocks are of one size.
+        let n_filled = if sizes[0] == sizes[1] { sizes[0].1 } else { 0 };
+        self.lines.chunks_exact_mut(stride).for_each(|line| line[n_filled..].fill(ZERO));
         for (part, around) in pair.iter().enumerate() {
             let Surroundings { mirror, at, .. } = around;
             around.gather(&mut self.smoother, &mut self.block);
