@@ -570,3 +570,29 @@ fn plane_mirror_asks_for_the_film() {
     let expected_um = 10_000.0 * (1.0 + 50.0 / 2000.0) * 0.5_f64.sqrt();
     assert!((psf[0]["rms_radius_um"].as_f64().unwrap() / expected_um - 1.0).abs() < 1e-3, "{psf}");
 }
+
+/// What lands far from a point is spread as by a round pupil, which a pupil with an obscuration is not.
+#[test]
+fn round_halos_of_other_pupils_are_stated() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = |apertures: &str| {
+        format!(
+            "(name: \"singlet\", source: \"test\", surfaces: [\
+             (radius_mm: 50.0, stop: true, semi_aperture_mm: 6.0, medium: Named(\"SCHOTT:N-BK7\"), thickness_mm: 3.0), \
+             (radius_mm: -50.0, semi_aperture_mm: 12.0, thickness_mm: 0.0)], apertures: [{apertures}])"
+        )
+    };
+    fs::write(folder.path().join("open.ron"), lens("")).unwrap();
+    let obscured = lens("(surface: 0, outline: Circle(radius_mm: 2.0), is_obscuration: true)");
+    fs::write(folder.path().join("obscured.ron"), obscured).unwrap();
+    fs::write(folder.path().join("camera.ron"), common::CAMERA).unwrap();
+    let is_noted = |file: &str, options: &[&str]| {
+        let run = ["run", "camera.ron", "--lens", file, "--quality", "sketch", "--out", "run"];
+        let found = dioptric(folder.path(), &[&run[..], options].concat());
+        let notes = String::from_utf8_lossy(&found.stderr).into_owned();
+        assert!(found.status.success(), "{notes}");
+        notes.contains("is spread evenly around it: spikes end there")
+    };
+    assert!(is_noted("obscured.ron", &[]));
+    assert!(!is_noted("open.ron", &[]) && !is_noted("obscured.ron", &["--diffraction", "none"]));
+}

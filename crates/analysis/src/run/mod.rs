@@ -7,7 +7,7 @@ mod pixel_optics;
 mod statistics;
 
 use dioptric_pipeline::{AberrationSummary, BankData, Camera, Capture, FilmPart, PipelineError};
-use dioptric_psf::LensImageModel;
+use dioptric_psf::{Diffraction, LensImageModel};
 use dioptric_scene::SceneLight;
 use dioptric_spectrum::{ColorTemperature, DepthMap};
 use serde::Serialize;
@@ -167,6 +167,16 @@ fn note_on_scattered_light(run: &Run<'_>) -> Option<String> {
     Some(format!("{lens}: light from beyond {last_deg:.1}° off axis is left out: the lens scatters it over the film"))
 }
 
+/// States where diffraction is round, though the pupil is not: beyond kernels it is spread as that of a circle (docs/forward.md 2, "Halos").
+fn note_on_round_halos(run: &Run<'_>) -> Option<String> {
+    let (camera, lens) = (&run.capture.camera, &run.capture.lens.lens);
+    let has_halos = camera.diffraction != Diffraction::None && !lens.apertures().is_empty();
+    let name = lens.name();
+    has_halos.then(|| {
+        format!("{name}: diffraction by its openings and obscurations that lands beyond some 12 λN of a point is spread evenly around it: spikes end there")
+    })
+}
+
 impl RunReport {
     /// Returns the numbers of a run.
     ///
@@ -192,7 +202,8 @@ impl RunReport {
             lens: optics.lens,
             lens_notes: {
                 let without_sums = LensData::note_on_third_order(&capture.lens.lens);
-                capture.lens_notes().into_iter().chain(without_sums).chain(note_on_scattered_light(run)).collect()
+                let of_light = note_on_scattered_light(run).into_iter().chain(note_on_round_halos(run));
+                capture.lens_notes().into_iter().chain(without_sums).chain(of_light).collect()
             },
             film_distance_mm: place.film_distance_mm,
             film: FilmData {
