@@ -44,10 +44,23 @@ impl Kernel {
     pub(crate) fn faded_out(mut self, lambda_n_px: f64) -> Self {
         self.lambda_n_px = lambda_n_px;
         let (fade_px, side) = (self.fade_px(), self.samples.nrows());
-        if fade_px > 0.0 {
-            for ((row, column), sample) in self.samples.indexed_iter_mut() {
-                let from_border = row.min(column).min(side - 1 - row.max(column)) as f64 + 0.5;
-                *sample *= (from_border / fade_px).min(1.0) as f32;
+        let factors = (0..side.div_ceil(2)).map(|from_border| (from_border as f64 + 0.5) / fade_px);
+        let factors: Vec<f32> = factors.take_while(|factor| *factor < 1.0).map(|factor| factor as f32).collect();
+        for (row, mut line) in self.samples.rows_mut().into_iter().enumerate() {
+            let fade = |sample: &mut f32, from_border: usize| {
+                if let Some(factor) = factors.get(from_border) {
+                    *sample *= factor;
+                }
+            };
+            let from_border = row.min(side - 1 - row);
+            if from_border < factors.len() {
+                let columns = line.iter_mut().enumerate();
+                columns.for_each(|(column, sample)| fade(sample, from_border.min(column).min(side - 1 - column)));
+            } else {
+                for column in 0..factors.len() {
+                    fade(&mut line[column], column);
+                    fade(&mut line[side - 1 - column], column);
+                }
             }
         }
         self
@@ -90,15 +103,17 @@ impl Kernel {
 
 /// Returns the smallest odd square about the middle that holds at least `share` of what the picture holds.
 pub(crate) fn trim(energy: &Array2<f64>, share: f64) -> Array2<f32> {
+    let energy = energy.as_standard_layout();
     let middle = energy.nrows() / 2;
     let mut by_ring = vec![0.0; middle + 1];
     for (row, energies) in energy.rows().into_iter().enumerate() {
         // Of a row so far from the middle, as many samples on both sides of it lie in its own ring.
         let ring = row.abs_diff(middle);
         by_ring[ring] += energies.slice(s![middle - ring..=middle + ring]).sum();
-        for beyond in ring + 1..=middle {
-            by_ring[beyond] += energies[middle - beyond] + energies[middle + beyond];
-        }
+        let energies = energies.to_slice().expect("rows are in standard order");
+        let (left, right) = (&energies[..middle - ring], &energies[middle + ring + 1..]);
+        let beyond = by_ring[ring + 1..].iter_mut().zip(left.iter().rev().zip(right));
+        beyond.for_each(|(sum, (left, right))| *sum += left + right);
     }
     let wanted = share * by_ring.iter().sum::<f64>();
     let mut held = 0.0;
