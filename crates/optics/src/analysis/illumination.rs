@@ -216,9 +216,7 @@ mod tests {
     /// A smooth fall takes half the looks of halving, a step one more than it at most.
     #[test]
     fn falls_are_found_with_few_looks() {
-        let (smooth, step) = (|x: f64| (1.0 - x).powi(3) - 0.2, |x: f64| if x < 0.7341 { 0.4 } else { -1e-3 });
-        let cases: [(&dyn Fn(f64) -> f64, f64, usize); 2] = [(&smooth, 1.0 - 0.2f64.cbrt(), 7), (&step, 0.7341, 15)];
-        for (function, expected, most) in cases {
+        let check = |function: fn(f64) -> f64, expected: f64, most: usize| {
             let looks = std::cell::Cell::new(0);
             let counted = |x: f64| {
                 looks.set(looks.get() + 1);
@@ -227,7 +225,9 @@ mod tests {
             let found = last_above_zero([0.0, 1.0], [function(0.0), function(1.0)], 1e-4, counted);
             assert!((0.0..=1e-4).contains(&(expected - found)), "{found} {expected}");
             assert!(looks.get() <= most, "{} looks", looks.get());
-        }
+        };
+        check(|x| (1.0 - x).powi(3) - 0.2, 1.0 - 0.2f64.cbrt(), 7);
+        check(|x| if x < 0.7341 { 0.4 } else { -1e-3 }, 0.7341, 15);
     }
 
     #[test]
