@@ -46,7 +46,7 @@ impl Symmetry {
     }
 }
 
-/// Kernels of so many samples along a side get a border before they are moved: of larger ones the outermost hold too little to matter.
+/// Kernels of up to so many samples along a side get no border before they are moved where they are about their centroid: most are one sample.
 const SMALL: usize = 9;
 
 /// The share of a kernel's light that is left out on each side of it.
@@ -80,8 +80,8 @@ impl KnotKernel {
         let (left, lit_columns) = lit_part(&by_column, sum);
         let (first_row, first_column) = (first_row + above as i64, first_column + left as i64);
         let lit = Rectangle { first_row, first_column, rows: lit_rows, columns: lit_columns };
-        // Light that is moved from the outermost samples needs a place.
-        let border = usize::from(*centroid_px != DVec2::ZERO && rows.max(columns) <= SMALL);
+        // Light that is moved from the outermost samples needs a place: a rim may lie in them.
+        let border = usize::from(*centroid_px != DVec2::ZERO || rows.max(columns) > SMALL);
         let at = lit.grown(1).intersection(&whole.grown(border)).unwrap_or(lit);
         let mut bordered = Bordered::new(at);
         let (skipped_rows, margin) =
