@@ -46,20 +46,16 @@ impl Kernel {
         let (fade_px, side) = (self.fade_px(), self.samples.nrows());
         let factors = (0..side.div_ceil(2)).map(|from_border| (from_border as f64 + 0.5) / fade_px);
         let factors: Vec<f32> = factors.take_while(|factor| *factor < 1.0).map(|factor| factor as f32).collect();
+        let n_faded = factors.len();
         for (row, mut line) in self.samples.rows_mut().into_iter().enumerate() {
-            let fade = |sample: &mut f32, from_border: usize| {
-                if let Some(factor) = factors.get(from_border) {
-                    *sample *= factor;
-                }
-            };
             let from_border = row.min(side - 1 - row);
-            if from_border < factors.len() {
-                let columns = line.iter_mut().enumerate();
-                columns.for_each(|(column, sample)| fade(sample, from_border.min(column).min(side - 1 - column)));
-            } else {
-                for column in 0..factors.len() {
-                    fade(&mut line[column], column);
-                    fade(&mut line[side - 1 - column], column);
+            // Of a row that does not fade out itself, the ends do.
+            let columns = if from_border < n_faded { 0..side.div_ceil(2) } else { 0..n_faded };
+            for column in columns {
+                let Some(factor) = factors.get(column.min(from_border)) else { continue };
+                line[column] *= factor;
+                if column != side - 1 - column {
+                    line[side - 1 - column] *= factor;
                 }
             }
         }
