@@ -127,46 +127,34 @@ fn half_defocused_lens_is_as_bright_about_an_axis_elsewhere() {
     );
 }
 
+/// The two-element lens, two dioptres off.
+fn defocused_on_a_curved_field(f_number: f64, bands_nm: &'static [f64]) -> Case {
+    Case {
+        lens: "paper-2el",
+        f_number,
+        focus_mm: 2000.0,
+        plane_mm: 400.0,
+        columns: 724,
+        pitch_um: 27.6243,
+        aside_mm: 0.0,
+        diffraction: Diffraction::None,
+        bands_nm,
+        is_adaptive: false,
+    }
+}
+
 /// Kernels near the axis had their bright rim in the outermost samples of their window and no place to be moved to: their centroids lay elsewhere, and the middle of the picture
 /// was .52 % too bright.
 #[test]
 fn kernels_with_a_rim_at_the_border_of_their_window_are_centered() {
-    check(
-        &Case {
-            lens: "paper-2el",
-            f_number: 2.8,
-            focus_mm: 2000.0,
-            plane_mm: 400.0,
-            columns: 724,
-            pitch_um: 27.6243,
-            aside_mm: 0.0,
-            diffraction: Diffraction::None,
-            bands_nm: ONE_BAND_NM,
-            is_adaptive: false,
-        },
-        1.5e-3,
-    );
+    check(&defocused_on_a_curved_field(2.8, ONE_BAND_NM), 1.5e-3);
 }
 
 /// A curved field brings one line focus or the other onto the film: thin lines in wide kernels, which count in one pixel or the next. Cells left steps of
 /// 3.8e-4.
 #[test]
 fn stopped_down_lens_with_a_curved_field_has_no_seams() {
-    check(
-        &Case {
-            lens: "paper-2el",
-            f_number: 8.0,
-            focus_mm: 2000.0,
-            plane_mm: 400.0,
-            columns: 724,
-            pitch_um: 27.6243,
-            aside_mm: 0.0,
-            diffraction: Diffraction::None,
-            bands_nm: THREE_BANDS_NM,
-            is_adaptive: false,
-        },
-        2e-3,
-    );
+    check(&defocused_on_a_curved_field(8.0, THREE_BANDS_NM), 2e-3);
 }
 
 /// Checks how bright a plane in focus is from corner to corner of a film of this half diagonal, on as many fields as usual.
