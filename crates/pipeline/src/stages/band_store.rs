@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File, OpenOptions},
-    io::{BufWriter, Read, Seek, SeekFrom, Write},
+    io::{Read, Seek, SeekFrom, Write},
     ops::Range,
     path::{Path, PathBuf},
 };
@@ -17,7 +17,7 @@ const KEY: &str = "bands.ron";
 /// The bands one after the other, little-endian.
 const BANDS: &str = "bands.raw";
 
-/// Rows of a band that are read at a time.
+/// Rows of a band that are read or written at a time.
 const ROWS_AT_ONCE: usize = 64;
 
 /// How a camera keeps bands as they are finished.
@@ -141,14 +141,19 @@ fn band_bytes((rows, columns): (usize, usize)) -> u64 {
     4 * rows as u64 * columns as u64
 }
 
-/// Writes a band where the file stands, a row at a time.
+/// Writes a band where the file stands, some rows at a time.
 pub(super) fn write_plane(file: &mut File, plane: &Array2<f32>) -> std::io::Result<()> {
-    let mut writer = BufWriter::with_capacity(1 << 20, file);
-    for row in plane.rows() {
-        let bytes: Vec<u8> = row.iter().flat_map(|sample| sample.to_le_bytes()).collect();
-        writer.write_all(&bytes)?;
+    let plane = plane.as_standard_layout();
+    let samples = plane.as_slice().expect("it is in standard order");
+    let mut bytes = Vec::new();
+    for samples in samples.chunks((ROWS_AT_ONCE * plane.ncols()).max(1)) {
+        bytes.resize(4 * samples.len(), 0);
+        for (bytes, sample) in bytes.chunks_exact_mut(4).zip(samples) {
+            bytes.copy_from_slice(&sample.to_le_bytes());
+        }
+        file.write_all(&bytes)?;
     }
-    writer.flush()
+    Ok(())
 }
 
 /// Reads a band of a file of bands.

@@ -165,7 +165,10 @@ impl Irradiance {
     /// Returns the samples of rows of a band.
     fn rows_of(&self, band: usize, rows: Range<usize>) -> Result<Vec<f32>, String> {
         match &self.planes {
-            Planes::Memory(cube) => Ok(cube.slice(s![band, rows, ..]).iter().copied().collect()),
+            Planes::Memory(cube) => {
+                let samples = cube.slice(s![band, rows, ..]);
+                Ok(samples.to_slice().expect("rows of a cube in standard layout lie one after the other").to_vec())
+            }
             Planes::File(file) => {
                 let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
                 read_rows(&mut file, band, rows, self.size).map_err(|error| error.to_string())
@@ -351,12 +354,31 @@ impl Summing {
     }
 
     fn add(&mut self, band: usize, plane: &Array2<f32>) {
-        let mean = plane.iter().map(|&e| f64::from(e)).sum::<f64>() / plane.len() as f64;
+        let (mean, max) = mean_and_max(plane);
         self.summary.mean.push(mean);
-        self.summary.max.push(plane.iter().copied().fold(0.0, f32::max).into());
+        self.summary.max.push(max.into());
         self.summary.mean_lux += self.luminous[band] * mean;
         self.summary.seen.add(plane, self.to_rgb.of_band(band));
     }
+}
+
+/// Returns the mean of samples and the largest of them, 0 at least.
+fn mean_and_max(plane: &Array2<f32>) -> (f64, f32) {
+    /// Sums that do not wait for each other.
+    const LANES: usize = 16;
+    let (mut sums, mut max) = ([0.0_f64; LANES], [0.0_f32; LANES]);
+    let mut add = |lane: usize, sample: f32| {
+        sums[lane] += f64::from(sample);
+        max[lane] = max[lane].max(sample);
+    };
+    for row in plane.as_standard_layout().rows() {
+        let (whole, rest) = row.to_slice().expect("it is in standard order").as_chunks::<LANES>();
+        for samples in whole {
+            (0..LANES).for_each(|lane| add(lane, samples[lane]));
+        }
+        rest.iter().enumerate().for_each(|(lane, &sample)| add(lane, sample));
+    }
+    (sums.iter().sum::<f64>() / plane.len() as f64, max.into_iter().fold(0.0, f32::max))
 }
 
 #[cfg(test)]
