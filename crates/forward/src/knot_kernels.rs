@@ -471,13 +471,13 @@ const CENTERED_PX: f64 = 1e-7;
 ///
 /// What falls on the pixels of a spread has its own centroid elsewhere where the spread is small: the part within a pixel counts as its
 /// middle. Such a shift changes over the film, and a change of shift is light that is drawn together or apart: half a per cent of a
-/// uniform plane in focus. Each round adds the derivative by central differences, which leaves second moments as they are.
+/// uniform plane in focus. Rounds move light across the edges between samples ([`crossing`]), which brings thin lines and cusps as far as the rest.
 fn centered(mut kernel: Bordered, centroid_px: DVec2) -> Vec<f32> {
     const ROUNDS: usize = 40;
     let mut sums = kernel.sums();
     for _ in 0..ROUNDS {
         let off_px = sums.centroid_px(&kernel.at) - centroid_px;
-        if f64::max(off_px.x.abs(), off_px.y.abs()) < CENTERED_PX {
+        if off_px.abs().max_element() < CENTERED_PX {
             break;
         }
         sums = kernel.moved(off_px);
@@ -510,11 +510,13 @@ struct Bordered {
     at: Rectangle,
     samples: Vec<f64>,
     next: Vec<f64>,
+    /// Room for what crosses the edges of a line.
+    edges: Vec<f64>,
 }
 
 impl Bordered {
     fn new(at: Rectangle) -> Self {
-        Self { at, samples: vec![0.0; at.grown(1).len()], next: vec![] }
+        Self { at, samples: vec![0.0; at.grown(1).len()], next: vec![], edges: vec![] }
     }
 
     fn rows_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
@@ -535,10 +537,13 @@ impl Bordered {
         sums
     }
 
-    /// Moves the samples back by a part of a pixel to first order; none below 0.
+    /// Moves the samples back by a part of a pixel to first order; none below 0, and nothing beyond the outermost.
     fn moved(&mut self, off_px: DVec2) -> Sums {
         self.next.resize(self.samples.len(), 0.0);
-        let sums = move_back(&self.samples, (self.at.rows, self.at.columns), off_px, &mut self.next);
+        let Rectangle { rows, columns, .. } = self.at;
+        self.edges.clear();
+        self.edges.resize(3 * columns + 1, 0.0);
+        let sums = move_back(&self.samples, (rows, columns), off_px, &mut self.edges, &mut self.next);
         std::mem::swap(&mut self.samples, &mut self.next);
         sums
     }
@@ -569,24 +574,62 @@ fn add_sums(line: &[f64], row: usize, sums: &mut Sums) {
     sums.down += all * row as f64;
 }
 
-/// Puts samples moved back by a part of a pixel into `moved`; both have a border of zeros.
+/// Puts samples moved back by a part of a pixel into `moved`; both have a border of zeros. `edges` has zeros for one edge more than three lines have samples.
 #[multiversion::multiversion(targets("x86_64+avx2", "aarch64+neon"))]
-fn move_back(samples: &[f64], (rows, width): (usize, usize), off_px: DVec2, moved: &mut [f64]) -> Sums {
+fn move_back(
+    samples: &[f64],
+    (rows, width): (usize, usize),
+    off_px: DVec2,
+    edges: &mut [f64],
+    moved: &mut [f64],
+) -> Sums {
     let stride = width + 2;
-    let (across, down) = (0.5 * off_px.x, 0.5 * off_px.y);
+    let [across_px, down_px] = [off_px.x, off_px.y].map(|off_px| off_px.abs().min(MOST_PX));
+    let (to_left, to_above) = (off_px.x.signum(), off_px.y.signum());
+    // Nothing crosses the edges of the block.
+    let (between_columns, lines) = edges.split_at_mut(width + 1);
+    let (mut above, mut below) = lines.split_at_mut(width);
     let mut sums = Sums::default();
     for row in 0..rows {
-        let first = (row + 1) * stride;
-        let (above, below) = (&samples[first - stride + 1..][..width], &samples[first + stride + 1..][..width]);
-        let (left, own, right) =
-            (&samples[first..][..width], &samples[first + 1..][..width], &samples[first + 2..][..width]);
-        let line = &mut moved[first + 1..][..width];
+        let first = (row + 1) * stride + 1;
+        let along_row = |offset: usize| &samples[first + offset - 1..][..width - 1];
+        let (behind, from, to) = if off_px.x > 0.0 { (3, 2, 1) } else { (0, 1, 2) };
+        crossing(across_px, along_row(behind), along_row(from), along_row(to), &mut between_columns[1..width]);
+        if row + 1 < rows {
+            let line = |offset: usize| &samples[first + offset * stride - stride..][..width];
+            let (behind, from, to) = if off_px.y > 0.0 { (3, 2, 1) } else { (0, 1, 2) };
+            crossing(down_px, line(behind), line(from), line(to), below);
+        } else {
+            below.fill(0.0);
+        }
+        let (own, line) = (&samples[first..][..width], &mut moved[first..][..width]);
+        let (left, right) = (&between_columns[..width], &between_columns[1..]);
         for i in 0..width {
-            line[i] = (own[i] + across * (right[i] - left[i]) + down * (below[i] - above[i])).max(0.0);
+            line[i] = own[i] + to_left * (right[i] - left[i]) + to_above * (below[i] - above[i]);
         }
         add_sums(line, row, &mut sums);
+        std::mem::swap(&mut above, &mut below);
     }
     sums
+}
+
+/// How far light is moved at once at most, pixels: less than half, so that samples have light for the next.
+const MOST_PX: f64 = 0.25;
+
+/// Puts into `crossing` what crosses the edges between samples `from` and `to` if light is moved by a part of a pixel, at most half of what is in `from`.
+///
+/// Central differences take half of a sample's move from the sample behind it and put half into the next, which leaves second moments as they are. What the sample behind
+/// does not have the next gets more: each sample's own light is moved as far.
+#[inline(always)]
+fn crossing(part_px: f64, behind: &[f64], from: &[f64], to: &[f64], crossing: &mut [f64]) {
+    let most = 0.5 - part_px;
+    let n = crossing.len();
+    let (behind, from, to) = (&behind[..n], &from[..n], &to[..n]);
+    for i in 0..n {
+        let taken_behind = f64::min(0.5 * part_px * from[i], most * behind[i]);
+        let taken_here = f64::min(0.5 * part_px * to[i], most * from[i]);
+        crossing[i] = part_px * from[i] - taken_behind + taken_here;
+    }
 }
 
 #[cfg(test)]
@@ -644,6 +687,37 @@ mod tests {
         let at = Rectangle { first_row: 1, first_column: 0, rows: 2, columns: 2 };
         assert_eq!(knot_kernel(corner, DVec2::new(1.0, 2.0)).at.intersection(&at), Some(at));
         assert_eq!(knot_kernel(Array2::zeros((5, 3)), DVec2::ZERO), even(1, 1));
+    }
+
+    /// A comet with its cusp in the corner of its window: central differences would take light away beyond the cusp, where there is none.
+    #[test]
+    fn comets_are_moved_off_their_cusps() {
+        for brightness in [1.0, 100.0, 1000.0] {
+            let mut comet = Array2::from_elem((81, 81), 0.1_f32);
+            comet[(80, 80)] = brightness;
+            comet.row_mut(80).fill(brightness / 10.0);
+            let sum = f64::from(comet.sum());
+            let drawn = comet.indexed_iter().fold(DVec2::ZERO, |drawn, ((row, column), &sample)| {
+                drawn + f64::from(sample) * DVec2::new(column as f64, row as f64)
+            });
+            let drawn_px = drawn / sum - 40.0;
+            let variance_px2 = comet.indexed_iter().fold(DVec2::ZERO, |variance, ((row, column), &sample)| {
+                let from_px = DVec2::new(column as f64, row as f64) - 40.0 - drawn_px;
+                variance + f64::from(sample) / sum * from_px * from_px
+            });
+            for (across_px, down_px) in [(-0.1, -0.2), (-0.02, 0.003), (0.1, -0.2), (0.3, 0.3)] {
+                let place_px = drawn_px + DVec2::new(across_px, down_px);
+                let kernel = knot_kernel(comet.clone(), place_px);
+                let [down, across] = kernel.first_moments();
+                let off_px = DVec2::new(across, down) - place_px;
+                assert!(off_px.abs().max_element() < 1e-5, "{brightness} at {place_px}: {off_px}");
+                assert!(kernel.samples.iter().all(|sample| *sample >= 0.0), "{brightness} at {place_px}");
+                let [down, _, across] = kernel.second_moments();
+                let grown_px2 = DVec2::new(across, down) - place_px * place_px - variance_px2;
+                // Light moved by a part of a pixel is in two: at most a half each.
+                assert!(grown_px2.abs().max_element() < 0.25, "{brightness} at {place_px}: {grown_px2}");
+            }
+        }
     }
 
     /// A comet pointing away from the axis at (tan 2, 1): right and up.
