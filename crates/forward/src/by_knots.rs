@@ -241,6 +241,16 @@ struct Buffers {
     smoother: Smoother,
 }
 
+const ZERO: Complex<f32> = Complex::new(0.0, 0.0);
+
+/// Returns the first values of a buffer, which grows where it has fewer, whatever they are.
+fn first_of(buffer: &mut Vec<Complex<f32>>, n: usize) -> &mut [Complex<f32>] {
+    if buffer.len() < n {
+        buffer.resize(n, ZERO);
+    }
+    &mut buffer[..n]
+}
+
 impl Buffers {
     /// Spreads the samples around a knot by the canonical kernel, which is transformed and whose samples lie in a rectangle.
     fn spread(&mut self, fft: &mut Fft2, kernel: &Rectangle, around: &Surroundings<'_>) -> BlurredCell {
@@ -265,32 +275,33 @@ impl Buffers {
         cells: &mut Vec<BlurredCell>,
     ) {
         let (stride, scale) = (fft.columns(), 1.0 / fft.len() as f32);
-        const ZERO: Complex<f32> = Complex::new(0.0, 0.0);
         let size_of = |part: usize| {
             let Surroundings { mirror, at, .. } = &pair[part];
             mirror.size((at.rows, at.columns))
         };
         let sizes = [size_of(0), size_of(1)];
         let n_rows = sizes[0].0.max(sizes[1].0);
-        self.lines.resize(n_rows * stride, ZERO);
+        let lines = first_of(&mut self.lines, n_rows * stride);
         // Samples fill what they lie in, if both blocks are of one size.
         let n_filled = if sizes[0] == sizes[1] { sizes[0].1 } else { 0 };
-        self.lines.chunks_exact_mut(stride).for_each(|line| line[n_filled..].fill(ZERO));
+        lines.chunks_exact_mut(stride).for_each(|line| line[n_filled..].fill(ZERO));
         for (part, around) in pair.iter().enumerate() {
             let Surroundings { mirror, at, .. } = around;
             around.gather(&mut self.smoother, &mut self.block);
-            let (block, lines) = (&self.block, (&mut self.lines[..], stride));
+            let (block, lines) = (&self.block, (&mut *lines, stride));
             match part {
                 0 => mirror.applied_to(block, (at.rows, at.columns), lines, |value, sample| value.re = sample),
                 _ => mirror.applied_to(block, (at.rows, at.columns), lines, |value, sample| value.im = sample),
             }
         }
-        fft.forward_pair(&mut self.lines, &mut self.spectrum);
-        multiply_by_real(&mut self.spectrum, &self.kernel, fft.rows());
-        fft.inverse_pair(&mut self.spectrum, n_rows + kernel.rows - 1, &mut self.lines);
+        let spectrum = first_of(&mut self.spectrum, fft.len());
+        fft.forward_pair(lines, spectrum);
+        multiply_by_real(spectrum, &self.kernel, fft.rows());
+        let lines = first_of(&mut self.lines, (n_rows + kernel.rows - 1) * stride);
+        fft.inverse_pair(spectrum, lines);
         for (part, Surroundings { mirror, at, .. }) in pair.iter().enumerate() {
             let at = at.spread_over(&mirror.window_at_knot(kernel));
-            let (size, lines) = ((at.rows, at.columns), (&self.lines[..], stride));
+            let (size, lines) = ((at.rows, at.columns), (&*lines, stride));
             let values = match part {
                 0 => mirror.restored_from(lines, size, |value| value.re * scale),
                 _ => mirror.restored_from(lines, size, |value| value.im * scale),

@@ -128,11 +128,9 @@ impl Fft2 {
 
     /// Puts the spectrum of two blocks, one as the real and one as the imaginary part of some whole rows, padded with zeros below, into `spectrum`: column by
     /// column, as many as a row has samples. Leaves the rows in disorder.
-    pub(crate) fn forward_pair(&mut self, lines: &mut [Complex<f32>], spectrum: &mut Vec<Complex<f32>>) {
-        let (rows, columns, len) = (self.down.size, self.across.size, self.len());
-        let scratch = &mut self.work.scratch;
+    pub(crate) fn forward_pair(&mut self, lines: &mut [Complex<f32>], spectrum: &mut [Complex<f32>]) {
+        let (rows, columns, scratch) = (self.down.size, self.across.size, &mut self.work.scratch);
         self.across.forward.process_with_scratch(lines, scratch);
-        spectrum.resize(len, Complex::new(0.0, 0.0));
         transpose(lines, columns, spectrum, rows);
         // Below the rows there may be those of another block.
         let n_rows = lines.len() / columns;
@@ -140,12 +138,11 @@ impl Fft2 {
         self.down.forward.process_with_scratch(spectrum, scratch);
     }
 
-    /// Puts the first rows of the rectangle of the spectrum of a pair into `lines`, and leaves the spectrum in disorder. What [`Fft2::forward_pair`]
+    /// Fills `lines` with as many first rows of the rectangle of the spectrum of a pair, and leaves the spectrum in disorder. What [`Fft2::forward_pair`]
     /// was given comes back times the number of samples of the rectangle.
-    pub(crate) fn inverse_pair(&mut self, spectrum: &mut [Complex<f32>], n_rows: usize, lines: &mut Vec<Complex<f32>>) {
+    pub(crate) fn inverse_pair(&mut self, spectrum: &mut [Complex<f32>], lines: &mut [Complex<f32>]) {
         let (rows, columns, scratch) = (self.down.size, self.across.size, &mut self.work.scratch);
         self.down.inverse.process_with_scratch(spectrum, scratch);
-        lines.resize(n_rows * columns, Complex::new(0.0, 0.0));
         transpose(spectrum, rows, lines, columns);
         self.across.inverse.process_with_scratch(lines, scratch);
     }

@@ -215,12 +215,18 @@ impl Mirror {
         (rows, columns): (usize, usize),
         sample: impl Fn(T) -> f32,
     ) -> Vec<f32> {
+        if !self.swaps {
+            let mut block = Vec::with_capacity(rows * columns);
+            for row in 0..rows {
+                let row = if self.flips_rows { rows - 1 - row } else { row };
+                let line = mirrored[row * stride..][..columns].iter().map(|&value| sample(value));
+                if self.flips_columns { block.extend(line.rev()) } else { block.extend(line) }
+            }
+            return block;
+        }
         let mut block = vec![0.0; rows * columns];
         // Rows and columns exchanged as `applied_to` has it, seen from the mirrored block.
-        let turned = match self.swaps {
-            true => Turned { flips_rows: !self.flips_columns, flips_columns: !self.flips_rows, swaps: true },
-            false => Turned { flips_rows: self.flips_rows, flips_columns: self.flips_columns, swaps: false },
-        };
+        let turned = Turned { flips_rows: !self.flips_columns, flips_columns: !self.flips_rows, swaps: true };
         turned
             .copy((mirrored, stride), self.size((rows, columns)), (&mut block, columns), |to, from| *to = sample(from));
         block
