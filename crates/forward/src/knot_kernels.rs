@@ -469,6 +469,9 @@ fn corner_spread_peaks(kernel: &[f32], width: usize) -> impl Iterator<Item = f64
     })
 }
 
+/// The share of a kernel's light in a sample that changes no picture.
+const NOTHING: f64 = 1e-15;
+
 /// Distance of a kernel's centroid from where it belongs that changes no picture, pixels.
 const CENTERED_PX: f64 = 1e-7;
 
@@ -490,8 +493,10 @@ fn centered(mut kernel: Bordered, centroid_px: DVec2) -> Vec<f32> {
     }
     let scale = 1.0 / sums.all;
     let mut samples = Vec::with_capacity(kernel.at.len());
+    // What rounds move on and on is soon below the least of normal numbers, which take many times as long.
+    let settled = |sample: f64| if sample < NOTHING { 0.0 } else { sample as f32 };
     for row in kernel.rows() {
-        samples.extend(row.iter().map(|sample| (sample * scale) as f32));
+        samples.extend(row.iter().map(|sample| settled(sample * scale)));
     }
     samples
 }
@@ -723,6 +728,18 @@ mod tests {
                 // Light moved by a part of a pixel is in two: at most a half each.
                 assert!(grown_px2.abs().max_element() < 0.25, "{brightness} at {place_px}: {grown_px2}");
             }
+        }
+    }
+
+    /// Sums of products with numbers below the least of normal ones take many times as long.
+    #[test]
+    fn samples_are_nothing_or_normal() {
+        let mut samples = Array2::from_elem((3, 5), 1e-20_f32);
+        samples[(1, 2)] = 1.0;
+        samples.column_mut(1).fill(1e-6);
+        for across_px in [0.0, 0.2] {
+            let kernel = knot_kernel(samples.clone(), DVec2::new(across_px, 0.0));
+            assert!(kernel.samples.iter().all(|&sample| sample == 0.0 || sample > 1e-16), "{kernel:?}");
         }
     }
 

@@ -18,6 +18,9 @@ const MIDDLE: i32 = 11;
 /// where the step is a normal distribution's.
 pub(crate) struct BlurredEdgeTable([[f32; WIDTH]; ROWS + 1]);
 
+/// A share that no picture shows. Products with less are soon below the least of normal numbers, which takes many times as long.
+const NOTHING: f64 = 1e-12;
+
 /// Profiles by variance, up to 1 pixel².
 static PROFILES: LazyLock<Vec<BlurredEdgeTable>> =
     LazyLock::new(|| (0..N_PROFILES).map(|number| BlurredEdgeTable::new(variance_of(number))).collect());
@@ -61,7 +64,8 @@ impl BlurredEdgeTable {
         Self(std::array::from_fn(|row| {
             let step = f64::from(MIDDLE) + row as f64 / ROWS as f64;
             let beyond = |pixel: usize| sigma * normal_integral((pixel as f64 - step) / sigma);
-            std::array::from_fn(|pixel| (beyond(pixel + 1) - beyond(pixel)) as f32)
+            let held = |pixel: usize| Some(beyond(pixel + 1) - beyond(pixel)).filter(|held| *held > NOTHING);
+            std::array::from_fn(|pixel| held(pixel).unwrap_or_default() as f32)
         }))
     }
 
@@ -114,6 +118,13 @@ mod tests {
         assert!((normal_integral(0.0) - 0.398_942_280).abs() < 1e-9);
         assert!((normal_integral(1.0) - (0.841_344_746 + 0.241_970_725)).abs() < 1e-8);
         assert!((normal_integral(-5.4)).abs() < 1e-7 && (normal_integral(5.4) - 5.4).abs() < 1e-7);
+    }
+
+    /// Products with numbers below the least of normal ones take many times as long.
+    #[test]
+    fn shares_are_nothing_or_far_above_the_least_number() {
+        let shares = || profiles().iter().flat_map(|profile| profile.0.iter().flatten());
+        assert!(shares().all(|&share| share == 0.0 || f64::from(share) > 0.5 * NOTHING));
     }
 
     #[test]
