@@ -143,8 +143,7 @@ fn defocused_on_a_curved_field(f_number: f64, bands_nm: &'static [f64]) -> Case 
     }
 }
 
-/// Kernels near the axis had their bright rim in the outermost samples of their window and no place to be moved to: their centroids lay elsewhere, and the middle of the picture
-/// was .52 % too bright.
+/// Kernels near the axis have their brightest samples outermost, and were not moved where they belong: the middle of the picture was .52 % too bright.
 #[test]
 fn kernels_with_a_rim_at_the_border_of_their_window_are_centered() {
     check(&defocused_on_a_curved_field(2.8, ONE_BAND_NM), 1.5e-3);
