@@ -49,7 +49,6 @@ fn main() {
                         aside_mm: 0.0,
                         diffraction,
                         bands_nm,
-                        is_adaptive: true,
                     };
                     let uniform = Uniform::new(&case);
                     let WorstStep { step, wavelength_nm, row, column } = uniform.worst_step();

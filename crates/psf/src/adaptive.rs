@@ -16,7 +16,8 @@ use crate::{
 /// How right a bank is to be, and how large it may become.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptiveSettings {
-    /// The error that nine tenths of the places may have, as [`MeasuredError::p90`].
+    /// The error that nine tenths of the places may have, as [`MeasuredError::p90`]. Areas of pupils between fields along a radius may be off by a
+    /// twentieth of it.
     pub target: f64,
     /// The largest number of samples: fields × depths × wavelengths.
     pub most_samples: usize,
@@ -99,10 +100,16 @@ const LEAST_HELD: f64 = 0.5;
 /// The least share of the error that a step takes away; a smaller one is not worth its samples.
 const LEAST_GAIN: f64 = 0.1;
 
+/// By how much areas of pupils between fields may be off, as a share of the largest, over the error wanted of pictures: a uniform plane shows it.
+const AREA_OVER_PICTURE: f64 = 0.05;
+
+/// How often fields are halved for areas of pupils: four times leave a sixteenth of what a rim that begins to cut them does.
+const MOST_HALVINGS: usize = 4;
+
 impl LensImageModel {
-    /// Traces as many samples as pictures between them need: it begins with those of `start`, measures the error at held-back
-    /// places, and adds samples along the axis whose refinement helps most (of fields along a radius also closer to each other outwards), until the target is met, no axis helps any more or there
-    /// are as many as there may be.
+    /// Traces as many samples as pictures between them need: it begins with those of `start`, adds fields along a radius where areas of
+    /// pupils between them are off by more than a twentieth of the target, measures the error at held-back places, and adds samples along the axis whose refinement
+    /// helps most (of fields along a radius also closer to each other outwards), until the target is met, no axis helps any more or there are as many as there may be.
     ///
     /// # Errors
     /// Those of [`build_with`](Self::build_with), and when the adaptive settings make no sense or `start` has single fields alone.
@@ -162,21 +169,30 @@ fn refined_until<B: Sampled>(
 ) -> Result<(BankSettings, MeasuredError), PsfError> {
     let first = trace(start)?;
     let truth = Truth::trace(&first, &wanted.places, cancel)?;
-    let (mut settings, mut error) = (start.clone(), truth.error_of(&first, cancel)?);
+    // Most pictures that are wrong are so for their outlines.
+    let (mut settings, mut bank) = finer_for_pupils(&trace, (start.clone(), first), wanted)?;
+    let mut error = truth.error_of(&bank, cancel)?;
+    let n_for_pupils = settings.n_samples();
     // An axis that did not help once is not tried again: what is left is not its.
     let mut useful = Along::EACH.to_vec();
     while error.p90 > wanted.target {
-        let step = |along: Along| -> Result<Option<Step>, PsfError> {
+        let step = |along: Along| -> Result<Option<Step<B>>, PsfError> {
             let Some(finer) = along.refined(&settings).filter(|finer| finer.n_samples() <= wanted.most_samples) else {
                 return Ok(None);
             };
-            let found = truth.error_of(&trace(&finer)?, cancel)?;
+            let bank = trace(&finer)?;
+            let found = truth.error_of(&bank, cancel)?;
             // What it gains for what it costs.
             let growth = finer.n_samples() as f64 / settings.n_samples() as f64;
             let gain = (error.p90 / found.p90.max(1e-9)).ln() / growth.ln();
-            Ok((found.p90 < (1.0 - LEAST_GAIN) * error.p90).then_some(Step { settings: finer, error: found, gain }))
+            Ok((found.p90 < (1.0 - LEAST_GAIN) * error.p90).then_some(Step {
+                settings: finer,
+                error: found,
+                gain,
+                bank,
+            }))
         };
-        let mut best: Option<Step> = None;
+        let mut best: Option<Step<B>> = None;
         let mut helped = vec![];
         for along in useful {
             let Some(tried) = step(along)? else { continue };
@@ -195,16 +211,36 @@ fn refined_until<B: Sampled>(
             useful = Along::EACH.to_vec();
         }
         let Some(best) = best else { break };
-        (settings, error) = (best.settings, best.error);
+        (settings, error, bank) = (best.settings, best.error, best.bank);
+    }
+    if settings.n_samples() > n_for_pupils {
+        (settings, bank) = finer_for_pupils(&trace, (settings, bank), wanted)?;
+        error = truth.error_of(&bank, cancel)?;
     }
     Ok((settings, MeasuredError { target: Some(wanted.target), ..error }))
 }
 
+/// Halves fields about which areas of pupils are off by more than they may, until none are, they were halved often enough or there would be too many samples.
+fn finer_for_pupils<B: Sampled>(
+    trace: impl Fn(&BankSettings) -> Result<B, PsfError>,
+    (mut settings, mut bank): (BankSettings, B),
+    wanted: &AdaptiveSettings,
+) -> Result<(BankSettings, B), PsfError> {
+    let is_allowed = |finer: &BankSettings| finer.n_samples() <= wanted.most_samples;
+    for _ in 0..MOST_HALVINGS {
+        let Some(finer) = bank.finer_for_pupils(AREA_OVER_PICTURE * wanted.target).filter(is_allowed) else { break };
+        bank = trace(&finer)?;
+        settings = finer;
+    }
+    Ok((settings, bank))
+}
+
 /// A refinement that helps.
-struct Step {
+struct Step<B> {
     settings: BankSettings,
     error: MeasuredError,
     gain: f64,
+    bank: B,
 }
 
 impl Along {
@@ -279,6 +315,9 @@ trait Sampled: Sync {
 
     /// Returns the picture of a place as it interpolates it; `None` of one that it takes to be dark.
     fn interpolated(&self, place: PsfQuery) -> Option<Kernel>;
+
+    /// Returns settings with more fields where areas of pupils between them are off by more than a share of the largest; `None` where they are not.
+    fn finer_for_pupils(&self, most_off: f64) -> Option<BankSettings>;
 }
 
 fn between(list: &[f64], part: f64) -> f64 {
@@ -312,6 +351,11 @@ impl Sampled for RotationalBank {
     fn interpolated(&self, place: PsfQuery) -> Option<Kernel> {
         Some(self.kernel_and_model(place).0)
     }
+
+    fn finer_for_pupils(&self, most_off: f64) -> Option<BankSettings> {
+        let fields = FieldSampling::Radial(self.fields_for_pupils(most_off)?);
+        Some(BankSettings { fields, ..self.settings().clone() })
+    }
 }
 
 impl Sampled for GeneralBank {
@@ -337,6 +381,11 @@ impl Sampled for GeneralBank {
 
     fn interpolated(&self, place: PsfQuery) -> Option<Kernel> {
         Some(self.kernel_and_model(place)?.0)
+    }
+
+    /// Of fields over a grid areas are known at the samples alone, and where light ends.
+    fn finer_for_pupils(&self, _: f64) -> Option<BankSettings> {
+        None
     }
 }
 
@@ -447,6 +496,27 @@ mod tests {
         let even = BankSettings { fields: FieldSampling::Radial(even), ..start };
         let even = LensImageModel::build(&lens, &even).unwrap().measured_error(&places, &Cancel::new()).unwrap();
         assert!(even.p90 > 4.0 * error.p90, "{even:?} {error:?}");
+    }
+
+    /// Wide open, rims cut the pupil of the double Gauss from the smallest fields on; stopped down, only far out.
+    #[test]
+    fn fields_are_closer_where_rims_begin_to_cut_the_pupil() {
+        let fields_at = |f_number: f64, last_tan: f64| {
+            let lens = Lens::built_in("dgauss-50mm").unwrap().with_f_number(f_number, 550.0).unwrap();
+            let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+            let start =
+                BankSettings::covering(film_distance_mm, last_tan, (2.0, 2.0), (550.0, 550.0), Diffraction::None);
+            let wanted = AdaptiveSettings::STANDARD;
+            let bank = LensImageModel::build_adaptive(&lens, &start, &wanted, &|_| {}, &Cancel::new()).unwrap();
+            (bank.settings().fields.axes().0.to_vec(), bank)
+        };
+        let (fields, bank) = fields_at(2.03, 0.25);
+        let steps: Vec<f64> = fields.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(fields.len() > 9 && steps[0] < 0.6 * steps[steps.len() - 1], "{fields:?}");
+        let Ok(bank) = bank.form() else { panic!("the lens has an axis") };
+        assert_eq!(bank.fields_for_pupils(1e-3), None);
+        assert!(bank.fields_for_pupils(1e-6).is_some_and(|more| more.len() > fields.len()));
+        assert_eq!(fields_at(8.0, 0.15).0.len(), 9);
     }
 
     #[test]

@@ -328,6 +328,39 @@ impl RotationalBank {
         PupilFunctionFit::mix(weighted.into_iter())
     }
 
+    /// Returns the fields with one more in the middle, in angle, of any two between which areas of pupils, interpolated as rays are, are off by more than a
+    /// share of the largest, at some depth and wavelength; `None` if none are.
+    ///
+    /// Where a rim begins to cut the pupil its outline changes at once, and blurs have that outline: a uniform plane is off by as much as the area where their
+    /// rms radius is a quarter of the way from one field to the next or more, and by less where they are narrower.
+    pub(crate) fn fields_for_pupils(&self, most_off: f64) -> Option<Vec<f64>> {
+        const WIDE: f64 = 0.25;
+        let is_off = |column: &[RayMapMoments], knot: usize| {
+            let largest_mm2 = column.iter().map(|summary| summary.pupil_mm2).fold(0.0, f64::max);
+            let [inner, outer] = [knot, knot + 1].map(|knot| knot * GEOMETRY_STEPS);
+            let radius_mm = |place: usize| column[place].centroid_mm.x * self.geometry_fields[place];
+            let wide_mm = WIDE * (radius_mm(outer) - radius_mm(inner)).abs();
+            (inner + 1..outer).any(|place| {
+                let here = &column[place];
+                let stencil = self.fields.stencil(self.geometry_fields[place].atan());
+                let known = |(knot, weight): (usize, f64)| weight * column[knot * GEOMETRY_STEPS].pupil_mm2;
+                let between_mm2: f64 = stencil.iter().map(known).sum();
+                // How much of it is seen.
+                let share = if here.rms_mm < wide_mm { here.rms_mm / wide_mm } else { 1.0 };
+                share * (between_mm2 - here.pupil_mm2).abs() > most_off * largest_mm2
+            })
+        };
+        let columns = || self.summaries.chunks(self.geometry_fields.len());
+        let off = (0..self.n_fields() - 1).filter(|&knot| columns().any(|column| is_off(column, knot)));
+        let middle = |knot: usize| (0.5 * (self.fields.knots()[knot] + self.fields.knots()[knot + 1])).tan();
+        let more: Vec<f64> = off.map(middle).collect();
+        (!more.is_empty()).then(|| {
+            let mut fields = [radius(&self.settings), &more].concat();
+            fields.sort_by(f64::total_cmp);
+            fields
+        })
+    }
+
     pub(crate) fn record(&self, field_tan: f64, dioptres: f64, wavelength_nm: f64) -> RayMap {
         let n = self.fields.knots().len();
         let fields = self.fields.stencil(field_tan.atan());

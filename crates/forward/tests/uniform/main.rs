@@ -41,7 +41,6 @@ fn wide_double_gauss_has_no_seams() {
             aside_mm: 0.0,
             diffraction: Diffraction::None,
             bands_nm: ONE_BAND_NM,
-            is_adaptive: false,
         },
         2e-3,
     );
@@ -60,7 +59,6 @@ fn wide_tessar_has_no_seams() {
             aside_mm: 0.0,
             diffraction: Diffraction::None,
             bands_nm: ONE_BAND_NM,
-            is_adaptive: false,
         },
         2e-3,
     );
@@ -80,7 +78,26 @@ fn defocused_lens_has_no_seams() {
             aside_mm: 0.0,
             diffraction: Diffraction::None,
             bands_nm: ONE_BAND_NM,
-            is_adaptive: false,
+        },
+        2e-3,
+    );
+}
+
+/// Rims begin to cut the pupil between the first two of nine fields, which were 1.5 mm apart on the film: rays between them were those of neither outline,
+/// and the plane .25 % too dark on the axis.
+#[test]
+fn defocused_lens_is_as_bright_on_the_axis() {
+    check(
+        &Case {
+            lens: "dgauss-50mm",
+            f_number: 2.03,
+            focus_mm: 2000.0,
+            plane_mm: 500.0,
+            columns: 724,
+            pitch_um: 31.2155,
+            aside_mm: 0.0,
+            diffraction: Diffraction::None,
+            bands_nm: ONE_BAND_NM,
         },
         2e-3,
     );
@@ -101,7 +118,6 @@ fn half_defocused_lens_is_as_bright_in_the_middle() {
             aside_mm: 0.0,
             diffraction: Diffraction::None,
             bands_nm: ONE_BAND_NM,
-            is_adaptive: false,
         },
         1.2e-3,
     );
@@ -121,7 +137,6 @@ fn half_defocused_lens_is_as_bright_about_an_axis_elsewhere() {
             aside_mm: 1.0,
             diffraction: Diffraction::None,
             bands_nm: ONE_BAND_NM,
-            is_adaptive: false,
         },
         2e-3,
     );
@@ -139,7 +154,6 @@ fn defocused_on_a_curved_field(f_number: f64, bands_nm: &'static [f64]) -> Case 
         aside_mm: 0.0,
         diffraction: Diffraction::None,
         bands_nm,
-        is_adaptive: false,
     }
 }
 
@@ -156,7 +170,7 @@ fn stopped_down_lens_with_a_curved_field_has_no_seams() {
     check(&defocused_on_a_curved_field(8.0, THREE_BANDS_NM), 2e-3);
 }
 
-/// Checks how bright a plane in focus is from corner to corner of a film of this half diagonal, on as many fields as usual.
+/// Checks how bright a plane in focus is from corner to corner of a film of this half diagonal.
 #[track_caller]
 fn check_in_focus((lens, f_number, radius_mm): (&'static str, f64, f64), flatness: f64) {
     let columns = 724;
@@ -170,7 +184,6 @@ fn check_in_focus((lens, f_number, radius_mm): (&'static str, f64, f64), flatnes
         aside_mm: 0.0,
         diffraction: Diffraction::None,
         bands_nm: ONE_BAND_NM,
-        is_adaptive: false,
     };
     let (error, at_mm) = Uniform::new(&case).worst_illumination();
     println!("{lens} f/{f_number} in focus: illumination {error:+.2e} at {at_mm:.2} mm");

@@ -20,7 +20,8 @@ const MOST_SAMPLES: (usize, usize) = (4000, 12_000);
 #[serde(deny_unknown_fields)]
 pub enum BankSpec {
     /// Rays of 9 fields (11 × 11 of a lens without an axis of symmetry), 9 depths and 4 wavelengths, interpolated, and of more where
-    /// the error at nine tenths of the places between them is above 2 %.
+    /// the error at nine tenths of the places between them is above 2 %; and of more fields where rims begin to cut the pupil, until its areas
+    /// between fields are within .1 % where blurs show it.
     #[default]
     Standard,
     /// Rays of as few samples as an error needs.
