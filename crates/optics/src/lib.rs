@@ -59,7 +59,7 @@ pub use mirror_shadows::MirrorShadow;
 pub use mono::{AxialBeam, MonoLens};
 pub use paraxial::{Conjugate, FirstOrder};
 pub use placement::{CoordinateBreak, Placement};
-pub use pupil::{PupilBoundary, PupilPlane, PupilRegion};
+pub use pupil::{FilmCone, PupilBoundary, PupilPlane, PupilRegion};
 pub use rays::{Losses, RayBatch, RayFate, SurfaceLosses};
 pub use rays_f32::RayBatchF32;
 pub use reversed::ReversedLens;

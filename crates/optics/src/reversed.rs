@@ -112,7 +112,7 @@ impl ReversedLens {
     /// axis, mm; −∞ for one that does not get through. Openings count as rims, obscurations do not.
     ///
     /// With `to_stop` the surfaces are those behind the stop and the stop.
-    pub(crate) fn clearances_mm(&self, rays: &mut RayBatch, to_stop: bool) -> Vec<f64> {
+    pub fn clearances_mm(&self, rays: &mut RayBatch, to_stop: bool) -> Vec<f64> {
         let part = if to_stop { Part::ToStop } else { Part::Whole };
         let steps = part_of(&mirrored_steps(&self.forward, rays.object_z_mm), self.forward.stop(), part);
         let mut clearances_mm = vec![f64::INFINITY; rays.len()];

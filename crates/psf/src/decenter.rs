@@ -5,8 +5,6 @@ use std::borrow::Cow;
 use dioptric_optics::Lens;
 use glam::DVec2;
 
-use crate::PsfQuery;
-
 /// Returns the lens, on its axis, whose fields may be sampled along a radius, and how far the lens stands from there, mm to the
 /// right and upwards: of a rotationally symmetric lens itself, and of one that is moved sideways as a whole
 /// ([`Lens::recentered`]) the one that stayed.
@@ -43,9 +41,9 @@ impl Decenter {
         self == Self::default()
     }
 
-    /// How far the axis lies from the middle of the film at most, mm.
-    pub(crate) fn length_mm(self) -> f64 {
-        self.mm.length()
+    /// Where the axis stands in the scene, mm to the right and upwards.
+    pub(crate) fn mm(self) -> DVec2 {
+        self.mm
     }
 
     /// The place of the axis in the picture, mm from the film's middle.
@@ -56,15 +54,5 @@ impl Decenter {
     /// The field of the scene that lies on the axis, at a depth.
     pub(crate) fn axis_tan(self, dioptres: f64) -> DVec2 {
         1e-3 * dioptres * self.mm
-    }
-
-    /// Returns the lens's field of a field of the scene.
-    pub(crate) fn seen_from_lens(self, field_tan: DVec2, dioptres: f64) -> DVec2 {
-        field_tan - self.axis_tan(dioptres)
-    }
-
-    /// Returns the query of a point of the scene as the lens sees it.
-    pub(crate) fn query(self, query: PsfQuery) -> PsfQuery {
-        PsfQuery { field_tan: self.seen_from_lens(query.field_tan, query.dioptres), ..query }
     }
 }

@@ -4,7 +4,7 @@ use dioptric_diffraction::DiffractionError;
 use dioptric_optics::OpticsError;
 use dioptric_spectrum::Cancelled;
 
-/// A bank or point spread function that cannot be made.
+/// A lens's image or point spread function that cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum PsfError {
     /// The lens cannot be traced.
@@ -13,16 +13,6 @@ pub enum PsfError {
     /// The waves of a point cannot be summed.
     #[error(transparent)]
     Diffraction(#[from] DiffractionError),
-    /// An axis of the bank that is empty, or whose values do not ascend or are out of range.
-    #[error("{axis} must be an ascending list of {expected}, found {found:?}")]
-    Axis {
-        /// The name of the setting.
-        axis: &'static str,
-        /// What its values must be.
-        expected: &'static str,
-        /// The list.
-        found: Vec<f64>,
-    },
     /// A number out of range.
     #[error("{key} is {found}, expected {expected}")]
     Setting {
@@ -33,13 +23,13 @@ pub enum PsfError {
         /// What it must be.
         expected: &'static str,
     },
-    /// A lens that lets no light of an axial point through to the film.
-    #[error("no light of an axial point at {dioptres} dioptres and {wavelength_nm} nm reaches the film through {lens}")]
+    /// A lens through which no light reaches the film.
+    #[error("no light of {wavelength_nm} nm reaches a film {film_distance_mm} mm behind {lens}")]
     Dark {
         /// Name of the lens.
         lens: String,
-        /// The point's vergence, 1/m.
-        dioptres: f64,
+        /// Distance of the film behind the last vertex, mm.
+        film_distance_mm: f64,
         /// Wavelength, nm.
         wavelength_nm: f64,
     },

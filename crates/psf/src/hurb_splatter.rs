@@ -11,9 +11,9 @@ use crate::{
     blurred_edge::LANES,
     mesh::Mesh,
     raster::Raster,
-    ray_map::Node,
     ring::{Cut, PIECE, Piece, Ring},
     splat::{Splat, SplatBuffer, Splats},
+    spots::Node,
 };
 
 /// A cell this many standard deviations across, both ways, is drawn as a polygon.

@@ -1,6 +1,6 @@
 //! A point spread function on pixels.
 
-use glam::{DVec2, IVec2};
+use glam::IVec2;
 use ndarray::{Array2, s};
 
 /// Within how much of the borders of a window diffracted light fades out, in units of λN: what is spread beyond has no edge there then.
@@ -17,17 +17,15 @@ pub struct Kernel {
     pub pitch_um: f64,
     /// Where the middle pixel lies, pixels to the right of the one that the kernel is about and below it; mostly 0.
     pub middle_px: IVec2,
-    /// Where the centroid lies, pixels to the right of the middle of the middle pixel and below it; mostly 0.
-    pub centroid_px: DVec2,
     /// λN of the light on the film, pixels; 0 without diffraction. The samples of diffracted light, which has no end at the borders, fade out there:
     /// [`fade_px`](Self::fade_px).
     pub lambda_n_px: f64,
 }
 
 impl Kernel {
-    /// Returns the kernel of these samples, odd × odd, that is about the middle of the middle one, where its centroid lies.
+    /// Returns the kernel of these samples, odd × odd, that is about the middle of the middle one.
     pub fn centered(samples: Array2<f32>, pitch_um: f64) -> Self {
-        Self { samples, pitch_um, middle_px: IVec2::ZERO, centroid_px: DVec2::ZERO, lambda_n_px: 0.0 }
+        Self { samples, pitch_um, middle_px: IVec2::ZERO, lambda_n_px: 0.0 }
     }
 
     /// Returns the kernel that blurs nothing.
@@ -89,9 +87,14 @@ impl Kernel {
         differences.sum::<f64>() / other.sum()
     }
 
-    /// Returns the kernel with the sum 1.
+    /// Returns the kernel with the sum 1; one without energy becomes that which blurs nothing.
+    #[must_use]
     pub fn normalized(mut self) -> Self {
-        let scale = (1.0 / self.sum()) as f32;
+        let sum = self.sum();
+        if sum.is_nan() || sum <= 0.0 {
+            return Self::identity(self.pitch_um);
+        }
+        let scale = (1.0 / sum) as f32;
         self.samples.mapv_inplace(|e| e * scale);
         self
     }

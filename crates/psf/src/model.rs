@@ -1,311 +1,384 @@
-//! The image of a traced lens: one model, whatever the symmetry of the lens.
+//! The image of a traced lens, described from the film.
 
-use dioptric_optics::Lens;
-use dioptric_spectrum::Cancel;
-use glam::DVec2;
-use ndarray::Array2;
-
-use crate::{
-    BankSettings, FieldSampling, Kernel, MeasuredError, ModelUse, PsfError, PsfQuery, RadialGeometry,
-    decenter::Decenter, field_to_film::FieldToFilm, general::GeneralBank, ray_map::RayMap, render::Layout,
-    rotational::RotationalBank,
+use std::{
+    collections::{HashMap, VecDeque},
+    sync::{Arc, Mutex, PoisonError},
 };
 
-/// The image that a lens forms, from ray maps sampled over field, depth and wavelength.
+use dioptric_diffraction::{CircularStop, WaveQuality, WaveWindow, WindowCenter, wave_psf};
+use dioptric_optics::{FilmCone, Lens, MonoLens, ObjectPoint, ReversedLens};
+use glam::DVec2;
+
+use crate::{
+    FilmMap, FilmQuery, ImageSettings, Kernel, LensImage, PsfError, PupilDivision,
+    bundle::{Bundle, FilmPointJob, Frame, Moments, unobscured},
+    decenter::Decenter,
+    hurb_splatter::StopHurb,
+    part_image::PartImage,
+    pupil::Outline,
+    render::Layout,
+    survey::Survey,
+};
+
+/// Bytes of bundles that are kept for each wavelength.
+const MOST_KEPT_BYTES: usize = 48 << 20;
+/// Steps per doubling in which the reach of a survey grows.
+const REACH_STEPS: f64 = 4.0;
+/// Radii, over the film's distance, at which light is looked for before anything else is done.
+const PROBED_RADII: [f64; 6] = [0.0, 0.05, 0.12, 0.25, 0.5, 1.0];
+
+/// The image that a lens forms, from rays traced back from the film.
 ///
-/// It interpolates rays, not pictures: 50 to 300 samples are better than thousands of blended ones. Where points land and
-/// how bright they are is kept apart from blur. Of a rotationally symmetric lens, on the axis or moved sideways as a whole, fields
-/// are sampled along one radius and turned; of any other over a grid ([`FieldSampling`]).
-///
-/// Fields are tangents at the entrance pupil and places mm from the film's middle, both in the picture frame (x right, y
-/// up); depths are dioptres from the entrance pupil. What lies outside the ranges of the samples is moved to their ends.
+/// Nothing is sampled over depth or wavelength: the rays that a point of the film sees leave the front of the lens along straight
+/// lines, which are at all depths at once. Directions and irradiances are tabulated over the film, to 1e-6 and 1e-4; the bundle of a
+/// kernel is traced where it is asked for.
 #[derive(Clone, Debug)]
 pub struct LensImageModel {
-    lens: Lens,
-    pub(crate) form: Form,
-    /// Of fields along a radius: how far the lens stands from the axis of scene and film.
-    decenter: Decenter,
-    error: Option<MeasuredError>,
+    shared: Arc<Shared>,
 }
 
-/// What was sampled.
-#[derive(Clone, Debug)]
-pub(crate) enum Form {
-    /// Of a lens with an axis of symmetry.
-    Rotational(Box<RotationalBank>),
-    /// Of any lens.
-    General {
-        bank: Box<GeneralBank>,
-        /// Which field is seen where; `None` of [`FieldSampling::Points`].
-        field_to_film: Option<Box<FieldToFilm>>,
-    },
+#[derive(Debug)]
+pub(crate) struct Shared {
+    lens: Lens,
+    /// The lens as it is traced: on its axis where it has one.
+    centered: Lens,
+    is_rotational: bool,
+    decenter: Decenter,
+    settings: ImageSettings,
+    wavelengths_nm: Vec<f64>,
+    reference: MonoLens,
+    /// The depth in focus at the reference wavelength.
+    focus_dioptres: f64,
+    colors: Mutex<HashMap<u64, Arc<Color>>>,
+    /// The farthest points of the film that were asked for, mm.
+    reach_mm: Mutex<f64>,
+}
+
+/// The lens at one wavelength.
+#[derive(Debug)]
+pub(crate) struct Color {
+    pub(crate) lens: MonoLens,
+    reversed: ReversedLens,
+    unobscured: Option<ReversedLens>,
+    surveys: Mutex<Vec<Arc<Survey>>>,
+    bundles: Mutex<KeptBundles>,
+}
+
+/// Bundles by the points of the film that see them, the oldest dropped first.
+#[derive(Debug, Default)]
+struct KeptBundles {
+    by_place: HashMap<[u64; 2], Option<Arc<Bundle>>>,
+    in_order: VecDeque<[u64; 2]>,
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl LensImageModel {
-    /// Traces the samples on all threads.
-    ///
-    /// Along a radius, fields that see no light at some depth or wavelength are left out, and those beyond them; on a grid
-    /// they are dark.
+    /// Returns the image of a lens at these wavelengths, nm.
     ///
     /// # Errors
-    /// When the settings make no sense, the lens has no index at a wavelength, a lens without an axis of symmetry is to be
-    /// sampled along a radius, or so few fields see light that nothing can be imaged.
-    pub fn build(lens: &Lens, settings: &BankSettings) -> Result<Self, PsfError> {
-        Self::build_with(lens, settings, &|_| {}, &Cancel::new())
-    }
-
-    /// Traces the samples as [`build`](Self::build) does; `progress` hears the part that is done, from 0 to 1, on any
-    /// thread.
-    ///
-    /// # Errors
-    /// Those of [`build`](Self::build), and [`PsfError::Cancelled`] a few milliseconds after `cancel` asks for it.
-    pub fn build_with(
-        lens: &Lens,
-        settings: &BankSettings,
-        progress: &(dyn Fn(f64) + Sync),
-        cancel: &Cancel,
-    ) -> Result<Self, PsfError> {
-        let mut decenter = Decenter::default();
-        let form = match &settings.fields {
-            FieldSampling::Radial(_) => {
-                let (centered, aside) = Decenter::of(lens, settings.reference_wavelength_nm);
-                decenter = aside;
-                Form::Rotational(Box::new(RotationalBank::build(&centered, settings, progress, cancel)?))
-            }
-            FieldSampling::Grid { .. } => {
-                let mut bank = GeneralBank::build(lens, settings, progress, cancel)?;
-                let field_to_film = Some(Box::new(FieldToFilm::new(&mut bank, cancel)?));
-                Form::General { bank: Box::new(bank), field_to_film }
-            }
-            FieldSampling::Points { .. } => {
-                let bank = Box::new(GeneralBank::build(lens, settings, progress, cancel)?);
-                Form::General { bank, field_to_film: None }
-            }
+    /// When the settings make no sense, the lens has no index at a wavelength, or no light reaches the film.
+    pub fn new(lens: &Lens, wavelengths_nm: &[f64], settings: &ImageSettings) -> Result<Self, PsfError> {
+        settings.check()?;
+        let reference = lens.at(settings.reference_wavelength_nm)?;
+        let (centered, decenter) = Decenter::of(lens, settings.reference_wavelength_nm);
+        let centered = centered.into_owned();
+        let center_z_mm = reference.projection_center_z_mm();
+        let focus_mm = reference.object_distance_mm_for(settings.film_distance_mm);
+        let focus_dioptres = focus_mm.map_or(0.0, |distance_mm| 1e3 / (distance_mm + center_z_mm));
+        let shared = Shared {
+            lens: lens.clone(),
+            is_rotational: centered.is_rotational(),
+            centered,
+            decenter,
+            settings: *settings,
+            wavelengths_nm: wavelengths_nm.to_vec(),
+            reference,
+            focus_dioptres: if focus_dioptres.is_finite() { focus_dioptres } else { 0.0 },
+            colors: Mutex::default(),
+            reach_mm: Mutex::default(),
         };
-        progress(1.0);
-        Ok(Self { lens: lens.clone(), form, decenter, error: None })
-    }
-
-    pub(crate) fn form(&self) -> Result<&RotationalBank, &GeneralBank> {
-        match &self.form {
-            Form::Rotational(bank) => Ok(bank),
-            Form::General { bank, .. } => Err(bank),
+        for &wavelength_nm in wavelengths_nm {
+            let color = shared.new_color(wavelength_nm)?;
+            shared.check_light(&color)?;
+            locked(&shared.colors).insert(wavelength_nm.to_bits(), Arc::new(color));
         }
-    }
-
-    /// How far the lens stands from the axis of scene and film.
-    pub(crate) fn decenter(&self) -> Decenter {
-        self.decenter
-    }
-
-    /// Of a grid of fields: the sample that stands for each, itself where it is lit.
-    pub(crate) fn nearest_lit(&self) -> Option<&[usize]> {
-        match &self.form {
-            Form::General { field_to_film: Some(inverse), .. } => Some(inverse.nearest_lit()),
-            _ => None,
-        }
-    }
-
-    /// Returns the ray map of a point, of a dark one that of the nearest lit field, and how it is turned in the picture.
-    ///
-    /// # Panics
-    /// Of [`FieldSampling::Points`].
-    pub(crate) fn record(&self, query: PsfQuery) -> (RayMap, DVec2) {
-        let PsfQuery { field_tan, dioptres, wavelength_nm, .. } = self.decenter.query(query);
-        match &self.form {
-            Form::Rotational(bank) => {
-                let turn = field_tan.try_normalize().unwrap_or(DVec2::X);
-                (bank.record(field_tan.length(), dioptres, wavelength_nm), turn)
-            }
-            Form::General { bank, field_to_film } => {
-                let inverse = field_to_film.as_ref().expect("single points are not divided");
-                (inverse.record(bank, field_tan, dioptres, wavelength_nm), DVec2::X)
-            }
-        }
-    }
-
-    /// Returns a point's ray map laid out on pixels.
-    pub(crate) fn ray_layout<'a>(&self, record: &'a RayMap, query: PsfQuery) -> Layout<'a> {
-        match self.form() {
-            Ok(bank) => bank.layout(record, self.decenter.query(query), None),
-            Err(bank) => bank.layout(record, query, None),
-        }
-    }
-
-    /// Returns the model with the error of its interpolation noted: see [`measured_error`](Self::measured_error).
-    #[must_use]
-    pub fn with_error(self, error: MeasuredError) -> Self {
-        Self { error: Some(error), ..self }
-    }
-
-    /// The error of what lies between the samples, if it was measured.
-    pub fn error(&self) -> Option<MeasuredError> {
-        self.error
-    }
-
-    /// What was sampled, dark fields included.
-    pub fn settings(&self) -> &BankSettings {
-        match self.form() {
-            Ok(bank) => bank.settings(),
-            Err(bank) => bank.settings(),
-        }
+        Ok(Self { shared: Arc::new(shared) })
     }
 
     /// The lens.
     pub fn lens(&self) -> &Lens {
-        &self.lens
+        &self.shared.lens
     }
 
-    /// The number of fields: of those along a radius, as many as see light.
-    pub fn n_fields(&self) -> usize {
-        match self.form() {
-            Ok(bank) => bank.n_fields(),
-            Err(bank) => bank.settings().fields.len(),
-        }
+    /// How the lens stands and is traced.
+    pub fn settings(&self) -> &ImageSettings {
+        &self.shared.settings
     }
 
-    /// The field (tangent) beyond which light reaches the film but is not gathered to an image ([`GatheredFields`](crate::GatheredFields)), where the model
-    /// ends for that.
-    pub fn scattered_beyond_tan(&self) -> Option<f64> {
-        self.form().ok().filter(|bank| bank.is_scattered_beyond()).map(|bank| bank.last_field_tan())
+    /// The wavelengths that it was made for, nm; it can be asked for others.
+    pub fn wavelengths_nm(&self) -> &[f64] {
+        &self.shared.wavelengths_nm
     }
 
-    /// Whether samples about a point see light: of dark points there are no pictures.
-    pub fn is_lit(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> bool {
-        match self.form() {
-            Ok(bank) => self.decenter.seen_from_lens(field_tan, dioptres).length() <= bank.last_field_tan(),
-            Err(bank) => bank.centroid_mm(field_tan, dioptres, wavelength_nm).is_some(),
-        }
+    /// The depth in focus at the reference wavelength, dioptres; 0 where none is.
+    pub fn focus_dioptres(&self) -> f64 {
+        self.shared.focus_dioptres
     }
 
-    /// Returns the point spread function of a point about its centroid.
-    ///
-    /// The window holds the whole geometric picture, and of diffraction's Gaussians all but their far tails; the sum says
-    /// how much. Of a dark point it is that of the nearest field that sees light.
-    pub fn kernel(&self, query: PsfQuery) -> Kernel {
-        match &self.form {
-            Form::Rotational(bank) => bank.kernel_and_model(self.decenter.query(query)).0,
-            Form::General { bank, field_to_film: Some(inverse) } => inverse.kernel(bank, query),
-            Form::General { bank, field_to_film: None } => {
-                bank.kernel_and_model(query).map_or_else(|| Kernel::identity(query.pitch_um), |(kernel, _)| kernel)
-            }
-        }
-    }
-
-    /// Returns the point spread function of a point about its centroid and the model that drew it, or `None` of a dark point.
-    pub fn kernel_and_model(&self, query: PsfQuery) -> Option<(Kernel, ModelUse)> {
-        match self.form() {
-            Ok(bank) => self.is_lit_at(query).then(|| bank.kernel_and_model(self.decenter.query(query))),
-            Err(bank) => bank.kernel_and_model(query),
-        }
-    }
-
-    /// Returns the energy on each pixel of a window of `size` × `size` about the centroid, in the picture frame, and the
-    /// model that drew it, or `None` of a dark point. The energy of the point is 1; what falls outside is lost.
-    pub fn picture(&self, query: PsfQuery, size: usize) -> Option<(Array2<f64>, ModelUse)> {
-        match self.form() {
-            Ok(bank) => self.is_lit_at(query).then(|| bank.picture(self.decenter.query(query), size)),
-            Err(bank) => bank.picture(query, size),
-        }
-    }
-
-    fn is_lit_at(&self, query: PsfQuery) -> bool {
-        self.is_lit(query.field_tan, query.dioptres, query.wavelength_nm)
-    }
-
-    /// Returns how far from the centroid the farthest ray of a point lands, mm, or `None` of a dark point.
-    pub fn extent_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<f64> {
-        match self.form() {
-            Ok(bank) => self.is_lit(field_tan, dioptres, wavelength_nm).then(|| {
-                let field_tan = self.decenter.seen_from_lens(field_tan, dioptres);
-                bank.extent_mm(field_tan.length(), dioptres, wavelength_nm)
-            }),
-            Err(bank) => bank.extent_mm(field_tan, dioptres, wavelength_nm),
-        }
-    }
-
-    /// Returns how much of the kernel of a point is wave optics, and not HURB: 1 or 0, or between them where they are
-    /// blended. It is 0 unless the settings have [`Diffraction::Wave`](crate::Diffraction::Wave), and of dark points.
+    /// Returns how much of the kernel of a point of the film is wave optics, and not HURB: 1 or 0, or between them where they are
+    /// blended. It is 0 unless the settings have [`Diffraction::Wave`](crate::Diffraction::Wave), and in darkness.
     ///
     /// It falls with the range of phases B over the pupil that the diffraction integral has to follow, on a scale of its
     /// logarithm: from 1 at B = 200 to 0 at B = 400, a blur of about ten waves of defocus.
-    pub fn wave_fraction(&self, query: PsfQuery) -> f64 {
-        match self.form() {
-            Ok(bank) => bank.wave_fraction(self.decenter.query(query)),
-            Err(bank) => bank.wave_fraction(query),
+    pub fn wave_fraction(&self, query: FilmQuery) -> f64 {
+        let shared = &self.shared;
+        let color = shared.color(query.wavelength_nm);
+        let Some((bundle, map, frame)) = shared.bundle(&color, query.place_mm) else { return 0.0 };
+        let spots = bundle.spots(&map, &frame, query.place_mm, query.dioptres);
+        Layout::new(&spots, shared.bending(&color), query.pitch_um).wave_fraction(shared.settings.diffraction)
+    }
+
+    /// Returns the images through the parts of a division of the pupil, whose irradiances add up to that of the whole: views of the scene
+    /// from as many places, each blurred by what goes through its part. Blur radii are those of the whole pupil.
+    ///
+    /// The pupil of each point of the film is divided as that point sees it, vignetted or not.
+    ///
+    /// # Errors
+    /// For diffraction integrals, which parts of a pupil do not add up to.
+    pub fn through(&self, division: PupilDivision) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
+        let images = PartImage::all(&self.shared, division)?;
+        Ok(images.into_iter().map(|image| Arc::new(image) as Arc<dyn LensImage + Send>).collect())
+    }
+}
+
+impl LensImage for LensImageModel {
+    fn is_symmetric(&self) -> bool {
+        self.shared.is_rotational && self.shared.decenter.is_none()
+    }
+
+    fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
+        self.shared.survey(&self.shared.color(wavelength_nm), reach_mm).map.clone()
+    }
+
+    fn kernel(&self, query: FilmQuery) -> Kernel {
+        self.shared.kernel(query, None)
+    }
+
+    fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        self.shared.blur_radius_mm(place_mm, dioptres, wavelength_nm)
+    }
+
+    fn spread_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        self.shared.spread_mm(place_mm, dioptres, wavelength_nm)
+    }
+
+    fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
+        self.through(PupilDivision::new(n_parts))
+    }
+}
+
+impl Shared {
+    pub(crate) fn settings(&self) -> &ImageSettings {
+        &self.settings
+    }
+
+    /// Whether the lens as it is traced has an axis of symmetry.
+    pub(crate) fn is_rotational(&self) -> bool {
+        self.is_rotational
+    }
+
+    pub(crate) fn decenter(&self) -> Decenter {
+        self.decenter
+    }
+
+    pub(crate) fn focus_dioptres(&self) -> f64 {
+        self.focus_dioptres
+    }
+
+    fn new_color(&self, wavelength_nm: f64) -> Result<Color, PsfError> {
+        let lens = self.centered.at(wavelength_nm)?;
+        Ok(Color {
+            reversed: lens.reversed(),
+            unobscured: unobscured(&lens),
+            lens,
+            surveys: Mutex::default(),
+            bundles: Mutex::default(),
+        })
+    }
+
+    /// Returns the lens at a wavelength, or at the nearest one that it was made for where it is not known.
+    pub(crate) fn color(&self, wavelength_nm: f64) -> Arc<Color> {
+        if let Some(color) = locked(&self.colors).get(&wavelength_nm.to_bits()) {
+            return color.clone();
+        }
+        let color = self.new_color(wavelength_nm).map(Arc::new).unwrap_or_else(|_| {
+            let off = |nm: &&f64| (**nm - wavelength_nm).abs();
+            let nearest = self.wavelengths_nm.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+            let nearest_nm = nearest.copied().unwrap_or(self.settings.reference_wavelength_nm);
+            locked(&self.colors)[&nearest_nm.to_bits()].clone()
+        });
+        locked(&self.colors).entry(wavelength_nm.to_bits()).or_insert(color).clone()
+    }
+
+    /// Fails if no light reaches the film about its middle.
+    fn check_light(&self, color: &Color) -> Result<(), PsfError> {
+        const N_DIRECTIONS: usize = 16;
+        let n_directions = if self.is_rotational { 1 } else { N_DIRECTIONS };
+        let directions =
+            (0..n_directions).map(|i| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n_directions as f64));
+        let mut probes = directions
+            .flat_map(|direction| PROBED_RADII.map(|radius| direction * (radius * self.settings.film_distance_mm)));
+        let is_lit = |place_mm: DVec2| {
+            let cone = FilmCone::new(&color.reversed, -place_mm, self.settings.film_distance_mm);
+            cone.is_some_and(|cone| cone.is_lit())
+        };
+        match probes.any(is_lit) {
+            true => Ok(()),
+            false => Err(PsfError::Dark {
+                lens: self.lens.name().to_owned(),
+                film_distance_mm: self.settings.film_distance_mm,
+                wavelength_nm: color.lens.wavelength_nm(),
+            }),
         }
     }
 
-    /// Returns where the centroid of a point lands, mm.
-    ///
-    /// Fields beyond the last that sees light go on straight; of [`FieldSampling::Points`] a dark one has NaN.
-    pub fn centroid_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> DVec2 {
-        match &self.form {
-            Form::Rotational(bank) => {
-                let field_tan = self.decenter.seen_from_lens(field_tan, dioptres);
-                let direction = field_tan.try_normalize().unwrap_or(DVec2::X);
-                let radius_mm = bank.geometry(dioptres, wavelength_nm).image_radius_mm(field_tan.length());
-                direction * radius_mm + self.decenter.axis_mm()
-            }
-            Form::General { bank, field_to_film: Some(inverse) } => {
-                inverse.centroid_mm(bank, field_tan, dioptres, wavelength_nm)
-            }
-            Form::General { bank, .. } => {
-                bank.centroid_mm(field_tan, dioptres, wavelength_nm).unwrap_or(DVec2::splat(f64::NAN))
-            }
+    /// Returns what traces the bundle of a point of the film of the centered lens.
+    pub(crate) fn job<'a>(&self, color: &'a Color, place_mm: DVec2) -> FilmPointJob<'a> {
+        FilmPointJob {
+            lens: &color.reversed,
+            unobscured: color.unobscured.as_ref(),
+            film_distance_mm: self.settings.film_distance_mm,
+            center_z_mm: self.reference.projection_center_z_mm(),
+            mesh: self.settings.mesh(),
+            place_mm,
         }
     }
 
-    /// Returns irradiance on the film over radiance of a locally uniform scene, sr: the projected solid angle of the pupil
-    /// times `|dA_object / dA_film|`. It holds vignetting and every cosine; losses in glass are not in it.
-    ///
-    /// [`FieldSampling::Points`] do not tell it: there it is NaN.
-    pub fn irradiance_per_radiance(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        match &self.form {
-            Form::Rotational(bank) => {
-                let field_tan = self.decenter.seen_from_lens(field_tan, dioptres);
-                bank.geometry(dioptres, wavelength_nm).irradiance_per_radiance(field_tan.length())
-            }
-            Form::General { bank, field_to_film: Some(inverse) } => {
-                inverse.irradiance_per_radiance(bank, field_tan, dioptres, wavelength_nm)
-            }
-            Form::General { .. } => f64::NAN,
+    /// Returns the survey of the film up to `reach_mm` from its middle, or farther.
+    pub(crate) fn survey(&self, color: &Color, reach_mm: f64) -> Arc<Survey> {
+        let reach_mm = {
+            let mut known_mm = locked(&self.reach_mm);
+            *known_mm = known_mm.max(reach_mm);
+            // Of a lens moved sideways, as far from its axis.
+            *known_mm + self.decenter.mm().length()
+        };
+        let reach_mm = ((REACH_STEPS * reach_mm.max(1e-3).log2()).ceil() / REACH_STEPS).exp2();
+        let known = |surveys: &[Arc<Survey>]| surveys.iter().find(|survey| survey.reach_mm == reach_mm).cloned();
+        if let Some(survey) = known(&locked(&color.surveys)) {
+            return survey;
         }
+        // Threads that ask at once get the same, whoever is first.
+        let survey = Arc::new(Survey::new(self, color, reach_mm));
+        let mut surveys = locked(&color.surveys);
+        known(&surveys).unwrap_or_else(|| {
+            surveys.push(survey.clone());
+            survey
+        })
     }
 
-    /// Returns image height and brightness over the field, at one depth and wavelength; `None` unless fields are sampled
-    /// along a radius, about the middle of the scene.
-    pub fn radial_geometry(&self, dioptres: f64, wavelength_nm: f64) -> Option<RadialGeometry> {
-        Some(self.form().ok().filter(|_| self.decenter.is_none())?.geometry(dioptres, wavelength_nm))
+    /// Returns the bundle of a point of the film, the map that goes with it and the frame that it was traced in; `None` in darkness.
+    pub(crate) fn bundle(&self, color: &Color, place_mm: DVec2) -> Option<(Arc<Bundle>, Arc<FilmMap>, Frame)> {
+        let survey = self.survey(color, place_mm.length());
+        let from_axis_mm = place_mm - self.decenter.axis_mm();
+        // Of a lens with an axis, bundles are traced along +x and turned.
+        let (traced_mm, turn) = match self.is_rotational {
+            true => (DVec2::X * from_axis_mm.length(), from_axis_mm.try_normalize().unwrap_or(DVec2::X)),
+            false => (from_axis_mm, DVec2::X),
+        };
+        let frame = Frame { turn, aside_mm: self.decenter.mm() };
+        let key = traced_mm.to_array().map(f64::to_bits);
+        let known = locked(&color.bundles).by_place.get(&key).cloned();
+        let bundle = known.unwrap_or_else(|| {
+            let has_stop = self.settings.diffraction.hurb().is_some();
+            let seed: Option<&Outline> = survey.seed(traced_mm);
+            let bundle = self.job(color, traced_mm).trace(seed, has_stop).map(Arc::new);
+            locked(&color.bundles).keep(key, bundle.clone());
+            bundle
+        });
+        Some((bundle?, survey.map.clone(), frame))
     }
 
-    /// Returns the field that a corner of the film sees, `corner_mm` from its middle: of a radius about the middle, along +x.
-    ///
-    /// Where the corner sees nothing it is the last field that is seen.
-    pub fn corner_field_tan(&self, corner_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> DVec2 {
-        match &self.form {
-            Form::Rotational(bank) if self.decenter.is_none() => {
-                let geometry = bank.geometry(dioptres, wavelength_nm);
-                DVec2::X * geometry.field_tan(corner_mm.length()).unwrap_or(bank.last_field_tan())
+    fn bending(&self, color: &Color) -> Option<StopHurb> {
+        let lens = &color.lens;
+        let edge = || CircularStop::new(lens.stop_semi_aperture_mm(), lens.wavelength_nm(), lens.stop_medium_index());
+        self.settings.diffraction.hurb().map(|model| StopHurb { model, edge: edge() })
+    }
+
+    /// Returns the kernel of a point of the film, of the whole pupil or of a part of it, given by its part in a division.
+    pub(crate) fn kernel(&self, query: FilmQuery, part: Option<(&PupilDivision, usize)>) -> Kernel {
+        let FilmQuery { place_mm, dioptres, wavelength_nm, pitch_um } = query;
+        let color = self.color(wavelength_nm);
+        let Some((bundle, map, frame)) = self.bundle(&color, place_mm) else { return Kernel::identity(pitch_um) };
+        let mut spots = bundle.spots(&map, &frame, place_mm, dioptres);
+        if let Some((division, number)) = part {
+            let shares = division.cell_shares(number, spots.mesh, frame.turn * bundle.pupil_sign);
+            spots.energies.iter_mut().zip(shares).for_each(|(energy, share)| *energy *= share);
+            if spots.energies.iter().sum::<f64>() <= 0.0 {
+                return Kernel::identity(pitch_um);
             }
-            _ => self.film_map(dioptres, wavelength_nm, corner_mm.length()).field_tan(corner_mm),
         }
+        let layout = Layout::new(&spots, self.bending(&color), pitch_um);
+        let wave_fraction = layout.wave_fraction(self.settings.diffraction);
+        let waves = if wave_fraction > 0.0 { self.waves(&color, &map, &query, &layout) } else { None };
+        let energies = match waves {
+            Some(waves) if wave_fraction == 1.0 => waves,
+            Some(waves) => waves * wave_fraction + layout.draw() * (1.0 - wave_fraction),
+            None => layout.draw(),
+        };
+        layout.kernel(&energies, pitch_um)
     }
 
-    /// Returns the signed radius of the circle of confusion, mm: above 0 for objects nearer than the focus.
-    ///
-    /// It is that of the part of the ray map that is linear in the pupil, scaled so that an even disc of this size has 95 %
-    /// of its energy within it. So it goes smoothly through 0, where aberrations keep a spot from vanishing.
-    pub fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        match &self.form {
-            Form::Rotational(bank) => {
-                let field_tan = self.decenter.seen_from_lens(field_tan, dioptres);
-                bank.blur_radius_mm(field_tan.length(), dioptres, wavelength_nm)
-            }
-            Form::General { bank, field_to_film } => {
-                let nearest_lit = field_to_film.as_ref().map(|inverse| inverse.nearest_lit());
-                bank.blur_radius_mm(nearest_lit, field_tan, dioptres, wavelength_nm)
-            }
+    /// Returns the wave-optical energies, in the window of a layout, of the object point that the chief ray of a point of the film sees.
+    fn waves(
+        &self,
+        color: &Color,
+        map: &FilmMap,
+        query: &FilmQuery,
+        layout: &Layout<'_>,
+    ) -> Option<ndarray::Array2<f64>> {
+        // As the centered lens sees the point.
+        let aside_mm = self.decenter.mm();
+        let field_tan = map.field_tan(query.place_mm)? - aside_mm * (1e-3 * query.dioptres);
+        let point = ObjectPoint::from_field(&self.reference, field_tan, query.dioptres);
+        let middle_mm = layout.middle_px().as_dvec2() * DVec2::new(1e-3, -1e-3) * query.pitch_um;
+        // The picture is the film turned by 180°.
+        let center = WindowCenter::At(-(query.place_mm - self.decenter.axis_mm() + middle_mm));
+        let side = layout.side();
+        let window = WaveWindow { pitch_um: query.pitch_um, rows: side, columns: side, center };
+        let film_distance_mm = self.settings.film_distance_mm;
+        Some(wave_psf(&color.lens, &point, film_distance_mm, &window, WaveQuality::default()).ok()?.samples)
+    }
+
+    fn moments(&self, place_mm: DVec2, wavelength_nm: f64) -> Moments {
+        let color = self.color(wavelength_nm);
+        let survey = self.survey(&color, place_mm.length());
+        survey.moments(place_mm - self.decenter.axis_mm())
+    }
+
+    pub(crate) fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        let moments = self.moments(place_mm, wavelength_nm);
+        moments.blur_mm + moments.blur_mm_per_dioptre * (dioptres - self.focus_dioptres)
+    }
+
+    pub(crate) fn spread_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        let moments = self.moments(place_mm, wavelength_nm);
+        let blur_mm = moments.blur_mm + moments.blur_mm_per_dioptre * (dioptres - self.focus_dioptres);
+        blur_mm.hypot(moments.residue_mm)
+    }
+}
+
+impl KeptBundles {
+    fn keep(&mut self, key: [u64; 2], bundle: Option<Arc<Bundle>>) {
+        let most = bundle.as_ref().map_or(usize::MAX, |bundle| MOST_KEPT_BYTES / bundle.size_bytes().max(1));
+        while self.in_order.len() > most.max(1) {
+            let Some(oldest) = self.in_order.pop_front() else { break };
+            self.by_place.remove(&oldest);
+        }
+        if self.by_place.insert(key, bundle).is_none() {
+            self.in_order.push_back(key);
         }
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::{EDGE_MM, PupilBoundary, Search};
+use super::{EDGE_MM, PupilBoundary, Search, edge::EdgeSearch};
 use crate::{MonoLens, ObjectPoint, Vignetting};
 
 /// What bounds a pupil in some direction: a surface and the part of its openings, 0 for the round rim.

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use glam::DVec2;
 
-use super::{PupilBoundary, Search};
+use super::{PupilBoundary, Search, edge::EdgeSearch};
 use crate::{RayFate, Vignetting};
 
 /// Rays across the front of the lens in a first look, and in a second where that finds no light.

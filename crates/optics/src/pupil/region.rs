@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
-use super::{EDGE_MM, PupilBoundary, PupilPlane, Search, front::Front, strips::Strips};
+use super::{EDGE_MM, PupilBoundary, PupilPlane, Search, edge::EdgeSearch, front::Front, strips::Strips};
 use crate::{MonoLens, ObjectPoint, quadrature::gauss_legendre_on};
 
 /// The share of an outline's area that may be wrong at jumps of its edge.

@@ -2,7 +2,10 @@
 
 use glam::DVec2;
 
-use super::{Edge, Front, Search};
+use super::{
+    Front, Search,
+    edge::{Edge, EdgeSearch},
+};
 use crate::quadrature::gauss_legendre_on;
 
 /// Lines of a first look, and rays across each.

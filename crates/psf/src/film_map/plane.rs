@@ -1,0 +1,147 @@
+//! The map of a lens without an axis of symmetry.
+
+use glam::{DMat2, DVec2, DVec3};
+
+/// Newton's steps to the point that sees a direction, at most.
+const MOST_STEPS: usize = 30;
+
+/// A grid of points over a square of film, with the directions that they see and their irradiances; bicubic between them.
+///
+/// Directions are kept as the tangent of half the angle along x and y, which is smooth through 90° and beyond.
+#[derive(Clone, Debug)]
+pub(crate) struct PlaneMap {
+    /// Half the side of the square, mm.
+    half_mm: f64,
+    /// Points along each side, of those within the square; there is one more on each side of it.
+    n: usize,
+    /// Rows from the bottom up, each from left to right: both tangents of half the angle, and the irradiance, sr.
+    nodes: Vec<[f64; 3]>,
+    /// About where a direction is seen: a point, and how far it moves with both tangents of half the angle, mm.
+    middle: (DVec2, DVec2, DMat2),
+}
+
+impl PlaneMap {
+    /// Takes n × n points (at least 3 × 3) over a square from −`half_mm` to `half_mm`, rows from the bottom up: the tangents of half
+    /// the angle and the irradiance, sr.
+    pub(crate) fn new(half_mm: f64, n: usize, nodes: &[(DVec2, f64)]) -> Self {
+        // One more on each side, by going on straight.
+        let within = |row: i64, column: i64| {
+            let (half_tan, sr) = nodes[row as usize * n + column as usize];
+            [half_tan.x, half_tan.y, sr]
+        };
+        let last = n as i64 - 1;
+        let straight = |row: i64, column: i64| {
+            let (r, c) = (row.clamp(0, last), column.clamp(0, last));
+            let (r2, c2) = (2 * r - row, 2 * c - column);
+            let (near, far) = (within(r, c), within(r2, c2));
+            std::array::from_fn(|i| if (row, column) == (r, c) { near[i] } else { 2.0 * near[i] - far[i] })
+        };
+        let padded = (-1..=n as i64).flat_map(|row| (-1..=n as i64).map(move |column| (row, column)));
+        let all = padded.map(|(row, column)| straight(row, column)).collect();
+        let mut map = Self { half_mm, n, nodes: all, middle: (DVec2::ZERO, DVec2::ZERO, DMat2::IDENTITY) };
+        let (half_tan, by_place) = map.half_tan(DVec2::ZERO);
+        map.middle = (DVec2::ZERO, half_tan, by_place.inverse());
+        map
+    }
+
+    /// Returns the map with the irradiances of its points each times a factor.
+    pub(super) fn scaled(&self, factors: &[f64]) -> Self {
+        let inner = (0..self.n).flat_map(|row| (0..self.n).map(move |column| (row + 1) * (self.n + 2) + column + 1));
+        let node = |(i, factor): (usize, &f64)| {
+            let [x, y, sr] = self.nodes[i];
+            (DVec2::new(x, y), sr * factor)
+        };
+        Self::new(self.half_mm, self.n, &inner.zip(factors).map(node).collect::<Vec<_>>())
+    }
+
+    fn step_mm(&self) -> f64 {
+        2.0 * self.half_mm / (self.n - 1) as f64
+    }
+
+    /// Returns values at a point within the square and their slopes, per mm, along x and y.
+    #[inline]
+    fn look_up(&self, place_mm: DVec2) -> [[f64; 3]; 3] {
+        let step_mm = self.step_mm();
+        let at = ((place_mm + self.half_mm) / step_mm).clamp(DVec2::ZERO, DVec2::splat((self.n - 1) as f64));
+        let below = at.floor().min(DVec2::splat((self.n - 2) as f64));
+        let (across, up) = (cubic(at.x - below.x), cubic(at.y - below.y));
+        let (column, row) = (below.x as usize, below.y as usize);
+        let mut sums = [[0.0; 3]; 3];
+        for (i, (weight_y, slope_y)) in up.into_iter().enumerate() {
+            let nodes = &self.nodes[(row + i) * (self.n + 2) + column..][..4];
+            for ((weight_x, slope_x), node) in across.iter().zip(nodes) {
+                for k in 0..3 {
+                    sums[0][k] += weight_y * weight_x * node[k];
+                    sums[1][k] += weight_y * slope_x * node[k] / step_mm;
+                    sums[2][k] += slope_y * weight_x * node[k] / step_mm;
+                }
+            }
+        }
+        sums
+    }
+
+    /// Returns the tangents of half the angle at a point and their derivatives by the point, per mm; beyond the square they go on
+    /// straight.
+    #[inline]
+    fn half_tan(&self, place_mm: DVec2) -> (DVec2, DMat2) {
+        let inside_mm = place_mm.clamp(DVec2::splat(-self.half_mm), DVec2::splat(self.half_mm));
+        let [value, x, y] = self.look_up(inside_mm).map(|[x, y, _]| DVec2::new(x, y));
+        let by_place = DMat2::from_cols(x, y);
+        (value + by_place * (place_mm - inside_mm), by_place)
+    }
+
+    #[inline]
+    pub(super) fn direction(&self, place_mm: DVec2) -> DVec3 {
+        let (half_tan, _) = self.half_tan(place_mm);
+        (2.0 * half_tan).extend(1.0 - half_tan.length_squared())
+    }
+
+    #[inline]
+    pub(crate) fn irradiance_sr(&self, place_mm: DVec2) -> f64 {
+        self.look_up(place_mm)[0][2].max(0.0)
+    }
+
+    pub(crate) fn place_of(&self, direction: DVec3) -> DVec2 {
+        let half_tan = direction.truncate() / (direction.z + direction.length());
+        let (middle_mm, middle_tan, by_half_tan) = self.middle;
+        let mut place_mm = middle_mm + by_half_tan * (half_tan - middle_tan);
+        let most_mm = self.half_mm;
+        for _ in 0..MOST_STEPS {
+            let (here, by_place) = self.half_tan(place_mm);
+            let step_mm = (by_place.inverse() * (half_tan - here)).clamp_length_max(most_mm);
+            if !step_mm.is_finite() {
+                break;
+            }
+            place_mm += step_mm;
+            if step_mm.length_squared() < (1e-12 * self.half_mm).powi(2) {
+                break;
+            }
+        }
+        place_mm
+    }
+
+    pub(super) fn jacobian_mm(&self, place_mm: DVec2) -> DMat2 {
+        let (half_tan, by_place) = self.half_tan(place_mm);
+        // t = 2 q / (1 − |q|²)
+        let ahead = 1.0 - half_tan.length_squared();
+        let outer = DMat2::from_cols(half_tan * half_tan.x, half_tan * half_tan.y);
+        let tan_by_half_tan = DMat2::IDENTITY * (2.0 / ahead) + outer * (4.0 / (ahead * ahead));
+        (tan_by_half_tan * by_place).inverse()
+    }
+
+    pub(super) fn size_bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice())
+    }
+}
+
+/// Returns the weights of four values in a row, and those of the slope per step, at a place between the second and the third (Catmull and Rom's
+/// cubic).
+#[inline(always)]
+fn cubic(u: f64) -> [(f64, f64); 4] {
+    [
+        (0.5 * u * (u * (2.0 - u) - 1.0), 0.5 * (u * (4.0 - 3.0 * u) - 1.0)),
+        (0.5 * (u * u * (3.0 * u - 5.0) + 2.0), 0.5 * u * (9.0 * u - 10.0)),
+        (0.5 * u * (u * (4.0 - 3.0 * u) + 1.0), 0.5 * (u * (8.0 - 9.0 * u) + 1.0)),
+        (0.5 * u * u * (u - 1.0), 0.5 * u * (3.0 * u - 2.0)),
+    ]
+}

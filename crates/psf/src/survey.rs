@@ -1,0 +1,467 @@
+//! The film surveyed: where its points look, how much light they get and how their blurs grow, at one wavelength.
+
+use std::{f64::consts::TAU, sync::Arc};
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use crate::{
+    FilmMap,
+    bundle::{Bundle, Frame, Moments},
+    film_map::{PlaneMap, RadialMap, ShareMap},
+    mesh::Mesh,
+    model::{Color, Shared},
+    pupil::Outline,
+    pupil_division::PupilDivision,
+};
+
+/// Intervals along a radius to begin with, and how often they are halved at most.
+const N_RADIAL: usize = 12;
+const MOST_HALVINGS: usize = 9;
+/// Points along each side of the first grid over a film, and how often its steps are halved at most.
+const N_GRID: usize = 13;
+const MOST_GRID_HALVINGS: usize = 2;
+/// How far what lies between samples may be off: directions, by the place on the film, over the reach, and irradiances, over the largest.
+const MOST_OFF: f64 = 1e-6;
+const MOST_OFF_SR: f64 = 1e-4;
+/// The same for a grid, which is sampled as a whole.
+const MOST_OFF_ON_GRID: f64 = 1e-5;
+const MOST_OFF_SR_ON_GRID: f64 = 1e-3;
+/// The place on the radius, over its length, that stands for the axis.
+const NEXT_TO_AXIS: f64 = 1e-4;
+/// Points with less of the largest irradiance do not tell how directions go on beyond the light.
+const DIM: f64 = 1e-3;
+/// Over how much of the lit radius the slope is taken with which directions go on beyond it.
+const RIM: f64 = 0.1;
+/// Radii and directions at which the share of a part of a pupil is tabulated.
+const N_SHARE_RADII: usize = 65;
+const N_SHARE_AZIMUTHS: usize = 32;
+
+/// A point of the film and what it sees.
+#[derive(Clone, Debug)]
+pub(crate) struct Station {
+    place_mm: DVec2,
+    bundle: Option<Arc<Bundle>>,
+}
+
+/// The film of the centered lens up to some distance from its axis.
+#[derive(Debug)]
+pub(crate) struct Survey {
+    pub(crate) reach_mm: f64,
+    /// Of the lens where it stands.
+    pub(crate) map: Arc<FilmMap>,
+    /// Along +x by distance from the axis, or over a grid of so many columns, rows from the bottom up.
+    stations: Vec<Station>,
+    n_columns: Option<usize>,
+    /// Where the axis meets the film, mm from its middle.
+    axis_mm: DVec2,
+    /// Of each station; of dark ones those of a lit one near by.
+    moments: Vec<Moments>,
+}
+
+impl Station {
+    fn irradiance_sr(&self) -> f64 {
+        self.bundle.as_ref().map_or(0.0, |bundle| bundle.irradiance_sr)
+    }
+
+    /// Returns the tangents of half the angle of the chief ray.
+    fn half_tan(&self, focus_dioptres: f64) -> Option<DVec2> {
+        let chief = self.bundle.as_ref()?.chief(focus_dioptres);
+        let half_tan = chief.truncate() / (chief.z + chief.length());
+        half_tan.is_finite().then_some(half_tan)
+    }
+
+    fn outline(&self) -> Option<&Outline> {
+        self.bundle.as_ref().map(|bundle| &bundle.outline)
+    }
+}
+
+impl Survey {
+    /// Surveys the film up to `reach_mm` from the axis of the centered lens.
+    pub(crate) fn new(shared: &Shared, color: &Color, reach_mm: f64) -> Self {
+        let (map, stations, n_columns) = match shared.is_rotational() {
+            true => {
+                let radius = Radius::survey(shared, color, reach_mm);
+                (FilmMap::from(radius.map(reach_mm)), radius.stations, None)
+            }
+            false => {
+                let (map, stations, n) = surveyed_grid(shared, color, reach_mm);
+                (FilmMap::from(map), stations, Some(n))
+            }
+        };
+        let own_moments = |station: &Station| {
+            station.bundle.as_ref().map(|bundle| bundle.moments(&map, &Frame::OWN, shared.focus_dioptres()))
+        };
+        let known: Vec<Option<Moments>> = stations.iter().map(own_moments).collect();
+        let moments = nearest_known(&stations, &known);
+        // Move it to where the lens stands.
+        let decenter = shared.decenter();
+        let axis_tan = decenter.mm() * (1e-3 * shared.focus_dioptres());
+        let map = Arc::new(map.about(decenter.axis_mm(), axis_tan));
+        Self { reach_mm, map, stations, n_columns, axis_mm: decenter.axis_mm(), moments }
+    }
+
+    /// Returns the outline of what is seen from a station near a point, if light is.
+    pub(crate) fn seed(&self, place_mm: DVec2) -> Option<&Outline> {
+        let lit = self.stations.iter().filter(|station| station.bundle.is_some());
+        let nearest = lit.min_by(|a, b| {
+            let square = |station: &Station| station.place_mm.distance_squared(place_mm);
+            square(a).total_cmp(&square(b))
+        });
+        nearest?.outline()
+    }
+
+    /// Returns how blurs grow at a point, mm from the axis.
+    pub(crate) fn moments(&self, from_axis_mm: DVec2) -> Moments {
+        let Some(n) = self.n_columns else {
+            let radius_mm = from_axis_mm.length();
+            let above = self.stations.partition_point(|station| station.place_mm.x < radius_mm);
+            let above = above.clamp(1, self.stations.len() - 1);
+            let [from, to] = [above - 1, above].map(|i| self.stations[i].place_mm.x);
+            let fraction = ((radius_mm - from) / (to - from)).clamp(0.0, 1.0);
+            return mixed([(self.moments[above - 1], 1.0 - fraction), (self.moments[above], fraction)]);
+        };
+        let step_mm = 2.0 * self.reach_mm / (n - 1) as f64;
+        let place = ((from_axis_mm + self.reach_mm) / step_mm).clamp(DVec2::ZERO, DVec2::splat((n - 1) as f64));
+        let below = place.floor().min(DVec2::splat((n - 2) as f64));
+        let (f, at) = (place - below, below.y as usize * n + below.x as usize);
+        mixed([
+            (self.moments[at], (1.0 - f.x) * (1.0 - f.y)),
+            (self.moments[at + 1], f.x * (1.0 - f.y)),
+            (self.moments[at + n], (1.0 - f.x) * f.y),
+            (self.moments[at + n + 1], f.x * f.y),
+        ])
+    }
+
+    /// Returns the map of a part of the pupil: the directions of the whole, and its share of the irradiances.
+    pub(crate) fn part_map(&self, mesh: Mesh, division: &PupilDivision, part: usize) -> FilmMap {
+        let n_directions = if self.n_columns.is_some() { 2 } else { N_SHARE_AZIMUTHS };
+        let turn = |i: usize| DVec2::from_angle(TAU * i as f64 / n_directions as f64);
+        let cell_shares: Vec<Vec<f64>> = (0..n_directions).map(|i| division.cell_shares(part, mesh, turn(i))).collect();
+        // Of each station, as if it lay in each direction from the axis; in darkness that of the nearest light.
+        let shares_of = |bundle: &Bundle, i: usize| -> f64 {
+            let i = if bundle.pupil_sign < 0.0 { (i + n_directions / 2) % n_directions } else { i };
+            bundle.energies.iter().zip(&cell_shares[i]).map(|(energy, share)| energy * share).sum()
+        };
+        if self.n_columns.is_some() {
+            let share = |station: &Station| station.bundle.as_ref().map_or(0.0, |bundle| shares_of(bundle, 0));
+            return self.map.scaled(&self.stations.iter().map(share).collect::<Vec<_>>());
+        }
+        let lit: Vec<(f64, &Bundle)> =
+            self.stations.iter().filter_map(|station| Some((station.place_mm.x, station.bundle.as_deref()?))).collect();
+        let at_radius = |radius_mm: f64| -> Vec<f64> {
+            let Some(last) = lit.len().checked_sub(1) else { return vec![0.0; n_directions] };
+            let above = lit.partition_point(|(at_mm, _)| *at_mm < radius_mm).min(last);
+            let below = above.saturating_sub(1);
+            let step_mm = lit[above].0 - lit[below].0;
+            let fraction = if step_mm > 0.0 { ((radius_mm - lit[below].0) / step_mm).clamp(0.0, 1.0) } else { 0.0 };
+            let mix = |i: usize| shares_of(lit[below].1, i) * (1.0 - fraction) + shares_of(lit[above].1, i) * fraction;
+            (0..n_directions).map(mix).collect()
+        };
+        let step_mm = self.reach_mm / (N_SHARE_RADII - 1) as f64;
+        let shares = (0..N_SHARE_RADII).flat_map(|i| at_radius(step_mm * i as f64)).collect();
+        FilmMap::clone(&self.map).with_share(ShareMap::new(self.axis_mm, step_mm, n_directions, shares))
+    }
+}
+
+fn mixed<const N: usize>(weighted: [(Moments, f64); N]) -> Moments {
+    let sum = |of: fn(&Moments) -> f64| weighted.iter().map(|(moments, weight)| of(moments) * weight).sum();
+    Moments {
+        blur_mm: sum(|m| m.blur_mm),
+        blur_mm_per_dioptre: sum(|m| m.blur_mm_per_dioptre),
+        residue_mm: sum(|m| m.residue_mm),
+    }
+}
+
+/// Returns what is known of each station, or of the nearest one of which something is.
+fn nearest_known(stations: &[Station], known: &[Option<Moments>]) -> Vec<Moments> {
+    let nearest = |place_mm: DVec2| {
+        let square = |i: &usize| stations[*i].place_mm.distance_squared(place_mm);
+        let lit = (0..stations.len()).filter(|&i| known[i].is_some());
+        lit.min_by(|a, b| square(a).total_cmp(&square(b))).and_then(|i| known[i]).unwrap_or_default()
+    };
+    stations.iter().zip(known).map(|(station, known)| known.unwrap_or_else(|| nearest(station.place_mm))).collect()
+}
+
+/// Stations along a radius, and what they say by distance from the axis.
+struct Radius {
+    stations: Vec<Station>,
+    focus_dioptres: f64,
+    half_tan: EvenCurve,
+    irradiance_sr: MonotoneCurve,
+}
+
+impl Radius {
+    /// Traces stations until what lies between them is known, on all threads.
+    fn survey(shared: &Shared, color: &Color, reach_mm: f64) -> Self {
+        let station = |radius_mm: f64, seed: Option<&Outline>| {
+            let place_mm = DVec2::X * radius_mm;
+            Station { place_mm, bundle: shared.job(color, place_mm).trace(seed, false).map(Arc::new) }
+        };
+        // From the axis outwards, each from the last.
+        let mut stations: Vec<Station> = Vec::new();
+        for i in 0..=N_RADIAL {
+            let share = if i == 0 { NEXT_TO_AXIS } else { i as f64 / N_RADIAL as f64 };
+            let seed = stations.iter().rev().find_map(Station::outline);
+            stations.push(station(reach_mm * share, seed));
+        }
+        let mut radius = Self::of(stations, shared.focus_dioptres());
+        // Halve the intervals that held a station which was not foreseen.
+        let mut open: Vec<[f64; 2]> =
+            radius.stations.windows(2).map(|pair| [0, 1].map(|i| pair[i].place_mm.x)).collect();
+        for _ in 0..MOST_HALVINGS {
+            let largest_sr = radius.stations.iter().map(Station::irradiance_sr).fold(0.0, f64::max);
+            if largest_sr == 0.0 {
+                break;
+            }
+            let between = |&[from, to]: &[f64; 2]| {
+                let at_mm = 0.5 * (from + to);
+                let found = station(at_mm, radius.seed(at_mm));
+                let is_foreseen = radius.foresees(&found, reach_mm, largest_sr);
+                (found, is_foreseen)
+            };
+            let found: Vec<(Station, bool)> = open.par_iter().map(between).collect();
+            let halves = open.iter().zip(&found).filter(|(_, (_, is_foreseen))| !is_foreseen);
+            let next: Vec<[f64; 2]> = halves
+                .flat_map(|(&[from, to], (station, _))| [[from, station.place_mm.x], [station.place_mm.x, to]])
+                .collect();
+            let mut stations = radius.stations;
+            stations.extend(found.into_iter().map(|(station, _)| station));
+            stations.sort_by(|a, b| a.place_mm.x.total_cmp(&b.place_mm.x));
+            radius = Self::of(stations, shared.focus_dioptres());
+            open = next;
+            if open.is_empty() {
+                break;
+            }
+        }
+        radius
+    }
+
+    fn of(stations: Vec<Station>, focus_dioptres: f64) -> Self {
+        let largest_sr = stations.iter().map(Station::irradiance_sr).fold(0.0, f64::max);
+        let bright = stations.iter().filter(|station| station.irradiance_sr() > DIM * largest_sr);
+        let half_tans: Vec<(f64, f64)> = bright
+            .filter_map(|station| Some((station.place_mm.x, station.half_tan(focus_dioptres)?.x / station.place_mm.x)))
+            .collect();
+        let irradiances = stations.iter().map(|station| (station.place_mm.x, station.irradiance_sr())).collect();
+        Self {
+            half_tan: EvenCurve::new(half_tans),
+            irradiance_sr: MonotoneCurve::new(irradiances),
+            stations,
+            focus_dioptres,
+        }
+    }
+
+    fn seed(&self, radius_mm: f64) -> Option<&Outline> {
+        let lit = self.stations.iter().filter(|station| station.bundle.is_some());
+        let off = |station: &&Station| (station.place_mm.x - radius_mm).abs();
+        lit.min_by(|a, b| off(a).total_cmp(&off(b)))?.outline()
+    }
+
+    /// Whether a station is as those about it say.
+    fn foresees(&self, station: &Station, reach_mm: f64, largest_sr: f64) -> bool {
+        let radius_mm = station.place_mm.x;
+        let off_sr = (self.irradiance_sr.at(radius_mm) - station.irradiance_sr()).abs();
+        let is_dim = station.irradiance_sr() <= DIM * largest_sr;
+        let direction = station.half_tan(self.focus_dioptres).filter(|_| !is_dim);
+        let is_foreseen = direction.is_none_or(|half_tan| {
+            let per_mm = self.half_tan.at(radius_mm);
+            (per_mm * radius_mm - half_tan.x).abs() <= MOST_OFF * reach_mm * per_mm.abs()
+        });
+        is_foreseen && off_sr <= MOST_OFF_SR * largest_sr
+    }
+
+    fn map(&self, reach_mm: f64) -> RadialMap {
+        let last_mm = self.half_tan.x.last().copied().unwrap_or(0.0);
+        let half_tan = |radius_mm: f64| self.half_tan.at(radius_mm) * radius_mm;
+        // Beyond the light directions go on with the slope of the last part of it, in angle.
+        let angle = |radius_mm: f64| 2.0 * half_tan(radius_mm).atan();
+        let from_mm = last_mm * (1.0 - RIM);
+        let slope = if last_mm > 0.0 { (angle(last_mm) - angle(from_mm)) / (last_mm - from_mm) } else { 0.0 };
+        let half_tan_at = |radius_mm: f64| match radius_mm <= last_mm {
+            true => Some(half_tan(radius_mm)),
+            false if last_mm > 0.0 => {
+                let angle = angle(last_mm) + slope * (radius_mm - last_mm);
+                (angle.abs() < 0.9 * std::f64::consts::PI).then(|| (0.5 * angle).tan())
+            }
+            false => None,
+        };
+        RadialMap::from_half_tans(reach_mm, half_tan_at, |radius_mm| self.irradiance_sr.at(radius_mm).max(0.0))
+    }
+}
+
+/// An even function known at points of ascending x above 0: Lagrange's polynomial through the nearest of them and their mirror images.
+struct EvenCurve {
+    x: Vec<f64>,
+    y: Vec<f64>,
+}
+
+impl EvenCurve {
+    /// Points of a polynomial.
+    const N: usize = 6;
+
+    fn new(points: Vec<(f64, f64)>) -> Self {
+        let (x, y) = points.into_iter().unzip();
+        Self { x, y }
+    }
+
+    fn point(&self, i: i64) -> (f64, f64) {
+        if i >= 0 { (self.x[i as usize], self.y[i as usize]) } else { (-self.x[!i as usize], self.y[!i as usize]) }
+    }
+
+    /// Returns the value at a place up to the last point.
+    fn at(&self, x: f64) -> f64 {
+        let n = self.x.len() as i64;
+        let first = self.x.partition_point(|&known| known < x) as i64 - Self::N as i64 / 2;
+        // As many mirrored points as there are others.
+        let first = first.min(n - Self::N as i64).max(-n);
+        let points: Vec<(f64, f64)> = (first..(first + Self::N as i64).min(n)).map(|i| self.point(i)).collect();
+        let term = |(i, &(own, value)): (usize, &(f64, f64))| {
+            let others = points.iter().enumerate().filter(|(j, _)| *j != i);
+            value * others.map(|(_, &(other, _))| (x - other) / (own - other)).product::<f64>()
+        };
+        points.iter().enumerate().map(term).sum()
+    }
+}
+
+/// A curve that passes no value of its points by, level at the first: cubics with limited slopes (Fritsch & Carlson 1980, Monotone piecewise
+/// cubic interpolation), for what has kinks.
+struct MonotoneCurve {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    slopes: Vec<f64>,
+}
+
+impl MonotoneCurve {
+    /// Takes points of ascending x.
+    fn new(points: Vec<(f64, f64)>) -> Self {
+        let (x, y): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+        let n = x.len();
+        let secant = |i: usize| (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
+        let slope = |i: usize| {
+            if n < 3 || i == 0 {
+                return 0.0;
+            }
+            // That of the parabola through three points, at the middle or at the last.
+            let (k, is_last) = (i.min(n - 2), i == n - 1);
+            let (before, after) = (secant(k - 1), secant(k));
+            let (step_before, step_after) = (x[k] - x[k - 1], x[k + 1] - x[k]);
+            let bend = (after - before) / (step_before + step_after);
+            if is_last {
+                let parabola = after + bend * step_after;
+                return if parabola * after > 0.0 {
+                    parabola.abs().min(3.0 * after.abs()).copysign(after)
+                } else {
+                    0.0
+                };
+            }
+            let parabola = before + bend * step_before;
+            match before * after > 0.0 {
+                true => parabola.abs().min(3.0 * before.abs().min(after.abs())).copysign(before),
+                false => 0.0,
+            }
+        };
+        let slopes = (0..n).map(slope).collect();
+        Self { x, y, slopes }
+    }
+
+    /// Returns the value at a place; before the first point and beyond the last, theirs.
+    fn at(&self, x: f64) -> f64 {
+        let n = self.x.len();
+        let above = self.x.partition_point(|&known| known < x).clamp(1, n - 1);
+        let below = above - 1;
+        let step = self.x[above] - self.x[below];
+        let t = ((x - self.x[below]) / step).clamp(0.0, 1.0);
+        // Hermite's cubic.
+        let (from, to) = (self.y[below], self.y[above]);
+        let (slope_from, slope_to) = (self.slopes[below] * step, self.slopes[above] * step);
+        let s = 1.0 - t;
+        from * s * s * (1.0 + 2.0 * t) + to * t * t * (3.0 - 2.0 * t) + t * s * (slope_from * s - slope_to * t)
+    }
+}
+
+/// Surveys a square of film, with ever finer grids until what lies between their points is known; returns the number of columns too.
+fn surveyed_grid(shared: &Shared, color: &Color, reach_mm: f64) -> (PlaneMap, Vec<Station>, usize) {
+    let place_mm =
+        |n: usize, i: usize| DVec2::new((i % n) as f64, (i / n) as f64) * (2.0 * reach_mm / (n - 1) as f64) - reach_mm;
+    let station = |place_mm: DVec2, seed: Option<&Outline>| {
+        let bundle = shared.job(color, place_mm).trace(seed, false).map(Arc::new);
+        Station { place_mm, bundle }
+    };
+    let map_of = |stations: &[Station], n: usize| {
+        let lit = stations.iter().map(|station| station.half_tan(shared.focus_dioptres())).collect();
+        // Where nothing is seen far and wide, as through a hole in place of the lens.
+        let through_hole = |station: &Station| station.place_mm / (2.0 * shared.settings().film_distance_mm);
+        let half_tans = straight_on(lit, n).unwrap_or_else(|| stations.iter().map(through_hole).collect());
+        let nodes: Vec<(DVec2, f64)> = half_tans
+            .into_iter()
+            .zip(stations)
+            .map(|(half_tan, station)| (half_tan, station.irradiance_sr()))
+            .collect();
+        PlaneMap::new(reach_mm, n, &nodes)
+    };
+    let mut n = N_GRID;
+    let mut stations: Vec<Station> = (0..n * n).into_par_iter().map(|i| station(place_mm(n, i), None)).collect();
+    let mut map = map_of(&stations, n);
+    for _ in 0..MOST_GRID_HALVINGS {
+        let finer = 2 * n - 1;
+        let found: Vec<Station> = (0..finer * finer)
+            .into_par_iter()
+            .map(|i| {
+                let (row, column) = (i / finer, i % finer);
+                let near = |row: usize, column: usize| &stations[row.min(n - 1) * n + column.min(n - 1)];
+                if row % 2 == 0 && column % 2 == 0 {
+                    return near(row / 2, column / 2).clone();
+                }
+                let corners = [(0, 0), (0, 1), (1, 0), (1, 1)];
+                let seed = corners.iter().find_map(|(down, right)| near(row / 2 + down, column / 2 + right).outline());
+                station(place_mm(finer, i), seed)
+            })
+            .collect();
+        let largest_sr = found.iter().map(Station::irradiance_sr).fold(0.0, f64::max);
+        let is_foreseen = |station: &Station| {
+            let off_sr = (map.irradiance_sr(station.place_mm) - station.irradiance_sr()).abs();
+            let chief = station.bundle.as_ref().filter(|bundle| bundle.irradiance_sr > DIM * largest_sr);
+            let off_mm = chief
+                .map_or(0.0, |bundle| map.place_of(bundle.chief(shared.focus_dioptres())).distance(station.place_mm));
+            off_sr <= MOST_OFF_SR_ON_GRID * largest_sr && off_mm <= MOST_OFF_ON_GRID * reach_mm
+        };
+        let is_done = found.par_iter().all(is_foreseen);
+        map = map_of(&found, finer);
+        (stations, n) = (found, finer);
+        if is_done {
+            break;
+        }
+    }
+    (map, stations, n)
+}
+
+/// Fills the gaps of a grid by going on straight from two neighbors in a line, or returns `None` where there are no two.
+fn straight_on(mut values: Vec<Option<DVec2>>, n_columns: usize) -> Option<Vec<DVec2>> {
+    let n_rows = values.len() / n_columns;
+    while values.iter().any(Option::is_none) {
+        let at = |row: i64, column: i64| {
+            let is_inside = (0..n_rows as i64).contains(&row) && (0..n_columns as i64).contains(&column);
+            is_inside.then(|| values[row as usize * n_columns + column as usize]).flatten()
+        };
+        let filled: Vec<Option<DVec2>> = (0..values.len())
+            .map(|i| {
+                let (row, column) = ((i / n_columns) as i64, (i % n_columns) as i64);
+                let ways = [(0, 1), (0, -1), (1, 0), (-1, 0)];
+                let found: Vec<DVec2> = ways
+                    .into_iter()
+                    .filter_map(|(down, right)| {
+                        let near = at(row + down, column + right)?;
+                        Some(2.0 * near - at(row + 2 * down, column + 2 * right)?)
+                    })
+                    .collect();
+                values[i].or_else(|| (!found.is_empty()).then(|| found.iter().sum::<DVec2>() / found.len() as f64))
+            })
+            .collect();
+        if filled == values {
+            return None;
+        }
+        values = filled;
+    }
+    values.into_iter().collect()
+}
