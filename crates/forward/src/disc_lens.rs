@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dioptric_psf::{FilmMap, Kernel, LensImage, PartOfPoint, PsfError, PsfQuery, PupilDivision, RadialMap, ShiftedMap};
+use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage, PsfError, PupilDivision};
 use glam::DVec2;
 use ndarray::Array2;
 
@@ -48,36 +48,43 @@ impl LensImage for DiscLens {
     fn is_symmetric(&self) -> bool {
         true
     }
-    fn wavelengths_nm(&self) -> (f64, f64) {
-        (100.0, 10_000.0)
+
+    fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
+        self.map(wavelength_nm, reach_mm, 1.0)
     }
-    fn dioptres(&self) -> (f64, f64) {
-        (0.0, 1000.0)
-    }
-    fn is_dark_beyond_extent(&self) -> bool {
-        true
-    }
-    fn film_map(&self, _dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
-        let scale_mm = self.focal_mm * (1.0 + self.lateral_per_nm * (wavelength_nm - 550.0));
-        let tan_at = |r: f64| Some(r / scale_mm * (1.0 + self.distortion_per_mm2 * r * r));
-        RadialMap::tabulate(extent_mm, tan_at, |_| self.irradiance_per_radiance).into()
-    }
-    fn kernel(&self, query: PsfQuery) -> Kernel {
-        let PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um } = query;
-        let radius_mm = self.blur_radius_mm(field_tan, dioptres, wavelength_nm).abs();
+
+    fn kernel(&self, query: FilmQuery) -> Kernel {
+        let FilmQuery { place_mm, dioptres, wavelength_nm, pitch_um } = query;
+        let radius_mm = self.blur_radius_mm(place_mm, dioptres, wavelength_nm).abs();
         Kernel::centered(disc(1e3 * radius_mm / pitch_um), pitch_um)
     }
+
     fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
         let division = Arc::new(PupilDivision::new(n_parts));
         let part = |part: usize| {
-            let moments = disc_moments(|at| division.share(part, at));
-            Arc::new(PartOfDisc { lens: self.clone(), division: division.clone(), part, moments })
+            let share = disc_share(|at| division.share(part, at));
+            Arc::new(PartOfDisc { lens: self.clone(), division: division.clone(), part, share })
         };
         Ok((0..division.n_parts()).map(|i| part(i) as Arc<dyn LensImage + Send>).collect())
     }
-    fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+
+    fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
         let focus_dioptres = self.focus_dioptres + self.axial_per_nm * (wavelength_nm - 550.0);
-        1e-3 * self.radius_um_per_dioptre * (dioptres - focus_dioptres) * (1.0 + self.growth * field_tan.length())
+        let field_tan = self.field_tan(wavelength_nm, place_mm.length());
+        1e-3 * self.radius_um_per_dioptre * (dioptres - focus_dioptres) * (1.0 + self.growth * field_tan)
+    }
+}
+
+impl DiscLens {
+    /// The field seen at a distance from the axis, mm.
+    fn field_tan(&self, wavelength_nm: f64, radius_mm: f64) -> f64 {
+        let scale_mm = self.focal_mm * (1.0 + self.lateral_per_nm * (wavelength_nm - 550.0));
+        radius_mm / scale_mm * (1.0 + self.distortion_per_mm2 * radius_mm * radius_mm)
+    }
+
+    fn map(&self, wavelength_nm: f64, reach_mm: f64, share: f64) -> Arc<FilmMap> {
+        let irradiance_sr = share * self.irradiance_per_radiance;
+        Arc::new(FilmMap::radial(reach_mm, |radius_mm| self.field_tan(wavelength_nm, radius_mm), |_| irradiance_sr))
     }
 }
 
@@ -86,69 +93,50 @@ struct PartOfDisc {
     lens: DiscLens,
     division: Arc<PupilDivision>,
     part: usize,
-    /// Share of the light, and the middle of the part in the unit disc of the pupil.
-    moments: (f64, DVec2),
+    /// Of the light.
+    share: f64,
 }
 
 impl LensImage for PartOfDisc {
     fn is_symmetric(&self) -> bool {
         false
     }
-    fn wavelengths_nm(&self) -> (f64, f64) {
-        self.lens.wavelengths_nm()
-    }
-    fn dioptres(&self) -> (f64, f64) {
-        self.lens.dioptres()
-    }
-    fn is_dark_beyond_extent(&self) -> bool {
-        self.lens.is_dark_beyond_extent()
+
+    fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
+        self.lens.map(wavelength_nm, reach_mm, self.share)
     }
 
-    fn is_dark_beyond_extent_on(&self, low_mm: DVec2, high_mm: DVec2) -> bool {
-        self.lens.is_dark_beyond_extent_on(low_mm, high_mm)
-    }
-    fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
-        let radius_mm = |field_tan: DVec2| self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm);
-        let (share, middle) = self.moments;
-        let aside_mm = 2.0 * radius_mm(DVec2::ZERO).abs();
-        let whole = self.lens.film_map(dioptres, wavelength_nm, extent_mm + aside_mm);
+    fn kernel(&self, query: FilmQuery) -> Kernel {
+        let FilmQuery { place_mm, dioptres, wavelength_nm, pitch_um } = query;
         // In the picture, which is the film turned by 180°, light of near points lies on the other side of the pupil.
-        let part_at = |field_tan: DVec2| PartOfPoint { share, shift_mm: -middle * radius_mm(field_tan) };
-        FilmMap::Shifted(ShiftedMap::tabulate(whole, extent_mm, part_at))
+        let radius_px = -1e3 * self.lens.blur_radius_mm(place_mm, dioptres, wavelength_nm) / pitch_um;
+        Kernel::centered(part_of_disc(radius_px, |at| self.division.share(self.part, at)), pitch_um)
     }
-    fn kernel(&self, query: PsfQuery) -> Kernel {
-        let PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um } = query;
-        let radius_px = 1e3 * self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm) / pitch_um;
-        let samples = part_of_disc(-radius_px, self.moments.1, |at| self.division.share(self.part, at));
-        Kernel::centered(samples, pitch_um)
-    }
-    fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm)
+
+    fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        self.lens.blur_radius_mm(place_mm, dioptres, wavelength_nm)
     }
 }
 
-/// Returns the share of a part in the unit disc, and its middle.
-fn disc_moments(share_at: impl Fn(DVec2) -> f64) -> (f64, DVec2) {
-    let (mut share, mut places, mut total) = (0.0, DVec2::ZERO, 0.0);
+/// Returns the share of a part in the unit disc.
+fn disc_share(share_at: impl Fn(DVec2) -> f64) -> f64 {
+    let (mut share, mut total) = (0.0, 0.0);
     for (at, weight) in disc_points(400) {
-        let part = weight * share_at(at);
-        (share, places, total) = (share + part, places + part * at, total + weight);
+        (share, total) = (share + weight * share_at(at), total + weight);
     }
-    (share / total, if share > 0.0 { places / share } else { DVec2::ZERO })
+    share / total
 }
 
 /// Returns a uniform disc whose points are shared bilinearly among the pixels around them.
 fn disc(radius_px: f64) -> Array2<f32> {
-    part_of_disc(radius_px, DVec2::ZERO, |_| 1.0)
+    part_of_disc(radius_px, |_| 1.0)
 }
 
-/// Returns the part of a uniform disc that goes through a part of the pupil, about its own middle; points of the unit disc, y up, land at `radius_px` times their
-/// place.
-fn part_of_disc(radius_px: f64, middle: DVec2, share_at: impl Fn(DVec2) -> f64) -> Array2<f32> {
+/// Returns the part of a uniform disc that goes through a part of the pupil; points of the unit disc, y up, land at `radius_px` times their place.
+fn part_of_disc(radius_px: f64, share_at: impl Fn(DVec2) -> f64) -> Array2<f32> {
     // Points across a pixel, and rings across the smallest discs.
     const FINE: f64 = 8.0;
-    let reach_px = radius_px.abs() * (1.0 + middle.length());
-    let half = reach_px.ceil() as usize;
+    let half = radius_px.abs().ceil() as usize;
     let n_rings = (FINE * radius_px.abs()).round().max(1.0) as usize;
     let mut kernel = Array2::<f64>::zeros((2 * half + 1, 2 * half + 1));
     let mut share = |row: f64, column: f64, weight: f64| {
@@ -168,7 +156,7 @@ fn part_of_disc(radius_px: f64, middle: DVec2, share_at: impl Fn(DVec2) -> f64) 
     for (at, weight) in disc_points(n_rings) {
         let weight = weight * share_at(at);
         if weight > 0.0 {
-            let place = (at - middle) * radius_px;
+            let place = at * radius_px;
             share(half as f64 - place.y, half as f64 + place.x, weight);
         }
     }

@@ -81,28 +81,6 @@ pub enum ForwardError {
         /// What it may be.
         expected: &'static str,
     },
-    /// A band at a wavelength for which the bank was not traced.
-    #[error("the scene has a band at {wavelength_nm} nm, but the lens was traced from {first_nm} to {last_nm} nm")]
-    WavelengthOutside {
-        /// Center of the band, nm.
-        wavelength_nm: f64,
-        /// Shortest wavelength of the bank, nm.
-        first_nm: f64,
-        /// Longest wavelength of the bank, nm.
-        last_nm: f64,
-    },
-    /// Depths for which the bank was not traced.
-    #[error("the scene is {near_m} to {far_m} m away, but the lens was traced for {bank_near_m} to {bank_far_m} m")]
-    DepthOutside {
-        /// Nearest depth of the scene, m.
-        near_m: f64,
-        /// Farthest depth of the scene, m.
-        far_m: f64,
-        /// Nearest depth of the bank, m.
-        bank_near_m: f64,
-        /// Farthest depth of the bank, m.
-        bank_far_m: f64,
-    },
     /// A depth that lies inside the lens.
     #[error(
         "the scene is {depth_m:.5} m away{}, which lies inside {lens}: its first surface is {least_m:.4} m from its entrance pupil, where depth begins",
@@ -117,31 +95,6 @@ pub enum ForwardError {
         lens: String,
         /// Depth of the first surface, m.
         least_m: f64,
-    },
-    /// Film towards its corner sees fields that a lens without an axis is not traced for, though they have light: beyond 78.7°, or not gathered to an image.
-    #[error(
-        "the film reaches {corner_mm:.3} mm from its middle, and what a lens without an axis, as a tilted one, shows at {wavelength_nm} nm is known only to {extent_mm:.3} mm on the way to \
-         its corners or sides: light there comes from more than 78.7° or is not gathered to an image; expected a smaller film"
-    )]
-    FilmBeyondImage {
-        /// Half the film's diagonal, mm.
-        corner_mm: f64,
-        /// How far from the middle of the film something is seen, mm.
-        extent_mm: f64,
-        /// Wavelength, nm.
-        wavelength_nm: f64,
-    },
-    /// The corner of the film sees a field that was not traced, or that the lens does not pass.
-    #[error(
-        "the film's corner is {corner_mm:.3} mm off axis, but at {wavelength_nm} nm the lens was traced only to {extent_mm:.3} mm"
-    )]
-    FilmBeyondField {
-        /// Half the film's diagonal, mm.
-        corner_mm: f64,
-        /// The extent of the traced field from the axis, mm.
-        extent_mm: f64,
-        /// Wavelength, nm.
-        wavelength_nm: f64,
     },
     /// No light reaches the middle of the film.
     #[error("no light of the scene reaches the middle of the film through {lens} at {wavelength_nm} nm")]

@@ -75,59 +75,53 @@ pub enum BlurMode {
     Views(usize),
 }
 
+/// What lies beyond the edges of a scene, for the blur of what the film sees near them. Points of the film that look beyond the scene stay dark.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Border {
+    /// The outermost samples go on.
+    #[default]
+    Hold,
+    /// The scene is mirrored at its edges.
+    Mirror,
+    /// Darkness, at the depth of the edge.
+    Black,
+}
+
 /// How finely a forward rendering is made.
 ///
-/// The defaults are those whose accuracy was measured; a larger step or spacing is faster and less exact.
+/// The defaults are those whose accuracy was measured; a larger step is faster and less exact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// How surfaces hide each other.
     pub mode: BlurMode,
-    /// Distance between the points of the film at which the PSF is computed, pixels. Cells in which the
-    /// interpolated PSF is off by more than `max_edge_error` are halved.
-    pub knot_spacing_px: usize,
-    /// Largest error of the edge spread function in the middle band that interpolation over the field may cause, where cells are not yet as small as the
-    /// raster of their kernels allows.
+    /// Side of the largest tiles of the film, between whose corners point spread functions are interpolated, pixels (samples where those are wider).
+    pub tile_px: usize,
+    /// Largest error of the edge spread function in the middle of a tile, in the middle band: larger ones are cut in four.
     pub max_edge_error: f64,
-    /// Largest relative error of the irradiance of a uniform plane in the middle band by interpolated PSFs: cells where it is larger are halved likewise.
-    pub max_shading_error: f64,
     /// Distance between depth layers, pixels of blur radius.
     pub layer_step_px: f64,
-    /// A change of blur radius between neighbors that counts as a depth edge, pixels.
-    pub depth_edge_px: f64,
-    /// Largest change of blur radius between wavelengths among which PSFs are interpolated, pixels.
+    /// Largest change of blur radius between wavelengths among which point spread functions are interpolated, pixels.
     pub chromatic_step_px: f64,
-    /// Largest motion of a point of the film between wavelengths among which what layers cover is interpolated, pixels; off an even
-    /// motion it may be by a 25th of it.
-    pub coverage_step_px: f64,
-    /// A change of kernels over a cell that moves no spread function of an edge or a corner by more than this is left out. What is left out shows as
-    /// steps between cells.
-    pub negligible_edge: f64,
-    /// Largest blur radius that is imaged on the pixels of the film; where on the film a blur is wider, pixels are 2, 4, 8 … times
-    /// as wide, so that the radius is between half of this and this. At least 4.
+    /// Largest blur radius that is imaged on the pixels of the film; wider blurs are imaged on samples 2, 4, 8 … times as wide, so that the radius is
+    /// between half of this and this. At least 4.
     pub widest_blur_px: f64,
-    /// Length that the weights of knots are smoothed over where kernels change so from cell to cell that a uniform plane would show seams, pixels; twice
-    /// that where they would show most. An even number up to 8; 0 leaves seams.
-    pub smoothing_px: usize,
-    /// Whether what layers cover takes account of fourth moments of kernels where blur is a tenth of the film wide or more: whole surfaces are up to 2.5 % too bright
-    /// without, in scenes of several depths.
-    pub levels_wide_blur: bool,
+    /// Whether detail of the scene below a pixel is imaged on samples of half a pixel where the blur leaves any of it.
+    pub subpixels: bool,
+    /// What lies beyond the edges of the scene.
+    pub border: Border,
 }
 
 impl Default for Settings {
     fn default() -> Self {
         Self {
             mode: BlurMode::Layered,
-            knot_spacing_px: 128,
+            tile_px: 128,
             max_edge_error: 0.01,
-            max_shading_error: 5e-4,
             layer_step_px: 2.0,
-            depth_edge_px: 3.0,
             chromatic_step_px: 0.25,
-            coverage_step_px: 0.25,
-            negligible_edge: 4e-6,
             widest_blur_px: 64.0,
-            smoothing_px: 4,
-            levels_wide_blur: true,
+            subpixels: true,
+            border: Border::Hold,
         }
     }
 }
@@ -138,46 +132,21 @@ impl Settings {
     /// # Errors
     /// Names the first setting that is out of range.
     pub fn check(&self) -> Result<(), ForwardError> {
-        let positive = [
-            ("the largest edge error", self.max_edge_error),
-            ("the largest shading error", self.max_shading_error),
-            ("the layer step", self.layer_step_px),
-            ("the depth edge", self.depth_edge_px),
-        ];
-        for (what, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(ForwardError::Setting { what, value, expected: "a number above 0" });
-            }
+        let check = |what, value: f64, expected, is_good: bool| match is_good {
+            true => Ok(()),
+            false => Err(ForwardError::Setting { what, value, expected }),
+        };
+        for (what, value) in [("the largest edge error", self.max_edge_error), ("the layer step", self.layer_step_px)] {
+            check(what, value, "a number above 0", value.is_finite() && value > 0.0)?;
         }
-        let not_negative = [
-            ("the chromatic step", self.chromatic_step_px),
-            ("the coverage step", self.coverage_step_px),
-            ("the negligible edge", self.negligible_edge),
-        ];
-        for (what, value) in not_negative {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(ForwardError::Setting { what, value, expected: "a number, 0 or more" });
-            }
+        let step = self.chromatic_step_px;
+        check("the chromatic step", step, "a number, 0 or more", step.is_finite() && step >= 0.0)?;
+        if let BlurMode::Views(n) = self.mode {
+            check("the number of views", n as f64, "a whole number from 2 to 256", (2..=256).contains(&n))?;
         }
-        if let BlurMode::Views(n) = self.mode
-            && !(2..=256).contains(&n)
-        {
-            let (what, value) = ("the number of views", n as f64);
-            return Err(ForwardError::Setting { what, value, expected: "a whole number from 2 to 256" });
-        }
-        if !(self.widest_blur_px.is_finite() && self.widest_blur_px >= 4.0) {
-            let (what, value) = ("the widest blur", self.widest_blur_px);
-            return Err(ForwardError::Setting { what, value, expected: "a number, 4 pixels or more" });
-        }
-        // Twice that is no longer than the smallest cell.
-        if self.smoothing_px > 8 || self.smoothing_px % 2 == 1 {
-            let (what, value) = ("the smoothing of weights", self.smoothing_px as f64);
-            return Err(ForwardError::Setting { what, value, expected: "an even number of pixels, 8 at most" });
-        }
-        if !(16..=1024).contains(&self.knot_spacing_px) || self.knot_spacing_px % 2 == 1 {
-            let (what, value) = ("the knot spacing", self.knot_spacing_px as f64);
-            return Err(ForwardError::Setting { what, value, expected: "an even number from 16 to 1024 pixels" });
-        }
-        Ok(())
+        let widest = self.widest_blur_px;
+        check("the widest blur", widest, "a number, 4 pixels or more", widest.is_finite() && widest >= 4.0)?;
+        let is_good = (16..=1024).contains(&self.tile_px) && self.tile_px.is_power_of_two();
+        check("the side of tiles", self.tile_px as f64, "a power of two from 16 to 1024 pixels", is_good)
     }
 }

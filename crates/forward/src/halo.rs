@@ -8,13 +8,13 @@ use std::{
     f64::consts::{PI, SQRT_2},
 };
 
-use dioptric_psf::{LensImage, PsfQuery};
+use dioptric_psf::{FilmQuery, LensImage};
 use glam::DVec2;
 use multiversion::multiversion;
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{Film, layers::Layers, raster::LayerRaster};
+use crate::{Film, layers::Layers};
 
 /// A share of the light beyond the window that is not worth spreading: kernels leave out as little on each side.
 const NEGLIGIBLE: f64 = 1e-6;
@@ -49,9 +49,10 @@ impl Beyond {
     fn of(lens: &dyn LensImage, layers: &Layers, (wavelength_nm, pitch_um): (f64, f64), widest_px: f64) -> Self {
         let radius_px = |layer: &usize| layers.radius_px_at(*layer as f32);
         let sharpest = (0..layers.len()).min_by(|a, b| radius_px(a).total_cmp(&radius_px(b))).unwrap_or(0);
-        let factor = LayerRaster::factor_for(radius_px(&sharpest), widest_px) as f64;
+        let factor = (radius_px(&sharpest) / widest_px).log2().ceil().max(0.0).exp2();
         let dioptres = layers.dioptres()[sharpest];
-        let kernel = lens.kernel(PsfQuery::new(DVec2::ZERO, dioptres, wavelength_nm, factor * pitch_um));
+        let query = FilmQuery { place_mm: DVec2::ZERO, dioptres, wavelength_nm, pitch_um: factor * pitch_um };
+        let kernel = lens.kernel(query);
         if kernel.lambda_n_px == 0.0 {
             // It holds all that there is, whatever it is scaled by.
             return Self { share: 0.0, half_px: factor, steep: 0.0 };

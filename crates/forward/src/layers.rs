@@ -18,26 +18,26 @@ pub(crate) struct Layers {
 
 /// The blur of a lens on a film, sampled over the field and the bands.
 pub(crate) struct Blurs<'a> {
-    pub(crate) kernels: &'a dyn LensImage,
+    pub(crate) lens: &'a dyn LensImage,
     pub(crate) pitch_mm: f64,
-    /// A few fields from end to end of the film.
-    pub(crate) fields: &'a [DVec2],
+    /// A few points from end to end of the film, mm.
+    pub(crate) places_mm: &'a [DVec2],
     pub(crate) wavelengths_nm: &'a [f64],
 }
 
 impl Blurs<'_> {
-    /// The fields at a band: tangents and wavelength.
+    /// The points at a band, with its wavelength.
     fn samples(&self, band: usize) -> impl Iterator<Item = (DVec2, f64)> {
         let wavelength_nm = self.wavelengths_nm[band];
-        self.fields.iter().map(move |&tan| (tan, wavelength_nm))
+        self.places_mm.iter().map(move |&place_mm| (place_mm, wavelength_nm))
     }
 
-    fn blur_px(&self, (tan, wavelength_nm): (DVec2, f64), dioptres: f64) -> f64 {
-        self.kernels.blur_radius_mm(tan, dioptres, wavelength_nm) / self.pitch_mm
+    fn blur_px(&self, (place_mm, wavelength_nm): (DVec2, f64), dioptres: f64) -> f64 {
+        self.lens.blur_radius_mm(place_mm, dioptres, wavelength_nm) / self.pitch_mm
     }
 
-    fn spread_px(&self, (tan, wavelength_nm): (DVec2, f64), dioptres: f64) -> f64 {
-        self.kernels.spread_mm(tan, dioptres, wavelength_nm) / self.pitch_mm
+    fn spread_px(&self, (place_mm, wavelength_nm): (DVec2, f64), dioptres: f64) -> f64 {
+        self.lens.spread_mm(place_mm, dioptres, wavelength_nm) / self.pitch_mm
     }
 }
 
@@ -86,24 +86,12 @@ impl Layers {
     /// Returns the bands at which PSFs are computed: first, last, and enough between them that the blur radius changes
     /// by at most `step_px` from one to the next, all over the film and the depths.
     pub(crate) fn chromatic_knots(&self, step_px: f64, lens: &Blurs<'_>) -> Vec<usize> {
-        self.bands_by_blur(|_| step_px, lens)
-    }
-
-    /// Returns the bands at which the coverage of layers is computed, as far as blur tells: those of [`chromatic_knots`](Self::chromatic_knots) where it is small, and
-    /// where it is wide those between which it changes by as small a part of it as from layer to layer. A step of 0 asks for all bands.
-    pub(crate) fn coverage_knots(&self, step_px: f64, lens: &Blurs<'_>) -> Vec<usize> {
-        let of_radius = if step_px > 0.0 { STEP_OF_RADIUS } else { 0.0 };
-        self.bands_by_blur(|radius_px| step_px.max(of_radius * radius_px), lens)
-    }
-
-    /// Returns first and last band, and enough between them that blur radii change by at most a step from one to the next.
-    fn bands_by_blur(&self, step_at_radius: impl Fn(f64) -> f64, lens: &Blurs<'_>) -> Vec<usize> {
         let ends = [self.dioptres[0], self.dioptres[self.len() - 1]];
         let blurs = |band: usize| -> Vec<f64> {
             lens.samples(band).flat_map(|sample| ends.map(|d| lens.blur_px(sample, d))).collect()
         };
         let all: Vec<Vec<f64>> = (0..lens.wavelengths_nm.len()).map(blurs).collect();
-        let is_far = |(a, b): (&f64, &f64)| (a - b).abs() > step_at_radius(a.abs().max(b.abs()));
+        let is_far = |(a, b): (&f64, &f64)| (a - b).abs() > step_px;
         let mut knots = vec![0];
         for band in 1..all.len() {
             let last = knots[knots.len() - 1];
@@ -207,11 +195,11 @@ mod tests {
     use super::*;
     use crate::DiscLens;
 
-    const FIELDS: [DVec2; 3] = [DVec2::ZERO, DVec2::new(0.05, 0.0), DVec2::new(0.1, 0.0)];
+    const PLACES_MM: [DVec2; 3] = [DVec2::ZERO, DVec2::new(0.05, 0.0), DVec2::new(0.1, 0.0)];
 
     fn layers(range: (f64, f64), step_px: f64) -> Layers {
         let kernels = DiscLens { focus_dioptres: 10.0, ..DiscLens::default() };
-        let lens = Blurs { kernels: &kernels, pitch_mm: 1e-3, fields: &FIELDS, wavelengths_nm: &[550.0] };
+        let lens = Blurs { lens: &kernels, pitch_mm: 1e-3, places_mm: &PLACES_MM, wavelengths_nm: &[550.0] };
         Layers::over(range, step_px, &lens)
     }
 
@@ -219,14 +207,11 @@ mod tests {
     fn bands_share_psfs_only_while_the_blur_stays() {
         let lens = DiscLens { focus_dioptres: 10.0, axial_per_nm: 0.002, ..DiscLens::default() };
         let wavelengths_nm: Vec<f64> = (0..31).map(|i| 400.0 + 10.0 * f64::from(i)).collect();
-        let lens = Blurs { kernels: &lens, pitch_mm: 1e-3, fields: &FIELDS, wavelengths_nm: &wavelengths_nm };
+        let lens = Blurs { lens: &lens, pitch_mm: 1e-3, places_mm: &PLACES_MM, wavelengths_nm: &wavelengths_nm };
         let layers = Layers::over((5.0, 12.0), 2.0, &lens);
         // 0.02 pixels a band: 12 bands make 0.24 pixels.
         assert_eq!(layers.chromatic_knots(0.25, &lens), [0, 12, 24, 30]);
         assert_eq!(layers.chromatic_knots(0.0, &lens), (0..31).collect::<Vec<_>>());
-        // Of the narrower blur, of 2.3 to 1.7 pixels, 6 % are six bands at first and five at last.
-        assert_eq!(layers.coverage_knots(0.01, &lens), [0, 6, 12, 18, 23, 28, 30]);
-        assert_eq!(layers.coverage_knots(0.25, &lens), [0, 12, 24, 30]);
     }
 
     #[test]

@@ -1,65 +1,49 @@
-//! From a scene and the PSFs of a lens to spectral irradiance on the film.
+//! From a scene and the image of a lens to spectral irradiance on the film.
 //!
-//! Every sample of the scene is put where the centroid of its PSF lies (distortion and lateral color included),
-//! given the irradiance that the pupil passes, and spread by the PSF of its place, depth and wavelength. Surfaces at
-//! different depths are blurred in layers and laid one behind the other, so that near ones hide far ones.
+//! Each point of the film gathers what it sees: E(x) = I(x) Σ_k w_k(x) (L ∗ h_k)(x), with kernels h_k of sum 1 at the corners k of the tile that x lies in, weights
+//! of sum 1, and the irradiance I of a uniform scene (`docs/forward.md`). Surfaces at different depths are blurred in layers and laid one behind the other, so that near
+//! ones hide far ones.
 //!
 //! Radiance is W m⁻² sr⁻¹ nm⁻¹, irradiance W m⁻² nm⁻¹, absolute throughout. Row 0 of a picture is its top.
 //!
-//! This crate knows nothing of sensors, and of a lens only what [`LensImage`](dioptric_psf::LensImage) asks.
+//! This crate knows nothing of sensors, and of a lens only what [`LensImage`](dioptric_psf::LensImage) says.
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-mod active;
-mod basis;
-mod block_layers;
-mod block_search;
-mod blur;
-mod by_knots;
+mod blocks;
 mod convolve;
-mod cost;
 mod coverage;
+mod depth_check;
 mod disc_lens;
 mod error;
-mod expansion;
 mod film;
-mod film_lens;
-mod framed;
-mod geometry;
+mod gather;
 mod halo;
 mod hidden;
+mod imaging;
 mod irradiance;
-mod knot_kernels;
-mod lateral_color;
+mod kept;
 mod layers;
-mod layout;
-mod level;
-mod mesh;
 mod mixed;
 mod narrow;
-mod neighbors;
+mod node_kernels;
 mod occluded;
-mod occlusion;
-mod patch;
-mod patch_samples;
+mod places;
 mod plan;
-mod probe;
 mod raster;
 mod rectangle;
 mod render;
-mod sample_density;
 mod sampler;
-mod seams;
-mod smoothing;
+mod scene_layers;
 mod source;
 mod spec;
-mod squares;
 mod stopwatch;
-mod stream;
-mod tiles;
-mod uniform_response;
+mod surface;
+mod symmetry;
+mod tile;
+mod tiling;
 mod views;
 mod work;
 
@@ -68,12 +52,12 @@ mod acceptance;
 #[cfg(test)]
 mod plan_tests;
 
-pub use basis::BandKernels;
-pub use coverage::{PsfDomain, check_depth_map};
+pub use depth_check::check_depth_map;
 pub use disc_lens::DiscLens;
 pub use error::{ForwardError, SinkError};
-pub use film::{BlurMode, Film, Settings};
+pub use film::{BlurMode, Border, Film, Settings};
 pub use irradiance::irradiance;
+pub use kept::BandKernels;
 pub use plan::ImagingPlan;
 pub use render::render;
 pub use source::{BandRadiance, OccludedLayer, SceneGeometry, SceneRadiance, Source};

@@ -9,7 +9,7 @@ use dioptric_spectrum::{Cancel, Cancelled};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::occluded::Distances;
+use crate::{layers::Layers, occluded::Distances, scene_layers::DEPTH_EDGE_PX};
 
 /// Samples beside an edge of depth, and the samples around by which they are judged.
 #[derive(Default)]
@@ -34,14 +34,19 @@ struct Mixed {
     end: u32,
 }
 
+/// Up to this radius of blur a sample is in focus, pixels.
+const SHARP_PX: f64 = 1.0;
 /// How far around a sample others of its own side are looked for.
 const AROUND: usize = 2;
 
 impl MixedSamples {
     /// Finds the samples of which a neighbor lies farther or nearer by more than a jump, where of neither is known what lies behind it: what a
     /// second layer holds of mixed samples, and what these show of it, make up each other.
-    pub(crate) fn find(distances: &Distances, jump: f32, cancel: &Cancel) -> Result<Self, Cancelled> {
-        let front = &distances.front;
+    pub(crate) fn find(distances: &Distances, layers: &Layers, cancel: &Cancel) -> Result<Self, Cancelled> {
+        let (front, jump) = (&distances.front, DEPTH_EDGE_PX);
+        // What is in focus keeps its outline, mixtures and all: pixels of a sharp picture show both sides too.
+        let is_sharp =
+            |at: (usize, usize)| layers.radius_px_at(layers.coordinate_of_distance(front[at])) <= SHARP_PX;
         let (rows, columns) = front.dim();
         let near = |row: usize, column: usize, by: usize| {
             let lines = row.saturating_sub(by)..(row + by + 1).min(rows);
@@ -54,7 +59,7 @@ impl MixedSamples {
         let of_row = |row: usize| {
             cancel.check()?;
             let mut found = vec![];
-            for at in (0..columns).map(|column| (row, column)).filter(|&at| is_beside_edge(at)) {
+            for at in (0..columns).map(|column| (row, column)).filter(|&at| is_beside_edge(at) && !is_sharp(at)) {
                 let (row, column) = at;
                 if near(row, column, 1).any(|other| distances.is_known_behind(other, jump)) {
                     continue;
@@ -118,10 +123,19 @@ impl MixedSamples {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layers::Blurs;
+
+    /// Layers whose nearest is blurred over 20 pixels and whose farthest over 10.
+    fn out_of_focus() -> Layers {
+        let lens = crate::DiscLens { focus_dioptres: 0.0, ..crate::DiscLens::default() };
+        let (places_mm, wavelengths_nm) = ([glam::DVec2::ZERO], [550.0]);
+        let blurs = Blurs { lens: &lens, pitch_mm: 1e-3, places_mm: &places_mm, wavelengths_nm: &wavelengths_nm };
+        Layers::over((2.0, 20.0), 2.0, &blurs)
+    }
 
     fn found(front: &Array2<f32>) -> MixedSamples {
         let distances = Distances { front: front.clone(), behind: None };
-        MixedSamples::find(&distances, 3.0, &Cancel::new()).unwrap()
+        MixedSamples::find(&distances, &out_of_focus(), &Cancel::new()).unwrap()
     }
 
     /// A near half plane of 2 before a wall of stripes of 5 and 6; the edge passes through column 8 or 9.
@@ -168,7 +182,7 @@ mod tests {
         // Known behind the near side, in the upper half.
         let behind = Array2::from_shape_fn((12, 20), |(row, column)| if row < 6 && column < 9 { 10.0 } else { 0.0 });
         let distances = Distances { front, behind: Some(behind) };
-        let unmixed = MixedSamples::find(&distances, 3.0, &Cancel::new()).unwrap().unmixed(&plane).into_owned();
+        let unmixed = MixedSamples::find(&distances, &out_of_focus(), &Cancel::new()).unwrap().unmixed(&plane).into_owned();
         for (row, value) in unmixed.column(9).iter().enumerate() {
             // The row beside the known half has known neighbors.
             assert_eq!(*value == plane[(row, 9)], row < 7, "{row}: {value}");

@@ -6,10 +6,11 @@ use dioptric_spectrum::{Cancel, Cancelled, DepthMap};
 use ndarray::Array2;
 
 use crate::{
-    SceneGeometry, Settings,
+    SceneGeometry,
     hidden::{EdgeRule, Fill, reach_of_edges},
     layers::Layers,
-    sampler::LayerCoordinates,
+    scene_layers::DEPTH_EDGE_PX,
+    surface::LayerCoordinates,
     work::plane_of,
 };
 
@@ -69,13 +70,12 @@ impl OccludedSamples {
     pub(crate) fn find(
         distances: &Distances,
         layers: &Layers,
-        settings: &Settings,
         scene_per_film: f64,
         cancel: &Cancel,
     ) -> Result<Self, Cancelled> {
         let reach =
             |distance: f32| layers.radius_px_at(layers.coordinate_of_distance(distance)) as f32 * scene_per_film as f32;
-        let rule = EdgeRule { jump: settings.depth_edge_px as f32, reach: &reach };
+        let rule = EdgeRule { jump: DEPTH_EDGE_PX, reach: &reach };
         let Distances { front, behind } = distances;
         let size = front.dim();
         if let Some(known) = behind {

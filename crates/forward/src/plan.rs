@@ -8,10 +8,9 @@ use ndarray::Array2;
 
 use crate::{
     BandKernels, BandRadiance, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
-    framed::Framed,
-    layout::Layout,
+    imaging::Imaging,
     stopwatch::{Clock, ImagingTimes, Stopwatch},
-    views::Views,
+    views::{Framed, Views},
     work::{Watch, Work},
 };
 
@@ -53,7 +52,7 @@ pub struct ImagingPlan {
 
 impl std::fmt::Debug for ImagingPlan {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Layout { spec, scene, .. } = self.views.first();
+        let Imaging { spec, scene, .. } = self.views.first();
         f.debug_struct("ImagingPlan")
             .field("spec", spec)
             .field("dioptres", &scene.layers.dioptres())
@@ -94,20 +93,19 @@ impl ImagingPlan {
         Ok(Self { lens, views })
     }
 
-    /// Returns the plan that keeps at most this many bytes of kernels and of what layers cover; others are computed anew for each
-    /// band.
+    /// Returns the plan that keeps at most this many bytes of kernels; others are computed anew for each band.
     #[must_use]
     pub fn with_kernel_budget(mut self, bytes: usize) -> Self {
-        let layouts = self.views.layouts_mut();
-        let budget_bytes = bytes / layouts.len();
-        layouts.iter_mut().for_each(|layout| layout.keep_at_most(budget_bytes));
+        let imagings = self.views.imagings_mut();
+        let budget_bytes = bytes / imagings.len();
+        imagings.iter_mut().for_each(|imaging| imaging.keep_at_most(budget_bytes));
         self
     }
 
     /// Returns the plan whose bands in flight take at most this many bytes together; one band is always worked on.
     #[must_use]
     pub fn with_band_budget(mut self, bytes: usize) -> Self {
-        self.views.layouts_mut().iter_mut().for_each(|layout| layout.in_flight_bytes = Some(bytes));
+        self.views.imagings_mut().iter_mut().for_each(|imaging| imaging.in_flight_bytes = Some(bytes));
         self
     }
 
@@ -116,16 +114,11 @@ impl ImagingPlan {
         self.views.first().band_bytes()
     }
 
-    /// Returns about how many bytes of memory the bases of two bands take, between which others are interpolated.
-    pub fn bases_bytes(&self) -> usize {
-        self.views.largest_bases_bytes()
-    }
-
     /// Returns the plan that adds up, by a clock, the time that its parts take; see [`times`](Self::times).
     #[must_use]
     pub fn with_clock(mut self, clock: Arc<Clock>) -> Self {
         let stopwatch = Stopwatch::of(clock);
-        self.views.layouts_mut().iter_mut().for_each(|layout| layout.stopwatch = stopwatch.clone());
+        self.views.imagings_mut().iter_mut().for_each(|imaging| imaging.stopwatch = stopwatch.clone());
         self
     }
 
@@ -150,7 +143,7 @@ impl ImagingPlan {
     /// When there is no such band, or the work is cancelled.
     pub fn kernels(&self, band: usize, cancel: &Cancel) -> Result<Vec<BandKernels>, ForwardError> {
         self.views.first().check_band(band)?;
-        let of = |(lens, layout): (&dyn LensImage, &Layout)| layout.kernels(lens, band, &Work::unobserved(cancel));
+        let of = |(lens, imaging): (&dyn LensImage, &Imaging)| imaging.kernels(lens, band, &Work::unobserved(cancel));
         Ok(self.views.iter(self.lens.as_ref()).map(of).collect::<Result<_, _>>()?)
     }
 
@@ -159,9 +152,9 @@ impl ImagingPlan {
     /// # Errors
     /// When there is no such band, when the radiance is not that of the planned samples, or when the work is cancelled.
     pub fn image(&self, band: usize, radiance: BandRadiance<'_>, cancel: &Cancel) -> Result<Array2<f32>, ForwardError> {
-        let layout = self.views.first();
-        layout.check_band(band)?;
-        radiance.check(layout.size(), layout.scene.occluded.needs_radiance())?;
+        let first = self.views.first();
+        first.check_band(band)?;
+        radiance.check(first.size(), first.scene.occluded.needs_radiance())?;
         Ok(self.views.image(self.lens.as_ref(), band, radiance, &Work::unobserved(cancel))?)
     }
 
@@ -195,8 +188,8 @@ impl ImagingPlan {
         cancel: &Cancel,
         sink: &mut Sink<'_>,
     ) -> Result<(), ForwardError> {
-        let layout = self.views.first();
-        radiance.check(layout.size(), &layout.spec.grid)?;
+        let imaging = self.views.first();
+        radiance.check(imaging.size(), &imaging.spec.grid)?;
         progress(0.0);
         let watch = Watch { progress, range: (0.0, 1.0), cancel };
         self.views.stream_from(first, self.lens.as_ref(), radiance, &watch, sink)

@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use dioptric_psf::{FilmMap, Kernel, LensImage, PsfQuery};
+use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage};
 use dioptric_scene::View;
 use dioptric_spectrum::{Bands, Cancel, DepthMap, Quantity, SpectralImage, SpectrumError, WavelengthGrid};
 use glam::DVec2;
@@ -106,45 +106,6 @@ fn planned_bands_equal_rendered_ones() {
     }
 }
 
-/// Wide blurs change by more than kernels are interpolated over from each band to the next, and by less than coverage is: bands between two at which that is computed have
-/// kernels of their own.
-#[test]
-fn bands_between_bases_have_their_own_kernels() {
-    let lens = DiscLens { focus_dioptres: 6.0, axial_per_nm: 0.015, growth: 2.0, ..DiscLens::default() };
-    let scene = Scene { lens: Arc::new(lens), ..Scene::new() };
-    let layout = |plan: &ImagingPlan| {
-        let scene = plan.views.first().scene.clone();
-        (scene.kernel_bands.clone(), scene.basis_bands.clone())
-    };
-    let plan = scene.plan();
-    assert_eq!(layout(&plan), ((0..7).collect(), vec![0, 2, 4, 6]));
-    let rendered = scene.rendered();
-    let source = Source { radiance: &scene.radiance, depth: &scene.depth, view: scene.view(), occluded: None };
-    for plan in [plan, scene.plan().with_kernel_budget(0), scene.plan().with_band_budget(1)] {
-        assert_eq!(scene.band(&plan, 5), rendered[5]);
-        let mut left = vec![];
-        let mut sink = |_, picture: Array2<f32>| {
-            left.push(picture);
-            Ok(())
-        };
-        plan.stream_from(3, &source.light(), &|_| {}, &Cancel::new(), &mut sink).unwrap();
-        assert_eq!(left, rendered[3..]);
-    }
-    let every_band =
-        ImagingSpec { settings: Settings { chromatic_step_px: 0.0, ..Settings::default() }, ..scene.spec() };
-    let every_band =
-        ImagingPlan::new(scene.lens.clone(), &scene.geometry(), every_band, &|_| {}, &Cancel::new()).unwrap();
-    assert_eq!(layout(&every_band).1, (0..7).collect::<Vec<_>>());
-    for (band, rendered) in rendered.iter().enumerate() {
-        let own = scene.band(&every_band, band);
-        let mean = own.mean().unwrap();
-        let worst = own.iter().zip(rendered).map(|(a, b)| (a - b).abs() / mean).fold(0.0, f32::max);
-        // Coverage is off by an eighth of what it bends by over two bands; where it is computed, by what levels it, which is between fewer bands.
-        let most = if band % 2 == 1 { 2e-3 } else { 1e-4 };
-        assert!(worst < most, "{band}: {worst}");
-    }
-}
-
 #[test]
 fn light_changes_without_another_plan() {
     let scene = Scene::new();
@@ -163,25 +124,18 @@ fn size_counts_kept_kernels() {
     let empty = keeps_none.size_bytes();
     // Depth layers of all samples and the second samples behind edges, at least.
     assert!(empty >= 2 * 4 * ROWS * COLUMNS, "{empty}");
-    // Where seams are looked for, kernels were computed: in the first, the middle and the last band.
+    // Kernels of the middle band tell how much memory they take.
     let plan = scene.plan();
-    let of_seams: usize =
-        [0, 3, 6].map(|band| plan.kernels(band, &Cancel::new()).unwrap()[0].size_bytes()).iter().sum();
+    let of_middle = plan.kernels(3, &Cancel::new()).unwrap()[0].size_bytes();
     let planned = scene.plan().size_bytes();
-    assert_eq!(planned, empty + of_seams);
-    let plan = scene.plan();
-    let kernels = plan.kernels(1, &Cancel::new()).unwrap().remove(0);
+    assert_eq!(planned, empty + of_middle);
+    let kernels = plan.kernels(0, &Cancel::new()).unwrap().remove(0);
     assert!(kernels.n_kernels() > 0);
-    let grown = plan.size_bytes() - planned;
-    plan.kernels(1, &Cancel::new()).unwrap();
-    assert_eq!(plan.size_bytes() - planned, grown);
-    // Without the kernels what is left is maps.
-    keeps_none.kernels(1, &Cancel::new()).unwrap();
-    assert_eq!(keeps_none.size_bytes() - empty, grown - kernels.size_bytes());
-    assert!(grown > kernels.size_bytes());
-    // A smaller budget keeps what fits into it.
-    let kept = scene.plan().with_kernel_budget(of_seams - 1).size_bytes();
-    assert!(kept > empty && kept < planned, "{kept}");
+    assert_eq!(plan.size_bytes() - planned, kernels.size_bytes());
+    plan.kernels(0, &Cancel::new()).unwrap();
+    assert_eq!(plan.size_bytes() - planned, kernels.size_bytes());
+    keeps_none.kernels(0, &Cancel::new()).unwrap();
+    assert_eq!(keeps_none.size_bytes(), empty);
 }
 
 /// A lens that cancels the work when it has been asked for a number of kernels, and counts them all.
@@ -196,30 +150,17 @@ impl LensImage for Cancelling {
     fn is_symmetric(&self) -> bool {
         self.lens.is_symmetric()
     }
-    fn wavelengths_nm(&self) -> (f64, f64) {
-        self.lens.wavelengths_nm()
+    fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
+        self.lens.film_map(wavelength_nm, reach_mm)
     }
-    fn dioptres(&self) -> (f64, f64) {
-        self.lens.dioptres()
-    }
-    fn is_dark_beyond_extent(&self) -> bool {
-        self.lens.is_dark_beyond_extent()
-    }
-
-    fn is_dark_beyond_extent_on(&self, low_mm: DVec2, high_mm: DVec2) -> bool {
-        self.lens.is_dark_beyond_extent_on(low_mm, high_mm)
-    }
-    fn film_map(&self, dioptres: f64, wavelength_nm: f64, extent_mm: f64) -> FilmMap {
-        self.lens.film_map(dioptres, wavelength_nm, extent_mm)
-    }
-    fn kernel(&self, query: PsfQuery) -> Kernel {
+    fn kernel(&self, query: FilmQuery) -> Kernel {
         if self.asked.fetch_add(1, Ordering::Relaxed) + 1 == self.at {
             self.cancel.cancel();
         }
         self.lens.kernel(query)
     }
-    fn blur_radius_mm(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
-        self.lens.blur_radius_mm(field_tan, dioptres, wavelength_nm)
+    fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        self.lens.blur_radius_mm(place_mm, dioptres, wavelength_nm)
     }
 }
 

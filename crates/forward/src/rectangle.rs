@@ -23,11 +23,6 @@ impl Rectangle {
         (self.first_row + self.rows as i64, self.first_column + self.columns as i64)
     }
 
-    /// Returns the part within a film, or `None` if there is none.
-    pub(crate) fn clipped(&self, film_rows: usize, film_columns: usize) -> Option<Self> {
-        self.intersection(&Self { first_row: 0, first_column: 0, rows: film_rows, columns: film_columns })
-    }
-
     /// Returns it with a margin all around.
     pub(crate) fn grown(&self, margin: usize) -> Self {
         Self {
@@ -63,21 +58,14 @@ impl Rectangle {
         rectangles.reduce(|all, next| all.united(&next))
     }
 
-    /// Returns what light from its pixels reaches that is spread over a kernel's.
-    pub(crate) fn spread_over(&self, kernel: &Self) -> Self {
+    /// Returns the samples that its own gather from, by a kernel that lies in a window: of the sample x those at x − d, for d in the window.
+    pub(crate) fn seen_through(&self, window: &Self) -> Self {
         Self {
-            first_row: self.first_row + kernel.first_row,
-            first_column: self.first_column + kernel.first_column,
-            rows: self.rows + kernel.rows - 1,
-            columns: self.columns + kernel.columns - 1,
+            first_row: self.first_row - (window.first_row + window.rows as i64 - 1),
+            first_column: self.first_column - (window.first_column + window.columns as i64 - 1),
+            rows: self.rows + window.rows - 1,
+            columns: self.columns + window.columns - 1,
         }
-    }
-
-    /// Returns the part from which light reaches a film that is spread over a kernel's pixels, or `None` if there is none.
-    pub(crate) fn in_reach_of(&self, film_rows: usize, film_columns: usize, kernel: &Self) -> Option<Self> {
-        let (end_row, end_column) = kernel.end();
-        let (rows, columns) = (film_rows + kernel.rows - 1, film_columns + kernel.columns - 1);
-        self.intersection(&Self { first_row: 1 - end_row, first_column: 1 - end_column, rows, columns })
     }
 
     /// Returns the number of its first pixel among those of another around it, row by row.
@@ -92,28 +80,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rectangles_are_spread_and_found_again() {
-        let kernel = Rectangle { first_row: -1, first_column: -2, rows: 4, columns: 3 };
+    fn samples_are_seen_through_windows() {
+        let window = Rectangle { first_row: -1, first_column: 2, rows: 4, columns: 3 };
         let pixel = Rectangle { first_row: 10, first_column: 20, rows: 1, columns: 1 };
-        let spread = Rectangle { first_row: 9, first_column: 18, rows: 4, columns: 3 };
-        assert_eq!(pixel.spread_over(&kernel), spread);
-        assert_eq!((pixel.offset_in(&spread), spread.len()), (5, 12));
-        assert_eq!(Rectangle::around([pixel, spread].into_iter()), Some(spread));
+        let seen = Rectangle { first_row: 8, first_column: 16, rows: 4, columns: 3 };
+        assert_eq!(pixel.seen_through(&window), seen);
+        assert_eq!(Rectangle { rows: 3, ..pixel }.seen_through(&window).rows, 6);
+        assert_eq!((pixel.united(&seen).rows, seen.len()), (4, 12));
         assert_eq!(pixel.united(&pixel.grown(2)), pixel.grown(2));
-    }
-
-    /// Each pixel of a part is within reach where the pixels that its light is spread over are on the film.
-    #[test]
-    fn light_comes_from_pixels_within_reach() {
-        let kernel = Rectangle { first_row: -1, first_column: 1, rows: 4, columns: 3 };
-        let around = Rectangle { first_row: -9, first_column: -9, rows: 30, columns: 30 };
-        let reaching = around.in_reach_of(8, 6, &kernel).unwrap();
-        for row in -9..21 {
-            for column in -9..21 {
-                let pixel = Rectangle { first_row: row, first_column: column, ..Rectangle::PIXEL };
-                let reaches = pixel.spread_over(&kernel).clipped(8, 6).is_some();
-                assert_eq!(pixel.intersection(&reaching).is_some(), reaches, "{row}, {column}");
-            }
-        }
+        assert_eq!(pixel.offset_in(&pixel.grown(2)), 12);
     }
 }

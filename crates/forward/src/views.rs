@@ -2,27 +2,28 @@
 
 use std::sync::Arc;
 
-use dioptric_psf::LensImage;
+use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage, PsfError};
 use dioptric_spectrum::{Cancel, Cancelled};
+use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
     BandRadiance, BlurMode, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance, Sink,
-    layout::{KEPT_BUDGET_BYTES, Layout, SceneLayers},
-    stream::HandOn,
+    imaging::{Imaging, KEPT_BUDGET_BYTES},
+    scene_layers::SceneLayers,
     work::{Progress, Watch, Work},
 };
 
-/// The layouts of a scene, and the parts of the pupil that they are for; none for the whole pupil.
+/// What is imaged through the parts of a pupil; through the whole there are no parts.
 pub(crate) struct Views {
     parts: Vec<Arc<dyn LensImage + Send>>,
     /// One of each part, or of the whole.
-    layouts: Vec<Layout>,
+    imagings: Vec<Imaging>,
 }
 
 impl Views {
-    /// Lays out a scene for the parts of a pupil that a mode of blur asks for.
+    /// Plans a scene for the parts of a pupil that a mode of blur asks for.
     pub(crate) fn of(
         lens: &dyn LensImage,
         scene: &SceneGeometry<'_>,
@@ -30,55 +31,47 @@ impl Views {
         (progress, range): (&Progress<'_>, (f64, f64)),
         cancel: &Cancel,
     ) -> Result<Self, ForwardError> {
-        let layers = Arc::new(SceneLayers::over(lens, scene, spec, cancel)?);
+        let layers = SceneLayers::over(lens, scene, spec, cancel)?;
         let parts = match spec.settings.mode {
             // A scene of one depth looks the same from everywhere.
             BlurMode::Views(n) if layers.layers.len() > 1 => lens.through_parts(n)?,
             _ => vec![],
         };
-        let layout = |lens: &dyn LensImage, range: (f64, f64)| {
-            Layout::new(lens, scene.view, layers.clone(), spec.clone(), (progress, range), cancel)
-        };
+        let work = Work::new(cancel, progress, range, (layers.layers.len() * parts.len().max(1)) as u64);
+        let imaging = |lens: &dyn LensImage| Imaging::new(lens, scene, layers.clone(), spec.clone(), &work);
         if parts.is_empty() {
-            return Ok(Self { layouts: vec![layout(lens, range)?], parts });
+            return Ok(Self { imagings: vec![imaging(lens)?], parts });
         }
-        let step = (range.1 - range.0) / parts.len() as f64;
-        let part_range = |i: usize| (range.0 + step * i as f64, range.0 + step * (i + 1) as f64);
-        let of_part = |(i, part): (usize, &Arc<dyn LensImage + Send>)| {
-            let mut layout = layout(part.as_ref(), part_range(i))?;
+        let of_part = |part: &Arc<dyn LensImage + Send>| {
+            let mut imaging = imaging(part.as_ref())?;
             // Together they keep no more than one would.
-            layout.keep_at_most(KEPT_BUDGET_BYTES / parts.len());
-            Ok(layout)
+            imaging.keep_at_most(KEPT_BUDGET_BYTES / parts.len());
+            Ok(imaging)
         };
-        let layouts = parts.iter().enumerate().map(of_part).collect::<Result<_, ForwardError>>()?;
-        Ok(Self { layouts, parts })
+        let imagings = parts.iter().map(of_part).collect::<Result<_, ForwardError>>()?;
+        Ok(Self { imagings, parts })
     }
 
-    /// The first layout: what it holds of scene, film and bands is that of all.
-    pub(crate) fn first(&self) -> &Layout {
-        &self.layouts[0]
+    /// The first: what it holds of scene, film and bands is that of all.
+    pub(crate) fn first(&self) -> &Imaging {
+        &self.imagings[0]
     }
 
-    pub(crate) fn layouts_mut(&mut self) -> &mut [Layout] {
-        &mut self.layouts
+    pub(crate) fn imagings_mut(&mut self) -> &mut [Imaging] {
+        &mut self.imagings
     }
 
-    /// The layouts, each with the lens or part of its pupil.
+    /// All of them, each with the lens or part of its pupil.
     pub(crate) fn iter<'a>(
         &'a self,
         whole: &'a dyn LensImage,
-    ) -> impl Iterator<Item = (&'a dyn LensImage, &'a Layout)> {
+    ) -> impl Iterator<Item = (&'a dyn LensImage, &'a Imaging)> {
         let lens = move |i: usize| -> &'a dyn LensImage { self.parts.get(i).map_or(whole, |part| part.as_ref()) };
-        self.layouts.iter().enumerate().map(move |(i, layout)| (lens(i), layout))
-    }
-
-    /// What the bases of two bands take, of one layout at a time.
-    pub(crate) fn largest_bases_bytes(&self) -> usize {
-        self.layouts.iter().map(Layout::bases_bytes).max().unwrap_or(0)
+        self.imagings.iter().enumerate().map(move |(i, imaging)| (lens(i), imaging))
     }
 
     pub(crate) fn size_bytes(&self) -> usize {
-        self.first().scene.size_bytes() + self.layouts.iter().map(Layout::size_bytes).sum::<usize>()
+        self.first().scene.size_bytes() + self.imagings.iter().map(Imaging::size_bytes).sum::<usize>()
     }
 
     /// Returns the irradiance of a band: the sum of all views.
@@ -89,15 +82,12 @@ impl Views {
         radiance: BandRadiance<'_>,
         work: &Work<'_>,
     ) -> Result<Array2<f32>, Cancelled> {
-        let mut sum: Option<Array2<f32>> = None;
-        for (lens, layout) in self.iter(whole) {
-            let basis = layout.basis_between(lens, band, work)?;
-            add(&mut sum, layout.image(lens, band, &basis, radiance, work)?);
-        }
-        Ok(sum.expect("there is at least one view"))
+        let pictures = self.iter(whole).map(|(lens, imaging)| imaging.image(lens, band, radiance, work));
+        let sum = pictures.reduce(|sum, picture| Ok(sum? + picture?));
+        sum.expect("there is at least one view")
     }
 
-    /// Images the bands from `first` on.
+    /// Images the bands from `first` on, some at once, and hands them on in their order.
     pub(crate) fn stream_from(
         &self,
         first: usize,
@@ -106,58 +96,67 @@ impl Views {
         watch: &Watch<'_>,
         sink: &mut Sink<'_>,
     ) -> Result<(), ForwardError> {
-        let n_units = self.layouts.iter().map(|layout| layout.stream_units(first, self.layouts.len() > 1)).sum();
+        let n_units = self.imagings.iter().map(|imaging| imaging.stream_units(first)).sum();
         let work = Work::new(watch.cancel, watch.progress, watch.range, n_units);
-        let mut hand_on = |band, picture| sink(band, picture).map_err(|reason| ForwardError::Sink { band, reason });
-        if self.parts.is_empty() {
-            self.layouts[0].stream_from(first, whole, radiance, &work, &mut hand_on)?;
-        } else {
-            self.stream_sums(first, whole, radiance, &work, &mut hand_on)?;
+        let bands: Vec<usize> = (first..self.first().spec.grid.len()).collect();
+        for group in bands.chunks(self.first().bands_at_once()) {
+            let mut sums: Vec<Option<Array2<f32>>> = vec![None; group.len()];
+            for (lens, imaging) in self.iter(whole) {
+                let image = |&band: &usize| imaging.image_of(lens, band, radiance, &work);
+                let pictures: Vec<Array2<f32>> = group.par_iter().map(image).collect::<Result<_, ForwardError>>()?;
+                for (sum, picture) in sums.iter_mut().zip(pictures) {
+                    *sum = Some(match sum.take() {
+                        Some(sum) => sum + picture,
+                        None => picture,
+                    });
+                }
+            }
+            for (&band, sum) in group.iter().zip(sums) {
+                work.check()?;
+                let picture = sum.expect("there is at least one view");
+                sink(band, picture).map_err(|reason| ForwardError::Sink { band, reason })?;
+            }
         }
         (watch.progress)(watch.range.1);
         Ok(())
     }
-
-    /// Images the bands between two bases through one part after the other, so that no more than one part's bases are held.
-    fn stream_sums(
-        &self,
-        first: usize,
-        whole: &dyn LensImage,
-        radiance: &SceneRadiance<'_>,
-        work: &Work<'_>,
-        hand_on: &mut HandOn<'_>,
-    ) -> Result<(), ForwardError> {
-        for (pair, bands) in self.first().bands_between_bases(first) {
-            let mut sums: Vec<Option<Array2<f32>>> = vec![None; bands.len()];
-            for (lens, layout) in self.iter(whole) {
-                let lower = layout.basis(lens, pair[0], work)?;
-                let upper = if pair[1] == pair[0] { lower.clone() } else { layout.basis(lens, pair[1], work)? };
-                let at_once = layout.bands_at_once([&lower, &upper]);
-                for (group, sums) in bands.chunks(at_once).zip(sums.chunks_mut(at_once)) {
-                    let pictures: Vec<Result<Array2<f32>, ForwardError>> = group
-                        .par_iter()
-                        .map(|&band| {
-                            let basis = layout.between(lens, (band, pair), [&lower, &upper], work)?;
-                            layout.image_of(lens, band, &basis, radiance, work)
-                        })
-                        .collect();
-                    for (sum, picture) in sums.iter_mut().zip(pictures) {
-                        add(sum, picture?);
-                    }
-                }
-                layout.drop_maps();
-            }
-            for (band, sum) in bands.into_iter().zip(sums) {
-                hand_on(band, sum.expect("there is at least one view"))?;
-            }
-        }
-        Ok(())
-    }
 }
 
-fn add(sum: &mut Option<Array2<f32>>, picture: Array2<f32>) {
-    match sum {
-        Some(sum) => *sum += &picture,
-        None => *sum = Some(picture),
+/// A lens whose film points are counted from another point of the film than its middle.
+pub(crate) struct Framed<L> {
+    pub(crate) lens: L,
+    /// That point, mm from where they were counted from.
+    pub(crate) center_mm: DVec2,
+}
+
+impl<L> LensImage for Framed<L>
+where
+    L: std::ops::Deref<Target: LensImage> + Sync,
+{
+    /// About the middle of the film nothing is.
+    fn is_symmetric(&self) -> bool {
+        false
+    }
+
+    fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
+        let map = self.lens.film_map(wavelength_nm, reach_mm + self.center_mm.length());
+        Arc::new(map.counted_from(self.center_mm))
+    }
+
+    fn kernel(&self, query: FilmQuery) -> Kernel {
+        self.lens.kernel(FilmQuery { place_mm: query.place_mm + self.center_mm, ..query })
+    }
+
+    fn blur_radius_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        self.lens.blur_radius_mm(place_mm + self.center_mm, dioptres, wavelength_nm)
+    }
+
+    fn spread_mm(&self, place_mm: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+        self.lens.spread_mm(place_mm + self.center_mm, dioptres, wavelength_nm)
+    }
+
+    fn through_parts(&self, n_parts: usize) -> Result<Vec<Arc<dyn LensImage + Send>>, PsfError> {
+        let framed = |lens| Arc::new(Framed { lens, center_mm: self.center_mm }) as Arc<dyn LensImage + Send>;
+        Ok(self.lens.through_parts(n_parts)?.into_iter().map(framed).collect())
     }
 }

@@ -1,0 +1,308 @@
+//! The imaging of a scene's layers through one lens or one part of its pupil.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+use dioptric_psf::{FieldsAlong, FilmMap, LensImage};
+use dioptric_spectrum::Cancelled;
+use ndarray::Array2;
+use rayon::prelude::*;
+
+use crate::{
+    BandKernels, BandRadiance, Border, Film, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance,
+    blocks::Blocks,
+    coverage::Composite,
+    gather::{GatherTask, TileGroup, gather, out_samples},
+    halo::Halos,
+    kept::Kept,
+    places::SceneRaster,
+    raster::{Level, Raster},
+    rectangle::Rectangle,
+    sampler::Sampler,
+    scene_layers::SceneLayers,
+    stopwatch::{Part, Stopwatch},
+    surface::{LayerCoordinates, Surface},
+    tile::film_pixels,
+    tiling::{LayeredLens, Rule, Tiling, reach_px},
+    work::Work,
+};
+
+/// Kernels that are kept when nothing else is asked for, bytes.
+pub(crate) const KEPT_BUDGET_BYTES: usize = 256 << 20;
+
+/// What bands in flight take when nothing else is asked for, bytes.
+const IN_FLIGHT_BYTES: usize = 256 << 20;
+
+/// Units of work of a kernel, and of a group of tiles in one band, about in proportion to their time.
+const KERNEL_UNITS: u64 = 1;
+const GROUP_UNITS: u64 = 8;
+
+/// Lateral color and distortion move the edge of what is seen by less than this, over the reach of the film.
+const BEYOND: f64 = 1.05;
+
+/// A plan for one lens, or for one part of a pupil: all but the lens, which each method takes.
+pub(crate) struct Imaging {
+    pub(crate) spec: ImagingSpec,
+    pub(crate) scene: Arc<SceneLayers>,
+    raster: SceneRaster,
+    tiling: Tiling,
+    blocks: Blocks,
+    /// How far from the middle of the film light is taken from, mm.
+    reach_mm: f64,
+    kept: Mutex<Kept>,
+    halos: Halos,
+    /// The largest that the kernels of a band have been, bytes.
+    kernel_bytes: usize,
+    pub(crate) stopwatch: Stopwatch,
+    /// Bytes that bands in flight may take; `None` for the usual ones.
+    pub(crate) in_flight_bytes: Option<usize>,
+}
+
+impl Imaging {
+    pub(crate) fn new(
+        lens: &dyn LensImage,
+        geometry: &SceneGeometry<'_>,
+        scene: Arc<SceneLayers>,
+        spec: ImagingSpec,
+        work: &Work<'_>,
+    ) -> Result<Self, ForwardError> {
+        let ImagingSpec { film, grid, settings } = &spec;
+        let (rows, columns) = geometry.size();
+        let raster = SceneRaster { view: geometry.view, rows, columns, border: settings.border };
+        let layers = &scene.layers;
+        let widest_px = (0..layers.len()).map(|layer| layers.radius_px_at(layer as f32)).fold(0.0, f64::max);
+        let margin_px = reach_px(widest_px).ceil() as usize;
+        let reach_mm = BEYOND * (film.half_diagonal_mm() + 1.5e-3 * film.pitch_um * margin_px as f64);
+
+        // Look which layers lie where.
+        let wavelengths_nm = grid.centers_nm();
+        let middle_nm = wavelengths_nm[grid.len() / 2];
+        let wavelengths_nm = [wavelengths_nm[0], middle_nm, wavelengths_nm[grid.len() - 1]];
+        let maps: Vec<Arc<FilmMap>> = wavelengths_nm.par_iter().map(|&nm| lens.film_map(nm, reach_mm)).collect();
+        let maps: Vec<&FilmMap> = maps.iter().map(Arc::as_ref).collect();
+        let surfaces: Vec<&LayerCoordinates> =
+            std::iter::once(&scene.coordinates).chain(scene.occluded.layer_coordinates()).collect();
+        let blocks = Blocks::find((film, margin_px), &raster, &maps, &surfaces, work.cancel())?;
+
+        // Cut the film into tiles for each of them.
+        let stopwatch = Stopwatch::default();
+        let layered = LayeredLens { image: lens, film, layers, stopwatch: &stopwatch };
+        let rule = Rule { lens: layered, settings, blocks: &blocks, middle_nm, wavelengths_nm: &wavelengths_nm };
+        let tiling = Tiling::new(&rule, work)?;
+        let looked_up = few_of(&scene.kernel_bands).map(|band| (band, grid.centers_nm()[band]));
+        let halos = Halos::of((lens, layers), (film, settings.widest_blur_px), &looked_up.collect::<Vec<_>>(), grid.len());
+        let kept = Mutex::new(Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() });
+        let mut imaging = Self {
+            scene,
+            raster,
+            tiling,
+            blocks,
+            reach_mm,
+            kept,
+            halos,
+            kernel_bytes: 0,
+            stopwatch,
+            in_flight_bytes: None,
+            spec,
+        };
+        // Those of the middle band tell how much memory kernels take.
+        let middle = imaging.scene.kernel_bands[imaging.scene.kernel_bands.len() / 2];
+        let kernels = imaging.computed_kernels(lens, middle, &Work::unobserved(work.cancel()))?;
+        imaging.kernel_bytes = kernels.size_bytes() + kernels.size_bytes() / 4;
+        Ok(imaging)
+    }
+
+    /// The bytes of memory that it takes, what it shares with other parts of a pupil left out.
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.blocks.size_bytes() + self.tiling.size_bytes() + self.kept().size_bytes
+    }
+
+    /// Keeps at most so many bytes of kernels from now on.
+    pub(crate) fn keep_at_most(&mut self, budget_bytes: usize) {
+        self.kept().limit(budget_bytes);
+    }
+
+    /// Rows and columns of the scene.
+    pub(crate) fn size(&self) -> (usize, usize) {
+        self.scene.size()
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        // Whoever panicked with the lock had nothing half-written in it.
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn check_band(&self, band: usize) -> Result<(), ForwardError> {
+        let n_bands = self.spec.grid.len();
+        if band < n_bands { Ok(()) } else { Err(ForwardError::NoSuchBand { band, n_bands }) }
+    }
+
+    /// Returns the kernels of a band, between the two bands around it at which they are computed.
+    pub(crate) fn kernels(&self, lens: &dyn LensImage, band: usize, work: &Work<'_>) -> Result<BandKernels, Cancelled> {
+        let above = self.scene.kernel_bands.partition_point(|&knot| knot < band);
+        let upper = self.scene.kernel_bands[above];
+        if upper == band {
+            return self.computed_kernels(lens, band, work);
+        }
+        let lower = self.scene.kernel_bands[above - 1];
+        let fraction = (band - lower) as f32 / (upper - lower) as f32;
+        let lower = self.computed_kernels(lens, lower, work)?;
+        Ok(lower.mixed(&self.computed_kernels(lens, upper, work)?, fraction))
+    }
+
+    /// Returns the kernels of a band at which they are computed, kept or new.
+    fn computed_kernels(&self, lens: &dyn LensImage, band: usize, work: &Work<'_>) -> Result<BandKernels, Cancelled> {
+        if let Some(kernels) = self.kept().kernels.get(&band) {
+            return Ok(kernels.clone());
+        }
+        let ImagingSpec { film, grid, .. } = &self.spec;
+        let layered = LayeredLens { image: lens, film, layers: &self.scene.layers, stopwatch: &self.stopwatch };
+        let by_layer = Arc::new(self.tiling.kernels_at(&layered, grid.centers_nm()[band], work)?);
+        let kernels = BandKernels { by_layer };
+        self.kept().keep(band, &kernels);
+        Ok(kernels)
+    }
+
+    /// Returns the units of work of all bands from `first` on.
+    pub(crate) fn stream_units(&self, first: usize) -> u64 {
+        let n_bands = self.spec.grid.len().saturating_sub(first) as u64;
+        let n_kernels = self.tiling.n_nodes() as u64 * self.scene.kernel_bands.len() as u64;
+        self.tiling.n_groups() as u64 * n_bands * GROUP_UNITS + n_kernels * KERNEL_UNITS
+    }
+
+    /// How many bands are worked on at once: more than there are threads, so that none waits, where pictures are small.
+    pub(crate) fn bands_at_once(&self) -> usize {
+        let threads = rayon::current_num_threads();
+        match self.in_flight_bytes {
+            None => (IN_FLIGHT_BYTES / self.band_bytes().max(1)).clamp(threads.min(4), 4 * threads),
+            Some(limit) => (limit / self.band_bytes().max(1)).clamp(1, 4 * threads),
+        }
+    }
+
+    /// About what a band takes while it is imaged, bytes: its planes, and kernels.
+    pub(crate) fn band_bytes(&self) -> usize {
+        // The picture, what is open and what the surface covers; a layer as it is sampled and as it is gathered, light and coverage of each.
+        const PLANES: usize = 7;
+        let (Film { rows, columns, .. }, (scene_rows, scene_columns)) = (self.spec.film, self.size());
+        PLANES * size_of::<f32>() * (rows * columns).max(scene_rows * scene_columns) + self.kernel_bytes
+    }
+
+    /// Reads a band and images it.
+    pub(crate) fn image_of(
+        &self,
+        lens: &dyn LensImage,
+        band: usize,
+        radiance: &SceneRadiance<'_>,
+        work: &Work<'_>,
+    ) -> Result<Array2<f32>, ForwardError> {
+        work.check()?;
+        let front = radiance.front.band(band)?;
+        let needed = radiance.occluded.filter(|_| self.scene.occluded.needs_radiance());
+        let occluded = needed.map(|occluded| occluded.band(band)).transpose()?;
+        let light = BandRadiance { front: &front, occluded: occluded.as_deref() };
+        light.check(self.size(), self.scene.occluded.needs_radiance())?;
+        Ok(self.image(lens, band, light, work)?)
+    }
+
+    /// Images a band: layer by layer what each tile gathers, one behind the other; then the light of the lens.
+    pub(crate) fn image(
+        &self,
+        lens: &dyn LensImage,
+        band: usize,
+        light: BandRadiance<'_>,
+        work: &Work<'_>,
+    ) -> Result<Array2<f32>, Cancelled> {
+        let cancel = work.cancel();
+        let kernels = self.kernels(lens, band, work)?;
+        let map = lens.film_map(self.spec.grid.centers_nm()[band], self.reach_mm);
+        let front = self.scene.mixed.unmixed(light.front);
+        let occluded = self.scene.occluded.samples(&front, light.occluded, cancel)?;
+        let front = front.as_standard_layout();
+        let occluded = occluded.as_ref().map(|samples| samples.as_standard_layout());
+        let surface = |radiance, coordinates| Surface { radiance, coordinates };
+        let mut surfaces = vec![surface(front.as_slice().unwrap_or_default(), &self.scene.coordinates)];
+        if let (Some(radiance), Some(coordinates)) = (&occluded, self.scene.occluded.layer_coordinates()) {
+            surfaces.push(surface(radiance.as_slice().unwrap_or_default(), coordinates));
+        }
+        let with_alpha = self.scene.hides;
+        let sampler =
+            Sampler { scene: self.raster, map: &map, blocks: &self.blocks, surfaces: &surfaces, with_alpha };
+        let Film { rows, columns, .. } = self.spec.film;
+        let mut picture = Composite::new((rows, columns), with_alpha);
+        for (layer, tiles) in self.tiling.layers.iter().enumerate() {
+            let task = GatherTask {
+                film: &self.spec.film,
+                kernels: &kernels.by_layer[layer],
+                sampler: &sampler,
+                layer,
+                stopwatch: &self.stopwatch,
+                cancel,
+            };
+            self.lay(&task, &tiles.groups, &mut picture)?;
+            work.advance(tiles.groups.len() as u64 * GROUP_UNITS);
+        }
+        let lit = self.stopwatch.time(Part::Compositing, || self.lit(picture.finish(), &map));
+        Ok(self.stopwatch.time(Part::Compositing, || self.halos.applied(band, lit)))
+    }
+
+    /// Lays what the tiles of a layer gather behind a picture.
+    fn lay(&self, task: &GatherTask<'_>, groups: &[TileGroup], picture: &mut Composite) -> Result<(), Cancelled> {
+        let film = film_pixels(&self.spec.film);
+        let mut by_level: BTreeMap<Level, Vec<&TileGroup>> = BTreeMap::new();
+        groups.iter().for_each(|group| by_level.entry(group.level).or_default().push(group));
+        let mut gathered = vec![];
+        for (level, groups) in by_level {
+            if level < Level::PIXEL {
+                gathered.extend(gather(task, &groups, None)?);
+                continue;
+            }
+            let raster = Raster::new(&self.spec.film, level);
+            let Some(at) = self.seen_by(task, &groups, &raster) else { continue };
+            let ideal = self.stopwatch.time(Part::Sampling, || task.sampler.sample(&raster, at, task.layer, task.cancel))?;
+            gathered.extend(gather(task, &groups, Some(&ideal))?);
+        }
+        self.stopwatch.time(Part::Compositing, || {
+            gathered.iter().for_each(|gathered| picture.under(&film, task.layer, gathered));
+        });
+        Ok(())
+    }
+
+    /// Returns the rectangle of a raster that tiles gather from.
+    fn seen_by(&self, task: &GatherTask<'_>, groups: &[&TileGroup], raster: &Raster) -> Option<Rectangle> {
+        let pixels = Raster::new(&self.spec.film, Level::PIXEL);
+        let tiles = groups.iter().flat_map(|group| group.members.iter().map(|(tile, _)| tile));
+        let seen = tiles.filter_map(|tile| {
+            let out = out_samples(&tile.pixels(&self.spec.film)?, &pixels, raster);
+            let windows = tile.corners().map(|node| task.kernels.window_at((node, raster.level)));
+            Some(out.seen_through(&Rectangle::around(windows.into_iter())?))
+        });
+        Rectangle::around(seen)
+    }
+
+    /// Returns a picture of radiance as irradiance: times that of a uniform scene of radiance 1. Points that look beyond the scene are dark.
+    fn lit(&self, mut picture: Array2<f32>, map: &FilmMap) -> Array2<f32> {
+        let raster = Raster::new(&self.spec.film, Level::PIXEL);
+        let Rectangle { first_row, first_column, columns, .. } = film_pixels(&self.spec.film);
+        let x_mm: Vec<f64> = (0..columns as i64).map(|column| raster.x_mm((first_column + column) as f64)).collect();
+        let is_masked = self.raster.border != Border::Black;
+        let samples = picture.as_slice_mut().expect("it is in standard order");
+        let rows = samples.par_chunks_mut(columns).enumerate();
+        rows.for_each_init(FieldsAlong::default, |seen, (row, line)| {
+            map.along(&x_mm, raster.y_mm((first_row + row as i64) as f64), seen);
+            for (i, sample) in line.iter_mut().enumerate() {
+                let is_beyond =
+                    is_masked && !self.raster.is_within(self.raster.position_of(seen.tan_x[i], seen.tan_y[i]));
+                let gain = seen.irradiance_per_radiance[i];
+                *sample *= if is_beyond || gain.is_nan() { 0.0 } else { gain as f32 };
+            }
+        });
+        picture
+    }
+}
+
+/// Returns the first, the middle and the last of some bands.
+fn few_of(bands: &[usize]) -> impl Iterator<Item = usize> {
+    BTreeSet::from([0, bands.len() / 2, bands.len() - 1].map(|number| bands[number])).into_iter()
+}

@@ -1,0 +1,231 @@
+//! The kernels of a lens at points of the film.
+
+use std::collections::BTreeMap;
+
+use dioptric_psf::Kernel;
+
+use crate::{
+    convolve::{LANES, add_scaled},
+    raster::Level,
+    rectangle::Rectangle,
+    symmetry::{Mirror, Node, Symmetry},
+};
+
+/// The part of a kernel's light that is left out on each side of it.
+const LEFT_OUT: f64 = 1e-7;
+
+/// What a film point gathers, on samples of some width: of sum 1, about that point.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct NodeKernel {
+    /// Where its samples lie: rows below the point and columns to the right of it. A comet lies to one side.
+    pub(crate) at: Rectangle,
+    pub(crate) samples: Vec<f32>,
+}
+
+impl NodeKernel {
+    /// Takes a kernel of odd sides, leaves out borders without light and scales it to a sum of 1.
+    pub(crate) fn new(kernel: &Kernel) -> Self {
+        let Kernel { samples, middle_px, .. } = kernel;
+        let (rows, columns) = samples.dim();
+        let first = |middle: i32, n: usize| i64::from(middle) - (n / 2) as i64;
+        let (first_row, first_column) = (first(middle_px.y, rows), first(middle_px.x, columns));
+        let samples = samples.as_standard_layout();
+        let samples = samples.as_slice().expect("it is in standard order");
+        let (by_row, by_column) = sums_of_lines(samples, columns);
+        let sum: f64 = by_row.iter().sum();
+        if sum <= 0.0 {
+            // Nothing is gathered here.
+            return Self { at: Rectangle::PIXEL, samples: vec![1.0] };
+        }
+        let ((above, lit_rows), (left, lit_columns)) = (lit_part(&by_row, sum), lit_part(&by_column, sum));
+        let (first_row, first_column) = (first_row + above as i64, first_column + left as i64);
+        let at = Rectangle { first_row, first_column, rows: lit_rows, columns: lit_columns };
+        let lines = samples.chunks_exact(columns).skip(above).take(lit_rows);
+        let mut samples = Vec::with_capacity(at.len());
+        lines.for_each(|line| samples.extend_from_slice(&line[left..][..lit_columns]));
+        Self { at, samples }.normalized()
+    }
+
+    fn normalized(mut self) -> Self {
+        let scale = (1.0 / self.samples.iter().map(|&sample| f64::from(sample)).sum::<f64>()) as f32;
+        self.samples.iter_mut().for_each(|sample| *sample *= scale);
+        // What rounding leaves goes to the brightest sample, so that uniform scenes stay uniform.
+        let left = 1.0 - self.samples.iter().map(|&sample| f64::from(sample)).sum::<f64>();
+        if let Some(brightest) = self.samples.iter_mut().max_by(|a, b| a.total_cmp(b)) {
+            *brightest += left as f32;
+        }
+        self
+    }
+
+    /// Returns the kernel for a picture whose samples are means over themselves, of `n` points each way: that takes from its width what the means add.
+    ///
+    /// Means over squares of side 1 have the variance v = (1 − 1/n²)/12; with δ² the second difference, 1 − v/2 δ² + 9v/160 δ⁴ undoes them up to fourth
+    /// order (the cell averages of finite volumes), as far as no sample falls below 0.
+    pub(crate) fn for_means_of(self, n: usize) -> Self {
+        let variance = (1.0 - 1.0 / (n * n) as f32) / 12.0;
+        if variance == 0.0 {
+            return self;
+        }
+        let [near, far] = [-0.5 * variance, 9.0 / 160.0 * variance];
+        let taps = [far, near - 4.0 * far, 1.0 - 2.0 * near + 6.0 * far, near - 4.0 * far, far];
+        let at = self.at.grown(2);
+        let (rows, columns) = (at.rows, at.columns);
+        let mut wide = vec![0.0; at.len()];
+        self.add_to(&mut wide, &at, 1.0);
+        let mut along = vec![0.0; at.len()];
+        for (line, from) in along.chunks_exact_mut(columns).zip(wide.chunks_exact(columns)) {
+            for (k, tap) in taps.into_iter().enumerate() {
+                let (skip, ahead) = (2_usize.saturating_sub(k), k.saturating_sub(2));
+                line[skip..].iter_mut().zip(&from[ahead..]).for_each(|(sum, value)| *sum += tap * value);
+            }
+        }
+        let mut samples = vec![0.0; at.len()];
+        for (row, line) in samples.chunks_exact_mut(columns).enumerate() {
+            for (k, tap) in taps.into_iter().enumerate() {
+                let Some(from) = (row + k).checked_sub(2).filter(|from| *from < rows) else { continue };
+                add_scaled(line, tap, &along[from * columns..][..columns]);
+            }
+            line.iter_mut().for_each(|sample| *sample = sample.max(0.0));
+        }
+        Self { at, samples }.normalized()
+    }
+
+    /// Adds the kernel times a factor to a block about the point that holds all of it.
+    pub(crate) fn add_to(&self, sum: &mut [f32], block: &Rectangle, factor: f32) {
+        if *block == self.at {
+            return add_scaled(sum, factor, &self.samples);
+        }
+        let lines = sum[self.at.offset_in(block)..].chunks_mut(block.columns);
+        for (line, samples) in lines.zip(self.samples.chunks_exact(self.at.columns)) {
+            line.iter_mut().zip(samples).for_each(|(sum, sample)| *sum += factor * sample);
+        }
+    }
+
+    /// Returns the sum of kernels times factors.
+    pub(crate) fn sum_of(terms: &[(&Self, f32)]) -> Self {
+        let at = Rectangle::around(terms.iter().map(|(kernel, _)| kernel.at)).unwrap_or(Rectangle::PIXEL);
+        let mut samples = vec![0.0; at.len()];
+        terms.iter().for_each(|(kernel, factor)| kernel.add_to(&mut samples, &at, *factor));
+        Self { at, samples }
+    }
+
+    /// Returns the kernel of a canonical node at another.
+    fn mirrored(&self, mirror: Mirror) -> Self {
+        let at = mirror.window_at_node(&self.at);
+        Self { at, samples: mirror.restored(&self.samples, (at.rows, at.columns)) }
+    }
+
+    /// Returns the variances of the light, down and across, in samples².
+    pub(crate) fn variances(&self) -> [f64; 2] {
+        let (by_row, by_column) = sums_of_lines(&self.samples, self.at.columns);
+        [by_row, by_column].map(|sums| {
+            let mean = sums.iter().enumerate().map(|(i, sum)| i as f64 * sum).sum::<f64>();
+            sums.iter().enumerate().map(|(i, sum)| (i as f64 - mean).powi(2) * sum).sum()
+        })
+    }
+}
+
+/// Returns the sums of the rows and of the columns of a block of samples.
+fn sums_of_lines(samples: &[f32], columns: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut by_row = Vec::with_capacity(samples.len() / columns);
+    let mut by_column = vec![0.0; columns];
+    for line in samples.chunks_exact(columns) {
+        let mut lanes = [0.0; LANES];
+        let (whole, rest) = line.as_chunks::<LANES>();
+        for samples in whole {
+            (0..LANES).for_each(|k| lanes[k] += f64::from(samples[k]));
+        }
+        by_row.push(lanes.iter().sum::<f64>() + rest.iter().map(|&v| f64::from(v)).sum::<f64>());
+        by_column.iter_mut().zip(line).for_each(|(sum, &value)| *sum += f64::from(value));
+    }
+    (by_row, by_column)
+}
+
+/// Returns the first of some lines of a kernel that hold all but a negligible share of its light on each side, and their number.
+fn lit_part(sums: &[f64], sum: f64) -> (usize, usize) {
+    let dark = |sums: &mut dyn Iterator<Item = &f64>| {
+        let mut left_out = 0.0;
+        let is_dark = |part: &&f64| {
+            left_out += **part;
+            left_out <= LEFT_OUT * sum
+        };
+        sums.take_while(is_dark).count()
+    };
+    let before = dark(&mut sums.iter());
+    (before, sums.len() - before - dark(&mut sums[before + 1..].iter().rev()))
+}
+
+/// A node and the width of the samples that its kernel is on.
+pub(crate) type NodeAt = (Node, Level);
+
+/// The kernels of one layer at one wavelength, at canonical nodes.
+#[derive(Clone, Debug)]
+pub(crate) struct LayerKernels {
+    pub(crate) symmetry: Symmetry,
+    by_node: BTreeMap<NodeAt, NodeKernel>,
+}
+
+impl LayerKernels {
+    pub(crate) fn new(symmetry: Symmetry, by_node: BTreeMap<NodeAt, NodeKernel>) -> Self {
+        Self { symmetry, by_node }
+    }
+
+    /// The number of kernels.
+    pub(crate) fn n_kernels(&self) -> usize {
+        self.by_node.len()
+    }
+
+    /// The bytes of memory of the kernels' samples.
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.by_node.values().map(|kernel| size_of_val(kernel.samples.as_slice())).sum()
+    }
+
+    /// Returns the kernels between two wavelengths.
+    pub(crate) fn mixed(&self, other: &Self, fraction: f32) -> Self {
+        let mix = |(node, kernel): (&NodeAt, &NodeKernel)| {
+            let terms = [(kernel, 1.0 - fraction), (&other.by_node[node], fraction)];
+            (*node, NodeKernel::sum_of(&terms))
+        };
+        Self { symmetry: self.symmetry, by_node: self.by_node.iter().map(mix).collect() }
+    }
+
+    /// Adds kernels of canonical nodes.
+    pub(crate) fn extend(&mut self, by_node: BTreeMap<NodeAt, NodeKernel>) {
+        self.by_node.extend(by_node);
+    }
+
+    /// Whether the kernel at a canonical node is known.
+    pub(crate) fn has(&self, node: &NodeAt) -> bool {
+        self.by_node.contains_key(node)
+    }
+
+    /// Returns where the samples of the kernel at a node lie.
+    pub(crate) fn window_at(&self, (node, level): NodeAt) -> Rectangle {
+        let canonical = &self.by_node[&(self.symmetry.canonical(node), level)];
+        self.symmetry.mirror(node).window_at_node(&canonical.at)
+    }
+
+    /// Returns the kernel at a node anywhere on the film: that of its canonical node, mirrored.
+    pub(crate) fn at(&self, (node, level): NodeAt) -> NodeKernel {
+        self.by_node[&(self.symmetry.canonical(node), level)].mirrored(self.symmetry.mirror(node))
+    }
+}
+
+/// Returns the largest magnitude of the edge spread functions, along rows and columns, of a kernel.
+pub(crate) fn edge_spread_peak(kernel: &[f32], width: usize) -> f64 {
+    let mut by_column = vec![0.0_f64; width];
+    let (mut down, mut peak) = (0.0_f64, 0.0_f64);
+    for line in kernel.chunks_exact(width) {
+        for (sum, &value) in by_column.iter_mut().zip(line) {
+            *sum += f64::from(value);
+        }
+        down += line.iter().map(|&value| f64::from(value)).sum::<f64>();
+        peak = peak.max(down.abs());
+    }
+    let mut right = 0.0;
+    for sum in by_column {
+        right += sum;
+        peak = peak.max(right.abs());
+    }
+    peak
+}

@@ -1,0 +1,97 @@
+//! The depths of a scene in layers, and what their edges hide: the same for all parts of a pupil.
+
+use std::sync::Arc;
+
+use dioptric_psf::LensImage;
+use dioptric_spectrum::Cancel;
+use glam::DVec2;
+
+use crate::{
+    BlurMode, Film, ForwardError, ImagingSpec, SceneGeometry,
+    layers::{Blurs, Layers},
+    mixed::MixedSamples,
+    narrow::NarrowRule,
+    occluded::{Distances, OccludedSamples},
+    surface::LayerCoordinates,
+    work::plane_of,
+};
+
+/// A change of blur radius between neighbors that counts as an edge of depth, pixels.
+pub(crate) const DEPTH_EDGE_PX: f32 = 3.0;
+
+/// A scene laid in layers of depth by the blur of a lens.
+pub(crate) struct SceneLayers {
+    pub(crate) layers: Layers,
+    /// The bands at which kernels are computed; between them they are interpolated.
+    pub(crate) kernel_bands: Vec<usize>,
+    /// Of the first surface.
+    pub(crate) coordinates: LayerCoordinates,
+    pub(crate) occluded: OccludedSamples,
+    /// Samples that show both sides of an edge of depth.
+    pub(crate) mixed: MixedSamples,
+    /// The fraction of samples on surfaces narrower than the pupil.
+    pub(crate) narrow_fraction: f64,
+    /// Whether layers hide those behind them.
+    pub(crate) hides: bool,
+}
+
+impl SceneLayers {
+    /// Lays a scene in layers of the blur of a lens.
+    pub(crate) fn over(
+        lens: &dyn LensImage,
+        scene: &SceneGeometry<'_>,
+        spec: &ImagingSpec,
+        cancel: &Cancel,
+    ) -> Result<Arc<Self>, ForwardError> {
+        let ImagingSpec { film, grid, settings } = spec;
+        film.check()?;
+        settings.check()?;
+        scene.check()?;
+        let (near_m, far_m) = scene.depth.range_m();
+        let (pitch_mm, places_mm) = (1e-3 * film.pitch_um, places_over(lens, film));
+        let blurs = Blurs { lens, pitch_mm, places_mm: &places_mm, wavelengths_nm: grid.centers_nm() };
+        let layers = Layers::over((1.0 / far_m, 1.0 / near_m), settings.layer_step_px, &blurs);
+        let kernel_bands = layers.chromatic_knots(settings.chromatic_step_px, &blurs);
+        let z_m = scene.depth.z_m();
+        let coordinate = |row: usize, column: usize| layers.coordinate_of(z_m[(row, column)]);
+        let coordinates = LayerCoordinates::new(plane_of(z_m.dim(), cancel, coordinate)?, cancel)?;
+        let hides = settings.mode != BlurMode::Pointwise && layers.len() > 1;
+        if !hides {
+            let (occluded, mixed) = (OccludedSamples::Nothing, MixedSamples::default());
+            let layers = Self { layers, kernel_bands, coordinates, occluded, mixed, narrow_fraction: 0.0, hides };
+            return Ok(Arc::new(layers));
+        }
+        // How fine the scene is in the film's middle.
+        let map = lens.film_map(grid.centers_nm()[grid.len() / 2], film.half_diagonal_mm());
+        let tan = |x_mm: f64| map.field_tan(DVec2::X * x_mm).unwrap_or_default();
+        let scene_per_film = scene.view.focal_px * (tan(0.5 * pitch_mm) - tan(-0.5 * pitch_mm)).length();
+        let distances = Distances::of(scene, &layers, cancel)?;
+        let narrow = NarrowRule { jump: DEPTH_EDGE_PX, scene_per_film: scene_per_film as f32 };
+        let occluded = OccludedSamples::find(&distances, &layers, scene_per_film, cancel)?;
+        let mixed = MixedSamples::find(&distances, &layers, cancel)?;
+        let narrow_fraction = narrow.fraction(&distances.front, cancel)?;
+        Ok(Arc::new(Self { layers, kernel_bands, coordinates, occluded, mixed, narrow_fraction, hides }))
+    }
+
+    /// Rows and columns of the scene.
+    pub(crate) fn size(&self) -> (usize, usize) {
+        self.coordinates.size()
+    }
+
+    pub(crate) fn size_bytes(&self) -> usize {
+        self.coordinates.size_bytes()
+            + self.occluded.layer_coordinates().map_or(0, LayerCoordinates::size_bytes)
+            + self.occluded.size_bytes()
+            + self.mixed.size_bytes()
+    }
+}
+
+/// Returns a few points of the film, of which the blur tells that of all: from the axis outwards, or all over it.
+fn places_over(lens: &dyn LensImage, film: &Film) -> Vec<DVec2> {
+    if lens.is_symmetric() {
+        return [0.0, 0.5, 1.0].map(|part| DVec2::X * part * film.half_diagonal_mm()).to_vec();
+    }
+    let parts = [-1.0, 0.0, 1.0];
+    let places = parts.iter().flat_map(|&up| parts.iter().map(move |&across| DVec2::new(across, up)));
+    places.map(|place| place * film.half_size_mm()).collect()
+}
