@@ -110,8 +110,8 @@ impl FilmMap {
 
     /// Returns the map with points counted from another: `center_mm` is where that is now.
     #[must_use]
-    pub fn counted_from(self, center_mm: DVec2) -> Self {
-        Self { from_mm: self.from_mm + center_mm, ..self }
+    pub fn counted_from(&self, center_mm: DVec2) -> Self {
+        Self { from_mm: self.from_mm + center_mm, ..self.clone() }
     }
 
     /// Returns the tangents of the direction that the chief ray of a point sees; `None` beyond 89.9° from the axis.
