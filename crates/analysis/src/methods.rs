@@ -216,9 +216,8 @@ impl MethodRow {
 
 /// Returns the pixels that the blur at a depth edge reaches: that of the more blurred side, and one more.
 fn edge_band(z_m: &Array2<f32>, model: &LensImageModel, pitch_um: f64) -> Array2<bool> {
-    let (far, near) = model.dioptres();
     let radius_px = |z_m: f32| {
-        let dioptres = (1.0 / f64::from(z_m)).clamp(far, near);
+        let dioptres = 1.0 / f64::from(z_m);
         1e3 * model.blur_radius_mm(DVec2::ZERO, dioptres, REFERENCE_WAVELENGTH_NM).abs() / pitch_um
     };
     let (rows, columns) = z_m.dim();

@@ -235,11 +235,11 @@ pub(crate) struct RunArgs {
     /// Strength γ of ray bending, in place of that of its kind
     #[arg(long, value_name = "G", help_heading = heading::SIMULATION)]
     pub(crate) gamma: Option<f64>,
-    /// How point-spread functions are sampled
-    #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error", help_heading = heading::SIMULATION)]
-    pub(crate) bank: Option<BankKind>,
-    /// Samples point-spread functions as finely as this error at nine tenths of the places needs, a share of the energy, e.g. 0.01 [default: 0.02]
-    #[arg(long, value_name = "E", help_heading = heading::SIMULATION)]
+    /// Of older command lines, ignored: point spreads are no longer sampled
+    #[arg(long, value_name = "KIND", hide = true)]
+    pub(crate) bank: Option<String>,
+    /// The same
+    #[arg(long, value_name = "E", hide = true)]
     pub(crate) bank_error: Option<f64>,
     /// How the scene is blurred: 'layered', in layers of depth of which near ones hide far ones; 'views:N', such layers through N parts of the
     /// pupil, for occluders narrower than it; 'pointwise', every sample on its own, as in the paper [default: layered]
@@ -402,15 +402,6 @@ pub(crate) enum DiffractionKind {
     Wave,
 }
 
-/// How point-spread functions are sampled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum BankKind {
-    /// Rays of 9 fields, 9 depths and 4 wavelengths, interpolated, and of more where the error asks for them
-    Standard,
-    /// Pictures of the same samples, blended as in the paper, for comparison only
-    Paper,
-}
-
 /// Rays to trace.
 #[derive(Debug, Args)]
 pub(crate) struct TraceArgs {
@@ -469,11 +460,11 @@ pub(crate) struct PsfArgs {
     /// Keeps the paper mode's rays on the exact grid, which beats with the pixels; without it each is moved by up to half a step, drawn from --seed
     #[arg(long, help_heading = heading::SIMULATION)]
     pub(crate) exact_grid: bool,
-    /// Draws from a bank over the range of the points, not traced at each, and tells the error of that
-    #[arg(long, value_name = "KIND", value_enum, conflicts_with = "bank_error", help_heading = heading::SIMULATION)]
-    pub(crate) bank: Option<BankKind>,
-    /// Draws from a bank sampled as finely as this error at nine tenths of the places needs, a share of the energy, e.g. 0.01
-    #[arg(long, value_name = "E", help_heading = heading::SIMULATION)]
+    /// Of older command lines, ignored: each point is traced
+    #[arg(long, value_name = "KIND", hide = true)]
+    pub(crate) bank: Option<String>,
+    /// The same
+    #[arg(long, value_name = "E", hide = true)]
     pub(crate) bank_error: Option<f64>,
     /// Adds MTF tables at these frequencies, cycles/mm
     #[arg(long, value_name = "LIST", help_heading = heading::RESULTS)]

@@ -4,11 +4,11 @@ use std::fmt::Write;
 
 use anyhow::Context;
 use dioptric_analysis::{LensDefaults, PsfRequest, PsfRow, PsfSampling, PsfSet, psf_csv};
-use dioptric_pipeline::{BankSpec, FocusSpec, REFERENCE_WAVELENGTH_NM, Staged, parse_numbers};
+use dioptric_pipeline::{FocusSpec, REFERENCE_WAVELENGTH_NM, RetiredBank, Staged, parse_numbers};
 use dioptric_report::{PsfFormat, chart_svg, psf_page, write_drawing, write_psfs};
 
 use crate::{
-    args::{BankKind, Common, PsfArgs, PsfMode},
+    args::{Common, PsfArgs, PsfMode},
     lens::{list_of, tell, tell_taken},
     run::{diffraction, with_gamma},
     terminal::{Bar, fixed, guarded, print, print_json, remark, remark_on_png},
@@ -37,7 +37,6 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
             PsfMode::Pupil => PsfSampling::Pupil,
             PsfMode::Paper => PsfSampling::Paper { n_across: arguments.rays, jitter: !arguments.exact_grid },
         },
-        bank: bank(arguments.bank, arguments.bank_error),
         mtf_per_mm: match &arguments.mtf_per_mm {
             Some(list) => parse_numbers("--mtf-per-mm", list)?,
             None => Vec::new(),
@@ -48,7 +47,9 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     let reference_nm = request.reference_nm(&used.lens)?;
     let lens = arguments.lens.state.apply(used, reference_nm, common)?.lens;
     let notes = lens.notes_on_glass_range(&request.wavelengths_nm);
-    tell(&notes, common);
+    let is_old = arguments.bank.is_some() || arguments.bank_error.is_some();
+    let on_bank = is_old.then(|| RetiredBank::STATED.note()).flatten();
+    tell(&notes.into_iter().chain(on_bank).collect::<Vec<_>>(), common);
     // The place is tried before the work.
     let format = arguments.output.as_deref().map(PsfFormat::of).transpose()?;
     let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
@@ -155,23 +156,11 @@ fn lines(notes: &[String]) -> String {
     notes.iter().map(|note| format!("\n{note}\n")).collect()
 }
 
-fn bank(kind: Option<BankKind>, error: Option<f64>) -> Option<BankSpec> {
-    match (kind, error) {
-        (_, Some(error)) => Some(BankSpec::Within { error }),
-        (Some(BankKind::Standard), None) => Some(BankSpec::Standard),
-        (Some(BankKind::Paper), None) => Some(BankSpec::Paper),
-        (None, None) => None,
-    }
-}
-
 fn table(set: &PsfSet, rows: &[PsfRow]) -> Result<String, std::fmt::Error> {
     let mut text =
         format!("film {:.4} mm behind the last vertex, pixels of {} µm\n", set.film_distance_mm, set.pixel_um);
     if let Some(row) = rows.first().filter(|row| row.field_y_deg != 0.0) {
         writeln!(text, "all fields {}° above the axis", row.field_y_deg)?;
-    }
-    if let Some(bank) = &set.bank {
-        writeln!(text, "{}", bank.summary())?;
     }
     text.push('\n');
     writeln!(

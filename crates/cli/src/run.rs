@@ -12,16 +12,16 @@ use std::{
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport, RunTimes};
 use dioptric_pipeline::{
-    BankSpec, BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
-    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, PictureOptions, Progress, Quality, SceneSpec, SensorOptions,
-    SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, parse_illuminant, parse_numbers,
-    with_exposure_s,
+    BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
+    ImagingTimes, KeptCamera, LensReadOptions, LensSpec, PictureOptions, Progress, Quality, RetiredBank, SceneSpec,
+    SensorOptions, SensorSpec, Silent, Stage, Staged, StopSpec, WavelengthSpec, display, parse_illuminant,
+    parse_numbers, with_exposure_s,
 };
 use dioptric_report::write_run;
 use dioptric_spectrum::Cancel;
 
 use crate::{
-    args::{BankKind, Common, DiffractionKind, DualPixelArg, FilmKind, FrameArgs, PictureArgs, QualityKind, RunArgs},
+    args::{Common, DiffractionKind, DualPixelArg, FilmKind, FrameArgs, PictureArgs, QualityKind, RunArgs},
     lens::tell,
     memory::{give_back_at_once, give_back_freed, memory_budget},
     paintings::{build, painting_folder},
@@ -221,14 +221,8 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
         camera.diffraction = diffraction(kind);
     }
     camera.diffraction = with_gamma(camera.diffraction, arguments.gamma)?;
-    if let Some(kind) = arguments.bank {
-        camera.bank = match kind {
-            BankKind::Standard => BankSpec::Standard,
-            BankKind::Paper => BankSpec::Paper,
-        };
-    }
-    if let Some(error) = arguments.bank_error {
-        camera.bank = BankSpec::Within { error };
+    if arguments.bank.is_some() || arguments.bank_error.is_some() {
+        camera.bank = RetiredBank::STATED;
     }
     camera.blur = arguments.blur.unwrap_or(camera.blur);
     Ok(())
@@ -343,14 +337,13 @@ pub(crate) fn parse_size(text: &str) -> anyhow::Result<(usize, usize)> {
 
 pub(crate) fn summary(report: &RunReport, total_s: f64, out: &Path) -> String {
     format!(
-        "{}: {} × {} pixels, {} bands, {:.2} ms, {:.1} s\n{}{}\n",
+        "{}: {} × {} pixels, {} bands, {:.2} ms, {:.1} s\n{}\n",
         report.camera.name,
         report.film.columns,
         report.film.rows,
         report.irradiance.wavelengths_nm.len(),
         1e3 * report.sensor.exposure_time_s,
         total_s,
-        report.psf_bank.as_ref().map_or_else(String::new, |bank| format!("point spreads: {}\n", bank.summary())),
         out.join("report.html").display(),
     )
 }

@@ -7,14 +7,12 @@ use crate::{
     FilmMap,
     mesh::{Mesh, polar},
     pupil::Outline,
-    spots::{Node, Spots, cell_areas},
+    spots::{Node, Spots, cell_areas, clear_shares},
 };
 
 /// Step of a direction cosine at the stop for difference quotients: their truncation, of order its square, and their rounding, 1e-16 over it, are below
 /// 1e-9 of the derivative.
 const STOP_STEP: f64 = 1e-5;
-/// Places along each side of a cell at which obscurations are looked for.
-const CLEAR_ACROSS: usize = 8;
 /// The radius that holds 95 % of an even disc over its rms radius: r² = 0.95 R², and the mean square is R²/2.
 pub(crate) const RIM_OVER_RMS: f64 = 1.378_404_875_209_022;
 
@@ -124,7 +122,8 @@ impl FilmPointJob<'_> {
         // Weigh cells by their projected solid angle and by what obscurations and other diffraction orders leave of it.
         let mut energies = cell_areas(mesh, &outline.rho);
         if self.unobscured.is_some() {
-            energies.iter_mut().zip(self.clear_shares(&cone, &outline)).for_each(|(e, share)| *e *= share);
+            let shares = clear_shares(mesh, &outline, &|cosines, with| self.passed(&cone, cosines, with));
+            energies.iter_mut().zip(shares).for_each(|(e, share)| *e *= share);
         }
         let solid_angle: f64 = energies.iter().sum();
         if !(solid_angle > 0.0 && rays.fate[0].is_in_flight()) {
@@ -198,38 +197,12 @@ impl FilmPointJob<'_> {
         rays
     }
 
-    /// Returns how much of each cell obscurations leave clear: of 8 × 8 rays through it.
-    fn clear_shares(&self, cone: &FilmCone<'_>, outline: &Outline) -> Vec<f64> {
-        const N: usize = CLEAR_ACROSS;
-        let mesh = self.mesh;
-        let rho = |j: usize| outline.rho[(2 * j) % outline.rho.len()];
-        let place = |ring: usize, j: usize, k: usize| {
-            let middle = |i: usize| (i as f64 + 0.5) / N as f64;
-            let (out, around) = (middle(k / N), middle(k % N));
-            let [inner, outer] = [ring, ring + 1].map(|ring| mesh.share(ring as f64).powi(2));
-            // Even in area.
-            let share = (inner + (outer - inner) * out).sqrt();
-            polar(outline.center, share * (rho(j) + (rho(j + 1) - rho(j)) * around), mesh.azimuth(j as f64 + around))
-        };
-        let cosines: Vec<DVec2> =
-            mesh.cells().flat_map(|(ring, j)| (0..N * N).map(move |k| place(ring, j, k))).collect();
-        let passed = |lens: &ReversedLens, cosines: &[DVec2]| -> Vec<bool> {
-            let mut rays = cone.rays(cosines);
-            lens.trace(&mut rays, Vignetting::On);
-            rays.fate.iter().map(|fate| fate.is_in_flight()).collect()
-        };
-        let n_passed = |passed: &[bool]| passed.iter().filter(|passed| **passed).count();
-        let mut shares: Vec<f64> =
-            passed(self.lens, &cosines).chunks(N * N).map(|cell| n_passed(cell) as f64 / (N * N) as f64).collect();
-        // Rims end some rays of the outermost cells, whose areas have that already.
-        let outermost = mesh.n_cells() - mesh.n_azimuths;
-        if let Some(unobscured) = self.unobscured {
-            let whole = passed(unobscured, &cosines[outermost * N * N..]);
-            for (share, cell) in shares[outermost..].iter_mut().zip(whole.chunks(N * N)) {
-                *share = (*share * (N * N) as f64 / n_passed(cell).max(1) as f64).min(1.0);
-            }
-        }
-        shares
+    /// Returns which rays get through the lens, or through it without its obscurations.
+    fn passed(&self, cone: &FilmCone<'_>, cosines: &[DVec2], with_obscurations: bool) -> Vec<bool> {
+        let lens = self.unobscured.filter(|_| !with_obscurations).unwrap_or(self.lens);
+        let mut rays = cone.rays(cosines);
+        lens.trace(&mut rays, Vignetting::On);
+        rays.fate.iter().map(|fate| fate.is_in_flight()).collect()
     }
 }
 

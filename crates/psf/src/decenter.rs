@@ -50,9 +50,4 @@ impl Decenter {
     pub(crate) fn axis_mm(self) -> DVec2 {
         -self.mm
     }
-
-    /// The field of the scene that lies on the axis, at a depth.
-    pub(crate) fn axis_tan(self, dioptres: f64) -> DVec2 {
-        1e-3 * dioptres * self.mm
-    }
 }

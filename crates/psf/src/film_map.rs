@@ -75,6 +75,14 @@ impl FilmMap {
         RadialMap::tabulate(reach_mm, tan_at, irradiance_sr).into()
     }
 
+    /// Where the axis of symmetry meets the film, mm; `None` of a lens without one.
+    pub fn axis_mm(&self) -> Option<DVec2> {
+        match &self.kind {
+            Kind::Radial(map) => Some(map.axis_mm() - self.from_mm),
+            Kind::Plane(_) => None,
+        }
+    }
+
     /// Returns the map of a lens moved sideways: about an axis that meets the film at `axis_mm` and looks along `axis_tan`.
     #[must_use]
     pub fn about(self, axis_mm: DVec2, axis_tan: DVec2) -> Self {
@@ -102,8 +110,8 @@ impl FilmMap {
 
     /// Returns the map with points counted from another: `center_mm` is where that is now.
     #[must_use]
-    pub fn counted_from(self, center_mm: DVec2) -> Self {
-        Self { from_mm: self.from_mm + center_mm, ..self }
+    pub fn counted_from(&self, center_mm: DVec2) -> Self {
+        Self { from_mm: self.from_mm + center_mm, ..self.clone() }
     }
 
     /// Returns the tangents of the direction that the chief ray of a point sees; `None` beyond 89.9° from the axis.

@@ -7,10 +7,11 @@ use std::{
 
 use dioptric_diffraction::{CircularStop, WaveQuality, WaveWindow, WindowCenter, wave_psf};
 use dioptric_optics::{FilmCone, Lens, MonoLens, ObjectPoint, ReversedLens};
-use glam::DVec2;
+use glam::{DVec2, IVec2};
+use ndarray::Array2;
 
 use crate::{
-    FilmMap, FilmQuery, ImageSettings, Kernel, LensImage, PsfError, PupilDivision,
+    Diffraction, FilmMap, FilmQuery, ImageSettings, Kernel, LensImage, PointImage, PsfError, PupilDivision,
     bundle::{Bundle, FilmPointJob, Frame, Moments, unobscured},
     decenter::Decenter,
     hurb_splatter::StopHurb,
@@ -71,6 +72,25 @@ struct KeptBundles {
     in_order: VecDeque<[u64; 2]>,
 }
 
+/// Returns the wave-optical energies of a point on pixels of a side in µm, so many along a window, about a point of the film, mm, picture frame.
+pub(crate) fn wave_energies(
+    lens: &MonoLens,
+    point: &ObjectPoint,
+    settings: &ImageSettings,
+    center_mm: DVec2,
+    (pitch_um, side): (f64, usize),
+) -> Result<Array2<f64>, PsfError> {
+    // The picture is the film turned by 180°.
+    let window = WaveWindow { pitch_um, rows: side, columns: side, center: WindowCenter::At(-center_mm) };
+    Ok(wave_psf(lens, point, settings.film_distance_mm, &window, WaveQuality::default())?.samples)
+}
+
+/// Returns what bends rays at the stop.
+pub(crate) fn bending(lens: &MonoLens, diffraction: Diffraction) -> Option<StopHurb> {
+    let edge = || CircularStop::new(lens.stop_semi_aperture_mm(), lens.wavelength_nm(), lens.stop_medium_index());
+    diffraction.hurb().map(|model| StopHurb { model, edge: edge() })
+}
+
 fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -128,6 +148,12 @@ impl LensImageModel {
         self.shared.focus_dioptres
     }
 
+    /// Returns the image of a point of the scene, traced forward, at these tangents of field angles; `None` if none of its light reaches the
+    /// film, or the lens is not known at the wavelength.
+    pub fn point(&self, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> Option<PointImage> {
+        PointImage::trace(self.lens(), self.settings(), field_tan, dioptres, wavelength_nm).ok().flatten()
+    }
+
     /// Returns how much of the kernel of a point of the film is wave optics, and not HURB: 1 or 0, or between them where they are
     /// blended. It is 0 unless the settings have [`Diffraction::Wave`](crate::Diffraction::Wave), and in darkness.
     ///
@@ -138,7 +164,8 @@ impl LensImageModel {
         let color = shared.color(query.wavelength_nm);
         let Some((bundle, map, frame)) = shared.bundle(&color, query.place_mm) else { return 0.0 };
         let spots = bundle.spots(&map, &frame, query.place_mm, query.dioptres);
-        Layout::new(&spots, shared.bending(&color), query.pitch_um).wave_fraction(shared.settings.diffraction)
+        Layout::new(&spots, bending(&color.lens, shared.settings.diffraction), query.pitch_um)
+            .wave_fraction(shared.settings.diffraction)
     }
 
     /// Returns the images through the parts of a division of the pupil, whose irradiances add up to that of the whole: views of the scene
@@ -301,12 +328,6 @@ impl Shared {
         Some((bundle?, survey.map.clone(), frame))
     }
 
-    fn bending(&self, color: &Color) -> Option<StopHurb> {
-        let lens = &color.lens;
-        let edge = || CircularStop::new(lens.stop_semi_aperture_mm(), lens.wavelength_nm(), lens.stop_medium_index());
-        self.settings.diffraction.hurb().map(|model| StopHurb { model, edge: edge() })
-    }
-
     /// Returns the kernel of a point of the film, of the whole pupil or of a part of it, given by its part in a division.
     pub(crate) fn kernel(&self, query: FilmQuery, part: Option<(&PupilDivision, usize)>) -> Kernel {
         let FilmQuery { place_mm, dioptres, wavelength_nm, pitch_um } = query;
@@ -320,36 +341,29 @@ impl Shared {
                 return Kernel::identity(pitch_um);
             }
         }
-        let layout = Layout::new(&spots, self.bending(&color), pitch_um);
-        let wave_fraction = layout.wave_fraction(self.settings.diffraction);
-        let waves = if wave_fraction > 0.0 { self.waves(&color, &map, &query, &layout) } else { None };
-        let energies = match waves {
-            Some(waves) if wave_fraction == 1.0 => waves,
-            Some(waves) => waves * wave_fraction + layout.draw() * (1.0 - wave_fraction),
-            None => layout.draw(),
-        };
-        layout.kernel(&energies, pitch_um)
+        let layout = Layout::new(&spots, bending(&color.lens, self.settings.diffraction), pitch_um);
+        let waves = |side, middle_px| self.waves(&color, &map, &query, side, middle_px);
+        let (energies, _) = layout.drawn(self.settings.diffraction, waves);
+        layout.kernel(&energies, pitch_um).normalized()
     }
 
-    /// Returns the wave-optical energies, in the window of a layout, of the object point that the chief ray of a point of the film sees.
+    /// Returns the wave-optical energies, in a window about a pixel, of the object point that the chief ray of a point of the film sees.
     fn waves(
         &self,
         color: &Color,
         map: &FilmMap,
         query: &FilmQuery,
-        layout: &Layout<'_>,
-    ) -> Option<ndarray::Array2<f64>> {
+        side: usize,
+        middle_px: IVec2,
+    ) -> Result<Array2<f64>, PsfError> {
         // As the centered lens sees the point.
-        let aside_mm = self.decenter.mm();
-        let field_tan = map.field_tan(query.place_mm)? - aside_mm * (1e-3 * query.dioptres);
+        let moved = self.decenter.mm() * (1e-3 * query.dioptres);
+        let direction = map.direction(query.place_mm);
+        let field_tan = direction.truncate() / direction.z - moved;
         let point = ObjectPoint::from_field(&self.reference, field_tan, query.dioptres);
-        let middle_mm = layout.middle_px().as_dvec2() * DVec2::new(1e-3, -1e-3) * query.pitch_um;
-        // The picture is the film turned by 180°.
-        let center = WindowCenter::At(-(query.place_mm - self.decenter.axis_mm() + middle_mm));
-        let side = layout.side();
-        let window = WaveWindow { pitch_um: query.pitch_um, rows: side, columns: side, center };
-        let film_distance_mm = self.settings.film_distance_mm;
-        Some(wave_psf(&color.lens, &point, film_distance_mm, &window, WaveQuality::default()).ok()?.samples)
+        let middle_mm = middle_px.as_dvec2() * DVec2::new(1e-3, -1e-3) * query.pitch_um;
+        let center_mm = query.place_mm - self.decenter.axis_mm() + middle_mm;
+        wave_energies(&color.lens, &point, &self.settings, center_mm, (query.pitch_um, side))
     }
 
     fn moments(&self, place_mm: DVec2, wavelength_nm: f64) -> Moments {

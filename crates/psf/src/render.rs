@@ -3,9 +3,10 @@
 use dioptric_diffraction::CircularStop;
 use glam::{DVec2, IVec2};
 use ndarray::Array2;
+use serde::Serialize;
 
 use crate::{
-    Diffraction, Kernel,
+    Diffraction, Kernel, PsfError,
     hurb_splatter::{HurbSplatter, StopHurb},
     kernel::trim,
     raster::Raster,
@@ -22,6 +23,16 @@ const KEPT_OF_RAYS: f64 = 1.0 - 1e-7;
 const TAILS: f64 = 12.0;
 /// The largest range of phases, radians, at which a kernel is wave optics alone; at twice that there is none.
 const ALL_WAVE: f64 = 200.0;
+
+/// Which model a point spread function was drawn with.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModelUse {
+    /// How much of it is the diffraction integral; the rest is geometric rays or HURB, as the setting says.
+    pub wave_fraction: f64,
+    /// Why waves that were wanted were not summed, if so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fallback: Option<String>,
+}
 
 /// Spots on pixels, and the window that holds them.
 pub(crate) struct Layout<'a> {
@@ -43,39 +54,33 @@ pub(crate) struct Layout<'a> {
 impl<'a> Layout<'a> {
     /// Lays out spots on pixels of which one has its middle where places count from, in a window about the middle of the light.
     pub(crate) fn new(spots: &'a Spots, bending: Option<StopHurb>, pitch_um: f64) -> Self {
-        let per_mm = DVec2::new(1e3, -1e3) / pitch_um;
+        let (low, high) = spots.bounds_mm();
+        let middle = (0.5 * (low + high) * per_mm(pitch_um)).round();
+        Self::about(if middle.is_finite() { middle.as_ivec2() } else { IVec2::ZERO }, spots, bending, pitch_um)
+    }
+
+    /// Lays out spots in a window about a pixel.
+    pub(crate) fn about(middle_px: IVec2, spots: &'a Spots, bending: Option<StopHurb>, pitch_um: f64) -> Self {
+        let per_mm = per_mm(pitch_um);
         let mut nodes = spots.nodes.clone();
         for node in &mut nodes {
             for v in [&mut node.at_mm, &mut node.along_l_mm, &mut node.along_m_mm] {
                 *v *= per_mm;
             }
         }
-        let (low, high) = bounds(spots, &nodes);
-        let middle = (0.5 * (low + high)).round();
-        let middle_px = if middle.is_finite() { middle.as_ivec2() } else { IVec2::ZERO };
-        nodes.iter_mut().for_each(|node| node.at_mm -= middle_px.as_dvec2());
-        let reach = (high - middle).max(middle - low).max_element().max(0.0);
+        let middle = middle_px.as_dvec2();
+        nodes.iter_mut().for_each(|node| node.at_mm -= middle);
+        let (low, high) = spots.bounds_mm();
+        let reach = [low, high].map(|corner| (corner * per_mm - middle).abs().max_element());
+        let reach = reach[0].max(reach[1]).max(0.0);
         let lambda_n_px = bending.map_or(0.0, |bending| lambda_n(&nodes[0], bending));
         let side = 2 * (reach + TAILS * lambda_n_px - 0.5).ceil().clamp(0.0, MOST_PIXELS) as usize + 1;
         Self { spots, nodes, bending, middle_px, reach, lambda_n_px, side, natural_side: side }
     }
 
-    /// Returns the layout in a window of so many pixels along its side about where places count from: about the middle of a pixel if the
-    /// number is odd, else about the corner of four.
-    pub(crate) fn with_side(mut self, side: usize) -> Self {
-        let middle_px = std::mem::take(&mut self.middle_px).as_dvec2();
-        self.nodes.iter_mut().for_each(|node| node.at_mm += middle_px);
+    /// Returns the layout with a window of so many pixels along its side: about the middle of a pixel if the number is odd, else about the corner of four.
+    pub(crate) fn with_side(self, side: usize) -> Self {
         Self { side, ..self }
-    }
-
-    /// The side of the window, pixels.
-    pub(crate) fn side(&self) -> usize {
-        self.side
-    }
-
-    /// The middle of the window, pixels to the right of where places count from, and below it.
-    pub(crate) fn middle_px(&self) -> IVec2 {
-        self.middle_px
     }
 
     /// The range of phases B that a wave sum would have to follow, radians: over the pupil's radius, for light from
@@ -94,7 +99,7 @@ impl<'a> Layout<'a> {
     }
 
     /// Draws the energy of each pixel of the window.
-    pub(crate) fn draw(&self) -> Array2<f64> {
+    fn draw(&self) -> Array2<f64> {
         // Count from the corner of the window.
         let middle = DVec2::splat(0.5 * self.side as f64);
         let mut nodes = self.nodes.clone();
@@ -111,19 +116,38 @@ impl<'a> Layout<'a> {
         raster.finish()
     }
 
-    /// Returns drawn energies of the window as a kernel of sum 1, trimmed to what matters.
+    /// Draws the energy of each pixel of the window, with waves in so far as the setting and the blur want them: `waves` sums them in a
+    /// window of a side about a middle, pixels.
+    pub(crate) fn drawn(
+        &self,
+        diffraction: Diffraction,
+        waves: impl FnOnce(usize, IVec2) -> Result<Array2<f64>, PsfError>,
+    ) -> (Array2<f64>, ModelUse) {
+        let wave_fraction = self.wave_fraction(diffraction);
+        if wave_fraction == 0.0 {
+            return (self.draw(), ModelUse { wave_fraction, fallback: None });
+        }
+        match waves(self.side, self.middle_px) {
+            Ok(waves) if wave_fraction == 1.0 => (waves, ModelUse { wave_fraction, fallback: None }),
+            Ok(waves) => {
+                let energies = waves * wave_fraction + self.draw() * (1.0 - wave_fraction);
+                (energies, ModelUse { wave_fraction, fallback: None })
+            }
+            Err(error) => (self.draw(), ModelUse { wave_fraction: 0.0, fallback: Some(error.to_string()) }),
+        }
+    }
+
+    /// Returns drawn energies of the window as a kernel, trimmed to what matters.
     pub(crate) fn kernel(&self, energies: &Array2<f64>, pitch_um: f64) -> Kernel {
         let kept = if self.lambda_n_px > 0.0 { KEPT_OF_TAILS } else { KEPT_OF_RAYS };
         let kernel = Kernel::centered(trim(energies, kept), pitch_um).faded_out(self.lambda_n_px);
-        Kernel { middle_px: self.middle_px, ..kernel }.normalized()
+        Kernel { middle_px: self.middle_px, ..kernel }
     }
 }
 
-/// Returns the corners of the box that holds the cells which have energy, pixels.
-fn bounds(spots: &Spots, nodes: &[Node]) -> (DVec2, DVec2) {
-    let lit = spots.mesh.cells().zip(&spots.energies).filter(|(_, energy)| **energy != 0.0);
-    let corners = lit.flat_map(|((ring, j), _)| spots.mesh.corners(ring, j)).map(|node| nodes[node].at_mm);
-    corners.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)))
+/// Returns pixels per mm: columns to the right, rows down.
+fn per_mm(pitch_um: f64) -> DVec2 {
+    DVec2::new(1e3, -1e3) / pitch_um
 }
 
 /// Returns λN in pixels: what the Gaussian of a ray through the middle of the pupil would give.

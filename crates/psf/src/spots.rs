@@ -2,7 +2,13 @@
 
 use glam::DVec2;
 
-use crate::mesh::Mesh;
+use crate::{
+    mesh::{Mesh, polar},
+    pupil::Outline,
+};
+
+/// Places along each side of a cell at which obscurations are looked for.
+const CLEAR_ACROSS: usize = 8;
 
 /// One node of a mesh of rays.
 #[derive(Clone, Copy, Debug, Default)]
@@ -44,15 +50,30 @@ impl Spots {
         self
     }
 
+    /// Returns the rms distance of the energy from where places count from, mm, cells taken at the means of their corners.
+    pub(crate) fn rms_mm(&self) -> f64 {
+        let square = |((ring, j), energy): ((usize, usize), &f64)| {
+            let corners = self.mesh.corners(ring, j).map(|node| self.nodes[node].at_mm);
+            (corners.into_iter().sum::<DVec2>() / 4.0).length_squared() * energy
+        };
+        self.mesh.cells().zip(&self.energies).map(square).sum::<f64>().sqrt()
+    }
+
+    /// Returns the corners of the box that holds the cells which have energy, mm.
+    pub(crate) fn bounds_mm(&self) -> (DVec2, DVec2) {
+        let lit = self.mesh.cells().zip(&self.energies).filter(|(_, energy)| **energy != 0.0);
+        let corners = lit.flat_map(|((ring, j), _)| self.mesh.corners(ring, j)).map(|node| self.nodes[node].at_mm);
+        corners.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)))
+    }
+
     /// Returns how far from the point that places count from the farthest spot lies, mm.
     pub(crate) fn extent_mm(&self) -> f64 {
         self.nodes.iter().map(|node| node.at_mm.length()).fold(0.0, f64::max)
     }
 }
 
-/// Returns the fractions of a mesh's energy in its cells, from the squares of the outline's radii: at each azimuth of the mesh and once between two.
-///
-/// Cells of a plane that light passes evenly: their areas by Simpson's rule around the pupil. The sum is the area.
+/// Returns the areas of the cells of an outline's mesh, by Simpson's rule around it: its radii are known at each azimuth of the mesh and once
+/// between two.
 pub(crate) fn cell_areas(mesh: Mesh, rho: &[f64]) -> Vec<f64> {
     let n = rho.len();
     let wedge = mesh.azimuth(1.0);
@@ -65,4 +86,30 @@ pub(crate) fn cell_areas(mesh: Mesh, rho: &[f64]) -> Vec<f64> {
         })
     };
     (0..mesh.n_rings).flat_map(ring).collect()
+}
+
+/// Returns how much of each cell of an outline's mesh obscurations leave clear: of 8 × 8 rays through it. `passed` says of places of the
+/// outline's plane which rays get through the lens, with its obscurations or without.
+pub(crate) fn clear_shares(mesh: Mesh, outline: &Outline, passed: &dyn Fn(&[DVec2], bool) -> Vec<bool>) -> Vec<f64> {
+    const N: usize = CLEAR_ACROSS;
+    let rho = |j: usize| outline.rho[(2 * j) % outline.rho.len()];
+    let place = |ring: usize, j: usize, k: usize| {
+        let middle = |i: usize| (i as f64 + 0.5) / N as f64;
+        let (out, around) = (middle(k / N), middle(k % N));
+        let [inner, outer] = [ring, ring + 1].map(|ring| mesh.share(ring as f64).powi(2));
+        // Even in area.
+        let share = (inner + (outer - inner) * out).sqrt();
+        polar(outline.center, share * (rho(j) + (rho(j + 1) - rho(j)) * around), mesh.azimuth(j as f64 + around))
+    };
+    let places: Vec<DVec2> = mesh.cells().flat_map(|(ring, j)| (0..N * N).map(move |k| place(ring, j, k))).collect();
+    let n_passed = |passed: &[bool]| passed.iter().filter(|passed| **passed).count() as f64;
+    let mut shares: Vec<f64> =
+        passed(&places, true).chunks(N * N).map(|cell| n_passed(cell) / (N * N) as f64).collect();
+    // Rims end some rays of the outermost cells, whose areas have that already.
+    let outermost = mesh.n_cells() - mesh.n_azimuths;
+    let whole = passed(&places[outermost * N * N..], false);
+    for (share, cell) in shares[outermost..].iter_mut().zip(whole.chunks(N * N)) {
+        *share = (*share * (N * N) as f64 / n_passed(cell).max(1.0)).min(1.0);
+    }
+    shares
 }

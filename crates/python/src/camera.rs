@@ -123,9 +123,6 @@ impl Camera {
     ///     Strength of HURB.
     /// blur : {"layered", "pointwise", "views:N"}
     ///     Layers of depth; each sample on its own, as in the paper; layers through N parts of the pupil.
-    /// bank : {"standard", "paper"}
-    /// bank_error : float
-    ///     Samples the lens as finely as this error at nine tenths of the places needs.
     /// scene : Scene or path
     /// fov_deg, depth_m, width_mm, distance_mm, fill_depth, hidden, white_level
     /// illuminant, illuminance_lux, scene_light, mean_luminance_cd_m2

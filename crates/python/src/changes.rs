@@ -2,9 +2,8 @@
 
 use dioptric_optics::Lens as OpticsLens;
 use dioptric_pipeline::{
-    BankSpec, Camera, Crop, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions, LensSpec,
-    PictureOptions, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure,
-    with_exposure_s,
+    Camera, Crop, FilmSpec, FocusSpec, FramesSpec, GivenParts, KeptCamera, LensReadOptions, LensSpec, PictureOptions,
+    RetiredBank, SceneSpec, SensorOptions, SensorSpec, StopSpec, WavelengthSpec, with_auto_exposure, with_exposure_s,
 };
 use dioptric_sensor::Processing;
 use pyo3::{
@@ -303,14 +302,8 @@ fn set_imaging(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRe
             let expected = "'layered', 'pointwise' or 'views:16'";
             camera.blur = found.parse().map_err(|_| wrong(key, format!("'{found}'"), expected))?;
         }
-        "bank" => {
-            camera.bank = match word(key, value)?.as_str() {
-                "standard" => BankSpec::Standard,
-                "paper" => BankSpec::Paper,
-                other => return Err(wrong(key, format!("'{other}'"), "'standard' or 'paper'")),
-            }
-        }
-        "bank_error" => camera.bank = BankSpec::Within { error: number(key, value)? },
+        // Of older programs; the report notes it.
+        "bank" | "bank_error" => camera.bank = RetiredBank::STATED,
         "wavelengths_nm" if value.is_instance_of::<PyString>() => match word(key, value)?.as_str() {
             "scene" => camera.wavelengths = WavelengthSpec::Scene,
             other => return Err(wrong(key, format!("'{other}'"), "numbers, or 'scene' for the scene's own")),

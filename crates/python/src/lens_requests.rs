@@ -74,7 +74,6 @@ impl PsfOptions {
             pixel_um: 1.0,
             size: Some(65),
             sampling: PsfSampling::Pupil,
-            bank: None,
             mtf_per_mm: Vec::new(),
             seed: 1,
             spectral_weights: Vec::new(),

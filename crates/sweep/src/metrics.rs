@@ -12,7 +12,6 @@ struct Report {
     film_mm: f64,
     scene: Scene,
     irradiance: Irradiance,
-    psf_bank: Option<Bank>,
     sensor: Sensor,
     losses: Vec<Loss>,
     color_matrix_mean_delta_e: Option<f64>,
@@ -37,11 +36,6 @@ struct Scene {
 #[derive(Deserialize)]
 struct Irradiance {
     mean_lux: Option<f64>,
-}
-
-#[derive(Deserialize)]
-struct Bank {
-    median_error: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -101,7 +95,6 @@ pub(crate) fn metrics(json: &[u8]) -> Result<Metrics, serde_json::Error> {
         ("near_m".to_owned(), scene.near_m),
         ("far_m".to_owned(), scene.far_m),
         ("mean_luminance_cd_m2".to_owned(), scene.mean_luminance_cd_m2),
-        ("psf_median_error".to_owned(), report.psf_bank.and_then(|bank| bank.median_error)),
         ("color_matrix_mean_delta_e".to_owned(), report.color_matrix_mean_delta_e),
     ]);
     Ok(all.into_iter().filter_map(|(name, number)| Some((name, number?))).collect())

@@ -4,7 +4,6 @@ mod charts;
 mod polychromatic;
 mod request;
 mod row;
-mod source;
 pub(crate) mod spot;
 mod table;
 mod through_focus;

@@ -1,14 +1,17 @@
 //! Which point-spread functions to compute, and how.
 
 use dioptric_optics::{Lens, MonoLens, glam::DVec2};
-use dioptric_psf::{Diffraction, PsfError, PsfQuery};
+use dioptric_psf::{Diffraction, ImageSettings, PointImage, PsfError};
 
-use dioptric_pipeline::{BankSpec, FocusSpec, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
+use dioptric_pipeline::{FocusSpec, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm};
 
 /// Wavelengths that are seen.
 const VISIBLE_NM: std::ops::RangeInclusive<f64> = 380.0..=780.0;
 /// Pixels along the side of the largest picture that is made.
 pub(crate) const LARGEST: usize = 4097;
+/// Rings and azimuths of the rays through a pupil.
+const RINGS: usize = 24;
+const AZIMUTHS: usize = 96;
 
 /// Which point-spread functions to compute, and how.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,8 +34,6 @@ pub struct PsfRequest {
     pub size: Option<usize>,
     /// How the light is sampled.
     pub sampling: PsfSampling,
-    /// A bank over the range of the points from which they are drawn; `None` to trace each of them.
-    pub bank: Option<BankSpec>,
     /// Spatial frequencies of the MTF tables, cycles per mm.
     pub mtf_per_mm: Vec<f64>,
     /// The seed of the paper mode's jitter and diffraction.
@@ -71,10 +72,9 @@ impl Item {
         DVec2::new(self.field_deg.to_radians().tan(), self.field_y_deg.to_radians().tan())
     }
 
-    /// Returns what to ask of a source on pixels of this size.
-    pub(crate) fn query(&self, pitch_um: f64) -> PsfQuery {
-        let Self { dioptres, wavelength_nm, .. } = *self;
-        PsfQuery { field_tan: self.field_tan(), dioptres, wavelength_nm, pitch_um }
+    /// Returns the point as the lens images it; `None` of a dark one.
+    pub(crate) fn image(&self, lens: &Lens, settings: &ImageSettings) -> Result<Option<PointImage>, PipelineError> {
+        Ok(PointImage::trace(lens, settings, self.field_tan(), self.dioptres, self.wavelength_nm)?)
     }
 }
 
@@ -120,6 +120,17 @@ impl PsfRequest {
         Ok(items)
     }
 
+    /// Returns how a lens stands before a film.
+    pub(crate) fn image_settings(&self, lens: &Lens, film_distance_mm: f64) -> Result<ImageSettings, PipelineError> {
+        Ok(ImageSettings {
+            film_distance_mm,
+            reference_wavelength_nm: self.reference_nm(lens)?,
+            diffraction: self.diffraction,
+            n_rings: RINGS,
+            n_azimuths: AZIMUTHS,
+        })
+    }
+
     pub(crate) fn check(&self) -> Result<(), PipelineError> {
         for &field in self.fields_deg.iter().chain([&self.field_y_deg]) {
             if field.is_nan() || field.abs() >= 89.9 {
@@ -154,14 +165,6 @@ impl PsfRequest {
         }
         if matches!(self.sampling, PsfSampling::Paper { .. }) && self.diffraction == Diffraction::Wave {
             return Err(self.wrong("diffraction", "wave", "HURB or none in the paper mode"));
-        }
-        if let Some(BankSpec::Within { error }) = self.bank
-            && !(error.is_finite() && error > 0.0)
-        {
-            return Err(self.wrong("bank_error", &error.to_string(), "a number above 0"));
-        }
-        if self.bank.is_some() && self.sampling != PsfSampling::Pupil {
-            return Err(self.wrong("bank", "a bank", "none in the paper mode, which counts the rays of each point"));
         }
         let (weights, n) = (&self.spectral_weights, self.wavelengths_nm.len());
         let are_weights = weights.iter().all(|w| w.is_finite() && *w >= 0.0) && weights.iter().any(|w| *w > 0.0);

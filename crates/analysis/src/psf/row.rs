@@ -8,7 +8,6 @@ use dioptric_psf::Picture;
 use serde::Serialize;
 
 use super::spot::Moments;
-use dioptric_pipeline::BankData;
 
 /// What is measured of one point-spread function.
 ///
@@ -67,9 +66,6 @@ pub struct PsfRow {
     /// The Strehl ratio at the pattern's peak, where waves were summed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub strehl: Option<f64>,
-    /// The bank from which it was drawn, where it was not traced.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bank: Option<BankData>,
     /// Modulation at the frequencies asked for, of all light of the point: what lies outside of the picture counts as if it fell off
     /// with the third power of the distance.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -137,7 +133,6 @@ impl PsfRow {
             wave_fraction: None,
             fallback: None,
             strehl: None,
-            bank: None,
             mtf: Vec::new(),
         }
     }

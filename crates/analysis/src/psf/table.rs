@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dioptric_diffraction::{PupilGrid, PupilSamples};
 use dioptric_optics::{Lens, ObjectPoint, glam::DVec2};
-use dioptric_psf::{LensImageModel, ModelUse, Picture};
+use dioptric_psf::{ImageSettings, ModelUse, Picture, PointImage};
 use dioptric_scene::{ExrSamples, write_planes_exr};
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use super::row::{PointName, place_and_size};
 use super::spot::{PaperRays, Spot};
 use super::windowed::Windowed;
 use crate::{PsfRequest, PsfRow, PsfSampling};
-use dioptric_pipeline::{BankData, FocusSpec, PipelineError};
+use dioptric_pipeline::{FocusSpec, PipelineError};
 use dioptric_psf::Diffraction;
 
 /// Point-spread functions with their pictures.
@@ -28,8 +28,6 @@ pub struct PsfSet {
     pub rows: Vec<PsfRow>,
     /// The energy on each pixel about the centroid, in the order of `rows`; the sum is at most 1.
     pub pictures: Vec<Array2<f32>>,
-    /// How the bank was sampled, where points were drawn from one and not traced.
-    pub bank: Option<BankData>,
     /// The weight of each wavelength in the light of all of them, in the order of the request.
     pub spectral_weights: Vec<f64>,
 }
@@ -48,13 +46,10 @@ impl PsfRequest {
             FocusSpec::NearObject => return Err(self.wrong("focus", "NearObject", "a distance or a film place")),
         };
         let items = self.items(lens)?;
-        let source = match self.sampling {
-            PsfSampling::Pupil => Some(self.source(lens, &items, film_distance_mm)?),
-            PsfSampling::Paper { .. } => None,
-        };
+        let settings = self.image_settings(lens, film_distance_mm)?;
         let computed: Result<Vec<(PsfRow, Array2<f32>)>, PipelineError> =
-            items.par_iter().map(|item| self.compute_one(item, lens, source.as_ref(), film_distance_mm)).collect();
-        let (mut rows, pictures): (Vec<PsfRow>, _) = computed?.into_iter().unzip();
+            items.par_iter().map(|item| self.compute_one(item, lens, &settings)).collect();
+        let (rows, pictures): (Vec<PsfRow>, _) = computed?.into_iter().unzip();
         if !rows.iter().any(|row| row.energy > 0.0) {
             let found = format!("{:?}", self.fields_deg);
             let expected = format!("at least one field of which light gets through {} to the film", lens.name());
@@ -64,31 +59,29 @@ impl PsfRequest {
             true => vec![1.0; self.wavelengths_nm.len()],
             false => self.spectral_weights.clone(),
         };
-        let bank = source.as_ref().and_then(BankData::of);
-        rows.iter_mut().for_each(|row| row.bank.clone_from(&bank));
-        Ok(PsfSet { film_distance_mm, pixel_um: self.pixel_um, rows, pictures, bank, spectral_weights })
+        Ok(PsfSet { film_distance_mm, pixel_um: self.pixel_um, rows, pictures, spectral_weights })
     }
 
     fn compute_one(
         &self,
         item: &Item,
         lens: &Lens,
-        source: Option<&LensImageModel>,
-        film_distance_mm: f64,
+        settings: &ImageSettings,
     ) -> Result<(PsfRow, Array2<f32>), PipelineError> {
+        let film_distance_mm = settings.film_distance_mm;
         let reference = self.reference(lens)?;
         let mono = lens.at(item.wavelength_nm)?;
         let point = ObjectPoint::from_field(&reference, item.field_tan(), item.dioptres);
-        let (spot, picture, model) = match (self.sampling, source) {
-            (PsfSampling::Pupil, Some(source)) => {
+        let (spot, picture, model) = match self.sampling {
+            PsfSampling::Pupil => {
                 let axial = ObjectPoint::from_field(&reference, DVec2::ZERO, item.dioptres);
                 let spot = Spot::through_pupil(&mono, &point, &axial, film_distance_mm);
-                let drawn = if spot.at_mm.is_empty() { None } else { self.draw(item, source) };
+                let image = if spot.at_mm.is_empty() { None } else { item.image(lens, settings)? };
+                let drawn = image.map(|image| self.draw(&image));
                 let (picture, model) = drawn.map_or_else(|| (Array2::zeros((1, 1)), None), |(p, m)| (p, Some(m)));
                 (spot, self.size.map_or_else(|| picture.clone(), |size| resized(&picture, size)), model)
             }
-            (PsfSampling::Pupil, None) => unreachable!("a bank is built for this sampling"),
-            (PsfSampling::Paper { n_across, jitter }, _) => {
+            PsfSampling::Paper { n_across, jitter } => {
                 let paper = PaperRays { n_across, jitter, bending: self.diffraction.hurb(), seed: self.seed };
                 let spot = Spot::over_front(&mono, &point, film_distance_mm, &paper);
                 let picture = self.counted(&spot);
@@ -108,15 +101,18 @@ impl PsfRequest {
         Ok((row, picture))
     }
 
-    /// Draws a picture: of the size asked for, or its own; `None` of a dark point.
-    fn draw(&self, item: &Item, source: &LensImageModel) -> Option<(Array2<f32>, ModelUse)> {
-        let query = item.query(self.pixel_um);
+    /// Draws a picture: of the size asked for, or its own.
+    fn draw(&self, image: &PointImage) -> (Array2<f32>, ModelUse) {
         match self.size {
             // A picture is centered on the middle of a pixel, which an odd number has.
             Some(size) if size % 2 == 1 => {
-                source.picture(query, size).map(|(picture, model)| (picture.mapv(|e| e as f32), model))
+                let (picture, model) = image.picture(self.pixel_um, size);
+                (picture.mapv(|e| e as f32), model)
             }
-            _ => source.kernel_and_model(query).map(|(kernel, model)| (kernel.samples, model)),
+            _ => {
+                let (kernel, model) = image.kernel(self.pixel_um);
+                (kernel.samples, model)
+            }
         }
     }
 
@@ -210,7 +206,6 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
     use dioptric_optics::{Glass, Interface, Surface};
-    use dioptric_pipeline::BankSpec;
 
     fn request() -> PsfRequest {
         PsfRequest {
@@ -223,7 +218,6 @@ mod tests {
             pixel_um: 2.0,
             size: None,
             sampling: PsfSampling::Pupil,
-            bank: None,
             mtf_per_mm: vec![0.0, 10.0],
             seed: 1,
             spectral_weights: vec![],
@@ -323,22 +317,6 @@ mod tests {
     }
 
     #[test]
-    fn points_drawn_from_a_bank_are_nearly_the_traced_ones() {
-        let request =
-            PsfRequest { fields_deg: vec![0.0, 1.7, 5.0], distances_mm: vec![1000.0, 1700.0, 8000.0], ..request() };
-        let traced = request.compute(&paper_lens()).unwrap();
-        assert_eq!((traced.bank.is_none(), traced.rows[0].bank.is_none()), (true, true));
-        let drawn =
-            PsfRequest { bank: Some(BankSpec::Within { error: 0.02 }), ..request }.compute(&paper_lens()).unwrap();
-        let data = drawn.rows[3].bank.as_ref().unwrap();
-        assert!(data.p90_error <= 0.02 && data.n_places == 40, "{data:?}");
-        for (a, b) in traced.rows.iter().zip(&drawn.rows) {
-            // Blurs of tens of µm whose outlines are right to some hundredths of a pixel.
-            assert_relative_eq!(a.ee80_radius_um, b.ee80_radius_um, max_relative = 0.03, epsilon = 0.3);
-        }
-    }
-
-    #[test]
     fn fields_above_the_axis_are_turned_ones() {
         let beside = PsfRequest { fields_deg: vec![5.0], ..request() }.compute(&paper_lens()).unwrap();
         let above = PsfRequest { fields_deg: vec![0.0], field_y_deg: 5.0, ..request() }.compute(&paper_lens()).unwrap();
@@ -408,12 +386,6 @@ mod tests {
             PsfRequest { pixel_um: 0.0, ..request() },
             PsfRequest { size: Some(0), ..request() },
             PsfRequest { focus: FocusSpec::NearObject, ..request() },
-            PsfRequest { bank: Some(BankSpec::Within { error: f64::NAN }), ..request() },
-            PsfRequest {
-                bank: Some(BankSpec::Paper),
-                sampling: PsfSampling::Paper { n_across: 21, jitter: true },
-                ..request()
-            },
         ] {
             assert!(wrong.compute(&paper_lens()).is_err(), "{wrong:?}");
         }

@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use dioptric_optics::{Lens, ObjectPoint};
-use dioptric_psf::LensImageModel;
+use dioptric_psf::PointImage;
 use rayon::prelude::*;
 
 use super::request::Item;
@@ -94,8 +94,9 @@ impl Here<'_> {
     fn modulations(&self) -> Result<Vec<(f64, f64)>, PipelineError> {
         match self.request.sampling {
             PsfSampling::Pupil => {
-                let source = self.request.exact_source(self.lens, self.items, self.film_distance_mm)?;
-                Ok(self.items.par_iter().map(|item| self.of_picture(item, &source)).collect())
+                let settings = self.request.image_settings(self.lens, self.film_distance_mm)?;
+                let modulation = |item: &Item| Ok(self.of_picture(item, item.image(self.lens, &settings)?.as_ref()));
+                self.items.par_iter().map(modulation).collect()
             }
             PsfSampling::Paper { n_across, jitter } => {
                 let rays =
@@ -105,8 +106,8 @@ impl Here<'_> {
         }
     }
 
-    fn of_picture(&self, item: &Item, source: &LensImageModel) -> (f64, f64) {
-        let Some((picture, pitch_um)) = self.window(item, source) else { return (f64::NAN, f64::NAN) };
+    fn of_picture(&self, item: &Item, image: Option<&PointImage>) -> (f64, f64) {
+        let Some((picture, pitch_um)) = image.map(|image| self.window(image)) else { return (f64::NAN, f64::NAN) };
         let modulation = |direction| {
             let own = picture.modulation(direction, self.cycles_per_mm);
             let [asked, drawn] = [self.request.pixel_um, pitch_um].map(|um| self.pixels(um, direction));
@@ -116,18 +117,17 @@ impl Here<'_> {
         (modulation(meridian), modulation(meridian + FRAC_PI_2))
     }
 
-    /// Draws a point on the coarsest pixels that do, of a side in µm, in a window that is not too large; `None` of a dark point.
-    fn window(&self, item: &Item, source: &LensImageModel) -> Option<(Windowed, f64)> {
+    /// Draws a point on the coarsest pixels that do, of a side in µm, in a window that is not too large.
+    fn window(&self, image: &PointImage) -> (Windowed, f64) {
         let asked_um = self.request.pixel_um;
-        let reach_um = 1e3 * source.extent_mm(item.field_tan(), item.dioptres, item.wavelength_nm)?;
+        let reach_um = 1e3 * image.extent_mm();
         let pitch_um = pitch_um(asked_um, self.cycles_per_mm, reach_um);
-        let query = item.query(pitch_um);
         if 2.0 * reach_um > pitch_um * LARGEST_WINDOW as f64 {
-            let (energy, _) = source.picture(query, LARGEST_WINDOW)?;
-            return Some((Windowed::new(energy.mapv(|e| e as f32).view(), pitch_um), pitch_um));
+            let (energy, _) = image.picture(pitch_um, LARGEST_WINDOW);
+            return (Windowed::new(energy.mapv(|e| e as f32).view(), pitch_um), pitch_um);
         }
-        let (kernel, _) = source.kernel_and_model(query)?;
-        Some((Windowed::new(kernel.samples.view(), pitch_um), pitch_um))
+        let (kernel, _) = image.kernel(pitch_um);
+        (Windowed::new(kernel.samples.view(), pitch_um), pitch_um)
     }
 
     fn of_rays(&self, item: &Item, rays: &PaperRays) -> Result<(f64, f64), PipelineError> {

@@ -1,7 +1,7 @@
 //! The plots of the report.
 
 use dioptric_optics::glam::DVec2;
-use dioptric_psf::{LensImage, LensImageModel, Picture, PsfQuery};
+use dioptric_psf::{FilmMap, Kernel, LensImage, LensImageModel, Picture};
 
 use super::Run;
 use crate::SensorStatistics;
@@ -33,7 +33,9 @@ pub struct RunCharts {
 pub struct RunPlaces {
     /// The field of the film's corner, tangents across and up.
     pub corner: DVec2,
-    /// The depth in focus, dioptres, moved into the range of the bank.
+    /// The corner itself, mm from the middle of the film.
+    pub corner_mm: DVec2,
+    /// The depth in focus, dioptres, moved into the range of the scene.
     pub focus_dioptres: f64,
     /// A few depths from far to near, dioptres.
     pub dioptres: Vec<f64>,
@@ -44,8 +46,8 @@ pub struct RunPlaces {
 impl RunPlaces {
     /// Returns the places of a run.
     pub fn of(run: &Run<'_>) -> Self {
-        let (bank, place) = (run.model, &run.capture.place);
-        let (far, near) = bank.dioptres();
+        let (place, scene) = (&run.capture.place, &run.capture.scene);
+        let (far, near) = (1.0 / scene.far_m, 1.0 / scene.near_m);
         let steps = if near - far > 1e-6 { 4 } else { 1 };
         let (first, last) = run.capture.grid().range_nm();
         // Four wavelengths from end to end, and the reference in place of the nearest where it is among them.
@@ -57,8 +59,10 @@ impl RunPlaces {
         });
         let film = place.film();
         let corner_mm = film.half_size_mm() + film.center_mm.abs();
+        let map = run.model.film_map(REFERENCE_WAVELENGTH_NM, corner_mm.length());
         Self {
-            corner: bank.corner_field_tan(corner_mm, focus.clamp(far, near), REFERENCE_WAVELENGTH_NM),
+            corner: seen_towards(&map, corner_mm),
+            corner_mm,
             focus_dioptres: focus.clamp(far, near),
             dioptres: (0..steps).map(|i| far + (near - far) * i as f64 / (steps as f64 - 1.0).max(1.0)).collect(),
             wavelengths_nm: if last > first { wavelengths_nm } else { vec![first] },
@@ -92,22 +96,37 @@ impl RunCharts {
     }
 }
 
-fn picture(bank: &LensImageModel, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Picture {
-    Picture::from(&bank.kernel(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um }))
+/// Returns the field that a point of the film sees or, where that is in darkness, the last one on the way to it that is seen.
+fn seen_towards(map: &FilmMap, place_mm: DVec2) -> DVec2 {
+    let on_the_way = (0..=POINTS).rev().map(|i| place_mm * (i as f64 / POINTS as f64));
+    let mut seen = on_the_way.filter(|at_mm| map.irradiance_sr(*at_mm) > 0.0).filter_map(|at_mm| map.field_tan(at_mm));
+    seen.next().unwrap_or(DVec2::ZERO)
+}
+
+/// Returns the picture of a point about its centroid; all in the middle pixel of a dark one.
+fn picture(model: &LensImageModel, field_tan: DVec2, dioptres: f64, wavelength_nm: f64, pitch_um: f64) -> Picture {
+    let image = model.point(field_tan, dioptres, wavelength_nm);
+    Picture::from(&image.map_or_else(|| Kernel::identity(pitch_um), |image| image.kernel(pitch_um).0))
+}
+
+/// Returns the radius of a point's blur of defocus, µm; 0 of a dark one.
+fn blur_um(model: &LensImageModel, field_tan: DVec2, dioptres: f64, wavelength_nm: f64) -> f64 {
+    let image = model.point(field_tan, dioptres, wavelength_nm);
+    image.map_or(0.0, |image| 1e3 * image.blur_radius_mm().abs())
 }
 
 /// Line spreads on the axis, in focus, over wavelength.
 fn lsf(run: &Run<'_>, places: &RunPlaces) -> LineChart {
-    let bank = run.model;
+    let model = run.model;
     let spreads: Vec<_> = places
         .wavelengths_nm
         .iter()
         .map(|&nm| {
             // As fine as the narrowest line asks for.
             let airy_um = 1e-3 * nm * run.capture.lens.lens.at(nm).map_or(4.0, |l| l.first_order().f_number);
-            let blur_um = 1e3 * bank.blur_radius_mm(DVec2::ZERO, places.focus_dioptres, nm).abs();
+            let blur_um = blur_um(model, DVec2::ZERO, places.focus_dioptres, nm);
             let pitch_um = (0.1 * airy_um).max(0.02 * blur_um);
-            (nm, picture(bank, DVec2::ZERO, places.focus_dioptres, nm, pitch_um).line_spread(0.0))
+            (nm, picture(model, DVec2::ZERO, places.focus_dioptres, nm, pitch_um).line_spread(0.0))
         })
         .collect();
     let reach_um = spreads
@@ -196,16 +215,16 @@ fn cutoff_per_mm(run: &Run<'_>, places: &RunPlaces) -> f64 {
 
 /// Returns the modulation at frequencies up to the last, those near 0 denser, as far as a picture of the point can hold them.
 fn modulation(
-    bank: &LensImageModel,
+    model: &LensImageModel,
     (field_tan, dioptres): (DVec2, f64),
     direction: f64,
     last_per_mm: f64,
 ) -> Vec<(f64, f64)> {
     // Four pixels a wave; of a wide blur, which has modulation at low frequencies alone, as many pixels as are quick to add up.
     const WIDEST_PX: f64 = 400.0;
-    let blur_um = 1e3 * bank.blur_radius_mm(field_tan, dioptres, REFERENCE_WAVELENGTH_NM).abs();
+    let blur_um = blur_um(model, field_tan, dioptres, REFERENCE_WAVELENGTH_NM);
     let pitch_um = (250.0 / last_per_mm).max(2.0 * blur_um / WIDEST_PX);
-    let spot = picture(bank, field_tan, dioptres, REFERENCE_WAVELENGTH_NM, pitch_um);
+    let spot = picture(model, field_tan, dioptres, REFERENCE_WAVELENGTH_NM, pitch_um);
     // The average over a pixel of the picture is not the lens's.
     let along = std::f64::consts::PI * 1e-3 * pitch_um * DVec2::from_angle(direction);
     let sinc = |x: f64| if x == 0.0 { 1.0 } else { x.sin() / x };
@@ -224,8 +243,9 @@ fn over_field(places: &RunPlaces, of: impl Fn(DVec2) -> f64) -> Vec<(f64, f64)> 
         .collect()
 }
 
-fn illumination(bank: &LensImageModel, places: &RunPlaces) -> LineChart {
-    let gain = |tan| bank.irradiance_per_radiance(tan, places.focus_dioptres, REFERENCE_WAVELENGTH_NM);
+fn illumination(model: &LensImageModel, places: &RunPlaces) -> LineChart {
+    let map = model.film_map(REFERENCE_WAVELENGTH_NM, places.corner_mm.length());
+    let gain = |tan| map.place_mm(tan).map_or(0.0, |at_mm| map.irradiance_sr(at_mm));
     let axis = gain(DVec2::ZERO);
     let real = over_field(places, |tan| gain(tan) / axis);
     let cosines = over_field(places, |tan| tan.length().atan().cos().powi(4));
@@ -250,19 +270,22 @@ fn illumination(bank: &LensImageModel, places: &RunPlaces) -> LineChart {
     }
 }
 
-fn distortion(bank: &LensImageModel, places: &RunPlaces) -> LineChart {
-    let at = |tan, nm| bank.centroid_mm(tan, places.focus_dioptres, nm);
+fn distortion(model: &LensImageModel, places: &RunPlaces) -> LineChart {
+    let map_at = |nm: f64| model.film_map(nm, places.corner_mm.length());
+    let at = |map: &FilmMap, tan: DVec2| map.place_mm(tan).unwrap_or(DVec2::NAN);
     // Heights count from where the axis lands, which a tilted lens moves.
-    let axis_mm = at(DVec2::ZERO, REFERENCE_WAVELENGTH_NM);
+    let reference = map_at(REFERENCE_WAVELENGTH_NM);
+    let axis_mm = at(&reference, DVec2::ZERO);
     let small = places.field(1e-3);
-    let scale_mm = at(small, REFERENCE_WAVELENGTH_NM).distance(axis_mm) / small.length();
+    let scale_mm = at(&reference, small).distance(axis_mm) / small.length();
     let curves: Vec<Series> = places
         .wavelengths_nm
         .iter()
         .map(|&nm| {
+            let map = map_at(nm);
             let points = over_field(places, |tan| {
                 let tan = if tan.length() > small.length() { tan } else { small };
-                100.0 * (at(tan, nm).distance(axis_mm) / (scale_mm * tan.length()) - 1.0)
+                100.0 * (at(&map, tan).distance(axis_mm) / (scale_mm * tan.length()) - 1.0)
             });
             Series { label: Some(format!("{nm:.0} nm")), color: wavelength_color(nm), points, is_dashed: false }
         })

@@ -6,7 +6,7 @@ mod dual_pixel;
 mod pixel_optics;
 mod statistics;
 
-use dioptric_pipeline::{AberrationSummary, BankData, Camera, Capture, FilmPart, PipelineError};
+use dioptric_pipeline::{AberrationSummary, Camera, Capture, FilmPart, PipelineError};
 use dioptric_psf::{Diffraction, LensImageModel};
 use dioptric_scene::SceneLight;
 use dioptric_spectrum::{ColorTemperature, DepthMap};
@@ -50,8 +50,6 @@ pub struct RunReport {
     pub film: FilmData,
     /// The scene.
     pub scene: SceneData,
-    /// How the point-spread functions were sampled, and the error of what lies between.
-    pub psf_bank: Option<BankData>,
     /// The irradiance on the film.
     pub irradiance: IrradianceData,
     /// What the sensor saw.
@@ -160,13 +158,6 @@ impl RunOptics {
     }
 }
 
-/// States from which field on light is not in the irradiance, though it reaches the film: where a lens does not gather it to an image.
-fn note_on_scattered_light(run: &Run<'_>) -> Option<String> {
-    let last_deg = run.model.scattered_beyond_tan()?.atan().to_degrees();
-    let lens = run.capture.lens.lens.name();
-    Some(format!("{lens}: light from beyond {last_deg:.1}° off axis is left out: the lens scatters it over the film"))
-}
-
 /// States where diffraction is round, though the pupil is not: beyond kernels it is spread as that of a circle (docs/forward.md 2, "Halos").
 fn note_on_round_halos(run: &Run<'_>) -> Option<String> {
     let (camera, lens) = (&run.capture.camera, &run.capture.lens.lens);
@@ -202,7 +193,7 @@ impl RunReport {
             lens: optics.lens,
             lens_notes: {
                 let without_sums = LensData::note_on_third_order(&capture.lens.lens);
-                let of_light = note_on_scattered_light(run).into_iter().chain(note_on_round_halos(run));
+                let of_light = note_on_round_halos(run);
                 capture.lens_notes().into_iter().chain(without_sums).chain(of_light).collect()
             },
             film_distance_mm: place.film_distance_mm,
@@ -227,7 +218,6 @@ impl RunReport {
                     scene.notes.iter().cloned().chain(narrow.and_then(|narrow| narrow.note())).collect()
                 },
             },
-            psf_bank: BankData::of(run.model),
             irradiance: IrradianceData {
                 wavelengths_nm: capture.grid().centers_nm().to_vec(),
                 mean_w_m2_nm: capture.irradiance.summary.mean.clone(),

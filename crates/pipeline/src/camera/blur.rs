@@ -5,7 +5,7 @@ use std::{fmt, str::FromStr};
 use dioptric_psf::Diffraction;
 use serde::{Deserialize, Serialize};
 
-use super::{bank::BankSpec, check::Checker};
+use super::check::Checker;
 use crate::PipelineError;
 
 /// How the point-spread functions are laid over the scene.
@@ -27,20 +27,12 @@ pub enum BlurSpec {
 
 impl BlurSpec {
     /// Checks the number of views, and that the rest of the camera allows them.
-    pub(crate) fn check(
-        self,
-        diffraction: Diffraction,
-        bank: BankSpec,
-        checker: &Checker<'_>,
-    ) -> Result<(), PipelineError> {
+    pub(crate) fn check(self, diffraction: Diffraction, checker: &Checker<'_>) -> Result<(), PipelineError> {
         let Self::Views(n) = self else { return Ok(()) };
         checker.count("Views", n, 2..=256)?;
         let with_views = |what: &str| format!("{what}, with views through parts of the pupil");
         if diffraction == Diffraction::Wave {
             return checker.wrong("diffraction", "Wave", &with_views("HURB or no diffraction"));
-        }
-        if bank == BankSpec::Paper {
-            return checker.wrong("bank", "Paper", &with_views("a bank of rays"));
         }
         Ok(())
     }
@@ -89,14 +81,13 @@ mod tests {
 
     #[test]
     fn views_need_rays_of_their_own() {
-        let check = |n, diffraction, bank| {
-            let checked = BlurSpec::Views(n).check(diffraction, bank, &Checker::of_settings("a camera"));
+        let check = |n, diffraction| {
+            let checked = BlurSpec::Views(n).check(diffraction, &Checker::of_settings("a camera"));
             checked.map_err(|error| error.to_string())
         };
-        let (hurb, standard) = (Diffraction::default(), BankSpec::Standard);
-        assert_eq!(check(2, hurb, standard), Ok(()));
-        assert!(check(1, hurb, standard).unwrap_err().contains("2 to 256"));
-        assert!(check(16, Diffraction::Wave, standard).unwrap_err().contains("HURB or no diffraction"));
-        assert!(check(16, hurb, BankSpec::Paper).unwrap_err().contains("bank of rays"));
+        let hurb = Diffraction::default();
+        assert_eq!(check(2, hurb), Ok(()));
+        assert!(check(1, hurb).unwrap_err().contains("2 to 256"));
+        assert!(check(16, Diffraction::Wave).unwrap_err().contains("HURB or no diffraction"));
     }
 }

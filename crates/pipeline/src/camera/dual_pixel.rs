@@ -6,7 +6,7 @@ use dioptric_psf::{Diffraction, PupilDivision, PupilSides, Sides};
 use dioptric_sensor::DisparityAxis;
 use serde::{Deserialize, Serialize};
 
-use super::{BankSpec, BlurSpec, Camera, FramesSpec, Photodiodes, SceneSource, check::Checker};
+use super::{BlurSpec, Camera, FramesSpec, Photodiodes, SceneSource, check::Checker};
 use crate::PipelineError;
 
 /// The share of light from far on one side of the pupil that the photodiode of the other side gets, where nothing else is said.
@@ -86,9 +86,6 @@ impl DualPixelSpec {
         let with = |what: &str| format!("{what}, with dual_pixel");
         if camera.diffraction == Diffraction::Wave {
             checker.wrong("diffraction", "Wave", &with("HURB or no diffraction"))?;
-        }
-        if camera.bank == BankSpec::Paper {
-            checker.wrong("bank", "Paper", &with("a bank of rays"))?;
         }
         if let BlurSpec::Views(_) = camera.blur {
             checker.wrong("blur", &camera.blur.to_string(), &with("layered or pointwise"))?;

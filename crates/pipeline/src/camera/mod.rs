@@ -29,7 +29,7 @@ use dioptric_spectrum::WavelengthGrid;
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-pub use bank::{BankData, BankSpec};
+pub use bank::RetiredBank;
 pub use blur::BlurSpec;
 pub use crop::Crop;
 pub use dual_pixel::DualPixelSpec;
@@ -84,9 +84,10 @@ pub struct Camera {
     /// Diffraction at the stop.
     #[serde(default)]
     pub diffraction: Diffraction,
-    /// How the point-spread functions are sampled.
-    #[serde(default)]
-    pub bank: BankSpec,
+    /// Of older files.
+    #[serde(default, skip_serializing)]
+    #[cfg_attr(feature = "schema", schemars(skip))]
+    pub bank: RetiredBank,
     /// How the point-spread functions are laid over the scene.
     #[serde(default)]
     pub blur: BlurSpec,
@@ -319,10 +320,7 @@ impl Camera {
         if let Err(PsfError::Setting { key, found, expected }) = self.diffraction.check() {
             checker.wrong(key, &found.to_string(), expected)?;
         }
-        if let BankSpec::Within { error } = self.bank {
-            checker.positive("error", error)?;
-        }
-        self.blur.check(self.diffraction, self.bank, checker)?;
+        self.blur.check(self.diffraction, checker)?;
         self.exposure.check().map_err(|error| checker.of_sensor(error))?;
         match &self.wavelengths {
             WavelengthSpec::Scene => {}
@@ -521,8 +519,12 @@ mod tests {
         check_error(&SHORT.replace("2000.0", "0"), &["shot.ron:5", "DistanceMm"]);
         let film = "film: Pixels(columns: 0, rows: 4, pitch_um: 1.0),\n    sensor:";
         check_error(&SHORT.replace("sensor:", film), &["shot.ron:6", "columns", "0"]);
-        let bank = "bank: Within(error: -0.1),\n    sensor:";
-        check_error(&SHORT.replace("sensor:", bank), &["shot.ron:6", "error", "-0.1"]);
+        // A key of older files is read and ignored.
+        for old in ["Standard", "Within(error: -0.1)", "Paper"] {
+            let camera = parse(&SHORT.replace("sensor:", &format!("bank: {old},\n    sensor:"))).unwrap();
+            assert!(camera.bank.note().unwrap().contains("ignored"));
+            assert_eq!(parse(SHORT).unwrap().bank.note(), None);
+        }
         for (metering, value) in [("Percentile(NaN)", "NaN"), ("Percentile(-3)", "-3"), ("Percentile(101)", "101")] {
             let exposure = format!("exposure: Auto((metering: {metering}, target_fraction: 0.9)),\n    sensor:");
             check_error(&SHORT.replace("sensor:", &exposure), &["shot.ron:6", "Percentile", value, "0 to 100"]);

@@ -1,8 +1,10 @@
 //! Figure 3: three targets at 8 m and at 2 m through the paper's two-element lens, focused for 8 m.
 
+use std::sync::Arc;
+
 use dioptric_forward::{Film, Settings, Source, render};
 use dioptric_psf::paper::{FIGURE_3_FILM_MM, figure_3_psfs, figure_3_rms_um, two_element_lens};
-use dioptric_psf::{FilmMap, Kernel, LensImage, PsfQuery, RadialMap};
+use dioptric_psf::{FilmMap, FilmQuery, Kernel, LensImage};
 use dioptric_scene::{Target, View};
 use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
@@ -95,24 +97,15 @@ impl LensImage for CountedPsfs {
     fn is_symmetric(&self) -> bool {
         true
     }
-    fn wavelengths_nm(&self) -> (f64, f64) {
-        (self.wavelengths_nm[0], self.wavelengths_nm[self.wavelengths_nm.len() - 1])
+    fn film_map(&self, _wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
+        Arc::new(FilmMap::radial(reach_mm, |radius_mm| Some(radius_mm / FIGURE_3_FILM_MM), |_| 1.0))
     }
-    fn dioptres(&self) -> (f64, f64) {
-        (0.0, 1.0)
-    }
-    fn is_dark_beyond_extent(&self) -> bool {
-        true
-    }
-    fn film_map(&self, _dioptres: f64, _wavelength_nm: f64, extent_mm: f64) -> FilmMap {
-        RadialMap::tabulate(extent_mm, |radius_mm| Some(radius_mm / FIGURE_3_FILM_MM), |_| 1.0).into()
-    }
-    fn kernel(&self, query: PsfQuery) -> Kernel {
-        let PsfQuery { wavelength_nm, pitch_um, .. } = query;
+    fn kernel(&self, query: FilmQuery) -> Kernel {
+        let FilmQuery { wavelength_nm, pitch_um, .. } = query;
         let samples = on_pixels(&self.psfs[self.nearest(wavelength_nm)], COUNTING_PITCH_UM, pitch_um);
         Kernel::centered(samples, pitch_um)
     }
-    fn blur_radius_mm(&self, _field_tan: DVec2, _dioptres: f64, wavelength_nm: f64) -> f64 {
+    fn blur_radius_mm(&self, _place_mm: DVec2, _dioptres: f64, wavelength_nm: f64) -> f64 {
         self.radii_mm[self.nearest(wavelength_nm)]
     }
 }

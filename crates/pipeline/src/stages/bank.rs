@@ -1,42 +1,29 @@
-//! The image of the lens, over the fields, depths and wavelengths that the scene and the film need.
+//! The image of the lens, described from the film.
 
-use dioptric_forward::PsfDomain;
-use dioptric_psf::{LensImageModel, SampleCounts};
+use dioptric_psf::{ImageSettings, LensImageModel};
 use dioptric_spectrum::WavelengthGrid;
 
-use super::{Watch, film::FilmPlace, lens::ResolvedLens, spec::BankInputs};
-use crate::{PipelineError, Quality, Stage};
+use super::{film::FilmPlace, lens::ResolvedLens, spec::BankInputs};
+use crate::{PipelineError, Quality, REFERENCE_WAVELENGTH_NM};
 
-/// For sketches: what one sees on pixels of several times the full ones.
-const SKETCH: SampleCounts =
-    SampleCounts { n_radial: 4, n_grid: 3, n_depths: 2, n_wavelengths: 2, n_rings: 5, n_azimuths: 20 };
+/// Rings and azimuths of the pupil's mesh for sketches: what one sees on pixels of several times the full ones.
+const SKETCH: (usize, usize) = (5, 20);
 
-/// Traces the model; its error is measured for a full picture alone.
+/// Describes the lens at each band; what is asked of the film is traced then.
 pub(super) fn build(
     inputs: &BankInputs,
     lens: &ResolvedLens,
     place: &FilmPlace,
-    depth_range_m: (f64, f64),
     grid: &WavelengthGrid,
-    watch: &Watch<'_>,
 ) -> Result<LensImageModel, PipelineError> {
-    let domain = PsfDomain {
-        lens: &lens.lens,
-        film: &place.film(),
-        film_distance_mm: place.film_distance_mm,
-        depth_range_m,
-        grid,
-        diffraction: inputs.diffraction,
+    let settings = ImageSettings {
+        reference_wavelength_nm: lens.reference.wavelength_nm(),
+        ..ImageSettings::new(place.film_distance_mm, inputs.diffraction)
     };
-    let standard = domain.settings()?;
-    let progress = |fraction| watch.progress.at(Stage::Lens, fraction);
     let settings = match inputs.film.geometry.quality {
-        Quality::Full => {
-            return inputs.bank.build(&lens.lens, standard, place.pitch_um, &progress, watch.cancel);
-        }
-        Quality::Draft => standard,
-        Quality::Sketch => standard.with_counts(SKETCH),
-        Quality::Preview => standard.with_counts(SampleCounts::PREVIEW),
+        Quality::Full | Quality::Draft => settings,
+        Quality::Preview => settings.for_preview(),
+        Quality::Sketch => ImageSettings { n_rings: SKETCH.0, n_azimuths: SKETCH.1, ..settings },
     };
-    Ok(LensImageModel::build_with(&lens.lens, &settings, &progress, watch.cancel)?)
+    Ok(LensImageModel::new(&lens.lens, grid.centers_nm(), &settings)?)
 }

@@ -60,7 +60,12 @@ impl Capture {
     /// which glasses are continued beyond the range in which they are known, and what of it the pixels' response to angles leaves out.
     pub fn lens_notes(&self) -> Vec<String> {
         let on_angles = electrons::note_on_angles(&self.sensor, &self.lens.lens, self.camera.movements);
-        self.lens.notes_at(self.grid().centers_nm()).into_iter().chain(on_angles).collect()
+        self.lens
+            .notes_at(self.grid().centers_nm())
+            .into_iter()
+            .chain(on_angles)
+            .chain(self.camera.bank.note())
+            .collect()
     }
 
     /// What is written of the frames.

@@ -106,7 +106,7 @@ impl Chain<'_> {
                 check_depth_map(&lens.lens, &grid, depth)?;
             }
             self.watch.progress.at(Stage::Lens, 0.0);
-            bank::build(inputs, &lens, &place, (summary.near_m, summary.far_m), &grid, &self.watch)
+            bank::build(inputs, &lens, &place, &grid)
         })
     }
 

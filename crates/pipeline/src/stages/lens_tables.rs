@@ -1,10 +1,10 @@
 //! The tables by which a picture is freed of the aberrations of its lens, from the model of the lens's image.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
-use dioptric_forward::{Film, PsfDomain};
+use dioptric_forward::Film;
 use dioptric_optics::glam::{DMat2, DVec2};
-use dioptric_psf::{Diffraction, FilmMap, LensImageModel, SampleCounts};
+use dioptric_psf::{Diffraction, FilmMap, ImageSettings, LensImage, LensImageModel};
 use dioptric_sensor::{AngularResponse, FrameTable, LensTables, Sensor};
 use dioptric_spectrum::{Illuminant, Observer, WavelengthGrid};
 use rayon::prelude::*;
@@ -15,9 +15,6 @@ use crate::PipelineError;
 
 /// Nodes of the tables each way. Cubics between 41 nodes follow 10 % of distortion over 4,000 pixels to .01 pixel.
 const NODES: usize = 41;
-/// Samples of the lens: one depth, wavelengths fine enough for the turn of lateral color.
-const SAMPLES: SampleCounts =
-    SampleCounts { n_radial: 13, n_grid: 13, n_depths: 1, n_wavelengths: 7, n_rings: 12, n_azimuths: 48 };
 /// The most by which a place is brightened: what is darker than this part of the brightest place stays dark.
 const MOST_GAIN: f64 = 32.0;
 /// The most by which a picture is enlarged so that nothing beyond the frame is seen in it.
@@ -64,19 +61,12 @@ impl TableParts<'_> {
     pub(super) fn aberrations(&self, watch: &Watch<'_>) -> Result<LensAberrations, PipelineError> {
         let whole = self.whole_film();
         let depth_m = self.depth_m();
-        let domain = PsfDomain {
-            lens: &self.lens.lens,
-            film: &whole,
-            film_distance_mm: self.place.film_distance_mm,
-            depth_range_m: (depth_m, depth_m),
-            grid: self.grid,
-            diffraction: Diffraction::None,
-        };
-        let settings = domain.settings()?.with_counts(SAMPLES);
-        let model = LensImageModel::build_with(&self.lens.lens, &settings, &|_| {}, watch.cancel)?;
-        let extent_mm = 1.1 * whole.half_diagonal_mm();
-        let map = |&nm: &f64| model.film_map(1.0 / depth_m, nm, extent_mm);
-        let bands: Vec<FilmMap> = self.grid.centers_nm().par_iter().map(map).collect();
+        let settings = ImageSettings::new(self.place.film_distance_mm, Diffraction::None);
+        let model = LensImageModel::new(&self.lens.lens, self.grid.centers_nm(), &settings)?;
+        let reach_mm = 1.1 * whole.half_diagonal_mm();
+        let map = |&nm: &f64| model.film_map(nm, reach_mm);
+        let bands: Vec<Arc<FilmMap>> = self.grid.centers_nm().par_iter().map(map).collect();
+        watch.cancel.check()?;
         let channels = ChannelImages { bands: &bands, weights: self.channel_weights() };
         let geometry = Geometry::of(channels, self.reference_channel(), whole, self.place)?;
         let aberrations = geometry.tabulate(self, depth_m)?;
@@ -133,56 +123,35 @@ impl TableParts<'_> {
 /// Where channels have fields, and how bright.
 struct ChannelImages<'a> {
     /// The maps of the bands.
-    bands: &'a [FilmMap],
+    bands: &'a [Arc<FilmMap>],
     /// For each channel the share of each band.
     weights: Vec<Vec<f64>>,
 }
 
 impl ChannelImages<'_> {
     /// Returns the mean place of a field in a channel, mm in the picture frame; `None` where no band has it.
-    fn place_mm(&self, channel: usize, field_tan: DVec2, from_mm: DVec2) -> Option<DVec2> {
+    fn place_mm(&self, channel: usize, field_tan: DVec2) -> Option<DVec2> {
         let bands = self.bands.iter().zip(&self.weights[channel]).filter(|(_, share)| **share > 0.0);
-        let mut near_mm = from_mm;
         let (mut sum, mut weight) = (DVec2::ZERO, 0.0);
         for (map, share) in bands {
-            if let Some(at_mm) = lands_mm(map, field_tan, near_mm) {
-                (sum, weight, near_mm) = (sum + *share * at_mm, weight + share, at_mm);
+            if let Some(at_mm) = map.place_mm(field_tan).filter(|at_mm| map.irradiance_sr(*at_mm) > 0.0) {
+                (sum, weight) = (sum + *share * at_mm, weight + share);
             }
         }
         (weight > 0.0).then(|| sum / weight)
     }
 
-    /// Returns the mean field that a channel sees at a place; where nothing is seen, that of a place near by.
+    /// Returns the mean field that a channel sees at a place; NaN where none is.
     fn field_tan(&self, channel: usize, place_mm: DVec2) -> DVec2 {
-        self.bands.iter().zip(&self.weights[channel]).map(|(map, share)| *share * map.field_tan(place_mm)).sum()
+        let bands = self.bands.iter().zip(&self.weights[channel]).filter(|(_, share)| **share > 0.0);
+        bands.map(|(map, share)| *share * map.field_tan(place_mm).unwrap_or(DVec2::NAN)).sum()
     }
 
     /// Returns the mean irradiance of a channel over radiance, sr; 0 where nothing is seen.
     fn irradiance_per_radiance(&self, channel: usize, place_mm: DVec2) -> f64 {
         let bands = self.bands.iter().zip(&self.weights[channel]);
-        bands.map(|(map, share)| share * map.at(place_mm).map_or(0.0, |(_, gain)| gain)).sum()
+        bands.map(|(map, share)| share * map.irradiance_sr(place_mm)).sum()
     }
-}
-
-/// Returns where a field lands by the map from places to fields, by Newton's method from a place near by.
-fn lands_mm(map: &FilmMap, field_tan: DVec2, from_mm: DVec2) -> Option<DVec2> {
-    const STEPS: usize = 40;
-    /// Wide enough that a table's straight pieces are smoothed, in parts of a focal length far below any distortion, mm.
-    const BY_MM: f64 = 0.01;
-    let mut at_mm = from_mm;
-    for _ in 0..STEPS {
-        let (seen, _) = map.at(at_mm)?;
-        let slope = |by: DVec2| (map.field_tan(at_mm + by) - map.field_tan(at_mm - by)) / (2.0 * BY_MM);
-        let step = DMat2::from_cols(slope(DVec2::X * BY_MM), slope(DVec2::Y * BY_MM)).inverse() * (field_tan - seen);
-        if !step.is_finite() {
-            return None;
-        }
-        at_mm += step;
-        if step.length() < 1e-7 {
-            return Some(at_mm);
-        }
-    }
-    None
 }
 
 /// The frame behind the lens, and the perspective that the lens would have without distortion.
@@ -207,10 +176,7 @@ impl<'a> Geometry<'a> {
         whole: Film,
         place: &FilmPlace,
     ) -> Result<Self, PipelineError> {
-        let center_mm = match &channels.bands[channels.bands.len() / 2] {
-            FilmMap::Radial(map) => map.axis_mm(),
-            FilmMap::Plane(_) | FilmMap::Shifted(_) => DVec2::ZERO,
-        };
+        let center_mm = channels.bands[channels.bands.len() / 2].axis_mm().unwrap_or(DVec2::ZERO);
         let dark = || PipelineError::Unsuitable {
             what: "lens_corrections",
             reason: "the lens shows nothing about its axis or the middle of the film, from where its scale is taken"
@@ -220,7 +186,7 @@ impl<'a> Geometry<'a> {
         let by_mm = 0.02 * whole.half_diagonal_mm();
         let by_tan = |way: DVec2| channels.field_tan(reference, center_mm + way * by_mm) - axis_tan;
         let steps = DMat2::from_cols(by_tan(DVec2::X), by_tan(DVec2::Y));
-        let place_of = |field_tan: DVec2| channels.place_mm(reference, field_tan, center_mm).ok_or_else(dark);
+        let place_of = |field_tan: DVec2| channels.place_mm(reference, field_tan).ok_or_else(dark);
         let axis_mm = place_of(axis_tan)?;
         let mut places = [DVec2::ZERO; 2];
         for (place, step) in places.iter_mut().zip([steps.x_axis, steps.y_axis]) {
@@ -238,7 +204,7 @@ impl<'a> Geometry<'a> {
     fn source_mm(&self, place_mm: DVec2, scale: f64) -> Option<DVec2> {
         let place_mm = place_mm / scale;
         let field_tan = self.axis_tan + self.mm_per_tan.inverse() * (place_mm - self.axis_mm);
-        self.channels.place_mm(self.reference, field_tan, self.axis_mm.lerp(place_mm, 0.5))
+        self.channels.place_mm(self.reference, field_tan)
     }
 
     /// Returns the least enlargement at which every place of the picture has light from within the film.
@@ -286,8 +252,8 @@ impl<'a> Geometry<'a> {
                         return Some(at_mm);
                     }
                     let field_tan = self.channels.field_tan(self.reference, at_mm);
-                    let own = self.channels.place_mm(self.reference, field_tan, at_mm)?;
-                    Some(at_mm + self.channels.place_mm(channel, field_tan, at_mm)? - own)
+                    let own = self.channels.place_mm(self.reference, field_tan)?;
+                    Some(at_mm + self.channels.place_mm(channel, field_tan)? - own)
                 })
             })
             .collect();

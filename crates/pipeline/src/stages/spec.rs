@@ -21,9 +21,9 @@ use super::{
     given::{Given, GivenParts},
 };
 use crate::{
-    BankSpec, BlurSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec,
-    FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort,
-    SceneSource, SceneSpec, StopSpec, WavelengthSpec, WorldSpec,
+    BlurSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec, FramesSpec,
+    LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort, SceneSource, SceneSpec,
+    StopSpec, WavelengthSpec, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.
@@ -134,7 +134,6 @@ pub(crate) enum Raster {
 pub(crate) struct BankInputs {
     pub(crate) film: FilmInputs,
     pub(crate) diffraction: Diffraction,
-    pub(crate) bank: BankSpec,
 }
 
 /// The plan of the imaging.
@@ -314,7 +313,7 @@ impl IrradianceInputs {
             raster,
             crop: camera.crop,
         };
-        let bank = BankInputs { film, diffraction: camera.diffraction, bank: camera.bank };
+        let bank = BankInputs { film, diffraction: camera.diffraction };
         let micro_array = camera.light_field.as_ref().and_then(LightFieldSpec::micro_array);
         let effort = match &camera.scene.source {
             SceneSource::World(spec) => spec.backward(),

@@ -191,6 +191,10 @@ impl RadialMap {
         self.half_tan_per_mm.at(place) + place * self.half_tan_per_mm.slope(place)
     }
 
+    pub(super) fn axis_mm(&self) -> DVec2 {
+        self.axis_mm
+    }
+
     pub(super) fn about(self, axis_mm: DVec2, axis_tan: DVec2) -> Self {
         Self { axis_mm, axis_tan, ..self }
     }

@@ -1,7 +1,7 @@
 //! Point-spread functions in color, laid out over field and depth as in Figure 1.
 
 use dioptric_optics::glam::DVec2;
-use dioptric_psf::{Kernel, LensImage, LensImageModel, PsfQuery};
+use dioptric_psf::{LensImageModel, PointImage};
 use dioptric_spectrum::WavelengthGrid;
 use image::{Rgb, RgbImage, imageops};
 use ndarray::Array2;
@@ -42,9 +42,9 @@ pub struct MosaicPlan {
 }
 
 impl PsfMosaic {
-    /// Draws the mosaic from a bank.
-    pub fn draw(bank: &LensImageModel, plan: &MosaicPlan) -> Self {
-        let widest = |&dioptres: &f64| plan.tile_um.unwrap_or_else(|| widest_um(bank, plan, dioptres));
+    /// Draws the mosaic of a lens.
+    pub fn draw(model: &LensImageModel, plan: &MosaicPlan) -> Self {
+        let widest = |&dioptres: &f64| plan.tile_um.unwrap_or_else(|| widest_um(model, plan, dioptres));
         let tiles_um: Vec<f64> = plan.dioptres.iter().map(widest).collect();
         let white = vec![1.0; plan.grid.len()];
         let to_rgb = SpectrumToRgb::with_white(&plan.grid, &white);
@@ -53,9 +53,12 @@ impl PsfMosaic {
             let pitch_um = tile_um / plan.tile_px as f64;
             for &field_tan in &plan.field_tans {
                 let mut light = LinearRgb::black(plan.tile_px, plan.tile_px);
+                let image = |nm: f64| model.point(field_tan, dioptres, nm);
+                let reference = image(REFERENCE_WAVELENGTH_NM);
                 for (band, &wavelength_nm) in plan.grid.centers_nm().iter().enumerate() {
-                    let point = Point { field_tan, dioptres, wavelength_nm };
-                    light.add(&window(bank, &point, pitch_um, plan.tile_px), to_rgb.of_band(band));
+                    let Some(image) = image(wavelength_nm) else { continue };
+                    let lateral_um = lateral_color_um(&image, reference.as_ref());
+                    light.add(&window(&image, lateral_um, pitch_um, plan.tile_px), to_rgb.of_band(band));
                 }
                 tiles.push(light.to_srgb(light.level_at(1.0).max(f64::MIN_POSITIVE)));
             }
@@ -88,31 +91,15 @@ impl PsfMosaic {
     }
 }
 
-/// One point-spread function of a bank.
-#[derive(Clone, Copy)]
-struct Point {
-    field_tan: DVec2,
-    dioptres: f64,
-    wavelength_nm: f64,
-}
-
-impl Point {
-    fn kernel(&self, bank: &LensImageModel, pitch_um: f64) -> Kernel {
-        let Self { field_tan, dioptres, wavelength_nm } = *self;
-        bank.kernel(PsfQuery { field_tan, dioptres, wavelength_nm, pitch_um })
-    }
-
-    /// How far from the reference wavelength's image this one lies, µm, right and up: lateral color.
-    fn lateral_color_um(&self, bank: &LensImageModel) -> DVec2 {
-        let at = |nm: f64| bank.centroid_mm(self.field_tan, self.dioptres, nm);
-        1e3 * (at(self.wavelength_nm) - at(REFERENCE_WAVELENGTH_NM))
-    }
+/// How far from the reference wavelength's image one lies, µm, right and up: lateral color.
+fn lateral_color_um(image: &PointImage, reference: Option<&PointImage>) -> DVec2 {
+    reference.map_or(DVec2::ZERO, |reference| 1e3 * (image.centroid_mm() - reference.centroid_mm()))
 }
 
 /// Returns a point-spread function in a window that is centered on the image of the reference wavelength.
-fn window(bank: &LensImageModel, point: &Point, pitch_um: f64, size: usize) -> Array2<f32> {
-    let kernel = point.kernel(bank, pitch_um).samples;
-    let shift = (point.lateral_color_um(bank) / pitch_um).round();
+fn window(image: &PointImage, lateral_um: DVec2, pitch_um: f64, size: usize) -> Array2<f32> {
+    let kernel = image.kernel(pitch_um).0.samples;
+    let shift = (lateral_um / pitch_um).round();
     let (right, up) = (shift.x as isize, shift.y as isize);
     let (rows, columns) = kernel.dim();
     let offset = |n: usize| n as isize / 2 - size as isize / 2;
@@ -123,14 +110,14 @@ fn window(bank: &LensImageModel, point: &Point, pitch_um: f64, size: usize) -> A
 }
 
 /// Returns the side of a tile that holds all but the tails of every point-spread function of a depth, µm.
-fn widest_um(bank: &LensImageModel, plan: &MosaicPlan, dioptres: f64) -> f64 {
+fn widest_um(model: &LensImageModel, plan: &MosaicPlan, dioptres: f64) -> f64 {
     let (first, last) = plan.grid.range_nm();
     let mut reach_um: f64 = 5.0;
     for &field_tan in &plan.field_tans {
-        for wavelength_nm in [first, last] {
-            let point = Point { field_tan, dioptres, wavelength_nm };
-            let blur_um = 1e3 * bank.spread_mm(field_tan, dioptres, wavelength_nm);
-            reach_um = reach_um.max(blur_um + point.lateral_color_um(bank).length());
+        let reference = model.point(field_tan, dioptres, REFERENCE_WAVELENGTH_NM);
+        for image in [first, last].into_iter().filter_map(|nm| model.point(field_tan, dioptres, nm)) {
+            let lateral_um = lateral_color_um(&image, reference.as_ref()).length();
+            reach_um = reach_um.max(1e3 * image.spread_mm() + lateral_um);
         }
     }
     2.6 * reach_um
@@ -140,13 +127,13 @@ fn widest_um(bank: &LensImageModel, plan: &MosaicPlan, dioptres: f64) -> f64 {
 mod tests {
     use super::*;
     use dioptric_optics::Lens;
-    use dioptric_psf::{BankSettings, Diffraction};
+    use dioptric_psf::{Diffraction, ImageSettings};
 
     #[test]
     fn a_mosaic_has_a_tile_a_field_and_depth() {
         let lens = Lens::built_in("paper-2el").unwrap().with_stop_diameter_mm(4.0).unwrap();
-        let settings = BankSettings::covering(51.8145, 0.06, (0.0625, 0.5), (400.0, 700.0), Diffraction::None);
-        let bank = LensImageModel::build(&lens, &settings).unwrap();
+        let settings = ImageSettings::new(51.8145, Diffraction::None);
+        let model = LensImageModel::new(&lens, &[400.0, 700.0], &settings).unwrap();
         let plan = MosaicPlan {
             field_tans: vec![DVec2::ZERO, DVec2::new(0.05, 0.0)],
             dioptres: vec![0.0625, 0.25, 0.5],
@@ -154,7 +141,7 @@ mod tests {
             tile_px: 31,
             tile_um: None,
         };
-        let mosaic = PsfMosaic::draw(&bank, &plan);
+        let mosaic = PsfMosaic::draw(&model, &plan);
         let picture = mosaic.to_picture(2);
         assert_eq!((picture.width(), picture.height()), (2 * 65 + 3, 3 * 65 + 3));
         // Nothing is bright at the rim of a tile; its middle is.

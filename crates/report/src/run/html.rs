@@ -3,7 +3,6 @@
 use std::fmt::Write;
 
 use dioptric_analysis::{LineChart, PixelPlace, Run, RunCharts, RunPlaces, RunReport, RunTimes};
-use dioptric_pipeline::BankData;
 use dioptric_sensor::WhiteBalance;
 
 use crate::{PsfMosaic, chart_svg, panel::escaped};
@@ -161,13 +160,11 @@ fn spreads(page: &Page<'_>, (mosaic, src): &(PsfMosaic, String)) -> String {
         let _ = write!(html, "<div>{field_deg:.1}°</div>");
     }
     html.push_str("</div>\n</div>\n");
-    let sampling = page.report.psf_bank.as_ref().map(BankData::summary);
-    let sampling = sampling.map_or(String::new(), |words| format!(" Sampling: {}.", escaped(&words)));
     html += &note(&format!(
         "A white point of equal energy, as an observer sees its image. Depths are at the left, with the width of the \
          tiles of that row on the film (a pixel is {:.1} µm), fields below. Each tile is exposed for its own brightest \
          spot, and is centered on the light of {:.0} nm, so that lateral color shows. The center of the picture lies \
-         to the left.{sampling}",
+         to the left.",
         page.report.film.pitch_um, page.report.lens.first_order.wavelength_nm
     ));
     html + &pair([&page.charts.lsf, &page.charts.mtf])

@@ -2,7 +2,7 @@
 
 use dioptric_optics::glam::DVec2;
 use dioptric_pipeline::display::SpectrumToRgb;
-use dioptric_psf::{LensImage, Picture, PsfQuery};
+use dioptric_psf::{LensImage, Picture, PointImage};
 use dioptric_spectrum::WavelengthGrid;
 use ndarray::Array2;
 
@@ -84,35 +84,22 @@ impl Product {
         0.5e-3 * place.pitch_um * columns.hypot(rows)
     }
 
-    /// Returns the field that is seen at a place, tangents, for something at a depth.
-    fn field_tan(&self, share: [f64; 2], dioptres: f64) -> Option<DVec2> {
-        let place_mm = self.place_mm(share);
+    /// Returns the field that is seen at a place of the film, tangents.
+    fn field_tan(&self, place_mm: DVec2) -> Option<DVec2> {
         let reference_nm = self.model.settings().reference_wavelength_nm;
-        let (first_nm, last_nm) = self.model.wavelengths_nm();
-        let map = self.model.film_map(dioptres, reference_nm.clamp(first_nm, last_nm), 1.05 * place_mm.length() + 0.1);
-        map.at(place_mm).map(|(tan, _)| tan)
+        let map = self.model.film_map(reference_nm, place_mm.length().max(self.film_corner_mm()));
+        map.field_tan(place_mm).filter(|_| map.irradiance_sr(place_mm) > 0.0)
     }
 
     /// Returns the tangent of the field that is seen so far off the axis of the film.
     pub(crate) fn field_at_radius(&self, radius_mm: f64) -> Option<f64> {
-        let (far, near) = self.model.dioptres();
-        let reference_nm = self.model.settings().reference_wavelength_nm;
-        let (first_nm, last_nm) = self.model.wavelengths_nm();
-        let wavelength_nm = reference_nm.clamp(first_nm, last_nm);
-        let map = self.model.film_map(0.5 * (far + near), wavelength_nm, 1.05 * radius_mm);
-        map.at(DVec2::new(radius_mm, 0.0)).map(|(tan, _)| tan.length())
+        self.field_tan(DVec2::new(radius_mm, 0.0)).map(DVec2::length)
     }
 
-    /// Returns the field and the depth in metres of what is seen at a place, by going from one to the other until they agree.
+    /// Returns the field and the depth in metres of what is seen at a place.
     fn seen(&self, share: [f64; 2]) -> Option<(DVec2, Option<f64>)> {
-        let (far, near) = self.model.dioptres();
-        let mut tan = self.field_tan(share, 0.5 * (far + near))?;
-        let mut depth_m = self.depth_at(tan);
-        if let Some(found_m) = depth_m {
-            tan = self.field_tan(share, (1.0 / found_m).clamp(far, near))?;
-            depth_m = self.depth_at(tan);
-        }
-        Some((tan, depth_m))
+        let tan = self.field_tan(self.place_mm(share))?;
+        Some((tan, self.depth_at(tan)))
     }
 
     /// Returns the depth of the scene in a field, m.
@@ -170,25 +157,27 @@ impl Product {
     /// Returns the point spread function of what is seen at a place.
     pub fn spread(&self, share: [f64; 2]) -> Option<Spread> {
         let (tan, depth_m) = self.seen(share)?;
-        let (far, near) = self.model.dioptres();
-        let dioptres = depth_m.map_or(0.5 * (far + near), |depth_m| 1.0 / depth_m).clamp(far, near);
-        let (first_nm, last_nm) = self.model.wavelengths_nm();
+        let scene = &self.capture.scene;
+        let dioptres = depth_m.map_or(0.5 * (1.0 / scene.far_m + 1.0 / scene.near_m), |depth_m| 1.0 / depth_m);
+        let (first_nm, last_nm) = self.capture.grid().range_nm();
         let wavelengths_nm: Vec<f64> =
             (0..5).map(|i| first_nm + (last_nm - first_nm) * (f64::from(i) + 0.5) / 5.0).collect();
-        let widest_mm = wavelengths_nm.iter().map(|&nm| self.model.spread_mm(tan, dioptres, nm)).fold(0.0, f64::max);
+        let images: Vec<Option<PointImage>> =
+            wavelengths_nm.iter().map(|&nm| self.model.point(tan, dioptres, nm)).collect();
+        let widest_mm = images.iter().flatten().map(PointImage::spread_mm).fold(0.0, f64::max);
         // Where there is hardly any blur, Airy's disc fills the window.
         let airy_mm = 1.22e-6 * last_nm * self.capture.lens.reference.first_order().f_number.abs().clamp(1.0, 200.0);
         let pitch_um = 1e3 * (widest_mm + airy_mm) / (FILLED * SIDE as f64);
         let grid = WavelengthGrid::new(wavelengths_nm.clone()).ok()?;
         let to_rgb = SpectrumToRgb::with_white(&grid, &vec![1.0; grid.len()]);
-        let middle_um = 1e3 * self.model.centroid_mm(tan, dioptres, wavelengths_nm[2]);
+        let middle_um = 1e3 * images[2].as_ref()?.centroid_mm();
         let mut rgb = vec![[0.0_f32; 3]; SIDE * SIDE];
         let mut energy = Array2::<f64>::zeros((SIDE, SIDE));
-        for (band, &nm) in wavelengths_nm.iter().enumerate() {
-            let query = PsfQuery::new(tan, dioptres, nm, pitch_um);
-            let Some((picture, _)) = self.model.picture(query, SIDE) else { continue };
+        for (band, image) in images.iter().enumerate() {
+            let Some(image) = image else { continue };
+            let (picture, _) = image.picture(pitch_um, SIDE);
             // Lateral color moves the wavelengths against each other.
-            let moved = (1e3 * self.model.centroid_mm(tan, dioptres, nm) - middle_um) / pitch_um;
+            let moved = (1e3 * image.centroid_mm() - middle_um) / pitch_um;
             let moved = [moved.x.round() as isize, -moved.y.round() as isize];
             let weights = to_rgb.of_band(band);
             for ((row, column), &e) in picture.indexed_iter() {

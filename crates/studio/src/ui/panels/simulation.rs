@@ -1,6 +1,6 @@
 //! How the picture is computed: diffraction, blur, sampling, bands; and what is written of it.
 
-use dioptric_pipeline::{BankSpec, BlurSpec, Camera, Diffraction, ExrSamples, FrameFile, Outputs, WavelengthSpec};
+use dioptric_pipeline::{BlurSpec, Camera, Diffraction, ExrSamples, FrameFile, Outputs, WavelengthSpec};
 use egui::Ui;
 
 use super::{
@@ -37,16 +37,6 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
         if desk.product.is_some_and(|product| product.rung < Rung::Full) {
             ui.weak("The picture shown has layers in place of views; the full one has them.");
         }
-    }
-    let banks = [
-        (BankSpec::Standard, "standard"),
-        (BankSpec::Within { error: 0.02 }, "within an error"),
-        (BankSpec::Paper, "the paper's"),
-    ];
-    variant(ui, "sampling", "How the point spread functions are sampled", &mut camera.bank, &banks);
-    if let BankSpec::Within { error } = &mut camera.bank {
-        let words = "What nine tenths of the places between samples may be wrong by, as a share of the energy";
-        NumberField::by_factors("error", "", 1e-4..=1.0, 0.002..=0.2, words).show(ui, error);
     }
     bands(ui, &mut camera.wavelengths);
     desk.tell(ui, Field::Simulation, camera);
