@@ -39,16 +39,22 @@ impl Covered {
     /// Lays a layer that covers a fraction of the pixel behind, and returns how much of its light is seen.
     #[inline(always)]
     fn takes(&mut self, alpha: f32, layer: u16) -> f32 {
-        if alpha <= LEAST_OF_LAYER {
-            return self.open();
+        let is_behind = layer > self.layer + 1;
+        if is_behind && alpha <= LEAST_OF_LAYER {
+            // Too little to begin a surface: a small lamp.
+            let open = self.open();
+            self.surface += (1.0 - self.surface) * alpha.max(0.0);
+            return open;
         }
-        if layer > self.layer + 1 {
+        if is_behind {
             *self = Self { open: self.open(), surface: 0.0, layer };
         }
-        self.layer = layer;
-        let taken = alpha.min(1.0 - self.surface);
+        if alpha > LEAST_OF_LAYER {
+            self.layer = layer;
+        }
+        let taken = alpha.clamp(0.0, 1.0 - self.surface);
         self.surface += taken;
-        self.open * (taken / alpha)
+        self.open * if taken < alpha { taken / alpha } else { 1.0 }
     }
 
     /// What nothing covers.

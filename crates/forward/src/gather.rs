@@ -116,6 +116,15 @@ struct Source {
     samples: Vec<f32>,
 }
 
+impl Source {
+    /// A power of two about as large as the largest sample: in its units what is transformed together has rounding errors of one size.
+    fn scale(&self) -> f32 {
+        let largest = self.samples.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        // The exponent alone.
+        f32::from_bits(largest.to_bits() & 0x7f80_0000)
+    }
+}
+
 /// A tile to be gathered.
 struct Member {
     mirror: Mirror,
@@ -458,10 +467,11 @@ fn by_transforms(
             let lines = &mut lines[..n_rows * columns];
             lines.fill(zero);
             for (part, (_, source)) in pair.iter().enumerate() {
+                let unit = 1.0 / source.scale();
                 for (line, samples) in lines.chunks_exact_mut(columns).zip(source.samples.chunks_exact(source.size.1)) {
                     match part {
-                        0 => line.iter_mut().zip(samples).for_each(|(value, sample)| value.re = *sample),
-                        _ => line.iter_mut().zip(samples).for_each(|(value, sample)| value.im = *sample),
+                        0 => line.iter_mut().zip(samples).for_each(|(value, sample)| value.re = unit * sample),
+                        _ => line.iter_mut().zip(samples).for_each(|(value, sample)| value.im = unit * sample),
                     }
                 }
             }
@@ -474,8 +484,9 @@ fn by_transforms(
                 fft.inverse_pair(&mut product, lines);
                 // Where a kernel reaches beyond the source transforms are of something else: the rest is what is gathered.
                 let (top, left) = (kernels.at.rows - 1, kernels.at.columns - 1);
-                for (part, ((number, _), sums)) in pair.iter().zip(&mut sums).enumerate() {
+                for (part, ((number, source), sums)) in pair.iter().zip(&mut sums).enumerate() {
                     let Member { out_size, down, across, .. } = &members[*number];
+                    let scale = scale * source.scale();
                     for (row, (sums, v)) in sums.chunks_exact_mut(out_size.1).zip(down).enumerate() {
                         let line = lines[(top + stride * row) * columns + left..].iter().step_by(stride);
                         for ((sum, value), u) in sums.iter_mut().zip(line).zip(across) {

@@ -295,7 +295,7 @@ impl Imaging {
             for (i, sample) in line.iter_mut().enumerate() {
                 let is_beyond =
                     is_masked && !self.raster.is_within(self.raster.position_of(seen.tan_x[i], seen.tan_y[i]));
-                let gain = seen.irradiance_per_radiance[i];
+                let gain = seen.irradiance_sr[i];
                 *sample *= if is_beyond || gain.is_nan() { 0.0 } else { gain as f32 };
             }
         });

@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn points_are_found_among_samples() {
         let view = View { focal_px: 100.0, center_x_px: 4.5, center_y_px: 2.0 };
-        let map = FilmMap::radial(1.0, |r| r * (1.0 + 0.1 * r * r), |_| 1.0);
+        let map = FilmMap::radial(1.0, |r| Some(r * (1.0 + 0.1 * r * r)), |_| 1.0);
         for border in [Border::Hold, Border::Mirror, Border::Black] {
             let scene = SceneRaster { view, rows: 5, columns: 10, border };
             let mut places = Places::default();

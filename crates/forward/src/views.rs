@@ -140,7 +140,7 @@ where
 
     fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap> {
         let map = self.lens.film_map(wavelength_nm, reach_mm + self.center_mm.length());
-        Arc::new(map.counted_from(self.center_mm))
+        Arc::new(FilmMap::clone(&map).counted_from(self.center_mm))
     }
 
     fn kernel(&self, query: FilmQuery) -> Kernel {
