@@ -84,8 +84,6 @@ class Camera:
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
         blur: str | None = ...,
-        bank: Literal["standard", "paper"] | None = ...,
-        bank_error: float | None = ...,
         scene: Scene | _Path | None = ...,
         fov_deg: float | None = ...,
         depth_m: float | None = ...,
