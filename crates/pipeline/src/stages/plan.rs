@@ -23,11 +23,13 @@ pub(super) fn plan(
         (BlurSpec::Layered | BlurSpec::Views(_), _) => BlurMode::Layered,
         (BlurSpec::Pointwise, _) => BlurMode::Pointwise,
     };
+    let border = inputs.border.into();
     let settings = match quality {
-        Quality::Full | Quality::Draft => Settings { mode, ..Settings::default() },
+        Quality::Full | Quality::Draft => Settings { mode, border, ..Settings::default() },
         // The pixels are several of the full film's: what a step costs is a part of what the pixels cost.
         Quality::Preview | Quality::Sketch => Settings {
             mode,
+            border,
             layer_step_px: 4.0,
             chromatic_step_px: 4.0,
             max_edge_error: 0.03,

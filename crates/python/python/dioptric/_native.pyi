@@ -84,6 +84,7 @@ class Camera:
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
         blur: str | None = ...,
+        border: str | None = ...,
         bank: Literal["standard", "paper"] | None = ...,
         bank_error: float | None = ...,
         scene: Scene | _Path | None = ...,
