@@ -7,7 +7,7 @@ use dioptric_scene::View;
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, s};
 
-use crate::{Border, BlurMode, DiscLens, Film, ForwardError, OccludedLayer, Settings, Source, render};
+use crate::{BlurMode, Border, DiscLens, Film, ForwardError, OccludedLayer, Settings, Source, render};
 
 /// Smooth noise between 0 and 1, half mixed with a checkerboard of squares of this size.
 fn texture(rows: usize, columns: usize, square: usize, seed: u32) -> Array2<f32> {
@@ -317,8 +317,7 @@ fn one_kernel_convolves_as_the_sum_does_and_keeps_energy() {
         for mode in [BlurMode::Layered, BlurMode::Pointwise] {
             let settings = Settings { mode, ..Settings::default() };
             let picture = rendered(&scene.source(), &lens(), &scene.film, &settings).remove(0);
-            let expected =
-                convolved(&plane, &lens().kernel(query(glam::DVec2::ZERO, 20.0 + blur)).samples);
+            let expected = convolved(&plane, &lens().kernel(query(glam::DVec2::ZERO, 20.0 + blur)).samples);
             for (a, b) in picture.iter().zip(&expected) {
                 assert!((f64::from(*a) - b).abs() <= 1e-5, "blur {blur}: {a} {b}");
             }

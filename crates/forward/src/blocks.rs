@@ -55,7 +55,9 @@ impl Blocks {
         let row = |row: usize| -> Result<Vec<Block>, Cancelled> {
             cancel.check()?;
             let top = (row as i64 - down) * BLOCK;
-            Ok((0..size.1).map(|column| block((top, (column as i64 - across) * BLOCK), &pixels, scene, (maps, surfaces))).collect())
+            Ok((0..size.1)
+                .map(|column| block((top, (column as i64 - across) * BLOCK), &pixels, scene, (maps, surfaces)))
+                .collect())
         };
         let blocks: Vec<Vec<Block>> = (0..size.0).into_par_iter().map(row).collect::<Result<_, Cancelled>>()?;
         let blocks = Array2::from_shape_vec(size, blocks.concat()).expect("as many as there are");
@@ -68,13 +70,15 @@ impl Blocks {
 
     /// Whether a layer has anything in a rectangle of the film, given by its sides in pixels from the middle; beyond the blocks nothing is known.
     pub(crate) fn has(&self, layer: usize, down_px: Range<f64>, across_px: Range<f64>) -> bool {
-        let blocks = |px: Range<f64>| (px.start.floor() as i64).div_euclid(BLOCK)..=(px.end.ceil() as i64).div_euclid(BLOCK);
+        let blocks =
+            |px: Range<f64>| (px.start.floor() as i64).div_euclid(BLOCK)..=(px.end.ceil() as i64).div_euclid(BLOCK);
         blocks(down_px).any(|row| blocks(across_px.clone()).any(|column| self.may_have(layer, (row, column), 0)))
     }
 
     /// The most samples of the scene along a side of a pixel in such a rectangle.
     pub(crate) fn most_density(&self, down_px: Range<f64>, across_px: Range<f64>) -> usize {
-        let blocks = |px: Range<f64>| (px.start.floor() as i64).div_euclid(BLOCK)..=(px.end.ceil() as i64).div_euclid(BLOCK);
+        let blocks =
+            |px: Range<f64>| (px.start.floor() as i64).div_euclid(BLOCK)..=(px.end.ceil() as i64).div_euclid(BLOCK);
         let density = |at: (i64, i64)| self.at(at).density.into_iter().max().unwrap_or(1);
         let all = blocks(down_px).flat_map(|row| blocks(across_px.clone()).map(move |column| (row, column)));
         usize::from(all.map(density).max().unwrap_or(1))
@@ -99,7 +103,8 @@ impl Blocks {
         while column < columns.end {
             let block = block_of(raster.across_px(column));
             // The first sample in the next block.
-            let next = (raster.column_before((block + 1) as f64 * BLOCK as f64 - 1e-9) + 1).max(column + 1).min(columns.end);
+            let next =
+                (raster.column_before((block + 1) as f64 * BLOCK as f64 - 1e-9) + 1).max(column + 1).min(columns.end);
             let may_have = self.may_have(layer, (block_row, block), margin);
             let here = self.points((block_row, block), raster.level);
             match start < columns.end {
@@ -122,7 +127,8 @@ impl Blocks {
 
     fn at(&self, (row, column): (i64, i64)) -> Block {
         let clamped = |at: i64, first: i64, n: usize| (at - first).clamp(0, n as i64 - 1) as usize;
-        self.blocks[(clamped(row, self.first.0, self.blocks.nrows()), clamped(column, self.first.1, self.blocks.ncols()))]
+        self.blocks
+            [(clamped(row, self.first.0, self.blocks.nrows()), clamped(column, self.first.1, self.blocks.ncols()))]
     }
 
     fn may_have(&self, layer: usize, (row, column): (i64, i64), margin: i64) -> bool {
@@ -130,7 +136,9 @@ impl Blocks {
             let index = (usize::try_from(row - self.first.0), usize::try_from(column - self.first.1));
             let (Ok(row), Ok(column)) = index else { return true };
             let block = self.blocks.get((row, column));
-            block.is_none_or(|Block { layers: (first, last), .. }| (usize::from(*first)..=usize::from(*last)).contains(&layer))
+            block.is_none_or(|Block { layers: (first, last), .. }| {
+                (usize::from(*first)..=usize::from(*last)).contains(&layer)
+            })
         };
         (row - margin..=row + margin).any(|row| (column - margin..=column + margin).any(|column| is_in(row, column)))
     }
@@ -160,7 +168,8 @@ fn block(
             );
             map.field_tan(place).map(|tan| scene.position_of(tan.x, tan.y))
         };
-        let grid: Vec<Option<[f64; 2]>> = PARTS.iter().flat_map(|down| PARTS.map(|across| looks(*down, across))).collect();
+        let grid: Vec<Option<[f64; 2]>> =
+            PARTS.iter().flat_map(|down| PARTS.map(|across| looks(*down, across))).collect();
         for [row, column] in grid.iter().flatten().copied() {
             (low, high) = ([low[0].min(row), low[1].min(column)], [high[0].max(row), high[1].max(column)]);
         }

@@ -44,7 +44,10 @@ impl Plans {
     }
 
     fn scratch_len(&self) -> usize {
-        self.real_forward.get_scratch_len().max(self.forward.get_inplace_scratch_len()).max(self.inverse.get_inplace_scratch_len())
+        self.real_forward
+            .get_scratch_len()
+            .max(self.forward.get_inplace_scratch_len())
+            .max(self.inverse.get_inplace_scratch_len())
     }
 }
 

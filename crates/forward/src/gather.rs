@@ -208,11 +208,7 @@ impl GatherTask<'_> {
         let out = out_samples(&pixels, &film_pixels, raster);
         // Samples from the first to the last one that is gathered at, and all that the kernel reaches from there.
         let window = mirror.window_at_node(kernel);
-        let reach = Rectangle {
-            rows: stride * (out.rows - 1) + 1,
-            columns: stride * (out.columns - 1) + 1,
-            ..out
-        };
+        let reach = Rectangle { rows: stride * (out.rows - 1) + 1, columns: stride * (out.columns - 1) + 1, ..out };
         let from = reach.seen_through(&window);
         let is_there = ideal.is_none_or(|ideal| ideal.has_any(&from));
         if !is_there {
@@ -250,9 +246,12 @@ impl GatherTask<'_> {
                 (below, (place - below as f64) as f32)
             };
             let step_px = raster.level.step_px();
-            let row = |row: usize| (film_pixels.down_px(pixels.first_row + row as i64) - raster.down_px(out.first_row)) / step_px;
+            let row = |row: usize| {
+                (film_pixels.down_px(pixels.first_row + row as i64) - raster.down_px(out.first_row)) / step_px
+            };
             let column = |column: usize| {
-                (film_pixels.across_px(pixels.first_column + column as i64) - raster.across_px(out.first_column)) / step_px
+                (film_pixels.across_px(pixels.first_column + column as i64) - raster.across_px(out.first_column))
+                    / step_px
             };
             [
                 (0..pixels.rows).map(|i| split(row(i), out.rows)).collect(),
@@ -262,7 +261,8 @@ impl GatherTask<'_> {
         // Positions of what is gathered from the middle of the canonical tile.
         let step = stride as i64;
         let down_px = (0..out.rows as i64).map(|row| raster.down_px(out.first_row + step * row) + film_shift(raster));
-        let across_px = (0..out.columns as i64).map(|column| raster.across_px(out.first_column + step * column) + film_shift(raster));
+        let across_px = (0..out.columns as i64)
+            .map(|column| raster.across_px(out.first_column + step * column) + film_shift(raster));
         let (down_px, across_px) = mirror.positions(down_px.collect(), across_px.collect());
         let side = f64::from(canonical.size);
         let from_middle = |positions: Vec<f64>, start: i32| -> Vec<f32> {
@@ -348,7 +348,8 @@ fn convolve(
 ) -> Result<Vec<Vec<f32>>, Cancelled> {
     let largest = |of: fn(&Source) -> usize| sources.iter().map(|(_, source)| of(source)).max().unwrap_or(1);
     let size = (fast_size(largest(|source| source.size.0)), fast_size(largest(|source| source.size.1)));
-    let n_out: usize = sources.iter().map(|(number, _)| members[*number].out_size.0 * members[*number].out_size.1).sum();
+    let n_out: usize =
+        sources.iter().map(|(number, _)| members[*number].out_size.0 * members[*number].out_size.1).sum();
     if is_better_direct(kernels, n_out, sources.len(), size) {
         let sum = |(number, source): &(usize, &Source)| {
             cancel.check()?;

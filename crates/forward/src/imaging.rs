@@ -92,7 +92,8 @@ impl Imaging {
         let rule = Rule { lens: layered, settings, blocks: &blocks, middle_nm, wavelengths_nm: &wavelengths_nm };
         let tiling = Tiling::new(&rule, work)?;
         let looked_up = few_of(&scene.kernel_bands).map(|band| (band, grid.centers_nm()[band]));
-        let halos = Halos::of((lens, layers), (film, settings.widest_blur_px), &looked_up.collect::<Vec<_>>(), grid.len());
+        let halos =
+            Halos::of((lens, layers), (film, settings.widest_blur_px), &looked_up.collect::<Vec<_>>(), grid.len());
         let kept = Mutex::new(Kept { budget_bytes: KEPT_BUDGET_BYTES, ..Kept::default() });
         let mut imaging = Self {
             scene,
@@ -227,8 +228,7 @@ impl Imaging {
             surfaces.push(surface(radiance.as_slice().unwrap_or_default(), coordinates));
         }
         let with_alpha = self.scene.hides;
-        let sampler =
-            Sampler { scene: self.raster, map: &map, blocks: &self.blocks, surfaces: &surfaces, with_alpha };
+        let sampler = Sampler { scene: self.raster, map: &map, blocks: &self.blocks, surfaces: &surfaces, with_alpha };
         let Film { rows, columns, .. } = self.spec.film;
         let mut picture = Composite::new((rows, columns), with_alpha);
         for (layer, tiles) in self.tiling.layers.iter().enumerate() {
@@ -260,7 +260,8 @@ impl Imaging {
             }
             let raster = Raster::new(&self.spec.film, level);
             let Some(at) = self.seen_by(task, &groups, &raster) else { continue };
-            let ideal = self.stopwatch.time(Part::Sampling, || task.sampler.sample(&raster, at, task.layer, task.cancel))?;
+            let ideal =
+                self.stopwatch.time(Part::Sampling, || task.sampler.sample(&raster, at, task.layer, task.cancel))?;
             gathered.extend(gather(task, &groups, Some(&ideal))?);
         }
         self.stopwatch.time(Part::Compositing, || {

@@ -45,8 +45,7 @@ impl MixedSamples {
     pub(crate) fn find(distances: &Distances, layers: &Layers, cancel: &Cancel) -> Result<Self, Cancelled> {
         let (front, jump) = (&distances.front, DEPTH_EDGE_PX);
         // What is in focus keeps its outline, mixtures and all: pixels of a sharp picture show both sides too.
-        let is_sharp =
-            |at: (usize, usize)| layers.radius_px_at(layers.coordinate_of_distance(front[at])) <= SHARP_PX;
+        let is_sharp = |at: (usize, usize)| layers.radius_px_at(layers.coordinate_of_distance(front[at])) <= SHARP_PX;
         let (rows, columns) = front.dim();
         let near = |row: usize, column: usize, by: usize| {
             let lines = row.saturating_sub(by)..(row + by + 1).min(rows);
@@ -182,7 +181,8 @@ mod tests {
         // Known behind the near side, in the upper half.
         let behind = Array2::from_shape_fn((12, 20), |(row, column)| if row < 6 && column < 9 { 10.0 } else { 0.0 });
         let distances = Distances { front, behind: Some(behind) };
-        let unmixed = MixedSamples::find(&distances, &out_of_focus(), &Cancel::new()).unwrap().unmixed(&plane).into_owned();
+        let unmixed =
+            MixedSamples::find(&distances, &out_of_focus(), &Cancel::new()).unwrap().unmixed(&plane).into_owned();
         for (row, value) in unmixed.column(9).iter().enumerate() {
             // The row beside the known half has known neighbors.
             assert_eq!(*value == plane[(row, 9)], row < 7, "{row}: {value}");

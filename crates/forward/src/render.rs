@@ -3,7 +3,11 @@
 use dioptric_psf::LensImage;
 use dioptric_spectrum::Cancel;
 
-use crate::{Film, ForwardError, ImagingSpec, Settings, Sink, Source, views::{Framed, Views}, work::Watch};
+use crate::{
+    Film, ForwardError, ImagingSpec, Settings, Sink, Source,
+    views::{Framed, Views},
+    work::Watch,
+};
 
 /// Images a source through a lens: hands the irradiance on the film, W m⁻² nm⁻¹, to `sink` band by band.
 ///

@@ -61,11 +61,14 @@ impl Sampler<'_> {
             self.row(raster, (at.first_row + row as i64, at.first_column), layer, places, (light, alpha))
         };
         if self.with_alpha {
-            lines.zip(alpha.par_chunks_mut(at.columns)).try_for_each_init(Places::default, |places, ((row, (light, lit)), alpha)| {
-                cancel.check()?;
-                *lit = fill(places, row, light, alpha);
-                Ok(())
-            })?;
+            lines.zip(alpha.par_chunks_mut(at.columns)).try_for_each_init(
+                Places::default,
+                |places, ((row, (light, lit)), alpha)| {
+                    cancel.check()?;
+                    *lit = fill(places, row, light, alpha);
+                    Ok(())
+                },
+            )?;
         } else {
             lines.try_for_each_init(Places::default, |places, (row, (light, lit))| {
                 cancel.check()?;
@@ -94,7 +97,8 @@ impl Sampler<'_> {
             }
             start = run.end;
             let within = (run.start - first_column) as usize..(run.end - first_column) as usize;
-            let (light, mut alpha) = (&mut light[within.clone()], if alpha.is_empty() { &mut [][..] } else { &mut alpha[within.clone()] });
+            let (light, mut alpha) =
+                (&mut light[within.clone()], if alpha.is_empty() { &mut [][..] } else { &mut alpha[within.clone()] });
             let step_mm = (raster.x_mm(1.0) - raster.x_mm(0.0)) / n_across as f64;
             let first_mm = raster.x_mm(run.start as f64 - 0.5) + 0.5 * step_mm;
             let mut has_any = false;
@@ -123,7 +127,8 @@ impl Sampler<'_> {
                     continue;
                 }
                 has_any = true;
-                let corners = [first as usize, first as usize + beside, first as usize + below, first as usize + below + beside];
+                let corners =
+                    [first as usize, first as usize + beside, first as usize + below, first as usize + below + beside];
                 let [a, b, c, d] = corners.map(|corner| surface.radiance[corner]);
                 let (down, across) = (places.down[k], places.across[k]);
                 let (upper, lower) = (a + (b - a) * across, c + (d - c) * across);
@@ -145,7 +150,8 @@ impl Sampler<'_> {
                     continue;
                 }
                 let coordinates = surface.coordinates.samples();
-                let weights: [f32; 4] = std::array::from_fn(|i| shares[i] * tent(coordinates[corners[i]], layer as f32));
+                let weights: [f32; 4] =
+                    std::array::from_fn(|i| shares[i] * tent(coordinates[corners[i]], layer as f32));
                 let weight = weights[0] + weights[1] + weights[2] + weights[3];
                 if weight <= 0.0 {
                     continue;

@@ -37,7 +37,11 @@ impl Tile {
 
     pub(crate) fn quarters(&self) -> [Self; 4] {
         let size = self.size / 2;
-        [(0, 0), (size, 0), (0, size), (size, size)].map(|(x, y)| Self { right: self.right + x, down: self.down + y, size })
+        [(0, 0), (size, 0), (0, size), (size, size)].map(|(x, y)| Self {
+            right: self.right + x,
+            down: self.down + y,
+            size,
+        })
     }
 
     /// Returns the mirror image of the tile among those that mirror each other whose kernels are computed, and what takes this one to it.

@@ -173,11 +173,19 @@ impl Rule<'_> {
                 Ok((*node, self.lens.kernel(layer, *node, self.middle_nm)))
             };
             known.extend(missing.par_iter().map(kernel).collect::<Result<_, Cancelled>>()?);
-            let is_coarse: Vec<bool> =
-                groups.par_iter().map(|group| group.can_be_cut && self.error(&known, group) > self.settings.max_edge_error).collect();
+            let is_coarse: Vec<bool> = groups
+                .par_iter()
+                .map(|group| group.can_be_cut && self.error(&known, group) > self.settings.max_edge_error)
+                .collect();
             for (group, is_coarse) in groups.into_iter().zip(is_coarse) {
                 if is_coarse {
-                    tiles.extend(group.members.iter().flat_map(|(tile, _)| tile.quarters()).filter(|tile| tile.pixels(film).is_some()));
+                    tiles.extend(
+                        group
+                            .members
+                            .iter()
+                            .flat_map(|(tile, _)| tile.quarters())
+                            .filter(|tile| tile.pixels(film).is_some()),
+                    );
                 } else {
                     self.take(layer, group, symmetry, &mut made);
                 }

@@ -160,17 +160,18 @@ fn window_off_the_axis_is_lit() {
     let mono = lens.at(NM).unwrap();
     let model = model(&lens, film_distance_mm, Diffraction::None);
     let map = model.film_map(NM, 40.0);
-    let mut n_lit = 0;
+    let (mut n_lit, mut light) = (0, DVec2::ZERO);
     let brightest = (-40..40).map(|y| map.irradiance_sr(DVec2::Y * f64::from(y))).fold(0.0, f64::max);
     for y in -40..40 {
         let place_mm = DVec2::new(2.3, f64::from(y));
         let counted = Counted::at(&mono, film_distance_mm, place_mm, 200).irradiance_sr;
         let off = (map.irradiance_sr(place_mm) - counted) / brightest;
         // Points of the grid lie 2 mm apart, over which the light of the window comes and goes.
-        assert!(off.abs() < 0.08, "{place_mm}: {} {counted}", map.irradiance_sr(place_mm));
+        assert!(off.abs() < 0.2, "{place_mm}: {} {counted}", map.irradiance_sr(place_mm));
+        light += DVec2::new(map.irradiance_sr(place_mm), counted);
         n_lit += usize::from(counted > 0.0);
     }
-    assert!(n_lit > 3, "{n_lit}");
+    assert!(n_lit > 3 && (light.x / light.y - 1.0).abs() < 0.02, "{n_lit} {light}");
 }
 
 /// Beyond 90° there are no tangents, but light and kernels.

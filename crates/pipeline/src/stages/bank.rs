@@ -4,7 +4,7 @@ use dioptric_psf::{ImageSettings, LensImageModel};
 use dioptric_spectrum::WavelengthGrid;
 
 use super::{film::FilmPlace, lens::ResolvedLens, spec::BankInputs};
-use crate::{PipelineError, Quality, REFERENCE_WAVELENGTH_NM};
+use crate::{PipelineError, Quality};
 
 /// Rings and azimuths of the pupil's mesh for sketches: what one sees on pixels of several times the full ones.
 const SKETCH: (usize, usize) = (5, 20);
