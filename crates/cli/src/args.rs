@@ -4,7 +4,7 @@ use std::{any::TypeId, ffi::OsString, path::PathBuf};
 
 use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use dioptric_pipeline::{BlurSpec, Crop, DualPixelSpec, ExrSamples, FilterSpec, PipelineError};
+use dioptric_pipeline::{BlurSpec, BorderSpec, Crop, DualPixelSpec, ExrSamples, FilterSpec, PipelineError};
 
 pub(crate) use crate::common::Common;
 use crate::{
@@ -245,6 +245,9 @@ pub(crate) struct RunArgs {
     /// pupil, for occluders narrower than it; 'pointwise', every sample on its own, as in the paper [default: layered]
     #[arg(long, value_name = "MODE", help_heading = heading::SIMULATION)]
     pub(crate) blur: Option<BlurSpec>,
+    /// What lies beyond the edges of the scene, for the blur near them: 'hold', its outermost samples go on; 'mirror'; 'black' [default: hold]
+    #[arg(long, value_name = "KIND", help_heading = heading::SIMULATION)]
+    pub(crate) border: Option<BorderSpec>,
     #[command(flatten)]
     pub(crate) bands: BandArgs,
 }

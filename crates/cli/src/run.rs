@@ -225,6 +225,7 @@ fn change_lens(camera: &mut Camera, arguments: &RunArgs) -> anyhow::Result<()> {
         camera.bank = RetiredBank::STATED;
     }
     camera.blur = arguments.blur.unwrap_or(camera.blur);
+    camera.border = arguments.border.unwrap_or(camera.border);
     Ok(())
 }
 

@@ -82,6 +82,7 @@ pub(crate) const ALL: &[&str] = &[
     "diffraction",
     "gamma",
     "blur",
+    "border",
     "bank",
     "bank_error",
     "scene",
@@ -301,6 +302,11 @@ fn set_imaging(camera: &mut Camera, key: &str, value: &Bound<'_, PyAny>) -> PyRe
             let found = word(key, value)?;
             let expected = "'layered', 'pointwise' or 'views:16'";
             camera.blur = found.parse().map_err(|_| wrong(key, format!("'{found}'"), expected))?;
+        }
+        "border" => {
+            let found = word(key, value)?;
+            let expected = "'hold', 'mirror' or 'black'";
+            camera.border = found.parse().map_err(|_| wrong(key, format!("'{found}'"), expected))?;
         }
         // Of older programs; the report notes it.
         "bank" | "bank_error" => camera.bank = RetiredBank::STATED,

@@ -2,6 +2,7 @@
 
 mod bank;
 mod blur;
+mod border;
 mod check;
 mod crop;
 mod dual_pixel;
@@ -31,6 +32,7 @@ use serde::{Deserialize, Serialize};
 
 pub use bank::RetiredBank;
 pub use blur::BlurSpec;
+pub use border::BorderSpec;
 pub use crop::Crop;
 pub use dual_pixel::DualPixelSpec;
 pub use filters::FilterSpec;
@@ -91,6 +93,9 @@ pub struct Camera {
     /// How the point-spread functions are laid over the scene.
     #[serde(default)]
     pub blur: BlurSpec,
+    /// What lies beyond the edges of the scene.
+    #[serde(default)]
+    pub border: BorderSpec,
     /// What makes a light-field camera of it: an array of small lenses or holes before the film, or more cameras beside it.
     #[serde(default)]
     pub light_field: Option<LightFieldSpec>,

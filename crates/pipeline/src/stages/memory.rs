@@ -113,13 +113,13 @@ impl MemoryBudget {
         let shares = self.shares(&plan, scene, place)?;
         let plan = plan.with_kernel_budget(shares.kernels.min(USUAL_BYTES) as usize);
         // Where there is room for what is usual, it stays as usual.
-        let is_tight = shares.bands < USUAL_BYTES.max(4 * (plan.band_bytes() + plan.bases_bytes()) as u64);
+        let is_tight = shares.bands < USUAL_BYTES.max(4 * plan.band_bytes() as u64);
         Ok(if is_tight { plan.with_band_budget(shares.bands as usize) } else { plan })
     }
 
     /// Whether a plan twice as large would fit too.
     pub(crate) fn would_fit_twice(self, plan: &ImagingPlan, scene: &Scene, place: &FilmPlace) -> bool {
-        let band = (plan.band_bytes() + plan.bases_bytes()) as u64;
+        let band = plan.band_bytes() as u64;
         let fixed = imaging_bytes(scene, place) + 2 * plan.size_bytes() as u64;
         self.left(fixed, 2 * band, self.film_bytes(place, n_bands(scene))).is_ok()
     }
@@ -152,11 +152,11 @@ impl MemoryBudget {
         self.bytes.saturating_sub(PROGRAM_BYTES + taken_bytes + self.film_bytes(place, n_bands))
     }
 
-    /// Half of what scene and plan leave is for bands in flight and what they are interpolated from, a quarter each for kernels and irradiance;
+    /// Half of what scene and plan leave is for bands in flight, a quarter each for kernels and irradiance;
     /// kernels and bands take no more than is usual, and irradiance no more than the stages after it leave. Where the irradiance does not fit and goes
     /// to a file, its quarter is left to the allocator, which holds a tenth more than the many kernels are.
     fn shares(self, plan: &ImagingPlan, scene: &Scene, place: &FilmPlace) -> Result<Shares, PipelineError> {
-        let band = (plan.band_bytes() + plan.bases_bytes()) as u64;
+        let band = plan.band_bytes() as u64;
         let film = self.film_bytes(place, n_bands(scene));
         let left = self.left(imaging_bytes(scene, place) + plan.size_bytes() as u64, band, film)?;
         let bands = (left / 2).clamp(band, USUAL_BYTES.max(4 * band));

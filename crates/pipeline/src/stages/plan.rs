@@ -23,23 +23,18 @@ pub(super) fn plan(
         (BlurSpec::Layered | BlurSpec::Views(_), _) => BlurMode::Layered,
         (BlurSpec::Pointwise, _) => BlurMode::Pointwise,
     };
+    let border = inputs.border.into();
     let settings = match quality {
-        Quality::Full | Quality::Draft => Settings { mode, ..Settings::default() },
-        // The pixels are several of the full film's: what a step costs is a part of what the pixels cost. Kernels of simple lenses, which change
-        // fastest over the film, decide: with wide blurs on wide pixels from 8 pixels on, a singlet takes half the time that it takes from 16 on;
-        // kernels interpolated over changes of 4 pixels of blur two thirds of the time of 1, for .002 of full scale more from the full picture (layers 8
-        // pixels apart add .006 to the double Gauss). A negligible edge twice as large leaves seams of 2.8 % on a plain wall.
+        Quality::Full | Quality::Draft => Settings { mode, border, ..Settings::default() },
+        // The pixels are several of the full film's: what a step costs is a part of what the pixels cost.
         Quality::Preview | Quality::Sketch => Settings {
             mode,
+            border,
             layer_step_px: 4.0,
             chromatic_step_px: 4.0,
-            coverage_step_px: 8.0,
             max_edge_error: 0.03,
-            max_shading_error: 0.1,
-            negligible_edge: 5e-4,
             widest_blur_px: 8.0,
-            smoothing_px: 0,
-            levels_wide_blur: false,
+            subpixels: false,
             ..Settings::default()
         },
     };

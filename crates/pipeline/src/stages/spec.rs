@@ -21,7 +21,7 @@ use super::{
     given::{Given, GivenParts},
 };
 use crate::{
-    BlurSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec, FramesSpec,
+    BlurSpec, BorderSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec, FramesSpec,
     LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort, SceneSource, SceneSpec,
     StopSpec, WavelengthSpec, WorldSpec,
 };
@@ -141,6 +141,7 @@ pub(crate) struct BankInputs {
 pub(crate) struct PlanInputs {
     pub(crate) bank: BankInputs,
     pub(crate) blur: BlurSpec,
+    pub(crate) border: BorderSpec,
     /// The photodiode whose part of the pupil is imaged through, by number; none for the whole pupil.
     pub(crate) photodiode: Option<(DualPixelSpec, usize)>,
 }
@@ -319,7 +320,7 @@ impl IrradianceInputs {
             SceneSource::World(spec) => spec.backward(),
             _ => None,
         };
-        let plan = PlanInputs { bank, blur: camera.blur, photodiode: None };
+        let plan = PlanInputs { bank, blur: camera.blur, border: camera.border, photodiode: None };
         Self { plan, scene, micro_array, dual_pixel: camera.dual_pixel, effort }
     }
 }

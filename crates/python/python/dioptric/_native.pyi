@@ -84,6 +84,7 @@ class Camera:
         diffraction: _Diffraction | None = ...,
         gamma: float | None = ...,
         blur: str | None = ...,
+        border: str | None = ...,
         scene: Scene | _Path | None = ...,
         fov_deg: float | None = ...,
         depth_m: float | None = ...,

@@ -178,6 +178,10 @@ impl Telling {
             self.text("blur", &camera.blur.to_string());
             self.made.blur = camera.blur;
         }
+        if camera.border != self.made.border {
+            self.text("border", &camera.border.to_string());
+            self.made.border = camera.border;
+        }
     }
 
     fn sensor(&mut self, camera: &Camera) {

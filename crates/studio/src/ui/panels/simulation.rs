@@ -1,6 +1,6 @@
 //! How the picture is computed: diffraction, blur, sampling, bands; and what is written of it.
 
-use dioptric_pipeline::{BlurSpec, Camera, Diffraction, ExrSamples, FrameFile, Outputs, WavelengthSpec};
+use dioptric_pipeline::{BlurSpec, BorderSpec, Camera, Diffraction, ExrSamples, FrameFile, Outputs, WavelengthSpec};
 use egui::Ui;
 
 use super::{
@@ -31,6 +31,12 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
         (BlurSpec::Pointwise, "point by point"),
     ];
     variant(ui, "blur", "How the point spread functions are laid over the scene", &mut camera.blur, &blurs);
+    let borders = [
+        (BorderSpec::Hold, "samples go on"),
+        (BorderSpec::Mirror, "mirrored"),
+        (BorderSpec::Black, "black"),
+    ];
+    variant(ui, "border", "What lies beyond the edges of the scene", &mut camera.border, &borders);
     if let BlurSpec::Views(n) = &mut camera.blur {
         let words = "Parts of the pupil that the scene is seen through one after the other";
         count(ui, "views", words, 2..=256, n);
