@@ -107,7 +107,6 @@ impl Bench<'_> {
             pixel_um: self.pixel_um(),
             size: None,
             sampling: PsfSampling::Pupil,
-            bank: None,
             mtf_per_mm: Vec::new(),
             seed: 1,
             spectral_weights: if has_weights { self.weights.to_vec() } else { Vec::new() },
