@@ -46,10 +46,10 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     };
     let reference_nm = request.reference_nm(&used.lens)?;
     let lens = arguments.lens.state.apply(used, reference_nm, common)?.lens;
-    let notes = lens.notes_on_glass_range(&request.wavelengths_nm);
+    let mut notes = lens.notes_on_glass_range(&request.wavelengths_nm);
     let is_old = arguments.bank.is_some() || arguments.bank_error.is_some();
-    let on_bank = is_old.then(|| RetiredBank::STATED.note()).flatten();
-    tell(&notes.into_iter().chain(on_bank).collect::<Vec<_>>(), common);
+    notes.extend(is_old.then(|| RetiredBank::STATED.note()).flatten());
+    tell(&notes, common);
     // The place is tried before the work.
     let format = arguments.output.as_deref().map(PsfFormat::of).transpose()?;
     let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);

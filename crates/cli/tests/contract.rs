@@ -232,22 +232,14 @@ fn psf_out_of_focus_is_as_wide_as_the_f_number_says() {
     check_error(folder.path(), &["psf", "dgauss-50mm", "--f-number", "1", "--focus-mm", "2000"], &["f/2.028"]);
 }
 
+/// Of older command lines.
 #[test]
-fn psf_tells_the_error_of_the_bank_that_it_draws_from() {
+fn psf_ignores_the_bank_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
-    let common =
-        ["psf", "dgauss-50mm", "--stop-mm", "8", "--focus-mm", "2000", "--fields-deg", "0,5", "--distances-mm"];
-    let common = [&common[..], &["1000,1500,4000", "--pixel-um", "5"]].concat();
-    let error = |more: &[&str]| {
-        let records = json(folder.path(), &[&common[..], more, &["--json"]].concat());
-        check_numbers(&records[1]["bank"], "median_error p90_error n_fields n_depths n_wavelengths n_places pitch_um");
-        records[1]["bank"]["median_error"].as_f64().unwrap()
-    };
-    let (within, paper) = (error(&["--bank-error", "0.01"]), error(&["--bank", "paper"]));
-    assert!(within <= 0.01 && paper > 0.1, "{within} {paper}");
-    let text = output(folder.path(), &[&common[..], &["--bank", "standard"]].concat());
-    assert!(text.contains("rays interpolated between 9 fields") && text.contains("median"), "{text}");
-    common::check_error(folder.path(), &[&common[..], &["--bank-error", "0"]].concat(), &["bank_error", "above 0"]);
+    let common = ["psf", "dgauss-50mm", "--stop-mm", "8", "--focus-mm", "2000", "--distances-mm", "1500", "--json"];
+    let traced = json(folder.path(), &common);
+    assert_eq!(json(folder.path(), &[&common[..], &["--bank-error", "0.01"]].concat()), traced);
+    assert_eq!(json(folder.path(), &[&common[..], &["--bank", "paper"]].concat()), traced);
 }
 
 #[test]
@@ -269,7 +261,6 @@ fn psf_of_a_lens_without_an_axis_of_symmetry() {
     assert!((number(0, "centroid_x_mm") + number(2, "centroid_x_mm")).abs() < 1e-6);
     assert!(number(1, "sigma_x_um") > 2.0 * number(1, "sigma_y_um"), "{records}");
     assert!(folder.path().join("plots/through_focus.csv").exists());
-    common::check_error(folder.path(), &[&common[..], &["--bank", "standard"]].concat(), &["bank", "axis of symmetry"]);
 }
 
 #[test]
@@ -286,11 +277,9 @@ fn run_takes_a_picture_through_a_tilted_lens() {
         .replace("Pixels(columns: 48, rows: 32, pitch_um: 200.0)", "Scene");
     fs::write(folder.path().join("camera.ron"), camera).unwrap();
     let moved = ["--tilt-deg", "5", "--swing-deg=-1", "--rise-mm", "0.5"];
-    let told = output(folder.path(), &[&["run", "camera.ron", "--out", "out"][..], &moved].concat());
-    assert!(told.contains("121 fields"), "{told}");
+    output(folder.path(), &[&["run", "camera.ron", "--out", "out"][..], &moved].concat());
     let report: Value =
         serde_json::from_str(&fs::read_to_string(folder.path().join("out/report.json")).unwrap()).unwrap();
-    assert!(report["psf_bank"]["median_error"].as_f64().unwrap() < 0.05, "{report}");
     let movements = serde_json::json!({"tilt_deg": 5.0, "swing_deg": -1.0, "rise_mm": 0.5, "shift_mm": 0.0});
     assert_eq!(report["camera"]["movements"], movements);
     // The scene fills the film to its rim: no corner is dark.

@@ -12,8 +12,8 @@ use std::{
 use approx::assert_relative_eq;
 use common::output;
 use dioptric_pipeline::{
-    BankData, BankSpec, Camera, Capture, FilmSpec, FramesSpec, KeptCamera, RenderEffort, SceneSource, SceneSpec,
-    Silent, WavelengthSpec, with_exposure_s,
+    Camera, Capture, FilmSpec, FramesSpec, KeptCamera, RenderEffort, SceneSource, SceneSpec, Silent, WavelengthSpec,
+    with_exposure_s,
 };
 use dioptric_spectrum::Cancel;
 use serde_json::Value;
@@ -31,7 +31,7 @@ fn camera_files() -> Vec<PathBuf> {
 }
 
 /// Takes the picture on pixels twelve times as wide, of what is as coarse, in three bands.
-fn small(path: &Path) -> (Capture, Option<BankData>) {
+fn small(path: &Path) -> Capture {
     const COARSER: usize = 12;
     let fewer = |n: &mut usize| *n = (*n / COARSER).max(8);
     let mut camera = Camera::read(path).unwrap();
@@ -59,9 +59,7 @@ fn small(path: &Path) -> (Capture, Option<BankData>) {
         camera.wavelengths = WavelengthSpec::ListNm(vec![460.0, 540.0, 620.0]);
     }
     let kept = KeptCamera::new(camera);
-    let capture = kept.capture(&Silent, &Cancel::new()).unwrap();
-    let model = kept.model(&Silent, &Cancel::new()).unwrap();
-    (capture, BankData::of(&model))
+    kept.capture(&Silent, &Cancel::new()).unwrap()
 }
 
 #[test]
@@ -69,23 +67,19 @@ fn every_example_camera_takes_its_picture() {
     let files = camera_files();
     assert!(files.len() >= 10, "{files:?}");
     for path in files {
-        let (capture, bank) = small(&path);
+        let capture = small(&path);
         let codes = capture.developed.picture.to_rgb8();
         let mean = codes.iter().map(|&code| f64::from(code)).sum::<f64>() / codes.len() as f64;
         // Neither black nor white.
         assert!((15.0..240.0).contains(&mean), "{}: a mean code of {mean}", path.display());
         let (darkest, brightest) = (codes.iter().min().unwrap(), codes.iter().max().unwrap());
         assert!(brightest - darkest > 60, "{}: codes from {darkest} to {brightest}", path.display());
-        if let Some(bank) = bank {
-            assert!(bank.median_error <= 0.02, "{}: {}", path.display(), bank.summary());
-        }
     }
 }
 
 #[test]
-fn phone_and_night_ask_for_what_they_show() {
+fn examples_ask_for_what_they_show() {
     let read = |name: &str| Camera::read(&examples().join(name)).unwrap();
-    assert_eq!(read("phone.ron").bank, BankSpec::Within { error: 0.02 });
     assert!(matches!(read("night-burst.ron").frames, FramesSpec::MovingBurst { frames: 8, .. }));
     assert_eq!(read("view-camera.ron").movements.tilt_deg, 6.0);
 }

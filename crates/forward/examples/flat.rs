@@ -1,7 +1,11 @@
 //! A flat textured megapixel of 31 bands through built-in lenses: where the time goes.
 //! `cargo run --release --example flat -p dioptric-forward [-- LENS … [--depth]]`
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "an example shows its numbers, and stops where one is missing")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "an example shows its numbers, and stops where one is missing"
+)]
 
 use std::{
     sync::Arc,
@@ -40,7 +44,8 @@ fn main() {
         let settings = ImageSettings::new(film_distance_mm, Diffraction::Hurb { gamma: 1.0 });
         let model = LensImageModel::new(&lens, grid.centers_nm(), &settings).unwrap();
         let focal_px = lens.at(550.0).unwrap().first_order().efl_mm / (1e-3 * film.pitch_um);
-        let texture = Array2::from_shape_fn((rows, columns), |(r, c)| ((r * 7919 + c * 104_729 + r * c) % 97) as f32 + 3.0);
+        let texture =
+            Array2::from_shape_fn((rows, columns), |(r, c)| ((r * 7919 + c * 104_729 + r * c) % 97) as f32 + 3.0);
         let radiance = SpectralImage::new(Quantity::Radiance, grid.clone(), vec![texture; grid.len()]).unwrap();
         let z_m = |(r, c): (usize, usize)| match has_depth {
             true if r.abs_diff(500).pow(2) + c.abs_diff(400).pow(2) < 150 * 150 => 0.7,

@@ -1,7 +1,11 @@
 //! Uniform planes through random lenses, stops, focuses, depths and kinds of diffraction: how far a picture is from the irradiance of a uniform scene, and that from counted rays.
 //! `cargo run --release --example planes -p dioptric-forward [-- CASES]`
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "an example shows its numbers, and stops where one is missing")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "an example shows its numbers, and stops where one is missing"
+)]
 
 use dioptric_forward::{Film, Settings, Source, render};
 use dioptric_optics::Lens;
@@ -37,7 +41,8 @@ fn main() {
         let name = &names[(draws.next() * names.len() as f64) as usize];
         let wide = Lens::built_in(name).unwrap();
         let Ok(mono) = wide.at(550.0) else { continue };
-        let f_number = draws.between(mono.first_order().f_number.max(0.8), 22.0_f64.max(mono.first_order().f_number * 2.0));
+        let f_number =
+            draws.between(mono.first_order().f_number.max(0.8), 22.0_f64.max(mono.first_order().f_number * 2.0));
         let lens = wide.with_f_number(f_number, 550.0).unwrap_or(wide);
         let (focus_mm, plane_m) = (draws.between(400.0, 1e5), draws.between(0.4, 100.0));
         let diffraction = match (3.0 * draws.next()) as usize {
@@ -73,7 +78,9 @@ fn main() {
             }
         }
         worst = worst.max(error);
-        println!("{case}: {name} f/{f_number:.2}, focus {focus_mm:.0} mm, plane {plane_m:.2} m, {nm:.0} nm, {diffraction:?}: {error:.1e}");
+        println!(
+            "{case}: {name} f/{f_number:.2}, focus {focus_mm:.0} mm, plane {plane_m:.2} m, {nm:.0} nm, {diffraction:?}: {error:.1e}"
+        );
     }
     println!("worst of {n_cases}: {worst:.1e}");
 }

@@ -84,7 +84,11 @@ impl DiscLens {
 
     fn map(&self, wavelength_nm: f64, reach_mm: f64, share: f64) -> Arc<FilmMap> {
         let irradiance_sr = share * self.irradiance_per_radiance;
-        Arc::new(FilmMap::radial(reach_mm, |radius_mm| Some(self.field_tan(wavelength_nm, radius_mm)), |_| irradiance_sr))
+        Arc::new(FilmMap::radial(
+            reach_mm,
+            |radius_mm| Some(self.field_tan(wavelength_nm, radius_mm)),
+            |_| irradiance_sr,
+        ))
     }
 }
 

@@ -35,10 +35,10 @@ pub use dioptric_psf::Diffraction;
 pub use dioptric_scene::{ExrSamples, FillDepth};
 
 pub use camera::{
-    BlurSpec, BorderSpec, Camera, CameraTurn, Crop, DualPixelSpec, Exposed, FilmSpec, FilterSpec, FlatSize, FocusSpec, FramesSpec,
-    LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads, Photodiodes, PictureOptions,
-    REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec,
-    TurnPath, VideoSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
+    BlurSpec, BorderSpec, Camera, CameraTurn, Crop, DualPixelSpec, Exposed, FilmSpec, FilterSpec, FlatSize, FocusSpec,
+    FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads, Photodiodes, PictureOptions,
+    REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, RetiredBank, SceneSource, SceneSpec, SensorOptions,
+    SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
 pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;

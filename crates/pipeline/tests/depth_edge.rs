@@ -4,9 +4,9 @@
 use dioptric_backward::{
     BandSampling, Bands, Camera, LightPaths, Pinhole, PixelGrid, Placement, RenderSettings, Renderer, layered_depth,
 };
-use dioptric_forward::{BlurMode, Film, PsfDomain, Settings, irradiance};
+use dioptric_forward::{BlurMode, Film, Settings, irradiance};
 use dioptric_optics::{Lens, glam::DVec2};
-use dioptric_psf::{Diffraction, LensImageModel};
+use dioptric_psf::{Diffraction, ImageSettings, LensImageModel};
 use dioptric_scene::{HiddenLayer, Scene, View, read_spectral_exr};
 use dioptric_spectrum::{Cancel, DepthMap, SpectralImage, WavelengthGrid};
 use dioptric_world::{
@@ -119,15 +119,8 @@ fn edges_are_those_of_a_traced_picture() {
     let scene = seen(&world, &lens, &grid);
     let film = Film::centered(256, 256, 62.5);
     let depth = scene.depth.as_ref().unwrap();
-    let domain = PsfDomain {
-        lens: &lens,
-        film: &film,
-        film_distance_mm: FILM_MM,
-        depth_range_m: depth.range_m(),
-        grid: &grid,
-        diffraction: Diffraction::None,
-    };
-    let model = LensImageModel::build(&lens, &domain.settings().unwrap()).unwrap();
+    let settings = ImageSettings::new(FILM_MM, Diffraction::None);
+    let model = LensImageModel::new(&lens, grid.centers_nm(), &settings).unwrap();
     let is_edge = edge_band(depth, 62.5e-3 / 51.1);
     let image = |scene: &Scene, mode: BlurMode| {
         let settings = Settings { mode, ..Settings::default() };

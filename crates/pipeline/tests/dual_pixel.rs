@@ -168,7 +168,6 @@ fn no_photodiode_is_imaged_within_a_budget_too_small_for_another() {
     while enough - too_small > 1 << 12 {
         let budget = u64::midpoint(too_small, enough);
         let imaging = Imaging::default();
-        // The error of the bank is not measured.
         let kept = KeptCamera::new(camera.clone()).with_quality(Quality::Draft).with_memory_budget(budget);
         match kept.irradiance(&imaging, &Cancel::new()) {
             Ok(_) => enough = budget,

@@ -70,7 +70,6 @@ def test_every_choice_survives_a_dictionary(tiny: dp.Camera) -> None:
         {"film": "scene"},
         {"diffraction": "wave"},
         {"diffraction": "hurb", "gamma": 1.5},
-        {"bank_error": 0.02},
         {"burst": 4},
         {"bracket_stops": [-2, 0]},
         {"interleaved_ratio": 8},

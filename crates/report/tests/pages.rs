@@ -79,7 +79,6 @@ fn mosaic_has_a_tile_for_each_picture() {
         pixel_um: 2.0,
         size: None,
         sampling: PsfSampling::Pupil,
-        bank: None,
         mtf_per_mm: vec![],
         seed: 1,
         spectral_weights: vec![],

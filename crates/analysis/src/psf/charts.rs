@@ -276,7 +276,6 @@ mod tests {
             pixel_um: 4.0,
             size: None,
             sampling: PsfSampling::Pupil,
-            bank: None,
             mtf_per_mm: vec![10.0],
             seed: 1,
             spectral_weights: vec![],

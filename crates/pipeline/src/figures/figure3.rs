@@ -39,7 +39,6 @@ pub fn targets() -> [Target; 3] {
 
 /// One counted picture a wavelength, used all over the field, as the authors did.
 struct CountedPsfs {
-    wavelengths_nm: Vec<f64>,
     /// Energies on pixels of 4 µm.
     psfs: Vec<Array2<f64>>,
     /// Signed radius of the blur a wavelength, mm.
@@ -61,7 +60,7 @@ impl CountedPsfs {
             })
             .collect::<Result<_, PipelineError>>()?;
         let psfs = figure_3_psfs(object_mm, &wavelengths_nm)?.iter().map(symmetrical).collect();
-        Ok(Self { wavelengths_nm, psfs, radii_mm })
+        Ok(Self { psfs, radii_mm })
     }
 
     fn nearest(&self, wavelength_nm: f64) -> usize {

@@ -21,9 +21,9 @@ use super::{
     given::{Given, GivenParts},
 };
 use crate::{
-    BlurSpec, BorderSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec, FramesSpec,
-    LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort, SceneSource, SceneSpec,
-    StopSpec, WavelengthSpec, WorldSpec,
+    BlurSpec, BorderSpec, Camera, Crop, Diffraction, DualPixelSpec, FilmSpec, FilterSpec, FlatSize, FocusSpec,
+    FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PipelineError, Quality, RenderEffort,
+    SceneSource, SceneSpec, StopSpec, WavelengthSpec, WorldSpec,
 };
 
 /// A file as it was when it was looked at, so that a change of it is seen.

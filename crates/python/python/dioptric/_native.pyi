@@ -85,8 +85,6 @@ class Camera:
         gamma: float | None = ...,
         blur: str | None = ...,
         border: str | None = ...,
-        bank: Literal["standard", "paper"] | None = ...,
-        bank_error: float | None = ...,
         scene: Scene | _Path | None = ...,
         fov_deg: float | None = ...,
         depth_m: float | None = ...,

@@ -3,9 +3,9 @@
 use std::{collections::BTreeSet, sync::LazyLock, time::Duration};
 
 use dioptric_pipeline::{
-    BankSpec, BlurSpec, CAMERA_SCHEMA, Camera, Crop, Diffraction, DualPixelSpec, FillDepth, FlatSize, FocusSpec,
-    FramesSpec, LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange,
-    WavelengthSpec, WorldSpec, with_exposure_s,
+    BlurSpec, CAMERA_SCHEMA, Camera, Crop, Diffraction, DualPixelSpec, FillDepth, FlatSize, FocusSpec, FramesSpec,
+    LensSpec, LightPaths, Photodiodes, RenderEffort, SceneSource, SceneSpec, StopSpec, SurfaceChange, WavelengthSpec,
+    WorldSpec, with_exposure_s,
 };
 use dioptric_scene::Pattern;
 use dioptric_sensor::{Brightness, ColorCorrection, LensShading, ToneCurve};
@@ -59,8 +59,6 @@ const PANELS: &[(&str, &[&str])] = &[
     ("part rows", &["Crop.rows"]),
     ("diffraction", &["Camera.diffraction", "Diffraction.Hurb"]),
     ("gamma", &["Diffraction.Hurb.gamma"]),
-    ("sampling", &["Camera.bank", "BankSpec.Within"]),
-    ("error", &["BankSpec.Within.error"]),
     ("blur", &["Camera.blur"]),
     ("views", &["BlurSpec.Views"]),
     ("bands", &["Camera.wavelengths", "WavelengthSpec.Range"]),
@@ -259,7 +257,6 @@ fn world(effort: RenderEffort) -> Camera {
 fn everything(camera: &mut Camera) {
     camera.crop = Some(Crop { x: 8, y: 8, columns: 32, rows: 24 });
     camera.blur = BlurSpec::Views(4);
-    camera.bank = BankSpec::Within { error: 0.05 };
     camera.diffraction = Diffraction::Hurb { gamma: 1.0 };
     camera.wavelengths = WavelengthSpec::Range { first_nm: 400.0, last_nm: 700.0, step_nm: 100.0 };
     camera.stop = StopSpec::DiameterMm(8.0);

@@ -31,11 +31,7 @@ pub(super) fn show(ui: &mut Ui, camera: &mut Camera, desk: &Desk<'_>) {
         (BlurSpec::Pointwise, "point by point"),
     ];
     variant(ui, "blur", "How the point spread functions are laid over the scene", &mut camera.blur, &blurs);
-    let borders = [
-        (BorderSpec::Hold, "samples go on"),
-        (BorderSpec::Mirror, "mirrored"),
-        (BorderSpec::Black, "black"),
-    ];
+    let borders = [(BorderSpec::Hold, "samples go on"), (BorderSpec::Mirror, "mirrored"), (BorderSpec::Black, "black")];
     variant(ui, "border", "What lies beyond the edges of the scene", &mut camera.border, &borders);
     if let BlurSpec::Views(n) = &mut camera.blur {
         let words = "Parts of the pupil that the scene is seen through one after the other";
