@@ -21,7 +21,7 @@ pub struct FilmQuery {
 
 /// The image that a lens forms, described from the film: where each point looks, how much light reaches it, and what it gathers.
 ///
-/// The irradiance at a point x of the film is I(x) Σ_s L(s) h(x − s): L is the radiance seen by the chief ray of the film point s
+/// The irradiance at a point x of the film is `I(x) Σ_s L(s) h(x − s)`: L is the radiance seen by the chief ray of the film point s
 /// (`FilmMap::field_tan`), I the irradiance per radiance of a uniform scene (`FilmMap::irradiance_sr`), h the kernel, of sum 1.
 pub trait LensImage: Sync {
     /// Whether film points that mirror each other, about the axes or their diagonals, have kernels that do.

@@ -53,7 +53,7 @@ impl Outline {
         let area: f64 = self.rho.iter().map(|r| r * r).sum::<f64>() / 2.0;
         let shift = edge.iter().map(|p| *p * (p.length_squared() / 3.0)).sum::<DVec2>() / area;
         let rho = (0..n).map(|i| ray_to_polygon(shift, DVec2::from_angle(self.azimuth(i)), &edge)).collect();
-        Self { center: self.center + shift, rho, ..self }
+        Self { center: self.center + shift, rho }
     }
 
     /// Returns the region with its edge moved to where clearances are 0, or `None` if that does not converge.
