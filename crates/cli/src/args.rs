@@ -160,10 +160,6 @@ pub(crate) struct RunArgs {
     /// Continues a killed run to the same folder from the bands that it finished
     #[arg(long, conflicts_with = "from", help_heading = heading::RESULTS)]
     pub(crate) resume: bool,
-    /// Memory that scene, imaging and film may take, as 1GiB or 500MB; what does not fit goes through files [default: half of the
-    /// machine's]
-    #[arg(long, value_name = "BYTES", help_heading = heading::SIMULATION)]
-    pub(crate) memory: Option<String>,
     /// How finely the picture is simulated
     #[arg(long, value_name = "QUALITY", value_enum, default_value = "full", help_heading = heading::SIMULATION)]
     pub(crate) quality: QualityKind,

@@ -13,7 +13,7 @@ use crate::{
     paintings::painting_folder,
     render_args::LightFieldArgs,
     run::Clock,
-    terminal::{guarded, print, print_json},
+    terminal::{print, print_json},
 };
 
 /// Refocused pictures where no depths are asked for.
@@ -32,7 +32,7 @@ pub(crate) fn run(arguments: &LightFieldArgs, common: &Common) -> anyhow::Result
     }
     let kept = KeptCamera::new(camera).with_paintings(painting_folder());
     kept.check()?;
-    let staged = guarded(Staged::folder(&arguments.out)?);
+    let staged = Staged::folder(&arguments.out)?;
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
     let n_views = arguments.views.map(usize::from);
     let field = match &arguments.irradiance {

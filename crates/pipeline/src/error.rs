@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use dioptric_backward::BackwardError;
+use dioptric_files::WriteError;
 use dioptric_forward::ForwardError;
 use dioptric_optics::OpticsError;
 use dioptric_psf::PsfError;
@@ -145,6 +146,12 @@ pub enum PipelineError {
         /// Why.
         reason: String,
     },
+}
+
+impl From<WriteError> for PipelineError {
+    fn from(WriteError { path, reason, .. }: WriteError) -> Self {
+        Self::Write { path, reason }
+    }
 }
 
 impl PipelineError {

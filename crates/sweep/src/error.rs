@@ -92,6 +92,12 @@ pub enum SweepError {
     Cancelled(#[from] Cancelled),
 }
 
+impl From<dioptric_files::WriteError> for SweepError {
+    fn from(error: dioptric_files::WriteError) -> Self {
+        Self::Pipeline(error.into())
+    }
+}
+
 impl SweepError {
     /// Returns what makes of an error of the system that a file cannot be read.
     pub(crate) fn reading(path: &Path) -> impl Fn(std::io::Error) -> Self {

@@ -228,7 +228,7 @@ impl SceneSpec {
     /// # Errors
     /// When a file cannot be read, lacks what is needed or holds what cannot be.
     pub fn open(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
-        self.open_with(wanted, |life, grid| Ok(life.scene(grid)?))
+        self.open_with(wanted, None, |life, grid| Ok(life.scene(grid)?))
     }
 
     /// Returns the still life of this size as it is pictured.
@@ -237,13 +237,14 @@ impl SceneSpec {
         StillLife { horizontal_fov_deg: self.field_of_view_deg.unwrap_or(usual.horizontal_fov_deg), ..usual }
     }
 
-    /// As [`open`](Self::open); where it is the still life, `paint` has or makes it.
+    /// As [`open`](Self::open), a picture no finer than asked for; where it is the still life, `paint` has or makes it.
     ///
     /// # Errors
     /// As [`open`](Self::open), and those of `paint`.
     pub(crate) fn open_with(
         &self,
         wanted: Option<&WavelengthGrid>,
+        finest_tangent: Option<f64>,
         paint: impl FnOnce(&StillLife, &WavelengthGrid) -> Result<Scene, PipelineError>,
     ) -> Result<Scene, PipelineError> {
         if self.flat.is_some() && self.depth_m.is_none() {
@@ -263,6 +264,7 @@ impl SceneSpec {
                     depth_m: self.depth_m,
                     horizontal_fov_deg: self.field_of_view_deg,
                     fill_depth: self.fill_depth,
+                    finest_tangent,
                     white_level: self.white_level,
                     ..ReadOptions::default()
                 };

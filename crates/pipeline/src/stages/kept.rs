@@ -2,6 +2,7 @@
 
 use std::{fs, path::PathBuf, sync::Arc};
 
+use dioptric_files::Leftover;
 use dioptric_psf::LensImageModel;
 use dioptric_spectrum::{Cancel, DepthMap};
 
@@ -23,7 +24,7 @@ use super::{
     scene::ResolvedScene,
     spec::{IrradianceInputs, PictureInputs, Raster},
 };
-use crate::{Camera, Leftover, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
+use crate::{Camera, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
 
 /// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
 const MEMORY_BYTES: u64 = 2 << 30;
