@@ -8,6 +8,7 @@ use dioptric_spectrum::{Cancelled, SpectrumError};
 
 /// A rendering that cannot be made, or was stopped.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BackwardError {
     /// It was cancelled.
     #[error(transparent)]

@@ -9,9 +9,11 @@ use dioptric_pipeline::{BlurSpec, Crop, DualPixelSpec, ExrSamples, FilterSpec, P
 pub(crate) use crate::common::Common;
 use crate::{
     camera::{CameraCommand, SensorCommand},
+    examples::with_examples,
     filter::FilterCommand,
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
+    ranges,
     render_args::{CompareArgs, LightFieldArgs, RenderArgs},
     show::ShowArgs,
     sweep::SweepArgs,
@@ -33,13 +35,17 @@ pub(crate) struct Cli {
 impl Cli {
     /// Returns the words of the program.
     pub(crate) fn words() -> clap::Command {
-        takes_negative_numbers(Self::command())
+        with_examples(takes_negative_numbers(Self::command()))
     }
 
-    /// Reads a command line, the name of the program first.
-    pub(crate) fn read<T: Into<OsString> + Clone>(line: impl IntoIterator<Item = T>) -> Result<Self, clap::Error> {
-        let mut matches = Self::words().try_get_matches_from(line)?;
-        Self::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut Self::words()))
+    /// Reads a command line, the name of the program first, with whether its numbers are in their ranges.
+    pub(crate) fn read<T: Into<OsString> + Clone>(
+        line: impl IntoIterator<Item = T>,
+    ) -> Result<(Self, anyhow::Result<()>), clap::Error> {
+        let mut words = Self::words();
+        let mut matches = words.try_get_matches_from_mut(line)?;
+        let in_range = ranges::check(&words, &matches);
+        Ok((Self::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut words))?, in_range))
     }
 }
 
@@ -151,7 +157,7 @@ pub(crate) struct RunArgs {
     /// Scene to photograph: spectral EXR, ENVI header, `ISETCam` .mat, folder of band PNGs, or a picture
     #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
     pub(crate) scene: Option<PathBuf>,
-    /// Folder for the results [default: dioptric-out, or that of --from]
+    /// Folder for the results [default: dioptric-out; with --from DIR, DIR-changed]
     #[arg(long, short, value_name = "DIR", help_heading = heading::RESULTS)]
     pub(crate) out: Option<PathBuf>,
     /// Continues from the folder of a finished run: its camera, and its irradiance where no change touches it

@@ -1,6 +1,5 @@
 //! `dioptric lightfield`: views, refocused pictures and depth of a light-field camera.
 
-use anyhow::bail;
 use dioptric_pipeline::{
     Camera, DepthSearch, ExrSamples, IRRADIANCE_FILE, Irradiance, KeptCamera, LightField, RenderEffort, SceneSource,
     Staged,
@@ -26,9 +25,6 @@ pub(crate) fn run(arguments: &LightFieldArgs, common: &Common) -> anyhow::Result
     if let SceneSource::World(spec) = &mut camera.scene.source {
         spec.effort = arguments.samples.map_or(spec.effort, RenderEffort::Samples);
         spec.seed = common.seed.unwrap_or(spec.seed);
-    }
-    if let Some(wrong) = arguments.refocus_m.iter().find(|depth_m| depth_m.is_nan() || **depth_m <= 0.0) {
-        bail!("--refocus-m has {wrong}, expected depths above 0 m");
     }
     let kept = KeptCamera::new(camera).with_paintings(painting_folder());
     kept.check()?;

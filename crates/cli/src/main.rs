@@ -9,6 +9,7 @@ mod camera;
 mod common;
 mod compare;
 mod develop;
+mod examples;
 mod filter;
 mod glass;
 mod lens;
@@ -20,6 +21,7 @@ mod memory;
 mod movement_args;
 mod paintings;
 mod psf;
+mod ranges;
 mod render;
 mod render_args;
 mod run;
@@ -47,12 +49,12 @@ use crate::{
 };
 
 fn main() -> ExitCode {
-    let cli = Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    let (cli, in_range) = Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
     terminal::remove_partial_files_on_interrupt();
     if !matches!(cli.command, Command::Studio(_)) {
         memory::keep_freed();
     }
-    match dispatch(cli) {
+    match in_range.and_then(|()| dispatch(cli)) {
         Ok(()) => ExitCode::SUCCESS,
         // Whoever read the output has seen enough.
         Err(error) if error.is::<ClosedPipe>() || is_closed(&error) => ExitCode::SUCCESS,

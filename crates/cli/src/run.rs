@@ -1,7 +1,7 @@
 //! `dioptric run`: the whole of Figure 1.
 
 use std::{
-    path::Path,
+    path::{Path, PathBuf},
     sync::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicUsize, Ordering},
@@ -35,7 +35,11 @@ pub(crate) const OUT: &str = "dioptric-out";
 pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     let kept = camera_of(arguments, common)?;
     kept.camera().validate()?;
-    let out = arguments.out.as_deref().or(arguments.from.as_deref()).unwrap_or(Path::new(OUT));
+    let out = &*match (&arguments.out, &arguments.from) {
+        (Some(out), _) => out.clone(),
+        (None, Some(from)) => beside(from),
+        (None, None) => PathBuf::from(OUT),
+    };
     let staged = Staged::folder(out)?;
     let kept = match build() {
         Some(build) => kept.with_bands_kept_in(staged.root(), build),
@@ -75,6 +79,14 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     }
     remark(common.quiet, "");
     if common.quiet { Ok(()) } else { print(&summary(&report, total_s, out)) }
+}
+
+/// Returns the folder of a run that continues another without being told where to: that of the other stays.
+fn beside(from: &Path) -> PathBuf {
+    let from = from.canonicalize().unwrap_or_else(|_| from.to_owned());
+    let mut name = from.file_name().unwrap_or_default().to_owned();
+    name.push("-changed");
+    from.with_file_name(name)
 }
 
 /// What is to be known of a budget for a run that is continued.
@@ -436,7 +448,7 @@ mod tests {
     use crate::args::{Cli, Command};
 
     fn try_camera(options: &[&str]) -> anyhow::Result<Camera> {
-        let cli = Cli::read([&["dioptric", "run"], options].concat())?;
+        let cli = Cli::read([&["dioptric", "run"], options].concat())?.0;
         let Command::Run(arguments) = &cli.command else { panic!("another command") };
         let kept = camera_of(arguments, &cli.common)?;
         kept.camera().validate()?;

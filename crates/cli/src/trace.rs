@@ -2,7 +2,7 @@
 
 use std::{fs::File, io};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use dioptric_analysis::{RayTable, TraceError, TraceSettings};
 use dioptric_pipeline::Staged;
 
@@ -13,9 +13,6 @@ use crate::{
 };
 
 pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> {
-    if let Some(film_mm) = arguments.film_mm.filter(|mm| !mm.is_finite()) {
-        bail!("--film-mm is {film_mm}, expected a finite number of mm behind the last vertex");
-    }
     let used = arguments.lens.open(common)?;
     let wavelength_nm = used.wavelength_or_usual();
     let lens = arguments.lens.state.apply(used, wavelength_nm, common)?.lens;

@@ -14,6 +14,7 @@ use dioptric_world::WorldError;
 
 /// A camera that cannot be built, run or written down.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PipelineError {
     /// A list of numbers that cannot be read.
     #[error("{what}: '{item}' is neither a number nor a range first:last:step whose step leads from first to last")]

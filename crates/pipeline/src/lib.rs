@@ -21,12 +21,16 @@ mod numbers;
 mod paintings;
 mod progress;
 mod quality;
+mod ranges;
 mod schema;
 mod sense;
 mod shown;
 mod stages;
 mod video_files;
 mod words;
+
+/// Planes and cubes of this crate are arrays of it.
+pub use ndarray;
 
 pub use dioptric_backward::{BandSampling, LightPaths, MicroArray, MicroElements, MicroLayout, Renderer, Rendering};
 pub use dioptric_optics::{GlassRange, MissingGlass, SeqNumbers, SurfaceChange};
@@ -50,6 +54,7 @@ pub use numbers::{number, parse_bytes, parse_numbers, parse_pairs};
 pub use paintings::{PaintingFolder, program_build};
 pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
 pub use quality::Quality;
+pub use ranges::{Range, range_of};
 #[cfg(feature = "schema")]
 pub use schema::generated_schemas;
 pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};

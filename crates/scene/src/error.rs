@@ -8,6 +8,7 @@ use dioptric_spectrum::{Cancelled, SpectrumError};
 
 /// A scene that cannot be read, written or used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// Work that was stopped on request.
     #[error(transparent)]

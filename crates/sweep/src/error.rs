@@ -7,6 +7,7 @@ use dioptric_spectrum::Cancelled;
 
 /// A plan that cannot be read, or a store that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SweepError {
     /// A file that cannot be read.
     #[error("cannot read {}: {reason}", path.display())]

@@ -205,7 +205,7 @@ impl KeptCamera {
     /// As [`capture`](Self::capture) has them before it computes anything.
     pub fn check(&self) -> Result<Arc<ResolvedLens>, PipelineError> {
         self.camera.validate()?;
-        let inputs = self.irradiance_inputs()?;
+        let inputs = self.picture_inputs()?.frames.electrons.irradiance;
         let lens = self.kept.lens.get_or_make(inputs.plan.bank.film.lens, lens::resolve)?;
         check_glasses(&lens, self.camera.wavelengths.grid()?.as_ref())?;
         let file = match &self.camera.scene.source {

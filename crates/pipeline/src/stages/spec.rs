@@ -12,7 +12,7 @@ use dioptric_backward::MicroArray;
 use dioptric_forward::Film;
 use dioptric_optics::Lens;
 use dioptric_scene::{FillDepth, Scene};
-use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor};
+use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor, WhiteBalance};
 use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
 
@@ -50,7 +50,7 @@ impl FileStamp {
         std::iter::once(path).chain(beside.iter().map(PathBuf::as_path)).map(Self::of).collect()
     }
 
-    fn of(path: &Path) -> Self {
+    pub(crate) fn of(path: &Path) -> Self {
         let state = fs::metadata(path).ok().map(|data| (data.len(), data.modified().ok()));
         Self { path: path.to_owned(), state }
     }
@@ -210,6 +210,24 @@ fn check_stack(camera: &Camera, sensor: &Sensor) -> Result<(), PipelineError> {
     };
     let reason = format!("of {} does not go with {expected}, expected a sensor without it", sensor.name);
     Err(PipelineError::Unsuitable { what: "pixel_stack", reason })
+}
+
+/// Checks that a patch that is made white lies in the frame.
+fn check_patch(camera: &Camera, sensor: &Sensor) -> Result<(), PipelineError> {
+    let WhiteBalance::Patch { left, top, width, height } = camera.processing.white else { return Ok(()) };
+    let (columns, rows) = match (camera.crop, camera.film) {
+        (Some(crop), _) => (crop.columns, crop.rows),
+        (None, FilmSpec::Sensor) => (sensor.columns, sensor.rows),
+        (None, FilmSpec::Pixels { columns, rows, .. }) => (columns, rows),
+        (None, FilmSpec::Scene) => return Ok(()),
+    };
+    let is_within = left.saturating_add(width) <= columns && top.saturating_add(height) <= rows && width * height > 0;
+    if is_within {
+        return Ok(());
+    }
+    let found = format!("a patch of {width} × {height} pixels from column {left}, row {top}");
+    let expected = format!("one within the frame of {columns} × {rows} pixels");
+    Err(PipelineError::Value { origin: camera.name.clone(), key: "white", found, expected })
 }
 
 impl LensInputs {
@@ -399,6 +417,7 @@ impl PictureInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts, quality: Quality) -> Result<Self, PipelineError> {
         let sensor = given.sensor.as_deref().map_or_else(|| camera.sensor.open(), |sensor| Ok(sensor.clone()))?;
         check_stack(camera, &sensor)?;
+        check_patch(camera, &sensor)?;
         let irradiance = IrradianceInputs::of(camera, given, &sensor, quality);
         let frames = FrameInputs {
             electrons: ElectronInputs { irradiance, sensor, filters: FilterSpec::open_all(&camera.filters)? },
