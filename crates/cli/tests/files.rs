@@ -23,8 +23,9 @@ fn draw_to(folder: &Path, target: &str) -> String {
 
 /// Runs a line of a shell in a folder, `D` being the program.
 fn shell(folder: &Path, line: &str) -> String {
-    let run = Command::new("bash").arg("-c").arg(line).env("D", env!("CARGO_BIN_EXE_dioptric")).current_dir(folder);
-    let run = { run }.output().unwrap();
+    let mut run = Command::new("bash");
+    run.arg("-c").arg(line).env("D", env!("CARGO_BIN_EXE_dioptric")).current_dir(folder);
+    let run = run.output().unwrap();
     assert!(run.status.success(), "{line}: {}", String::from_utf8_lossy(&run.stderr));
     String::from_utf8(run.stdout).unwrap()
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dioptric_pipeline::{Camera as CameraFile, KeptCamera, PipelineError, Quality, parse_bytes};
+use dioptric_pipeline::{Camera as CameraFile, KeptCamera, Quality, parse_bytes};
 use pyo3::{
     prelude::*,
     types::{PyDict, PyType},
