@@ -60,7 +60,7 @@ impl Counted {
             });
             (lit.iter().map(|&i| (rays.point_mm(i), rays.direction(i))).collect::<Vec<_>>(), bounds, step)
         };
-        let (_, (low, high), step) = trace(DVec2::NEG_ONE, DVec2::ONE, 300);
+        let (_, (low, high), step) = trace(DVec2::NEG_ONE, DVec2::ONE, 160);
         if !low.is_finite() {
             return Self { rays: vec![], irradiance_sr: 0.0 };
         }
@@ -102,11 +102,11 @@ fn irradiance_is_that_of_counted_rays() {
             let map = model.film_map(NM, reach_mm);
             let brightest =
                 (0..40).map(|i| map.irradiance_sr(DVec2::X * reach_mm * f64::from(i) / 39.0)).fold(0.0, f64::max);
-            for share in [0.0, 0.31, 0.55, 0.83, 1.0] {
+            for share in [0.0, 0.55, 0.9] {
                 let place_mm = share * reach_mm * DVec2::new(0.8, -0.6);
-                let counted = Counted::at(&mono, film_distance_mm, place_mm, 250).irradiance_sr;
+                let counted = Counted::at(&mono, film_distance_mm, place_mm, 280).irradiance_sr;
                 let off = (map.irradiance_sr(place_mm) - counted) / brightest;
-                // Counting on a grid is off by some 3e-4; the table by 1e-4.
+                // Counting on a grid is off by some 4e-4; the table by 1e-4.
                 assert!(off.abs() < 1e-3, "{name} {f_number:?} at {place_mm}: {off}");
                 let Some(tan) = map.field_tan(place_mm) else { continue };
                 let back_mm = map.place_mm(tan).unwrap();
@@ -164,7 +164,7 @@ fn window_off_the_axis_is_lit() {
     let brightest = (-40..40).map(|y| map.irradiance_sr(DVec2::Y * f64::from(y))).fold(0.0, f64::max);
     for y in -40..40 {
         let place_mm = DVec2::new(2.3, f64::from(y));
-        let counted = Counted::at(&mono, film_distance_mm, place_mm, 200).irradiance_sr;
+        let counted = Counted::at(&mono, film_distance_mm, place_mm, 280).irradiance_sr;
         let off = (map.irradiance_sr(place_mm) - counted) / brightest;
         // Points of the grid lie 2 mm apart, over which the light of the window comes and goes.
         assert!(off.abs() < 0.2, "{place_mm}: {} {counted}", map.irradiance_sr(place_mm));

@@ -157,7 +157,7 @@ fn lens_moved_sideways_sees_from_where_it_stands() {
             let kernels =
                 [straight.kernel(query(place_mm, dioptres, 5.0)), aside.kernel(query(there_mm, dioptres, 5.0))];
             // Out of focus it sees past what it saw: by the way that it moved times the vergence.
-            let parallax_px = aside_mm * (1e-3 * (dioptres - focus)) * film_distance_mm * 200.0;
+            let parallax_px = before.jacobian_mm(place_mm) * aside_mm * (1e-3 * (dioptres - focus)) * 200.0;
             let apart = (kernels[1].middle_px - kernels[0].middle_px).as_dvec2() * DVec2::new(1.0, -1.0);
             assert!((apart + parallax_px).length() < 4.0, "{dioptres}: {apart} {parallax_px}");
             let [a, b] = kernels.map(|kernel| Picture::from(&kernel).rms_radius_um());
