@@ -1,4 +1,4 @@
-//! Project chores: `cargo xtask book`, `features`, `layers`, `modules`, `packages`, `schema`, `figures [4 | --out DIR]`.
+//! Project chores: `cargo xtask book`, `features`, `layers`, `modules`, `packages`, `prose`, `schema`, `figures [4 | --out DIR]`.
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command-line tool talks to its user")]
 
@@ -8,12 +8,13 @@ mod figures;
 mod layers;
 mod modules;
 mod packages;
+mod prose;
 mod schema;
 
 use std::{path::Path, process::ExitCode};
 
 const USAGE: &str =
-    "usage: cargo xtask book | features | layers | modules | packages | schema | figures [4 | --out DIR]";
+    "usage: cargo xtask book | features | layers | modules | packages | prose | schema | figures [4 | --out DIR]";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -23,6 +24,7 @@ fn main() -> ExitCode {
         ["layers"] => layers::run(),
         ["modules"] => modules::run(),
         ["packages"] => packages::run(),
+        ["prose"] => prose::run(),
         ["schema"] => schema::run(),
         ["figures"] => figures::run(Path::new("docs/figures")),
         ["figures", "4"] => figures::run_figure4(Path::new("docs/figures")),

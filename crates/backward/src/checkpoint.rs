@@ -6,13 +6,15 @@ use std::{
     path::Path,
 };
 
+use dioptric_files::Staged;
+
 use crate::{BackwardError, Renderer};
 
 /// The first bytes of a checkpoint, with the version of its layout.
 const MAGIC: &[u8; 16] = b"dioptric render1";
 
 impl Renderer<'_> {
-    /// Writes a checkpoint beside its place and renames it when it is whole.
+    /// Writes a checkpoint, whole or not at all.
     ///
     /// `identity` describes what is rendered beyond the settings: the world and the camera. A checkpoint resumes
     /// nothing else.
@@ -21,17 +23,14 @@ impl Renderer<'_> {
     /// When the file cannot be written.
     pub fn save(&self, path: &Path, identity: &str) -> Result<(), BackwardError> {
         let failed = |error: io::Error| BackwardError::Write { file: path.to_owned(), reason: error.to_string() };
-        let partial = path.with_extension(format!("{}.partial", std::process::id()));
-        let written = fs::File::create(&partial).and_then(|file| {
+        let staged = Staged::file(path)?;
+        let written = fs::File::create(staged.path()).and_then(|file| {
             let mut out = io::BufWriter::new(file);
             self.write_to(&mut out, identity)?;
             out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
         });
-        written.and_then(|()| fs::rename(&partial, path)).map_err(|error| {
-            // What is left of it is of no use; that it cannot be removed changes nothing.
-            let _ = fs::remove_file(&partial);
-            failed(error)
-        })
+        written.map_err(failed)?;
+        Ok(staged.commit()?)
     }
 
     fn write_to(&self, out: &mut impl Write, identity: &str) -> io::Result<()> {

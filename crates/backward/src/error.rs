@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
+use dioptric_files::WriteError;
 use dioptric_optics::OpticsError;
 use dioptric_spectrum::{Cancelled, SpectrumError};
 
 /// A rendering that cannot be made, or was stopped.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BackwardError {
     /// It was cancelled.
     #[error(transparent)]
@@ -48,5 +50,11 @@ pub enum BackwardError {
 impl BackwardError {
     pub(crate) fn setting(what: &'static str, found: impl ToString, expected: &'static str) -> Self {
         Self::Setting { what, found: found.to_string(), expected }
+    }
+}
+
+impl From<WriteError> for BackwardError {
+    fn from(WriteError { path, reason, .. }: WriteError) -> Self {
+        Self::Write { file: path, reason }
     }
 }

@@ -31,6 +31,9 @@ mod renderer;
 mod sampler;
 mod world_camera;
 
+/// Planes and cubes of this crate are arrays of it.
+pub use ndarray;
+
 pub use auxiliary::{Auxiliary, auxiliary, layered_depth};
 pub use camera::{Camera, Pinhole, ThinLens};
 pub use error::BackwardError;

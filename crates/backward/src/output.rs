@@ -2,6 +2,7 @@
 
 use std::{fs, path::Path};
 
+use dioptric_files::Staged;
 use dioptric_spectrum::{Quantity, SpectralImage, sort_exr_attributes};
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder, SmallVec,
@@ -65,7 +66,7 @@ fn channel(name: &str, plane: &Array2<f32>) -> Channel {
     AnyChannel::new(name, FlatSamples::F32(plane.iter().copied().collect()))
 }
 
-/// Writes a file beside its place and renames it when it is whole.
+/// Writes a file, whole or not at all.
 fn write(
     path: &Path,
     (rows, columns): (usize, usize),
@@ -73,18 +74,13 @@ fn write(
     channels: Vec<Channel>,
 ) -> Result<(), BackwardError> {
     let failed = |reason: String| BackwardError::Write { file: path.to_owned(), reason };
-    let partial = path.with_extension(format!("{}.partial", std::process::id()));
+    let staged = Staged::file(path)?;
     let list: SmallVec<[Channel; 4]> = channels.into_iter().collect();
     // In a fixed order, so that equal pictures are equal files whatever the threads do.
     let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS };
     let layer = Layer::new((columns, rows), attributes, encoding, AnyChannels::sort(list));
-    let written = Image::from_layer(layer).write().to_file(&partial).map_err(|error| failed(error.to_string()));
-    let in_place = || {
-        sort_exr_attributes(&mut fs::File::options().read(true).write(true).open(&partial)?)?;
-        fs::rename(&partial, path)
-    };
-    written.and_then(|()| in_place().map_err(|error| failed(error.to_string()))).inspect_err(|_| {
-        // What is left of it is of no use; that it cannot be removed changes nothing.
-        let _ = fs::remove_file(&partial);
-    })
+    Image::from_layer(layer).write().to_file(staged.path()).map_err(|error| failed(error.to_string()))?;
+    let file = fs::File::options().read(true).write(true).open(staged.path());
+    file.and_then(|mut file| sort_exr_attributes(&mut file)).map_err(|error| failed(error.to_string()))?;
+    Ok(staged.commit()?)
 }

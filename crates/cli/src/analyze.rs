@@ -14,7 +14,7 @@ use crate::{
     args::Common,
     lens::{list_of, tell_taken},
     lens_args::LensAnalyzeArgs,
-    terminal::{Bar, fixed, guarded, print, print_json, remark, remark_on_png},
+    terminal::{Bar, fixed, print, print_json, remark, remark_on_png},
 };
 
 /// Pixels of the plots as PNG for each of the drawing's own.
@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &LensAnalyzeArgs, common: &Common) -> anyhow::Resul
     let request = request(arguments, &used, common)?;
     let used = arguments.lens.state.apply(used, request.reference_nm(), common)?;
     // The place is tried before the work.
-    let staged = arguments.out.as_ref().map(|path| Staged::folder(path)).transpose()?.map(guarded);
+    let staged = arguments.out.as_ref().map(|path| Staged::folder(path)).transpose()?;
     let bar = Bar::new(common.quiet);
     bar.show("tracing the lens", 0.0);
     let analysis = request.compute(&used.lens)?;

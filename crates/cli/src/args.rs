@@ -9,9 +9,11 @@ use dioptric_pipeline::{BlurSpec, BorderSpec, Crop, DualPixelSpec, ExrSamples, F
 pub(crate) use crate::common::Common;
 use crate::{
     camera::{CameraCommand, SensorCommand},
+    examples::with_examples,
     filter::FilterCommand,
     lens_args::{BandArgs, FilmArgs, GlassCommand, LensArgs, LensCommand, LensStateArgs},
     measure_args::MeasureCommand,
+    ranges,
     render_args::{CompareArgs, LightFieldArgs, RenderArgs},
     show::ShowArgs,
     sweep::SweepArgs,
@@ -33,13 +35,17 @@ pub(crate) struct Cli {
 impl Cli {
     /// Returns the words of the program.
     pub(crate) fn words() -> clap::Command {
-        takes_negative_numbers(Self::command())
+        with_examples(takes_negative_numbers(Self::command()))
     }
 
-    /// Reads a command line, the name of the program first.
-    pub(crate) fn read<T: Into<OsString> + Clone>(line: impl IntoIterator<Item = T>) -> Result<Self, clap::Error> {
-        let mut matches = Self::words().try_get_matches_from(line)?;
-        Self::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut Self::words()))
+    /// Reads a command line, the name of the program first, with whether its numbers are in their ranges.
+    pub(crate) fn read<T: Into<OsString> + Clone>(
+        line: impl IntoIterator<Item = T>,
+    ) -> Result<(Self, anyhow::Result<()>), clap::Error> {
+        let mut words = Self::words();
+        let mut matches = words.try_get_matches_from_mut(line)?;
+        let in_range = ranges::check(&words, &matches);
+        Ok((Self::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut words))?, in_range))
     }
 }
 
@@ -151,7 +157,7 @@ pub(crate) struct RunArgs {
     /// Scene to photograph: spectral EXR, ENVI header, `ISETCam` .mat, folder of band PNGs, or a picture
     #[arg(long, value_name = "FILE", help_heading = heading::SCENE)]
     pub(crate) scene: Option<PathBuf>,
-    /// Folder for the results [default: dioptric-out, or that of --from]
+    /// Folder for the results [default: dioptric-out; with --from DIR, DIR-changed]
     #[arg(long, short, value_name = "DIR", help_heading = heading::RESULTS)]
     pub(crate) out: Option<PathBuf>,
     /// Continues from the folder of a finished run: its camera, and its irradiance where no change touches it
@@ -160,10 +166,6 @@ pub(crate) struct RunArgs {
     /// Continues a killed run to the same folder from the bands that it finished
     #[arg(long, conflicts_with = "from", help_heading = heading::RESULTS)]
     pub(crate) resume: bool,
-    /// Memory that scene, imaging and film may take, as 1GiB or 500MB; what does not fit goes through files [default: half of the
-    /// machine's]
-    #[arg(long, value_name = "BYTES", help_heading = heading::SIMULATION)]
-    pub(crate) memory: Option<String>,
     /// How finely the picture is simulated
     #[arg(long, value_name = "QUALITY", value_enum, default_value = "full", help_heading = heading::SIMULATION)]
     pub(crate) quality: QualityKind,

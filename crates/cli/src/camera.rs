@@ -2,21 +2,19 @@
 
 use std::{
     fmt::Write,
-    fs,
     path::{Path, PathBuf},
 };
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::{Args, Subcommand};
 use dioptric_analysis::{built_in_sensors, pixel_optics_rows};
-use dioptric_pipeline::{
-    CAMERA_SCHEMA, CAMERA_TEMPLATE, Camera, KeptCamera, SENSOR_SCHEMA, SensorSpec, Staged, parse_numbers,
-};
+use dioptric_files::{is_stream, write};
+use dioptric_pipeline::{CAMERA_SCHEMA, CAMERA_TEMPLATE, Camera, KeptCamera, SENSOR_SCHEMA, SensorSpec, parse_numbers};
 use serde_json::json;
 
 use crate::{
     common::Common,
-    terminal::{guarded, print, print_json, remark},
+    terminal::{print, print_json, remark},
 };
 
 /// Something to do with camera files.
@@ -125,12 +123,10 @@ fn optics(arguments: &PixelOpticsArgs, common: &Common) -> anyhow::Result<()> {
 /// Writes a file that is not there yet, or to standard output.
 pub(crate) fn write_new(path: Option<&Path>, text: &str, common: &Common) -> anyhow::Result<()> {
     let Some(path) = path else { return print(text) };
-    if path.exists() {
+    if path.exists() && !is_stream(path) {
         bail!("{} is there already; expected the name of a new file", path.display());
     }
-    let staged = guarded(Staged::file(path)?);
-    fs::write(staged.path(), text).with_context(|| format!("cannot write {}", path.display()))?;
-    staged.commit()?;
+    write(path, text.as_bytes())?;
     remark(common.quiet, &format!("wrote {}", path.display()));
     Ok(())
 }

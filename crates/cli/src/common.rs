@@ -1,6 +1,7 @@
 //! Options of every command.
 
 use clap::Args;
+use dioptric_pipeline::parse_bytes;
 
 /// Options of every command.
 #[derive(Clone, Debug, Args)]
@@ -9,7 +10,10 @@ pub(crate) struct Common {
     /// Prints numbers as JSON
     #[arg(long, global = true)]
     pub(crate) json: bool,
-    /// Uses N threads [default: one a core]; results do not depend on it
+    /// Memory that the program may take, as 1GiB or 500MB: what does not fit goes through files or is refused [default: half of the machine's]
+    #[arg(long, global = true, value_name = "BYTES", value_parser = parse_bytes)]
+    pub(crate) memory: Option<u64>,
+    /// Uses N threads, at most 4 per core [default: 1 per core]; results do not depend on it
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) threads: Option<u16>,
     /// Draws all noise from this seed [default: the camera file's, or 1]

@@ -12,7 +12,7 @@ use crate::{
     lens::tell,
     render_args::CompareArgs,
     run::Clock,
-    terminal::{guarded, print, print_json, remark},
+    terminal::{print, print_json, remark},
 };
 
 pub(crate) fn run(arguments: &CompareArgs, common: &Common) -> anyhow::Result<()> {
@@ -22,7 +22,7 @@ pub(crate) fn run(arguments: &CompareArgs, common: &Common) -> anyhow::Result<()
         spec.seed = common.seed.unwrap_or(spec.seed);
     }
     camera.validate()?;
-    let staged = guarded(Staged::folder(&arguments.out)?);
+    let staged = Staged::folder(&arguments.out)?;
     let clock = Clock::new(common.quiet);
     let comparison = MethodComparison::of(&camera, &clock, &Cancel::new())?;
     write_comparison(&comparison, staged.path())?;

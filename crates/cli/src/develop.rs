@@ -9,7 +9,7 @@ use crate::{
     args::{Common, DevelopArgs},
     lens::tell,
     run::picture_options,
-    terminal::{guarded, print, print_json},
+    terminal::{print, print_json},
 };
 
 pub(crate) fn run(arguments: &DevelopArgs, common: &Common) -> anyhow::Result<()> {
@@ -19,7 +19,7 @@ pub(crate) fn run(arguments: &DevelopArgs, common: &Common) -> anyhow::Result<()
     };
     picture_options(&arguments.picture).apply(&mut processing)?;
     let also = arguments.also.as_deref().map_or(Ok(Vec::new()), FrameFile::parse_list)?;
-    let staged = guarded(Staged::folder(&arguments.out)?);
+    let staged = Staged::folder(&arguments.out)?;
     let developed = DevelopedFile::read(&arguments.raw, processing)?;
     let report = DngReport::new(&developed);
     developed.write_pictures(&also, staged.path())?;

@@ -26,6 +26,10 @@ fn root() -> PathBuf {
 /// Every page in this folder, and in those below it.
 fn pages_in(folder: &Path, depth: usize, pages: &mut Vec<Page>) {
     for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        // Notes are dated, and keep the words of their time.
+        if entry.ends_with("docs/notes") {
+            continue;
+        }
         if entry.is_dir() && depth > 0 {
             pages_in(&entry, depth - 1, pages);
         } else if entry.extension().is_some_and(|extension| extension == "md") {

@@ -7,15 +7,16 @@ use dioptric_analysis::{
     ConfigurationData, LensData, LensInfoRequest, SurfaceRow, built_in_lenses, convert_lens, placement_lines,
     surface_rows,
 };
+use dioptric_files::{Staged, write};
 use dioptric_pipeline::{
-    LensReadOptions, PipelineError, REFERENCE_WAVELENGTH_NM, Staged, nearest_to_reference_nm, parse_numbers,
+    LensReadOptions, PipelineError, REFERENCE_WAVELENGTH_NM, nearest_to_reference_nm, parse_numbers,
 };
 use dioptric_report::{LensDrawing, check_drawing_name, drawing_file};
 
 use crate::{
     args::Common,
     lens_args::{LensCommand, LensDrawArgs, LensInfoArgs},
-    terminal::{guarded, print, print_json, remark},
+    terminal::{print, print_json, remark},
 };
 
 pub(crate) fn run(command: &LensCommand, common: &Common) -> anyhow::Result<()> {
@@ -60,19 +61,13 @@ fn convert(input: &str, output: &Path, reading: &LensReadOptions, common: &Commo
                 "{beside}: the lens needs a glass catalogue of this name, which is there already; choose another name"
             );
         }
-        write(&beside, &glasses)?;
+        write(&beside, glasses.as_bytes())?;
         remark(common.quiet, &format!("wrote the lens's own glasses to {}", beside.display()));
     }
-    write(output, &converted.text)?;
+    write(output, converted.text.as_bytes())?;
     tell(&converted.notes, common);
     remark(common.quiet, &format!("wrote {}", output.display()));
     Ok(())
-}
-
-fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    let staged = guarded(Staged::file(path)?);
-    fs::write(staged.path(), text).with_context(|| format!("cannot write {}", path.display()))?;
-    Ok(staged.commit()?)
 }
 
 fn list(common: &Common) -> anyhow::Result<()> {
@@ -232,6 +227,8 @@ fn number(key: &str, value: &serde_json::Value) -> String {
 
 fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     check_drawing_name(&arguments.output)?;
+    // The place is tried before the work.
+    let staged = Staged::file(&arguments.output)?;
     let used = arguments.lens.open(common)?;
     let mut taken = Vec::new();
     let wavelengths_nm = match arguments.bands.nm()? {
@@ -271,7 +268,6 @@ fn draw(arguments: &LensDrawArgs, common: &Common) -> anyhow::Result<()> {
     let drawing = LensDrawing { fields_deg, distance_mm, wavelengths_nm, film_distance_mm };
     let path = &arguments.output;
     let bytes = drawing_file(&drawing.to_svg(&used.lens)?, path)?;
-    let staged = guarded(Staged::file(path)?);
     fs::write(staged.path(), bytes).with_context(|| format!("cannot write {}", path.display()))?;
     staged.commit()?;
     remark(common.quiet, &format!("wrote {}", path.display()));

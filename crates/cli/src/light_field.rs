@@ -1,6 +1,5 @@
 //! `dioptric lightfield`: views, refocused pictures and depth of a light-field camera.
 
-use anyhow::bail;
 use dioptric_pipeline::{
     Camera, DepthSearch, ExrSamples, IRRADIANCE_FILE, Irradiance, KeptCamera, LightField, RenderEffort, SceneSource,
     Staged,
@@ -13,7 +12,7 @@ use crate::{
     paintings::painting_folder,
     render_args::LightFieldArgs,
     run::Clock,
-    terminal::{guarded, print, print_json},
+    terminal::{print, print_json},
 };
 
 /// Refocused pictures where no depths are asked for.
@@ -27,12 +26,9 @@ pub(crate) fn run(arguments: &LightFieldArgs, common: &Common) -> anyhow::Result
         spec.effort = arguments.samples.map_or(spec.effort, RenderEffort::Samples);
         spec.seed = common.seed.unwrap_or(spec.seed);
     }
-    if let Some(wrong) = arguments.refocus_m.iter().find(|depth_m| depth_m.is_nan() || **depth_m <= 0.0) {
-        bail!("--refocus-m has {wrong}, expected depths above 0 m");
-    }
     let kept = KeptCamera::new(camera).with_paintings(painting_folder());
     kept.check()?;
-    let staged = guarded(Staged::folder(&arguments.out)?);
+    let staged = Staged::folder(&arguments.out)?;
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
     let n_views = arguments.views.map(usize::from);
     let field = match &arguments.irradiance {

@@ -9,6 +9,7 @@ mod camera;
 mod common;
 mod compare;
 mod develop;
+mod examples;
 mod filter;
 mod glass;
 mod lens;
@@ -20,6 +21,7 @@ mod memory;
 mod movement_args;
 mod paintings;
 mod psf;
+mod ranges;
 mod render;
 mod render_args;
 mod run;
@@ -39,6 +41,7 @@ mod documentation;
 use std::process::ExitCode;
 
 use anyhow::Context;
+use dioptric_files::WriteError;
 
 use crate::{
     args::{Cli, Command, Common},
@@ -46,15 +49,15 @@ use crate::{
 };
 
 fn main() -> ExitCode {
-    let cli = Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
+    let (cli, in_range) = Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
     terminal::remove_partial_files_on_interrupt();
     if !matches!(cli.command, Command::Studio(_)) {
         memory::keep_freed();
     }
-    match dispatch(cli) {
+    match in_range.and_then(|()| dispatch(cli)) {
         Ok(()) => ExitCode::SUCCESS,
         // Whoever read the output has seen enough.
-        Err(error) if error.is::<ClosedPipe>() => ExitCode::SUCCESS,
+        Err(error) if error.is::<ClosedPipe>() || is_closed(&error) => ExitCode::SUCCESS,
         Err(error) => {
             terminal::print_error(&error);
             ExitCode::FAILURE
@@ -62,7 +65,13 @@ fn main() -> ExitCode {
     }
 }
 
+/// Whether a file could not be written since nobody reads it any more.
+fn is_closed(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<WriteError>().is_some_and(|error| error.is_closed)
+}
+
 fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
+    dioptric_files::memory::allow(common.memory);
     use_threads(&common)?;
     match command {
         Command::Run(arguments) => run::run(&arguments, &common),
@@ -88,10 +97,21 @@ fn dispatch(Cli { command, common }: Cli) -> anyhow::Result<()> {
     }
 }
 
+/// More threads than these only take memory.
+const THREADS_PER_CORE: usize = 4;
+
 fn use_threads(common: &Common) -> anyhow::Result<()> {
-    let Some(n_threads) = common.threads else { return Ok(()) };
+    let Some(asked) = common.threads.map(usize::from) else { return Ok(()) };
+    let most = THREADS_PER_CORE * std::thread::available_parallelism().map_or(1, usize::from);
+    let n_threads = asked.min(most);
+    if n_threads < asked {
+        terminal::remark(
+            common.quiet,
+            &format!("{n_threads} threads in place of {asked}: {THREADS_PER_CORE} per core"),
+        );
+    }
     rayon::ThreadPoolBuilder::new()
-        .num_threads(n_threads.into())
+        .num_threads(n_threads)
         .build_global()
         .with_context(|| format!("cannot start {n_threads} threads"))
 }

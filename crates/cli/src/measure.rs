@@ -14,7 +14,7 @@ use dioptric_report::{MeasurementWords, write_measurement};
 use crate::{
     args::Common,
     measure_args::{ColorArgs, CurveKind, MeasureCommand, MtfArgs, NoiseArgs, SpotArgs, TextureArgs},
-    terminal::{guarded, print, print_json, remark_on_png},
+    terminal::{print, print_json, remark_on_png},
 };
 
 /// The seed where the user gives none.
@@ -100,7 +100,7 @@ fn noise(arguments: &NoiseArgs, common: &Common) -> anyhow::Result<()> {
             // Frames and numbers may go to the same folder.
             let is_shared = arguments.keep_frames == arguments.out;
             let own = arguments.keep_frames.as_deref().filter(|_| !is_shared);
-            let kept = own.map(Staged::folder).transpose()?.map(guarded);
+            let kept = own.map(Staged::folder).transpose()?;
             let folder = if is_shared { finish.staged.as_ref() } else { kept.as_ref() };
             let data = measure_bench(&request, folder.map(Staged::path))?;
             kept.map_or(Ok(()), Staged::commit)?;
@@ -168,7 +168,7 @@ impl<'a> Finish<'a> {
         folder: Option<&Path>,
         common: &'a Common,
     ) -> anyhow::Result<Self> {
-        let staged = folder.map(Staged::folder).transpose()?.map(guarded);
+        let staged = folder.map(Staged::folder).transpose()?;
         Ok(Self { name, title, subject, common, staged })
     }
 

@@ -1,19 +1,4 @@
-//! How much memory a run may take.
-
-use std::fs;
-
-use dioptric_pipeline::parse_bytes;
-
-/// The share of the machine's memory that a run takes where nothing else is asked for: one in so many.
-const SHARE: u64 = 2;
-
-/// Returns the bytes that were asked for, or a share of the machine's; `None` where nothing tells how much it has.
-pub(crate) fn memory_budget(asked: Option<&str>) -> anyhow::Result<Option<u64>> {
-    match asked {
-        Some(text) => Ok(Some(parse_bytes(text)?)),
-        None => Ok(fs::read_to_string("/proc/meminfo").ok().as_deref().and_then(total_bytes).map(|all| all / SHARE)),
-    }
-}
+//! The allocator of a run.
 
 /// Gives memory that was freed back to the system where the allocator would keep it: kernels of a lens are many small pieces, and one of them
 /// that stays holds megabytes of freed ones.
@@ -82,23 +67,3 @@ pub(crate) fn give_back_at_once() {}
 /// Other allocators give back what they see fit.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub(crate) fn give_back_freed() {}
-
-/// Returns the memory that Linux says the machine has.
-fn total_bytes(meminfo: &str) -> Option<u64> {
-    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kibibytes.checked_mul(1024)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn memory_of_the_machine_is_read() {
-        assert_eq!(total_bytes("MemTotal:       16316412 kB\nMemFree: 1 kB\n"), Some(16_316_412 * 1024));
-        assert_eq!(total_bytes("MemFree: 1 kB\n"), None);
-        assert_eq!(memory_budget(Some("1GiB")).unwrap(), Some(1 << 30));
-        assert!(memory_budget(Some("much")).is_err());
-    }
-}

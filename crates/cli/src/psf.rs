@@ -11,7 +11,7 @@ use crate::{
     args::{Common, PsfArgs, PsfMode},
     lens::{list_of, tell, tell_taken},
     run::{diffraction, with_gamma},
-    terminal::{Bar, fixed, guarded, print, print_json, remark, remark_on_png},
+    terminal::{Bar, fixed, print, print_json, remark, remark_on_png},
 };
 
 /// Pixels of a plot as PNG for each of the drawing's own.
@@ -52,9 +52,9 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
     tell(&notes, common);
     // The place is tried before the work.
     let format = arguments.output.as_deref().map(PsfFormat::of).transpose()?;
-    let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
-    let csv = arguments.csv.as_ref().map(|path| Staged::file(path)).transpose()?.map(guarded);
-    let plots = arguments.plots.as_ref().map(|folder| Staged::folder(folder)).transpose()?.map(guarded);
+    let staged = arguments.output.as_ref().map(|path| Staged::file(path)).transpose()?;
+    let csv = arguments.csv.as_ref().map(|path| Staged::file(path)).transpose()?;
+    let plots = arguments.plots.as_ref().map(|folder| Staged::folder(folder)).transpose()?;
     let bar = Bar::new(common.quiet);
     bar.show("tracing the lens", 0.0);
     let set = request.compute(&lens)?;
@@ -63,6 +63,7 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         true => with_polychromatic(&set, &request.mtf_per_mm),
         false => set.rows.clone(),
     };
+    let is_printed = [&staged, &csv].into_iter().flatten().any(Staged::is_standard_output);
     if let (Some(staged), Some(path)) = (csv, &arguments.csv) {
         std::fs::write(staged.path(), psf_csv(&rows))?;
         staged.commit()?;
@@ -86,7 +87,11 @@ pub(crate) fn run(arguments: &PsfArgs, common: &Common) -> anyhow::Result<()> {
         remark(common.quiet, &format!("wrote plots into {}", folder.display()));
         remark_on_png(common.quiet);
     }
-    if common.json { print_json(&rows) } else { print(&table(&set, &rows)?) }
+    match (is_printed, common.json) {
+        (true, _) => Ok(()),
+        (false, true) => print_json(&rows),
+        (false, false) => print(&table(&set, &rows)?),
+    }
 }
 
 /// Which points are looked at, and where the film is.

@@ -3,7 +3,6 @@
 use std::{
     fs,
     path::Path,
-    process,
     time::{Duration, Instant},
 };
 
@@ -23,7 +22,7 @@ use crate::{
     lens::tell,
     render_args::RenderArgs,
     run::{Clock, parse_size, stem_of, summary},
-    terminal::{guard, guarded, print, print_json, remark},
+    terminal::{print, print_json, remark},
 };
 
 /// The name of a checkpoint.
@@ -226,7 +225,6 @@ fn refine(arguments: &RenderArgs, (render, clock, cancel): Job<'_>) -> anyhow::R
     let out = &arguments.out;
     make_folder(out)?;
     let (state, identity) = (out.join(STATE), render.identity(effort));
-    guard(state.with_extension(format!("{}.partial", process::id())));
     let mut renderer = render.renderer()?;
     if arguments.resume && state.exists() {
         renderer.resume(&state, &identity)?;
@@ -266,7 +264,7 @@ fn finish(
 ) -> anyhow::Result<()> {
     let out = &arguments.out;
     kept.keep_irradiance(rendering.picture.clone())?;
-    let staged = guarded(Staged::folder(out)?);
+    let staged = Staged::folder(out)?;
     let capture = kept.capture(clock, cancel)?;
     let (model, depth) = (kept.model(clock, cancel)?, kept.depth(clock, cancel)?);
     clock.at(Stage::Report, 0.0);
@@ -331,7 +329,7 @@ fn render_without_sensor(
     }
     let rendering = refine(arguments, job)?;
     let out = &arguments.out;
-    let staged = guarded(Staged::folder(out)?);
+    let staged = Staged::folder(out)?;
     clock.at(Stage::Report, 0.0);
     render.write_files(&rendering, &render.auxiliary(cancel)?, staged.path())?;
     write_seen_png(&rendering.picture, 1, &staged.path().join("picture.png"))?;

@@ -1,7 +1,7 @@
 //! `dioptric run`: the whole of Figure 1.
 
 use std::{
-    path::Path,
+    path::{Path, PathBuf},
     sync::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicUsize, Ordering},
@@ -11,6 +11,7 @@ use std::{
 
 use anyhow::{Context, bail};
 use dioptric_analysis::{Run, RunReport, RunTimes};
+use dioptric_files::memory;
 use dioptric_pipeline::{
     BlurSpec, Camera, Clock as PartClock, Diffraction, FilmSpec, FlatSize, FocusSpec, FrameFile, FramesSpec,
     ImagingTimes, KeptCamera, LensReadOptions, LensSpec, PictureOptions, Progress, Quality, RetiredBank, SceneSpec,
@@ -23,9 +24,9 @@ use dioptric_spectrum::Cancel;
 use crate::{
     args::{Common, DiffractionKind, DualPixelArg, FilmKind, FrameArgs, PictureArgs, QualityKind, RunArgs},
     lens::tell,
-    memory::{give_back_at_once, give_back_freed, memory_budget},
+    memory::{give_back_at_once, give_back_freed},
     paintings::{build, painting_folder},
-    terminal::{Bar, guarded, print, print_json, remark},
+    terminal::{Bar, print, print_json, remark},
 };
 
 /// Where results go when nothing else is asked for.
@@ -34,8 +35,12 @@ pub(crate) const OUT: &str = "dioptric-out";
 pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     let kept = camera_of(arguments, common)?;
     kept.camera().validate()?;
-    let out = arguments.out.as_deref().or(arguments.from.as_deref()).unwrap_or(Path::new(OUT));
-    let staged = guarded(Staged::folder(out)?);
+    let out = &*match (&arguments.out, &arguments.from) {
+        (Some(out), _) => out.clone(),
+        (None, Some(from)) => beside(from),
+        (None, None) => PathBuf::from(OUT),
+    };
+    let staged = Staged::folder(out)?;
     let kept = match build() {
         Some(build) => kept.with_bands_kept_in(staged.root(), build),
         None => kept,
@@ -43,7 +48,7 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     if arguments.resume && !kept.take_bands(&staged.leftovers())? {
         remark(common.quiet, "no killed run of this camera left bands here: it starts from the beginning");
     }
-    let (clock, cancel) = (Clock::new(common.quiet).sparing(arguments.memory.is_some()), Cancel::new());
+    let (clock, cancel) = (Clock::new(common.quiet).sparing(common.memory.is_some()), Cancel::new());
     let capture = kept.capture(&clock, &cancel)?;
     let model = kept.model(&clock, &cancel)?;
     let depth = kept.depth(&clock, &cancel)?;
@@ -76,6 +81,14 @@ pub(crate) fn run(arguments: &RunArgs, common: &Common) -> anyhow::Result<()> {
     if common.quiet { Ok(()) } else { print(&summary(&report, total_s, out)) }
 }
 
+/// Returns the folder of a run that continues another without being told where to: that of the other stays.
+fn beside(from: &Path) -> PathBuf {
+    let from = from.canonicalize().unwrap_or_else(|_| from.to_owned());
+    let mut name = from.file_name().unwrap_or_default().to_owned();
+    name.push("-changed");
+    from.with_file_name(name)
+}
+
 /// What is to be known of a budget for a run that is continued.
 const MEMORY_WITH_FROM: &str =
     "--memory limits scene and imaging: the irradiance of the run that is continued is read whole beside it";
@@ -86,7 +99,7 @@ pub(crate) fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<
         (Some(folder), _) => {
             let resumed = KeptCamera::resume(folder)?;
             tell(&resumed.notes, common);
-            if arguments.memory.is_some() {
+            if common.memory.is_some() {
                 tell(&[MEMORY_WITH_FROM.to_owned()], common);
             }
             resumed.camera
@@ -117,7 +130,7 @@ pub(crate) fn camera_of(arguments: &RunArgs, common: &Common) -> anyhow::Result<
         QualityKind::Full => Quality::Full,
     };
     let kept = kept.with(|own| *own = camera).with_quality(quality).with_paintings(painting_folder());
-    let kept = match memory_budget(arguments.memory.as_deref())? {
+    let kept = match memory::allowed_bytes() {
         Some(bytes) => kept.with_memory_budget(bytes),
         None => kept,
     };
@@ -429,7 +442,7 @@ mod tests {
     use crate::args::{Cli, Command};
 
     fn try_camera(options: &[&str]) -> anyhow::Result<Camera> {
-        let cli = Cli::read([&["dioptric", "run"], options].concat())?;
+        let cli = Cli::read([&["dioptric", "run"], options].concat())?.0;
         let Command::Run(arguments) = &cli.command else { panic!("another command") };
         let kept = camera_of(arguments, &cli.common)?;
         kept.camera().validate()?;

@@ -12,7 +12,7 @@ use crate::{
     args::{Common, SenseArgs},
     lens::tell,
     run::{frames_of, sensor_options},
-    terminal::{guarded, print, print_json},
+    terminal::{print, print_json},
 };
 
 pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> {
@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &SenseArgs, common: &Common) -> anyhow::Result<()> 
             ..Outputs::default()
         },
     };
-    let staged = guarded(Staged::folder(&arguments.out)?);
+    let staged = Staged::folder(&arguments.out)?;
     let sensed = request.sense(&arguments.irradiance)?;
     let statistics = write_sensed(&sensed, &request.outputs, staged.path())?;
     staged.commit()?;

@@ -16,7 +16,7 @@ use crate::{
     camera::write_new,
     common::Common,
     paintings::painting_folder,
-    terminal::{Bar, guard, print, print_json, remark},
+    terminal::{Bar, print, print_json, remark},
 };
 
 /// A sweep to make or to look at.
@@ -116,7 +116,6 @@ fn make(plan: &Path, arguments: &SweepArgs, common: &Common) -> anyhow::Result<(
         return count(&sweep, &store, shard, common);
     }
     let place = store.begin()?;
-    guard(place.path().to_owned());
     let bar = ItemBar { bar: Bar::new(common.quiet), items: Mutex::new((0, sweep.len())) };
     let made = sweep.make(&place, shard, arguments.limit, &bar, &Cancel::new())?;
     drop((place, bar));

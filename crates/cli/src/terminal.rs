@@ -6,21 +6,18 @@ use std::{
     borrow::Cow,
     fmt,
     io::{self, IsTerminal, Write},
-    path::{Path, PathBuf},
-    sync::{LazyLock, Mutex, PoisonError},
+    path::Path,
     time::Duration,
 };
 
-use dioptric_pipeline::{PipelineError, SceneLack, Staged, has_kept_bands};
+use dioptric_files::unfinished;
+use dioptric_pipeline::{PipelineError, SceneLack, has_kept_bands};
 use dioptric_report::{DRAWS_PNG, PNG_REMEDY};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 /// The status of a program that an interrupt ended.
 const INTERRUPTED: i32 = 130;
-
-/// Half-written results, to be removed on an interrupt.
-static PARTIAL: LazyLock<Mutex<Vec<PathBuf>>> = LazyLock::new(|| Mutex::new(Vec::new()));
 
 /// Whoever read standard output is gone.
 #[derive(Debug)]
@@ -59,7 +56,7 @@ pub(crate) fn output_error(error: io::Error) -> anyhow::Error {
 /// Prints an error and its causes as one sentence on one line.
 pub(crate) fn print_error(error: &anyhow::Error) {
     // After an interrupt this waits for the end: what then cannot be written was just removed.
-    let _partial = PARTIAL.lock().unwrap_or_else(PoisonError::into_inner);
+    let _held = unfinished();
     let remedy = error.chain().filter_map(|cause| cause.downcast_ref()).find_map(remedy).unwrap_or_default();
     let sentence = format!("{error:#}{remedy}");
     let words: Vec<&str> = sentence.split_whitespace().collect();
@@ -96,9 +93,9 @@ pub(crate) fn remark_on_png(quiet: bool) {
 /// Removes half-written results when the user interrupts the program, but for bands from which the same run can go on.
 pub(crate) fn remove_partial_files_on_interrupt() {
     let removed = ctrlc::set_handler(|| {
-        let partial = PARTIAL.lock().unwrap_or_else(PoisonError::into_inner);
-        let (kept, unfinished): (Vec<_>, Vec<_>) = partial.iter().partition(|path| has_kept_bands(path));
-        unfinished.into_iter().for_each(|path| remove(path));
+        let held = unfinished();
+        let (kept, partial): (Vec<_>, Vec<_>) = held.iter().partition(|path| has_kept_bands(path));
+        partial.into_iter().for_each(|path| remove(path));
         for folder in kept {
             // Standard error may be closed too; then there is nobody to tell.
             let words = "with --resume the same command goes on from its bands, and without removes them";
@@ -119,17 +116,6 @@ fn remove(path: &Path) {
         let gone = Path::new(&gone);
         let _ = if gone.is_dir() { std::fs::remove_dir_all(gone) } else { std::fs::remove_file(gone) };
     }
-}
-
-/// Makes results known, so that an interrupt removes them while they are half-written.
-pub(crate) fn guarded(staged: Staged) -> Staged {
-    PARTIAL.lock().unwrap_or_else(PoisonError::into_inner).push(staged.root().to_owned());
-    staged
-}
-
-/// Makes a file known that an interrupt may leave half-written.
-pub(crate) fn guard(path: PathBuf) {
-    PARTIAL.lock().unwrap_or_else(PoisonError::into_inner).push(path);
 }
 
 /// A progress bar, shown on a terminal only.

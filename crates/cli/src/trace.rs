@@ -1,21 +1,18 @@
 //! `dioptric trace`: rays from a table through a lens.
 
-use std::{fs::File, io, path::Path};
+use std::{fs::File, io};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use dioptric_analysis::{RayTable, TraceError, TraceSettings};
 use dioptric_pipeline::Staged;
 
 use crate::{
     args::{Common, TraceArgs},
     lens::tell,
-    terminal::{guarded, output_error, remark},
+    terminal::{output_error, remark},
 };
 
 pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> {
-    if let Some(film_mm) = arguments.film_mm.filter(|mm| !mm.is_finite()) {
-        bail!("--film-mm is {film_mm}, expected a finite number of mm behind the last vertex");
-    }
     let used = arguments.lens.open(common)?;
     let wavelength_nm = used.wavelength_or_usual();
     let lens = arguments.lens.state.apply(used, wavelength_nm, common)?.lens;
@@ -26,16 +23,12 @@ pub(crate) fn run(arguments: &TraceArgs, common: &Common) -> anyhow::Result<()> 
         let out = io::BufWriter::new(io::stdout().lock());
         return rays.trace(&lens, &settings, out).map_err(without_closed_pipe);
     };
-    let staged = guarded(Staged::file(path)?);
-    let file = create(staged.path())?;
+    let staged = Staged::file(path)?;
+    let file = File::create(staged.path()).with_context(|| format!("cannot write {}", path.display()))?;
     rays.trace(&lens, &settings, io::BufWriter::new(file))?;
     staged.commit()?;
     remark(common.quiet, &format!("wrote {}", path.display()));
     Ok(())
-}
-
-fn create(path: &Path) -> anyhow::Result<File> {
-    File::create(path).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn without_closed_pipe(error: TraceError) -> anyhow::Error {

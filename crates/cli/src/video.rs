@@ -10,7 +10,7 @@ use crate::{
     args::{Common, VideoArgs},
     lens::tell,
     run::{Clock, OUT, camera_of},
-    terminal::{guarded, print, print_json},
+    terminal::{print, print_json},
 };
 
 pub(crate) fn run(arguments: &VideoArgs, common: &Common) -> anyhow::Result<()> {
@@ -22,7 +22,7 @@ pub(crate) fn run(arguments: &VideoArgs, common: &Common) -> anyhow::Result<()> 
     let kept = kept.with(|camera| camera.video = Some(spec));
     kept.camera().validate()?;
     let out = arguments.camera.out.as_deref().unwrap_or(Path::new(OUT));
-    let staged = guarded(Staged::folder(out)?);
+    let staged = Staged::folder(out)?;
     let (clock, cancel) = (Clock::new(common.quiet), Cancel::new());
     let video = kept.video(&clock, &cancel)?;
     let mut frames = Vec::new();

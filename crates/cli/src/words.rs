@@ -8,7 +8,7 @@ use dioptric_pipeline::Staged;
 
 use crate::{
     args::{Cli, Common},
-    terminal::{guarded, print, remark},
+    terminal::{print, remark},
 };
 
 /// Prints what completes the words in a shell.
@@ -20,7 +20,7 @@ pub(crate) fn completions(shell: Shell) -> anyhow::Result<()> {
 
 /// Writes a page for each command.
 pub(crate) fn manual(folder: &Path, common: &Common) -> anyhow::Result<()> {
-    let staged = guarded(Staged::folder(folder)?);
+    let staged = Staged::folder(folder)?;
     clap_mangen::generate_to(Cli::words(), staged.path())
         .with_context(|| format!("cannot write to {}", folder.display()))?;
     let n_pages = fs::read_dir(staged.path()).with_context(|| folder.display().to_string())?.count();

@@ -8,7 +8,7 @@ mod common;
 use std::{
     fs,
     path::Path,
-    process::{Command, Stdio},
+    process::{Child, Command, Stdio},
     thread::sleep,
     time::Duration,
 };
@@ -40,6 +40,13 @@ fn peak_mib(folder: &Path, mib: u64, out: &str) -> Result<u64, String> {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
+    let most = watched(&mut run);
+    let ended = run.wait_with_output().unwrap();
+    if ended.status.success() { Ok(most) } else { Err(String::from_utf8_lossy(&ended.stderr).into_owned()) }
+}
+
+/// Waits for the end of a process; returns the most that it had resident, MiB.
+fn watched(run: &mut Child) -> u64 {
     let status = format!("/proc/{}/status", run.id());
     let mut most = 0;
     loop {
@@ -48,12 +55,10 @@ fn peak_mib(folder: &Path, mib: u64, out: &str) -> Result<u64, String> {
         let kib: Option<u64> = peak.and_then(|peak| peak.trim().strip_suffix("kB")?.trim().parse().ok());
         most = most.max(kib.unwrap_or_default().div_ceil(1024));
         if run.try_wait().unwrap().is_some() {
-            break;
+            return most;
         }
         sleep(Duration::from_millis(2));
     }
-    let ended = run.wait_with_output().unwrap();
-    if ended.status.success() { Ok(most) } else { Err(String::from_utf8_lossy(&ended.stderr).into_owned()) }
 }
 
 /// Runs the camera with the least memory that it asks for: what is known before the lens is traced, and then what the plan takes. Returns that and the most
@@ -100,4 +105,77 @@ fn paintings_and_photodiodes_are_within_the_least() {
         let [least_mib, peak_mib] = least_and_peak_mib(folder.path(), "least");
         assert!(peak_mib <= least_mib, "{peak_mib} of {least_mib} MiB: {parts:?}");
     }
+}
+
+/// Writes a picture of 1 bit per pixel, which is small as a file.
+fn write_large_png(path: &Path, side: u32) {
+    let mut encoder = png::Encoder::new(fs::File::create(path).unwrap(), side, side);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::One);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header().unwrap();
+    let mut stream = writer.stream_writer().unwrap();
+    let row = vec![0xf0; side.div_ceil(8) as usize];
+    (0..side).for_each(|_| std::io::Write::write_all(&mut stream, &row).unwrap());
+    stream.finish().unwrap();
+}
+
+/// Runs a command; returns the most that its process had resident, MiB, and what it said where it failed.
+fn peak_of(folder: &Path, arguments: &[&str]) -> (u64, Option<String>) {
+    let mut run = Command::new(env!("CARGO_BIN_EXE_dioptric"))
+        .args(arguments)
+        .args(["--threads", "2"])
+        .env("DIOPTRIC_CACHE", "")
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let most = watched(&mut run);
+    let ended = run.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    (most, Some(said).filter(|_| !ended.status.success()))
+}
+
+/// Pictures of 30,000 × 30,000 pixels in a file of a few megabytes, as whatever is read: refused from their header.
+#[test]
+fn pictures_that_fill_the_memory_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_large_png(&folder.path().join("large.png"), 30_000);
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    let world = "LookAt 0 0 -5 0 0 0 0 1 0\nCamera \"perspective\" \"float fov\" 40\nWorldBegin\n\
+                 Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"large.png\"\n\
+                 LightSource \"infinite\"\nMaterial \"diffuse\" \"texture reflectance\" \"t\"\nShape \"sphere\"\n";
+    fs::write(folder.path().join("world.pbrt"), world).unwrap();
+    fs::create_dir(folder.path().join("bands")).unwrap();
+    fs::hard_link(folder.path().join("large.png"), folder.path().join("bands/large-550.png")).unwrap();
+    for arguments in [
+        &["measure", "mtf", "large.png"][..],
+        &["measure", "spot", "large.png"],
+        &["show", "large.png", "--distance-mm", "600", "-o", "shown.exr"],
+        &["render", "world.pbrt", "--samples", "1", "-o", "rendered"],
+        &["run", "camera.ron", "--scene", "bands", "--depth-m", "2", "--fov-deg", "14", "--out", "run"],
+        // The film has as many pixels as the scene.
+        &["run", "camera.ron", "--scene", "large.png", "--depth-m", "2", "--fov-deg", "14", "--film", "scene"],
+    ] {
+        let (mib, said) = peak_of(folder.path(), arguments);
+        let said = said.unwrap_or_else(|| panic!("{arguments:?} was read"));
+        assert!(said.contains("large") && said.contains("GiB of memory and may take"), "{arguments:?}: {said}");
+        assert!(mib < 300, "{arguments:?}: {mib} MiB");
+    }
+}
+
+/// A picture that is finer than the film by far is read at the pixels that the film needs, and the same picture comes out.
+#[test]
+fn large_pictures_are_read_as_fine_as_the_film_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    write_large_png(&folder.path().join("large.png"), 6000);
+    fs::write(folder.path().join("camera.ron"), CAMERA).unwrap();
+    let line = "run camera.ron --scene large.png --depth-m 2 --fov-deg 14 --diffraction none --memory 700MiB --out out";
+    let (mib, said) = peak_of(folder.path(), &line.split(' ').collect::<Vec<_>>());
+    assert_eq!(said, None);
+    assert!(mib < 700, "{mib} MiB");
+    let report = fs::read_to_string(folder.path().join("out/report.json")).unwrap();
+    assert!(report.contains("6000 × 6000 pixels are read as"), "{report}");
 }

@@ -2,6 +2,7 @@
 
 /// A wave-optical point spread function or wavefront that cannot be had.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DiffractionError {
     /// No light of the point reaches the film.
     #[error("no light of the object point gets through the lens at {wavelength_nm} nm")]

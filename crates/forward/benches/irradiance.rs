@@ -4,9 +4,9 @@
 mod by_formula;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use dioptric_forward::{BlurMode, Film, PsfDomain, Settings, irradiance};
+use dioptric_forward::{BlurMode, Film, Settings, irradiance};
 use dioptric_optics::Lens;
-use dioptric_psf::{Diffraction, LensImageModel};
+use dioptric_psf::{Diffraction, ImageSettings, LensImageModel};
 use dioptric_spectrum::WavelengthGrid;
 
 fn scene_through_the_double_gauss(criterion: &mut Criterion) {
@@ -14,19 +14,10 @@ fn scene_through_the_double_gauss(criterion: &mut Criterion) {
     let grid = WavelengthGrid::uniform(460.0, 640.0, 60.0).expect("four bands");
     let scene = by_formula::scene(film.rows, film.columns, &grid).expect("its depths are positive");
     let lens = Lens::built_in("dgauss-50mm").and_then(|lens| lens.with_f_number(4.0, 550.0)).expect("it is built in");
-    let domain = PsfDomain {
-        lens: &lens,
-        film: &film,
-        film_distance_mm: lens
-            .at(550.0)
-            .and_then(|mono| mono.film_distance_mm_for(1000.0))
-            .expect("1 m can be in focus"),
-        depth_range_m: scene.depth.as_ref().expect("it has depth").range_m(),
-        grid: &grid,
-        diffraction: Diffraction::Hurb { gamma: 1.0 },
-    };
-    let settings = domain.settings().expect("the lens covers the film");
-    let bank = LensImageModel::build(&lens, &settings).expect("the lens passes light");
+    let film_distance_mm =
+        lens.at(550.0).and_then(|mono| mono.film_distance_mm_for(1000.0)).expect("1 m can be in focus");
+    let settings = ImageSettings::new(film_distance_mm, Diffraction::Hurb { gamma: 1.0 });
+    let bank = LensImageModel::new(&lens, grid.centers_nm(), &settings).expect("the lens passes light");
 
     let mut group = criterion.benchmark_group("irradiance/dgauss_f4");
     group.sample_size(10);

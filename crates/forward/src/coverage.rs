@@ -1,5 +1,7 @@
 //! Layers laid one behind the other until every pixel is covered.
 
+use std::sync::Arc;
+
 use ndarray::{Array2, Zip};
 
 use crate::rectangle::Rectangle;
@@ -13,13 +15,24 @@ pub(crate) struct Gathered {
 
 /// The picture so far, and what of each pixel no layer has covered yet.
 ///
-/// Along a ray of layers, nearest first, those in a row belong to one surface, which covers a pixel no more than once ("saturating coverage"): a continuous surface
-/// that spans many layers shows no seams. Where a layer has nothing between two that have, another surface begins behind the first. Which part of the pupil the first
-/// covers says nothing about which part the second does, so of the second as much is seen as the first leaves uncovered.
+/// Layers in a row, nearest first, belong to one surface, which covers a pixel no more than once ("saturating coverage"): a continuous surface that spans many layers
+/// shows no seams. Where a layer has nothing between two that have, another surface begins behind the first. Beside the edge of the first, where the chief ray passes
+/// it, what is blurred to the same side of the focus is seen through the part of the pupil that the first leaves: it may cover all of that. Elsewhere, which part of the
+/// pupil the first covers says nothing about which part the second does: as much of it is seen as the first leaves (docs/forward.md 3).
 pub(crate) struct Composite {
     light: Array2<f32>,
     /// Where layers hide each other.
     pixels: Array2<Covered>,
+    chief: Arc<ChiefLayers>,
+}
+
+/// The layers that the chief rays of a film meet first.
+#[derive(Debug, Default)]
+pub(crate) struct ChiefLayers {
+    /// Row by row; empty where layers do not hide each other.
+    pub(crate) first: Vec<u16>,
+    /// Of each layer.
+    pub(crate) is_beyond_focus: Vec<bool>,
 }
 
 /// What of a pixel is covered so far.
@@ -33,13 +46,28 @@ struct Covered {
     layer: u16,
 }
 
+/// What the chief ray of a pixel meets first, as a layer, and which layers lie beyond the focus.
+#[derive(Clone, Copy)]
+pub(crate) struct Sees<'a> {
+    pub(crate) first: u16,
+    pub(crate) is_beyond_focus: &'a [bool],
+}
+
+impl Sees<'_> {
+    /// Whether the chief ray passes a nearer layer on its way to one on the same side of the focus.
+    #[inline(always)]
+    fn beside(self, nearer: u16, layer: u16) -> bool {
+        self.first + 1 >= layer && self.is_beyond_focus[usize::from(nearer)] == self.is_beyond_focus[usize::from(layer)]
+    }
+}
+
 impl Covered {
     const NOTHING: Self = Self { open: 1.0, surface: 0.0, layer: 0 };
 
     /// Lays a layer that covers a fraction of the pixel behind, and returns how much of its light is seen.
     #[inline(always)]
-    fn takes(&mut self, alpha: f32, layer: u16) -> f32 {
-        let is_behind = layer > self.layer + 1;
+    fn takes(&mut self, alpha: f32, layer: u16, sees: Sees<'_>) -> f32 {
+        let is_behind = layer > self.layer + 1 && !sees.beside(self.layer, layer);
         if is_behind && alpha <= LEAST_OF_LAYER {
             // Too little to begin a surface: a small lamp.
             let open = self.open();
@@ -71,9 +99,9 @@ const LEAST_COVERAGE: f32 = 1e-5;
 
 impl Composite {
     /// Returns a picture without light, in which layers may hide each other.
-    pub(crate) fn new((rows, columns): (usize, usize), hides: bool) -> Self {
-        let size = if hides { (rows, columns) } else { (0, 0) };
-        Self { light: Array2::zeros((rows, columns)), pixels: Array2::from_elem(size, Covered::NOTHING) }
+    pub(crate) fn new((rows, columns): (usize, usize), chief: Arc<ChiefLayers>) -> Self {
+        let size = if chief.first.is_empty() { (0, 0) } else { (rows, columns) };
+        Self { light: Array2::zeros((rows, columns)), pixels: Array2::from_elem(size, Covered::NOTHING), chief }
     }
 
     /// Lays pixels of a layer, counted from those of a film, behind the layers before.
@@ -88,10 +116,13 @@ impl Composite {
             return;
         }
         let pixels = self.pixels.as_slice_mut().expect("in standard order")[first..].chunks_mut(film.columns);
+        let ChiefLayers { first: chief, is_beyond_focus } = self.chief.as_ref();
+        let chief = chief[first..].chunks(film.columns);
         let layers = gathered.light.chunks_exact(columns).zip(gathered.alpha.chunks_exact(columns));
-        for ((sums, pixels), (light, alpha)) in sums.zip(pixels).zip(layers) {
-            for ((sum, pixel), (light, alpha)) in sums.iter_mut().zip(pixels).zip(light.iter().zip(alpha)) {
-                *sum += light * pixel.takes(*alpha, number);
+        for (((sums, pixels), chief), (light, alpha)) in sums.zip(pixels).zip(chief).zip(layers) {
+            let pixels = sums.iter_mut().zip(pixels).zip(chief);
+            for (((sum, pixel), first), (light, alpha)) in pixels.zip(light.iter().zip(alpha)) {
+                *sum += light * pixel.takes(*alpha, number, Sees { first: *first, is_beyond_focus });
             }
         }
     }
@@ -117,7 +148,13 @@ mod tests {
     const PIXEL: Rectangle = Rectangle::PIXEL;
 
     fn composite(layers: &[(f32, f32)]) -> f32 {
-        let mut picture = Composite::new((1, 1), true);
+        composite_seen(layers, 0)
+    }
+
+    /// Of a pixel whose chief ray meets a layer first; all are beyond the focus.
+    fn composite_seen(layers: &[(f32, f32)], first: u16) -> f32 {
+        let chief = ChiefLayers { first: vec![first], is_beyond_focus: vec![true; layers.len()] };
+        let mut picture = Composite::new((1, 1), Arc::new(chief));
         for (layer, &(light, alpha)) in layers.iter().enumerate() {
             picture.under(&PIXEL, layer, &Gathered { at: PIXEL, light: vec![light], alpha: vec![alpha] });
         }
@@ -145,6 +182,9 @@ mod tests {
     fn small_lamps_do_not_shine_through_surfaces() {
         let seen = composite(&[(0.0, 0.98), (0.0, 0.0), (0.01 * 1e4, 0.01), (0.0, 0.0), (0.0, 1.0)]);
         assert!((seen / (0.02 * 0.01 * 1e4) - 1.0).abs() < 1e-4, "{seen}");
+        // Beside the edge, where the chief ray sees it, it is not hidden.
+        let seen = composite_seen(&[(0.0, 0.3), (0.0, 0.0), (0.01 * 1e4, 0.01), (0.0, 0.0), (0.0, 1.0)], 2);
+        assert!((seen / (0.01 * 1e4) - 1.0).abs() < 1e-4, "{seen}");
     }
 
     #[test]

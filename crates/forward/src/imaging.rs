@@ -7,17 +7,18 @@ use std::{
 
 use dioptric_psf::{FieldsAlong, FilmMap, LensImage};
 use dioptric_spectrum::Cancelled;
+use glam::DVec2;
 use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::{
     BandKernels, BandRadiance, Border, Film, ForwardError, ImagingSpec, SceneGeometry, SceneRadiance,
     blocks::Blocks,
-    coverage::Composite,
+    coverage::{ChiefLayers, Composite},
     gather::{GatherTask, TileGroup, gather, out_samples},
     halo::Halos,
     kept::Kept,
-    places::SceneRaster,
+    places::{Places, SceneRaster, UNSEEN},
     raster::{Level, Raster},
     rectangle::Rectangle,
     sampler::Sampler,
@@ -51,6 +52,7 @@ pub(crate) struct Imaging {
     blocks: Blocks,
     /// How far from the middle of the film light is taken from, mm.
     reach_mm: f64,
+    chief: Arc<ChiefLayers>,
     kept: Mutex<Kept>,
     halos: Halos,
     /// The largest that the kernels of a band have been, bytes.
@@ -86,6 +88,8 @@ impl Imaging {
             std::iter::once(&scene.coordinates).chain(scene.occluded.layer_coordinates()).collect();
         let blocks = Blocks::find((film, margin_px), &raster, &maps, &surfaces, work.cancel())?;
 
+        let chief = chief_layers((lens, film, middle_nm), maps[1], &raster, &scene);
+
         // Cut the film into tiles for each of them.
         let stopwatch = Stopwatch::default();
         let layered = LayeredLens { image: lens, film, layers, stopwatch: &stopwatch };
@@ -101,6 +105,7 @@ impl Imaging {
             tiling,
             blocks,
             reach_mm,
+            chief: Arc::new(chief),
             kept,
             halos,
             kernel_bytes: 0,
@@ -230,7 +235,7 @@ impl Imaging {
         let with_alpha = self.scene.hides;
         let sampler = Sampler { scene: self.raster, map: &map, blocks: &self.blocks, surfaces: &surfaces, with_alpha };
         let Film { rows, columns, .. } = self.spec.film;
-        let mut picture = Composite::new((rows, columns), with_alpha);
+        let mut picture = Composite::new((rows, columns), self.chief.clone());
         for (layer, tiles) in self.tiling.layers.iter().enumerate() {
             let task = GatherTask {
                 film: &self.spec.film,
@@ -301,6 +306,34 @@ impl Imaging {
         });
         picture
     }
+}
+
+/// Returns the layers that chief rays meet first, by the map of the middle band.
+fn chief_layers(
+    (lens, film, wavelength_nm): (&dyn LensImage, &Film, f64),
+    map: &FilmMap,
+    raster: &SceneRaster,
+    scene: &SceneLayers,
+) -> ChiefLayers {
+    if !scene.hides {
+        return ChiefLayers::default();
+    }
+    let pixels = Raster::new(film, Level::PIXEL);
+    let Rectangle { first_row, first_column, rows, columns } = film_pixels(film);
+    let (first_mm, step_mm) = (pixels.x_mm(first_column as f64), 1e-3 * film.pitch_um);
+    let of_row = |places: &mut Places, row: usize| -> Vec<u16> {
+        places.find(raster, map, columns, (first_mm, step_mm, pixels.y_mm((first_row + row as i64) as f64)));
+        let (beside, below) = raster.steps();
+        let nearest = |k: usize| {
+            let corner = if places.across[k] >= 0.5 { beside } else { 0 } + if places.down[k] >= 0.5 { below } else { 0 };
+            let coordinate = scene.coordinates.samples()[places.first[k] as usize + corner];
+            coordinate.round() as u16
+        };
+        (0..columns).map(|k| if places.first[k] == UNSEEN { 0 } else { nearest(k) }).collect()
+    };
+    let first: Vec<Vec<u16>> = (0..rows).into_par_iter().map_init(Places::default, of_row).collect();
+    let is_beyond_focus = |&dioptres: &f64| lens.blur_radius_mm(DVec2::ZERO, dioptres, wavelength_nm) < 0.0;
+    ChiefLayers { first: first.concat(), is_beyond_focus: scene.layers.dioptres().iter().map(is_beyond_focus).collect() }
 }
 
 /// Returns the first, the middle and the last of some bands.

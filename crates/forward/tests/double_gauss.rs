@@ -2,9 +2,9 @@
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by panicking and shows its numbers")]
 
-use dioptric_forward::{Film, PsfDomain, Settings, check_depth_map, irradiance};
+use dioptric_forward::{Film, Settings, check_depth_map, irradiance};
 use dioptric_optics::{Lens, ObjectPoint, Vignetting, rays_over_front};
-use dioptric_psf::{Diffraction, LensImageModel};
+use dioptric_psf::{Diffraction, ImageSettings, LensImageModel};
 use dioptric_scene::{Scene, View};
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
@@ -27,17 +27,10 @@ impl Camera {
     }
 
     fn image(&self, scene: &Scene, diffraction: Diffraction, settings: &Settings) -> Vec<Array2<f32>> {
-        let domain = PsfDomain {
-            lens: &self.lens,
-            film: &self.film,
-            film_distance_mm: self.film_distance_mm,
-            depth_range_m: scene.depth.as_ref().unwrap().range_m(),
-            grid: scene.radiance.grid(),
-            diffraction,
-        };
-        let bank = LensImageModel::build(&self.lens, &domain.settings().unwrap()).unwrap();
+        let settings_of_lens = ImageSettings::new(self.film_distance_mm, diffraction);
+        let model = LensImageModel::new(&self.lens, scene.radiance.grid().centers_nm(), &settings_of_lens).unwrap();
         let mut bands = vec![];
-        irradiance(scene, &bank, &self.film, settings, &|_| {}, &mut |_, band| {
+        irradiance(scene, &model, &self.film, settings, &|_| {}, &mut |_, band| {
             bands.push(band);
             Ok(())
         })
@@ -197,15 +190,6 @@ fn depth_inside_the_lens_is_refused() {
         depth[(3, 7)] = z_m;
         let depth = DepthMap::new(depth).unwrap();
         let mapped = check_depth_map(&camera.lens, &grid, &depth);
-        let domain = PsfDomain {
-            lens: &camera.lens,
-            film: &camera.film,
-            film_distance_mm: camera.film_distance_mm,
-            depth_range_m: depth.range_m(),
-            grid: &grid,
-            diffraction: Diffraction::None,
-        };
-        assert_eq!(mapped.is_err(), domain.settings().is_err(), "{z_m} m");
         mapped.err().map(|error| error.to_string())
     };
     let least_m = 1e-3 * camera.lens.at(550.0).unwrap().projection_center_z_mm() as f32;

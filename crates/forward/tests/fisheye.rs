@@ -2,9 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
 
-use dioptric_forward::{Film, PsfDomain, Settings, irradiance};
+use dioptric_forward::{Border, Film, Settings, irradiance};
 use dioptric_optics::Lens;
-use dioptric_psf::{Diffraction, LensImageModel};
+use dioptric_psf::{Diffraction, ImageSettings, LensImage, LensImageModel};
 use dioptric_scene::{Scene, View};
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use glam::DVec2;
@@ -29,17 +29,15 @@ fn picture(check_px: usize) -> (Film, Array2<f32>, f64) {
     let scene = Scene { depth: Some(depth), view: Some(view), ..Scene::new("checks", radiance) };
     let film = Film::centered(120, 180, 300.0);
     let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(3000.0).unwrap();
-    let diffraction = Diffraction::None;
-    let depth_range_m = (3.0, 3.0);
-    let domain = PsfDomain { lens: &lens, film: &film, film_distance_mm, depth_range_m, grid: &grid, diffraction };
-    let model = LensImageModel::build(&lens, &domain.settings().unwrap()).unwrap();
+    let model = LensImageModel::new(&lens, &[550.0], &ImageSettings::new(film_distance_mm, Diffraction::None)).unwrap();
     let mut bands = vec![];
-    irradiance(&scene, &model, &film, &Settings::default(), &|_| {}, &mut |_, band| {
+    let settings = Settings { border: Border::Black, ..Settings::default() };
+    irradiance(&scene, &model, &film, &settings, &|_| {}, &mut |_, band| {
         bands.push(band);
         Ok(())
     })
     .unwrap();
-    let edge_mm = model.centroid_mm(DVec2::X * HALF_TAN.0, 1.0 / 3.0, 550.0).x;
+    let edge_mm = model.film_map(550.0, 30.0).place_mm(DVec2::X * HALF_TAN.0).unwrap().x;
     (film, bands.remove(0), edge_mm)
 }
 

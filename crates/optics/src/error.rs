@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 /// A glass, lens or lens file that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum OpticsError {
     /// A wavelength at which a glass is not known.
     #[error("{glass} is known from {first_nm} to {last_nm} nm, not at {wavelength_nm} nm{remedy}")]

@@ -1,14 +1,19 @@
 //! Files of pictures, read and written.
 #![doc = include_str!("../README.md")]
 
+mod reduced;
+
 use std::{
+    fs,
     io::{self, Cursor},
     path::Path,
 };
 
-use image::{ExtendedColorType, ImageEncoder, ImageReader, codecs::png::PngEncoder};
+use dioptric_files::memory;
+use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader, codecs::png::PngEncoder};
 
 pub use image::{DynamicImage, ImageError, ImageFormat, Limits};
+pub use reduced::{Curve, read_reduced};
 
 /// Returns the format of a file by its first bytes, or by the extension of its name where they say nothing.
 ///
@@ -18,7 +23,37 @@ pub fn format_of(path: &Path) -> io::Result<Option<ImageFormat>> {
     Ok(ImageReader::open(path)?.with_guessed_format()?.format())
 }
 
-/// Reads a picture of any format that is compiled in.
+/// Returns the columns and rows of a picture from its header.
+///
+/// # Errors
+/// When the file cannot be read or is no such picture.
+pub fn size_of(path: &Path) -> Result<(usize, usize), ImageError> {
+    let (columns, rows) = ImageReader::open(path)?.with_guessed_format()?.into_decoder()?.dimensions();
+    Ok((columns as usize, rows as usize))
+}
+
+/// Reads a picture of any format that is compiled in, after its header was found to fit the memory that a file may take: its samples, and
+/// `beside_bytes` for each pixel that its reader makes of them.
+///
+/// # Errors
+/// When the file cannot be read, is no such picture, or takes more memory than it may.
+pub fn read_within(path: &Path, beside_bytes: u64) -> Result<DynamicImage, ImageError> {
+    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
+    reader.limits(Limits::no_limits());
+    let decoder = reader.into_decoder()?;
+    let (columns, rows) = decoder.dimensions();
+    let beside = beside_bytes.saturating_mul(u64::from(columns)).saturating_mul(u64::from(rows));
+    check(decoder.total_bytes().saturating_add(beside), path)?;
+    DynamicImage::from_decoder(decoder)
+}
+
+/// Checks that what a picture takes is allowed.
+fn check(bytes: u64, path: &Path) -> Result<(), ImageError> {
+    let too_large = |error| ImageError::IoError(io::Error::other(error));
+    memory::check(bytes, fs::metadata(path)?.len()).map_err(too_large)
+}
+
+/// Reads a picture of any format that is compiled in, whatever memory it takes within the limits: one of the program's own.
 ///
 /// # Errors
 /// When the file cannot be read, is no such picture, or is larger than the limits.
@@ -54,8 +89,9 @@ pub fn encode_rgb8_png(codes: &[u8], (columns, rows): (usize, usize)) -> Result<
 /// Writes a picture in the format of the path's extension.
 ///
 /// # Errors
-/// When the format is not known or has no such samples, or the file cannot be written; what was written of it stays.
+/// When the format is not known or has no such samples, or the file cannot be written.
 pub fn save(picture: &DynamicImage, path: &Path) -> Result<(), ImageError> {
     let format = ImageFormat::from_path(path)?;
-    Ok(std::fs::write(path, encode(picture, format)?)?)
+    let bytes = encode(picture, format)?;
+    dioptric_files::write(path, &bytes).map_err(|error| ImageError::IoError(io::Error::other(error)))
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use dioptric_backward::BackwardError;
+use dioptric_files::WriteError;
 use dioptric_forward::ForwardError;
 use dioptric_optics::OpticsError;
 use dioptric_psf::PsfError;
@@ -13,6 +14,7 @@ use dioptric_world::WorldError;
 
 /// A camera that cannot be built, run or written down.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PipelineError {
     /// A list of numbers that cannot be read.
     #[error("{what}: '{item}' is neither a number nor a range first:last:step whose step leads from first to last")]
@@ -145,6 +147,12 @@ pub enum PipelineError {
         /// Why.
         reason: String,
     },
+}
+
+impl From<WriteError> for PipelineError {
+    fn from(WriteError { path, reason, .. }: WriteError) -> Self {
+        Self::Write { path, reason }
+    }
 }
 
 impl PipelineError {

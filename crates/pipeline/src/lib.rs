@@ -15,19 +15,22 @@ pub mod display;
 mod error;
 pub mod figures;
 mod frame_files;
-mod hidden;
+mod json;
 mod light_field;
 mod numbers;
 mod paintings;
 mod progress;
 mod quality;
+mod ranges;
 mod schema;
 mod sense;
 mod shown;
-mod staged;
 mod stages;
 mod video_files;
 mod words;
+
+/// Planes and cubes of this crate are arrays of it.
+pub use ndarray;
 
 pub use dioptric_backward::{BandSampling, LightPaths, MicroArray, MicroElements, MicroLayout, Renderer, Rendering};
 pub use dioptric_optics::{GlassRange, MissingGlass, SeqNumbers, SurfaceChange};
@@ -42,20 +45,21 @@ pub use camera::{
 };
 pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;
+pub use dioptric_files::Staged;
 pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};
-pub use hidden::{HiddenFolder, Leftover};
+pub use json::{write_file, write_json};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_bytes, parse_numbers, parse_pairs};
 pub use paintings::{PaintingFolder, program_build};
 pub use progress::{Clock, ImagingTimes, Progress, Silent, Stage};
 pub use quality::Quality;
+pub use ranges::{Range, range_of};
 #[cfg(feature = "schema")]
 pub use schema::generated_schemas;
 pub use schema::{CAMERA_SCHEMA, CAMERA_TEMPLATE, SENSOR_SCHEMA};
 pub use sense::{SenseRequest, Sensed};
 pub use shown::{ShowRequest, ShownPicture, open_display};
-pub use staged::{Staged, write_file, write_json};
 pub use stages::{
     AberrationSummary, Capture, FilmPart, FilmPlace, FrameSet, Given, GivenParts, IRRADIANCE_FILE, Irradiance,
     IrradianceSummary, KeptCamera, LensAberrations, NarrowSurfaces, PaintReach, RESUME_FILE, RenderingSummary,

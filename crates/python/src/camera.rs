@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use dioptric_pipeline::{Camera as CameraFile, KeptCamera, PipelineError, Quality, Staged, parse_bytes, write_file};
+use dioptric_pipeline::{Camera as CameraFile, KeptCamera, Quality, parse_bytes};
 use pyo3::{
     prelude::*,
     types::{PyDict, PyType},
@@ -207,6 +207,7 @@ impl Camera {
                 Ok(bytes) => bytes,
                 Err(_) => parse_bytes(&word("memory", memory)?).map_err(exception)?,
             };
+            dioptric_files::memory::allow(Some(budget));
             kept = kept.with_memory_budget(budget);
         }
         Shot::take(py, kept, &Follower::of(progress)?)
@@ -272,14 +273,7 @@ impl Camera {
     /// Writes the camera file.
     fn write(&self, path: PathBuf) -> PyResult<()> {
         let text = self.to_ron()?;
-        guarded(|| {
-            let write = || -> Result<(), PipelineError> {
-                let staged = Staged::file(&path)?;
-                write_file(staged.path(), text.as_bytes())?;
-                staged.commit()
-            };
-            write().map_err(exception)
-        })
+        guarded(|| dioptric_files::write(&path, text.as_bytes()).map_err(exception))
     }
 
     fn __eq__(&self, other: &Self) -> bool {

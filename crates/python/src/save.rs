@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use dioptric_pipeline::{PipelineError, Staged, picture_png, write_file};
+use dioptric_pipeline::{PipelineError, picture_png};
 use dioptric_sensor::Picture;
 use pyo3::PyResult;
 
@@ -22,8 +22,6 @@ pub(crate) fn is_picture(path: &Path) -> PyResult<bool> {
 
 /// Writes a picture whole or not at all; returns the name of the file.
 pub(crate) fn write_picture(picture: &Picture, path: &Path) -> Result<Vec<String>, PipelineError> {
-    let staged = Staged::file(path)?;
-    write_file(staged.path(), &picture_png(picture)?)?;
-    staged.commit()?;
+    dioptric_files::write(path, &picture_png(picture)?)?;
     Ok(vec![path.file_name().unwrap_or_default().to_string_lossy().into_owned()])
 }

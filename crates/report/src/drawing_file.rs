@@ -2,6 +2,7 @@
 
 use std::{fs, path::Path};
 
+use dioptric_files::is_stream;
 use dioptric_pipeline::PipelineError;
 
 /// Pixels of a PNG for each of the drawing's own where its name asks for one.
@@ -59,8 +60,10 @@ pub fn check_drawing_name(target: &Path) -> Result<(), PipelineError> {
     }
 }
 
+/// Returns what a name ends in; standard output and devices take SVG.
 fn extension(target: &Path) -> String {
-    target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+    let own = target.extension().map(|e| e.to_string_lossy().to_lowercase());
+    own.unwrap_or_else(|| if is_stream(target) { "svg".to_owned() } else { String::new() })
 }
 
 #[cfg(feature = "png")]

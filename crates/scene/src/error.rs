@@ -2,10 +2,13 @@
 
 use std::path::PathBuf;
 
+use dioptric_files::memory::TooLarge;
+
 use dioptric_spectrum::{Cancelled, SpectrumError};
 
 /// A scene that cannot be read, written or used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SceneError {
     /// Work that was stopped on request.
     #[error(transparent)]
@@ -26,15 +29,13 @@ pub enum SceneError {
         /// Why.
         reason: String,
     },
-    /// A header that asks for more memory than any sensible picture needs.
-    #[error("{}: its header asks for {bytes} bytes of samples, more than the limit of {limit} bytes", file.display())]
+    /// A file that takes more memory than it may.
+    #[error("{}: {reason}", file.display())]
     TooLarge {
         /// The file.
         file: PathBuf,
-        /// Bytes asked for.
-        bytes: u64,
-        /// Bytes allowed.
-        limit: u64,
+        /// What it would take, and what it may.
+        reason: TooLarge,
     },
     /// A file of a kind that this build leaves out.
     #[error("{}: this build cannot read it, expected one with the feature '{feature}'", file.display())]

@@ -29,6 +29,9 @@ mod still_life;
 mod targets;
 mod view;
 
+/// Planes and cubes of this crate are arrays of it.
+pub use ndarray;
+
 pub use display_model::{DisplayCurve, DisplayModel, PixelLayout};
 pub use error::SceneError;
 pub use formats::{

@@ -1,16 +1,13 @@
 //! A quick look at a spectral image as an sRGB picture.
 
-use std::{io::Write, path::Path};
+use std::path::Path;
 
 use dioptric_pictures::encode_rgb8_png;
 use dioptric_spectrum::{Observer, SpectralImage, Xyz, adapt_bradford, srgb_encode};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::{
-    SceneError,
-    formats::{PartialFile, unwritable},
-};
+use crate::{SceneError, formats::unwritable};
 
 /// Returns an image as sRGB codes, the color `white` becoming white and what is brighter being clipped.
 ///
@@ -45,9 +42,7 @@ pub fn srgb_preview(image: &SpectralImage, white: Xyz) -> Array2<[u8; 3]> {
 pub fn write_preview_png(path: &Path, image: &SpectralImage, white: Xyz) -> Result<(), SceneError> {
     let codes: Vec<u8> = srgb_preview(image, white).into_iter().flatten().collect();
     let png = encode_rgb8_png(&codes, (image.columns(), image.rows())).map_err(|error| unwritable(path, error))?;
-    let mut partial = PartialFile::create(path)?;
-    partial.file().write_all(&png).map_err(|error| unwritable(path, error))?;
-    partial.finish()
+    Ok(dioptric_files::write(path, &png)?)
 }
 
 #[cfg(test)]

@@ -6,10 +6,13 @@ use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use ndarray::{Array2, Array3};
 use rayon::prelude::*;
 
-use crate::{DisplayModel, Scene, SceneError, View, formats::decode_picture};
+use crate::{
+    DisplayModel, Scene, SceneError, View,
+    formats::{check_made, decode_picture},
+};
 
-/// The most bytes of samples that a shown picture may have.
-const MOST_BYTES: u64 = 8 << 30;
+/// What a pixel takes as codes, of 16 bits and as single floats, bytes.
+const CODES_BYTES: u64 = 18;
 
 impl DisplayModel {
     /// Returns the scene that a PNG, JPEG or TIFF file is on this display at a distance, m: radiance, depth and view.
@@ -17,7 +20,8 @@ impl DisplayModel {
     /// # Errors
     /// When the file is no such picture, or as [`show`](Self::show).
     pub fn show_file(&self, path: &Path, grid: &WavelengthGrid, distance_m: f64) -> Result<Scene, SceneError> {
-        let picture = decode_picture(path)?.into_rgb16();
+        let n = self.pixels.samples() as u64;
+        let picture = decode_picture(path, CODES_BYTES + n * n * 4 * grid.len() as u64)?.into_rgb16();
         let (columns, rows) = (picture.width() as usize, picture.height() as usize);
         let codes = picture.into_raw().into_iter().map(|code| f32::from(code) / 65535.0).collect();
         let codes = Array3::from_shape_vec((rows, columns, 3), codes).expect("three codes a pixel");
@@ -32,7 +36,7 @@ impl DisplayModel {
     ///
     /// # Errors
     /// When the display's numbers make no sense, its bands do not tell the primaries apart, the distance is not above 0, or the scene
-    /// would be larger than 8 GiB.
+    /// would be larger than memory allows.
     pub fn show(
         &self,
         name: &str,
@@ -50,14 +54,14 @@ impl DisplayModel {
         }
         let n = self.pixels.samples();
         let (rows, columns) = (n * codes.dim().0, n * codes.dim().1);
-        let bytes = (rows as u64).saturating_mul(columns as u64).saturating_mul(4 * grid.len() as u64);
-        if bytes > MOST_BYTES || bytes == 0 {
+        if rows * columns == 0 {
             return Err(SceneError::Setting {
                 what: "the samples of a shown picture",
-                value: format!("{columns} × {rows} in {} bands", grid.len()),
-                expected: "some, of 8 GiB at most".to_owned(),
+                value: format!("{columns} × {rows}"),
+                expected: "some".to_owned(),
             });
         }
+        check_made(Path::new(name), (rows as u64 * columns as u64).saturating_mul(4 * grid.len() as u64))?;
         let primaries = self.primaries_on(grid)?;
         let drive = self.drives(codes);
         let plane = |band: usize| {

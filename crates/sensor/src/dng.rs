@@ -32,8 +32,7 @@ pub use self::{
     read::{DngFile, DngShot},
 };
 use crate::{
-    LensCorrections, LensTables, Picture, Raw, RawPlane, Sensor, SensorError,
-    files::{write_beside_and_rename, write_error},
+    LensCorrections, LensTables, Picture, Raw, RawPlane, Sensor, SensorError, files::write_error,
     white_light::white_response,
 };
 
@@ -102,7 +101,7 @@ impl Sensor {
         let tags = Tags { sensor: self, raw, details, colors: color_codes(raw)? };
         let too_large = || write_error(path, "the frame is larger than a file of this kind can be, 4 GiB");
         let file = tags.directory(codes)?.into_file().ok_or_else(too_large)?;
-        write_beside_and_rename(path, &file)
+        Ok(dioptric_files::write(path, &file)?)
     }
 
     /// Returns the ISO speed of an exposure: that of the data sheet, or else the saturation-based one.

@@ -6,6 +6,7 @@ use dioptric_spectrum::SpectrumError;
 
 /// A sensor, exposure, frame or picture that cannot be had.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SensorError {
     /// A name that names no built-in sensor.
     #[error("no sensor is named '{name}'; known: {known}")]

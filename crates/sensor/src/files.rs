@@ -1,11 +1,8 @@
 //! Pictures and raw frames as PNG and TIFF files.
 
-use std::{
-    fs,
-    io::{BufWriter, Write},
-    path::Path,
-};
+use std::path::Path;
 
+use dioptric_files::WriteError;
 use dioptric_pictures::{DynamicImage, ImageFormat, encode};
 use image::ImageBuffer;
 
@@ -94,25 +91,13 @@ fn write_image(path: &Path, image: &DynamicImage) -> Result<(), SensorError> {
         Some("tif" | "tiff") => ImageFormat::Tiff,
         _ => return Err(write_error(path, "the extension must be png, tif or tiff")),
     };
-    write_beside_and_rename(path, &encode(image, format).map_err(|e| write_error(path, e))?)
+    Ok(dioptric_files::write(path, &encode(image, format).map_err(|e| write_error(path, e))?)?)
 }
 
-/// Writes a file under another name beside its own, then renames it, so that there is never half a file.
-pub(crate) fn write_beside_and_rename(path: &Path, bytes: &[u8]) -> Result<(), SensorError> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".part");
-    let beside = Path::new(&beside);
-    let write = || {
-        let mut file = BufWriter::new(fs::File::create(beside)?);
-        file.write_all(bytes)?;
-        file.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?;
-        fs::rename(beside, path)
-    };
-    write().map_err(|e| {
-        // The part may not exist; what matters is the first error.
-        let _ = fs::remove_file(beside);
-        write_error(path, e)
-    })
+impl From<WriteError> for SensorError {
+    fn from(WriteError { path, reason, .. }: WriteError) -> Self {
+        Self::Write { path, reason }
+    }
 }
 
 pub(crate) fn write_error(path: &Path, reason: impl std::fmt::Display) -> SensorError {

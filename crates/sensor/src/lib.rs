@@ -74,6 +74,9 @@ mod tone;
 mod uniformity;
 mod white_light;
 
+/// Planes and cubes of this crate are arrays of it.
+pub use ndarray;
+
 pub use acuity::Viewing;
 pub use angular_response::{AngularResponse, PixelLight};
 pub use balance::WhiteBalance;

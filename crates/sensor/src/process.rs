@@ -279,36 +279,49 @@ fn check_settings(camera: &dyn CameraProfile, raw: &Raw, processing: &Processing
         Err(SensorError::Shape { what, expected: expected.to_string(), found: found.to_string() })
     };
     let n_channels = camera.n_channels();
-    let not_negative = [
-        ("defect_threshold", processing.defect_threshold.unwrap_or(0.0)),
-        ("denoise", processing.denoise.unwrap_or(0.0)),
-    ];
-    if let Some((key, value)) = not_negative.into_iter().find(|(_, v)| !(*v >= 0.0 && v.is_finite())) {
-        return Err(SensorError::value("the processing", key, value, "a number of 0 or more"));
-    }
+    processing.check()?;
     processing.shading.as_ref().map_or(Ok(()), |shading| shading.check(n_channels))?;
     if raw.filter_names.len() != n_channels {
         return shape("filters of the raw frame", n_channels, raw.filter_names.len());
     }
     processing.white.check(n_channels)?;
-    processing.color.check(n_channels)?;
-    let (key, value, right) = match processing.brightness {
-        Brightness::AsExposed => ("", 1.0, true),
-        Brightness::Factor(factor) => ("brightness.factor", factor, factor > 0.0 && factor.is_finite()),
-        Brightness::Percentile { percent, to } if (0.0..=100.0).contains(&percent) => {
-            ("brightness.to", to, to > 0.0 && to.is_finite())
+    processing.color.check(n_channels)
+}
+
+impl Processing {
+    /// Checks every number that makes sense or not whatever the frame is, so that a wrong one is found before there is any.
+    ///
+    /// # Errors
+    /// Names the first number that makes no sense, and what was expected.
+    pub fn check(&self) -> Result<(), SensorError> {
+        let wrong = |key, value, expected| Err(SensorError::value("the processing", key, value, expected));
+        let not_negative =
+            [("defect_threshold", self.defect_threshold.unwrap_or(0.0)), ("denoise", self.denoise.unwrap_or(0.0))];
+        if let Some((key, value)) = not_negative.into_iter().find(|(_, v)| !(*v >= 0.0 && v.is_finite())) {
+            return wrong(key, value, "a number of 0 or more");
         }
-        Brightness::Percentile { percent, .. } => ("brightness.percent", percent, false),
-    };
-    if !right {
-        return Err(SensorError::value("the processing", key, value, "a number above 0, and at most 100 %"));
+        let (key, value, right) = match self.brightness {
+            Brightness::AsExposed => ("", 1.0, true),
+            Brightness::Factor(factor) => ("brightness.factor", factor, factor > 0.0 && factor.is_finite()),
+            Brightness::Percentile { percent, to } if (0.0..=100.0).contains(&percent) => {
+                ("brightness.to", to, to > 0.0 && to.is_finite())
+            }
+            Brightness::Percentile { percent, .. } => ("brightness.percent", percent, false),
+        };
+        if !right {
+            return wrong(key, value, "a number above 0, and at most 100 %");
+        }
+        if !(0.0..=2.0).contains(&self.sharpen_px) {
+            return wrong("sharpen_px", self.sharpen_px, "0 to 2 pixels");
+        }
+        // Gains are counted where the channels are known.
+        if !matches!(self.white, WhiteBalance::Gains(_)) {
+            self.white.check(0)?;
+        }
+        self.perspective.map_or(Ok(()), |perspective| perspective.check())?;
+        self.local_tone.check()?;
+        self.curve.check()
     }
-    if !(0.0..=2.0).contains(&processing.sharpen_px) {
-        return Err(SensorError::value("the processing", "sharpen_px", processing.sharpen_px, "0 to 2 pixels"));
-    }
-    processing.perspective.map_or(Ok(()), |perspective| perspective.check())?;
-    processing.local_tone.check()?;
-    processing.curve.check()
 }
 
 /// Mends defects, undoes a given fall of light and takes out noise, that of each filter.

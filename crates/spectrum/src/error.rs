@@ -2,6 +2,7 @@
 
 /// Spectral data that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SpectrumError {
     /// A wavelength list that is empty, not finite and positive, or not ascending.
     #[error("wavelengths must be finite, positive and ascending, but number {index} is {value} nm")]

@@ -29,6 +29,9 @@ mod illuminant;
 mod image;
 mod spectrum;
 
+/// Planes and cubes of this crate are arrays of it.
+pub use ndarray;
+
 pub use cancel::{Cancel, Cancelled};
 pub use color::{Lab, Observer, Xyz, adapt_bradford, delta_e_2000, srgb_decode, srgb_encode};
 pub use display::Display;

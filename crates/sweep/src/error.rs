@@ -7,6 +7,7 @@ use dioptric_spectrum::Cancelled;
 
 /// A plan that cannot be read, or a store that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SweepError {
     /// A file that cannot be read.
     #[error("cannot read {}: {reason}", path.display())]
@@ -90,6 +91,12 @@ pub enum SweepError {
     /// Work that was stopped on request.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<dioptric_files::WriteError> for SweepError {
+    fn from(error: dioptric_files::WriteError) -> Self {
+        Self::Pipeline(error.into())
+    }
 }
 
 impl SweepError {

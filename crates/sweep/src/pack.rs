@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_pipeline::Staged;
+use dioptric_files::Staged;
 use tar::{EntryType, Header};
 
 use crate::{Status, Store, Sweep, SweepError, Value, item::THUMBNAIL};

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use dioptric_pipeline::{HiddenFolder, Leftover};
+use dioptric_files::{HiddenFolder, Leftover};
 use serde::{Deserialize, Serialize};
 
 use crate::{ItemId, SweepError};

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use dioptric_pipeline::Staged;
+use dioptric_files::Staged;
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use crate::{

@@ -6,6 +6,7 @@ use dioptric_spectrum::Cancelled;
 
 /// A world that cannot be read or built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum WorldError {
     /// A file that cannot be read: absent, truncated, or of another format.
     #[error("{}: cannot be read: {reason}", file.display())]

@@ -53,6 +53,9 @@ enum Texels {
 /// The largest picture that is read, samples.
 const MAX_SAMPLES: u64 = 1 << 28;
 
+/// What a texel takes beside the sample of the file that it is made from, bytes.
+const TEXEL_BYTES: u64 = 12;
+
 impl ImageTexture {
     /// Reads a PNG, JPEG, TGA, TIFF or EXR file; EXR is linear whatever `encoding` is.
     ///
@@ -67,11 +70,7 @@ impl ImageTexture {
         if cfg!(not(feature = "jpeg")) && format == Some(image::ImageFormat::Jpeg) {
             return Err(WorldError::LacksFeature { file: path.to_owned(), feature: "jpeg" });
         }
-        let mut limits = image::Limits::default();
-        limits.max_alloc = Some(16 * MAX_SAMPLES);
-        limits.max_image_width = Some(1 << 20);
-        limits.max_image_height = Some(1 << 20);
-        let picture = dioptric_pictures::read(path, limits).map_err(|e| unreadable(e.to_string()))?;
+        let picture = dioptric_pictures::read_within(path, TEXEL_BYTES).map_err(|e| unreadable(e.to_string()))?;
         let (columns, rows) = (picture.width() as usize, picture.height() as usize);
         if columns == 0 || rows == 0 || columns as u64 * rows as u64 > MAX_SAMPLES {
             return Err(unreadable(format!("{columns} x {rows} samples: expected 1 to 2²⁸")));

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use dioptric_files::is_stream;
 use dioptric_optics::D_LINE_NM;
 use dioptric_pipeline::{LensReadOptions, LensSpec, PipelineError};
 
@@ -25,7 +26,9 @@ pub struct ConvertedLens {
 /// When there is no such lens, or the format cannot hold it.
 pub fn convert_lens(input: &str, target: &Path, reading: &LensReadOptions) -> Result<ConvertedLens, PipelineError> {
     let mut file = LensSpec::named(input).open(reading)?;
-    let extension = target.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let named = target.extension().map(|e| e.to_string_lossy().to_lowercase());
+    // Standard output and devices have no name that tells: our own format.
+    let extension = named.unwrap_or_else(|| if is_stream(target) { "ron".to_owned() } else { String::new() });
     let mut notes = std::mem::take(&mut file.notes);
     if reading.configuration.is_some() {
         let n_configurations = file.configurations.len();

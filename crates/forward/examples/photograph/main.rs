@@ -7,9 +7,9 @@ mod by_formula;
 
 use std::{path::Path, time::Instant};
 
-use dioptric_forward::{BlurMode, Film, PsfDomain, Settings, irradiance};
+use dioptric_forward::{BlurMode, Film, Settings, irradiance};
 use dioptric_optics::Lens;
-use dioptric_psf::{Diffraction, LensImageModel};
+use dioptric_psf::{Diffraction, ImageSettings, LensImageModel};
 use dioptric_scene::{ReadOptions, read_scene, write_preview_png};
 use dioptric_spectrum::{Illuminant, Observer, Quantity, SpectralImage, WavelengthGrid, Xyz};
 
@@ -30,16 +30,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mono = lens.at(550.0)?;
     let focus_mm = 1e3 * focus_m.parse::<f64>()? - mono.first_order().entrance_pupil_z_mm;
     let start = Instant::now();
-    let domain = PsfDomain {
-        lens: &lens,
-        film: &film,
-        film_distance_mm: mono.film_distance_mm_for(focus_mm)?,
-        depth_range_m: scene.require_depth()?.range_m(),
-        grid: scene.radiance.grid(),
-        diffraction: Diffraction::Hurb { gamma: 1.0 },
-    };
-    let settings = domain.settings()?;
-    let bank = LensImageModel::build(&lens, &settings)?;
+    let settings = ImageSettings::new(mono.film_distance_mm_for(focus_mm)?, Diffraction::Hurb { gamma: 1.0 });
+    let bank = LensImageModel::new(&lens, scene.radiance.grid().centers_nm(), &settings)?;
     let bank_s = start.elapsed().as_secs_f64();
     let mut planes = vec![];
     irradiance(&scene, &bank, &film, &Settings { mode, ..Settings::default() }, &|_| {}, &mut |_, plane| {

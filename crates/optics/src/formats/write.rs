@@ -1,6 +1,6 @@
 //! Lens files written: what each format can hold of a lens, and a refusal where it cannot.
 
-use std::{fmt::Write as _, fs, path::Path};
+use std::{fmt::Write as _, path::Path};
 
 use serde_json::{Value, json};
 
@@ -49,7 +49,8 @@ impl LensFile {
                 return Err(failed(format!("the extension '.{extension}' is no format to write; {expected}")));
             }
         };
-        fs::write(path, text).map_err(|error| failed(error.to_string()))
+        dioptric_files::write(path, text.as_bytes())
+            .map_err(|error| failed(format!("cannot be written: {}", error.reason)))
     }
 
     /// Returns the lens as a `.dat` file, which holds spheres around a plane stop in air, and of each medium one index:

@@ -4,7 +4,7 @@ use std::{ops::RangeInclusive, path::Path};
 
 use dioptric_sensor::SensorError;
 
-use crate::PipelineError;
+use crate::{PipelineError, ranges::range_of};
 
 /// Where numbers come from, for the error that names them.
 pub(crate) struct Checker<'a> {
@@ -23,20 +23,16 @@ impl<'a> Checker<'a> {
         Self { origin: name.to_owned(), text: "" }
     }
 
-    /// Checks that a number is finite and above 0.
-    pub(crate) fn positive(&self, key: &'static str, found: f64) -> Result<(), PipelineError> {
-        if found.is_finite() && found > 0.0 {
+    /// Checks that a number is in the range of its key.
+    ///
+    /// # Panics
+    /// When the key has none, which is a mistake of the program's.
+    pub(crate) fn number(&self, key: &'static str, found: f64) -> Result<(), PipelineError> {
+        let range = range_of(key).unwrap_or_else(|| panic!("'{key}' has a range"));
+        if range.holds(found) {
             return Ok(());
         }
-        self.wrong(key, &found.to_string(), "a finite number above 0")
-    }
-
-    /// Checks that a number is finite.
-    pub(crate) fn finite(&self, key: &'static str, found: f64) -> Result<(), PipelineError> {
-        if found.is_finite() {
-            return Ok(());
-        }
-        self.wrong(key, &found.to_string(), "a finite number")
+        self.wrong(key, &found.to_string(), &range.to_string())
     }
 
     /// Checks that a number is one of a range.

@@ -42,7 +42,7 @@ impl LightFieldSpec {
             Self::Cameras { columns, rows, spacing_mm } => {
                 checker.count("columns", *columns, 1..=MOST_CAMERAS)?;
                 checker.count("rows", *rows, 1..=MOST_CAMERAS)?;
-                checker.positive("spacing_mm", *spacing_mm)
+                checker.number("spacing_mm", *spacing_mm)
             }
         }
     }

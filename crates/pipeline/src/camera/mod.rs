@@ -266,6 +266,9 @@ impl WavelengthSpec {
     }
 }
 
+/// The most bands that a picture may have.
+const MOST_BANDS: usize = 10_000;
+
 fn one() -> u64 {
     1
 }
@@ -327,15 +330,20 @@ impl Camera {
         }
         self.blur.check(self.diffraction, checker)?;
         self.exposure.check().map_err(|error| checker.of_sensor(error))?;
+        self.processing.check().map_err(|error| checker.of_sensor(error))?;
         match &self.wavelengths {
             WavelengthSpec::Scene => {}
             WavelengthSpec::Range { first_nm, last_nm, step_nm } => {
-                checker.positive("first_nm", *first_nm)?;
-                checker.positive("last_nm", *last_nm)?;
-                checker.positive("step_nm", *step_nm)?;
+                checker.number("first_nm", *first_nm)?;
+                checker.number("last_nm", *last_nm)?;
+                checker.number("step_nm", *step_nm)?;
+                if (last_nm - first_nm) / step_nm > MOST_BANDS as f64 {
+                    let found = format!("{step_nm} from {first_nm} to {last_nm}");
+                    checker.wrong("step_nm", &found, &format!("{MOST_BANDS} bands at most"))?;
+                }
             }
             WavelengthSpec::ListNm(list) if list.is_empty() => checker.wrong("ListNm", "no wavelength", "1 or more")?,
-            WavelengthSpec::ListNm(list) => list.iter().try_for_each(|&nm| checker.positive("ListNm", nm))?,
+            WavelengthSpec::ListNm(list) => list.iter().try_for_each(|&nm| checker.number("ListNm", nm))?,
         }
         self.frames.check()?;
         if let Some(spec) = &self.light_field {
@@ -365,31 +373,30 @@ impl Camera {
         }
         match self.lens.base() {
             LensSpec::Thin { focal_length_mm, diameter_mm } => {
-                checker.positive("focal_length_mm", *focal_length_mm)?;
-                checker.positive("diameter_mm", *diameter_mm)?;
+                checker.number("focal_length_mm", *focal_length_mm)?;
+                checker.number("diameter_mm", *diameter_mm)?;
             }
-            LensSpec::Pinhole { diameter_mm } => checker.positive("diameter_mm", *diameter_mm)?,
+            LensSpec::Pinhole { diameter_mm } => checker.number("diameter_mm", *diameter_mm)?,
             LensSpec::BuiltIn(_) | LensSpec::File(_) | LensSpec::Changed { .. } => {}
         }
         if let Some(slope_per_nm) = self.lens_reading.slope_per_nm {
-            checker.finite("slope_per_nm", slope_per_nm)?;
+            checker.number("slope_per_nm", slope_per_nm)?;
         }
         match self.stop {
-            StopSpec::FNumber(n) => checker.positive("FNumber", n)?,
-            StopSpec::DiameterMm(d) => checker.positive("DiameterMm", d)?,
+            StopSpec::FNumber(n) => checker.number("FNumber", n)?,
+            StopSpec::DiameterMm(d) => checker.number("DiameterMm", d)?,
             StopSpec::AsGiven => {}
         }
         match self.focus {
-            FocusSpec::DistanceMm(d) if d == f64::INFINITY => {}
-            FocusSpec::DistanceMm(d) => checker.positive("DistanceMm", d)?,
-            FocusSpec::FilmMm(d) => checker.finite("FilmMm", d)?,
+            FocusSpec::DistanceMm(d) => checker.number("DistanceMm", d)?,
+            FocusSpec::FilmMm(d) => checker.number("FilmMm", d)?,
             FocusSpec::NearObject => {}
         }
         let Movements { tilt_deg, swing_deg, rise_mm, shift_mm } = self.movements;
         for (key, value) in
             [("tilt_deg", tilt_deg), ("swing_deg", swing_deg), ("rise_mm", rise_mm), ("shift_mm", shift_mm)]
         {
-            checker.finite(key, value)?;
+            checker.number(key, value)?;
         }
         Ok(())
     }
@@ -399,7 +406,7 @@ impl Camera {
         if let FilmSpec::Pixels { columns, rows, pitch_um } = self.film {
             checker.count("columns", columns, 1..=65_536)?;
             checker.count("rows", rows, 1..=65_536)?;
-            checker.positive("pitch_um", pitch_um)?;
+            checker.number("pitch_um", pitch_um)?;
         }
         if let (Some(crop), FilmSpec::Pixels { columns, rows, .. }) = (self.crop, self.film) {
             crop.check((rows, columns))?;

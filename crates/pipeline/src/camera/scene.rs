@@ -13,7 +13,7 @@ use dioptric_spectrum::{DepthMap, Illuminant, WavelengthGrid};
 use serde::{Deserialize, Serialize};
 
 use super::{check::Checker, world::WorldSpec};
-use crate::PipelineError;
+use crate::{PipelineError, ranges::range_of};
 
 /// What stands before the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -88,7 +88,18 @@ impl FlatSize {
             );
             return Err(PipelineError::Unsuitable { what: "flat", reason });
         }
-        Ok((2.0 * (0.5 * self.width_mm / depth_mm).atan().to_degrees(), 1e-3 * depth_mm))
+        let (fov_deg, depth_m) = (2.0 * (0.5 * self.width_mm / depth_mm).atan().to_degrees(), 1e-3 * depth_mm);
+        for (key, found) in [("field_of_view_deg", fov_deg), ("depth_m", depth_m)] {
+            let range = range_of(key).expect("the key has a range");
+            if !range.holds(found) {
+                let reason = format!(
+                    "{} mm wide, {} mm away, it has a {key} of {found}, expected {range}",
+                    self.width_mm, self.distance_mm
+                );
+                return Err(PipelineError::Unsuitable { what: "flat", reason });
+            }
+        }
+        Ok((fov_deg, depth_m))
     }
 }
 
@@ -141,19 +152,17 @@ impl SceneSpec {
     }
 
     pub(crate) fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
-        if let Some(angle) = self.field_of_view_deg
-            && !(angle > 0.0 && angle < 180.0)
-        {
-            return checker.wrong("field_of_view_deg", &angle.to_string(), "an angle above 0 and below 180 degrees");
+        if let Some(angle) = self.field_of_view_deg {
+            checker.number("field_of_view_deg", angle)?;
         }
         if let Some(depth) = self.depth_m {
-            checker.positive("depth_m", depth)?;
+            checker.number("depth_m", depth)?;
         }
         if let Some(luminance) = self.mean_luminance_cd_m2 {
-            checker.positive("mean_luminance_cd_m2", luminance)?;
+            checker.number("mean_luminance_cd_m2", luminance)?;
         }
         if let Some(level) = self.white_level {
-            checker.positive("white_level", level)?;
+            checker.number("white_level", level)?;
         }
         if let Some(FillDepth::Metres(z_m)) = self.fill_depth.filter(|fill| fill.check().is_err()) {
             checker.wrong("fill_depth", &z_m.to_string(), "Beside, Far, or Metres above 0")?;
@@ -163,7 +172,7 @@ impl SceneSpec {
             checker.wrong("hidden", "a file", "a source that is a file as well")?;
         }
         if let Some(lux) = self.illuminance_lux {
-            checker.positive("illuminance_lux", lux)?;
+            checker.number("illuminance_lux", lux)?;
         }
         for (key, light) in [("illuminant", &self.illuminant), ("light", &self.light)] {
             if let Some(Err(error)) = light.as_ref().map(Illuminant::check) {
@@ -196,8 +205,11 @@ impl SceneSpec {
 
     fn check_flat(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
         let Some(FlatSize { width_mm, distance_mm }) = self.flat else { return Ok(()) };
-        checker.positive("width_mm", width_mm)?;
-        checker.positive("distance_mm", distance_mm)?;
+        checker.number("width_mm", width_mm)?;
+        checker.number("distance_mm", distance_mm)?;
+        if distance_mm.is_infinite() {
+            checker.wrong("distance_mm", "inf", "a finite number: a flat scene has a size")?;
+        }
         if self.field_of_view_deg.is_some() || self.depth_m.is_some() {
             let found = "a size beside a field of view or a depth";
             checker.wrong("flat", found, "one or the other: they say the same")?;
@@ -228,7 +240,7 @@ impl SceneSpec {
     /// # Errors
     /// When a file cannot be read, lacks what is needed or holds what cannot be.
     pub fn open(&self, wanted: Option<&WavelengthGrid>) -> Result<Scene, PipelineError> {
-        self.open_with(wanted, |life, grid| Ok(life.scene(grid)?))
+        self.open_with(wanted, None, |life, grid| Ok(life.scene(grid)?))
     }
 
     /// Returns the still life of this size as it is pictured.
@@ -237,13 +249,14 @@ impl SceneSpec {
         StillLife { horizontal_fov_deg: self.field_of_view_deg.unwrap_or(usual.horizontal_fov_deg), ..usual }
     }
 
-    /// As [`open`](Self::open); where it is the still life, `paint` has or makes it.
+    /// As [`open`](Self::open), a picture no finer than asked for; where it is the still life, `paint` has or makes it.
     ///
     /// # Errors
     /// As [`open`](Self::open), and those of `paint`.
     pub(crate) fn open_with(
         &self,
         wanted: Option<&WavelengthGrid>,
+        finest_tangent: Option<f64>,
         paint: impl FnOnce(&StillLife, &WavelengthGrid) -> Result<Scene, PipelineError>,
     ) -> Result<Scene, PipelineError> {
         if self.flat.is_some() && self.depth_m.is_none() {
@@ -263,6 +276,7 @@ impl SceneSpec {
                     depth_m: self.depth_m,
                     horizontal_fov_deg: self.field_of_view_deg,
                     fill_depth: self.fill_depth,
+                    finest_tangent,
                     white_level: self.white_level,
                     ..ReadOptions::default()
                 };

@@ -152,10 +152,10 @@ impl WorldSpec {
     }
 
     pub(super) fn check(&self, checker: &Checker<'_>) -> Result<(), PipelineError> {
-        checker.positive("unit_m", self.unit_m)?;
-        checker.finite("advance_mm", self.advance_mm)?;
-        checker.finite("aside_mm", self.aside_mm.0)?;
-        checker.finite("aside_mm", self.aside_mm.1)?;
+        checker.number("unit_m", self.unit_m)?;
+        checker.number("advance_mm", self.advance_mm)?;
+        checker.number("aside_mm", self.aside_mm.0)?;
+        checker.number("aside_mm", self.aside_mm.1)?;
         if let Some((columns, rows)) = self.size {
             checker.count("size", columns, 1..=65_536)?;
             checker.count("size", rows, 1..=65_536)?;
@@ -172,7 +172,7 @@ impl WorldSpec {
         }
         match self.effort {
             RenderEffort::Samples(n) => checker.count("Samples", n as usize, 1..=1 << 24),
-            RenderEffort::Noise(noise) => checker.positive("Noise", noise),
+            RenderEffort::Noise(noise) => checker.number("Noise", noise),
         }
     }
 }

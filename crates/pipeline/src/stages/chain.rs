@@ -70,7 +70,11 @@ impl Chain<'_> {
                 None => {
                     let lens = inputs.geometry.flat.as_ref().map(|(_, lens)| self.lens(lens)).transpose()?;
                     let pupil_z_mm = lens.map(|lens| lens.reference.projection_center_z_mm());
-                    scene::open(inputs, pupil_z_mm, paintings, &self.watch)?
+                    let finest = match &inputs.geometry.seen_by {
+                        Some((lens, pitch_um)) => scene::finest_tangent(&*self.lens(lens)?, *pitch_um),
+                        None => None,
+                    };
+                    scene::open(inputs, pupil_z_mm, finest, paintings, &self.watch)?
                 }
             };
             self.watch.progress.at(Stage::Scene, 1.0);

@@ -2,7 +2,7 @@
 
 use std::{
     borrow::Cow,
-    fs::File,
+    fs::{self, File},
     ops::Range,
     path::Path,
     sync::{Mutex, PoisonError},
@@ -18,6 +18,7 @@ use super::{
     band_store::{BandFolder, BandStore, read_plane, read_rows, write_plane},
     film::FilmPlace,
     narrow_surfaces::NarrowSurfaces,
+    spec::FileStamp,
 };
 use crate::{
     PipelineError, Stage,
@@ -46,6 +47,8 @@ pub struct Irradiance {
     planes: Planes,
     /// What falls on each of the photodiodes that it is the sum of; none for whole pixels.
     photodiodes: Vec<Self>,
+    /// The file that it was read from as it was then, and how that holds its samples.
+    stored: Option<(FileStamp, ExrSamples)>,
     /// Means and largest samples.
     pub summary: IrradianceSummary,
 }
@@ -127,7 +130,7 @@ impl Irradiance {
             }
         }
         let planes = if is_kept { Planes::Memory(cube) } else { Planes::Sums };
-        Ok(Self { grid, size, pitch_um, planes, photodiodes, summary: summing.summary })
+        Ok(Self { grid, size, pitch_um, planes, photodiodes, stored: None, summary: summing.summary })
     }
 
     /// The distance between samples on the film, µm.
@@ -143,11 +146,25 @@ impl Irradiance {
         }
     }
 
-    /// Writes it as spectral EXR, a few rows of all bands at a time.
+    /// Returns it with the file that it was read from.
+    #[must_use]
+    pub(super) fn stored_in(mut self, path: &Path, samples: ExrSamples) -> Self {
+        self.stored = Some((FileStamp::of(path), samples));
+        self
+    }
+
+    /// Writes it as spectral EXR, a few rows of all bands at a time; a copy of the file that it was read from, as long as that is what it was.
     ///
     /// # Errors
     /// When the file cannot be written.
     pub fn write_exr(&self, path: &Path, samples: ExrSamples) -> Result<(), PipelineError> {
+        if let Some((file, of_file)) = &self.stored
+            && *of_file == samples
+            && FileStamp::of(file.path()) == *file
+            && fs::copy(file.path(), path).is_ok()
+        {
+            return Ok(());
+        }
         let head = SpectralHead {
             quantity: Quantity::Irradiance,
             grid: &self.grid,
@@ -224,7 +241,15 @@ impl Irradiance {
             summing.add(band, &plane);
             cube.index_axis_mut(Axis(0), band).assign(&plane);
         }
-        Self { grid, size, pitch_um, planes: Planes::Memory(cube), photodiodes: Vec::new(), summary: summing.summary }
+        Self {
+            grid,
+            size,
+            pitch_um,
+            planes: Planes::Memory(cube),
+            photodiodes: Vec::new(),
+            stored: None,
+            summary: summing.summary,
+        }
     }
 }
 
@@ -330,7 +355,7 @@ pub(super) fn image(
     let file = file.or(store.filter(|_| is_spilled).map(BandStore::into_file));
     let planes = file.map_or(Planes::Memory(cube), |file| Planes::File(Mutex::new(file)));
     let photodiodes = Vec::new();
-    Ok(Irradiance { grid, size, pitch_um: place.pitch_um, planes, photodiodes, summary: summing.summary })
+    Ok(Irradiance { grid, size, pitch_um: place.pitch_um, planes, photodiodes, stored: None, summary: summing.summary })
 }
 
 /// Sums up bands as they come.

@@ -2,6 +2,7 @@
 
 use std::{fs, path::PathBuf, sync::Arc};
 
+use dioptric_files::Leftover;
 use dioptric_psf::LensImageModel;
 use dioptric_spectrum::{Cancel, DepthMap};
 
@@ -23,7 +24,7 @@ use super::{
     scene::ResolvedScene,
     spec::{IrradianceInputs, PictureInputs, Raster},
 };
-use crate::{Camera, Leftover, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
+use crate::{Camera, PaintingFolder, PipelineError, Progress, Quality, SceneSource, Stage};
 
 /// Irradiance that is kept in memory where nothing else is asked for, bytes: 2 GiB.
 const MEMORY_BYTES: u64 = 2 << 30;
@@ -204,7 +205,7 @@ impl KeptCamera {
     /// As [`capture`](Self::capture) has them before it computes anything.
     pub fn check(&self) -> Result<Arc<ResolvedLens>, PipelineError> {
         self.camera.validate()?;
-        let inputs = self.irradiance_inputs()?;
+        let inputs = self.picture_inputs()?.frames.electrons.irradiance;
         let lens = self.kept.lens.get_or_make(inputs.plan.bank.film.lens, lens::resolve)?;
         check_glasses(&lens, self.camera.wavelengths.grid()?.as_ref())?;
         let file = match &self.camera.scene.source {

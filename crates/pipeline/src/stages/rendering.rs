@@ -8,7 +8,7 @@ use image::RgbImage;
 use ndarray::Array2;
 use serde::Serialize;
 
-use crate::{PipelineError, Staged, WorldSpec, display::LinearRgb};
+use crate::{PipelineError, WorldSpec, display::LinearRgb};
 
 /// A rendering in brief.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -76,7 +76,6 @@ fn n_lit(picture: &SpectralImage) -> usize {
 /// When the file cannot be written.
 pub fn write_seen_png(picture: &SpectralImage, magnification: usize, path: &Path) -> Result<(), PipelineError> {
     let seen = LinearRgb::of_image(picture).within_gamut();
-    let staged = Staged::file(path)?;
     let white = seen.level_at(0.99).max(f64::MIN_POSITIVE);
     let small = seen.to_srgb(white);
     let times = magnification.max(1) as u32;
@@ -84,7 +83,5 @@ pub fn write_seen_png(picture: &SpectralImage, magnification: usize, path: &Path
     let shown = RgbImage::from_fn(width, height, |x, y| *small.get_pixel(x / times, y / times));
     let png = dioptric_pictures::encode_rgb8_png(&shown, (width as usize, height as usize))
         .map_err(|e| PipelineError::Png { reason: e.to_string() })?;
-    let written = std::fs::write(staged.path(), png);
-    written.map_err(|e| PipelineError::Write { path: path.to_owned(), reason: e.to_string() })?;
-    staged.commit()
+    Ok(dioptric_files::write(path, &png)?)
 }

@@ -101,7 +101,7 @@ impl KeptCamera {
         let read = |file: &str| -> Result<Irradiance, PipelineError> {
             let irradiance = Irradiance::read_exr(&folder.join(file), Some(kept.place.pitch_um))?;
             kept.check(&irradiance, file).map_err(unreadable)?;
-            Ok(irradiance)
+            Ok(irradiance.stored_in(&folder.join(file), kept.camera.outputs.exr_samples))
         };
         let irradiance = match kept.camera.dual_pixel {
             None => read(IRRADIANCE_FILE)?,

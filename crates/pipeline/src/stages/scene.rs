@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Watch,
     canvas::Viewing,
+    lens::ResolvedLens,
     painting::Paintings,
     spec::{GeometryInputs, SceneInputs},
 };
@@ -71,6 +72,15 @@ pub struct ResolvedScene {
     pub binning: usize,
 }
 
+/// Samples of a large picture for a pixel of the film, each way, at least: beyond what optics resolve within a pixel.
+const SAMPLES_PER_PIXEL: f64 = 8.0;
+
+/// Returns how far apart samples may be that pixels behind a lens see, as the tangent between them; `None` of a lens without a focal length.
+pub(super) fn finest_tangent(lens: &ResolvedLens, pitch_um: f64) -> Option<f64> {
+    let tangent = 1e-3 * pitch_um / (SAMPLES_PER_PIXEL * lens.reference.first_order().efl_mm.abs());
+    Some(tangent).filter(|tangent| *tangent > 0.0 && tangent.is_finite())
+}
+
 /// Reads or makes the scene.
 ///
 /// A full scene has the samples and bands of its source. Of a lower quality a computed scene is made with fewer of both,
@@ -79,12 +89,13 @@ pub struct ResolvedScene {
 pub(super) fn open(
     inputs: &SceneInputs,
     pupil_z_mm: Option<f64>,
+    finest: Option<f64>,
     paintings: Paintings<'_>,
     watch: &Watch<'_>,
 ) -> Result<ResolvedScene, PipelineError> {
     let GeometryInputs { source, wavelengths, quality, .. } = &inputs.geometry;
     let viewing = inputs.geometry.viewing();
-    let read = |scene, wanted| read(scene, wanted, viewing, paintings, watch);
+    let read = |scene, wanted| read(scene, wanted, finest, viewing, paintings, watch);
     let wanted = wavelengths.grid()?;
     let whole = inputs.choice();
     let whole = match pupil_z_mm {
@@ -133,6 +144,7 @@ pub(super) fn open(
 fn read(
     scene: SceneSpec,
     wanted: Option<WavelengthGrid>,
+    finest: Option<f64>,
     viewing: Viewing,
     paintings: Paintings<'_>,
     watch: &Watch<'_>,
@@ -141,10 +153,10 @@ fn read(
         SceneSource::StillLife { columns, rows } => {
             let (life, grid) = (scene.still_life(columns, rows), bands_or_own(wanted.as_ref())?);
             let painting = paintings.scene(&life, &grid, viewing, watch)?;
-            watch.run(move || scene.open_with(Some(&grid), |_, _| Ok(painting)))
+            watch.run(move || scene.open_with(Some(&grid), None, |_, _| Ok(painting)))
         }
         SceneSource::File(_) | SceneSource::Target { .. } | SceneSource::World(_) => {
-            watch.run(move || scene.open(wanted.as_ref()))
+            watch.run(move || scene.open_with(wanted.as_ref(), finest, |life, grid| Ok(life.scene(grid)?)))
         }
     }
 }

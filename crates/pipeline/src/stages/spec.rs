@@ -12,7 +12,7 @@ use dioptric_backward::MicroArray;
 use dioptric_forward::Film;
 use dioptric_optics::Lens;
 use dioptric_scene::{FillDepth, Scene};
-use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor};
+use dioptric_sensor::{ExposureControl, Noise, OpticalFilter, Processing, Sensor, WhiteBalance};
 use dioptric_spectrum::Illuminant;
 use serde::{Deserialize, Serialize};
 
@@ -50,7 +50,7 @@ impl FileStamp {
         std::iter::once(path).chain(beside.iter().map(PathBuf::as_path)).map(Self::of).collect()
     }
 
-    fn of(path: &Path) -> Self {
+    pub(crate) fn of(path: &Path) -> Self {
         let state = fs::metadata(path).ok().map(|data| (data.len(), data.modified().ok()));
         Self { path: path.to_owned(), state }
     }
@@ -84,6 +84,9 @@ pub(crate) struct GeometryInputs {
     pub(crate) hidden: Option<PathBuf>,
     pub(crate) wavelengths: WavelengthSpec,
     pub(crate) quality: Quality,
+    /// The lens, and the distance between the pixels behind it, µm, that see a picture that is large in all bands: it is read no finer than by far more
+    /// than they need.
+    pub(crate) seen_by: Option<(Box<LensInputs>, f64)>,
     /// Whether the view of the still life is but the summary of a picture that rays from the film make.
     pub(crate) is_summary: bool,
     /// The frame in which a preview has all that the film sees of the still life, where that matters and is known from the lens and the film.
@@ -209,6 +212,24 @@ fn check_stack(camera: &Camera, sensor: &Sensor) -> Result<(), PipelineError> {
     Err(PipelineError::Unsuitable { what: "pixel_stack", reason })
 }
 
+/// Checks that a patch that is made white lies in the frame.
+fn check_patch(camera: &Camera, sensor: &Sensor) -> Result<(), PipelineError> {
+    let WhiteBalance::Patch { left, top, width, height } = camera.processing.white else { return Ok(()) };
+    let (columns, rows) = match (camera.crop, camera.film) {
+        (Some(crop), _) => (crop.columns, crop.rows),
+        (None, FilmSpec::Sensor) => (sensor.columns, sensor.rows),
+        (None, FilmSpec::Pixels { columns, rows, .. }) => (columns, rows),
+        (None, FilmSpec::Scene) => return Ok(()),
+    };
+    let is_within = left.saturating_add(width) <= columns && top.saturating_add(height) <= rows && width * height > 0;
+    if is_within {
+        return Ok(());
+    }
+    let found = format!("a patch of {width} × {height} pixels from column {left}, row {top}");
+    let expected = format!("one within the frame of {columns} × {rows} pixels");
+    Err(PipelineError::Value { origin: camera.name.clone(), key: "white", found, expected })
+}
+
 impl LensInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts) -> Self {
         let lens_file = camera.lens.file().filter(|_| given.lens.is_none()).map_or_else(Vec::new, FileStamp::all_of);
@@ -279,6 +300,7 @@ impl SceneInputs {
                 hidden: scene.hidden.clone(),
                 wavelengths: camera.wavelengths.clone(),
                 quality,
+                seen_by: None,
                 is_summary: is_summary(&scene.source, camera.film),
                 frame: None,
                 files: match &scene.source {
@@ -301,19 +323,19 @@ impl SceneInputs {
 
 impl IrradianceInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts, sensor: &Sensor, quality: Quality) -> Self {
-        let scene = SceneInputs::of(camera, given, quality);
+        let mut scene = SceneInputs::of(camera, given, quality);
         let raster = match camera.film {
             FilmSpec::Sensor => Raster::Pixels(Film::centered(sensor.rows, sensor.columns, sensor.pixel_pitch_um)),
             FilmSpec::Pixels { columns, rows, pitch_um } => Raster::Pixels(Film::centered(rows, columns, pitch_um)),
             FilmSpec::Scene => Raster::Scene,
         };
-        let film = FilmInputs {
-            lens: LensInputs::of(camera, given),
-            geometry: scene.geometry.clone(),
-            focus: camera.focus,
-            raster,
-            crop: camera.crop,
-        };
+        let lens = LensInputs::of(camera, given);
+        if let Raster::Pixels(film) = &raster {
+            let is_large = given.scene.is_none() && is_large_picture(&camera.scene);
+            scene.geometry.seen_by = is_large.then(|| (Box::new(lens.clone()), film.pitch_um));
+        }
+        let film =
+            FilmInputs { lens, geometry: scene.geometry.clone(), focus: camera.focus, raster, crop: camera.crop };
         let bank = BankInputs { film, diffraction: camera.diffraction };
         let micro_array = camera.light_field.as_ref().and_then(LightFieldSpec::micro_array);
         let effort = match &camera.scene.source {
@@ -323,6 +345,24 @@ impl IrradianceInputs {
         let plan = PlanInputs { bank, blur: camera.blur, border: camera.border, photodiode: None };
         Self { plan, scene, micro_array, dual_pixel: camera.dual_pixel, effort }
     }
+}
+
+/// What a picture takes in all bands from which on it is read no finer than needed, bytes.
+const LARGE_BYTES: u64 = 256 << 20;
+
+/// Bands of a picture where none are asked for.
+const USUAL_BANDS: u64 = 31;
+
+/// Whether a scene is a picture of one depth and of a stated view that is large in all bands.
+fn is_large_picture(scene: &SceneSpec) -> bool {
+    let SceneSource::File(path) = &scene.source else { return false };
+    let is_flat = scene.flat.is_some() || (scene.depth_m.is_some() && scene.field_of_view_deg.is_some());
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    is_flat
+        && scene.hidden.is_none()
+        && ["png", "jpg", "jpeg", "tif", "tiff"].contains(&ending.as_str())
+        && dioptric_pictures::size_of(path)
+            .is_ok_and(|(columns, rows)| (columns as u64 * rows as u64).saturating_mul(4 * USUAL_BANDS) > LARGE_BYTES)
 }
 
 /// Whether a view of the still life is needed for the summary of the scene alone: rays from the film make the picture, which does not have
@@ -377,6 +417,7 @@ impl PictureInputs {
     pub(crate) fn of(camera: &Camera, given: &GivenParts, quality: Quality) -> Result<Self, PipelineError> {
         let sensor = given.sensor.as_deref().map_or_else(|| camera.sensor.open(), |sensor| Ok(sensor.clone()))?;
         check_stack(camera, &sensor)?;
+        check_patch(camera, &sensor)?;
         let irradiance = IrradianceInputs::of(camera, given, &sensor, quality);
         let frames = FrameInputs {
             electrons: ElectronInputs { irradiance, sensor, filters: FilterSpec::open_all(&camera.filters)? },

@@ -12,6 +12,7 @@ use crate::{
     png::png_bytes,
 };
 use dioptric_analysis::{LineChart, PsfRow, PsfSet};
+use dioptric_files::is_stream;
 use dioptric_pipeline::{PipelineError, display::LinearRgb, display::code, number};
 
 /// Side of a tile where there is room, pixels.
@@ -149,6 +150,9 @@ impl PsfFormat {
             path: path.to_owned(),
             reason: format!("{what} is no format of pictures here; expected .exr or .png"),
         };
+        if path.extension().is_none() && is_stream(path) {
+            return Ok(Self::Exr);
+        }
         let Some(extension) = path.extension() else { return Err(cannot("a name without an ending".to_owned())) };
         match extension.to_string_lossy().to_lowercase().as_str() {
             "exr" => Ok(Self::Exr),

@@ -10,7 +10,7 @@ use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::{beside::unreadable, picture::decode};
+use super::{picture::decode, unusable::unreadable};
 use crate::SceneError;
 
 /// Names of a text file with the wavelengths of numbered pictures, nm.
@@ -93,7 +93,7 @@ fn wavelengths_of(folder: &Path, pictures: &[(f64, PathBuf)]) -> Result<Vec<f64>
 
 /// Reads a gray picture, white being 1; of a colored one the green channel, which a gray one saved as RGB repeats.
 fn gray(path: &Path) -> Result<Array2<f32>, SceneError> {
-    let picture = decode(path)?;
+    let picture = decode(path, 4)?;
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
     let samples: Vec<f32> = match picture {
         DynamicImage::ImageLuma8(p) => p.into_raw().into_iter().map(|v| f32::from(v) / 255.0).collect(),

@@ -7,7 +7,7 @@ use std::{
 
 use serde::Deserialize;
 
-use super::beside::unreadable;
+use super::unusable::unreadable;
 use crate::{SceneError, View};
 
 /// The keys that are used; others are allowed and left alone.

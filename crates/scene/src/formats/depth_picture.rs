@@ -6,9 +6,9 @@ use dioptric_pictures::DynamicImage;
 use ndarray::Array2;
 
 use super::{
-    beside::unreadable,
     camera::{beside, depth_unit_beside},
     picture::decode,
+    unusable::unreadable,
 };
 use crate::SceneError;
 
@@ -29,7 +29,7 @@ pub(super) fn depth_beside(
     let is_other = |path: &Path| path != picture && path.is_file();
     let Some(path) = beside(picture, &endings).into_iter().find(|path| is_other(path)) else { return Ok(None) };
     let wrong = |reason: String| Err(unreadable(&path, reason));
-    let codes = match decode(&path)? {
+    let codes = match decode(&path, 4)? {
         DynamicImage::ImageLuma16(codes) => codes,
         other => return wrong(format!("its samples are {:?}, expected gray ones of 16 bits", other.color())),
     };

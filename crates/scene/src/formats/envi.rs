@@ -10,14 +10,12 @@ use dioptric_spectrum::{Quantity, SpectralImage, WavelengthGrid};
 use ndarray::Array2;
 
 use super::{
-    beside::unreadable,
     envi_header::{self, DataType, EnviHeader, Interleave},
     light_unit::LightUnit,
+    unusable::{check_memory, unreadable},
 };
 use crate::SceneError;
 
-/// No cube read here may need more memory than this.
-const LIMIT_BYTES: u64 = 16 << 30;
 /// A text header longer than this is none.
 const LIMIT_HEADER_BYTES: u64 = 64 << 20;
 /// Endings of the file of numbers beside `NAME.hdr`; none at all as well.
@@ -177,11 +175,11 @@ fn read_samples(path: &Path, header: &EnviHeader) -> Result<Vec<u8>, SceneError>
     let wanted = [header.columns, header.rows, header.bands]
         .iter()
         .fold(header.data_type.bytes() as u64, |product, &n| product.saturating_mul(n as u64));
-    if wanted > LIMIT_BYTES {
-        return Err(SceneError::TooLarge { file: path.to_owned(), bytes: wanted, limit: LIMIT_BYTES });
-    }
+    let samples = wanted / header.data_type.bytes() as u64;
     let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
     let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
+    // The bytes of the file, and the single floats that they become.
+    check_memory(path, wanted.saturating_add(samples.saturating_mul(4)), length)?;
     if length < header.offset.saturating_add(wanted) {
         let reason = format!(
             "it holds {length} bytes, but its header asks for {wanted} after an offset of {}: truncated?",

@@ -7,7 +7,7 @@ use exr::prelude::{Compression, FlatSamples, SampleType, f16};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use super::beside::unwritable;
+use super::unusable::unwritable;
 use crate::SceneError;
 
 /// The largest half float.

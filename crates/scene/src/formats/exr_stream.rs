@@ -6,6 +6,7 @@ use std::{
     path::Path,
 };
 
+use dioptric_files::Staged;
 use dioptric_spectrum::{DepthMap, Quantity, WavelengthGrid, sort_exr_attributes};
 use exr::{
     block::{
@@ -21,10 +22,9 @@ use ndarray::s;
 use rayon::prelude::*;
 
 use super::{
-    band_name,
-    beside::{PartialFile, unwritable},
-    exr_attributes,
+    band_name, exr_attributes,
     exr_samples::{ExrSamples, Stored, check_size},
+    unusable::{open_new, unwritable},
 };
 use crate::{SceneError, View};
 
@@ -71,9 +71,10 @@ impl SpectralHead<'_> {
         }
         let stored = self.samples.layout(self.quantity, self.largest);
         let channels = Channels::of(self);
-        let mut partial = PartialFile::create(path)?;
+        let staged = Staged::file(path)?;
+        let mut file = open_new(&staged, path)?;
         let mut failed = None;
-        let writer = BufWriter::with_capacity(1 << 20, partial.file());
+        let writer = BufWriter::with_capacity(1 << 20, &mut file);
         let written = write_chunks(writer, channels.headers(self, &stored), true, |meta, chunks| {
             let mut lines = Lines { head: self, channels: &channels, stored: &stored, rows_of, failed: &mut failed };
             lines.write(&meta.headers, chunks)
@@ -82,8 +83,9 @@ impl SpectralHead<'_> {
             return Err(unwritable(path, reason));
         }
         written.map_err(|error| unwritable(path, error))?;
-        sort_exr_attributes(partial.file()).map_err(|error| unwritable(path, error))?;
-        partial.finish()
+        sort_exr_attributes(&mut file).map_err(|error| unwritable(path, error))?;
+        drop(file);
+        Ok(staged.commit()?)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::{io::BufWriter, path::Path};
 
+use dioptric_files::Staged;
 use dioptric_spectrum::{DepthMap, SpectralImage, sort_exr_attributes};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder, SmallVec, Text,
@@ -10,12 +11,11 @@ use exr::prelude::{
 use ndarray::{Array2, s};
 
 use super::{
-    band_name,
-    beside::{PartialFile, unwritable},
-    exr_attributes,
+    band_name, exr_attributes,
     exr_samples::{ExrSamples, Stored, check_size},
     exr_stream::SpectralHead,
     spectral_exr::HIDDEN_LAYER,
+    unusable::{open_new, unwritable},
 };
 use crate::{HiddenLayer, Scene, SceneError, View};
 
@@ -154,8 +154,9 @@ fn channel(
 }
 
 fn write_layers(path: &Path, mut layers: Vec<Layer<AnyChannels<FlatSamples>>>) -> Result<(), SceneError> {
-    let mut partial = PartialFile::create(path)?;
-    let writer = BufWriter::with_capacity(1 << 20, partial.file());
+    let staged = Staged::file(path)?;
+    let mut file = open_new(&staged, path)?;
+    let writer = BufWriter::with_capacity(1 << 20, &mut file);
     let written = if layers.len() == 1 {
         Image::from_layer(layers.swap_remove(0)).write().to_buffered(writer)
     } else {
@@ -163,6 +164,7 @@ fn write_layers(path: &Path, mut layers: Vec<Layer<AnyChannels<FlatSamples>>>) -
         Image::from_layers(attributes, SmallVec::<[_; 2]>::from_vec(layers)).write().to_buffered(writer)
     };
     written.map_err(|error| unwritable(path, error))?;
-    sort_exr_attributes(partial.file()).map_err(|error| unwritable(path, error))?;
-    partial.finish()
+    sort_exr_attributes(&mut file).map_err(|error| unwritable(path, error))?;
+    drop(file);
+    Ok(staged.commit()?)
 }

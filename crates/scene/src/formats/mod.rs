@@ -2,7 +2,6 @@
 
 mod band_folder;
 mod band_name;
-mod beside;
 mod camera;
 mod depth_picture;
 mod envi;
@@ -22,9 +21,10 @@ mod picture;
 mod read_scene;
 mod spectral_exr;
 mod unmeasured;
+mod unusable;
 
-pub(crate) use beside::{PartialFile, unwritable};
 pub(crate) use picture::decode as decode_picture;
+pub(crate) use unusable::{check_made, unwritable};
 
 pub use band_folder::read_band_folder;
 pub use envi::{EnviCube, read_envi};

@@ -162,7 +162,7 @@ fn payloads_of_png_are_read_or_refused() {
     let (n, mut n_read) = (n_cases(), 0);
     for _ in 0..n {
         fs::write(&path, png(&mut rng)).unwrap();
-        match decode(&path) {
+        match decode(&path, 0) {
             Ok(_) => n_read += 1,
             Err(error) => assert_eq!(error.to_string().lines().count(), 1, "{error}"),
         }

@@ -2,16 +2,21 @@
 
 use std::path::Path;
 
-use dioptric_pictures::{DynamicImage, Limits};
-use dioptric_spectrum::{Display, Quantity, SpectralImage, WavelengthGrid, srgb_decode};
+use dioptric_pictures::{Curve, DynamicImage, ImageError, read_reduced, size_of};
+use dioptric_spectrum::{Display, Quantity, SpectralImage, WavelengthGrid, srgb_decode, srgb_encode};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::beside::unreadable;
+use super::unusable::{check_made, unreadable};
 use crate::SceneError;
 
 /// Pixels that are lifted to spectra at a time.
 const AT_ONCE: usize = 1 << 13;
+
+/// What a pixel takes as codes of 16 bits while it is lifted to bands, bytes.
+const CODES_BYTES: u64 = 6;
+/// What a pixel takes as planes of single floats beside its codes, bytes.
+const SAMPLES_BYTES: u64 = 15;
 
 /// Reads a PNG, JPEG or TIFF picture of 8 or 16 bits as the radiance of a display that shows it.
 ///
@@ -26,8 +31,36 @@ pub fn read_picture(
     grid: &WavelengthGrid,
     white_cd_m2: f64,
 ) -> Result<SpectralImage, SceneError> {
+    read_picture_of(path, picture_size_of(path)?, display, grid, white_cd_m2)
+}
+
+/// Returns the columns and rows of a picture.
+pub(super) fn picture_size_of(path: &Path) -> Result<(usize, usize), SceneError> {
+    size_of(path).map_err(|error| undecodable(path, &error))
+}
+
+/// As [`read_picture`], of means over blocks where it has more pixels than `size`, columns and rows.
+pub(super) fn read_picture_of(
+    path: &Path,
+    size: (usize, usize),
+    display: &Display,
+    grid: &WavelengthGrid,
+    white_cd_m2: f64,
+) -> Result<SpectralImage, SceneError> {
     check_white(white_cd_m2)?;
-    let picture = decode(path)?.into_rgb16();
+    let whole = picture_size_of(path)?;
+    let lifted_bytes = (4 * grid.len() as u64 + CODES_BYTES).saturating_mul((size.0 * size.1) as u64);
+    check_made(path, lifted_bytes)?;
+    let picture = if size == whole {
+        decode(path, CODES_BYTES)?
+    } else {
+        let curve = Curve {
+            to_light: &|code| srgb_decode(f64::from(code) / 65535.0),
+            to_code: &|light| (65535.0 * srgb_encode(light)).round() as u16,
+        };
+        read_reduced(path, size, &curve).map_err(|error| undecodable(path, &error))?
+    };
+    let picture = picture.into_rgb16();
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
     let linear: Vec<f64> = (0..=u16::MAX).map(|code| srgb_decode(f64::from(code) / 65535.0)).collect();
     let basis = display.srgb_basis(grid, white_cd_m2);
@@ -109,7 +142,7 @@ pub fn read_picture_samples(path: &Path) -> Result<PictureSamples, SceneError> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
         return Ok(PictureSamples { planes: super::spectral_exr::read_planes_exr(path)?, top: None });
     }
-    let picture = decode(path)?;
+    let picture = decode(path, SAMPLES_BYTES)?;
     let (columns, rows) = (picture.width() as usize, picture.height() as usize);
     let parted = |samples: Vec<f32>, names: &[&str]| {
         let n = names.len();
@@ -140,13 +173,13 @@ pub fn read_picture_samples(path: &Path) -> Result<PictureSamples, SceneError> {
     Ok(PictureSamples { planes, top })
 }
 
-/// Decodes a picture of any kind that is recognized by the file's content.
-pub(crate) fn decode(path: &Path) -> Result<DynamicImage, SceneError> {
-    let mut limits = Limits::default();
-    limits.max_alloc = Some(4 << 30);
-    limits.max_image_width = Some(1 << 17);
-    limits.max_image_height = Some(1 << 17);
-    dioptric_pictures::read(path, limits).map_err(|error| unreadable(path, error.to_string().replace('\n', " ")))
+/// Decodes a picture of any kind that is recognized by the file's content, of which `beside_bytes` are made for each pixel.
+pub(crate) fn decode(path: &Path, beside_bytes: u64) -> Result<DynamicImage, SceneError> {
+    dioptric_pictures::read_within(path, beside_bytes).map_err(|error| undecodable(path, &error))
+}
+
+fn undecodable(path: &Path, error: &ImageError) -> SceneError {
+    unreadable(path, error.to_string().replace('\n', " "))
 }
 
 #[cfg(test)]
@@ -191,7 +224,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("broken.jpg");
         std::fs::write(&path, b"\xff\xd8\xff\xe0 no more").unwrap();
-        let message = decode(&path).unwrap_err().to_string();
+        let message = decode(&path, 0).unwrap_err().to_string();
         assert!(message.contains("broken.jpg: cannot be read"), "{message}");
     }
 

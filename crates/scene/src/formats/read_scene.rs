@@ -6,14 +6,14 @@ use dioptric_spectrum::{DepthMap, Display, Illuminant, Quantity, SpectralImage, 
 use ndarray::Array2;
 
 use super::{
-    beside::unreadable,
     camera::view_beside,
     depth_picture::depth_beside,
     mat::read_iset_mat,
-    picture::lifted,
-    read_band_folder, read_envi, read_picture,
+    picture::{lifted, picture_size_of, read_picture_of},
+    read_band_folder, read_envi,
     spectral_exr::{RawFile, RawImage, axial, read_raw_exr},
     unmeasured::{self, FillDepth},
+    unusable::unreadable,
 };
 use crate::{HiddenLayer, Scene, SceneError, SceneLight, View, reflectance_under, resampled};
 
@@ -36,6 +36,9 @@ pub struct ReadOptions {
     pub depth_m: Option<f64>,
     /// The horizontal field of view, in place of the file's own camera data.
     pub horizontal_fov_deg: Option<f64>,
+    /// How far apart the samples of a picture of one depth may be, as the tangent of the angle between neighbours on the axis: a picture that is finer
+    /// is read as means of its pixels.
+    pub finest_tangent: Option<f64>,
     /// The depth of places where none was measured; where `None`, those of a depth picture get the farther of the depths beside
     /// them, and a file that has such places is refused.
     pub fill_depth: Option<FillDepth>,
@@ -53,6 +56,7 @@ impl Default for ReadOptions {
             white_level: None,
             depth_m: None,
             horizontal_fov_deg: None,
+            finest_tangent: None,
             fill_depth: None,
         }
     }
@@ -127,13 +131,35 @@ fn contents_of(path: &Path, options: &ReadOptions) -> Result<Contents, SceneErro
         }
         "png" | "jpg" | "jpeg" | "tif" | "tiff" => {
             let display = Display::apple_studio();
-            let image = read_picture(path, &display, &picture_bands(options)?, options.picture_white_cd_m2)?;
+            let (size, notes) = picture_size(path, options)?;
+            let image = read_picture_of(path, size, &display, &picture_bands(options)?, options.picture_white_cd_m2)?;
             let light = Some(white_of(&display, options.picture_white_cd_m2)?);
-            Ok(Contents { light, ..Contents::of(image) })
+            Ok(Contents { light, notes, ..Contents::of(image) })
         }
         _ if !path.exists() => Err(unreadable(path, "there is no such file")),
         _ => Err(SceneError::UnknownKind { file: path.to_owned() }),
     }
+}
+
+/// Returns the columns and rows as which a picture is read, and what is to be said of them: its own, or fewer where the options allow that and nothing
+/// lies beside it that counts its pixels.
+fn picture_size(path: &Path, options: &ReadOptions) -> Result<((usize, usize), Vec<String>), SceneError> {
+    let (columns, rows) = picture_size_of(path)?;
+    let (Some(finest), Some(fov_deg)) = (options.finest_tangent, options.horizontal_fov_deg) else {
+        return Ok(((columns, rows), vec![]));
+    };
+    let own = 2.0 * (0.5 * fov_deg.to_radians()).tan() / columns as f64;
+    // Whole numbers of pixels, of which the last block of a row may have one more.
+    let block = ((finest / own) as usize).min(columns).min(rows);
+    if block < 2 || depth_beside(path, rows, columns)?.is_some() {
+        return Ok(((columns, rows), vec![]));
+    }
+    let size = (columns / block, rows / block);
+    let note = format!(
+        "its {columns} × {rows} pixels are read as {} × {} means, finer than those of the film by far",
+        size.0, size.1
+    );
+    Ok((size, vec![note]))
 }
 
 fn of_exr(path: &Path, options: &ReadOptions) -> Result<Contents, SceneError> {

@@ -5,25 +5,20 @@ use std::{collections::HashMap, fs::File, io::BufReader, path::Path};
 use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
 use exr::{
     meta::MetaData,
-    prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, ReadChannels, ReadLayers, read},
+    prelude::{AnyChannel, AnyChannels, FlatSamples, Layer, ReadChannels, ReadLayers, SampleType, read},
 };
 use ndarray::Array2;
 
 use super::{
     band_name::{self, BandKind},
-    beside::unreadable,
     exr_attributes::{self, Attributes},
     light_unit::LightUnit,
+    unusable::{check_memory, unreadable},
 };
 use crate::{HiddenLayer, SceneError, View};
 
 /// The name of the layer that holds what lies behind the first surface.
 pub(crate) const HIDDEN_LAYER: &str = "hidden";
-
-/// No picture read here may need more memory than this.
-const LIMIT_BYTES: u64 = 16 << 30;
-/// The samples of a compressed file are at most this many times the file, or the header lies.
-const LIMIT_RATIO: u64 = 2000;
 
 /// What a spectral EXR file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -293,22 +288,21 @@ fn plane_of(
     }
 }
 
-/// Refuses a file whose header asks for more memory than it can fill.
+/// Refuses a file whose samples take more memory than they may: as they stand in the file, and as single floats where they are none.
 fn guard(path: &Path, file: File) -> Result<(), SceneError> {
     let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
     let meta =
         MetaData::read_from_buffered(BufReader::new(file), false).map_err(|error| unreadable(path, explain(&error)))?;
     let bytes = meta.headers.iter().fold(0_u64, |sum, header| {
         let samples = (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
-        let sample_bytes = header.channels.list.iter().map(|channel| channel.sample_type.bytes_per_sample() as u64);
+        let sample_bytes = header.channels.list.iter().map(|channel| match channel.sample_type {
+            SampleType::F32 => 4,
+            other => other.bytes_per_sample() as u64 + 4,
+        });
         // Even a file without channels has a table of its rows.
         sum.saturating_add(samples.saturating_mul(sample_bytes.sum::<u64>().max(1)))
     });
-    let limit = LIMIT_BYTES.min(length.saturating_mul(LIMIT_RATIO));
-    if bytes > limit {
-        return Err(SceneError::TooLarge { file: path.to_owned(), bytes, limit });
-    }
-    Ok(())
+    check_memory(path, bytes, length)
 }
 
 /// Returns what is wrong with an EXR file in a few words.

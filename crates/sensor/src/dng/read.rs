@@ -2,6 +2,8 @@
 
 use std::{fs, path::Path};
 
+use dioptric_files::memory;
+
 use serde::Serialize;
 
 use super::{
@@ -93,6 +95,8 @@ impl DngFile {
     /// When the file cannot be read, is no DNG, or has samples of another kind.
     pub fn read(path: &Path) -> Result<Self, SensorError> {
         let wrong = |reason: String| SensorError::Read { path: path.to_owned(), reason };
+        let length = fs::metadata(path).map_err(|e| wrong(e.to_string()))?.len();
+        memory::check(length, length).map_err(|e| wrong(e.to_string()))?;
         let bytes = fs::read(path).map_err(|e| wrong(e.to_string()))?;
         Self::from_bytes(&bytes).map_err(wrong)
     }

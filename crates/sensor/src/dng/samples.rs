@@ -1,5 +1,6 @@
 //! The samples of a raw frame in a DNG file: strips or tiles, plain or as lossless JPEG.
 
+use dioptric_files::memory;
 use rayon::prelude::*;
 
 use super::{
@@ -11,6 +12,9 @@ use super::{
     },
     tiff_reader::{Fields, TiffReader},
 };
+
+/// What a code takes while a frame is read, bytes: itself, its level and the sample of a plane.
+const CODE_BYTES: u64 = 8;
 
 /// Values of the tag `Compression`.
 const PLAIN: usize = 1;
@@ -99,6 +103,9 @@ impl<'a> Storage<'a> {
             let found = places.len().min(counts.len());
             return Err(format!("has {found} strips or tiles, expected {n_blocks}"));
         }
+        // Codes, and the levels and planes that are made of them.
+        let bytes = (rows as u64).saturating_mul(columns as u64).saturating_mul(CODE_BYTES * n_planes as u64);
+        memory::check(bytes, file.n_bytes() as u64).map_err(|error| error.to_string())?;
         let block = |(&place, &n): (&usize, &usize)| {
             file.slice(place, n).ok_or_else(|| format!("ends before the {n} bytes of samples at byte {place}"))
         };

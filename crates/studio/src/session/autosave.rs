@@ -5,7 +5,9 @@ use std::{fs, path::PathBuf};
 use dioptric_pipeline::Camera;
 use etcetera::{BaseStrategy, choose_base_strategy};
 
-use super::{copy::as_ron, write_beside};
+use dioptric_files::write;
+
+use super::copy::as_ron;
 
 /// The most files that are remembered.
 const MOST_RECENT: usize = 8;
@@ -35,7 +37,7 @@ impl Autosave {
 
     /// Keeps a camera. That it cannot be written is no reason to stop anybody's work: whether it was.
     pub fn keep(&self, camera: &Camera) -> bool {
-        fs::create_dir_all(&self.folder).is_ok() && write_beside(&self.camera_file(), as_ron(camera).as_bytes()).is_ok()
+        fs::create_dir_all(&self.folder).is_ok() && write(&self.camera_file(), as_ron(camera).as_bytes()).is_ok()
     }
 
     /// Returns the camera that was kept last, if it can be read.
@@ -59,7 +61,7 @@ impl Autosave {
         let text: String = recent.iter().map(|path| format!("{}\n", path.display())).collect();
         if fs::create_dir_all(&self.folder).is_ok() {
             // As above.
-            _ = write_beside(&self.folder.join("recent"), text.as_bytes());
+            _ = write(&self.folder.join("recent"), text.as_bytes());
         }
     }
 }

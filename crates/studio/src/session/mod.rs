@@ -8,7 +8,7 @@ mod presets;
 
 use std::path::{Path, PathBuf};
 
-use dioptric_pipeline::{Camera, PipelineError, write_file};
+use dioptric_pipeline::{Camera, PipelineError};
 
 pub use autosave::Autosave;
 pub use copy::{as_command, as_python, as_ron};
@@ -134,19 +134,10 @@ impl Session {
     /// When the file cannot be written.
     pub fn save(&mut self, path: &Path) -> Result<(), PipelineError> {
         let text = as_ron(&self.camera);
-        write_beside(path, text.as_bytes())?;
+        dioptric_files::write(path, text.as_bytes())?;
         (self.path, self.kept) = (Some(path.to_owned()), self.camera.clone());
         Ok(())
     }
-}
-
-/// Writes a file beside its place and puts it there, so that what was there stays whole until then.
-pub(crate) fn write_beside(path: &Path, bytes: &[u8]) -> Result<(), PipelineError> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.partial", std::process::id()));
-    let partial = path.with_file_name(name);
-    write_file(&partial, bytes)?;
-    std::fs::rename(&partial, path).map_err(|e| PipelineError::Write { path: path.to_owned(), reason: e.to_string() })
 }
 
 #[cfg(test)]

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use dioptric_analysis::{Run, RunTimes};
 use dioptric_optics::Lens;
-use dioptric_pipeline::{Camera, LensSpec, PipelineError, SceneSource, SceneSpec, SensorSpec, Staged, WorldSpec};
+use dioptric_pipeline::{
+    Camera, LensSpec, PipelineError, SceneSource, SceneSpec, SensorSpec, Staged, WorldSpec, write_file,
+};
 use dioptric_report::write_run;
 use egui::Ui;
 
@@ -15,7 +17,7 @@ use super::{
 };
 use crate::{
     engine::{Product, Rung},
-    session::{as_ron, write_beside},
+    session::as_ron,
 };
 
 /// Endings of files that hold a world.
@@ -141,7 +143,7 @@ impl Studio {
             Purpose::SavePicture => {
                 let written = self.whole_product().and_then(|product| {
                     let png = product.png().map_err(|error| error.to_string())?;
-                    write_beside(path, &png).map_err(|error| error.to_string())
+                    dioptric_files::write(path, &png).map_err(|error| error.to_string())
                 });
                 self.note = Some(written.map_or_else(|error| error, |()| format!("saved {}", path.display())));
             }
@@ -172,7 +174,7 @@ impl Studio {
         let mut camera = self.session.camera().clone();
         let written = camera.lens.open(&camera.lens_reading).and_then(|file| {
             let text = file.to_ron() + "\n";
-            write_beside(path, text.as_bytes())
+            Ok(dioptric_files::write(path, text.as_bytes())?)
         });
         match written {
             Ok(()) => {
@@ -229,7 +231,7 @@ fn export(product: &Product, folder: &Path, work_s: f64) -> Result<String, Pipel
     let run = Run { capture: &product.capture, model: &product.model, depth: Some(&product.depth) };
     let times = || RunTimes { stages_s: vec![("full picture".to_owned(), work_s)], imaging_s: Vec::new() };
     write_run(&run, staged.path(), &times)?;
-    write_beside(&staged.path().join("camera.ron"), as_ron(product.camera()).as_bytes())?;
+    write_file(&staged.path().join("camera.ron"), as_ron(product.camera()).as_bytes())?;
     let names = std::fs::read_dir(staged.path()).into_iter().flatten().flatten();
     let mut names: Vec<String> = names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
     names.sort();

@@ -7,11 +7,9 @@ use std::{fs::File, io::Read, path::Path};
 
 use flate2::read::ZlibDecoder;
 
-use super::super::beside::unreadable;
+use super::super::unusable::{check_memory, unreadable};
 use crate::SceneError;
 
-/// No variable read here may need more memory than this.
-const LIMIT_BYTES: u64 = 16 << 30;
 /// Deflate cannot shrink more than 1032 times; a header that says otherwise lies.
 const LIMIT_RATIO: u64 = 1040;
 /// Structures within each other.
@@ -68,11 +66,12 @@ impl MatFile {
     pub(super) fn read(path: &Path, wanted: &[&str]) -> Result<Self, SceneError> {
         let mut file = File::open(path).map_err(|error| unreadable(path, error))?;
         let length = file.metadata().map_err(|error| unreadable(path, error))?.len();
-        if length > LIMIT_BYTES {
-            return Err(SceneError::TooLarge { file: path.to_owned(), bytes: length, limit: LIMIT_BYTES });
-        }
+        check_memory(path, length, length)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(|error| unreadable(path, error))?;
+        // A broken file is named by what reads it. Single floats are made of the inflated numbers while those are there.
+        let inflated = wanted_bytes(&bytes, wanted).unwrap_or(0);
+        check_memory(path, length.saturating_add(inflated.saturating_mul(2)), length)?;
         Self::parse(&bytes, wanted).map_err(|reason| unreadable(path, reason))
     }
 
@@ -180,6 +179,20 @@ impl Numbers<'_> {
     }
 }
 
+/// Returns what the variables of a file whose names are wanted are inflated to, bytes.
+fn wanted_bytes(bytes: &[u8], wanted: &[&str]) -> Result<u64, String> {
+    let is_big_endian = bytes.get(126..128) == Some(b"MI");
+    let mut rest = Elements { bytes: bytes.get(128..).unwrap_or_default(), is_big_endian };
+    let mut sum = 0_u64;
+    while let Some((kind, content)) = rest.next()? {
+        if kind == COMPRESSED {
+            let peeked = peek(content, is_big_endian, wanted)?;
+            sum = sum.saturating_add(peeked.map_or(0, |peeked| peeked.n_bytes));
+        }
+    }
+    Ok(sum)
+}
+
 /// Returns the bytes of a stored number of a type, or `None` for types that are none.
 fn width_of(kind: u32) -> Option<usize> {
     Some(match kind {
@@ -233,12 +246,24 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// Inflates an element if it is a variable whose name is wanted.
-fn inflate(bytes: &[u8], is_big_endian: bool, wanted: &[&str]) -> Result<Option<(String, Vec<u8>)>, String> {
-    let broken = |_| "a compressed variable is broken".to_owned();
+/// The beginning of a compressed variable whose name is wanted.
+struct Peeked<'a> {
+    name: String,
+    /// The bytes that it says it is inflated to.
+    n_bytes: u64,
+    /// Its first bytes, those of its tag before them.
+    start: Vec<u8>,
+    /// What follows them.
+    stream: ZlibDecoder<&'a [u8]>,
+}
+
+const BROKEN: &str = "a compressed variable is broken";
+
+/// Inflates the beginning of an element if it is a variable whose name is wanted.
+fn peek<'a>(bytes: &'a [u8], is_big_endian: bool, wanted: &[&str]) -> Result<Option<Peeked<'a>>, String> {
     let mut stream = ZlibDecoder::new(bytes);
     let mut start = Vec::with_capacity(PEEK_BYTES);
-    stream.by_ref().take(PEEK_BYTES as u64).read_to_end(&mut start).map_err(broken)?;
+    stream.by_ref().take(PEEK_BYTES as u64).read_to_end(&mut start).map_err(|_| BROKEN.to_owned())?;
     let tag = Elements { bytes: &start, is_big_endian };
     let (Some(kind), Some(n_bytes)) = (tag.word(0), tag.word(4)) else { return Err(TRUNCATED.to_owned()) };
     if kind != MATRIX {
@@ -252,10 +277,18 @@ fn inflate(bytes: &[u8], is_big_endian: bool, wanted: &[&str]) -> Result<Option<
     if n_bytes > limit {
         return Err(format!("its variable '{name}' claims {n_bytes} bytes in {} compressed ones", bytes.len()));
     }
+    Ok(Some(Peeked { name, n_bytes, start, stream }))
+}
+
+/// Inflates an element if it is a variable whose name is wanted.
+fn inflate(bytes: &[u8], is_big_endian: bool, wanted: &[&str]) -> Result<Option<(String, Vec<u8>)>, String> {
+    let Some(Peeked { name, n_bytes, mut start, stream }) = peek(bytes, is_big_endian, wanted)? else {
+        return Ok(None);
+    };
     let mut content = start.split_off(8);
     content.truncate(n_bytes as usize);
     let missing = n_bytes - content.len() as u64;
-    stream.take(missing).read_to_end(&mut content).map_err(broken)?;
+    stream.take(missing).read_to_end(&mut content).map_err(|_| BROKEN.to_owned())?;
     if (content.len() as u64) < n_bytes {
         return Err(TRUNCATED.to_owned());
     }

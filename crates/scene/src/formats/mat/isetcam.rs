@@ -9,7 +9,7 @@ use dioptric_spectrum::{Illuminant, Observer, Quantity, SpectralImage, Spectrum,
 use ndarray::Array2;
 
 use super::{
-    super::{beside::unreadable, photons::joules_per_photon},
+    super::{photons::joules_per_photon, unusable::unreadable},
     container::{MatArray, MatFile},
 };
 use crate::{SceneError, SceneLight};

@@ -204,3 +204,28 @@ fn no_mutation_of_a_matlab_file_makes_the_reader_panic() {
     // Any change of a compressed file is seen; of a plain one many change a sample.
     assert!(n_refused > 2500, "{n_refused} of 4000 refused");
 }
+
+/// A file of 3 MB whose variable is inflated to 3.2 GB, refused before it is.
+#[test]
+fn a_variable_that_fills_the_memory_is_refused() {
+    let side = 20_000_u32;
+    let mut array = Vec::new();
+    let mut words = |words: &[u32]| words.iter().for_each(|word| array.extend(word.to_le_bytes()));
+    words(&[14, 8 * side * side + 56, 6, 8, 6, 0, 5, 8, side, side, 1, 7]);
+    array.extend(*b"photons\0");
+    array.extend([9_u32, 8 * side * side].iter().flat_map(|word| word.to_le_bytes()));
+    array.resize(600, 0);
+    let mut packed = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::Write::write_all(&mut packed, &array).unwrap();
+    let mut packed = packed.finish().unwrap();
+    packed.resize(3_200_000, 0);
+    let mut bytes = vec![b' '; 124];
+    bytes.extend([0, 1, b'I', b'M']);
+    bytes.extend([15_u32, packed.len() as u32].iter().flat_map(|word| word.to_le_bytes()));
+    bytes.extend(packed);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("large.mat");
+    fs::write(&path, bytes).unwrap();
+    let message = read_iset_mat(&path).unwrap_err().to_string();
+    assert!(message.contains("large.mat: it would take 6.0 GiB of memory"), "{message}");
+}

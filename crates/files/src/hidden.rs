@@ -1,16 +1,25 @@
-//! Hidden folders that their owners hold as long as they live, so that what killed processes left is distinguished from what others are making.
+//! Hidden folders that their owners hold as long as they live: what a killed process left is told from what another is making.
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
     io,
     path::{Path, PathBuf},
+    sync::{LazyLock, Mutex, MutexGuard, PoisonError},
 };
 
 /// The file in a hidden folder that its owner holds locked, so that nobody needs to know of processes.
 const LOCK: &str = "lock";
 
-/// So many names are tried: processes of many machines may have one number.
+/// Names that are tried: processes of many machines may have one number.
 const MOST_NAMES: usize = 10_000;
+
+/// The hidden folders of this process.
+static UNFINISHED: LazyLock<Mutex<Vec<PathBuf>>> = LazyLock::new(Mutex::default);
+
+/// Returns the hidden folders of this process: what is to be removed when it is interrupted. None is finished as long as the list is held.
+pub fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A folder for what is not finished, removed with all that is in it when it is dropped.
 ///
@@ -37,6 +46,7 @@ impl HiddenFolder {
             }
             // Another may take the folder for a leftover until it is locked.
             if let Lock::Held(lock) | Lock::Unknown(lock) = lock(&path) {
+                unfinished().push(path.clone());
                 return Ok(Self { path, lock: Some(lock) });
             }
         }
@@ -52,6 +62,7 @@ impl HiddenFolder {
     pub(crate) fn remove(&mut self) {
         if self.lock.take().is_some() {
             drop(fs::remove_dir_all(&self.path));
+            unfinished().retain(|path| *path != self.path);
         }
     }
 }

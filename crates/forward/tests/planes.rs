@@ -1,0 +1,55 @@
+//! A uniform scene has the irradiance of a uniform scene, whatever lens, stop, depth, film and diffraction.
+
+#![expect(clippy::unwrap_used, reason = "a helper of tests fails by panicking")]
+
+use dioptric_forward::{Film, Settings, Source, render};
+use dioptric_optics::Lens;
+use dioptric_psf::{Diffraction, ImageSettings, LensImage, LensImageModel};
+use dioptric_scene::View;
+use dioptric_spectrum::{DepthMap, Quantity, SpectralImage, WavelengthGrid};
+use glam::DVec2;
+use ndarray::Array2;
+
+/// Returns the largest relative difference of a picture of an even plane from the irradiance of an even scene.
+fn error(lens: &str, f_number: f64, plane_m: f64, diffraction: Diffraction, settings: &Settings) -> f64 {
+    let lens = Lens::built_in(lens).unwrap().with_f_number(f_number, 550.0).unwrap();
+    let film_distance_mm = lens.at(550.0).unwrap().film_distance_mm_for(2000.0).unwrap();
+    let (film, grid) = (Film::centered(37, 300, 60.0), WavelengthGrid::new(vec![530.0]).unwrap());
+    let model = LensImageModel::new(&lens, &[530.0], &ImageSettings::new(film_distance_mm, diffraction)).unwrap();
+    let size = (150, 300);
+    let radiance = SpectralImage::new(Quantity::Radiance, grid, vec![Array2::from_elem(size, 0.7)]).unwrap();
+    let depth = DepthMap::new(Array2::from_elem(size, plane_m as f32)).unwrap();
+    // Far wider than the film sees.
+    let view = View { focal_px: 60.0, center_x_px: 149.5, center_y_px: 74.5 };
+    let source = Source { radiance: &radiance, depth: &depth, view, occluded: None };
+    let mut picture = Array2::zeros((0, 0));
+    let mut sink = |_: usize, band: Array2<f32>| {
+        picture = band;
+        Ok(())
+    };
+    render(&source, &model, &film, settings, &|_| {}, &mut sink).unwrap();
+    let map = model.film_map(530.0, film.half_diagonal_mm());
+    let off = |((row, column), light): ((usize, usize), &f32)| {
+        let place_mm = 0.06 * DVec2::new(column as f64 - 149.5, 18.0 - row as f64);
+        (f64::from(*light) / (0.7 * map.irradiance_sr(place_mm)) - 1.0).abs()
+    };
+    picture.indexed_iter().map(off).fold(0.0, f64::max)
+}
+
+/// Kernels of a thin line within a wide blur, of a field that curves, of rims that cut the pupil from the axis on, and of waves.
+#[test]
+fn planes_are_exact() {
+    let coarse = Settings { tile_px: 256, max_edge_error: 1.0, widest_blur_px: 8.0, ..Settings::default() };
+    let hurb = Diffraction::Hurb { gamma: 1.0 };
+    for (lens, f_number, plane_m, diffraction, settings) in [
+        ("paper-2el", 2.8, 0.4, Diffraction::None, Settings::default()),
+        ("dgauss-50mm", 2.5, 0.5, hurb, Settings::default()),
+        ("dgauss-50mm", 2.03, 0.4, hurb, coarse),
+        ("canon-50mm", 1.85, 30.0, Diffraction::None, coarse),
+        ("tessar-50mm", 8.0, 2.0, Diffraction::Wave, Settings::default()),
+    ] {
+        let worst = error(lens, f_number, plane_m, diffraction, &settings);
+        // Single precision.
+        assert!(worst < 1e-5, "{lens} f/{f_number}, {plane_m} m, {diffraction:?}: {worst}");
+    }
+}

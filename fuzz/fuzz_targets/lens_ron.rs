@@ -1,0 +1,8 @@
+//! Reads our own lens files.
+
+#![no_main]
+
+use dioptric_optics::{LensFile, ReadOptions};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| dioptric_fuzz::read(data, "ron", |path| LensFile::read(path, &ReadOptions::default()).is_ok()));

@@ -1,0 +1,7 @@
+//! Reads ENVI headers.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| dioptric_fuzz::read(data, "hdr", |path| dioptric_scene::read_envi(path).is_ok()));

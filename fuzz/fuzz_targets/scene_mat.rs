@@ -1,0 +1,7 @@
+//! Reads MATLAB files.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| dioptric_fuzz::read(data, "mat", |path| dioptric_scene::read_iset_mat(path).is_ok()));
