@@ -57,7 +57,7 @@ impl Beyond {
             // It holds all that there is, whatever it is scaled by.
             return Self { share: 0.0, half_px: factor, steep: 0.0 };
         }
-        let (share, half_px) = (1.0 - kernel.sum(), 0.5 * (kernel.samples.nrows() as f64 - kernel.fade_px()));
+        let (share, half_px) = (1.0 - kernel.kept_share, 0.5 * (kernel.samples.nrows() as f64 - kernel.fade_px()));
         let bent = BENT * kernel.lambda_n_px / half_px;
         Self { share, half_px: factor * half_px, steep: (1.0 - bent / share).clamp(0.0, 1.0) }
     }

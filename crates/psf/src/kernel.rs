@@ -10,9 +10,10 @@ const FADE: f64 = 4.0;
 /// of the middle one, or of another where the light lies far to one side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kernel {
-    /// The share of the point's transmitted energy that falls on each pixel. The sum is what the window holds, 1 or
-    /// up to some hundredths less.
+    /// The share of the light of the window that falls on each pixel.
     pub samples: Array2<f32>,
+    /// The share of the point's light that the window holds, fading at its borders: 1, or with diffraction some hundredths less.
+    pub kept_share: f64,
     /// Side of a pixel, µm.
     pub pitch_um: f64,
     /// Where the middle pixel lies, pixels to the right of the one that the kernel is about and below it; mostly 0.
@@ -25,7 +26,7 @@ pub struct Kernel {
 impl Kernel {
     /// Returns the kernel of these samples, odd × odd, that is about the middle of the middle one.
     pub fn centered(samples: Array2<f32>, pitch_um: f64) -> Self {
-        Self { samples, pitch_um, middle_px: IVec2::ZERO, lambda_n_px: 0.0 }
+        Self { samples, kept_share: 1.0, pitch_um, middle_px: IVec2::ZERO, lambda_n_px: 0.0 }
     }
 
     /// Returns the kernel that blurs nothing.
@@ -87,7 +88,7 @@ impl Kernel {
         differences.sum::<f64>() / other.sum()
     }
 
-    /// Returns the kernel with the sum 1; one without energy becomes that which blurs nothing.
+    /// Returns the kernel with the sum 1, and what the sum was as the share that it keeps; one without energy becomes that which blurs nothing.
     #[must_use]
     pub fn normalized(mut self) -> Self {
         let sum = self.sum();
@@ -96,6 +97,7 @@ impl Kernel {
         }
         let scale = (1.0 / sum) as f32;
         self.samples.mapv_inplace(|e| e * scale);
+        self.kept_share *= sum.min(1.0);
         self
     }
 }
