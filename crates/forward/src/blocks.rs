@@ -21,7 +21,7 @@ pub(crate) const BLOCK: i64 = 8;
 const SLACK: f64 = 2.0;
 
 /// The most points of a sample at which the scene is looked up, each way.
-const MOST_POINTS: usize = 8;
+const MOST_POINTS: usize = 16;
 
 /// What a block of pixels looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

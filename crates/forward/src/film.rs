@@ -116,7 +116,7 @@ impl Default for Settings {
         Self {
             mode: BlurMode::Layered,
             tile_px: 128,
-            max_edge_error: 0.01,
+            max_edge_error: 0.007,
             layer_step_px: 2.0,
             chromatic_step_px: 0.25,
             widest_blur_px: 64.0,

@@ -337,14 +337,16 @@ impl Shared {
         if let Some((division, number)) = part {
             let shares = division.cell_shares(number, spots.mesh, frame.turn * bundle.pupil_sign);
             spots.energies.iter_mut().zip(shares).for_each(|(energy, share)| *energy *= share);
-            if spots.energies.iter().sum::<f64>() <= 0.0 {
+            let sum: f64 = spots.energies.iter().sum();
+            if sum <= 0.0 {
                 return Kernel::identity(pitch_um);
             }
+            spots.energies.iter_mut().for_each(|energy| *energy /= sum);
         }
         let layout = Layout::new(&spots, bending(&color.lens, self.settings.diffraction), pitch_um);
         let waves = |side, middle_px| self.waves(&color, &map, &query, side, middle_px);
         let (energies, _) = layout.drawn(self.settings.diffraction, waves);
-        layout.kernel(&energies, pitch_um).normalized()
+        layout.kernel(&energies, pitch_um)
     }
 
     /// Returns the wave-optical energies, in a window about a pixel, of the object point that the chief ray of a point of the film sees.
