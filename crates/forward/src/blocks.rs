@@ -173,9 +173,11 @@ fn block(
         for [row, column] in grid.iter().flatten().copied() {
             (low, high) = ([low[0].min(row), low[1].min(column)], [high[0].max(row), high[1].max(column)]);
         }
-        for (a, b, axis) in [(0, 6, 0), (2, 8, 0), (0, 2, 1), (6, 8, 1), (1, 7, 0), (3, 5, 1)] {
-            if let (Some(a), Some(b)) = (grid[a], grid[b]) {
-                let length = (b[0] - a[0]).hypot(b[1] - a[1]) / BLOCK as f64;
+        // The densest half of a side: near the rim of a fisheye's image it changes within a block.
+        for (i, (apart, axis)) in (0..9).flat_map(|i| [(i, (3, 0)), (i, (1, 1))]) {
+            let is_side = if axis == 0 { i + apart < 9 } else { i % 3 < 2 };
+            if let (true, Some(a), Some(b)) = (is_side, grid[i], grid.get(i + apart).copied().flatten()) {
+                let length = (b[0] - a[0]).hypot(b[1] - a[1]) / (0.5 * BLOCK as f64);
                 density[axis] = density[axis].max(length);
             }
         }

@@ -31,7 +31,7 @@ pub trait LensImage: Sync {
     /// light of the lens the directions go on smoothly.
     fn film_map(&self, wavelength_nm: f64, reach_mm: f64) -> Arc<FilmMap>;
 
-    /// Returns the point spread function that a film point sees, about that point; its sum is what its window holds of it, 1 without diffraction. A ray of the point that meets the
+    /// Returns the normalised point spread function that a film point sees: sum 1, about that point. A ray of the point that meets the
     /// scene where the chief ray of film point s does is at x − s. In darkness it is [`Kernel::identity`].
     fn kernel(&self, query: FilmQuery) -> Kernel;
 

@@ -346,7 +346,7 @@ impl Shared {
         let layout = Layout::new(&spots, bending(&color.lens, self.settings.diffraction), pitch_um);
         let waves = |side, middle_px| self.waves(&color, &map, &query, side, middle_px);
         let (energies, _) = layout.drawn(self.settings.diffraction, waves);
-        layout.kernel(&energies, pitch_um)
+        layout.kernel(&energies, pitch_um).normalized()
     }
 
     /// Returns the wave-optical energies, in a window about a pixel, of the object point that the chief ray of a point of the film sees.
