@@ -16,6 +16,7 @@ mod error;
 pub mod figures;
 mod frame_files;
 mod json;
+mod keys;
 mod light_field;
 mod numbers;
 mod paintings;
@@ -40,8 +41,8 @@ pub use dioptric_scene::{ExrSamples, FillDepth};
 pub use camera::{
     BankData, BankSpec, BlurSpec, Camera, CameraTurn, Crop, DualPixelSpec, Exposed, FilmSpec, FilterSpec, FlatSize,
     FocusSpec, FramesSpec, LensReadOptions, LensSpec, LightFieldSpec, Movements, PhotodiodeReads, Photodiodes,
-    PictureOptions, REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec, SensorOptions,
-    SensorSpec, StopSpec, TurnPath, VideoSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
+    REFERENCE_WAVELENGTH_NM, RenderEffort, RenderMethod, SceneSource, SceneSpec, SensorOptions, SensorSpec, StopSpec,
+    TurnPath, VideoSpec, WavelengthSpec, WorldSpec, nearest_to_reference_nm,
 };
 pub use capture_files::{irradiance_files, write_capture, write_frames_and_depth, write_irradiance, write_scene};
 pub use develop::DevelopedFile;
@@ -49,6 +50,7 @@ pub use dioptric_files::Staged;
 pub use error::{PipelineError, SceneLack};
 pub use frame_files::{FrameFile, Frames, LensFacts, Outputs, picture_png, write_frames};
 pub use json::{write_file, write_json};
+pub use keys::{Key, PICTURE, PictureOptions, light_word, white_word};
 pub use light_field::{DepthEstimate, DepthSearch, LightField, ViewGeometry};
 pub use numbers::{number, parse_bytes, parse_numbers, parse_pairs};
 pub use paintings::{PaintingFolder, program_build};
